@@ -1,0 +1,54 @@
+// Bytes in and out. Outputs are written beside their target and renamed, so that nothing half-written is ever left under the
+// output's name.
+#pragma once
+#include <cstddef>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace flexel {
+
+using Bytes = std::vector<std::byte>;
+
+// The whole of a file, or of stdin for "-". Throws InputError: missing, a directory, unreadable, empty (for stdin: "the program
+// before it in the pipe failed or wrote nothing").
+[[nodiscard]] Bytes read_all(const std::string& path);
+
+// Where a result goes. Data is appended in pieces; nothing appears under the target's name until commit().
+// "-" writes to stdout: refused (InputError) when stdout is a terminal and `binary`. All errors of the disk (full, read-only, no
+// such folder) are InputError naming the path and the reason; a closed pipe is ReaderClosedPipe. A writer destroyed without
+// commit() removes its temporary file.
+class OutputFile {
+ public:
+  explicit OutputFile(const std::string& path, bool binary = true);
+  ~OutputFile();
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
+  void write(const void* data, std::size_t size);
+  void write(const std::string& text) { write(text.data(), text.size()); }
+  void commit();
+
+ private:
+  void fail(const char* doing) const;
+  void flush_buffer();
+  std::string path_;
+  std::string temporary_;
+  int descriptor_ = -1;
+  bool committed_ = false;
+  std::vector<char> buffer_;
+};
+
+// Lower-case extension without the dot ("stl"), "" where there is none.
+[[nodiscard]] std::string extension(const std::string& path);
+// Last part of a path without its extension.
+[[nodiscard]] std::string stem(const std::string& path);
+
+// zlib (RFC 1950). decompress throws InputError when the data is damaged or its size is not `expected_size`.
+[[nodiscard]] Bytes compress(std::span<const std::byte> data, int level = 6);
+[[nodiscard]] Bytes decompress(std::span<const std::byte> data, std::size_t expected_size);
+
+// 64-bit FNV-1a of the bytes, for telling files apart (not for security).
+[[nodiscard]] std::uint64_t content_hash(std::span<const std::byte> data);
+
+}  // namespace flexel

@@ -1,0 +1,59 @@
+// Deformed body + its surface -> displacement of every vertex, and a report on how far it can be trusted.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "formats/body.h"
+#include "formats/progress.h"
+
+namespace flexel {
+
+enum class MapMethod { gram_schmidt, affine };
+
+// What holds a vertex. Later kinds are what is left when no four close elements span space.
+enum class FrameKind : std::uint8_t { full, plane, line, rigid };
+
+struct MapOptions {
+  MapMethod method = MapMethod::affine;
+};
+
+// One value per vertex of the surface.
+struct MapResult {
+  std::vector<Vec3> displacement;           // (vertices x 3) m
+  std::vector<FrameKind> kind;              // (vertices)
+  std::vector<std::uint8_t> flags;          // (vertices) bits of MapFlag
+  std::vector<std::array<std::uint32_t, 4>> quadruple;  // (vertices x 4) origin, primary axis, two secondary; repeated where
+                                                        // the frame is a plane, a line or rigid
+  std::vector<std::uint8_t> rings;          // (vertices) how many times the search along connections was widened
+  double rest_residual = 0;                 // m, largest distance of a vertex mapped at rest from itself
+  double distance_outside = 0;              // in spacings, largest distance of a vertex from its nearest element, less half a
+                                            // voxel's diagonal
+};
+
+enum MapFlag : std::uint8_t {
+  kVoronoiCellLeft = 1,   // advisory: another element is now nearer than the origin
+  kFrameInverted = 2,     // failure: the base changed its handedness
+  kFrameDegenerate = 4,   // failure: the deformed base spans no volume
+  kNotFinite = 8,         // failure
+};
+
+[[nodiscard]] MapResult map_surface(const Body& body, const MapOptions& options, Progress& progress);
+
+struct MapReport {
+  std::size_t vertices = 0;
+  std::array<std::size_t, 4> kinds{};       // by FrameKind
+  std::size_t widened = 0;                  // vertices whose search was widened
+  std::size_t voronoi_cell_left = 0, inverted = 0, degenerate = 0, not_finite = 0;
+  double rest_residual = 0;                 // m
+  double distance_outside = 0;              // in spacings
+  double largest_displacement = 0;          // m
+  double volume_before = 0, volume_after = 0;  // m^3 enclosed by the surface
+  [[nodiscard]] bool valid() const { return inverted == 0 && degenerate == 0 && not_finite == 0; }
+};
+
+[[nodiscard]] MapReport report(const Body& body, const MapResult& result);
+[[nodiscard]] std::string report_json(const MapReport& report, const MapOptions& options);
+
+}  // namespace flexel
