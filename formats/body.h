@@ -68,6 +68,12 @@ struct Body {
   std::vector<std::uint8_t> broken;                         // (m) 1: fractured, resists no more
   std::map<std::string, Column> cell_columns;
 
+  // Cells under the surface: polygon p bounds the matter of cells surface_cells[surface_cell_offsets[p] ...
+  // surface_cell_offsets[p + 1]), ascending. It tells apart two pieces of one voxel, and where the matter just under a polygon
+  // was too little for a cell it names the neighbouring cell that it hangs on. Empty for centre placement.
+  std::vector<std::uint32_t> surface_cell_offsets;  // (polygons + 1)
+  std::vector<std::uint32_t> surface_cells;         // indices of cells
+
   Surface surface;                // the part's own mesh, at rest; surface.parts[p] is parts[p]
   std::map<std::string, std::string> notes;  // free text that travels along: "history", "isa", ...
 

@@ -1,0 +1,22 @@
+// Sparse symmetric matrix of 3x3 blocks, compressed rows: the tangent stiffness over the elements.
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "formats/vec.h"
+
+namespace flexel {
+
+using Block = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
+struct BlockMatrix {
+  std::vector<std::uint64_t> row_offsets;  // (rows + 1)
+  std::vector<std::uint32_t> columns;      // (blocks) ascending within a row; the diagonal is always present
+  std::vector<Block> values;               // (blocks) N/m
+  [[nodiscard]] std::size_t rows() const { return row_offsets.empty() ? 0 : row_offsets.size() - 1; }
+};
+
+// y = A x, rows in parallel; the same bits for any thread count. x and y: (rows x 3).
+void multiply(const BlockMatrix& matrix, const std::vector<Vec3>& x, std::vector<Vec3>& y);
+
+}  // namespace flexel

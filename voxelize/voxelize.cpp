@@ -1,0 +1,1 @@
+#include "voxelize/voxelize.h"
