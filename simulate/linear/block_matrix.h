@@ -19,4 +19,10 @@ struct BlockMatrix {
 // y = A x, rows in parallel; the same bits for any thread count. x and y: (rows x 3).
 void multiply(const BlockMatrix& matrix, const std::vector<Vec3>& x, std::vector<Vec3>& y);
 
+// Position in `columns` of the diagonal block of `row`.
+[[nodiscard]] std::size_t diagonal_position(const BlockMatrix& matrix, std::size_t row);
+
+// Largest magnitude among the diagonal entries.
+[[nodiscard]] double largest_diagonal(const BlockMatrix& matrix);
+
 }  // namespace flexel

@@ -1,0 +1,84 @@
+// Preconditioned conjugate gradients (Hestenes and Stiefel 1952), the way a Newton method needs them (Dembo
+// and Steihaug 1983): a direction of negative curvature ends the iteration with the step reached so far. The
+// residual is updated by recursion; when it says "converged" the true residual is computed, and where
+// rounding made the two differ the iteration restarts from the true one.
+#include <cmath>
+#include <limits>
+
+#include "formats/parallel.h"
+#include "simulate/linear/solve.h"
+
+namespace flexel {
+namespace {
+
+using Vector = std::vector<Vec3>;
+
+double dot(const Vector& a, const Vector& b) {
+  return parallel_sum<double>(a.size(), [&](std::size_t i) { return a[i].dot(b[i]); });
+}
+
+// y += factor x
+void add(double factor, const Vector& x, Vector& y) {
+  parallel_for_each(x.size(), [&](std::size_t i) { y[i] += factor * x[i]; });
+}
+
+// direction = correction + beta direction
+void turn(const Vector& correction, double beta, Vector& direction) {
+  parallel_for_each(correction.size(),
+                    [&](std::size_t i) { direction[i] = correction[i] + beta * direction[i]; });
+}
+
+// residual = b - A x; returns its norm.
+double true_residual(const BlockMatrix& matrix, const Vector& b, const Vector& x, Vector& residual) {
+  multiply(matrix, x, residual);
+  parallel_for_each(b.size(), [&](std::size_t i) { residual[i] = b[i] - residual[i]; });
+  return std::sqrt(dot(residual, residual));
+}
+
+}  // namespace
+
+LinearResult conjugate_gradients(const BlockMatrix& matrix, const Vector& b, Vector& x,
+                                 const Preconditioner& preconditioner, double tolerance, int max_iterations,
+                                 const std::function<void(int, double)>& progress) {
+  LinearResult result;
+  x.assign(b.size(), Vec3::Zero());
+  const double scale = std::sqrt(dot(b, b));
+  if (scale == 0) {
+    result.converged = true;
+    return result;
+  }
+  Vector residual = b, correction, direction(b.size(), Vec3::Zero()), image;
+  double rz = 0, norm = scale, checked = std::numeric_limits<double>::infinity();
+  bool restart = true;
+  while (result.iterations < max_iterations && std::isfinite(norm)) {
+    preconditioner.apply(residual, correction);
+    const double rz_before = rz;
+    rz = dot(residual, correction);
+    if (!(rz > 0)) break;
+    turn(correction, restart ? 0 : rz / rz_before, direction);
+    restart = false;
+    multiply(matrix, direction, image);
+    const double curvature = dot(direction, image);
+    if (!(curvature > 0)) {
+      result.indefinite = curvature <= 0;
+      if (result.indefinite && result.iterations == 0) x = direction;
+      break;
+    }
+    add(rz / curvature, direction, x);
+    add(-rz / curvature, image, residual);
+    norm = std::sqrt(dot(residual, residual));
+    ++result.iterations;
+    if (progress) progress(result.iterations, norm / scale);
+    if (norm > tolerance * scale) continue;
+    norm = true_residual(matrix, b, x, residual);
+    result.converged = norm <= tolerance * scale;
+    // Another round only while it still helps: rounding sets a floor to the true residual.
+    if (result.converged || norm > .5 * checked) break;
+    checked = norm;
+    restart = true;
+  }
+  result.relative_residual = true_residual(matrix, b, x, residual) / scale;
+  return result;
+}
+
+}  // namespace flexel
