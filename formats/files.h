@@ -2,6 +2,7 @@
 // output's name.
 #pragma once
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <span>
 #include <string>
@@ -30,14 +31,19 @@ class OutputFile {
   void commit();
 
  private:
-  void fail(const char* doing) const;
+  void open_file();
   void flush_buffer();
-  std::string path_;
-  std::string temporary_;
+  void write_through(const char* data, std::size_t size);
+  std::string path_;       // as given
+  std::string target_;     // what it stands for once links are followed
+  std::string temporary_;  // "" for stdout, devices and FIFOs, and once committed
   int descriptor_ = -1;
   bool committed_ = false;
   std::vector<char> buffer_;
 };
+
+// Removes the temporary files of all writers. Only for a signal handler that ends the process: safe there, and nowhere needed else.
+void remove_temporary_outputs();
 
 // Lower-case extension without the dot ("stl"), "" where there is none.
 [[nodiscard]] std::string extension(const std::string& path);

@@ -1,0 +1,224 @@
+// The edge of a program. run_program() is the only place where exceptions become words and exit codes;
+// parse_arguments() turns what CLI11 throws into InputError; the signal handlers only set a flag (first
+// SIGINT) or remove the temporary outputs and end the process (second SIGINT, SIGTERM, SIGHUP).
+#include "formats/program.h"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <new>
+#include <numeric>
+
+#include "formats/files.h"
+
+namespace flexel {
+namespace {
+
+volatile std::sig_atomic_t interrupt_count = 0;
+
+void on_interrupt(int) {
+  interrupt_count = interrupt_count + 1;
+  if (interrupt_count > 1) {
+    remove_temporary_outputs();
+    _exit(kExitInterrupted);
+  }
+}
+
+void on_termination(int signal) {
+  remove_temporary_outputs();
+  std::signal(signal, SIG_DFL);
+  std::raise(signal);
+}
+
+// Without SA_RESTART, so that a read from a silent pipe ends when the user interrupts it. A signal that was
+// ignored when the program began (nohup, a background job) stays ignored.
+void handle(int signal, void (*handler)(int)) {
+  struct sigaction action = {};
+  if (sigaction(signal, nullptr, &action) == 0 && action.sa_handler == SIG_IGN) return;
+  action = {};
+  action.sa_handler = handler;
+  sigemptyset(&action.sa_mask);
+  sigaction(signal, &action, nullptr);
+}
+
+void install_handlers() {
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);  // a limit on the size of files then surfaces as EFBIG
+  handle(SIGINT, on_interrupt);
+  handle(SIGTERM, on_termination);
+  handle(SIGHUP, on_termination);
+}
+
+std::string one_line(const std::string& text) {
+  std::string line;
+  for (const char c : text) {
+    const bool space = c == '\n' || c == '\r' || c == '\t' || c == ' ';
+    if (space && (line.empty() || line.back() == ' ')) continue;
+    line += space ? ' ' : c;
+  }
+  while (!line.empty() && line.back() == ' ') line.pop_back();
+  return line;
+}
+
+int report(const std::string& name, const std::string& what, int code) {
+  const std::string line = name + ": error: " + one_line(what) + "\n";
+  std::fwrite(line.data(), 1, line.size(), stderr);
+  return code;
+}
+
+bool reader_of_stdout_is_gone() {
+  pollfd descriptor = {STDOUT_FILENO, POLLOUT, 0};
+  return poll(&descriptor, 1, 0) == 1 && (descriptor.revents & POLLERR) != 0;
+}
+
+// What was printed to stdout has arrived, or an exception says why not.
+void flush_stdout() {
+  errno = 0;
+  const bool failed = std::fflush(stdout) != 0 || std::ferror(stdout) != 0;
+  if (!failed) return;
+  const int reason = errno;
+  if (reason == EPIPE || reader_of_stdout_is_gone()) throw ReaderClosedPipe();
+  throw InputError("stdout", fmt::format("cannot write: {}",
+                                         reason != 0 ? std::strerror(reason) : "an earlier write failed"));
+}
+
+void print(const std::string& text) {
+  std::fwrite(text.data(), 1, text.size(), stdout);
+  flush_stdout();
+}
+
+void collect_options(const CLI::App& app, std::vector<std::string>& names) {
+  for (const CLI::Option* option : app.get_options()) {
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    for (const std::string& name : option->get_snames()) names.push_back("-" + name);
+  }
+  for (const CLI::App* subcommand : app.get_subcommands()) collect_options(*subcommand, names);
+}
+
+[[noreturn]] void refuse_extras(const CLI::App& app, const std::vector<std::string>& extras) {
+  const std::string word =
+      extras.empty() ? std::string() : extras.front().substr(0, extras.front().find('='));
+  if (word.size() < 2 || word.front() != '-')
+    throw InputError(fmt::format("unexpected argument \"{}\"; --help shows what is accepted", word));
+  std::vector<std::string> names;
+  collect_options(app, names);
+  const std::string hint = did_you_mean(word, names);
+  throw InputError(
+      fmt::format("unknown option \"{}\"{}", word, hint.empty() ? "; --help lists the options" : hint));
+}
+
+// Edit distance where swapping two neighbouring letters counts as one edit, as mistyping does (optimal string
+// alignment; Damerau, "A technique for computer detection and correction of spelling errors", 1964). Case
+// does not count.
+std::size_t edit_distance(const std::string& a, const std::string& b) {
+  const auto same = [](char x, char y) {
+    return std::tolower(static_cast<unsigned char>(x)) == std::tolower(static_cast<unsigned char>(y));
+  };
+  std::vector<std::size_t> before_last, last(b.size() + 1), row(b.size() + 1);
+  std::iota(last.begin(), last.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t change = last[j - 1] + (same(a[i - 1], b[j - 1]) ? 0 : 1);
+      row[j] = std::min({last[j] + 1, row[j - 1] + 1, change});
+      if (i > 1 && j > 1 && same(a[i - 1], b[j - 2]) && same(a[i - 2], b[j - 1]))
+        row[j] = std::min(row[j], before_last[j - 2] + 1);
+    }
+    before_last = last;
+    std::swap(last, row);
+  }
+  return last[b.size()];
+}
+
+}  // namespace
+
+int run_program(const std::string& name, const std::function<int()>& body) {
+  install_handlers();
+  try {
+    const int code = body();
+    flush_stdout();
+    return code;
+  } catch (const InputError& error) {
+    return report(name, error.where().empty() ? error.what() : error.where() + ": " + error.what(),
+                  kExitInput);
+  } catch (const DivergedError& error) {
+    return report(name, error.what(), kExitDiverged);
+  } catch (const InvalidMappingError& error) {
+    return report(name, error.what(), kExitInvalidMapping);
+  } catch (const Interrupted&) {
+    std::fprintf(stderr, "%s: interrupted\n", name.c_str());
+    return kExitInterrupted;
+  } catch (const ReaderClosedPipe&) {
+    return kExitReaderClosedPipe;
+  } catch (const std::bad_alloc&) {
+    return report(name, "not enough memory: a larger spacing (--size) or fewer elements (--count) needs less",
+                  kExitInput);
+  } catch (const std::exception& error) {
+    return report(name, fmt::format("internal error, please report it with the input: {}", error.what()),
+                  kExitOurFault);
+  } catch (...) {
+    return report(name, "internal error of an unknown kind, please report it with the input", kExitOurFault);
+  }
+}
+
+bool parse_arguments(CLI::App& app, int argc, char** argv) {
+  if (app.get_option_no_throw("--version") == nullptr) {
+    const std::string name = app.get_name().empty() ? stem(argv[0]) : app.get_name();
+    app.set_version_flag("--version", name + " " + version(), "Print the version and exit");
+  }
+  try {
+    app.parse(argc, argv);
+    return true;
+  } catch (const CLI::CallForHelp&) {
+    print(app.help());
+  } catch (const CLI::CallForAllHelp&) {
+    print(app.help("", CLI::AppFormatMode::All));
+  } catch (const CLI::CallForVersion& version_text) {
+    print(std::string(version_text.what()) + "\n");
+  } catch (const CLI::ExtrasError&) {
+    refuse_extras(app, app.remaining(true));
+  } catch (const CLI::ParseError& error) {
+    throw InputError(fmt::format("{}; --help shows what is accepted", one_line(error.what())));
+  }
+  return false;
+}
+
+bool interrupted() {
+  return interrupt_count > 0;
+}
+
+void throw_if_interrupted() {
+  if (interrupted()) throw Interrupted();
+}
+
+std::string nearest_word(const std::string& word, const std::vector<std::string>& candidates) {
+  const std::size_t limit = std::max<std::size_t>(2, word.size() / 3);
+  std::string nearest;
+  std::size_t smallest = limit + 1;
+  for (const std::string& candidate : candidates) {
+    const std::size_t distance = edit_distance(word, candidate);
+    // A word all of whose letters would have to change is no suggestion.
+    if (distance < smallest && distance < std::max(word.size(), candidate.size())) {
+      smallest = distance;
+      nearest = candidate;
+    }
+  }
+  return nearest;
+}
+
+std::string did_you_mean(const std::string& word, const std::vector<std::string>& candidates) {
+  const std::string nearest = nearest_word(word, candidates);
+  return nearest.empty() ? "" : fmt::format("; did you mean \"{}\"?", nearest);
+}
+
+const char* version() {
+  return FLEXEL_VERSION;
+}
+
+}  // namespace flexel
