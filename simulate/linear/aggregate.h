@@ -1,0 +1,54 @@
+// Groups of unknowns that one coarse element stands for.
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "formats/vec.h"
+#include "simulate/linear/block_matrix.h"
+
+namespace flexel {
+
+constexpr std::uint32_t kNoAggregate = 0xffffffffu;
+
+// Compressed rows of neighbours, both directions, without the node itself.
+struct Graph {
+  std::vector<std::uint64_t> offsets;     // (nodes + 1)
+  std::vector<std::uint32_t> neighbours;  // ascending within a row
+  [[nodiscard]] std::size_t nodes() const { return offsets.empty() ? 0 : offsets.size() - 1; }
+  [[nodiscard]] std::span<const std::uint32_t> of(std::size_t node) const {
+    return {neighbours.data() + offsets[node], static_cast<std::size_t>(offsets[node + 1] - offsets[node])};
+  }
+};
+
+// The unknowns of one level: elements, or aggregates of the level below.
+struct LevelNodes {
+  std::vector<Index3> index;        // (nodes x 3) integer coordinates: lattice index, or block of it
+  std::vector<std::uint32_t> part;  // (nodes)
+  std::vector<Vec3> position;       // (nodes x 3) m; of an aggregate the mean of its members
+  std::vector<double>
+      reach;  // (nodes) m, scale of the node's rotation: rotation unknown = reach x angle. 0 for elements
+};
+
+struct Aggregates {
+  std::vector<std::uint32_t> of;  // (fine nodes) aggregate, or kNoAggregate for a node coupled with nothing
+  LevelNodes nodes;               // the aggregates
+  Graph links;                    // which aggregates contain linked nodes (the quotient graph)
+  [[nodiscard]] std::size_t count() const { return nodes.index.size(); }
+};
+
+// Pairs of rows with |A_ij| > threshold sqrt(|A_ii| |A_jj|) (Frobenius norms).
+[[nodiscard]] Graph coupled_rows(const BlockMatrix& matrix, double threshold);
+
+struct AggregateOptions {
+  int width = 3;               // nodes along each edge of a block
+  std::size_t smallest = 4;    // smaller aggregates join the neighbour of the same part with most links
+  bool drop_isolated = false;  // nodes without any link get no aggregate
+};
+
+// Cuts each part into blocks of about `width`^3 nodes, evenly along each axis, and each block into the pieces
+// that `strong` connects. Aggregates are numbered along x, then y, then z, part by part.
+[[nodiscard]] Aggregates aggregate(const LevelNodes& nodes, const Graph& links, const Graph& strong,
+                                   const AggregateOptions& options);
+
+}  // namespace flexel

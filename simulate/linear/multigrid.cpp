@@ -1,0 +1,187 @@
+// Smoothed aggregation (Vanek, Mandel, Brezina 1996) with the six rigid motions of each aggregate. Level 0 is
+// the tangent over the elements; every coarser level stands for groups of the level below: blocks of 3x3x3
+// elements first, then of 2x2x2 aggregates, split where they are not connected. A V-cycle smooths with a
+// Chebyshev polynomial in block Jacobi before and after, and the coarsest level is factorised. What depends
+// on the pattern alone (aggregates, patterns of the transfers and of the coarse matrices) is made once;
+// refresh() fills in values.
+//
+// Precision: vectors and every sum are in double precision. The coarse matrices, which only smooth, and the
+// prolongators are kept in single precision: the Galerkin products are formed from the double precision
+// values before they are rounded.
+#include <array>
+#include <cassert>
+
+#include "simulate/linear/direct.h"
+#include "simulate/linear/level.h"
+#include "simulate/linear/solve.h"
+
+namespace flexel {
+namespace {
+
+constexpr std::size_t kDirectRows = 1000;   // elements; a matrix up to this size is factorised at once
+constexpr std::size_t kCoarsestRows = 500;  // aggregates of six unknowns
+constexpr double kStrongLink = .01;         // weaker couplings do not hold an aggregate together
+constexpr double kAnyLink = 1e-12;          // weaker couplings are rounding
+
+using FineView = MatrixView<Block>;
+using CoarseBlock = Eigen::Matrix<float, 6, 6>;
+
+FineView view(const BlockMatrix& matrix) {
+  return {matrix.row_offsets, matrix.columns, matrix.values};
+}
+
+template <class BlockType>
+MatrixView<BlockType> view(const Pattern& pattern, const std::vector<BlockType>& values) {
+  return {pattern.offsets, pattern.columns, values};
+}
+
+// What a level's prolongator is made from, besides the matrix.
+struct Grouping {
+  std::vector<std::uint32_t> aggregate_of;  // (rows)
+  std::vector<Vec3> offset;                 // (rows x 3) m, from the aggregate's centre
+  std::vector<float> fine_reach;            // (rows); empty for elements
+  std::vector<double> coarse_reach;         // (aggregates)
+};
+
+Grouping grouping(const LevelNodes& fine, const Aggregates& aggregates) {
+  Grouping result{
+      aggregates.of, std::vector<Vec3>(fine.index.size(), Vec3::Zero()), {}, aggregates.nodes.reach};
+  for (std::size_t i = 0; i < fine.index.size(); ++i) {
+    const std::uint32_t a = aggregates.of[i];
+    if (a != kNoAggregate) result.offset[i] = fine.position[i] - aggregates.nodes.position[a];
+  }
+  result.fine_reach.assign(fine.reach.begin(), fine.reach.end());
+  return result;
+}
+
+template <int R, class View>
+void refresh_transfer(const View& matrix, const Grouping& groups, Level<R>& level) {
+  prepare_smoother<R>(matrix, level);
+  const auto tentative = [&](std::size_t i) {
+    return rigid_motion<R>(groups.offset[i], R == 6 ? groups.fine_reach[i] : 0.,
+                           groups.coarse_reach[groups.aggregate_of[i]]);
+  };
+  const double weight = 4. / 3 / (1.05 * level.largest_eigenvalue);
+  smooth_prolongator<R>(matrix, level.inverse_diagonal, weight, groups.aggregate_of, tentative,
+                        level.transfer);
+}
+
+struct CoarseLevel {
+  Pattern pattern;
+  std::vector<CoarseBlock> values;
+  Grouping groups;
+  Level<6> level;
+};
+
+class Multigrid : public Preconditioner {
+ public:
+  Multigrid(const BlockMatrix& matrix, const NodeGeometry& geometry) : matrix_(matrix) {
+    assert(geometry.position.size() == matrix.rows() && geometry.index.size() == matrix.rows());
+    if (matrix.rows() > kDirectRows) build_structure(geometry);
+    refresh();
+  }
+
+  void apply(const std::vector<Vec3>& residual, std::vector<Vec3>& correction) const override {
+    correction.resize(matrix_.rows());
+    if (residual.empty()) return;
+    if (coarse_.empty()) {
+      correction = residual;
+      coarsest_.solve(correction.front().data());
+      return;
+    }
+    const double* b = residual.front().data();
+    double* x = correction.front().data();
+    double* work = fine_.next.data();
+    const FineView fine = view(matrix_);
+    smooth_from_zero<3>(fine, fine_, b, x, work);
+    restrict_residual<3>(fine, fine_, b, x, work, coarse_.front().level.rhs.data());
+    cycle(0);
+    prolong<3>(fine_, coarse_.front().level.x.data(), x);
+    smooth<3>(fine, fine_, b, x, work);
+  }
+
+  void refresh() override {
+    if (matrix_.rows() == 0) return;
+    if (coarse_.empty()) return coarsest_.factorise(lower_half(view(matrix_)));
+    refresh_transfer<3>(view(matrix_), groups_, fine_);
+    std::vector<Square<6>> values = galerkin<3>(view(matrix_), fine_.transfer, coarse_.front().pattern);
+    for (std::size_t l = 0; l < coarse_.size(); ++l) {
+      CoarseLevel& coarse = coarse_[l];
+      const auto exact = view(coarse.pattern, values);
+      if (l + 1 == coarse_.size()) {
+        coarsest_.factorise(lower_half(exact));
+        break;
+      }
+      refresh_transfer<6>(exact, coarse.groups, coarse.level);
+      std::vector<Square<6>> next = galerkin<6>(exact, coarse.level.transfer, coarse_[l + 1].pattern);
+      coarse.values.resize(values.size());
+      for (std::size_t q = 0; q < values.size(); ++q) coarse.values[q] = values[q].cast<float>();
+      values = std::move(next);
+    }
+  }
+
+ private:
+  // Aggregates and patterns of every level.
+  void build_structure(const NodeGeometry& geometry) {
+    LevelNodes nodes{geometry.index, geometry.part, geometry.position,
+                     std::vector<double>(matrix_.rows(), 0)};
+    const FineView fine = view(matrix_);
+    Aggregates aggregates =
+        aggregate(nodes, coupled_rows(matrix_, kAnyLink), coupled_rows(matrix_, kStrongLink),
+                  {.width = 3, .smallest = 4, .drop_isolated = true});
+    groups_ = grouping(nodes, aggregates);
+    fine_.transfer = transfer_pattern<3>(fine, aggregates.of, aggregates.count());
+    fine_.next.resize(3 * matrix_.rows());
+    coarse_.emplace_back().pattern = coarse_pattern<3>(fine, fine_.transfer);
+    while (aggregates.count() > kCoarsestRows) {
+      nodes = std::move(aggregates.nodes);
+      const Graph links = std::move(aggregates.links);
+      aggregates = aggregate(nodes, links, links, {.width = 2, .smallest = 2, .drop_isolated = false});
+      if (aggregates.count() > nodes.index.size() * 4 / 5) break;  // nothing left to group: many small parts
+      CoarseLevel& last = coarse_.back();
+      last.groups = grouping(nodes, aggregates);
+      const auto structure = view(last.pattern, last.values);
+      last.level.transfer = transfer_pattern<6>(structure, aggregates.of, aggregates.count());
+      Pattern next = coarse_pattern<6>(structure, last.level.transfer);
+      coarse_.emplace_back().pattern = std::move(next);
+    }
+    for (CoarseLevel& coarse : coarse_) {
+      const std::size_t size = 6 * (coarse.pattern.offsets.size() - 1);
+      coarse.level.rhs.resize(size);
+      coarse.level.x.resize(size);
+      coarse.level.next.resize(size);
+    }
+  }
+
+  // Solves level l approximately: from its rhs to its x.
+  void cycle(std::size_t l) const {
+    const CoarseLevel& coarse = coarse_[l];
+    const Level<6>& level = coarse.level;
+    if (l + 1 == coarse_.size()) {
+      level.x = level.rhs;
+      return coarsest_.solve(level.x.data());
+    }
+    const auto matrix = view(coarse.pattern, coarse.values);
+    smooth_from_zero<6>(matrix, level, level.rhs.data(), level.x.data(), level.next.data());
+    restrict_residual<6>(matrix, level, level.rhs.data(), level.x.data(), level.next.data(),
+                         coarse_[l + 1].level.rhs.data());
+    cycle(l + 1);
+    prolong<6>(level, coarse_[l + 1].level.x.data(), level.x.data());
+    smooth<6>(matrix, level, level.rhs.data(), level.x.data(), level.next.data());
+  }
+
+  const BlockMatrix& matrix_;
+  Grouping groups_;
+  Level<3> fine_;
+  std::vector<CoarseLevel> coarse_;  // empty where the matrix itself is factorised
+  DirectSolver coarsest_;
+};
+
+}  // namespace
+
+std::unique_ptr<Preconditioner> aggregation_multigrid(const BlockMatrix& matrix,
+                                                      const NodeGeometry& geometry) {
+  return std::make_unique<Multigrid>(matrix, geometry);
+}
+
+}  // namespace flexel

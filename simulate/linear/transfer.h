@@ -1,0 +1,265 @@
+// Transfer between a level and the next coarser one, and the coarse matrix that follows from it. R is the
+// number of unknowns of a fine node: 3 for an element, 6 for an aggregate (translation, reach x rotation).
+//
+// Prolongator: T moves every member of an aggregate as one rigid body; P = T - w D^-1 A T smooths it once
+// (Vanek, Mandel, Brezina 1996), D being the block diagonal. P is stored in single precision; the coarse
+// matrix P^T A P is formed in double precision with the very P that is stored, so that it is symmetric and as
+// positive as A.
+#pragma once
+#include <algorithm>
+#include <cassert>
+#include <numeric>
+#include <span>
+#include <type_traits>
+#include <vector>
+
+#include "formats/parallel.h"
+#include "simulate/linear/aggregate.h"
+
+namespace flexel {
+
+template <int R>
+using Square = Eigen::Matrix<double, R, R, R == 3 ? Eigen::RowMajor : Eigen::ColMajor>;
+
+// Compressed rows without values.
+struct Pattern {
+  std::vector<std::uint64_t> offsets;  // (rows + 1)
+  std::vector<std::uint32_t> columns;  // ascending within a row
+};
+
+// A square matrix of RxR blocks that lives elsewhere.
+template <class BlockType>
+struct MatrixView {
+  std::span<const std::uint64_t> offsets;
+  std::span<const std::uint32_t> columns;
+  std::span<const BlockType> values;
+  [[nodiscard]] std::size_t rows() const { return offsets.empty() ? 0 : offsets.size() - 1; }
+};
+
+template <int R>
+struct Transfer {
+  Pattern pattern;                                 // fine rows, columns are aggregates
+  std::vector<Eigen::Matrix<float, 6, R>> values;  // transposed blocks of P
+  std::size_t coarse_rows = 0;
+  // The same entries sorted by aggregate, for the restriction.
+  std::vector<std::uint64_t> transposed_offsets;    // (coarse rows + 1)
+  std::vector<std::uint32_t> transposed_rows;       // fine row
+  std::vector<std::uint64_t> transposed_positions;  // in `values`
+};
+
+// Rigid motion of an aggregate at one of its members, transposed (6 x R). For elements x - c is their
+// distance from the centre; for aggregates the rotation unknown is carried over too, scaled by the two
+// reaches.
+template <int R>
+[[nodiscard]] Eigen::Matrix<double, 6, R> rigid_motion(const Vec3& offset, double fine_reach,
+                                                       double coarse_reach) {
+  // u = t + (w / reach) x offset = t - (offset / reach) x w; rows of the result are the coarse unknowns.
+  Mat3 cross;
+  cross << 0, -offset[2], offset[1], offset[2], 0, -offset[0], -offset[1], offset[0], 0;
+  Eigen::Matrix<double, 6, R> transposed = Eigen::Matrix<double, 6, R>::Zero();
+  transposed.template topLeftCorner<3, 3>().setIdentity();
+  transposed.template bottomLeftCorner<3, 3>() = cross / coarse_reach;  // (-cross)^T = cross
+  if constexpr (R == 6)
+    transposed.template bottomRightCorner<3, 3>() = Mat3::Identity() * (fine_reach / coarse_reach);
+  return transposed;
+}
+
+// Collects rows of a pattern in parallel: row(i, out) appends the columns of row i, in any order and
+// repeated.
+template <class Row>
+[[nodiscard]] Pattern collect_pattern(std::size_t rows, std::size_t grain, const Row& row) {
+  const std::size_t chunks = (rows + grain - 1) / grain;
+  std::vector<std::vector<std::uint32_t>> columns(chunks);
+  Pattern pattern;
+  pattern.offsets.assign(rows + 1, 0);
+  parallel_chunks(rows, grain, [&](std::size_t begin, std::size_t end) {
+    std::vector<std::uint32_t>& chunk = columns[begin / grain];
+    std::vector<std::uint32_t> list;
+    for (std::size_t i = begin; i < end; ++i) {
+      list.clear();
+      row(i, list);
+      std::sort(list.begin(), list.end());
+      list.erase(std::unique(list.begin(), list.end()), list.end());
+      pattern.offsets[i + 1] = list.size();
+      chunk.insert(chunk.end(), list.begin(), list.end());
+    }
+  });
+  std::partial_sum(pattern.offsets.begin(), pattern.offsets.end(), pattern.offsets.begin());
+  pattern.columns.reserve(pattern.offsets.back());
+  for (const auto& chunk : columns) pattern.columns.insert(pattern.columns.end(), chunk.begin(), chunk.end());
+  return pattern;
+}
+
+// Position in `columns` of `column`, which the row has.
+[[nodiscard]] inline std::size_t position_in_row(const Pattern& pattern, std::size_t row,
+                                                 std::uint32_t column) {
+  const auto begin = pattern.columns.begin() + static_cast<std::ptrdiff_t>(pattern.offsets[row]);
+  const auto end = pattern.columns.begin() + static_cast<std::ptrdiff_t>(pattern.offsets[row + 1]);
+  const auto found = std::lower_bound(begin, end, column);
+  assert(found != end && *found == column);
+  return static_cast<std::size_t>(found - pattern.columns.begin());
+}
+
+// Where P has blocks: a fine row reaches the aggregates of the nodes it is coupled with. Rows without an
+// aggregate stay empty.
+template <int R, class View>
+[[nodiscard]] Transfer<R> transfer_pattern(const View& matrix, const std::vector<std::uint32_t>& aggregate_of,
+                                           std::size_t coarse_rows) {
+  Transfer<R> transfer;
+  transfer.coarse_rows = coarse_rows;
+  transfer.pattern =
+      collect_pattern(matrix.rows(), 1024, [&](std::size_t i, std::vector<std::uint32_t>& out) {
+        if (aggregate_of[i] == kNoAggregate) return;
+        for (std::uint64_t q = matrix.offsets[i]; q < matrix.offsets[i + 1]; ++q) {
+          const std::uint32_t a = aggregate_of[matrix.columns[q]];
+          if (a != kNoAggregate && (out.empty() || out.back() != a)) out.push_back(a);
+        }
+      });
+  const Pattern& pattern = transfer.pattern;
+  transfer.transposed_offsets.assign(coarse_rows + 1, 0);
+  for (const std::uint32_t a : pattern.columns) ++transfer.transposed_offsets[a + 1];
+  std::partial_sum(transfer.transposed_offsets.begin(), transfer.transposed_offsets.end(),
+                   transfer.transposed_offsets.begin());
+  transfer.transposed_rows.resize(pattern.columns.size());
+  transfer.transposed_positions.resize(pattern.columns.size());
+  std::vector<std::uint64_t> next(transfer.transposed_offsets.begin(), transfer.transposed_offsets.end() - 1);
+  for (std::size_t i = 0; i < matrix.rows(); ++i) {
+    for (std::uint64_t q = pattern.offsets[i]; q < pattern.offsets[i + 1]; ++q) {
+      const std::uint64_t at = next[pattern.columns[q]]++;
+      transfer.transposed_rows[at] = static_cast<std::uint32_t>(i);
+      transfer.transposed_positions[at] = q;
+    }
+  }
+  return transfer;
+}
+
+// Values of P = T - weight D^-1 A T. `tentative(i)` is the transposed (6 x R) block of T in row i;
+// `inverse_diagonal` holds D^-1.
+template <int R, class View, class Inverse, class Tentative>
+void smooth_prolongator(const View& matrix, const std::vector<Inverse>& inverse_diagonal, double weight,
+                        const std::vector<std::uint32_t>& aggregate_of, const Tentative& tentative,
+                        Transfer<R>& transfer) {
+  using Transposed = Eigen::Matrix<double, 6, R>;
+  transfer.values.resize(transfer.pattern.columns.size());
+  parallel_chunks(matrix.rows(), 256, [&](std::size_t begin, std::size_t end) {
+    std::vector<Transposed> sums;
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::uint64_t first = transfer.pattern.offsets[i];
+      if (transfer.pattern.offsets[i + 1] == first) continue;
+      sums.assign(transfer.pattern.offsets[i + 1] - first, Transposed::Zero());
+      for (std::uint64_t q = matrix.offsets[i]; q < matrix.offsets[i + 1]; ++q) {
+        const std::uint32_t j = matrix.columns[q];
+        if (aggregate_of[j] == kNoAggregate) continue;
+        sums[position_in_row(transfer.pattern, i, aggregate_of[j]) - first].noalias() +=
+            tentative(j) * matrix.values[q].transpose();
+      }
+      const Eigen::Matrix<double, R, R> inverse = inverse_diagonal[i].template cast<double>();
+      for (std::size_t s = 0; s < sums.size(); ++s) {
+        Transposed block = -weight * (sums[s] * inverse);  // D^-1 is symmetric
+        if (transfer.pattern.columns[first + s] == aggregate_of[i]) block += tentative(i);
+        transfer.values[first + s] = block.template cast<float>();
+      }
+    }
+  });
+}
+
+// Where P^T A P has blocks.
+template <int R, class View>
+[[nodiscard]] Pattern coarse_pattern(const View& matrix, const Transfer<R>& transfer) {
+  const Pattern& p = transfer.pattern;
+  return collect_pattern(transfer.coarse_rows, 64, [&](std::size_t coarse, std::vector<std::uint32_t>& out) {
+    // Nodes coupled with the support of P's column, each once; then the aggregates that they reach.
+    std::vector<std::uint32_t> nodes;
+    for (std::uint64_t t = transfer.transposed_offsets[coarse]; t < transfer.transposed_offsets[coarse + 1];
+         ++t) {
+      const std::uint32_t i = transfer.transposed_rows[t];
+      nodes.insert(nodes.end(), matrix.columns.begin() + static_cast<std::ptrdiff_t>(matrix.offsets[i]),
+                   matrix.columns.begin() + static_cast<std::ptrdiff_t>(matrix.offsets[i + 1]));
+    }
+    std::sort(nodes.begin(), nodes.end());
+    nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+    for (const std::uint32_t j : nodes) {
+      out.insert(out.end(), p.columns.begin() + static_cast<std::ptrdiff_t>(p.offsets[j]),
+                 p.columns.begin() + static_cast<std::ptrdiff_t>(p.offsets[j + 1]));
+    }
+  });
+}
+
+// Rows [begin, end) of A P, transposed blocks.
+template <int R>
+struct ProductRows {
+  std::size_t begin = 0;
+  std::vector<std::vector<std::pair<std::uint32_t, Eigen::Matrix<double, 6, R>>>> rows;
+};
+
+template <int R, class View>
+void product_rows(const View& matrix, const Transfer<R>& transfer, std::size_t begin, std::size_t end,
+                  ProductRows<R>& product) {
+  const Pattern& p = transfer.pattern;
+  product.begin = begin;
+  product.rows.resize(std::max(product.rows.size(), end - begin));
+  parallel_chunks(end - begin, 512, [&](std::size_t chunk_begin, std::size_t chunk_end) {
+    std::vector<std::uint32_t> slot(transfer.coarse_rows, kNoAggregate);
+    for (std::size_t r = chunk_begin; r < chunk_end; ++r) {
+      auto& row = product.rows[r];
+      row.clear();
+      // A row that no aggregate reaches takes no part in P^T (A P).
+      if (p.offsets[begin + r] == p.offsets[begin + r + 1]) continue;
+      for (std::uint64_t q = matrix.offsets[begin + r]; q < matrix.offsets[begin + r + 1]; ++q) {
+        const Eigen::Matrix<double, R, R> transposed = matrix.values[q].transpose();
+        const std::uint32_t k = matrix.columns[q];
+        for (std::uint64_t s = p.offsets[k]; s < p.offsets[k + 1]; ++s) {
+          std::uint32_t& at = slot[p.columns[s]];
+          if (at == kNoAggregate) {
+            at = static_cast<std::uint32_t>(row.size());
+            row.emplace_back(p.columns[s], Eigen::Matrix<double, 6, R>::Zero());
+          }
+          row[at].second.noalias() += transfer.values[s].template cast<double>() * transposed;
+        }
+      }
+      for (const auto& entry : row) slot[entry.first] = kNoAggregate;
+    }
+  });
+}
+
+// Values of the coarse matrix P^T A P over `pattern`. Fine rows are taken in batches so that A P is never
+// stored whole; each coarse row adds its fine rows in ascending order, so the bits do not depend on the
+// threads. The lower half mirrors the upper.
+template <int R, class View>
+[[nodiscard]] std::vector<Square<6>> galerkin(const View& matrix, const Transfer<R>& transfer,
+                                              const Pattern& pattern) {
+  constexpr std::size_t kBatch = 8192;
+  std::vector<Square<6>> values(pattern.columns.size(), Square<6>::Zero());
+  std::vector<std::uint64_t> next(transfer.transposed_offsets.begin(), transfer.transposed_offsets.end() - 1);
+  ProductRows<R> product;
+  for (std::size_t begin = 0; begin < matrix.rows(); begin += kBatch) {
+    const std::size_t end = std::min(matrix.rows(), begin + kBatch);
+    product_rows(matrix, transfer, begin, end, product);
+    parallel_chunks(transfer.coarse_rows, 64, [&](std::size_t chunk_begin, std::size_t chunk_end) {
+      std::vector<std::uint64_t> slot(transfer.coarse_rows, 0);
+      for (std::size_t a = chunk_begin; a < chunk_end; ++a) {
+        const std::uint64_t last = transfer.transposed_offsets[a + 1];
+        if (next[a] == last || transfer.transposed_rows[next[a]] >= end) continue;
+        for (std::uint64_t q = pattern.offsets[a]; q < pattern.offsets[a + 1]; ++q)
+          slot[pattern.columns[q]] = q;
+        for (; next[a] < last && transfer.transposed_rows[next[a]] < end; ++next[a]) {
+          const Eigen::Matrix<double, 6, R> p =
+              transfer.values[transfer.transposed_positions[next[a]]].template cast<double>();
+          for (const auto& [column, block] : product.rows[transfer.transposed_rows[next[a]] - begin]) {
+            if (column >= a) values[slot[column]].noalias() += p * block.transpose();
+          }
+        }
+      }
+    });
+  }
+  parallel_for_each(transfer.coarse_rows, [&](std::size_t a) {
+    for (std::uint64_t q = pattern.offsets[a]; q < pattern.offsets[a + 1]; ++q) {
+      const std::uint32_t b = pattern.columns[q];
+      if (b < a) values[q] = values[position_in_row(pattern, b, static_cast<std::uint32_t>(a))].transpose();
+      if (b == a) values[q] = (.5 * (values[q] + values[q].transpose())).eval();
+    }
+  });
+  return values;
+}
+
+}  // namespace flexel
