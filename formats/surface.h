@@ -35,7 +35,8 @@ struct SurfaceSource {
 
 struct Surface {
   std::vector<Vec3> vertices;                   // (vertices x 3) m, world frame; the file's own order. STL, which has no
-                                                // vertices of its own: exactly equal positions are one, in order of first use
+                                                // vertices of its own: exactly equal positions of a solid are one, in
+                                                // order of first use. No vertex belongs to two parts
   std::vector<std::uint32_t> polygon_offsets;   // (polygons + 1) polygon p owns corners [offsets[p], offsets[p + 1])
   std::vector<std::uint32_t> polygon_vertices;  // (corners) indices into vertices
   std::vector<std::uint32_t> polygon_face;      // (polygons) index into faces
@@ -61,12 +62,18 @@ struct Triangles {
 // their area vector. Deterministic. Each polygon of n corners gives n - 2 triangles.
 [[nodiscard]] Triangles triangulate(const Surface& surface);
 
-// Finite coordinates, indices in range, offsets ascending, polygons of at least three corners, at least one polygon, tables
-// consistent. Throws InputError(where, ...) naming the first vertex or polygon that is wrong, numbered from 1.
+// Coordinates finite and below kLargestCoordinate, indices in range, offsets ascending, polygons of at least three corners, at
+// least one polygon, no vertex in two parts, tables consistent. Throws InputError(where, ...) naming the first vertex or polygon that is wrong, numbered from 1.
 void check(const Surface& surface, const std::string& where);
 
 // Number of the face within its part, from 1, and its selection name "part/12".
 [[nodiscard]] std::vector<std::uint32_t> face_numbers(const Surface& surface);
+
+// Where products of three coordinates are still far from overflow, and no part reaches.
+constexpr double kLargestCoordinate = 1e12;  // m
+
+// Gives parts without a name `fallback`, and repeated names a number: "-2", "-3" ...; the first keeps its name.
+void make_part_names_unique(Surface& surface, const std::string& fallback);
 
 // Appends `other` (another input file) to `surface`; part names stay unique.
 void append(Surface& surface, Surface other);

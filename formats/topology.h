@@ -16,7 +16,8 @@ constexpr std::uint32_t kNoTriangle = 0xffffffffu;
 struct Topology {
   std::vector<std::array<std::uint32_t, 3>> neighbour;  // (triangles x 3) the triangle across edge (corner i, corner i+1), or
                                                         // kNoTriangle where the edge is open or non-manifold
-  std::vector<std::uint32_t> shell;    // (triangles) edge-connected shell, numbered from 0 in order of first triangle
+  std::vector<std::uint32_t> shell;    // (triangles) edge-connected shell, numbered from 0 in order of first triangle;
+                                       // kNoTriangle for degenerate triangles
   std::uint32_t shell_count = 0;
   std::size_t open_edges = 0;          // edges with one triangle
   std::size_t non_manifold_edges = 0;  // edges with more than two
@@ -33,7 +34,8 @@ struct Topology {
 [[nodiscard]] double signed_volume(const std::vector<Vec3>& vertices, const std::vector<std::array<std::uint32_t, 3>>& corners);
 
 // Numbers regions of triangles bounded by edges whose dihedral angle exceeds `degrees` (or that are open or non-manifold).
-// Returns (triangles) region ids from 0 in order of first triangle.
+// A triangle too low to have a direction (a millionth of the diagonal) is judged by the one across its longest edge; a degenerate
+// one goes with the triangle before it. Returns (triangles) region ids from 0 in order of first triangle.
 [[nodiscard]] std::vector<std::uint32_t> dihedral_regions(const std::vector<Vec3>& vertices,
                                                           const std::vector<std::array<std::uint32_t, 3>>& corners,
                                                           const Topology& topology, double degrees);

@@ -1,1 +1,121 @@
+// Tells the format by the first bytes, then by the extension, has its reader make the surface, and finishes
+// it: names, source, and our own checks, whatever the reader promised.
 #include "formats/import.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+
+#include "formats/body_file.h"
+#include "formats/error.h"
+#include "formats/import/readers.h"
+#include "formats/program.h"
+
+namespace flexel {
+namespace {
+
+const std::vector<std::string>& known_formats() {
+  static const std::vector<std::string> names{"step", "stl", "obj"};
+  return names;
+}
+
+ImportInput load(const std::string& path) {
+  ImportInput input;
+  input.bytes = read_all(path);
+  const bool piped = path == "-";
+  input.where = piped ? "stdin" : path;
+  input.file = piped ? "stdin" : clean_name(std::filesystem::path(path).filename().string());
+  input.stem = piped ? "part" : clean_name(stem(path));
+  return input;
+}
+
+std::string_view beginning(const ImportInput& input, std::size_t size) {
+  return {reinterpret_cast<const char*>(input.bytes.data()), std::min(size, input.bytes.size())};
+}
+
+bool begins_with_word(std::string_view text, std::string_view word) {
+  std::size_t at = 0;
+  while (at < text.size() && std::isspace(static_cast<unsigned char>(text[at])) != 0) ++at;
+  return text.size() - at >= word.size() &&
+         std::equal(word.begin(), word.end(), text.begin() + static_cast<std::ptrdiff_t>(at),
+                    [](char w, char t) { return w == std::tolower(static_cast<unsigned char>(t)); });
+}
+
+// A binary STL of n triangles is 84 + 50 n bytes long.
+bool sized_like_binary_stl(const ImportInput& input) {
+  if (input.bytes.size() < 84) return false;
+  std::uint32_t count = 0;
+  std::copy_n(input.bytes.data() + 80, 4, reinterpret_cast<std::byte*>(&count));
+  return input.bytes.size() == 84 + std::size_t{50} * count;
+}
+
+// The first line that is neither empty nor a comment begins with a word of OBJ.
+bool looks_like_obj(std::string_view text) {
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    std::string_view line = text.substr(0, end);
+    text.remove_prefix(std::min(end + 1, text.size()));
+    while (!line.empty() && std::isspace(static_cast<unsigned char>(line.front())) != 0)
+      line.remove_prefix(1);
+    if (line.empty() || line.front() == '#') continue;
+    const std::string_view word = line.substr(0, line.find_first_of(" \t\r"));
+    constexpr std::array<std::string_view, 10> kWords{"v", "vn", "vt", "vp",     "f",
+                                                      "g", "o",  "s",  "mtllib", "usemtl"};
+    return std::find(kWords.begin(), kWords.end(), word) != kWords.end();
+  }
+  return false;
+}
+
+std::string sniff(const ImportInput& input, const std::string& path) {
+  const std::string_view text = beginning(input, 4096);
+  if (begins_with_word(text, "iso-10303-21")) return "step";
+  if (sized_like_binary_stl(input)) return "stl";
+  if (looks_like_body(input.bytes))
+    throw InputError(
+        input.where,
+        "is a body (a lattice), not a part: give it to flexel-simulate or flexel-map, or give a part "
+        "(STEP, STL, OBJ) here");
+  if (begins_with_word(text, "solid")) return "stl";
+  const std::string suffix = path == "-" ? "" : extension(path);
+  if (suffix == "stp" || suffix == "step" || suffix == "p21") return "step";
+  if (suffix == "stl" || suffix == "obj") return suffix;
+  if (looks_like_obj(text)) return "obj";
+  throw InputError(input.where,
+                   path == "-"
+                       ? "its bytes do not tell its format: say it with --input-format (step, stl or obj)"
+                       : "is in no format that can be read: a part comes as STEP, STL or OBJ");
+}
+
+std::string format_of(const ImportInput& input, const ImportOptions& options, const std::string& path) {
+  if (!options.format) return sniff(input, path);
+  const std::string format = *options.format == "stp" ? "step" : *options.format;
+  const auto& known = known_formats();
+  if (std::find(known.begin(), known.end(), format) == known.end())
+    throw InputError(
+        fmt::format("unknown input format \"{}\": step, stl or obj{}", format, did_you_mean(format, known)));
+  return format;
+}
+
+}  // namespace
+
+Surface import_surface(const std::string& path, const ImportOptions& options) {
+  ImportInput input = load(path);
+  const std::string format = format_of(input, options, path);
+  const std::uint64_t hash = content_hash(input.bytes);
+  Surface surface = format == "step"  ? read_step(input, options)
+                    : format == "stl" ? read_stl(input, options)
+                                      : read_obj(input, options);
+  surface.sources.at(0).file = input.file;
+  surface.sources.at(0).hash = hash;
+  surface.part_source.assign(surface.parts.size(), 0);
+  make_part_names_unique(surface, input.stem.empty() ? "part" : input.stem);
+  check(surface, input.where);
+  const bool has_area = std::any_of(surface.vertices.begin(), surface.vertices.end(),
+                                    [&](const Vec3& vertex) { return vertex != surface.vertices.front(); });
+  if (!has_area) throw InputError(input.where, "all its vertices are at one point: nothing to work on");
+  return surface;
+}
+
+}  // namespace flexel

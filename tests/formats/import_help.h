@@ -1,0 +1,105 @@
+// Helpers of the import tests: scratch files, errors, the parts folder.
+#pragma once
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "formats/error.h"
+#include "formats/import.h"
+#include "formats/topology.h"
+
+namespace flexel::test {
+
+// A folder of this test alone, removed with its files.
+class Scratch {
+ public:
+  Scratch() {
+    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = std::filesystem::temp_directory_path() / (std::string("flexel-") + test->test_suite_name() +
+                                                        "-" + test->name() + "-" + std::to_string(getpid()));
+    std::filesystem::create_directories(folder_);
+  }
+  ~Scratch() { std::filesystem::remove_all(folder_); }
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  std::string write(const std::string& name, const std::string& content) const {
+    std::ofstream(path(name), std::ios::binary) << content;
+    return path(name);
+  }
+
+ private:
+  std::filesystem::path folder_;
+};
+
+inline std::string read_file(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+inline std::string part_path(const std::string& name) {
+  return std::string(FLEXEL_PARTS_DIR) + "/" + name;
+}
+#define SKIP_WITHOUT_PARTS() \
+  if (!std::filesystem::exists(FLEXEL_PARTS_DIR)) GTEST_SKIP() << "no parts folder: " << FLEXEL_PARTS_DIR
+
+// "where|what" of the InputError that importing gives, "" when it gives none.
+inline std::string import_error(const std::string& path, const ImportOptions& options = {}) {
+  try {
+    static_cast<void>(import_surface(path, options));
+  } catch (const InputError& error) {
+    return error.where() + "|" + error.what();
+  }
+  return "";
+}
+
+using Facets = std::vector<std::array<std::array<float, 3>, 3>>;
+
+// A binary STL; `count` overrides the header's number of triangles.
+inline std::string binary_stl(const Facets& facets, const std::string& header = "", std::int64_t count = -1) {
+  std::string bytes = header;
+  bytes.resize(80, '\0');
+  const auto n = static_cast<std::uint32_t>(count < 0 ? static_cast<std::int64_t>(facets.size()) : count);
+  bytes.append(reinterpret_cast<const char*>(&n), 4);
+  for (const auto& facet : facets) {
+    bytes.append(12, '\0');
+    for (const auto& corner : facet) bytes.append(reinterpret_cast<const char*>(corner.data()), 12);
+    bytes.append(2, '\0');
+  }
+  return bytes;
+}
+
+// A box from `low` to `high` as 12 triangles, outward.
+inline Facets box_facets(std::array<float, 3> low, std::array<float, 3> high) {
+  const auto corner = [&](int i) {
+    return std::array<float, 3>{i & 1 ? high[0] : low[0], i & 2 ? high[1] : low[1], i & 4 ? high[2] : low[2]};
+  };
+  constexpr int quads[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4},
+                               {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
+  Facets facets;
+  for (const auto& q : quads) {
+    facets.push_back({corner(q[0]), corner(q[1]), corner(q[2])});
+    facets.push_back({corner(q[0]), corner(q[2]), corner(q[3])});
+  }
+  return facets;
+}
+
+struct Shape {
+  Triangles triangles;
+  Topology topology;
+  double volume = 0;  // m^3
+};
+
+inline Shape shape(const Surface& surface) {
+  Shape result;
+  result.triangles = triangulate(surface);
+  result.topology = topology(result.triangles.corners, weld(surface.vertices));
+  result.volume = signed_volume(surface.vertices, result.triangles.corners);
+  return result;
+}
+
+}  // namespace flexel::test
