@@ -3,6 +3,7 @@
 // p, ...), so all are cut in parallel.
 #include "formats/surface.h"
 
+#include <Eigen/Geometry>
 #include <fmt/format.h>
 
 #include <cmath>

@@ -4,6 +4,7 @@
 // numbering in order of first triangle is one sweep.
 #include "formats/topology.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -253,6 +254,11 @@ std::vector<std::uint32_t> dihedral_regions(const std::vector<Vec3>& vertices,
   for (std::uint32_t t = 0; t < n; ++t)
     for (std::size_t i = 0; i < 3; ++i)
       if (smooth[t] >> i & 1) sets.unite(t, topology.neighbour[t][i]);
+  // Degenerate triangles: those at the front go with the first that is not, others with the one before.
+  const auto whole =
+      std::find_if(topology.shell.begin(), topology.shell.end(), [](auto s) { return s != kNoTriangle; });
+  if (whole != topology.shell.end())
+    sets.unite(0, static_cast<std::uint32_t>(whole - topology.shell.begin()));
   for (std::uint32_t t = 1; t < n; ++t)
     if (topology.shell[t] == kNoTriangle) sets.unite(t, t - 1);
   std::vector<std::uint32_t> region(n);

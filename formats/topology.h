@@ -35,7 +35,7 @@ struct Topology {
 
 // Numbers regions of triangles bounded by edges whose dihedral angle exceeds `degrees` (or that are open or non-manifold).
 // A triangle too low to have a direction (a millionth of the diagonal) is judged by the one across its longest edge; a degenerate
-// one goes with the triangle before it. Returns (triangles) region ids from 0 in order of first triangle.
+// one goes with the triangle before it (at the front: the first after). Returns (triangles) region ids from 0 in order of first triangle.
 [[nodiscard]] std::vector<std::uint32_t> dihedral_regions(const std::vector<Vec3>& vertices,
                                                           const std::vector<std::array<std::uint32_t, 3>>& corners,
                                                           const Topology& topology, double degrees);

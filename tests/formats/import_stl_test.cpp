@@ -137,7 +137,7 @@ TEST(ImportStl, BadFilesGiveOneClearError) {
   EXPECT_THAT(error(binary_stl(bad)), HasSubstr("triangle 9 has a coordinate that is not a finite number"));
   EXPECT_THAT(error(ascii_solid("a", bad)), HasSubstr("triangle 9"));
   const std::string ascii = ascii_solid("a", unit_box());
-  EXPECT_THAT(error(ascii.substr(0, ascii.size() / 2)), HasSubstr("cut off inside triangle 7"));
+  EXPECT_THAT(error(ascii.substr(0, ascii.size() / 2 + 30)), HasSubstr("cut off inside triangle 7"));
   EXPECT_THAT(error(ascii.substr(0, ascii.find("endsolid"))), HasSubstr("cut off after triangle 12"));
   EXPECT_THAT(error("solid a\nfacet normal 0 0 0\nouter loop\nvertex 0 0 zero\n"),
               HasSubstr("bad.stl:4|triangle 1: \"zero\""));
@@ -146,7 +146,7 @@ TEST(ImportStl, BadFilesGiveOneClearError) {
   EXPECT_THAT(error(ascii + "solids b"), HasSubstr("\"solids\""));
   EXPECT_THAT(error(binary_stl({{{{1, 1, 1}, {1, 1, 1}, {1, 1, 1}}}})), HasSubstr("one point"));
   EXPECT_THAT(import_error(scratch.path("absent.stl")), HasSubstr("absent.stl"));
-  EXPECT_THAT(import_error(scratch.path("")), HasSubstr("directory"));
+  EXPECT_THAT(import_error(scratch.path("")), HasSubstr("folder"));
   EXPECT_THAT(error(""), HasSubstr("empty"));
   EXPECT_THAT(import_error(scratch.write("a.txt", "hello world, this is no part\n")),
               HasSubstr("no format that can be read"));

@@ -1,5 +1,6 @@
 #include "formats/surface.h"
 
+#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
 #include <cmath>
