@@ -1,0 +1,57 @@
+// Each distinct frame is rebuilt once from the deformed elements; a vertex then moves by a translation and a
+// 3x3 product. The check of its Voronoi cell compares the distance to the origin with those to the elements
+// connected with it: O(1), and enough unless the body folds onto itself.
+#include <cmath>
+
+#include "formats/parallel.h"
+#include "mapping/bind.h"
+
+namespace flexel {
+namespace {
+
+// Differences under this share of the distance between the two elements are ties and rounding.
+constexpr double kTie = 1e-6;
+
+// True when an element connected with `origin` is now nearer to the moved vertex, and was not at rest.
+bool left_its_cell(const Binding& binding, const Body& body, const std::vector<Vec3>& position,
+                   std::uint32_t origin, const Vec3& rest_vertex, const Vec3& vertex) {
+  const double now = (vertex - position[origin]).squaredNorm();
+  const double at_rest = (rest_vertex - body.rest[origin]).squaredNorm();
+  for (const std::uint32_t other : binding.connections.of(origin)) {
+    const double nearer = now - (vertex - position[other]).squaredNorm();
+    if (nearer <= 0) continue;
+    const double tie = kTie * (body.rest[other] - body.rest[origin]).squaredNorm();
+    if (nearer > tie && at_rest - (rest_vertex - body.rest[other]).squaredNorm() <= tie) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+Mapped apply(const Binding& binding, const Body& body, const std::vector<Vec3>& position) {
+  std::vector<FrameMotion> motion(binding.frames.size());
+  parallel_for_each(motion.size(), [&](std::size_t f) {
+    motion[f] = frame_motion(binding.frames[f], body.rest, position, binding.method);
+  });
+  Mapped mapped;
+  const std::size_t n = binding.frame.size();
+  mapped.displacement.resize(n);
+  mapped.flags.assign(n, 0);
+  parallel_for_each(n, [&](std::size_t v) {
+    const FrameMotion& by = motion[binding.frame[v]];
+    const Vec3 displacement = by.translation + by.change * binding.coordinates[v];
+    mapped.displacement[v] = displacement;
+    if (!displacement.allFinite()) {
+      mapped.flags[v] = kNotFinite;
+    } else if (binding.referenced[v]) {
+      const Vec3& vertex = body.surface.vertices[v];
+      const std::uint32_t origin = binding.frames[binding.frame[v]].elements[0];
+      mapped.flags[v] = by.flags;
+      if (left_its_cell(binding, body, position, origin, vertex, vertex + displacement))
+        mapped.flags[v] |= kVoronoiCellLeft;
+    }
+  });
+  return mapped;
+}
+
+}  // namespace flexel

@@ -1,0 +1,43 @@
+// Frames: the elements that hold a vertex, and the base that they span.
+#pragma once
+#include "mapping/map.h"
+
+namespace flexel {
+
+// A base with a smaller normalised determinant is not taken at rest ...
+constexpr double kWellConditioned = 0.1;
+// ... and one below this, once deformed, spans no volume any more.
+constexpr double kDegenerate = 1e-6;
+
+// Elements of one part, each connected with the one before it or with the origin through other elements.
+struct Frame {
+  std::array<std::uint32_t, 4>
+      elements{};  // origin, primary axis, two secondary; the origin again where the kind has fewer
+  FrameKind kind = FrameKind::rigid;
+  std::uint8_t rings = 0;  // how many times the search was widened
+};
+
+// Determinant of the three edges over the product of their lengths: 1 for orthogonal edges, 0 for edges in a
+// plane; negative when left-handed.
+[[nodiscard]] double normalised_determinant(const Vec3& a, const Vec3& b, const Vec3& c);
+// Sine of the angle between two edges.
+[[nodiscard]] double sine(const Vec3& a, const Vec3& b);
+
+// The base of a frame, columns in m (affine edges) or unit length (orthonormal axes), world frame.
+// gram_schmidt: the paper's orthonormal base (section 6.1.2); affine: the edges themselves.
+// Kinds with fewer than four elements complete it: a plane by its unit normal, a line by the two axes that
+// the smallest rotation from its direction at rest carries along (the axes at rest are arbitrary but fixed);
+// a rigid frame has the world's axes, whatever its elements do.
+[[nodiscard]] Mat3 rest_base(const Frame& frame, const std::vector<Vec3>& rest, MapMethod method);
+
+// How a frame has moved. A vertex with coordinates c in the rest base moves by translation + change * c:
+// exactly zero where its elements did not move.
+struct FrameMotion {
+  Vec3 translation = Vec3::Zero();  // of the origin, m
+  Mat3 change = Mat3::Zero();       // deformed base - rest base
+  std::uint8_t flags = 0;           // kFrameInverted, kFrameDegenerate
+};
+[[nodiscard]] FrameMotion frame_motion(const Frame& frame, const std::vector<Vec3>& rest,
+                                       const std::vector<Vec3>& position, MapMethod method);
+
+}  // namespace flexel

@@ -1,0 +1,233 @@
+// Nearly every vertex lies inside the voxel of a cell that its first polygon bounds: that is found first,
+// without a table of the polygons around each vertex. The rest (matter too thin for a cell of its own, so
+// that it hangs on a neighbour) looks through the cells of all polygons around it for the nearest; what finds
+// no cell at all takes the nearest element of its part.
+//
+// Vertices at one position in one part (an OBJ has them along texture seams) have one representative, which
+// alone is seated.
+#include "mapping/seat.h"
+
+#include <limits>
+#include <memory>
+
+#include "formats/error.h"
+#include "formats/locate.h"
+#include "formats/parallel.h"
+#include "formats/topology.h"
+
+namespace flexel {
+namespace {
+
+constexpr std::uint32_t kNone = 0xffffffffu;
+constexpr double kFar = std::numeric_limits<double>::infinity();
+
+// First polygon around each vertex, and the vertex whose seat it shares.
+struct Corners {
+  std::vector<std::uint32_t> first_polygon;   // (vertices) kNone: unused
+  std::vector<std::uint32_t> representative;  // (vertices) the first of those at this position in this part
+};
+
+Corners corners_of(const Surface& surface) {
+  Corners corners;
+  corners.first_polygon.assign(surface.vertices.size(), kNone);
+  for (std::size_t p = surface.polygon_count(); p-- > 0;)
+    for (const std::uint32_t v : surface.polygon(p)) corners.first_polygon[v] = static_cast<std::uint32_t>(p);
+  corners.representative = weld(surface.vertices);
+  // A representative that is unused, or of another part, cannot speak for the vertex; the vertex then speaks
+  // for itself.
+  for (std::size_t v = 0; v < surface.vertices.size(); ++v) {
+    const std::uint32_t mine = corners.first_polygon[v],
+                        other = corners.first_polygon[corners.representative[v]];
+    if (mine == kNone || other == kNone || surface.polygon_part(mine) != surface.polygon_part(other))
+      corners.representative[v] = static_cast<std::uint32_t>(v);
+  }
+  return corners;
+}
+
+// The nearest voxel so far.
+struct Home {
+  double squared_distance = kFar;  // m^2, 0 inside
+  Seat seat;
+};
+
+// Compares `cell` with the nearest so far; `u` is a point in lattice coordinates.
+void consider(const Body& body, std::uint32_t cell, const Vec3& u, const Vec3& spacing, Home& home) {
+  const Index3& index = body.lattice_index[body.cell_elements[cell][0]];
+  const Vec3 within = u - Vec3(index[0], index[1], index[2]);
+  const Vec3 clamped = within.cwiseMax(Vec3::Zero()).cwiseMin(Vec3::Ones());
+  const double squared_distance = (within - clamped).cwiseProduct(spacing).squaredNorm();
+  if (squared_distance >= home.squared_distance) return;
+  const int corner = (within.x() >= 0.5 ? 1 : 0) + (within.y() >= 0.5 ? 2 : 0) + (within.z() >= 0.5 ? 4 : 0);
+  home = {squared_distance, {cell, true, static_cast<std::uint8_t>(corner)}};
+}
+
+// Beyond this many cells under a polygon a search by bisection is faster than looking at each.
+constexpr std::size_t kManyCells = 64;
+
+// Looks through the cells that polygon `p` bounds for one nearer to `point`.
+void look_under(const Body& body, std::size_t p, const Vec3& point, Home& home) {
+  if (body.surface_cell_offsets.empty()) return;
+  const std::uint32_t begin = body.surface_cell_offsets[p], end = body.surface_cell_offsets[p + 1];
+  const Lattice& lattice = body.parts[body.surface.polygon_part(p)].lattice;
+  const Vec3 u = lattice.to_lattice(point);
+  if (end - begin > kManyCells)
+    return consider(body, locate_on_surface(body, p, point)->cell, u, lattice.spacing, home);
+  for (std::uint32_t s = begin; s < end && home.squared_distance > 0; ++s)
+    consider(body, body.surface_cells[s], u, lattice.spacing, home);
+}
+
+Seat seat_at_element(const Body& body, std::uint32_t part, std::uint32_t element, const Vec3& point) {
+  const Vec3 offset = body.parts[part].lattice.axes.transpose() * (point - body.rest[element]);
+  const int octant = (offset.x() >= 0 ? 1 : 0) + (offset.y() >= 0 ? 2 : 0) + (offset.z() >= 0 ? 4 : 0);
+  return {element, false, static_cast<std::uint8_t>(octant)};
+}
+
+// Polygons around some of the vertices.
+struct Around {
+  std::vector<std::uint32_t> slot;      // (vertices) kNone: not asked for
+  std::vector<std::uint32_t> offsets;   // (slots + 1)
+  std::vector<std::uint32_t> polygons;  // ascending within a slot
+};
+
+// The polygons around each vertex of `wanted`, and around those that it speaks for.
+Around polygons_around(const Surface& surface, const Corners& corners,
+                       const std::vector<std::uint32_t>& wanted) {
+  Around around;
+  around.slot.assign(surface.vertices.size(), kNone);
+  for (std::size_t i = 0; i < wanted.size(); ++i) around.slot[wanted[i]] = static_cast<std::uint32_t>(i);
+  around.offsets.assign(wanted.size() + 1, 0);
+  const auto for_each_corner = [&](const auto& visit) {
+    for (std::size_t p = 0; p < surface.polygon_count(); ++p)
+      for (const std::uint32_t v : surface.polygon(p)) {
+        const std::uint32_t slot = around.slot[corners.representative[v]];
+        if (slot != kNone) visit(slot, static_cast<std::uint32_t>(p));
+      }
+  };
+  for_each_corner([&](std::uint32_t slot, std::uint32_t) { ++around.offsets[slot + 1]; });
+  for (std::size_t i = 1; i < around.offsets.size(); ++i) around.offsets[i] += around.offsets[i - 1];
+  std::vector<std::uint32_t> next(around.offsets.begin(), around.offsets.end() - 1);
+  around.polygons.resize(around.offsets.back());
+  for_each_corner([&](std::uint32_t slot, std::uint32_t p) { around.polygons[next[slot]++] = p; });
+  return around;
+}
+
+class Seating {
+ public:
+  explicit Seating(const Body& body)
+      : body_(body), corners_(corners_of(body.surface)), grids_(body.parts.size()) {
+    const std::size_t n = body.surface.vertices.size();
+    seats_.seat.resize(n);
+    seats_.referenced.resize(n);
+    squared_distance_.assign(n, kFar);
+  }
+
+  Seats take() {
+    seat_under_first_polygon();
+    seat_remaining();
+    parallel_for_each(seats_.seat.size(), [&](std::size_t v) {
+      seats_.referenced[v] = corners_.first_polygon[v] != kNone;
+      seats_.seat[v] = seats_.seat[corners_.representative[v]];
+    });
+    return std::move(seats_);
+  }
+
+ private:
+  [[nodiscard]] Home look(std::uint32_t v, std::size_t polygon, Home home) const {
+    look_under(body_, polygon, body_.surface.vertices[v], home);
+    return home;
+  }
+
+  void seat_under_first_polygon() {
+    parallel_for_each(seats_.seat.size(), [&](std::size_t v) {
+      if (corners_.first_polygon[v] == kNone || corners_.representative[v] != v) return;
+      const Home home = look(static_cast<std::uint32_t>(v), corners_.first_polygon[v], {});
+      seats_.seat[v] = home.seat;
+      squared_distance_[v] = home.squared_distance;
+    });
+  }
+
+  void seat_remaining() {
+    std::vector<std::uint32_t> remaining;
+    for (std::uint32_t v = 0; v < seats_.seat.size(); ++v)
+      if (corners_.representative[v] == v && squared_distance_[v] > 0) remaining.push_back(v);
+    if (remaining.empty()) return;
+    const Around around =
+        body_.surface_cells.empty() ? Around{} : polygons_around(body_.surface, corners_, remaining);
+    make_grids(remaining, around);
+    parallel_for_each(
+        remaining.size(),
+        [&](std::size_t i) {
+          const std::uint32_t v = remaining[i];
+          const Home home = nearest_under(v, around);
+          seats_.seat[v] = home.squared_distance < kFar ? home.seat : seat_nearest(v);
+        },
+        256);
+  }
+
+  [[nodiscard]] Home nearest_under(std::uint32_t v, const Around& around) const {
+    Home home;
+    if (around.slot.empty()) return home;
+    const std::uint32_t slot = around.slot[v];
+    for (std::uint32_t i = around.offsets[slot]; i < around.offsets[slot + 1] && home.squared_distance > 0;
+         ++i)
+      home = look(v, around.polygons[i], home);
+    return home;
+  }
+
+  [[nodiscard]] std::uint32_t part_of(std::uint32_t v) const {
+    return body_.surface.polygon_part(corners_.first_polygon[v]);
+  }
+
+  // Grids of the parts that a vertex without a cell belongs to.
+  void make_grids(const std::vector<std::uint32_t>& remaining, const Around& around) {
+    std::vector<std::uint8_t> needed(body_.parts.size(), 0);
+    for (const std::uint32_t v : remaining) {
+      if (corners_.first_polygon[v] == kNone)
+        std::fill(needed.begin(), needed.end(), std::uint8_t{1});
+      else if (nearest_under(v, around).squared_distance == kFar)
+        needed[part_of(v)] = 1;
+    }
+    for (std::uint32_t part = 0; part < needed.size(); ++part)
+      if (needed[part] && body_.parts[part].element_begin < body_.parts[part].element_end)
+        grids_[part] = std::make_unique<ElementGrid>(body_, part);
+  }
+
+  [[nodiscard]] Seat seat_nearest(std::uint32_t v) const {
+    const Vec3& point = body_.surface.vertices[v];
+    if (corners_.first_polygon[v] != kNone) {
+      const std::uint32_t part = part_of(v);
+      return seat_at_element(body_, part, grids_[part]->nearest(point), point);
+    }
+    std::uint32_t best_part = 0, best = kNone;
+    for (std::uint32_t part = 0; part < grids_.size(); ++part) {
+      const std::uint32_t element = grids_[part]->nearest(point);
+      if (best != kNone &&
+          (body_.rest[element] - point).squaredNorm() >= (body_.rest[best] - point).squaredNorm())
+        continue;
+      best = element;
+      best_part = part;
+    }
+    return seat_at_element(body_, best_part, best, point);
+  }
+
+  const Body& body_;
+  Corners corners_;
+  std::vector<std::unique_ptr<ElementGrid>> grids_;  // (parts)
+  std::vector<double> squared_distance_;             // (vertices) m^2, to the voxel of the seat
+  Seats seats_;
+};
+
+}  // namespace
+
+Seats take_seats(const Body& body) {
+  if (body.surface.vertices.empty() || body.surface.polygon_count() == 0)
+    throw InputError(
+        "the body carries no surface to map onto; only frame 0 of a series does: take the body that "
+        "flexel-voxelize or flexel-simulate wrote");
+  for (const Part& part : body.parts)
+    if (part.element_begin == part.element_end)
+      throw InputError("part \"" + part.name + "\" has no elements: voxelize it with a smaller --size");
+  return Seating(body).take();
+}
+
+}  // namespace flexel

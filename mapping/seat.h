@@ -1,0 +1,24 @@
+// Where a vertex sits in the lattice, before a frame is looked for.
+#pragma once
+#include "mapping/nearest.h"
+
+namespace flexel {
+
+// The element (or the cell and its corner) that becomes the origin of the vertex's frame, and the side of it
+// that the vertex is on. Vertices with equal seats share one frame.
+struct Seat {
+  std::uint32_t owner = 0;  // cell or element
+  bool in_cell = false;
+  std::uint8_t octant =
+      0;  // of a cell: its corner a = i + 2 j + 4 k; of an element: bits set on its high sides
+};
+
+struct Seats {
+  std::vector<Seat> seat;                // (vertices)
+  std::vector<std::uint8_t> referenced;  // (vertices) 1: some polygon uses it
+};
+
+// Throws InputError: no surface, a part without elements.
+[[nodiscard]] Seats take_seats(const Body& body);
+
+}  // namespace flexel
