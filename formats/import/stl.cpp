@@ -153,10 +153,10 @@ class Words {
   }
   void expect(std::string_view keyword, std::size_t triangle) {
     const std::string_view word = next();
-    if (word.empty()) fail(fmt::format("the file is cut off inside triangle {}", triangle));
-    if (!same(word, keyword))
-      fail(fmt::format("triangle {}: \"{}\" expected, \"{}\" found", triangle, keyword,
-                       clean_name(word.substr(0, 40))));
+    if (same(word, keyword)) return;
+    if (at_ == text_.size()) fail(fmt::format("the file is cut off inside triangle {}", triangle));
+    fail(fmt::format("triangle {}: \"{}\" expected, \"{}\" found", triangle, keyword,
+                     clean_name(word.substr(0, 40))));
   }
   [[nodiscard]] static bool same(std::string_view word, std::string_view keyword) {
     return std::equal(word.begin(), word.end(), keyword.begin(), keyword.end(),
