@@ -65,7 +65,8 @@ bool ObjLines::next(ObjLine& line) {
   std::size_t comment = std::string_view::npos;
   line.number = number_;
   while (at_ < text_.size() && text_[at_] != '\n') {
-    if (text_[at_] == '#' && comment == std::string_view::npos) comment = at_;
+    const bool word_begins = at_ == begin || is_blank(text_[at_ - 1]);
+    if (text_[at_] == '#' && word_begins && comment == std::string_view::npos) comment = at_;
     const std::size_t skip = continuation(text_.substr(at_, 3));
     number_ += skip > 0;
     at_ += std::max<std::size_t>(skip, 1);

@@ -1,0 +1,194 @@
+// Writes OBJ. From OBJ: the source's bytes are copied up to each number of a v or vn line that changes, and
+// the new number is put in its place, so everything else stays as it was. A normal (vn) is turned by the
+// smallest rotation that takes the summed area vectors of the polygons that use it from rest to their
+// deformed state; its length stays.
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <iterator>
+
+#include "formats/error.h"
+#include "formats/obj_text.h"
+#include "formats/parallel.h"
+#include "formats/program.h"
+#include "formats/surface_writers.h"
+
+namespace flexel {
+namespace {
+
+// What the polygons that use one vn line did.
+struct NormalChange {
+  Vec3 rest = Vec3::Zero(), deformed = Vec3::Zero();  // summed area vectors
+  bool moved = false;
+};
+
+// Area vector of a polygon, doubled (Newell).
+template <class At>
+Vec3 area_vector(const std::vector<ObjCorner>& corners, const At& at) {
+  Vec3 area = Vec3::Zero();
+  const Vec3 origin = at(corners[0].vertex);
+  for (std::size_t i = 1; i + 1 < corners.size(); ++i)
+    area += (at(corners[i].vertex) - origin).cross(at(corners[i + 1].vertex) - origin);
+  return area;
+}
+
+std::string_view source_text(const DeformedSurface& deformed) {
+  const Bytes& bytes = deformed.surface.sources[0].bytes;
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+void add_polygon(const DeformedSurface& deformed, const std::vector<ObjCorner>& corners,
+                 std::vector<NormalChange>& changes) {
+  const std::vector<Vec3>&vertices = deformed.surface.vertices, &displacement = deformed.displacement;
+  bool moved = false;
+  for (const ObjCorner& corner : corners) moved = moved || displacement[corner.vertex] != Vec3::Zero();
+  const Vec3 rest = area_vector(corners, [&](std::int64_t v) { return vertices[v]; });
+  const Vec3 now =
+      moved ? area_vector(corners, [&](std::int64_t v) { return Vec3(vertices[v] + displacement[v]); })
+            : rest;
+  for (const ObjCorner& corner : corners) {
+    if (corner.normal == kNoIndex || corner.normal >= static_cast<std::int64_t>(changes.size())) continue;
+    NormalChange& change = changes[corner.normal];
+    change.rest += rest;
+    change.deformed += now;
+    change.moved = change.moved || moved;
+  }
+}
+
+std::size_t count_normals(std::string_view text) {
+  std::size_t count = 0;
+  ObjLines lines(text);
+  for (ObjLine line; lines.next(line);) count += line.keyword == ObjKeyword::normal;
+  return count;
+}
+
+// What happens to each vn line. Corners that name one that does not exist have none.
+std::vector<NormalChange> normal_changes(const DeformedSurface& deformed) {
+  std::vector<NormalChange> changes(count_normals(source_text(deformed)));
+  ObjCounts counts;
+  std::vector<ObjCorner> corners;
+  const std::string& file = deformed.surface.sources[0].file;
+  ObjLines lines(source_text(deformed));
+  for (ObjLine line; lines.next(line);) {
+    counts.vertices += line.keyword == ObjKeyword::vertex;
+    counts.normals += line.keyword == ObjKeyword::normal;
+    if (line.keyword != ObjKeyword::face) continue;
+    parse_face(line, counts, file, corners);
+    for (const ObjCorner& corner : corners)
+      if (corner.vertex >= static_cast<std::int64_t>(deformed.displacement.size()))
+        throw InputError(fmt::format("{}:{}", file, line.number), "index out of range");
+    add_polygon(deformed, corners, changes);
+  }
+  return changes;
+}
+
+// Replaces numbers of a text, in order.
+class Rewriter {
+ public:
+  Rewriter(std::string_view text, OutputFile& out) : text_(text), out_(out) {}
+  // Puts `value` where `word`, a piece of the text, is.
+  void replace(std::string_view word, const std::string& value) {
+    copy_to(static_cast<std::size_t>(word.data() - text_.data()));
+    out_.write(value);
+    done_ += word.size();
+  }
+  void copy_rest() { copy_to(text_.size()); }
+
+ private:
+  void copy_to(std::size_t end) {
+    out_.write(text_.data() + done_, end - done_);
+    done_ = end;
+  }
+  std::string_view text_;
+  OutputFile& out_;
+  std::size_t done_ = 0;
+};
+
+void rewrite_vertex(const DeformedSurface& deformed, const ObjLine& line, std::size_t vertex,
+                    Rewriter& rewriter) {
+  const SurfaceSource& source = deformed.surface.sources[0];
+  const Vec3 rest = parse_triple(line, source.file);
+  std::string_view text = line.text;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const std::string_view word = next_word(text);
+    const double displacement = deformed.displacement[vertex][i];
+    if (displacement == 0 && deformed.unit == source.unit) continue;
+    rewriter.replace(
+        word, fmt::format("{}", rest[i] * (source.unit / deformed.unit) + displacement / deformed.unit));
+  }
+}
+
+void rewrite_normal(const NormalChange& change, const ObjLine& line, const std::string& file,
+                    Rewriter& rewriter) {
+  constexpr double kNoTurn = 1e-12;  // rounding of a part that only moved along
+  const double size = change.rest.norm() * change.deformed.norm();
+  const bool turned_back = change.rest.dot(change.deformed) < 0;
+  const bool turns = turned_back || change.rest.cross(change.deformed).norm() > kNoTurn * size;
+  if (!change.moved || !turns || !(size > 0)) return;
+  const Vec3 turned =
+      Eigen::Quaterniond::FromTwoVectors(change.rest, change.deformed) * parse_triple(line, file);
+  std::string_view text = line.text;
+  for (const double value : turned) rewriter.replace(next_word(text), fmt::format("{:.9g}", value));
+}
+
+// Names in OBJ have no blanks.
+std::string obj_name(std::string name) {
+  for (char& c : name)
+    if (c == ' ') c = '_';
+  return name;
+}
+
+}  // namespace
+
+void rewrite_obj(const DeformedSurface& deformed, OutputFile& out) {
+  const std::string& file = deformed.surface.sources[0].file;
+  const std::vector<NormalChange> changes = normal_changes(deformed);
+  Rewriter rewriter(source_text(deformed), out);
+  std::size_t vertex = 0, normal = 0;
+  ObjLines lines(source_text(deformed));
+  for (ObjLine line; lines.next(line);) {
+    if (line.keyword == ObjKeyword::vertex) {
+      if (vertex == deformed.displacement.size())
+        throw InputError(file, "the embedded OBJ has more vertices than the surface");
+      rewrite_vertex(deformed, line, vertex++, rewriter);
+    } else if (line.keyword == ObjKeyword::normal) {
+      rewrite_normal(changes[normal++], line, file, rewriter);
+    }
+  }
+  if (vertex != deformed.displacement.size())
+    throw InputError(file, "the embedded OBJ has fewer vertices than the surface");
+  rewriter.copy_rest();
+}
+
+void write_new_obj(const DeformedSurface& deformed, OutputFile& out) {
+  constexpr std::size_t kGrain = 4096;
+  const Surface& surface = deformed.surface;
+  out.write(fmt::format("# Flexel {}\n", version()));
+  std::vector<std::string> chunks(surface.vertices.size() / kGrain + 1);
+  parallel_chunks(surface.vertices.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    std::string& text = chunks[begin / kGrain];
+    for (std::size_t v = begin; v < end; ++v) {
+      text += 'v';
+      append_position(text, deformed, v);
+      text += '\n';
+    }
+  });
+  for (const std::string& text : chunks) out.write(text);
+  const std::vector<std::uint32_t> numbers = face_numbers(surface);
+  std::string text;
+  for (std::size_t p = 0; p < surface.polygon_count(); ++p) {
+    const std::uint32_t face = surface.polygon_face[p], part = surface.faces[face].part;
+    const std::string name = obj_name(surface.parts[part].name);
+    if (p == 0 || part != surface.polygon_part(p - 1))
+      fmt::format_to(std::back_inserter(text), "o {}\n", name);
+    if (p == 0 || face != surface.polygon_face[p - 1])
+      fmt::format_to(std::back_inserter(text), "g {}/{}\n", name, numbers[face]);
+    text += 'f';
+    for (const std::uint32_t vertex : surface.polygon(p))
+      fmt::format_to(std::back_inserter(text), " {}", std::uint64_t{vertex} + 1);
+    text += '\n';
+  }
+  out.write(text);
+}
+
+}  // namespace flexel
