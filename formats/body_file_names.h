@@ -1,0 +1,59 @@
+// Names of the arrays of a body file, for its writer and its reader; docs/body-file.md explains them.
+#pragma once
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <string>
+
+#include "formats/vtu.h"
+
+namespace flexel::names {
+
+constexpr const char* version = "flexel_version";
+constexpr const char* metadata = "flexel_metadata";
+constexpr const char* surface_vertices = "surface_vertices";
+constexpr const char* surface_polygon_offsets = "surface_polygon_offsets";
+constexpr const char* surface_polygon_vertices = "surface_polygon_vertices";
+constexpr const char* surface_polygon_face = "surface_polygon_face";
+constexpr const char* surface_face_part = "surface_face_part";
+constexpr const char* surface_cell_offsets = "surface_cell_offsets";
+constexpr const char* surface_cells = "surface_cells";
+constexpr const char* surface_source_bytes = "surface_source_bytes";
+constexpr const char* surface_source_headers = "surface_source_headers";
+constexpr const char* position = "position";
+constexpr const char* rest = "rest";
+constexpr const char* displacement = "displacement";
+constexpr const char* lattice_index = "lattice_index";
+constexpr const char* piece = "piece";
+constexpr const char* part = "part";
+constexpr const char* connections = "connections";
+constexpr const char* connectivity = "connectivity";
+constexpr const char* offsets = "offsets";
+constexpr const char* types = "types";
+constexpr const char* fill = "fill";
+constexpr const char* material = "material";
+constexpr const char* broken = "broken";
+
+// Our corner a = i + 2 j + 4 k at place v of VTK's hexahedron (which runs around the lower face, then the
+// upper). Its own inverse.
+constexpr std::array<std::size_t, 8> vtk_corner = {0, 1, 3, 2, 4, 5, 7, 6};
+constexpr std::uint8_t vtk_hexahedron = 12, vtk_vertex = 1;
+
+// True for the arrays of point or cell data that are not columns.
+[[nodiscard]] inline bool reserved(const std::string& name, vtu::Section section) {
+  if (section == vtu::Section::point_data)
+    return name == rest || name == displacement || name == lattice_index || name == piece || name == part ||
+           name == connections;
+  return name == fill || name == part || name == material || name == broken;
+}
+
+// Columns have names that XML, VTK and spreadsheets take as they are: letters, digits, "_", "-" and ".".
+[[nodiscard]] inline bool valid_column(const std::string& name, vtu::Section section) {
+  const auto plain = [](char c) {
+    return (std::isalnum(static_cast<unsigned char>(c)) != 0 && static_cast<unsigned char>(c) < 128) ||
+           c == '_' || c == '-' || c == '.';
+  };
+  return !name.empty() && std::all_of(name.begin(), name.end(), plain) && !reserved(name, section);
+}
+
+}  // namespace flexel::names
