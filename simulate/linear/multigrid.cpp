@@ -35,6 +35,11 @@ MatrixView<BlockType> view(const Pattern& pattern, const std::vector<BlockType>&
   return {pattern.offsets, pattern.columns, values};
 }
 
+// Weight of the step that smooths the prolongator; the estimate is from below, hence 1.05.
+double smoothing_weight(double largest_eigenvalue) {
+  return 4. / 3 / (1.05 * largest_eigenvalue);
+}
+
 // What a level's prolongator is made from, besides the matrix.
 struct Grouping {
   std::vector<std::uint32_t> aggregate_of;  // (rows)
@@ -54,16 +59,50 @@ Grouping grouping(const LevelNodes& fine, const Aggregates& aggregates) {
   return result;
 }
 
-template <int R, class View>
-void refresh_transfer(const View& matrix, const Grouping& groups, Level<R>& level) {
-  prepare_smoother<R>(matrix, level);
+// Directions in which a support holds element i directly: moving i and its neighbours together along such a
+// direction is resisted nearly as much as moving i alone (elastic links do not resist that at all). Returns
+// the projector on the other directions. A coarse motion must leave held elements alone: one that drags them
+// against a penalty of hundreds of E / h would cost so much that the free elements of the same aggregate
+// would get no coarse motion either.
+Mat3 free_directions(const FineView& matrix, std::size_t i) {
+  constexpr double kHeld = .5;
+  Mat3 sum = Mat3::Zero(), own = Mat3::Zero();
+  for (std::uint64_t q = matrix.offsets[i]; q < matrix.offsets[i + 1]; ++q) {
+    sum += matrix.values[q];
+    if (matrix.columns[q] == i) own = matrix.values[q];
+  }
+  if (sum.norm() < .1 * own.norm()) return Mat3::Identity();
+  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(.5 * (sum + sum.transpose()));
+  Mat3 projector = Mat3::Identity();
+  for (int c = 0; c < 3; ++c) {
+    const Vec3 direction = eigen.eigenvectors().col(c);
+    if (eigen.eigenvalues()[c] > kHeld * direction.dot(own * direction))
+      projector -= direction * direction.transpose();
+  }
+  return projector;
+}
+
+void refresh_transfer(const FineView& matrix, const Grouping& groups, Level<3>& level) {
+  prepare_smoother<3>(matrix, level);
+  std::vector<Eigen::Matrix3f> free(matrix.rows());
+  parallel_for_each(matrix.rows(),
+                    [&](std::size_t i) { free[i] = free_directions(matrix, i).cast<float>(); });
+  const auto tentative = [&](std::size_t i) -> Eigen::Matrix<double, 6, 3> {
+    const double reach = groups.coarse_reach[groups.aggregate_of[i]];
+    return rigid_motion<3>(groups.offset[i], 0, reach) * free[i].cast<double>();
+  };
+  smooth_prolongator<3>(matrix, level.inverse_diagonal, smoothing_weight(level.largest_eigenvalue),
+                        groups.aggregate_of, tentative, level.transfer);
+}
+
+void refresh_transfer(const MatrixView<Square<6>>& matrix, const Grouping& groups, Level<6>& level) {
+  prepare_smoother<6>(matrix, level);
   const auto tentative = [&](std::size_t i) {
-    return rigid_motion<R>(groups.offset[i], R == 6 ? groups.fine_reach[i] : 0.,
+    return rigid_motion<6>(groups.offset[i], groups.fine_reach[i],
                            groups.coarse_reach[groups.aggregate_of[i]]);
   };
-  const double weight = 4. / 3 / (1.05 * level.largest_eigenvalue);
-  smooth_prolongator<R>(matrix, level.inverse_diagonal, weight, groups.aggregate_of, tentative,
-                        level.transfer);
+  smooth_prolongator<6>(matrix, level.inverse_diagonal, smoothing_weight(level.largest_eigenvalue),
+                        groups.aggregate_of, tentative, level.transfer);
 }
 
 struct CoarseLevel {
@@ -103,7 +142,7 @@ class Multigrid : public Preconditioner {
   void refresh() override {
     if (matrix_.rows() == 0) return;
     if (coarse_.empty()) return coarsest_.factorise(lower_half(view(matrix_)));
-    refresh_transfer<3>(view(matrix_), groups_, fine_);
+    refresh_transfer(view(matrix_), groups_, fine_);
     std::vector<Square<6>> values = galerkin<3>(view(matrix_), fine_.transfer, coarse_.front().pattern);
     for (std::size_t l = 0; l < coarse_.size(); ++l) {
       CoarseLevel& coarse = coarse_[l];
@@ -112,7 +151,7 @@ class Multigrid : public Preconditioner {
         coarsest_.factorise(lower_half(exact));
         break;
       }
-      refresh_transfer<6>(exact, coarse.groups, coarse.level);
+      refresh_transfer(exact, coarse.groups, coarse.level);
       std::vector<Square<6>> next = galerkin<6>(exact, coarse.level.transfer, coarse_[l + 1].pattern);
       coarse.values.resize(values.size());
       for (std::size_t q = 0; q < values.size(); ++q) coarse.values[q] = values[q].cast<float>();
