@@ -1,1 +1,142 @@
-int main() { return 1; }
+// flexel-voxelize: parts in, body out.
+#include <optional>
+#include <vector>
+
+#include "formats/body_file.h"
+#include "formats/error.h"
+#include "formats/import.h"
+#include "formats/parallel.h"
+#include "formats/program.h"
+#include "formats/progress.h"
+#include "formats/units.h"
+#include "voxelize/voxelize.h"
+
+namespace flexel {
+namespace {
+
+constexpr const char* kName = "flexel-voxelize";
+
+struct Arguments {
+  std::vector<std::string> parts;
+  std::string size, placement = "corner", unit, align = "snap", material, max_memory, deflection, format,
+                    output = "-";
+  std::optional<std::size_t> count;
+  int threads = 0;
+  bool compress = false, quiet = false;
+};
+
+void declare(CLI::App& app, Arguments& arguments) {
+  app.add_option("PART", arguments.parts, "STEP, STL or OBJ files; - or none: standard input");
+  app.add_option("--size", arguments.size, "spacing of the lattice, for example \"2 mm\"");
+  app.add_option("--count", arguments.count, "or: about this many cells over all parts (default 20000)");
+  app.add_option("--placement", arguments.placement, "elements at the voxels' corner (default) or centre");
+  app.add_option("--unit", arguments.unit, "length unit of files that carry none (default mm)");
+  app.add_option("--align", arguments.align,
+                 "lattice to the part's flat faces: snap (default), to its box: box, or none");
+  app.add_option("--material", arguments.material, "name of the parts' material; else the scene gives it");
+  app.add_option("--max-memory", arguments.max_memory,
+                 "refuse what needs more to simulate, for example 4GB (default 80 % of what is free)");
+  app.add_option("--deflection", arguments.deflection,
+                 "STEP: largest distance of the triangles from the CAD surface");
+  app.add_option("--input-format,--format", arguments.format,
+                 "format of the input (step, stl, obj) instead of what its bytes tell");
+  app.add_option("--threads", arguments.threads, "threads; 0 (default): every core")
+      ->check(CLI::NonNegativeNumber);
+  app.add_flag("--compress", arguments.compress, "compress the arrays of the body file");
+  app.add_flag("--quiet", arguments.quiet, "say warnings only");
+  app.add_option("-o,--output", arguments.output, "body file (.vtu); - or none: standard output");
+}
+
+// One of `words`; throws InputError with the nearest.
+std::size_t choose(const std::string& option, const std::string& word,
+                   const std::vector<std::string>& words) {
+  for (std::size_t n = 0; n < words.size(); ++n)
+    if (words[n] == word) return n;
+  std::string list;
+  for (const std::string& each : words) list += (list.empty() ? "" : ", ") + each;
+  throw InputError(option + ": unknown word \"" + word + "\" (one of " + list + ")" +
+                   did_you_mean(word, words));
+}
+
+// Bytes from "4GB", "512 MiB" or a plain number of bytes.
+double parse_bytes(const std::string& text) {
+  std::size_t end = 0;
+  double value = -1;
+  try {
+    value = std::stod(text, &end);
+  } catch (const std::exception&) {
+    throw InputError("--max-memory: \"" + text + "\" is not a number of bytes, for example 4GB");
+  }
+  std::string unit = text.substr(end);
+  unit.erase(0, unit.find_first_not_of(' '));
+  const std::vector<std::string> units = {"", "B", "kB", "MB", "GB", "TB", "KiB", "MiB", "GiB", "TiB"};
+  const double factors[] = {1, 1, 1e3, 1e6, 1e9, 1e12, 1024., 1048576., 1073741824., 1099511627776.};
+  for (std::size_t n = 0; n < units.size(); ++n)
+    if (unit == units[n] && value > 0 && value < 1e30) return value * factors[n];
+  throw InputError("--max-memory: \"" + text + "\" is not an amount of memory, for example 4GB" +
+                   did_you_mean(unit, units));
+}
+
+VoxelizeOptions voxelize_options(const Arguments& arguments) {
+  VoxelizeOptions options;
+  if (!arguments.size.empty() && arguments.count) throw InputError("give --size or --count, not both");
+  if (!arguments.size.empty()) {
+    options.size = parse_quantity(arguments.size, Dimension::length);
+    if (!(*options.size > 0)) throw InputError("--size: must be above zero");
+  }
+  if (arguments.count && *arguments.count == 0) throw InputError("--count: must be above zero");
+  options.count = arguments.count;
+  options.placement = choose("--placement", arguments.placement, {"corner", "centre"}) == 0
+                          ? Placement::corner
+                          : Placement::centre;
+  constexpr Align aligns[] = {Align::snap, Align::box, Align::none};
+  options.align = aligns[choose("--align", arguments.align, {"snap", "box", "none"})];
+  options.material = arguments.material;
+  if (!arguments.max_memory.empty()) options.max_memory = parse_bytes(arguments.max_memory);
+  return options;
+}
+
+ImportOptions import_options(const Arguments& arguments) {
+  ImportOptions options;
+  if (!arguments.unit.empty()) options.unit = length_unit(arguments.unit);
+  if (!arguments.format.empty()) options.format = arguments.format;
+  if (!arguments.deflection.empty()) {
+    options.deflection = parse_quantity(arguments.deflection, Dimension::length);
+    if (!(*options.deflection > 0)) throw InputError("--deflection: must be above zero");
+  }
+  return options;
+}
+
+Surface import_all(const Arguments& arguments, const ImportOptions& options) {
+  std::vector<std::string> files = arguments.parts;
+  if (files.empty()) files.emplace_back("-");
+  Surface surface = import_surface(files[0], options);
+  for (std::size_t n = 1; n < files.size(); ++n) append(surface, import_surface(files[n], options));
+  return surface;
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("Turns parts into lattices of elements.", kName);
+  Arguments arguments;
+  declare(app, arguments);
+  if (!parse_arguments(app, argc, argv)) return kExitDone;
+  const VoxelizeOptions options = voxelize_options(arguments);
+  const ImportOptions import = import_options(arguments);
+  const ThreadLimit threads(arguments.threads);
+  Progress progress(kName, arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
+  progress.stage("import");
+  Surface surface = import_all(arguments, import);
+  const VoxelizeResult result = voxelize(std::move(surface), options, progress);
+  report(result, progress);
+  progress.stage("write");
+  write_body(result.body, arguments.output, {.compress = arguments.compress});
+  progress.finish();
+  return kExitDone;
+}
+
+}  // namespace
+}  // namespace flexel
+
+int main(int argc, char** argv) {
+  return flexel::run_program(flexel::kName, [&] { return flexel::run(argc, argv); });
+}

@@ -1,0 +1,27 @@
+// Voxels -> elements and cells of the body.
+#pragma once
+#include "formats/body.h"
+#include "voxelize/voxels.h"
+
+namespace flexel {
+
+struct AssembledPart {
+  std::size_t cells = 0, elements = 0;
+  std::size_t dropped_cells = 0;
+  double volume = 0, dropped_volume = 0;  // in voxels
+};
+
+// The cells that bound each polygon, as (polygon, cell) pairs by cell; cells are numbered over the body.
+struct PolygonCell {
+  std::uint32_t polygon = 0, cell = 0;
+};
+
+// Appends one part's elements (corner placement: and cells) to the body and sets the part's ranges. `part`
+// has its lattice and placement. The cells under polygons are appended to `polygon_cells` (corner placement).
+AssembledPart assemble_part(const Voxels& voxels, const Part& part, Body& body,
+                            std::vector<PolygonCell>& polygon_cells);
+
+// Fills surface_cell_offsets and surface_cells from the pairs of all parts.
+void set_surface_cells(const std::vector<PolygonCell>& polygon_cells, Body& body);
+
+}  // namespace flexel

@@ -1,0 +1,46 @@
+#include "voxelize/memory.h"
+
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <string>
+
+namespace flexel {
+
+double estimate_cells(const PartExtent& extent, double spacing, Placement placement) {
+  const double inside = extent.volume / (spacing * spacing * spacing);
+  return placement == Placement::centre ? inside : inside + .75 * extent.area / (spacing * spacing);
+}
+
+double spacing_for_cells(const std::vector<PartExtent>& extents, double cells, Placement placement) {
+  const auto total = [&](double spacing) {
+    double sum = 0;
+    for (const PartExtent& extent : extents) sum += estimate_cells(extent, spacing, placement);
+    return sum;
+  };
+  // The count falls with the spacing: bisect its logarithm.
+  double low = -60, high = 60;
+  for (int step = 0; step < 200; ++step) {
+    const double middle = (low + high) / 2;
+    (total(std::exp(middle)) > cells ? low : high) = middle;
+  }
+  return std::exp(high);
+}
+
+double simulation_memory(double cells, Placement placement) {
+  constexpr double kPerCell = 4400, kPerCentreElement = 400;  // bytes
+  return cells * (placement == Placement::corner ? kPerCell : kPerCentreElement);
+}
+
+double available_memory() {
+  std::ifstream file("/proc/meminfo");
+  std::string name, unit;
+  double kibibytes = 0;
+  while (file >> name >> kibibytes) {
+    if (name == "MemAvailable:") return kibibytes * 1024;
+    std::getline(file, unit);
+  }
+  return std::numeric_limits<double>::infinity();
+}
+
+}  // namespace flexel

@@ -1,0 +1,31 @@
+// What the lattice and its simulation will need, before either is made.
+#pragma once
+#include "formats/body.h"
+
+namespace flexel {
+
+// Size of a part, for estimates.
+struct PartExtent {
+  double volume = 0;  // m^3
+  double area = 0;    // m^2 of its surface
+};
+
+// Cells (centre placement: elements) of a part at spacing h [m]. A lattice plane at a random place and
+// orientation cuts 3/2 A / h^2 voxels of a smooth surface of area A (mean of |n_x| + |n_y| + |n_z| over
+// directions); half the volume of those is inside already: V / h^3 + 3/4 A / h^2 (corners), V / h^3
+// (centres).
+[[nodiscard]] double estimate_cells(const PartExtent& extent, double spacing, Placement placement);
+
+// The spacing [m] at which all parts together have `cells` cells.
+[[nodiscard]] double spacing_for_cells(const std::vector<PartExtent>& extents, double cells,
+                                       Placement placement);
+
+// Bytes that simulate needs at equilibrium. Corner placement: 4.4 kB a cell: about one element a cell, 27
+// blocks of 3 x 3 doubles (72 B) each in the assembled matrix = 1.9 kB, about as much again for the multigrid
+// hierarchy, the rest vectors. Centre placement, which is stepped without a matrix: 400 B an element.
+[[nodiscard]] double simulation_memory(double cells, Placement placement);
+
+// Bytes that can be used without swapping (MemAvailable); infinite where the system does not say.
+[[nodiscard]] double available_memory();
+
+}  // namespace flexel

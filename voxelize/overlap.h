@@ -1,0 +1,15 @@
+// Where shells interpenetrate: fills and volumes of their union.
+#pragma once
+#include "voxelize/pieces.h"
+
+namespace flexel {
+
+// Share of the voxel where the winding number is above 0, by 64 x 64 lines through it (exact along each
+// line).
+[[nodiscard]] double fill_by_lines(const VoxelRecords& voxel);
+
+// Volume [m^3] of the part where the winding number is above 0, by `lines` x `lines` lines along each axis
+// (their mean).
+[[nodiscard]] double union_volume(const PartMesh& mesh, int lines = 512);
+
+}  // namespace flexel

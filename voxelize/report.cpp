@@ -1,0 +1,90 @@
+// What is said about each part after it was voxelised.
+#include <fmt/format.h>
+#include <cmath>
+
+#include "formats/units.h"
+#include "voxelize/voxelize.h"
+
+namespace flexel {
+namespace {
+
+std::string spacing_text(const Vec3& spacing) {
+  if (spacing.maxCoeff() - spacing.minCoeff() <= 1e-9 * spacing.maxCoeff()) return human_length(spacing.x());
+  return fmt::format("{} x {} x {}", human_length(spacing.x()), human_length(spacing.y()),
+                     human_length(spacing.z()));
+}
+
+void say_volume(const VoxelizedPart& part, const std::string& name, Placement placement, Progress& progress) {
+  if (!part.closed) return;
+  const double lattice = part.lattice_volume + part.dropped_volume;
+  progress.say(fmt::format("{}: volume of the lattice {}, of the surface {}{} (relative difference {:.1e})",
+                           name, human_volume(lattice), human_volume(part.surface_volume),
+                           part.overlapping_voxels > 0 ? " (union of its shells)" : "",
+                           std::abs(lattice / part.surface_volume - 1)));
+  if (placement == Placement::corner && part.dropped_cells > 0)
+    progress.say(
+        fmt::format("{}: {} slivers under 1/64 of a cell dropped, {} together ({:.1e} of the volume)", name,
+                    human_count(part.dropped_cells), human_volume(part.dropped_volume),
+                    part.dropped_volume / part.surface_volume));
+}
+
+void say_repairs(const VoxelizedPart& part, const std::string& name, Progress& progress) {
+  if (part.flipped_triangles > 0)
+    progress.warn(
+        fmt::format("{}: {} triangles faced the other way than their neighbours; taken the other way round",
+                    name, human_count(part.flipped_triangles)));
+  if (part.inverted_shells > 0)
+    progress.warn(fmt::format("{}: {} of {} shells are inside out; taken the other way round", name,
+                              human_count(part.inverted_shells), human_count(part.shells)));
+  if (part.cracks_closed)
+    progress.warn(fmt::format(
+        "{}: cracks in the surface closed by welding vertices within 1e-7 of its diagonal", name));
+  if (!part.closed)
+    progress.warn(
+        fmt::format("{}: the surface is not closed; inside and outside by vote of lines along three axes, "
+                    "which differ in {} voxels",
+                    name, human_count(part.disagreements)));
+  if (part.overlapping_voxels > 0)
+    progress.say(fmt::format("{}: shells interpenetrate in {} voxels; their union is taken", name,
+                             human_count(part.overlapping_voxels)));
+  if (part.undecided_voxels > 0)
+    progress.warn(fmt::format("{}: the pieces of {} voxels could not be told apart; taken as one", name,
+                              human_count(part.undecided_voxels)));
+}
+
+void say_walls(const VoxelizedPart& part, const std::string& name, Progress& progress) {
+  if (!part.thinnest || part.thin_walls == 0) return;
+  const Vec3& at = part.thinnest->where;
+  progress.warn(fmt::format(
+      "{}: walls thinner than two cells, the thinnest {} at ({}, {}, {}); a smaller size resolves them", name,
+      human_length(part.thinnest->thickness), human_length(at.x()), human_length(at.y()),
+      human_length(at.z())));
+}
+
+}  // namespace
+
+void report(const VoxelizeResult& result, Progress& progress) {
+  for (std::size_t p = 0; p < result.parts.size(); ++p) {
+    const VoxelizedPart& part = result.parts[p];
+    const Part& lattice = result.body.parts[p];
+    const SurfaceSource& source = result.body.surface.sources[result.body.surface.part_source[p]];
+    if (!source.unit_given)
+      progress.say(fmt::format("{}: {} has no unit: {} assumed (--unit)", lattice.name, source.file,
+                               human_length(source.unit)));
+    progress.say(lattice.placement == Placement::corner
+                     ? fmt::format("{}: {} elements, {} cells of {}", lattice.name,
+                                   human_count(part.elements), human_count(part.cells),
+                                   spacing_text(part.spacing))
+                     : fmt::format("{}: {} elements, spacing {}", lattice.name, human_count(part.elements),
+                                   spacing_text(part.spacing)));
+    say_volume(part, lattice.name, lattice.placement, progress);
+    if (part.split_voxels > 0)
+      progress.say(fmt::format("{}: {} voxels hold several pieces, kept apart", lattice.name,
+                               human_count(part.split_voxels)));
+    say_repairs(part, lattice.name, progress);
+    say_walls(part, lattice.name, progress);
+  }
+  progress.say(fmt::format("simulating this needs about {}", human_bytes(result.simulation_memory)));
+}
+
+}  // namespace flexel
