@@ -99,7 +99,7 @@ class Checker {
       constexpr double kTolerance = 1e-9;  // far above rounding, far below any harm
       const Mat3& axes = lattice.axes;
       const double deviation = (axes.transpose() * axes - Mat3::Identity()).cwiseAbs().maxCoeff();
-      if (!(deviation <= kTolerance) || axes.determinant() <= 0)
+      if (!axes.allFinite() || deviation > kTolerance || axes.determinant() <= 0)
         fail("parts[{}].lattice.axes is not a rotation", p);
       if (!std::isfinite(part.surface_volume)) fail("parts[{}].surface_volume is not finite", p);
     }

@@ -116,14 +116,15 @@ Bytes decompress(std::span<const std::byte> data, std::size_t expected_size) {
   if (expected_size / kBestRatio > data.size())
     throw InputError(
         fmt::format("compressed data is damaged: {} bytes cannot hold {}", data.size(), expected_size));
-  Bytes plain(expected_size);
-  std::byte nothing{};
-  uLongf size = expected_size;
+  Bytes plain(expected_size + 1);  // one more, so that data that goes on is seen
+  uLongf size = plain.size();
   uLong used = data.size();
-  const int code = uncompress2(reinterpret_cast<Bytef*>(plain.empty() ? &nothing : plain.data()), &size,
+  const int code = uncompress2(reinterpret_cast<Bytef*>(plain.data()), &size,
                                reinterpret_cast<const Bytef*>(data.data()), &used);
   if (code == Z_MEM_ERROR) throw std::bad_alloc();
-  if (code != Z_OK || size != expected_size) throw InputError("compressed data is damaged");
+  if (code != Z_OK || size != expected_size || used != data.size())
+    throw InputError("compressed data is damaged");
+  plain.pop_back();
   return plain;
 }
 

@@ -54,11 +54,12 @@ std::string escaped(const std::string& text) {
   return result;
 }
 
+// One component is not said, as VTK does: readers then give a plain list instead of a table of one column.
 std::string tag(const Array& array, std::uint64_t offset) {
-  return fmt::format(
-      "<DataArray type=\"{}\" Name=\"{}\" NumberOfComponents=\"{}\"{} format=\"appended\" offset=\"{}\"/>\n",
-      array.type, escaped(array.name), array.components,
-      array.section == Section::field ? fmt::format(" NumberOfTuples=\"{}\"", array.tuples) : "", offset);
+  std::string text = fmt::format("<DataArray type=\"{}\" Name=\"{}\"", array.type, escaped(array.name));
+  if (array.components != 1) text += fmt::format(" NumberOfComponents=\"{}\"", array.components);
+  if (array.section == Section::field) text += fmt::format(" NumberOfTuples=\"{}\"", array.tuples);
+  return text + fmt::format(" format=\"appended\" offset=\"{}\"/>\n", offset);
 }
 
 std::string section_tags(const char* element, Section section, const std::vector<Array>& arrays,

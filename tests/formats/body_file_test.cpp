@@ -185,7 +185,9 @@ TEST_F(BodyFile, HexahedraHaveVtksCornerOrder) {
 
 TEST_F(BodyFile, EveryTruncationIsRefused) {
   for (const bool compress : {false, true}) {
-    const std::string text = written(test::random_body(2), {compress, true});
+    Body body = test::random_body(2);
+    body.surface.sources[0].bytes.resize(1000);
+    const std::string text = written(body, {compress, true});
     std::vector<std::size_t> lengths;
     for (std::size_t length = 1; length < text.size(); length += 1 + text.size() / 200)
       lengths.push_back(length);
@@ -219,7 +221,7 @@ TEST_F(BodyFile, RandomDamageNeverPassesUnchecked) {
     const std::string good = written(body, {compress, true});
     const std::size_t head = good.find("<AppendedData");
     int refused = 0;
-    for (int trial = 0; trial < 1500; ++trial) {
+    for (int trial = 0; trial < 600; ++trial) {
       std::string bad = good;
       const std::size_t reach =
           trial % 2 == 0 ? head + 1200 : bad.size();  // half of them in the head and the metadata
@@ -227,7 +229,7 @@ TEST_F(BodyFile, RandomDamageNeverPassesUnchecked) {
         bad[random() % reach] = static_cast<char>(trial % 3 == 0 ? '0' + random() % 10 : random() % 256);
       refused += failure(bad).empty() ? 0 : 1;
     }
-    EXPECT_GT(refused, 500);
+    EXPECT_GT(refused, 200);
   }
 }
 
