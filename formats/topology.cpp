@@ -10,6 +10,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "formats/disjoint_sets.h"
 #include "formats/parallel.h"
 #include "formats/weld.h"
 
@@ -17,25 +18,6 @@ namespace flexel {
 namespace {
 
 using Corners = std::array<std::uint32_t, 3>;
-
-// Disjoint sets of triangles; the root of a set is its lowest member.
-class DisjointSets {
- public:
-  explicit DisjointSets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0u); }
-  std::uint32_t root(std::uint32_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void unite(std::uint32_t a, std::uint32_t b) {
-    a = root(a);
-    b = root(b);
-    if (a < b) parent_[b] = a;
-    if (b < a) parent_[a] = b;
-  }
-
- private:
-  std::vector<std::uint32_t> parent_;
-};
 
 bool degenerate(const Corners& c) {
   return c[0] == c[1] || c[1] == c[2] || c[2] == c[0];

@@ -1,1 +1,87 @@
-int main() { return 1; }
+// flexel-map: a deformed body in, its surface deformed out.
+#include "formats/body_file.h"
+#include "formats/parallel.h"
+#include "formats/program.h"
+#include "formats/surface_file.h"
+#include "formats/units.h"
+#include "mapping/map.h"
+
+namespace flexel {
+namespace {
+
+constexpr const char* kProgram = "flexel-map";
+
+struct Arguments {
+  std::string body = "-", output = "-", method = "affine", report, format, unit;
+  bool ascii = false, strict = false, quiet = false;
+  int threads = 0;
+};
+
+void declare(CLI::App& app, Arguments& arguments) {
+  app.add_option("body", arguments.body, "Body file (.vtu); without one, or with -, stdin")
+      ->type_name("BODY");
+  app.add_option("--method", arguments.method,
+                 "How a frame carries its vertices: affine (second order) or gram-schmidt (the paper's)")
+      ->type_name("NAME")
+      ->capture_default_str();
+  app.add_option("--report", arguments.report, "Write the validity report as JSON")->type_name("FILE");
+  app.add_option("--format", arguments.format, "stl or obj; else told by the output's extension")
+      ->type_name("NAME");
+  app.add_flag("--ascii", arguments.ascii, "Write an ASCII STL");
+  app.add_option("--unit", arguments.unit, "Unit of the coordinates written; else that of the input")
+      ->type_name("UNIT");
+  app.add_flag("--strict", arguments.strict,
+               "Exit 4 and write no surface when a frame is inverted or degenerate");
+  app.add_option("--threads", arguments.threads, "Threads; 0 is every core")->check(CLI::NonNegativeNumber);
+  app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
+  app.add_option("-o,--output", arguments.output, "Where the surface goes; without it, or with -, stdout")
+      ->type_name("FILE");
+}
+
+void write_text(const std::string& text, const std::string& path) {
+  OutputFile file(path, false);
+  file.write(text);
+  file.commit();
+}
+
+int run(int argc, char** argv) {
+  Arguments arguments;
+  CLI::App app{"Maps the deformation of a body onto the surface that it was made from.", kProgram};
+  declare(app, arguments);
+  if (!parse_arguments(app, argc, argv)) return kExitDone;
+  const MapOptions options{map_method(arguments.method)};
+  const SurfaceFormat format = surface_format(arguments.format, arguments.output, arguments.ascii);
+  const double unit = arguments.unit.empty() ? 0 : length_unit(arguments.unit);
+  if (arguments.report == "-" && arguments.output == "-")
+    throw InputError("the report and the surface cannot both go to stdout: give one of them a file");
+  const ThreadLimit limit(arguments.threads);
+  Progress progress(kProgram, arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
+
+  progress.stage("read");
+  const Body body = read_body(arguments.body);
+  progress.stage("map");
+  const MapResult result = map_surface(body, options, progress);
+  const MapReport found = report(body, result);
+  const std::vector<std::string> lines = report_lines(found);
+  progress.finish();
+  for (std::size_t i = 0; i < lines.size(); ++i)
+    if (i == 0 && !found.valid())
+      progress.warn(lines[i]);
+    else
+      progress.say(lines[i]);
+  // The report is written first: it says why --strict refuses.
+  if (!arguments.report.empty()) write_text(report_json(found, options), arguments.report);
+  if (!found.valid() && (arguments.strict || found.not_finite > 0)) throw InvalidMappingError(lines.front());
+  progress.stage("write");
+  write_surface(body.surface, result.displacement, format, unit > 0 ? unit : default_unit(body.surface),
+                arguments.output);
+  progress.finish();
+  return kExitDone;
+}
+
+}  // namespace
+}  // namespace flexel
+
+int main(int argc, char** argv) {
+  return flexel::run_program(flexel::kProgram, [&] { return flexel::run(argc, argv); });
+}

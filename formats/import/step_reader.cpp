@@ -1,11 +1,354 @@
-// STEP through OpenCASCADE.
+// STEP through OpenCASCADE, the only file that sees it. Every solid is tessellated face by face; the nodes of
+// neighbouring faces are merged by topology: the i-th node that two faces have on one edge is one vertex, and
+// so are all nodes on one CAD vertex. No tolerance is involved, so thin walls cannot be welded to each other
+// and the mesh is closed where the solid is.
+#include <fmt/format.h>
+
+#include <BRepBndLib.hxx>
+#include <BRepMesh_IncrementalMesh.hxx>
+#include <BRep_Tool.hxx>
+#include <Bnd_Box.hxx>
+#include <IMeshTools_Parameters.hxx>
+#include <Interface_Static.hxx>
+#include <Message.hxx>
+#include <Message_Messenger.hxx>
+#include <Poly_PolygonOnTriangulation.hxx>
+#include <Poly_Triangulation.hxx>
+#include <STEPControl_Reader.hxx>
+#include <Standard_Failure.hxx>
+#include <StepBasic_Product.hxx>
+#include <StepBasic_ProductDefinition.hxx>
+#include <StepBasic_ProductDefinitionFormation.hxx>
+#include <StepShape_Face.hxx>
+#include <StepShape_SolidModel.hxx>
+#include <TCollection_HAsciiString.hxx>
+#include <TopExp.hxx>
+#include <TopExp_Explorer.hxx>
+#include <TopTools_IndexedMapOfShape.hxx>
+#include <TopoDS.hxx>
+#include <TopoDS_Edge.hxx>
+#include <TopoDS_Face.hxx>
+#include <TopoDS_Vertex.hxx>
+#include <TransferBRep.hxx>
+#include <Transfer_TransientProcess.hxx>
+#include <XSControl_TransferReader.hxx>
+#include <XSControl_WorkSession.hxx>
+#include <algorithm>
+#include <array>
+#include <istream>
+#include <map>
+#include <streambuf>
+#include <utility>
+
+#include "formats/disjoint_sets.h"
 #include "formats/error.h"
 #include "formats/import/readers.h"
+#include "formats/topology.h"
 
 namespace flexel {
+namespace {
 
-Surface read_step(ImportInput& input, const ImportOptions&) {
-  throw InputError(input.where, "STEP files cannot be read yet: export the part as STL");
+constexpr double kMillimetre = 1e-3;
+constexpr std::uint32_t kNone = 0xffffffffu;
+
+// --- reading
+
+// A stream over bytes in memory.
+class MemoryStream : private std::streambuf, public std::istream {
+ public:
+  explicit MemoryStream(Bytes& bytes) : std::istream(static_cast<std::streambuf*>(this)) {
+    char* begin = reinterpret_cast<char*>(bytes.data());
+    setg(begin, begin, begin + bytes.size());
+  }
+};
+
+void check_complete(const ImportInput& input) {
+  const std::string_view text(reinterpret_cast<const char*>(input.bytes.data()), input.bytes.size());
+  if (text.rfind("END-ISO-10303-21") == std::string_view::npos)
+    throw InputError(input.where, text.find("ISO-10303-21") == std::string_view::npos
+                                      ? "is no STEP file: it does not begin with ISO-10303-21"
+                                      : "is cut off: a STEP file ends with END-ISO-10303-21");
+}
+
+TopoDS_Shape transfer(STEPControl_Reader& reader, ImportInput& input) {
+  // OpenCASCADE reports on stdout, which belongs to the result.
+  Message::DefaultMessenger()->ChangePrinters().Clear();
+  Interface_Static::SetCVal("xstep.cascade.unit", "MM");
+  MemoryStream stream(input.bytes);
+  if (reader.ReadStream(input.file.c_str(), stream) != IFSelect_RetDone)
+    throw InputError(input.where, "is damaged: OpenCASCADE cannot make sense of it as STEP");
+  reader.TransferRoots();
+  return reader.OneShape();
+}
+
+// Every shape of a kind, in the order of exploration, locations applied; each once.
+std::vector<TopoDS_Shape> shapes_of(const TopoDS_Shape& shape, TopAbs_ShapeEnum kind,
+                                    TopAbs_ShapeEnum avoid = TopAbs_SHAPE) {
+  std::vector<TopoDS_Shape> found;
+  for (TopExp_Explorer explorer(shape, kind, avoid); explorer.More(); explorer.Next())
+    found.push_back(explorer.Current());
+  return found;
+}
+
+// The solids; where there are none, closed shells stand for solids.
+std::vector<TopoDS_Shape> solids_of(const TopoDS_Shape& shape, const ImportInput& input) {
+  if (shape.IsNull()) throw InputError(input.where, "holds no shape");
+  std::vector<TopoDS_Shape> solids = shapes_of(shape, TopAbs_SOLID);
+  if (!solids.empty()) return solids;
+  std::vector<TopoDS_Shape> shells = shapes_of(shape, TopAbs_SHELL);
+  const std::size_t faces = shapes_of(shape, TopAbs_FACE).size();
+  for (const TopoDS_Shape& shell : shells)
+    if (BRep_Tool::IsClosed(shell)) solids.push_back(shell);
+  if (solids.empty())
+    throw InputError(
+        input.where,
+        fmt::format("holds no solid, only {} open shells and {} faces: export the part as a solid",
+                    shells.size(), faces));
+  return solids;
+}
+
+// --- names
+
+std::string name_of(const Handle(TCollection_HAsciiString) & text) {
+  if (text.IsNull()) return "";
+  const std::string name = clean_name(text->ToCString());
+  const bool empty = name == "NONE" || name.starts_with("Open CASCADE STEP translator");
+  return empty ? "" : name;
+}
+
+// Names by what they were read for; a shape's instances share its TShape.
+struct Names {
+  std::map<const TopoDS_TShape*, std::string> own;  // of faces and solids
+  // Of the smallest product that holds a solid, and how many solids that product holds.
+  std::map<const TopoDS_TShape*, std::pair<std::size_t, std::string>> product;
+};
+
+void add_product(Names& names, const StepBasic_ProductDefinition& definition, const TopoDS_Shape& shape) {
+  if (definition.Formation().IsNull() || definition.Formation()->OfProduct().IsNull()) return;
+  std::string name = name_of(definition.Formation()->OfProduct()->Name());
+  if (name.empty()) name = name_of(definition.Formation()->OfProduct()->Id());
+  const std::vector<TopoDS_Shape> solids = shapes_of(shape, TopAbs_SOLID);
+  for (const TopoDS_Shape& solid : solids) {
+    const auto [entry, added] = names.product.emplace(solid.TShape().get(), std::pair(solids.size(), name));
+    if (!added && solids.size() < entry->second.first) entry->second = {solids.size(), name};
+  }
+}
+
+Names read_names(const STEPControl_Reader& reader) {
+  Names names;
+  const Handle(Transfer_TransientProcess) process = reader.WS()->TransferReader()->TransientProcess();
+  for (Standard_Integer i = 1; i <= process->NbMapped(); ++i) {
+    const Handle(Standard_Transient) entity = process->Mapped(i);
+    const bool is_product = entity->IsKind(STANDARD_TYPE(StepBasic_ProductDefinition));
+    const bool is_item =
+        entity->IsKind(STANDARD_TYPE(StepShape_Face)) || entity->IsKind(STANDARD_TYPE(StepShape_SolidModel));
+    if (!is_product && !is_item) continue;
+    const TopoDS_Shape shape = TransferBRep::ShapeResult(process, entity);
+    if (shape.IsNull()) continue;
+    if (is_product)
+      add_product(names, *Handle(StepBasic_ProductDefinition)::DownCast(entity), shape);
+    else
+      names.own.emplace(shape.TShape().get(),
+                        name_of(Handle(StepRepr_RepresentationItem)::DownCast(entity)->Name()));
+  }
+  return names;
+}
+
+std::string own_name(const Names& names, const TopoDS_Shape& shape) {
+  const auto found = names.own.find(shape.TShape().get());
+  return found == names.own.end() ? "" : found->second;
+}
+
+// A product with one solid gives it its name; the solids of one product are told apart by their own names.
+std::string solid_name(const Names& names, const TopoDS_Shape& solid) {
+  const auto product = names.product.find(solid.TShape().get());
+  const std::string own = own_name(names, solid);
+  if (product == names.product.end()) return own;
+  const auto& [solids, name] = product->second;
+  return (solids > 1 && !own.empty()) || name.empty() ? own : name;
+}
+
+// --- tessellation
+
+void tessellate(const TopoDS_Shape& solid, const ImportOptions& options, const ImportInput& input) {
+  constexpr double kDefaultShare = 1e-3;  // of the diagonal
+  Bnd_Box box;
+  BRepBndLib::Add(solid, box, Standard_False);
+  if (box.IsVoid()) throw InputError(input.where, "holds a solid without extent");
+  IMeshTools_Parameters parameters;
+  parameters.Deflection =
+      options.deflection ? *options.deflection / kMillimetre : kDefaultShare * std::sqrt(box.SquareExtent());
+  parameters.Angle = options.angular_deflection;
+  parameters.InParallel = Standard_True;
+  if (!(parameters.Deflection > 0) || !(parameters.Angle > 0))
+    throw InputError(input.where, "the deflection of the tessellation must be positive");
+  BRepMesh_IncrementalMesh mesher(solid, parameters);
+}
+
+// The triangulated faces of one solid. Node i (from 1) of face f is node_base[f] + i - 1.
+struct SolidMesh {
+  TopTools_IndexedMapOfShape faces, edges, vertices;
+  std::vector<Handle(Poly_Triangulation)> triangulations;  // (faces) null where OpenCASCADE made none
+  std::vector<TopLoc_Location> locations;
+  std::vector<std::uint32_t> node_base;  // (faces + 1)
+};
+
+SolidMesh collect(const TopoDS_Shape& solid) {
+  SolidMesh mesh;
+  TopExp::MapShapes(solid, TopAbs_FACE, mesh.faces);
+  TopExp::MapShapes(solid, TopAbs_EDGE, mesh.edges);
+  TopExp::MapShapes(solid, TopAbs_VERTEX, mesh.vertices);
+  mesh.node_base.push_back(0);
+  for (Standard_Integer f = 1; f <= mesh.faces.Extent(); ++f) {
+    TopLoc_Location location;
+    mesh.triangulations.push_back(BRep_Tool::Triangulation(TopoDS::Face(mesh.faces(f)), location));
+    mesh.locations.push_back(location);
+    const auto& triangulation = mesh.triangulations.back();
+    mesh.node_base.push_back(
+        mesh.node_base.back() +
+        (triangulation.IsNull() ? 0u : static_cast<std::uint32_t>(triangulation->NbNodes())));
+  }
+  return mesh;
+}
+
+// Merges the nodes that faces have in common, through the edges of face f.
+class NodeMerger {
+ public:
+  explicit NodeMerger(const SolidMesh& mesh)
+      : mesh_(mesh),
+        sets_(mesh.node_base.back()),
+        on_edge_(mesh.edges.Extent()),
+        on_vertex_(mesh.vertices.Extent(), kNone) {}
+
+  void add_face(std::size_t f) {
+    if (mesh_.triangulations[f].IsNull()) return;
+    const TopoDS_Shape face = mesh_.faces(static_cast<Standard_Integer>(f) + 1).Oriented(TopAbs_FORWARD);
+    for (TopExp_Explorer explorer(face, TopAbs_EDGE); explorer.More(); explorer.Next())
+      add_edge(f, TopoDS::Edge(explorer.Current()));
+  }
+  std::uint32_t root(std::uint32_t node) { return sets_.root(node); }
+
+ private:
+  void add_edge(std::size_t f, const TopoDS_Edge& edge) {
+    const Handle(Poly_PolygonOnTriangulation) polygon =
+        BRep_Tool::PolygonOnTriangulation(edge, mesh_.triangulations[f], mesh_.locations[f]);
+    if (polygon.IsNull()) return;
+    const auto node = [&](Standard_Integer i) {
+      return mesh_.node_base[f] + static_cast<std::uint32_t>(polygon->Node(i)) - 1;
+    };
+    const Standard_Integer count = polygon->NbNodes();
+    add_vertex(TopExp::FirstVertex(TopoDS::Edge(edge.Oriented(TopAbs_FORWARD))), node(1));
+    add_vertex(TopExp::LastVertex(TopoDS::Edge(edge.Oriented(TopAbs_FORWARD))), node(count));
+    if (BRep_Tool::Degenerated(edge)) {
+      for (Standard_Integer i = 2; i <= count; ++i) sets_.unite(node(1), node(i));
+      return;
+    }
+    std::vector<std::uint32_t>& first = on_edge_[mesh_.edges.FindIndex(edge) - 1];
+    if (first.empty())
+      for (Standard_Integer i = 1; i <= count; ++i) first.push_back(node(i));
+    if (first.size() != static_cast<std::size_t>(count)) return;
+    for (Standard_Integer i = 1; i <= count; ++i) sets_.unite(first[i - 1], node(i));
+  }
+  void add_vertex(const TopoDS_Vertex& vertex, std::uint32_t node) {
+    if (vertex.IsNull()) return;
+    std::uint32_t& first = on_vertex_[mesh_.vertices.FindIndex(vertex) - 1];
+    if (first == kNone) first = node;
+    sets_.unite(first, node);
+  }
+
+  const SolidMesh& mesh_;
+  DisjointSets sets_;
+  std::vector<std::vector<std::uint32_t>>
+      on_edge_;                           // (edges) nodes along each, of the first face that has it
+  std::vector<std::uint32_t> on_vertex_;  // (vertices)
+};
+
+Vec3 position(const SolidMesh& mesh, std::size_t f, Standard_Integer node) {
+  const gp_Pnt point = mesh.triangulations[f]->Node(node).Transformed(mesh.locations[f].Transformation());
+  return Vec3(point.X(), point.Y(), point.Z()) * kMillimetre;
+}
+
+// Adds the triangles of one face. `vertex_of` (nodes) is the vertex of each root, kNone until it has one.
+void add_face(Surface& surface, const SolidMesh& mesh, std::size_t f, NodeMerger& merger,
+              std::vector<std::uint32_t>& vertex_of) {
+  const auto& triangulation = mesh.triangulations[f];
+  if (triangulation.IsNull()) return;
+  const bool reversed = mesh.faces(static_cast<Standard_Integer>(f) + 1).Orientation() == TopAbs_REVERSED;
+  const bool mirrored = mesh.locations[f].Transformation().IsNegative();
+  for (Standard_Integer t = 1; t <= triangulation->NbTriangles(); ++t) {
+    std::array<Standard_Integer, 3> nodes{};
+    triangulation->Triangle(t).Get(nodes[0], nodes[1], nodes[2]);
+    if (reversed != mirrored) std::swap(nodes[1], nodes[2]);
+    std::array<std::uint32_t, 3> roots{};
+    for (std::size_t i = 0; i < 3; ++i)
+      roots[i] = merger.root(mesh.node_base[f] + static_cast<std::uint32_t>(nodes[i]) - 1);
+    if (roots[0] == roots[1] || roots[1] == roots[2] || roots[2] == roots[0]) continue;
+    for (std::size_t i = 0; i < 3; ++i) {
+      std::uint32_t& vertex = vertex_of[roots[i]];
+      if (vertex == kNone) {
+        vertex = static_cast<std::uint32_t>(surface.vertices.size());
+        surface.vertices.push_back(position(mesh, f, nodes[i]));
+      }
+      surface.polygon_vertices.push_back(vertex);
+    }
+    surface.polygon_face.push_back(static_cast<std::uint32_t>(surface.faces.size() - 1));
+    surface.polygon_offsets.push_back(static_cast<std::uint32_t>(surface.polygon_vertices.size()));
+  }
+}
+
+// A solid that is inside out is turned round.
+void orient_outward(Surface& surface, std::size_t first_polygon) {
+  std::vector<std::array<std::uint32_t, 3>> corners;
+  for (std::size_t p = first_polygon; p < surface.polygon_count(); ++p) {
+    const auto polygon = surface.polygon(p);
+    corners.push_back({polygon[0], polygon[1], polygon[2]});
+  }
+  if (signed_volume(surface.vertices, corners) >= 0) return;
+  for (std::size_t p = first_polygon; p < surface.polygon_count(); ++p)
+    std::swap(surface.polygon_vertices[3 * p + 1], surface.polygon_vertices[3 * p + 2]);
+}
+
+void add_solid(Surface& surface, const TopoDS_Shape& solid, const Names& names) {
+  const SolidMesh mesh = collect(solid);
+  const std::size_t faces = mesh.triangulations.size(), first_polygon = surface.polygon_count();
+  NodeMerger merger(mesh);
+  for (std::size_t f = 0; f < faces; ++f) merger.add_face(f);
+  const auto part = static_cast<std::uint32_t>(surface.parts.size());
+  surface.parts.push_back({solid_name(names, solid)});
+  std::vector<std::uint32_t> vertex_of(mesh.node_base.back(), kNone);
+  for (std::size_t f = 0; f < faces; ++f) {
+    surface.faces.push_back({own_name(names, mesh.faces(static_cast<Standard_Integer>(f) + 1)), part});
+    add_face(surface, mesh, f, merger, vertex_of);
+  }
+  orient_outward(surface, first_polygon);
+}
+
+}  // namespace
+
+Surface read_step(ImportInput& input, const ImportOptions& options) {
+  if (options.unit) throw InputError(input.where, "a STEP file carries its own unit: leave out --unit");
+  check_complete(input);
+  try {
+    STEPControl_Reader reader;
+    const std::vector<TopoDS_Shape> solids = solids_of(transfer(reader, input), input);
+    const Names names = read_names(reader);
+    Surface surface;
+    surface.polygon_offsets.push_back(0);
+    for (const TopoDS_Shape& solid : solids) {
+      tessellate(solid, options, input);
+      add_solid(surface, solid, names);
+    }
+    SurfaceSource source;
+    source.format = "step";
+    source.unit = kMillimetre;
+    source.unit_given = true;
+    surface.sources.push_back(std::move(source));
+    return surface;
+  } catch (const Standard_Failure& failure) {
+    throw InputError(input.where,
+                     fmt::format("is damaged: OpenCASCADE stops with \"{}\"",
+                                 clean_name(failure.GetMessageString() ? failure.GetMessageString() : "")));
+  }
 }
 
 }  // namespace flexel

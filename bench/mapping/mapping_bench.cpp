@@ -1,0 +1,238 @@
+// Binding and mapping a surface of 1 M vertices on a lattice of about 100,000 elements: a ring of
+// diameter 2.6 m, h = 25 mm. The counter per_vertex is what docs/mapping.md quotes; the argument is the
+// number of threads.
+#include <benchmark/benchmark.h>
+
+#include <cmath>
+#include <numeric>
+
+#include "formats/parallel.h"
+#include "formats/topology.h"
+#include "mapping/bind.h"
+#include "mapping/nearest.h"
+
+namespace flexel {
+namespace {
+
+constexpr double kRing = 1.0, kTube = 0.3, kSpacing = 0.0245;
+constexpr std::uint32_t kAround = 1000, kAcross = 1000;
+
+Surface ring_surface() {
+  Surface surface;
+  for (std::uint32_t i = 0; i < kAround; ++i)
+    for (std::uint32_t j = 0; j < kAcross; ++j) {
+      const double a = 2 * M_PI * i / kAround, b = 2 * M_PI * j / kAcross, r = kRing + kTube * std::cos(b);
+      surface.vertices.emplace_back(r * std::cos(a), r * std::sin(a), kTube * std::sin(b));
+    }
+  surface.polygon_offsets.push_back(0);
+  for (std::uint32_t i = 0; i < kAround; ++i)
+    for (std::uint32_t j = 0; j < kAcross; ++j) {
+      for (const auto& [s, t] : {std::pair{0u, 0u}, {1u, 0u}, {1u, 1u}, {0u, 1u}})
+        surface.polygon_vertices.push_back((i + s) % kAround * kAcross + (j + t) % kAcross);
+      surface.polygon_offsets.push_back(static_cast<std::uint32_t>(surface.polygon_vertices.size()));
+    }
+  surface.polygon_face.assign(surface.polygon_count(), 0);
+  surface.faces.push_back({"ring", 0});
+  surface.parts.push_back({"ring"});
+  surface.sources.resize(1);
+  surface.part_source.push_back(0);
+  return surface;
+}
+
+bool inside(const Vec3& p) {
+  const double r = std::hypot(p.x(), p.y()) - kRing;
+  return r * r + p.z() * p.z() < kTube * kTube;
+}
+
+// Voxels of the ring, (k, j, i) ascending, and which number each has.
+struct Voxels {
+  std::array<std::int32_t, 3> count{};
+  std::vector<std::uint32_t> number;  // dense; 0xffffffff: none
+  [[nodiscard]] std::uint32_t& at(std::int32_t i, std::int32_t j, std::int32_t k) {
+    return number[(static_cast<std::size_t>(k) * count[1] + j) * count[0] + i];
+  }
+};
+
+Lattice ring_lattice() {
+  Lattice lattice;
+  lattice.spacing = Vec3::Constant(kSpacing);
+  lattice.origin = Vec3(-kRing - kTube, -kRing - kTube, -kTube) - Vec3(1.37, 1.21, 1.43) * kSpacing;
+  return lattice;
+}
+
+Voxels ring_voxels(const Surface& surface, const Lattice& lattice, Placement placement) {
+  Voxels voxels;
+  const Vec3 size = Vec3(kRing + kTube, kRing + kTube, kTube) * 2 / kSpacing;
+  for (int axis = 0; axis < 3; ++axis) voxels.count[axis] = static_cast<std::int32_t>(size[axis]) + 4;
+  voxels.number.assign(static_cast<std::size_t>(voxels.count[0]) * voxels.count[1] * voxels.count[2],
+                       0xffffffffu);
+  for (std::int32_t k = 0; k < voxels.count[2]; ++k)
+    for (std::int32_t j = 0; j < voxels.count[1]; ++j)
+      for (std::int32_t i = 0; i < voxels.count[0]; ++i)
+        if (inside(lattice.to_world(Vec3(i + 0.5, j + 0.5, k + 0.5)))) voxels.at(i, j, k) = 0;
+  if (placement == Placement::corner)
+    for (const Vec3& vertex : surface.vertices) {
+      const Vec3 u = lattice.to_lattice(vertex);
+      voxels.at(static_cast<std::int32_t>(u.x()), static_cast<std::int32_t>(u.y()),
+                static_cast<std::int32_t>(u.z())) = 0;
+    }
+  std::uint32_t next = 0;
+  for (std::uint32_t& number : voxels.number)
+    if (number == 0) number = next++;
+  return voxels;
+}
+
+void add_corner_elements(Body& body, Voxels& voxels) {
+  const auto corners = [&](std::int32_t i, std::int32_t j, std::int32_t k, const auto& visit) {
+    for (int a = 0; a < 8; ++a) {
+      const std::int32_t x = i - (a & 1), y = j - (a >> 1 & 1), z = k - (a >> 2);
+      if (x >= 0 && y >= 0 && z >= 0 && x < voxels.count[0] && y < voxels.count[1] && z < voxels.count[2] &&
+          voxels.at(x, y, z) != 0xffffffffu)
+        visit(voxels.at(x, y, z), a);
+    }
+  };
+  for (const std::uint32_t number : voxels.number)
+    if (number != 0xffffffffu) body.cell_elements.push_back({});
+  for (std::int32_t k = 0; k <= voxels.count[2]; ++k)
+    for (std::int32_t j = 0; j <= voxels.count[1]; ++j)
+      for (std::int32_t i = 0; i <= voxels.count[0]; ++i) {
+        bool used = false;
+        const auto number = static_cast<std::uint32_t>(body.rest.size());
+        corners(i, j, k, [&](std::uint32_t cell, int a) {
+          used = true;
+          body.cell_elements[cell][a] = number;
+        });
+        if (!used) continue;
+        body.lattice_index.push_back({i, j, k});
+        body.rest.push_back(body.parts[0].lattice.to_world(Vec3(i, j, k)));
+      }
+}
+
+void add_centre_elements(Body& body, Voxels& voxels) {
+  for (std::int32_t k = 0; k < voxels.count[2]; ++k)
+    for (std::int32_t j = 0; j < voxels.count[1]; ++j)
+      for (std::int32_t i = 0; i < voxels.count[0]; ++i) {
+        if (voxels.at(i, j, k) == 0xffffffffu) continue;
+        body.lattice_index.push_back({i, j, k});
+        body.rest.push_back(body.parts[0].lattice.to_world(Vec3(i + 0.5, j + 0.5, k + 0.5)));
+        std::uint32_t bits = 0;
+        for (std::size_t b = 0; b < half_neighbourhood.size(); ++b) {
+          const Index3& step = half_neighbourhood[b];
+          if (voxels.at(i + step[0], j + step[1], k + step[2]) != 0xffffffffu) bits |= 1u << b;
+        }
+        body.connections.push_back(bits);
+      }
+}
+
+Body make_ring(Placement placement) {
+  Body body;
+  body.surface = ring_surface();
+  body.parts.resize(1);
+  body.parts[0].name = "ring";
+  body.parts[0].placement = placement;
+  body.parts[0].lattice = ring_lattice();
+  Voxels voxels = ring_voxels(body.surface, body.parts[0].lattice, placement);
+  if (placement == Placement::corner) {
+    add_corner_elements(body, voxels);
+    body.connections.assign(body.rest.size(), 0);
+    for (std::size_t p = 0; p < body.surface.polygon_count(); ++p) {
+      body.surface_cell_offsets.push_back(static_cast<std::uint32_t>(body.surface_cells.size()));
+      const std::size_t begin = body.surface_cells.size();
+      for (const std::uint32_t v : body.surface.polygon(p)) {
+        const Vec3 u = body.parts[0].lattice.to_lattice(body.surface.vertices[v]);
+        body.surface_cells.push_back(voxels.at(static_cast<std::int32_t>(u.x()),
+                                               static_cast<std::int32_t>(u.y()),
+                                               static_cast<std::int32_t>(u.z())));
+      }
+      std::sort(body.surface_cells.begin() + begin, body.surface_cells.end());
+      body.surface_cells.erase(std::unique(body.surface_cells.begin() + begin, body.surface_cells.end()),
+                               body.surface_cells.end());
+    }
+    body.surface_cell_offsets.push_back(static_cast<std::uint32_t>(body.surface_cells.size()));
+  } else {
+    add_centre_elements(body, voxels);
+  }
+  body.fill.assign(body.cell_count(), 1);
+  body.broken.assign(body.cell_count(), 0);
+  body.piece.assign(body.rest.size(), 0);
+  body.parts[0].element_end = static_cast<std::uint32_t>(body.rest.size());
+  body.parts[0].cell_end = static_cast<std::uint32_t>(body.cell_count());
+  for (const Vec3& x : body.rest)  // twisted about the ring's diameter
+    body.position.emplace_back(x.x(), x.y() * std::cos(0.5 * x.x()) - x.z() * std::sin(0.5 * x.x()),
+                               x.y() * std::sin(0.5 * x.x()) + x.z() * std::cos(0.5 * x.x()));
+  check(body, "ring");
+  return body;
+}
+
+const Body& ring(Placement placement) {
+  static const Body corner = make_ring(Placement::corner), centre = make_ring(Placement::centre);
+  return placement == Placement::corner ? corner : centre;
+}
+
+void count(benchmark::State& state, const Body& body) {
+  const auto vertices = static_cast<double>(body.surface.vertices.size());
+  state.counters["elements"] = static_cast<double>(body.element_count());
+  state.counters["per_vertex"] = benchmark::Counter(
+      vertices, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+}
+
+template <Placement placement, MapMethod method>
+void bind_surface(benchmark::State& state) {
+  const Body& body = ring(placement);
+  const ThreadLimit limit(static_cast<int>(state.range(0)));
+  for (auto _ : state) benchmark::DoNotOptimize(bind(body, method).frame.data());
+  count(state, body);
+}
+
+template <Placement placement, MapMethod method>
+void apply_state(benchmark::State& state) {
+  const Body& body = ring(placement);
+  const ThreadLimit limit(static_cast<int>(state.range(0)));
+  const Binding binding = bind(body, method);
+  for (auto _ : state) benchmark::DoNotOptimize(apply(binding, body, body.position).flags.data());
+  count(state, body);
+}
+
+// Parts of binding that other people's code does.
+void connections(benchmark::State& state) {
+  const Body& body = ring(Placement::corner);
+  const ThreadLimit limit(static_cast<int>(state.range(0)));
+  for (auto _ : state) benchmark::DoNotOptimize(element_adjacency(body).neighbours.data());
+  count(state, body);
+}
+
+void welding(benchmark::State& state) {
+  const Body& body = ring(Placement::corner);
+  const ThreadLimit limit(static_cast<int>(state.range(0)));
+  for (auto _ : state) benchmark::DoNotOptimize(weld(body.surface.vertices).data());
+  count(state, body);
+}
+
+// The nearest element of every vertex, which centre placement needs.
+void nearest(benchmark::State& state) {
+  const Body& body = ring(Placement::centre);
+  const ThreadLimit limit(static_cast<int>(state.range(0)));
+  const ElementGrid grid(body, 0);
+  std::vector<std::uint32_t> found(body.surface.vertices.size());
+  for (auto _ : state) {
+    parallel_for_each(found.size(),
+                      [&](std::size_t v) { found[v] = grid.nearest(body.surface.vertices[v]); });
+    benchmark::DoNotOptimize(found.data());
+  }
+  count(state, body);
+}
+
+constexpr auto kMs = benchmark::kMillisecond;
+BENCHMARK(bind_surface<Placement::corner, MapMethod::affine>)->Arg(1)->Arg(2)->Unit(kMs)->UseRealTime();
+BENCHMARK(bind_surface<Placement::centre, MapMethod::affine>)->Arg(1)->Arg(2)->Unit(kMs)->UseRealTime();
+BENCHMARK(apply_state<Placement::corner, MapMethod::affine>)->Arg(1)->Arg(2)->Unit(kMs)->UseRealTime();
+BENCHMARK(apply_state<Placement::corner, MapMethod::gram_schmidt>)->Arg(1)->Arg(2)->Unit(kMs)->UseRealTime();
+BENCHMARK(apply_state<Placement::centre, MapMethod::gram_schmidt>)->Arg(1)->Arg(2)->Unit(kMs)->UseRealTime();
+BENCHMARK(connections)->Arg(1)->Arg(2)->Unit(kMs)->UseRealTime();
+BENCHMARK(welding)->Arg(1)->Arg(2)->Unit(kMs)->UseRealTime();
+BENCHMARK(nearest)->Arg(1)->Arg(2)->Unit(kMs)->UseRealTime();
+
+}  // namespace
+}  // namespace flexel
+
+BENCHMARK_MAIN();
