@@ -92,6 +92,8 @@ template <class Entry, class Make>
 void write(OutputFile& output, std::size_t points, std::size_t cells, const std::vector<Array>& arrays,
            bool compress);
 
+struct HeadArray;  // formats/vtu_head.h
+
 // A file that was read, its arrays still packed. Every offset and size is checked when it is opened, so that
 // none is trusted later. Throws InputError: truncated, not a .vtu with appended raw data, sizes that do not
 // agree (naming the array).
@@ -131,8 +133,9 @@ class File {
     std::size_t block_size = 0;                    // compressed: bytes of a block, unpacked
     std::vector<std::uint64_t> packed_block_size;  // compressed: bytes of each block, packed
   };
-  void read_head(std::size_t head_end);
-  void locate(Stored& stored, const std::string& name, std::uint64_t offset) const;
+  [[nodiscard]] std::size_t find_data();
+  [[nodiscard]] Stored locate(const HeadArray& array) const;
+  void locate_raw(Stored& stored, const std::string& name, std::size_t begin) const;
   void locate_blocks(Stored& stored, const std::string& name, std::size_t begin) const;
   [[nodiscard]] std::uint64_t header(std::size_t at) const;
   [[nodiscard]] const Stored& stored(Section section, const std::string& name) const;

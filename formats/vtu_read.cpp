@@ -4,54 +4,22 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cstring>
-#include <pugixml.hpp>
 #include <string_view>
 
 #include "formats/error.h"
 #include "formats/parallel.h"
 #include "formats/vtu.h"
+#include "formats/vtu_head.h"
 
 namespace flexel::vtu {
 namespace {
 
-constexpr std::uint64_t kMostTuples = 0xffffffffu;  // of points and cells
-constexpr std::uint64_t kMostComponents = 1024;
-
-std::size_t scalar_size(const std::string& type) {
-  static const std::map<std::string, std::size_t> sizes = {
-      {"Float64", 8}, {"Float32", 4}, {"Int64", 8},  {"UInt64", 8}, {"Int32", 4},
-      {"UInt32", 4},  {"Int16", 2},   {"UInt16", 2}, {"Int8", 1},   {"UInt8", 1}};
-  const auto found = sizes.find(type);
-  return found == sizes.end() ? 0 : found->second;
-}
+// Deflate never packs better than this: a larger size is a lie and must not be allocated.
+constexpr std::size_t kBestRatio = 1032;
 
 std::string_view text_of(const Bytes& bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
-// The attribute as a whole number up to `most`, or nothing.
-bool whole_number(const pugi::xml_node& node, const char* attribute, std::uint64_t most,
-                  std::uint64_t& value) {
-  const std::string_view text = node.attribute(attribute).value();
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && !text.empty() && end == text.data() + text.size() && value <= most;
-}
-
-const char* section_name(Section section) {
-  switch (section) {
-    case Section::field:
-      return "field data";
-    case Section::points:
-      return "points";
-    case Section::point_data:
-      return "point data";
-    case Section::cells:
-      return "cells";
-    default:
-      return "cell data";
-  }
 }
 
 }  // namespace
@@ -67,14 +35,26 @@ void File::fail_truncated() const {
 }
 
 File::File(Bytes bytes, std::string where) : bytes_(std::move(bytes)), where_(std::move(where)) {
+  const std::size_t head_end = find_data();
+  const Head head = parse_head(text_of(bytes_).substr(0, head_end), where_);
+  points_ = head.points;
+  cells_ = head.cells;
+  compressed_ = head.compressed;
+  for (const HeadArray& array : head.arrays)
+    if (!arrays_.emplace(std::pair(array.section, array.name), locate(array)).second)
+      fail(fmt::format("damaged: {} is there twice", array.shown()));
+}
+
+// Finds where the appended data begins and ends; returns the end of the head. The end tags come last, so that
+// they are missing exactly when something is.
+std::size_t File::find_data() {
   const std::string_view text = text_of(bytes_);
-  const std::size_t tag_begin = text.find("<AppendedData");
-  const std::size_t tag_end = tag_begin == text.npos ? text.npos : text.find('>', tag_begin);
+  const std::size_t tag = text.find("<AppendedData");
+  const std::size_t tag_end = tag == text.npos ? text.npos : text.find('>', tag);
   const std::size_t mark = tag_end == text.npos ? text.npos : text.find_first_not_of(" \t\r\n", tag_end + 1);
   if (mark == text.npos) {
-    const bool whole = text.find("</VTKFile>") != text.npos;
-    if (!whole) fail_truncated();
-    fail("is a .vtu without appended data, not a body file: a .vtu written by this suite is needed");
+    if (text.find("</VTKFile>") == text.npos) fail_truncated();
+    fail("is a .vtu without appended data, not a body file: one written by this suite is needed");
   }
   if (text[mark] != '_') fail("damaged: the appended data does not begin with \"_\"");
   data_begin_ = mark + 1;
@@ -83,76 +63,27 @@ File::File(Bytes bytes, std::string where) : bytes_(std::move(bytes)), where_(st
   const std::size_t tail = text.substr(tail_begin).rfind("</AppendedData>");
   if (tail == text.npos || text.find("</VTKFile>", tail_begin + tail) == text.npos) fail_truncated();
   data_end_ = tail_begin + tail;
-  read_head(tag_end + 1);
+  return tag_end + 1;
 }
 
-void File::read_head(std::size_t head_end) {
-  const std::string head = std::string(text_of(bytes_).substr(0, head_end)) + "</AppendedData></VTKFile>";
-  pugi::xml_document document;
-  const pugi::xml_parse_result parsed = document.load_buffer(head.data(), head.size());
-  if (!parsed)
-    fail(fmt::format("damaged: its XML head does not parse at byte {} ({})", parsed.offset,
-                     parsed.description()));
-  const pugi::xml_node file = document.child("VTKFile");
-  const pugi::xml_node grid = file.child("UnstructuredGrid"), piece = grid.child("Piece");
-  const auto demand = [&](const pugi::xml_node& node, const char* attribute, std::string_view value) {
-    if (node.attribute(attribute).value() != value)
-      fail(fmt::format("damaged, or not written by this suite: {} is \"{}\" instead of \"{}\"", attribute,
-                       node.attribute(attribute).value(), value));
-  };
-  demand(file, "type", "UnstructuredGrid");
-  demand(file, "version", "1.0");
-  demand(file, "byte_order", "LittleEndian");
-  demand(file, "header_type", "UInt64");
-  demand(file.child("AppendedData"), "encoding", "raw");
-  compressed_ = !file.attribute("compressor").empty();
-  if (compressed_) demand(file, "compressor", "vtkZLibDataCompressor");
-  if (!piece || piece.next_sibling("Piece")) fail("damaged: exactly one Piece is needed");
-  if (!whole_number(piece, "NumberOfPoints", kMostTuples, points_))
-    fail("damaged: NumberOfPoints is not a number of points");
-  if (!whole_number(piece, "NumberOfCells", kMostTuples, cells_))
-    fail("damaged: NumberOfCells is not a number of cells");
-
-  const auto add = [&](const pugi::xml_node& parent, Section section) {
-    for (const pugi::xml_node& node : parent.children()) {
-      if (node.type() != pugi::node_element) continue;
-      const std::string name = node.attribute("Name").value();
-      Stored stored;
-      stored.type = node.attribute("type").value();
-      const std::string shown = fmt::format("{} \"{}\"", section_name(section), name);
-      if (name.empty() || scalar_size(stored.type) == 0)
-        fail(fmt::format("damaged: {} has no name or an unknown type \"{}\"", shown, stored.type));
-      demand(node, "format", "appended");
-      std::uint64_t components = 1, tuples = 0, offset = 0;
-      if (!node.attribute("NumberOfComponents").empty() &&
-          (!whole_number(node, "NumberOfComponents", kMostComponents, components) || components == 0))
-        fail(fmt::format("damaged: {} has a wrong NumberOfComponents", shown));
-      if (!whole_number(node, "offset", bytes_.size(), offset))
-        fail(fmt::format("damaged: {} has a wrong offset", shown));
-      stored.components = components;
-      locate(stored, shown, offset);
-      const std::size_t tuple_size = scalar_size(stored.type) * components;
-      if (section == Section::field) {
-        if (!whole_number(node, "NumberOfTuples", bytes_.size() * 1032 + 1, tuples))
-          fail(fmt::format("damaged: {} has a wrong NumberOfTuples", shown));
-      } else if (section == Section::cells) {
-        tuples = name == "connectivity" ? stored.size / tuple_size : cells_;
-      } else {
-        tuples = section == Section::cell_data ? cells_ : points_;
-      }
-      stored.tuples = tuples;
-      if (stored.size % tuple_size != 0 || stored.size / tuple_size != tuples)
-        fail(fmt::format("damaged: {} has {} bytes for {} x {} {}", shown, stored.size, tuples, components,
-                         stored.type));
-      if (!arrays_.emplace(std::pair(section, name), std::move(stored)).second)
-        fail(fmt::format("damaged: {} is there twice", shown));
-    }
-  };
-  add(grid.child("FieldData"), Section::field);
-  add(piece.child("PointData"), Section::point_data);
-  add(piece.child("CellData"), Section::cell_data);
-  add(piece.child("Points"), Section::points);
-  add(piece.child("Cells"), Section::cells);
+// The number of tuples that the head claims must be the number that the data have.
+File::Stored File::locate(const HeadArray& array) const {
+  Stored stored;
+  stored.type = array.type;
+  stored.components = array.components;
+  const std::size_t begin = data_begin_ + array.offset;
+  if (compressed_)
+    locate_blocks(stored, array.shown(), begin);
+  else
+    locate_raw(stored, array.shown(), begin);
+  const std::size_t tuple_size = scalar_size(array.type) * array.components;
+  const bool free_size = array.section == Section::cells && array.name == "connectivity";
+  const bool of_cells = array.section == Section::cells || array.section == Section::cell_data;
+  stored.tuples = free_size ? stored.size / tuple_size : array.tuples.value_or(of_cells ? cells_ : points_);
+  if (stored.size % tuple_size != 0 || stored.size / tuple_size != stored.tuples)
+    fail(fmt::format("damaged: {} has {} bytes for {} x {} {}", array.shown(), stored.size, stored.tuples,
+                     array.components, array.type));
+  return stored;
 }
 
 std::uint64_t File::header(std::size_t at) const {
@@ -162,14 +93,11 @@ std::uint64_t File::header(std::size_t at) const {
   return value;
 }
 
-void File::locate(Stored& stored, const std::string& name, std::uint64_t offset) const {
-  const std::size_t begin = data_begin_ + offset;
-  const std::uint64_t first = header(begin);
-  if (compressed_) return locate_blocks(stored, name, begin);
+void File::locate_raw(Stored& stored, const std::string& name, std::size_t begin) const {
+  stored.size = header(begin);
   stored.begin = begin + sizeof(std::uint64_t);
-  stored.size = first;
-  if (first > data_end_ - stored.begin)
-    fail(fmt::format("damaged or truncated: {} has {} bytes, more than the file holds", name, first));
+  if (stored.size > data_end_ - stored.begin)
+    fail(fmt::format("damaged or truncated: {} has {} bytes, more than the file holds", name, stored.size));
 }
 
 void File::locate_blocks(Stored& stored, const std::string& name, std::size_t begin) const {
@@ -177,18 +105,19 @@ void File::locate_blocks(Stored& stored, const std::string& name, std::size_t be
   constexpr std::uint64_t kLargestBlock = std::uint64_t{1} << 31;
   const std::uint64_t blocks = header(begin), block_size = header(begin + kWord),
                       last = header(begin + 2 * kWord);
-  if (blocks > (data_end_ - begin) / kWord || block_size > kLargestBlock || last > block_size ||
-      (blocks > 0 && block_size == 0))
+  const std::uint64_t room = data_end_ - begin;  // bounds every size below, so that no sum overflows
+  if (blocks > room / kWord || block_size > kLargestBlock || last > block_size ||
+      (blocks > 0 && block_size == 0) || (blocks > 1 && (blocks - 1) > room * kBestRatio / block_size))
     fail(fmt::format("damaged: {} has wrong sizes of its compressed blocks", name));
   stored.begin = begin + (3 + blocks) * kWord;
   stored.block_size = block_size;
-  stored.size = blocks == 0 ? 0 : (last == 0 ? blocks * block_size : (blocks - 1) * block_size + last);
+  stored.size = blocks == 0 ? 0 : (blocks - 1) * block_size + (last == 0 ? block_size : last);
   std::uint64_t packed = 0;
   for (std::uint64_t b = 0; b < blocks; ++b) {
-    stored.packed_block_size.push_back(header(begin + (3 + b) * kWord));
-    packed += stored.packed_block_size.back();
-    if (stored.packed_block_size.back() > data_end_ - begin || packed > data_end_ - begin)
-      fail(fmt::format("damaged or truncated: {} has more bytes than the file holds", name));
+    const std::uint64_t size = header(begin + (3 + b) * kWord);
+    stored.packed_block_size.push_back(size);
+    packed += std::min(size, room + 1);
+    if (packed > room) break;
   }
   if (stored.begin > data_end_ || packed > data_end_ - stored.begin)
     fail(fmt::format("damaged or truncated: {} has more bytes than the file holds", name));
@@ -225,8 +154,7 @@ std::size_t File::expect(Section section, const std::string& name, const char* t
   if (array.type != type || array.components != components)
     fail(fmt::format("damaged: {} \"{}\" has {} x {} in place of {} x {}", section_name(section), name,
                      array.components, array.type, components, type));
-  // Deflate never packs better than 1032:1: a larger size is a lie and must not be allocated.
-  if (compressed_ && array.size / 1032 > bytes_.size())
+  if (compressed_ && array.size / kBestRatio > bytes_.size())
     fail(
         fmt::format("damaged: {} \"{}\" has more bytes than the file can hold", section_name(section), name));
   return array.tuples;
