@@ -15,6 +15,8 @@
 #include "voxelize/memory.h"
 #include "voxelize/overlap.h"
 #include "voxelize/part_mesh.h"
+#include "voxelize/vote.h"
+#include "voxelize/walls.h"
 
 namespace flexel {
 namespace {
@@ -64,9 +66,6 @@ void check_meshes(const std::vector<PartMesh>& meshes, const Surface& surface) {
   for (std::size_t p = 0; p < meshes.size(); ++p) {
     if (meshes[p].corners.empty())
       throw InputError(fmt::format("part \"{}\" has no triangle with an area", surface.parts[p].name));
-    if (!meshes[p].balanced())
-      throw InputError(fmt::format("part \"{}\" is not closed ({} open edges)", surface.parts[p].name,
-                                   meshes[p].open_edges));
   }
 }
 
@@ -97,6 +96,19 @@ VoxelizedPart describe(const PartMesh& mesh, const Voxels& voxels, const Assembl
   return found;
 }
 
+// Walls of a part: the thinnest, and how many samples are thinner than two cells.
+void measure_walls(const PartMesh& mesh, std::uint32_t part, VoxelizedPart& found) {
+  constexpr int kLines = 128;
+  if (!mesh.balanced()) return;
+  const std::vector<WallSample> samples = wall_samples(mesh, kLines);
+  if (samples.empty()) return;
+  const WallSample& least = samples[thinnest_sample(samples)];
+  found.thinnest = ThinWall{least.thickness, least.where, part};
+  const double two_cells = 2 * found.spacing.maxCoeff();
+  found.thin_walls = static_cast<std::size_t>(std::count_if(
+      samples.begin(), samples.end(), [&](const WallSample& s) { return s.thickness < two_cells; }));
+}
+
 // One part onto the body.
 VoxelizedPart voxelize_part(PartMesh& mesh, double spacing, const VoxelizeOptions& options,
                             const std::string& name, Body& body, std::vector<PolygonCell>& polygon_cells) {
@@ -107,12 +119,18 @@ VoxelizedPart voxelize_part(PartMesh& mesh, double spacing, const VoxelizeOption
   part.placement = options.placement;
   part.lattice = align_lattice(mesh, spacing, options.align, centre);
   place_on_lattice(mesh, part.lattice);
-  const Voxels voxels = classify_closed(mesh, {.with_centres = centre});
+  const Voxels voxels =
+      mesh.balanced() ? classify_closed(mesh, {.with_centres = centre}) : classify_open(mesh);
   const AssembledPart assembled = assemble_part(voxels, part, body, polygon_cells);
+  if (assembled.elements == 0 && !mesh.balanced())
+    throw InputError(
+        fmt::format("part \"{}\" encloses no volume: its surface is open ({} open edges); close it first",
+                    name, human_count(mesh.open_edges)));
   if (assembled.elements == 0)
     throw InputError(fmt::format("nothing of part \"{}\" is left at size {}; choose a smaller size", name,
                                  human_length(spacing)));
-  const VoxelizedPart found = describe(mesh, voxels, assembled, part);
+  VoxelizedPart found = describe(mesh, voxels, assembled, part);
+  measure_walls(mesh, static_cast<std::uint32_t>(body.parts.size() - 1), found);
   body.parts.back().surface_volume = found.surface_volume;
   return found;
 }

@@ -1,0 +1,121 @@
+// Surfaces that are inside out, inconsistently oriented, interpenetrating or open.
+#include <gtest/gtest.h>
+
+#include "formats/error.h"
+#include "tests/voxelize/shapes.h"
+#include "voxelize/part_mesh.h"
+#include "voxelize/vote.h"
+
+namespace flexel {
+namespace {
+
+using namespace shapes;
+
+double total(const VoxelizeResult& result) {
+  return result.parts[0].lattice_volume + result.parts[0].dropped_volume;
+}
+
+TEST(Broken, InsideOutIsTakenTheOtherWayRound) {
+  const Mesh ball = icosphere(2, 1);
+  const VoxelizeResult result = run(inverted(ball), .2);
+  EXPECT_EQ(result.parts[0].inverted_shells, 1u);
+  EXPECT_NEAR(total(result) / volume(ball), 1, 1e-9);
+}
+
+TEST(Broken, AHollowBallInsideOutStaysHollow) {
+  const Mesh hollow = merged(icosphere(2, 1), inverted(icosphere(2, .6)));
+  const VoxelizeResult result = run(inverted(hollow), .1);
+  EXPECT_EQ(result.parts[0].inverted_shells, 2u);
+  EXPECT_NEAR(total(result) / volume(hollow), 1, 1e-9);
+}
+
+TEST(Broken, FlippedTrianglesAreTurnedBack) {
+  std::mt19937 random(9);
+  const Mesh ball = icosphere(3, 1);
+  Mesh mesh = ball;
+  std::size_t flipped = 0;
+  for (auto& t : mesh.triangles)
+    if (random() % 10 == 0) {
+      std::swap(t[1], t[2]);
+      ++flipped;
+    }
+  const VoxelizeResult result = run(mesh, .15);
+  EXPECT_TRUE(result.parts[0].closed);
+  EXPECT_EQ(result.parts[0].flipped_triangles, flipped);
+  EXPECT_NEAR(total(result) / volume(ball), 1, 1e-9);
+}
+
+TEST(Broken, InterpenetratingBoxesHaveTheirUnionsVolume) {
+  std::mt19937 random(13);
+  for (int trial = 0; trial < 6; ++trial) {
+    const Mesh cross =
+        transformed(merged(box({0, 0, 0}, {3, 1, 1}), box({1, -1, .2}, {2, 2, .7})), random_rotation(random));
+    const VoxelizeResult result = run(cross, .13);
+    EXPECT_GT(result.parts[0].overlapping_voxels, 0u);
+    EXPECT_NEAR(total(result), 3 + 1.5 - .5, 1e-3) << trial;
+    EXPECT_EQ(component_count(result.body), 1u) << trial;
+  }
+}
+
+TEST(Broken, AlignedInterpenetratingBoxesAreExact) {
+  const VoxelizeResult result = run(merged(box({0, 0, 0}, {3, 1, 1}), box({1, -1, .25}, {2, 2, .75})), .25);
+  EXPECT_NEAR(total(result), 4, 1e-9);
+  EXPECT_EQ(result.parts[0].dropped_cells, 0u);
+}
+
+TEST(Broken, TouchingBoxesHangTogether) {
+  std::mt19937 random(17);
+  for (int trial = 0; trial < 10; ++trial) {
+    const Mat3 rotation = trial == 0 ? Mat3(Mat3::Identity()) : random_rotation(random);
+    const Mesh stack =
+        transformed(merged(box({0, 0, 0}, {1, 1, .5}), box({0, 0, .5}, {1, 1, 1.2})), rotation);
+    const VoxelizeResult result = run(stack, .13);
+    EXPECT_NEAR(total(result), 1.2, 1e-6) << trial;
+    EXPECT_EQ(component_count(result.body), 1u) << trial;
+  }
+}
+
+TEST(Broken, SmallHolesAreVotedOver) {
+  std::mt19937 random(19);
+  const Mesh ball = icosphere(3, 1);
+  Mesh mesh = ball;
+  std::erase_if(mesh.triangles, [&](const auto&) { return random() % 100 == 0; });
+  ASSERT_LT(mesh.triangles.size(), ball.triangles.size());
+  const VoxelizeResult result = run(mesh, .1);
+  EXPECT_FALSE(result.parts[0].closed);
+  EXPECT_GT(result.parts[0].disagreements, 0u);
+  EXPECT_NEAR(total(result) / volume(ball), 1, .01);
+  EXPECT_EQ(component_count(result.body), 1u);
+}
+
+TEST(Broken, VotingOnAClosedMeshIsNearTheExactFill) {
+  std::mt19937 random(29);
+  const Mesh mesh = transformed(torus(1, .3, 41, 23), random_rotation(random));
+  PartMesh part = part_meshes(surface(mesh))[0];
+  Lattice lattice;
+  lattice.spacing = Vec3::Constant(.1);
+  place_on_lattice(part, lattice);
+  double sum = 0;
+  std::size_t disagreements = 0;
+  for (const Slab& slab : classify_open(part).slabs) {
+    for (const Piece& piece : slab.pieces) sum += piece.fill;
+    disagreements += slab.disagreements;
+  }
+  EXPECT_EQ(disagreements, 0u);
+  EXPECT_NEAR(sum * 1e-3 / volume(mesh), 1, 2e-3);
+}
+
+TEST(Broken, ASheetEnclosesNothing) {
+  Mesh sheet = box({0, 0, 0}, {1, 1, 1});
+  sheet.triangles.resize(2);
+  EXPECT_THROW(run(sheet, .1), InputError);
+}
+
+TEST(Broken, ASizeThatFitsNothingIsRefused) {
+  EXPECT_THROW(run(icosphere(1, 1), 5), InputError);
+  EXPECT_THROW(run(icosphere(1, 1), 0), InputError);
+  EXPECT_THROW(run(icosphere(1, 1), 1e-12), InputError);
+}
+
+}  // namespace
+}  // namespace flexel

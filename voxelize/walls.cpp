@@ -1,0 +1,75 @@
+#include "voxelize/walls.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+
+#include "voxelize/lines.h"
+#include "voxelize/voxelize.h"
+
+namespace flexel {
+namespace {
+
+Vec3 unit_normal(const PartMesh& mesh, std::uint32_t triangle) {
+  const Corners& c = mesh.corners[triangle];
+  return (mesh.world[c[1]] - mesh.world[c[0]]).cross(mesh.world[c[2]] - mesh.world[c[0]]).normalized();
+}
+
+void add_samples(const PartMesh& mesh, const LineGrid& grid, double negligible,
+                 std::vector<WallSample>& samples) {
+  constexpr double kOpposed = -.985;  // cosine of 170 degrees
+  const int u = (grid.axis + 1) % 3, v = (grid.axis + 2) % 3;
+  const std::vector<LineCrossing> crossings = cross_lines(mesh, mesh.world, grid);
+  int winding = 0;
+  for (std::size_t n = 0; n + 1 < crossings.size(); ++n) {
+    const LineCrossing &enter = crossings[n], &leave = crossings[n + 1];
+    winding += enter.change;
+    if (winding != 1 || enter.change != 1 || leave.change != -1 || enter.line != leave.line) continue;
+    const Vec3 normal = unit_normal(mesh, enter.triangle);
+    if (normal.dot(unit_normal(mesh, leave.triangle)) > kOpposed) continue;
+    const double thickness = (leave.at - enter.at) * -normal[grid.axis];
+    if (!(thickness > negligible)) continue;
+    WallSample sample{thickness, Vec3::Zero()};
+    sample.where[grid.axis] = enter.at;
+    sample.where[u] = grid.u_begin + enter.line % static_cast<unsigned>(grid.u_count) * grid.u_step;
+    sample.where[v] = grid.v_begin + enter.line / static_cast<unsigned>(grid.u_count) * grid.v_step;
+    samples.push_back(sample);
+  }
+}
+
+}  // namespace
+
+std::vector<WallSample> wall_samples(const PartMesh& mesh, int lines) {
+  const Box box = bounding_box(mesh.world);
+  std::vector<WallSample> samples;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    const double u_step = box.size()[u] / lines, v_step = box.size()[v] / lines;
+    if (!(u_step > 0) || !(v_step > 0)) continue;
+    add_samples(mesh, {axis, box.min[u] + u_step / 2, box.min[v] + v_step / 2, u_step, v_step, lines, lines},
+                1e-6 * box.diagonal(), samples);
+  }
+  return samples;
+}
+
+std::size_t thinnest_sample(const std::vector<WallSample>& samples) {
+  const auto least =
+      std::min_element(samples.begin(), samples.end(),
+                       [](const WallSample& a, const WallSample& b) { return a.thickness < b.thickness; });
+  return static_cast<std::size_t>(least - samples.begin());
+}
+
+std::vector<std::optional<ThinWall>> thinnest_walls(const Surface& surface, int rays) {
+  std::vector<std::optional<ThinWall>> result;
+  for (PartMesh& mesh : part_meshes(surface)) {
+    result.emplace_back();
+    repair_orientation(mesh);
+    if (mesh.corners.empty() || !mesh.balanced()) continue;
+    const std::vector<WallSample> samples = wall_samples(mesh, rays);
+    if (samples.empty()) continue;
+    const WallSample& least = samples[thinnest_sample(samples)];
+    result.back() = ThinWall{least.thickness, least.where, static_cast<std::uint32_t>(result.size() - 1)};
+  }
+  return result;
+}
+
+}  // namespace flexel
