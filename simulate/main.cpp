@@ -1,1 +1,86 @@
-int main() { return 1; }
+// flexel-simulate: body + scene -> deformed body.
+#include <fmt/format.h>
+
+#include "formats/body_file.h"
+#include "formats/files.h"
+#include "formats/program.h"
+#include "simulate/merge.h"
+#include "simulate/scene.h"
+#include "simulate/simulate.h"
+
+namespace {
+
+using namespace flexel;
+
+struct Arguments {
+  std::string scene;
+  std::vector<std::string> bodies;
+  std::string output = "-", summary;
+  SimulateOptions options;
+  bool quiet = false, compress = false;
+};
+
+void declare(CLI::App& app, Arguments& arguments) {
+  app.add_option("scene", arguments.scene, "Scene file (TOML; docs/scene.md gives every key)")->required();
+  app.add_option("body", arguments.bodies,
+                 "Body files; none or \"-\": stdin. Several are simulated together");
+  app.add_option("-o,--output", arguments.output, "Deformed body (.vtu); \"-\": stdout");
+  app.add_option("--threads", arguments.options.threads, "Threads; 0: every core")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--summary", arguments.summary, "Write the summary as JSON to this file (docs/summary.md)");
+  app.add_flag("--explain", arguments.options.explain,
+               "Say which effects run and why, and the share of time of each");
+  app.add_flag("--quiet", arguments.quiet, "Say nothing but warnings and errors");
+  app.add_flag("--compress", arguments.compress, "Compress the arrays of the body file");
+}
+
+Body read_bodies(std::vector<std::string> paths) {
+  if (paths.empty()) paths.emplace_back("-");
+  if (std::count(paths.begin(), paths.end(), "-") > 1) throw InputError("\"-\" (stdin) is given twice");
+  Body body;
+  for (std::size_t p = 0; p < paths.size(); ++p) {
+    Body next = read_body(paths[p]);
+    if (p == 0)
+      body = std::move(next);
+    else
+      append(body, std::move(next));
+  }
+  return body;
+}
+
+std::string failed_name(const std::string& output) {
+  if (output == "-") return "";
+  const std::string ending = ".vtu";
+  const bool ends = output.size() > ending.size() && output.ends_with(ending);
+  return (ends ? output.substr(0, output.size() - ending.size()) : output) + ".failed.vtu";
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("Deforms a body as a scene says: loads, fixes and moves, to equilibrium.", "flexel-simulate");
+  Arguments arguments;
+  declare(app, arguments);
+  if (!parse_arguments(app, argc, argv)) return kExitDone;
+  if (arguments.scene == "-" && arguments.bodies.empty())
+    throw InputError("scene and body cannot both come from stdin; give the body's file");
+  Progress progress("flexel-simulate", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
+  const Scene scene = read_scene(arguments.scene);  // before the body: a typo is answered at once
+  Body body = read_bodies(arguments.bodies);
+  arguments.options.failed_output = failed_name(arguments.output);
+  const SimulateResult result = simulate(body, scene, arguments.options, progress);
+  for (const std::string& line : summary_lines(result)) progress.say(line);
+  BodyFileOptions file_options;
+  file_options.compress = arguments.compress;
+  write_body(body, arguments.output, file_options);
+  if (!arguments.summary.empty()) {
+    OutputFile file(arguments.summary, false);
+    file.write(summary_json(result, body));
+    file.commit();
+  }
+  return kExitDone;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return flexel::run_program("flexel-simulate", [&] { return run(argc, argv); });
+}

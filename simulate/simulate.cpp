@@ -1,1 +1,166 @@
+// The run: materials, loose crumbs, effects, the check for free motions, equilibrium, what is reported.
 #include "simulate/simulate.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+
+#include "formats/body_file.h"
+#include "formats/error.h"
+#include "formats/parallel.h"
+#include "formats/units.h"
+#include "simulate/equilibrium.h"
+#include "simulate/fragments.h"
+#include "simulate/probes.h"
+#include "simulate/scene.h"
+
+namespace flexel {
+namespace {
+
+void refuse_empty(const Body& body) {
+  if (body.parts.empty() || body.element_count() == 0) throw InputError("the body holds no matter");
+}
+
+void move_body(Body& body, const State& state) {
+  for (std::size_t e = 0; e < body.element_count(); ++e)
+    body.position[e] = body.rest[e] + state.displacement[e];
+}
+
+void name_materials(Body& body, const std::vector<Material>& materials) {
+  for (std::size_t p = 0; p < body.parts.size(); ++p) body.parts[p].material = materials[p].name;
+}
+
+void report_strays(const Fragments& fragments, SimulateResult& result, Progress& progress) {
+  double volume = 0;
+  std::size_t crumbs = 0;
+  for (const Fragment& fragment : fragments.list)
+    if (fragment.stray) {
+      ++crumbs;
+      result.stray_cells += fragment.cells;
+      volume += fragment.volume;
+    }
+  if (crumbs > 0)
+    progress.warn(fmt::format(
+        "{} loose crumb(s) of {} cells in all ({}) hang on nothing; they are carried along with the matter "
+        "nearest to them",
+        crumbs, human_count(result.stray_cells), human_volume(volume)));
+}
+
+void explain_before(const std::vector<Pass>& passes, Progress& progress) {
+  progress.say("plan: cells (model of every part), equilibrium by Newton's method");
+  for (const Pass& pass : passes) progress.say(fmt::format("plan: {} ({})", pass.name, pass.why));
+}
+
+void explain_after(const SimulateResult& result, double linear_seconds, Progress& progress) {
+  const auto line = [&](const std::string& name, double seconds) {
+    progress.say(fmt::format("time: {:<14} {:8.3f} s {:5.1f} %", name, seconds,
+                             100 * seconds / std::max(result.seconds, 1e-9)));
+  };
+  for (const PassShare& pass : result.passes) line(pass.name, pass.seconds);
+  line("linear solver", linear_seconds);
+}
+
+void measure_displacement(const Body& body, const State& state, SimulateResult& result) {
+  for (std::size_t e = 0; e < body.element_count(); ++e)
+    if (const double length = state.displacement[e].norm(); length > result.largest_displacement) {
+      result.largest_displacement = length;
+      result.largest_displacement_at = body.rest[e];
+    }
+}
+
+double mass_of(const Setting& setting) {
+  const std::vector<std::uint32_t> part = cell_parts(setting.body);
+  return parallel_sum<double>(setting.body.cell_count(), [&](std::size_t c) {
+    return setting.body.fill[c] * setting.materials[part[c]].density *
+           setting.body.parts[part[c]].lattice.spacing.prod();
+  });
+}
+
+bool anything_acts(const Scene& scene) {
+  bool acts = scene.get<Gravity>().acceleration.has_value() || !scene.get<Loads>().loads.empty();
+  for (const Tie& tie : scene.get<Ties>().ties) acts = acts || tie.is_move;
+  return acts;
+}
+
+class Run {
+ public:
+  Run(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress)
+      : body_(body),
+        scene_(scene),
+        options_(options),
+        progress_(progress),
+        fragments_(find_fragments(body)) {}
+
+  SimulateResult operator()();
+
+ private:
+  EquilibriumResult solve(Mechanics& mechanics);
+
+  Body& body_;
+  const Scene& scene_;
+  const SimulateOptions& options_;
+  Progress& progress_;
+  Fragments fragments_;
+  State state_;
+};
+
+EquilibriumResult Run::solve(Mechanics& mechanics) {
+  refuse_loose_fragments(fragments_, body_, mechanics.tied_elements(), scene_.name);
+  refuse_free_motions(mechanics, scene_.name);
+  try {
+    return find_equilibrium(mechanics, state_, scene_.run, progress_);
+  } catch (const DivergedError& error) {
+    if (options_.failed_output.empty()) throw;
+    carry_strays(fragments_, body_, mechanics.stencil(), state_);
+    move_body(body_, state_);
+    write_body(body_, options_.failed_output);
+    throw DivergedError(
+        fmt::format("{}; the last state in equilibrium is in {}", error.what(), options_.failed_output));
+  }
+}
+
+SimulateResult Run::operator()() {
+  const auto began = std::chrono::steady_clock::now();
+  SimulateResult result;
+  const Setting setting{body_, materials_of_parts(scene_, body_), stray_cells(fragments_)};
+  name_materials(body_, setting.materials);
+  const std::vector<ProbePoints> probes = place_probes(scene_, body_, setting.stray_cell);
+  std::vector<Pass> passes = Effects::passes(scene_.effects, setting);
+  if (!anything_acts(scene_))
+    progress_.warn("the scene has no [[load]], [[move]] or [gravity]: nothing will move");
+  if (options_.explain) explain_before(passes, progress_);
+  report_strays(fragments_, result, progress_);
+  Mechanics mechanics(setting, std::move(passes));
+  state_.displacement.assign(body_.element_count(), Vec3::Zero());
+  const EquilibriumResult solved = solve(mechanics);
+  mechanics.report(state_, result);
+  result.elastic_energy = mechanics.elastic_energy(state_);
+  result.smallest_jacobian = mechanics.cells().smallest_jacobian(state_).value;
+  carry_strays(fragments_, body_, mechanics.stencil(), state_);
+  move_body(body_, state_);
+  for (const ProbePoints& probe : probes) result.probes.push_back(measure(probe, state_));
+  for (const AppliedLoad& load : result.loads) result.imbalance += load.force;
+  for (const Reaction& reaction : result.reactions) result.imbalance += reaction.force;
+  measure_displacement(body_, state_, result);
+  result.mass = mass_of(setting);
+  result.load_steps = solved.load_steps;
+  result.newton_iterations = solved.newton_iterations;
+  result.cg_iterations = solved.cg_iterations;
+  result.relative_residual = solved.relative_residual;
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  if (options_.explain) explain_after(result, solved.linear_seconds, progress_);
+  return result;
+}
+
+}  // namespace
+
+SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress) {
+  const ThreadLimit limit(options.threads);
+  refuse_empty(body);
+  progress.stage("simulate");
+  SimulateResult result = Run(body, scene, options, progress)();
+  progress.finish();
+  return result;
+}
+
+}  // namespace flexel

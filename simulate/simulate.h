@@ -13,36 +13,56 @@ struct Scene;  // simulate/scene.h
 
 struct ProbeResult {
   std::string name;
-  Vec3 where = Vec3::Zero();          // m, rest position
-  Vec3 displacement = Vec3::Zero();   // m
+  Vec3 where = Vec3::Zero();         // m, rest position
+  Vec3 displacement = Vec3::Zero();  // m
 };
 
-struct Reaction {                     // of one [[fix]] or [[move]]
+struct Reaction {  // of one [[fix]] or [[move]]
   std::string name;
-  Vec3 force = Vec3::Zero();          // N, by the support on the body
+  Vec3 force = Vec3::Zero();  // N, by the support on the body
+};
+
+struct AppliedLoad {  // of one [[load]], or of gravity
+  std::string name;
+  Vec3 force = Vec3::Zero();  // N, in total
+};
+
+struct PassShare {  // an effect that ran, why, and how long it took
+  std::string name, why;
+  double seconds = 0;
 };
 
 struct SimulateResult {
   std::vector<ProbeResult> probes;
   std::vector<Reaction> reactions;
-  double largest_displacement = 0;    // m, over the elements
+  std::vector<AppliedLoad> loads;
+  Vec3 imbalance = Vec3::Zero();  // N, sum of loads and reactions; 0 but for the tolerance
+  std::vector<PassShare> passes;
+  std::size_t stray_cells = 0;      // in loose crumbs that were carried along, not simulated
+  double largest_displacement = 0;  // m, over the elements
   Vec3 largest_displacement_at = Vec3::Zero();
-  double elastic_energy = 0;          // J
-  double smallest_jacobian = 1;       // of all cells' mean deformation gradients
+  double elastic_energy = 0;     // J
+  double mass = 0;               // kg
+  double smallest_jacobian = 1;  // of all cells' mean deformation gradients
   int load_steps = 0, newton_iterations = 0, cg_iterations = 0;
   double relative_residual = 0;
   double seconds = 0;
 };
 
 struct SimulateOptions {
-  int threads = 0;                    // 0: every core
-  std::string failed_output;          // where the last good state goes when the run diverges; "" for nowhere
+  int threads = 0;            // 0: every core
+  std::string failed_output;  // where the last good state goes when the run diverges; "" for nowhere
+  bool explain = false;       // say which effects run and why, and afterwards the share of time of each
 };
 
 // Runs the scene on the body, which is moved to its new state. Throws InputError, DivergedError, Interrupted.
-[[nodiscard]] SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress);
+[[nodiscard]] SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& options,
+                                      Progress& progress);
 
 // The result as JSON (docs/summary.md gives every key and unit).
 [[nodiscard]] std::string summary_json(const SimulateResult& result, const Body& body);
+
+// The result in lines for people.
+[[nodiscard]] std::vector<std::string> summary_lines(const SimulateResult& result);
 
 }  // namespace flexel

@@ -1,0 +1,28 @@
+// Elements that follow a given path exactly, axis by axis; they are eliminated from the unknowns.
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "formats/body.h"
+#include "simulate/linear/block_matrix.h"
+#include "simulate/motion.h"
+
+namespace flexel {
+
+struct Constraints {
+  std::vector<std::uint8_t> mask;                    // (elements) bit i: axis i is prescribed
+  std::vector<std::array<std::uint32_t, 3>> motion;  // (elements x 3) index into motions, where prescribed
+  std::vector<Motion> motions;
+};
+
+// Displacement [m] that the prescribed axes have at load share `share`; the others keep `displacement`.
+void apply(const Constraints& constraints, const Body& body, double share, std::vector<Vec3>& displacement);
+
+// 0 in every prescribed component.
+void clear_prescribed(const Constraints& constraints, std::vector<Vec3>& values);
+
+// Rows and columns of prescribed components become 0 but for the diagonal entry, which stays (1 where it was
+// 0).
+void eliminate(const Constraints& constraints, BlockMatrix& matrix);
+
+}  // namespace flexel

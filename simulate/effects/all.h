@@ -1,0 +1,32 @@
+// The list of effects. A new one is added here and nowhere else.
+#pragma once
+#include <tuple>
+
+#include "simulate/effects/gravity.h"
+#include "simulate/effects/loads.h"
+#include "simulate/effects/ties.h"
+
+namespace flexel {
+
+template <class... E>
+struct EffectList {
+  using Parameters = std::tuple<typename E::Parameters...>;
+
+  static void parse(TableReader& scene, Parameters& parameters) {
+    (E::parse(scene, std::get<typename E::Parameters>(parameters)), ...);
+  }
+
+  // The passes of the effects that the scene calls for, in the order of the list.
+  [[nodiscard]] static std::vector<Pass> passes(const Parameters& parameters, const Setting& setting) {
+    std::vector<Pass> result;
+    const auto add = [&](auto made) {
+      if (made) result.push_back(make_pass(std::move(*made)));
+    };
+    (add(E::make(std::get<typename E::Parameters>(parameters), setting)), ...);
+    return result;
+  }
+};
+
+using Effects = EffectList<Gravity, Loads, Ties>;
+
+}  // namespace flexel

@@ -1,0 +1,104 @@
+// What an effect is, and how a run holds those that its scene calls for.
+//
+// An effect E is one header (with its .cpp) in simulate/effects and one entry of simulate/effects/all.h. It
+// owns
+//   E::Parameters                                  what a scene says of it; default: nothing
+//   static void parse(TableReader& scene, Parameters&)                     reads its own keys of the scene
+//   static std::optional<E> make(const Parameters&, const Setting&)        nothing when the scene does not
+//   call for it std::string why() const                                                "2 loads", for
+//   --explain
+// and any of these hooks, found by concept; a hook that an effect lacks is never called:
+//   double energy(const State&) const                                      J
+//   void add_forces(const State&, std::vector<Vec3>& forces) const         N, minus the energy's derivative
+//   void add_stiffness(const State&, const Stencil&, const Body&, BlockMatrix&) const     N/m, minus the
+//   forces' derivative void constrain(Constraints&) const                                     elements that
+//   follow a path exactly void report(const State&, const std::vector<Vec3>& unbalanced, SimulateResult&)
+//   const
+// An effect that a scene does not name makes no object, no array and no pass.
+#pragma once
+#include <chrono>
+#include <concepts>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "simulate/constraints.h"
+#include "simulate/scene_table.h"
+#include "simulate/simulate.h"
+#include "simulate/state.h"
+#include "simulate/stiffness.h"
+
+namespace flexel {
+
+template <class E>
+concept HasEnergy = requires(const E& e, const State& s) {
+  { e.energy(s) } -> std::convertible_to<double>;
+};
+template <class E>
+concept AddsForces = requires(const E& e, const State& s, std::vector<Vec3>& f) {
+  e.add_forces(s, f);
+};
+template <class E>
+concept AddsStiffness = requires(const E& e, const State& s, const Stencil& t, const Body& b,
+                                 BlockMatrix& m) {
+  e.add_stiffness(s, t, b, m);
+};
+template <class E>
+concept Constrains = requires(const E& e, Constraints& c) {
+  e.constrain(c);
+};
+template <class E>
+concept Reports = requires(const E& e, const State& s, const std::vector<Vec3>& u, SimulateResult& r) {
+  e.report(s, u, r);
+};
+
+// An effect in a run, its hooks as callables (empty where it has none), and the time it took.
+struct Pass {
+  std::string name, why;
+  std::function<double(const State&)> energy;
+  std::function<void(const State&, std::vector<Vec3>&)> add_forces;
+  std::function<void(const State&, const Stencil&, const Body&, BlockMatrix&)> add_stiffness;
+  std::function<void(Constraints&)> constrain;
+  std::function<void(const State&, const std::vector<Vec3>&, SimulateResult&)> report;
+  double seconds = 0;
+};
+
+template <class E>
+[[nodiscard]] Pass make_pass(E made) {
+  const auto effect = std::make_shared<const E>(std::move(made));
+  Pass pass;
+  pass.name = E::name;
+  pass.why = effect->why();
+  if constexpr (HasEnergy<E>) pass.energy = [effect](const State& s) { return effect->energy(s); };
+  if constexpr (AddsForces<E>)
+    pass.add_forces = [effect](const State& s, std::vector<Vec3>& f) { effect->add_forces(s, f); };
+  if constexpr (AddsStiffness<E>)
+    pass.add_stiffness = [effect](const State& s, const Stencil& t, const Body& b, BlockMatrix& m) {
+      effect->add_stiffness(s, t, b, m);
+    };
+  if constexpr (Constrains<E>) pass.constrain = [effect](Constraints& c) { effect->constrain(c); };
+  if constexpr (Reports<E>)
+    pass.report = [effect](const State& s, const std::vector<Vec3>& u, SimulateResult& r) {
+      effect->report(s, u, r);
+    };
+  return pass;
+}
+
+// Adds the time of its scope to a pass.
+class PassTimer {
+ public:
+  explicit PassTimer(double& seconds) : seconds_(seconds), began_(std::chrono::steady_clock::now()) {}
+  ~PassTimer() {
+    seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
+  }
+  PassTimer(const PassTimer&) = delete;
+  PassTimer& operator=(const PassTimer&) = delete;
+
+ private:
+  double& seconds_;
+  std::chrono::steady_clock::time_point began_;
+};
+
+}  // namespace flexel

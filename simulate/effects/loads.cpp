@@ -1,0 +1,127 @@
+// Consistent forces: each surface point's share goes to the eight elements of its cell with the trilinear
+// weights, so that the sum of the forces, and of their moments, is that of the load on the surface itself.
+#include "simulate/effects/loads.h"
+
+#include <fmt/format.h>
+
+#include "formats/error.h"
+#include "simulate/cells.h"
+#include "simulate/scene_selection.h"
+#include "simulate/surface_points.h"
+
+namespace flexel {
+namespace {
+
+Load parse_load(TableReader& reader) {
+  Load load;
+  load.origin = reader.place();
+  load.where = require_where(reader);
+  load.name = reader.text("name").value_or(describe(load.where));
+  load.force = reader.vector("force", Dimension::force);
+  load.pressure = reader.quantity("pressure", Dimension::pressure);
+  reader.finish();
+  if (load.force.has_value() == load.pressure.has_value())
+    reader.fail(
+        "[[load]] needs either \"force\" (the total, for example [\"0 N\", \"0 N\", \"-100 N\"]) or "
+        "\"pressure\" "
+        "(for example \"2 MPa\")");
+  return load;
+}
+
+void spread(const CellPoint& at, const Vec3& force, const Body& body, std::vector<Vec3>& sum) {
+  for (std::size_t a = 0; a < 8; ++a) sum[body.cell_elements[at.cell][a]] += at.weights[a] * force;
+}
+
+void add_surface_load(const Load& load, const std::vector<std::uint32_t>& polygons, const Setting& setting,
+                      std::vector<Vec3>& sum) {
+  const std::vector<SurfacePoint> points = surface_points(setting.body, polygons, setting.stray_cell);
+  const double area = total_area(points);
+  if (!(area > 0))
+    throw InputError(
+        load.origin,
+        fmt::format("load \"{}\": no cell lies under the selected surface; use a smaller spacing",
+                    load.name));
+  for (const SurfacePoint& point : points) {
+    const Vec3 force = load.force ? Vec3(*load.force * (point.area_vector.norm() / area))
+                                  : Vec3(-*load.pressure * point.area_vector);
+    spread(point.at, force, setting.body, sum);
+  }
+}
+
+// The force spread over the selected elements by the volume of the matter around them.
+void add_volume_load(const Load& load, const std::vector<std::uint32_t>& elements, const Setting& setting,
+                     std::vector<Vec3>& sum) {
+  if (load.pressure)
+    throw InputError(load.origin,
+                     fmt::format("load \"{}\": a pressure needs a face, group or side; {} selects elements",
+                                 load.name, describe(load.where)));
+  std::vector<double> volume(setting.body.element_count(), 0);
+  const std::vector<std::uint8_t> active = active_cells(setting);
+  const std::vector<std::uint32_t> part = cell_parts(setting.body);
+  for (std::size_t c = 0; c < setting.body.cell_count(); ++c)
+    if (active[c])
+      for (const std::uint32_t e : setting.body.cell_elements[c])
+        volume[e] += setting.body.fill[c] * setting.body.parts[part[c]].lattice.spacing.prod() / 8;
+  double total = 0;
+  for (const std::uint32_t e : elements) total += volume[e];
+  if (!(total > 0))
+    throw InputError(load.origin,
+                     fmt::format("load \"{}\": the selected elements hold no matter", load.name));
+  for (const std::uint32_t e : elements) sum[e] += *load.force * (volume[e] / total);
+}
+
+}  // namespace
+
+void Loads::parse(TableReader& scene, Parameters& parameters) {
+  for (const SceneValue* table : scene.tables("load")) {
+    TableReader reader(*table, scene.file(), "[[load]]");
+    parameters.loads.push_back(parse_load(reader));
+  }
+}
+
+std::optional<Loads> Loads::make(const Parameters& parameters, const Setting& setting) {
+  if (parameters.loads.empty()) return std::nullopt;
+  Loads loads;
+  std::vector<Vec3> total(setting.body.element_count(), Vec3::Zero());
+  for (const Load& load : parameters.loads) {
+    const Selected selected = resolve(load.where, setting.body);
+    if (!selected.polygons.empty() && !selected.elements.empty())
+      throw InputError(load.origin,
+                       fmt::format("load \"{}\" mixes surface and elements; write two loads", load.name));
+    std::vector<Vec3> sum(setting.body.element_count(), Vec3::Zero());
+    if (selected.elements.empty())
+      add_surface_load(load, selected.polygons, setting, sum);
+    else
+      add_volume_load(load, selected.elements, setting, sum);
+    Vec3 resultant = Vec3::Zero();
+    for (std::size_t e = 0; e < sum.size(); ++e) {
+      resultant += sum[e];
+      total[e] += sum[e];
+    }
+    loads.totals_.emplace_back(load.name, resultant);
+  }
+  for (std::uint32_t e = 0; e < total.size(); ++e)
+    if (total[e] != Vec3::Zero()) loads.forces_.push_back({e, total[e]});
+  return loads;
+}
+
+std::string Loads::why() const {
+  return fmt::format("{} [[load]]", totals_.size());
+}
+
+double Loads::energy(const State& state) const {
+  double work = 0;
+  for (const ElementForce& at : forces_) work += at.force.dot(state.displacement[at.element]);
+  return -state.share * work;
+}
+
+void Loads::add_forces(const State& state, std::vector<Vec3>& forces) const {
+  for (const ElementForce& at : forces_) forces[at.element] += state.share * at.force;
+}
+
+void Loads::report(const State& state, const std::vector<Vec3>&, SimulateResult& result) const {
+  for (const auto& [name_of_load, force] : totals_)
+    result.loads.push_back({name_of_load, state.share * force});
+}
+
+}  // namespace flexel

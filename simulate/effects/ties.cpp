@@ -1,0 +1,157 @@
+// Ties: penalty matrices per tied cell, and elements that are followed exactly. Tied cells are few (a layer
+// under a surface), so their sums run on one thread in a fixed order.
+#include "simulate/effects/ties.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+
+#include "formats/error.h"
+#include "simulate/surface_points.h"
+
+namespace flexel {
+namespace {
+
+bool share_an_axis(const Tie& a, const Tie& b) {
+  return (a.axes[0] && b.axes[0]) || (a.axes[1] && b.axes[1]) || (a.axes[2] && b.axes[2]);
+}
+
+bool same_motion(const Motion& a, const Motion& b) {
+  return a.translation == b.translation && a.angle == b.angle &&
+         (a.angle == 0 || (a.axis == b.axis && a.through == b.through));
+}
+
+bool intersect(const std::vector<std::uint32_t>& a, const std::vector<std::uint32_t>& b) {
+  for (auto x = a.begin(), y = b.begin(); x != a.end() && y != b.end();) {
+    if (*x == *y) return true;
+    *x < *y ? ++x : ++y;
+  }
+  return false;
+}
+
+void refuse_conflicts(const std::vector<Tie>& ties, const std::vector<Selected>& selected) {
+  for (std::size_t i = 0; i < ties.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      if (!share_an_axis(ties[i], ties[j]) || same_motion(ties[i].motion, ties[j].motion)) continue;
+      if (intersect(selected[i].polygons, selected[j].polygons) ||
+          intersect(selected[i].elements, selected[j].elements))
+        throw InputError(ties[i].origin,
+                         fmt::format("\"{}\" and \"{}\" ({}) lead the same place to different positions",
+                                     ties[i].name, ties[j].name, ties[j].origin));
+    }
+}
+
+}  // namespace
+
+std::optional<Ties> Ties::make(const Parameters& parameters, const Setting& setting) {
+  if (parameters.ties.empty()) return std::nullopt;
+  Ties made;
+  made.body_ = &setting.body;
+  made.ties_ = parameters.ties;
+  std::vector<Selected> selected;
+  for (const Tie& tie : made.ties_) selected.push_back(resolve(tie.where, setting.body));
+  refuse_conflicts(made.ties_, selected);
+  for (std::uint32_t t = 0; t < made.ties_.size(); ++t) {
+    if (!selected[t].polygons.empty()) made.add_surface_tie(t, selected[t].polygons, setting);
+    made.held_elements_.push_back(std::move(selected[t].elements));
+  }
+  return made;
+}
+
+void Ties::add_surface_tie(std::uint32_t tie, const std::vector<std::uint32_t>& polygons,
+                           const Setting& setting) {
+  const std::vector<SurfacePoint> points = surface_points(setting.body, polygons, setting.stray_cell);
+  if (!(total_area(points) > 0))
+    throw InputError(ties_[tie].origin,
+                     fmt::format("\"{}\": no cell lies under the selected surface; use a smaller spacing",
+                                 ties_[tie].name));
+  std::map<std::uint32_t, Eigen::Matrix<double, 8, 8>> by_cell;
+  for (const SurfacePoint& point : points) {
+    const std::uint32_t part = setting.body.surface.polygon_part(point.polygon);
+    const double stiffness = kPenalty * setting.materials[part].young /
+                             setting.body.parts[part].lattice.spacing.mean() * point.area_vector.norm();
+    const Eigen::Map<const Eigen::Matrix<double, 8, 1>> weights(point.at.weights.data());
+    auto [entry, fresh] = by_cell.try_emplace(point.at.cell, Eigen::Matrix<double, 8, 8>::Zero());
+    entry->second += stiffness * weights * weights.transpose();
+  }
+  for (const auto& [cell, stiffness] : by_cell) cells_.push_back({tie, cell, stiffness});
+}
+
+std::string Ties::why() const {
+  const auto moves = std::count_if(ties_.begin(), ties_.end(), [](const Tie& tie) { return tie.is_move; });
+  return fmt::format("{} [[fix]], {} [[move]]", static_cast<std::ptrdiff_t>(ties_.size()) - moves, moves);
+}
+
+// u_a - d(X_a) on the tied axes, 0 on the others. (8 x 3) m
+Eigen::Matrix<double, 8, 3> Ties::violation(const TiedCell& tied, const State& state) const {
+  const Tie& tie = ties_[tied.tie];
+  Eigen::Matrix<double, 8, 3> result;
+  for (std::size_t a = 0; a < 8; ++a) {
+    const std::uint32_t e = body_->cell_elements[tied.cell][a];
+    const Vec3 off = state.displacement[e] - tie.motion.displacement(body_->rest[e], state.share);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      result(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(axis)) =
+          tie.axes[axis] ? off[static_cast<Eigen::Index>(axis)] : 0;
+  }
+  return result;
+}
+
+double Ties::energy(const State& state) const {
+  double energy = 0;
+  for (const TiedCell& tied : cells_) {
+    const Eigen::Matrix<double, 8, 3> off = violation(tied, state);
+    energy += 0.5 * (off.transpose() * tied.stiffness * off).trace();
+  }
+  return energy;
+}
+
+void Ties::add_forces(const State& state, std::vector<Vec3>& forces) const {
+  for (const TiedCell& tied : cells_) {
+    const Eigen::Matrix<double, 8, 3> force = tied.stiffness * violation(tied, state);
+    for (std::size_t a = 0; a < 8; ++a)
+      forces[body_->cell_elements[tied.cell][a]] -= force.row(static_cast<Eigen::Index>(a)).transpose();
+  }
+}
+
+void Ties::add_stiffness(const State&, const Stencil& stencil, const Body& body, BlockMatrix& matrix) const {
+  for (const TiedCell& tied : cells_)
+    for (std::size_t a = 0; a < 8; ++a)
+      for (std::size_t b = 0; b < 8; ++b) {
+        Block& block = matrix.values[block_index(stencil, matrix, body, tied.cell, a, b)];
+        for (int axis = 0; axis < 3; ++axis)
+          if (ties_[tied.tie].axes[static_cast<std::size_t>(axis)])
+            block(axis, axis) += tied.stiffness(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b));
+      }
+}
+
+void Ties::constrain(Constraints& constraints) const {
+  for (std::size_t t = 0; t < ties_.size(); ++t) {
+    const auto motion = static_cast<std::uint32_t>(constraints.motions.size());
+    constraints.motions.push_back(ties_[t].motion);
+    for (const std::uint32_t e : held_elements_[t])
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        if (ties_[t].axes[axis]) {
+          constraints.mask[e] = static_cast<std::uint8_t>(constraints.mask[e] | 1u << axis);
+          constraints.motion[e][axis] = motion;
+        }
+  }
+}
+
+void Ties::report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) const {
+  std::vector<Vec3> reaction(ties_.size(), Vec3::Zero());
+  for (const TiedCell& tied : cells_)
+    reaction[tied.tie] -= (tied.stiffness * violation(tied, state)).colwise().sum().transpose();
+  std::vector<std::uint8_t> counted(body_->element_count(),
+                                    0);  // an element of two ties counts for the first
+  for (std::size_t t = 0; t < ties_.size(); ++t)
+    for (const std::uint32_t e : held_elements_[t])
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        if (!ties_[t].axes[axis] || (counted[e] >> axis & 1)) continue;
+        counted[e] = static_cast<std::uint8_t>(counted[e] | 1u << axis);
+        reaction[t][static_cast<Eigen::Index>(axis)] -= unbalanced[e][static_cast<Eigen::Index>(axis)];
+      }
+  for (std::size_t t = 0; t < ties_.size(); ++t) result.reactions.push_back({ties_[t].name, reaction[t]});
+}
+
+}  // namespace flexel

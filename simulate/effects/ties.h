@@ -1,0 +1,58 @@
+// Fixes and moves: material points that are held or led.
+//
+// Surface selections are tied by penalty at quadrature points q of the surface: energy 1/2 k_q |u_q - d_q|^2
+// on the tied axes with u_q = sum_a w_qa u_a (trilinear, elements of the cell under q), k_q = 300 E / h times
+// the point's area (E of the part, h the mean spacing; 10 to 300 moves a cantilever's tip by under one
+// percent, docs/model.md). The led displacement d is affine in the rest position, which trilinear weights
+// reproduce, so u_q - d_q = sum_a w_qa (u_a - d(X_a)): one 8 x 8 matrix a cell holds all its points. Element
+// selections (box, sphere, half-space, part) are followed exactly and eliminated.
+#pragma once
+#include "simulate/effects/effect.h"
+#include "simulate/motion.h"
+#include "simulate/selection.h"
+
+namespace flexel {
+
+struct Tie {
+  Selection where;
+  std::array<bool, 3> axes{true, true, true};  // world axes that are held or led; the others are free
+  Motion motion;                               // none for a fix
+  std::string name;
+  std::string origin;  // "beam.toml:12"
+  bool is_move = false;
+};
+
+class Ties {
+ public:
+  struct Parameters {
+    std::vector<Tie> ties;
+  };
+  static constexpr const char* name = "ties";
+  static constexpr double kPenalty = 300;  // stiffness per area, in E / h
+
+  static void parse(TableReader& scene, Parameters& parameters);
+  [[nodiscard]] static std::optional<Ties> make(const Parameters& parameters, const Setting& setting);
+  [[nodiscard]] std::string why() const;
+
+  [[nodiscard]] double energy(const State& state) const;
+  void add_forces(const State& state, std::vector<Vec3>& forces) const;
+  void add_stiffness(const State& state, const Stencil& stencil, const Body& body, BlockMatrix& matrix) const;
+  void constrain(Constraints& constraints) const;
+  // Reactions: penalty forces, and minus the unbalanced forces on eliminated elements.
+  void report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) const;
+
+ private:
+  struct TiedCell {
+    std::uint32_t tie = 0, cell = 0;
+    Eigen::Matrix<double, 8, 8> stiffness;  // sum over points of k_q w_qa w_qb [N/m]
+  };
+  [[nodiscard]] Eigen::Matrix<double, 8, 3> violation(const TiedCell& tied, const State& state) const;
+  void add_surface_tie(std::uint32_t tie, const std::vector<std::uint32_t>& polygons, const Setting& setting);
+
+  const Body* body_ = nullptr;
+  std::vector<Tie> ties_;
+  std::vector<TiedCell> cells_;                            // by tie, then cell
+  std::vector<std::vector<std::uint32_t>> held_elements_;  // (ties) eliminated elements
+};
+
+}  // namespace flexel

@@ -1,0 +1,23 @@
+// Equilibrium: Newton's method under load steps that cut themselves.
+#pragma once
+#include "formats/progress.h"
+#include "simulate/mechanics.h"
+#include "simulate/scene.h"
+
+namespace flexel {
+
+struct EquilibriumResult {
+  int load_steps = 0, newton_iterations = 0, cg_iterations = 0;
+  double relative_residual = 0;
+  double linear_seconds = 0;
+};
+
+// The rigid motions that the ties leave free: throws InputError(scene, ...) naming part and motion.
+void refuse_free_motions(Mechanics& mechanics, const std::string& scene);
+
+// Moves `state` to equilibrium under the whole load. Throws DivergedError naming load step, iteration, the
+// worst cell and a suggestion; `state` is then the last one in equilibrium. Throws Interrupted.
+[[nodiscard]] EquilibriumResult find_equilibrium(Mechanics& mechanics, State& state,
+                                                 const RunSettings& settings, Progress& progress);
+
+}  // namespace flexel

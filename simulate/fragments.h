@@ -1,0 +1,43 @@
+// Pieces of a part that are not connected with one another, and loose crumbs among them.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "formats/body.h"
+#include "simulate/state.h"
+#include "simulate/stiffness.h"
+
+namespace flexel {
+
+// A connected set of whole cells.
+struct Fragment {
+  std::uint32_t part = 0;
+  std::size_t cells = 0;
+  double volume = 0;           // m^3, filled
+  Vec3 centre = Vec3::Zero();  // m, rest, of its matter
+  bool stray = false;          // under a thousandth of its part's volume, and not its largest
+};
+
+struct Fragments {
+  std::vector<Fragment> list;             // in order of their first cell
+  std::vector<std::uint32_t> of_cell;     // (cells) index into list; kNoFragment where broken
+  std::vector<std::uint32_t> of_element;  // (elements) likewise; kNoFragment where no whole cell is
+};
+constexpr std::uint32_t kNoFragment = 0xffffffffu;
+
+[[nodiscard]] Fragments find_fragments(const Body& body);
+
+// (cells) 1 in the cells of stray fragments.
+[[nodiscard]] std::vector<std::uint8_t> stray_cells(const Fragments& fragments);
+
+// Throws InputError naming the part, and the fragment where there are several, when no element of a fragment
+// that is not stray is tied. `scene` is the scene's name for the message.
+void refuse_loose_fragments(const Fragments& fragments, const Body& body,
+                            const std::vector<std::uint8_t>& tied_elements, const std::string& scene);
+
+// Moves the elements of stray fragments (and those without a whole cell) as the matter nearest to the
+// fragment's centre moved, by that cell's mean deformation. `stencil` is that of the cells that were
+// simulated.
+void carry_strays(const Fragments& fragments, const Body& body, const Stencil& stencil, State& state);
+
+}  // namespace flexel

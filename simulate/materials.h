@@ -1,0 +1,28 @@
+// Materials: isotropic elastic constants and density, from a library of named ones or from the scene.
+#pragma once
+#include <string>
+#include <vector>
+
+namespace flexel {
+
+struct Material {
+  std::string name;
+  double young = 0;    // Pa
+  double poisson = 0;  // in (-1, 0.5)
+  double density = 0;  // kg/m^3
+  std::string source;  // where the figures come from
+};
+
+// The library, in order of docs/scene.md. Room temperature, typical values: a scene's own figures go before
+// them.
+[[nodiscard]] const std::vector<Material>& material_library();
+
+// The library's material of that name or alias ("aluminum" = "aluminium 6061"; case, blanks, "-" and "_" do
+// not matter); nothing when there is none.
+[[nodiscard]] const Material* library_material(const std::string& name);
+
+// Lame's first parameter and the shear modulus [Pa].
+[[nodiscard]] double lame_lambda(const Material& material);
+[[nodiscard]] double shear_modulus(const Material& material);
+
+}  // namespace flexel

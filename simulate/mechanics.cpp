@@ -1,0 +1,112 @@
+// Sums the cells and the passes. A pass without a hook is skipped; an effect that the scene does not name has
+// no pass.
+#include "simulate/mechanics.h"
+
+#include <cmath>
+
+#include "formats/parallel.h"
+
+namespace flexel {
+namespace {
+
+double squared_norm(const std::vector<Vec3>& values) {
+  return parallel_sum<double>(values.size(), [&](std::size_t e) { return values[e].squaredNorm(); });
+}
+
+// Elements without a cell that resists (of loose crumbs) stay where they are.
+Constraints initial_constraints(const Body& body, const Stencil& stencil) {
+  Constraints constraints;
+  constraints.mask.assign(body.element_count(), 0);
+  constraints.motion.assign(body.element_count(), {0, 0, 0});
+  constraints.motions.push_back({});
+  for (std::uint32_t e = 0; e < body.element_count(); ++e)
+    if (stencil.of(e).empty()) constraints.mask[e] = 7;
+  return constraints;
+}
+
+}  // namespace
+
+Mechanics::Mechanics(const Setting& setting, std::vector<Pass> passes)
+    : body_(setting.body),
+      pattern_(stiffness_pattern(setting.body, active_cells(setting))),
+      cells_(setting, pattern_.stencil),
+      passes_(std::move(passes)),
+      constraints_(initial_constraints(setting.body, pattern_.stencil)) {
+  for (const Pass& pass : passes_)
+    if (pass.constrain) pass.constrain(constraints_);
+}
+
+double Mechanics::energy(const State& state) {
+  double energy = 0;
+  {
+    const PassTimer timer(cell_seconds_);
+    energy = cells_.energy(state);
+  }
+  for (Pass& pass : passes_)
+    if (pass.energy) {
+      const PassTimer timer(pass.seconds);
+      energy += pass.energy(state);
+    }
+  return energy;
+}
+
+Forces Mechanics::forces(const State& state) {
+  Forces result;
+  std::vector<Vec3> inner(body_.element_count(), Vec3::Zero());
+  result.total.assign(body_.element_count(), Vec3::Zero());
+  for (Pass& pass : passes_)
+    if (pass.add_forces) {
+      const PassTimer timer(pass.seconds);
+      pass.add_forces(state, result.total);
+    }
+  const PassTimer timer(cell_seconds_);
+  cells_.add_forces(state, inner);
+  const double outer = squared_norm(result.total);
+  const double held = parallel_sum<double>(inner.size(), [&](std::size_t e) {
+    double sum = 0;
+    for (int axis = 0; axis < 3; ++axis)
+      if (constraints_.mask[e] >> axis & 1) sum += inner[e][axis] * inner[e][axis];
+    return sum;
+  });
+  result.scale = std::sqrt(outer + held);
+  parallel_for_each(inner.size(), [&](std::size_t e) { result.total[e] += inner[e]; });
+  return result;
+}
+
+void Mechanics::assemble(const State& state, bool project) {
+  {
+    const PassTimer timer(cell_seconds_);
+    cells_.set_stiffness(state, project, pattern_.matrix);
+  }
+  for (Pass& pass : passes_)
+    if (pass.add_stiffness) {
+      const PassTimer timer(pass.seconds);
+      pass.add_stiffness(state, pattern_.stencil, body_, pattern_.matrix);
+    }
+}
+
+std::vector<std::uint8_t> Mechanics::tied_elements() {
+  std::vector<std::uint8_t> tied(body_.element_count(), 0);
+  BlockMatrix& matrix = pattern_.matrix;
+  std::fill(matrix.values.begin(), matrix.values.end(), Block::Zero());
+  const State rest{std::vector<Vec3>(body_.element_count(), Vec3::Zero()), 1};
+  for (const Pass& pass : passes_)
+    if (pass.add_stiffness) pass.add_stiffness(rest, pattern_.stencil, body_, matrix);
+  for (std::uint32_t e = 0; e < tied.size(); ++e) {
+    bool held = constraints_.mask[e] != 0;
+    for (std::size_t entry = matrix.row_offsets[e]; entry < matrix.row_offsets[e + 1]; ++entry)
+      held = held || (matrix.columns[entry] == e && matrix.values[entry].diagonal().maxCoeff() > 0);
+    tied[e] = held;
+  }
+  return tied;
+}
+
+void Mechanics::report(const State& state, SimulateResult& result) {
+  const Forces unbalanced = forces(state);
+  for (const Pass& pass : passes_)
+    if (pass.report) pass.report(state, unbalanced.total, result);
+  result.passes.push_back({"cells", "model of every part", cell_seconds_});
+  for (const Pass& pass : passes_) result.passes.push_back({pass.name, pass.why, pass.seconds});
+}
+
+}  // namespace flexel

@@ -1,0 +1,48 @@
+// Everything that acts on a body in a run: the model of its cells and the passes of its effects, summed up.
+#pragma once
+#include "simulate/cells.h"
+#include "simulate/effects/effect.h"
+
+namespace flexel {
+
+// Forces on the elements [N].
+struct Forces {
+  std::vector<Vec3> total;  // (elements) of the cells and of every pass
+  double scale = 0;  // 2-norm of what acts from outside: loads, ties, and cells on prescribed components
+};
+
+class Mechanics {
+ public:
+  // `setting`'s body must outlive it.
+  Mechanics(const Setting& setting, std::vector<Pass> passes);
+  Mechanics(const Mechanics&) = delete;
+  Mechanics& operator=(const Mechanics&) = delete;
+
+  [[nodiscard]] const Body& body() const { return body_; }
+  [[nodiscard]] const Constraints& constraints() const { return constraints_; }
+  [[nodiscard]] const Stencil& stencil() const { return pattern_.stencil; }
+  [[nodiscard]] const Cells& cells() const { return cells_; }
+  [[nodiscard]] const BlockMatrix& stiffness() const { return pattern_.matrix; }
+
+  // Total energy [J]; infinity where a cell has J <= 0.
+  [[nodiscard]] double energy(const State& state);
+  [[nodiscard]] double elastic_energy(const State& state) { return cells_.energy(state); }
+  [[nodiscard]] Forces forces(const State& state);
+  // Tangent stiffness into stiffness(), prescribed components not yet eliminated.
+  void assemble(const State& state, bool project);
+  void eliminate_prescribed() { eliminate(constraints_, pattern_.matrix); }
+  // 1 for each element that a tie holds or leads.
+  [[nodiscard]] std::vector<std::uint8_t> tied_elements();
+
+  void report(const State& state, SimulateResult& result);
+
+ private:
+  const Body& body_;
+  StiffnessPattern pattern_;
+  Cells cells_;
+  std::vector<Pass> passes_;
+  Constraints constraints_;
+  double cell_seconds_ = 0;
+};
+
+}  // namespace flexel

@@ -1,0 +1,265 @@
+// Inexact Newton (Eisenstat and Walker 1996, choice 1): the conjugate gradients of an iteration go only as
+// far as the linear model could be trusted in the last one, and no further than convergence needs. While that
+// model was good to a thousandth, the tangent and its preconditioner are kept: small deformations assemble
+// and factorise once. A tangent that turns out indefinite is assembled again with the cells' moduli projected
+// to their positive part. Every step must lower the energy (Armijo) with J > 0 in every cell. Prescribed
+// elements are led to their targets by the first full step, together with what the others do in response.
+#include "simulate/newton.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+
+#include "formats/parallel.h"
+
+namespace flexel {
+namespace {
+
+constexpr double kFirstForcing = 1e-4;  // relative residual of the first linear solve
+constexpr double kLargestForcing = 0.1;
+constexpr double kKeepTangentBelow = 1e-3;  // model error of the last step under which the tangent is kept
+constexpr double kArmijo = 1e-4;
+constexpr double kSmallestStep = 1.0 / 4096;
+constexpr int kMaxCgIterations = 3000;
+
+double dot(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
+  return parallel_sum<double>(a.size(), [&](std::size_t e) { return a[e].dot(b[e]); });
+}
+
+double norm(const std::vector<Vec3>& a) {
+  return std::sqrt(dot(a, a));
+}
+
+// What a force computed at `u` cannot be better than: rounding in displacements times the stiffness that they
+// meet.
+double rounding_floor(const BlockMatrix& matrix, const std::vector<Vec3>& u) {
+  const double squared = parallel_sum<double>(matrix.rows(), [&](std::size_t e) {
+    for (std::size_t entry = matrix.row_offsets[e]; entry < matrix.row_offsets[e + 1]; ++entry)
+      if (matrix.columns[entry] == e)
+        return matrix.values[entry].diagonal().squaredNorm() * u[e].squaredNorm();
+    return 0.0;
+  });
+  return 16 * std::numeric_limits<double>::epsilon() * std::sqrt(squared);
+}
+
+class Solver {
+ public:
+  Solver(Mechanics& mechanics, State& state, const NewtonOptions& options,
+         const std::function<void(const std::string&)>& progress)
+      : mechanics_(mechanics), state_(state), options_(options), progress_(progress) {}
+
+  NewtonOutcome run();
+
+ private:
+  void prepare_tangent(bool project);
+  void factor();
+  void solve_linear(const std::vector<Vec3>& rhs, double forcing);
+  std::vector<Vec3> right_hand_side();
+  bool line_search(const std::vector<Vec3>& residual);
+  bool lead_prescribed();
+  [[nodiscard]] State moved(double step) const;
+  void update_residual();
+  [[nodiscard]] double forcing() const;
+
+  Mechanics& mechanics_;
+  State& state_;
+  const NewtonOptions& options_;
+  const std::function<void(const std::string&)>& progress_;
+  NewtonOutcome outcome_;
+  std::unique_ptr<Preconditioner> preconditioner_;
+  bool factored_ =
+      false;  // the preconditioner is that of the matrix, whose prescribed components are eliminated
+  int usual_iterations_ = 0;    // of conjugate gradients with a preconditioner made anew
+  std::vector<Vec3> gap_;       // what prescribed elements still have to go; empty when they are there
+  std::vector<Vec3> residual_;  // forces on free components
+  std::vector<Vec3> direction_;
+  double residual_norm_ = 0, scale_ = 0;
+  double model_error_ = 1;  // of the last step, relative
+  bool projected_ = false;
+};
+
+void Solver::update_residual() {
+  Forces forces = mechanics_.forces(state_);
+  residual_ = std::move(forces.total);
+  clear_prescribed(mechanics_.constraints(), residual_);
+  residual_norm_ = norm(residual_);
+  scale_ = forces.scale;
+  outcome_.relative_residual = scale_ > 0 ? residual_norm_ / scale_ : 0;
+}
+
+void Solver::prepare_tangent(bool project) {
+  factored_ = false;
+  mechanics_.assemble(state_, project);
+  projected_ = project;
+}
+
+// A refreshed preconditioner keeps the aggregates and the rigid motions of the positions it was made at; it
+// is made anew when turning has made it poor.
+void Solver::factor() {
+  mechanics_.eliminate_prescribed();
+  if (preconditioner_)
+    preconditioner_->refresh();
+  else
+    preconditioner_ = aggregation_multigrid(mechanics_.stiffness(), node_geometry(mechanics_.body(), state_));
+  factored_ = true;
+}
+
+// Forces on the free components, less what the way of the prescribed ones pulls with it. Eliminates them from
+// the matrix.
+std::vector<Vec3> Solver::right_hand_side() {
+  std::vector<Vec3> rhs = residual_;
+  if (!gap_.empty()) {
+    std::vector<Vec3> pulled(rhs.size());
+    multiply(mechanics_.stiffness(), gap_, pulled);
+    for (std::size_t e = 0; e < rhs.size(); ++e) rhs[e] -= pulled[e];
+    clear_prescribed(mechanics_.constraints(), rhs);
+  }
+  return rhs;
+}
+
+void Solver::solve_linear(const std::vector<Vec3>& rhs, double forcing) {
+  const PassTimer timer(outcome_.linear_seconds);
+  const bool fresh = !preconditioner_;
+  if (!factored_) factor();
+  direction_.assign(rhs.size(), Vec3::Zero());
+  const LinearResult result = conjugate_gradients(
+      mechanics_.stiffness(), rhs, direction_, *preconditioner_, forcing, kMaxCgIterations,
+      [&](int iteration, double relative) {
+        progress_(fmt::format("newton {}, cg {}, {:.0e}", outcome_.iterations + 1, iteration, relative));
+      });
+  outcome_.cg_iterations += result.iterations;
+  if (fresh) usual_iterations_ = result.iterations;
+  const bool poor = result.iterations > 2 * usual_iterations_ + 20;
+  if (result.indefinite && !projected_) {
+    prepare_tangent(true);
+    const std::vector<Vec3> again = right_hand_side();
+    solve_linear(again, forcing);
+  } else if (poor) {
+    preconditioner_.reset();
+    factored_ = false;
+    model_error_ = 1;
+  }
+}
+
+State Solver::moved(double step) const {
+  State trial = state_;
+  parallel_for_each(trial.displacement.size(),
+                    [&](std::size_t e) { trial.displacement[e] += step * direction_[e]; });
+  return trial;
+}
+
+// The first step of a share with prescribed elements: as much of it as every cell bears. Energy is no guide
+// here.
+bool Solver::lead_prescribed() {
+  for (std::size_t e = 0; e < gap_.size(); ++e) direction_[e] += gap_[e];
+  double step = 1;
+  while (step >= kSmallestStep) {
+    State trial = moved(step);
+    if (std::isfinite(mechanics_.energy(trial))) {
+      state_ = std::move(trial);
+      for (Vec3& gap : gap_) gap *= 1 - step;
+      if (step == 1) {
+        apply(mechanics_.constraints(), mechanics_.body(), state_.share, state_.displacement);
+        gap_.clear();
+      }
+      return true;
+    }
+    step /= 2;
+  }
+  return false;
+}
+
+bool Solver::line_search(const std::vector<Vec3>& residual) {
+  const double slope = -dot(residual, direction_);
+  if (!(slope < 0)) return false;
+  const double before = mechanics_.energy(state_);
+  const double noise = 1e-12 * std::abs(before);
+  for (double step = 1; step >= kSmallestStep; step /= 2) {
+    State trial = moved(step);
+    const double after = mechanics_.energy(trial);
+    if (!std::isfinite(after)) continue;
+    bool accepted = after <= before + kArmijo * step * slope;
+    if (!accepted && after <= before + noise) {
+      // Near the minimum the energy no longer has the digits; the forces do.
+      Forces forces = mechanics_.forces(trial);
+      clear_prescribed(mechanics_.constraints(), forces.total);
+      accepted = norm(forces.total) < 0.9 * residual_norm_;
+    }
+    if (accepted) {
+      state_ = std::move(trial);
+      return true;
+    }
+  }
+  return false;
+}
+
+double Solver::forcing() const {
+  const double wanted = 0.3 * options_.tolerance * scale_ / residual_norm_;
+  const double trusted = outcome_.iterations == 0 ? kFirstForcing : std::min(kLargestForcing, model_error_);
+  return std::max(std::min(trusted, kLargestForcing), std::min(wanted, kLargestForcing));
+}
+
+NewtonOutcome Solver::run() {
+  gap_ = state_.displacement;
+  apply(mechanics_.constraints(), mechanics_.body(), state_.share, gap_);
+  for (std::size_t e = 0; e < gap_.size(); ++e) gap_[e] -= state_.displacement[e];
+  if (norm(gap_) == 0) gap_.clear();
+  update_residual();
+  for (; outcome_.iterations < options_.max_iterations; ++outcome_.iterations) {
+    const bool led = gap_.empty();
+    if (led && (residual_norm_ <= options_.tolerance * scale_ || residual_norm_ == 0)) {
+      outcome_.converged = true;
+      return outcome_;
+    }
+    if (!factored_ || model_error_ > kKeepTangentBelow || !led) prepare_tangent(false);
+    if (led && residual_norm_ <= rounding_floor(mechanics_.stiffness(), state_.displacement)) {
+      outcome_.converged = true;
+      return outcome_;
+    }
+    const std::vector<Vec3> rhs = right_hand_side();
+    if (norm(rhs) > 0)
+      solve_linear(rhs, forcing());
+    else
+      direction_.assign(rhs.size(), Vec3::Zero());
+    // What the linear model predicts for the residual after a full step.
+    std::vector<Vec3> predicted(rhs.size());
+    if (factored_) multiply(mechanics_.stiffness(), direction_, predicted);
+    parallel_for_each(rhs.size(), [&](std::size_t e) { predicted[e] = rhs[e] - predicted[e]; });
+    const double before = led ? residual_norm_ : norm(rhs);
+    const bool moved_on = led ? line_search(residual_) : lead_prescribed();
+    if (!moved_on) {
+      if (led && outcome_.relative_residual <= 10 * options_.tolerance) break;
+      outcome_.trouble = "no step lowers the energy with every cell the right way round";
+      return outcome_;
+    }
+    update_residual();
+    if (before > 0) {
+      parallel_for_each(rhs.size(), [&](std::size_t e) { predicted[e] -= residual_[e]; });
+      model_error_ = norm(predicted) / before;
+    }
+    progress_(fmt::format("newton {}, residual {:.1e}", outcome_.iterations + 1, outcome_.relative_residual));
+  }
+  outcome_.converged = outcome_.relative_residual <= options_.tolerance;
+  if (!outcome_.converged)
+    outcome_.trouble = fmt::format("the residual stays at {:.1e} of the loads", outcome_.relative_residual);
+  return outcome_;
+}
+
+}  // namespace
+
+NewtonOutcome newton(Mechanics& mechanics, State& state, const NewtonOptions& options,
+                     const std::function<void(const std::string&)>& progress) {
+  return Solver(mechanics, state, options, progress).run();
+}
+
+NodeGeometry node_geometry(const Body& body, const State& state) {
+  NodeGeometry geometry;
+  geometry.position = body.rest;
+  for (std::size_t e = 0; e < body.element_count(); ++e) geometry.position[e] += state.displacement[e];
+  geometry.index = body.lattice_index;
+  geometry.part = element_parts(body);
+  return geometry;
+}
+
+}  // namespace flexel

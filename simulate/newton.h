@@ -1,0 +1,32 @@
+// Newton's method for one load share.
+#pragma once
+#include <functional>
+#include <string>
+
+#include "simulate/linear/solve.h"
+#include "simulate/mechanics.h"
+
+namespace flexel {
+
+struct NewtonOptions {
+  double tolerance = 1e-8;  // residual relative to loads and reactions
+  int max_iterations = 40;
+};
+
+struct NewtonOutcome {
+  bool converged = false;
+  int iterations = 0, cg_iterations = 0;
+  double relative_residual = 1;
+  double linear_seconds = 0;  // in preconditioners and conjugate gradients
+  std::string trouble;        // why it stopped when not converged
+};
+
+// Moves `state` to the equilibrium at its share. On failure the state is what was reached: the caller keeps
+// its own copy. `progress` hears of every iteration and may throw.
+[[nodiscard]] NewtonOutcome newton(Mechanics& mechanics, State& state, const NewtonOptions& options,
+                                   const std::function<void(const std::string&)>& progress);
+
+// Geometry of the unknowns at `state`, for the preconditioner and for free_motions().
+[[nodiscard]] NodeGeometry node_geometry(const Body& body, const State& state);
+
+}  // namespace flexel

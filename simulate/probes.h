@@ -1,0 +1,24 @@
+// Probes: the displacement of material points.
+#pragma once
+#include <vector>
+
+#include "simulate/scene.h"
+#include "simulate/simulate.h"
+#include "simulate/state.h"
+
+namespace flexel {
+
+// Where a probe's points are carried, found before the run so that a wrong probe is refused before it.
+// Weights sum to 1.
+struct ProbePoints {
+  std::string name;
+  Vec3 where = Vec3::Zero();                              // m, rest: the point, or the mean of the selection
+  std::vector<std::pair<std::uint32_t, double>> weights;  // element, weight
+};
+
+// Throws InputError: a point further than one spacing from all matter, a selection that selects nothing.
+[[nodiscard]] std::vector<ProbePoints> place_probes(const Scene& scene, const Body& body,
+                                                    const std::vector<std::uint8_t>& stray_cell);
+[[nodiscard]] ProbeResult measure(const ProbePoints& probe, const State& state);
+
+}  // namespace flexel

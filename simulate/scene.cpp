@@ -1,0 +1,152 @@
+// Parses the scene's general tables (materials, parts, probes, run); each effect reads its own.
+#include "simulate/scene.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "formats/error.h"
+#include "formats/files.h"
+
+namespace flexel {
+namespace {
+
+double required_quantity(TableReader& reader, const char* key, Dimension dimension, const char* example) {
+  return reader.to_quantity(reader.require(key, example), dimension, key);
+}
+
+Material parse_material(TableReader& reader, const std::string& name) {
+  Material material;
+  material.name = name;
+  material.young = required_quantity(reader, "young", Dimension::pressure, "\"210 GPa\"");
+  (void)reader.require("poisson", "0.3");
+  material.poisson = *reader.number("poisson");
+  material.density = required_quantity(reader, "density", Dimension::density, "\"7850 kg/m3\"");
+  material.source = reader.text("source").value_or(reader.file());
+  reader.finish();
+  if (!(material.young > 0)) reader.fail("\"young\" needs to be above 0");
+  if (!(material.poisson > -1 && material.poisson < 0.5))
+    reader.fail(fmt::format("\"poisson\" = {} needs to lie above -1 and below 0.5", material.poisson));
+  if (!(material.density > 0)) reader.fail("\"density\" needs to be above 0");
+  return material;
+}
+
+void parse_materials(TableReader& root, Scene& scene) {
+  const SceneValue* table = root.find("materials");
+  if (!table) return;
+  TableReader materials(*table, root.file(), "[materials]");
+  for (const auto& [name, value] : table->members) {
+    TableReader reader(value, root.file(), fmt::format("[materials.{}]", name));
+    scene.materials[name] = parse_material(reader, name);
+  }
+}
+
+void parse_parts(TableReader& root, Scene& scene) {
+  const SceneValue* table = root.find("parts");
+  if (!table) return;
+  TableReader parts(*table, root.file(), "[parts]");
+  for (const auto& [name, value] : table->members) {
+    TableReader reader(value, root.file(), fmt::format("[parts.{}]", name));
+    PartSettings settings;
+    settings.origin = reader.place();
+    settings.material = reader.text("material").value_or("");
+    settings.model = reader.text("model").value_or("cells");
+    reader.finish();
+    scene.parts[name] = settings;
+  }
+}
+
+Probe parse_probe(TableReader& reader, std::size_t number) {
+  Probe probe;
+  probe.origin = reader.place();
+  probe.name = reader.text("name").value_or(fmt::format("probe {}", number));
+  probe.at = reader.vector("at", Dimension::length);
+  if (const SceneValue* where = reader.find("where")) probe.where = parse_selection(*where, reader);
+  reader.finish();
+  if (probe.at.has_value() == probe.where.has_value())
+    reader.fail(
+        "[[probe]] needs either \"at\" (a point, for example [\"10 mm\", \"5 mm\", \"0 mm\"]) or \"where\" "
+        "(a "
+        "selection, whose mean it gives)");
+  return probe;
+}
+
+RunSettings parse_run(TableReader& root) {
+  RunSettings run;
+  const SceneValue* table = root.find("run");
+  if (!table) return run;
+  TableReader reader(*table, root.file(), "[run]");
+  const std::string until = reader.text("until").value_or("equilibrium");
+  if (until != "equilibrium")
+    reader.fail(
+        reader.find("until")->line,
+        fmt::format("\"until\" = \"{}\" is not available; this version knows \"equilibrium\"", until));
+  run.tolerance = reader.number("tolerance").value_or(run.tolerance);
+  const double steps = reader.number("load_steps").value_or(run.load_steps);
+  reader.finish();
+  if (!(run.tolerance >= 1e-12 && run.tolerance <= 1e-2))
+    reader.fail(fmt::format("\"tolerance\" = {} needs to lie between 1e-12 and 1e-2", run.tolerance));
+  if (!(steps >= 1 && steps <= 10000 && steps == std::floor(steps)))
+    reader.fail("\"load_steps\" needs to be a whole number from 1 to 10000");
+  run.load_steps = static_cast<int>(steps);
+  return run;
+}
+
+}  // namespace
+
+Scene parse_scene(const std::string& text, const std::string& name) {
+  const SceneValue tree = read_toml(text, name);
+  TableReader root(tree, name, "the scene");
+  Scene scene;
+  scene.name = name;
+  scene.material = root.text("material").value_or("");
+  parse_materials(root, scene);
+  parse_parts(root, scene);
+  for (const SceneValue* table : root.tables("probe")) {
+    TableReader reader(*table, name, "[[probe]]");
+    scene.probes.push_back(parse_probe(reader, scene.probes.size() + 1));
+  }
+  scene.run = parse_run(root);
+  Effects::parse(root, scene.effects);
+  root.finish();
+  return scene;
+}
+
+Scene read_scene(const std::string& path) {
+  const Bytes bytes = read_all(path);
+  return parse_scene(std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()),
+                     path == "-" ? "stdin" : path);
+}
+
+Tie make_fix(Selection where) {
+  Tie tie;
+  tie.name = describe(where);
+  tie.origin = where.origin;
+  tie.where = std::move(where);
+  return tie;
+}
+
+Tie make_move(Selection where, const Vec3& displacement) {
+  Tie tie = make_fix(std::move(where));
+  tie.is_move = true;
+  tie.motion.translation = displacement;
+  return tie;
+}
+
+Load make_push(Selection where, const Vec3& force) {
+  Load load;
+  load.name = describe(where);
+  load.origin = where.origin;
+  load.where = std::move(where);
+  load.force = force;
+  return load;
+}
+
+Load make_pressure(Selection where, double pressure) {
+  Load load = make_push(std::move(where), Vec3::Zero());
+  load.force.reset();
+  load.pressure = pressure;
+  return load;
+}
+
+}  // namespace flexel

@@ -1,0 +1,66 @@
+// The only file that sees toml++: copies its tree into SceneValue, keeping each value's line.
+#define TOML_EXCEPTIONS 1
+#include <toml++/toml.h>
+
+#include "formats/error.h"
+#include "simulate/scene_table.h"
+
+namespace flexel {
+namespace {
+
+int line_of(const toml::node& node) {
+  return static_cast<int>(node.source().begin.line);
+}
+
+SceneValue convert(const toml::node& node);
+
+void convert_table(const toml::table& table, SceneValue& value) {
+  value.kind = SceneValue::Kind::table;
+  for (const auto& [key, member] : table) {
+    SceneValue converted = convert(member);
+    // The key's own line says where a mistyped key is, also where its value begins further down.
+    converted.line = static_cast<int>(key.source().begin.line);
+    value.members.emplace_back(std::string(key.str()), std::move(converted));
+  }
+  std::stable_sort(value.members.begin(), value.members.end(),
+                   [](const auto& a, const auto& b) { return a.second.line < b.second.line; });
+}
+
+SceneValue convert(const toml::node& node) {
+  SceneValue value;
+  value.line = line_of(node);
+  if (const auto* text = node.as_string()) {
+    value.kind = SceneValue::Kind::string;
+    value.text = text->get();
+  } else if (const auto* integer = node.as_integer()) {
+    value.kind = SceneValue::Kind::number;
+    value.number = static_cast<double>(integer->get());
+  } else if (const auto* real = node.as_floating_point()) {
+    value.kind = SceneValue::Kind::number;
+    value.number = real->get();
+  } else if (const auto* flag = node.as_boolean()) {
+    value.kind = SceneValue::Kind::boolean;
+    value.flag = flag->get();
+  } else if (const auto* array = node.as_array()) {
+    value.kind = SceneValue::Kind::array;
+    for (const auto& item : *array) value.items.push_back(convert(item));
+  } else if (const auto* table = node.as_table()) {
+    convert_table(*table, value);
+  }
+  return value;
+}
+
+}  // namespace
+
+SceneValue read_toml(const std::string& text, const std::string& name) {
+  try {
+    SceneValue root = convert(toml::parse(text, name));
+    root.line = 1;
+    return root;
+  } catch (const toml::parse_error& error) {
+    throw InputError(name + ":" + std::to_string(error.source().begin.line),
+                     std::string(error.description()));
+  }
+}
+
+}  // namespace flexel

@@ -1,0 +1,24 @@
+// What changes while a run goes on, and what stays: the state and the setting that effects are made in.
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "formats/body.h"
+#include "simulate/materials.h"
+
+namespace flexel {
+
+struct State {
+  std::vector<Vec3> displacement;  // (elements x 3) m, from rest, world frame
+  double share = 1;                // of every load and move that acts now, in [0, 1] (load stepping)
+};
+
+// What effects are made from. Refers to the body, which stays unchanged during a run.
+struct Setting {
+  const Body& body;
+  std::vector<Material> materials;  // (parts)
+  std::vector<std::uint8_t>
+      stray_cell;  // (cells) 1: of a loose crumb that nothing holds; it is carried along, not simulated
+};
+
+}  // namespace flexel

@@ -1,0 +1,73 @@
+// Pattern of the stiffness: count the cells at each element, gather the elements of those cells into sorted
+// rows, then look up where each cell's blocks lie. Rows are independent, so everything but the counting runs
+// in parallel.
+#include "simulate/stiffness.h"
+
+#include <algorithm>
+
+#include "formats/parallel.h"
+
+namespace flexel {
+namespace {
+
+void fill_incidences(const Body& body, const std::vector<std::uint8_t>& active, Stencil& stencil) {
+  stencil.offsets.assign(body.element_count() + 1, 0);
+  for (std::uint32_t c = 0; c < body.cell_count(); ++c)
+    if (active[c])
+      for (const std::uint32_t e : body.cell_elements[c]) ++stencil.offsets[e + 1];
+  for (std::size_t e = 0; e < body.element_count(); ++e) stencil.offsets[e + 1] += stencil.offsets[e];
+  stencil.incidences.resize(stencil.offsets.back());
+  std::vector<std::uint32_t> next(stencil.offsets.begin(), stencil.offsets.end() - 1);
+  for (std::uint32_t c = 0; c < body.cell_count(); ++c)
+    if (active[c])
+      for (std::uint32_t a = 0; a < 8; ++a) stencil.incidences[next[body.cell_elements[c][a]]++] = {c, a};
+}
+
+// Elements that share an active cell with `element`, itself among them, ascending.
+void collect_row(const Body& body, const Stencil& stencil, std::uint32_t element,
+                 std::vector<std::uint32_t>& row) {
+  row.assign(1, element);
+  for (const Incidence& at : stencil.of(element))
+    row.insert(row.end(), body.cell_elements[at.cell].begin(), body.cell_elements[at.cell].end());
+  std::sort(row.begin(), row.end());
+  row.erase(std::unique(row.begin(), row.end()), row.end());
+}
+
+}  // namespace
+
+StiffnessPattern stiffness_pattern(const Body& body, const std::vector<std::uint8_t>& active) {
+  StiffnessPattern pattern;
+  Stencil& stencil = pattern.stencil;
+  BlockMatrix& matrix = pattern.matrix;
+  const std::size_t n = body.element_count();
+  fill_incidences(body, active, stencil);
+  std::vector<std::uint32_t> length(n);
+  parallel_chunks(n, 4096, [&](std::size_t begin, std::size_t end) {
+    std::vector<std::uint32_t> row;
+    for (std::size_t e = begin; e < end; ++e) {
+      collect_row(body, stencil, static_cast<std::uint32_t>(e), row);
+      length[e] = static_cast<std::uint32_t>(row.size());
+    }
+  });
+  matrix.row_offsets.assign(n + 1, 0);
+  for (std::size_t e = 0; e < n; ++e) matrix.row_offsets[e + 1] = matrix.row_offsets[e] + length[e];
+  matrix.columns.resize(matrix.row_offsets[n]);
+  matrix.values.assign(matrix.row_offsets[n], Block::Zero());
+  stencil.slot.resize(body.cell_count());
+  parallel_chunks(n, 4096, [&](std::size_t begin, std::size_t end) {
+    std::vector<std::uint32_t> row;
+    for (std::size_t e = begin; e < end; ++e) {
+      collect_row(body, stencil, static_cast<std::uint32_t>(e), row);
+      std::copy(row.begin(), row.end(),
+                matrix.columns.begin() + static_cast<std::ptrdiff_t>(matrix.row_offsets[e]));
+      for (const Incidence& at : stencil.of(static_cast<std::uint32_t>(e)))
+        for (std::size_t b = 0; b < 8; ++b) {
+          const auto found = std::lower_bound(row.begin(), row.end(), body.cell_elements[at.cell][b]);
+          stencil.slot[at.cell][8 * at.corner + b] = static_cast<std::uint8_t>(found - row.begin());
+        }
+    }
+  });
+  return pattern;
+}
+
+}  // namespace flexel

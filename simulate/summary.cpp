@@ -1,0 +1,87 @@
+// The result of a run as JSON and as lines for people.
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "formats/program.h"
+#include "formats/units.h"
+#include "simulate/simulate.h"
+
+namespace flexel {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json vector(const Vec3& value) {
+  return Json::array({value.x(), value.y(), value.z()});
+}
+
+std::string lengths(const Vec3& value) {
+  return fmt::format("({}, {}, {})", human_length(value.x()), human_length(value.y()),
+                     human_length(value.z()));
+}
+
+std::string forces(const Vec3& value) {
+  return fmt::format("({}, {}, {})", human_force(value.x()), human_force(value.y()), human_force(value.z()));
+}
+
+}  // namespace
+
+std::string summary_json(const SimulateResult& result, const Body& body) {
+  Json json;
+  json["program"] = "flexel-simulate";
+  json["version"] = version();
+  json["elements"] = body.element_count();
+  json["cells"] = body.cell_count();
+  json["stray_cells"] = result.stray_cells;
+  json["parts"] = Json::array();
+  for (const Part& part : body.parts)
+    json["parts"].push_back(
+        {{"name", part.name}, {"material", part.material}, {"spacing", vector(part.lattice.spacing)}});
+  json["mass"] = result.mass;
+  json["largest_displacement"] = result.largest_displacement;
+  json["largest_displacement_at"] = vector(result.largest_displacement_at);
+  json["probes"] = Json::array();
+  for (const ProbeResult& probe : result.probes)
+    json["probes"].push_back(
+        {{"name", probe.name}, {"at", vector(probe.where)}, {"displacement", vector(probe.displacement)}});
+  json["loads"] = Json::array();
+  for (const AppliedLoad& load : result.loads)
+    json["loads"].push_back({{"name", load.name}, {"force", vector(load.force)}});
+  json["reactions"] = Json::array();
+  for (const Reaction& reaction : result.reactions)
+    json["reactions"].push_back({{"name", reaction.name}, {"force", vector(reaction.force)}});
+  json["imbalance"] = vector(result.imbalance);
+  json["elastic_energy"] = result.elastic_energy;
+  json["smallest_jacobian"] = result.smallest_jacobian;
+  json["load_steps"] = result.load_steps;
+  json["newton_iterations"] = result.newton_iterations;
+  json["cg_iterations"] = result.cg_iterations;
+  json["relative_residual"] = result.relative_residual;
+  json["seconds"] = result.seconds;
+  json["time"] = Json::array();
+  for (const PassShare& pass : result.passes)
+    json["time"].push_back({{"name", pass.name}, {"why", pass.why}, {"seconds", pass.seconds}});
+  return json.dump(2) + "\n";
+}
+
+std::vector<std::string> summary_lines(const SimulateResult& result) {
+  std::vector<std::string> lines;
+  lines.push_back(fmt::format("largest displacement {} at {}", human_length(result.largest_displacement),
+                              lengths(result.largest_displacement_at)));
+  for (const ProbeResult& probe : result.probes)
+    lines.push_back(fmt::format("probe \"{}\" moved {}: {}", probe.name,
+                                human_length(probe.displacement.norm()), lengths(probe.displacement)));
+  for (const AppliedLoad& load : result.loads)
+    lines.push_back(fmt::format("load \"{}\": {}", load.name, forces(load.force)));
+  for (const Reaction& reaction : result.reactions)
+    lines.push_back(fmt::format("reaction of \"{}\": {}", reaction.name, forces(reaction.force)));
+  lines.push_back(fmt::format(
+      "elastic energy {:.4g} J, smallest J {:.4g}, {} load step(s), {} Newton and {} CG iterations, "
+      "residual {:.1e}, {:.2f} s",
+      result.elastic_energy, result.smallest_jacobian, result.load_steps, result.newton_iterations,
+      result.cg_iterations, result.relative_residual, result.seconds));
+  return lines;
+}
+
+}  // namespace flexel

@@ -1,0 +1,88 @@
+// Longest-edge bisection keeps the pieces of long slender triangles (which CAD tessellation is full of) few:
+// their number grows with length over h, not with its square. The centroid rule on pieces of h/2 integrates
+// the piecewise trilinear weights of the cells to well under a percent of one cell's share, and exactly in
+// sum, since the weights of a point sum to 1.
+#include "simulate/surface_points.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+
+#include "formats/parallel.h"
+
+namespace flexel {
+namespace {
+
+using Corners = std::array<Vec3, 3>;
+
+void add_pieces(const Corners& triangle, double longest, std::vector<Corners>& pieces) {
+  std::vector<Corners> pending{triangle};
+  while (!pending.empty()) {
+    const Corners corners = pending.back();
+    pending.pop_back();
+    std::size_t edge = 0;
+    double length = 0;
+    for (std::size_t e = 0; e < 3; ++e) {
+      const double each = (corners[(e + 1) % 3] - corners[e]).norm();
+      if (each > length) {
+        length = each;
+        edge = e;
+      }
+    }
+    if (!(length > longest)) {
+      pieces.push_back(corners);
+      continue;
+    }
+    const Vec3 middle = 0.5 * (corners[edge] + corners[(edge + 1) % 3]);
+    const Vec3& apex = corners[(edge + 2) % 3];
+    pending.push_back({middle, corners[(edge + 1) % 3], apex});
+    pending.push_back({corners[edge], middle, apex});
+  }
+}
+
+// The triangles of the selected polygons, by polygon.
+std::vector<std::uint32_t> selected_triangles(const Body& body, const Triangles& triangles,
+                                              const std::vector<std::uint32_t>& polygons) {
+  std::vector<std::uint8_t> chosen(body.surface.polygon_count(), 0);
+  for (const std::uint32_t p : polygons) chosen[p] = 1;
+  std::vector<std::uint32_t> list;
+  for (std::uint32_t t = 0; t < triangles.polygon.size(); ++t)
+    if (chosen[triangles.polygon[t]]) list.push_back(t);
+  return list;
+}
+
+}  // namespace
+
+std::vector<SurfacePoint> surface_points(const Body& body, const std::vector<std::uint32_t>& polygons,
+                                         const std::vector<std::uint8_t>& skip) {
+  const Triangles triangles = triangulate(body.surface);
+  const std::vector<std::uint32_t> list = selected_triangles(body, triangles, polygons);
+  std::vector<std::vector<SurfacePoint>> found(list.size());
+  parallel_for_each(
+      list.size(),
+      [&](std::size_t t) {
+        const std::uint32_t polygon = triangles.polygon[list[t]];
+        Corners corners;
+        for (std::size_t c = 0; c < 3; ++c) corners[c] = body.surface.vertices[triangles.corners[list[t]][c]];
+        std::vector<Corners> pieces;
+        add_pieces(corners, 0.5 * body.parts[body.surface.polygon_part(polygon)].lattice.spacing.minCoeff(),
+                   pieces);
+        for (const Corners& piece : pieces) {
+          const Vec3 centre = (piece[0] + piece[1] + piece[2]) / 3;
+          const auto at = locate_on_surface(body, polygon, centre);
+          if (!at || (at->cell < skip.size() && skip[at->cell])) continue;
+          found[t].push_back({*at, centre, 0.5 * (piece[1] - piece[0]).cross(piece[2] - piece[0]), polygon});
+        }
+      },
+      16);
+  std::vector<SurfacePoint> points;
+  for (const auto& each : found) points.insert(points.end(), each.begin(), each.end());
+  return points;
+}
+
+double total_area(const std::vector<SurfacePoint>& points) {
+  double area = 0;
+  for (const SurfacePoint& point : points) area += point.area_vector.norm();
+  return area;
+}
+
+}  // namespace flexel
