@@ -9,6 +9,9 @@
 #include <BRep_Tool.hxx>
 #include <Bnd_Box.hxx>
 #include <IMeshTools_Parameters.hxx>
+#include <Interface_Check.hxx>
+#include <Interface_CheckIterator.hxx>
+#include <Interface_InterfaceModel.hxx>
 #include <Interface_Static.hxx>
 #include <Message.hxx>
 #include <Message_Messenger.hxx>
@@ -19,8 +22,10 @@
 #include <StepBasic_Product.hxx>
 #include <StepBasic_ProductDefinition.hxx>
 #include <StepBasic_ProductDefinitionFormation.hxx>
+#include <StepGeom_GeometricRepresentationItem.hxx>
 #include <StepShape_Face.hxx>
 #include <StepShape_SolidModel.hxx>
+#include <StepShape_TopologicalRepresentationItem.hxx>
 #include <TCollection_HAsciiString.hxx>
 #include <TopExp.hxx>
 #include <TopExp_Explorer.hxx>
@@ -62,12 +67,32 @@ class MemoryStream : private std::streambuf, public std::istream {
   }
 };
 
+std::string damage(const std::string& what) {
+  return fmt::format("is damaged: OpenCASCADE says \"{}\"", clean_name(what));
+}
+
 void check_complete(const ImportInput& input) {
   const std::string_view text(reinterpret_cast<const char*>(input.bytes.data()), input.bytes.size());
   if (text.rfind("END-ISO-10303-21") == std::string_view::npos)
     throw InputError(input.where, text.find("ISO-10303-21") == std::string_view::npos
                                       ? "is no STEP file: it does not begin with ISO-10303-21"
                                       : "is cut off: a STEP file ends with END-ISO-10303-21");
+}
+
+// OpenCASCADE loads what it can and later follows the references that are missing, so a solid of which a part
+// did not load is refused here. Damage elsewhere in the file (drawings, tolerances, colours) does no harm.
+void check_loaded(const STEPControl_Reader& reader, const ImportInput& input) {
+  const Handle(Interface_InterfaceModel) model = reader.WS()->Model();
+  const Interface_CheckIterator checks = reader.WS()->ModelCheckList(Standard_False);
+  for (checks.Start(); checks.More(); checks.Next()) {
+    if (!checks.Value()->HasFailed()) continue;
+    if (checks.Number() < 1) throw InputError(input.where, damage(checks.Value()->CFail(1)));
+    const Handle(Standard_Transient) entity = model->Value(checks.Number());
+    if (entity->IsKind(STANDARD_TYPE(StepGeom_GeometricRepresentationItem)) ||
+        entity->IsKind(STANDARD_TYPE(StepShape_TopologicalRepresentationItem)))
+      throw InputError(input.where, damage(fmt::format("{}: {}", model->StringLabel(entity)->ToCString(),
+                                                       checks.Value()->CFail(1))));
+  }
 }
 
 TopoDS_Shape transfer(STEPControl_Reader& reader, ImportInput& input) {
@@ -77,6 +102,7 @@ TopoDS_Shape transfer(STEPControl_Reader& reader, ImportInput& input) {
   MemoryStream stream(input.bytes);
   if (reader.ReadStream(input.file.c_str(), stream) != IFSelect_RetDone)
     throw InputError(input.where, "is damaged: OpenCASCADE cannot make sense of it as STEP");
+  check_loaded(reader, input);
   reader.TransferRoots();
   return reader.OneShape();
 }
@@ -346,8 +372,7 @@ Surface read_step(ImportInput& input, const ImportOptions& options) {
     return surface;
   } catch (const Standard_Failure& failure) {
     throw InputError(input.where,
-                     fmt::format("is damaged: OpenCASCADE stops with \"{}\"",
-                                 clean_name(failure.GetMessageString() ? failure.GetMessageString() : "")));
+                     damage(failure.GetMessageString() ? failure.GetMessageString() : "no reason"));
   }
 }
 
