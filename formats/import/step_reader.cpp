@@ -23,6 +23,7 @@
 #include <StepBasic_ProductDefinition.hxx>
 #include <StepBasic_ProductDefinitionFormation.hxx>
 #include <StepGeom_GeometricRepresentationItem.hxx>
+#include <StepRepr_Representation.hxx>
 #include <StepShape_Face.hxx>
 #include <StepShape_SolidModel.hxx>
 #include <StepShape_TopologicalRepresentationItem.hxx>
@@ -47,6 +48,7 @@
 
 #include "formats/disjoint_sets.h"
 #include "formats/error.h"
+#include "formats/import/crash_guard.h"
 #include "formats/import/readers.h"
 #include "formats/topology.h"
 
@@ -79,6 +81,13 @@ void check_complete(const ImportInput& input) {
                                       : "is cut off: a STEP file ends with END-ISO-10303-21");
 }
 
+bool is_geometry(const Handle(Standard_Transient) & entity) {
+  const bool representation = entity->IsKind(STANDARD_TYPE(StepRepr_Representation)) &&
+                              !std::string_view(entity->DynamicType()->Name()).starts_with("StepVisual_");
+  return representation || entity->IsKind(STANDARD_TYPE(StepGeom_GeometricRepresentationItem)) ||
+         entity->IsKind(STANDARD_TYPE(StepShape_TopologicalRepresentationItem));
+}
+
 // OpenCASCADE loads what it can and later follows the references that are missing, so a solid of which a part
 // did not load is refused here. Damage elsewhere in the file (drawings, tolerances, colours) does no harm.
 void check_loaded(const STEPControl_Reader& reader, const ImportInput& input) {
@@ -88,8 +97,7 @@ void check_loaded(const STEPControl_Reader& reader, const ImportInput& input) {
     if (!checks.Value()->HasFailed()) continue;
     if (checks.Number() < 1) throw InputError(input.where, damage(checks.Value()->CFail(1)));
     const Handle(Standard_Transient) entity = model->Value(checks.Number());
-    if (entity->IsKind(STANDARD_TYPE(StepGeom_GeometricRepresentationItem)) ||
-        entity->IsKind(STANDARD_TYPE(StepShape_TopologicalRepresentationItem)))
+    if (is_geometry(entity))
       throw InputError(input.where, damage(fmt::format("{}: {}", model->StringLabel(entity)->ToCString(),
                                                        checks.Value()->CFail(1))));
   }
@@ -349,27 +357,35 @@ void add_solid(Surface& surface, const TopoDS_Shape& solid, const Names& names) 
   orient_outward(surface, first_polygon);
 }
 
+Surface read_solids(ImportInput& input, const ImportOptions& options) {
+  STEPControl_Reader reader;
+  const std::vector<TopoDS_Shape> solids = solids_of(transfer(reader, input), input);
+  const Names names = read_names(reader);
+  Surface surface;
+  surface.polygon_offsets.push_back(0);
+  for (const TopoDS_Shape& solid : solids) {
+    tessellate(solid, options, input);
+    add_solid(surface, solid, names);
+  }
+  return surface;
+}
+
 }  // namespace
 
 Surface read_step(ImportInput& input, const ImportOptions& options) {
   if (options.unit) throw InputError(input.where, "a STEP file carries its own unit: leave out --unit");
   check_complete(input);
   try {
-    STEPControl_Reader reader;
-    const std::vector<TopoDS_Shape> solids = solids_of(transfer(reader, input), input);
-    const Names names = read_names(reader);
     Surface surface;
-    surface.polygon_offsets.push_back(0);
-    for (const TopoDS_Shape& solid : solids) {
-      tessellate(solid, options, input);
-      add_solid(surface, solid, names);
-    }
+    guarded([&] { surface = read_solids(input, options); });
     SurfaceSource source;
     source.format = "step";
     source.unit = kMillimetre;
     source.unit_given = true;
     surface.sources.push_back(std::move(source));
     return surface;
+  } catch (const LibraryCrashed&) {
+    throw InputError(input.where, "is damaged: OpenCASCADE cannot read it");
   } catch (const Standard_Failure& failure) {
     throw InputError(input.where,
                      damage(failure.GetMessageString() ? failure.GetMessageString() : "no reason"));
