@@ -3,6 +3,7 @@
 // SIGINT) or remove the temporary outputs and end the process (second SIGINT, SIGTERM, SIGHUP).
 #include "formats/program.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
 #include <unistd.h>
@@ -45,6 +46,17 @@ void handle(int signal, void (*handler)(int)) {
   action.sa_handler = handler;
   sigemptyset(&action.sa_mask);
   sigaction(signal, &action, nullptr);
+}
+
+// A program may be started with stdin, stdout or stderr closed. The next file it opens would then take that
+// number, and what is printed would land in it. Holding the numbers with a file that cannot be written keeps
+// errors errors.
+void hold_standard_descriptors() {
+  int descriptor = 0;
+  do {
+    descriptor = ::open("/dev/null", O_RDONLY);
+  } while (descriptor >= 0 && descriptor <= STDERR_FILENO);
+  if (descriptor > STDERR_FILENO) ::close(descriptor);
 }
 
 void install_handlers() {
@@ -139,6 +151,7 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
 }  // namespace
 
 int run_program(const std::string& name, const std::function<int()>& body) {
+  hold_standard_descriptors();
   install_handlers();
   try {
     const int code = body();

@@ -24,8 +24,8 @@ struct Outcome {
   std::string err;
 };
 
-// Runs `body` as a program in a process of its own.
-Outcome run(const std::function<int()>& body) {
+// Runs `body` as a program in a process of its own, after `before`.
+Outcome run(const std::function<int()>& body, const std::function<void()>& before = {}) {
   int ends[2];
   if (pipe(ends) != 0) return {};
   const pid_t child = fork();
@@ -33,6 +33,7 @@ Outcome run(const std::function<int()>& body) {
     dup2(ends[1], STDERR_FILENO);
     close(ends[0]);
     close(ends[1]);
+    if (before) before();
     _exit(run_program("flexel-test", body));
   }
   close(ends[1]);
@@ -108,6 +109,19 @@ TEST(Program, AReaderOfStdoutThatLeftEndsItSilently) {
   });
   EXPECT_EQ(outcome.code, 141);
   EXPECT_EQ(outcome.err, "");
+}
+
+TEST(Program, AClosedStdoutIsNoSuccessAndNoFileTakesItsPlace) {
+  const Outcome outcome = run(
+      [] {
+        OutputFile output("-");
+        output.write("result");
+        output.commit();
+        return 0;
+      },
+      [] { close(STDOUT_FILENO); });
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("stdout: cannot write"));
 }
 
 TEST(Program, OneInterruptAsksAndASecondEnds) {
