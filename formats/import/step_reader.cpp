@@ -88,14 +88,36 @@ bool is_geometry(const Handle(Standard_Transient) & entity) {
          entity->IsKind(STANDARD_TYPE(StepShape_TopologicalRepresentationItem));
 }
 
+// "#176" of "Unresolved Reference, Ent.Id.#176 Param.n0 4 (Id.#225)", or "".
+std::string label_in(std::string_view message) {
+  constexpr std::string_view kBefore = "Ent.Id.";
+  const std::size_t at = message.find(kBefore);
+  if (at == std::string_view::npos) return "";
+  const std::string_view label = message.substr(at + kBefore.size());
+  return std::string(label.substr(0, label.find(' ')));
+}
+
+// A reference from a solid to something that is not in the file. OpenCASCADE keeps these apart, as messages
+// on the whole.
+void check_references(const Handle(Interface_InterfaceModel) & model, const ImportInput& input) {
+  const Handle(Interface_Check) check = model->GlobalCheck();
+  const auto examine = [&](Standard_CString message) {
+    const std::string label = label_in(message);
+    const Standard_Integer number = label.empty() ? 0 : model->NextNumberForLabel(label.c_str());
+    if (number > 0 && is_geometry(model->Value(number))) throw InputError(input.where, damage(message));
+  };
+  for (Standard_Integer i = 1; i <= check->NbFails(); ++i) examine(check->CFail(i));
+  for (Standard_Integer i = 1; i <= check->NbWarnings(); ++i) examine(check->CWarning(i));
+}
+
 // OpenCASCADE loads what it can and later follows the references that are missing, so a solid of which a part
 // did not load is refused here. Damage elsewhere in the file (drawings, tolerances, colours) does no harm.
 void check_loaded(const STEPControl_Reader& reader, const ImportInput& input) {
   const Handle(Interface_InterfaceModel) model = reader.WS()->Model();
+  check_references(model, input);
   const Interface_CheckIterator checks = reader.WS()->ModelCheckList(Standard_False);
   for (checks.Start(); checks.More(); checks.Next()) {
-    if (!checks.Value()->HasFailed()) continue;
-    if (checks.Number() < 1) throw InputError(input.where, damage(checks.Value()->CFail(1)));
+    if (!checks.Value()->HasFailed() || checks.Number() < 1) continue;
     const Handle(Standard_Transient) entity = model->Value(checks.Number());
     if (is_geometry(entity))
       throw InputError(input.where, damage(fmt::format("{}: {}", model->StringLabel(entity)->ToCString(),

@@ -1,0 +1,203 @@
+#include <gmock/gmock.h>
+
+#include <csignal>
+#include <map>
+
+#include "formats/import/crash_guard.h"
+#include "formats/parallel.h"
+#include "tests/formats/import_help.h"
+
+namespace flexel::test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+TEST(CrashGuard, ACrashBecomesAnExceptionAndHandlersComeBack) {
+  const auto before = std::signal(SIGSEGV, SIG_IGN);
+  EXPECT_THROW(guarded([] { std::raise(SIGSEGV); }), LibraryCrashed);
+  EXPECT_THROW(guarded([] { throw InputError("of our own"); }), InputError);
+  int done = 0;
+  guarded([&] { done = 1; });
+  EXPECT_EQ(done, 1);
+  EXPECT_EQ(std::signal(SIGSEGV, before), SIG_IGN);
+}
+
+#ifndef FLEXEL_STEP
+
+TEST(ImportStep, WithoutOpenCascadeTheMessageSaysHowToGetIt) {
+  const Scratch scratch;
+  EXPECT_THAT(import_error(scratch.write("a.step", "ISO-10303-21;\nHEADER;\n")),
+              AllOf(HasSubstr("no STEP support"), HasSubstr("-DFLEXEL_STEP=ON")));
+}
+
+#else
+
+struct Expected {
+  const char* file;
+  const char* part;
+  std::size_t faces;
+  std::uint32_t shells;
+  double volume;  // mm^3 of the exact solid, by OpenCASCADE's BRepGProp::VolumeProperties at 1e-8
+};
+
+constexpr Expected kSingles[] = {
+    {"4040_base_mount.step", "SOARM100-4040-Adapter-V2", 178, 1, 45514.278},
+    {"Moving_Jaw_SO101.step", "Moving_Jaw_SO101 v1", 189, 2, 20692.667},
+    {"base_interface_AP203.STEP", "base_interface_AP203", 30, 1, 1257991.53},
+    {"featuretype.STEP", "featuretype", 96, 1, 190447.659},
+    {"lower_leg_structure_fork.STEP", "lower_leg_structure_fork", 118, 1, 4184.13685}};
+
+TEST(ImportStep, PartsAreClosedAndHaveTheirSolidsVolume) {
+  SKIP_WITHOUT_PARTS();
+  for (const Expected& e : kSingles) {
+    const Surface surface = import_surface(part_path(e.file));
+    const Shape found = shape(surface);
+    ASSERT_EQ(surface.parts.size(), 1u) << e.file;
+    EXPECT_EQ(surface.parts[0].name, e.part);
+    EXPECT_EQ(surface.faces.size(), e.faces) << e.file;
+    EXPECT_TRUE(found.topology.closed() && found.topology.oriented()) << e.file;
+    EXPECT_EQ(found.topology.shell_count, e.shells) << e.file;
+    EXPECT_NEAR(found.volume * 1e9 / e.volume, 1, 2e-3) << e.file;
+    EXPECT_EQ(surface.sources.at(0).unit, 1e-3);
+    EXPECT_TRUE(surface.sources.at(0).unit_given);
+  }
+}
+
+TEST(ImportStep, EveryFaceHasTrianglesAndNoVertexIsUnused) {
+  SKIP_WITHOUT_PARTS();
+  const Surface surface = import_surface(part_path("4040_base_mount.step"));
+  std::vector<int> used_faces(surface.faces.size()), used(surface.vertices.size());
+  for (const std::uint32_t f : surface.polygon_face) ++used_faces[f];
+  for (const std::uint32_t v : surface.polygon_vertices) ++used[v];
+  EXPECT_THAT(used_faces, Not(::testing::Contains(0)));
+  EXPECT_THAT(used, Not(::testing::Contains(0)));
+}
+
+TEST(ImportStep, AFinerDeflectionComesNearerToTheSolid) {
+  SKIP_WITHOUT_PARTS();
+  const std::string path = part_path("lower_leg_structure_fork.STEP");
+  ImportOptions fine;
+  fine.deflection = 2e-6;
+  fine.angular_deflection = 0.05;
+  const Shape found = shape(import_surface(path, fine));
+  EXPECT_TRUE(found.topology.closed());
+  EXPECT_NEAR(found.volume * 1e9 / 4184.13685, 1, 5e-5);
+}
+
+// A cavity's shell runs the other way round, so that its volume counts against the outer one's.
+TEST(ImportStep, AVoidShellIsInsideOut) {
+  SKIP_WITHOUT_PARTS();
+  const Surface surface = import_surface(part_path("Moving_Jaw_SO101.step"));
+  const Shape found = shape(surface);
+  std::array<std::vector<std::array<std::uint32_t, 3> >, 2> shells;
+  for (std::size_t t = 0; t < found.triangles.corners.size(); ++t)
+    shells.at(found.topology.shell[t]).push_back(found.triangles.corners[t]);
+  const double first = signed_volume(surface.vertices, shells[0]),
+               second = signed_volume(surface.vertices, shells[1]);
+  EXPECT_LT(first * second, 0);
+  EXPECT_GT(first + second, 0);
+}
+
+TEST(ImportStep, UnitsOfTheFileBecomeMetresExactly) {
+  SKIP_WITHOUT_PARTS();
+  // In metres: a cube of 10 mm.
+  const Surface two = import_surface(part_path("red_cube_blue_cylinder.step"));
+  ASSERT_EQ(two.parts.size(), 2u);
+  EXPECT_EQ(two.parts[0].name, "blue_cylinder");
+  EXPECT_EQ(two.parts[1].name, "red_cube");
+  Box cube;
+  for (std::size_t p = 0; p < two.polygon_count(); ++p)
+    if (two.polygon_part(p) == 1)
+      for (const std::uint32_t v : two.polygon(p)) cube.add(two.vertices[v]);
+  EXPECT_NEAR((cube.size() - Vec3::Constant(0.01)).norm(), 0, 1e-15);
+  // In inches: a plate of 3/16 inch.
+  const Surface plate = import_surface(part_path("base_interface_AP203.STEP"));
+  EXPECT_NEAR(bounding_box(plate.vertices).size().z(), 0.1875 * 0.0254, 1e-15);
+  ImportOptions options;
+  options.unit = 0.0254;
+  EXPECT_THAT(import_error(part_path("base_interface_AP203.STEP"), options), HasSubstr("leave out --unit"));
+}
+
+TEST(ImportStep, SameForAnyThreadCountAndSilentOnStdout) {
+  SKIP_WITHOUT_PARTS();
+  const std::string path = part_path("featuretype.STEP");
+  ::testing::internal::CaptureStdout();
+  const ThreadLimit one(1);
+  const Surface first = import_surface(path);
+  const ThreadLimit many(4);
+  const Surface second = import_surface(path);
+  EXPECT_EQ(::testing::internal::GetCapturedStdout(), "");
+  EXPECT_EQ(first.vertices, second.vertices);
+  EXPECT_EQ(first.polygon_vertices, second.polygon_vertices);
+  EXPECT_EQ(first.polygon_face, second.polygon_face);
+}
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos);
+  return text.replace(at, from.size(), to);
+}
+
+TEST(ImportStep, AClosedShellStandsForASolid) {
+  SKIP_WITHOUT_PARTS();
+  const Scratch scratch;
+  std::string text = read_file(part_path("red_cube_blue_cylinder.step"));
+  text = replaced(text, "MANIFOLD_SOLID_BREP( 'red_cube', #111 )",
+                  "SHELL_BASED_SURFACE_MODEL( 'red_cube', ( #111 ) )");
+  text = replaced(text, "MANIFOLD_SOLID_BREP( 'blue_cylinder', #106 )",
+                  "SHELL_BASED_SURFACE_MODEL( 'b', ( #106 ) )");
+  const Surface surface = import_surface(scratch.write("shells.step", text));
+  EXPECT_EQ(surface.parts.size(), 2u);
+  EXPECT_TRUE(shape(surface).topology.closed());
+  EXPECT_GT(shape(surface).volume, 1.7e-6);
+}
+
+TEST(ImportStep, DamagedFilesGiveOneClearError) {
+  SKIP_WITHOUT_PARTS();
+  const Scratch scratch;
+  const auto error = [&](const std::string& content) {
+    return import_error(scratch.write("bad.step", content));
+  };
+  const std::string text = read_file(part_path("red_cube_blue_cylinder.step"));
+  EXPECT_THAT(error(text.substr(0, text.size() / 2)), HasSubstr("is cut off"));
+  EXPECT_THAT(error("ISO-10303-21;\nHEADER;\ngarbage\nENDSEC;\nEND-ISO-10303-21;\n"), HasSubstr("bad.step|"));
+  EXPECT_THAT(error(replaced(text, "MANIFOLD_SOLID_BREP( 'red_cube', #111 )",
+                             "MANIFOLD_SOLID_BREP( 'red_cube', #38 )")),
+              HasSubstr("is damaged"));
+  ImportOptions step;
+  step.format = "step";
+  EXPECT_THAT(import_error(scratch.write("a.stl", "solid a\n"), step), HasSubstr("is no STEP file"));
+}
+
+// Whatever single line is lost, the result is an error or a sound part; never a crash, never half a solid.
+TEST(ImportStep, ALostLineNeverGivesHalfASolid) {
+  SKIP_WITHOUT_PARTS();
+  const Scratch scratch;
+  const std::string text = read_file(part_path("red_cube_blue_cylinder.step"));
+  std::vector<std::string> lines;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = text.find('\n', at);
+    lines.push_back(text.substr(at, end - at + 1));
+    at = end == std::string::npos ? text.size() : end + 1;
+  }
+  std::size_t refused = 0;
+  for (std::size_t lost = 8; lost < lines.size(); lost += 2) {
+    std::string damaged;
+    for (std::size_t i = 0; i < lines.size(); ++i)
+      if (i != lost) damaged += lines[i];
+    const std::string path = scratch.write("lost.step", damaged);
+    if (!import_error(path).empty()) {
+      ++refused;
+      continue;
+    }
+    EXPECT_TRUE(shape(import_surface(path)).topology.closed()) << lines[lost];
+  }
+  EXPECT_GT(refused, 20u);
+}
+
+#endif
+
+}  // namespace
+}  // namespace flexel::test
