@@ -58,7 +58,7 @@ struct Body {
   std::vector<Vec3> position;            // (n x 3) m, world frame
   std::map<std::string, Column> element_columns;
 
-  // Centre placement: bit b is set when the element is connected with its neighbour at half_neighbourhood[b].
+  // Centre placement: bit b is set when the element is connected with its neighbour, of the same piece, at half_neighbourhood[b].
   // Corner placement: derived from the cells (two elements are connected while a whole cell contains both).
   std::vector<std::uint32_t> connections;  // (n)
 
