@@ -139,7 +139,7 @@ class SlabBuilder {
   }
 
   void add_voxel(const VoxelRecords& voxel, Slab& slab) {
-    const VoxelPieces found = finder_.find(voxel, options_.with_centres);
+    VoxelPieces found = finder_.find(voxel, options_.with_centres);
     const auto first = static_cast<std::uint32_t>(slab.pieces.size());
     for (std::uint32_t p = 0; p < found.count; ++p) {
       Piece piece{.i = voxel.i, .flags = static_cast<std::uint8_t>(found.count > 1 ? kOneOfSeveral : 0)};
@@ -150,13 +150,20 @@ class SlabBuilder {
       slab.pieces.push_back(piece);
     }
     add_records(voxel, found, first, slab);
-    if (found.overlapping) slab.pieces[first].fill = fill_by_lines(voxel);
+    if (found.count == 1 && (found.overlapping || found.undecided || impossible(slab.pieces[first].fill))) {
+      const LineFill by_lines = fill_by_lines(voxel);
+      found.overlapping = by_lines.overlap;
+      if (by_lines.overlap) slab.pieces[first].fill = by_lines.fill;
+    }
     for (std::uint32_t p = 0; p < found.count; ++p)
       slab.pieces[first + p].fill = std::min(1., slab.pieces[first + p].fill);
     slab.split_voxels += found.count > 1;
-    slab.undecided_voxels += found.undecided;
+    slab.undecided_voxels += found.undecided && !found.overlapping;
     slab.overlapping_voxels += found.overlapping;
   }
+
+  // A surface that passes through itself encloses some of the voxel twice or the wrong way round.
+  static bool impossible(double fill) { return fill < -1e-9 || fill > 1 + 1e-9; }
 
   static void add_records(const VoxelRecords& voxel, const VoxelPieces& found, std::uint32_t first,
                           Slab& slab) {

@@ -11,7 +11,8 @@
 namespace flexel {
 namespace {
 
-constexpr int kLines = 64;  // across a voxel
+constexpr int kLines = 64;          // across a voxel
+constexpr double kTouching = 1e-6;  // in cells
 
 // Sum of the changes of `line` at coordinates in [low, high).
 int change_between(std::span<const LineCrossing> crossings, double low, double high) {
@@ -29,20 +30,25 @@ std::vector<std::size_t> line_begins(const std::vector<LineCrossing>& crossings,
 }
 
 // Length with winding > 0 in [low, high], starting from `winding` at low.
-double length_inside(std::span<const LineCrossing> crossings, double low, double high, int winding) {
-  double length = 0, from = low;
+LineFill length_inside(std::span<const LineCrossing> crossings, double low, double high, int winding) {
+  LineFill length;
+  double from = low;
   for (const LineCrossing& crossing : crossings) {
     if (crossing.at < low || crossing.at >= high) continue;
-    if (winding > 0) length += crossing.at - from;
+    if (winding > 0) length.fill += crossing.at - from;
+    // Surfaces that touch may be met in either order: a winding number over no length is no overlap.
+    if (winding != 0 && winding != 1 && crossing.at - from > kTouching) length.overlap = true;
     winding += crossing.change;
     from = crossing.at;
   }
-  return winding > 0 ? length + (high - from) : length;
+  if (winding > 0) length.fill += high - from;
+  if (winding != 0 && winding != 1) length.overlap = true;
+  return length;
 }
 
 }  // namespace
 
-double fill_by_lines(const VoxelRecords& voxel) {
+LineFill fill_by_lines(const VoxelRecords& voxel) {
   std::vector<std::uint32_t> triangles;
   for (const Record& record : voxel.records) triangles.push_back(record.triangle);
   const PartMesh& mesh = *voxel.mesh;
@@ -54,18 +60,21 @@ double fill_by_lines(const VoxelRecords& voxel) {
   const auto face = cross_lines(mesh, mesh.vertices, {0, y, z, kStep, 1, kLines, 1}, triangles);
   const auto inside = cross_lines(mesh, mesh.vertices, {2, x, y, kStep, kStep, kLines, kLines}, triangles);
   const auto face_begin = line_begins(face, kLines), inside_begin = line_begins(inside, kLines * kLines);
-  double sum = 0;
+  LineFill sum;
   for (int b = 0; b < kLines; ++b) {
     const int row = voxel.winding[0] + change_between(edge, voxel.j, y + b * kStep);
     const std::span<const LineCrossing> along_x{face.data() + face_begin[b], face.data() + face_begin[b + 1]};
     for (int a = 0; a < kLines; ++a) {
       const int start = row + change_between(along_x, voxel.i, x + a * kStep);
       const std::size_t line = static_cast<std::size_t>(a + kLines * b);
-      sum += length_inside({inside.data() + inside_begin[line], inside.data() + inside_begin[line + 1]},
-                           voxel.k, voxel.k + 1, start);
+      const LineFill length =
+          length_inside({inside.data() + inside_begin[line], inside.data() + inside_begin[line + 1]}, voxel.k,
+                        voxel.k + 1, start);
+      sum.fill += length.fill / (kLines * kLines);
+      sum.overlap |= length.overlap;
     }
   }
-  return sum / (kLines * kLines);
+  return sum;
 }
 
 double union_volume(const PartMesh& mesh, int lines) {

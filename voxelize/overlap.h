@@ -4,9 +4,13 @@
 
 namespace flexel {
 
-// Share of the voxel where the winding number is above 0, by 64 x 64 lines through it (exact along each
-// line).
-[[nodiscard]] double fill_by_lines(const VoxelRecords& voxel);
+struct LineFill {
+  double fill = 0;       // share of the voxel where the winding number is above 0
+  bool overlap = false;  // a winding number other than 0 and 1 was met
+};
+
+// By 64 x 64 lines through the voxel, exact along each line.
+[[nodiscard]] LineFill fill_by_lines(const VoxelRecords& voxel);
 
 // Volume [m^3] of the part where the winding number is above 0, by `lines` x `lines` lines along each axis
 // (their mean).

@@ -133,6 +133,22 @@ PartMesh close_cracks(const Surface& surface, const Triangles& triangles,
   return mesh;
 }
 
+std::vector<PartMesh> make_meshes(const Surface& surface, bool closing) {
+  const Triangles triangles = triangulate(surface);
+  const std::vector<std::uint32_t> welded = weld(surface.vertices);
+  std::vector<std::vector<std::uint32_t>> of_part(surface.parts.size());
+  for (std::uint32_t t = 0; t < triangles.corners.size(); ++t)
+    of_part[surface.polygon_part(triangles.polygon[t])].push_back(t);
+  std::vector<PartMesh> meshes;
+  for (const auto& chosen : of_part) {
+    PartMesh mesh = build_mesh(surface, triangles, chosen, welded);
+    if (closing && mesh.open_edges > 0)
+      mesh = close_cracks(surface, triangles, chosen, welded, std::move(mesh));
+    meshes.push_back(std::move(mesh));
+  }
+  return meshes;
+}
+
 }  // namespace
 
 void number_edges(PartMesh& mesh) {
@@ -157,18 +173,11 @@ void number_edges(PartMesh& mesh) {
 }
 
 std::vector<PartMesh> part_meshes(const Surface& surface) {
-  const Triangles triangles = triangulate(surface);
-  const std::vector<std::uint32_t> welded = weld(surface.vertices);
-  std::vector<std::vector<std::uint32_t>> of_part(surface.parts.size());
-  for (std::uint32_t t = 0; t < triangles.corners.size(); ++t)
-    of_part[surface.polygon_part(triangles.polygon[t])].push_back(t);
-  std::vector<PartMesh> meshes;
-  for (const auto& chosen : of_part) {
-    PartMesh mesh = build_mesh(surface, triangles, chosen, welded);
-    if (mesh.open_edges > 0) mesh = close_cracks(surface, triangles, chosen, welded, std::move(mesh));
-    meshes.push_back(std::move(mesh));
-  }
-  return meshes;
+  return make_meshes(surface, true);
+}
+
+std::vector<PartMesh> exact_part_meshes(const Surface& surface) {
+  return make_meshes(surface, false);
 }
 
 void place_on_lattice(PartMesh& mesh, const Lattice& lattice, double tolerance) {

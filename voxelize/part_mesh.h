@@ -33,6 +33,8 @@ struct PartMesh {
 // The meshes of all parts of a surface, in world coordinates. Where exact welding leaves a part open and
 // welding at 1e-7 of its diagonal closes it, the latter is taken (`cracks_closed`).
 [[nodiscard]] std::vector<PartMesh> part_meshes(const Surface& surface);
+// The same without closing cracks.
+[[nodiscard]] std::vector<PartMesh> exact_part_meshes(const Surface& surface);
 
 // Numbers edges and shells and counts open and unbalanced edges. Needs `world` and `corners`.
 void number_edges(PartMesh& mesh);

@@ -90,9 +90,6 @@ VoxelizedPart describe(const PartMesh& mesh, const Voxels& voxels, const Assembl
     found.undecided_voxels += slab.undecided_voxels;
     found.disagreements += slab.disagreements;
   }
-  found.surface_volume = !mesh.balanced()               ? 0
-                         : found.overlapping_voxels > 0 ? union_volume(mesh)
-                                                        : enclosed_volume(mesh);
   return found;
 }
 
@@ -107,6 +104,18 @@ void measure_walls(const PartMesh& mesh, std::uint32_t part, VoxelizedPart& foun
   const double two_cells = 2 * found.spacing.maxCoeff();
   found.thin_walls = static_cast<std::size_t>(std::count_if(
       samples.begin(), samples.end(), [&](const WallSample& s) { return s.thickness < two_cells; }));
+}
+
+// What does not depend on the lattice but where shells interpenetrate: volumes and walls.
+void measure(const std::vector<PartMesh>& meshes, VoxelizeResult& result) {
+  for (std::size_t p = 0; p < meshes.size(); ++p) {
+    VoxelizedPart& found = result.parts[p];
+    if (found.closed)
+      found.surface_volume =
+          found.overlapping_voxels > 0 ? union_volume(meshes[p]) : enclosed_volume(meshes[p]);
+    result.body.parts[p].surface_volume = found.surface_volume;
+    measure_walls(meshes[p], static_cast<std::uint32_t>(p), found);
+  }
 }
 
 // One part onto the body.
@@ -129,10 +138,7 @@ VoxelizedPart voxelize_part(PartMesh& mesh, double spacing, const VoxelizeOption
   if (assembled.elements == 0)
     throw InputError(fmt::format("nothing of part \"{}\" is left at size {}; choose a smaller size", name,
                                  human_length(spacing)));
-  VoxelizedPart found = describe(mesh, voxels, assembled, part);
-  measure_walls(mesh, static_cast<std::uint32_t>(body.parts.size() - 1), found);
-  body.parts.back().surface_volume = found.surface_volume;
-  return found;
+  return describe(mesh, voxels, assembled, part);
 }
 
 // All parts at one spacing.
@@ -193,6 +199,7 @@ VoxelizeResult voxelize(Surface surface, const VoxelizeOptions& options, Progres
   }
   const double cells = total_cells(result, options.placement);
   check_memory(cells, limit, extents, options.placement);
+  measure(meshes, result);
   result.simulation_memory = simulation_memory(cells, options.placement);
   progress.finish();
   return result;

@@ -1,0 +1,112 @@
+// Voxelising a knotted tube of about a million triangles, the longest axis cut into 512 voxels.
+#include <benchmark/benchmark.h>
+
+#include <cmath>
+#include <numbers>
+
+#include <Eigen/Geometry>
+
+#include "formats/parallel.h"
+#include "voxelize/align.h"
+#include "voxelize/classify.h"
+#include "voxelize/elements.h"
+#include "voxelize/voxelize.h"
+
+namespace flexel {
+namespace {
+
+// A (2, 3) torus knot, outward-oriented, 2 * around * along triangles; about 210 mm long.
+Surface knot(int along, int around) {
+  Surface surface;
+  const auto centre = [](double t) {
+    const double r = .070 + .035 * std::cos(3 * t);
+    return Vec3(r * std::cos(2 * t), r * std::sin(2 * t), .035 * std::sin(3 * t));
+  };
+  for (int a = 0; a < along; ++a) {
+    const double t = 2 * std::numbers::pi * a / along;
+    const Vec3 tangent = (centre(t + 1e-5) - centre(t - 1e-5)).normalized();
+    const Vec3 normal = tangent.cross(Vec3(.3, .2, 1)).normalized(), binormal = tangent.cross(normal);
+    for (int b = 0; b < around; ++b) {
+      const double q = 2 * std::numbers::pi * b / around;
+      surface.vertices.push_back(centre(t) + .0056 * (std::cos(q) * normal + std::sin(q) * binormal));
+    }
+  }
+  const auto at = [&](int a, int b) { return static_cast<std::uint32_t>(a % along * around + b % around); };
+  surface.polygon_offsets.push_back(0);
+  for (int a = 0; a < along; ++a)
+    for (int b = 0; b < around; ++b)
+      for (const auto& t : {std::array{at(a, b), at(a + 1, b + 1), at(a + 1, b)},
+                            {at(a, b), at(a, b + 1), at(a + 1, b + 1)}}) {
+        surface.polygon_vertices.insert(surface.polygon_vertices.end(), t.begin(), t.end());
+        surface.polygon_offsets.push_back(static_cast<std::uint32_t>(surface.polygon_vertices.size()));
+        surface.polygon_face.push_back(0);
+      }
+  surface.faces.push_back({"", 0});
+  surface.parts.push_back({"knot"});
+  surface.sources.emplace_back();
+  surface.part_source.push_back(0);
+  return surface;
+}
+
+const Surface& million() {
+  static const Surface surface = knot(1024, 512);
+  return surface;
+}
+
+double size_for(int voxels) {
+  return bounding_box(million().vertices).size().maxCoeff() / voxels;
+}
+
+PartMesh placed(int voxels) {
+  PartMesh mesh = part_meshes(million())[0];
+  repair_orientation(mesh);
+  place_on_lattice(mesh, align_lattice(mesh, size_for(voxels), Align::none, true));
+  return mesh;
+}
+
+void whole(benchmark::State& state) {
+  const ThreadLimit threads(static_cast<int>(state.range(1)));
+  Progress progress("bench", Progress::Mode::quiet);
+  VoxelizeOptions options;
+  options.size = size_for(static_cast<int>(state.range(0)));
+  options.max_memory = 1e12;
+  for (auto _ : state) {
+    state.PauseTiming();
+    Surface surface = million();
+    state.ResumeTiming();
+    const VoxelizeResult result = voxelize(std::move(surface), options, progress);
+    state.counters["cells"] = static_cast<double>(result.parts[0].cells);
+  }
+}
+
+void meshes(benchmark::State& state) {
+  const ThreadLimit threads(static_cast<int>(state.range(0)));
+  for (auto _ : state) benchmark::DoNotOptimize(part_meshes(million()));
+}
+
+void classify(benchmark::State& state) {
+  const ThreadLimit threads(static_cast<int>(state.range(1)));
+  const PartMesh mesh = placed(static_cast<int>(state.range(0)));
+  for (auto _ : state) benchmark::DoNotOptimize(classify_closed(mesh, {}));
+}
+
+void elements(benchmark::State& state) {
+  const ThreadLimit threads(static_cast<int>(state.range(1)));
+  const Voxels voxels = classify_closed(placed(static_cast<int>(state.range(0))), {});
+  for (auto _ : state) benchmark::DoNotOptimize(make_elements(voxels));
+}
+
+BENCHMARK(whole)->Args({512, 1})->Args({512, 2})->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(meshes)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(classify)
+    ->Args({256, 2})
+    ->Args({512, 1})
+    ->Args({512, 2})
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK(elements)->Args({512, 1})->Args({512, 2})->Unit(benchmark::kMillisecond)->UseRealTime();
+
+}  // namespace
+}  // namespace flexel
+
+BENCHMARK_MAIN();
