@@ -1,7 +1,8 @@
 // Preconditioned conjugate gradients (Hestenes and Stiefel 1952), the way a Newton method needs them (Dembo
 // and Steihaug 1983): a direction of negative curvature ends the iteration with the step reached so far. The
 // residual is updated by recursion; when it says "converged" the true residual is computed, and where
-// rounding made the two differ the iteration restarts from the true one.
+// rounding made the two differ the iteration restarts from the true one. For slender parts the smallest
+// residual that double precision allows can lie above the tolerance; reaching it counts as converged.
 #include <cmath>
 #include <limits>
 
@@ -33,6 +34,21 @@ double true_residual(const BlockMatrix& matrix, const Vector& b, const Vector& x
   multiply(matrix, x, residual);
   parallel_for_each(b.size(), [&](std::size_t i) { residual[i] = b[i] - residual[i]; });
   return std::sqrt(dot(residual, residual));
+}
+
+// Size of the error that rounding alone leaves in b - A x (Rigal and Gaches 1967): eps | |A| |x| |.
+double rounding_level(const BlockMatrix& matrix, const Vector& x) {
+  const double squared = parallel_sum<double>(
+      matrix.rows(),
+      [&](std::size_t row) {
+        Vec3 sum = Vec3::Zero();
+        for (std::uint64_t q = matrix.row_offsets[row]; q < matrix.row_offsets[row + 1]; ++q) {
+          sum.noalias() += matrix.values[q].cwiseAbs() * x[matrix.columns[q]].cwiseAbs();
+        }
+        return sum.squaredNorm();
+      },
+      512);
+  return std::numeric_limits<double>::epsilon() * std::sqrt(squared);
 }
 
 }  // namespace
@@ -71,7 +87,7 @@ LinearResult conjugate_gradients(const BlockMatrix& matrix, const Vector& b, Vec
     if (progress) progress(result.iterations, norm / scale);
     if (norm > tolerance * scale) continue;
     norm = true_residual(matrix, b, x, residual);
-    result.converged = norm <= tolerance * scale;
+    result.converged = norm <= tolerance * scale || norm <= rounding_level(matrix, x);
     // Another round only while it still helps: rounding sets a floor to the true residual.
     if (result.converged || norm > .5 * checked) break;
     checked = norm;
