@@ -1,5 +1,5 @@
-// Reads CAD and mesh files into a Surface. Implemented by flexel_import (assimp, OpenCASCADE), declared here so that no program
-// sees those libraries.
+// Reads CAD and mesh files into a Surface. Implemented by flexel_import (OpenCASCADE), declared here so that no program
+// sees that library.
 #pragma once
 #include <optional>
 #include <string>
