@@ -1,1 +1,76 @@
-int main() { return 1; }
+// flexel, the front door: `flexel COMMAND ...`.
+#include <fmt/format.h>
+
+#include <string>
+
+#include "flexel/commands.h"
+#include "formats/files.h"
+#include "formats/program.h"
+
+namespace flexel {
+namespace {
+
+constexpr const char* kHelp =
+    "flexel deforms CAD parts.\n"
+    "\n"
+    "  flexel deform PART... --fix WHERE --push \"WHERE: 0 0 -50 N\" --material NAME -o OUT\n"
+    "                        the part, deformed as its material would be (STL, OBJ; .vtu for the body)\n"
+    "  flexel info PART...   solids, faces, unit, size, volume, closedness, thinnest wall: what a scene can "
+    "name\n"
+    "  flexel voxelize ...   part -> lattice of elements      (the program flexel-voxelize)\n"
+    "  flexel simulate ...   lattice + scene -> deformed      (flexel-simulate)\n"
+    "  flexel map ...        deformed lattice -> the part     (flexel-map)\n"
+    "\n"
+    "`flexel COMMAND --help` lists the options of a command; `flexel --version` prints the version.\n";
+
+void print(const std::string& text) {
+  OutputFile out("-", false);
+  out.write(text);
+  out.commit();
+}
+
+bool is_stage(const std::string& command) {
+  return command == "voxelize" || command == "simulate" || command == "map";
+}
+
+[[noreturn]] void unknown_command(const std::string& command) {
+  const std::vector<std::string> commands = {"deform", "info", "voxelize", "simulate", "map", "help"};
+  throw InputError(fmt::format("unknown command \"{}\"; the commands are {}{}", command,
+                               fmt::join(commands, ", "), did_you_mean(command, commands)));
+}
+
+int help(int argc, char** argv) {
+  if (argc < 2) {
+    print(kHelp);
+    return kExitDone;
+  }
+  std::string option = "--help";
+  char* arguments[] = {argv[1], option.data(), nullptr};
+  const std::string command = argv[1];
+  if (command == "deform") return deform_command(2, arguments);
+  if (command == "info") return info_command(2, arguments);
+  if (is_stage(command)) run_stage_program(argv[1], arguments);
+  unknown_command(command);
+}
+
+int run(int argc, char** argv) {
+  if (argc < 2)
+    throw InputError("a command is missing: deform, info, voxelize, simulate or map (`flexel help`)");
+  const std::string command = argv[1];
+  if (command == "--version") {
+    print(fmt::format("flexel {}\n", version()));
+    return kExitDone;
+  }
+  if (command == "help" || command == "--help" || command == "-h") return help(argc - 1, argv + 1);
+  if (command == "deform") return deform_command(argc - 1, argv + 1);
+  if (command == "info") return info_command(argc - 1, argv + 1);
+  if (is_stage(command)) run_stage_program(argv[1], argv + 1);
+  unknown_command(command);
+}
+
+}  // namespace
+}  // namespace flexel
+
+int main(int argc, char** argv) {
+  return flexel::run_program("flexel", [&] { return flexel::run(argc, argv); });
+}

@@ -1,0 +1,13 @@
+// The commands of flexel. Each takes its own arguments (argv[0] is the command) and returns the exit code.
+#pragma once
+
+namespace flexel {
+
+int deform_command(int argc, char** argv);
+int info_command(int argc, char** argv);
+
+// Becomes the stage program flexel-NAME that lies beside this one. Returns only by throwing InputError: it is
+// not there.
+[[noreturn]] void run_stage_program(const char* name, char** argv);
+
+}  // namespace flexel

@@ -1,0 +1,264 @@
+// flexel deform: every stage in one process, on one body in memory. All that can be wrong with the arguments
+// is found before the first stage runs, and nothing is written before the last has ended.
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "flexel/actions.h"
+#include "flexel/commands.h"
+#include "formats/body_file.h"
+#include "formats/import.h"
+#include "formats/parallel.h"
+#include "formats/program.h"
+#include "formats/surface_file.h"
+#include "formats/units.h"
+#include "mapping/map.h"
+#include "simulate/simulate.h"
+#include "voxelize/voxelize.h"
+
+namespace flexel {
+namespace {
+
+struct Arguments {
+  std::vector<std::string> parts, fixes, pushes, moves, outputs;
+  std::string scene, material, size, unit, method = "affine", report, summary, body, format;
+  std::optional<std::size_t> count;
+  int threads = 0;
+  bool ascii = false, strict = false, quiet = false;
+};
+
+void declare_input(CLI::App& app, Arguments& arguments) {
+  app.add_option("part", arguments.parts, "STEP, STL or OBJ files; -: stdin")->required()->type_name("PART");
+  app.add_option("--scene", arguments.scene, "Scene file (TOML; docs/scene.md)")->type_name("FILE");
+  app.add_option("--fix", arguments.fixes,
+                 "Hold this surface: \"xmin\", \"part/3\" (`flexel info` lists faces)")
+      ->type_name("WHERE")
+      ->allow_extra_args(false);
+  app.add_option("--push", arguments.pushes,
+                 "Push a surface: \"xmax: 0 0 -50 N\", \"part/3: 50 N\" (inwards), \"part/3: 2 MPa\"")
+      ->type_name("WHERE:FORCE")
+      ->allow_extra_args(false);
+  app.add_option("--move", arguments.moves, "Move a surface: \"xmax: 0 0 -2 mm\", \"part/3: 2 mm\" (inwards)")
+      ->type_name("WHERE:LENGTH")
+      ->allow_extra_args(false);
+  app.add_option("--material", arguments.material,
+                 "What the parts are made of: steel, PLA, ... (docs/scene.md)")
+      ->type_name("NAME");
+  app.add_option("--size", arguments.size, "Spacing of the lattice (\"2 mm\")")->type_name("LENGTH");
+  app.add_option("--count", arguments.count, "Or: about this many cells (default 20000)")->type_name("N");
+  app.add_option("--unit", arguments.unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
+}
+
+void declare_output(CLI::App& app, Arguments& arguments) {
+  app.add_option("-o,--output", arguments.outputs,
+                 "The deformed part (.stl, .obj) or body (.vtu); again for more; -: stdout")
+      ->type_name("FILE")
+      ->required()
+      ->allow_extra_args(false);
+  app.add_option("--format", arguments.format, "Format of what goes to stdout: stl or obj")
+      ->type_name("NAME");
+  app.add_flag("--ascii", arguments.ascii, "Write ASCII STL");
+  app.add_option("--body", arguments.body, "Write the deformed body (.vtu) too")->type_name("FILE");
+  app.add_option("--method", arguments.method, "Mapping: affine or gram-schmidt")
+      ->type_name("NAME")
+      ->capture_default_str();
+  app.add_option("--report", arguments.report, "Write the mapping's validity report (JSON)")
+      ->type_name("FILE");
+  app.add_option("--summary", arguments.summary, "Write the summary of all stages (JSON; docs/deform.md)")
+      ->type_name("FILE");
+  app.add_flag("--strict", arguments.strict, "Exit 4 and write no surface when the mapping is invalid");
+  app.add_option("--threads", arguments.threads, "Threads; 0 is every core")->check(CLI::NonNegativeNumber);
+  app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
+}
+
+// What the arguments ask for, checked.
+struct Plan {
+  ImportOptions import;
+  VoxelizeOptions voxelize;
+  Scene scene;
+  std::vector<Action> pushes, moves;
+  MapOptions map;
+  struct Output {
+    std::string path;
+    std::optional<SurfaceFormat> format;  // nothing: the body
+  };
+  std::vector<Output> outputs;
+};
+
+// The material must be known before the work begins: without one there is no resistance to compute.
+void check_material(const Arguments& arguments, const Scene& scene) {
+  std::vector<std::string> known;
+  for (const auto& [name, material] : scene.materials) known.push_back(name);
+  for (const Material& material : material_library()) known.push_back(material.name);
+  if (arguments.material.empty() && arguments.scene.empty())
+    throw InputError(
+        fmt::format("no material: add --material NAME; the library has {}", fmt::join(known, ", ")));
+  if (arguments.material.empty() || scene.materials.count(arguments.material) ||
+      library_material(arguments.material))
+    return;
+  const std::string hint = did_you_mean(arguments.material, known);
+  throw InputError(
+      fmt::format("--material: no material \"{}\"{}", arguments.material,
+                  hint.empty() ? fmt::format("; the library has {}", fmt::join(known, ", ")) : hint));
+}
+
+void plan_scene(const Arguments& arguments, Plan& plan) {
+  if (!arguments.scene.empty())
+    plan.scene = read_scene(arguments.scene);
+  else
+    plan.scene.name = "flexel deform";
+  check_material(arguments, plan.scene);
+  if (!arguments.material.empty()) plan.scene.material = arguments.material;
+  for (const std::string& where : arguments.fixes)
+    plan.scene.get<Ties>().ties.push_back(make_fix(parse_where(where, "--fix")));
+  for (const std::string& text : arguments.pushes) plan.pushes.push_back(parse_push(text));
+  for (const std::string& text : arguments.moves) plan.moves.push_back(parse_move(text));
+  if (arguments.scene.empty() && plan.pushes.empty() && plan.moves.empty())
+    throw InputError(
+        "nothing acts on the part: add --push \"WHERE: 0 0 -50 N\", --move \"WHERE: 0 0 -2 mm\" or --scene "
+        "FILE");
+}
+
+void plan_outputs(const Arguments& arguments, Plan& plan) {
+  for (const std::string& path : arguments.outputs)
+    if (extension(path) == "vtu")
+      plan.outputs.push_back({path, std::nullopt});
+    else
+      plan.outputs.push_back(
+          {path, surface_format(path == "-" ? arguments.format : "", path, arguments.ascii)});
+  if (!arguments.body.empty()) plan.outputs.push_back({arguments.body, std::nullopt});
+  std::vector<std::string> paths{arguments.report, arguments.summary};
+  for (const Plan::Output& output : plan.outputs) paths.push_back(output.path);
+  std::sort(paths.begin(), paths.end());
+  for (std::size_t i = 1; i < paths.size(); ++i)
+    if (!paths[i].empty() && paths[i] == paths[i - 1])
+      throw InputError("two results would go to \"" + paths[i] + "\"");
+}
+
+Plan make_plan(const Arguments& arguments) {
+  Plan plan;
+  if (std::count(arguments.parts.begin(), arguments.parts.end(), "-") + (arguments.scene == "-") > 1)
+    throw InputError("only one input can come from stdin");
+  if (!arguments.unit.empty()) plan.import.unit = length_unit(arguments.unit);
+  if (!arguments.size.empty() && arguments.count) throw InputError("give --size or --count, not both");
+  if (!arguments.size.empty()) {
+    plan.voxelize.size = parse_quantity(arguments.size, Dimension::length);
+    if (!(*plan.voxelize.size > 0)) throw InputError("--size: must be above zero");
+  }
+  if (arguments.count && *arguments.count == 0) throw InputError("--count: must be above zero");
+  plan.voxelize.count = arguments.count;
+  plan.map.method = map_method(arguments.method);
+  plan_outputs(arguments, plan);
+  plan_scene(arguments, plan);
+  return plan;
+}
+
+Surface import_parts(const std::vector<std::string>& paths, const ImportOptions& options) {
+  Surface surface = import_surface(paths.front(), options);
+  for (std::size_t p = 1; p < paths.size(); ++p) append(surface, import_surface(paths[p], options));
+  return surface;
+}
+
+// Where the last good state goes when the simulation diverges: beside the first file that is written.
+std::string failed_name(const Plan& plan) {
+  for (const Plan::Output& output : plan.outputs) {
+    if (output.path == "-") continue;
+    const std::string ending = "." + extension(output.path);
+    return output.path.substr(0, output.path.size() - ending.size()) + ".failed.vtu";
+  }
+  return "";
+}
+
+nlohmann::ordered_json summary_of_voxels(const VoxelizeResult& result) {
+  nlohmann::ordered_json parts = nlohmann::ordered_json::array();
+  for (std::size_t p = 0; p < result.parts.size(); ++p) {
+    const VoxelizedPart& part = result.parts[p];
+    parts.push_back({{"name", result.body.parts[p].name},
+                     {"closed", part.closed},
+                     {"elements", part.elements},
+                     {"cells", part.cells},
+                     {"spacing", {part.spacing.x(), part.spacing.y(), part.spacing.z()}},
+                     {"surface_volume", part.surface_volume},
+                     {"lattice_volume", part.lattice_volume},
+                     {"dropped_volume", part.dropped_volume}});
+  }
+  return {{"parts", parts}};
+}
+
+void write_text(const std::string& text, const std::string& path) {
+  OutputFile file(path, false);
+  file.write(text);
+  file.commit();
+}
+
+void say_map(const MapReport& found, Progress& progress) {
+  const std::vector<std::string> lines = report_lines(found);
+  for (std::size_t i = 0; i < lines.size(); ++i)
+    if (i == 0 && !found.valid())
+      progress.warn(lines[i]);
+    else
+      progress.say(lines[i]);
+}
+
+void write_outputs(const Plan& plan, const Body& body, const MapResult& mapped, Progress& progress) {
+  progress.stage("write");
+  for (const Plan::Output& output : plan.outputs)
+    if (output.format)
+      write_surface(body.surface, mapped.displacement, *output.format, default_unit(body.surface),
+                    output.path);
+    else
+      write_body(body, output.path);
+}
+
+int run_stages(const Arguments& arguments, Plan& plan, Progress& progress) {
+  progress.stage("import");
+  Surface surface = import_parts(arguments.parts, plan.import);
+  VoxelizeResult voxels = voxelize(std::move(surface), plan.voxelize, progress);
+  report(voxels, progress);
+  Body& body = voxels.body;
+  for (const Action& push : plan.pushes) add_push(plan.scene, push, body);
+  for (const Action& move : plan.moves) add_move(plan.scene, move, body);
+
+  SimulateOptions options;
+  options.threads = arguments.threads;
+  options.failed_output = failed_name(plan);
+  const SimulateResult simulated = simulate(body, plan.scene, options, progress);
+  for (const std::string& line : summary_lines(simulated)) progress.say(line);
+
+  progress.stage("map");
+  const MapResult mapped = map_surface(body, plan.map, progress);
+  const MapReport found = report(body, mapped);
+  progress.finish();
+  say_map(found, progress);
+  const std::string mapping = report_json(found, plan.map);
+  if (!arguments.report.empty()) write_text(mapping, arguments.report);
+  if (!found.valid() && (arguments.strict || found.not_finite > 0))
+    throw InvalidMappingError(report_lines(found).front());
+  write_outputs(plan, body, mapped, progress);
+  if (!arguments.summary.empty()) {
+    nlohmann::ordered_json summary;
+    summary["voxelize"] = summary_of_voxels(voxels);
+    summary["simulate"] = nlohmann::ordered_json::parse(summary_json(simulated, body));
+    summary["map"] = nlohmann::ordered_json::parse(mapping);
+    write_text(summary.dump(2) + "\n", arguments.summary);
+  }
+  progress.finish();
+  return kExitDone;
+}
+
+}  // namespace
+
+int deform_command(int argc, char** argv) {
+  Arguments arguments;
+  CLI::App app{"Deforms a part as its material would be: import, lattice, simulation and mapping in one run.",
+               "flexel deform"};
+  declare_input(app, arguments);
+  declare_output(app, arguments);
+  if (!parse_arguments(app, argc, argv)) return kExitDone;
+  Plan plan = make_plan(arguments);
+  const ThreadLimit limit(arguments.threads);
+  Progress progress("flexel", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
+  return run_stages(arguments, plan, progress);
+}
+
+}  // namespace flexel

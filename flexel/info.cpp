@@ -1,0 +1,238 @@
+// flexel info: what a part is and what a scene can name in it.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "flexel/commands.h"
+#include "flexel/face_shape.h"
+#include "formats/import.h"
+#include "formats/program.h"
+#include "formats/topology.h"
+#include "formats/units.h"
+#include "voxelize/voxelize.h"
+
+namespace flexel {
+namespace {
+
+struct PartInfo {
+  std::string name;
+  std::size_t vertices = 0, polygons = 0, triangles = 0;
+  Box box;
+  double area = 0, volume = 0;  // SI; volume is meaningless where the surface is open
+  Topology topology;
+  std::optional<ThinWall> thinnest;
+  std::vector<std::uint32_t> faces;  // indices into Surface::faces
+  [[nodiscard]] bool closed() const { return topology.closed(); }
+};
+
+std::vector<PartInfo> look_at(const Surface& surface, const std::vector<FaceShape>& shapes) {
+  std::vector<PartInfo> parts(surface.parts.size());
+  const Triangles triangles = triangulate(surface);
+  const std::vector<std::uint32_t> welded = weld(surface.vertices);
+  std::vector<std::vector<std::array<std::uint32_t, 3>>> corners(parts.size());
+  for (std::size_t t = 0; t < triangles.corners.size(); ++t)
+    corners[surface.polygon_part(triangles.polygon[t])].push_back(triangles.corners[t]);
+  for (std::size_t p = 0; p < surface.polygon_count(); ++p) ++parts[surface.polygon_part(p)].polygons;
+  for (std::uint32_t f = 0; f < surface.faces.size(); ++f) {
+    parts[surface.faces[f].part].faces.push_back(f);
+    parts[surface.faces[f].part].area += shapes[f].area;
+  }
+  const std::vector<std::optional<ThinWall>> thinnest = thinnest_walls(surface);
+  std::vector<std::uint32_t> used_by(surface.vertices.size(), 0xffffffffu);
+  for (std::uint32_t p = 0; p < parts.size(); ++p) {
+    PartInfo& part = parts[p];
+    part.name = surface.parts[p].name;
+    part.triangles = corners[p].size();
+    for (const auto& triangle : corners[p])
+      for (const std::uint32_t v : triangle) {
+        part.box.add(surface.vertices[v]);
+        part.vertices += std::exchange(used_by[v], p) != p;
+      }
+    part.topology = topology(corners[p], welded);
+    part.volume = signed_volume(surface.vertices, corners[p]);
+    part.thinnest = thinnest[p];
+  }
+  return parts;
+}
+
+struct Unit {
+  double metres = 1e-3;
+  std::string name = "mm";
+};
+
+// The unit to speak in: the file's own, by the shortest name that it has.
+Unit unit_of(const SurfaceSource& source) {
+  for (const char* name : {"mm", "cm", "m", "um", "in", "ft", "km"})
+    if (std::abs(length_unit(name) - source.unit) <= 1e-12 * source.unit) return {source.unit, name};
+  return {};
+}
+
+std::string place(const Vec3& at, const Unit& unit) {
+  const auto tidy = [&](double x) { return std::abs(x) < 1e-9 * unit.metres ? 0.0 : x / unit.metres; };
+  return fmt::format("({:.4g}, {:.4g}, {:.4g})", tidy(at.x()), tidy(at.y()), tidy(at.z()));
+}
+
+std::string closedness(const PartInfo& part) {
+  std::string text;
+  const auto add = [&](std::size_t count, const std::string& what) {
+    if (count > 0) text += fmt::format(", {} {}", human_count(count), what);
+  };
+  text = part.closed() ? "closed" : "NOT closed";
+  add(part.topology.shell_count, part.topology.shell_count == 1 ? "shell" : "shells");
+  add(part.topology.open_edges, "open edges");
+  add(part.topology.non_manifold_edges, "non-manifold edges");
+  add(part.topology.misoriented_edges, "edges whose triangles face opposite ways");
+  add(part.topology.degenerate_triangles, "degenerate triangles");
+  return text;
+}
+
+std::string part_text(const PartInfo& part, const Unit& unit) {
+  const Vec3 size = part.box.size() / unit.metres;
+  std::string text = fmt::format("part \"{}\"\n  size       {:.6g} x {:.6g} x {:.6g} {}, from {} to {}\n",
+                                 part.name, size.x(), size.y(), size.z(), unit.name,
+                                 place(part.box.min, unit), place(part.box.max, unit));
+  text += fmt::format("  mesh       {} vertices, {} polygons; {}\n", human_count(part.vertices),
+                      human_count(part.polygons), closedness(part));
+  text += fmt::format("  area       {:.6g} {}^2\n", part.area / (unit.metres * unit.metres), unit.name);
+  if (part.closed())
+    text += fmt::format("  volume     {:.6g} {}^3{}\n", std::abs(part.volume) / std::pow(unit.metres, 3),
+                        unit.name, part.volume < 0 ? " (inside out)" : "");
+  else
+    text += "  volume     none: the surface is not closed\n";
+  if (part.thinnest)
+    text += fmt::format("  thinnest   wall {:.4g} {} at {}\n", part.thinnest->thickness / unit.metres,
+                        unit.name, place(part.thinnest->where, unit));
+  return text;
+}
+
+std::string faces_text(const PartInfo& part, const Surface& surface, const std::vector<FaceShape>& shapes,
+                       const std::vector<std::uint32_t>& numbers, const Unit& unit) {
+  const auto selection = [&](std::uint32_t f) { return fmt::format("{}/{}", part.name, numbers[f]); };
+  std::size_t width = 4;
+  for (const std::uint32_t f : part.faces) width = std::max(width, selection(f).size());
+  std::string text = fmt::format("  {:<{}} {:>12}  {:<28} {}\n", "face", width, "area " + unit.name + "^2",
+                                 "centre " + unit.name, "what");
+  for (const std::uint32_t f : part.faces) {
+    std::string what = describe(shapes[f], unit.metres, unit.name);
+    if (!surface.faces[f].name.empty()) what += fmt::format(", called \"{}\"", surface.faces[f].name);
+    text += fmt::format("  {:<{}} {:>12.5g}  {:<28} {}\n", selection(f), width,
+                        shapes[f].area / (unit.metres * unit.metres), place(shapes[f].centroid, unit), what);
+  }
+  return text;
+}
+
+std::string source_text(const SurfaceSource& source, const Unit& unit) {
+  return fmt::format("{}: {}, unit {}{}\n", source.file, source.format, unit.name,
+                     source.unit_given ? "" : " (assumed: the file carries none; --unit)");
+}
+
+std::string info_text(const Surface& surface) {
+  const std::vector<FaceShape> shapes = face_shapes(surface);
+  const std::vector<std::uint32_t> numbers = face_numbers(surface);
+  const std::vector<PartInfo> parts = look_at(surface, shapes);
+  std::string text;
+  for (std::uint32_t s = 0; s < surface.sources.size(); ++s) {
+    const Unit unit = unit_of(surface.sources[s]);
+    text += source_text(surface.sources[s], unit);
+    for (std::size_t p = 0; p < parts.size(); ++p)
+      if (surface.part_source[p] == s)
+        text += part_text(parts[p], unit) + faces_text(parts[p], surface, shapes, numbers, unit);
+  }
+  text +=
+      "A scene or an option can name a part, a face, a group, or a side: xmin, xmax, ymin, ymax, zmin, "
+      "zmax.\n";
+  return text;
+}
+
+using Json = nlohmann::ordered_json;
+
+Json json_of(const Vec3& vector) {
+  return {vector.x(), vector.y(), vector.z()};
+}
+
+Json face_json(const SurfaceFace& face, std::uint32_t number, const std::string& part,
+               const FaceShape& shape) {
+  Json json = {{"number", number},   {"selection", fmt::format("{}/{}", part, number)},
+               {"name", face.name},  {"polygons", shape.polygons},
+               {"area", shape.area}, {"centroid", json_of(shape.centroid)}};
+  constexpr const char* kKinds[] = {"flat", "round", "curved"};
+  json["kind"] = kKinds[static_cast<int>(shape.kind)];
+  if (shape.kind == FaceShape::Kind::flat) json["normal"] = json_of(shape.normal);
+  if (shape.kind == FaceShape::Kind::round) {
+    json["axis"] = json_of(shape.axis);
+    json["axis_point"] = json_of(shape.axis_point);
+    json["radius"] = shape.radius;
+    json["hole"] = shape.hollow;
+  }
+  return json;
+}
+
+Json part_json(const PartInfo& part) {
+  Json json = {{"name", part.name},
+               {"vertices", part.vertices},
+               {"polygons", part.polygons},
+               {"triangles", part.triangles},
+               {"min", json_of(part.box.min)},
+               {"max", json_of(part.box.max)},
+               {"area", part.area},
+               {"volume", part.closed() ? Json(part.volume) : Json()},
+               {"closed", part.closed()},
+               {"shells", part.topology.shell_count},
+               {"open_edges", part.topology.open_edges},
+               {"non_manifold_edges", part.topology.non_manifold_edges},
+               {"misoriented_edges", part.topology.misoriented_edges},
+               {"degenerate_triangles", part.topology.degenerate_triangles}};
+  json["thinnest_wall"] =
+      part.thinnest ? Json{{"thickness", part.thinnest->thickness}, {"where", json_of(part.thinnest->where)}}
+                    : Json();
+  return json;
+}
+
+std::string info_json(const Surface& surface) {
+  const std::vector<FaceShape> shapes = face_shapes(surface);
+  const std::vector<std::uint32_t> numbers = face_numbers(surface);
+  const std::vector<PartInfo> parts = look_at(surface, shapes);
+  Json files = Json::array();
+  for (std::uint32_t s = 0; s < surface.sources.size(); ++s) {
+    const SurfaceSource& source = surface.sources[s];
+    Json file = {{"file", source.file},
+                 {"format", source.format},
+                 {"unit", source.unit},
+                 {"unit_given", source.unit_given}};
+    file["parts"] = Json::array();
+    for (std::size_t p = 0; p < parts.size(); ++p) {
+      if (surface.part_source[p] != s) continue;
+      Json part = part_json(parts[p]);
+      part["faces"] = Json::array();
+      for (const std::uint32_t f : parts[p].faces)
+        part["faces"].push_back(face_json(surface.faces[f], numbers[f], parts[p].name, shapes[f]));
+      file["parts"].push_back(part);
+    }
+    files.push_back(file);
+  }
+  return Json{{"files", files}}.dump(2) + "\n";
+}
+
+}  // namespace
+
+int info_command(int argc, char** argv) {
+  std::vector<std::string> files;
+  std::string unit;
+  bool json = false;
+  CLI::App app{"What a part is, and what a scene can name in it.", "flexel info"};
+  app.add_option("part", files, "STEP, STL or OBJ files; -: stdin")->required()->type_name("PART");
+  app.add_flag("--json", json, "As JSON, in SI units (docs/info.md)");
+  app.add_option("--unit", unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
+  if (!parse_arguments(app, argc, argv)) return kExitDone;
+  ImportOptions options;
+  if (!unit.empty()) options.unit = length_unit(unit);
+  Surface surface = import_surface(files.front(), options);
+  for (std::size_t f = 1; f < files.size(); ++f) append(surface, import_surface(files[f], options));
+  OutputFile out("-", false);
+  out.write(json ? info_json(surface) : info_text(surface));
+  out.commit();
+  return kExitDone;
+}
+
+}  // namespace flexel

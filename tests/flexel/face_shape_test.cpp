@@ -1,0 +1,83 @@
+// Flat, round and curved faces, in any direction and place.
+#include "flexel/face_shape.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+
+namespace flexel {
+namespace {
+
+// A patch z = f(u, v) of n x n quads, mapped by `place`.
+Surface patch(int n, const std::function<Vec3(double, double)>& place) {
+  Surface surface;
+  surface.parts.push_back({"part"});
+  surface.faces.push_back({"", 0});
+  surface.polygon_offsets.push_back(0);
+  for (int i = 0; i <= n; ++i)
+    for (int j = 0; j <= n; ++j) surface.vertices.push_back(place(double(i) / n, double(j) / n));
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j) {
+      for (const auto& [a, b] : {std::pair{0, 0}, {1, 0}, {1, 1}, {0, 1}})
+        surface.polygon_vertices.push_back(static_cast<std::uint32_t>((i + a) * (n + 1) + j + b));
+      surface.polygon_offsets.push_back(static_cast<std::uint32_t>(surface.polygon_vertices.size()));
+      surface.polygon_face.push_back(0);
+    }
+  return surface;
+}
+
+const Mat3 kTurn = Eigen::AngleAxisd(0.8, Vec3(1, 2, 3).normalized()).toRotationMatrix();
+const Vec3 kShift(10, -20, 5);
+
+TEST(FaceShape, FlatFacesGiveNormalAreaAndCentroid) {
+  const auto shape = face_shapes(
+      patch(4, [](double u, double v) -> Vec3 { return kTurn * Vec3(2 * u, 3 * v, 0) + kShift; }))[0];
+  EXPECT_EQ(shape.kind, FaceShape::Kind::flat);
+  EXPECT_LT((shape.normal - kTurn.col(2)).norm(), 1e-12);
+  EXPECT_NEAR(shape.area, 6, 1e-12);
+  EXPECT_LT((shape.centroid - (kTurn * Vec3(1, 1.5, 0) + kShift)).norm(), 1e-12);
+  EXPECT_EQ(shape.polygons, 16u);
+}
+
+TEST(FaceShape, PartsOfCylindersGiveAxisRadiusAndSide) {
+  for (const double angle : {0.5, 3.0, 2 * M_PI})
+    for (const bool hollow : {false, true}) {
+      const auto shape = face_shapes(patch(24, [&](double u, double v) -> Vec3 {
+        const double a = angle * (hollow ? 1 - u : u);
+        return kTurn * Vec3(0.3 * std::cos(a), 0.3 * std::sin(a), v) + kShift;
+      }))[0];
+      ASSERT_EQ(shape.kind, FaceShape::Kind::round);
+      EXPECT_NEAR(std::abs(shape.axis.dot(kTurn.col(2))), 1, 1e-9);
+      EXPECT_NEAR(shape.radius, 0.3, 1e-9);
+      EXPECT_EQ(shape.hollow, hollow);
+      EXPECT_LT((shape.axis_point - kShift).cross(shape.axis).norm(), 1e-9);
+    }
+}
+
+TEST(FaceShape, OthersAreCurved) {
+  const auto ball = [](double u, double v) -> Vec3 {
+    return {std::cos(u) * std::cos(v), std::sin(u) * std::cos(v), std::sin(v)};
+  };
+  const auto cone = [](double u, double v) -> Vec3 {
+    return {(1 + v) * std::cos(u), (1 + v) * std::sin(u), v};
+  };
+  const auto ellipse = [](double u, double v) -> Vec3 { return {2 * std::cos(3 * u), std::sin(3 * u), v}; };
+  for (const auto& place : {std::function<Vec3(double, double)>(ball), {cone}, {ellipse}})
+    EXPECT_EQ(face_shapes(patch(24, place))[0].kind, FaceShape::Kind::curved);
+}
+
+TEST(FaceShape, InWords) {
+  FaceShape shape;
+  shape.kind = FaceShape::Kind::flat;
+  shape.normal = -Vec3::UnitY();
+  EXPECT_EQ(describe(shape, 1e-3, "mm"), "flat, normal -y");
+  shape.kind = FaceShape::Kind::round;
+  shape.axis = Vec3::UnitX();
+  shape.radius = 4e-3;
+  shape.hollow = true;
+  EXPECT_EQ(describe(shape, 1e-3, "mm"), "round, hole of diameter 8 mm along x");
+  EXPECT_EQ(direction_name(Vec3(1, 0, 1).normalized()), "(0.707, 0, 0.707)");
+}
+
+}  // namespace
+}  // namespace flexel

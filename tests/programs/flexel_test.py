@@ -1,0 +1,125 @@
+"""The front door: flexel deform, flexel info, and the stage programs through it."""
+
+import json
+import os
+import struct
+
+from harness import bracket, box, expect, expect_error, expect_ok, expect_only, main, run, scene, write
+
+CASE = ["--material", "steel", "--fix", "xmin", "--push", "xmax: 0 0 -100 N", "--count", "4000"]
+
+
+def vertices_of(stl):
+    data = open(stl, "rb").read()
+    (count,) = struct.unpack_from("<I", data, 80)
+    return [struct.unpack_from("<9f", data, 84 + 50 * t + 12) for t in range(count)]
+
+
+def test_deform_writes_every_output():
+    result = expect_ok(run("flexel", "deform", box(), *CASE, "-o", "bent.stl", "-o", "bent.obj", "-o", "bent.vtu", "--report",
+                           "report.json", "--summary", "summary.json"))
+    expect_only("box.stl", "bent.stl", "bent.obj", "bent.vtu", "report.json", "summary.json")
+    expect(result.out == b"", "everything that is said goes to stderr")
+    before, after = vertices_of("box.stl"), vertices_of("bent.stl")
+    expect(len(before) == len(after) == 12, "the same triangles")
+    lowest = min(triangle[2::3] for triangle in after)
+    drop = max(b - a for t, s in zip(before, after) for b, a in zip(t[2::3], s[2::3]))
+    # Euler and Bernoulli: F L^3 / (3 E I) = 100 * 0.04^3 / (3 * 210e9 * 0.01^4 / 12) = 12.2 um; shear adds some percent.
+    expect(11.5e-3 < drop < 14.5e-3, f"the tip sinks by 12 to 14 um: {drop} mm, {lowest}")
+    summary = json.load(open("summary.json"))
+    expect(set(summary) == {"voxelize", "simulate", "map"}, f"{summary.keys()}")
+    expect(summary["map"] == json.load(open("report.json")) and summary["map"]["valid"], "one mapping, one report")
+
+
+def test_deform_equals_the_pipe():
+    box()
+    expect_ok(run("flexel", "deform", "box.stl", "--scene", scene(), "--count", "2000", "-o", "one.stl"))
+    expect_ok(run("flexel", "voxelize", "box.stl", "--count", "2000", "-o", "rest.vtu"))
+    expect_ok(run("flexel", "simulate", "scene.toml", "rest.vtu", "-o", "bent.vtu"))
+    expect_ok(run("flexel", "map", "bent.vtu", "-o", "two.stl"))
+    expect(open("one.stl", "rb").read() == open("two.stl", "rb").read(), "one process or three, the same bits")
+
+
+def test_deform_to_stdout_and_threads():
+    box()
+    one = expect_ok(run("flexel", "deform", "box.stl", *CASE, "--threads", "1", "--quiet", "--format", "obj", "-o", "-"))
+    two = expect_ok(run("flexel", "deform", "-", *CASE, "--threads", "2", "--quiet", "--format", "obj", "-o", "-",
+                        stdin=open("box.stl", "rb")))
+    expect([line for line in one.out.splitlines() if line.startswith(b"v ")] ==
+           [line for line in two.out.splitlines() if line.startswith(b"v ")], "any number of threads gives the same bits")
+
+
+def test_push_inwards_is_a_push_down():
+    box()
+    expect_ok(run("flexel", "deform", "box.stl", *CASE[:4], "--push", "zmax: 100 N", "--count", "2000", "-o", "in.stl"))
+    expect_ok(run("flexel", "deform", "box.stl", *CASE[:4], "--push", "zmax: 0 0 -100 N", "--count", "2000", "-o", "down.stl"))
+    for a, b in zip(vertices_of("in.stl"), vertices_of("down.stl")):
+        expect(all(abs(x - y) < 1e-6 for x, y in zip(a, b)), f"{a} {b}")
+
+
+def test_move_is_followed():
+    box()
+    expect_ok(run("flexel", "deform", "box.stl", "--material", "PLA", "--fix", "xmin", "--move", "xmax: 0.5 0 0 mm", "--count",
+                  "2000", "-o", "out.stl"))
+    longest = max(x for t in vertices_of("out.stl") for x in t[0::3])
+    expect(abs(longest - 40.5) < 5e-3, f"the end is at 40.5 mm: {longest}")
+
+
+def test_deform_refuses_at_once_and_writes_nothing():
+    box()
+    fix = ["--fix", "xmin"]
+    for arguments, words in (
+            ([*fix, "--push", "xmax: 0 0 -1 N", "-o", "out.stl"], ["no material", "steel"]),
+            (["--material", "stel", *fix, "--push", "xmax: 0 0 -1 N", "-o", "out.stl"], ["stel", "did you mean \"steel\""]),
+            (["--material", "steel", *fix, "-o", "out.stl"], ["nothing acts", "--push"]),
+            (["--material", "steel", *fix, "--push", "xmax 0 0 -1 N", "-o", "out.stl"], ["--push", "colon"]),
+            (["--material", "steel", *fix, "--push", "xmax: 0 0 -1", "-o", "out.stl"], ["--push", "unit"]),
+            (["--material", "steel", *fix, "--push", "xmax: 0 0 -1 mm", "-o", "out.stl"], ["--push", "mm"]),
+            (["--material", "steel", *fix, "--push", "xmas: 0 0 -1 N", "-o", "out.stl"], ["xmas", "xmax"]),
+            (["--material", "steel", *fix, "--push", "xmax: 0 0 -1 N", "-o", "out.step"], ["step"]),
+            (["--material", "steel", *fix, "--push", "xmax: 0 0 -1 N", "-o", "-"], ["--format"]),
+            (["--material", "steel", *fix, "--push", "xmax: 0 0 -1 N", "-o", "a.stl", "-o", "a.stl"], ["a.stl"]),
+            (["--material", "steel", *fix, "--push", "xmax: 0 0 -1 N", "--size", "2", "-o", "out.stl"], ["unit"]),
+            (["--material", "steel", "--push", "xmax: 0 0 -1 N", "-o", "out.stl"], ["box"])):
+        expect_error(run("flexel", "deform", "box.stl", *arguments), "flexel", *words)
+        expect_only("box.stl")
+
+
+def test_info_says_what_a_scene_can_name():
+    result = expect_ok(run("flexel", "info", box()))
+    text = result.out.decode()
+    for words in ("40 x 10 x 10 mm", "box/6", "flat, normal +x", "closed", "4000 mm^3", "assumed"):
+        expect(words in text, f"\"{words}\" is missing in {text}")
+    data = json.loads(expect_ok(run("flexel", "info", "box.stl", "--unit", "m", "--json")).out)
+    part = data["files"][0]["parts"][0]
+    expect(part["volume"] == 4000 and part["closed"] and len(part["faces"]) == 6, f"{part}")
+    expect(abs(part["thinnest_wall"]["thickness"] - 10) < 1e-6, f"{part['thinnest_wall']}")
+
+
+def test_info_of_a_bracket():
+    data = json.loads(expect_ok(run("flexel", "info", bracket(), "--json")).out)
+    part = data["files"][0]["parts"][0]
+    expect(data["files"][0]["unit_given"] and part["closed"], f"{part}")
+    holes = [face for face in part["faces"] if face["kind"] == "round" and face["hole"]]
+    expect(holes, "the bracket has holes")
+
+
+def test_info_of_an_open_part():
+    write("open.stl", b"".join([open(box(), "rb").read()[:80], struct.pack("<I", 11), open("box.stl", "rb").read()[84:84 + 550]]))
+    text = expect_ok(run("flexel", "info", "open.stl")).out.decode()
+    expect("NOT closed" in text and "3 open edges" in text and "volume     none" in text, text)
+
+
+def test_commands():
+    expect(expect_ok(run("flexel", "--version")).out.startswith(b"flexel 0."), "a version")
+    expect(b"flexel deform" in expect_ok(run("flexel", "help")).out, "help on stdout")
+    for command in ("deform", "info", "voxelize", "simulate", "map"):
+        expect(b"--" in expect_ok(run("flexel", "help", command)).out, f"help {command}")
+    expect_error(run("flexel"), "flexel", "command", "help")
+    expect_error(run("flexel", "defrom"), "flexel", "did you mean \"deform\"")
+    expect_error(run("flexel", "map", "absent.vtu", "--format", "stl"), "flexel-map", "absent.vtu")
+    expect(not os.listdir("."), "nothing written")
+
+
+if __name__ == "__main__":
+    main(globals())
