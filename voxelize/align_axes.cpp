@@ -13,6 +13,7 @@ namespace {
 constexpr double kSameDirection = 1.75e-3;  // rad, 0.1 degree
 constexpr double kIsWorldAxis = 1e-5;       // rad: closer than the noise of single-precision files
 constexpr double kEnoughArea = .05;         // of the part's: less is no dominant face
+constexpr double kSplit = 8;                // a direction on a boundary may be split among so many cells
 constexpr double kComparable = .5;          // of the largest: a world axis is preferred from here on
 
 struct Direction {
@@ -36,21 +37,44 @@ Vec3 same_way(const Vec3& normal) {
   return normal[largest] < 0 ? Vec3(-normal) : normal;
 }
 
-// Area vectors gathered by direction, largest area first. Ties are broken by the cell, for repeatable
-// results.
-std::vector<Direction> gather(const PartMesh& mesh) {
+Vec3 area_vector(const PartMesh& mesh, const Corners& c) {
+  const Vec3& a = mesh.world[c[0]];
+  return same_way((mesh.world[c[1]] - a).cross(mesh.world[c[2]] - a) / 2);
+}
+
+// Coarse squares on a cube around the directions: a quick first look at where area gathers.
+constexpr int kSquares = 64;  // along each side of a cube's face
+std::size_t coarse_square(const Vec3& vector) {
+  int largest = 0;
+  const double length = vector.cwiseAbs().maxCoeff(&largest);
+  const auto square = [&](double x) {
+    return static_cast<std::size_t>(std::min(kSquares - 1., (x / length + 1) / 2 * kSquares));
+  };
+  return (static_cast<std::size_t>(largest) * kSquares + square(vector[(largest + 1) % 3])) * kSquares +
+         square(vector[(largest + 2) % 3]);
+}
+
+// Squares in which enough area gathers for a dominant face to be there.
+std::vector<bool> heavy_squares(const PartMesh& mesh, double least_area) {
+  std::vector<double> area(3 * kSquares * kSquares, 0);
+  for (const Corners& c : mesh.corners)
+    if (const Vec3 vector = area_vector(mesh, c); vector.squaredNorm() > 0)
+      area[coarse_square(vector)] += vector.norm();
+  std::vector<bool> heavy;
+  for (const double sum : area) heavy.push_back(sum >= least_area);
+  return heavy;
+}
+
+// Area vectors gathered by direction where enough area is, largest first. Ties are broken by the cell, for
+// repeatable results.
+std::vector<Direction> gather(const PartMesh& mesh, double least_area) {
+  const std::vector<bool> heavy = heavy_squares(mesh, least_area);
+  if (std::find(heavy.begin(), heavy.end(), true) == heavy.end()) return {};
   std::map<Cell, Vec3> cells;
-  Cell last{};
-  Vec3* into = nullptr;
   for (const Corners& c : mesh.corners) {
-    const Vec3& a = mesh.world[c[0]];
-    const Vec3 vector = same_way((mesh.world[c[1]] - a).cross(mesh.world[c[2]] - a) / 2);
-    const double area = vector.norm();
-    if (!(area > 0)) continue;
-    const Cell cell = cell_of(vector / area);
-    if (into == nullptr || cell != last) into = &cells.try_emplace(cell, Vec3::Zero()).first->second;
-    last = cell;
-    *into += vector;
+    const Vec3 vector = area_vector(mesh, c);
+    if (!(vector.squaredNorm() > 0) || !heavy[coarse_square(vector)]) continue;
+    cells.try_emplace(cell_of(vector.normalized()), Vec3::Zero()).first->second += vector;
   }
   std::vector<Direction> directions;
   for (const auto& [cell, vector] : cells) directions.push_back({vector.normalized(), vector.norm()});
@@ -63,7 +87,7 @@ std::vector<Direction> gather(const PartMesh& mesh) {
 std::vector<Direction> merge(const std::vector<Direction>& gathered, double least_area) {
   std::vector<Direction> merged;
   for (const Direction& seed : gathered) {
-    if (merged.size() == 32 || seed.area < least_area / 8) break;
+    if (merged.size() == 32 || seed.area < least_area) break;
     const auto near = [&](const Direction& other) {
       return seed.normal.cross(other.normal).norm() < kSameDirection;
     };
@@ -124,7 +148,7 @@ Mat3 least_turn(const std::array<Vec3, 3>& directions) {
 
 Mat3 dominant_axes(const PartMesh& mesh) {
   const double least_area = kEnoughArea * surface_area(mesh);
-  const std::vector<Direction> directions = merge(gather(mesh), least_area);
+  const std::vector<Direction> directions = merge(gather(mesh, least_area / kSplit), least_area / kSplit);
   const Direction first = largest(directions, Vec3::Zero(), least_area);
   if (first.area == 0) return Mat3::Identity();
   const Direction second = largest(directions, first.normal, least_area);
