@@ -4,6 +4,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <poll.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <zlib.h>
@@ -41,6 +42,18 @@ class Descriptor {
   int value_ = -1;
 };
 
+// Returns when a read would not wait. A signal that arrives just before the wait would go unseen, so that it
+// is looked for ten times a second.
+void wait_until_readable(int descriptor) {
+  constexpr int kInterval = 100;  // ms
+  pollfd wait = {descriptor, POLLIN, 0};
+  int ready = 0;
+  while (ready == 0 || (ready < 0 && errno == EINTR)) {
+    throw_if_interrupted();
+    ready = ::poll(&wait, 1, kInterval);
+  }
+}
+
 // Reads until the end of the file; `expected` is its size as far as is known.
 Bytes read_to_end(int descriptor, std::size_t expected, const std::string& where) {
   Bytes bytes;
@@ -52,6 +65,7 @@ Bytes read_to_end(int descriptor, std::size_t expected, const std::string& where
       if (full) bytes.reserve(std::max(2 * bytes.capacity(), kStep));
       bytes.resize(std::min(bytes.size() + kStep, bytes.capacity()));
     }
+    wait_until_readable(descriptor);
     const ssize_t got = ::read(descriptor, bytes.data() + size, bytes.size() - size);
     if (got == 0) break;
     if (got > 0) {

@@ -33,6 +33,8 @@ Outcome run(const std::function<int()>& body, const std::function<void()>& befor
     dup2(ends[1], STDERR_FILENO);
     close(ends[0]);
     close(ends[1]);
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP})
+      std::signal(signal, SIG_DFL);  // a background job ignores some
     if (before) before();
     _exit(run_program("flexel-test", body));
   }
