@@ -20,7 +20,7 @@ struct Arguments {
   std::vector<std::string> parts;
   std::string size, placement = "corner", unit, align = "snap", material, max_memory, deflection, format,
                     output = "-";
-  std::optional<std::size_t> count;
+  std::optional<long long> count;
   int threads = 0;
   bool compress = false, quiet = false;
 };
@@ -40,8 +40,7 @@ void declare(CLI::App& app, Arguments& arguments) {
                  "STEP: largest distance of the triangles from the CAD surface");
   app.add_option("--input-format,--format", arguments.format,
                  "format of the input (step, stl, obj) instead of what its bytes tell");
-  app.add_option("--threads", arguments.threads, "threads; 0 (default): every core")
-      ->check(CLI::NonNegativeNumber);
+  app.add_option("--threads", arguments.threads, "threads; 0 (default): every core");
   app.add_flag("--compress", arguments.compress, "compress the arrays of the body file");
   app.add_flag("--quiet", arguments.quiet, "say warnings only");
   app.add_option("-o,--output", arguments.output, "body file (.vtu); - or none: standard output");
@@ -84,8 +83,9 @@ VoxelizeOptions voxelize_options(const Arguments& arguments) {
     options.size = parse_quantity(arguments.size, Dimension::length);
     if (!(*options.size > 0)) throw InputError("--size: must be above zero");
   }
-  if (arguments.count && *arguments.count == 0) throw InputError("--count: must be above zero");
-  options.count = arguments.count;
+  if (arguments.count && *arguments.count <= 0) throw InputError("--count: must be above zero");
+  if (arguments.threads < 0) throw InputError("--threads: must not be below zero");
+  if (arguments.count) options.count = static_cast<std::size_t>(*arguments.count);
   options.placement = choose("--placement", arguments.placement, {"corner", "centre"}) == 0
                           ? Placement::corner
                           : Placement::centre;
