@@ -1,6 +1,6 @@
 // Smoothed aggregation (Vanek, Mandel, Brezina 1996) with the six rigid motions of each aggregate. Level 0 is
 // the tangent over the elements; every coarser level stands for groups of the level below: blocks of 3x3x3
-// elements first, then of 2x2x2 aggregates, split where they are not connected. A cycle smooths with a
+// elements first, then of 2x2x2 aggregates, split where they are not connected. A V-cycle smooths with a
 // Chebyshev polynomial in block Jacobi before and after, and the coarsest level is factorised. What depends
 // on the pattern alone (aggregates, patterns of the transfers and of the coarse matrices) is made once;
 // refresh() fills in values.
@@ -20,9 +20,8 @@ namespace {
 
 constexpr std::size_t kDirectRows = 1000;   // elements; a matrix up to this size is factorised at once
 constexpr std::size_t kCoarsestRows = 500;  // aggregates of six unknowns
-constexpr std::size_t kTwiceRows = 4000;  // a level this small visits the next one twice (thin plates, beams)
-constexpr double kStrongLink = .01;       // weaker couplings do not hold an aggregate together
-constexpr double kAnyLink = 1e-12;        // weaker couplings are rounding
+constexpr double kStrongLink = .01;         // weaker couplings do not hold an aggregate together
+constexpr double kAnyLink = 1e-12;          // weaker couplings are rounding
 
 using FineView = MatrixView<Block>;
 using CoarseBlock = Eigen::Matrix<float, 6, 6>;
@@ -203,14 +202,11 @@ class Multigrid : public Preconditioner {
     }
     const auto matrix = view(coarse.pattern, coarse.values);
     smooth_from_zero<6>(matrix, level, level.rhs.data(), level.x.data(), level.next.data());
-    const int visits = matrix.rows() <= kTwiceRows ? 2 : 1;
-    for (int visit = 0; visit < visits; ++visit) {
-      restrict_residual<6>(matrix, level, level.rhs.data(), level.x.data(), level.next.data(),
-                           coarse_[l + 1].level.rhs.data());
-      cycle(l + 1);
-      prolong<6>(level, coarse_[l + 1].level.x.data(), level.x.data());
-      smooth<6>(matrix, level, level.rhs.data(), level.x.data(), level.next.data());
-    }
+    restrict_residual<6>(matrix, level, level.rhs.data(), level.x.data(), level.next.data(),
+                         coarse_[l + 1].level.rhs.data());
+    cycle(l + 1);
+    prolong<6>(level, coarse_[l + 1].level.x.data(), level.x.data());
+    smooth<6>(matrix, level, level.rhs.data(), level.x.data(), level.next.data());
   }
 
   const BlockMatrix& matrix_;
