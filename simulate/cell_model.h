@@ -8,19 +8,17 @@
 //     gamma_a = axes (s_ax / hx, s_ay / hy, s_az / hz)
 //     H = 1/4 sum_a u_a (x) gamma_a,   F = I + H
 //     U = f { V W(F) + 1/2 sum_m c_m |q_m|^2 },   q_m = 1/8 sum_a s_ma u_a,   m in {xy, yz, zx, xyz}
-//     W = mu/2 (tr F^T F - 3 - 2 ln J) + lambda/2 ln^2 J                      (neo-Hookean; Simo and Pister
-//     1984)
+//     W = mu/2 (tr F^T F - 3 - 2 ln J) + lambda/2 ln^2 J     (neo-Hookean; Simo and Pister 1984)
 // q_m vanishes for every affine field, hence the patch test at any spacing; |q_m| does not see a rotation.
 //
 // Hourglass stiffness. In the natural coordinates xi, eta of a cell the field of mode xy is u = q xi eta. The
 // energy of pure bending along x (no Poisson effect, no shear) is 1/2 V (4/3) (2 mu / hx^2) q_x^2, that of
 // twisting 1/2 V (4/3) mu (1/hx^2 + 1/hy^2) q_z^2. A frame-free energy has one c for the three components of
 // q; the mean of the three is that of the twist:
-//     c_xy = (4/3) mu V (1/hx^2 + 1/hy^2), and likewise yz, zx;   c_xyz = (8/9) mu V (1/hx^2 + 1/hy^2 +
-//     1/hz^2).
-// Equal spacings give (8/3) mu h for all four, the value of the lattice study (docs/model.md). The hourglass
-// part is 1/n^2 of the bending energy of a beam n cells thick: spacings 7 % apart change a beam of four cells
-// by 0.2 %.
+//     c_xy = (4/3) mu V (1/hx^2 + 1/hy^2), and likewise yz, zx
+//     c_xyz = (8/9) mu V (1/hx^2 + 1/hy^2 + 1/hz^2)
+// Equal spacings give (8/3) mu h for all four. The hourglass part is 1/n^2 of the bending energy of a beam n
+// cells thick: spacings 7 % apart change the energy of a beam of four cells by 0.5 %.
 #pragma once
 #include <array>
 
@@ -36,8 +34,8 @@ struct CellKind {
   double volume = 0;                  // m^3
   double mu = 0, lambda = 0;          // Pa
   std::array<double, 4> hourglass{};  // c_m [N/m]
-  std::array<double, 64>
-      diagonal{};  // (8 x 8) the part of K_ab that is a multiple of I and does not depend on the state [N/m]
+  // (8 x 8) the part of K_ab that is a multiple of I and does not depend on the state [N/m]
+  std::array<double, 64> diagonal{};
 };
 
 using CellVectors = std::array<Vec3, 8>;  // one vector per element of a cell

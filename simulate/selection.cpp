@@ -59,7 +59,7 @@ std::vector<std::uint32_t> polygons_of_side(const Surface& surface, Side side,
     }
   }
   const double limit = high - kSideTolerance * (high - low);
-  const auto collect = [&](bool whole, double least_cosine) {
+  const auto collect = [&](bool whole, double least_cosine, bool inside_out = false) {
     std::vector<std::uint32_t> found;
     for (std::size_t p = 0; p < surface.polygon_count(); ++p) {
       if (!wanted(p)) continue;
@@ -69,13 +69,15 @@ std::vector<std::uint32_t> polygons_of_side(const Surface& surface, Side side,
                   : std::any_of(corners.begin(), corners.end(), reaches)))
         continue;
       const Vec3 area = area_vector(surface, corners);
-      if (area.norm() > 0 && side.sign * area[side.axis] >= least_cosine * area.norm())
+      const double facing = inside_out ? std::abs(area[side.axis]) : side.sign * area[side.axis];
+      if (area.norm() > 0 && facing >= least_cosine * area.norm())
         found.push_back(static_cast<std::uint32_t>(p));
     }
     return found;
   };
   std::vector<std::uint32_t> found = collect(true, 0.7);
   if (found.empty()) found = collect(false, 0.5);
+  if (found.empty()) found = collect(true, 0.7, true);
   return found;
 }
 

@@ -16,12 +16,21 @@ Json vector(const Vec3& value) {
   return Json::array({value.x(), value.y(), value.z()});
 }
 
-std::string lengths(const Vec3& value) {
+// Components that are only rounding beside the largest are shown as 0.
+Vec3 without_rounding(Vec3 value) {
+  for (double& each : value)
+    if (std::abs(each) < 1e-6 * value.cwiseAbs().maxCoeff()) each = 0;
+  return value;
+}
+
+std::string lengths(const Vec3& exact) {
+  const Vec3 value = without_rounding(exact);
   return fmt::format("({}, {}, {})", human_length(value.x()), human_length(value.y()),
                      human_length(value.z()));
 }
 
-std::string forces(const Vec3& value) {
+std::string forces(const Vec3& exact) {
+  const Vec3 value = without_rounding(exact);
   return fmt::format("({}, {}, {})", human_force(value.x()), human_force(value.y()), human_force(value.z()));
 }
 

@@ -1,7 +1,7 @@
 // Longest-edge bisection keeps the pieces of long slender triangles (which CAD tessellation is full of) few:
-// their number grows with length over h, not with its square. The centroid rule on pieces of h/2 integrates
-// the piecewise trilinear weights of the cells to well under a percent of one cell's share, and exactly in
-// sum, since the weights of a point sum to 1.
+// their number grows with length over h, not with its square. The centroid rule on such small pieces
+// integrates the piecewise trilinear weights of the cells to well under a percent of one cell's share, and
+// exactly in sum, since the weights of a point sum to 1.
 #include "simulate/surface_points.h"
 
 #include <Eigen/Geometry>
@@ -11,6 +11,8 @@
 
 namespace flexel {
 namespace {
+
+constexpr double kLongestEdge = 0.3;  // of a piece, in spacings
 
 using Corners = std::array<Vec3, 3>;
 
@@ -64,7 +66,8 @@ std::vector<SurfacePoint> surface_points(const Body& body, const std::vector<std
         Corners corners;
         for (std::size_t c = 0; c < 3; ++c) corners[c] = body.surface.vertices[triangles.corners[list[t]][c]];
         std::vector<Corners> pieces;
-        add_pieces(corners, 0.5 * body.parts[body.surface.polygon_part(polygon)].lattice.spacing.minCoeff(),
+        add_pieces(corners,
+                   kLongestEdge * body.parts[body.surface.polygon_part(polygon)].lattice.spacing.minCoeff(),
                    pieces);
         for (const Corners& piece : pieces) {
           const Vec3 centre = (piece[0] + piece[1] + piece[2]) / 3;

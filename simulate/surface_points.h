@@ -14,7 +14,7 @@ struct SurfacePoint {
   std::uint32_t polygon = 0;
 };
 
-// Triangles are cut in two at their longest edge until that edge is at most half the smallest spacing of
+// Triangles are cut in two at their longest edge until that edge is at most 0.3 of the smallest spacing of
 // their part; each piece gives its centroid. Points over no cell, or over a cell with skip[cell] != 0, are
 // left out. Order: by polygon.
 [[nodiscard]] std::vector<SurfacePoint> surface_points(const Body& body,

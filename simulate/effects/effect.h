@@ -2,18 +2,20 @@
 //
 // An effect E is one header (with its .cpp) in simulate/effects and one entry of simulate/effects/all.h. It
 // owns
-//   E::Parameters                                  what a scene says of it; default: nothing
-//   static void parse(TableReader& scene, Parameters&)                     reads its own keys of the scene
-//   static std::optional<E> make(const Parameters&, const Setting&)        nothing when the scene does not
-//   call for it std::string why() const                                                "2 loads", for
-//   --explain
+//   E::Parameters                      what a scene says of it; default: nothing
+//   E::name                            what it is called in --explain
+//   static void parse(TableReader& scene, Parameters&)
+//                                      reads its own keys of the scene
+//   static std::optional<E> make(const Parameters&, const Setting&)
+//                                      nothing when the scene does not call for it
+//   std::string why() const            "2 [[load]]", for --explain
 // and any of these hooks, found by concept; a hook that an effect lacks is never called:
-//   double energy(const State&) const                                      J
-//   void add_forces(const State&, std::vector<Vec3>& forces) const         N, minus the energy's derivative
-//   void add_stiffness(const State&, const Stencil&, const Body&, BlockMatrix&) const     N/m, minus the
-//   forces' derivative void constrain(Constraints&) const                                     elements that
-//   follow a path exactly void report(const State&, const std::vector<Vec3>& unbalanced, SimulateResult&)
-//   const
+//   double energy(const State&) const                                 J
+//   void add_forces(const State&, std::vector<Vec3>&) const           N, minus the energy's derivative
+//   void add_stiffness(const State&, const Stencil&, const Body&, BlockMatrix&) const
+//                                                                     N/m, minus the forces' derivative
+//   void constrain(Constraints&) const                                elements that follow a path exactly
+//   void report(const State&, const std::vector<Vec3>& unbalanced, SimulateResult&) const
 // An effect that a scene does not name makes no object, no array and no pass.
 #pragma once
 #include <chrono>

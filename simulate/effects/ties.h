@@ -3,7 +3,7 @@
 // Surface selections are tied by penalty at quadrature points q of the surface: energy 1/2 k_q |u_q - d_q|^2
 // on the tied axes with u_q = sum_a w_qa u_a (trilinear, elements of the cell under q), k_q = 300 E / h times
 // the point's area (E of the part, h the mean spacing; 10 to 300 moves a cantilever's tip by under one
-// percent, docs/model.md). The led displacement d is affine in the rest position, which trilinear weights
+// percent). The led displacement d is affine in the rest position, which trilinear weights
 // reproduce, so u_q - d_q = sum_a w_qa (u_a - d(X_a)): one 8 x 8 matrix a cell holds all its points. Element
 // selections (box, sphere, half-space, part) are followed exactly and eliminated.
 #pragma once

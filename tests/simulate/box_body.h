@@ -13,7 +13,7 @@ struct BoxOptions {
   Vec3 origin = Vec3::Zero();
   Mat3 axes = Mat3::Identity();
   std::string name = "box";
-  std::function<double(int, int, int)> fill;  // 0: no cell; default 1
+  std::function<double(int, int, int)> fill = {};  // 0: no cell; default 1
 };
 
 // Box of cells with eight-cornered surface: six quads, the faces "x0", "x1", "y0", "y1", "z0", "z1", outward.
@@ -94,6 +94,7 @@ inline Body box_body(const BoxOptions& options = {}) {
   surface.part_source.push_back(0);
   part.surface_volume = options.spacing.prod() * nx * ny * nz;
   body.parts.push_back(part);
+  derive_connections(body);
   return body;
 }
 
