@@ -78,6 +78,7 @@ std::vector<std::uint32_t> polygons_of_side(const Surface& surface, Side side,
   std::vector<std::uint32_t> found = collect(true, 0.7);
   if (found.empty()) found = collect(false, 0.5);
   if (found.empty()) found = collect(true, 0.7, true);
+  if (found.empty()) found = collect(false, 0.5, true);
   return found;
 }
 
