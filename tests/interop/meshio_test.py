@@ -1,0 +1,115 @@
+"""meshio reads our body files, raw and compressed, and carries them to other formats; it reads the meshes that we write."""
+
+import meshio
+import numpy as np
+from files import obj_parts, stl_triangles, vtu_arrays
+
+from harness import body, box, expect, expect_ok, main, run, scene, write
+
+
+def deformed(*options):
+    scene()
+    body("rest.vtu", *options)
+    expect_ok(run("flexel-simulate", "scene.toml", "rest.vtu", "-o", "body.vtu", *options))
+    return "body.vtu"
+
+
+def same_as_ours(path):
+    mesh = meshio.read(path)
+    ours = vtu_arrays(path)
+    expect([block.type for block in mesh.cells] == ["hexahedron"], f"one block of hexahedra wanted: {mesh}")
+    expect(len(mesh.cells[0].data) == 32, f"32 cells wanted: {mesh}")
+    compared = 0
+    for kind, data in (("point", mesh.point_data), ("cell", mesh.cell_data), ("field", mesh.field_data)):
+        for name, value in data.items():
+            value = value[0] if kind == "cell" else value
+            expect(np.array_equal(np.ravel(value), np.ravel(ours[name])), f"{kind} data \"{name}\" differs")
+            compared += 1
+    expect(compared >= 6, f"only {compared} arrays were there to compare: {mesh}")
+    points = ours[next(name for name in ours if name.lower() == "points")]
+    expect(np.array_equal(mesh.points, points), "points differ")
+    return mesh
+
+
+def test_raw_body():
+    mesh = same_as_ours(deformed())
+    expect(len(mesh.points) == 81, "81 elements wanted")
+    lengths = mesh.points.max(axis=0) - mesh.points.min(axis=0)
+    expect(0.03 < lengths[0] < 0.05, f"a body is in metres: {lengths}")
+
+
+def test_compressed_body():
+    same_as_ours(deformed("--compress"))
+
+
+def test_compressed_equals_raw():
+    body("raw.vtu")
+    body("small.vtu", "--compress")
+    raw, small = vtu_arrays("raw.vtu"), vtu_arrays("small.vtu")
+    expect(raw.keys() == small.keys(), "different arrays")
+    for name, array in raw.items():
+        expect(np.array_equal(array, small[name]), f"\"{name}\" differs")
+
+
+def test_hexahedra_are_right_handed():
+    mesh = meshio.read(body())
+    corners = mesh.points[mesh.cells[0].data]
+    edges = [corners[:, i] - corners[:, 0] for i in (1, 3, 4)]
+    volumes = np.einsum("ij,ij->i", np.cross(edges[0], edges[1]), edges[2])
+    expect(np.allclose(volumes, 0.005**3, rtol=1e-9), f"VTK's order of corners gives every cell its volume: {volumes.min()}")
+
+
+def test_abaqus():
+    path = deformed()
+    mesh = meshio.read(path)
+    meshio.write_points_cells("body.inp", mesh.points, [("hexahedron", mesh.cells[0].data)])
+    again = meshio.read("body.inp")
+    expect(np.allclose(again.points, mesh.points, rtol=1e-12, atol=1e-15), "points differ after .inp")
+    expect(np.array_equal(again.cells_dict["hexahedron"], mesh.cells[0].data), "cells differ after .inp")
+
+
+def test_stl_is_read_with_its_triangles_in_order():
+    box()
+    path = deformed()
+    expect_ok(run("flexel-map", path, "-o", "bent.stl"))
+    ours = stl_triangles("bent.stl")
+    mesh = meshio.read("bent.stl")
+    expect(len(ours) == 12 and np.array_equal(mesh.points[mesh.cells_dict["triangle"]], ours.astype(np.float32)), "triangles differ")
+    expect(np.abs(ours - stl_triangles("box.stl")).max() > 0, "the load left no trace in the STL")
+
+
+QUADS = """# a box, as quads
+v 0 0 0
+v 40 0 0
+v 40 10 0
+v 0 10 0
+v 0 0 10
+v 40 0 10
+v 40 10 10
+v 0 10 10
+g box
+f 4 3 2 1
+f 5 6 7 8
+f 1 2 6 5
+f 2 3 7 6
+f 3 4 8 7
+f 4 1 5 8
+"""
+
+
+def test_obj_is_read_with_its_vertices_in_order():
+    write("part.obj", QUADS)
+    scene()
+    expect_ok(run("flexel-voxelize", "part.obj", "--size", "5 mm", "-o", "rest.vtu"))
+    expect_ok(run("flexel-simulate", "scene.toml", "rest.vtu", "-o", "body.vtu"))
+    expect_ok(run("flexel-map", "body.vtu", "-o", "bent.obj"))
+    before, faces = obj_parts("part.obj")
+    vertices, new_faces = obj_parts("bent.obj")
+    expect(faces == new_faces and len(before) == len(vertices), "faces or vertices were added, lost or reordered")
+    expect(np.abs(vertices - before)[:, 2].max() > 0, "the load left no trace in the OBJ")
+    mesh = meshio.read("bent.obj")
+    expect(np.allclose(mesh.points, vertices, rtol=1e-6), "meshio reads other points")
+
+
+if __name__ == "__main__":
+    main(globals())

@@ -1,0 +1,68 @@
+"""The scripts of samples/pipelines work, and their results are what the text says."""
+
+import os
+import re
+import sys
+
+from harness import BIN, SOURCE, box_triangles, expect, expect_ok, main, need, run
+
+sys.path.insert(0, str(SOURCE / "tests/interop"))
+PIPELINES = SOURCE / "samples/pipelines"
+
+
+def pipeline(name, *arguments):
+    environment = dict(os.environ, PATH=f"{BIN}:{os.environ['PATH']}")
+    result = run("bash", PIPELINES / name, *arguments, timeout=170, env=environment)
+    return expect_ok(result).out.decode()
+
+
+def bent(before, after):
+    """Same triangles in the same order; the held end stays, the other goes down."""
+    import numpy as np
+    from files import any_stl_triangles
+    old, new = any_stl_triangles(before), any_stl_triangles(after)
+    expect(old.shape == new.shape and np.isfinite(new).all(), f"{old.shape} became {new.shape}")
+    moved = (new - old)[..., 2]
+    left, right = old[..., 0] < old[..., 0].min() + 1e-3, old[..., 0] > old[..., 0].max() - 1e-3
+    expect(abs(moved[left]).max() < 0.02 * abs(moved[right]).max(), f"the held end moved by {abs(moved[left]).max()} mm")
+    expect(moved[right].max() < -0.01, f"the loaded end moved by {moved[right].max()} mm")
+
+
+def test_openscad():
+    need("openscad", "admesh")
+    text = pipeline("openscad.sh", "out")
+    bent("out/clip.stl", "out/pressed.stl")
+    for key in ("Edges fixed", "Facets removed", "Facets added", "Facets reversed", "Backwards edges"):
+        expect(re.search(rf"{key}\s*:\s*0\b", text), f"admesh reports {key}: {text}")
+
+
+def test_gmsh():
+    need("gmsh")
+    text = pipeline("gmsh.sh", "out")
+    expect("Error" not in text, text)
+    bent("out/plate.stl", "out/bent.stl")
+    import meshio
+    tetrahedra = meshio.read("out/bent.msh").cells_dict.get("tetra", [])
+    expect(len(tetrahedra) > 100, f"gmsh filled the bent plate with {len(tetrahedra)} tetrahedra")
+
+
+def test_meshio():
+    import meshio
+    import numpy as np
+    triangles = np.array(box_triangles())
+    points, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    meshio.write_points_cells("part.ply", points, [("triangle", index.reshape(-1, 3))])
+    pipeline("meshio.sh", "part.ply", "out")
+    bent("out/part.stl", "out/bent.stl")
+    expect(len(meshio.read("out/bent.ply").cells_dict["triangle"]) == len(triangles), "triangles were lost on the way")
+    hexahedra = meshio.read("out/body.inp").cells_dict["hexahedron"]
+    expect(1000 < len(hexahedra) < 4000, f"{len(hexahedra)} hexahedra in the .inp")
+
+
+def test_failure_stops_the_pipeline():
+    result = run("bash", PIPELINES / "meshio.sh", "absent.ply", "out", env=dict(os.environ, PATH=f"{BIN}:{os.environ['PATH']}"))
+    expect(result.code != 0 and not os.path.exists("out/bent.stl"), f"a missing part should stop the script: {result}")
+
+
+if __name__ == "__main__":
+    main(globals())

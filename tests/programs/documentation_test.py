@@ -1,0 +1,56 @@
+"""Every command in a ```sh block of README.md, docs/ and samples/ works as it stands.
+
+The blocks of a page run one after another in one shell (`bash -eu -o pipefail`), in a folder that looks like the repository after
+tools/demo: build/release/bin, samples and out/bracket.step are there. A block that is not to be run is fenced ```text.
+"""
+
+import pathlib
+import re
+
+from harness import BIN, SOURCE, bracket, expect, main, shell, write
+
+
+def blocks(page):
+    return re.findall(r"^```sh\n(.*?)^```$", page.read_text(encoding="utf-8"), re.M | re.S)
+
+
+def furnish():
+    pathlib.Path("build/release").mkdir(parents=True)
+    pathlib.Path("build/release/bin").symlink_to(BIN)
+    pathlib.Path("samples").symlink_to(SOURCE / "samples")
+    pathlib.Path("out").mkdir()
+    bracket("out/bracket.step")
+
+
+def run_page(name):
+    found = blocks(SOURCE / name)
+    expect(found, f"{name} has no ```sh block")
+    furnish()
+    result = shell("set -eu -o pipefail\n" + "\n".join(found), timeout=170)
+    expect(result.code == 0, f"the commands of {name} as they stand: {result}\n{result.out.decode(errors='replace')}")
+
+
+def test_readme():
+    run_page("README.md")
+
+
+def test_samples():
+    run_page("samples/README.md")
+
+
+def test_bracket():
+    run_page("samples/bracket/README.md")
+
+
+def test_docs():
+    pages = [page for page in sorted((SOURCE / "docs").glob("*.md")) if blocks(page)]
+    expect(pages, "no page of docs/ has a command that can be run")
+    furnish()
+    for page in pages:
+        write("page.sh", "set -eu -o pipefail\n" + "\n".join(blocks(page)))
+        result = shell("bash page.sh", timeout=100)
+        expect(result.code == 0, f"the commands of docs/{page.name} as they stand: {result}")
+
+
+if __name__ == "__main__":
+    main(globals())

@@ -1,0 +1,190 @@
+"""Where results go: pipes, full disks, terminals, folders that are not there, and what stays when a run is stopped."""
+
+import os
+import pty
+import signal
+import subprocess
+import time
+
+from harness import (BIN, SCENE, Skip, bracket, body, box, expect, expect_error, expect_ok, expect_only, main, run, scene, shell)
+
+# Big enough to overflow any pipe's buffer.
+FINE = ["--size", "0.4 mm"]
+
+
+def test_reader_that_closes_the_pipe():
+    box()
+    result = shell('flexel-voxelize --quiet box.stl --size 0.4mm | head -c 10 >/dev/null; echo "${PIPESTATUS[0]}"')
+    expect(result.out == b"141\n", f"exit code 141 wanted: {result.out} {result}")
+    expect(result.err == "", f"silence wanted: {result}")
+
+
+def test_full_disk_as_stdout():
+    box()
+    with open("/dev/full", "wb") as full:
+        expect_error(run("flexel-voxelize", "box.stl", *FINE, stdout=full), "flexel-voxelize", "no space")
+        body()
+        expect_error(run("flexel-map", "body.vtu", "--format", "stl", stdout=full), "flexel-map", "no space")
+
+
+def test_full_disk():
+    box()
+    os.mkdir("disk")
+    program = BIN / "flexel-voxelize"
+    result = run("unshare", "-m", "bash", "-c",
+                 f"mount -t tmpfs -o size=64k none disk || exit 99; {program} box.stl --size 0.4mm -o disk/out.vtu; "
+                 "code=$?; ls -A disk; exit $code")
+    if result.code in (1, 99) and "error: disk" not in result.err:
+        raise Skip("mounting is not permitted here")
+    expect_error(result, "flexel-voxelize", "disk/out.vtu", "no space")
+
+
+def test_terminal_as_stdout():
+    master, slave = pty.openpty()
+    try:
+        expect_error(run("flexel-voxelize", box(), stdout=slave), "flexel-voxelize", "terminal", "-o")
+        expect_error(run("flexel-map", body(), "--format", "stl", stdout=slave), "flexel-map", "terminal")
+        expect_ok(run("flexel-map", "body.vtu", "--format", "stl", "--ascii", "--quiet", stdout=slave))
+        expect(os.read(master, 5) == b"solid", "an ASCII STL may go to a terminal")
+    finally:
+        os.close(master)
+        os.close(slave)
+
+
+def test_missing_folder():
+    expect_error(run("flexel-voxelize", box(), "-o", "absent/out.vtu"), "flexel-voxelize", "absent/out.vtu", "no such file")
+
+
+def test_folder_as_output():
+    os.mkdir("out.vtu")
+    expect_error(run("flexel-voxelize", box(), "-o", "out.vtu"), "flexel-voxelize", "out.vtu", "folder")
+
+
+def test_folder_without_permission():
+    os.mkdir("locked")
+    os.chmod("locked", 0o555)
+    folder = "locked" if os.geteuid() != 0 else "/sys/kernel"  # root may write anywhere but there
+    result = run("flexel-voxelize", box(), "-o", f"{folder}/out.vtu")
+    expect_error(result, "flexel-voxelize", f"{folder}/out.vtu")
+    expect(not os.path.exists(f"{folder}/out.vtu"), "nothing should have been written")
+
+
+def test_failure_keeps_the_old_output():
+    box()
+    with open("out.vtu", "w", encoding="ascii") as file:
+        file.write("precious")
+    expect_error(run("flexel-voxelize", "absent.stl", "-o", "out.vtu"), "flexel-voxelize")
+    with open("out.vtu", encoding="ascii") as file:
+        expect(file.read() == "precious", "a failed run replaced the file")
+
+
+def stage_before(producer, consumer, program):
+    scene()
+    body()
+    before = os.listdir(".")
+    result = shell(f"{producer} | {consumer}")
+    expect_error(result, program, "program before")
+    expect_only(*before)
+
+
+def test_voxelize_after_a_program_that_failed():
+    stage_before("false", "flexel-voxelize --size 5mm -o out.vtu", "flexel-voxelize")
+
+
+def test_simulate_after_a_program_that_failed():
+    stage_before("false", "flexel-simulate scene.toml -o out.vtu", "flexel-simulate")
+
+
+def test_map_after_a_program_that_failed():
+    stage_before("false", "flexel-map -o out.stl", "flexel-map")
+
+
+def test_simulate_after_a_program_that_died():
+    stage_before("head -c 3000 body.vtu", "flexel-simulate scene.toml -o out.vtu", "flexel-simulate")
+
+
+def test_map_after_a_program_that_died():
+    stage_before("head -c 3000 body.vtu", "flexel-map -o out.stl", "flexel-map")
+
+
+def stop(command, seconds, stdin=subprocess.DEVNULL):
+    with subprocess.Popen([str(BIN / command[0]), *command[1:]], stdin=stdin, stdout=subprocess.DEVNULL,
+                          stderr=subprocess.PIPE) as process:
+        time.sleep(seconds)
+        if process.poll() is not None:
+            raise AssertionError(f"{command[0]} ended before it was stopped: {process.stderr.read().decode()}")
+        process.send_signal(signal.SIGINT)
+        began = time.monotonic()
+        process.wait(timeout=30)
+        expect(time.monotonic() - began < 10, "it took too long to stop")
+        return process.returncode
+
+
+def test_interrupt_while_waiting_for_input():
+    before = [scene()]
+    read, keep_open = os.pipe()
+    code = stop(["flexel-simulate", "scene.toml", "-o", "out.vtu"], 0.7, stdin=read)
+    os.close(keep_open)
+    expect(code == 130, f"exit code 130 wanted, not {code}")
+    expect_only(*before)
+
+
+def test_interrupt_while_simulating():
+    scene(text=SCENE + "[run]\nload_steps = 100\n")
+    box()
+    expect_ok(run("flexel-voxelize", "box.stl", *FINE, "-o", "body.vtu"))
+    before = os.listdir(".")
+    code = stop(["flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu"], 2.0)
+    expect(code == 130, f"exit code 130 wanted, not {code}")
+    expect_only(*before)
+
+
+PROGRAMS = ["flexel", "flexel-voxelize", "flexel-simulate", "flexel-map"]
+
+
+def test_version():
+    for program in PROGRAMS:
+        result = expect_ok(run(program, "--version"))
+        expect(b"0.1.0" in result.out and result.err == "", f"{program}: {result.out}")
+
+
+def test_help():
+    for program in PROGRAMS:
+        result = expect_ok(run(program, "--help"))
+        expect(b"--help" in result.out and b"--version" in result.out and result.err == "", f"{program}: {result.out}")
+
+
+def test_whole_chain_in_one_pipe():
+    bracket()
+    scene()
+    result = shell("set -o pipefail; flexel-voxelize bracket.step --size 3mm | "
+                   f"flexel-simulate {scene('bend.toml', SCENE.replace('40 mm', '80 mm').replace('5 mm', '3 mm'))} | "
+                   "flexel-map --format stl > bent.stl")
+    expect(result.code == 0, str(result))
+    expect(os.path.getsize("bent.stl") > 84, "the deformed bracket is empty")
+
+
+def test_flexel_runs_the_stages():
+    box()
+    scene()
+    expect_ok(run("flexel", "voxelize", "box.stl", "--size", "5mm", "-o", "one.vtu"))
+    expect_ok(run("flexel-voxelize", "box.stl", "--size", "5mm", "-o", "two.vtu"))
+    with open("one.vtu", "rb") as one, open("two.vtu", "rb") as two:
+        expect(one.read() == two.read(), "flexel voxelize and flexel-voxelize differ")
+
+
+def test_same_bits_for_any_thread_count():
+    box()
+    scene()
+    for threads in ("1", "2", "3"):
+        expect_ok(run("flexel-voxelize", "box.stl", "--size", "2 mm", "--threads", threads, "-o", f"body{threads}.vtu"))
+        expect_ok(run("flexel-simulate", "scene.toml", f"body{threads}.vtu", "--threads", threads, "-o", f"bent{threads}.vtu"))
+    with open("bent1.vtu", "rb") as first:
+        reference = first.read()
+    for threads in ("2", "3"):
+        with open(f"bent{threads}.vtu", "rb") as other:
+            expect(other.read() == reference, f"{threads} threads give other bits than one")
+
+
+if __name__ == "__main__":
+    main(globals())
