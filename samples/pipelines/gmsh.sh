@@ -10,7 +10,7 @@ gmsh "$here/plate.geo" -2 -format stl -bin -o "$out/plate.stl" -v 2
 flexel-voxelize "$out/plate.stl" --size 1mm |
   flexel-simulate "$here/press.toml" |
   flexel-map --format stl >"$out/bent.stl"
-gmsh "$out/bent.stl" -check -v 3 | tee "$out/gmsh.txt"
+gmsh "$out/bent.stl" -check -v 4 | tee "$out/gmsh.txt"
 cat >"$out/fill.geo" <<GEO
 Merge "bent.stl";
 Surface Loop(1) = Surface{:};

@@ -48,7 +48,7 @@ def test_admesh_reads_ascii():
 
 
 def gmsh(*arguments):
-    result = expect_ok(run("gmsh", *arguments, "-v", "3", timeout=100))
+    result = expect_ok(run("gmsh", *arguments, "-v", "4", timeout=100))
     text = result.out.decode() + result.err
     expect("Error" not in text, text)
     return text

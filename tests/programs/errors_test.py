@@ -36,7 +36,7 @@ def test_unknown_format():
 
 
 def test_truncated_binary_stl():
-    voxelize_refuses(write("part.stl", binary_stl(box_triangles())[:-70]), "part.stl", "truncated")
+    voxelize_refuses(write("part.stl", binary_stl(box_triangles())[:-70]), "part.stl", "cut off")
 
 
 def test_truncated_ascii_stl():
