@@ -11,13 +11,17 @@ TYPES = {"Float64": "<f8", "Float32": "<f4", "Int32": "<i4", "UInt32": "<u4", "I
 
 
 def vtu_arrays(path):
-    """Every DataArray of an appended raw .vtu (header_type UInt64), by name: a plain reading of VTK's file format."""
+    """Every DataArray of an appended raw .vtu (header_type UInt64), by section and name ("point/rest", "cell/fill", "field/...",
+    "points/...", "cells/..."): a plain reading of VTK's file format."""
     data = open(path, "rb").read()
     start = data.index(b"_", data.index(b"<AppendedData")) + 1
     head = data[:start].decode("latin-1")
     compressed = "vtkZLibDataCompressor" in head
-    arrays = {}
-    for tag in re.findall(r"<DataArray\s([^>]*)>", head):
+    arrays, section = {}, ""
+    for element, tag in re.findall(r"<(PointData|CellData|FieldData|Points|Cells|DataArray)\b([^>]*)>", head):
+        if element != "DataArray":
+            section = element.replace("Data", "").lower()
+            continue
         attributes = dict(re.findall(r'(\w+)="([^"]*)"', tag))
         at = start + int(attributes["offset"])
         if compressed:
@@ -33,7 +37,7 @@ def vtu_arrays(path):
             raw = data[at + 8:at + 8 + size]
         array = np.frombuffer(raw, TYPES[attributes["type"]])
         components = int(attributes.get("NumberOfComponents", 1))
-        arrays[attributes["Name"]] = array.reshape(-1, components) if components > 1 else array
+        arrays[f"{section}/{attributes['Name']}"] = array.reshape(-1, components) if components > 1 else array
     return arrays
 
 

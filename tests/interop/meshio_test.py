@@ -23,10 +23,10 @@ def same_as_ours(path):
     for kind, data in (("point", mesh.point_data), ("cell", mesh.cell_data), ("field", mesh.field_data)):
         for name, value in data.items():
             value = value[0] if kind == "cell" else value
-            expect(np.array_equal(np.ravel(value), np.ravel(ours[name])), f"{kind} data \"{name}\" differs")
+            expect(np.array_equal(np.ravel(value), np.ravel(ours[f"{kind}/{name}"])), f"{kind} data \"{name}\" differs")
             compared += 1
     expect(compared >= 6, f"only {compared} arrays were there to compare: {mesh}")
-    expect(np.array_equal(mesh.points, ours["position"]), "points differ")
+    expect(np.array_equal(mesh.points, ours["points/position"]), "points differ")
     return mesh
 
 

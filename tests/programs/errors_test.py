@@ -121,7 +121,7 @@ def test_scene_with_an_unknown_face():
 
 def test_scene_that_selects_nothing():
     simulate_refuses(SCENE.replace('"xmax"', '{ sphere = { centre = ["9 m", "0 m", "0 m"], radius = "1 mm" } }'), "bend.toml:5",
-                     "nothing")
+                     "holds no element")
 
 
 def test_scene_that_holds_nothing():
@@ -158,12 +158,12 @@ def both_refuse_body(*fragments):
 
 def test_body_with_a_wrong_number_of_points():
     changed_body(b'NumberOfPoints="81"', b'NumberOfPoints="82"')
-    both_refuse_body("points")
+    both_refuse_body("damaged", '"rest"')
 
 
 def test_body_with_a_wrong_number_of_cells():
     changed_body(b'NumberOfCells="32"', b'NumberOfCells="31"')
-    both_refuse_body("cells")
+    both_refuse_body("damaged", '"fill"')
 
 
 def test_body_with_a_wrong_array_size():
@@ -174,7 +174,7 @@ def test_body_with_a_wrong_array_size():
     size = struct.unpack_from("<Q", data, start)[0]
     struct.pack_into("<Q", data, start, size + 8)
     write("body.vtu", bytes(data))
-    both_refuse_body()
+    both_refuse_body("damaged")
 
 
 def test_body_that_is_truncated():
@@ -182,7 +182,7 @@ def test_body_that_is_truncated():
     with open("body.vtu", "rb") as file:
         data = file.read()
     write("body.vtu", data[: len(data) * 2 // 3])
-    both_refuse_body()
+    both_refuse_body("truncated")
 
 
 def test_body_that_is_an_stl():
