@@ -37,9 +37,9 @@ def vector(values, unit=""):
 
 
 def hold_and_draw(low, high, parts):
-    """A scene for the part between `low` and `high`; where it has several solids, one for each by its sides."""
+    """A scene for the part between `low` and `high`; where it has several solids, one for each by its first two faces."""
     if parts:
-        sides = "[[fix]]\nwhere = \"{0}/xmin\"\n[[load]]\nwhere = \"{0}/xmax\"\nforce = [\"0 N\", \"0 N\", \"-1 N\"]\n"
+        sides = "[[fix]]\nwhere = \"{0}/1\"\n[[load]]\nwhere = \"{0}/2\"\nforce = [\"0 N\", \"0 N\", \"-1 N\"]\n"
         return scene("draw.toml", 'material = "PLA"\n' + "".join(sides.format(part) for part in parts))
     along = int(np.argmax(high - low))
     axis = np.eye(3)[along]
