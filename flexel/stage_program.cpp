@@ -1,3 +1,4 @@
+// Replaces this process by the stage program that lies beside it.
 #include <unistd.h>
 
 #include <cerrno>

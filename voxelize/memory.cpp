@@ -1,3 +1,4 @@
+// Estimates by volume and area alone: what is inside, and what a surface cuts (memory.h gives the formula).
 #include "voxelize/memory.h"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// Walls along straight lines through the part: from where a line enters to where it leaves again.
 #include "voxelize/walls.h"
 
 #include <Eigen/Geometry>

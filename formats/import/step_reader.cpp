@@ -41,15 +41,14 @@
 #include <XSControl_WorkSession.hxx>
 #include <algorithm>
 #include <array>
-#include <istream>
 #include <map>
-#include <streambuf>
 #include <utility>
 
 #include "formats/disjoint_sets.h"
 #include "formats/error.h"
 #include "formats/import/crash_guard.h"
 #include "formats/import/readers.h"
+#include "formats/import/step_help.h"
 #include "formats/topology.h"
 
 namespace flexel {
@@ -60,25 +59,8 @@ constexpr std::uint32_t kNone = 0xffffffffu;
 
 // --- reading
 
-// A stream over bytes in memory.
-class MemoryStream : private std::streambuf, public std::istream {
- public:
-  explicit MemoryStream(Bytes& bytes) : std::istream(static_cast<std::streambuf*>(this)) {
-    char* begin = reinterpret_cast<char*>(bytes.data());
-    setg(begin, begin, begin + bytes.size());
-  }
-};
-
 std::string damage(const std::string& what) {
   return fmt::format("is damaged: OpenCASCADE says \"{}\"", clean_name(what));
-}
-
-void check_complete(const ImportInput& input) {
-  const std::string_view text(reinterpret_cast<const char*>(input.bytes.data()), input.bytes.size());
-  if (text.rfind("END-ISO-10303-21") == std::string_view::npos)
-    throw InputError(input.where, text.find("ISO-10303-21") == std::string_view::npos
-                                      ? "is no STEP file: it does not begin with ISO-10303-21"
-                                      : "is cut off: a STEP file ends with END-ISO-10303-21");
 }
 
 bool is_geometry(const Handle(Standard_Transient) & entity) {
@@ -352,18 +334,6 @@ void add_face(Surface& surface, const SolidMesh& mesh, std::size_t f, NodeMerger
   }
 }
 
-// A solid that is inside out is turned round.
-void orient_outward(Surface& surface, std::size_t first_polygon) {
-  std::vector<std::array<std::uint32_t, 3>> corners;
-  for (std::size_t p = first_polygon; p < surface.polygon_count(); ++p) {
-    const auto polygon = surface.polygon(p);
-    corners.push_back({polygon[0], polygon[1], polygon[2]});
-  }
-  if (signed_volume(surface.vertices, corners) >= 0) return;
-  for (std::size_t p = first_polygon; p < surface.polygon_count(); ++p)
-    std::swap(surface.polygon_vertices[3 * p + 1], surface.polygon_vertices[3 * p + 2]);
-}
-
 void add_solid(Surface& surface, const TopoDS_Shape& solid, const Names& names) {
   const SolidMesh mesh = collect(solid);
   const std::size_t faces = mesh.triangulations.size(), first_polygon = surface.polygon_count();
@@ -396,7 +366,7 @@ Surface read_solids(ImportInput& input, const ImportOptions& options) {
 
 Surface read_step(ImportInput& input, const ImportOptions& options) {
   if (options.unit) throw InputError(input.where, "a STEP file carries its own unit: leave out --unit");
-  check_complete(input);
+  check_step_complete(input);
   try {
     Surface surface;
     guarded([&] { surface = read_solids(input, options); });

@@ -203,7 +203,7 @@ def test_info_of_a_missing_file():
 
 
 def test_deform_with_an_unknown_face():
-    expect_error(run("flexel", "deform", box(), "--fix", "box/77", "--push", "xmax:100 N", "-o", "out.stl"), "flexel", "box/77")
+    expect_error(run("flexel", "deform", box(), "--fix", "box/77", "--push", "xmax:100 N", "--material", "steel", "-o", "out.stl"), "flexel", "box/77")
     expect_only("box.stl")
 
 
