@@ -9,15 +9,15 @@ namespace flexel {
 constexpr int kBodyFileVersion = 1;
 
 struct BodyFileOptions {
-  bool compress = false;       // zlib-compressed arrays (VTK's vtkZLibDataCompressor blocks)
-  bool embed_surface = true;   // false for frames of a series after the first
+  bool compress = false;      // zlib-compressed arrays (VTK's vtkZLibDataCompressor blocks)
+  bool embed_surface = true;  // false for frames of a series after the first
 };
 
 // Writes `body` ("-": stdout). The round trip is bit-exact.
 void write_body(const Body& body, const std::string& path, const BodyFileOptions& options = {});
 
-// Reads a body ("-": stdin). Throws InputError: not a body file, empty or truncated (for stdin: the program before it failed), an
-// unknown version, a size that does not agree (naming the field).
+// Reads a body ("-": stdin). Throws InputError: not a body file, empty or truncated (for stdin: the program
+// before it failed), an unknown version, a size that does not agree (naming the field).
 [[nodiscard]] Body read_body(const std::string& path);
 
 // True when the bytes begin like a body file.

@@ -1,4 +1,5 @@
-// Union-find whose root is always the lowest member, so that numbering sets in order of first member is one sweep.
+// Union-find whose root is always the lowest member, so that numbering sets in order of first member is one
+// sweep.
 #pragma once
 #include <cstdint>
 #include <numeric>

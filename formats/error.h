@@ -1,5 +1,5 @@
-// The exceptions that cross a stage. Each is caught once, at the edge of the program (formats/program.h), and becomes one line
-// on stderr and an exit code.
+// The exceptions that cross a stage. Each is caught once, at the edge of the program (formats/program.h), and
+// becomes one line on stderr and an exit code.
 #pragma once
 #include <stdexcept>
 #include <string>
@@ -18,20 +18,21 @@ enum ExitCode : int {
   kExitReaderClosedPipe = 141,
 };
 
-// Something that the user can put right: the input, the arguments or the environment (exit 2). `what()` says what is wrong
-// and what to do, on one line; `where` is "file:line", "file" or empty.
+// Something that the user can put right: the input, the arguments or the environment (exit 2). `what()` says
+// what is wrong and what to do, on one line; `where` is "file:line", "file" or empty.
 class InputError : public std::runtime_error {
  public:
   explicit InputError(const std::string& what) : std::runtime_error(what) {}
-  InputError(std::string where, const std::string& what) : std::runtime_error(what), where_(std::move(where)) {}
+  InputError(std::string where, const std::string& what)
+      : std::runtime_error(what), where_(std::move(where)) {}
   [[nodiscard]] const std::string& where() const { return where_; }
 
  private:
   std::string where_;
 };
 
-// The simulation diverged (exit 3). `what()` names the step, the element and a suggestion. The caller that knows the output's
-// name saves the last good state under <out>.failed.vtu first.
+// The simulation diverged (exit 3). `what()` names the step, the element and a suggestion. The caller that
+// knows the output's name saves the last good state under <out>.failed.vtu first.
 class DivergedError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

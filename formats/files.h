@@ -1,5 +1,5 @@
-// Bytes in and out. Outputs are written beside their target and renamed, so that nothing half-written is ever left under the
-// output's name.
+// Bytes in and out. Outputs are written beside their target and renamed, so that nothing half-written is ever
+// left under the output's name.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -12,14 +12,14 @@ namespace flexel {
 
 using Bytes = std::vector<std::byte>;
 
-// The whole of a file, or of stdin for "-". Throws InputError: missing, a directory, unreadable, empty (for stdin: "the program
-// before it in the pipe failed or wrote nothing").
+// The whole of a file, or of stdin for "-". Throws InputError: missing, a directory, unreadable, empty (for
+// stdin: "the program before it in the pipe failed or wrote nothing").
 [[nodiscard]] Bytes read_all(const std::string& path);
 
 // Where a result goes. Data is appended in pieces; nothing appears under the target's name until commit().
-// "-" writes to stdout: refused (InputError) when stdout is a terminal and `binary`. All errors of the disk (full, read-only, no
-// such folder) are InputError naming the path and the reason; a closed pipe is ReaderClosedPipe. A writer destroyed without
-// commit() removes its temporary file.
+// "-" writes to stdout: refused (InputError) when stdout is a terminal and `binary`. All errors of the disk
+// (full, read-only, no such folder) are InputError naming the path and the reason; a closed pipe is
+// ReaderClosedPipe. A writer destroyed without commit() removes its temporary file.
 class OutputFile {
  public:
   explicit OutputFile(const std::string& path, bool binary = true);
@@ -42,7 +42,8 @@ class OutputFile {
   std::vector<char> buffer_;
 };
 
-// Removes the temporary files of all writers. Only for a signal handler that ends the process: safe there, and nowhere needed else.
+// Removes the temporary files of all writers. Only for a signal handler that ends the process: safe there,
+// and nowhere needed else.
 void remove_temporary_outputs();
 
 // Lower-case extension without the dot ("stl"), "" where there is none.

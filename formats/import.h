@@ -1,5 +1,5 @@
-// Reads CAD and mesh files into a Surface. Implemented by flexel_import (OpenCASCADE), declared here so that no program
-// sees that library.
+// Reads CAD and mesh files into a Surface. Implemented by flexel_import (OpenCASCADE), declared here so that
+// no program sees that library.
 #pragma once
 #include <optional>
 #include <string>
@@ -9,17 +9,18 @@
 namespace flexel {
 
 struct ImportOptions {
-  std::optional<double> unit;          // metres per file unit, for formats that carry none (STL, OBJ); default mm
-  std::optional<std::string> format;   // "step", "stl", "obj": overrides sniffing
-  // STEP tessellation: largest distance [m] of the triangles from the CAD surface, and largest angle [rad] between neighbouring
-  // normals. No deflection given: a thousandth of the part's diagonal.
+  std::optional<double> unit;  // metres per file unit, for formats that carry none (STL, OBJ); default mm
+  std::optional<std::string> format;  // "step", "stl", "obj": overrides sniffing
+  // STEP tessellation: largest distance [m] of the triangles from the CAD surface, and largest angle [rad]
+  // between neighbouring normals. No deflection given: a thousandth of the part's diagonal.
   std::optional<double> deflection;
   double angular_deflection = 0.35;
 };
 
-// Reads one file ("-": stdin). The format is told by its bytes, then by its extension. Solids become parts; CAD faces, groups or
-// dihedral regions become faces; the result has passed check(). Throws InputError: unreadable, empty, truncated, unknown format,
-// not finite, STEP without OpenCASCADE (the message says how to get it), a `unit` given for a file that carries another.
+// Reads one file ("-": stdin). The format is told by its bytes, then by its extension. Solids become parts;
+// CAD faces, groups or dihedral regions become faces; the result has passed check(). Throws InputError:
+// unreadable, empty, truncated, unknown format, not finite, STEP without OpenCASCADE (the message says how to
+// get it), a `unit` given for a file that carries another.
 [[nodiscard]] Surface import_surface(const std::string& path, const ImportOptions& options = {});
 
 }  // namespace flexel

@@ -8,21 +8,25 @@
 
 namespace flexel {
 
-// A material point, carried by the eight elements of a cell with trilinear weights. The weights sum to 1; they reach slightly
-// outside [0, 1] where the point lies in a neighbouring voxel that has no cell of its own.
+// A material point, carried by the eight elements of a cell with trilinear weights. The weights sum to 1;
+// they reach slightly outside [0, 1] where the point lies in a neighbouring voxel that has no cell of its
+// own.
 struct CellPoint {
   std::uint32_t cell = 0;
-  std::array<double, 8> weights{};   // by corner a = i + 2 j + 4 k
+  std::array<double, 8> weights{};  // by corner a = i + 2 j + 4 k
 };
 
 // Trilinear weights of the rest point `point` (m, world frame) in `cell`.
 [[nodiscard]] CellPoint cell_point(const Body& body, std::uint32_t cell, const Vec3& point);
 
-// The cell under `point` on polygon `polygon` of the surface at rest: among the cells that the polygon bounds, the one whose
-// voxel is nearest. Nothing when the polygon bounds no cell (centre placement, or all its matter was dropped).
-[[nodiscard]] std::optional<CellPoint> locate_on_surface(const Body& body, std::size_t polygon, const Vec3& point);
+// The cell under `point` on polygon `polygon` of the surface at rest: among the cells that the polygon
+// bounds, the one whose voxel is nearest. Nothing when the polygon bounds no cell (centre placement, or all
+// its matter was dropped).
+[[nodiscard]] std::optional<CellPoint> locate_on_surface(const Body& body, std::size_t polygon,
+                                                         const Vec3& point);
 
 // Where the material point is now / was at rest.
-[[nodiscard]] Vec3 interpolate(const CellPoint& at, const Body& body, const std::vector<Vec3>& element_values);
+[[nodiscard]] Vec3 interpolate(const CellPoint& at, const Body& body,
+                               const std::vector<Vec3>& element_values);
 
 }  // namespace flexel

@@ -1,11 +1,11 @@
-// All use of oneTBB is here. Every function gives the same bits for any number of threads: work is cut into chunks whose size
-// depends on n only, and reductions add the chunks' sums in order.
+// All use of oneTBB is here. Every function gives the same bits for any number of threads: work is cut into
+// chunks whose size depends on n only, and reductions add the chunks' sums in order.
 #pragma once
 #include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/info.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/parallel_sort.h>
-#include <oneapi/tbb/info.h>
 
 #include <algorithm>
 #include <cstddef>
@@ -26,7 +26,9 @@ class ThreadLimit {
   tbb::global_control control_;
 };
 
-[[nodiscard]] inline int default_thread_count() { return tbb::info::default_concurrency(); }
+[[nodiscard]] inline int default_thread_count() {
+  return tbb::info::default_concurrency();
+}
 
 // body(begin, end) over [0, n) in chunks of `grain`.
 template <class Body>

@@ -6,8 +6,8 @@
 
 namespace flexel {
 
-// One display for a whole run, whichever stages run in it: a bar on a terminal, a line per finished stage in a log, nothing when
-// quiet. Not thread-safe: call from the thread that owns the run.
+// One display for a whole run, whichever stages run in it: a bar on a terminal, a line per finished stage in
+// a log, nothing when quiet. Not thread-safe: call from the thread that owns the run.
 class Progress {
  public:
   enum class Mode { automatic, bar, lines, quiet };
@@ -18,9 +18,11 @@ class Progress {
 
   // A stage begins ("voxelize"); the one before it ends.
   void stage(const std::string& name);
-  // Share of the stage that is done, in [0, 1], and a short note ("newton 3, residual 1e-4"). Drawn at most 10 times a second.
+  // Share of the stage that is done, in [0, 1], and a short note ("newton 3, residual 1e-4"). Drawn at most
+  // 10 times a second.
   void update(double share, const std::string& note = "");
-  // A line for the user, above the bar: "flexel-voxelize: 51,234 elements ...". Printed in every mode but quiet.
+  // A line for the user, above the bar: "flexel-voxelize: 51,234 elements ...". Printed in every mode but
+  // quiet.
   void say(const std::string& line);
   // The same, as "flexel-voxelize: warning: ...". Printed in every mode.
   void warn(const std::string& line);

@@ -3,8 +3,8 @@
 // p, ...), so all are cut in parallel.
 #include "formats/surface.h"
 
-#include <Eigen/Geometry>
 #include <fmt/format.h>
+#include <Eigen/Geometry>
 
 #include <cmath>
 #include <set>

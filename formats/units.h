@@ -6,21 +6,39 @@
 
 namespace flexel {
 
-enum class Dimension { length, area, volume, mass, time, angle, force, torque, pressure, density, velocity, acceleration, energy, share };
+enum class Dimension {
+  length,
+  area,
+  volume,
+  mass,
+  time,
+  angle,
+  force,
+  torque,
+  pressure,
+  density,
+  velocity,
+  acceleration,
+  energy,
+  share
+};
 
-// The value of `text` in the SI unit of `dimension` (radians for angles; "30 %" is 0.3 for shares). A number is required before
-// a unit. Throws InputError: not a number, no unit where one is needed (a share needs none), an unknown unit (with the nearest),
-// a unit of another dimension, not finite. `0` alone is accepted for every dimension.
+// The value of `text` in the SI unit of `dimension` (radians for angles; "30 %" is 0.3 for shares). A number
+// is required before a unit. Throws InputError: not a number, no unit where one is needed (a share needs
+// none), an unknown unit (with the nearest), a unit of another dimension, not finite. `0` alone is accepted
+// for every dimension.
 [[nodiscard]] double parse_quantity(std::string_view text, Dimension dimension);
 
-// Metres per unit of a length unit's name: "mm", "cm", "m", "in", "inch", "ft", "um", "millimetre" ... Throws InputError.
+// Metres per unit of a length unit's name: "mm", "cm", "m", "in", "inch", "ft", "um", "millimetre" ... Throws
+// InputError.
 [[nodiscard]] double length_unit(std::string_view name);
 
 // The units a dimension accepts, for messages and documentation.
 [[nodiscard]] std::vector<std::string> unit_names(Dimension dimension);
 [[nodiscard]] const char* dimension_name(Dimension dimension);
 
-// A quantity for people: 3 to 4 significant digits and a fitting SI prefix ("1.84 mm", "210 GPa", "34.2 MB" for bytes).
+// A quantity for people: 3 to 4 significant digits and a fitting SI prefix ("1.84 mm", "210 GPa", "34.2 MB"
+// for bytes).
 [[nodiscard]] std::string human_length(double metres);
 [[nodiscard]] std::string human_volume(double cubic_metres);
 [[nodiscard]] std::string human_bytes(double bytes);

@@ -1,4 +1,5 @@
-// The small fixed-size types that every stage uses, all double precision, all SI (metres) unless a name says otherwise.
+// The small fixed-size types that every stage uses, all double precision, all SI (metres) unless a name says
+// otherwise.
 #pragma once
 #include <Eigen/Core>
 #include <array>
