@@ -142,25 +142,16 @@ Adjacency with_bit_connections(const Body& body, const Adjacency& cells) {
   return result;
 }
 
-// The 28 pairs of a cell's corners: which corner has the bit, and which bit.
-struct CornerPair {
-  std::uint8_t owner, other;
-  std::uint32_t bit;
-};
-
-std::array<CornerPair, 28> corner_pairs() {
-  std::array<CornerPair, 28> pairs{};
-  std::size_t count = 0;
-  for (int a = 0; a < 8; ++a) {
+// A whole cell connects each of its corners with all others: the bits that each corner then has.
+std::array<std::uint32_t, 8> corner_bits() {
+  std::array<std::uint32_t, 8> bits{};
+  for (int a = 0; a < 8; ++a)
     for (int b = 0; b < 8; ++b) {
       const Index3 offset = {(b & 1) - (a & 1), (b >> 1 & 1) - (a >> 1 & 1), (b >> 2) - (a >> 2)};
       const auto found = std::find(half_neighbourhood.begin(), half_neighbourhood.end(), offset);
-      if (found == half_neighbourhood.end()) continue;
-      pairs[count++] = {static_cast<std::uint8_t>(a), static_cast<std::uint8_t>(b),
-                        1u << (found - half_neighbourhood.begin())};
+      if (found != half_neighbourhood.end()) bits[a] |= 1u << (found - half_neighbourhood.begin());
     }
-  }
-  return pairs;
+  return bits;
 }
 
 }  // namespace
@@ -181,7 +172,7 @@ Adjacency element_adjacency(const Body& body) {
 }
 
 void derive_connections(Body& body) {
-  static const std::array<CornerPair, 28> pairs = corner_pairs();
+  static const std::array<std::uint32_t, 8> bits = corner_bits();
   body.connections.resize(body.element_count(), 0);
   for (const Part& part : body.parts)
     if (part.placement == Placement::corner)
@@ -190,7 +181,7 @@ void derive_connections(Body& body) {
   for (std::size_t c = 0; c < body.cell_count(); ++c) {
     if (body.broken[c] != 0) continue;
     const std::array<std::uint32_t, 8>& cell = body.cell_elements[c];
-    for (const CornerPair& pair : pairs) body.connections[cell[pair.owner]] |= pair.bit;
+    for (std::size_t a = 0; a < 8; ++a) body.connections[cell[a]] |= bits[a];
   }
 }
 

@@ -7,9 +7,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "formats/parallel.h"
 #include "voxelize/elements.h"
+#include "voxelize/reserve.h"
 
 namespace flexel {
 namespace {
@@ -20,7 +22,8 @@ constexpr double kNothing = 1e-9;  // fill: the rim of a face that lies on a lat
 // Pieces that become something: (pieces) their number, or kNoCell.
 std::vector<std::uint32_t> number_kept(const Voxels& voxels, bool (*keep)(const Piece&),
                                        std::uint32_t first) {
-  std::vector<std::uint32_t> number(voxels.piece_count(), kNoCell);
+  std::vector<std::uint32_t> number;
+  resize_large(number, voxels.piece_count());
   std::size_t p = 0;
   for (const Slab& slab : voxels.slabs)
     for (const Piece& piece : slab.pieces) number[p++] = keep(piece) ? first++ : kNoCell;
@@ -47,16 +50,29 @@ AssembledPart count_volumes(const Voxels& voxels, bool (*keep)(const Piece&)) {
   return result;
 }
 
-void append_elements(const std::vector<Index3>& index, const std::vector<std::uint16_t>& number,
-                     const Part& part, Body& body) {
+// Moved where `to` has nothing yet, as it is for the first part.
+template <class Value>
+void append(std::vector<Value>&& from, std::vector<Value>& to) {
+  if (to.empty()) {
+    to = std::move(from);
+    return;
+  }
+  reserve_large(to, to.size() + from.size());
+  to.insert(to.end(), from.begin(), from.end());
+}
+
+void append_elements(std::vector<Index3>&& index, std::vector<std::uint16_t>&& number, const Part& part,
+                     Body& body) {
   const std::size_t first = body.rest.size(), n = index.size();
   const Vec3 shift = Vec3::Constant(part.placement == Placement::centre ? .5 : 0);
-  body.lattice_index.insert(body.lattice_index.end(), index.begin(), index.end());
-  body.piece.insert(body.piece.end(), number.begin(), number.end());
-  body.rest.resize(first + n);
+  append(std::move(index), body.lattice_index);
+  append(std::move(number), body.piece);
+  resize_large(body.rest, first + n);
   parallel_for_each(n, [&](std::size_t e) {
-    body.rest[first + e] = part.lattice.to_world(Vec3(index[e][0], index[e][1], index[e][2]) + shift);
+    const Index3& at = body.lattice_index[first + e];
+    body.rest[first + e] = part.lattice.to_world(Vec3(at[0], at[1], at[2]) + shift);
   });
+  reserve_large(body.position, first + n);
   body.position.insert(body.position.end(), body.rest.begin() + static_cast<std::ptrdiff_t>(first),
                        body.rest.end());
 }
@@ -151,8 +167,8 @@ void trace_slab(const Voxels& voxels, std::size_t s, const std::vector<std::uint
 
 void append_cells(const Voxels& voxels, const LatticeElements& elements, std::uint32_t first_element,
                   const std::vector<std::uint32_t>& cell, std::size_t cells, Body& body) {
-  body.cell_elements.resize(body.cell_elements.size() + cells);
-  body.fill.resize(body.fill.size() + cells);
+  resize_large(body.cell_elements, body.cell_elements.size() + cells);
+  resize_large(body.fill, body.fill.size() + cells);
   body.broken.resize(body.broken.size() + cells, 0);
   parallel_for_each(
       voxels.slabs.size(),
@@ -170,7 +186,7 @@ void append_cells(const Voxels& voxels, const LatticeElements& elements, std::ui
 
 AssembledPart assemble_corners(const Voxels& voxels, const Part& part, Body& body,
                                std::vector<PolygonCell>& polygon_cells) {
-  const LatticeElements elements = make_elements(voxels);
+  LatticeElements elements = make_elements(voxels);
   const auto first_element = static_cast<std::uint32_t>(body.element_count());
   const auto first_cell = static_cast<std::uint32_t>(body.cell_count());
   AssembledPart result = count_volumes(voxels, has_cell);
@@ -178,7 +194,7 @@ AssembledPart assemble_corners(const Voxels& voxels, const Part& part, Body& bod
   const std::vector<std::uint32_t> cell = number_kept(voxels, has_cell, first_cell);
   result.cells = static_cast<std::size_t>(
       std::count_if(cell.begin(), cell.end(), [](std::uint32_t c) { return c != kNoCell; }));
-  append_elements(elements.index, elements.number, part, body);
+  append_elements(std::move(elements.index), std::move(elements.number), part, body);
   append_cells(voxels, elements, first_element, cell, result.cells, body);
   std::vector<std::vector<PolygonCell>> pairs(voxels.slabs.size());
   parallel_for_each(
@@ -227,7 +243,8 @@ AssembledPart assemble_centres(const Voxels& voxels, const Part& part, Body& bod
   result.dropped_cells = 0;  // what lies off the centres is no sliver: centre placement counts voxels
   result.volume = static_cast<double>(index.size());
   result.dropped_volume = 0;
-  append_elements(index, std::vector<std::uint16_t>(index.size(), 0), part, body);
+  std::vector<std::uint16_t> pieces(index.size(), 0);
+  append_elements(std::move(index), std::move(pieces), part, body);
   body.connections.resize(first, 0);
   body.connections.insert(body.connections.end(), connections.begin(), connections.end());
   return result;

@@ -8,6 +8,7 @@
 #include <algorithm>
 
 #include "formats/parallel.h"
+#include "voxelize/reserve.h"
 #include "voxelize/union_find.h"
 
 namespace flexel {
@@ -176,8 +177,8 @@ class PlaneSweep {
 
 void concatenate(const std::vector<PlaneElements>& planes, const std::vector<std::uint32_t>& begin,
                  LatticeElements& elements) {
-  elements.index.resize(begin.back());
-  elements.number.resize(begin.back());
+  resize_large(elements.index, begin.back());
+  resize_large(elements.number, begin.back());
   parallel_for_each(
       planes.size(),
       [&](std::size_t p) {
@@ -191,7 +192,7 @@ void concatenate(const std::vector<PlaneElements>& planes, const std::vector<std
 
 LatticeElements make_elements(const Voxels& voxels) {
   LatticeElements elements;
-  elements.of_piece.resize(voxels.piece_count());
+  resize_large(elements.of_piece, voxels.piece_count());
   std::vector<PlaneElements> planes(voxels.slabs.size() + 1);
   parallel_for_each(
       planes.size(),
