@@ -21,7 +21,7 @@ namespace {
 
 struct Arguments {
   std::vector<std::string> parts, fixes, pushes, moves, outputs;
-  std::string scene, material, size, unit, method = "affine", report, summary, body, format;
+  std::string scene, material, size, unit, edge, method = "affine", report, summary, body, format;
   std::optional<std::size_t> count;
   int threads = 0;
   bool ascii = false, strict = false, quiet = false;
@@ -47,6 +47,9 @@ void declare_input(CLI::App& app, Arguments& arguments) {
   app.add_option("--size", arguments.size, "Spacing of the lattice (\"2 mm\")")->type_name("LENGTH");
   app.add_option("--count", arguments.count, "Or: about this many cells (default 20000)")->type_name("N");
   app.add_option("--unit", arguments.unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
+  app.add_option("--edge", arguments.edge,
+                 "STEP: longest edge of the mesh (default a 64th of the solid's diagonal)")
+      ->type_name("LENGTH");
 }
 
 void declare_output(CLI::App& app, Arguments& arguments) {
@@ -140,6 +143,10 @@ Plan make_plan(const Arguments& arguments) {
   if (std::count(arguments.parts.begin(), arguments.parts.end(), "-") + (arguments.scene == "-") > 1)
     throw InputError("only one input can come from stdin");
   if (!arguments.unit.empty()) plan.import.unit = length_unit(arguments.unit);
+  if (!arguments.edge.empty()) {
+    plan.import.largest_edge = parse_quantity(arguments.edge, Dimension::length);
+    if (!(*plan.import.largest_edge > 0)) throw InputError("--edge: must be above zero");
+  }
   if (!arguments.size.empty() && arguments.count) throw InputError("give --size or --count, not both");
   if (!arguments.size.empty()) {
     plan.voxelize.size = parse_quantity(arguments.size, Dimension::length);

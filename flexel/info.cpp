@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "flexel/commands.h"
@@ -218,15 +219,23 @@ std::string info_json(const Surface& surface) {
 
 int info_command(int argc, char** argv) {
   std::vector<std::string> files;
-  std::string unit;
+  std::string unit, edge;
   bool json = false;
   CLI::App app{"What a part is, and what a scene can name in it.", "flexel info"};
   app.add_option("part", files, "STEP, STL or OBJ files; -: stdin")->required()->type_name("PART");
   app.add_flag("--json", json, "As JSON, in SI units (docs/info.md)");
   app.add_option("--unit", unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
+  app.add_option("--edge", edge, "STEP: split the mesh to this longest edge (default: not split)")
+      ->type_name("LENGTH");
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   ImportOptions options;
+  // Corners on chords would make the circles that are fitted to round faces too small.
+  options.largest_edge = std::numeric_limits<double>::infinity();
   if (!unit.empty()) options.unit = length_unit(unit);
+  if (!edge.empty()) {
+    options.largest_edge = parse_quantity(edge, Dimension::length);
+    if (!(*options.largest_edge > 0)) throw InputError("--edge: must be above zero");
+  }
   Surface surface = import_surface(files.front(), options);
   for (std::size_t f = 1; f < files.size(); ++f) append(surface, import_surface(files[f], options));
   OutputFile out("-", false);

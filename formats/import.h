@@ -15,6 +15,10 @@ struct ImportOptions {
   // between neighbouring normals. No deflection given: a thousandth of the part's diagonal.
   std::optional<double> deflection;
   double angular_deflection = 0.35;
+  // STEP: the tessellation is then split until no edge is longer than this [m], so that flat faces can bend
+  // too. Not given: a 64th of each solid's diagonal, or what 2 million triangles for the file allow; given,
+  // more triangles than that are an error. Meshes (STL, OBJ) are the user's and are never split.
+  std::optional<double> largest_edge;
 };
 
 // Reads one file ("-": stdin). The format is told by its bytes, then by its extension. Solids become parts;

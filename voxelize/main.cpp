@@ -18,8 +18,8 @@ constexpr const char* kName = "flexel-voxelize";
 
 struct Arguments {
   std::vector<std::string> parts;
-  std::string size, placement = "corner", unit, align = "snap", material, max_memory, deflection, format,
-                    output = "-";
+  std::string size, placement = "corner", unit, align = "snap", material, max_memory, deflection, edge,
+                    format, output = "-";
   std::optional<long long> count;
   int threads = 0;
   bool compress = false, quiet = false;
@@ -38,6 +38,8 @@ void declare(CLI::App& app, Arguments& arguments) {
                  "refuse what needs more to simulate, for example 4GB (default 80 % of what is free)");
   app.add_option("--deflection", arguments.deflection,
                  "STEP: largest distance of the triangles from the CAD surface");
+  app.add_option("--edge", arguments.edge,
+                 "STEP: longest edge of the triangles (default a 64th of the solid's diagonal)");
   app.add_option("--input-format,--format", arguments.format,
                  "format of the input (step, stl, obj) instead of what its bytes tell");
   app.add_option("--threads", arguments.threads, "threads; 0 (default): every core");
@@ -103,6 +105,10 @@ ImportOptions import_options(const Arguments& arguments) {
   if (!arguments.deflection.empty()) {
     options.deflection = parse_quantity(arguments.deflection, Dimension::length);
     if (!(*options.deflection > 0)) throw InputError("--deflection: must be above zero");
+  }
+  if (!arguments.edge.empty()) {
+    options.largest_edge = parse_quantity(arguments.edge, Dimension::length);
+    if (!(*options.largest_edge > 0)) throw InputError("--edge: must be above zero");
   }
   return options;
 }

@@ -1,7 +1,8 @@
-// STEP through OpenCASCADE, the only file that sees it. Every solid is tessellated face by face; the nodes of
-// neighbouring faces are merged by topology: the i-th node that two faces have on one edge is one vertex, and
-// so are all nodes on one CAD vertex. No tolerance is involved, so thin walls cannot be welded to each other
-// and the mesh is closed where the solid is.
+// STEP through OpenCASCADE, which only this file and step_reader_names.cpp see. Every solid is tessellated
+// face by face; the nodes of neighbouring faces are merged by topology: the i-th node that two faces have on
+// one edge is one vertex, and so are all nodes on one CAD vertex. No tolerance is involved, so thin walls
+// cannot be welded to each other and the mesh is closed where the solid is. A flat face has nodes on its rim
+// only; subdivide() then gives it some to bend by.
 #include <fmt/format.h>
 
 #include <BRepBndLib.hxx>
@@ -19,13 +20,8 @@
 #include <Poly_Triangulation.hxx>
 #include <STEPControl_Reader.hxx>
 #include <Standard_Failure.hxx>
-#include <StepBasic_Product.hxx>
-#include <StepBasic_ProductDefinition.hxx>
-#include <StepBasic_ProductDefinitionFormation.hxx>
 #include <StepGeom_GeometricRepresentationItem.hxx>
 #include <StepRepr_Representation.hxx>
-#include <StepShape_Face.hxx>
-#include <StepShape_SolidModel.hxx>
 #include <StepShape_TopologicalRepresentationItem.hxx>
 #include <TCollection_HAsciiString.hxx>
 #include <TopExp.hxx>
@@ -35,13 +31,9 @@
 #include <TopoDS_Edge.hxx>
 #include <TopoDS_Face.hxx>
 #include <TopoDS_Vertex.hxx>
-#include <TransferBRep.hxx>
-#include <Transfer_TransientProcess.hxx>
-#include <XSControl_TransferReader.hxx>
 #include <XSControl_WorkSession.hxx>
 #include <algorithm>
 #include <array>
-#include <map>
 #include <utility>
 
 #include "formats/disjoint_sets.h"
@@ -49,6 +41,8 @@
 #include "formats/import/crash_guard.h"
 #include "formats/import/readers.h"
 #include "formats/import/step_help.h"
+#include "formats/import/step_names.h"
+#include "formats/import/subdivide.h"
 #include "formats/topology.h"
 
 namespace flexel {
@@ -143,67 +137,6 @@ std::vector<TopoDS_Shape> solids_of(const TopoDS_Shape& shape, const ImportInput
         fmt::format("holds no solid, only {} open shells and {} faces: export the part as a solid",
                     shells.size(), faces));
   return solids;
-}
-
-// --- names
-
-std::string name_of(const Handle(TCollection_HAsciiString) & text) {
-  if (text.IsNull()) return "";
-  const std::string name = clean_name(text->ToCString());
-  const bool empty = name == "NONE" || name.starts_with("Open CASCADE STEP translator");
-  return empty ? "" : name;
-}
-
-// Names by what they were read for; a shape's instances share its TShape.
-struct Names {
-  std::map<const TopoDS_TShape*, std::string> own;  // of faces and solids
-  // Of the smallest product that holds a solid, and how many solids that product holds.
-  std::map<const TopoDS_TShape*, std::pair<std::size_t, std::string>> product;
-};
-
-void add_product(Names& names, const StepBasic_ProductDefinition& definition, const TopoDS_Shape& shape) {
-  if (definition.Formation().IsNull() || definition.Formation()->OfProduct().IsNull()) return;
-  std::string name = name_of(definition.Formation()->OfProduct()->Name());
-  if (name.empty()) name = name_of(definition.Formation()->OfProduct()->Id());
-  const std::vector<TopoDS_Shape> solids = shapes_of(shape, TopAbs_SOLID);
-  for (const TopoDS_Shape& solid : solids) {
-    const auto [entry, added] = names.product.emplace(solid.TShape().get(), std::pair(solids.size(), name));
-    if (!added && solids.size() < entry->second.first) entry->second = {solids.size(), name};
-  }
-}
-
-Names read_names(const STEPControl_Reader& reader) {
-  Names names;
-  const Handle(Transfer_TransientProcess) process = reader.WS()->TransferReader()->TransientProcess();
-  for (Standard_Integer i = 1; i <= process->NbMapped(); ++i) {
-    const Handle(Standard_Transient) entity = process->Mapped(i);
-    const bool is_product = entity->IsKind(STANDARD_TYPE(StepBasic_ProductDefinition));
-    const bool is_item =
-        entity->IsKind(STANDARD_TYPE(StepShape_Face)) || entity->IsKind(STANDARD_TYPE(StepShape_SolidModel));
-    if (!is_product && !is_item) continue;
-    const TopoDS_Shape shape = TransferBRep::ShapeResult(process, entity);
-    if (shape.IsNull()) continue;
-    if (is_product)
-      add_product(names, *Handle(StepBasic_ProductDefinition)::DownCast(entity), shape);
-    else
-      names.own.emplace(shape.TShape().get(),
-                        name_of(Handle(StepRepr_RepresentationItem)::DownCast(entity)->Name()));
-  }
-  return names;
-}
-
-std::string own_name(const Names& names, const TopoDS_Shape& shape) {
-  const auto found = names.own.find(shape.TShape().get());
-  return found == names.own.end() ? "" : found->second;
-}
-
-// A product with one solid gives it its name; the solids of one product are told apart by their own names.
-std::string solid_name(const Names& names, const TopoDS_Shape& solid) {
-  const auto product = names.product.find(solid.TShape().get());
-  const std::string own = own_name(names, solid);
-  if (product == names.product.end()) return own;
-  const auto& [solids, name] = product->second;
-  return (solids > 1 && !own.empty()) || name.empty() ? own : name;
 }
 
 // --- tessellation
@@ -334,30 +267,57 @@ void add_face(Surface& surface, const SolidMesh& mesh, std::size_t f, NodeMerger
   }
 }
 
-void add_solid(Surface& surface, const TopoDS_Shape& solid, const Names& names) {
+void add_solid(Surface& surface, const TopoDS_Shape& solid, const StepNames& names) {
   const SolidMesh mesh = collect(solid);
   const std::size_t faces = mesh.triangulations.size(), first_polygon = surface.polygon_count();
   NodeMerger merger(mesh);
   for (std::size_t f = 0; f < faces; ++f) merger.add_face(f);
   const auto part = static_cast<std::uint32_t>(surface.parts.size());
-  surface.parts.push_back({solid_name(names, solid)});
+  surface.parts.push_back({names.solid(solid)});
   std::vector<std::uint32_t> vertex_of(mesh.node_base.back(), kNone);
   for (std::size_t f = 0; f < faces; ++f) {
-    surface.faces.push_back({own_name(names, mesh.faces(static_cast<Standard_Integer>(f) + 1)), part});
+    surface.faces.push_back({names.own(mesh.faces(static_cast<Standard_Integer>(f) + 1)), part});
     add_face(surface, mesh, f, merger, vertex_of);
   }
   orient_outward(surface, first_polygon);
 }
 
+// Default for the largest edge: a share of the solid's diagonal.
+constexpr double kDefaultEdges = 64;
+// No file becomes more triangles by subdivision.
+constexpr std::size_t kMostTriangles = 2'000'000;
+
+// Subdivides the last solid. Without a limit of the user's it gets its share of the triangles and what edges
+// they allow.
+void refine(Surface& surface, std::size_t first_polygon, std::size_t solids, const ImportOptions& options,
+            const ImportInput& input) {
+  if (options.largest_edge) {
+    const std::size_t left = kMostTriangles - std::min(kMostTriangles, first_polygon);
+    if (!subdivide(surface, first_polygon, *options.largest_edge, left))
+      throw InputError(input.where, fmt::format("edges of at most {:g} mm would take more than {} triangles: "
+                                                "give a larger --edge",
+                                                *options.largest_edge / kMillimetre, kMostTriangles));
+    return;
+  }
+  Box box;
+  for (std::size_t i = surface.polygon_offsets[first_polygon]; i < surface.polygon_vertices.size(); ++i)
+    box.add(surface.vertices[surface.polygon_vertices[i]]);
+  const double largest = box.size().norm() / kDefaultEdges;
+  if (largest > 0) static_cast<void>(subdivide(surface, first_polygon, largest, kMostTriangles / solids));
+}
+
 Surface read_solids(ImportInput& input, const ImportOptions& options) {
   STEPControl_Reader reader;
   const std::vector<TopoDS_Shape> solids = solids_of(transfer(reader, input), input);
-  const Names names = read_names(reader);
+  const StepNames names(reader);
   Surface surface;
   surface.polygon_offsets.push_back(0);
   for (const TopoDS_Shape& solid : solids) {
+    const std::size_t first_polygon = surface.polygon_count();
     tessellate(solid, options, input);
     add_solid(surface, solid, names);
+    if (surface.polygon_count() > first_polygon)
+      refine(surface, first_polygon, solids.size(), options, input);
   }
   return surface;
 }
@@ -366,6 +326,8 @@ Surface read_solids(ImportInput& input, const ImportOptions& options) {
 
 Surface read_step(ImportInput& input, const ImportOptions& options) {
   if (options.unit) throw InputError(input.where, "a STEP file carries its own unit: leave out --unit");
+  if (options.largest_edge && !(*options.largest_edge > 0))
+    throw InputError(input.where, "the largest edge of the mesh must be above zero");
   check_step_complete(input);
   try {
     Surface surface;
