@@ -17,6 +17,7 @@ namespace {
 
 constexpr double kSmallestIncrement = 1.0 / 1024;  // of the first load step
 constexpr int kEasyIterations = 10;
+constexpr double kHopelessReach = 300;  // diagonals of the body
 
 std::string axis_name(const Vec3& direction) {
   for (int axis = 0; axis < 3; ++axis)
@@ -76,6 +77,7 @@ EquilibriumResult find_equilibrium(Mechanics& mechanics, State& state, const Run
   double done = 0, increment = first;
   NewtonOptions options;
   options.tolerance = settings.tolerance;
+  options.hopeless_reach = kHopelessReach * bounding_box(mechanics.body().rest).diagonal();
   while (done < 1) {
     State trial = state;
     trial.share = done + increment > 1 - 1e-9 ? 1 : done + increment;
@@ -87,7 +89,8 @@ EquilibriumResult find_equilibrium(Mechanics& mechanics, State& state, const Run
     result.cg_iterations += outcome.cg_iterations;
     result.linear_seconds += outcome.linear_seconds;
     if (!outcome.converged) {
-      if (increment <= kSmallestIncrement * first) diverge(mechanics, trial, done, trial.share, outcome);
+      if (outcome.hopeless || increment <= kSmallestIncrement * first)
+        diverge(mechanics, trial, done, trial.share, outcome);
       increment /= 2;
       continue;
     }

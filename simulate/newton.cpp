@@ -8,10 +8,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "formats/parallel.h"
+#include "formats/units.h"
 
 namespace flexel {
 namespace {
@@ -58,6 +60,7 @@ class Solver {
   std::vector<Vec3> right_hand_side();
   bool line_search(const std::vector<Vec3>& residual);
   bool lead_prescribed();
+  bool hopeless();
   [[nodiscard]] State moved(double step) const;
   void update_residual();
   [[nodiscard]] double forcing() const;
@@ -194,6 +197,20 @@ bool Solver::line_search(const std::vector<Vec3>& residual) {
   return false;
 }
 
+// A load so far beyond the part's strength that no share of it that is worth trying has an equilibrium:
+// mostly a unit that is wrong by a thousand. Told by the first linear answer, taken to the whole load.
+bool Solver::hopeless() {
+  if (options_.hopeless_reach <= 0 || outcome_.iterations > 0 || !gap_.empty()) return false;
+  double reach = 0;
+  for (const Vec3& step : direction_) reach = std::max(reach, step.norm());
+  if (reach <= options_.hopeless_reach * state_.share) return false;
+  outcome_.hopeless = true;
+  outcome_.trouble = fmt::format(
+      "at first stiffness the load would move the part by {}: check the unit of the part and the load",
+      human_length(reach / state_.share));
+  return true;
+}
+
 double Solver::forcing() const {
   const double wanted = 0.3 * options_.tolerance * scale_ / residual_norm_;
   const double trusted = outcome_.iterations == 0 ? kFirstForcing : std::min(kLargestForcing, model_error_);
@@ -222,6 +239,7 @@ NewtonOutcome Solver::run() {
       solve_linear(rhs, forcing());
     else
       direction_.assign(rhs.size(), Vec3::Zero());
+    if (hopeless()) return outcome_;
     // What the linear model predicts for the residual after a full step.
     std::vector<Vec3> predicted(rhs.size());
     if (factored_) multiply(mechanics_.stiffness(), direction_, predicted);

@@ -11,6 +11,8 @@ namespace flexel {
 struct NewtonOptions {
   double tolerance = 1e-8;  // residual relative to loads and reactions
   int max_iterations = 40;
+  double hopeless_reach =
+      0;  // m: a first linear answer beyond this for the whole load ends the run; 0: none does
 };
 
 struct NewtonOutcome {
@@ -19,6 +21,7 @@ struct NewtonOutcome {
   double relative_residual = 1;
   double linear_seconds = 0;  // in preconditioners and conjugate gradients
   std::string trouble;        // why it stopped when not converged
+  bool hopeless = false;      // a smaller share of the load would not help
 };
 
 // Moves `state` to the equilibrium at its share. On failure the state is what was reached: the caller keeps
