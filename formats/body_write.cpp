@@ -89,10 +89,10 @@ void add_columns(Section section, const std::map<std::string, Column>& columns, 
     array.tuples = count + padding;
     if (padding > 0) {  // VTK's cells beyond ours have no value: 0
       array.memory = nullptr;
-      array.make = [&column, components](std::size_t begin, std::size_t end, void* out) {
+      array.make = [&values = column.values, components](std::size_t begin, std::size_t end, void* out) {
         double* next = static_cast<double*>(out);
         for (std::size_t i = begin * components; i < end * components; ++i)
-          *next++ = i < column.values.size() ? column.values[i] : 0.0;
+          *next++ = i < values.size() ? values[i] : 0.0;
       };
     }
     arrays.push_back(std::move(array));

@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <chrono>
+#include <cstring>
 #include <random>
 
 #include "tests/formats/import_help.h"
@@ -66,8 +67,8 @@ TEST(SurfaceFile, BinaryStlThatDidNotMoveHasTheSameBytesButForNormals) {
     std::string bytes = written(surface, nothing(surface), SurfaceFormat::stl_binary, scratch);
     ASSERT_EQ(bytes.size(), original.size());
     for (std::size_t t = 0; t < facets.size(); ++t) {
-      const auto normal =
-          Eigen::Map<const Eigen::Vector3f>(reinterpret_cast<const float*>(bytes.data() + 84 + 50 * t));
+      Eigen::Vector3f normal;
+      std::memcpy(normal.data(), bytes.data() + 84 + 50 * t, 12);  // records are not aligned
       EXPECT_NEAR(normal.norm(), 1, 1e-6);
       bytes.replace(84 + 50 * t, 12, 12, '\0');
     }

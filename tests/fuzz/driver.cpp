@@ -6,6 +6,7 @@
 
 #include <sys/resource.h>
 #include <unistd.h>
+#include <algorithm>
 
 #include <chrono>
 #include <cstdio>
@@ -158,7 +159,7 @@ bool survives(const std::function<void(const std::string&)>& read, const std::st
 
 Bytes bytes_of(const std::string& text) {
   Bytes bytes(text.size());
-  std::memcpy(bytes.data(), text.data(), text.size());
+  std::transform(text.begin(), text.end(), bytes.begin(), [](char c) { return static_cast<std::byte>(c); });
   return bytes;
 }
 
