@@ -51,7 +51,7 @@ const std::vector<Material>& material_library() {
       {"stainless", 200e9, 0.30, 7900, "EN 1993-1-4:2006, 2.1.3 (1.4301)"},
       {"aluminium 6061", 68.3e9, 0.33, 2700, "MIL-HDBK-5J, table 3.6.2 (6061-T6, 9.9e3 ksi)"},
       {"titanium", 110.3e9, 0.31, 4430, "MIL-HDBK-5J, table 5.4.1 (Ti-6Al-4V annealed, 16.0e3 ksi)"},
-      {"brass", 97e9, 0.34, 8490, "CDA C36000 (modulus, density); nu typical of alpha-beta brass"},
+      {"brass", 97e9, 0.31, 8490, "CDA C36000 (modulus, density); nu from E and G = 37 GPa"},
       {"copper", 117e9, 0.34, 8910, "CDA C11000 (modulus, density); nu typical"},
       {"PLA", 3.25e9, 0.36, 1240, "Ultimaker PLA data sheet (ISO 527, XY); nu typical"},
       {"ABS", 2.1e9, 0.37, 1100, "Ultimaker ABS data sheet (ISO 527, XY); nu typical"},
