@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/column.h"
 #include "formats/surface.h"
 #include "formats/vec.h"
 
@@ -44,13 +45,6 @@ struct Part {
   double surface_volume = 0;  // m^3 enclosed by the part's surface (0 where it is not closed)
 };
 
-// An optional attribute of the elements or of the cells, by name ("velocity", "von_mises"). Absent effects
-// have none.
-struct Column {
-  int components = 1;
-  std::vector<double> values;  // (n x components), row major, SI
-};
-
 struct Body {
   std::vector<Part> parts;
 
@@ -60,7 +54,7 @@ struct Body {
   std::vector<std::uint16_t> piece;
   std::vector<Vec3> rest;      // (n x 3) m, world frame
   std::vector<Vec3> position;  // (n x 3) m, world frame
-  std::map<std::string, Column> element_columns;
+  Columns element_columns;
 
   // Centre placement: bit b is set when the element is connected with its neighbour, of the same piece, at
   // half_neighbourhood[b]. Corner placement: derived from the cells (two elements are connected while a whole
@@ -72,7 +66,7 @@ struct Body {
   std::vector<std::array<std::uint32_t, 8>> cell_elements;
   std::vector<double> fill;          // (m) share of the voxel inside the part (this piece), in (0, 1]
   std::vector<std::uint8_t> broken;  // (m) 1: fractured, resists no more
-  std::map<std::string, Column> cell_columns;
+  Columns cell_columns;
 
   // Cells under the surface: polygon p bounds the matter of cells surface_cells[surface_cell_offsets[p] ...
   // surface_cell_offsets[p + 1]), ascending. It tells apart two pieces of one voxel, and where the matter

@@ -1,10 +1,9 @@
 // Names of the arrays of a body file, for its writer and its reader; docs/body-file.md explains them.
 #pragma once
-#include <algorithm>
 #include <array>
-#include <cctype>
 #include <string>
 
+#include "formats/column.h"
 #include "formats/vtu.h"
 
 namespace flexel::names {
@@ -18,6 +17,9 @@ constexpr const char* surface_polygon_face = "surface_polygon_face";
 constexpr const char* surface_face_part = "surface_face_part";
 constexpr const char* surface_cell_offsets = "surface_cell_offsets";
 constexpr const char* surface_cells = "surface_cells";
+// Before the name of each attribute of the surface.
+constexpr const char* surface_vertex_columns = "surface_vertex_columns.";
+constexpr const char* surface_polygon_columns = "surface_polygon_columns.";
 constexpr const char* surface_source_bytes = "surface_source_bytes";
 constexpr const char* surface_source_headers = "surface_source_headers";
 constexpr const char* position = "position";
@@ -47,13 +49,8 @@ constexpr std::uint8_t vtk_hexahedron = 12, vtk_vertex = 1;
   return name == fill || name == part || name == material || name == broken;
 }
 
-// Columns have names that XML, VTK and spreadsheets take as they are: letters, digits, "_", "-" and ".".
 [[nodiscard]] inline bool valid_column(const std::string& name, vtu::Section section) {
-  const auto plain = [](char c) {
-    return (std::isalnum(static_cast<unsigned char>(c)) != 0 && static_cast<unsigned char>(c) < 128) ||
-           c == '_' || c == '-' || c == '.';
-  };
-  return !name.empty() && std::all_of(name.begin(), name.end(), plain) && !reserved(name, section);
+  return valid_column_name(name) && !reserved(name, section);
 }
 
 }  // namespace flexel::names

@@ -64,6 +64,16 @@ void read_sources(const vtu::File& file, const Metadata& metadata, Surface& surf
   }
 }
 
+// Attributes of the surface: the arrays of the field data whose names begin with `prefix`.
+void read_surface_columns(const vtu::File& file, const std::string& prefix, Columns& columns) {
+  for (const std::string& name : file.names(Section::field)) {
+    if (!name.starts_with(prefix)) continue;
+    Column column{static_cast<int>(file.components(Section::field, name)),
+                  file.read_flat(Section::field, name)};
+    columns.emplace(name.substr(prefix.size()), std::move(column));
+  }
+}
+
 void read_surface(const vtu::File& file, const Metadata& metadata, Body& body) {
   Surface& surface = body.surface;
   surface.vertices = file.read<Vec3>(Section::field, names::surface_vertices);
@@ -80,10 +90,11 @@ void read_surface(const vtu::File& file, const Metadata& metadata, Body& body) {
   body.surface_cell_offsets = file.read<std::uint32_t>(Section::field, names::surface_cell_offsets);
   body.surface_cells = file.read<std::uint32_t>(Section::field, names::surface_cells);
   read_sources(file, metadata, surface);
+  read_surface_columns(file, names::surface_vertex_columns, surface.vertex_columns);
+  read_surface_columns(file, names::surface_polygon_columns, surface.polygon_columns);
 }
 
-void read_columns(const vtu::File& file, Section section, std::size_t count,
-                  std::map<std::string, Column>& columns) {
+void read_columns(const vtu::File& file, Section section, std::size_t count, Columns& columns) {
   for (const std::string& name : file.names(section)) {
     if (names::reserved(name, section)) continue;
     if (!names::valid_column(name, section))

@@ -63,6 +63,20 @@ Workspace prepare(const Body& body, bool with_surface) {
   return work;
 }
 
+void add_surface_columns(const std::string& prefix, const Columns& columns, std::size_t count,
+                         std::vector<vtu::Array>& arrays) {
+  for (const auto& [name, column] : columns) {
+    const auto components = static_cast<std::size_t>(column.components);
+    if (column.components < 1 || column.values.size() != count * components || !valid_column_name(name))
+      throw std::logic_error("attribute \"" + name +
+                             "\" of the surface has a wrong size or a name that is not plain ASCII");
+    vtu::Array array = array_of(Section::field, prefix + name, column.values);
+    array.components = components;
+    array.tuples = count;
+    arrays.push_back(std::move(array));
+  }
+}
+
 void add_surface(const Body& body, const Workspace& work, std::vector<vtu::Array>& arrays) {
   const Surface& surface = body.surface;
   arrays.push_back(array_of(Section::field, names::surface_vertices, surface.vertices));
@@ -70,14 +84,17 @@ void add_surface(const Body& body, const Workspace& work, std::vector<vtu::Array
   arrays.push_back(array_of(Section::field, names::surface_polygon_vertices, surface.polygon_vertices));
   arrays.push_back(array_of(Section::field, names::surface_polygon_face, surface.polygon_face));
   arrays.push_back(array_of(Section::field, names::surface_face_part, work.face_part));
+  add_surface_columns(names::surface_vertex_columns, surface.vertex_columns, surface.vertices.size(), arrays);
+  add_surface_columns(names::surface_polygon_columns, surface.polygon_columns, surface.polygon_count(),
+                      arrays);
   arrays.push_back(array_of(Section::field, names::surface_cell_offsets, body.surface_cell_offsets));
   arrays.push_back(array_of(Section::field, names::surface_cells, body.surface_cells));
   arrays.push_back(array_of(Section::field, names::surface_source_bytes, work.source_bytes));
   arrays.push_back(array_of(Section::field, names::surface_source_headers, work.source_headers));
 }
 
-void add_columns(Section section, const std::map<std::string, Column>& columns, std::size_t count,
-                 std::size_t padding, std::vector<vtu::Array>& arrays) {
+void add_columns(Section section, const Columns& columns, std::size_t count, std::size_t padding,
+                 std::vector<vtu::Array>& arrays) {
   for (const auto& [name, column] : columns) {
     const auto components = static_cast<std::size_t>(column.components);
     if (column.components < 1 || column.values.size() != count * components ||

@@ -180,6 +180,8 @@ void check(const Surface& surface, const std::string& where) {
           where, fmt::format("vertex {} lies beyond {} m: is the file damaged?", v + 1, kLargestCoordinate));
   }
   check_polygons(surface, where);
+  check_columns(surface.vertex_columns, surface.vertices.size(), "vertex_columns", where);
+  check_columns(surface.polygon_columns, surface.polygon_count(), "polygon_columns", where);
 }
 
 std::vector<std::uint32_t> face_numbers(const Surface& surface) {
@@ -210,6 +212,10 @@ void append(Surface& surface, Surface other) {
     to.reserve(to.size() + from.size());
     for (const std::uint32_t value : from) to.push_back(static_cast<std::uint32_t>(value + by));
   };
+  append_columns(surface.vertex_columns, surface.vertices.size(), other.vertex_columns,
+                 other.vertices.size());
+  append_columns(surface.polygon_columns, surface.polygon_count(), other.polygon_columns,
+                 other.polygon_count());
   if (surface.polygon_offsets.empty()) surface.polygon_offsets.push_back(0);
   if (!other.polygon_offsets.empty()) {
     const std::uint32_t corners = surface.polygon_offsets.back();

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/column.h"
 #include "formats/files.h"
 #include "formats/vec.h"
 
@@ -43,6 +44,10 @@ struct Surface {
   std::vector<std::uint32_t> polygon_offsets;
   std::vector<std::uint32_t> polygon_vertices;  // (corners) indices into vertices
   std::vector<std::uint32_t> polygon_face;      // (polygons) index into faces
+  // Attributes of the file, by name: kColorColumn ("color"), and numbers of other names ("quality"). A part's
+  // or face's colour is that of its polygons. None where the file has none.
+  Columns vertex_columns;   // (vertices)
+  Columns polygon_columns;  // (polygons)
   std::vector<SurfaceFace> faces;
   std::vector<SurfacePart> parts;
   std::vector<SurfaceSource> sources;      // one per input file
@@ -68,8 +73,8 @@ struct Triangles {
 [[nodiscard]] Triangles triangulate(const Surface& surface);
 
 // Coordinates finite and below kLargestCoordinate, indices in range, offsets ascending, polygons of at least
-// three corners, at least one polygon, no vertex in two parts, tables consistent. Throws InputError(where,
-// ...) naming the first vertex or polygon that is wrong, numbered from 1.
+// three corners, at least one polygon, no vertex in two parts, tables and columns consistent. Throws
+// InputError(where, ...) naming the first vertex or polygon that is wrong, numbered from 1, or the column.
 void check(const Surface& surface, const std::string& where);
 
 // Number of the face within its part, from 1, and its selection name "part/12".
@@ -82,7 +87,8 @@ constexpr double kLargestCoordinate = 1e12;  // m
 // name.
 void make_part_names_unique(Surface& surface, const std::string& fallback);
 
-// Appends `other` (another input file) to `surface`; part names stay unique.
+// Appends `other` (another input file) to `surface`; part names stay unique. Attributes that only one of them
+// has: append_columns().
 void append(Surface& surface, Surface other);
 
 }  // namespace flexel

@@ -149,6 +149,13 @@ inline Body random_body(std::uint64_t seed) {
   body.cell_columns["von_mises"] = stress;
   body.notes = {{"history", "line 1\nline 2 <b>"}, {"isa", "\xFE"}};
   add_surface(body, random);
+  Column color{4, {}}, quality{1, {}};
+  for (std::size_t i = 0; i < 4 * body.surface.polygon_count(); ++i)
+    color.values.push_back(uniform(random, 0, 1));
+  for (std::size_t i = 0; i < body.surface.vertices.size(); ++i)
+    quality.values.push_back(uniform(random, -1e300, 1));
+  body.surface.polygon_columns[kColorColumn] = color;
+  body.surface.vertex_columns = {{"quality", quality}, {"offsets", quality}};
   return body;
 }
 

@@ -79,7 +79,7 @@ void expect_same_parts(const Body& a, const Body& b) {
   }
 }
 
-void expect_same_columns(const std::map<std::string, Column>& a, const std::map<std::string, Column>& b) {
+void expect_same_columns(const Columns& a, const Columns& b) {
   ASSERT_EQ(a.size(), b.size());
   for (const auto& [name, column] : a) {
     ASSERT_EQ(b.count(name), 1u) << name;
@@ -94,6 +94,8 @@ void expect_same_surface(const Surface& a, const Surface& b) {
   EXPECT_EQ(a.polygon_vertices, b.polygon_vertices);
   EXPECT_EQ(a.polygon_face, b.polygon_face);
   EXPECT_EQ(a.part_source, b.part_source);
+  expect_same_columns(a.vertex_columns, b.vertex_columns);
+  expect_same_columns(a.polygon_columns, b.polygon_columns);
   ASSERT_EQ(a.faces.size(), b.faces.size());
   for (std::size_t f = 0; f < a.faces.size(); ++f) {
     EXPECT_EQ(a.faces[f].name, b.faces[f].name);

@@ -153,6 +153,50 @@ TEST(Append, KeepsBothAndMakesNamesUnique) {
   check(empty, "appended to nothing");
 }
 
+TEST(Append, FillsAttributesThatOneFileLacks) {
+  Surface one = one_polygon({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}), other = one, third = one;
+  one.vertex_columns["color"] = {3, {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+  one.vertex_columns["quality"] = {1, {7, 8, 9}};
+  third.vertex_columns["color"] = {4, {0, 0, 0, 0.5, 0, 0, 0, 0.5, 0, 0, 0, 0.5}};
+  third.polygon_columns["color"] = {3, {0.25, 0.5, 0.75}};
+  append(one, other);
+  append(one, third);
+  check(one, "appended");
+  EXPECT_EQ(one.vertex_columns["color"].components, 4);
+  EXPECT_EQ(one.vertex_columns["color"].values,
+            (std::vector<double>{1, 0, 0, 1, 0, 1, 0, 1, 0, 0,   1, 1, 1, 1,   1, 1, 1, 1,
+                                 1, 1, 1, 1, 1, 1, 0, 0, 0, 0.5, 0, 0, 0, 0.5, 0, 0, 0, 0.5}));
+  EXPECT_EQ(one.vertex_columns["quality"].values, (std::vector<double>{7, 8, 9, 0, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(one.polygon_columns["color"].values, (std::vector<double>{1, 1, 1, 1, 1, 1, 0.25, 0.5, 0.75}));
+}
+
+TEST(CheckSurface, AttributesAreCheckedByName) {
+  const Surface good = one_polygon({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}});
+  const auto error = [&](const std::string& name, const Column& column) {
+    Surface bad = good;
+    bad.vertex_columns[name] = column;
+    return check_error(bad);
+  };
+  const std::string damaged = "the surface is damaged: vertex_columns ";
+  EXPECT_EQ(error("quality", {1, {1, 2, 3}}), "");
+  EXPECT_EQ(error("quality", {1, {1, 2}}), damaged + "\"quality\" has 2 values in place of 3");
+  EXPECT_EQ(error("quality", {0, {}}), damaged + "\"quality\" has no components");
+  EXPECT_EQ(error("quality", {1, {1, 2, std::nan("")}}),
+            damaged + "\"quality\" has a value that is not finite");
+  EXPECT_EQ(error("a b", {1, {1, 2, 3}}), damaged + "\"a b\" is not the name of a column");
+  EXPECT_EQ(error("color", {1, {1, 0, 1}}), damaged + "\"color\" has neither 3 nor 4 components");
+  EXPECT_EQ(error("color", {3, std::vector<double>(9, 1.5)}),
+            damaged + "\"color\" has a value outside [0, 1]");
+  Surface bad = good;
+  bad.polygon_columns["color"] = {3, {0, 0}};
+  EXPECT_NE(check_error(bad).find("polygon_columns \"color\""), std::string::npos);
+}
+
+TEST(ColumnName, AnyTextBecomesAName) {
+  EXPECT_EQ(column_name("quality 2\xC3\xA9"), "quality_2__");
+  EXPECT_EQ(column_name(""), "_");
+}
+
 TEST(PartNames, ARepeatedNameDoesNotTakeOneThatIsInUse) {
   Surface surface;
   surface.parts = {{"a"}, {"a"}, {"a-2"}, {""}, {"a"}, {""}};
