@@ -17,6 +17,8 @@ constexpr const char* kHelp =
     "                        the part, deformed as its material would be (STL, OBJ; .vtu for the body)\n"
     "  flexel info PART...   solids, faces, unit, size, volume, closedness, thinnest wall: what a scene can "
     "name\n"
+    "  flexel picture FILE... -o OUT.png\n"
+    "                        a picture of parts and bodies, deformed and coloured, without a display\n"
     "  flexel voxelize ...   part -> lattice of elements      (the program flexel-voxelize)\n"
     "  flexel simulate ...   lattice + scene -> deformed      (flexel-simulate)\n"
     "  flexel map ...        deformed lattice -> the part     (flexel-map)\n"
@@ -34,7 +36,8 @@ bool is_stage(const std::string& command) {
 }
 
 [[noreturn]] void unknown_command(const std::string& command) {
-  const std::vector<std::string> commands = {"deform", "info", "voxelize", "simulate", "map", "help"};
+  const std::vector<std::string> commands = {"deform",   "info", "picture", "voxelize",
+                                             "simulate", "map",  "help"};
   throw InputError(fmt::format("unknown command \"{}\"; the commands are {}{}", command,
                                fmt::join(commands, ", "), did_you_mean(command, commands)));
 }
@@ -49,13 +52,15 @@ int help(int argc, char** argv) {
   const std::string command = argv[1];
   if (command == "deform") return deform_command(2, arguments);
   if (command == "info") return info_command(2, arguments);
+  if (command == "picture") return picture_command(2, arguments);
   if (is_stage(command)) run_stage_program(argv[1], arguments);
   unknown_command(command);
 }
 
 int run(int argc, char** argv) {
   if (argc < 2)
-    throw InputError("a command is missing: deform, info, voxelize, simulate or map (`flexel help`)");
+    throw InputError(
+        "a command is missing: deform, info, picture, voxelize, simulate or map (`flexel help`)");
   const std::string command = argv[1];
   if (command == "--version") {
     print(fmt::format("flexel {}\n", version()));
@@ -64,6 +69,7 @@ int run(int argc, char** argv) {
   if (command == "help" || command == "--help" || command == "-h") return help(argc - 1, argv + 1);
   if (command == "deform") return deform_command(argc - 1, argv + 1);
   if (command == "info") return info_command(argc - 1, argv + 1);
+  if (command == "picture") return picture_command(argc - 1, argv + 1);
   if (is_stage(command)) run_stage_program(argv[1], argv + 1);
   unknown_command(command);
 }

@@ -1,0 +1,186 @@
+// Body attributes, and their way from cells to elements to the vertices of the surface.
+#include "flexel/picture/attribute.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+
+#include "formats/locate.h"
+#include "formats/parallel.h"
+
+namespace flexel {
+namespace {
+
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+constexpr std::uint32_t kNoPolygon = 0xffffffffu;
+
+double equivalent_strain(const Mat3& gradient) {
+  if (!gradient.allFinite() || !(gradient.determinant() > 0)) return kUnknown;
+  const Eigen::SelfAdjointEigenSolver<Mat3> solver(gradient.transpose() * gradient, Eigen::EigenvaluesOnly);
+  if (!(solver.eigenvalues().minCoeff() > 0)) return kUnknown;
+  const Vec3 logarithms = 0.5 * solver.eigenvalues().array().log();
+  return std::sqrt(2.0 / 3.0) * (logarithms.array() - logarithms.mean()).matrix().norm();
+}
+
+Mat3 cell_gradient(const Body& body, const Part& part, std::size_t cell) {
+  Mat3 gradient = Mat3::Zero();
+  for (std::size_t a = 0; a < 8; ++a) {
+    const Vec3 side((a & 1) != 0 ? 1 : -1, (a & 2) != 0 ? 1 : -1, (a & 4) != 0 ? 1 : -1);
+    gradient +=
+        body.position[body.cell_elements[cell][a]] * side.cwiseQuotient(4 * part.lattice.spacing).transpose();
+  }
+  return gradient;
+}
+
+Mat3 fitted_gradient(const Body& body, const Adjacency& adjacency, std::uint32_t element) {
+  Mat3 moved = Mat3::Zero(), rest = Mat3::Zero();
+  for (const std::uint32_t other : adjacency.of(element)) {
+    const Vec3 arm = body.rest[other] - body.rest[element];
+    moved += (body.position[other] - body.position[element]) * arm.transpose();
+    rest += arm * arm.transpose();
+  }
+  const double scale = rest.trace() / 3;
+  if (!(rest.determinant() > 1e-6 * scale * scale * scale)) return Mat3::Constant(kUnknown);
+  return moved * rest.inverse();
+}
+
+// The cell under each vertex, by the first polygon that has one.
+std::vector<std::optional<CellPoint>> cell_points(const Body& body) {
+  const Surface& surface = body.surface;
+  std::vector<std::uint32_t> polygon(surface.vertices.size(), kNoPolygon);
+  for (std::uint32_t p = 0; p < surface.polygon_count(); ++p)
+    for (const std::uint32_t v : surface.polygon(p))
+      if (polygon[v] == kNoPolygon && body.surface_cell_offsets[p + 1] > body.surface_cell_offsets[p])
+        polygon[v] = p;
+  std::vector<std::optional<CellPoint>> points(surface.vertices.size());
+  parallel_for_each(points.size(), [&](std::size_t v) {
+    if (polygon[v] != kNoPolygon) points[v] = locate_on_surface(body, polygon[v], surface.vertices[v]);
+  });
+  return points;
+}
+
+// The column of that name, or the component that the name asks for.
+std::optional<Attribute> in_columns(const Columns& columns, const std::string& name, Attribute::At at) {
+  if (const auto found = columns.find(name); found != columns.end())
+    return Attribute{at, scalars(found->second, std::nullopt)};
+  const auto [column, component] = split_name(name);
+  const auto found = columns.find(column);
+  if (!component || found == columns.end() || *component >= found->second.components) return std::nullopt;
+  return Attribute{at, scalars(found->second, component)};
+}
+
+}  // namespace
+
+std::vector<std::string> body_attribute_names(const Body& body) {
+  std::vector<std::string> names{"displacement", "strain"};
+  if (body.cell_count() > 0) names.emplace_back("fill");
+  for (const auto& [name, column] : body.element_columns) names.push_back(name);
+  for (const auto& [name, column] : body.cell_columns) names.push_back(name);
+  return names;
+}
+
+AttributeName split_name(const std::string& name) {
+  const std::size_t dot = name.rfind('.');
+  int component = 0;
+  if (dot == std::string::npos) return {name, std::nullopt};
+  const auto [end, error] = std::from_chars(name.data() + dot + 1, name.data() + name.size(), component);
+  if (error != std::errc() || end != name.data() + name.size() || component < 0) return {name, std::nullopt};
+  return {name.substr(0, dot), component};
+}
+
+std::vector<double> scalars(const Column& column, std::optional<int> component) {
+  const auto width = static_cast<std::size_t>(column.components);
+  std::vector<double> values(width == 0 ? 0 : column.values.size() / width);
+  parallel_for_each(values.size(), [&](std::size_t i) {
+    const Eigen::Map<const Eigen::VectorXd> row(column.values.data() + i * width, column.components);
+    values[i] = component ? row[*component] : width == 1 ? row[0] : row.norm();
+  });
+  return values;
+}
+
+Attribute strain(const Body& body) {
+  if (body.cell_count() == 0) {
+    const Adjacency adjacency = element_adjacency(body);
+    Attribute result{Attribute::At::elements, std::vector<double>(body.element_count())};
+    parallel_for_each(result.values.size(), [&](std::size_t e) {
+      result.values[e] = equivalent_strain(fitted_gradient(body, adjacency, static_cast<std::uint32_t>(e)));
+    });
+    return result;
+  }
+  Attribute result{Attribute::At::cells, std::vector<double>(body.cell_count(), kUnknown)};
+  for (const Part& part : body.parts)
+    parallel_for_each(part.cell_end - part.cell_begin, [&](std::size_t i) {
+      const std::size_t c = part.cell_begin + i;
+      result.values[c] = equivalent_strain(cell_gradient(body, part, c));
+    });
+  return result;
+}
+
+std::vector<std::string> surface_attribute_names(const Surface& surface) {
+  std::vector<std::string> names;
+  for (const Columns* columns : {&surface.vertex_columns, &surface.polygon_columns})
+    for (const auto& [name, column] : *columns)
+      if (name != kColorColumn) names.push_back(name);
+  return names;
+}
+
+std::optional<Attribute> surface_attribute(const Surface& surface, const std::string& name) {
+  if (auto found = in_columns(surface.vertex_columns, name, Attribute::At::vertices)) return found;
+  return in_columns(surface.polygon_columns, name, Attribute::At::polygons);
+}
+
+std::optional<Attribute> body_attribute(const Body& body, const std::string& name) {
+  if (auto found = in_columns(body.element_columns, name, Attribute::At::elements)) return found;
+  if (auto found = in_columns(body.cell_columns, name, Attribute::At::cells)) return found;
+  if (name == "strain") return strain(body);
+  if (name == "fill" && body.cell_count() > 0) return Attribute{Attribute::At::cells, body.fill};
+  if (name != "displacement") return std::nullopt;
+  Attribute result{Attribute::At::elements, std::vector<double>(body.element_count())};
+  parallel_for_each(body.element_count(),
+                    [&](std::size_t e) { result.values[e] = (body.position[e] - body.rest[e]).norm(); });
+  return result;
+}
+
+std::vector<double> at_elements(const Body& body, const Attribute& attribute) {
+  if (attribute.at == Attribute::At::elements) return attribute.values;
+  std::vector<double> sum(body.element_count(), 0), weight(body.element_count(), 0);
+  for (std::size_t c = 0; c < body.cell_count(); ++c) {
+    if (!std::isfinite(attribute.values[c])) continue;
+    for (const std::uint32_t e : body.cell_elements[c]) {
+      sum[e] += body.fill[c] * attribute.values[c];
+      weight[e] += body.fill[c];
+    }
+  }
+  for (std::size_t e = 0; e < sum.size(); ++e) sum[e] = weight[e] > 0 ? sum[e] / weight[e] : kUnknown;
+  return sum;
+}
+
+std::vector<double> at_cells(const Body& body, const Attribute& attribute) {
+  if (attribute.at == Attribute::At::cells) return attribute.values;
+  std::vector<double> values(body.cell_count(), 0);
+  for (std::size_t c = 0; c < values.size(); ++c)
+    for (const std::uint32_t e : body.cell_elements[c]) values[c] += attribute.values[e] / 8;
+  return values;
+}
+
+std::vector<double> at_vertices(const Body& body, const Attribute& attribute,
+                                const std::vector<std::uint32_t>& nearest_element) {
+  const std::vector<double> elements = at_elements(body, attribute);
+  std::vector<double> values(body.surface.vertices.size(), kUnknown);
+  const bool with_cells = body.surface_cell_offsets.size() == body.surface.polygon_count() + 1;
+  const auto points = with_cells ? cell_points(body) : std::vector<std::optional<CellPoint>>(values.size());
+  parallel_for_each(values.size(), [&](std::size_t v) {
+    if (!points[v]) {
+      values[v] = elements[nearest_element[v]];
+      return;
+    }
+    values[v] = 0;
+    for (std::size_t a = 0; a < 8; ++a)
+      values[v] += points[v]->weights[a] * elements[body.cell_elements[points[v]->cell][a]];
+  });
+  return values;
+}
+
+}  // namespace flexel

@@ -1,0 +1,52 @@
+// The values that a picture can be coloured by.
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "formats/body.h"
+
+namespace flexel {
+
+// One value for each element, cell, vertex or polygon; SI; NaN where nothing is known.
+struct Attribute {
+  enum class At : std::uint8_t { elements, cells, vertices, polygons };
+  At at = At::elements;
+  std::vector<double> values;
+};
+
+// The attributes of a surface: the columns of its vertices and polygons but for its colour; vectors as below.
+[[nodiscard]] std::optional<Attribute> surface_attribute(const Surface& surface, const std::string& name);
+[[nodiscard]] std::vector<std::string> surface_attribute_names(const Surface& surface);
+
+// The attributes of a body: "displacement" [m], "strain" (equivalent logarithmic), "fill", and its columns,
+// whose vectors give their length, or one component as "NAME.0".
+[[nodiscard]] std::optional<Attribute> body_attribute(const Body& body, const std::string& name);
+[[nodiscard]] std::vector<std::string> body_attribute_names(const Body& body);
+
+// Equivalent (von Mises) logarithmic strain of every cell, sqrt(2/3 e : e) with e the deviator of 1/2 ln(F^T
+// F), F the cell's mean deformation gradient; of every element in centre placement, F fitted to its
+// connections by least squares. NaN where F has no inverse.
+[[nodiscard]] Attribute strain(const Body& body);
+
+// Values of cells at the elements: the mean over the element's cells, weighted by fill; and of elements in
+// the cells: the mean of the eight.
+[[nodiscard]] std::vector<double> at_elements(const Body& body, const Attribute& attribute);
+[[nodiscard]] std::vector<double> at_cells(const Body& body, const Attribute& attribute);
+
+// Values at the surface's vertices: interpolated in the cell under the vertex, or those of the element that
+// `nearest_element` (vertices) names.
+[[nodiscard]] std::vector<double> at_vertices(const Body& body, const Attribute& attribute,
+                                              const std::vector<std::uint32_t>& nearest_element);
+
+// One value a row: the length of a vector, or component `component`.
+[[nodiscard]] std::vector<double> scalars(const Column& column, std::optional<int> component);
+
+// "velocity.2" is component 2 of "velocity".
+struct AttributeName {
+  std::string column;
+  std::optional<int> component;
+};
+[[nodiscard]] AttributeName split_name(const std::string& name);
+
+}  // namespace flexel

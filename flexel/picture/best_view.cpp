@@ -1,0 +1,86 @@
+// Each candidate is looked at with a few thousand rays.
+#include "flexel/picture/best_view.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "formats/parallel.h"
+
+namespace flexel {
+namespace {
+
+constexpr int kAcross = 72, kDown = 54;
+
+// Entropy, in nats, of the shares of the picture that the faces take up, the background being one of them.
+double entropy(const Drawable& drawn, const std::vector<Hit>& hits) {
+  std::vector<std::uint32_t> seen;
+  for (const Hit& hit : hits)
+    seen.push_back(hit.primitive == kNoHit ? kNoHit
+                   : drawn.face.empty()    ? drawn.part[hit.primitive]
+                                           : drawn.face[hit.primitive]);
+  std::sort(seen.begin(), seen.end());
+  double sum = 0;
+  for (std::size_t i = 0; i < seen.size();) {
+    std::size_t stop = i;
+    while (stop < seen.size() && seen[stop] == seen[i]) ++stop;
+    const double share = static_cast<double>(stop - i) / static_cast<double>(seen.size());
+    sum -= share * std::log(share);
+    i = stop;
+  }
+  return sum;
+}
+
+double score(const ViewSubject& subject, const View& view, double aspect) {
+  Camera camera = camera_towards(view);
+  const Drawable& drawn = *subject.drawn;
+  std::vector<Vec3f> centres;
+  for (const Eigen::Vector4f& sphere : drawn.spheres) centres.push_back(sphere.head<3>());
+  const Eigen::Vector4f box = extent(camera, drawn.triangles.empty() ? centres : drawn.vertices);
+  const double width = std::max(1e-6f, box[2] - box[0]), height = std::max(1e-6f, box[3] - box[1]);
+  const double half = std::max(width / aspect, height) / 2;  // of the frame's height
+  camera.pixels = static_cast<float>(kDown / (2 * half));
+  camera.x = kAcross / 2.0f - camera.pixels * (box[0] + box[2]) / 2;
+  camera.y = kDown / 2.0f + camera.pixels * (box[1] + box[3]) / 2;
+  std::vector<Ray> rays;
+  for (int y = 0; y < kDown; ++y)
+    for (int x = 0; x < kAcross; ++x)
+      rays.push_back(camera.ray(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f));
+  std::vector<Hit> hits(rays.size());
+  subject.tracer->intersect(rays, hits);
+  const double total = subject.motion.trace();
+  const Vec3 sight = camera.forward.cast<double>();
+  const double across = total > 0 ? 1 - sight.dot(subject.motion * sight) / total : 1;
+  return (0.2 + entropy(drawn, hits)) * (0.35 + 0.65 * std::sqrt(std::clamp(across, 0.0, 1.0)));
+}
+
+struct Candidate {
+  View view;
+  double preference;
+};
+
+std::vector<Candidate> candidates() {
+  std::vector<Candidate> all;
+  for (const double elevation : {25.0, 35.0, 50.0})
+    for (const double azimuth : {35.0, -35.0, 60.0, -60.0, 145.0, -145.0, 120.0, -120.0}) {
+      const double side = std::abs(azimuth) > 90 ? 0.8 : azimuth > 0 ? 1.0 : 0.87;
+      all.push_back({{azimuth, elevation}, side * (elevation > 40 ? 0.96 : 1.0)});
+    }
+  return all;
+}
+
+}  // namespace
+
+View best_view(const std::vector<ViewSubject>& subjects, double aspect) {
+  const std::vector<Candidate> all = candidates();
+  std::vector<double> scores(all.size(), 0);
+  parallel_for_each(
+      all.size(),
+      [&](std::size_t i) {
+        for (const ViewSubject& subject : subjects)
+          scores[i] += all[i].preference * score(subject, all[i].view, aspect);
+      },
+      1);
+  return all[static_cast<std::size_t>(std::max_element(scores.begin(), scores.end()) - scores.begin())].view;
+}
+
+}  // namespace flexel

@@ -1,0 +1,162 @@
+// Every pixel of a 4 x 4 block takes its own sixteenth of one set of directions (the R2 sequence of M.
+// Roberts, 2018), so that a block together has sampled the sky evenly; pixels with the same sixteenth are
+// traced together, which keeps the rays of a packet nearly parallel.
+#include "flexel/picture/light.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "formats/parallel.h"
+
+namespace flexel {
+namespace {
+
+constexpr int kTile = 16, kBlock = 4;
+constexpr int kSkyRays = 4, kLampRays = 2;  // a pixel
+constexpr float kSkyReach = 0.7f;           // of the part's radius: what is farther away darkens nothing
+constexpr float kLampSize = 0.22f;          // tangent of the lamp's half angle
+constexpr float kLift = 2e-4f;              // off the surface, of the part's radius
+
+// Point j of the R2 sequence.
+Eigen::Vector2f sample(int j) {
+  const double a = 0.5 + 0.7548776662466927 * j, b = 0.5 + 0.5698402909980532 * j;
+  return {static_cast<float>(a - std::floor(a)), static_cast<float>(b - std::floor(b))};
+}
+
+Eigen::Vector2f on_disc(const Eigen::Vector2f& s) {
+  const float radius = std::sqrt(s.x()), angle = 2 * std::numbers::pi_v<float> * s.y();
+  return {radius * std::cos(angle), radius * std::sin(angle)};
+}
+
+// Cosine-weighted about the facet's normal.
+Ray sky_ray(const Surfel& at, int j) {
+  const Eigen::Vector2f disc = on_disc(sample(j));
+  const TangentBase base = tangent_base(at.geometric);
+  const Vec3f direction = disc.x() * base.x + disc.y() * base.y +
+                          std::sqrt(std::max(0.0f, 1 - disc.squaredNorm())) * at.geometric;
+  return {at.position + kLift * at.geometric, direction, 0, kSkyReach};
+}
+
+Ray lamp_ray(const Surfel& at, const Vec3f& lamp, const TangentBase& base, int j) {
+  const Eigen::Vector2f disc = kLampSize * on_disc(sample(j));
+  return {at.lifted + kLift * at.geometric, (lamp + disc.x() * base.x + disc.y() * base.y).normalized(), 0,
+          1e30f};
+}
+
+// Pixels of one tile that share a place in their blocks, with what they show.
+struct Group {
+  std::vector<std::size_t> pixels;
+  std::vector<Surfel> surfels;
+};
+
+Group gather(const PixelBuffer& buffer, const Viewport& viewport, const Camera& camera, const Drawable& drawn,
+             int left, int top) {
+  Group group;
+  for (int y = top; y < std::min(top - top % kBlock + kTile, buffer.height); y += kBlock)
+    for (int x = left; x < std::min(left - left % kBlock + kTile, buffer.width); x += kBlock) {
+      const std::size_t i = buffer.index(x, y);
+      if (buffer.hits[i].primitive == kNoHit) continue;
+      const Ray ray =
+          camera.ray(static_cast<float>(viewport.x + x) + 0.5f, static_cast<float>(viewport.y + y) + 0.5f);
+      group.pixels.push_back(i);
+      group.surfels.push_back(surfel_at(drawn, ray, buffer.hits[i]));
+    }
+  return group;
+}
+
+void light_group(const Group& group, int place, const Tracer& tracer, const Vec3f& lamp,
+                 std::vector<Light>& light) {
+  const TangentBase base = tangent_base(lamp);
+  std::vector<Ray> rays(group.pixels.size());
+  std::vector<std::uint8_t> blocked(rays.size());
+  std::vector<int> sky(rays.size(), 0), lamps(rays.size(), 0);
+  for (int k = 0; k < kSkyRays; ++k) {
+    for (std::size_t i = 0; i < rays.size(); ++i) rays[i] = sky_ray(group.surfels[i], 16 * k + place);
+    tracer.occluded(rays, blocked);
+    for (std::size_t i = 0; i < rays.size(); ++i) sky[i] += blocked[i];
+  }
+  for (int k = 0; k < kLampRays; ++k) {
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      rays[i] = lamp_ray(group.surfels[i], lamp, base, 16 * k + place);
+      // A point whose facet looks away needs no ray, unless the smooth surface would see the lamp.
+      if (group.surfels[i].normal.dot(lamp) <= 0) rays[i].far = 0;
+    }
+    tracer.occluded(rays, blocked);
+    for (std::size_t i = 0; i < rays.size(); ++i) lamps[i] += blocked[i];
+  }
+  for (std::size_t i = 0; i < rays.size(); ++i)
+    light[group.pixels[i]] = {1 - static_cast<float>(sky[i]) / kSkyRays,
+                              1 - static_cast<float>(lamps[i]) / kLampRays};
+}
+
+// How far pixel q is on the same smooth surface as a point with this normal and place.
+float kinship(const Vec3f& normal, const Vec3f& other, float off_plane, float tolerance) {
+  const float turn = std::clamp((normal.dot(other) - 0.8f) * 5, 0.0f, 1.0f);
+  return turn * turn * std::max(0.0f, 1 - std::abs(off_plane) / tolerance);
+}
+
+}  // namespace
+
+Vec3f lamp_direction(const Camera& camera) {
+  return (-0.50f * camera.right + 0.72f * camera.up - 0.62f * camera.forward).normalized();
+}
+
+std::vector<Light> trace_light(const PixelBuffer& buffer, const Viewport& viewport, const Camera& camera,
+                               const Drawable& drawn, const Tracer& tracer) {
+  std::vector<Light> light(buffer.hits.size());
+  const int across = (buffer.width + kTile - 1) / kTile, down = (buffer.height + kTile - 1) / kTile;
+  const Vec3f lamp = lamp_direction(camera);
+  parallel_for_each(
+      static_cast<std::size_t>(across) * static_cast<std::size_t>(down),
+      [&](std::size_t tile) {
+        const int left = static_cast<int>(tile) % across * kTile,
+                  top = static_cast<int>(tile) / across * kTile;
+        for (int place = 0; place < kBlock * kBlock; ++place) {
+          // A permutation of the places, so that neighbours get distant points of the sequence.
+          const Group group =
+              gather(buffer, viewport, camera, drawn, left + place % kBlock, top + place / kBlock);
+          if (!group.pixels.empty()) light_group(group, place * 7 % 16, tracer, lamp, light);
+        }
+      },
+      4);
+  return light;
+}
+
+std::vector<Light> smooth_light(const std::vector<Light>& light, const PixelBuffer& buffer,
+                                const Camera& camera) {
+  constexpr int kReach = 3;
+  const float pixel = 1 / camera.pixels, tolerance = 3 * pixel;
+  std::vector<Light> smooth(light.size());
+  const auto smooth_pixel = [&](int x, int y) {
+    const std::size_t i = buffer.index(x, y);
+    if (buffer.hits[i].primitive == kNoHit) return;
+    const Vec3f normal = buffer.normals[i];
+    // The plane through the point, as depth over pixels.
+    const float facing = std::max(0.05f, -normal.dot(camera.forward));
+    const float a = normal.dot(camera.right) * pixel, b = -normal.dot(camera.up) * pixel;
+    float sky = 0, lamp = 0, total = 0;
+    for (int v = std::max(0, y - kReach); v <= std::min(buffer.height - 1, y + kReach); ++v)
+      for (int u = std::max(0, x - kReach); u <= std::min(buffer.width - 1, x + kReach); ++u) {
+        const std::size_t j = buffer.index(u, v);
+        if (buffer.hits[j].primitive == kNoHit) continue;
+        const float off = a * static_cast<float>(u - x) + b * static_cast<float>(v - y) -
+                          facing * (buffer.hits[j].t - buffer.hits[i].t);
+        const auto tent = static_cast<float>((kReach + 1 - std::abs(u - x)) * (kReach + 1 - std::abs(v - y)));
+        const float weight = tent * (j == i ? 1 : kinship(normal, buffer.normals[j], off, tolerance));
+        sky += weight * light[j].sky;
+        lamp += weight * light[j].lamp;
+        total += weight;
+      }
+    smooth[i] = {sky / total, lamp / total};
+  };
+  parallel_for_each(
+      static_cast<std::size_t>(buffer.height),
+      [&](std::size_t y) {
+        for (int x = 0; x < buffer.width; ++x) smooth_pixel(x, static_cast<int>(y));
+      },
+      8);
+  return smooth;
+}
+
+}  // namespace flexel

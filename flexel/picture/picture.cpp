@@ -1,0 +1,203 @@
+// The passes in order: what each panel shows, the range of the colours, the view, the layout; then shaded
+// parts, lines over them, words last.
+#include "flexel/picture/picture.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "flexel/picture/layout.h"
+#include "flexel/picture/lines.h"
+#include "flexel/picture/panel.h"
+#include "flexel/picture/text.h"
+#include "formats/error.h"
+#include "formats/program.h"
+
+namespace flexel {
+namespace {
+
+constexpr std::uint32_t kPaper = 0xfafbfc, kRestInk = 0x7a8794;
+
+double range_end(const std::string& text, std::optional<Dimension> dimension) {
+  try {
+    if (dimension) return parse_quantity(text, *dimension);
+    std::size_t used = 0;
+    const double value = std::stod(text, &used);
+    if (std::isfinite(value) && text.find_first_not_of(' ', used) == std::string::npos) return value;
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("--range: {}", error.what()));
+  } catch (const std::exception&) {
+  }
+  throw InputError(fmt::format("--range: \"{}\" is not a number", text));
+}
+
+// The unit may stand at the second number alone: "1:5 mm".
+std::pair<double, double> given_range(const std::pair<std::string, std::string>& range,
+                                      std::optional<Dimension> dimension) {
+  std::string first = range.first;
+  const std::size_t unit = range.second.find_last_of("0123456789.");
+  if (first.find_last_not_of(" ") == first.find_last_of("0123456789.") && unit != std::string::npos)
+    first += range.second.substr(unit + 1);
+  const double low = range_end(first, dimension), high = range_end(range.second, dimension);
+  if (!(low < high)) throw InputError(fmt::format("--range: {} is not below {}", range.first, range.second));
+  return {low, high};
+}
+
+// The range of all panels' values. Lengths of vectors begin at zero.
+Legend make_legend(const std::vector<Panel>& panels, const ColourBy& by, const PictureOptions& options,
+                   std::vector<std::string>& notes) {
+  Legend legend;
+  legend.title = by.name;
+  const std::optional<Dimension> dimension = dimension_of(by.name);
+  double low = 0, high = 0;
+  bool any = false;
+  for (const Panel& panel : panels) {
+    if (!panel.low) continue;
+    low = any ? std::min<double>(low, *panel.low) : static_cast<double>(*panel.low);
+    high = any ? std::max<double>(high, *panel.high) : static_cast<double>(*panel.high);
+    any = true;
+  }
+  if (!any) notes.push_back(fmt::format("no point has a value of \"{}\": everything is grey", by.name));
+  legend.largest = high;
+  if (low >= 0 && low < 0.5 * high) low = 0;
+  if (options.range) std::tie(low, high) = given_range(*options.range, dimension);
+  legend.low = low;
+  legend.high = high > low ? high : low + std::max(1e-30, 1e-3 * std::abs(low));
+  legend.unit = display_unit(dimension, std::max(std::abs(legend.low), std::abs(legend.high)));
+  return legend;
+}
+
+View choose_view(const std::vector<Panel>& panels, const PictureOptions& options,
+                 std::vector<std::string>& notes) {
+  if (options.view) return *options.view;
+  std::vector<ViewSubject> subjects;
+  for (const Panel& panel : panels) subjects.push_back({&panel.drawn, panel.tracer.get(), panel.motion});
+  const View view = best_view(subjects, static_cast<double>(options.width) / options.height);
+  notes.push_back(fmt::format("view {:g},{:g}", view.azimuth, view.elevation));
+  return view;
+}
+
+void draw_panel(Image& image, const Panel& panel, const Viewport& viewport, const Camera& camera,
+                const ShadeOptions& shade, float scale) {
+  // The viewport holds the part exactly; outlines and soft edges need a little more.
+  const int spare = 4;
+  Viewport room{std::max(0, viewport.x - spare), std::max(0, viewport.y - spare), 0, 0};
+  room.width = std::min(image.width, viewport.x + viewport.width + spare) - room.x;
+  room.height = std::min(image.height, viewport.y + viewport.height + spare) - room.y;
+  render(image, room, camera, panel.drawn, *panel.tracer, shade);
+  throw_if_interrupted();
+  LineStyle style;
+  style.scale = scale;
+  if (panel.rest) {
+    const Moved moved{panel.drawn, *panel.tracer};
+    LineStyle rest = style;
+    rest.ink = colour(kRestInk);
+    rest.strength = 0.85f;
+    rest.strength_behind = 0.16f;
+    rest.scale = 0.8f * scale;
+    draw_lines(image, visible_lines(*panel.rest, *panel.rest_tracer, camera, &moved), rest);
+  }
+  if (!panel.drawn.triangles.empty())
+    draw_lines(image, visible_lines(panel.drawn, *panel.tracer, camera), style);
+}
+
+// What the picture has to say of itself, bottom right.
+std::vector<std::string> captions(const std::vector<Panel>& panels, double exaggeration) {
+  std::vector<std::string> lines;
+  const bool moved =
+      std::any_of(panels.begin(), panels.end(), [](const Panel& p) { return p.largest_displacement > 0; });
+  if (moved && exaggeration != 1)
+    lines.push_back(fmt::format("deformation drawn {:g} times as large", exaggeration));
+  if (std::any_of(panels.begin(), panels.end(), [](const Panel& p) { return p.rest.has_value(); }))
+    lines.emplace_back("grey lines: before");
+  return lines;
+}
+
+void annotate(Image& image, const std::vector<Panel>& panels, const Layout& layout, const Framing& framing,
+              const Legend* legend, double exaggeration) {
+  const float size = layout.text;
+  if (legend != nullptr) draw_legend(image, layout.legend, size, *legend);
+  draw_triad(image, 4.2f * size, layout.foot - 0.5f * size, size, framing.cameras.front());
+  const float most = 0.2f * static_cast<float>(image.width);
+  for (std::size_t p = 0; p < panels.size(); ++p) {
+    const Viewport& room = layout.panels[p];
+    const double pixels = static_cast<double>(framing.cameras[p].pixels) / panels[p].frame.radius;
+    const auto left = static_cast<float>(room.x), width = static_cast<float>(room.width);
+    if (layout.labels)
+      draw_text(image, left + width / 2, static_cast<float>(room.y) - size,
+                shortened(panels[p].subject->label, size, width), size, colour(kInk), Anchor::middle);
+    if (!framing.common_scale) {
+      draw_scale_bar(image, left, static_cast<float>(room.y + room.height) + 0.2f * size, 0.85f * size,
+                     pixels, std::min(most, width / 3));
+    } else if (p == 0) {
+      draw_scale_bar(image, 9 * size, layout.foot + 0.9f * size, size, pixels, most);
+    }
+  }
+  float y = layout.foot + 0.9f * size;
+  const std::vector<std::string> lines = captions(panels, exaggeration);
+  for (auto line = lines.rbegin(); line != lines.rend(); ++line, y -= 1.4f * size)
+    draw_text(image, static_cast<float>(image.width) - 2.4f * size, y, *line, size, colour(kFaintInk),
+              Anchor::right);
+}
+
+// One factor for all panels, so that they can be compared.
+double exaggeration_of(const std::vector<PictureSubject>& subjects, const PictureOptions& options) {
+  if (options.exaggeration) return *options.exaggeration;
+  double factor = 0;
+  for (const PictureSubject& subject : subjects)
+    if (subject.body && subject.body->position != subject.body->rest) {
+      const double fitting = fitting_exaggeration(*subject.body);
+      factor = factor > 0 ? std::min(factor, fitting) : fitting;
+    }
+  return factor > 0 ? factor : 1;
+}
+
+std::vector<Panel> make_panels(const std::vector<PictureSubject>& subjects, const PictureOptions& options,
+                               const ColourBy& by, Progress& progress) {
+  std::vector<Panel> panels;
+  for (const PictureSubject& subject : subjects) {
+    panels.push_back(make_panel(subject, options, by, progress));
+    throw_if_interrupted();
+  }
+  return panels;
+}
+
+}  // namespace
+
+PictureResult draw_picture(const std::vector<PictureSubject>& subjects, const PictureOptions& given,
+                           Progress& progress) {
+  PictureOptions options = given;
+  options.exaggeration = exaggeration_of(subjects, given);
+  // The fill is a property of cells: on the surface it would be smeared.
+  const bool cells = std::all_of(subjects.begin(), subjects.end(),
+                                 [](const PictureSubject& s) { return s.body && s.body->cell_count() > 0; });
+  if (options.colour == "fill" && options.show == PictureOptions::Show::surface && cells)
+    options.show = PictureOptions::Show::cells;
+  const ColourBy by = colour_by(subjects, options);
+  if (options.range && by.name.empty()) throw InputError("--range needs a --color to be the range of");
+  std::vector<Panel> panels = make_panels(subjects, options, by, progress);
+  PictureResult result{Image(options.width, options.height, colour(kPaper)), {}};
+  std::optional<Legend> legend;
+  if (!by.name.empty()) legend = make_legend(panels, by, options, result.notes);
+  progress.update(0.4, "choosing the view");
+  const View view = choose_view(panels, options, result.notes);
+  const Layout layout = lay_out(panels.size(), options, legend ? &*legend : nullptr);
+  const Framing framing = frame_panels(panels, layout, view);
+  progress.update(0.5, "casting rays");
+  for (std::size_t p = 0; p < panels.size(); ++p) {
+    ShadeOptions shade;
+    shade.by_value = !by.name.empty() && !by.by_rays;
+    shade.thickness = by.by_rays;
+    shade.unit = static_cast<float>(panels[p].frame.radius);
+    if (legend) {
+      shade.low = static_cast<float>(legend->low);
+      shade.high = static_cast<float>(legend->high);
+    }
+    draw_panel(result.image, panels[p], layout.panels[p], framing.cameras[p], shade, layout.text / 21);
+  }
+  annotate(result.image, panels, layout, framing, legend ? &*legend : nullptr, *options.exaggeration);
+  return result;
+}
+
+}  // namespace flexel

@@ -1,0 +1,45 @@
+// A picture of surfaces and bodies: what `flexel picture` does but for its arguments and files.
+#pragma once
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "flexel/picture/camera.h"
+#include "flexel/picture/image.h"
+#include "formats/body.h"
+#include "formats/progress.h"
+
+namespace flexel {
+
+// One panel: a surface, or a body (whose own surface is drawn).
+struct PictureSubject {
+  std::string label;  // the file's name
+  std::string where;  // the same for messages, as given
+  Surface surface;    // without a body
+  std::optional<Body> body;
+};
+
+struct PictureOptions {
+  int width = 1600, height = 1200;
+  std::optional<View> view;                                           // else chosen
+  enum class Show { surface, cells, elements } show = Show::surface;  // cells and elements: bodies only
+  // "none"; or an attribute; else displacement for bodies that are deformed, and none
+  std::optional<std::string> colour;
+  std::optional<std::pair<std::string, std::string>>
+      range;                               // as written: numbers with units; else that of the values
+  std::optional<double> exaggeration = 1;  // of the displacement; nothing: as chosen for it to be seen
+  bool outline_at_rest = true;
+};
+
+struct PictureResult {
+  Image image;
+  std::vector<std::string> notes;  // for the user: the view, the range, what was left out
+};
+
+// Throws InputError: an attribute that is not there (with those that are), a range that is none, cells asked
+// of a surface, a body without a surface or cells.
+[[nodiscard]] PictureResult draw_picture(const std::vector<PictureSubject>& subjects,
+                                         const PictureOptions& options, Progress& progress);
+
+}  // namespace flexel
