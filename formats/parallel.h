@@ -5,7 +5,9 @@
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/info.h>
 #include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/parallel_invoke.h>
 #include <oneapi/tbb/parallel_sort.h>
+#include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
 #include <cstddef>
@@ -28,6 +30,19 @@ class ThreadLimit {
 
 [[nodiscard]] inline int default_thread_count() {
   return tbb::info::default_concurrency();
+}
+
+// Threads that the functions below use now, at least 1.
+[[nodiscard]] inline std::size_t thread_count() {
+  const std::size_t allowed = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
+  return std::max<std::size_t>(
+      1, std::min(allowed, static_cast<std::size_t>(tbb::this_task_arena::max_concurrency())));
+}
+
+// Both at the same time.
+template <class First, class Second>
+void parallel_both(const First& first, const Second& second) {
+  tbb::parallel_invoke(first, second);
 }
 
 // body(begin, end) over [0, n) in chunks of `grain`.

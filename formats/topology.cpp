@@ -10,6 +10,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "formats/bucket.h"
 #include "formats/disjoint_sets.h"
 #include "formats/parallel.h"
 #include "formats/weld.h"
@@ -25,14 +26,10 @@ bool degenerate(const Corners& c) {
 
 // Half-edge 3 t + i runs from corner i of triangle t to the next. Those of bucket v have v as their lower
 // corner.
-struct HalfEdges {
-  std::vector<std::uint32_t> starts;   // (vertices + 1)
-  std::vector<std::uint64_t> members;  // higher corner << 32 | half-edge
-};
+using HalfEdges = Buckets<std::uint64_t>;  // higher corner << 32 | half-edge
 
 HalfEdges bucket_half_edges(const std::vector<Corners>& corners, std::size_t vertex_count) {
-  HalfEdges edges{std::vector<std::uint32_t>(vertex_count + 1, 0), {}};
-  const auto for_each_edge = [&](const auto& use) {
+  return sort_into_buckets<std::uint64_t>(vertex_count, [&](const auto& use) {
     for (std::size_t t = 0; t < corners.size(); ++t) {
       if (degenerate(corners[t])) continue;
       for (std::size_t i = 0; i < 3; ++i) {
@@ -40,13 +37,7 @@ HalfEdges bucket_half_edges(const std::vector<Corners>& corners, std::size_t ver
         use(low, static_cast<std::uint64_t>(high) << 32 | (3 * t + i));
       }
     }
-  };
-  for_each_edge([&](std::uint32_t low, std::uint64_t) { ++edges.starts[low + 1]; });
-  std::partial_sum(edges.starts.begin(), edges.starts.end(), edges.starts.begin());
-  edges.members.resize(edges.starts.back());
-  std::vector<std::uint32_t> next(edges.starts.begin(), edges.starts.end() - 1);
-  for_each_edge([&](std::uint32_t low, std::uint64_t edge) { edges.members[next[low]++] = edge; });
-  return edges;
+  });
 }
 
 // Edges counted in a range of buckets, and the pairs of triangles that meet at a non-manifold edge.
@@ -77,13 +68,13 @@ void pair_edge(const std::uint64_t* begin, const std::uint64_t* end, const std::
 std::vector<std::array<std::uint32_t, 2>> pair_edges(const std::vector<Corners>& corners, HalfEdges& edges,
                                                      Topology& result) {
   constexpr std::size_t kGrain = 1 << 14;
-  const std::size_t n = edges.starts.size() - 1;
+  const std::size_t n = edges.begin.size() - 1;
   std::vector<EdgeTally> tallies(n / kGrain + 1);
   parallel_chunks(n, kGrain, [&](std::size_t begin, std::size_t end) {
     EdgeTally& tally = tallies[begin / kGrain];
     for (std::size_t v = begin; v < end; ++v) {
-      std::uint64_t* first = edges.members.data() + edges.starts[v];
-      std::uint64_t* last = edges.members.data() + edges.starts[v + 1];
+      std::uint64_t* first = edges.values.data() + edges.begin[v];
+      std::uint64_t* last = edges.values.data() + edges.begin[v + 1];
       std::sort(first, last);
       for (std::uint64_t* run = first; run != last;) {
         std::uint64_t* stop = run;

@@ -14,7 +14,7 @@
 namespace flexel::vtu {
 namespace {
 
-constexpr std::size_t kChunkBytes = std::size_t{1} << 19;
+constexpr std::size_t kChunkBytes = std::size_t{1} << 20, kPieceBytes = std::size_t{1} << 18;
 
 template <class Use>
 void for_each_chunk(const Array& array, const Use& use) {
@@ -26,7 +26,10 @@ void for_each_chunk(const Array& array, const Use& use) {
   Bytes chunk(step * array.tuple_size());
   for (std::size_t begin = 0; begin < array.tuples; begin += step) {
     const std::size_t end = std::min(array.tuples, begin + step);
-    array.make(begin, end, chunk.data());
+    parallel_chunks(end - begin, std::max<std::size_t>(1, kPieceBytes / array.tuple_size()),
+                    [&](std::size_t first, std::size_t last) {
+                      array.make(begin + first, begin + last, chunk.data() + first * array.tuple_size());
+                    });
     use(chunk.data(), (end - begin) * array.tuple_size());
   }
 }

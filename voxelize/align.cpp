@@ -7,6 +7,9 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <optional>
+
+#include "formats/parallel.h"
 
 namespace flexel {
 namespace {
@@ -56,19 +59,30 @@ Lattice snapped(const PartMesh& mesh, double size, bool cubic) {
   return lattice;
 }
 
+// The plane of a triangle that lies across `axis`.
+std::optional<FacePlane> flat_across(const PartMesh& mesh, const Corners& c, const Vec3& axis,
+                                     double tolerance) {
+  constexpr double kSine = 1.75e-3;  // of 0.1 degree
+  const Vec3& a = mesh.world[c[0]];
+  const Vec3 normal = (mesh.world[c[1]] - a).cross(mesh.world[c[2]] - a) / 2;
+  if (normal.cross(axis).squaredNorm() > kSine * kSine * normal.squaredNorm()) return {};
+  const double u = axis.dot(a), v = axis.dot(mesh.world[c[1]]), w = axis.dot(mesh.world[c[2]]);
+  if (std::max({u, v, w}) - std::min({u, v, w}) > tolerance) return {};
+  return FacePlane{(u + v + w) / 3, normal.norm()};
+}
+
 }  // namespace
 
 std::vector<FacePlane> face_planes(const PartMesh& mesh, const Vec3& axis, double tolerance) {
-  constexpr double kSine = 1.75e-3;  // of 0.1 degree
+  constexpr std::size_t kGrain = 1 << 14;
+  std::vector<std::vector<FacePlane>> of_chunk((mesh.corners.size() + kGrain - 1) / kGrain);
+  parallel_chunks(mesh.corners.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t)
+      if (const auto face = flat_across(mesh, mesh.corners[t], axis, tolerance))
+        of_chunk[begin / kGrain].push_back(*face);
+  });
   std::vector<FacePlane> faces;
-  for (const Corners& c : mesh.corners) {
-    const Vec3& a = mesh.world[c[0]];
-    const Vec3 normal = (mesh.world[c[1]] - a).cross(mesh.world[c[2]] - a) / 2;
-    if (normal.cross(axis).squaredNorm() > kSine * kSine * normal.squaredNorm()) continue;
-    const double u = axis.dot(a), v = axis.dot(mesh.world[c[1]]), w = axis.dot(mesh.world[c[2]]);
-    if (std::max({u, v, w}) - std::min({u, v, w}) <= tolerance)
-      faces.push_back({(u + v + w) / 3, normal.norm()});
-  }
+  for (const auto& part : of_chunk) faces.insert(faces.end(), part.begin(), part.end());
   std::sort(faces.begin(), faces.end(),
             [](const FacePlane& a, const FacePlane& b) { return a.offset < b.offset; });
   std::vector<FacePlane> planes;

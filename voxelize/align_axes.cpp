@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include "formats/parallel.h"
 #include "voxelize/align.h"
 
 namespace flexel {
@@ -54,14 +55,34 @@ std::size_t coarse_square(const Vec3& vector) {
          square(vector[(largest + 2) % 3]);
 }
 
+// use(chunk, triangle's corners) for all triangles, in a number of chunks that is always the same.
+constexpr std::size_t kChunks = 16;
+template <class Use>
+void for_each_triangle(const PartMesh& mesh, const Use& use) {
+  const std::size_t n = mesh.corners.size();
+  parallel_for_each(
+      kChunks,
+      [&](std::size_t chunk) {
+        for (std::size_t t = chunk * n / kChunks; t < (chunk + 1) * n / kChunks; ++t)
+          use(chunk, mesh.corners[t]);
+      },
+      1);
+}
+
 // Squares in which enough area gathers for a dominant face to be there.
 std::vector<bool> heavy_squares(const PartMesh& mesh, double least_area) {
-  std::vector<double> area(3 * kSquares * kSquares, 0);
-  for (const Corners& c : mesh.corners)
+  std::array<std::vector<double>, kChunks> area;
+  for (auto& of_chunk : area) of_chunk.assign(3 * kSquares * kSquares, 0);
+  for_each_triangle(mesh, [&](std::size_t chunk, const Corners& c) {
     if (const Vec3 vector = area_vector(mesh, c); vector.squaredNorm() > 0)
-      area[coarse_square(vector)] += vector.norm();
+      area[chunk][coarse_square(vector)] += vector.norm();
+  });
   std::vector<bool> heavy;
-  for (const double sum : area) heavy.push_back(sum >= least_area);
+  for (std::size_t square = 0; square < area[0].size(); ++square) {
+    double sum = 0;
+    for (const auto& of_chunk : area) sum += of_chunk[square];
+    heavy.push_back(sum >= least_area);
+  }
   return heavy;
 }
 
@@ -70,12 +91,15 @@ std::vector<bool> heavy_squares(const PartMesh& mesh, double least_area) {
 std::vector<Direction> gather(const PartMesh& mesh, double least_area) {
   const std::vector<bool> heavy = heavy_squares(mesh, least_area);
   if (std::find(heavy.begin(), heavy.end(), true) == heavy.end()) return {};
-  std::map<Cell, Vec3> cells;
-  for (const Corners& c : mesh.corners) {
+  std::array<std::map<Cell, Vec3>, kChunks> of_chunk;
+  for_each_triangle(mesh, [&](std::size_t chunk, const Corners& c) {
     const Vec3 vector = area_vector(mesh, c);
-    if (!(vector.squaredNorm() > 0) || !heavy[coarse_square(vector)]) continue;
-    cells.try_emplace(cell_of(vector.normalized()), Vec3::Zero()).first->second += vector;
-  }
+    if (vector.squaredNorm() > 0 && heavy[coarse_square(vector)])
+      of_chunk[chunk].try_emplace(cell_of(vector.normalized()), Vec3::Zero()).first->second += vector;
+  });
+  std::map<Cell, Vec3> cells;
+  for (const auto& part : of_chunk)
+    for (const auto& [cell, vector] : part) cells.try_emplace(cell, Vec3::Zero()).first->second += vector;
   std::vector<Direction> directions;
   for (const auto& [cell, vector] : cells) directions.push_back({vector.normalized(), vector.norm()});
   std::stable_sort(directions.begin(), directions.end(),

@@ -9,9 +9,9 @@
 #include <numeric>
 #include <utility>
 
+#include "formats/bucket.h"
 #include "formats/parallel.h"
 #include "voxelize/elements.h"
-#include "voxelize/reserve.h"
 
 namespace flexel {
 namespace {
@@ -19,15 +19,38 @@ namespace {
 constexpr std::uint32_t kNoCell = 0xffffffffu;
 constexpr double kNothing = 1e-9;  // fill: the rim of a face that lies on a lattice plane, no sliver
 
-// Pieces that become something: (pieces) their number, or kNoCell.
-std::vector<std::uint32_t> number_kept(const Voxels& voxels, bool (*keep)(const Piece&),
-                                       std::uint32_t first) {
-  std::vector<std::uint32_t> number;
-  resize_large(number, voxels.piece_count());
-  std::size_t p = 0;
-  for (const Slab& slab : voxels.slabs)
-    for (const Piece& piece : slab.pieces) number[p++] = keep(piece) ? first++ : kNoCell;
-  return number;
+// Pieces that become something, numbered on from `first`.
+struct KeptPieces {
+  std::vector<std::uint32_t> number;  // (pieces) or kNoCell
+  std::size_t count = 0;
+};
+
+KeptPieces number_kept(const Voxels& voxels, bool (*keep)(const Piece&), std::uint32_t first) {
+  const std::size_t slabs = voxels.slabs.size();
+  std::vector<std::uint32_t> next(slabs);
+  parallel_for_each(
+      slabs,
+      [&](std::size_t s) {
+        const std::vector<Piece>& pieces = voxels.slabs[s].pieces;
+        next[s] = static_cast<std::uint32_t>(std::count_if(pieces.begin(), pieces.end(), keep));
+      },
+      2);
+  KeptPieces kept;
+  for (std::uint32_t& number : next) {
+    const std::uint32_t here = number;
+    number = first + static_cast<std::uint32_t>(kept.count);
+    kept.count += here;
+  }
+  resize_touched(kept.number, voxels.piece_count());
+  parallel_for_each(
+      slabs,
+      [&](std::size_t s) {
+        std::size_t p = voxels.first_piece[s];
+        for (const Piece& piece : voxels.slabs[s].pieces)
+          kept.number[p++] = keep(piece) ? next[s]++ : kNoCell;
+      },
+      2);
+  return kept;
 }
 
 bool has_cell(const Piece& piece) {
@@ -37,16 +60,28 @@ bool has_centre(const Piece& piece) {
   return piece.flags & kContainsCentre;
 }
 
-AssembledPart count_volumes(const Voxels& voxels, bool (*keep)(const Piece&)) {
+AssembledPart count_slab(const Slab& slab, bool (*keep)(const Piece&)) {
   AssembledPart result;
-  for (const Slab& slab : voxels.slabs)
-    for (const Piece& piece : slab.pieces) {
-      if (keep(piece))
-        result.volume += piece.fill;
-      else if (std::abs(piece.fill) > kNothing)
-        result.dropped_volume += piece.fill;
-      result.dropped_cells += !keep(piece) && piece.fill > kNothing;
-    }
+  for (const Piece& piece : slab.pieces) {
+    if (keep(piece))
+      result.volume += piece.fill;
+    else if (std::abs(piece.fill) > kNothing)
+      result.dropped_volume += piece.fill;
+    result.dropped_cells += !keep(piece) && piece.fill > kNothing;
+  }
+  return result;
+}
+
+AssembledPart count_volumes(const Voxels& voxels, bool (*keep)(const Piece&)) {
+  std::vector<AssembledPart> of_slab(voxels.slabs.size());
+  parallel_for_each(
+      of_slab.size(), [&](std::size_t s) { of_slab[s] = count_slab(voxels.slabs[s], keep); }, 2);
+  AssembledPart result;
+  for (const AssembledPart& slab : of_slab) {
+    result.volume += slab.volume;
+    result.dropped_volume += slab.dropped_volume;
+    result.dropped_cells += slab.dropped_cells;
+  }
   return result;
 }
 
@@ -57,7 +92,6 @@ void append(std::vector<Value>&& from, std::vector<Value>& to) {
     to = std::move(from);
     return;
   }
-  reserve_large(to, to.size() + from.size());
   to.insert(to.end(), from.begin(), from.end());
 }
 
@@ -67,14 +101,13 @@ void append_elements(std::vector<Index3>&& index, std::vector<std::uint16_t>&& n
   const Vec3 shift = Vec3::Constant(part.placement == Placement::centre ? .5 : 0);
   append(std::move(index), body.lattice_index);
   append(std::move(number), body.piece);
-  resize_large(body.rest, first + n);
+  resize_touched(body.rest, first + n);
+  resize_touched(body.position, first + n);
   parallel_for_each(n, [&](std::size_t e) {
     const Index3& at = body.lattice_index[first + e];
-    body.rest[first + e] = part.lattice.to_world(Vec3(at[0], at[1], at[2]) + shift);
+    body.position[first + e] = body.rest[first + e] =
+        part.lattice.to_world(Vec3(at[0], at[1], at[2]) + shift);
   });
-  reserve_large(body.position, first + n);
-  body.position.insert(body.position.end(), body.rest.begin() + static_cast<std::ptrdiff_t>(first),
-                       body.rest.end());
 }
 
 // The row of voxels (j, k) and the number of its first piece.
@@ -165,41 +198,49 @@ void trace_slab(const Voxels& voxels, std::size_t s, const std::vector<std::uint
   }
 }
 
-void append_cells(const Voxels& voxels, const LatticeElements& elements, std::uint32_t first_element,
-                  const std::vector<std::uint32_t>& cell, std::size_t cells, Body& body) {
-  resize_large(body.cell_elements, body.cell_elements.size() + cells);
-  resize_large(body.fill, body.fill.size() + cells);
-  body.broken.resize(body.broken.size() + cells, 0);
+// Cells of the part: their elements, numbered within it so far, and their fills.
+void append_cells(const Voxels& voxels, const KeptPieces& kept, std::uint32_t first_element,
+                  std::vector<std::array<std::uint32_t, 8>>&& cell_elements, Body& body) {
+  const std::size_t first_cell = body.cell_count(), cells = cell_elements.size();
+  append(std::move(cell_elements), body.cell_elements);
+  if (first_element > 0)
+    parallel_for_each(cells, [&](std::size_t c) {
+      for (std::uint32_t& element : body.cell_elements[first_cell + c]) element += first_element;
+    });
+  resize_touched(body.fill, first_cell + cells);
+  resize_touched(body.broken, first_cell + cells);
   parallel_for_each(
       voxels.slabs.size(),
       [&](std::size_t s) {
-        for (std::size_t p = 0; p < voxels.slabs[s].pieces.size(); ++p) {
-          const std::size_t global = voxels.first_piece[s] + p;
-          if (cell[global] == kNoCell) continue;
-          body.fill[cell[global]] = voxels.slabs[s].pieces[p].fill;
-          for (int a = 0; a < 8; ++a)
-            body.cell_elements[cell[global]][a] = first_element + elements.of_piece[global][a];
+        const std::uint32_t* cell = &kept.number[voxels.first_piece[s]];
+        for (const Piece& piece : voxels.slabs[s].pieces) {
+          if (*cell != kNoCell) body.fill[*cell] = piece.fill;
+          ++cell;
         }
       },
       2);
 }
 
 AssembledPart assemble_corners(const Voxels& voxels, const Part& part, Body& body,
-                               std::vector<PolygonCell>& polygon_cells) {
-  LatticeElements elements = make_elements(voxels);
+                               PolygonCells& polygon_cells) {
   const auto first_element = static_cast<std::uint32_t>(body.element_count());
   const auto first_cell = static_cast<std::uint32_t>(body.cell_count());
   AssembledPart result = count_volumes(voxels, has_cell);
+  const KeptPieces kept = number_kept(voxels, has_cell, first_cell);
+  result.cells = kept.count;
+  LatticeElements elements = make_elements(voxels, kept.number, first_cell, kept.count);
   result.elements = elements.index.size();
-  const std::vector<std::uint32_t> cell = number_kept(voxels, has_cell, first_cell);
-  result.cells = static_cast<std::size_t>(
-      std::count_if(cell.begin(), cell.end(), [](std::uint32_t c) { return c != kNoCell; }));
   append_elements(std::move(elements.index), std::move(elements.number), part, body);
-  append_cells(voxels, elements, first_element, cell, result.cells, body);
-  std::vector<std::vector<PolygonCell>> pairs(voxels.slabs.size());
+  append_cells(voxels, kept, first_element, std::move(elements.of_piece), body);
+  const std::size_t first_list = polygon_cells.size();
+  polygon_cells.resize(first_list + voxels.slabs.size());
   parallel_for_each(
-      voxels.slabs.size(), [&](std::size_t s) { trace_slab(voxels, s, cell, pairs[s]); }, 2);
-  for (const auto& of_slab : pairs) polygon_cells.insert(polygon_cells.end(), of_slab.begin(), of_slab.end());
+      voxels.slabs.size(),
+      [&](std::size_t s) {
+        polygon_cells[first_list + s].reserve(voxels.slabs[s].traces.size());
+        trace_slab(voxels, s, kept.number, polygon_cells[first_list + s]);
+      },
+      2);
   return result;
 }
 
@@ -213,7 +254,7 @@ AssembledPart assemble_centres(const Voxels& voxels, const Part& part, Body& bod
   const LatticeElements corners = make_elements(voxels);
   const auto first = static_cast<std::uint32_t>(body.element_count());
   AssembledPart result = count_volumes(voxels, has_centre);
-  const std::vector<std::uint32_t> number = number_kept(voxels, has_centre, first);
+  const std::vector<std::uint32_t> number = number_kept(voxels, has_centre, first).number;
   std::vector<Index3> index;
   std::vector<std::uint32_t> connections;
   for (std::size_t s = 0; s < voxels.slabs.size(); ++s) {
@@ -252,8 +293,7 @@ AssembledPart assemble_centres(const Voxels& voxels, const Part& part, Body& bod
 
 }  // namespace
 
-AssembledPart assemble_part(const Voxels& voxels, const Part& part, Body& body,
-                            std::vector<PolygonCell>& polygon_cells) {
+AssembledPart assemble_part(const Voxels& voxels, const Part& part, Body& body, PolygonCells& polygon_cells) {
   Part placed = part;
   placed.element_begin = static_cast<std::uint32_t>(body.element_count());
   placed.cell_begin = static_cast<std::uint32_t>(body.cell_count());
@@ -266,21 +306,26 @@ AssembledPart assemble_part(const Voxels& voxels, const Part& part, Body& body,
   return result;
 }
 
-void set_surface_cells(const std::vector<PolygonCell>& polygon_cells, Body& body) {
+void set_surface_cells(const PolygonCells& polygon_cells, Body& body) {
   const std::size_t polygons = body.surface.polygon_count();
-  std::vector<std::uint32_t> begin(polygons + 1, 0);
-  for (const PolygonCell& pair : polygon_cells) ++begin[pair.polygon + 1];
-  std::partial_sum(begin.begin(), begin.end(), begin.begin());
-  std::vector<std::uint32_t> cells(polygon_cells.size()), at(begin);
-  for (const PolygonCell& pair : polygon_cells) cells[at[pair.polygon]++] = pair.cell;
-  body.surface_cell_offsets.assign(1, 0);
+  Buckets<std::uint32_t> cells = sort_into_buckets<std::uint32_t>(polygons, [&](const auto& use) {
+    for (const std::vector<PolygonCell>& list : polygon_cells)
+      for (const PolygonCell& pair : list) use(pair.polygon, pair.cell);
+  });
+  std::vector<std::uint32_t>& offsets = body.surface_cell_offsets;
+  offsets.assign(polygons + 1, 0);
+  parallel_for_each(polygons, [&](std::size_t p) {
+    const auto begin = cells.values.begin() + cells.begin[p], end = cells.values.begin() + cells.begin[p + 1];
+    std::sort(begin, end);
+    offsets[p + 1] = static_cast<std::uint32_t>(std::unique(begin, end) - begin);
+  });
+  std::partial_sum(offsets.begin(), offsets.end(), offsets.begin());
   body.surface_cells.clear();
-  for (std::size_t p = 0; p < polygons; ++p) {
-    std::sort(cells.begin() + begin[p], cells.begin() + begin[p + 1]);
-    const auto last = std::unique(cells.begin() + begin[p], cells.begin() + begin[p + 1]);
-    body.surface_cells.insert(body.surface_cells.end(), cells.begin() + begin[p], last);
-    body.surface_cell_offsets.push_back(static_cast<std::uint32_t>(body.surface_cells.size()));
-  }
+  resize_touched(body.surface_cells, offsets.back());
+  parallel_for_each(polygons, [&](std::size_t p) {
+    std::copy_n(cells.values.begin() + cells.begin[p], offsets[p + 1] - offsets[p],
+                body.surface_cells.begin() + offsets[p]);
+  });
 }
 
 }  // namespace flexel

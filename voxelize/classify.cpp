@@ -67,6 +67,11 @@ std::array<int, 8> corner_windings(int lowest, std::span<const Record> records) 
   return w;
 }
 
+// Range of voxels.
+struct Box2 {
+  int i_begin = 0, i_last = 0, j_begin = 0, j_last = 0;
+};
+
 // Fills one slab.
 class SlabBuilder {
  public:
@@ -95,27 +100,44 @@ class SlabBuilder {
       const Corners& c = mesh_.corners[t];
       clip_to_slab({&mesh_.vertices[c[0]], &mesh_.vertices[c[1]], &mesh_.vertices[c[2]]}, t, k, unsorted_);
     }
-    sort_by_row();
+    sort_by_voxel();
   }
 
-  void sort_by_row() {
-    records_.resize(unsorted_.size());
-    if (unsorted_.empty()) return;
-    const auto by_j = [](const Record& a, const Record& b) { return a.j < b.j; };
-    const auto [low, high] = std::minmax_element(unsorted_.begin(), unsorted_.end(), by_j);
-    const int j_begin = low->j;
-    row_start_.assign(static_cast<std::size_t>(high->j - j_begin + 2), 0);
-    for (const Record& record : unsorted_) ++row_start_[record.j - j_begin + 1];
-    for (std::size_t r = 1; r < row_start_.size(); ++r) row_start_[r] += row_start_[r - 1];
-    for (const Record& record : unsorted_) records_[row_start_[record.j - j_begin]++] = record;
-    // row_start_[r] is now the end of row r. Triangles come in ascending order and counting sort keeps it.
-    std::uint32_t begin = 0;
-    for (std::size_t r = 0; r + 1 < row_start_.size(); ++r) {
-      std::sort(
-          records_.begin() + begin, records_.begin() + row_start_[r],
-          [](const Record& a, const Record& b) { return a.i != b.i ? a.i < b.i : a.triangle < b.triangle; });
-      begin = row_start_[r];
+  // Triangles come in ascending order, and both counting sorts keep the order of what they find equal.
+  void sort_by_voxel() {
+    constexpr std::size_t kWide = 1 << 16;
+    if (unsorted_.empty()) {
+      records_.clear();
+      return;
     }
+    records_.resize(unsorted_.size());
+    Box2 box{unsorted_[0].i, unsorted_[0].i, unsorted_[0].j, unsorted_[0].j};
+    for (const Record& record : unsorted_) {
+      box.i_begin = std::min(box.i_begin, record.i);
+      box.i_last = std::max(box.i_last, record.i);
+      box.j_begin = std::min(box.j_begin, record.j);
+      box.j_last = std::max(box.j_last, record.j);
+    }
+    const auto columns = static_cast<std::size_t>(box.i_last - box.i_begin) + 1,
+               rows = static_cast<std::size_t>(box.j_last - box.j_begin) + 1;
+    if (std::max(columns, rows) > std::max(kWide, unsorted_.size())) {  // few records far apart
+      records_ = unsorted_;
+      std::stable_sort(records_.begin(), records_.end(),
+                       [](const Record& a, const Record& b) { return a.j != b.j ? a.j < b.j : a.i < b.i; });
+      return;
+    }
+    counting_sort(unsorted_, records_, columns, [&](const Record& r) { return r.i - box.i_begin; });
+    unsorted_.swap(records_);
+    counting_sort(unsorted_, records_, rows, [&](const Record& r) { return r.j - box.j_begin; });
+  }
+
+  template <class Key>
+  void counting_sort(const std::vector<Record>& from, std::vector<Record>& to, std::size_t keys,
+                     const Key& key) {
+    next_.assign(keys + 1, 0);
+    for (const Record& record : from) ++next_[static_cast<std::size_t>(key(record)) + 1];
+    for (std::size_t n = 1; n <= keys; ++n) next_[n] += next_[n - 1];
+    for (const Record& record : from) to[next_[static_cast<std::size_t>(key(record))]++] = record;
   }
 
   void sweep_row(std::span<const Record> row, int k, Slab& slab) {
@@ -190,7 +212,7 @@ class SlabBuilder {
   const ClassifyOptions& options_;
   PieceFinder finder_;
   std::vector<Record> unsorted_, records_;
-  std::vector<std::uint32_t> row_start_;
+  std::vector<std::uint32_t> next_;
 };
 
 }  // namespace

@@ -120,22 +120,27 @@ EdgeCrossing edge_crossing(std::uint16_t first, std::uint16_t second) {
 Record make_record(const Polygon& polygon, std::uint32_t triangle, int i, int j, int k) {
   Record record{.volume = column_volume(polygon, k), .i = i, .j = j, .triangle = triangle};
   std::array<int, kVoxelEdges> change{};
+  bool changes = false;
   std::uint16_t before = polygon.side[polygon.count - 1];
   for (int v = 0; v < polygon.count; ++v) {
     const std::uint16_t side = polygon.side[v];
     record.sides |= side;
-    const Point& p = polygon.corner[v];
-    if (side == kZLow) {
-      const Point& q = polygon.corner[v + 1 < polygon.count ? v + 1 : 0];
-      record.volume += (((j + 1) - p[1]) + ((j + 1) - q[1])) / 2 * (q[0] - p[0]);
-    }
-    if (const EdgeCrossing at = edge_crossing(before, side); at.edge >= 0) {
-      change[at.edge] += at.sign;
-      if (at.edge == kAlongX) record.volume += at.sign * ((i + 1) - p[0]);
+    if (side > kTriangleEdges) {
+      const Point& p = polygon.corner[v];
+      if (side == kZLow) {
+        const Point& q = polygon.corner[v + 1 < polygon.count ? v + 1 : 0];
+        record.volume += (((j + 1) - p[1]) + ((j + 1) - q[1])) / 2 * (q[0] - p[0]);
+      }
+      const EdgeCrossing at = before > kTriangleEdges ? edge_crossing(before, side) : EdgeCrossing{};
+      if (at.edge >= 0) {
+        changes = true;
+        change[at.edge] += at.sign;
+        if (at.edge == kAlongX) record.volume += at.sign * ((i + 1) - p[0]);
+      }
     }
     before = side;
   }
-  for (int edge = 0; edge < kVoxelEdges; ++edge)
+  for (int edge = 0; changes && edge < kVoxelEdges; ++edge)
     record.windings = static_cast<std::uint16_t>(record.windings | ((change[edge] & 3) << (2 * edge)));
   return record;
 }
@@ -144,13 +149,15 @@ Record make_record(const Polygon& polygon, std::uint32_t triangle, int i, int j,
 
 void clip_to_slab(const TrianglePoints& points, std::uint32_t triangle, int k, std::vector<Record>& records) {
   const Polygon whole = whole_triangle(points);
-  Polygon slab, row, voxel;
-  cut_band(whole, 2, k, slab);
-  if (slab.count == 0) return;
-  const auto [j_begin, j_last] = band_range(slab, 1);
+  Polygon slab, row, voxel;  // a cut that would keep everything is left out
+  const auto [k_begin, k_last] = band_range(whole, 2);
+  if (k_begin != k_last) cut_band(whole, 2, k, slab);
+  const Polygon& in_slab = k_begin != k_last ? slab : whole;
+  if (in_slab.count == 0) return;
+  const auto [j_begin, j_last] = band_range(in_slab, 1);
   for (int j = j_begin; j <= j_last; ++j) {
-    if (j_begin != j_last) cut_band(slab, 1, j, row);
-    const Polygon& in_row = j_begin != j_last ? row : slab;
+    if (j_begin != j_last) cut_band(in_slab, 1, j, row);
+    const Polygon& in_row = j_begin != j_last ? row : in_slab;
     if (in_row.count == 0) continue;
     const auto [i_begin, i_last] = band_range(in_row, 0);
     if (i_begin == i_last) {

@@ -7,18 +7,39 @@
 
 #include <algorithm>
 
+#include "formats/bucket.h"
 #include "formats/parallel.h"
-#include "voxelize/reserve.h"
 #include "voxelize/union_find.h"
 
 namespace flexel {
 namespace {
 
+constexpr std::size_t kNoEntry = ~std::size_t{0};
+
+// Where the elements of a piece are put.
+class Entries {
+ public:
+  explicit Entries(std::size_t pieces) : count_(pieces) {}
+  Entries(const std::vector<std::uint32_t>& number, std::uint32_t first, std::size_t count)
+      : number_(&number), first_(first), count_(count) {}
+  [[nodiscard]] std::size_t of(std::size_t piece) const {
+    if (number_ == nullptr) return piece;
+    const std::uint32_t number = (*number_)[piece];
+    return number == kNoElement ? kNoEntry : number - first_;
+  }
+  [[nodiscard]] std::size_t count() const { return count_; }
+
+ private:
+  const std::vector<std::uint32_t>* number_ = nullptr;
+  std::uint32_t first_ = 0;
+  std::size_t count_ = 0;
+};
+
 // A piece beside the lattice point.
 struct Neighbour {
   const Slab* slab = nullptr;
   std::uint32_t piece = 0;  // within the slab
-  std::size_t global = 0;   // over all slabs
+  std::size_t entry = 0;    // in of_piece, or kNoEntry
   int voxel = 0;            // which of the eight: di + 2 dj + 4 dk, 0 below the point, 1 above it
 };
 
@@ -36,9 +57,9 @@ struct PlaneElements {
 
 class PlaneSweep {
  public:
-  PlaneSweep(const Voxels& voxels, int k, PlaneElements& out,
+  PlaneSweep(const Voxels& voxels, const Entries& entries, int k, PlaneElements& out,
              std::vector<std::array<std::uint32_t, 8>>& of_piece)
-      : voxels_(voxels), k_(k), out_(out), of_piece_(of_piece) {}
+      : voxels_(voxels), entries_(entries), k_(k), out_(out), of_piece_(of_piece) {}
 
   void run() {
     int begin = 0, end = 0;
@@ -99,12 +120,14 @@ class PlaneSweep {
   }
 
   void add_neighbour(const Cursor& c, std::uint32_t piece, int voxel) {
-    neighbours_.push_back({c.slab, piece, c.global + piece, voxel});
+    neighbours_.push_back({c.slab, piece, entries_.of(c.global + piece), voxel});
   }
 
   static const Piece& piece_of(const Neighbour& n) { return n.slab->pieces[n.piece]; }
 
-  void set(const Neighbour& n, std::uint32_t element) { of_piece_[n.global][7 - n.voxel] = element; }
+  void set(const Neighbour& n, std::uint32_t element) {
+    if (n.entry != kNoEntry) of_piece_[n.entry][7 - n.voxel] = element;
+  }
 
   // All eight voxels are there in one piece each, and the point is inside all of them.
   [[nodiscard]] bool inside() const {
@@ -164,6 +187,7 @@ class PlaneSweep {
   }
 
   const Voxels& voxels_;
+  const Entries& entries_;
   int k_;
   PlaneElements& out_;
   std::vector<std::array<std::uint32_t, 8>>& of_piece_;
@@ -177,8 +201,8 @@ class PlaneSweep {
 
 void concatenate(const std::vector<PlaneElements>& planes, const std::vector<std::uint32_t>& begin,
                  LatticeElements& elements) {
-  resize_large(elements.index, begin.back());
-  resize_large(elements.number, begin.back());
+  resize_touched(elements.index, begin.back());
+  resize_touched(elements.number, begin.back());
   parallel_for_each(
       planes.size(),
       [&](std::size_t p) {
@@ -188,31 +212,49 @@ void concatenate(const std::vector<PlaneElements>& planes, const std::vector<std
       4);
 }
 
-}  // namespace
+// Numbers within planes become numbers within the part.
+void shift_numbers(const Voxels& voxels, const Entries& entries, const std::vector<std::uint32_t>& begin,
+                   std::vector<std::array<std::uint32_t, 8>>& of_piece) {
+  parallel_for_each(
+      voxels.slabs.size(),
+      [&](std::size_t s) {
+        for (std::size_t p = voxels.first_piece[s]; p < voxels.first_piece[s + 1]; ++p) {
+          const std::size_t entry = entries.of(p);
+          if (entry == kNoEntry) continue;
+          for (int a = 0; a < 8; ++a)
+            if (of_piece[entry][a] != kNoElement) of_piece[entry][a] += begin[s + (a >> 2)];
+        }
+      },
+      2);
+}
 
-LatticeElements make_elements(const Voxels& voxels) {
+LatticeElements make(const Voxels& voxels, const Entries& entries) {
   LatticeElements elements;
-  resize_large(elements.of_piece, voxels.piece_count());
+  resize_touched(elements.of_piece, entries.count());
   std::vector<PlaneElements> planes(voxels.slabs.size() + 1);
   parallel_for_each(
       planes.size(),
       [&](std::size_t p) {
-        PlaneSweep(voxels, voxels.k_begin + static_cast<int>(p), planes[p], elements.of_piece).run();
+        PlaneSweep(voxels, entries, voxels.k_begin + static_cast<int>(p), planes[p], elements.of_piece).run();
       },
       2);
   std::vector<std::uint32_t> begin(1, 0);
   for (const PlaneElements& plane : planes)
     begin.push_back(begin.back() + static_cast<std::uint32_t>(plane.index.size()));
   concatenate(planes, begin, elements);
-  parallel_for_each(
-      voxels.slabs.size(),
-      [&](std::size_t s) {
-        for (std::size_t p = voxels.first_piece[s]; p < voxels.first_piece[s + 1]; ++p)
-          for (int a = 0; a < 8; ++a)
-            if (elements.of_piece[p][a] != kNoElement) elements.of_piece[p][a] += begin[s + (a >> 2)];
-      },
-      2);
+  shift_numbers(voxels, entries, begin, elements.of_piece);
   return elements;
+}
+
+}  // namespace
+
+LatticeElements make_elements(const Voxels& voxels) {
+  return make(voxels, Entries(voxels.piece_count()));
+}
+
+LatticeElements make_elements(const Voxels& voxels, const std::vector<std::uint32_t>& number,
+                              std::uint32_t first, std::size_t count) {
+  return make(voxels, Entries(number, first, count));
 }
 
 }  // namespace flexel

@@ -22,6 +22,16 @@ int lines_below(double coordinate, double begin, double step, int count) {
   return static_cast<int>(n);
 }
 
+// Whether surely no grid line lies between the coordinates: a quick look that may say no where it is true.
+bool between_lines(const std::array<double, 3>& coordinates, double begin, double step, int count) {
+  constexpr double kMargin = 1e-6;
+  const auto [low, high] = std::minmax({coordinates[0], coordinates[1], coordinates[2]});
+  const double first = (low - begin) / step - kMargin, last = (high - begin) / step + kMargin;
+  // Both are moved into [0, count + 1], where casting rounds down.
+  const auto whole = [&](double lines) { return static_cast<int>(std::clamp(lines + 1, 0., count + 1.)); };
+  return whole(first) == whole(last);
+}
+
 struct Triangle2 {
   std::array<double, 3> u, v, w;
 };
@@ -72,6 +82,9 @@ void cross_triangle_lines(const PartMesh& mesh, const std::vector<Vec3>& points,
     t.v[c] = point[v];
     t.w[c] = point[grid.axis];
   }
+  if (between_lines(t.v, grid.v_begin, grid.v_step, grid.v_count) ||
+      between_lines(t.u, grid.u_begin, grid.u_step, grid.u_count))
+    return;
   const auto [low, high] = std::minmax({t.v[0], t.v[1], t.v[2]});
   // A row at exactly the lowest coordinate does not cross (a coordinate on a line is above it); one at the
   // highest does not count as below it either.

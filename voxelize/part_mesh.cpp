@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
+#include "formats/bucket.h"
 #include "formats/parallel.h"
 #include "formats/topology.h"
 #include "voxelize/union_find.h"
@@ -20,31 +22,52 @@ struct HalfEdge {
 };
 
 // Half-edges in buckets by lower vertex, each bucket sorted by (upper, slot).
-struct HalfEdges {
-  std::vector<std::uint32_t> begin;  // (vertices + 1)
-  std::vector<HalfEdge> entries;     // (3 triangles)
-};
-
-HalfEdges half_edges(const PartMesh& mesh) {
-  HalfEdges result;
-  result.begin.assign(mesh.world.size() + 2, 0);
-  for (const Corners& c : mesh.corners)
-    for (int e = 0; e < 3; ++e) ++result.begin[std::min(c[e], c[(e + 1) % 3]) + 2];
-  std::partial_sum(result.begin.begin(), result.begin.end(), result.begin.begin());
-  result.entries.resize(3 * mesh.corners.size());
-  for (std::size_t t = 0; t < mesh.corners.size(); ++t)
-    for (int e = 0; e < 3; ++e) {
-      const auto [lower, upper] = std::minmax(mesh.corners[t][e], mesh.corners[t][(e + 1) % 3]);
-      result.entries[result.begin[lower + 1]++] = {upper, static_cast<std::uint32_t>(3 * t + e)};
-    }
-  result.begin.pop_back();
+Buckets<HalfEdge> half_edges(const PartMesh& mesh) {
+  Buckets<HalfEdge> result = sort_into_buckets<HalfEdge>(mesh.world.size(), [&](const auto& use) {
+    for (std::size_t t = 0; t < mesh.corners.size(); ++t)
+      for (int e = 0; e < 3; ++e) {
+        const auto [lower, upper] = std::minmax(mesh.corners[t][e], mesh.corners[t][(e + 1) % 3]);
+        use(lower, HalfEdge{upper, static_cast<std::uint32_t>(3 * t + e)});
+      }
+  });
   parallel_for_each(mesh.world.size(), [&](std::size_t v) {
-    std::sort(result.entries.begin() + result.begin[v], result.entries.begin() + result.begin[v + 1],
+    std::sort(result.values.begin() + result.begin[v], result.values.begin() + result.begin[v + 1],
               [](const HalfEdge& a, const HalfEdge& b) {
                 return a.upper != b.upper ? a.upper < b.upper : a.slot < b.slot;
               });
   });
   return result;
+}
+
+// What is counted over the edges of a range of lower vertices.
+struct EdgeTally {
+  std::uint32_t edges = 0;
+  std::size_t open = 0, unbalanced = 0;
+};
+
+// Numbers the edges from lower vertex `v` on; counts them too.
+void number_edges_of(std::size_t v, const Buckets<HalfEdge>& half, EdgeTally& tally, PartMesh& mesh) {
+  for (std::uint32_t n = half.begin[v]; n < half.begin[v + 1];) {
+    const std::uint32_t upper = half.values[n].upper;
+    int balance = 0, count = 0;
+    for (; n < half.begin[v + 1] && half.values[n].upper == upper; ++n, ++count) {
+      const std::uint32_t t = half.values[n].slot / 3, e = half.values[n].slot % 3;
+      mesh.edges[t][e] = tally.edges;
+      balance += mesh.corners[t][e] == v ? 1 : -1;
+    }
+    ++tally.edges;
+    tally.open += static_cast<std::size_t>(count % 2);
+    tally.unbalanced += balance != 0;
+  }
+}
+
+// How many edges lie in the buckets [begin, end).
+std::uint32_t count_edges(const Buckets<HalfEdge>& half, std::size_t begin, std::size_t end) {
+  std::uint32_t edges = 0;
+  for (std::size_t v = begin; v < end; ++v)
+    for (std::uint32_t n = half.begin[v]; n < half.begin[v + 1]; ++n)
+      edges += n == half.begin[v] || half.values[n].upper != half.values[n - 1].upper;
+  return edges;
 }
 
 void number_shells(PartMesh& mesh) {
@@ -71,6 +94,8 @@ PartMesh build_mesh(const Surface& surface, const Triangles& triangles, std::spa
                     const std::vector<std::uint32_t>& welded) {
   PartMesh mesh;
   std::vector<std::uint32_t> number(surface.vertices.size(), kNoTriangle);
+  mesh.corners.reserve(chosen.size());
+  mesh.polygon.reserve(chosen.size());
   for (const std::uint32_t t : chosen) {
     Corners c;
     for (int a = 0; a < 3; ++a) c[a] = welded[triangles.corners[t][a]];
@@ -152,23 +177,24 @@ std::vector<PartMesh> make_meshes(const Surface& surface, bool closing) {
 }  // namespace
 
 void number_edges(PartMesh& mesh) {
-  const HalfEdges half = half_edges(mesh);
-  mesh.edges.resize(mesh.corners.size());
+  constexpr std::size_t kGrain = 1 << 14;
+  const Buckets<HalfEdge> half = half_edges(mesh);
+  resize_touched(mesh.edges, mesh.corners.size());
+  const std::size_t vertices = mesh.world.size();
+  std::vector<EdgeTally> tallies((vertices + kGrain - 1) / kGrain);
+  parallel_chunks(vertices, kGrain, [&](std::size_t begin, std::size_t end) {
+    tallies[begin / kGrain].edges = count_edges(half, begin, end);
+  });
   mesh.edge_count = 0;
+  for (EdgeTally& tally : tallies) mesh.edge_count += std::exchange(tally.edges, mesh.edge_count);
+  parallel_chunks(vertices, kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v) number_edges_of(v, half, tallies[begin / kGrain], mesh);
+  });
   mesh.open_edges = mesh.unbalanced_edges = 0;
-  for (std::size_t v = 0; v < mesh.world.size(); ++v)
-    for (std::uint32_t n = half.begin[v]; n < half.begin[v + 1];) {
-      const std::uint32_t upper = half.entries[n].upper;
-      int balance = 0, count = 0;
-      for (; n < half.begin[v + 1] && half.entries[n].upper == upper; ++n, ++count) {
-        const std::uint32_t t = half.entries[n].slot / 3, e = half.entries[n].slot % 3;
-        mesh.edges[t][e] = mesh.edge_count;
-        balance += mesh.corners[t][e] == v ? 1 : -1;
-      }
-      ++mesh.edge_count;
-      mesh.open_edges += count % 2;
-      mesh.unbalanced_edges += balance != 0;
-    }
+  for (const EdgeTally& tally : tallies) {
+    mesh.open_edges += tally.open;
+    mesh.unbalanced_edges += tally.unbalanced;
+  }
   number_shells(mesh);
 }
 

@@ -181,6 +181,23 @@ Vec3 corner_point(const VoxelRecords& voxel, int a) {
   return Vec3(voxel.i + (a & 1), voxel.j + (a >> 1 & 1), voxel.k + (a >> 2)) - Vec3::Constant(kBelowLattice);
 }
 
+// Joins records that have an edge in common.
+void join_at_edges(std::vector<std::array<std::uint32_t, 2>>& edge_records, UnionFind& sets) {
+  constexpr std::size_t kFew = 40;  // up to here comparing all with all is faster than sorting
+  if (edge_records.size() <= kFew) {
+    for (std::size_t e = 1; e < edge_records.size(); ++e)
+      for (std::size_t f = 0; f < e; ++f)
+        if (edge_records[f][0] == edge_records[e][0]) {
+          sets.join(edge_records[f][1], edge_records[e][1]);
+          break;
+        }
+    return;
+  }
+  std::sort(edge_records.begin(), edge_records.end());
+  for (std::size_t e = 1; e < edge_records.size(); ++e)
+    if (edge_records[e][0] == edge_records[e - 1][0]) sets.join(edge_records[e][1], edge_records[e - 1][1]);
+}
+
 // Groups the records into fragments, numbered by first record. Returns how many.
 std::uint32_t group_fragments(const VoxelRecords& voxel, PieceFinder& finder) {
   const auto n = static_cast<std::uint32_t>(voxel.records.size());
@@ -191,11 +208,8 @@ std::uint32_t group_fragments(const VoxelRecords& voxel, PieceFinder& finder) {
     for (int e = 0; e < 3; ++e)
       if (voxel.records[r].sides >> e & 1)
         finder.edge_records.push_back({voxel.mesh->edges[voxel.records[r].triangle][e], r});
-  std::sort(finder.edge_records.begin(), finder.edge_records.end());
   finder.sets.reset(n);
-  for (std::size_t e = 1; e < finder.edge_records.size(); ++e)
-    if (finder.edge_records[e][0] == finder.edge_records[e - 1][0])
-      finder.sets.join(finder.edge_records[e][1], finder.edge_records[e - 1][1]);
+  join_at_edges(finder.edge_records, finder.sets);
   std::uint32_t count = 0;
   for (std::uint32_t r = 0; r < n; ++r) {
     const std::uint32_t root = finder.sets.root(r);

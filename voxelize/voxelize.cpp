@@ -120,7 +120,7 @@ void measure(const std::vector<PartMesh>& meshes, VoxelizeResult& result) {
 
 // One part onto the body.
 VoxelizedPart voxelize_part(PartMesh& mesh, double spacing, const VoxelizeOptions& options,
-                            const std::string& name, Body& body, std::vector<PolygonCell>& polygon_cells) {
+                            const std::string& name, Body& body, PolygonCells& polygon_cells) {
   const bool centre = options.placement == Placement::centre;
   Part part;
   part.name = name;
@@ -145,7 +145,7 @@ VoxelizedPart voxelize_part(PartMesh& mesh, double spacing, const VoxelizeOption
 VoxelizeResult build(Surface& surface, std::vector<PartMesh>& meshes, double spacing,
                      const VoxelizeOptions& options, Progress& progress) {
   VoxelizeResult result;
-  std::vector<PolygonCell> polygon_cells;
+  PolygonCells polygon_cells;
   for (std::size_t p = 0; p < meshes.size(); ++p) {
     throw_if_interrupted();
     progress.update(static_cast<double>(p) / static_cast<double>(meshes.size()), surface.parts[p].name);

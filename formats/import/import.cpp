@@ -11,6 +11,7 @@
 #include "formats/body_file.h"
 #include "formats/error.h"
 #include "formats/import/readers.h"
+#include "formats/parallel.h"
 #include "formats/program.h"
 
 namespace flexel {
@@ -98,24 +99,41 @@ std::string format_of(const ImportInput& input, const ImportOptions& options, co
   return format;
 }
 
+struct HashedSurface {
+  Surface surface;
+  std::uint64_t hash = 0;
+};
+
+// STL is hashed while it is read, for neither makes full use of the threads; the other readers are larger
+// than the hash, and one takes the bytes for itself.
+HashedSurface read_and_hash(ImportInput& input, const std::string& format, const ImportOptions& options) {
+  HashedSurface result;
+  if (format == "stl") {
+    parallel_both([&] { result.surface = read_stl(input, options); },
+                  [&] { result.hash = content_hash(input.bytes); });
+    return result;
+  }
+  result.hash = content_hash(input.bytes);
+  result.surface = format == "step" ? read_step(input, options) : read_obj(input, options);
+  return result;
+}
+
 }  // namespace
 
 Surface import_surface(const std::string& path, const ImportOptions& options) {
   ImportInput input = load(path);
   const std::string format = format_of(input, options, path);
-  const std::uint64_t hash = content_hash(input.bytes);
-  Surface surface = format == "step"  ? read_step(input, options)
-                    : format == "stl" ? read_stl(input, options)
-                                      : read_obj(input, options);
+  HashedSurface read = read_and_hash(input, format, options);
+  Surface& surface = read.surface;
   surface.sources.at(0).file = input.file;
-  surface.sources.at(0).hash = hash;
+  surface.sources.at(0).hash = read.hash;
   surface.part_source.assign(surface.parts.size(), 0);
   make_part_names_unique(surface, input.stem.empty() ? "part" : input.stem);
   check(surface, input.where);
   const bool has_area = std::any_of(surface.vertices.begin(), surface.vertices.end(),
                                     [&](const Vec3& vertex) { return vertex != surface.vertices.front(); });
   if (!has_area) throw InputError(input.where, "all its vertices are at one point: nothing to work on");
-  return surface;
+  return std::move(read.surface);
 }
 
 }  // namespace flexel
