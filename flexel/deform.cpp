@@ -21,7 +21,7 @@ namespace {
 
 struct Arguments {
   std::vector<std::string> parts, fixes, pushes, moves, outputs;
-  std::string scene, material, size, unit, edge, method = "affine", report, summary, body, format;
+  std::string scene, material, size, unit, edge, method = "affine", report, summary, body, format, timeout;
   std::optional<std::size_t> count;
   int threads = 0;
   bool ascii = false, strict = false, quiet = false;
@@ -71,6 +71,10 @@ void declare_output(CLI::App& app, Arguments& arguments) {
       ->type_name("FILE");
   app.add_flag("--strict", arguments.strict, "Exit 4 and write no surface when the mapping is invalid");
   app.add_option("--threads", arguments.threads, "Threads; 0 is every core")->check(CLI::NonNegativeNumber);
+  app.add_option("--timeout", arguments.timeout,
+                 "Stop the simulation after this time (\"90 s\"): exit 5, the last good state in "
+                 "OUTPUT.failed.vtu")
+      ->type_name("TIME");
   app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
 }
 
@@ -80,6 +84,7 @@ struct Plan {
   VoxelizeOptions voxelize;
   Scene scene;
   std::vector<Action> pushes, moves;
+  std::optional<double> timeout;  // s
   MapOptions map;
   struct Output {
     std::string path;
@@ -154,6 +159,7 @@ Plan make_plan(const Arguments& arguments) {
   }
   if (arguments.count && *arguments.count == 0) throw InputError("--count: must be above zero");
   plan.voxelize.count = arguments.count;
+  if (!arguments.timeout.empty()) plan.timeout = parse_timeout(arguments.timeout);
   plan.map.method = map_method(arguments.method);
   plan_outputs(arguments, plan);
   plan_scene(arguments, plan);
@@ -229,6 +235,7 @@ int run_stages(const Arguments& arguments, Plan& plan, Progress& progress) {
   SimulateOptions options;
   options.threads = arguments.threads;
   options.failed_output = failed_name(plan);
+  options.timeout = plan.timeout;
   const SimulateResult simulated = simulate(body, plan.scene, options, progress);
   for (const std::string& line : summary_lines(simulated)) progress.say(line);
 

@@ -44,6 +44,12 @@ class InvalidMappingError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+// The time that --timeout allows ran out (exit 5). `what()` says how far the run had come.
+class TimeoutError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 // SIGINT arrived and the work was stopped cleanly (exit 130).
 class Interrupted : public std::runtime_error {
  public:

@@ -162,6 +162,8 @@ int run_program(const std::string& name, const std::function<int()>& body) {
                   kExitInput);
   } catch (const DivergedError& error) {
     return report(name, error.what(), kExitDiverged);
+  } catch (const TimeoutError& error) {
+    return report(name, error.what(), kExitTimeout);
   } catch (const InvalidMappingError& error) {
     return report(name, error.what(), kExitInvalidMapping);
   } catch (const Interrupted&) {

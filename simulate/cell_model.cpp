@@ -72,6 +72,18 @@ Mat3 displacement_gradient(const CellKind& kind, const CellVectors& u) {
   return h;
 }
 
+Mat3 corner_gradient(const CellKind& kind, const CellVectors& u, std::uint32_t corner) {
+  Mat3 h = Mat3::Zero();
+  for (std::uint32_t axis = 0; axis < 3; ++axis) {
+    const std::uint32_t other = corner ^ 1u << axis;
+    const Vec3 change = corner < other ? Vec3(u[other] - u[corner]) : Vec3(u[corner] - u[other]);
+    // Direction of the axis over the spacing: half the difference of the gradients along it.
+    const Vec3 slope = 0.5 * (kind.gradient[1u << axis] - kind.gradient[0]);
+    h += change * slope.transpose();
+  }
+  return h;
+}
+
 double volume_change(const Mat3& h) {
   return h.trace() + second_invariant(h) + h.determinant();
 }
@@ -89,6 +101,20 @@ Mat3 stress(const CellKind& kind, const Mat3& h) {
   // F - F^-T = (F F^T - I) F^-T.
   const Mat3 strain = h + h.transpose() + h * h.transpose();
   return (kind.mu * strain + kind.lambda * tangent.log_volume * Mat3::Identity()) * tangent.inverse_transpose;
+}
+
+Mat3 second_stress(const CellKind& kind, const Mat3& h) {
+  return (Mat3::Identity() + h).inverse() * stress(kind, h);
+}
+
+Mat3 predicted_stress(const CellKind& kind, const Mat3& h, const Mat3& change) {
+  const CellTangent tangent = cell_tangent(h);
+  const Mat3 product = (Mat3::Identity() + h).transpose() * change;
+  const Mat3 strain = 0.5 * (product + product.transpose());
+  const Mat3 metric = tangent.inverse_transpose.transpose() * tangent.inverse_transpose;  // C^-1
+  const Mat3 turned = metric * strain;
+  return second_stress(kind, h) + kind.lambda * turned.trace() * metric +
+         2 * (kind.mu - kind.lambda * tangent.log_volume) * turned * metric;
 }
 
 double cell_energy(const CellKind& kind, const CellVectors& u) {

@@ -51,6 +51,10 @@ using CellVectors = std::array<Vec3, 8>;  // one vector per element of a cell
 // H of a cell whose elements moved by `displacement` [m].
 [[nodiscard]] Mat3 displacement_gradient(const CellKind& kind, const CellVectors& displacement);
 
+// Gradient of the trilinear displacement at corner a, from the three edges that meet there.
+[[nodiscard]] Mat3 corner_gradient(const CellKind& kind, const CellVectors& displacement,
+                                   std::uint32_t corner);
+
 // J - 1 = det(I + H) - 1, without cancellation for small H.
 [[nodiscard]] double volume_change(const Mat3& gradient);
 
@@ -58,6 +62,11 @@ using CellVectors = std::array<Vec3, 8>;  // one vector per element of a cell
 // J > 0.
 [[nodiscard]] double energy_density(const CellKind& kind, const Mat3& gradient);
 [[nodiscard]] Mat3 stress(const CellKind& kind, const Mat3& gradient);
+
+// Second Piola-Kirchhoff stress S = F^-1 P [Pa], and what the linear model at H predicts it to be at H +
+// change: S + dS/dE : sym(F^T change), E the Green-Lagrange strain. Need J > 0.
+[[nodiscard]] Mat3 second_stress(const CellKind& kind, const Mat3& gradient);
+[[nodiscard]] Mat3 predicted_stress(const CellKind& kind, const Mat3& gradient, const Mat3& change);
 
 // Of a whole cell with fill 1: energy [J], infinity where J <= 0; forces -dU/du_a [N]; need J > 0.
 [[nodiscard]] double cell_energy(const CellKind& kind, const CellVectors& displacement);

@@ -3,6 +3,7 @@
 // every sum has a fixed order and the bits do not depend on the number of threads.
 #include "simulate/cells.h"
 
+#include <Eigen/Eigenvalues>
 #include <limits>
 #include <memory>
 
@@ -16,8 +17,34 @@ constexpr std::size_t kGrain = 512;
 // What the rows need of a cell: its tangent, and where it is indefinite the projected moduli.
 struct PreparedCell {
   CellTangent tangent;
+  double coupling = 0;  // mu - lambda ln J [Pa]
   std::unique_ptr<Mat9> projected;
+  std::unique_ptr<Mat3> added_stress;  // to that of the state in the geometric stiffness [Pa]
 };
+
+Mat3 positive_part(const Mat3& symmetric) {
+  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(0.5 * (symmetric + symmetric.transpose()));
+  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() *
+         eigen.eigenvectors().transpose();
+}
+
+PreparedCell prepare(const CellKind& kind, const Mat3& gradient, bool project, const Mat3* stress) {
+  PreparedCell cell;
+  cell.tangent = cell_tangent(gradient);
+  cell.coupling = kind.mu - kind.lambda * cell.tangent.log_volume;
+  if (stress) {
+    Mat3 added = (project ? positive_part(*stress) : *stress) - second_stress(kind, gradient);
+    if (project && cell.coupling < 0) {
+      // The material's part stays positive without its shear.
+      added -= cell.coupling * cell.tangent.inverse_transpose.transpose() * cell.tangent.inverse_transpose;
+      cell.coupling = 0;
+    }
+    cell.added_stress = std::make_unique<Mat3>(added);
+  } else if (project) {
+    cell.projected = std::make_unique<Mat9>(projected_elasticity(kind, cell.tangent));
+  }
+  return cell;
+}
 
 void add_cell_row(const CellKind& kind, const PreparedCell& cell, double fill, std::size_t a,
                   const std::array<std::uint8_t, 64>& slot, Block* row) {
@@ -29,24 +56,31 @@ void add_cell_row(const CellKind& kind, const PreparedCell& cell, double fill, s
   const double scale = fill * kind.volume / 16;
   const Vec3 w_a = cell.tangent.inverse_transpose * kind.gradient[a];
   const Vec3 symmetric = (scale * kind.lambda) * w_a;
-  const Vec3 swapped = (scale * (kind.mu - kind.lambda * cell.tangent.log_volume)) * w_a;
+  const Vec3 swapped = (scale * cell.coupling) * w_a;
+  const Vec3 added =
+      cell.added_stress ? Vec3(scale * (*cell.added_stress * kind.gradient[a])) : Vec3(Vec3::Zero());
   for (std::size_t b = 0; b < 8; ++b) {
     const Vec3 w_b = cell.tangent.inverse_transpose * kind.gradient[b];
     Block& block = row[slot[8 * a + b]];
     block.noalias() += symmetric * w_b.transpose();
     block.noalias() += w_b * swapped.transpose();
-    block.diagonal().array() += fill * kind.diagonal[8 * a + b];
+    block.diagonal().array() += fill * kind.diagonal[8 * a + b] + added.dot(kind.gradient[b]);
   }
 }
 
 struct Smallest {
   double value = std::numeric_limits<double>::infinity();
-  std::uint32_t cell = 0;
+  std::uint32_t cell = 0, corner = 0;
   Smallest& operator+=(const Smallest& other) {
     if (other.value < value) *this = other;
     return *this;
   }
 };
+
+SmallestJacobian found(const Smallest& smallest) {
+  if (!(smallest.value < std::numeric_limits<double>::infinity())) return {};
+  return {smallest.value, smallest.cell, smallest.corner};
+}
 
 }  // namespace
 
@@ -67,9 +101,9 @@ Cells::Cells(const Setting& setting, const Stencil& stencil)
     kinds_.push_back(cell_kind(body_.parts[p].lattice, setting.materials[p]));
 }
 
-CellVectors Cells::displacement_of(std::uint32_t cell, const State& state) const {
+CellVectors Cells::corner_values(std::uint32_t cell, const std::vector<Vec3>& values) const {
   CellVectors u;
-  for (std::size_t a = 0; a < 8; ++a) u[a] = state.displacement[body_.cell_elements[cell][a]];
+  for (std::size_t a = 0; a < 8; ++a) u[a] = values[body_.cell_elements[cell][a]];
   return u;
 }
 
@@ -79,7 +113,7 @@ double Cells::energy(const State& state) const {
       [&](std::size_t c) {
         if (!active_[c]) return 0.0;
         const auto cell = static_cast<std::uint32_t>(c);
-        return body_.fill[c] * cell_energy(kinds_[part_[c]], displacement_of(cell, state));
+        return body_.fill[c] * cell_energy(kinds_[part_[c]], corner_values(cell, state.displacement));
       },
       kGrain);
 }
@@ -91,7 +125,7 @@ void Cells::add_forces(const State& state, std::vector<Vec3>& forces) {
       [&](std::size_t c) {
         if (!active_[c]) return;
         corner_force_[c] =
-            cell_forces(kinds_[part_[c]], displacement_of(static_cast<std::uint32_t>(c), state));
+            cell_forces(kinds_[part_[c]], corner_values(static_cast<std::uint32_t>(c), state.displacement));
         for (Vec3& force : corner_force_[c]) force *= body_.fill[c];
       },
       kGrain);
@@ -101,17 +135,17 @@ void Cells::add_forces(const State& state, std::vector<Vec3>& forces) {
   });
 }
 
-void Cells::set_stiffness(const State& state, bool project, BlockMatrix& matrix) {
+void Cells::set_stiffness(const State& state, const TangentOptions& tangent, BlockMatrix& matrix) {
   std::vector<PreparedCell> prepared(body_.cell_count());
   parallel_for_each(
       body_.cell_count(),
       [&](std::size_t c) {
         if (!active_[c]) return;
         const CellKind& kind = kinds_[part_[c]];
-        prepared[c].tangent =
-            cell_tangent(displacement_gradient(kind, displacement_of(static_cast<std::uint32_t>(c), state)));
-        if (project)
-          prepared[c].projected = std::make_unique<Mat9>(projected_elasticity(kind, prepared[c].tangent));
+        const Mat3 gradient =
+            displacement_gradient(kind, corner_values(static_cast<std::uint32_t>(c), state.displacement));
+        prepared[c] =
+            prepare(kind, gradient, tangent.project, tangent.stress ? &(*tangent.stress)[c] : nullptr);
       },
       kGrain);
   parallel_for_each(
@@ -126,18 +160,50 @@ void Cells::set_stiffness(const State& state, bool project, BlockMatrix& matrix)
       kGrain);
 }
 
+std::vector<Mat3> Cells::predicted_stress(const State& state, const std::vector<Vec3>& step) const {
+  std::vector<Mat3> stress(body_.cell_count(), Mat3::Zero());
+  parallel_for_each(
+      body_.cell_count(),
+      [&](std::size_t c) {
+        if (!active_[c]) return;
+        const auto cell = static_cast<std::uint32_t>(c);
+        const CellKind& kind = kinds_[part_[c]];
+        stress[c] = flexel::predicted_stress(
+            kind, displacement_gradient(kind, corner_values(cell, state.displacement)),
+            displacement_gradient(kind, corner_values(cell, step)));
+      },
+      kGrain);
+  return stress;
+}
+
 SmallestJacobian Cells::smallest_jacobian(const State& state) const {
   const Smallest smallest = parallel_sum<Smallest>(
       body_.cell_count(),
       [&](std::size_t c) {
         if (!active_[c]) return Smallest{};
         const auto cell = static_cast<std::uint32_t>(c);
-        return Smallest{
-            1 + volume_change(displacement_gradient(kinds_[part_[c]], displacement_of(cell, state))), cell};
+        return Smallest{1 + volume_change(displacement_gradient(kinds_[part_[c]],
+                                                                corner_values(cell, state.displacement))),
+                        cell};
       },
       kGrain);
-  if (!(smallest.value < std::numeric_limits<double>::infinity())) return {};
-  return {smallest.value, smallest.cell};
+  return found(smallest);
+}
+
+SmallestJacobian Cells::smallest_corner_jacobian(const State& state) const {
+  const Smallest smallest = parallel_sum<Smallest>(
+      body_.cell_count(),
+      [&](std::size_t c) {
+        Smallest least;
+        if (!active_[c]) return least;
+        const auto cell = static_cast<std::uint32_t>(c);
+        const CellVectors u = corner_values(cell, state.displacement);
+        for (std::uint32_t a = 0; a < 8; ++a)
+          least += Smallest{1 + volume_change(corner_gradient(kinds_[part_[c]], u, a)), cell, a};
+        return least;
+      },
+      kGrain);
+  return found(smallest);
 }
 
 }  // namespace flexel

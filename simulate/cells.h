@@ -10,6 +10,14 @@ namespace flexel {
 struct SmallestJacobian {
   double value = 1;
   std::uint32_t cell = 0;
+  std::uint32_t corner = 0;  // of the cell, where it is that of a corner
+};
+
+// How the tangent is taken.
+struct TangentOptions {
+  bool project = false;  // positive semi-definite, cell by cell
+  // (cells) the stresses of the geometric stiffness, in place of those of the state; null: those of the state
+  const std::vector<Mat3>* stress = nullptr;
 };
 
 class Cells {
@@ -24,13 +32,18 @@ class Cells {
   [[nodiscard]] double energy(const State& state) const;
   // Adds the forces of the cells on their elements [N].
   void add_forces(const State& state, std::vector<Vec3>& forces);
-  // Sets (not adds) every value of `matrix`. With `project`, cells with an indefinite material tangent get
-  // its positive part.
-  void set_stiffness(const State& state, bool project, BlockMatrix& matrix);
+  // Sets (not adds) every value of `matrix`. With `tangent.project`, cells with an indefinite tangent get its
+  // positive part.
+  void set_stiffness(const State& state, const TangentOptions& tangent, BlockMatrix& matrix);
+  // Second Piola-Kirchhoff stress [Pa] (cells) that the linear model at `state` predicts for `state` moved by
+  // `step` [m].
+  [[nodiscard]] std::vector<Mat3> predicted_stress(const State& state, const std::vector<Vec3>& step) const;
   [[nodiscard]] SmallestJacobian smallest_jacobian(const State& state) const;
+  // Of the trilinear map at the corners of the cells.
+  [[nodiscard]] SmallestJacobian smallest_corner_jacobian(const State& state) const;
 
  private:
-  [[nodiscard]] CellVectors displacement_of(std::uint32_t cell, const State& state) const;
+  [[nodiscard]] CellVectors corner_values(std::uint32_t cell, const std::vector<Vec3>& values) const;
 
   const Body& body_;
   const Stencil& stencil_;

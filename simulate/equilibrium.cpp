@@ -1,5 +1,8 @@
-// The whole load is tried at once (or in the steps that the scene asks for). A step that fails is halved and
-// tried again from the last equilibrium; one that succeeds lets the next be twice as long.
+// The whole load is tried at once (or in the steps that the scene asks for), with full Newton steps. A load
+// step that fails is halved and tried again from the last equilibrium; from an eighth on it is tried with
+// steps that lower the energy too, which also pass a buckling or a snap. One that succeeds lets the next be
+// twice as long. The Newton iterations of a run are bounded: a scene without an equilibrium ends in the time
+// of some hundred linear solutions.
 #include "simulate/equilibrium.h"
 
 #include <fmt/format.h>
@@ -16,8 +19,13 @@ namespace flexel {
 namespace {
 
 constexpr double kSmallestIncrement = 1.0 / 1024;  // of the first load step
+constexpr double kLoweringIncrement = 1.0 / 8;     // from this one on energy-lowering steps are tried too
 constexpr int kEasyIterations = 10;
-constexpr double kHopelessReach = 300;  // diagonals of the body
+constexpr int kFullStepIterations = 20;
+constexpr int kIterations = 100;            // of Newton in a run, unless the scene says
+constexpr int kOverloadIterations = 40;     // likewise where the load is out of proportion
+constexpr int kIterationsPerLoadStep = 10;  // that one which ends in equilibrium adds to those of the run
+constexpr double kOverload = 3;  // diagonals: a first linear answer beyond this suggests a wrong unit
 
 std::string axis_name(const Vec3& direction) {
   for (int axis = 0; axis < 3; ++axis)
@@ -34,27 +42,124 @@ std::string point_name(const Vec3& at) {
   return fmt::format("({}, {}, {})", human_length(at.x()), human_length(at.y()), human_length(at.z()));
 }
 
-[[noreturn]] void diverge(Mechanics& mechanics, const State& reached, double done, double tried,
-                          const NewtonOutcome& outcome) {
-  const SmallestJacobian worst = mechanics.cells().smallest_jacobian(reached);
-  const Body& body = mechanics.body();
+// A run over load steps.
+class LoadStepping {
+ public:
+  LoadStepping(Mechanics& mechanics, State& state, const RunSettings& settings, const Deadline& deadline,
+               Progress& progress)
+      : mechanics_(mechanics),
+        state_(state),
+        settings_(settings),
+        deadline_(deadline),
+        progress_(progress),
+        first_(1.0 / settings.load_steps),
+        increment_(first_) {}
+
+  EquilibriumResult operator()();
+
+ private:
+  // Tries the next share; true and moved on when it converged.
+  bool attempt(NewtonSteps steps, int max_iterations);
+  [[nodiscard]] bool gives_up() const {
+    return increment_ <= kSmallestIncrement * first_ || iterations_left() <= 0;
+  }
+  [[nodiscard]] bool overloaded() const {
+    return reach_ > kOverload * bounding_box(mechanics_.body().rest).diagonal();
+  }
+  [[nodiscard]] int iterations_left() const;
+  void stop_when_asked() const;
+  [[noreturn]] void diverge() const;
+
+  Mechanics& mechanics_;
+  State& state_;
+  const RunSettings& settings_;
+  const Deadline& deadline_;
+  Progress& progress_;
+  double first_, increment_, done_ = 0;
+  EquilibriumResult result_;
+  State trial_;  // of the last attempt
+  NewtonOutcome outcome_;
+  double reach_ = 0;  // m: of the first linear answer, for the whole load
+};
+
+int LoadStepping::iterations_left() const {
+  const int allowed = settings_.newton_iterations.value_or(overloaded() ? kOverloadIterations : kIterations);
+  return allowed + kIterationsPerLoadStep * result_.load_steps - result_.newton_iterations;
+}
+
+void LoadStepping::stop_when_asked() const {
+  throw_if_interrupted();
+  if (deadline_ && std::chrono::steady_clock::now() > *deadline_)
+    throw TimeoutError(
+        fmt::format("stopped by --timeout in equilibrium with {:.4g} % of the load, {} Newton iterations",
+                    100 * done_, result_.newton_iterations));
+}
+
+bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
+  NewtonOptions options;
+  options.steps = steps;
+  options.tolerance = settings_.tolerance;
+  options.max_iterations = std::min(max_iterations, iterations_left());
+  trial_ = state_;
+  trial_.share = done_ + increment_ > 1 - 1e-9 ? 1 : done_ + increment_;
+  outcome_ = newton(mechanics_, trial_, options, [&](const std::string& note) {
+    stop_when_asked();
+    progress_.update(done_, fmt::format("load {:.3g} %, {}", 100 * trial_.share, note));
+  });
+  if (result_.newton_iterations == 0) reach_ = outcome_.first_reach / trial_.share;
+  result_.newton_iterations += outcome_.iterations;
+  result_.cg_iterations += outcome_.cg_iterations;
+  result_.linear_seconds += outcome_.linear_seconds;
+  if (!outcome_.converged) return false;
+  done_ = trial_.share;
+  state_ = trial_;
+  ++result_.load_steps;
+  result_.relative_residual = outcome_.relative_residual;
+  if (outcome_.iterations <= kEasyIterations) increment_ = std::min(first_, 2 * increment_);
+  return true;
+}
+
+void LoadStepping::diverge() const {
+  const SmallestJacobian worst = mechanics_.cells().smallest_jacobian(trial_);
+  const Body& body = mechanics_.body();
   const std::uint32_t element = body.cell_elements[worst.cell][0];
-  const std::uint32_t part = element_parts(body)[element];
-  throw DivergedError(
-      fmt::format("no equilibrium beyond {:.4g} % of the load (tried {:.4g} %, Newton iteration {}): {}; the "
-                  "most compressed cell is {} near "
-                  "{} of part \"{}\" with J = {:.3g}. Use a smaller load or move, a smaller spacing or a "
-                  "stiffer material; a part that "
-                  "buckles or snaps through has no equilibrium nearby",
-                  100 * done, 100 * tried, outcome.iterations + 1, outcome.trouble, worst.cell,
-                  point_name(body.rest[element]), body.parts[part].name, worst.value));
+  const std::string limit =
+      iterations_left() <= 0
+          ? fmt::format(" within {} Newton iterations ([run] newton_iterations)", result_.newton_iterations)
+          : "";
+  const double diagonal = bounding_box(body.rest).diagonal();
+  const std::string advice =
+      overloaded()
+          ? fmt::format(
+                "At its first stiffness the load would move the part by {}, {:.2g} times its size: "
+                "check the unit of the part and the load",
+                human_length(reach_), reach_ / diagonal)
+          : "Use a smaller load or move, a smaller spacing or a stiffer material; a part that buckles or "
+            "snaps through has no equilibrium nearby";
+  throw DivergedError(fmt::format(
+      "no equilibrium beyond {:.4g} % of the load{} (tried {:.4g} %): {}; the most compressed cell "
+      "is {} near {} of part \"{}\" with J = {:.3g}. {}",
+      100 * done_, limit, 100 * trial_.share, outcome_.trouble, worst.cell, point_name(body.rest[element]),
+      body.parts[element_parts(body)[element]].name, worst.value, advice));
+}
+
+EquilibriumResult LoadStepping::operator()() {
+  while (done_ < 1) {
+    if (attempt(NewtonSteps::full, kFullStepIterations)) continue;
+    if (iterations_left() > 0 && increment_ <= kLoweringIncrement * first_ &&
+        attempt(NewtonSteps::lowering, NewtonOptions().max_iterations))
+      continue;
+    if (gives_up()) diverge();
+    increment_ /= 2;
+  }
+  return result_;
 }
 
 }  // namespace
 
 void refuse_free_motions(Mechanics& mechanics, const std::string& scene) {
   const State rest{std::vector<Vec3>(mechanics.body().element_count(), Vec3::Zero()), 1};
-  mechanics.assemble(rest, false);
+  mechanics.assemble(rest);
   mechanics.eliminate_prescribed();
   const std::vector<FreeMotion> free =
       free_motions(mechanics.stiffness(), node_geometry(mechanics.body(), rest));
@@ -71,36 +176,8 @@ void refuse_free_motions(Mechanics& mechanics, const std::string& scene) {
 }
 
 EquilibriumResult find_equilibrium(Mechanics& mechanics, State& state, const RunSettings& settings,
-                                   Progress& progress) {
-  EquilibriumResult result;
-  const double first = 1.0 / settings.load_steps;
-  double done = 0, increment = first;
-  NewtonOptions options;
-  options.tolerance = settings.tolerance;
-  options.hopeless_reach = kHopelessReach * bounding_box(mechanics.body().rest).diagonal();
-  while (done < 1) {
-    State trial = state;
-    trial.share = done + increment > 1 - 1e-9 ? 1 : done + increment;
-    const NewtonOutcome outcome = newton(mechanics, trial, options, [&](const std::string& note) {
-      throw_if_interrupted();
-      progress.update(done, fmt::format("load {:.3g} %, {}", 100 * trial.share, note));
-    });
-    result.newton_iterations += outcome.iterations;
-    result.cg_iterations += outcome.cg_iterations;
-    result.linear_seconds += outcome.linear_seconds;
-    if (!outcome.converged) {
-      if (outcome.hopeless || increment <= kSmallestIncrement * first)
-        diverge(mechanics, trial, done, trial.share, outcome);
-      increment /= 2;
-      continue;
-    }
-    done = trial.share;
-    state = std::move(trial);
-    ++result.load_steps;
-    result.relative_residual = outcome.relative_residual;
-    if (outcome.iterations <= kEasyIterations) increment = std::min(first, 2 * increment);
-  }
-  return result;
+                                   const Deadline& deadline, Progress& progress) {
+  return LoadStepping(mechanics, state, settings, deadline, progress)();
 }
 
 }  // namespace flexel

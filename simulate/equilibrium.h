@@ -1,5 +1,8 @@
 // Equilibrium: Newton's method under load steps that cut themselves.
 #pragma once
+#include <chrono>
+#include <optional>
+
 #include "formats/progress.h"
 #include "simulate/mechanics.h"
 #include "simulate/scene.h"
@@ -16,8 +19,11 @@ struct EquilibriumResult {
 void refuse_free_motions(Mechanics& mechanics, const std::string& scene);
 
 // Moves `state` to equilibrium under the whole load. Throws DivergedError naming load step, iteration, the
-// worst cell and a suggestion; `state` is then the last one in equilibrium. Throws Interrupted.
+// worst cell and a suggestion, and TimeoutError once `deadline` has passed; `state` is then the last one in
+// equilibrium. Throws Interrupted.
+using Deadline = std::optional<std::chrono::steady_clock::time_point>;
 [[nodiscard]] EquilibriumResult find_equilibrium(Mechanics& mechanics, State& state,
-                                                 const RunSettings& settings, Progress& progress);
+                                                 const RunSettings& settings, const Deadline& deadline,
+                                                 Progress& progress);
 
 }  // namespace flexel

@@ -15,7 +15,7 @@ using namespace flexel;
 struct Arguments {
   std::string scene;
   std::vector<std::string> bodies;
-  std::string output = "-", summary;
+  std::string output = "-", summary, timeout;
   SimulateOptions options;
   bool quiet = false, compress = false;
 };
@@ -30,6 +30,10 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_option("--summary", arguments.summary, "Write the summary as JSON to this file (docs/summary.md)");
   app.add_flag("--explain", arguments.options.explain,
                "Say which effects run and why, and the share of time of each");
+  app.add_option("--timeout", arguments.timeout,
+                 "Stop after this time (\"90 s\", \"5 min\"): exit 5, the last good state in "
+                 "OUTPUT.failed.vtu")
+      ->type_name("TIME");
   app.add_flag("--quiet", arguments.quiet, "Say nothing but warnings and errors");
   app.add_flag("--compress", arguments.compress, "Compress the arrays of the body file");
 }
@@ -63,6 +67,7 @@ int run(int argc, char** argv) {
   if (arguments.scene == "-" && arguments.bodies.empty())
     throw InputError("scene and body cannot both come from stdin; give the body's file");
   Progress progress("flexel-simulate", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
+  if (!arguments.timeout.empty()) arguments.options.timeout = parse_timeout(arguments.timeout);
   const Scene scene = read_scene(arguments.scene);  // before the body: a typo is answered at once
   Body body = read_bodies(arguments.bodies);
   arguments.options.failed_output = failed_name(arguments.output);

@@ -73,10 +73,10 @@ Forces Mechanics::forces(const State& state) {
   return result;
 }
 
-void Mechanics::assemble(const State& state, bool project) {
+void Mechanics::assemble(const State& state, const TangentOptions& tangent) {
   {
     const PassTimer timer(cell_seconds_);
-    cells_.set_stiffness(state, project, pattern_.matrix);
+    cells_.set_stiffness(state, tangent, pattern_.matrix);
   }
   for (Pass& pass : passes_)
     if (pass.add_stiffness) {

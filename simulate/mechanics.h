@@ -29,7 +29,7 @@ class Mechanics {
   [[nodiscard]] double elastic_energy(const State& state) { return cells_.energy(state); }
   [[nodiscard]] Forces forces(const State& state);
   // Tangent stiffness into stiffness(), prescribed components not yet eliminated.
-  void assemble(const State& state, bool project);
+  void assemble(const State& state, const TangentOptions& tangent = {});
   void eliminate_prescribed() { eliminate(constraints_, pattern_.matrix); }
   // 1 for each element that a tie holds or leads.
   [[nodiscard]] std::vector<std::uint8_t> tied_elements();

@@ -8,11 +8,15 @@
 
 namespace flexel {
 
+// How far a step goes. `full`: all the way, whatever the energy does in between; fast, also where a part
+// bends past its thickness, but it can run away. `lowering`: as far as the energy falls; slow, hardly ever
+// fails.
+enum class NewtonSteps { full, lowering };
+
 struct NewtonOptions {
+  NewtonSteps steps = NewtonSteps::lowering;
   double tolerance = 1e-8;  // residual relative to loads and reactions
   int max_iterations = 40;
-  double hopeless_reach =
-      0;  // m: a first linear answer beyond this for the whole load ends the run; 0: none does
 };
 
 struct NewtonOutcome {
@@ -20,8 +24,8 @@ struct NewtonOutcome {
   int iterations = 0, cg_iterations = 0;
   double relative_residual = 1;
   double linear_seconds = 0;  // in preconditioners and conjugate gradients
+  double first_reach = 0;     // m: largest displacement of the first linear answer
   std::string trouble;        // why it stopped when not converged
-  bool hopeless = false;      // a smaller share of the load would not help
 };
 
 // Moves `state` to the equilibrium at its share. On failure the state is what was reached: the caller keeps

@@ -71,6 +71,14 @@ Probe parse_probe(TableReader& reader, std::size_t number) {
   return probe;
 }
 
+std::optional<int> whole_number(TableReader& reader, const char* key, int most) {
+  const std::optional<double> value = reader.number(key);
+  if (!value) return std::nullopt;
+  if (!(*value >= 1 && *value <= most && *value == std::floor(*value)))
+    reader.fail(fmt::format("\"{}\" needs to be a whole number from 1 to {}", key, most));
+  return static_cast<int>(*value);
+}
+
 RunSettings parse_run(TableReader& root) {
   RunSettings run;
   const SceneValue* table = root.find("run");
@@ -82,13 +90,11 @@ RunSettings parse_run(TableReader& root) {
         reader.find("until")->line,
         fmt::format("\"until\" = \"{}\" is not available; this version knows \"equilibrium\"", until));
   run.tolerance = reader.number("tolerance").value_or(run.tolerance);
-  const double steps = reader.number("load_steps").value_or(run.load_steps);
+  run.load_steps = whole_number(reader, "load_steps", 10000).value_or(run.load_steps);
+  run.newton_iterations = whole_number(reader, "newton_iterations", 1000000);
   reader.finish();
   if (!(run.tolerance >= 1e-12 && run.tolerance <= 1e-2))
     reader.fail(fmt::format("\"tolerance\" = {} needs to lie between 1e-12 and 1e-2", run.tolerance));
-  if (!(steps >= 1 && steps <= 10000 && steps == std::floor(steps)))
-    reader.fail("\"load_steps\" needs to be a whole number from 1 to 10000");
-  run.load_steps = static_cast<int>(steps);
   return run;
 }
 

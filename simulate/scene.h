@@ -35,6 +35,9 @@ struct Probe {
 struct RunSettings {
   double tolerance = 1e-8;  // largest residual, relative to loads and reactions
   int load_steps = 1;       // at least; steps that fail are cut by themselves
+  // after which the run gives up; each load step that ends in equilibrium allows 10 more. Nothing: 100, or 40
+  // where the first linear answer is several times the size of the body
+  std::optional<int> newton_iterations;
 };
 
 struct Scene {

@@ -68,6 +68,25 @@ void measure_displacement(const Body& body, const State& state, SimulateResult& 
     }
 }
 
+// A cell resists by its mean deformation gradient; a corner of it may fold unnoticed, and with it the surface
+// that is mapped through it.
+void measure_corners(const Mechanics& mechanics, const State& state, SimulateResult& result,
+                     Progress& progress) {
+  constexpr double kNearlyFolded = 0.2;
+  const SmallestJacobian smallest = mechanics.cells().smallest_corner_jacobian(state);
+  const Body& body = mechanics.body();
+  if (smallest.cell >= body.cell_count()) return;
+  result.smallest_corner_jacobian = smallest.value;
+  result.smallest_corner_at = body.rest[body.cell_elements[smallest.cell][smallest.corner]];
+  if (smallest.value > kNearlyFolded) return;
+  const Vec3& at = result.smallest_corner_at;
+  progress.warn(
+      fmt::format("a corner of a cell near ({}, {}, {}) {} (J = {:.2g}): the result is coarse there; "
+                  "use a smaller spacing, or spread the load or the fix over a larger area",
+                  human_length(at.x()), human_length(at.y()), human_length(at.z()),
+                  smallest.value > 0 ? "is nearly folded" : "is folded", smallest.value));
+}
+
 double mass_of(const Setting& setting) {
   const std::vector<std::uint32_t> part = cell_parts(setting.body);
   return parallel_sum<double>(setting.body.cell_count(), [&](std::size_t c) {
@@ -95,6 +114,7 @@ class Run {
 
  private:
   EquilibriumResult solve(Mechanics& mechanics);
+  [[nodiscard]] std::string save_failed(const Mechanics& mechanics);
 
   Body& body_;
   const Scene& scene_;
@@ -102,25 +122,35 @@ class Run {
   Progress& progress_;
   Fragments fragments_;
   State state_;
+  std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
 };
 
 EquilibriumResult Run::solve(Mechanics& mechanics) {
   refuse_loose_fragments(fragments_, body_, mechanics.tied_elements(), scene_.name);
   refuse_free_motions(mechanics, scene_.name);
+  Deadline deadline;
+  if (options_.timeout)
+    deadline = began_ + std::chrono::duration_cast<std::chrono::steady_clock::duration>(
+                            std::chrono::duration<double>(*options_.timeout));
   try {
-    return find_equilibrium(mechanics, state_, scene_.run, progress_);
+    return find_equilibrium(mechanics, state_, scene_.run, deadline, progress_);
   } catch (const DivergedError& error) {
-    if (options_.failed_output.empty()) throw;
-    carry_strays(fragments_, body_, mechanics.stencil(), state_);
-    move_body(body_, state_);
-    write_body(body_, options_.failed_output);
-    throw DivergedError(
-        fmt::format("{}; the last state in equilibrium is in {}", error.what(), options_.failed_output));
+    throw DivergedError(error.what() + save_failed(mechanics));
+  } catch (const TimeoutError& error) {
+    throw TimeoutError(error.what() + save_failed(mechanics));
   }
 }
 
+// Writes the last state in equilibrium; says where it is.
+std::string Run::save_failed(const Mechanics& mechanics) {
+  if (options_.failed_output.empty()) return "";
+  carry_strays(fragments_, body_, mechanics.stencil(), state_);
+  move_body(body_, state_);
+  write_body(body_, options_.failed_output);
+  return "; the last state in equilibrium is in " + options_.failed_output;
+}
+
 SimulateResult Run::operator()() {
-  const auto began = std::chrono::steady_clock::now();
   SimulateResult result;
   const Setting setting{body_, materials_of_parts(scene_, body_), stray_cells(fragments_)};
   name_materials(body_, setting.materials);
@@ -136,6 +166,7 @@ SimulateResult Run::operator()() {
   mechanics.report(state_, result);
   result.elastic_energy = mechanics.elastic_energy(state_);
   result.smallest_jacobian = mechanics.cells().smallest_jacobian(state_).value;
+  measure_corners(mechanics, state_, result, progress_);
   carry_strays(fragments_, body_, mechanics.stencil(), state_);
   move_body(body_, state_);
   for (const ProbePoints& probe : probes) result.probes.push_back(measure(probe, state_));
@@ -147,12 +178,18 @@ SimulateResult Run::operator()() {
   result.newton_iterations = solved.newton_iterations;
   result.cg_iterations = solved.cg_iterations;
   result.relative_residual = solved.relative_residual;
-  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
   if (options_.explain) explain_after(result, solved.linear_seconds, progress_);
   return result;
 }
 
 }  // namespace
+
+double parse_timeout(const std::string& text) {
+  const double seconds = parse_quantity(text, Dimension::time);
+  if (!(seconds > 0)) throw InputError("--timeout: must be above zero");
+  return seconds;
+}
 
 SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress) {
   const ThreadLimit limit(options.threads);

@@ -1,6 +1,7 @@
 // Body + scene -> deformed body.
 #pragma once
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -41,23 +42,30 @@ struct SimulateResult {
   std::size_t stray_cells = 0;      // in loose crumbs that were carried along, not simulated
   double largest_displacement = 0;  // m, over the elements
   Vec3 largest_displacement_at = Vec3::Zero();
-  double elastic_energy = 0;     // J
-  double mass = 0;               // kg
-  double smallest_jacobian = 1;  // of all cells' mean deformation gradients
+  double elastic_energy = 0;               // J
+  double mass = 0;                         // kg
+  double smallest_jacobian = 1;            // of all cells' mean deformation gradients
+  double smallest_corner_jacobian = 1;     // of the trilinear map at the cells' corners; <= 0: folded there
+  Vec3 smallest_corner_at = Vec3::Zero();  // m, rest position of that corner
   int load_steps = 0, newton_iterations = 0, cg_iterations = 0;
   double relative_residual = 0;
   double seconds = 0;
 };
 
 struct SimulateOptions {
-  int threads = 0;            // 0: every core
-  std::string failed_output;  // where the last good state goes when the run diverges; "" for nowhere
-  bool explain = false;       // say which effects run and why, and afterwards the share of time of each
+  int threads = 0;                // 0: every core
+  std::string failed_output;      // where the last good state goes when the run fails; "" for nowhere
+  std::optional<double> timeout;  // s, after which the run stops
+  bool explain = false;           // say which effects run and why, and afterwards the share of time of each
 };
 
-// Runs the scene on the body, which is moved to its new state. Throws InputError, DivergedError, Interrupted.
+// Runs the scene on the body, which is moved to its new state. Throws InputError, DivergedError,
+// TimeoutError, Interrupted.
 [[nodiscard]] SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& options,
                                       Progress& progress);
+
+// "90 s", "5 min" in seconds. Throws InputError: no time, or none above zero.
+[[nodiscard]] double parse_timeout(const std::string& text);
 
 // The result as JSON (docs/summary.md gives every key and unit).
 [[nodiscard]] std::string summary_json(const SimulateResult& result, const Body& body);

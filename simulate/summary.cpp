@@ -63,6 +63,8 @@ std::string summary_json(const SimulateResult& result, const Body& body) {
   json["imbalance"] = vector(result.imbalance);
   json["elastic_energy"] = result.elastic_energy;
   json["smallest_jacobian"] = result.smallest_jacobian;
+  json["smallest_corner_jacobian"] = result.smallest_corner_jacobian;
+  json["smallest_corner_at"] = vector(result.smallest_corner_at);
   json["load_steps"] = result.load_steps;
   json["newton_iterations"] = result.newton_iterations;
   json["cg_iterations"] = result.cg_iterations;
@@ -86,10 +88,11 @@ std::vector<std::string> summary_lines(const SimulateResult& result) {
   for (const Reaction& reaction : result.reactions)
     lines.push_back(fmt::format("reaction of \"{}\": {}", reaction.name, forces(reaction.force)));
   lines.push_back(fmt::format(
-      "elastic energy {:.4g} J, smallest J {:.4g}, {} load step(s), {} Newton and {} CG iterations, "
+      "elastic energy {:.4g} J, smallest J {:.4g} (at a corner {:.4g}), {} load step(s), {} Newton and {} CG "
+      "iterations, "
       "residual {:.1e}, {:.2f} s",
-      result.elastic_energy, result.smallest_jacobian, result.load_steps, result.newton_iterations,
-      result.cg_iterations, result.relative_residual, result.seconds));
+      result.elastic_energy, result.smallest_jacobian, result.smallest_corner_jacobian, result.load_steps,
+      result.newton_iterations, result.cg_iterations, result.relative_residual, result.seconds));
   return lines;
 }
 

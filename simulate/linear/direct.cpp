@@ -37,9 +37,4 @@ void DirectSolver::solve(double* x) const {
   vector.noalias() = factor_.permutationPinv() * work_;
 }
 
-std::size_t DirectSolver::bytes() const {
-  if (inverse_pivots_.size() == 0) return 0;
-  return static_cast<std::size_t>(factor_.matrixL().nestedExpression().nonZeros()) * 12;
-}
-
 }  // namespace flexel

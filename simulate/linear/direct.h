@@ -16,7 +16,6 @@ class DirectSolver {
   void factorise(const Eigen::SparseMatrix<double>& lower);
   // x = A^-1 x in place; x has one value per row.
   void solve(double* x) const;
-  [[nodiscard]] std::size_t bytes() const;
 
  private:
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor_;

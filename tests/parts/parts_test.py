@@ -23,7 +23,7 @@ where = {{ half_space = {{ point = [{high}], normal = [{up}] }} }}
 force = [{force}]
 """
 
-PRESSURE = 3e4  # Pa over the square of the shortest side: a strain of 1e-5 in a compact part of PLA, and no collapse of a plate
+PRESSURE = 1e3  # Pa over the square of the longest side: a plate of PLA folds up under it
 
 
 def bounding_box(name, unit):
@@ -46,7 +46,7 @@ def hold_and_draw(low, high, parts):
     side = np.eye(3)[(along + 1) % 3]
     size = float((high - low)[along])
     text = HOLD_AND_DRAW.format(low=vector(low + 0.1 * size * axis, "m"), down=vector(-axis), high=vector(low + 0.9 * size * axis, "m"),
-                                up=vector(axis), force=vector(PRESSURE * float((high - low).min())**2 * side, "N"))
+                                up=vector(axis), force=vector(PRESSURE * size**2 * side, "N"))
     return scene("draw.toml", text)
 
 

@@ -142,6 +142,74 @@ def test_interrupt_while_simulating():
     expect_only(*before)
 
 
+# The cell between the two selections is led to its mirror image: no equilibrium.
+MIRROR = """material = "steel"
+[[fix]]
+where = { half_space = { point = ["11 mm", 0, 0], normal = [-1, 0, 0] } }
+[[move]]
+where = { half_space = { point = ["19 mm", 0, 0], normal = [1, 0, 0] } }
+displacement = ["-25 mm", "0 mm", "0 mm"]
+"""
+
+
+def expect_failed_state(name, *others):
+    """Besides the inputs only the last good state is there, and it is a body that flexel-map takes."""
+    expect_only(name, *others)
+    expect_ok(run("flexel-map", name, "-o", "last.stl", "--quiet"))
+
+
+def test_divergence_leaves_the_last_good_state():
+    box()
+    expect_ok(run("flexel-voxelize", "box.stl", "--size", "10 mm", "-o", "body.vtu"))
+    inputs = ["box.stl", "body.vtu", scene(text=MIRROR)]
+    expect_error(run("flexel-simulate", "scene.toml", "body.vtu"), "flexel-simulate", "no equilibrium beyond", "% of the load", code=3)
+    expect_only(*inputs)
+    result = run("flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu", "--summary", "summary.json")
+    expect_error(result, "flexel-simulate", "no equilibrium beyond", "out.failed.vtu", code=3)
+    expect_failed_state("out.failed.vtu", *inputs)
+
+
+def test_deform_leaves_the_last_good_state():
+    inputs = [box(), scene(text=MIRROR)]
+    result = run("flexel", "deform", "box.stl", "--size", "10 mm", "--scene", "scene.toml", "-o", "out.stl")
+    expect_error(result, "flexel", "no equilibrium beyond", "out.failed.vtu", code=3)
+    expect_failed_state("out.failed.vtu", *inputs)
+
+
+def test_newton_iterations_are_bounded():
+    box()
+    expect_ok(run("flexel-voxelize", "box.stl", "--size", "2.5 mm", "-o", "body.vtu"))
+    text = SCENE.replace("-100 N", "-1000 MN") + "[run]\nnewton_iterations = 10\n"
+    inputs = ["box.stl", "body.vtu", scene(text=text)]
+    result = run("flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu", timeout=60)
+    expect_error(result, "flexel-simulate", "% of the load within 10 Newton iterations", "times its size", "check the unit", code=3)
+    expect_failed_state("out.failed.vtu", *inputs)
+
+
+def test_timeout():
+    box()
+    expect_ok(run("flexel-voxelize", "box.stl", *FINE, "-o", "body.vtu"))
+    inputs = ["box.stl", "body.vtu", scene(text=SCENE + "[run]\nload_steps = 100\n")]
+    began = time.monotonic()
+    result = run("flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu", "--timeout", "2 s")
+    expect(time.monotonic() - began < 40, "it took too long to stop")
+    expect_error(result, "flexel-simulate", "stopped by --timeout", "% of the load", "out.failed.vtu", code=5)
+    expect_failed_state("out.failed.vtu", *inputs)
+
+
+def test_timeout_of_deform():
+    inputs = [box(), scene(text=SCENE + "[run]\nload_steps = 100\n")]
+    result = run("flexel", "deform", "box.stl", *FINE, "--scene", "scene.toml", "--timeout", "1s", "-o", "out.stl")
+    expect_error(result, "flexel", "stopped by --timeout", "out.failed.vtu", code=5)
+    expect_failed_state("out.failed.vtu", *inputs)
+
+
+def test_timeout_that_is_no_time():
+    scene()
+    for text in ("5", "5 mm", "0 s", "-1 s"):
+        expect_error(run("flexel-simulate", "scene.toml", "body.vtu", "--timeout=" + text), "flexel-simulate", "time")
+
+
 PROGRAMS = ["flexel", "flexel-voxelize", "flexel-simulate", "flexel-map"]
 
 

@@ -180,6 +180,44 @@ TEST(CellModel, ProjectedModuliArePositiveAndElseTheSame) {
           1e-9 * tangent_block(kind, calm, a, a).norm());
 }
 
+TEST(CellModel, SecondStressTurnsWithNothingAndGivesTheFirst) {
+  Random random;
+  const Lattice lattice = turned_lattice();
+  const CellKind kind = cell_kind(lattice, rubbery(0.3));
+  const Mat3 h = displacement_gradient(kind, random.displacement(0.015));
+  const Mat3 f = Mat3::Identity() + h;
+  EXPECT_LT((f * second_stress(kind, h) - stress(kind, h)).norm(), 1e-12 * stress(kind, h).norm());
+  const Mat3 rotation = Eigen::AngleAxisd(1.3, Vec3(1, -2, 3).normalized()).toRotationMatrix();
+  const Mat3 turned = second_stress(kind, rotation * f - Mat3::Identity());
+  EXPECT_LT((turned - second_stress(kind, h)).norm(), 1e-12 * turned.norm());
+}
+
+// The prediction is exact to first order in the change: its error falls with the square.
+TEST(CellModel, PredictedStressIsTheLinearModel) {
+  Random random;
+  const CellKind kind = cell_kind(turned_lattice(), rubbery(0.3));
+  const Mat3 h = displacement_gradient(kind, random.displacement(0.015));
+  const Mat3 change = displacement_gradient(kind, random.displacement(0.015));
+  const auto error = [&](double step) {
+    return (predicted_stress(kind, h, step * change) - second_stress(kind, h + step * change)).norm();
+  };
+  EXPECT_NEAR(error(1e-3) / error(5e-4), 4, 0.05);
+}
+
+TEST(CellModel, CornerGradientIsThatOfAnAffineFieldAndSeesAFold) {
+  const Lattice lattice = turned_lattice();
+  const CellKind kind = cell_kind(lattice, rubbery(0.3));
+  Mat3 h;
+  h << 0.2, 0.1, -0.05, 0.03, -0.1, 0.2, 0.0, 0.15, 0.1;
+  CellVectors u = affine(lattice, h, Vec3(1, 2, 3));
+  for (std::uint32_t a = 0; a < 8; ++a) EXPECT_LT((corner_gradient(kind, u, a) - h).norm(), 1e-13);
+  u.fill(Vec3::Zero());
+  const auto x = corners(lattice);
+  u[0] = 1.2 * (x[7] - x[0]);  // beyond the plane of its three neighbours, and beyond the opposite corner
+  EXPECT_LT(1 + volume_change(corner_gradient(kind, u, 0)), 0);
+  EXPECT_GT(1 + volume_change(displacement_gradient(kind, u)), 0);
+}
+
 TEST(CellModel, InvertedCellHasInfiniteEnergy) {
   const Lattice lattice = turned_lattice();
   const CellKind kind = cell_kind(lattice, rubbery(0.3));
