@@ -175,10 +175,11 @@ class SlabBuilder {
     if (found.count == 1 && (found.overlapping || found.undecided || impossible(slab.pieces[first].fill))) {
       const LineFill by_lines = fill_by_lines(voxel);
       found.overlapping = by_lines.overlap;
-      if (by_lines.overlap) slab.pieces[first].fill = by_lines.fill;
+      if (by_lines.overlap || impossible(slab.pieces[first].fill)) slab.pieces[first].fill = by_lines.fill;
     }
+    // A shell that passes through itself may give one of several pieces less than nothing, or too much.
     for (std::uint32_t p = 0; p < found.count; ++p)
-      slab.pieces[first + p].fill = std::min(1., slab.pieces[first + p].fill);
+      slab.pieces[first + p].fill = std::clamp(slab.pieces[first + p].fill, 0., 1.);
     slab.split_voxels += found.count > 1;
     slab.undecided_voxels += found.undecided && !found.overlapping;
     slab.overlapping_voxels += found.overlapping;

@@ -1,6 +1,7 @@
 // Estimates by volume and area alone: what is inside, and what a surface cuts (memory.h gives the formula).
 #include "voxelize/memory.h"
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <limits>
@@ -28,9 +29,20 @@ double spacing_for_cells(const std::vector<PartExtent>& extents, double cells, P
   return std::exp(high);
 }
 
+namespace {
+constexpr double kProgram = 35e6;                           // bytes
+constexpr double kPerCell = 4500, kPerCentreElement = 400;  // bytes
+double bytes_each(Placement placement) {
+  return placement == Placement::corner ? kPerCell : kPerCentreElement;
+}
+}  // namespace
+
 double simulation_memory(double cells, Placement placement) {
-  constexpr double kPerCell = 4400, kPerCentreElement = 400;  // bytes
-  return cells * (placement == Placement::corner ? kPerCell : kPerCentreElement);
+  return kProgram + cells * bytes_each(placement);
+}
+
+double cells_within(double bytes, Placement placement) {
+  return std::max(1., (bytes - kProgram) / bytes_each(placement));
 }
 
 double available_memory() {

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "formats/error.h"
 #include "formats/program.h"
@@ -54,7 +55,7 @@ void check_spacing(double spacing, const std::vector<PartMesh>& meshes, const Su
 void check_memory(double cells, double limit, const std::vector<PartExtent>& extents, Placement placement) {
   const double needed = simulation_memory(cells, placement);
   if (needed <= limit) return;
-  const double fitting = spacing_for_cells(extents, limit / simulation_memory(1, placement), placement);
+  const double fitting = spacing_for_cells(extents, cells_within(limit, placement), placement);
   throw InputError(
       fmt::format("about {} cells need {} to simulate, more than the limit of {}; --size {} would fit, or "
                   "raise --max-memory",
@@ -168,6 +169,72 @@ double total_cells(const VoxelizeResult& result, Placement placement) {
   return total;
 }
 
+// The body at the spacing for the count asked for. The estimate is rough for thin parts: it is scaled by what
+// came out, again while the count is off by more than a tenth, at most three times; a spacing between one
+// that gave too many and one that gave too few stays between them. The best is kept.
+class CountSearch {
+ public:
+  CountSearch(const std::vector<PartExtent>& extents, double wanted, Placement placement)
+      : extents_(extents), placement_(placement), wanted_(wanted), target_(wanted) {}
+
+  // What came out at `spacing`.
+  void add(double spacing, double got) {
+    if (got > wanted_)
+      too_small_ = std::max(too_small_, spacing);
+    else
+      too_large_ = std::min(too_large_, spacing);
+    target_ *= wanted_ / got;
+    if (const double error = std::abs(std::log(got / wanted_)); error < least_error_) {
+      least_error_ = error;
+      best_ = spacing;
+    }
+  }
+  [[nodiscard]] bool close() const { return least_error_ <= std::log(1.1); }
+  [[nodiscard]] double best() const { return best_; }
+  [[nodiscard]] double next() const {
+    const double spacing = spacing_for_cells(extents_, target_, placement_);
+    const bool between = spacing > too_small_ && spacing < too_large_;
+    return between || too_small_ == 0 || std::isinf(too_large_) ? spacing
+                                                                : std::sqrt(too_small_ * too_large_);
+  }
+
+ private:
+  const std::vector<PartExtent>& extents_;
+  Placement placement_;
+  double wanted_, target_;
+  double too_small_ = 0, too_large_ = std::numeric_limits<double>::infinity();
+  double least_error_ = std::numeric_limits<double>::infinity(), best_ = 0;
+};
+
+VoxelizeResult correct_count(VoxelizeResult result, double spacing, std::vector<PartMesh>& meshes,
+                             const std::vector<PartExtent>& extents, const VoxelizeOptions& options,
+                             Progress& progress) {
+  constexpr int kCorrections = 3;
+  CountSearch search(extents, static_cast<double>(options.count.value_or(kDefaultCount)), options.placement);
+  search.add(spacing, total_cells(result, options.placement));
+  Surface surface;
+  const auto build_at = [&](double next) {
+    spacing = next;
+    check_spacing(spacing, meshes, surface);
+    result = build(surface, meshes, spacing, options, progress);
+  };
+  for (int n = 0; n < kCorrections && !search.close(); ++n) {
+    std::swap(surface, result.body.surface);
+    try {
+      build_at(search.next());
+    } catch (const InputError&) {  // as small a count cannot be met: the best before stays
+      spacing = 0;
+      break;
+    }
+    search.add(spacing, total_cells(result, options.placement));
+  }
+  if (spacing != search.best()) {
+    if (surface.parts.empty()) std::swap(surface, result.body.surface);
+    build_at(search.best());
+  }
+  return result;
+}
+
 }  // namespace
 
 VoxelizeResult voxelize(Surface surface, const VoxelizeOptions& options, Progress& progress) {
@@ -177,26 +244,13 @@ VoxelizeResult voxelize(Surface surface, const VoxelizeOptions& options, Progres
   check_meshes(meshes, surface);
   const std::vector<PartExtent> extents = extents_of(meshes);
   const double limit = options.max_memory.value_or(.8 * available_memory());
-  double spacing = choose_spacing(options, extents);
-  const auto admit = [&] {
-    check_spacing(spacing, meshes, surface);
-    double cells = 0;
-    for (const PartExtent& extent : extents) cells += estimate_cells(extent, spacing, options.placement);
-    check_memory(cells, limit, extents, options.placement);
-  };
-  admit();
+  const double spacing = choose_spacing(options, extents);
+  check_spacing(spacing, meshes, surface);
+  double estimate = 0;
+  for (const PartExtent& extent : extents) estimate += estimate_cells(extent, spacing, options.placement);
+  check_memory(estimate, limit, extents, options.placement);
   VoxelizeResult result = build(surface, meshes, spacing, options, progress);
-  if (!options.size) {
-    // The estimate of the count is rough for thin parts: correct it once by what came out.
-    const double wanted = static_cast<double>(options.count.value_or(kDefaultCount)),
-                 got = total_cells(result, options.placement);
-    if (std::abs(got / wanted - 1) > .1) {
-      std::swap(surface, result.body.surface);
-      spacing = spacing_for_cells(extents, wanted * wanted / got, options.placement);
-      admit();
-      result = build(surface, meshes, spacing, options, progress);
-    }
-  }
+  if (!options.size) result = correct_count(std::move(result), spacing, meshes, extents, options, progress);
   const double cells = total_cells(result, options.placement);
   check_memory(cells, limit, extents, options.placement);
   measure(meshes, result);

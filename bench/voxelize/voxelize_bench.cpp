@@ -1,12 +1,18 @@
-// Voxelising a knotted tube of about a million triangles, the longest axis cut into 512 voxels.
+// Voxelising a knotted tube of about a million triangles, the longest axis cut into 512 voxels: from binary
+// STL to body file as the program does it (stl_to_body), and its phases.
 #include <benchmark/benchmark.h>
 
+#include <unistd.h>
 #include <cmath>
+#include <filesystem>
 #include <numbers>
 
 #include <Eigen/Geometry>
 
+#include "formats/body_file.h"
+#include "formats/import.h"
 #include "formats/parallel.h"
+#include "formats/surface_file.h"
 #include "voxelize/align.h"
 #include "voxelize/classify.h"
 #include "voxelize/elements.h"
@@ -64,6 +70,36 @@ PartMesh placed(int voxels) {
   return mesh;
 }
 
+// Files of this process, in memory where the system has a file system there; removed at the end.
+struct TemporaryFiles {
+  std::filesystem::path folder;
+  TemporaryFiles() {
+    const std::filesystem::path memory = "/dev/shm";
+    folder = (std::filesystem::is_directory(memory) ? memory : std::filesystem::temp_directory_path()) /
+             ("flexel-bench-" + std::to_string(getpid()));
+    std::filesystem::create_directory(folder);
+    write_surface(million(), std::vector<Vec3>(million().vertices.size(), Vec3::Zero()),
+                  SurfaceFormat::stl_binary, 1e-3, part());
+  }
+  ~TemporaryFiles() { std::filesystem::remove_all(folder); }
+  [[nodiscard]] std::string part() const { return (folder / "knot.stl").string(); }
+  [[nodiscard]] std::string body() const { return (folder / "knot.vtu").string(); }
+};
+
+void stl_to_body(benchmark::State& state) {
+  static const TemporaryFiles files;
+  const ThreadLimit threads(static_cast<int>(state.range(1)));
+  Progress progress("bench", Progress::Mode::quiet);
+  VoxelizeOptions options;
+  options.size = size_for(static_cast<int>(state.range(0)));
+  options.max_memory = 1e12;
+  for (auto _ : state) {
+    const VoxelizeResult result = voxelize(import_surface(files.part()), options, progress);
+    write_body(result.body, files.body());
+    state.counters["cells"] = static_cast<double>(result.parts[0].cells);
+  }
+}
+
 void whole(benchmark::State& state) {
   const ThreadLimit threads(static_cast<int>(state.range(1)));
   Progress progress("bench", Progress::Mode::quiet);
@@ -96,6 +132,12 @@ void elements(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(make_elements(voxels));
 }
 
+BENCHMARK(stl_to_body)
+    ->Args({512, 1})
+    ->Args({512, 2})
+    ->Unit(benchmark::kMillisecond)
+    ->MeasureProcessCPUTime()
+    ->UseRealTime();
 BENCHMARK(whole)->Args({512, 1})->Args({512, 2})->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(meshes)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(classify)

@@ -75,6 +75,30 @@ TEST(Broken, TouchingBoxesHangTogether) {
   }
 }
 
+// One closed shell that passes through itself: winding numbers from below 0 to above 1.
+TEST(Broken, SelfIntersectingShellsNeverHoldLessThanNothing) {
+  std::mt19937 random(23);
+  std::normal_distribution<double> noise(0, .35);
+  std::size_t impossible = 0;
+  for (int trial = 0; trial < 8; ++trial) {
+    Mesh crumpled = trial % 2 == 0 ? icosphere(2, 1) : torus(1, .3, 24, 12);
+    for (Vec3& vertex : crumpled.vertices) vertex += Vec3(noise(random), noise(random), noise(random));
+    for (const double size : {.05, .1, .3}) {
+      const VoxelizeResult result = run(crumpled, size);
+      const VoxelizedPart& part = result.parts[0];
+      const double voxel = part.spacing.prod();
+      EXPECT_GE(part.dropped_volume, 0) << trial << " at " << size;
+      EXPECT_LE(part.dropped_volume, static_cast<double>(part.dropped_cells) * voxel / 64 + 1e-6 * voxel);
+      for (const double fill : result.body.fill) {
+        EXPECT_GE(fill, 1. / 64);
+        EXPECT_LE(fill, 1);
+      }
+      impossible += part.overlapping_voxels;
+    }
+  }
+  EXPECT_GT(impossible, 1000u);  // the shells do pass through themselves
+}
+
 TEST(Broken, SmallHolesAreVotedOver) {
   std::mt19937 random(19);
   const Mesh ball = icosphere(3, 1);

@@ -137,8 +137,7 @@ TEST(Classify, MemoryBeyondTheLimitIsRefusedWithASizeThatFits) {
     EXPECT_THAT(error.what(), testing::HasSubstr("--max-memory"));
   }
   const PartExtent extent{4.19, 12.57};
-  options.size =
-      1.05 * spacing_for_cells({extent}, 1e9 / simulation_memory(1, Placement::corner), Placement::corner);
+  options.size = 1.05 * spacing_for_cells({extent}, cells_within(1e9, Placement::corner), Placement::corner);
   EXPECT_LE(voxelize(surface(icosphere(2, 1)), options, progress).simulation_memory, 1e9);
 }
 
