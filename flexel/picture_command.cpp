@@ -174,6 +174,8 @@ int picture_command(int argc, char** argv) {
   ImportOptions import;
   // Flat faces need no splitting to be drawn.
   import.largest_edge = std::numeric_limits<double>::infinity();
+  // Outlines of round faces should look round.
+  import.angular_deflection = 0.12;
   if (!arguments.unit.empty()) import.unit = length_unit(arguments.unit);
   if (!arguments.input_format.empty()) import.format = arguments.input_format;
   const ThreadLimit limit(arguments.threads);

@@ -1,6 +1,7 @@
 // Each candidate is looked at with a few thousand rays.
 #include "flexel/picture/best_view.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
@@ -30,7 +31,54 @@ double entropy(const Drawable& drawn, const std::vector<Hit>& hits) {
   return sum;
 }
 
-double score(const ViewSubject& subject, const View& view, double aspect) {
+// Points of the surface, evenly spread by area, with their normals.
+struct Probe {
+  Vec3f point, normal;
+};
+
+std::vector<Probe> probes(const Drawable& drawn) {
+  constexpr double kProbes = 1500;
+  std::vector<Probe> result;
+  double total = 0, sum = 0;
+  std::vector<float> area(drawn.triangles.size());
+  const auto corner = [&](std::size_t t, std::size_t i) -> const Vec3f& {
+    return drawn.vertices[drawn.triangles[t][i]];
+  };
+  for (std::size_t t = 0; t < area.size(); ++t) {
+    area[t] = (corner(t, 1) - corner(t, 0)).cross(corner(t, 2) - corner(t, 0)).norm();
+    total += area[t];
+  }
+  for (std::size_t t = 0; t < area.size() && total > 0; ++t) {
+    const double before = std::floor(sum * kProbes / total);
+    sum += area[t];
+    const int here = static_cast<int>(std::floor(sum * kProbes / total) - before);
+    const Vec3f normal = (corner(t, 1) - corner(t, 0)).cross(corner(t, 2) - corner(t, 0)).normalized();
+    for (int k = 0; k < here; ++k) {
+      // Spread over the triangle by the R2 sequence, folded into it.
+      float u = std::fmod(0.5f + 0.7548777f * static_cast<float>(k), 1.0f),
+            v = std::fmod(0.5f + 0.5698403f * static_cast<float>(k), 1.0f);
+      if (u + v > 1) u = 1 - u, v = 1 - v;
+      result.push_back({(1 - u - v) * corner(t, 0) + u * corner(t, 1) + v * corner(t, 2), normal});
+    }
+  }
+  return result;
+}
+
+// The share of what faces the camera that nothing hides.
+double openness(const std::vector<Probe>& points, const Tracer& tracer, const Camera& camera) {
+  constexpr float kLift = 1e-3f;
+  std::vector<Ray> rays;
+  for (const Probe& probe : points)
+    if (probe.normal.dot(camera.forward) < -0.05f)
+      rays.push_back({probe.point + kLift * probe.normal, -camera.forward, 0, 1e30f});
+  if (rays.empty()) return 1;
+  std::vector<std::uint8_t> hidden(rays.size());
+  tracer.occluded(rays, hidden);
+  return 1 -
+         static_cast<double>(std::count(hidden.begin(), hidden.end(), 1)) / static_cast<double>(rays.size());
+}
+
+double score(const ViewSubject& subject, const std::vector<Probe>& points, const View& view, double aspect) {
   Camera camera = camera_towards(view);
   const Drawable& drawn = *subject.drawn;
   std::vector<Vec3f> centres;
@@ -50,7 +98,8 @@ double score(const ViewSubject& subject, const View& view, double aspect) {
   const double total = subject.motion.trace();
   const Vec3 sight = camera.forward.cast<double>();
   const double across = total > 0 ? 1 - sight.dot(subject.motion * sight) / total : 1;
-  return (0.2 + entropy(drawn, hits)) * (0.35 + 0.65 * std::sqrt(std::clamp(across, 0.0, 1.0)));
+  return (0.2 + entropy(drawn, hits)) * (0.4 + 0.6 * openness(points, *subject.tracer, camera)) *
+         (0.35 + 0.65 * std::sqrt(std::clamp(across, 0.0, 1.0)));
 }
 
 struct Candidate {
@@ -73,11 +122,13 @@ std::vector<Candidate> candidates() {
 View best_view(const std::vector<ViewSubject>& subjects, double aspect) {
   const std::vector<Candidate> all = candidates();
   std::vector<double> scores(all.size(), 0);
+  std::vector<std::vector<Probe>> points;
+  for (const ViewSubject& subject : subjects) points.push_back(probes(*subject.drawn));
   parallel_for_each(
       all.size(),
       [&](std::size_t i) {
-        for (const ViewSubject& subject : subjects)
-          scores[i] += all[i].preference * score(subject, all[i].view, aspect);
+        for (std::size_t k = 0; k < subjects.size(); ++k)
+          scores[i] += all[i].preference * score(subjects[k], points[k], all[i].view, aspect);
       },
       1);
   return all[static_cast<std::size_t>(std::max_element(scores.begin(), scores.end()) - scores.begin())].view;

@@ -13,9 +13,9 @@ struct ViewSubject {
 };
 
 // The view, of 24 from above (eight quarters of the horizon, three heights), that shows the most: many faces
-// of the part, each with a fair share of the picture (viewpoint entropy: P.-P. Vazquez et al., VMV 2001), a
-// large part of the displacement across the line of sight, and a full frame. The usual view from the front
-// right wins near ties.
+// of the part, each with a fair share of the picture (viewpoint entropy: P.-P. Vazquez et al., VMV 2001),
+// little of it hidden, and a large part of the displacement across the line of sight. The usual view from the
+// front right wins near ties.
 [[nodiscard]] View best_view(const std::vector<ViewSubject>& subjects, double aspect);
 
 }  // namespace flexel

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "formats/disjoint_sets.h"
 #include "formats/parallel.h"
 
 namespace flexel {
@@ -37,6 +38,36 @@ bool is_crease(const Vec3& a, const Vec3& b, bool turned, double noise) {
   return (turned ? -a.dot(b) : a.dot(b)) < std::cos(kCrease) * lengths;
 }
 
+// On coarse round shapes single edges pass the angle of a crease. Creases that hang together stay where one
+// of them is sharp, or an end of the surface, or all of them together are long.
+void drop_stray_creases(const Surface& surface, const MeshTopology& mesh, const std::vector<Vec3>& area,
+                        std::vector<std::array<EdgeKind, 3>>& edges) {
+  constexpr double kSharp = 0.707;  // cosine of 45 degrees
+  const double long_enough = 0.25 * bounding_box(surface.vertices).diagonal();
+  const auto for_each_crease = [&](const auto& use) {
+    for (std::size_t t = 0; t < edges.size(); ++t)
+      for (std::size_t i = 0; i < 3; ++i)
+        if (edges[t][i] == EdgeKind::crease)
+          use(t, i, mesh.welded[mesh.triangles.corners[t][i]],
+              mesh.welded[mesh.triangles.corners[t][(i + 1) % 3]]);
+  };
+  DisjointSets sets(surface.vertices.size());
+  for_each_crease(
+      [&](std::size_t, std::size_t, std::uint32_t from, std::uint32_t to) { sets.unite(from, to); });
+  std::vector<double> length(surface.vertices.size(), 0);
+  for_each_crease([&](std::size_t t, std::size_t i, std::uint32_t from, std::uint32_t to) {
+    const std::uint32_t u = mesh.topology.neighbour[t][i];
+    const bool sharp =
+        u == kNoTriangle || std::abs(area[t].dot(area[u])) < kSharp * area[t].norm() * area[u].norm();
+    // Both triangles of an edge come by: half of it each.
+    length[sets.root(from)] +=
+        sharp ? long_enough : 0.5 * (surface.vertices[to] - surface.vertices[from]).norm();
+  });
+  for_each_crease([&](std::size_t t, std::size_t i, std::uint32_t from, std::uint32_t) {
+    if (length[sets.root(from)] < long_enough) edges[t][i] = EdgeKind::none;
+  });
+}
+
 std::vector<std::array<EdgeKind, 3>> classify_edges(const Surface& surface, const MeshTopology& mesh) {
   const std::size_t n = mesh.triangles.corners.size();
   const double diagonal = bounding_box(surface.vertices).diagonal();
@@ -56,6 +87,7 @@ std::vector<std::array<EdgeKind, 3>> classify_edges(const Surface& surface, cons
       edges[t][i] = other_face ? EdgeKind::border : EdgeKind::none;
     }
   });
+  drop_stray_creases(surface, mesh, area, edges);
   return edges;
 }
 

@@ -84,7 +84,7 @@ void LineLayer::add(const Eigen::Vector2f& from, const Eigen::Vector2f& to, floa
 }
 
 void LineLayer::lay_on(Image& image, const Colour& ink, const Colour& ink_on_dark) const {
-  constexpr float kDark = 0.36f, kBright = 0.46f;  // luma: below, the one ink; above, the other
+  constexpr float kDark = 0.24f, kBright = 0.32f;  // luma: below, the one ink; above, the other
   for (std::size_t i = 0; i < cover_.size(); ++i) {
     if (cover_[i] <= 0) continue;
     const float luma = image.pixels[i].dot(Colour(0.299f, 0.587f, 0.114f));

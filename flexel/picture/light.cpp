@@ -13,33 +13,42 @@ namespace flexel {
 namespace {
 
 constexpr int kTile = 16, kBlock = 4;
-constexpr int kSkyRays = 4, kLampRays = 2;  // a pixel
+constexpr int kSkyRays = 3, kLampRays = 1;  // a pixel
 constexpr float kSkyReach = 0.7f;           // of the part's radius: what is farther away darkens nothing
 constexpr float kLampSize = 0.22f;          // tangent of the lamp's half angle
 constexpr float kLift = 2e-4f;              // off the surface, of the part's radius
 
-// Point j of the R2 sequence.
-Eigen::Vector2f sample(int j) {
-  const double a = 0.5 + 0.7548776662466927 * j, b = 0.5 + 0.5698402909980532 * j;
-  return {static_cast<float>(a - std::floor(a)), static_cast<float>(b - std::floor(b))};
-}
-
-Eigen::Vector2f on_disc(const Eigen::Vector2f& s) {
-  const float radius = std::sqrt(s.x()), angle = 2 * std::numbers::pi_v<float> * s.y();
-  return {radius * std::cos(angle), radius * std::sin(angle)};
+// Points in the unit disc, evenly spread: some (place in the block, then ray) for each of the 16 blocks of a
+// tile. Each block's set is the R2 sequence turned round the unit square by a shift of its own.
+struct DiscPoints {
+  std::array<std::array<Eigen::Vector2f, 16 * kSkyRays>, 16> of_block;
+  DiscPoints() {
+    const auto wrap = [](double x) { return x - std::floor(x); };
+    for (std::size_t b = 0; b < of_block.size(); ++b)
+      for (std::size_t j = 0; j < of_block[b].size(); ++j) {
+        const auto n = static_cast<double>(j), shift = static_cast<double>(b * 7 % 16);
+        const double radius = std::sqrt(wrap(0.5 + 0.7548776662466927 * n + 0.6180339887498949 * shift));
+        const double angle = 2 * std::numbers::pi * wrap(0.5 + 0.5698402909980532 * n + shift / 16);
+        of_block[b][j] = {static_cast<float>(radius * std::cos(angle)),
+                          static_cast<float>(radius * std::sin(angle))};
+      }
+  }
+};
+const DiscPoints& disc_points() {
+  static const DiscPoints points;
+  return points;
 }
 
 // Cosine-weighted about the facet's normal.
-Ray sky_ray(const Surfel& at, int j) {
-  const Eigen::Vector2f disc = on_disc(sample(j));
+Ray sky_ray(const Surfel& at, const Eigen::Vector2f& disc) {
   const TangentBase base = tangent_base(at.geometric);
   const Vec3f direction = disc.x() * base.x + disc.y() * base.y +
                           std::sqrt(std::max(0.0f, 1 - disc.squaredNorm())) * at.geometric;
   return {at.position + kLift * at.geometric, direction, 0, kSkyReach};
 }
 
-Ray lamp_ray(const Surfel& at, const Vec3f& lamp, const TangentBase& base, int j) {
-  const Eigen::Vector2f disc = kLampSize * on_disc(sample(j));
+Ray lamp_ray(const Surfel& at, const Vec3f& lamp, const TangentBase& base, const Eigen::Vector2f& point) {
+  const Eigen::Vector2f disc = kLampSize * point;
   return {at.lifted + kLift * at.geometric, (lamp + disc.x() * base.x + disc.y() * base.y).normalized(), 0,
           1e30f};
 }
@@ -47,6 +56,7 @@ Ray lamp_ray(const Surfel& at, const Vec3f& lamp, const TangentBase& base, int j
 // Pixels of one tile that share a place in their blocks, with what they show.
 struct Group {
   std::vector<std::size_t> pixels;
+  std::vector<std::size_t> blocks;  // which of the tile's
   std::vector<Surfel> surfels;
 };
 
@@ -60,6 +70,7 @@ Group gather(const PixelBuffer& buffer, const Viewport& viewport, const Camera& 
       const Ray ray =
           camera.ray(static_cast<float>(viewport.x + x) + 0.5f, static_cast<float>(viewport.y + y) + 0.5f);
       group.pixels.push_back(i);
+      group.blocks.push_back(static_cast<std::size_t>(y / kBlock % 4 * 4 + x / kBlock % 4));
       group.surfels.push_back(surfel_at(drawn, ray, buffer.hits[i]));
     }
   return group;
@@ -71,14 +82,17 @@ void light_group(const Group& group, int place, const Tracer& tracer, const Vec3
   std::vector<Ray> rays(group.pixels.size());
   std::vector<std::uint8_t> blocked(rays.size());
   std::vector<int> sky(rays.size(), 0), lamps(rays.size(), 0);
+  const auto point = [&](std::size_t i, int k) -> const Eigen::Vector2f& {
+    return disc_points().of_block[group.blocks[i]][static_cast<std::size_t>(16 * k + place)];
+  };
   for (int k = 0; k < kSkyRays; ++k) {
-    for (std::size_t i = 0; i < rays.size(); ++i) rays[i] = sky_ray(group.surfels[i], 16 * k + place);
+    for (std::size_t i = 0; i < rays.size(); ++i) rays[i] = sky_ray(group.surfels[i], point(i, k));
     tracer.occluded(rays, blocked);
     for (std::size_t i = 0; i < rays.size(); ++i) sky[i] += blocked[i];
   }
   for (int k = 0; k < kLampRays; ++k) {
     for (std::size_t i = 0; i < rays.size(); ++i) {
-      rays[i] = lamp_ray(group.surfels[i], lamp, base, 16 * k + place);
+      rays[i] = lamp_ray(group.surfels[i], lamp, base, point(i, k));
       // A point whose facet looks away needs no ray, unless the smooth surface would see the lamp.
       if (group.surfels[i].normal.dot(lamp) <= 0) rays[i].far = 0;
     }
@@ -94,6 +108,44 @@ void light_group(const Group& group, int place, const Tracer& tracer, const Vec3
 float kinship(const Vec3f& normal, const Vec3f& other, float off_plane, float tolerance) {
   const float turn = std::clamp((normal.dot(other) - 0.8f) * 5, 0.0f, 1.0f);
   return turn * turn * std::max(0.0f, 1 - std::abs(off_plane) / tolerance);
+}
+
+// The mean over seven by seven pixels that are `stride` apart.
+std::vector<Light> smooth_at(const std::vector<Light>& light, const PixelBuffer& buffer, const Camera& camera,
+                             int stride) {
+  const float pixel = 1 / camera.pixels, tolerance = 3 * pixel;
+  std::vector<Light> smooth(light.size());
+  const auto smooth_pixel = [&](int x, int y) {
+    const std::size_t i = buffer.index(x, y);
+    if (buffer.hits[i].primitive == kNoHit) return;
+    const Vec3f normal = buffer.normals[i];
+    // The plane through the point, as depth over pixels.
+    const float facing = std::max(0.05f, -normal.dot(camera.forward));
+    const float a = normal.dot(camera.right) * pixel, b = -normal.dot(camera.up) * pixel;
+    float sky = 0, lamp = 0, total = 0;
+    for (int dv = -3; dv <= 3; ++dv)
+      for (int du = -3; du <= 3; ++du) {
+        const int u = x + stride * du, v = y + stride * dv;
+        if (u < 0 || v < 0 || u >= buffer.width || v >= buffer.height) continue;
+        const std::size_t j = buffer.index(u, v);
+        if (buffer.hits[j].primitive == kNoHit) continue;
+        const float off = a * static_cast<float>(u - x) + b * static_cast<float>(v - y) -
+                          facing * (buffer.hits[j].t - buffer.hits[i].t);
+        const auto tent = static_cast<float>((4 - std::abs(du)) * (4 - std::abs(dv)));
+        const float weight = tent * (j == i ? 1 : kinship(normal, buffer.normals[j], off, tolerance));
+        sky += weight * light[j].sky;
+        lamp += weight * light[j].lamp;
+        total += weight;
+      }
+    smooth[i] = {sky / total, lamp / total};
+  };
+  parallel_for_each(
+      static_cast<std::size_t>(buffer.height),
+      [&](std::size_t y) {
+        for (int x = 0; x < buffer.width; ++x) smooth_pixel(x, static_cast<int>(y));
+      },
+      8);
+  return smooth;
 }
 
 }  // namespace
@@ -125,38 +177,7 @@ std::vector<Light> trace_light(const PixelBuffer& buffer, const Viewport& viewpo
 
 std::vector<Light> smooth_light(const std::vector<Light>& light, const PixelBuffer& buffer,
                                 const Camera& camera) {
-  constexpr int kReach = 3;
-  const float pixel = 1 / camera.pixels, tolerance = 3 * pixel;
-  std::vector<Light> smooth(light.size());
-  const auto smooth_pixel = [&](int x, int y) {
-    const std::size_t i = buffer.index(x, y);
-    if (buffer.hits[i].primitive == kNoHit) return;
-    const Vec3f normal = buffer.normals[i];
-    // The plane through the point, as depth over pixels.
-    const float facing = std::max(0.05f, -normal.dot(camera.forward));
-    const float a = normal.dot(camera.right) * pixel, b = -normal.dot(camera.up) * pixel;
-    float sky = 0, lamp = 0, total = 0;
-    for (int v = std::max(0, y - kReach); v <= std::min(buffer.height - 1, y + kReach); ++v)
-      for (int u = std::max(0, x - kReach); u <= std::min(buffer.width - 1, x + kReach); ++u) {
-        const std::size_t j = buffer.index(u, v);
-        if (buffer.hits[j].primitive == kNoHit) continue;
-        const float off = a * static_cast<float>(u - x) + b * static_cast<float>(v - y) -
-                          facing * (buffer.hits[j].t - buffer.hits[i].t);
-        const auto tent = static_cast<float>((kReach + 1 - std::abs(u - x)) * (kReach + 1 - std::abs(v - y)));
-        const float weight = tent * (j == i ? 1 : kinship(normal, buffer.normals[j], off, tolerance));
-        sky += weight * light[j].sky;
-        lamp += weight * light[j].lamp;
-        total += weight;
-      }
-    smooth[i] = {sky / total, lamp / total};
-  };
-  parallel_for_each(
-      static_cast<std::size_t>(buffer.height),
-      [&](std::size_t y) {
-        for (int x = 0; x < buffer.width; ++x) smooth_pixel(x, static_cast<int>(y));
-      },
-      8);
-  return smooth;
+  return smooth_at(smooth_at(light, buffer, camera, 1), buffer, camera, kBlock);
 }
 
 }  // namespace flexel

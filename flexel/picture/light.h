@@ -23,14 +23,16 @@ struct Light {
 // Unit vector towards the lamp, which stands to the upper left behind the camera.
 [[nodiscard]] Vec3f lamp_direction(const Camera& camera);
 
-// Traces the light of each pixel that shows something. Few rays a pixel, whose directions differ over blocks
-// of 4 x 4 pixels; smooth_light() then takes the mean over such blocks.
+// Traces the light of each pixel that shows something: few rays a pixel, whose directions differ over tiles
+// of 16 x 16 pixels. smooth_light() then takes the mean over such tiles.
 [[nodiscard]] std::vector<Light> trace_light(const PixelBuffer& buffer, const Viewport& viewport,
                                              const Camera& camera, const Drawable& drawn,
                                              const Tracer& tracer);
 
-// The mean of the light around each pixel, over pixels on the same smooth surface only. The weights (1 2 3 4
-// 3 2 1 each way) leave nothing of a pattern of period 4.
+// The mean of the light around each pixel, over pixels on the same smooth surface only; in two passes (H.
+// Dammertz et al., "Edge-avoiding a-trous wavelet transform", HPG 2010), the second over pixels 4 apart. The
+// weights (1 2 3 4 3 2 1 each way) leave nothing of patterns of period 4 in the first pass and of period 16
+// in the second.
 [[nodiscard]] std::vector<Light> smooth_light(const std::vector<Light>& light, const PixelBuffer& buffer,
                                               const Camera& camera);
 

@@ -20,7 +20,7 @@ struct Edge {
   Vec3f from, to;
   std::array<std::uint32_t, 2> vertices;
   LineKind kind;
-  bool sharp;  // drawn whether or not the view falls away beside it
+  bool sharp;  // an outline that is a crease where the view does not fall away beside it
 };
 
 // Every triangle's direction: 1 faces the camera.
@@ -65,11 +65,13 @@ struct Pieces {
   int count = 0;
   std::vector<Ray> rays, beside;
   std::vector<std::uint8_t> hidden, covered;
+  std::vector<LineKind> kinds;
   std::vector<Hit> drops;
 };
 
 // The outlook from just beside the line, on both sides, through each piece.
-void look_beside(const Tracer& tracer, const Camera& camera, const Vec3f& across, Pieces& pieces) {
+void look_beside(const Tracer& tracer, const Camera& camera, const Vec3f& across, bool sharp,
+                 Pieces& pieces) {
   pieces.beside.clear();
   for (const Ray& ray : pieces.rays)
     for (const float side : {-1.0f, 1.0f}) {
@@ -80,7 +82,13 @@ void look_beside(const Tracer& tracer, const Camera& camera, const Vec3f& across
   tracer.intersect(pieces.beside, pieces.drops);
   for (std::size_t k = 0; k < pieces.rays.size(); ++k) {
     const float own = camera.depth(pieces.rays[k].origin);
-    if (std::max(pieces.drops[2 * k].t, pieces.drops[2 * k + 1].t) < own + kDrop) pieces.hidden[k] = 1;
+    const float farther = std::max(pieces.drops[2 * k].t, pieces.drops[2 * k + 1].t);
+    if (farther < own + kDrop) {
+      pieces.kinds[k] = LineKind::crease;
+      if (!sharp) pieces.hidden[k] = 1;
+    } else if (farther < Hit{}.t) {
+      pieces.kinds[k] = LineKind::step;
+    }
   }
 }
 
@@ -109,17 +117,18 @@ void judge(const Edge& edge, const Tracer& tracer, const Moved* moved, const Cam
   pieces.hidden.resize(pieces.rays.size());
   tracer.occluded(pieces.rays, pieces.hidden);
   pieces.covered.assign(pieces.rays.size(), 0);
+  pieces.kinds.assign(pieces.rays.size(), edge.kind);
   if (moved != nullptr) {
     moved->tracer.occluded(pieces.rays, pieces.covered);
     hide_unmoved(edge, moved->drawn, camera, pieces);
   }
-  if (edge.kind != LineKind::outline || edge.sharp) return;
+  if (edge.kind != LineKind::outline) return;
   const float length = screen.norm();
   const Eigen::Vector2f normal =
       length > 0 ? Eigen::Vector2f(-screen.y(), screen.x()) / length : Eigen::Vector2f(1, 0);
   constexpr float kBeside = 1.0f;  // pixel
   look_beside(tracer, camera, kBeside / camera.pixels * (normal.x() * camera.right - normal.y() * camera.up),
-              pieces);
+              edge.sharp, pieces);
 }
 
 void add_runs(const Edge& edge, const Camera& camera, const Pieces& pieces, std::vector<ScreenLine>& lines) {
@@ -132,9 +141,10 @@ void add_runs(const Edge& edge, const Camera& camera, const Pieces& pieces, std:
     int stop = k + 1;
     if (pieces.hidden[index(k)] == 0) {
       while (stop < pieces.count && pieces.hidden[index(stop)] == 0 &&
+             pieces.kinds[index(stop)] == pieces.kinds[index(k)] &&
              pieces.covered[index(stop)] == pieces.covered[index(k)])
         ++stop;
-      lines.push_back({at(k), at(stop), edge.kind, pieces.covered[index(k)] != 0});
+      lines.push_back({at(k), at(stop), pieces.kinds[index(k)], pieces.covered[index(k)] != 0});
     }
     k = stop;
   }
@@ -172,6 +182,9 @@ void draw_lines(Image& image, const std::vector<ScreenLine>& lines, const LineSt
     switch (line.kind) {
       case LineKind::outline:
         outlines.add(line.from, line.to, 2.1f * style.scale, fade * strength);
+        break;
+      case LineKind::step:
+        inner.add(line.from, line.to, 1.9f * style.scale, fade * strength);
         break;
       case LineKind::crease:
         inner.add(line.from, line.to, 1.5f * style.scale, 0.85f * fade * strength);

@@ -6,7 +6,12 @@
 
 namespace flexel {
 
-enum class LineKind : std::uint8_t { outline, crease, border };
+enum class LineKind : std::uint8_t {
+  outline,  // against the background
+  step,     // against something farther away
+  crease,   // both sides are seen
+  border    // EdgeKind::border
+};
 
 // A visible piece of a line, in pixels of the whole picture.
 struct ScreenLine {
@@ -21,9 +26,9 @@ struct Moved {
   const Tracer& tracer;
 };
 
-// The lines of `drawn` that nothing of itself hides. Outlines are the edges between a triangle that faces the
-// camera and one that does not, where the view beside them falls away by more than a hundredth of the part's
-// radius. `front`, where given, is what may lie in front of the lines (ScreenLine::behind).
+// The lines of `drawn` that nothing of itself hides. Outlines and steps are the edges between a triangle that
+// faces the camera and one that does not, where the view beside them falls away by more than a hundredth of
+// the part's radius. `front`, where given, is what may lie in front of the lines (ScreenLine::behind).
 [[nodiscard]] std::vector<ScreenLine> visible_lines(const Drawable& drawn, const Tracer& tracer,
                                                     const Camera& camera, const Moved* moved = nullptr);
 

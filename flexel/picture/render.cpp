@@ -116,7 +116,8 @@ Colour shade(const Scene& scene, const Surfel& at, const Light& light) {
   const float diffuse = (sky + camera) * (0.12f + 0.88f * light.sky) + 0.62f * cosine * light.lamp;
   const float gloss = squared_again(std::max(0.0f, at.normal.dot(scene.half)), 5) * light.lamp;
   const bool coloured = scene.options.by_value || scene.options.thickness;
-  return own_colour(scene, at) * diffuse +
+  // Values are read off colours: light tells less there.
+  return own_colour(scene, at) * (coloured ? 0.3f + 0.7f * diffuse : diffuse) +
          Colour::Constant(coloured ? 0.012f + 0.03f * gloss : 0.07f * gloss);
 }
 
