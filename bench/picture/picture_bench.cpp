@@ -1,0 +1,130 @@
+// A picture of 1600 x 1200 pixels of a fluted, knotted tube of a million triangles: from the surface in
+// memory to the bytes of the PNG, and what its passes take.
+#include <benchmark/benchmark.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
+
+#include "flexel/picture/lines.h"
+#include "flexel/picture/picture.h"
+#include "flexel/picture/render.h"
+#include "formats/parallel.h"
+
+namespace flexel {
+namespace {
+
+// A (2, 3) torus knot of 2 x along x around triangles, about 125 mm across, its tube fluted.
+Surface knot(int along, int around) {
+  Surface surface;
+  const auto centre = [](double t) {
+    const double r = 0.02 * (2.2 + std::cos(3 * t));
+    return Vec3(r * std::cos(2 * t), r * std::sin(2 * t), -0.02 * std::sin(3 * t));
+  };
+  for (int a = 0; a < along; ++a) {
+    const double t = 2 * std::numbers::pi * a / along;
+    const Vec3 tangent = (centre(t + 1e-4) - centre(t - 1e-4)).normalized();
+    const Vec3 normal = tangent.cross(Vec3::UnitZ()).normalized(), binormal = tangent.cross(normal);
+    for (int b = 0; b < around; ++b) {
+      const double q = 2 * std::numbers::pi * b / around,
+                   radius = 0.0084 * (1 + 0.05 * std::sin(9 * q + 24 * t));
+      surface.vertices.push_back(centre(t) + radius * (std::cos(q) * normal + std::sin(q) * binormal));
+    }
+  }
+  const auto at = [&](int a, int b) { return static_cast<std::uint32_t>(a % along * around + b % around); };
+  surface.polygon_offsets.push_back(0);
+  for (int a = 0; a < along; ++a)
+    for (int b = 0; b < around; ++b)
+      for (const auto& t : {std::array{at(a, b), at(a + 1, b + 1), at(a + 1, b)},
+                            {at(a, b), at(a, b + 1), at(a + 1, b + 1)}}) {
+        surface.polygon_vertices.insert(surface.polygon_vertices.end(), t.begin(), t.end());
+        surface.polygon_offsets.push_back(static_cast<std::uint32_t>(surface.polygon_vertices.size()));
+        surface.polygon_face.push_back(0);
+      }
+  surface.faces.push_back({"", 0});
+  surface.parts.push_back({"knot"});
+  surface.sources.emplace_back();
+  surface.part_source.push_back(0);
+  return surface;
+}
+
+const Surface& million() {
+  static const Surface surface = knot(1024, 512);
+  return surface;
+}
+
+void whole(benchmark::State& state) {
+  const ThreadLimit threads(static_cast<int>(state.range(0)));
+  Progress progress("bench", Progress::Mode::quiet);
+  std::vector<PictureSubject> subjects(1);
+  subjects[0].surface = million();
+  PictureOptions options;
+  if (state.range(1) == 0) options.view = View{};
+  for (auto _ : state) benchmark::DoNotOptimize(encode_png(draw_picture(subjects, options, progress).image));
+  state.counters["triangles"] = static_cast<double>(million().polygon_count());
+}
+
+const DrawingFrame& frame() {
+  static const DrawingFrame one = [] {
+    const Box box = bounding_box(million().vertices);
+    return DrawingFrame{(box.min + box.max) / 2, box.diagonal() / 2};
+  }();
+  return one;
+}
+
+const Drawable& drawn() {
+  static const Drawable one = draw_surface(million(), mesh_topology(million()), million().vertices, frame());
+  return one;
+}
+
+void prepare(benchmark::State& state) {
+  const ThreadLimit threads(static_cast<int>(state.range(0)));
+  for (auto _ : state)
+    benchmark::DoNotOptimize(draw_surface(million(), mesh_topology(million()), million().vertices, frame()));
+}
+
+void build_tree(benchmark::State& state) {
+  const ThreadLimit threads(static_cast<int>(state.range(0)));
+  (void)drawn();
+  for (auto _ : state) benchmark::DoNotOptimize(make_tracer(drawn()));
+}
+
+Camera camera() {
+  Camera one = camera_towards({});
+  one.pixels = 700;
+  one.x = 800;
+  one.y = 600;
+  return one;
+}
+
+void shade(benchmark::State& state) {
+  const ThreadLimit threads(static_cast<int>(state.range(0)));
+  const Tracer tracer = make_tracer(drawn());
+  Image image(1600, 1200, colour(0xffffff));
+  for (auto _ : state) render(image, {0, 0, 1600, 1200}, camera(), drawn(), tracer, {});
+}
+
+void lines(benchmark::State& state) {
+  const ThreadLimit threads(static_cast<int>(state.range(0)));
+  const Tracer tracer = make_tracer(drawn());
+  Image image(1600, 1200, colour(0xffffff));
+  for (auto _ : state) draw_lines(image, visible_lines(drawn(), tracer, camera()), {});
+}
+
+// By threads; the second argument of `whole` is 1 where the view is chosen. CPU is that of all threads.
+BENCHMARK(whole)
+    ->Args({1, 0})
+    ->Args({2, 0})
+    ->Args({2, 1})
+    ->Unit(benchmark::kMillisecond)
+    ->MeasureProcessCPUTime()
+    ->UseRealTime();
+BENCHMARK(prepare)->Arg(2)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
+BENCHMARK(build_tree)->Arg(2)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
+BENCHMARK(shade)->Arg(2)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
+BENCHMARK(lines)->Arg(2)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
+
+}  // namespace
+}  // namespace flexel
+
+BENCHMARK_MAIN();
