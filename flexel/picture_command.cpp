@@ -18,10 +18,12 @@ namespace flexel {
 namespace {
 
 constexpr int kLargestSide = 16384, kSmallestSide = 64;
+constexpr double kMostPixels = 40e6;  // about a hundred bytes each while the picture is made
 
 struct Arguments {
   std::vector<std::string> files;
-  std::string output, colour, range, scale = "1", view = "auto", size = "1600x1200", unit, input_format;
+  std::string output, colour, range, scale = "1", view = "auto", up = "z", size = "1600x1200", unit,
+                                     input_format;
   bool cells = false, elements = false, no_outline = false, quiet = false;
   int threads = 0;
 };
@@ -43,6 +45,10 @@ void declare(CLI::App& app, Arguments& a) {
   app.add_option("--view", a.view,
                  "auto, iso, front, back, left, right, top, bottom, or AZIMUTH,ELEVATION in degrees")
       ->type_name("VIEW")
+      ->capture_default_str();
+  app.add_option("--up", a.up, "The axis that points up: x, y (glTF, many OBJ files) or z")
+      ->check(CLI::IsMember({"x", "y", "z"}))
+      ->type_name("AXIS")
       ->capture_default_str();
   app.add_option("--size", a.size, "Pixels")->type_name("WIDTHxHEIGHT")->capture_default_str();
   app.add_flag("--cells", a.cells, "Draw the cells of a body instead of its surface");
@@ -78,12 +84,15 @@ void parse_size(const std::string& text, PictureOptions& options) {
     if (side < kSmallestSide || side > kLargestSide)
       throw InputError(
           fmt::format("--size {}: a side has {} to {} pixels", text, kSmallestSide, kLargestSide));
+  if (static_cast<double>(options.width) * options.height > kMostPixels)
+    throw InputError(fmt::format("--size {}: at most {:g} million pixels", text, kMostPixels / 1e6));
 }
 
 PictureOptions options_of(const Arguments& a) {
   PictureOptions options;
   parse_size(a.size, options);
   options.view = parse_view(a.view);
+  options.up = a.up == "x" ? Up::x : a.up == "y" ? Up::y : Up::z;
   if (a.cells && a.elements) throw InputError("--cells and --elements exclude each other: give one of them");
   if (a.cells) options.show = PictureOptions::Show::cells;
   if (a.elements) options.show = PictureOptions::Show::elements;

@@ -107,20 +107,20 @@ struct Candidate {
   double preference;
 };
 
-std::vector<Candidate> candidates() {
+std::vector<Candidate> candidates(Up up) {
   std::vector<Candidate> all;
   for (const double elevation : {25.0, 35.0, 50.0})
     for (const double azimuth : {35.0, -35.0, 60.0, -60.0, 145.0, -145.0, 120.0, -120.0}) {
       const double side = std::abs(azimuth) > 90 ? 0.8 : azimuth > 0 ? 1.0 : 0.87;
-      all.push_back({{azimuth, elevation}, side * (elevation > 40 ? 0.96 : 1.0)});
+      all.push_back({{azimuth, elevation, up}, side * (elevation > 40 ? 0.96 : 1.0)});
     }
   return all;
 }
 
 }  // namespace
 
-View best_view(const std::vector<ViewSubject>& subjects, double aspect) {
-  const std::vector<Candidate> all = candidates();
+View best_view(const std::vector<ViewSubject>& subjects, double aspect, Up up) {
+  const std::vector<Candidate> all = candidates(up);
   std::vector<double> scores(all.size(), 0);
   std::vector<std::vector<Probe>> points;
   for (const ViewSubject& subject : subjects) points.push_back(probes(*subject.drawn));

@@ -16,6 +16,6 @@ struct ViewSubject {
 // of the part, each with a fair share of the picture (viewpoint entropy: P.-P. Vazquez et al., VMV 2001),
 // little of it hidden, and a large part of the displacement across the line of sight. The usual view from the
 // front right wins near ties.
-[[nodiscard]] View best_view(const std::vector<ViewSubject>& subjects, double aspect);
+[[nodiscard]] View best_view(const std::vector<ViewSubject>& subjects, double aspect, Up up = Up::z);
 
 }  // namespace flexel

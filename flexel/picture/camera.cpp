@@ -65,10 +65,15 @@ Camera camera_towards(const View& view) {
   const Vec3 horizontal(std::sin(azimuth), -std::cos(azimuth), 0);
   const Vec3 right(std::cos(azimuth), std::sin(azimuth), 0);
   const Vec3 up = std::cos(elevation) * Vec3::UnitZ() - std::sin(elevation) * horizontal;
+  // From axes with z up to the file's.
+  const auto turned = [&](const Vec3& v) {
+    if (view.up == Up::y) return Vec3(v.x(), v.z(), -v.y());
+    return view.up == Up::x ? Vec3(v.z(), v.x(), v.y()) : v;
+  };
   Camera camera;
-  camera.right = right.cast<float>();
-  camera.up = up.cast<float>();
-  camera.forward = up.cross(right).cast<float>();
+  camera.right = turned(right).cast<float>();
+  camera.up = turned(up).cast<float>();
+  camera.forward = turned(up.cross(right)).cast<float>();
   return camera;
 }
 

@@ -8,10 +8,15 @@
 
 namespace flexel {
 
-// The direction that the camera stands in, as seen from the part: azimuth about z, from the front (0: at -y,
-// 90: the right, at +x), and elevation above the horizon; degrees. z is up; seen from the top, y is.
+// Which axis of the file points up.
+enum class Up : std::uint8_t { x, y, z };
+
+// The direction that the camera stands in, as seen from the part: azimuth about the upward axis, from the
+// front (with z up 0: at -y, 90: the right, at +x), and elevation above the horizon; degrees. With y up the
+// front is at +z, as in glTF; with x up it is at -z, and the right at +y.
 struct View {
   double azimuth = 45, elevation = 35.264389682754654;
+  Up up = Up::z;
 };
 
 // "iso", "front", "back", "left", "right", "top", "bottom", or "AZIMUTH,ELEVATION" in degrees; nothing for

@@ -70,10 +70,10 @@ Legend make_legend(const std::vector<Panel>& panels, const ColourBy& by, const P
 
 View choose_view(const std::vector<Panel>& panels, const PictureOptions& options,
                  std::vector<std::string>& notes) {
-  if (options.view) return *options.view;
+  if (options.view) return {options.view->azimuth, options.view->elevation, options.up};
   std::vector<ViewSubject> subjects;
   for (const Panel& panel : panels) subjects.push_back({&panel.drawn, panel.tracer.get(), panel.motion});
-  const View view = best_view(subjects, static_cast<double>(options.width) / options.height);
+  const View view = best_view(subjects, static_cast<double>(options.width) / options.height, options.up);
   notes.push_back(fmt::format("view {:g},{:g}", view.azimuth, view.elevation));
   return view;
 }
@@ -100,6 +100,17 @@ void draw_panel(Image& image, const Panel& panel, const Viewport& viewport, cons
   }
   if (!panel.drawn.triangles.empty())
     draw_lines(image, visible_lines(panel.drawn, *panel.tracer, camera), style);
+}
+
+void hint_at_scale(const std::vector<Panel>& panels, double exaggeration, std::vector<std::string>& notes) {
+  double share = 0;
+  for (const Panel& panel : panels)
+    if (panel.diagonal > 0)
+      share = std::max(share, exaggeration * panel.largest_displacement / panel.diagonal);
+  if (share > 0 && share < 0.01)
+    notes.push_back(
+        fmt::format("the displacement is drawn as {:.2g} % of the part's size: --scale auto makes it visible",
+                    100 * share));
 }
 
 // What the picture has to say of itself, bottom right.
@@ -180,6 +191,7 @@ PictureResult draw_picture(const std::vector<PictureSubject>& subjects, const Pi
   PictureResult result{Image(options.width, options.height, colour(kPaper)), {}};
   std::optional<Legend> legend;
   if (!by.name.empty()) legend = make_legend(panels, by, options, result.notes);
+  hint_at_scale(panels, *options.exaggeration, result.notes);
   progress.update(0.4, "choosing the view");
   const View view = choose_view(panels, options, result.notes);
   const Layout layout = lay_out(panels.size(), options, legend ? &*legend : nullptr);

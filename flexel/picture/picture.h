@@ -22,7 +22,8 @@ struct PictureSubject {
 
 struct PictureOptions {
   int width = 1600, height = 1200;
-  std::optional<View> view;                                           // else chosen
+  std::optional<View> view;  // else chosen; its `up` is the one below
+  Up up = Up::z;
   enum class Show { surface, cells, elements } show = Show::surface;  // cells and elements: bodies only
   // "none"; or an attribute; else displacement for bodies that are deformed, and none
   std::optional<std::string> colour;

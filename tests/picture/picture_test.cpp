@@ -47,14 +47,19 @@ TEST(Views, NamedOnesLookAlongTheAxes) {
   EXPECT_LT((forward("iso") - Vec3f(-1, 1, -1).normalized()).norm(), 1e-6);
   EXPECT_LT((camera_towards(*parse_view("top")).up - Vec3f(0, 1, 0)).norm(), 1e-6);
   EXPECT_FALSE(parse_view("auto"));
-  for (double azimuth = -180; azimuth < 180; azimuth += 17)
-    for (double elevation = -90; elevation <= 90; elevation += 15) {
-      const Camera c = camera_towards({azimuth, elevation});
-      Eigen::Matrix3f base;
-      base << c.right, c.up, -c.forward;
-      EXPECT_LT((base.transpose() * base - Eigen::Matrix3f::Identity()).norm(), 1e-5);
-      EXPECT_NEAR(base.determinant(), 1, 1e-5);
-    }
+  const auto up = [](Up axis) { return camera_towards({0, 0, axis}).up; };
+  EXPECT_EQ(up(Up::x), Vec3f::UnitX());
+  EXPECT_EQ(up(Up::y), Vec3f::UnitY());
+  EXPECT_LT((camera_towards({0, 0, Up::y}).forward + Vec3f::UnitZ()).norm(), 1e-6);
+  for (const Up axis : {Up::x, Up::y, Up::z})
+    for (double azimuth = -180; azimuth < 180; azimuth += 17)
+      for (double elevation = -90; elevation <= 90; elevation += 15) {
+        const Camera c = camera_towards({azimuth, elevation, axis});
+        Eigen::Matrix3f base;
+        base << c.right, c.up, -c.forward;
+        EXPECT_LT((base.transpose() * base - Eigen::Matrix3f::Identity()).norm(), 1e-5);
+        EXPECT_NEAR(base.determinant(), 1, 1e-5);
+      }
 }
 
 TEST(Views, WrongOnesAreRefused) {

@@ -9,8 +9,8 @@ from harness import BIN, SOURCE, Skip, expect, main, need
 
 CODE = ["formats", "voxelize", "simulate", "mapping", "flexel"]
 STAGES = {"voxelize", "simulate", "mapping"}
-HEAVY = re.compile(r"\b(assimp|CGAL|openvdb)/|<[A-Z][A-Za-z0-9]*_?[A-Za-z0-9]*\.hxx>|<(gp|TopoDS|TopExp|BRep|Poly)\w*\.hxx>")
-LIBRARIES = re.compile(r"lib(assimp|TK[A-Z]\w*|CGAL|openvdb)\b")
+HEAVY = re.compile(r"\b(assimp|CGAL|openvdb|embree3)/|<(png\.h|ft2build\.h)>|<[A-Z][A-Za-z0-9]*_?[A-Za-z0-9]*\.hxx>|<(gp|TopoDS|TopExp|BRep|Poly)\w*\.hxx>")
+LIBRARIES = re.compile(r"lib(assimp|TK[A-Z]\w*|CGAL|openvdb|embree3|png16|freetype)\b")
 
 
 def code_files(folder, *suffixes):
