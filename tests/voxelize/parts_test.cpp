@@ -1,15 +1,17 @@
 // Real parts, good and broken.
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <filesystem>
-#include <map>
+#include <limits>
 
 #include "formats/import.h"
+#include "formats/locate.h"
 #include "formats/parallel.h"
 #include "tests/voxelize/shapes.h"
 #include "voxelize/align.h"
 #include "voxelize/part_mesh.h"
-#include "voxelize/union_find.h"
 #include "voxelize/vote.h"
 
 namespace flexel {
@@ -86,63 +88,98 @@ TEST_F(Parts, MultibodyIsTurnedTheRightWayRound) {
   EXPECT_GT(inverted, 0u);
 }
 
-// Connected groups of fine cells among `cells`, as the volume of each in coarse cells, largest first. `root`
-// is scratch (elements).
-std::vector<double> group_volumes(const Body& fine, const std::vector<std::uint32_t>& cells,
-                                  UnionFind& sets) {
-  std::vector<std::uint32_t> used;
-  for (const std::uint32_t c : cells)
-    used.insert(used.end(), fine.cell_elements[c].begin(), fine.cell_elements[c].end());
-  std::sort(used.begin(), used.end());
-  used.erase(std::unique(used.begin(), used.end()), used.end());
-  const auto local = [&](std::uint32_t e) {
-    return static_cast<std::uint32_t>(std::lower_bound(used.begin(), used.end(), e) - used.begin());
-  };
-  sets.reset(used.size());
-  for (const std::uint32_t c : cells)
-    for (int a = 1; a < 8; ++a) sets.join(local(fine.cell_elements[c][0]), local(fine.cell_elements[c][a]));
-  std::map<std::uint32_t, double> volume;
-  for (const std::uint32_t c : cells) volume[sets.root(local(fine.cell_elements[c][0]))] += fine.fill[c] / 64;
-  std::vector<double> volumes;
-  for (const auto& [root, sum] : volume) volumes.push_back(sum);
-  std::sort(volumes.rbegin(), volumes.rend());
-  return volumes;
+// Two places on the surface that face each other across a void, found by rays alone.
+struct Gap {
+  std::uint32_t polygons[2];
+  Vec3 points[2];
+  double width;
+};
+
+// Distance along the ray to the triangle, infinite where it misses (Moeller and Trumbore, 1997).
+double ray_distance(const Vec3& from, const Vec3& along, const Vec3& a, const Vec3& b, const Vec3& c) {
+  constexpr double kMiss = std::numeric_limits<double>::infinity();
+  const Vec3 u = b - a, v = c - a, p = along.cross(v);
+  const double determinant = u.dot(p);
+  if (std::abs(determinant) < 1e-30) return kMiss;
+  const Vec3 offset = from - a, q = offset.cross(u);
+  const double s = offset.dot(p) / determinant, t = along.dot(q) / determinant,
+               distance = v.dot(q) / determinant;
+  return s < 0 || t < 0 || s + t > 1 || distance <= 0 ? kMiss : distance;
 }
 
-// Where the fine lattice, in which the slits are cells wide, has two separate bodies of matter around a
-// coarse lattice point, no coarse element joins them: the cells of one element hold no more matter than the
-// larger body.
-TEST_F(Parts, SpringyTriggerKeepsItsSlits) {
-  std::size_t checked = 0;
-  for (const double size : {1e-3, 3e-3, 5e-3}) {
-    const Body coarse = run_file("Springy_Trigger.STL", size, Align::none).body;
-    const Body fine = run_file("Springy_Trigger.STL", size / 4, Align::none).body;
-    EXPECT_EQ(shapes::component_count(coarse), 1u);
-    std::map<Index3, std::vector<std::uint32_t>> fine_in_voxel;
-    for (std::uint32_t c = 0; c < fine.cell_count(); ++c) {
-      const Index3 index = fine.lattice_index[fine.cell_elements[c][0]];
-      fine_in_voxel[{index[0] >> 2, index[1] >> 2, index[2] >> 2}].push_back(c);
+// From the middle of every triangle outwards, while the void is narrower than `widest` and the
+// triangle beyond faces back.
+std::vector<Gap> gaps(const Surface& surface, double widest) {
+  const Triangles triangles = triangulate(surface);
+  const auto corner = [&](std::size_t t, int k) { return surface.vertices[triangles.corners[t][k]]; };
+  const auto normal = [&](std::size_t t) {
+    return Vec3((corner(t, 1) - corner(t, 0)).cross(corner(t, 2) - corner(t, 0)).normalized());
+  };
+  std::vector<Gap> found;
+  for (std::size_t t = 0; t < triangles.corners.size(); ++t) {
+    const Vec3 middle = (corner(t, 0) + corner(t, 1) + corner(t, 2)) / 3, out = normal(t);
+    double nearest = std::numeric_limits<double>::infinity();
+    std::size_t hit = t;
+    for (std::size_t other = 0; other < triangles.corners.size(); ++other) {
+      if (other == t) continue;
+      const double distance = ray_distance(middle, out, corner(other, 0), corner(other, 1), corner(other, 2));
+      if (distance < nearest) nearest = distance, hit = other;
     }
-    std::vector<double> held(coarse.element_count(), 0);
-    for (std::uint32_t c = 0; c < coarse.cell_count(); ++c)
-      for (const std::uint32_t e : coarse.cell_elements[c]) held[e] += coarse.fill[c];
-    UnionFind sets;
-    for (std::uint32_t e = 0; e < coarse.element_count(); ++e) {
-      const Index3& at = coarse.lattice_index[e];
-      std::vector<std::uint32_t> around;
-      for (int a = 0; a < 8; ++a)
-        if (const auto found = fine_in_voxel.find({at[0] - (a & 1), at[1] - (a >> 1 & 1), at[2] - (a >> 2)});
-            found != fine_in_voxel.end())
-          around.insert(around.end(), found->second.begin(), found->second.end());
-      if (around.size() > 500) continue;  // no room for a slit
-      const std::vector<double> volumes = group_volumes(fine, around, sets);
-      if (volumes.size() < 2 || volumes[1] < .1) continue;
-      EXPECT_LT(held[e], volumes[0] + .08)
-          << "element " << e << " joins " << volumes[0] << " and " << volumes[1];
-      ++checked;
-    }
+    if (nearest < widest && normal(hit).dot(out) < -.8)
+      found.push_back(
+          {{triangles.polygon[t], triangles.polygon[hit]}, {middle, middle + nearest * out}, nearest});
   }
-  EXPECT_GT(checked, 3u);
+  return found;
+}
+
+// Steps through connected elements from any of `from` to any of `to`; `farthest` + 1 where that many do not
+// do.
+int steps_between(const Adjacency& adjacency, const std::array<std::uint32_t, 8>& from,
+                  const std::array<std::uint32_t, 8>& to, int farthest) {
+  std::vector<int> steps(adjacency.offsets.size() - 1, -1);
+  std::vector<std::uint32_t> front(from.begin(), from.end());
+  for (const std::uint32_t e : from) steps[e] = 0;
+  for (std::size_t next = 0; next < front.size(); ++next) {
+    const std::uint32_t e = front[next];
+    if (std::find(to.begin(), to.end(), e) != to.end()) return steps[e];
+    if (steps[e] == farthest) break;
+    for (const std::uint32_t neighbour : adjacency.of(e))
+      if (steps[neighbour] < 0) steps[neighbour] = steps[e] + 1, front.push_back(neighbour);
+  }
+  return farthest + 1;
+}
+
+// Places that face each other across a slit narrower than 1.2 cells, between which the way through matter (in
+// a lattice of 1 mm, in which the slits are nine cells wide and more) is longer than 4 cells, have no
+// element in common.
+TEST_F(Parts, SpringyTriggerKeepsItsSlits) {
+  constexpr double kFine = 1e-3;
+  const Body fine = run_file("Springy_Trigger.STL", kFine, Align::none).body;
+  const Adjacency adjacency = element_adjacency(fine);
+  const std::vector<Gap> places = gaps(fine.surface, 1.2 * 14e-3);
+  for (const double size : {10e-3, 12e-3, 14e-3}) {
+    const Body coarse = run_file("Springy_Trigger.STL", size, Align::none).body;
+    EXPECT_EQ(shapes::component_count(coarse), 1u);
+    std::size_t checked = 0, joined = 0;
+    for (const Gap& gap : places) {
+      if (gap.width > 1.2 * size) continue;
+      std::array<std::uint32_t, 8> elements[2], fine_elements[2];
+      for (int side = 0; side < 2; ++side) {
+        const auto at = locate_on_surface(coarse, gap.polygons[side], gap.points[side]);
+        const auto fine_at = locate_on_surface(fine, gap.polygons[side], gap.points[side]);
+        ASSERT_TRUE(at && fine_at);
+        elements[side] = coarse.cell_elements[at->cell];
+        fine_elements[side] = fine.cell_elements[fine_at->cell];
+      }
+      const int far = static_cast<int>(4 * size / kFine);
+      if (steps_between(adjacency, fine_elements[0], fine_elements[1], far) <= far) continue;
+      ++checked;
+      joined += std::find_first_of(elements[0].begin(), elements[0].end(), elements[1].begin(),
+                                   elements[1].end()) != elements[0].end();
+    }
+    EXPECT_EQ(joined, 0u) << "of " << checked << " places at " << size;
+    EXPECT_GT(checked, 50u) << "at " << size;
+  }
 }
 
 TEST_F(Parts, CracksVoteTheVolumeThatWeldingGives) {
