@@ -197,7 +197,8 @@ class SlabBuilder {
       const auto faces = static_cast<std::uint8_t>(record.sides >> kFirstPlaneBit);
       slab.pieces[p].fill += record.volume;
       slab.pieces[p].faces |= faces;
-      slab.traces.push_back({voxel.mesh->polygon[record.triangle], p});
+      if (const std::uint32_t polygon = voxel.mesh->polygon[record.triangle]; polygon != kNoPolygon)
+        slab.traces.push_back({polygon, p});
       if (found.count > 1) slab.split_traces.push_back({p, record.triangle, faces});
     }
     if (found.count <= 1) return;

@@ -18,8 +18,8 @@ constexpr const char* kName = "flexel-voxelize";
 
 struct Arguments {
   std::vector<std::string> parts;
-  std::string size, placement = "corner", unit, align = "snap", material, max_memory, deflection, edge,
-                    format, output = "-";
+  std::string size, placement = "corner", unit, align = "snap", heal = "auto", material, max_memory,
+                    deflection, edge, format, output = "-";
   std::optional<long long> count;
   int threads = 0;
   bool compress = false, quiet = false;
@@ -33,6 +33,9 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_option("--unit", arguments.unit, "length unit of files that carry none (default mm)");
   app.add_option("--align", arguments.align,
                  "lattice to the part's flat faces: snap (default), to its box: box, or none");
+  app.add_option("--heal", arguments.heal,
+                 "broken surfaces: auto (default) repairs small damage and refuses what cannot be told, wrap "
+                 "(wrap:LENGTH) wraps them, none takes them as they are");
   app.add_option("--material", arguments.material, "name of the parts' material; else the scene gives it");
   app.add_option("--max-memory", arguments.max_memory,
                  "refuse what needs more to simulate, for example 4GB (default 80 % of what is free)");
@@ -93,6 +96,7 @@ VoxelizeOptions voxelize_options(const Arguments& arguments) {
                           : Placement::centre;
   constexpr Align aligns[] = {Align::snap, Align::box, Align::none};
   options.align = aligns[choose("--align", arguments.align, {"snap", "box", "none"})];
+  options.heal = heal_choice(arguments.heal);
   options.material = arguments.material;
   if (!arguments.max_memory.empty()) options.max_memory = parse_bytes(arguments.max_memory);
   return options;

@@ -42,7 +42,7 @@ Buckets<HalfEdge> half_edges(const PartMesh& mesh) {
 // What is counted over the edges of a range of lower vertices.
 struct EdgeTally {
   std::uint32_t edges = 0;
-  std::size_t open = 0, unbalanced = 0;
+  std::size_t open = 0, crowded = 0, unbalanced = 0;
 };
 
 // Numbers the edges from lower vertex `v` on; counts them too.
@@ -57,6 +57,7 @@ void number_edges_of(std::size_t v, const Buckets<HalfEdge>& half, EdgeTally& ta
     }
     ++tally.edges;
     tally.open += static_cast<std::size_t>(count % 2);
+    tally.crowded += count > 2;
     tally.unbalanced += balance != 0;
   }
 }
@@ -99,7 +100,10 @@ PartMesh build_mesh(const Surface& surface, const Triangles& triangles, std::spa
   for (const std::uint32_t t : chosen) {
     Corners c;
     for (int a = 0; a < 3; ++a) c[a] = welded[triangles.corners[t][a]];
-    if (c[0] == c[1] || c[1] == c[2] || c[2] == c[0]) continue;
+    if (c[0] == c[1] || c[1] == c[2] || c[2] == c[0]) {
+      ++mesh.degenerate_triangles;
+      continue;
+    }
     for (std::uint32_t& v : c) {
       if (number[v] == kNoTriangle) {
         number[v] = static_cast<std::uint32_t>(mesh.world.size());
@@ -190,9 +194,10 @@ void number_edges(PartMesh& mesh) {
   parallel_chunks(vertices, kGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t v = begin; v < end; ++v) number_edges_of(v, half, tallies[begin / kGrain], mesh);
   });
-  mesh.open_edges = mesh.unbalanced_edges = 0;
+  mesh.open_edges = mesh.crowded_edges = mesh.unbalanced_edges = 0;
   for (const EdgeTally& tally : tallies) {
     mesh.open_edges += tally.open;
+    mesh.crowded_edges += tally.crowded;
     mesh.unbalanced_edges += tally.unbalanced;
   }
   number_shells(mesh);

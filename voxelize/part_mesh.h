@@ -11,17 +11,21 @@
 namespace flexel {
 
 using Corners = std::array<std::uint32_t, 3>;
+// A triangle that healing added: it belongs to no polygon of the surface.
+constexpr std::uint32_t kNoPolygon = 0xffffffffu;
 
 struct PartMesh {
   std::vector<Vec3> world;             // (vertices x 3) m, equal positions are one vertex
   std::vector<Vec3> vertices;          // (vertices x 3) lattice coordinates; filled by place_on_lattice
   std::vector<Corners> corners;        // (triangles x 3) indices into vertices
-  std::vector<std::uint32_t> polygon;  // (triangles) polygon of the surface
+  std::vector<std::uint32_t> polygon;  // (triangles) polygon of the surface, or kNoPolygon
   std::vector<Corners> edges;          // (triangles x 3) number of the edge (corner e, corner e + 1)
   std::vector<std::uint32_t> shell;    // (triangles) edge-connected shell, from 0 in order of first triangle
   std::uint32_t edge_count = 0, shell_count = 0;
   std::size_t open_edges = 0;         // edges with an odd number of triangles
+  std::size_t crowded_edges = 0;      // edges with more than two triangles
   std::size_t unbalanced_edges = 0;   // edges run more often one way than the other
+  std::size_t degenerate_triangles = 0;  // left out: a corner repeats once equal positions are one
   std::size_t flipped_triangles = 0;  // turned over by repair_orientation
   std::size_t inverted_shells = 0;    // shells turned inside out by repair_orientation
   bool cracks_closed = false;         // vertices within a tolerance were welded to close it

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "formats/units.h"
+#include "voxelize/heal.h"
 #include "voxelize/voxelize.h"
 
 namespace flexel {
@@ -29,21 +30,15 @@ void say_volume(const VoxelizedPart& part, const std::string& name, Placement pl
 }
 
 void say_repairs(const VoxelizedPart& part, const std::string& name, Progress& progress) {
-  if (part.flipped_triangles > 0)
-    progress.warn(
-        fmt::format("{}: {} triangles faced the other way than their neighbours; taken the other way round",
-                    name, human_count(part.flipped_triangles)));
-  if (part.inverted_shells > 0)
-    progress.warn(fmt::format("{}: {} of {} shells are inside out; taken the other way round", name,
-                              human_count(part.inverted_shells), human_count(part.shells)));
-  if (part.cracks_closed)
-    progress.warn(fmt::format(
-        "{}: cracks in the surface closed by welding vertices within 1e-7 of its diagonal", name));
+  for (const std::string& line : healing_lines(part.healing))
+    progress.warn(fmt::format("{}: healed: {}", name, line));
   if (!part.closed)
-    progress.warn(
-        fmt::format("{}: the surface is not closed; inside and outside by vote of lines along three axes, "
-                    "which differ in {} voxels",
-                    name, human_count(part.disagreements)));
+    progress.warn(fmt::format("{}: the surface is not closed ({} open edges left); inside and outside by {}",
+                              name, human_count(part.healing.left_open),
+                              part.healing.by == Healing::By::flood
+                                  ? "flooding from outside (OpenVDB), confirmed by winding numbers"
+                                  : fmt::format("vote of lines along three axes, which differ in {} voxels",
+                                                human_count(part.disagreements))));
   if (part.overlapping_voxels > 0)
     progress.say(fmt::format("{}: shells interpenetrate in {} voxels; their union is taken", name,
                              human_count(part.overlapping_voxels)));

@@ -13,9 +13,12 @@
 #include "voxelize/align.h"
 #include "voxelize/assemble.h"
 #include "voxelize/classify.h"
+#include "voxelize/heal.h"
+#include "voxelize/judge.h"
 #include "voxelize/memory.h"
 #include "voxelize/overlap.h"
 #include "voxelize/part_mesh.h"
+#include "voxelize/trace.h"
 #include "voxelize/vote.h"
 #include "voxelize/walls.h"
 
@@ -24,10 +27,10 @@ namespace {
 
 constexpr std::size_t kDefaultCount = 20000;
 
-std::vector<PartExtent> extents_of(const std::vector<PartMesh>& meshes) {
+std::vector<PartExtent> extents_of(const std::vector<HealedPart>& parts) {
   std::vector<PartExtent> extents;
-  for (const PartMesh& mesh : meshes)
-    extents.push_back({std::abs(enclosed_volume(mesh)), surface_area(mesh)});
+  for (const HealedPart& part : parts)
+    extents.push_back({std::abs(enclosed_volume(part.mesh)), surface_area(part.mesh)});
   return extents;
 }
 
@@ -38,10 +41,10 @@ double choose_spacing(const VoxelizeOptions& options, const std::vector<PartExte
                            options.placement);
 }
 
-void check_spacing(double spacing, const std::vector<PartMesh>& meshes, const Surface& surface) {
+void check_spacing(double spacing, const std::vector<HealedPart>& meshes, const Surface& surface) {
   if (!(spacing > 0) || !std::isfinite(spacing)) throw InputError("the size must be a length above zero");
   for (std::size_t p = 0; p < meshes.size(); ++p) {
-    const double longest = bounding_box(meshes[p].world).size().maxCoeff();
+    const double longest = bounding_box(meshes[p].mesh.world).size().maxCoeff();
     if (spacing > longest)
       throw InputError(fmt::format("size {} is larger than part \"{}\" ({} long); choose a smaller size",
                                    human_length(spacing), surface.parts[p].name, human_length(longest)));
@@ -63,16 +66,17 @@ void check_memory(double cells, double limit, const std::vector<PartExtent>& ext
                   human_bytes(limit), human_length(1.05 * fitting)));
 }
 
-void check_meshes(const std::vector<PartMesh>& meshes, const Surface& surface) {
+void check_meshes(const std::vector<HealedPart>& meshes, const Surface& surface) {
   for (std::size_t p = 0; p < meshes.size(); ++p) {
-    if (meshes[p].corners.empty())
+    if (meshes[p].mesh.corners.empty())
       throw InputError(fmt::format("part \"{}\" has no triangle with an area", surface.parts[p].name));
   }
 }
 
-VoxelizedPart describe(const PartMesh& mesh, const Voxels& voxels, const AssembledPart& assembled,
+VoxelizedPart describe(const HealedPart& healed, const Voxels& voxels, const AssembledPart& assembled,
                        const Part& part) {
   VoxelizedPart found;
+  const PartMesh& mesh = healed.mesh;
   const double voxel = part.lattice.spacing.prod();
   found.closed = mesh.balanced();
   found.shells = mesh.shell_count;
@@ -82,9 +86,7 @@ VoxelizedPart describe(const PartMesh& mesh, const Voxels& voxels, const Assembl
   found.elements = assembled.elements;
   found.dropped_cells = assembled.dropped_cells;
   found.spacing = part.lattice.spacing;
-  found.flipped_triangles = mesh.flipped_triangles;
-  found.inverted_shells = mesh.inverted_shells;
-  found.cracks_closed = mesh.cracks_closed;
+  found.healing = healed.done;
   for (const Slab& slab : voxels.slabs) {
     found.split_voxels += slab.split_voxels;
     found.overlapping_voxels += slab.overlapping_voxels;
@@ -108,42 +110,70 @@ void measure_walls(const PartMesh& mesh, std::uint32_t part, VoxelizedPart& foun
 }
 
 // What does not depend on the lattice but where shells interpenetrate: volumes and walls.
-void measure(const std::vector<PartMesh>& meshes, VoxelizeResult& result) {
+void measure(const std::vector<HealedPart>& meshes, VoxelizeResult& result) {
   for (std::size_t p = 0; p < meshes.size(); ++p) {
     VoxelizedPart& found = result.parts[p];
     if (found.closed)
       found.surface_volume =
-          found.overlapping_voxels > 0 ? union_volume(meshes[p]) : enclosed_volume(meshes[p]);
+          found.overlapping_voxels > 0 ? union_volume(meshes[p].mesh) : enclosed_volume(meshes[p].mesh);
     result.body.parts[p].surface_volume = found.surface_volume;
-    measure_walls(meshes[p], static_cast<std::uint32_t>(p), found);
+    measure_walls(meshes[p].mesh, static_cast<std::uint32_t>(p), found);
   }
 }
 
+std::vector<HealedPart> heal_parts(const Surface& surface, const HealChoice& how) {
+  std::vector<HealedPart> healed;
+  for (PartMesh& mesh : exact_part_meshes(surface))
+    healed.push_back(heal(std::move(mesh), how, surface.parts[healed.size()].name));
+  return healed;
+}
+
+// Inside and outside of a part whose mesh lies on the lattice.
+Voxels classify(HealedPart& part, const Lattice& lattice, const VoxelizeOptions& options,
+                const std::string& name) {
+  if (part.mesh.balanced()) {
+    Voxels voxels = classify_closed(part.mesh, {.with_centres = options.placement == Placement::centre});
+    if (!part.original.corners.empty()) {
+      place_on_lattice(part.original, lattice);
+      trace_missing(part.original, voxels);
+    }
+    return voxels;
+  }
+  if (options.heal.mode == Heal::none) {
+    Voxels voxels = classify_open(part.mesh);
+    part.done.by = Healing::By::vote;
+    if (voxels.piece_count() == 0) throw InputError(why_undecided(part, name));
+    return voxels;
+  }
+  Sampled sampled = classify_sampled(part.mesh, has_large_hole(part));
+  if (sampled.by == Sampled::By::nobody) throw InputError(why_undecided(part, name));
+  part.done.by = sampled.by == Sampled::By::vote ? Healing::By::vote : Healing::By::flood;
+  return std::move(sampled.voxels);
+}
+
 // One part onto the body.
-VoxelizedPart voxelize_part(PartMesh& mesh, double spacing, const VoxelizeOptions& options,
+VoxelizedPart voxelize_part(HealedPart& healed, double spacing, const VoxelizeOptions& options,
                             const std::string& name, Body& body, PolygonCells& polygon_cells) {
   const bool centre = options.placement == Placement::centre;
+  PartMesh& mesh = healed.mesh;
   Part part;
   part.name = name;
   part.material = options.material;
   part.placement = options.placement;
   part.lattice = align_lattice(mesh, spacing, options.align, centre);
   place_on_lattice(mesh, part.lattice);
-  const Voxels voxels =
-      mesh.balanced() ? classify_closed(mesh, {.with_centres = centre}) : classify_open(mesh);
+  const Voxels voxels = classify(healed, part.lattice, options, name);
   const AssembledPart assembled = assemble_part(voxels, part, body, polygon_cells);
-  if (assembled.elements == 0 && !mesh.balanced())
-    throw InputError(
-        fmt::format("part \"{}\" encloses no volume: its surface is open ({} open edges); close it first",
-                    name, human_count(mesh.open_edges)));
+  if (assembled.elements == 0 && enclosed_volume(mesh) < 0)
+    throw InputError(fmt::format("part \"{}\" is inside out; --heal auto turns it", name));
   if (assembled.elements == 0)
     throw InputError(fmt::format("nothing of part \"{}\" is left at size {}; choose a smaller size", name,
                                  human_length(spacing)));
-  return describe(mesh, voxels, assembled, part);
+  return describe(healed, voxels, assembled, part);
 }
 
 // All parts at one spacing.
-VoxelizeResult build(Surface& surface, std::vector<PartMesh>& meshes, double spacing,
+VoxelizeResult build(Surface& surface, std::vector<HealedPart>& meshes, double spacing,
                      const VoxelizeOptions& options, Progress& progress) {
   VoxelizeResult result;
   PolygonCells polygon_cells;
@@ -239,8 +269,7 @@ VoxelizeResult correct_count(VoxelizeResult result, double spacing, std::vector<
 
 VoxelizeResult voxelize(Surface surface, const VoxelizeOptions& options, Progress& progress) {
   progress.stage("voxelize");
-  std::vector<PartMesh> meshes = part_meshes(surface);
-  for (PartMesh& mesh : meshes) repair_orientation(mesh);
+  std::vector<HealedPart> meshes = heal_parts(surface, options.heal);
   check_meshes(meshes, surface);
   const std::vector<PartExtent> extents = extents_of(meshes);
   const double limit = options.max_memory.value_or(.8 * available_memory());

@@ -10,6 +10,15 @@
 namespace flexel {
 
 enum class Align { snap, box, none };
+// What is done to surfaces that are not closed before inside is told from outside; docs/healing.md.
+enum class Heal { none, automatic, wrap };
+struct HealChoice {
+  Heal mode = Heal::automatic;
+  std::optional<double> alpha =
+      std::nullopt;  // m, wrap: the widest opening that it spans; default a hundredth of the diagonal
+};
+// From "none", "auto", "wrap", "wrap:5 mm"; throws InputError naming --heal.
+[[nodiscard]] HealChoice heal_choice(const std::string& word);
 
 struct VoxelizeOptions {
   std::optional<double> size;  // spacing h [m]
@@ -17,6 +26,7 @@ struct VoxelizeOptions {
       count;  // or about this many cells (elements for centre placement) over all parts; default 20,000
   Placement placement = Placement::corner;
   Align align = Align::snap;
+  HealChoice heal;
   std::string material;              // of every part; "" leaves it to the scene
   std::optional<double> max_memory;  // bytes; default 80 % of what is free
 };
@@ -26,6 +36,21 @@ struct ThinWall {
   double thickness = 0;       // m
   Vec3 where = Vec3::Zero();  // m, world frame, on the surface
   std::uint32_t part = 0;
+};
+
+// What was healed in one part's surface, for the classification only.
+struct Healing {
+  std::size_t open_edges = 0;                                                           // before
+  std::size_t degenerate_facets = 0, duplicate_facets = 0, fins = 0, loose_facets = 0;  // facets left out
+  std::size_t welded_edges = 0;               // open edges closed by welding at 1e-7 of the diagonal
+  std::size_t holes = 0, hole_triangles = 0;  // filled, and with how many triangles
+  double widest_hole = 0;                     // m
+  std::size_t flipped_facets = 0;             // turned over to agree with their neighbours
+  std::size_t inverted_shells = 0;            // taken the other way round: they were inside out
+  std::size_t left_open = 0;                  // open edges afterwards
+  bool wrapped = false;
+  double wrap_alpha = 0;                                    // m, the widest opening spanned
+  enum class By { surface, vote, flood } by = By::surface;  // what told inside from outside
 };
 
 // What was found for one part.
@@ -39,10 +64,8 @@ struct VoxelizedPart {
   std::size_t split_voxels = 0;  // voxels that hold more than one piece
   std::size_t overlapping_voxels =
       0;  // voxels in which shells interpenetrate; their fill comes from 64 x 64 lines
-  std::size_t undecided_voxels = 0;   // voxels whose pieces could not be told apart
-  std::size_t flipped_triangles = 0;  // turned over to agree with their neighbours
-  std::size_t inverted_shells = 0;    // taken the other way round: they were inside out
-  bool cracks_closed = false;         // vertices within 1e-7 of the diagonal were welded to close the surface
+  std::size_t undecided_voxels = 0;  // voxels whose pieces could not be told apart
+  Healing healing;
   std::size_t disagreements =
       0;  // voxels where the votes of the three axes differ (surfaces that are not closed)
   Vec3 spacing = Vec3::Zero();

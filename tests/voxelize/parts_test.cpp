@@ -81,8 +81,8 @@ TEST_F(Parts, MultibodyIsTurnedTheRightWayRound) {
     EXPECT_TRUE(part.closed);
     EXPECT_GT(part.surface_volume, 0);
     EXPECT_NEAR(total(part) / part.surface_volume, 1, 1e-6);
-    flipped += part.flipped_triangles;
-    inverted += part.inverted_shells;
+    flipped += part.healing.flipped_facets;
+    inverted += part.healing.inverted_shells;
   }
   EXPECT_GT(flipped, 0u);
   EXPECT_GT(inverted, 0u);

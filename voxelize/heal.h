@@ -1,0 +1,33 @@
+// Healing: what is done to a part's surface so that inside can be told from outside. The surface that the
+// user gets back is never touched.
+#pragma once
+#include "voxelize/heal_holes.h"
+#include "voxelize/part_mesh.h"
+#include "voxelize/voxelize.h"
+
+namespace flexel {
+
+struct HealedPart {
+  PartMesh mesh;      // what is classified
+  PartMesh original;  // the part's own triangles where `mesh` lacks some of them; else empty
+  Healing done;
+  std::vector<Hole> holes;  // those left open
+};
+
+// Heals one part, whose equal positions are one vertex. Heal::none: nothing. Heal::automatic: leaves out
+// repeated facets, welds open edges within 1e-7 of the diagonal, leaves out fins, fills small holes, and
+// makes triangles and shells face outwards. Heal::wrap: the same, then an alpha wrap around it; throws
+// InputError where that goes through an opening and keeps no volume.
+[[nodiscard]] HealedPart heal(PartMesh mesh, const HealChoice& how, const std::string& name);
+
+// Whether a hole that is too large to fill is left in a shell of a tenth of the area or more.
+[[nodiscard]] bool has_large_hole(const HealedPart& part);
+
+// Why inside cannot be told from outside, and what to try; one line.
+[[nodiscard]] std::string why_undecided(const HealedPart& part, const std::string& name);
+
+// What was healed, one phrase each: "140 open edges closed by welding at 1e-7 of the diagonal". Empty:
+// nothing.
+[[nodiscard]] std::vector<std::string> healing_lines(const Healing& done);
+
+}  // namespace flexel

@@ -1,0 +1,55 @@
+// CGAL's hole filling and alpha wrapping.
+#include "voxelize/heal_cgal.h"
+
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Polygon_mesh_processing/triangulate_hole.h>
+#include <CGAL/Surface_mesh.h>
+#include <CGAL/alpha_wrap_3.h>
+
+namespace flexel {
+namespace {
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Point = Kernel::Point_3;
+
+std::vector<Point> points_of(const std::vector<Vec3>& vertices) {
+  std::vector<Point> points;
+  points.reserve(vertices.size());
+  for (const Vec3& v : vertices) points.emplace_back(v.x(), v.y(), v.z());
+  return points;
+}
+
+}  // namespace
+
+std::vector<Corners> close_loop(const std::vector<Vec3>& loop, const std::vector<Vec3>& across) {
+  std::vector<CGAL::Triple<int, int, int>> found;
+  CGAL::Polygon_mesh_processing::triangulate_hole_polyline(points_of(loop), points_of(across),
+                                                           std::back_inserter(found));
+  std::vector<Corners> triangles;
+  for (const auto& t : found)
+    triangles.push_back({static_cast<std::uint32_t>(t.first), static_cast<std::uint32_t>(t.second),
+                         static_cast<std::uint32_t>(t.third)});
+  return triangles;
+}
+
+PartMesh alpha_wrap(const PartMesh& mesh, double alpha, double offset) {
+  CGAL::Surface_mesh<Point> wrap;
+  CGAL::alpha_wrap_3(points_of(mesh.world), mesh.corners, alpha, offset, wrap);
+  PartMesh result;
+  for (const auto v : wrap.vertices()) {
+    const Point& p = wrap.point(v);
+    result.world.emplace_back(p.x(), p.y(), p.z());
+  }
+  for (const auto f : wrap.faces()) {
+    Corners c{};
+    int n = 0;
+    for (const auto v : CGAL::vertices_around_face(wrap.halfedge(f), wrap))
+      c[static_cast<std::size_t>(n++)] = static_cast<std::uint32_t>(v.idx());
+    result.corners.push_back(c);
+    result.polygon.push_back(kNoPolygon);
+  }
+  number_edges(result);
+  return result;
+}
+
+}  // namespace flexel

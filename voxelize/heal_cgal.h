@@ -1,0 +1,18 @@
+// What CGAL does for healing; heal_cgal.cpp alone sees it.
+#pragma once
+#include <span>
+#include <vector>
+
+#include "voxelize/part_mesh.h"
+
+namespace flexel {
+
+// Triangles (indices into `loop`) that close a loop of points [m]; `across[i]` is the far corner of the
+// triangle at edge (i, i + 1), which the patch should continue smoothly. Empty where there is none.
+[[nodiscard]] std::vector<Corners> close_loop(const std::vector<Vec3>& loop, const std::vector<Vec3>& across);
+
+// A closed surface around the triangles, from outside, through no opening narrower than `alpha` [m], `offset`
+// [m] off them (Portaneri et al., "Alpha wrapping with an offset", 2022). Its triangles have no polygon.
+[[nodiscard]] PartMesh alpha_wrap(const PartMesh& mesh, double alpha, double offset);
+
+}  // namespace flexel
