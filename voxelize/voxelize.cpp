@@ -236,7 +236,7 @@ class CountSearch {
   double least_error_ = std::numeric_limits<double>::infinity(), best_ = 0;
 };
 
-VoxelizeResult correct_count(VoxelizeResult result, double spacing, std::vector<PartMesh>& meshes,
+VoxelizeResult correct_count(VoxelizeResult result, double spacing, std::vector<HealedPart>& meshes,
                              const std::vector<PartExtent>& extents, const VoxelizeOptions& options,
                              Progress& progress) {
   constexpr int kCorrections = 3;
