@@ -85,6 +85,8 @@ AttributeName split_name(const std::string& name) {
   const std::size_t dot = name.rfind('.');
   int component = 0;
   if (dot == std::string::npos) return {name, std::nullopt};
+  if (dot + 2 == name.size() && name.back() >= 'x' && name.back() <= 'z')
+    return {name.substr(0, dot), name.back() - 'x'};
   const auto [end, error] = std::from_chars(name.data() + dot + 1, name.data() + name.size(), component);
   if (error != std::errc() || end != name.data() + name.size() || component < 0) return {name, std::nullopt};
   return {name.substr(0, dot), component};
@@ -136,11 +138,22 @@ std::optional<Attribute> body_attribute(const Body& body, const std::string& nam
   if (auto found = in_columns(body.cell_columns, name, Attribute::At::cells)) return found;
   if (name == "strain") return strain(body);
   if (name == "fill" && body.cell_count() > 0) return Attribute{Attribute::At::cells, body.fill};
-  if (name != "displacement") return std::nullopt;
-  Attribute result{Attribute::At::elements, std::vector<double>(body.element_count())};
-  parallel_for_each(body.element_count(),
-                    [&](std::size_t e) { result.values[e] = (body.position[e] - body.rest[e]).norm(); });
-  return result;
+  const auto [column, component] = split_name(name);
+  if (column != "displacement") return std::nullopt;
+  std::vector<Vec3> moved(body.element_count());
+  parallel_for_each(moved.size(), [&](std::size_t e) { moved[e] = body.position[e] - body.rest[e]; });
+  auto values = displacement_values(moved, component);
+  return values ? std::optional(Attribute{Attribute::At::elements, std::move(*values)}) : std::nullopt;
+}
+
+std::optional<std::vector<double>> displacement_values(const std::vector<Vec3>& displacement,
+                                                       std::optional<int> component) {
+  if (component && *component > 2) return std::nullopt;
+  std::vector<double> values(displacement.size());
+  parallel_for_each(values.size(), [&](std::size_t i) {
+    values[i] = component ? displacement[i][*component] : displacement[i].norm();
+  });
+  return values;
 }
 
 std::vector<double> at_elements(const Body& body, const Attribute& attribute) {

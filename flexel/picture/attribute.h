@@ -20,7 +20,7 @@ struct Attribute {
 [[nodiscard]] std::vector<std::string> surface_attribute_names(const Surface& surface);
 
 // The attributes of a body: "displacement" [m], "strain" (equivalent logarithmic), "fill", and its columns,
-// whose vectors give their length, or one component as "NAME.0".
+// whose vectors give their length, or one component as "NAME.0" or "NAME.x".
 [[nodiscard]] std::optional<Attribute> body_attribute(const Body& body, const std::string& name);
 [[nodiscard]] std::vector<std::string> body_attribute_names(const Body& body);
 
@@ -42,11 +42,15 @@ struct Attribute {
 // One value a row: the length of a vector, or component `component`.
 [[nodiscard]] std::vector<double> scalars(const Column& column, std::optional<int> component);
 
-// "velocity.2" is component 2 of "velocity".
+// "velocity.2" and "velocity.z" are component 2 of "velocity".
 struct AttributeName {
   std::string column;
   std::optional<int> component;
 };
 [[nodiscard]] AttributeName split_name(const std::string& name);
+
+// One value a displacement: its length, or a component; nothing for a component that it does not have.
+[[nodiscard]] std::optional<std::vector<double>> displacement_values(const std::vector<Vec3>& displacement,
+                                                                     std::optional<int> component);
 
 }  // namespace flexel

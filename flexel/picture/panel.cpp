@@ -46,6 +46,10 @@ Positions move(std::vector<Vec3> rest, const std::vector<Vec3>& displacement, co
   positions.moved = rest;
   if (positions.deformed)
     parallel_for_each(rest.size(), [&](std::size_t i) { positions.moved[i] += factor * displacement[i]; });
+  const Vec3 size = bounding_box(positions.moved).size();
+  if (!size.allFinite() || size.maxCoeff() > kLargestCoordinate)
+    throw InputError(panel.subject->where,
+                     fmt::format("--scale {:g} takes its deformation beyond all measure", factor));
   positions.rest = std::move(rest);
   return positions;
 }
@@ -119,12 +123,9 @@ void draw_body_surface(const Body& body, const PictureOptions& options, const Co
   if (with_rest) panel.rest = draw_surface(surface, mesh, positions.rest, panel.frame);
   set_own_colours(surface, mesh, panel.drawn);
   if (by.name.empty() || by.by_rays) return;
-  if (by.name == "displacement") {
-    std::vector<double> values(mapped.displacement.size());
-    parallel_for_each(values.size(), [&](std::size_t v) { values[v] = mapped.displacement[v].norm(); });
-    set_values(panel.drawn, Drawable::ValuesAt::vertices, values);
-    return;
-  }
+  if (const auto [column, component] = split_name(by.name); column == "displacement")
+    if (const auto values = displacement_values(mapped.displacement, component))
+      return set_values(panel.drawn, Drawable::ValuesAt::vertices, *values);
   const std::optional<Attribute> attribute = body_attribute(body, by.name);
   if (!attribute) return set_surface_values(surface, mesh, by.name, panel.drawn);
   std::vector<std::uint32_t> nearest(mapped.quadruple.size());

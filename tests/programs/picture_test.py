@@ -80,7 +80,8 @@ def test_every_kind_of_picture():
     deformed()
     for options in (["--color", "strain"], ["--color", "fill"], ["--color", "thickness"], ["--cells"], ["--elements"],
                     ["--scale", "auto"], ["--scale", "0"], ["--color", "displacement", "--range", "1:20 um"], ["--view", "top"],
-                    ["--view", "-30,15"], ["--cells", "--color", "displacement"], ["--elements", "--color", "strain"]):
+                    ["--view", "-30,15"], ["--cells", "--color", "displacement"], ["--elements", "--color", "strain"],
+                    ["--color", "displacement.z"], ["--cells", "--color", "displacement.2"], ["--up", "y"]):
         read_png_of("bent.vtu", "--size", "160x120", *options)
     read_png_of("bent.vtu", box(), "rest.vtu", "--size", "400x300")
 
@@ -109,7 +110,7 @@ def test_faces_of_a_step_part():
 
 def test_refused_and_nothing_written():
     box()
-    body("rest.vtu")
+    deformed()
     write("empty.stl", "")
     for arguments, words in (
             (["box.stl"], ["--output"]),
@@ -127,6 +128,9 @@ def test_refused_and_nothing_written():
             (["box.stl", "-o", "x.png", "--view", "fornt"], ["fornt", "did you mean \"front\""]),
             (["box.stl", "-o", "x.png", "--scale", "big"], ["--scale", "big"]),
             (["box.stl", "-o", "x.png", "--scale", "-1"], ["--scale"]),
+            (["bent.vtu", "-o", "x.png", "--scale", "1e300"], ["bent.vtu", "--scale"]),
+            (["bent.vtu", "-o", "x.png", "--color", "displacement.3"], ["displacement.3"]),
+            (["box.stl", "-o", "x.png", "--up", "w"], ["--up"]),
             (["missing.stl", "-o", "x.png"], ["missing.stl"]),
             (["empty.stl", "-o", "x.png"], ["empty.stl", "empty"]),
             (["box.stl", "-o", "no/such/folder/x.png"], ["no/such/folder"])):
