@@ -18,8 +18,18 @@ Ticks legend_ticks(const Legend& legend) {
   return round_ticks(legend.low / legend.unit.factor, legend.high / legend.unit.factor, kMostTicks);
 }
 
-std::string largest_text(const Legend& legend) {
-  return fmt::format("max {} {}", short_number(legend.largest / legend.unit.factor), legend.unit.name);
+std::string extreme_text(const char* which, double value, const Legend& legend) {
+  // Rounding errors of a zero are no value.
+  const double size = std::max(std::abs(legend.smallest), std::abs(legend.largest));
+  const double shown = std::abs(value) < 1e-6 * size ? 0 : value;
+  return fmt::format("{} {} {}", which, short_number(shown / legend.unit.factor), legend.unit.name);
+}
+
+// The largest and the smallest value that there are, the smallest unless it is the bar's plain end at zero.
+std::vector<std::string> extremes(const Legend& legend) {
+  std::vector<std::string> lines{extreme_text("max", legend.largest, legend)};
+  if (legend.smallest < 0 || legend.low > 0) lines.push_back(extreme_text("min", legend.smallest, legend));
+  return lines;
 }
 
 std::string title_text(const Legend& legend) {
@@ -58,9 +68,9 @@ int legend_width(float size, const Legend& legend) {
   float widest = 0;
   for (const std::string& label : legend_ticks(legend).labels)
     widest = std::max(widest, text_width(label, size));
-  const float bar = 1.1f * size + 0.9f * size + widest;
-  return static_cast<int>(std::ceil(
-      std::max({bar, text_width(title_text(legend), size), text_width(largest_text(legend), size)})));
+  float width = std::max(2 * size + widest, text_width(title_text(legend), size));
+  for (const std::string& line : extremes(legend)) width = std::max(width, text_width(line, size));
+  return static_cast<int>(std::ceil(width));
 }
 
 void draw_legend(Image& image, const Viewport& box, float size, const Legend& legend) {
@@ -68,7 +78,7 @@ void draw_legend(Image& image, const Viewport& box, float size, const Legend& le
   const float line = 1.35f * size;
   const float title = static_cast<float>(box.y) + size,
               top = title + (legend.unit.name.empty() ? 0.6f : 1.0f) * line + 0.3f * size;
-  const float bottom = static_cast<float>(box.y + box.height) - 1.9f * line;
+  const float bottom = static_cast<float>(box.y + box.height) - 2.9f * line;
   draw_text(image, left, title, title_text(legend), size, colour(kInk));
   if (!legend.unit.name.empty())
     draw_text(image, left, title + line * 0.95f, legend.unit.name, size, colour(kFaintInk));
@@ -85,7 +95,11 @@ void draw_legend(Image& image, const Viewport& box, float size, const Legend& le
                 colour(kInk));
     draw_text(image, left + width + 0.6f * size, y + 0.36f * size, ticks.labels[i], size, colour(kInk));
   }
-  draw_text(image, left, bar_bottom + 1.3f * line, largest_text(legend), size, colour(kFaintInk));
+  float below = bar_bottom + 1.3f * line;
+  for (const std::string& text : extremes(legend)) {
+    draw_text(image, left, below, text, size, colour(kFaintInk));
+    below += line;
+  }
 }
 
 void draw_triad(Image& image, float x, float y, float size, const Camera& camera) {

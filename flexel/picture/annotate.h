@@ -12,9 +12,9 @@ namespace flexel {
 constexpr std::uint32_t kInk = 0x27313d, kFaintInk = 0x66717e;
 
 struct Legend {
-  std::string title;         // "displacement"
-  double low = 0, high = 1;  // SI, the ends of the colour map
-  double largest = 0;        // SI, the largest value there is
+  std::string title;                 // "displacement"
+  double low = 0, high = 1;          // SI, the ends of the colour map
+  double smallest = 0, largest = 0;  // SI, of the values that there are
   DisplayUnit unit;
 };
 

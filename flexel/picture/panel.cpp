@@ -175,6 +175,7 @@ void find_range(const ColourBy& by, Panel& panel) {
   if (by.by_rays) {
     const ThicknessRange range = thickness_range(panel.drawn, *panel.tracer);
     if (!(range.high > 0)) return;
+    panel.largest = range.largest * static_cast<float>(panel.frame.radius);
     panel.low = range.low * static_cast<float>(panel.frame.radius);
     panel.high = range.high * static_cast<float>(panel.frame.radius);
     return;

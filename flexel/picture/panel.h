@@ -27,6 +27,7 @@ struct Panel {
   Eigen::Matrix3d motion = Eigen::Matrix3d::Zero();
   double largest_displacement = 0, diagonal = 0;  // m
   std::optional<float> low, high;                 // of the values; nothing without any
+  std::optional<float> largest;                   // where it is above `high`
 };
 
 // What to colour by, when the user did not say or did: displacement where a body is deformed, else nothing.

@@ -50,16 +50,19 @@ Legend make_legend(const std::vector<Panel>& panels, const ColourBy& by, const P
   Legend legend;
   legend.title = by.name;
   const std::optional<Dimension> dimension = dimension_of(by.name);
-  double low = 0, high = 0;
+  double low = 0, high = 0, largest = 0;
   bool any = false;
   for (const Panel& panel : panels) {
     if (!panel.low) continue;
     low = any ? std::min<double>(low, *panel.low) : static_cast<double>(*panel.low);
     high = any ? std::max<double>(high, *panel.high) : static_cast<double>(*panel.high);
+    const auto most = static_cast<double>(panel.largest.value_or(*panel.high));
+    largest = any ? std::max(largest, most) : most;
     any = true;
   }
   if (!any) notes.push_back(fmt::format("no point has a value of \"{}\": everything is grey", by.name));
-  legend.largest = high;
+  legend.smallest = low;
+  legend.largest = largest;
   if (low >= 0 && low < 0.5 * high) low = 0;
   if (options.range) std::tie(low, high) = given_range(*options.range, dimension);
   legend.low = low;

@@ -44,7 +44,8 @@ ThicknessRange thickness_range(const Drawable& drawn, const Tracer& tracer) {
       if ((sum += f.area) >= share * total) return f.thickness;
     return found.back().thickness;
   };
-  return {quantile(0.01), quantile(0.99)};
+  const float largest = quantile(0.99);
+  return {quantile(0.01), largest, std::min(largest, 2.5f * quantile(0.5))};
 }
 
 }  // namespace flexel
