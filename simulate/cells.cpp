@@ -47,7 +47,7 @@ PreparedCell prepare(const CellKind& kind, const Mat3& gradient, bool project, c
 }
 
 void add_cell_row(const CellKind& kind, const PreparedCell& cell, double fill, std::size_t a,
-                  const std::array<std::uint8_t, 64>& slot, Block* row) {
+                  const std::array<std::uint16_t, 64>& slot, Block* row) {
   if (cell.projected) {
     for (std::size_t b = 0; b < 8; ++b)
       row[slot[8 * a + b]] += fill * projected_block(kind, *cell.projected, a, b);

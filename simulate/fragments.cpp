@@ -63,6 +63,21 @@ std::string near(const Vec3& at) {
   return fmt::format("({}, {}, {})", human_length(at.x()), human_length(at.y()), human_length(at.z()));
 }
 
+// What is bonded with something that is held is held too.
+void hold_bonded(const Fragments& fragments, const std::vector<CellPair>& coupled,
+                 std::vector<std::uint8_t>& held) {
+  std::vector<std::uint32_t> parent(held.size());
+  std::iota(parent.begin(), parent.end(), 0u);
+  for (const auto& [a, b] : coupled) {
+    const std::uint32_t x = root_of(parent, fragments.of_cell[a]), y = root_of(parent, fragments.of_cell[b]);
+    parent[std::max(x, y)] = std::min(x, y);
+  }
+  std::vector<std::uint8_t> group(held.size(), 0);
+  for (std::uint32_t f = 0; f < held.size(); ++f)
+    if (held[f]) group[root_of(parent, f)] = 1;
+  for (std::uint32_t f = 0; f < held.size(); ++f) held[f] = group[root_of(parent, f)];
+}
+
 // The cell of simulated matter whose centre is nearest to `point`, in `part`.
 std::uint32_t nearest_cell(const Fragments& fragments, const Body& body, std::uint32_t part,
                            const Vec3& point) {
@@ -116,11 +131,13 @@ std::vector<std::uint8_t> stray_cells(const Fragments& fragments) {
 }
 
 void refuse_loose_fragments(const Fragments& fragments, const Body& body,
-                            const std::vector<std::uint8_t>& tied_elements, const std::string& scene) {
+                            const std::vector<std::uint8_t>& tied_elements,
+                            const std::vector<CellPair>& coupled, const std::string& scene) {
   std::vector<std::uint8_t> held(fragments.list.size(), 0);
   std::vector<std::size_t> fragments_of_part(body.parts.size(), 0);
   for (std::size_t e = 0; e < tied_elements.size(); ++e)
     if (tied_elements[e] && fragments.of_element[e] != kNoFragment) held[fragments.of_element[e]] = 1;
+  hold_bonded(fragments, coupled, held);
   for (const Fragment& fragment : fragments.list) fragments_of_part[fragment.part] += !fragment.stray;
   for (std::size_t f = 0; f < fragments.list.size(); ++f) {
     const Fragment& fragment = fragments.list[f];

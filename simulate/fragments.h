@@ -31,9 +31,11 @@ constexpr std::uint32_t kNoFragment = 0xffffffffu;
 [[nodiscard]] std::vector<std::uint8_t> stray_cells(const Fragments& fragments);
 
 // Throws InputError naming the part, and the fragment where there are several, when no element of a fragment
-// that is not stray is tied. `scene` is the scene's name for the message.
+// that is not stray is tied, nor any of those that it is bonded with (`coupled` cells). `scene` is the
+// scene's name for the message.
 void refuse_loose_fragments(const Fragments& fragments, const Body& body,
-                            const std::vector<std::uint8_t>& tied_elements, const std::string& scene);
+                            const std::vector<std::uint8_t>& tied_elements,
+                            const std::vector<CellPair>& coupled, const std::string& scene);
 
 // Moves the elements of stray fragments (and those without a whole cell) as the matter nearest to the
 // fragment's centre moved, by that cell's mean deformation. `stencil` is that of the cells that were

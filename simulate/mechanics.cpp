@@ -28,12 +28,18 @@ Constraints initial_constraints(const Body& body, const Stencil& stencil) {
 
 Mechanics::Mechanics(const Setting& setting, std::vector<Pass> passes)
     : body_(setting.body),
-      pattern_(stiffness_pattern(setting.body, active_cells(setting))),
+      pattern_(stiffness_pattern(setting.body, active_cells(setting), coupled(passes))),
       cells_(setting, pattern_.stencil),
       passes_(std::move(passes)),
       constraints_(initial_constraints(setting.body, pattern_.stencil)) {
   for (const Pass& pass : passes_)
     if (pass.constrain) pass.constrain(constraints_);
+}
+
+std::vector<CellPair> Mechanics::coupled(const std::vector<Pass>& passes) {
+  std::vector<CellPair> pairs;
+  for (const Pass& pass : passes) pairs.insert(pairs.end(), pass.couples.begin(), pass.couples.end());
+  return pairs;
 }
 
 double Mechanics::energy(const State& state) {
@@ -57,7 +63,7 @@ Forces Mechanics::forces(const State& state) {
   for (Pass& pass : passes_)
     if (pass.add_forces) {
       const PassTimer timer(pass.seconds);
-      pass.add_forces(state, result.total);
+      pass.add_forces(state, pass.couples.empty() ? result.total : inner);
     }
   const PassTimer timer(cell_seconds_);
   cells_.add_forces(state, inner);
@@ -91,7 +97,7 @@ std::vector<std::uint8_t> Mechanics::tied_elements() {
   std::fill(matrix.values.begin(), matrix.values.end(), Block::Zero());
   const State rest{std::vector<Vec3>(body_.element_count(), Vec3::Zero()), 1};
   for (const Pass& pass : passes_)
-    if (pass.add_stiffness) pass.add_stiffness(rest, pattern_.stencil, body_, matrix);
+    if (pass.add_stiffness && pass.couples.empty()) pass.add_stiffness(rest, pattern_.stencil, body_, matrix);
   for (std::uint32_t e = 0; e < tied.size(); ++e) {
     bool held = constraints_.mask[e] != 0;
     for (std::size_t entry = matrix.row_offsets[e]; entry < matrix.row_offsets[e + 1]; ++entry)

@@ -31,12 +31,16 @@ class Mechanics {
   // Tangent stiffness into stiffness(), prescribed components not yet eliminated.
   void assemble(const State& state, const TangentOptions& tangent = {});
   void eliminate_prescribed() { eliminate(constraints_, pattern_.matrix); }
+  // Pairs of cells that effects couple (bonds).
+  [[nodiscard]] std::vector<CellPair> coupled_cells() const { return coupled(passes_); }
   // 1 for each element that a tie holds or leads.
   [[nodiscard]] std::vector<std::uint8_t> tied_elements();
 
   void report(const State& state, SimulateResult& result);
 
  private:
+  static std::vector<CellPair> coupled(const std::vector<Pass>& passes);
+
   const Body& body_;
   StiffnessPattern pattern_;
   Cells cells_;

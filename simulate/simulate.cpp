@@ -126,7 +126,8 @@ class Run {
 };
 
 EquilibriumResult Run::solve(Mechanics& mechanics) {
-  refuse_loose_fragments(fragments_, body_, mechanics.tied_elements(), scene_.name);
+  refuse_loose_fragments(fragments_, body_, mechanics.tied_elements(), mechanics.coupled_cells(),
+                         scene_.name);
   refuse_free_motions(mechanics, scene_.name);
   Deadline deadline;
   if (options_.timeout)

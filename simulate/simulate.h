@@ -28,6 +28,11 @@ struct AppliedLoad {  // of one [[load]], or of gravity
   Vec3 force = Vec3::Zero();  // N, in total
 };
 
+struct BondedParts {  // two parts that touch
+  std::array<std::string, 2> parts;
+  double area = 0;  // m^2, over which they do
+};
+
 struct PassShare {  // an effect that ran, why, and how long it took
   std::string name, why;
   double seconds = 0;
@@ -37,6 +42,7 @@ struct SimulateResult {
   std::vector<ProbeResult> probes;
   std::vector<Reaction> reactions;
   std::vector<AppliedLoad> loads;
+  std::vector<BondedParts> bonds;
   Vec3 imbalance = Vec3::Zero();  // N, sum of loads and reactions; 0 but for the tolerance
   std::vector<PassShare> passes;
   std::size_t stray_cells = 0;      // in loose crumbs that were carried along, not simulated

@@ -4,6 +4,7 @@
 #include "simulate/stiffness.h"
 
 #include <algorithm>
+#include <unordered_map>
 
 #include "formats/parallel.h"
 
@@ -23,19 +24,41 @@ void fill_incidences(const Body& body, const std::vector<std::uint8_t>& active, 
       for (std::uint32_t a = 0; a < 8; ++a) stencil.incidences[next[body.cell_elements[c][a]]++] = {c, a};
 }
 
-// Elements that share an active cell with `element`, itself among them, ascending.
-void collect_row(const Body& body, const Stencil& stencil, std::uint32_t element,
+// Cells by the cell that they are coupled with.
+using Coupled = std::unordered_map<std::uint32_t, std::vector<std::uint32_t>>;
+
+Coupled both_ways(const std::vector<CellPair>& pairs) {
+  Coupled coupled;
+  for (const auto& [a, b] : pairs) {
+    coupled[a].push_back(b);
+    coupled[b].push_back(a);
+  }
+  return coupled;
+}
+
+// Elements that share an active cell with `element` or lie in one that is coupled with such a cell, itself
+// among them, ascending.
+void collect_row(const Body& body, const Stencil& stencil, const Coupled& coupled, std::uint32_t element,
                  std::vector<std::uint32_t>& row) {
   row.assign(1, element);
-  for (const Incidence& at : stencil.of(element))
-    row.insert(row.end(), body.cell_elements[at.cell].begin(), body.cell_elements[at.cell].end());
+  const auto add = [&](std::uint32_t cell) {
+    row.insert(row.end(), body.cell_elements[cell].begin(), body.cell_elements[cell].end());
+  };
+  for (const Incidence& at : stencil.of(element)) {
+    add(at.cell);
+    if (coupled.empty()) continue;
+    if (const auto others = coupled.find(at.cell); others != coupled.end())
+      for (const std::uint32_t other : others->second) add(other);
+  }
   std::sort(row.begin(), row.end());
   row.erase(std::unique(row.begin(), row.end()), row.end());
 }
 
 }  // namespace
 
-StiffnessPattern stiffness_pattern(const Body& body, const std::vector<std::uint8_t>& active) {
+StiffnessPattern stiffness_pattern(const Body& body, const std::vector<std::uint8_t>& active,
+                                   const std::vector<CellPair>& pairs) {
+  const Coupled coupled = both_ways(pairs);
   StiffnessPattern pattern;
   Stencil& stencil = pattern.stencil;
   BlockMatrix& matrix = pattern.matrix;
@@ -45,7 +68,7 @@ StiffnessPattern stiffness_pattern(const Body& body, const std::vector<std::uint
   parallel_chunks(n, 4096, [&](std::size_t begin, std::size_t end) {
     std::vector<std::uint32_t> row;
     for (std::size_t e = begin; e < end; ++e) {
-      collect_row(body, stencil, static_cast<std::uint32_t>(e), row);
+      collect_row(body, stencil, coupled, static_cast<std::uint32_t>(e), row);
       length[e] = static_cast<std::uint32_t>(row.size());
     }
   });
@@ -57,13 +80,13 @@ StiffnessPattern stiffness_pattern(const Body& body, const std::vector<std::uint
   parallel_chunks(n, 4096, [&](std::size_t begin, std::size_t end) {
     std::vector<std::uint32_t> row;
     for (std::size_t e = begin; e < end; ++e) {
-      collect_row(body, stencil, static_cast<std::uint32_t>(e), row);
+      collect_row(body, stencil, coupled, static_cast<std::uint32_t>(e), row);
       std::copy(row.begin(), row.end(),
                 matrix.columns.begin() + static_cast<std::ptrdiff_t>(matrix.row_offsets[e]));
       for (const Incidence& at : stencil.of(static_cast<std::uint32_t>(e)))
         for (std::size_t b = 0; b < 8; ++b) {
           const auto found = std::lower_bound(row.begin(), row.end(), body.cell_elements[at.cell][b]);
-          stencil.slot[at.cell][8 * at.corner + b] = static_cast<std::uint8_t>(found - row.begin());
+          stencil.slot[at.cell][8 * at.corner + b] = static_cast<std::uint16_t>(found - row.begin());
         }
     }
   });

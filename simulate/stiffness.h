@@ -9,6 +9,8 @@
 
 namespace flexel {
 
+using CellPair = std::array<std::uint32_t, 2>;
+
 // One cell at one of its elements.
 struct Incidence {
   std::uint32_t cell = 0;
@@ -20,7 +22,7 @@ struct Incidence {
 struct Stencil {
   std::vector<std::uint32_t> offsets;  // (elements + 1)
   std::vector<Incidence> incidences;   // (8 cells)
-  std::vector<std::array<std::uint8_t, 64>>
+  std::vector<std::array<std::uint16_t, 64>>
       slot;  // (cells) block (a, b) of a cell is entry slot[8 a + b] of the row of its element a
   [[nodiscard]] std::span<const Incidence> of(std::uint32_t element) const {
     return {incidences.data() + offsets[element], offsets[element + 1] - offsets[element]};
@@ -28,12 +30,14 @@ struct Stencil {
 };
 
 // The stencil of the cells with active[cell] != 0, and a matrix of zeros with its pattern: a row per element,
-// its diagonal always present.
+// its diagonal always present. The elements of two cells of `coupled` are neighbours as those of one cell
+// are.
 struct StiffnessPattern {
   Stencil stencil;
   BlockMatrix matrix;
 };
-[[nodiscard]] StiffnessPattern stiffness_pattern(const Body& body, const std::vector<std::uint8_t>& active);
+[[nodiscard]] StiffnessPattern stiffness_pattern(const Body& body, const std::vector<std::uint8_t>& active,
+                                                 const std::vector<CellPair>& coupled = {});
 
 // Where block (a, b) of a cell is in the matrix's values.
 [[nodiscard]] inline std::size_t block_index(const Stencil& stencil, const BlockMatrix& matrix,

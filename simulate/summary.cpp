@@ -60,6 +60,9 @@ std::string summary_json(const SimulateResult& result, const Body& body) {
   json["reactions"] = Json::array();
   for (const Reaction& reaction : result.reactions)
     json["reactions"].push_back({{"name", reaction.name}, {"force", vector(reaction.force)}});
+  json["bonds"] = Json::array();
+  for (const BondedParts& bond : result.bonds)
+    json["bonds"].push_back({{"parts", bond.parts}, {"area", bond.area}});
   json["imbalance"] = vector(result.imbalance);
   json["elastic_energy"] = result.elastic_energy;
   json["smallest_jacobian"] = result.smallest_jacobian;
@@ -87,6 +90,9 @@ std::vector<std::string> summary_lines(const SimulateResult& result) {
     lines.push_back(fmt::format("load \"{}\": {}", load.name, forces(load.force)));
   for (const Reaction& reaction : result.reactions)
     lines.push_back(fmt::format("reaction of \"{}\": {}", reaction.name, forces(reaction.force)));
+  for (const BondedParts& bond : result.bonds)
+    lines.push_back(fmt::format("\"{}\" and \"{}\" are bonded over {:.4g} mm2", bond.parts[0], bond.parts[1],
+                                bond.area * 1e6));
   lines.push_back(fmt::format(
       "elastic energy {:.4g} J, smallest J {:.4g} (at a corner {:.4g}), {} load step(s), {} Newton and {} CG "
       "iterations, "

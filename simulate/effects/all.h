@@ -2,6 +2,7 @@
 #pragma once
 #include <tuple>
 
+#include "simulate/effects/bonds.h"
 #include "simulate/effects/gravity.h"
 #include "simulate/effects/loads.h"
 #include "simulate/effects/ties.h"
@@ -27,6 +28,6 @@ struct EffectList {
   }
 };
 
-using Effects = EffectList<Gravity, Loads, Ties>;
+using Effects = EffectList<Gravity, Loads, Ties, Bonds>;
 
 }  // namespace flexel

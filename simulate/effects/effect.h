@@ -15,6 +15,9 @@
 //   void add_stiffness(const State&, const Stencil&, const Body&, BlockMatrix&) const
 //                                                                     N/m, minus the forces' derivative
 //   void constrain(Constraints&) const                                elements that follow a path exactly
+//   std::vector<CellPair> couples() const                             cells between which its forces act;
+//   they
+//                                                                     are inner ones then, and hold nothing
 //   void report(const State&, const std::vector<Vec3>& unbalanced, SimulateResult&) const
 // An effect that a scene does not name makes no object, no array and no pass.
 #pragma once
@@ -52,6 +55,10 @@ concept Constrains = requires(const E& e, Constraints& c) {
   e.constrain(c);
 };
 template <class E>
+concept Couples = requires(const E& e) {
+  { e.couples() } -> std::same_as<std::vector<CellPair>>;
+};
+template <class E>
 concept Reports = requires(const E& e, const State& s, const std::vector<Vec3>& u, SimulateResult& r) {
   e.report(s, u, r);
 };
@@ -64,6 +71,7 @@ struct Pass {
   std::function<void(const State&, const Stencil&, const Body&, BlockMatrix&)> add_stiffness;
   std::function<void(Constraints&)> constrain;
   std::function<void(const State&, const std::vector<Vec3>&, SimulateResult&)> report;
+  std::vector<CellPair> couples;
   double seconds = 0;
 };
 
@@ -81,6 +89,7 @@ template <class E>
       effect->add_stiffness(s, t, b, m);
     };
   if constexpr (Constrains<E>) pass.constrain = [effect](Constraints& c) { effect->constrain(c); };
+  if constexpr (Couples<E>) pass.couples = effect->couples();
   if constexpr (Reports<E>)
     pass.report = [effect](const State& s, const std::vector<Vec3>& u, SimulateResult& r) {
       effect->report(s, u, r);

@@ -24,12 +24,16 @@ void multiply(const BlockMatrix& matrix, const std::vector<Vec3>& x, std::vector
       512);
 }
 
-std::size_t diagonal_position(const BlockMatrix& matrix, std::size_t row) {
+std::size_t position_of(const BlockMatrix& matrix, std::size_t row, std::uint32_t column) {
   const auto begin = matrix.columns.begin() + static_cast<std::ptrdiff_t>(matrix.row_offsets[row]);
   const auto end = matrix.columns.begin() + static_cast<std::ptrdiff_t>(matrix.row_offsets[row + 1]);
-  const auto found = std::lower_bound(begin, end, static_cast<std::uint32_t>(row));
-  assert(found != end && *found == row);
+  const auto found = std::lower_bound(begin, end, column);
+  assert(found != end && *found == column);
   return static_cast<std::size_t>(found - matrix.columns.begin());
+}
+
+std::size_t diagonal_position(const BlockMatrix& matrix, std::size_t row) {
+  return position_of(matrix, row, static_cast<std::uint32_t>(row));
 }
 
 double largest_diagonal(const BlockMatrix& matrix) {

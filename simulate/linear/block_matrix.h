@@ -19,7 +19,8 @@ struct BlockMatrix {
 // y = A x, rows in parallel; the same bits for any thread count. x and y: (rows x 3).
 void multiply(const BlockMatrix& matrix, const std::vector<Vec3>& x, std::vector<Vec3>& y);
 
-// Position in `columns` of the diagonal block of `row`.
+// Position in `columns` of the block of `row` and `column`, which must be there, and of the diagonal one.
+[[nodiscard]] std::size_t position_of(const BlockMatrix& matrix, std::size_t row, std::uint32_t column);
 [[nodiscard]] std::size_t diagonal_position(const BlockMatrix& matrix, std::size_t row);
 
 // Largest magnitude among the diagonal entries.

@@ -1,0 +1,194 @@
+// Only polygons near the box of another part are looked at. The coarser part's surface is cut into pieces
+// too; their centroids, in a grid of half a spacing, tell which of its polygons can be near a point of the
+// finer one; the distance is then taken from the polygons' triangles themselves.
+#include "simulate/touching.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+
+#include "simulate/surface_points.h"
+
+namespace flexel {
+namespace {
+
+constexpr double kOfDiagonal = 1e-6, kOfSpacing = 1e-2;
+constexpr double kFacing = -0.7;  // cosine between the normals
+
+bool overlap(const Box& a, const Box& b, double margin) {
+  return (a.min.array() <= b.max.array() + margin).all() && (b.min.array() <= a.max.array() + margin).all();
+}
+
+Box polygon_box(const Surface& surface, std::size_t polygon) {
+  Box box;
+  for (const std::uint32_t vertex : surface.polygon(polygon)) box.add(surface.vertices[vertex]);
+  return box;
+}
+
+// Distance from a point to a triangle (Ericson, Real-Time Collision Detection, 2005, section 5.1.5).
+double distance_to_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
+  const Vec3 ab = b - a, ac = c - a, ap = p - a;
+  const double d1 = ab.dot(ap), d2 = ac.dot(ap);
+  if (d1 <= 0 && d2 <= 0) return ap.norm();
+  const Vec3 bp = p - b;
+  const double d3 = ab.dot(bp), d4 = ac.dot(bp);
+  if (d3 >= 0 && d4 <= d3) return bp.norm();
+  const double vc = d1 * d4 - d3 * d2;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0) return (ap - d1 / (d1 - d3) * ab).norm();
+  const Vec3 cp = p - c;
+  const double d5 = ab.dot(cp), d6 = ac.dot(cp);
+  if (d6 >= 0 && d5 <= d6) return cp.norm();
+  const double vb = d5 * d2 - d1 * d6;
+  if (vb <= 0 && d2 >= 0 && d6 <= 0) return (ap - d2 / (d2 - d6) * ac).norm();
+  const double va = d3 * d6 - d5 * d4;
+  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0)
+    return (bp - (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (c - b)).norm();
+  return std::abs(ap.dot(ab.cross(ac).normalized()));
+}
+
+// Sample points by the cube of a grid that they lie in.
+class Grid {
+ public:
+  Grid(const std::vector<SurfacePoint>& points, double width) : points_(points), width_(width) {
+    for (std::uint32_t i = 0; i < points.size(); ++i) cubes_[key(cube(points[i].position))].push_back(i);
+  }
+  // Polygons with a sample in the cubes around `point`, ascending.
+  [[nodiscard]] std::vector<std::uint32_t> polygons_near(const Vec3& point) const {
+    std::vector<std::uint32_t> polygons;
+    const std::array<std::int64_t, 3> middle = cube(point);
+    for (std::int64_t n = 0; n < 27; ++n) {
+      const auto found =
+          cubes_.find(key({middle[0] + n % 3 - 1, middle[1] + n / 3 % 3 - 1, middle[2] + n / 9 - 1}));
+      if (found == cubes_.end()) continue;
+      for (const std::uint32_t i : found->second) polygons.push_back(points_[i].polygon);
+    }
+    std::sort(polygons.begin(), polygons.end());
+    polygons.erase(std::unique(polygons.begin(), polygons.end()), polygons.end());
+    return polygons;
+  }
+
+ private:
+  [[nodiscard]] std::array<std::int64_t, 3> cube(const Vec3& point) const {
+    std::array<std::int64_t, 3> result;
+    for (int axis = 0; axis < 3; ++axis)
+      result[static_cast<std::size_t>(axis)] = static_cast<std::int64_t>(std::floor(point[axis] / width_));
+    return result;
+  }
+  static std::uint64_t key(const std::array<std::int64_t, 3>& cube) {
+    std::uint64_t hash = 0;
+    for (const std::int64_t each : cube)
+      hash = (hash ^ static_cast<std::uint64_t>(each)) * 0x9e3779b97f4a7c15u;
+    return hash;
+  }
+  const std::vector<SurfacePoint>& points_;
+  double width_;
+  std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cubes_;
+};
+
+class Search {
+ public:
+  Search(const Body& body, const std::vector<std::uint8_t>& skip);
+  std::vector<TouchingPoint> operator()();
+
+ private:
+  [[nodiscard]] double tolerance(std::uint32_t part) const {
+    return std::max(kOfDiagonal * diagonal_, kOfSpacing * body_.parts[part].lattice.spacing.minCoeff());
+  }
+  void sample(std::uint32_t part, const std::vector<std::uint8_t>& skip);
+  void touch(std::uint32_t finer, std::uint32_t coarser);
+  [[nodiscard]] double distance(const Vec3& point, std::uint32_t polygon) const;
+
+  const Body& body_;
+  const std::vector<std::uint8_t>& skip_;
+  double diagonal_ = 0;
+  Triangles triangles_;
+  std::vector<std::uint32_t> first_triangle_;      // (polygons + 1)
+  std::vector<Box> box_;                           // (parts)
+  std::vector<std::vector<SurfacePoint>> points_;  // (parts) near another part
+  std::vector<TouchingPoint> found_;
+};
+
+Search::Search(const Body& body, const std::vector<std::uint8_t>& skip)
+    : body_(body), skip_(skip), diagonal_(bounding_box(body.surface.vertices).diagonal()) {
+  const Surface& surface = body.surface;
+  box_.resize(body.parts.size());
+  for (std::size_t p = 0; p < surface.polygon_count(); ++p)
+    for (const std::uint32_t vertex : surface.polygon(p))
+      box_[surface.polygon_part(p)].add(surface.vertices[vertex]);
+  triangles_ = triangulate(surface);
+  first_triangle_.assign(surface.polygon_count() + 1, 0);
+  for (const std::uint32_t polygon : triangles_.polygon) ++first_triangle_[polygon + 1];
+  for (std::size_t p = 0; p < surface.polygon_count(); ++p) first_triangle_[p + 1] += first_triangle_[p];
+  points_.resize(body.parts.size());
+  for (std::uint32_t part = 0; part < body.parts.size(); ++part) sample(part, skip);
+}
+
+void Search::sample(std::uint32_t part, const std::vector<std::uint8_t>& skip) {
+  std::vector<std::uint32_t> polygons;
+  for (std::uint32_t p = 0; p < body_.surface.polygon_count(); ++p) {
+    if (body_.surface.polygon_part(p) != part) continue;
+    const Box box = polygon_box(body_.surface, p);
+    for (std::uint32_t other = 0; other < body_.parts.size(); ++other)
+      if (other != part && overlap(box, box_[other], tolerance(part))) {
+        polygons.push_back(p);
+        break;
+      }
+  }
+  if (!polygons.empty()) points_[part] = surface_points(body_, polygons, skip);
+}
+
+double Search::distance(const Vec3& point, std::uint32_t polygon) const {
+  double least = 1e300;
+  for (std::uint32_t t = first_triangle_[polygon]; t < first_triangle_[polygon + 1]; ++t) {
+    const auto& corners = triangles_.corners[t];
+    least = std::min(
+        least, distance_to_triangle(point, body_.surface.vertices[corners[0]],
+                                    body_.surface.vertices[corners[1]], body_.surface.vertices[corners[2]]));
+  }
+  return least;
+}
+
+void Search::touch(std::uint32_t finer, std::uint32_t coarser) {
+  const double limit = tolerance(finer);
+  std::unordered_map<std::uint32_t, Vec3> normal;
+  for (const SurfacePoint& point : points_[coarser])
+    normal.try_emplace(point.polygon, point.area_vector.normalized());
+  const Grid grid(points_[coarser], 0.5 * body_.parts[coarser].lattice.spacing.minCoeff());
+  for (const SurfacePoint& point : points_[finer]) {
+    const Vec3 own = point.area_vector.normalized();
+    double least = limit;
+    std::optional<std::uint32_t> nearest;
+    for (const std::uint32_t polygon : grid.polygons_near(point.position)) {
+      if (own.dot(normal.at(polygon)) > kFacing) continue;
+      const double away = distance(point.position, polygon);
+      if (away > least || (nearest && away == least)) continue;
+      least = away;
+      nearest = polygon;
+    }
+    if (!nearest) continue;
+    const auto at = locate_on_surface(body_, *nearest, point.position);
+    if (!at || (at->cell < skip_.size() && skip_[at->cell])) continue;
+    found_.push_back({{finer, coarser}, {point.at, *at}, point.area_vector.norm()});
+  }
+}
+
+std::vector<TouchingPoint> Search::operator()() {
+  const auto spacing = [&](std::uint32_t part) { return body_.parts[part].lattice.spacing.mean(); };
+  for (std::uint32_t a = 0; a < body_.parts.size(); ++a)
+    for (std::uint32_t b = a + 1; b < body_.parts.size(); ++b) {
+      if (points_[a].empty() || points_[b].empty()) continue;
+      if (!overlap(box_[a], box_[b], std::max(tolerance(a), tolerance(b)))) continue;
+      spacing(a) <= spacing(b) ? touch(a, b) : touch(b, a);
+    }
+  return std::move(found_);
+}
+
+}  // namespace
+
+std::vector<TouchingPoint> touching_points(const Body& body, const std::vector<std::uint8_t>& skip) {
+  if (body.parts.size() < 2) return {};
+  return Search(body, skip)();
+}
+
+}  // namespace flexel

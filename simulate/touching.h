@@ -1,0 +1,22 @@
+// Where parts touch: points at which the surface of one part lies on that of another.
+#pragma once
+#include <vector>
+
+#include "formats/locate.h"
+
+namespace flexel {
+
+struct TouchingPoint {
+  std::array<std::uint32_t, 2> part{};  // of the finer lattice first
+  std::array<CellPoint, 2> at;          // the same rest point, carried by a cell of each
+  double area = 0;                      // m^2 that the point stands for
+};
+
+// Points of the finer part's surface (surface_points()) that lie within 1e-6 of the body's diagonal, or 0.01
+// of the finer spacing, of a polygon of the other part that faces them within 45 degrees. Each point touches
+// the nearest such polygon. Cells with skip[cell] != 0 are left out. Order: by pair of parts, then by
+// polygon.
+[[nodiscard]] std::vector<TouchingPoint> touching_points(const Body& body,
+                                                         const std::vector<std::uint8_t>& skip);
+
+}  // namespace flexel

@@ -1,0 +1,129 @@
+// Parts that touch: a bar in two pieces behaves as the whole bar.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+
+#include "formats/error.h"
+#include "simulate/merge.h"
+#include "simulate/scene.h"
+#include "simulate/simulate.h"
+#include "simulate/touching.h"
+#include "tests/simulate/box_body.h"
+
+namespace flexel {
+namespace {
+
+using testing::box_body;
+using testing::BoxOptions;
+using ::testing::HasSubstr;
+
+// A bar 2 x 0.5 x 0.5 m, whole or cut at x = 1, the far half `n` cells thick, `gap` away.
+Body bar(bool whole, int n = 4, double gap = 0) {
+  BoxOptions near;
+  near.name = "near";
+  near.cells = {whole ? 16 : 8, 4, 4};
+  near.spacing = Vec3::Constant(0.125);
+  Body body = box_body(near);
+  if (whole) return body;
+  BoxOptions far;
+  far.name = "far";
+  far.cells = {2 * n, n, n};
+  far.spacing = Vec3::Constant(0.5 / n);
+  far.origin = Vec3(1 + gap, 0, 0);
+  append(body, box_body(far));
+  return body;
+}
+
+Scene pull(const Vec3& force) {
+  Scene scene;
+  scene.materials["gum"] = {"gum", 12.1e5, 0.3, 580, "test"};
+  scene.material = "gum";
+  scene.get<Ties>().ties.push_back(make_fix(select_by_name("xmin")));
+  scene.get<Loads>().loads.push_back(make_push(select_by_name("xmax"), force));
+  Probe tip;
+  tip.where = select_by_name("xmax");
+  scene.probes.push_back(tip);
+  return scene;
+}
+
+SimulateResult run(Body& body, const Scene& scene) {
+  Progress progress("test", Progress::Mode::quiet);
+  return simulate(body, scene, {}, progress);
+}
+
+Vec3 tip(Body body, const Vec3& force) {
+  return run(body, pull(force)).probes[0].displacement;
+}
+
+TEST(Bonds, CutBarIsTheWholeBar) {
+  for (const Vec3& force : {Vec3(1e-3, 0, 0), Vec3(0, 0, 1e-3)}) {
+    const Vec3 whole = tip(bar(true), force);
+    EXPECT_LT((tip(bar(false), force) - whole).norm(), 0.005 * whole.norm());
+    EXPECT_LT((tip(bar(false, 5), force) - whole).norm(), 0.015 * whole.norm());
+    EXPECT_LT((tip(bar(false, 3), force) - whole).norm(), 0.015 * whole.norm());
+  }
+}
+
+TEST(Bonds, LargeDeflectionOfACutBar) {
+  const Vec3 force(0, 0, 400);
+  const Vec3 whole = tip(bar(true), force);
+  EXPECT_GT(whole.norm(), 0.08);
+  EXPECT_LT((tip(bar(false, 5), force) - whole).norm(), 0.015 * whole.norm());
+}
+
+TEST(Bonds, SaysWhoIsBondedOverWhatArea) {
+  Body body = bar(false, 5);
+  const SimulateResult result = run(body, pull(Vec3(0, 0, 1)));
+  ASSERT_EQ(result.bonds.size(), 1u);
+  EXPECT_EQ(result.bonds[0].parts, (std::array<std::string, 2>{"near", "far"}));
+  EXPECT_NEAR(result.bonds[0].area, 0.25, 1e-12);
+  EXPECT_LT((result.reactions[0].force + Vec3(0, 0, 1)).norm(), 1e-6);
+  const std::string json = summary_json(result, body);
+  EXPECT_THAT(json, HasSubstr("\"bonds\""));
+}
+
+// A rotation of everything costs nothing, whatever the lattices: the bond does not see it.
+TEST(Bonds, RotationOfBondedPartsIsFree) {
+  Body body = bar(false, 3);
+  Scene scene = pull(Vec3::Zero());
+  scene.get<Loads>().loads.clear();
+  scene.get<Ties>().ties.clear();
+  Tie tie = make_move(select_by_name("near/xmin"), Vec3::Zero());
+  tie.motion.axis = Vec3(1, 2, 3).normalized();
+  tie.motion.angle = 1;
+  scene.get<Ties>().ties.push_back(tie);
+  const SimulateResult result = run(body, scene);
+  for (std::size_t e = 0; e < body.element_count(); ++e)
+    EXPECT_LT((body.position[e] - body.rest[e] - tie.motion.displacement(body.rest[e], 1)).norm(), 1e-6);
+  EXPECT_LT(result.elastic_energy, 1e-6);
+}
+
+std::string refusal(Body body, const Scene& scene) {
+  try {
+    (void)run(body, scene);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(Bonds, OnlyPartsThatTouchAreBonded) {
+  EXPECT_TRUE(touching_points(bar(true), {}).empty());
+  EXPECT_FALSE(touching_points(bar(false, 4, 0.0005), {}).empty());  // under a hundredth of the spacing
+  EXPECT_TRUE(touching_points(bar(false, 4, 0.002), {}).empty());
+  EXPECT_THAT(refusal(bar(false, 4, 0.002), pull(Vec3(0, 0, 1))), HasSubstr("nothing holds part \"far\""));
+}
+
+TEST(Bonds, CanBeLeftOut) {
+  Scene scene = pull(Vec3(0, 0, 1));
+  scene.get<Bonds>().bond = false;
+  EXPECT_THAT(refusal(bar(false), scene), HasSubstr("nothing holds part \"far\""));
+  EXPECT_FALSE(parse_scene("bond = false\n", "s.toml").get<Bonds>().bond);
+  EXPECT_TRUE(parse_scene("", "s.toml").get<Bonds>().bond);
+  EXPECT_THROW((void)parse_scene("contact = true\n", "s.toml"), InputError);
+  EXPECT_THROW((void)parse_scene("bond = 1\n", "s.toml"), InputError);
+}
+
+}  // namespace
+}  // namespace flexel
