@@ -23,13 +23,15 @@ struct Edge {
   bool sharp;  // an outline that is a crease where the view does not fall away beside it
 };
 
-// Every triangle's direction: 1 faces the camera.
+// Every triangle's direction: 1 faces the camera; one that is seen edge-on does not.
 std::vector<std::uint8_t> facing(const Drawable& drawn, const Camera& camera) {
+  constexpr float kEdgeOn = 1e-5f;
   std::vector<std::uint8_t> result(drawn.triangles.size());
   parallel_for_each(result.size(), [&](std::size_t t) {
     const auto& c = drawn.triangles[t];
     const Vec3f& a = drawn.vertices[c[0]];
-    result[t] = (drawn.vertices[c[1]] - a).cross(drawn.vertices[c[2]] - a).dot(camera.forward) < 0;
+    const Vec3f cross = (drawn.vertices[c[1]] - a).cross(drawn.vertices[c[2]] - a);
+    result[t] = cross.dot(camera.forward) < -kEdgeOn * cross.norm();
   });
   return result;
 }
