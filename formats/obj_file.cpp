@@ -4,10 +4,10 @@
 // deformed state; its length stays.
 #include <fmt/format.h>
 
-#include <Eigen/Geometry>
 #include <iterator>
 
 #include "formats/error.h"
+#include "formats/normal_change.h"
 #include "formats/obj_text.h"
 #include "formats/parallel.h"
 #include "formats/program.h"
@@ -15,22 +15,6 @@
 
 namespace flexel {
 namespace {
-
-// What the polygons that use one vn line did.
-struct NormalChange {
-  Vec3 rest = Vec3::Zero(), deformed = Vec3::Zero();  // summed area vectors
-  bool moved = false;
-};
-
-// Area vector of a polygon, doubled (Newell).
-template <class At>
-Vec3 area_vector(const std::vector<ObjCorner>& corners, const At& at) {
-  Vec3 area = Vec3::Zero();
-  const Vec3 origin = at(corners[0].vertex);
-  for (std::size_t i = 1; i + 1 < corners.size(); ++i)
-    area += (at(corners[i].vertex) - origin).cross(at(corners[i + 1].vertex) - origin);
-  return area;
-}
 
 std::string_view source_text(const DeformedSurface& deformed) {
   const Bytes& bytes = deformed.surface.sources[0].bytes;
@@ -42,10 +26,13 @@ void add_polygon(const DeformedSurface& deformed, const std::vector<ObjCorner>& 
   const std::vector<Vec3>&vertices = deformed.surface.vertices, &displacement = deformed.displacement;
   bool moved = false;
   for (const ObjCorner& corner : corners) moved = moved || displacement[corner.vertex] != Vec3::Zero();
-  const Vec3 rest = area_vector(corners, [&](std::int64_t v) { return vertices[v]; });
-  const Vec3 now =
-      moved ? area_vector(corners, [&](std::int64_t v) { return Vec3(vertices[v] + displacement[v]); })
-            : rest;
+  const Vec3 rest = area_vector(corners.size(), [&](std::size_t i) { return vertices[corners[i].vertex]; });
+  const Vec3 now = moved ? area_vector(corners.size(),
+                                       [&](std::size_t i) {
+                                         const std::int64_t v = corners[i].vertex;
+                                         return Vec3(vertices[v] + displacement[v]);
+                                       })
+                         : rest;
   for (const ObjCorner& corner : corners) {
     if (corner.normal == kNoIndex || corner.normal >= static_cast<std::int64_t>(changes.size())) continue;
     NormalChange& change = changes[corner.normal];
@@ -82,51 +69,22 @@ std::vector<NormalChange> normal_changes(const DeformedSurface& deformed) {
   return changes;
 }
 
-// Replaces numbers of a text, in order.
-class Rewriter {
- public:
-  Rewriter(std::string_view text, OutputFile& out) : text_(text), out_(out) {}
-  // Puts `value` where `word`, a piece of the text, is.
-  void replace(std::string_view word, const std::string& value) {
-    copy_to(static_cast<std::size_t>(word.data() - text_.data()));
-    out_.write(value);
-    done_ += word.size();
-  }
-  void copy_rest() { copy_to(text_.size()); }
-
- private:
-  void copy_to(std::size_t end) {
-    out_.write(text_.data() + done_, end - done_);
-    done_ = end;
-  }
-  std::string_view text_;
-  OutputFile& out_;
-  std::size_t done_ = 0;
-};
-
 void rewrite_vertex(const DeformedSurface& deformed, const ObjLine& line, std::size_t vertex,
                     Rewriter& rewriter) {
-  const SurfaceSource& source = deformed.surface.sources[0];
-  const Vec3 rest = parse_triple(line, source.file);
+  const Vec3 rest = parse_triple(line, deformed.surface.sources[0].file);
   std::string_view text = line.text;
   for (Eigen::Index i = 0; i < 3; ++i) {
     const std::string_view word = next_word(text);
-    const double displacement = deformed.displacement[vertex][i];
-    if (displacement == 0 && deformed.unit == source.unit) continue;
-    rewriter.replace(
-        word, fmt::format("{}", rest[i] * (source.unit / deformed.unit) + displacement / deformed.unit));
+    if (const auto value = deformed.rewritten(vertex, i, rest[i]))
+      rewriter.replace(word, fmt::format("{}", *value));
   }
 }
 
 void rewrite_normal(const NormalChange& change, const ObjLine& line, const std::string& file,
                     Rewriter& rewriter) {
-  constexpr double kNoTurn = 1e-12;  // rounding of a part that only moved along
-  const double size = change.rest.norm() * change.deformed.norm();
-  const bool turned_back = change.rest.dot(change.deformed) < 0;
-  const bool turns = turned_back || change.rest.cross(change.deformed).norm() > kNoTurn * size;
-  if (!change.moved || !turns || !(size > 0)) return;
-  const Vec3 turned =
-      Eigen::Quaterniond::FromTwoVectors(change.rest, change.deformed) * parse_triple(line, file);
+  const std::optional<Eigen::Quaterniond> rotation = turn(change);
+  if (!rotation) return;
+  const Vec3 turned = *rotation * parse_triple(line, file);
   std::string_view text = line.text;
   for (const double value : turned) rewriter.replace(next_word(text), fmt::format("{:.9g}", value));
 }

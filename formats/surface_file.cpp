@@ -3,6 +3,7 @@
 #include "formats/surface_file.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <Eigen/Geometry>
 #include <bit>
@@ -152,20 +153,29 @@ void write_stl_ascii(const DeformedSurface& deformed, OutputFile& out) {
 }
 
 SurfaceFormat surface_format(const std::string& format, const std::string& path, bool ascii) {
+  static const std::vector<std::string> kKnown = {"stl", "obj", "ply", "off", "glb"};
   const std::string asked = format.empty() ? extension(path) : format;
   if (asked == "stl") return ascii ? SurfaceFormat::stl_ascii : SurfaceFormat::stl_binary;
-  if (asked == "obj") {
-    if (ascii) throw InputError("--ascii is for STL only: OBJ is text as it is");
-    return SurfaceFormat::obj;
+  if (asked == "ply") return ascii ? SurfaceFormat::ply_ascii : SurfaceFormat::ply;
+  if (asked == "glb") {
+    if (ascii) throw InputError("--ascii is for STL and PLY only: GLB is binary");
+    return SurfaceFormat::glb;
+  }
+  if (asked == "obj" || asked == "off") {
+    if (ascii)
+      throw InputError(fmt::format("--ascii is for STL and PLY only: {} is text as it is",
+                                   asked == "obj" ? "OBJ" : "OFF"));
+    return asked == "obj" ? SurfaceFormat::obj : SurfaceFormat::off;
   }
   if (!format.empty())
-    throw InputError(fmt::format("unknown output format \"{}\": stl or obj{}", format,
-                                 did_you_mean(format, {"stl", "obj"})));
-  if (path == "-" || path.empty()) throw InputError("a pipe needs --format (stl or obj)");
+    throw InputError(fmt::format("unknown output format \"{}\": {}{}", format, fmt::join(kKnown, ", "),
+                                 did_you_mean(format, kKnown)));
+  if (path == "-" || path.empty())
+    throw InputError(fmt::format("a pipe needs --format ({})", fmt::join(kKnown, ", ")));
   if (asked.empty())
     throw InputError(path, "the name has no extension that tells the format: give --format (stl or obj)");
-  throw InputError(path, fmt::format("parts cannot be written as \"{}\": use .stl or .obj{}", asked,
-                                     did_you_mean(asked, {"stl", "obj"})));
+  throw InputError(path, fmt::format("parts cannot be written as \"{}\": use .{}{}", asked,
+                                     fmt::join(kKnown, ", ."), did_you_mean(asked, kKnown)));
 }
 
 void write_surface(const Surface& surface, const std::vector<Vec3>& displacement, SurfaceFormat format,
@@ -174,9 +184,13 @@ void write_surface(const Surface& surface, const std::vector<Vec3>& displacement
     throw std::invalid_argument("write_surface: a displacement per vertex is needed");
   const DeformedSurface deformed{surface, displacement, unit};
   check_finite(deformed, path);
-  OutputFile out(path, format == SurfaceFormat::stl_binary);
-  const bool same_lines =
-      surface.sources.size() == 1 && surface.sources[0].format == "obj" && !surface.sources[0].bytes.empty();
+  const bool binary =
+      format == SurfaceFormat::stl_binary || format == SurfaceFormat::ply || format == SurfaceFormat::glb;
+  OutputFile out(path, binary);
+  const auto from = [&](std::string_view source) {
+    return surface.sources.size() == 1 && surface.sources[0].format == source &&
+           !surface.sources[0].bytes.empty();
+  };
   switch (format) {
     case SurfaceFormat::stl_binary:
       write_stl_binary(deformed, out);
@@ -185,7 +199,20 @@ void write_surface(const Surface& surface, const std::vector<Vec3>& displacement
       write_stl_ascii(deformed, out);
       break;
     case SurfaceFormat::obj:
-      same_lines ? rewrite_obj(deformed, out) : write_new_obj(deformed, out);
+      from("obj") ? rewrite_obj(deformed, out) : write_new_obj(deformed, out);
+      break;
+    case SurfaceFormat::ply:
+      from("ply-binary") || from("ply-ascii") ? rewrite_ply(deformed, out)
+                                              : write_new_ply(deformed, false, out);
+      break;
+    case SurfaceFormat::ply_ascii:
+      from("ply-ascii") ? rewrite_ply(deformed, out) : write_new_ply(deformed, true, out);
+      break;
+    case SurfaceFormat::off:
+      from("off") ? rewrite_off(deformed, out) : write_new_off(deformed, out);
+      break;
+    case SurfaceFormat::glb:
+      from("glb") ? rewrite_glb(deformed, out) : write_new_glb(deformed, out);
       break;
   }
   out.commit();

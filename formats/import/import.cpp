@@ -3,6 +3,7 @@
 #include "formats/import.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cctype>
@@ -11,6 +12,7 @@
 #include "formats/body_file.h"
 #include "formats/error.h"
 #include "formats/import/readers.h"
+#include "formats/off.h"
 #include "formats/parallel.h"
 #include "formats/program.h"
 
@@ -18,7 +20,8 @@ namespace flexel {
 namespace {
 
 const std::vector<std::string>& known_formats() {
-  static const std::vector<std::string> names{"step", "stl", "obj"};
+  static const std::vector<std::string> names{"step", "iges", "brep", "stl", "obj",
+                                              "ply",  "off",  "glb",  "3mf"};
   return names;
 }
 
@@ -28,6 +31,7 @@ ImportInput load(const std::string& path) {
   const bool piped = path == "-";
   input.where = piped ? "stdin" : path;
   input.file = piped ? "stdin" : clean_name(std::filesystem::path(path).filename().string());
+  input.folder = piped ? "" : std::filesystem::path(path).parent_path().string();
   input.stem = piped ? "part" : clean_name(stem(path));
   return input;
 }
@@ -69,33 +73,83 @@ bool looks_like_obj(std::string_view text) {
   return false;
 }
 
+bool looks_like_brep(std::string_view text) {
+  constexpr std::string_view kBinary = "Open CASCADE Topology V";
+  return begins_with_word(text, "dbrep_drawableshape") || begins_with_word(text, "cascade topology v") ||
+         text.substr(0, kBinary.size() + 1).find(kBinary) != std::string_view::npos;
+}
+
+// The first line is 80 characters long: text, an S in column 73, and the number 1.
+bool looks_like_iges(std::string_view text) {
+  constexpr std::size_t kLetter = 72, kLine = 80;
+  if (text.size() < kLine || text[kLetter] != 'S') return false;
+  const std::string_view number = text.substr(kLetter + 1, kLine - kLetter - 1);
+  return number.find_first_not_of(" 0") == number.size() - 1 && number.back() == '1' &&
+         text.substr(0, kLine).find('\n') == std::string_view::npos;
+}
+
+// JSON that speaks of an asset somewhere near its beginning.
+bool looks_like_gltf(std::string_view text) {
+  return begins_with_word(text, "{") && text.find("\"asset\"") != std::string_view::npos;
+}
+
+// The format that an extension or --input-format stands for, "" for none.
+std::string format_named(const std::string& name) {
+  if (name == "stp" || name == "p21") return "step";
+  if (name == "igs") return "iges";
+  if (name == "brp") return "brep";
+  if (name == "gltf") return "glb";
+  const auto& known = known_formats();
+  return std::find(known.begin(), known.end(), name) == known.end() ? "" : name;
+}
+
+Surface read(const std::string& format, ImportInput& input, const ImportOptions& options) {
+  if (format == "step") return read_step(input, options);
+  if (format == "iges") return read_iges(input, options);
+  if (format == "brep") return read_brep(input, options);
+  if (format == "stl") return read_stl(input, options);
+  if (format == "obj") return read_obj(input, options);
+  if (format == "ply") return read_ply(input, options);
+  if (format == "off") return read_off(input, options);
+  if (format == "glb") return read_gltf(input, options);
+  return read_3mf(input, options);
+}
+
 std::string sniff(const ImportInput& input, const std::string& path) {
   const std::string_view text = beginning(input, 4096);
   if (begins_with_word(text, "iso-10303-21")) return "step";
+  if (text.starts_with("glTF")) return "glb";
+  if (text.starts_with("PK\x03\x04")) return "3mf";
+  if (text.starts_with("ply\n") || text.starts_with("ply\r")) return "ply";
   if (sized_like_binary_stl(input)) return "stl";
   if (looks_like_body(input.bytes))
     throw InputError(
         input.where,
         "is a body (a lattice), not a part: give it to flexel-simulate or flexel-map, or give a part "
-        "(STEP, STL, OBJ) here");
+        "(STEP, STL, OBJ, ...) here");
   if (begins_with_word(text, "solid")) return "stl";
-  const std::string suffix = path == "-" ? "" : extension(path);
-  if (suffix == "stp" || suffix == "step" || suffix == "p21") return "step";
-  if (suffix == "stl" || suffix == "obj") return suffix;
+  if (looks_like_off(text)) return "off";
+  if (looks_like_brep(text)) return "brep";
+  if (looks_like_iges(text)) return "iges";
+  const std::string suffix = format_named(path == "-" ? "" : extension(path));
+  if (!suffix.empty()) return suffix;
   if (looks_like_obj(text)) return "obj";
+  if (looks_like_gltf(text)) return "glb";
   throw InputError(input.where,
                    path == "-"
-                       ? "its bytes do not tell its format: say it with --input-format (step, stl or obj)"
-                       : "is in no format that can be read: a part comes as STEP, STL or OBJ");
+                       ? fmt::format("its bytes do not tell its format: say it with --input-format ({})",
+                                     fmt::join(known_formats(), ", "))
+                       : "is in no format that can be read: a part comes as STEP, IGES, BREP, STL, OBJ, PLY, "
+                         "OFF, glTF or 3MF");
 }
 
 std::string format_of(const ImportInput& input, const ImportOptions& options, const std::string& path) {
   if (!options.format) return sniff(input, path);
-  const std::string format = *options.format == "stp" ? "step" : *options.format;
-  const auto& known = known_formats();
-  if (std::find(known.begin(), known.end(), format) == known.end())
-    throw InputError(
-        fmt::format("unknown input format \"{}\": step, stl or obj{}", format, did_you_mean(format, known)));
+  const std::string format = format_named(*options.format);
+  if (format.empty())
+    throw InputError(fmt::format("unknown input format \"{}\": {}{}", *options.format,
+                                 fmt::join(known_formats(), ", "),
+                                 did_you_mean(*options.format, known_formats())));
   return format;
 }
 
@@ -114,7 +168,7 @@ HashedSurface read_and_hash(ImportInput& input, const std::string& format, const
     return result;
   }
   result.hash = content_hash(input.bytes);
-  result.surface = format == "step" ? read_step(input, options) : read_obj(input, options);
+  result.surface = read(format, input, options);
   return result;
 }
 

@@ -83,10 +83,7 @@ Surface read_obj(ImportInput& input, const ImportOptions& options) {
   Surface surface = std::move(scan.surface);
   if (surface.polygon_count() == 0)
     throw InputError(input.where, "holds no faces (f lines): is it an OBJ file with a surface?");
-  for (const std::uint32_t vertex : surface.polygon_vertices)
-    if (vertex >= surface.vertices.size())
-      throw InputError(input.where, fmt::format("a face names vertex {}, but there are only {}",
-                                                std::uint64_t{vertex} + 1, surface.vertices.size()));
+  check_indices(surface, input);
   surface.sources.push_back(unitless_source("obj", options));
   for (Vec3& vertex : surface.vertices) vertex *= surface.sources[0].unit;
   surface.parts.push_back({""});

@@ -1,8 +1,12 @@
 // Faces of meshes without groups, names, units: what several readers need.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cctype>
 #include <map>
+#include <set>
 
+#include "formats/error.h"
 #include "formats/import/readers.h"
 #include "formats/topology.h"
 
@@ -27,6 +31,34 @@ void assign_dihedral_faces(Surface& surface, const std::vector<std::uint32_t>& p
     }
     surface.polygon_face[p] = region_face[region];
   }
+}
+
+void assign_group_faces(Surface& surface, const std::vector<std::uint32_t>& polygon_part,
+                        const std::vector<std::uint32_t>& polygon_group,
+                        const std::vector<std::string>& group_names,
+                        const std::vector<std::uint32_t>& welded) {
+  std::vector<std::set<std::uint32_t>> groups(surface.parts.size());
+  for (std::size_t p = 0; p < polygon_group.size(); ++p) groups[polygon_part[p]].insert(polygon_group[p]);
+  assign_dihedral_faces(surface, polygon_part, welded);
+  // The groups' numbers come after those of the regions.
+  const std::size_t regions = surface.faces.size();
+  std::map<std::size_t, std::uint32_t> face_of;
+  std::vector<SurfaceFace> faces;
+  for (std::size_t p = 0; p < polygon_group.size(); ++p) {
+    const bool grouped = groups[polygon_part[p]].size() > 1;
+    const std::size_t key = grouped ? regions + polygon_group[p] : surface.polygon_face[p];
+    const auto [face, added] = face_of.emplace(key, static_cast<std::uint32_t>(faces.size()));
+    if (added) faces.push_back({grouped ? group_names[polygon_group[p]] : "", polygon_part[p]});
+    surface.polygon_face[p] = face->second;
+  }
+  surface.faces = std::move(faces);
+}
+
+void check_indices(const Surface& surface, const ImportInput& input) {
+  for (const std::uint32_t vertex : surface.polygon_vertices)
+    if (vertex >= surface.vertices.size())
+      throw InputError(input.where, fmt::format("a face names vertex {}, but there are only {}",
+                                                std::uint64_t{vertex} + 1, surface.vertices.size()));
 }
 
 namespace {

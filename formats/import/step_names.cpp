@@ -1,5 +1,7 @@
 // A solid's name is that of the smallest product it is in, where it is alone there; else its own. Both are
 // found from the entities that OpenCASCADE made shapes of.
+#include <Quantity_Color.hxx>
+#include <STEPConstruct_Styles.hxx>
 #include <STEPControl_Reader.hxx>
 #include <StepBasic_Product.hxx>
 #include <StepBasic_ProductDefinition.hxx>
@@ -7,6 +9,8 @@
 #include <StepRepr_RepresentationItem.hxx>
 #include <StepShape_Face.hxx>
 #include <StepShape_SolidModel.hxx>
+#include <StepVisual_Colour.hxx>
+#include <StepVisual_StyledItem.hxx>
 #include <TCollection_HAsciiString.hxx>
 #include <TopExp_Explorer.hxx>
 #include <TopoDS_Shape.hxx>
@@ -14,6 +18,8 @@
 #include <Transfer_TransientProcess.hxx>
 #include <XSControl_TransferReader.hxx>
 #include <XSControl_WorkSession.hxx>
+#include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "formats/import/readers.h"
@@ -45,6 +51,7 @@ void StepNames::add_product(const StepBasic_ProductDefinition& definition, const
 }
 
 StepNames::StepNames(const STEPControl_Reader& reader) {
+  add_colors(reader);
   const Handle(Transfer_TransientProcess) process = reader.WS()->TransferReader()->TransientProcess();
   for (Standard_Integer i = 1; i <= process->NbMapped(); ++i) {
     const Handle(Standard_Transient) entity = process->Mapped(i);
@@ -60,6 +67,33 @@ StepNames::StepNames(const STEPControl_Reader& reader) {
       own_.emplace(shape.TShape().get(),
                    name_of(Handle(StepRepr_RepresentationItem)::DownCast(entity)->Name()));
   }
+}
+
+// Styled items; of two that style one shape, the last, which overrides.
+void StepNames::add_colors(const STEPControl_Reader& reader) {
+  STEPConstruct_Styles styles(reader.WS());
+  if (!styles.LoadStyles()) return;
+  const Handle(Transfer_TransientProcess) process = reader.WS()->TransferReader()->TransientProcess();
+  for (Standard_Integer i = 1; i <= styles.NbStyles(); ++i) {
+    const Handle(StepVisual_StyledItem) style = styles.Style(i);
+    if (style.IsNull() || style->Item().IsNull()) continue;
+    Handle(StepVisual_Colour) surface, boundary, curve, render;
+    Standard_Real transparency = 0;
+    Standard_Boolean component = Standard_False;
+    if (!styles.GetColors(style, surface, boundary, curve, render, transparency, component)) continue;
+    Quantity_Color color;
+    if (surface.IsNull() || !STEPConstruct_Styles::DecodeColor(surface, color)) continue;
+    const TopoDS_Shape shape = TransferBRep::ShapeResult(process, style->Item());
+    if (shape.IsNull()) continue;
+    ShapeColor& values = color_[shape.TShape().get()];
+    color.Values(values[0], values[1], values[2], Quantity_TOC_sRGB);
+    for (double& value : values) value = std::clamp(std::round(value * 1e6) / 1e6, 0.0, 1.0);
+  }
+}
+
+std::optional<ShapeColor> StepNames::color(const TopoDS_Shape& shape) const {
+  const auto found = color_.find(shape.TShape().get());
+  return found == color_.end() ? std::nullopt : std::optional(found->second);
 }
 
 std::string StepNames::own(const TopoDS_Shape& shape) const {

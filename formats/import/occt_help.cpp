@@ -1,5 +1,5 @@
 // STEP is text between two fixed lines; a file that was cut off lacks the second.
-#include "formats/import/step_help.h"
+#include "formats/import/occt_help.h"
 
 #include <algorithm>
 

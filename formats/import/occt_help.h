@@ -1,4 +1,4 @@
-// What the STEP reader needs that has nothing to do with OpenCASCADE.
+// What the readers of OpenCASCADE's formats need that has nothing to do with OpenCASCADE.
 #pragma once
 #include <istream>
 #include <streambuf>
