@@ -10,6 +10,7 @@
 #include "formats/import.h"
 #include "formats/parallel.h"
 #include "formats/program.h"
+#include "formats/size_warning.h"
 #include "formats/surface_file.h"
 #include "formats/units.h"
 #include "mapping/map.h"
@@ -29,7 +30,9 @@ struct Arguments {
 };
 
 void declare_input(CLI::App& app, Arguments& arguments) {
-  app.add_option("part", arguments.parts, "STEP, STL or OBJ files; -: stdin")->required()->type_name("PART");
+  app.add_option("part", arguments.parts, "STEP, IGES, BREP, STL, OBJ, PLY, OFF, glTF or 3MF files; -: stdin")
+      ->required()
+      ->type_name("PART");
   app.add_option("--scene", arguments.scene, "Scene file (TOML; docs/scene.md)")->type_name("FILE");
   app.add_option("--fix", arguments.fixes,
                  "Hold this surface: \"xmin\", \"part/3\" (`flexel info` lists faces)")
@@ -62,9 +65,9 @@ void declare_output(CLI::App& app, Arguments& arguments) {
       ->type_name("FILE")
       ->required()
       ->allow_extra_args(false);
-  app.add_option("--format", arguments.format, "Format of what goes to stdout: stl or obj")
+  app.add_option("--format", arguments.format, "Format of what goes to stdout: stl, obj, ply, off or glb")
       ->type_name("NAME");
-  app.add_flag("--ascii", arguments.ascii, "Write ASCII STL");
+  app.add_flag("--ascii", arguments.ascii, "Write ASCII STL or PLY");
   app.add_option("--body", arguments.body, "Write the deformed body (.vtu) too")->type_name("FILE");
   app.add_option("--method", arguments.method, "Mapping: affine or gram-schmidt")
       ->type_name("NAME")
@@ -231,6 +234,7 @@ void write_outputs(const Plan& plan, const Body& body, const MapResult& mapped, 
 int run_stages(const Arguments& arguments, Plan& plan, Progress& progress) {
   progress.stage("import");
   Surface surface = import_parts(arguments.parts, plan.import);
+  for (const std::string& line : size_warnings(surface)) progress.warn(line);
   VoxelizeResult voxels = voxelize(std::move(surface), plan.voxelize, progress);
   report(voxels, progress);
   Body& body = voxels.body;

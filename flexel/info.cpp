@@ -9,6 +9,8 @@
 #include "flexel/face_shape.h"
 #include "formats/import.h"
 #include "formats/program.h"
+#include "formats/progress.h"
+#include "formats/size_warning.h"
 #include "formats/topology.h"
 #include "formats/units.h"
 #include "voxelize/voxelize.h"
@@ -222,7 +224,9 @@ int info_command(int argc, char** argv) {
   std::string unit, edge;
   bool json = false;
   CLI::App app{"What a part is, and what a scene can name in it.", "flexel info"};
-  app.add_option("part", files, "STEP, STL or OBJ files; -: stdin")->required()->type_name("PART");
+  app.add_option("part", files, "STEP, IGES, BREP, STL, OBJ, PLY, OFF, glTF or 3MF files; -: stdin")
+      ->required()
+      ->type_name("PART");
   app.add_flag("--json", json, "As JSON, in SI units (docs/info.md)");
   app.add_option("--unit", unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
   app.add_option("--edge", edge, "STEP: split the mesh to this longest edge (default: not split)")
@@ -238,6 +242,8 @@ int info_command(int argc, char** argv) {
   }
   Surface surface = import_surface(files.front(), options);
   for (std::size_t f = 1; f < files.size(); ++f) append(surface, import_surface(files[f], options));
+  Progress progress("flexel", Progress::Mode::quiet);
+  for (const std::string& line : size_warnings(surface)) progress.warn(line);
   OutputFile out("-", false);
   out.write(json ? info_json(surface) : info_text(surface));
   out.commit();

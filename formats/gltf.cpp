@@ -367,7 +367,7 @@ bool has_triangles(const GltfJson& primitive, const std::string& where) {
 }
 
 double linear_to_srgb(double linear) {
-  return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
+  return linear <= 0.0031308 ? 12.92 * linear : std::min(1.0, 1.055 * std::pow(linear, 1 / 2.4) - 0.055);
 }
 
 double srgb_to_linear(double srgb) {

@@ -9,15 +9,17 @@
 namespace flexel {
 
 struct ImportOptions {
-  std::optional<double> unit;  // metres per file unit, for formats that carry none (STL, OBJ); default mm
-  std::optional<std::string> format;  // "step", "stl", "obj": overrides sniffing
+  std::optional<double> unit;  // metres per file unit, for formats that carry none (STL, OBJ, PLY, OFF,
+                               // BREP); default mm
+  std::optional<std::string> format;  // "step", "iges", "brep", "stl", "obj", "ply", "off",
+                                      // "glb" (glTF too), "3mf": overrides sniffing
   // STEP tessellation: largest distance [m] of the triangles from the CAD surface, and largest angle [rad]
   // between neighbouring normals. No deflection given: a thousandth of the part's diagonal.
   std::optional<double> deflection;
   double angular_deflection = 0.35;
   // STEP: the tessellation is then split until no edge is longer than this [m], so that flat faces can bend
   // too. Not given: a 64th of each solid's diagonal, or what 2 million triangles for the file allow; given,
-  // more triangles than that are an error. Meshes (STL, OBJ) are the user's and are never split.
+  // more triangles than that are an error. Meshes (STL, OBJ, ...) are the user's and are never split.
   std::optional<double> largest_edge;
 };
 

@@ -102,17 +102,26 @@ class Words {
   std::size_t at_ = 0, line_ = 1;
 };
 
-// Lines with something on them.
-std::size_t count_lines(std::string_view text) {
-  std::size_t count = 0;
+// True where every vertex and every face has a line of its own.
+bool written_by_lines(std::string_view text, std::uint64_t vertices, std::uint64_t faces) {
+  std::uint64_t lines = 0;
+  const std::string nowhere;
   while (!text.empty()) {
     const std::size_t end = std::min(text.find('\n'), text.size());
-    const std::string_view line = text.substr(0, end);
-    const auto first = std::find_if_not(line.begin(), line.end(), blank);
-    count += first != line.end() && *first != '#';
+    Words words(text.substr(0, end), nowhere);
     text.remove_prefix(std::min(end + 1, text.size()));
+    const std::string_view first = words.next();
+    if (first.empty()) continue;
+    std::uint64_t needed = 3;
+    if (lines++ >= vertices) {
+      const auto [stop, error] = std::from_chars(first.data(), first.data() + first.size(), needed);
+      if (error != std::errc{} || stop != first.data() + first.size()) return false;
+      ++needed;
+    }
+    for (std::uint64_t found = 1; found < needed; ++found)
+      if (words.next().empty()) return false;
   }
-  return count;
+  return lines == vertices + faces;
 }
 
 Kind read_keyword(Words& words, const std::string& where) {
@@ -192,7 +201,7 @@ OffFile parse_off(std::string_view text, const std::string& where) {
   if (vertices > words.rest().size() / 5 || faces > words.rest().size() / 7 + 1)
     throw InputError(where,
                      fmt::format("is cut off: it announces {} vertices and {} faces", vertices, faces));
-  const bool by_lines = count_lines(words.rest()) == vertices + faces;
+  const bool by_lines = written_by_lines(words.rest(), vertices, faces);
   OffFile file;
   file.positions.reserve(vertices);
   for (std::uint64_t v = 0; v < vertices; ++v) {

@@ -28,11 +28,13 @@ struct SurfacePart {
 // Where the surface came from, and what is needed to write the same file again.
 struct SurfaceSource {
   std::string file;         // name as given, without folders; "stdin" for a pipe
-  std::string format;       // "stl-binary", "stl-ascii", "obj", "step"
+  std::string format;       // "stl-binary", "stl-ascii", "obj", "ply-binary", "ply-ascii", "off", "glb"
+                            // (glTF too), "3mf", "step", "iges", "brep"
   double unit = 1e-3;       // metres per unit of the file's coordinates
   bool unit_given = false;  // the file itself or the user said so (else the default, mm, was assumed)
   std::uint64_t hash = 0;   // content_hash of the file
-  Bytes bytes;              // the file itself, for formats whose lines are kept (OBJ); else empty
+  Bytes bytes;  // the file itself, for formats that are written again from it (OBJ, PLY, OFF, glTF,
+                // as one GLB); else empty
   std::vector<std::byte> stl_header;  // the 80 bytes of a binary STL's header; else empty
 };
 

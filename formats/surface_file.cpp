@@ -172,8 +172,7 @@ SurfaceFormat surface_format(const std::string& format, const std::string& path,
                                  did_you_mean(format, kKnown)));
   if (path == "-" || path.empty())
     throw InputError(fmt::format("a pipe needs --format ({})", fmt::join(kKnown, ", ")));
-  if (asked.empty())
-    throw InputError(path, "the name has no extension that tells the format: give --format (stl or obj)");
+  if (asked.empty()) throw InputError(path, "the name has no extension that tells the format: give --format");
   throw InputError(path, fmt::format("parts cannot be written as \"{}\": use .{}{}", asked,
                                      fmt::join(kKnown, ", ."), did_you_mean(asked, kKnown)));
 }

@@ -25,9 +25,10 @@ void declare(CLI::App& app, Arguments& arguments) {
       ->type_name("NAME")
       ->capture_default_str();
   app.add_option("--report", arguments.report, "Write the validity report as JSON")->type_name("FILE");
-  app.add_option("--format", arguments.format, "stl or obj; else told by the output's extension")
+  app.add_option("--format", arguments.format,
+                 "stl, obj, ply, off or glb; else told by the output's extension")
       ->type_name("NAME");
-  app.add_flag("--ascii", arguments.ascii, "Write an ASCII STL");
+  app.add_flag("--ascii", arguments.ascii, "Write an ASCII STL or PLY");
   app.add_option("--unit", arguments.unit, "Unit of the coordinates written; else that of the input")
       ->type_name("UNIT");
   app.add_flag("--strict", arguments.strict,
@@ -52,6 +53,8 @@ int run(int argc, char** argv) {
   const MapOptions options{map_method(arguments.method)};
   const SurfaceFormat format = surface_format(arguments.format, arguments.output, arguments.ascii);
   const double unit = arguments.unit.empty() ? 0 : length_unit(arguments.unit);
+  if (unit > 0 && format == SurfaceFormat::glb)
+    throw InputError("GLB has a unit of its own: leave out --unit");
   if (arguments.report == "-" && arguments.output == "-")
     throw InputError("the report and the surface cannot both go to stdout: give one of them a file");
   const ThreadLimit limit(arguments.threads);

@@ -8,6 +8,7 @@
 #include "formats/parallel.h"
 #include "formats/program.h"
 #include "formats/progress.h"
+#include "formats/size_warning.h"
 #include "formats/units.h"
 #include "voxelize/voxelize.h"
 
@@ -26,7 +27,8 @@ struct Arguments {
 };
 
 void declare(CLI::App& app, Arguments& arguments) {
-  app.add_option("PART", arguments.parts, "STEP, STL or OBJ files; - or none: standard input");
+  app.add_option("PART", arguments.parts,
+                 "STEP, IGES, BREP, STL, OBJ, PLY, OFF, glTF or 3MF files; - or none: stdin");
   app.add_option("--size", arguments.size, "spacing of the lattice, for example \"2 mm\"");
   app.add_option("--count", arguments.count, "or: about this many cells over all parts (default 20000)");
   app.add_option("--placement", arguments.placement, "elements at the voxels' corner (default) or centre");
@@ -43,8 +45,9 @@ void declare(CLI::App& app, Arguments& arguments) {
                  "STEP: largest distance of the triangles from the CAD surface");
   app.add_option("--edge", arguments.edge,
                  "STEP: longest edge of the triangles (default a 64th of the solid's diagonal)");
-  app.add_option("--input-format,--format", arguments.format,
-                 "format of the input (step, stl, obj) instead of what its bytes tell");
+  app.add_option(
+      "--input-format,--format", arguments.format,
+      "format of the input (step, iges, brep, stl, obj, ply, off, glb, 3mf) instead of what its bytes tell");
   app.add_option("--threads", arguments.threads, "threads; 0 (default): every core");
   app.add_flag("--compress", arguments.compress, "compress the arrays of the body file");
   app.add_flag("--quiet", arguments.quiet, "say warnings only");
@@ -136,6 +139,7 @@ int run(int argc, char** argv) {
   Progress progress(kName, arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
   progress.stage("import");
   Surface surface = import_all(arguments, import);
+  for (const std::string& line : size_warnings(surface)) progress.warn(line);
   const VoxelizeResult result = voxelize(std::move(surface), options, progress);
   report(result, progress);
   progress.stage("write");

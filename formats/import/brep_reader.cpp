@@ -6,10 +6,11 @@
 #include <BinTools.hxx>
 #include <TopoDS_Shape.hxx>
 #include <charconv>
+#include <ios>
+#include <sstream>
 
 #include "formats/error.h"
 #include "formats/import/occt.h"
-#include "formats/import/occt_help.h"
 #include "formats/import/readers.h"
 
 namespace flexel {
@@ -50,7 +51,9 @@ void check_tables(std::string_view text, const ImportInput& input) {
 
 Surface read_shape(ImportInput& input, const ImportOptions& options) {
   const std::string_view text(reinterpret_cast<const char*>(input.bytes.data()), input.bytes.size());
-  MemoryStream stream(input.bytes);
+  std::istringstream stream{std::string(text)};  // OpenCASCADE also seeks
+  // It reads on past the end without looking, some of it forever; so the stream throws there.
+  stream.exceptions(std::ios::failbit | std::ios::badbit);
   TopoDS_Shape shape;
   if (is_binary(text)) {
     BinTools::Read(shape, stream);
@@ -71,7 +74,11 @@ Surface read_shape(ImportInput& input, const ImportOptions& options) {
 }  // namespace
 
 Surface read_brep(ImportInput& input, const ImportOptions& options) {
-  return read_with_occt(input, [&] { return read_shape(input, options); });
+  try {
+    return read_with_occt(input, [&] { return read_shape(input, options); });
+  } catch (const std::ios_base::failure&) {
+    throw InputError(input.where, "is cut off or damaged: numbers are missing in it");
+  }
 }
 
 }  // namespace flexel

@@ -1,0 +1,16 @@
+// Parts of a size that hardly any part has: their file's unit was likely another.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "formats/surface.h"
+
+namespace flexel {
+
+constexpr double kSuspiciouslySmall = 1e-4, kSuspiciouslyLarge = 100;  // m, largest extent
+
+// A line for every file whose largest part is smaller or larger than that; it names the unit in which the
+// part would be nearest to the size of a hand, and what to do.
+[[nodiscard]] std::vector<std::string> size_warnings(const Surface& surface);
+
+}  // namespace flexel
