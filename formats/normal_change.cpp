@@ -1,3 +1,4 @@
+// Normals turn as the area vectors of the polygons around them do.
 #include "formats/normal_change.h"
 
 namespace flexel {

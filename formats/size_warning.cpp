@@ -1,3 +1,4 @@
+// Sizes of parts against what people make, and the unit that would bring them there.
 #include "formats/size_warning.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// ZIP archives through libzip, which only this file sees. Sizes are checked before they are believed.
 #include "formats/import/zip.h"
 
 #include <fmt/format.h>
