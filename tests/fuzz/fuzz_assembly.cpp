@@ -2,6 +2,7 @@
 // the model of a 3MF file, which is put into an archive here: mutated archives end at their checksums.
 #include <filesystem>
 
+#include "formats/error.h"
 #include "formats/import.h"
 #include "formats/surface_file.h"
 #include "tests/formats/make_files.h"
@@ -59,7 +60,7 @@ constexpr const char* kModel =
     "objectid=\"2\"/></build>"
     "</model>";
 
-void read(const std::string& path) {
+void read_mutant(const std::string& path) {
   const Bytes bytes = read_all(path);
   ImportOptions options;
   options.format = "glb";
@@ -101,5 +102,5 @@ int main(int argc, char** argv) {
   const std::vector<Bytes> corpus = {fuzz::bytes_of(text),
                                      fuzz::bytes_of(test::glb(tables() + "}]}", buffer())),
                                      fuzz::bytes_of(kModel), fuzz::bytes_of(test::threemf(kModel))};
-  return fuzz::run(argc, argv, "fuzz_assembly", corpus, read);
+  return fuzz::run(argc, argv, "fuzz_assembly", corpus, read_mutant);
 }

@@ -1,6 +1,7 @@
 // Mutated PLY and OFF files, read and, moved, written again from their own bytes.
 #include <filesystem>
 
+#include "formats/error.h"
 #include "formats/import.h"
 #include "formats/surface_file.h"
 #include "tests/fuzz/driver.h"
