@@ -181,6 +181,7 @@ void write_surface(const Surface& surface, const std::vector<Vec3>& displacement
                    double unit, const std::string& path) {
   if (displacement.size() != surface.vertices.size())
     throw std::invalid_argument("write_surface: a displacement per vertex is needed");
+  if (names_parts(path)) return write_parts(surface, displacement, format, unit, path);
   const DeformedSurface deformed{surface, displacement, unit};
   check_finite(deformed, path);
   const bool binary =

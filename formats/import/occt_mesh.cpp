@@ -9,6 +9,7 @@
 #include <BRepMesh_IncrementalMesh.hxx>
 #include <BRep_Tool.hxx>
 #include <Bnd_Box.hxx>
+#include <Eigen/Geometry>
 #include <IMeshTools_Parameters.hxx>
 #include <Poly_PolygonOnTriangulation.hxx>
 #include <Poly_Triangulation.hxx>
@@ -22,6 +23,7 @@
 #include <TopoDS_Vertex.hxx>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <utility>
 
 #include "formats/disjoint_sets.h"
@@ -224,8 +226,19 @@ constexpr std::size_t kMostTriangles = 2'000'000;
 void refine(Surface& surface, std::size_t first_polygon, std::size_t solids, const ImportOptions& options,
             const ImportInput& input) {
   if (options.largest_edge) {
+    // A triangle without an edge above L has at most the area of the equilateral one: a bound from below.
+    double area = 0;
+    for (std::size_t p = first_polygon; p < surface.polygon_count(); ++p) {
+      const auto corners = surface.polygon(p);
+      area += (surface.vertices[corners[1]] - surface.vertices[corners[0]])
+                  .cross(surface.vertices[corners[2]] - surface.vertices[corners[0]])
+                  .norm() /
+              2;
+    }
+    const double most = std::sqrt(3.0) / 4 * *options.largest_edge * *options.largest_edge;
     const std::size_t left = kMostTriangles - std::min(kMostTriangles, first_polygon);
-    if (!subdivide(surface, first_polygon, *options.largest_edge, left))
+    if (area > most * static_cast<double>(left) ||
+        !subdivide(surface, first_polygon, *options.largest_edge, left))
       throw InputError(input.where, fmt::format("edges of at most {:g} mm would take more than {} triangles: "
                                                 "give a larger --edge",
                                                 *options.largest_edge / 1e-3, kMostTriangles));

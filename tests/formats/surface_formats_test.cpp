@@ -251,6 +251,22 @@ TEST(WriteSurface, RealFilesComeOutAsTheyWentIn) {
   }
 }
 
+TEST(WriteSurface, OneFileAPart) {
+  const Scratch scratch;
+  Surface surface = two_parts(scratch);
+  surface.parts[1].name = "left/arm";
+  write_surface(surface, bend(surface), SurfaceFormat::ply, 1e-3, scratch.path("out_{part}.ply"));
+  const Surface one = import_surface(scratch.path("out_one.ply")),
+                two = import_surface(scratch.path("out_left_arm.ply"));
+  EXPECT_EQ(one.vertices.size(), 4u);
+  EXPECT_EQ(two.vertex_columns.at("heat").values, (std::vector<double>{5, 6, 7, 8.5}));
+  EXPECT_EQ(two.polygon_vertices, one.polygon_vertices);
+  const std::vector<Vec3> motion = bend(surface);
+  for (std::size_t v = 0; v < 4; ++v)
+    EXPECT_NEAR((surface.vertices[4 + v] + motion[4 + v] - two.vertices[v]).norm(), 0, 1e-18);
+  EXPECT_FALSE(std::filesystem::exists(scratch.path("out_{part}.ply")));
+}
+
 TEST(SurfaceFormat, NewFormatsAreTold) {
   EXPECT_EQ(surface_format("", "a.ply", false), SurfaceFormat::ply);
   EXPECT_EQ(surface_format("ply", "-", true), SurfaceFormat::ply_ascii);
