@@ -93,7 +93,7 @@ void Tracer::intersect(std::span<const Ray> rays, std::span<Hit> hits) const {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  RTCRayHit16 packet;
+  RTCRayHit16 packet{};  // lanes without a ray hold numbers too
   for (std::size_t begin = 0; begin < rays.size(); begin += kPacket) {
     const std::size_t count = std::min(kPacket, rays.size() - begin);
     Lanes lanes;
@@ -115,7 +115,7 @@ void Tracer::intersect(std::span<const Ray> rays, std::span<Hit> hits) const {
 void Tracer::occluded(std::span<const Ray> rays, std::span<std::uint8_t> blocked) const {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  RTCRay16 packet;
+  RTCRay16 packet{};
   for (std::size_t begin = 0; begin < rays.size(); begin += kPacket) {
     const std::size_t count = std::min(kPacket, rays.size() - begin);
     Lanes lanes;
