@@ -1,6 +1,9 @@
 // CGAL's hole filling and alpha wrapping.
 #include "voxelize/heal_cgal.h"
 
+#include <CGAL/AABB_traits.h>
+#include <CGAL/AABB_tree.h>
+#include <CGAL/AABB_triangle_primitive.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Polygon_mesh_processing/triangulate_hole.h>
 #include <CGAL/Surface_mesh.h>
@@ -50,6 +53,36 @@ PartMesh alpha_wrap(const PartMesh& mesh, double alpha, double offset) {
   }
   number_edges(result);
   return result;
+}
+
+struct RayCaster::Tree {
+  using Triangle = Kernel::Triangle_3;
+  using Primitive = CGAL::AABB_triangle_primitive<Kernel, std::vector<Triangle>::const_iterator>;
+  std::vector<Triangle> triangles;
+  CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>> tree;
+};
+
+RayCaster::RayCaster(const PartMesh& mesh) : tree_(std::make_unique<Tree>()) {
+  const std::vector<Point> points = points_of(mesh.world);
+  for (const Corners& c : mesh.corners)
+    tree_->triangles.emplace_back(points[c[0]], points[c[1]], points[c[2]]);
+  tree_->tree.rebuild(tree_->triangles.cbegin(), tree_->triangles.cend());
+}
+RayCaster::~RayCaster() = default;
+
+std::optional<RayCaster::Hit> RayCaster::first(const Vec3& from, const Vec3& unit_direction,
+                                               std::uint32_t own) const {
+  const Point origin(from.x(), from.y(), from.z());
+  const Kernel::Ray_3 ray(origin,
+                          Kernel::Vector_3(unit_direction.x(), unit_direction.y(), unit_direction.z()));
+  const auto number = [&](const auto& id) {
+    return static_cast<std::uint32_t>(id - tree_->triangles.cbegin());
+  };
+  const auto met = tree_->tree.first_intersection(ray, [&](const auto& id) { return number(id) == own; });
+  if (!met) return std::nullopt;
+  const Point* point = boost::get<Point>(&met->first);
+  if (point == nullptr) return std::nullopt;  // along the triangle
+  return Hit{std::sqrt(CGAL::squared_distance(origin, *point)), number(met->second)};
 }
 
 }  // namespace flexel

@@ -1,6 +1,7 @@
 // What CGAL does for healing; heal_cgal.cpp alone sees it.
 #pragma once
-#include <span>
+#include <memory>
+#include <optional>
 #include <vector>
 
 #include "voxelize/part_mesh.h"
@@ -14,5 +15,23 @@ namespace flexel {
 // A closed surface around the triangles, from outside, through no opening narrower than `alpha` [m], `offset`
 // [m] off them (Portaneri et al., "Alpha wrapping with an offset", 2022). Its triangles have no polygon.
 [[nodiscard]] PartMesh alpha_wrap(const PartMesh& mesh, double alpha, double offset);
+
+// Rays against a mesh's triangles (world coordinates), which must stay.
+class RayCaster {
+ public:
+  struct Hit {
+    double distance = 0;  // m
+    std::uint32_t triangle = 0;
+  };
+  explicit RayCaster(const PartMesh& mesh);
+  ~RayCaster();
+  // The first triangle but `own` that the ray meets.
+  [[nodiscard]] std::optional<Hit> first(const Vec3& from, const Vec3& unit_direction,
+                                         std::uint32_t own) const;
+
+ private:
+  struct Tree;
+  std::unique_ptr<Tree> tree_;
+};
 
 }  // namespace flexel

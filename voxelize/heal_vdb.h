@@ -1,7 +1,9 @@
 // What OpenVDB does for healing; heal_vdb.cpp alone sees it.
 #pragma once
 #include <memory>
+#include <string>
 
+#include "formats/body.h"
 #include "voxelize/samples.h"
 
 namespace flexel {
@@ -24,5 +26,12 @@ class SampleDistances {
   struct Grid;
   std::unique_ptr<Grid> grid_;
 };
+
+// Writes OpenVDB grids of a body with cells, two for each part: "fill_NAME", the fill of the voxels (index
+// (i, j, k) is the voxel's centre, with the lattice's transform; pieces of one voxel add up), and
+// "distance_NAME", a level set of the part's surface [m, negative inside] to three voxels from it, on cubic
+// voxels of the lattice's least spacing with its axes and origin (the lattice's own transform where it is
+// cubic). Inside is where the fill is a half or more. Throws InputError for a body without cells.
+void write_vdb(const Body& body, const std::string& path);
 
 }  // namespace flexel

@@ -10,6 +10,7 @@
 #include "formats/progress.h"
 #include "formats/size_warning.h"
 #include "formats/units.h"
+#include "voxelize/heal_vdb.h"
 #include "voxelize/voxelize.h"
 
 namespace flexel {
@@ -20,7 +21,7 @@ constexpr const char* kName = "flexel-voxelize";
 struct Arguments {
   std::vector<std::string> parts;
   std::string size, placement = "corner", unit, align = "snap", heal = "auto", material, max_memory,
-                    deflection, edge, format, output = "-";
+                    deflection, edge, format, vdb, output = "-";
   std::optional<long long> count;
   int threads = 0;
   bool compress = false, quiet = false;
@@ -51,6 +52,7 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_option("--threads", arguments.threads, "threads; 0 (default): every core");
   app.add_flag("--compress", arguments.compress, "compress the arrays of the body file");
   app.add_flag("--quiet", arguments.quiet, "say warnings only");
+  app.add_option("--vdb", arguments.vdb, "also write fill and distance as OpenVDB grids to this file");
   app.add_option("-o,--output", arguments.output, "body file (.vtu); - or none: standard output");
 }
 
@@ -135,6 +137,8 @@ int run(int argc, char** argv) {
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   const VoxelizeOptions options = voxelize_options(arguments);
   const ImportOptions import = import_options(arguments);
+  if (!arguments.vdb.empty() && options.placement != Placement::corner)
+    throw InputError("--vdb: centre placement has no cells; use --placement corner");
   const ThreadLimit threads(arguments.threads);
   Progress progress(kName, arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
   progress.stage("import");
@@ -143,6 +147,7 @@ int run(int argc, char** argv) {
   const VoxelizeResult result = voxelize(std::move(surface), options, progress);
   report(result, progress);
   progress.stage("write");
+  if (!arguments.vdb.empty()) write_vdb(result.body, arguments.vdb);
   write_body(result.body, arguments.output, {.compress = arguments.compress});
   progress.finish();
   return kExitDone;

@@ -1,0 +1,27 @@
+"""OpenVDB's own vdb_print opens what `flexel-voxelize --vdb` writes."""
+
+import re
+
+from harness import box, expect, expect_error, expect_ok, main, need, run
+
+
+def test_vdb_print_opens_fill_and_distance():
+    need("vdb_print")
+    box()
+    expect_ok(run("flexel-voxelize", "box.stl", "--size", "1 mm", "--vdb", "box.vdb", "-o", "box.vtu"))
+    shown = expect_ok(run("vdb_print", "-l", "box.vdb")).out.decode()
+    for name in ("fill_box", "distance_box"):
+        expect(name in shown, f"{name} wanted:\n{shown}")
+    expect(re.search(r"Voxel Size:.*0\.001", shown), f"voxels of 1 mm wanted:\n{shown}")
+    # 40 x 10 x 10 cells, each full
+    expect(re.search(r"4,?000 active", shown) or "4000" in shown.replace(",", ""), f"4000 active voxels wanted:\n{shown}")
+
+
+def test_centre_placement_has_no_cells():
+    box()
+    expect_error(run("flexel-voxelize", "box.stl", "--size", "1 mm", "--placement", "centre", "--vdb", "box.vdb", "-o", "box.vtu"),
+                 "flexel-voxelize", "--vdb", "centre placement")
+
+
+if __name__ == "__main__":
+    main(globals())

@@ -1,0 +1,29 @@
+"""The command that writes docs/parts.md: every real part ends in a lattice or is refused with one line."""
+
+import pathlib
+import sys
+
+from harness import BIN, PARTS, SOURCE, Skip, expect, expect_ok, main, run
+
+
+def test_every_part_ends_in_a_lattice_or_in_one_line():
+    if not PARTS.is_dir():
+        raise Skip(f"{PARTS} is not there")
+    expect_ok(run(sys.executable, SOURCE / "tools/parts-table", "--bin", BIN, "--parts", PARTS, "--count", "2000", "-o", "parts.md", timeout=280))
+    rows = [line.split(" | ") for line in pathlib.Path("parts.md").read_text().splitlines() if line.startswith("| ")][1:]
+    said = {row[0].removeprefix("| "): row[1] + ": " + row[2] for row in rows}
+    expected = {
+        "foot_structure.STL": "140 open edges closed by welding",
+        "angle_block.STL": "166 open edges closed by welding",
+        "multibody.stl": "inside out and turned",
+        "planar-geom-03.stl": "refused (exit 2)",
+        "conrod.stl": "shells interpenetrate",
+        "openscad-nonmanifold-crash.obj": "cells",
+        "yarn_guide.stl": "cells",
+    }
+    for file, words in expected.items():
+        expect(words in said[file], f"{file}: \"{words}\" wanted: {said[file]}")
+
+
+if __name__ == "__main__":
+    main(globals())
