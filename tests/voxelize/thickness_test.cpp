@@ -25,7 +25,9 @@ TEST(Thickness, OfAForkIsThatOfItsLeaves) {
   const Mesh mesh = fork(.1, .3, .4, 1);
   const std::vector<double> thickness = vertex_thickness(surface(mesh));
   for (std::size_t v = 0; v < thickness.size(); ++v) {
-    if (mesh.vertices[v].x() > .9) EXPECT_NEAR(thickness[v], .1, 1e-9);
+    if (mesh.vertices[v].x() > .9) {
+      EXPECT_NEAR(thickness[v], .1, 1e-9);
+    }
   }
 }
 
