@@ -30,7 +30,7 @@ void heal_automatically(HealedPart& part) {
   done.degenerate_facets = mesh.degenerate_triangles;
   done.open_edges = mesh.open_edges;
   const std::size_t triangles = mesh.corners.size();
-  if (!mesh.balanced() || mesh.crowded_edges > 0) {
+  if (!mesh.balanced()) {
     part.original = mesh;
     if (mesh.crowded_edges > 0) done.duplicate_facets = drop_duplicates(mesh);
     const std::size_t degenerate = mesh.degenerate_triangles;
@@ -134,6 +134,11 @@ std::string why_undecided(const HealedPart& part, const std::string& name) {
         "try "
         "--heal wrap",
         name, edges, human_length(largest->width), place(largest->centre));
+  if (part.mesh.open_edges == 0)
+    return fmt::format(
+        "part \"{}\": inside cannot be told from outside: no open edges, but {} edges whose triangles face ways that "
+        "do not fit together; repair it in a mesh program, or try --heal wrap",
+        name, human_count(part.mesh.unbalanced_edges));
   return fmt::format(
       "part \"{}\": inside cannot be told from outside: {}, and lines, flood and winding numbers disagree "
       "about what "
