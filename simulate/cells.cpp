@@ -68,6 +68,16 @@ void add_cell_row(const CellKind& kind, const PreparedCell& cell, double fill, s
   }
 }
 
+void add_spring_row(const SpringKind& kind, const CellVectors& u, double fill, std::size_t a, bool project,
+                    const std::array<std::uint16_t, 64>& slot, Block* row) {
+  for (const Spring& spring : kind.springs) {
+    if (spring.a != a && spring.b != a) continue;
+    const Block block = fill * spring_block(spring, u, project);
+    row[slot[9 * a]] += block;
+    row[slot[8 * a + (spring.a == a ? spring.b : spring.a)]] -= block;
+  }
+}
+
 struct Smallest {
   double value = std::numeric_limits<double>::infinity();
   std::uint32_t cell = 0, corner = 0;
@@ -99,6 +109,10 @@ Cells::Cells(const Setting& setting, const Stencil& stencil)
       part_(cell_parts(setting.body)) {
   for (std::size_t p = 0; p < body_.parts.size(); ++p)
     kinds_.push_back(cell_kind(body_.parts[p].lattice, setting.materials[p]));
+  springs_.resize(body_.parts.size());
+  for (std::size_t p = 0; p < setting.models.size(); ++p)
+    if (setting.models[p] == Model::springs)
+      springs_[p] = spring_kind(body_.parts[p].lattice, setting.materials[p]);
 }
 
 CellVectors Cells::corner_values(std::uint32_t cell, const std::vector<Vec3>& values) const {
@@ -113,7 +127,12 @@ double Cells::energy(const State& state) const {
       [&](std::size_t c) {
         if (!active_[c]) return 0.0;
         const auto cell = static_cast<std::uint32_t>(c);
-        return body_.fill[c] * cell_energy(kinds_[part_[c]], corner_values(cell, state.displacement));
+        const CellVectors u = corner_values(cell, state.displacement);
+        if (!springs_[part_[c]]) return body_.fill[c] * cell_energy(kinds_[part_[c]], u);
+        // Springs alone would let a cell turn inside out and stay so.
+        if (!(volume_change(displacement_gradient(kinds_[part_[c]], u)) > -1))
+          return std::numeric_limits<double>::infinity();
+        return body_.fill[c] * cell_energy(*springs_[part_[c]], u);
       },
       kGrain);
 }
@@ -124,8 +143,9 @@ void Cells::add_forces(const State& state, std::vector<Vec3>& forces) {
       body_.cell_count(),
       [&](std::size_t c) {
         if (!active_[c]) return;
-        corner_force_[c] =
-            cell_forces(kinds_[part_[c]], corner_values(static_cast<std::uint32_t>(c), state.displacement));
+        const CellVectors u = corner_values(static_cast<std::uint32_t>(c), state.displacement);
+        const auto& springs = springs_[part_[c]];
+        corner_force_[c] = springs ? cell_forces(*springs, u) : cell_forces(kinds_[part_[c]], u);
         for (Vec3& force : corner_force_[c]) force *= body_.fill[c];
       },
       kGrain);
@@ -140,7 +160,7 @@ void Cells::set_stiffness(const State& state, const TangentOptions& tangent, Blo
   parallel_for_each(
       body_.cell_count(),
       [&](std::size_t c) {
-        if (!active_[c]) return;
+        if (!active_[c] || springs_[part_[c]]) return;
         const CellKind& kind = kinds_[part_[c]];
         const Mat3 gradient =
             displacement_gradient(kind, corner_values(static_cast<std::uint32_t>(c), state.displacement));
@@ -154,8 +174,12 @@ void Cells::set_stiffness(const State& state, const TangentOptions& tangent, Blo
         Block* row = matrix.values.data() + matrix.row_offsets[e];
         std::fill(row, matrix.values.data() + matrix.row_offsets[e + 1], Block::Zero());
         for (const Incidence& at : stencil_.of(static_cast<std::uint32_t>(e)))
-          add_cell_row(kinds_[part_[at.cell]], prepared[at.cell], body_.fill[at.cell], at.corner,
-                       stencil_.slot[at.cell], row);
+          if (springs_[part_[at.cell]])
+            add_spring_row(*springs_[part_[at.cell]], corner_values(at.cell, state.displacement),
+                           body_.fill[at.cell], at.corner, tangent.project, stencil_.slot[at.cell], row);
+          else
+            add_cell_row(kinds_[part_[at.cell]], prepared[at.cell], body_.fill[at.cell], at.corner,
+                         stencil_.slot[at.cell], row);
       },
       kGrain);
 }
@@ -165,7 +189,7 @@ std::vector<Mat3> Cells::predicted_stress(const State& state, const std::vector<
   parallel_for_each(
       body_.cell_count(),
       [&](std::size_t c) {
-        if (!active_[c]) return;
+        if (!active_[c] || springs_[part_[c]]) return;
         const auto cell = static_cast<std::uint32_t>(c);
         const CellKind& kind = kinds_[part_[c]];
         stress[c] = flexel::predicted_stress(

@@ -1,6 +1,10 @@
-// Model `cells` over a body: every unbroken cell resists by simulate/cell_model.h, scaled by its fill.
+// The cells of a body: every unbroken one resists by its part's model, simulate/cell_model.h or
+// simulate/spring_model.h, scaled by its fill.
 #pragma once
+#include <optional>
+
 #include "simulate/cell_model.h"
+#include "simulate/spring_model.h"
 #include "simulate/state.h"
 #include "simulate/stiffness.h"
 
@@ -47,10 +51,11 @@ class Cells {
 
   const Body& body_;
   const Stencil& stencil_;
-  std::vector<std::uint8_t> active_;       // (cells) 1: resists
-  std::vector<std::uint32_t> part_;        // (cells)
-  std::vector<CellKind> kinds_;            // (parts)
-  std::vector<CellVectors> corner_force_;  // (cells) scratch: forces of a cell on its elements
+  std::vector<std::uint8_t> active_;                // (cells) 1: resists
+  std::vector<std::uint32_t> part_;                 // (cells)
+  std::vector<CellKind> kinds_;                     // (parts)
+  std::vector<std::optional<SpringKind>> springs_;  // (parts) of model springs
+  std::vector<CellVectors> corner_force_;           // (cells) scratch: forces of a cell on its elements
 };
 
 // Cells that resist: not broken, not stray.

@@ -3,6 +3,7 @@
 
 #include "formats/error.h"
 #include "formats/program.h"
+#include "formats/units.h"
 #include "simulate/scene.h"
 
 namespace flexel {
@@ -21,24 +22,44 @@ Material material_named(const Scene& scene, const std::string& name, const std::
   throw InputError(origin, fmt::format("no material \"{}\"{}", name, hint));
 }
 
+void refuse_uneven(const PartSettings& settings, const Part& part) {
+  const Vec3& h = part.lattice.spacing;
+  if (h.maxCoeff() <= (1 + 1e-6) * h.minCoeff()) return;
+  throw InputError(settings.origin,
+                   fmt::format("model \"springs\" needs cubic cells; those of part \"{}\" are {} x {} x {}: "
+                               "voxelize with --align none",
+                               part.name, human_length(h.x()), human_length(h.y()), human_length(h.z())));
+}
+
 void refuse_model(const PartSettings& settings, const Part& part) {
   if (part.placement != Placement::corner)
     throw InputError(settings.origin,
-                     fmt::format("model \"cells\" is not available for placement centre (part \"{}\"); "
+                     fmt::format("model \"{}\" is not available for placement centre (part \"{}\"); "
                                  "voxelize with --placement corner",
-                                 part.name));
+                                 settings.model, part.name));
   if (settings.model == "cells") return;
-  if (settings.model == "springs")
-    throw InputError(settings.origin, "model \"springs\" is not available in this version; use \"cells\"");
+  if (settings.model == "springs") return refuse_uneven(settings, part);
   if (settings.model == "paper")
-    throw InputError(
-        settings.origin,
-        fmt::format("model \"paper\" is not available for placement corner (part \"{}\")", part.name));
+    throw InputError(settings.origin,
+                     fmt::format("model \"paper\" needs elements at the voxels' centres (flexel-voxelize "
+                                 "--placement centre), which this version does not run; part \"{}\" can be "
+                                 "\"cells\" or \"springs\"",
+                                 part.name));
   throw InputError(settings.origin, fmt::format("no model \"{}\"{}", settings.model,
                                                 did_you_mean(settings.model, {"cells", "springs", "paper"})));
 }
 
 }  // namespace
+
+std::vector<Model> models_of_parts(const Scene& scene, const Body& body) {
+  std::vector<Model> models;
+  for (const Part& part : body.parts) {
+    const auto found = scene.parts.find(part.name);
+    const bool springs = found != scene.parts.end() && found->second.model == "springs";
+    models.push_back(springs ? Model::springs : Model::cells);
+  }
+  return models;
+}
 
 std::vector<Material> materials_of_parts(const Scene& scene, const Body& body) {
   std::vector<std::string> names;

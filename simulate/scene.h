@@ -13,6 +13,7 @@
 #include "simulate/effects/all.h"
 #include "simulate/materials.h"
 #include "simulate/scene_selection.h"
+#include "simulate/state.h"
 
 namespace flexel {
 
@@ -75,6 +76,7 @@ struct Scene {
 // The material of each part: that of [parts.NAME], else the scene's default, else the body's own. Throws
 // InputError: none (and what to write), an unknown name (with the nearest), a setting for a part that the
 // body does not have, a model or placement that cannot be run.
+[[nodiscard]] std::vector<Model> models_of_parts(const Scene& scene, const Body& body);  // cells by default
 [[nodiscard]] std::vector<Material> materials_of_parts(const Scene& scene, const Body& body);
 
 }  // namespace flexel

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <cmath>
 
 #include "formats/body_file.h"
 #include "formats/error.h"
@@ -30,6 +31,15 @@ void name_materials(Body& body, const std::vector<Material>& materials) {
   for (std::size_t p = 0; p < body.parts.size(); ++p) body.parts[p].material = materials[p].name;
 }
 
+void warn_of_poisson(const Setting& setting, Progress& progress) {
+  for (std::size_t p = 0; p < setting.models.size(); ++p)
+    if (const Material& material = setting.materials[p];
+        setting.models[p] == Model::springs && std::abs(material.poisson - 0.25) > 0.005)
+      progress.warn(
+          fmt::format("part \"{}\": model \"springs\" has Poisson's ratio 0.25, not the {:.3g} of {}",
+                      setting.body.parts[p].name, material.poisson, material.name));
+}
+
 void report_strays(const Fragments& fragments, SimulateResult& result, Progress& progress) {
   double volume = 0;
   std::size_t crumbs = 0;
@@ -47,7 +57,7 @@ void report_strays(const Fragments& fragments, SimulateResult& result, Progress&
 }
 
 void explain_before(const std::vector<Pass>& passes, Progress& progress) {
-  progress.say("plan: cells (model of every part), equilibrium by Newton's method");
+  progress.say("plan: cells (the parts' models), equilibrium by Newton's method");
   for (const Pass& pass : passes) progress.say(fmt::format("plan: {} ({})", pass.name, pass.why));
 }
 
@@ -153,7 +163,9 @@ std::string Run::save_failed(const Mechanics& mechanics) {
 
 SimulateResult Run::operator()() {
   SimulateResult result;
-  const Setting setting{body_, materials_of_parts(scene_, body_), stray_cells(fragments_)};
+  const Setting setting{body_, materials_of_parts(scene_, body_), stray_cells(fragments_),
+                        models_of_parts(scene_, body_)};
+  warn_of_poisson(setting, progress_);
   name_materials(body_, setting.materials);
   const std::vector<ProbePoints> probes = place_probes(scene_, body_, setting.stray_cell);
   std::vector<Pass> passes = Effects::passes(scene_.effects, setting);

@@ -13,12 +13,16 @@ struct State {
   double share = 1;                // of every load and move that acts now, in [0, 1] (load stepping)
 };
 
+// How a part resists.
+enum class Model { cells, springs };
+
 // What effects are made from. Refers to the body, which stays unchanged during a run.
 struct Setting {
   const Body& body;
   std::vector<Material> materials;  // (parts)
   std::vector<std::uint8_t>
       stray_cell;  // (cells) 1: of a loose crumb that nothing holds; it is carried along, not simulated
+  std::vector<Model> models = {};  // (parts); empty: cells
 };
 
 }  // namespace flexel

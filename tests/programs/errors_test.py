@@ -3,8 +3,8 @@
 import os
 import struct
 
-from harness import (SCENE, ascii_stl, binary_stl, body, box, box_triangles, bracket, expect_error, expect_only, main, run, scene,
-                     write)
+from harness import (SCENE, ascii_stl, binary_stl, body, box, box_triangles, bracket, expect, expect_error, expect_ok, expect_only, main,
+                     run, scene, write)
 
 
 def voxelize_refuses(part, *fragments):
@@ -12,6 +12,20 @@ def voxelize_refuses(part, *fragments):
     result = run("flexel-voxelize", part, "--size", "5 mm", "-o", "out.vtu")
     expect_error(result, "flexel-voxelize", *fragments)
     expect_only(*before)
+
+
+def test_models():
+    text = SCENE + '[parts.box]\nmodel = "{}"\n'
+    box()
+    expect_ok(run("flexel-voxelize", "box.stl", "--size", "5 mm", "--align", "none", "-o", "cubes.vtu"))
+    result = expect_ok(run("flexel-simulate", scene("springs.toml", text.format("springs")), "cubes.vtu", "-o", "bent.vtu"))
+    expect("Poisson's ratio 0.25" in result.err, f"no word on Poisson's ratio: {result}")
+    expect_error(run("flexel-simulate", scene("paper.toml", text.format("paper")), "cubes.vtu"), "flexel-simulate", "paper.toml",
+                 "--placement centre")
+    expect_error(run("flexel-simulate", scene("typo.toml", text.format("spings")), "cubes.vtu"), "flexel-simulate",
+                 'did you mean "springs"')
+    expect_ok(run("flexel-voxelize", "box.stl", "--size", "5 mm", "--placement", "centre", "-o", "centres.vtu"))
+    expect_error(run("flexel-simulate", "springs.toml", "centres.vtu"), "flexel-simulate", "--placement corner")
 
 
 def test_empty_file():

@@ -157,6 +157,9 @@ TEST(Materials, EachPartNeedsOne) {
   scene.parts["box"].material = "brass";
   EXPECT_EQ(materials_of_parts(scene, body)[0].name, "brass");
   scene.parts["box"].model = "springs";
+  EXPECT_EQ(materials_of_parts(scene, body)[0].name, "brass");
+  EXPECT_EQ(models_of_parts(scene, body)[0], Model::springs);
+  scene.parts["box"].model = "paper";
   EXPECT_THROW((void)materials_of_parts(scene, body), InputError);
   scene.parts.clear();
   scene.parts["bxo"].material = "brass";
