@@ -111,8 +111,8 @@ TEST(Beam, LargeDeflectionFollowsTheElastica) {
   EXPECT_LT(result.imbalance.norm(), 1e-6 * result.loads[0].force.norm());
 }
 
-// A plate held at two edges that bends by more than ten times its thickness: the membrane stresses of a linear
-// answer, which are not there in equilibrium, must not be in the way.
+// A plate held at two edges that bends by more than ten times its thickness: the membrane stresses of a
+// linear answer, which are not there in equilibrium, must not be in the way.
 TEST(Beam, PlateBendsFarPastItsThicknessInFewIterations) {
   testing::BoxOptions options;
   options.cells = {40, 40, 1};

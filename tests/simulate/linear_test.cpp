@@ -105,8 +105,8 @@ Eigen::VectorXd refined_solution(const VoxelProblem& problem) {
 }
 
 TEST(ConjugateGradients, AgreesWithADirectSolution) {
-  // Double precision cannot do better than its epsilon times the condition number: a contrast of 1e5 on top of
-  // slivers leaves 2e-10.
+  // Double precision cannot do better than its epsilon times the condition number: a contrast of 1e5 on top
+  // of slivers leaves 2e-10.
   for (const auto& [problem, tolerance] :
        {std::pair{beam(3000), 1e-10}, {plate(2000), 1e-10}, {awkward(), 1e-9}}) {
     Vector x;
