@@ -158,6 +158,17 @@ std::string header_lines(const std::vector<NewProperty>& properties) {
   return text;
 }
 
+// Which numbers of parts and faces a new file has: of parts where there are several, of faces where they came
+// with the file. Simple readers (meshio 5) take no face with more than its corners.
+struct Numbered {
+  explicit Numbered(const Surface& surface) : parts(surface.parts.size() > 1) {
+    for (const SurfaceFace& face : surface.faces) faces = faces || !face.name.empty();
+    for (const SurfaceSource& source : surface.sources)
+      faces = faces || source.format == "step" || source.format == "iges" || source.format == "brep";
+  }
+  bool parts, faces = false;
+};
+
 std::string new_header(const Surface& surface, bool ascii, const std::vector<NewProperty>& of_vertices,
                        const std::vector<NewProperty>& of_polygons) {
   std::string text = fmt::format("ply\nformat {} 1.0\ncomment Flexel {}\n",
@@ -171,10 +182,10 @@ std::string new_header(const Surface& surface, bool ascii, const std::vector<New
                           surface.faces[f].name);
   text += fmt::format("element vertex {}\nproperty double x\nproperty double y\nproperty double z\n{}",
                       surface.vertices.size(), header_lines(of_vertices));
-  text += fmt::format(
-      "element face {}\nproperty list uint uint vertex_indices\nproperty uint part\n"
-      "property uint face\n{}end_header\n",
-      surface.polygon_count(), header_lines(of_polygons));
+  const Numbered numbered(surface);
+  text += fmt::format("element face {}\nproperty list uint uint vertex_indices\n{}{}{}end_header\n",
+                      surface.polygon_count(), numbered.parts ? "property uint part\n" : "",
+                      numbered.faces ? "property uint face\n" : "", header_lines(of_polygons));
   return text;
 }
 
@@ -244,6 +255,7 @@ void write_new_ply(const DeformedSurface& deformed, bool ascii, OutputFile& out)
   const std::vector<NewProperty> of_vertices = new_properties(surface.vertex_columns, {"x", "y", "z"}),
                                  of_polygons = new_properties(surface.polygon_columns, {"part", "face"});
   const std::vector<std::uint32_t> numbers = face_numbers(surface);
+  const Numbered numbered(surface);
   out.write(new_header(surface, ascii, of_vertices, of_polygons));
   write_entries(surface.vertices.size(), ascii, out, [&](Numbers& entry, std::size_t v) {
     entry.add_position(deformed, v);
@@ -253,8 +265,8 @@ void write_new_ply(const DeformedSurface& deformed, bool ascii, OutputFile& out)
     const auto polygon = surface.polygon(p);
     entry.add(static_cast<double>(polygon.size()), PlyType::uint32);
     for (const std::uint32_t v : polygon) entry.add(v, PlyType::uint32);
-    entry.add(surface.polygon_part(p), PlyType::uint32);
-    entry.add(numbers[surface.polygon_face[p]], PlyType::uint32);
+    if (numbered.parts) entry.add(surface.polygon_part(p), PlyType::uint32);
+    if (numbered.faces) entry.add(numbers[surface.polygon_face[p]], PlyType::uint32);
     entry.add(of_polygons, p);
   });
 }

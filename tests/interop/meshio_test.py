@@ -110,5 +110,13 @@ def test_obj_is_read_with_its_vertices_in_order():
     expect(np.allclose(mesh.points, vertices, rtol=1e-6), "meshio reads other points")
 
 
+def test_new_ply_and_off_are_read():
+    expect_ok(run("flexel-voxelize", box(), "--size", "5 mm", "-o", "rest.vtu"))
+    for name in ["part.ply", "part.off"]:
+        expect_ok(run("flexel-map", "rest.vtu", "-o", name))
+        mesh = meshio.read(name)
+        expect(len(mesh.points) == 8 and len(mesh.cells_dict["triangle"]) == 12, f"meshio reads {mesh} from {name}")
+
+
 if __name__ == "__main__":
     main(globals())
