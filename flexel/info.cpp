@@ -11,8 +11,10 @@
 #include "formats/program.h"
 #include "formats/progress.h"
 #include "formats/size_warning.h"
+#include "formats/surface_file.h"
 #include "formats/topology.h"
 #include "formats/units.h"
+#include "voxelize/thickness.h"
 #include "voxelize/voxelize.h"
 
 namespace flexel {
@@ -217,11 +219,24 @@ std::string info_json(const Surface& surface) {
   return Json{{"files", files}}.dump(2) + "\n";
 }
 
+// The surface as a new PLY with the wall thickness at every vertex, in the unit of the coordinates; 0 where
+// there is none.
+void write_thickness(Surface surface, const std::string& path) {
+  const double unit = default_unit(surface);
+  std::vector<double> thickness = vertex_thickness(surface);
+  for (double& value : thickness) value = std::isfinite(value) ? value / unit : 0;
+  surface.vertex_columns["thickness"] = {1, std::move(thickness)};
+  for (SurfaceSource& source : surface.sources)
+    source.bytes = {};  // a new file, not the source's with other numbers
+  const std::vector<Vec3> still(surface.vertices.size(), Vec3::Zero());
+  write_surface(surface, still, SurfaceFormat::ply, unit, path);
+}
+
 }  // namespace
 
 int info_command(int argc, char** argv) {
   std::vector<std::string> files;
-  std::string unit, edge;
+  std::string unit, edge, thickness;
   bool json = false;
   CLI::App app{"What a part is, and what a scene can name in it.", "flexel info"};
   app.add_option("part", files, "STEP, IGES, BREP, STL, OBJ, PLY, OFF, glTF or 3MF files; -: stdin")
@@ -231,7 +246,12 @@ int info_command(int argc, char** argv) {
   app.add_option("--unit", unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
   app.add_option("--edge", edge, "STEP: split the mesh to this longest edge (default: not split)")
       ->type_name("LENGTH");
+  app.add_option("--thickness", thickness,
+                 "Also write the surface as PLY with the wall thickness at its vertices")
+      ->type_name("FILE.ply");
   if (!parse_arguments(app, argc, argv)) return kExitDone;
+  if (!thickness.empty() && extension(thickness) != "ply")
+    throw InputError("--thickness: the file must end in .ply");
   ImportOptions options;
   // Corners on chords would make the circles that are fitted to round faces too small.
   options.largest_edge = std::numeric_limits<double>::infinity();
@@ -244,6 +264,7 @@ int info_command(int argc, char** argv) {
   for (std::size_t f = 1; f < files.size(); ++f) append(surface, import_surface(files[f], options));
   Progress progress("flexel", Progress::Mode::quiet);
   for (const std::string& line : size_warnings(surface)) progress.warn(line);
+  if (!thickness.empty()) write_thickness(surface, thickness);
   OutputFile out("-", false);
   out.write(json ? info_json(surface) : info_text(surface));
   out.commit();
