@@ -1,8 +1,8 @@
 // The whole load is tried at once (or in the steps that the scene asks for), with full Newton steps. A load
-// step that fails is halved and tried again from the last equilibrium; from an eighth on it is tried with
-// steps that lower the energy too, which also pass a buckling or a snap. One that succeeds lets the next be
-// twice as long. The Newton iterations of a run are bounded: a scene without an equilibrium ends in the time
-// of some hundred linear solutions.
+// step that fails is halved and tried again from the last equilibrium; from a thirty-second on it is tried
+// with steps that lower the energy too, which also pass a buckling or a snap. One that succeeds lets the next
+// be twice as long. The Newton iterations of a run are bounded: a scene without an equilibrium ends in the
+// time of some hundred linear solutions.
 #include "simulate/equilibrium.h"
 
 #include <fmt/format.h>
@@ -19,7 +19,7 @@ namespace flexel {
 namespace {
 
 constexpr double kSmallestIncrement = 1.0 / 1024;  // of the first load step
-constexpr double kLoweringIncrement = 1.0 / 8;     // from this one on energy-lowering steps are tried too
+constexpr double kLoweringIncrement = 1.0 / 32;    // from this one on energy-lowering steps are tried too
 constexpr int kEasyIterations = 10;
 constexpr int kFullStepIterations = 20;
 constexpr int kIterations = 100;            // of Newton in a run, unless the scene says

@@ -23,7 +23,7 @@ where = {{ half_space = {{ point = [{high}], normal = [{up}] }} }}
 force = [{force}]
 """
 
-PRESSURE = 1e3  # Pa over the square of the longest side: a plate of PLA folds up under it
+PRESSURE = 1e3  # Pa over the square of the longest side: a thin plate of PLA folds up under it, and still has an equilibrium
 
 
 def bounding_box(name, unit):
