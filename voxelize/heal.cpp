@@ -136,7 +136,8 @@ std::string why_undecided(const HealedPart& part, const std::string& name) {
         name, edges, human_length(largest->width), place(largest->centre));
   if (part.mesh.open_edges == 0)
     return fmt::format(
-        "part \"{}\": inside cannot be told from outside: no open edges, but {} edges whose triangles face ways that "
+        "part \"{}\": inside cannot be told from outside: no open edges, but {} edges whose triangles face "
+        "ways that "
         "do not fit together; repair it in a mesh program, or try --heal wrap",
         name, human_count(part.mesh.unbalanced_edges));
   return fmt::format(

@@ -22,13 +22,13 @@ struct PartMesh {
   std::vector<Corners> edges;          // (triangles x 3) number of the edge (corner e, corner e + 1)
   std::vector<std::uint32_t> shell;    // (triangles) edge-connected shell, from 0 in order of first triangle
   std::uint32_t edge_count = 0, shell_count = 0;
-  std::size_t open_edges = 0;         // edges with an odd number of triangles
-  std::size_t crowded_edges = 0;      // edges with more than two triangles
-  std::size_t unbalanced_edges = 0;   // edges run more often one way than the other
+  std::size_t open_edges = 0;            // edges with an odd number of triangles
+  std::size_t crowded_edges = 0;         // edges with more than two triangles
+  std::size_t unbalanced_edges = 0;      // edges run more often one way than the other
   std::size_t degenerate_triangles = 0;  // left out: a corner repeats once equal positions are one
-  std::size_t flipped_triangles = 0;  // turned over by repair_orientation
-  std::size_t inverted_shells = 0;    // shells turned inside out by repair_orientation
-  bool cracks_closed = false;         // vertices within a tolerance were welded to close it
+  std::size_t flipped_triangles = 0;     // turned over by repair_orientation
+  std::size_t inverted_shells = 0;       // shells turned inside out by repair_orientation
+  bool cracks_closed = false;            // vertices within a tolerance were welded to close it
 
   // Every directed edge has its opposite: winding numbers are whole and the divergence theorem holds.
   [[nodiscard]] bool balanced() const { return unbalanced_edges == 0; }
