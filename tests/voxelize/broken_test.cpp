@@ -83,7 +83,7 @@ TEST(Broken, SelfIntersectingShellsNeverHoldLessThanNothing) {
   for (int trial = 0; trial < 8; ++trial) {
     Mesh crumpled = trial % 2 == 0 ? icosphere(2, 1) : torus(1, .3, 24, 12);
     for (Vec3& vertex : crumpled.vertices) vertex += Vec3(noise(random), noise(random), noise(random));
-    for (const double size : {.05, .1, .3}) {
+    for (const double size : {.1, .3}) {
       const VoxelizeResult result = run(crumpled, size);
       const VoxelizedPart& part = result.parts[0];
       const double voxel = part.spacing.prod();
