@@ -164,11 +164,7 @@ class GltfReader {
     for (Vec3& vertex : surface_.vertices) vertex *= unit;
     if (colored_) surface_.polygon_columns[kColorColumn] = std::move(color_);
     assign_group_faces(surface_, polygon_part_, polygon_group_, group_names_, welded_);
-    SurfaceSource source;
-    source.format = "glb";
-    source.unit = unit;
-    source.unit_given = true;
-    surface_.sources.push_back(std::move(source));
+    surface_.sources.push_back(source_in_unit("glb", unit));
     return std::move(surface_);
   }
 

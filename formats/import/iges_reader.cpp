@@ -139,11 +139,7 @@ Surface read_entities(const std::string& path, const ImportOptions& options, con
   };
   Surface surface = mesh_of(shape, kMillimetre,
                             {name, name, [](const TopoDS_Shape&) { return std::nullopt; }}, options, input);
-  SurfaceSource source;
-  source.format = "iges";
-  source.unit = kMillimetre;
-  source.unit_given = true;
-  surface.sources.push_back(std::move(source));
+  surface.sources.push_back(source_in_unit("iges", kMillimetre));
   return surface;
 }
 

@@ -56,10 +56,7 @@ Surface read_off(ImportInput& input, const ImportOptions& options) {
     surface.vertex_columns[kColorColumn] = std::move(*color);
   if (auto color = color_column(file.face_colors, input.where))
     surface.polygon_columns[kColorColumn] = std::move(*color);
-  surface.parts.push_back({""});
-  assign_dihedral_faces(surface, std::vector<std::uint32_t>(surface.polygon_count(), 0),
-                        weld(surface.vertices));
-  surface.sources[0].bytes = std::move(input.bytes);
+  complete_single_part(surface, input);
   return surface;
 }
 

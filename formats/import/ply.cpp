@@ -197,10 +197,7 @@ Surface read_ply(ImportInput& input, const ImportOptions& options) {
   surface.sources.push_back(
       unitless_source(header.encoding == PlyEncoding::ascii ? "ply-ascii" : "ply-binary", options));
   for (Vec3& vertex : surface.vertices) vertex *= surface.sources[0].unit;
-  surface.parts.push_back({""});
-  assign_dihedral_faces(surface, std::vector<std::uint32_t>(surface.polygon_count(), 0),
-                        weld(surface.vertices));
-  surface.sources[0].bytes = std::move(input.bytes);
+  complete_single_part(surface, input);
   return surface;
 }
 

@@ -56,4 +56,10 @@ void check_indices(const Surface& surface, const ImportInput& input);
 // The source record of a format that carries no unit: --unit, else mm.
 [[nodiscard]] SurfaceSource unitless_source(const char* format, const ImportOptions& options);
 
+// The source record of a format that carries its unit [m].
+[[nodiscard]] SurfaceSource source_in_unit(const char* format, double unit);
+
+// For meshes that are one nameless part: faces are dihedral regions, and the file's bytes travel along.
+void complete_single_part(Surface& surface, ImportInput& input);
+
 }  // namespace flexel

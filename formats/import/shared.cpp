@@ -9,6 +9,7 @@
 #include "formats/error.h"
 #include "formats/import/readers.h"
 #include "formats/topology.h"
+#include "formats/weld.h"
 
 namespace flexel {
 
@@ -105,6 +106,21 @@ SurfaceSource unitless_source(const char* format, const ImportOptions& options) 
   source.unit = options.unit.value_or(1e-3);
   source.unit_given = options.unit.has_value();
   return source;
+}
+
+SurfaceSource source_in_unit(const char* format, double unit) {
+  SurfaceSource source;
+  source.format = format;
+  source.unit = unit;
+  source.unit_given = true;
+  return source;
+}
+
+void complete_single_part(Surface& surface, ImportInput& input) {
+  surface.parts.push_back({""});
+  assign_dihedral_faces(surface, std::vector<std::uint32_t>(surface.polygon_count(), 0),
+                        weld(surface.vertices));
+  surface.sources[0].bytes = std::move(input.bytes);
 }
 
 }  // namespace flexel

@@ -92,11 +92,7 @@ Surface read_solids(ImportInput& input, const ImportOptions& options) {
                              [&](const TopoDS_Shape& face) { return names.own(face); },
                              [&](const TopoDS_Shape& item) { return names.color(item); }},
                             options, input);
-  SurfaceSource source;
-  source.format = "step";
-  source.unit = kMillimetre;
-  source.unit_given = true;
-  surface.sources.push_back(std::move(source));
+  surface.sources.push_back(source_in_unit("step", kMillimetre));
   return surface;
 }
 

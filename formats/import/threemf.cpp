@@ -76,11 +76,7 @@ class ThreeMfReader {
     for (Vec3& vertex : surface_.vertices) vertex *= unit;
     if (colored_) surface_.polygon_columns[kColorColumn] = std::move(color_);
     assign_dihedral_faces(surface_, polygon_part_, welded_);
-    SurfaceSource source;
-    source.format = "3mf";
-    source.unit = unit;
-    source.unit_given = true;
-    surface_.sources.push_back(std::move(source));
+    surface_.sources.push_back(source_in_unit("3mf", unit));
     return std::move(surface_);
   }
 

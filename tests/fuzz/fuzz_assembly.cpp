@@ -67,16 +67,7 @@ void read_mutant(const std::string& path) {
   if (bytes[0] == std::byte{'g'} || bytes[0] == std::byte{'{'}) {
     const Surface surface = import_surface(path, options);
     check(surface, path);
-    std::vector<Vec3> displacement;
-    for (const Vec3& v : surface.vertices) displacement.emplace_back(-1e-3 * v.y(), 2e-3 * v.x(), 0);
-    const std::string out = path + ".out";
-    try {
-      write_surface(surface, displacement, SurfaceFormat::glb, default_unit(surface), out);
-    } catch (const InputError&) {
-      std::filesystem::remove(out);
-      throw;
-    }
-    std::filesystem::remove(out);
+    fuzz::write_moved(surface, SurfaceFormat::glb, path + ".out");
     return;
   }
   const std::string archive = path + ".3mf";

@@ -1,7 +1,4 @@
 // Mutated PLY and OFF files, read and, moved, written again from their own bytes.
-#include <filesystem>
-
-#include "formats/error.h"
 #include "formats/import.h"
 #include "formats/surface_file.h"
 #include "tests/fuzz/driver.h"
@@ -58,16 +55,7 @@ int main(int argc, char** argv) {
     options.format = !bytes.empty() && bytes[0] == std::byte{'p'} ? "ply" : "off";
     const Surface surface = import_surface(path, options);
     check(surface, path);
-    std::vector<Vec3> displacement;
-    for (const Vec3& v : surface.vertices) displacement.emplace_back(-1e-3 * v.y(), 2e-3 * v.x(), 0);
-    const std::string out = path + ".out";
-    try {
-      write_surface(surface, displacement, *options.format == "ply" ? SurfaceFormat::ply : SurfaceFormat::off,
-                    default_unit(surface), out);
-    } catch (const InputError&) {
-      std::filesystem::remove(out);
-      throw;
-    }
-    std::filesystem::remove(out);
+    fuzz::write_moved(surface, *options.format == "ply" ? SurfaceFormat::ply : SurfaceFormat::off,
+                      path + ".out");
   });
 }

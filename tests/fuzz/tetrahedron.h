@@ -6,7 +6,9 @@
 #include <filesystem>
 #include <fstream>
 
+#include "formats/error.h"
 #include "formats/import.h"
+#include "formats/surface_file.h"
 #include "tests/fuzz/driver.h"
 
 namespace flexel::fuzz {
@@ -49,6 +51,19 @@ inline Surface tetrahedron() {
   Surface surface = import_surface(path);
   std::filesystem::remove(path);
   return surface;
+}
+
+// Writes the surface, sheared a little, and removes the file again, also where it is refused.
+inline void write_moved(const Surface& surface, SurfaceFormat format, const std::string& path) {
+  std::vector<Vec3> displacement;
+  for (const Vec3& v : surface.vertices) displacement.emplace_back(-1e-3 * v.y(), 2e-3 * v.x(), 0);
+  try {
+    write_surface(surface, displacement, format, default_unit(surface), path);
+  } catch (const InputError&) {
+    std::filesystem::remove(path);
+    throw;
+  }
+  std::filesystem::remove(path);
 }
 
 }  // namespace flexel::fuzz
