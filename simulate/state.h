@@ -13,8 +13,11 @@ struct State {
   double share = 1;                // of every load and move that acts now, in [0, 1] (load stepping)
 };
 
-// How a part resists.
-enum class Model { cells, springs };
+// How a part resists: cells and springs at corner placement, paper at centre placement.
+enum class Model { cells, springs, paper };
+
+// Where the Hooke constants of model `paper` come from: equation (22) or (21) of the paper.
+enum class HookeConstant { paper, ganovelli };
 
 // What effects are made from. Refers to the body, which stays unchanged during a run.
 struct Setting {
@@ -22,7 +25,10 @@ struct Setting {
   std::vector<Material> materials;  // (parts)
   std::vector<std::uint8_t>
       stray_cell;  // (cells) 1: of a loose crumb that nothing holds; it is carried along, not simulated
-  std::vector<Model> models = {};  // (parts); empty: cells
+  std::vector<Model> models = {};         // (parts); empty: cells
+  std::vector<HookeConstant> hooke = {};  // (parts); empty: paper
+  std::vector<std::uint8_t> stray_element =
+      {};  // (elements) 1: likewise, of a centre-placed part; empty: none
 };
 
 }  // namespace flexel
