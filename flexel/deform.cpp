@@ -7,6 +7,7 @@
 #include "flexel/actions.h"
 #include "flexel/commands.h"
 #include "formats/body_file.h"
+#include "formats/files.h"
 #include "formats/import.h"
 #include "formats/parallel.h"
 #include "formats/program.h"
@@ -190,28 +191,6 @@ std::string failed_name(const Plan& plan) {
   return "";
 }
 
-nlohmann::ordered_json summary_of_voxels(const VoxelizeResult& result) {
-  nlohmann::ordered_json parts = nlohmann::ordered_json::array();
-  for (std::size_t p = 0; p < result.parts.size(); ++p) {
-    const VoxelizedPart& part = result.parts[p];
-    parts.push_back({{"name", result.body.parts[p].name},
-                     {"closed", part.closed},
-                     {"elements", part.elements},
-                     {"cells", part.cells},
-                     {"spacing", {part.spacing.x(), part.spacing.y(), part.spacing.z()}},
-                     {"surface_volume", part.surface_volume},
-                     {"lattice_volume", part.lattice_volume},
-                     {"dropped_volume", part.dropped_volume}});
-  }
-  return {{"parts", parts}};
-}
-
-void write_text(const std::string& text, const std::string& path) {
-  OutputFile file(path, false);
-  file.write(text);
-  file.commit();
-}
-
 void say_map(const MapReport& found, Progress& progress) {
   const std::vector<std::string> lines = report_lines(found);
   for (std::size_t i = 0; i < lines.size(); ++i)
@@ -260,7 +239,7 @@ int run_stages(const Arguments& arguments, Plan& plan, Progress& progress) {
   write_outputs(plan, body, mapped, progress);
   if (!arguments.summary.empty()) {
     nlohmann::ordered_json summary;
-    summary["voxelize"] = summary_of_voxels(voxels);
+    summary["voxelize"] = nlohmann::ordered_json::parse(summary_json(voxels));
     summary["simulate"] = nlohmann::ordered_json::parse(summary_json(simulated, body));
     summary["map"] = nlohmann::ordered_json::parse(mapping);
     write_text(summary.dump(2) + "\n", arguments.summary);

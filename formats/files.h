@@ -42,6 +42,9 @@ class OutputFile {
   std::vector<char> buffer_;
 };
 
+// A whole text to `path`, as OutputFile does.
+void write_text(const std::string& text, const std::string& path);
+
 // Removes the temporary files of all writers. Only for a signal handler that ends the process: safe there,
 // and nowhere needed else.
 void remove_temporary_outputs();

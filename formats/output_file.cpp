@@ -182,4 +182,10 @@ void OutputFile::commit() {
   temporary_.clear();
 }
 
+void write_text(const std::string& text, const std::string& path) {
+  OutputFile file(path, false);
+  file.write(text);
+  file.commit();
+}
+
 }  // namespace flexel

@@ -1,7 +1,10 @@
 // One file a part: each part of a surface is taken out with the vertices that its polygons use, in their
 // order, and written like a surface of its own.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstdint>
+#include <set>
 
 #include "formats/surface_file.h"
 
@@ -68,12 +71,30 @@ Extract extract(const Surface& whole, std::uint32_t part) {
   return result;
 }
 
-// The path with the part's name in it, fit for a file's name.
-std::string path_of(std::string path, std::string name) {
-  std::replace(name.begin(), name.end(), '/', '_');
+// The path with a part's file name in it.
+std::string path_of(std::string path, const std::string& name) {
   for (std::size_t at = path.find(kPlace); at != std::string::npos; at = path.find(kPlace, at + name.size()))
     path.replace(at, kPlace.size(), name);
   return path;
+}
+
+// Names fit for files, no two alike: a part whose own name fits has it, others get "-2", "-3" ... where
+// theirs is taken.
+std::vector<std::string> file_names(const std::vector<SurfacePart>& parts) {
+  std::vector<std::string> names(parts.size());
+  std::set<std::string> taken;
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    names[p] = parts[p].name;
+    std::replace(names[p].begin(), names[p].end(), '/', '_');
+    if (names[p] == parts[p].name) taken.insert(names[p]);
+  }
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    if (names[p] == parts[p].name) continue;
+    const std::string fit = names[p];
+    for (int number = 2; !taken.insert(names[p]).second; ++number)
+      names[p] = fmt::format("{}-{}", fit, number);
+  }
+  return names;
 }
 
 }  // namespace
@@ -84,8 +105,9 @@ bool names_parts(const std::string& path) {
 
 void write_parts(const Surface& surface, const std::vector<Vec3>& displacement, SurfaceFormat format,
                  double unit, const std::string& path) {
+  const std::vector<std::string> names = file_names(surface.parts);
   if (surface.parts.size() == 1) {
-    write_surface(surface, displacement, format, unit, path_of(path, surface.parts[0].name));
+    write_surface(surface, displacement, format, unit, path_of(path, names[0]));
     return;
   }
   for (std::uint32_t part = 0; part < surface.parts.size(); ++part) {
@@ -93,7 +115,7 @@ void write_parts(const Surface& surface, const std::vector<Vec3>& displacement, 
     if (own.surface.polygon_count() == 0) continue;
     std::vector<Vec3> moved;
     for (const std::uint32_t v : own.vertices) moved.push_back(displacement[v]);
-    write_surface(own.surface, moved, format, unit, path_of(path, surface.parts[part].name));
+    write_surface(own.surface, moved, format, unit, path_of(path, names[part]));
   }
 }
 

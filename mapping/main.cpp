@@ -1,5 +1,6 @@
 // flexel-map: a deformed body in, its surface deformed out.
 #include "formats/body_file.h"
+#include "formats/files.h"
 #include "formats/parallel.h"
 #include "formats/program.h"
 #include "formats/surface_file.h"
@@ -37,12 +38,6 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
   app.add_option("-o,--output", arguments.output, "Where the surface goes; without it, or with -, stdout")
       ->type_name("FILE");
-}
-
-void write_text(const std::string& text, const std::string& path) {
-  OutputFile file(path, false);
-  file.write(text);
-  file.commit();
 }
 
 int run(int argc, char** argv) {

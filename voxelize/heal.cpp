@@ -107,6 +107,7 @@ HealedPart heal(PartMesh mesh, const HealChoice& how, const std::string& name) {
   HealedPart part;
   part.mesh = std::move(mesh);
   if (part.mesh.corners.empty()) return part;
+  if (how.mode == Heal::none) part.done.open_edges = part.done.left_open = part.mesh.open_edges;
   if (how.mode == Heal::automatic) heal_automatically(part);
   if (how.mode == Heal::wrap)
     wrap(part, how.alpha.value_or(kAlpha * bounding_box(part.mesh.world).diagonal()), name);

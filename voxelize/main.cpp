@@ -4,6 +4,7 @@
 
 #include "formats/body_file.h"
 #include "formats/error.h"
+#include "formats/files.h"
 #include "formats/import.h"
 #include "formats/parallel.h"
 #include "formats/program.h"
@@ -21,7 +22,7 @@ constexpr const char* kName = "flexel-voxelize";
 struct Arguments {
   std::vector<std::string> parts;
   std::string size, placement = "corner", unit, align = "snap", heal = "auto", material, max_memory,
-                    deflection, edge, format, vdb, output = "-";
+                    deflection, edge, format, vdb, summary, output = "-";
   std::optional<long long> count;
   int threads = 0;
   bool compress = false, quiet = false;
@@ -53,6 +54,7 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_flag("--compress", arguments.compress, "compress the arrays of the body file");
   app.add_flag("--quiet", arguments.quiet, "say warnings only");
   app.add_option("--vdb", arguments.vdb, "also write fill and distance as OpenVDB grids to this file");
+  app.add_option("--summary", arguments.summary, "also write what was found as JSON (docs/voxelize.md)");
   app.add_option("-o,--output", arguments.output, "body file (.vtu); - or none: standard output");
 }
 
@@ -139,6 +141,8 @@ int run(int argc, char** argv) {
   const ImportOptions import = import_options(arguments);
   if (!arguments.vdb.empty() && options.placement != Placement::corner)
     throw InputError("--vdb: centre placement has no cells; use --placement corner");
+  if (arguments.summary == "-" && arguments.output == "-")
+    throw InputError("the summary and the body cannot both go to stdout: give one of them a file");
   const ThreadLimit threads(arguments.threads);
   Progress progress(kName, arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
   progress.stage("import");
@@ -148,6 +152,7 @@ int run(int argc, char** argv) {
   report(result, progress);
   progress.stage("write");
   if (!arguments.vdb.empty()) write_vdb(result.body, arguments.vdb);
+  if (!arguments.summary.empty()) write_text(summary_json(result), arguments.summary);
   write_body(result.body, arguments.output, {.compress = arguments.compress});
   progress.finish();
   return kExitDone;

@@ -85,6 +85,8 @@ struct VoxelizeResult {
 
 // Says what was found, a few lines a part.
 void report(const VoxelizeResult& result, Progress& progress);
+// The same as JSON, in SI units (docs/voxelize.md).
+[[nodiscard]] std::string summary_json(const VoxelizeResult& result);
 
 // Thinnest wall of each part, measured along rays through the surface on a grid of `rays` lines per axis:
 // distance between an entry and the next exit whose normals oppose each other, times the cosine to the ray.

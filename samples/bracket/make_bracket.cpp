@@ -1,7 +1,9 @@
 // Writes the sample part: an L-bracket of 80 x 40 x 60 mm, 6 mm thick, with a fillet in its corner and two
-// bolt holes in its wall leg, as STEP in mm.
+// bolt holes in its wall leg, as STEP in mm; or, by the file's extension, as IGES or as BREP.
 //
 //     make_bracket bracket.step
+//     make_bracket bracket.igs
+//     make_bracket bracket.brep
 //
 // The outline is extruded along y and drilled along x. Boolean operations leave the faces in an order of
 // their own, so the solid is put together again from the same faces in the order below; that is their
@@ -16,10 +18,13 @@
 #include <BRepGProp.hxx>
 #include <BRepPrimAPI_MakeCylinder.hxx>
 #include <BRepPrimAPI_MakePrism.hxx>
+#include <BRepTools.hxx>
 #include <BRep_Builder.hxx>
 #include <GC_MakeArcOfCircle.hxx>
 #include <GProp_GProps.hxx>
 #include <Geom_TrimmedCurve.hxx>
+#include <IGESControl_Controller.hxx>
+#include <IGESControl_Writer.hxx>
 #include <Interface_Static.hxx>
 #include <Message.hxx>
 #include <Message_Messenger.hxx>
@@ -164,13 +169,37 @@ std::string step_text(const std::vector<NamedFace>& faces) {
   return text.str();
 }
 
+std::string iges_text(const std::vector<NamedFace>& faces) {
+  Message::DefaultMessenger()->ChangePrinters().Clear();
+  IGESControl_Controller::Init();
+  IGESControl_Writer writer("MM", 1);
+  std::ostringstream text;
+  if (!writer.AddShape(solid_of(faces)) || !writer.Write(text))
+    throw std::runtime_error("OpenCASCADE could not write the bracket");
+  return text.str();
+}
+
+std::string brep_text(const std::vector<NamedFace>& faces) {
+  std::ostringstream text;
+  BRepTools::Write(solid_of(faces), text);
+  return text.str();
+}
+
+std::string text_for(const std::string& path) {
+  const std::vector<NamedFace> faces = ordered_faces(drilled_bracket());
+  const std::string extension = flexel::extension(path);
+  if (extension == "igs" || extension == "iges") return iges_text(faces);
+  if (extension == "brep") return brep_text(faces);
+  return step_text(faces);
+}
+
 int make_bracket(int argc, char** argv) {
-  CLI::App app{"Writes the sample bracket as STEP"};
+  CLI::App app{"Writes the sample bracket as STEP, IGES or BREP"};
   std::string path;
   app.add_option("FILE", path, "where to write it (\"-\": stdout)")->required();
   if (!flexel::parse_arguments(app, argc, argv)) return flexel::kExitDone;
   flexel::OutputFile out(path, false);
-  out.write(step_text(ordered_faces(drilled_bracket())));
+  out.write(text_for(path));
   out.commit();
   return flexel::kExitDone;
 }

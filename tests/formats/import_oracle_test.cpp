@@ -3,6 +3,7 @@
 
 #include <assimp/Importer.hpp>
 
+#include "formats/surface_file.h"
 #include "tests/formats/import_help.h"
 
 namespace flexel::test {
@@ -43,6 +44,25 @@ TEST(ImportOracle, AssimpSeesTheSameCornersInTheSameOrder) {
     for (std::size_t c = 0; c < expected.size(); ++c)
       largest = std::max(largest, (surface.vertices[surface.polygon_vertices[c]] - expected[c]).norm());
     EXPECT_LE(largest, tolerance) << file;
+  }
+}
+
+TEST(ImportOracle, AssimpReadsTheGlbThatWeWrite) {
+  const Scratch scratch;
+  const std::string box =
+      "OFF\n8 6 0\n0 0 0\n40 0 0\n40 10 0\n0 10 0\n0 0 5\n40 0 5\n40 10 5\n0 10 5\n4 0 3 2 1\n4 4 5 6 7\n"
+      "4 0 1 5 4\n4 2 3 7 6\n4 1 2 6 5\n4 0 4 7 3\n";
+  Surface surface = import_surface(scratch.write("one.off", box));
+  append(surface, import_surface(scratch.write("two.off", box)));
+  std::vector<Vec3> displacement(8, Vec3::Zero());
+  displacement.resize(16, Vec3(0, 0, 0.02));
+  write_surface(surface, displacement, SurfaceFormat::glb, 1, scratch.path("new.glb"));
+  const std::vector<Vec3> seen = corners_by_assimp(scratch.path("new.glb"));
+  const Triangles triangles = triangulate(surface);
+  ASSERT_EQ(seen.size(), 3 * triangles.corners.size());
+  for (std::size_t c = 0; c < seen.size(); ++c) {
+    const std::uint32_t v = triangles.corners[c / 3][c % 3];
+    EXPECT_LE((surface.vertices[v] + displacement[v] - seen[c]).norm(), 1e-8) << c;
   }
 }
 

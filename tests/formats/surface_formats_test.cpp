@@ -267,6 +267,24 @@ TEST(WriteSurface, OneFileAPart) {
   EXPECT_FALSE(std::filesystem::exists(scratch.path("out_{part}.ply")));
 }
 
+TEST(WriteSurface, NamesThatDifferByASlashGetFilesOfTheirOwn) {
+  const Scratch scratch;
+  for (const bool slash_first : {true, false}) {
+    Surface surface = two_parts(scratch);
+    surface.parts[slash_first ? 0 : 1].name = "left/arm";
+    surface.parts[slash_first ? 1 : 0].name = "left_arm";
+    write_surface(surface, nothing(surface), SurfaceFormat::ply, 1e-3, scratch.path("out_{part}.ply"));
+    const auto first_of = [&](const std::string& file, std::size_t part) {
+      const Surface own = import_surface(scratch.path(file));
+      EXPECT_EQ(own.vertex_columns.at("heat").values.front(),
+                surface.vertex_columns.at("heat").values[4 * part])
+          << file;
+    };
+    first_of("out_left_arm.ply", slash_first ? 1 : 0);  // whose own name it is
+    first_of("out_left_arm-2.ply", slash_first ? 0 : 1);
+  }
+}
+
 TEST(SurfaceFormat, NewFormatsAreTold) {
   EXPECT_EQ(surface_format("", "a.ply", false), SurfaceFormat::ply);
   EXPECT_EQ(surface_format("ply", "-", true), SurfaceFormat::ply_ascii);

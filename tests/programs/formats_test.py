@@ -1,0 +1,137 @@
+"""Every format through the whole chain: the part that comes out is the one that went in, bent, in its own format where that is written,
+else as STL."""
+
+import struct
+
+from harness import bracket, box, expect, expect_error, expect_ok, expect_only, main, run, scene, write
+from meshes import glb_box, indexed_box, off_box, ply_box, read_glb, read_off, read_ply, threemf_box
+
+BEND = """material = "PLA"
+[[fix]]
+where = "xmin"
+[[load]]
+where = "xmax"
+force = ["0 N", "0 N", "-50 N"]
+"""
+
+
+def through_the_chain(part, out, *options, size="2.5 mm"):
+    scene("bend.toml", BEND)
+    expect_ok(run("flexel-voxelize", part, "--size", size, "-o", "rest.vtu"))
+    expect_ok(run("flexel-simulate", "bend.toml", "rest.vtu", "-o", "body.vtu"))
+    expect_ok(run("flexel-map", "rest.vtu", "-o", "rest." + out.rsplit(".", 1)[1], *options))
+    expect_ok(run("flexel-map", "body.vtu", "-o", out, *options))
+
+
+def expect_bent(before, after, unit=1.0):
+    """The held end stays, the loaded end sinks: F L^3 / (3 E I) of 50 N on PLA is 0.4 mm for the box."""
+    expect(len(before) == len(after), f"{len(before)} vertices became {len(after)}")
+    low, high = min(v[0] for v in before), max(v[0] for v in before)
+    for a, b in zip(before, after):
+        sunk = (a[2] - b[2]) * unit
+        if a[0] == low:
+            expect(abs(sunk) < 0.02, f"{a} is held, and moved to {b}")
+        if a[0] == high:
+            expect(0.2 < sunk < 1.5, f"{a} is pushed down, and moved to {b}")
+
+
+def test_ply():
+    through_the_chain(ply_box(), "bent.ply")
+    before, heat, head = read_ply("box.ply")
+    after, same_heat, same_head = read_ply("bent.ply")
+    expect(open("box.ply", "rb").read() == open("rest.ply", "rb").read(), "a part that did not move is the same file")
+    expect((head, heat) == (same_head, same_heat), "a property was lost")
+    expect_bent(before, after)
+
+
+def test_off():
+    through_the_chain(off_box(), "bent.off")
+    before, lines = read_off("box.off")
+    after, new = read_off("bent.off")
+    expect(lines[:3] + lines[11:] == new[:3] + new[11:], "only the vertices may change")
+    expect(open("box.off", "rb").read() == open("rest.off", "rb").read(), "a part that did not move is the same file")
+    expect_bent(before, after)
+
+
+def test_glb():
+    through_the_chain(glb_box(), "bent.glb")
+    ((name, before, triangles),), _ = read_glb("box.glb")
+    ((same_name, after, same_triangles),), document = read_glb("bent.glb")
+    expect((name, triangles) == (same_name, same_triangles) and document["asset"]["generator"] == "hand", "not the same file, moved")
+    expect(open("box.glb", "rb").read() == open("rest.glb", "rb").read(), "a part that did not move is the same file")
+    expect_bent(before, after, 1000)
+
+
+def test_a_new_glb():
+    """Of another format: what the specification asks of a file, and the box in metres."""
+    through_the_chain(threemf_box(), "bent.glb")
+    meshes, _ = read_glb("rest.glb")
+    expect([name for name, _, _ in meshes] == ["bar"], f"one part, called bar: {meshes}")
+    vertices, triangles = indexed_box((0.04, 0.01, 0.01))
+    (_, positions, faces), (_, moved, _) = meshes[0], read_glb("bent.glb")[0][0]
+    wanted = [[struct.unpack("3f", struct.pack("3f", *vertices[v])) for v in t] for t in triangles]
+    expect([[positions[v] for v in face] for face in faces] == wanted, "the box's triangles, in order")
+    expect_bent(positions, moved, 1000)
+
+
+def test_3mf():
+    through_the_chain(threemf_box(), "bent.ply")
+    data = open("bent.ply", "rb").read()
+    at = data.index(b"end_header\n") + 11
+    expect_bent(indexed_box()[0], list(struct.iter_unpack("<3d", data[at:at + 8 * 24])))
+    expect_error(run("flexel-map", "body.vtu", "-o", "bent.3mf"), "flexel-map", "3mf")
+
+
+def bent_bracket(file):
+    """Triangles at rest and bent."""
+    through_the_chain(bracket(file), "bent.stl", size="3 mm")
+    found = []
+    for name in ("rest.stl", "bent.stl"):
+        data = open(name, "rb").read()
+        (count,) = struct.unpack_from("<I", data, 80)
+        found.append([struct.unpack_from("<9f", data, 84 + 50 * t + 12) for t in range(count)])
+    return found
+
+
+def volume(triangles):
+    return sum(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) for a, b, c, d, e, f, g, h, i in triangles) / 6
+
+
+def test_iges_and_brep_are_the_same_bracket_as_step():
+    reference, bent = bent_bracket("bracket.step")
+    tip = max(p[2] - q[2] for p, q in zip(reference, bent))
+    for file in ("bracket.igs", "bracket.brep"):
+        rest, moved = bent_bracket(file)
+        expect(abs(volume(rest) / volume(reference) - 1) < 1e-3, f"{file}: {volume(rest)} mm^3, not {volume(reference)}")
+        sunk = max(p[2] - q[2] for p, q in zip(rest, moved))
+        expect(abs(sunk / tip - 1) < 0.02 and tip > 0.1, f"{file}: the tip sinks by {sunk} mm, not {tip}")
+
+
+def test_one_file_a_part():
+    lower = off_box("lower.off")
+    vertices, triangles = indexed_box()
+    write("upper.off", "\n".join(["OFF", "8 12 0"] + [f"{x} {y} {z + 30}" for x, y, z in vertices] +
+                                 ["3 " + " ".join(map(str, t)) for t in triangles]) + "\n")
+    expect_ok(run("flexel-voxelize", lower, "upper.off", "--size", "5 mm", "-o", "rest.vtu"))
+    expect_ok(run("flexel-map", "rest.vtu", "-o", "out_{part}.stl"))
+    expect_only("lower.off", "upper.off", "rest.vtu", "out_lower.stl", "out_upper.stl")
+    for name, bottom in (("out_lower.stl", 0.0), ("out_upper.stl", 30.0)):
+        data = open(name, "rb").read()
+        (count,) = struct.unpack_from("<I", data, 80)
+        lowest = min(min(struct.unpack_from("<9f", data, 96 + 50 * t)[2::3]) for t in range(count))
+        expect((count, lowest) == (12, bottom), f"{name}: {count} triangles from {lowest} mm")
+
+
+def test_size_warning_names_the_likely_unit():
+    vertices, triangles = indexed_box((0.04, 0.01, 0.01))
+    write("metres.off", "\n".join(["OFF", "8 12 0"] + [f"{x} {y} {z}" for x, y, z in vertices] +
+                                  ["3 " + " ".join(map(str, t)) for t in triangles]) + "\n")
+    for command in (["flexel-voxelize", "metres.off", "--count", "500", "-o", "rest.vtu"], ["flexel", "info", "metres.off"]):
+        result = expect_ok(run(*command))
+        expect("warning: metres.off is 40 um across in mm, the unit for files that carry none: likely --unit m" in result.err, f"{result}")
+        expect("likely" not in expect_ok(run(*command, "--unit", "m")).err, "in metres it is 40 mm long")
+    expect("likely" not in expect_ok(run("flexel-voxelize", box(), "--count", "500", "-o", "rest.vtu")).err, "40 mm is no suspicious size")
+
+
+if __name__ == "__main__":
+    main(globals())

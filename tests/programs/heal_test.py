@@ -1,0 +1,129 @@
+"""Broken surfaces through the programs: what was healed is said and counted, what cannot be told is refused with a reason."""
+
+import json
+
+from harness import ascii_stl, binary_stl, box_triangles, expect, expect_error, expect_ok, expect_only, main, run, write
+
+
+def grid_box(cells=8, size=40.0):
+    """Outward triangles of a cube from the origin, each side `cells` x `cells` squares."""
+    def at(side, i, j):
+        axis, top = divmod(side, 2)
+        point = [0.0, 0.0, 0.0]
+        point[axis] = size * top
+        point[(axis + 1) % 3] = size * i / cells
+        point[(axis + 2) % 3] = size * j / cells
+        return tuple(point)
+
+    triangles = []
+    for side in range(6):
+        for i in range(cells):
+            for j in range(cells):
+                a, b, c, d = at(side, i, j), at(side, i + 1, j), at(side, i + 1, j + 1), at(side, i, j + 1)
+                for t in ([a, b, c], [a, c, d]):
+                    triangles.append(t if side % 2 else [t[0], t[2], t[1]])
+    return triangles
+
+
+def healed(triangles, *options):
+    """What was said, and the part's entry in the summary."""
+    write("part.stl", binary_stl(triangles))
+    result = expect_ok(run("flexel-voxelize", "part.stl", "--size", "4 mm", "--summary", "summary.json", "-o", "body.vtu", *options))
+    with open("summary.json", encoding="utf-8") as file:
+        return result.err, json.load(file)["parts"][0]
+
+
+def expect_volume(part, size=40e-3, share=1e-9):
+    volume = part["lattice_volume"] + part["dropped_volume"]
+    expect(abs(volume / size**3 - 1) <= share, f"the lattice holds {volume} m^3, not {size**3}")
+
+
+def test_a_clean_part_is_not_healed():
+    said, part = healed(grid_box())
+    expect("healed" not in said, f"nothing was broken: {said}")
+    counts = {key: value for key, value in part["healing"].items() if key != "inside_by"}
+    expect(not any(counts.values()), f"nothing was broken: {counts}")
+    expect_volume(part)
+
+
+def test_auto_names_what_it_healed():
+    triangles = grid_box()
+    del triangles[100], triangles[300]  # two holes of one triangle
+    triangles[7] = [triangles[7][0], triangles[7][2], triangles[7][1]]
+    triangles.append(triangles[50])
+    said, part = healed(triangles)
+    for words in ("part: healed: 2 holes filled with 2 triangles, the widest 7.07 mm",
+                  "part: healed: 1 triangle faced the other way", "part: healed: 1 repeated facet left out"):
+        expect(words in said, f"\"{words}\" is missing in {said}")
+    found = part["healing"]
+    expect((found["holes"], found["hole_triangles"], found["flipped_facets"], found["duplicate_facets"]) == (2, 2, 1, 1), f"{found}")
+    expect(found["open_edges"] > 0 and found["left_open"] == 0 and part["closed"], f"{found}")
+    expect_volume(part)
+
+
+def test_a_part_inside_out_is_turned():
+    said, part = healed([[a, c, b] for a, b, c in grid_box()])
+    expect("1 shell inside out and turned" in said and part["healing"]["inverted_shells"] == 1, f"{said} {part}")
+    expect_volume(part)
+
+
+def test_a_sheet_is_refused_with_what_to_do():
+    sheet = [t for t in grid_box() if all(corner[2] == 0 for corner in t)]
+    write("sheet.stl", ascii_stl(sheet, "plate"))
+    for option in ("auto", "wrap", "none"):
+        expect_error(run("flexel-voxelize", "sheet.stl", "--size", "4 mm", "--heal", option, "-o", "body.vtu"), "flexel-voxelize", "plate",
+                     *{"auto": ["encloses no volume", "sheet", "open edges", "give it a thickness or close it"],
+                       "wrap": ["sheet", "close it", "wrap:"], "none": ["plate"]}[option])
+        expect_only("sheet.stl")
+
+
+def test_an_open_box_is_refused_with_the_hole():
+    write("part.stl", binary_stl([t for t in grid_box() if not all(corner[2] == 40 for corner in t)]))
+    expect_error(run("flexel-voxelize", "part.stl", "--size", "4 mm", "-o", "body.vtu"), "flexel-voxelize",
+                 "inside cannot be told from outside", "32 open edges", "56.6 mm wide", "(20 mm, 20 mm, 40 mm)", "--heal wrap")
+    expect_only("part.stl")
+
+
+def test_wrap_spans_what_it_is_told_to():
+    top = [t for t in grid_box() if not all(corner[2] == 40 for corner in t)]
+    said, part = healed(top, "--heal", "wrap:60 mm")
+    expect("wrapped: openings up to 60 mm are spanned" in said and part["healing"]["wrapped"], f"{said} {part}")
+    # It lies a thirtieth of 60 mm outside, with rounded edges: at most that box, at least the part.
+    expect(40.0**3 < 1e9 * part["lattice_volume"] < 44.0**3, f"{part}")
+
+
+def test_wrap_narrower_than_the_hole_is_refused():
+    write("part.stl", binary_stl([t for t in grid_box() if not all(corner[2] == 40 for corner in t)]))
+    expect_error(run("flexel-voxelize", "part.stl", "--size", "4 mm", "--heal", "wrap:5 mm", "-o", "body.vtu"), "flexel-voxelize",
+                 "opening 56.6 mm wide", "wrap:62.2 mm")
+    expect_only("part.stl")
+
+
+def test_none_takes_it_as_it_is():
+    triangles = grid_box()
+    del triangles[100]
+    said, part = healed(triangles, "--heal", "none")
+    expect("healed" not in said and "3 open edges left" in said, said)
+    expect(not part["closed"] and part["healing"]["inside_by"] == "vote" and part["healing"]["holes"] == 0, f"{part}")
+
+
+def test_unknown_words():
+    write("part.stl", binary_stl(box_triangles()))
+    expect_error(run("flexel-voxelize", "part.stl", "--heal", "warp"), "flexel-voxelize", "--heal", 'did you mean "wrap"')
+    expect_error(run("flexel-voxelize", "part.stl", "--heal", "wrap:5"), "flexel-voxelize", "unit")
+    expect_ok(run("flexel-voxelize", "part.stl", "--size", "4 mm", "--heal", "auto"))
+
+
+def test_deform_has_the_counts_too():
+    triangles = grid_box()
+    del triangles[100]
+    write("part.stl", binary_stl(triangles))
+    result = expect_ok(run("flexel", "deform", "part.stl", "--material", "PLA", "--fix", "xmin", "--push", "xmax: 0 0 -10 N", "--size",
+                           "5 mm", "--summary", "summary.json", "-o", "bent.stl"))
+    with open("summary.json", encoding="utf-8") as file:
+        part = json.load(file)["voxelize"]["parts"][0]
+    expect(part["healing"]["holes"] == 1 and "1 hole filled with 1 triangle" in result.err, f"{part} {result}")
+
+
+if __name__ == "__main__":
+    main(globals())
