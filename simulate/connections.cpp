@@ -40,6 +40,13 @@ ConnectionKinds connection_kinds(const Lattice& lattice, const Material& materia
   return kinds;
 }
 
+double axial_stiffness(HookeConstant hooke) {
+  const double k1 = relative_stiffness(hooke, 1), k2 = relative_stiffness(hooke, 2),
+               k3 = relative_stiffness(hooke, 3);
+  const double c11 = k1 + 2 * k2 + 4 * k3 / 3, c12 = k2 + 4 * k3 / 3;
+  return c11 - 2 * c12 * c12 / (c11 + c12);
+}
+
 Connections make_connections(const Setting& setting) {
   static const std::array<std::uint8_t, 27> kind_of = kinds_by_direction();
   const Body& body = setting.body;
@@ -74,6 +81,24 @@ Connections make_connections(const Setting& setting) {
     made.parts[p].end = static_cast<std::uint32_t>(made.size());
   }
   return made;
+}
+
+// Connections ascend by (a, b), so those that end at an element, then those that begin at it, ascend too.
+ConnectionRows connection_rows(const Connections& connections, std::size_t elements) {
+  ConnectionRows rows;
+  rows.offsets.assign(elements + 1, 0);
+  for (std::size_t c = 0; c < connections.size(); ++c) {
+    ++rows.offsets[connections.a[c] + 1];
+    ++rows.offsets[connections.b[c] + 1];
+  }
+  for (std::size_t e = 0; e < elements; ++e) rows.offsets[e + 1] += rows.offsets[e];
+  rows.entries.resize(rows.offsets.back());
+  std::vector<std::uint32_t> next(rows.offsets.begin(), rows.offsets.end() - 1);
+  for (std::size_t c = 0; c < connections.size(); ++c)
+    rows.entries[next[connections.b[c]]++] = {connections.a[c], connections.kind[c], -1};
+  for (std::size_t c = 0; c < connections.size(); ++c)
+    rows.entries[next[connections.a[c]]++] = {connections.b[c], connections.kind[c], 1};
+  return rows;
 }
 
 }  // namespace flexel

@@ -9,6 +9,7 @@
 // Every connection has the value of the interior, also at the surface.
 #pragma once
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "simulate/state.h"
@@ -41,7 +42,26 @@ struct Connections {
 [[nodiscard]] ConnectionKinds connection_kinds(const Lattice& lattice, const Material& material,
                                                HookeConstant hooke);
 
+// Young's modulus along an axis of the lattice, over that of the material: C11 - 2 C12^2 / (C11 + C12) with
+// C11 = (k1 + 2 k2 + 4/3 k3) / h and C12 = (k2 + 4/3 k3) / h.
+[[nodiscard]] double axial_stiffness(HookeConstant hooke);
+
 // The connections of the body's centre-placed parts (Body::connections); none of stray elements.
 [[nodiscard]] Connections make_connections(const Setting& setting);
+
+// The connections at each element (compressed rows), ascending by the other element.
+struct ConnectionRows {
+  struct Entry {
+    std::uint32_t other = 0;
+    std::uint8_t kind = 0;
+    std::int8_t sign = 1;  // the kind's rest vector times sign leads to `other`
+  };
+  std::vector<std::uint32_t> offsets;  // (elements + 1)
+  std::vector<Entry> entries;          // (2 connections)
+  [[nodiscard]] std::span<const Entry> of(std::uint32_t element) const {
+    return {entries.data() + offsets[element], offsets[element + 1] - offsets[element]};
+  }
+};
+[[nodiscard]] ConnectionRows connection_rows(const Connections& connections, std::size_t elements);
 
 }  // namespace flexel

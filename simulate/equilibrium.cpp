@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -25,6 +26,7 @@ constexpr int kFullStepIterations = 20;
 constexpr int kIterations = 100;            // of Newton in a run, unless the scene says
 constexpr int kOverloadIterations = 40;     // likewise where the load is out of proportion
 constexpr int kIterationsPerLoadStep = 10;  // that one which ends in equilibrium adds to those of the run
+constexpr double kUnsupported = 1e-9;       // of the stiffness of an element in its stiffest direction
 constexpr double kOverload = 3;  // diagonals: a first linear answer beyond this suggests a wrong unit
 
 std::string axis_name(const Vec3& direction) {
@@ -120,9 +122,8 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
 }
 
 void LoadStepping::diverge() const {
-  const SmallestJacobian worst = mechanics_.cells().smallest_jacobian(trial_);
+  const MostCompressed worst = mechanics_.most_compressed(trial_);
   const Body& body = mechanics_.body();
-  const std::uint32_t element = body.cell_elements[worst.cell][0];
   const std::string limit =
       iterations_left() <= 0
           ? fmt::format(" within {} Newton iterations ([run] newton_iterations)", result_.newton_iterations)
@@ -136,11 +137,11 @@ void LoadStepping::diverge() const {
                 human_length(reach_), reach_ / diagonal)
           : "Use a smaller load or move, a smaller spacing or a stiffer material; a part that buckles or "
             "snaps through has no equilibrium nearby";
-  throw DivergedError(fmt::format(
-      "no equilibrium beyond {:.4g} % of the load{} (tried {:.4g} %): {}; the most compressed cell "
-      "is {} near {} of part \"{}\" with J = {:.3g}. {}",
-      100 * done_, limit, 100 * trial_.share, outcome_.trouble, worst.cell, point_name(body.rest[element]),
-      body.parts[element_parts(body)[element]].name, worst.value, advice));
+  throw DivergedError(
+      fmt::format("no equilibrium beyond {:.4g} % of the load{} (tried {:.4g} %): {}; most compressed "
+                  "is {} near {} of part \"{}\" with J = {:.3g}. {}",
+                  100 * done_, limit, 100 * trial_.share, outcome_.trouble, worst.name,
+                  point_name(worst.rest), body.parts[worst.part].name, worst.value, advice));
 }
 
 EquilibriumResult LoadStepping::operator()() {
@@ -173,6 +174,32 @@ void refuse_free_motions(Mechanics& mechanics, const std::string& scene) {
   throw InputError(scene,
                    fmt::format("part \"{}\" is free {}: add a [[fix]] that stops it",
                                mechanics.body().parts[free.front().part].name, fmt::join(names, " and ")));
+}
+
+void refuse_unsupported_elements(Mechanics& mechanics, const std::string& scene) {
+  const Body& body = mechanics.body();
+  const std::vector<std::uint8_t>& active = mechanics.paper().active();
+  if (std::find(active.begin(), active.end(), 1) == active.end()) return;
+  mechanics.assemble({std::vector<Vec3>(body.element_count(), Vec3::Zero()), 1});
+  mechanics.eliminate_prescribed();
+  const BlockMatrix& matrix = mechanics.stiffness();
+  std::size_t count = 0;
+  std::uint32_t first = 0;
+  for (std::uint32_t e = 0; e < body.element_count(); ++e) {
+    if (!active[e]) continue;
+    const Eigen::SelfAdjointEigenSolver<Mat3> eigen(Mat3(matrix.values[diagonal_position(matrix, e)]),
+                                                    Eigen::EigenvaluesOnly);
+    if (eigen.eigenvalues()[0] > kUnsupported * eigen.eigenvalues()[2]) continue;
+    if (count++ == 0) first = e;
+  }
+  if (count == 0) return;
+  throw InputError(
+      scene,
+      fmt::format("part \"{}\": the connections of {} element(s), the first near {}, lie in one plane, "
+                  "and nothing resists across it; model \"paper\" needs two elements through every "
+                  "wall: use a smaller spacing, or voxelize with --placement corner",
+                  body.parts[element_parts(body)[first]].name, human_count(count),
+                  point_name(body.rest[first])));
 }
 
 EquilibriumResult find_equilibrium(Mechanics& mechanics, State& state, const RunSettings& settings,

@@ -1,5 +1,5 @@
-// Fragments by union-find over the elements of whole cells; the smaller index is the root, so the numbering
-// is repeatable.
+// Fragments by union-find over the elements of whole cells, or over the connections of centre-placed parts;
+// the smaller index is the root, so the numbering is repeatable.
 #include "simulate/fragments.h"
 
 #include <fmt/format.h>
@@ -28,16 +28,30 @@ bool whole(const Body& body, std::size_t cell) {
   return !(cell < body.broken.size() && body.broken[cell]);
 }
 
+void join(std::vector<std::uint32_t>& parent, std::uint32_t a, std::uint32_t b) {
+  const std::uint32_t x = root_of(parent, a), y = root_of(parent, b);
+  parent[std::max(x, y)] = std::min(x, y);
+}
+
+bool any_centre(const Body& body) {
+  return std::any_of(body.parts.begin(), body.parts.end(),
+                     [](const Part& part) { return part.placement == Placement::centre; });
+}
+
 std::vector<std::uint32_t> joined_elements(const Body& body) {
   std::vector<std::uint32_t> parent(body.element_count());
   std::iota(parent.begin(), parent.end(), 0u);
+  if (any_centre(body)) {
+    const Adjacency adjacency = element_adjacency(body);
+    for (const Part& part : body.parts) {
+      if (part.placement == Placement::corner) continue;
+      for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
+        for (const std::uint32_t other : adjacency.of(e)) join(parent, e, other);
+    }
+  }
   for (std::size_t c = 0; c < body.cell_count(); ++c) {
     if (!whole(body, c)) continue;
-    for (std::size_t a = 1; a < 8; ++a) {
-      const std::uint32_t x = root_of(parent, body.cell_elements[c][0]),
-                          y = root_of(parent, body.cell_elements[c][a]);
-      parent[std::max(x, y)] = std::min(x, y);
-    }
+    for (std::size_t a = 1; a < 8; ++a) join(parent, body.cell_elements[c][0], body.cell_elements[c][a]);
   }
   return parent;
 }
@@ -64,14 +78,13 @@ std::string near(const Vec3& at) {
 }
 
 // What is bonded with something that is held is held too.
-void hold_bonded(const Fragments& fragments, const std::vector<CellPair>& coupled,
+void hold_bonded(const Fragments& fragments, const std::vector<CoupledElements>& coupled,
                  std::vector<std::uint8_t>& held) {
   std::vector<std::uint32_t> parent(held.size());
   std::iota(parent.begin(), parent.end(), 0u);
-  for (const auto& [a, b] : coupled) {
-    const std::uint32_t x = root_of(parent, fragments.of_cell[a]), y = root_of(parent, fragments.of_cell[b]);
-    parent[std::max(x, y)] = std::min(x, y);
-  }
+  for (const CoupledElements& group : coupled)
+    for (const std::uint32_t e : group)
+      join(parent, fragments.of_element[group.front()], fragments.of_element[e]);
   std::vector<std::uint8_t> group(held.size(), 0);
   for (std::uint32_t f = 0; f < held.size(); ++f)
     if (held[f]) group[root_of(parent, f)] = 1;
@@ -94,6 +107,28 @@ std::uint32_t nearest_cell(const Fragments& fragments, const Body& body, std::ui
   return nearest;
 }
 
+void add_matter(double volume, const Vec3& at, Fragment& fragment) {
+  ++fragment.size;
+  fragment.volume += volume;
+  fragment.centre += volume * at;
+}
+
+// The element of simulated matter that rests nearest to `point`, in a centre-placed part.
+std::uint32_t nearest_simulated(const Fragments& fragments, const Part& part, const Body& body,
+                                const Vec3& point) {
+  std::uint32_t nearest = kNoFragment;
+  double least = 1e300;
+  for (std::uint32_t e = part.element_begin; e < part.element_end; ++e) {
+    if (fragments.list[fragments.of_element[e]].stray) continue;
+    const double squared_distance = (body.rest[e] - point).squaredNorm();
+    if (squared_distance < least) {
+      least = squared_distance;
+      nearest = e;
+    }
+  }
+  return nearest;
+}
+
 }  // namespace
 
 Fragments find_fragments(const Body& body) {
@@ -111,12 +146,22 @@ Fragments find_fragments(const Body& body) {
       found.list.push_back({part[c]});
     }
     Fragment& fragment = found.list[which];
-    const double volume = body.fill[c] * body.parts[part[c]].lattice.spacing.prod();
-    ++fragment.cells;
-    fragment.volume += volume;
-    fragment.centre += volume * rest_centre(body, c);
+    add_matter(body.fill[c] * body.parts[part[c]].lattice.spacing.prod(), rest_centre(body, c), fragment);
     found.of_cell[c] = which;
     for (const std::uint32_t e : body.cell_elements[c]) found.of_element[e] = which;
+  }
+  for (std::uint32_t p = 0; p < body.parts.size(); ++p) {
+    const Part& placed = body.parts[p];
+    if (placed.placement == Placement::corner) continue;
+    for (std::uint32_t e = placed.element_begin; e < placed.element_end; ++e) {
+      std::uint32_t& which = number[root_of(parent, e)];
+      if (which == kNoFragment) {
+        which = static_cast<std::uint32_t>(found.list.size());
+        found.list.push_back({p});
+      }
+      add_matter(placed.lattice.spacing.prod(), body.rest[e], found.list[which]);
+      found.of_element[e] = which;
+    }
   }
   for (Fragment& fragment : found.list) fragment.centre /= fragment.volume;
   mark_strays(body, found.list);
@@ -130,9 +175,18 @@ std::vector<std::uint8_t> stray_cells(const Fragments& fragments) {
   return stray;
 }
 
+std::vector<std::uint8_t> stray_elements(const Fragments& fragments, const Body& body) {
+  std::vector<std::uint8_t> stray(body.element_count(), 0);
+  for (const Part& part : body.parts)
+    if (part.placement == Placement::centre)
+      for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
+        stray[e] = fragments.list[fragments.of_element[e]].stray;
+  return stray;
+}
+
 void refuse_loose_fragments(const Fragments& fragments, const Body& body,
                             const std::vector<std::uint8_t>& tied_elements,
-                            const std::vector<CellPair>& coupled, const std::string& scene) {
+                            const std::vector<CoupledElements>& coupled, const std::string& scene) {
   std::vector<std::uint8_t> held(fragments.list.size(), 0);
   std::vector<std::size_t> fragments_of_part(body.parts.size(), 0);
   for (std::size_t e = 0; e < tied_elements.size(); ++e)
@@ -150,20 +204,26 @@ void refuse_loose_fragments(const Fragments& fragments, const Body& body,
                       part));
     throw InputError(
         scene,
-        fmt::format("part \"{}\" is in {} pieces that are not connected; the one of {} cells near {} hangs "
+        fmt::format("part \"{}\" is in {} pieces that are not connected; the one of {} {} near {} hangs "
                     "on nothing: fix it too, or voxelize with a smaller spacing if it should be joined",
-                    part, fragments_of_part[fragment.part], human_count(fragment.cells),
+                    part, fragments_of_part[fragment.part], human_count(fragment.size),
+                    body.parts[fragment.part].placement == Placement::centre ? "elements" : "cells",
                     near(fragment.centre)));
   }
 }
 
 void carry_strays(const Fragments& fragments, const Body& body, const Stencil& stencil, State& state) {
-  struct Carrier {
+  struct Way {
     Vec3 centre = Vec3::Zero(), displacement = Vec3::Zero();
     Mat3 gradient = Mat3::Zero();
   };
   const auto carrier_near = [&](std::uint32_t part, const Vec3& point) {
-    Carrier carrier;
+    Way carrier;
+    if (body.parts[part].placement == Placement::centre) {
+      const std::uint32_t element = nearest_simulated(fragments, body.parts[part], body, point);
+      if (element != kNoFragment) carrier.displacement = state.displacement[element];
+      return carrier;
+    }
     const std::uint32_t cell = nearest_cell(fragments, body, part, point);
     if (cell == kNoFragment) return carrier;
     CellVectors u;
@@ -176,15 +236,16 @@ void carry_strays(const Fragments& fragments, const Body& body, const Stencil& s
         displacement_gradient(cell_kind(body.parts[part].lattice, Material{"", 1, 0, 1, ""}), u);
     return carrier;
   };
-  std::vector<Carrier> of_fragment(fragments.list.size());
+  std::vector<Way> of_fragment(fragments.list.size());
   for (std::size_t f = 0; f < fragments.list.size(); ++f)
     if (fragments.list[f].stray)
       of_fragment[f] = carrier_near(fragments.list[f].part, fragments.list[f].centre);
   const std::vector<std::uint32_t> part = element_parts(body);
   for (std::uint32_t e = 0; e < body.element_count(); ++e) {
-    if (!stencil.of(e).empty()) continue;
     const std::uint32_t f = fragments.of_element[e];
-    const Carrier carrier = f == kNoFragment ? carrier_near(part[e], body.rest[e]) : of_fragment[f];
+    const bool centre = body.parts[part[e]].placement == Placement::centre;
+    if (centre ? !fragments.list[f].stray : !stencil.of(e).empty()) continue;
+    const Way carrier = f == kNoFragment ? carrier_near(part[e], body.rest[e]) : of_fragment[f];
     state.displacement[e] = carrier.displacement + carrier.gradient * (body.rest[e] - carrier.centre);
   }
 }

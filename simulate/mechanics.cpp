@@ -1,6 +1,8 @@
-// Sums the cells and the passes. A pass without a hook is skipped; an effect that the scene does not name has
-// no pass.
+// Sums the models and the passes. A pass without a hook is skipped; an effect that the scene does not name
+// has no pass.
 #include "simulate/mechanics.h"
+
+#include <fmt/format.h>
 
 #include <cmath>
 
@@ -13,14 +15,14 @@ double squared_norm(const std::vector<Vec3>& values) {
   return parallel_sum<double>(values.size(), [&](std::size_t e) { return values[e].squaredNorm(); });
 }
 
-// Elements without a cell that resists (of loose crumbs) stay where they are.
-Constraints initial_constraints(const Body& body, const Stencil& stencil) {
+// Elements that nothing resists at (of loose crumbs) stay where they are.
+Constraints initial_constraints(const Body& body, const Stencil& stencil, const PaperModel& paper) {
   Constraints constraints;
   constraints.mask.assign(body.element_count(), 0);
   constraints.motion.assign(body.element_count(), {0, 0, 0});
   constraints.motions.push_back({});
   for (std::uint32_t e = 0; e < body.element_count(); ++e)
-    if (stencil.of(e).empty()) constraints.mask[e] = 7;
+    if (stencil.of(e).empty() && !paper.active()[e]) constraints.mask[e] = 7;
   return constraints;
 }
 
@@ -28,18 +30,19 @@ Constraints initial_constraints(const Body& body, const Stencil& stencil) {
 
 Mechanics::Mechanics(const Setting& setting, std::vector<Pass> passes)
     : body_(setting.body),
-      pattern_(stiffness_pattern(setting.body, active_cells(setting), coupled(passes))),
+      paper_(setting),
+      pattern_(stiffness_pattern(setting.body, active_cells(setting), paper_.rows(), coupled(passes))),
       cells_(setting, pattern_.stencil),
       passes_(std::move(passes)),
-      constraints_(initial_constraints(setting.body, pattern_.stencil)) {
+      constraints_(initial_constraints(setting.body, pattern_.stencil, paper_)) {
   for (const Pass& pass : passes_)
     if (pass.constrain) pass.constrain(constraints_);
 }
 
-std::vector<CellPair> Mechanics::coupled(const std::vector<Pass>& passes) {
-  std::vector<CellPair> pairs;
-  for (const Pass& pass : passes) pairs.insert(pairs.end(), pass.couples.begin(), pass.couples.end());
-  return pairs;
+std::vector<CoupledElements> Mechanics::coupled(const std::vector<Pass>& passes) {
+  std::vector<CoupledElements> groups;
+  for (const Pass& pass : passes) groups.insert(groups.end(), pass.couples.begin(), pass.couples.end());
+  return groups;
 }
 
 double Mechanics::energy(const State& state) {
@@ -47,6 +50,10 @@ double Mechanics::energy(const State& state) {
   {
     const PassTimer timer(cell_seconds_);
     energy = cells_.energy(state);
+  }
+  {
+    const PassTimer timer(paper_seconds_);
+    energy += paper_.energy(state);
   }
   for (Pass& pass : passes_)
     if (pass.energy) {
@@ -65,8 +72,14 @@ Forces Mechanics::forces(const State& state) {
       const PassTimer timer(pass.seconds);
       pass.add_forces(state, pass.couples.empty() ? result.total : inner);
     }
-  const PassTimer timer(cell_seconds_);
-  cells_.add_forces(state, inner);
+  {
+    const PassTimer timer(cell_seconds_);
+    cells_.add_forces(state, inner);
+  }
+  {
+    const PassTimer timer(paper_seconds_);
+    paper_.add_forces(state, inner);
+  }
   const double outer = squared_norm(result.total);
   const double held = parallel_sum<double>(inner.size(), [&](std::size_t e) {
     double sum = 0;
@@ -84,11 +97,30 @@ void Mechanics::assemble(const State& state, const TangentOptions& tangent) {
     const PassTimer timer(cell_seconds_);
     cells_.set_stiffness(state, tangent, pattern_.matrix);
   }
+  {
+    const PassTimer timer(paper_seconds_);
+    paper_.add_stiffness(state, tangent.project, pattern_.matrix);
+  }
   for (Pass& pass : passes_)
     if (pass.add_stiffness) {
       const PassTimer timer(pass.seconds);
-      pass.add_stiffness(state, pattern_.stencil, body_, pattern_.matrix);
+      pass.add_stiffness(state, pattern_.matrix);
     }
+}
+
+MostCompressed Mechanics::most_compressed(const State& state) const {
+  MostCompressed most;
+  if (body_.cell_count() > 0) {
+    const SmallestJacobian cell = cells_.smallest_jacobian(state);
+    const std::uint32_t element = body_.cell_elements[cell.cell][0];
+    most = {cell.value, fmt::format("cell {}", cell.cell), body_.rest[element],
+            element_parts(body_)[element]};
+  }
+  if (paper_.rows().entries.empty()) return most;
+  const PaperModel::SmallestVolume at = paper_.smallest_volume(state);
+  if (body_.cell_count() > 0 && most.value <= at.value) return most;
+  return {at.value, fmt::format("element {}", at.element), body_.rest[at.element],
+          element_parts(body_)[at.element]};
 }
 
 std::vector<std::uint8_t> Mechanics::tied_elements() {
@@ -97,7 +129,7 @@ std::vector<std::uint8_t> Mechanics::tied_elements() {
   std::fill(matrix.values.begin(), matrix.values.end(), Block::Zero());
   const State rest{std::vector<Vec3>(body_.element_count(), Vec3::Zero()), 1};
   for (const Pass& pass : passes_)
-    if (pass.add_stiffness && pass.couples.empty()) pass.add_stiffness(rest, pattern_.stencil, body_, matrix);
+    if (pass.add_stiffness && pass.couples.empty()) pass.add_stiffness(rest, matrix);
   for (std::uint32_t e = 0; e < tied.size(); ++e) {
     bool held = constraints_.mask[e] != 0;
     for (std::size_t entry = matrix.row_offsets[e]; entry < matrix.row_offsets[e + 1]; ++entry)
@@ -111,7 +143,10 @@ void Mechanics::report(const State& state, SimulateResult& result) {
   const Forces unbalanced = forces(state);
   for (const Pass& pass : passes_)
     if (pass.report) pass.report(state, unbalanced.total, result);
-  result.passes.push_back({"cells", "model of every part", cell_seconds_});
+  if (body_.cell_count() > 0)
+    result.passes.push_back({"cells", "model of corner-placed parts", cell_seconds_});
+  if (!paper_.rows().entries.empty())
+    result.passes.push_back({"connections", "model of centre-placed parts", paper_seconds_});
   for (const Pass& pass : passes_) result.passes.push_back({pass.name, pass.why, pass.seconds});
 }
 

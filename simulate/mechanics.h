@@ -1,14 +1,23 @@
-// Everything that acts on a body in a run: the model of its cells and the passes of its effects, summed up.
+// Everything that acts on a body in a run: the models of its parts and the passes of its effects, summed up.
 #pragma once
 #include "simulate/cells.h"
 #include "simulate/effects/effect.h"
+#include "simulate/paper_model.h"
 
 namespace flexel {
 
 // Forces on the elements [N].
 struct Forces {
-  std::vector<Vec3> total;  // (elements) of the cells and of every pass
-  double scale = 0;  // 2-norm of what acts from outside: loads, ties, and cells on prescribed components
+  std::vector<Vec3> total;  // (elements) of the models and of every pass
+  double scale = 0;  // 2-norm of what acts from outside: loads, ties, and matter on prescribed components
+};
+
+// Where matter is compressed most.
+struct MostCompressed {
+  double value = 1;          // J: volume now over that at rest, of a cell or around an element
+  std::string name;          // "cell 12", "element 7"
+  Vec3 rest = Vec3::Zero();  // m, of an element there
+  std::uint32_t part = 0;
 };
 
 class Mechanics {
@@ -22,31 +31,36 @@ class Mechanics {
   [[nodiscard]] const Constraints& constraints() const { return constraints_; }
   [[nodiscard]] const Stencil& stencil() const { return pattern_.stencil; }
   [[nodiscard]] const Cells& cells() const { return cells_; }
+  [[nodiscard]] const PaperModel& paper() const { return paper_; }
   [[nodiscard]] const BlockMatrix& stiffness() const { return pattern_.matrix; }
 
-  // Total energy [J]; infinity where a cell has J <= 0.
+  // Total energy [J]; infinity where a cell or an element has J <= 0.
   [[nodiscard]] double energy(const State& state);
-  [[nodiscard]] double elastic_energy(const State& state) { return cells_.energy(state); }
+  [[nodiscard]] double elastic_energy(const State& state) {
+    return cells_.energy(state) + paper_.energy(state);
+  }
+  [[nodiscard]] MostCompressed most_compressed(const State& state) const;
   [[nodiscard]] Forces forces(const State& state);
   // Tangent stiffness into stiffness(), prescribed components not yet eliminated.
   void assemble(const State& state, const TangentOptions& tangent = {});
   void eliminate_prescribed() { eliminate(constraints_, pattern_.matrix); }
-  // Pairs of cells that effects couple (bonds).
-  [[nodiscard]] std::vector<CellPair> coupled_cells() const { return coupled(passes_); }
+  // Groups of elements that effects couple (bonds).
+  [[nodiscard]] std::vector<CoupledElements> coupled_elements() const { return coupled(passes_); }
   // 1 for each element that a tie holds or leads.
   [[nodiscard]] std::vector<std::uint8_t> tied_elements();
 
   void report(const State& state, SimulateResult& result);
 
  private:
-  static std::vector<CellPair> coupled(const std::vector<Pass>& passes);
+  static std::vector<CoupledElements> coupled(const std::vector<Pass>& passes);
 
   const Body& body_;
+  PaperModel paper_;
   StiffnessPattern pattern_;
   Cells cells_;
   std::vector<Pass> passes_;
   Constraints constraints_;
-  double cell_seconds_ = 0;
+  double cell_seconds_ = 0, paper_seconds_ = 0;
 };
 
 }  // namespace flexel

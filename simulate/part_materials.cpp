@@ -22,31 +22,52 @@ Material material_named(const Scene& scene, const std::string& name, const std::
   throw InputError(origin, fmt::format("no material \"{}\"{}", name, hint));
 }
 
-void refuse_uneven(const PartSettings& settings, const Part& part) {
+const char* default_model(const Part& part) {
+  return part.placement == Placement::corner ? "cells" : "paper";
+}
+
+void refuse_uneven(const PartSettings& settings, const std::string& model, const Part& part) {
   const Vec3& h = part.lattice.spacing;
   if (h.maxCoeff() <= (1 + 1e-6) * h.minCoeff()) return;
-  throw InputError(settings.origin,
-                   fmt::format("model \"springs\" needs cubic cells; those of part \"{}\" are {} x {} x {}: "
-                               "voxelize with --align none",
-                               part.name, human_length(h.x()), human_length(h.y()), human_length(h.z())));
+  throw InputError(
+      settings.origin,
+      fmt::format("model \"{}\" needs a cubic lattice; the spacings of part \"{}\" are {} x {} "
+                  "x {}: voxelize with --align none",
+                  model, part.name, human_length(h.x()), human_length(h.y()), human_length(h.z())));
+}
+
+void refuse_placement(const PartSettings& settings, const std::string& model, const Part& part) {
+  const bool centre = part.placement == Placement::centre;
+  if (model == "paper" && !centre)
+    throw InputError(
+        settings.origin,
+        fmt::format("model \"paper\" needs an element at the centre of each voxel: voxelize part "
+                    "\"{}\" with --placement centre; with this one it can be \"cells\" or \"springs\"",
+                    part.name));
+  if (model != "paper" && centre)
+    throw InputError(
+        settings.origin,
+        fmt::format("model \"{}\" needs elements at the corners of the voxels: voxelize part "
+                    "\"{}\" with --placement corner; with --placement centre it can only be \"paper\"",
+                    model, part.name));
 }
 
 void refuse_model(const PartSettings& settings, const Part& part) {
-  if (part.placement != Placement::corner)
+  const std::string model = settings.model.empty() ? default_model(part) : settings.model;
+  if (model != "cells" && model != "springs" && model != "paper")
+    throw InputError(settings.origin, fmt::format("no model \"{}\"{}", model,
+                                                  did_you_mean(model, {"cells", "springs", "paper"})));
+  refuse_placement(settings, model, part);
+  if (model != "cells") refuse_uneven(settings, model, part);
+  if (settings.hooke.empty()) return;
+  if (model != "paper")
+    throw InputError(
+        settings.origin,
+        fmt::format("\"hooke\" belongs to model \"paper\"; part \"{}\" has model \"{}\"", part.name, model));
+  if (settings.hooke != "paper" && settings.hooke != "ganovelli")
     throw InputError(settings.origin,
-                     fmt::format("model \"{}\" is not available for placement centre (part \"{}\"); "
-                                 "voxelize with --placement corner",
-                                 settings.model, part.name));
-  if (settings.model == "cells") return;
-  if (settings.model == "springs") return refuse_uneven(settings, part);
-  if (settings.model == "paper")
-    throw InputError(settings.origin,
-                     fmt::format("model \"paper\" needs elements at the voxels' centres (flexel-voxelize "
-                                 "--placement centre), which this version does not run; part \"{}\" can be "
-                                 "\"cells\" or \"springs\"",
-                                 part.name));
-  throw InputError(settings.origin, fmt::format("no model \"{}\"{}", settings.model,
-                                                did_you_mean(settings.model, {"cells", "springs", "paper"})));
+                     fmt::format("no Hooke constant \"{}\"{}; known: paper, ganovelli", settings.hooke,
+                                 did_you_mean(settings.hooke, {"paper", "ganovelli"})));
 }
 
 }  // namespace
@@ -55,10 +76,22 @@ std::vector<Model> models_of_parts(const Scene& scene, const Body& body) {
   std::vector<Model> models;
   for (const Part& part : body.parts) {
     const auto found = scene.parts.find(part.name);
-    const bool springs = found != scene.parts.end() && found->second.model == "springs";
-    models.push_back(springs ? Model::springs : Model::cells);
+    const std::string model = found != scene.parts.end() && !found->second.model.empty()
+                                  ? found->second.model
+                                  : default_model(part);
+    models.push_back(model == "springs" ? Model::springs : model == "paper" ? Model::paper : Model::cells);
   }
   return models;
+}
+
+std::vector<HookeConstant> hooke_of_parts(const Scene& scene, const Body& body) {
+  std::vector<HookeConstant> constants;
+  for (const Part& part : body.parts) {
+    const auto found = scene.parts.find(part.name);
+    const bool ganovelli = found != scene.parts.end() && found->second.hooke == "ganovelli";
+    constants.push_back(ganovelli ? HookeConstant::ganovelli : HookeConstant::paper);
+  }
+  return constants;
 }
 
 std::vector<Material> materials_of_parts(const Scene& scene, const Body& body) {

@@ -1,5 +1,6 @@
-// A probe at a point is carried by the cell whose voxel is nearest, with trilinear weights; a probe of a
-// selection is the mean over its surface points by area, or over its elements.
+// A probe at a point is carried by the cell whose voxel is nearest, with trilinear weights, or by the nearest
+// element and its gradient (centre placement); a probe of a selection is the mean over its surface points by
+// area, or over its elements.
 #include "simulate/probes.h"
 
 #include <fmt/format.h>
@@ -13,58 +14,82 @@
 namespace flexel {
 namespace {
 
-// Distance [m] of a point from a cell's voxel.
-double distance_from_cell(const Body& body, const Lattice& lattice, std::uint32_t cell, const Vec3& point) {
-  const Index3& at = body.lattice_index[body.cell_elements[cell][0]];
-  const Vec3 low(at[0], at[1], at[2]);
-  const Vec3 inside = lattice.to_lattice(point) - low;
+// Distance [m] of a point from the voxel at a lattice index.
+double distance_from_voxel(const Lattice& lattice, const Index3& at, const Vec3& point) {
+  const Vec3 inside = lattice.to_lattice(point) - Vec3(at[0], at[1], at[2]);
   const Vec3 outside = (-inside).cwiseMax(inside - Vec3::Ones()).cwiseMax(0.0);
   return outside.cwiseProduct(lattice.spacing).norm();
 }
 
-ProbePoints place_point(const Probe& probe, const Body& body, const std::vector<std::uint8_t>& stray_cell) {
-  double least = 1e300, spacing = 0;
-  std::uint32_t nearest = 0;
-  for (const Part& part : body.parts)
+const Index3& lowest_corner(const Body& body, std::uint32_t cell) {
+  return body.lattice_index[body.cell_elements[cell][0]];
+}
+
+void add(const Carrier& carrier, std::vector<std::pair<std::uint32_t, double>>& weights) {
+  for (std::uint32_t a = 0; a < carrier.count; ++a)
+    weights.emplace_back(carrier.elements[a], carrier.weights[a]);
+}
+
+// The voxel nearest to a probe.
+struct Found {
+  double distance = 1e300;  // m, from the voxel that is nearest
+  double spacing = 0;       // m, of its part
+  std::uint32_t part = 0;
+  std::uint32_t cell = 0;  // of a corner-placed part
+};
+
+ProbePoints place_point(const Probe& probe, const Setting& setting) {
+  const Body& body = setting.body;
+  Found found;
+  for (std::uint32_t p = 0; p < body.parts.size(); ++p) {
+    const Part& part = body.parts[p];
+    const double spacing = part.lattice.spacing.maxCoeff();
     for (std::uint32_t c = part.cell_begin; c < part.cell_end; ++c) {
-      const double distance = distance_from_cell(body, part.lattice, c, *probe.at);
-      if (distance >= least || stray_cell[c]) continue;
-      least = distance;
-      nearest = c;
-      spacing = part.lattice.spacing.maxCoeff();
+      const double distance = distance_from_voxel(part.lattice, lowest_corner(body, c), *probe.at);
+      if (distance < found.distance && !setting.stray_cell[c]) found = {distance, spacing, p, c};
     }
-  if (!(least <= spacing))
+    if (part.placement == Placement::corner) continue;
+    for (std::uint32_t e = part.element_begin; e < part.element_end; ++e) {
+      const double distance = distance_from_voxel(part.lattice, body.lattice_index[e], *probe.at);
+      if (distance < found.distance && !setting.stray_element[e]) found = {distance, spacing, p, 0};
+    }
+  }
+  if (!(found.distance <= found.spacing))
     throw InputError(probe.origin,
                      fmt::format("probe \"{}\" lies {} outside the matter; move it onto the part", probe.name,
-                                 human_length(least)));
-  const CellPoint at = cell_point(body, nearest, *probe.at);
+                                 human_length(found.distance)));
   ProbePoints points{probe.name, *probe.at, {}};
-  for (std::size_t a = 0; a < 8; ++a)
-    points.weights.emplace_back(body.cell_elements[nearest][a], at.weights[a]);
+  if (body.parts[found.part].placement == Placement::corner) {
+    add(cell_carrier(body, cell_point(body, found.cell, *probe.at)), points.weights);
+  } else {
+    // Within a spacing of a voxel there is an element within two.
+    const auto element = nearest_element(setting, found.part, *probe.at, Vec3::Zero());
+    add(with_gradient(setting, {{*element}, {1}, 1}, *probe.at), points.weights);
+  }
   return points;
 }
 
-ProbePoints place_selection(const Probe& probe, const Body& body,
-                            const std::vector<std::uint8_t>& stray_cell) {
-  const Selected selected = resolve(*probe.where, body);
+ProbePoints place_selection(const Probe& probe, const Setting& setting) {
+  const Selected selected = resolve(*probe.where, setting.body);
   std::map<std::uint32_t, double> weights;
   double total = 0;
   ProbePoints points{probe.name, Vec3::Zero(), {}};
-  for (const SurfacePoint& point : surface_points(body, selected.polygons, stray_cell)) {
+  for (const SurfacePoint& point : surface_points(setting, selected.polygons)) {
     const double area = point.area_vector.norm();
     total += area;
     points.where += area * point.position;
-    for (std::size_t a = 0; a < 8; ++a)
-      weights[body.cell_elements[point.at.cell][a]] += area * point.at.weights[a];
+    const Carrier carrier = with_gradient(setting, point.at, point.position);
+    for (std::uint32_t a = 0; a < carrier.count; ++a)
+      weights[carrier.elements[a]] += area * carrier.weights[a];
   }
   if (total == 0)  // elements only
     for (const std::uint32_t e : selected.elements) {
       total += 1;
-      points.where += body.rest[e];
+      points.where += setting.body.rest[e];
       weights[e] += 1;
     }
   if (!(total > 0))
-    throw InputError(probe.origin, fmt::format("probe \"{}\": no cell lies under its surface", probe.name));
+    throw InputError(probe.origin, fmt::format("probe \"{}\": no matter lies under its surface", probe.name));
   points.where /= total;
   for (const auto& [element, weight] : weights) points.weights.emplace_back(element, weight / total);
   return points;
@@ -72,12 +97,10 @@ ProbePoints place_selection(const Probe& probe, const Body& body,
 
 }  // namespace
 
-std::vector<ProbePoints> place_probes(const Scene& scene, const Body& body,
-                                      const std::vector<std::uint8_t>& stray_cell) {
+std::vector<ProbePoints> place_probes(const Scene& scene, const Setting& setting) {
   std::vector<ProbePoints> placed;
   for (const Probe& probe : scene.probes)
-    placed.push_back(probe.at ? place_point(probe, body, stray_cell)
-                              : place_selection(probe, body, stray_cell));
+    placed.push_back(probe.at ? place_point(probe, setting) : place_selection(probe, setting));
   return placed;
 }
 

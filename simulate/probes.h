@@ -17,8 +17,7 @@ struct ProbePoints {
 };
 
 // Throws InputError: a point further than one spacing from all matter, a selection that selects nothing.
-[[nodiscard]] std::vector<ProbePoints> place_probes(const Scene& scene, const Body& body,
-                                                    const std::vector<std::uint8_t>& stray_cell);
+[[nodiscard]] std::vector<ProbePoints> place_probes(const Scene& scene, const Setting& setting);
 [[nodiscard]] ProbeResult measure(const ProbePoints& probe, const State& state);
 
 }  // namespace flexel

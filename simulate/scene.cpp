@@ -50,7 +50,8 @@ void parse_parts(TableReader& root, Scene& scene) {
     PartSettings settings;
     settings.origin = reader.place();
     settings.material = reader.text("material").value_or("");
-    settings.model = reader.text("model").value_or("cells");
+    settings.model = reader.text("model").value_or("");
+    settings.hooke = reader.text("hooke").value_or("");
     reader.finish();
     scene.parts[name] = settings;
   }

@@ -20,7 +20,8 @@ namespace flexel {
 // [parts.NAME]
 struct PartSettings {
   std::string material;  // "" : the scene's default, else the body's own
-  std::string model = "cells";
+  std::string model;     // "" : cells at corner placement, paper at centre placement
+  std::string hooke;     // of model paper: "paper" ("" too) or "ganovelli"
   std::string origin;
 };
 
@@ -76,7 +77,8 @@ struct Scene {
 // The material of each part: that of [parts.NAME], else the scene's default, else the body's own. Throws
 // InputError: none (and what to write), an unknown name (with the nearest), a setting for a part that the
 // body does not have, a model or placement that cannot be run.
-[[nodiscard]] std::vector<Model> models_of_parts(const Scene& scene, const Body& body);  // cells by default
+[[nodiscard]] std::vector<Model> models_of_parts(const Scene& scene, const Body& body);
+[[nodiscard]] std::vector<HookeConstant> hooke_of_parts(const Scene& scene, const Body& body);
 [[nodiscard]] std::vector<Material> materials_of_parts(const Scene& scene, const Body& body);
 
 }  // namespace flexel

@@ -31,13 +31,21 @@ void name_materials(Body& body, const std::vector<Material>& materials) {
   for (std::size_t p = 0; p < body.parts.size(); ++p) body.parts[p].material = materials[p].name;
 }
 
-void warn_of_poisson(const Setting& setting, Progress& progress) {
-  for (std::size_t p = 0; p < setting.models.size(); ++p)
-    if (const Material& material = setting.materials[p];
-        setting.models[p] == Model::springs && std::abs(material.poisson - 0.25) > 0.005)
+void warn_of_springs(const Setting& setting, Progress& progress) {
+  for (std::size_t p = 0; p < setting.models.size(); ++p) {
+    const Material& material = setting.materials[p];
+    const std::string& part = setting.body.parts[p].name;
+    if (setting.models[p] == Model::springs && std::abs(material.poisson - 0.25) > 0.005)
       progress.warn(
-          fmt::format("part \"{}\": model \"springs\" has Poisson's ratio 0.25, not the {:.3g} of {}",
-                      setting.body.parts[p].name, material.poisson, material.name));
+          fmt::format("part \"{}\": model \"springs\" has Poisson's ratio 0.25, not the {:.3g} of {}", part,
+                      material.poisson, material.name));
+    if (setting.models[p] == Model::paper)
+      progress.warn(fmt::format(
+          "part \"{}\": model \"paper\" is stiffer than {} inside (Young's modulus {:.3g} times along the "
+          "lattice's axes) and softer at its surface; it is meant for comparison with the paper, not for "
+          "sizes",
+          part, material.name, axial_stiffness(setting.hooke[p])));
+  }
 }
 
 void report_strays(const Fragments& fragments, SimulateResult& result, Progress& progress) {
@@ -46,18 +54,18 @@ void report_strays(const Fragments& fragments, SimulateResult& result, Progress&
   for (const Fragment& fragment : fragments.list)
     if (fragment.stray) {
       ++crumbs;
-      result.stray_cells += fragment.cells;
+      result.stray_cells += fragment.size;
       volume += fragment.volume;
     }
   if (crumbs > 0)
     progress.warn(fmt::format(
-        "{} loose crumb(s) of {} cells in all ({}) hang on nothing; they are carried along with the matter "
+        "{} loose crumb(s) of {} voxels in all ({}) hang on nothing; they are carried along with the matter "
         "nearest to them",
         crumbs, human_count(result.stray_cells), human_volume(volume)));
 }
 
 void explain_before(const std::vector<Pass>& passes, Progress& progress) {
-  progress.say("plan: cells (the parts' models), equilibrium by Newton's method");
+  progress.say("plan: the parts' models, equilibrium by Newton's method");
   for (const Pass& pass : passes) progress.say(fmt::format("plan: {} ({})", pass.name, pass.why));
 }
 
@@ -99,10 +107,17 @@ void measure_corners(const Mechanics& mechanics, const State& state, SimulateRes
 
 double mass_of(const Setting& setting) {
   const std::vector<std::uint32_t> part = cell_parts(setting.body);
-  return parallel_sum<double>(setting.body.cell_count(), [&](std::size_t c) {
+  double mass = parallel_sum<double>(setting.body.cell_count(), [&](std::size_t c) {
     return setting.body.fill[c] * setting.materials[part[c]].density *
            setting.body.parts[part[c]].lattice.spacing.prod();
   });
+  for (std::size_t p = 0; p < setting.body.parts.size(); ++p) {
+    const Part& each = setting.body.parts[p];
+    if (each.placement == Placement::centre)
+      mass += (each.element_end - each.element_begin) * setting.materials[p].density *
+              each.lattice.spacing.prod();
+  }
+  return mass;
 }
 
 bool anything_acts(const Scene& scene) {
@@ -136,8 +151,9 @@ class Run {
 };
 
 EquilibriumResult Run::solve(Mechanics& mechanics) {
-  refuse_loose_fragments(fragments_, body_, mechanics.tied_elements(), mechanics.coupled_cells(),
+  refuse_loose_fragments(fragments_, body_, mechanics.tied_elements(), mechanics.coupled_elements(),
                          scene_.name);
+  refuse_unsupported_elements(mechanics, scene_.name);
   refuse_free_motions(mechanics, scene_.name);
   Deadline deadline;
   if (options_.timeout)
@@ -163,11 +179,15 @@ std::string Run::save_failed(const Mechanics& mechanics) {
 
 SimulateResult Run::operator()() {
   SimulateResult result;
-  const Setting setting{body_, materials_of_parts(scene_, body_), stray_cells(fragments_),
-                        models_of_parts(scene_, body_)};
-  warn_of_poisson(setting, progress_);
+  const Setting setting{body_,
+                        materials_of_parts(scene_, body_),
+                        stray_cells(fragments_),
+                        models_of_parts(scene_, body_),
+                        hooke_of_parts(scene_, body_),
+                        stray_elements(fragments_, body_)};
+  warn_of_springs(setting, progress_);
   name_materials(body_, setting.materials);
-  const std::vector<ProbePoints> probes = place_probes(scene_, body_, setting.stray_cell);
+  const std::vector<ProbePoints> probes = place_probes(scene_, setting);
   std::vector<Pass> passes = Effects::passes(scene_.effects, setting);
   if (!anything_acts(scene_))
     progress_.warn("the scene has no [[load]], [[move]] or [gravity]: nothing will move");
@@ -178,7 +198,7 @@ SimulateResult Run::operator()() {
   const EquilibriumResult solved = solve(mechanics);
   mechanics.report(state_, result);
   result.elastic_energy = mechanics.elastic_energy(state_);
-  result.smallest_jacobian = mechanics.cells().smallest_jacobian(state_).value;
+  result.smallest_jacobian = mechanics.most_compressed(state_).value;
   measure_corners(mechanics, state_, result, progress_);
   carry_strays(fragments_, body_, mechanics.stencil(), state_);
   move_body(body_, state_);

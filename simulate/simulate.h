@@ -48,10 +48,11 @@ struct SimulateResult {
   std::size_t stray_cells = 0;      // in loose crumbs that were carried along, not simulated
   double largest_displacement = 0;  // m, over the elements
   Vec3 largest_displacement_at = Vec3::Zero();
-  double elastic_energy = 0;               // J
-  double mass = 0;                         // kg
-  double smallest_jacobian = 1;            // of all cells' mean deformation gradients
-  double smallest_corner_jacobian = 1;     // of the trilinear map at the cells' corners; <= 0: folded there
+  double elastic_energy = 0;     // J
+  double mass = 0;               // kg
+  double smallest_jacobian = 1;  // of all cells' mean gradients, and those around elements at centres
+  // of the trilinear map at the cells' corners; <= 0: folded there; nothing without cells
+  std::optional<double> smallest_corner_jacobian;
   Vec3 smallest_corner_at = Vec3::Zero();  // m, rest position of that corner
   int load_steps = 0, newton_iterations = 0, cg_iterations = 0;
   double relative_residual = 0;

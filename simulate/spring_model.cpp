@@ -1,26 +1,17 @@
-// One cell of springs. The elongation is written as (2 rest . du + du . du) / (|r| + |rest|), which keeps its
-// digits for small strains.
+// One cell of springs.
 #include "simulate/spring_model.h"
 
 #include <bit>
-#include <cmath>
+
+#include "simulate/central_spring.h"
 
 namespace flexel {
 namespace {
 
 constexpr double kCornerShare = 0.1;  // t
 
-struct Stretched {
-  Vec3 direction = Vec3::Zero();  // unit, from a to b
-  double length = 0, elongation = 0;
-};
-
-Stretched stretched(const Spring& spring, const CellVectors& u) {
-  const Vec3 change = u[spring.b] - u[spring.a];
-  const Vec3 now = spring.rest + change;
-  const double length = now.norm();
-  return {now / length, length,
-          (2 * spring.rest.dot(change) + change.squaredNorm()) / (length + spring.rest.norm())};
+Stretch stretched(const Spring& spring, const CellVectors& u) {
+  return stretch(spring.rest, u[spring.b] - u[spring.a]);
 }
 
 }  // namespace
@@ -57,7 +48,7 @@ CellVectors cell_forces(const SpringKind& kind, const CellVectors& u) {
   CellVectors forces;
   forces.fill(Vec3::Zero());
   for (const Spring& spring : kind.springs) {
-    const Stretched now = stretched(spring, u);
+    const Stretch now = stretched(spring, u);
     const Vec3 force = spring.stiffness * now.elongation * now.direction;
     forces[spring.a] += force;
     forces[spring.b] -= force;
@@ -66,11 +57,7 @@ CellVectors cell_forces(const SpringKind& kind, const CellVectors& u) {
 }
 
 Block spring_block(const Spring& spring, const CellVectors& u, bool project) {
-  const Stretched now = stretched(spring, u);
-  const double across = now.elongation / now.length;  // of the stiffness, by tension
-  const double kept = project ? std::max(across, 0.0) : across;
-  const Mat3 along = now.direction * now.direction.transpose();
-  return spring.stiffness * (along + kept * (Mat3::Identity() - along));
+  return spring_tangent(spring.stiffness, stretched(spring, u), project);
 }
 
 }  // namespace flexel

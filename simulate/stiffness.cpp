@@ -24,32 +24,32 @@ void fill_incidences(const Body& body, const std::vector<std::uint8_t>& active, 
       for (std::uint32_t a = 0; a < 8; ++a) stencil.incidences[next[body.cell_elements[c][a]]++] = {c, a};
 }
 
-// Cells by the cell that they are coupled with.
-using Coupled = std::unordered_map<std::uint32_t, std::vector<std::uint32_t>>;
+// What makes elements neighbours: cells, connections, and groups by the elements that they hold.
+struct Neighbourhood {
+  const Body& body;
+  const Stencil& stencil;
+  const ConnectionRows& connections;
+  std::unordered_map<std::uint32_t, std::vector<const CoupledElements*>> groups;
+};
 
-Coupled both_ways(const std::vector<CellPair>& pairs) {
-  Coupled coupled;
-  for (const auto& [a, b] : pairs) {
-    coupled[a].push_back(b);
-    coupled[b].push_back(a);
-  }
-  return coupled;
+Neighbourhood neighbourhood(const Body& body, const Stencil& stencil, const ConnectionRows& connections,
+                            const std::vector<CoupledElements>& coupled) {
+  Neighbourhood result{body, stencil, connections, {}};
+  for (const CoupledElements& group : coupled)
+    for (const std::uint32_t e : group) result.groups[e].push_back(&group);
+  return result;
 }
 
-// Elements that share an active cell with `element` or lie in one that is coupled with such a cell, itself
-// among them, ascending.
-void collect_row(const Body& body, const Stencil& stencil, const Coupled& coupled, std::uint32_t element,
-                 std::vector<std::uint32_t>& row) {
+// The neighbours of `element`, itself among them, ascending.
+void collect_row(const Neighbourhood& near, std::uint32_t element, std::vector<std::uint32_t>& row) {
   row.assign(1, element);
-  const auto add = [&](std::uint32_t cell) {
-    row.insert(row.end(), body.cell_elements[cell].begin(), body.cell_elements[cell].end());
-  };
-  for (const Incidence& at : stencil.of(element)) {
-    add(at.cell);
-    if (coupled.empty()) continue;
-    if (const auto others = coupled.find(at.cell); others != coupled.end())
-      for (const std::uint32_t other : others->second) add(other);
+  for (const Incidence& at : near.stencil.of(element)) {
+    const auto& cell = near.body.cell_elements[at.cell];
+    row.insert(row.end(), cell.begin(), cell.end());
   }
+  for (const ConnectionRows::Entry& entry : near.connections.of(element)) row.push_back(entry.other);
+  if (const auto groups = near.groups.find(element); groups != near.groups.end())
+    for (const CoupledElements* group : groups->second) row.insert(row.end(), group->begin(), group->end());
   std::sort(row.begin(), row.end());
   row.erase(std::unique(row.begin(), row.end()), row.end());
 }
@@ -57,18 +57,19 @@ void collect_row(const Body& body, const Stencil& stencil, const Coupled& couple
 }  // namespace
 
 StiffnessPattern stiffness_pattern(const Body& body, const std::vector<std::uint8_t>& active,
-                                   const std::vector<CellPair>& pairs) {
-  const Coupled coupled = both_ways(pairs);
+                                   const ConnectionRows& connections,
+                                   const std::vector<CoupledElements>& coupled) {
   StiffnessPattern pattern;
   Stencil& stencil = pattern.stencil;
   BlockMatrix& matrix = pattern.matrix;
   const std::size_t n = body.element_count();
   fill_incidences(body, active, stencil);
+  const Neighbourhood near = neighbourhood(body, stencil, connections, coupled);
   std::vector<std::uint32_t> length(n);
   parallel_chunks(n, 4096, [&](std::size_t begin, std::size_t end) {
     std::vector<std::uint32_t> row;
     for (std::size_t e = begin; e < end; ++e) {
-      collect_row(body, stencil, coupled, static_cast<std::uint32_t>(e), row);
+      collect_row(near, static_cast<std::uint32_t>(e), row);
       length[e] = static_cast<std::uint32_t>(row.size());
     }
   });
@@ -80,7 +81,7 @@ StiffnessPattern stiffness_pattern(const Body& body, const std::vector<std::uint
   parallel_chunks(n, 4096, [&](std::size_t begin, std::size_t end) {
     std::vector<std::uint32_t> row;
     for (std::size_t e = begin; e < end; ++e) {
-      collect_row(body, stencil, coupled, static_cast<std::uint32_t>(e), row);
+      collect_row(near, static_cast<std::uint32_t>(e), row);
       std::copy(row.begin(), row.end(),
                 matrix.columns.begin() + static_cast<std::ptrdiff_t>(matrix.row_offsets[e]));
       for (const Incidence& at : stencil.of(static_cast<std::uint32_t>(e)))

@@ -5,11 +5,13 @@
 #include <vector>
 
 #include "formats/body.h"
+#include "simulate/connections.h"
 #include "simulate/linear/block_matrix.h"
 
 namespace flexel {
 
-using CellPair = std::array<std::uint32_t, 2>;
+// Elements between which an effect acts, each with each; ascending.
+using CoupledElements = std::vector<std::uint32_t>;
 
 // One cell at one of its elements.
 struct Incidence {
@@ -30,20 +32,14 @@ struct Stencil {
 };
 
 // The stencil of the cells with active[cell] != 0, and a matrix of zeros with its pattern: a row per element,
-// its diagonal always present. The elements of two cells of `coupled` are neighbours as those of one cell
-// are.
+// its diagonal always present. Connected elements, and those of a group of `coupled`, are neighbours as those
+// of one cell are.
 struct StiffnessPattern {
   Stencil stencil;
   BlockMatrix matrix;
 };
 [[nodiscard]] StiffnessPattern stiffness_pattern(const Body& body, const std::vector<std::uint8_t>& active,
-                                                 const std::vector<CellPair>& coupled = {});
-
-// Where block (a, b) of a cell is in the matrix's values.
-[[nodiscard]] inline std::size_t block_index(const Stencil& stencil, const BlockMatrix& matrix,
-                                             const Body& body, std::uint32_t cell, std::size_t a,
-                                             std::size_t b) {
-  return matrix.row_offsets[body.cell_elements[cell][a]] + stencil.slot[cell][8 * a + b];
-}
+                                                 const ConnectionRows& connections,
+                                                 const std::vector<CoupledElements>& coupled = {});
 
 }  // namespace flexel

@@ -66,8 +66,10 @@ std::string summary_json(const SimulateResult& result, const Body& body) {
   json["imbalance"] = vector(result.imbalance);
   json["elastic_energy"] = result.elastic_energy;
   json["smallest_jacobian"] = result.smallest_jacobian;
-  json["smallest_corner_jacobian"] = result.smallest_corner_jacobian;
-  json["smallest_corner_at"] = vector(result.smallest_corner_at);
+  if (result.smallest_corner_jacobian) {
+    json["smallest_corner_jacobian"] = *result.smallest_corner_jacobian;
+    json["smallest_corner_at"] = vector(result.smallest_corner_at);
+  }
   json["load_steps"] = result.load_steps;
   json["newton_iterations"] = result.newton_iterations;
   json["cg_iterations"] = result.cg_iterations;
@@ -93,12 +95,15 @@ std::vector<std::string> summary_lines(const SimulateResult& result) {
   for (const BondedParts& bond : result.bonds)
     lines.push_back(fmt::format("\"{}\" and \"{}\" are bonded over {:.4g} mm2", bond.parts[0], bond.parts[1],
                                 bond.area * 1e6));
-  lines.push_back(fmt::format(
-      "elastic energy {:.4g} J, smallest J {:.4g} (at a corner {:.4g}), {} load step(s), {} Newton and {} CG "
-      "iterations, "
-      "residual {:.1e}, {:.2f} s",
-      result.elastic_energy, result.smallest_jacobian, result.smallest_corner_jacobian, result.load_steps,
-      result.newton_iterations, result.cg_iterations, result.relative_residual, result.seconds));
+  const std::string corner = result.smallest_corner_jacobian
+                                 ? fmt::format(" (at a corner {:.4g})", *result.smallest_corner_jacobian)
+                                 : "";
+  lines.push_back(
+      fmt::format("elastic energy {:.4g} J, smallest J {:.4g}{}, {} load step(s), {} Newton and {} CG "
+                  "iterations, residual "
+                  "{:.1e}, {:.2f} s",
+                  result.elastic_energy, result.smallest_jacobian, corner, result.load_steps,
+                  result.newton_iterations, result.cg_iterations, result.relative_residual, result.seconds));
   return lines;
 }
 

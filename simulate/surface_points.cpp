@@ -54,8 +54,8 @@ std::vector<std::uint32_t> selected_triangles(const Body& body, const Triangles&
 
 }  // namespace
 
-std::vector<SurfacePoint> surface_points(const Body& body, const std::vector<std::uint32_t>& polygons,
-                                         const std::vector<std::uint8_t>& skip) {
+std::vector<SurfacePoint> surface_points(const Setting& setting, const std::vector<std::uint32_t>& polygons) {
+  const Body& body = setting.body;
   const Triangles triangles = triangulate(body.surface);
   const std::vector<std::uint32_t> list = selected_triangles(body, triangles, polygons);
   std::vector<std::vector<SurfacePoint>> found(list.size());
@@ -71,9 +71,9 @@ std::vector<SurfacePoint> surface_points(const Body& body, const std::vector<std
                    pieces);
         for (const Corners& piece : pieces) {
           const Vec3 centre = (piece[0] + piece[1] + piece[2]) / 3;
-          const auto at = locate_on_surface(body, polygon, centre);
-          if (!at || (at->cell < skip.size() && skip[at->cell])) continue;
-          found[t].push_back({*at, centre, 0.5 * (piece[1] - piece[0]).cross(piece[2] - piece[0]), polygon});
+          const Vec3 area = 0.5 * (piece[1] - piece[0]).cross(piece[2] - piece[0]);
+          if (const auto at = carrier_on_surface(setting, polygon, centre, area))
+            found[t].push_back({*at, centre, area, polygon});
         }
       },
       16);

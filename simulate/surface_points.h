@@ -1,25 +1,24 @@
-// Quadrature over selected polygons: points on the part's surface at rest, each carried by the cell under it.
+// Quadrature over selected polygons: points on the part's surface at rest, each carried by the cell under it,
+// or by the nearest element (centre placement).
 #pragma once
 #include <vector>
 
-#include "formats/body.h"
-#include "formats/locate.h"
+#include "simulate/carrier.h"
 
 namespace flexel {
 
 struct SurfacePoint {
-  CellPoint at;
+  Carrier at;
   Vec3 position = Vec3::Zero();     // m, rest, world frame
   Vec3 area_vector = Vec3::Zero();  // m^2, outward normal times the area that the point stands for
   std::uint32_t polygon = 0;
 };
 
 // Triangles are cut in two at their longest edge until that edge is at most 0.3 of the smallest spacing of
-// their part; each piece gives its centroid. Points over no cell, or over a cell with skip[cell] != 0, are
-// left out. Order: by polygon.
-[[nodiscard]] std::vector<SurfacePoint> surface_points(const Body& body,
-                                                       const std::vector<std::uint32_t>& polygons,
-                                                       const std::vector<std::uint8_t>& skip);
+// their part; each piece gives its centroid. Points that nothing carries, or only stray matter, are left out.
+// Order: by polygon.
+[[nodiscard]] std::vector<SurfacePoint> surface_points(const Setting& setting,
+                                                       const std::vector<std::uint32_t>& polygons);
 
 [[nodiscard]] double total_area(const std::vector<SurfacePoint>& points);
 

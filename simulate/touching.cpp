@@ -88,19 +88,19 @@ class Grid {
 
 class Search {
  public:
-  Search(const Body& body, const std::vector<std::uint8_t>& skip);
+  explicit Search(const Setting& setting);
   std::vector<TouchingPoint> operator()();
 
  private:
   [[nodiscard]] double tolerance(std::uint32_t part) const {
     return std::max(kOfDiagonal * diagonal_, kOfSpacing * body_.parts[part].lattice.spacing.minCoeff());
   }
-  void sample(std::uint32_t part, const std::vector<std::uint8_t>& skip);
+  void sample(std::uint32_t part);
   void touch(std::uint32_t finer, std::uint32_t coarser);
   [[nodiscard]] double distance(const Vec3& point, std::uint32_t polygon) const;
 
+  const Setting& setting_;
   const Body& body_;
-  const std::vector<std::uint8_t>& skip_;
   double diagonal_ = 0;
   Triangles triangles_;
   std::vector<std::uint32_t> first_triangle_;      // (polygons + 1)
@@ -109,10 +109,12 @@ class Search {
   std::vector<TouchingPoint> found_;
 };
 
-Search::Search(const Body& body, const std::vector<std::uint8_t>& skip)
-    : body_(body), skip_(skip), diagonal_(bounding_box(body.surface.vertices).diagonal()) {
-  const Surface& surface = body.surface;
-  box_.resize(body.parts.size());
+Search::Search(const Setting& setting)
+    : setting_(setting),
+      body_(setting.body),
+      diagonal_(bounding_box(setting.body.surface.vertices).diagonal()) {
+  const Surface& surface = body_.surface;
+  box_.resize(body_.parts.size());
   for (std::size_t p = 0; p < surface.polygon_count(); ++p)
     for (const std::uint32_t vertex : surface.polygon(p))
       box_[surface.polygon_part(p)].add(surface.vertices[vertex]);
@@ -120,11 +122,11 @@ Search::Search(const Body& body, const std::vector<std::uint8_t>& skip)
   first_triangle_.assign(surface.polygon_count() + 1, 0);
   for (const std::uint32_t polygon : triangles_.polygon) ++first_triangle_[polygon + 1];
   for (std::size_t p = 0; p < surface.polygon_count(); ++p) first_triangle_[p + 1] += first_triangle_[p];
-  points_.resize(body.parts.size());
-  for (std::uint32_t part = 0; part < body.parts.size(); ++part) sample(part, skip);
+  points_.resize(body_.parts.size());
+  for (std::uint32_t part = 0; part < body_.parts.size(); ++part) sample(part);
 }
 
-void Search::sample(std::uint32_t part, const std::vector<std::uint8_t>& skip) {
+void Search::sample(std::uint32_t part) {
   std::vector<std::uint32_t> polygons;
   for (std::uint32_t p = 0; p < body_.surface.polygon_count(); ++p) {
     if (body_.surface.polygon_part(p) != part) continue;
@@ -135,7 +137,7 @@ void Search::sample(std::uint32_t part, const std::vector<std::uint8_t>& skip) {
         break;
       }
   }
-  if (!polygons.empty()) points_[part] = surface_points(body_, polygons, skip);
+  if (!polygons.empty()) points_[part] = surface_points(setting_, polygons);
 }
 
 double Search::distance(const Vec3& point, std::uint32_t polygon) const {
@@ -167,9 +169,12 @@ void Search::touch(std::uint32_t finer, std::uint32_t coarser) {
       nearest = polygon;
     }
     if (!nearest) continue;
-    const auto at = locate_on_surface(body_, *nearest, point.position);
-    if (!at || (at->cell < skip_.size() && skip_[at->cell])) continue;
-    found_.push_back({{finer, coarser}, {point.at, *at}, point.area_vector.norm()});
+    const auto at = carrier_on_surface(setting_, *nearest, point.position, normal.at(*nearest));
+    if (!at) continue;
+    found_.push_back(
+        {{finer, coarser},
+         {with_gradient(setting_, point.at, point.position), with_gradient(setting_, *at, point.position)},
+         point.area_vector.norm()});
   }
 }
 
@@ -186,9 +191,9 @@ std::vector<TouchingPoint> Search::operator()() {
 
 }  // namespace
 
-std::vector<TouchingPoint> touching_points(const Body& body, const std::vector<std::uint8_t>& skip) {
-  if (body.parts.size() < 2) return {};
-  return Search(body, skip)();
+std::vector<TouchingPoint> touching_points(const Setting& setting) {
+  if (setting.body.parts.size() < 2) return {};
+  return Search(setting)();
 }
 
 }  // namespace flexel

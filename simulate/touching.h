@@ -2,21 +2,19 @@
 #pragma once
 #include <vector>
 
-#include "formats/locate.h"
+#include "simulate/carrier.h"
 
 namespace flexel {
 
 struct TouchingPoint {
   std::array<std::uint32_t, 2> part{};  // of the finer lattice first
-  std::array<CellPoint, 2> at;          // the same rest point, carried by a cell of each
+  std::array<Carrier, 2> at;            // the same rest point, carried by the matter of each
   double area = 0;                      // m^2 that the point stands for
 };
 
 // Points of the finer part's surface (surface_points()) that lie within 1e-6 of the body's diagonal, or 0.01
 // of the finer spacing, of a polygon of the other part that faces them within 45 degrees. Each point touches
-// the nearest such polygon. Cells with skip[cell] != 0 are left out. Order: by pair of parts, then by
-// polygon.
-[[nodiscard]] std::vector<TouchingPoint> touching_points(const Body& body,
-                                                         const std::vector<std::uint8_t>& skip);
+// the nearest such polygon. Stray matter is left out. Order: by pair of parts, then by polygon.
+[[nodiscard]] std::vector<TouchingPoint> touching_points(const Setting& setting);
 
 }  // namespace flexel

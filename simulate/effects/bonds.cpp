@@ -1,4 +1,4 @@
-// Pairs of cells along the shared surface, each with a constant matrix. They are few (a layer between two
+// Pairs of carriers along the shared surface, each with a constant matrix. They are few (a layer between two
 // parts), so their sums run on one thread in a fixed order.
 #include "simulate/effects/bonds.h"
 
@@ -12,14 +12,20 @@
 namespace flexel {
 namespace {
 
-using Weights = Eigen::Matrix<double, 16, 1>;
+using Weights = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 16, 1>;
+
+std::vector<std::uint32_t> elements_of(const TouchingPoint& point) {
+  std::vector<std::uint32_t> elements;
+  for (const Carrier& carrier : point.at)
+    elements.insert(elements.end(), carrier.elements.begin(), carrier.elements.begin() + carrier.count);
+  return elements;
+}
 
 Weights jump(const TouchingPoint& point) {
-  Weights weights;
-  for (Eigen::Index a = 0; a < 8; ++a) {
-    weights[a] = point.at[0].weights[static_cast<std::size_t>(a)];
-    weights[8 + a] = -point.at[1].weights[static_cast<std::size_t>(a)];
-  }
+  Weights weights(point.at[0].count + point.at[1].count);
+  for (std::uint32_t a = 0; a < point.at[0].count; ++a) weights[a] = point.at[0].weights[a];
+  for (std::uint32_t a = 0; a < point.at[1].count; ++a)
+    weights[point.at[0].count + a] = -point.at[1].weights[a];
   return weights;
 }
 
@@ -50,20 +56,20 @@ void Bonds::parse(TableReader& scene, Parameters& parameters) {
 
 std::optional<Bonds> Bonds::make(const Parameters& parameters, const Setting& setting) {
   if (!parameters.bond) return std::nullopt;
-  const std::vector<TouchingPoint> points = touching_points(setting.body, setting.stray_cell);
+  const std::vector<TouchingPoint> points = touching_points(setting);
   if (points.empty()) return std::nullopt;
   Bonds made;
-  made.body_ = &setting.body;
-  std::map<CellPair, Eigen::Matrix<double, 16, 16>> by_cells;
+  using Matrix = decltype(BondedElements::stiffness);
+  std::map<std::vector<std::uint32_t>, Matrix> by_elements;
   std::map<std::array<std::uint32_t, 2>, double> area;
   for (const TouchingPoint& point : points) {
     const Weights weights = jump(point);
     auto [entry, fresh] =
-        by_cells.try_emplace({point.at[0].cell, point.at[1].cell}, Eigen::Matrix<double, 16, 16>::Zero());
+        by_elements.try_emplace(elements_of(point), Matrix::Zero(weights.size(), weights.size()));
     entry->second += kPenalty * foundation(point, setting) * point.area * weights * weights.transpose();
     area[{std::min(point.part[0], point.part[1]), std::max(point.part[0], point.part[1])}] += point.area;
   }
-  for (const auto& [cells, stiffness] : by_cells) made.cells_.push_back({cells, stiffness});
+  for (const auto& [elements, stiffness] : by_elements) made.bonds_.push_back({elements, stiffness});
   for (const auto& [parts, shared] : area)
     made.parts_.push_back({{setting.body.parts[parts[0]].name, setting.body.parts[parts[1]].name}, shared});
   return made;
@@ -73,40 +79,43 @@ std::string Bonds::why() const {
   return fmt::format("{} pair(s) of parts touch; bond = false leaves them apart", parts_.size());
 }
 
-Eigen::Matrix<double, 16, 3> Bonds::displacements(const BondedCells& bond, const State& state) const {
-  Eigen::Matrix<double, 16, 3> u;
-  for (Eigen::Index a = 0; a < 16; ++a) u.row(a) = state.displacement[element(bond, a)].transpose();
+Bonds::Displacements Bonds::displacements(const BondedElements& bond, const State& state) {
+  Displacements u(bond.elements.size(), 3);
+  for (Eigen::Index a = 0; a < u.rows(); ++a) u.row(a) = state.displacement[bond.element(a)].transpose();
   return u;
 }
 
 double Bonds::energy(const State& state) const {
   double energy = 0;
-  for (const BondedCells& bond : cells_) {
-    const Eigen::Matrix<double, 16, 3> u = displacements(bond, state);
+  for (const BondedElements& bond : bonds_) {
+    const Displacements u = displacements(bond, state);
     energy += 0.5 * (u.transpose() * bond.stiffness * u).trace();
   }
   return energy;
 }
 
 void Bonds::add_forces(const State& state, std::vector<Vec3>& forces) const {
-  for (const BondedCells& bond : cells_) {
-    const Eigen::Matrix<double, 16, 3> force = bond.stiffness * displacements(bond, state);
-    for (Eigen::Index a = 0; a < 16; ++a) forces[element(bond, a)] -= force.row(a).transpose();
+  for (const BondedElements& bond : bonds_) {
+    const Displacements force = bond.stiffness * displacements(bond, state);
+    for (Eigen::Index a = 0; a < force.rows(); ++a) forces[bond.element(a)] -= force.row(a).transpose();
   }
 }
 
-void Bonds::add_stiffness(const State&, const Stencil&, const Body&, BlockMatrix& matrix) const {
-  for (const BondedCells& bond : cells_)
-    for (Eigen::Index a = 0; a < 16; ++a)
-      for (Eigen::Index b = 0; b < 16; ++b)
-        matrix.values[position_of(matrix, element(bond, a), element(bond, b))].diagonal().array() +=
+void Bonds::add_stiffness(const State&, BlockMatrix& matrix) const {
+  for (const BondedElements& bond : bonds_)
+    for (Eigen::Index a = 0; a < bond.stiffness.rows(); ++a)
+      for (Eigen::Index b = 0; b < bond.stiffness.cols(); ++b)
+        matrix.values[position_of(matrix, bond.element(a), bond.element(b))].diagonal().array() +=
             bond.stiffness(a, b);
 }
 
-std::vector<CellPair> Bonds::couples() const {
-  std::vector<CellPair> pairs;
-  for (const BondedCells& bond : cells_) pairs.push_back(bond.cells);
-  return pairs;
+std::vector<CoupledElements> Bonds::couples() const {
+  std::vector<CoupledElements> groups;
+  for (const BondedElements& bond : bonds_) {
+    groups.push_back(bond.elements);
+    std::sort(groups.back().begin(), groups.back().end());
+  }
+  return groups;
 }
 
 void Bonds::report(const State&, const std::vector<Vec3>&, SimulateResult& result) const {

@@ -12,12 +12,11 @@
 // and any of these hooks, found by concept; a hook that an effect lacks is never called:
 //   double energy(const State&) const                                 J
 //   void add_forces(const State&, std::vector<Vec3>&) const           N, minus the energy's derivative
-//   void add_stiffness(const State&, const Stencil&, const Body&, BlockMatrix&) const
-//                                                                     N/m, minus the forces' derivative
+//   void add_stiffness(const State&, BlockMatrix&) const              N/m, minus the forces' derivative
 //   void constrain(Constraints&) const                                elements that follow a path exactly
-//   std::vector<CellPair> couples() const                             cells between which its forces act;
-//   they
-//                                                                     are inner ones then, and hold nothing
+//   std::vector<CoupledElements> couples() const                      elements between which its forces act;
+//                                                                     they are inner ones then, and hold
+//                                                                     nothing
 //   void report(const State&, const std::vector<Vec3>& unbalanced, SimulateResult&) const
 // An effect that a scene does not name makes no object, no array and no pass.
 #pragma once
@@ -46,9 +45,8 @@ concept AddsForces = requires(const E& e, const State& s, std::vector<Vec3>& f) 
   e.add_forces(s, f);
 };
 template <class E>
-concept AddsStiffness = requires(const E& e, const State& s, const Stencil& t, const Body& b,
-                                 BlockMatrix& m) {
-  e.add_stiffness(s, t, b, m);
+concept AddsStiffness = requires(const E& e, const State& s, BlockMatrix& m) {
+  e.add_stiffness(s, m);
 };
 template <class E>
 concept Constrains = requires(const E& e, Constraints& c) {
@@ -56,7 +54,7 @@ concept Constrains = requires(const E& e, Constraints& c) {
 };
 template <class E>
 concept Couples = requires(const E& e) {
-  { e.couples() } -> std::same_as<std::vector<CellPair>>;
+  { e.couples() } -> std::same_as<std::vector<CoupledElements>>;
 };
 template <class E>
 concept Reports = requires(const E& e, const State& s, const std::vector<Vec3>& u, SimulateResult& r) {
@@ -68,10 +66,10 @@ struct Pass {
   std::string name, why;
   std::function<double(const State&)> energy;
   std::function<void(const State&, std::vector<Vec3>&)> add_forces;
-  std::function<void(const State&, const Stencil&, const Body&, BlockMatrix&)> add_stiffness;
+  std::function<void(const State&, BlockMatrix&)> add_stiffness;
   std::function<void(Constraints&)> constrain;
   std::function<void(const State&, const std::vector<Vec3>&, SimulateResult&)> report;
-  std::vector<CellPair> couples;
+  std::vector<CoupledElements> couples;
   double seconds = 0;
 };
 
@@ -85,9 +83,7 @@ template <class E>
   if constexpr (AddsForces<E>)
     pass.add_forces = [effect](const State& s, std::vector<Vec3>& f) { effect->add_forces(s, f); };
   if constexpr (AddsStiffness<E>)
-    pass.add_stiffness = [effect](const State& s, const Stencil& t, const Body& b, BlockMatrix& m) {
-      effect->add_stiffness(s, t, b, m);
-    };
+    pass.add_stiffness = [effect](const State& s, BlockMatrix& m) { effect->add_stiffness(s, m); };
   if constexpr (Constrains<E>) pass.constrain = [effect](Constraints& c) { effect->constrain(c); };
   if constexpr (Couples<E>) pass.couples = effect->couples();
   if constexpr (Reports<E>)

@@ -2,7 +2,7 @@
 #include "simulate/effects/gravity.h"
 
 #include "formats/parallel.h"
-#include "simulate/cells.h"
+#include "simulate/carrier.h"
 
 namespace flexel {
 
@@ -20,15 +20,7 @@ std::optional<Gravity> Gravity::make(const Parameters& parameters, const Setting
   if (!parameters.acceleration) return std::nullopt;
   Gravity gravity;
   gravity.acceleration_ = *parameters.acceleration;
-  gravity.mass_.assign(setting.body.element_count(), 0);
-  const std::vector<std::uint8_t> active = active_cells(setting);
-  const std::vector<std::uint32_t> part = cell_parts(setting.body);
-  for (std::size_t c = 0; c < setting.body.cell_count(); ++c) {
-    if (!active[c]) continue;
-    const double eighth = setting.body.fill[c] * setting.materials[part[c]].density *
-                          setting.body.parts[part[c]].lattice.spacing.prod() / 8;
-    for (const std::uint32_t e : setting.body.cell_elements[c]) gravity.mass_[e] += eighth;
-  }
+  gravity.mass_ = element_masses(setting);
   return gravity;
 }
 

@@ -1,6 +1,6 @@
 // Uniform gravity: every cell's matter, f rho V, is drawn the same way; an eighth of it acts on each of the
-// cell's elements. The field of the paper's equation (1) with one distant source (Jansson and Vergeest,
-// section 3.2).
+// cell's elements; at centre placement an element has the matter of its voxel. The field of the paper's
+// equation (1) with one distant source (Jansson and Vergeest, section 3.2).
 #pragma once
 #include "simulate/effects/effect.h"
 
@@ -23,7 +23,7 @@ class Gravity {
 
  private:
   Vec3 acceleration_ = Vec3::Zero();
-  std::vector<double> mass_;  // (elements) kg, of the cells that resist
+  std::vector<double> mass_;  // (elements) kg, of the matter that resists
 };
 
 }  // namespace flexel

@@ -1,11 +1,12 @@
 // Consistent forces: each surface point's share goes to the eight elements of its cell with the trilinear
 // weights, so that the sum of the forces, and of their moments, is that of the load on the surface itself.
+// Centre placement: to the nearest element, which keeps the sum; the moment is that of a surface half a voxel
+// further in.
 #include "simulate/effects/loads.h"
 
 #include <fmt/format.h>
 
 #include "formats/error.h"
-#include "simulate/cells.h"
 #include "simulate/scene_selection.h"
 #include "simulate/surface_points.h"
 
@@ -28,23 +29,23 @@ Load parse_load(TableReader& reader) {
   return load;
 }
 
-void spread(const CellPoint& at, const Vec3& force, const Body& body, std::vector<Vec3>& sum) {
-  for (std::size_t a = 0; a < 8; ++a) sum[body.cell_elements[at.cell][a]] += at.weights[a] * force;
+void spread(const Carrier& at, const Vec3& force, std::vector<Vec3>& sum) {
+  for (std::uint32_t a = 0; a < at.count; ++a) sum[at.elements[a]] += at.weights[a] * force;
 }
 
 void add_surface_load(const Load& load, const std::vector<std::uint32_t>& polygons, const Setting& setting,
                       std::vector<Vec3>& sum) {
-  const std::vector<SurfacePoint> points = surface_points(setting.body, polygons, setting.stray_cell);
+  const std::vector<SurfacePoint> points = surface_points(setting, polygons);
   const double area = total_area(points);
   if (!(area > 0))
     throw InputError(
         load.origin,
-        fmt::format("load \"{}\": no cell lies under the selected surface; use a smaller spacing",
+        fmt::format("load \"{}\": no matter lies under the selected surface; use a smaller spacing",
                     load.name));
   for (const SurfacePoint& point : points) {
     const Vec3 force = load.force ? Vec3(*load.force * (point.area_vector.norm() / area))
                                   : Vec3(-*load.pressure * point.area_vector);
-    spread(point.at, force, setting.body, sum);
+    spread(point.at, force, sum);
   }
 }
 
@@ -55,13 +56,7 @@ void add_volume_load(const Load& load, const std::vector<std::uint32_t>& element
     throw InputError(load.origin,
                      fmt::format("load \"{}\": a pressure needs a face, group or side; {} selects elements",
                                  load.name, describe(load.where)));
-  std::vector<double> volume(setting.body.element_count(), 0);
-  const std::vector<std::uint8_t> active = active_cells(setting);
-  const std::vector<std::uint32_t> part = cell_parts(setting.body);
-  for (std::size_t c = 0; c < setting.body.cell_count(); ++c)
-    if (active[c])
-      for (const std::uint32_t e : setting.body.cell_elements[c])
-        volume[e] += setting.body.fill[c] * setting.body.parts[part[c]].lattice.spacing.prod() / 8;
+  const std::vector<double> volume = element_volumes(setting);
   double total = 0;
   for (const std::uint32_t e : elements) total += volume[e];
   if (!(total > 0))

@@ -1,5 +1,5 @@
-// Ties: penalty matrices per tied cell, and elements that are followed exactly. Tied cells are few (a layer
-// under a surface), so their sums run on one thread in a fixed order.
+// Ties: penalty matrices per tied cell or element, and elements that are followed exactly. Tied ones are few
+// (a layer under a surface), so their sums run on one thread in a fixed order.
 #include "simulate/effects/ties.h"
 
 #include <fmt/format.h>
@@ -61,21 +61,24 @@ std::optional<Ties> Ties::make(const Parameters& parameters, const Setting& sett
 
 void Ties::add_surface_tie(std::uint32_t tie, const std::vector<std::uint32_t>& polygons,
                            const Setting& setting) {
-  const std::vector<SurfacePoint> points = surface_points(setting.body, polygons, setting.stray_cell);
+  const std::vector<SurfacePoint> points = surface_points(setting, polygons);
   if (!(total_area(points) > 0))
     throw InputError(ties_[tie].origin,
-                     fmt::format("\"{}\": no cell lies under the selected surface; use a smaller spacing",
+                     fmt::format("\"{}\": no matter lies under the selected surface; use a smaller spacing",
                                  ties_[tie].name));
-  std::map<std::uint32_t, Eigen::Matrix<double, 8, 8>> by_cell;
+  using Matrix = decltype(TiedElements::stiffness);
+  std::map<std::array<std::uint32_t, 8>, TiedElements> by_elements;
   for (const SurfacePoint& point : points) {
     const std::uint32_t part = setting.body.surface.polygon_part(point.polygon);
     const double stiffness = kPenalty * setting.materials[part].young /
                              setting.body.parts[part].lattice.spacing.mean() * point.area_vector.norm();
-    const Eigen::Map<const Eigen::Matrix<double, 8, 1>> weights(point.at.weights.data());
-    auto [entry, fresh] = by_cell.try_emplace(point.at.cell, Eigen::Matrix<double, 8, 8>::Zero());
-    entry->second += stiffness * weights * weights.transpose();
+    const auto count = static_cast<Eigen::Index>(point.at.count);
+    const Eigen::Map<const Eigen::VectorXd> weights(point.at.weights.data(), count);
+    auto [entry, fresh] = by_elements.try_emplace(
+        point.at.elements, TiedElements{tie, point.at.count, point.at.elements, Matrix::Zero(count, count)});
+    entry->second.stiffness += stiffness * weights * weights.transpose();
   }
-  for (const auto& [cell, stiffness] : by_cell) cells_.push_back({tie, cell, stiffness});
+  for (const auto& [elements, tied] : by_elements) tied_.push_back(tied);
 }
 
 std::string Ties::why() const {
@@ -83,12 +86,12 @@ std::string Ties::why() const {
   return fmt::format("{} [[fix]], {} [[move]]", static_cast<std::ptrdiff_t>(ties_.size()) - moves, moves);
 }
 
-// u_a - d(X_a) on the tied axes, 0 on the others. (8 x 3) m
-Eigen::Matrix<double, 8, 3> Ties::violation(const TiedCell& tied, const State& state) const {
+// u_a - d(X_a) on the tied axes, 0 on the others. (count x 3) m
+Ties::Displacements Ties::violation(const TiedElements& tied, const State& state) const {
   const Tie& tie = ties_[tied.tie];
-  Eigen::Matrix<double, 8, 3> result;
-  for (std::size_t a = 0; a < 8; ++a) {
-    const std::uint32_t e = body_->cell_elements[tied.cell][a];
+  Displacements result(tied.count, 3);
+  for (std::size_t a = 0; a < tied.count; ++a) {
+    const std::uint32_t e = tied.elements[a];
     const Vec3 off = state.displacement[e] - tie.motion.displacement(body_->rest[e], state.share);
     for (std::size_t axis = 0; axis < 3; ++axis)
       result(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(axis)) =
@@ -99,26 +102,26 @@ Eigen::Matrix<double, 8, 3> Ties::violation(const TiedCell& tied, const State& s
 
 double Ties::energy(const State& state) const {
   double energy = 0;
-  for (const TiedCell& tied : cells_) {
-    const Eigen::Matrix<double, 8, 3> off = violation(tied, state);
+  for (const TiedElements& tied : tied_) {
+    const Displacements off = violation(tied, state);
     energy += 0.5 * (off.transpose() * tied.stiffness * off).trace();
   }
   return energy;
 }
 
 void Ties::add_forces(const State& state, std::vector<Vec3>& forces) const {
-  for (const TiedCell& tied : cells_) {
-    const Eigen::Matrix<double, 8, 3> force = tied.stiffness * violation(tied, state);
-    for (std::size_t a = 0; a < 8; ++a)
-      forces[body_->cell_elements[tied.cell][a]] -= force.row(static_cast<Eigen::Index>(a)).transpose();
+  for (const TiedElements& tied : tied_) {
+    const Displacements force = tied.stiffness * violation(tied, state);
+    for (std::size_t a = 0; a < tied.count; ++a)
+      forces[tied.elements[a]] -= force.row(static_cast<Eigen::Index>(a)).transpose();
   }
 }
 
-void Ties::add_stiffness(const State&, const Stencil& stencil, const Body& body, BlockMatrix& matrix) const {
-  for (const TiedCell& tied : cells_)
-    for (std::size_t a = 0; a < 8; ++a)
-      for (std::size_t b = 0; b < 8; ++b) {
-        Block& block = matrix.values[block_index(stencil, matrix, body, tied.cell, a, b)];
+void Ties::add_stiffness(const State&, BlockMatrix& matrix) const {
+  for (const TiedElements& tied : tied_)
+    for (std::size_t a = 0; a < tied.count; ++a)
+      for (std::size_t b = 0; b < tied.count; ++b) {
+        Block& block = matrix.values[position_of(matrix, tied.elements[a], tied.elements[b])];
         for (int axis = 0; axis < 3; ++axis)
           if (ties_[tied.tie].axes[static_cast<std::size_t>(axis)])
             block(axis, axis) += tied.stiffness(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b));
@@ -140,7 +143,7 @@ void Ties::constrain(Constraints& constraints) const {
 
 void Ties::report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) const {
   std::vector<Vec3> reaction(ties_.size(), Vec3::Zero());
-  for (const TiedCell& tied : cells_)
+  for (const TiedElements& tied : tied_)
     reaction[tied.tie] -= (tied.stiffness * violation(tied, state)).colwise().sum().transpose();
   std::vector<std::uint8_t> counted(body_->element_count(),
                                     0);  // an element of two ties counts for the first

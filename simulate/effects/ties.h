@@ -1,10 +1,12 @@
 // Fixes and moves: material points that are held or led.
 //
 // Surface selections are tied by penalty at quadrature points q of the surface: energy 1/2 k_q |u_q - d_q|^2
-// on the tied axes with u_q = sum_a w_qa u_a (trilinear, elements of the cell under q), k_q = 300 E / h times
+// on the tied axes with u_q = sum_a w_qa u_a (trilinear, elements of the cell under q; centre
+// placement: the nearest element), k_q = 300 E / h times
 // the point's area (E of the part, h the mean spacing; 10 to 300 moves a cantilever's tip by under one
 // percent). The led displacement d is affine in the rest position, which trilinear weights
-// reproduce, so u_q - d_q = sum_a w_qa (u_a - d(X_a)): one 8 x 8 matrix a cell holds all its points. Element
+// reproduce, so u_q - d_q = sum_a w_qa (u_a - d(X_a)): one 8 x 8 matrix a cell holds all its points (one
+// number an element that carries by itself, which is led to d(X) of its own place). Element
 // selections (box, sphere, half-space, part) are followed exactly and eliminated.
 #pragma once
 #include "simulate/effects/effect.h"
@@ -36,22 +38,26 @@ class Ties {
 
   [[nodiscard]] double energy(const State& state) const;
   void add_forces(const State& state, std::vector<Vec3>& forces) const;
-  void add_stiffness(const State& state, const Stencil& stencil, const Body& body, BlockMatrix& matrix) const;
+  void add_stiffness(const State& state, BlockMatrix& matrix) const;
   void constrain(Constraints& constraints) const;
   // Reactions: penalty forces, and minus the unbalanced forces on eliminated elements.
   void report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) const;
 
  private:
-  struct TiedCell {
-    std::uint32_t tie = 0, cell = 0;
-    Eigen::Matrix<double, 8, 8> stiffness;  // sum over points of k_q w_qa w_qb [N/m]
+  struct TiedElements {
+    std::uint32_t tie = 0;
+    std::uint32_t count = 0;
+    std::array<std::uint32_t, 8> elements{};  // `count` of them
+    // sum over points of k_q w_qa w_qb [N/m]
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 8, 8> stiffness;
   };
-  [[nodiscard]] Eigen::Matrix<double, 8, 3> violation(const TiedCell& tied, const State& state) const;
+  using Displacements = Eigen::Matrix<double, Eigen::Dynamic, 3, 0, 8, 3>;
+  [[nodiscard]] Displacements violation(const TiedElements& tied, const State& state) const;
   void add_surface_tie(std::uint32_t tie, const std::vector<std::uint32_t>& polygons, const Setting& setting);
 
   const Body* body_ = nullptr;
   std::vector<Tie> ties_;
-  std::vector<TiedCell> cells_;                            // by tie, then cell
+  std::vector<TiedElements> tied_;                         // by tie, then elements
   std::vector<std::vector<std::uint32_t>> held_elements_;  // (ties) eliminated elements
 };
 

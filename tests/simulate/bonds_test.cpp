@@ -109,9 +109,9 @@ std::string refusal(Body body, const Scene& scene) {
 }
 
 TEST(Bonds, OnlyPartsThatTouchAreBonded) {
-  EXPECT_TRUE(touching_points(bar(true), {}).empty());
-  EXPECT_FALSE(touching_points(bar(false, 4, 0.0005), {}).empty());  // under a hundredth of the spacing
-  EXPECT_TRUE(touching_points(bar(false, 4, 0.002), {}).empty());
+  EXPECT_TRUE(touching_points({bar(true), {}, {}}).empty());
+  EXPECT_FALSE(touching_points({bar(false, 4, 0.0005), {}, {}}).empty());  // under a hundredth of the spacing
+  EXPECT_TRUE(touching_points({bar(false, 4, 0.002), {}, {}}).empty());
   EXPECT_THAT(refusal(bar(false, 4, 0.002), pull(Vec3(0, 0, 1))), HasSubstr("nothing holds part \"far\""));
 }
 

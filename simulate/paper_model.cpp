@@ -1,0 +1,133 @@
+// Every element gathers over its own row of connections, in the order of the other elements, so every sum has
+// a fixed order and the bits do not depend on the number of threads. A connection is worked out at both of
+// its ends; both give the same numbers with opposite signs, so that momentum is kept exactly.
+#include "simulate/paper_model.h"
+
+#include <Eigen/LU>
+#include <limits>
+
+#include "formats/parallel.h"
+#include "simulate/central_spring.h"
+
+namespace flexel {
+namespace {
+
+constexpr std::size_t kGrain = 512;
+
+// Axis of a kind of connection along one axis of the lattice, or 3. Kinds are 1 + the bit of
+// half_neighbourhood.
+std::size_t axis_of(std::uint8_t kind) {
+  return kind == 1 ? 0 : kind == 3 ? 1 : kind == 9 ? 2 : 3;
+}
+static_assert(half_neighbourhood[0] == Index3{1, 0, 0} && half_neighbourhood[2] == Index3{0, 1, 0} &&
+              half_neighbourhood[8] == Index3{0, 0, 1});
+
+struct Least {
+  double value = std::numeric_limits<double>::infinity();
+  std::uint32_t element = 0;
+  Least& operator+=(const Least& other) {
+    if (other.value < value) *this = other;
+    return *this;
+  }
+};
+
+}  // namespace
+
+PaperModel::PaperModel(const Setting& setting)
+    : body_(setting.body),
+      connections_(make_connections(setting)),
+      rows_(connection_rows(connections_, setting.body.element_count())),
+      part_(element_parts(setting.body)),
+      active_(setting.body.element_count(), 0) {
+  for (std::size_t e = 0; e < active_.size(); ++e)
+    active_[e] = body_.parts[part_[e]].placement == Placement::centre &&
+                 !(e < setting.stray_element.size() && setting.stray_element[e]);
+}
+
+double PaperModel::volume_ratio(const State& state, std::uint32_t element) const {
+  Mat3 gradient = Mat3::Zero();
+  std::array<int, 3> sides{};
+  std::array<double, 3> length{};
+  for (const ConnectionRows::Entry& entry : rows_.of(element)) {
+    const std::size_t axis = axis_of(entry.kind);
+    if (axis == 3) continue;
+    const ConnectionKind& connection = kind(element, entry.kind);
+    gradient.col(static_cast<Eigen::Index>(axis)) +=
+        entry.sign * (state.displacement[entry.other] - state.displacement[element]);
+    ++sides[axis];
+    length[axis] += connection.length;
+  }
+  if (sides[0] * sides[1] * sides[2] == 0) return 1;
+  for (std::size_t axis = 0; axis < 3; ++axis) gradient.col(static_cast<Eigen::Index>(axis)) /= length[axis];
+  return (body_.parts[part_[element]].lattice.axes + gradient).determinant();
+}
+
+double PaperModel::energy(const State& state) const {
+  return parallel_sum<double>(
+      rows_.offsets.size() - 1,
+      [&](std::size_t e) {
+        const auto element = static_cast<std::uint32_t>(e);
+        if (!active_[e]) return 0.0;
+        if (!(volume_ratio(state, element) > 0)) return std::numeric_limits<double>::infinity();
+        double energy = 0;
+        for (const ConnectionRows::Entry& entry : rows_.of(element)) {
+          if (entry.sign < 0) continue;
+          const ConnectionKind& connection = kind(element, entry.kind);
+          const double elongation =
+              stretch(connection.rest, state.displacement[entry.other] - state.displacement[e]).elongation;
+          energy += 0.5 * connection.stiffness * elongation * elongation;
+        }
+        return energy;
+      },
+      kGrain);
+}
+
+void PaperModel::add_forces(const State& state, std::vector<Vec3>& forces) const {
+  parallel_for_each(
+      rows_.offsets.size() - 1,
+      [&](std::size_t e) {
+        const auto element = static_cast<std::uint32_t>(e);
+        for (const ConnectionRows::Entry& entry : rows_.of(element)) {
+          const ConnectionKind& connection = kind(element, entry.kind);
+          const Stretch now =
+              stretch(entry.sign * connection.rest, state.displacement[entry.other] - state.displacement[e]);
+          forces[e] += (connection.stiffness * now.elongation) * now.direction;
+        }
+      },
+      kGrain);
+}
+
+void PaperModel::add_stiffness(const State& state, bool project, BlockMatrix& matrix) const {
+  parallel_for_each(
+      rows_.offsets.size() - 1,
+      [&](std::size_t e) {
+        const auto element = static_cast<std::uint32_t>(e);
+        if (rows_.of(element).empty()) return;
+        Block own = Block::Zero();
+        for (const ConnectionRows::Entry& entry : rows_.of(element)) {
+          const ConnectionKind& connection = kind(element, entry.kind);
+          const Stretch now =
+              stretch(entry.sign * connection.rest, state.displacement[entry.other] - state.displacement[e]);
+          const Block block = spring_tangent(connection.stiffness, now, project);
+          own += block;
+          matrix.values[position_of(matrix, e, entry.other)] -= block;
+        }
+        matrix.values[diagonal_position(matrix, e)] += own;
+      },
+      kGrain);
+}
+
+PaperModel::SmallestVolume PaperModel::smallest_volume(const State& state) const {
+  const Least least = parallel_sum<Least>(
+      rows_.offsets.size() - 1,
+      [&](std::size_t e) {
+        if (!active_[e]) return Least{};
+        const auto element = static_cast<std::uint32_t>(e);
+        return Least{volume_ratio(state, element), element};
+      },
+      kGrain);
+  if (!(least.value < std::numeric_limits<double>::infinity())) return {};
+  return {least.value, least.element};
+}
+
+}  // namespace flexel

@@ -1,0 +1,50 @@
+// Model `paper`: the centre-placed parts of a body resist by central springs along their connections, and by
+// nothing else (Jansson and Vergeest, equations 2, 15 and 22; simulate/connections.h).
+//
+// Springs alone would let matter turn inside out and stay so. As a measure of that every element with
+// neighbours along each axis of the lattice has a deformation gradient: by differences between the two
+// neighbours along an axis, or between the one and itself. Its determinant J is the volume now over that at
+// rest; states with J <= 0 are refused.
+#pragma once
+#include "simulate/connections.h"
+#include "simulate/linear/block_matrix.h"
+
+namespace flexel {
+
+class PaperModel {
+ public:
+  // Keeps a reference to the setting's body.
+  explicit PaperModel(const Setting& setting);
+
+  [[nodiscard]] const ConnectionRows& rows() const { return rows_; }
+  // (elements) 1: of a centre-placed part, and simulated
+  [[nodiscard]] const std::vector<std::uint8_t>& active() const { return active_; }
+
+  // Elastic energy [J], 1/2 k (d - l)^2 over the connections; infinity where an element has J <= 0.
+  [[nodiscard]] double energy(const State& state) const;
+  // Adds the forces of the connections on their elements [N].
+  void add_forces(const State& state, std::vector<Vec3>& forces) const;
+  // Adds the tangent. With `project` without the negative part that compressed connections have.
+  void add_stiffness(const State& state, bool project, BlockMatrix& matrix) const;
+
+  struct SmallestVolume {
+    double value = 1;  // J
+    std::uint32_t element = 0;
+  };
+  [[nodiscard]] SmallestVolume smallest_volume(const State& state) const;
+  // J of an element; 1 where it lacks neighbours along an axis.
+  [[nodiscard]] double volume_ratio(const State& state, std::uint32_t element) const;
+
+ private:
+  [[nodiscard]] const ConnectionKind& kind(std::uint32_t element, std::uint8_t which) const {
+    return connections_.parts[part_[element]].kinds[which];
+  }
+
+  const Body& body_;
+  Connections connections_;
+  ConnectionRows rows_;
+  std::vector<std::uint32_t> part_;  // (elements)
+  std::vector<std::uint8_t> active_;
+};
+
+}  // namespace flexel
