@@ -30,8 +30,8 @@ double spacing_for_cells(const std::vector<PartExtent>& extents, double cells, P
 }
 
 namespace {
-constexpr double kProgram = 35e6;                           // bytes
-constexpr double kPerCell = 4500, kPerCentreElement = 400;  // bytes
+constexpr double kProgram = 35e6;                            // bytes
+constexpr double kPerCell = 4500, kPerCentreElement = 4200;  // bytes
 double bytes_each(Placement placement) {
   return placement == Placement::corner ? kPerCell : kPerCentreElement;
 }

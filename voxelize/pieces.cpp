@@ -336,11 +336,15 @@ void number_by_record(const std::vector<std::uint32_t>& fragment, std::uint32_t 
 
 }  // namespace
 
+// The way from the corner to the point bends at an irregular place: a straight one from the corner to the
+// voxel's centre would run through a box's own corner, where the signs of the edges tie.
 int winding_at(const VoxelRecords& voxel, const Vec3& point) {
+  const Vec3 bend = Vec3(voxel.i, voxel.j, voxel.k) + Vec3(kCentres[0][0], kCentres[0][1], kCentres[0][2]);
   int winding = voxel.winding[0];
   for (const Record& record : voxel.records) {
     double at = 0;
-    winding += cross_triangle(corner_point(voxel, 0), point, *voxel.mesh, record.triangle, at);
+    winding += cross_triangle(corner_point(voxel, 0), bend, *voxel.mesh, record.triangle, at);
+    winding += cross_triangle(bend, point, *voxel.mesh, record.triangle, at);
   }
   return winding;
 }

@@ -84,6 +84,10 @@ inline double tip_error(Body body, Scene scene, Selection loaded, int n) {
   return 100 * (compliance / study_reference(study_width(n)) - 1);
 }
 
+inline double cells_error(int n) {
+  return tip_error(corner_beam(n), held_beam("cells"), select_by_name("box/x1"), n);
+}
+
 inline double springs_error(int n) {
   return tip_error(corner_beam(n), held_beam("springs"), select_by_name("box/x1"), n);
 }

@@ -74,6 +74,15 @@ TEST(Pieces, AThinTurnedPlateStaysWhole) {
   }
 }
 
+// The way from a voxel's corner to its centre runs through the box's own corner.
+TEST(Pieces, AnAlignedBoxHasAnElementInEveryVoxel) {
+  for (const int n : {1, 2, 5})
+    for (const Vec3& at : {Vec3(0, 0, 0), Vec3(-0.3, 0.1, 0.2)}) {
+      const VoxelizeResult result = run(box(at, at + Vec3(4, 1, 1)), 1.0 / n, Align::snap, Placement::centre);
+      EXPECT_EQ(result.body.element_count(), static_cast<std::size_t>(4 * n * n * n)) << n;
+    }
+}
+
 TEST(Pieces, PlacedAtCentresLeavesStayTwo) {
   const double h = .1;
   std::mt19937 random(31);
