@@ -51,14 +51,16 @@ std::optional<std::uint32_t> neighbour(const Body& body, const Part& part, std::
   return std::nullopt;
 }
 
-std::vector<std::uint32_t> neighbours(const Body& body, const Part& part, std::uint32_t element,
+std::vector<std::uint32_t> neighbours(const Setting& setting, const Part& part, std::uint32_t element,
                                       bool along_axes) {
   std::vector<std::uint32_t> found;
   for (std::size_t bit = 0; bit < half_neighbourhood.size(); ++bit) {
     const Index3& d = half_neighbourhood[bit];
     if ((std::abs(d[0]) + std::abs(d[1]) + std::abs(d[2]) == 1) != along_axes) continue;
     for (const int sign : {-1, 1})
-      if (const auto other = neighbour(body, part, element, bit, sign)) found.push_back(*other);
+      if (const auto other = neighbour(setting.body, part, element, bit, sign);
+          other && !is_stray(setting, *other))
+        found.push_back(*other);
   }
   return found;
 }
@@ -138,7 +140,7 @@ Carrier with_gradient(const Setting& setting, const Carrier& carrier, const Vec3
   const Body& body = setting.body;
   const std::uint32_t element = carrier.elements[0];
   const Part& part = body.parts[part_of_element(body, element)];
-  std::vector<std::uint32_t> others = neighbours(body, part, element, true);
+  std::vector<std::uint32_t> others = neighbours(setting, part, element, true);
   const auto fit = [&] {
     Mat3 moment = Mat3::Zero();
     for (const std::uint32_t f : others) {
@@ -149,7 +151,7 @@ Carrier with_gradient(const Setting& setting, const Carrier& carrier, const Vec3
   };
   std::pair<Mat3, bool> inverse = fit();
   if (!inverse.second) {
-    for (const std::uint32_t f : neighbours(body, part, element, false)) others.push_back(f);
+    for (const std::uint32_t f : neighbours(setting, part, element, false)) others.push_back(f);
     if (others.size() > 7) others.resize(7);
     inverse = fit();
   }

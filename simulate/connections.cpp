@@ -69,7 +69,7 @@ Connections make_connections(const Setting& setting) {
       if (stray(e)) continue;
       const Index3& from = body.lattice_index[e];
       for (const std::uint32_t other : adjacency.of(e)) {
-        if (other < e) continue;
+        if (other < e || stray(other)) continue;
         const Index3& to = body.lattice_index[other];
         const int direction = 13 + (to[0] - from[0]) + 3 * (to[1] - from[1]) + 9 * (to[2] - from[2]);
         assert(direction >= 0 && direction < 27 && kind_of[static_cast<std::size_t>(direction)] > 0);

@@ -9,6 +9,7 @@
 
 #include "formats/error.h"
 #include "formats/units.h"
+#include "simulate/carrier.h"
 #include "simulate/cell_model.h"
 
 namespace flexel {
@@ -114,19 +115,33 @@ void add_matter(double volume, const Vec3& at, Fragment& fragment) {
 }
 
 // The element of simulated matter that rests nearest to `point`, in a centre-placed part.
-std::uint32_t nearest_simulated(const Fragments& fragments, const Part& part, const Body& body,
-                                const Vec3& point) {
+std::uint32_t nearest_simulated(const Setting& setting, const Part& part, const Vec3& point) {
   std::uint32_t nearest = kNoFragment;
   double least = 1e300;
   for (std::uint32_t e = part.element_begin; e < part.element_end; ++e) {
-    if (fragments.list[fragments.of_element[e]].stray) continue;
-    const double squared_distance = (body.rest[e] - point).squaredNorm();
+    if (setting.stray_element[e]) continue;
+    const double squared_distance = (setting.body.rest[e] - point).squaredNorm();
     if (squared_distance < least) {
       least = squared_distance;
       nearest = e;
     }
   }
   return nearest;
+}
+
+void carry_stray_elements(const Setting& setting, State& state) {
+  for (const Part& part : setting.body.parts) {
+    if (part.placement == Placement::corner) continue;
+    for (std::uint32_t e = part.element_begin; e < part.element_end; ++e) {
+      if (!setting.stray_element[e]) continue;
+      const std::uint32_t nearest = nearest_simulated(setting, part, setting.body.rest[e]);
+      if (nearest == kNoFragment) continue;
+      const Carrier carrier = with_gradient(setting, {{nearest}, {1}, 1}, setting.body.rest[e]);
+      state.displacement[e] = Vec3::Zero();
+      for (std::uint32_t a = 0; a < carrier.count; ++a)
+        state.displacement[e] += carrier.weights[a] * state.displacement[carrier.elements[a]];
+    }
+  }
 }
 
 }  // namespace
@@ -212,18 +227,15 @@ void refuse_loose_fragments(const Fragments& fragments, const Body& body,
   }
 }
 
-void carry_strays(const Fragments& fragments, const Body& body, const Stencil& stencil, State& state) {
+void carry_strays(const Fragments& fragments, const Setting& setting, const Stencil& stencil, State& state) {
+  const Body& body = setting.body;
+  carry_stray_elements(setting, state);
   struct Way {
     Vec3 centre = Vec3::Zero(), displacement = Vec3::Zero();
     Mat3 gradient = Mat3::Zero();
   };
   const auto carrier_near = [&](std::uint32_t part, const Vec3& point) {
     Way carrier;
-    if (body.parts[part].placement == Placement::centre) {
-      const std::uint32_t element = nearest_simulated(fragments, body.parts[part], body, point);
-      if (element != kNoFragment) carrier.displacement = state.displacement[element];
-      return carrier;
-    }
     const std::uint32_t cell = nearest_cell(fragments, body, part, point);
     if (cell == kNoFragment) return carrier;
     CellVectors u;
@@ -238,13 +250,12 @@ void carry_strays(const Fragments& fragments, const Body& body, const Stencil& s
   };
   std::vector<Way> of_fragment(fragments.list.size());
   for (std::size_t f = 0; f < fragments.list.size(); ++f)
-    if (fragments.list[f].stray)
+    if (fragments.list[f].stray && body.parts[fragments.list[f].part].placement == Placement::corner)
       of_fragment[f] = carrier_near(fragments.list[f].part, fragments.list[f].centre);
   const std::vector<std::uint32_t> part = element_parts(body);
   for (std::uint32_t e = 0; e < body.element_count(); ++e) {
+    if (body.parts[part[e]].placement == Placement::centre || !stencil.of(e).empty()) continue;
     const std::uint32_t f = fragments.of_element[e];
-    const bool centre = body.parts[part[e]].placement == Placement::centre;
-    if (centre ? !fragments.list[f].stray : !stencil.of(e).empty()) continue;
     const Way carrier = f == kNoFragment ? carrier_near(part[e], body.rest[e]) : of_fragment[f];
     state.displacement[e] = carrier.displacement + carrier.gradient * (body.rest[e] - carrier.centre);
   }

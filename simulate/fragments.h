@@ -39,8 +39,8 @@ void refuse_loose_fragments(const Fragments& fragments, const Body& body,
                             const std::vector<CoupledElements>& coupled, const std::string& scene);
 
 // Moves the elements of stray fragments (and those without a whole cell) as the matter nearest to the
-// fragment's centre moved: by that cell's mean deformation, or along with that element (centre placement).
-// `stencil` is that of the cells that were simulated.
-void carry_strays(const Fragments& fragments, const Body& body, const Stencil& stencil, State& state);
+// fragment's centre moved, by that cell's mean deformation; stray elements of a centre-placed part as the
+// element nearest to them and its neighbours. `stencil` is that of the cells that were simulated.
+void carry_strays(const Fragments& fragments, const Setting& setting, const Stencil& stencil, State& state);
 
 }  // namespace flexel

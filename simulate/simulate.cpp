@@ -14,6 +14,7 @@
 #include "simulate/fragments.h"
 #include "simulate/probes.h"
 #include "simulate/scene.h"
+#include "simulate/unsupported.h"
 
 namespace flexel {
 namespace {
@@ -62,6 +63,15 @@ void report_strays(const Fragments& fragments, SimulateResult& result, Progress&
         "{} loose crumb(s) of {} voxels in all ({}) hang on nothing; they are carried along with the matter "
         "nearest to them",
         crumbs, human_count(result.stray_cells), human_volume(volume)));
+}
+
+void report_unsupported(std::size_t elements, SimulateResult& result, Progress& progress) {
+  if (elements == 0) return;
+  result.stray_cells += elements;
+  progress.warn(fmt::format(
+      "{} element(s) at tips or edges have connections in one plane only, which resist nothing across it; "
+      "they are carried along with the matter nearest to them",
+      human_count(elements)));
 }
 
 void explain_before(const std::vector<Pass>& passes, Progress& progress) {
@@ -133,7 +143,20 @@ class Run {
         scene_(scene),
         options_(options),
         progress_(progress),
-        fragments_(find_fragments(body)) {}
+        fragments_(find_fragments(body)),
+        setting_{body_,
+                 materials_of_parts(scene, body),
+                 stray_cells(fragments_),
+                 models_of_parts(scene, body),
+                 hooke_of_parts(scene, body),
+                 stray_elements(fragments_, body)} {
+    const std::vector<std::uint8_t> unsupported = unsupported_elements(setting_);
+    for (std::size_t e = 0; e < unsupported.size(); ++e)
+      if (unsupported[e]) {
+        setting_.stray_element[e] = 1;
+        ++unsupported_;
+      }
+  }
 
   SimulateResult operator()();
 
@@ -146,6 +169,8 @@ class Run {
   const SimulateOptions& options_;
   Progress& progress_;
   Fragments fragments_;
+  Setting setting_;
+  std::size_t unsupported_ = 0;  // elements at tips and edges that springs do not hold
   State state_;
   std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
 };
@@ -171,7 +196,7 @@ EquilibriumResult Run::solve(Mechanics& mechanics) {
 // Writes the last state in equilibrium; says where it is.
 std::string Run::save_failed(const Mechanics& mechanics) {
   if (options_.failed_output.empty()) return "";
-  carry_strays(fragments_, body_, mechanics.stencil(), state_);
+  carry_strays(fragments_, setting_, mechanics.stencil(), state_);
   move_body(body_, state_);
   write_body(body_, options_.failed_output);
   return "; the last state in equilibrium is in " + options_.failed_output;
@@ -179,34 +204,29 @@ std::string Run::save_failed(const Mechanics& mechanics) {
 
 SimulateResult Run::operator()() {
   SimulateResult result;
-  const Setting setting{body_,
-                        materials_of_parts(scene_, body_),
-                        stray_cells(fragments_),
-                        models_of_parts(scene_, body_),
-                        hooke_of_parts(scene_, body_),
-                        stray_elements(fragments_, body_)};
-  warn_of_springs(setting, progress_);
-  name_materials(body_, setting.materials);
-  const std::vector<ProbePoints> probes = place_probes(scene_, setting);
-  std::vector<Pass> passes = Effects::passes(scene_.effects, setting);
+  warn_of_springs(setting_, progress_);
+  name_materials(body_, setting_.materials);
+  const std::vector<ProbePoints> probes = place_probes(scene_, setting_);
+  std::vector<Pass> passes = Effects::passes(scene_.effects, setting_);
   if (!anything_acts(scene_))
     progress_.warn("the scene has no [[load]], [[move]] or [gravity]: nothing will move");
   if (options_.explain) explain_before(passes, progress_);
   report_strays(fragments_, result, progress_);
-  Mechanics mechanics(setting, std::move(passes));
+  report_unsupported(unsupported_, result, progress_);
+  Mechanics mechanics(setting_, std::move(passes));
   state_.displacement.assign(body_.element_count(), Vec3::Zero());
   const EquilibriumResult solved = solve(mechanics);
   mechanics.report(state_, result);
   result.elastic_energy = mechanics.elastic_energy(state_);
   result.smallest_jacobian = mechanics.most_compressed(state_).value;
   measure_corners(mechanics, state_, result, progress_);
-  carry_strays(fragments_, body_, mechanics.stencil(), state_);
+  carry_strays(fragments_, setting_, mechanics.stencil(), state_);
   move_body(body_, state_);
   for (const ProbePoints& probe : probes) result.probes.push_back(measure(probe, state_));
   for (const AppliedLoad& load : result.loads) result.imbalance += load.force;
   for (const Reaction& reaction : result.reactions) result.imbalance += reaction.force;
   measure_displacement(body_, state_, result);
-  result.mass = mass_of(setting);
+  result.mass = mass_of(setting_);
   result.load_steps = solved.load_steps;
   result.newton_iterations = solved.newton_iterations;
   result.cg_iterations = solved.cg_iterations;

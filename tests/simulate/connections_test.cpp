@@ -106,6 +106,9 @@ TEST(Connections, LeaveOutStrayElementsAndMissingBits) {
   setting.stray_element.assign(body.element_count(), 0);
   setting.stray_element[0] = 1;
   EXPECT_EQ(make_connections(setting).size(), all - 7);  // a corner of the box has seven neighbours
+  setting.stray_element[0] = 0;
+  setting.stray_element.back() = 1;
+  EXPECT_EQ(make_connections(setting).size(), all - 7);
   setting.stray_element.clear();
   body.connections[0] &= ~1u;
   EXPECT_EQ(make_connections(setting).size(), all - 1);
