@@ -23,8 +23,8 @@ namespace {
 
 struct Arguments {
   std::vector<std::string> parts, fixes, pushes, moves, outputs;
-  std::string scene, material, size, heal = "auto", unit, edge, method = "affine", report, summary, body,
-                                     format, timeout;
+  std::string scene, material, size, heal = "auto", placement = "corner", unit, edge, method = "affine",
+                                     report, summary, body, format, timeout;
   std::optional<std::size_t> count;
   int threads = 0;
   bool ascii = false, strict = false, quiet = false;
@@ -51,6 +51,10 @@ void declare_input(CLI::App& app, Arguments& arguments) {
       ->type_name("NAME");
   app.add_option("--size", arguments.size, "Spacing of the lattice (\"2 mm\")")->type_name("LENGTH");
   app.add_option("--count", arguments.count, "Or: about this many cells (default 20000)")->type_name("N");
+  app.add_option("--placement", arguments.placement,
+                 "Elements at the voxels' corner or centre (model \"paper\")")
+      ->type_name("WHERE")
+      ->capture_default_str();
   app.add_option("--heal", arguments.heal, "Broken surfaces: auto, wrap or none (docs/healing.md)")
       ->type_name("HOW")
       ->capture_default_str();
@@ -169,6 +173,7 @@ Plan make_plan(const Arguments& arguments) {
   plan.voxelize.count = arguments.count;
   if (!arguments.timeout.empty()) plan.timeout = parse_timeout(arguments.timeout);
   plan.voxelize.heal = heal_choice(arguments.heal);
+  plan.voxelize.placement = placement_choice(arguments.placement);
   plan.map.method = map_method(arguments.method);
   plan_outputs(arguments, plan);
   plan_scene(arguments, plan);

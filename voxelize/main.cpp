@@ -98,9 +98,7 @@ VoxelizeOptions voxelize_options(const Arguments& arguments) {
   if (arguments.count && *arguments.count <= 0) throw InputError("--count: must be above zero");
   if (arguments.threads < 0) throw InputError("--threads: must not be below zero");
   if (arguments.count) options.count = static_cast<std::size_t>(*arguments.count);
-  options.placement = choose("--placement", arguments.placement, {"corner", "centre"}) == 0
-                          ? Placement::corner
-                          : Placement::centre;
+  options.placement = placement_choice(arguments.placement);
   constexpr Align aligns[] = {Align::snap, Align::box, Align::none};
   options.align = aligns[choose("--align", arguments.align, {"snap", "box", "none"})];
   options.heal = heal_choice(arguments.heal);

@@ -267,6 +267,13 @@ VoxelizeResult correct_count(VoxelizeResult result, double spacing, std::vector<
 
 }  // namespace
 
+Placement placement_choice(const std::string& word) {
+  if (word == "corner") return Placement::corner;
+  if (word == "centre") return Placement::centre;
+  throw InputError("--placement: unknown word \"" + word + "\" (one of corner, centre)" +
+                   did_you_mean(word, {"corner", "centre"}));
+}
+
 VoxelizeResult voxelize(Surface surface, const VoxelizeOptions& options, Progress& progress) {
   progress.stage("voxelize");
   std::vector<HealedPart> meshes = heal_parts(surface, options.heal);

@@ -20,6 +20,9 @@ struct HealChoice {
 // From "none", "auto", "wrap", "wrap:5 mm"; throws InputError naming --heal.
 [[nodiscard]] HealChoice heal_choice(const std::string& word);
 
+// From "corner", "centre"; throws InputError naming --placement.
+[[nodiscard]] Placement placement_choice(const std::string& word);
+
 struct VoxelizeOptions {
   std::optional<double> size;  // spacing h [m]
   std::optional<std::size_t>

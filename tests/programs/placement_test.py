@@ -71,6 +71,17 @@ def test_pipe():
     expect(len(mapped.out) == 84 + 50 * 12, f"12 triangles: {len(mapped.out)} bytes")
 
 
+def test_deform_in_one_process():
+    centres()
+    scene("bend.toml", SCENE.format(""))
+    expect_ok(run("flexel-simulate", "bend.toml", "centres.vtu", "-o", "bent.vtu"))
+    expect_ok(run("flexel-map", "bent.vtu", "-o", "stages.stl"))
+    deform = ["flexel", "deform", "box.stl", "--scene", "bend.toml", "--size", "1.25 mm", "-o", "one.stl", "--placement"]
+    expect_ok(run(*deform, "centre"))
+    expect(open("stages.stl", "rb").read() == open("one.stl", "rb").read(), "one process or three, the same bits")
+    expect_error(run(*deform, "center"), "flexel", "--placement", 'did you mean "centre"')
+
+
 def test_hooke_constants_and_threads():
     centres()
     paper = simulate(SCENE.format('model = "paper"'))["probes"][0]["displacement"][2]
