@@ -116,7 +116,7 @@ HealedPart heal(PartMesh mesh, const HealChoice& how, const std::string& name) {
 
 bool has_large_hole(const HealedPart& part) {
   return std::any_of(part.holes.begin(), part.holes.end(), [](const Hole& hole) {
-    return hole.share > kLargestHole && hole.shell_share > kMajorShell;
+    return (hole.share > kLargestHole || hole.uncertain) && hole.shell_share > kMajorShell;
   });
 }
 

@@ -112,6 +112,51 @@ std::vector<Corners> closing_triangles(const Loop& loop) {
   return close_loop(loop.points, loop.across);
 }
 
+// The angle at a rim edge between the surface and what closes it is judged by the directions away from the
+// edge, which do not depend on how triangles face: straight on is opposite.
+bool goes_on(const Vec3& from, const Vec3& to, const Vec3& here, const Vec3& there) {
+  constexpr double kSmooth = .7;  // cosine of 45 degrees
+  const Vec3 along = (to - from).normalized();
+  const auto away = [&](const Vec3& point) {
+    return Vec3((point - from) - (point - from).dot(along) * along).normalized();
+  };
+  return -away(here).dot(away(there)) >= kSmooth;
+}
+
+// How far the shape of a hole is from following from its rim: the share of the rim along which what closes it
+// does not go on smoothly; 0 for what is flat, as a lost face is, and for a single triangle.
+double unknown_share(const Loop& loop, const std::vector<Corners>& closing) {
+  constexpr double kFlat = .98;
+  if (closing.size() <= 1) return 0;
+  const auto n = static_cast<std::uint32_t>(loop.points.size());
+  double rim = 0, smooth = 0, sum = 0;
+  Vec3 vector = Vec3::Zero();
+  for (Corners c : closing) {
+    std::sort(c.begin(), c.end());  // as the loop runs
+    const Vec3 normal = (loop.points[c[1]] - loop.points[c[0]]).cross(loop.points[c[2]] - loop.points[c[0]]);
+    vector += normal;
+    sum += normal.norm();
+    for (std::size_t e = 0; e < 3; ++e) {
+      const std::uint32_t a = c[e], b = c[(e + 1) % 3];
+      if ((a + 1) % n != b) continue;
+      const double length = (loop.points[b] - loop.points[a]).norm();
+      rim += length;
+      if (goes_on(loop.points[a], loop.points[b], loop.across[a], loop.points[c[(e + 2) % 3]]))
+        smooth += length;
+    }
+  }
+  return vector.norm() >= kFlat * sum || !(rim > 0) ? 0 : 1 - smooth / rim;
+}
+
+// Volume [m^3] of the part once `closing` is in it, whichever way its triangles face now.
+double volume_with(PartMesh mesh, const std::vector<Corners>& closing) {
+  mesh.corners.insert(mesh.corners.end(), closing.begin(), closing.end());
+  mesh.polygon.resize(mesh.corners.size(), kNoPolygon);
+  number_edges(mesh);
+  repair_orientation(mesh);
+  return std::abs(enclosed_volume(mesh));
+}
+
 Corners sorted(Corners c) {
   std::sort(c.begin(), c.end());
   return c;
@@ -130,6 +175,9 @@ FilledHoles fill_holes(PartMesh& mesh) {
     at_holes.insert(sorted(mesh.corners[walker.edge(n).triangle]));
   const double whole = std::accumulate(shell_area.begin(), shell_area.end(), 0.);
   std::size_t in_loops = 0;
+  std::vector<std::vector<Corners>> closings;  // (holes)
+  std::vector<double> reaches;  // (holes) m^3, what may be missing beyond the triangles that close it
+  std::vector<Corners> all;
   for (const auto& edges : walker.walk()) {
     const Loop loop = loop_of(mesh, walker, edges);
     Hole hole{.loop = loop.vertices};
@@ -141,6 +189,7 @@ FilledHoles fill_holes(PartMesh& mesh) {
     hole.width = box.diagonal();
     in_loops += edges.size();
     std::vector<Corners> closing = closing_triangles(loop);
+    const double unknown = unknown_share(loop, closing);
     double sum = 0;
     bool doubles = false;  // a triangle that is there already: a sheet, not a hole
     for (Corners& c : closing) {
@@ -155,15 +204,25 @@ FilledHoles fill_holes(PartMesh& mesh) {
     hole.shell_share = shell_area[shell] / whole;
     hole.filled = hole.share <= (closing.size() == 1 ? kLargestTriangle : kLargestHole) &&
                   filled_area[shell] + sum <= kAllHoles * shell_area[shell];
+    reaches.push_back(hole.filled ? sum * hole.width * unknown : 0);
     if (hole.filled) {
       filled_area[shell] += sum;
-      result.triangles += closing.size();
-      for (const Corners& c : closing) {
-        mesh.corners.push_back(c);
-        mesh.polygon.push_back(kNoPolygon);
-      }
+      all.insert(all.end(), closing.begin(), closing.end());
     }
+    closings.push_back(std::move(closing));
     result.holes.push_back(std::move(hole));
+  }
+  const bool any_uncertain = std::any_of(reaches.begin(), reaches.end(), [](double r) { return r > 0; });
+  double left = any_uncertain ? kUncertain * volume_with(mesh, all) : 0;
+  for (std::size_t n = 0; n < closings.size(); ++n) {
+    Hole& hole = result.holes[n];
+    hole.uncertain = hole.filled && reaches[n] > left;
+    hole.filled = hole.filled && !hole.uncertain;
+    if (!hole.filled) continue;
+    left -= reaches[n];
+    result.triangles += closings[n].size();
+    mesh.corners.insert(mesh.corners.end(), closings[n].begin(), closings[n].end());
+    mesh.polygon.resize(mesh.corners.size(), kNoPolygon);
   }
   result.stray_edges = walker.edge_count() - in_loops;
   if (result.triangles > 0) number_edges(mesh);

@@ -16,12 +16,18 @@ struct Hole {
   double share = 0;                 // area that closes it, over that of the surface around it (its shell)
   double shell_share = 0;           // area of that shell over that of the part
   bool filled = false;
+  bool uncertain = false;  // not filled because its shape does not follow from what is around it
 };
 
 // A hole is small, and filled, where one triangle closes it that is under kLargestTriangle of its shell's
 // area, or several that are under kLargestHole together, and all holes of a shell stay under kAllHoles: a
 // plate whose round hole lost its wall would be plugged, with an error of twice that share of its volume.
 constexpr double kLargestTriangle = .15, kLargestHole = .02, kAllHoles = .2;
+// Several triangles that do not lie in a plane, and along some share of the rim do not go on smoothly (within
+// 45 degrees) where the surface ends, close a hole whose shape is not known: the matter that is missing may
+// reach as far beyond them as the hole is wide. That share x area x width is added up, and such holes are
+// filled while it is at most kUncertain of the volume.
+constexpr double kUncertain = .02;
 
 struct FilledHoles {
   std::vector<Hole> holes;      // filled or not

@@ -183,6 +183,28 @@ TEST(Heal, ALargeHoleIsRefusedWithItsPlace) {
   EXPECT_THAT(refusal(bitten, .1), testing::HasSubstr("the largest hole"));
 }
 
+// A ring of which a piece was torn out: two small holes, and an eighth of the volume missing between them.
+TEST(Heal, AJaggedEndIsNotTakenForTheWholePart) {
+  Mesh torn = torus(1, .1, 192, 24);
+  std::erase_if(torn.triangles, [&](const auto& t) {
+    const Vec3 at = (torn.vertices[t[0]] + torn.vertices[t[1]] + torn.vertices[t[2]]) / 3;
+    const double angle = std::atan2(at.y(), at.x());
+    const double shift = at.z() > 0 ? .3 : 0;
+    return angle > shift && angle < .8 + shift;
+  });
+  EXPECT_THAT(refusal(torn, .05), testing::HasSubstr("the largest hole"));
+  // Cut off in planes it is what any part that lost two flat faces looks like.
+  Mesh cut = torus(1, .1, 192, 24);
+  std::erase_if(cut.triangles, [&](const auto& t) {
+    const auto inside = [&](std::uint32_t v) {
+      const double angle = std::atan2(cut.vertices[v].y(), cut.vertices[v].x());
+      return angle > -1e-9 && angle < .8;
+    };
+    return inside(t[0]) && inside(t[1]) && inside(t[2]);
+  });
+  EXPECT_EQ(run_healed(cut, .05, Heal::automatic).parts[0].healing.holes, 2u);
+}
+
 TEST(Heal, WrapSurroundsWhatIsThere) {
   Mesh mesh = icosphere(3, 1);
   mesh.triangles.erase(mesh.triangles.begin() + 5);
