@@ -50,10 +50,34 @@ void say_repairs(const VoxelizedPart& part, const std::string& name, Progress& p
 void say_walls(const VoxelizedPart& part, const std::string& name, Progress& progress) {
   if (!part.thinnest || part.thin_walls == 0) return;
   const Vec3& at = part.thinnest->where;
-  progress.warn(fmt::format(
-      "{}: walls thinner than two cells, the thinnest {} at ({}, {}, {}); a smaller size resolves them", name,
-      human_length(part.thinnest->thickness), human_length(at.x()), human_length(at.y()),
-      human_length(at.z())));
+  const std::string place =
+      fmt::format("({}, {}, {})", human_length(at.x()), human_length(at.y()), human_length(at.z()));
+  const auto share = [&](std::size_t count) {
+    return fmt::format("{:.2g} %",
+                       100. * static_cast<double>(count) / static_cast<double>(part.wall_samples));
+  };
+  if (part.lost_walls > 0) {
+    progress.warn(
+        fmt::format("{}: features lost: walls thinner than one cell ({} of the places measured), the "
+                    "thinnest {} at {}; the "
+                    "lattice holds their matter, not their shape: a size of {} gives the thinnest two cells",
+                    name, share(part.lost_walls), human_length(part.thinnest->thickness), place,
+                    human_length(part.thinnest->thickness / 2)));
+    return;
+  }
+  progress.warn(
+      fmt::format("{}: walls thinner than two cells, the thinnest {} at {}; a smaller size resolves them",
+                  name, human_length(part.thinnest->thickness), place));
+}
+
+// Matter that no cell holds, where that is no sliver of the surface but a part's own share.
+void say_lost_matter(const VoxelizedPart& part, const std::string& name, Progress& progress) {
+  constexpr double kNotable = 1e-2;  // of the volume
+  if (!part.closed || !(part.dropped_volume > kNotable * part.surface_volume)) return;
+  progress.warn(
+      fmt::format("{}: features lost: {:.2g} % of the volume is in cells filled by less than 1/64, which "
+                  "are dropped; a smaller size keeps it",
+                  name, 100 * part.dropped_volume / part.surface_volume));
 }
 
 }  // namespace
@@ -78,6 +102,7 @@ void report(const VoxelizeResult& result, Progress& progress) {
                                human_count(part.split_voxels)));
     say_repairs(part, lattice.name, progress);
     say_walls(part, lattice.name, progress);
+    if (lattice.placement == Placement::corner) say_lost_matter(part, lattice.name, progress);
   }
   progress.say(fmt::format("simulating this needs about {}", human_bytes(result.simulation_memory)));
 }

@@ -44,6 +44,12 @@ std::string summary_json(const VoxelizeResult& result) {
                      {"surface_volume", part.surface_volume},
                      {"lattice_volume", part.lattice_volume},
                      {"dropped_volume", part.dropped_volume},
+                     {"thinnest_wall", part.thinnest ? Json{{"thickness", part.thinnest->thickness},
+                                                            {"where", json_of(part.thinnest->where)}}
+                                                     : Json()},
+                     {"thin_walls", part.thin_walls},
+                     {"lost_walls", part.lost_walls},
+                     {"wall_samples", part.wall_samples},
                      {"healing", json_of(part.healing)}});
   }
   return Json{{"parts", parts}}.dump(2) + "\n";

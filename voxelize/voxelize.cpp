@@ -104,9 +104,15 @@ void measure_walls(const PartMesh& mesh, std::uint32_t part, VoxelizedPart& foun
   if (samples.empty()) return;
   const WallSample& least = samples[thinnest_sample(samples)];
   found.thinnest = ThinWall{least.thickness, least.where, part};
-  const double two_cells = 2 * found.spacing.maxCoeff();
-  found.thin_walls = static_cast<std::size_t>(std::count_if(
-      samples.begin(), samples.end(), [&](const WallSample& s) { return s.thickness < two_cells; }));
+  const double cell = found.spacing.maxCoeff();
+  const auto thinner_than = [&](double thickness) {
+    return static_cast<std::size_t>(std::count_if(
+        samples.begin(), samples.end(), [&](const WallSample& s) { return s.thickness < thickness; }));
+  };
+  constexpr double kWhole = 1 - 1e-6;  // a wall of whole cells, but for rounding
+  found.thin_walls = thinner_than(2 * kWhole * cell);
+  found.lost_walls = thinner_than(kWhole * cell);
+  found.wall_samples = samples.size();
 }
 
 // What does not depend on the lattice but where shells interpenetrate: volumes and walls.

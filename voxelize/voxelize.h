@@ -74,6 +74,8 @@ struct VoxelizedPart {
   Vec3 spacing = Vec3::Zero();
   std::optional<ThinWall> thinnest;  // thinnest wall found
   std::size_t thin_walls = 0;        // sampled places thinner than two cells
+  std::size_t lost_walls = 0;        // of them, thinner than one cell: the lattice does not have their shape
+  std::size_t wall_samples = 0;      // places sampled
 };
 
 struct VoxelizeResult {
@@ -93,7 +95,7 @@ void report(const VoxelizeResult& result, Progress& progress);
 
 // Thinnest wall of each part, measured along rays through the surface on a grid of `rays` lines per axis:
 // distance between an entry and the next exit whose normals oppose each other, times the cosine to the ray.
-// Nothing where a part is not closed.
+// Healed as the voxelizer does (Heal::automatic); nothing where a part is not closed then.
 [[nodiscard]] std::vector<std::optional<ThinWall>> thinnest_walls(const Surface& surface, int rays = 256);
 
 }  // namespace flexel

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
+#include "voxelize/heal.h"
 #include "voxelize/lines.h"
 #include "voxelize/voxelize.h"
 
@@ -61,9 +62,9 @@ std::size_t thinnest_sample(const std::vector<WallSample>& samples) {
 
 std::vector<std::optional<ThinWall>> thinnest_walls(const Surface& surface, int rays) {
   std::vector<std::optional<ThinWall>> result;
-  for (PartMesh& mesh : part_meshes(surface)) {
+  for (PartMesh& unhealed : exact_part_meshes(surface)) {
     result.emplace_back();
-    repair_orientation(mesh);
+    const PartMesh mesh = heal(std::move(unhealed), {}, "").mesh;
     if (mesh.corners.empty() || !mesh.balanced()) continue;
     const std::vector<WallSample> samples = wall_samples(mesh, rays);
     if (samples.empty()) continue;

@@ -107,6 +107,21 @@ def test_none_takes_it_as_it_is():
     expect(not part["closed"] and part["healing"]["inside_by"] == "vote" and part["healing"]["holes"] == 0, f"{part}")
 
 
+def test_lost_features_are_named():
+    for depth, words in ((2.0, "features lost: walls thinner than one cell (33 % of the places measured), the thinnest 2 mm at ("),
+                         (4.0, "walls thinner than two cells, the thinnest 4 mm at (")):
+        write("plate.stl", binary_stl(box_triangles((40.0, 40.0, depth))))
+        result = expect_ok(run("flexel-voxelize", "plate.stl", "--size", "4 mm", "--align", "none", "--summary", "s.json", "-o", "body.vtu"))
+        expect(words in result.err and result.err.count("walls thinner") == 1, f"{words}: {result}")
+        with open("s.json", encoding="utf-8") as file:
+            part = json.load(file)["parts"][0]
+        thin = part["wall_samples"] // 3  # of the lines along three axes, those through the plate
+        expect((part["thin_walls"], part["lost_walls"]) == (thin, thin if depth < 4 else 0), f"{part}")
+        expect(abs(part["thinnest_wall"]["thickness"] - depth * 1e-3) < 1e-9, f"{part}")
+    write("cube.stl", binary_stl(box_triangles((40.0, 40.0, 40.0))))
+    expect("walls" not in expect_ok(run("flexel-voxelize", "cube.stl", "--size", "4 mm", "-o", "body.vtu")).err, "no thin wall")
+
+
 def test_unknown_words():
     write("part.stl", binary_stl(box_triangles()))
     expect_error(run("flexel-voxelize", "part.stl", "--heal", "warp"), "flexel-voxelize", "--heal", 'did you mean "wrap"')
