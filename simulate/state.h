@@ -1,6 +1,7 @@
 // What changes while a run goes on, and what stays: the state and the setting that effects are made in.
 #pragma once
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "formats/body.h"
@@ -11,6 +12,9 @@ namespace flexel {
 struct State {
   std::vector<Vec3> displacement;  // (elements x 3) m, from rest, world frame
   double share = 1;                // of every load and move that acts now, in [0, 1] (load stepping)
+  // Timed runs only:
+  std::vector<Vec3> velocity = {};  // (elements x 3) m/s, world frame; of the half step before `time`
+  std::optional<double> time = {};  // s, since the run began
 };
 
 // How a part resists: cells and springs at corner placement, paper at centre placement.

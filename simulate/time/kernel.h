@@ -1,0 +1,92 @@
+// The hot loop of timed runs, as plain data: what one chunk of cells needs, what it gives back, and a table
+// of the compiled variants. simulate/time/layout.h builds the chunks, simulate/time/kernel.cpp is the loop.
+//
+// kernel.cpp is compiled once per instruction set. Its code and everything that it includes must therefore
+// stay out of the other translation units' way: no templates or inline functions of the standard library or
+// of Eigen, whose copies the linker would be free to take from the wrong one. Hence raw pointers and arrays
+// here.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+
+namespace flexel::step {
+
+constexpr std::size_t kLanes = 8;  // cells that are computed side by side, on every instruction set
+
+// Eight cells of a chunk. Lanes without a cell have fill 0 and corners 0.
+struct CellBlock {
+  std::uint16_t corner[8][kLanes];  // elements, numbered within the chunk
+  double fill[kLanes];              // 0: absent or broken, resists nothing
+  // 1: corner[a][l] = corner[a][0] + l for every corner: neighbours along a row
+  std::uint64_t is_run;
+};
+
+// What all cells of a part have in common. Lattice frame: axis j is column j of `axes`.
+struct CellConstants {
+  double spacing[3];    // m
+  double volume;        // m^3
+  double mu, lambda;    // Pa
+  double hourglass[4];  // N/m, of the modes xy, yz, zx, xyz
+  double spring[3];     // N/m, a cell's share of a spring along an edge, across a face, through the centre
+  double damping;       // s; 0 in the variants without damping
+  double axes[9];       // column-major rotation from the lattice to the world frame
+  bool aligned;         // axes is the identity
+};
+
+// A set of cells that one thread computes at a time, and the elements at their corners. Elements that no
+// other chunk touches are advanced with it; the forces on the others go to `shared_force`.
+struct ChunkView {
+  const CellBlock* blocks;
+  std::size_t block_count;
+  const std::uint32_t* elements;  // (count) numbers of the body, ascending
+  std::size_t count;
+  const std::uint16_t *owned, *shared;  // numbers within the chunk, ascending
+  std::size_t owned_count, shared_count;
+  double* shared_force;    // (shared_count x 3) N, world frame
+  double* shared_damping;  // the same of the damping alone, with `book`
+  const CellConstants* constants;
+};
+
+// The whole state in the body's order, world frame, (n x 3) row by row.
+struct StateView {
+  double* displacement;        // m
+  double* velocity;            // m/s
+  const double* outer;         // N, forces of the passes; null: none
+  const double* inverse_mass;  // (n) 1/kg; 0: does not move by force
+};
+
+// One advance: v += kick f / m, then u += drift v (the new one, or the old one for explicit Euler).
+struct Advance {
+  double kick, drift;  // s
+  bool explicit_drift;
+};
+
+struct ChunkOutcome {
+  double
+      smallest_jacobian;  // over the chunk's cells, at the state before the advance; NaN counts as -infinity
+  double damped_power;    // W, of the damping on the owned elements: force times mean velocity; `book`
+};
+
+// Doubles of scratch that a chunk with `count` elements needs.
+[[nodiscard]] constexpr std::size_t scratch_stride(std::size_t count) {
+  return (count + 2 * kLanes - 1) / kLanes * kLanes;
+}
+constexpr std::size_t kScratchColumns = 12;  // u, v, f, damping force
+
+using ChunkKernel = ChunkOutcome (*)(const ChunkView&, const StateView&, const Advance&, double* scratch);
+
+// `book`: account for the power of the damping (simulate/time/history.h).
+enum class Damping { none, plain, book };
+
+struct KernelTable {
+  const char* isa;
+  ChunkKernel cells[3];    // by Damping
+  ChunkKernel springs[3];  // by Damping
+};
+
+// The table of an instruction set; that of this machine's best one.
+[[nodiscard]] const KernelTable& kernels_portable();
+[[nodiscard]] const KernelTable& kernels_avx2();
+[[nodiscard]] const KernelTable& kernels_avx512();
+
+}  // namespace flexel::step

@@ -1,0 +1,234 @@
+// Tiles, chunks, blocks: sorted, so that neighbours along a row of the lattice fill a block wherever they
+// can.
+#include "simulate/time/layout.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "simulate/cells.h"
+
+namespace flexel {
+namespace {
+
+using step::CellBlock;
+using step::kLanes;
+
+constexpr Index3 kTile{32, 8, 8};
+
+step::CellConstants constants_of(const Part& part, const Material& material, double damping) {
+  const CellKind kind = cell_kind(part.lattice, material);
+  step::CellConstants c{};
+  for (std::size_t j = 0; j < 3; ++j) c.spacing[j] = part.lattice.spacing[static_cast<Eigen::Index>(j)];
+  c.volume = kind.volume;
+  c.mu = kind.mu;
+  c.lambda = kind.lambda;
+  for (std::size_t m = 0; m < 4; ++m) c.hourglass[m] = kind.hourglass[m];
+  // corners 0 and 1 (edge), 3 (across a face), 7 (through the centre)
+  for (const Spring& spring : spring_kind(part.lattice, material).springs)
+    if (spring.a == 0 && (spring.b == 1 || spring.b == 3 || spring.b == 7))
+      c.spring[spring.b == 1 ? 0 : spring.b == 3 ? 1 : 2] = spring.stiffness;
+  c.damping = damping;
+  for (Eigen::Index k = 0; k < 9; ++k) c.axes[k] = part.lattice.axes.data()[k];
+  c.aligned = part.lattice.axes == Mat3::Identity();
+  return c;
+}
+
+// Cells of a part that resist, tile by tile; within a tile in the body's order.
+struct TiledCells {
+  std::vector<std::uint32_t> cells;
+  std::vector<std::size_t> tile_begin;  // and the end
+};
+
+TiledCells tiled_cells(const Body& body, const Part& part, const std::vector<std::uint8_t>& active) {
+  TiledCells result;
+  for (std::uint32_t c = part.cell_begin; c < part.cell_end; ++c)
+    if (active[c]) result.cells.push_back(c);
+  if (result.cells.empty()) return result;
+  const auto index = [&](std::uint32_t cell) { return body.lattice_index[body.cell_elements[cell][0]]; };
+  Index3 low = index(result.cells[0]), high = low;
+  for (const std::uint32_t c : result.cells)
+    for (std::size_t j = 0; j < 3; ++j) {
+      low[j] = std::min(low[j], index(c)[j]);
+      high[j] = std::max(high[j], index(c)[j]);
+    }
+  Index3 size{};
+  std::array<std::int64_t, 3> tiles{};
+  for (std::size_t j = 0; j < 3; ++j) {
+    const int extent = high[j] - low[j] + 1;
+    tiles[j] = (extent + kTile[j] - 1) / kTile[j];
+    size[j] = static_cast<int>((extent + tiles[j] - 1) / tiles[j]);  // even shares
+  }
+  size[0] = (size[0] + 7) / 8 * 8;  // whole blocks
+  const auto tile = [&](std::uint32_t cell) {
+    const Index3 at = index(cell);
+    std::int64_t number = 0;
+    for (std::size_t j = 3; j-- > 0;) number = number * tiles[j] + (at[j] - low[j]) / size[j];
+    return number;
+  };
+  std::vector<std::pair<std::int64_t, std::uint32_t>> keyed;
+  keyed.reserve(result.cells.size());
+  for (const std::uint32_t c : result.cells) keyed.emplace_back(tile(c), c);
+  std::sort(keyed.begin(), keyed.end());
+  for (std::size_t i = 0; i < keyed.size(); ++i) {
+    if (i == 0 || keyed[i].first != keyed[i - 1].first) result.tile_begin.push_back(i);
+    result.cells[i] = keyed[i].second;
+  }
+  result.tile_begin.push_back(keyed.size());
+  return result;
+}
+
+class Builder {
+ public:
+  Builder(const Setting& setting, StepLayout& layout)
+      : body_(setting.body),
+        layout_(layout),
+        local_(setting.body.element_count()),
+        users_(local_.size(), 0) {}
+
+  void add_chunk(std::uint32_t part, std::span<const std::uint32_t> cells);
+  void share();
+
+ private:
+  void add_block(std::span<const std::uint32_t> cells, bool is_run);
+  [[nodiscard]] bool continues(std::uint32_t cell, std::uint32_t next) const;
+
+  const Body& body_;
+  StepLayout& layout_;
+  std::vector<std::uint16_t> local_;  // (elements) number within the chunk that is built
+  std::vector<std::uint8_t> users_;   // (elements) chunks that touch it, up to 2
+};
+
+void Builder::add_block(std::span<const std::uint32_t> cells, bool is_run) {
+  CellBlock block{};
+  std::array<std::uint32_t, kLanes> lanes;
+  lanes.fill(StepLayout::kNoCell);
+  block.is_run = is_run;
+  for (std::size_t l = 0; l < cells.size(); ++l) {
+    lanes[l] = cells[l];
+    block.fill[l] = body_.fill[cells[l]];
+    for (std::size_t a = 0; a < 8; ++a) block.corner[a][l] = local_[body_.cell_elements[cells[l]][a]];
+  }
+  layout_.blocks.push_back(block);
+  layout_.block_cells.push_back(lanes);
+}
+
+bool Builder::continues(std::uint32_t cell, std::uint32_t next) const {
+  for (std::size_t a = 0; a < 8; ++a)
+    if (local_[body_.cell_elements[next][a]] != local_[body_.cell_elements[cell][a]] + 1) return false;
+  return true;
+}
+
+void Builder::add_chunk(std::uint32_t part, std::span<const std::uint32_t> cells) {
+  StepLayout::Chunk chunk;
+  chunk.part = part;
+  chunk.block_begin = layout_.blocks.size();
+  chunk.element_begin = layout_.elements.size();
+  std::vector<std::uint32_t> elements;
+  elements.reserve(2 * cells.size());
+  for (const std::uint32_t c : cells)
+    elements.insert(elements.end(), body_.cell_elements[c].begin(), body_.cell_elements[c].end());
+  std::sort(elements.begin(), elements.end());
+  elements.erase(std::unique(elements.begin(), elements.end()), elements.end());
+  for (std::size_t l = 0; l < elements.size(); ++l) {
+    local_[elements[l]] = static_cast<std::uint16_t>(l);
+    users_[elements[l]] = static_cast<std::uint8_t>(std::min(2, users_[elements[l]] + 1));
+  }
+  std::vector<std::uint32_t> rest;
+  for (std::size_t i = 0; i < cells.size();) {
+    std::size_t end = i + 1;
+    while (end < cells.size() && end < i + kLanes && continues(cells[end - 1], cells[end])) ++end;
+    if (end == i + kLanes) {
+      add_block(cells.subspan(i, kLanes), true);
+      i = end;
+    } else {
+      for (; i < end; ++i) rest.push_back(cells[i]);
+    }
+  }
+  for (std::size_t i = 0; i < rest.size(); i += kLanes)
+    add_block(std::span(rest).subspan(i, std::min(kLanes, rest.size() - i)), false);
+  layout_.elements.insert(layout_.elements.end(), elements.begin(), elements.end());
+  layout_.largest_chunk = std::max(layout_.largest_chunk, elements.size());
+  chunk.block_end = layout_.blocks.size();
+  chunk.element_end = layout_.elements.size();
+  layout_.chunks.push_back(chunk);
+}
+
+// Once all chunks are there: who owns what.
+void Builder::share() {
+  std::vector<std::uint32_t> place(users_.size(), 0);  // of a shared element in shared_elements
+  for (std::uint32_t e = 0; e < users_.size(); ++e) {
+    if (users_[e] == 0) layout_.lone_elements.push_back(e);
+    if (users_[e] < 2) continue;
+    place[e] = static_cast<std::uint32_t>(layout_.shared_elements.size());
+    layout_.shared_elements.push_back(e);
+  }
+  std::vector<std::vector<std::uint32_t>> of(layout_.shared_elements.size());
+  for (StepLayout::Chunk& chunk : layout_.chunks) {
+    chunk.owned_begin = layout_.owned.size();
+    chunk.shared_begin = layout_.shared.size();
+    for (std::size_t i = chunk.element_begin; i < chunk.element_end; ++i) {
+      const std::uint32_t e = layout_.elements[i];
+      const auto l = static_cast<std::uint16_t>(i - chunk.element_begin);
+      if (users_[e] < 2) {
+        layout_.owned.push_back(l);
+      } else {
+        of[place[e]].push_back(static_cast<std::uint32_t>(layout_.shared.size()));
+        layout_.shared.push_back(l);
+      }
+    }
+    chunk.owned_end = layout_.owned.size();
+    chunk.shared_end = layout_.shared.size();
+  }
+  layout_.slot_offsets.push_back(0);
+  for (const std::vector<std::uint32_t>& slots : of) {
+    layout_.slots.insert(layout_.slots.end(), slots.begin(), slots.end());
+    layout_.slot_offsets.push_back(static_cast<std::uint32_t>(layout_.slots.size()));
+  }
+}
+
+}  // namespace
+
+std::size_t StepLayout::bytes() const {
+  const auto of = [](const auto& v) { return v.capacity() * sizeof(v[0]); };
+  return of(chunks) + of(blocks) + of(block_cells) + of(elements) + of(owned) + of(shared) +
+         of(shared_elements) + of(slot_offsets) + of(slots) + of(lone_elements);
+}
+
+StepLayout step_layout(const Setting& setting, const std::vector<double>& damping) {
+  StepLayout layout;
+  const Body& body = setting.body;
+  const std::vector<std::uint8_t> active = active_cells(setting);
+  Builder builder(setting, layout);
+  for (std::uint32_t p = 0; p < body.parts.size(); ++p) {
+    layout.constants.push_back(constants_of(body.parts[p], setting.materials[p], damping[p]));
+    const TiledCells tiled = tiled_cells(body, body.parts[p], active);
+    for (std::size_t t = 0; t + 1 < tiled.tile_begin.size();) {
+      const std::size_t begin = tiled.tile_begin[t];
+      std::size_t end = tiled.tile_begin[++t];
+      while (t + 1 < tiled.tile_begin.size() && tiled.tile_begin[t + 1] - begin <= StepLayout::kChunkCells)
+        end = tiled.tile_begin[++t];
+      builder.add_chunk(p, std::span(tiled.cells).subspan(begin, end - begin));
+    }
+  }
+  builder.share();
+  layout.elements.shrink_to_fit();
+  layout.blocks.shrink_to_fit();
+  layout.owned.shrink_to_fit();
+  return layout;
+}
+
+std::vector<double> element_masses(const Setting& setting) {
+  const Body& body = setting.body;
+  std::vector<double> mass(body.element_count(), 0);
+  for (std::size_t p = 0; p < body.parts.size(); ++p) {
+    const Part& part = body.parts[p];
+    const double whole = setting.materials[p].density * part.lattice.spacing.prod();
+    if (part.placement == Placement::centre)
+      std::fill(mass.begin() + part.element_begin, mass.begin() + part.element_end, whole);
+    for (std::uint32_t c = part.cell_begin; c < part.cell_end; ++c)
+      for (const std::uint32_t e : body.cell_elements[c]) mass[e] += body.fill[c] * whole / 8;
+  }
+  return mass;
+}
+
+}  // namespace flexel

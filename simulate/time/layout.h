@@ -1,0 +1,51 @@
+// How a body is cut up for stepping: chunks of cells in blocks of eight (simulate/time/kernel.h), and which
+// elements each chunk owns or shares with others. Depends on the body only, never on the number of threads,
+// so that every sum has a fixed order.
+//
+// Cells are gathered tile by tile (up to 32 x 8 x 8 voxels, a row of a tile contiguous) until a chunk holds
+// about kChunkCells; the small tiles of thin walls share a chunk. The state itself stays in the body's order.
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "simulate/state.h"
+#include "simulate/time/kernel.h"
+
+namespace flexel {
+
+struct StepLayout {
+  static constexpr std::size_t kChunkCells = 2048;
+
+  struct Chunk {
+    std::uint32_t part = 0;
+    std::size_t block_begin = 0, block_end = 0;      // of `blocks`
+    std::size_t element_begin = 0, element_end = 0;  // of `elements`
+    std::size_t owned_begin = 0, owned_end = 0;      // of `owned`
+    std::size_t shared_begin = 0, shared_end = 0;    // of `shared`, and the slots of the forces on them
+  };
+
+  std::vector<Chunk> chunks;
+  std::vector<step::CellBlock> blocks;
+  std::vector<std::array<std::uint32_t, step::kLanes>> block_cells;  // cells of the lanes; kNoCell: none
+  std::vector<std::uint32_t> elements;                               // by chunk, ascending
+  std::vector<std::uint16_t> owned, shared;                          // by chunk, numbers within it
+  std::vector<step::CellConstants> constants;                        // (parts)
+
+  // Elements of several chunks, ascending, and the slots of their forces (compressed rows, ascending).
+  std::vector<std::uint32_t> shared_elements;
+  std::vector<std::uint32_t> slot_offsets, slots;
+  std::vector<std::uint32_t> lone_elements;  // that no active cell contains, ascending
+
+  std::size_t largest_chunk = 0;  // elements
+
+  static constexpr std::uint32_t kNoCell = 0xffffffff;
+  [[nodiscard]] std::size_t bytes() const;
+};
+
+// Of the cells that resist (simulate/cells.h). `damping` is the time tau of each part [s].
+[[nodiscard]] StepLayout step_layout(const Setting& setting, const std::vector<double>& damping);
+
+// Mass of each element [kg]: an eighth of rho f V of each of its cells, or rho h^3 in centre placement.
+[[nodiscard]] std::vector<double> element_masses(const Setting& setting);
+
+}  // namespace flexel

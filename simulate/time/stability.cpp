@@ -1,0 +1,136 @@
+// Eigenvalues of one cell per part, and an upper bound on how a deformed cell's grow.
+#include "simulate/time/stability.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "formats/parallel.h"
+#include "simulate/cells.h"
+
+namespace flexel {
+namespace {
+
+using CellMatrix = Eigen::Matrix<double, 24, 24>;
+
+CellMatrix cells_stiffness(const CellKind& kind) {
+  CellMatrix k;
+  const CellTangent rest = cell_tangent(Mat3::Zero());
+  for (std::size_t a = 0; a < 8; ++a)
+    for (std::size_t b = 0; b < 8; ++b)
+      k.block<3, 3>(3 * static_cast<Eigen::Index>(a), 3 * static_cast<Eigen::Index>(b)) =
+          tangent_block(kind, rest, a, b);
+  return k;
+}
+
+CellMatrix springs_stiffness(const SpringKind& kind) {
+  CellMatrix k = CellMatrix::Zero();
+  const CellVectors rest = [] {
+    CellVectors u;
+    u.fill(Vec3::Zero());
+    return u;
+  }();
+  for (const Spring& spring : kind.springs) {
+    const Block block = spring_block(spring, rest, false);
+    const auto a = 3 * static_cast<Eigen::Index>(spring.a), b = 3 * static_cast<Eigen::Index>(spring.b);
+    k.block<3, 3>(a, a) += block;
+    k.block<3, 3>(b, b) += block;
+    k.block<3, 3>(a, b) -= block;
+    k.block<3, 3>(b, a) -= block;
+  }
+  return k;
+}
+
+bool is_springs(const Setting& setting, std::size_t part) {
+  return setting.models.size() > part && setting.models[part] == Model::springs;
+}
+
+struct Largest {
+  double value = 1;
+  Largest& operator+=(const Largest& other) {
+    value = std::max(value, other.value);
+    return *this;
+  }
+};
+
+// d2W/dF2 of the neo-Hookean energy has, with s the singular values of F, entries of at most mu + (mu +
+// lambda (1 - ln J)) / s_min^2; at rest 2 mu + lambda.
+double cell_stiffening(const CellKind& kind, const CellVectors& u) {
+  const Mat3 gradient = displacement_gradient(kind, u);
+  const double jacobian = 1 + volume_change(gradient);
+  if (!(jacobian > 0)) return std::numeric_limits<double>::infinity();
+  const Mat3 f = Mat3::Identity() + gradient;
+  Eigen::SelfAdjointEigenSolver<Mat3> eigen;
+  eigen.computeDirect(f.transpose() * f, Eigen::EigenvaluesOnly);
+  const double least = std::max(eigen.eigenvalues()[0], 1e-12);
+  const double log_volume = std::log(jacobian);
+  const double coupling = kind.mu + kind.lambda * (1 - log_volume);
+  return (kind.mu + std::max(coupling, 0.0) / least) / (2 * kind.mu + kind.lambda);
+}
+
+// k (1 + extension) at most; compression turns the cross stiffness k (1 - l/d) negative, which slows.
+double springs_stiffening(const SpringKind& kind, const CellVectors& u) {
+  double largest = 1;
+  for (const Spring& spring : kind.springs) {
+    const double stretch = (spring.rest + u[spring.b] - u[spring.a]).norm() / spring.rest.norm();
+    largest = std::max(largest, 2 - 1 / stretch);
+  }
+  return largest;
+}
+
+}  // namespace
+
+std::vector<double> cell_frequencies(const Setting& setting) {
+  std::vector<double> result;
+  for (std::size_t p = 0; p < setting.body.parts.size(); ++p) {
+    const Part& part = setting.body.parts[p];
+    if (part.cell_begin == part.cell_end) {
+      result.push_back(0);
+      continue;
+    }
+    const CellMatrix k = is_springs(setting, p)
+                             ? springs_stiffness(spring_kind(part.lattice, setting.materials[p]))
+                             : cells_stiffness(cell_kind(part.lattice, setting.materials[p]));
+    const Eigen::SelfAdjointEigenSolver<CellMatrix> eigen(k, Eigen::EigenvaluesOnly);
+    const double corner_mass = setting.materials[p].density * part.lattice.spacing.prod() / 8;
+    result.push_back(eigen.eigenvalues()[23] / corner_mass);
+  }
+  return result;
+}
+
+double stable_step(double omega2, double tau) {
+  if (!(omega2 > 0)) return std::numeric_limits<double>::infinity();
+  const double omega = std::sqrt(omega2), zeta = tau * omega / 2;
+  return 2 / omega / (std::sqrt(1 + zeta * zeta) + zeta);
+}
+
+double stable_step(const Setting& setting, const std::vector<double>& damping) {
+  double step = std::numeric_limits<double>::infinity();
+  const std::vector<double> omega2 = cell_frequencies(setting);
+  for (std::size_t p = 0; p < omega2.size(); ++p) step = std::min(step, stable_step(omega2[p], damping[p]));
+  return step;
+}
+
+std::vector<double> stiffening(const Setting& setting, const std::vector<Vec3>& displacement) {
+  const Body& body = setting.body;
+  const std::vector<std::uint8_t> active = active_cells(setting);
+  std::vector<double> result;
+  for (std::size_t p = 0; p < body.parts.size(); ++p) {
+    const Part& part = body.parts[p];
+    const CellKind cells = cell_kind(part.lattice, setting.materials[p]);
+    const SpringKind springs = spring_kind(part.lattice, setting.materials[p]);
+    const bool by_springs = is_springs(setting, p);
+    result.push_back(parallel_sum<Largest>(part.cell_end - part.cell_begin, [&](std::size_t i) {
+                       const std::size_t c = part.cell_begin + i;
+                       if (!active[c]) return Largest{};
+                       CellVectors u;
+                       for (std::size_t a = 0; a < 8; ++a) u[a] = displacement[body.cell_elements[c][a]];
+                       return Largest{by_springs ? springs_stiffening(springs, u)
+                                                 : cell_stiffening(cells, u)};
+                     }).value);
+  }
+  return result;
+}
+
+}  // namespace flexel

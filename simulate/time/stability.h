@@ -1,0 +1,29 @@
+// How long a step may be.
+//
+// The largest frequency of a body is at most that of its stiffest cell swinging alone (the element eigenvalue
+// theorem; Irons and Treharne 1971): with the cell's stiffness K and the mass m = rho V / 8 at its corners,
+// omega^2 = max eig(K) / m. Fill scales both, so a sliver is no stiffer than a whole cell. At rest this is
+// 2 / omega = h sqrt(rho / max(3 K, 2 mu)) for cubes of model `cells`. Damping with a time tau has the ratio
+// zeta = tau omega / 2 there, and the explicit step is stable up to
+//     dt <= 2 / omega (sqrt(1 + zeta^2) - zeta)      (Belytschko, Liu, Moran 2000, section 6.2)
+#pragma once
+#include <vector>
+
+#include "simulate/state.h"
+
+namespace flexel {
+
+// omega^2 [1/s^2] of one whole cell at rest, by part. 0: the part has no cells.
+[[nodiscard]] std::vector<double> cell_frequencies(const Setting& setting);
+
+// The bound on the step [s] for frequency^2 `omega2` and damping time `tau` [s]; infinity for omega2 = 0.
+[[nodiscard]] double stable_step(double omega2, double tau);
+
+// Of the whole body at rest, by cells alone. `damping`: tau of each part [s].
+[[nodiscard]] double stable_step(const Setting& setting, const std::vector<double>& damping);
+
+// By how much omega^2 of the stiffest cell of each part exceeds that at rest, in the deformed state: at
+// least 1. Neo-Hookean stiffness grows as a cell is squeezed; for springs it changes by their strain.
+[[nodiscard]] std::vector<double> stiffening(const Setting& setting, const std::vector<Vec3>& displacement);
+
+}  // namespace flexel
