@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "formats/body.h"
+#include "simulate/course.h"
 #include "simulate/linear/block_matrix.h"
 #include "simulate/motion.h"
 
@@ -13,6 +14,7 @@ struct Constraints {
   std::vector<std::uint8_t> mask;                    // (elements) bit i: axis i is prescribed
   std::vector<std::array<std::uint32_t, 3>> motion;  // (elements x 3) index into motions, where prescribed
   std::vector<Motion> motions;
+  std::vector<Course> courses = {};  // (motions) how each goes on in a timed run
 };
 
 // Displacement [m] that the prescribed axes have at load share `share`; the others keep `displacement`.

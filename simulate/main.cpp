@@ -24,7 +24,8 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_option("scene", arguments.scene, "Scene file (TOML; docs/scene.md gives every key)")->required();
   app.add_option("body", arguments.bodies,
                  "Body files; none or \"-\": stdin. Several are simulated together");
-  app.add_option("-o,--output", arguments.output, "Deformed body (.vtu); \"-\": stdout");
+  app.add_option("-o,--output", arguments.output,
+                 "Deformed body (.vtu; in timed runs also .pvd, a series of frames); \"-\": stdout");
   app.add_option("--threads", arguments.options.threads, "Threads; 0: every core")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--summary", arguments.summary, "Write the summary as JSON to this file (docs/summary.md)");
@@ -34,6 +35,11 @@ void declare(CLI::App& app, Arguments& arguments) {
                  "Stop after this time (\"90 s\", \"5 min\"): exit 5, the last good state in "
                  "OUTPUT.failed.vtu")
       ->type_name("TIME");
+  app.add_option(
+      "--history", arguments.options.history,
+      "Timed runs: write energies, momenta and probes over time to this CSV file (docs/motion.md)");
+  app.add_option("--isa", arguments.options.isa,
+                 "Timed runs: instruction set of the kernel (portable, avx2, avx512); the best by itself");
   app.add_flag("--quiet", arguments.quiet, "Say nothing but warnings and errors");
   app.add_flag("--compress", arguments.compress, "Compress the arrays of the body file");
 }
@@ -54,9 +60,8 @@ Body read_bodies(std::vector<std::string> paths) {
 
 std::string failed_name(const std::string& output) {
   if (output == "-") return "";
-  const std::string ending = ".vtu";
-  const bool ends = output.size() > ending.size() && output.ends_with(ending);
-  return (ends ? output.substr(0, output.size() - ending.size()) : output) + ".failed.vtu";
+  const bool ends = extension(output) == "vtu" || extension(output) == "pvd";
+  return (ends ? output.substr(0, output.size() - 4) : output) + ".failed.vtu";
 }
 
 int run(int argc, char** argv) {
@@ -71,11 +76,14 @@ int run(int argc, char** argv) {
   const Scene scene = read_scene(arguments.scene);  // before the body: a typo is answered at once
   Body body = read_bodies(arguments.bodies);
   arguments.options.failed_output = failed_name(arguments.output);
+  arguments.options.compress = arguments.compress;
+  const bool series = extension(arguments.output) == "pvd";
+  if (series) arguments.options.series = arguments.output;
   const SimulateResult result = simulate(body, scene, arguments.options, progress);
   for (const std::string& line : summary_lines(result)) progress.say(line);
   BodyFileOptions file_options;
   file_options.compress = arguments.compress;
-  write_body(body, arguments.output, file_options);
+  if (!series) write_body(body, arguments.output, file_options);
   if (!arguments.summary.empty()) {
     OutputFile file(arguments.summary, false);
     file.write(summary_json(result, body));

@@ -21,6 +21,7 @@ Constraints initial_constraints(const Body& body, const Stencil& stencil, const 
   constraints.mask.assign(body.element_count(), 0);
   constraints.motion.assign(body.element_count(), {0, 0, 0});
   constraints.motions.push_back({});
+  constraints.courses.push_back({});
   for (std::uint32_t e = 0; e < body.element_count(); ++e)
     if (stencil.of(e).empty() && !paper.active()[e]) constraints.mask[e] = 7;
   return constraints;

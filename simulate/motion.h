@@ -1,4 +1,5 @@
-// A prescribed motion: a rotation about an axis, then a translation, both in proportion to the load share.
+// A prescribed motion: a rotation about an axis, then a translation, both in proportion to the load share, or
+// in a timed run to the factor of a course.
 #pragma once
 #include <Eigen/Geometry>
 

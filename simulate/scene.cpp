@@ -80,16 +80,42 @@ std::optional<int> whole_number(TableReader& reader, const char* key, int most) 
   return static_cast<int>(*value);
 }
 
+void parse_time(TableReader& reader, RunSettings& run) {
+  run.time = reader.quantity("time", Dimension::time);
+  run.step = reader.quantity("step", Dimension::time);
+  run.history_every = reader.quantity("history_every", Dimension::time);
+  run.frames = whole_number(reader, "frames", 1000000);
+  const std::optional<std::string> method = reader.text("method");
+  for (const auto& [key, value] :
+       {std::pair{"time", run.time}, {"step", run.step}, {"history_every", run.history_every}})
+    if (value && !(*value > 0)) reader.fail(fmt::format("\"{}\" needs to be above 0", key));
+  if (run.time && reader.find("until")) reader.fail("[run] has both \"until\" and \"time\"; give one");
+  if (!run.time && (run.step || run.history_every || run.frames || method))
+    reader.fail("[run] has keys of a timed run but no \"time\", for example time = \"1 s\"");
+  if (!method) return;
+  if (*method == "symplectic")
+    run.method = TimeMethod::symplectic_euler;
+  else if (*method == "explicit")
+    run.method = TimeMethod::explicit_euler;
+  else if (*method == "verlet")
+    run.method = TimeMethod::verlet;
+  else
+    reader.fail(
+        reader.find("method")->line,
+        fmt::format("\"method\" = \"{}\"; choose \"symplectic\", \"verlet\" or \"explicit\"", *method));
+}
+
 RunSettings parse_run(TableReader& root) {
   RunSettings run;
   const SceneValue* table = root.find("run");
   if (!table) return run;
   TableReader reader(*table, root.file(), "[run]");
-  const std::string until = reader.text("until").value_or("equilibrium");
-  if (until != "equilibrium")
+  if (const std::optional<std::string> until = reader.text("until"); until && *until != "equilibrium")
     reader.fail(
         reader.find("until")->line,
-        fmt::format("\"until\" = \"{}\" is not available; this version knows \"equilibrium\"", until));
+        fmt::format("\"until\" = \"{}\": only \"equilibrium\", or leave it out and give time = \"1 s\"",
+                    *until));
+  parse_time(reader, run);
   run.tolerance = reader.number("tolerance").value_or(run.tolerance);
   run.load_steps = whole_number(reader, "load_steps", 10000).value_or(run.load_steps);
   run.newton_iterations = whole_number(reader, "newton_iterations", 1000000);

@@ -33,10 +33,18 @@ struct Probe {
   std::string origin;
 };
 
+enum class TimeMethod { symplectic_euler, explicit_euler, verlet };
+
 // [run]
 struct RunSettings {
-  double tolerance = 1e-8;  // largest residual, relative to loads and reactions
-  int load_steps = 1;       // at least; steps that fail are cut by themselves
+  // Timed runs; nothing in `time`: equilibrium.
+  std::optional<double> time;  // s
+  std::optional<double> step;  // s; nothing: from the stability bound
+  TimeMethod method = TimeMethod::symplectic_euler;
+  std::optional<int> frames;            // of a .pvd series, the first one not counted
+  std::optional<double> history_every;  // s
+  double tolerance = 1e-8;              // largest residual, relative to loads and reactions
+  int load_steps = 1;                   // at least; steps that fail are cut by themselves
   // after which the run gives up; each load step that ends in equilibrium allows 10 more. Nothing: 100, or 40
   // where the first linear answer is several times the size of the body
   std::optional<int> newton_iterations;

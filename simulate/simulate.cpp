@@ -13,8 +13,10 @@
 #include "simulate/equilibrium.h"
 #include "simulate/fragments.h"
 #include "simulate/probes.h"
+#include "simulate/report.h"
 #include "simulate/scene.h"
 #include "simulate/unsupported.h"
+#include "simulate/time/timed_run.h"
 
 namespace flexel {
 namespace {
@@ -26,27 +28,6 @@ void refuse_empty(const Body& body) {
 void move_body(Body& body, const State& state) {
   for (std::size_t e = 0; e < body.element_count(); ++e)
     body.position[e] = body.rest[e] + state.displacement[e];
-}
-
-void name_materials(Body& body, const std::vector<Material>& materials) {
-  for (std::size_t p = 0; p < body.parts.size(); ++p) body.parts[p].material = materials[p].name;
-}
-
-void warn_of_springs(const Setting& setting, Progress& progress) {
-  for (std::size_t p = 0; p < setting.models.size(); ++p) {
-    const Material& material = setting.materials[p];
-    const std::string& part = setting.body.parts[p].name;
-    if (setting.models[p] == Model::springs && std::abs(material.poisson - 0.25) > 0.005)
-      progress.warn(
-          fmt::format("part \"{}\": model \"springs\" has Poisson's ratio 0.25, not the {:.3g} of {}", part,
-                      material.poisson, material.name));
-    if (setting.models[p] == Model::paper)
-      progress.warn(fmt::format(
-          "part \"{}\": model \"paper\" is stiffer than {} inside (Young's modulus {:.3g} times along the "
-          "lattice's axes) and softer at its surface; it is meant for comparison with the paper, not for "
-          "sizes",
-          part, material.name, axial_stiffness(setting.hooke[p])));
-  }
 }
 
 void report_strays(const Fragments& fragments, SimulateResult& result, Progress& progress) {
@@ -88,33 +69,6 @@ void explain_after(const SimulateResult& result, double linear_seconds, Progress
   line("linear solver", linear_seconds);
 }
 
-void measure_displacement(const Body& body, const State& state, SimulateResult& result) {
-  for (std::size_t e = 0; e < body.element_count(); ++e)
-    if (const double length = state.displacement[e].norm(); length > result.largest_displacement) {
-      result.largest_displacement = length;
-      result.largest_displacement_at = body.rest[e];
-    }
-}
-
-// A cell resists by its mean deformation gradient; a corner of it may fold unnoticed, and with it the surface
-// that is mapped through it.
-void measure_corners(const Mechanics& mechanics, const State& state, SimulateResult& result,
-                     Progress& progress) {
-  constexpr double kNearlyFolded = 0.2;
-  const SmallestJacobian smallest = mechanics.cells().smallest_corner_jacobian(state);
-  const Body& body = mechanics.body();
-  if (smallest.cell >= body.cell_count()) return;
-  result.smallest_corner_jacobian = smallest.value;
-  result.smallest_corner_at = body.rest[body.cell_elements[smallest.cell][smallest.corner]];
-  if (smallest.value > kNearlyFolded) return;
-  const Vec3& at = result.smallest_corner_at;
-  progress.warn(
-      fmt::format("a corner of a cell near ({}, {}, {}) {} (J = {:.2g}): the result is coarse there; "
-                  "use a smaller spacing, or spread the load or the fix over a larger area",
-                  human_length(at.x()), human_length(at.y()), human_length(at.z()),
-                  smallest.value > 0 ? "is nearly folded" : "is folded", smallest.value));
-}
-
 double mass_of(const Setting& setting) {
   const std::vector<std::uint32_t> part = cell_parts(setting.body);
   double mass = parallel_sum<double>(setting.body.cell_count(), [&](std::size_t c) {
@@ -134,6 +88,18 @@ bool anything_acts(const Scene& scene) {
   bool acts = scene.get<Gravity>().acceleration.has_value() || !scene.get<Loads>().loads.empty();
   for (const Tie& tie : scene.get<Ties>().ties) acts = acts || tie.is_move;
   return acts;
+}
+
+// An effect that acts in time has no meaning at equilibrium.
+void refuse_timed(const std::vector<Pass>& passes, const SimulateOptions& options, const std::string& scene) {
+  for (const Pass& pass : passes)
+    if (pass.needs_time)
+      throw InputError(scene,
+                       fmt::format("{} ({}) acts in timed runs only: give [run] time = \"1 s\", or leave "
+                                   "it out",
+                                   pass.name, pass.why));
+  if (!options.history.empty() || !options.series.empty())
+    throw InputError(scene, "--history and a .pvd series are for timed runs: give [run] time = \"1 s\"");
 }
 
 class Run {
@@ -208,6 +174,7 @@ SimulateResult Run::operator()() {
   name_materials(body_, setting_.materials);
   const std::vector<ProbePoints> probes = place_probes(scene_, setting_);
   std::vector<Pass> passes = Effects::passes(scene_.effects, setting_);
+  refuse_timed(passes, options_, scene_.name);
   if (!anything_acts(scene_))
     progress_.warn("the scene has no [[load]], [[move]] or [gravity]: nothing will move");
   if (options_.explain) explain_before(passes, progress_);
@@ -219,7 +186,7 @@ SimulateResult Run::operator()() {
   mechanics.report(state_, result);
   result.elastic_energy = mechanics.elastic_energy(state_);
   result.smallest_jacobian = mechanics.most_compressed(state_).value;
-  measure_corners(mechanics, state_, result, progress_);
+  measure_corners(mechanics.cells(), body_, state_, result, progress_);
   carry_strays(fragments_, setting_, mechanics.stencil(), state_);
   move_body(body_, state_);
   for (const ProbePoints& probe : probes) result.probes.push_back(measure(probe, state_));
@@ -248,7 +215,8 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
   const ThreadLimit limit(options.threads);
   refuse_empty(body);
   progress.stage("simulate");
-  SimulateResult result = Run(body, scene, options, progress)();
+  SimulateResult result =
+      scene.run.time ? run_in_time(body, scene, options, progress) : Run(body, scene, options, progress)();
   progress.finish();
   return result;
 }

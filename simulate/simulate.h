@@ -38,6 +38,14 @@ struct PassShare {  // an effect that ran, why, and how long it took
   double seconds = 0;
 };
 
+struct TimedSummary {  // of a run in time
+  double time = 0;     // s, reached
+  std::uint64_t steps = 0;
+  double step = 0;                                    // s, the last one
+  std::string isa;                                    // instruction set of the kernel
+  std::vector<std::pair<std::string, double>> books;  // J, by name; with a history only
+};
+
 struct SimulateResult {
   std::vector<ProbeResult> probes;
   std::vector<Reaction> reactions;
@@ -57,13 +65,18 @@ struct SimulateResult {
   int load_steps = 0, newton_iterations = 0, cg_iterations = 0;
   double relative_residual = 0;
   double seconds = 0;
+  std::optional<TimedSummary> timed;
 };
 
 struct SimulateOptions {
   int threads = 0;                // 0: every core
   std::string failed_output;      // where the last good state goes when the run fails; "" for nowhere
   std::optional<double> timeout;  // s, after which the run stops
-  bool explain = false;           // say which effects run and why, and afterwards the share of time of each
+  // Timed runs: where the books go (CSV), and the frames (.pvd); "" for nowhere. docs/motion.md
+  std::string history, series;
+  bool compress = false;  // the frames
+  std::string isa;        // "portable", "avx2", "avx512"; "" for the best that the machine has
+  bool explain = false;   // say which effects run and why, and afterwards the share of time of each
 };
 
 // Runs the scene on the body, which is moved to its new state. Throws InputError, DivergedError,

@@ -70,10 +70,18 @@ std::string summary_json(const SimulateResult& result, const Body& body) {
     json["smallest_corner_jacobian"] = *result.smallest_corner_jacobian;
     json["smallest_corner_at"] = vector(result.smallest_corner_at);
   }
-  json["load_steps"] = result.load_steps;
-  json["newton_iterations"] = result.newton_iterations;
-  json["cg_iterations"] = result.cg_iterations;
-  json["relative_residual"] = result.relative_residual;
+  if (result.timed) {
+    json["timed"] = {{"time", result.timed->time},
+                     {"steps", result.timed->steps},
+                     {"step", result.timed->step},
+                     {"isa", result.timed->isa}};
+    for (const auto& [name, joules] : result.timed->books) json["timed"]["books"][name] = joules;
+  } else {
+    json["load_steps"] = result.load_steps;
+    json["newton_iterations"] = result.newton_iterations;
+    json["cg_iterations"] = result.cg_iterations;
+    json["relative_residual"] = result.relative_residual;
+  }
   json["seconds"] = result.seconds;
   json["time"] = Json::array();
   for (const PassShare& pass : result.passes)
@@ -98,6 +106,18 @@ std::vector<std::string> summary_lines(const SimulateResult& result) {
   const std::string corner = result.smallest_corner_jacobian
                                  ? fmt::format(" (at a corner {:.4g})", *result.smallest_corner_jacobian)
                                  : "";
+  if (result.timed) {
+    lines.push_back(fmt::format(
+        "{} steps of {:.4g} s to {:.6g} s in {:.2f} s (kernel {}), elastic energy {:.4g} J, "
+        "smallest J {:.4g}{}",
+        result.timed->steps, result.timed->step, result.timed->time, result.seconds, result.timed->isa,
+        result.elastic_energy, result.smallest_jacobian, corner));
+    std::string books;
+    for (const auto& [name, joules] : result.timed->books)
+      books += fmt::format("{}{} {:.4g} J", books.empty() ? "" : ", ", name, joules);
+    if (!books.empty()) lines.push_back("books: " + books);
+    return lines;
+  }
   lines.push_back(
       fmt::format("elastic energy {:.4g} J, smallest J {:.4g}{}, {} load step(s), {} Newton and {} CG "
                   "iterations, residual "

@@ -3,7 +3,9 @@
 #include <tuple>
 
 #include "simulate/effects/bonds.h"
+#include "simulate/effects/damping.h"
 #include "simulate/effects/gravity.h"
+#include "simulate/effects/initial_velocity.h"
 #include "simulate/effects/loads.h"
 #include "simulate/effects/ties.h"
 
@@ -28,6 +30,6 @@ struct EffectList {
   }
 };
 
-using Effects = EffectList<Gravity, Loads, Ties, Bonds>;
+using Effects = EffectList<Gravity, Loads, Ties, Bonds, Damping, InitialVelocity>;
 
 }  // namespace flexel

@@ -18,6 +18,15 @@
 //                                                                     they are inner ones then, and hold
 //                                                                     nothing
 //   void report(const State&, const std::vector<Vec3>& unbalanced, SimulateResult&) const
+// In timed runs (simulate/time/timed_run.h) also
+//   static constexpr bool needs_time                                  true: refused at equilibrium
+//   static constexpr Book book                                        where its energy is entered; default:
+//   work void compose(StepPlan&) const                                     what it asks of the hot kernel
+//   void start(State&) const                                          changes the state before the first step
+//   bool constant() const                                             its forces are the same at every step
+//   double added_frequency(const std::vector<double>& mass) const     1/s^2: bound on what its stiffness adds
+//   to
+//                                                                     the square of the largest frequency
 // An effect that a scene does not name makes no object, no array and no pass.
 #pragma once
 #include <chrono>
@@ -33,8 +42,13 @@
 #include "simulate/simulate.h"
 #include "simulate/state.h"
 #include "simulate/stiffness.h"
+#include "simulate/time/plan.h"
 
 namespace flexel {
+
+// Where the energy that an effect's forces give or take is entered: as potential energy (its energy() is
+// that), as work done on the body, or as energy dissipated.
+enum class Book { potential, work, dissipation };
 
 template <class E>
 concept HasEnergy = requires(const E& e, const State& s) {
@@ -61,6 +75,23 @@ concept Reports = requires(const E& e, const State& s, const std::vector<Vec3>& 
   e.report(s, u, r);
 };
 
+template <class E>
+concept Composes = requires(const E& e, StepPlan& p) {
+  e.compose(p);
+};
+template <class E>
+concept Starts = requires(const E& e, State& s) {
+  e.start(s);
+};
+template <class E>
+concept TellsConstant = requires(const E& e) {
+  { e.constant() } -> std::same_as<bool>;
+};
+template <class E>
+concept AddsFrequency = requires(const E& e, const std::vector<double>& m) {
+  { e.added_frequency(m) } -> std::same_as<double>;
+};
+
 // An effect in a run, its hooks as callables (empty where it has none), and the time it took.
 struct Pass {
   std::string name, why;
@@ -70,6 +101,11 @@ struct Pass {
   std::function<void(Constraints&)> constrain;
   std::function<void(const State&, const std::vector<Vec3>&, SimulateResult&)> report;
   std::vector<CoupledElements> couples;
+  std::function<void(StepPlan&)> compose;
+  std::function<void(State&)> start;
+  std::function<double(const std::vector<double>&)> added_frequency;
+  Book book = Book::work;
+  bool constant = false, needs_time = false;
   double seconds = 0;
 };
 
@@ -86,6 +122,13 @@ template <class E>
     pass.add_stiffness = [effect](const State& s, BlockMatrix& m) { effect->add_stiffness(s, m); };
   if constexpr (Constrains<E>) pass.constrain = [effect](Constraints& c) { effect->constrain(c); };
   if constexpr (Couples<E>) pass.couples = effect->couples();
+  if constexpr (Composes<E>) pass.compose = [effect](StepPlan& p) { effect->compose(p); };
+  if constexpr (Starts<E>) pass.start = [effect](State& s) { effect->start(s); };
+  if constexpr (AddsFrequency<E>)
+    pass.added_frequency = [effect](const std::vector<double>& m) { return effect->added_frequency(m); };
+  if constexpr (TellsConstant<E>) pass.constant = effect->constant();
+  if constexpr (requires { E::book; }) pass.book = E::book;
+  if constexpr (requires { E::needs_time; }) pass.needs_time = E::needs_time;
   if constexpr (Reports<E>)
     pass.report = [effect](const State& s, const std::vector<Vec3>& u, SimulateResult& r) {
       effect->report(s, u, r);

@@ -12,11 +12,13 @@ class Gravity {
     std::optional<Vec3> acceleration;  // m/s^2, world frame
   };
   static constexpr const char* name = "gravity";
+  static constexpr Book book = Book::potential;
 
   static void parse(TableReader& scene, Parameters& parameters);
   [[nodiscard]] static std::optional<Gravity> make(const Parameters& parameters, const Setting& setting);
   [[nodiscard]] std::string why() const;
 
+  [[nodiscard]] bool constant() const { return true; }
   [[nodiscard]] double energy(const State& state) const;
   void add_forces(const State& state, std::vector<Vec3>& forces) const;
   void report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) const;

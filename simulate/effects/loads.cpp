@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "formats/error.h"
 #include "simulate/scene_selection.h"
 #include "simulate/surface_points.h"
@@ -20,6 +22,7 @@ Load parse_load(TableReader& reader) {
   load.name = reader.text("name").value_or(describe(load.where));
   load.force = reader.vector("force", Dimension::force);
   load.pressure = reader.quantity("pressure", Dimension::pressure);
+  load.course = parse_course(reader);
   reader.finish();
   if (load.force.has_value() == load.pressure.has_value())
     reader.fail(
@@ -77,7 +80,14 @@ void Loads::parse(TableReader& scene, Parameters& parameters) {
 std::optional<Loads> Loads::make(const Parameters& parameters, const Setting& setting) {
   if (parameters.loads.empty()) return std::nullopt;
   Loads loads;
-  std::vector<Vec3> total(setting.body.element_count(), Vec3::Zero());
+  std::vector<Vec3> steady(setting.body.element_count(), Vec3::Zero());
+  const auto add_group = [&](const Course& course, const std::vector<Vec3>& forces) {
+    Group made;
+    made.course = course;
+    for (std::uint32_t e = 0; e < forces.size(); ++e)
+      if (forces[e] != Vec3::Zero()) made.forces.push_back({e, forces[e]});
+    if (!made.forces.empty()) loads.groups_.push_back(std::move(made));
+  };
   for (const Load& load : parameters.loads) {
     const Selected selected = resolve(load.where, setting.body);
     if (!selected.polygons.empty() && !selected.elements.empty())
@@ -89,14 +99,14 @@ std::optional<Loads> Loads::make(const Parameters& parameters, const Setting& se
     else
       add_volume_load(load, selected.elements, setting, sum);
     Vec3 resultant = Vec3::Zero();
-    for (std::size_t e = 0; e < sum.size(); ++e) {
-      resultant += sum[e];
-      total[e] += sum[e];
-    }
-    loads.totals_.emplace_back(load.name, resultant);
+    for (const Vec3& force : sum) resultant += force;
+    loads.totals_.push_back({load.name, resultant, load.course});
+    if (!load.course.time.empty())
+      add_group(load.course, sum);
+    else
+      for (std::size_t e = 0; e < sum.size(); ++e) steady[e] += sum[e];
   }
-  for (std::uint32_t e = 0; e < total.size(); ++e)
-    if (total[e] != Vec3::Zero()) loads.forces_.push_back({e, total[e]});
+  add_group({}, steady);
   return loads;
 }
 
@@ -104,19 +114,31 @@ std::string Loads::why() const {
   return fmt::format("{} [[load]]", totals_.size());
 }
 
+bool Loads::constant() const {
+  return std::all_of(groups_.begin(), groups_.end(),
+                     [](const Group& group) { return group.course.time.empty(); });
+}
+
 double Loads::energy(const State& state) const {
-  double work = 0;
-  for (const ElementForce& at : forces_) work += at.force.dot(state.displacement[at.element]);
-  return -state.share * work;
+  double energy = 0;
+  for (const Group& group : groups_) {
+    double work = 0;
+    for (const ElementForce& at : group.forces) work += at.force.dot(state.displacement[at.element]);
+    energy -= group.course.at(state) * work;
+  }
+  return energy;
 }
 
 void Loads::add_forces(const State& state, std::vector<Vec3>& forces) const {
-  for (const ElementForce& at : forces_) forces[at.element] += state.share * at.force;
+  for (const Group& group : groups_) {
+    const double factor = group.course.at(state);
+    for (const ElementForce& at : group.forces) forces[at.element] += factor * at.force;
+  }
 }
 
 void Loads::report(const State& state, const std::vector<Vec3>&, SimulateResult& result) const {
-  for (const auto& [name_of_load, force] : totals_)
-    result.loads.push_back({name_of_load, state.share * force});
+  for (const Total& total : totals_)
+    result.loads.push_back({total.name, total.course.at(state) * total.force});
 }
 
 }  // namespace flexel

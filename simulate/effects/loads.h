@@ -2,6 +2,7 @@
 // or a pressure along the surface's normals at rest. Both are dead: they keep the direction and the size that
 // they have at rest.
 #pragma once
+#include "simulate/course.h"
 #include "simulate/effects/effect.h"
 #include "simulate/selection.h"
 
@@ -11,6 +12,7 @@ struct Load {
   Selection where;
   std::optional<Vec3> force;       // N, in total
   std::optional<double> pressure;  // Pa, pushes against the surface
+  Course course = {};              // in timed runs; none: all of it from the start
   std::string name;
   std::string origin;  // "beam.toml:12"
 };
@@ -26,6 +28,7 @@ class Loads {
   [[nodiscard]] static std::optional<Loads> make(const Parameters& parameters, const Setting& setting);
   [[nodiscard]] std::string why() const;
 
+  [[nodiscard]] bool constant() const;
   [[nodiscard]] double energy(const State& state) const;
   void add_forces(const State& state, std::vector<Vec3>& forces) const;
   void report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) const;
@@ -35,8 +38,17 @@ class Loads {
     std::uint32_t element = 0;
     Vec3 force = Vec3::Zero();  // N
   };
-  std::vector<ElementForce> forces_;                  // ascending by element
-  std::vector<std::pair<std::string, Vec3>> totals_;  // of each load
+  struct Group {  // loads of one course
+    Course course;
+    std::vector<ElementForce> forces;  // ascending by element
+  };
+  struct Total {
+    std::string name;
+    Vec3 force = Vec3::Zero();  // N
+    Course course;
+  };
+  std::vector<Group> groups_;  // one a load with a course, then all others in one
+  std::vector<Total> totals_;  // of each load
 };
 
 }  // namespace flexel

@@ -9,6 +9,8 @@
 
 #include "formats/error.h"
 #include "simulate/surface_points.h"
+#include "simulate/time/layout.h"
+#include "simulate/time/stability.h"
 
 namespace flexel {
 namespace {
@@ -42,6 +44,13 @@ void refuse_conflicts(const std::vector<Tie>& ties, const std::vector<Selected>&
     }
 }
 
+// A point on a cell's face has its weight on the four elements there.
+constexpr double kOffFace = 1e-6;
+bool lies_on_face(const CellPoint& at) {
+  return std::count_if(at.weights.begin(), at.weights.end(),
+                       [](double w) { return std::abs(w) > kOffFace; }) <= 4;
+}
+
 }  // namespace
 
 std::optional<Ties> Ties::make(const Parameters& parameters, const Setting& setting) {
@@ -49,12 +58,19 @@ std::optional<Ties> Ties::make(const Parameters& parameters, const Setting& sett
   Ties made;
   made.body_ = &setting.body;
   made.ties_ = parameters.ties;
+  if (setting.duration)
+    for (Tie& tie : made.ties_)
+      if (tie.is_move && tie.course.time.empty()) tie.course = {{0, *setting.duration}, {0, 1}};
+  made.held_elements_.resize(made.ties_.size());
   std::vector<Selected> selected;
   for (const Tie& tie : made.ties_) selected.push_back(resolve(tie.where, setting.body));
   refuse_conflicts(made.ties_, selected);
   for (std::uint32_t t = 0; t < made.ties_.size(); ++t) {
     if (!selected[t].polygons.empty()) made.add_surface_tie(t, selected[t].polygons, setting);
-    made.held_elements_.push_back(std::move(selected[t].elements));
+    std::vector<std::uint32_t>& held = made.held_elements_[t];
+    held.insert(held.end(), selected[t].elements.begin(), selected[t].elements.end());
+    std::sort(held.begin(), held.end());
+    held.erase(std::unique(held.begin(), held.end()), held.end());
   }
   return made;
 }
@@ -68,7 +84,13 @@ void Ties::add_surface_tie(std::uint32_t tie, const std::vector<std::uint32_t>& 
                                  ties_[tie].name));
   using Matrix = decltype(TiedElements::stiffness);
   std::map<std::array<std::uint32_t, 8>, TiedElements> by_elements;
+  const std::size_t first = tied_.size();
   for (const SurfacePoint& point : points) {
+    if (setting.duration && lies_on_face(point.at)) {
+      for (std::size_t a = 0; a < point.at.count; ++a)
+        if (point.at.weights[a] > kOffFace) held_elements_[tie].push_back(point.at.elements[a]);
+      continue;
+    }
     const std::uint32_t part = setting.body.surface.polygon_part(point.polygon);
     const double stiffness = kPenalty * setting.materials[part].young /
                              setting.body.parts[part].lattice.spacing.mean() * point.area_vector.norm();
@@ -79,6 +101,41 @@ void Ties::add_surface_tie(std::uint32_t tie, const std::vector<std::uint32_t>& 
     entry->second.stiffness += stiffness * weights * weights.transpose();
   }
   for (const auto& [elements, tied] : by_elements) tied_.push_back(tied);
+  if (setting.duration) soften(first, setting);
+}
+
+// Lowers the matrices from `first` on so that at no element their rows together are stiffer than omega^2 of its part
+// times its mass.
+void Ties::soften(std::size_t first, const Setting& setting) {
+  const std::vector<double> omega2 = cell_frequencies(setting);
+  const std::vector<double> mass = element_masses(setting);
+  const std::vector<std::uint32_t> part = element_parts(setting.body);
+  std::map<std::uint32_t, int> sharers;
+  for (std::size_t i = first; i < tied_.size(); ++i)
+    for (std::size_t a = 0; a < tied_[i].count; ++a) ++sharers[tied_[i].elements[a]];
+  for (std::size_t i = first; i < tied_.size(); ++i) {
+    double scale = 1;
+    for (std::size_t a = 0; a < tied_[i].count; ++a) {
+      const std::uint32_t e = tied_[i].elements[a];
+      const double row = tied_[i].stiffness.row(static_cast<Eigen::Index>(a)).cwiseAbs().sum();
+      if (row > 0) scale = std::min(scale, omega2[part[e]] * mass[e] / (sharers[e] * row));
+    }
+    tied_[i].stiffness *= scale;
+  }
+}
+
+double Ties::added_frequency(const std::vector<double>& mass) const {
+  std::map<std::uint32_t, double> row_sum;
+  for (const TiedElements& tied : tied_)
+    for (std::size_t a = 0; a < tied.count; ++a)
+      row_sum[tied.elements[a]] += tied.stiffness.row(static_cast<Eigen::Index>(a)).cwiseAbs().sum();
+  double largest = 0;
+  for (const auto& [e, sum] : row_sum) largest = std::max(largest, sum / mass[e]);
+  return largest;
+}
+
+double Ties::factor(const Tie& tie, const State& state) const {
+  return tie.is_move ? tie.course.at(state) : state.share;
 }
 
 std::string Ties::why() const {
@@ -92,7 +149,7 @@ Ties::Displacements Ties::violation(const TiedElements& tied, const State& state
   Displacements result(tied.count, 3);
   for (std::size_t a = 0; a < tied.count; ++a) {
     const std::uint32_t e = tied.elements[a];
-    const Vec3 off = state.displacement[e] - tie.motion.displacement(body_->rest[e], state.share);
+    const Vec3 off = state.displacement[e] - tie.motion.displacement(body_->rest[e], factor(tie, state));
     for (std::size_t axis = 0; axis < 3; ++axis)
       result(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(axis)) =
           tie.axes[axis] ? off[static_cast<Eigen::Index>(axis)] : 0;
@@ -132,6 +189,7 @@ void Ties::constrain(Constraints& constraints) const {
   for (std::size_t t = 0; t < ties_.size(); ++t) {
     const auto motion = static_cast<std::uint32_t>(constraints.motions.size());
     constraints.motions.push_back(ties_[t].motion);
+    constraints.courses.push_back(ties_[t].course);
     for (const std::uint32_t e : held_elements_[t])
       for (std::size_t axis = 0; axis < 3; ++axis)
         if (ties_[t].axes[axis]) {

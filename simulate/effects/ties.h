@@ -8,6 +8,10 @@
 // reproduce, so u_q - d_q = sum_a w_qa (u_a - d(X_a)): one 8 x 8 matrix a cell holds all its points (one
 // number an element that carries by itself, which is led to d(X) of its own place). Element
 // selections (box, sphere, half-space, part) are followed exactly and eliminated.
+//
+// In a timed run so stiff a penalty would cut the step by 17. There the elements of a cell face that the
+// surface lies on are followed exactly, and where the surface cuts through cells k_q is lowered, cell by
+// cell, until its frequency is that of the cells: the step is cut by at most sqrt(2).
 #pragma once
 #include "simulate/effects/effect.h"
 #include "simulate/motion.h"
@@ -19,6 +23,7 @@ struct Tie {
   Selection where;
   std::array<bool, 3> axes{true, true, true};  // world axes that are held or led; the others are free
   Motion motion;                               // none for a fix
+  Course course = {};                          // in timed runs; none: evenly over the whole run
   std::string name;
   std::string origin;  // "beam.toml:12"
   bool is_move = false;
@@ -36,6 +41,7 @@ class Ties {
   [[nodiscard]] static std::optional<Ties> make(const Parameters& parameters, const Setting& setting);
   [[nodiscard]] std::string why() const;
 
+  [[nodiscard]] double added_frequency(const std::vector<double>& mass) const;
   [[nodiscard]] double energy(const State& state) const;
   void add_forces(const State& state, std::vector<Vec3>& forces) const;
   void add_stiffness(const State& state, BlockMatrix& matrix) const;
@@ -53,6 +59,8 @@ class Ties {
   };
   using Displacements = Eigen::Matrix<double, Eigen::Dynamic, 3, 0, 8, 3>;
   [[nodiscard]] Displacements violation(const TiedElements& tied, const State& state) const;
+  [[nodiscard]] double factor(const Tie& tie, const State& state) const;
+  void soften(std::size_t first, const Setting& setting);
   void add_surface_tie(std::uint32_t tie, const std::vector<std::uint32_t>& polygons, const Setting& setting);
 
   const Body* body_ = nullptr;

@@ -74,6 +74,7 @@ void Ties::parse(TableReader& scene, Parameters& parameters) {
     tie.name = reader.text("name").value_or(describe(tie.where));
     parse_displacement(reader, tie);
     parse_rotation(reader, tie);
+    tie.course = parse_course(reader);
     reader.finish();
     if (!reader.find("displacement") && !reader.find("rotation"))
       reader.fail(

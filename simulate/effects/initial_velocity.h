@@ -1,0 +1,35 @@
+// [[velocity]]: what a selection moves with when a timed run begins. Costs nothing afterwards.
+#pragma once
+#include "simulate/effects/effect.h"
+#include "simulate/selection.h"
+
+namespace flexel {
+
+struct StartingVelocity {
+  Selection where;
+  Vec3 velocity = Vec3::Zero();  // m/s
+  Vec3 spin = Vec3::Zero();      // rad/s about `through`, right-handed
+  Vec3 through = Vec3::Zero();   // m
+  std::string origin;
+};
+
+class InitialVelocity {
+ public:
+  struct Parameters {
+    std::vector<StartingVelocity> velocities;  // added where they overlap
+  };
+  static constexpr const char* name = "initial velocity";
+  static constexpr bool needs_time = true;
+
+  static void parse(TableReader& scene, Parameters& parameters);
+  [[nodiscard]] static std::optional<InitialVelocity> make(const Parameters& parameters,
+                                                           const Setting& setting);
+  [[nodiscard]] std::string why() const;
+  void start(State& state) const;
+
+ private:
+  std::vector<Vec3> velocity_;  // (elements) m/s
+  std::size_t count_ = 0;
+};
+
+}  // namespace flexel

@@ -1,0 +1,24 @@
+// What every run measures and says, at equilibrium or in time.
+#pragma once
+#include "formats/progress.h"
+#include "simulate/cells.h"
+#include "simulate/simulate.h"
+
+namespace flexel {
+
+void name_materials(Body& body, const std::vector<Material>& materials);
+
+// What models `springs` and `paper` cannot follow of a material.
+void warn_of_springs(const Setting& setting, Progress& progress);
+
+// Largest displacement over the elements, and where.
+void measure_displacement(const Body& body, const State& state, SimulateResult& result);
+
+// Smallest J at the corners of the cells, with a warning where one is folded or nearly so.
+void measure_corners(const Cells& cells, const Body& body, const State& state, SimulateResult& result,
+                     Progress& progress);
+
+// Diagonal of the box around the elements at rest [m].
+[[nodiscard]] double body_extent(const Body& body);
+
+}  // namespace flexel

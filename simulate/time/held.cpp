@@ -1,0 +1,59 @@
+// Held components: f = m a of the free advance, R = m (a of the path) - f.
+#include "simulate/time/held.h"
+
+#include "formats/parallel.h"
+
+namespace flexel {
+
+Held::Held(const Constraints& constraints, const Body& body, State& state)
+    : constraints_(constraints), body_(body) {
+  for (std::uint32_t e = 0; e < constraints.mask.size(); ++e) {
+    if (!constraints.mask[e]) continue;
+    for (int axis = 0; axis < 3; ++axis)
+      if (constraints.mask[e] >> axis & 1) {
+        state.displacement[e][axis] = path(e, axis, state);
+        state.velocity[e][axis] = 0;
+      }
+    entries_.push_back({e, state.displacement[e], state.velocity[e], Vec3::Zero()});
+  }
+}
+
+double Held::path(std::uint32_t element, int axis, const State& state) const {
+  const std::uint32_t motion = constraints_.motion[element][static_cast<std::size_t>(axis)];
+  return constraints_.motions[motion].displacement(body_.rest[element],
+                                                   constraints_.courses[motion].at(state))[axis];
+}
+
+double Held::impose(State& state, const std::vector<double>& mass, const step::Advance& advance) {
+  return parallel_sum<double>(entries_.size(), [&](std::size_t i) {
+    Entry& entry = entries_[i];
+    const std::uint32_t e = entry.element;
+    Vec3& u = state.displacement[e];
+    Vec3& v = state.velocity[e];
+    double power = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(constraints_.mask[e] >> axis & 1)) continue;
+      const double wanted = path(e, axis, state);
+      const double velocity = (wanted - entry.displacement[axis]) / advance.drift;
+      entry.force[axis] = mass[e] * (velocity - v[axis]) / advance.kick;
+      power += entry.force[axis] * (0.5 * (entry.velocity[axis] + velocity));
+      u[axis] = wanted;
+      v[axis] = velocity;
+    }
+    entry.displacement = u;
+    entry.velocity = v;
+    return power;
+  });
+}
+
+void Held::add_unbalanced(std::vector<Vec3>& unbalanced) const {
+  for (const Entry& entry : entries_) unbalanced[entry.element] -= entry.force;
+}
+
+Vec3 Held::total_force() const {
+  Vec3 total = Vec3::Zero();
+  for (const Entry& entry : entries_) total += entry.force;
+  return total;
+}
+
+}  // namespace flexel

@@ -1,0 +1,65 @@
+// The books of a timed run, a row per sample: energies, momenta, probes (docs/motion.md gives every column).
+//
+// At the time of step n, with the velocities of the half steps before and after it, the kinetic energy is 1/2
+// sum m v(n-1/2) . v(n+1/2): with it the books of the leapfrog close to second order and, for forces linear
+// in the displacement, exactly. Momentum and angular momentum use the mean velocity. Work and dissipation are
+// the forces' powers with the mean velocity, by the trapezoidal rule.
+#pragma once
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "simulate/cells.h"
+#include "simulate/effects/effect.h"
+#include "simulate/probes.h"
+
+namespace flexel {
+
+// J, at one time
+struct Energies {
+  double kinetic = 0, elastic = 0, potential = 0, work = 0, dissipated = 0;
+  // What is missing: kinetic + elastic + potential + dissipated - work, less its value at the start.
+  double residual = 0;
+};
+
+class History {
+ public:
+  // Refers to all of them while it lives.
+  History(const Setting& setting, const std::vector<Pass>& passes, const std::vector<ProbePoints>& probes,
+          const std::vector<double>& mass);
+
+  // Before a step: keeps the velocities and, where `sample`, the energies of the state.
+  void before(const State& state, bool sample);
+  // The forces of pass p [N] (elements) at the state before the step.
+  [[nodiscard]] std::vector<Vec3>& forces_of(std::size_t pass) { return forces_[pass]; }
+  // After it: its powers [W] of damping and supports, and the length [s] of the step before it (0 for the
+  // first).
+  void after(const State& state, double damped_power, double held_power, double previous_step);
+
+  [[nodiscard]] const Energies& last() const { return last_; }             // of the last sample
+  [[nodiscard]] double worst_residual() const { return worst_residual_; }  // J, largest absolute one
+  [[nodiscard]] double largest_term() const { return largest_term_; }      // J, of any energy
+  [[nodiscard]] const std::string& csv() const { return csv_; }
+
+ private:
+  void add_row(const State& state);
+
+  const Setting& setting_;
+  const std::vector<Pass>& passes_;
+  const std::vector<ProbePoints>& probes_;
+  const std::vector<double>& mass_;
+  Stencil no_stencil_;
+  Cells cells_;
+  std::vector<std::vector<Vec3>> forces_;  // (passes x elements)
+  std::vector<Vec3> velocity_;             // before the step
+  std::vector<double> power_, energy_;     // (passes, then supports, then damping) W now, J so far
+  bool sample_ = false, first_ = true;
+  double time_ = 0, elastic_ = 0, potential_ = 0, start_ = 0;
+  Vec3 arm_momentum_ = Vec3::Zero();
+  State sampled_;
+  Energies last_;
+  double worst_residual_ = 0, largest_term_ = 0;
+  std::string csv_;
+};
+
+}  // namespace flexel

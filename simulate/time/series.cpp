@@ -1,0 +1,37 @@
+// VTK's collection file (.pvd) and its frames.
+#include "simulate/time/series.h"
+
+#include <fmt/format.h>
+
+#include "formats/body_file.h"
+#include "formats/error.h"
+#include "formats/files.h"
+
+namespace flexel {
+
+Series::Series(std::string path, bool compress) : path_(std::move(path)), compress_(compress) {
+  if (extension(path_) != "pvd") throw InputError(path_, "a series of frames is a .pvd file");
+  base_ = path_.substr(0, path_.size() - 4);
+  name_ = stem(path_);
+}
+
+void Series::add(const Body& body, double time) {
+  BodyFileOptions options;
+  options.compress = compress_;
+  options.embed_surface = frames_ == 0;
+  write_body(body, fmt::format("{}_{:05}.vtu", base_, frames_), options);
+  std::string file;
+  for (const char c : name_)
+    file += c == '&' ? "&amp;" : c == '<' ? "&lt;" : c == '"' ? "&quot;" : std::string(1, c);
+  entries_ += fmt::format("    <DataSet timestep=\"{:.17g}\" part=\"0\" file=\"{}_{:05}.vtu\"/>\n", time,
+                          file, frames_);
+  ++frames_;
+  OutputFile out(path_, false);
+  out.write(
+      "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n"
+      "  <Collection>\n" +
+      entries_ + "  </Collection>\n</VTKFile>\n");
+  out.commit();
+}
+
+}  // namespace flexel

@@ -1,0 +1,365 @@
+// The loop over steps. Per step: forces of the effects that change, the kernel, held elements, and where
+// asked the books. Every kCheck steps the bound on the step is taken anew and the state kept as the last good
+// one.
+#include "simulate/time/timed_run.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+
+#include "formats/body_file.h"
+#include "formats/error.h"
+#include "formats/files.h"
+#include "formats/parallel.h"
+#include "formats/program.h"
+#include "formats/units.h"
+#include "simulate/report.h"
+#include "simulate/time/held.h"
+#include "simulate/time/history.h"
+#include "simulate/time/series.h"
+#include "simulate/time/stability.h"
+#include "simulate/time/stepper.h"
+
+namespace flexel {
+namespace {
+
+constexpr int kCheck = 100;          // steps between checks
+constexpr double kSafety = 0.9;      // of the bound: it may fall between two checks
+constexpr double kRunaway = 1e4;     // of the body's diagonal: a displacement that no scene means
+constexpr std::size_t kRows = 1000;  // of the history, unless the scene says otherwise
+constexpr std::size_t kFrames = 50;  // likewise
+
+std::vector<Vec3> initial_velocity(const Body& body) {
+  std::vector<Vec3> velocity(body.element_count(), Vec3::Zero());
+  if (const auto found = body.element_columns.find("velocity");
+      found != body.element_columns.end() && found->second.components == 3)
+    for (std::size_t e = 0; e < velocity.size(); ++e)
+      velocity[e] =
+          Vec3(found->second.values[3 * e], found->second.values[3 * e + 1], found->second.values[3 * e + 2]);
+  return velocity;
+}
+
+Constraints no_constraints(const Body& body) {
+  Constraints constraints;
+  constraints.mask.assign(body.element_count(), 0);
+  constraints.motion.assign(body.element_count(), {0, 0, 0});
+  return constraints;
+}
+
+class TimedRun {
+ public:
+  TimedRun(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress);
+  SimulateResult operator()();
+
+ private:
+  [[nodiscard]] double bound() const;
+  void choose_step();
+  void check();
+  void step();
+  void sum_forces();
+  void write_frame();
+  void store(const State& state);
+  [[nodiscard]] std::string save_failed();
+  [[noreturn]] void diverged(const std::string& what);
+  [[nodiscard]] std::string where_it_folds() const;
+  SimulateResult report();
+
+  Body& body_;
+  const Scene& scene_;
+  const SimulateOptions& options_;
+  Progress& progress_;
+  std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
+  double duration_;
+  Setting setting_;
+  std::vector<ProbePoints> probes_;
+  std::vector<Pass> passes_;
+  StepPlan plan_;
+  Constraints constraints_;
+  State state_;
+  std::optional<Stepper> stepper_;
+  std::optional<Held> held_;
+  std::optional<History> history_;
+  std::optional<Series> series_;
+  std::vector<double> frequencies_, stiffening_;  // (parts)
+  double added_frequency_ = 0;
+  std::vector<Vec3> steady_, outer_;  // (elements) N, of the passes that are constant; of all
+  bool varies_ = false;
+  State good_;
+  double step_ = 0, previous_step_ = 0, epoch_ = 0;  // s; time of step 0 of the present step length
+  std::uint64_t in_epoch_ = 0, steps_ = 0;
+  double next_row_ = 0, next_frame_ = 0;
+  double kernel_seconds_ = 0;
+};
+
+TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress)
+    : body_(body),
+      scene_(scene),
+      options_(options),
+      progress_(progress),
+      duration_(*scene.run.time),
+      setting_{body, materials_of_parts(scene, body), std::vector<std::uint8_t>(body.cell_count(), 0),
+               models_of_parts(scene, body), duration_},
+      probes_(place_probes(scene, body, setting_.stray_cell)),
+      passes_(Effects::passes(scene.effects, setting_)),
+      constraints_(no_constraints(body)) {
+  warn_of_springs(setting_, progress_);
+  name_materials(body_, setting_.materials);
+  plan_.damping.assign(body.parts.size(), 0);
+  state_.time = 0;
+  state_.displacement.resize(body.element_count());
+  for (std::size_t e = 0; e < body.element_count(); ++e)
+    state_.displacement[e] = body.position[e] - body.rest[e];
+  state_.velocity = initial_velocity(body);
+  for (Pass& pass : passes_) {
+    if (pass.compose) pass.compose(plan_);
+    if (pass.start) pass.start(state_);
+    if (pass.constrain) pass.constrain(constraints_);
+  }
+  stepper_.emplace(setting_, plan_.damping, !options.history.empty(), options.isa);
+  held_.emplace(constraints_, body_, state_);
+  for (const Pass& pass : passes_) {
+    if (pass.added_frequency) added_frequency_ += pass.added_frequency(stepper_->mass());
+    if (!pass.add_forces) continue;
+    if (steady_.empty()) steady_.assign(body.element_count(), Vec3::Zero());
+    if (pass.constant) pass.add_forces(state_, steady_);
+    varies_ = varies_ || !pass.constant;
+  }
+  frequencies_ = cell_frequencies(setting_);
+  if (!options.history.empty()) history_.emplace(setting_, passes_, probes_, stepper_->mass());
+  if (!options.series.empty()) series_.emplace(options.series, options.compress);
+}
+
+// The longest stable step in the present state [s].
+double TimedRun::bound() const {
+  double longest = std::numeric_limits<double>::infinity();
+  for (std::size_t p = 0; p < frequencies_.size(); ++p)
+    longest =
+        std::min(longest, stable_step(frequencies_[p] * stiffening_[p] + added_frequency_, plan_.damping[p]));
+  return longest;
+}
+
+void TimedRun::choose_step() {
+  stiffening_ = stiffening(setting_, state_.displacement);
+  const double longest = bound();
+  double step = kSafety * longest;
+  if (scene_.run.step) {
+    if (steps_ == 0 && *scene_.run.step > longest)
+      throw InputError(scene_.name,
+                       fmt::format("[run] step = {:.4g} s is above {:.4g} s, the longest stable one",
+                                   *scene_.run.step, longest));
+    step = std::min(steps_ == 0 ? longest : step, *scene_.run.step);
+  }
+  epoch_ = *state_.time;
+  in_epoch_ = 0;
+  const double left = duration_ - epoch_;
+  // without stiffness there is no bound: a thousand steps draw the path
+  if (!std::isfinite(step)) step = duration_ / 1000;
+  if (!(step > 1e-12 * duration_))
+    diverged(fmt::format("the stable step has fallen to {:.3g} s: {}", step, where_it_folds()));
+  step_ = left / std::ceil(left / step - 1e-9);
+}
+
+void TimedRun::check() {
+  throw_if_interrupted();
+  if (options_.timeout &&
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count() > *options_.timeout) {
+    good_ = state_;
+    throw TimeoutError(fmt::format("stopped by --timeout after {} steps at {:.4g} s of {:.4g} s{}", steps_,
+                                   *state_.time, duration_, save_failed()));
+  }
+  double farthest = 0;
+  for (const Vec3& u : state_.displacement) farthest = std::max(farthest, u.squaredNorm());
+  if (!(std::sqrt(farthest) < kRunaway * (1 + body_extent(body_))))
+    diverged("the motion ran away: look at loads and units, or give a shorter [run] step");
+  stiffening_ = stiffening(setting_, state_.displacement);
+  const double longest = bound();
+  if (!(longest > 0)) diverged(where_it_folds());
+  good_ = state_;
+  if (step_ > 0.97 * longest || (!scene_.run.step && step_ < 0.6 * kSafety * longest)) choose_step();
+  progress_.update(*state_.time / duration_, fmt::format("{:.4g} s, step {}", *state_.time, steps_));
+}
+
+// Forces of the passes at the present state; with a history also one by one.
+void TimedRun::sum_forces() {
+  if (history_)
+    for (std::size_t p = 0; p < passes_.size(); ++p)
+      if (std::vector<Vec3>& own = history_->forces_of(p); !own.empty()) {
+        std::fill(own.begin(), own.end(), Vec3::Zero());
+        passes_[p].add_forces(state_, own);
+      }
+  if (!varies_) return;
+  outer_ = steady_;
+  for (Pass& pass : passes_)
+    if (pass.add_forces && !pass.constant) {
+      const PassTimer timer(pass.seconds);
+      pass.add_forces(state_, outer_);
+    }
+}
+
+void TimedRun::step() {
+  const bool row = history_ && *state_.time >= next_row_;
+  if (row) next_row_ += scene_.run.history_every.value_or(duration_ / kRows);
+  if (history_) history_->before(state_, row);
+  sum_forces();
+  const bool first = steps_ == 0;
+  const double before = first ? (scene_.run.method == TimeMethod::verlet ? 0 : step_) : previous_step_;
+  const step::Advance advance{0.5 * (before + step_), step_, scene_.run.method == TimeMethod::explicit_euler};
+  StepOutcome outcome;
+  {
+    const PassTimer timer(kernel_seconds_);
+    outcome = stepper_->advance(state_, varies_ ? outer_ : steady_, advance);
+  }
+  ++in_epoch_;
+  ++steps_;
+  state_.time = epoch_ + static_cast<double>(in_epoch_) * step_;
+  const double held_power = held_->impose(state_, stepper_->mass(), advance);
+  if (history_) history_->after(state_, outcome.damped_power, held_power, first ? 0 : previous_step_);
+  previous_step_ = step_;
+  if (!(outcome.smallest_jacobian > 0)) diverged(where_it_folds());
+}
+
+void TimedRun::store(const State& state) {
+  body_.position.resize(body_.element_count());
+  Column velocity;
+  velocity.components = 3;
+  velocity.values.reserve(3 * body_.element_count());
+  for (std::size_t e = 0; e < body_.element_count(); ++e) {
+    body_.position[e] = body_.rest[e] + state.displacement[e];
+    velocity.values.insert(velocity.values.end(), state.velocity[e].begin(), state.velocity[e].end());
+  }
+  body_.element_columns["velocity"] = std::move(velocity);
+}
+
+void TimedRun::write_frame() {
+  if (!series_) return;
+  store(state_);
+  series_->add(body_, *state_.time);
+  next_frame_ = duration_ * static_cast<double>(series_->size()) / scene_.run.frames.value_or(kFrames);
+}
+
+std::string TimedRun::save_failed() {
+  if (history_) {
+    OutputFile file(options_.history, false);
+    file.write(history_->csv());
+    file.commit();
+  }
+  if (options_.failed_output.empty() || good_.displacement.empty()) return "";
+  store(good_);
+  write_body(body_, options_.failed_output);
+  return fmt::format("; the state at {:.6g} s is in {}", *good_.time, options_.failed_output);
+}
+
+std::string TimedRun::where_it_folds() const {
+  std::size_t worst = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t c = 0; c < body_.cell_count(); ++c) {
+    std::array<Vec3, 8> x;
+    for (std::size_t a = 0; a < 8; ++a)
+      x[a] = body_.rest[body_.cell_elements[c][a]] + state_.displacement[body_.cell_elements[c][a]];
+    Mat3 edges;
+    for (Eigen::Index j = 0; j < 3; ++j) {
+      Vec3 sum = Vec3::Zero();
+      for (std::size_t a = 0; a < 8; ++a) sum += (a >> j & 1 ? 1.0 : -1.0) * x[a];
+      edges.col(j) = sum;
+    }
+    const double volume = edges.determinant();
+    if (!(volume >= least)) {
+      least = std::isnan(volume) ? -std::numeric_limits<double>::infinity() : volume;
+      worst = c;
+    }
+  }
+  if (body_.cell_count() == 0) return "an element's position is not a number";
+  const Vec3& at = body_.rest[body_.cell_elements[worst][0]];
+  return fmt::format(
+      "a cell near ({}, {}, {}) turned inside out: load it more slowly, damp it ([damping]), or use a "
+      "shorter [run] step or a smaller spacing",
+      human_length(at.x()), human_length(at.y()), human_length(at.z()));
+}
+
+void TimedRun::diverged(const std::string& what) {
+  throw DivergedError(fmt::format("step {} at {:.6g} s: {}{}", steps_, *state_.time, what, save_failed()));
+}
+
+SimulateResult TimedRun::report() {
+  SimulateResult result;
+  std::vector<Vec3> unbalanced(body_.element_count(), Vec3::Zero());
+  held_->add_unbalanced(unbalanced);
+  for (const Pass& pass : passes_)
+    if (pass.report) pass.report(state_, unbalanced, result);
+  for (const ProbePoints& probe : probes_) result.probes.push_back(measure(probe, state_));
+  const Stencil none;
+  const Cells cells(setting_, none);
+  result.elastic_energy = cells.energy(state_);
+  result.smallest_jacobian = cells.smallest_jacobian(state_).value;
+  measure_corners(cells, body_, state_, result, progress_);
+  measure_displacement(body_, state_, result);
+  for (const double mass : stepper_->mass()) result.mass += mass;
+  TimedSummary timed;
+  timed.time = *state_.time;
+  timed.steps = steps_;
+  timed.step = step_;
+  timed.isa = stepper_->isa();
+  if (history_) {
+    const Energies& last = history_->last();
+    timed.books = {{"kinetic", last.kinetic},
+                   {"elastic", last.elastic},
+                   {"potential", last.potential},
+                   {"work", last.work},
+                   {"dissipated", last.dissipated},
+                   {"worst_residual", history_->worst_residual()},
+                   {"largest_term", history_->largest_term()}};
+  }
+  result.timed = timed;
+  result.passes.push_back(
+      {"cells", fmt::format("model of every part, kernel {}", stepper_->isa()), kernel_seconds_});
+  for (const Pass& pass : passes_) result.passes.push_back({pass.name, pass.why, pass.seconds});
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
+  return result;
+}
+
+SimulateResult TimedRun::operator()() {
+  choose_step();
+  if (options_.explain) {
+    progress_.say(fmt::format("plan: cells (the parts' models), {} steps of {:.4g} s, kernel {}",
+                              static_cast<std::uint64_t>(std::llround(duration_ / step_)), step_,
+                              stepper_->isa()));
+    for (const Pass& pass : passes_) progress_.say(fmt::format("plan: {} ({})", pass.name, pass.why));
+  }
+  write_frame();
+  good_ = state_;
+  try {
+    while (*state_.time < duration_ * (1 - 1e-12)) {
+      if (steps_ % kCheck == 0) check();
+      step();
+      if (series_ && *state_.time >= next_frame_ * (1 - 1e-9)) write_frame();
+    }
+  } catch (const Interrupted&) {
+    good_ = state_;
+    if (const std::string saved = save_failed(); !saved.empty())
+      progress_.say(fmt::format("interrupted at step {}{}", steps_, saved));
+    throw;
+  }
+  if (history_) {  // the books of the last state need the forces there, hence a step that is thrown away
+    State last = state_;
+    next_row_ = 0;
+    step();
+    state_ = std::move(last);
+    --steps_;
+    OutputFile file(options_.history, false);
+    file.write(history_->csv());
+    file.commit();
+  }
+  SimulateResult result = report();
+  store(state_);
+  return result;
+}
+
+}  // namespace
+
+SimulateResult run_in_time(Body& body, const Scene& scene, const SimulateOptions& options,
+                           Progress& progress) {
+  return TimedRun(body, scene, options, progress)();
+}
+
+}  // namespace flexel

@@ -1,0 +1,15 @@
+// Motion in time: effects and cells are stepped explicitly until the time that the scene gives.
+#pragma once
+#include "simulate/scene.h"
+#include "simulate/simulate.h"
+
+namespace flexel {
+
+// Runs `scene`, whose [run] has a time, on `body`, from its present positions (and velocities, where it
+// carries the column "velocity"), and moves it to its last state. Throws InputError (a step above the stable
+// one among others), DivergedError, TimeoutError, Interrupted; the last good state is then saved under
+// options.failed_output.
+[[nodiscard]] SimulateResult run_in_time(Body& body, const Scene& scene, const SimulateOptions& options,
+                                         Progress& progress);
+
+}  // namespace flexel
