@@ -30,10 +30,10 @@ struct Setting {
   std::vector<std::uint8_t>
       stray_cell;  // (cells) 1: of a loose crumb that nothing holds; it is carried along, not simulated
   std::vector<Model> models = {};         // (parts); empty: cells
-  std::optional<double> duration = {};    // s, of a timed run; nothing: equilibrium
   std::vector<HookeConstant> hooke = {};  // (parts); empty: paper
   std::vector<std::uint8_t> stray_element =
-      {};  // (elements) 1: likewise, of a centre-placed part; empty: none
+      {};                               // (elements) 1: likewise, of a centre-placed part; empty: none
+  std::optional<double> duration = {};  // s, of a timed run; nothing: equilibrium
 };
 
 }  // namespace flexel

@@ -1,5 +1,5 @@
-// bench_step: reading and tessellating STEP, seconds and memory.
-//   bench_step [PART.step DEFLECTION_MM]...
+// bench_import_step: reading and tessellating STEP, seconds and memory.
+//   bench_import_step [PART.step DEFLECTION_MM]...
 // Without arguments: a block with dimples, made here, and real parts of ../shared/parts, at deflections that
 // give half a million triangles or more. Every row is read by a process of its own, so that the peak of
 // memory is that row's, libraries and file included.
@@ -37,7 +37,7 @@ void read_in_child(const std::string& file, double deflection, int out) {
   try {
     result.triangles = static_cast<double>(import_surface(file, options).polygon_count());
   } catch (const std::exception& error) {
-    fmt::print(stderr, "bench_step: {}\n", error.what());
+    fmt::print(stderr, "bench_import_step: {}\n", error.what());
   }
   result.wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   static_cast<void>(!write(out, &result, sizeof result));

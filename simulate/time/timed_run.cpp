@@ -99,10 +99,13 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
       progress_(progress),
       duration_(*scene.run.time),
       setting_{body, materials_of_parts(scene, body), std::vector<std::uint8_t>(body.cell_count(), 0),
-               models_of_parts(scene, body), duration_},
-      probes_(place_probes(scene, body, setting_.stray_cell)),
-      passes_(Effects::passes(scene.effects, setting_)),
+               models_of_parts(scene, body),
+               hooke_of_parts(scene, body),
+               std::vector<std::uint8_t>(body.element_count(), 0)},
       constraints_(no_constraints(body)) {
+  setting_.duration = duration_;
+  probes_ = place_probes(scene, setting_);
+  passes_ = Effects::passes(scene.effects, setting_);
   warn_of_springs(setting_, progress_);
   name_materials(body_, setting_.materials);
   plan_.damping.assign(body.parts.size(), 0);
