@@ -15,8 +15,8 @@
 #include "simulate/probes.h"
 #include "simulate/report.h"
 #include "simulate/scene.h"
-#include "simulate/unsupported.h"
 #include "simulate/time/timed_run.h"
+#include "simulate/unsupported.h"
 
 namespace flexel {
 namespace {

@@ -107,11 +107,11 @@ std::vector<std::string> summary_lines(const SimulateResult& result) {
                                  ? fmt::format(" (at a corner {:.4g})", *result.smallest_corner_jacobian)
                                  : "";
   if (result.timed) {
-    lines.push_back(fmt::format(
-        "{} steps of {:.4g} s to {:.6g} s in {:.2f} s (kernel {}), elastic energy {:.4g} J, "
-        "smallest J {:.4g}{}",
-        result.timed->steps, result.timed->step, result.timed->time, result.seconds, result.timed->isa,
-        result.elastic_energy, result.smallest_jacobian, corner));
+    lines.push_back(
+        fmt::format("{} steps of {:.4g} s to {:.6g} s in {:.2f} s (kernel {}), elastic energy {:.4g} J, "
+                    "smallest J {:.4g}{}",
+                    result.timed->steps, result.timed->step, result.timed->time, result.seconds,
+                    result.timed->isa, result.elastic_energy, result.smallest_jacobian, corner));
     std::string books;
     for (const auto& [name, joules] : result.timed->books)
       books += fmt::format("{}{} {:.4g} J", books.empty() ? "" : ", ", name, joules);

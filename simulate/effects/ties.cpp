@@ -46,8 +46,8 @@ void refuse_conflicts(const std::vector<Tie>& ties, const std::vector<Selected>&
 
 // A point on a cell's face has its weight on the four elements there.
 constexpr double kOffFace = 1e-6;
-bool lies_on_face(const CellPoint& at) {
-  return std::count_if(at.weights.begin(), at.weights.end(),
+bool lies_on_face(const Carrier& at) {
+  return std::count_if(at.weights.begin(), at.weights.begin() + at.count,
                        [](double w) { return std::abs(w) > kOffFace; }) <= 4;
 }
 
@@ -104,11 +104,11 @@ void Ties::add_surface_tie(std::uint32_t tie, const std::vector<std::uint32_t>& 
   if (setting.duration) soften(first, setting);
 }
 
-// Lowers the matrices from `first` on so that at no element their rows together are stiffer than omega^2 of its part
-// times its mass.
+// Lowers the matrices from `first` on so that at no element their rows together are stiffer than omega^2 of
+// its part times its mass.
 void Ties::soften(std::size_t first, const Setting& setting) {
   const std::vector<double> omega2 = cell_frequencies(setting);
-  const std::vector<double> mass = element_masses(setting);
+  const std::vector<double> mass = lumped_masses(setting);
   const std::vector<std::uint32_t> part = element_parts(setting.body);
   std::map<std::uint32_t, int> sharers;
   for (std::size_t i = first; i < tied_.size(); ++i)

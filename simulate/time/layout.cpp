@@ -217,7 +217,7 @@ StepLayout step_layout(const Setting& setting, const std::vector<double>& dampin
   return layout;
 }
 
-std::vector<double> element_masses(const Setting& setting) {
+std::vector<double> lumped_masses(const Setting& setting) {
   const Body& body = setting.body;
   std::vector<double> mass(body.element_count(), 0);
   for (std::size_t p = 0; p < body.parts.size(); ++p) {

@@ -45,7 +45,8 @@ struct StepLayout {
 // Of the cells that resist (simulate/cells.h). `damping` is the time tau of each part [s].
 [[nodiscard]] StepLayout step_layout(const Setting& setting, const std::vector<double>& damping);
 
-// Mass of each element [kg]: an eighth of rho f V of each of its cells, or rho h^3 in centre placement.
-[[nodiscard]] std::vector<double> element_masses(const Setting& setting);
+// Inertia of each element [kg], broken cells included: an eighth of rho f V of each of its cells, or rho h^3
+// in centre placement.
+[[nodiscard]] std::vector<double> lumped_masses(const Setting& setting);
 
 }  // namespace flexel

@@ -83,7 +83,7 @@ Stepper::Stepper(const Setting& setting, const std::vector<double>& damping, boo
                  const std::string& isa)
     : layout_(step_layout(setting, damping)),
       table_(&kernel_table(isa)),
-      mass_(element_masses(setting)),
+      mass_(lumped_masses(setting)),
       inverse_mass_(mass_.size()),
       shared_force_(3 * layout_.shared.size()),
       book_(book) {
