@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "bench/knot.h"
 #include "flexel/picture/lines.h"
 #include "flexel/picture/picture.h"
 #include "flexel/picture/render.h"
@@ -16,36 +17,12 @@ namespace {
 
 // A (2, 3) torus knot of 2 x along x around triangles, about 125 mm across, its tube fluted.
 Surface knot(int along, int around) {
-  Surface surface;
   const auto centre = [](double t) {
     const double r = 0.02 * (2.2 + std::cos(3 * t));
     return Vec3(r * std::cos(2 * t), r * std::sin(2 * t), -0.02 * std::sin(3 * t));
   };
-  for (int a = 0; a < along; ++a) {
-    const double t = 2 * std::numbers::pi * a / along;
-    const Vec3 tangent = (centre(t + 1e-4) - centre(t - 1e-4)).normalized();
-    const Vec3 normal = tangent.cross(Vec3::UnitZ()).normalized(), binormal = tangent.cross(normal);
-    for (int b = 0; b < around; ++b) {
-      const double q = 2 * std::numbers::pi * b / around,
-                   radius = 0.0084 * (1 + 0.05 * std::sin(9 * q + 24 * t));
-      surface.vertices.push_back(centre(t) + radius * (std::cos(q) * normal + std::sin(q) * binormal));
-    }
-  }
-  const auto at = [&](int a, int b) { return static_cast<std::uint32_t>(a % along * around + b % around); };
-  surface.polygon_offsets.push_back(0);
-  for (int a = 0; a < along; ++a)
-    for (int b = 0; b < around; ++b)
-      for (const auto& t : {std::array{at(a, b), at(a + 1, b + 1), at(a + 1, b)},
-                            {at(a, b), at(a, b + 1), at(a + 1, b + 1)}}) {
-        surface.polygon_vertices.insert(surface.polygon_vertices.end(), t.begin(), t.end());
-        surface.polygon_offsets.push_back(static_cast<std::uint32_t>(surface.polygon_vertices.size()));
-        surface.polygon_face.push_back(0);
-      }
-  surface.faces.push_back({"", 0});
-  surface.parts.push_back({"knot"});
-  surface.sources.emplace_back();
-  surface.part_source.push_back(0);
-  return surface;
+  const auto fluted = [](double t, double q) { return 0.0084 * (1 + 0.05 * std::sin(9 * q + 24 * t)); };
+  return closed_tube(along, around, centre, fluted, Vec3::UnitZ(), 1e-4);
 }
 
 const Surface& million() {

@@ -9,6 +9,7 @@
 
 #include <Eigen/Geometry>
 
+#include "bench/knot.h"
 #include "formats/body_file.h"
 #include "formats/import.h"
 #include "formats/parallel.h"
@@ -23,35 +24,12 @@ namespace {
 
 // A (2, 3) torus knot, outward-oriented, 2 * around * along triangles; about 210 mm long.
 Surface knot(int along, int around) {
-  Surface surface;
   const auto centre = [](double t) {
     const double r = .070 + .035 * std::cos(3 * t);
     return Vec3(r * std::cos(2 * t), r * std::sin(2 * t), .035 * std::sin(3 * t));
   };
-  for (int a = 0; a < along; ++a) {
-    const double t = 2 * std::numbers::pi * a / along;
-    const Vec3 tangent = (centre(t + 1e-5) - centre(t - 1e-5)).normalized();
-    const Vec3 normal = tangent.cross(Vec3(.3, .2, 1)).normalized(), binormal = tangent.cross(normal);
-    for (int b = 0; b < around; ++b) {
-      const double q = 2 * std::numbers::pi * b / around;
-      surface.vertices.push_back(centre(t) + .0056 * (std::cos(q) * normal + std::sin(q) * binormal));
-    }
-  }
-  const auto at = [&](int a, int b) { return static_cast<std::uint32_t>(a % along * around + b % around); };
-  surface.polygon_offsets.push_back(0);
-  for (int a = 0; a < along; ++a)
-    for (int b = 0; b < around; ++b)
-      for (const auto& t : {std::array{at(a, b), at(a + 1, b + 1), at(a + 1, b)},
-                            {at(a, b), at(a, b + 1), at(a + 1, b + 1)}}) {
-        surface.polygon_vertices.insert(surface.polygon_vertices.end(), t.begin(), t.end());
-        surface.polygon_offsets.push_back(static_cast<std::uint32_t>(surface.polygon_vertices.size()));
-        surface.polygon_face.push_back(0);
-      }
-  surface.faces.push_back({"", 0});
-  surface.parts.push_back({"knot"});
-  surface.sources.emplace_back();
-  surface.part_source.push_back(0);
-  return surface;
+  return closed_tube(
+      along, around, centre, [](double, double) { return .0056; }, Vec3(.3, .2, 1), 1e-5);
 }
 
 const Surface& million() {
