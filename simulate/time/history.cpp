@@ -65,15 +65,17 @@ void History::before(const State& state, bool sample) {
     if (pass.book == Book::potential && pass.energy) potential_ += pass.energy(state);
 }
 
-void History::after(const State& state, double damped_power, double held_power, double previous_step) {
+void History::after(const State& state, const std::vector<Vec3>& damping, double held_power,
+                    double previous_step) {
+  const auto power_of = [&](const std::vector<Vec3>& forces) {
+    return parallel_sum<double>(forces.size(), [&](std::size_t e) {
+      return forces[e].dot(0.5 * (velocity_[e] + state.velocity[e]));
+    });
+  };
   std::vector<double> power(power_.size(), 0);
-  for (std::size_t p = 0; p < passes_.size(); ++p)
-    if (!forces_[p].empty())
-      power[p] = parallel_sum<double>(forces_[p].size(), [&](std::size_t e) {
-        return forces_[p][e].dot(0.5 * (velocity_[e] + state.velocity[e]));
-      });
+  for (std::size_t p = 0; p < passes_.size(); ++p) power[p] = power_of(forces_[p]);
   power[passes_.size()] = held_power;
-  power[passes_.size() + 1] = damped_power;
+  power[passes_.size() + 1] = power_of(damping);
   for (std::size_t p = 0; p < power.size(); ++p) energy_[p] += 0.5 * (power_[p] + power[p]) * previous_step;
   power_ = std::move(power);
   if (sample_) add_row(state);

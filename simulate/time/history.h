@@ -32,9 +32,9 @@ class History {
   void before(const State& state, bool sample);
   // The forces of pass p [N] (elements) at the state before the step.
   [[nodiscard]] std::vector<Vec3>& forces_of(std::size_t pass) { return forces_[pass]; }
-  // After it: its powers [W] of damping and supports, and the length [s] of the step before it (0 for the
-  // first).
-  void after(const State& state, double damped_power, double held_power, double previous_step);
+  // After it: the forces of the damping [N] (elements; or none), the power [W] of the supports, and the
+  // length [s] of the step before it (0 for the first).
+  void after(const State& state, const std::vector<Vec3>& damping, double held_power, double previous_step);
 
   [[nodiscard]] const Energies& last() const { return last_; }             // of the last sample
   [[nodiscard]] double worst_residual() const { return worst_residual_; }  // J, largest absolute one

@@ -118,9 +118,9 @@ struct Sums {
 };
 
 struct Gradient {
-  Matrix h, cofactor;       // H; cof F
-  Lanes jacobian, inverse;  // J, 1 / J
-  Lanes trace, change;      // tr H; J - 1
+  Matrix h, cofactor, less_one;  // H; cof F; cof F - I without cancellation
+  Lanes jacobian, inverse;       // J, 1 / J
+  Lanes trace, change;           // tr H; J - 1
 };
 
 FLEXEL_INLINE Gradient gradient_of(const Modes modes[3], const CellConstants& k, const Lanes& fill,
@@ -145,7 +145,9 @@ FLEXEL_INLINE Gradient gradient_of(const Modes modes[3], const CellConstants& k,
   g.inverse = 1 / g.jacobian;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
-      g.cofactor.at[i][j] = second.at[i][j] - h.at[j][i] + (i == j ? 1 + g.trace : Lanes{});
+      g.less_one.at[i][j] = second.at[i][j] - h.at[j][i] + (i == j ? g.trace : Lanes{});
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) g.cofactor.at[i][j] = g.less_one.at[i][j] + (i == j ? 1.0 : 0.0);
   return g;
 }
 
@@ -157,8 +159,8 @@ FLEXEL_INLINE Matrix elastic_stress(const Gradient& g, const CellConstants& k) {
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) {
       // J (F - F^-T), F^-T = cof F / J
-      Lanes difference = g.jacobian * g.h.at[i][j] - g.cofactor.at[i][j];
-      if (i == j) difference = g.jacobian * g.h.at[i][j] + g.change - (g.cofactor.at[i][j] - 1);
+      const Lanes difference =
+          g.jacobian * g.h.at[i][j] - g.less_one.at[i][j] + (i == j ? g.change : Lanes{});
       p.at[i][j] = shear * difference + pressure * g.cofactor.at[i][j];
     }
   return p;
@@ -356,12 +358,10 @@ void read_elements(const ChunkView& chunk, const StateView& state, const Scratch
     __builtin_memset(scratch.column[kForce + c], 0, chunk.count * sizeof(double));
 }
 
-// Advances the chunk's own elements; gives the power of the damping on them [W].
 template <Damping damping>
-double advance_owned(const ChunkView& chunk, const StateView& state, const Advance& advance,
-                     const Scratch& scratch) {
+void advance_owned(const ChunkView& chunk, const StateView& state, const Advance& advance,
+                   const Scratch& scratch) {
   const CellConstants& k = *chunk.constants;
-  double power = 0;
   for (std::size_t o = 0; o < chunk.owned_count; ++o) {
     const std::size_t l = chunk.owned[o], e = chunk.elements[l];
     Triple force = to_world(k, scratch.column + kForce, l);
@@ -373,13 +373,12 @@ double advance_owned(const ChunkView& chunk, const StateView& state, const Advan
       const double before = v[c];
       v[c] = before + gain * force.at[c];
       u[c] += advance.drift * (advance.explicit_drift ? before : v[c]);
-      if constexpr (damping == Damping::book) {
-        const Triple damped = to_world(k, scratch.column + kDampingForce, l);
-        power += damped.at[c] * (0.5 * (before + v[c]));
-      }
+    }
+    if constexpr (damping == Damping::book) {
+      const Triple damped = to_world(k, scratch.column + kDampingForce, l);
+      for (int c = 0; c < 3; ++c) state.damping_force[3 * e + c] = damped.at[c];
     }
   }
-  return power;
 }
 
 void hand_over_shared(const ChunkView& chunk, double* const* column, double* out) {
@@ -399,7 +398,7 @@ ChunkOutcome run(const ChunkView& chunk, const StateView& state, const Advance& 
   for (std::size_t b = 0; b < chunk.block_count; ++b)
     Model::template add_block<damping>(chunk.blocks[b], *chunk.constants, scratch, sums);
   ChunkOutcome outcome;
-  outcome.damped_power = advance_owned<damping>(chunk, state, advance, scratch);
+  advance_owned<damping>(chunk, state, advance, scratch);
   hand_over_shared(chunk, scratch.column + kForce, chunk.shared_force);
   if constexpr (damping == Damping::book)
     hand_over_shared(chunk, scratch.column + kDampingForce, chunk.shared_damping);

@@ -53,6 +53,7 @@ struct StateView {
   double* velocity;            // m/s
   const double* outer;         // N, forces of the passes; null: none
   const double* inverse_mass;  // (n) 1/kg; 0: does not move by force
+  double* damping_force;       // N, out: that of the damping alone on the owned elements, with `book`
 };
 
 // One advance: v += kick f / m, then u += drift v (the new one, or the old one for explicit Euler).
@@ -62,9 +63,8 @@ struct Advance {
 };
 
 struct ChunkOutcome {
-  double
-      smallest_jacobian;  // over the chunk's cells, at the state before the advance; NaN counts as -infinity
-  double damped_power;    // W, of the damping on the owned elements: force times mean velocity; `book`
+  // over the chunk's cells, at the state before the advance; NaN counts as -infinity
+  double smallest_jacobian;
 };
 
 // Doubles of scratch that a chunk with `count` elements needs.

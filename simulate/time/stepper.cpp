@@ -35,30 +35,25 @@ std::vector<const step::KernelTable*> tables() {  // the best one first
 struct Lowest {
   double value = std::numeric_limits<double>::infinity();
   std::uint32_t part = 0;
-  double power = 0;
   Lowest& operator+=(const Lowest& other) {
     if (other.value < value) {
       value = other.value;
       part = other.part;
     }
-    power += other.power;
     return *this;
   }
 };
 
-double move_element(std::size_t e, const double* force, const double* damping, const step::StateView& view,
-                    const step::Advance& advance) {
+void move_element(std::size_t e, const double* force, const step::StateView& view,
+                  const step::Advance& advance) {
   double* u = view.displacement + 3 * e;
   double* v = view.velocity + 3 * e;
   const double gain = advance.kick * view.inverse_mass[e];
-  double power = 0;
   for (std::size_t c = 0; c < 3; ++c) {
     const double before = v[c];
     v[c] = before + gain * (view.outer ? force[c] + view.outer[3 * e + c] : force[c]);
     u[c] += advance.drift * (advance.explicit_drift ? before : v[c]);
-    if (damping) power += damping[c] * (0.5 * (before + v[c]));
   }
-  return power;
 }
 
 void add_slots(const std::vector<double>& values, std::span<const std::uint32_t> slots, double* sum) {
@@ -97,7 +92,10 @@ Stepper::Stepper(const Setting& setting, const std::vector<double>& damping, boo
     kernel_.push_back((springs ? table_->springs : table_->cells)[static_cast<std::size_t>(kind)]);
   }
   book_ = book && damped;
-  if (book_) shared_damping_.assign(shared_force_.size(), 0);
+  if (book_) {
+    shared_damping_.assign(shared_force_.size(), 0);
+    damping_force_.assign(mass_.size(), Vec3::Zero());
+  }
 }
 
 std::size_t Stepper::bytes() const {
@@ -107,7 +105,8 @@ std::size_t Stepper::bytes() const {
 
 StepOutcome Stepper::advance(State& state, const std::vector<Vec3>& outer, const step::Advance& advance) {
   const step::StateView view{state.displacement.data()->data(), state.velocity.data()->data(),
-                             outer.empty() ? nullptr : outer.data()->data(), inverse_mass_.data()};
+                             outer.empty() ? nullptr : outer.data()->data(), inverse_mass_.data(),
+                             book_ ? damping_force_.data()->data() : nullptr};
   const std::size_t doubles = step::kScratchColumns * step::scratch_stride(layout_.largest_chunk);
   const Lowest lowest = parallel_sum<Lowest>(
       layout_.chunks.size(),
@@ -127,33 +126,33 @@ StepOutcome Stepper::advance(State& state, const std::vector<Vec3>& outer, const
                                          book_ ? shared_damping_.data() + 3 * chunk.shared_begin : nullptr,
                                          &layout_.constants[chunk.part]};
         const step::ChunkOutcome outcome = kernel_[chunk.part](chunk_view, view, advance, scratch.data());
-        return Lowest{outcome.smallest_jacobian, chunk.part, outcome.damped_power};
+        return Lowest{outcome.smallest_jacobian, chunk.part};
       },
       1);
   StepOutcome outcome;
   outcome.smallest_jacobian = lowest.value;
   outcome.part = lowest.part;
-  outcome.damped_power = lowest.power + advance_shared(view, advance);
+  advance_shared(view, advance);
   advance_lone(view, advance);
   return outcome;
 }
 
-double Stepper::advance_shared(const step::StateView& view, const step::Advance& advance) {
-  return parallel_sum<double>(layout_.shared_elements.size(), [&](std::size_t i) {
+void Stepper::advance_shared(const step::StateView& view, const step::Advance& advance) {
+  parallel_for_each(layout_.shared_elements.size(), [&](std::size_t i) {
     const std::span slots(layout_.slots.data() + layout_.slot_offsets[i],
                           layout_.slot_offsets[i + 1] - layout_.slot_offsets[i]);
-    double force[3], damping[3];
+    const std::uint32_t e = layout_.shared_elements[i];
+    double force[3];
     add_slots(shared_force_, slots, force);
-    if (book_) add_slots(shared_damping_, slots, damping);
-    return move_element(layout_.shared_elements[i], force, book_ ? damping : nullptr, view, advance);
+    move_element(e, force, view, advance);
+    if (book_) add_slots(shared_damping_, slots, damping_force_[e].data());
   });
 }
 
 void Stepper::advance_lone(const step::StateView& view, const step::Advance& advance) {
   constexpr double none[3] = {0, 0, 0};
-  parallel_for_each(layout_.lone_elements.size(), [&](std::size_t i) {
-    (void)move_element(layout_.lone_elements[i], none, nullptr, view, advance);
-  });
+  parallel_for_each(layout_.lone_elements.size(),
+                    [&](std::size_t i) { move_element(layout_.lone_elements[i], none, view, advance); });
 }
 
 }  // namespace flexel

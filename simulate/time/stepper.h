@@ -9,8 +9,6 @@ namespace flexel {
 struct StepOutcome {
   double smallest_jacobian = 1;  // over the cells, before the step; -infinity: not a number
   std::uint32_t part = 0;        // of that cell
-  double damped_power =
-      0;  // W, of the internal damping on all elements: force times mean velocity; with a book
 };
 
 class Stepper {
@@ -26,12 +24,14 @@ class Stepper {
 
   [[nodiscard]] const std::vector<double>& mass() const { return mass_; }                  // (elements) kg
   [[nodiscard]] const std::vector<double>& inverse_mass() const { return inverse_mass_; }  // (elements) 1/kg
+  // Of the internal damping in the last advance [N] (elements); empty without a book or without damping.
+  [[nodiscard]] const std::vector<Vec3>& damping_force() const { return damping_force_; }
   [[nodiscard]] const char* isa() const { return table_->isa; }
   [[nodiscard]] const StepLayout& layout() const { return layout_; }
   [[nodiscard]] std::size_t bytes() const;
 
  private:
-  double advance_shared(const step::StateView& view, const step::Advance& advance);
+  void advance_shared(const step::StateView& view, const step::Advance& advance);
   void advance_lone(const step::StateView& view, const step::Advance& advance);
 
   StepLayout layout_;
@@ -39,6 +39,7 @@ class Stepper {
   std::vector<step::ChunkKernel> kernel_;  // (parts)
   std::vector<double> mass_, inverse_mass_;
   std::vector<double> shared_force_, shared_damping_;  // (slots x 3) N
+  std::vector<Vec3> damping_force_;
   bool book_;
 };
 

@@ -219,7 +219,7 @@ void TimedRun::step() {
   ++steps_;
   state_.time = epoch_ + static_cast<double>(in_epoch_) * step_;
   const double held_power = held_->impose(state_, stepper_->mass(), advance);
-  if (history_) history_->after(state_, outcome.damped_power, held_power, first ? 0 : previous_step_);
+  if (history_) history_->after(state_, stepper_->damping_force(), held_power, first ? 0 : previous_step_);
   previous_step_ = step_;
   if (!(outcome.smallest_jacobian > 0)) diverged(where_it_folds());
 }

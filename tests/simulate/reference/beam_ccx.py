@@ -1,7 +1,8 @@
 """The reference of tests/simulate/beam_test.cpp: the paper's cantilever by CalculiX (Debian's calculix-ccx 2.20).
 
 C3D20R, n elements through 0.5 m, clamped at x = 0, uniform traction over the end x = 2 m. Prints the mean displacement of the end
-along the load per newton, for n = 2, 4, 8, and its Richardson extrapolation (order from the three).
+along the load per newton, for n = 2, 4, 8, and its Richardson extrapolation (order from the three); then the two lowest
+frequencies of the beam (density 580 kg/m3), the reference of tests/simulate/motion_test.cpp.
 Run: python3 tests/simulate/reference/beam_ccx.py
 """
 import os
@@ -9,7 +10,7 @@ import subprocess
 import tempfile
 
 
-def run(folder, n, nu, axis, elem="C3D20R"):
+def run(folder, n, nu, axis, elem="C3D20R", frequencies=False):
     L,W,H=2.0,0.7,0.5; E=12.1e5; F=1e-3
     nx,ny,nz=4*n,max(1,round(1.4*n)),n
     hx,hy,hz=L/nx,W/ny,H/nz
@@ -46,10 +47,17 @@ def run(folder, n, nu, axis, elem="C3D20R"):
             t=[q+1]+e; o.write(",".join(map(str,t[:15]))+",\n"+",".join(map(str,t[15:]))+"\n")
         o.write("*NSET, NSET=FIX\n"+",\n".join(map(str,fixed))+"\n")
         o.write("*NSET, NSET=END\n"+",\n".join(str(v) for v in f)+"\n")
-        o.write(f"*MATERIAL,NAME=M\n*ELASTIC\n{E},{nu}\n*SOLID SECTION,ELSET=E,MATERIAL=M\n*BOUNDARY\nFIX,1,3\n*STEP\n*STATIC\n*CLOAD\n")
-        for v,x in f.items(): o.write(f"{v},{axis+1},{x:.12g}\n")
-        o.write("*NODE PRINT, NSET=END\nU\n*END STEP\n")
+        o.write(f"*MATERIAL,NAME=M\n*ELASTIC\n{E},{nu}\n*DENSITY\n580\n*SOLID SECTION,ELSET=E,MATERIAL=M\n*BOUNDARY\nFIX,1,3\n*STEP\n")
+        if frequencies:
+            o.write("*FREQUENCY\n2\n*END STEP\n")
+        else:
+            o.write("*STATIC\n*CLOAD\n")
+            for v,x in f.items(): o.write(f"{v},{axis+1},{x:.12g}\n")
+            o.write("*NODE PRINT, NSET=END\nU\n*END STEP\n")
     subprocess.run(["ccx",name],stdout=subprocess.DEVNULL,check=True)
+    if frequencies:  # "mode  eigenvalue  rad/s  Hz  imaginary part"
+        rows=[line.split() for line in open(name+".dat")]
+        return [float(row[3]) for row in rows if len(row)==5 and row[0] in ("1","2")][:2]
     u={}
     for line in open(name+".dat"):
         t=line.split()
@@ -63,3 +71,6 @@ with tempfile.TemporaryDirectory() as folder:
             a, b, c = (run(folder, n, nu, axis) for n in (2, 4, 8))
             limit = c + (c - b) ** 2 / ((b - a) - (c - b))
             print(f"nu {nu} axis {'xyz'[axis]}: n = 2, 4, 8: {a:.6e} {b:.6e} {c:.6e}; extrapolated {limit:.5e} m/N", flush=True)
+    for nu in (0.25, 0.3):
+        a, b = (run(folder, n, nu, 0, frequencies=True) for n in (4, 8))
+        print(f"nu {nu} frequencies n = 4: {a[0]:.6g} {a[1]:.6g} Hz, n = 8: {b[0]:.6g} {b[1]:.6g} Hz", flush=True)
