@@ -3,7 +3,9 @@
 // its ends; both give the same numbers with opposite signs, so that momentum is kept exactly.
 #include "simulate/paper_model.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <algorithm>
 #include <limits>
 
 #include "formats/parallel.h"
@@ -27,6 +29,14 @@ struct Least {
   std::uint32_t element = 0;
   Least& operator+=(const Least& other) {
     if (other.value < value) *this = other;
+    return *this;
+  }
+};
+
+struct Greatest {
+  double value = 0;
+  Greatest& operator+=(const Greatest& other) {
+    value = std::max(value, other.value);
     return *this;
   }
 };
@@ -95,6 +105,56 @@ void PaperModel::add_forces(const State& state, std::vector<Vec3>& forces) const
         }
       },
       kGrain);
+}
+
+void PaperModel::add_damping(const State& state, const std::vector<double>& damping,
+                             std::vector<Vec3>& forces) const {
+  parallel_for_each(
+      rows_.offsets.size() - 1,
+      [&](std::size_t e) {
+        const auto element = static_cast<std::uint32_t>(e);
+        const double tau = damping[part_[e]];
+        if (tau == 0) return;
+        for (const ConnectionRows::Entry& entry : rows_.of(element)) {
+          const ConnectionKind& connection = kind(element, entry.kind);
+          const Vec3 direction =
+              (entry.sign * connection.rest + (state.displacement[entry.other] - state.displacement[e]))
+                  .normalized();
+          const double rate = direction.dot(state.velocity[entry.other] - state.velocity[e]);
+          forces[e] += (tau * connection.stiffness * rate) * direction;
+        }
+      },
+      kGrain);
+}
+
+std::vector<double> PaperModel::frequencies(const State& state, const std::vector<double>& mass) const {
+  std::vector<double> result;
+  for (std::size_t p = 0; p < body_.parts.size(); ++p) {
+    const Part& part = body_.parts[p];
+    if (part.placement != Placement::centre) {
+      result.push_back(0);
+      continue;
+    }
+    const auto largest = parallel_sum<Greatest>(
+        part.element_end - part.element_begin,
+        [&](std::size_t i) {
+          const auto element = static_cast<std::uint32_t>(part.element_begin + i);
+          Mat3 own = Mat3::Zero();
+          for (const ConnectionRows::Entry& entry : rows_.of(element)) {
+            const ConnectionKind& connection = kind(element, entry.kind);
+            own += spring_tangent(connection.stiffness,
+                                  stretch(entry.sign * connection.rest,
+                                          state.displacement[entry.other] - state.displacement[element]),
+                                  true);
+          }
+          Eigen::SelfAdjointEigenSolver<Mat3> eigen;
+          eigen.computeDirect(own, Eigen::EigenvaluesOnly);
+          return Greatest{2 * eigen.eigenvalues()[2] / mass[element]};
+        },
+        kGrain);
+    result.push_back(largest.value);
+  }
+  return result;
 }
 
 void PaperModel::add_stiffness(const State& state, bool project, BlockMatrix& matrix) const {

@@ -24,6 +24,14 @@ class PaperModel {
   [[nodiscard]] double energy(const State& state) const;
   // Adds the forces of the connections on their elements [N].
   void add_forces(const State& state, std::vector<Vec3>& forces) const;
+  // Adds the damping of the connections [N] with b = tau k (equations 3, 16 and 18), from state.velocity;
+  // `damping`: tau of each part [s].
+  void add_damping(const State& state, const std::vector<double>& damping, std::vector<Vec3>& forces) const;
+  // (parts) 1/s^2: an upper bound on the square of the largest frequency in the state; 0: no connections.
+  // With the tension-only tangents k_c of the connections and B_e = sum over those of an element, the energy
+  // of a swing is sum_c 1/2 (u_a - u_b) k_c (u_a - u_b) <= sum_e u_e B_e u_e, hence omega^2 <= 2 max eig(B_e)
+  // / m_e. `mass` (elements) [kg].
+  [[nodiscard]] std::vector<double> frequencies(const State& state, const std::vector<double>& mass) const;
   // Adds the tangent. With `project` without the negative part that compressed connections have.
   void add_stiffness(const State& state, bool project, BlockMatrix& matrix) const;
 

@@ -25,11 +25,13 @@ struct Momenta {
 }  // namespace
 
 History::History(const Setting& setting, const std::vector<Pass>& passes,
-                 const std::vector<ProbePoints>& probes, const std::vector<double>& mass)
+                 const std::vector<ProbePoints>& probes, const std::vector<double>& mass,
+                 const PaperModel* paper)
     : setting_(setting),
       passes_(passes),
       probes_(probes),
       mass_(mass),
+      paper_(paper),
       cells_(setting, no_stencil_),
       forces_(passes.size()),
       power_(passes.size() + 2, 0),
@@ -59,7 +61,7 @@ void History::before(const State& state, bool sample) {
   time_ = *state.time;
   if (!sample) return;
   sampled_.displacement = state.displacement;
-  elastic_ = cells_.energy(state);
+  elastic_ = cells_.energy(state) + (paper_ ? paper_->energy(state) : 0);
   potential_ = 0;
   for (const Pass& pass : passes_)
     if (pass.book == Book::potential && pass.energy) potential_ += pass.energy(state);
@@ -75,7 +77,7 @@ void History::after(const State& state, const std::vector<Vec3>& damping, double
   std::vector<double> power(power_.size(), 0);
   for (std::size_t p = 0; p < passes_.size(); ++p) power[p] = power_of(forces_[p]);
   power[passes_.size()] = held_power;
-  power[passes_.size() + 1] = power_of(damping);
+  power[passes_.size() + 1] = power_of(damping) + power_of(connection_damping_);
   for (std::size_t p = 0; p < power.size(); ++p) energy_[p] += 0.5 * (power_[p] + power[p]) * previous_step;
   power_ = std::move(power);
   if (sample_) add_row(state);

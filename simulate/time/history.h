@@ -11,6 +11,7 @@
 
 #include "simulate/cells.h"
 #include "simulate/effects/effect.h"
+#include "simulate/paper_model.h"
 #include "simulate/probes.h"
 
 namespace flexel {
@@ -24,16 +25,18 @@ struct Energies {
 
 class History {
  public:
-  // Refers to all of them while it lives.
+  // Refers to all of them while it lives. `paper`: of the centre-placed parts; null: there are none.
   History(const Setting& setting, const std::vector<Pass>& passes, const std::vector<ProbePoints>& probes,
-          const std::vector<double>& mass);
+          const std::vector<double>& mass, const PaperModel* paper);
 
   // Before a step: keeps the velocities and, where `sample`, the energies of the state.
   void before(const State& state, bool sample);
   // The forces of pass p [N] (elements) at the state before the step.
   [[nodiscard]] std::vector<Vec3>& forces_of(std::size_t pass) { return forces_[pass]; }
-  // After it: the forces of the damping [N] (elements; or none), the power [W] of the supports, and the
-  // length [s] of the step before it (0 for the first).
+  // Likewise of the damping of connections.
+  [[nodiscard]] std::vector<Vec3>& connection_damping() { return connection_damping_; }
+  // After it: the forces of the cells' damping [N] (elements; or none), the power [W] of the supports, and
+  // the length [s] of the step before it (0 for the first).
   void after(const State& state, const std::vector<Vec3>& damping, double held_power, double previous_step);
 
   [[nodiscard]] const Energies& last() const { return last_; }             // of the last sample
@@ -48,9 +51,11 @@ class History {
   const std::vector<Pass>& passes_;
   const std::vector<ProbePoints>& probes_;
   const std::vector<double>& mass_;
+  const PaperModel* paper_;
   Stencil no_stencil_;
   Cells cells_;
   std::vector<std::vector<Vec3>> forces_;  // (passes x elements)
+  std::vector<Vec3> connection_damping_;   // (elements) or empty
   std::vector<Vec3> velocity_;             // before the step
   std::vector<double> power_, energy_;     // (passes, then supports, then damping) W now, J so far
   bool sample_ = false, first_ = true;

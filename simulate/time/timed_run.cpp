@@ -14,7 +14,9 @@
 #include "formats/parallel.h"
 #include "formats/program.h"
 #include "formats/units.h"
+#include "simulate/paper_model.h"
 #include "simulate/report.h"
+#include "simulate/time/folds.h"
 #include "simulate/time/held.h"
 #include "simulate/time/history.h"
 #include "simulate/time/series.h"
@@ -54,15 +56,16 @@ class TimedRun {
 
  private:
   [[nodiscard]] double bound() const;
+  void look_at_stiffness();
   void choose_step();
   void check();
   void step();
   void sum_forces();
+  void add_connection_forces();
   void write_frame();
   void store(const State& state);
   [[nodiscard]] std::string save_failed();
   [[noreturn]] void diverged(const std::string& what);
-  [[nodiscard]] std::string where_it_folds() const;
   SimulateResult report();
 
   Body& body_;
@@ -77,11 +80,14 @@ class TimedRun {
   StepPlan plan_;
   Constraints constraints_;
   State state_;
+  std::optional<PaperModel> paper_;  // of the centre-placed parts
+  bool paper_damped_ = false;
   std::optional<Stepper> stepper_;
   std::optional<Held> held_;
   std::optional<History> history_;
   std::optional<Series> series_;
   std::vector<double> frequencies_, stiffening_;  // (parts)
+  std::vector<double> connection_frequencies_;    // (parts) 1/s^2, or empty
   double added_frequency_ = 0;
   std::vector<Vec3> steady_, outer_;  // (elements) N, of the passes that are constant; of all
   bool varies_ = false;
@@ -89,7 +95,7 @@ class TimedRun {
   double step_ = 0, previous_step_ = 0, epoch_ = 0;  // s; time of step 0 of the present step length
   std::uint64_t in_epoch_ = 0, steps_ = 0;
   double next_row_ = 0, next_frame_ = 0;
-  double kernel_seconds_ = 0;
+  double kernel_seconds_ = 0, paper_seconds_ = 0;
 };
 
 TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress)
@@ -130,22 +136,39 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
     if (pass.constant) pass.add_forces(state_, steady_);
     varies_ = varies_ || !pass.constant;
   }
+  for (std::size_t p = 0; p < body.parts.size(); ++p) {
+    if (body.parts[p].placement != Placement::centre) continue;
+    if (!paper_) paper_.emplace(setting_);
+    paper_damped_ = paper_damped_ || plan_.damping[p] > 0;
+    varies_ = true;
+  }
+  if (varies_ && steady_.empty()) steady_.assign(body.element_count(), Vec3::Zero());
   frequencies_ = cell_frequencies(setting_);
-  if (!options.history.empty()) history_.emplace(setting_, passes_, probes_, stepper_->mass());
+  if (!options.history.empty())
+    history_.emplace(setting_, passes_, probes_, stepper_->mass(), paper_ ? &*paper_ : nullptr);
   if (!options.series.empty()) series_.emplace(options.series, options.compress);
 }
 
 // The longest stable step in the present state [s].
 double TimedRun::bound() const {
   double longest = std::numeric_limits<double>::infinity();
-  for (std::size_t p = 0; p < frequencies_.size(); ++p)
-    longest =
-        std::min(longest, stable_step(frequencies_[p] * stiffening_[p] + added_frequency_, plan_.damping[p]));
+  for (std::size_t p = 0; p < frequencies_.size(); ++p) {
+    const double own =
+        connection_frequencies_.empty() ? 0 : connection_frequencies_[p];  // one of the two is 0
+    longest = std::min(
+        longest, stable_step(frequencies_[p] * stiffening_[p] + own + added_frequency_, plan_.damping[p]));
+  }
   return longest;
 }
 
-void TimedRun::choose_step() {
+// How stiff the parts are in the present state.
+void TimedRun::look_at_stiffness() {
   stiffening_ = stiffening(setting_, state_.displacement);
+  if (paper_) connection_frequencies_ = paper_->frequencies(state_, stepper_->mass());
+}
+
+void TimedRun::choose_step() {
+  look_at_stiffness();
   const double longest = bound();
   double step = kSafety * longest;
   if (scene_.run.step) {
@@ -161,7 +184,8 @@ void TimedRun::choose_step() {
   // without stiffness there is no bound: a thousand steps draw the path
   if (!std::isfinite(step)) step = duration_ / 1000;
   if (!(step > 1e-12 * duration_))
-    diverged(fmt::format("the stable step has fallen to {:.3g} s: {}", step, where_it_folds()));
+    diverged(fmt::format("the stable step has fallen to {:.3g} s: {}", step,
+                         where_it_folds(body_, state_.displacement)));
   step_ = left / std::ceil(left / step - 1e-9);
 }
 
@@ -174,12 +198,16 @@ void TimedRun::check() {
                                    *state_.time, duration_, save_failed()));
   }
   double farthest = 0;
-  for (const Vec3& u : state_.displacement) farthest = std::max(farthest, u.squaredNorm());
-  if (!(std::sqrt(farthest) < kRunaway * (1 + body_extent(body_))))
+  bool finite = true;
+  for (const Vec3& u : state_.displacement) {
+    farthest = std::max(farthest, u.squaredNorm());
+    finite = finite && u.allFinite();
+  }
+  if (!finite || !(std::sqrt(farthest) < kRunaway * (1 + body_extent(body_))))
     diverged("the motion ran away: look at loads and units, or give a shorter [run] step");
-  stiffening_ = stiffening(setting_, state_.displacement);
+  look_at_stiffness();
   const double longest = bound();
-  if (!(longest > 0)) diverged(where_it_folds());
+  if (!(longest > 0)) diverged(where_it_folds(body_, state_.displacement));
   good_ = state_;
   if (step_ > 0.97 * longest || (!scene_.run.step && step_ < 0.6 * kSafety * longest)) choose_step();
   progress_.update(*state_.time / duration_, fmt::format("{:.4g} s, step {}", *state_.time, steps_));
@@ -200,6 +228,20 @@ void TimedRun::sum_forces() {
       const PassTimer timer(pass.seconds);
       pass.add_forces(state_, outer_);
     }
+  if (paper_) add_connection_forces();
+}
+
+void TimedRun::add_connection_forces() {
+  const PassTimer timer(paper_seconds_);
+  if (const PaperModel::SmallestVolume least = paper_->smallest_volume(state_); !(least.value > 0))
+    diverged(folds_at("an element", body_.rest[least.element]));
+  paper_->add_forces(state_, outer_);
+  if (!paper_damped_) return;
+  paper_->add_damping(state_, plan_.damping, outer_);
+  if (!history_) return;
+  std::vector<Vec3>& own = history_->connection_damping();
+  own.assign(body_.element_count(), Vec3::Zero());
+  paper_->add_damping(state_, plan_.damping, own);
 }
 
 void TimedRun::step() {
@@ -221,7 +263,7 @@ void TimedRun::step() {
   const double held_power = held_->impose(state_, stepper_->mass(), advance);
   if (history_) history_->after(state_, stepper_->damping_force(), held_power, first ? 0 : previous_step_);
   previous_step_ = step_;
-  if (!(outcome.smallest_jacobian > 0)) diverged(where_it_folds());
+  if (!(outcome.smallest_jacobian > 0)) diverged(where_it_folds(body_, state_.displacement));
 }
 
 void TimedRun::store(const State& state) {
@@ -255,33 +297,6 @@ std::string TimedRun::save_failed() {
   return fmt::format("; the state at {:.6g} s is in {}", *good_.time, options_.failed_output);
 }
 
-std::string TimedRun::where_it_folds() const {
-  std::size_t worst = 0;
-  double least = std::numeric_limits<double>::infinity();
-  for (std::size_t c = 0; c < body_.cell_count(); ++c) {
-    std::array<Vec3, 8> x;
-    for (std::size_t a = 0; a < 8; ++a)
-      x[a] = body_.rest[body_.cell_elements[c][a]] + state_.displacement[body_.cell_elements[c][a]];
-    Mat3 edges;
-    for (Eigen::Index j = 0; j < 3; ++j) {
-      Vec3 sum = Vec3::Zero();
-      for (std::size_t a = 0; a < 8; ++a) sum += (a >> j & 1 ? 1.0 : -1.0) * x[a];
-      edges.col(j) = sum;
-    }
-    const double volume = edges.determinant();
-    if (!(volume >= least)) {
-      least = std::isnan(volume) ? -std::numeric_limits<double>::infinity() : volume;
-      worst = c;
-    }
-  }
-  if (body_.cell_count() == 0) return "an element's position is not a number";
-  const Vec3& at = body_.rest[body_.cell_elements[worst][0]];
-  return fmt::format(
-      "a cell near ({}, {}, {}) turned inside out: load it more slowly, damp it ([damping]), or use a "
-      "shorter [run] step or a smaller spacing",
-      human_length(at.x()), human_length(at.y()), human_length(at.z()));
-}
-
 void TimedRun::diverged(const std::string& what) {
   throw DivergedError(fmt::format("step {} at {:.6g} s: {}{}", steps_, *state_.time, what, save_failed()));
 }
@@ -295,8 +310,10 @@ SimulateResult TimedRun::report() {
   for (const ProbePoints& probe : probes_) result.probes.push_back(measure(probe, state_));
   const Stencil none;
   const Cells cells(setting_, none);
-  result.elastic_energy = cells.energy(state_);
-  result.smallest_jacobian = cells.smallest_jacobian(state_).value;
+  result.elastic_energy = cells.energy(state_) + (paper_ ? paper_->energy(state_) : 0);
+  if (body_.cell_count() > 0) result.smallest_jacobian = cells.smallest_jacobian(state_).value;
+  if (paper_)
+    result.smallest_jacobian = std::min(result.smallest_jacobian, paper_->smallest_volume(state_).value);
   measure_corners(cells, body_, state_, result, progress_);
   measure_displacement(body_, state_, result);
   for (const double mass : stepper_->mass()) result.mass += mass;
@@ -318,6 +335,7 @@ SimulateResult TimedRun::report() {
   result.timed = timed;
   result.passes.push_back(
       {"cells", fmt::format("model of every part, kernel {}", stepper_->isa()), kernel_seconds_});
+  if (paper_) result.passes.push_back({"connections", "model of centre-placed parts", paper_seconds_});
   for (const Pass& pass : passes_) result.passes.push_back({pass.name, pass.why, pass.seconds});
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
   return result;
