@@ -71,7 +71,7 @@ def write_data(lattice, path, margin=100):
 
 def write_input(lattice, data, path, step, steps, dump=None):
     """fix nve is velocity Verlet. There are no pair forces, so no list of neighbours is ever needed again."""
-    reach = 4 * lattice.spacing
+    reach = 8 * lattice.spacing
     lines = ["units si", "atom_style bond", "boundary f f f", "newton on", f"neighbor {reach!r} bin",
              "neigh_modify delay 1000000 every 1000000 check no", f"comm_modify cutoff {reach!r}", "bond_style harmonic",
              "special_bonds lj/coul 1 1 1", f"read_data {data}", "fix move all nve", f"timestep {step!r}", "thermo_modify norm no",
