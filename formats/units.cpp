@@ -128,14 +128,17 @@ const DimensionEntry& entry(Dimension dimension) {
       {"an acceleration", {1, 0, -2, 0}, "9.81 m/s^2", {"m/s^2", "mm/s^2"}},
       {"an energy", kTorque, "3 J", {"J", "mJ", "kJ", "N m"}},
       {"a share", kShare, "30 %", {"%"}},
+      {"a gravitational constant", {3, -1, -2, 0}, "6.674e-11 m^3/kg/s^2", {"m^3/kg/s^2", "N m^2/kg^2"}},
   };
   return entries[static_cast<std::size_t>(dimension)];
 }
 
 constexpr Dimension kDimensions[] = {
-    Dimension::length,   Dimension::area,         Dimension::volume, Dimension::mass,     Dimension::time,
-    Dimension::angle,    Dimension::force,        Dimension::torque, Dimension::pressure, Dimension::density,
-    Dimension::velocity, Dimension::acceleration, Dimension::energy, Dimension::share};
+    Dimension::length,  Dimension::area,     Dimension::volume,
+    Dimension::mass,    Dimension::time,     Dimension::angle,
+    Dimension::force,   Dimension::torque,   Dimension::pressure,
+    Dimension::density, Dimension::velocity, Dimension::acceleration,
+    Dimension::energy,  Dimension::share,    Dimension::gravitational_constant};
 
 std::string lower(std::string_view text) {
   std::string result(text);

@@ -20,7 +20,8 @@ enum class Dimension {
   velocity,
   acceleration,
   energy,
-  share
+  share,
+  gravitational_constant
 };
 
 // The value of `text` in the SI unit of `dimension` (radians for angles; "30 %" is 0.3 for shares). A number

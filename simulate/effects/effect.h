@@ -19,14 +19,16 @@
 //                                                                     nothing
 //   void report(const State&, const std::vector<Vec3>& unbalanced, SimulateResult&) const
 // In timed runs (simulate/time/timed_run.h) also
-//   static constexpr bool needs_time                                  true: refused at equilibrium
+//   static constexpr bool needs_time, or bool needs_time() const      true: refused at equilibrium
 //   static constexpr Book book                                        where its energy is entered; default:
-//   work void compose(StepPlan&) const                                     what it asks of the hot kernel
+//                                                                     work
+//   void compose(StepPlan&) const                                     what it asks of the hot kernel
 //   void start(State&) const                                          changes the state before the first step
 //   bool constant() const                                             its forces are the same at every step
-//   double added_frequency(const std::vector<double>& mass) const     1/s^2: bound on what its stiffness adds
-//   to
-//                                                                     the square of the largest frequency
+//   double added_frequency([const State&,] const std::vector<double>& mass) const
+//                                                                     1/s^2: bound on what its stiffness adds
+//                                                                     to the square of the largest frequency;
+//                                                                     asked anew at every check of the step
 // An effect that a scene does not name makes no object, no array and no pass.
 #pragma once
 #include <chrono>
@@ -92,6 +94,15 @@ concept AddsFrequency = requires(const E& e, const std::vector<double>& m) {
   { e.added_frequency(m) } -> std::same_as<double>;
 };
 
+template <class E>
+concept AddsFrequencyOfState = requires(const E& e, const State& s, const std::vector<double>& m) {
+  { e.added_frequency(s, m) } -> std::same_as<double>;
+};
+template <class E>
+concept TellsNeedOfTime = requires(const E& e) {
+  { e.needs_time() } -> std::same_as<bool>;
+};
+
 // An effect in a run, its hooks as callables (empty where it has none), and the time it took.
 struct Pass {
   std::string name, why;
@@ -103,7 +114,7 @@ struct Pass {
   std::vector<CoupledElements> couples;
   std::function<void(StepPlan&)> compose;
   std::function<void(State&)> start;
-  std::function<double(const std::vector<double>&)> added_frequency;
+  std::function<double(const State&, const std::vector<double>&)> added_frequency;
   Book book = Book::work;
   bool constant = false, needs_time = false;
   double seconds = 0;
@@ -125,10 +136,21 @@ template <class E>
   if constexpr (Composes<E>) pass.compose = [effect](StepPlan& p) { effect->compose(p); };
   if constexpr (Starts<E>) pass.start = [effect](State& s) { effect->start(s); };
   if constexpr (AddsFrequency<E>)
-    pass.added_frequency = [effect](const std::vector<double>& m) { return effect->added_frequency(m); };
+    pass.added_frequency = [effect, known = std::optional<double>()](const State&,
+                                                                     const std::vector<double>& m) mutable {
+      if (!known) known = effect->added_frequency(m);
+      return *known;
+    };
+  if constexpr (AddsFrequencyOfState<E>)
+    pass.added_frequency = [effect](const State& s, const std::vector<double>& m) {
+      return effect->added_frequency(s, m);
+    };
   if constexpr (TellsConstant<E>) pass.constant = effect->constant();
   if constexpr (requires { E::book; }) pass.book = E::book;
-  if constexpr (requires { E::needs_time; }) pass.needs_time = E::needs_time;
+  if constexpr (TellsNeedOfTime<E>)
+    pass.needs_time = effect->needs_time();
+  else if constexpr (requires { E::needs_time; })
+    pass.needs_time = E::needs_time;
   if constexpr (Reports<E>)
     pass.report = [effect](const State& s, const std::vector<Vec3>& u, SimulateResult& r) {
       effect->report(s, u, r);

@@ -1,47 +1,167 @@
-// Weight: a dead force on every element, in proportion to the load share.
+// Weight and attraction: dead forces in proportion to the load share, and forces that follow the elements.
 #include "simulate/effects/gravity.h"
+
+#include <fmt/format.h>
 
 #include "formats/parallel.h"
 #include "simulate/carrier.h"
+#include "simulate/time/layout.h"
 
 namespace flexel {
+namespace {
+
+constexpr double kResolve = 60;  // steps of at most 2 / 60 rad of the fastest orbit
+
+Gravity::Source parse_source(const SceneValue& value, const TableReader& parent) {
+  TableReader reader(value, parent.file(), "source of [gravity]");
+  Gravity::Source source;
+  source.at =
+      reader.to_vector(reader.require("at", "[\"0 m\", \"0 m\", \"-6371 km\"]"), Dimension::length, "at");
+  source.mass = reader.to_quantity(reader.require("mass", "\"5.97e24 kg\""), Dimension::mass, "mass");
+  reader.finish();
+  if (!(source.mass > 0)) reader.fail("\"mass\" of a source needs to be above 0");
+  return source;
+}
+
+struct Greatest {
+  double value = 0;
+  Greatest& operator+=(const Greatest& other) {
+    value = std::max(value, other.value);
+    return *this;
+  }
+};
+
+}  // namespace
 
 void Gravity::parse(TableReader& scene, Parameters& parameters) {
   const SceneValue* table = scene.find("gravity");
   if (!table) return;
   TableReader reader(*table, scene.file(), "[gravity]");
-  parameters.acceleration =
-      reader.to_vector(reader.require("acceleration", "[\"0 m/s2\", \"0 m/s2\", \"-9.81 m/s2\"]"),
-                       Dimension::acceleration, "acceleration");
+  parameters.acceleration = reader.vector("acceleration", Dimension::acceleration);
+  for (const SceneValue* source : reader.tables("source"))
+    parameters.sources.push_back(parse_source(*source, reader));
+  if (const SceneValue* mutual = reader.find("mutual")) {
+    if (mutual->kind != SceneValue::Kind::boolean)
+      reader.fail(mutual->line, "\"mutual\" in [gravity] needs to be true or false");
+    parameters.mutual = mutual->flag;
+  }
+  const std::optional<double> constant = reader.quantity("constant", Dimension::gravitational_constant);
+  parameters.constant = constant.value_or(kNewton);
+  const bool attracts = parameters.mutual || !parameters.sources.empty();
+  if (!parameters.acceleration && !attracts)  // as a mistyped key, where it looks like one
+    (void)reader.require("acceleration", "[\"0 m/s2\", \"0 m/s2\", \"-9.81 m/s2\"]");
   reader.finish();
+  if (constant && !attracts)
+    reader.fail("\"constant\" in [gravity] is that of \"source\" and \"mutual = true\"; give one of them");
+  if (!(parameters.constant > 0)) reader.fail("\"constant\" in [gravity] needs to be above 0");
 }
 
 std::optional<Gravity> Gravity::make(const Parameters& parameters, const Setting& setting) {
-  if (!parameters.acceleration) return std::nullopt;
-  Gravity gravity;
-  gravity.acceleration_ = *parameters.acceleration;
-  gravity.mass_ = element_masses(setting);
-  return gravity;
+  Gravity made;
+  made.acceleration_ = parameters.acceleration.value_or(Vec3::Zero());
+  made.sources_ = parameters.sources;
+  made.mutual_ = parameters.mutual;
+  made.constant_ = parameters.constant;
+  if (!parameters.acceleration && !made.needs_time()) return std::nullopt;
+  // in time broken matter falls too
+  made.mass_ = setting.duration ? lumped_masses(setting) : element_masses(setting);
+  if (!made.needs_time()) return made;
+  made.rest_ = setting.body.rest;
+  made.radius_.resize(made.rest_.size());
+  for (const Part& part : setting.body.parts)
+    std::fill(made.radius_.begin() + part.element_begin, made.radius_.begin() + part.element_end,
+              0.5 * part.lattice.spacing.minCoeff());
+  for (std::uint32_t e = 0; made.mutual_ && e < made.mass_.size(); ++e)
+    if (made.mass_[e] > 0) made.massive_.push_back(e);
+  return made;
 }
 
 std::string Gravity::why() const {
-  return "[gravity]";
+  std::string why = "[gravity]";
+  if (!sources_.empty()) why += fmt::format(", {} source(s)", sources_.size());
+  if (mutual_) why += fmt::format(", {} elements on each other by pairs", massive_.size());
+  return why;
+}
+
+PointMasses Gravity::points(const State& state) const {
+  PointMasses points;
+  for (const std::uint32_t e : massive_) {
+    points.position.push_back(rest_[e] + state.displacement[e]);
+    points.mass.push_back(mass_[e]);
+    points.radius.push_back(radius_[e]);
+  }
+  return points;
+}
+
+Attraction Gravity::attraction(const State& state) const {
+  return attraction_by_pairs(points(state));
+}
+
+Pull Gravity::pull(const State& state, std::size_t element) const {
+  Pull sum;
+  for (const Source& source : sources_) {
+    const Pull each =
+        pull_of(source.mass, source.at - rest_[element] - state.displacement[element], radius_[element]);
+    sum.field += each.field;
+    sum.potential += each.potential;
+    sum.tide += each.tide;
+  }
+  return sum;
 }
 
 double Gravity::energy(const State& state) const {
-  return -state.share * parallel_sum<double>(mass_.size(), [&](std::size_t e) {
+  double energy = -state.share * parallel_sum<double>(mass_.size(), [&](std::size_t e) {
     return mass_[e] * acceleration_.dot(state.displacement[e]);
   });
+  if (!sources_.empty())
+    energy += parallel_sum<double>(
+        mass_.size(), [&](std::size_t e) { return constant_ * mass_[e] * pull(state, e).potential; });
+  if (mutual_) {
+    const Attraction mutual = attraction(state);
+    for (std::size_t i = 0; i < massive_.size(); ++i)
+      energy += 0.5 * constant_ * mass_[massive_[i]] * mutual.potential[i];
+  }
+  return energy;
 }
 
 void Gravity::add_forces(const State& state, std::vector<Vec3>& forces) const {
-  parallel_for_each(mass_.size(),
-                    [&](std::size_t e) { forces[e] += (state.share * mass_[e]) * acceleration_; });
+  if (acceleration_ != Vec3::Zero())
+    parallel_for_each(mass_.size(),
+                      [&](std::size_t e) { forces[e] += (state.share * mass_[e]) * acceleration_; });
+  if (!sources_.empty())
+    parallel_for_each(mass_.size(),
+                      [&](std::size_t e) { forces[e] += (constant_ * mass_[e]) * pull(state, e).field; });
+  if (!mutual_) return;
+  const Attraction mutual = attraction(state);
+  parallel_for_each(massive_.size(), [&](std::size_t i) {
+    forces[massive_[i]] += (constant_ * mass_[massive_[i]]) * mutual.field[i];
+  });
+}
+
+// The stiffness of an attraction is at most G m M / r^3 (across), and between two elements that of their
+// distance at most twice that of the one by itself (Gershgorin).
+double Gravity::added_frequency(const State& state, const std::vector<double>&) const {
+  if (!needs_time()) return 0;
+  double largest = 0;
+  if (!sources_.empty())
+    largest += parallel_sum<Greatest>(mass_.size(), [&](std::size_t e) {
+                 return Greatest{pull(state, e).tide};
+               }).value;
+  if (mutual_) {
+    const Attraction mutual = attraction(state);
+    double most = 0;
+    for (const double tide : mutual.tide) most = std::max(most, tide);
+    largest += 2 * most;
+  }
+  return kResolve * kResolve * constant_ * largest;
 }
 
 void Gravity::report(const State& state, const std::vector<Vec3>&, SimulateResult& result) const {
   const double mass = parallel_sum<double>(mass_.size(), [&](std::size_t e) { return mass_[e]; });
-  result.loads.push_back({"gravity", state.share * mass * acceleration_});
+  Vec3 force = state.share * mass * acceleration_;
+  for (std::size_t e = 0; !sources_.empty() && e < mass_.size(); ++e)
+    force += (constant_ * mass_[e]) * pull(state, e).field;
+  result.loads.push_back({"gravity", force});  // the mutual part sums up to 0
 }
 
 }  // namespace flexel

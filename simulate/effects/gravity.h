@@ -1,15 +1,28 @@
-// Uniform gravity: every cell's matter, f rho V, is drawn the same way; an eighth of it acts on each of the
-// cell's elements; at centre placement an element has the matter of its voxel. The field of the paper's
-// equation (1) with one distant source (Jansson and Vergeest, section 3.2).
+// Gravity on every cell's matter, f rho V, an eighth of it on each of the cell's elements; at centre
+// placement on that of the element's voxel. Three kinds, which add up (Jansson and Vergeest, section 3.2 and
+// equations 1 and 13):
+//     uniform   F = m g, energy -m g . u
+//     source    F = G m M (s - x) / |s - x|^3, energy -G m M / |s - x|, for each mass M at a fixed point s
+//     mutual    the same of every element on every other (simulate/effects/gravity_sum.h)
+// The last two act in timed runs only.
 #pragma once
 #include "simulate/effects/effect.h"
+#include "simulate/effects/gravity_sum.h"
 
 namespace flexel {
 
 class Gravity {
  public:
+  struct Source {
+    Vec3 at = Vec3::Zero();  // m, world frame; it does not move
+    double mass = 0;         // kg
+  };
+  static constexpr double kNewton = 6.6743e-11;  // m^3/kg/s^2, CODATA 2018
   struct Parameters {
     std::optional<Vec3> acceleration;  // m/s^2, world frame
+    std::vector<Source> sources = {};
+    bool mutual = false;
+    double constant = kNewton;  // m^3/kg/s^2, G
   };
   static constexpr const char* name = "gravity";
   static constexpr Book book = Book::potential;
@@ -18,14 +31,28 @@ class Gravity {
   [[nodiscard]] static std::optional<Gravity> make(const Parameters& parameters, const Setting& setting);
   [[nodiscard]] std::string why() const;
 
-  [[nodiscard]] bool constant() const { return true; }
+  [[nodiscard]] bool needs_time() const { return mutual_ || !sources_.empty(); }
+  [[nodiscard]] bool constant() const { return !needs_time(); }
   [[nodiscard]] double energy(const State& state) const;
   void add_forces(const State& state, std::vector<Vec3>& forces) const;
+  // So that a step turns no orbit by more than 2 / 60 rad: 60^2 times what attraction adds.
+  [[nodiscard]] double added_frequency(const State& state, const std::vector<double>& mass) const;
   void report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) const;
 
  private:
+  // The elements with mass, where they are now.
+  [[nodiscard]] PointMasses points(const State& state) const;
+  [[nodiscard]] Attraction attraction(const State& state) const;
+  [[nodiscard]] Pull pull(const State& state, std::size_t element) const;  // of the sources
+
   Vec3 acceleration_ = Vec3::Zero();
-  std::vector<double> mass_;  // (elements) kg, of the matter that resists
+  std::vector<Source> sources_;
+  bool mutual_ = false;
+  double constant_ = kNewton;
+  std::vector<double> mass_;            // (elements) kg
+  std::vector<double> radius_;          // (elements) m, half the spacing; with sources or mutual
+  std::vector<Vec3> rest_;              // (elements) m, likewise
+  std::vector<std::uint32_t> massive_;  // elements with mass, ascending; with mutual
 };
 
 }  // namespace flexel

@@ -130,7 +130,6 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
   stepper_.emplace(setting_, plan_.damping, !options.history.empty(), options.isa);
   held_.emplace(constraints_, body_, state_);
   for (const Pass& pass : passes_) {
-    if (pass.added_frequency) added_frequency_ += pass.added_frequency(stepper_->mass());
     if (!pass.add_forces) continue;
     if (steady_.empty()) steady_.assign(body.element_count(), Vec3::Zero());
     if (pass.constant) pass.add_forces(state_, steady_);
@@ -165,6 +164,9 @@ double TimedRun::bound() const {
 void TimedRun::look_at_stiffness() {
   stiffening_ = stiffening(setting_, state_.displacement);
   if (paper_) connection_frequencies_ = paper_->frequencies(state_, stepper_->mass());
+  added_frequency_ = 0;
+  for (const Pass& pass : passes_)
+    if (pass.added_frequency) added_frequency_ += pass.added_frequency(state_, stepper_->mass());
 }
 
 void TimedRun::choose_step() {
