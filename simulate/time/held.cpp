@@ -14,7 +14,7 @@ Held::Held(const Constraints& constraints, const Body& body, State& state)
         state.displacement[e][axis] = path(e, axis, state);
         state.velocity[e][axis] = 0;
       }
-    entries_.push_back({e, state.displacement[e], state.velocity[e], Vec3::Zero()});
+    entries_.push_back({e, state.displacement[e], Vec3::Zero()});
   }
 }
 
@@ -24,36 +24,46 @@ double Held::path(std::uint32_t element, int axis, const State& state) const {
                                                    constraints_.courses[motion].at(state))[axis];
 }
 
-double Held::impose(State& state, const std::vector<double>& mass, const step::Advance& advance) {
-  return parallel_sum<double>(entries_.size(), [&](std::size_t i) {
+void Held::impose(State& state, const std::vector<double>& mass, const step::Advance& advance) {
+  parallel_for_each(entries_.size(), [&](std::size_t i) {
     Entry& entry = entries_[i];
     const std::uint32_t e = entry.element;
     Vec3& u = state.displacement[e];
     Vec3& v = state.velocity[e];
-    double power = 0;
     for (int axis = 0; axis < 3; ++axis) {
       if (!(constraints_.mask[e] >> axis & 1)) continue;
       const double wanted = path(e, axis, state);
       const double velocity = (wanted - entry.displacement[axis]) / advance.drift;
       entry.force[axis] = mass[e] * (velocity - v[axis]) / advance.kick;
-      power += entry.force[axis] * (0.5 * (entry.velocity[axis] + velocity));
       u[axis] = wanted;
       v[axis] = velocity;
     }
     entry.displacement = u;
-    entry.velocity = v;
-    return power;
   });
 }
 
-void Held::add_unbalanced(std::vector<Vec3>& unbalanced) const {
-  for (const Entry& entry : entries_) unbalanced[entry.element] -= entry.force;
+void Held::impose_velocity(const State& end, double drift, std::vector<Vec3>& velocity) const {
+  for (const Entry& entry : entries_)
+    for (int axis = 0; axis < 3; ++axis)
+      if (constraints_.mask[entry.element] >> axis & 1)
+        velocity[entry.element][axis] = (path(entry.element, axis, end) - entry.displacement[axis]) / drift;
 }
 
-Vec3 Held::total_force() const {
-  Vec3 total = Vec3::Zero();
-  for (const Entry& entry : entries_) total += entry.force;
-  return total;
+void Held::clear(std::vector<Vec3>& values) const {
+  for (const Entry& entry : entries_)
+    for (int axis = 0; axis < 3; ++axis)
+      if (constraints_.mask[entry.element] >> axis & 1) values[entry.element][axis] = 0;
+}
+
+void Held::copy(const std::vector<Vec3>& from, std::vector<Vec3>& values) const {
+  for (const Entry& entry : entries_)
+    for (int axis = 0; axis < 3; ++axis)
+      if (constraints_.mask[entry.element] >> axis & 1)
+        values[entry.element][axis] = from[entry.element][axis];
+}
+
+void Held::add_forces(std::vector<Vec3>& forces) const {
+  for (const Entry& entry : entries_) forces[entry.element] += entry.force;
 }
 
 }  // namespace flexel

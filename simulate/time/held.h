@@ -15,18 +15,23 @@ class Held {
   Held(const Constraints& constraints, const Body& body, State& state);
 
   // Call after the velocities and displacements have been advanced as if free to `state.time`, by `advance`.
-  // Gives the power [W] of the supports' forces at the time before, with the mean velocity.
-  double impose(State& state, const std::vector<double>& mass, const step::Advance& advance);
+  void impose(State& state, const std::vector<double>& mass, const step::Advance& advance);
 
-  // Minus the supports' forces at the time before the last advance [N]; 0 for free components. (elements)
-  void add_unbalanced(std::vector<Vec3>& unbalanced) const;
-  [[nodiscard]] Vec3 total_force() const;  // N, of the supports
+  // Sets the held components of `velocity` [m/s] to those that lead to the path at `end.time`, `drift` s
+  // away.
+  void impose_velocity(const State& end, double drift, std::vector<Vec3>& velocity) const;
+  // Sets the held components to 0, or to those of `from`.
+  void clear(std::vector<Vec3>& values) const;
+  void copy(const std::vector<Vec3>& from, std::vector<Vec3>& values) const;
+
+  // Adds the supports' forces at the time before the last advance [N] (elements); 0 for free components.
+  void add_forces(std::vector<Vec3>& forces) const;
 
  private:
   struct Entry {
     std::uint32_t element = 0;
-    Vec3 displacement = Vec3::Zero(), velocity = Vec3::Zero();  // that it last had
-    Vec3 force = Vec3::Zero();                                  // N, of the support
+    Vec3 displacement = Vec3::Zero();  // that it last had
+    Vec3 force = Vec3::Zero();         // N, of the support
   };
   [[nodiscard]] double path(std::uint32_t element, int axis, const State& state) const;
 

@@ -34,7 +34,6 @@ History::History(const Setting& setting, const std::vector<Pass>& passes,
       paper_(paper),
       cells_(setting, no_stencil_),
       forces_(passes.size()),
-      power_(passes.size() + 2, 0),
       energy_(passes.size() + 2, 0) {
   for (std::size_t p = 0; p < passes.size(); ++p)
     if (passes[p].add_forces && passes[p].book != Book::potential)
@@ -67,20 +66,20 @@ void History::before(const State& state, bool sample) {
     if (pass.book == Book::potential && pass.energy) potential_ += pass.energy(state);
 }
 
-void History::after(const State& state, const std::vector<Vec3>& damping, double held_power,
-                    double previous_step) {
-  const auto power_of = [&](const std::vector<Vec3>& forces) {
-    return parallel_sum<double>(forces.size(), [&](std::size_t e) {
-      return forces[e].dot(0.5 * (velocity_[e] + state.velocity[e]));
-    });
+void History::after(const State& state, const std::vector<Vec3>& damping, const std::vector<Vec3>& supports,
+                    double previous_step, double step) {
+  const auto add_powers = [&](const std::vector<Vec3>& velocity, double time) {
+    const auto energy = [&](const std::vector<Vec3>& forces) {
+      return time *
+             parallel_sum<double>(forces.size(), [&](std::size_t e) { return forces[e].dot(velocity[e]); });
+    };
+    for (std::size_t p = 0; p < passes_.size(); ++p) energy_[p] += energy(forces_[p]);
+    energy_[passes_.size()] += energy(supports);
+    energy_[passes_.size() + 1] += energy(damping) + energy(connection_damping_);
   };
-  std::vector<double> power(power_.size(), 0);
-  for (std::size_t p = 0; p < passes_.size(); ++p) power[p] = power_of(forces_[p]);
-  power[passes_.size()] = held_power;
-  power[passes_.size() + 1] = power_of(damping) + power_of(connection_damping_);
-  for (std::size_t p = 0; p < power.size(); ++p) energy_[p] += 0.5 * (power_[p] + power[p]) * previous_step;
-  power_ = std::move(power);
+  add_powers(velocity_, 0.5 * previous_step);
   if (sample_) add_row(state);
+  add_powers(state.velocity, 0.5 * step);
 }
 
 void History::add_row(const State& state) {

@@ -1,9 +1,10 @@
 // The books of a timed run, a row per sample: energies, momenta, probes (docs/motion.md gives every column).
 //
 // At the time of step n, with the velocities of the half steps before and after it, the kinetic energy is 1/2
-// sum m v(n-1/2) . v(n+1/2): with it the books of the leapfrog close to second order and, for forces linear
-// in the displacement, exactly. Momentum and angular momentum use the mean velocity. Work and dissipation are
-// the forces' powers with the mean velocity, by the trapezoidal rule.
+// sum m v(n-1/2) . v(n+1/2). It changes from step to step by exactly the mean of the forces at both ends
+// times the displacement between, and so the work of every force is summed up; elastic and potential energy
+// follow to second order in the step, exactly where they are quadratic. Momentum and angular momentum use the
+// mean velocity.
 #pragma once
 #include <memory>
 #include <string>
@@ -35,9 +36,10 @@ class History {
   [[nodiscard]] std::vector<Vec3>& forces_of(std::size_t pass) { return forces_[pass]; }
   // Likewise of the damping of connections.
   [[nodiscard]] std::vector<Vec3>& connection_damping() { return connection_damping_; }
-  // After it: the forces of the cells' damping [N] (elements; or none), the power [W] of the supports, and
-  // the length [s] of the step before it (0 for the first).
-  void after(const State& state, const std::vector<Vec3>& damping, double held_power, double previous_step);
+  // After it: the forces of damping and supports [N] (elements; or none), the length [s] of the step before
+  // it (0 for the first), and its own.
+  void after(const State& state, const std::vector<Vec3>& damping, const std::vector<Vec3>& supports,
+             double previous_step, double step);
 
   [[nodiscard]] const Energies& last() const { return last_; }             // of the last sample
   [[nodiscard]] double worst_residual() const { return worst_residual_; }  // J, largest absolute one
@@ -57,7 +59,7 @@ class History {
   std::vector<std::vector<Vec3>> forces_;  // (passes x elements)
   std::vector<Vec3> connection_damping_;   // (elements) or empty
   std::vector<Vec3> velocity_;             // before the step
-  std::vector<double> power_, energy_;     // (passes, then supports, then damping) W now, J so far
+  std::vector<double> energy_;             // (passes, then supports, then damping) J so far
   bool sample_ = false, first_ = true;
   double time_ = 0, elastic_ = 0, potential_ = 0, start_ = 0;
   Vec3 arm_momentum_ = Vec3::Zero();

@@ -19,8 +19,9 @@
 #include "simulate/time/folds.h"
 #include "simulate/time/held.h"
 #include "simulate/time/history.h"
+#include "simulate/time/implicit_damping.h"
 #include "simulate/time/series.h"
-#include "simulate/time/stability.h"
+#include "simulate/time/step_bound.h"
 #include "simulate/time/stepper.h"
 
 namespace flexel {
@@ -55,7 +56,6 @@ class TimedRun {
   SimulateResult operator()();
 
  private:
-  [[nodiscard]] double bound() const;
   void look_at_stiffness();
   void choose_step();
   void check();
@@ -84,11 +84,10 @@ class TimedRun {
   bool paper_damped_ = false;
   std::optional<Stepper> stepper_;
   std::optional<Held> held_;
+  std::optional<ImplicitDamping> implicit_;
   std::optional<History> history_;
   std::optional<Series> series_;
-  std::vector<double> frequencies_, stiffening_;  // (parts)
-  std::vector<double> connection_frequencies_;    // (parts) 1/s^2, or empty
-  double added_frequency_ = 0;
+  std::optional<StepBound> bound_;
   std::vector<Vec3> steady_, outer_;  // (elements) N, of the passes that are constant; of all
   bool varies_ = false;
   State good_;
@@ -127,8 +126,12 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
     if (pass.start) pass.start(state_);
     if (pass.constrain) pass.constrain(constraints_);
   }
-  stepper_.emplace(setting_, plan_.damping, !options.history.empty(), options.isa);
+  bound_.emplace(setting_, passes_, plan_.damping);
+  // Explicit damping may cut the step by 2; beyond that every step solves for it.
+  const bool by_steps = scene.run.method == TimeMethod::explicit_euler || bound_->damps_explicitly();
+  stepper_.emplace(setting_, plan_.damping, !options.history.empty() || !by_steps, options.isa);
   held_.emplace(constraints_, body_, state_);
+  if (!by_steps) implicit_.emplace(*stepper_, *held_);
   for (const Pass& pass : passes_) {
     if (!pass.add_forces) continue;
     if (steady_.empty()) steady_.assign(body.element_count(), Vec3::Zero());
@@ -142,36 +145,18 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
     varies_ = true;
   }
   if (varies_ && steady_.empty()) steady_.assign(body.element_count(), Vec3::Zero());
-  frequencies_ = cell_frequencies(setting_);
   if (!options.history.empty())
     history_.emplace(setting_, passes_, probes_, stepper_->mass(), paper_ ? &*paper_ : nullptr);
   if (!options.series.empty()) series_.emplace(options.series, options.compress);
 }
 
-// The longest stable step in the present state [s].
-double TimedRun::bound() const {
-  double longest = std::numeric_limits<double>::infinity();
-  for (std::size_t p = 0; p < frequencies_.size(); ++p) {
-    const double own =
-        connection_frequencies_.empty() ? 0 : connection_frequencies_[p];  // one of the two is 0
-    longest = std::min(
-        longest, stable_step(frequencies_[p] * stiffening_[p] + own + added_frequency_, plan_.damping[p]));
-  }
-  return longest;
-}
-
-// How stiff the parts are in the present state.
 void TimedRun::look_at_stiffness() {
-  stiffening_ = stiffening(setting_, state_.displacement);
-  if (paper_) connection_frequencies_ = paper_->frequencies(state_, stepper_->mass());
-  added_frequency_ = 0;
-  for (const Pass& pass : passes_)
-    if (pass.added_frequency) added_frequency_ += pass.added_frequency(state_, stepper_->mass());
+  bound_->look(state_, paper_ ? &*paper_ : nullptr, stepper_->mass());
 }
 
 void TimedRun::choose_step() {
   look_at_stiffness();
-  const double longest = bound();
+  const double longest = bound_->longest(implicit_.has_value());
   double step = kSafety * longest;
   if (scene_.run.step) {
     if (steps_ == 0 && *scene_.run.step > longest)
@@ -208,7 +193,7 @@ void TimedRun::check() {
   if (!finite || !(std::sqrt(farthest) < kRunaway * (1 + body_extent(body_))))
     diverged("the motion ran away: look at loads and units, or give a shorter [run] step");
   look_at_stiffness();
-  const double longest = bound();
+  const double longest = bound_->longest(implicit_.has_value());
   if (!(longest > 0)) diverged(where_it_folds(body_, state_.displacement));
   good_ = state_;
   if (step_ > 0.97 * longest || (!scene_.run.step && step_ < 0.6 * kSafety * longest)) choose_step();
@@ -255,15 +240,22 @@ void TimedRun::step() {
   const double before = first ? (scene_.run.method == TimeMethod::verlet ? 0 : step_) : previous_step_;
   const step::Advance advance{0.5 * (before + step_), step_, scene_.run.method == TimeMethod::explicit_euler};
   StepOutcome outcome;
+  const double end = epoch_ + static_cast<double>(in_epoch_ + 1) * step_;
   {
     const PassTimer timer(kernel_seconds_);
-    outcome = stepper_->advance(state_, varies_ ? outer_ : steady_, advance);
+    const std::vector<Vec3>& outer = varies_ ? outer_ : steady_;
+    outcome = implicit_ ? implicit_->advance(state_, outer, advance, end)
+                        : stepper_->advance(state_, outer, advance);
   }
   ++in_epoch_;
   ++steps_;
-  state_.time = epoch_ + static_cast<double>(in_epoch_) * step_;
-  const double held_power = held_->impose(state_, stepper_->mass(), advance);
-  if (history_) history_->after(state_, stepper_->damping_force(), held_power, first ? 0 : previous_step_);
+  state_.time = end;
+  held_->impose(state_, stepper_->mass(), advance);
+  if (history_) {
+    std::vector<Vec3> supports(body_.element_count(), Vec3::Zero());
+    held_->add_forces(supports);
+    history_->after(state_, stepper_->damping_force(), supports, first ? 0 : previous_step_, step_);
+  }
   previous_step_ = step_;
   if (!(outcome.smallest_jacobian > 0)) diverged(where_it_folds(body_, state_.displacement));
 }
@@ -306,7 +298,8 @@ void TimedRun::diverged(const std::string& what) {
 SimulateResult TimedRun::report() {
   SimulateResult result;
   std::vector<Vec3> unbalanced(body_.element_count(), Vec3::Zero());
-  held_->add_unbalanced(unbalanced);
+  held_->add_forces(unbalanced);
+  for (Vec3& force : unbalanced) force = -force;
   for (const Pass& pass : passes_)
     if (pass.report) pass.report(state_, unbalanced, result);
   for (const ProbePoints& probe : probes_) result.probes.push_back(measure(probe, state_));
@@ -349,6 +342,9 @@ SimulateResult TimedRun::operator()() {
     progress_.say(fmt::format("plan: cells (the parts' models), {} steps of {:.4g} s, kernel {}",
                               static_cast<std::uint64_t>(std::llround(duration_ / step_)), step_,
                               stepper_->isa()));
+    if (implicit_)
+      progress_.say(
+          "plan: every step solves for the damping, which taken explicitly would cut it by more than 2");
     for (const Pass& pass : passes_) progress_.say(fmt::format("plan: {} ({})", pass.name, pass.why));
   }
   write_frame();

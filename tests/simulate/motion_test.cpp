@@ -165,6 +165,33 @@ TEST(Motion, BarSwingsAtItsFrequency) {
   EXPECT_NEAR(swing_of_bar(Model::cells, 0).frequency / expected, 1, 0.002);
 }
 
+// A damping time that explicit steps could not take: the same decrement, within momentum and books.
+TEST(Motion, LongDampingIsSolvedFor) {
+  const double omega = std::sqrt(1e6 / 1000) * pi / 2 / 0.4;
+  for (const double zeta : {0.1, 0.3})
+    for (const Model model : {Model::cells, Model::springs})
+      EXPECT_NEAR(
+          swing_of_bar(model, 2 * zeta / omega).decrement / (2 * pi * zeta / std::sqrt(1 - zeta * zeta)), 1,
+          0.02)
+          << zeta;
+}
+
+TEST(Motion, LongDampingKeepsMomenta) {
+  Scene scene = scene_of(kGum, 0.02);
+  scene.get<InitialVelocity>() = thrown(Vec3(1, 0.5, -2), Vec3(20, 10, 30), Vec3(0.01, 0.01, 0.01));
+  scene.get<Damping>().entries.push_back({0.05, {}, ""});
+  const TimedCase made = run(small_box(), scene);
+  for (const char* name : {"momentum", "angular momentum"})
+    for (const char* axis : {" x", " y", " z"}) {
+      const std::vector<double>& column = made.history.column(std::string(name) + axis);
+      double largest = 0;
+      for (const char* other : {" x", " y", " z"})
+        largest = std::max(largest, std::abs(made.history.column(std::string(name) + other)[0]));
+      EXPECT_NEAR(column.back(), column[0], 1e-6 * largest) << name << axis;
+    }
+  expect_books_close(made);
+}
+
 TEST(Motion, LogarithmicDecrement) {
   const double omega = std::sqrt(1e6 / 1000) * pi / 2 / 0.4, zeta = 0.03;
   const double expected = 2 * pi * zeta / std::sqrt(1 - zeta * zeta);

@@ -1,0 +1,91 @@
+// Conjugate gradients preconditioned by the masses; sums in a fixed order.
+#include "simulate/time/implicit_damping.h"
+
+#include <cmath>
+#include <stdexcept>
+
+#include "formats/parallel.h"
+
+namespace flexel {
+namespace {
+
+constexpr double kTolerance = 1e-6;  // of the residual in the norm of the inverse masses
+constexpr int kIterations = 5000;
+
+double weighted(const std::vector<Vec3>& a, const std::vector<Vec3>& b, const std::vector<double>& weight) {
+  return parallel_sum<double>(a.size(), [&](std::size_t e) { return weight[e] * a[e].dot(b[e]); });
+}
+
+double dot(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
+  return parallel_sum<double>(a.size(), [&](std::size_t e) { return a[e].dot(b[e]); });
+}
+
+}  // namespace
+
+const std::vector<Vec3>& ImplicitDamping::damping(const std::vector<Vec3>& velocity) {
+  probe_.velocity = velocity;
+  (void)stepper_.advance(probe_, {}, {0, 0, false});
+  return stepper_.damping_force();
+}
+
+StepOutcome ImplicitDamping::advance(State& state, const std::vector<Vec3>& outer,
+                                     const step::Advance& advance, double time) {
+  const std::vector<double>&mass = stepper_.mass(), &inverse = stepper_.inverse_mass();
+  const double dt = advance.kick;
+  const std::size_t n = state.velocity.size();
+  before_ = state.velocity;
+  probe_.displacement = state.displacement;
+  const StepOutcome outcome = stepper_.advance(state, outer, {dt, 0, false});  // v- + dt / m (f + D v-)
+  state.time = time;
+  right_.resize(n);
+  residual_.resize(n);
+  direction_.resize(n);
+  image_.resize(n);
+  parallel_for_each(n, [&](std::size_t e) { right_[e] = mass[e] * (state.velocity[e] - before_[e]); });
+
+  if (change_.size() != n) change_.assign(n, Vec3::Zero());
+  parallel_for_each(n, [&](std::size_t e) { direction_[e] = before_[e] + change_[e]; });
+  held_.impose_velocity(state, advance.drift, direction_);
+  parallel_for_each(n, [&](std::size_t e) { change_[e] = direction_[e] - before_[e]; });
+
+  const std::vector<Vec3>& first = damping(change_);
+  parallel_for_each(n,
+                    [&](std::size_t e) { residual_[e] = right_[e] + dt * first[e] - mass[e] * change_[e]; });
+  held_.clear(residual_);
+  held_.clear(right_);
+  const double enough = kTolerance * kTolerance * weighted(right_, right_, inverse);
+  double norm = weighted(residual_, residual_, inverse);
+  parallel_for_each(n, [&](std::size_t e) { direction_[e] = inverse[e] * residual_[e]; });
+  for (int i = 0; norm > enough; ++i) {
+    if (i == kIterations || !std::isfinite(norm))
+      throw std::runtime_error("the implicit damping was not solved");
+    ++iterations_;
+    const std::vector<Vec3>& damped = damping(direction_);
+    parallel_for_each(n, [&](std::size_t e) { image_[e] = mass[e] * direction_[e] - dt * damped[e]; });
+    held_.clear(image_);
+    const double length = norm / dot(direction_, image_);
+    parallel_for_each(n, [&](std::size_t e) {
+      change_[e] += length * direction_[e];
+      residual_[e] -= length * image_[e];
+    });
+    const double next = weighted(residual_, residual_, inverse);
+    const double share = next / norm;
+    parallel_for_each(
+        n, [&](std::size_t e) { direction_[e] = inverse[e] * residual_[e] + share * direction_[e]; });
+    norm = next;
+  }
+  // What the forces make of the held components as if they were free: the damping at v+ in place of that at
+  // v-. The former stays with the stepper, for the books.
+  const std::vector<Vec3>& then = damping(before_);
+  parallel_for_each(n, [&](std::size_t e) {
+    image_[e] = state.velocity[e] - dt * inverse[e] * then[e];
+    state.velocity[e] = before_[e] + change_[e];
+  });
+  const std::vector<Vec3>& now = damping(state.velocity);
+  parallel_for_each(n, [&](std::size_t e) { image_[e] += dt * inverse[e] * now[e]; });
+  held_.copy(image_, state.velocity);
+  parallel_for_each(n, [&](std::size_t e) { state.displacement[e] += advance.drift * state.velocity[e]; });
+  return outcome;
+}
+
+}  // namespace flexel

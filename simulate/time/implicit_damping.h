@@ -1,0 +1,42 @@
+// Damping taken implicitly, for damping times that would cut an explicit step short.
+//
+// With the elastic and outer forces f at the state before the step and the damping D v, linear in the
+// velocities,
+//     (M - dt D) x = dt (f + D v-),   v+ = v- + x
+// by conjugate gradients, D without a matrix by the kernel. M - dt D is symmetric and positive definite, for
+// damping only takes energy; its condition is 1 + dt tau omega^2. The previous step's x is where the search
+// starts.
+#pragma once
+#include <vector>
+
+#include "simulate/time/held.h"
+#include "simulate/time/stepper.h"
+
+namespace flexel {
+
+class ImplicitDamping {
+ public:
+  // `stepper` needs a book (its damping forces are read), and must outlive it, as must `held`.
+  ImplicitDamping(Stepper& stepper, const Held& held) : stepper_(stepper), held_(held) {}
+
+  // One step: velocities to v+, displacements by `drift` times them. `state.time` becomes `time`. Velocities
+  // of held components are left as if free, for Held::impose. Throws std::runtime_error where the search does
+  // not end.
+  StepOutcome advance(State& state, const std::vector<Vec3>& outer, const step::Advance& advance,
+                      double time);
+
+  [[nodiscard]] std::uint64_t iterations() const { return iterations_; }  // of all steps
+
+ private:
+  // D v [N] (elements) at the displacements of probe_.
+  const std::vector<Vec3>& damping(const std::vector<Vec3>& velocity);
+
+  Stepper& stepper_;
+  const Held& held_;
+  std::vector<Vec3> change_;                                         // x of the last step [m/s]
+  std::vector<Vec3> before_, right_, residual_, direction_, image_;  // kept from step to step
+  State probe_;
+  std::uint64_t iterations_ = 0;
+};
+
+}  // namespace flexel

@@ -1,0 +1,48 @@
+// Frequencies of cells, connections and effects, put together.
+#include "simulate/time/step_bound.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "simulate/time/stability.h"
+
+namespace flexel {
+
+StepBound::StepBound(const Setting& setting, const std::vector<Pass>& passes,
+                     const std::vector<double>& damping)
+    : setting_(setting),
+      passes_(passes),
+      damping_(damping),
+      cells_(cell_frequencies(setting)),
+      stiffening_(cells_.size(), 1),
+      connections_(cells_.size(), 0) {}
+
+bool StepBound::damps_explicitly() const {
+  double bare = std::numeric_limits<double>::infinity(), damped = bare;
+  for (std::size_t p = 0; p < cells_.size(); ++p) {
+    bare = std::min(bare, stable_step(cells_[p], 0));
+    damped = std::min(damped, stable_step(cells_[p], damping_[p]));
+  }
+  return damped >= 0.5 * bare;
+}
+
+void StepBound::look(const State& state, const PaperModel* paper, const std::vector<double>& mass) {
+  stiffening_ = stiffening(setting_, state.displacement);
+  if (paper) connections_ = paper->frequencies(state, mass);
+  added_ = 0;
+  for (const Pass& pass : passes_)
+    if (pass.added_frequency) added_ += pass.added_frequency(state, mass);
+}
+
+double StepBound::longest(bool implicit_damping) const {
+  double longest = std::numeric_limits<double>::infinity();
+  for (std::size_t p = 0; p < cells_.size(); ++p) {
+    // a part has cells or connections
+    const double own = cells_[p] * stiffening_[p] + connections_[p];
+    const double damping = implicit_damping && connections_[p] == 0 ? 0 : damping_[p];
+    longest = std::min(longest, stable_step(own + added_, damping));
+  }
+  return longest;
+}
+
+}  // namespace flexel

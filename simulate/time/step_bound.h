@@ -1,0 +1,33 @@
+// The longest stable step of a whole run: cells, connections and the stiffness that effects add
+// (simulate/time/stability.h), in the state that was last looked at.
+#pragma once
+#include <vector>
+
+#include "simulate/effects/effect.h"
+#include "simulate/paper_model.h"
+
+namespace flexel {
+
+class StepBound {
+ public:
+  // Keeps references to all; `damping`: tau of each part [s].
+  StepBound(const Setting& setting, const std::vector<Pass>& passes, const std::vector<double>& damping);
+
+  // Whether explicit damping of the cells leaves at least half of the undamped step.
+  [[nodiscard]] bool damps_explicitly() const;
+
+  // Looks at how stiff everything is now. `paper`: the centre-placed parts, or none.
+  void look(const State& state, const PaperModel* paper, const std::vector<double>& mass);
+
+  // s; `implicit_damping`: that of the cells does not count. 0 or less: a cell is folded.
+  [[nodiscard]] double longest(bool implicit_damping) const;
+
+ private:
+  const Setting& setting_;
+  const std::vector<Pass>& passes_;
+  const std::vector<double>& damping_;
+  std::vector<double> cells_, stiffening_, connections_;  // (parts) 1/s^2 at rest, its growth; 1/s^2
+  double added_ = 0;                                      // 1/s^2
+};
+
+}  // namespace flexel

@@ -1,0 +1,167 @@
+"""Timed runs of flexel-simulate from the outside: series, books, refusals, failures, interrupts."""
+
+import csv
+import json
+import math
+import os
+import signal
+import subprocess
+import time
+import xml.etree.ElementTree
+
+from harness import BIN, Skip, body, expect, expect_error, expect_ok, expect_only, main, run, scene
+
+SWING = """material = "rubber"
+[[fix]]
+where = "xmin"
+[[load]]
+where = "xmax"
+force = ["0 N", "0 N", "-0.01 N"]
+[damping]
+time = "2 us"
+[[probe]]
+name = "tip"
+where = "xmax"
+[run]
+time = "5 ms"
+"""
+LONG = SWING.replace('"5 ms"', '"1000 s"')
+
+
+def test_series():
+    inputs = [body(), scene(text=SWING + "frames = 4\n")]
+    expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "swing.pvd"))
+    frames = [f"swing_{n:05}.vtu" for n in range(5)]
+    expect_only(*inputs, "swing.pvd", *frames)
+    sets = xml.etree.ElementTree.parse("swing.pvd").getroot().findall("./Collection/DataSet")
+    expect([each.get("file") for each in sets] == frames, "the .pvd should name the frames in order")
+    times = [float(each.get("timestep")) for each in sets]
+    expect(times[0] == 0 and abs(times[-1] - 5e-3) < 1e-12 and times == sorted(times), f"times {times}")
+    expect(os.path.getsize(frames[0]) > os.path.getsize(frames[1]), "the first frame alone should hold the surface")
+
+
+def test_series_is_read_by_meshio():
+    try:
+        import meshio
+    except ImportError as error:
+        raise Skip("meshio is not installed") from error
+    body()
+    scene(text=SWING + "frames = 2\n")
+    expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "swing.pvd"))
+    first, last = (meshio.read(f"swing_{n:05}.vtu") for n in (0, 2))
+    expect("velocity" in last.point_data, "the frames should hold velocities")
+    expect(abs(first.point_data["displacement"]).max() == 0 < abs(last.point_data["displacement"]).max(), "the beam should move")
+
+
+def rows(name):
+    with open(name, newline="") as file:
+        return [{key.split(" [")[0]: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
+
+
+def test_history_and_summary():
+    body()
+    scene(text=SWING)
+    expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu", "--history", "h.csv", "--summary", "s.json"))
+    found = rows("h.csv")
+    expect(found[0]["time"] == 0 and abs(found[-1]["time"] - 5e-3) < 1e-12, "the books should reach from start to end")
+    largest = max(abs(row[name]) for row in found for name in ("kinetic", "elastic", "work", "dissipated"))
+    expect(0 < max(abs(row["residual"]) for row in found) < 1e-3 * largest, "the books should close")
+    summary = json.load(open("s.json"))
+    expect(summary["timed"]["steps"] > 0 and summary["timed"]["books"]["worst_residual"] < 1e-3 * largest, "summary")
+    probe = summary["probes"][0]["displacement"]
+    expect(all(math.isclose(found[-1][f"tip {axis}"], value, rel_tol=1e-9, abs_tol=1e-15) for axis, value in zip("xyz", probe)),
+           "the books' last row and the summary should agree")
+
+
+def test_pipe_carries_the_last_state():
+    body()
+    scene(text=SWING)
+    state = expect_ok(run("flexel-simulate", "scene.toml", "body.vtu")).out
+    mapped = expect_ok(run("flexel-map", "--format", "stl", stdin=state)).out
+    expect(len(mapped) == 84 + 50 * 12, "the box should come out")
+
+
+def test_a_run_goes_on_where_another_ended():
+    body()
+    scene("whole.toml", SWING.replace("[damping]", "[gravity]").replace('time = "2 us"', 'acceleration = ["0 m/s2", "0 m/s2", "-1 m/s2"]'))
+    text = open("whole.toml").read()
+    scene("half.toml", text.replace('"5 ms"', '"2.5 ms"'))
+    expect_ok(run("flexel-simulate", "whole.toml", "body.vtu", "-o", "whole.vtu", "--summary", "whole.json"))
+    expect_ok(run("flexel-simulate", "half.toml", "body.vtu", "-o", "half.vtu"))
+    expect_ok(run("flexel-simulate", "half.toml", "half.vtu", "-o", "halves.vtu", "--summary", "halves.json"))
+    whole, halves = (json.load(open(name))["probes"][0]["displacement"][2] for name in ("whole.json", "halves.json"))
+    expect(whole != 0 and abs(halves / whole - 1) < 1e-2, f"two halves should make a whole: {whole}, {halves}")
+
+
+def test_wrong_keys():
+    body()
+    for text, fragment in ((SWING + "step = 5\n", "unit"), (SWING + 'method = "verlat"\n', "verlet"),
+                           (SWING + 'until = "equilibrium"\n', "both"), (SWING + 'step = "1 s"\n', "longest stable"),
+                           (SWING.replace('time = "5 ms"', 'step = "1 us"'), "time"),
+                           (SWING.replace('"2 us"', '"-2 us"'), "0 or more"),
+                           (SWING.replace("[[probe]]", "[[velocity]]\nwhere = \"xmin\"\nvelocity = [\"1 m/s\", 0, 0]\n[[probe]]"), "part"),
+                           (SWING.replace("[damping]", 'time = ["0 s"]\n[damping]'), "factor")):
+        expect_error(run("flexel-simulate", scene(text=text), "body.vtu", "-o", "out.vtu"), "flexel-simulate", fragment)
+
+
+def test_timed_outputs_need_time():
+    body()
+    still = SWING.replace('time = "5 ms"', "").replace('[damping]\ntime = "2 us"', "")
+    expect_error(run("flexel-simulate", scene(text=still), "body.vtu", "-o", "out.pvd"), "flexel-simulate", "time")
+    expect_error(run("flexel-simulate", scene(text=still), "body.vtu", "-o", "out.vtu", "--history", "h.csv"), "flexel-simulate", "time")
+    damped = SWING.replace('time = "5 ms"', "")
+    expect_error(run("flexel-simulate", scene(text=damped), "body.vtu", "-o", "out.vtu"), "flexel-simulate", "damping", "time")
+
+
+def test_unknown_instruction_set():
+    body()
+    expect_error(run("flexel-simulate", scene(text=SWING), "body.vtu", "-o", "out.vtu", "--isa", "mmx"), "flexel-simulate", "mmx", "portable")
+
+
+def test_instruction_sets_agree_to_the_bit():
+    body()
+    scene(text=SWING)
+    expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "best.vtu"))
+    expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "portable.vtu", "--isa", "portable", "--threads", "1"))
+    expect(open("best.vtu", "rb").read() == open("portable.vtu", "rb").read(), "the bits should not depend on the machine")
+
+
+def test_collapse_leaves_the_last_sound_state():
+    inputs = [body(), scene(text=SWING.replace("-0.01 N", "-5 kN"))]
+    result = run("flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu", "--history", "h.csv")
+    expect_error(result, "flexel-simulate", "step ", "inside out", "out.failed.vtu", code=3)
+    expect_only(*inputs, "out.failed.vtu", "h.csv")
+    expect_ok(run("flexel-map", "out.failed.vtu", "-o", "last.stl", "--quiet"))
+
+
+def test_timeout():
+    inputs = [body(), scene(text=LONG)]
+    result = run("flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu", "--timeout", "1 s")
+    expect_error(result, "flexel-simulate", "stopped by --timeout", "out.failed.vtu", code=5)
+    expect_only(*inputs, "out.failed.vtu")
+
+
+def test_interrupt():
+    inputs = [body(), scene(text=LONG)]
+    process = subprocess.Popen([BIN / "flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu"], stderr=subprocess.PIPE)
+    time.sleep(1)
+    process.send_signal(signal.SIGINT)
+    text = process.communicate(timeout=30)[1].decode()
+    expect(process.returncode == 130 and "out.failed.vtu" in text, f"exit {process.returncode}: {text}")
+    expect_only(*inputs, "out.failed.vtu")
+    expect_ok(run("flexel-simulate", scene("short.toml", SWING), "out.failed.vtu", "-o", "on.vtu"))
+
+
+def test_explain():
+    body()
+    scene(text=SWING)
+    lines = expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu", "--explain")).err
+    for word in ("steps of", "kernel", "damping (1 [damping])", "loads (1 [[load]])"):
+        expect(word in lines, f"\"{word}\" is missing in: {lines}")
+    bare = SWING.replace('[damping]\ntime = "2 us"', "")
+    lines = expect_ok(run("flexel-simulate", scene(text=bare), "body.vtu", "-o", "out.vtu", "--explain")).err
+    expect("damping" not in lines, f"nothing that the scene does not name belongs in the plan: {lines}")
+
+
+if __name__ == "__main__":
+    main(globals())
