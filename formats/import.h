@@ -21,6 +21,8 @@ struct ImportOptions {
   // too. Not given: a 64th of each solid's diagonal, or what 2 million triangles for the file allow; given,
   // more triangles than that are an error. Meshes (STL, OBJ, ...) are the user's and are never split.
   std::optional<double> largest_edge;
+  // s of processor time that OpenCASCADE may take over a file; not given: a minute and 10 s a megabyte
+  std::optional<double> occt_seconds;
 };
 
 // Reads one file ("-": stdin). The format is told by its bytes, then by its extension. Solids become parts;

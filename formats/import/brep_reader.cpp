@@ -75,7 +75,7 @@ Surface read_shape(ImportInput& input, const ImportOptions& options) {
 
 Surface read_brep(ImportInput& input, const ImportOptions& options) {
   try {
-    return read_with_occt(input, [&] { return read_shape(input, options); });
+    return read_with_occt(input, options, [&] { return read_shape(input, options); });
   } catch (const std::ios_base::failure&) {
     throw InputError(input.where, "is cut off or damaged: numbers are missing in it");
   }

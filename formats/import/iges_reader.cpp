@@ -149,7 +149,7 @@ Surface read_iges(ImportInput& input, const ImportOptions& options) {
   if (options.unit) throw InputError(input.where, "an IGES file carries its own unit: leave out --unit");
   check_complete(input);
   const TemporaryFile file(input.bytes);
-  return read_with_occt(input, [&] { return read_entities(file.path(), options, input); });
+  return read_with_occt(input, options, [&] { return read_entities(file.path(), options, input); });
 }
 
 }  // namespace flexel

@@ -29,7 +29,9 @@ struct ShapeLabels {
 // The message for what OpenCASCADE found wrong with a file.
 [[nodiscard]] std::string damage_message(const std::string& what);
 
-// Runs `read`, which uses OpenCASCADE on the file; its exceptions and crashes become InputError.
-[[nodiscard]] Surface read_with_occt(const ImportInput& input, const std::function<Surface()>& read);
+// Runs `read`, which uses OpenCASCADE on the file; its exceptions, crashes and endless loops become
+// InputError.
+[[nodiscard]] Surface read_with_occt(const ImportInput& input, const ImportOptions& options,
+                                     const std::function<Surface()>& read);
 
 }  // namespace flexel

@@ -288,13 +288,23 @@ std::string damage_message(const std::string& what) {
   return fmt::format("is damaged: OpenCASCADE says \"{}\"", clean_name(what));
 }
 
-Surface read_with_occt(const ImportInput& input, const std::function<Surface()>& read) {
+Surface read_with_occt(const ImportInput& input, const ImportOptions& options,
+                       const std::function<Surface()>& read) {
+  // Some damaged files send OpenCASCADE into loops without an end. Sound ones take it about a second a
+  // megabyte.
+  const double limit = options.occt_seconds.value_or(60 + 1e-5 * static_cast<double>(input.bytes.size()));
   try {
     Surface surface;
-    guarded([&] { surface = read(); });
+    guarded([&] { surface = read(); }, limit);
     return surface;
   } catch (const LibraryCrashed&) {
     throw InputError(input.where, "is damaged: OpenCASCADE cannot read it");
+  } catch (const LibraryHung&) {
+    throw InputError(
+        input.where,
+        fmt::format("is damaged, or too much for OpenCASCADE: it had not read it after {:.3g} s of "
+                    "processor time; export it anew, or as STL",
+                    limit));
   } catch (const Standard_Failure& failure) {
     throw InputError(input.where,
                      damage_message(failure.GetMessageString() ? failure.GetMessageString() : "no reason"));

@@ -101,7 +101,7 @@ Surface read_solids(ImportInput& input, const ImportOptions& options) {
 Surface read_step(ImportInput& input, const ImportOptions& options) {
   if (options.unit) throw InputError(input.where, "a STEP file carries its own unit: leave out --unit");
   check_step_complete(input);
-  return read_with_occt(input, [&] { return read_solids(input, options); });
+  return read_with_occt(input, options, [&] { return read_solids(input, options); });
 }
 
 }  // namespace flexel

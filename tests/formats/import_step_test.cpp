@@ -18,6 +18,14 @@ TEST(CrashGuard, ACrashBecomesAnExceptionAndHandlersComeBack) {
   const auto before = std::signal(SIGSEGV, SIG_IGN);
   EXPECT_THROW(guarded([] { std::raise(SIGSEGV); }), LibraryCrashed);
   EXPECT_THROW(guarded([] { throw InputError("of our own"); }), InputError);
+  volatile bool forever = true;
+  EXPECT_THROW(guarded(
+                   [&] {
+                     while (forever) {
+                     }
+                   },
+                   0.05),
+               LibraryHung);
   int done = 0;
   guarded([&] { done = 1; });
   EXPECT_EQ(done, 1);
