@@ -1,0 +1,105 @@
+#!/usr/bin/python3
+"""Prints what each effect adds to a step, an element: instructions (callgrind: exact), nanoseconds (processor time of one thread,
+medians of five) and heap (bytes allocated in the run, by valgrind), over a scene that names none; then the hot loop's variants and what they cost to
+build. Writes it into docs/effects.md.
+
+    PATH=build/release/bin:$PATH bench/step/effects.py
+"""
+
+import os
+import pathlib
+import re
+import resource
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+
+SOURCE = pathlib.Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(SOURCE / "tests" / folder) for folder in ("interop", "programs")]
+from instructions import EFFECTS, make_block, of_a_step, simulate_command  # noqa: E402
+
+COUNTED_CELLS, TIMED_CELLS, TIMED_STEPS, REPEATS = 16, 46, 100, 5
+ROWS = {"nothing": ("", ()), **{name: (text, ()) for name, text in EFFECTS.items()}, "`--history`, a row in 10 steps":
+        ("history_every = \"100 us\"\n", ("--history", "history.csv"))}
+
+
+def processor_seconds(command):
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(command, check=True, timeout=120)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def nanoseconds(elements, model):
+    """Of a step, an element, by row; the rows take turns, so that what else the machine does meets all of them."""
+    taken = {row: [] for row in ROWS}
+    for _ in range(REPEATS):
+        for row, (effect, options) in ROWS.items():
+            short = processor_seconds(simulate_command(TIMED_STEPS, effect, model, options))
+            long = processor_seconds(simulate_command(2 * TIMED_STEPS, effect, model, options))
+            taken[row].append((long - short) / TIMED_STEPS / elements * 1e9)
+    return {row: statistics.median(values) for row, values in taken.items()}
+
+
+def heap(effect, options):
+    """Bytes that a run of ten steps allocates, whether or not it gives them back."""
+    done = subprocess.run(["valgrind", "--leak-check=no", *simulate_command(10, effect, "cells", options)], check=True, timeout=300,
+                          stderr=subprocess.PIPE)
+    return int(re.search(r"total heap usage: .* ([\d,]+) bytes allocated", done.stderr.decode()).group(1).replace(",", ""))
+
+
+def costs():
+    elements = make_block(COUNTED_CELLS)
+    instructions = {row: sum(of_a_step(lambda steps, e=effect, o=options: simulate_command(steps, e, "cells", o)).values()) / elements
+                    for row, (effect, options) in ROWS.items()}
+    memory = {row: heap(*scene) / elements for row, scene in ROWS.items()}
+    taken = nanoseconds(make_block(TIMED_CELLS), "cells")
+    lines = ["| the scene names | instructions | ns | heap, bytes |", "|---|---|---|---|",
+             f"| nothing | {instructions['nothing']:.0f} | {taken['nothing']:.1f} | {memory['nothing']:.0f} |"]
+    for row in list(ROWS)[1:]:
+        lines.append(f"| {row} | {instructions[row] - instructions['nothing']:+.1f} | {taken[row] - taken['nothing']:+.1f} |"
+                     f" {memory[row] - memory['nothing']:+.0f} |")
+    return lines
+
+
+def kernels(program):
+    """The hot loop for each instruction set: variants a model, size of its code, seconds to compile."""
+    build = program.resolve().parent.parent
+    lines = ["| hot loop | variants a model | object file | compiled in |", "|---|---|---|---|"]
+    for isa in ("portable", "avx2", "avx512"):
+        target = f"simulate/CMakeFiles/flexel_kernel_{isa}.dir/time/kernel.cpp.o"
+        if not (build / target).exists():
+            continue
+        command = subprocess.run(["ninja", "-C", build, "-t", "commands", "-s", target], check=True, stdout=subprocess.PIPE).stdout.decode()
+        began = time.monotonic()
+        subprocess.run(command.splitlines()[-1].replace(target, os.path.abspath("kernel.o")), shell=True, check=True, cwd=build, timeout=300,
+                       env=dict(os.environ, CCACHE_DISABLE="1"))
+        seconds = time.monotonic() - began
+        listed = subprocess.run(["nm", "-C", "kernel.o"], check=True, stdout=subprocess.PIPE).stdout.decode()
+        found = set(re.findall(r" [tT] .*\brun<[^\n]*::(\w+Model), ([^\n]*?)>\(", listed))
+        counts = {model: sum(1 for m, _ in found if m == model) for model, _ in found}
+        told = ", ".join(f"{model.removesuffix('Model').lower()} {n}" for model, n in sorted(counts.items()))
+        lines.append(f"| {isa} | {told} | {os.path.getsize('kernel.o') / 1024:.0f} KiB | {seconds:.0f} s |")
+    return [*lines, "", f"`flexel-simulate` is {os.path.getsize(program) / 2**20:.1f} MiB, as built (not stripped)."]
+
+
+def main():
+    program = shutil.which("flexel-simulate")
+    if not program or not shutil.which("valgrind"):
+        sys.exit("effects.py: needs flexel-simulate on the PATH, and valgrind")
+    with tempfile.TemporaryDirectory(prefix="flexel-") as folder:
+        os.chdir(folder)
+        tables = "\n".join([*costs(), "", *kernels(pathlib.Path(program))])
+        os.chdir("/")
+    print(tables)
+    page = SOURCE / "docs/effects.md"
+    before, _, rest = page.read_text(encoding="utf-8").partition("<!-- effects.py -->\n")
+    _, _, after = rest.partition("<!-- end -->\n")
+    page.write_text(f"{before}<!-- effects.py -->\n{tables}\n<!-- end -->\n{after}", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,70 @@
+"""Counts the instructions of a timed run function by function, by valgrind's callgrind: exact, whatever else the machine does."""
+
+import collections
+import pathlib
+import re
+import subprocess
+
+from shapes import binary_stl, box_triangles
+
+MATTER = """material = "gum"
+[materials.gum]
+young = "1.2 MPa"
+poisson = 0.25
+density = "930 kg/m3"
+[parts.block]
+model = "{model}"
+[run]
+time = "{time} us"
+step = "10 us"
+"""
+
+# What a scene says to call for an effect, and options that go with it. The block is a cube from the origin.
+EFFECTS = {
+    "`[gravity]`": '[gravity]\nacceleration = [0, 0, "-9.81 m/s2"]\n',
+    "`[[load]]`": '[[load]]\nwhere = "xmax"\nforce = ["0 N", "0 N", "-1 mN"]\n',
+    "`[[load]]` with a course": '[[load]]\nwhere = "xmax"\nforce = ["0 N", "0 N", "-1 mN"]\ntime = ["0 s", "1 s"]\nfactor = [0, 1]\n',
+    "`[[fix]]` of a side": '[[fix]]\nwhere = "xmin"\n',
+    "`[[fix]]` of elements": '[[fix]]\nwhere = { half_space = { point = ["0.5 mm", 0, 0], normal = [-1, 0, 0] } }\n',
+    "`[[velocity]]`": '[[velocity]]\nwhere = "block"\nvelocity = ["0 m/s", "0 m/s", "1 m/s"]\n',
+    "`[damping]`": '[damping]\ntime = "2 us"\n',
+}
+
+
+def make_block(cells):
+    """block.stl and block.vtu of cells^3 cells of a millimetre."""
+    pathlib.Path("block.stl").write_bytes(binary_stl(box_triangles(3 * (float(cells),))))
+    subprocess.run(["flexel-voxelize", "block.stl", "--size", "1 mm", "--align", "none", "--quiet", "-o", "block.vtu"], check=True,
+                   timeout=120)
+    return (cells + 1)**3
+
+
+def simulate_command(steps, effect="", model="cells", options=()):
+    """Writes scene.toml and gives the command that runs it for so many steps."""
+    pathlib.Path("scene.toml").write_text(MATTER.format(time=10 * steps, model=model) + effect, encoding="utf-8")
+    return ["flexel-simulate", "scene.toml", "block.vtu", "-o", "out.vtu", "--threads", "1", "--quiet", *options]
+
+
+def count(command):
+    """Instructions by function (demangled) of a run, those of what it calls left out."""
+    subprocess.run(["valgrind", "--tool=callgrind", "--callgrind-out-file=callgrind.out", *command], check=True, timeout=300,
+                   stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    listed = subprocess.run(["callgrind_annotate", "--threshold=100", "--show-percs=no", "--auto=no", "callgrind.out"], check=True,
+                            stdout=subprocess.PIPE, timeout=60).stdout.decode()
+    found = collections.Counter()
+    for number, function in re.findall(r"(?m)^ *([\d,]+)  [^\n:]*?:(\S[^\n]*?)(?: \[[^\]\n]*\])?$", listed):
+        found[function] += int(number.replace(",", ""))
+    return found
+
+
+def of_a_step(command_for, steps=200):
+    """Instructions of one step by function, from runs of `steps` and twice as many; what is done every hundredth step is in it."""
+    # one after the other: both may write the same scene.toml
+    short = count(command_for(steps))
+    long = count(command_for(2 * steps))
+    return {f: (long[f] - short[f]) / steps for f in set(short) | set(long) if long[f] != short[f]}
+
+
+def kernel_only(functions):
+    """Those of the hot loop, simulate/time/kernel.cpp."""
+    return {f: n for f, n in functions.items() if re.match(r"(void |double |flexel::step::ChunkOutcome )?flexel::step::", f)}
