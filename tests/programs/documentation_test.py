@@ -42,6 +42,10 @@ def test_bracket():
     run_page("samples/bracket/README.md")
 
 
+def test_swing():
+    run_page("samples/swing/README.md")
+
+
 def test_docs():
     pages = [page for page in sorted((SOURCE / "docs").glob("*.md")) if blocks(page)]
     expect(pages, "no page of docs/ has a command that can be run")
