@@ -11,6 +11,10 @@ struct Material {
   double poisson = 0;  // in (-1, 0.5)
   double density = 0;  // kg/m^3
   std::string source;  // where the figures come from
+  // Of [plasticity] and [fracture]; 0: not given
+  double yield = 0, hardening = 0;  // Pa
+  double strength = 0;              // Pa, largest principal stress
+  double elongation = 0;            // equivalent plastic strain at break
 };
 
 // The library, in order of docs/scene.md. Room temperature, typical values: a scene's own figures go before

@@ -23,7 +23,18 @@ Material parse_material(TableReader& reader, const std::string& name) {
   material.poisson = *reader.number("poisson");
   material.density = required_quantity(reader, "density", Dimension::density, "\"7850 kg/m3\"");
   material.source = reader.text("source").value_or(reader.file());
+  const auto optional_limit = [&](const char* key) {
+    const std::optional<double> value = reader.quantity(key, Dimension::pressure);
+    if (value && !(*value > 0)) reader.fail(fmt::format("\"{}\" needs to be above 0", key));
+    return value.value_or(0);
+  };
+  material.yield = optional_limit("yield");
+  material.hardening = reader.quantity("hardening", Dimension::pressure).value_or(0);
+  material.strength = optional_limit("strength");
+  material.elongation = reader.number("elongation").value_or(0);
   reader.finish();
+  if (!(material.hardening >= 0)) reader.fail("\"hardening\" needs to be 0 or more");
+  if (!(material.elongation >= 0)) reader.fail("\"elongation\" needs to be above 0");
   if (!(material.young > 0)) reader.fail("\"young\" needs to be above 0");
   if (!(material.poisson > -1 && material.poisson < 0.5))
     reader.fail(fmt::format("\"poisson\" = {} needs to lie above -1 and below 0.5", material.poisson));

@@ -44,7 +44,7 @@ void step(benchmark::State& state, const Body& body) {
                         std::vector<Model>(body.parts.size(), model)};
   const double bare = stable_step(setting, std::vector<double>(body.parts.size(), 0));
   const std::vector<double> damping(body.parts.size(), state.range(1) ? 0.1 * bare : 0);
-  Stepper stepper(setting, damping, false);
+  Stepper stepper(setting, {damping}, false);
   const double dt = stable_step(setting, damping);
   State now;
   now.displacement.assign(body.element_count(), Vec3::Zero());

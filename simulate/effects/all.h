@@ -4,9 +4,11 @@
 
 #include "simulate/effects/bonds.h"
 #include "simulate/effects/damping.h"
+#include "simulate/effects/fracture.h"
 #include "simulate/effects/gravity.h"
 #include "simulate/effects/initial_velocity.h"
 #include "simulate/effects/loads.h"
+#include "simulate/effects/plasticity.h"
 #include "simulate/effects/ties.h"
 
 namespace flexel {
@@ -30,6 +32,6 @@ struct EffectList {
   }
 };
 
-using Effects = EffectList<Gravity, Loads, Ties, Bonds, Damping, InitialVelocity>;
+using Effects = EffectList<Gravity, Loads, Ties, Bonds, Damping, InitialVelocity, Plasticity, Fracture>;
 
 }  // namespace flexel

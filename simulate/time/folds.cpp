@@ -23,6 +23,7 @@ std::string where_it_folds(const Body& body, const std::vector<Vec3>& displaceme
   std::size_t worst = 0;
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t c = 0; c < body.cell_count(); ++c) {
+    if (body.broken[c]) continue;
     std::array<Vec3, 8> x;
     for (std::size_t a = 0; a < 8; ++a)
       x[a] = body.rest[body.cell_elements[c][a]] + displacement[body.cell_elements[c][a]];

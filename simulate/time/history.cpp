@@ -26,7 +26,7 @@ struct Momenta {
 
 History::History(const Setting& setting, const std::vector<Pass>& passes,
                  const std::vector<ProbePoints>& probes, const std::vector<double>& mass,
-                 const PaperModel* paper)
+                 const PaperModel* paper, const StepPlan& plan)
     : setting_(setting),
       passes_(passes),
       probes_(probes),
@@ -44,6 +44,13 @@ History::History(const Setting& setting, const std::vector<Pass>& passes,
       fmt::format_to(std::back_inserter(csv_), ",{} {} [J]", pass.name,
                      pass.book == Book::work ? "work" : "dissipated");
   csv_ += ",supports work [J],damping dissipated [J]";
+  const auto add = [&](const char* name) {
+    energy_.push_back(0);
+    fmt::format_to(std::back_inserter(csv_), ",{} dissipated [J]", name);
+    return energy_.size() - 1;
+  };
+  if (!plan.plasticity.empty()) plasticity_ = add("plasticity");
+  if (!plan.fracture.empty()) fracture_ = add("fracture");
   for (const char* name : {"momentum", "angular momentum"})
     for (const char axis : {'x', 'y', 'z'})
       fmt::format_to(std::back_inserter(csv_), ",{} {} [{}]", name, axis,
@@ -60,14 +67,15 @@ void History::before(const State& state, bool sample) {
   time_ = *state.time;
   if (!sample) return;
   sampled_.displacement = state.displacement;
-  elastic_ = cells_.energy(state) + (paper_ ? paper_->energy(state) : 0);
+  // with plasticity or fracture the step tells that of the cells
+  elastic_ = (plasticity_ || fracture_ ? 0 : cells_.energy(state)) + (paper_ ? paper_->energy(state) : 0);
   potential_ = 0;
   for (const Pass& pass : passes_)
     if (pass.book == Book::potential && pass.energy) potential_ += pass.energy(state);
 }
 
-void History::after(const State& state, const std::vector<Vec3>& damping, const std::vector<Vec3>& supports,
-                    double previous_step, double step) {
+void History::after(const State& state, const StepOutcome& outcome, const std::vector<Vec3>& damping,
+                    const std::vector<Vec3>& supports, double previous_step, double step) {
   const auto add_powers = [&](const std::vector<Vec3>& velocity, double time) {
     const auto energy = [&](const std::vector<Vec3>& forces) {
       return time *
@@ -78,6 +86,9 @@ void History::after(const State& state, const std::vector<Vec3>& damping, const 
     energy_[passes_.size() + 1] += energy(damping) + energy(connection_damping_);
   };
   add_powers(velocity_, 0.5 * previous_step);
+  if (plasticity_) energy_[plasticity_] -= outcome.plastic_work;
+  if (fracture_) energy_[fracture_] -= outcome.released;
+  if (outcome.elastic) elastic_ += *outcome.elastic;
   if (sample_) add_row(state);
   add_powers(state.velocity, 0.5 * step);
 }

@@ -14,6 +14,7 @@
 #include "simulate/effects/effect.h"
 #include "simulate/paper_model.h"
 #include "simulate/probes.h"
+#include "simulate/time/stepper.h"
 
 namespace flexel {
 
@@ -28,7 +29,7 @@ class History {
  public:
   // Refers to all of them while it lives. `paper`: of the centre-placed parts; null: there are none.
   History(const Setting& setting, const std::vector<Pass>& passes, const std::vector<ProbePoints>& probes,
-          const std::vector<double>& mass, const PaperModel* paper);
+          const std::vector<double>& mass, const PaperModel* paper, const StepPlan& plan);
 
   // Before a step: keeps the velocities and, where `sample`, the energies of the state.
   void before(const State& state, bool sample);
@@ -36,10 +37,10 @@ class History {
   [[nodiscard]] std::vector<Vec3>& forces_of(std::size_t pass) { return forces_[pass]; }
   // Likewise of the damping of connections.
   [[nodiscard]] std::vector<Vec3>& connection_damping() { return connection_damping_; }
-  // After it: the forces of damping and supports [N] (elements; or none), the length [s] of the step before
-  // it (0 for the first), and its own.
-  void after(const State& state, const std::vector<Vec3>& damping, const std::vector<Vec3>& supports,
-             double previous_step, double step);
+  // After it: what the stepper says of its energies, the forces of damping and supports [N] (elements; or
+  // none), the length [s] of the step before it (0 for the first), and its own.
+  void after(const State& state, const StepOutcome& outcome, const std::vector<Vec3>& damping,
+             const std::vector<Vec3>& supports, double previous_step, double step);
 
   [[nodiscard]] const Energies& last() const { return last_; }             // of the last sample
   [[nodiscard]] double worst_residual() const { return worst_residual_; }  // J, largest absolute one
@@ -59,7 +60,9 @@ class History {
   std::vector<std::vector<Vec3>> forces_;  // (passes x elements)
   std::vector<Vec3> connection_damping_;   // (elements) or empty
   std::vector<Vec3> velocity_;             // before the step
-  std::vector<double> energy_;             // (passes, then supports, then damping) J so far
+  // (passes, then supports, damping, and where the plan has them plasticity and fracture) J so far
+  std::vector<double> energy_;
+  std::size_t plasticity_ = 0, fracture_ = 0;  // places in energy_; 0: absent
   bool sample_ = false, first_ = true;
   double time_ = 0, elastic_ = 0, potential_ = 0, start_ = 0;
   Vec3 arm_momentum_ = Vec3::Zero();

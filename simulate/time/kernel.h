@@ -29,14 +29,24 @@ struct CellConstants {
   double hourglass[4];  // N/m, of the modes xy, yz, zx, xyz
   double spring[3];     // N/m, a cell's share of a spring along an edge, across a face, through the centre
   double damping;       // s; 0 in the variants without damping
-  double axes[9];       // column-major rotation from the lattice to the world frame
-  bool aligned;         // axes is the identity
+  double yield, hardening;      // Pa, J2 yield stress and its isotropic, linear hardening
+  double strength, elongation;  // Pa, plastic strain: what breaks a cell; infinity: nothing
+  double axes[9];               // column-major rotation from the lattice to the world frame
+  bool aligned;                 // axes is the identity
+};
+
+// What the cells of a block remember of their plastic flow; model `cells`, lattice frame.
+struct PlasticBlock {
+  double flow[6][kLanes];          // Cp^-1 - I, Cp = Fp^T Fp: xx, yy, zz, xy, yz, zx
+  double strain[kLanes];           // equivalent plastic strain
+  double hourglass[4][3][kLanes];  // m, plastic part of the hourglass displacements, drawn back by F
 };
 
 // A set of cells that one thread computes at a time, and the elements at their corners. Elements that no
 // other chunk touches are advanced with it; the forces on the others go to `shared_force`.
 struct ChunkView {
-  const CellBlock* blocks;
+  CellBlock* blocks;      // fracture sets the fill of cells that break to 0
+  PlasticBlock* plastic;  // (block_count); null in the variants without plasticity
   std::size_t block_count;
   const std::uint32_t* elements;  // (count) numbers of the body, ascending
   std::size_t count;
@@ -65,6 +75,10 @@ struct Advance {
 struct ChunkOutcome {
   // over the chunk's cells, at the state before the advance; NaN counts as -infinity
   double smallest_jacobian;
+  // with fracture or plasticity: elastic energy of the cells [J], as the forces took it; what this step
+  // dissipated [J]; all of them `book`
+  double elastic, plastic_work, released;
+  std::uint64_t broken;  // cells that broke in this step
 };
 
 // Doubles of scratch that a chunk with `count` elements needs.
@@ -78,10 +92,20 @@ using ChunkKernel = ChunkOutcome (*)(const ChunkView&, const StateView&, const A
 // `book`: account for the power of the damping (simulate/time/history.h).
 enum class Damping { none, plain, book };
 
+// What a variant of the kernel has in it.
+struct Composition {
+  Damping damping = Damping::none;
+  bool plasticity = false, fracture = false;
+};
+constexpr std::size_t kVariants = 12;
+[[nodiscard]] constexpr std::size_t variant_number(const Composition& c) {
+  return static_cast<std::size_t>(c.damping) + 3 * (std::size_t{c.plasticity} + 2 * std::size_t{c.fracture});
+}
+
 struct KernelTable {
   const char* isa;
-  ChunkKernel cells[3];    // by Damping
-  ChunkKernel springs[3];  // by Damping
+  ChunkKernel cells[kVariants];  // by variant_number
+  ChunkKernel springs[kVariants];
 };
 
 // The table of an instruction set; that of this machine's best one.

@@ -9,6 +9,7 @@ namespace {
 
 using Lanes = double __attribute__((vector_size(64)));
 using LaneBits = long long __attribute__((vector_size(64)));
+using LaneMask = decltype(Lanes{} > Lanes{});
 
 #define FLEXEL_INLINE inline __attribute__((always_inline))
 

@@ -56,7 +56,8 @@ struct Largest {
 
 // d2W/dF2 of the neo-Hookean energy has, with s the singular values of F, entries of at most mu + (mu +
 // lambda (1 - ln J)) / s_min^2; at rest 2 mu + lambda.
-double cell_stiffening(const CellKind& kind, const CellVectors& u) {
+// With plastic flow mu is that of b = F Cp^-1 F^T: at most 1 / s_min^2 where the flow follows F.
+double cell_stiffening(const CellKind& kind, const CellVectors& u, bool plastic) {
   const Mat3 gradient = displacement_gradient(kind, u);
   const double jacobian = 1 + volume_change(gradient);
   if (!(jacobian > 0)) return std::numeric_limits<double>::infinity();
@@ -66,7 +67,8 @@ double cell_stiffening(const CellKind& kind, const CellVectors& u) {
   const double least = std::max(eigen.eigenvalues()[0], 1e-12);
   const double log_volume = std::log(jacobian);
   const double coupling = kind.mu + kind.lambda * (1 - log_volume);
-  return (kind.mu + std::max(coupling, 0.0) / least) / (2 * kind.mu + kind.lambda);
+  const double own = plastic ? kind.mu / std::min(least, 1.0) : kind.mu;
+  return (own + std::max(coupling, 0.0) / least) / (2 * kind.mu + kind.lambda);
 }
 
 // k (1 + extension) at most; compression turns the cross stiffness k (1 - l/d) negative, which slows.
@@ -112,7 +114,7 @@ double stable_step(const Setting& setting, const std::vector<double>& damping) {
   return step;
 }
 
-std::vector<double> stiffening(const Setting& setting, const std::vector<Vec3>& displacement) {
+std::vector<double> stiffening(const Setting& setting, const std::vector<Vec3>& displacement, bool plastic) {
   const Body& body = setting.body;
   const std::vector<std::uint8_t> active = active_cells(setting);
   std::vector<double> result;
@@ -127,7 +129,7 @@ std::vector<double> stiffening(const Setting& setting, const std::vector<Vec3>& 
                        CellVectors u;
                        for (std::size_t a = 0; a < 8; ++a) u[a] = displacement[body.cell_elements[c][a]];
                        return Largest{by_springs ? springs_stiffening(springs, u)
-                                                 : cell_stiffening(cells, u)};
+                                                 : cell_stiffening(cells, u, plastic)};
                      }).value);
   }
   return result;

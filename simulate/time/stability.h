@@ -24,6 +24,8 @@ namespace flexel {
 
 // By how much omega^2 of the stiffest cell of each part exceeds that at rest, in the deformed state: at
 // least 1. Neo-Hookean stiffness grows as a cell is squeezed; for springs it changes by their strain.
-[[nodiscard]] std::vector<double> stiffening(const Setting& setting, const std::vector<Vec3>& displacement);
+// `plastic`: the stretch of what has flowed counts as stretch of the stiffness, too, which bounds it.
+[[nodiscard]] std::vector<double> stiffening(const Setting& setting, const std::vector<Vec3>& displacement,
+                                             bool plastic = false);
 
 }  // namespace flexel

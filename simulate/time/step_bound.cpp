@@ -8,11 +8,10 @@
 
 namespace flexel {
 
-StepBound::StepBound(const Setting& setting, const std::vector<Pass>& passes,
-                     const std::vector<double>& damping)
+StepBound::StepBound(const Setting& setting, const std::vector<Pass>& passes, const StepPlan& plan)
     : setting_(setting),
       passes_(passes),
-      damping_(damping),
+      plan_(plan),
       cells_(cell_frequencies(setting)),
       stiffening_(cells_.size(), 1),
       connections_(cells_.size(), 0) {}
@@ -21,13 +20,13 @@ bool StepBound::damps_explicitly() const {
   double bare = std::numeric_limits<double>::infinity(), damped = bare;
   for (std::size_t p = 0; p < cells_.size(); ++p) {
     bare = std::min(bare, stable_step(cells_[p], 0));
-    damped = std::min(damped, stable_step(cells_[p], damping_[p]));
+    damped = std::min(damped, stable_step(cells_[p], plan_.damping[p]));
   }
   return damped >= 0.5 * bare;
 }
 
 void StepBound::look(const State& state, const PaperModel* paper, const std::vector<double>& mass) {
-  stiffening_ = stiffening(setting_, state.displacement);
+  stiffening_ = stiffening(setting_, state.displacement, !plan_.plasticity.empty());
   if (paper) connections_ = paper->frequencies(state, mass);
   added_ = 0;
   for (const Pass& pass : passes_)
@@ -39,7 +38,7 @@ double StepBound::longest(bool implicit_damping) const {
   for (std::size_t p = 0; p < cells_.size(); ++p) {
     // a part has cells or connections
     const double own = cells_[p] * stiffening_[p] + connections_[p];
-    const double damping = implicit_damping && connections_[p] == 0 ? 0 : damping_[p];
+    const double damping = implicit_damping && connections_[p] == 0 ? 0 : plan_.damping[p];
     longest = std::min(longest, stable_step(own + added_, damping));
   }
   return longest;

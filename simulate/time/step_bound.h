@@ -10,8 +10,8 @@ namespace flexel {
 
 class StepBound {
  public:
-  // Keeps references to all; `damping`: tau of each part [s].
-  StepBound(const Setting& setting, const std::vector<Pass>& passes, const std::vector<double>& damping);
+  // Keeps references to all.
+  StepBound(const Setting& setting, const std::vector<Pass>& passes, const StepPlan& plan);
 
   // Whether explicit damping of the cells leaves at least half of the undamped step.
   [[nodiscard]] bool damps_explicitly() const;
@@ -25,7 +25,7 @@ class StepBound {
  private:
   const Setting& setting_;
   const std::vector<Pass>& passes_;
-  const std::vector<double>& damping_;
+  const StepPlan& plan_;
   std::vector<double> cells_, stiffening_, connections_;  // (parts) 1/s^2 at rest, its growth; 1/s^2
   double added_ = 0;                                      // 1/s^2
 };

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "formats/error.h"
@@ -35,11 +37,17 @@ std::vector<const step::KernelTable*> tables() {  // the best one first
 struct Lowest {
   double value = std::numeric_limits<double>::infinity();
   std::uint32_t part = 0;
+  double elastic = 0, plastic_work = 0, released = 0;
+  std::uint64_t broken = 0;
   Lowest& operator+=(const Lowest& other) {
     if (other.value < value) {
       value = other.value;
       part = other.part;
     }
+    elastic += other.elastic;
+    plastic_work += other.plastic_work;
+    released += other.released;
+    broken += other.broken;
     return *this;
   }
 };
@@ -74,33 +82,111 @@ const step::KernelTable& kernel_table(const std::string& isa) {
   throw InputError(fmt::format("--isa \"{}\": this machine runs {}", isa, have));
 }
 
-Stepper::Stepper(const Setting& setting, const std::vector<double>& damping, bool book,
-                 const std::string& isa)
-    : layout_(step_layout(setting, damping)),
+Stepper::Stepper(const Setting& setting, const StepPlan& plan, bool book, const std::string& isa)
+    : layout_(step_layout(setting, plan.damping)),
       table_(&kernel_table(isa)),
       mass_(lumped_masses(setting)),
       inverse_mass_(mass_.size()),
       shared_force_(3 * layout_.shared.size()),
       book_(book) {
   for (std::size_t e = 0; e < mass_.size(); ++e) inverse_mass_[e] = mass_[e] > 0 ? 1 / mass_[e] : 0;
-  bool damped = false;
-  for (std::size_t p = 0; p < damping.size(); ++p) {
+  choose_kernels(setting, plan);
+  if (book_) make_room_for_books();
+}
+
+void Stepper::make_room_for_books() {
+  shared_damping_.resize(shared_force_.size());
+  damping_force_.resize(mass_.size(), Vec3::Zero());
+}
+
+void Stepper::choose_kernels(const Setting& setting, const StepPlan& plan) {
+  bool damped = false, plastic = false;
+  for (const PlasticFlow& flow : plan.plasticity) plastic = plastic || std::isfinite(flow.yield);
+  for (const FractureLimits& limits : plan.fracture) fractures_ = fractures_ || limits.any();
+  for (std::size_t p = 0; p < plan.damping.size(); ++p) {
+    step::CellConstants& c = layout_.constants[p];
+    const PlasticFlow flow = plan.plasticity.empty() ? PlasticFlow{} : plan.plasticity[p];
+    const FractureLimits limits = plan.fracture.empty() ? FractureLimits{} : plan.fracture[p];
+    c.yield = flow.yield;
+    c.hardening = flow.hardening;
+    c.strength = limits.strength;
+    c.elongation = limits.elongation;
+    step::Composition has{plan.damping[p] > 0 ? step::Damping::plain : step::Damping::none,
+                          std::isfinite(flow.yield), limits.any()};
+    damped = damped || plan.damping[p] > 0;
     const bool springs = setting.models.size() > p && setting.models[p] == Model::springs;
-    const step::Damping kind =
-        damping[p] > 0 ? book ? step::Damping::book : step::Damping::plain : step::Damping::none;
-    damped = damped || damping[p] > 0;
-    kernel_.push_back((springs ? table_->springs : table_->cells)[static_cast<std::size_t>(kind)]);
+    const step::ChunkKernel* kernels = springs ? table_->springs : table_->cells;
+    // Only kernels with fracture or plasticity tell the elastic energy: where one part needs it, all do.
+    step::Composition booking = has;
+    booking.damping = step::Damping::book;
+    booking.fracture = has.fracture || plastic || fractures_;
+    if (book_ && (booking.fracture || plan.damping[p] > 0)) has = booking;
+    kernel_.push_back(kernels[step::variant_number(has)]);
+    booking_.push_back(kernels[step::variant_number(booking)]);
   }
-  book_ = book && damped;
-  if (book_) {
-    shared_damping_.assign(shared_force_.size(), 0);
-    damping_force_.assign(mass_.size(), Vec3::Zero());
-  }
+  book_ = book_ && (damped || plastic || fractures_);
+  if (plastic) plastic_.assign(layout_.blocks.size(), step::PlasticBlock{});
+}
+
+Stepper::Memory Stepper::memory() const {
+  Memory memory;
+  memory.plastic = plastic_;
+  if (fractures_)
+    for (const step::CellBlock& block : layout_.blocks) memory.fill.push_back(std::to_array(block.fill));
+  return memory;
+}
+
+void Stepper::restore(const Memory& memory) {
+  plastic_ = memory.plastic;
+  for (std::size_t b = 0; b < memory.fill.size(); ++b)
+    std::copy(memory.fill[b].begin(), memory.fill[b].end(), layout_.blocks[b].fill);
+}
+
+std::optional<double> Stepper::elastic_energy(const State& state) {
+  if (!fractures_ && plastic_.empty()) return std::nullopt;
+  const Memory kept = memory();
+  const std::vector<step::ChunkKernel> kernels = kernel_;
+  const bool book = book_;
+  kernel_ = booking_;
+  book_ = true;
+  make_room_for_books();
+  State copy = state;
+  const StepOutcome outcome = advance(copy, {}, {0, 0, false});
+  kernel_ = kernels;
+  book_ = book;
+  restore(kept);
+  return outcome.elastic;
+}
+
+bool Stepper::mark_broken(std::vector<std::uint8_t>& broken) const {
+  if (!fractures_) return false;
+  bool found = false;
+  for (std::size_t b = 0; b < layout_.blocks.size(); ++b)
+    for (std::size_t l = 0; l < step::kLanes; ++l) {
+      const std::uint32_t cell = layout_.block_cells[b][l];
+      if (cell == StepLayout::kNoCell || layout_.blocks[b].fill[l] > 0) continue;
+      broken[cell] = 1;
+      found = true;
+    }
+  return found;
+}
+
+std::vector<double> Stepper::plastic_strain(std::size_t cells) const {
+  std::vector<double> strain;
+  if (plastic_.empty()) return strain;
+  strain.assign(cells, 0);
+  for (std::size_t b = 0; b < layout_.blocks.size(); ++b)
+    for (std::size_t l = 0; l < step::kLanes; ++l)
+      if (const std::uint32_t cell = layout_.block_cells[b][l]; cell != StepLayout::kNoCell)
+        strain[cell] = plastic_[b].strain[l];
+  return strain;
 }
 
 std::size_t Stepper::bytes() const {
-  return layout_.bytes() + sizeof(double) * (mass_.capacity() + inverse_mass_.capacity() +
-                                             shared_force_.capacity() + shared_damping_.capacity());
+  return layout_.bytes() +
+         sizeof(double) * (mass_.capacity() + inverse_mass_.capacity() + shared_force_.capacity() +
+                           shared_damping_.capacity()) +
+         plastic_.capacity() * sizeof(step::PlasticBlock);
 }
 
 StepOutcome Stepper::advance(State& state, const std::vector<Vec3>& outer, const step::Advance& advance) {
@@ -115,6 +201,7 @@ StepOutcome Stepper::advance(State& state, const std::vector<Vec3>& outer, const
         if (scratch.size() < doubles) scratch.resize(doubles);
         const StepLayout::Chunk& chunk = layout_.chunks[i];
         const step::ChunkView chunk_view{layout_.blocks.data() + chunk.block_begin,
+                                         plastic_.empty() ? nullptr : plastic_.data() + chunk.block_begin,
                                          chunk.block_end - chunk.block_begin,
                                          layout_.elements.data() + chunk.element_begin,
                                          chunk.element_end - chunk.element_begin,
@@ -126,12 +213,17 @@ StepOutcome Stepper::advance(State& state, const std::vector<Vec3>& outer, const
                                          book_ ? shared_damping_.data() + 3 * chunk.shared_begin : nullptr,
                                          &layout_.constants[chunk.part]};
         const step::ChunkOutcome outcome = kernel_[chunk.part](chunk_view, view, advance, scratch.data());
-        return Lowest{outcome.smallest_jacobian, chunk.part};
+        return Lowest{outcome.smallest_jacobian, chunk.part,       outcome.elastic,
+                      outcome.plastic_work,      outcome.released, outcome.broken};
       },
       1);
   StepOutcome outcome;
   outcome.smallest_jacobian = lowest.value;
   outcome.part = lowest.part;
+  outcome.plastic_work = lowest.plastic_work;
+  outcome.released = lowest.released;
+  outcome.broken = lowest.broken;
+  if (book_ && (fractures_ || !plastic_.empty())) outcome.elastic = lowest.elastic;
   advance_shared(view, advance);
   advance_lone(view, advance);
   return outcome;

@@ -1,26 +1,47 @@
 // One explicit step of a body: forces of the cells by model and damping, then velocities and displacements.
 #pragma once
+#include <optional>
 #include <vector>
 
 #include "simulate/time/layout.h"
+#include "simulate/time/plan.h"
 
 namespace flexel {
 
 struct StepOutcome {
   double smallest_jacobian = 1;  // over the cells, before the step; -infinity: not a number
   std::uint32_t part = 0;        // of that cell
+  // With a book, and plasticity or fracture: elastic energy of the cells [J] as the step's forces took it,
+  // and what was dissipated in this step [J].
+  std::optional<double> elastic = {};
+  double plastic_work = 0, released = 0;
+  std::uint64_t broken = 0;  // cells that broke in it
 };
 
 class Stepper {
  public:
-  // `damping`: tau of each part [s]; `book`: account for its power. `isa`: "", "portable", "avx2" or
-  // "avx512";
-  // "" for the best of this machine. Throws InputError: an instruction set that this machine lacks.
-  Stepper(const Setting& setting, const std::vector<double>& damping, bool book, const std::string& isa = "");
+  // `book`: account for energies. `isa`: "", "portable", "avx2" or "avx512"; "" for the best of this
+  // machine. Throws InputError: an instruction set that this machine lacks.
+  Stepper(const Setting& setting, const StepPlan& plan, bool book, const std::string& isa = "");
 
   // v += kick f / m, u += drift v (simulate/time/kernel.h), f = forces of the cells + outer. `outer`
   // (elements) [N] may be empty.
   StepOutcome advance(State& state, const std::vector<Vec3>& outer, const step::Advance& advance);
+
+  // What the cells remember: which are broken, what has flowed. Empty without fracture and plasticity.
+  struct Memory {
+    std::vector<std::array<double, step::kLanes>> fill;  // (blocks)
+    std::vector<step::PlasticBlock> plastic;             // (blocks)
+  };
+  [[nodiscard]] Memory memory() const;
+  void restore(const Memory& memory);
+  // Elastic energy [J] at `state`; nothing without plasticity and fracture, which alone make it other than
+  // Cells::energy.
+  [[nodiscard]] std::optional<double> elastic_energy(const State& state);
+  // Sets broken[c] (cells) of those that broke. True: one did.
+  bool mark_broken(std::vector<std::uint8_t>& broken) const;
+  // (cells) equivalent plastic strain; empty without plasticity.
+  [[nodiscard]] std::vector<double> plastic_strain(std::size_t cells) const;
 
   [[nodiscard]] const std::vector<double>& mass() const { return mass_; }                  // (elements) kg
   [[nodiscard]] const std::vector<double>& inverse_mass() const { return inverse_mass_; }  // (elements) 1/kg
@@ -31,12 +52,17 @@ class Stepper {
   [[nodiscard]] std::size_t bytes() const;
 
  private:
+  void make_room_for_books();
+  void choose_kernels(const Setting& setting, const StepPlan& plan);
   void advance_shared(const step::StateView& view, const step::Advance& advance);
   void advance_lone(const step::StateView& view, const step::Advance& advance);
 
   StepLayout layout_;
   const step::KernelTable* table_;
-  std::vector<step::ChunkKernel> kernel_;  // (parts)
+  // (parts)
+  std::vector<step::ChunkKernel> kernel_, booking_;
+  std::vector<step::PlasticBlock> plastic_;  // (blocks); empty without plasticity
+  bool fractures_ = false;
   std::vector<double> mass_, inverse_mass_;
   std::vector<double> shared_force_, shared_damping_;  // (slots x 3) N
   std::vector<Vec3> damping_force_;

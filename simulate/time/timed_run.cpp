@@ -126,10 +126,10 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
     if (pass.start) pass.start(state_);
     if (pass.constrain) pass.constrain(constraints_);
   }
-  bound_.emplace(setting_, passes_, plan_.damping);
+  bound_.emplace(setting_, passes_, plan_);
   // Explicit damping may cut the step by 2; beyond that every step solves for it.
   const bool by_steps = scene.run.method == TimeMethod::explicit_euler || bound_->damps_explicitly();
-  stepper_.emplace(setting_, plan_.damping, !options.history.empty() || !by_steps, options.isa);
+  stepper_.emplace(setting_, plan_, !options.history.empty() || !by_steps, options.isa);
   held_.emplace(constraints_, body_, state_);
   if (!by_steps) implicit_.emplace(*stepper_, *held_);
   for (const Pass& pass : passes_) {
@@ -146,11 +146,12 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
   }
   if (varies_ && steady_.empty()) steady_.assign(body.element_count(), Vec3::Zero());
   if (!options.history.empty())
-    history_.emplace(setting_, passes_, probes_, stepper_->mass(), paper_ ? &*paper_ : nullptr);
+    history_.emplace(setting_, passes_, probes_, stepper_->mass(), paper_ ? &*paper_ : nullptr, plan_);
   if (!options.series.empty()) series_.emplace(options.series, options.compress);
 }
 
 void TimedRun::look_at_stiffness() {
+  stepper_->mark_broken(body_.broken);
   bound_->look(state_, paper_ ? &*paper_ : nullptr, stepper_->mass());
 }
 
@@ -254,7 +255,7 @@ void TimedRun::step() {
   if (history_) {
     std::vector<Vec3> supports(body_.element_count(), Vec3::Zero());
     held_->add_forces(supports);
-    history_->after(state_, stepper_->damping_force(), supports, first ? 0 : previous_step_, step_);
+    history_->after(state_, outcome, stepper_->damping_force(), supports, first ? 0 : previous_step_, step_);
   }
   previous_step_ = step_;
   if (!(outcome.smallest_jacobian > 0)) diverged(where_it_folds(body_, state_.displacement));
@@ -270,6 +271,9 @@ void TimedRun::store(const State& state) {
     velocity.values.insert(velocity.values.end(), state.velocity[e].begin(), state.velocity[e].end());
   }
   body_.element_columns["velocity"] = std::move(velocity);
+  if (stepper_->mark_broken(body_.broken)) derive_connections(body_);
+  if (std::vector<double> strain = stepper_->plastic_strain(body_.cell_count()); !strain.empty())
+    body_.cell_columns["plastic_strain"] = {1, std::move(strain)};
 }
 
 void TimedRun::write_frame() {
@@ -305,7 +309,9 @@ SimulateResult TimedRun::report() {
   for (const ProbePoints& probe : probes_) result.probes.push_back(measure(probe, state_));
   const Stencil none;
   const Cells cells(setting_, none);
-  result.elastic_energy = cells.energy(state_) + (paper_ ? paper_->energy(state_) : 0);
+  const std::optional<double> inelastic = stepper_->elastic_energy(state_);
+  result.elastic_energy =
+      (inelastic ? *inelastic : cells.energy(state_)) + (paper_ ? paper_->energy(state_) : 0);
   if (body_.cell_count() > 0) result.smallest_jacobian = cells.smallest_jacobian(state_).value;
   if (paper_)
     result.smallest_jacobian = std::min(result.smallest_jacobian, paper_->smallest_volume(state_).value);
@@ -363,17 +369,18 @@ SimulateResult TimedRun::operator()() {
   }
   if (history_) {  // the books of the last state need the forces there, hence a step that is thrown away
     State last = state_;
+    const Stepper::Memory memory = stepper_->memory();
     next_row_ = 0;
     step();
     state_ = std::move(last);
+    stepper_->restore(memory);
     --steps_;
     OutputFile file(options_.history, false);
     file.write(history_->csv());
     file.commit();
   }
-  SimulateResult result = report();
   store(state_);
-  return result;
+  return report();
 }
 
 }  // namespace

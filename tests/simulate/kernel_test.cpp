@@ -56,7 +56,7 @@ Setting setting_of(const Body& body, Model model) {
 // The forces that the kernel used [N], out of one advance.
 std::vector<Vec3> forces(const Setting& setting, const State& before, double tau, const std::string& isa = "",
                          bool book = false) {
-  Stepper stepper(setting, {tau}, book, isa);
+  Stepper stepper(setting, {{tau}}, book, isa);
   State state = before;
   const double kick = 1e-3;
   (void)stepper.advance(state, {}, {kick, 0, false});
@@ -156,7 +156,7 @@ TEST_P(KernelOf, SameBitsForAnyThreadsAndInstructions) {
   const double tau = 1e-5, dt = 0.5 * stable_step(setting, {tau});
   const auto after = [&](const std::string& isa, int threads, bool book) {
     const ThreadLimit limit(threads);
-    Stepper stepper(setting, {tau}, book, isa);
+    Stepper stepper(setting, {{tau}}, book, isa);
     State state = shaken(body, 1e-4, 5);
     for (int i = 0; i < 5; ++i) (void)stepper.advance(state, {}, {dt, dt, false});
     return state;
@@ -190,7 +190,7 @@ TEST_P(KernelOf, BoundIsSafeAndNotWasteful) {
   for (const double zeta : {0.0, 0.2, 1.0, 5.0}) {
     const double tau = 2 * zeta / omega, bound = stable_step(setting, {tau});
     const auto growth = [&](double dt) {
-      Stepper stepper(setting, {tau}, false);
+      Stepper stepper(setting, {{tau}}, false);
       State state = shaken(body, 0, 6);
       for (Vec3& v : state.velocity) v *= 1e-9;
       for (int i = 0; i < 400; ++i) (void)stepper.advance(state, {}, {dt, dt, false});
@@ -211,7 +211,7 @@ TEST(Kernel, FoldedCellIsTold) {
   const Setting setting = setting_of(body, Model::cells);
   State state = shaken(body, 0, 7);
   state.displacement[13] = Vec3(0.05, 0.05, 0.05);
-  Stepper stepper(setting, {0}, false);
+  Stepper stepper(setting, {{0}}, false);
   EXPECT_LE(stepper.advance(state, {}, {1e-6, 1e-6, false}).smallest_jacobian, 0);
   state.displacement[13].x() = std::nan("");
   EXPECT_LE(stepper.advance(state, {}, {1e-6, 1e-6, false}).smallest_jacobian, 0);

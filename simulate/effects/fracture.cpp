@@ -1,0 +1,75 @@
+// [fracture] of a scene.
+#include "simulate/effects/fracture.h"
+
+#include <fmt/format.h>
+
+#include "formats/error.h"
+#include "simulate/effects/part_entries.h"
+
+namespace flexel {
+
+void Fracture::parse(TableReader& scene, Parameters& parameters) {
+  for (const SceneValue* table : scene.tables("fracture")) {
+    TableReader reader(*table, scene.file(), "[fracture]");
+    Entry entry;
+    entry.origin = reader.place();
+    entry.strength = reader.quantity("strength", Dimension::pressure);
+    entry.elongation = reader.number("elongation");
+    entry.part = reader.text("part");
+    reader.finish();
+    if (entry.strength && !(*entry.strength > 0)) reader.fail("\"strength\" needs to be above 0");
+    if (entry.elongation && !(*entry.elongation > 0)) reader.fail("\"elongation\" needs to be above 0");
+    parameters.entries.push_back(entry);
+  }
+}
+
+std::optional<Fracture> Fracture::make(const Parameters& parameters, const Setting& setting) {
+  if (parameters.entries.empty()) return std::nullopt;
+  Fracture made;
+  made.origin_ = parameters.entries[0].origin;
+  made.limits_.resize(setting.body.parts.size());
+  made.needs_flow_.resize(setting.body.parts.size());
+  for (const Entry& entry : parameters.entries)
+    for (const std::size_t p : parts_of(entry, setting)) {
+      const Material& material = setting.materials[p];
+      const double strength = entry.strength.value_or(material.strength);
+      const double elongation = entry.elongation.value_or(material.elongation);
+      const bool can_break = model_of(setting, p) == Model::cells;
+      if (entry.part && !can_break)
+        throw InputError(entry.origin, fmt::format("part \"{}\" cannot break: fracture needs model \"cells\"",
+                                                   *entry.part));
+      if (entry.part && !(strength > 0) && !(elongation > 0))
+        throw InputError(entry.origin,
+                         fmt::format("part \"{}\": {} has neither strength nor elongation: write strength = "
+                                     "\"40 MPa\" here or in [materials.NAME]",
+                                     *entry.part, material.name));
+      if (!can_break) continue;
+      made.limits_[p] = {};
+      if (strength > 0) made.limits_[p].strength = strength;
+      if (elongation > 0) made.limits_[p].elongation = elongation;
+      made.needs_flow_[p] = elongation > 0 && !(strength > 0);
+    }
+  for (const FractureLimits& limits : made.limits_)
+    if (limits.any()) return made;
+  throw InputError(
+      made.origin_,
+      "no part can break: write strength = \"40 MPa\" here or in [materials.NAME], of a part with "
+      "model \"cells\"");
+}
+
+std::string Fracture::why() const {
+  std::size_t parts = 0;
+  for (const FractureLimits& limits : limits_) parts += limits.any();
+  return fmt::format("[fracture], {} part(s) that can break", parts);
+}
+
+void Fracture::compose(StepPlan& plan) const {
+  for (std::size_t p = 0; p < limits_.size(); ++p)
+    if (needs_flow_[p] && (plan.plasticity.empty() || !std::isfinite(plan.plasticity[p].yield)))
+      throw InputError(origin_,
+                       "\"elongation\" is the plastic strain at which a cell breaks: add [plasticity] and a "
+                       "yield stress, or give \"strength\"");
+  plan.fracture = limits_;
+}
+
+}  // namespace flexel

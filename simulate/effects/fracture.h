@@ -1,0 +1,38 @@
+// Fracture: cells that are pulled beyond their strength, or flow beyond their elongation, resist no more;
+// their matter stays in the scene and moves on (Jansson and Vergeest, section 3.2: a connection ends where
+// its length passes a threshold, equation 2). Lives in the kernel (simulate/time/kernel_plastic.h);
+// docs/fracture-plasticity.md.
+#pragma once
+#include "simulate/effects/effect.h"
+
+namespace flexel {
+
+class Fracture {
+ public:
+  struct Entry {
+    std::optional<double> strength;    // Pa; nothing: the material's
+    std::optional<double> elongation;  // plastic strain; nothing: the material's
+    std::optional<std::string> part;   // nothing: every part
+    std::string origin;
+  };
+  struct Parameters {
+    std::vector<Entry> entries;  // a later one goes before an earlier one
+  };
+  static constexpr const char* name = "fracture";
+  static constexpr bool needs_time = true;
+
+  static void parse(TableReader& scene, Parameters& parameters);
+  // Throws InputError: an unknown part, a part that is named but has neither limit or whose model cannot
+  // break, no part that can.
+  [[nodiscard]] static std::optional<Fracture> make(const Parameters& parameters, const Setting& setting);
+  [[nodiscard]] std::string why() const;
+  // After that of plasticity, without which a limit of elongation is refused in model `cells`.
+  void compose(StepPlan& plan) const;
+
+ private:
+  std::vector<FractureLimits> limits_;  // (parts)
+  std::vector<bool> needs_flow_;        // (parts) an elongation of cells
+  std::string origin_;
+};
+
+}  // namespace flexel

@@ -1,0 +1,31 @@
+// Entries of a scene that are for one part, by name, or for every part.
+#pragma once
+#include <fmt/format.h>
+
+#include "formats/error.h"
+#include "formats/program.h"
+#include "simulate/effects/effect.h"
+
+namespace flexel {
+
+[[nodiscard]] inline Model model_of(const Setting& setting, std::size_t part) {
+  return setting.models.empty() ? Model::cells : setting.models[part];
+}
+
+// The parts that `entry`, with `part` and `origin`, is for. Throws InputError: the body has none of that
+// name.
+template <class Entry>
+[[nodiscard]] std::vector<std::size_t> parts_of(const Entry& entry, const Setting& setting) {
+  std::vector<std::size_t> parts;
+  std::vector<std::string> names;
+  for (std::size_t p = 0; p < setting.body.parts.size(); ++p) {
+    names.push_back(setting.body.parts[p].name);
+    if (!entry.part || *entry.part == names[p]) parts.push_back(p);
+  }
+  if (parts.empty())
+    throw InputError(entry.origin, fmt::format("the body has no part \"{}\"{}", *entry.part,
+                                               did_you_mean(*entry.part, names)));
+  return parts;
+}
+
+}  // namespace flexel

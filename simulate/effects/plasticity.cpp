@@ -1,0 +1,63 @@
+// [plasticity] of a scene.
+#include "simulate/effects/plasticity.h"
+
+#include <fmt/format.h>
+
+#include "formats/error.h"
+#include "simulate/effects/part_entries.h"
+
+namespace flexel {
+
+void Plasticity::parse(TableReader& scene, Parameters& parameters) {
+  for (const SceneValue* table : scene.tables("plasticity")) {
+    TableReader reader(*table, scene.file(), "[plasticity]");
+    Entry entry;
+    entry.origin = reader.place();
+    entry.yield = reader.quantity("yield", Dimension::pressure);
+    entry.hardening = reader.quantity("hardening", Dimension::pressure);
+    entry.part = reader.text("part");
+    reader.finish();
+    if (entry.yield && !(*entry.yield > 0)) reader.fail("\"yield\" needs to be above 0");
+    if (entry.hardening && !(*entry.hardening >= 0)) reader.fail("\"hardening\" needs to be 0 or more");
+    parameters.entries.push_back(entry);
+  }
+}
+
+std::optional<Plasticity> Plasticity::make(const Parameters& parameters, const Setting& setting) {
+  if (parameters.entries.empty()) return std::nullopt;
+  Plasticity made;
+  made.flow_.resize(setting.body.parts.size());
+  for (const Entry& entry : parameters.entries)
+    for (const std::size_t p : parts_of(entry, setting)) {
+      const Material& material = setting.materials[p];
+      const double yield = entry.yield.value_or(material.yield);
+      const bool can_flow = model_of(setting, p) == Model::cells;
+      if (entry.part && !can_flow)
+        throw InputError(
+            entry.origin,
+            fmt::format("part \"{}\" cannot flow: plasticity needs model \"cells\"", *entry.part));
+      if (entry.part && !(yield > 0))
+        throw InputError(entry.origin, fmt::format("part \"{}\": {} has no yield stress: write yield = \"250 "
+                                                   "MPa\" here or in [materials.NAME]",
+                                                   *entry.part, material.name));
+      if (can_flow && yield > 0) made.flow_[p] = {yield, entry.hardening.value_or(material.hardening)};
+    }
+  for (const PlasticFlow& flow : made.flow_)
+    if (std::isfinite(flow.yield)) return made;
+  throw InputError(
+      parameters.entries[0].origin,
+      "no part can flow: write yield = \"250 MPa\" here or in [materials.NAME], of a part with model "
+      "\"cells\"");
+}
+
+std::string Plasticity::why() const {
+  std::size_t parts = 0;
+  for (const PlasticFlow& flow : flow_) parts += std::isfinite(flow.yield);
+  return fmt::format("[plasticity], {} part(s) with a yield stress", parts);
+}
+
+void Plasticity::compose(StepPlan& plan) const {
+  plan.plasticity = flow_;
+}
+
+}  // namespace flexel

@@ -1,0 +1,33 @@
+// Plasticity: parts whose material has a yield stress keep part of their deformation. J2 flow with isotropic,
+// linear hardening (Simo and Hughes 1998, box 9.1), cell by cell. Lives in the kernel
+// (simulate/time/kernel_plastic.h); docs/fracture-plasticity.md.
+#pragma once
+#include "simulate/effects/effect.h"
+
+namespace flexel {
+
+class Plasticity {
+ public:
+  struct Entry {
+    std::optional<double> yield, hardening;  // Pa; nothing: the material's
+    std::optional<std::string> part;         // nothing: every part
+    std::string origin;
+  };
+  struct Parameters {
+    std::vector<Entry> entries;  // a later one goes before an earlier one
+  };
+  static constexpr const char* name = "plasticity";
+  static constexpr bool needs_time = true;
+
+  static void parse(TableReader& scene, Parameters& parameters);
+  // Throws InputError: an unknown part, a part that is named but has no yield stress or whose model cannot
+  // flow, no part that can.
+  [[nodiscard]] static std::optional<Plasticity> make(const Parameters& parameters, const Setting& setting);
+  [[nodiscard]] std::string why() const;
+  void compose(StepPlan& plan) const;
+
+ private:
+  std::vector<PlasticFlow> flow_;  // (parts)
+};
+
+}  // namespace flexel

@@ -1,0 +1,54 @@
+// What both models' loops share: the columns of a chunk's elements, and reading and adding at the corners of
+// a block. Included by kernel.cpp alone.
+#pragma once
+#include "simulate/time/kernel.h"
+#include "simulate/time/lanes.h"
+
+namespace flexel::step {
+namespace {
+
+struct Scratch {
+  double* column[kScratchColumns];
+};
+
+struct Corners {
+  Lanes at[8][3];
+};
+
+enum Column { kDisplacement = 0, kVelocity = 3, kForce = 6, kDampingForce = 9 };
+
+FLEXEL_INLINE void read_corners(const CellBlock& block, double* const* column, Corners& corners) {
+  if (block.is_run) {
+    for (int a = 0; a < 8; ++a)
+      for (int c = 0; c < 3; ++c) corners.at[a][c] = load(column[c] + block.corner[a][0]);
+  } else {
+    for (int a = 0; a < 8; ++a)
+      for (int c = 0; c < 3; ++c) corners.at[a][c] = gather(column[c], block.corner[a]);
+  }
+}
+
+FLEXEL_INLINE void add_to_corners(const CellBlock& block, const Corners& corners, double* const* column) {
+  if (block.is_run) {
+    // Corner a + 1 of a cell is corner a of the next one: both are added in one go.
+    constexpr LaneBits one_on = {0, 8, 9, 10, 11, 12, 13, 14};
+    for (int a = 0; a < 8; a += 2)
+      for (int c = 0; c < 3; ++c) {
+        double* row = column[c] + block.corner[a][0];
+        const Lanes& next = corners.at[a + 1][c];
+        store(row, load(row) + (corners.at[a][c] + __builtin_shuffle(Lanes{}, next, one_on)));
+        row[8] += next[7];
+      }
+  } else {
+    for (int a = 0; a < 8; ++a)
+      for (int c = 0; c < 3; ++c) scatter_add(column[c], block.corner[a], corners.at[a][c]);
+  }
+}
+// What the cells add up to while a chunk is computed.
+struct Sums {
+  Lanes smallest_jacobian = Lanes{} + __builtin_huge_val();
+  Lanes elastic = {}, plastic_work = {}, released = {};  // J
+  std::uint64_t broken = 0;
+};
+
+}  // namespace
+}  // namespace flexel::step

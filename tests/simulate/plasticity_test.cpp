@@ -1,0 +1,309 @@
+// Plastic flow of model `cells`: against closed forms, its energies, its symmetries.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cstring>
+
+#include "formats/error.h"
+#include "formats/parallel.h"
+#include "simulate/scene.h"
+#include "tests/simulate/stepped.h"
+
+namespace flexel {
+namespace {
+
+using testing::at_rest;
+using testing::box_body;
+using testing::BoxOptions;
+using testing::forces_of;
+using ::testing::HasSubstr;
+using testing::random_displacements;
+using testing::setting_of;
+
+const Material kMetal{"metal", 1e9, 0.3, 1000, "test"};
+constexpr double kYield = 2e6;
+
+StepPlan plan_with(double hardening, double damping = 0) {
+  return {{damping}, {{kYield, hardening}}, {}};
+}
+
+Body box(std::array<int, 3> cells, double h = 1e-3) {
+  BoxOptions options;
+  options.cells = cells;
+  options.spacing = Vec3::Constant(h);
+  return box_body(options);
+}
+
+// Pulled beyond yield and let go within a scene, slowly, over tens of its periods.
+const char* const kBar = R"(
+material = "metal"
+[materials.metal]
+young = "1 GPa"
+poisson = 0.3
+density = "1000 kg/m3"
+yield = "2 MPa"
+hardening = "50 MPa"
+[plasticity]
+[damping]
+time = "2 us"
+[[fix]]
+where = "xmin"
+axes = "x"
+[[fix]]
+where = "ymin"
+axes = "y"
+[[fix]]
+where = "zmin"
+axes = "z"
+[[load]]
+where = "xmax"
+force = ["10 N", "0 N", "0 N"]
+time = ["0 s", "1.4 ms", "1.8 ms", "2.6 ms"]
+factor = [0, 1, 1, 0]
+[[probe]]
+name = "end"
+where = "xmax"
+[run]
+time = "3 ms"
+)";
+
+TEST(Plasticity, BarKeepsItsSet) {
+  for (const int n : {1, 2, 3}) {
+    Body body = box({3 * n, n, n}, 2e-3 / n);
+    const Scene scene = parse_scene(kBar, "bar.toml");
+    SimulateOptions options;
+    options.history = ::testing::TempDir() + "plastic_bar.csv";
+    Progress progress("test", Progress::Mode::quiet);
+    const SimulateResult result = simulate(body, scene, options, progress);
+    // Logarithmic strains, Kirchhoff stress t = P exp(e): t = yield + H ep, e = ep + t / E.
+    const double nominal = 10 / 4e-6;
+    double plastic = 0;
+    for (int i = 0; i < 100; ++i) {
+      const double t = kYield + 50e6 * plastic;
+      plastic = (nominal * std::exp(plastic + t / 1e9) - kYield) / 50e6;
+    }
+    const double set = 6e-3 * std::expm1(plastic);
+    EXPECT_NEAR(result.probes[0].displacement.x(), set, 0.02 * set) << n;
+    const auto& books = result.timed->books;
+    EXPECT_LT(books[5].second, 1e-3 * books[6].second) << n;
+    for (const double strain : body.cell_columns.at("plastic_strain").values)
+      EXPECT_NEAR(strain, plastic, 0.02 * plastic);
+  }
+}
+
+// Cross-sections of a beam of n cells are turned, and turned back until no moment is left.
+double residual_curvature(int n, double curvature) {
+  const double h = 1e-3;
+  const Body body = box({2, n, 1}, h);
+  const Setting setting = setting_of(body, kMetal);
+  const StepPlan plan = plan_with(0, 1e-6);
+  Stepper stepper(setting, plan, false);
+  const double dt = 0.8 * stable_step(setting, plan.damping);
+  State state = at_rest(body);
+  const auto turn = [&](double k, double* moment) {
+    const std::vector<Vec3> before = state.velocity;
+    stepper.advance(state, {}, {dt, dt, false});
+    if (moment) *moment = 0;
+    for (std::size_t e = 0; e < body.element_count(); ++e) {
+      const double y = body.rest[e].y() - 0.5 * n * h;
+      const double side = body.rest[e].x() / h - 1;
+      if (side == 0) continue;
+      if (moment && side > 0)
+        *moment += stepper.mass()[e] * (state.velocity[e].x() - before[e].x()) / dt * -y;
+      state.displacement[e].x() = side * h * k * y;
+      state.velocity[e].x() = 0;
+    }
+  };
+  const int steps = 20000;
+  double loaded = 0, unloaded = 0;
+  for (int i = 1; i <= steps; ++i) turn(curvature * i / steps, nullptr);
+  for (int i = 0; i < 2000; ++i) turn(curvature, &loaded);
+  const double back = 0.5 * curvature;
+  for (int i = 1; i <= steps; ++i) turn(curvature + (back - curvature) * i / steps, nullptr);
+  for (int i = 0; i < 2000; ++i) turn(back, &unloaded);
+  return back - unloaded * (curvature - back) / (loaded - unloaded);
+}
+
+TEST(Plasticity, BeamKeepsItsCurvature) {
+  for (const int n : {12, 16}) {
+    const double yields = kYield / kMetal.young / (0.5e-3 * n);  // curvature at which the surface yields
+    for (const double times : {2.0, 4.0}) {
+      const double moment = 1.5 * (1 - 1 / (3 * times * times));  // of that at first yield (Prager and Hodge)
+      const double exact = (times - moment) * yields;
+      EXPECT_NEAR(residual_curvature(n, times * yields), exact, 0.02 * exact) << n << " " << times;
+    }
+  }
+}
+
+// A deformed, yielded body: random, then drawn back a little, so that it is elastic around there.
+State yielded(Stepper& stepper, const Body& body, double size) {
+  State state = at_rest(body);
+  const std::vector<Vec3> u = random_displacements(body, size, 3);
+  for (const double share : {0.4, 0.8, 1.0}) {
+    for (std::size_t e = 0; e < u.size(); ++e) state.displacement[e] = share * u[e];
+    (void)forces_of(stepper, state);
+  }
+  for (Vec3& value : state.displacement) value *= 0.9995;
+  return state;
+}
+
+TEST(Plasticity, ForcesAreTheDerivativeOfTheElasticEnergy) {
+  BoxOptions options;
+  options.cells = {3, 2, 2};
+  options.spacing = Vec3(1e-3, 1.1e-3, 0.9e-3);
+  options.axes = Eigen::AngleAxisd(0.5, Vec3(1, 2, 3).normalized()).toRotationMatrix();
+  const Body body = box_body(options);
+  const Setting setting = setting_of(body, kMetal);
+  Stepper stepper(setting, plan_with(1e8), false);
+  State state = yielded(stepper, body, 1e-4);
+  const std::vector<Vec3> force = forces_of(stepper, state);
+  const Stepper::Memory before = stepper.memory();
+  for (const double strain : stepper.plastic_strain(body.cell_count())) EXPECT_GT(strain, 0.01);
+  const double step = 1e-11;
+  double scale = 0;
+  for (const Vec3& f : force) scale = std::max(scale, f.norm());
+  for (std::size_t e = 0; e < body.element_count(); e += 5)
+    for (int axis = 0; axis < 3; ++axis) {
+      State moved = state;
+      moved.displacement[e][axis] += step;
+      const double up = *stepper.elastic_energy(moved);
+      moved.displacement[e][axis] -= 2 * step;
+      const double down = *stepper.elastic_energy(moved);
+      EXPECT_NEAR(force[e][axis], -(up - down) / (2 * step), 1e-4 * scale);
+    }
+  const Stepper::Memory after = stepper.memory();
+  EXPECT_EQ(0, std::memcmp(before.plastic.data(), after.plastic.data(),
+                           before.plastic.size() * sizeof(step::PlasticBlock)));
+}
+
+TEST(Plasticity, FlowDoesNotSeeARotation) {
+  const Body body = box({3, 2, 2});
+  const Setting setting = setting_of(body, kMetal);
+  const Mat3 turn = Eigen::AngleAxisd(1.1, Vec3(1, -2, 0.5).normalized()).toRotationMatrix();
+  Stepper one(setting, plan_with(1e8), false), two(setting, plan_with(1e8), false);
+  const std::vector<Vec3> u = random_displacements(body, 1e-4, 5), w = random_displacements(body, 1e-4, 6);
+  for (const double share : {0.3, 0.7, 1.0}) {
+    State a = at_rest(body), b = at_rest(body);
+    for (std::size_t e = 0; e < u.size(); ++e) {
+      a.displacement[e] = share * u[e] + share * share * w[e];
+      // turned further at every stage
+      const Mat3 now =
+          share < 1 ? Mat3(Eigen::AngleAxisd(3 * share, Vec3::UnitY()).toRotationMatrix()) : turn;
+      b.displacement[e] = now * (body.rest[e] + a.displacement[e]) - body.rest[e];
+    }
+    const std::vector<Vec3> force = forces_of(one, a), turned = forces_of(two, b);
+    double scale = 0;
+    for (const Vec3& f : force) scale = std::max(scale, f.norm());
+    if (share < 1) continue;
+    for (std::size_t e = 0; e < u.size(); ++e) EXPECT_LT((turn * force[e] - turned[e]).norm(), 1e-9 * scale);
+  }
+  const std::vector<double> alpha = one.plastic_strain(body.cell_count()),
+                            beta = two.plastic_strain(body.cell_count());
+  for (std::size_t c = 0; c < alpha.size(); ++c) {
+    EXPECT_GT(alpha[c], 0.01);
+    EXPECT_NEAR(alpha[c], beta[c], 1e-10);
+  }
+}
+
+struct Momenta {
+  Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
+};
+
+Momenta momenta(const Body& body, const Stepper& stepper, const State& state) {
+  Momenta sum;
+  for (std::size_t e = 0; e < body.element_count(); ++e) {
+    const Vec3 p = stepper.mass()[e] * state.velocity[e];
+    sum.linear += p;
+    sum.angular += (body.rest[e] + state.displacement[e]).cross(p);
+  }
+  return sum;
+}
+
+TEST(Plasticity, KeepsMomentum) {
+  const Body body = box({4, 3, 3});
+  const Setting setting = setting_of(body, kMetal);
+  const StepPlan plan = plan_with(0, 1e-7);
+  Stepper stepper(setting, plan, false);
+  const double dt = 0.5 * stable_step(setting, plan.damping);
+  State state = at_rest(body);
+  state.velocity = random_displacements(body, 20, 9);
+  const Momenta before = momenta(body, stepper, state);
+  for (int i = 0; i < 500; ++i) ASSERT_GT(stepper.advance(state, {}, {dt, dt, false}).smallest_jacobian, 0);
+  const Momenta after = momenta(body, stepper, state);
+  double most = 0, scale = 0;
+  for (const double strain : stepper.plastic_strain(body.cell_count())) most = std::max(most, strain);
+  EXPECT_GT(most, 0.01);
+  for (std::size_t e = 0; e < body.element_count(); ++e) scale += stepper.mass()[e] * 20;
+  EXPECT_LT((after.linear - before.linear).norm(), 1e-12 * scale);
+  EXPECT_LT((after.angular - before.angular).norm(), 1e-12 * scale * 4e-3);
+}
+
+std::vector<Vec3> after_steps(const Body& body, const std::string& isa, int threads) {
+  const ThreadLimit limit(threads);
+  const Setting setting = setting_of(body, kMetal);
+  const StepPlan plan = plan_with(1e7, 1e-7);
+  Stepper stepper(setting, plan, true, isa);
+  const double dt = 0.5 * stable_step(setting, plan.damping);
+  State state = at_rest(body);
+  state.velocity = random_displacements(body, 10, 2);
+  for (int i = 0; i < 60; ++i) stepper.advance(state, {}, {dt, dt, false});
+  for (const double strain : stepper.plastic_strain(body.cell_count()))
+    state.displacement.push_back(Vec3::Constant(strain));
+  return state.displacement;
+}
+
+TEST(Plasticity, BitsDoNotDependOnThreadsOrInstructions) {
+  const Body body = box({20, 13, 12});
+  const std::vector<Vec3> one = after_steps(body, "portable", 1);
+  EXPECT_GT(one.back().x(), 0);
+  EXPECT_EQ(one, after_steps(body, "portable", 3));
+  const std::string best = kernel_table("").isa;
+  EXPECT_EQ(one, after_steps(body, best, 2));
+  if (best == "avx512") {
+    EXPECT_EQ(one, after_steps(body, "avx2", 1));
+  }
+}
+
+// Below its yield stress a body moves as without plasticity but for rounding.
+TEST(Plasticity, BelowYieldThereIsNone) {
+  const Body body = box({6, 3, 3});
+  const Setting setting = setting_of(body, kMetal);
+  Stepper bare(setting, {{0}}, false), plastic(setting, {{0}, {{1e8, 0}}, {}}, false);
+  const double dt = 0.5 * stable_step(setting, {0});
+  State a = at_rest(body);
+  a.velocity = random_displacements(body, 1, 4);
+  State b = a;
+  double size = 0;
+  for (int i = 0; i < 300; ++i) {
+    bare.advance(a, {}, {dt, dt, false});
+    plastic.advance(b, {}, {dt, dt, false});
+  }
+  for (const Vec3& u : a.displacement) size = std::max(size, u.norm());
+  for (std::size_t e = 0; e < a.displacement.size(); ++e)
+    EXPECT_LT((a.displacement[e] - b.displacement[e]).norm(), 1e-9 * size);
+  for (const double strain : plastic.plastic_strain(body.cell_count())) EXPECT_EQ(strain, 0);
+}
+
+std::string refusal(const std::string& text) {
+  Body body = box({2, 1, 1});
+  Progress progress("test", Progress::Mode::quiet);
+  try {
+    (void)simulate(body, parse_scene(text, "s.toml"), {}, progress);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(Plasticity, RefusesWhatCannotFlow) {
+  const std::string begin = "material = \"steel\"\n[run]\ntime = \"1 us\"\n[plasticity]\n";
+  EXPECT_THAT(refusal(begin), HasSubstr("no part can flow: write yield"));
+  EXPECT_THAT(refusal(begin + "yield = \"1\"\n"), HasSubstr("has no unit"));
+  EXPECT_THAT(refusal(begin + "yield = \"-1 Pa\"\n"), HasSubstr("above 0"));
+  EXPECT_THAT(refusal(begin + "yield = \"1 MPa\"\npart = \"bax\"\n"), HasSubstr("no part \"bax\""));
+  EXPECT_THAT(refusal("material = \"steel\"\n[plasticity]\nyield = \"1 MPa\"\n"), HasSubstr("time"));
+}
+
+}  // namespace
+}  // namespace flexel
