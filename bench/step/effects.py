@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Prints what each effect adds to a step, an element: instructions (callgrind: exact), nanoseconds (processor time of one thread,
-medians of five) and heap (bytes allocated in the run, by valgrind), over a scene that names none; then the hot loop's variants and what they cost to
-build. Writes it into docs/effects.md.
+medians of five) and bytes of memory (the process's peak), over a scene that names none; then the hot loop's variants and what they
+cost to build. Writes it into docs/effects.md.
 
     PATH=build/release/bin:$PATH bench/step/effects.py
 """
@@ -44,20 +44,23 @@ def nanoseconds(elements, model):
     return {row: statistics.median(values) for row, values in taken.items()}
 
 
-def heap(effect, options):
-    """Bytes that a run of ten steps allocates, whether or not it gives them back."""
-    done = subprocess.run(["valgrind", "--leak-check=no", *simulate_command(10, effect, "cells", options)], check=True, timeout=300,
-                          stderr=subprocess.PIPE)
-    return int(re.search(r"total heap usage: .* ([\d,]+) bytes allocated", done.stderr.decode()).group(1).replace(",", ""))
+def peak_memory(effect, options):
+    """Bytes of the process at most, all of it: reading the body, the run, writing."""
+    process = subprocess.Popen(simulate_command(10, effect, "cells", options))
+    _, status, usage = os.wait4(process.pid, 0)
+    if status != 0:
+        sys.exit("effects.py: a run failed")
+    return 1024 * usage.ru_maxrss
 
 
 def costs():
     elements = make_block(COUNTED_CELLS)
     instructions = {row: sum(of_a_step(lambda steps, e=effect, o=options: simulate_command(steps, e, "cells", o)).values()) / elements
                     for row, (effect, options) in ROWS.items()}
-    memory = {row: heap(*scene) / elements for row, scene in ROWS.items()}
-    taken = nanoseconds(make_block(TIMED_CELLS), "cells")
-    lines = ["| the scene names | instructions | ns | heap, bytes |", "|---|---|---|---|",
+    elements = make_block(TIMED_CELLS)
+    memory = {row: peak_memory(*scene) / elements for row, scene in ROWS.items()}
+    taken = nanoseconds(elements, "cells")
+    lines = ["| the scene names | instructions | ns | memory, bytes |", "|---|---|---|---|",
              f"| nothing | {instructions['nothing']:.0f} | {taken['nothing']:.1f} | {memory['nothing']:.0f} |"]
     for row in list(ROWS)[1:]:
         lines.append(f"| {row} | {instructions[row] - instructions['nothing']:+.1f} | {taken[row] - taken['nothing']:+.1f} |"
