@@ -22,7 +22,7 @@ int main(int argc, char** argv) {
                         std::vector<Model>(body.parts.size(), Model::cells),
                         {},
                         {}};
-  Stepper stepper(setting, std::vector<double>(body.parts.size(), 0), false);
+  Stepper stepper(setting, {std::vector<double>(body.parts.size(), 0)}, false);
   State state;
   state.displacement.assign(body.element_count(), Vec3::Zero());
   state.velocity.assign(body.element_count(), Vec3::Zero());

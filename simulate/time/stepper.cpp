@@ -13,25 +13,23 @@
 namespace flexel {
 namespace {
 
-bool machine_has(const char* isa) {
 #if defined(__x86_64__)
-  const std::string name = isa;
-  if (name == "avx512")
-    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-           __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw");
-  if (name == "avx2") return __builtin_cpu_supports("avx2");
-  return name == "portable";
-#else
-  return std::string(isa) == "portable";
-#endif
+bool has_avx512() {
+  return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+         __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw");
 }
-
-std::vector<const step::KernelTable*> tables() {  // the best one first
-#if defined(__x86_64__)
-  return {&step::kernels_avx512(), &step::kernels_avx2(), &step::kernels_portable()};
-#else
-  return {&step::kernels_portable()};
 #endif
+
+// Those that this machine runs, the best one first. The others are not so much as asked for: what fills in a
+// table is compiled for its instruction set too.
+std::vector<const step::KernelTable*> tables() {
+  std::vector<const step::KernelTable*> found;
+#if defined(__x86_64__)
+  if (has_avx512()) found.push_back(&step::kernels_avx512());
+  if (__builtin_cpu_supports("avx2")) found.push_back(&step::kernels_avx2());
+#endif
+  found.push_back(&step::kernels_portable());
+  return found;
 }
 
 struct Lowest {
@@ -75,7 +73,6 @@ void add_slots(const std::vector<double>& values, std::span<const std::uint32_t>
 const step::KernelTable& kernel_table(const std::string& isa) {
   std::string have;
   for (const step::KernelTable* table : tables()) {
-    if (!machine_has(table->isa)) continue;
     if (isa.empty() || isa == table->isa) return *table;
     have += have.empty() ? table->isa : fmt::format(", {}", table->isa);
   }

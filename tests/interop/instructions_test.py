@@ -40,7 +40,7 @@ def bare():
 def of_effects(counted):
     """What was counted in effects, in the damped variants of the hot loop, or in what serves effects."""
     names = "|".join([*effects(), "Held", "History"])
-    return {f: n for f, n in counted.items() if re.search(rf"flexel::({names})::|make_pass|Damping\)[12]", f)}
+    return {f: n for f, n in counted.items() if re.search(rf"flexel::({names})::|make_pass|Damping\)[12]|Composition\{{[^}}]", f)}
 
 
 def test_a_bare_step_runs_nothing_of_any_effect():
