@@ -34,10 +34,12 @@ std::optional<Fracture> Fracture::make(const Parameters& parameters, const Setti
       const Material& material = setting.materials[p];
       const double strength = entry.strength.value_or(material.strength);
       const double elongation = entry.elongation.value_or(material.elongation);
-      const bool can_break = model_of(setting, p) == Model::cells;
+      const bool can_break = model_of(setting, p) != Model::paper;
       if (entry.part && !can_break)
-        throw InputError(entry.origin, fmt::format("part \"{}\" cannot break: fracture needs model \"cells\"",
-                                                   *entry.part));
+        throw InputError(
+            entry.origin,
+            fmt::format("part \"{}\" cannot break: fracture is for models \"cells\" and \"springs\"",
+                        *entry.part));
       if (entry.part && !(strength > 0) && !(elongation > 0))
         throw InputError(entry.origin,
                          fmt::format("part \"{}\": {} has neither strength nor elongation: write strength = "
@@ -45,6 +47,12 @@ std::optional<Fracture> Fracture::make(const Parameters& parameters, const Setti
                                      *entry.part, material.name));
       if (!can_break) continue;
       made.limits_[p] = {};
+      made.needs_flow_[p] = false;
+      if (model_of(setting, p) == Model::springs) {  // t = l (1 + elongation)
+        if (strength > 0) made.limits_[p].elongation = strength / material.young;
+        if (elongation > 0) made.limits_[p].elongation = elongation;
+        continue;
+      }
       if (strength > 0) made.limits_[p].strength = strength;
       if (elongation > 0) made.limits_[p].elongation = elongation;
       made.needs_flow_[p] = elongation > 0 && !(strength > 0);
@@ -53,8 +61,7 @@ std::optional<Fracture> Fracture::make(const Parameters& parameters, const Setti
     if (limits.any()) return made;
   throw InputError(
       made.origin_,
-      "no part can break: write strength = \"40 MPa\" here or in [materials.NAME], of a part with "
-      "model \"cells\"");
+      "no part can break: write strength = \"40 MPa\" here or in [materials.NAME] (model \"paper\" cannot)");
 }
 
 std::string Fracture::why() const {

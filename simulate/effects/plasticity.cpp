@@ -31,11 +31,12 @@ std::optional<Plasticity> Plasticity::make(const Parameters& parameters, const S
     for (const std::size_t p : parts_of(entry, setting)) {
       const Material& material = setting.materials[p];
       const double yield = entry.yield.value_or(material.yield);
-      const bool can_flow = model_of(setting, p) == Model::cells;
+      const bool can_flow = model_of(setting, p) != Model::paper;
       if (entry.part && !can_flow)
         throw InputError(
             entry.origin,
-            fmt::format("part \"{}\" cannot flow: plasticity needs model \"cells\"", *entry.part));
+            fmt::format("part \"{}\" cannot flow: plasticity is for models \"cells\" and \"springs\"",
+                        *entry.part));
       if (entry.part && !(yield > 0))
         throw InputError(entry.origin, fmt::format("part \"{}\": {} has no yield stress: write yield = \"250 "
                                                    "MPa\" here or in [materials.NAME]",
@@ -46,8 +47,7 @@ std::optional<Plasticity> Plasticity::make(const Parameters& parameters, const S
     if (std::isfinite(flow.yield)) return made;
   throw InputError(
       parameters.entries[0].origin,
-      "no part can flow: write yield = \"250 MPa\" here or in [materials.NAME], of a part with model "
-      "\"cells\"");
+      "no part can flow: write yield = \"250 MPa\" here or in [materials.NAME] (model \"paper\" cannot)");
 }
 
 std::string Plasticity::why() const {

@@ -31,6 +31,7 @@ struct CellConstants {
   double damping;       // s; 0 in the variants without damping
   double yield, hardening;      // Pa, J2 yield stress and its isotropic, linear hardening
   double strength, elongation;  // Pa, plastic strain: what breaks a cell; infinity: nothing
+                                // (springs: yield, hardening, elongation are strains of a spring)
   double axes[9];               // column-major rotation from the lattice to the world frame
   bool aligned;                 // axes is the identity
 };
@@ -42,11 +43,24 @@ struct PlasticBlock {
   double hourglass[4][3][kLanes];  // m, plastic part of the hourglass displacements, drawn back by F
 };
 
+// What they remember of their springs, a bit or a row each, a < b in the order (0, 1), (0, 2), ... (6, 7);
+// model `springs`.
+constexpr std::uint64_t kAllSprings = (std::uint64_t{1} << 28) - 1;
+struct SpringBlock {
+  std::uint64_t broken[kLanes];
+};
+struct SpringFlow {
+  double flowed[28][kLanes];  // m, change of the rest length
+  double strain[28][kLanes];  // sum of its absolute changes, over the rest length
+};
+
 // A set of cells that one thread computes at a time, and the elements at their corners. Elements that no
 // other chunk touches are advanced with it; the forces on the others go to `shared_force`.
 struct ChunkView {
-  CellBlock* blocks;      // fracture sets the fill of cells that break to 0
-  PlasticBlock* plastic;  // (block_count); null in the variants without plasticity
+  CellBlock* blocks;        // fracture sets the fill of cells that break to 0
+  PlasticBlock* plastic;    // (block_count); null in the variants without plasticity
+  SpringBlock* springs;     // (block_count); null but with fracture of springs
+  SpringFlow* spring_flow;  // (block_count); null but with plasticity of springs
   std::size_t block_count;
   const std::uint32_t* elements;  // (count) numbers of the body, ascending
   std::size_t count;

@@ -98,49 +98,43 @@ void Stepper::make_room_for_books() {
 
 void Stepper::choose_kernels(const Setting& setting, const StepPlan& plan) {
   bool damped = false, plastic = false;
+  bool cells_flow = false, springs_flow = false, springs_break = false;
   for (const PlasticFlow& flow : plan.plasticity) plastic = plastic || std::isfinite(flow.yield);
   for (const FractureLimits& limits : plan.fracture) fractures_ = fractures_ || limits.any();
   for (std::size_t p = 0; p < plan.damping.size(); ++p) {
     step::CellConstants& c = layout_.constants[p];
     const PlasticFlow flow = plan.plasticity.empty() ? PlasticFlow{} : plan.plasticity[p];
     const FractureLimits limits = plan.fracture.empty() ? FractureLimits{} : plan.fracture[p];
-    c.yield = flow.yield;
-    c.hardening = flow.hardening;
+    const bool springs = setting.models.size() > p && setting.models[p] == Model::springs;
+    const double unit = springs ? setting.materials[p].young : 1;
+    c.yield = flow.yield / unit;
+    c.hardening = flow.hardening / unit;
     c.strength = limits.strength;
     c.elongation = limits.elongation;
     step::Composition has{plan.damping[p] > 0 ? step::Damping::plain : step::Damping::none,
                           std::isfinite(flow.yield), limits.any()};
     damped = damped || plan.damping[p] > 0;
-    const bool springs = setting.models.size() > p && setting.models[p] == Model::springs;
+    (springs ? springs_flow : cells_flow) |= has.plasticity;
     const step::ChunkKernel* kernels = springs ? table_->springs : table_->cells;
     // Only kernels with fracture or plasticity tell the elastic energy: where one part needs it, all do.
     step::Composition booking = has;
     booking.damping = step::Damping::book;
     booking.fracture = has.fracture || plastic || fractures_;
+    springs_break = springs_break || (springs && booking.fracture);
     if (book_ && (booking.fracture || plan.damping[p] > 0)) has = booking;
     kernel_.push_back(kernels[step::variant_number(has)]);
     booking_.push_back(kernels[step::variant_number(booking)]);
   }
   book_ = book_ && (damped || plastic || fractures_);
-  if (plastic) plastic_.assign(layout_.blocks.size(), step::PlasticBlock{});
-}
-
-Stepper::Memory Stepper::memory() const {
-  Memory memory;
-  memory.plastic = plastic_;
-  if (fractures_)
-    for (const step::CellBlock& block : layout_.blocks) memory.fill.push_back(std::to_array(block.fill));
-  return memory;
-}
-
-void Stepper::restore(const Memory& memory) {
-  plastic_ = memory.plastic;
-  for (std::size_t b = 0; b < memory.fill.size(); ++b)
-    std::copy(memory.fill[b].begin(), memory.fill[b].end(), layout_.blocks[b].fill);
+  inelastic_ = plastic || fractures_;
+  const std::size_t blocks = layout_.blocks.size();
+  if (cells_flow) plastic_.assign(blocks, step::PlasticBlock{});
+  if (springs_flow) spring_flow_.assign(blocks, step::SpringFlow{});
+  if (springs_break) springs_.assign(blocks, step::SpringBlock{});
 }
 
 std::optional<double> Stepper::elastic_energy(const State& state) {
-  if (!fractures_ && plastic_.empty()) return std::nullopt;
+  if (!inelastic_) return std::nullopt;
   const Memory kept = memory();
   const std::vector<step::ChunkKernel> kernels = kernel_;
   const bool book = book_;
@@ -155,35 +149,12 @@ std::optional<double> Stepper::elastic_energy(const State& state) {
   return outcome.elastic;
 }
 
-bool Stepper::mark_broken(std::vector<std::uint8_t>& broken) const {
-  if (!fractures_) return false;
-  bool found = false;
-  for (std::size_t b = 0; b < layout_.blocks.size(); ++b)
-    for (std::size_t l = 0; l < step::kLanes; ++l) {
-      const std::uint32_t cell = layout_.block_cells[b][l];
-      if (cell == StepLayout::kNoCell || layout_.blocks[b].fill[l] > 0) continue;
-      broken[cell] = 1;
-      found = true;
-    }
-  return found;
-}
-
-std::vector<double> Stepper::plastic_strain(std::size_t cells) const {
-  std::vector<double> strain;
-  if (plastic_.empty()) return strain;
-  strain.assign(cells, 0);
-  for (std::size_t b = 0; b < layout_.blocks.size(); ++b)
-    for (std::size_t l = 0; l < step::kLanes; ++l)
-      if (const std::uint32_t cell = layout_.block_cells[b][l]; cell != StepLayout::kNoCell)
-        strain[cell] = plastic_[b].strain[l];
-  return strain;
-}
-
 std::size_t Stepper::bytes() const {
   return layout_.bytes() +
          sizeof(double) * (mass_.capacity() + inverse_mass_.capacity() + shared_force_.capacity() +
                            shared_damping_.capacity()) +
-         plastic_.capacity() * sizeof(step::PlasticBlock);
+         plastic_.capacity() * sizeof(step::PlasticBlock) +
+         spring_flow_.capacity() * sizeof(step::SpringFlow) + springs_.capacity() * sizeof(step::SpringBlock);
 }
 
 StepOutcome Stepper::advance(State& state, const std::vector<Vec3>& outer, const step::Advance& advance) {
@@ -197,18 +168,21 @@ StepOutcome Stepper::advance(State& state, const std::vector<Vec3>& outer, const
         thread_local std::vector<double> scratch;
         if (scratch.size() < doubles) scratch.resize(doubles);
         const StepLayout::Chunk& chunk = layout_.chunks[i];
-        const step::ChunkView chunk_view{layout_.blocks.data() + chunk.block_begin,
-                                         plastic_.empty() ? nullptr : plastic_.data() + chunk.block_begin,
-                                         chunk.block_end - chunk.block_begin,
-                                         layout_.elements.data() + chunk.element_begin,
-                                         chunk.element_end - chunk.element_begin,
-                                         layout_.owned.data() + chunk.owned_begin,
-                                         layout_.shared.data() + chunk.shared_begin,
-                                         chunk.owned_end - chunk.owned_begin,
-                                         chunk.shared_end - chunk.shared_begin,
-                                         shared_force_.data() + 3 * chunk.shared_begin,
-                                         book_ ? shared_damping_.data() + 3 * chunk.shared_begin : nullptr,
-                                         &layout_.constants[chunk.part]};
+        const step::ChunkView chunk_view{
+            layout_.blocks.data() + chunk.block_begin,
+            plastic_.empty() ? nullptr : plastic_.data() + chunk.block_begin,
+            springs_.empty() ? nullptr : springs_.data() + chunk.block_begin,
+            spring_flow_.empty() ? nullptr : spring_flow_.data() + chunk.block_begin,
+            chunk.block_end - chunk.block_begin,
+            layout_.elements.data() + chunk.element_begin,
+            chunk.element_end - chunk.element_begin,
+            layout_.owned.data() + chunk.owned_begin,
+            layout_.shared.data() + chunk.shared_begin,
+            chunk.owned_end - chunk.owned_begin,
+            chunk.shared_end - chunk.shared_begin,
+            shared_force_.data() + 3 * chunk.shared_begin,
+            book_ ? shared_damping_.data() + 3 * chunk.shared_begin : nullptr,
+            &layout_.constants[chunk.part]};
         const step::ChunkOutcome outcome = kernel_[chunk.part](chunk_view, view, advance, scratch.data());
         return Lowest{outcome.smallest_jacobian, chunk.part,       outcome.elastic,
                       outcome.plastic_work,      outcome.released, outcome.broken};
@@ -220,7 +194,7 @@ StepOutcome Stepper::advance(State& state, const std::vector<Vec3>& outer, const
   outcome.plastic_work = lowest.plastic_work;
   outcome.released = lowest.released;
   outcome.broken = lowest.broken;
-  if (book_ && (fractures_ || !plastic_.empty())) outcome.elastic = lowest.elastic;
+  if (book_ && inelastic_) outcome.elastic = lowest.elastic;
   advance_shared(view, advance);
   advance_lone(view, advance);
   return outcome;

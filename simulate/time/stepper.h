@@ -32,6 +32,8 @@ class Stepper {
   struct Memory {
     std::vector<std::array<double, step::kLanes>> fill;  // (blocks)
     std::vector<step::PlasticBlock> plastic;             // (blocks)
+    std::vector<step::SpringBlock> springs;              // (blocks)
+    std::vector<step::SpringFlow> spring_flow;           // (blocks)
   };
   [[nodiscard]] Memory memory() const;
   void restore(const Memory& memory);
@@ -40,7 +42,12 @@ class Stepper {
   [[nodiscard]] std::optional<double> elastic_energy(const State& state);
   // Sets broken[c] (cells) of those that broke. True: one did.
   bool mark_broken(std::vector<std::uint8_t>& broken) const;
-  // (cells) equivalent plastic strain; empty without plasticity.
+  // The memory as columns of the body's cells (docs/fracture-plasticity.md), and from there; whether there
+  // are such columns.
+  void write_memory(std::size_t cells, Columns& columns) const;
+  void read_memory(const Columns& columns);
+  [[nodiscard]] static bool remembers(const Columns& columns);
+  // (cells) equivalent plastic strain; empty without plasticity of cells.
   [[nodiscard]] std::vector<double> plastic_strain(std::size_t cells) const;
 
   [[nodiscard]] const std::vector<double>& mass() const { return mass_; }                  // (elements) kg
@@ -61,8 +68,10 @@ class Stepper {
   const step::KernelTable* table_;
   // (parts)
   std::vector<step::ChunkKernel> kernel_, booking_;
-  std::vector<step::PlasticBlock> plastic_;  // (blocks); empty without plasticity
-  bool fractures_ = false;
+  std::vector<step::PlasticBlock> plastic_;    // (blocks); empty without plasticity
+  std::vector<step::SpringBlock> springs_;     // (blocks); empty without fracture of springs
+  std::vector<step::SpringFlow> spring_flow_;  // (blocks); empty without plasticity of springs
+  bool fractures_ = false, inelastic_ = false;
   std::vector<double> mass_, inverse_mass_;
   std::vector<double> shared_force_, shared_damping_;  // (slots x 3) N
   std::vector<Vec3> damping_force_;

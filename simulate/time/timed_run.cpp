@@ -130,6 +130,9 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
   // Explicit damping may cut the step by 2; beyond that every step solves for it.
   const bool by_steps = scene.run.method == TimeMethod::explicit_euler || bound_->damps_explicitly();
   stepper_.emplace(setting_, plan_, !options.history.empty() || !by_steps, options.isa);
+  stepper_->read_memory(body.cell_columns);
+  if (Stepper::remembers(body.cell_columns) && plan_.plasticity.empty() && plan_.fracture.empty())
+    progress.warn("the body flowed or broke before: without [plasticity] or [fracture] it forgets that");
   held_.emplace(constraints_, body_, state_);
   if (!by_steps) implicit_.emplace(*stepper_, *held_);
   for (const Pass& pass : passes_) {
@@ -272,8 +275,7 @@ void TimedRun::store(const State& state) {
   }
   body_.element_columns["velocity"] = std::move(velocity);
   if (stepper_->mark_broken(body_.broken)) derive_connections(body_);
-  if (std::vector<double> strain = stepper_->plastic_strain(body_.cell_count()); !strain.empty())
-    body_.cell_columns["plastic_strain"] = {1, std::move(strain)};
+  stepper_->write_memory(body_.cell_count(), body_.cell_columns);
 }
 
 void TimedRun::write_frame() {

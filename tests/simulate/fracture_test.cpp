@@ -191,15 +191,32 @@ TEST(Fracture, BreaksByTheLargestPrincipalStress) {
   EXPECT_GT(broke, 100);
 }
 
+// Model springs: a bar parts where its springs along it have reached t = l (1 + strength / E).
+TEST(Fracture, SpringsPartAtTheirLength) {
+  for (const char* limit : {"strength = \"5 MPa\"", "elongation = 0.005"}) {
+    std::string text = kBar;
+    text.replace(text.find("strength = \"5 MPa\""), 18, limit);
+    text += "[parts.box]\nmodel = \"springs\"\n";
+    Body body = box({8, 2, 2});
+    const Broke broke = run(body, parse_scene(text, "bar.toml"));
+    const double stress = 22 * broke.time / 3.6e-3 / 4e-6;
+    EXPECT_NEAR(stress, kStrength, 0.01 * kStrength) << limit;
+    EXPECT_LT(broke.worst, 1e-3);
+    EXPECT_GT(std::accumulate(body.broken.begin(), body.broken.end(), 0), 0);
+  }
+}
+
 struct Outcome {
   std::vector<Vec3> displacement;
   std::vector<std::uint8_t> broken;
 };
 
-Outcome burst(const Body& body, double strength, const std::string& isa, int threads, bool book = true) {
+Outcome burst(const Body& body, double strength, const std::string& isa, int threads, bool book = true,
+              Model model = Model::cells) {
   const ThreadLimit limit(threads);
-  const Setting setting = setting_of(body, kGlass);
-  const StepPlan plan = plan_with(strength, 2e-7);
+  const Setting setting = setting_of(body, kGlass, model);
+  StepPlan plan = plan_with(strength, 2e-7);
+  if (model == Model::springs) plan.fracture[0] = {plan.fracture[0].elongation, strength / kGlass.young};
   Stepper stepper(setting, std::isfinite(strength) ? plan : StepPlan{plan.damping}, book, isa);
   const double dt = 0.5 * stable_step(setting, plan.damping);
   State state = at_rest(body);
@@ -227,8 +244,22 @@ TEST(Fracture, BitsDoNotDependOnThreadsInstructionsOrBooks) {
 // The kernel with fracture is the one without as long as nothing breaks, to the bit.
 TEST(Fracture, NothingChangesWhereNothingBreaks) {
   const Body body = box({7, 5, 6});
-  EXPECT_EQ(burst(body, 1e12, "", 2).displacement,
-            burst(body, std::numeric_limits<double>::infinity(), "", 2).displacement);
+  for (const Model model : {Model::cells, Model::springs})
+    EXPECT_EQ(burst(body, 1e12, "", 2, true, model).displacement,
+              burst(body, std::numeric_limits<double>::infinity(), "", 2, true, model).displacement);
+}
+
+TEST(Fracture, BitsOfSpringsDoNotDependOnThreadsInstructionsOrBooks) {
+  const Body body = box({20, 13, 12});
+  const Outcome one = burst(body, 2e6, "portable", 1, true, Model::springs);
+  const auto count = std::accumulate(one.broken.begin(), one.broken.end(), 0u);
+  EXPECT_GT(count, 10u);
+  EXPECT_LT(count, body.cell_count());
+  for (const Outcome& other :
+       {burst(body, 2e6, "", 3, true, Model::springs), burst(body, 2e6, "", 1, false, Model::springs)}) {
+    EXPECT_EQ(one.displacement, other.displacement);
+    EXPECT_EQ(one.broken, other.broken);
+  }
 }
 
 TEST(Fracture, DebrisKeepsMomentum) {

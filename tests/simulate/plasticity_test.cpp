@@ -92,6 +92,51 @@ TEST(Plasticity, BarKeepsItsSet) {
   }
 }
 
+// Model springs, held from narrowing: the springs along the bar flow alone. With their share k of the
+// stiffness 6/5 E (8/15 of E) a stress between yields leaves the strain k p / (6/5 E), p what they flowed.
+TEST(Plasticity, SpringsKeepTheirSet) {
+  Body body = box({4, 2, 2});
+  std::string text = kBar;
+  for (const char* side : {"ymax", "zmax"})
+    text += std::string("[[fix]]\nwhere = \"") + side + "\"\naxes = \"" + side[0] + "\"\n";
+  text += "[parts.box]\nmodel = \"springs\"\n";
+  text.replace(text.find("hardening = \"50 MPa\""), 20, "hardening = \"0 MPa\"");
+  Scene scene = parse_scene(text, "bar.toml");
+  scene.get<Loads>().loads[0].force = Vec3(4e-6 * 3e6, 0, 0);
+  SimulateOptions options;
+  options.history = ::testing::TempDir() + "plastic_springs.csv";
+  Progress progress("test", Progress::Mode::quiet);
+  const SimulateResult result = simulate(body, scene, options, progress);
+  const double yields = kYield / 1e9, axial = 8.0 / 15;
+  const double strain = (3e6 / 1e9 - axial * yields) / (1.2 - axial);
+  const double set = 4e-3 * axial * (strain - yields) / 1.2;
+  EXPECT_NEAR(result.probes[0].displacement.x(), set, 0.02 * set);
+  const auto& books = result.timed->books;
+  EXPECT_LT(books[5].second, 1e-3 * books[6].second);
+}
+
+// What cells remember travels in the body's columns.
+TEST(Plasticity, GoesOnFromWhatTheBodyRemembers) {
+  const Body body = box({5, 3, 3});
+  for (const Model model : {Model::cells, Model::springs}) {
+    const Setting setting = setting_of(body, kMetal, model);
+    StepPlan plan = plan_with(1e7);
+    plan.fracture = {{1e12, 0.3}};
+    Stepper one(setting, plan, false), two(setting, plan, false), fresh(setting, plan, false);
+    State state = at_rest(body);
+    state.displacement = random_displacements(body, 1e-4, 11);
+    (void)forces_of(one, state);
+    Columns columns;
+    one.write_memory(body.cell_count(), columns);
+    EXPECT_TRUE(Stepper::remembers(columns));
+    two.read_memory(columns);
+    for (Vec3& u : state.displacement) u *= 0.99;
+    const std::vector<Vec3> force = forces_of(one, state);
+    EXPECT_EQ(force, forces_of(two, state));
+    EXPECT_NE(force, forces_of(fresh, state));
+  }
+}
+
 // Cross-sections of a beam of n cells are turned, and turned back until no moment is left.
 double residual_curvature(int n, double curvature) {
   const double h = 1e-3;
