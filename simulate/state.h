@@ -15,6 +15,7 @@ struct State {
   // Timed runs only:
   std::vector<Vec3> velocity = {};  // (elements x 3) m/s, world frame; of the half step before `time`
   std::optional<double> time = {};  // s, since the run began
+  double kick = 0;                  // s, for which the forces at this time act on the velocities
 };
 
 // How a part resists: cells and springs at corner placement, paper at centre placement.

@@ -174,7 +174,8 @@ void Search::touch(std::uint32_t finer, std::uint32_t coarser) {
     found_.push_back(
         {{finer, coarser},
          {with_gradient(setting_, point.at, point.position), with_gradient(setting_, *at, point.position)},
-         point.area_vector.norm()});
+         point.area_vector.norm(),
+         own});
   }
 }
 

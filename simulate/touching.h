@@ -10,6 +10,7 @@ struct TouchingPoint {
   std::array<std::uint32_t, 2> part{};  // of the finer lattice first
   std::array<Carrier, 2> at;            // the same rest point, carried by the matter of each
   double area = 0;                      // m^2 that the point stands for
+  Vec3 normal = Vec3::Zero();           // at rest, out of part[0] into part[1]
 };
 
 // Points of the finer part's surface (surface_points()) that lie within 1e-6 of the body's diagonal, or 0.01

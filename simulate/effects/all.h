@@ -4,6 +4,7 @@
 
 #include "simulate/effects/bonds.h"
 #include "simulate/effects/damping.h"
+#include "simulate/effects/drag.h"
 #include "simulate/effects/fracture.h"
 #include "simulate/effects/gravity.h"
 #include "simulate/effects/initial_velocity.h"
@@ -32,6 +33,6 @@ struct EffectList {
   }
 };
 
-using Effects = EffectList<Gravity, Loads, Ties, Bonds, Damping, InitialVelocity, Plasticity, Fracture>;
+using Effects = EffectList<Gravity, Loads, Ties, Bonds, Damping, InitialVelocity, Plasticity, Fracture, Drag>;
 
 }  // namespace flexel

@@ -48,9 +48,9 @@ void Gravity::parse(TableReader& scene, Parameters& parameters) {
   const std::optional<double> constant = reader.quantity("constant", Dimension::gravitational_constant);
   parameters.constant = constant.value_or(kNewton);
   const bool attracts = parameters.mutual || !parameters.sources.empty();
-  if (!parameters.acceleration && !attracts)  // as a mistyped key, where it looks like one
-    (void)reader.require("acceleration", "[\"0 m/s2\", \"0 m/s2\", \"-9.81 m/s2\"]");
   reader.finish();
+  if (!parameters.acceleration && !attracts)
+    (void)reader.require("acceleration", "[\"0 m/s2\", \"0 m/s2\", \"-9.81 m/s2\"]");
   if (constant && !attracts)
     reader.fail("\"constant\" in [gravity] is that of \"source\" and \"mutual = true\"; give one of them");
   if (!(parameters.constant > 0)) reader.fail("\"constant\" in [gravity] needs to be above 0");

@@ -239,10 +239,11 @@ void TimedRun::step() {
   const bool row = history_ && *state_.time >= next_row_;
   if (row) next_row_ += scene_.run.history_every.value_or(duration_ / kRows);
   if (history_) history_->before(state_, row);
-  sum_forces();
   const bool first = steps_ == 0;
   const double before = first ? (scene_.run.method == TimeMethod::verlet ? 0 : step_) : previous_step_;
   const step::Advance advance{0.5 * (before + step_), step_, scene_.run.method == TimeMethod::explicit_euler};
+  state_.kick = advance.kick;
+  sum_forces();
   StepOutcome outcome;
   const double end = epoch_ + static_cast<double>(in_epoch_ + 1) * step_;
   {

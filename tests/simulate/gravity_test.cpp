@@ -266,6 +266,7 @@ TEST(GravityScene, RefusesWhatItCannotUse) {
     return "";
   };
   EXPECT_THAT(message("[gravity]\n"), HasSubstr("needs \"acceleration\""));
+  EXPECT_THAT(message("[gravity]\nsorce = 1\n"), HasSubstr("did you mean \"source\""));
   EXPECT_THAT(message("[gravity]\nmutual = 1\n"), HasSubstr("needs to be true or false"));
   EXPECT_THAT(message("[gravity]\nmutual = true\nconstant = \"1 m/s2\"\n"),
               HasSubstr("gravitational constant"));
