@@ -5,12 +5,15 @@
 
 #include "formats/parallel.h"
 #include "simulate/carrier.h"
+#include "simulate/effects/gravity_tree.h"
 #include "simulate/time/layout.h"
 
 namespace flexel {
 namespace {
 
-constexpr double kResolve = 60;  // steps of at most 2 / 60 rad of the fastest orbit
+constexpr std::size_t kMostByPairs = 2000;  // elements; more are summed up by a tree
+constexpr double kOpening = 0.4;            // of the tree
+constexpr double kResolve = 60;             // steps of at most 2 / 60 rad of the fastest orbit
 
 Gravity::Source parse_source(const SceneValue& value, const TableReader& parent) {
   TableReader reader(value, parent.file(), "source of [gravity]");
@@ -79,7 +82,9 @@ std::optional<Gravity> Gravity::make(const Parameters& parameters, const Setting
 std::string Gravity::why() const {
   std::string why = "[gravity]";
   if (!sources_.empty()) why += fmt::format(", {} source(s)", sources_.size());
-  if (mutual_) why += fmt::format(", {} elements on each other by pairs", massive_.size());
+  if (mutual_)
+    why += fmt::format(", {} elements on each other by {}", massive_.size(),
+                       massive_.size() > kMostByPairs ? "a tree" : "pairs");
   return why;
 }
 
@@ -94,7 +99,8 @@ PointMasses Gravity::points(const State& state) const {
 }
 
 Attraction Gravity::attraction(const State& state) const {
-  return attraction_by_pairs(points(state));
+  const PointMasses all = points(state);
+  return massive_.size() > kMostByPairs ? attraction_by_tree(all, kOpening) : attraction_by_pairs(all);
 }
 
 Pull Gravity::pull(const State& state, std::size_t element) const {

@@ -165,7 +165,8 @@ TEST(Drag, ALightBodyInADenseMediumIsSlowedNotThrownBack) {
   scene.get<Drag>() = {1e5, 1};
   const TimedCase made = run(body, scene);
   const std::vector<double>& momentum = made.history.column("momentum x");
-  const std::vector<double>&kinetic = made.history.column("kinetic"), &elastic = made.history.column("elastic");
+  const std::vector<double>&kinetic = made.history.column("kinetic"),
+        &elastic = made.history.column("elastic");
   for (std::size_t i = 1; i < momentum.size(); ++i) {
     ASSERT_LE(kinetic[i] + elastic[i], 1.001 * kinetic[0]);
     ASSERT_GE(momentum[i], -1e-3 * momentum[0]);

@@ -228,6 +228,29 @@ TEST(MutualGravity, BlocksMeetHalfwayWithoutMomentum) {
   expect_books_close(made.result);
 }
 
+// Over 2,000 elements: by the tree.
+TEST(MutualGravity, LargeBlocksFallByTheTree) {
+  testing::BoxOptions options;
+  options.cells = {30, 10, 10};
+  options.spacing = Vec3::Constant(0.1);
+  options.fill = [](int i, int, int) { return i < 10 || i >= 20 ? 1.0 : 0.0; };
+  Scene scene = scene_for(0.4, 0.004);
+  scene.get<Gravity>().mutual = true;
+  const TimedCase made = run(testing::box_body(options), scene);
+  ASSERT_GT(made.body.element_count(), 2000u);
+  EXPECT_THAT(made.result.passes[1].why, HasSubstr("by a tree"));
+  // 1 t each, centres 2 m apart: they draw each other with 1 N per kg or so
+  const std::vector<double>& kinetic = made.history.column("kinetic");
+  EXPECT_GT(kinetic.back(), 50);
+  for (const char* name : {"momentum x", "momentum y", "momentum z"})
+    EXPECT_LT(std::abs(made.history.column(name).back()), 1e-10 * std::sqrt(2 * 2000 * kinetic.back()));
+  expect_books_close(made.result);
+  for (const auto& [name, joules] : made.result.timed->books)
+    if (name == "worst_residual") {
+      EXPECT_LT(joules, 0.02 * kinetic.back());
+    }
+}
+
 TEST(MutualGravity, SameBitsForAnyNumberOfThreads) {
   Scene scene = scene_for(0.1, 0.02);
   scene.get<Gravity>().mutual = true;
