@@ -35,6 +35,22 @@ FLEXEL_INLINE SpringLanes spring_of(const Corners& u, int a, int b, const CellCo
   return s;
 }
 
+// The springs in order, for loops that are not unrolled: fracture and plasticity do much per spring, and
+// their kernels would take minutes to compile.
+struct SpringEnds {
+  int a[28], b[28];
+};
+constexpr SpringEnds kEnds = [] {
+  SpringEnds ends{};
+  int number = 0;
+  for (int a = 0; a < 8; ++a)
+    for (int b = a + 1; b < 8; ++b, ++number) {
+      ends.a[number] = a;
+      ends.b[number] = b;
+    }
+  return ends;
+}();
+
 // Whether the springs that are left join all eight elements.
 inline bool holds_together(std::uint64_t broken) {
   unsigned reached = 1;
@@ -59,14 +75,11 @@ FLEXEL_INLINE LaneBits break_springs(const Corners& u, const CellConstants& k, C
   const LaneBits before = load_bits(memory.broken);
   LaneBits now = before;
   const double longest = k.elongation * (2 + k.elongation);
-  int number = 0;
-#pragma GCC unroll 8
-  for (int a = 0; a < 8; ++a)
-#pragma GCC unroll 8
-    for (int b = a + 1; b < 8; ++b, ++number) {
-      const SpringLanes s = spring_of(u, a, b, k);
-      now = s.off > longest * s.rest_square ? now | (LaneBits{} + (1LL << number)) : now;
-    }
+#pragma GCC unroll 1
+  for (int number = 0; number < 28; ++number) {
+    const SpringLanes s = spring_of(u, kEnds.a[number], kEnds.b[number], k);
+    now = s.off > longest * s.rest_square ? now | (LaneBits{} + (1LL << number)) : now;
+  }
   for (std::size_t l = 0; l < kLanes; ++l) {
     if (now[l] == before[l] || !(block.fill[l] > 0)) continue;
     memory.broken[l] = static_cast<std::uint64_t>(now[l]);
@@ -111,61 +124,65 @@ struct SpringsModel {
       before = break_springs(u, k, block, chunk.springs[number], sums);
       broken = load_bits(chunk.springs[number].broken);
     }
-    [[maybe_unused]] std::size_t spring = 0;
-#pragma GCC unroll 8
-    for (int a = 0; a < 8; ++a)
-#pragma GCC unroll 8
-      for (int b = a + 1; b < 8; ++b, ++spring) {
-        const SpringLanes s = spring_of(u, a, b, k);
-        Lanes square = {};
-        for (int c = 0; c < 3; ++c) square += s.d[c] * s.d[c];
-        const double rest_length = __builtin_sqrt(s.rest_square);
-        const Lanes length = square_root(square);
-        const Lanes stiffness = k.spring[s.kind] * fill;
-        Lanes pull;  // force on a along d, over |d|
-        [[maybe_unused]] Lanes viscous = {}, along = {}, stretch = {};
-        if constexpr (changes) stretch = s.off / (length + rest_length);
-        if constexpr (has.plasticity) {
-          SpringFlow& memory = chunk.spring_flow[number];
-          Lanes resists = fill;
-          if constexpr (has.fracture) resists = (before >> spring & 1) != 0 ? Lanes{} : fill;
-          stretch = flow(stretch, rest_length, k.spring[s.kind], k, resists, memory.flowed[spring],
-                         memory.strain[spring], sums);
-          pull = stiffness * stretch / length;
-        } else if constexpr (damping == Damping::none) {
-          pull = stiffness * s.off / (length * (length + rest_length));
-        }
-        if constexpr (damping != Damping::none) {
-          for (int c = 0; c < 3; ++c) along += (v.at[b][c] - v.at[a][c]) * s.d[c];
-          const Lanes both = length * (length + rest_length);
-          const Lanes inverse = 1 / (both * square);
-          viscous = stiffness * (k.damping * along * (both * inverse));
-          if constexpr (!has.plasticity) pull = stiffness * (s.off * (square * inverse));
-        }
-        if constexpr (has.fracture) {
-          const LaneMask gone = (broken >> spring & 1) != 0;
-          if constexpr (damping == Damping::book) {
-            // As cells do (kernel.cpp): the energy of half a step ago.
-            const Lanes released = 0.5 * stiffness * stretch * stretch - 0.5 * advance.kick * pull * along;
-            sums.released += gone & ((before >> spring & 1) == 0) & (fill > 0) ? released : Lanes{};
-          }
-          pull = gone ? Lanes{} : pull;
-          viscous = gone ? Lanes{} : viscous;
-          stretch = gone ? Lanes{} : stretch;
-        }
-        if constexpr (changes && damping == Damping::book)
-          sums.elastic += 0.5 * stiffness * stretch * stretch;
-        if constexpr (damping == Damping::book)
-          for (int c = 0; c < 3; ++c) {
-            damped.at[a][c] += viscous * s.d[c];
-            damped.at[b][c] -= viscous * s.d[c];
-          }
-        if constexpr (damping != Damping::none) pull = pull + viscous;
-        for (int c = 0; c < 3; ++c) {
-          force.at[a][c] += pull * s.d[c];
-          force.at[b][c] -= pull * s.d[c];
-        }
+    const auto add_spring = [&](int a, int b, [[maybe_unused]] int spring) __attribute__((always_inline)) {
+      const SpringLanes s = spring_of(u, a, b, k);
+      Lanes square = {};
+      for (int c = 0; c < 3; ++c) square += s.d[c] * s.d[c];
+      const double rest_length = __builtin_sqrt(s.rest_square);
+      const Lanes length = square_root(square);
+      const Lanes stiffness = k.spring[s.kind] * fill;
+      Lanes pull;  // force on a along d, over |d|
+      [[maybe_unused]] Lanes viscous = {}, along = {}, stretch = {};
+      if constexpr (changes) stretch = s.off / (length + rest_length);
+      if constexpr (has.plasticity) {
+        SpringFlow& memory = chunk.spring_flow[number];
+        Lanes resists = fill;
+        if constexpr (has.fracture) resists = (before >> spring & 1) != 0 ? Lanes{} : fill;
+        stretch = flow(stretch, rest_length, k.spring[s.kind], k, resists, memory.flowed[spring],
+                       memory.strain[spring], sums);
+        pull = stiffness * stretch / length;
+      } else if constexpr (damping == Damping::none) {
+        pull = stiffness * s.off / (length * (length + rest_length));
       }
+      if constexpr (damping != Damping::none) {
+        for (int c = 0; c < 3; ++c) along += (v.at[b][c] - v.at[a][c]) * s.d[c];
+        const Lanes both = length * (length + rest_length);
+        const Lanes inverse = 1 / (both * square);
+        viscous = stiffness * (k.damping * along * (both * inverse));
+        if constexpr (!has.plasticity) pull = stiffness * (s.off * (square * inverse));
+      }
+      if constexpr (has.fracture) {
+        const LaneMask gone = (broken >> spring & 1) != 0;
+        if constexpr (damping == Damping::book) {
+          // As cells do (kernel.cpp): the energy of half a step ago.
+          const Lanes released = 0.5 * stiffness * stretch * stretch - 0.5 * advance.kick * pull * along;
+          sums.released += gone & ((before >> spring & 1) == 0) & (fill > 0) ? released : Lanes{};
+        }
+        pull = gone ? Lanes{} : pull;
+        viscous = gone ? Lanes{} : viscous;
+        stretch = gone ? Lanes{} : stretch;
+      }
+      if constexpr (changes && damping == Damping::book) sums.elastic += 0.5 * stiffness * stretch * stretch;
+      if constexpr (damping == Damping::book)
+        for (int c = 0; c < 3; ++c) {
+          damped.at[a][c] += viscous * s.d[c];
+          damped.at[b][c] -= viscous * s.d[c];
+        }
+      if constexpr (damping != Damping::none) pull = pull + viscous;
+      for (int c = 0; c < 3; ++c) {
+        force.at[a][c] += pull * s.d[c];
+        force.at[b][c] -= pull * s.d[c];
+      }
+    };
+    if constexpr (changes) {
+#pragma GCC unroll 1
+      for (int n = 0; n < 28; ++n) add_spring(kEnds.a[n], kEnds.b[n], n);
+    } else {
+#pragma GCC unroll 8
+      for (int a = 0; a < 8; ++a)
+#pragma GCC unroll 8
+        for (int b = a + 1; b < 8; ++b) add_spring(a, b, 0);
+    }
     // A length that is not a number makes the forces so; the first one tells.
     const Lanes told = fill > 0 ? 1 + 0 * force.at[0][0] : Lanes{} + __builtin_huge_val();
     sums.smallest_jacobian = told >= sums.smallest_jacobian ? sums.smallest_jacobian : told;
