@@ -3,8 +3,7 @@
 
 #include <fmt/format.h>
 
-#include "formats/error.h"
-#include "formats/program.h"
+#include "simulate/effects/part_entries.h"
 
 namespace flexel {
 
@@ -26,18 +25,8 @@ std::optional<Damping> Damping::make(const Parameters& parameters, const Setting
   made.entries_ = parameters.entries.size();
   made.time_.assign(setting.body.parts.size(), 0);
   bool damped = false;
-  std::vector<std::string> names;
-  for (const Part& part : setting.body.parts) names.push_back(part.name);
   for (const Entry& entry : parameters.entries) {
-    bool found = false;
-    for (std::size_t p = 0; p < names.size(); ++p)
-      if (!entry.part || *entry.part == names[p]) {
-        made.time_[p] = entry.time;
-        found = true;
-      }
-    if (!found)
-      throw InputError(entry.origin, fmt::format("the body has no part \"{}\"{}", *entry.part,
-                                                 did_you_mean(*entry.part, names)));
+    for (const std::size_t p : parts_of(entry, setting)) made.time_[p] = entry.time;
     damped = damped || entry.time > 0;
   }
   if (!damped) return std::nullopt;

@@ -11,13 +11,12 @@
 #include "simulate/scene.h"
 #include "simulate/simulate.h"
 #include "tests/simulate/centre_body.h"
-#include "tests/simulate/csv.h"
+#include "tests/simulate/timed_case.h"
 
 namespace flexel {
 namespace {
 
 using std::numbers::pi;
-using testing::Csv;
 using ::testing::HasSubstr;
 
 constexpr double kSide = 0.2, kDensity = 100, kMedium = 50, kCoefficient = 1.3, kGravity = 9.81;
@@ -47,33 +46,13 @@ Scene scene_for(double time, double density = kDensity) {
   return scene;
 }
 
-struct TimedCase {
-  Body body;
-  SimulateResult result;
-  Csv history;
-};
+using testing::expect_books_close;
+using testing::TimedCase;
 
 TimedCase run(Body body, const Scene& scene, int threads = 0) {
-  TimedCase made;
-  made.body = std::move(body);
-  Progress progress("test", Progress::Mode::quiet);
   SimulateOptions options;
   options.threads = threads;
-  options.history =
-      ::testing::TempDir() + "/drag_" + ::testing::UnitTest::GetInstance()->current_test_info()->name();
-  made.result = simulate(made.body, scene, options, progress);
-  made.history = testing::read_csv(options.history);
-  return made;
-}
-
-void expect_books_close(const SimulateResult& result) {
-  double residual = 0, largest = 0;
-  for (const auto& [name, joules] : result.timed->books) {
-    if (name == "worst_residual") residual = joules;
-    if (name == "largest_term") largest = joules;
-  }
-  EXPECT_GT(largest, 0);
-  EXPECT_LT(residual, 1e-3 * largest);
+  return testing::run_timed(std::move(body), scene, options);
 }
 
 void throw_at(Body& body, const Vec3& velocity) {

@@ -13,7 +13,7 @@
 #include "simulate/time/stability.h"
 #include "simulate/time/stepper.h"
 #include "tests/simulate/box_body.h"
-#include "tests/simulate/csv.h"
+#include "tests/simulate/timed_case.h"
 
 namespace flexel {
 namespace {
@@ -21,7 +21,9 @@ namespace {
 using std::numbers::pi;
 using testing::box_body;
 using testing::BoxOptions;
-using testing::Csv;
+using testing::expect_books_close;
+using testing::expect_momenta_kept;
+using testing::TimedCase;
 
 Scene scene_of(const Material& material, double time) {
   Scene scene;
@@ -32,38 +34,6 @@ Scene scene_of(const Material& material, double time) {
 }
 
 const Material kGum{"gum", 12.1e5, 0.25, 580, "Jansson and Vergeest, section 5"};
-
-struct TimedCase {
-  Body body;
-  SimulateResult result;
-  Csv history;
-};
-
-TimedCase run(Body body, const Scene& scene, const std::string& isa = "", int threads = 0) {
-  TimedCase made;
-  made.body = std::move(body);
-  Progress progress("test", Progress::Mode::quiet);
-  SimulateOptions options;
-  options.history =
-      ::testing::TempDir() + "/" + ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".csv";
-  options.isa = isa;
-  options.threads = threads;
-  made.result = simulate(made.body, scene, options, progress);
-  made.history = testing::read_csv(options.history);
-  return made;
-}
-
-// The books close within 0.1 % of the largest term.
-void expect_books_close(const TimedCase& made) {
-  const auto& books = made.result.timed->books;
-  double residual = 0, largest = 0;
-  for (const auto& [name, joules] : books) {
-    if (name == "worst_residual") residual = joules;
-    if (name == "largest_term") largest = joules;
-  }
-  EXPECT_GT(largest, 0);
-  EXPECT_LT(residual, 1e-3 * largest);
-}
 
 InitialVelocity::Parameters thrown(const Vec3& velocity, const Vec3& spin = Vec3::Zero(),
                                    const Vec3& through = Vec3::Zero()) {
@@ -86,12 +56,12 @@ TEST(Motion, FreeFall) {
   Scene scene = scene_of(kGum, 0.2);
   scene.get<Gravity>().acceleration = Vec3(1, -2, -9.81);
   scene.get<Damping>().entries.push_back({1e-5, {}, ""});
-  const TimedCase made = run(small_box(), scene);
+  const TimedCase made = testing::run_timed(small_box(), scene);
   for (std::size_t e = 0; e < made.body.element_count(); ++e) {
     const Vec3 fallen = made.body.position[e] - made.body.rest[e];
     EXPECT_LT((fallen - 0.5 * 0.2 * 0.2 * Vec3(1, -2, -9.81)).norm(), 1e-3 * 0.2);
   }
-  expect_books_close(made);
+  expect_books_close(made.result);
 }
 
 TEST(Motion, ThrownBodyKeepsItsMomenta) {
@@ -104,19 +74,12 @@ TEST(Motion, ThrownBodyKeepsItsMomenta) {
   const Vec3 centre(0.02, 0.01, 0.01);
   scene.get<InitialVelocity>() = thrown(Vec3(1, 0.5, -2), 40 * Vec3(0.3, 0.2, 1).normalized(), centre);
   scene.get<Damping>().entries.push_back({2e-5, {}, ""});
-  const TimedCase made = run(box_body(options), scene);
-  for (const char* name : {"momentum", "angular momentum"})
-    for (const char* axis : {" x", " y", " z"}) {
-      const std::vector<double>& column = made.history.column(std::string(name) + axis);
-      double largest = 0;
-      for (const char* other : {" x", " y", " z"})
-        largest = std::max(largest, std::abs(made.history.column(std::string(name) + other)[0]));
-      for (const double value : column) EXPECT_NEAR(value, column[0], 1e-9 * largest) << name << axis;
-    }
+  const TimedCase made = testing::run_timed(box_body(options), scene);
+  expect_momenta_kept(made.history, 1e-9);
   // its spin stretches it, and the swing from that is damped
   EXPECT_GT(made.history.column("elastic").back(), 0);
   EXPECT_GT(made.history.column("damping dissipated").back(), 0);
-  expect_books_close(made);
+  expect_books_close(made.result);
 }
 
 // A bar held at one end in its first longitudinal mode, nu = 0: frequency c / 4 L, damping ratio tau omega
@@ -146,8 +109,8 @@ Swing swing_of_bar(Model model, double tau) {
   for (const Vec3& at : body.rest)
     for (const double v : {1e-3 * std::sin(pi / 2 * at.x() / length), 0.0, 0.0}) velocity.values.push_back(v);
   body.element_columns["velocity"] = velocity;
-  const TimedCase made = run(std::move(body), scene);
-  expect_books_close(made);
+  const TimedCase made = testing::run_timed(std::move(body), scene);
+  expect_books_close(made.result);
   // the mode is clean, so that peaks and zeros of the end tell
   const std::vector<double>&time = made.history.column("time"), &u = made.history.column("end x");
   std::vector<double> zeros, peaks;
@@ -180,16 +143,9 @@ TEST(Motion, LongDampingKeepsMomenta) {
   Scene scene = scene_of(kGum, 0.02);
   scene.get<InitialVelocity>() = thrown(Vec3(1, 0.5, -2), Vec3(20, 10, 30), Vec3(0.01, 0.01, 0.01));
   scene.get<Damping>().entries.push_back({0.05, {}, ""});
-  const TimedCase made = run(small_box(), scene);
-  for (const char* name : {"momentum", "angular momentum"})
-    for (const char* axis : {" x", " y", " z"}) {
-      const std::vector<double>& column = made.history.column(std::string(name) + axis);
-      double largest = 0;
-      for (const char* other : {" x", " y", " z"})
-        largest = std::max(largest, std::abs(made.history.column(std::string(name) + other)[0]));
-      EXPECT_NEAR(column.back(), column[0], 1e-6 * largest) << name << axis;
-    }
-  expect_books_close(made);
+  const TimedCase made = testing::run_timed(small_box(), scene);
+  expect_momenta_kept(made.history, 1e-6);
+  expect_books_close(made.result);
 }
 
 TEST(Motion, LogarithmicDecrement) {
@@ -217,7 +173,7 @@ TEST(Motion, WaveSpeed) {
     for (const double v : {speed * 2 * x / width * u, 0.0, 0.0}) velocity.values.push_back(v);
   }
   body.element_columns["velocity"] = velocity;
-  const TimedCase made = run(std::move(body), scene_of({"bar", 1e6, 0, 1000, "test"}, time));
+  const TimedCase made = testing::run_timed(std::move(body), scene_of({"bar", 1e6, 0, 1000, "test"}, time));
   double sum = 0, moment = 0;
   for (std::size_t e = 0; e < made.body.element_count(); ++e) {
     const double u = made.body.position[e].x() - made.body.rest[e].x();
@@ -225,7 +181,7 @@ TEST(Motion, WaveSpeed) {
     moment += u * u * made.body.rest[e].x();
   }
   EXPECT_NEAR((moment / sum - start) / (speed * time), 1, 0.01);
-  expect_books_close(made);
+  expect_books_close(made.result);
 }
 
 // The paper's beam struck sideways: its lowest frequencies, by CalculiX (reference/beam_ccx.py).
@@ -254,8 +210,8 @@ TEST(Motion, BeamSwingsAtItsFrequency) {
       velocity.values.insert(velocity.values.end(), v.begin(), v.end());
     }
     body.element_columns["velocity"] = velocity;
-    const TimedCase made = run(std::move(body), scene);
-    expect_books_close(made);
+    const TimedCase made = testing::run_timed(std::move(body), scene);
+    expect_books_close(made.result);
     // amplitude of the tip at a frequency: the one with the largest is the beam's
     const std::vector<double>& time = made.history.column("time");
     const std::vector<double>& u = made.history.column(std::string("tip ") + "xyz"[each.axis]);
@@ -304,12 +260,12 @@ TEST(Motion, MovesTakeTheirCourseAndSupportsDoTheWork) {
   pull.course = {{0, 0.05, 0.1}, {0, 1, 1}};
   scene.get<Ties>().ties.push_back(pull);
   scene.get<Damping>().entries.push_back({2e-4, {}, ""});
-  const TimedCase made = run(small_box(), scene);
+  const TimedCase made = testing::run_timed(small_box(), scene);
   EXPECT_NEAR(made.body.position.back().x() - made.body.rest.back().x(), 0.003, 1e-12);
   const double stored = made.history.column("elastic").back();
   EXPECT_NEAR(made.history.column("supports work").back(),
               stored + made.history.column("damping dissipated").back(), 1e-3 * stored);
-  expect_books_close(made);
+  expect_books_close(made.result);
 }
 
 // Verlet starts with half a kick, which is second order in the step; symplectic Euler's whole one is first
@@ -323,7 +279,7 @@ TEST(Motion, OrderOfTheMethods) {
     scene.get<Gravity>().acceleration = Vec3(0, 0, -9.81);
     scene.run.method = method;
     scene.run.step = share * longest;
-    const TimedCase made = run(std::move(body), scene);
+    const TimedCase made = testing::run_timed(std::move(body), scene);
     return std::abs(made.body.position[0].z() - made.body.rest[0].z() +
                     0.5 * 9.81 * std::pow(*scene.run.time, 2));
   };
@@ -337,7 +293,7 @@ TEST(Motion, ExplicitEulerGainsEnergy) {
   scene.get<InitialVelocity>() = thrown(Vec3::Zero(), Vec3(0, 0, 30), Vec3(0.015, 0.01, 0.01));
   scene.run.method = TimeMethod::explicit_euler;
   scene.run.step = 1e-6;
-  const TimedCase made = run(small_box(), scene);
+  const TimedCase made = testing::run_timed(small_box(), scene);
   EXPECT_GT(made.history.column("residual").back(), 0);
 }
 
