@@ -9,6 +9,7 @@ namespace {
 
 using Lanes = double __attribute__((vector_size(64)));
 using LaneBits = long long __attribute__((vector_size(64)));
+using LaneWords = unsigned long long __attribute__((vector_size(64)));  // bits that may run over
 using LaneMask = decltype(Lanes{} > Lanes{});
 
 #define FLEXEL_INLINE inline __attribute__((always_inline))
@@ -42,19 +43,20 @@ FLEXEL_INLINE double sum(const Lanes& x) {
   return ((x[0] + x[1]) + (x[2] + x[3])) + ((x[4] + x[5]) + (x[6] + x[7]));
 }
 
-// ln(1 + y) for y > -1, to a few units in the last place, also for small y. With 1 + y = 2^k m, m in
-// [sqrt(1/2), sqrt(2)): k ln 2 + 2 artanh(f / (2 + f)), f = m - 1.
+// ln(1 + y) for y > -1 (any number for others), to a few units in the last place, also for small y. With 1 +
+// y = 2^k m, m in [sqrt(1/2), sqrt(2)): k ln 2 + 2 artanh(f / (2 + f)), f = m - 1.
 FLEXEL_INLINE Lanes log1p(const Lanes& y) {
   const Lanes whole = 1 + y;
-  const LaneBits root_half = LaneBits{} + 0x3fe6a09e667f3bcdLL;
-  LaneBits bits;
+  const LaneWords root_half = LaneWords{} + 0x3fe6a09e667f3bcdULL;
+  LaneWords bits;
   __builtin_memcpy(&bits, &whole, sizeof bits);
-  const LaneBits exponent = (bits - root_half) >> 52;
-  const LaneBits scaled_bits = bits - (exponent << 52);
+  const LaneBits exponent = __builtin_convertvector(bits - root_half, LaneBits) >> 52;
+  const LaneWords exponent_word = __builtin_convertvector(exponent, LaneWords);
+  const LaneWords scaled_bits = bits - (exponent_word << 52);
   Lanes scaled;
   __builtin_memcpy(&scaled, &scaled_bits, sizeof scaled);
   // to double by the bits of 2^52 + 2^51 + k: vectors of integers have no conversion before AVX-512
-  const LaneBits magic_bits = exponent + 0x4338000000000000LL;
+  const LaneWords magic_bits = exponent_word + 0x4338000000000000ULL;
   Lanes magic;
   __builtin_memcpy(&magic, &magic_bits, sizeof magic);
   const Lanes k = magic - 6755399441055744.0;
