@@ -10,6 +10,7 @@
 
 #include "formats/parallel.h"
 #include "simulate/central_spring.h"
+#include "simulate/greatest.h"
 
 namespace flexel {
 namespace {
@@ -29,14 +30,6 @@ struct Least {
   std::uint32_t element = 0;
   Least& operator+=(const Least& other) {
     if (other.value < value) *this = other;
-    return *this;
-  }
-};
-
-struct Greatest {
-  double value = 0;
-  Greatest& operator+=(const Greatest& other) {
-    value = std::max(value, other.value);
     return *this;
   }
 };

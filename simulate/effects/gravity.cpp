@@ -6,6 +6,7 @@
 #include "formats/parallel.h"
 #include "simulate/carrier.h"
 #include "simulate/effects/gravity_tree.h"
+#include "simulate/greatest.h"
 #include "simulate/time/layout.h"
 
 namespace flexel {
@@ -25,14 +26,6 @@ Gravity::Source parse_source(const SceneValue& value, const TableReader& parent)
   if (!(source.mass > 0)) reader.fail("\"mass\" of a source needs to be above 0");
   return source;
 }
-
-struct Greatest {
-  double value = 0;
-  Greatest& operator+=(const Greatest& other) {
-    value = std::max(value, other.value);
-    return *this;
-  }
-};
 
 }  // namespace
 

@@ -8,6 +8,7 @@
 
 #include "formats/parallel.h"
 #include "simulate/cells.h"
+#include "simulate/greatest.h"
 
 namespace flexel {
 namespace {
@@ -45,14 +46,6 @@ CellMatrix springs_stiffness(const SpringKind& kind) {
 bool is_springs(const Setting& setting, std::size_t part) {
   return setting.models.size() > part && setting.models[part] == Model::springs;
 }
-
-struct Largest {
-  double value = 1;
-  Largest& operator+=(const Largest& other) {
-    value = std::max(value, other.value);
-    return *this;
-  }
-};
 
 // d2W/dF2 of the neo-Hookean energy has, with s the singular values of F, entries of at most mu + (mu +
 // lambda (1 - ln J)) / s_min^2; at rest 2 mu + lambda.
@@ -102,6 +95,7 @@ std::vector<double> cell_frequencies(const Setting& setting) {
 }
 
 double stable_step(double omega2, double tau) {
+  if (!(omega2 < std::numeric_limits<double>::infinity())) return 0;  // a cell is folded
   if (!(omega2 > 0)) return std::numeric_limits<double>::infinity();
   const double omega = std::sqrt(omega2), zeta = tau * omega / 2;
   return 2 / omega / (std::sqrt(1 + zeta * zeta) + zeta);
@@ -123,14 +117,14 @@ std::vector<double> stiffening(const Setting& setting, const std::vector<Vec3>& 
     const CellKind cells = cell_kind(part.lattice, setting.materials[p]);
     const SpringKind springs = spring_kind(part.lattice, setting.materials[p]);
     const bool by_springs = is_springs(setting, p);
-    result.push_back(parallel_sum<Largest>(part.cell_end - part.cell_begin, [&](std::size_t i) {
-                       const std::size_t c = part.cell_begin + i;
-                       if (!active[c]) return Largest{};
-                       CellVectors u;
-                       for (std::size_t a = 0; a < 8; ++a) u[a] = displacement[body.cell_elements[c][a]];
-                       return Largest{by_springs ? springs_stiffening(springs, u)
-                                                 : cell_stiffening(cells, u, plastic)};
-                     }).value);
+    const Greatest greatest = parallel_sum<Greatest>(part.cell_end - part.cell_begin, [&](std::size_t i) {
+      const std::size_t c = part.cell_begin + i;
+      if (!active[c]) return Greatest{};
+      CellVectors u;
+      for (std::size_t a = 0; a < 8; ++a) u[a] = displacement[body.cell_elements[c][a]];
+      return Greatest{by_springs ? springs_stiffening(springs, u) : cell_stiffening(cells, u, plastic)};
+    });
+    result.push_back(std::max(1.0, greatest.value));
   }
   return result;
 }

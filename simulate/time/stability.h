@@ -16,7 +16,8 @@ namespace flexel {
 // omega^2 [1/s^2] of one whole cell at rest, by part. 0: the part has no cells.
 [[nodiscard]] std::vector<double> cell_frequencies(const Setting& setting);
 
-// The bound on the step [s] for frequency^2 `omega2` and damping time `tau` [s]; infinity for omega2 = 0.
+// The bound on the step [s] for frequency^2 `omega2` and damping time `tau` [s]; infinity for omega2 = 0, 0
+// where it is not finite.
 [[nodiscard]] double stable_step(double omega2, double tau);
 
 // Of the whole body at rest, by cells alone. `damping`: tau of each part [s].

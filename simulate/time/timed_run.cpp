@@ -7,6 +7,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <limits>
 
 #include "formats/body_file.h"
 #include "formats/error.h"
@@ -59,6 +60,7 @@ class TimedRun {
   void look_at_stiffness();
   void choose_step();
   void check();
+  void refuse_unsound();
   void step();
   void sum_forces();
   void add_connection_forces();
@@ -180,6 +182,17 @@ void TimedRun::choose_step() {
   step_ = left / std::ceil(left / step - 1e-9);
 }
 
+// Stops the run where the present state is folded, not finite or far beyond what any scene means.
+void TimedRun::refuse_unsound() {
+  double farthest = 0;
+  for (const Vec3& u : state_.displacement)
+    farthest = u.allFinite() ? std::max(farthest, u.squaredNorm()) : std::numeric_limits<double>::infinity();
+  if (!(std::sqrt(farthest) < kRunaway * (1 + body_extent(body_))))
+    diverged("the motion ran away: look at loads and units, or give a shorter [run] step");
+  look_at_stiffness();
+  if (!(bound_->longest(implicit_.has_value()) > 0)) diverged(where_it_folds(body_, state_.displacement));
+}
+
 void TimedRun::check() {
   throw_if_interrupted();
   if (options_.timeout &&
@@ -188,17 +201,8 @@ void TimedRun::check() {
     throw TimeoutError(fmt::format("stopped by --timeout after {} steps at {:.4g} s of {:.4g} s{}", steps_,
                                    *state_.time, duration_, save_failed()));
   }
-  double farthest = 0;
-  bool finite = true;
-  for (const Vec3& u : state_.displacement) {
-    farthest = std::max(farthest, u.squaredNorm());
-    finite = finite && u.allFinite();
-  }
-  if (!finite || !(std::sqrt(farthest) < kRunaway * (1 + body_extent(body_))))
-    diverged("the motion ran away: look at loads and units, or give a shorter [run] step");
-  look_at_stiffness();
+  refuse_unsound();
   const double longest = bound_->longest(implicit_.has_value());
-  if (!(longest > 0)) diverged(where_it_folds(body_, state_.displacement));
   good_ = state_;
   if (step_ > 0.97 * longest || (!scene_.run.step && step_ < 0.6 * kSafety * longest)) choose_step();
   progress_.update(*state_.time / duration_, fmt::format("{:.4g} s, step {}", *state_.time, steps_));
@@ -321,11 +325,7 @@ SimulateResult TimedRun::report() {
   measure_corners(cells, body_, state_, result, progress_);
   measure_displacement(body_, state_, result);
   for (const double mass : stepper_->mass()) result.mass += mass;
-  TimedSummary timed;
-  timed.time = *state_.time;
-  timed.steps = steps_;
-  timed.step = step_;
-  timed.isa = stepper_->isa();
+  TimedSummary timed{*state_.time, steps_, step_, stepper_->isa(), {}};
   if (history_) {
     const Energies& last = history_->last();
     timed.books = {{"kinetic", last.kinetic},
@@ -364,6 +364,7 @@ SimulateResult TimedRun::operator()() {
       step();
       if (series_ && *state_.time >= next_frame_ * (1 - 1e-9)) write_frame();
     }
+    refuse_unsound();  // a step looks at the state that it begins with; nothing has looked at the last one
   } catch (const Interrupted&) {
     good_ = state_;
     if (const std::string saved = save_failed(); !saved.empty())

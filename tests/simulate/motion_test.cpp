@@ -273,6 +273,19 @@ TEST(Motion, StepAboveTheBoundIsRefused) {
   EXPECT_NO_THROW((void)simulate(body, scene, {}, progress));
 }
 
+TEST(Motion, FoldInTheLastStepIsTold) {
+  Body body = small_box();
+  const Setting setting{body, {kGum}, std::vector<std::uint8_t>(body.cell_count(), 0)};
+  const double step = 0.5 * stable_step(setting, {0});
+  Column velocity;
+  velocity.components = 3;
+  velocity.values.assign(3 * body.element_count(), 0);
+  velocity.values[0] = 0.1 / step;  // ten cells further
+  body.element_columns["velocity"] = velocity;
+  Progress progress("test", Progress::Mode::quiet);
+  EXPECT_THROW((void)simulate(body, scene_of(kGum, step), {}, progress), DivergedError);
+}
+
 TEST(Motion, EffectsOfTimeAreRefusedAtEquilibrium) {
   Scene scene = scene_of(kGum, 1);
   scene.run.time.reset();
