@@ -5,12 +5,12 @@
 
 namespace flexel {
 
-Held::Held(const Constraints& constraints, const Body& body, State& state)
+Held::Held(const Constraints& constraints, const Body& body, State& state, bool fresh)
     : constraints_(constraints), body_(body) {
   for (std::uint32_t e = 0; e < constraints.mask.size(); ++e) {
     if (!constraints.mask[e]) continue;
     for (int axis = 0; axis < 3; ++axis)
-      if (constraints.mask[e] >> axis & 1) {
+      if (fresh && constraints.mask[e] >> axis & 1) {
         state.displacement[e][axis] = path(e, axis, state);
         state.velocity[e][axis] = 0;
       }

@@ -11,8 +11,9 @@ namespace flexel {
 
 class Held {
  public:
-  // Both must outlive it. Puts the held components of `state` on their paths at its time.
-  Held(const Constraints& constraints, const Body& body, State& state);
+  // Both must outlive it. With `fresh` puts the held components of `state` on their paths at its time, at
+  // rest; without, they are on them.
+  Held(const Constraints& constraints, const Body& body, State& state, bool fresh = true);
 
   // Call after the velocities and displacements have been advanced as if free to `state.time`, by `advance`.
   void impose(State& state, const std::vector<double>& mass, const step::Advance& advance);

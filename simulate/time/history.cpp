@@ -24,9 +24,41 @@ struct Momenta {
 
 }  // namespace
 
+std::size_t Ledger::account(const std::string& name, bool dissipates) {
+  for (std::size_t a = 0; a < accounts.size(); ++a)
+    if (accounts[a].name == name) return a;
+  accounts.push_back({name, dissipates, 0});
+  return accounts.size() - 1;
+}
+
+std::string Ledger::csv() const {
+  std::string text = "time [s],kinetic [J],elastic [J],potential [J],work [J],dissipated [J],residual [J]";
+  auto out = std::back_inserter(text);
+  for (const Account& account : accounts)
+    fmt::format_to(out, ",{} {} [J]", account.name, account.dissipates ? "dissipated" : "work");
+  for (const char* name : {"momentum", "angular momentum"})
+    for (const char axis : {'x', 'y', 'z'})
+      fmt::format_to(out, ",{} {} [{}]", name, axis, std::string(name) == "momentum" ? "kg m/s" : "kg m2/s");
+  for (const std::string& probe : probes)
+    for (const char axis : {'x', 'y', 'z'}) fmt::format_to(out, ",{} {} [m]", probe, axis);
+  text += '\n';
+  for (const BookRow& row : rows) {
+    const Energies& e = row.energies;
+    fmt::format_to(out, "{:.17g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.3g}", row.time, e.kinetic, e.elastic,
+                   e.potential, e.work, e.dissipated, e.residual);
+    for (std::size_t a = 0; a < accounts.size(); ++a)
+      fmt::format_to(out, ",{:.9g}", a < row.accounts.size() ? row.accounts[a] : 0.0);
+    for (const Vec3& vector : {row.momentum, row.angular})
+      for (const double value : vector) fmt::format_to(out, ",{:.12g}", value);
+    for (const double value : row.probes) fmt::format_to(out, ",{:.12g}", value);
+    text += '\n';
+  }
+  return text;
+}
+
 History::History(const Setting& setting, const std::vector<Pass>& passes,
                  const std::vector<ProbePoints>& probes, const std::vector<double>& mass,
-                 const PaperModel* paper, const StepPlan& plan)
+                 const PaperModel* paper, const StepPlan& plan, Ledger ledger)
     : setting_(setting),
       passes_(passes),
       probes_(probes),
@@ -34,31 +66,19 @@ History::History(const Setting& setting, const std::vector<Pass>& passes,
       paper_(paper),
       cells_(setting, no_stencil_),
       forces_(passes.size()),
-      energy_(passes.size() + 2, 0) {
-  for (std::size_t p = 0; p < passes.size(); ++p)
-    if (passes[p].add_forces && passes[p].book != Book::potential)
-      forces_[p].assign(setting.body.element_count(), Vec3::Zero());
-  csv_ = "time [s],kinetic [J],elastic [J],potential [J],work [J],dissipated [J],residual [J]";
-  for (const Pass& pass : passes)
-    if (pass.add_forces && pass.book != Book::potential)
-      fmt::format_to(std::back_inserter(csv_), ",{} {} [J]", pass.name,
-                     pass.book == Book::work ? "work" : "dissipated");
-  csv_ += ",supports work [J],damping dissipated [J]";
-  const auto add = [&](const char* name) {
-    energy_.push_back(0);
-    fmt::format_to(std::back_inserter(csv_), ",{} dissipated [J]", name);
-    return energy_.size() - 1;
-  };
-  if (!plan.plasticity.empty()) plasticity_ = add("plasticity");
-  if (!plan.fracture.empty()) fracture_ = add("fracture");
-  for (const char* name : {"momentum", "angular momentum"})
-    for (const char axis : {'x', 'y', 'z'})
-      fmt::format_to(std::back_inserter(csv_), ",{} {} [{}]", name, axis,
-                     std::string(name) == "momentum" ? "kg m/s" : "kg m2/s");
-  for (const ProbePoints& probe : probes)
-    for (const char axis : {'x', 'y', 'z'})
-      fmt::format_to(std::back_inserter(csv_), ",{} {} [m]", probe.name, axis);
-  csv_ += '\n';
+      ledger_(std::move(ledger)) {
+  own_.assign(passes.size(), 0);
+  for (std::size_t p = 0; p < passes.size(); ++p) {
+    if (!passes[p].add_forces || passes[p].book == Book::potential) continue;
+    forces_[p].assign(setting.body.element_count(), Vec3::Zero());
+    own_[p] = ledger_.account(passes[p].name, passes[p].book == Book::dissipation);
+  }
+  supports_ = ledger_.account("supports", false);
+  damping_ = ledger_.account("damping", true);
+  if (!plan.plasticity.empty()) plasticity_ = ledger_.account("plasticity", true);
+  if (!plan.fracture.empty()) fracture_ = ledger_.account("fracture", true);
+  ledger_.probes.clear();
+  for (const ProbePoints& probe : probes) ledger_.probes.push_back(probe.name);
 }
 
 void History::before(const State& state, bool sample) {
@@ -77,17 +97,20 @@ void History::before(const State& state, bool sample) {
 void History::after(const State& state, const StepOutcome& outcome, const std::vector<Vec3>& damping,
                     const std::vector<Vec3>& supports, double previous_step, double step) {
   const auto add_powers = [&](const std::vector<Vec3>& velocity, double time) {
-    const auto energy = [&](const std::vector<Vec3>& forces) {
-      return time *
-             parallel_sum<double>(forces.size(), [&](std::size_t e) { return forces[e].dot(velocity[e]); });
+    const auto enter = [&](std::size_t account, const std::vector<Vec3>& forces) {
+      ledger_.accounts[account].energy += time * parallel_sum<double>(forces.size(), [&](std::size_t e) {
+                                            return forces[e].dot(velocity[e]);
+                                          });
     };
-    for (std::size_t p = 0; p < passes_.size(); ++p) energy_[p] += energy(forces_[p]);
-    energy_[passes_.size()] += energy(supports);
-    energy_[passes_.size() + 1] += energy(damping) + energy(connection_damping_);
+    for (std::size_t p = 0; p < passes_.size(); ++p)
+      if (!forces_[p].empty()) enter(own_[p], forces_[p]);
+    enter(supports_, supports);
+    enter(damping_, damping);
+    enter(damping_, connection_damping_);
   };
   add_powers(velocity_, 0.5 * previous_step);
-  if (plasticity_) energy_[plasticity_] -= outcome.plastic_work;
-  if (fracture_) energy_[fracture_] -= outcome.released;
+  if (plasticity_) ledger_.accounts[*plasticity_].energy -= outcome.plastic_work;
+  if (fracture_) ledger_.accounts[*fracture_].energy -= outcome.released;
   if (outcome.elastic) elastic_ += *outcome.elastic;
   if (sample_) add_row(state);
   add_powers(state.velocity, 0.5 * step);
@@ -100,34 +123,25 @@ void History::add_row(const State& state) {
     return Momenta{0.5 * mass_[e] * velocity_[e].dot(state.velocity[e]), mass_[e] * mean,
                    mass_[e] * at.cross(mean)};
   });
-  Energies now{sum.kinetic, elastic_, potential_, 0, 0, 0};
-  for (std::size_t p = 0; p < energy_.size(); ++p) {
-    const bool dissipates =
-        p > passes_.size() || (p < passes_.size() && passes_[p].book == Book::dissipation);
-    (dissipates ? now.dissipated : now.work) += dissipates ? -energy_[p] : energy_[p];
+  BookRow row;
+  row.time = time_;
+  row.momentum = sum.linear;
+  row.angular = sum.angular;
+  Energies& now = row.energies;
+  now = {sum.kinetic, elastic_, potential_, 0, 0, 0};
+  for (const Account& account : ledger_.accounts) {
+    (account.dissipates ? now.dissipated : now.work) += account.dissipates ? -account.energy : account.energy;
+    row.accounts.push_back(account.dissipates ? 0.0 - account.energy : account.energy);
   }
   const double book = now.kinetic + now.elastic + now.potential + now.dissipated - now.work;
-  if (first_) start_ = book;
-  first_ = false;
-  now.residual = book - start_;
-  last_ = now;
-  worst_residual_ = std::max(worst_residual_, std::abs(now.residual));
+  if (!ledger_.start) ledger_.start = book;
+  now.residual = book - *ledger_.start;
+  ledger_.worst_residual = std::max(ledger_.worst_residual, std::abs(now.residual));
   for (const double term : {now.kinetic, now.elastic, now.potential, now.work, now.dissipated})
-    largest_term_ = std::max(largest_term_, std::abs(term));
-  auto out = std::back_inserter(csv_);
-  fmt::format_to(out, "{:.17g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.3g}", time_, now.kinetic, now.elastic,
-                 now.potential, now.work, now.dissipated, now.residual);
-  for (std::size_t p = 0; p < energy_.size(); ++p) {
-    if (p < passes_.size() && forces_[p].empty()) continue;
-    const bool dissipates =
-        p > passes_.size() || (p < passes_.size() && passes_[p].book == Book::dissipation);
-    fmt::format_to(out, ",{:.9g}", dissipates ? 0.0 - energy_[p] : energy_[p]);
-  }
-  for (const Vec3& vector : {sum.linear, sum.angular})
-    for (const double value : vector) fmt::format_to(out, ",{:.12g}", value);
+    ledger_.largest_term = std::max(ledger_.largest_term, std::abs(term));
   for (const ProbePoints& probe : probes_)
-    for (const double value : measure(probe, sampled_).displacement) fmt::format_to(out, ",{:.12g}", value);
-  csv_ += '\n';
+    for (const double value : measure(probe, sampled_).displacement) row.probes.push_back(value);
+  ledger_.rows.push_back(std::move(row));
 }
 
 }  // namespace flexel

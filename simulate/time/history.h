@@ -7,6 +7,7 @@
 // mean velocity.
 #pragma once
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,11 +26,41 @@ struct Energies {
   double residual = 0;
 };
 
+// A column of energy that one kind of force, or what happens in cells, gave the body (work) or took from it.
+struct Account {
+  std::string name;  // "loads"
+  bool dissipates = false;
+  double energy = 0;  // J, given to the body so far
+};
+
+struct BookRow {
+  double time = 0;  // s
+  Energies energies;
+  std::vector<double> accounts;  // J, work or dissipated energy; of those that were there
+  Vec3 momentum = Vec3::Zero(), angular = Vec3::Zero();
+  std::vector<double> probes;  // m, (probes x 3)
+};
+
+// What the books have summed up: all that goes on when the run does.
+struct Ledger {
+  std::vector<Account> accounts;
+  std::vector<BookRow> rows;
+  std::vector<std::string> probes;  // names
+  std::optional<double> start;      // J: the sum of the first row
+  double worst_residual = 0;        // J, largest absolute one
+  double largest_term = 0;          // J, of any energy
+
+  [[nodiscard]] std::string csv() const;
+  // Place of the account of that name; a new one is made at the end.
+  std::size_t account(const std::string& name, bool dissipates);
+};
+
 class History {
  public:
-  // Refers to all of them while it lives. `paper`: of the centre-placed parts; null: there are none.
+  // Refers to all but the ledger, which it goes on with, while it lives. `paper`: of the centre-placed parts;
+  // null: there are none.
   History(const Setting& setting, const std::vector<Pass>& passes, const std::vector<ProbePoints>& probes,
-          const std::vector<double>& mass, const PaperModel* paper, const StepPlan& plan);
+          const std::vector<double>& mass, const PaperModel* paper, const StepPlan& plan, Ledger ledger = {});
 
   // Before a step: keeps the velocities and, where `sample`, the energies of the state.
   void before(const State& state, bool sample);
@@ -42,10 +73,7 @@ class History {
   void after(const State& state, const StepOutcome& outcome, const std::vector<Vec3>& damping,
              const std::vector<Vec3>& supports, double previous_step, double step);
 
-  [[nodiscard]] const Energies& last() const { return last_; }             // of the last sample
-  [[nodiscard]] double worst_residual() const { return worst_residual_; }  // J, largest absolute one
-  [[nodiscard]] double largest_term() const { return largest_term_; }      // J, of any energy
-  [[nodiscard]] const std::string& csv() const { return csv_; }
+  [[nodiscard]] const Ledger& ledger() const { return ledger_; }
 
  private:
   void add_row(const State& state);
@@ -60,16 +88,13 @@ class History {
   std::vector<std::vector<Vec3>> forces_;  // (passes x elements)
   std::vector<Vec3> connection_damping_;   // (elements) or empty
   std::vector<Vec3> velocity_;             // before the step
-  // (passes, then supports, damping, and where the plan has them plasticity and fracture) J so far
-  std::vector<double> energy_;
-  std::size_t plasticity_ = 0, fracture_ = 0;  // places in energy_; 0: absent
-  bool sample_ = false, first_ = true;
-  double time_ = 0, elastic_ = 0, potential_ = 0, start_ = 0;
-  Vec3 arm_momentum_ = Vec3::Zero();
+  Ledger ledger_;
+  std::vector<std::size_t> own_;  // (passes) places in the ledger
+  std::size_t supports_ = 0, damping_ = 0;
+  std::optional<std::size_t> plasticity_, fracture_;
+  bool sample_ = false;
+  double time_ = 0, elastic_ = 0, potential_ = 0;
   State sampled_;
-  Energies last_;
-  double worst_residual_ = 0, largest_term_ = 0;
-  std::string csv_;
 };
 
 }  // namespace flexel

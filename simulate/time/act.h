@@ -1,0 +1,91 @@
+// A stretch of a timed run in which nothing changes but the state: what is made of a body and a scene to step
+// it (effects, kernel, held elements, the bound on the step). A run is one act, or several where something
+// else changes between them; the clock and the books go from one act to the next.
+#pragma once
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "simulate/scene.h"
+#include "simulate/simulate.h"
+#include "simulate/time/held.h"
+#include "simulate/time/history.h"
+#include "simulate/time/implicit_damping.h"
+#include "simulate/time/step_bound.h"
+#include "simulate/time/stepper.h"
+
+namespace flexel {
+
+// How far a run has come; State::time is the time itself.
+struct Clock {
+  double until = 0;               // s, when the act ends
+  double step = 0, previous = 0;  // s: the present length of a step, that of the last step taken
+  double epoch = 0;               // s, time of step 0 of the present length
+  std::uint64_t in_epoch = 0;     // steps of the present length
+  std::uint64_t steps = 0;        // of the run
+};
+
+// The state of a body as a run finds it: displaced to its positions, with its column "velocity" where it has
+// one, at time 0.
+[[nodiscard]] State beginning(const Body& body);
+
+class Act {
+ public:
+  // Refers to all of them while it lives. `fresh`: the run begins, so effects that change the state at its
+  // start do, and held elements are put on their paths. Throws InputError.
+  Act(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress, State state,
+      bool fresh);
+  Act(const Act&) = delete;
+  Act& operator=(const Act&) = delete;
+
+  // Chooses the length of the steps from here to clock.until. Throws DivergedError: it has fallen to nothing;
+  // InputError: at the first step, where the scene's step is above the stable one.
+  void choose_step(Clock& clock);
+  // Looks at the present state. Throws DivergedError: it is folded, not finite or far beyond what any scene
+  // means.
+  void refuse_unsound();
+  // Chooses anew where the length does not suit what was last looked at.
+  void adapt_step(Clock& clock);
+  // One step. With `history` its books, and a row of them where `row`. Throws DivergedError.
+  void step(Clock& clock, History* history, bool row);
+  // The books of the present state need the forces there, hence a step that is thrown away.
+  void close_books(const Clock& clock, History& history);
+
+  // Moves the body to `state`: positions, velocities, what broke, what the cells remember.
+  void store(const State& state);
+  // What can be measured now. `unbalanced` forces are those of the last step.
+  void report(const Clock& clock, SimulateResult& result);
+
+  [[nodiscard]] const State& state() const { return state_; }
+  [[nodiscard]] const std::vector<Pass>& passes() const { return passes_; }
+  [[nodiscard]] const Stepper& stepper() const { return *stepper_; }
+  [[nodiscard]] bool solves() const { return implicit_.has_value(); }
+  [[nodiscard]] std::unique_ptr<History> make_history(Ledger ledger) const;
+
+ private:
+  void make_forces();
+  void look();
+  void sum_forces(History* history);
+  void add_connection_forces(History* history);
+
+  Body& body_;
+  const Scene& scene_;
+  Progress& progress_;
+  Setting setting_;
+  std::vector<ProbePoints> probes_;
+  std::vector<Pass> passes_;
+  StepPlan plan_;
+  Constraints constraints_;
+  State state_;
+  std::optional<PaperModel> paper_;  // of the centre-placed parts
+  bool paper_damped_ = false;
+  std::optional<Stepper> stepper_;
+  std::optional<Held> held_;
+  std::optional<ImplicitDamping> implicit_;
+  std::optional<StepBound> bound_;
+  std::vector<Vec3> steady_, outer_;  // (elements) N, of the passes that are constant; of all
+  bool varies_ = false;
+  double kernel_seconds_ = 0, paper_seconds_ = 0;
+};
+
+}  // namespace flexel
