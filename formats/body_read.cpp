@@ -152,8 +152,10 @@ void read_cells(const vtu::File& file, Body& body) {
 }  // namespace
 
 Body read_body(const std::string& path) {
-  const std::string where = path == "-" ? "stdin" : path;
-  Bytes bytes = read_all(path);
+  return read_body(read_all(path), path == "-" ? "stdin" : path);
+}
+
+Body read_body(Bytes bytes, const std::string& where) {
   if (!looks_like_body(bytes))
     throw InputError(where,
                      "is not a body file: one written by flexel-voxelize or flexel-simulate is needed");

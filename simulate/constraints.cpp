@@ -6,13 +6,15 @@
 
 namespace flexel {
 
-void apply(const Constraints& constraints, const Body& body, double share, std::vector<Vec3>& displacement) {
+void apply(const Constraints& constraints, const Body& body, const State& state,
+           std::vector<Vec3>& displacement) {
   parallel_for_each(constraints.mask.size(), [&](std::size_t e) {
     if (!constraints.mask[e]) return;
     for (int axis = 0; axis < 3; ++axis)
       if (constraints.mask[e] >> axis & 1) {
-        const Motion& motion = constraints.motions[constraints.motion[e][static_cast<std::size_t>(axis)]];
-        displacement[e][axis] = motion.displacement(body.rest[e], share)[axis];
+        const std::uint32_t motion = constraints.motion[e][static_cast<std::size_t>(axis)];
+        displacement[e][axis] = constraints.motions[motion].displacement(
+            body.rest[e], constraints.courses[motion].at(state))[axis];
       }
   });
 }

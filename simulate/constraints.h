@@ -17,8 +17,10 @@ struct Constraints {
   std::vector<Course> courses = {};  // (motions) how each goes on in a timed run
 };
 
-// Displacement [m] that the prescribed axes have at load share `share`; the others keep `displacement`.
-void apply(const Constraints& constraints, const Body& body, double share, std::vector<Vec3>& displacement);
+// Displacement [m] that the prescribed axes have at `state`'s load share, or in a timed run at its time; the
+// others keep `displacement`, which may be that of `state`.
+void apply(const Constraints& constraints, const Body& body, const State& state,
+           std::vector<Vec3>& displacement);
 
 // 0 in every prescribed component.
 void clear_prescribed(const Constraints& constraints, std::vector<Vec3>& values);

@@ -15,14 +15,15 @@ double squared_norm(const std::vector<Vec3>& values) {
   return parallel_sum<double>(values.size(), [&](std::size_t e) { return values[e].squaredNorm(); });
 }
 
-// Elements that nothing resists at (of loose crumbs) stay where they are.
-Constraints initial_constraints(const Body& body, const Stencil& stencil, const PaperModel& paper) {
+// Elements that nothing resists at (of loose crumbs) stay where they are; in time their inertia carries them.
+Constraints initial_constraints(const Setting& setting, const Stencil& stencil, const PaperModel& paper) {
+  const Body& body = setting.body;
   Constraints constraints;
   constraints.mask.assign(body.element_count(), 0);
   constraints.motion.assign(body.element_count(), {0, 0, 0});
   constraints.motions.push_back({});
   constraints.courses.push_back({});
-  for (std::uint32_t e = 0; e < body.element_count(); ++e)
+  for (std::uint32_t e = 0; !setting.duration && e < body.element_count(); ++e)
     if (stencil.of(e).empty() && !paper.active()[e]) constraints.mask[e] = 7;
   return constraints;
 }
@@ -35,7 +36,7 @@ Mechanics::Mechanics(const Setting& setting, std::vector<Pass> passes)
       pattern_(stiffness_pattern(setting.body, active_cells(setting), paper_.rows(), coupled(passes))),
       cells_(setting, pattern_.stencil),
       passes_(std::move(passes)),
-      constraints_(initial_constraints(setting.body, pattern_.stencil, paper_)) {
+      constraints_(initial_constraints(setting, pattern_.stencil, paper_)) {
   for (const Pass& pass : passes_)
     if (pass.constrain) pass.constrain(constraints_);
 }
@@ -64,6 +65,15 @@ double Mechanics::energy(const State& state) {
   return energy;
 }
 
+void Mechanics::add_elastic_forces(const State& state, std::vector<Vec3>& forces) {
+  {
+    const PassTimer timer(cell_seconds_);
+    cells_.add_forces(state, forces);
+  }
+  const PassTimer timer(paper_seconds_);
+  paper_.add_forces(state, forces);
+}
+
 Forces Mechanics::forces(const State& state) {
   Forces result;
   std::vector<Vec3> inner(body_.element_count(), Vec3::Zero());
@@ -73,14 +83,7 @@ Forces Mechanics::forces(const State& state) {
       const PassTimer timer(pass.seconds);
       pass.add_forces(state, pass.couples.empty() ? result.total : inner);
     }
-  {
-    const PassTimer timer(cell_seconds_);
-    cells_.add_forces(state, inner);
-  }
-  {
-    const PassTimer timer(paper_seconds_);
-    paper_.add_forces(state, inner);
-  }
+  add_elastic_forces(state, inner);
   const double outer = squared_norm(result.total);
   const double held = parallel_sum<double>(inner.size(), [&](std::size_t e) {
     double sum = 0;

@@ -33,12 +33,15 @@ class Mechanics {
   [[nodiscard]] const Cells& cells() const { return cells_; }
   [[nodiscard]] const PaperModel& paper() const { return paper_; }
   [[nodiscard]] const BlockMatrix& stiffness() const { return pattern_.matrix; }
+  [[nodiscard]] const std::vector<Pass>& passes() const { return passes_; }
 
   // Total energy [J]; infinity where a cell or an element has J <= 0.
   [[nodiscard]] double energy(const State& state);
   [[nodiscard]] double elastic_energy(const State& state) {
     return cells_.energy(state) + paper_.energy(state);
   }
+  // Adds the forces of the models alone [N] (elements).
+  void add_elastic_forces(const State& state, std::vector<Vec3>& forces);
   [[nodiscard]] MostCompressed most_compressed(const State& state) const;
   [[nodiscard]] Forces forces(const State& state);
   // Tangent stiffness into stiffness(), prescribed components not yet eliminated.

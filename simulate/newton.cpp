@@ -62,8 +62,14 @@ double rounding_floor(const BlockMatrix& matrix, const std::vector<Vec3>& u) {
 class Solver {
  public:
   Solver(Mechanics& mechanics, State& state, const NewtonOptions& options,
-         const std::function<void(const std::string&)>& progress)
-      : mechanics_(mechanics), state_(state), options_(options), progress_(progress) {}
+         const std::function<void(const std::string&)>& progress, NewtonMemory* memory)
+      : mechanics_(mechanics),
+        state_(state),
+        options_(options),
+        progress_(progress),
+        kept_(memory ? *memory : own_) {
+    if (kept_.projected) kept_.factored = false;
+  }
 
   NewtonOutcome run();
 
@@ -88,16 +94,12 @@ class Solver {
   const NewtonOptions& options_;
   const std::function<void(const std::string&)>& progress_;
   NewtonOutcome outcome_;
-  std::unique_ptr<Preconditioner> preconditioner_;
-  bool factored_ =
-      false;  // the preconditioner is that of the matrix, whose prescribed components are eliminated
-  int usual_iterations_ = 0;    // of conjugate gradients with a preconditioner made anew
+  NewtonMemory own_;
+  NewtonMemory& kept_;
   std::vector<Vec3> gap_;       // what prescribed elements still have to go; empty when they are there
   std::vector<Vec3> residual_;  // forces on free components
   std::vector<Vec3> direction_;
   double residual_norm_ = 0, scale_ = 0;
-  double model_error_ = 1;   // of the last step, relative
-  bool projected_ = false;   // the tangent's indefinite cells were made positive
   bool indefinite_ = false;  // conjugate gradients met negative curvature in the last solve
   double longest_step_ = 0;
   // (cells) Pa, predicted by the last full step's linear model; empty before it and for lowering steps
@@ -109,25 +111,26 @@ void Solver::update_residual() {
   residual_ = std::move(forces.total);
   clear_prescribed(mechanics_.constraints(), residual_);
   residual_norm_ = norm(residual_);
-  scale_ = forces.scale;
+  scale_ = std::max(forces.scale, options_.least_scale);
   outcome_.relative_residual = scale_ > 0 ? residual_norm_ / scale_ : 0;
 }
 
 void Solver::prepare_tangent(bool project) {
-  factored_ = false;
+  kept_.factored = false;
   mechanics_.assemble(state_, {project, predicted_stress_.empty() ? nullptr : &predicted_stress_});
-  projected_ = project;
+  kept_.projected = project;
 }
 
 // A refreshed preconditioner keeps the aggregates and the rigid motions of the positions it was made at; it
 // is made anew when turning has made it poor.
 void Solver::factor() {
   mechanics_.eliminate_prescribed();
-  if (preconditioner_)
-    preconditioner_->refresh();
+  if (kept_.preconditioner)
+    kept_.preconditioner->refresh();
   else
-    preconditioner_ = aggregation_multigrid(mechanics_.stiffness(), node_geometry(mechanics_.body(), state_));
-  factored_ = true;
+    kept_.preconditioner =
+        aggregation_multigrid(mechanics_.stiffness(), node_geometry(mechanics_.body(), state_));
+  kept_.factored = true;
 }
 
 // Forces on the free components, less what the way of the prescribed ones pulls with it. Eliminates them from
@@ -145,26 +148,26 @@ std::vector<Vec3> Solver::right_hand_side() {
 
 void Solver::solve_linear(const std::vector<Vec3>& rhs, double forcing) {
   const PassTimer timer(outcome_.linear_seconds);
-  const bool fresh = !preconditioner_;
-  if (!factored_) factor();
+  const bool fresh = !kept_.preconditioner;
+  if (!kept_.factored) factor();
   direction_.assign(rhs.size(), Vec3::Zero());
   const LinearResult result = conjugate_gradients(
-      mechanics_.stiffness(), rhs, direction_, *preconditioner_, forcing,
+      mechanics_.stiffness(), rhs, direction_, *kept_.preconditioner, forcing,
       full() ? kMaxCgOfFullStep : kMaxCgIterations, [&](int iteration, double relative) {
         progress_(fmt::format("newton {}, cg {}, {:.0e}", outcome_.iterations + 1, iteration, relative));
       });
   outcome_.cg_iterations += result.iterations;
   indefinite_ = result.indefinite || (full() && result.iterations == kMaxCgOfFullStep);
-  if (fresh) usual_iterations_ = result.iterations;
-  const bool poor = result.iterations > 2 * usual_iterations_ + 20;
-  if (result.indefinite && !projected_) {
+  if (fresh) kept_.usual_iterations = result.iterations;
+  const bool poor = result.iterations > 2 * kept_.usual_iterations + 20;
+  if (result.indefinite && !kept_.projected) {
     prepare_tangent(true);
     const std::vector<Vec3> again = right_hand_side();
     solve_linear(again, forcing);
   } else if (poor) {
-    preconditioner_.reset();
-    factored_ = false;
-    model_error_ = 1;
+    kept_.preconditioner.reset();
+    kept_.factored = false;
+    kept_.model_error = 1;
   }
 }
 
@@ -186,7 +189,7 @@ bool Solver::lead_prescribed() {
       state_ = std::move(trial);
       for (Vec3& gap : gap_) gap *= 1 - step;
       if (step == 1) {
-        apply(mechanics_.constraints(), mechanics_.body(), state_.share, state_.displacement);
+        apply(mechanics_.constraints(), mechanics_.body(), state_, state_.displacement);
         gap_.clear();
       }
       return true;
@@ -232,7 +235,7 @@ bool Solver::full_step() {
   predicted_stress_ = mechanics_.cells().predicted_stress(state_, direction_);
   state_ = std::move(trial);
   if (!gap_.empty()) {
-    apply(mechanics_.constraints(), mechanics_.body(), state_.share, state_.displacement);
+    apply(mechanics_.constraints(), mechanics_.body(), state_, state_.displacement);
     gap_.clear();
   }
   return true;
@@ -241,13 +244,13 @@ bool Solver::full_step() {
 double Solver::forcing() const {
   const double largest = full() ? kLooseForcing : kLargestForcing;
   const double wanted = std::min(0.3 * options_.tolerance * scale_ / residual_norm_, kLargestForcing);
-  const double trusted = outcome_.iterations == 0 ? kFirstForcing : std::min(largest, model_error_);
+  const double trusted = outcome_.iterations == 0 ? kFirstForcing : std::min(largest, kept_.model_error);
   return std::max(trusted, wanted);
 }
 
 void Solver::begin() {
   gap_ = state_.displacement;
-  apply(mechanics_.constraints(), mechanics_.body(), state_.share, gap_);
+  apply(mechanics_.constraints(), mechanics_.body(), state_, gap_);
   for (std::size_t e = 0; e < gap_.size(); ++e) gap_[e] -= state_.displacement[e];
   if (norm(gap_) == 0) gap_.clear();
   update_residual();
@@ -257,7 +260,7 @@ void Solver::begin() {
 bool Solver::arrived() {
   const bool led = gap_.empty();
   if (led && (residual_norm_ <= options_.tolerance * scale_ || residual_norm_ == 0)) return true;
-  if (!factored_ || model_error_ > kKeepTangentBelow || !led) prepare_tangent(false);
+  if (!kept_.factored || kept_.model_error > kKeepTangentBelow || !led) prepare_tangent(false);
   return led && residual_norm_ <= rounding_floor(mechanics_.stiffness(), state_.displacement);
 }
 
@@ -273,14 +276,14 @@ bool Solver::advance() {
     for (const Vec3& step : direction_) outcome_.first_reach = std::max(outcome_.first_reach, step.norm());
   // What the linear model predicts for the residual after a full step.
   std::vector<Vec3> predicted(rhs.size());
-  if (factored_) multiply(mechanics_.stiffness(), direction_, predicted);
+  if (kept_.factored) multiply(mechanics_.stiffness(), direction_, predicted);
   parallel_for_each(rhs.size(), [&](std::size_t e) { predicted[e] = rhs[e] - predicted[e]; });
   const double before = led ? residual_norm_ : norm(rhs);
   if (!(full() ? full_step() : led ? line_search(residual_) : lead_prescribed())) return false;
   update_residual();
   if (before > 0) {
     parallel_for_each(rhs.size(), [&](std::size_t e) { predicted[e] -= residual_[e]; });
-    model_error_ = norm(predicted) / before;
+    kept_.model_error = norm(predicted) / before;
   }
   progress_(fmt::format("newton {}, residual {:.1e}", outcome_.iterations + 1, outcome_.relative_residual));
   return true;
@@ -290,7 +293,7 @@ NewtonOutcome Solver::run() {
   begin();
   for (; outcome_.iterations < options_.max_iterations; ++outcome_.iterations) {
     if (arrived()) {
-      outcome_.converged = !(full() && (projected_ || indefinite_));
+      outcome_.converged = !(full() && (kept_.projected || indefinite_));
       if (!outcome_.converged) outcome_.trouble = "the equilibrium that was found is unstable";
       return outcome_;
     }
@@ -309,8 +312,8 @@ NewtonOutcome Solver::run() {
 }  // namespace
 
 NewtonOutcome newton(Mechanics& mechanics, State& state, const NewtonOptions& options,
-                     const std::function<void(const std::string&)>& progress) {
-  return Solver(mechanics, state, options, progress).run();
+                     const std::function<void(const std::string&)>& progress, NewtonMemory* memory) {
+  return Solver(mechanics, state, options, progress, memory).run();
 }
 
 NodeGeometry node_geometry(const Body& body, const State& state) {

@@ -17,6 +17,18 @@ struct NewtonOptions {
   NewtonSteps steps = NewtonSteps::lowering;
   double tolerance = 1e-8;  // residual relative to loads and reactions
   int max_iterations = 40;
+  double least_scale = 0;  // N, that the residual is measured against at least
+};
+
+// What one solution may leave to the next, of the same mechanics nearby: the tangent, eliminated, in
+// Mechanics::stiffness() and its preconditioner. Empty: everything is made anew.
+struct NewtonMemory {
+  std::unique_ptr<Preconditioner> preconditioner;
+  // the preconditioner is that of the matrix, whose prescribed components are eliminated
+  bool factored = false;
+  int usual_iterations = 0;  // of conjugate gradients with a preconditioner made anew
+  double model_error = 1;    // of the last step, relative
+  bool projected = false;    // the tangent's indefinite cells were made positive
 };
 
 struct NewtonOutcome {

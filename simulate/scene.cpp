@@ -110,10 +110,13 @@ void parse_time(TableReader& reader, RunSettings& run) {
     run.method = TimeMethod::explicit_euler;
   else if (*method == "verlet")
     run.method = TimeMethod::verlet;
+  else if (*method == "implicit")
+    run.method = TimeMethod::implicit_euler;
   else
     reader.fail(
         reader.find("method")->line,
-        fmt::format("\"method\" = \"{}\"; choose \"symplectic\", \"verlet\" or \"explicit\"", *method));
+        fmt::format("\"method\" = \"{}\"; choose \"symplectic\", \"verlet\", \"explicit\" or \"implicit\"",
+                    *method));
 }
 
 RunSettings parse_run(TableReader& root) {

@@ -33,7 +33,7 @@ struct Probe {
   std::string origin;
 };
 
-enum class TimeMethod { symplectic_euler, explicit_euler, verlet };
+enum class TimeMethod { symplectic_euler, explicit_euler, verlet, implicit_euler };
 
 // [run]
 struct RunSettings {

@@ -133,7 +133,7 @@ std::string Drag::why() const {
   return why;
 }
 
-Vec3 Drag::force(const Face& face, const State& state) const {
+Drag::Front Drag::front(const Face& face, const State& state) const {
   CellVectors u;
   Vec3 velocity = Vec3::Zero();
   for (std::size_t a = 0; a < 8; ++a) {
@@ -142,12 +142,45 @@ Vec3 Drag::force(const Face& face, const State& state) const {
   }
   const Vec3 now =
       cofactor(Mat3::Identity() + displacement_gradient(kinds_[face.part], u)) * (face.exposed * face.area);
-  const double area = now.norm();
-  const double outward = velocity.dot(now) / area;
-  if (!(outward > 0)) return Vec3::Zero();
-  double resistance = 0.5 * density_ * coefficient_ * outward;  // Pa s/m
+  const double outward = velocity.dot(now) / now.norm();
+  return {now, outward > 0 ? outward : 0};
+}
+
+Vec3 Drag::force(const Face& face, const State& state) const {
+  const Front at = front(face, state);
+  if (at.outward == 0) return Vec3::Zero();
+  double resistance = 0.5 * density_ * coefficient_ * at.outward;  // Pa s/m
   if (state.kick > 0) resistance = std::min(resistance, kMostOfStep * face.surface_mass / state.kick);
-  return -(resistance * outward) * now;
+  return -(resistance * at.outward) * at.area;
+}
+
+double Drag::resistance(const State& state) const {
+  return parallel_sum<double>(faces_.size(),
+                              [&](std::size_t f) {
+                                const Front at = front(faces_[f], state);
+                                return density_ * coefficient_ / 6 * at.area.norm() * std::pow(at.outward, 3);
+                              }) +
+         parallel_sum<double>(balls_.size(), [&](std::size_t b) {
+           return density_ / 3 * balls_[b].area * std::pow(state.velocity[balls_[b].element].norm(), 3);
+         });
+}
+
+// Each piece's matrix g w w^T n n^T is at most its row sums on the diagonal, and the same for what moves as
+// one; balls: rho A (|v| I + v v^T / |v|) is at most twice rho A |v| I.
+void Drag::add_resistance(const State& state, double scale, BlockMatrix& matrix) const {
+  for (const Face& face : faces_) {
+    const Front at = front(face, state);
+    if (at.outward == 0) continue;
+    const Block block =
+        scale * density_ * coefficient_ * at.outward / at.area.norm() * at.area * at.area.transpose();
+    double sum = 0;
+    for (const double weight : face.weights) sum += std::abs(weight);
+    for (std::size_t a = 0; a < 8; ++a)
+      matrix.values[diagonal_position(matrix, face.elements[a])] += std::abs(face.weights[a]) * sum * block;
+  }
+  for (const Ball& ball : balls_)
+    matrix.values[diagonal_position(matrix, ball.element)].diagonal().array() +=
+        2 * scale * density_ * ball.area * state.velocity[ball.element].norm();
 }
 
 void Drag::add_forces(const State& state, std::vector<Vec3>& forces) const {

@@ -14,7 +14,8 @@
 // In one step drag takes at most a fifth of the velocity away: a light body in a dense medium is slowed, not
 // thrown back, and the bound on the step stays what it is. For a surface piece: its impulse is at most 0.2
 // v_n of the mass that its share of the elements' surface carries, with which the sum over all pieces is at
-// most 0.2 m v of every element.
+// most 0.2 m v of every element. Implicit steps take the drag whole, at the velocity that they end with:
+// minus the derivative of 1/6 rho C A v_n^3, and of 1/3 pi r^2 rho |v|^3.
 #pragma once
 #include "simulate/cell_model.h"
 #include "simulate/effects/effect.h"
@@ -35,6 +36,8 @@ class Drag {
   [[nodiscard]] static std::optional<Drag> make(const Parameters& parameters, const Setting& setting);
   [[nodiscard]] std::string why() const;
   void add_forces(const State& state, std::vector<Vec3>& forces) const;
+  [[nodiscard]] double resistance(const State& state) const;
+  void add_resistance(const State& state, double scale, BlockMatrix& matrix) const;
 
  private:
   // The surface of one polygon in one cell.
@@ -53,6 +56,12 @@ class Drag {
   [[nodiscard]] static std::vector<Face> faces(const Setting& setting);
   static void uncover(const Setting& setting, std::vector<Face>& faces);
   static void weigh(const std::vector<double>& mass, std::vector<Face>& faces);
+  // Of one piece of surface as it is now.
+  struct Front {
+    Vec3 area = Vec3::Zero();  // m^2, outward
+    double outward = 0;        // m/s, along it; 0: nothing is felt
+  };
+  [[nodiscard]] Front front(const Face& face, const State& state) const;
   [[nodiscard]] Vec3 force(const Face& face, const State& state) const;
 
   double density_ = 0, coefficient_ = 1;

@@ -24,6 +24,12 @@
 //                                                                     work
 //   void compose(StepPlan&) const                                     what it asks of the hot kernel
 //   void start(State&) const                                          changes the state before the first step
+//   double resistance(const State&) const                             W, minus whose derivative by the
+//                                                                     velocities its forces are: it resists
+//                                                                     them
+//   void add_resistance(const State&, double scale, BlockMatrix&) const
+//                                                                     scale [1/s] times at least the second
+//                                                                     derivative, for implicit steps
 //   bool constant() const                                             its forces are the same at every step
 //   double added_frequency([const State&,] const std::vector<double>& mass) const
 //                                                                     1/s^2: bound on what its stiffness adds
@@ -86,6 +92,11 @@ concept Starts = requires(const E& e, State& s) {
   e.start(s);
 };
 template <class E>
+concept Resists = requires(const E& e, const State& s, double scale, BlockMatrix& m) {
+  { e.resistance(s) } -> std::convertible_to<double>;
+  e.add_resistance(s, scale, m);
+};
+template <class E>
 concept TellsConstant = requires(const E& e) {
   { e.constant() } -> std::same_as<bool>;
 };
@@ -114,6 +125,8 @@ struct Pass {
   std::vector<CoupledElements> couples;
   std::function<void(StepPlan&)> compose;
   std::function<void(State&)> start;
+  std::function<double(const State&)> resistance;
+  std::function<void(const State&, double, BlockMatrix&)> add_resistance;
   std::function<double(const State&, const std::vector<double>&)> added_frequency;
   Book book = Book::work;
   bool constant = false, needs_time = false;
@@ -135,6 +148,12 @@ template <class E>
   if constexpr (Couples<E>) pass.couples = effect->couples();
   if constexpr (Composes<E>) pass.compose = [effect](StepPlan& p) { effect->compose(p); };
   if constexpr (Starts<E>) pass.start = [effect](State& s) { effect->start(s); };
+  if constexpr (Resists<E>) {
+    pass.resistance = [effect](const State& s) { return effect->resistance(s); };
+    pass.add_resistance = [effect](const State& s, double scale, BlockMatrix& m) {
+      effect->add_resistance(s, scale, m);
+    };
+  }
   if constexpr (AddsFrequency<E>)
     pass.added_frequency = [effect, known = std::optional<double>()](const State&,
                                                                      const std::vector<double>& m) mutable {
