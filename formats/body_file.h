@@ -17,9 +17,6 @@ struct BodyFileOptions {
 // Writes `body` ("-": stdout). The round trip is bit-exact.
 void write_body(const Body& body, const std::string& path, const BodyFileOptions& options = {});
 
-// The bytes of such a file.
-[[nodiscard]] Bytes body_bytes(const Body& body, const BodyFileOptions& options = {});
-
 // Reads a body ("-": stdin). Throws InputError: not a body file, empty or truncated (for stdin: the program
 // before it failed), an unknown version, a size that does not agree (naming the field).
 [[nodiscard]] Body read_body(const std::string& path);

@@ -23,8 +23,6 @@ using Bytes = std::vector<std::byte>;
 class OutputFile {
  public:
   explicit OutputFile(const std::string& path, bool binary = true);
-  // Appends to `memory`, which must outlive it; whole once committed.
-  explicit OutputFile(Bytes& memory) : memory_(&memory) {}
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
@@ -40,7 +38,6 @@ class OutputFile {
   std::string target_;     // what it stands for once links are followed
   std::string temporary_;  // "" for stdout, devices and FIFOs, and once committed
   int descriptor_ = -1;
-  Bytes* memory_ = nullptr;
   bool committed_ = false;
   std::vector<char> buffer_;
 };

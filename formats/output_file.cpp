@@ -153,11 +153,6 @@ void OutputFile::flush_buffer() {
 }
 
 void OutputFile::write_through(const char* data, std::size_t size) {
-  if (memory_) {
-    const auto* bytes = reinterpret_cast<const std::byte*>(data);
-    memory_->insert(memory_->end(), bytes, bytes + size);
-    return;
-  }
   while (size > 0) {
     const ssize_t written = ::write(descriptor_, data, size);
     if (written >= 0) {
@@ -177,7 +172,7 @@ void OutputFile::commit() {
   if (committed_) return;
   flush_buffer();
   committed_ = true;
-  if (memory_ || descriptor_ == STDOUT_FILENO) return;
+  if (descriptor_ == STDOUT_FILENO) return;
   const int closed =
       ::close(std::exchange(descriptor_, -1));  // some disks report only here that they are full
   if (closed != 0 && errno != EINTR) refuse(path_, errno);

@@ -7,6 +7,7 @@
 #include "simulate/merge.h"
 #include "simulate/scene.h"
 #include "simulate/simulate.h"
+#include "simulate/time/checkpoint.h"
 
 namespace {
 
@@ -15,17 +16,27 @@ using namespace flexel;
 struct Arguments {
   std::string scene;
   std::vector<std::string> bodies;
-  std::string output = "-", summary, timeout;
+  std::string output, summary, timeout, resume, checkpoint_every;
   SimulateOptions options;
   bool quiet = false, compress = false;
 };
 
 void declare(CLI::App& app, Arguments& arguments) {
-  app.add_option("scene", arguments.scene, "Scene file (TOML; docs/scene.md gives every key)")->required();
+  app.add_option("scene", arguments.scene, "Scene file (TOML; docs/scene.md gives every key)");
   app.add_option("body", arguments.bodies,
                  "Body files; none or \"-\": stdin. Several are simulated together");
   app.add_option("-o,--output", arguments.output,
                  "Deformed body (.vtu; in timed runs also .pvd, a series of frames); \"-\": stdout");
+  app.add_option("--checkpoint", arguments.options.checkpoint,
+                 "Timed runs: write now and then, and when the run is stopped, all that it needs to go on to "
+                 "this file (docs/motion.md)");
+  app.add_option("--checkpoint-every", arguments.checkpoint_every,
+                 "Work between two of them (\"60 s\"); \"10 min\" by itself")
+      ->type_name("TIME");
+  app.add_option(
+      "--resume", arguments.resume,
+      "Go on from this checkpoint to the same bits; scene, body, -o and --history are those of the "
+      "run, and need not be given");
   app.add_option("--threads", arguments.options.threads, "Threads; 0: every core")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--summary", arguments.summary, "Write the summary as JSON to this file (docs/summary.md)");
@@ -64,22 +75,69 @@ std::string failed_name(const std::string& output) {
   return (ends ? output.substr(0, output.size() - 4) : output) + ".failed.vtu";
 }
 
+struct Input {
+  Scene scene;
+  Body body;
+};
+
+// What a checkpoint holds; scene and bodies that are given as well must be the same.
+Input resume(Arguments& arguments) {
+  Resumed resumed = read_checkpoint(arguments.resume);
+  Checkpoint& from = resumed.checkpoint;
+  const auto refuse = [&](const std::string& what) { throw InputError(arguments.resume, what); };
+  if (!arguments.scene.empty() && read_scene(arguments.scene).text != from.scene)
+    refuse(
+        fmt::format("is of a run of another scene than {}: leave the scene out, or begin anew without "
+                    "--resume",
+                    arguments.scene));
+  if (!arguments.bodies.empty() && body_fingerprint(read_bodies(arguments.bodies)) != from.input)
+    refuse("is of a run of another body: leave the body out, or begin anew without --resume");
+  SimulateOptions& options = arguments.options;
+  if (arguments.output.empty()) arguments.output = from.output;
+  if ((extension(arguments.output) == "pvd" || extension(from.output) == "pvd") &&
+      arguments.output != from.output)
+    refuse(fmt::format("is of a run with -o {}: frames go on there; leave -o out", from.output));
+  if (!options.history.empty() && from.history.empty())
+    refuse("is of a run without --history, whose beginning is lost: leave --history out");
+  if (options.history.empty()) options.history = from.history;
+  if (options.checkpoint.empty()) options.checkpoint = arguments.resume;
+  arguments.compress = arguments.compress || from.compress;
+  Input input{parse_scene(from.scene, from.scene_name), std::move(resumed.body)};
+  options.resume = std::make_shared<const Checkpoint>(std::move(from));
+  return input;
+}
+
+Input read_input(Arguments& arguments) {
+  if (arguments.scene == "-" && arguments.bodies.empty())
+    throw InputError("scene and body cannot both come from stdin; give the body's file");
+  if (!arguments.resume.empty()) return resume(arguments);
+  if (arguments.scene.empty())
+    throw InputError("a scene is needed, for example scene.toml; --help shows what is accepted");
+  Scene scene = read_scene(arguments.scene);  // before the body: a typo is answered at once
+  return {std::move(scene), read_bodies(arguments.bodies)};
+}
+
 int run(int argc, char** argv) {
   CLI::App app("Deforms a body as a scene says: loads, fixes and moves, to equilibrium.", "flexel-simulate");
   Arguments arguments;
   declare(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
-  if (arguments.scene == "-" && arguments.bodies.empty())
-    throw InputError("scene and body cannot both come from stdin; give the body's file");
   Progress progress("flexel-simulate", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
-  if (!arguments.timeout.empty()) arguments.options.timeout = parse_timeout(arguments.timeout);
-  const Scene scene = read_scene(arguments.scene);  // before the body: a typo is answered at once
-  Body body = read_bodies(arguments.bodies);
-  arguments.options.failed_output = failed_name(arguments.output);
-  arguments.options.compress = arguments.compress;
+  SimulateOptions& options = arguments.options;
+  if (!arguments.timeout.empty()) options.timeout = parse_timeout(arguments.timeout);
+  if (!arguments.checkpoint_every.empty()) {
+    if (options.checkpoint.empty() && arguments.resume.empty())
+      throw InputError("--checkpoint-every needs --checkpoint FILE");
+    options.checkpoint_every = parse_timeout(arguments.checkpoint_every, "--checkpoint-every");
+  }
+  auto [scene, body] = read_input(arguments);
+  if (arguments.output.empty()) arguments.output = "-";
+  options.output = arguments.output;
+  options.failed_output = failed_name(arguments.output);
+  options.compress = arguments.compress;
   const bool series = extension(arguments.output) == "pvd";
-  if (series) arguments.options.series = arguments.output;
-  const SimulateResult result = simulate(body, scene, arguments.options, progress);
+  if (series) options.series = arguments.output;
+  const SimulateResult result = simulate(body, scene, options, progress);
   for (const std::string& line : summary_lines(result)) progress.say(line);
   BodyFileOptions file_options;
   file_options.compress = arguments.compress;

@@ -41,9 +41,10 @@ struct NewtonOutcome {
 };
 
 // Moves `state` to the equilibrium at its share. On failure the state is what was reached: the caller keeps
-// its own copy. `progress` hears of every iteration and may throw.
+// its own copy. `progress` hears of every iteration and may throw. `memory`: from one solution to the next.
 [[nodiscard]] NewtonOutcome newton(Mechanics& mechanics, State& state, const NewtonOptions& options,
-                                   const std::function<void(const std::string&)>& progress);
+                                   const std::function<void(const std::string&)>& progress,
+                                   NewtonMemory* memory = nullptr);
 
 // Geometry of the unknowns at `state`, for the preconditioner and for free_motions().
 [[nodiscard]] NodeGeometry node_geometry(const Body& body, const State& state);

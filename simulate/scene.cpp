@@ -146,6 +146,7 @@ Scene parse_scene(const std::string& text, const std::string& name) {
   TableReader root(tree, name, "the scene");
   Scene scene;
   scene.name = name;
+  scene.text = text;
   scene.material = root.text("material").value_or("");
   parse_materials(root, scene);
   parse_parts(root, scene);

@@ -100,6 +100,8 @@ void refuse_timed(const std::vector<Pass>& passes, const SimulateOptions& option
                                    pass.name, pass.why));
   if (!options.history.empty() || !options.series.empty())
     throw InputError(scene, "--history and a .pvd series are for timed runs: give [run] time = \"1 s\"");
+  if (!options.checkpoint.empty())
+    throw InputError(scene, "--checkpoint is for timed runs: give [run] time = \"1 s\"");
 }
 
 class Run {
@@ -205,9 +207,9 @@ SimulateResult Run::operator()() {
 
 }  // namespace
 
-double parse_timeout(const std::string& text) {
+double parse_timeout(const std::string& text, const std::string& option) {
   const double seconds = parse_quantity(text, Dimension::time);
-  if (!(seconds > 0)) throw InputError("--timeout: must be above zero");
+  if (!(seconds > 0)) throw InputError(option + ": must be above zero");
   return seconds;
 }
 

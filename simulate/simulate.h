@@ -10,7 +10,8 @@
 
 namespace flexel {
 
-struct Scene;  // simulate/scene.h
+struct Checkpoint;  // simulate/time/checkpoint.h
+struct Scene;       // simulate/scene.h
 
 struct ProbeResult {
   std::string name;
@@ -75,8 +76,15 @@ struct SimulateOptions {
   // Timed runs: where the books go (CSV), and the frames (.pvd); "" for nowhere. docs/motion.md
   std::string history, series;
   bool compress = false;  // the frames
-  std::string isa;        // "portable", "avx2", "avx512"; "" for the best that the machine has
-  bool explain = false;   // say which effects run and why, and afterwards the share of time of each
+  // Timed runs: where checkpoints go ("" for nowhere), how many seconds of work lie between two, what the
+  // output is called, for them; and the one that the run goes on from, whose scene and body simulate() is
+  // given.
+  std::string checkpoint;
+  double checkpoint_every = 600;
+  std::string output;
+  std::shared_ptr<const Checkpoint> resume;
+  std::string isa;       // "portable", "avx2", "avx512"; "" for the best that the machine has
+  bool explain = false;  // say which effects run and why, and afterwards the share of time of each
 };
 
 // Runs the scene on the body, which is moved to its new state. Throws InputError, DivergedError,
@@ -84,8 +92,8 @@ struct SimulateOptions {
 [[nodiscard]] SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& options,
                                       Progress& progress);
 
-// "90 s", "5 min" in seconds. Throws InputError: no time, or none above zero.
-[[nodiscard]] double parse_timeout(const std::string& text);
+// "90 s", "5 min" in seconds, of `option`. Throws InputError: no time, or none above zero.
+[[nodiscard]] double parse_timeout(const std::string& text, const std::string& option = "--timeout");
 
 // The result as JSON (docs/summary.md gives every key and unit).
 [[nodiscard]] std::string summary_json(const SimulateResult& result, const Body& body);

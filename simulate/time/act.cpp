@@ -7,14 +7,17 @@
 #include <limits>
 
 #include "formats/error.h"
+#include "formats/parallel.h"
 #include "simulate/report.h"
 #include "simulate/time/folds.h"
 
 namespace flexel {
 namespace {
 
-constexpr double kSafety = 0.9;   // of the bound: it may fall between two checks
-constexpr double kRunaway = 1e4;  // of the body's diagonal: a displacement that no scene means
+constexpr double kSafety = 0.9;       // of the bound: it may fall between two checks
+constexpr int kImplicitSteps = 200;   // in a run, unless the scene says otherwise
+constexpr std::uint64_t kRenew = 10;  // implicit steps that one tangent may serve
+constexpr double kRunaway = 1e4;      // of the body's diagonal: a displacement that no scene means
 
 Constraints no_constraints(const Body& body) {
   Constraints constraints;
@@ -66,14 +69,31 @@ Act::Act(Body& body, const Scene& scene, const SimulateOptions& options, Progres
   }
   bound_.emplace(setting_, passes_, plan_);
   // Explicit damping may cut the step by 2; beyond that every step solves for it.
-  const bool by_steps = scene.run.method == TimeMethod::explicit_euler || bound_->damps_explicitly();
-  stepper_.emplace(setting_, plan_, !options.history.empty() || !by_steps, options.isa);
+  const bool implicit = scene.run.method == TimeMethod::implicit_euler;
+  const bool by_steps =
+      implicit || scene.run.method == TimeMethod::explicit_euler || bound_->damps_explicitly();
+  stepper_.emplace(setting_, plan_, (!options.history.empty() && !implicit) || !by_steps, options.isa);
   stepper_->read_memory(body.cell_columns);
   if (fresh && Stepper::remembers(body.cell_columns) && plan_.plasticity.empty() && plan_.fracture.empty())
     progress.warn("the body flowed or broke before: without [plasticity] or [fracture] it forgets that");
   held_.emplace(constraints_, body_, state_, fresh);
   if (!by_steps) implicit_.emplace(*stepper_, *held_);
   make_forces();
+  if (implicit) make_implicit();
+}
+
+void Act::make_implicit() {
+  const auto refuse = [&](const std::string& what) {
+    throw InputError(scene_.name,
+                     fmt::format("[run] method = \"implicit\" does not take {}: leave \"method\" out", what));
+  };
+  if (!plan_.plasticity.empty()) refuse("[plasticity]");
+  if (!plan_.fracture.empty()) refuse("[fracture]");
+  if (paper_damped_) refuse("[damping] of model \"paper\"");
+  for (const Pass& pass : passes_)
+    if (pass.add_forces && !pass.energy && !pass.resistance)
+      refuse(fmt::format("{} ({})", pass.name, pass.why));
+  euler_.emplace(setting_, passes_, plan_, stepper_->mass(), scene_.run.tolerance);
 }
 
 void Act::make_forces() {
@@ -93,8 +113,12 @@ void Act::make_forces() {
 }
 
 std::unique_ptr<History> Act::make_history(Ledger ledger) const {
-  return std::make_unique<History>(setting_, passes_, probes_, stepper_->mass(), paper_ ? &*paper_ : nullptr,
-                                   plan_, std::move(ledger));
+  auto history = std::make_unique<History>(setting_, passes_, probes_, stepper_->mass(),
+                                           paper_ ? &*paper_ : nullptr, plan_, std::move(ledger));
+  for (std::size_t p = 0; p < passes_.size(); ++p)
+    if (passes_[p].constant && !history->forces_of(p).empty())
+      passes_[p].add_forces(state_, history->forces_of(p));
+  return history;
 }
 
 void Act::look() {
@@ -105,8 +129,11 @@ void Act::look() {
 void Act::choose_step(Clock& clock) {
   look();
   const double longest = bound_->longest(implicit_.has_value());
+  if (!(longest > 0)) throw DivergedError(where_it_folds(body_, state_.displacement));
   double step = kSafety * longest;
-  if (scene_.run.step) {
+  if (euler_) {
+    step = scene_.run.step.value_or(*scene_.run.time / kImplicitSteps);
+  } else if (scene_.run.step) {
     if (clock.steps == 0 && *scene_.run.step > longest)
       throw InputError(scene_.name,
                        fmt::format("[run] step = {:.4g} s is above {:.4g} s, the longest stable one",
@@ -136,26 +163,33 @@ void Act::refuse_unsound() {
 }
 
 void Act::adapt_step(Clock& clock) {
+  if (euler_) return;
   const double longest = bound_->longest(implicit_.has_value());
   if (clock.step > 0.97 * longest || (!scene_.run.step && clock.step < 0.6 * kSafety * longest))
     choose_step(clock);
 }
 
-// Forces of the passes at the present state; with a history also one by one.
+// Calls add(outer_); where the books want to know, `own` (elements) becomes what it added. So the sum, and
+// with it the motion, has the same bits with books and without.
+template <class Add>
+void Act::add_apart(std::vector<Vec3>* own, const Add& add) {
+  if (own) *own = outer_;
+  add(outer_);
+  if (own) parallel_for_each(own->size(), [&](std::size_t e) { (*own)[e] = outer_[e] - (*own)[e]; });
+}
+
+// Forces of the passes at the present state; with a history also one by one, those that are constant but
+// once.
 void Act::sum_forces(History* history) {
-  if (history)
-    for (std::size_t p = 0; p < passes_.size(); ++p)
-      if (std::vector<Vec3>& own = history->forces_of(p); !own.empty()) {
-        std::fill(own.begin(), own.end(), Vec3::Zero());
-        passes_[p].add_forces(state_, own);
-      }
   if (!varies_) return;
   outer_ = steady_;
-  for (Pass& pass : passes_)
-    if (pass.add_forces && !pass.constant) {
-      const PassTimer timer(pass.seconds);
-      pass.add_forces(state_, outer_);
-    }
+  for (std::size_t p = 0; p < passes_.size(); ++p) {
+    Pass& pass = passes_[p];
+    if (!pass.add_forces || pass.constant) continue;
+    const PassTimer timer(pass.seconds);
+    add_apart(history && !history->forces_of(p).empty() ? &history->forces_of(p) : nullptr,
+              [&](std::vector<Vec3>& sum) { pass.add_forces(state_, sum); });
+  }
   if (paper_) add_connection_forces(history);
 }
 
@@ -165,14 +199,66 @@ void Act::add_connection_forces(History* history) {
     throw DivergedError(folds_at("an element", body_.rest[least.element]));
   paper_->add_forces(state_, outer_);
   if (!paper_damped_) return;
-  paper_->add_damping(state_, plan_.damping, outer_);
-  if (!history) return;
-  std::vector<Vec3>& own = history->connection_damping();
-  own.assign(body_.element_count(), Vec3::Zero());
-  paper_->add_damping(state_, plan_.damping, own);
+  add_apart(history ? &history->connection_damping() : nullptr,
+            [&](std::vector<Vec3>& sum) { paper_->add_damping(state_, plan_.damping, sum); });
+}
+
+void Act::step_implicitly(Clock& clock, History* history, bool row) {
+  const PassTimer timer(kernel_seconds_);
+  if (history && row) history->add_row_of(state_);
+  if (renews(clock)) euler_->forget();
+  const double end = clock.epoch + static_cast<double>(clock.in_epoch + 1) * clock.step;
+  while (*state_.time < end) {
+    const ImplicitStep told = euler_->advance(state_, end, hear_);
+    newton_iterations_ += told.newton_iterations;
+    cg_iterations_ += told.cg_iterations;
+    if (told.step == 0)
+      throw DivergedError(fmt::format(
+          "Newton's method ends nowhere, with steps of {:.3g} s and down to 1/1024 of it: {}; load "
+          "it more slowly or give a shorter [run] step",
+          clock.step, told.trouble));
+    held_->settle(state_, euler_->supports());
+    if (!history) continue;
+    for (std::size_t p = 0; p < passes_.size(); ++p)
+      if (std::vector<Vec3>& own = history->forces_of(p); !own.empty()) {
+        std::fill(own.begin(), own.end(), Vec3::Zero());
+        euler_->add_forces(p, state_, own);
+      }
+    history->enter(euler_->moved(), euler_->damping_force(), euler_->supports(),
+                   euler_->numerical_dissipation(state_));
+  }
+  ++clock.in_epoch;
+  ++clock.steps;
+  clock.previous = clock.step;
+}
+
+bool Act::renews(const Clock& clock) const {
+  return !euler_ || clock.steps % kRenew == 0;
+}
+
+Act::Memory Act::memory() const {
+  Memory memory;
+  memory.cells = stepper_->memory();
+  if (implicit_) memory.damping_change = implicit_->change();
+  if (euler_) memory.reach = euler_->reach();
+  return memory;
+}
+
+void Act::restore(const Memory& memory) {
+  const Stepper::Memory own = stepper_->memory();
+  const std::size_t change = memory.damping_change.size();
+  if (memory.cells.fill.size() != own.fill.size() || memory.cells.plastic.size() != own.plastic.size() ||
+      memory.cells.springs.size() != own.springs.size() ||
+      memory.cells.spring_flow.size() != own.spring_flow.size() ||
+      (change != 0 && (!implicit_ || change != body_.element_count())))
+    throw InputError("the checkpoint's memory is not that of its scene and body: it is damaged");
+  stepper_->restore(memory.cells);
+  if (implicit_) implicit_->set_change(memory.damping_change);
+  if (euler_) euler_->set_reach(memory.reach);
 }
 
 void Act::step(Clock& clock, History* history, bool row) {
+  if (euler_) return step_implicitly(clock, history, row);
   if (history) history->before(state_, row);
   const bool first = clock.steps == 0;
   const double before = first ? (scene_.run.method == TimeMethod::verlet ? 0 : clock.step) : clock.previous;
@@ -203,6 +289,7 @@ void Act::step(Clock& clock, History* history, bool row) {
 }
 
 void Act::close_books(const Clock& clock, History& history) {
+  if (euler_) return history.add_row_of(state_);
   State last = state_;
   const Stepper::Memory memory = stepper_->memory();
   Clock beyond = clock;
@@ -244,8 +331,13 @@ void Act::report(const Clock& clock, SimulateResult& result) {
   measure_displacement(body_, state_, result);
   for (const double mass : stepper_->mass()) result.mass += mass;
   result.timed = TimedSummary{*state_.time, clock.steps, clock.step, stepper_->isa(), {}};
-  result.passes.push_back(
-      {"cells", fmt::format("model of every part, kernel {}", stepper_->isa()), kernel_seconds_});
+  result.newton_iterations = newton_iterations_;
+  result.cg_iterations = cg_iterations_;
+  if (euler_) euler_->add_seconds(passes_);
+  result.passes.push_back({"cells",
+                           euler_ ? "model of every part, Newton's method and its linear solver"
+                                  : fmt::format("model of every part, kernel {}", stepper_->isa()),
+                           kernel_seconds_});
   if (paper_) result.passes.push_back({"connections", "model of centre-placed parts", paper_seconds_});
   for (const Pass& pass : passes_) result.passes.push_back({pass.name, pass.why, pass.seconds});
 }

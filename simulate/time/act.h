@@ -11,6 +11,7 @@
 #include "simulate/time/held.h"
 #include "simulate/time/history.h"
 #include "simulate/time/implicit_damping.h"
+#include "simulate/time/implicit_euler.h"
 #include "simulate/time/step_bound.h"
 #include "simulate/time/stepper.h"
 
@@ -48,6 +49,21 @@ class Act {
   void adapt_step(Clock& clock);
   // One step. With `history` its books, and a row of them where `row`. Throws DivergedError.
   void step(Clock& clock, History* history, bool row);
+  // What the next steps depend on besides state() and the clock; only where renews() says so.
+  struct Memory {
+    Stepper::Memory cells;
+    std::vector<Vec3> damping_change;  // m/s, of ImplicitDamping
+    double reach = 0;                  // s, of ImplicitEuler
+  };
+  [[nodiscard]] Memory memory() const;
+  // Throws InputError("", ...): it is that of another act.
+  void restore(const Memory& memory);
+  // Whether the step to come depends on nothing else. Always, but implicit steps keep their tangent for a
+  // while.
+  [[nodiscard]] bool renews(const Clock& clock) const;
+  // Implicit steps tell `hear` of every iteration; it may throw.
+  void set_hear(std::function<void(const std::string&)> hear) { hear_ = std::move(hear); }
+
   // The books of the present state need the forces there, hence a step that is thrown away.
   void close_books(const Clock& clock, History& history);
 
@@ -60,11 +76,16 @@ class Act {
   [[nodiscard]] const std::vector<Pass>& passes() const { return passes_; }
   [[nodiscard]] const Stepper& stepper() const { return *stepper_; }
   [[nodiscard]] bool solves() const { return implicit_.has_value(); }
+  [[nodiscard]] bool is_implicit() const { return euler_.has_value(); }
   [[nodiscard]] std::unique_ptr<History> make_history(Ledger ledger) const;
 
  private:
   void make_forces();
+  void make_implicit();
+  void step_implicitly(Clock& clock, History* history, bool row);
   void look();
+  template <class Add>
+  void add_apart(std::vector<Vec3>* own, const Add& add);
   void sum_forces(History* history);
   void add_connection_forces(History* history);
 
@@ -82,10 +103,13 @@ class Act {
   std::optional<Stepper> stepper_;
   std::optional<Held> held_;
   std::optional<ImplicitDamping> implicit_;
+  std::optional<ImplicitEuler> euler_;
+  std::function<void(const std::string&)> hear_ = [](const std::string&) {};
   std::optional<StepBound> bound_;
   std::vector<Vec3> steady_, outer_;  // (elements) N, of the passes that are constant; of all
   bool varies_ = false;
   double kernel_seconds_ = 0, paper_seconds_ = 0;
+  int newton_iterations_ = 0, cg_iterations_ = 0;
 };
 
 }  // namespace flexel

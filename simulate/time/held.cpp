@@ -42,6 +42,13 @@ void Held::impose(State& state, const std::vector<double>& mass, const step::Adv
   });
 }
 
+void Held::settle(const State& state, const std::vector<Vec3>& supports) {
+  for (Entry& entry : entries_) {
+    entry.displacement = state.displacement[entry.element];
+    entry.force = supports[entry.element];
+  }
+}
+
 void Held::impose_velocity(const State& end, double drift, std::vector<Vec3>& velocity) const {
   for (const Entry& entry : entries_)
     for (int axis = 0; axis < 3; ++axis)

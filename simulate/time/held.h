@@ -18,6 +18,9 @@ class Held {
   // Call after the velocities and displacements have been advanced as if free to `state.time`, by `advance`.
   void impose(State& state, const std::vector<double>& mass, const step::Advance& advance);
 
+  // Likewise after an advance that already led there, with the supports' forces [N] (elements).
+  void settle(const State& state, const std::vector<Vec3>& supports);
+
   // Sets the held components of `velocity` [m/s] to those that lead to the path at `end.time`, `drift` s
   // away.
   void impose_velocity(const State& end, double drift, std::vector<Vec3>& velocity) const;

@@ -116,6 +116,24 @@ void History::after(const State& state, const StepOutcome& outcome, const std::v
   add_powers(state.velocity, 0.5 * step);
 }
 
+void History::add_row_of(const State& state) {
+  before(state, true);
+  add_row(state);
+}
+
+void History::enter(const std::vector<Vec3>& moved, const std::vector<Vec3>& damping,
+                    const std::vector<Vec3>& supports, double numerical) {
+  const auto add = [&](std::size_t account, const std::vector<Vec3>& forces) {
+    ledger_.accounts[account].energy +=
+        parallel_sum<double>(forces.size(), [&](std::size_t e) { return forces[e].dot(moved[e]); });
+  };
+  for (std::size_t p = 0; p < passes_.size(); ++p)
+    if (!forces_[p].empty()) add(own_[p], forces_[p]);
+  add(supports_, supports);
+  add(damping_, damping);
+  ledger_.accounts[ledger_.account("numerical", true)].energy -= numerical;
+}
+
 void History::add_row(const State& state) {
   const Momenta sum = parallel_sum<Momenta>(mass_.size(), [&](std::size_t e) {
     const Vec3 mean = 0.5 * (velocity_[e] + state.velocity[e]);

@@ -73,6 +73,13 @@ class History {
   void after(const State& state, const StepOutcome& outcome, const std::vector<Vec3>& damping,
              const std::vector<Vec3>& supports, double previous_step, double step);
 
+  // In place of before() and after() where the velocities are those of the state's own time, as in implicit
+  // steps: a row of `state`, and the forces there times how far they moved [m] (elements), with what the
+  // method itself dissipated [J].
+  void add_row_of(const State& state);
+  void enter(const std::vector<Vec3>& moved, const std::vector<Vec3>& damping,
+             const std::vector<Vec3>& supports, double numerical);
+
   [[nodiscard]] const Ledger& ledger() const { return ledger_; }
 
  private:

@@ -26,6 +26,9 @@ class ImplicitDamping {
                       double time);
 
   [[nodiscard]] std::uint64_t iterations() const { return iterations_; }  // of all steps
+  // Where the next search starts [m/s] (elements; or none before the first step).
+  [[nodiscard]] const std::vector<Vec3>& change() const { return change_; }
+  void set_change(std::vector<Vec3> change) { change_ = std::move(change); }
 
  private:
   // D v [N] (elements) at the displacements of probe_.

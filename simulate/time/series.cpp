@@ -15,17 +15,25 @@ Series::Series(std::string path, bool compress) : path_(std::move(path)), compre
   name_ = stem(path_);
 }
 
-void Series::add(const Body& body, double time) {
-  BodyFileOptions options;
-  options.compress = compress_;
-  options.embed_surface = frames_ == 0;
-  write_body(body, fmt::format("{}_{:05}.vtu", base_, frames_), options);
+void Series::enter(double time) {
   std::string file;
   for (const char c : name_)
     file += c == '&' ? "&amp;" : c == '<' ? "&lt;" : c == '"' ? "&quot;" : std::string(1, c);
   entries_ += fmt::format("    <DataSet timestep=\"{:.17g}\" part=\"0\" file=\"{}_{:05}.vtu\"/>\n", time,
-                          file, frames_);
-  ++frames_;
+                          file, times_.size());
+  times_.push_back(time);
+}
+
+void Series::resume(const std::vector<double>& times) {
+  for (const double time : times) enter(time);
+}
+
+void Series::add(const Body& body, double time) {
+  BodyFileOptions options;
+  options.compress = compress_;
+  options.embed_surface = times_.empty();
+  write_body(body, fmt::format("{}_{:05}.vtu", base_, times_.size()), options);
+  enter(time);
   OutputFile out(path_, false);
   out.write(
       "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n"

@@ -12,12 +12,17 @@ class Series {
   // `path` ends in .pvd. Throws InputError when it does not.
   Series(std::string path, bool compress);
   void add(const Body& body, double time);
-  [[nodiscard]] std::size_t size() const { return frames_; }
+  // The frames of these times [s] are there already.
+  void resume(const std::vector<double>& times);
+  [[nodiscard]] std::size_t size() const { return times_.size(); }
+  [[nodiscard]] const std::vector<double>& times() const { return times_; }
 
  private:
+  void enter(double time);
+
   std::string path_, base_, name_, entries_;
   bool compress_;
-  std::size_t frames_ = 0;
+  std::vector<double> times_;
 };
 
 }  // namespace flexel

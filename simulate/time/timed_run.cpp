@@ -12,12 +12,13 @@
 #include "formats/files.h"
 #include "formats/program.h"
 #include "simulate/time/act.h"
+#include "simulate/time/checkpoint.h"
 #include "simulate/time/series.h"
 
 namespace flexel {
 namespace {
 
-constexpr int kCheck = 100;          // steps between checks
+constexpr int kCheck = 100;          // steps between checks; implicit ones are checked one by one
 constexpr std::size_t kRows = 1000;  // of the history, unless the scene says otherwise
 constexpr std::size_t kFrames = 50;  // likewise
 
@@ -27,13 +28,20 @@ class TimedRun {
   SimulateResult operator()();
 
  private:
+  void begin();
+  void resume(const Checkpoint& from);
   void explain();
+  void listen(const std::string& note);
+  void keep();
+  [[nodiscard]] bool save_checkpoint();
+  [[nodiscard]] bool out_of_time() const;
   void play();
   void check();
   void step();
   void write_frame();
   void write_history();
   [[nodiscard]] std::string save_failed();
+  [[nodiscard]] std::string stop();
   SimulateResult report();
 
   Body& body_;
@@ -47,40 +55,108 @@ class TimedRun {
   std::unique_ptr<History> history_;  // of the act; null: none asked for
   std::optional<Series> series_;
   State good_;
+  std::optional<Checkpoint> kept_;  // with --checkpoint: where the run can go on from
+  Bytes act_body_;                  // likewise: the body as the present act began, to be made with it
+  std::chrono::steady_clock::time_point saved_ = began_;
   double next_row_ = 0, next_frame_ = 0;
 };
 
 TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress)
     : body_(body), scene_(scene), options_(options), progress_(progress), duration_(*scene.run.time) {
-  clock_.until = duration_;
-  act_.emplace(body, scene, options, progress, beginning(body), true);
-  if (!options.history.empty()) history_ = act_->make_history({});
   if (!options.series.empty()) series_.emplace(options.series, options.compress);
+  if (!options.checkpoint.empty()) {
+    kept_.emplace();
+    kept_->input = options.resume ? options.resume->input : body_fingerprint(body);
+    act_body_ = body_bytes(body, options.checkpoint);
+  }
+  if (options.resume)
+    resume(*options.resume);
+  else
+    begin();
+  act_->set_hear([this](const std::string& note) { listen(note); });
+}
+
+void TimedRun::begin() {
+  clock_.until = duration_;
+  act_.emplace(body_, scene_, options_, progress_, beginning(body_), true);
+  if (!options_.history.empty()) history_ = act_->make_history({});
+}
+
+void TimedRun::resume(const Checkpoint& from) {
+  clock_ = from.clock;
+  act_.emplace(body_, scene_, options_, progress_, from.state, false);
+  act_->restore(from.memory);
+  if (!options_.history.empty()) history_ = act_->make_history(from.ledger);
+  if (series_) series_->resume(from.frames);
+  next_row_ = from.next_row;
+  next_frame_ = from.next_frame;
 }
 
 void TimedRun::explain() {
   if (!options_.explain) return;
-  progress_.say(fmt::format("plan: cells (the parts' models), {} steps of {:.4g} s, kernel {}",
-                            static_cast<std::uint64_t>(std::llround(duration_ / clock_.step)), clock_.step,
-                            act_->stepper().isa()));
+  const double left = clock_.until - *act_->state().time;
+  progress_.say(fmt::format("plan: cells (the parts' models), {} {}steps of {:.4g} s, {}",
+                            static_cast<std::uint64_t>(std::llround(left / clock_.step)),
+                            act_->is_implicit() ? "implicit " : "", clock_.step,
+                            act_->is_implicit() ? std::string("Newton's method")
+                                                : fmt::format("kernel {}", act_->stepper().isa())));
   if (act_->solves())
     progress_.say(
         "plan: every step solves for the damping, which taken explicitly would cut it by more than 2");
   for (const Pass& pass : act_->passes()) progress_.say(fmt::format("plan: {} ({})", pass.name, pass.why));
 }
 
-void TimedRun::check() {
+bool TimedRun::out_of_time() const {
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - began_;
+  return options_.timeout && taken.count() > *options_.timeout;
+}
+
+// Within an implicit step: what was reached before it stays.
+void TimedRun::listen(const std::string& note) {
   throw_if_interrupted();
+  if (out_of_time()) throw TimeoutError("");
   const double time = *act_->state().time;
-  if (options_.timeout &&
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count() > *options_.timeout) {
-    good_ = act_->state();
-    throw TimeoutError(fmt::format("stopped by --timeout after {} steps at {:.4g} s of {:.4g} s{}",
-                                   clock_.steps, time, duration_, save_failed()));
+  progress_.update(time / duration_, fmt::format("{:.4g} s, step {}, {}", time, clock_.steps, note));
+}
+
+// Where the run can go on from, to the bit.
+void TimedRun::keep() {
+  kept_->state = act_->state();
+  kept_->clock = clock_;
+  kept_->memory = act_->memory();
+  if (history_) kept_->ledger = history_->ledger();
+  if (series_) kept_->frames = series_->times();
+  kept_->next_row = next_row_;
+  kept_->next_frame = next_frame_;
+}
+
+bool TimedRun::save_checkpoint() {
+  saved_ = std::chrono::steady_clock::now();
+  if (!kept_ || !kept_->state.time) return false;
+  kept_->scene_name = scene_.name;
+  kept_->scene = scene_.text;
+  kept_->output = options_.output;
+  kept_->history = options_.history;
+  kept_->compress = options_.compress;
+  try {
+    write_checkpoint(*kept_, act_body_, options_.checkpoint);
+    return true;
+  } catch (const InputError& error) {  // a full disk is no reason to lose the run
+    progress_.warn(fmt::format("no checkpoint: {}: {}", error.where(), error.what()));
+    return false;
   }
+}
+
+void TimedRun::check() {
+  if (kept_ && act_->renews(clock_)) keep();
+  throw_if_interrupted();
+  if (out_of_time()) throw TimeoutError("");
+  const std::chrono::duration<double> since = std::chrono::steady_clock::now() - saved_;
+  if (kept_ && since.count() > options_.checkpoint_every) (void)save_checkpoint();
   act_->refuse_unsound();
   good_ = act_->state();
   act_->adapt_step(clock_);
+  const double time = *act_->state().time;
   progress_.update(time / duration_, fmt::format("{:.4g} s, step {}", time, clock_.steps));
 }
 
@@ -130,17 +206,26 @@ SimulateResult TimedRun::report() {
 }
 
 void TimedRun::play() {
-  act_->choose_step(clock_);
+  if (!options_.resume) act_->choose_step(clock_);
   explain();
-  write_frame();
+  if (!options_.resume) write_frame();
   good_ = act_->state();
+  const std::uint64_t between = act_->is_implicit() ? 1 : kCheck;
   while (*act_->state().time < clock_.until * (1 - 1e-12)) {
-    if (clock_.steps % kCheck == 0) check();
+    if (clock_.steps % between == 0) check();
     step();
     if (series_ && *act_->state().time >= next_frame_ * (1 - 1e-9)) write_frame();
   }
   act_->refuse_unsound();  // a step looks at the state that it begins with; nothing has looked at the last
                            // one
+}
+
+// Saves what a run that is stopped leaves; says where it is.
+std::string TimedRun::stop() {
+  good_ = act_->state();
+  std::string saved = save_failed();
+  if (save_checkpoint()) saved += fmt::format("; go on with --resume {}", options_.checkpoint);
+  return saved;
 }
 
 SimulateResult TimedRun::operator()() {
@@ -150,9 +235,11 @@ SimulateResult TimedRun::operator()() {
   } catch (const DivergedError& error) {
     throw DivergedError(fmt::format("step {} at {:.6g} s: {}{}", clock_.steps, *act_->state().time,
                                     error.what(), save_failed()));
+  } catch (const TimeoutError&) {
+    throw TimeoutError(fmt::format("stopped by --timeout after {} steps at {:.4g} s of {:.4g} s{}",
+                                   clock_.steps, *act_->state().time, duration_, stop()));
   } catch (const Interrupted&) {
-    good_ = act_->state();
-    if (const std::string saved = save_failed(); !saved.empty())
+    if (const std::string saved = stop(); !saved.empty())
       progress_.say(fmt::format("interrupted at step {}{}", clock_.steps, saved));
     throw;
   }

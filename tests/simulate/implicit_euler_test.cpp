@@ -19,6 +19,7 @@ namespace {
 using std::numbers::pi;
 using testing::box_body;
 using testing::BoxOptions;
+using testing::TimedCase;
 
 // Sheared, squeezed, turned cells of partial fill on a turned lattice: C v is what the kernel brakes with.
 TEST(DampingMatrix, IsTheKernelsDamping) {
@@ -48,6 +49,226 @@ TEST(DampingMatrix, IsTheKernelsDamping) {
     EXPECT_GT(largest, 0);
     for (std::size_t e = 0; e < pulled.size(); ++e)
       EXPECT_LT((pulled[e] + stepper.damping_force()[e]).norm(), 1e-11 * largest) << e;
+  }
+}
+
+Scene implicit_scene(const Material& material, double time, double step) {
+  Scene scene;
+  scene.materials[material.name] = material;
+  scene.material = material.name;
+  scene.run.time = time;
+  scene.run.step = step;
+  scene.run.method = TimeMethod::implicit_euler;
+  return scene;
+}
+
+const Material kSteel{"steel", 210e9, 0.3, 7850, "test"};
+const Material kGum{"gum", 1e6, 0.25, 1000, "test"};
+
+Body small_box() {
+  BoxOptions options;
+  options.cells = {3, 2, 2};
+  options.spacing = Vec3::Constant(0.01);
+  return box_body(options);
+}
+
+// A column of one cell, nu = 0, its top displaced and let go: implicit Euler of an oscillator of frequency
+// omega and damping ratio zeta is known exactly.
+//     (1 + 2 zeta omega dt + omega^2 dt^2) x+ = (2 + 2 zeta omega dt) x - x-
+struct Decay {
+  double end = 0, exact = 0, discrete = 0;
+};
+
+Decay decay(int steps, double zeta) {
+  BoxOptions options;
+  options.cells = {1, 1, 1};
+  options.spacing = Vec3::Constant(0.01);
+  Body body = box_body(options);
+  const Material material{"bar", 1e6, 0, 1000, "test"};
+  // one cell: stiffness E A / h over half of its mass
+  const double omega = std::sqrt(1e6 * 0.01 / (0.5 * 1000 * 1e-6)), time = 1.3 / omega * 2 * pi;
+  Scene scene = implicit_scene(material, time, time / steps);
+  scene.run.tolerance = 1e-11;
+  scene.get<Ties>().ties.push_back(make_fix(select_by_name("x0")));
+  if (zeta > 0) scene.get<Damping>().entries.push_back({2 * zeta / omega, {}, ""});
+  const double start = 1e-9;
+  for (Vec3& at : body.position)
+    if (at.x() > 0.005) at.x() += start;
+  const TimedCase made = testing::run_timed(std::move(body), scene);
+  testing::expect_books_close(made.result);
+  Decay result;
+  result.end = (made.body.position.back().x() - made.body.rest.back().x()) / start;
+  const double fast = omega * std::sqrt(1 - zeta * zeta), dt = time / steps;
+  result.exact =
+      std::exp(-zeta * omega * time) * (std::cos(fast * time) + zeta * omega / fast * std::sin(fast * time));
+  double before = 1, now = 1;
+  for (int n = 0; n < steps; ++n) {
+    const double next =
+        ((2 + 2 * zeta * omega * dt) * now - before) / (1 + 2 * zeta * omega * dt + std::pow(omega * dt, 2));
+    before = now;
+    now = next;
+  }
+  result.discrete = now;
+  return result;
+}
+
+TEST(ImplicitEuler, OscillatorIsOfFirstOrder) {
+  for (const double zeta : {0.0, 0.3}) {
+    const Decay coarse = decay(400, zeta), fine = decay(800, zeta);
+    EXPECT_NEAR(coarse.end, coarse.discrete, 1e-6);
+    EXPECT_NEAR(fine.end, fine.discrete, 1e-6);
+    EXPECT_NEAR((coarse.end - coarse.exact) / (fine.end - fine.exact), 2, 0.2) << zeta;
+  }
+}
+
+TEST(ImplicitEuler, FreeFallIsOfFirstOrder) {
+  // exactly dt^2 g n (n + 1) / 2
+  Scene scene = implicit_scene(kGum, 0.2, 0.02);
+  scene.get<Gravity>().acceleration = Vec3(1, -2, -9.81);
+  scene.get<Damping>().entries.push_back({1e-3, {}, ""});
+  const TimedCase made = testing::run_timed(small_box(), scene);
+  for (std::size_t e = 0; e < made.body.element_count(); ++e)
+    EXPECT_LT((made.body.position[e] - made.body.rest[e] - 0.02 * 0.02 * 55 * Vec3(1, -2, -9.81)).norm(),
+              1e-9);
+  testing::expect_books_close(made.result);
+  EXPECT_LT(std::abs(made.history.column("numerical dissipated").back() -
+                     0.5 * made.result.mass * 10 * std::pow(0.02, 2) * Vec3(1, -2, -9.81).squaredNorm()),
+            1e-6 * made.history.column("kinetic").back());
+}
+
+// Thrown, spinning, damped: momentum is kept; what of the angular momentum is lost halves with the step, and
+// so does the energy.
+TEST(ImplicitEuler, MomentaOfAThrownBody) {
+  const auto thrown = [](Model model, double step) {
+    StartingVelocity start;
+    start.where = select_by_name("box");
+    start.velocity = Vec3(1, 0.5, -2);
+    start.spin = Vec3(20, 10, 30);
+    start.through = Vec3(0.015, 0.01, 0.01);
+    Scene scene = implicit_scene(kGum, 0.005, step);
+    scene.parts["box"].model = model == Model::springs ? "springs" : "cells";
+    scene.get<InitialVelocity>() = {{start}};
+    scene.get<Damping>().entries.push_back({1e-3, {}, ""});
+    const TimedCase made = testing::run_timed(small_box(), scene);
+    testing::expect_books_close(made.result);
+    for (const char* axis : {"momentum x", "momentum y", "momentum z"})
+      for (const double value : made.history.column(axis))
+        EXPECT_NEAR(value, made.history.column(axis)[0],
+                    1e-8 * std::abs(made.history.column("momentum z")[0]));
+    double lost = 0, whole = 0;
+    for (const char* axis : {"angular momentum x", "angular momentum y", "angular momentum z"}) {
+      const std::vector<double>& values = made.history.column(axis);
+      lost += std::pow(values.back() - values.front(), 2);
+      whole += values.front() * values.front();
+    }
+    EXPECT_GE(made.history.column("numerical dissipated").back(), 0);
+    return std::sqrt(lost / whole);
+  };
+  for (const Model model : {Model::cells, Model::springs}) {
+    const double coarse = thrown(model, 2.5e-5), fine = thrown(model, 1.25e-5);
+    EXPECT_LT(fine, 0.05);
+    EXPECT_NEAR(coarse / fine, 2, 0.3);
+  }
+}
+
+// Steps a thousand times the stable ones lead a steel beam under its load to equilibrium.
+TEST(ImplicitEuler, StiffBodyComesToRestInEquilibrium) {
+  BoxOptions options;
+  options.cells = {8, 2, 2};
+  options.spacing = Vec3::Constant(0.002);
+  options.axes = Eigen::AngleAxisd(0.4, Vec3(0, 1, 0)).toRotationMatrix();
+  const Body body = box_body(options);
+  const double bound = stable_step(testing::setting_of(body, kSteel), {0});
+  Scene scene = implicit_scene(kSteel, 1e5 * bound, 1e3 * bound);
+  // elements, which equilibrium holds exactly too
+  Selection held, led;
+  held.kind = led.kind = Selection::Kind::half_space;
+  held.point = body.rest.front() + 1e-6 * options.axes.col(0);
+  held.normal = -options.axes.col(0);
+  led.point = body.rest.back() - 1e-6 * options.axes.col(0);
+  led.normal = options.axes.col(0);
+  scene.get<Ties>().ties.push_back(make_fix(held));
+  Tie push = make_move(led, Vec3(0, 1e-4, 0));
+  push.course = {{0, 2e4 * bound}, {0, 1}};
+  push.axes = {false, true, false};
+  scene.get<Ties>().ties.push_back(push);
+  scene.get<Loads>().loads.push_back(make_push(select_by_name("z1"), Vec3(0, 0, -300)));
+  const TimedCase made = testing::run_timed(body, scene);
+  testing::expect_books_close(made.result);
+  scene.run.time.reset();
+  scene.run.step.reset();
+  for (Tie& tie : scene.get<Ties>().ties) tie.course = {};
+  Body rest = body;
+  Progress progress("test", Progress::Mode::quiet);
+  const SimulateResult still = simulate(rest, scene, {}, progress);
+  double largest = 0, apart = 0;
+  for (std::size_t e = 0; e < body.element_count(); ++e) {
+    largest = std::max(largest, (rest.position[e] - rest.rest[e]).norm());
+    apart = std::max(apart, (rest.position[e] - made.body.position[e]).norm());
+  }
+  EXPECT_LT(apart, 1e-4 * largest);
+  ASSERT_EQ(still.reactions.size(), made.result.reactions.size());
+  for (std::size_t r = 0; r < still.reactions.size(); ++r)
+    EXPECT_LT((still.reactions[r].force - made.result.reactions[r].force).norm(),
+              1e-3 * still.reactions[0].force.norm());
+}
+
+// A plate that falls through a medium comes to the speed at which drag carries its weight, also with steps
+// that are long against the time that takes.
+TEST(ImplicitEuler, DragIsTakenAtTheEndOfTheStep) {
+  BoxOptions options;
+  options.cells = {3, 3, 1};
+  options.spacing = Vec3::Constant(0.01);
+  Scene scene = implicit_scene({"light", 1e6, 0.25, 10, "test"}, 0.9, 0.1);
+  scene.get<Gravity>().acceleration = Vec3(0, 0, -9.81);
+  scene.get<Drag>().density = 1.2;
+  const TimedCase made = testing::run_timed(box_body(options), scene);
+  testing::expect_books_close(made.result);
+  const double speed = std::sqrt(10 * 0.01 * 9.81 / (0.5 * 1.2));
+  EXPECT_NEAR(-made.history.column("momentum z").back() / made.result.mass / speed, 1, 1e-3);
+}
+
+TEST(ImplicitEuler, SameBitsForAnyNumberOfThreads) {
+  BoxOptions options;
+  options.cells = {16, 8, 8};
+  options.spacing = Vec3::Constant(0.01);
+  const auto positions = [&](int threads) {
+    Scene scene = implicit_scene(kGum, 0.02, 0.005);
+    scene.get<Ties>().ties.push_back(make_fix(select_by_name("x0")));
+    scene.get<Gravity>().acceleration = Vec3(0, 0, -9.81);
+    scene.get<Damping>().entries.push_back({1e-3, {}, ""});
+    SimulateOptions run;
+    run.threads = threads;
+    return testing::run_timed(box_body(options), scene, run).body.position;
+  };
+  EXPECT_EQ(positions(1), positions(4));
+}
+
+TEST(ImplicitEuler, RefusesWhatItDoesNotTake) {
+  Scene scene = implicit_scene(kGum, 0.01, 1e-3);
+  scene.get<Plasticity>().entries.emplace_back();
+  scene.materials["gum"].yield = 1e4;
+  Body body = small_box();
+  Progress progress("test", Progress::Mode::quiet);
+  EXPECT_THROW((void)simulate(body, scene, {}, progress), InputError);
+}
+
+// Squeezed flat: no step ends with every cell the right way round.
+TEST(ImplicitEuler, TellsWhereItEnds) {
+  Scene scene = implicit_scene(kGum, 0.01, 1e-3);
+  scene.get<Ties>().ties.push_back(make_fix(select_by_name("x0")));
+  Tie squeeze = make_move(select_by_name("x1"), Vec3(-0.05, 0, 0));
+  scene.get<Ties>().ties.push_back(squeeze);
+  BoxOptions options;
+  options.cells = {1, 1, 1};
+  options.spacing = Vec3::Constant(0.01);
+  Body body = box_body(options);
+  Progress progress("test", Progress::Mode::quiet);
+  try {
+    (void)simulate(body, scene, {}, progress);
+    ADD_FAILURE() << "a box pushed through itself should end the run";
+  } catch (const DivergedError& error) {
+    EXPECT_NE(std::string(error.what()).find("Newton"), std::string::npos) << error.what();
   }
 }
 

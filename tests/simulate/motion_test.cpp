@@ -273,6 +273,16 @@ TEST(Motion, StepAboveTheBoundIsRefused) {
   EXPECT_NO_THROW((void)simulate(body, scene, {}, progress));
 }
 
+// A state that is folded at the start is told as such, not as a step that is too long.
+TEST(Motion, FoldAtTheStartIsTold) {
+  Body body = small_box();
+  body.position[0].x() += 0.1;  // ten cells further
+  Scene scene = scene_of(kGum, 0.01);
+  scene.run.step = 1e-6;
+  Progress progress("test", Progress::Mode::quiet);
+  EXPECT_THROW((void)simulate(body, scene, {}, progress), DivergedError);
+}
+
 TEST(Motion, FoldInTheLastStepIsTold) {
   Body body = small_box();
   const Setting setting{body, {kGum}, std::vector<std::uint8_t>(body.cell_count(), 0)};

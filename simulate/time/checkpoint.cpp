@@ -1,0 +1,235 @@
+// One list of the values serves writing and reading. Everything is checked by its hash before it is taken
+// apart; lengths are checked all the same.
+#include "simulate/time/checkpoint.h"
+
+#include <fmt/format.h>
+
+#include <bit>
+#include <cstring>
+#include <filesystem>
+#include <type_traits>
+
+#include "formats/body_file.h"
+#include "formats/error.h"
+#include "formats/files.h"
+
+namespace flexel {
+namespace {
+
+static_assert(std::endian::native == std::endian::little);
+
+constexpr char kMagic[8] = {'f', 'l', 'e', 'x', 'e', 'l', 'C', 'P'};
+constexpr std::uint64_t kVersion = 1;
+
+struct Head {
+  char magic[8];
+  std::uint64_t version, values_size, body_size, values_hash, body_hash;
+};
+
+std::span<const std::byte> bytes_of(const void* data, std::size_t size) {
+  return {static_cast<const std::byte*>(data), size};
+}
+
+class Packer {
+ public:
+  void raw(void* data, std::size_t size) {
+    const auto* from = static_cast<const std::byte*>(data);
+    bytes.insert(bytes.end(), from, from + size);
+  }
+  [[nodiscard]] std::size_t length(std::size_t count, std::size_t) {
+    std::uint64_t number = count;
+    raw(&number, sizeof number);
+    return count;
+  }
+  Bytes bytes;
+};
+
+class Unpacker {
+ public:
+  Unpacker(std::span<const std::byte> bytes, std::string where) : left_(bytes), where_(std::move(where)) {}
+  void raw(void* data, std::size_t size) {
+    if (size > left_.size()) fail();
+    if (size > 0) std::memcpy(data, left_.data(), size);
+    left_ = left_.subspan(size);
+  }
+  [[nodiscard]] std::size_t length(std::size_t, std::size_t least_size) {
+    std::uint64_t number = 0;
+    raw(&number, sizeof number);
+    if (number > left_.size() / least_size) fail();
+    return number;
+  }
+  void finish() const {
+    if (!left_.empty()) fail();
+  }
+
+ private:
+  [[noreturn]] void fail() const { throw InputError(where_, "damaged: its values do not fit together"); }
+  std::span<const std::byte> left_;
+  std::string where_;
+};
+
+template <class Archive, class Value>
+void visit(Archive& archive, Value& value);
+
+template <class Archive, class Value>
+void visit(Archive& archive, std::vector<Value>& values) {
+  // of a string or a row at least its length
+  values.resize(archive.length(values.size(), std::is_trivially_copyable_v<Value> ? sizeof(Value) : 8));
+  if constexpr (std::is_trivially_copyable_v<Value>)
+    archive.raw(values.data(), values.size() * sizeof(Value));
+  else
+    for (Value& value : values) visit(archive, value);
+}
+
+template <class Archive>
+void visit(Archive& archive, std::vector<Vec3>& values) {
+  static_assert(sizeof(Vec3) == 3 * sizeof(double));
+  values.resize(archive.length(values.size(), sizeof(Vec3)));
+  archive.raw(values.data(), values.size() * sizeof(Vec3));
+}
+
+template <class Archive>
+void visit(Archive& archive, std::string& text) {
+  text.resize(archive.length(text.size(), 1));
+  archive.raw(text.data(), text.size());
+}
+
+template <class Archive>
+void visit(Archive& archive, std::optional<double>& value) {
+  double number = value.value_or(0);
+  std::uint8_t there = value.has_value();
+  archive.raw(&there, 1);
+  archive.raw(&number, sizeof number);
+  value = there ? std::optional(number) : std::nullopt;
+}
+
+template <class Archive>
+void visit(Archive& archive, Account& account) {
+  visit(archive, account.name);
+  visit(archive, account.dissipates);
+  visit(archive, account.energy);
+}
+
+template <class Archive>
+void visit(Archive& archive, BookRow& row) {
+  visit(archive, row.time);
+  visit(archive, row.energies);
+  visit(archive, row.accounts);
+  archive.raw(row.momentum.data(), sizeof(Vec3));
+  archive.raw(row.angular.data(), sizeof(Vec3));
+  visit(archive, row.probes);
+}
+
+template <class Archive, class Value>
+void visit(Archive& archive, Value& value) {
+  static_assert(std::is_trivially_copyable_v<Value>);
+  archive.raw(&value, sizeof value);
+}
+
+template <class Archive>
+void visit(Archive& archive, Checkpoint& c) {
+  for (std::string* text : {&c.scene_name, &c.scene, &c.output, &c.history}) visit(archive, *text);
+  visit(archive, c.compress);
+  visit(archive, c.input);
+  visit(archive, c.state.displacement);
+  visit(archive, c.state.velocity);
+  visit(archive, c.state.share);
+  visit(archive, c.state.time);
+  visit(archive, c.state.kick);
+  visit(archive, c.clock);
+  visit(archive, c.memory.cells.fill);
+  visit(archive, c.memory.cells.plastic);
+  visit(archive, c.memory.cells.springs);
+  visit(archive, c.memory.cells.spring_flow);
+  visit(archive, c.memory.damping_change);
+  visit(archive, c.memory.reach);
+  visit(archive, c.ledger.accounts);
+  visit(archive, c.ledger.rows);
+  visit(archive, c.ledger.probes);
+  visit(archive, c.ledger.start);
+  visit(archive, c.ledger.worst_residual);
+  visit(archive, c.ledger.largest_term);
+  visit(archive, c.next_row);
+  visit(archive, c.next_frame);
+  visit(archive, c.frames);
+}
+
+}  // namespace
+
+void write_checkpoint(const Checkpoint& checkpoint, const Bytes& body, const std::string& path) {
+  Packer packer;
+  visit(packer, const_cast<Checkpoint&>(checkpoint));
+  Head head{{}, kVersion, packer.bytes.size(), body.size(), content_hash(packer.bytes), content_hash(body)};
+  std::memcpy(head.magic, kMagic, sizeof kMagic);
+  OutputFile file(path);
+  file.write(&head, sizeof head);
+  file.write(packer.bytes.data(), packer.bytes.size());
+  file.write(body.data(), body.size());
+  file.commit();
+}
+
+Bytes body_bytes(const Body& body, const std::string& path) {
+  const std::string beside = path + ".body";
+  write_body(body, beside);
+  Bytes bytes = read_all(beside);
+  std::filesystem::remove(beside);
+  return bytes;
+}
+
+Resumed read_checkpoint(const std::string& path) {
+  const std::string where = path == "-" ? "stdin" : path;
+  const Bytes bytes = read_all(path);
+  Head head;
+  if (bytes.size() < sizeof kMagic || std::memcmp(bytes.data(), kMagic, sizeof kMagic) != 0)
+    throw InputError(where, "is not a checkpoint: one written by flexel-simulate --checkpoint is needed");
+  if (bytes.size() >= sizeof head) std::memcpy(&head, bytes.data(), sizeof head);
+  if (bytes.size() >= 16 && (std::memcpy(&head.version, bytes.data() + 8, 8), head.version != kVersion))
+    throw InputError(where, fmt::format("is a checkpoint of version {}; this program reads version {}: "
+                                        "resume with the release that wrote it",
+                                        head.version, kVersion));
+  const std::size_t size = bytes.size() < sizeof head ? 0 : bytes.size() - sizeof head;
+  if (bytes.size() < sizeof head || head.values_size > size || head.body_size != size - head.values_size)
+    throw InputError(where, "is truncated: copy it again, or resume from another checkpoint");
+  const auto values = std::span(bytes).subspan(sizeof head, head.values_size);
+  const auto body = std::span(bytes).subspan(sizeof head + head.values_size);
+  if (content_hash(values) != head.values_hash || content_hash(body) != head.body_hash)
+    throw InputError(where, "is damaged: copy it again, or resume from another checkpoint");
+  Resumed resumed;
+  Unpacker unpacker(values, where);
+  visit(unpacker, resumed.checkpoint);
+  unpacker.finish();
+  resumed.body = read_body(Bytes(body.begin(), body.end()), where);
+  const Checkpoint& c = resumed.checkpoint;
+  const std::size_t n = resumed.body.element_count();
+  if (c.state.displacement.size() != n || c.state.velocity.size() != n || !c.state.time)
+    throw InputError(where, "is damaged: its state is not that of its body");
+  return resumed;
+}
+
+std::uint64_t body_fingerprint(const Body& body) {
+  std::vector<std::uint64_t> hashes;
+  const auto add = [&](const auto& values) {
+    hashes.push_back(content_hash(bytes_of(values.data(), values.size() * sizeof(values[0]))));
+  };
+  add(body.lattice_index);
+  add(body.rest);
+  add(body.position);
+  add(body.cell_elements);
+  add(body.fill);
+  add(body.broken);
+  add(body.connections);
+  add(body.surface.vertices);
+  add(body.surface.polygon_vertices);
+  for (const Columns* columns : {&body.element_columns, &body.cell_columns})
+    for (const auto& [name, column] : *columns) {
+      add(name);
+      add(column.values);
+    }
+  for (const Part& part : body.parts) {
+    add(part.name);
+    add(part.material);
+  }
+  return content_hash(bytes_of(hashes.data(), hashes.size() * sizeof hashes[0]));
+}
+
+}  // namespace flexel

@@ -1,0 +1,46 @@
+// Where a timed run stood, to the bit: what is written now and then so that a run that was stopped goes on as
+// if it had not been (docs/motion.md).
+//
+// The file: eight bytes "flexelCP", the version, the sizes of the two parts that follow and the content hash
+// of each [u64, little endian]; the values of Checkpoint one after another, numbers as they lie in memory,
+// lists after their length; a body file, the body as the present act began.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "simulate/time/act.h"
+
+namespace flexel {
+
+struct Checkpoint {
+  std::string scene_name, scene;  // for messages; the scene's text
+  std::string output, history;    // -o and --history of the run; history "": none
+  bool compress = false;          // --compress
+  std::uint64_t input = 0;        // body_fingerprint() of the body that the run was given
+  State state;
+  Clock clock;
+  Act::Memory memory;
+  Ledger ledger;
+  double next_row = 0, next_frame = 0;  // s
+  std::vector<double> frames;           // s, of the series so far
+};
+
+// `body`: the bytes of its file. Appears under `path` only when it is whole. Throws InputError: it cannot be
+// written.
+void write_checkpoint(const Checkpoint& checkpoint, const Bytes& body, const std::string& path);
+
+// The bytes of the body's file. It is written beside `path`, where the checkpoints will be, and removed: a
+// run that could not write them does not begin. Throws InputError.
+[[nodiscard]] Bytes body_bytes(const Body& body, const std::string& path);
+
+struct Resumed {
+  Checkpoint checkpoint;
+  Body body;
+};
+// Throws InputError: not a checkpoint, of another version, truncated or damaged.
+[[nodiscard]] Resumed read_checkpoint(const std::string& path);
+
+// Tells bodies apart by what a run reads of them: elements, cells and columns.
+[[nodiscard]] std::uint64_t body_fingerprint(const Body& body);
+
+}  // namespace flexel
