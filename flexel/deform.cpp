@@ -23,7 +23,7 @@ namespace {
 
 struct Arguments {
   std::vector<std::string> parts, fixes, pushes, moves, outputs;
-  std::string scene, material, size, heal = "auto", placement = "corner", unit, edge, method = "affine",
+  std::string scene, material, size, heal = "auto", placement = "corner", unit, edge, method = "blended",
                                      report, summary, body, format, timeout;
   std::optional<std::size_t> count;
   int threads = 0;
@@ -74,7 +74,7 @@ void declare_output(CLI::App& app, Arguments& arguments) {
       ->type_name("NAME");
   app.add_flag("--ascii", arguments.ascii, "Write ASCII STL or PLY");
   app.add_option("--body", arguments.body, "Write the deformed body (.vtu) too")->type_name("FILE");
-  app.add_option("--method", arguments.method, "Mapping: affine or gram-schmidt")
+  app.add_option("--method", arguments.method, "Mapping: blended, smooth, affine or gram-schmidt")
       ->type_name("NAME")
       ->capture_default_str();
   app.add_option("--report", arguments.report, "Write the mapping's validity report (JSON)")

@@ -1,10 +1,12 @@
-// Each distinct frame is rebuilt once from the deformed elements; a vertex then moves by a translation and a
-// 3x3 product. The check of its Voronoi cell compares the distance to the origin with those to the elements
-// connected with it: O(1), and enough unless the body folds onto itself.
+// gram-schmidt and affine: each distinct frame is rebuilt once from the deformed elements; a vertex then
+// moves by a translation and a 3x3 product. Whatever the method, the vertex's frame tells whether the place
+// it sits in has kept its sense. The check of its Voronoi cell compares the distance to the origin with those
+// to the elements connected with it: O(1), and enough unless the body folds onto itself.
 #include <cmath>
 
 #include "formats/parallel.h"
 #include "mapping/bind.h"
+#include "mapping/smooth.h"
 
 namespace flexel {
 namespace {
@@ -26,32 +28,48 @@ bool left_its_cell(const Binding& binding, const Body& body, const std::vector<V
   return false;
 }
 
-}  // namespace
-
-Mapped apply(const Binding& binding, const Body& body, const std::vector<Vec3>& position) {
+std::vector<FrameMotion> frame_motions(const Binding& binding, const Body& body,
+                                       const std::vector<Vec3>& position) {
   std::vector<FrameMotion> motion(binding.frames.size());
   parallel_for_each(motion.size(), [&](std::size_t f) {
     motion[f] = frame_motion(binding.frames[f], body.rest, position, binding.method);
   });
-  Mapped mapped;
-  const std::size_t n = binding.frame.size();
-  mapped.displacement.resize(n);
-  mapped.flags.assign(n, 0);
-  parallel_for_each(n, [&](std::size_t v) {
+  return motion;
+}
+
+}  // namespace
+
+std::vector<Vec3> apply(const Binding& binding, const Body& body, const std::vector<Vec3>& position) {
+  if (binding.method == MapMethod::blended)
+    return apply(binding.blend, body,
+                 element_motions(binding.blend.moving, body, binding.connections, position));
+  if (binding.method == MapMethod::smooth)
+    return apply_smooth(binding.groups, body, binding.frames, binding.frame, position);
+  const std::vector<FrameMotion> motion = frame_motions(binding, body, position);
+  std::vector<Vec3> displacement(binding.frame.size());
+  parallel_for_each(displacement.size(), [&](std::size_t v) {
     const FrameMotion& by = motion[binding.frame[v]];
-    const Vec3 displacement = by.translation + by.change * binding.coordinates[v];
-    mapped.displacement[v] = displacement;
-    if (!displacement.allFinite()) {
-      mapped.flags[v] = kNotFinite;
+    displacement[v] = by.translation + by.change * binding.coordinates[v];
+  });
+  return displacement;
+}
+
+std::vector<std::uint8_t> judge(const Binding& binding, const Body& body, const std::vector<Vec3>& position,
+                                const std::vector<Vec3>& displacement) {
+  const std::vector<FrameMotion> motion = frame_motions(binding, body, position);
+  std::vector<std::uint8_t> flags(displacement.size(), 0);
+  parallel_for_each(flags.size(), [&](std::size_t v) {
+    if (!displacement[v].allFinite()) {
+      flags[v] = kNotFinite;
     } else if (binding.referenced[v]) {
       const Vec3& vertex = body.surface.vertices[v];
       const std::uint32_t origin = binding.frames[binding.frame[v]].elements[0];
-      mapped.flags[v] = by.flags;
-      if (left_its_cell(binding, body, position, origin, vertex, vertex + displacement))
-        mapped.flags[v] |= kVoronoiCellLeft;
+      flags[v] = motion[binding.frame[v]].flags;
+      if (left_its_cell(binding, body, position, origin, vertex, vertex + displacement[v]))
+        flags[v] |= kVoronoiCellLeft;
     }
   });
-  return mapped;
+  return flags;
 }
 
 }  // namespace flexel

@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "formats/parallel.h"
+#include "mapping/kernel.h"
 #include "mapping/search.h"
 #include "mapping/seat.h"
 
@@ -98,13 +99,15 @@ void take_coordinates(const Body& body, Binding& binding) {
     inverse[f] = base[f].inverse();
   });
   const std::vector<std::uint32_t> part = element_parts(body);
-  binding.coordinates.resize(binding.frame.size());
+  const bool keep = binding.method == MapMethod::affine || binding.method == MapMethod::gram_schmidt;
+  if (keep) binding.coordinates.resize(binding.frame.size());
   const Extremes extremes = parallel_sum<Extremes>(binding.frame.size(), [&](std::size_t v) {
     const std::uint32_t f = binding.frame[v], origin = binding.frames[f].elements[0];
     const Vec3& point = body.surface.vertices[v];
-    binding.coordinates[v] = inverse[f] * (point - body.rest[origin]);
+    const Vec3 coordinates = inverse[f] * (point - body.rest[origin]);
+    if (keep) binding.coordinates[v] = coordinates;
     if (!binding.referenced[v]) return Extremes{};
-    return Extremes{(body.rest[origin] + base[f] * binding.coordinates[v] - point).norm(),
+    return Extremes{(body.rest[origin] + base[f] * coordinates - point).norm(),
                     distance_outside(body.parts[part[origin]].lattice, body.rest[origin], point)};
   });
   binding.rest_residual = extremes.residual;
@@ -113,7 +116,7 @@ void take_coordinates(const Body& body, Binding& binding) {
 
 }  // namespace
 
-Binding bind(const Body& body, MapMethod method) {
+Binding bind(const Body& body, MapMethod method, std::size_t states) {
   Seats seats = take_seats(body);
   Binding binding;
   binding.method = method;
@@ -121,6 +124,10 @@ Binding bind(const Body& body, MapMethod method) {
   binding.referenced = std::move(seats.referenced);
   make_frames(body, seats.seat, binding);
   take_coordinates(body, binding);
+  if (method == MapMethod::blended)
+    binding.blend = make_blend(body, binding.connections, seats.seat, states > 1);
+  if (method == MapMethod::smooth)
+    binding.groups = group_vertices(body, binding.connections, seats.seat, kSmoothSteps, kSmoothRadius);
   return binding;
 }
 

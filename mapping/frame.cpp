@@ -59,7 +59,7 @@ Mat3 line_base(const Vec3& rest, const Vec3& edge, MapMethod method) {
   const Mat3 rotation = smallest_rotation(along, edge.normalized());
   const Vec3 across = along.unitOrthogonal();
   Mat3 base;
-  base.col(0) = method == MapMethod::affine ? edge : edge.normalized();
+  base.col(0) = method == MapMethod::gram_schmidt ? edge.normalized() : edge;
   base.col(1) = rotation * across;
   base.col(2) = rotation * along.cross(across);
   return base;
@@ -69,7 +69,7 @@ Mat3 line_base(const Vec3& rest, const Vec3& edge, MapMethod method) {
 Mat3 base_of(FrameKind kind, const Mat3& rest_edge, const Mat3& edge, MapMethod method) {
   switch (kind) {
     case FrameKind::full:
-      return method == MapMethod::affine ? edge : gram_schmidt(edge);
+      return method == MapMethod::gram_schmidt ? gram_schmidt(edge) : edge;
     case FrameKind::plane:
       return plane_base(edge, method);
     case FrameKind::line:

@@ -9,14 +9,6 @@ constexpr double kWellConditioned = 0.1;
 // ... and one below this, once deformed, spans no volume any more.
 constexpr double kDegenerate = 1e-6;
 
-// Elements of one part, each connected with the one before it or with the origin through other elements.
-struct Frame {
-  std::array<std::uint32_t, 4>
-      elements{};  // origin, primary axis, two secondary; the origin again where the kind has fewer
-  FrameKind kind = FrameKind::rigid;
-  std::uint8_t rings = 0;  // how many times the search was widened
-};
-
 // Determinant of the three edges over the product of their lengths: 1 for orthogonal edges, 0 for edges in a
 // plane; negative when left-handed.
 [[nodiscard]] double normalised_determinant(const Vec3& a, const Vec3& b, const Vec3& c);
@@ -24,7 +16,7 @@ struct Frame {
 [[nodiscard]] double sine(const Vec3& a, const Vec3& b);
 
 // The base of a frame, columns in m (affine edges) or unit length (orthonormal axes), world frame.
-// gram_schmidt: the paper's orthonormal base (section 6.1.2); affine: the edges themselves.
+// gram_schmidt: the paper's orthonormal base (section 6.1.2); all other methods: the edges themselves.
 // Kinds with fewer than four elements complete it: a plane by its unit normal, a line by the two axes that
 // the smallest rotation from its direction at rest carries along (the axes at rest are arbitrary but fixed);
 // a rigid frame has the world's axes, whatever its elements do.

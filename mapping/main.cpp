@@ -13,7 +13,7 @@ namespace {
 constexpr const char* kProgram = "flexel-map";
 
 struct Arguments {
-  std::string body = "-", output = "-", method = "affine", report, format, unit;
+  std::string body = "-", output = "-", method = "blended", report, format, unit;
   bool ascii = false, strict = false, quiet = false;
   int threads = 0;
 };
@@ -22,7 +22,7 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_option("body", arguments.body, "Body file (.vtu); without one, or with -, stdin")
       ->type_name("BODY");
   app.add_option("--method", arguments.method,
-                 "How a frame carries its vertices: affine (second order) or gram-schmidt (the paper's)")
+                 "How elements carry the vertices: blended, smooth, affine or gram-schmidt (the paper's)")
       ->type_name("NAME")
       ->capture_default_str();
   app.add_option("--report", arguments.report, "Write the validity report as JSON")->type_name("FILE");

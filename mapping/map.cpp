@@ -1,42 +1,46 @@
 // The passes in order: bind at rest, map the state, lay out what is known of each vertex.
 #include "mapping/map.h"
 
-#include "formats/parallel.h"
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
 #include "formats/program.h"
 #include "mapping/bind.h"
 
 namespace flexel {
 
+namespace {
+
+const std::vector<std::string> kMethods = {"gram-schmidt", "affine", "blended", "smooth"};  // by MapMethod
+
+}  // namespace
+
 MapMethod map_method(const std::string& name) {
-  if (name == "affine") return MapMethod::affine;
-  if (name == "gram-schmidt") return MapMethod::gram_schmidt;
-  throw InputError("unknown method \"" + name + "\": --method is gram-schmidt or affine" +
-                   did_you_mean(name, {"gram-schmidt", "affine"}));
+  const auto found = std::find(kMethods.begin(), kMethods.end(), name);
+  if (found != kMethods.end()) return static_cast<MapMethod>(found - kMethods.begin());
+  throw InputError(fmt::format("unknown method \"{}\": --method is {}{}", name, fmt::join(kMethods, ", "),
+                               did_you_mean(name, kMethods)));
+}
+
+std::string name_of(MapMethod method) {
+  return kMethods[static_cast<std::size_t>(method)];
 }
 
 MapResult map_surface(const Body& body, const MapOptions& options, Progress& progress) {
   progress.update(0, "binding vertices");
-  const Binding binding = bind(body, options.method);
+  Binding binding = bind(body, options.method);
   throw_if_interrupted();
-  progress.update(0.7, "mapping");
-  Mapped mapped = apply(binding, body, body.position);
-  throw_if_interrupted();
-
-  const std::size_t n = binding.frame.size();
+  progress.update(0.5, "mapping");
   MapResult result;
-  result.displacement = std::move(mapped.displacement);
-  result.flags = std::move(mapped.flags);
-  result.kind.resize(n);
-  result.quadruple.resize(n);
-  result.rings.resize(n);
-  parallel_for_each(n, [&](std::size_t v) {
-    const Frame& frame = binding.frames[binding.frame[v]];
-    result.kind[v] = frame.kind;
-    result.quadruple[v] = frame.elements;
-    result.rings[v] = frame.rings;
-  });
-  result.referenced = binding.referenced;
-  result.distinct_frames = binding.frames.size();
+  result.displacement = apply(binding, body, body.position);
+  throw_if_interrupted();
+  progress.update(0.9, "judging");
+  result.flags = judge(binding, body, body.position, result.displacement);
+  result.frames = std::move(binding.frames);
+  result.frame = std::move(binding.frame);
+  result.referenced = std::move(binding.referenced);
   result.rest_residual = binding.rest_residual;
   result.distance_outside = binding.distance_outside;
   progress.update(1);

@@ -10,32 +10,43 @@
 
 namespace flexel {
 
-enum class MapMethod { gram_schmidt, affine };
+// How the elements around a vertex carry it (docs/mapping.md compares them).
+enum class MapMethod {
+  gram_schmidt,  // the paper's: the orthonormal base of four elements
+  affine,        // the edges of the same four elements
+  blended,       // the frames of all elements around, blended with two continuous derivatives
+  smooth,        // moving least squares, quadratic
+};
 
 // What holds a vertex. Later kinds are what is left when no four close elements span space.
 enum class FrameKind : std::uint8_t { full, plane, line, rigid };
 
-// "gram-schmidt" or "affine"; InputError for any other word, with the nearest.
+// "gram-schmidt", "affine", "blended" or "smooth"; InputError for any other word, with the nearest.
 [[nodiscard]] MapMethod map_method(const std::string& name);
+[[nodiscard]] std::string name_of(MapMethod method);
 
 struct MapOptions {
-  MapMethod method = MapMethod::affine;
+  MapMethod method = MapMethod::blended;
 };
 
-// One value per vertex of the surface.
+// Elements of one part, each connected with the one before it or with the origin through other elements.
+struct Frame {
+  std::array<std::uint32_t, 4> elements{};  // origin, primary axis, two secondary; the origin again where the
+                                            // kind has fewer
+  FrameKind kind = FrameKind::rigid;
+  std::uint8_t rings = 0;  // how many times the search along connections was widened
+};
+
 struct MapResult {
-  std::vector<Vec3> displacement;   // (vertices x 3) m
-  std::vector<FrameKind> kind;      // (vertices)
-  std::vector<std::uint8_t> flags;  // (vertices) bits of MapFlag
-  std::vector<std::array<std::uint32_t, 4>>
-      quadruple;                         // (vertices x 4) origin, primary axis, two secondary; repeated where
-                                         // the frame is a plane, a line or rigid
-  std::vector<std::uint8_t> rings;       // (vertices) how many times the search along connections was widened
+  std::vector<Vec3> displacement;        // (vertices x 3) m
+  std::vector<std::uint8_t> flags;       // (vertices) bits of MapFlag
+  std::vector<Frame> frames;             // distinct; every vertex has one, whatever the method evaluates
+  std::vector<std::uint32_t> frame;      // (vertices) index into frames
   std::vector<std::uint8_t> referenced;  // (vertices) 1: some polygon uses it
-  std::size_t distinct_frames = 0;
-  double rest_residual = 0;     // m, largest distance of a vertex rebuilt at rest from itself
+  double rest_residual = 0;              // m, largest distance of a vertex rebuilt at rest from itself
   double distance_outside = 0;  // in spacings, largest distance of a vertex from its nearest element, less
                                 // half a voxel's diagonal
+  [[nodiscard]] const Frame& frame_of(std::size_t vertex) const { return frames[frame[vertex]]; }
 };
 
 enum MapFlag : std::uint8_t {

@@ -51,12 +51,13 @@ std::string fewer_elements(const MapReport& report) {
 MapReport report(const Body& body, const MapResult& result) {
   MapReport report;
   report.vertices = result.displacement.size();
-  report.distinct_frames = result.distinct_frames;
+  report.distinct_frames = result.frames.size();
   for (std::size_t v = 0; v < report.vertices; ++v) {
     const std::uint8_t flags = result.flags[v];
-    ++report.kinds[static_cast<std::size_t>(result.kind[v])];
+    const Frame& frame = result.frame_of(v);
+    ++report.kinds[static_cast<std::size_t>(frame.kind)];
     report.unreferenced += result.referenced[v] == 0;
-    report.widened += result.rings[v] > 0;
+    report.widened += frame.rings > 0;
     report.voronoi_cell_left += (flags & kVoronoiCellLeft) != 0;
     report.inverted += (flags & kFrameInverted) != 0;
     report.degenerate += (flags & kFrameDegenerate) != 0;
@@ -103,7 +104,7 @@ std::string report_json(const MapReport& report, const MapOptions& options) {
   nlohmann::ordered_json json;
   json["program"] = "flexel-map";
   json["version"] = version();
-  json["method"] = options.method == MapMethod::affine ? "affine" : "gram-schmidt";
+  json["method"] = name_of(options.method);
   json["valid"] = report.valid();
   json["verdict"] = report_lines(report).front();
   json["vertices"] = report.vertices;

@@ -180,7 +180,7 @@ template <Placement placement, MapMethod method>
 void bind_surface(benchmark::State& state) {
   const Body& body = ring(placement);
   const ThreadLimit limit(static_cast<int>(state.range(0)));
-  for (auto _ : state) benchmark::DoNotOptimize(bind(body, method).frame.data());
+  for (auto _ : state) benchmark::DoNotOptimize(bind(body, method, 2).frame.data());
   count(state, body);
 }
 
@@ -188,8 +188,8 @@ template <Placement placement, MapMethod method>
 void apply_state(benchmark::State& state) {
   const Body& body = ring(placement);
   const ThreadLimit limit(static_cast<int>(state.range(0)));
-  const Binding binding = bind(body, method);
-  for (auto _ : state) benchmark::DoNotOptimize(apply(binding, body, body.position).flags.data());
+  const Binding binding = bind(body, method, 2);
+  for (auto _ : state) benchmark::DoNotOptimize(apply(binding, body, body.position).data());
   count(state, body);
 }
 
@@ -222,17 +222,48 @@ void nearest(benchmark::State& state) {
   count(state, body);
 }
 
-constexpr auto kMs = benchmark::kMillisecond;
-BENCHMARK(bind_surface<Placement::corner, MapMethod::affine>)->Arg(1)->Arg(2)->Unit(kMs)->UseRealTime();
-BENCHMARK(bind_surface<Placement::centre, MapMethod::affine>)->Arg(1)->Arg(2)->Unit(kMs)->UseRealTime();
-BENCHMARK(apply_state<Placement::corner, MapMethod::affine>)->Arg(1)->Arg(2)->Unit(kMs)->UseRealTime();
-BENCHMARK(apply_state<Placement::corner, MapMethod::gram_schmidt>)->Arg(1)->Arg(2)->Unit(kMs)->UseRealTime();
-BENCHMARK(apply_state<Placement::centre, MapMethod::gram_schmidt>)->Arg(1)->Arg(2)->Unit(kMs)->UseRealTime();
-BENCHMARK(connections)->Arg(1)->Arg(2)->Unit(kMs)->UseRealTime();
-BENCHMARK(welding)->Arg(1)->Arg(2)->Unit(kMs)->UseRealTime();
-BENCHMARK(nearest)->Arg(1)->Arg(2)->Unit(kMs)->UseRealTime();
+// What judging a mapped state costs: frames turned over, Voronoi cells left.
+void judging(benchmark::State& state) {
+  const Body& body = ring(Placement::corner);
+  const ThreadLimit limit(static_cast<int>(state.range(0)));
+  const Binding binding = bind(body, MapMethod::affine);
+  const std::vector<Vec3> displacement = apply(binding, body, body.position);
+  for (auto _ : state) benchmark::DoNotOptimize(judge(binding, body, body.position, displacement).data());
+  count(state, body);
+}
+
+void register_all() {
+  const auto add = [](const std::string& name, auto* function) {
+    for (const int threads : {1, 2})
+      benchmark::RegisterBenchmark(name.c_str(), function)
+          ->Arg(threads)
+          ->Unit(benchmark::kMillisecond)
+          ->UseRealTime();
+  };
+  constexpr auto corner = Placement::corner, centre = Placement::centre;
+  add("bind/corner/gram-schmidt", bind_surface<corner, MapMethod::gram_schmidt>);
+  add("bind/corner/affine", bind_surface<corner, MapMethod::affine>);
+  add("bind/corner/blended", bind_surface<corner, MapMethod::blended>);
+  add("bind/corner/smooth", bind_surface<corner, MapMethod::smooth>);
+  add("bind/centre/gram-schmidt", bind_surface<centre, MapMethod::gram_schmidt>);
+  add("bind/centre/blended", bind_surface<centre, MapMethod::blended>);
+  add("apply/corner/gram-schmidt", apply_state<corner, MapMethod::gram_schmidt>);
+  add("apply/corner/affine", apply_state<corner, MapMethod::affine>);
+  add("apply/corner/blended", apply_state<corner, MapMethod::blended>);
+  add("apply/corner/smooth", apply_state<corner, MapMethod::smooth>);
+  add("apply/centre/gram-schmidt", apply_state<centre, MapMethod::gram_schmidt>);
+  add("apply/centre/blended", apply_state<centre, MapMethod::blended>);
+  add("judge", judging);
+  add("part/connections", connections);
+  add("part/welding", welding);
+  add("part/nearest", nearest);
+}
 
 }  // namespace
 }  // namespace flexel
 
-BENCHMARK_MAIN();
+int main(int argc, char** argv) {
+  benchmark::Initialize(&argc, argv);
+  flexel::register_all();
+  benchmark::RunSpecifiedBenchmarks();
+}

@@ -128,8 +128,8 @@ void draw_body_surface(const Body& body, const PictureOptions& options, const Co
       return set_values(panel.drawn, Drawable::ValuesAt::vertices, *values);
   const std::optional<Attribute> attribute = body_attribute(body, by.name);
   if (!attribute) return set_surface_values(surface, mesh, by.name, panel.drawn);
-  std::vector<std::uint32_t> nearest(mapped.quadruple.size());
-  for (std::size_t v = 0; v < nearest.size(); ++v) nearest[v] = mapped.quadruple[v][0];
+  std::vector<std::uint32_t> nearest(mapped.frame.size());
+  for (std::size_t v = 0; v < nearest.size(); ++v) nearest[v] = mapped.frame_of(v).elements[0];
   set_values(panel.drawn, Drawable::ValuesAt::vertices, at_vertices(body, *attribute, nearest));
 }
 

@@ -37,15 +37,15 @@ TEST_P(Thin, OneLayerGivesPlanesThatFollowRigidMotionAndKeepTheirThickness) {
   const auto rigid = [&](const Vec3& x) -> Vec3 { return turn * x + Vec3(1, 2, 3); };
   test::deform(body, rigid);
   MapResult result = map(body, GetParam());
-  for (std::size_t v = 0; v < result.kind.size(); ++v) {
-    EXPECT_EQ(result.kind[v], FrameKind::plane);
+  for (std::size_t v = 0; v < result.frame.size(); ++v) {
+    EXPECT_EQ(result.frame_of(v).kind, FrameKind::plane);
     EXPECT_LT((body.surface.vertices[v] + result.displacement[v] - rigid(body.surface.vertices[v])).norm(),
               1e-12);
   }
   // Stretched in its plane, the layer stays as thick as it was.
   test::deform(body, [](const Vec3& x) -> Vec3 { return {1.5 * x.x(), x.y(), x.z()}; });
   result = map(body, GetParam());
-  for (std::size_t v = 0; v < result.kind.size(); ++v) EXPECT_NEAR(result.displacement[v].z(), 0, 1e-15);
+  for (std::size_t v = 0; v < result.frame.size(); ++v) EXPECT_NEAR(result.displacement[v].z(), 0, 1e-15);
 }
 
 TEST_P(Thin, OneRowGivesLinesThatFollowItsDirection) {
@@ -56,16 +56,16 @@ TEST_P(Thin, OneRowGivesLinesThatFollowItsDirection) {
   const auto rigid = [&](const Vec3& x) -> Vec3 { return turn * (x - middle) + middle; };
   test::deform(body, rigid);
   const MapResult result = map(body, GetParam());
-  for (std::size_t v = 0; v < result.kind.size(); ++v) {
-    EXPECT_EQ(result.kind[v], FrameKind::line);
+  for (std::size_t v = 0; v < result.frame.size(); ++v) {
+    EXPECT_EQ(result.frame_of(v).kind, FrameKind::line);
     EXPECT_LT((body.surface.vertices[v] + result.displacement[v] - rigid(body.surface.vertices[v])).norm(),
               1e-12);
   }
   // Turned right round, which has no smallest rotation: finite, and as far apart as before.
   test::deform(body, [](const Vec3& x) -> Vec3 { return {-x.x(), x.y(), x.z()}; });
   const MapResult opposite = map(body, GetParam());
-  for (std::size_t v = 0; v < opposite.kind.size(); ++v) {
-    const std::uint32_t origin = opposite.quadruple[v][0];
+  for (std::size_t v = 0; v < opposite.frame.size(); ++v) {
+    const std::uint32_t origin = opposite.frame_of(v).elements[0];
     EXPECT_NEAR((body.surface.vertices[v] + opposite.displacement[v] - body.position[origin]).norm(),
                 (body.surface.vertices[v] - body.rest[origin]).norm(), 1e-12);
   }
@@ -75,8 +75,8 @@ TEST_P(Thin, OneElementCarriesItsVerticesAlong) {
   Body body = test::block(1, 1, 1, 0.1, Placement::centre);
   test::deform(body, [](const Vec3& x) -> Vec3 { return x + Vec3(1, -2, 3); });
   const MapResult result = map(body, GetParam());
-  for (std::size_t v = 0; v < result.kind.size(); ++v) {
-    EXPECT_EQ(result.kind[v], FrameKind::rigid);
+  for (std::size_t v = 0; v < result.frame.size(); ++v) {
+    EXPECT_EQ(result.frame_of(v).kind, FrameKind::rigid);
     EXPECT_LT((result.displacement[v] - Vec3(1, -2, 3)).norm(), 1e-15);
   }
   EXPECT_TRUE(report(body, result).valid());
@@ -94,12 +94,12 @@ TEST(Search, WidensAlongConnections) {
   Body body = test::make_body({}, {0, 0, 0}, {4, 4, 4}, solid, Placement::centre);
   test::add_surface(body, {Vec3(0.4, 0.4, 0.1), Vec3(1.4, 0.4, 0.1), Vec3(2.4, 0.4, 0.2)}, {{0, 1, 2}});
   const MapResult result = map(body);
-  EXPECT_EQ(result.kind[0], FrameKind::plane);
-  EXPECT_EQ(result.rings[0], kRings - 1);
-  EXPECT_EQ(result.kind[1], FrameKind::full);
-  EXPECT_EQ(result.rings[1], 1);
-  EXPECT_EQ(result.kind[2], FrameKind::full);
-  EXPECT_EQ(result.rings[2], 0);
+  EXPECT_EQ(result.frame_of(0).kind, FrameKind::plane);
+  EXPECT_EQ(result.frame_of(0).rings, kRings - 1);
+  EXPECT_EQ(result.frame_of(1).kind, FrameKind::full);
+  EXPECT_EQ(result.frame_of(1).rings, 1);
+  EXPECT_EQ(result.frame_of(2).kind, FrameKind::full);
+  EXPECT_EQ(result.frame_of(2).rings, 0);
   EXPECT_EQ(report(body, result).widened, 2u);
 }
 
@@ -113,10 +113,10 @@ TEST(Search, QuadruplesAreWellConditionedAndClose) {
       Placement::centre);
   test::add_box_surface(body, middle - Vec3::Constant(0.3), middle + Vec3::Constant(0.3), 9);
   const MapResult result = map(body);
-  for (std::size_t v = 0; v < result.kind.size(); ++v) {
-    const auto& q = result.quadruple[v];
+  for (std::size_t v = 0; v < result.frame.size(); ++v) {
+    const auto& q = result.frame_of(v).elements;
     const auto edge = [&](int i) -> Vec3 { return body.rest[q[i]] - body.rest[q[0]]; };
-    ASSERT_EQ(result.kind[v], FrameKind::full);
+    ASSERT_EQ(result.frame_of(v).kind, FrameKind::full);
     EXPECT_GE(std::abs(normalised_determinant(edge(1), edge(2), edge(3))), kWellConditioned);
     for (int i = 1; i < 4; ++i) EXPECT_LT(edge(i).norm(), 0.2);
   }
@@ -133,10 +133,10 @@ TEST(Cracks, BrokenCellsCutFrames) {
     if (body.lattice_index[e][0] >= 5) body.position[e] += Vec3(0.3, 0, 0);
   for (const MapMethod method : {MapMethod::affine, MapMethod::gram_schmidt}) {
     const MapResult result = map(body, method);
-    for (std::size_t v = 0; v < result.kind.size(); ++v) {
-      EXPECT_EQ(result.kind[v], FrameKind::full);
-      for (const std::uint32_t element : result.quadruple[v])
-        EXPECT_TRUE(are_connected(connections, result.quadruple[v][0], element));
+    for (std::size_t v = 0; v < result.frame.size(); ++v) {
+      EXPECT_EQ(result.frame_of(v).kind, FrameKind::full);
+      for (const std::uint32_t element : result.frame_of(v).elements)
+        EXPECT_TRUE(are_connected(connections, result.frame_of(v).elements[0], element));
       const double moved = result.displacement[v].x();
       EXPECT_TRUE(std::abs(moved) < 1e-12 || std::abs(moved - 0.3) < 1e-12) << moved;
     }
@@ -150,9 +150,9 @@ TEST(Cracks, AnElementLeftAloneCarriesItsVertices) {
   derive_connections(body);
   test::deform(body, [](const Vec3& x) -> Vec3 { return 3 * x; });
   const MapResult result = map(body);
-  for (std::size_t v = 0; v < result.kind.size(); ++v) {
-    EXPECT_EQ(result.kind[v], FrameKind::rigid);
-    EXPECT_LT((result.displacement[v] - 2 * body.rest[result.quadruple[v][0]]).norm(), 1e-15);
+  for (std::size_t v = 0; v < result.frame.size(); ++v) {
+    EXPECT_EQ(result.frame_of(v).kind, FrameKind::rigid);
+    EXPECT_LT((result.displacement[v] - 2 * body.rest[result.frame_of(v).elements[0]]).norm(), 1e-15);
   }
 }
 
@@ -168,8 +168,8 @@ TEST(Parts, InTouchNeverShareFrames) {
     const std::size_t first = body.surface.vertices.size();
     test::append_body(body, other);
     const MapResult result = map(body);
-    for (std::size_t v = 0; v < result.kind.size(); ++v)
-      for (const std::uint32_t element : result.quadruple[v])
+    for (std::size_t v = 0; v < result.frame.size(); ++v)
+      for (const std::uint32_t element : result.frame_of(v).elements)
         EXPECT_EQ(element < body.parts[0].element_end, v < first);
   }
 }
@@ -218,7 +218,7 @@ TEST(Pieces, LeavesNearerThanASpacingKeepToTheirOwnElements) {
     if (split.piece[e] == 1) split.position[e] += Vec3(0, 0, 0.2);
   const MapResult result = map(split);
   for (std::size_t v = 0; v < 8; ++v) {
-    EXPECT_EQ(result.kind[v], FrameKind::full);
+    EXPECT_EQ(result.frame_of(v).kind, FrameKind::full);
     EXPECT_NEAR(result.displacement[v].z(), v < 4 ? 0 : 0.2, 1e-15);
   }
 }

@@ -27,7 +27,7 @@ TEST_P(Flags, ACellTurnedInsideOutIsInverted) {
   const MapResult result = map(body, GetParam());
   std::size_t around = 0;
   for (std::size_t v = 0; v < result.flags.size(); ++v) {
-    const auto& held_by = result.quadruple[v];
+    const auto& held_by = result.frame_of(v).elements;
     const bool held = std::find(held_by.begin(), held_by.end(), corner) != held_by.end();
     around += held;
     EXPECT_EQ((result.flags[v] & kFrameInverted) != 0, held);
@@ -96,7 +96,7 @@ TEST(Voronoi, AgreesWithALookAtEveryElement) {
   std::size_t flagged = 0;
   for (std::size_t v = 0; v < result.flags.size(); ++v) {
     const Vec3 now = body.surface.vertices[v] + result.displacement[v];
-    const double own = (now - body.position[result.quadruple[v][0]]).norm();
+    const double own = (now - body.position[result.frame_of(v).elements[0]]).norm();
     double nearest = own;
     for (const Vec3& x : body.position) nearest = std::min(nearest, (now - x).norm());
     EXPECT_EQ((result.flags[v] & kVoronoiCellLeft) != 0, nearest < own * (1 - 1e-9)) << own - nearest;

@@ -1,0 +1,110 @@
+// Prints how well each method of mapping follows known motions of all elements, as the Markdown table of
+// docs/mapping.md: root mean square error of the vertices by spacing, its order of convergence, the normal
+// jump between neighbouring triangles. Rows in brackets are no methods of the product: they are what
+// `blended` would give with other frames.
+//
+//   convergence [corner|centre]
+#include <fmt/format.h>
+
+#include <Eigen/LU>
+#include <cstring>
+
+#include "mapping/bind.h"
+#include "mapping/search.h"
+#include "motions.h"
+
+namespace flexel {
+namespace {
+
+struct Motion {
+  const char* name;
+  test::Field field;
+};
+
+// The motions of the quadruple of each element, in place of the least squares fit.
+std::vector<ElementMotion> quadruple_motions(const Body& body, const Binding& binding, MapMethod method) {
+  const MovingElements& moving = binding.blend.moving;
+  std::vector<ElementMotion> motions(moving.elements.size());
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    const std::uint32_t e = moving.elements[i];
+    const Frame frame = find_frame(body, binding.connections, body.parts[0], e, 7);
+    motions[i].displacement = body.position[e] - body.rest[e];
+    motions[i].gradient = frame_motion(frame, body.rest, body.position, method).change *
+                          rest_base(frame, body.rest, method).inverse();
+  }
+  return motions;
+}
+
+struct Row {
+  const char* name;
+  std::vector<Vec3> (*map)(const Body&);
+};
+
+template <MapMethod method>
+std::vector<Vec3> mapped(const Body& body) {
+  return apply(bind(body, method), body, body.position);
+}
+template <MapMethod frames>
+std::vector<Vec3> blended_with(const Body& body) {
+  const Binding binding = bind(body, MapMethod::blended);
+  return apply(binding.blend, body, quadruple_motions(body, binding, frames));
+}
+
+constexpr std::array<Row, 6> kRows = {{
+    {"`gram-schmidt`", mapped<MapMethod::gram_schmidt>},
+    {"`affine`", mapped<MapMethod::affine>},
+    {"`blended`", mapped<MapMethod::blended>},
+    {"(blended, Gram-Schmidt frames)", blended_with<MapMethod::gram_schmidt>},
+    {"(blended, affine frames)", blended_with<MapMethod::affine>},
+    {"`smooth`", mapped<MapMethod::smooth>},
+}};
+
+void print_table(const char* title, std::vector<Body>& bodies, const std::vector<int>& across,
+                 const Motion& motion) {
+  fmt::print("\n{}, {}\n\n| method |", title, motion.name);
+  for (const int n : across) fmt::print(" h = 1/{} |", n);
+  fmt::print(" order | normal jump at h = 1/{} (degrees) |\n|---|", across[1]);
+  for (std::size_t i = 0; i < across.size() + 2; ++i) fmt::print("---|");
+  fmt::print("\n");
+  for (Body& body : bodies) test::deform(body, motion.field);
+  for (const Row& row : kRows) {
+    fmt::print("| {} |", row.name);
+    std::vector<double> error;
+    double jump = 0;
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      const std::vector<Vec3> displacement = row.map(bodies[i]);
+      error.push_back(test::rms_error(bodies[i], displacement, motion.field));
+      if (i == 1) jump = test::normal_jump(bodies[i], displacement, motion.field);
+      fmt::print(" {:.1e} |", error.back());
+    }
+    const std::size_t last = error.size() - 1;
+    if (error[last] < 1e-11)
+      fmt::print(" exact |");
+    else
+      fmt::print(" {:.1f} |", std::log2(error[last - 1] / error[last]));
+    fmt::print(" {:.2g} |\n", jump);
+  }
+}
+
+}  // namespace
+}  // namespace flexel
+
+int main(int argc, char** argv) {
+  using namespace flexel;
+  const Placement placement =
+      argc > 1 && std::strcmp(argv[1], "centre") == 0 ? Placement::centre : Placement::corner;
+  fmt::print("Placement {}.\n", placement == Placement::centre ? "centre" : "corner");
+  const std::vector<int> across = {8, 16, 32};
+  std::vector<Body> bars, knots;
+  for (const int n : across) bars.push_back(test::round_bar(n, placement, 256, 96));
+  for (const Motion& motion : {Motion{"bent by 180 degrees", test::bend},
+                               {"twisted by 360 degrees", test::twist},
+                               {"stretched to twice its length", test::stretch},
+                               {"turned", test::turn}})
+    print_table("Round bar", bars, across, motion);
+  const std::vector<int> knot_across = {6, 12, 24};
+  for (const int n : knot_across) knots.push_back(test::knot(n, placement));
+  for (const Motion& motion : {Motion{"bent", test::bend}, {"twisted", test::twist}})
+    print_table("Trefoil knot", knots, knot_across, motion);
+  return 0;
+}

@@ -1,0 +1,97 @@
+// Displacements, not positions, are fitted: what did not move gives exactly nothing. The fit of a rigid or
+// affine motion is exact, whatever the weights.
+#include "mapping/element_motion.h"
+
+#include <Eigen/LU>
+#include <numeric>
+
+#include "formats/parallel.h"
+#include "mapping/search.h"
+
+namespace flexel {
+namespace {
+
+// The moments of three unit edges have the square of their normalised determinant.
+constexpr double kSmallestMoments = kWellConditioned * kWellConditioned;
+
+// Sum of e e^T over the edges' directions e.
+Mat3 moments(const Body& body, const Adjacency& connections, std::uint32_t element) {
+  Mat3 sum = Mat3::Zero();
+  for (const std::uint32_t other : connections.of(element)) {
+    const Vec3 edge = body.rest[other] - body.rest[element];
+    const double squared_length = edge.squaredNorm();
+    if (squared_length > 0) sum += edge * edge.transpose() / squared_length;
+  }
+  return sum;
+}
+
+bool spans_space(const Mat3& moments) {
+  const double mean = moments.trace() / 3;
+  return mean > 0 && (moments / mean).determinant() >= kSmallestMoments;
+}
+
+Mat3 least_squares_gradient(const Body& body, const Adjacency& connections, std::uint32_t element,
+                            const Mat3& inverse_moments, const std::vector<Vec3>& position) {
+  const Vec3 own_rest = body.rest[element], own = position[element] - own_rest;
+  Mat3 sum = Mat3::Zero();
+  for (const std::uint32_t other : connections.of(element)) {
+    const Vec3 edge = body.rest[other] - own_rest;
+    const double squared_length = edge.squaredNorm();
+    if (squared_length > 0)
+      sum += (position[other] - body.rest[other] - own) * (edge / squared_length).transpose();
+  }
+  return sum * inverse_moments;
+}
+
+Mat3 frame_gradient(const Body& body, const Frame& frame, const std::vector<Vec3>& position) {
+  const FrameMotion motion = frame_motion(frame, body.rest, position, MapMethod::affine);
+  return motion.change * rest_base(frame, body.rest, MapMethod::affine).inverse();
+}
+
+}  // namespace
+
+MovingElements find_moving_elements(const Body& body, const Adjacency& connections,
+                                    const std::vector<std::uint32_t>& wanted) {
+  constexpr int kOctant = 7;  // whichever: the frame stands for all sides of the element
+  MovingElements moving;
+  moving.slot_of.assign(body.element_count(), kNoSlot);
+  for (const std::uint32_t element : wanted) moving.slot_of[element] = 0;
+  for (std::uint32_t e = 0; e < body.element_count(); ++e)
+    if (moving.slot_of[e] == 0) {
+      moving.slot_of[e] = static_cast<std::uint32_t>(moving.elements.size());
+      moving.elements.push_back(e);
+    }
+  const std::size_t n = moving.elements.size();
+  moving.inverse_moments.resize(n);
+  moving.frame.assign(n, kNoSlot);
+  std::vector<std::uint8_t> flat(n, 0);
+  parallel_for_each(n, [&](std::size_t i) {
+    const Mat3 sum = moments(body, connections, moving.elements[i]);
+    flat[i] = !spans_space(sum);
+    moving.inverse_moments[i] = flat[i] ? Mat3(Mat3::Zero()) : Mat3(sum.inverse());
+  });
+  const std::vector<std::uint32_t> part = element_parts(body);
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!flat[i]) continue;
+    const std::uint32_t element = moving.elements[i];
+    moving.frame[i] = static_cast<std::uint32_t>(moving.frames.size());
+    moving.frames.push_back(find_frame(body, connections, body.parts[part[element]], element, kOctant));
+  }
+  return moving;
+}
+
+std::vector<ElementMotion> element_motions(const MovingElements& moving, const Body& body,
+                                           const Adjacency& connections, const std::vector<Vec3>& position) {
+  std::vector<ElementMotion> motions(moving.elements.size());
+  parallel_for_each(motions.size(), [&](std::size_t i) {
+    const std::uint32_t element = moving.elements[i];
+    motions[i].displacement = position[element] - body.rest[element];
+    motions[i].gradient =
+        moving.frame[i] != kNoSlot
+            ? frame_gradient(body, moving.frames[moving.frame[i]], position)
+            : least_squares_gradient(body, connections, element, moving.inverse_moments[i], position);
+  });
+  return motions;
+}
+
+}  // namespace flexel

@@ -1,0 +1,26 @@
+// Bodies and known motions of all their elements, for measuring how well a mapping follows: in tests and in
+// the table of convergence (bench/mapping).
+#pragma once
+#include "bodies.h"
+
+namespace flexel::test {
+
+// The round bar of the study: diameter 1, length 8 along x, its lattice turned and shifted against it;
+// `across` voxels to the diameter.
+Body round_bar(int across, Placement placement, int along_vertices = 128, int around_vertices = 48);
+// A trefoil tube of diameter 1, about 8 across, so that strands pass each other; its lattice is turned too.
+Body knot(int across, Placement placement);
+
+Vec3 bend(const Vec3& p);     // of the bar: half a circle
+Vec3 twist(const Vec3& p);    // one full turn over a length of 8
+Vec3 stretch(const Vec3& p);  // to twice its length, keeping the volume
+Vec3 turn(const Vec3& p);     // a rigid motion
+
+// Distance of the mapped vertices from where `field` takes them [m].
+double largest_error(const Body& body, const std::vector<Vec3>& displacement, const Field& field);
+double rms_error(const Body& body, const std::vector<Vec3>& displacement, const Field& field);
+// Root mean square, over edges between triangles, of the difference between the angle of their normals and
+// that of the exact surface [degrees].
+double normal_jump(const Body& body, const std::vector<Vec3>& displacement, const Field& field);
+
+}  // namespace flexel::test
