@@ -8,6 +8,7 @@
 #include "formats/error.h"
 #include "mapping/bind.h"
 #include "mapping/search.h"
+#include "motions.h"
 
 namespace flexel {
 namespace {
@@ -82,10 +83,8 @@ TEST_P(Thin, OneElementCarriesItsVerticesAlong) {
   EXPECT_TRUE(report(body, result).valid());
 }
 
-INSTANTIATE_TEST_SUITE_P(Methods, Thin, testing::Values(MapMethod::affine, MapMethod::gram_schmidt),
-                         [](const auto& with) {
-                           return with.param == MapMethod::affine ? "affine" : "gram_schmidt";
-                         });
+INSTANTIATE_TEST_SUITE_P(Methods, Thin, testing::ValuesIn(test::kEveryMethod),
+                         [](const auto& with) { return test::test_name(with.param); });
 
 // A row along x that ends in a wall across it: the farther from the wall, the wider the search; beyond kRings
 // the row's elements see too little of the wall.
@@ -131,7 +130,7 @@ TEST(Cracks, BrokenCellsCutFrames) {
   const Adjacency connections = element_adjacency(body);
   for (std::size_t e = 0; e < body.element_count(); ++e)
     if (body.lattice_index[e][0] >= 5) body.position[e] += Vec3(0.3, 0, 0);
-  for (const MapMethod method : {MapMethod::affine, MapMethod::gram_schmidt}) {
+  for (const MapMethod method : test::kEveryMethod) {
     const MapResult result = map(body, method);
     for (std::size_t v = 0; v < result.frame.size(); ++v) {
       EXPECT_EQ(result.frame_of(v).kind, FrameKind::full);
@@ -167,10 +166,16 @@ TEST(Parts, InTouchNeverShareFrames) {
     other.position = other.rest;
     const std::size_t first = body.surface.vertices.size();
     test::append_body(body, other);
-    const MapResult result = map(body);
-    for (std::size_t v = 0; v < result.frame.size(); ++v)
-      for (const std::uint32_t element : result.frame_of(v).elements)
-        EXPECT_EQ(element < body.parts[0].element_end, v < first);
+    for (std::size_t e = 0; e < body.element_count(); ++e)
+      if (e >= body.parts[0].element_end) body.position[e] += Vec3(0.3, 0, 0);
+    for (const MapMethod method : test::kEveryMethod) {
+      const MapResult result = map(body, method);
+      for (std::size_t v = 0; v < result.frame.size(); ++v) {
+        for (const std::uint32_t element : result.frame_of(v).elements)
+          EXPECT_EQ(element < body.parts[0].element_end, v < first);
+        EXPECT_NEAR(result.displacement[v].x(), v < first ? 0 : 0.3, 1e-15);
+      }
+    }
   }
 }
 
@@ -216,10 +221,12 @@ TEST(Pieces, LeavesNearerThanASpacingKeepToTheirOwnElements) {
   check(split, "test");
   for (std::size_t e = 0; e < split.element_count(); ++e)
     if (split.piece[e] == 1) split.position[e] += Vec3(0, 0, 0.2);
-  const MapResult result = map(split);
-  for (std::size_t v = 0; v < 8; ++v) {
-    EXPECT_EQ(result.frame_of(v).kind, FrameKind::full);
-    EXPECT_NEAR(result.displacement[v].z(), v < 4 ? 0 : 0.2, 1e-15);
+  for (const MapMethod method : test::kEveryMethod) {
+    const MapResult result = map(split, method);
+    for (std::size_t v = 0; v < 8; ++v) {
+      EXPECT_EQ(result.frame_of(v).kind, FrameKind::full);
+      EXPECT_NEAR(result.displacement[v].z(), v < 4 ? 0 : 0.2, 1e-15);
+    }
   }
 }
 
@@ -240,15 +247,17 @@ TEST(Seams, VerticesAtOnePositionMoveAsOne) {
   test::deform(body, [](const Vec3& x) -> Vec3 {
     return {x.x() + x.y() * x.y(), x.y() + x.z() * x.x(), x.z()};
   });
-  const MapResult result = map(body, MapMethod::gram_schmidt);
-  std::size_t pairs = 0;
-  for (std::size_t a = 0; a < vertices.size(); ++a)
-    for (std::size_t b = 0; b < a; ++b)
-      if (vertices[a] == vertices[b]) {
-        ++pairs;
-        EXPECT_EQ(result.displacement[a], result.displacement[b]);
-      }
-  EXPECT_GT(pairs, 200u);
+  for (const MapMethod method : test::kEveryMethod) {
+    const MapResult result = map(body, method);
+    std::size_t pairs = 0;
+    for (std::size_t a = 0; a < vertices.size(); ++a)
+      for (std::size_t b = 0; b < a; ++b)
+        if (vertices[a] == vertices[b]) {
+          ++pairs;
+          EXPECT_EQ(result.displacement[a], result.displacement[b]);
+        }
+    EXPECT_GT(pairs, 200u);
+  }
 }
 
 TEST(Unreferenced, VerticesFollowTheNearestElementOfAnyPart) {

@@ -1,9 +1,21 @@
 // Bodies and known motions of all their elements, for measuring how well a mapping follows: in tests and in
 // the table of convergence (bench/mapping).
 #pragma once
+#include <algorithm>
+
 #include "bodies.h"
+#include "mapping/map.h"
 
 namespace flexel::test {
+
+constexpr std::array<MapMethod, 4> kEveryMethod = {MapMethod::gram_schmidt, MapMethod::affine,
+                                                   MapMethod::blended, MapMethod::smooth};
+// For the names of tests: "gram_schmidt".
+inline std::string test_name(MapMethod method) {
+  std::string name = name_of(method);
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
+}
 
 // The round bar of the study: diameter 1, length 8 along x, its lattice turned and shifted against it;
 // `across` voxels to the diameter.

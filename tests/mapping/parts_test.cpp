@@ -7,6 +7,7 @@
 #include "bodies.h"
 #include "formats/import.h"
 #include "mapping/map.h"
+#include "motions.h"
 #include "voxelize/voxelize.h"
 
 namespace flexel {
@@ -48,15 +49,15 @@ class RealPart : public testing::TestWithParam<const char*> {
 TEST_P(RealPart, StaysAtRestAndFollowsImposedMotions) {
   const Mat3 turn = test::rotation(2.1, Vec3(1, -2, 0.5));
   const Vec3 move(0.1, 0.2, -0.3);
-  for (const MapMethod method : {MapMethod::affine, MapMethod::gram_schmidt}) {
+  for (const MapMethod method : test::kEveryMethod) {
     EXPECT_EQ(largest_error(method, [](const Vec3& x) { return x; }), 0);
     EXPECT_LT(largest_error(method, [&](const Vec3& x) -> Vec3 { return turn * x + move; }), 1e-9);
     EXPECT_EQ(left_, 0u);
   }
   const Mat3 stretch = (Mat3() << 1.02, 0.01, 0, -0.01, 0.99, 0.005, 0, 0.01, 1.01).finished();
-  EXPECT_LT(
-      largest_error(MapMethod::affine, [&](const Vec3& x) -> Vec3 { return turn * (stretch * x) + move; }),
-      1e-9);
+  for (const MapMethod method : {MapMethod::affine, MapMethod::blended, MapMethod::smooth})
+    EXPECT_LT(largest_error(method, [&](const Vec3& x) -> Vec3 { return turn * (stretch * x) + move; }),
+              1e-9);
 }
 
 TEST_P(RealPart, HasFourElementsForEveryVertex) {

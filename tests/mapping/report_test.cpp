@@ -6,6 +6,7 @@
 
 #include "bodies.h"
 #include "mapping/bind.h"
+#include "motions.h"
 
 namespace flexel {
 namespace {
@@ -68,10 +69,8 @@ TEST_P(Flags, WhatIsNotFiniteIsSaid) {
   EXPECT_TRUE(nlohmann::json::parse(report_json(found, {GetParam()}))["volume_after"].is_null());
 }
 
-INSTANTIATE_TEST_SUITE_P(Methods, Flags, testing::Values(MapMethod::affine, MapMethod::gram_schmidt),
-                         [](const auto& with) {
-                           return with.param == MapMethod::affine ? "affine" : "gram_schmidt";
-                         });
+INSTANTIATE_TEST_SUITE_P(Methods, Flags, testing::ValuesIn(test::kEveryMethod),
+                         [](const auto& with) { return test::test_name(with.param); });
 
 TEST(Voronoi, RigidAndUniformMotionLeaveNoCellAndShearDoes) {
   Body body = test::block(6, 6, 6, 0.1, Placement::centre, 12);
