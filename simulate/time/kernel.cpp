@@ -17,9 +17,12 @@
 // velocities, so linear and angular momentum are kept exactly.
 //
 // Model `springs` (simulate/spring_model.h): F = -k (d - l) along each spring, Jansson and Vergeest eqs. 15,
-// 16, 18; d - l = (d^2 - l^2) / (d + l) with d^2 - l^2 from the displacements, without cancellation.
+// 16, 18; d - l = (d^2 - l^2) / (d + l) with d^2 - l^2 from the displacements, without cancellation. Cell by
+// cell where springs flow or break, else connection by connection.
 #include "simulate/time/kernel.h"
 
+#include "simulate/time/kernel_connections.h"
+#include "simulate/time/kernel_elements.h"
 #include "simulate/time/kernel_plastic.h"
 #include "simulate/time/kernel_springs.h"
 
@@ -31,6 +34,8 @@ namespace flexel::step {
 namespace {
 
 struct CellsModel {
+  static constexpr bool by_connection = false;
+
   template <Composition has>
   FLEXEL_INLINE static void add_block(const ChunkView& chunk, std::size_t number, const Advance& advance,
                                       const Scratch& scratch, Sums& sums) {
@@ -113,82 +118,29 @@ struct CellsModel {
   }
 };
 
-struct Triple {
-  double at[3];
-};
-
-FLEXEL_INLINE Triple to_lattice(const CellConstants& k, const double* world) {
-  if (k.aligned) return {{world[0], world[1], world[2]}};
-  Triple out;
-  for (int j = 0; j < 3; ++j)
-    out.at[j] = k.axes[3 * j] * world[0] + k.axes[3 * j + 1] * world[1] + k.axes[3 * j + 2] * world[2];
-  return out;
-}
-
-FLEXEL_INLINE Triple to_world(const CellConstants& k, double* const* column, std::size_t l) {
-  const double x = column[0][l], y = column[1][l], z = column[2][l];
-  if (k.aligned) return {{x, y, z}};
-  Triple out;
-  for (int i = 0; i < 3; ++i) out.at[i] = k.axes[i] * x + k.axes[3 + i] * y + k.axes[6 + i] * z;
-  return out;
-}
-
-template <Damping damping>
-void read_elements(const ChunkView& chunk, const StateView& state, const Scratch& scratch) {
-  const CellConstants& k = *chunk.constants;
-  for (std::size_t l = 0; l < chunk.count; ++l) {
-    const std::size_t e = 3 * static_cast<std::size_t>(chunk.elements[l]);
-    const Triple u = to_lattice(k, state.displacement + e);
-    for (int c = 0; c < 3; ++c) scratch.column[kDisplacement + c][l] = u.at[c];
-    if constexpr (damping != Damping::none) {
-      const Triple v = to_lattice(k, state.velocity + e);
-      for (int c = 0; c < 3; ++c) scratch.column[kVelocity + c][l] = v.at[c];
-    }
-  }
-  const int columns = damping == Damping::book ? 6 : 3;
+// Cell by cell, or the model's own way.
+template <class Model, Composition has>
+FLEXEL_INLINE void add_forces(const ChunkView& chunk, const Advance& advance, const Scratch& scratch,
+                              Sums& sums) {
+  const int columns = has.damping == Damping::book ? 6 : 3;
   for (int c = 0; c < columns; ++c)
     __builtin_memset(scratch.column[kForce + c], 0, chunk.count * sizeof(double));
-}
-
-template <Damping damping>
-void advance_owned(const ChunkView& chunk, const StateView& state, const Advance& advance,
-                   const Scratch& scratch) {
-  const CellConstants& k = *chunk.constants;
-  for (std::size_t o = 0; o < chunk.owned_count; ++o) {
-    const std::size_t l = chunk.owned[o], e = chunk.elements[l];
-    Triple force = to_world(k, scratch.column + kForce, l);
-    double* u = state.displacement + 3 * e;
-    double* v = state.velocity + 3 * e;
-    const double gain = advance.kick * state.inverse_mass[e];
-    for (int c = 0; c < 3; ++c) {
-      if (state.outer) force.at[c] += state.outer[3 * e + c];
-      const double before = v[c];
-      v[c] = before + gain * force.at[c];
-      u[c] += advance.drift * (advance.explicit_drift ? before : v[c]);
-    }
-    if constexpr (damping == Damping::book) {
-      const Triple damped = to_world(k, scratch.column + kDampingForce, l);
-      for (int c = 0; c < 3; ++c) state.damping_force[3 * e + c] = damped.at[c];
-    }
-  }
-}
-
-void hand_over_shared(const ChunkView& chunk, double* const* column, double* out) {
-  for (std::size_t s = 0; s < chunk.shared_count; ++s) {
-    const Triple force = to_world(*chunk.constants, column, chunk.shared[s]);
-    for (int c = 0; c < 3; ++c) out[3 * s + c] = force.at[c];
-  }
+  for (std::size_t b = 0; b < chunk.block_count; ++b)
+    Model::template add_block<has>(chunk, b, advance, scratch, sums);
 }
 
 template <class Model, Composition has>
 ChunkOutcome run(const ChunkView& chunk, const StateView& state, const Advance& advance, double* memory) {
   Scratch scratch;
-  const std::size_t stride = scratch_stride(chunk.count);
-  for (std::size_t c = 0; c < kScratchColumns; ++c) scratch.column[c] = memory + c * stride;
+  const std::size_t stride = scratch.stride = scratch_stride(chunk.count);
+  for (std::size_t c = 0; c < kScratchColumns; ++c) scratch.column[c] = memory + kLanes + c * stride;
   read_elements<has.damping>(chunk, state, scratch);
   Sums sums;
-  for (std::size_t b = 0; b < chunk.block_count; ++b)
-    Model::template add_block<has>(chunk, b, advance, scratch, sums);
+  if constexpr (Model::by_connection) {
+    Model::template add_forces<has.damping>(chunk, scratch, sums);
+  } else {
+    add_forces<Model, has>(chunk, advance, scratch, sums);
+  }
   ChunkOutcome outcome = {};
   advance_owned<has.damping>(chunk, state, advance, scratch);
   hand_over_shared(chunk, scratch.column + kForce, chunk.shared_force);
@@ -200,7 +152,7 @@ ChunkOutcome run(const ChunkView& chunk, const StateView& state, const Advance& 
     if (!(value >= outcome.smallest_jacobian))
       outcome.smallest_jacobian = value != value ? -__builtin_huge_val() : value;
   }
-  if constexpr (has.fracture || has.plasticity) {
+  if constexpr (has.fracture || has.plasticity || Model::by_connection) {
     outcome.elastic = sum(sums.elastic);
     outcome.plastic_work = sum(sums.plastic_work);
     outcome.released = sum(sums.released);
@@ -218,9 +170,9 @@ void fill_in(ChunkKernel* to) {
   to[variant_number(book)] = &run<Model, book>;
 }
 
-template <class Model>
+template <class Model, class Plain = Model>
 void fill_in(ChunkKernel* to) {
-  fill_in<Model, false, false>(to);
+  fill_in<Plain, false, false>(to);
   fill_in<Model, true, false>(to);
   fill_in<Model, false, true>(to);
   fill_in<Model, true, true>(to);
@@ -237,7 +189,7 @@ const KernelTable& FLEXEL_TABLE(FLEXEL_ISA)() {
   static const KernelTable table = [] {
     KernelTable made{FLEXEL_NAME(FLEXEL_ISA), {}, {}};
     fill_in<CellsModel>(made.cells);
-    fill_in<SpringsModel>(made.springs);
+    fill_in<SpringsModel, ConnectionsModel>(made.springs);
     return made;
   }();
   return table;

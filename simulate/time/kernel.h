@@ -21,6 +21,24 @@ struct CellBlock {
   std::uint64_t is_run;
 };
 
+// Connections of one direction of the lattice, eight side by side (simulate/time/connection_runs.h). The
+// first eight lead from elements a ... a + 7 to b ... b + 7, the next ones from a + 8 ..., all numbers of the
+// chunk + kLanes. cell[0] ...: lowest corners of the cells around, 4 around an edge, 2 around a diagonal
+// across a face, 1 around one through a cell.
+struct ConnectionRun {
+  std::uint16_t a, b, cell[4];
+  std::uint16_t blocks;    // of eight
+  std::uint8_t direction;  // of CellConstants::connection
+  std::uint8_t lanes;      // bit l: lane l counts; all of them where there are several blocks
+};
+
+// What all connections of one direction have in common, lattice frame.
+struct ConnectionKind {
+  double rest[3], rest_square, rest_length;  // m, m^2
+  double stiffness;                          // N/m, a cell's share
+  int cells;                                 // around one
+};
+
 // What all cells of a part have in common. Lattice frame: axis j is column j of `axes`.
 struct CellConstants {
   double spacing[3];    // m
@@ -28,12 +46,13 @@ struct CellConstants {
   double mu, lambda;    // Pa
   double hourglass[4];  // N/m, of the modes xy, yz, zx, xyz
   double spring[3];     // N/m, a cell's share of a spring along an edge, across a face, through the centre
-  double damping;       // s; 0 in the variants without damping
-  double yield, hardening;      // Pa, J2 yield stress and its isotropic, linear hardening
-  double strength, elongation;  // Pa, plastic strain: what breaks a cell; infinity: nothing
-                                // (springs: yield, hardening, elongation are strains of a spring)
-  double axes[9];               // column-major rotation from the lattice to the world frame
-  bool aligned;                 // axes is the identity
+  ConnectionKind connection[13];  // half_neighbourhood (formats/body.h)
+  double damping;                 // s; 0 in the variants without damping
+  double yield, hardening;        // Pa, J2 yield stress and its isotropic, linear hardening
+  double strength, elongation;    // Pa, plastic strain: what breaks a cell; infinity: nothing
+                                  // (springs: yield, hardening, elongation are strains of a spring)
+  double axes[9];                 // column-major rotation from the lattice to the world frame
+  bool aligned;                   // axes is the identity
 };
 
 // What the cells of a block remember of their plastic flow; model `cells`, lattice frame.
@@ -62,6 +81,9 @@ struct ChunkView {
   SpringBlock* springs;     // (block_count); null but with fracture of springs
   SpringFlow* spring_flow;  // (block_count); null but with plasticity of springs
   std::size_t block_count;
+  const ConnectionRun* runs;  // in place of blocks where connections are computed one by one
+  std::size_t run_count;
+  const double* cell_fill;        // by element that is a cell's lowest corner, + kLanes; 0: no cell
   const std::uint32_t* elements;  // (count) numbers of the body, ascending
   std::size_t count;
   const std::uint16_t *owned, *shared;  // numbers within the chunk, ascending
@@ -89,17 +111,18 @@ struct Advance {
 struct ChunkOutcome {
   // over the chunk's cells, at the state before the advance; NaN counts as -infinity
   double smallest_jacobian;
-  // with fracture or plasticity: elastic energy of the cells [J], as the forces took it; what this step
-  // dissipated [J]; all of them `book`
+  // with fracture or plasticity, and of connections: elastic energy of the cells [J], as the forces took it;
+  // what this step dissipated [J]; all of them `book`
   double elastic, plastic_work, released;
   std::uint64_t broken;  // cells that broke in this step
 };
 
-// Doubles of scratch that a chunk with `count` elements needs.
+// Doubles of a column of scratch of a chunk with `count` elements: kLanes before them and as many behind.
 [[nodiscard]] constexpr std::size_t scratch_stride(std::size_t count) {
-  return (count + 2 * kLanes - 1) / kLanes * kLanes;
+  return (count + 3 * kLanes - 1) / kLanes * kLanes;
 }
-constexpr std::size_t kScratchColumns = 12;  // u, v, f, damping force
+constexpr std::size_t kScratchColumns = 18;  // u, v, f, damping force, and the latter two of connections
+constexpr std::size_t kScratchAlignment = 64;
 
 using ChunkKernel = ChunkOutcome (*)(const ChunkView&, const StateView&, const Advance&, double* scratch);
 

@@ -1,4 +1,5 @@
-// Model `springs`, eight cells at a time; kernel.cpp has the formulas. Included by kernel.cpp alone.
+// Model `springs` where they flow or break, eight cells at a time; kernel.cpp has the formulas. Included by
+// kernel.cpp alone.
 //
 // Fracture: a spring ends where its length passes t = l (1 + `elongation`) (Jansson and Vergeest, equation
 // 2). Each cell that holds a share of it sees the same length and decides the same. A cell whose springs
@@ -108,11 +109,12 @@ FLEXEL_INLINE Lanes flow(Lanes stretch, double rest, double stiffness, const Cel
 }
 
 struct SpringsModel {
+  static constexpr bool by_connection = false;
+
   template <Composition has>
   FLEXEL_INLINE static void add_block(const ChunkView& chunk, std::size_t number, const Advance& advance,
                                       const Scratch& scratch, Sums& sums) {
     constexpr Damping damping = has.damping;
-    constexpr bool changes = has.fracture || has.plasticity;
     CellBlock& block = chunk.blocks[number];
     const CellConstants& k = *chunk.constants;
     const Lanes fill = load(block.fill);
@@ -132,8 +134,8 @@ struct SpringsModel {
       const Lanes length = square_root(square);
       const Lanes stiffness = k.spring[s.kind] * fill;
       Lanes pull;  // force on a along d, over |d|
-      [[maybe_unused]] Lanes viscous = {}, along = {}, stretch = {};
-      if constexpr (changes) stretch = s.off / (length + rest_length);
+      [[maybe_unused]] Lanes viscous = {}, along = {};
+      Lanes stretch = s.off / (length + rest_length);
       if constexpr (has.plasticity) {
         SpringFlow& memory = chunk.spring_flow[number];
         Lanes resists = fill;
@@ -162,7 +164,7 @@ struct SpringsModel {
         viscous = gone ? Lanes{} : viscous;
         stretch = gone ? Lanes{} : stretch;
       }
-      if constexpr (changes && damping == Damping::book) sums.elastic += 0.5 * stiffness * stretch * stretch;
+      if constexpr (damping == Damping::book) sums.elastic += 0.5 * stiffness * stretch * stretch;
       if constexpr (damping == Damping::book)
         for (int c = 0; c < 3; ++c) {
           damped.at[a][c] += viscous * s.d[c];
@@ -174,15 +176,8 @@ struct SpringsModel {
         force.at[b][c] -= pull * s.d[c];
       }
     };
-    if constexpr (changes) {
 #pragma GCC unroll 1
-      for (int n = 0; n < 28; ++n) add_spring(kEnds.a[n], kEnds.b[n], n);
-    } else {
-#pragma GCC unroll 8
-      for (int a = 0; a < 8; ++a)
-#pragma GCC unroll 8
-        for (int b = a + 1; b < 8; ++b) add_spring(a, b, 0);
-    }
+    for (int n = 0; n < 28; ++n) add_spring(kEnds.a[n], kEnds.b[n], n);
     // A length that is not a number makes the forces so; the first one tells.
     const Lanes told = fill > 0 ? 1 + 0 * force.at[0][0] : Lanes{} + __builtin_huge_val();
     sums.smallest_jacobian = told >= sums.smallest_jacobian ? sums.smallest_jacobian : told;

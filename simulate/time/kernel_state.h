@@ -9,13 +9,21 @@ namespace {
 
 struct Scratch {
   double* column[kScratchColumns];
+  std::size_t stride;  // from a column to the next one
 };
 
 struct Corners {
   Lanes at[8][3];
 };
 
-enum Column { kDisplacement = 0, kVelocity = 3, kForce = 6, kDampingForce = 9 };
+enum Column {
+  kDisplacement = 0,
+  kVelocity = 3,
+  kForce = 6,
+  kDampingForce = 9,
+  kReaction = 12,
+  kDampingReaction = 15
+};
 
 FLEXEL_INLINE void read_corners(const CellBlock& block, double* const* column, Corners& corners) {
   if (block.is_run) {
@@ -43,6 +51,7 @@ FLEXEL_INLINE void add_to_corners(const CellBlock& block, const Corners& corners
       for (int c = 0; c < 3; ++c) scatter_add(column[c], block.corner[a], corners.at[a][c]);
   }
 }
+
 // What the cells add up to while a chunk is computed.
 struct Sums {
   Lanes smallest_jacobian = Lanes{} + __builtin_huge_val();

@@ -3,9 +3,11 @@
 #include "simulate/time/layout.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include "simulate/cells.h"
+#include "simulate/time/connection_runs.h"
 
 namespace flexel {
 namespace {
@@ -14,6 +16,8 @@ using step::CellBlock;
 using step::kLanes;
 
 constexpr Index3 kTile{32, 8, 8};
+// Connections between the elements that chunks share are computed in each of them.
+constexpr Index3 kConnectionTile{64, 8, 16};
 
 step::CellConstants constants_of(const Part& part, const Material& material, double damping) {
   const CellKind kind = cell_kind(part.lattice, material);
@@ -27,6 +31,18 @@ step::CellConstants constants_of(const Part& part, const Material& material, dou
   for (const Spring& spring : spring_kind(part.lattice, material).springs)
     if (spring.a == 0 && (spring.b == 1 || spring.b == 3 || spring.b == 7))
       c.spring[spring.b == 1 ? 0 : spring.b == 3 ? 1 : 2] = spring.stiffness;
+  for (std::size_t d = 0; d < half_neighbourhood.size(); ++d) {
+    step::ConnectionKind& connection = c.connection[d];
+    int axes = 0;
+    for (std::size_t j = 0; j < 3; ++j) {
+      connection.rest[j] = half_neighbourhood[d][j] * c.spacing[j];
+      connection.rest_square += connection.rest[j] * connection.rest[j];
+      axes += half_neighbourhood[d][j] != 0;
+    }
+    connection.rest_length = std::sqrt(connection.rest_square);
+    connection.stiffness = c.spring[axes - 1];
+    connection.cells = 1 << (3 - axes);
+  }
   c.damping = damping;
   for (Eigen::Index k = 0; k < 9; ++k) c.axes[k] = part.lattice.axes.data()[k];
   c.aligned = part.lattice.axes == Mat3::Identity();
@@ -39,7 +55,8 @@ struct TiledCells {
   std::vector<std::size_t> tile_begin;  // and the end
 };
 
-TiledCells tiled_cells(const Body& body, const Part& part, const std::vector<std::uint8_t>& active) {
+TiledCells tiled_cells(const Body& body, const Part& part, const std::vector<std::uint8_t>& active,
+                       const Index3& largest) {
   TiledCells result;
   for (std::uint32_t c = part.cell_begin; c < part.cell_end; ++c)
     if (active[c]) result.cells.push_back(c);
@@ -55,7 +72,7 @@ TiledCells tiled_cells(const Body& body, const Part& part, const std::vector<std
   std::array<std::int64_t, 3> tiles{};
   for (std::size_t j = 0; j < 3; ++j) {
     const int extent = high[j] - low[j] + 1;
-    tiles[j] = (extent + kTile[j] - 1) / kTile[j];
+    tiles[j] = (extent + largest[j] - 1) / largest[j];
     size[j] = static_cast<int>((extent + tiles[j] - 1) / tiles[j]);  // even shares
   }
   size[0] = (size[0] + 7) / 8 * 8;  // whole blocks
@@ -85,17 +102,24 @@ class Builder {
         local_(setting.body.element_count()),
         users_(local_.size(), 0) {}
 
-  void add_chunk(std::uint32_t part, std::span<const std::uint32_t> cells);
+  void add_chunk(std::uint32_t part, std::span<const std::uint32_t> cells, bool by_connection);
+  // Cells that share their lowest corner with another one of their chunk, which runs cannot tell apart: where
+  // pieces branch.
+  void add_left_over(std::uint32_t part);
   void share();
 
  private:
+  [[nodiscard]] std::vector<std::uint32_t> take_apart(std::span<const std::uint32_t> cells);
+  void add_blocks(std::span<const std::uint32_t> cells);
   void add_block(std::span<const std::uint32_t> cells, bool is_run);
+  void add_runs(std::span<const std::uint32_t> cells, std::size_t count);
   [[nodiscard]] bool continues(std::uint32_t cell, std::uint32_t next) const;
 
   const Body& body_;
   StepLayout& layout_;
   std::vector<std::uint16_t> local_;  // (elements) number within the chunk that is built
   std::vector<std::uint8_t> users_;   // (elements) chunks that touch it, up to 2
+  std::vector<std::uint32_t> left_over_;
 };
 
 void Builder::add_block(std::span<const std::uint32_t> cells, bool is_run) {
@@ -118,21 +142,7 @@ bool Builder::continues(std::uint32_t cell, std::uint32_t next) const {
   return true;
 }
 
-void Builder::add_chunk(std::uint32_t part, std::span<const std::uint32_t> cells) {
-  StepLayout::Chunk chunk;
-  chunk.part = part;
-  chunk.block_begin = layout_.blocks.size();
-  chunk.element_begin = layout_.elements.size();
-  std::vector<std::uint32_t> elements;
-  elements.reserve(2 * cells.size());
-  for (const std::uint32_t c : cells)
-    elements.insert(elements.end(), body_.cell_elements[c].begin(), body_.cell_elements[c].end());
-  std::sort(elements.begin(), elements.end());
-  elements.erase(std::unique(elements.begin(), elements.end()), elements.end());
-  for (std::size_t l = 0; l < elements.size(); ++l) {
-    local_[elements[l]] = static_cast<std::uint16_t>(l);
-    users_[elements[l]] = static_cast<std::uint8_t>(std::min(2, users_[elements[l]] + 1));
-  }
+void Builder::add_blocks(std::span<const std::uint32_t> cells) {
   std::vector<std::uint32_t> rest;
   for (std::size_t i = 0; i < cells.size();) {
     std::size_t end = i + 1;
@@ -146,11 +156,76 @@ void Builder::add_chunk(std::uint32_t part, std::span<const std::uint32_t> cells
   }
   for (std::size_t i = 0; i < rest.size(); i += kLanes)
     add_block(std::span(rest).subspan(i, std::min(kLanes, rest.size() - i)), false);
+}
+
+void Builder::add_runs(std::span<const std::uint32_t> cells, std::size_t count) {
+  std::vector<std::array<std::uint16_t, 8>> corners(cells.size());
+  std::vector<double> fill(cells.size());
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    fill[i] = body_.fill[cells[i]];
+    for (std::size_t a = 0; a < 8; ++a) corners[i][a] = local_[body_.cell_elements[cells[i]][a]];
+  }
+  const ConnectionRuns made = connection_runs(corners, fill, count);
+  layout_.runs.insert(layout_.runs.end(), made.runs.begin(), made.runs.end());
+  layout_.cell_fill.insert(layout_.cell_fill.end(), made.fill.begin(), made.fill.end());
+}
+
+void Builder::add_chunk(std::uint32_t part, std::span<const std::uint32_t> cells, bool by_connection) {
+  StepLayout::Chunk chunk;
+  chunk.part = part;
+  chunk.block_begin = layout_.blocks.size();
+  chunk.run_begin = layout_.runs.size();
+  chunk.fill_begin = layout_.cell_fill.size();
+  chunk.element_begin = layout_.elements.size();
+  std::vector<std::uint32_t> elements;
+  elements.reserve(2 * cells.size());
+  std::vector<std::uint32_t> apart;
+  if (by_connection) {
+    apart = take_apart(cells);
+    cells = apart;
+  }
+  for (const std::uint32_t c : cells)
+    elements.insert(elements.end(), body_.cell_elements[c].begin(), body_.cell_elements[c].end());
+  std::sort(elements.begin(), elements.end());
+  elements.erase(std::unique(elements.begin(), elements.end()), elements.end());
+  for (std::size_t l = 0; l < elements.size(); ++l) {
+    local_[elements[l]] = static_cast<std::uint16_t>(l);
+    users_[elements[l]] = static_cast<std::uint8_t>(std::min(2, users_[elements[l]] + 1));
+  }
+  if (by_connection) {
+    add_runs(cells, elements.size());
+  } else {
+    add_blocks(cells);
+  }
   layout_.elements.insert(layout_.elements.end(), elements.begin(), elements.end());
   layout_.largest_chunk = std::max(layout_.largest_chunk, elements.size());
   chunk.block_end = layout_.blocks.size();
+  chunk.run_end = layout_.runs.size();
   chunk.element_end = layout_.elements.size();
   layout_.chunks.push_back(chunk);
+}
+
+// Cells with a lowest corner of their own; the others are left over.
+std::vector<std::uint32_t> Builder::take_apart(std::span<const std::uint32_t> cells) {
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> by_corner;  // lowest corner, cell
+  by_corner.reserve(cells.size());
+  for (const std::uint32_t c : cells) by_corner.emplace_back(body_.cell_elements[c][0], c);
+  std::sort(by_corner.begin(), by_corner.end());
+  std::vector<std::uint32_t> kept;
+  for (std::size_t i = 0; i < by_corner.size(); ++i) {
+    const bool again = i > 0 && by_corner[i].first == by_corner[i - 1].first;
+    (again ? left_over_ : kept).push_back(by_corner[i].second);
+  }
+  return kept;
+}
+
+void Builder::add_left_over(std::uint32_t part) {
+  while (!left_over_.empty()) {
+    const std::vector<std::uint32_t> cells = std::move(left_over_);
+    left_over_.clear();
+    for (std::size_t i = 0; i < cells.size(); i += StepLayout::kChunkCells)
+      add_chunk(part, std::span(cells).subspan(i, std::min(StepLayout::kChunkCells, cells.size() - i)), true);
+  }
 }
 
 // Once all chunks are there: who owns what.
@@ -190,29 +265,41 @@ void Builder::share() {
 
 std::size_t StepLayout::bytes() const {
   const auto of = [](const auto& v) { return v.capacity() * sizeof(v[0]); };
-  return of(chunks) + of(blocks) + of(block_cells) + of(elements) + of(owned) + of(shared) +
-         of(shared_elements) + of(slot_offsets) + of(slots) + of(lone_elements);
+  return of(chunks) + of(blocks) + of(block_cells) + of(runs) + of(cell_fill) + of(elements) + of(owned) +
+         of(shared) + of(shared_elements) + of(slot_offsets) + of(slots) + of(lone_elements);
 }
 
-StepLayout step_layout(const Setting& setting, const std::vector<double>& damping) {
+bool steps_by_connection(const Setting& setting, const StepPlan& plan, std::size_t part) {
+  return setting.models.size() > part && setting.models[part] == Model::springs &&
+         (plan.plasticity.empty() || !std::isfinite(plan.plasticity[part].yield)) &&
+         (plan.fracture.empty() || !plan.fracture[part].any());
+}
+
+StepLayout step_layout(const Setting& setting, const StepPlan& plan) {
   StepLayout layout;
   const Body& body = setting.body;
   const std::vector<std::uint8_t> active = active_cells(setting);
   Builder builder(setting, layout);
   for (std::uint32_t p = 0; p < body.parts.size(); ++p) {
-    layout.constants.push_back(constants_of(body.parts[p], setting.materials[p], damping[p]));
-    const TiledCells tiled = tiled_cells(body, body.parts[p], active);
+    layout.constants.push_back(constants_of(body.parts[p], setting.materials[p], plan.damping[p]));
+    const bool by_connection = steps_by_connection(setting, plan, p);
+    const TiledCells tiled =
+        tiled_cells(body, body.parts[p], active, by_connection ? kConnectionTile : kTile);
     for (std::size_t t = 0; t + 1 < tiled.tile_begin.size();) {
       const std::size_t begin = tiled.tile_begin[t];
       std::size_t end = tiled.tile_begin[++t];
       while (t + 1 < tiled.tile_begin.size() && tiled.tile_begin[t + 1] - begin <= StepLayout::kChunkCells)
         end = tiled.tile_begin[++t];
-      builder.add_chunk(p, std::span(tiled.cells).subspan(begin, end - begin));
+      builder.add_chunk(p, std::span(tiled.cells).subspan(begin, end - begin), by_connection);
     }
+    builder.add_left_over(p);
   }
   builder.share();
   layout.elements.shrink_to_fit();
   layout.blocks.shrink_to_fit();
+  layout.block_cells.shrink_to_fit();
+  layout.runs.shrink_to_fit();
+  layout.cell_fill.shrink_to_fit();
   layout.owned.shrink_to_fit();
   return layout;
 }

@@ -1,6 +1,6 @@
-// How a body is cut up for stepping: chunks of cells in blocks of eight (simulate/time/kernel.h), and which
-// elements each chunk owns or shares with others. Depends on the body only, never on the number of threads,
-// so that every sum has a fixed order.
+// How a body is cut up for stepping: chunks of cells in blocks of eight, or of the connections that they make
+// in runs of eight (simulate/time/kernel.h), and which elements each chunk owns or shares with others.
+// Depends on the body only, never on the number of threads, so that every sum has a fixed order.
 //
 // Cells are gathered tile by tile (up to 32 x 8 x 8 voxels, a row of a tile contiguous) until a chunk holds
 // about kChunkCells; the small tiles of thin walls share a chunk. The state itself stays in the body's order.
@@ -10,6 +10,7 @@
 
 #include "simulate/state.h"
 #include "simulate/time/kernel.h"
+#include "simulate/time/plan.h"
 
 namespace flexel {
 
@@ -19,6 +20,8 @@ struct StepLayout {
   struct Chunk {
     std::uint32_t part = 0;
     std::size_t block_begin = 0, block_end = 0;      // of `blocks`
+    std::size_t run_begin = 0, run_end = 0;          // of `runs`
+    std::size_t fill_begin = 0;                      // of `cell_fill`
     std::size_t element_begin = 0, element_end = 0;  // of `elements`
     std::size_t owned_begin = 0, owned_end = 0;      // of `owned`
     std::size_t shared_begin = 0, shared_end = 0;    // of `shared`, and the slots of the forces on them
@@ -27,9 +30,12 @@ struct StepLayout {
   std::vector<Chunk> chunks;
   std::vector<step::CellBlock> blocks;
   std::vector<std::array<std::uint32_t, step::kLanes>> block_cells;  // cells of the lanes; kNoCell: none
-  std::vector<std::uint32_t> elements;                               // by chunk, ascending
-  std::vector<std::uint16_t> owned, shared;                          // by chunk, numbers within it
-  std::vector<step::CellConstants> constants;                        // (parts)
+  // Parts of model `springs` in which nothing flows or breaks have no blocks, but runs.
+  std::vector<step::ConnectionRun> runs;
+  std::vector<double> cell_fill;
+  std::vector<std::uint32_t> elements;         // by chunk, ascending
+  std::vector<std::uint16_t> owned, shared;    // by chunk, numbers within it
+  std::vector<step::CellConstants> constants;  // (parts)
 
   // Elements of several chunks, ascending, and the slots of their forces (compressed rows, ascending).
   std::vector<std::uint32_t> shared_elements;
@@ -42,8 +48,11 @@ struct StepLayout {
   [[nodiscard]] std::size_t bytes() const;
 };
 
-// Of the cells that resist (simulate/cells.h). `damping` is the time tau of each part [s].
-[[nodiscard]] StepLayout step_layout(const Setting& setting, const std::vector<double>& damping);
+// Whether the connections of a part are computed one by one, instead of its cells.
+[[nodiscard]] bool steps_by_connection(const Setting& setting, const StepPlan& plan, std::size_t part);
+
+// Of the cells that resist (simulate/cells.h).
+[[nodiscard]] StepLayout step_layout(const Setting& setting, const StepPlan& plan);
 
 // Inertia of each element [kg], broken cells included: an eighth of rho f V of each of its cells, or rho h^3
 // in centre placement.

@@ -108,7 +108,8 @@ double stable_step(const Setting& setting, const std::vector<double>& damping) {
   return step;
 }
 
-std::vector<double> stiffening(const Setting& setting, const std::vector<Vec3>& displacement, bool plastic) {
+std::vector<double> stiffening(const Setting& setting, const std::vector<Vec3>& displacement,
+                               const StepPlan& plan) {
   const Body& body = setting.body;
   const std::vector<std::uint8_t> active = active_cells(setting);
   std::vector<double> result;
@@ -116,13 +117,17 @@ std::vector<double> stiffening(const Setting& setting, const std::vector<Vec3>& 
     const Part& part = body.parts[p];
     const CellKind cells = cell_kind(part.lattice, setting.materials[p]);
     const SpringKind springs = spring_kind(part.lattice, setting.materials[p]);
-    const bool by_springs = is_springs(setting, p);
+    const bool by_springs = is_springs(setting, p), plastic = !plan.plasticity.empty();
+    const bool breaks = !plan.fracture.empty() && plan.fracture[p].any();
     const Greatest greatest = parallel_sum<Greatest>(part.cell_end - part.cell_begin, [&](std::size_t i) {
       const std::size_t c = part.cell_begin + i;
       if (!active[c]) return Greatest{};
       CellVectors u;
       for (std::size_t a = 0; a < 8; ++a) u[a] = displacement[body.cell_elements[c][a]];
-      return Greatest{by_springs ? springs_stiffening(springs, u) : cell_stiffening(cells, u, plastic)};
+      if (!by_springs) return Greatest{cell_stiffening(cells, u, plastic)};
+      if (!breaks && !(1 + volume_change(displacement_gradient(cells, u)) > 0))
+        return Greatest{std::numeric_limits<double>::infinity()};
+      return Greatest{springs_stiffening(springs, u)};
     });
     result.push_back(std::max(1.0, greatest.value));
   }

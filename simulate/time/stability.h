@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "simulate/state.h"
+#include "simulate/time/plan.h"
 
 namespace flexel {
 
@@ -25,8 +26,10 @@ namespace flexel {
 
 // By how much omega^2 of the stiffest cell of each part exceeds that at rest, in the deformed state: at
 // least 1. Neo-Hookean stiffness grows as a cell is squeezed; for springs it changes by their strain.
-// `plastic`: the stretch of what has flowed counts as stretch of the stiffness, too, which bounds it.
+// With plasticity in the plan the stretch of what has flowed counts as stretch of the stiffness, too, which
+// bounds it. Infinity: a cell is folded. Springs resist as well inside out, so nothing else tells it of them;
+// where they break a cell of which some are left may turn as it likes.
 [[nodiscard]] std::vector<double> stiffening(const Setting& setting, const std::vector<Vec3>& displacement,
-                                             bool plastic = false);
+                                             const StepPlan& plan);
 
 }  // namespace flexel

@@ -26,7 +26,7 @@ bool StepBound::damps_explicitly() const {
 }
 
 void StepBound::look(const State& state, const PaperModel* paper, const std::vector<double>& mass) {
-  stiffening_ = stiffening(setting_, state.displacement, !plan_.plasticity.empty());
+  stiffening_ = stiffening(setting_, state.displacement, plan_);
   if (paper) connections_ = paper->frequencies(state, mass);
   added_ = 0;
   for (const Pass& pass : passes_)

@@ -62,6 +62,13 @@ void move_element(std::size_t e, const double* force, const step::StateView& vie
   }
 }
 
+// The first aligned double.
+double* aligned(std::vector<double>& scratch) {
+  const auto address = reinterpret_cast<std::uintptr_t>(scratch.data());
+  return scratch.data() + (step::kScratchAlignment - address % step::kScratchAlignment) %
+                              step::kScratchAlignment / sizeof(double);
+}
+
 void add_slots(const std::vector<double>& values, std::span<const std::uint32_t> slots, double* sum) {
   sum[0] = sum[1] = sum[2] = 0;
   for (const std::uint32_t slot : slots)
@@ -80,7 +87,7 @@ const step::KernelTable& kernel_table(const std::string& isa) {
 }
 
 Stepper::Stepper(const Setting& setting, const StepPlan& plan, bool book, const std::string& isa)
-    : layout_(step_layout(setting, plan.damping)),
+    : layout_(step_layout(setting, plan)),
       table_(&kernel_table(isa)),
       mass_(lumped_masses(setting)),
       inverse_mass_(mass_.size()),
@@ -116,12 +123,14 @@ void Stepper::choose_kernels(const Setting& setting, const StepPlan& plan) {
     damped = damped || plan.damping[p] > 0;
     (springs ? springs_flow : cells_flow) |= has.plasticity;
     const step::ChunkKernel* kernels = springs ? table_->springs : table_->cells;
-    // Only kernels with fracture or plasticity tell the elastic energy: where one part needs it, all do.
+    // Cells' kernels tell the elastic energy only with fracture or plasticity: where one part needs it, all
+    // do.
     step::Composition booking = has;
     booking.damping = step::Damping::book;
-    booking.fracture = has.fracture || plastic || fractures_;
+    const bool tells = steps_by_connection(setting, plan, p);
+    booking.fracture = has.fracture || (!tells && (plastic || fractures_));
     springs_break = springs_break || (springs && booking.fracture);
-    if (book_ && (booking.fracture || plan.damping[p] > 0)) has = booking;
+    if (book_ && (plastic || fractures_ || plan.damping[p] > 0)) has = booking;
     kernel_.push_back(kernels[step::variant_number(has)]);
     booking_.push_back(kernels[step::variant_number(booking)]);
   }
@@ -161,7 +170,8 @@ StepOutcome Stepper::advance(State& state, const std::vector<Vec3>& outer, const
   const step::StateView view{state.displacement.data()->data(), state.velocity.data()->data(),
                              outer.empty() ? nullptr : outer.data()->data(), inverse_mass_.data(),
                              book_ ? damping_force_.data()->data() : nullptr};
-  const std::size_t doubles = step::kScratchColumns * step::scratch_stride(layout_.largest_chunk);
+  const std::size_t doubles = step::kScratchColumns * step::scratch_stride(layout_.largest_chunk) +
+                              step::kScratchAlignment / sizeof(double);
   const Lowest lowest = parallel_sum<Lowest>(
       layout_.chunks.size(),
       [&](std::size_t i) {
@@ -174,6 +184,9 @@ StepOutcome Stepper::advance(State& state, const std::vector<Vec3>& outer, const
             springs_.empty() ? nullptr : springs_.data() + chunk.block_begin,
             spring_flow_.empty() ? nullptr : spring_flow_.data() + chunk.block_begin,
             chunk.block_end - chunk.block_begin,
+            layout_.runs.data() + chunk.run_begin,
+            chunk.run_end - chunk.run_begin,
+            layout_.cell_fill.data() + chunk.fill_begin,
             layout_.elements.data() + chunk.element_begin,
             chunk.element_end - chunk.element_begin,
             layout_.owned.data() + chunk.owned_begin,
@@ -183,7 +196,7 @@ StepOutcome Stepper::advance(State& state, const std::vector<Vec3>& outer, const
             shared_force_.data() + 3 * chunk.shared_begin,
             book_ ? shared_damping_.data() + 3 * chunk.shared_begin : nullptr,
             &layout_.constants[chunk.part]};
-        const step::ChunkOutcome outcome = kernel_[chunk.part](chunk_view, view, advance, scratch.data());
+        const step::ChunkOutcome outcome = kernel_[chunk.part](chunk_view, view, advance, aligned(scratch));
         return Lowest{outcome.smallest_jacobian, chunk.part,       outcome.elastic,
                       outcome.plastic_work,      outcome.released, outcome.broken};
       },

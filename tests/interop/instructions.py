@@ -28,6 +28,9 @@ EFFECTS = {
     "`[[fix]]` of elements": '[[fix]]\nwhere = { half_space = { point = ["0.5 mm", 0, 0], normal = [-1, 0, 0] } }\n',
     "`[[velocity]]`": '[[velocity]]\nwhere = "block"\nvelocity = ["0 m/s", "0 m/s", "1 m/s"]\n',
     "`[damping]`": '[damping]\ntime = "2 us"\n',
+    "`[drag]`": '[drag]\ndensity = "1.2 kg/m3"\n',
+    "`[plasticity]`": '[plasticity]\nyield = "1 GPa"\n',
+    "`[fracture]`": '[fracture]\nstrength = "1 GPa"\n',
 }
 
 

@@ -76,7 +76,7 @@ def test_a_program_without_effects_steps_with_the_same_instructions():
 
 def test_the_hot_loop_has_few_variants():
     listed = symbols("flexel-simulate")
-    for model in ("CellsModel", "SpringsModel"):
+    for model in ("CellsModel", "SpringsModel", "ConnectionsModel"):
         found = set(re.findall(rf"run<flexel::step::\(anonymous namespace\)::{model}, ([^\n]*?)>\(", listed))
         print(model, len(found))
         expect(1 <= len(found) <= MOST_VARIANTS, f"{model} has {len(found)} variants: {found}")

@@ -1,0 +1,326 @@
+// Springs computed connection by connection: every connection of every cell once, whatever the shape, with
+// the forces, momenta and energies of the model cell by cell.
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <map>
+#include <random>
+#include <tuple>
+
+#include "formats/error.h"
+#include "formats/parallel.h"
+#include "simulate/cells.h"
+#include "simulate/time/connection_runs.h"
+#include "simulate/time/stability.h"
+#include "simulate/time/step_bound.h"
+#include "simulate/time/stepper.h"
+#include "tests/simulate/box_body.h"
+
+namespace flexel {
+namespace {
+
+using testing::box_body;
+using testing::BoxOptions;
+
+const Material kGum{"gum", 12.1e5, 0.25, 580, "test"};
+
+// A share of the voxels, each with a fill of its own; turned.
+Body crumbs(const std::array<int, 3>& cells, double share, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> any(0, 1);
+  std::map<std::array<int, 3>, double> fills;
+  BoxOptions options;
+  options.cells = cells;
+  options.spacing = Vec3::Constant(0.01);
+  options.axes = Eigen::AngleAxisd(0.7, Vec3(1, -2, 0.5).normalized()).toRotationMatrix();
+  options.fill = [&](int i, int j, int k) {
+    const auto [found, is_new] = fills.try_emplace({i, j, k}, 0);
+    if (is_new) found->second = any(random) < share ? 0.05 + 0.95 * any(random) : 0;
+    return found->second;
+  };
+  return box_body(options);
+}
+
+// A shell two cells thick about a ball: rows of every length, oblique.
+Body shell(int n) {
+  BoxOptions options;
+  options.cells = {n, n, n};
+  options.spacing = Vec3::Constant(0.01);
+  options.fill = [n](int i, int j, int k) {
+    const double r = (Vec3(i, j, k) - Vec3::Constant(0.5 * (n - 1))).norm();
+    return r < 0.5 * n && r > 0.5 * n - 2 ? 0.2 + 0.8 * std::abs(std::sin(r * 7 + i)) : 0.0;
+  };
+  return box_body(options);
+}
+
+// Two leaves of cells on one: their lowest corners are the same elements.
+Body branching() {
+  Body body = box_body({{3, 3, 4}, Vec3::Constant(0.01)});
+  const std::uint32_t top = body.parts[0].element_end - 32;  // the two upper planes, once more
+  for (std::uint32_t e = top; e < top + 32; ++e) {
+    body.lattice_index.push_back(body.lattice_index[e]);
+    body.piece.push_back(1);
+    body.rest.push_back(body.rest[e]);
+  }
+  body.position = body.rest;
+  const std::size_t cells = body.cell_count();
+  for (std::size_t c = cells - 18; c < cells; ++c) {
+    std::array<std::uint32_t, 8> corners = body.cell_elements[c];
+    for (std::uint32_t& e : corners)
+      if (e >= top) e += 32;
+    body.cell_elements.push_back(corners);
+    body.fill.push_back(0.5);
+    body.broken.push_back(0);
+  }
+  body.parts[0].element_end = static_cast<std::uint32_t>(body.element_count());
+  body.parts[0].cell_end = static_cast<std::uint32_t>(body.cell_count());
+  return body;
+}
+
+Setting setting_of(const Body& body, std::vector<Model> models = {Model::springs}) {
+  return {body, std::vector<Material>(body.parts.size(), kGum),
+          std::vector<std::uint8_t>(body.cell_count(), 0), std::move(models)};
+}
+
+State shaken(const Body& body, double amplitude, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> any(-1, 1);
+  const auto vector = [&] { return Vec3(any(random), any(random), any(random)); };
+  State state;
+  state.time = 0;
+  for (std::size_t e = 0; e < body.element_count(); ++e) {
+    state.displacement.push_back(amplitude * vector());
+    state.velocity.push_back(vector());
+  }
+  return state;
+}
+
+// [N] (elements), spring by spring, cell by cell; of elasticity and damping.
+std::vector<Vec3> brute_force(const Setting& setting, const State& state, double tau) {
+  const Body& body = setting.body;
+  const SpringKind kind = spring_kind(body.parts[0].lattice, kGum);
+  std::vector<Vec3> result(body.element_count(), Vec3::Zero());
+  for (std::size_t c = 0; c < body.cell_count(); ++c)
+    for (const Spring& spring : kind.springs) {
+      const std::uint32_t a = body.cell_elements[c][spring.a], b = body.cell_elements[c][spring.b];
+      const Vec3 d = spring.rest + state.displacement[b] - state.displacement[a];
+      const double rate = (state.velocity[b] - state.velocity[a]).dot(d.normalized());
+      const Vec3 force =
+          body.fill[c] * spring.stiffness * (d.norm() - spring.rest.norm() + tau * rate) * d.normalized();
+      result[a] += force;
+      result[b] -= force;
+    }
+  return result;
+}
+
+std::vector<Vec3> forces(const Setting& setting, const State& before, double tau, bool book = false) {
+  Stepper stepper(setting, {{tau}}, book);
+  State state = before;
+  EXPECT_GT(stepper.advance(state, {}, {1e-3, 0, false}).smallest_jacobian, 0);
+  std::vector<Vec3> result;
+  for (std::size_t e = 0; e < state.velocity.size(); ++e)
+    result.push_back((state.velocity[e] - before.velocity[e]) * stepper.mass()[e] / 1e-3);
+  return result;
+}
+
+double largest_difference(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
+  double result = 0;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    if (const double size = (a[i] - b[i]).norm(); !(size <= result)) result = size;
+  return result;
+}
+
+std::vector<std::pair<const char*, Body>> bodies() {
+  return {{"one cell", box_body({{1, 1, 1}, Vec3::Constant(0.01)})},
+          {"plate", box_body({{70, 9, 1}, Vec3::Constant(0.01)})},
+          {"wall across x", box_body({{1, 9, 70}, Vec3::Constant(0.01)})},
+          {"half of the voxels", crumbs({23, 11, 20}, 0.5, 1)},
+          {"nearly all", crumbs({30, 19, 20}, 0.95, 2)},
+          {"few", crumbs({40, 20, 18}, 0.08, 3)},
+          {"shell", shell(21)},
+          {"branching", branching()}};
+}
+
+TEST(ConnectionKernel, ForcesAreThoseOfTheSpringsOfAllCells) {
+  for (const auto& [name, body] : bodies()) {
+    const Setting setting = setting_of(body);
+    const State state = shaken(body, 1e-3, 1);
+    for (const double tau : {0.0, 1e-3}) {
+      const std::vector<Vec3> expected = brute_force(setting, state, tau);
+      const double size = largest_difference(expected, std::vector<Vec3>(expected.size(), Vec3::Zero()));
+      EXPECT_LT(largest_difference(forces(setting, state, tau), expected), 1e-11 * size) << name << tau;
+      EXPECT_EQ(forces(setting, state, tau, true), forces(setting, state, tau)) << name << tau;
+    }
+  }
+}
+
+TEST(ConnectionKernel, BodiesOfThisTestHaveSeveralChunks) {
+  const Body many = crumbs({30, 19, 20}, 0.95, 2), leaves = branching();
+  const Setting of_many = setting_of(many), of_leaves = setting_of(leaves);
+  EXPECT_GT(step_layout(of_many, {{0}}).chunks.size(), 2u);
+  EXPECT_TRUE(step_layout(of_many, {{0}}).blocks.empty());
+  EXPECT_EQ(step_layout(of_leaves, {{0}}).chunks.size(), 2u);  // one of the leaves by itself
+}
+
+// Forces between elements, along their distance: neither momentum changes.
+TEST(ConnectionKernel, KeepsMomentaAndDampingTakesEnergy) {
+  const Body body = crumbs({23, 11, 20}, 0.5, 4);
+  const Setting setting = setting_of(body);
+  const State state = shaken(body, 2e-3, 2);
+  const std::vector<Vec3> elastic = forces(setting, state, 0), all = forces(setting, state, 1e-3);
+  Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
+  double power = 0, size = 0;
+  for (std::size_t e = 0; e < all.size(); ++e) {
+    force += all[e];
+    torque += (body.rest[e] + state.displacement[e]).cross(all[e]);
+    power += (all[e] - elastic[e]).dot(state.velocity[e]);
+    size += all[e].norm();
+  }
+  EXPECT_LT(force.norm(), 1e-11 * size);
+  EXPECT_LT(torque.norm(), 1e-11 * size * 0.2);
+  EXPECT_LT(power, 0);
+}
+
+// Every connection of the cells once, with the fills of all cells around it.
+TEST(ConnectionKernel, RunsHoldEveryConnectionOnce) {
+  for (const auto& [name, body] : bodies()) {
+    if (std::string(name) == "branching") continue;  // its two leaves are two chunks
+    std::vector<std::array<std::uint16_t, 8>> cells;
+    using Key = std::tuple<std::size_t, std::size_t, std::size_t>;  // direction, ends
+    std::map<Key, double> expected, found;
+    for (std::size_t c = 0; c < body.cell_count(); ++c) {
+      std::array<std::uint16_t, 8> corners;
+      for (std::size_t a = 0; a < 8; ++a) corners[a] = static_cast<std::uint16_t>(body.cell_elements[c][a]);
+      cells.push_back(corners);
+      for (const std::uint32_t a : body.cell_elements[c])
+        for (const std::uint32_t b : body.cell_elements[c])
+          for (std::size_t d = 0; d < half_neighbourhood.size(); ++d) {
+            bool leads = true;
+            for (std::size_t j = 0; j < 3; ++j)
+              leads =
+                  leads && body.lattice_index[b][j] - body.lattice_index[a][j] == half_neighbourhood[d][j];
+            if (leads) expected[{d, a, b}] += body.fill[c];
+          }
+    }
+    const ConnectionRuns made = connection_runs(cells, body.fill, body.element_count());
+    for (const step::ConnectionRun& run : made.runs) {
+      const int around = 4 >> (std::abs(half_neighbourhood[run.direction][0]) +
+                               std::abs(half_neighbourhood[run.direction][1]) +
+                               std::abs(half_neighbourhood[run.direction][2]) - 1);
+      for (std::size_t i = 0; i < step::kLanes * run.blocks; ++i) {
+        double fill = 0;
+        for (int n = 0; n < around; ++n) {
+          ASSERT_LT(run.cell[n] + i, made.fill.size());
+          fill += made.fill[run.cell[n] + i];
+        }
+        ASSERT_TRUE(run.blocks == 1 || run.lanes == 0xff);
+        if (fill == 0 || !(run.lanes >> i % step::kLanes & 1)) continue;
+        const auto [at, is_new] =
+            found.try_emplace({run.direction, run.a + i - step::kLanes, run.b + i - step::kLanes}, fill);
+        EXPECT_TRUE(is_new) << name;
+      }
+    }
+    ASSERT_EQ(found.size(), expected.size()) << name;
+    for (const auto& [key, fill] : expected) ASSERT_NEAR(found[key], fill, 1e-14) << name;
+  }
+}
+
+TEST(ConnectionKernel, SameBitsForAnyThreadsInstructionsAndBooks) {
+  const Body body = crumbs({30, 19, 20}, 0.8, 5);
+  const Setting setting = setting_of(body);
+  const double tau = 1e-5, dt = 0.5 * stable_step(setting, {tau});
+  const auto after = [&](const std::string& isa, int threads, bool book) {
+    const ThreadLimit limit(threads);
+    Stepper stepper(setting, {{tau}}, book, isa);
+    State state = shaken(body, 1e-4, 6);
+    for (int i = 0; i < 3; ++i) (void)stepper.advance(state, {}, {dt, dt, false});
+    return state;
+  };
+  const State reference = after("portable", 1, false);
+  for (const auto& [isa, threads, book] : {std::tuple{"portable", 2, true},
+                                           {"portable", 7, false},
+                                           {"avx2", 1, false},
+                                           {"avx2", 7, true},
+                                           {"avx512", 1, true},
+                                           {"avx512", 2, false},
+                                           {"avx512", 7, false}}) {
+    State other;
+    try {
+      other = after(isa, threads, book);
+    } catch (const InputError&) {
+      continue;  // a machine without that instruction set
+    }
+    EXPECT_EQ(other.displacement, reference.displacement) << isa << threads;
+    EXPECT_EQ(other.velocity, reference.velocity) << isa << threads;
+  }
+}
+
+// Where another part breaks, the stepper tells the energy of all: also of those computed by connection.
+TEST(ConnectionKernel, TellsItsEnergyWhereAnotherPartBreaks) {
+  Body body = crumbs({9, 8, 7}, 0.7, 7);
+  const Body other = box_body({{3, 3, 3}, Vec3::Constant(0.01)});
+  Part part = other.parts[0];
+  const auto elements = static_cast<std::uint32_t>(body.element_count());
+  const auto cells = static_cast<std::uint32_t>(body.cell_count());
+  for (std::size_t e = 0; e < other.element_count(); ++e) {
+    body.lattice_index.push_back(other.lattice_index[e]);
+    body.piece.push_back(0);
+    body.rest.push_back(other.rest[e]);
+  }
+  body.position = body.rest;
+  for (std::size_t c = 0; c < other.cell_count(); ++c) {
+    std::array<std::uint32_t, 8> corners = other.cell_elements[c];
+    for (std::uint32_t& e : corners) e += elements;
+    body.cell_elements.push_back(corners);
+    body.fill.push_back(1);
+    body.broken.push_back(0);
+  }
+  part.element_begin = elements;
+  part.element_end = static_cast<std::uint32_t>(body.element_count());
+  part.cell_begin = cells;
+  part.cell_end = static_cast<std::uint32_t>(body.cell_count());
+  body.parts.push_back(part);
+  const Setting setting = setting_of(body, {Model::springs, Model::springs});
+  StepPlan plan{{0, 0}};
+  plan.fracture = {{}, {1e12, 1e12}};
+  Stepper stepper(setting, plan, false);
+  const State state = shaken(body, 1e-3, 8);
+  const Stencil none;
+  const double energy = Cells(setting, none).energy(state);
+  ASSERT_TRUE(stepper.elastic_energy(state).has_value());
+  EXPECT_NEAR(*stepper.elastic_energy(state), energy, 1e-12 * energy);
+}
+
+TEST(ConnectionKernel, LengthThatIsNoNumberIsTold) {
+  const Body body = crumbs({9, 7, 5}, 0.9, 9);
+  const Setting setting = setting_of(body);
+  for (const double bad : {std::nan(""), 1e300}) {
+    State state = shaken(body, 1e-3, 10);
+    state.displacement[body.cell_elements[20][3]].y() = bad;
+    Stepper stepper(setting, {{0}}, false);
+    EXPECT_LE(stepper.advance(state, {}, {1e-6, 1e-6, false}).smallest_jacobian, 0) << bad;
+  }
+}
+
+// Springs resist as well inside out: the check between steps has to see it, but for springs that break.
+TEST(ConnectionKernel, FoldedCellEndsTheStableStep) {
+  const Body body = box_body({{2, 2, 2}, Vec3::Constant(0.01)});
+  const Setting setting = setting_of(body);
+  State state = shaken(body, 0, 11);
+  const std::vector<Pass> none;
+  StepPlan plan{{0}};
+  StepBound bound(setting, none, plan);
+  bound.look(state, nullptr, {});
+  EXPECT_GT(bound.longest(false), 0);
+  for (std::size_t e = 0; e < body.element_count(); ++e)
+    state.displacement[e].z() = -2.1 * body.rest[e].z();  // a mirror image
+  bound.look(state, nullptr, {});
+  EXPECT_LE(bound.longest(false), 0);
+  plan.fracture = {{1e6, 0.1}};
+  bound.look(state, nullptr, {});
+  EXPECT_GT(bound.longest(false), 0);
+}
+
+}  // namespace
+}  // namespace flexel
