@@ -1,7 +1,8 @@
-// Collects every connection with the cells around it, then lets runs grow block by block of eight elements.
+// Collects every connection with the cells around it, then lets runs grow by eight elements at a time.
 #include "simulate/time/connection_runs.h"
 
 #include <algorithm>
+#include <bit>
 #include <limits>
 #include <stdexcept>
 
@@ -15,7 +16,7 @@ using step::kLanes;
 
 // Elements whose connections of all directions are computed one after the other: their state and forces stay
 // in the innermost cache.
-constexpr std::size_t kGroupBlocks = 32;
+constexpr std::size_t kGroup = 256;
 constexpr std::int32_t kNone = -1;
 constexpr std::uint8_t kAllLanes = 0xff;
 
@@ -63,15 +64,19 @@ class Builder {
   };
 
   void add(const Pair& pair, const std::array<std::uint16_t, 8>& corners);
-  void add_runs(std::size_t direction, std::size_t first_block, std::size_t last_block);
+  void add_runs(std::size_t direction, std::size_t first, std::size_t last);  // elements
   [[nodiscard]] bool holds(const Shape& shape, std::int32_t a, const Link& link) const;
   [[nodiscard]] bool is_empty(const Shape& shape, std::int32_t a) const;
   [[nodiscard]] bool continues(const Shape& shape, const Link* links, std::int32_t a) const;
-  // Takes as many of the lanes as share a shape; gives which.
-  unsigned take(const Link* links, std::int32_t a, unsigned lanes, Shape& shape) const;
+  struct Taken {
+    Shape shape;
+    unsigned lanes = 0;
+  };
+  // The first connection of the eight and all others that a run of one shape may hold with it.
+  [[nodiscard]] Taken take(const Link* links, std::int32_t a) const;
   void add_run(std::size_t direction, std::int32_t a, const Shape& shape, unsigned lanes);
 
-  std::size_t count_, blocks_;
+  std::size_t count_;
   ConnectionRuns result_;
   std::array<std::vector<Link>, 13> links_;  // by element
   struct Branch {
@@ -83,13 +88,13 @@ class Builder {
 
 Builder::Builder(std::span<const std::array<std::uint16_t, 8>> cells, std::span<const double> fill,
                  std::size_t count)
-    : count_(count), blocks_((count + kLanes - 1) / kLanes) {
+    : count_(count) {
   static const std::vector<Pair> pairs = make_pairs();
   if (kLanes + count_ > std::numeric_limits<std::uint16_t>::max())
     throw std::length_error("a chunk has more elements than its numbers can tell apart");
-  for (std::vector<Link>& links : links_) links.resize(blocks_ * kLanes);
+  for (std::vector<Link>& links : links_) links.resize(count + 2 * kLanes);
   // behind the elements' as many zeros as the longest run may read where it has no cell
-  result_.fill.assign(2 * kLanes + count + kGroupBlocks * kLanes, 0);
+  result_.fill.assign(2 * kLanes + count + kGroup, 0);
   for (std::size_t c = 0; c < cells.size(); ++c) {
     result_.fill[kLanes + cells[c][0]] = fill[c];
     for (const Pair& pair : pairs) add(pair, cells[c]);
@@ -130,20 +135,24 @@ bool Builder::is_empty(const Shape& shape, std::int32_t a) const {
   });
 }
 
+// Whether a run may go on over the block that begins with `links`: some connection there, all of that shape.
 bool Builder::continues(const Shape& shape, const Link* links, std::int32_t a) const {
   const auto size = static_cast<std::int32_t>(result_.fill.size());
+  bool any = false;
   for (std::int32_t l = 0; l < static_cast<std::int32_t>(kLanes); ++l) {
     for (const std::int32_t offset : shape.cell)
       if (offset != kNoOffset && (a + l + offset < 0 || a + l + offset >= size)) return false;
     if (links[l].b == kNone ? !is_empty(shape, a + l) : !holds(shape, a + l, links[l])) return false;
+    any = any || links[l].b != kNone;
   }
-  return true;
+  return any;
 }
 
-unsigned Builder::take(const Link* links, std::int32_t a, unsigned lanes, Shape& shape) const {
+Builder::Taken Builder::take(const Link* links, std::int32_t a) const {
+  Shape shape;
   unsigned taken = 0;
   for (unsigned l = 0; l < kLanes; ++l) {
-    if (!(lanes >> l & 1)) continue;
+    if (links[l].b == kNone) continue;
     const auto own = a + static_cast<std::int32_t>(l);
     Shape wider = shape;
     if (taken == 0) wider.b = links[l].b - own;
@@ -156,7 +165,7 @@ unsigned Builder::take(const Link* links, std::int32_t a, unsigned lanes, Shape&
     shape = wider;
     taken |= 1U << l;
   }
-  return taken;
+  return {shape, taken};
 }
 
 void Builder::add_run(std::size_t direction, std::int32_t a, const Shape& shape, unsigned lanes) {
@@ -172,43 +181,50 @@ void Builder::add_run(std::size_t direction, std::int32_t a, const Shape& shape,
   result_.runs.push_back(run);
 }
 
-void Builder::add_runs(std::size_t direction, std::size_t first_block, std::size_t last_block) {
-  bool open = false;  // the last run may go on
-  Shape shape;
-  for (std::size_t block = first_block; block < last_block; ++block) {
-    const Link* links = links_[direction].data() + block * kLanes;
-    const auto a = static_cast<std::int32_t>(kLanes + block * kLanes);
-    unsigned left = 0;
-    for (unsigned l = 0; l < kLanes; ++l) left |= links[l].b == kNone ? 0U : 1U << l;
-    if (left != 0 && open && continues(shape, links, a)) {
-      ++result_.runs.back().blocks;
+// From the first connection that is left: a run from there, or one that begins at a multiple of eight where
+// that takes as many or goes on, for aligned loads are cheaper.
+void Builder::add_runs(std::size_t direction, std::size_t first, std::size_t last) {
+  Link* links = links_[direction].data();
+  const auto number = [](std::size_t element) { return static_cast<std::int32_t>(kLanes + element); };
+  for (std::size_t e = first; e < last;) {
+    if (links[e].b == kNone) {
+      ++e;
       continue;
     }
-    open = left != 0;
-    for (bool first = true; left != 0; first = false) {
-      shape = {};
-      const unsigned taken = take(links, a, left, shape);
-      left &= ~taken;
-      bool alone = true;  // the other lanes find nothing
-      for (unsigned l = 0; l < kLanes; ++l)
-        alone = alone && ((taken >> l & 1) || is_empty(shape, a + static_cast<std::int32_t>(l)));
-      add_run(direction, a, shape, alone ? kAllLanes : taken);
-      open = first && alone;
+    std::size_t begin = e / kLanes * kLanes;
+    Taken taken = take(links + begin, number(begin));
+    if (begin != e && !continues(taken.shape, links + begin + kLanes, number(begin + kLanes)))
+      if (const Taken own = take(links + e, number(e));
+          std::popcount(own.lanes) > std::popcount(taken.lanes)) {
+        taken = own;
+        begin = e;
+      }
+    bool alone = true;  // the other lanes find nothing
+    for (unsigned l = 0; l < kLanes; ++l)
+      if (taken.lanes >> l & 1) {
+        links[begin + l] = {};
+      } else {
+        alone = alone && is_empty(taken.shape, number(begin + l));
+      }
+    add_run(direction, number(begin), taken.shape, alone ? kAllLanes : taken.lanes);
+    for (begin += kLanes; alone && begin < last && continues(taken.shape, links + begin, number(begin));
+         begin += kLanes) {
+      ++result_.runs.back().blocks;
+      std::fill(links + begin, links + begin + kLanes, Link{});
     }
   }
 }
 
 ConnectionRuns Builder::operator()() {
-  for (std::size_t block = 0; block < blocks_; block += kGroupBlocks)
-    for (std::size_t d = 0; d < links_.size(); ++d)
-      add_runs(d, block, std::min(blocks_, block + kGroupBlocks));
+  for (std::size_t first = 0; first < count_; first += kGroup)
+    for (std::size_t d = 0; d < links_.size(); ++d) add_runs(d, first, std::min(count_, first + kGroup));
   for (const Branch& branch : branches_) {
     std::array<Link, kLanes> links{};
     const std::size_t lane = branch.from % kLanes;
     links[lane] = branch.link;
-    Shape shape;
     const auto a = static_cast<std::int32_t>(kLanes + branch.from - lane);
-    add_run(branch.direction, a, shape, take(links.data(), a, 1U << lane, shape));
+    const Taken taken = take(links.data(), a);
+    add_run(branch.direction, a, taken.shape, taken.lanes);
   }
   return std::move(result_);
 }
