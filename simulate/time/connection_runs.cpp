@@ -16,7 +16,7 @@ using step::kLanes;
 
 // Elements whose connections of all directions are computed one after the other: their state and forces stay
 // in the innermost cache.
-constexpr std::size_t kGroup = 256;
+constexpr std::size_t kGroup = 128;
 constexpr std::int32_t kNone = -1;
 constexpr std::uint8_t kAllLanes = 0xff;
 
