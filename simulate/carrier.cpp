@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include "simulate/cells.h"
+#include "simulate/rest_shape.h"
 
 namespace flexel {
 namespace {
@@ -166,7 +167,11 @@ Carrier with_gradient(const Setting& setting, const Carrier& carrier, const Vec3
   return result;
 }
 
-std::vector<double> element_volumes(const Setting& setting) {
+namespace {
+
+// `share` (cells) of the voxel's volume, `factor` (elements, or none) at centre placement.
+std::vector<double> spread(const Setting& setting, const std::vector<double>& share,
+                           const std::vector<double>& factor) {
   const Body& body = setting.body;
   std::vector<double> volume(body.element_count(), 0);
   const std::vector<std::uint8_t> active = active_cells(setting);
@@ -174,16 +179,22 @@ std::vector<double> element_volumes(const Setting& setting) {
     const double voxel = part.lattice.spacing.prod();
     for (std::uint32_t c = part.cell_begin; c < part.cell_end; ++c)
       if (active[c])
-        for (const std::uint32_t e : body.cell_elements[c]) volume[e] += body.fill[c] * voxel / 8;
+        for (const std::uint32_t e : body.cell_elements[c]) volume[e] += share[c] * voxel / 8;
     if (part.placement == Placement::corner) continue;
     for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
-      if (!is_stray(setting, e)) volume[e] = voxel;
+      if (!is_stray(setting, e)) volume[e] = factor.empty() ? voxel : factor[e] * voxel;
   }
   return volume;
 }
 
+}  // namespace
+
+std::vector<double> element_volumes(const Setting& setting) {
+  return spread(setting, setting.body.fill, {});
+}
+
 std::vector<double> element_masses(const Setting& setting) {
-  std::vector<double> mass = element_volumes(setting);
+  std::vector<double> mass = spread(setting, mass_shares(setting.body), mass_factors(setting.body));
   for (std::size_t p = 0; p < setting.body.parts.size(); ++p)
     for (std::uint32_t e = setting.body.parts[p].element_begin; e < setting.body.parts[p].element_end; ++e)
       mass[e] *= setting.materials[p].density;

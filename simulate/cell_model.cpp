@@ -24,21 +24,27 @@ double less_logarithm(double x) {
          (1.0 / 2 - x * (1.0 / 3 - x * (1.0 / 4 - x * (1.0 / 5 - x * (1.0 / 6 - x * (1.0 / 7 - x / 8))))));
 }
 
-std::array<Vec3, 4> hourglass_displacements(const CellVectors& u) {
+std::array<Vec3, 4> hourglass_displacements(const CellKind& kind, const CellVectors& u) {
   std::array<Vec3, 4> q;
-  for (int mode = 0; mode < 4; ++mode) {
-    Vec3 sum = Vec3::Zero();
-    for (int a = 0; a < 8; ++a) sum += hourglass_sign(mode, a) * u[static_cast<std::size_t>(a)];
-    q[static_cast<std::size_t>(mode)] = sum / 8;
+  for (std::size_t mode = 0; mode < 4; ++mode) {
+    q[mode] = -kind.mode_offset[mode];
+    for (std::size_t a = 0; a < 8; ++a) q[mode] += kind.mode[mode][a] * u[a];
   }
   return q;
 }
 
-double hourglass_coefficient(const CellKind& kind, int a, int b) {
+double hourglass_coefficient(const CellKind& kind, std::size_t a, std::size_t b) {
   double sum = 0;
-  for (int mode = 0; mode < 4; ++mode)
-    sum += kind.hourglass[static_cast<std::size_t>(mode)] * hourglass_sign(mode, a) * hourglass_sign(mode, b);
-  return sum / 64;
+  for (std::size_t mode = 0; mode < 4; ++mode)
+    sum += kind.hourglass[mode] * kind.mode[mode][a] * kind.mode[mode][b];
+  return sum;
+}
+
+void set_diagonal(CellKind& kind) {
+  for (std::size_t a = 0; a < 8; ++a)
+    for (std::size_t b = 0; b < 8; ++b)
+      kind.diagonal[8 * a + b] = kind.mu * kind.volume / 16 * kind.gradient[a].dot(kind.gradient[b]) +
+                                 hourglass_coefficient(kind, a, b);
 }
 
 }  // namespace
@@ -58,15 +64,31 @@ CellKind cell_kind(const Lattice& lattice, const Material& material) {
   kind.hourglass = {4.0 / 3 * scale * (curvature.x() + curvature.y()),
                     4.0 / 3 * scale * (curvature.y() + curvature.z()),
                     4.0 / 3 * scale * (curvature.z() + curvature.x()), 8.0 / 9 * scale * curvature.sum()};
-  for (std::size_t a = 0; a < 8; ++a)
-    for (std::size_t b = 0; b < 8; ++b)
-      kind.diagonal[8 * a + b] = scale / 16 * kind.gradient[a].dot(kind.gradient[b]) +
-                                 hourglass_coefficient(kind, static_cast<int>(a), static_cast<int>(b));
+  for (int mode = 0; mode < 4; ++mode)
+    for (int corner = 0; corner < 8; ++corner)
+      kind.mode[static_cast<std::size_t>(mode)][static_cast<std::size_t>(corner)] =
+          hourglass_sign(mode, corner) / 8;
+  set_diagonal(kind);
   return kind;
 }
 
+CellKind with_rest_shape(const CellKind& kind, const Mat3& change, double volume,
+                         const std::array<Vec3, 4>& hourglass) {
+  CellKind own = kind;
+  own.volume *= volume;
+  own.offset = change;
+  own.mode_offset = hourglass;
+  for (std::size_t m = 0; m < 4; ++m) {
+    own.hourglass[m] *= volume;
+    for (std::size_t a = 0; a < 8; ++a) own.mode[m][a] -= kind.gradient[a].dot(hourglass[m]) / 4;
+  }
+  for (Vec3& gradient : own.gradient) gradient += (change * gradient).eval();
+  set_diagonal(own);
+  return own;
+}
+
 Mat3 displacement_gradient(const CellKind& kind, const CellVectors& u) {
-  Mat3 h = Mat3::Zero();
+  Mat3 h = kind.offset;
   // Opposite corners share a gradient but for its sign.
   for (std::size_t a = 0; a < 4; ++a) h += (0.25 * (u[a] - u[7 - a])) * kind.gradient[a].transpose();
   return h;
@@ -121,22 +143,19 @@ double cell_energy(const CellKind& kind, const CellVectors& u) {
   const Mat3 h = displacement_gradient(kind, u);
   if (!(volume_change(h) > -1)) return std::numeric_limits<double>::infinity();
   double energy = kind.volume * energy_density(kind, h);
-  const std::array<Vec3, 4> q = hourglass_displacements(u);
+  const std::array<Vec3, 4> q = hourglass_displacements(kind, u);
   for (std::size_t mode = 0; mode < 4; ++mode) energy += 0.5 * kind.hourglass[mode] * q[mode].squaredNorm();
   return energy;
 }
 
 CellVectors cell_forces(const CellKind& kind, const CellVectors& u) {
   const Mat3 first_piola = (0.25 * kind.volume) * stress(kind, displacement_gradient(kind, u));
-  const std::array<Vec3, 4> q = hourglass_displacements(u);
+  const std::array<Vec3, 4> q = hourglass_displacements(kind, u);
   CellVectors forces;
-  for (int a = 0; a < 8; ++a) {
-    Vec3 force = first_piola * kind.gradient[static_cast<std::size_t>(a)];
-    for (int mode = 0; mode < 4; ++mode) {
-      const auto m = static_cast<std::size_t>(mode);
-      force += (kind.hourglass[m] / 8 * hourglass_sign(mode, a)) * q[m];
-    }
-    forces[static_cast<std::size_t>(a)] = -force;
+  for (std::size_t a = 0; a < 8; ++a) {
+    Vec3 force = first_piola * kind.gradient[a];
+    for (std::size_t m = 0; m < 4; ++m) force += (kind.hourglass[m] * kind.mode[m][a]) * q[m];
+    forces[a] = -force;
   }
   return forces;
 }
@@ -181,7 +200,7 @@ Block projected_block(const CellKind& kind, const Mat9& moduli, std::size_t a, s
   for (int i = 0; i < 3; ++i)
     for (int k = 0; k < 3; ++k)
       block(i, k) = kind.volume / 16 * gradient_a.dot(moduli.block<3, 3>(3 * i, 3 * k) * gradient_b);
-  block.diagonal().array() += hourglass_coefficient(kind, static_cast<int>(a), static_cast<int>(b));
+  block.diagonal().array() += hourglass_coefficient(kind, a, b);
   return block;
 }
 

@@ -36,6 +36,10 @@ struct CellKind {
   std::array<double, 4> hourglass{};  // c_m [N/m]
   // (8 x 8) the part of K_ab that is a multiple of I and does not depend on the state [N/m]
   std::array<double, 64> diagonal{};
+  Mat3 offset = Mat3::Zero();  // of H: G - I; 0 at the lattice's shape
+  // w_ma of the hourglass displacements sum_a w_ma u_a - Q_m [m] of a rest shape of its own; else s_ma / 8, 0
+  std::array<std::array<double, 8>, 4> mode{};
+  std::array<Vec3, 4> mode_offset{Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
 };
 
 using CellVectors = std::array<Vec3, 8>;  // one vector per element of a cell
@@ -48,7 +52,14 @@ using CellVectors = std::array<Vec3, 8>;  // one vector per element of a cell
 
 [[nodiscard]] CellKind cell_kind(const Lattice& lattice, const Material& material);
 
-// H of a cell whose elements moved by `displacement` [m].
+// `kind` for a cell that is free of stress at another shape than the lattice's: where F^T F = Cp and q_m = F
+// Q_m. With G = Cp^-1/2 the energy is `volume` (that of the rest shape over the voxel's) times that of F G
+// and of q_m - F Q_m, hence gamma_a becomes G gamma_a, H becomes H G + (G - I), V becomes `volume` V.
+// `change` is G - I, world frame; `hourglass` the Q_m [m].
+[[nodiscard]] CellKind with_rest_shape(const CellKind& kind, const Mat3& change, double volume,
+                                       const std::array<Vec3, 4>& hourglass);
+
+// H of a cell whose elements moved by `displacement` [m]; F - I of F G where it has a rest shape of its own.
 [[nodiscard]] Mat3 displacement_gradient(const CellKind& kind, const CellVectors& displacement);
 
 // Gradient of the trilinear displacement at corner a, from the three edges that meet there.

@@ -106,7 +106,9 @@ Cells::Cells(const Setting& setting, const Stencil& stencil)
     : body_(setting.body),
       stencil_(stencil),
       active_(active_cells(setting)),
-      part_(cell_parts(setting.body)) {
+      part_(cell_parts(setting.body)),
+      rest_shapes_(setting.body),
+      share_(stiffness_shares(setting.body)) {
   for (std::size_t p = 0; p < body_.parts.size(); ++p)
     kinds_.push_back(cell_kind(body_.parts[p].lattice, setting.materials[p]));
   springs_.resize(body_.parts.size());
@@ -121,6 +123,20 @@ CellVectors Cells::corner_values(std::uint32_t cell, const std::vector<Vec3>& va
   return u;
 }
 
+template <class Visit>
+auto Cells::with_kind(std::uint32_t cell, const Visit& visit) const {
+  const std::uint32_t part = part_[cell];
+  if (const std::optional<SpringKind>& springs = springs_[part]) {
+    if (const auto own = rest_shapes_.any() ? rest_shapes_.of(*springs, cell) : std::nullopt)
+      return visit(*own);
+    return visit(*springs);
+  }
+  if (const auto own =
+          rest_shapes_.any() ? rest_shapes_.of(kinds_[part], body_.parts[part], cell) : std::nullopt)
+    return visit(*own);
+  return visit(kinds_[part]);
+}
+
 double Cells::energy(const State& state) const {
   return parallel_sum<double>(
       body_.cell_count(),
@@ -128,11 +144,10 @@ double Cells::energy(const State& state) const {
         if (!active_[c]) return 0.0;
         const auto cell = static_cast<std::uint32_t>(c);
         const CellVectors u = corner_values(cell, state.displacement);
-        if (!springs_[part_[c]]) return body_.fill[c] * cell_energy(kinds_[part_[c]], u);
         // Springs alone would let a cell turn inside out and stay so.
-        if (!(volume_change(displacement_gradient(kinds_[part_[c]], u)) > -1))
+        if (springs_[part_[c]] && !(volume_change(displacement_gradient(kinds_[part_[c]], u)) > -1))
           return std::numeric_limits<double>::infinity();
-        return body_.fill[c] * cell_energy(*springs_[part_[c]], u);
+        return share_[c] * with_kind(cell, [&](const auto& kind) { return cell_energy(kind, u); });
       },
       kGrain);
 }
@@ -143,10 +158,10 @@ void Cells::add_forces(const State& state, std::vector<Vec3>& forces) {
       body_.cell_count(),
       [&](std::size_t c) {
         if (!active_[c]) return;
-        const CellVectors u = corner_values(static_cast<std::uint32_t>(c), state.displacement);
-        const auto& springs = springs_[part_[c]];
-        corner_force_[c] = springs ? cell_forces(*springs, u) : cell_forces(kinds_[part_[c]], u);
-        for (Vec3& force : corner_force_[c]) force *= body_.fill[c];
+        const auto cell = static_cast<std::uint32_t>(c);
+        const CellVectors u = corner_values(cell, state.displacement);
+        corner_force_[c] = with_kind(cell, [&](const auto& kind) { return cell_forces(kind, u); });
+        for (Vec3& force : corner_force_[c]) force *= share_[c];
       },
       kGrain);
   parallel_for_each(body_.element_count(), [&](std::size_t e) {
@@ -161,11 +176,13 @@ void Cells::set_stiffness(const State& state, const TangentOptions& tangent, Blo
       body_.cell_count(),
       [&](std::size_t c) {
         if (!active_[c] || springs_[part_[c]]) return;
-        const CellKind& kind = kinds_[part_[c]];
-        const Mat3 gradient =
-            displacement_gradient(kind, corner_values(static_cast<std::uint32_t>(c), state.displacement));
-        prepared[c] =
-            prepare(kind, gradient, tangent.project, tangent.stress ? &(*tangent.stress)[c] : nullptr);
+        const auto cell = static_cast<std::uint32_t>(c);
+        const CellVectors u = corner_values(cell, state.displacement);
+        with_kind(cell, [&](const auto& kind) {
+          if constexpr (std::is_same_v<std::decay_t<decltype(kind)>, CellKind>)
+            prepared[c] = prepare(kind, displacement_gradient(kind, u), tangent.project,
+                                  tangent.stress ? &(*tangent.stress)[c] : nullptr);
+        });
       },
       kGrain);
   parallel_for_each(
@@ -174,12 +191,13 @@ void Cells::set_stiffness(const State& state, const TangentOptions& tangent, Blo
         Block* row = matrix.values.data() + matrix.row_offsets[e];
         std::fill(row, matrix.values.data() + matrix.row_offsets[e + 1], Block::Zero());
         for (const Incidence& at : stencil_.of(static_cast<std::uint32_t>(e)))
-          if (springs_[part_[at.cell]])
-            add_spring_row(*springs_[part_[at.cell]], corner_values(at.cell, state.displacement),
-                           body_.fill[at.cell], at.corner, tangent.project, stencil_.slot[at.cell], row);
-          else
-            add_cell_row(kinds_[part_[at.cell]], prepared[at.cell], body_.fill[at.cell], at.corner,
-                         stencil_.slot[at.cell], row);
+          with_kind(at.cell, [&](const auto& kind) {
+            if constexpr (std::is_same_v<std::decay_t<decltype(kind)>, CellKind>)
+              add_cell_row(kind, prepared[at.cell], share_[at.cell], at.corner, stencil_.slot[at.cell], row);
+            else
+              add_spring_row(kind, corner_values(at.cell, state.displacement), share_[at.cell], at.corner,
+                             tangent.project, stencil_.slot[at.cell], row);
+          });
       },
       kGrain);
 }
@@ -191,10 +209,12 @@ std::vector<Mat3> Cells::predicted_stress(const State& state, const std::vector<
       [&](std::size_t c) {
         if (!active_[c] || springs_[part_[c]]) return;
         const auto cell = static_cast<std::uint32_t>(c);
-        const CellKind& kind = kinds_[part_[c]];
-        stress[c] = flexel::predicted_stress(
-            kind, displacement_gradient(kind, corner_values(cell, state.displacement)),
-            displacement_gradient(kind, corner_values(cell, step)));
+        with_kind(cell, [&](const auto& kind) {
+          if constexpr (std::is_same_v<std::decay_t<decltype(kind)>, CellKind>)
+            stress[c] = flexel::predicted_stress(
+                kind, displacement_gradient(kind, corner_values(cell, state.displacement)),
+                displacement_gradient(kind, corner_values(cell, step)) - kind.offset);
+        });
       },
       kGrain);
   return stress;

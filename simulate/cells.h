@@ -1,9 +1,11 @@
 // The cells of a body: every unbroken one resists by its part's model, simulate/cell_model.h or
-// simulate/spring_model.h, scaled by its fill.
+// simulate/spring_model.h, from its own rest shape where it has one (simulate/rest_shape.h), scaled by its
+// fill and what an edit made of its stiffness.
 #pragma once
 #include <optional>
 
 #include "simulate/cell_model.h"
+#include "simulate/rest_shape.h"
 #include "simulate/spring_model.h"
 #include "simulate/state.h"
 #include "simulate/stiffness.h"
@@ -26,7 +28,7 @@ struct TangentOptions {
 
 class Cells {
  public:
-  // Keeps references to the setting's body and to `stencil`.
+  // Keeps references to the setting's body, its columns and to `stencil`.
   Cells(const Setting& setting, const Stencil& stencil);
 
   [[nodiscard]] const std::vector<std::uint8_t>& active() const { return active_; }
@@ -48,6 +50,9 @@ class Cells {
 
  private:
   [[nodiscard]] CellVectors corner_values(std::uint32_t cell, const std::vector<Vec3>& values) const;
+  // Calls visit(kind) with what the cell is: a CellKind or a SpringKind.
+  template <class Visit>
+  auto with_kind(std::uint32_t cell, const Visit& visit) const;
 
   const Body& body_;
   const Stencil& stencil_;
@@ -55,7 +60,9 @@ class Cells {
   std::vector<std::uint32_t> part_;                 // (cells)
   std::vector<CellKind> kinds_;                     // (parts)
   std::vector<std::optional<SpringKind>> springs_;  // (parts) of model springs
-  std::vector<CellVectors> corner_force_;           // (cells) scratch: forces of a cell on its elements
+  RestShapes rest_shapes_;
+  std::vector<double> share_;              // (cells) of the stiffness of a whole cell of its material
+  std::vector<CellVectors> corner_force_;  // (cells) scratch: forces of a cell on its elements
 };
 
 // Cells that resist: not broken, not stray.

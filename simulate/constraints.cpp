@@ -13,8 +13,8 @@ void apply(const Constraints& constraints, const Body& body, const State& state,
     for (int axis = 0; axis < 3; ++axis)
       if (constraints.mask[e] >> axis & 1) {
         const std::uint32_t motion = constraints.motion[e][static_cast<std::size_t>(axis)];
-        displacement[e][axis] = constraints.motions[motion].displacement(
-            body.rest[e], constraints.courses[motion].at(state))[axis];
+        displacement[e][axis] = constraints.path(body, static_cast<std::uint32_t>(e), axis,
+                                                 constraints.courses[motion].at(state));
       }
   });
 }

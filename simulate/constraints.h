@@ -15,6 +15,14 @@ struct Constraints {
   std::vector<std::array<std::uint32_t, 3>> motion;  // (elements x 3) index into motions, where prescribed
   std::vector<Motion> motions;
   std::vector<Course> courses = {};  // (motions) how each goes on in a timed run
+  std::vector<Vec3> start = {};      // (elements) m, displacement where every path starts; empty: 0
+
+  // m, along an axis that is prescribed, when `share` of the motion is done
+  [[nodiscard]] double path(const Body& body, std::uint32_t element, int axis, double share) const {
+    const Motion& way = motions[motion[element][static_cast<std::size_t>(axis)]];
+    if (start.empty()) return way.displacement(body.rest[element], share)[axis];
+    return start[element][axis] + way.displacement(body.rest[element] + start[element], share)[axis];
+  }
 };
 
 // Displacement [m] that the prescribed axes have at `state`'s load share, or in a timed run at its time; the

@@ -158,12 +158,11 @@ EquilibriumResult LoadStepping::operator()() {
 
 }  // namespace
 
-void refuse_free_motions(Mechanics& mechanics, const std::string& scene) {
-  const State rest{std::vector<Vec3>(mechanics.body().element_count(), Vec3::Zero()), 1};
-  mechanics.assemble(rest);
+void refuse_free_motions(Mechanics& mechanics, const State& start, const std::string& scene) {
+  mechanics.assemble(start);
   mechanics.eliminate_prescribed();
   const std::vector<FreeMotion> free =
-      free_motions(mechanics.stiffness(), node_geometry(mechanics.body(), rest));
+      free_motions(mechanics.stiffness(), node_geometry(mechanics.body(), start));
   if (free.empty()) return;
   std::vector<std::string> names;
   for (const FreeMotion& motion : free) {
@@ -176,11 +175,11 @@ void refuse_free_motions(Mechanics& mechanics, const std::string& scene) {
                                mechanics.body().parts[free.front().part].name, fmt::join(names, " and ")));
 }
 
-void refuse_unsupported_elements(Mechanics& mechanics, const std::string& scene) {
+void refuse_unsupported_elements(Mechanics& mechanics, const State& start, const std::string& scene) {
   const Body& body = mechanics.body();
   const std::vector<std::uint8_t>& active = mechanics.paper().active();
   if (std::find(active.begin(), active.end(), 1) == active.end()) return;
-  mechanics.assemble({std::vector<Vec3>(body.element_count(), Vec3::Zero()), 1});
+  mechanics.assemble(start);
   mechanics.eliminate_prescribed();
   const BlockMatrix& matrix = mechanics.stiffness();
   std::size_t count = 0;

@@ -15,12 +15,13 @@ struct EquilibriumResult {
   double linear_seconds = 0;
 };
 
-// The rigid motions that the ties leave free: throws InputError(scene, ...) naming part and motion.
-void refuse_free_motions(Mechanics& mechanics, const std::string& scene);
+// The rigid motions that the ties leave free at `start`: throws InputError(scene, ...) naming part and
+// motion.
+void refuse_free_motions(Mechanics& mechanics, const State& start, const std::string& scene);
 
 // Elements of centre-placed parts whose connections lie in one plane or line, and that no tie holds across
 // it, resist nothing in that direction: throws InputError(scene, ...) naming part, number and place.
-void refuse_unsupported_elements(Mechanics& mechanics, const std::string& scene);
+void refuse_unsupported_elements(Mechanics& mechanics, const State& start, const std::string& scene);
 
 // Moves `state` to equilibrium under the whole load. Throws DivergedError naming load step, iteration, the
 // worst cell and a suggestion, and TimeoutError once `deadline` has passed; `state` is then the last one in

@@ -11,6 +11,7 @@
 #include "formats/parallel.h"
 #include "simulate/central_spring.h"
 #include "simulate/greatest.h"
+#include "simulate/rest_shape.h"
 
 namespace flexel {
 namespace {
@@ -45,6 +46,32 @@ PaperModel::PaperModel(const Setting& setting)
   for (std::size_t e = 0; e < active_.size(); ++e)
     active_[e] = body_.parts[part_[e]].placement == Placement::centre &&
                  !(e < setting.stray_element.size() && setting.stray_element[e]);
+  const std::size_t entries = rows_.entries.size();
+  const RestShapes shapes(body_);
+  const std::vector<double> factors = stiffness_factors(body_);
+  if (shapes.any()) flowed_.assign(entries, 0);
+  if (!factors.empty()) factor_.assign(entries, 1);
+  if (flowed_.empty() && factor_.empty()) return;
+  for (std::uint32_t e = 0; e < active_.size(); ++e)
+    for (std::size_t i = rows_.offsets[e]; i < rows_.offsets[e + 1]; ++i) {
+      const ConnectionRows::Entry& entry = rows_.entries[i];
+      const std::uint32_t from = entry.sign > 0 ? e : entry.other;
+      if (!flowed_.empty()) flowed_[i] = shapes.of_connection(from, entry.kind - std::size_t{1});
+      if (!factor_.empty()) factor_[i] = 0.5 * (factors[e] + factors[entry.other]);
+    }
+}
+
+Stretch PaperModel::stretched(const State& state, std::uint32_t element,
+                              const ConnectionRows::Entry& entry) const {
+  Stretch now = stretch(entry.sign * kind(element, entry.kind).rest,
+                        state.displacement[entry.other] - state.displacement[element]);
+  if (!flowed_.empty()) now.elongation -= flowed_[place(entry)];
+  return now;
+}
+
+double PaperModel::stiffness(std::uint32_t element, const ConnectionRows::Entry& entry) const {
+  const double own = kind(element, entry.kind).stiffness;
+  return factor_.empty() ? own : factor_[place(entry)] * own;
 }
 
 double PaperModel::volume_ratio(const State& state, std::uint32_t element) const {
@@ -75,10 +102,8 @@ double PaperModel::energy(const State& state) const {
         double energy = 0;
         for (const ConnectionRows::Entry& entry : rows_.of(element)) {
           if (entry.sign < 0) continue;
-          const ConnectionKind& connection = kind(element, entry.kind);
-          const double elongation =
-              stretch(connection.rest, state.displacement[entry.other] - state.displacement[e]).elongation;
-          energy += 0.5 * connection.stiffness * elongation * elongation;
+          const double elongation = stretched(state, element, entry).elongation;
+          energy += 0.5 * stiffness(element, entry) * elongation * elongation;
         }
         return energy;
       },
@@ -91,10 +116,8 @@ void PaperModel::add_forces(const State& state, std::vector<Vec3>& forces) const
       [&](std::size_t e) {
         const auto element = static_cast<std::uint32_t>(e);
         for (const ConnectionRows::Entry& entry : rows_.of(element)) {
-          const ConnectionKind& connection = kind(element, entry.kind);
-          const Stretch now =
-              stretch(entry.sign * connection.rest, state.displacement[entry.other] - state.displacement[e]);
-          forces[e] += (connection.stiffness * now.elongation) * now.direction;
+          const Stretch now = stretched(state, element, entry);
+          forces[e] += (stiffness(element, entry) * now.elongation) * now.direction;
         }
       },
       kGrain);
@@ -114,7 +137,7 @@ void PaperModel::add_damping(const State& state, const std::vector<double>& damp
               (entry.sign * connection.rest + (state.displacement[entry.other] - state.displacement[e]))
                   .normalized();
           const double rate = direction.dot(state.velocity[entry.other] - state.velocity[e]);
-          forces[e] += (tau * connection.stiffness * rate) * direction;
+          forces[e] += (tau * stiffness(element, entry) * rate) * direction;
         }
       },
       kGrain);
@@ -134,11 +157,7 @@ std::vector<double> PaperModel::frequencies(const State& state, const std::vecto
           const auto element = static_cast<std::uint32_t>(part.element_begin + i);
           Mat3 own = Mat3::Zero();
           for (const ConnectionRows::Entry& entry : rows_.of(element)) {
-            const ConnectionKind& connection = kind(element, entry.kind);
-            own += spring_tangent(connection.stiffness,
-                                  stretch(entry.sign * connection.rest,
-                                          state.displacement[entry.other] - state.displacement[element]),
-                                  true);
+            own += spring_tangent(stiffness(element, entry), stretched(state, element, entry), true);
           }
           Eigen::SelfAdjointEigenSolver<Mat3> eigen;
           eigen.computeDirect(own, Eigen::EigenvaluesOnly);
@@ -158,10 +177,8 @@ void PaperModel::add_stiffness(const State& state, bool project, BlockMatrix& ma
         if (rows_.of(element).empty()) return;
         Block own = Block::Zero();
         for (const ConnectionRows::Entry& entry : rows_.of(element)) {
-          const ConnectionKind& connection = kind(element, entry.kind);
-          const Stretch now =
-              stretch(entry.sign * connection.rest, state.displacement[entry.other] - state.displacement[e]);
-          const Block block = spring_tangent(connection.stiffness, now, project);
+          const Block block =
+              spring_tangent(stiffness(element, entry), stretched(state, element, entry), project);
           own += block;
           matrix.values[position_of(matrix, e, entry.other)] -= block;
         }

@@ -6,6 +6,7 @@
 // neighbours along an axis, or between the one and itself. Its determinant J is the volume now over that at
 // rest; states with J <= 0 are refused.
 #pragma once
+#include "simulate/central_spring.h"
 #include "simulate/connections.h"
 #include "simulate/linear/block_matrix.h"
 
@@ -47,12 +48,21 @@ class PaperModel {
   [[nodiscard]] const ConnectionKind& kind(std::uint32_t element, std::uint8_t which) const {
     return connections_.parts[part_[element]].kinds[which];
   }
+  // A connection as it is now, from its own rest length (simulate/rest_shape.h), and its Hooke constant.
+  [[nodiscard]] Stretch stretched(const State& state, std::uint32_t element,
+                                  const ConnectionRows::Entry& entry) const;
+  [[nodiscard]] double stiffness(std::uint32_t element, const ConnectionRows::Entry& entry) const;
+  [[nodiscard]] std::size_t place(const ConnectionRows::Entry& entry) const {
+    return static_cast<std::size_t>(&entry - rows_.entries.data());
+  }
 
   const Body& body_;
   Connections connections_;
   ConnectionRows rows_;
   std::vector<std::uint32_t> part_;  // (elements)
   std::vector<std::uint8_t> active_;
+  std::vector<double> flowed_;  // (entries of rows_) m, change of the rest length; empty: none
+  std::vector<double> factor_;  // (entries of rows_) of the Hooke constant; empty: none
 };
 
 }  // namespace flexel

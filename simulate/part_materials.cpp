@@ -98,7 +98,8 @@ std::vector<Material> materials_of_parts(const Scene& scene, const Body& body) {
   std::vector<std::string> names;
   for (const Part& part : body.parts) names.push_back(part.name);
   for (const auto& [name, settings] : scene.parts)
-    if (std::find(names.begin(), names.end(), name) == names.end()) {
+    if (std::find(names.begin(), names.end(), name) == names.end() &&
+        std::find(scene.coming_parts.begin(), scene.coming_parts.end(), name) == scene.coming_parts.end()) {
       std::string hint = did_you_mean(name, names);
       if (hint.empty()) hint = fmt::format("; it has {}", fmt::join(names, ", "));
       throw InputError(settings.origin, fmt::format("the body has no part \"{}\"{}", name, hint));

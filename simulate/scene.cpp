@@ -1,12 +1,15 @@
 // Parses the scene's general tables (materials, parts, probes, run); each effect reads its own.
 #include "simulate/scene.h"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include <cmath>
 
 #include "formats/error.h"
 #include "formats/files.h"
+#include "simulate/events/all.h"
 
 namespace flexel {
 namespace {
@@ -133,10 +136,30 @@ RunSettings parse_run(TableReader& root) {
   run.tolerance = reader.number("tolerance").value_or(run.tolerance);
   run.load_steps = whole_number(reader, "load_steps", 10000).value_or(run.load_steps);
   run.newton_iterations = whole_number(reader, "newton_iterations", 1000000);
+  if (const SceneValue* value = reader.find("renormalise")) {
+    if (value->kind != SceneValue::Kind::boolean)
+      reader.fail(value->line, "\"renormalise\" needs to be true or false");
+    run.renormalise = value->flag;
+  }
   reader.finish();
   if (!(run.tolerance >= 1e-12 && run.tolerance <= 1e-2))
     reader.fail(fmt::format("\"tolerance\" = {} needs to lie between 1e-12 and 1e-2", run.tolerance));
   return run;
+}
+
+void parse_events(TableReader& root, Scene& scene) {
+  for (const SceneValue* table : root.tables("event")) {
+    TableReader reader(*table, root.file(), "[[event]]");
+    Event event = Events::parse(reader);
+    if (!scene.run.time)
+      reader.fail("events happen in timed runs only: give [run] time = \"1 s\", or leave them out");
+    if (!(event.at >= 0 && event.at <= *scene.run.time))
+      reader.fail(
+          fmt::format("\"at\" = {:.6g} s is not within the run, 0 s to {:.6g} s", event.at, *scene.run.time));
+    scene.events.push_back(std::move(event));
+  }
+  std::stable_sort(scene.events.begin(), scene.events.end(),
+                   [](const Event& a, const Event& b) { return a.at < b.at; });
 }
 
 }  // namespace
@@ -155,6 +178,7 @@ Scene parse_scene(const std::string& text, const std::string& name) {
     scene.probes.push_back(parse_probe(reader, scene.probes.size() + 1));
   }
   scene.run = parse_run(root);
+  parse_events(root, scene);
   Effects::parse(root, scene.effects);
   root.finish();
   return scene;

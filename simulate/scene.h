@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "simulate/effects/all.h"
+#include "simulate/events/event.h"
 #include "simulate/materials.h"
 #include "simulate/scene_selection.h"
 #include "simulate/state.h"
@@ -48,6 +49,7 @@ struct RunSettings {
   // after which the run gives up; each load step that ends in equilibrium allows 10 more. Nothing: 100, or 40
   // where the first linear answer is several times the size of the body
   std::optional<int> newton_iterations;
+  bool renormalise = false;  // the shape at the end becomes the rest shape (simulate/rest_shape.h)
 };
 
 struct Scene {
@@ -58,6 +60,8 @@ struct Scene {
   std::map<std::string, PartSettings> parts;
   std::vector<Probe> probes;
   RunSettings run;
+  std::vector<Event> events;              // ascending in time
+  std::vector<std::string> coming_parts;  // that events will add; set when the run begins
   Effects::Parameters effects;
 
   template <class E>

@@ -194,12 +194,12 @@ bool holds(const Selection& selection, const Vec3& point) {
   }
 }
 
-Selected resolve_region(const Selection& selection, const Body& body) {
+Selected resolve_region(const Selection& selection, const std::vector<Vec3>& at) {
   Selected selected;
-  for (std::uint32_t e = 0; e < body.element_count(); ++e)
-    if (holds(selection, body.rest[e])) selected.elements.push_back(e);
+  for (std::uint32_t e = 0; e < at.size(); ++e)
+    if (holds(selection, at[e])) selected.elements.push_back(e);
   if (selected.elements.empty()) {
-    const Box box = bounding_box(body.rest);
+    const Box box = bounding_box(at);
     throw InputError(
         selection.origin,
         fmt::format("the {} holds no element; the elements lie from ({}, {}, {}) to ({}, {}, {})",
@@ -253,7 +253,7 @@ std::string describe(const Selection& selection) {
   return fmt::format("{}", fmt::join(members, " + "));
 }
 
-Selected resolve(const Selection& selection, const Body& body) {
+Selected resolve(const Selection& selection, const Body& body, const std::vector<Vec3>* at) {
   switch (selection.kind) {
     case Selection::Kind::name: {
       Selected selected = resolve_name(selection, body);
@@ -264,13 +264,13 @@ Selected resolve(const Selection& selection, const Body& body) {
     case Selection::Kind::any_of: {
       Selected all;
       for (const Selection& member : selection.members) {
-        const Selected one = resolve(member, body);
+        const Selected one = resolve(member, body, at);
         all = {united(all.polygons, one.polygons), united(all.elements, one.elements)};
       }
       return all;
     }
     case Selection::Kind::complement: {
-      const Selected out = resolve(selection.members.front(), body);
+      const Selected out = resolve(selection.members.front(), body, at);
       Selected rest = {without(body.surface.polygon_count(), out.polygons),
                        without(body.element_count(), out.elements)};
       if (rest.polygons.empty() && rest.elements.empty())
@@ -278,7 +278,7 @@ Selected resolve(const Selection& selection, const Body& body) {
       return rest;
     }
     default:
-      return resolve_region(selection, body);
+      return resolve_region(selection, at ? *at : body.rest);
   }
 }
 

@@ -31,8 +31,10 @@ struct Selected {
 };
 
 // Throws InputError(selection.origin, ...) when a name is unknown (with the nearest that exists), ambiguous,
-// or when nothing is selected (with what to change).
-[[nodiscard]] Selected resolve(const Selection& selection, const Body& body);
+// or when nothing is selected (with what to change). `at` (elements) [m]: where boxes, spheres and
+// half-spaces look for elements; nothing: where they rest.
+[[nodiscard]] Selected resolve(const Selection& selection, const Body& body,
+                               const std::vector<Vec3>* at = nullptr);
 
 // The selection in words, for summaries: `"bracket/12"`, `box`, `2 selections`.
 [[nodiscard]] std::string describe(const Selection& selection);

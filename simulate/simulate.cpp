@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <numeric>
 
 #include "formats/body_file.h"
 #include "formats/error.h"
@@ -14,6 +15,7 @@
 #include "simulate/fragments.h"
 #include "simulate/probes.h"
 #include "simulate/report.h"
+#include "simulate/rest_shape.h"
 #include "simulate/scene.h"
 #include "simulate/time/timed_run.h"
 #include "simulate/unsupported.h"
@@ -28,6 +30,15 @@ void refuse_empty(const Body& body) {
 void move_body(Body& body, const State& state) {
   for (std::size_t e = 0; e < body.element_count(); ++e)
     body.position[e] = body.rest[e] + state.displacement[e];
+}
+
+// From the lattice's shape; where the rest shape is another, that may be far from any equilibrium, and the
+// present one is near.
+std::vector<Vec3> where_to_begin(const Body& body) {
+  std::vector<Vec3> displacement(body.element_count(), Vec3::Zero());
+  if (RestShapes(body).any())
+    for (std::size_t e = 0; e < displacement.size(); ++e) displacement[e] = body.position[e] - body.rest[e];
+  return displacement;
 }
 
 void report_strays(const Fragments& fragments, SimulateResult& result, Progress& progress) {
@@ -71,15 +82,17 @@ void explain_after(const SimulateResult& result, double linear_seconds, Progress
 
 double mass_of(const Setting& setting) {
   const std::vector<std::uint32_t> part = cell_parts(setting.body);
+  const std::vector<double> share = mass_shares(setting.body), factor = mass_factors(setting.body);
   double mass = parallel_sum<double>(setting.body.cell_count(), [&](std::size_t c) {
-    return setting.body.fill[c] * setting.materials[part[c]].density *
-           setting.body.parts[part[c]].lattice.spacing.prod();
+    return share[c] * setting.materials[part[c]].density * setting.body.parts[part[c]].lattice.spacing.prod();
   });
   for (std::size_t p = 0; p < setting.body.parts.size(); ++p) {
     const Part& each = setting.body.parts[p];
-    if (each.placement == Placement::centre)
-      mass += (each.element_end - each.element_begin) * setting.materials[p].density *
-              each.lattice.spacing.prod();
+    if (each.placement != Placement::centre) continue;
+    const double whole = setting.materials[p].density * each.lattice.spacing.prod();
+    mass += factor.empty() ? (each.element_end - each.element_begin) * whole
+                           : whole * std::accumulate(factor.begin() + each.element_begin,
+                                                     factor.begin() + each.element_end, 0.0);
   }
   return mass;
 }
@@ -117,7 +130,9 @@ class Run {
                  stray_cells(fragments_),
                  models_of_parts(scene, body),
                  hooke_of_parts(scene, body),
-                 stray_elements(fragments_, body)} {
+                 stray_elements(fragments_, body),
+                 {},
+                 settled_displacement(body)} {
     const std::vector<std::uint8_t> unsupported = unsupported_elements(setting_);
     for (std::size_t e = 0; e < unsupported.size(); ++e)
       if (unsupported[e]) {
@@ -146,8 +161,8 @@ class Run {
 EquilibriumResult Run::solve(Mechanics& mechanics) {
   refuse_loose_fragments(fragments_, body_, mechanics.tied_elements(), mechanics.coupled_elements(),
                          scene_.name);
-  refuse_unsupported_elements(mechanics, scene_.name);
-  refuse_free_motions(mechanics, scene_.name);
+  refuse_unsupported_elements(mechanics, state_, scene_.name);
+  refuse_free_motions(mechanics, state_, scene_.name);
   Deadline deadline;
   if (options_.timeout)
     deadline = began_ + std::chrono::duration_cast<std::chrono::steady_clock::duration>(
@@ -183,7 +198,7 @@ SimulateResult Run::operator()() {
   report_strays(fragments_, result, progress_);
   report_unsupported(unsupported_, result, progress_);
   Mechanics mechanics(setting_, std::move(passes));
-  state_.displacement.assign(body_.element_count(), Vec3::Zero());
+  state_.displacement = where_to_begin(body_);
   const EquilibriumResult solved = solve(mechanics);
   mechanics.report(state_, result);
   result.elastic_energy = mechanics.elastic_energy(state_);
@@ -191,6 +206,7 @@ SimulateResult Run::operator()() {
   measure_corners(mechanics.cells(), body_, state_, result, progress_);
   carry_strays(fragments_, setting_, mechanics.stencil(), state_);
   move_body(body_, state_);
+  if (scene_.run.renormalise) renormalise_all(body_, setting_, state_.displacement);
   for (const ProbePoints& probe : probes) result.probes.push_back(measure(probe, state_));
   for (const AppliedLoad& load : result.loads) result.imbalance += load.force;
   for (const Reaction& reaction : result.reactions) result.imbalance += reaction.force;

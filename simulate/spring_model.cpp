@@ -11,7 +11,9 @@ namespace {
 constexpr double kCornerShare = 0.1;  // t
 
 Stretch stretched(const Spring& spring, const CellVectors& u) {
-  return stretch(spring.rest, u[spring.b] - u[spring.a]);
+  Stretch now = stretch(spring.rest, u[spring.b] - u[spring.a]);
+  now.elongation -= spring.flowed;
+  return now;
 }
 
 }  // namespace

@@ -17,6 +17,7 @@ struct Spring {
   std::size_t a = 0, b = 0;  // corners, a < b
   double stiffness = 0;      // N/m, this cell's share
   Vec3 rest = Vec3::Zero();  // m, from a to b, world frame
+  double flowed = 0;         // m, change of the rest length |rest|
 };
 
 // Springs of all cells of a part. The lattice must be cubic.
@@ -25,7 +26,7 @@ struct SpringKind {
 };
 [[nodiscard]] SpringKind spring_kind(const Lattice& lattice, const Material& material);
 
-// Of a whole cell with fill 1: energy 1/2 k (|r| - |rest|)^2 [J]; forces on the elements [N].
+// Of a whole cell with fill 1: energy 1/2 k (|r| - |rest| - flowed)^2 [J]; forces on the elements [N].
 [[nodiscard]] double cell_energy(const SpringKind& kind, const CellVectors& displacement);
 [[nodiscard]] CellVectors cell_forces(const SpringKind& kind, const CellVectors& displacement);
 

@@ -35,6 +35,9 @@ struct Setting {
   std::vector<std::uint8_t> stray_element =
       {};                               // (elements) 1: likewise, of a centre-placed part; empty: none
   std::optional<double> duration = {};  // s, of a timed run; nothing: equilibrium
+  // (elements) m, displacement that fixes and moves start from (simulate/rest_shape.h); empty: none
+  std::vector<Vec3> settled = {};
+  std::size_t bonding_parts = SIZE_MAX;  // the first ones; later ones joined in a run, and bond with nothing
 };
 
 }  // namespace flexel

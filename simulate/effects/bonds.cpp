@@ -63,12 +63,14 @@ std::optional<Bonds> Bonds::make(const Parameters& parameters, const Setting& se
   std::map<std::vector<std::uint32_t>, Matrix> by_elements;
   std::map<std::array<std::uint32_t, 2>, double> area;
   for (const TouchingPoint& point : points) {
+    if (std::max(point.part[0], point.part[1]) >= setting.bonding_parts) continue;
     const Weights weights = jump(point);
     auto [entry, fresh] =
         by_elements.try_emplace(elements_of(point), Matrix::Zero(weights.size(), weights.size()));
     entry->second += kPenalty * foundation(point, setting) * point.area * weights * weights.transpose();
     area[{std::min(point.part[0], point.part[1]), std::max(point.part[0], point.part[1])}] += point.area;
   }
+  if (by_elements.empty()) return std::nullopt;
   for (const auto& [elements, stiffness] : by_elements) made.bonds_.push_back({elements, stiffness});
   for (const auto& [parts, shared] : area)
     made.parts_.push_back({{setting.body.parts[parts[0]].name, setting.body.parts[parts[1]].name}, shared});

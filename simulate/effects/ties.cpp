@@ -57,6 +57,7 @@ std::optional<Ties> Ties::make(const Parameters& parameters, const Setting& sett
   if (parameters.ties.empty()) return std::nullopt;
   Ties made;
   made.body_ = &setting.body;
+  made.start_ = setting.settled;
   made.ties_ = parameters.ties;
   if (setting.duration)
     for (Tie& tie : made.ties_)
@@ -149,7 +150,9 @@ Ties::Displacements Ties::violation(const TiedElements& tied, const State& state
   Displacements result(tied.count, 3);
   for (std::size_t a = 0; a < tied.count; ++a) {
     const std::uint32_t e = tied.elements[a];
-    const Vec3 off = state.displacement[e] - tie.motion.displacement(body_->rest[e], factor(tie, state));
+    const Vec3 start = start_.empty() ? Vec3(Vec3::Zero()) : start_[e];
+    const Vec3 off =
+        state.displacement[e] - start - tie.motion.displacement(body_->rest[e] + start, factor(tie, state));
     for (std::size_t axis = 0; axis < 3; ++axis)
       result(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(axis)) =
           tie.axes[axis] ? off[static_cast<Eigen::Index>(axis)] : 0;
@@ -186,6 +189,7 @@ void Ties::add_stiffness(const State&, BlockMatrix& matrix) const {
 }
 
 void Ties::constrain(Constraints& constraints) const {
+  constraints.start = start_;
   for (std::size_t t = 0; t < ties_.size(); ++t) {
     const auto motion = static_cast<std::uint32_t>(constraints.motions.size());
     constraints.motions.push_back(ties_[t].motion);

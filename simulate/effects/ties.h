@@ -64,6 +64,7 @@ class Ties {
   void add_surface_tie(std::uint32_t tie, const std::vector<std::uint32_t>& polygons, const Setting& setting);
 
   const Body* body_ = nullptr;
+  std::vector<Vec3> start_;  // (elements) m, displacement that ties start from; empty: 0
   std::vector<Tie> ties_;
   std::vector<TiedElements> tied_;                         // by tie, then elements
   std::vector<std::vector<std::uint32_t>> held_elements_;  // (ties) eliminated elements

@@ -8,7 +8,9 @@
 
 #include "formats/error.h"
 #include "formats/parallel.h"
+#include "simulate/events/fuse.h"
 #include "simulate/report.h"
+#include "simulate/rest_shape.h"
 #include "simulate/time/folds.h"
 
 namespace flexel {
@@ -43,22 +45,30 @@ State beginning(const Body& body) {
   return state;
 }
 
-Act::Act(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress, State state,
-         bool fresh)
+Setting timed_setting(const Body& body, const Scene& scene, const Beginning& beginning) {
+  return {body,
+          materials_of_parts(scene, body),
+          std::vector<std::uint8_t>(body.cell_count(), 0),
+          models_of_parts(scene, body),
+          hooke_of_parts(scene, body),
+          std::vector<std::uint8_t>(body.element_count(), 0),
+          scene.run.time,
+          beginning.settled,
+          beginning.bonding_parts};
+}
+
+Act::Act(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress,
+         const Beginning& beginning)
     : body_(body),
       scene_(scene),
       progress_(progress),
-      setting_{body,
-               materials_of_parts(scene, body),
-               std::vector<std::uint8_t>(body.cell_count(), 0),
-               models_of_parts(scene, body),
-               hooke_of_parts(scene, body),
-               std::vector<std::uint8_t>(body.element_count(), 0),
-               scene.run.time},
+      setting_(timed_setting(body, scene, beginning)),
       probes_(place_probes(scene, setting_)),
       passes_(Effects::passes(scene.effects, setting_)),
       constraints_(no_constraints(body)),
-      state_(std::move(state)) {
+      state_(beginning.state) {
+  const bool fresh = beginning.fresh;
+  if (!beginning.fused.empty()) passes_.push_back(make_pass(FusedPoints(body, beginning.fused)));
   if (fresh) warn_of_springs(setting_, progress_);
   name_materials(body_, setting_.materials);
   plan_.damping.assign(body.parts.size(), 0);
@@ -67,6 +77,8 @@ Act::Act(Body& body, const Scene& scene, const SimulateOptions& options, Progres
     if (pass.start && fresh) pass.start(state_);
     if (pass.constrain) pass.constrain(constraints_);
   }
+  plan_.rest_shapes = RestShapes(body).any();
+  plan_.broken_springs = body.cell_columns.contains("broken_springs");
   bound_.emplace(setting_, passes_, plan_);
   // Explicit damping may cut the step by 2; beyond that every step solves for it.
   const bool implicit = scene.run.method == TimeMethod::implicit_euler;
@@ -74,8 +86,6 @@ Act::Act(Body& body, const Scene& scene, const SimulateOptions& options, Progres
       implicit || scene.run.method == TimeMethod::explicit_euler || bound_->damps_explicitly();
   stepper_.emplace(setting_, plan_, (!options.history.empty() && !implicit) || !by_steps, options.isa);
   stepper_->read_memory(body.cell_columns);
-  if (fresh && Stepper::remembers(body.cell_columns) && plan_.plasticity.empty() && plan_.fracture.empty())
-    progress.warn("the body flowed or broke before: without [plasticity] or [fracture] it forgets that");
   held_.emplace(constraints_, body_, state_, fresh);
   if (!by_steps) implicit_.emplace(*stepper_, *held_);
   make_forces();
@@ -293,6 +303,7 @@ void Act::close_books(const Clock& clock, History& history) {
   State last = state_;
   const Stepper::Memory memory = stepper_->memory();
   Clock beyond = clock;
+  history.close();
   step(beyond, &history, true);
   state_ = std::move(last);
   stepper_->restore(memory);

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "simulate/events/event.h"
 #include "simulate/scene.h"
 #include "simulate/simulate.h"
 #include "simulate/time/held.h"
@@ -30,12 +31,24 @@ struct Clock {
 // one, at time 0.
 [[nodiscard]] State beginning(const Body& body);
 
+// What an act begins with, beside the body.
+struct Beginning {
+  State state;
+  // The run begins: effects that change the state at its start do, and held elements are put on their paths.
+  bool fresh = true;
+  std::vector<Vec3> settled = {};        // Setting::settled
+  std::vector<FusedPoint> fused = {};    // by events so far
+  std::size_t bonding_parts = SIZE_MAX;  // Setting::bonding_parts
+};
+
+// The setting of a timed run with the body as it is now.
+[[nodiscard]] Setting timed_setting(const Body& body, const Scene& scene, const Beginning& beginning);
+
 class Act {
  public:
-  // Refers to all of them while it lives. `fresh`: the run begins, so effects that change the state at its
-  // start do, and held elements are put on their paths. Throws InputError.
-  Act(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress, State state,
-      bool fresh);
+  // Refers to the others while it lives. Throws InputError.
+  Act(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress,
+      const Beginning& beginning);
   Act(const Act&) = delete;
   Act& operator=(const Act&) = delete;
 

@@ -13,6 +13,7 @@
 
 #include "formats/parallel.h"
 #include "simulate/cells.h"
+#include "simulate/rest_shape.h"
 
 namespace flexel {
 namespace {
@@ -72,6 +73,7 @@ void set_damping(const Setting& setting, const Stencil& stencil, const std::vect
                  const std::vector<Vec3>& displacement, BlockMatrix& matrix) {
   const Body& body = setting.body;
   const std::vector<std::uint32_t> part = element_parts(body);
+  const std::vector<double> share = stiffness_shares(body);
   std::vector<CellKind> cells;
   std::vector<std::optional<SpringKind>> springs(body.parts.size());
   for (std::size_t p = 0; p < body.parts.size(); ++p) {
@@ -89,7 +91,7 @@ void set_damping(const Setting& setting, const Stencil& stencil, const std::vect
       for (std::size_t a = 0; a < 8; ++a) u[a] = displacement[body.cell_elements[at.cell][a]];
       const std::array<Mat3, 8> blocks =
           springs[p] ? damping_row(*springs[p], u, at.corner) : damping_row(cells[p], u, at.corner);
-      const double scale = damping[p] * body.fill[at.cell];
+      const double scale = damping[p] * share[at.cell];
       for (std::size_t b = 0; b < 8; ++b) row[stencil.slot[at.cell][8 * at.corner + b]] += scale * blocks[b];
     }
   });

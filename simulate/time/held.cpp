@@ -20,8 +20,7 @@ Held::Held(const Constraints& constraints, const Body& body, State& state, bool 
 
 double Held::path(std::uint32_t element, int axis, const State& state) const {
   const std::uint32_t motion = constraints_.motion[element][static_cast<std::size_t>(axis)];
-  return constraints_.motions[motion].displacement(body_.rest[element],
-                                                   constraints_.courses[motion].at(state))[axis];
+  return constraints_.path(body_, element, axis, constraints_.courses[motion].at(state));
 }
 
 void Held::impose(State& state, const std::vector<double>& mass, const step::Advance& advance) {

@@ -66,6 +66,7 @@ History::History(const Setting& setting, const std::vector<Pass>& passes,
       paper_(paper),
       cells_(setting, no_stencil_),
       forces_(passes.size()),
+      remembers_(plan.remembers()),
       ledger_(std::move(ledger)) {
   own_.assign(passes.size(), 0);
   for (std::size_t p = 0; p < passes.size(); ++p) {
@@ -87,8 +88,8 @@ void History::before(const State& state, bool sample) {
   time_ = *state.time;
   if (!sample) return;
   sampled_.displacement = state.displacement;
-  // with plasticity or fracture the step tells that of the cells
-  elastic_ = (plasticity_ || fracture_ ? 0 : cells_.energy(state)) + (paper_ ? paper_->energy(state) : 0);
+  // with plasticity, fracture or rest shapes the step tells that of the cells
+  elastic_ = (remembers_ ? 0 : cells_.energy(state)) + (paper_ ? paper_->energy(state) : 0);
   potential_ = 0;
   for (const Pass& pass : passes_)
     if (pass.book == Book::potential && pass.energy) potential_ += pass.energy(state);
@@ -108,16 +109,22 @@ void History::after(const State& state, const StepOutcome& outcome, const std::v
     enter(damping_, damping);
     enter(damping_, connection_damping_);
   };
-  add_powers(velocity_, 0.5 * previous_step);
+  // before an event the half step to it was entered
+  if (!ledger_.changed) add_powers(velocity_, 0.5 * previous_step);
+  const std::vector<Account> kept = closing_ ? ledger_.accounts : std::vector<Account>();
   if (plasticity_) ledger_.accounts[*plasticity_].energy -= outcome.plastic_work;
   if (fracture_) ledger_.accounts[*fracture_].energy -= outcome.released;
   if (outcome.elastic) elastic_ += *outcome.elastic;
   if (sample_) add_row(state);
-  add_powers(state.velocity, 0.5 * step);
+  if (closing_)
+    ledger_.accounts = kept;
+  else
+    add_powers(state.velocity, 0.5 * step);
 }
 
 void History::add_row_of(const State& state) {
   before(state, true);
+  if (remembers_) elastic_ += cells_.energy(state);  // no step tells it
   add_row(state);
 }
 
@@ -147,11 +154,17 @@ void History::add_row(const State& state) {
   row.angular = sum.angular;
   Energies& now = row.energies;
   now = {sum.kinetic, elastic_, potential_, 0, 0, 0};
+  double book = now.kinetic + now.elastic + now.potential;
+  for (const Account& account : ledger_.accounts) book -= account.energy;
+  if (ledger_.changed && !ledger_.rows.empty())
+    ledger_.accounts[ledger_.account("events", false)].energy +=
+        book - *ledger_.start - ledger_.rows.back().energies.residual;
+  ledger_.changed = false;
   for (const Account& account : ledger_.accounts) {
     (account.dissipates ? now.dissipated : now.work) += account.dissipates ? -account.energy : account.energy;
     row.accounts.push_back(account.dissipates ? 0.0 - account.energy : account.energy);
   }
-  const double book = now.kinetic + now.elastic + now.potential + now.dissipated - now.work;
+  book = now.kinetic + now.elastic + now.potential + now.dissipated - now.work;
   if (!ledger_.start) ledger_.start = book;
   now.residual = book - *ledger_.start;
   ledger_.worst_residual = std::max(ledger_.worst_residual, std::abs(now.residual));

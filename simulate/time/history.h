@@ -47,8 +47,9 @@ struct Ledger {
   std::vector<BookRow> rows;
   std::vector<std::string> probes;  // names
   std::optional<double> start;      // J: the sum of the first row
-  double worst_residual = 0;        // J, largest absolute one
-  double largest_term = 0;          // J, of any energy
+  bool changed = false;       // an event came since the last row: what it gave is entered as work of "events"
+  double worst_residual = 0;  // J, largest absolute one
+  double largest_term = 0;    // J, of any energy
 
   [[nodiscard]] std::string csv() const;
   // Place of the account of that name; a new one is made at the end.
@@ -80,7 +81,11 @@ class History {
   void enter(const std::vector<Vec3>& moved, const std::vector<Vec3>& damping,
              const std::vector<Vec3>& supports, double numerical);
 
+  // The next step is thrown away: what it says of the state before it counts, nothing else.
+  void close() { closing_ = true; }
+
   [[nodiscard]] const Ledger& ledger() const { return ledger_; }
+  [[nodiscard]] Ledger take_ledger() { return std::move(ledger_); }
 
  private:
   void add_row(const State& state);
@@ -93,13 +98,14 @@ class History {
   Stencil no_stencil_;
   Cells cells_;
   std::vector<std::vector<Vec3>> forces_;  // (passes x elements)
-  std::vector<Vec3> connection_damping_;   // (elements) or empty
-  std::vector<Vec3> velocity_;             // before the step
+  bool remembers_;
+  std::vector<Vec3> connection_damping_;  // (elements) or empty
+  std::vector<Vec3> velocity_;            // before the step
   Ledger ledger_;
   std::vector<std::size_t> own_;  // (passes) places in the ledger
   std::size_t supports_ = 0, damping_ = 0;
   std::optional<std::size_t> plasticity_, fracture_;
-  bool sample_ = false;
+  bool sample_ = false, closing_ = false;
   double time_ = 0, elastic_ = 0, potential_ = 0;
   State sampled_;
 };

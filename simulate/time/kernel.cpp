@@ -41,56 +41,58 @@ struct CellsModel {
                                       const Scratch& scratch, Sums& sums) {
     CellBlock& block = chunk.blocks[number];
     const CellConstants& k = *chunk.constants;
-    Lanes fill = load(block.fill);
+    const Lanes fill = load(block.fill);
+    Lanes matter = fill;  // the share of the voxel; that volume in the rest shape
     Corners corners;
     Modes u[3], v[3];
     read_corners(block, scratch.column + kDisplacement, corners);
     for (int i = 0; i < 3; ++i) u[i] = transform(corners, i);
     const Gradient g = gradient_of(u, k, fill, sums);
-    const Lanes log_volume = log1p(g.change);
     Matrix stress;
     Lanes mode_force[4][3];
     [[maybe_unused]] Elastic now;
     if constexpr (has.plasticity) {
       PlasticBlock& memory = chunk.plastic[number];
-      now = plastic_state(g, u, log_volume, k, fill, memory, sums);
+      matter = fill * (1 + load(memory.volume));
+      now = plastic_state(g, u, k, matter, memory, sums);
       stress = plastic_stress(g, now, k, memory);
       for (int m = 0; m < 4; ++m)
         for (int i = 0; i < 3; ++i) mode_force[m][i] = k.hourglass[m] * now.hourglass[m][i];
     } else {
+      const Lanes log_volume = log1p(g.change);
       stress = elastic_stress(g, log_volume, k);
       for (int m = 0; m < 4; ++m)
         for (int i = 0; i < 3; ++i) mode_force[m][i] = (0.125 * k.hourglass[m]) * u[i].q[m];
-      if constexpr (has.fracture) now = elastic_state(g, u, log_volume, k);
+      if constexpr (has.fracture) now = elastic_state(g, u, g.change, log_volume, k);
     }
     if constexpr (has.damping != Damping::none) {
       read_corners(block, scratch.column + kVelocity, corners);
       for (int i = 0; i < 3; ++i) v[i] = transform(corners, i);
     }
     if constexpr (has.fracture) {
-      LaneMask broken = breaks(g, now, k, fill);
+      LaneMask broken = breaks(now, k, fill);
       if constexpr (has.plasticity)
         broken |= (load(chunk.plastic[number].strain) > k.elongation) & (fill > 0);
       if (any(broken)) {
         for (std::size_t l = 0; l < kLanes; ++l) sums.broken += broken[l] != 0;
-        const Lanes lost = broken ? fill : Lanes{};
+        const Lanes lost = broken ? matter : Lanes{};
         if constexpr (has.damping == Damping::book)
           sums.released +=
               released_energy(stress, mode_force, elastic_energy(now, k), lost, k, advance, corners);
-        fill = broken ? Lanes{} : fill;
-        store(block.fill, fill);
+        store(block.fill, broken ? Lanes{} : fill);
+        matter = broken ? Lanes{} : matter;
       }
     }
     if constexpr (has.damping == Damping::book && (has.fracture || has.plasticity)) {
-      const Lanes energy = fill * elastic_energy(now, k);
-      sums.elastic += fill > 0 ? energy : Lanes{};
+      const Lanes energy = matter * elastic_energy(now, k);
+      sums.elastic += matter > 0 ? energy : Lanes{};
     }
     if constexpr (has.damping != Damping::none) {
       Matrix viscous = {};
       Lanes spin_free[4][3];
       add_damping(g, u, v, k, viscous, spin_free);
       if constexpr (has.damping == Damping::book) {
-        forces_of(viscous, spin_free, fill, k, corners);
+        forces_of(viscous, spin_free, matter, k, corners);
         add_to_corners(block, corners, scratch.column + kDampingForce);
       }
       for (int i = 0; i < 3; ++i)
@@ -98,7 +100,7 @@ struct CellsModel {
       for (int m = 0; m < 4; ++m)
         for (int i = 0; i < 3; ++i) mode_force[m][i] += spin_free[m][i];
     }
-    forces_of(stress, mode_force, fill, k, corners);
+    forces_of(stress, mode_force, matter, k, corners);
     add_to_corners(block, corners, scratch.column + kForce);
   }
 

@@ -16,7 +16,7 @@ constexpr std::size_t kLanes = 8;  // cells that are computed side by side, on e
 // Eight cells of a chunk. Lanes without a cell have fill 0 and corners 0.
 struct CellBlock {
   std::uint16_t corner[8][kLanes];  // elements, numbered within the chunk
-  double fill[kLanes];              // 0: absent or broken, resists nothing
+  double fill[kLanes];              // times what an edit made of it; 0: absent or broken, resists nothing
   // 1: corner[a][l] = corner[a][0] + l for every corner: neighbours along a row
   std::uint64_t is_run;
 };
@@ -55,11 +55,13 @@ struct CellConstants {
   bool aligned;                   // axes is the identity
 };
 
-// What the cells of a block remember of their plastic flow; model `cells`, lattice frame.
+// What the cells of a block remember of their plastic flow and of the shape that is their rest; model
+// `cells`, lattice frame.
 struct PlasticBlock {
   double flow[6][kLanes];          // Cp^-1 - I, Cp = Fp^T Fp: xx, yy, zz, xy, yz, zx
   double strain[kLanes];           // equivalent plastic strain
   double hourglass[4][3][kLanes];  // m, plastic part of the hourglass displacements, drawn back by F
+  double volume[kLanes];           // Jp - 1, Jp = det Fp: the rest shape's volume over the voxel's
 };
 
 // What they remember of their springs, a bit or a row each, a < b in the order (0, 1), (0, 2), ... (6, 7);

@@ -7,6 +7,10 @@
 // is kept by shrinking s. The trace of b follows from det b = J^2 (plastic flow keeps the volume): Newton on
 // the cubic det(s/mu + x I) = J^2. Then P = tau F^-T.
 //
+// A cell whose rest shape is another than the voxel's (docs/events.md) has Fp with Jp = det Fp other than 1:
+// J is then over Jp, in everything but F^-T, and energies and stresses are per volume of the rest shape, Jp
+// to one of the voxel.
+//
 // The hourglass displacements q_m have a plastic part F Q_m, which turns with the cell: energy 1/2 c_m
 // |e_m|^2, e_m = q_m - F Q_m. Their stress at a cell's faces, beside the mean one, S^2 = 6 mu / V sum_m c_m
 // |e_m|^2, is bounded as the bending moment of a rectangular section under tension is (Prager and Hodge 1951,
@@ -76,6 +80,7 @@ FLEXEL_INLINE Lanes determinant(const Symmetric& s) {
 struct Elastic {
   Symmetric strain;        // b - I
   Lanes trace;             // tr(b - I)
+  Lanes change;            // J - 1, J over that of the rest shape
   Lanes log_volume;        // ln J
   Lanes hourglass[4][3];   // e_m [m]
   Lanes hourglass_square;  // sum_m c_m |e_m|^2 [J]
@@ -97,9 +102,10 @@ FLEXEL_INLINE Lanes sum_of_squares(const Elastic& now, const CellConstants& k) {
   return sum;
 }
 
-FLEXEL_INLINE Elastic elastic_state(const Gradient& g, const Modes u[3], const Lanes& log_volume,
-                                    const CellConstants& k) {
+FLEXEL_INLINE Elastic elastic_state(const Gradient& g, const Modes u[3], const Lanes& change,
+                                    const Lanes& log_volume, const CellConstants& k) {
   Elastic now;
+  now.change = change;
   now.log_volume = log_volume;
   now.strain = left_strain(g.h);
   now.trace = now.strain.at[0] + now.strain.at[1] + now.strain.at[2];
@@ -141,7 +147,7 @@ FLEXEL_INLINE Yielding flow(const Gradient& g, const CellConstants& k, const Lan
   const Lanes multiplier = yields ? (y.stress - y.bound) / (2 * elastic + 2.0 / 3 * k.hardening) : Lanes{};
   const Lanes shrink = yields ? 1 - 2 * elastic * multiplier / y.stress : Lanes{} + 1;
   const Lanes third = determinant(d) * shrink * shrink * shrink, second = 0.5 * dd * shrink * shrink;
-  const Lanes wanted = g.change * (2 + g.change);  // J^2 - 1
+  const Lanes wanted = now.change * (2 + now.change);  // J^2 - 1
   Lanes w = now.trace * (1.0 / 3);
   for (int i = 0; i < 3; ++i) {
     const Lanes value = w * (3 + w * (3 + w)) - second * (1 + w) + third - wanted;
@@ -194,10 +200,10 @@ FLEXEL_INLINE void flow_of_hourglass(const Gradient& g, const CellConstants& k, 
 }
 
 // The state less what has flowed, flowing on where it yields.
-FLEXEL_INLINE Elastic plastic_state(const Gradient& g, const Modes u[3], const Lanes& log_volume,
-                                    const CellConstants& k, const Lanes& fill, PlasticBlock& memory,
-                                    Sums& sums) {
-  Elastic now = elastic_state(g, u, log_volume, k);
+FLEXEL_INLINE Elastic plastic_state(const Gradient& g, const Modes u[3], const CellConstants& k,
+                                    const Lanes& fill, PlasticBlock& memory, Sums& sums) {
+  const Lanes rest = load(memory.volume), change = (g.change - rest) / (1 + rest);
+  Elastic now = elastic_state(g, u, change, log1p(change), k);
   Symmetric flowed;
   for (int i = 0; i < 6; ++i) flowed.at[i] = load(memory.flow[i]);
   const Matrix f = deformation(g);
@@ -243,9 +249,8 @@ FLEXEL_INLINE Lanes elastic_energy(const Elastic& now, const CellConstants& k) {
 }
 
 // Lanes that break.
-FLEXEL_INLINE LaneMask breaks(const Gradient& g, const Elastic& now, const CellConstants& k,
-                              const Lanes& fill) {
-  const Lanes limit = k.strength * g.jacobian, pressure = k.lambda * now.log_volume;
+FLEXEL_INLINE LaneMask breaks(const Elastic& now, const CellConstants& k, const Lanes& fill) {
+  const Lanes limit = k.strength * (1 + now.change), pressure = k.lambda * now.log_volume;
   const Symmetric d = deviator(now.strain, now.trace);
   // No principal value of a deviator passes sqrt(2/3) of its norm.
   const Lanes most =

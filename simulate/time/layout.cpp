@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "simulate/cells.h"
+#include "simulate/rest_shape.h"
 #include "simulate/time/connection_runs.h"
 
 namespace flexel {
@@ -98,6 +99,7 @@ class Builder {
  public:
   Builder(const Setting& setting, StepLayout& layout)
       : body_(setting.body),
+        share_(stiffness_shares(setting.body)),
         layout_(layout),
         local_(setting.body.element_count()),
         users_(local_.size(), 0) {}
@@ -116,6 +118,7 @@ class Builder {
   [[nodiscard]] bool continues(std::uint32_t cell, std::uint32_t next) const;
 
   const Body& body_;
+  std::vector<double> share_;  // (cells) of the stiffness of a whole cell
   StepLayout& layout_;
   std::vector<std::uint16_t> local_;  // (elements) number within the chunk that is built
   std::vector<std::uint8_t> users_;   // (elements) chunks that touch it, up to 2
@@ -129,7 +132,7 @@ void Builder::add_block(std::span<const std::uint32_t> cells, bool is_run) {
   block.is_run = is_run;
   for (std::size_t l = 0; l < cells.size(); ++l) {
     lanes[l] = cells[l];
-    block.fill[l] = body_.fill[cells[l]];
+    block.fill[l] = share_[cells[l]];
     for (std::size_t a = 0; a < 8; ++a) block.corner[a][l] = local_[body_.cell_elements[cells[l]][a]];
   }
   layout_.blocks.push_back(block);
@@ -162,7 +165,7 @@ void Builder::add_runs(std::span<const std::uint32_t> cells, std::size_t count) 
   std::vector<std::array<std::uint16_t, 8>> corners(cells.size());
   std::vector<double> fill(cells.size());
   for (std::size_t i = 0; i < cells.size(); ++i) {
-    fill[i] = body_.fill[cells[i]];
+    fill[i] = share_[cells[i]];
     for (std::size_t a = 0; a < 8; ++a) corners[i][a] = local_[body_.cell_elements[cells[i]][a]];
   }
   const ConnectionRuns made = connection_runs(corners, fill, count);
@@ -270,8 +273,8 @@ std::size_t StepLayout::bytes() const {
 }
 
 bool steps_by_connection(const Setting& setting, const StepPlan& plan, std::size_t part) {
-  return setting.models.size() > part && setting.models[part] == Model::springs &&
-         (plan.plasticity.empty() || !std::isfinite(plan.plasticity[part].yield)) &&
+  return setting.models.size() > part && setting.models[part] == Model::springs && !plan.rest_shapes &&
+         !plan.broken_springs && (plan.plasticity.empty() || !std::isfinite(plan.plasticity[part].yield)) &&
          (plan.fracture.empty() || !plan.fracture[part].any());
 }
 
@@ -307,13 +310,15 @@ StepLayout step_layout(const Setting& setting, const StepPlan& plan) {
 std::vector<double> lumped_masses(const Setting& setting) {
   const Body& body = setting.body;
   std::vector<double> mass(body.element_count(), 0);
+  const std::vector<double> share = mass_shares(body), factor = mass_factors(body);
   for (std::size_t p = 0; p < body.parts.size(); ++p) {
     const Part& part = body.parts[p];
     const double whole = setting.materials[p].density * part.lattice.spacing.prod();
     if (part.placement == Placement::centre)
-      std::fill(mass.begin() + part.element_begin, mass.begin() + part.element_end, whole);
+      for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
+        mass[e] = factor.empty() ? whole : factor[e] * whole;
     for (std::uint32_t c = part.cell_begin; c < part.cell_end; ++c)
-      for (const std::uint32_t e : body.cell_elements[c]) mass[e] += body.fill[c] * whole / 8;
+      for (const std::uint32_t e : body.cell_elements[c]) mass[e] += share[c] * whole / 8;
   }
   return mass;
 }

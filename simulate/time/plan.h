@@ -22,6 +22,13 @@ struct StepPlan {
   std::vector<double> damping;                // (parts) s, the time tau of the internal damping; 0: none
   std::vector<PlasticFlow> plasticity = {};   // (parts); empty: none
   std::vector<FractureLimits> fracture = {};  // (parts); empty: none
+  bool broken_springs = false;                // the body remembers springs that broke (simulate/rest_shape.h)
+  bool rest_shapes = false;                   // cells have rest shapes of their own (simulate/rest_shape.h)
+
+  // Whether the elastic energy of the cells is another than that of the lattice's shape, unbroken.
+  [[nodiscard]] bool remembers() const {
+    return !plasticity.empty() || !fracture.empty() || rest_shapes || broken_springs;
+  }
 };
 
 }  // namespace flexel

@@ -26,12 +26,14 @@ void Series::enter(double time) {
 
 void Series::resume(const std::vector<double>& times) {
   for (const double time : times) enter(time);
+  parts_ = SIZE_MAX;
 }
 
 void Series::add(const Body& body, double time) {
   BodyFileOptions options;
   options.compress = compress_;
-  options.embed_surface = times_.empty();
+  options.embed_surface = times_.empty() || body.parts.size() > parts_;  // parts may join
+  parts_ = body.parts.size();
   write_body(body, fmt::format("{}_{:05}.vtu", base_, times_.size()), options);
   enter(time);
   OutputFile out(path_, false);

@@ -23,6 +23,7 @@ class Series {
   std::string path_, base_, name_, entries_;
   bool compress_;
   std::vector<double> times_;
+  std::size_t parts_ = 0;  // of the last frame
 };
 
 }  // namespace flexel

@@ -9,6 +9,7 @@
 #include "formats/parallel.h"
 #include "simulate/cells.h"
 #include "simulate/greatest.h"
+#include "simulate/rest_shape.h"
 
 namespace flexel {
 namespace {
@@ -49,8 +50,10 @@ bool is_springs(const Setting& setting, std::size_t part) {
 
 // d2W/dF2 of the neo-Hookean energy has, with s the singular values of F, entries of at most mu + (mu +
 // lambda (1 - ln J)) / s_min^2; at rest 2 mu + lambda.
-// With plastic flow mu is that of b = F Cp^-1 F^T: at most 1 / s_min^2 where the flow follows F.
-double cell_stiffening(const CellKind& kind, const CellVectors& u, bool plastic) {
+// With plastic flow mu is that of b = F Cp^-1 F^T: at most 1 / s_min^2 where the flow follows F. With a rest
+// shape mu is times the largest eigenvalue of Cp^-1, ln J less ln Jp, and all times Jp.
+double cell_stiffening(const CellKind& kind, const CellVectors& u, bool plastic,
+                       const std::optional<CellKind>& shaped) {
   const Mat3 gradient = displacement_gradient(kind, u);
   const double jacobian = 1 + volume_change(gradient);
   if (!(jacobian > 0)) return std::numeric_limits<double>::infinity();
@@ -58,17 +61,24 @@ double cell_stiffening(const CellKind& kind, const CellVectors& u, bool plastic)
   Eigen::SelfAdjointEigenSolver<Mat3> eigen;
   eigen.computeDirect(f.transpose() * f, Eigen::EigenvaluesOnly);
   const double least = std::max(eigen.eigenvalues()[0], 1e-12);
-  const double log_volume = std::log(jacobian);
+  const double volume = shaped ? shaped->volume / kind.volume : 1;
+  const double log_volume = std::log(jacobian / volume);
   const double coupling = kind.mu + kind.lambda * (1 - log_volume);
-  const double own = plastic ? kind.mu / std::min(least, 1.0) : kind.mu;
-  return (own + std::max(coupling, 0.0) / least) / (2 * kind.mu + kind.lambda);
+  double own = plastic ? kind.mu / std::min(least, 1.0) : kind.mu;
+  if (shaped) {
+    const Mat3 root = Mat3::Identity() + shaped->offset;
+    eigen.computeDirect(root * root, Eigen::EigenvaluesOnly);
+    own = std::max(own, kind.mu * eigen.eigenvalues()[2]);
+  }
+  return volume * (own + std::max(coupling, 0.0) / least) / (2 * kind.mu + kind.lambda);
 }
 
 // k (1 + extension) at most; compression turns the cross stiffness k (1 - l/d) negative, which slows.
 double springs_stiffening(const SpringKind& kind, const CellVectors& u) {
   double largest = 1;
   for (const Spring& spring : kind.springs) {
-    const double stretch = (spring.rest + u[spring.b] - u[spring.a]).norm() / spring.rest.norm();
+    const double stretch =
+        (spring.rest + u[spring.b] - u[spring.a]).norm() / (spring.rest.norm() + spring.flowed);
     largest = std::max(largest, 2 - 1 / stretch);
   }
   return largest;
@@ -112,22 +122,30 @@ std::vector<double> stiffening(const Setting& setting, const std::vector<Vec3>& 
                                const StepPlan& plan) {
   const Body& body = setting.body;
   const std::vector<std::uint8_t> active = active_cells(setting);
+  const RestShapes shapes(body);
+  const std::vector<double> stiffness = stiffness_shares(body), mass = mass_shares(body);
   std::vector<double> result;
   for (std::size_t p = 0; p < body.parts.size(); ++p) {
     const Part& part = body.parts[p];
     const CellKind cells = cell_kind(part.lattice, setting.materials[p]);
     const SpringKind springs = spring_kind(part.lattice, setting.materials[p]);
     const bool by_springs = is_springs(setting, p), plastic = !plan.plasticity.empty();
-    const bool breaks = !plan.fracture.empty() && plan.fracture[p].any();
+    const bool breaks = plan.broken_springs || (!plan.fracture.empty() && plan.fracture[p].any());
     const Greatest greatest = parallel_sum<Greatest>(part.cell_end - part.cell_begin, [&](std::size_t i) {
       const std::size_t c = part.cell_begin + i;
       if (!active[c]) return Greatest{};
       CellVectors u;
       for (std::size_t a = 0; a < 8; ++a) u[a] = displacement[body.cell_elements[c][a]];
-      if (!by_springs) return Greatest{cell_stiffening(cells, u, plastic)};
-      if (!breaks && !(1 + volume_change(displacement_gradient(cells, u)) > 0))
+      if (by_springs && !breaks && !(1 + volume_change(displacement_gradient(cells, u)) > 0))
         return Greatest{std::numeric_limits<double>::infinity()};
-      return Greatest{springs_stiffening(springs, u)};
+      const auto cell = static_cast<std::uint32_t>(c);
+      const double edited = stiffness[c] / mass[c];
+      if (!shapes.any())
+        return Greatest{edited * (by_springs ? springs_stiffening(springs, u)
+                                             : cell_stiffening(cells, u, plastic, std::nullopt))};
+      if (by_springs)
+        return Greatest{edited * springs_stiffening(shapes.of(springs, cell).value_or(springs), u)};
+      return Greatest{edited * cell_stiffening(cells, u, plastic, shapes.of(cells, part, cell))};
     });
     result.push_back(std::max(1.0, greatest.value));
   }

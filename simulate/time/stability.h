@@ -29,6 +29,7 @@ namespace flexel {
 // With plasticity in the plan the stretch of what has flowed counts as stretch of the stiffness, too, which
 // bounds it. Infinity: a cell is folded. Springs resist as well inside out, so nothing else tells it of them;
 // where they break a cell of which some are left may turn as it likes.
+// Rest shapes of the body (simulate/rest_shape.h) and what edits made of stiffness and mass count.
 [[nodiscard]] std::vector<double> stiffening(const Setting& setting, const std::vector<Vec3>& displacement,
                                              const StepPlan& plan);
 

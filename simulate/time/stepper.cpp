@@ -106,8 +106,10 @@ void Stepper::make_room_for_books() {
 void Stepper::choose_kernels(const Setting& setting, const StepPlan& plan) {
   bool damped = false, plastic = false;
   bool cells_flow = false, springs_flow = false, springs_break = false;
+  plastic = plan.rest_shapes;  // flows nowhere without a yield stress
   for (const PlasticFlow& flow : plan.plasticity) plastic = plastic || std::isfinite(flow.yield);
   for (const FractureLimits& limits : plan.fracture) fractures_ = fractures_ || limits.any();
+  fractures_ = fractures_ || plan.broken_springs;
   for (std::size_t p = 0; p < plan.damping.size(); ++p) {
     step::CellConstants& c = layout_.constants[p];
     const PlasticFlow flow = plan.plasticity.empty() ? PlasticFlow{} : plan.plasticity[p];
@@ -119,7 +121,8 @@ void Stepper::choose_kernels(const Setting& setting, const StepPlan& plan) {
     c.strength = limits.strength;
     c.elongation = limits.elongation;
     step::Composition has{plan.damping[p] > 0 ? step::Damping::plain : step::Damping::none,
-                          std::isfinite(flow.yield), limits.any()};
+                          std::isfinite(flow.yield) || plan.rest_shapes,
+                          limits.any() || (springs && plan.broken_springs)};
     damped = damped || plan.damping[p] > 0;
     (springs ? springs_flow : cells_flow) |= has.plasticity;
     const step::ChunkKernel* kernels = springs ? table_->springs : table_->cells;

@@ -42,11 +42,9 @@ class Stepper {
   [[nodiscard]] std::optional<double> elastic_energy(const State& state);
   // Sets broken[c] (cells) of those that broke. True: one did.
   bool mark_broken(std::vector<std::uint8_t>& broken) const;
-  // The memory as columns of the body's cells (docs/fracture-plasticity.md), and from there; whether there
-  // are such columns.
+  // The memory as columns of the body's cells (simulate/rest_shape.h), and from there.
   void write_memory(std::size_t cells, Columns& columns) const;
   void read_memory(const Columns& columns);
-  [[nodiscard]] static bool remembers(const Columns& columns);
   // (cells) equivalent plastic strain; empty without plasticity of cells.
   [[nodiscard]] std::vector<double> plastic_strain(std::size_t cells) const;
 

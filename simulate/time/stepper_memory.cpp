@@ -17,8 +17,9 @@ struct Remembered {
 constexpr std::size_t kRow = step::kLanes;
 constexpr Remembered kOfCells[] = {
     {"plastic_flow", 6, 0}, {"plastic_strain", 1, 6 * kRow}, {"plastic_hourglass", 12, 7 * kRow}};
+constexpr Remembered kRestVolume{"rest_volume", 1, 19 * kRow};
 constexpr Remembered kOfSprings[] = {{"spring_flow", 28, 0}, {"spring_strain", 28, 28 * kRow}};
-static_assert(sizeof(step::PlasticBlock) == 19 * kRow * sizeof(double));
+static_assert(sizeof(step::PlasticBlock) == 20 * kRow * sizeof(double));
 static_assert(sizeof(step::SpringFlow) == 56 * kRow * sizeof(double));
 
 // Calls visit(block, lane, cell) for every lane with a cell.
@@ -33,15 +34,15 @@ template <class Block>
 void write_rows(const StepLayout& layout, const std::vector<Block>& memory, const Remembered& what,
                 std::size_t cells, Columns& columns) {
   if (memory.empty()) return;
-  Column column;
-  column.components = what.components;
+  // Cells that are not stepped, broken ones, keep what they remember.
+  Column& column = columns[what.column];
   const auto width = static_cast<std::size_t>(what.components);
-  column.values.assign(width * cells, 0);
+  if (column.components != what.components || column.values.size() != width * cells)
+    column = {what.components, std::vector<double>(width * cells, 0)};
   for_each_lane(layout, [&](std::size_t b, std::size_t l, std::uint32_t cell) {
     const auto* rows = reinterpret_cast<const double*>(&memory[b]) + what.offset;
     for (std::size_t i = 0; i < width; ++i) column.values[width * cell + i] = rows[kRow * i + l];
   });
-  columns[what.column] = std::move(column);
 }
 
 template <class Block>
@@ -98,6 +99,7 @@ std::vector<double> Stepper::plastic_strain(std::size_t cells) const {
 void Stepper::write_memory(std::size_t cells, Columns& columns) const {
   for (const Remembered& what : kOfCells) write_rows(layout_, plastic_, what, cells, columns);
   for (const Remembered& what : kOfSprings) write_rows(layout_, spring_flow_, what, cells, columns);
+  if (columns.contains(kRestVolume.column)) write_rows(layout_, plastic_, kRestVolume, cells, columns);
   if (springs_.empty()) return;
   Column column;
   column.values.assign(cells, 0);
@@ -109,18 +111,13 @@ void Stepper::write_memory(std::size_t cells, Columns& columns) const {
 
 void Stepper::read_memory(const Columns& columns) {
   for (const Remembered& what : kOfCells) read_rows(layout_, columns, what, plastic_);
+  read_rows(layout_, columns, kRestVolume, plastic_);
   for (const Remembered& what : kOfSprings) read_rows(layout_, columns, what, spring_flow_);
   const auto found = columns.find("broken_springs");
   if (springs_.empty() || found == columns.end() || found->second.components != 1) return;
   for_each_lane(layout_, [&](std::size_t b, std::size_t l, std::uint32_t cell) {
     springs_[b].broken[l] = static_cast<std::uint64_t>(found->second.values[cell]) & step::kAllSprings;
   });
-}
-
-bool Stepper::remembers(const Columns& columns) {
-  for (const char* name : {"plastic_flow", "spring_flow", "broken_springs"})
-    if (columns.contains(name)) return true;
-  return false;
 }
 
 }  // namespace flexel

@@ -1,5 +1,5 @@
 // The loop over steps. Every kCheck steps the bound on the step is taken anew and the state kept as the last
-// good one; frames, books and what happens when a run fails are seen to here.
+// good one; frames, books, events and what happens when a run fails are seen to here.
 #include "simulate/time/timed_run.h"
 
 #include <fmt/format.h>
@@ -11,6 +11,7 @@
 #include "formats/error.h"
 #include "formats/files.h"
 #include "formats/program.h"
+#include "simulate/rest_shape.h"
 #include "simulate/time/act.h"
 #include "simulate/time/checkpoint.h"
 #include "simulate/time/series.h"
@@ -36,6 +37,8 @@ class TimedRun {
   [[nodiscard]] bool save_checkpoint();
   [[nodiscard]] bool out_of_time() const;
   void play();
+  void play_until(double end);
+  void happen(std::size_t begin, std::size_t end);
   void check();
   void step();
   void write_frame();
@@ -45,12 +48,13 @@ class TimedRun {
   SimulateResult report();
 
   Body& body_;
-  const Scene& scene_;
+  Scene scene_;
   const SimulateOptions& options_;
   Progress& progress_;
   std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
   double duration_;
   Clock clock_;
+  Beginning beginning_;  // of the act
   std::optional<Act> act_;
   std::unique_ptr<History> history_;  // of the act; null: none asked for
   std::optional<Series> series_;
@@ -63,6 +67,13 @@ class TimedRun {
 
 TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress)
     : body_(body), scene_(scene), options_(options), progress_(progress), duration_(*scene.run.time) {
+  for (const Event& event : scene_.events)
+    if (event.prepare)
+      for (std::string& name : event.prepare()) scene_.coming_parts.push_back(std::move(name));
+  if (!options.checkpoint.empty() && !scene_.events.empty())
+    throw InputError(scene_.name, "--checkpoint does not take scenes with [[event]] in this version");
+  beginning_.settled = settled_displacement(body);
+  beginning_.bonding_parts = body.parts.size();
   if (!options.series.empty()) series_.emplace(options.series, options.compress);
   if (!options.checkpoint.empty()) {
     kept_.emplace();
@@ -77,14 +88,16 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
 }
 
 void TimedRun::begin() {
-  clock_.until = duration_;
-  act_.emplace(body_, scene_, options_, progress_, beginning(body_), true);
+  beginning_.state = beginning(body_);
+  act_.emplace(body_, scene_, options_, progress_, beginning_);
   if (!options_.history.empty()) history_ = act_->make_history({});
 }
 
 void TimedRun::resume(const Checkpoint& from) {
   clock_ = from.clock;
-  act_.emplace(body_, scene_, options_, progress_, from.state, false);
+  beginning_.state = from.state;
+  beginning_.fresh = false;
+  act_.emplace(body_, scene_, options_, progress_, beginning_);
   act_->restore(from.memory);
   if (!options_.history.empty()) history_ = act_->make_history(from.ledger);
   if (series_) series_->resume(from.frames);
@@ -104,6 +117,8 @@ void TimedRun::explain() {
     progress_.say(
         "plan: every step solves for the damping, which taken explicitly would cut it by more than 2");
   for (const Pass& pass : act_->passes()) progress_.say(fmt::format("plan: {} ({})", pass.name, pass.why));
+  for (const Event& event : scene_.events)
+    progress_.say(fmt::format("plan: at {:.4g} s {} ({})", event.at, event.name, event.origin));
 }
 
 bool TimedRun::out_of_time() const {
@@ -161,8 +176,9 @@ void TimedRun::check() {
 }
 
 void TimedRun::step() {
-  const bool row = history_ && *act_->state().time >= next_row_;
-  if (row) next_row_ += scene_.run.history_every.value_or(duration_ / kRows);
+  const bool due = history_ && *act_->state().time >= next_row_;
+  const bool row = due || (history_ && history_->ledger().changed);
+  if (due) next_row_ += scene_.run.history_every.value_or(duration_ / kRows);
   act_->step(clock_, history_.get(), row);
 }
 
@@ -182,7 +198,7 @@ void TimedRun::write_history() {
 std::string TimedRun::save_failed() {
   if (history_) write_history();
   if (options_.failed_output.empty() || good_.displacement.empty()) return "";
-  act_->store(good_);
+  if (act_) act_->store(good_);  // else an event failed, and the body is what it was before that
   write_body(body_, options_.failed_output);
   return fmt::format("; the state at {:.6g} s is in {}", *good_.time, options_.failed_output);
 }
@@ -205,13 +221,16 @@ SimulateResult TimedRun::report() {
   return result;
 }
 
-void TimedRun::play() {
-  if (!options_.resume) act_->choose_step(clock_);
-  explain();
-  if (!options_.resume) write_frame();
+void TimedRun::play_until(double end) {
+  const auto goes_on = [&] { return *act_->state().time < end * (1 - 1e-12); };
+  const bool first = clock_.steps == 0 && goes_on();
+  clock_.until = end;
+  if (goes_on() && !options_.resume) act_->choose_step(clock_);
+  if (first || options_.resume) explain();
+  if (first) write_frame();
   good_ = act_->state();
   const std::uint64_t between = act_->is_implicit() ? 1 : kCheck;
-  while (*act_->state().time < clock_.until * (1 - 1e-12)) {
+  while (goes_on()) {
     if (clock_.steps % between == 0) check();
     step();
     if (series_ && *act_->state().time >= next_frame_ * (1 - 1e-9)) write_frame();
@@ -228,13 +247,50 @@ std::string TimedRun::stop() {
   return saved;
 }
 
+// Events [begin, end) of the scene happen now, and another act begins.
+void TimedRun::happen(std::size_t begin, std::size_t end) {
+  Ledger ledger;
+  if (history_) {
+    if (clock_.steps > 0) act_->close_books(clock_, *history_);
+    ledger = history_->take_ledger();
+    ledger.changed = !ledger.rows.empty();
+    history_.reset();
+  }
+  act_->store(act_->state());
+  beginning_.state = act_->state();
+  beginning_.fresh = false;
+  act_.reset();
+  for (std::size_t i = begin; i < end; ++i) {
+    const Event& event = scene_.events[i];
+    const Setting setting = timed_setting(body_, scene_, beginning_);
+    Stage stage{body_, beginning_.state, beginning_.fused, beginning_.settled, setting, progress_};
+    const std::string what = event.happen(stage);
+    progress_.say(fmt::format("at {:.4g} s {}: {}", event.at, event.name, what));
+  }
+  act_.emplace(body_, scene_, options_, progress_, beginning_);
+  act_->set_hear([this](const std::string& note) { listen(note); });
+  if (!options_.history.empty()) history_ = act_->make_history(std::move(ledger));
+}
+
+void TimedRun::play() {
+  for (std::size_t begin = 0; begin < scene_.events.size();) {
+    std::size_t end = begin + 1;
+    while (end < scene_.events.size() && scene_.events[end].at == scene_.events[begin].at) ++end;
+    play_until(scene_.events[begin].at);
+    happen(begin, end);
+    begin = end;
+  }
+  play_until(duration_);
+  if (history_) act_->close_books(clock_, *history_);
+}
+
 SimulateResult TimedRun::operator()() {
   try {
     play();
-    if (history_) act_->close_books(clock_, *history_);
   } catch (const DivergedError& error) {
-    throw DivergedError(fmt::format("step {} at {:.6g} s: {}{}", clock_.steps, *act_->state().time,
-                                    error.what(), save_failed()));
+    const double time = act_ ? *act_->state().time : *beginning_.state.time;
+    throw DivergedError(
+        fmt::format("step {} at {:.6g} s: {}{}", clock_.steps, time, error.what(), save_failed()));
   } catch (const TimeoutError&) {
     throw TimeoutError(fmt::format("stopped by --timeout after {} steps at {:.4g} s of {:.4g} s{}",
                                    clock_.steps, *act_->state().time, duration_, stop()));
@@ -245,7 +301,10 @@ SimulateResult TimedRun::operator()() {
   }
   if (history_) write_history();
   act_->store(act_->state());
-  return report();
+  SimulateResult result = report();
+  if (scene_.run.renormalise)
+    renormalise_all(body_, timed_setting(body_, scene_, beginning_), act_->state().displacement);
+  return result;
 }
 
 }  // namespace

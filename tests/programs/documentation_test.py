@@ -46,6 +46,22 @@ def test_swing():
     run_page("samples/swing/README.md")
 
 
+def test_frozen():
+    run_page("samples/frozen/README.md")
+
+
+def test_carved():
+    run_page("samples/carved/README.md")
+
+
+def test_torn():
+    run_page("samples/torn/README.md")
+
+
+def test_dented():
+    run_page("samples/dented/README.md")
+
+
 def test_docs():
     pages = [page for page in sorted((SOURCE / "docs").glob("*.md")) if blocks(page)]
     expect(pages, "no page of docs/ has a command that can be run")

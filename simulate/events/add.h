@@ -1,0 +1,21 @@
+// add: a body from a file joins the scene, where and as fast as the file says. docs/events.md
+#pragma once
+#include "simulate/events/event.h"
+
+namespace flexel {
+
+class Add {
+ public:
+  static constexpr const char* name = "add";
+  [[nodiscard]] static Add parse(TableReader& reader);
+  // Reads the file: the names of its parts. Throws InputError.
+  [[nodiscard]] std::vector<std::string> prepare();
+  [[nodiscard]] std::string happen(Stage& stage) const;
+
+ private:
+  std::string path_, origin_;
+  std::optional<Vec3> velocity_;  // m/s, in place of that of the file
+  Body body_;
+};
+
+}  // namespace flexel

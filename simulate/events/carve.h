@@ -1,0 +1,20 @@
+// carve: matter inside a region is taken away, cells and the elements that no other cell holds.
+// docs/events.md
+#pragma once
+#include "simulate/events/event.h"
+
+namespace flexel {
+
+class Carve {
+ public:
+  static constexpr const char* name = "carve";
+  [[nodiscard]] static Carve parse(TableReader& reader);
+  // Throws InputError: nothing of a part is left.
+  [[nodiscard]] std::string happen(Stage& stage) const;
+
+ private:
+  EventRegion region_;
+  std::string origin_;
+};
+
+}  // namespace flexel

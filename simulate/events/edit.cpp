@@ -1,0 +1,57 @@
+// Factors are kept in columns, less 1, so that 0 is what was never edited.
+#include "simulate/events/edit.h"
+
+#include <fmt/format.h>
+
+#include "formats/column.h"
+
+namespace flexel {
+namespace {
+
+constexpr double kMost = 1e6;  // of a factor, and one over it
+
+double factor(TableReader& reader, const char* key) {
+  const double value = reader.number(key).value_or(1);
+  if (!(value >= 1 / kMost && value <= kMost))
+    reader.fail(fmt::format("\"{}\" is a factor, above 0 (from {} to {})", key, 1 / kMost, kMost));
+  return value;
+}
+
+// Column `name` holds the factor less 1.
+void multiply(Columns& columns, const char* name, const std::vector<std::uint8_t>& chosen, double by) {
+  if (by == 1 || chosen.empty()) return;
+  Column& column = columns[name];
+  if (column.components != 1 || column.values.size() != chosen.size())
+    column = {1, std::vector<double>(chosen.size(), 0)};
+  for (std::size_t i = 0; i < chosen.size(); ++i)
+    if (chosen[i]) column.values[i] = (1 + column.values[i]) * by - 1;
+}
+
+}  // namespace
+
+Edit Edit::parse(TableReader& reader) {
+  Edit made;
+  made.region_ = parse_region(reader);
+  made.stiffness_ = factor(reader, "stiffness");
+  made.density_ = factor(reader, "density");
+  if (made.stiffness_ == 1 && made.density_ == 1)
+    reader.fail(
+        "edit needs \"stiffness\" or \"density\", factors on what there is, for example stiffness = 2");
+  return made;
+}
+
+std::string Edit::happen(Stage& stage) const {
+  const Chosen chosen = choose(region_, stage.body, stage.state);
+  std::vector<std::uint8_t> elements = chosen.elements;
+  for (const Part& part : stage.body.parts)
+    if (part.placement == Placement::corner)
+      std::fill(elements.begin() + part.element_begin, elements.begin() + part.element_end, 0);
+  const bool by_elements = std::find(elements.begin(), elements.end(), 1) != elements.end();
+  for (const auto& [column, by] : {std::pair{"stiffness_change", stiffness_}, {"density_change", density_}}) {
+    multiply(stage.body.cell_columns, column, chosen.cells, by);
+    if (by_elements) multiply(stage.body.element_columns, column, elements, by);
+  }
+  return fmt::format("{}: stiffness times {}, density times {}", describe(region_), stiffness_, density_);
+}
+
+}  // namespace flexel

@@ -1,0 +1,19 @@
+// edit: what cells and elements are made of changes, by factors on stiffness (and with it damping, strength
+// and yield stress) and on mass. Velocities stay. docs/events.md
+#pragma once
+#include "simulate/events/event.h"
+
+namespace flexel {
+
+class Edit {
+ public:
+  static constexpr const char* name = "edit";
+  [[nodiscard]] static Edit parse(TableReader& reader);
+  [[nodiscard]] std::string happen(Stage& stage) const;
+
+ private:
+  EventRegion region_;
+  double stiffness_ = 1, density_ = 1;  // factors
+};
+
+}  // namespace flexel

@@ -1,0 +1,72 @@
+// What an event is: something that changes the body itself at a time of a timed run (Jansson and Vergeest,
+// sections 4.1 and 6.1), between two acts (simulate/time/act.h). The kernel knows nothing of events, and a
+// run without any is one act.
+//
+// An event E is one header (with its .cpp) in simulate/events and one entry of simulate/events/all.h. It owns
+//   E::name                                 what a scene calls it, `do = "carve"`
+//   static E parse(TableReader&)            reads its own keys of [[event]]
+//   std::vector<std::string> prepare()      before the run: reads what it needs; the parts that it will add
+//   std::string happen(Stage&) const        changes the stage; says what it did
+#pragma once
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "formats/progress.h"
+#include "simulate/scene_selection.h"
+#include "simulate/scene_table.h"
+#include "simulate/state.h"
+
+namespace flexel {
+
+// A point of one part and a point of another that are held together: sum of weights x positions = 0.
+struct FusedPoint {
+  std::vector<std::uint32_t> elements;
+  std::vector<double> weights;  // sum 0
+  double stiffness = 0;         // N/m
+};
+
+// What an event acts on; all of it agrees when it begins and when it ends.
+struct Stage {
+  Body& body;                      // as Act::store leaves it
+  State& state;                    // displacement, velocity
+  std::vector<FusedPoint>& fused;  // so far
+  std::vector<Vec3>& settled;      // (elements) m, or empty: Setting::settled
+  const Setting& setting;          // of the body as it was before the events of this time
+  Progress& progress;
+};
+
+struct Event {
+  double at = 0;  // s, of the run
+  std::string name, origin;
+  std::function<std::vector<std::string>()> prepare;
+  std::function<std::string(Stage&)> happen;
+};
+
+template <class E>
+[[nodiscard]] Event make_event(E made, double at, std::string origin) {
+  const auto event = std::make_shared<E>(std::move(made));
+  Event result{at, E::name, std::move(origin), {}, [event](Stage& stage) { return event->happen(stage); }};
+  if constexpr (requires(E & e) { e.prepare(); }) result.prepare = [event] { return event->prepare(); };
+  return result;
+}
+
+// Where an event acts: the keys "where" and "positions".
+struct EventRegion {
+  std::optional<Selection> where;  // nothing: everything
+  bool at_rest = false;            // shapes are looked for at rest instead of where matter is now
+};
+[[nodiscard]] EventRegion parse_region(TableReader& reader);
+[[nodiscard]] std::string describe(const EventRegion& region);
+
+// The elements of a region, and the cells: those that have more than half of their elements in it, and those
+// under its surface. Throws InputError: nothing is selected.
+struct Chosen {
+  std::vector<std::uint8_t> elements;  // (elements)
+  std::vector<std::uint8_t> cells;     // (cells)
+};
+[[nodiscard]] Chosen choose(const EventRegion& region, const Body& body, const State& state);
+
+}  // namespace flexel

@@ -1,0 +1,253 @@
+// Elements on the outside of one part look for the nearest point of a cell of another: candidates by a grid
+// of cell centres, the point by Newton on the trilinear map of the cell as it is now.
+#include "simulate/events/fuse.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/LU>
+#include <cmath>
+#include <map>
+#include <unordered_map>
+
+#include "formats/error.h"
+#include "formats/units.h"
+#include "simulate/cells.h"
+
+namespace flexel {
+namespace {
+
+std::array<double, 8> trilinear(const Vec3& at) {
+  std::array<double, 8> weights;
+  for (std::size_t a = 0; a < 8; ++a) {
+    weights[a] = 1;
+    for (Eigen::Index j = 0; j < 3; ++j) weights[a] *= a >> j & 1 ? at[j] : 1 - at[j];
+  }
+  return weights;
+}
+
+Vec3 point_of(const CellVectors& x, const Vec3& at) {
+  const std::array<double, 8> weights = trilinear(at);
+  Vec3 point = Vec3::Zero();
+  for (std::size_t a = 0; a < 8; ++a) point += weights[a] * x[a];
+  return point;
+}
+
+Mat3 edges_of(const CellVectors& x, const Vec3& at) {
+  Mat3 edges = Mat3::Zero();
+  for (Eigen::Index j = 0; j < 3; ++j) {
+    Vec3 low = at, high = at;
+    low[j] = 0;
+    high[j] = 1;
+    edges.col(j) = point_of(x, high) - point_of(x, low);
+  }
+  return edges;
+}
+
+// Coordinates of `point` in a deformed cell, outside [0, 1] where it lies outside; nothing where Newton does
+// not get there.
+std::optional<Vec3> coordinates(const CellVectors& x, const Vec3& point) {
+  Vec3 at = Vec3::Constant(0.5);
+  for (int i = 0; i < 20; ++i) {
+    const Mat3 edges = edges_of(x, at);
+    if (!(edges.determinant() > 0)) return std::nullopt;
+    const Vec3 change = edges.inverse() * (point - point_of(x, at));
+    at += change;
+    if (!(at.cwiseAbs().maxCoeff() < 3)) return std::nullopt;
+    if (change.norm() < 1e-12) return at;
+  }
+  return std::nullopt;
+}
+
+using Bucket = std::array<std::int64_t, 3>;
+struct BucketHash {
+  std::size_t operator()(const Bucket& at) const {
+    return static_cast<std::size_t>(at[0] * 73856093 ^ at[1] * 19349663 ^ at[2] * 83492791);
+  }
+};
+
+// Cells by their centres.
+class CellGrid {
+ public:
+  CellGrid(const Body& body, const std::vector<Vec3>& now, const std::vector<std::uint8_t>& cells,
+           double width)
+      : width_(width) {
+    for (std::uint32_t c = 0; c < body.cell_count(); ++c) {
+      if (!cells[c] || body.broken[c]) continue;
+      Vec3 centre = Vec3::Zero();
+      for (const std::uint32_t e : body.cell_elements[c]) centre += now[e] / 8;
+      buckets_[bucket(centre)].push_back(c);
+    }
+  }
+  template <class Visit>
+  void near(const Vec3& point, const Visit& visit) const {
+    const Bucket home = bucket(point);
+    for (std::int64_t k = -1; k <= 1; ++k)
+      for (std::int64_t j = -1; j <= 1; ++j)
+        for (std::int64_t i = -1; i <= 1; ++i)
+          if (const auto found = buckets_.find({home[0] + i, home[1] + j, home[2] + k});
+              found != buckets_.end())
+            for (const std::uint32_t c : found->second) visit(c);
+  }
+
+ private:
+  [[nodiscard]] Bucket bucket(const Vec3& at) const {
+    return {std::llround(std::floor(at.x() / width_)), std::llround(std::floor(at.y() / width_)),
+            std::llround(std::floor(at.z() / width_))};
+  }
+  double width_;
+  std::unordered_map<Bucket, std::vector<std::uint32_t>, BucketHash> buckets_;
+};
+
+// E h of the softer of two parts [N/m].
+double stiffness_between(const Setting& setting, std::uint32_t a, std::uint32_t b) {
+  const auto of = [&](std::uint32_t part) {
+    return setting.materials[part].young * setting.body.parts[part].lattice.spacing.mean();
+  };
+  return std::min(of(a), of(b));
+}
+
+std::size_t fuse_parts(Stage& stage, const Chosen& chosen, const std::vector<Vec3>& now, double within) {
+  const Body& body = stage.body;
+  double width = within;
+  for (const Part& part : body.parts) width = std::max(width, part.lattice.spacing.maxCoeff());
+  width = 2 * width;
+  const CellGrid grid(body, now, chosen.cells, width);
+  const std::vector<std::uint32_t> part_of = element_parts(body), part_of_cell = cell_parts(body);
+  std::vector<int> cells_at(body.element_count(), 0);
+  for (std::size_t c = 0; c < body.cell_count(); ++c)
+    if (!body.broken[c])
+      for (const std::uint32_t e : body.cell_elements[c]) ++cells_at[e];
+  const std::size_t before = stage.fused.size();
+  for (std::uint32_t e = 0; e < body.element_count(); ++e) {
+    if (!chosen.elements[e] || cells_at[e] == 0 || cells_at[e] == 8) continue;  // inner ones touch nothing
+    double nearest = within;
+    std::optional<FusedPoint> best;
+    grid.near(now[e], [&](std::uint32_t c) {
+      if (part_of_cell[c] == part_of[e]) return;
+      CellVectors x;
+      for (std::size_t a = 0; a < 8; ++a) x[a] = now[body.cell_elements[c][a]];
+      const std::optional<Vec3> at = coordinates(x, now[e]);
+      if (!at) return;
+      const double gap = (now[e] - point_of(x, at->cwiseMax(0).cwiseMin(1))).norm();
+      if (!(gap <= nearest) || (best && gap == nearest)) return;
+      nearest = gap;
+      best = FusedPoint{{e}, {1}, stiffness_between(stage.setting, part_of[e], part_of_cell[c])};
+      const std::array<double, 8> weights = trilinear(*at);
+      for (std::size_t a = 0; a < 8; ++a) {
+        best->elements.push_back(body.cell_elements[c][a]);
+        best->weights.push_back(-weights[a]);
+      }
+    });
+    if (best) stage.fused.push_back(std::move(*best));
+  }
+  return stage.fused.size() - before;
+}
+
+// Whether a broken cell has its shape back: every edge within `within` of its length at rest, not inside out.
+bool is_whole(const Body& body, std::uint32_t cell, const std::vector<Vec3>& now, double within) {
+  const auto& corners = body.cell_elements[cell];
+  for (std::size_t a = 0; a < 8; ++a)
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const std::size_t b = a | std::size_t{1} << axis;
+      if (b == a) continue;
+      const double rest = (body.rest[corners[b]] - body.rest[corners[a]]).norm();
+      if (!(std::abs((now[corners[b]] - now[corners[a]]).norm() - rest) <= std::min(within, 0.5 * rest)))
+        return false;
+    }
+  CellVectors x;
+  for (std::size_t a = 0; a < 8; ++a) x[a] = now[corners[a]];
+  return edges_of(x, Vec3::Constant(0.5)).determinant() *
+             edges_of(
+                 {body.rest[corners[0]], body.rest[corners[1]], body.rest[corners[2]], body.rest[corners[3]],
+                  body.rest[corners[4]], body.rest[corners[5]], body.rest[corners[6]], body.rest[corners[7]]},
+                 Vec3::Constant(0.5))
+                 .determinant() >
+         0;
+}
+
+std::size_t heal(Stage& stage, const Chosen& chosen, const std::vector<Vec3>& now, double within) {
+  Body& body = stage.body;
+  std::vector<std::uint8_t> healed(body.cell_count(), 0);
+  std::size_t count = 0;
+  for (std::uint32_t c = 0; c < body.cell_count(); ++c)
+    if (body.broken[c] && chosen.cells[c] && is_whole(body, c, now, within)) {
+      body.broken[c] = 0;
+      healed[c] = 1;
+      ++count;
+    }
+  if (count == 0) return 0;
+  if (const auto found = body.cell_columns.find("broken_springs"); found != body.cell_columns.end())
+    for (std::size_t c = 0; c < healed.size(); ++c)
+      if (healed[c]) found->second.values[c] = 0;
+  const std::vector<Vec3> settled = settled_displacement(body);
+  renormalise(body, stage.setting, stage.state.displacement, healed,
+              std::vector<std::uint8_t>(body.element_count(), 0));
+  if (settled.empty()) body.element_columns.erase("settled");  // fixes are not led by what was healed
+  derive_connections(body);
+  return count;
+}
+
+}  // namespace
+
+Fuse Fuse::parse(TableReader& reader) {
+  Fuse made;
+  made.origin_ = reader.place();
+  made.within_ = reader.to_quantity(reader.require("within", "\"0.5 mm\""), Dimension::length, "within");
+  if (!(made.within_ > 0)) reader.fail("\"within\" needs to be above 0");
+  made.region_ = parse_region(reader);
+  return made;
+}
+
+std::string Fuse::happen(Stage& stage) const {
+  const Chosen chosen = choose(region_, stage.body, stage.state);
+  std::vector<Vec3> now(stage.body.element_count());
+  for (std::size_t e = 0; e < now.size(); ++e) now[e] = stage.body.rest[e] + stage.state.displacement[e];
+  const std::size_t points = fuse_parts(stage, chosen, now, within_);
+  const std::size_t cells = heal(stage, chosen, now, within_);
+  if (points + cells == 0)
+    throw InputError(origin_, fmt::format("fuse: in {} nothing of one part is within {} of another, and no "
+                                          "broken cell is nearly whole",
+                                          describe(region_), human_length(within_)));
+  return fmt::format("{} points of parts fused, {} broken cells whole again", points, cells);
+}
+
+std::string FusedPoints::why() const {
+  return fmt::format("{} points fused by events", points_.size());
+}
+
+Vec3 FusedPoints::gap(const FusedPoint& point, const State& state) const {
+  Vec3 sum = Vec3::Zero();
+  for (std::size_t i = 0; i < point.elements.size(); ++i)
+    sum += point.weights[i] * (body_->rest[point.elements[i]] + state.displacement[point.elements[i]]);
+  return sum;
+}
+
+double FusedPoints::energy(const State& state) const {
+  double energy = 0;
+  for (const FusedPoint& point : points_) energy += 0.5 * point.stiffness * gap(point, state).squaredNorm();
+  return energy;
+}
+
+void FusedPoints::add_forces(const State& state, std::vector<Vec3>& forces) const {
+  for (const FusedPoint& point : points_) {
+    const Vec3 pull = -point.stiffness * gap(point, state);
+    for (std::size_t i = 0; i < point.elements.size(); ++i)
+      forces[point.elements[i]] += point.weights[i] * pull;
+  }
+}
+
+// Gershgorin on the rows of k w w^T.
+double FusedPoints::added_frequency(const std::vector<double>& mass) const {
+  std::map<std::uint32_t, double> row;
+  for (const FusedPoint& point : points_) {
+    double all = 0;
+    for (const double weight : point.weights) all += std::abs(weight);
+    for (std::size_t i = 0; i < point.elements.size(); ++i)
+      row[point.elements[i]] += point.stiffness * std::abs(point.weights[i]) * all;
+  }
+  double largest = 0;
+  for (const auto& [e, sum] : row) largest = std::max(largest, sum / mass[e]);
+  return largest;
+}
+
+}  // namespace flexel

@@ -1,0 +1,43 @@
+// fuse: matter that touches becomes one. Parts are held together point by point where they are nearer than a
+// distance; broken cells that are nearly whole again resist again. docs/events.md
+#pragma once
+#include "simulate/effects/effect.h"
+#include "simulate/events/event.h"
+
+namespace flexel {
+
+class Fuse {
+ public:
+  static constexpr const char* name = "fuse";
+  [[nodiscard]] static Fuse parse(TableReader& reader);
+  // Throws InputError: nothing in the region is near enough to anything.
+  [[nodiscard]] std::string happen(Stage& stage) const;
+
+ private:
+  EventRegion region_;
+  double within_ = 0;  // m
+  std::string origin_;
+};
+
+// The points that were fused so far, as an effect. With the present positions x and weights w of a point, the
+// energy is 1/2 k |sum_i w_i x_i|^2: no force at the moment of fusing, none by any rigid motion of all, and
+// neither momentum nor angular momentum, for the weights sum to 0.
+class FusedPoints {
+ public:
+  static constexpr const char* name = "fused";
+  static constexpr Book book = Book::potential;
+
+  FusedPoints(const Body& body, std::vector<FusedPoint> points) : body_(&body), points_(std::move(points)) {}
+  [[nodiscard]] std::string why() const;
+  [[nodiscard]] double energy(const State& state) const;
+  void add_forces(const State& state, std::vector<Vec3>& forces) const;
+  [[nodiscard]] double added_frequency(const std::vector<double>& mass) const;
+
+ private:
+  [[nodiscard]] Vec3 gap(const FusedPoint& point, const State& state) const;
+
+  const Body* body_;
+  std::vector<FusedPoint> points_;
+};
+
+}  // namespace flexel

@@ -1,0 +1,296 @@
+// Events of timed runs: what each leaves behind, momenta and books across them, and what is refused.
+#include <gmock/gmock.h>
+
+#include "formats/body_file.h"
+#include "formats/error.h"
+#include "tests/simulate/box_body.h"
+#include "tests/simulate/stepped.h"
+#include "tests/simulate/timed_case.h"
+
+namespace flexel {
+namespace {
+
+using testing::book;
+using testing::box_body;
+using testing::BoxOptions;
+using testing::Csv;
+using testing::expect_books_close;
+using ::testing::HasSubstr;
+using testing::random_displacements;
+using testing::run_timed;
+using testing::TimedCase;
+
+Body bar(std::array<int, 3> cells = {8, 2, 2}) {
+  BoxOptions options;
+  options.cells = cells;
+  options.spacing = Vec3::Constant(1e-2);
+  options.name = "bar";
+  return box_body(options);
+}
+
+Scene scene_of(const std::string& rest) {
+  return parse_scene(
+      "material = \"gum\"\n[materials.gum]\nyoung = \"1 MPa\"\npoisson = 0.3\ndensity = \"1000 kg/m3\"\n" +
+          rest,
+      "scene.toml");
+}
+
+std::string event(const std::string& at, const std::string& keys) {
+  return "[[event]]\nat = \"" + at + "\"\n" + keys + "\n";
+}
+
+void set_velocity(Body& body, const std::vector<Vec3>& velocity) {
+  Column column{3, {}};
+  for (const Vec3& v : velocity) column.values.insert(column.values.end(), v.begin(), v.end());
+  body.element_columns["velocity"] = column;
+}
+
+// Thrown, spinning, with waves running in it.
+Body lively_bar() {
+  Body body = bar();
+  std::vector<Vec3> velocity;
+  for (std::size_t e = 0; e < body.element_count(); ++e) {
+    velocity.push_back(Vec3(1, 0.5, 0) + Vec3(0, 0, 20).cross(body.rest[e]));
+    const double phase = 2 * M_PI * body.rest[e].x() / 0.08;
+    body.position[e] += Vec3(2e-4 * std::sin(phase), 0, 1e-3 * std::cos(phase));
+  }
+  set_velocity(body, velocity);
+  return body;
+}
+
+// Momenta before and after the row at which an event happens, which comes twice.
+struct Rows {
+  std::size_t before = 0, after = 0;
+};
+Rows at_event(const Csv& history) {
+  const std::vector<double>& time = history.column("time");
+  for (std::size_t i = 1; i < time.size(); ++i)
+    if (time[i] == time[i - 1]) return {i - 1, i};
+  ADD_FAILURE() << "no event in the books";
+  return {};
+}
+
+TEST(Events, RenormalisedBodyRestsAsItIs) {
+  for (const char* model : {"cells", "springs"}) {
+    Body body = bar();
+    const std::vector<Vec3> bent = random_displacements(body, 2e-3, 1);
+    for (std::size_t e = 0; e < bent.size(); ++e) body.position[e] += bent[e];
+    const std::vector<Vec3> before = body.position;
+    const TimedCase made = run_timed(
+        std::move(body), scene_of(std::string("[parts.bar]\nmodel = \"") + model +
+                                  "\"\n[run]\ntime = \"20 ms\"\n" + event("0 s", "do = \"renormalise\"")));
+    for (std::size_t e = 0; e < before.size(); ++e)
+      EXPECT_LT((made.body.position[e] - before[e]).norm(), 1e-13) << model;
+    EXPECT_TRUE(
+        made.body.cell_columns.contains(model == std::string("cells") ? "rest_volume" : "spring_flow"));
+    // a run from the file goes on from there, with no word of plasticity or events
+    const TimedCase next = run_timed(
+        made.body, scene_of(std::string("[parts.bar]\nmodel = \"") + model + "\"\n[run]\ntime = \"5 ms\"\n"));
+    for (std::size_t e = 0; e < before.size(); ++e)
+      EXPECT_LT((next.body.position[e] - before[e]).norm(), 1e-13) << model;
+  }
+}
+
+TEST(Events, RenormalisingKeepsMomentaAndBooks) {
+  const TimedCase made = run_timed(lively_bar(), scene_of("[run]\ntime = \"20 ms\"\nstep = \"50 us\"\n" +
+                                                          event("10 ms", "do = \"renormalise\"")));
+  testing::expect_momenta_kept(made.history, 1e-9);
+  expect_books_close(made.result);
+  const auto [before, after] = at_event(made.history);
+  const double elastic = made.history.column("elastic")[before];
+  EXPECT_GT(elastic, 0);
+  EXPECT_LT(made.history.column("elastic")[after], 1e-12 * elastic);
+  const auto both = [&](std::size_t row) {
+    return made.history.column("kinetic")[row] + made.history.column("elastic")[row];
+  };
+  EXPECT_NEAR(made.history.column("events work")[after], both(after) - both(before), 1e-6 * both(before));
+}
+
+TEST(Events, EditOfMassAndStiffnessChangesTheFrequency) {
+  // Length changes of a held bar: omega ~ sqrt(E / rho).
+  const auto period = [](const std::string& events) {
+    Body body = bar({8, 1, 1});
+    std::vector<Vec3> velocity;
+    for (const Vec3& at : body.rest) velocity.emplace_back(1e-3 * std::sin(0.5 * M_PI * at.x() / 0.08), 0, 0);
+    set_velocity(body, velocity);
+    const TimedCase made = run_timed(
+        std::move(body), scene_of("[[fix]]\nwhere = \"x0\"\n[[probe]]\nname = \"end\"\nwhere = \"x1\"\n"
+                                  "[run]\ntime = \"100 ms\"\nhistory_every = \"50 us\"\n" +
+                                  events));
+    expect_books_close(made.result);
+    const std::vector<double>& time = made.history.column("time");
+    const std::vector<double>& x = made.history.column("end x");
+    std::vector<double> turns;
+    for (std::size_t i = 1; i < x.size(); ++i)
+      if (x[i - 1] < 0 && x[i] >= 0)
+        turns.push_back(time[i - 1] - x[i - 1] * (time[i] - time[i - 1]) / (x[i] - x[i - 1]));
+    EXPECT_GT(turns.size(), 4u);
+    return (turns.back() - turns.front()) / static_cast<double>(turns.size() - 1);
+  };
+  const double plain = period("");
+  EXPECT_NEAR(period(event("0 s", "do = \"edit\"\nstiffness = 2")), plain / std::sqrt(2.0), 0.01 * plain);
+  EXPECT_NEAR(period(event("0 s", "do = \"edit\"\ndensity = 2")), plain * std::sqrt(2.0), 0.01 * plain);
+  EXPECT_NEAR(
+      period(event("0 s", "do = \"edit\"\ndensity = 2") + event("0 s", "do = \"edit\"\nstiffness = 2")),
+      plain, 0.001 * plain);
+}
+
+TEST(Events, EditOfMassKeepsVelocities) {
+  Body body = bar();
+  set_velocity(body, std::vector<Vec3>(body.element_count(), Vec3(2, 0, 0)));
+  const TimedCase made = run_timed(
+      std::move(body), scene_of("[run]\ntime = \"10 ms\"\n" +
+                                event("5 ms",
+                                      "do = \"edit\"\ndensity = 3\nwhere = { box = { min = [\"39 mm\", "
+                                      "\"-9 mm\", \"-9 mm\"], max = [\"99 mm\", \"99 mm\", \"99 mm\"] } }\n"
+                                      "positions = \"rest\"")));
+  const auto [before, after] = at_event(made.history);
+  const double kinetic = made.history.column("kinetic")[before];
+  EXPECT_NEAR(kinetic, 0.5 * 32e-6 * 1000 * 4, 1e-9);
+  EXPECT_NEAR(made.history.column("kinetic")[after], 2 * kinetic,
+              1e-8 * kinetic);  // half of it weighs 3 times
+  EXPECT_NEAR(made.history.column("events work")[after], kinetic, 1e-8 * kinetic);
+  EXPECT_NEAR(made.result.mass, 0.064, 1e-12);
+  expect_books_close(made.result);
+}
+
+TEST(Events, CarvedHalfLeavesHalf) {
+  const TimedCase made = run_timed(
+      lively_bar(),
+      scene_of("[run]\ntime = \"20 ms\"\nstep = \"50 us\"\n" +
+               event("10 ms",
+                     "do = \"carve\"\npositions = \"rest\"\nwhere = { half_space = { point = [\"40 mm\", "
+                     "0, 0], normal = [1, 0, 0] } }")));
+  EXPECT_NEAR(made.result.mass, 0.016, 1e-12);
+  EXPECT_EQ(made.body.cell_count(), 16u);
+  EXPECT_EQ(made.body.element_count(), 45u);
+  EXPECT_NO_THROW(check(made.body, "carved"));
+  expect_books_close(made.result);
+  const auto [before, after] = at_event(made.history);
+  const double kinetic = made.history.column("kinetic")[before];
+  EXPECT_LT(made.history.column("events work")[after], -0.3 * kinetic);
+  for (const std::string name : {"momentum", "angular momentum"})
+    for (const char* axis : {" x", " y", " z"}) {
+      const std::vector<double>& value = made.history.column(name + axis);
+      for (std::size_t i = after; i < value.size(); ++i) EXPECT_NEAR(value[i], value[after], 1e-10);
+    }
+  EXPECT_NEAR(made.history.column("momentum y")[after], 0.016 * (0.5 + 20 * 0.02), 2e-3);
+  // The quad over the carved end bounds no matter any more; those along the bar still do.
+  const std::vector<double>& carved = made.body.surface.polygon_columns.at("carved").values;
+  EXPECT_EQ(carved, (std::vector<double>{0, 1, 0, 0, 0, 0}));
+}
+
+TEST(Events, CarvingEverythingIsRefused) {
+  try {
+    (void)run_timed(bar(), scene_of("[run]\ntime = \"2 ms\"\n" +
+                                    event("1 ms",
+                                          "do = \"carve\"\nwhere = { sphere = { centre = [\"0 mm\", 0, 0], "
+                                          "radius = \"1 m\" } }")));
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("leaves nothing of part \"bar\""));
+  }
+}
+
+TEST(Events, FusedBlocksFlyAsOne) {
+  BoxOptions options;
+  options.cells = {4, 2, 2};
+  options.spacing = Vec3::Constant(1e-2);
+  options.name = "left";
+  Body body = box_body(options);
+  options.name = "right";
+  options.origin = Vec3(4.01e-2, 0.3e-2, 0.2e-2);  // 0.1 mm away, shifted
+  const Body right = box_body(options);
+  const std::string path = ::testing::TempDir() + "fuse_right.vtu";
+  write_body(right, path);
+  set_velocity(body, std::vector<Vec3>(body.element_count(), Vec3(0.02, 0, 0)));
+  const std::string add = event("0 s", "do = \"add\"\nbody = \"" + path + "\"");
+  const std::string run = "[run]\ntime = \"100 ms\"\n";
+  const TimedCase made =
+      run_timed(body, scene_of(run + add + event("0 s", "do = \"fuse\"\nwithin = \"0.2 mm\"")));
+  expect_books_close(made.result);
+  const auto mean = [](const TimedCase& of, std::uint32_t part) {
+    Vec3 sum = Vec3::Zero();
+    const Part& range = of.body.parts[part];
+    for (std::uint32_t e = range.element_begin; e < range.element_end; ++e)
+      sum += of.body.position[e] - of.body.rest[e];
+    return Vec3(sum / (range.element_end - range.element_begin));
+  };
+  ASSERT_EQ(made.body.parts.size(), 2u);
+  EXPECT_NEAR(mean(made, 1).x(), 0.01 * 0.1, 2e-4) << "drawn along at half of the speed";
+  testing::expect_momenta_kept(made.history, 1e-9);
+  const TimedCase apart = run_timed(body, scene_of(run + add));
+  EXPECT_EQ(mean(apart, 1).norm(), 0);
+  EXPECT_THROW((void)run_timed(body, scene_of(run + add + event("0 s", "do = \"fuse\"\nwithin = \"1 um\""))),
+               InputError);
+}
+
+TEST(Events, AddedBodyFallsLikeTheOthers) {
+  BoxOptions options;
+  options.cells = {2, 2, 2};
+  options.spacing = Vec3::Constant(1e-2);
+  options.name = "late";
+  options.origin = Vec3(1, 0, 0);
+  const std::string path = ::testing::TempDir() + "late.vtu";
+  write_body(box_body(options), path);
+  const TimedCase made = run_timed(
+      bar(), scene_of("[gravity]\nacceleration = [0, 0, \"-9.81 m/s2\"]\n[run]\ntime = \"100 ms\"\n" +
+                      event("50 ms", "do = \"add\"\nbody = \"" + path +
+                                         "\"\nvelocity = [\"0 m/s\", \"1 m/s\", \"0 "
+                                         "m/s\"]")));
+  ASSERT_EQ(made.body.parts.size(), 2u);
+  const std::vector<double>& v = made.body.element_columns.at("velocity").values;
+  const std::size_t first = made.body.parts[1].element_begin;
+  EXPECT_NEAR(v[2], -0.981, 2e-3);
+  EXPECT_NEAR(v[3 * first + 2], -0.4905, 2e-3);
+  EXPECT_NEAR(made.body.position[first].y(), 0.05, 1e-9);
+  EXPECT_NEAR(made.result.mass, 0.040, 1e-12);
+  expect_books_close(made.result);
+}
+
+TEST(Events, BrokenCellsAreHealedWhereTheyAreWhole) {
+  Body body = bar();
+  for (std::uint32_t c = 0; c < body.cell_count(); ++c)
+    body.broken[c] = body.lattice_index[body.cell_elements[c][0]][0] == 4;
+  derive_connections(body);
+  const std::string pull =
+      "[[velocity]]\nwhere = { half_space = { point = [\"45 mm\", 0, 0], normal = [1, 0, 0] } }\nvelocity = "
+      "[\"10 "
+      "mm/s\", 0, 0]\n[run]\ntime = \"50 ms\"\n";
+  const auto stretch = [&](const std::string& events) {
+    const TimedCase made = run_timed(body, scene_of(pull + events));
+    double low = 0, high = 0;
+    for (std::size_t e = 0; e < made.body.element_count(); ++e) {
+      const double u = (made.body.position[e] - made.body.rest[e]).x();
+      made.body.lattice_index[e][0] <= 4 ? low += u / 45 : high += u / 36;
+    }
+    return high - low;
+  };
+  EXPECT_NEAR(stretch(""), 0.5e-3, 1e-6) << "parted: the right one flies on";
+  EXPECT_LT(stretch(event("0 s", "do = \"fuse\"\nwithin = \"1 mm\"")), 0.1e-3);
+}
+
+TEST(Events, WrongEntriesAreRefused) {
+  const auto message = [](const std::string& text) -> std::string {
+    try {
+      (void)scene_of(text);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const std::string run = "[run]\ntime = \"1 s\"\n";
+  EXPECT_THAT(message(run + event("2 s", "do = \"renormalise\"")), HasSubstr("not within the run"));
+  EXPECT_THAT(message(run + event("0.2 s", "do = \"renormalize\"")),
+              HasSubstr("did you mean \"renormalise\"?"));
+  EXPECT_THAT(message(event("0.2 s", "do = \"renormalise\"")), HasSubstr("timed runs only"));
+  EXPECT_THAT(message(run + event("0.2 s", "do = \"edit\"")),
+              HasSubstr("needs \"stiffness\" or \"density\""));
+  EXPECT_THAT(message(run + event("0.2 s", "do = \"edit\"\nstiffness = 0")), HasSubstr("is a factor"));
+  EXPECT_THAT(message(run + event("0.2 s", "do = \"carve\"")), HasSubstr("where"));
+  EXPECT_THAT(message(run + event("0.2 s", "do = \"fuse\"")), HasSubstr("within"));
+  EXPECT_THAT(message(run + event("0.2 s", "do = \"renormalise\"\nwhen = 3")), HasSubstr("unknown key"));
+}
+
+}  // namespace
+}  // namespace flexel
