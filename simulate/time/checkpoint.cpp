@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <cstring>
 #include <filesystem>
@@ -111,6 +112,13 @@ void visit(Archive& archive, Account& account) {
 }
 
 template <class Archive>
+void visit(Archive& archive, FusedPoint& point) {
+  visit(archive, point.elements);
+  visit(archive, point.weights);
+  visit(archive, point.stiffness);
+}
+
+template <class Archive>
 void visit(Archive& archive, BookRow& row) {
   visit(archive, row.time);
   visit(archive, row.energies);
@@ -143,10 +151,15 @@ void visit(Archive& archive, Checkpoint& c) {
   visit(archive, c.memory.cells.spring_flow);
   visit(archive, c.memory.damping_change);
   visit(archive, c.memory.reach);
+  visit(archive, c.events);
+  visit(archive, c.settled);
+  visit(archive, c.fused);
+  visit(archive, c.bonding_parts);
   visit(archive, c.ledger.accounts);
   visit(archive, c.ledger.rows);
   visit(archive, c.ledger.probes);
   visit(archive, c.ledger.start);
+  visit(archive, c.ledger.changed);
   visit(archive, c.ledger.worst_residual);
   visit(archive, c.ledger.largest_term);
   visit(archive, c.next_row);
@@ -201,7 +214,12 @@ Resumed read_checkpoint(const std::string& path) {
   resumed.body = read_body(Bytes(body.begin(), body.end()), where);
   const Checkpoint& c = resumed.checkpoint;
   const std::size_t n = resumed.body.element_count();
-  if (c.state.displacement.size() != n || c.state.velocity.size() != n || !c.state.time)
+  const auto fits = [&](const FusedPoint& point) {
+    return point.weights.size() == point.elements.size() &&
+           std::all_of(point.elements.begin(), point.elements.end(), [&](std::uint32_t e) { return e < n; });
+  };
+  if (c.state.displacement.size() != n || c.state.velocity.size() != n || !c.state.time ||
+      (!c.settled.empty() && c.settled.size() != n) || !std::all_of(c.fused.begin(), c.fused.end(), fits))
     throw InputError(where, "is damaged: its state is not that of its body");
   return resumed;
 }

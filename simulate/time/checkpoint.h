@@ -20,6 +20,10 @@ struct Checkpoint {
   State state;
   Clock clock;
   Act::Memory memory;
+  std::uint64_t events = 0;         // that have happened
+  std::vector<Vec3> settled;        // of Beginning, as are
+  std::vector<FusedPoint> fused;    // these
+  std::uint64_t bonding_parts = 0;  // and this
   Ledger ledger;
   double next_row = 0, next_frame = 0;  // s
   std::vector<double> frames;           // s, of the series so far

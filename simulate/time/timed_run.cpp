@@ -6,6 +6,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <utility>
 
 #include "formats/body_file.h"
 #include "formats/error.h"
@@ -37,8 +38,8 @@ class TimedRun {
   [[nodiscard]] bool save_checkpoint();
   [[nodiscard]] bool out_of_time() const;
   void play();
-  void play_until(double end);
-  void happen(std::size_t begin, std::size_t end);
+  void play_until(double end, bool resumed);
+  void happen(std::size_t end);
   void check();
   void step();
   void write_frame();
@@ -62,6 +63,7 @@ class TimedRun {
   std::optional<Checkpoint> kept_;  // with --checkpoint: where the run can go on from
   Bytes act_body_;                  // likewise: the body as the present act began, to be made with it
   std::chrono::steady_clock::time_point saved_ = began_;
+  std::size_t events_ = 0;  // that have happened
   double next_row_ = 0, next_frame_ = 0;
 };
 
@@ -70,8 +72,6 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
   for (const Event& event : scene_.events)
     if (event.prepare)
       for (std::string& name : event.prepare()) scene_.coming_parts.push_back(std::move(name));
-  if (!options.checkpoint.empty() && !scene_.events.empty())
-    throw InputError(scene_.name, "--checkpoint does not take scenes with [[event]] in this version");
   beginning_.settled = settled_displacement(body);
   beginning_.bonding_parts = body.parts.size();
   if (!options.series.empty()) series_.emplace(options.series, options.compress);
@@ -95,8 +95,8 @@ void TimedRun::begin() {
 
 void TimedRun::resume(const Checkpoint& from) {
   clock_ = from.clock;
-  beginning_.state = from.state;
-  beginning_.fresh = false;
+  beginning_ = {from.state, false, from.settled, from.fused, from.bonding_parts};
+  events_ = std::min<std::size_t>(from.events, scene_.events.size());
   act_.emplace(body_, scene_, options_, progress_, beginning_);
   act_->restore(from.memory);
   if (!options_.history.empty()) history_ = act_->make_history(from.ledger);
@@ -139,6 +139,10 @@ void TimedRun::keep() {
   kept_->state = act_->state();
   kept_->clock = clock_;
   kept_->memory = act_->memory();
+  kept_->events = events_;
+  kept_->settled = beginning_.settled;
+  kept_->fused = beginning_.fused;
+  kept_->bonding_parts = beginning_.bonding_parts;
   if (history_) kept_->ledger = history_->ledger();
   if (series_) kept_->frames = series_->times();
   kept_->next_row = next_row_;
@@ -221,13 +225,15 @@ SimulateResult TimedRun::report() {
   return result;
 }
 
-void TimedRun::play_until(double end) {
+// From the beginning of an act to its end, or from where a checkpoint has it to there.
+void TimedRun::play_until(double end, bool resumed) {
   const auto goes_on = [&] { return *act_->state().time < end * (1 - 1e-12); };
-  const bool first = clock_.steps == 0 && goes_on();
+  const bool first = clock_.steps == 0 && goes_on() && !resumed;
   clock_.until = end;
-  if (goes_on() && !options_.resume) act_->choose_step(clock_);
-  if (first || options_.resume) explain();
+  if (goes_on() && !resumed) act_->choose_step(clock_);
+  if (first || resumed) explain();
   if (first) write_frame();
+  if (kept_) keep();
   good_ = act_->state();
   const std::uint64_t between = act_->is_implicit() ? 1 : kCheck;
   while (goes_on()) {
@@ -241,14 +247,14 @@ void TimedRun::play_until(double end) {
 
 // Saves what a run that is stopped leaves; says where it is.
 std::string TimedRun::stop() {
-  good_ = act_->state();
+  if (act_) good_ = act_->state();
   std::string saved = save_failed();
   if (save_checkpoint()) saved += fmt::format("; go on with --resume {}", options_.checkpoint);
   return saved;
 }
 
-// Events [begin, end) of the scene happen now, and another act begins.
-void TimedRun::happen(std::size_t begin, std::size_t end) {
+// Events up to `end` happen now, and another act begins.
+void TimedRun::happen(std::size_t end) {
   Ledger ledger;
   if (history_) {
     if (clock_.steps > 0) act_->close_books(clock_, *history_);
@@ -260,12 +266,16 @@ void TimedRun::happen(std::size_t begin, std::size_t end) {
   beginning_.state = act_->state();
   beginning_.fresh = false;
   act_.reset();
-  for (std::size_t i = begin; i < end; ++i) {
-    const Event& event = scene_.events[i];
+  for (; events_ < end; ++events_) {
+    const Event& event = scene_.events[events_];
     const Setting setting = timed_setting(body_, scene_, beginning_);
     Stage stage{body_, beginning_.state, beginning_.fused, beginning_.settled, setting, progress_};
     const std::string what = event.happen(stage);
     progress_.say(fmt::format("at {:.4g} s {}: {}", event.at, event.name, what));
+  }
+  if (kept_) {
+    kept_->state.time.reset();  // until the act has begun, what was kept is of another body
+    act_body_ = body_bytes(body_, options_.checkpoint);
   }
   act_.emplace(body_, scene_, options_, progress_, beginning_);
   act_->set_hear([this](const std::string& note) { listen(note); });
@@ -273,14 +283,15 @@ void TimedRun::happen(std::size_t begin, std::size_t end) {
 }
 
 void TimedRun::play() {
-  for (std::size_t begin = 0; begin < scene_.events.size();) {
-    std::size_t end = begin + 1;
-    while (end < scene_.events.size() && scene_.events[end].at == scene_.events[begin].at) ++end;
-    play_until(scene_.events[begin].at);
-    happen(begin, end);
-    begin = end;
+  bool resumed = options_.resume != nullptr;
+  while (events_ < scene_.events.size()) {
+    const double at = scene_.events[events_].at;
+    std::size_t end = events_ + 1;
+    while (end < scene_.events.size() && scene_.events[end].at == at) ++end;
+    play_until(at, std::exchange(resumed, false));
+    happen(end);
   }
-  play_until(duration_);
+  play_until(duration_, resumed);
   if (history_) act_->close_books(clock_, *history_);
 }
 
@@ -293,7 +304,8 @@ SimulateResult TimedRun::operator()() {
         fmt::format("step {} at {:.6g} s: {}{}", clock_.steps, time, error.what(), save_failed()));
   } catch (const TimeoutError&) {
     throw TimeoutError(fmt::format("stopped by --timeout after {} steps at {:.4g} s of {:.4g} s{}",
-                                   clock_.steps, *act_->state().time, duration_, stop()));
+                                   clock_.steps, act_ ? *act_->state().time : *beginning_.state.time,
+                                   duration_, stop()));
   } catch (const Interrupted&) {
     if (const std::string saved = stop(); !saved.empty())
       progress_.say(fmt::format("interrupted at step {}{}", clock_.steps, saved));

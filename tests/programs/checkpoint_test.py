@@ -40,6 +40,9 @@ MODELS = {
     "broken": text("soft", "6 N", "0.1 s", '[materials.soft]\nyoung = "10 MPa"\npoisson = 0.3\ndensity = "1000 kg/m3"\nsource = "test"\n'
                    '[plasticity]\nyield = "20 kPa"\nhardening = "1 MPa"\n[fracture]\nelongation = 0.02').replace(
                        '["0 N", "0 N", "6 N"]', '["6 N", "0 N", "0 N"]'),
+    "events": text(*RUBBER, "0.3 s", '[damping]\ntime = "2 us"\n[[event]]\nat = "0.05 s"\ndo = "renormalise"\n[[event]]\nat = "0.1 s"\ndo = "edit"\n'
+                   'stiffness = 0.5\nwhere = { box = { min = ["10 mm", "-1 mm", "-1 mm"], max = ["20 mm", "11 mm", "11 mm"] } }\n'
+                   '[[event]]\nat = "0.2 s"\ndo = "carve"\nwhere = { box = { min = ["14 mm", "4 mm", "4 mm"], max = ["26 mm", "11 mm", "11 mm"] } }\n'),
     "implicit": text("steel", "-100 N", "0.01 s", '[damping]\ntime = "20 us"', 'method = "implicit"\nstep = "5 us"\n'),
 }
 
@@ -108,6 +111,10 @@ def test_cells_that_flow_and_break():
 def test_paper():
     MODELS["paper"] = MODELS["damped"]
     stop_and_go("paper", "--placement", "centre")
+
+
+def test_events():
+    stop_and_go("events")
 
 
 def test_implicit_steps():

@@ -37,6 +37,10 @@ Checkpoint some_checkpoint(const Body& body) {
   c.memory.cells.spring_flow.resize(1);
   c.memory.damping_change = c.state.velocity;
   c.memory.reach = INFINITY;
+  c.events = 2;
+  c.settled = c.state.velocity;
+  c.fused = {{{1, 2, 3}, {0.5, 0.5, -1}, 6}, {{}, {}, 7}};
+  c.bonding_parts = 15;
   c.ledger.accounts = {{"loads", false, 1.5}, {"damping", true, -2}};
   BookRow row;
   row.time = 9;
@@ -48,6 +52,7 @@ Checkpoint some_checkpoint(const Body& body) {
   c.ledger.rows = {BookRow{}, row};
   c.ledger.probes = {"tip"};
   c.ledger.start = -1;
+  c.ledger.changed = true;
   c.next_row = 13;
   c.next_frame = 14;
   c.frames = {0, 0.5};
@@ -83,6 +88,8 @@ TEST_F(CheckpointFile, ComesBackToTheBit) {
   EXPECT_EQ(found.memory.cells.springs[3].broken[7], 8);
   EXPECT_EQ(found.ledger.rows[1].angular, Vec3(4, 5, 6));
   EXPECT_EQ(found.ledger.accounts[1].name, "damping");
+  EXPECT_EQ(found.fused[0].weights, wanted.fused[0].weights);
+  EXPECT_TRUE(found.ledger.changed);
   EXPECT_EQ(found.frames, wanted.frames);
   EXPECT_EQ(body_fingerprint(resumed.body), found.input);
 }
