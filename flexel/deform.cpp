@@ -14,7 +14,7 @@
 #include "formats/size_warning.h"
 #include "formats/surface_file.h"
 #include "formats/units.h"
-#include "mapping/map.h"
+#include "mapping/crack.h"
 #include "simulate/simulate.h"
 #include "voxelize/voxelize.h"
 
@@ -24,7 +24,8 @@ namespace {
 struct Arguments {
   std::vector<std::string> parts, fixes, pushes, moves, outputs;
   std::string scene, material, size, heal = "auto", placement = "corner", unit, edge, method = "blended",
-                                     report, summary, body, format, timeout;
+                                     report, summary, body, format, timeout, crack = "keep", debris = "keep",
+                                     pieces;
   std::optional<std::size_t> count;
   int threads = 0;
   bool ascii = false, strict = false, quiet = false;
@@ -77,6 +78,17 @@ void declare_output(CLI::App& app, Arguments& arguments) {
   app.add_option("--method", arguments.method, "Mapping: blended, smooth, affine or gram-schmidt")
       ->type_name("NAME")
       ->capture_default_str();
+  app.add_option(
+         "--crack", arguments.crack,
+         "Where the part broke: keep the surface as it is, open it, or cap the pieces (docs/cracks.md)")
+      ->type_name("HOW")
+      ->capture_default_str();
+  app.add_option("--debris", arguments.debris, "Pieces of a single element: keep or drop")
+      ->type_name("HOW")
+      ->capture_default_str();
+  app.add_option("--pieces", arguments.pieces,
+                 "Write each piece to a file of its own too: a folder, or \"out/{piece}.stl\"")
+      ->type_name("PATH");
   app.add_option("--report", arguments.report, "Write the mapping's validity report (JSON)")
       ->type_name("FILE");
   app.add_option("--summary", arguments.summary, "Write the summary of all stages (JSON; docs/deform.md)")
@@ -98,6 +110,7 @@ struct Plan {
   std::vector<Action> pushes, moves;
   std::optional<double> timeout;  // s
   MapOptions map;
+  CrackOptions crack;
   struct Output {
     std::string path;
     std::optional<SurfaceFormat> format;  // nothing: the body
@@ -175,6 +188,8 @@ Plan make_plan(const Arguments& arguments) {
   plan.voxelize.heal = heal_choice(arguments.heal);
   plan.voxelize.placement = placement_choice(arguments.placement);
   plan.map.method = map_method(arguments.method);
+  plan.crack =
+      crack_options(arguments.crack, arguments.debris, arguments.pieces, arguments.format, arguments.ascii);
   plan_outputs(arguments, plan);
   plan_scene(arguments, plan);
   return plan;
@@ -205,12 +220,15 @@ void say_map(const MapReport& found, Progress& progress) {
       progress.say(lines[i]);
 }
 
-void write_outputs(const Plan& plan, const Body& body, const MapResult& mapped, Progress& progress) {
+void write_outputs(const Plan& plan, const Body& body, const MappedPart& mapped, Progress& progress) {
   progress.stage("write");
+  if (!plan.crack.pieces.empty())
+    write_parts(mapped.surface(body), mapped.result.displacement, plan.crack.pieces_format,
+                default_unit(body.surface), plan.crack.pieces);
   for (const Plan::Output& output : plan.outputs)
     if (output.format)
-      write_surface(body.surface, mapped.displacement, *output.format, default_unit(body.surface),
-                    output.path);
+      write_surface(mapped.surface(body), mapped.result.displacement, *output.format,
+                    default_unit(body.surface), output.path);
     else
       write_body(body, output.path);
 }
@@ -233,8 +251,8 @@ int run_stages(const Arguments& arguments, Plan& plan, Progress& progress) {
   for (const std::string& line : summary_lines(simulated)) progress.say(line);
 
   progress.stage("map");
-  const MapResult mapped = map_surface(body, plan.map, progress);
-  const MapReport found = report(body, mapped);
+  const MappedPart mapped = map_part(body, plan.map, plan.crack, progress);
+  const MapReport& found = mapped.report;
   progress.finish();
   say_map(found, progress);
   const std::string mapping = report_json(found, plan.map);

@@ -117,7 +117,10 @@ void take_coordinates(const Body& body, Binding& binding) {
 }  // namespace
 
 Binding bind(const Body& body, MapMethod method, std::size_t states) {
-  Seats seats = take_seats(body);
+  return bind(body, method, take_seats(body), states);
+}
+
+Binding bind(const Body& body, MapMethod method, Seats seats, std::size_t states) {
   Binding binding;
   binding.method = method;
   binding.connections = element_adjacency(body);

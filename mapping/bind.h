@@ -2,6 +2,7 @@
 // state.
 #pragma once
 #include "mapping/blend.h"
+#include "mapping/seat.h"
 
 namespace flexel {
 
@@ -30,6 +31,8 @@ struct Binding {
 //
 // Throws InputError: the body carries no surface, a part has no elements.
 [[nodiscard]] Binding bind(const Body& body, MapMethod method, std::size_t states = 1);
+// The same with seats that are known: those of a surface that is parted along cracks (mapping/crack.h).
+[[nodiscard]] Binding bind(const Body& body, MapMethod method, Seats seats, std::size_t states = 1);
 
 // Maps the state `position` (elements x 3, m) onto the vertices: (vertices x 3) m.
 [[nodiscard]] std::vector<Vec3> apply(const Binding& binding, const Body& body,

@@ -5,7 +5,7 @@
 #include "formats/program.h"
 #include "formats/surface_file.h"
 #include "formats/units.h"
-#include "mapping/map.h"
+#include "mapping/crack.h"
 
 namespace flexel {
 namespace {
@@ -13,7 +13,8 @@ namespace {
 constexpr const char* kProgram = "flexel-map";
 
 struct Arguments {
-  std::string body = "-", output = "-", method = "blended", report, format, unit;
+  std::string body = "-", output = "-", method = "blended", report, format, unit, crack = "keep",
+              debris = "keep", pieces;
   bool ascii = false, strict = false, quiet = false;
   int threads = 0;
 };
@@ -25,6 +26,17 @@ void declare(CLI::App& app, Arguments& arguments) {
                  "How elements carry the vertices: blended, smooth, affine or gram-schmidt (the paper's)")
       ->type_name("NAME")
       ->capture_default_str();
+  app.add_option(
+         "--crack", arguments.crack,
+         "Where the part broke: keep the surface as it is, open it, or cap the pieces (docs/cracks.md)")
+      ->type_name("HOW")
+      ->capture_default_str();
+  app.add_option("--debris", arguments.debris, "Pieces of a single element: keep or drop")
+      ->type_name("HOW")
+      ->capture_default_str();
+  app.add_option("--pieces", arguments.pieces,
+                 "Write each piece to a file of its own too: a folder, or \"out/{piece}.stl\"")
+      ->type_name("PATH");
   app.add_option("--report", arguments.report, "Write the validity report as JSON")->type_name("FILE");
   app.add_option("--format", arguments.format,
                  "stl, obj, ply, off or glb; else told by the output's extension")
@@ -46,6 +58,8 @@ int run(int argc, char** argv) {
   declare(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   const MapOptions options{map_method(arguments.method)};
+  const CrackOptions crack =
+      crack_options(arguments.crack, arguments.debris, arguments.pieces, arguments.format, arguments.ascii);
   const SurfaceFormat format = surface_format(arguments.format, arguments.output, arguments.ascii);
   const double unit = arguments.unit.empty() ? 0 : length_unit(arguments.unit);
   if (unit > 0 && format == SurfaceFormat::glb)
@@ -56,10 +70,10 @@ int run(int argc, char** argv) {
   Progress progress(kProgram, arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
 
   progress.stage("read");
-  const Body body = read_body(arguments.body);
+  Body body = read_body(arguments.body);
   progress.stage("map");
-  const MapResult result = map_surface(body, options, progress);
-  const MapReport found = report(body, result);
+  const MappedPart mapped = map_part(body, options, crack, progress);
+  const MapReport& found = mapped.report;
   const std::vector<std::string> lines = report_lines(found);
   progress.finish();
   for (std::size_t i = 0; i < lines.size(); ++i)
@@ -71,8 +85,10 @@ int run(int argc, char** argv) {
   if (!arguments.report.empty()) write_text(report_json(found, options), arguments.report);
   if (!found.valid() && (arguments.strict || found.not_finite > 0)) throw InvalidMappingError(lines.front());
   progress.stage("write");
-  write_surface(body.surface, result.displacement, format, unit > 0 ? unit : default_unit(body.surface),
-                arguments.output);
+  const double written = unit > 0 ? unit : default_unit(body.surface);
+  if (!crack.pieces.empty())
+    write_parts(mapped.surface(body), mapped.result.displacement, crack.pieces_format, written, crack.pieces);
+  write_surface(mapped.surface(body), mapped.result.displacement, format, written, arguments.output);
   progress.finish();
   return kExitDone;
 }

@@ -29,8 +29,12 @@ std::string name_of(MapMethod method) {
 }
 
 MapResult map_surface(const Body& body, const MapOptions& options, Progress& progress) {
+  return map_surface(body, options, take_seats(body), progress);
+}
+
+MapResult map_surface(const Body& body, const MapOptions& options, const Seats& seats, Progress& progress) {
   progress.update(0, "binding vertices");
-  Binding binding = bind(body, options.method);
+  Binding binding = bind(body, options.method, seats);
   throw_if_interrupted();
   progress.update(0.5, "mapping");
   MapResult result;

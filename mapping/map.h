@@ -7,6 +7,7 @@
 
 #include "formats/body.h"
 #include "formats/progress.h"
+#include "mapping/crack_report.h"
 
 namespace flexel {
 
@@ -59,6 +60,10 @@ enum MapFlag : std::uint8_t {
 // Maps the deformed state of `body` onto the surface that travels in it (mapping/bind.h says how vertices are
 // bound). Throws InputError: the body carries no surface, a part has no elements; Interrupted.
 [[nodiscard]] MapResult map_surface(const Body& body, const MapOptions& options, Progress& progress);
+// The same with seats that are known (mapping/crack.h).
+struct Seats;
+[[nodiscard]] MapResult map_surface(const Body& body, const MapOptions& options, const Seats& seats,
+                                    Progress& progress);
 
 struct MapReport {
   std::size_t vertices = 0;
@@ -71,6 +76,7 @@ struct MapReport {
   double distance_outside = 0;                 // in spacings
   double largest_displacement = 0;             // m
   double volume_before = 0, volume_after = 0;  // m^3 enclosed by the surface
+  CrackReport crack;
   [[nodiscard]] bool valid() const { return inverted == 0 && degenerate == 0 && not_finite == 0; }
 };
 

@@ -97,6 +97,7 @@ std::vector<std::string> report_lines(const MapReport& report) {
     lines.back() += fmt::format(", volume {} -> {} ({:+.3g} %)", human_volume(report.volume_before),
                                 human_volume(report.volume_after),
                                 100 * (report.volume_after / report.volume_before - 1));
+  for (const std::string& line : crack_lines(report.crack)) lines.push_back(line);
   return lines;
 }
 
@@ -120,6 +121,7 @@ std::string report_json(const MapReport& report, const MapOptions& options) {
   json["largest_displacement"] = report.largest_displacement;
   json["volume_before"] = report.volume_before;
   json["volume_after"] = report.volume_after;
+  json["crack"] = nlohmann::ordered_json::parse(crack_json(report.crack));
   return json.dump(2) + "\n";
 }
 

@@ -76,12 +76,6 @@ void look_under(const Body& body, std::size_t p, const Vec3& point, Home& home) 
     consider(body, body.surface_cells[s], u, lattice.spacing, home);
 }
 
-Seat seat_at_element(const Body& body, std::uint32_t part, std::uint32_t element, const Vec3& point) {
-  const Vec3 offset = body.parts[part].lattice.axes.transpose() * (point - body.rest[element]);
-  const int octant = (offset.x() >= 0 ? 1 : 0) + (offset.y() >= 0 ? 2 : 0) + (offset.z() >= 0 ? 4 : 0);
-  return {element, false, static_cast<std::uint8_t>(octant)};
-}
-
 // Polygons around some of the vertices.
 struct Around {
   std::vector<std::uint32_t> slot;      // (vertices) kNone: not asked for
@@ -218,6 +212,12 @@ class Seating {
 };
 
 }  // namespace
+
+Seat seat_at_element(const Body& body, std::uint32_t part, std::uint32_t element, const Vec3& point) {
+  const Vec3 offset = body.parts[part].lattice.axes.transpose() * (point - body.rest[element]);
+  const int octant = (offset.x() >= 0 ? 1 : 0) + (offset.y() >= 0 ? 2 : 0) + (offset.z() >= 0 ? 4 : 0);
+  return {element, false, static_cast<std::uint8_t>(octant)};
+}
 
 Seats take_seats(const Body& body) {
   if (body.surface.vertices.empty() || body.surface.polygon_count() == 0)

@@ -18,6 +18,10 @@ struct Seats {
   std::vector<std::uint8_t> referenced;  // (vertices) 1: some polygon uses it
 };
 
+// At `element` of `part`, for a vertex at `point` (m).
+[[nodiscard]] Seat seat_at_element(const Body& body, std::uint32_t part, std::uint32_t element,
+                                   const Vec3& point);
+
 // Throws InputError: no surface, a part without elements.
 [[nodiscard]] Seats take_seats(const Body& body);
 

@@ -1,0 +1,249 @@
+// Part by part: boxes, cut, walls, pieces. What rounding can spoil (a point on a plane, two points at one
+// place) shows as an odd count or an open edge; the part is then cut again with its boxes shifted a little
+// further.
+#include "mapping/crack.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "formats/error.h"
+#include "formats/program.h"
+#include "formats/topology.h"
+#include "mapping/bind.h"
+#include "mapping/crack_pieces.h"
+
+namespace flexel {
+namespace {
+
+// In spacings. Parts are modelled in round numbers, and lattices are snapped to them: these are not round.
+const Vec3 kShift = Vec3(0.8310341, 1.0471976, 0.6180340) * 1e-4;
+constexpr int kAttempts = 8;
+constexpr double kFarthestBox = 1 << 20;
+
+// The surface of one part, ready to be cut.
+struct PartSurface {
+  std::vector<std::array<std::uint32_t, 3>> triangles;  // vertices
+  std::vector<std::uint32_t> polygon;                   // (triangles)
+};
+
+PartSurface surface_of(const Surface& surface, const Triangles& triangles, std::uint32_t part) {
+  PartSurface result;
+  for (std::size_t t = 0; t < triangles.corners.size(); ++t)
+    if (surface.polygon_part(triangles.polygon[t]) == part) {
+      result.triangles.push_back(triangles.corners[t]);
+      result.polygon.push_back(triangles.polygon[t]);
+    }
+  return result;
+}
+
+void refuse_open(const Part& part, const PartSurface& own, const std::vector<std::uint32_t>& welded) {
+  const Topology topology = flexel::topology(own.triangles, welded);
+  std::string why;
+  if (topology.open_edges > 0)
+    why = fmt::format("is open ({} open edges)", topology.open_edges);
+  else if (topology.misoriented_edges > 0)
+    why = fmt::format("is not oriented ({} edges)", topology.misoriented_edges);
+  else if (topology.non_manifold_edges > 0)
+    why = fmt::format("has {} edges with more than two sides", topology.non_manifold_edges);
+  else
+    return;
+  throw InputError(
+      fmt::format("--crack cap: the surface of part \"{}\" {}, so its pieces have no inside: take --crack "
+                  "open, or mend the part's file first",
+                  part.name, why));
+}
+
+struct Cutting {
+  const Body& body;
+  const Fragments& fragments;
+  const CrackOptions& options;
+  const std::vector<std::uint32_t>& welded;
+};
+
+CapOutcome cut_part(const Cutting& cutting, std::uint32_t part, const PartSurface& own,
+                    const std::vector<Vec3>& u, const Vec3& shift, PieceBuilder& builder) {
+  const Surface& surface = cutting.body.surface;
+  std::vector<std::array<Vec3, 3>> corners;
+  for (const auto& triangle : own.triangles)
+    corners.push_back({u[triangle[0]], u[triangle[1]], u[triangle[2]]});
+  const CrackBoxes boxes(cutting.body, part, cutting.fragments, shift, corners);
+  const Part& of = cutting.body.parts[part];
+  CrackMesh mesh(surface, cutting.welded, u, of.lattice, of.placement == Placement::centre ? 0.5 : 0,
+                 own.triangles, boxes);
+  if (!mesh.split()) return CapOutcome::degenerate;
+  std::vector<CrackCap> caps;
+  if (cutting.options.mode == CrackMode::cap) {
+    CrackEdges edges;
+    CapOutcome outcome = edges.find(mesh);
+    if (outcome != CapOutcome::done) return outcome;
+    mesh.insert_points();
+    outcome = make_caps(mesh, edges, caps);
+    if (outcome != CapOutcome::done) return outcome;
+  } else {
+    mesh.insert_points();
+  }
+  resolve_mixed(cutting.body, own.polygon, cutting.fragments, mesh, caps);
+  const CrackPolygons polygons = gather_polygons(surface, mesh, own.polygon, caps);
+  if (cutting.options.mode == CrackMode::cap && !is_closed(mesh, polygons)) return CapOutcome::degenerate;
+  builder.add_pieces(mesh, polygons);
+  return CapOutcome::done;
+}
+
+// (vertices x 3) in box coordinates of the part; only those of its triangles.
+std::vector<Vec3> box_coordinates(const Body& body, std::uint32_t part, const PartSurface& own) {
+  const Part& of = body.parts[part];
+  const double half = of.placement == Placement::centre ? 0.5 : 0;
+  std::vector<Vec3> u(body.surface.vertices.size(), Vec3::Zero());
+  for (const auto& triangle : own.triangles)
+    for (const std::uint32_t v : triangle) {
+      u[v] = of.lattice.to_lattice(body.surface.vertices[v]) - Vec3::Constant(half);
+      if (!(u[v].cwiseAbs().maxCoeff() < kFarthestBox))
+        throw InputError("--crack: the surface of part \"" + of.name +
+                         "\" reaches too far from its lattice to be cut");
+    }
+  return u;
+}
+
+void cut_broken_part(const Cutting& cutting, std::uint32_t part, const Triangles& triangles,
+                     PieceBuilder& builder) {
+  const Body& body = cutting.body;
+  const PartSurface own = surface_of(body.surface, triangles, part);
+  if (cutting.options.mode == CrackMode::cap) refuse_open(body.parts[part], own, cutting.welded);
+  const std::vector<Vec3> u = box_coordinates(body, part, own);
+  CapOutcome outcome = CapOutcome::degenerate;
+  for (int attempt = 0; attempt < kAttempts && outcome != CapOutcome::done; ++attempt)
+    outcome = cut_part(cutting, part, own, u, (1 + 0.7 * attempt) * kShift, builder);
+  if (outcome == CapOutcome::done) return;
+  throw InputError(
+      fmt::format("--crack {}: the surface of part \"{}\" {} where it broke: take --crack {}, or mend the "
+                  "part's file first",
+                  name_of(cutting.options.mode), body.parts[part].name,
+                  outcome == CapOutcome::crosses_itself ? "crosses itself" : "cannot be cut cleanly",
+                  cutting.options.mode == CrackMode::cap ? "open" : "keep"));
+}
+
+// Volumes of the pieces that are in the surface, by piece.
+std::vector<double> piece_volumes(const CrackedSurface& cracked, const std::vector<Vec3>& vertices) {
+  const Triangles triangles = triangulate(cracked.surface);
+  std::vector<std::vector<std::array<std::uint32_t, 3>>> own(cracked.pieces.size());
+  for (std::size_t t = 0; t < triangles.corners.size(); ++t)
+    own[cracked.part_piece[cracked.surface.polygon_part(triangles.polygon[t])]].push_back(
+        triangles.corners[t]);
+  std::vector<double> volumes;
+  for (const auto& piece : own) volumes.push_back(piece.empty() ? 0 : signed_volume(vertices, piece));
+  return volumes;
+}
+
+}  // namespace
+
+CrackedSurface part_surface(const Body& body, const Fragments& fragments, const CrackOptions& options) {
+  PieceBuilder builder(body, fragments, options, take_seats(body));
+  const Triangles triangles = triangulate(body.surface);
+  const std::vector<std::uint32_t> welded = weld(body.surface.vertices);
+  const Cutting cutting{body, fragments, options, welded};
+  for (std::uint32_t part = 0; part < body.parts.size(); ++part) {
+    if (fragments.in_pieces(part))
+      cut_broken_part(cutting, part, triangles, builder);
+    else
+      builder.add_whole(part);
+    throw_if_interrupted();
+  }
+  CrackedSurface cracked = builder.take();
+  if (options.mode == CrackMode::cap) {
+    const std::vector<double> volumes = piece_volumes(cracked, cracked.surface.vertices);
+    for (std::size_t p = 0; p < volumes.size(); ++p) cracked.pieces[p].volume_before = volumes[p];
+  }
+  if (options.drop_debris) drop_debris(cracked);
+  return cracked;
+}
+
+namespace {
+
+// Fragments are looked for where something may have broken: a body without broken cells is spared the search.
+bool may_be_broken(const Body& body) {
+  const bool centre = std::any_of(body.parts.begin(), body.parts.end(),
+                                  [](const Part& part) { return part.placement == Placement::centre; });
+  return centre || std::find(body.broken.begin(), body.broken.end(), 1) != body.broken.end();
+}
+
+// Triangles of the body's surface whose corners go with different fragments.
+std::size_t spanning_triangles(const Body& body, const MapResult& result, const Fragments& fragments) {
+  const Triangles triangles = triangulate(body.surface);
+  std::size_t count = 0;
+  for (const auto& corner : triangles.corners) {
+    const auto fragment = [&](int c) { return fragments.of[result.frame_of(corner[c]).elements[0]]; };
+    count += fragment(0) != fragment(1) || fragment(1) != fragment(2);
+  }
+  return count;
+}
+
+// Puts a body's own surface back, whatever happens.
+class SurfaceLoan {
+ public:
+  SurfaceLoan(Surface& own, Surface& lent) : own_(own), lent_(lent) { std::swap(own_, lent_); }
+  SurfaceLoan(const SurfaceLoan&) = delete;
+  SurfaceLoan& operator=(const SurfaceLoan&) = delete;
+  ~SurfaceLoan() { std::swap(own_, lent_); }
+
+ private:
+  Surface &own_, &lent_;
+};
+
+void map_pieces(Body& body, const Fragments& fragments, const MapOptions& options, CrackMode mode,
+                MappedPart& mapped, Progress& progress) {
+  CrackedSurface& cracked = *mapped.cracked;
+  {
+    const SurfaceLoan loan(body.surface, cracked.surface);
+    std::vector<Vec3>& vertices = body.surface.vertices;
+    std::vector<Vec3> at_rest;
+    for (const auto& [vertex, by] : cracked.shifts) {
+      at_rest.push_back(vertices[vertex]);
+      vertices[vertex] += by;
+    }
+    mapped.result = map_surface(body, options, cracked.seats, progress);
+    for (std::size_t s = 0; s < cracked.shifts.size(); ++s) {
+      vertices[cracked.shifts[s].vertex] = at_rest[s];
+      mapped.result.displacement[cracked.shifts[s].vertex] += cracked.shifts[s].by;
+    }
+    mapped.report = report(body, mapped.result);
+    mapped.report.crack.spanning_triangles = spanning_triangles(body, mapped.result, fragments);
+    // What is open encloses nothing.
+    if (mode == CrackMode::open) mapped.report.volume_after = std::numeric_limits<double>::quiet_NaN();
+  }
+  if (mode != CrackMode::cap) return;
+  std::vector<Vec3> moved = cracked.surface.vertices;
+  for (std::size_t v = 0; v < moved.size(); ++v) moved[v] += mapped.result.displacement[v];
+  const std::vector<double> volumes = piece_volumes(cracked, moved);
+  for (std::size_t p = 0; p < volumes.size(); ++p) cracked.pieces[p].volume_after = volumes[p];
+}
+
+}  // namespace
+
+MappedPart map_part(Body& body, const MapOptions& options, const CrackOptions& crack, Progress& progress) {
+  MappedPart mapped;
+  std::optional<Fragments> fragments;
+  std::size_t parted = 0;
+  if (may_be_broken(body)) {
+    fragments = find_fragments(body, element_adjacency(body));
+    for (std::uint32_t part = 0; part < body.parts.size(); ++part)
+      if (fragments->in_pieces(part)) parted += fragments->offset[part + 1] - fragments->offset[part];
+  }
+  if (parted > 0 && crack.mode != CrackMode::keep) {
+    progress.update(0, "parting the surface");
+    mapped.cracked = part_surface(body, *fragments, crack);
+    map_pieces(body, *fragments, options, crack.mode, mapped, progress);
+    mapped.report.crack.pieces = mapped.cracked->pieces;
+  } else {
+    mapped.result = map_surface(body, options, progress);
+    mapped.report = report(body, mapped.result);
+    if (parted > 0)
+      mapped.report.crack.spanning_triangles = spanning_triangles(body, mapped.result, *fragments);
+  }
+  mapped.report.crack.mode = crack.mode;
+  mapped.report.crack.fragments = parted;
+  return mapped;
+}
+
+}  // namespace flexel

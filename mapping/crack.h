@@ -1,0 +1,65 @@
+// Mapping across a fracture: the surface is parted along the boundary between the Voronoi cells of the
+// fragments' elements, so that each piece goes with its own elements only (docs/cracks.md).
+#pragma once
+#include <optional>
+
+#include "formats/surface_file.h"
+#include "mapping/crack_report.h"
+#include "mapping/fragments.h"
+#include "mapping/map.h"
+#include "mapping/seat.h"
+
+namespace flexel {
+
+// What --crack, --debris and --pieces ask for.
+struct CrackOptions {
+  CrackMode mode = CrackMode::keep;
+  bool drop_debris = false;  // leave out pieces of a single element in parts that broke
+  std::string pieces;        // where a file for each piece goes, as write_parts() wants it; "" nowhere
+  SurfaceFormat pieces_format = SurfaceFormat::stl_binary;
+};
+
+// From the words of the command line; `format` and `ascii` as for surface_format(). `pieces`: a path with
+// "{piece}" in it, or a folder. InputError for what is unknown or does not fit together.
+[[nodiscard]] CrackOptions crack_options(const std::string& mode, const std::string& debris,
+                                         const std::string& pieces, const std::string& format, bool ascii);
+
+// The parted surface.
+struct CrackedSurface {
+  // Its parts are the pieces that are kept, in order; vertices of the body's surface come first and as they
+  // were, then new ones. Polygons that no crack crosses are as they were; others are triangles. Faces keep
+  // their names; those on cracks are "crack". The polygons have a column "piece", numbered from 1.
+  Surface surface;
+  std::vector<std::uint32_t> part_piece;  // (parts of the surface) index into pieces
+  std::vector<CrackPiece> pieces;
+  Seats seats;  // (vertices) each with its own fragment
+  // Where a piece touches itself along an edge or in a point only, its vertices there are one for each side
+  // and come out drawn apart by kDrawnApart spacings; at rest they are where they belong.
+  struct Shift {
+    std::uint32_t vertex;
+    Vec3 by;  // m
+  };
+  std::vector<Shift> shifts;
+};
+constexpr double kDrawnApart = 1e-3;
+
+// Throws InputError: no surface; `cap` of a part in fragments whose surface is not closed or crosses itself.
+[[nodiscard]] CrackedSurface part_surface(const Body& body, const Fragments& fragments,
+                                          const CrackOptions& options);
+
+// A surface and where its vertices go.
+struct MappedPart {
+  MapResult result;
+  MapReport report;
+  std::optional<CrackedSurface> cracked;  // `open` and `cap`, where a part is in more than one fragment
+  [[nodiscard]] const Surface& surface(const Body& body) const {
+    return cracked ? cracked->surface : body.surface;
+  }
+};
+
+// Maps the deformed state of `body` onto its surface, parted as `crack` says, and reports on it. While it
+// works the body holds the parted surface; it gets its own back. Throws as part_surface() and map_surface().
+[[nodiscard]] MappedPart map_part(Body& body, const MapOptions& options, const CrackOptions& crack,
+                                  Progress& progress);
+
+}  // namespace flexel

@@ -1,0 +1,30 @@
+// What a body has fallen into: elements that connections join, directly or through others.
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "formats/body.h"
+
+namespace flexel {
+
+struct Fragment {
+  std::uint32_t part = 0;
+  std::uint32_t elements = 0;
+};
+
+struct Fragments {
+  std::vector<std::uint32_t> of;      // (elements) index into list
+  std::vector<Fragment> list;         // by part, then most elements first, then lowest element
+  std::vector<std::uint32_t> offset;  // (parts + 1) a part's fragments in list
+  // Debris: an element that nothing holds any more, in a part that has other fragments.
+  [[nodiscard]] bool debris(std::uint32_t fragment) const {
+    const std::uint32_t part = list[fragment].part;
+    return list[fragment].elements == 1 && offset[part + 1] - offset[part] > 1;
+  }
+  [[nodiscard]] bool in_pieces(std::uint32_t part) const { return offset[part + 1] - offset[part] > 1; }
+};
+
+// Connected components of `connections`, which element_adjacency(body) gives.
+[[nodiscard]] Fragments find_fragments(const Body& body, const Adjacency& connections);
+
+}  // namespace flexel
