@@ -34,7 +34,8 @@ struct CrackedSurface {
   std::vector<CrackPiece> pieces;
   Seats seats;  // (vertices) each with its own fragment
   // Where a piece touches itself along an edge or in a point only, its vertices there are one for each side
-  // and come out drawn apart by kDrawnApart spacings; at rest they are where they belong.
+  // and come out drawn apart by kDrawnApart spacings, or less where triangles are small; at rest they are
+  // where they belong.
   struct Shift {
     std::uint32_t vertex;
     Vec3 by;  // m

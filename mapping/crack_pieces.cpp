@@ -6,7 +6,9 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 
 #include "formats/disjoint_sets.h"
 #include "formats/topology.h"
@@ -134,6 +136,13 @@ int planes_at(const CrackMesh& mesh, std::uint32_t node) {
   return count;
 }
 
+// Of a triangle.
+double least_height(const Vec3& a, const Vec3& b, const Vec3& c) {
+  const double longest =
+      std::sqrt(std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()}));
+  return longest > 0 ? (b - a).cross(c - a).norm() / longest : 0;
+}
+
 }  // namespace
 
 // Points on an edge of the surface: one vertex in each fragment.
@@ -189,8 +198,14 @@ void PieceBuilder::place_fans(const CrackMesh& mesh, std::span<const Corner> aro
       }
   }
   std::vector<Holder> held(around.size());
-  for (std::uint32_t k = 0; k < around.size(); ++k)
-    held[fans.root(k)] += holder(mesh, *around[k].polygon, around[k].node);
+  std::vector<double> room(around.size(), kDrawnApart);  // how far a fan's vertex may be drawn, in spacings
+  for (std::uint32_t k = 0; k < around.size(); ++k) {
+    const Corner& corner = around[k];
+    const std::uint32_t root = fans.root(k);
+    held[root] += holder(mesh, *corner.polygon, corner.node);
+    room[root] = std::min(
+        room[root], 0.2 * least_height(mesh.u(corner.previous), mesh.u(corner.node), mesh.u(corner.next)));
+  }
   std::vector<std::uint32_t> added(around.size(), kNoBox);
   int count = 0;
   for (std::uint32_t k = 0; k < around.size(); ++k) count += fans.root(k) == k;
@@ -202,7 +217,7 @@ void PieceBuilder::place_fans(const CrackMesh& mesh, std::span<const Corner> aro
       if (count > 1 && options_.mode == CrackMode::cap && inward.norm() > 0) {
         const Lattice& lattice = body_.parts[result_.pieces[around[k].fragment].part].lattice;
         result_.shifts.push_back(
-            {added[k], lattice.axes * (kDrawnApart * inward.normalized()).cwiseProduct(lattice.spacing)});
+            {added[k], lattice.axes * (room[k] * inward.normalized()).cwiseProduct(lattice.spacing)});
       }
     }
     vertex[around[k].slot] = added[root];

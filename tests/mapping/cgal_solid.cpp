@@ -7,10 +7,14 @@
 #include <CGAL/Polygon_mesh_processing/self_intersections.h>
 #include <CGAL/Surface_mesh.h>
 
+#include <iomanip>
+#include <sstream>
+
 namespace flexel::test {
 
 namespace PMP = CGAL::Polygon_mesh_processing;
 using Point = CGAL::Exact_predicates_inexact_constructions_kernel::Point_3;
+using Mesh = CGAL::Surface_mesh<Point>;
 
 std::string what_cgal_minds(const std::vector<Vec3>& points,
                             const std::vector<std::array<std::uint32_t, 3>>& triangles) {
@@ -25,10 +29,19 @@ std::string what_cgal_minds(const std::vector<Vec3>& points,
   }
   PMP::merge_duplicate_points_in_polygon_soup(soup, polygons);
   if (!PMP::is_polygon_soup_a_polygon_mesh(polygons)) return "no oriented manifold";
-  CGAL::Surface_mesh<Point> mesh;
+  Mesh mesh;
   PMP::polygon_soup_to_polygon_mesh(soup, polygons, mesh);
   if (!CGAL::is_closed(mesh)) return "open";
-  if (PMP::does_self_intersect(mesh)) return "crosses itself";
+  std::vector<std::pair<Mesh::Face_index, Mesh::Face_index>> crossing;
+  PMP::self_intersections(mesh, std::back_inserter(crossing));
+  if (!crossing.empty()) {
+    std::ostringstream text;
+    text << "crosses itself: " << std::setprecision(12);
+    for (const Mesh::Face_index face : {crossing.front().first, crossing.front().second})
+      for (const Mesh::Vertex_index vertex : mesh.vertices_around_face(mesh.halfedge(face)))
+        text << "(" << mesh.point(vertex) << ") ";
+    return text.str();
+  }
   if (!PMP::does_bound_a_volume(mesh)) return "bounds no volume";
   return "";
 }

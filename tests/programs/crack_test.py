@@ -129,13 +129,15 @@ density = "1000 kg/m3"
 strength = "0.5 MPa"
 source = "test"
 [[fix]]
-where = "xmin"
+where = { box = { min = ["-1 mm", "-1 mm", "-1 mm"], max = ["11 mm", "11 mm", "11 mm"] } }
 [[load]]
 where = "xmax"
 force = ["90 N", "0 N", "0 N"]
+time = ["0 s", "3 ms"]
+factor = [0, 1]
 [fracture]
 [run]
-time = "1.5 ms"
+time = "3 ms"
 """)
     expect_ok(run("flexel", "deform", "box.stl", "--scene", "tear.toml", "--material", "jelly", "--size", "2.5 mm", "--crack", "cap",
                   "--debris", "drop", "--pieces", "{piece}.stl", "--report", "report.json", "-o", "torn.stl", "-o", "torn.vtu"))
