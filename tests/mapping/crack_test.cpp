@@ -8,164 +8,26 @@
 #include <random>
 #include <set>
 
-#include "bodies.h"
-#include "cgal_solid.h"
 #include "formats/error.h"
 #include "formats/topology.h"
+#include "pieces.h"
 #include "voxelize/voxelize.h"
 
 namespace flexel {
 namespace {
 
+using namespace test;
 using Edge = std::pair<std::uint32_t, std::uint32_t>;
-
-// One part of a surface, by index.
-struct Piece {
-  std::vector<std::array<std::uint32_t, 3>> triangles;
-  std::vector<std::vector<std::uint32_t>> polygons;
-};
-
-std::vector<Piece> pieces_of(const Surface& surface) {
-  std::vector<Piece> pieces(surface.parts.size());
-  const Triangles triangles = triangulate(surface);
-  for (std::size_t t = 0; t < triangles.corners.size(); ++t)
-    pieces[surface.polygon_part(triangles.polygon[t])].triangles.push_back(triangles.corners[t]);
-  for (std::size_t p = 0; p < surface.polygon_count(); ++p)
-    pieces[surface.polygon_part(p)].polygons.emplace_back(surface.polygon(p).begin(),
-                                                          surface.polygon(p).end());
-  return pieces;
-}
-
-// Every edge has two sides, which run through it in opposite directions; every vertex has one fan.
-void expect_manifold(const Piece& piece) {
-  std::map<Edge, int> uses;
-  std::map<std::uint32_t, std::map<std::uint32_t, std::uint32_t>> fans;
-  for (const auto& corner : piece.polygons)
-    for (std::size_t k = 0; k < corner.size(); ++k) {
-      const std::uint32_t before = corner[(k + corner.size() - 1) % corner.size()],
-                          after = corner[(k + 1) % corner.size()];
-      ++uses[{corner[k], after}];
-      fans[corner[k]][after] = before;
-    }
-  for (const auto& [edge, count] : uses) {
-    ASSERT_EQ(count, 1);
-    ASSERT_EQ(uses.count({edge.second, edge.first}), 1u);
-  }
-  for (const auto& [vertex, next] : fans) {
-    std::size_t steps = 0;
-    std::uint32_t at = next.begin()->first;
-    do {
-      at = next.at(at);
-      ++steps;
-    } while (at != next.begin()->first && steps <= next.size());
-    ASSERT_EQ(steps, next.size());
-  }
-}
-
-int euler(const Piece& piece) {
-  std::set<std::uint32_t> vertices;
-  std::set<Edge> edges;
-  for (const auto& corner : piece.polygons)
-    for (std::size_t k = 0; k < corner.size(); ++k) {
-      vertices.insert(corner[k]);
-      edges.insert(std::minmax(corner[k], corner[(k + 1) % corner.size()]));
-    }
-  return static_cast<int>(vertices.size()) - static_cast<int>(edges.size()) +
-         static_cast<int>(piece.polygons.size());
-}
-
-double volume_of(const Surface& surface) {
-  return signed_volume(surface.vertices, triangulate(surface).corners);
-}
-
-// Breaks the cells whose middle is in `broken`.
-void break_cells(Body& body, const test::Solid& broken) {
-  for (std::size_t c = 0; c < body.cell_count(); ++c) {
-    Vec3 middle = Vec3::Zero();
-    for (const std::uint32_t e : body.cell_elements[c]) middle += body.rest[e] / 8;
-    body.broken[c] = broken(middle);
-  }
-  derive_connections(body);
-}
-
-MappedPart map_broken(Body& body, CrackMode mode, bool drop_debris = false) {
-  Progress progress("test", Progress::Mode::quiet);
-  CrackOptions options;
-  options.mode = mode;
-  options.drop_debris = drop_debris;
-  return map_part(body, {}, options, progress);
-}
-
-// Closed, manifold, positive, and together the whole.
-void expect_whole(const Body& body, const MappedPart& mapped) {
-  ASSERT_TRUE(mapped.cracked);
-  const Surface& surface = mapped.cracked->surface;
-  check(surface, "pieces");
-  std::vector<Vec3> moved = surface.vertices;
-  for (std::size_t v = 0; v < moved.size(); ++v) moved[v] += mapped.result.displacement[v];
-  double sum = 0;
-  for (const Piece& piece : pieces_of(surface)) {
-    expect_manifold(piece);
-    EXPECT_EQ(test::what_cgal_minds(moved, piece.triangles), "");
-    const double volume = signed_volume(surface.vertices, piece.triangles);
-    EXPECT_GT(volume, 0);
-    sum += volume;
-  }
-  const double whole = volume_of(body.surface);
-  EXPECT_NEAR(sum, whole, 1e-12 * whole);
-  double reported = 0;
-  for (const CrackPiece& piece : mapped.report.crack.pieces) reported += piece.volume_before;
-  EXPECT_NEAR(reported, whole, 1e-12 * whole);
-}
-
-// A ball of quads and triangles around `centre`.
-void add_ball(Body& body, const Vec3& centre, double radius, int rings, bool inwards = false) {
-  std::vector<Vec3> vertices{centre + Vec3(0, 0, radius)};
-  std::vector<std::vector<std::uint32_t>> polygons;
-  const int around = 2 * rings;
-  for (int i = 1; i < rings; ++i)
-    for (int j = 0; j < around; ++j) {
-      const double a = M_PI * i / rings, b = 2 * M_PI * (j + 0.3) / around;
-      vertices.push_back(centre + radius * Vec3(sin(a) * cos(b), sin(a) * sin(b), cos(a)));
-    }
-  vertices.push_back(centre - Vec3(0, 0, radius));
-  const auto at = [&](int i, int j) { return static_cast<std::uint32_t>(1 + (i - 1) * around + j % around); };
-  const auto last = static_cast<std::uint32_t>(vertices.size() - 1);
-  for (int j = 0; j < around; ++j) {
-    polygons.push_back({0, at(1, j), at(1, j + 1)});
-    for (int i = 1; i + 1 < rings; ++i)
-      polygons.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)});
-    polygons.push_back({at(rings - 1, j), last, at(rings - 1, j + 1)});
-  }
-  if (inwards)
-    for (auto& polygon : polygons) std::reverse(polygon.begin(), polygon.end());
-  test::add_surface(body, vertices, polygons);
-}
-
-Body ball(Placement placement, const Mat3& axes, double hole = 0) {
-  Lattice lattice;
-  lattice.axes = axes;
-  lattice.spacing = Vec3(0.1, 0.11, 0.09);
-  lattice.origin = Vec3(0.013, -0.02, 0.031);
-  // Every voxel that may hold matter, as the voxeliser does.
-  const double margin = placement == Placement::corner ? 0.09 : 0.02;
-  Body body = test::make_body(
-      lattice, {-7, -7, -7}, {7, 7, 7},
-      [&](const Vec3& x) { return x.norm() < 0.5 + margin && x.norm() > hole - margin; }, placement);
-  add_ball(body, Vec3::Zero(), 0.5, 14);
-  if (hole > 0) add_ball(body, Vec3::Zero(), hole, 9, true);
-  return body;
-}
 
 TEST(Crack, APlaneOfBrokenCellsGivesTwoClosedPiecesThatMoveAsTheirElements) {
   for (const int n : {1, 7}) {
-    Body body = test::block(9, 4, 3, 0.1, Placement::corner, n);
+    Body body = block(9, 4, 3, 0.1, Placement::corner, n);
     break_cells(body, [](const Vec3& x) { return x.x() > 0.4 && x.x() < 0.5; });
-    const Mat3 turn = test::rotation(0.7, Vec3(1, -2, 0.5));
+    const Mat3 turn = rotation(0.7, Vec3(1, -2, 0.5));
     const auto motion = [&](const Vec3& x) -> Vec3 {
       return x.x() > 0.45 ? Vec3(turn * x + Vec3(1, 0, 0)) : Vec3(x - Vec3(0, 2, 0));
     };
-    test::deform(body, motion);
+    deform(body, motion);
     const Surface before = body.surface;
     const MappedPart mapped = map_broken(body, CrackMode::cap);
     EXPECT_EQ(body.surface.vertices, before.vertices);
@@ -194,19 +56,19 @@ TEST(Crack, APlaneOfBrokenCellsGivesTwoClosedPiecesThatMoveAsTheirElements) {
 }
 
 TEST(Crack, KeepCountsTheTrianglesThatSpanAndChangesNothing) {
-  Body body = test::block(9, 4, 3, 0.1, Placement::corner, 7);
+  Body body = block(9, 4, 3, 0.1, Placement::corner, 7);
   break_cells(body, [](const Vec3& x) { return x.x() > 0.4 && x.x() < 0.5; });
   const MappedPart mapped = map_broken(body, CrackMode::keep);
   EXPECT_FALSE(mapped.cracked);
   EXPECT_EQ(mapped.report.crack.fragments, 2u);
   EXPECT_GT(mapped.report.crack.spanning_triangles, 0u);
   // A whole part stays as it is, whatever is asked.
-  Body whole = test::block(5, 4, 3, 0.1, Placement::corner, 7);
+  Body whole = block(5, 4, 3, 0.1, Placement::corner, 7);
   EXPECT_FALSE(map_broken(whole, CrackMode::cap).cracked);
 }
 
 TEST(Crack, OpenPartsTheSurfaceAndLeavesItOpenAtTheCrackOnly) {
-  Body body = test::block(9, 4, 3, 0.1, Placement::corner, 7);
+  Body body = block(9, 4, 3, 0.1, Placement::corner, 7);
   break_cells(body, [](const Vec3& x) { return x.x() > 0.4 && x.x() < 0.5; });
   const MappedPart mapped = map_broken(body, CrackMode::open);
   ASSERT_TRUE(mapped.cracked);
@@ -238,7 +100,7 @@ TEST(Crack, OpenPartsTheSurfaceAndLeavesItOpenAtTheCrackOnly) {
 }
 
 TEST(Crack, ACrackThatEndsInsideOpensNothing) {
-  Body body = test::block(9, 4, 3, 0.1, Placement::corner, 7);
+  Body body = block(9, 4, 3, 0.1, Placement::corner, 7);
   break_cells(body, [](const Vec3& x) { return x.x() > 0.4 && x.x() < 0.5 && x.y() < 0.3; });
   const MappedPart mapped = map_broken(body, CrackMode::cap);
   EXPECT_FALSE(mapped.cracked);
@@ -251,7 +113,7 @@ TEST_P(RandomDamage, IsClosedAndAddsUpInABlock) {
   std::mt19937 random(static_cast<unsigned>(GetParam()));
   std::uniform_real_distribution<double> uniform(0, 1);
   const double share = 0.35 + 0.6 * uniform(random);
-  Body body = test::block(5, 4, 5, 0.1, Placement::corner, 1 + GetParam() % 5);
+  Body body = block(5, 4, 5, 0.1, Placement::corner, 1 + GetParam() % 5);
   break_cells(body, [&](const Vec3&) { return uniform(random) < share; });
   const MappedPart mapped = map_broken(body, CrackMode::cap);
   if (mapped.report.crack.fragments == 0) return;
@@ -262,7 +124,7 @@ TEST_P(RandomDamage, IsClosedAndAddsUpInATurnedBall) {
   std::mt19937 random(static_cast<unsigned>(100 + GetParam()));
   std::uniform_real_distribution<double> uniform(0, 1);
   const double share = 0.35 + 0.6 * uniform(random);
-  const Mat3 axes = test::rotation(0.1 + GetParam(), Vec3(1, 2, 3));
+  const Mat3 axes = rotation(0.1 + GetParam(), Vec3(1, 2, 3));
   Body body = ball(Placement::corner, axes, GetParam() % 2 ? 0.2 : 0);
   break_cells(body, [&](const Vec3&) { return uniform(random) < share; });
   const MappedPart mapped = map_broken(body, CrackMode::cap);
@@ -275,7 +137,7 @@ INSTANTIATE_TEST_SUITE_P(Seeds, RandomDamage, testing::Range(0, 8));
 // An irregular crack across a hollow ball, in a turned lattice, in both placements.
 TEST(Crack, AnIrregularCrackThroughAHollowBallGivesTwoPieces) {
   for (const Placement placement : {Placement::corner, Placement::centre}) {
-    const Mat3 axes = test::rotation(0.4, Vec3(1, 1, -1));
+    const Mat3 axes = rotation(0.4, Vec3(1, 1, -1));
     Body body = ball(placement, axes, 0.22);
     const auto side = [&](const Vec3& x) {
       const Vec3 u = axes.transpose() * x;
@@ -299,8 +161,8 @@ TEST(Crack, AnIrregularCrackThroughAHollowBallGivesTwoPieces) {
             body.connections[e] &= ~(1u << bit);
         }
     }
-    const Mat3 turn = test::rotation(-0.5, Vec3(0, 1, 1));
-    test::deform(body, [&](const Vec3& x) -> Vec3 { return side(x) ? Vec3(turn * x + Vec3(1, 1, 0)) : x; });
+    const Mat3 turn = rotation(-0.5, Vec3(0, 1, 1));
+    deform(body, [&](const Vec3& x) -> Vec3 { return side(x) ? Vec3(turn * x + Vec3(1, 1, 0)) : x; });
     const MappedPart mapped = map_broken(body, CrackMode::cap);
     expect_whole(body, mapped);
     std::size_t large = 0;
@@ -316,7 +178,7 @@ TEST(Crack, AnIrregularCrackThroughAHollowBallGivesTwoPieces) {
 
 // A piece that touches itself along an edge comes out drawn apart there, and is manifold.
 TEST(Crack, APieceThatTouchesItselfIsManifoldAndDrawnApart) {
-  Body body = test::block(5, 5, 5, 0.1, Placement::corner, 3);
+  Body body = block(5, 5, 5, 0.1, Placement::corner, 3);
   // Two columns of elements that meet along an edge stay with the bottom; what is around them goes.
   break_cells(body, [](const Vec3& x) {
     const bool column = (x.x() < 0.2 && x.y() < 0.2) || (x.x() > 0.3 && x.y() > 0.3);
@@ -341,7 +203,7 @@ TEST(Crack, APieceThatTouchesItselfIsManifoldAndDrawnApart) {
 }
 
 TEST(Crack, DebrisIsToldAndMayBeLeftOut) {
-  Body body = test::block(6, 6, 6, 0.1, Placement::corner, 5);
+  Body body = block(6, 6, 6, 0.1, Placement::corner, 5);
   break_cells(body, [](const Vec3& x) { return (x - Vec3(0.3, 0.3, 0.3)).cwiseAbs().maxCoeff() < 0.15; });
   const MappedPart kept = map_broken(body, CrackMode::cap);
   expect_whole(body, kept);
@@ -358,7 +220,7 @@ TEST(Crack, DebrisIsToldAndMayBeLeftOut) {
 }
 
 TEST(Crack, AnOpenSurfaceCannotBeCapped) {
-  Body body = test::block(9, 4, 3, 0.1, Placement::corner, 7);
+  Body body = block(9, 4, 3, 0.1, Placement::corner, 7);
   break_cells(body, [](const Vec3& x) { return x.x() > 0.4 && x.x() < 0.5; });
   Surface& surface = body.surface;
   const std::size_t corners = surface.polygon(surface.polygon_count() - 1).size();
@@ -394,7 +256,7 @@ TEST(Crack, ALeafThatBreaksOffTakesNothingOfTheOther) {
   Body bare;
   bare.parts.resize(1);
   bare.parts[0].name = "leaves";
-  test::add_surface(bare, vertices, polygons);
+  add_surface(bare, vertices, polygons);
   VoxelizeOptions options;
   options.size = 0.1;
   Progress progress("test", Progress::Mode::quiet);
@@ -444,7 +306,7 @@ TEST(Crack, ALeafThatBreaksOffTakesNothingOfTheOther) {
 }
 
 TEST(Crack, AttributesComeAlong) {
-  Body body = test::block(9, 4, 3, 0.1, Placement::corner, 2);
+  Body body = block(9, 4, 3, 0.1, Placement::corner, 2);
   break_cells(body, [](const Vec3& x) { return x.x() > 0.4 && x.x() < 0.5; });
   Column x, number;
   for (const Vec3& vertex : body.surface.vertices) x.values.push_back(vertex.x());
