@@ -40,7 +40,8 @@ std::vector<std::string> Add::prepare() {
   try {
     body_ = read_body(path_);
   } catch (const InputError& error) {
-    throw InputError(origin_, error.what());
+    throw InputError(origin_,
+                     "\"body\" " + (error.where().empty() ? path_ : error.where()) + ": " + error.what());
   }
   std::vector<std::string> names;
   for (const Part& part : body_.parts) names.push_back(part.name);

@@ -1,9 +1,11 @@
 // Conjugate gradients preconditioned by the masses; sums in a fixed order.
 #include "simulate/time/implicit_damping.h"
 
-#include <cmath>
-#include <stdexcept>
+#include <fmt/format.h>
 
+#include <cmath>
+
+#include "formats/error.h"
 #include "formats/parallel.h"
 
 namespace flexel {
@@ -58,7 +60,10 @@ StepOutcome ImplicitDamping::advance(State& state, const std::vector<Vec3>& oute
   parallel_for_each(n, [&](std::size_t e) { direction_[e] = inverse[e] * residual_[e]; });
   for (int i = 0; norm > enough; ++i) {
     if (i == kIterations || !std::isfinite(norm))
-      throw std::runtime_error("the implicit damping was not solved");
+      throw DivergedError(
+          fmt::format("the damping of the step was not solved in {} iterations: give a shorter [damping] "
+                      "time or [run] step",
+                      i));
     ++iterations_;
     const std::vector<Vec3>& damped = damping(direction_);
     parallel_for_each(n, [&](std::size_t e) { image_[e] = mass[e] * direction_[e] - dt * damped[e]; });

@@ -1,0 +1,78 @@
+"""Events of timed runs from the outside: what a chain of programs gets, and what is refused."""
+
+import json
+
+from harness import body, expect, expect_error, expect_ok, expect_only, main, run, scene
+
+# A part of 40 x 10 x 10 mm of 5 mm cells, pulled longer by a move and then let be.
+PULLED = """material = "rubber"
+[[fix]]
+where = "xmin"
+[[move]]
+where = "xmax"
+displacement = ["4 mm", "free", "free"]
+"""
+FREE = """material = "rubber"
+[damping]
+time = "20 us"
+[run]
+time = "2 ms"
+"""
+CARVE = '[[event]]\nat = "1 ms"\ndo = "carve"\nwhere = {{ box = {{ min = ["{}", "-1 mm", "-1 mm"], max = ["41 mm", "11 mm", "11 mm"] }} }}\n'
+
+
+def summary(*arguments):
+    expect_ok(run("flexel-simulate", *arguments, "--summary", "s.json"))
+    return json.load(open("s.json"))
+
+
+def test_a_renormalised_body_keeps_its_shape():
+    """Frozen at equilibrium and then let go: not held by anything, it stays as long as it was pulled; without freezing it does not."""
+    body()
+    scene("pull.toml", PULLED)
+    scene("freeze.toml", PULLED + "[run]\nrenormalise = true\n")
+    scene("free.toml", FREE)
+    expect_ok(run("flexel-simulate", "freeze.toml", "body.vtu", "-o", "frozen.vtu"))
+    expect_ok(run("flexel-simulate", "pull.toml", "body.vtu", "-o", "pulled.vtu"))
+    frozen = summary("free.toml", "frozen.vtu", "-o", "rest.vtu")
+    let_go = summary("free.toml", "pulled.vtu", "-o", "sprung.vtu")
+    expect(frozen["elastic_energy"] < 1e-9 * let_go["elastic_energy"], f"{frozen['elastic_energy']} J of {let_go['elastic_energy']} J")
+    map_of = {name: expect_ok(run("flexel-map", f"{name}.vtu", "--format", "obj")).out.decode() for name in ("frozen", "rest", "sprung")}
+
+    def longest(text):
+        return max(float(line.split()[1]) for line in text.splitlines() if line.startswith("v "))
+
+    expect(abs(longest(map_of["frozen"]) - 44) < 0.1, "the pulled part should be 44 mm long")
+    expect(abs(longest(map_of["rest"]) - longest(map_of["frozen"])) < 1e-6, "what was frozen should stay")
+    expect(abs(longest(map_of["sprung"]) - longest(map_of["rest"])) > 0.01, "what was not frozen should spring back")
+
+
+def test_carving_half_takes_half_the_mass():
+    inputs = [body(), scene(text=FREE + CARVE.format("19 mm"))]
+    result = run("flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu", "--summary", "s.json", "--history", "h.csv")
+    expect_ok(result)
+    expect("carve" in result.err, f"a warning should tell of the surface: {result}")
+    # the cells right of 20 mm, all eight elements of which are in the region
+    expect(abs(json.load(open("s.json"))["mass"] - 930 * 2e-6) < 1e-9, json.load(open("s.json"))["mass"])
+    expect_only(*inputs, "out.vtu", "s.json", "h.csv")
+
+
+def test_refusals():
+    body()
+    for text, fragments in (
+        (FREE + CARVE.format("-1 mm"), ("carve", "nothing", "scene.toml:")),
+        (FREE + '[[event]]\nat = "3 ms"\ndo = "renormalise"\n', ("scene.toml:6", "0.003 s", "0.002 s")),
+        (FREE + '[[event]]\nat = "1 ms"\ndo = "explode"\n', ("scene.toml:", "explode", "renormalise")),
+        (FREE + '[[event]]\nat = "1 ms"\ndo = "edit"\nstiffness = -2\n', ("scene.toml:", "stiffness")),
+        (FREE + '[[event]]\nat = "1 ms"\ndo = "edit"\nstifness = 2\n', ("scene.toml:", "stiffness")),
+        (FREE + '[[event]]\nat = "1 ms"\ndo = "add"\nbody = "missing.vtu"\n', ("missing.vtu",)),
+        (FREE + '[[event]]\nat = "1 ms"\ndo = "fuse"\nwithin = "1 mm"\n', ("fuse", "nothing")),
+        (PULLED + '[[event]]\nat = "1 ms"\ndo = "renormalise"\n', ("event", "time")),
+    ):
+        scene(text=text)
+        expect_error(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu"), "flexel-simulate", *fragments)
+        expect_only("body.vtu", "scene.toml")
+
+
+if __name__ == "__main__":
+    main(globals())
