@@ -294,6 +294,10 @@ void PieceBuilder::fill_columns() {
 
 CrackedSurface PieceBuilder::take() {
   fill_columns();
+  // Another part may have the name of a piece.
+  make_part_names_unique(result_.surface, "part");
+  for (std::size_t part = 0; part < result_.part_piece.size(); ++part)
+    result_.pieces[result_.part_piece[part]].name = result_.surface.parts[part].name;
   return std::move(result_);
 }
 

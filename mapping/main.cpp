@@ -1,4 +1,6 @@
 // flexel-map: a deformed body in, its surface deformed out.
+#include <optional>
+
 #include "formats/body_file.h"
 #include "formats/files.h"
 #include "formats/parallel.h"
@@ -13,8 +15,8 @@ namespace {
 constexpr const char* kProgram = "flexel-map";
 
 struct Arguments {
-  std::string body = "-", output = "-", method = "blended", report, format, unit, crack = "keep",
-              debris = "keep", pieces;
+  std::string body = "-", output, method = "blended", report, format, unit, crack = "keep", debris = "keep",
+              pieces;
   bool ascii = false, strict = false, quiet = false;
   int threads = 0;
 };
@@ -48,7 +50,8 @@ void declare(CLI::App& app, Arguments& arguments) {
                "Exit 4 and write no surface when a frame is inverted or degenerate");
   app.add_option("--threads", arguments.threads, "Threads; 0 is every core")->check(CLI::NonNegativeNumber);
   app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
-  app.add_option("-o,--output", arguments.output, "Where the surface goes; without it, or with -, stdout")
+  app.add_option("-o,--output", arguments.output,
+                 "Where the surface goes; -: stdout, also without it unless --pieces is given")
       ->type_name("FILE");
 }
 
@@ -60,9 +63,12 @@ int run(int argc, char** argv) {
   const MapOptions options{map_method(arguments.method)};
   const CrackOptions crack =
       crack_options(arguments.crack, arguments.debris, arguments.pieces, arguments.format, arguments.ascii);
-  const SurfaceFormat format = surface_format(arguments.format, arguments.output, arguments.ascii);
+  if (arguments.output.empty() && arguments.pieces.empty()) arguments.output = "-";
+  // Nothing: only the pieces are wanted.
+  std::optional<SurfaceFormat> format;
+  if (!arguments.output.empty()) format = surface_format(arguments.format, arguments.output, arguments.ascii);
   const double unit = arguments.unit.empty() ? 0 : length_unit(arguments.unit);
-  if (unit > 0 && format == SurfaceFormat::glb)
+  if (unit > 0 && (format == SurfaceFormat::glb || crack.pieces_format == SurfaceFormat::glb))
     throw InputError("GLB has a unit of its own: leave out --unit");
   if (arguments.report == "-" && arguments.output == "-")
     throw InputError("the report and the surface cannot both go to stdout: give one of them a file");
@@ -88,7 +94,8 @@ int run(int argc, char** argv) {
   const double written = unit > 0 ? unit : default_unit(body.surface);
   if (!crack.pieces.empty())
     write_parts(mapped.surface(body), mapped.result.displacement, crack.pieces_format, written, crack.pieces);
-  write_surface(mapped.surface(body), mapped.result.displacement, format, written, arguments.output);
+  if (format)
+    write_surface(mapped.surface(body), mapped.result.displacement, *format, written, arguments.output);
   progress.finish();
   return kExitDone;
 }

@@ -305,6 +305,23 @@ TEST(Crack, ALeafThatBreaksOffTakesNothingOfTheOther) {
     }
 }
 
+TEST(Crack, APartThatIsWholeStaysAndNamesStayApart) {
+  Body body = block(9, 4, 3, 0.1, Placement::corner, 3);
+  const Body other = block(3, 3, 3, 0.1, Placement::corner, 3);
+  append_body(body, other);
+  body.parts[1].name = body.surface.parts[1].name = "part-2";
+  break_cells(body, [&](const Vec3& x) { return x.x() > 0.4 && x.x() < 0.5; });
+  const MappedPart mapped = map_broken(body, CrackMode::cap);
+  expect_whole(body, mapped);
+  const Surface& surface = mapped.cracked->surface;
+  ASSERT_EQ(surface.parts.size(), 3u);
+  std::set<std::string> names;
+  for (const SurfacePart& part : surface.parts) names.insert(part.name);
+  EXPECT_EQ(names.size(), 3u);
+  EXPECT_EQ(mapped.report.crack.fragments, 2u);
+  EXPECT_EQ(pieces_of(surface)[2].polygons.size(), other.surface.polygon_count());
+}
+
 TEST(Crack, AttributesComeAlong) {
   Body body = block(9, 4, 3, 0.1, Placement::corner, 2);
   break_cells(body, [](const Vec3& x) { return x.x() > 0.4 && x.x() < 0.5; });

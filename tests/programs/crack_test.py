@@ -9,7 +9,7 @@ import struct
 
 import numpy as np
 
-from harness import (ascii_stl, body, box, box_triangles, bracket, expect, expect_error, expect_ok, main, run, write)
+from harness import (ascii_stl, body, box, box_triangles, bracket, expect, expect_error, expect_ok, expect_only, main, run, write)
 from torn import tear
 
 
@@ -84,6 +84,13 @@ def test_pieces_in_every_format():
     expect_ok(run("flexel-map", "torn.vtu", "--crack", "cap", "--pieces", "one-{piece}.obj", "-o", "all.obj", "--report", "r.json"))
     for piece in json.load(open("r.json"))["crack"]["pieces"]:
         expect(os.path.exists(f"one-{piece['name']}.obj"), f"no file for {piece}")
+
+
+def test_pieces_alone():
+    torn_bar(0.0)
+    result = expect_ok(run("flexel-map", "torn.vtu", "--crack", "cap", "--pieces", "{piece}.stl"))
+    expect(result.out == b"", "nothing on stdout")
+    expect_only("box.stl", "box-1.stl", "box-2.stl", "rest.vtu", "torn.vtu")
 
 
 def test_debris_is_kept_or_dropped():
