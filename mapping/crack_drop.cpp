@@ -1,5 +1,6 @@
 // Leaves the debris out: its polygons, the faces and parts that are its own, and the vertices that only it
 // used.
+#include "formats/error.h"
 #include "mapping/crack_pieces.h"
 
 namespace flexel {
@@ -72,6 +73,8 @@ std::vector<std::uint32_t> keep_vertices(const CrackedSurface& cracked, Renumber
 void drop_debris(CrackedSurface& cracked) {
   Surface kept;
   Renumbering to = keep_parts(cracked, kept);
+  if (kept.parts.empty())
+    throw InputError("--debris drop: nothing would be left: every piece is a single element");
   const std::vector<std::uint32_t> vertices = keep_vertices(cracked, to);
   const Surface& surface = cracked.surface;
   std::vector<std::uint32_t> polygons;

@@ -30,7 +30,7 @@ struct CrackPolygons {
 // Every edge is run through as often one way as the other, in each fragment.
 [[nodiscard]] bool is_closed(const CrackMesh& mesh, const CrackPolygons& polygons);
 
-// Takes debris out of the surface.
+// Takes debris out of the surface. Throws InputError: nothing else is there.
 void drop_debris(CrackedSurface& cracked);
 
 class PieceBuilder {

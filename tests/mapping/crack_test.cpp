@@ -219,6 +219,15 @@ TEST(Crack, DebrisIsToldAndMayBeLeftOut) {
   EXPECT_EQ(used.size(), dropped.cracked->surface.vertices.size());
 }
 
+TEST(Crack, ABodyThatIsAllDebrisCanBeKeptButNotDropped) {
+  Body body = block(3, 2, 2, 0.1, Placement::corner, 2);
+  break_cells(body, [](const Vec3&) { return true; });
+  const MappedPart kept = map_broken(body, CrackMode::cap);
+  expect_whole(body, kept);
+  EXPECT_EQ(kept.cracked->surface.parts.size(), body.element_count());
+  EXPECT_THROW((void)map_broken(body, CrackMode::cap, true), InputError);
+}
+
 TEST(Crack, AnOpenSurfaceCannotBeCapped) {
   Body body = block(9, 4, 3, 0.1, Placement::corner, 7);
   break_cells(body, [](const Vec3& x) { return x.x() > 0.4 && x.x() < 0.5; });
