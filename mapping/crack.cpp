@@ -38,21 +38,23 @@ PartSurface surface_of(const Surface& surface, const Triangles& triangles, std::
   return result;
 }
 
-void refuse_open(const Part& part, const PartSurface& own, const std::vector<std::uint32_t>& welded) {
+// Edges with more than two sides are no hindrance as long as they are run through both ways equally often.
+void refuse_open(const Part& part, const PartSurface& own, const std::vector<Vec3>& vertices,
+                 const std::vector<std::uint32_t>& welded) {
   const Topology topology = flexel::topology(own.triangles, welded);
   std::string why;
   if (topology.open_edges > 0)
     why = fmt::format("is open ({} open edges)", topology.open_edges);
   else if (topology.misoriented_edges > 0)
     why = fmt::format("is not oriented ({} edges)", topology.misoriented_edges);
-  else if (topology.non_manifold_edges > 0)
-    why = fmt::format("has {} edges with more than two sides", topology.non_manifold_edges);
+  else if (signed_volume(vertices, own.triangles) < 0)
+    why = "is inside out";
   else
     return;
-  throw InputError(
-      fmt::format("--crack cap: the surface of part \"{}\" {}, so its pieces have no inside: take --crack "
-                  "open, or mend the part's file first",
-                  part.name, why));
+  throw InputError(fmt::format(
+      "--crack cap: the surface of part \"{}\" {}, so its pieces would not be solids: take --crack "
+      "open, or mend the part's file first",
+      part.name, why));
 }
 
 struct Cutting {
@@ -110,7 +112,8 @@ void cut_broken_part(const Cutting& cutting, std::uint32_t part, const Triangles
                      PieceBuilder& builder) {
   const Body& body = cutting.body;
   const PartSurface own = surface_of(body.surface, triangles, part);
-  if (cutting.options.mode == CrackMode::cap) refuse_open(body.parts[part], own, cutting.welded);
+  if (cutting.options.mode == CrackMode::cap)
+    refuse_open(body.parts[part], own, body.surface.vertices, cutting.welded);
   const std::vector<Vec3> u = box_coordinates(body, part, own);
   CapOutcome outcome = CapOutcome::degenerate;
   for (int attempt = 0; attempt < kAttempts && outcome != CapOutcome::done; ++attempt)
@@ -120,7 +123,8 @@ void cut_broken_part(const Cutting& cutting, std::uint32_t part, const Triangles
       fmt::format("--crack {}: the surface of part \"{}\" {} where it broke: take --crack {}, or mend the "
                   "part's file first",
                   name_of(cutting.options.mode), body.parts[part].name,
-                  outcome == CapOutcome::crosses_itself ? "crosses itself" : "cannot be cut cleanly",
+                  outcome == CapOutcome::crosses_itself ? "crosses itself, or has shells that overlap,"
+                                                        : "cannot be cut cleanly",
                   cutting.options.mode == CrackMode::cap ? "open" : "keep"));
 }
 

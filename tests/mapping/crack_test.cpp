@@ -246,6 +246,16 @@ TEST(Crack, AnOpenSurfaceCannotBeCapped) {
     EXPECT_NE(std::string(error.what()).find("--crack open"), std::string::npos);
   }
   EXPECT_TRUE(map_broken(body, CrackMode::open).cracked);
+  // Nor one that is inside out, or two blocks in one another.
+  Body turned = block(9, 4, 3, 0.1, Placement::corner, 7);
+  break_cells(turned, [](const Vec3& x) { return x.x() > 0.4 && x.x() < 0.5; });
+  Body twice = turned;
+  for (std::size_t p = 0; p < turned.surface.polygon_count(); ++p)
+    std::reverse(turned.surface.polygon_vertices.begin() + turned.surface.polygon_offsets[p],
+                 turned.surface.polygon_vertices.begin() + turned.surface.polygon_offsets[p + 1]);
+  EXPECT_THROW((void)map_broken(turned, CrackMode::cap), InputError);
+  add_box_surface(twice, Vec3(0.2, 0.1, 0.1), Vec3(0.7, 0.5, 0.2), 3);
+  EXPECT_THROW((void)map_broken(twice, CrackMode::cap), InputError);
 }
 
 // Two leaves 0.3 spacings apart, joined at one end; the upper one breaks off. Boxes between them hold
