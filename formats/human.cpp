@@ -62,4 +62,9 @@ std::string human_force(double newtons) {
   return newtons == 0 ? "0 N" : human(newtons, kScales);
 }
 
+std::string human_pressure(double pascals) {
+  constexpr Scale kScales[] = {{1, "Pa"}, {1e3, "kPa"}, {1e6, "MPa"}, {1e9, "GPa"}};
+  return pascals == 0 ? "0 Pa" : human(pascals, kScales);
+}
+
 }  // namespace flexel

@@ -76,12 +76,13 @@ void Progress::update(double share, const std::string& note) {
 }
 
 void Progress::say(const std::string& line) {
-  if (mode_ == Mode::quiet) return;
+  if (mode_ == Mode::quiet || mode_ == Mode::silent) return;
   clear_bar();
   print(fmt::format("{}: {}\n", program_, line));
 }
 
 void Progress::warn(const std::string& line) {
+  if (mode_ == Mode::silent) return;
   clear_bar();
   print(fmt::format("{}: warning: {}\n", program_, line));
 }

@@ -7,10 +7,11 @@
 namespace flexel {
 
 // One display for a whole run, whichever stages run in it: a bar on a terminal, a line per finished stage in
-// a log, nothing when quiet. Not thread-safe: call from the thread that owns the run.
+// a log, nothing but warnings when quiet, nothing at all when silent (a run within a run). Not thread-safe:
+// call from the thread that owns the run.
 class Progress {
  public:
-  enum class Mode { automatic, bar, lines, quiet };
+  enum class Mode { automatic, bar, lines, quiet, silent };
   explicit Progress(std::string program, Mode mode = Mode::automatic);
   ~Progress();
   Progress(const Progress&) = delete;

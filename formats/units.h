@@ -45,5 +45,6 @@ enum class Dimension {
 [[nodiscard]] std::string human_bytes(double bytes);
 [[nodiscard]] std::string human_count(std::size_t count);  // 51,234
 [[nodiscard]] std::string human_force(double newtons);
+[[nodiscard]] std::string human_pressure(double pascals);
 
 }  // namespace flexel

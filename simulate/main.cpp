@@ -7,6 +7,7 @@
 #include "simulate/merge.h"
 #include "simulate/scene.h"
 #include "simulate/simulate.h"
+#include "simulate/stress.h"
 #include "simulate/time/checkpoint.h"
 
 namespace {
@@ -51,6 +52,9 @@ void declare(CLI::App& app, Arguments& arguments) {
       "Timed runs: write energies, momenta and probes over time to this CSV file (docs/motion.md)");
   app.add_option("--isa", arguments.options.isa,
                  "Timed runs: instruction set of the kernel (portable, avx2, avx512); the best by itself");
+  app.add_flag("!--no-stress", arguments.options.stress, "Leave out the stresses (docs/stress.md)");
+  app.add_flag("!--no-estimate", arguments.options.estimate,
+               "Leave out the error bars, and the two coarser runs that they come from (docs/error-bars.md)");
   app.add_flag("--quiet", arguments.quiet, "Say nothing but warnings and errors");
   app.add_flag("--compress", arguments.compress, "Compress the arrays of the body file");
 }
@@ -61,6 +65,7 @@ Body read_bodies(std::vector<std::string> paths) {
   Body body;
   for (std::size_t p = 0; p < paths.size(); ++p) {
     Body next = read_body(paths[p]);
+    erase_stress_columns(next);  // results of an earlier run, which another body may not have
     if (p == 0)
       body = std::move(next);
     else

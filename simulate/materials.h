@@ -15,15 +15,23 @@ struct Material {
   double yield = 0, hardening = 0;  // Pa
   double strength = 0;              // Pa, largest principal stress
   double elongation = 0;            // equivalent plastic strain at break
+  // For people to choose from; no effect takes them by itself. 0: not given
+  double friction = 0;  // Coulomb's, against itself
+  double damping = 0;   // share of the critical
 };
 
-// The library, in order of docs/scene.md. Room temperature, typical values: a scene's own figures go before
-// them.
+// The library, in order of docs/materials.md. At room temperature; figures that are not known for certain are
+// left out. A scene's own go before them.
 [[nodiscard]] const std::vector<Material>& material_library();
 
 // The library's material of that name or alias ("aluminum" = "aluminium 6061"; case, blanks, "-" and "_" do
 // not matter); nothing when there is none.
 [[nodiscard]] const Material* library_material(const std::string& name);
+
+// The library as lines for people, as a table in Markdown (docs/materials.md holds it), and as JSON (SI).
+[[nodiscard]] std::string materials_text();
+[[nodiscard]] std::string materials_markdown();
+[[nodiscard]] std::string materials_json();
 
 // Lame's first parameter and the shear modulus [Pa].
 [[nodiscard]] double lame_lambda(const Material& material);

@@ -7,6 +7,7 @@
 
 #include "formats/units.h"
 #include "simulate/connections.h"
+#include "simulate/stress.h"
 
 namespace flexel {
 
@@ -55,6 +56,17 @@ void measure_corners(const Cells& cells, const Body& body, const State& state, S
                   "use a smaller spacing, or spread the load or the fix over a larger area",
                   human_length(at.x()), human_length(at.y()), human_length(at.z()),
                   smallest.value > 0 ? "is nearly folded" : "is folded", smallest.value));
+}
+
+void measure_stress(const Setting& setting, const State& state, Body& body, SimulateResult& result) {
+  if (body.cell_count() == 0) return;
+  const Stresses computed = stresses(setting, state);
+  const std::optional<LargestStress> largest = largest_stress(setting, computed);
+  if (!largest) return;
+  const double yield = setting.materials[largest->part].yield;
+  result.stress = StressSummary{largest->value, largest->at, body.parts[largest->part].name, {}};
+  if (yield > 0) result.stress->yield_share = largest->value / yield;
+  write_stress_columns(computed, body);
 }
 
 double body_extent(const Body& body) {

@@ -18,6 +18,9 @@ void measure_displacement(const Body& body, const State& state, SimulateResult& 
 void measure_corners(const Cells& cells, const Body& body, const State& state, SimulateResult& result,
                      Progress& progress);
 
+// The stresses of the final state: columns of the body, and the largest. Model `paper` has none.
+void measure_stress(const Setting& setting, const State& state, Body& body, SimulateResult& result);
+
 // Diagonal of the box around the elements at rest [m].
 [[nodiscard]] double body_extent(const Body& body);
 

@@ -12,11 +12,13 @@
 #include "formats/parallel.h"
 #include "formats/units.h"
 #include "simulate/equilibrium.h"
+#include "simulate/error_bars.h"
 #include "simulate/fragments.h"
 #include "simulate/probes.h"
 #include "simulate/report.h"
 #include "simulate/rest_shape.h"
 #include "simulate/scene.h"
+#include "simulate/stress.h"
 #include "simulate/time/timed_run.h"
 #include "simulate/unsupported.h"
 
@@ -204,12 +206,19 @@ SimulateResult Run::operator()() {
   result.elastic_energy = mechanics.elastic_energy(state_);
   result.smallest_jacobian = mechanics.most_compressed(state_).value;
   measure_corners(mechanics.cells(), body_, state_, result, progress_);
+  if (options_.stress) measure_stress(setting_, state_, body_, result);
   carry_strays(fragments_, setting_, mechanics.stencil(), state_);
   move_body(body_, state_);
   if (scene_.run.renormalise) renormalise_all(body_, setting_, state_.displacement);
   for (const ProbePoints& probe : probes) result.probes.push_back(measure(probe, state_));
-  for (const AppliedLoad& load : result.loads) result.imbalance += load.force;
-  for (const Reaction& reaction : result.reactions) result.imbalance += reaction.force;
+  for (const AppliedLoad& load : result.loads) {
+    result.imbalance += load.force;
+    result.moment_imbalance += load.moment;
+  }
+  for (const Reaction& reaction : result.reactions) {
+    result.imbalance += reaction.force;
+    result.moment_imbalance += reaction.moment;
+  }
   measure_displacement(body_, state_, result);
   result.mass = mass_of(setting_);
   result.load_steps = solved.load_steps;
@@ -232,9 +241,22 @@ double parse_timeout(const std::string& text, const std::string& option) {
 SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress) {
   const ThreadLimit limit(options.threads);
   refuse_empty(body);
+  erase_stress_columns(body);
   progress.stage("simulate");
-  SimulateResult result =
-      scene.run.time ? run_in_time(body, scene, options, progress) : Run(body, scene, options, progress)();
+  if (scene.run.time) {
+    SimulateResult result = run_in_time(body, scene, options, progress);
+    progress.finish();
+    return result;
+  }
+  SimulateResult result = Run(body, scene, options, progress)();
+  if (options.estimate) {
+    progress.stage("error bars");
+    result.error_bars =
+        estimate_errors(body, scene, options, result, [](auto& coarse, auto& same, auto& how) {
+          Progress silent("", Progress::Mode::silent);
+          return Run(coarse, same, how, silent)();
+        });
+  }
   progress.finish();
   return result;
 }

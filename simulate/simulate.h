@@ -1,5 +1,6 @@
 // Body + scene -> deformed body.
 #pragma once
+#include <Eigen/Geometry>
 #include <memory>
 #include <optional>
 #include <string>
@@ -7,6 +8,7 @@
 
 #include "formats/body.h"
 #include "formats/progress.h"
+#include "simulate/estimate.h"
 
 namespace flexel {
 
@@ -21,13 +23,21 @@ struct ProbeResult {
 
 struct Reaction {  // of one [[fix]] or [[move]]
   std::string name;
-  Vec3 force = Vec3::Zero();  // N, by the support on the body
+  Vec3 force = Vec3::Zero();   // N, by the support on the body
+  Vec3 moment = Vec3::Zero();  // N m, about the world's origin, where the body is now
 };
 
 struct AppliedLoad {  // of one [[load]], or of gravity
   std::string name;
-  Vec3 force = Vec3::Zero();  // N, in total
+  Vec3 force = Vec3::Zero();   // N, in total
+  Vec3 moment = Vec3::Zero();  // N m, about the world's origin, where the body is now
 };
+
+// Adds a force at a place to a resultant and its moment about the origin.
+inline void add_at(const Vec3& force, const Vec3& place, Vec3& sum, Vec3& moment) {
+  sum += force;
+  moment += place.cross(force);
+}
 
 struct BondedParts {  // two parts that touch
   std::array<std::string, 2> parts;
@@ -39,6 +49,13 @@ struct PassShare {  // an effect that ran, why, and how long it took
   double seconds = 0;
 };
 
+struct StressSummary {     // of the largest von Mises stress
+  double value = 0;        // Pa
+  Vec3 at = Vec3::Zero();  // m, rest position
+  std::string part;
+  std::optional<double> yield_share;  // of the part's material; nothing where it has no `yield`
+};
+
 struct TimedSummary {  // of a run in time
   double time = 0;     // s, reached
   std::uint64_t steps = 0;
@@ -48,11 +65,13 @@ struct TimedSummary {  // of a run in time
 };
 
 struct SimulateResult {
+  ErrorBars error_bars;  // at equilibrium
   std::vector<ProbeResult> probes;
   std::vector<Reaction> reactions;
   std::vector<AppliedLoad> loads;
   std::vector<BondedParts> bonds;
-  Vec3 imbalance = Vec3::Zero();  // N, sum of loads and reactions; 0 but for the tolerance
+  Vec3 imbalance = Vec3::Zero();         // N, sum of loads and reactions; 0 but for the tolerance
+  Vec3 moment_imbalance = Vec3::Zero();  // N m, likewise
   std::vector<PassShare> passes;
   std::size_t stray_cells = 0;      // in loose crumbs that were carried along, not simulated
   double largest_displacement = 0;  // m, over the elements
@@ -63,6 +82,7 @@ struct SimulateResult {
   // of the trilinear map at the cells' corners; <= 0: folded there; nothing without cells
   std::optional<double> smallest_corner_jacobian;
   Vec3 smallest_corner_at = Vec3::Zero();  // m, rest position of that corner
+  std::optional<StressSummary> stress;     // nothing where no part has stresses, or they were not asked for
   int load_steps = 0, newton_iterations = 0, cg_iterations = 0;
   double relative_residual = 0;
   double seconds = 0;
@@ -84,6 +104,8 @@ struct SimulateOptions {
   std::string output;
   std::shared_ptr<const Checkpoint> resume;
   std::string isa;       // "portable", "avx2", "avx512"; "" for the best that the machine has
+  bool stress = true;    // compute it, and give the body its columns
+  bool estimate = true;  // equilibrium: error bars, by two runs on coarser lattices
   bool explain = false;  // say which effects run and why, and afterwards the share of time of each
 };
 

@@ -1,6 +1,7 @@
 // The result of a run as JSON and as lines for people.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "formats/program.h"
@@ -34,6 +35,67 @@ std::string forces(const Vec3& exact) {
   return fmt::format("({}, {}, {})", human_force(value.x()), human_force(value.y()), human_force(value.z()));
 }
 
+// The force, or the moment of a couple.
+std::string resultant(const Vec3& force, const Vec3& moment) {
+  constexpr double kCouple = 1e-6;  // 1/m, force over moment: a lever no part has
+  if (moment.norm() == 0 || force.norm() > kCouple * moment.norm()) return forces(force);
+  const Vec3 shown = without_rounding(moment);
+  return fmt::format("({:.3g}, {:.3g}, {:.3g}) N m", shown.x(), shown.y(), shown.z());
+}
+
+// " +- 12 um", or nothing.
+std::string bar_of(const SimulateResult& result, ErrorBar::Of of, std::size_t probe = 0) {
+  for (const ErrorBar& each : result.error_bars.bars)
+    if (each.of == of && each.probe == probe)
+      return of == ErrorBar::Of::elastic_energy ? fmt::format(" +- {:.2g} J", each.bar.half_width)
+                                                : " +- " + human_length(each.bar.half_width);
+  return "";
+}
+
+Json error_bars_json(const ErrorBars& errors) {
+  Json json;
+  json["cells"] = errors.cells;
+  json["note"] = errors.note;
+  json["seconds"] = errors.seconds;
+  json["bars"] = Json::array();
+  for (const ErrorBar& each : errors.bars) {
+    Json bar = {{"of", each.name()},
+                {"value", each.value},
+                {"bar", each.bar.half_width},
+                {"extrapolated", each.bar.extrapolated}};
+    bar["order"] = each.bar.order ? Json(*each.bar.order) : Json(nullptr);
+    json["bars"].push_back(bar);
+  }
+  return json;
+}
+
+// "error bars from 2,048, 256 and 32 cells in 0.01 s, observed order 1.9
+// to 2.1"
+std::string error_bars_line(const ErrorBars& errors) {
+  if (errors.bars.empty()) return "no error bars: " + errors.note;
+  std::vector<std::string> cells;
+  for (const std::size_t each : errors.cells) cells.push_back(human_count(each));
+  std::string line =
+      fmt::format("error bars from {} cells in {:.2f} s", fmt::join(cells, ", "), errors.seconds);
+  double least = 1e300, most = -1e300;
+  for (const ErrorBar& each : errors.bars)
+    if (each.bar.order) {
+      least = std::min(least, *each.bar.order);
+      most = std::max(most, *each.bar.order);
+    }
+  if (least <= most) line += fmt::format(", observed order {:.1f} to {:.1f}", least, most);
+  const auto wide = std::count_if(errors.bars.begin(), errors.bars.end(),
+                                  [](const ErrorBar& each) { return !each.bar.order; });
+  if (wide > 0 && errors.note.empty())
+    line += fmt::format(
+        "; {} of {} quantities do not approach a limit evenly: "
+        "their bars are three times the largest "
+        "difference",
+        wide, errors.bars.size());
+  if (!errors.note.empty()) line += "; " + errors.note;
+  return line;
+}
+
 }  // namespace
 
 std::string summary_json(const SimulateResult& result, const Body& body) {
@@ -56,19 +118,30 @@ std::string summary_json(const SimulateResult& result, const Body& body) {
         {{"name", probe.name}, {"at", vector(probe.where)}, {"displacement", vector(probe.displacement)}});
   json["loads"] = Json::array();
   for (const AppliedLoad& load : result.loads)
-    json["loads"].push_back({{"name", load.name}, {"force", vector(load.force)}});
+    json["loads"].push_back(
+        {{"name", load.name}, {"force", vector(load.force)}, {"moment", vector(load.moment)}});
   json["reactions"] = Json::array();
   for (const Reaction& reaction : result.reactions)
-    json["reactions"].push_back({{"name", reaction.name}, {"force", vector(reaction.force)}});
+    json["reactions"].push_back(
+        {{"name", reaction.name}, {"force", vector(reaction.force)}, {"moment", vector(reaction.moment)}});
   json["bonds"] = Json::array();
   for (const BondedParts& bond : result.bonds)
     json["bonds"].push_back({{"parts", bond.parts}, {"area", bond.area}});
   json["imbalance"] = vector(result.imbalance);
+  json["moment_imbalance"] = vector(result.moment_imbalance);
   json["elastic_energy"] = result.elastic_energy;
+  if (!result.error_bars.bars.empty() || !result.error_bars.note.empty())
+    json["error_bars"] = error_bars_json(result.error_bars);
   json["smallest_jacobian"] = result.smallest_jacobian;
   if (result.smallest_corner_jacobian) {
     json["smallest_corner_jacobian"] = *result.smallest_corner_jacobian;
     json["smallest_corner_at"] = vector(result.smallest_corner_at);
+  }
+  if (result.stress) {
+    json["largest_von_mises"] = result.stress->value;
+    json["largest_von_mises_at"] = vector(result.stress->at);
+    json["largest_von_mises_part"] = result.stress->part;
+    if (result.stress->yield_share) json["largest_von_mises_yield_share"] = *result.stress->yield_share;
   }
   if (result.timed) {
     json["timed"] = {{"time", result.timed->time},
@@ -91,15 +164,28 @@ std::string summary_json(const SimulateResult& result, const Body& body) {
 
 std::vector<std::string> summary_lines(const SimulateResult& result) {
   std::vector<std::string> lines;
-  lines.push_back(fmt::format("largest displacement {} at {}", human_length(result.largest_displacement),
+  lines.push_back(fmt::format("largest displacement {}{} at {}", human_length(result.largest_displacement),
+                              bar_of(result, ErrorBar::Of::largest_displacement),
                               lengths(result.largest_displacement_at)));
-  for (const ProbeResult& probe : result.probes)
-    lines.push_back(fmt::format("probe \"{}\" moved {}: {}", probe.name,
-                                human_length(probe.displacement.norm()), lengths(probe.displacement)));
+  for (std::size_t p = 0; p < result.probes.size(); ++p) {
+    const ProbeResult& probe = result.probes[p];
+    lines.push_back(fmt::format("probe \"{}\" moved {}{}: {}", probe.name,
+                                human_length(probe.displacement.norm()),
+                                bar_of(result, ErrorBar::Of::probe, p), lengths(probe.displacement)));
+  }
+  if (result.stress) {
+    const std::string share = result.stress->yield_share
+                                  ? fmt::format(", {:.3g} % of yield", 100 * *result.stress->yield_share)
+                                  : "";
+    lines.push_back(fmt::format("largest von Mises stress {} in \"{}\" at {}{}",
+                                human_pressure(result.stress->value), result.stress->part,
+                                lengths(result.stress->at), share));
+  }
   for (const AppliedLoad& load : result.loads)
-    lines.push_back(fmt::format("load \"{}\": {}", load.name, forces(load.force)));
+    lines.push_back(fmt::format("load \"{}\": {}", load.name, resultant(load.force, load.moment)));
   for (const Reaction& reaction : result.reactions)
-    lines.push_back(fmt::format("reaction of \"{}\": {}", reaction.name, forces(reaction.force)));
+    lines.push_back(
+        fmt::format("reaction of \"{}\": {}", reaction.name, resultant(reaction.force, reaction.moment)));
   for (const BondedParts& bond : result.bonds)
     lines.push_back(fmt::format("\"{}\" and \"{}\" are bonded over {:.4g} mm2", bond.parts[0], bond.parts[1],
                                 bond.area * 1e6));
@@ -108,7 +194,8 @@ std::vector<std::string> summary_lines(const SimulateResult& result) {
                                  : "";
   if (result.timed) {
     lines.push_back(
-        fmt::format("{} steps of {:.4g} s to {:.6g} s in {:.2f} s (kernel {}), elastic energy {:.4g} J, "
+        fmt::format("{} steps of {:.4g} s to {:.6g} s in {:.2f} s "
+                    "(kernel {}), elastic energy {:.4g} J, "
                     "smallest J {:.4g}{}",
                     result.timed->steps, result.timed->step, result.timed->time, result.seconds,
                     result.timed->isa, result.elastic_energy, result.smallest_jacobian, corner));
@@ -119,11 +206,15 @@ std::vector<std::string> summary_lines(const SimulateResult& result) {
     return lines;
   }
   lines.push_back(
-      fmt::format("elastic energy {:.4g} J, smallest J {:.4g}{}, {} load step(s), {} Newton and {} CG "
+      fmt::format("elastic energy {:.4g} J{}, smallest J {:.4g}{}, {} load step(s), {} "
+                  "Newton and {} CG "
                   "iterations, residual "
                   "{:.1e}, {:.2f} s",
-                  result.elastic_energy, result.smallest_jacobian, corner, result.load_steps,
-                  result.newton_iterations, result.cg_iterations, result.relative_residual, result.seconds));
+                  result.elastic_energy, bar_of(result, ErrorBar::Of::elastic_energy),
+                  result.smallest_jacobian, corner, result.load_steps, result.newton_iterations,
+                  result.cg_iterations, result.relative_residual, result.seconds));
+  if (!result.error_bars.bars.empty() || !result.error_bars.note.empty())
+    lines.push_back(error_bars_line(result.error_bars));
   return lines;
 }
 

@@ -61,6 +61,8 @@ std::optional<Gravity> Gravity::make(const Parameters& parameters, const Setting
   if (!parameters.acceleration && !made.needs_time()) return std::nullopt;
   // in time broken matter falls too
   made.mass_ = setting.duration ? lumped_masses(setting) : element_masses(setting);
+  for (std::size_t e = 0; e < made.mass_.size(); ++e)
+    made.first_moment_ += made.mass_[e] * setting.body.rest[e];
   if (!made.needs_time()) return made;
   made.rest_ = setting.body.rest;
   made.radius_.resize(made.rest_.size());
@@ -156,11 +158,16 @@ double Gravity::added_frequency(const State& state, const std::vector<double>&) 
 }
 
 void Gravity::report(const State& state, const std::vector<Vec3>&, SimulateResult& result) const {
+  AppliedLoad total{"gravity", Vec3::Zero(), Vec3::Zero()};
   const double mass = parallel_sum<double>(mass_.size(), [&](std::size_t e) { return mass_[e]; });
-  Vec3 force = state.share * mass * acceleration_;
+  Vec3 first_moment = first_moment_;
+  for (std::size_t e = 0; e < mass_.size(); ++e) first_moment += mass_[e] * state.displacement[e];
+  total.force = state.share * mass * acceleration_;
+  total.moment = state.share * first_moment.cross(acceleration_);
   for (std::size_t e = 0; !sources_.empty() && e < mass_.size(); ++e)
-    force += (constant_ * mass_[e]) * pull(state, e).field;
-  result.loads.push_back({"gravity", force});  // the mutual part sums up to 0
+    add_at((constant_ * mass_[e]) * pull(state, e).field, rest_[e] + state.displacement[e], total.force,
+           total.moment);
+  result.loads.push_back(total);  // the mutual part sums up to 0
 }
 
 }  // namespace flexel

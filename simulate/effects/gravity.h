@@ -50,6 +50,7 @@ class Gravity {
   bool mutual_ = false;
   double constant_ = kNewton;
   std::vector<double> mass_;            // (elements) kg
+  Vec3 first_moment_ = Vec3::Zero();    // kg m, sum of mass times rest position
   std::vector<double> radius_;          // (elements) m, half the spacing; with sources or mutual
   std::vector<Vec3> rest_;              // (elements) m, likewise
   std::vector<std::uint32_t> massive_;  // elements with mass, ascending; with mutual

@@ -9,6 +9,7 @@
 #include <algorithm>
 
 #include "formats/error.h"
+#include "simulate/effects/load_distribution.h"
 #include "simulate/scene_selection.h"
 #include "simulate/surface_points.h"
 
@@ -21,14 +22,22 @@ Load parse_load(TableReader& reader) {
   load.where = require_where(reader);
   load.name = reader.text("name").value_or(describe(load.where));
   load.force = reader.vector("force", Dimension::force);
+  load.at = reader.vector("at", Dimension::length);
+  load.torque = reader.vector("torque", Dimension::torque);
   load.pressure = reader.quantity("pressure", Dimension::pressure);
+  const std::optional<Vec3> pin = reader.vector("bearing", Dimension::force);
   load.course = parse_course(reader);
   reader.finish();
-  if (load.force.has_value() == load.pressure.has_value())
+  if ((load.force || load.torque ? 1 : 0) + (load.pressure ? 1 : 0) + (pin ? 1 : 0) != 1)
     reader.fail(
         "[[load]] needs either \"force\" (the total, for example [\"0 N\", \"0 N\", \"-100 N\"]) or "
-        "\"pressure\" "
-        "(for example \"2 MPa\")");
+        "\"pressure\" (for example \"2 MPa\"), \"torque\" or \"bearing\"");
+  if (load.at && !load.force) reader.fail("\"at\" says where a \"force\" acts; give one");
+  if (pin) {
+    if (*pin == Vec3::Zero()) reader.fail("\"bearing\" is zero and has no direction");
+    load.force = pin;
+    load.bearing = true;
+  }
   return load;
 }
 
@@ -36,36 +45,63 @@ void spread(const Carrier& at, const Vec3& force, std::vector<Vec3>& sum) {
   for (std::uint32_t a = 0; a < at.count; ++a) sum[at.elements[a]] += at.weights[a] * force;
 }
 
+// Forces at the points, by the kind of the load.
+std::vector<Vec3> forces_at(const Load& load, const std::vector<LoadedPoint>& points) {
+  if (load.bearing) {
+    if (auto forces = bearing(points, *load.force)) return *forces;
+    throw InputError(load.origin,
+                     fmt::format("load \"{}\": the face does not look against the bearing load all around "
+                                 "it; select the cylindrical face, and give a force across its axis",
+                                 load.name));
+  }
+  if (auto forces = averaging_link(points, load.force.value_or(Vec3::Zero()),
+                                   load.torque.value_or(Vec3::Zero()), load.at))
+    return *forces;
+  throw InputError(
+      load.origin,
+      fmt::format("load \"{}\": its points lie on a line and take no moment about it; select a larger area",
+                  load.name));
+}
+
 void add_surface_load(const Load& load, const std::vector<std::uint32_t>& polygons, const Setting& setting,
                       std::vector<Vec3>& sum) {
   const std::vector<SurfacePoint> points = surface_points(setting, polygons);
-  const double area = total_area(points);
-  if (!(area > 0))
+  if (!(total_area(points) > 0))
     throw InputError(
         load.origin,
         fmt::format("load \"{}\": no matter lies under the selected surface; use a smaller spacing",
                     load.name));
-  for (const SurfacePoint& point : points) {
-    const Vec3 force = load.force ? Vec3(*load.force * (point.area_vector.norm() / area))
-                                  : Vec3(-*load.pressure * point.area_vector);
-    spread(point.at, force, sum);
+  if (load.pressure) {
+    for (const SurfacePoint& point : points) spread(point.at, -*load.pressure * point.area_vector, sum);
+    return;
   }
+  std::vector<LoadedPoint> loaded;
+  for (const SurfacePoint& point : points)
+    loaded.push_back({point.position, point.area_vector.norm(), point.area_vector.normalized()});
+  const std::vector<Vec3> forces = forces_at(load, loaded);
+  for (std::size_t q = 0; q < points.size(); ++q) spread(points[q].at, forces[q], sum);
 }
 
-// The force spread over the selected elements by the volume of the matter around them.
+// On the selected elements, by the volume of the matter around them.
 void add_volume_load(const Load& load, const std::vector<std::uint32_t>& elements, const Setting& setting,
                      std::vector<Vec3>& sum) {
-  if (load.pressure)
-    throw InputError(load.origin,
-                     fmt::format("load \"{}\": a pressure needs a face, group or side; {} selects elements",
-                                 load.name, describe(load.where)));
+  if (load.pressure || load.bearing)
+    throw InputError(
+        load.origin,
+        fmt::format("load \"{}\": a {} needs a face, group or side; {} selects elements", load.name,
+                    load.pressure ? "pressure" : "bearing load", describe(load.where)));
   const std::vector<double> volume = element_volumes(setting);
+  std::vector<LoadedPoint> loaded;
   double total = 0;
-  for (const std::uint32_t e : elements) total += volume[e];
+  for (const std::uint32_t e : elements) {
+    loaded.push_back({setting.body.rest[e], volume[e]});
+    total += volume[e];
+  }
   if (!(total > 0))
     throw InputError(load.origin,
                      fmt::format("load \"{}\": the selected elements hold no matter", load.name));
-  for (const std::uint32_t e : elements) sum[e] += *load.force * (volume[e] / total);
+  const std::vector<Vec3> forces = forces_at(load, loaded);
+  for (std::size_t q = 0; q < elements.size(); ++q) sum[elements[q]] += forces[q];
 }
 
 }  // namespace
@@ -80,14 +116,7 @@ void Loads::parse(TableReader& scene, Parameters& parameters) {
 std::optional<Loads> Loads::make(const Parameters& parameters, const Setting& setting) {
   if (parameters.loads.empty()) return std::nullopt;
   Loads loads;
-  std::vector<Vec3> steady(setting.body.element_count(), Vec3::Zero());
-  const auto add_group = [&](const Course& course, const std::vector<Vec3>& forces) {
-    Group made;
-    made.course = course;
-    for (std::uint32_t e = 0; e < forces.size(); ++e)
-      if (forces[e] != Vec3::Zero()) made.forces.push_back({e, forces[e]});
-    if (!made.forces.empty()) loads.groups_.push_back(std::move(made));
-  };
+  loads.body_ = &setting.body;
   for (const Load& load : parameters.loads) {
     const Selected selected = resolve(load.where, setting.body);
     if (!selected.polygons.empty() && !selected.elements.empty())
@@ -98,47 +127,49 @@ std::optional<Loads> Loads::make(const Parameters& parameters, const Setting& se
       add_surface_load(load, selected.polygons, setting, sum);
     else
       add_volume_load(load, selected.elements, setting, sum);
-    Vec3 resultant = Vec3::Zero();
-    for (const Vec3& force : sum) resultant += force;
-    loads.totals_.push_back({load.name, resultant, load.course});
-    if (!load.course.time.empty())
-      add_group(load.course, sum);
-    else
-      for (std::size_t e = 0; e < sum.size(); ++e) steady[e] += sum[e];
+    Spread made{load.name, load.course, {}};
+    for (std::uint32_t e = 0; e < sum.size(); ++e)
+      if (sum[e] != Vec3::Zero()) made.forces.push_back({e, sum[e]});
+    loads.loads_.push_back(std::move(made));
   }
-  add_group({}, steady);
   return loads;
 }
 
 std::string Loads::why() const {
-  return fmt::format("{} [[load]]", totals_.size());
+  return fmt::format("{} [[load]]", loads_.size());
 }
 
 bool Loads::constant() const {
-  return std::all_of(groups_.begin(), groups_.end(),
-                     [](const Group& group) { return group.course.time.empty(); });
+  return std::all_of(loads_.begin(), loads_.end(),
+                     [](const Spread& load) { return load.course.time.empty(); });
 }
 
 double Loads::energy(const State& state) const {
   double energy = 0;
-  for (const Group& group : groups_) {
+  for (const Spread& load : loads_) {
     double work = 0;
-    for (const ElementForce& at : group.forces) work += at.force.dot(state.displacement[at.element]);
-    energy -= group.course.at(state) * work;
+    for (const ElementForce& at : load.forces) work += at.force.dot(state.displacement[at.element]);
+    energy -= load.course.at(state) * work;
   }
   return energy;
 }
 
 void Loads::add_forces(const State& state, std::vector<Vec3>& forces) const {
-  for (const Group& group : groups_) {
-    const double factor = group.course.at(state);
-    for (const ElementForce& at : group.forces) forces[at.element] += factor * at.force;
+  for (const Spread& load : loads_) {
+    const double factor = load.course.at(state);
+    for (const ElementForce& at : load.forces) forces[at.element] += factor * at.force;
   }
 }
 
 void Loads::report(const State& state, const std::vector<Vec3>&, SimulateResult& result) const {
-  for (const Total& total : totals_)
-    result.loads.push_back({total.name, total.course.at(state) * total.force});
+  for (const Spread& load : loads_) {
+    const double factor = load.course.at(state);
+    AppliedLoad total{load.name, Vec3::Zero(), Vec3::Zero()};
+    for (const ElementForce& at : load.forces)
+      add_at(factor * at.force, body_->rest[at.element] + state.displacement[at.element], total.force,
+             total.moment);
+    result.loads.push_back(total);
+  }
 }
 
 }  // namespace flexel

@@ -1,6 +1,7 @@
-// Loads: a total force spread evenly over the selected surface (or over the volume of the selected elements),
-// or a pressure along the surface's normals at rest. Both are dead: they keep the direction and the size that
-// they have at rest.
+// Loads on the selected surface, or on the selected elements by the matter around them: a total force, spread
+// evenly; a force at a remote point and a torque, spread as an averaging link does; a pressure along the
+// surface's normals; a pin's bearing load (effects/load_distribution.h). All are dead: they keep the
+// direction and the size that they have at rest.
 #pragma once
 #include "simulate/course.h"
 #include "simulate/effects/effect.h"
@@ -15,6 +16,10 @@ struct Load {
   Course course = {};              // in timed runs; none: all of it from the start
   std::string name;
   std::string origin;  // "beam.toml:12"
+  // Of averaging links
+  std::optional<Vec3> at = {};      // m, rest: where `force` acts; nothing: spread evenly
+  std::optional<Vec3> torque = {};  // N m, a couple
+  bool bearing = false;             // `force` is that of a pin on a cylindrical face
 };
 
 class Loads {
@@ -38,17 +43,13 @@ class Loads {
     std::uint32_t element = 0;
     Vec3 force = Vec3::Zero();  // N
   };
-  struct Group {  // loads of one course
+  struct Spread {  // one load
+    std::string name;
     Course course;
     std::vector<ElementForce> forces;  // ascending by element
   };
-  struct Total {
-    std::string name;
-    Vec3 force = Vec3::Zero();  // N
-    Course course;
-  };
-  std::vector<Group> groups_;  // one a load with a course, then all others in one
-  std::vector<Total> totals_;  // of each load
+  const Body* body_ = nullptr;
+  std::vector<Spread> loads_;
 };
 
 }  // namespace flexel

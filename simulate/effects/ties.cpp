@@ -204,19 +204,29 @@ void Ties::constrain(Constraints& constraints) const {
 }
 
 void Ties::report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) const {
-  std::vector<Vec3> reaction(ties_.size(), Vec3::Zero());
-  for (const TiedElements& tied : tied_)
-    reaction[tied.tie] -= (tied.stiffness * violation(tied, state)).colwise().sum().transpose();
+  std::vector<Reaction> reaction;
+  for (const Tie& tie : ties_) reaction.push_back({tie.name, Vec3::Zero(), Vec3::Zero()});
+  const auto add = [&](std::size_t tie, const Vec3& force, std::uint32_t e) {
+    add_at(force, body_->rest[e] + state.displacement[e], reaction[tie].force, reaction[tie].moment);
+  };
+  for (const TiedElements& tied : tied_) {
+    const Displacements force = tied.stiffness * violation(tied, state);
+    for (std::size_t a = 0; a < tied.count; ++a)
+      add(tied.tie, -force.row(static_cast<Eigen::Index>(a)).transpose(), tied.elements[a]);
+  }
   std::vector<std::uint8_t> counted(body_->element_count(),
                                     0);  // an element of two ties counts for the first
   for (std::size_t t = 0; t < ties_.size(); ++t)
-    for (const std::uint32_t e : held_elements_[t])
+    for (const std::uint32_t e : held_elements_[t]) {
+      Vec3 held = Vec3::Zero();
       for (std::size_t axis = 0; axis < 3; ++axis) {
         if (!ties_[t].axes[axis] || (counted[e] >> axis & 1)) continue;
         counted[e] = static_cast<std::uint8_t>(counted[e] | 1u << axis);
-        reaction[t][static_cast<Eigen::Index>(axis)] -= unbalanced[e][static_cast<Eigen::Index>(axis)];
+        held[static_cast<Eigen::Index>(axis)] = -unbalanced[e][static_cast<Eigen::Index>(axis)];
       }
-  for (std::size_t t = 0; t < ties_.size(); ++t) result.reactions.push_back({ties_[t].name, reaction[t]});
+      add(t, held, e);
+    }
+  result.reactions.insert(result.reactions.end(), reaction.begin(), reaction.end());
 }
 
 }  // namespace flexel

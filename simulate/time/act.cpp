@@ -323,7 +323,7 @@ void Act::store(const State& state) {
   stepper_->write_memory(body_.cell_count(), body_.cell_columns);
 }
 
-void Act::report(const Clock& clock, SimulateResult& result) {
+void Act::report(const Clock& clock, bool stress, SimulateResult& result) {
   std::vector<Vec3> unbalanced(body_.element_count(), Vec3::Zero());
   held_->add_forces(unbalanced);
   for (Vec3& force : unbalanced) force = -force;
@@ -339,6 +339,7 @@ void Act::report(const Clock& clock, SimulateResult& result) {
   if (paper_)
     result.smallest_jacobian = std::min(result.smallest_jacobian, paper_->smallest_volume(state_).value);
   measure_corners(cells, body_, state_, result, progress_);
+  if (stress) measure_stress(setting_, state_, body_, result);
   measure_displacement(body_, state_, result);
   for (const double mass : stepper_->mass()) result.mass += mass;
   result.timed = TimedSummary{*state_.time, clock.steps, clock.step, stepper_->isa(), {}};

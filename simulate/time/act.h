@@ -82,8 +82,9 @@ class Act {
 
   // Moves the body to `state`: positions, velocities, what broke, what the cells remember.
   void store(const State& state);
-  // What can be measured now. `unbalanced` forces are those of the last step.
-  void report(const Clock& clock, SimulateResult& result);
+  // What can be measured now, with the stresses where they are asked for. `unbalanced` forces are those of
+  // the last step.
+  void report(const Clock& clock, bool stress, SimulateResult& result);
 
   [[nodiscard]] const State& state() const { return state_; }
   [[nodiscard]] const std::vector<Pass>& passes() const { return passes_; }

@@ -209,7 +209,7 @@ std::string TimedRun::save_failed() {
 
 SimulateResult TimedRun::report() {
   SimulateResult result;
-  act_->report(clock_, result);
+  act_->report(clock_, options_.stress, result);
   if (history_) {
     const Ledger& ledger = history_->ledger();
     const Energies& last = ledger.rows.back().energies;

@@ -309,7 +309,7 @@ std::string refusal(const std::string& text) {
 }
 
 TEST(Fracture, RefusesWhatCannotBreak) {
-  const std::string begin = "material = \"steel\"\n[run]\ntime = \"1 us\"\n[fracture]\n";
+  const std::string begin = "material = \"copper\"\n[run]\ntime = \"1 us\"\n[fracture]\n";
   EXPECT_THAT(refusal(begin), HasSubstr("no part can break: write strength"));
   EXPECT_THAT(refusal(begin + "elongation = 0.2\n"), HasSubstr("add [plasticity]"));
   EXPECT_THAT(refusal(begin + "strength = \"0 Pa\"\n"), HasSubstr("above 0"));

@@ -1,0 +1,319 @@
+#!/usr/bin/env python3
+"""Flexel beside CalculiX on the same parts: error, error bar, seconds, memory.
+
+    PATH=build/release/bin:$PATH bench/accuracy/calculix.py [--quick] [CASE...]
+
+Each part is made by gmsh (OpenCASCADE). CalculiX gets its mesh of quadratic tetrahedra (C3D10) at three sizes, Flexel the STEP file at
+two spacings, both one thread and the same faces, material and load. What is compared is the mean displacement of a face, or that of a
+point. The reference is Lame's solution for the tube, otherwise CalculiX's three values extrapolated (Aitken), or the finest where they
+do not approach a limit. Seconds are the processor's, which other jobs do not change, and hold everything from the file with the part or
+mesh to the result; those of CalculiX leave out gmsh's meshing. --quick leaves out the finest mesh and spacing. Needs ccx and gmsh (tools/setup --tests).
+"""
+
+import json
+import math
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+
+TOLERANCE = 1e-6  # mm, a node lies on a face
+
+
+def turned(angles):
+    """Rotation about x, then about z [deg]."""
+    x, z = np.radians(angles)
+    about_x = np.array([[1, 0, 0], [0, math.cos(x), -math.sin(x)], [0, math.sin(x), math.cos(x)]])
+    about_z = np.array([[math.cos(z), -math.sin(z), 0], [math.sin(z), math.cos(z), 0], [0, 0, 1]])
+    return about_z @ about_x
+
+
+def plane(axis, value):
+    return lambda p: np.abs(p[:, axis] - value) < TOLERANCE
+
+
+def cylinder(radius):
+    return lambda p: np.abs(np.hypot(p[:, 0], p[:, 1]) - radius) < 1e-3
+
+
+class Case:
+    """Lengths in mm before `turn`. faces: name -> (nodes of it, its middle). fix: [(face, axes)]. load: (face, kind, value), N, N m or
+    MPa. asked: a face, or a point."""
+
+    def __init__(self, geometry, faces, fix, load, asked, sizes, spacings, poisson=0.3, turn=None, reference=None):
+        self.geometry, self.faces, self.fix, self.load, self.asked = geometry, faces, fix, load, asked
+        self.sizes, self.spacings, self.poisson, self.reference = sizes, spacings, poisson, reference
+        self.angles = turn
+        self.turn = turned(turn) if turn else np.eye(3)
+
+
+YOUNG = 210e3  # MPa
+
+
+def beam(poisson, turn=None):
+    faces = {"held": (plane(0, 0), (0, 12.5, 12.5)), "end": (plane(0, 100), (100, 12.5, 12.5))}
+    return Case("Box(1) = {0, 0, 0, 100, 25, 25};", faces, [("held", "xyz")], ("end", "force", (0, 0, -1000)), "end",
+                (12.5, 8, 5), (25 / 4, 25 / 8), poisson, turn)
+
+
+def bracket():
+    geometry = """Box(1) = {0, 0, 0, 8, 40, 60}; Box(2) = {0, 0, 0, 60, 40, 8}; Cylinder(3) = {-1, 20, 40, 20, 0, 0, 6};
+BooleanUnion(4) = { Volume{1}; Delete; }{ Volume{2}; Delete; };
+BooleanDifference(5) = { Volume{4}; Delete; }{ Volume{3}; Delete; };"""
+    faces = {"held": (plane(0, 0), (0, 20, 30)), "end": (plane(0, 60), (60, 20, 4))}
+    return Case(geometry, faces, [("held", "xyz")], ("end", "force", (0, 0, -100)), "end", (5, 3.5, 2.5), (2, 1))
+
+
+def plate():
+    geometry = """Box(1) = {0, 0, 0, 100, 50, 5}; Cylinder(2) = {50, 25, -1, 0, 0, 7, 10};
+BooleanDifference(3) = { Volume{1}; Delete; }{ Volume{2}; Delete; };"""
+    faces = {"held": (plane(0, 0), (0, 25, 2.5)), "end": (plane(0, 100), (100, 25, 2.5))}
+    return Case(geometry, faces, [("held", "xyz")], ("end", "force", (5000, 0, 0)), "end", (6, 4, 2.5), (2.5, 1.25))
+
+
+def torsion():
+    faces = {"held": (plane(0, 0), (0, 10, 10)), "end": (plane(0, 100), (100, 10, 10))}
+    return Case("Box(1) = {0, 0, 0, 100, 20, 20};", faces, [("held", "xyz")], ("end", "torque", (50, 0, 0)), (100, 20, 20),
+                (10, 6, 4), (5, 2.5))
+
+
+def tube():
+    geometry = """Cylinder(1) = {0, 0, 0, 0, 0, 4, 40, Pi/2}; Cylinder(2) = {0, 0, 0, 0, 0, 4, 20, Pi/2};
+BooleanDifference(3) = { Volume{1}; Delete; }{ Volume{2}; Delete; };"""
+    middle = 2 / math.pi * 20
+    faces = {"inner": (cylinder(20), (middle, middle, 2)), "along": (plane(1, 0), (30, 0, 2)), "across": (plane(0, 0), (0, 30, 2)),
+             "low": (plane(2, 0), (19.8, 19.8, 0)), "high": (plane(2, 4), (19.8, 19.8, 4))}
+    nu, a, b, p = 0.3, 20, 40, 10
+    radial = (1 + nu) * p * a * a / (YOUNG * (b * b - a * a)) * ((1 - 2 * nu) * a + b * b / a)
+    return Case(geometry, faces, [("along", "y"), ("across", "x"), ("low", "z"), ("high", "z")], ("inner", "pressure", p), "inner",
+                (6, 4, 2.5), (2, 1), nu, reference=radial * 2 * math.sqrt(2) / math.pi)
+
+
+CASES = {
+    "beam": lambda: beam(0.3),
+    "beam, nu 0": lambda: beam(0.0),
+    "beam, nu 0.45": lambda: beam(0.45),
+    "beam turned": lambda: beam(0.3, (30, 30)),
+    "L-bracket with a hole": bracket,
+    "plate with a hole": plate,
+    "bar twisted": torsion,
+    "thick tube": tube,
+}
+
+
+def measured(command, **options):
+    """Processor seconds and MB of a process."""
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, **options)
+    text = process.stderr.read().decode(errors="replace")
+    _, status, usage = os.wait4(process.pid, 0)
+    if status != 0:
+        raise RuntimeError(f"{' '.join(map(str, command))}: {text[-400:]}")
+    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1000
+
+
+# CalculiX
+
+
+def read_mesh(path):
+    """Nodes by number, tetrahedra of ten and triangles of six, from gmsh's .inp."""
+    nodes, solids, faces = {}, [], []
+    into = None
+    for line in path.read_text().splitlines():
+        if line.startswith("*"):
+            upper = line.upper()
+            into = "node" if upper.startswith("*NODE") else "C3D10" if "C3D10" in upper else "CPS6" if "CPS6" in upper else None
+            rest = []
+            continue
+        values = [value for value in line.replace(",", " ").split()]
+        if into == "node":
+            nodes[int(values[0])] = [float(value) for value in values[1:4]]
+        elif into:
+            rest += [int(value) for value in values]
+            want = 11 if into == "C3D10" else 7
+            if len(rest) >= want:
+                (solids if into == "C3D10" else faces).append(rest[1:want])
+                rest = []
+    return nodes, solids, faces
+
+
+class Mesh:
+    def __init__(self, case, folder, size):
+        geo = folder / "part.geo"
+        turn = ""
+        if case.angles:
+            x, z = case.angles
+            turn = (f"Rotate {{ {{1, 0, 0}}, {{0, 0, 0}}, {x} * Pi / 180 }} {{ Volume{{:}}; }}\n"
+                    f"Rotate {{ {{0, 0, 1}}, {{0, 0, 0}}, {z} * Pi / 180 }} {{ Volume{{:}}; }}\n")
+        geo.write_text(f'SetFactory("OpenCASCADE");\n{case.geometry}\n{turn}Mesh.SaveAll = 1; Mesh.CharacteristicLengthMax = {size};\n'
+                       "Mesh.ElementOrder = 2; Mesh.HighOrderOptimize = 1;\n")
+        subprocess.run(["gmsh", geo, "-3", "-format", "inp", "-o", folder / "mesh.inp", "-v", "1"], check=True, stdout=subprocess.DEVNULL)
+        found, self.solids, triangles = read_mesh(folder / "mesh.inp")
+        used = sorted({node for solid in self.solids for node in solid})
+        self.number = used
+        self.place = {node: i for i, node in enumerate(used)}
+        self.points = np.array([found[node] for node in used])
+        self.rest = self.points @ case.turn  # turned back
+        self.triangles = np.array([[self.place[node] for node in triangle] for triangle in triangles])
+
+    def triangles_on(self, holds):
+        on = holds(self.rest)
+        return self.triangles[on[self.triangles].all(axis=1)]
+
+    def areas(self, triangles):
+        """Area vectors, outward."""
+        a, b, c = (self.rest[triangles[:, i]] for i in range(3))
+        area = 0.5 * np.cross(b - a, c - a)
+        return area
+
+    def weights(self, triangles):
+        """Of the mean over a face: a third of each triangle's area at its middle nodes."""
+        weights = np.zeros(len(self.points))
+        area = np.linalg.norm(self.areas(triangles), axis=1)
+        for i in range(3, 6):
+            np.add.at(weights, triangles[:, i], area / 3)
+        return weights
+
+
+def nodal_loads(case, mesh):
+    face, kind, value = case.load
+    triangles = mesh.triangles_on(case.faces[face][0])
+    weights = mesh.weights(triangles)
+    if kind == "force":
+        return weights[:, None] / weights.sum() * np.array(value, float)
+    if kind == "torque":
+        middle = (weights[:, None] * mesh.rest).sum(axis=0) / weights.sum()
+        arm = mesh.rest - middle
+        inertia = sum(w * (r @ r * np.eye(3) - np.outer(r, r)) for w, r in zip(weights, arm) if w > 0)
+        return weights[:, None] * np.cross(np.linalg.solve(inertia, 1000 * np.array(value, float)), arm)
+    area = mesh.areas(triangles)
+    centre = mesh.rest[triangles[:, :3]].mean(axis=1)
+    inward = np.einsum("ij,ij->i", area[:, :2], centre[:, :2]) < 0  # the tube's outward normal there looks to its axis
+    area[~inward] *= -1
+    forces = np.zeros_like(mesh.points)
+    for i in range(3, 6):
+        np.add.at(forces, triangles[:, i], -value * area / 3)
+    return forces
+
+
+def calculix(case, folder, size):
+    mesh = Mesh(case, folder, size)
+    forces = nodal_loads(case, mesh) @ case.turn.T
+    with open(folder / "job.inp", "w", encoding="utf-8") as out:
+        out.write("*NODE, NSET=ALL\n")
+        for i, point in enumerate(mesh.points):
+            out.write(f"{i + 1},{point[0]:.12g},{point[1]:.12g},{point[2]:.12g}\n")
+        out.write("*ELEMENT, TYPE=C3D10, ELSET=E\n")
+        for i, solid in enumerate(mesh.solids):
+            out.write(f"{i + 1}," + ",".join(str(mesh.place[node] + 1) for node in solid) + "\n")
+        out.write(f"*MATERIAL,NAME=M\n*ELASTIC\n{YOUNG},{case.poisson}\n*SOLID SECTION,ELSET=E,MATERIAL=M\n*BOUNDARY\n")
+        for face, axes in case.fix:
+            for i in np.flatnonzero(case.faces[face][0](mesh.rest)):
+                for axis in axes:
+                    out.write(f"{i + 1},{'xyz'.index(axis) + 1},{'xyz'.index(axis) + 1}\n")
+        out.write("*STEP\n*STATIC\n*CLOAD\n")
+        for i, axis in zip(*np.nonzero(forces)):
+            out.write(f"{i + 1},{axis + 1},{forces[i, axis]:.12g}\n")
+        out.write("*NODE PRINT, NSET=ALL\nU\n*END STEP\n")
+    seconds, memory = measured(["ccx", folder / "job"], cwd=folder, env={**os.environ, "OMP_NUM_THREADS": "1"})
+    moved = np.zeros_like(mesh.points)
+    for line in (folder / "job.dat").read_text().splitlines():
+        row = line.split()
+        if len(row) == 4 and row[0].isdigit():
+            moved[int(row[0]) - 1] = [float(value) for value in row[1:]]
+    if isinstance(case.asked, str):
+        weights = mesh.weights(mesh.triangles_on(case.faces[case.asked][0]))
+        mean = (weights[:, None] * moved).sum(axis=0) / weights.sum()
+    else:
+        mean = moved[np.argmin(np.linalg.norm(mesh.rest - np.array(case.asked, float), axis=1))]
+    return np.linalg.norm(mean), seconds, memory, len(mesh.solids)
+
+
+# Flexel
+
+
+def face_names(case, step):
+    """The faces of the part as Flexel numbers them, by their middles."""
+    text = subprocess.run(["flexel", "info", step], check=True, capture_output=True, text=True).stdout
+    found = {name: np.array([float(value) for value in middle.split(",")])
+             for name, middle in re.findall(r"^\s+(\S+/\d+)\s+[\d.]+\s+\(([^)]*)\)", text, re.M)}
+    return {name: min(found, key=lambda each, at=case.turn @ np.array(middle, float): np.linalg.norm(found[each] - at))
+            for name, (_, middle) in case.faces.items()}
+
+
+def quantities(vector, unit):
+    return "[" + ", ".join(f'"{value:.15g} {unit}"' for value in vector) + "]"
+
+
+def flexel(case, folder, spacing):
+    step = folder / "part.step"
+    if not step.exists():
+        geo = (folder / "part.geo").read_text() + 'Save "part.step";\n'
+        (folder / "export.geo").write_text(geo)
+        subprocess.run(["gmsh", "export.geo", "-0", "-v", "1"], check=True, cwd=folder, stdout=subprocess.DEVNULL)
+    names = face_names(case, step)
+    face, kind, value = case.load
+    vector = None if kind == "pressure" else case.turn @ np.array(value, float)
+    load = {"force": lambda: f"force = {quantities(vector, 'N')}", "torque": lambda: f"torque = {quantities(vector, 'N m')}",
+            "pressure": lambda: f'pressure = "{value} MPa"'}[kind]()
+    asked = f'where = "{names[case.asked]}"' if isinstance(case.asked, str) else f"at = {quantities(case.turn @ case.asked, 'mm')}"
+    scene = folder / "scene.toml"
+    scene.write_text(f"""material = "it"
+[materials.it]
+young = "{YOUNG} MPa"
+poisson = {case.poisson}
+density = "7850 kg/m3"
+""" + "".join(f'[[fix]]\nwhere = "{names[each]}"\naxes = "{axes}"\n' for each, axes in case.fix) + f"""[[load]]
+where = "{names[face]}"
+{load}
+[[probe]]
+name = "asked"
+{asked}
+""")
+    body = folder / "body.vtu"
+    first, memory = measured(["flexel-voxelize", step, "--size", f"{spacing} mm", "-o", body, "--threads", "1"])
+    second, more = measured(["flexel-simulate", scene, body, "-o", folder / "bent.vtu", "--threads", "1", "--summary", folder / "s.json"])
+    found = json.loads((folder / "s.json").read_text())
+    bars = found.get("error_bars", {}).get("bars", [])
+    bar = next((each["bar"] for each in bars if each["of"] == "probe asked"), float("nan"))
+    return np.linalg.norm(found["probes"][0]["displacement"]) * 1e3, bar * 1e3, first + second, max(memory, more), found["cells"]
+
+
+def limit(values):
+    """Aitken's extrapolation, or the last."""
+    if len(values) < 3:
+        return values[-1]
+    first, second = values[-2] - values[-3], values[-1] - values[-2]
+    return values[-1] if not 0 < second / first < 0.9 else values[-1] + second * second / (first - second)
+
+
+def run(name, quick):
+    case = CASES[name]()
+    with tempfile.TemporaryDirectory() as place:
+        folder = pathlib.Path(place)
+        rows = [calculix(case, folder, size) for size in case.sizes[: 2 if quick else 3]]
+        ours = [flexel(case, folder, spacing) for spacing in case.spacings[: 1 if quick else 2]]
+    reference = case.reference or limit([row[0] for row in rows])
+    for size, (value, seconds, memory, count) in zip(case.sizes, rows):
+        print(f"| {name} | CalculiX, C3D10 of {size:g} mm | {count:,} | {100 * (value / reference - 1):+.2f} | | {seconds:.2f} | {memory:.0f} |")
+    for spacing, (value, bar, seconds, memory, cells) in zip(case.spacings, ours):
+        print(f"| {name} | Flexel, cells of {spacing:g} mm | {cells:,} | {100 * (value / reference - 1):+.2f} | {100 * bar / reference:.2f} |"
+              f" {seconds:.2f} | {memory:.0f} |", flush=True)
+
+
+def main():
+    wanted = [argument for argument in sys.argv[1:] if not argument.startswith("-")] or list(CASES)
+    unknown = [name for name in wanted if name not in CASES]
+    if unknown or "--help" in sys.argv:
+        print(__doc__ + "\nCases: " + ", ".join(CASES), file=sys.stderr)
+        sys.exit(0 if "--help" in sys.argv else 2)
+    print("| part | by | elements, cells | error % | bar % | s | MB |\n|---|---|---|---|---|---|---|")
+    for name in wanted:
+        run(name, "--quick" in sys.argv)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,24 @@
+// The same matter on a coarser lattice: what error bars compare a result with (docs/error-bars.md).
+//
+// Each part's lattice becomes about twice as coarse along each axis. A cell of the finer lattice gives its
+// matter to the coarse voxels that it overlaps; the fill is what they got. What is not connected through the
+// faces of fine cells stays apart: a coarse voxel has a cell a connected piece in it, and coarse elements are
+// shared only where the matter on both sides of a coarse face meets there.
+//
+// The spacing is exactly doubled unless another one between 1.5 and 3 times puts more of the flat faces of
+// the part, which lie on planes of the fine lattice, on planes of the coarse one: a wall of three cells
+// becomes one of two, not one of one and a half.
+#pragma once
+#include "formats/body.h"
+
+namespace flexel {
+
+// At rest, without columns and without the source bytes of the surface. Throws InputError with the reason
+// where the body cannot be coarsened: centre placement, a part one cell thick, columns of an earlier run.
+[[nodiscard]] Body coarsened(const Body& body);
+
+// Share of the matter in walls under `cells` cells: the least, over the lattice's axes, of the matter in the
+// row of cells through a cell. Corner placement.
+[[nodiscard]] double share_of_thin_walls(const Body& body, double cells);
+
+}  // namespace flexel

@@ -1,0 +1,47 @@
+// The arithmetic of error bars; the coarse runs are in simulate/error_bars.cpp.
+#include "simulate/estimate.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace flexel {
+namespace {
+
+constexpr double kSafety = 1.25, kWideSafety = 3;
+constexpr double kLeastOrder = 0.5, kModelOrder = 2, kSuspiciousOrder = 2.1;
+constexpr int kIterations = 50;
+
+// p with e32 / e21 = (r32^p - 1) / (r21^p - 1) r21^p, by fixed-point iteration (Celik et al. 2008).
+double observed_order(double e21, double e32, const std::array<double, 2>& ratio) {
+  double p = std::log(e32 / e21) / std::log(ratio[0]);
+  for (int i = 0; i < kIterations; ++i) {
+    const double q = std::abs(ratio[0] - ratio[1]) < 1e-9
+                         ? 0
+                         : std::log((std::pow(ratio[0], std::max(p, 0.1)) - 1) /
+                                    (std::pow(ratio[1], std::max(p, 0.1)) - 1));
+    p = (std::log(e32 / e21) + q) / std::log(ratio[0]);
+  }
+  return p;
+}
+
+}  // namespace
+
+Bar wide_bar(const Sequence& s) {
+  const double largest = std::max(std::abs(s.value[1] - s.value[0]), std::abs(s.value[2] - s.value[1]));
+  return {kWideSafety * largest, s.value[0], std::nullopt};
+}
+
+Bar richardson(const Sequence& s) {
+  const double e21 = s.value[1] - s.value[0], e32 = s.value[2] - s.value[1];
+  if (e21 == 0 && e32 == 0) return {0, s.value[0], std::nullopt};
+  if (!(e21 * e32 > 0)) return wide_bar(s);
+  const double order = observed_order(e21, e32, s.ratio);
+  if (!(order >= kLeastOrder)) return wide_bar(s);
+  const double away = -e21 / (std::pow(s.ratio[0], std::min(order, kModelOrder)) - 1);
+  // Values that close in faster than the model's order may be about to pass the limit.
+  const double safety = order > kSuspiciousOrder ? kWideSafety : kSafety;
+  return {safety * std::abs(away), s.value[0] + away, order};
+}
+
+}  // namespace flexel
