@@ -28,7 +28,7 @@ struct Arguments {
                                      pieces;
   std::optional<std::size_t> count;
   int threads = 0;
-  bool ascii = false, strict = false, quiet = false;
+  bool ascii = false, strict = false, quiet = false, estimate = true;
 };
 
 void declare_input(CLI::App& app, Arguments& arguments) {
@@ -99,6 +99,7 @@ void declare_output(CLI::App& app, Arguments& arguments) {
                  "Stop the simulation after this time (\"90 s\"): exit 5, the last good state in "
                  "OUTPUT.failed.vtu")
       ->type_name("TIME");
+  app.add_flag("!--no-estimate", arguments.estimate, "Leave out the error bars (docs/error-bars.md)");
   app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
 }
 
@@ -247,6 +248,7 @@ int run_stages(const Arguments& arguments, Plan& plan, Progress& progress) {
   options.threads = arguments.threads;
   options.failed_output = failed_name(plan);
   options.timeout = plan.timeout;
+  options.estimate = arguments.estimate;
   const SimulateResult simulated = simulate(body, plan.scene, options, progress);
   for (const std::string& line : summary_lines(simulated)) progress.say(line);
 

@@ -20,6 +20,9 @@ constexpr const char* kHelp =
     "name\n"
     "  flexel picture FILE... -o OUT.png\n"
     "                        a picture of parts and bodies, deformed and coloured, without a display\n"
+    "  flexel materials      the materials that --material and scenes know, with their sources\n"
+    "  flexel measure --model NAME --size LENGTH\n"
+    "                        what the lattice makes of a material: E, nu and G by direction and resolution\n"
     "  flexel voxelize ...   part -> lattice of elements      (the program flexel-voxelize)\n"
     "  flexel simulate ...   lattice + scene -> deformed      (flexel-simulate)\n"
     "  flexel map ...        deformed lattice -> the part     (flexel-map)\n"
@@ -37,8 +40,8 @@ bool is_stage(const std::string& command) {
 }
 
 [[noreturn]] void unknown_command(const std::string& command) {
-  const std::vector<std::string> commands = {"deform",   "info", "picture", "voxelize",
-                                             "simulate", "map",  "help"};
+  const std::vector<std::string> commands = {"deform",   "info",     "picture", "materials", "measure",
+                                             "voxelize", "simulate", "map",     "help"};
   throw InputError(fmt::format("unknown command \"{}\"; the commands are {}{}", command,
                                fmt::join(commands, ", "), did_you_mean(command, commands)));
 }
@@ -52,6 +55,8 @@ int help(int argc, char** argv) {
   char* arguments[] = {argv[1], option.data(), nullptr};
   const std::string command = argv[1];
   if (command == "deform") return deform_command(2, arguments);
+  if (command == "materials") return materials_command(2, arguments);
+  if (command == "measure") return measure_command(2, arguments);
   if (command == "info") return info_command(2, arguments);
   if (command == "picture") return picture_command(2, arguments);
   if (is_stage(command)) run_stage_program(argv[1], arguments);
@@ -61,7 +66,8 @@ int help(int argc, char** argv) {
 int run(int argc, char** argv) {
   if (argc < 2)
     throw InputError(
-        "a command is missing: deform, info, picture, voxelize, simulate or map (`flexel help`)");
+        "a command is missing: deform, info, picture, materials, measure, voxelize, simulate or map (`flexel "
+        "help`)");
   const std::string command = argv[1];
   if (command == "--version") {
     print(fmt::format("flexel {}\n", version()));
@@ -69,6 +75,8 @@ int run(int argc, char** argv) {
   }
   if (command == "help" || command == "--help" || command == "-h") return help(argc - 1, argv + 1);
   if (command == "deform") return deform_command(argc - 1, argv + 1);
+  if (command == "materials") return materials_command(argc - 1, argv + 1);
+  if (command == "measure") return measure_command(argc - 1, argv + 1);
   if (command == "info") return info_command(argc - 1, argv + 1);
   if (command == "picture") return picture_command(argc - 1, argv + 1);
   if (is_stage(command)) run_stage_program(argv[1], argv + 1);

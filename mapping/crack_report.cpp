@@ -29,15 +29,14 @@ std::string piece_line(const CrackReport& report) {
   }
   const bool volumes = report.mode == CrackMode::cap;
   const auto with_volume = [&](double volume) { return volumes ? " of " + human_volume(volume) : ""; };
-  std::string line = fmt::format("{} piece{}", human_count(pieces.size()), pieces.size() == 1 ? "" : "s");
+  std::string line = fmt::format("{} pieces", human_count(pieces.size()));
   std::vector<std::string> named;
   for (std::size_t p = 0; p < std::min(pieces.size(), kNamed); ++p)
     named.push_back(fmt::format("\"{}\"{}", pieces[p]->name, with_volume(pieces[p]->volume_before)));
-  if (!named.empty())
-    line += fmt::format(": {}{}", fmt::join(named, ", "), pieces.size() > kNamed ? ", ..." : "");
+  line += fmt::format(": {}{}", fmt::join(named, ", "), pieces.size() > kNamed ? ", ..." : "");
   if (debris > 0)
-    line += fmt::format("; debris: {} single element{}{}{}", human_count(debris), debris == 1 ? "" : "s",
-                        with_volume(debris_volume), report.dropped() > 0 ? ", left out" : "");
+    line += fmt::format("; debris: {} single elements{}{}", human_count(debris), with_volume(debris_volume),
+                        report.dropped() > 0 ? ", left out" : "");
   return line;
 }
 

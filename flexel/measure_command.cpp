@@ -1,0 +1,148 @@
+// flexel measure: what the lattice makes of a material.
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "flexel/commands.h"
+#include "formats/error.h"
+#include "formats/files.h"
+#include "formats/program.h"
+#include "formats/units.h"
+#include "simulate/measure.h"
+
+namespace flexel {
+namespace {
+
+constexpr int kCells[] = {2, 4, 8};
+
+struct Arguments {
+  std::string model = "cells", hooke = "paper", material = "steel", size;
+  std::optional<double> poisson;
+  bool json = false;
+};
+
+struct Measured {
+  Material material;
+  double spacing = 0;
+  std::vector<MeasuredDirection> inside;
+  std::vector<MeasuredBar> bars;
+};
+
+Model model_named(const std::string& name) {
+  if (name == "cells") return Model::cells;
+  if (name == "springs") return Model::springs;
+  if (name == "paper") return Model::paper;
+  throw InputError(
+      fmt::format("--model: no model \"{}\"{}", name, did_you_mean(name, {"cells", "springs", "paper"})));
+}
+
+HookeConstant hooke_named(const std::string& name) {
+  if (name == "paper") return HookeConstant::paper;
+  if (name == "ganovelli") return HookeConstant::ganovelli;
+  throw InputError(fmt::format("--hooke: no Hooke constant \"{}\"{}; known: paper, ganovelli", name,
+                               did_you_mean(name, {"paper", "ganovelli"})));
+}
+
+Measured measured(const Arguments& arguments) {
+  const Model model = model_named(arguments.model);
+  const HookeConstant hooke = hooke_named(arguments.hooke);
+  Measured result;
+  const Material* found = library_material(arguments.material);
+  if (!found)
+    throw InputError(
+        fmt::format("--material: no material \"{}\"; `flexel materials` lists them", arguments.material));
+  result.material = *found;
+  if (arguments.poisson) result.material.poisson = *arguments.poisson;
+  if (!(result.material.poisson > -1 && result.material.poisson < 0.5))
+    throw InputError("--poisson: needs to lie above -1 and below 0.5");
+  result.spacing = parse_quantity(arguments.size, Dimension::length);
+  if (!(result.spacing > 0)) throw InputError("--size: must be above zero");
+  result.inside = measure_inside(model, hooke, result.material, result.spacing);
+  for (const int cells : kCells)
+    result.bars.push_back(measure_bar(model, hooke, result.material, result.spacing, cells));
+  return result;
+}
+
+// "210 GPa +0.00 %"
+std::string modulus(double value, double input) {
+  return fmt::format("{} {:+.2f} %", human_pressure(value), 100 * (value / input - 1));
+}
+
+// "[110]"
+std::string direction(const Vec3& unit) {
+  std::string text = "[";
+  for (const double each : unit) text += std::abs(each) < 1e-9 ? "0" : each > 0 ? "1" : "-1";
+  return text + "]";
+}
+
+std::string text_of(const Arguments& arguments, const Measured& found) {
+  const double young = found.material.young, shear = shear_modulus(found.material);
+  std::string text = fmt::format("model {}, {} as given: E {}, nu {:.4f}, G {}; cells of {}\n\n",
+                                 arguments.model, found.material.name, human_pressure(young),
+                                 found.material.poisson, human_pressure(shear), human_length(found.spacing));
+  text += fmt::format("{:<7} {:<7} {:<20} {:<8} {}\n", "along", "across", "E inside", "nu", "G");
+  for (const MeasuredDirection& each : found.inside)
+    text += fmt::format("{:<7} {:<7} {:<20} {:<8.4f} {}\n", direction(each.along), direction(each.across),
+                        modulus(each.young, young), each.poisson, modulus(each.shear, shear));
+  text += fmt::format("\n{:<15} {:<20} {:<8} {:<20} {}\n", "cells through", "E drawn", "nu", "E bent",
+                      "G twisted");
+  for (const MeasuredBar& each : found.bars)
+    text += fmt::format("{:<15} {:<20} {:<8.4f} {:<20} {}\n", each.cells, modulus(each.tension, young),
+                        each.poisson, modulus(each.bending, young), modulus(each.torsion, shear));
+  return text;
+}
+
+std::string json_of(const Arguments& arguments, const Measured& found) {
+  nlohmann::ordered_json json = {{"model", arguments.model},
+                                 {"young", found.material.young},
+                                 {"poisson", found.material.poisson},
+                                 {"shear", shear_modulus(found.material)},
+                                 {"spacing", found.spacing}};
+  for (const MeasuredDirection& each : found.inside)
+    json["inside"].push_back({{"along", direction(each.along)},
+                              {"across", direction(each.across)},
+                              {"young", each.young},
+                              {"poisson", each.poisson},
+                              {"shear", each.shear}});
+  for (const MeasuredBar& each : found.bars)
+    json["bars"].push_back({{"cells", each.cells},
+                            {"young_drawn", each.tension},
+                            {"poisson", each.poisson},
+                            {"young_bent", each.bending},
+                            {"shear_twisted", each.torsion}});
+  return json.dump(2) + "\n";
+}
+
+}  // namespace
+
+int measure_command(int argc, char** argv) {
+  Arguments arguments;
+  CLI::App app{
+      "Draws, bends and twists bars of lattice and prints the E, nu and G that they have, beside those of "
+      "the "
+      "material (docs/accuracy.md).",
+      "flexel measure"};
+  app.add_option("--model", arguments.model, "cells, springs or paper")
+      ->type_name("NAME")
+      ->capture_default_str();
+  app.add_option("--size", arguments.size, "Spacing of the lattice (\"2 mm\")")
+      ->type_name("LENGTH")
+      ->required();
+  app.add_option("--material", arguments.material, "From the library (`flexel materials`)")
+      ->type_name("NAME")
+      ->capture_default_str();
+  app.add_option("--poisson", arguments.poisson, "Poisson's ratio in place of the material's")
+      ->type_name("NU");
+  app.add_option("--hooke", arguments.hooke, "Model paper: paper or ganovelli")
+      ->type_name("NAME")
+      ->capture_default_str();
+  app.add_flag("--json", arguments.json, "As JSON, in SI units");
+  if (!parse_arguments(app, argc, argv)) return kExitDone;
+  const Measured found = measured(arguments);
+  OutputFile out("-", false);
+  out.write(arguments.json ? json_of(arguments, found) : text_of(arguments, found));
+  out.commit();
+  return kExitDone;
+}
+
+}  // namespace flexel
