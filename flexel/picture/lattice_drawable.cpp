@@ -22,11 +22,24 @@ struct Face {
   }
 };
 
+// Cells that are drawn: broken ones would span the crack that they left. A body of nothing else shows them.
+std::vector<std::uint32_t> drawn_cells(const Body& body) {
+  std::vector<std::uint32_t> drawn;
+  for (std::uint32_t c = 0; c < body.cell_count(); ++c)
+    if (body.broken[c] == 0) drawn.push_back(c);
+  if (drawn.empty()) {
+    drawn.resize(body.cell_count());
+    std::iota(drawn.begin(), drawn.end(), 0u);
+  }
+  return drawn;
+}
+
 std::vector<Face> open_faces(const Body& body) {
-  std::vector<Face> faces(6 * body.cell_count());
+  const std::vector<std::uint32_t> cells = drawn_cells(body);
+  std::vector<Face> faces(6 * cells.size());
   parallel_for_each(faces.size(), [&](std::size_t f) {
     Face& face = faces[f];
-    face.cell = static_cast<std::uint32_t>(f / 6);
+    face.cell = cells[f / 6];
     face.side = static_cast<std::uint32_t>(f % 6);
     for (std::size_t i = 0; i < 4; ++i) face.key[i] = body.cell_elements[face.cell][kFaces[face.side][i]];
     std::sort(face.key.begin(), face.key.end());

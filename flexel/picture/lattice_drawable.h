@@ -5,7 +5,8 @@
 
 namespace flexel {
 
-// The faces of cells that no other cell shares, two triangles each, with the cells' edges as borders.
+// The faces of cells that no other cell shares, two triangles each, with the cells' edges as borders; broken
+// cells are left out (unless there are no others).
 // Vertices are the elements, at `positions` (m); `cell` (triangles) is the cell each triangle belongs to.
 struct CellHull {
   Drawable drawn;

@@ -70,6 +70,16 @@ TEST(Lattice, TheHullOfABlockIsItsOutside) {
   EXPECT_NEAR(signed_volume(vertices, hull.drawn.triangles), 4 * 3 * 2 * 1e-6, 1e-11);
 }
 
+TEST(Lattice, BrokenCellsLeaveAGap) {
+  Body body = test::block(5, 2, 2, 0.01, Placement::corner);
+  for (std::size_t c = 0; c < body.cell_count(); ++c)
+    body.broken[c] = body.lattice_index[body.cell_elements[c][0]][0] == 2 ? 1 : 0;
+  // two blocks of 2 x 2 x 2
+  EXPECT_EQ(draw_cells(body, body.position, {Vec3::Zero(), 1}).drawn.triangles.size(), 2u * 2 * 6 * 4);
+  body.broken.assign(body.cell_count(), 1);
+  EXPECT_EQ(draw_cells(body, body.position, {Vec3::Zero(), 1}).drawn.triangles.size(), 2u * 2 * (10 + 4 + 10));
+}
+
 TEST(Picture, TheDeformedBodyIsDrawnWhereItIs) {
   // A block that is moved to the right by its own length: the shading follows, the outline stays.
   PictureSubject moved = test::subject({}, "body");
