@@ -88,18 +88,6 @@ Found drawn_bar(int n) {
                std::hypot(drawn, drawn_in, drawn_in));
 }
 
-// F L^2 / (E I) = 10 (Mattiasson 1981).
-Found elastica(int n) {
-  Body body = testing::box_body({.cells = {40 * n, n, n}, .spacing = Vec3::Constant(1.0 / 40 / n)});
-  Scene scene;
-  scene.materials["gum"] = {"gum", 1e6, 0, 1000, "test"};
-  scene.material = "gum";
-  scene.get<Ties>().ties.push_back(make_fix(select_by_name("xmin")));
-  const double bending = 1e6 * std::pow(1.0 / 40, 4) / 12;
-  return solve(body, loaded_end(scene, select_by_name("xmax"), Vec3(0, 0, -10 * bending)),
-               std::hypot(0.81061, 0.555));
-}
-
 // Adds quads, one CAD face.
 struct Mesh {
   Surface surface;
@@ -206,8 +194,6 @@ int main() {
     cases.push_back({fmt::format("cantilever bent across, {} cells thick", n), [n] { return wide_beam(n); }});
   for (const int n : {4, 8})
     cases.push_back({fmt::format("bar drawn, {} cells thick", n), [n] { return drawn_bar(n); }});
-  for (const int n : {4, 6})
-    cases.push_back({fmt::format("elastica, {} cells thick", n), [n] { return elastica(n); }});
   for (const int n : {4, 8, 12})
     cases.push_back(
         {fmt::format("cantilever turned twice, {} cells thick", n), [n] { return turned_beam(n); }});
