@@ -174,7 +174,7 @@ std::vector<double> spread(const Setting& setting, const std::vector<double>& sh
                            const std::vector<double>& factor) {
   const Body& body = setting.body;
   std::vector<double> volume(body.element_count(), 0);
-  const std::vector<std::uint8_t> active = active_cells(setting);
+  const std::vector<std::uint8_t> active = sound_cells(setting);
   for (const Part& part : body.parts) {
     const double voxel = part.lattice.spacing.prod();
     for (std::uint32_t c = part.cell_begin; c < part.cell_end; ++c)

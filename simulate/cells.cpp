@@ -94,11 +94,20 @@ SmallestJacobian found(const Smallest& smallest) {
 
 }  // namespace
 
-std::vector<std::uint8_t> active_cells(const Setting& setting) {
+std::vector<std::uint8_t> sound_cells(const Setting& setting) {
   std::vector<std::uint8_t> active(setting.body.cell_count(), 1);
   for (std::size_t c = 0; c < active.size(); ++c)
     active[c] = !(setting.body.broken.size() > c && setting.body.broken[c]) &&
                 !(setting.stray_cell.size() > c && setting.stray_cell[c]);
+  return active;
+}
+
+std::vector<std::uint8_t> active_cells(const Setting& setting) {
+  std::vector<std::uint8_t> active = sound_cells(setting);
+  for (std::size_t p = 0; p < setting.rigidity.size(); ++p)
+    if (setting.rigidity[p] != Rigidity::none)
+      std::fill(active.begin() + setting.body.parts[p].cell_begin,
+                active.begin() + setting.body.parts[p].cell_end, std::uint8_t{0});
   return active;
 }
 

@@ -65,7 +65,9 @@ class Cells {
   std::vector<CellVectors> corner_force_;  // (cells) scratch: forces of a cell on its elements
 };
 
-// Cells that resist: not broken, not stray.
+// Cells that hold matter together: not broken, not stray.
+[[nodiscard]] std::vector<std::uint8_t> sound_cells(const Setting& setting);
+// Those of them that resist: not of a rigid part.
 [[nodiscard]] std::vector<std::uint8_t> active_cells(const Setting& setting);
 
 }  // namespace flexel

@@ -1,5 +1,6 @@
 // Materials: isotropic elastic constants and density, from a library of named ones or from the scene.
 #pragma once
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,8 +17,9 @@ struct Material {
   double strength = 0;              // Pa, largest principal stress
   double elongation = 0;            // equivalent plastic strain at break
   // For people to choose from; no effect takes them by itself. 0: not given
-  double friction = 0;  // Coulomb's, against itself
-  double damping = 0;   // share of the critical
+  double friction = 0;                          // Coulomb's, against itself
+  double damping = 0;                           // share of the critical
+  std::optional<double> contact_friction = {};  // mu that a scene gives it, for [contact]
 };
 
 // The library, in order of docs/materials.md. At room temperature; figures that are not known for certain are

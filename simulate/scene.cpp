@@ -35,7 +35,10 @@ Material parse_material(TableReader& reader, const std::string& name) {
   material.hardening = reader.quantity("hardening", Dimension::pressure).value_or(0);
   material.strength = optional_limit("strength");
   material.elongation = reader.number("elongation").value_or(0);
+  material.contact_friction = reader.number("friction");
   reader.finish();
+  if (material.contact_friction && !(*material.contact_friction >= 0))
+    reader.fail("\"friction\" needs to be 0 or more");
   if (!(material.hardening >= 0)) reader.fail("\"hardening\" needs to be 0 or more");
   if (!(material.elongation >= 0)) reader.fail("\"elongation\" needs to be above 0");
   if (!(material.young > 0)) reader.fail("\"young\" needs to be above 0");
@@ -66,6 +69,7 @@ void parse_parts(TableReader& root, Scene& scene) {
     settings.material = reader.text("material").value_or("");
     settings.model = reader.text("model").value_or("");
     settings.hooke = reader.text("hooke").value_or("");
+    (void)reader.find("rigid");  // simulate/effects/rigid.h
     reader.finish();
     scene.parts[name] = settings;
   }

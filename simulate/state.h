@@ -24,6 +24,9 @@ enum class Model { cells, springs, paper };
 // Where the Hooke constants of model `paper` come from: equation (22) or (21) of the paper.
 enum class HookeConstant { paper, ganovelli };
 
+// Whether a part is rigid: free to move as a whole, or led on a path (simulate/effects/rigid.h).
+enum class Rigidity : std::uint8_t { none, free, led };
+
 // What effects are made from. Refers to the body, which stays unchanged during a run.
 struct Setting {
   const Body& body;
@@ -38,6 +41,7 @@ struct Setting {
   // (elements) m, displacement that fixes and moves start from (simulate/rest_shape.h); empty: none
   std::vector<Vec3> settled = {};
   std::size_t bonding_parts = SIZE_MAX;  // the first ones; later ones joined in a run, and bond with nothing
+  std::vector<Rigidity> rigidity = {};  // (parts); empty: none is rigid
 };
 
 }  // namespace flexel

@@ -3,6 +3,7 @@
 #include <tuple>
 
 #include "simulate/effects/bonds.h"
+#include "simulate/effects/contact.h"
 #include "simulate/effects/damping.h"
 #include "simulate/effects/drag.h"
 #include "simulate/effects/fracture.h"
@@ -10,6 +11,7 @@
 #include "simulate/effects/initial_velocity.h"
 #include "simulate/effects/loads.h"
 #include "simulate/effects/plasticity.h"
+#include "simulate/effects/rigid.h"
 #include "simulate/effects/ties.h"
 
 namespace flexel {
@@ -26,13 +28,21 @@ struct EffectList {
   [[nodiscard]] static std::vector<Pass> passes(const Parameters& parameters, const Setting& setting) {
     std::vector<Pass> result;
     const auto add = [&](auto made) {
-      if (made) result.push_back(make_pass(std::move(*made)));
+      if (!made) return;
+      if constexpr (requires { made->companion(); }) {
+        auto companion = made->companion();
+        result.push_back(make_pass(std::move(*made)));
+        if (companion) result.push_back(make_pass(std::move(*companion)));
+      } else {
+        result.push_back(make_pass(std::move(*made)));
+      }
     };
     (add(E::make(std::get<typename E::Parameters>(parameters), setting)), ...);
     return result;
   }
 };
 
-using Effects = EffectList<Gravity, Loads, Ties, Bonds, Damping, InitialVelocity, Plasticity, Fracture, Drag>;
+using Effects = EffectList<Gravity, Loads, Ties, Bonds, Damping, InitialVelocity, Plasticity, Fracture, Drag,
+                           RigidParts, Contact>;
 
 }  // namespace flexel

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <map>
 
+#include "simulate/effects/contact.h"
 #include "simulate/touching.h"
 
 namespace flexel {
@@ -40,18 +41,14 @@ double foundation(const TouchingPoint& point, const Setting& setting) {
 }  // namespace
 
 void Bonds::parse(TableReader& scene, Parameters& parameters) {
-  const auto flag = [&](const char* key, bool fallback) {
-    const SceneValue* value = scene.find(key);
-    if (!value) return fallback;
-    if (value->kind != SceneValue::Kind::boolean)
-      scene.fail(value->line, fmt::format("\"{}\" needs to be true or false", key));
-    return value->flag;
-  };
-  parameters.bond = flag("bond", true);
-  if (flag("contact", false))
-    scene.fail(scene.find("contact")->line,
-               "\"contact\" = true needs a timed run, which this version does not have; parts that touch are "
-               "bonded, or with bond = false do not feel one another");
+  const bool contact = asks_for_contact(scene);
+  const SceneValue* bond = scene.find("bond");
+  if (bond && bond->kind != SceneValue::Kind::boolean)
+    scene.fail(bond->line, "\"bond\" needs to be true or false");
+  if (bond && bond->flag && contact)
+    scene.fail(bond->line,
+               "\"bond\" = true, but with contact parts that touch are not bonded; give one of them");
+  parameters.bond = bond ? bond->flag : !contact;
 }
 
 std::optional<Bonds> Bonds::make(const Parameters& parameters, const Setting& setting) {

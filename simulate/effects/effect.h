@@ -35,6 +35,19 @@
 //                                                                     1/s^2: bound on what its stiffness adds
 //                                                                     to the square of the largest frequency;
 //                                                                     asked anew at every check of the step
+//   void begin(const State&) const                                    at the beginning of every act, after
+//                                                                     start()
+//   bool wants_check(const State&) const                              asked before every step: it has to be
+//                                                                     chosen anew now
+//   void finish_step(State&, const StepDone&) const                   after every step, once
+//   void add_support_forces(std::vector<Vec3>&) const                 N, of supports in the last step
+//   std::vector<double> memory() const, void restore(const std::vector<double>&) const
+//                                                                     what goes on from step to step, for
+//                                                                     checkpoints
+//   std::vector<std::string> history_columns() const, std::vector<double> history_values() const
+//                                                                     of the last step, for the books
+// and, where its forces are entered in two books,
+//   std::optional<F> companion() const                                another effect that runs after it
 // An effect that a scene does not name makes no object, no array and no pass.
 #pragma once
 #include <chrono>
@@ -57,6 +70,12 @@ namespace flexel {
 // Where the energy that an effect's forces give or take is entered: as potential energy (its energy() is
 // that), as work done on the body, or as energy dissipated.
 enum class Book { potential, work, dissipation };
+
+// The step that led to a state.
+struct StepDone {
+  const std::vector<double>& mass;  // (elements) kg
+  double kick = 0, drift = 0;       // s, for which forces changed velocities, and these places
+};
 
 template <class E>
 concept HasEnergy = requires(const E& e, const State& s) {
@@ -110,6 +129,32 @@ concept AddsFrequencyOfState = requires(const E& e, const State& s, const std::v
   { e.added_frequency(s, m) } -> std::same_as<double>;
 };
 template <class E>
+concept WantsCheck = requires(const E& e, const State& s) {
+  { e.wants_check(s) } -> std::same_as<bool>;
+};
+template <class E>
+concept FinishesStep = requires(const E& e, State& s, const StepDone& d) {
+  e.finish_step(s, d);
+};
+template <class E>
+concept Begins = requires(const E& e, const State& s) {
+  e.begin(s);
+};
+template <class E>
+concept Supports = requires(const E& e, std::vector<Vec3>& f) {
+  e.add_support_forces(f);
+};
+template <class E>
+concept Remembers = requires(const E& e, const std::vector<double>& m) {
+  { e.memory() } -> std::same_as<std::vector<double>>;
+  e.restore(m);
+};
+template <class E>
+concept TellsHistory = requires(const E& e) {
+  { e.history_columns() } -> std::same_as<std::vector<std::string>>;
+  { e.history_values() } -> std::same_as<std::vector<double>>;
+};
+template <class E>
 concept TellsNeedOfTime = requires(const E& e) {
   { e.needs_time() } -> std::same_as<bool>;
 };
@@ -128,6 +173,14 @@ struct Pass {
   std::function<double(const State&)> resistance;
   std::function<void(const State&, double, BlockMatrix&)> add_resistance;
   std::function<double(const State&, const std::vector<double>&)> added_frequency;
+  std::function<bool(const State&)> wants_check;
+  std::function<void(State&, const StepDone&)> finish_step;
+  std::function<void(const State&)> begin;
+  std::function<void(std::vector<Vec3>&)> add_support_forces;
+  std::function<std::vector<double>()> memory;
+  std::function<void(const std::vector<double>&)> restore;
+  std::vector<std::string> history_columns;
+  std::function<std::vector<double>()> history_values;
   Book book = Book::work;
   bool constant = false, needs_time = false;
   double seconds = 0;
@@ -164,6 +217,20 @@ template <class E>
     pass.added_frequency = [effect](const State& s, const std::vector<double>& m) {
       return effect->added_frequency(s, m);
     };
+  if constexpr (WantsCheck<E>) pass.wants_check = [effect](const State& s) { return effect->wants_check(s); };
+  if constexpr (FinishesStep<E>)
+    pass.finish_step = [effect](State& s, const StepDone& d) { effect->finish_step(s, d); };
+  if constexpr (Begins<E>) pass.begin = [effect](const State& s) { effect->begin(s); };
+  if constexpr (Supports<E>)
+    pass.add_support_forces = [effect](std::vector<Vec3>& f) { effect->add_support_forces(f); };
+  if constexpr (Remembers<E>) {
+    pass.memory = [effect] { return effect->memory(); };
+    pass.restore = [effect](const std::vector<double>& m) { effect->restore(m); };
+  }
+  if constexpr (TellsHistory<E>) {
+    pass.history_columns = effect->history_columns();
+    pass.history_values = [effect] { return effect->history_values(); };
+  }
   if constexpr (TellsConstant<E>) pass.constant = effect->constant();
   if constexpr (requires { E::book; }) pass.book = E::book;
   if constexpr (TellsNeedOfTime<E>)

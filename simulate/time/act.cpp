@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -54,7 +55,8 @@ Setting timed_setting(const Body& body, const Scene& scene, const Beginning& beg
           std::vector<std::uint8_t>(body.element_count(), 0),
           scene.run.time,
           beginning.settled,
-          beginning.bonding_parts};
+          beginning.bonding_parts,
+          RigidParts::rigidity(scene.get<RigidParts>(), body)};
 }
 
 Act::Act(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress,
@@ -75,10 +77,12 @@ Act::Act(Body& body, const Scene& scene, const SimulateOptions& options, Progres
   for (Pass& pass : passes_) {
     if (pass.compose) pass.compose(plan_);
     if (pass.start && fresh) pass.start(state_);
+    if (pass.begin) pass.begin(state_);
     if (pass.constrain) pass.constrain(constraints_);
   }
   plan_.rest_shapes = RestShapes(body).any();
   plan_.broken_springs = body.cell_columns.contains("broken_springs");
+  refuse_held_rigid();
   bound_.emplace(setting_, passes_, plan_);
   // Explicit damping may cut the step by 2; beyond that every step solves for it.
   const bool implicit = scene.run.method == TimeMethod::implicit_euler;
@@ -92,6 +96,16 @@ Act::Act(Body& body, const Scene& scene, const SimulateOptions& options, Progres
   if (implicit) make_implicit();
 }
 
+void Act::refuse_held_rigid() const {
+  for (std::size_t p = 0; p < setting_.rigidity.size(); ++p)
+    for (std::uint32_t e = body_.parts[p].element_begin; e < body_.parts[p].element_end; ++e)
+      if (setting_.rigidity[p] != Rigidity::none && constraints_.mask[e])
+        throw InputError(scene_.name,
+                         fmt::format("part \"{}\" is rigid and held by a [[fix]] or [[move]]: lead "
+                                     "it with a [[manipulator]], which without a path stays",
+                                     body_.parts[p].name));
+}
+
 void Act::make_implicit() {
   const auto refuse = [&](const std::string& what) {
     throw InputError(scene_.name,
@@ -101,7 +115,7 @@ void Act::make_implicit() {
   if (!plan_.fracture.empty()) refuse("[fracture]");
   if (paper_damped_) refuse("[damping] of model \"paper\"");
   for (const Pass& pass : passes_)
-    if (pass.add_forces && !pass.energy && !pass.resistance)
+    if (pass.finish_step || pass.wants_check || (pass.add_forces && !pass.energy && !pass.resistance))
       refuse(fmt::format("{} ({})", pass.name, pass.why));
   euler_.emplace(setting_, passes_, plan_, stepper_->mass(), scene_.run.tolerance);
 }
@@ -179,6 +193,11 @@ void Act::adapt_step(Clock& clock) {
     choose_step(clock);
 }
 
+bool Act::hurried() const {
+  return std::any_of(passes_.begin(), passes_.end(),
+                     [&](const Pass& pass) { return pass.wants_check && pass.wants_check(state_); });
+}
+
 // Calls add(outer_); where the books want to know, `own` (elements) becomes what it added. So the sum, and
 // with it the motion, has the same bits with books and without.
 template <class Add>
@@ -251,6 +270,8 @@ Act::Memory Act::memory() const {
   memory.cells = stepper_->memory();
   if (implicit_) memory.damping_change = implicit_->change();
   if (euler_) memory.reach = euler_->reach();
+  for (const Pass& pass : passes_)
+    memory.passes.push_back(pass.memory ? pass.memory() : std::vector<double>());
   return memory;
 }
 
@@ -263,6 +284,8 @@ void Act::restore(const Memory& memory) {
       (change != 0 && (!implicit_ || change != body_.element_count())))
     throw InputError("the checkpoint's memory is not that of its scene and body: it is damaged");
   stepper_->restore(memory.cells);
+  for (std::size_t p = 0; p < passes_.size() && p < memory.passes.size(); ++p)
+    if (passes_[p].restore) passes_[p].restore(memory.passes[p]);
   if (implicit_) implicit_->set_change(memory.damping_change);
   if (euler_) euler_->set_reach(memory.reach);
 }
@@ -288,9 +311,13 @@ void Act::step(Clock& clock, History* history, bool row) {
   ++clock.steps;
   state_.time = end;
   held_->impose(state_, stepper_->mass(), advance);
+  for (const Pass& pass : passes_)
+    if (pass.finish_step) pass.finish_step(state_, {stepper_->mass(), advance.kick, advance.drift});
   if (history) {
     std::vector<Vec3> supports(body_.element_count(), Vec3::Zero());
     held_->add_forces(supports);
+    for (const Pass& pass : passes_)
+      if (pass.add_support_forces) pass.add_support_forces(supports);
     history->after(state_, outcome, stepper_->damping_force(), supports, first ? 0 : clock.previous,
                    clock.step);
   }

@@ -60,13 +60,16 @@ class Act {
   void refuse_unsound();
   // Chooses anew where the length does not suit what was last looked at.
   void adapt_step(Clock& clock);
+  // Whether an effect cannot wait for the next look.
+  [[nodiscard]] bool hurried() const;
   // One step. With `history` its books, and a row of them where `row`. Throws DivergedError.
   void step(Clock& clock, History* history, bool row);
   // What the next steps depend on besides state() and the clock; only where renews() says so.
   struct Memory {
     Stepper::Memory cells;
-    std::vector<Vec3> damping_change;  // m/s, of ImplicitDamping
-    double reach = 0;                  // s, of ImplicitEuler
+    std::vector<Vec3> damping_change;         // m/s, of ImplicitDamping
+    double reach = 0;                         // s, of ImplicitEuler
+    std::vector<std::vector<double>> passes;  // what each remembers
   };
   [[nodiscard]] Memory memory() const;
   // Throws InputError("", ...): it is that of another act.
@@ -96,6 +99,7 @@ class Act {
  private:
   void make_forces();
   void make_implicit();
+  void refuse_held_rigid() const;
   void step_implicitly(Clock& clock, History* history, bool row);
   void look();
   template <class Add>

@@ -126,6 +126,7 @@ void visit(Archive& archive, BookRow& row) {
   archive.raw(row.momentum.data(), sizeof(Vec3));
   archive.raw(row.angular.data(), sizeof(Vec3));
   visit(archive, row.probes);
+  visit(archive, row.values);
 }
 
 template <class Archive, class Value>
@@ -155,9 +156,11 @@ void visit(Archive& archive, Checkpoint& c) {
   visit(archive, c.settled);
   visit(archive, c.fused);
   visit(archive, c.bonding_parts);
+  visit(archive, c.memory.passes);
   visit(archive, c.ledger.accounts);
   visit(archive, c.ledger.rows);
   visit(archive, c.ledger.probes);
+  visit(archive, c.ledger.columns);
   visit(archive, c.ledger.start);
   visit(archive, c.ledger.changed);
   visit(archive, c.ledger.worst_residual);

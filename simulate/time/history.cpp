@@ -41,6 +41,7 @@ std::string Ledger::csv() const {
       fmt::format_to(out, ",{} {} [{}]", name, axis, std::string(name) == "momentum" ? "kg m/s" : "kg m2/s");
   for (const std::string& probe : probes)
     for (const char axis : {'x', 'y', 'z'}) fmt::format_to(out, ",{} {} [m]", probe, axis);
+  for (const std::string& column : columns) fmt::format_to(out, ",{}", column);
   text += '\n';
   for (const BookRow& row : rows) {
     const Energies& e = row.energies;
@@ -51,6 +52,7 @@ std::string Ledger::csv() const {
     for (const Vec3& vector : {row.momentum, row.angular})
       for (const double value : vector) fmt::format_to(out, ",{:.12g}", value);
     for (const double value : row.probes) fmt::format_to(out, ",{:.12g}", value);
+    for (const double value : row.values) fmt::format_to(out, ",{:.9g}", value);
     text += '\n';
   }
   return text;
@@ -80,6 +82,9 @@ History::History(const Setting& setting, const std::vector<Pass>& passes,
   if (!plan.fracture.empty()) fracture_ = ledger_.account("fracture", true);
   ledger_.probes.clear();
   for (const ProbePoints& probe : probes) ledger_.probes.push_back(probe.name);
+  ledger_.columns.clear();
+  for (const Pass& pass : passes)
+    ledger_.columns.insert(ledger_.columns.end(), pass.history_columns.begin(), pass.history_columns.end());
 }
 
 void History::before(const State& state, bool sample) {
@@ -172,6 +177,9 @@ void History::add_row(const State& state) {
     ledger_.largest_term = std::max(ledger_.largest_term, std::abs(term));
   for (const ProbePoints& probe : probes_)
     for (const double value : measure(probe, sampled_).displacement) row.probes.push_back(value);
+  for (const Pass& pass : passes_)
+    if (pass.history_values)
+      for (const double value : pass.history_values()) row.values.push_back(value);
   ledger_.rows.push_back(std::move(row));
 }
 

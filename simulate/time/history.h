@@ -39,14 +39,16 @@ struct BookRow {
   std::vector<double> accounts;  // J, work or dissipated energy; of those that were there
   Vec3 momentum = Vec3::Zero(), angular = Vec3::Zero();
   std::vector<double> probes;  // m, (probes x 3)
+  std::vector<double> values;  // (columns)
 };
 
 // What the books have summed up: all that goes on when the run does.
 struct Ledger {
   std::vector<Account> accounts;
   std::vector<BookRow> rows;
-  std::vector<std::string> probes;  // names
-  std::optional<double> start;      // J: the sum of the first row
+  std::vector<std::string> probes;   // names
+  std::vector<std::string> columns;  // of effects, with their units
+  std::optional<double> start;       // J: the sum of the first row
   bool changed = false;       // an event came since the last row: what it gave is entered as work of "events"
   double worst_residual = 0;  // J, largest absolute one
   double largest_term = 0;    // J, of any energy

@@ -90,7 +90,8 @@ std::vector<double> cell_frequencies(const Setting& setting) {
   std::vector<double> result;
   for (std::size_t p = 0; p < setting.body.parts.size(); ++p) {
     const Part& part = setting.body.parts[p];
-    if (part.cell_begin == part.cell_end) {
+    const bool rigid = setting.rigidity.size() > p && setting.rigidity[p] != Rigidity::none;
+    if (part.cell_begin == part.cell_end || rigid) {
       result.push_back(0);
       continue;
     }

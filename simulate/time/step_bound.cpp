@@ -39,7 +39,9 @@ double StepBound::longest(bool implicit_damping) const {
     // a part has cells or connections
     const double own = cells_[p] * stiffening_[p] + connections_[p];
     const double damping = implicit_damping && connections_[p] == 0 ? 0 : plan_.damping[p];
-    longest = std::min(longest, stable_step(own + added_, damping));
+    // what effects add is not damped: total dt^2 / 4 + tau own dt / 2 <= 1
+    const double total = own + added_;
+    longest = std::min(longest, stable_step(total, total > 0 ? damping * (own / total) : 0));
   }
   return longest;
 }

@@ -237,7 +237,7 @@ void TimedRun::play_until(double end, bool resumed) {
   good_ = act_->state();
   const std::uint64_t between = act_->is_implicit() ? 1 : kCheck;
   while (goes_on()) {
-    if (clock_.steps % between == 0) check();
+    if (clock_.steps % between == 0 || act_->hurried()) check();
     step();
     if (series_ && *act_->state().time >= next_frame_ * (1 - 1e-9)) write_frame();
   }

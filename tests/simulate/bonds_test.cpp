@@ -121,7 +121,7 @@ TEST(Bonds, CanBeLeftOut) {
   EXPECT_THAT(refusal(bar(false), scene), HasSubstr("nothing holds part \"far\""));
   EXPECT_FALSE(parse_scene("bond = false\n", "s.toml").get<Bonds>().bond);
   EXPECT_TRUE(parse_scene("", "s.toml").get<Bonds>().bond);
-  EXPECT_THROW((void)parse_scene("contact = true\n", "s.toml"), InputError);
+  EXPECT_THROW((void)parse_scene("contact = true\nbond = true\n", "s.toml"), InputError);
   EXPECT_THROW((void)parse_scene("bond = 1\n", "s.toml"), InputError);
 }
 

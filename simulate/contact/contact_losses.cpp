@@ -1,0 +1,120 @@
+// Friction and damping of contacts.
+//
+// Both act at one place for either side, half way between the points, and along one line: momentum and
+// angular momentum are kept. A force f at a place o from a point of a cell, o as it is now, moves element a
+// by f (w_a + g_a . F^-1 o).
+//
+// Friction (Jansson and Vergeest, equations 4 and 20, with sticking added): a spring along the surface holds
+// what touches where it first touched, stiff as 0.8 of the contact itself (Mindlin 1949: 0.8 at Poisson's
+// ratio 1/3); where its force would pass mu N it slides and keeps that of mu N. Damping: a dashpot of tau
+// times the contact's stiffness, along the normal and, while it sticks, along the surface. It never pulls.
+#include <algorithm>
+
+#include "simulate/contact/contacts.h"
+
+namespace flexel {
+namespace {
+
+constexpr double kAcross = 0.8;  // stiffness along the surface, of that along the normal
+
+Vec3 at_most(const Vec3& value, double most) {
+  const double norm = value.norm();
+  return norm > most ? Vec3(value * (most / norm)) : value;
+}
+
+}  // namespace
+
+// From each point to the place where they meet. A ball meets at its centre, which alone can carry a force.
+std::array<Vec3, 2> Contacts::meeting(const Pair& pair) const {
+  if (pair.j == kNoPoint) return {Vec3::Zero(), Vec3::Zero()};
+  const ContactSide &i = sides_[pair.i].at, &j = sides_[pair.j].at;
+  const Vec3 d = j.position - i.position;
+  const bool ball_i = i.radius > 0, ball_j = j.radius > 0;
+  const double share = ball_i == ball_j ? 0.5 : ball_i ? 0 : 1;
+  return {share * d, (share - 1) * d};
+}
+
+std::vector<Contacts::Motion> Contacts::motions(const State& state) const {
+  std::vector<Motion> result(near_.size());
+  parallel_for_each(
+      near_.size(),
+      [&](std::size_t n) {
+        const ContactPoint& point = points_[near_[n]];
+        Motion& motion = result[n];
+        for (std::uint32_t a = 0; a < point.at.count; ++a)
+          motion.velocity += point.at.weights[a] * state.velocity[point.at.elements[a]];
+        if (point.at.count != 8) return;
+        for (std::size_t a = 0; a < 8; ++a)
+          motion.gradient += state.velocity[point.at.elements[a]] * gradients_[point.part][a].transpose();
+        motion.gradient *= sides_[n].inverse;
+      },
+      512);
+  return result;
+}
+
+// Of j against i where they meet.
+Vec3 Contacts::relative_velocity(const Pair& pair, const std::vector<Motion>& motions) const {
+  const std::array<Vec3, 2> place = meeting(pair);
+  const auto at = [&](std::uint32_t near, const Vec3& away) {
+    return Vec3(motions[near].velocity + motions[near].gradient * away);
+  };
+  const Vec3 of_i = at(pair.i, place[0]);
+  return pair.j == kNoPoint ? Vec3(-of_i) : Vec3(at(pair.j, place[1]) - of_i);
+}
+
+void Contacts::add_losses(const State& state, std::vector<Vec3>& forces) {
+  look(state);
+  if (pairs_.empty()) return;
+  const std::vector<Motion> moving = settings_.damping > 0 ? motions(state) : std::vector<Motion>();
+  std::vector<Vec3> found(pairs_.size(), Vec3::Zero());  // N, on j
+  parallel_for_each(
+      pairs_.size(),
+      [&](std::size_t p) {
+        const PairState& now = states_[p];
+        if (!(now.pressure > 0)) return;
+        const Pair& pair = pairs_[p];
+        const double secant = now.pressure / -now.gap;  // N/m
+        const Vec3 velocity = settings_.damping > 0 ? relative_velocity(pair, moving) : Vec3(Vec3::Zero());
+        const double apart = velocity.dot(now.normal);
+        const double along =
+            std::max(-settings_.damping * secant * apart, -now.pressure);  // on j, along the normal
+        const Vec3 across = velocity - apart * now.normal;
+        const Vec3 held = -kAcross * secant * (memory_[p].stretch + settings_.damping * across);
+        found[p] = along * now.normal + at_most(held, pair.friction * now.pressure);
+      },
+      512);
+  std::vector<Total> totals(near_.size());
+  for (std::size_t p = 0; p < pairs_.size(); ++p) {
+    if (found[p] == Vec3::Zero()) continue;
+    const Pair& pair = pairs_[p];
+    const std::array<Vec3, 2> place = meeting(pair);
+    totals[pair.i].force -= found[p];
+    totals[pair.i].couple -= found[p] * place[0].transpose();
+    if (pair.j == kNoPoint) continue;
+    totals[pair.j].force += found[p];
+    totals[pair.j].couple += found[p] * place[1].transpose();
+  }
+  spread(totals, forces);
+}
+
+void Contacts::remember(const State& state, double drift) {
+  look(state);
+  if (pairs_.empty() || !loses()) return;
+  const std::vector<Motion> moving = motions(state);
+  parallel_for_each(
+      pairs_.size(),
+      [&](std::size_t p) {
+        const PairState& now = states_[p];
+        Vec3& stretch = memory_[p].stretch;
+        if (!(now.pressure > 0) || !(pairs_[p].friction > 0)) {
+          stretch = Vec3::Zero();
+          return;
+        }
+        stretch += drift * relative_velocity(pairs_[p], moving);
+        stretch -= stretch.dot(now.normal) * now.normal;
+        stretch = at_most(stretch, pairs_[p].friction * -now.gap / kAcross);
+      },
+      512);
+}
+
+}  // namespace flexel

@@ -1,0 +1,220 @@
+// Where the points of the pairs are now, and the forces along their normals.
+//
+// A force f at a point moves its elements by their weights, f_a = w_a f. A change of the normal n ~ F^-T N
+// costs dU/dn . dn = -(F^-1 P dU/dn) . dF^T n with P = I - n n^T, dF = sum_a du_a (x) g_a: the force n (g_a .
+// F^-1 P dU/dn) on element a, which sums up to a couple.
+#include "simulate/contact/contacts.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+
+#include "formats/error.h"
+#include "simulate/cell_model.h"
+#include "simulate/rigid/rigid_body.h"
+#include "simulate/time/layout.h"
+
+namespace flexel {
+namespace {
+
+constexpr double kStiffness = 3;       // of a contact, in E / h an area
+constexpr double kLeastWeight = 1e-3;  // of a point on an element
+
+}  // namespace
+
+Contacts::Contacts(ContactSettings settings, const Setting& setting)
+    : settings_(std::move(settings)), body_(setting.body), points_(contact_points(setting, settings_.parts)) {
+  for (std::size_t p = 0; p < body_.parts.size(); ++p) {
+    const Material& material = setting.materials[p];
+    std::array<Vec3, 8> gradients = cell_kind(body_.parts[p].lattice, material).gradient;
+    for (Vec3& each : gradients) each /= 4;
+    gradients_.push_back(gradients);
+    foundation_.push_back(kStiffness * settings_.stiffness * material.young /
+                          body_.parts[p].lattice.spacing.mean());
+    friction_.push_back(material.contact_friction.value_or(settings_.friction));
+  }
+  mass_ = lumped_masses(setting);
+  rigid_.resize(body_.parts.size());
+  for (std::uint32_t p = 0; p < setting.rigidity.size(); ++p) {
+    if (setting.rigidity[p] == Rigidity::none) continue;
+    const RigidBody rigid = rigid_body(body_, p, mass_);
+    const Eigen::SelfAdjointEigenSolver<Mat3> eigen(rigid.inverse_inertia, Eigen::EigenvaluesOnly);
+    rigid_[p] =
+        Whole{setting.rigidity[p] == Rigidity::free, rigid.centre, 1 / rigid.mass, eigen.eigenvalues()[2]};
+  }
+  // Where an edge runs through a sliver of a cell its elements are light: a point there stands for no more
+  // area than a face's would.
+  for (ContactPoint& point : points_)
+    for (std::uint32_t a = 0; a < point.at.count && point.shape == ContactShape::edge; ++a)
+      if (std::abs(point.at.weights[a]) > kLeastWeight)
+        point.area = std::min(point.area, 0.5 * mass_[point.at.elements[a]] /
+                                              (setting.materials[point.part].density * point.width *
+                                               std::abs(point.at.weights[a])));
+  std::vector<std::uint8_t> carries(body_.element_count(), 0);
+  for (const ContactPoint& point : points_) {
+    for (std::uint32_t a = 0; a < point.at.count; ++a) carries[point.at.elements[a]] = 1;
+    widest_ = std::max(widest_, point.width);
+    narrowest_ = std::min(narrowest_, point.width);
+  }
+  for (std::uint32_t e = 0; e < carries.size(); ++e)
+    if (carries[e]) elements_.push_back(e);
+  built_at_.resize(elements_.size());
+  if (settings_.self) find_near_matter(setting);
+}
+
+bool Contacts::loses() const {
+  bool friction = settings_.damping > 0;
+  for (std::size_t p = 0; p < friction_.size(); ++p)
+    friction = friction || (settings_.parts[p] && friction_[p] > 0);
+  for (const ContactPlane& plane : settings_.planes) friction = friction || plane.friction.value_or(0) > 0;
+  return friction;
+}
+
+Vec3 Contacts::position(const ContactPoint& point, const State& state) const {
+  Vec3 at = point.rest;
+  for (std::uint32_t a = 0; a < point.at.count; ++a)
+    at += point.at.weights[a] * state.displacement[point.at.elements[a]];
+  return at;
+}
+
+Mat3 Contacts::gradient(const ContactPoint& point, const std::vector<Vec3>& displacement) const {
+  Mat3 f = Mat3::Identity();
+  if (point.at.count == 8)
+    for (std::size_t a = 0; a < 8; ++a)
+      f += displacement[point.at.elements[a]] * gradients_[point.part][a].transpose();
+  return f;
+}
+
+Contacts::Side Contacts::side(std::uint32_t point, const State& state) const {
+  const ContactPoint& from = points_[point];
+  Side made;
+  made.at.position = position(from, state);
+  made.at.own_plane = from.shape == ContactShape::face ? 1 : 0;
+  made.at.radius = from.radius;
+  if (from.shape == ContactShape::ball) return made;
+  made.inverse = gradient(from, state.displacement).inverse();
+  made.at.normal = (made.inverse.transpose() * from.normal).normalized();
+  return made;
+}
+
+ContactSide Contacts::other_side(const Pair& pair) const {
+  if (pair.j != kNoPoint) return sides_[pair.j].at;
+  const ContactPlane& plane = settings_.planes[pair.plane];
+  const Vec3& from = sides_[pair.i].at.position;
+  return {from - (from - plane.point).dot(plane.normal) * plane.normal, plane.normal, 1, 0};
+}
+
+// The hooks of one step ask for the same state several times.
+bool Contacts::seen(const State& state) {
+  bool same = seen_builds_ == builds_ && seen_.size() == near_elements_.size();
+  for (std::size_t e = 0; same && e < seen_.size(); ++e)
+    same = seen_[e] == state.displacement[near_elements_[e]];
+  if (same) return true;
+  seen_builds_ = builds_;
+  seen_.resize(near_elements_.size());
+  for (std::size_t e = 0; e < seen_.size(); ++e) seen_[e] = state.displacement[near_elements_[e]];
+  return false;
+}
+
+void Contacts::look(const State& state) {
+  refresh(state);
+  if (seen(state)) return;
+  sides_.resize(near_.size());
+  states_.resize(pairs_.size());
+  parallel_for_each(
+      near_.size(), [&](std::size_t n) { sides_[n] = side(near_[n], state); }, 512);
+  parallel_for_each(
+      pairs_.size(),
+      [&](std::size_t p) {
+        ContactSide from = sides_[pairs_[p].i].at;
+        if (pairs_[p].j == kNoPoint) from.own_plane = 0;  // the plane's normal is the exact one
+        states_[p] = pair_state(from, other_side(pairs_[p]), pairs_[p].constants);
+      },
+      512);
+}
+
+double Contacts::energy(const State& state) {
+  look(state);
+  double energy = 0;
+  for (const PairState& now : states_) energy += now.energy;
+  return energy;
+}
+
+void Contacts::add_forces(const State& state, std::vector<Vec3>& forces) {
+  look(state);
+  if (pairs_.empty()) return;
+  std::vector<Total> totals(near_.size());
+  for (std::size_t p = 0; p < pairs_.size(); ++p) {
+    const PairState& now = states_[p];
+    if (!(now.pressure > 0)) continue;
+    totals[pairs_[p].i].force -= now.force;
+    totals[pairs_[p].i].turning += now.turning[0];
+    if (pairs_[p].j == kNoPoint) continue;
+    totals[pairs_[p].j].force += now.force;
+    totals[pairs_[p].j].turning += now.turning[1];
+  }
+  spread(totals, forces);
+}
+
+void Contacts::spread(const std::vector<Total>& totals, std::vector<Vec3>& forces) const {
+  for (std::size_t n = 0; n < near_.size(); ++n) {
+    const Total& total = totals[n];
+    const ContactPoint& point = points_[near_[n]];
+    if (total.force == Vec3::Zero() && total.turning == Vec3::Zero()) continue;
+    for (std::uint32_t a = 0; a < point.at.count; ++a)
+      forces[point.at.elements[a]] += point.at.weights[a] * total.force;
+    if (point.at.count != 8) continue;
+    const Vec3& normal = sides_[n].at.normal;
+    const Vec3 turned = sides_[n].inverse * (total.turning - total.turning.dot(normal) * normal);
+    const Mat3 couple = normal * turned.transpose() + total.couple * sides_[n].inverse.transpose();
+    for (std::size_t a = 0; a < 8; ++a) forces[point.at.elements[a]] += couple * gradients_[point.part][a];
+  }
+}
+
+std::vector<double> Contacts::memory() const {
+  std::vector<double> memory{built_ ? 1.0 : 0.0, promised_, looked_at_ == builds_ ? 1.0 : 0.0,
+                             static_cast<double>(memory_.size())};
+  for (const Memory& entry : memory_) {
+    memory.push_back(static_cast<double>(entry.key >> 32));
+    memory.push_back(static_cast<double>(entry.key & 0xffffffff));
+    memory.insert(memory.end(), entry.stretch.begin(), entry.stretch.end());
+  }
+  for (const Vec3& at : built_at_) memory.insert(memory.end(), at.begin(), at.end());
+  return memory;
+}
+
+void Contacts::restore(const std::vector<double>& memory) {
+  constexpr std::size_t kHead = 4, kEntry = 5;
+  const std::size_t entries = memory.size() < kHead ? 0 : static_cast<std::size_t>(memory[3]);
+  if (memory.size() != kHead + kEntry * entries + 3 * built_at_.size())
+    throw InputError("the checkpoint's contacts are not those of its scene");
+  memory_.resize(entries);
+  const double* from = memory.data() + kHead;
+  for (Memory& entry : memory_) {
+    entry.key = static_cast<std::uint64_t>(from[0]) << 32 | static_cast<std::uint64_t>(from[1]);
+    entry.stretch = Vec3(from[2], from[3], from[4]);
+    from += kEntry;
+  }
+  State then;
+  then.displacement.assign(body_.element_count(), Vec3::Zero());
+  for (const std::uint32_t e : elements_) {
+    then.displacement[e] = Vec3(from[0], from[1], from[2]);
+    from += 3;
+  }
+  built_ = false;
+  if (memory[0] == 0) return;
+  build(then);
+  promised_ = memory[1];
+  looked_at_ = memory[2] == 1 ? builds_ : builds_ - 1;
+}
+
+std::vector<std::array<std::uint32_t, 2>> Contacts::touching(const State& state) {
+  look(state);
+  std::vector<std::array<std::uint32_t, 2>> result;
+  for (std::size_t p = 0; p < pairs_.size(); ++p)
+    if (states_[p].pressure > 0)
+      result.push_back({static_cast<std::uint32_t>(pairs_[p].key >> 32),
+                        static_cast<std::uint32_t>(pairs_[p].key & 0xffffffff)});
+  return result;
+}
+
+}  // namespace flexel

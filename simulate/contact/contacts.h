@@ -1,0 +1,144 @@
+// Contact of parts with one another, with themselves and with rigid planes: which points touch
+// (simulate/contact/contact_points.h), what they do to each other (simulate/contact/pair_law.h) and what they
+// remember.
+//
+// Pairs that could touch come from a grid (simulate/contact/broad_phase.h) with a margin, and are looked for
+// anew only when an element of the surface has moved by half of it, relative to all others: motion of
+// everything together costs nothing. Forces on the elements are summed pair by pair in the order of the
+// pairs, so that the bits do not depend on the number of threads. Not copied: one object serves all the hooks
+// of a run.
+#pragma once
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "simulate/contact/broad_phase.h"
+#include "simulate/contact/contact_points.h"
+#include "simulate/contact/pair_law.h"
+#include "simulate/contact/settings.h"
+
+namespace flexel {
+
+class Contacts {
+ public:
+  Contacts(ContactSettings settings, const Setting& setting);
+  Contacts(const Contacts&) = delete;
+  Contacts& operator=(const Contacts&) = delete;
+
+  [[nodiscard]] bool empty() const { return points_.empty(); }
+  [[nodiscard]] bool loses() const;  // there is friction or damping
+  [[nodiscard]] const std::vector<ContactPoint>& points() const { return points_; }
+
+  [[nodiscard]] double energy(const State& state);  // J, of the forces along the normals
+  void add_forces(const State& state, std::vector<Vec3>& forces);
+  // Friction and damping.
+  void add_losses(const State& state, std::vector<Vec3>& forces);
+  // After a step of `drift` s that led to `state`: what slid, slid.
+  void remember(const State& state, double drift);
+  // All that the next steps depend on besides the state, and back.
+  [[nodiscard]] std::vector<double> memory() const;
+  void restore(const std::vector<double>& memory);
+
+  // 1/s^2, what the contacts add to the square of the largest frequency; at least what keeps the motion of a
+  // step small against the contact spheres.
+  [[nodiscard]] double frequency(const State& state);
+  // Whether more is needed now than frequency() said last.
+  [[nodiscard]] bool hurried(const State& state);
+
+  // Pairs whose spheres are near now, as numbers of points (a plane: after the last point), ascending.
+  [[nodiscard]] std::vector<std::array<std::uint32_t, 2>> touching(const State& state);
+
+ private:
+  static constexpr std::uint32_t kNoPoint = 0xffffffff;
+  struct Pair {
+    std::uint32_t i = 0, j = kNoPoint;  // numbers in near_; j kNoPoint: of a plane
+    std::uint32_t plane = 0;
+    std::uint64_t key = 0;
+    double friction = 0;
+    PairConstants constants;
+  };
+  // A near point as it is now.
+  struct Side {
+    ContactSide at;
+    Mat3 inverse = Mat3::Identity();  // F^-1 of its cell
+  };
+  // Sums over the pairs of a near point.
+  struct Total {
+    Vec3 force = Vec3::Zero();    // N
+    Vec3 turning = Vec3::Zero();  // dU/dn
+    Mat3 couple = Mat3::Zero();   // N m, sum of force (x) its place from the point
+  };
+
+  // contact_list.cpp
+  void refresh(const State& state);
+  void build(const State& state);
+  void find_near_matter(const Setting& setting);
+  [[nodiscard]] bool near_in_matter(std::uint32_t i, std::uint32_t j) const;
+  [[nodiscard]] PairConstants constants(std::uint32_t i, std::uint32_t j) const;
+  [[nodiscard]] PairConstants plane_constants(std::uint32_t i) const;
+  [[nodiscard]] bool led(std::uint32_t part) const { return rigid_[part] && !rigid_[part]->free; }
+  [[nodiscard]] double friction_of(std::uint32_t point) const { return friction_[points_[point].part]; }
+  [[nodiscard]] double reach(std::uint32_t i, std::uint32_t j) const;
+  void add_pairs(const std::vector<Vec3>& positions, const std::vector<Vec3>& normals);
+  void add_plane_pairs(const std::vector<Vec3>& positions, const std::vector<Vec3>& normals);
+  void number_near();
+
+  // contacts.cpp
+  [[nodiscard]] Vec3 position(const ContactPoint& point, const State& state) const;
+  [[nodiscard]] Mat3 gradient(const ContactPoint& point, const std::vector<Vec3>& displacement) const;
+  [[nodiscard]] Side side(std::uint32_t point, const State& state) const;
+  void look(const State& state);
+  bool seen(const State& state);
+  [[nodiscard]] ContactSide other_side(const Pair& pair) const;
+  void spread(const std::vector<Total>& totals, std::vector<Vec3>& forces) const;
+  // contact_losses.cpp
+  struct Motion {  // of a near point: its velocity [m/s] and that of the matter around it, dv/dx [1/s]
+    Vec3 velocity = Vec3::Zero();
+    Mat3 gradient = Mat3::Zero();
+  };
+  [[nodiscard]] std::vector<Motion> motions(const State& state) const;
+  [[nodiscard]] std::array<Vec3, 2> meeting(const Pair& pair) const;
+  [[nodiscard]] Vec3 relative_velocity(const Pair& pair, const std::vector<Motion>& motions) const;
+  // contact_bound.cpp
+  [[nodiscard]] double stiffness_bound() const;
+  [[nodiscard]] double speed(const State& state) const;
+
+  ContactSettings settings_;
+  const Body& body_;
+  std::vector<ContactPoint> points_;
+  std::vector<std::array<Vec3, 8>> gradients_;  // (parts) 1/m, of the corners' weights
+  std::vector<double> foundation_, friction_;   // (parts) kappa [Pa/m]; mu
+  Neighbours near_matter_;                      // pairs that look at each other through less than three cells
+  double widest_ = 0, narrowest_ = std::numeric_limits<double>::infinity();  // m, spacings
+
+  std::vector<std::uint32_t> elements_;  // that carry points, ascending
+  std::vector<Vec3> built_at_;           // (elements_) their displacements when the pairs were found
+  bool built_ = false;
+  double slack_ = 0;                 // m, by which they may move before new ones can touch
+  std::vector<Pair> pairs_;          // ascending by key
+  std::vector<std::uint32_t> near_;  // points of pairs, ascending
+  // The state that was last looked at: displacements of the elements of near_, sides and pairs.
+  std::vector<std::uint32_t> near_elements_;
+  std::vector<Vec3> seen_;
+  std::uint64_t seen_builds_ = 0;
+  std::vector<Side> sides_;        // (near_)
+  std::vector<PairState> states_;  // (pairs_)
+  // What pairs remember, ascending by key: with the places where the list was made the only state of contact
+  // that is not a function of where everything is now.
+  struct Memory {
+    std::uint64_t key = 0;
+    Vec3 stretch = Vec3::Zero();  // m, of the spring along the surface that resists sliding
+  };
+  std::vector<Memory> memory_;  // (pairs_) where there is friction or damping
+  std::vector<double> mass_;    // (elements) kg
+  struct Whole {                // of a rigid part
+    bool free = false;
+    Vec3 centre = Vec3::Zero();            // m, at rest
+    double per_mass = 0, per_inertia = 0;  // 1/kg, 1/(kg m^2), the largest
+  };
+  std::vector<std::optional<Whole>> rigid_;   // (parts)
+  double promised_ = 0;                       // 1/s^2
+  std::uint64_t builds_ = 0, looked_at_ = 0;  // lists so far, and when the bound was last looked at
+};
+
+}  // namespace flexel

@@ -1,0 +1,74 @@
+// The derivatives of U in the order of the header.
+#include "simulate/contact/pair_law.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace flexel {
+namespace {
+
+struct Smooth {
+  double value = 0, slope = 0;
+};
+
+// K over t^2, and its derivative.
+Smooth kernel(double squared, double width) {
+  if (!(width > 0)) return {1, 0};
+  const double q = 1 - squared / (width * width);
+  if (!(q > 0)) return {};
+  const double scale = 3 / (std::numbers::pi * width * width);
+  return {scale * q * q, -2 * scale * q / (width * width)};
+}
+
+// 0 below `from`, 1 above `to`, a cubic between.
+Smooth ramp(double at, double from, double to) {
+  const double s = (at - from) / (to - from);
+  if (s <= 0) return {};
+  if (s >= 1) return {1, 0};
+  return {s * s * (3 - 2 * s), 6 * s * (1 - s) / (to - from)};
+}
+
+}  // namespace
+
+PairState pair_state(const ContactSide& i, const ContactSide& j, const PairConstants& pair) {
+  PairState now;
+  const Vec3 d = j.position - i.position;
+  const double far = std::max(pair.limit, pair.width);
+  if (pair.width > 0 && d.squaredNorm() > pair.width * pair.width + far * far) return now;
+  const bool faces = i.normal != Vec3::Zero() && j.normal != Vec3::Zero();
+  const Smooth facing =
+      faces ? ramp(-i.normal.dot(j.normal), pair.facing_from, pair.facing_fully) : Smooth{1, 0};
+  if (!(facing.value > 0)) return now;
+  const Vec3 b = i.own_plane * i.normal - j.own_plane * j.normal;
+  const double length = b.norm();
+  const bool balls = i.radius > 0 && j.radius > 0;
+  if (!balls && !(length > 0)) return now;  // two edges
+  now.normal = balls ? d.normalized() : Vec3(b / length);
+  const double along = d.dot(now.normal);
+  now.gap = along - i.radius - j.radius;
+  now.offset = balls ? Vec3(Vec3::Zero()) : Vec3(d - along * now.normal);
+  const Smooth k = kernel(now.offset.squaredNorm(), pair.width);
+  if (!(k.value > 0) || now.gap < -pair.limit) return now;
+  now.near = true;
+  now.weight = pair.stiffness * k.value * facing.value;
+  const NormalLaw::Value law = pair.law.at(-now.gap);
+  now.stiffness = now.weight * law.stiffness;
+  if (!(now.gap < 0)) return now;
+  now.energy = now.weight * law.energy;
+  now.pressure = now.weight * law.pressure;
+  const double spread = -2 * pair.stiffness * k.slope * facing.value * law.energy;  // N/m, of t
+  now.force = now.pressure * now.normal + spread * now.offset;
+  if (!balls) {
+    const Vec3 tilt = (spread * along - now.pressure) / length * now.offset;
+    now.turning = {i.own_plane * tilt, -j.own_plane * tilt};
+  }
+  if (faces) {
+    const double turn = pair.stiffness * k.value * facing.slope * law.energy;
+    now.turning[0] -= turn * j.normal;
+    now.turning[1] -= turn * i.normal;
+  }
+  return now;
+}
+
+}  // namespace flexel

@@ -1,0 +1,75 @@
+// What two contact points do to each other.
+//
+// Points x_i, x_j with outward unit normals n_i, n_j as they are now, d = x_j - x_i, c = -n_i . n_j. Contact
+// acts along n = b / |b|, b = a_i n_i - a_j n_j (a: 1 for a face, 0 for an edge or a ball; two balls: along
+// d).
+//     gap       g = d . n - R_i - R_j                 (R the radius of a ball)
+//     offset    t = d - (d . n) n
+//     energy    U = kappa A_i A_j K(t) w(c) psi(-g)
+// K is a kernel of unit area, so that the double sum over the patches A of two faces in contact is kappa
+// psi(-g) an area, whatever their lattices: K = 3 / (pi rho^2) (1 - t^2 / rho^2)^2. Gap and offset make
+// patches meet as planes do, and, since n is the mean of both normals, second order in their size where the
+// surfaces are curved: two points of one circle have d . (n_i + n_j) = 0. w lets only faces that look at each
+// other meet. U depends on the elements through x and n; its whole derivative is taken, the normals' too, and
+// so forces and moments on the two sides balance to rounding.
+//
+// psi' = p: soft over the first hundredth of a cell (an impact then begins smoothly from step to step),
+// linear, and hard where the sphere under the surface would be squeezed by half:
+//     p = delta^2 / (2 delta_0) below delta_0, delta - delta_0 / 2 above it;  + delta^3 / delta_h^2
+#pragma once
+#include "formats/vec.h"
+
+namespace flexel {
+
+struct NormalLaw {
+  double soft = 0, hard = 0;  // m, delta_0 and delta_h
+  struct Value {
+    double energy = 0, pressure = 0, stiffness = 0;  // psi [m^2], p [m], p' (the largest up to here)
+  };
+  [[nodiscard]] Value at(double depth) const {
+    if (!(depth > 0)) return {0, 0, 1};
+    const double hardening = depth * depth / (hard * hard);
+    Value value{0.25 * hardening * depth * depth, hardening * depth, 1 + 3 * hardening};
+    if (depth < soft) {
+      value.energy += depth * depth * depth / (6 * soft);
+      value.pressure += depth * depth / (2 * soft);
+    } else {
+      value.energy += 0.5 * depth * (depth - soft) + soft * soft / 6;
+      value.pressure += depth - 0.5 * soft;
+    }
+    return value;
+  }
+};
+
+// One side of a pair as it is now.
+struct ContactSide {
+  Vec3 position = Vec3::Zero();  // m
+  Vec3 normal = Vec3::Zero();    // unit; of a ball 0
+  double own_plane = 0;          // a
+  double radius = 0;             // m, R
+};
+
+struct PairConstants {
+  double stiffness = 0;  // kappa A_i A_j [N m], or kappa A [N/m] where the kernel is 1
+  double width = 0;      // rho [m]; 0: the kernel is 1
+  double facing_from = 0, facing_fully = 0;
+  double limit = 0;  // m, deeper than this it is no contact
+  NormalLaw law;
+};
+
+struct PairState {
+  bool near = false;     // within the kernel, facing; else nothing below holds
+  double gap = 0;        // m
+  double weight = 0;     // kappa A_i A_j K w [N/m]
+  double energy = 0;     // J
+  double pressure = 0;   // N, magnitude of the force along the normal
+  double stiffness = 0;  // N/m
+  Vec3 normal = Vec3::Zero();
+  Vec3 offset = Vec3::Zero();                               // t
+  Vec3 force = Vec3::Zero();                                // N, on j; minus it on i
+  std::array<Vec3, 2> turning{Vec3::Zero(), Vec3::Zero()};  // dU/dn_i, dU/dn_j [J]
+};
+
+[[nodiscard]] PairState pair_state(const ContactSide& i, const ContactSide& j, const PairConstants& pair);
+
+}  // namespace flexel

@@ -1,0 +1,28 @@
+// What a scene says of contact, resolved to the parts of a body.
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "formats/vec.h"
+
+namespace flexel {
+
+// A rigid half-space at rest.
+struct ContactPlane {
+  Vec3 point = Vec3::Zero();            // m
+  Vec3 normal = Vec3::UnitZ();          // unit, out of it
+  std::optional<double> friction = {};  // its own constant; none: that of what touches it
+  std::string name = {}, origin = {};
+};
+
+struct ContactSettings {
+  std::vector<std::uint8_t> parts = {};  // (parts) 1: can touch
+  bool self = true;                      // also itself
+  double stiffness = 1;                  // factor on that of the contacts
+  double friction = 0;                   // mu, of materials that give none
+  double damping = 0;                    // s, tau
+  std::vector<ContactPlane> planes = {};
+};
+
+}  // namespace flexel

@@ -1,0 +1,157 @@
+// [contact] and [[plane]] of a scene.
+#include "simulate/effects/contact.h"
+
+#include <fmt/format.h>
+
+#include "formats/error.h"
+#include "formats/program.h"
+#include "simulate/contact/contacts.h"
+
+namespace flexel {
+namespace {
+
+bool flag(TableReader& reader, const char* key, bool fallback) {
+  const SceneValue* value = reader.find(key);
+  if (!value) return fallback;
+  if (value->kind != SceneValue::Kind::boolean)
+    reader.fail(value->line, fmt::format("\"{}\" needs to be true or false", key));
+  return value->flag;
+}
+
+double at_least_0(TableReader& reader, const char* key, double fallback) {
+  const double value = reader.number(key).value_or(fallback);
+  if (!(value >= 0)) reader.fail(reader.find(key)->line, fmt::format("\"{}\" needs to be 0 or more", key));
+  return value;
+}
+
+std::optional<std::vector<std::string>> parse_names(TableReader& reader) {
+  const SceneValue* value = reader.find("parts");
+  if (!value) return std::nullopt;
+  if (value->kind == SceneValue::Kind::string && value->text == "all") return std::nullopt;
+  std::vector<std::string> names;
+  bool sound = value->kind == SceneValue::Kind::array;
+  for (const SceneValue& item : value->items) {
+    sound = sound && item.kind == SceneValue::Kind::string;
+    names.push_back(item.text);
+  }
+  if (!sound || names.empty())
+    reader.fail(value->line,
+                "\"parts\" needs to be \"all\" or a list of names, for example [\"peg\", \"hole\"]");
+  return names;
+}
+
+ContactPlane parse_plane(TableReader& reader, std::size_t number) {
+  ContactPlane plane;
+  plane.origin = reader.place();
+  plane.name = reader.text("name").value_or(fmt::format("plane {}", number));
+  plane.point = reader.to_vector(reader.require("point", "[\"0 mm\", \"0 mm\", \"-5 mm\"]"),
+                                 Dimension::length, "point");
+  (void)reader.require("normal", "[0, 0, 1]");
+  plane.normal = *reader.direction("normal");
+  if (reader.find("friction")) plane.friction = at_least_0(reader, "friction", 0);
+  reader.finish();
+  return plane;
+}
+
+std::vector<std::uint8_t> chosen_parts(const Contact::Parameters& parameters, const Body& body) {
+  if (!parameters.parts) return std::vector<std::uint8_t>(body.parts.size(), 1);
+  std::vector<std::uint8_t> chosen(body.parts.size(), 0);
+  std::vector<std::string> names;
+  for (const Part& part : body.parts) names.push_back(part.name);
+  for (const std::string& name : *parameters.parts) {
+    const auto found = std::find(names.begin(), names.end(), name);
+    if (found == names.end())
+      throw InputError(parameters.origin,
+                       fmt::format("[contact] names part \"{}\", which the body does not have{}", name,
+                                   did_you_mean(name, names)));
+    chosen[static_cast<std::size_t>(found - names.begin())] = 1;
+  }
+  return chosen;
+}
+
+}  // namespace
+
+bool asks_for_contact(TableReader& scene) {
+  const SceneValue* contact = scene.find("contact");
+  const bool said = contact && contact->kind == SceneValue::Kind::boolean;
+  return said ? contact->flag : contact || scene.find("plane");
+}
+
+void Contact::parse(TableReader& scene, Parameters& parameters) {
+  for (const SceneValue* table : scene.tables("plane")) {
+    TableReader reader(*table, scene.file(), "[[plane]]");
+    parameters.planes.push_back(parse_plane(reader, parameters.planes.size() + 1));
+  }
+  parameters.on = asks_for_contact(scene);
+  const SceneValue* contact = scene.find("contact");
+  if (contact && !parameters.on && !parameters.planes.empty())
+    scene.fail(contact->line, "\"contact\" = false, but there is a [[plane]], which only contact feels");
+  if (!contact || contact->kind == SceneValue::Kind::boolean) return;
+  TableReader reader(*contact, scene.file(), "[contact]");
+  parameters.origin = reader.place();
+  parameters.parts = parse_names(reader);
+  parameters.self = flag(reader, "self", true);
+  parameters.stiffness = at_least_0(reader, "stiffness", 1);
+  if (!(parameters.stiffness > 0)) reader.fail("\"stiffness\" in [contact] needs to be above 0");
+  parameters.friction = at_least_0(reader, "friction", 0);
+  parameters.damping = reader.quantity("damping", Dimension::time).value_or(0);
+  if (!(parameters.damping >= 0)) reader.fail("\"damping\" in [contact] needs to be 0 or more");
+  reader.finish();
+}
+
+std::optional<Contact> Contact::make(const Parameters& parameters, const Setting& setting) {
+  if (!parameters.on) return std::nullopt;
+  ContactSettings settings;
+  settings.parts = chosen_parts(parameters, setting.body);
+  settings.self = parameters.self;
+  settings.stiffness = parameters.stiffness;
+  settings.friction = parameters.friction;
+  settings.damping = parameters.damping;
+  settings.planes = parameters.planes;
+  Contact made;
+  made.contacts_ = std::make_shared<Contacts>(std::move(settings), setting);
+  return made;
+}
+
+std::string Contact::why() const {
+  return fmt::format("[contact], {} points", contacts_->points().size());
+}
+
+double Contact::energy(const State& state) const {
+  return contacts_->energy(state);
+}
+
+void Contact::add_forces(const State& state, std::vector<Vec3>& forces) const {
+  contacts_->add_forces(state, forces);
+}
+
+double Contact::added_frequency(const State& state, const std::vector<double>&) const {
+  return contacts_->frequency(state);
+}
+
+bool Contact::wants_check(const State& state) const {
+  return contacts_->hurried(state);
+}
+
+std::vector<double> Contact::memory() const {
+  return contacts_->memory();
+}
+
+void Contact::restore(const std::vector<double>& memory) const {
+  contacts_->restore(memory);
+}
+
+std::optional<ContactLosses> Contact::companion() const {
+  if (!contacts_->loses()) return std::nullopt;
+  return ContactLosses(contacts_);
+}
+
+void ContactLosses::add_forces(const State& state, std::vector<Vec3>& forces) const {
+  contacts_->add_losses(state, forces);
+}
+
+void ContactLosses::finish_step(State& state, const StepDone& done) const {
+  contacts_->remember(state, done.drift);
+}
+
+}  // namespace flexel

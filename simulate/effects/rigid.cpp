@@ -1,0 +1,212 @@
+// [[manipulator]], and `rigid` of [parts.NAME].
+#include "simulate/effects/rigid.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+
+#include "formats/error.h"
+#include "formats/program.h"
+#include "simulate/time/layout.h"
+
+namespace flexel {
+namespace {
+
+std::uint32_t part_named(const std::string& name, const Body& body, const std::string& origin) {
+  std::vector<std::string> names;
+  for (const Part& part : body.parts) names.push_back(part.name);
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end())
+    throw InputError(origin, fmt::format("no part \"{}\"{}", name, did_you_mean(name, names)));
+  return static_cast<std::uint32_t>(found - names.begin());
+}
+
+}  // namespace
+
+void RigidParts::parse(TableReader& scene, Parameters& parameters) {
+  if (const SceneValue* parts = scene.find("parts"))
+    for (const auto& [part, value] : parts->members)
+      for (const auto& [key, entry] : value.members) {
+        if (key != "rigid") continue;
+        if (entry.kind != SceneValue::Kind::boolean)
+          scene.fail(entry.line, "\"rigid\" needs to be true or false");
+        if (entry.flag) parameters.parts.push_back(part);
+      }
+  for (const SceneValue* table : scene.tables("manipulator")) {
+    TableReader reader(*table, scene.file(), "[[manipulator]]");
+    Manipulator made;
+    made.origin = reader.place();
+    (void)reader.require("part", "\"tool\"");
+    made.part = *reader.text("part");
+    made.name = reader.text("name").value_or(made.part);
+    made.path = parse_path(reader);
+    reader.finish();
+    parameters.manipulators.push_back(made);
+  }
+}
+
+std::vector<Rigidity> RigidParts::rigidity(const Parameters& parameters, const Body& body) {
+  if (parameters.parts.empty() && parameters.manipulators.empty()) return {};
+  std::vector<Rigidity> result(body.parts.size(), Rigidity::none);
+  for (const std::string& name : parameters.parts) result[part_named(name, body, "[parts]")] = Rigidity::free;
+  for (const Manipulator& each : parameters.manipulators) {
+    Rigidity& part = result[part_named(each.part, body, each.origin)];
+    if (part == Rigidity::led)
+      throw InputError(each.origin, fmt::format("part \"{}\" has two [[manipulator]]", each.part));
+    part = Rigidity::led;
+  }
+  return result;
+}
+
+std::optional<RigidParts> RigidParts::make(const Parameters& parameters, const Setting& setting) {
+  if (parameters.parts.empty() && parameters.manipulators.empty()) return std::nullopt;
+  RigidParts made;
+  made.body_ = &setting.body;
+  made.mass_ = lumped_masses(setting);
+  made.moving_ = std::make_shared<std::vector<Moving>>();
+  // at equilibrium, which refuses the effect, nothing is rigid
+  for (std::uint32_t p = 0; p < setting.rigidity.size(); ++p) {
+    if (setting.rigidity[p] == Rigidity::none) continue;
+    Moving moving;
+    moving.body = rigid_body(setting.body, p, made.mass_);
+    for (const Manipulator& each : parameters.manipulators)
+      if (each.part == setting.body.parts[p].name) moving.led = each;
+    moving.velocity.resize(moving.body.arms.size());
+    moving.support.resize(moving.body.arms.size(), Vec3::Zero());
+    made.moving_->push_back(std::move(moving));
+  }
+  return made;
+}
+
+std::string RigidParts::why() const {
+  const auto led = std::count_if(moving_->begin(), moving_->end(), [](const Moving& m) { return m.led; });
+  return fmt::format("{} rigid part(s), {} [[manipulator]]", moving_->size(), led);
+}
+
+void RigidParts::start(State& state) const {
+  for (Moving& moving : *moving_) {
+    RigidBody& body = moving.body;
+    take_up(body, *body_, mass_, state.displacement, state.velocity);
+    if (moving.led) {
+      body.momentum = body.spin = Vec3::Zero();
+      move_to(body, moving.led->path.at(*state.time, body.centre), 0, state.displacement, state.velocity);
+    } else {
+      move_to(body, body.pose, 0, state.displacement, state.velocity);
+    }
+  }
+}
+
+void RigidParts::begin(const State& state) const {
+  for (Moving& moving : *moving_) {
+    take_up(moving.body, *body_, mass_, state.displacement, state.velocity);
+    std::copy(state.velocity.begin() + moving.body.begin, state.velocity.begin() + moving.body.end,
+              moving.velocity.begin());
+  }
+}
+
+void RigidParts::finish_step(State& state, const StepDone& done) const {
+  for (Moving& moving : *moving_) {
+    RigidBody& body = moving.body;
+    Vec3 impulse = Vec3::Zero(), turning = Vec3::Zero();
+    for (std::uint32_t e = body.begin; e < body.end; ++e) {
+      const Vec3 took = done.mass[e] * (state.velocity[e] - moving.velocity[e - body.begin]);
+      impulse += took;
+      turning += (body.pose.rotation * body.arms[e - body.begin]).cross(took);
+      moving.support[e - body.begin] = state.velocity[e];  // as if free
+    }
+    if (moving.led) {
+      const Pose before = body.pose, next = moving.led->path.at(*state.time, body.centre);
+      const Vec3 momentum = body.mass / done.drift * (next.translation - before.translation);
+      const Vec3 turn = turn_of(next.rotation * before.rotation.transpose());
+      const Mat3 middle = turned_by(0.5 * turn) * before.rotation;
+      const Vec3 spin = middle * body.inertia * middle.transpose() * turn / done.drift;
+      moving.force = (momentum - body.momentum - impulse) / done.kick;
+      const Vec3 about = moving.led->path.about.value_or(body.centre) - body.centre;
+      moving.torque =
+          (spin - body.spin - turning) / done.kick - (before.rotation * about).cross(moving.force);
+      body.momentum = momentum;
+      body.spin = spin;
+      move_to(body, next, done.drift, state.displacement, state.velocity);
+    } else {
+      body.momentum += impulse;
+      body.spin += turning;
+      move_to(body, drifted(body, done.drift), done.drift, state.displacement, state.velocity);
+    }
+    for (std::uint32_t e = body.begin; e < body.end; ++e) {
+      Vec3& support = moving.support[e - body.begin];
+      support =
+          moving.led ? Vec3(done.mass[e] / done.kick * (state.velocity[e] - support)) : Vec3(Vec3::Zero());
+      moving.velocity[e - body.begin] = state.velocity[e];
+    }
+  }
+}
+
+void RigidParts::add_support_forces(std::vector<Vec3>& forces) const {
+  for (const Moving& moving : *moving_)
+    for (std::uint32_t e = moving.body.begin; e < moving.body.end; ++e)
+      forces[e] += moving.support[e - moving.body.begin];
+}
+
+// 18 numbers and the velocities, a part.
+std::vector<double> RigidParts::memory() const {
+  std::vector<double> memory;
+  const auto add = [&](const auto& values) {
+    memory.insert(memory.end(), values.data(), values.data() + values.size());
+  };
+  for (const Moving& moving : *moving_) {
+    add(moving.body.pose.translation);
+    add(moving.body.pose.rotation);
+    add(moving.body.momentum);
+    add(moving.body.spin);
+    for (const Vec3& velocity : moving.velocity) add(velocity);
+  }
+  return memory;
+}
+
+void RigidParts::restore(const std::vector<double>& memory) const {
+  const double* from = memory.data();
+  const auto take = [&](auto& values) {
+    std::copy(from, from + values.size(), values.data());
+    from += values.size();
+  };
+  std::size_t wanted = 0;
+  for (const Moving& moving : *moving_) wanted += 18 + 3 * moving.velocity.size();
+  if (memory.size() != wanted) throw InputError("the checkpoint's rigid parts are not those of its scene");
+  for (Moving& moving : *moving_) {
+    take(moving.body.pose.translation);
+    take(moving.body.pose.rotation);
+    take(moving.body.momentum);
+    take(moving.body.spin);
+    for (Vec3& velocity : moving.velocity) take(velocity);
+  }
+}
+
+void RigidParts::report(const State&, const std::vector<Vec3>&, SimulateResult& result) const {
+  for (const Moving& moving : *moving_)
+    if (moving.led) result.reactions.push_back({moving.led->name, moving.force});
+}
+
+std::vector<std::string> RigidParts::history_columns() const {
+  std::vector<std::string> columns;
+  for (const Moving& moving : *moving_) {
+    if (!moving.led) continue;
+    for (const char* what : {"force", "torque"})
+      for (const char axis : {'x', 'y', 'z'})
+        columns.push_back(fmt::format("{} {} {} [{}]", moving.led->name, what, axis,
+                                      std::string(what) == "force" ? "N" : "N m"));
+  }
+  return columns;
+}
+
+std::vector<double> RigidParts::history_values() const {
+  std::vector<double> values;
+  for (const Moving& moving : *moving_) {
+    if (!moving.led) continue;
+    values.insert(values.end(), moving.force.begin(), moving.force.end());
+    values.insert(values.end(), moving.torque.begin(), moving.torque.end());
+  }
+  return values;
+}
+
+}  // namespace flexel

@@ -1,0 +1,92 @@
+// Blocks and scenes that the tests of contact share.
+#pragma once
+#include <Eigen/Geometry>
+#include <string>
+
+#include "simulate/contact/contacts.h"
+#include "simulate/merge.h"
+#include "simulate/scene.h"
+#include "tests/simulate/box_body.h"
+#include "tests/simulate/timed_case.h"
+
+namespace flexel::testing {
+
+constexpr double kSide = 0.01;
+inline const Material kGum{"gum", 1e6, 0.3, 1000, "test"};
+
+inline Mat3 turn(double angle, const Vec3& axis) {
+  return Eigen::AngleAxisd(angle, axis.normalized()).toRotationMatrix();
+}
+
+inline Body block(const std::string& name, std::array<int, 3> cells, const Vec3& origin,
+                  const Mat3& axes = Mat3::Identity()) {
+  BoxOptions options;
+  options.name = name;
+  options.cells = cells;
+  options.spacing = Vec3::Constant(kSide);
+  options.origin = origin;
+  options.axes = axes;
+  return box_body(options);
+}
+
+inline Setting setting_of(const Body& body) {
+  Setting setting{body, std::vector<Material>(body.parts.size(), kGum),
+                  std::vector<std::uint8_t>(body.cell_count(), 0)};
+  setting.duration = 1;
+  return setting;
+}
+
+inline ContactSettings all_parts(const Body& body) {
+  ContactSettings settings;
+  settings.parts.assign(body.parts.size(), 1);
+  return settings;
+}
+
+inline State at_rest(const Body& body) {
+  State state;
+  state.displacement.assign(body.element_count(), Vec3::Zero());
+  state.velocity.assign(body.element_count(), Vec3::Zero());
+  state.time = 0;
+  return state;
+}
+
+inline Scene scene_of(double time) {
+  Scene scene;
+  scene.materials["gum"] = kGum;
+  scene.material = "gum";
+  scene.run.time = time;
+  scene.get<Contact>().on = true;
+  scene.get<Bonds>().bond = false;
+  return scene;
+}
+
+inline void throw_part(Scene& scene, const std::string& part, const Vec3& velocity,
+                       const Vec3& spin = Vec3::Zero()) {
+  StartingVelocity start;
+  start.where = select_by_name(part);
+  start.velocity = velocity;
+  start.spin = spin;
+  scene.get<InitialVelocity>().velocities.push_back(start);
+}
+
+// A body whose surface is `vertices` and `polygons`, within a block of cells of its own.
+inline Body within_block(Body body, const std::vector<Vec3>& vertices,
+                         const std::vector<std::vector<std::uint32_t>>& polygons) {
+  Surface& surface = body.surface;
+  surface.vertices = vertices;
+  surface.polygon_offsets = {0};
+  surface.polygon_vertices.clear();
+  surface.polygon_face.assign(polygons.size(), 0);
+  surface.faces = {{"all", 0}};
+  body.surface_cell_offsets = {0};
+  body.surface_cells.clear();
+  for (const auto& polygon : polygons) {
+    surface.polygon_vertices.insert(surface.polygon_vertices.end(), polygon.begin(), polygon.end());
+    surface.polygon_offsets.push_back(static_cast<std::uint32_t>(surface.polygon_vertices.size()));
+    for (std::uint32_t c = 0; c < body.cell_count(); ++c) body.surface_cells.push_back(c);
+    body.surface_cell_offsets.push_back(static_cast<std::uint32_t>(body.surface_cells.size()));
+  }
+  return body;
+}
+
+}  // namespace flexel::testing
