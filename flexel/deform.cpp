@@ -12,9 +12,9 @@
 #include "formats/parallel.h"
 #include "formats/program.h"
 #include "formats/size_warning.h"
-#include "formats/surface_file.h"
 #include "formats/units.h"
 #include "mapping/crack.h"
+#include "mapping/output.h"
 #include "simulate/simulate.h"
 #include "voxelize/voxelize.h"
 
@@ -25,10 +25,11 @@ struct Arguments {
   std::vector<std::string> parts, fixes, pushes, moves, outputs;
   std::string scene, material, size, heal = "auto", placement = "corner", unit, edge, method = "blended",
                                      report, summary, body, format, timeout, crack = "keep", debris = "keep",
-                                     pieces;
+                                     pieces, checks;
   std::optional<std::size_t> count;
   int threads = 0;
-  bool ascii = false, strict = false, quiet = false, estimate = true;
+  double scale = 1;
+  bool ascii = false, strict = false, quiet = false, attributes = false, table = false, estimate = true;
 };
 
 void declare_input(CLI::App& app, Arguments& arguments) {
@@ -89,6 +90,13 @@ void declare_output(CLI::App& app, Arguments& arguments) {
   app.add_option("--pieces", arguments.pieces,
                  "Write each piece to a file of its own too: a folder, or \"out/{piece}.stl\"")
       ->type_name("PATH");
+  app.add_option("--scale", arguments.scale, "Write the part's displacements this many times as large")
+      ->type_name("FACTOR");
+  app.add_option("--check", arguments.checks,
+                 "Also check the mapped surface: voronoi, self-intersection, or both with a comma")
+      ->type_name("NAMES");
+  app.add_flag("--attributes", arguments.attributes, "PLY: write what is known of each vertex too");
+  app.add_flag("--table", arguments.table, "Print the mapping's whole report as a table");
   app.add_option("--report", arguments.report, "Write the mapping's validity report (JSON)")
       ->type_name("FILE");
   app.add_option("--summary", arguments.summary, "Write the summary of all stages (JSON; docs/deform.md)")
@@ -114,7 +122,7 @@ struct Plan {
   CrackOptions crack;
   struct Output {
     std::string path;
-    std::optional<SurfaceFormat> format;  // nothing: the body
+    std::optional<MapOutput> surface;  // nothing: the body
   };
   std::vector<Output> outputs;
 };
@@ -158,8 +166,8 @@ void plan_outputs(const Arguments& arguments, Plan& plan) {
     if (extension(path) == "vtu")
       plan.outputs.push_back({path, std::nullopt});
     else
-      plan.outputs.push_back(
-          {path, surface_format(path == "-" ? arguments.format : "", path, arguments.ascii)});
+      plan.outputs.push_back({path, map_output(path == "-" ? arguments.format : "", path, arguments.ascii, 0,
+                                               arguments.scale, arguments.attributes)});
   if (!arguments.body.empty()) plan.outputs.push_back({arguments.body, std::nullopt});
   std::vector<std::string> paths{arguments.report, arguments.summary};
   for (const Plan::Output& output : plan.outputs) paths.push_back(output.path);
@@ -191,6 +199,7 @@ Plan make_plan(const Arguments& arguments) {
   plan.map.method = map_method(arguments.method);
   plan.crack =
       crack_options(arguments.crack, arguments.debris, arguments.pieces, arguments.format, arguments.ascii);
+  if (!arguments.checks.empty()) add_checks(plan.map, arguments.checks);
   plan_outputs(arguments, plan);
   plan_scene(arguments, plan);
   return plan;
@@ -227,9 +236,8 @@ void write_outputs(const Plan& plan, const Body& body, const MappedPart& mapped,
     write_parts(mapped.surface(body), mapped.result.displacement, plan.crack.pieces_format,
                 default_unit(body.surface), plan.crack.pieces);
   for (const Plan::Output& output : plan.outputs)
-    if (output.format)
-      write_surface(mapped.surface(body), mapped.result.displacement, *output.format,
-                    default_unit(body.surface), output.path);
+    if (output.surface)
+      write_mapped(mapped.surface(body), body, mapped.result, *output.surface);
     else
       write_body(body, output.path);
 }
@@ -257,6 +265,7 @@ int run_stages(const Arguments& arguments, Plan& plan, Progress& progress) {
   const MapReport& found = mapped.report;
   progress.finish();
   say_map(found, progress);
+  if (arguments.table) fmt::print(stderr, "{}", report_table(found, plan.map));
   const std::string mapping = report_json(found, plan.map);
   if (!arguments.report.empty()) write_text(mapping, arguments.report);
   if (!found.valid() && (arguments.strict || found.not_finite > 0))

@@ -4,7 +4,9 @@
 // arrays follow each other without gaps, as meshio requires.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstring>
+#include <iterator>
 #include <limits>
 #include <stdexcept>
 
@@ -98,16 +100,16 @@ void write_number(OutputFile& output, std::uint64_t value) {
 }
 
 void write_raw(OutputFile& output, std::size_t points, std::size_t cells, const std::vector<Array>& arrays) {
-  std::vector<std::uint64_t> offsets;
+  std::vector<std::uint64_t> offsets(arrays.size());
   std::uint64_t at = 0;
-  for (const Array& array : arrays) {
-    offsets.push_back(at);
-    at += sizeof(std::uint64_t) + array.size();
+  for (std::size_t i = arrays.size(); i-- > 0;) {
+    offsets[i] = at;
+    at += sizeof(std::uint64_t) + arrays[i].size();
   }
   output.write(head(points, cells, arrays, offsets, false));
-  for (const Array& array : arrays) {
-    write_number(output, array.size());
-    for_each_chunk(array, [&](const void* data, std::size_t size) { output.write(data, size); });
+  for (std::size_t i = arrays.size(); i-- > 0;) {
+    write_number(output, arrays[i].size());
+    for_each_chunk(arrays[i], [&](const void* data, std::size_t size) { output.write(data, size); });
   }
 }
 
@@ -126,16 +128,16 @@ PackedBlocks pack_array(const Array& array) {
 
 void write_compressed(OutputFile& output, std::size_t points, std::size_t cells,
                       const std::vector<Array>& arrays) {
-  std::vector<PackedBlocks> packed;
-  std::vector<std::uint64_t> offsets;
+  std::vector<PackedBlocks> packed(arrays.size());
+  std::vector<std::uint64_t> offsets(arrays.size());
   std::uint64_t at = 0;
-  for (const Array& array : arrays) {
-    packed.push_back(pack_array(array));
-    offsets.push_back(at);
-    at += sizeof(std::uint64_t) * (3 + packed.back().sizes.size()) + packed.back().bytes.size();
+  for (std::size_t i = arrays.size(); i-- > 0;) {
+    packed[i] = pack_array(arrays[i]);
+    offsets[i] = at;
+    at += sizeof(std::uint64_t) * (3 + packed[i].sizes.size()) + packed[i].bytes.size();
   }
   output.write(head(points, cells, arrays, offsets, true));
-  for (std::size_t i = 0; i < arrays.size(); ++i) {
+  for (std::size_t i = arrays.size(); i-- > 0;) {
     write_number(output, packed[i].sizes.size());
     write_number(output, kBlockSize);
     write_number(output, arrays[i].size() % kBlockSize);
@@ -164,8 +166,15 @@ PackedBlocks pack_blocks(std::span<const std::byte> data, int level) {
   return result;
 }
 
-void write(OutputFile& output, std::size_t points, std::size_t cells, const std::vector<Array>& arrays,
+// The data lie in the opposite order of their tags: meshio renumbers the tags' offsets one after the other
+// and looks each up by its number, which would else be taken by one that it has renumbered before.
+void write(OutputFile& output, std::size_t points, std::size_t cells, const std::vector<Array>& given,
            bool compress) {
+  std::vector<Array> arrays;
+  for (const Section section :
+       {Section::field, Section::point_data, Section::cell_data, Section::points, Section::cells})
+    std::copy_if(given.begin(), given.end(), std::back_inserter(arrays),
+                 [&](const Array& array) { return array.section == section; });
   if (compress)
     write_compressed(output, points, cells, arrays);
   else

@@ -4,7 +4,7 @@
 // to the elements connected with it: O(1), and enough unless the body folds onto itself.
 #include <cmath>
 
-#include "formats/parallel.h"
+#include "formats/bucket.h"
 #include "mapping/bind.h"
 #include "mapping/smooth.h"
 
@@ -28,15 +28,6 @@ bool left_its_cell(const Binding& binding, const Body& body, const std::vector<V
   return false;
 }
 
-std::vector<FrameMotion> frame_motions(const Binding& binding, const Body& body,
-                                       const std::vector<Vec3>& position) {
-  std::vector<FrameMotion> motion(binding.frames.size());
-  parallel_for_each(motion.size(), [&](std::size_t f) {
-    motion[f] = frame_motion(binding.frames[f], body.rest, position, binding.method);
-  });
-  return motion;
-}
-
 }  // namespace
 
 std::vector<Vec3> apply(const Binding& binding, const Body& body, const std::vector<Vec3>& position) {
@@ -45,8 +36,12 @@ std::vector<Vec3> apply(const Binding& binding, const Body& body, const std::vec
                  element_motions(binding.blend.moving, body, binding.connections, position));
   if (binding.method == MapMethod::smooth)
     return apply_smooth(binding.groups, body, binding.frames, binding.frame, position);
-  const std::vector<FrameMotion> motion = frame_motions(binding, body, position);
-  std::vector<Vec3> displacement(binding.frame.size());
+  std::vector<FrameMotion> motion(binding.frames.size());
+  parallel_for_each(motion.size(), [&](std::size_t f) {
+    motion[f] = quick_motion(binding.frames[f], binding.rest_base[f], body.rest, position, binding.method);
+  });
+  std::vector<Vec3> displacement;
+  resize_touched(displacement, binding.frame.size());
   parallel_for_each(displacement.size(), [&](std::size_t v) {
     const FrameMotion& by = motion[binding.frame[v]];
     displacement[v] = by.translation + by.change * binding.coordinates[v];
@@ -56,7 +51,10 @@ std::vector<Vec3> apply(const Binding& binding, const Body& body, const std::vec
 
 std::vector<std::uint8_t> judge(const Binding& binding, const Body& body, const std::vector<Vec3>& position,
                                 const std::vector<Vec3>& displacement) {
-  const std::vector<FrameMotion> motion = frame_motions(binding, body, position);
+  std::vector<std::uint8_t> of_frame(binding.frames.size());
+  parallel_for_each(of_frame.size(), [&](std::size_t f) {
+    of_frame[f] = frame_motion(binding.frames[f], body.rest, position, binding.method).flags;
+  });
   std::vector<std::uint8_t> flags(displacement.size(), 0);
   parallel_for_each(flags.size(), [&](std::size_t v) {
     if (!displacement[v].allFinite()) {
@@ -64,7 +62,7 @@ std::vector<std::uint8_t> judge(const Binding& binding, const Body& body, const 
     } else if (binding.referenced[v]) {
       const Vec3& vertex = body.surface.vertices[v];
       const std::uint32_t origin = binding.frames[binding.frame[v]].elements[0];
-      flags[v] = motion[binding.frame[v]].flags;
+      flags[v] = of_frame[binding.frame[v]];
       if (left_its_cell(binding, body, position, origin, vertex, vertex + displacement[v]))
         flags[v] |= kVoronoiCellLeft;
     }

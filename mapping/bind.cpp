@@ -86,19 +86,12 @@ struct Extremes {
   }
 };
 
-// Distance in spacings of `point` from `element`, less half a voxel's diagonal.
-double distance_outside(const Lattice& lattice, const Vec3& element, const Vec3& point) {
-  return (lattice.axes.transpose() * (point - element)).cwiseQuotient(lattice.spacing).norm() -
-         std::sqrt(0.75);
-}
-
 void take_coordinates(const Body& body, Binding& binding) {
   std::vector<Mat3> base(binding.frames.size()), inverse(binding.frames.size());
   parallel_for_each(binding.frames.size(), [&](std::size_t f) {
     base[f] = rest_base(binding.frames[f], body.rest, binding.method);
     inverse[f] = base[f].inverse();
   });
-  const std::vector<std::uint32_t> part = element_parts(body);
   const bool keep = binding.method == MapMethod::affine || binding.method == MapMethod::gram_schmidt;
   if (keep) binding.coordinates.resize(binding.frame.size());
   const Extremes extremes = parallel_sum<Extremes>(binding.frame.size(), [&](std::size_t v) {
@@ -108,8 +101,9 @@ void take_coordinates(const Body& body, Binding& binding) {
     if (keep) binding.coordinates[v] = coordinates;
     if (!binding.referenced[v]) return Extremes{};
     return Extremes{(body.rest[origin] + base[f] * coordinates - point).norm(),
-                    distance_outside(body.parts[part[origin]].lattice, body.rest[origin], point)};
+                    distance_outside(body, binding.frames[f], point)};
   });
+  if (keep) binding.rest_base = std::move(base);
   binding.rest_residual = extremes.residual;
   binding.distance_outside = extremes.outside;
 }

@@ -12,6 +12,7 @@ struct Binding {
   std::vector<std::uint32_t> frame;  // (vertices) index into frames
   // gram_schmidt, affine: (vertices x 3) in the rest base of the frame, m or edges
   std::vector<Vec3> coordinates;
+  std::vector<Mat3> rest_base;           // gram_schmidt, affine: (frames)
   Blend blend;                           // blended
   Groups groups;                         // smooth
   std::vector<std::uint8_t> referenced;  // (vertices) 1: some polygon uses it
@@ -43,5 +44,10 @@ struct Binding {
 [[nodiscard]] std::vector<std::uint8_t> judge(const Binding& binding, const Body& body,
                                               const std::vector<Vec3>& position,
                                               const std::vector<Vec3>& displacement);
+
+// apply() and judge(), and what the binding knows of each vertex.
+[[nodiscard]] MapResult map_state(const Binding& binding, const Body& body);
+// What `options` ask for beyond that: vertices far outside, checks by name. Throws InputError: --far refuse.
+void complete(const Body& body, const MapOptions& options, MapResult& result);
 
 }  // namespace flexel

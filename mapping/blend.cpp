@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "formats/parallel.h"
+#include "formats/bucket.h"
 #include "mapping/kernel.h"
 
 namespace flexel {
@@ -81,35 +81,45 @@ void weigh_block(const Body& body, const Groups& groups, const Groups::Block& bl
   }
 }
 
-// d - G (X - c), then G by columns: u(x) = a + G (x - c).
-struct Row {
-  std::array<double, 12> value{};
-};
+// d - G (X - c), then G by columns: u(x) = there + G (x - c).
+using Row = Eigen::Array<double, 12, 1>;
 
 void gather_rows(const Body& body, const Blend& blend, const Group& group,
-                 const std::vector<ElementMotion>& motions, const Vec3& centre, std::vector<Row>& rows) {
+                 const std::vector<ElementMotion>& motions, std::vector<Row>& rows) {
   rows.resize(group.reach_end - group.reach_begin);
+  const std::uint32_t* element = blend.groups.elements.data() + group.reach_begin;
+  const Vec3& centre = body.rest[element[0]];
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    const std::uint32_t element = blend.groups.elements[group.reach_begin + i];
-    const ElementMotion& motion = motions[blend.moving.slot_of[element]];
-    Eigen::Map<Vec3>(rows[i].value.data()) =
-        motion.displacement - motion.gradient * (body.rest[element] - centre);
-    Eigen::Map<Mat3>(rows[i].value.data() + 3) = motion.gradient;
+    const ElementMotion& motion = motions[blend.moving.slot_of[element[i]]];
+    Eigen::Map<Vec3>(rows[i].data()) =
+        motion.displacement - motion.gradient * (body.rest[element[i]] - centre);
+    Eigen::Map<Mat3>(rows[i].data() + 3) = motion.gradient;
   }
 }
 
-// The blend of the rows at `offset` from the centre they are given about.
+// The blend of the rows at `offset` from the centre.
 Vec3 blend_rows(const std::vector<Row>& rows, const BlockWeights& weights, std::size_t vertex,
                 const Vec3& offset) {
-  std::array<double, 12> sum{};
-  double total = 0;
-  for (std::uint32_t k = weights.begin[vertex]; k < weights.begin[vertex + 1]; ++k) {
-    const auto weight = static_cast<double>(weights.weight[k]);
-    const double* row = rows[weights.element[k]].value.data();
-    total += weight;
-    for (std::size_t c = 0; c < 12; ++c) sum[c] += weight * row[c];
+  // Two sums, so that an addition need not wait for the one before it.
+  Row even = Row::Zero(), odd = Row::Zero();
+  double total_even = 0, total_odd = 0;
+  std::uint32_t k = weights.begin[vertex];
+  const std::uint32_t end = weights.begin[vertex + 1];
+  for (; k + 1 < end; k += 2) {
+    const auto first = static_cast<double>(weights.weight[k]),
+               second = static_cast<double>(weights.weight[k + 1]);
+    even += first * rows[weights.element[k]];
+    odd += second * rows[weights.element[k + 1]];
+    total_even += first;
+    total_odd += second;
   }
-  return (Eigen::Map<const Vec3>(sum.data()) + Eigen::Map<const Mat3>(sum.data() + 3) * offset) / total;
+  if (k < end) {
+    even += static_cast<double>(weights.weight[k]) * rows[weights.element[k]];
+    total_even += static_cast<double>(weights.weight[k]);
+  }
+  const Row sum = even + odd;
+  return (Eigen::Map<const Vec3>(sum.data()) + Eigen::Map<const Mat3>(sum.data() + 3) * offset) /
+         (total_even + total_odd);
 }
 
 // Too far away to hear any element: the motion of the anchor nearest to the vertex, which the blend runs
@@ -151,7 +161,8 @@ Blend make_blend(const Body& body, const Adjacency& connections, const std::vect
 
 std::vector<Vec3> apply(const Blend& blend, const Body& body, const std::vector<ElementMotion>& motions) {
   const Groups& groups = blend.groups;
-  std::vector<Vec3> displacement(groups.vertices.size());
+  std::vector<Vec3> displacement;
+  resize_touched(displacement, groups.vertices.size());
   parallel_chunks(groups.blocks.size(), kBlocksAtATime, [&](std::size_t begin, std::size_t end) {
     Around around;
     BlockWeights found;
@@ -161,7 +172,7 @@ std::vector<Vec3> apply(const Blend& blend, const Body& body, const std::vector<
       const Groups::Block& block = groups.blocks[b];
       const Group& group = groups.groups[block.group];
       const Vec3& centre = body.rest[groups.elements[group.reach_begin]];
-      if (gathered != block.group) gather_rows(body, blend, group, motions, centre, rows);
+      if (gathered != block.group) gather_rows(body, blend, group, motions, rows);
       gathered = block.group;
       if (blend.weights.empty()) weigh_block(body, groups, block, around, found);
       const BlockWeights& weights = blend.weights.empty() ? found : blend.weights[b];

@@ -214,7 +214,8 @@ void map_pieces(Body& body, const Fragments& fragments, const MapOptions& option
     mapped.report = report(body, mapped.result);
     mapped.report.crack.spanning_triangles = spanning_triangles(body, mapped.result, fragments);
     // What is open encloses nothing.
-    if (mode == CrackMode::open) mapped.report.volume_after = std::numeric_limits<double>::quiet_NaN();
+    if (mode == CrackMode::open)
+      mapped.report.quality.volume_after = std::numeric_limits<double>::quiet_NaN();
   }
   if (mode != CrackMode::cap) return;
   std::vector<Vec3> moved = cracked.surface.vertices;

@@ -5,8 +5,11 @@
 #include "mapping/frame.h"
 
 #include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+
+#include "formats/parallel.h"
 
 namespace flexel {
 namespace {
@@ -118,6 +121,39 @@ FrameMotion frame_motion(const Frame& frame, const std::vector<Vec3>& rest, cons
   if (motion.flags & kFrameDegenerate) return motion;
   motion.change =
       base_of(frame.kind, rest_edge, edge, method) - base_of(frame.kind, rest_edge, rest_edge, method);
+  return motion;
+}
+
+std::vector<Mat3> deformation_gradients(const std::vector<Frame>& frames, const std::vector<Vec3>& rest,
+                                        const std::vector<Vec3>& position) {
+  std::vector<Mat3> gradients(frames.size());
+  parallel_for_each(frames.size(), [&](std::size_t f) {
+    const FrameMotion motion = frame_motion(frames[f], rest, position, MapMethod::affine);
+    gradients[f] = Mat3::Identity() + motion.change * rest_base(frames[f], rest, MapMethod::affine).inverse();
+  });
+  return gradients;
+}
+
+double distance_outside(const Body& body, const Frame& frame, const Vec3& point) {
+  const std::uint32_t origin = frame.elements[0];
+  const auto part =
+      std::upper_bound(body.parts.begin(), body.parts.end(), origin,
+                       [](std::uint32_t element, const Part& p) { return element < p.element_end; });
+  const Lattice& lattice = part->lattice;
+  return (lattice.axes.transpose() * (point - body.rest[origin])).cwiseQuotient(lattice.spacing).norm() -
+         std::sqrt(0.75);
+}
+
+FrameMotion quick_motion(const Frame& frame, const Mat3& rest_base, const std::vector<Vec3>& rest,
+                         const std::vector<Vec3>& position, MapMethod method) {
+  if (frame.kind != FrameKind::full) return frame_motion(frame, rest, position, method);
+  FrameMotion motion;
+  motion.translation = position[frame.elements[0]] - rest[frame.elements[0]];
+  const Mat3 edge = edges(frame, position);
+  const double determinant = edge.determinant();
+  const double lengths = edge.col(0).squaredNorm() * edge.col(1).squaredNorm() * edge.col(2).squaredNorm();
+  if (determinant * determinant < kDegenerate * kDegenerate * lengths || lengths == 0) return motion;
+  motion.change = (method == MapMethod::gram_schmidt ? gram_schmidt(edge) : edge) - rest_base;
   return motion;
 }
 

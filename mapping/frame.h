@@ -29,7 +29,22 @@ struct FrameMotion {
   Mat3 change = Mat3::Zero();       // deformed base - rest base
   std::uint8_t flags = 0;           // kFrameInverted, kFrameDegenerate
 };
+// As far as `flags` go, the same in every method.
 [[nodiscard]] FrameMotion frame_motion(const Frame& frame, const std::vector<Vec3>& rest,
                                        const std::vector<Vec3>& position, MapMethod method);
+
+// (frames) The deformation gradient of each, by its edges: the identity where nothing moved.
+[[nodiscard]] std::vector<Mat3> deformation_gradients(const std::vector<Frame>& frames,
+                                                      const std::vector<Vec3>& rest,
+                                                      const std::vector<Vec3>& position);
+
+// Distance in spacings of `point` from the frame's origin at rest, less half a voxel's diagonal.
+[[nodiscard]] double distance_outside(const Body& body, const Frame& frame, const Vec3& point);
+
+// frame_motion() without flags, for a frame whose base at rest is known: what a state costs when many are
+// mapped.
+[[nodiscard]] FrameMotion quick_motion(const Frame& frame, const Mat3& rest_base,
+                                       const std::vector<Vec3>& rest, const std::vector<Vec3>& position,
+                                       MapMethod method);
 
 }  // namespace flexel

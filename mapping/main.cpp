@@ -1,13 +1,16 @@
-// flexel-map: a deformed body in, its surface deformed out.
-#include <optional>
-
+// flexel-map: a deformed body in, its surface deformed out; or any other surface, points, or a series of
+// bodies.
 #include "formats/body_file.h"
 #include "formats/files.h"
+#include "formats/import.h"
 #include "formats/parallel.h"
 #include "formats/program.h"
-#include "formats/surface_file.h"
 #include "formats/units.h"
+#include "mapping/bind.h"
 #include "mapping/crack.h"
+#include "mapping/foreign.h"
+#include "mapping/output.h"
+#include "mapping/series.h"
 
 namespace flexel {
 namespace {
@@ -15,19 +18,37 @@ namespace {
 constexpr const char* kProgram = "flexel-map";
 
 struct Arguments {
-  std::string body = "-", output, method = "blended", report, format, unit, crack = "keep", debris = "keep",
-              pieces;
-  bool ascii = false, strict = false, quiet = false;
+  std::string body = "-", output, method = "blended", report, format, unit, onto, points, far, checks,
+              crack = "keep", debris = "keep", pieces;
+  double scale = 1, far_distance = 3;
+  bool ascii = false, strict = false, quiet = false, attributes = false, table = false;
   int threads = 0;
 };
 
 void declare(CLI::App& app, Arguments& arguments) {
-  app.add_option("body", arguments.body, "Body file (.vtu); without one, or with -, stdin")
+  app.add_option("body", arguments.body,
+                 "Body file (.vtu) or series (.pvd); without one, or with -, a body from stdin")
       ->type_name("BODY");
   app.add_option("--method", arguments.method,
                  "How elements carry the vertices: blended, smooth, affine or gram-schmidt (the paper's)")
       ->type_name("NAME")
       ->capture_default_str();
+  app.add_option("--onto", arguments.onto,
+                 "Deform this mesh (STL, OBJ, PLY, OFF, glTF, 3MF) instead of the body's own")
+      ->type_name("FILE");
+  app.add_option("--points", arguments.points, "Deform the points of this table (CSV) instead; CSV comes out")
+      ->type_name("FILE");
+  app.add_option("--far", arguments.far,
+                 "Vertices far outside the lattice: follow (extrapolated), rigid or refuse (default with "
+                 "--onto and --points)")
+      ->type_name("HOW");
+  app.add_option("--far-distance", arguments.far_distance, "How far that is, in spacings")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  app.add_option("--scale", arguments.scale, "Write displacements this many times as large")
+      ->type_name("FACTOR");
+  app.add_option("--check", arguments.checks, "Also check: voronoi, self-intersection, or both with a comma")
+      ->type_name("NAMES");
   app.add_option(
          "--crack", arguments.crack,
          "Where the part broke: keep the surface as it is, open it, or cap the pieces (docs/cracks.md)")
@@ -40,19 +61,196 @@ void declare(CLI::App& app, Arguments& arguments) {
                  "Write each piece to a file of its own too: a folder, or \"out/{piece}.stl\"")
       ->type_name("PATH");
   app.add_option("--report", arguments.report, "Write the validity report as JSON")->type_name("FILE");
+  app.add_flag("--table", arguments.table, "Print the whole report as a table");
+  app.add_flag("--attributes", arguments.attributes,
+               "PLY: write what is known of each vertex too (.vtu always has it)");
   app.add_option("--format", arguments.format,
-                 "stl, obj, ply, off or glb; else told by the output's extension")
+                 "stl, obj, ply, off, glb or vtu; else told by the output's extension")
       ->type_name("NAME");
   app.add_flag("--ascii", arguments.ascii, "Write an ASCII STL or PLY");
   app.add_option("--unit", arguments.unit, "Unit of the coordinates written; else that of the input")
       ->type_name("UNIT");
   app.add_flag("--strict", arguments.strict,
-               "Exit 4 and write no surface when a frame is inverted or degenerate");
+               "Exit 4 and write no surface when a frame is inverted or degenerate, or a check fails");
   app.add_option("--threads", arguments.threads, "Threads; 0 is every core")->check(CLI::NonNegativeNumber);
   app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
   app.add_option("-o,--output", arguments.output,
-                 "Where the surface goes; -: stdout, also without it unless --pieces is given")
+                 "Where the surface goes; -: stdout, also without it unless --pieces is given. A series: "
+                 "bent.stl gives "
+                 "bent_00000.stl ..., or {frame} in the name")
       ->type_name("FILE");
+}
+
+// What the arguments ask for, checked.
+struct Plan {
+  MapOptions options;
+  CrackOptions crack;
+  std::optional<MapOutput> output;  // nothing: points, or only the pieces are wanted
+  double unit = 0;                  // of the numbers written, m; 0: that of the surface
+  bool series = false;
+};
+
+void check_pieces(const Arguments& arguments, const Plan& plan, bool own_surface) {
+  const bool asked =
+      plan.crack.mode != CrackMode::keep || plan.crack.drop_debris || !arguments.pieces.empty();
+  if (asked && (!own_surface || plan.series))
+    throw InputError(
+        "--crack, --debris and --pieces are for a body's own surface: leave out --onto, --points, .pvd");
+  if (!arguments.pieces.empty() && arguments.scale != 1)
+    throw InputError("--pieces are written as they are: leave out --scale");
+  if (plan.unit > 0 && plan.crack.pieces_format == SurfaceFormat::glb)
+    throw InputError("GLB has a unit of its own: leave out --unit");
+}
+
+Plan make_plan(Arguments& arguments) {
+  Plan plan;
+  plan.options.method = map_method(arguments.method);
+  const bool foreign = !arguments.onto.empty() || !arguments.points.empty();
+  if (foreign) plan.options.far = FarVertices::refuse;
+  if (!arguments.far.empty()) plan.options.far = far_vertices(arguments.far);
+  plan.options.far_distance = arguments.far_distance;
+  if (!arguments.checks.empty()) add_checks(plan.options, arguments.checks);
+  plan.unit = arguments.unit.empty() ? 0 : length_unit(arguments.unit);
+  plan.series = extension(arguments.body) == "pvd";
+  plan.crack =
+      crack_options(arguments.crack, arguments.debris, arguments.pieces, arguments.format, arguments.ascii);
+  check_pieces(arguments, plan, !foreign);
+  if (arguments.output.empty() && arguments.pieces.empty()) arguments.output = "-";
+  if (!arguments.onto.empty() && !arguments.points.empty())
+    throw InputError("--onto and --points exclude each other: give one of them");
+  if ((arguments.body == "-") + (arguments.onto == "-") + (arguments.points == "-") > 1)
+    throw InputError("only one input can come from stdin");
+  if (plan.series && arguments.output == "-")
+    throw InputError("a series gives a file for each frame: name it with -o, such as -o bent.stl");
+  if (arguments.points.empty() && !arguments.output.empty())
+    plan.output = map_output(arguments.format, arguments.output, arguments.ascii, plan.unit, arguments.scale,
+                             arguments.attributes);
+  else if (!arguments.points.empty() &&
+           (arguments.attributes || arguments.ascii || !arguments.format.empty()))
+    throw InputError("--points: a table comes out; --format, --ascii and --attributes are for surfaces");
+  if (arguments.report == "-" && arguments.output == "-")
+    throw InputError("the report and the surface cannot both go to stdout: give one of them a file");
+  return plan;
+}
+
+// Reads a mesh in the part's frame; a file without a unit is in the part's.
+Surface read_onto(const std::string& path, const Body& body) {
+  ImportOptions options;
+  const std::string ending = extension(path);
+  if (ending == "stl" || ending == "obj" || ending == "ply" || ending == "off")
+    options.unit = default_unit(body.surface);
+  return import_surface(path, options);
+}
+
+void say(const Arguments& arguments, const MapReport& found, const MapOptions& options, Progress& progress) {
+  const std::vector<std::string> lines = report_lines(found);
+  for (std::size_t i = 0; i < lines.size(); ++i)
+    if (i == 0 && !found.valid())
+      progress.warn(lines[i]);
+    else
+      progress.say(lines[i]);
+  if (arguments.table) fmt::print(stderr, "{}", report_table(found, options));
+}
+
+// Maps one state and writes it. `binding` is that of the body's lattice and surface.
+class Run {
+ public:
+  Run(const Arguments& arguments, const Plan& plan, Progress& progress)
+      : arguments_(arguments), plan_(plan), progress_(progress) {}
+
+  // Takes what is to be mapped, in place of the body's own surface where the arguments say so.
+  void take_surface(Body& body) {
+    unit_ = plan_.unit > 0 ? plan_.unit : default_unit(body.surface);
+    if (!arguments_.onto.empty()) {
+      foreign_ = read_onto(arguments_.onto, body);
+      map_onto(body, *foreign_);
+    }
+    if (!arguments_.points.empty()) {
+      table_ = read_points(arguments_.points, unit_);
+      map_points(body, table_->points);
+    }
+  }
+
+  // Says what was found, and writes.
+  void finish(const Surface& surface, const Body& body, const MapResult& result, const MapReport& found,
+              const std::string& path) {
+    progress_.finish();
+    if (!table_) say(arguments_, found, plan_.options, progress_);
+    // The report is written first: it says why --strict refuses.
+    if (!arguments_.report.empty())
+      write_text(report_json(found, plan_.options),
+                 plan_.series ? frame_name(arguments_.report, frame_) : arguments_.report);
+    if (!found.valid() && (arguments_.strict || found.not_finite > 0))
+      throw InvalidMappingError(report_lines(found).front());
+    progress_.stage("write");
+    if (table_) {
+      std::vector<Vec3> displacement = result.displacement;
+      for (Vec3& u : displacement) u *= arguments_.scale;
+      write_text(moved_points(*table_, displacement, unit_), path);
+    }
+    if (!plan_.crack.pieces.empty())
+      write_parts(surface, result.displacement, plan_.crack.pieces_format, unit_, plan_.crack.pieces);
+    if (plan_.output) {
+      MapOutput output = *plan_.output;
+      output.path = path;
+      write_mapped(foreign_ ? *foreign_ : surface, body, result, output);
+    }
+    progress_.finish();
+    ++frame_;
+  }
+
+ private:
+  const Arguments& arguments_;
+  const Plan& plan_;
+  Progress& progress_;
+  std::optional<Surface> foreign_;
+  std::optional<PointTable> table_;
+  double unit_ = 0;
+  std::size_t frame_ = 0;
+};
+
+void map_one(const Arguments& arguments, const Plan& plan, Progress& progress) {
+  Run run(arguments, plan, progress);
+  progress.stage("read");
+  Body body = read_body(arguments.body);
+  run.take_surface(body);
+  progress.stage("map");
+  const MappedPart mapped = map_part(body, plan.options, plan.crack, progress);
+  run.finish(mapped.surface(body), body, mapped.result, mapped.report, arguments.output);
+}
+
+// Frames share one binding until the lattice changes (something broke, or was cut off); only the first frame
+// holds the surface.
+void map_series(const Arguments& arguments, const Plan& plan, Progress& progress) {
+  Run run(arguments, plan, progress);
+  const std::vector<std::string> files = series_files(arguments.body);
+  Body body;
+  std::optional<Binding> binding;
+  for (std::size_t f = 0; f < files.size(); ++f) {
+    throw_if_interrupted();
+    progress.stage(fmt::format("frame {} of {}", f + 1, files.size()));
+    Body next = read_body(files[f]);
+    if (f == 0) {
+      run.take_surface(next);
+    } else {
+      if (next.parts.size() != body.parts.size())
+        throw InputError(files[f], "has other parts than the first frame: map it with its own surface");
+      next.surface = std::move(body.surface);
+      next.surface_cell_offsets = std::move(body.surface_cell_offsets);
+      next.surface_cells = std::move(body.surface_cells);
+      if (next.cell_elements !=
+          body.cell_elements) {  // cells are numbered anew: seats come from the elements
+        next.surface_cell_offsets.clear();
+        next.surface_cells.clear();
+      }
+      if (!same_lattice(next, body)) binding.reset();
+    }
+    body = std::move(next);
+    if (!binding) binding = bind(body, plan.options.method, files.size() - f);
+    MapResult result = map_state(*binding, body);
+    complete(body, plan.options, result);
+    run.finish(body.surface, body, result, report(body, result), frame_name(arguments.output, f));
+  }
 }
 
 int run(int argc, char** argv) {
@@ -60,43 +258,10 @@ int run(int argc, char** argv) {
   CLI::App app{"Maps the deformation of a body onto the surface that it was made from.", kProgram};
   declare(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
-  const MapOptions options{map_method(arguments.method)};
-  const CrackOptions crack =
-      crack_options(arguments.crack, arguments.debris, arguments.pieces, arguments.format, arguments.ascii);
-  if (arguments.output.empty() && arguments.pieces.empty()) arguments.output = "-";
-  // Nothing: only the pieces are wanted.
-  std::optional<SurfaceFormat> format;
-  if (!arguments.output.empty()) format = surface_format(arguments.format, arguments.output, arguments.ascii);
-  const double unit = arguments.unit.empty() ? 0 : length_unit(arguments.unit);
-  if (unit > 0 && (format == SurfaceFormat::glb || crack.pieces_format == SurfaceFormat::glb))
-    throw InputError("GLB has a unit of its own: leave out --unit");
-  if (arguments.report == "-" && arguments.output == "-")
-    throw InputError("the report and the surface cannot both go to stdout: give one of them a file");
+  const Plan plan = make_plan(arguments);
   const ThreadLimit limit(arguments.threads);
   Progress progress(kProgram, arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
-
-  progress.stage("read");
-  Body body = read_body(arguments.body);
-  progress.stage("map");
-  const MappedPart mapped = map_part(body, options, crack, progress);
-  const MapReport& found = mapped.report;
-  const std::vector<std::string> lines = report_lines(found);
-  progress.finish();
-  for (std::size_t i = 0; i < lines.size(); ++i)
-    if (i == 0 && !found.valid())
-      progress.warn(lines[i]);
-    else
-      progress.say(lines[i]);
-  // The report is written first: it says why --strict refuses.
-  if (!arguments.report.empty()) write_text(report_json(found, options), arguments.report);
-  if (!found.valid() && (arguments.strict || found.not_finite > 0)) throw InvalidMappingError(lines.front());
-  progress.stage("write");
-  const double written = unit > 0 ? unit : default_unit(body.surface);
-  if (!crack.pieces.empty())
-    write_parts(mapped.surface(body), mapped.result.displacement, crack.pieces_format, written, crack.pieces);
-  if (format)
-    write_surface(mapped.surface(body), mapped.result.displacement, *format, written, arguments.output);
-  progress.finish();
+  plan.series ? map_series(arguments, plan, progress) : map_one(arguments, plan, progress);
   return kExitDone;
 }
 

@@ -83,11 +83,13 @@ void widen(const Adjacency& connections, std::vector<std::uint32_t>& known, std:
 Frame find_frame(const Body& body, const Adjacency& connections, const Part& part, std::uint32_t origin,
                  int octant) {
   const Vec3 sides(octant & 1 ? 1 : -1, octant & 2 ? 1 : -1, octant & 4 ? 1 : -1);
-  // Distances are taken on the lattice, where equal ones are exactly equal however the lattice is turned.
+  // Distances are taken on the lattice, where equal ones are exactly equal however the lattice is turned and
+  // whatever the unit.
+  const Vec3 proportions = part.lattice.spacing / part.lattice.spacing.maxCoeff();
   const auto to_middle = [&](std::uint32_t element) -> Vec3 {
     const Index3 &a = body.lattice_index[element], &b = body.lattice_index[origin];
     const Vec3 steps = Vec3(a[0], a[1], a[2]) - Vec3(b[0], b[1], b[2]);
-    return (steps - sides / 4).cwiseProduct(part.lattice.spacing);
+    return (steps - sides / 4).cwiseProduct(proportions);
   };
   Frame frame;
   frame.elements = {origin, origin, origin, origin};

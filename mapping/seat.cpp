@@ -7,12 +7,13 @@
 // alone is seated.
 #include "mapping/seat.h"
 
+#include <algorithm>
 #include <limits>
 #include <memory>
 
+#include "formats/bucket.h"
 #include "formats/error.h"
 #include "formats/locate.h"
-#include "formats/parallel.h"
 #include "formats/topology.h"
 
 namespace flexel {
@@ -74,6 +75,21 @@ void look_under(const Body& body, std::size_t p, const Vec3& point, Home& home) 
     return consider(body, locate_on_surface(body, p, point)->cell, u, lattice.spacing, home);
   for (std::uint32_t s = begin; s < end && home.squared_distance > 0; ++s)
     consider(body, body.surface_cells[s], u, lattice.spacing, home);
+}
+
+// Of the cells around `element`, the nearest element to `point`: the one that the point is in, or nearest to;
+// where there is none, the element itself.
+Seat seat_near_element(const Body& body, const Buckets<std::uint32_t>& cells_of, std::uint32_t part,
+                       std::uint32_t element, const Vec3& point) {
+  const Lattice& lattice = body.parts[part].lattice;
+  if (body.parts[part].placement == Placement::corner && !cells_of.begin.empty()) {
+    Home home;
+    const Vec3 u = lattice.to_lattice(point);
+    for (std::uint32_t i = cells_of.begin[element]; i < cells_of.begin[element + 1]; ++i)
+      consider(body, cells_of.values[i], u, lattice.spacing, home);
+    if (home.squared_distance < kFar) return home.seat;
+  }
+  return seat_at_element(body, part, element, point);
 }
 
 // Polygons around some of the vertices.
@@ -168,6 +184,13 @@ class Seating {
     return home;
   }
 
+  void find_cells_of_elements() {
+    cells_of_ = sort_into_buckets<std::uint32_t>(body_.element_count(), [&](const auto& use) {
+      for (std::uint32_t c = 0; c < body_.cell_count(); ++c)
+        for (const std::uint32_t element : body_.cell_elements[c]) use(element, c);
+    });
+  }
+
   [[nodiscard]] std::uint32_t part_of(std::uint32_t v) const {
     return body_.surface.polygon_part(corners_.first_polygon[v]);
   }
@@ -184,13 +207,15 @@ class Seating {
     for (std::uint32_t part = 0; part < needed.size(); ++part)
       if (needed[part] && body_.parts[part].element_begin < body_.parts[part].element_end)
         grids_[part] = std::make_unique<ElementGrid>(body_, part);
+    if (std::any_of(needed.begin(), needed.end(), [](std::uint8_t part) { return part != 0; }))
+      find_cells_of_elements();
   }
 
   [[nodiscard]] Seat seat_nearest(std::uint32_t v) const {
     const Vec3& point = body_.surface.vertices[v];
     if (corners_.first_polygon[v] != kNone) {
       const std::uint32_t part = part_of(v);
-      return seat_at_element(body_, part, grids_[part]->nearest(point), point);
+      return seat_near_element(body_, cells_of_, part, grids_[part]->nearest(point), point);
     }
     std::uint32_t best_part = 0, best = kNone;
     for (std::uint32_t part = 0; part < grids_.size(); ++part) {
@@ -201,12 +226,13 @@ class Seating {
       best = element;
       best_part = part;
     }
-    return seat_at_element(body_, best_part, best, point);
+    return seat_near_element(body_, cells_of_, best_part, best, point);
   }
 
   const Body& body_;
   Corners corners_;
   std::vector<std::unique_ptr<ElementGrid>> grids_;  // (parts)
+  Buckets<std::uint32_t> cells_of_;                  // (elements) cells around each, where grids are needed
   std::vector<double> squared_distance_;             // (vertices) m^2, to the voxel of the seat
   Seats seats_;
 };
@@ -220,7 +246,7 @@ Seat seat_at_element(const Body& body, std::uint32_t part, std::uint32_t element
 }
 
 Seats take_seats(const Body& body) {
-  if (body.surface.vertices.empty() || body.surface.polygon_count() == 0)
+  if (body.surface.vertices.empty())
     throw InputError(
         "the body carries no surface to map onto; only frame 0 of a series does: take the body that "
         "flexel-voxelize or flexel-simulate wrote");

@@ -2,9 +2,13 @@
 // diameter 2.6 m, h = 25 mm. The counter per_vertex is what docs/mapping.md quotes; the argument is the
 // number of threads.
 #include <benchmark/benchmark.h>
+#include <fmt/format.h>
+#include <sys/resource.h>
 
+#include <chrono>
 #include <cmath>
 #include <numeric>
+#include <string>
 
 #include "formats/parallel.h"
 #include "formats/topology.h"
@@ -15,20 +19,20 @@ namespace flexel {
 namespace {
 
 constexpr double kRing = 1.0, kTube = 0.3, kSpacing = 0.0245;
-constexpr std::uint32_t kAround = 1000, kAcross = 1000;
+constexpr std::uint32_t kSide = 1000, kLargeSide = 3163;  // vertices around and across: 1 and 10 million
 
-Surface ring_surface() {
+Surface ring_surface(std::uint32_t side) {
   Surface surface;
-  for (std::uint32_t i = 0; i < kAround; ++i)
-    for (std::uint32_t j = 0; j < kAcross; ++j) {
-      const double a = 2 * M_PI * i / kAround, b = 2 * M_PI * j / kAcross, r = kRing + kTube * std::cos(b);
+  for (std::uint32_t i = 0; i < side; ++i)
+    for (std::uint32_t j = 0; j < side; ++j) {
+      const double a = 2 * M_PI * i / side, b = 2 * M_PI * j / side, r = kRing + kTube * std::cos(b);
       surface.vertices.emplace_back(r * std::cos(a), r * std::sin(a), kTube * std::sin(b));
     }
   surface.polygon_offsets.push_back(0);
-  for (std::uint32_t i = 0; i < kAround; ++i)
-    for (std::uint32_t j = 0; j < kAcross; ++j) {
+  for (std::uint32_t i = 0; i < side; ++i)
+    for (std::uint32_t j = 0; j < side; ++j) {
       for (const auto& [s, t] : {std::pair{0u, 0u}, {1u, 0u}, {1u, 1u}, {0u, 1u}})
-        surface.polygon_vertices.push_back((i + s) % kAround * kAcross + (j + t) % kAcross);
+        surface.polygon_vertices.push_back((i + s) % side * side + (j + t) % side);
       surface.polygon_offsets.push_back(static_cast<std::uint32_t>(surface.polygon_vertices.size()));
     }
   surface.polygon_face.assign(surface.polygon_count(), 0);
@@ -124,9 +128,9 @@ void add_centre_elements(Body& body, Voxels& voxels) {
       }
 }
 
-Body make_ring(Placement placement) {
+Body make_ring(Placement placement, std::uint32_t side) {
   Body body;
-  body.surface = ring_surface();
+  body.surface = ring_surface(side);
   body.parts.resize(1);
   body.parts[0].name = "ring";
   body.parts[0].placement = placement;
@@ -165,7 +169,8 @@ Body make_ring(Placement placement) {
 }
 
 const Body& ring(Placement placement) {
-  static const Body corner = make_ring(Placement::corner), centre = make_ring(Placement::centre);
+  static const Body corner = make_ring(Placement::corner, kSide),
+                    centre = make_ring(Placement::centre, kSide);
   return placement == Placement::corner ? corner : centre;
 }
 
@@ -259,10 +264,33 @@ void register_all() {
   add("part/nearest", nearest);
 }
 
+// Peak resident memory of this process so far, MiB.
+double peak_memory() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024;
+}
+
+// Maps 10 million vertices once, as flexel-map does, and says what the process took at most.
+void print_memory(const std::string& method) {
+  const Body body = make_ring(Placement::corner, kLargeSide);
+  const double before = peak_memory();
+  const auto began = std::chrono::steady_clock::now();
+  const MapResult result = map_state(bind(body, map_method(method)), body);
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
+  fmt::print(
+      "{}: {} vertices, {} elements: peak {:.0f} MiB with the body ({:.0f} MiB before mapping), {:.1f} s\n",
+      method, result.displacement.size(), body.element_count(), peak_memory(), before, took.count());
+}
+
 }  // namespace
 }  // namespace flexel
 
 int main(int argc, char** argv) {
+  if (argc == 3 && std::string(argv[1]) == "--memory") {
+    flexel::print_memory(argv[2]);
+    return 0;
+  }
   benchmark::Initialize(&argc, argv);
   flexel::register_all();
   benchmark::RunSpecifiedBenchmarks();

@@ -1,4 +1,4 @@
-// In place of the readers through OpenCASCADE in a build without it.
+// In place of the readers through OpenCASCADE, in a build or a program without it.
 #include <fmt/format.h>
 
 #include "formats/error.h"
@@ -8,10 +8,14 @@ namespace flexel {
 namespace {
 
 [[noreturn]] void refuse(const ImportInput& input, const char* format) {
-  throw InputError(input.where,
-                   fmt::format("is {} file, and this build has no STEP support: configure with "
-                               "-DFLEXEL_STEP=ON (needs OpenCASCADE 7.6.3), or export the part as STL",
-                               format));
+#ifdef FLEXEL_MESHES_ONLY
+  constexpr const char* kWhy = "this program reads meshes only: export the part as STL";
+#else
+  constexpr const char* kWhy =
+      "this build has no STEP support: configure with -DFLEXEL_STEP=ON (needs OpenCASCADE 7.6.3), or export "
+      "the part as STL";
+#endif
+  throw InputError(input.where, fmt::format("is {} file, and {}", format, kWhy));
 }
 
 }  // namespace

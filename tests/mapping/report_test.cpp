@@ -109,15 +109,15 @@ TEST(Report, HoldsVolumeAndDisplacement) {
   test::deform(body, [](const Vec3& x) -> Vec3 { return {2 * x.x(), 3 * x.y(), x.z()}; });
   const MapReport found = report(body, map(body, MapMethod::affine));
   const double side = 0.4 - 0.003;
-  EXPECT_NEAR(found.volume_before, side * side * side, 1e-12);
-  EXPECT_NEAR(found.volume_after, 6 * side * side * side, 1e-12);
+  EXPECT_NEAR(found.quality.volume_before, side * side * side, 1e-12);
+  EXPECT_NEAR(found.quality.volume_after, 6 * side * side * side, 1e-12);
   EXPECT_NEAR(found.largest_displacement, std::hypot(0.3983, 2 * 0.3983), 1e-12);
   const auto json = nlohmann::json::parse(report_json(found, {MapMethod::affine}));
   EXPECT_EQ(json["method"], "affine");
   EXPECT_TRUE(json["valid"]);
   EXPECT_EQ(json["frames"]["full"], found.vertices);
   EXPECT_EQ(json["failures"]["inverted"], 0);
-  EXPECT_DOUBLE_EQ(json["volume_after"], found.volume_after);
+  EXPECT_DOUBLE_EQ(json["volume_after"], found.quality.volume_after);
 }
 
 }  // namespace

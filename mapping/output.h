@@ -1,0 +1,27 @@
+// Writes the mapped surface, with what the user wants beside it.
+#pragma once
+#include <optional>
+#include <string>
+
+#include "formats/surface_file.h"
+#include "mapping/map.h"
+
+namespace flexel {
+
+struct MapOutput {
+  std::string path = "-";
+  std::optional<SurfaceFormat> format;  // nothing: .vtu
+  double unit = 0;                      // metres; 0: that of the surface
+  double scale = 1;  // displacements are written this many times as large, which the file says where it can
+  bool attributes = false;  // what is known of each vertex (mapping/attributes.h), in PLY and .vtu
+};
+
+// The output's format by `format` or the extension of `path`, ".vtu" too; throws InputError for one that
+// cannot hold attributes where they are wanted, or a unit where the format has its own.
+[[nodiscard]] MapOutput map_output(const std::string& format, const std::string& path, bool ascii,
+                                   double unit, double scale, bool attributes);
+
+// `surface`: as it is to be written, the vertices that were mapped, in the same order.
+void write_mapped(const Surface& surface, const Body& body, const MapResult& result, const MapOutput& output);
+
+}  // namespace flexel

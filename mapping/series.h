@@ -1,0 +1,22 @@
+// A series of bodies (.pvd): which files it lists, and where the surface of each frame goes.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "formats/body.h"
+
+namespace flexel {
+
+// The frames' files, in order, with the folder of the .pvd. Throws InputError: unreadable, no collection, no
+// frame.
+[[nodiscard]] std::vector<std::string> series_files(const std::string& pvd);
+
+// Output name of frame `number`: {frame} in `pattern` becomes the number, as 00000; without one it goes
+// before the extension, "bent.stl" -> "bent_00000.stl".
+[[nodiscard]] std::string frame_name(const std::string& pattern, std::size_t number);
+
+// True when the lattice of both is the same in all that a binding depends on: elements, cells, what is
+// broken.
+[[nodiscard]] bool same_lattice(const Body& a, const Body& b);
+
+}  // namespace flexel

@@ -1,0 +1,136 @@
+// Bodies at the edge of what is a body: an answer or one clear line, never a number that is none.
+#include <gtest/gtest.h>
+
+#include "formats/error.h"
+#include "mapping/bind.h"
+#include "mapping/space_map.h"
+#include "motions.h"
+
+namespace flexel {
+namespace {
+
+MapResult map(const Body& body, const MapOptions& options) {
+  Progress progress("test", Progress::Mode::quiet);
+  return map_surface(body, options, progress);
+}
+
+void expect_numbers(const Body& body, const char* what) {
+  for (const MapMethod method : test::kEveryMethod) {
+    MapOptions options{method};
+    options.check_voronoi = true;
+    options.check_intersection = true;
+    const MapResult result = map(body, options);
+    for (const Vec3& u : result.displacement) ASSERT_TRUE(u.allFinite()) << what << ", " << name_of(method);
+    const MapReport found = report(body, result);
+    EXPECT_EQ(found.not_finite, 0u) << what;
+    EXPECT_TRUE(std::isfinite(found.largest_strain)) << what << ", " << name_of(method);
+    EXPECT_TRUE(std::isfinite(found.rest_residual)) << what;
+    EXPECT_TRUE(std::isfinite(found.quality.largest_normal_jump_added)) << what;
+    EXPECT_FALSE(report_lines(found).front().empty());
+  }
+  const SpaceMap space(body);
+  SpaceMap::Probe probe(space);
+  for (const Vec3& x : body.surface.vertices) ASSERT_TRUE(probe.at(x, 0).position.allFinite()) << what;
+}
+
+const std::vector<std::pair<const char*, test::Field>>& fields() {
+  static const std::vector<std::pair<const char*, test::Field>> list = {
+      {"nothing", [](const Vec3& x) -> Vec3 { return x; }},
+      {"turned", test::turn},
+      {"all elements in one place", [](const Vec3&) -> Vec3 { return Vec3(1, 2, 3); }},
+      {"in a line", [](const Vec3& x) -> Vec3 { return Vec3(x.x() + x.y(), 0, 0); }},
+      {"in a plane", [](const Vec3& x) -> Vec3 { return Vec3(x.x(), x.y(), 0); }},
+      {"inside out", [](const Vec3& x) -> Vec3 { return -x; }},
+      {"huge", [](const Vec3& x) -> Vec3 { return 1e9 * x; }},
+      {"tiny", [](const Vec3& x) -> Vec3 { return 1e-12 * x; }},
+  };
+  return list;
+}
+
+TEST(Degenerate, OneElementARowASheetAndABlockGiveNumbers) {
+  for (const Placement placement : {Placement::corner, Placement::centre})
+    for (const Index3& size : {Index3{1, 1, 1}, {5, 1, 1}, {5, 4, 1}, {3, 3, 3}}) {
+      Body body = test::block(size[0], size[1], size[2], 0.1, placement, 4);
+      for (const auto& [what, field] : fields()) {
+        test::deform(body, field);
+        expect_numbers(body, what);
+      }
+    }
+}
+
+TEST(Degenerate, TwoElementsApartGiveNumbers) {
+  Body body = test::make_body(
+      {}, {0, 0, 0}, {6, 1, 1}, [](const Vec3& p) { return p.x() < 1 || p.x() > 5; }, Placement::centre);
+  test::add_box_surface(body, Vec3(0.1, 0.1, 0.1), Vec3(5.9, 0.9, 0.9), 6);
+  for (const auto& [what, field] : fields()) {
+    test::deform(body, field);
+    expect_numbers(body, what);
+  }
+}
+
+TEST(Degenerate, EveryCellBrokenGivesNumbers) {
+  Body body = test::block(3, 3, 2, 0.1, Placement::corner, 5);
+  std::fill(body.broken.begin(), body.broken.end(), std::uint8_t{1});
+  derive_connections(body);
+  for (const auto& [what, field] : fields()) {
+    test::deform(body, field);
+    expect_numbers(body, what);
+  }
+}
+
+TEST(Degenerate, AnInvertedCellIsSaidByEveryMethod) {
+  Body body = test::block(5, 5, 5, 0.1, Placement::corner, 15);
+  for (std::uint32_t e = 0; e < body.element_count(); ++e)
+    if (body.lattice_index[e] == Index3{5, 5, 5}) body.position[e] -= Vec3::Constant(0.35);
+  for (const MapMethod method : test::kEveryMethod) EXPECT_GT(report(body, map(body, {method})).inverted, 0u);
+}
+
+// A part in metres and the same in millimetres, or a thousand times as large.
+TEST(Degenerate, TheUnitDoesNotMatter) {
+  for (const Placement placement : {Placement::corner, Placement::centre}) {
+    Body body = test::round_bar(6, placement);
+    test::deform(body, test::bend);
+    for (const double scale : {1e-3, 25.4, 1e3}) {
+      Body other = body;
+      other.parts[0].lattice.origin *= scale;
+      other.parts[0].lattice.spacing *= scale;
+      for (auto* points : {&other.rest, &other.position, &other.surface.vertices})
+        for (Vec3& x : *points) x *= scale;
+      for (const MapMethod method : test::kEveryMethod) {
+        const MapResult one = map(body, {method}), two = map(other, {method});
+        double largest = 0;
+        for (std::size_t v = 0; v < one.displacement.size(); ++v)
+          largest = std::max(largest, (two.displacement[v] / scale - one.displacement[v]).norm());
+        EXPECT_LT(largest, 1e-9 * 8) << scale << ", " << name_of(method);
+      }
+    }
+  }
+}
+
+TEST(FarVertices, AreFollowedTurnedOrRefused) {
+  Body body = test::block(4, 4, 4, 0.1, Placement::corner, 2);
+  const auto far = static_cast<std::uint32_t>(body.surface.vertices.size());
+  test::add_surface(body, {Vec3(5, 0.2, 0.2), Vec3(5, 0.3, 0.2), Vec3(5, 0.2, 0.3)}, {{0, 1, 2}});
+  const Mat3 turn = test::rotation(0.4, Vec3(0, 0, 1));
+  test::deform(body, [&](const Vec3& x) -> Vec3 { return 1.5 * (turn * x); });
+  MapOptions options;
+  const MapResult followed = map(body, options);
+  EXPECT_NEAR((body.surface.vertices[far] + followed.displacement[far]).norm(),
+              1.5 * body.surface.vertices[far].norm(), 1e-9);
+  options.far = FarVertices::rigid;
+  const MapResult rigid = map(body, options);
+  EXPECT_EQ(rigid.far, 3u);
+  const std::uint32_t origin = rigid.frame_of(far).elements[0];
+  const Vec3 arm = body.surface.vertices[far] - body.rest[origin];
+  EXPECT_LT(
+      (body.surface.vertices[far] + rigid.displacement[far] - body.position[origin] - turn * arm).norm(),
+      1e-9);
+  EXPECT_EQ(rigid.displacement[0], followed.displacement[0]);
+  options.far = FarVertices::refuse;
+  EXPECT_THROW(map(body, options), InputError);
+  options.far_distance = 100;
+  EXPECT_EQ(map(body, options).displacement, followed.displacement);
+}
+
+}  // namespace
+}  // namespace flexel
