@@ -263,8 +263,9 @@ TEST_F(BodyFile, WrongSizesNameTheField) {
 TEST_F(BodyFile, AnotherVersionSaysWhichIsRead) {
   const Body body = test::random_body(6);
   std::string text = written(body);
-  // The first array of the appended data: 8 bytes of size, then the version.
-  text[text.find("encoding=\"raw\">\n_") + 17 + 8] = 9;
+  // Where the version's tag says: 8 bytes of size, then the version.
+  const std::size_t tag = text.find("offset=\"", text.find("Name=\"flexel_version\"")) + 8;
+  text[text.find("encoding=\"raw\">\n_") + 17 + std::stoul(text.substr(tag, 20)) + 8] = 9;
   const std::string message = failure(text);
   EXPECT_NE(message.find("version 9"), std::string::npos) << message;
   EXPECT_NE(message.find("reads version 1"), std::string::npos) << message;
