@@ -224,10 +224,23 @@ void map_pieces(Body& body, const Fragments& fragments, const MapOptions& option
   for (std::size_t p = 0; p < volumes.size(); ++p) cracked.pieces[p].volume_after = volumes[p];
 }
 
+// What [[event]] carve took away leaves its surface behind (docs/events.md).
+void warn_of_carved(const Surface& surface, Progress& progress) {
+  const auto carved = surface.polygon_columns.find("carved");
+  if (carved == surface.polygon_columns.end()) return;
+  const auto gone = std::count(carved->second.values.begin(), carved->second.values.end(), 1);
+  if (gone > 0)
+    progress.warn(fmt::format(
+        "{} polygon(s) lie over matter that was carved away: they follow what is left around them, and the "
+        "walls of what was carved are missing",
+        gone));
+}
+
 }  // namespace
 
 MappedPart map_part(Body& body, const MapOptions& options, const CrackOptions& crack, Progress& progress) {
   MappedPart mapped;
+  warn_of_carved(body.surface, progress);
   std::optional<Fragments> fragments;
   std::size_t parted = 0;
   if (may_be_broken(body)) {

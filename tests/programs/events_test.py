@@ -55,6 +55,8 @@ def test_carving_half_takes_half_the_mass():
     # the cells right of 20 mm, all eight elements of which are in the region
     expect(abs(json.load(open("s.json"))["mass"] - 930 * 2e-6) < 1e-9, json.load(open("s.json"))["mass"])
     expect_only(*inputs, "out.vtu", "s.json", "h.csv")
+    mapped = expect_ok(run("flexel-map", "out.vtu", "--format", "stl"))
+    expect("carved away" in mapped.err, f"the mapping should tell, too: {mapped}")
 
 
 def test_refusals():
