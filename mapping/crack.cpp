@@ -165,13 +165,6 @@ CrackedSurface part_surface(const Body& body, const Fragments& fragments, const 
 
 namespace {
 
-// Fragments are looked for where something may have broken: a body without broken cells is spared the search.
-bool may_be_broken(const Body& body) {
-  const bool centre = std::any_of(body.parts.begin(), body.parts.end(),
-                                  [](const Part& part) { return part.placement == Placement::centre; });
-  return centre || std::find(body.broken.begin(), body.broken.end(), 1) != body.broken.end();
-}
-
 // Triangles of the body's surface whose corners go with different fragments.
 std::size_t spanning_triangles(const Body& body, const MapResult& result, const Fragments& fragments) {
   const Triangles triangles = triangulate(body.surface);
@@ -237,6 +230,12 @@ void warn_of_carved(const Surface& surface, Progress& progress) {
 }
 
 }  // namespace
+
+bool may_be_broken(const Body& body) {
+  const bool centre = std::any_of(body.parts.begin(), body.parts.end(),
+                                  [](const Part& part) { return part.placement == Placement::centre; });
+  return centre || std::find(body.broken.begin(), body.broken.end(), 1) != body.broken.end();
+}
 
 MappedPart map_part(Body& body, const MapOptions& options, const CrackOptions& crack, Progress& progress) {
   MappedPart mapped;

@@ -58,6 +58,9 @@ struct MappedPart {
   }
 };
 
+// Fragments are looked for where something may have broken: a body without broken cells is spared the search.
+[[nodiscard]] bool may_be_broken(const Body& body);
+
 // Maps the deformed state of `body` onto its surface, parted as `crack` says, and reports on it. While it
 // works the body holds the parted surface; it gets its own back. Throws as part_surface() and map_surface().
 [[nodiscard]] MappedPart map_part(Body& body, const MapOptions& options, const CrackOptions& crack,

@@ -93,9 +93,11 @@ struct Plan {
 void check_pieces(const Arguments& arguments, const Plan& plan, bool own_surface) {
   const bool asked =
       plan.crack.mode != CrackMode::keep || plan.crack.drop_debris || !arguments.pieces.empty();
-  if (asked && (!own_surface || plan.series))
+  if (asked && !own_surface)
     throw InputError(
-        "--crack, --debris and --pieces are for a body's own surface: leave out --onto, --points, .pvd");
+        "--crack, --debris and --pieces are for a body's own surface: leave out --onto, --points");
+  if (plan.series && !arguments.pieces.empty())
+    throw InputError("--pieces are of one state: give one frame, or leave it out for a file a frame");
   if (!arguments.pieces.empty() && arguments.scale != 1)
     throw InputError("--pieces are written as they are: leave out --scale");
   if (plan.unit > 0 && plan.crack.pieces_format == SurfaceFormat::glb)
@@ -171,6 +173,8 @@ class Run {
     }
   }
 
+  [[nodiscard]] bool foreign() const { return foreign_ || table_; }
+
   // Says what was found, and writes.
   void finish(const Surface& surface, const Body& body, const MapResult& result, const MapReport& found,
               const std::string& path) {
@@ -219,7 +223,7 @@ void map_one(const Arguments& arguments, const Plan& plan, Progress& progress) {
   run.finish(mapped.surface(body), body, mapped.result, mapped.report, arguments.output);
 }
 
-// Frames share one binding until the lattice changes (something broke, or was cut off); only the first frame
+// Frames share one binding until the lattice changes (something was cut off) or breaks; only the first frame
 // holds the surface.
 void map_series(const Arguments& arguments, const Plan& plan, Progress& progress) {
   Run run(arguments, plan, progress);
@@ -246,6 +250,11 @@ void map_series(const Arguments& arguments, const Plan& plan, Progress& progress
       if (!same_lattice(next, body)) binding.reset();
     }
     body = std::move(next);
+    if (!run.foreign() && may_be_broken(body)) {  // what breaks is bound anew, for its pieces
+      const MappedPart mapped = map_part(body, plan.options, plan.crack, progress);
+      run.finish(mapped.surface(body), body, mapped.result, mapped.report, frame_name(arguments.output, f));
+      continue;
+    }
     if (!binding) binding = bind(body, plan.options.method, files.size() - f);
     MapResult result = map_state(*binding, body);
     complete(body, plan.options, result);

@@ -59,6 +59,19 @@ def torn_bar(wave, *options):
     tear("rest.vtu", "torn.vtu", half(21, wave), away)
 
 
+def test_a_series_comes_out_in_pieces():
+    torn_bar(0)
+    frames = "".join(f'<DataSet timestep="{i}" part="0" file="{name}"/>' for i, name in enumerate(["rest.vtu", "torn.vtu"]))
+    write("run.pvd", f'<?xml version="1.0"?><VTKFile type="Collection" version="0.1"><Collection>{frames}</Collection></VTKFile>')
+    result = expect_ok(run("flexel-map", "run.pvd", "--crack", "cap", "-o", "frame.obj"))
+    expect("pieces" in result.err, f"it should tell of the pieces: {result}")
+    expect_ok(run("flexel-map", "torn.vtu", "--crack", "cap", "-o", "alone.obj"))
+    expect_ok(run("flexel-map", "rest.vtu", "-o", "rest.obj"))
+    for frame, alone in (("frame_00000.obj", "rest.obj"), ("frame_00001.obj", "alone.obj")):
+        expect(open(frame, "rb").read() == open(alone, "rb").read(), f"{frame} is what the frame alone gives")
+    expect_error(run("flexel-map", "run.pvd", "--crack", "cap", "--pieces", "p", "-o", "x.obj"), "flexel-map", "--pieces")
+
+
 def test_torn_bar_is_two_solids():
     torn_bar(0.0)
     os.mkdir("out")
