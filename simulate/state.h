@@ -41,7 +41,7 @@ struct Setting {
   // (elements) m, displacement that fixes and moves start from (simulate/rest_shape.h); empty: none
   std::vector<Vec3> settled = {};
   std::size_t bonding_parts = SIZE_MAX;  // the first ones; later ones joined in a run, and bond with nothing
-  std::vector<Rigidity> rigidity = {};  // (parts); empty: none is rigid
+  std::vector<Rigidity> rigidity = {};   // (parts); empty: none is rigid
 };
 
 }  // namespace flexel

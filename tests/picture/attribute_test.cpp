@@ -77,7 +77,8 @@ TEST(Lattice, BrokenCellsLeaveAGap) {
   // two blocks of 2 x 2 x 2
   EXPECT_EQ(draw_cells(body, body.position, {Vec3::Zero(), 1}).drawn.triangles.size(), 2u * 2 * 6 * 4);
   body.broken.assign(body.cell_count(), 1);
-  EXPECT_EQ(draw_cells(body, body.position, {Vec3::Zero(), 1}).drawn.triangles.size(), 2u * 2 * (10 + 4 + 10));
+  EXPECT_EQ(draw_cells(body, body.position, {Vec3::Zero(), 1}).drawn.triangles.size(),
+            2u * 2 * (10 + 4 + 10));
 }
 
 TEST(Picture, TheDeformedBodyIsDrawnWhereItIs) {
