@@ -13,7 +13,7 @@
 #include "formats/program.h"
 #include "formats/size_warning.h"
 #include "formats/units.h"
-#include "mapping/crack.h"
+#include "mapping/options.h"
 #include "mapping/output.h"
 #include "simulate/simulate.h"
 #include "voxelize/voxelize.h"
@@ -23,13 +23,11 @@ namespace {
 
 struct Arguments {
   std::vector<std::string> parts, fixes, pushes, moves, outputs;
-  std::string scene, material, size, heal = "auto", placement = "corner", unit, edge, method = "blended",
-                                     report, summary, body, format, timeout, crack = "keep", debris = "keep",
-                                     pieces, checks;
+  std::string scene, material, size, heal = "auto", placement = "corner", unit, edge, summary, body, timeout;
   std::optional<std::size_t> count;
+  MapArguments map;
   int threads = 0;
-  double scale = 1;
-  bool ascii = false, strict = false, quiet = false, attributes = false, table = false, estimate = true;
+  bool quiet = false, estimate = true;
 };
 
 void declare_input(CLI::App& app, Arguments& arguments) {
@@ -72,36 +70,10 @@ void declare_output(CLI::App& app, Arguments& arguments) {
       ->type_name("FILE")
       ->required()
       ->allow_extra_args(false);
-  app.add_option("--format", arguments.format, "Format of what goes to stdout: stl, obj, ply, off or glb")
-      ->type_name("NAME");
-  app.add_flag("--ascii", arguments.ascii, "Write ASCII STL or PLY");
   app.add_option("--body", arguments.body, "Write the deformed body (.vtu) too")->type_name("FILE");
-  app.add_option("--method", arguments.method, "Mapping: blended, smooth, affine or gram-schmidt")
-      ->type_name("NAME")
-      ->capture_default_str();
-  app.add_option(
-         "--crack", arguments.crack,
-         "Where the part broke: keep the surface as it is, open it, or cap the pieces (docs/cracks.md)")
-      ->type_name("HOW")
-      ->capture_default_str();
-  app.add_option("--debris", arguments.debris, "Pieces of a single element: keep or drop")
-      ->type_name("HOW")
-      ->capture_default_str();
-  app.add_option("--pieces", arguments.pieces,
-                 "Write each piece to a file of its own too: a folder, or \"out/{piece}.stl\"")
-      ->type_name("PATH");
-  app.add_option("--scale", arguments.scale, "Write the part's displacements this many times as large")
-      ->type_name("FACTOR");
-  app.add_option("--check", arguments.checks,
-                 "Also check the mapped surface: voronoi, self-intersection, or both with a comma")
-      ->type_name("NAMES");
-  app.add_flag("--attributes", arguments.attributes, "PLY: write what is known of each vertex too");
-  app.add_flag("--table", arguments.table, "Print the mapping's whole report as a table");
-  app.add_option("--report", arguments.report, "Write the mapping's validity report (JSON)")
-      ->type_name("FILE");
+  declare_map_options(app, arguments.map);
   app.add_option("--summary", arguments.summary, "Write the summary of all stages (JSON; docs/deform.md)")
       ->type_name("FILE");
-  app.add_flag("--strict", arguments.strict, "Exit 4 and write no surface when the mapping is invalid");
   app.add_option("--threads", arguments.threads, "Threads; 0 is every core")->check(CLI::NonNegativeNumber);
   app.add_option("--timeout", arguments.timeout,
                  "Stop the simulation after this time (\"90 s\"): exit 5, the last good state in "
@@ -166,10 +138,11 @@ void plan_outputs(const Arguments& arguments, Plan& plan) {
     if (extension(path) == "vtu")
       plan.outputs.push_back({path, std::nullopt});
     else
-      plan.outputs.push_back({path, map_output(path == "-" ? arguments.format : "", path, arguments.ascii, 0,
-                                               arguments.scale, arguments.attributes)});
+      plan.outputs.push_back(
+          {path, map_output(path == "-" ? arguments.map.format : "", path, arguments.map.ascii, 0,
+                            arguments.map.scale, arguments.map.attributes)});
   if (!arguments.body.empty()) plan.outputs.push_back({arguments.body, std::nullopt});
-  std::vector<std::string> paths{arguments.report, arguments.summary};
+  std::vector<std::string> paths{arguments.map.report, arguments.summary};
   for (const Plan::Output& output : plan.outputs) paths.push_back(output.path);
   std::sort(paths.begin(), paths.end());
   for (std::size_t i = 1; i < paths.size(); ++i)
@@ -196,10 +169,8 @@ Plan make_plan(const Arguments& arguments) {
   if (!arguments.timeout.empty()) plan.timeout = parse_timeout(arguments.timeout);
   plan.voxelize.heal = heal_choice(arguments.heal);
   plan.voxelize.placement = placement_choice(arguments.placement);
-  plan.map.method = map_method(arguments.method);
-  plan.crack =
-      crack_options(arguments.crack, arguments.debris, arguments.pieces, arguments.format, arguments.ascii);
-  if (!arguments.checks.empty()) add_checks(plan.map, arguments.checks);
+  plan.map = map_options(arguments.map);
+  plan.crack = crack_options(arguments.map);
   plan_outputs(arguments, plan);
   plan_scene(arguments, plan);
   return plan;
@@ -219,15 +190,6 @@ std::string failed_name(const Plan& plan) {
     return output.path.substr(0, output.path.size() - ending.size()) + ".failed.vtu";
   }
   return "";
-}
-
-void say_map(const MapReport& found, Progress& progress) {
-  const std::vector<std::string> lines = report_lines(found);
-  for (std::size_t i = 0; i < lines.size(); ++i)
-    if (i == 0 && !found.valid())
-      progress.warn(lines[i]);
-    else
-      progress.say(lines[i]);
 }
 
 void write_outputs(const Plan& plan, const Body& body, const MappedPart& mapped, Progress& progress) {
@@ -264,18 +226,14 @@ int run_stages(const Arguments& arguments, Plan& plan, Progress& progress) {
   const MappedPart mapped = map_part(body, plan.map, plan.crack, progress);
   const MapReport& found = mapped.report;
   progress.finish();
-  say_map(found, progress);
-  if (arguments.table) fmt::print(stderr, "{}", report_table(found, plan.map));
-  const std::string mapping = report_json(found, plan.map);
-  if (!arguments.report.empty()) write_text(mapping, arguments.report);
-  if (!found.valid() && (arguments.strict || found.not_finite > 0))
-    throw InvalidMappingError(report_lines(found).front());
+  say_report(found, arguments.map, plan.map, progress);
+  write_report(found, arguments.map, plan.map, arguments.map.report);
   write_outputs(plan, body, mapped, progress);
   if (!arguments.summary.empty()) {
     nlohmann::ordered_json summary;
     summary["voxelize"] = nlohmann::ordered_json::parse(summary_json(voxels));
     summary["simulate"] = nlohmann::ordered_json::parse(summary_json(simulated, body));
-    summary["map"] = nlohmann::ordered_json::parse(mapping);
+    summary["map"] = nlohmann::ordered_json::parse(report_json(found, plan.map));
     write_text(summary.dump(2) + "\n", arguments.summary);
   }
   progress.finish();

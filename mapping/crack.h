@@ -19,11 +19,6 @@ struct CrackOptions {
   SurfaceFormat pieces_format = SurfaceFormat::stl_binary;
 };
 
-// From the words of the command line; `format` and `ascii` as for surface_format(). `pieces`: a path with
-// "{piece}" in it, or a folder. InputError for what is unknown or does not fit together.
-[[nodiscard]] CrackOptions crack_options(const std::string& mode, const std::string& debris,
-                                         const std::string& pieces, const std::string& format, bool ascii);
-
 // The parted surface.
 struct CrackedSurface {
   // Its parts are the pieces that are kept, in order; vertices of the body's surface come first and as they

@@ -9,6 +9,7 @@
 #include "mapping/bind.h"
 #include "mapping/crack.h"
 #include "mapping/foreign.h"
+#include "mapping/options.h"
 #include "mapping/output.h"
 #include "mapping/series.h"
 
@@ -18,10 +19,10 @@ namespace {
 constexpr const char* kProgram = "flexel-map";
 
 struct Arguments {
-  std::string body = "-", output, method = "blended", report, format, unit, onto, points, far, checks,
-              crack = "keep", debris = "keep", pieces;
-  double scale = 1, far_distance = 3;
-  bool ascii = false, strict = false, quiet = false, attributes = false, table = false;
+  std::string body = "-", output, unit, onto, points, far;
+  double far_distance = 3;
+  MapArguments map;
+  bool quiet = false;
   int threads = 0;
 };
 
@@ -29,10 +30,6 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_option("body", arguments.body,
                  "Body file (.vtu) or series (.pvd); without one, or with -, a body from stdin")
       ->type_name("BODY");
-  app.add_option("--method", arguments.method,
-                 "How elements carry the vertices: blended, smooth, affine or gram-schmidt (the paper's)")
-      ->type_name("NAME")
-      ->capture_default_str();
   app.add_option("--onto", arguments.onto,
                  "Deform this mesh (STL, OBJ, PLY, OFF, glTF, 3MF) instead of the body's own")
       ->type_name("FILE");
@@ -45,33 +42,9 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_option("--far-distance", arguments.far_distance, "How far that is, in spacings")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  app.add_option("--scale", arguments.scale, "Write displacements this many times as large")
-      ->type_name("FACTOR");
-  app.add_option("--check", arguments.checks, "Also check: voronoi, self-intersection, or both with a comma")
-      ->type_name("NAMES");
-  app.add_option(
-         "--crack", arguments.crack,
-         "Where the part broke: keep the surface as it is, open it, or cap the pieces (docs/cracks.md)")
-      ->type_name("HOW")
-      ->capture_default_str();
-  app.add_option("--debris", arguments.debris, "Pieces of a single element: keep or drop")
-      ->type_name("HOW")
-      ->capture_default_str();
-  app.add_option("--pieces", arguments.pieces,
-                 "Write each piece to a file of its own too: a folder, or \"out/{piece}.stl\"")
-      ->type_name("PATH");
-  app.add_option("--report", arguments.report, "Write the validity report as JSON")->type_name("FILE");
-  app.add_flag("--table", arguments.table, "Print the whole report as a table");
-  app.add_flag("--attributes", arguments.attributes,
-               "PLY: write what is known of each vertex too (.vtu always has it)");
-  app.add_option("--format", arguments.format,
-                 "stl, obj, ply, off, glb or vtu; else told by the output's extension")
-      ->type_name("NAME");
-  app.add_flag("--ascii", arguments.ascii, "Write an ASCII STL or PLY");
+  declare_map_options(app, arguments.map);
   app.add_option("--unit", arguments.unit, "Unit of the coordinates written; else that of the input")
       ->type_name("UNIT");
-  app.add_flag("--strict", arguments.strict,
-               "Exit 4 and write no surface when a frame is inverted or degenerate, or a check fails");
   app.add_option("--threads", arguments.threads, "Threads; 0 is every core")->check(CLI::NonNegativeNumber);
   app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
   app.add_option("-o,--output", arguments.output,
@@ -92,13 +65,13 @@ struct Plan {
 
 void check_pieces(const Arguments& arguments, const Plan& plan, bool own_surface) {
   const bool asked =
-      plan.crack.mode != CrackMode::keep || plan.crack.drop_debris || !arguments.pieces.empty();
+      plan.crack.mode != CrackMode::keep || plan.crack.drop_debris || !arguments.map.pieces.empty();
   if (asked && !own_surface)
     throw InputError(
         "--crack, --debris and --pieces are for a body's own surface: leave out --onto, --points");
-  if (plan.series && !arguments.pieces.empty())
+  if (plan.series && !arguments.map.pieces.empty())
     throw InputError("--pieces are of one state: give one frame, or leave it out for a file a frame");
-  if (!arguments.pieces.empty() && arguments.scale != 1)
+  if (!arguments.map.pieces.empty() && arguments.map.scale != 1)
     throw InputError("--pieces are written as they are: leave out --scale");
   if (plan.unit > 0 && plan.crack.pieces_format == SurfaceFormat::glb)
     throw InputError("GLB has a unit of its own: leave out --unit");
@@ -106,18 +79,16 @@ void check_pieces(const Arguments& arguments, const Plan& plan, bool own_surface
 
 Plan make_plan(Arguments& arguments) {
   Plan plan;
-  plan.options.method = map_method(arguments.method);
+  plan.options = map_options(arguments.map);
   const bool foreign = !arguments.onto.empty() || !arguments.points.empty();
   if (foreign) plan.options.far = FarVertices::refuse;
   if (!arguments.far.empty()) plan.options.far = far_vertices(arguments.far);
   plan.options.far_distance = arguments.far_distance;
-  if (!arguments.checks.empty()) add_checks(plan.options, arguments.checks);
   plan.unit = arguments.unit.empty() ? 0 : length_unit(arguments.unit);
   plan.series = extension(arguments.body) == "pvd";
-  plan.crack =
-      crack_options(arguments.crack, arguments.debris, arguments.pieces, arguments.format, arguments.ascii);
+  plan.crack = crack_options(arguments.map);
   check_pieces(arguments, plan, !foreign);
-  if (arguments.output.empty() && arguments.pieces.empty()) arguments.output = "-";
+  if (arguments.output.empty() && arguments.map.pieces.empty()) arguments.output = "-";
   if (!arguments.onto.empty() && !arguments.points.empty())
     throw InputError("--onto and --points exclude each other: give one of them");
   if ((arguments.body == "-") + (arguments.onto == "-") + (arguments.points == "-") > 1)
@@ -125,12 +96,12 @@ Plan make_plan(Arguments& arguments) {
   if (plan.series && arguments.output == "-")
     throw InputError("a series gives a file for each frame: name it with -o, such as -o bent.stl");
   if (arguments.points.empty() && !arguments.output.empty())
-    plan.output = map_output(arguments.format, arguments.output, arguments.ascii, plan.unit, arguments.scale,
-                             arguments.attributes);
+    plan.output = map_output(arguments.map.format, arguments.output, arguments.map.ascii, plan.unit,
+                             arguments.map.scale, arguments.map.attributes);
   else if (!arguments.points.empty() &&
-           (arguments.attributes || arguments.ascii || !arguments.format.empty()))
+           (arguments.map.attributes || arguments.map.ascii || !arguments.map.format.empty()))
     throw InputError("--points: a table comes out; --format, --ascii and --attributes are for surfaces");
-  if (arguments.report == "-" && arguments.output == "-")
+  if (arguments.map.report == "-" && arguments.output == "-")
     throw InputError("the report and the surface cannot both go to stdout: give one of them a file");
   return plan;
 }
@@ -142,16 +113,6 @@ Surface read_onto(const std::string& path, const Body& body) {
   if (ending == "stl" || ending == "obj" || ending == "ply" || ending == "off")
     options.unit = default_unit(body.surface);
   return import_surface(path, options);
-}
-
-void say(const Arguments& arguments, const MapReport& found, const MapOptions& options, Progress& progress) {
-  const std::vector<std::string> lines = report_lines(found);
-  for (std::size_t i = 0; i < lines.size(); ++i)
-    if (i == 0 && !found.valid())
-      progress.warn(lines[i]);
-    else
-      progress.say(lines[i]);
-  if (arguments.table) fmt::print(stderr, "{}", report_table(found, options));
 }
 
 // Maps one state and writes it. `binding` is that of the body's lattice and surface.
@@ -179,17 +140,14 @@ class Run {
   void finish(const Surface& surface, const Body& body, const MapResult& result, const MapReport& found,
               const std::string& path) {
     progress_.finish();
-    if (!table_) say(arguments_, found, plan_.options, progress_);
-    // The report is written first: it says why --strict refuses.
-    if (!arguments_.report.empty())
-      write_text(report_json(found, plan_.options),
-                 plan_.series ? frame_name(arguments_.report, frame_) : arguments_.report);
-    if (!found.valid() && (arguments_.strict || found.not_finite > 0))
-      throw InvalidMappingError(report_lines(found).front());
+    if (!table_) say_report(found, arguments_.map, plan_.options, progress_);
+    const std::string& report = arguments_.map.report;
+    write_report(found, arguments_.map, plan_.options,
+                 plan_.series && !report.empty() ? frame_name(report, frame_) : report);
     progress_.stage("write");
     if (table_) {
       std::vector<Vec3> displacement = result.displacement;
-      for (Vec3& u : displacement) u *= arguments_.scale;
+      for (Vec3& u : displacement) u *= arguments_.map.scale;
       write_text(moved_points(*table_, displacement, unit_), path);
     }
     if (!plan_.crack.pieces.empty())

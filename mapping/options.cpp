@@ -1,0 +1,112 @@
+// Options are declared, checked and obeyed here, so that the two programs cannot drift apart.
+#include "mapping/options.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "formats/error.h"
+#include "formats/files.h"
+
+namespace flexel {
+namespace {
+
+constexpr std::string_view kPlace = "{piece}";
+
+// The path of every piece's file, as write_parts() wants it.
+std::string pattern_of(const std::string& pieces, const std::string& format) {
+  std::string path = pieces;
+  bool named = names_parts(path);
+  for (std::size_t at = path.find(kPlace); at != std::string::npos; at = path.find(kPlace, at)) {
+    path.replace(at, kPlace.size(), "{part}");
+    named = true;
+  }
+  if (named) return path;
+  if (std::error_code error; !std::filesystem::is_directory(path, error))
+    throw InputError(
+        fmt::format("--pieces: \"{}\" is no folder; make it, or give a path with {{piece}} in it, such as "
+                    "out/{{piece}}.stl",
+                    pieces));
+  return (std::filesystem::path(path) / ("{part}." + (format.empty() ? "stl" : format))).string();
+}
+
+}  // namespace
+
+void declare_map_options(CLI::App& app, MapArguments& arguments) {
+  app.add_option("--method", arguments.method,
+                 "How elements carry the vertices: blended, smooth, affine or gram-schmidt (the paper's)")
+      ->type_name("NAME")
+      ->capture_default_str();
+  app.add_option("--check", arguments.checks,
+                 "Also check the mapped surface: voronoi, self-intersection, or both with a comma")
+      ->type_name("NAMES");
+  app.add_option(
+         "--crack", arguments.crack,
+         "Where the part broke: keep the surface as it is, open it, or cap the pieces (docs/cracks.md)")
+      ->type_name("HOW")
+      ->capture_default_str();
+  app.add_option("--debris", arguments.debris, "Pieces of a single element: keep or drop")
+      ->type_name("HOW")
+      ->capture_default_str();
+  app.add_option("--pieces", arguments.pieces,
+                 "Write each piece to a file of its own too: a folder, or \"out/{piece}.stl\"")
+      ->type_name("PATH");
+  app.add_option("--scale", arguments.scale, "Write displacements this many times as large")
+      ->type_name("FACTOR");
+  app.add_option("--format", arguments.format,
+                 "stl, obj, ply, off, glb or vtu, for stdout and pieces; else told by the extension")
+      ->type_name("NAME");
+  app.add_flag("--ascii", arguments.ascii, "Write an ASCII STL or PLY");
+  app.add_flag("--attributes", arguments.attributes,
+               "PLY: write what is known of each vertex too (.vtu always has it)");
+  app.add_option("--report", arguments.report, "Write the mapping's validity report (JSON)")
+      ->type_name("FILE");
+  app.add_flag("--table", arguments.table, "Print the mapping's whole report as a table");
+  app.add_flag("--strict", arguments.strict,
+               "Exit 4 and write no surface when a frame is inverted or degenerate, or a check fails");
+}
+
+MapOptions map_options(const MapArguments& arguments) {
+  MapOptions options;
+  options.method = map_method(arguments.method);
+  if (!arguments.checks.empty()) add_checks(options, arguments.checks);
+  return options;
+}
+
+CrackOptions crack_options(const MapArguments& arguments) {
+  CrackOptions options;
+  options.mode = crack_mode(arguments.crack);
+  const std::vector<std::string> words = {"keep", "drop"};
+  if (arguments.debris != words[0] && arguments.debris != words[1])
+    throw InputError(fmt::format("unknown word \"{}\": --debris is keep or drop{}", arguments.debris,
+                                 did_you_mean(arguments.debris, words)));
+  options.drop_debris = arguments.debris == words[1];
+  if (options.mode == CrackMode::keep && options.drop_debris)
+    throw InputError("--debris drop needs --crack open or cap: else debris is not told from the rest");
+  if (arguments.pieces.empty()) return options;
+  if (options.mode == CrackMode::keep)
+    throw InputError("--pieces needs --crack open or cap: else there are no pieces");
+  options.pieces = pattern_of(arguments.pieces, arguments.format);
+  options.pieces_format = surface_format("", options.pieces, arguments.ascii);
+  return options;
+}
+
+void say_report(const MapReport& found, const MapArguments& arguments, const MapOptions& options,
+                Progress& progress) {
+  const std::vector<std::string> lines = report_lines(found);
+  for (std::size_t i = 0; i < lines.size(); ++i)
+    if (i == 0 && !found.valid())
+      progress.warn(lines[i]);
+    else
+      progress.say(lines[i]);
+  if (arguments.table) fmt::print(stderr, "{}", report_table(found, options));
+}
+
+void write_report(const MapReport& found, const MapArguments& arguments, const MapOptions& options,
+                  const std::string& path) {
+  if (!path.empty()) write_text(report_json(found, options), path);
+  if (!found.valid() && (arguments.strict || found.not_finite > 0))
+    throw InvalidMappingError(report_lines(found).front());
+}
+
+}  // namespace flexel

@@ -1,0 +1,29 @@
+// The command line's words for a mapping, the same in flexel-map and in flexel deform.
+#pragma once
+#include "formats/program.h"
+#include "mapping/crack.h"
+
+namespace flexel {
+
+struct MapArguments {
+  std::string method = "blended", checks, crack = "keep", debris = "keep", pieces, report, format;
+  double scale = 1;
+  bool attributes = false, table = false, ascii = false, strict = false;
+};
+
+// Adds their options to the program; --format too, as it also names that of the pieces.
+void declare_map_options(CLI::App& app, MapArguments& arguments);
+
+// What they ask for. Throws InputError: an unknown word, options that exclude each other.
+[[nodiscard]] MapOptions map_options(const MapArguments& arguments);
+[[nodiscard]] CrackOptions crack_options(const MapArguments& arguments);
+
+// Says the report's lines, the first as a warning where the mapping cannot be used; and its table.
+void say_report(const MapReport& found, const MapArguments& arguments, const MapOptions& options,
+                Progress& progress);
+// Writes the report to `path` where there is one. Throws InvalidMappingError after that: the mapping cannot
+// be used, and --strict or a vertex without a finite position forbids to write it.
+void write_report(const MapReport& found, const MapArguments& arguments, const MapOptions& options,
+                  const std::string& path);
+
+}  // namespace flexel
