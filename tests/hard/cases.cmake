@@ -1,0 +1,27 @@
+# The quick half of the hard cases: every case is the ctest test hard.<family>.<case>. tests/hard/run.py runs them all.
+execute_process(COMMAND ${FLEXEL_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/hard/run.py --list --quick OUTPUT_VARIABLE cases
+  RESULT_VARIABLE failed OUTPUT_STRIP_TRAILING_WHITESPACE)
+if(failed)
+  message(FATAL_ERROR "tests/hard/run.py --list failed; it needs python3-numpy (tools/setup --tests)")
+endif()
+file(GLOB scripts CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/hard/*.py)
+set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${scripts})
+string(REPLACE "\n" ";" cases "${cases}")
+foreach(case ${cases})
+  add_test(NAME hard.${case} COMMAND ${FLEXEL_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/hard/run.py --quick ${case})
+  set_tests_properties(hard.${case} PROPERTIES TIMEOUT 300 ENVIRONMENT "FLEXEL_BIN=${CMAKE_RUNTIME_OUTPUT_DIRECTORY}")
+endforeach()
+
+# Bullet's side of some cases, where Debian's libbullet-dev is there
+add_custom_target(hard_peers)
+if(FLEXEL_BENCH)
+  find_path(FLEXEL_BULLET_INCLUDE btBulletDynamicsCommon.h PATH_SUFFIXES bullet)
+  find_library(FLEXEL_BULLET_SOFT BulletSoftBody)
+  if(FLEXEL_BULLET_INCLUDE AND FLEXEL_BULLET_SOFT)
+    add_executable(hard_bullet hard/bullet_bodies.cpp)
+    target_include_directories(hard_bullet SYSTEM PRIVATE ${FLEXEL_BULLET_INCLUDE})
+    target_link_libraries(hard_bullet PRIVATE ${FLEXEL_BULLET_SOFT} BulletDynamics BulletCollision LinearMath)
+    target_compile_options(hard_bullet PRIVATE -Wno-conversion -Wno-shadow)
+    add_dependencies(hard_peers hard_bullet)
+  endif()
+endif()
