@@ -71,7 +71,9 @@ def crushed_by_lammps(trial, share):
     return peers.lammps_free(trial, Setup({}, head + '[run]\ntime = "250 ms"\nmethod = "verlet"\n', h, bodies=(body,)), 1e6, 1000)
 
 
-@case("90 % crush and release", quick=False, holds="the same to a tenth of its height", breaks="the same, and the corners that fold over the held faces")
+@case("90 % crush and release",
+      known={**all_of("corners of cells fold through each other (corner J under 0, which is warned of) and hold each other", "cells, symplectic", "cells, verlet"), "springs, implicit": "Newton's method that ends nowhere does not say where"},
+      quick=False, holds="the same to a tenth of its height", breaks="the same, and the corners that fold over the held faces")
 def crush_90(trial):
     crush(trial, 0.9)
 
