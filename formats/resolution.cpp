@@ -12,7 +12,7 @@ namespace {
 
 bool is_single_precision(const SurfaceSource& source) {
   if (source.format == "stl-binary") return true;
-  if (source.format != "ply-binary") return false;
+  if (source.format != "ply-binary" || source.bytes.empty()) return false;
   const PlyHeader header = parse_ply_header(source.bytes, source.file);
   const auto vertex = std::find_if(header.elements.begin(), header.elements.end(),
                                    [](const PlyElement& element) { return element.name == "vertex"; });

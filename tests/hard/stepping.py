@@ -113,7 +113,7 @@ def damping(trial):
         scene += f'[[probe]]\nname = "end"\nat = {view.point((length, h, h))}\n'
         return Setup({"bar": grid_box((count, 2, 2), h)}, scene + run, h)
 
-    for zeta in (0.1, 1.0, 5.0):
+    for zeta in (1.0,) if trial.quick else (0.1, 1.0, 5.0):
         tau = 2 * zeta / omega
         span, step = 4 / omega * max(1, zeta), 0.05 / omega / max(1, 2 * zeta)  # the fast root of the overdamped ones wants steps too
         outcomes = integrators(trial, lambda view, run: world(view, run if "step" in run or "explicit" in run else run + f'step = "{step!r} s"\n', tau), f"{span * 1e3!r} ms", f"{step / 2 * 1e3!r} ms", f"zeta {zeta}, ", free=1e-9, units=1e-7)
@@ -137,7 +137,7 @@ def damping(trial):
                 require(off < 0.05, f"{significant(100 * off)} % off the damped oscillator")
                 energy = out.history["kinetic"] + out.history["elastic"]
                 require(np.diff(energy).max() < 1e-3 * energy[0], "energy rises")
-    for zeta in (0.1, 1.0, 5.0):
+    for zeta in (5.0,) if trial.quick else (0.1, 1.0, 5.0):
         with trial.section(f"{zeta} of the stiffest cell"):
             run = '[run]\ntime = "20 ms"\n'
             out = worked(same_bits(trial, lambda view: world(view, run, 2 * zeta / stiffest), (7,)))
