@@ -4,6 +4,7 @@
 namespace flexel {
 
 int deform_command(int argc, char** argv);
+int export_command(int argc, char** argv);
 int info_command(int argc, char** argv);
 int picture_command(int argc, char** argv);
 int materials_command(int argc, char** argv);

@@ -4,64 +4,33 @@
 
 #include <nlohmann/json.hpp>
 
-#include "flexel/actions.h"
 #include "flexel/commands.h"
+#include "flexel/job.h"
 #include "formats/body_file.h"
 #include "formats/files.h"
-#include "formats/import.h"
 #include "formats/parallel.h"
-#include "formats/program.h"
-#include "formats/size_warning.h"
-#include "formats/units.h"
 #include "mapping/options.h"
 #include "mapping/output.h"
 #include "simulate/simulate.h"
-#include "voxelize/voxelize.h"
 
 namespace flexel {
 namespace {
 
 struct Arguments {
-  std::vector<std::string> parts, fixes, pushes, moves, outputs;
-  std::string scene, material, size, heal = "auto", placement = "corner", unit, edge, summary, body, timeout;
-  std::optional<std::size_t> count;
+  JobArguments job;
+  std::vector<std::string> outputs;
+  std::string summary, body, timeout;
   MapArguments map;
   int threads = 0;
   bool quiet = false, estimate = true;
 };
 
-void declare_input(CLI::App& app, Arguments& arguments) {
-  app.add_option("part", arguments.parts, "STEP, IGES, BREP, STL, OBJ, PLY, OFF, glTF or 3MF files; -: stdin")
-      ->required()
-      ->type_name("PART");
-  app.add_option("--scene", arguments.scene, "Scene file (TOML; docs/scene.md)")->type_name("FILE");
-  app.add_option("--fix", arguments.fixes,
-                 "Hold this surface: \"xmin\", \"part/3\" (`flexel info` lists faces)")
-      ->type_name("WHERE")
-      ->allow_extra_args(false);
-  app.add_option("--push", arguments.pushes,
-                 "Push a surface: \"xmax: 0 0 -50 N\", \"part/3: 50 N\" (inwards), \"part/3: 2 MPa\"")
-      ->type_name("WHERE:FORCE")
-      ->allow_extra_args(false);
-  app.add_option("--move", arguments.moves, "Move a surface: \"xmax: 0 0 -2 mm\", \"part/3: 2 mm\" (inwards)")
-      ->type_name("WHERE:LENGTH")
-      ->allow_extra_args(false);
-  app.add_option("--material", arguments.material,
-                 "What the parts are made of: steel, PLA, ... (docs/scene.md)")
-      ->type_name("NAME");
-  app.add_option("--size", arguments.size, "Spacing of the lattice (\"2 mm\")")->type_name("LENGTH");
-  app.add_option("--count", arguments.count, "Or: about this many cells (default 20000)")->type_name("N");
+void declare_input(CLI::App& app, JobArguments& arguments) {
+  declare_job(app, arguments);
   app.add_option("--placement", arguments.placement,
                  "Elements at the voxels' corner or centre (model \"paper\")")
       ->type_name("WHERE")
       ->capture_default_str();
-  app.add_option("--heal", arguments.heal, "Broken surfaces: auto, wrap or none (docs/healing.md)")
-      ->type_name("HOW")
-      ->capture_default_str();
-  app.add_option("--unit", arguments.unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
-  app.add_option("--edge", arguments.edge,
-                 "STEP: longest edge of the mesh (default a 64th of the solid's diagonal)")
-      ->type_name("LENGTH");
 }
 
 void declare_output(CLI::App& app, Arguments& arguments) {
@@ -85,10 +54,7 @@ void declare_output(CLI::App& app, Arguments& arguments) {
 
 // What the arguments ask for, checked.
 struct Plan {
-  ImportOptions import;
-  VoxelizeOptions voxelize;
-  Scene scene;
-  std::vector<Action> pushes, moves;
+  Job job;
   std::optional<double> timeout;  // s
   MapOptions map;
   CrackOptions crack;
@@ -98,40 +64,6 @@ struct Plan {
   };
   std::vector<Output> outputs;
 };
-
-// The material must be known before the work begins: without one there is no resistance to compute.
-void check_material(const Arguments& arguments, const Scene& scene) {
-  std::vector<std::string> known;
-  for (const auto& [name, material] : scene.materials) known.push_back(name);
-  for (const Material& material : material_library()) known.push_back(material.name);
-  if (arguments.material.empty() && arguments.scene.empty())
-    throw InputError(
-        fmt::format("no material: add --material NAME; the library has {}", fmt::join(known, ", ")));
-  if (arguments.material.empty() || scene.materials.count(arguments.material) ||
-      library_material(arguments.material))
-    return;
-  const std::string hint = did_you_mean(arguments.material, known);
-  throw InputError(
-      fmt::format("--material: no material \"{}\"{}", arguments.material,
-                  hint.empty() ? fmt::format("; the library has {}", fmt::join(known, ", ")) : hint));
-}
-
-void plan_scene(const Arguments& arguments, Plan& plan) {
-  if (!arguments.scene.empty())
-    plan.scene = read_scene(arguments.scene);
-  else
-    plan.scene.name = "flexel deform";
-  check_material(arguments, plan.scene);
-  if (!arguments.material.empty()) plan.scene.material = arguments.material;
-  for (const std::string& where : arguments.fixes)
-    plan.scene.get<Ties>().ties.push_back(make_fix(parse_where(where, "--fix")));
-  for (const std::string& text : arguments.pushes) plan.pushes.push_back(parse_push(text));
-  for (const std::string& text : arguments.moves) plan.moves.push_back(parse_move(text));
-  if (arguments.scene.empty() && plan.pushes.empty() && plan.moves.empty())
-    throw InputError(
-        "nothing acts on the part: add --push \"WHERE: 0 0 -50 N\", --move \"WHERE: 0 0 -2 mm\" or --scene "
-        "FILE");
-}
 
 void plan_outputs(const Arguments& arguments, Plan& plan) {
   for (const std::string& path : arguments.outputs)
@@ -152,34 +84,12 @@ void plan_outputs(const Arguments& arguments, Plan& plan) {
 
 Plan make_plan(const Arguments& arguments) {
   Plan plan;
-  if (std::count(arguments.parts.begin(), arguments.parts.end(), "-") + (arguments.scene == "-") > 1)
-    throw InputError("only one input can come from stdin");
-  if (!arguments.unit.empty()) plan.import.unit = length_unit(arguments.unit);
-  if (!arguments.edge.empty()) {
-    plan.import.largest_edge = parse_quantity(arguments.edge, Dimension::length);
-    if (!(*plan.import.largest_edge > 0)) throw InputError("--edge: must be above zero");
-  }
-  if (!arguments.size.empty() && arguments.count) throw InputError("give --size or --count, not both");
-  if (!arguments.size.empty()) {
-    plan.voxelize.size = parse_quantity(arguments.size, Dimension::length);
-    if (!(*plan.voxelize.size > 0)) throw InputError("--size: must be above zero");
-  }
-  if (arguments.count && *arguments.count == 0) throw InputError("--count: must be above zero");
-  plan.voxelize.count = arguments.count;
   if (!arguments.timeout.empty()) plan.timeout = parse_timeout(arguments.timeout);
-  plan.voxelize.heal = heal_choice(arguments.heal);
-  plan.voxelize.placement = placement_choice(arguments.placement);
   plan.map = map_options(arguments.map);
   plan.crack = crack_options(arguments.map);
   plan_outputs(arguments, plan);
-  plan_scene(arguments, plan);
+  plan.job = plan_job(arguments.job);
   return plan;
-}
-
-Surface import_parts(const std::vector<std::string>& paths, const ImportOptions& options) {
-  Surface surface = import_surface(paths.front(), options);
-  for (std::size_t p = 1; p < paths.size(); ++p) append(surface, import_surface(paths[p], options));
-  return surface;
 }
 
 // Where the last good state goes when the simulation diverges: beside the first file that is written.
@@ -206,20 +116,18 @@ void write_outputs(const Plan& plan, const Body& body, const MappedPart& mapped,
 
 int run_stages(const Arguments& arguments, Plan& plan, Progress& progress) {
   progress.stage("import");
-  Surface surface = import_parts(arguments.parts, plan.import);
-  for (const std::string& line : size_warnings(surface)) progress.warn(line);
-  VoxelizeResult voxels = voxelize(std::move(surface), plan.voxelize, progress);
+  VoxelizeResult voxels =
+      voxelize(read_parts(arguments.job.parts, plan.job.import, progress), plan.job.voxelize, progress);
   report(voxels, progress);
   Body& body = voxels.body;
-  for (const Action& push : plan.pushes) add_push(plan.scene, push, body);
-  for (const Action& move : plan.moves) add_move(plan.scene, move, body);
+  add_actions(plan.job, body);
 
   SimulateOptions options;
   options.threads = arguments.threads;
   options.failed_output = failed_name(plan);
   options.timeout = plan.timeout;
   options.estimate = arguments.estimate;
-  const SimulateResult simulated = simulate(body, plan.scene, options, progress);
+  const SimulateResult simulated = simulate(body, plan.job.scene, options, progress);
   for (const std::string& line : summary_lines(simulated)) progress.say(line);
 
   progress.stage("map");
@@ -246,7 +154,7 @@ int deform_command(int argc, char** argv) {
   Arguments arguments;
   CLI::App app{"Deforms a part as its material would be: import, lattice, simulation and mapping in one run.",
                "flexel deform"};
-  declare_input(app, arguments);
+  declare_input(app, arguments.job);
   declare_output(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   Plan plan = make_plan(arguments);

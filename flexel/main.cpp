@@ -16,6 +16,8 @@ constexpr const char* kHelp =
     "  flexel deform PART... --fix WHERE --push \"WHERE: 0 0 -50 N\" --material NAME -o OUT\n"
     "                        the part, deformed as its material would be (STL, OBJ, PLY, OFF, GLB; .vtu for "
     "the body)\n"
+    "  flexel export PART... --scene FILE --calculix -o OUT.inp\n"
+    "                        mesh, sets, material, supports and loads for detailed analysis by CalculiX\n"
     "  flexel info PART...   solids, faces, unit, size, volume, closedness, thinnest wall: what a scene can "
     "name\n"
     "  flexel picture FILE... -o OUT.png\n"
@@ -40,8 +42,8 @@ bool is_stage(const std::string& command) {
 }
 
 [[noreturn]] void unknown_command(const std::string& command) {
-  const std::vector<std::string> commands = {"deform",   "info",     "picture", "materials", "measure",
-                                             "voxelize", "simulate", "map",     "help"};
+  const std::vector<std::string> commands = {"deform",  "export",   "info",     "picture", "materials",
+                                             "measure", "voxelize", "simulate", "map",     "help"};
   throw InputError(fmt::format("unknown command \"{}\"; the commands are {}{}", command,
                                fmt::join(commands, ", "), did_you_mean(command, commands)));
 }
@@ -55,6 +57,7 @@ int help(int argc, char** argv) {
   char* arguments[] = {argv[1], option.data(), nullptr};
   const std::string command = argv[1];
   if (command == "deform") return deform_command(2, arguments);
+  if (command == "export") return export_command(2, arguments);
   if (command == "materials") return materials_command(2, arguments);
   if (command == "measure") return measure_command(2, arguments);
   if (command == "info") return info_command(2, arguments);
@@ -66,7 +69,8 @@ int help(int argc, char** argv) {
 int run(int argc, char** argv) {
   if (argc < 2)
     throw InputError(
-        "a command is missing: deform, info, picture, materials, measure, voxelize, simulate or map (`flexel "
+        "a command is missing: deform, export, info, picture, materials, measure, voxelize, simulate or map "
+        "(`flexel "
         "help`)");
   const std::string command = argv[1];
   if (command == "--version") {
@@ -77,6 +81,7 @@ int run(int argc, char** argv) {
   if (command == "deform") return deform_command(argc - 1, argv + 1);
   if (command == "materials") return materials_command(argc - 1, argv + 1);
   if (command == "measure") return measure_command(argc - 1, argv + 1);
+  if (command == "export") return export_command(argc - 1, argv + 1);
   if (command == "info") return info_command(argc - 1, argv + 1);
   if (command == "picture") return picture_command(argc - 1, argv + 1);
   if (is_stage(command)) run_stage_program(argv[1], argv + 1);

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <unordered_map>
 
+#include "formats/distance.h"
 #include "simulate/surface_points.h"
 
 namespace flexel {
@@ -24,27 +25,6 @@ Box polygon_box(const Surface& surface, std::size_t polygon) {
   Box box;
   for (const std::uint32_t vertex : surface.polygon(polygon)) box.add(surface.vertices[vertex]);
   return box;
-}
-
-// Distance from a point to a triangle (Ericson, Real-Time Collision Detection, 2005, section 5.1.5).
-double distance_to_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
-  const Vec3 ab = b - a, ac = c - a, ap = p - a;
-  const double d1 = ab.dot(ap), d2 = ac.dot(ap);
-  if (d1 <= 0 && d2 <= 0) return ap.norm();
-  const Vec3 bp = p - b;
-  const double d3 = ab.dot(bp), d4 = ac.dot(bp);
-  if (d3 >= 0 && d4 <= d3) return bp.norm();
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) return (ap - d1 / (d1 - d3) * ab).norm();
-  const Vec3 cp = p - c;
-  const double d5 = ab.dot(cp), d6 = ac.dot(cp);
-  if (d6 >= 0 && d5 <= d6) return cp.norm();
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) return (ap - d2 / (d2 - d6) * ac).norm();
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0)
-    return (bp - (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (c - b)).norm();
-  return std::abs(ap.dot(ab.cross(ac).normalized()));
 }
 
 // Sample points by the cube of a grid that they lie in.

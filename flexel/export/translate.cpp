@@ -1,0 +1,186 @@
+// Each item of the scene becomes one of the analysis; what has no counterpart is refused by name.
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "flexel/export/analysis.h"
+#include "formats/error.h"
+#include "formats/units.h"
+#include "simulate/simulate.h"
+#include "voxelize/voxelize.h"
+
+namespace flexel {
+namespace {
+
+constexpr double kTouching = 1e-2;  // of the spacing or the mesh's edge: surfaces this near touch
+constexpr double kTied = 0.1;       // of a tetrahedron's edge: gap that is tied
+constexpr std::size_t kProbeCells = 3000;
+constexpr double kSmallShare = 1e-3, kDifference = 0.01;
+constexpr double kSmallAngle = 0.01;  // rad
+
+std::string kind_of(const Load& load) {
+  if (load.pressure) return "pressure";
+  if (load.bearing) return "bearing load";
+  if (load.torque && !load.force) return "torque";
+  if (load.at || load.torque) return "remote force";
+  return "force";
+}
+
+AnalysisLoad translate_load(const Load& load, const AnalysisMesh& mesh, const Setting& setting) {
+  AnalysisLoad result;
+  result.name = load.name;
+  result.kind = kind_of(load);
+  const std::vector<Vec3> forces = nodal_forces(load, mesh, setting);
+  for (std::uint32_t node = 0; node < forces.size(); ++node)
+    if (forces[node] != Vec3::Zero()) {
+      result.forces.emplace_back(node, forces[node]);
+      result.total += forces[node];
+    }
+  return result;
+}
+
+// Mean length of the elements' sides [m].
+double mesh_size(const AnalysisMesh& mesh) {
+  if (mesh.kind == AnalysisMesh::Kind::hexahedra) {
+    double sum = 0;
+    for (const Part& part : mesh.body.parts) sum += part.lattice.spacing.mean();
+    return sum / static_cast<double>(mesh.body.parts.size());
+  }
+  double sum = 0;
+  for (std::size_t e = 0; e < mesh.element_count(); ++e)
+    sum += (mesh.body.rest[mesh.element(e)[0]] - mesh.body.rest[mesh.element(e)[1]]).norm();
+  return sum / static_cast<double>(mesh.element_count());
+}
+
+void add_ties(const Scene& scene, Analysis& analysis) {
+  if (!scene.get<Bonds>().bond || analysis.mesh.body.parts.size() < 2) return;
+  const double size = mesh_size(analysis.mesh);
+  const bool lattice = analysis.mesh.kind == AnalysisMesh::Kind::hexahedra;
+  analysis.ties = touching_faces(analysis.mesh, kTouching * size);
+  for (TiedFaces& tie : analysis.ties) tie.tolerance = lattice ? size : kTied * size;
+  if (lattice && !analysis.ties.empty())
+    analysis.warnings.push_back(
+        "parts that touch are tied by *TIE between the lattices' skins, which lie up to a cell apart; "
+        "--mesh tet ties the faces themselves");
+}
+
+void scale_actions(Scene& scene, double factor) {
+  for (Load& load : scene.get<Loads>().loads) {
+    if (load.force) *load.force *= factor;
+    if (load.torque) *load.torque *= factor;
+    if (load.pressure) *load.pressure *= factor;
+  }
+  for (Tie& tie : scene.get<Ties>().ties) {
+    tie.motion.translation *= factor;
+    tie.motion.angle *= factor;
+  }
+  if (auto& g = scene.get<Gravity>().acceleration) *g *= factor;
+}
+
+}  // namespace
+
+void refuse_untranslatable(const Scene& scene, const Setting& setting) {
+  if (scene.run.time)
+    throw InputError(
+        scene.name,
+        "this scene is a timed run ([run] time): only equilibrium is exported; leave \"time\" and "
+        "what needs it out, or use --scene with another file");
+  if (!scene.events.empty())
+    throw InputError(scene.name, "[[event]] has no translation: only equilibrium is exported");
+  Effects::Parameters others = scene.effects;
+  std::get<Gravity::Parameters>(others).acceleration.reset();
+  std::get<Loads::Parameters>(others) = {};
+  std::get<Ties::Parameters>(others) = {};
+  std::get<Bonds::Parameters>(others).bond = false;
+  for (const Pass& pass : Effects::passes(others, setting))
+    throw InputError(scene.name,
+                     fmt::format("{} ({}) has no translation: gravity, loads, fixes, moves and bonded parts "
+                                 "are exported; leave it out",
+                                 pass.name, pass.why));
+}
+
+std::vector<std::string> drop_models(Scene& scene) {
+  std::vector<std::string> lines;
+  for (auto& [name, settings] : scene.parts) {
+    if (!settings.model.empty() && settings.model != "cells")
+      lines.push_back(
+          fmt::format("part \"{}\": model \"{}\" is exported as ordinary elastic matter of the same material",
+                      name, settings.model));
+    settings.model.clear();
+    settings.hooke.clear();
+  }
+  return lines;
+}
+
+Analysis translate(AnalysisMesh mesh, const Scene& scene, const Setting& setting) {
+  Analysis analysis;
+  analysis.mesh = std::move(mesh);
+  analysis.materials = setting.materials;
+  HeldValues taken;
+  std::size_t shared = 0;
+  for (const Tie& tie : scene.get<Ties>().ties)
+    analysis.supports.push_back(hold(tie, analysis.mesh, setting, taken, shared));
+  if (shared > 0)
+    analysis.warnings.push_back(fmt::format(
+        "{} displacement(s) of nodes that two supports share are led differently by them: the first holds",
+        human_count(shared)));
+  for (const Load& load : scene.get<Loads>().loads) {
+    analysis.loads.push_back(translate_load(load, analysis.mesh, setting));
+    if (!load.course.time.empty())
+      analysis.warnings.push_back(fmt::format("load \"{}\": its course in time is left out", load.name));
+  }
+  analysis.gravity = scene.get<Gravity>().acceleration;
+  add_ties(scene, analysis);
+  for (const Probe& probe : scene.probes)
+    analysis.probes.push_back(place_probe(probe, analysis.mesh, setting));
+  analysis.load_steps = scene.run.load_steps;
+  if (scene.run.renormalise)
+    analysis.warnings.push_back(
+        "\"renormalise\" is left out: the deformed shape does not become the rest shape");
+  return analysis;
+}
+
+bool large_deflection(const Surface& surface, Scene scene, int threads, std::string& why) {
+  SimulateOptions options;
+  options.threads = threads;
+  options.stress = options.estimate = false;
+  for (const Tie& tie : scene.get<Ties>().ties)
+    if (std::abs(tie.motion.angle) > kSmallAngle) {
+      why = fmt::format("\"{}\" is turned by {:.3g} degrees", tie.name, tie.motion.angle * 180 / M_PI);
+      return true;
+    }
+  Progress silent("", Progress::Mode::silent);
+  double moved[2] = {0, 0};
+  try {
+    VoxelizeOptions coarse;
+    coarse.count = kProbeCells;
+    Body body = voxelize(surface, coarse, silent).body;
+    for (const bool small : {true, false}) {
+      Scene scaled = scene;
+      if (small) scale_actions(scaled, kSmallShare);
+      Body copy = body;
+      moved[small] = simulate(copy, scaled, options, silent).largest_displacement / (small ? kSmallShare : 1);
+    }
+  } catch (const DivergedError&) {
+    if (moved[1] > 0) {
+      why = "a coarse run of Flexel finds no equilibrium under the whole load";
+      return true;
+    }
+    why = "could not be told: a coarse run of Flexel diverged";
+    return false;
+  } catch (const InputError& error) {
+    why = fmt::format("could not be told by a coarse run of Flexel ({})", error.what());
+    return false;
+  }
+  if (!(moved[1] > 0)) {
+    why = "nothing moves";
+    return false;
+  }
+  const double difference = std::abs(moved[0] / moved[1] - 1);
+  why = fmt::format("in a coarse run of Flexel large rotations change the largest displacement by {:.2g} %",
+                    100 * difference);
+  return difference > kDifference;
+}
+
+}  // namespace flexel

@@ -1,0 +1,261 @@
+// flexel export: the part and the scene as the input of another program, for detailed analysis.
+#include <fmt/format.h>
+
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "flexel/commands.h"
+#include "flexel/export/calculix_file.h"
+#include "flexel/job.h"
+#include "formats/files.h"
+#include "formats/parallel.h"
+#include "formats/units.h"
+#include "simulate/fragments.h"
+
+namespace flexel {
+namespace {
+
+constexpr double kTetrahedraAcross = 30;  // of the part's diagonal, without --size
+constexpr std::size_t kLookCells = 3000;
+
+struct Arguments {
+  JobArguments job;
+  std::string output, mesh = "hex", element = "C3D8I", nlgeom = "auto", summary;
+  bool calculix = false, quiet = false;
+  int threads = 0;
+};
+
+void declare(CLI::App& app, Arguments& arguments) {
+  declare_job(app, arguments.job);
+  app.add_flag("--calculix", arguments.calculix, "For CalculiX (ccx), as an .inp file (docs/export.md)")
+      ->required();
+  app.add_option("-o,--output", arguments.output, "The file; -: stdout")->type_name("FILE")->required();
+  app.add_option("--mesh", arguments.mesh,
+                 "hex: the lattice's cells; tet: second-order tetrahedra, by the program gmsh")
+      ->type_name("KIND")
+      ->capture_default_str();
+  app.add_option("--element", arguments.element, "Of hexahedra: C3D8I or C3D8")
+      ->type_name("NAME")
+      ->capture_default_str();
+  app.add_option("--nlgeom", arguments.nlgeom, "Large deflections: on, off, or as a coarse run tells")
+      ->type_name("auto|on|off")
+      ->capture_default_str();
+  app.add_option("--summary", arguments.summary, "Write what was written as JSON (docs/export.md)")
+      ->type_name("FILE");
+  app.add_option("--threads", arguments.threads, "Threads; 0 is every core")->check(CLI::NonNegativeNumber);
+  app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
+}
+
+void choose(const char* option, const std::string& word, const std::vector<std::string>& known) {
+  if (std::find(known.begin(), known.end(), word) == known.end())
+    throw InputError(fmt::format("{}: no \"{}\"{}; choose {}", option, word, did_you_mean(word, known),
+                                 fmt::join(known, ", ")));
+}
+
+void check(const Arguments& arguments) {
+  choose("--mesh", arguments.mesh, {"hex", "tet"});
+  choose("--element", arguments.element, {"C3D8I", "C3D8"});
+  choose("--nlgeom", arguments.nlgeom, {"auto", "on", "off"});
+  if (arguments.mesh == "tet" && arguments.job.count)
+    throw InputError("--count is for --mesh hex; give --size, the largest edge of a tetrahedron");
+  if (arguments.mesh == "tet" && arguments.element == "C3D8")
+    throw InputError("--element is for --mesh hex; tetrahedra are C3D10");
+  if (!arguments.summary.empty() && arguments.summary == arguments.output)
+    throw InputError("two results would go to \"" + arguments.output + "\"");
+}
+
+Setting setting_of(const Body& body, const Scene& scene) {
+  const Fragments fragments = find_fragments(body);
+  return {body,
+          materials_of_parts(scene, body),
+          stray_cells(fragments),
+          models_of_parts(scene, body),
+          hooke_of_parts(scene, body),
+          {},
+          {},
+          {}};
+}
+
+std::vector<std::string> head(const Arguments& arguments, const Analysis& analysis) {
+  std::vector<std::string> lines;
+  lines.push_back(fmt::format("CalculiX input by flexel {}: {}{}", version(),
+                              fmt::join(arguments.job.parts, ", "),
+                              arguments.job.scene.empty() ? "" : ", scene " + arguments.job.scene));
+  for (const Part& part : analysis.mesh.body.parts)
+    if (analysis.mesh.kind == AnalysisMesh::Kind::hexahedra)
+      lines.push_back(fmt::format("part {}: {} of spacing {:.6g} x {:.6g} x {:.6g} mm", part.name,
+                                  arguments.element, 1e3 * part.lattice.spacing.x(),
+                                  1e3 * part.lattice.spacing.y(), 1e3 * part.lattice.spacing.z()));
+    else
+      lines.push_back(fmt::format("part {}: C3D10, by gmsh", part.name));
+  return lines;
+}
+
+using Json = nlohmann::ordered_json;
+
+Json json_of(const Vec3& vector) {
+  return Json::array({vector.x(), vector.y(), vector.z()});
+}
+
+std::string summary(const Analysis& analysis, const Arguments& arguments) {
+  const AnalysisMesh& mesh = analysis.mesh;
+  const CalculixNames names = calculix_names(analysis);
+  const std::vector<double> volumes = section_volumes(mesh), areas = side_areas(mesh);
+  const std::vector<std::uint8_t> used = used_nodes(mesh);
+  Json json;
+  json["program"] = "flexel export";
+  json["version"] = version();
+  json["file"] = arguments.output;
+  json["element"] = mesh.kind == AnalysisMesh::Kind::tetrahedra ? "C3D10" : arguments.element;
+  json["nodes"] = std::count(used.begin(), used.end(), 1);
+  json["elements"] = mesh.element_count();
+  double mass = 0;
+  json["sections"] = Json::array();
+  for (std::size_t s = 0; s < mesh.sections.size(); ++s) {
+    const MeshSection& each = mesh.sections[s];
+    mass += volumes[s] * analysis.materials[each.part].density;
+    json["sections"].push_back({{"part", mesh.body.parts[each.part].name},
+                                {"material", analysis.materials[each.part].name},
+                                {"fill", each.fill},
+                                {"elements", each.elements},
+                                {"volume", volumes[s]}});
+  }
+  json["mass"] = mass;
+  json["faces"] = Json::array();
+  const std::vector<std::uint32_t> numbers = face_numbers(mesh.body.surface);
+  for (std::size_t f = 0; f < mesh.sides.size(); ++f)
+    json["faces"].push_back(
+        {{"selection",
+          fmt::format("{}/{}", mesh.body.parts[mesh.body.surface.faces[f].part].name, numbers[f])},
+         {"nodes", "N_" + names.faces[f]},
+         {"surface", "S_" + names.faces[f]},
+         {"sides", mesh.sides[f].size()},
+         {"area", areas[f]}});
+  json["supports"] = Json::array();
+  for (std::size_t i = 0; i < analysis.supports.size(); ++i)
+    json["supports"].push_back({{"name", analysis.supports[i].name},
+                                {"set", "N_" + names.supports[i]},
+                                {"nodes", analysis.supports[i].nodes.size()},
+                                {"equations", analysis.supports[i].equations.size()}});
+  json["loads"] = Json::array();
+  for (const AnalysisLoad& load : analysis.loads)
+    json["loads"].push_back({{"name", load.name},
+                             {"kind", load.kind},
+                             {"nodes", load.forces.size()},
+                             {"force", json_of(load.total)}});
+  json["gravity"] = analysis.gravity ? json_of(*analysis.gravity) : Json(nullptr);
+  json["ties"] = Json::array();
+  for (const TiedFaces& tie : analysis.ties)
+    json["ties"].push_back({mesh.body.parts[tie.part[0]].name, mesh.body.parts[tie.part[1]].name});
+  json["probes"] = Json::array();
+  for (std::size_t i = 0; i < analysis.probes.size(); ++i) {
+    Json probe = {{"name", analysis.probes[i].name},
+                  {"set", "N_" + names.probes[i]},
+                  {"distance", analysis.probes[i].distance},
+                  {"nodes", Json::array()},
+                  {"weights", Json::array()}};
+    for (const auto& [node, weight] : analysis.probes[i].weights) {
+      probe["nodes"].push_back(node + 1);
+      probe["weights"].push_back(weight);
+    }
+    json["probes"].push_back(probe);
+  }
+  json["nlgeom"] = analysis.large_deflection;
+  json["why_nlgeom"] = analysis.why_deflection;
+  json["notes"] = mesh.notes;
+  json["warnings"] = analysis.warnings;
+  return json.dump(2) + "\n";
+}
+
+void report(const Analysis& analysis, Progress& progress) {
+  const AnalysisMesh& mesh = analysis.mesh;
+  const std::vector<std::uint8_t> used = used_nodes(mesh);
+  progress.say(fmt::format(
+      "{} {} on {} nodes, {} surfaces of CAD faces, {} support(s), {} load(s); {} deflection ({})",
+      human_count(mesh.element_count()),
+      mesh.kind == AnalysisMesh::Kind::tetrahedra ? "tetrahedra" : "hexahedra",
+      human_count(static_cast<std::size_t>(std::count(used.begin(), used.end(), 1))),
+      std::count_if(mesh.sides.begin(), mesh.sides.end(), [](const auto& each) { return !each.empty(); }),
+      analysis.supports.size(), analysis.loads.size(), analysis.large_deflection ? "large" : "small",
+      analysis.why_deflection));
+  for (const std::string& each : mesh.notes) progress.say(each);
+  for (const std::string& each : analysis.warnings) progress.warn(each);
+}
+
+// Voxelised, or meshed by gmsh; the scene gets its pushes and moves, and is refused where it has no
+// translation.
+Analysis analyse(const Arguments& arguments, Job& job, const Surface& surface, Progress& progress) {
+  const std::vector<std::string> dropped = drop_models(job.scene);
+  Analysis analysis;
+  if (arguments.mesh == "hex") {
+    VoxelizeResult voxels = voxelize(surface, job.voxelize, progress);
+    report(voxels, progress);
+    add_actions(job, voxels.body);
+    const Setting setting = setting_of(voxels.body, job.scene);
+    refuse_untranslatable(job.scene, setting);
+    progress.stage("translate");
+    analysis = translate(hexahedra(setting), job.scene, setting);
+  } else {
+    VoxelizeOptions look = job.voxelize;
+    look.size.reset();
+    look.count = kLookCells;
+    Progress silent("", Progress::Mode::silent);
+    const Body body = voxelize(surface, look, silent).body;
+    add_actions(job, body);
+    refuse_untranslatable(job.scene, setting_of(body, job.scene));
+    progress.stage("gmsh");
+    TetrahedraOptions options;
+    options.size = job.voxelize.size.value_or(bounding_box(surface.vertices).diagonal() / kTetrahedraAcross);
+    options.threads = arguments.threads;
+    AnalysisMesh mesh = tetrahedra(arguments.job.parts, surface, options);
+    if (const std::size_t folded = folded_tetrahedra(mesh); folded > 0)
+      throw InputError(arguments.job.parts.front(),
+                       fmt::format("gmsh's mesh folds in {} of {} tetrahedra; use a smaller --size",
+                                   human_count(folded), human_count(mesh.element_count())));
+    progress.stage("translate");
+    const Setting setting = setting_of(mesh.body, job.scene);
+    analysis = translate(std::move(mesh), job.scene, setting);
+  }
+  analysis.warnings.insert(analysis.warnings.end(), dropped.begin(), dropped.end());
+  return analysis;
+}
+
+}  // namespace
+
+int export_command(int argc, char** argv) {
+  Arguments arguments;
+  CLI::App app{"Writes the part and its scene as the input of another program, for detailed analysis.",
+               "flexel export"};
+  declare(app, arguments);
+  if (!parse_arguments(app, argc, argv)) return kExitDone;
+  check(arguments);
+  Job job = plan_job(arguments.job);
+  const ThreadLimit limit(arguments.threads);
+  Progress progress("flexel", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
+  progress.stage("import");
+  // gmsh meshes the geometry itself: only where faces lie is asked of the surface
+  if (arguments.mesh == "tet" && arguments.job.edge.empty())
+    job.import.largest_edge = std::numeric_limits<double>::infinity();
+  const Surface surface = read_parts(arguments.job.parts, job.import, progress);
+  Analysis analysis = analyse(arguments, job, surface, progress);
+  if (arguments.nlgeom == "auto") {
+    progress.stage("look at the deflection");
+    analysis.large_deflection =
+        large_deflection(surface, job.scene, arguments.threads, analysis.why_deflection);
+  } else {
+    analysis.large_deflection = arguments.nlgeom == "on";
+    analysis.why_deflection = "--nlgeom " + arguments.nlgeom;
+  }
+  progress.finish();
+  report(analysis, progress);
+  CalculixOptions options;
+  options.element = arguments.element;
+  options.head = head(arguments, analysis);
+  OutputFile out(arguments.output, false);
+  out.write(calculix_file(analysis, options));
+  out.commit();
+  if (!arguments.summary.empty()) write_text(summary(analysis, arguments), arguments.summary);
+  return kExitDone;
+}
+
+}  // namespace flexel
