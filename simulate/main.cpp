@@ -18,6 +18,7 @@ struct Arguments {
   std::string scene;
   std::vector<std::string> bodies;
   std::string output, summary, timeout, resume, checkpoint_every;
+  std::vector<std::string> live;
   SimulateOptions options;
   bool quiet = false, compress = false;
 };
@@ -50,6 +51,19 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_option(
       "--history", arguments.options.history,
       "Timed runs: write energies, momenta and probes over time to this CSV file (docs/motion.md)");
+  app.add_option(
+         "--live", arguments.live,
+         "Timed runs: keep real time, and write frames of positions and of what tools feel to stdout, "
+         "or where readers attach: tcp:PORT on this machine, unix:PATH (docs/live.md)")
+      ->expected(0, 1)
+      ->type_name("[WHERE]");
+  app.add_option("--live-rate", arguments.options.live_rate, "Frames a second")
+      ->check(CLI::Range(1e-3, 1e5))
+      ->capture_default_str();
+  app.add_option("--live-state", arguments.options.live_state,
+                 "Every so many frames hold the positions; 0: none does")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   app.add_option("--isa", arguments.options.isa,
                  "Timed runs: instruction set of the kernel (portable, avx2, avx512); the best by itself");
   app.add_flag("!--no-stress", arguments.options.stress, "Leave out the stresses (docs/stress.md)");
@@ -112,6 +126,19 @@ Input resume(Arguments& arguments) {
   return input;
 }
 
+// stdin and stdout each have one use.
+void refuse_shared_streams(const Arguments& arguments, const Scene& scene) {
+  const auto& bodies = arguments.bodies;
+  const bool body = bodies.empty() || std::count(bodies.begin(), bodies.end(), "-") > 0;
+  for (const Manipulator& each : scene.get<RigidParts>().manipulators) {
+    if (!each.live) continue;
+    if (arguments.scene == "-")
+      throw InputError(each.origin, "poses and the scene cannot both come from stdin; give the scene's file");
+    if (body)
+      throw InputError(each.origin, "poses and the body cannot both come from stdin; give the body's file");
+  }
+}
+
 Input read_input(Arguments& arguments) {
   if (arguments.scene == "-" && arguments.bodies.empty())
     throw InputError("scene and body cannot both come from stdin; give the body's file");
@@ -119,6 +146,7 @@ Input read_input(Arguments& arguments) {
   if (arguments.scene.empty())
     throw InputError("a scene is needed, for example scene.toml; --help shows what is accepted");
   Scene scene = read_scene(arguments.scene);  // before the body: a typo is answered at once
+  refuse_shared_streams(arguments, scene);
   return {std::move(scene), read_bodies(arguments.bodies)};
 }
 
@@ -134,6 +162,12 @@ int run(int argc, char** argv) {
     if (options.checkpoint.empty() && arguments.resume.empty())
       throw InputError("--checkpoint-every needs --checkpoint FILE");
     options.checkpoint_every = parse_timeout(arguments.checkpoint_every, "--checkpoint-every");
+  }
+  if (app.count("--live") > 0) {
+    options.live = arguments.live.empty() || arguments.live.front().empty() ? "-" : arguments.live.front();
+    if (options.live == "-" && (arguments.output.empty() || arguments.output == "-"))
+      throw InputError(
+          "--live writes frames to stdout: name the body's file with -o, or give --live tcp:PORT");
   }
   auto [scene, body] = read_input(arguments);
   if (arguments.output.empty()) arguments.output = "-";

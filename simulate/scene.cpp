@@ -138,6 +138,7 @@ RunSettings parse_run(TableReader& root) {
                     *until));
   parse_time(reader, run);
   run.tolerance = reader.number("tolerance").value_or(run.tolerance);
+  run.tolerance_given = reader.find("tolerance") != nullptr;
   run.load_steps = whole_number(reader, "load_steps", 10000).value_or(run.load_steps);
   run.newton_iterations = whole_number(reader, "newton_iterations", 1000000);
   if (const SceneValue* value = reader.find("renormalise")) {

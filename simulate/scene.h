@@ -45,6 +45,7 @@ struct RunSettings {
   std::optional<int> frames;            // of a .pvd series, the first one not counted
   std::optional<double> history_every;  // s
   double tolerance = 1e-8;              // largest residual, relative to loads and reactions
+  bool tolerance_given = false;         // by the scene's file
   int load_steps = 1;                   // at least; steps that fail are cut by themselves
   // after which the run gives up; each load step that ends in equilibrium allows 10 more. Nothing: 100, or 40
   // where the first linear answer is several times the size of the body

@@ -19,6 +19,7 @@
 #include "simulate/rest_shape.h"
 #include "simulate/scene.h"
 #include "simulate/stress.h"
+#include "simulate/time/settling.h"
 #include "simulate/time/timed_run.h"
 #include "simulate/unsupported.h"
 
@@ -106,15 +107,20 @@ bool anything_acts(const Scene& scene) {
 }
 
 // An effect that acts in time has no meaning at equilibrium.
-void refuse_timed(const std::vector<Pass>& passes, const SimulateOptions& options, const std::string& scene) {
+void refuse_timed(const std::vector<Pass>& passes, const std::string& scene) {
   for (const Pass& pass : passes)
     if (pass.needs_time)
       throw InputError(scene,
                        fmt::format("{} ({}) acts in timed runs only: give [run] time = \"1 s\", or leave "
                                    "it out",
                                    pass.name, pass.why));
+}
+
+// Outputs that only a timed run has.
+void refuse_timed(const SimulateOptions& options, const std::string& scene) {
   if (!options.history.empty() || !options.series.empty())
     throw InputError(scene, "--history and a .pvd series are for timed runs: give [run] time = \"1 s\"");
+  if (!options.live.empty()) throw InputError(scene, "--live is for timed runs: give [run] time = \"1 s\"");
   if (!options.checkpoint.empty())
     throw InputError(scene, "--checkpoint is for timed runs: give [run] time = \"1 s\"");
 }
@@ -193,7 +199,8 @@ SimulateResult Run::operator()() {
   name_materials(body_, setting_.materials);
   const std::vector<ProbePoints> probes = place_probes(scene_, setting_);
   std::vector<Pass> passes = Effects::passes(scene_.effects, setting_);
-  refuse_timed(passes, options_, scene_.name);
+  refuse_timed(passes, scene_.name);
+  refuse_timed(options_, scene_.name);
   if (!anything_acts(scene_))
     progress_.warn("the scene has no [[load]], [[move]] or [gravity]: nothing will move");
   if (options_.explain) explain_before(passes, progress_);
@@ -245,6 +252,12 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
   progress.stage("simulate");
   if (scene.run.time) {
     SimulateResult result = run_in_time(body, scene, options, progress);
+    progress.finish();
+    return result;
+  }
+  if (settles(scene)) {
+    refuse_timed(options, scene.name);
+    SimulateResult result = settle(body, scene, options, progress);
     progress.finish();
     return result;
   }

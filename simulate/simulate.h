@@ -56,12 +56,31 @@ struct StressSummary {     // of the largest von Mises stress
   std::optional<double> yield_share;  // of the part's material; nothing where it has no `yield`
 };
 
+struct SettleSummary {                 // of equilibrium with contact (simulate/time/settling.h)
+  std::uint64_t steps = 0, stops = 0;  // stops: times that all velocities were set to 0
+  double residual = 0;                 // forces left over, relative to loads and reactions
+  double kinetic = 0;                  // J, left over
+  double tolerance = 0;                // of both; that of the kinetic energy relative to its largest
+};
+
+struct LiveSummary {        // of a run with poses from stdin or --live (docs/live.md)
+  std::uint64_t poses = 0;  // that came in
+  bool poses_ended = false;
+  double rate = 0;  // 1/s, of frames; 0: none were written, and real time was not kept
+  std::uint64_t frames = 0, late = 0, missed = 0;
+  double behind = 0;                       // s, of real time that late frames let go
+  double jitter_squared = 0;               // s^2, sum over frames, of the time between two
+  double worst_jitter = 0;                 // s
+  std::uint64_t readers = 0, dropped = 0;  // that came; frames that one of them was too slow for
+};
+
 struct TimedSummary {  // of a run in time
   double time = 0;     // s, reached
   std::uint64_t steps = 0;
   double step = 0;                                    // s, the last one
   std::string isa;                                    // instruction set of the kernel
   std::vector<std::pair<std::string, double>> books;  // J, by name; with a history only
+  std::optional<LiveSummary> live = {};
 };
 
 struct SimulateResult {
@@ -87,6 +106,7 @@ struct SimulateResult {
   double relative_residual = 0;
   double seconds = 0;
   std::optional<TimedSummary> timed;
+  std::optional<SettleSummary> settled;
 };
 
 struct SimulateOptions {
@@ -103,6 +123,11 @@ struct SimulateOptions {
   double checkpoint_every = 600;
   std::string output;
   std::shared_ptr<const Checkpoint> resume;
+  // Timed runs: where frames go at `live_rate` a second in real time, every `live_state`-th with the
+  // positions (0: none); "" for nowhere. docs/live.md
+  std::string live;
+  double live_rate = 100;
+  int live_state = 1;
   std::string isa;       // "portable", "avx2", "avx512"; "" for the best that the machine has
   bool stress = true;    // compute it, and give the body its columns
   bool estimate = true;  // equilibrium: error bars, by two runs on coarser lattices

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "formats/program.h"
@@ -96,6 +97,35 @@ std::string error_bars_line(const ErrorBars& errors) {
   return line;
 }
 
+double rms_jitter(const LiveSummary& live) {
+  return live.frames > 1 ? std::sqrt(live.jitter_squared / static_cast<double>(live.frames - 1)) : 0;
+}
+
+Json live_json(const LiveSummary& live) {
+  Json json = {{"poses", live.poses}, {"poses_ended", live.poses_ended}, {"rate", live.rate}};
+  if (live.rate == 0) return json;
+  json["frames"] = live.frames;
+  json["late"] = live.late;
+  json["missed"] = live.missed;
+  json["behind"] = live.behind;
+  json["jitter"] = rms_jitter(live);
+  json["worst_jitter"] = live.worst_jitter;
+  json["readers"] = live.readers;
+  json["dropped"] = live.dropped;
+  return json;
+}
+
+std::string live_line(const LiveSummary& live) {
+  const std::string poses = fmt::format("live: {} pose(s)", human_count(live.poses));
+  if (live.rate == 0) return poses;
+  return fmt::format(
+      "{}, {} frame(s) at {:.6g} a second, {} late, {} missed, {:.3g} s behind real time; jitter {:.3g} ms, "
+      "at "
+      "most {:.3g} ms; {} reader(s), {} frame(s) dropped",
+      poses, human_count(live.frames), live.rate, human_count(live.late), human_count(live.missed),
+      live.behind, 1e3 * rms_jitter(live), 1e3 * live.worst_jitter, live.readers, human_count(live.dropped));
+}
+
 }  // namespace
 
 std::string summary_json(const SimulateResult& result, const Body& body) {
@@ -149,6 +179,13 @@ std::string summary_json(const SimulateResult& result, const Body& body) {
                      {"step", result.timed->step},
                      {"isa", result.timed->isa}};
     for (const auto& [name, joules] : result.timed->books) json["timed"]["books"][name] = joules;
+    if (result.timed->live) json["timed"]["live"] = live_json(*result.timed->live);
+  } else if (result.settled) {
+    json["settled"] = {{"steps", result.settled->steps},
+                       {"stops", result.settled->stops},
+                       {"relative_residual", result.settled->residual},
+                       {"kinetic_energy", result.settled->kinetic},
+                       {"tolerance", result.settled->tolerance}};
   } else {
     json["load_steps"] = result.load_steps;
     json["newton_iterations"] = result.newton_iterations;
@@ -203,6 +240,16 @@ std::vector<std::string> summary_lines(const SimulateResult& result) {
     for (const auto& [name, joules] : result.timed->books)
       books += fmt::format("{}{} {:.4g} J", books.empty() ? "" : ", ", name, joules);
     if (!books.empty()) lines.push_back("books: " + books);
+    if (result.timed->live) lines.push_back(live_line(*result.timed->live));
+    return lines;
+  }
+  if (result.settled) {
+    lines.push_back(fmt::format(
+        "at rest after {} steps and {} stops in {:.2f} s: residual {:.1e}, kinetic energy {:.2g} J; elastic "
+        "energy {:.4g} J, smallest J {:.4g}{}",
+        human_count(result.settled->steps), human_count(result.settled->stops), result.seconds,
+        result.settled->residual, result.settled->kinetic, result.elastic_energy, result.smallest_jacobian,
+        corner));
     return lines;
   }
   lines.push_back(

@@ -41,6 +41,8 @@ void RigidParts::parse(TableReader& scene, Parameters& parameters) {
     made.part = *reader.text("part");
     made.name = reader.text("name").value_or(made.part);
     made.path = parse_path(reader);
+    if (reader.text("path") == "stdin")
+      made.live = std::make_shared<LiveTool>(LiveTool{made.name, true, made.path});
     reader.finish();
     parameters.manipulators.push_back(made);
   }
@@ -84,13 +86,17 @@ std::string RigidParts::why() const {
   return fmt::format("{} rigid part(s), {} [[manipulator]]", moving_->size(), led);
 }
 
+Pose RigidParts::Moving::pose_at(double time) const {
+  return (led->live ? led->live->path : led->path).at(time, body.centre);
+}
+
 void RigidParts::start(State& state) const {
   for (Moving& moving : *moving_) {
     RigidBody& body = moving.body;
     take_up(body, *body_, mass_, state.displacement, state.velocity);
     if (moving.led) {
       body.momentum = body.spin = Vec3::Zero();
-      move_to(body, moving.led->path.at(*state.time, body.centre), 0, state.displacement, state.velocity);
+      move_to(body, moving.pose_at(*state.time), 0, state.displacement, state.velocity);
     } else {
       move_to(body, body.pose, 0, state.displacement, state.velocity);
     }
@@ -116,15 +122,21 @@ void RigidParts::finish_step(State& state, const StepDone& done) const {
       moving.support[e - body.begin] = state.velocity[e];  // as if free
     }
     if (moving.led) {
-      const Pose before = body.pose, next = moving.led->path.at(*state.time, body.centre);
+      const Pose before = body.pose, next = moving.pose_at(*state.time);
       const Vec3 momentum = body.mass / done.drift * (next.translation - before.translation);
       const Vec3 turn = turn_of(next.rotation * before.rotation.transpose());
       const Mat3 middle = turned_by(0.5 * turn) * before.rotation;
       const Vec3 spin = middle * body.inertia * middle.transpose() * turn / done.drift;
       moving.force = (momentum - body.momentum - impulse) / done.kick;
       const Vec3 about = moving.led->path.about.value_or(body.centre) - body.centre;
-      moving.torque =
-          (spin - body.spin - turning) / done.kick - (before.rotation * about).cross(moving.force);
+      const Vec3 arm = before.rotation * about;
+      moving.torque = (spin - body.spin - turning) / done.kick - arm.cross(moving.force);
+      if (moving.led->live) {
+        LiveTool& live = *moving.led->live;
+        live.impulse += impulse;
+        live.turning += turning - arm.cross(impulse);
+        live.seconds += done.kick;
+      }
       body.momentum = momentum;
       body.spin = spin;
       move_to(body, next, done.drift, state.displacement, state.velocity);
@@ -183,8 +195,14 @@ void RigidParts::restore(const std::vector<double>& memory) const {
 }
 
 void RigidParts::report(const State&, const std::vector<Vec3>&, SimulateResult& result) const {
-  for (const Moving& moving : *moving_)
-    if (moving.led) result.reactions.push_back({moving.led->name, moving.force});
+  for (const Moving& moving : *moving_) {
+    if (!moving.led) continue;
+    const Pose& pose = moving.body.pose;
+    const Vec3& centre = moving.body.centre;
+    const Vec3 arm = pose.rotation * (moving.led->path.about.value_or(centre) - centre);
+    const Vec3 about = centre + pose.translation + arm;
+    result.reactions.push_back({moving.led->name, moving.force, moving.torque + about.cross(moving.force)});
+  }
 }
 
 std::vector<std::string> RigidParts::history_columns() const {

@@ -3,6 +3,7 @@
 // what [contact] lets them.
 #pragma once
 #include "simulate/effects/effect.h"
+#include "simulate/live/live_tool.h"
 #include "simulate/rigid/path.h"
 #include "simulate/rigid/rigid_body.h"
 
@@ -11,7 +12,8 @@ namespace flexel {
 struct Manipulator {
   std::string part, name;
   ManipulatorPath path;
-  std::string origin;  // "bend.toml:12"
+  std::string origin;                        // "bend.toml:12"
+  std::shared_ptr<LiveTool> live = nullptr;  // `path = "stdin"`, or in a run that tells what it feels
 };
 
 class RigidParts {
@@ -48,6 +50,7 @@ class RigidParts {
   struct Moving {
     RigidBody body;
     std::optional<Manipulator> led;
+    [[nodiscard]] Pose pose_at(double time) const;
     std::vector<Vec3> velocity;                        // (its elements) m/s, that the step began with
     std::vector<Vec3> support;                         // (its elements) N, of the last step; of those led
     Vec3 force = Vec3::Zero(), torque = Vec3::Zero();  // N, N m, of what leads it

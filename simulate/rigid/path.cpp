@@ -78,28 +78,28 @@ PathColumn parse_column(const std::string& header, const std::string& place) {
 
 }  // namespace
 
-Pose ManipulatorPath::at(double when, const Vec3& centre) const {
-  Pose pose;
-  if (time.empty()) return pose;
+ManipulatorPath::Key ManipulatorPath::key(double when) const {
+  if (time.empty()) return {};
   const auto next = std::upper_bound(time.begin(), time.end(), when);
-  Vec3 moved;
-  if (next == time.begin() || next == time.end()) {
-    const std::size_t i = next == time.begin() ? 0 : time.size() - 1;
-    moved = displacement[i];
-    pose.rotation = turned_by(turn[i]);
-  } else {
-    const auto i = static_cast<std::size_t>(next - time.begin());
-    const double share = (when - time[i - 1]) / (time[i] - time[i - 1]);
-    moved = displacement[i - 1] + share * (displacement[i] - displacement[i - 1]);
-    // about one axis the whole way, also through more than half a turn; else the shortest way
-    const Mat3 before = turned_by(turn[i - 1]);
-    const bool one_axis = turn[i].cross(turn[i - 1]).norm() <= 1e-12 * turn[i].norm() * turn[i - 1].norm();
-    const Vec3 between =
-        one_axis ? Vec3(turn[i] - turn[i - 1]) : turn_of(turned_by(turn[i]) * before.transpose());
-    pose.rotation = turned_by(share * between) * before;
-  }
+  if (next == time.begin()) return {displacement.front(), turn.front()};
+  if (next == time.end()) return {displacement.back(), turn.back()};
+  const auto i = static_cast<std::size_t>(next - time.begin());
+  const double share = (when - time[i - 1]) / (time[i] - time[i - 1]);
+  const Vec3 moved = displacement[i - 1] + share * (displacement[i] - displacement[i - 1]);
+  // about one axis the whole way, also through more than half a turn; else the shortest way
+  if (turn[i].cross(turn[i - 1]).norm() <= 1e-12 * turn[i].norm() * turn[i - 1].norm())
+    return {moved, turn[i - 1] + share * (turn[i] - turn[i - 1])};
+  const Mat3 before = turned_by(turn[i - 1]);
+  const Vec3 between = turn_of(turned_by(turn[i]) * before.transpose());
+  return {moved, turn_of(turned_by(share * between) * before)};
+}
+
+Pose ManipulatorPath::at(double when, const Vec3& centre) const {
+  const Key here = key(when);
+  Pose pose;
+  pose.rotation = turned_by(here.turn);
   const Vec3 pivot = about.value_or(centre);
-  pose.translation = moved + (pose.rotation - Mat3::Identity()) * (centre - pivot);
+  pose.translation = here.displacement + (pose.rotation - Mat3::Identity()) * (centre - pivot);
   return pose;
 }
 
@@ -151,6 +151,8 @@ ManipulatorPath parse_path(TableReader& reader) {
       if (reader.find(key))
         reader.fail(reader.find(key)->line,
                     fmt::format("\"{}\" beside \"path\": the file has them all", key));
+    path.about = about;
+    if (*file == "stdin") return path;
     // beside the scene, unless it says otherwise
     std::filesystem::path where(*file);
     if (where.is_relative() && reader.file() != "stdin")

@@ -17,9 +17,15 @@ struct ManipulatorPath {
   // Pose at `time` s of a part whose centre of mass rests at `centre`. Rotations turn evenly about one axis
   // from key to key.
   [[nodiscard]] Pose at(double time, const Vec3& centre) const;
+  // Displacement [m] and rotation vector [rad] at `time` s.
+  struct Key {
+    Vec3 displacement = Vec3::Zero(), turn = Vec3::Zero();
+  };
+  [[nodiscard]] Key key(double time) const;
 };
 
-// The keys `path` (a file) or `time`, `displacement`, `rotation`, and `about` of [[manipulator]].
+// The keys `path` (a file; not "stdin") or `time`, `displacement`, `rotation`, and `about` of
+// [[manipulator]].
 [[nodiscard]] ManipulatorPath parse_path(TableReader& reader);
 
 // A table of a path, comma-separated: columns time, x, y, z, and where it turns rx, ry, rz (a rotation

@@ -325,6 +325,21 @@ void Act::step(Clock& clock, History* history, bool row) {
   if (!(outcome.smallest_jacobian > 0)) throw DivergedError(where_it_folds(body_, state_.displacement));
 }
 
+void Act::stop() {
+  std::fill(state_.velocity.begin(), state_.velocity.end(), Vec3::Zero());
+  if (implicit_) implicit_->set_change({});
+  for (const Pass& pass : passes_)
+    if (pass.begin) pass.begin(state_);
+}
+
+void Act::tell_forces(SimulateResult& result) const {
+  std::vector<Vec3> unbalanced(body_.element_count(), Vec3::Zero());
+  held_->add_forces(unbalanced);
+  for (Vec3& force : unbalanced) force = -force;
+  for (const Pass& pass : passes_)
+    if (pass.report) pass.report(state_, unbalanced, result);
+}
+
 void Act::close_books(const Clock& clock, History& history) {
   if (euler_) return history.add_row_of(state_);
   State last = state_;
@@ -351,11 +366,7 @@ void Act::store(const State& state) {
 }
 
 void Act::report(const Clock& clock, bool stress, SimulateResult& result) {
-  std::vector<Vec3> unbalanced(body_.element_count(), Vec3::Zero());
-  held_->add_forces(unbalanced);
-  for (Vec3& force : unbalanced) force = -force;
-  for (const Pass& pass : passes_)
-    if (pass.report) pass.report(state_, unbalanced, result);
+  tell_forces(result);
   for (const ProbePoints& probe : probes_) result.probes.push_back(measure(probe, state_));
   const Stencil none;
   const Cells cells(setting_, none);

@@ -80,6 +80,11 @@ class Act {
   // Implicit steps tell `hear` of every iteration; it may throw.
   void set_hear(std::function<void(const std::string&)> hear) { hear_ = std::move(hear); }
 
+  // Sets all velocities to 0, but of what follows a path.
+  void stop();
+  // Loads and reactions, as of the last step.
+  void tell_forces(SimulateResult& result) const;
+
   // The books of the present state need the forces there, hence a step that is thrown away.
   void close_books(const Clock& clock, History& history);
 

@@ -12,10 +12,12 @@
 #include "formats/error.h"
 #include "formats/files.h"
 #include "formats/program.h"
+#include "simulate/live/live_link.h"
 #include "simulate/rest_shape.h"
 #include "simulate/time/act.h"
 #include "simulate/time/checkpoint.h"
 #include "simulate/time/series.h"
+#include "simulate/time/settling.h"
 
 namespace flexel {
 namespace {
@@ -26,7 +28,8 @@ constexpr std::size_t kFrames = 50;  // likewise
 
 class TimedRun {
  public:
-  TimedRun(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress);
+  TimedRun(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress,
+           std::optional<Settling> settling = {});
   SimulateResult operator()();
 
  private:
@@ -37,6 +40,8 @@ class TimedRun {
   void keep();
   [[nodiscard]] bool save_checkpoint();
   [[nodiscard]] bool out_of_time() const;
+  void throw_if_stopped() const;
+  [[nodiscard]] bool over() const { return (live_ && live_->ended()) || (settling_ && settling_->done()); }
   void play();
   void play_until(double end, bool resumed);
   void happen(std::size_t end);
@@ -58,6 +63,8 @@ class TimedRun {
   Beginning beginning_;  // of the act
   std::optional<Act> act_;
   std::unique_ptr<History> history_;  // of the act; null: none asked for
+  std::optional<Settling> settling_;  // nothing: a run in time
+  std::unique_ptr<LiveLink> live_;    // null: neither poses nor frames
   std::optional<Series> series_;
   State good_;
   std::optional<Checkpoint> kept_;  // with --checkpoint: where the run can go on from
@@ -65,10 +72,17 @@ class TimedRun {
   std::chrono::steady_clock::time_point saved_ = began_;
   std::size_t events_ = 0;  // that have happened
   double next_row_ = 0, next_frame_ = 0;
+  std::optional<LiveSummary> live_summary_;
 };
 
-TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress)
-    : body_(body), scene_(scene), options_(options), progress_(progress), duration_(*scene.run.time) {
+TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress,
+                   std::optional<Settling> settling)
+    : body_(body),
+      scene_(scene),
+      options_(options),
+      progress_(progress),
+      duration_(*scene.run.time),
+      settling_(std::move(settling)) {
   for (const Event& event : scene_.events)
     if (event.prepare)
       for (std::string& name : event.prepare()) scene_.coming_parts.push_back(std::move(name));
@@ -80,11 +94,16 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
     kept_->input = options.resume ? options.resume->input : body_fingerprint(body);
     act_body_ = body_bytes(body, options.checkpoint);
   }
+  if (LiveLink::wanted(scene_, options)) {
+    live_ = std::make_unique<LiveLink>(scene_, body, options, progress, [this] { throw_if_stopped(); });
+    live_->await(0);
+  }
   if (options.resume)
     resume(*options.resume);
   else
     begin();
   act_->set_hear([this](const std::string& note) { listen(note); });
+  if (settling_) Settling::refuse(act_->passes(), scene_.name);
 }
 
 void TimedRun::begin() {
@@ -126,10 +145,14 @@ bool TimedRun::out_of_time() const {
   return options_.timeout && taken.count() > *options_.timeout;
 }
 
+void TimedRun::throw_if_stopped() const {
+  throw_if_interrupted();
+  if (out_of_time()) throw TimeoutError("stopped by --timeout before the first pose came");
+}
+
 // Within an implicit step: what was reached before it stays.
 void TimedRun::listen(const std::string& note) {
-  throw_if_interrupted();
-  if (out_of_time()) throw TimeoutError("");
+  throw_if_stopped();
   const double time = *act_->state().time;
   progress_.update(time / duration_, fmt::format("{:.4g} s, step {}, {}", time, clock_.steps, note));
 }
@@ -168,22 +191,31 @@ bool TimedRun::save_checkpoint() {
 
 void TimedRun::check() {
   if (kept_ && act_->renews(clock_)) keep();
-  throw_if_interrupted();
-  if (out_of_time()) throw TimeoutError("");
+  throw_if_stopped();
   const std::chrono::duration<double> since = std::chrono::steady_clock::now() - saved_;
   if (kept_ && since.count() > options_.checkpoint_every) (void)save_checkpoint();
   act_->refuse_unsound();
   good_ = act_->state();
   act_->adapt_step(clock_);
   const double time = *act_->state().time;
-  progress_.update(time / duration_, fmt::format("{:.4g} s, step {}", time, clock_.steps));
+  if (settling_)
+    progress_.update(time / duration_,
+                     fmt::format("step {}, residual {:.2g}", clock_.steps, settling_->summary().residual));
+  else
+    progress_.update(time / duration_, fmt::format("{:.4g} s, step {}", time, clock_.steps));
 }
 
 void TimedRun::step() {
   const bool due = history_ && *act_->state().time >= next_row_;
   const bool row = due || (history_ && history_->ledger().changed);
   if (due) next_row_ += scene_.run.history_every.value_or(duration_ / kRows);
+  if (live_) live_->await(clock_.epoch + static_cast<double>(clock_.in_epoch + 1) * clock_.step);
+  if (settling_) settling_->before(act_->state());
   act_->step(clock_, history_.get(), row);
+  if (settling_ && settling_->after(act_->state(), act_->stepper().mass(),
+                                    [&](SimulateResult& told) { act_->tell_forces(told); }))
+    act_->stop();
+  if (live_) live_->keep_pace(act_->state());
 }
 
 void TimedRun::write_frame() {
@@ -210,6 +242,7 @@ std::string TimedRun::save_failed() {
 SimulateResult TimedRun::report() {
   SimulateResult result;
   act_->report(clock_, options_.stress, result);
+  result.timed->live = live_summary_;
   if (history_) {
     const Ledger& ledger = history_->ledger();
     const Energies& last = ledger.rows.back().energies;
@@ -221,18 +254,20 @@ SimulateResult TimedRun::report() {
                            {"worst_residual", ledger.worst_residual},
                            {"largest_term", ledger.largest_term}};
   }
+  if (settling_) settling_->report(result);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
   return result;
 }
 
 // From the beginning of an act to its end, or from where a checkpoint has it to there.
 void TimedRun::play_until(double end, bool resumed) {
-  const auto goes_on = [&] { return *act_->state().time < end * (1 - 1e-12); };
+  const auto goes_on = [&] { return *act_->state().time < end * (1 - 1e-12) && !over(); };
   const bool first = clock_.steps == 0 && goes_on() && !resumed;
   clock_.until = end;
   if (goes_on() && !resumed) act_->choose_step(clock_);
   if (first || resumed) explain();
   if (first) write_frame();
+  if (live_ && (first || resumed)) live_->start(act_->state());
   if (kept_) keep();
   good_ = act_->state();
   const std::uint64_t between = act_->is_implicit() ? 1 : kCheck;
@@ -284,14 +319,17 @@ void TimedRun::happen(std::size_t end) {
 
 void TimedRun::play() {
   bool resumed = options_.resume != nullptr;
-  while (events_ < scene_.events.size()) {
+  while (events_ < scene_.events.size() && !over()) {
     const double at = scene_.events[events_].at;
     std::size_t end = events_ + 1;
     while (end < scene_.events.size() && scene_.events[end].at == at) ++end;
     play_until(at, std::exchange(resumed, false));
+    if (over()) break;
     happen(end);
   }
   play_until(duration_, resumed);
+  if (settling_ && !settling_->done()) throw DivergedError(settling_->failure());
+  if (live_) live_summary_ = live_->finish(act_->state());
   if (history_) act_->close_books(clock_, *history_);
 }
 
@@ -324,6 +362,14 @@ SimulateResult TimedRun::operator()() {
 SimulateResult run_in_time(Body& body, const Scene& scene, const SimulateOptions& options,
                            Progress& progress) {
   return TimedRun(body, scene, options, progress)();
+}
+
+SimulateResult settle(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress) {
+  Scene made = scene;
+  Settling settling(made, body);
+  SimulateResult result = TimedRun(body, made, options, progress, std::move(settling))();
+  body.element_columns.erase("velocity");
+  return result;
 }
 
 }  // namespace flexel

@@ -12,4 +12,9 @@ namespace flexel {
 [[nodiscard]] SimulateResult run_in_time(Body& body, const Scene& scene, const SimulateOptions& options,
                                          Progress& progress);
 
+// Brings a scene without a time, with contact or rigid parts, to rest (simulate/time/settling.h). Throws as
+// well DivergedError: it does not come to rest.
+[[nodiscard]] SimulateResult settle(Body& body, const Scene& scene, const SimulateOptions& options,
+                                    Progress& progress);
+
 }  // namespace flexel

@@ -62,6 +62,18 @@ def test_dented():
     run_page("samples/dented/README.md")
 
 
+def test_kneaded():
+    run_page("samples/kneaded/README.md")
+
+
+def test_squeezed():
+    run_page("samples/squeezed/README.md")
+
+
+def test_gripped():
+    run_page("samples/gripped/README.md")
+
+
 def test_docs():
     pages = [page for page in sorted((SOURCE / "docs").glob("*.md")) if blocks(page)]
     expect(pages, "no page of docs/ has a command that can be run")

@@ -1,0 +1,120 @@
+// The scene's courses, sums over the body, and when it has come to rest.
+#include "simulate/time/settling.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "formats/error.h"
+#include "formats/parallel.h"
+#include "simulate/report.h"
+
+namespace flexel {
+namespace {
+
+constexpr double kTolerance = 1e-5;         // unless the scene says otherwise
+constexpr double kRamp = 10, kMost = 3000;  // times that sound takes through the body
+
+// s, that sound takes along the body's diagonal in its slowest part.
+double sound_time(const Scene& scene, const Body& body) {
+  double slowest = 0;
+  const auto materials = materials_of_parts(scene, body);
+  for (const Material& material : materials)
+    slowest = std::max(slowest, std::sqrt(material.density / material.young));
+  return body_extent(body) * slowest;
+}
+
+}  // namespace
+
+bool settles(const Scene& scene) {
+  const auto& rigid = scene.get<RigidParts>();
+  const auto& contact = scene.get<Contact>();
+  return !scene.run.time &&
+         (contact.on || !contact.planes.empty() || !rigid.parts.empty() || !rigid.manipulators.empty());
+}
+
+Settling::Settling(Scene& scene, const Body& body) {
+  const double sound = sound_time(scene, body);
+  ramp_ = kRamp * sound;
+  const Course grows{{0, ramp_}, {0, 1}};
+  for (Load& load : scene.get<Loads>().loads) load.course = grows;
+  for (Tie& tie : scene.get<Ties>().ties)
+    if (tie.is_move) tie.course = grows;
+  for (Manipulator& each : scene.get<RigidParts>().manipulators) {
+    if (each.live)
+      throw InputError(each.origin, "path = \"stdin\" is for timed runs: give [run] time = \"1 s\"");
+    std::vector<double>& time = each.path.time;
+    if (time.empty()) continue;
+    const double begin = time.front(), whole = time.back() - begin;
+    for (double& key : time) key = whole > 0 ? ramp_ * (key - begin) / whole : 0;
+  }
+  scene.run.time = ramp_ + kMost * sound;
+  summary_.tolerance = scene.run.tolerance_given ? scene.run.tolerance : kTolerance;
+}
+
+void Settling::before(const State& state) {
+  if ((summary_.steps + 1) % kLook == 0) velocity_ = state.velocity;
+}
+
+bool Settling::after(const State& state, const std::vector<double>& mass,
+                     const std::function<void(SimulateResult&)>& tell) {
+  ++summary_.steps;
+  const double before = kinetic_;
+  kinetic_ = 0.5 * parallel_sum<double>(
+                       mass.size(), [&](std::size_t e) { return mass[e] * state.velocity[e].squaredNorm(); });
+  largest_ = std::max(largest_, kinetic_);
+  if (*state.time > ramp_ && summary_.steps % kLook == 0) {
+    SimulateResult told;
+    tell(told);
+    double scale = 0;
+    for (const AppliedLoad& load : told.loads) scale += load.force.norm();
+    for (const Reaction& reaction : told.reactions) scale += reaction.force.norm();
+    look(state, mass, scale);
+  }
+  if (!(kinetic_ < before)) return false;
+  kinetic_ = 0;
+  ++summary_.stops;
+  return true;
+}
+
+void Settling::look(const State& state, const std::vector<double>& mass, double scale) {
+  const double left = parallel_sum<double>(mass.size(), [&](std::size_t e) {
+    return mass[e] / state.kick * (state.velocity[e] - velocity_[e]).norm();
+  });
+  summary_.residual = scale > 0 ? left / scale : left > 0 ? HUGE_VAL : 0;
+  summary_.kinetic = kinetic_;
+  done_ = summary_.residual <= summary_.tolerance && kinetic_ <= summary_.tolerance * largest_;
+}
+
+void Settling::refuse(const std::vector<Pass>& passes, const std::string& scene) {
+  for (const Pass& pass : passes)
+    if (pass.needs_time && pass.name != Contact::name && pass.name != ContactLosses::name &&
+        pass.name != RigidParts::name && pass.name != Damping::name)
+      throw InputError(scene, fmt::format("{} ({}) acts in timed runs only: give [run] time = \"1 s\", or "
+                                          "leave it out",
+                                          pass.name, pass.why));
+}
+
+void Settling::report(SimulateResult& result) const {
+  result.settled = summary_;
+  result.timed.reset();
+  for (const AppliedLoad& load : result.loads) {
+    result.imbalance += load.force;
+    result.moment_imbalance += load.moment;
+  }
+  for (const Reaction& reaction : result.reactions) {
+    result.imbalance += reaction.force;
+    result.moment_imbalance += reaction.moment;
+  }
+}
+
+std::string Settling::failure() const {
+  return fmt::format(
+      "the body does not come to rest: after {} steps the forces left over are {:.2g} of loads and reactions "
+      "(tolerance {:.2g}), the kinetic energy {:.3g} J; look for a part that nothing stops, or give [run] a "
+      "larger tolerance",
+      summary_.steps, summary_.residual, summary_.tolerance, summary_.kinetic);
+}
+
+}  // namespace flexel

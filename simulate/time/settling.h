@@ -1,0 +1,52 @@
+// Equilibrium where parts touch, or are rigid: a run in a time of its own, whose motion is taken out until
+// nothing moves any more.
+//
+// Kinetic damping (Cundall 1976; Otter, Cassell and Hobbs 1966 for the method): whenever the kinetic energy
+// has passed a peak, all velocities are set to 0. A peak is where forces and inertia pass equilibrium, so
+// that the body stops near it and does not swing far beyond; no constant has to be chosen.
+//
+// Loads and moves grow evenly, and tools take their paths, in the first ten times that sound takes through
+// the body; the run then has 3000 such times to come to rest.
+#pragma once
+#include <functional>
+#include <vector>
+
+#include "simulate/scene.h"
+#include "simulate/simulate.h"
+
+namespace flexel {
+
+// Whether a scene without a time is brought to rest this way.
+[[nodiscard]] bool settles(const Scene& scene);
+
+class Settling {
+ public:
+  // Gives `scene`, which it must outlive, the courses of a run that settles. Throws InputError: what it does
+  // not take.
+  Settling(Scene& scene, const Body& body);
+
+  // Throws InputError: an effect that means nothing at rest.
+  static void refuse(const std::vector<Pass>& passes, const std::string& scene);
+  // Before a step: the velocities that it begins with.
+  void before(const State& state);
+  // After it. `tell` gives loads and reactions. True: the velocities are to be set to 0.
+  [[nodiscard]] bool after(const State& state, const std::vector<double>& mass,
+                           const std::function<void(SimulateResult&)>& tell);
+  [[nodiscard]] bool done() const { return done_; }
+  [[nodiscard]] const SettleSummary& summary() const { return summary_; }
+  void report(SimulateResult& result) const;
+  // Why the run, which has come to its end, has failed.
+  [[nodiscard]] std::string failure() const;
+
+ private:
+  static constexpr std::uint64_t kLook = 20;  // steps between two looks at the residual
+  void look(const State& state, const std::vector<double>& mass, double scale);
+
+  double ramp_ = 0;                   // s
+  double kinetic_ = 0, largest_ = 0;  // J
+  bool done_ = false;
+  std::vector<Vec3> velocity_;  // m/s, that the step began with
+  SettleSummary summary_;
+};
+
+}  // namespace flexel
