@@ -325,9 +325,8 @@ void Act::step(Clock& clock, History* history, bool row) {
   if (!(outcome.smallest_jacobian > 0)) throw DivergedError(where_it_folds(body_, state_.displacement));
 }
 
-void Act::stop() {
-  std::fill(state_.velocity.begin(), state_.velocity.end(), Vec3::Zero());
-  if (implicit_) implicit_->set_change({});
+void Act::slow(double factor) {
+  parallel_for_each(state_.velocity.size(), [&](std::size_t e) { state_.velocity[e] *= factor; });
   for (const Pass& pass : passes_)
     if (pass.begin) pass.begin(state_);
 }

@@ -80,8 +80,8 @@ class Act {
   // Implicit steps tell `hear` of every iteration; it may throw.
   void set_hear(std::function<void(const std::string&)> hear) { hear_ = std::move(hear); }
 
-  // Sets all velocities to 0, but of what follows a path.
-  void stop();
+  // Multiplies all velocities, but of what follows a path.
+  void slow(double factor);
   // Loads and reactions, as of the last step.
   void tell_forces(SimulateResult& result) const;
 

@@ -54,34 +54,45 @@ Settling::Settling(Scene& scene, const Body& body) {
 }
 
 void Settling::before(const State& state) {
-  if ((summary_.steps + 1) % kLook == 0) velocity_ = state.velocity;
+  velocity_ = state.velocity;
 }
 
-bool Settling::after(const State& state, const std::vector<double>& mass,
-                     const std::function<void(SimulateResult&)>& tell) {
-  ++summary_.steps;
-  const double before = kinetic_;
-  kinetic_ = 0.5 * parallel_sum<double>(
-                       mass.size(), [&](std::size_t e) { return mass[e] * state.velocity[e].squaredNorm(); });
-  largest_ = std::max(largest_, kinetic_);
-  if (*state.time > ramp_ && summary_.steps % kLook == 0) {
-    SimulateResult told;
-    tell(told);
-    double scale = 0;
-    for (const AppliedLoad& load : told.loads) scale += load.force.norm();
-    for (const Reaction& reaction : told.reactions) scale += reaction.force.norm();
-    look(state, mass, scale);
-  }
-  if (!(kinetic_ < before)) return false;
-  kinetic_ = 0;
-  ++summary_.stops;
-  return true;
-}
-
-void Settling::look(const State& state, const std::vector<double>& mass, double scale) {
-  const double left = parallel_sum<double>(mass.size(), [&](std::size_t e) {
-    return mass[e] / state.kick * (state.velocity[e] - velocity_[e]).norm();
+double Settling::after(const State& state, const std::vector<double>& mass,
+                       const std::function<void(SimulateResult&)>& tell) {
+  struct Sums {
+    double stiffness = 0, mass = 0, kinetic = 0;
+    Sums& operator+=(const Sums& other) {
+      stiffness += other.stiffness;
+      mass += other.mass;
+      kinetic += other.kinetic;
+      return *this;
+    }
+  };
+  const bool first = force_.empty();
+  force_.resize(mass.size(), Vec3::Zero());
+  const Sums sums = parallel_sum<Sums>(mass.size(), [&](std::size_t e) {
+    const Vec3 force = mass[e] / state.kick * (state.velocity[e] - velocity_[e]);
+    const Vec3 change = force - force_[e];
+    force_[e] = force;
+    return Sums{-velocity_[e].dot(change), mass[e] * velocity_[e].squaredNorm(),
+                0.5 * mass[e] * state.velocity[e].squaredNorm()};
   });
+  ++summary_.steps;
+  kinetic_ = sums.kinetic;
+  largest_ = std::max(largest_, kinetic_);
+  if (*state.time > ramp_ && summary_.steps % kLook == 0) look(tell);
+  if (first || !(sums.stiffness > 0)) return 1;
+  const double turned = std::sqrt(sums.stiffness * state.kick / sums.mass);  // omega dt
+  return std::exp(-2 * std::min(turned, 1.0));
+}
+
+void Settling::look(const std::function<void(SimulateResult&)>& tell) {
+  SimulateResult told;
+  tell(told);
+  double scale = 0;
+  for (const AppliedLoad& load : told.loads) scale += load.force.norm();
+  for (const Reaction& reaction : told.reactions) scale += reaction.force.norm();
+  const double left = parallel_sum<double>(force_.size(), [&](std::size_t e) { return force_[e].norm(); });
   summary_.residual = scale > 0 ? left / scale : left > 0 ? HUGE_VAL : 0;
   summary_.kinetic = kinetic_;
   done_ = summary_.residual <= summary_.tolerance && kinetic_ <= summary_.tolerance * largest_;

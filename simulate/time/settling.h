@@ -1,9 +1,11 @@
 // Equilibrium where parts touch, or are rigid: a run in a time of its own, whose motion is taken out until
 // nothing moves any more.
 //
-// Kinetic damping (Cundall 1976; Otter, Cassell and Hobbs 1966 for the method): whenever the kinetic energy
-// has passed a peak, all velocities are set to 0. A peak is where forces and inertia pass equilibrium, so
-// that the body stops near it and does not swing far beyond; no constant has to be chosen.
+// Adaptive dynamic relaxation (Underwood 1983): all velocities decay at the rate 2 omega, which is critical
+// for a swing of angular frequency omega. omega^2 is Rayleigh's quotient of the present motion,
+//     -v . (F+ - F) / (dt v . M v)
+// (F, F+ the forces before and after a way of v dt, M the masses): fast swings die first, and then it is that
+// of the slowest one left. What falls freely is not damped.
 //
 // Loads and moves grow evenly, and tools take their paths, in the first ten times that sound takes through
 // the body; the run then has 3000 such times to come to rest.
@@ -29,9 +31,9 @@ class Settling {
   static void refuse(const std::vector<Pass>& passes, const std::string& scene);
   // Before a step: the velocities that it begins with.
   void before(const State& state);
-  // After it. `tell` gives loads and reactions. True: the velocities are to be set to 0.
-  [[nodiscard]] bool after(const State& state, const std::vector<double>& mass,
-                           const std::function<void(SimulateResult&)>& tell);
+  // After it: what all velocities are to be multiplied by. `tell` gives loads and reactions.
+  [[nodiscard]] double after(const State& state, const std::vector<double>& mass,
+                             const std::function<void(SimulateResult&)>& tell);
   [[nodiscard]] bool done() const { return done_; }
   [[nodiscard]] const SettleSummary& summary() const { return summary_; }
   void report(SimulateResult& result) const;
@@ -40,12 +42,13 @@ class Settling {
 
  private:
   static constexpr std::uint64_t kLook = 20;  // steps between two looks at the residual
-  void look(const State& state, const std::vector<double>& mass, double scale);
+  void look(const std::function<void(SimulateResult&)>& tell);
 
   double ramp_ = 0;                   // s
-  double kinetic_ = 0, largest_ = 0;  // J
+  double kinetic_ = 0, largest_ = 0;  // J: now, ever
   bool done_ = false;
   std::vector<Vec3> velocity_;  // m/s, that the step began with
+  std::vector<Vec3> force_;     // N, (elements), of the last step; empty before the first
   SettleSummary summary_;
 };
 

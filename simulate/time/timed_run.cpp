@@ -212,9 +212,9 @@ void TimedRun::step() {
   if (live_) live_->await(clock_.epoch + static_cast<double>(clock_.in_epoch + 1) * clock_.step);
   if (settling_) settling_->before(act_->state());
   act_->step(clock_, history_.get(), row);
-  if (settling_ && settling_->after(act_->state(), act_->stepper().mass(),
-                                    [&](SimulateResult& told) { act_->tell_forces(told); }))
-    act_->stop();
+  if (settling_)
+    act_->slow(settling_->after(act_->state(), act_->stepper().mass(),
+                                [&](SimulateResult& told) { act_->tell_forces(told); }));
   if (live_) live_->keep_pace(act_->state());
 }
 
