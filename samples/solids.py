@@ -32,6 +32,22 @@ def block(name, x, y, z):
     prism(name, [(x[0], z[0]), (x[1], z[0]), (x[1], z[1]), (x[0], z[1])], y)
 
 
+def bar(name, x, y, z, pieces):
+    """A box in so many pieces along x, so that its surface can bend."""
+    rims = []
+    for i in range(pieces + 1):
+        at = x[0] + (x[1] - x[0]) * i / pieces
+        rims.append([(at, y[0], z[0]), (at, y[1], z[0]), (at, y[1], z[1]), (at, y[0], z[1])])
+    triangles = []
+    for one, two in zip(rims, rims[1:]):
+        for i in range(4):
+            j = (i + 1) % 4
+            triangles += [(one[i], one[j], two[j]), (one[i], two[j], two[i])]
+    first, last = rims[0], rims[-1]
+    triangles += [(first[0], first[2], first[1]), (first[0], first[3], first[2]), (last[0], last[1], last[2]), (last[0], last[2], last[3])]
+    solid(name, triangles)
+
+
 def circle(centre, radius, around=48):
     """Points (x, z), counter-clockwise."""
     turns = [2 * math.pi * i / around for i in range(around)]

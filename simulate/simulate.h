@@ -56,11 +56,11 @@ struct StressSummary {     // of the largest von Mises stress
   std::optional<double> yield_share;  // of the part's material; nothing where it has no `yield`
 };
 
-struct SettleSummary {                 // of equilibrium with contact (simulate/time/settling.h)
-  std::uint64_t steps = 0, stops = 0;  // stops: times that all velocities were set to 0
-  double residual = 0;                 // forces left over, relative to loads and reactions
-  double kinetic = 0;                  // J, left over
-  double tolerance = 0;                // of both; that of the kinetic energy relative to its largest
+struct SettleSummary {  // of equilibrium with contact (simulate/time/settling.h)
+  std::uint64_t steps = 0;
+  double residual = 0;   // forces left over, relative to loads and reactions
+  double kinetic = 0;    // J, left over
+  double tolerance = 0;  // of both; that of the kinetic energy relative to its largest
 };
 
 struct LiveSummary {        // of a run with poses from stdin or --live (docs/live.md)

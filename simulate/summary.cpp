@@ -182,7 +182,6 @@ std::string summary_json(const SimulateResult& result, const Body& body) {
     if (result.timed->live) json["timed"]["live"] = live_json(*result.timed->live);
   } else if (result.settled) {
     json["settled"] = {{"steps", result.settled->steps},
-                       {"stops", result.settled->stops},
                        {"relative_residual", result.settled->residual},
                        {"kinetic_energy", result.settled->kinetic},
                        {"tolerance", result.settled->tolerance}};
@@ -244,12 +243,11 @@ std::vector<std::string> summary_lines(const SimulateResult& result) {
     return lines;
   }
   if (result.settled) {
-    lines.push_back(fmt::format(
-        "at rest after {} steps and {} stops in {:.2f} s: residual {:.1e}, kinetic energy {:.2g} J; elastic "
-        "energy {:.4g} J, smallest J {:.4g}{}",
-        human_count(result.settled->steps), human_count(result.settled->stops), result.seconds,
-        result.settled->residual, result.settled->kinetic, result.elastic_energy, result.smallest_jacobian,
-        corner));
+    lines.push_back(
+        fmt::format("at rest after {} steps in {:.2f} s: residual {:.1e}, kinetic energy {:.2g} J; elastic "
+                    "energy {:.4g} J, smallest J {:.4g}{}",
+                    human_count(result.settled->steps), result.seconds, result.settled->residual,
+                    result.settled->kinetic, result.elastic_energy, result.smallest_jacobian, corner));
     return lines;
   }
   lines.push_back(

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """latency.py [--rate HZ] [--seconds S] [--size MM] [--bin FOLDER]: a scripted hand on a live run.
 
-A plate pats a rubber block on a floor. The hand sends a pose a millisecond (by default) and notes when; a frame tells the last
+A plate pats a block of gel on a floor. The hand sends a pose a millisecond (by default) and notes when; a frame tells the last
 line that the run has taken up. Printed: the time from a pose to the first frame that knows of it (the round trip), the time between
 two frames, late frames, and the force that came back.
 """
@@ -20,7 +20,11 @@ import time
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "samples"))
 from client import Run  # noqa: E402
 
-SCENE = """material = "rubber"
+SCENE = """material = "gel"
+[materials.gel]
+young = "20 kPa"
+poisson = 0.4
+density = "1000 kg/m3"
 [[manipulator]]
 part = "plate"
 path = "stdin"
@@ -30,7 +34,7 @@ friction = 0.3
 point = ["0 mm", "0 mm", "0 mm"]
 normal = [0, 0, 1]
 [damping]
-time = "50 us"
+time = "200 us"
 [run]
 time = "1000 s"
 """
@@ -38,7 +42,7 @@ PART = """import sys
 sys.path.insert(0, sys.argv[1])
 from solids import block
 block("block", (0, 40), (0, 40), (0, 30))
-block("plate", (-5, 45), (-5, 45), (30.2, 35.2))
+block("plate", (-5, 45), (-5, 45), (30.2, 40.2))
 """
 
 

@@ -75,7 +75,8 @@ TEST(PoseLine, TurnsGoOnThroughWholeOnes) {
 }
 
 TEST(LiveTool, KeysAreItsPath) {
-  LiveTool tool{"jaw", true};
+  LiveTool tool;
+  tool.name = "jaw";
   tool.add_key(at(0, Vec3::Zero()), "stdin:1");
   tool.add_key(at(1, Vec3(0, 0, -2)), "stdin:2");
   EXPECT_EQ(tool.path.key(0.25).displacement, Vec3(0, 0, -0.5));
@@ -92,7 +93,8 @@ TEST(LiveTool, KeysAreItsPath) {
 TEST(LiveTool, IsLedWithoutAJump) {
   std::mt19937 random(2);
   std::uniform_real_distribution<double> share(0, 1);
-  LiveTool tool{"jaw", true};
+  LiveTool tool;
+  tool.name = "jaw";
   double now = 0;
   for (int i = 0; i < 1000; ++i) {
     const ManipulatorPath::Key before = tool.path.key(now);
@@ -108,7 +110,7 @@ TEST(LiveTool, IsLedWithoutAJump) {
     EXPECT_EQ(tool.path.key(there).displacement, pose.displacement);
     EXPECT_LT((turned_by(tool.path.key(there).turn) - turned_by(pose.turn)).norm(), 1e-12);
     EXPECT_TRUE(std::is_sorted(tool.path.time.begin(), tool.path.time.end()));
-    EXPECT_LE(tool.path.time.size(), 3u);
+    EXPECT_LE(tool.path.time.size(), 64u);  // those that have passed are forgotten
     now += 0.004 * share(random);
   }
 }
