@@ -41,14 +41,14 @@ Settling::Settling(Scene& scene, const Body& body) {
   for (Load& load : scene.get<Loads>().loads) load.course = grows;
   for (Tie& tie : scene.get<Ties>().ties)
     if (tie.is_move) tie.course = grows;
+  double whole = 0;  // s, until the last tool is there
   for (Manipulator& each : scene.get<RigidParts>().manipulators) {
     if (each.live)
       throw InputError(each.origin, "path = \"stdin\" is for timed runs: give [run] time = \"1 s\"");
-    std::vector<double>& time = each.path.time;
-    if (time.empty()) continue;
-    const double begin = time.front(), whole = time.back() - begin;
-    for (double& key : time) key = whole > 0 ? ramp_ * (key - begin) / whole : 0;
+    if (!each.path.time.empty()) whole = std::max(whole, each.path.time.back());
   }
+  for (Manipulator& each : scene.get<RigidParts>().manipulators)
+    for (double& key : each.path.time) key *= whole > 0 ? ramp_ / whole : 1;
   scene.run.time = ramp_ + kMost * sound;
   summary_.tolerance = scene.run.tolerance_given ? scene.run.tolerance : kTolerance;
 }
