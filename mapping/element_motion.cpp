@@ -5,7 +5,8 @@
 #include <Eigen/LU>
 #include <numeric>
 
-#include "formats/parallel.h"
+#include "formats/bucket.h"
+#include "mapping/blend_kernel.h"
 #include "mapping/search.h"
 
 namespace flexel {
@@ -13,6 +14,8 @@ namespace {
 
 // The moments of three unit edges have the square of their normalised determinant.
 constexpr double kSmallestMoments = kWellConditioned * kWellConditioned;
+
+constexpr std::size_t kElementsAtATime = 1024;
 
 // Sum of e e^T over the edges' directions e.
 Mat3 moments(const Body& body, const Adjacency& connections, std::uint32_t element) {
@@ -28,19 +31,6 @@ Mat3 moments(const Body& body, const Adjacency& connections, std::uint32_t eleme
 bool spans_space(const Mat3& moments) {
   const double mean = moments.trace() / 3;
   return mean > 0 && (moments / mean).determinant() >= kSmallestMoments;
-}
-
-Mat3 least_squares_gradient(const Body& body, const Adjacency& connections, std::uint32_t element,
-                            const Mat3& inverse_moments, const std::vector<Vec3>& position) {
-  const Vec3 own_rest = body.rest[element], own = position[element] - own_rest;
-  Mat3 sum = Mat3::Zero();
-  for (const std::uint32_t other : connections.of(element)) {
-    const Vec3 edge = body.rest[other] - own_rest;
-    const double squared_length = edge.squaredNorm();
-    if (squared_length > 0)
-      sum += (position[other] - body.rest[other] - own) * (edge / squared_length).transpose();
-  }
-  return sum * inverse_moments;
 }
 
 Mat3 frame_gradient(const Body& body, const Frame& frame, const std::vector<Vec3>& position) {
@@ -82,14 +72,22 @@ MovingElements find_moving_elements(const Body& body, const Adjacency& connectio
 
 std::vector<ElementMotion> element_motions(const MovingElements& moving, const Body& body,
                                            const Adjacency& connections, const std::vector<Vec3>& position) {
-  std::vector<ElementMotion> motions(moving.elements.size());
-  parallel_for_each(motions.size(), [&](std::size_t i) {
-    const std::uint32_t element = moving.elements[i];
-    motions[i].displacement = position[element] - body.rest[element];
-    motions[i].gradient =
-        moving.frame[i] != kNoSlot
-            ? frame_gradient(body, moving.frames[moving.frame[i]], position)
-            : least_squares_gradient(body, connections, element, moving.inverse_moments[i], position);
+  const std::size_t n = moving.elements.size();
+  std::vector<ElementMotion> motions;
+  resize_touched(motions, n);
+  std::vector<double> displacement;  // (elements x 4) m
+  resize_touched(displacement, 4 * position.size());
+  parallel_for_each(position.size(), [&](std::size_t e) {
+    for (int axis = 0; axis < 3; ++axis) displacement[4 * e + axis] = position[e][axis] - body.rest[e][axis];
+  });
+  parallel_chunks(n, kElementsAtATime, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      motions[i].displacement = position[moving.elements[i]] - body.rest[moving.elements[i]];
+      if (moving.frame[i] != kNoSlot)
+        motions[i].gradient = frame_gradient(body, moving.frames[moving.frame[i]], position);
+    }
+    fit_gradients(&moving.elements[begin], &moving.frame[begin], end - begin, connections, body.rest.data(),
+                  displacement.data(), &moving.inverse_moments[begin], &motions[begin]);
   });
   return motions;
 }

@@ -1,108 +1,81 @@
 // The weights of the elements' displacements do not depend on the state, but are too many to keep (about 60 a
-// vertex): they are found again for each state, a block of vertices at a time. The normal equations of a
-// vertex are 10 x 10, in spacings about the vertex, so that their condition does not depend on the unit.
+// vertex): they are found again for each state, a block of vertices at a time, eight vertices at once
+// (mapping/smooth_fit.h).
 #include "mapping/smooth.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
-#include <cmath>
+#include <algorithm>
 
 #include "formats/parallel.h"
 #include "mapping/kernel.h"
+#include "mapping/smooth_fit.h"
 
 namespace flexel {
 namespace {
 
-constexpr double kQuadraticRidge = 1e-6, kLinearRidge = 1e-9;
 constexpr std::size_t kBlocksAtATime = 4;
-
-using Terms = Eigen::Matrix<double, 10, 1>;
-using Normal = Eigen::Matrix<double, 10, 10>;
-
-Terms terms(const Vec3& d) {
-  Terms result;
-  result << 1, d.x(), d.y(), d.z(), d.x() * d.x(), d.y() * d.y(), d.z() * d.z(), d.x() * d.y(), d.y() * d.z(),
-      d.z() * d.x();
-  return result;
-}
-
-// An element that a group reaches.
-struct Neighbour {
-  Vec3 at;            // in spacings, from the group's home
-  Vec3 rest;          // m, from the group's first element
-  Vec3 displacement;  // m
-  std::uint8_t from = 0xff;
-};
 
 // How the quadruple of a vertex moves: A(y) = displacement + gradient (y - origin).
 struct FrameField {
-  Vec3 displacement, origin;
-  Mat3 gradient;
+  Vec3 displacement = Vec3::Zero(), origin = Vec3::Zero();
+  Mat3 gradient = Mat3::Zero();
+  [[nodiscard]] Vec3 at(const Vec3& point) const { return displacement + gradient * (point - origin); }
 };
 
+// The displacements of what the group reaches, less `reference` at the group's first element.
 void gather(const Body& body, const Groups& groups, const Group& group, const std::vector<Vec3>& position,
-            std::vector<Neighbour>& neighbours) {
+            const FrameField& reference, std::vector<SmoothNeighbour>& neighbours) {
   neighbours.clear();
   const Vec3& centre = body.rest[groups.elements[group.reach_begin]];
   for (std::uint64_t i = group.reach_begin; i < group.reach_end; ++i) {
     const std::uint32_t e = groups.elements[i];
-    neighbours.push_back({offset(body, group, e), body.rest[e] - centre, position[e] - body.rest[e],
+    neighbours.push_back({offset(body, group, e), body.rest[e] - centre,
+                          position[e] - body.rest[e] - reference.at(body.rest[e]),
                           group.in_cell ? groups.from[i] : std::uint8_t{0xff}});
   }
 }
 
-// Room for the neighbours that one vertex hears.
-struct Heard {
-  std::vector<Terms> terms;
-  std::vector<double> weight;
-  std::vector<std::uint32_t> which;
-  Normal normal;
+// Eight vertices of a group, or what is left of them.
+struct Octet {
+  std::array<std::uint32_t, kSmoothLanes> vertex{};
+  int count = 0;
+  SmoothPoints points{};
+  Vec3 low, high;  // of the points, in spacings
+
+  Octet(const Body& body, const Groups& groups, const Group& group, std::uint32_t begin, std::uint32_t end) {
+    count = static_cast<int>(std::min<std::uint32_t>(end - begin, kSmoothLanes));
+    for (int l = 0; l < kSmoothLanes; ++l) {
+      vertex[l] = groups.vertices[begin + static_cast<std::uint32_t>(std::min(l, count - 1))];
+      const Vec3 point = within(body, group, body.surface.vertices[vertex[l]]);
+      for (int axis = 0; axis < 3; ++axis) points.at[axis][l] = point[axis];
+      const std::array<double, 8> share = shares(group, point);
+      for (std::size_t a = 0; a < 8; ++a) points.share[a][l] = share[a];
+      low = l == 0 ? point : Vec3(low.cwiseMin(point));
+      high = l == 0 ? point : Vec3(high.cwiseMax(point));
+    }
+  }
+
+  // Those of `all` that one of the points may hear.
+  void choose(const std::vector<SmoothNeighbour>& all, std::vector<SmoothNeighbour>& heard) const {
+    heard.clear();
+    for (const SmoothNeighbour& neighbour : all)
+      if ((neighbour.at - neighbour.at.cwiseMax(low).cwiseMin(high)).squaredNorm() <
+          kSmoothRadius * kSmoothRadius)
+        heard.push_back(neighbour);
+  }
 };
 
-void hear(const std::vector<Neighbour>& neighbours, const Vec3& point, const std::array<double, 8>& share,
-          Heard& heard) {
-  heard.terms.clear();
-  heard.weight.clear();
-  heard.which.clear();
-  heard.normal.setZero();
-  for (std::uint32_t i = 0; i < neighbours.size(); ++i) {
-    const Vec3 away = neighbours[i].at - point;
-    const double squared_distance = away.squaredNorm();
-    if (squared_distance >= kSmoothRadius * kSmoothRadius) continue;
-    double weight = wendland(std::sqrt(squared_distance) / kSmoothRadius);
-    if (neighbours[i].from != 0xff) {
-      double sum = 0;
-      for (unsigned a = 0; a < 8; ++a) sum += neighbours[i].from >> a & 1 ? share[a] : 0;
-      weight *= sum;
-    }
-    if (!(weight > 0)) continue;
-    heard.terms.push_back(terms(away));
-    heard.weight.push_back(weight);
-    heard.which.push_back(i);
-    const Terms& t = heard.terms.back();
-    for (Eigen::Index c = 0; c < 10; ++c) heard.normal.col(c) += weight * t[c] * t;
-  }
-}
-
-// The polynomial's constant term is sum_e w_e (coefficients . terms_e) r_e.
-Terms coefficients(Normal normal) {
-  const double scale = normal(0, 0);
-  for (Eigen::Index i = 1; i < 10; ++i) normal(i, i) += (i < 4 ? kLinearRidge : kQuadraticRidge) * scale;
-  return (normal / scale).ldlt().solve(Terms::Unit(0)) / scale;
-}
-
-// Displacement of the vertex at `from_centre` (m, from the group's first element, which rests at `centre`).
-Vec3 evaluate(const std::vector<Neighbour>& neighbours, const Heard& heard, const FrameField& field,
-              const Vec3& centre, const Vec3& from_centre) {
-  const Terms by = coefficients(heard.normal);
-  const Vec3 origin = field.origin - centre;
-  Vec3 left_over = Vec3::Zero();
-  for (std::size_t k = 0; k < heard.which.size(); ++k) {
-    const Neighbour& neighbour = neighbours[heard.which[k]];
-    left_over += heard.weight[k] * by.dot(heard.terms[k]) *
-                 (neighbour.displacement - field.displacement - field.gradient * (neighbour.rest - origin));
-  }
-  return field.displacement + field.gradient * (from_centre - origin) + left_over;
+// Displacement of vertex `l` of the octet, which rests at `vertex`. What is fitted is what its own field
+// leaves over: sum_e c_e (u_e - A(X_e)), with u_e and A less `reference` both.
+Vec3 evaluate(const SmoothFit& fit, int l, const FrameField& field, const FrameField& reference,
+              const Vec3& centre, const Vec3& vertex) {
+  const Vec3 along = field.at(vertex);
+  if (!(fit.weight[l] > 0)) return along;
+  const Vec3 at_centre = field.at(centre) - reference.at(centre);
+  const Mat3 gradient = field.gradient - reference.gradient;
+  const Vec3 rest(fit.rest[0][l], fit.rest[1][l], fit.rest[2][l]);
+  const Vec3 displacement(fit.displacement[0][l], fit.displacement[1][l], fit.displacement[2][l]);
+  return along + displacement - fit.value[l] * at_centre - gradient * rest;
 }
 
 std::vector<FrameField> frame_fields(const Body& body, const std::vector<Frame>& frames,
@@ -124,22 +97,27 @@ std::vector<Vec3> apply_smooth(const Groups& groups, const Body& body, const std
   const std::vector<FrameField> fields = frame_fields(body, frames, position);
   std::vector<Vec3> displacement(groups.vertices.size());
   parallel_chunks(groups.blocks.size(), kBlocksAtATime, [&](std::size_t begin, std::size_t end) {
-    std::vector<Neighbour> neighbours;
-    Heard heard;
+    std::vector<SmoothNeighbour> neighbours, heard;
+    std::vector<double> weights;
+    SmoothFit fit;
     for (std::size_t b = begin; b < end; ++b) {
       const Groups::Block& block = groups.blocks[b];
       const Group& group = groups.groups[block.group];
       const Vec3& centre = body.rest[groups.elements[group.reach_begin]];
-      gather(body, groups, group, position, neighbours);
-      for (std::uint32_t i = block.begin; i < block.end; ++i) {
-        const std::uint32_t v = groups.vertices[i];
-        const Vec3& vertex = body.surface.vertices[v];
-        const Vec3 point = within(body, group, vertex);
-        const FrameField& field = fields[frame_of[v]];
-        hear(neighbours, point, shares(group, point), heard);
-        displacement[v] = heard.which.empty()
-                              ? Vec3(field.displacement + field.gradient * (vertex - field.origin))
-                              : evaluate(neighbours, heard, field, centre, vertex - centre);
+      // The elements of a cell's frames are all heard by its vertices: what did not move is left exactly at
+      // rest.
+      const FrameField reference =
+          group.in_cell ? fields[frame_of[groups.vertices[block.begin]]] : FrameField{};
+      gather(body, groups, group, position, reference, neighbours);
+      for (std::uint32_t i = block.begin; i < block.end; i += kSmoothLanes) {
+        const Octet octet(body, groups, group, i, block.end);
+        octet.choose(neighbours, heard);
+        fit_quadratics(heard.data(), heard.size(), octet.points, weights, fit);
+        for (int l = 0; l < octet.count; ++l) {
+          const std::uint32_t v = octet.vertex[l];
+          displacement[v] =
+              evaluate(fit, l, fields[frame_of[v]], reference, centre, body.surface.vertices[v]);
+        }
       }
     }
   });

@@ -1,0 +1,35 @@
+// The arithmetic of `blended`, many numbers at a time.
+#pragma once
+#include <cstdint>
+
+#include "mapping/element_motion.h"
+
+namespace flexel {
+
+// How far the motion of an element departs from that of its group's first element, seen from that element:
+// displacement, then the gradient by columns.
+struct BlendRow {
+  double value[12];
+};
+
+// (count) `elements`: the group's; `slot_of` leads to their motions.
+void make_blend_rows(const std::uint32_t* elements, std::size_t count, const Vec3* rest,
+                     const std::uint32_t* slot_of, const ElementMotion* motions, BlendRow* rows);
+
+// (vertices) The sums of the rows over the elements that each vertex hears: those that `element` lists from
+// begin[i] to begin[i + 1].
+void sum_blend_rows(const BlendRow* rows, const std::uint32_t* begin, const std::uint16_t* element,
+                    const float* weight, std::size_t vertices, BlendRow* sums);
+
+// (count, a multiple of 16) wendland(|x - point| / kBlendRadius), all in spacings.
+void weigh_elements(const float* x, const float* y, const float* z, std::size_t count, const float* point,
+                    float* weight);
+
+// The least-squares gradients of `count` elements: element[i]'s from the displacements (x, y, z, 0; m) of
+// what it is connected with. `inverse_moments`, `motion`: (count); see mapping/element_motion.h. Elements
+// with a frame (frame[i] other than kNoSlot) are left out.
+void fit_gradients(const std::uint32_t* element, const std::uint32_t* frame, std::size_t count,
+                   const Adjacency& connections, const Vec3* rest, const double* displacement,
+                   const Mat3* inverse_moments, ElementMotion* motion);
+
+}  // namespace flexel

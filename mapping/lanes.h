@@ -1,0 +1,40 @@
+// Eight doubles or sixteen floats at a time by the compiler's vector extension, and functions that are
+// compiled once per instruction set, of which the program takes the best that its machine has. Contraction is
+// off, so the bits are the same on all.
+#pragma once
+
+// No clones under the address sanitizer: it is not ready when their resolvers run.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
+#define FLEXEL_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))
+#else
+#define FLEXEL_CLONES
+#endif
+#define FLEXEL_INLINE inline __attribute__((always_inline))
+
+namespace flexel {
+
+using Lanes = double __attribute__((vector_size(64)));
+constexpr int kLanes = 8;
+using FloatLanes = float __attribute__((vector_size(64)));
+constexpr int kFloatLanes = 16;
+
+FLEXEL_INLINE Lanes square_root(const Lanes& x) {
+  Lanes root;
+  for (int l = 0; l < kLanes; ++l) root[l] = __builtin_sqrt(x[l]);
+  return root;
+}
+
+FLEXEL_INLINE FloatLanes square_root(const FloatLanes& x) {
+  FloatLanes root;
+  for (int l = 0; l < kFloatLanes; ++l) root[l] = __builtin_sqrtf(x[l]);
+  return root;
+}
+
+template <class Vector>
+FLEXEL_INLINE Vector load(const void* from) {
+  Vector value;
+  __builtin_memcpy(&value, from, sizeof value);
+  return value;
+}
+
+}  // namespace flexel
