@@ -6,6 +6,7 @@
 #include "formats/body.h"
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <numeric>
 #include <tuple>
@@ -67,15 +68,40 @@ void for_each_bit_connection(const Body& body, const Part& part, const Pair& pai
   }
 }
 
-// Elements that share a whole cell with `element`, ascending, appended to `neighbours`.
+// Elements that share a whole cell with `element`, ascending, appended to `neighbours`. In each of the 27
+// places around an element there is one element at most, except where pieces branch: `place` finds all that
+// are twice among the cells' corners without sorting.
 void append_cell_neighbours(const Body& body, const Incidence& incidence, std::size_t element,
                             std::vector<std::uint32_t>& neighbours) {
+  constexpr std::uint32_t kNone = 0xffffffffu;
   const std::size_t begin = neighbours.size();
-  for (std::uint64_t at = incidence.offsets[element]; at < incidence.offsets[element + 1]; ++at)
-    for (const std::uint32_t other : body.cell_elements[incidence.cells[at]])
-      if (other != element) neighbours.push_back(other);
-  std::sort(neighbours.begin() + begin, neighbours.end());
-  neighbours.erase(std::unique(neighbours.begin() + begin, neighbours.end()), neighbours.end());
+  std::array<std::uint32_t, 27> place;
+  place.fill(kNone);
+  bool branches = false;
+  for (std::uint64_t at = incidence.offsets[element]; at < incidence.offsets[element + 1]; ++at) {
+    const std::array<std::uint32_t, 8>& corner = body.cell_elements[incidence.cells[at]];
+    // The place of the cell's lowest corner: 13 is the element's own.
+    std::size_t low = 0;
+    while (corner[low] != element) ++low;
+    low = 13 - (low & 1) - 3 * (low >> 1 & 1) - 9 * (low >> 2);
+    for (std::size_t a = 0; a < 8; ++a) {
+      std::uint32_t& there = place[low + (a & 1) + 3 * (a >> 1 & 1) + 9 * (a >> 2)];
+      branches = branches || (there != kNone && there != corner[a]);
+      there = corner[a];
+    }
+  }
+  place[13] = kNone;
+  if (branches)
+    for (std::uint64_t at = incidence.offsets[element]; at < incidence.offsets[element + 1]; ++at)
+      for (const std::uint32_t other : body.cell_elements[incidence.cells[at]])
+        neighbours.push_back(other == element ? kNone : other);
+  else
+    neighbours.insert(neighbours.end(), place.begin(), place.end());
+  const auto own = neighbours.begin() + static_cast<std::ptrdiff_t>(begin);
+  neighbours.erase(std::remove(own, neighbours.end(), kNone), neighbours.end());
+  const auto first = neighbours.begin() + static_cast<std::ptrdiff_t>(begin);
+  if (!std::is_sorted(first, neighbours.end())) std::sort(first, neighbours.end());
+  if (branches) neighbours.erase(std::unique(first, neighbours.end()), neighbours.end());
 }
 
 void check_graph_size(std::uint64_t neighbours) {

@@ -6,6 +6,7 @@
 
 #include "formats/bucket.h"
 #include "mapping/bind.h"
+#include "mapping/frame_kernel.h"
 #include "mapping/smooth.h"
 
 namespace flexel {
@@ -36,9 +37,15 @@ std::vector<Vec3> apply(const Binding& binding, const Body& body, const std::vec
                  element_motions(binding.blend.moving, body, binding.connections, position));
   if (binding.method == MapMethod::smooth)
     return apply_smooth(binding.groups, body, binding.frames, binding.frame, position);
-  std::vector<FrameMotion> motion(binding.frames.size());
-  parallel_for_each(motion.size(), [&](std::size_t f) {
-    motion[f] = quick_motion(binding.frames[f], binding.rest_base[f], body.rest, position, binding.method);
+  constexpr std::size_t kFramesAtATime = 1024;
+  std::vector<FrameMotion> motion;
+  resize_touched(motion, binding.frames.size());
+  parallel_chunks(motion.size(), kFramesAtATime, [&](std::size_t begin, std::size_t end) {
+    move_frames(&binding.frames[begin], end - begin, &binding.rest_base[begin], body.rest.data(),
+                position.data(), binding.method == MapMethod::gram_schmidt, &motion[begin]);
+    for (std::size_t f = begin; f < end; ++f)
+      if (binding.frames[f].kind != FrameKind::full)
+        motion[f] = frame_motion(binding.frames[f], body.rest, position, binding.method);
   });
   std::vector<Vec3> displacement;
   resize_touched(displacement, binding.frame.size());

@@ -9,7 +9,8 @@
 #include <bit>
 #include <cmath>
 
-#include "formats/parallel.h"
+#include "formats/bucket.h"
+#include "mapping/frame_kernel.h"
 #include "mapping/kernel.h"
 #include "mapping/search.h"
 #include "mapping/seat.h"
@@ -57,7 +58,7 @@ void make_frames(const Body& body, const std::vector<Seat>& seats, Binding& bind
   parallel_for_each(seats.size(), [&](std::size_t v) {
     (seats[v].in_cell ? in_cells : at_elements).take(seats[v].owner, seats[v].octant);
   });
-  binding.frames.resize(at_elements.number(in_cells.number(0)));
+  resize_touched(binding.frames, at_elements.number(in_cells.number(0)));
   const std::vector<std::uint32_t> cell_part = cell_parts(body), element_part = element_parts(body);
   in_cells.for_each([&](std::uint32_t cell, int corner, std::uint32_t number) {
     const std::optional<Frame> frame = cell_frame(body, cell, corner);
@@ -71,41 +72,58 @@ void make_frames(const Body& body, const std::vector<Seat>& seats, Binding& bind
     binding.frames[number] =
         find_frame(body, binding.connections, body.parts[element_part[element]], element, octant);
   });
-  binding.frame.resize(seats.size());
+  resize_touched(binding.frame, seats.size());
   parallel_for_each(seats.size(), [&](std::size_t v) {
     binding.frame[v] = (seats[v].in_cell ? in_cells : at_elements).of(seats[v].owner, seats[v].octant);
   });
 }
 
-// Largest values over the vertices.
+// Largest values over the vertices: m^2, and spacings^2 from the origin of its frame.
 struct Extremes {
-  double residual = 0, outside = 0;
+  double squared_residual = 0, squared_outside = 0;
   void operator+=(const Extremes& other) {
-    residual = std::max(residual, other.residual);
-    outside = std::max(outside, other.outside);
+    squared_residual = std::max(squared_residual, other.squared_residual);
+    squared_outside = std::max(squared_outside, other.squared_outside);
   }
 };
 
-void take_coordinates(const Body& body, Binding& binding) {
-  std::vector<Mat3> base(binding.frames.size()), inverse(binding.frames.size());
-  parallel_for_each(binding.frames.size(), [&](std::size_t f) {
-    base[f] = rest_base(binding.frames[f], body.rest, binding.method);
-    inverse[f] = base[f].inverse();
+// (frames) Their bases at rest, as apply() builds them anew in each state.
+std::vector<Mat3> rest_bases(const Body& body, const Binding& binding) {
+  constexpr std::size_t kFramesAtATime = 1024;
+  std::vector<Mat3> base;
+  resize_touched(base, binding.frames.size());
+  parallel_chunks(base.size(), kFramesAtATime, [&](std::size_t begin, std::size_t end) {
+    span_bases(&binding.frames[begin], end - begin, body.rest.data(),
+               binding.method == MapMethod::gram_schmidt, &base[begin]);
+    for (std::size_t f = begin; f < end; ++f)
+      if (binding.frames[f].kind != FrameKind::full)
+        base[f] = rest_base(binding.frames[f], body.rest, binding.method);
   });
+  return base;
+}
+
+void take_coordinates(const Body& body, Binding& binding) {
+  std::vector<Mat3> base = rest_bases(body, binding), inverse;
+  resize_touched(inverse, base.size());
+  parallel_for_each(base.size(), [&](std::size_t f) { inverse[f] = base[f].inverse(); });
+  std::vector<Mat3> to_spacings;  // (parts)
+  for (const Part& part : body.parts)
+    to_spacings.push_back(part.lattice.spacing.cwiseInverse().asDiagonal() * part.lattice.axes.transpose());
+  const std::vector<std::uint32_t> part = element_parts(body);
   const bool keep = binding.method == MapMethod::affine || binding.method == MapMethod::gram_schmidt;
-  if (keep) binding.coordinates.resize(binding.frame.size());
+  if (keep) resize_touched(binding.coordinates, binding.frame.size());
   const Extremes extremes = parallel_sum<Extremes>(binding.frame.size(), [&](std::size_t v) {
     const std::uint32_t f = binding.frame[v], origin = binding.frames[f].elements[0];
     const Vec3& point = body.surface.vertices[v];
-    const Vec3 coordinates = inverse[f] * (point - body.rest[origin]);
+    const Vec3 away = point - body.rest[origin], coordinates = inverse[f] * away;
     if (keep) binding.coordinates[v] = coordinates;
     if (!binding.referenced[v]) return Extremes{};
-    return Extremes{(body.rest[origin] + base[f] * coordinates - point).norm(),
-                    distance_outside(body, binding.frames[f], point)};
+    return Extremes{(body.rest[origin] + base[f] * coordinates - point).squaredNorm(),
+                    (to_spacings[part[origin]] * away).squaredNorm()};
   });
   if (keep) binding.rest_base = std::move(base);
-  binding.rest_residual = extremes.residual;
-  binding.distance_outside = extremes.outside;
+  binding.rest_residual = std::sqrt(extremes.squared_residual);
+  binding.distance_outside = std::max(0.0, std::sqrt(extremes.squared_outside) - kHalfDiagonal);
 }
 
 }  // namespace

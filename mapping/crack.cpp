@@ -11,7 +11,6 @@
 #include "formats/error.h"
 #include "formats/program.h"
 #include "formats/topology.h"
-#include "mapping/bind.h"
 #include "mapping/crack_pieces.h"
 
 namespace flexel {
@@ -237,7 +236,8 @@ bool may_be_broken(const Body& body) {
   return centre || std::find(body.broken.begin(), body.broken.end(), 1) != body.broken.end();
 }
 
-MappedPart map_part(Body& body, const MapOptions& options, const CrackOptions& crack, Progress& progress) {
+MappedPart map_part(Body& body, const MapOptions& options, const CrackOptions& crack, Progress& progress,
+                    const Binding* known) {
   MappedPart mapped;
   warn_of_carved(body.surface, progress);
   std::optional<Fragments> fragments;
@@ -253,7 +253,12 @@ MappedPart map_part(Body& body, const MapOptions& options, const CrackOptions& c
     map_pieces(body, *fragments, options, crack.mode, mapped, progress);
     mapped.report.crack.pieces = mapped.cracked->pieces;
   } else {
-    mapped.result = map_surface(body, options, progress);
+    if (known) {
+      mapped.result = map_state(*known, body);
+      complete(body, options, mapped.result);
+    } else {
+      mapped.result = map_surface(body, options, progress);
+    }
     mapped.report = report(body, mapped.result);
     if (parted > 0)
       mapped.report.crack.spanning_triangles = spanning_triangles(body, mapped.result, *fragments);

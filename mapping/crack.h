@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "formats/surface_file.h"
+#include "mapping/bind.h"
 #include "mapping/crack_report.h"
 #include "mapping/fragments.h"
 #include "mapping/map.h"
@@ -57,8 +58,9 @@ struct MappedPart {
 [[nodiscard]] bool may_be_broken(const Body& body);
 
 // Maps the deformed state of `body` onto its surface, parted as `crack` says, and reports on it. While it
-// works the body holds the parted surface; it gets its own back. Throws as part_surface() and map_surface().
+// works the body holds the parted surface; it gets its own back. `known`: the binding of a surface that stays
+// whole (CrackMode::keep), where there is one. Throws as part_surface() and map_surface().
 [[nodiscard]] MappedPart map_part(Body& body, const MapOptions& options, const CrackOptions& crack,
-                                  Progress& progress);
+                                  Progress& progress, const Binding* known = nullptr);
 
 }  // namespace flexel

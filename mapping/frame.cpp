@@ -141,20 +141,7 @@ double distance_outside(const Body& body, const Frame& frame, const Vec3& point)
                        [](std::uint32_t element, const Part& p) { return element < p.element_end; });
   const Lattice& lattice = part->lattice;
   return (lattice.axes.transpose() * (point - body.rest[origin])).cwiseQuotient(lattice.spacing).norm() -
-         std::sqrt(0.75);
-}
-
-FrameMotion quick_motion(const Frame& frame, const Mat3& rest_base, const std::vector<Vec3>& rest,
-                         const std::vector<Vec3>& position, MapMethod method) {
-  if (frame.kind != FrameKind::full) return frame_motion(frame, rest, position, method);
-  FrameMotion motion;
-  motion.translation = position[frame.elements[0]] - rest[frame.elements[0]];
-  const Mat3 edge = edges(frame, position);
-  const double determinant = edge.determinant();
-  const double lengths = edge.col(0).squaredNorm() * edge.col(1).squaredNorm() * edge.col(2).squaredNorm();
-  if (determinant * determinant < kDegenerate * kDegenerate * lengths || lengths == 0) return motion;
-  motion.change = (method == MapMethod::gram_schmidt ? gram_schmidt(edge) : edge) - rest_base;
-  return motion;
+         kHalfDiagonal;
 }
 
 }  // namespace flexel

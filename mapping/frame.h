@@ -38,13 +38,9 @@ struct FrameMotion {
                                                       const std::vector<Vec3>& rest,
                                                       const std::vector<Vec3>& position);
 
+// Half a voxel's diagonal, in spacings.
+constexpr double kHalfDiagonal = 0.86602540378443864676;
 // Distance in spacings of `point` from the frame's origin at rest, less half a voxel's diagonal.
 [[nodiscard]] double distance_outside(const Body& body, const Frame& frame, const Vec3& point);
-
-// frame_motion() without flags, for a frame whose base at rest is known: what a state costs when many are
-// mapped.
-[[nodiscard]] FrameMotion quick_motion(const Frame& frame, const Mat3& rest_base,
-                                       const std::vector<Vec3>& rest, const std::vector<Vec3>& position,
-                                       MapMethod method);
 
 }  // namespace flexel

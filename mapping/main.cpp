@@ -6,7 +6,7 @@
 #include "formats/parallel.h"
 #include "formats/program.h"
 #include "formats/units.h"
-#include "mapping/bind.h"
+#include "mapping/binding_file.h"
 #include "mapping/crack.h"
 #include "mapping/foreign.h"
 #include "mapping/options.h"
@@ -19,7 +19,7 @@ namespace {
 constexpr const char* kProgram = "flexel-map";
 
 struct Arguments {
-  std::string body = "-", output, unit, onto, points, far;
+  std::string body = "-", output, unit, onto, points, far, binding, save_binding;
   double far_distance = 3;
   MapArguments map;
   bool quiet = false;
@@ -43,6 +43,12 @@ void declare(CLI::App& app, Arguments& arguments) {
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   declare_map_options(app, arguments.map);
+  app.add_option("--save-binding", arguments.save_binding,
+                 "affine, gram-schmidt: write what ties the vertices to the elements, for --binding")
+      ->type_name("FILE");
+  app.add_option("--binding", arguments.binding,
+                 "Take the binding of this file, made for the same lattice and surface, and its method")
+      ->type_name("FILE");
   app.add_option("--unit", arguments.unit, "Unit of the coordinates written; else that of the input")
       ->type_name("UNIT");
   app.add_option("--threads", arguments.threads, "Threads; 0 is every core")->check(CLI::NonNegativeNumber);
@@ -77,6 +83,20 @@ void check_pieces(const Arguments& arguments, const Plan& plan, bool own_surface
     throw InputError("GLB has a unit of its own: leave out --unit");
 }
 
+void check_binding(const Arguments& arguments, const Plan& plan) {
+  if (arguments.binding.empty() && arguments.save_binding.empty()) return;
+  if (!arguments.binding.empty() && !arguments.save_binding.empty())
+    throw InputError(
+        "--binding and --save-binding exclude each other: a saved binding need not be saved again");
+  if (plan.crack.mode != CrackMode::keep)
+    throw InputError("--binding and --save-binding are for a surface that stays whole: leave out --crack");
+  if (arguments.binding.empty() && plan.options.method != MapMethod::affine &&
+      plan.options.method != MapMethod::gram_schmidt)
+    throw InputError(
+        fmt::format("--save-binding: {} has no binding to keep: add --method affine or gram-schmidt",
+                    name_of(plan.options.method)));
+}
+
 Plan make_plan(Arguments& arguments) {
   Plan plan;
   plan.options = map_options(arguments.map);
@@ -88,6 +108,7 @@ Plan make_plan(Arguments& arguments) {
   plan.series = extension(arguments.body) == "pvd";
   plan.crack = crack_options(arguments.map);
   check_pieces(arguments, plan, !foreign);
+  check_binding(arguments, plan);
   if (arguments.output.empty() && arguments.map.pieces.empty()) arguments.output = "-";
   if (!arguments.onto.empty() && !arguments.points.empty())
     throw InputError("--onto and --points exclude each other: give one of them");
@@ -171,19 +192,37 @@ class Run {
   std::size_t frame_ = 0;
 };
 
-void map_one(const Arguments& arguments, const Plan& plan, Progress& progress) {
+// The binding that the arguments name: read, with its method, or made and saved. Nothing where they name
+// none.
+std::optional<Binding> own_binding(const Arguments& arguments, const Body& body, MapOptions& options) {
+  std::optional<Binding> binding;
+  if (!arguments.binding.empty()) {
+    binding = read_binding(arguments.binding, body);
+    if (!arguments.map.method.empty() && binding->method != options.method)
+      throw InputError(arguments.binding, fmt::format("is a binding of method {}, not {}: leave out --method",
+                                                      name_of(binding->method), name_of(options.method)));
+    options.method = binding->method;
+  } else if (!arguments.save_binding.empty()) {
+    binding = bind(body, options.method);
+    write_binding(*binding, body, arguments.save_binding);
+  }
+  return binding;
+}
+
+void map_one(const Arguments& arguments, Plan& plan, Progress& progress) {
   Run run(arguments, plan, progress);
   progress.stage("read");
   Body body = read_body(arguments.body);
   run.take_surface(body);
   progress.stage("map");
-  const MappedPart mapped = map_part(body, plan.options, plan.crack, progress);
+  const std::optional<Binding> known = own_binding(arguments, body, plan.options);
+  const MappedPart mapped = map_part(body, plan.options, plan.crack, progress, known ? &*known : nullptr);
   run.finish(mapped.surface(body), body, mapped.result, mapped.report, arguments.output);
 }
 
 // Frames share one binding until the lattice changes (something was cut off) or breaks; only the first frame
 // holds the surface.
-void map_series(const Arguments& arguments, const Plan& plan, Progress& progress) {
+void map_series(const Arguments& arguments, Plan& plan, Progress& progress) {
   Run run(arguments, plan, progress);
   const std::vector<std::string> files = series_files(arguments.body);
   Body body;
@@ -194,6 +233,7 @@ void map_series(const Arguments& arguments, const Plan& plan, Progress& progress
     Body next = read_body(files[f]);
     if (f == 0) {
       run.take_surface(next);
+      binding = own_binding(arguments, next, plan.options);
     } else {
       if (next.parts.size() != body.parts.size())
         throw InputError(files[f], "has other parts than the first frame: map it with its own surface");
@@ -225,7 +265,7 @@ int run(int argc, char** argv) {
   CLI::App app{"Maps the deformation of a body onto the surface that it was made from.", kProgram};
   declare(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
-  const Plan plan = make_plan(arguments);
+  Plan plan = make_plan(arguments);
   const ThreadLimit limit(arguments.threads);
   Progress progress(kProgram, arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
   plan.series ? map_series(arguments, plan, progress) : map_one(arguments, plan, progress);

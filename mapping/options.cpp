@@ -36,7 +36,7 @@ void declare_map_options(CLI::App& app, MapArguments& arguments) {
   app.add_option("--method", arguments.method,
                  "How elements carry the vertices: blended, smooth, affine or gram-schmidt (the paper's)")
       ->type_name("NAME")
-      ->capture_default_str();
+      ->default_str("blended");
   app.add_option("--check", arguments.checks,
                  "Also check the mapped surface: voronoi, self-intersection, or both with a comma")
       ->type_name("NAMES");
@@ -68,7 +68,7 @@ void declare_map_options(CLI::App& app, MapArguments& arguments) {
 
 MapOptions map_options(const MapArguments& arguments) {
   MapOptions options;
-  options.method = map_method(arguments.method);
+  if (!arguments.method.empty()) options.method = map_method(arguments.method);
   if (!arguments.checks.empty()) add_checks(options, arguments.checks);
   return options;
 }

@@ -6,7 +6,8 @@
 namespace flexel {
 
 struct MapArguments {
-  std::string method = "blended", checks, crack = "keep", debris = "keep", pieces, report, format;
+  std::string method;  // "": blended
+  std::string checks, crack = "keep", debris = "keep", pieces, report, format;
   double scale = 1;
   bool attributes = false, table = false, ascii = false, strict = false;
 };

@@ -1,13 +1,15 @@
 // Nearly every vertex lies inside the voxel of a cell that its first polygon bounds: that is found first,
-// without a table of the polygons around each vertex. The rest (matter too thin for a cell of its own, so
-// that it hangs on a neighbour) looks through the cells of all polygons around it for the nearest; what finds
-// no cell at all takes the nearest element of its part.
+// without a table of the polygons around each vertex. The rest (on the face between two voxels, or of matter
+// too thin for a cell of its own, so that it hangs on a neighbour) looks through the cells of all polygons
+// around it for the nearest, so that the order of the polygons does not matter; what finds no cell at all
+// takes the nearest element of its part.
 //
 // Vertices at one position in one part (an OBJ has them along texture seams) have one representative, which
 // alone is seated.
 #include "mapping/seat.h"
 
 #include <algorithm>
+#include <atomic>
 #include <limits>
 #include <memory>
 
@@ -29,37 +31,61 @@ struct Corners {
 };
 
 Corners corners_of(const Surface& surface) {
+  constexpr std::size_t kGrain = 1 << 14;
   Corners corners;
-  corners.first_polygon.assign(surface.vertices.size(), kNone);
-  for (std::size_t p = surface.polygon_count(); p-- > 0;)
-    for (const std::uint32_t v : surface.polygon(p)) corners.first_polygon[v] = static_cast<std::uint32_t>(p);
+  resize_touched(corners.first_polygon, surface.vertices.size());
+  std::fill(corners.first_polygon.begin(), corners.first_polygon.end(), kNone);
+  parallel_chunks(surface.polygon_count(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p < end; ++p)
+      for (const std::uint32_t v : surface.polygon(p)) {
+        const std::atomic_ref<std::uint32_t> first(corners.first_polygon[v]);
+        std::uint32_t known = first.load(std::memory_order_relaxed);
+        while (p < known && !first.compare_exchange_weak(known, static_cast<std::uint32_t>(p),
+                                                         std::memory_order_relaxed)) {
+        }
+      }
+  });
   corners.representative = weld(surface.vertices);
   // A representative that is unused, or of another part, cannot speak for the vertex; the vertex then speaks
   // for itself.
-  for (std::size_t v = 0; v < surface.vertices.size(); ++v) {
-    const std::uint32_t mine = corners.first_polygon[v],
-                        other = corners.first_polygon[corners.representative[v]];
+  parallel_for_each(surface.vertices.size(), [&](std::size_t v) {
+    std::uint32_t& representative = corners.representative[v];
+    if (representative == v) return;
+    const std::uint32_t mine = corners.first_polygon[v], other = corners.first_polygon[representative];
     if (mine == kNone || other == kNone || surface.polygon_part(mine) != surface.polygon_part(other))
-      corners.representative[v] = static_cast<std::uint32_t>(v);
-  }
+      representative = static_cast<std::uint32_t>(v);
+  });
   return corners;
 }
 
-// The nearest voxel so far.
+// The nearest voxel so far; of those equally near, the cell of lowest number.
 struct Home {
   double squared_distance = kFar;  // m^2, 0 inside
+  bool on_face = false;            // inside, but another voxel may hold the point as well
   Seat seat;
+  [[nodiscard]] bool certain() const { return squared_distance == 0 && !on_face; }
 };
+
+// Parts are modelled in round numbers and lattices snapped to them: vertices lie on the faces of voxels and
+// half-way between elements. What is closer than this to such a place, in spacings, counts as on it, so that
+// rounding (another unit, a turned part) decides nothing.
+constexpr double kTie = 1e-9;
 
 // Compares `cell` with the nearest so far; `u` is a point in lattice coordinates.
 void consider(const Body& body, std::uint32_t cell, const Vec3& u, const Vec3& spacing, Home& home) {
   const Index3& index = body.lattice_index[body.cell_elements[cell][0]];
   const Vec3 within = u - Vec3(index[0], index[1], index[2]);
   const Vec3 clamped = within.cwiseMax(Vec3::Zero()).cwiseMin(Vec3::Ones());
-  const double squared_distance = (within - clamped).cwiseProduct(spacing).squaredNorm();
-  if (squared_distance >= home.squared_distance) return;
-  const int corner = (within.x() >= 0.5 ? 1 : 0) + (within.y() >= 0.5 ? 2 : 0) + (within.z() >= 0.5 ? 4 : 0);
-  home = {squared_distance, {cell, true, static_cast<std::uint8_t>(corner)}};
+  const bool inside = (within - clamped).cwiseAbs().maxCoeff() < kTie;
+  const double squared_distance = inside ? 0 : (within - clamped).cwiseProduct(spacing).squaredNorm();
+  const bool nearer = squared_distance < (1 - kTie) * home.squared_distance;
+  const bool tie = squared_distance <= (1 + kTie) * home.squared_distance && cell < home.seat.owner;
+  if (!nearer && !tie) return;
+  const bool on_face = inside && within.cwiseMin(Vec3::Ones() - within).minCoeff() < kTie;
+  constexpr double kHalf = 0.5 - kTie;
+  const int corner =
+      (within.x() >= kHalf ? 1 : 0) + (within.y() >= kHalf ? 2 : 0) + (within.z() >= kHalf ? 4 : 0);
+  home = {squared_distance, on_face, {cell, true, static_cast<std::uint8_t>(corner)}};
 }
 
 // Beyond this many cells under a polygon a search by bisection is faster than looking at each.
@@ -71,9 +97,11 @@ void look_under(const Body& body, std::size_t p, const Vec3& point, Home& home) 
   const std::uint32_t begin = body.surface_cell_offsets[p], end = body.surface_cell_offsets[p + 1];
   const Lattice& lattice = body.parts[body.surface.polygon_part(p)].lattice;
   const Vec3 u = lattice.to_lattice(point);
-  if (end - begin > kManyCells)
-    return consider(body, locate_on_surface(body, p, point)->cell, u, lattice.spacing, home);
-  for (std::uint32_t s = begin; s < end && home.squared_distance > 0; ++s)
+  if (end - begin > kManyCells) {
+    consider(body, locate_on_surface(body, p, point)->cell, u, lattice.spacing, home);
+    if (!home.on_face) return;
+  }
+  for (std::uint32_t s = begin; s < end && !home.certain(); ++s)
     consider(body, body.surface_cells[s], u, lattice.spacing, home);
 }
 
@@ -126,9 +154,9 @@ class Seating {
   explicit Seating(const Body& body)
       : body_(body), corners_(corners_of(body.surface)), grids_(body.parts.size()) {
     const std::size_t n = body.surface.vertices.size();
-    seats_.seat.resize(n);
-    seats_.referenced.resize(n);
-    squared_distance_.assign(n, kFar);
+    resize_touched(seats_.seat, n);
+    resize_touched(seats_.referenced, n);
+    resize_touched(certain_, n);
   }
 
   Seats take() {
@@ -149,17 +177,18 @@ class Seating {
 
   void seat_under_first_polygon() {
     parallel_for_each(seats_.seat.size(), [&](std::size_t v) {
+      certain_[v] = 0;
       if (corners_.first_polygon[v] == kNone || corners_.representative[v] != v) return;
       const Home home = look(static_cast<std::uint32_t>(v), corners_.first_polygon[v], {});
       seats_.seat[v] = home.seat;
-      squared_distance_[v] = home.squared_distance;
+      certain_[v] = home.certain();
     });
   }
 
   void seat_remaining() {
     std::vector<std::uint32_t> remaining;
     for (std::uint32_t v = 0; v < seats_.seat.size(); ++v)
-      if (corners_.representative[v] == v && squared_distance_[v] > 0) remaining.push_back(v);
+      if (corners_.representative[v] == v && !certain_[v]) remaining.push_back(v);
     if (remaining.empty()) return;
     const Around around =
         body_.surface_cells.empty() ? Around{} : polygons_around(body_.surface, corners_, remaining);
@@ -178,8 +207,7 @@ class Seating {
     Home home;
     if (around.slot.empty()) return home;
     const std::uint32_t slot = around.slot[v];
-    for (std::uint32_t i = around.offsets[slot]; i < around.offsets[slot + 1] && home.squared_distance > 0;
-         ++i)
+    for (std::uint32_t i = around.offsets[slot]; i < around.offsets[slot + 1] && !home.certain(); ++i)
       home = look(v, around.polygons[i], home);
     return home;
   }
@@ -233,14 +261,15 @@ class Seating {
   Corners corners_;
   std::vector<std::unique_ptr<ElementGrid>> grids_;  // (parts)
   Buckets<std::uint32_t> cells_of_;                  // (elements) cells around each, where grids are needed
-  std::vector<double> squared_distance_;             // (vertices) m^2, to the voxel of the seat
+  std::vector<std::uint8_t> certain_;                // (vertices) 1: its first polygon has settled its seat
   Seats seats_;
 };
 
 }  // namespace
 
 Seat seat_at_element(const Body& body, std::uint32_t part, std::uint32_t element, const Vec3& point) {
-  const Vec3 offset = body.parts[part].lattice.axes.transpose() * (point - body.rest[element]);
+  const Lattice& lattice = body.parts[part].lattice;
+  const Vec3 offset = lattice.axes.transpose() * (point - body.rest[element]) + kTie * lattice.spacing;
   const int octant = (offset.x() >= 0 ? 1 : 0) + (offset.y() >= 0 ? 2 : 0) + (offset.z() >= 0 ? 4 : 0);
   return {element, false, static_cast<std::uint8_t>(octant)};
 }

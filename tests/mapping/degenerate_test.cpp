@@ -107,6 +107,35 @@ TEST(Degenerate, TheUnitDoesNotMatter) {
   }
 }
 
+// A block whose surface lies on the faces of its voxels, half of its vertices half-way between elements.
+TEST(Degenerate, TheOrderOfThePolygonsDoesNotMatter) {
+  Lattice lattice;
+  lattice.spacing = Vec3::Constant(0.1);
+  Body body = test::make_body(
+      lattice, {0, 0, 0}, {6, 4, 4}, [](const Vec3&) { return true; }, Placement::corner);
+  test::add_box_surface(body, Vec3::Zero(), Vec3(0.6, 0.4, 0.4), 8);
+  Body backwards = body;
+  Surface& surface = backwards.surface;
+  surface.polygon_offsets = {0};
+  surface.polygon_vertices.clear();
+  backwards.surface_cell_offsets = {0};
+  backwards.surface_cells.clear();
+  for (std::size_t p = body.surface.polygon_count(); p-- > 0;) {
+    for (const std::uint32_t v : body.surface.polygon(p)) surface.polygon_vertices.push_back(v);
+    surface.polygon_offsets.push_back(static_cast<std::uint32_t>(surface.polygon_vertices.size()));
+    for (std::uint32_t s = body.surface_cell_offsets[p]; s < body.surface_cell_offsets[p + 1]; ++s)
+      backwards.surface_cells.push_back(body.surface_cells[s]);
+    backwards.surface_cell_offsets.push_back(static_cast<std::uint32_t>(backwards.surface_cells.size()));
+  }
+  const auto field = [](const Vec3& x) -> Vec3 {
+    return x + Vec3(x.y() * x.z(), x.x() * x.x(), -x.x() * x.y());
+  };
+  test::deform(body, field);
+  test::deform(backwards, field);
+  for (const MapMethod method : test::kEveryMethod)
+    EXPECT_EQ(map(body, {method}).displacement, map(backwards, {method}).displacement) << name_of(method);
+}
+
 TEST(FarVertices, AreFollowedTurnedOrRefused) {
   Body body = test::block(4, 4, 4, 0.1, Placement::corner, 2);
   const auto far = static_cast<std::uint32_t>(body.surface.vertices.size());

@@ -1,10 +1,12 @@
-// Real parts through import, lattice and mapping: nothing is lost, nothing moves by itself, imposed motions
-// are followed.
+// Every real part through import, lattice and mapping: nothing is lost, nothing moves by itself, imposed
+// motions are followed, units do not matter. A part is read and voxelised once for all of that.
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <set>
 
 #include "bodies.h"
+#include "formats/error.h"
 #include "formats/import.h"
 #include "mapping/map.h"
 #include "motions.h"
@@ -18,99 +20,156 @@ Progress& silent() {
   return progress;
 }
 
-class RealPart : public testing::TestWithParam<const char*> {
+// Sanitizers make all of this twenty times as slow: there the lattice is coarser, and of many polygons only
+// some are mapped.
+#ifdef __SANITIZE_ADDRESS__
+constexpr std::size_t kCells = 300, kMostVertices = 3000;
+#else
+constexpr std::size_t kCells = 1500, kMostVertices = 20'000;
+#endif
+
+const std::filesystem::path kFolder = FLEXEL_PARTS_DIR;
+
+// Two sheets, which enclose nothing: the one part that cannot be voxelised.
+const std::string kRefused = "planar-geom-03.stl";
+
+// The meshes and solids of the folder; one that is not there where the folder is absent.
+std::vector<std::string> parts() {
+  const std::set<std::string> known = {".step", ".stl", ".obj", ".ply", ".off", ".glb", ".3mf"};
+  std::set<std::string> names;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(kFolder, error)) {
+    std::string ending = entry.path().extension().string();
+    for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    if (known.count(ending)) names.insert(entry.path().filename().string());
+  }
+  if (names.empty()) names.insert("absent.step");
+  return {names.begin(), names.end()};
+}
+
+// Keeps every n-th polygon, so that at most `most` vertices are used, and says so.
+void thin_out(Body& body, std::size_t most) {
+  Surface& surface = body.surface;
+  const std::size_t step = (surface.vertices.size() + most - 1) / most;
+  if (step <= 1) return;
+  std::vector<Vec3> vertices;
+  std::vector<std::uint32_t> offsets{0}, corners, faces, cell_offsets{0}, cells;
+  for (std::size_t p = 0; p < surface.polygon_count(); p += step) {
+    for (const std::uint32_t v : surface.polygon(p)) {
+      corners.push_back(static_cast<std::uint32_t>(vertices.size()));
+      vertices.push_back(surface.vertices[v]);
+    }
+    offsets.push_back(static_cast<std::uint32_t>(corners.size()));
+    faces.push_back(surface.polygon_face[p]);
+    for (std::uint32_t s = body.surface_cell_offsets[p]; s < body.surface_cell_offsets[p + 1]; ++s)
+      cells.push_back(body.surface_cells[s]);
+    cell_offsets.push_back(static_cast<std::uint32_t>(cells.size()));
+  }
+  std::printf("1 of %zu of the %zu polygons is mapped\n", step, surface.polygon_count());
+  surface.vertices = std::move(vertices);
+  surface.polygon_offsets = std::move(offsets);
+  surface.polygon_vertices = std::move(corners);
+  surface.polygon_face = std::move(faces);
+  surface.vertex_columns.clear();
+  surface.polygon_columns.clear();
+  body.surface_cell_offsets = std::move(cell_offsets);
+  body.surface_cells = std::move(cells);
+}
+
+class RealPart : public testing::TestWithParam<std::string> {
  protected:
   void SetUp() override {
-    const std::filesystem::path path = std::filesystem::path(FLEXEL_PARTS_DIR) / GetParam();
+    const std::filesystem::path path = kFolder / GetParam();
     if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is not here";
     VoxelizeOptions options;
-    options.count = 6000;
-    body_ = voxelize(import_surface(path.string()), options, silent()).body;
+    options.count = kCells;
+    try {
+      body_ = voxelize(import_surface(path.string()), options, silent()).body;
+    } catch (const InputError& error) {
+      ASSERT_EQ(GetParam(), kRefused) << error.what();
+      GTEST_SKIP() << error.what();
+    }
+    thin_out(body_, kMostVertices);
     diagonal_ = bounding_box(body_.surface.vertices).diagonal();
   }
+
+  // Over the diagonal.
   double largest_error(MapMethod method, const test::Field& field) {
     test::deform(body_, field);
     const MapResult result = map_surface(body_, {method}, silent());
-    const MapReport found = report(body_, result);
-    EXPECT_TRUE(found.valid());
-    left_ = found.voronoi_cell_left;
-    double largest = 0;
-    for (std::size_t v = 0; v < body_.surface.vertices.size(); ++v) {
-      const Vec3& x = body_.surface.vertices[v];
-      largest = std::max(largest, (x + result.displacement[v] - field(x)).norm());
+    left_ = 0;
+    for (const std::uint8_t flags : result.flags) {
+      EXPECT_EQ(flags & ~kVoronoiCellLeft, 0);
+      left_ += flags != 0;
     }
-    return largest / diagonal_;
+    return test::largest_error(body_, result.displacement, field) / diagonal_;
   }
+
+  void stays_at_rest_and_follows_imposed_motions() {
+    const Mat3 turn = test::rotation(2.1, Vec3(1, -2, 0.5));
+    const Vec3 move(0.1, 0.2, -0.3);
+    const Mat3 stretch = (Mat3() << 1.02, 0.01, 0, -0.01, 0.99, 0.005, 0, 0.01, 1.01).finished();
+    for (const MapMethod method : test::kEveryMethod) {
+      EXPECT_EQ(largest_error(method, [](const Vec3& x) { return x; }), 0);
+      EXPECT_LT(largest_error(method, [&](const Vec3& x) -> Vec3 { return turn * x + move; }), 1e-9);
+      EXPECT_EQ(left_, 0u);
+      if (method == MapMethod::gram_schmidt) continue;
+      EXPECT_LT(largest_error(method, [&](const Vec3& x) -> Vec3 { return turn * (stretch * x) + move; }),
+                1e-9)
+          << name_of(method);
+    }
+  }
+
+  // In inches, and a thousand times as large.
+  void is_the_same_in_another_unit() {
+    const double bend = 1 / diagonal_;
+    test::deform(body_, [&](const Vec3& x) -> Vec3 {
+      return x + Vec3(0.2 * bend * x.y() * x.z(), 0.3 * bend * x.x() * x.x(), -0.1 * bend * x.x() * x.y());
+    });
+    for (const double scale : {1 / 0.0254, 1e3}) {
+      Body other = body_;
+      for (Part& part : other.parts) {
+        part.lattice.origin *= scale;
+        part.lattice.spacing *= scale;
+      }
+      for (auto* points : {&other.rest, &other.position, &other.surface.vertices})
+        for (Vec3& x : *points) x *= scale;
+      for (const MapMethod method : test::kEveryMethod) {
+        const MapResult one = map_surface(body_, {method}, silent()),
+                        two = map_surface(other, {method}, silent());
+        double largest = 0;
+        for (std::size_t v = 0; v < one.displacement.size(); ++v)
+          largest = std::max(largest, (two.displacement[v] / scale - one.displacement[v]).norm());
+        EXPECT_LT(largest, 1e-9 * diagonal_) << scale << ", " << name_of(method);
+      }
+    }
+  }
+
+  void has_four_elements_for_every_vertex() {
+    const MapReport found = report(body_, map_surface(body_, {}, silent()));
+    EXPECT_EQ(found.kinds[0], found.vertices);
+    EXPECT_LT(found.rest_residual, 1e-12 * diagonal_);
+    // A vertex whose matter was too little for a cell hangs on the cell beside it.
+    EXPECT_LT(found.distance_outside, 1);
+  }
+
   Body body_;
   double diagonal_ = 0;
   std::size_t left_ = 0;  // vertices that left their Voronoi cell in the last motion
 };
 
-TEST_P(RealPart, StaysAtRestAndFollowsImposedMotions) {
-  const Mat3 turn = test::rotation(2.1, Vec3(1, -2, 0.5));
-  const Vec3 move(0.1, 0.2, -0.3);
-  for (const MapMethod method : test::kEveryMethod) {
-    EXPECT_EQ(largest_error(method, [](const Vec3& x) { return x; }), 0);
-    EXPECT_LT(largest_error(method, [&](const Vec3& x) -> Vec3 { return turn * x + move; }), 1e-9);
-    EXPECT_EQ(left_, 0u);
-  }
-  const Mat3 stretch = (Mat3() << 1.02, 0.01, 0, -0.01, 0.99, 0.005, 0, 0.01, 1.01).finished();
-  for (const MapMethod method : {MapMethod::affine, MapMethod::blended, MapMethod::smooth})
-    EXPECT_LT(largest_error(method, [&](const Vec3& x) -> Vec3 { return turn * (stretch * x) + move; }),
-              1e-9);
+TEST_P(RealPart, IsMapped) {
+  stays_at_rest_and_follows_imposed_motions();
+  is_the_same_in_another_unit();
+  has_four_elements_for_every_vertex();
 }
 
-// In another unit, and a thousand times as large. affine and gram-schmidt jump where the octant of a vertex
-// changes, and a vertex half-way between two elements can go either way by rounding: they are measured where
-// there are no such (Degenerate.TheUnitDoesNotMatter).
-TEST_P(RealPart, IsTheSameInAnotherUnit) {
-  const double bend = 1 / diagonal_;
-  test::deform(body_, [&](const Vec3& x) -> Vec3 {
-    return x + Vec3(0.2 * bend * x.y() * x.z(), 0.3 * bend * x.x() * x.x(), -0.1 * bend * x.x() * x.y());
-  });
-  for (const double scale : {1 / 0.0254, 1e3}) {
-    Body other = body_;
-    for (Part& part : other.parts) {
-      part.lattice.origin *= scale;
-      part.lattice.spacing *= scale;
-    }
-    for (auto* points : {&other.rest, &other.position, &other.surface.vertices})
-      for (Vec3& x : *points) x *= scale;
-    for (const MapMethod method : {MapMethod::blended, MapMethod::smooth}) {
-      const MapResult one = map_surface(body_, {method}, silent()),
-                      two = map_surface(other, {method}, silent());
-      double largest = 0;
-      for (std::size_t v = 0; v < one.displacement.size(); ++v)
-        largest = std::max(largest, (two.displacement[v] / scale - one.displacement[v]).norm());
-      EXPECT_LT(largest, 1e-9 * diagonal_) << scale << ", " << name_of(method);
-    }
-  }
-}
-
-TEST_P(RealPart, HasFourElementsForEveryVertex) {
-  const MapResult result = map_surface(body_, {}, silent());
-  const MapReport found = report(body_, result);
-  EXPECT_EQ(found.kinds[0], found.vertices);
-  EXPECT_LT(found.rest_residual, 1e-12 * diagonal_);
-  // A vertex whose matter was too little for a cell hangs on the cell beside it.
-  EXPECT_LT(found.distance_outside, 1);
-}
-
-INSTANTIATE_TEST_SUITE_P(Parts, RealPart,
-                         testing::Values("base_interface_AP203.STEP", "featuretype.STEP",
-                                         "4040_base_mount.step", "Moving_Jaw_SO101.step",
-                                         "red_cube_blue_cylinder.step", "lower_leg_structure_fork.STEP",
-                                         "lower_leg_structure_fork.STL", "lower_leg_structure_200mm.STL",
-                                         "conrod.stl", "transmission_pulley_at3_t30_output.STL",
-                                         "hip_aa_module_shell_cover.STL", "Springy_Trigger.STL", "hook.stl",
-                                         "ADIS16480.STL", "spot_triangulated.obj", "spot_quadrangulated.obj",
-                                         "quadknot.obj", "rabbit.obj", "multibody.stl"),
-                         [](const auto& with) {
-                           std::string name = with.param;
-                           for (char& c : name)
-                             if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
-                           return name;
-                         });
+INSTANTIATE_TEST_SUITE_P(Parts, RealPart, testing::ValuesIn(parts()), [](const auto& with) {
+  std::string name = with.param;
+  for (char& c : name)
+    if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
+  return name;
+});
 
 }  // namespace
 }  // namespace flexel

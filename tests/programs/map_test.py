@@ -99,6 +99,43 @@ def test_a_series_gives_a_file_for_each_frame():
     expect_error(run("flexel-map", "empty.pvd", "-o", "x.stl"), "flexel-map", "empty.pvd", "no frame")
 
 
+def test_a_saved_binding_gives_the_same_bytes():
+    strip()
+    bent()
+    for extra in [[], ["--onto", "strip.obj"]]:
+        for method in ["affine", "gram-schmidt"]:
+            plain = ["flexel-map", "bent.vtu", *extra]
+            expect_ok(run(*plain, "--method", method, "-o", "plain.obj"))
+            expect_ok(run(*plain, "--method", method, "--save-binding", "part.binding", "-o", "saving.obj"))
+            expect_ok(run(*plain, "--binding", "part.binding", "--report", "report.json", "-o", "bound.obj"))
+            same = open("plain.obj", "rb").read()
+            expect(open("saving.obj", "rb").read() == same and open("bound.obj", "rb").read() == same, f"{method}")
+            expect(json.load(open("report.json"))["method"] == method, "the report names the binding's method")
+
+
+def test_a_wrong_binding_is_refused():
+    strip()
+    bound = ["flexel-map", bent(), "-o", "out.stl"]
+    expect_ok(run(*bound, "--method", "affine", "--save-binding", "part.binding"))
+    os.remove("out.stl")
+    whole = open("part.binding", "rb").read()
+    open("short.binding", "wb").write(whole[:-9])
+    open("corrupt.binding", "wb").write(whole[:200] + bytes([whole[200] ^ 1]) + whole[201:])
+    write("text.binding", "a text that is long enough to be taken for a header, were it not for its first word")
+    for arguments, fragment in [(["--binding", "short.binding"], "damaged"), (["--binding", "corrupt.binding"], "damaged"),
+                                (["--binding", "text.binding"], "no saved binding"),
+                                (["--binding", "missing.binding"], "missing.binding"),
+                                (["--binding", "part.binding", "--onto", "strip.obj"], "another surface"),
+                                (["--binding", "part.binding", "--method", "gram-schmidt"], "method affine"),
+                                (["--binding", "part.binding", "--crack", "cap"], "--crack"),
+                                (["--save-binding", "b", "--method", "blended"], "--method affine"),
+                                (["--save-binding", "b"], "--method affine")]:
+        expect_error(run(*bound, *arguments), "flexel-map", fragment)
+        expect(not os.path.exists("out.stl") and not os.path.exists("b"), "nothing is written")
+    body("other.vtu", "--placement", "centre")
+    expect_error(run("flexel-map", "other.vtu", "-o", "out.stl", "--binding", "part.binding"), "flexel-map", "another lattice")
+
+
 def test_attributes_checks_and_the_table():
     result = expect_ok(run("flexel-map", bent(), "-o", "a.ply", "--ascii", "--attributes", "--table", "--check",
                            "voronoi,self-intersection", "--report", "r.json"))

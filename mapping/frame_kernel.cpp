@@ -1,0 +1,96 @@
+// Edges are gathered into lanes, a lane a frame; what is left of the last eight takes the last frame again.
+#include "mapping/frame_kernel.h"
+
+#include <algorithm>
+
+#include "mapping/lanes.h"
+
+namespace flexel {
+namespace {
+
+// By axis of the base, then coordinate.
+struct Axes {
+  Lanes of[3][3];
+};
+
+FLEXEL_INLINE Lanes dot(const Lanes* a, const Lanes* b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+FLEXEL_INLINE void gather_edges(const Frame* frames, std::size_t begin, std::size_t count, const Vec3* points,
+                                Axes& edges) {
+  alignas(64) double value[3][3][kLanes];
+  for (std::size_t l = 0; l < kLanes; ++l) {
+    const Frame& frame = frames[std::min(begin + l, count - 1)];
+    const double* origin = points[frame.elements[0]].data();
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double* to = points[frame.elements[axis + 1]].data();
+      for (std::size_t c = 0; c < 3; ++c) value[axis][c][l] = to[c] - origin[c];
+    }
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    for (std::size_t c = 0; c < 3; ++c) edges.of[axis][c] = load<Lanes>(value[axis][c]);
+}
+
+FLEXEL_INLINE void normalise(Lanes* axis) {
+  const Lanes inverse = 1 / square_root(dot(axis, axis));
+  for (int c = 0; c < 3; ++c) axis[c] *= inverse;
+}
+
+// In place: the first edge's direction, the second's across it, the third's across both.
+FLEXEL_INLINE void orthonormalise(Axes& axes) {
+  normalise(axes.of[0]);
+  const Lanes along = dot(axes.of[1], axes.of[0]);
+  for (int c = 0; c < 3; ++c) axes.of[1][c] -= along * axes.of[0][c];
+  normalise(axes.of[1]);
+  const Lanes first = dot(axes.of[2], axes.of[0]), second = dot(axes.of[2], axes.of[1]);
+  for (int c = 0; c < 3; ++c) axes.of[2][c] -= first * axes.of[0][c] + second * axes.of[1][c];
+  normalise(axes.of[2]);
+}
+
+// True in lanes whose edges span a volume (normalised determinant of kDegenerate or more).
+FLEXEL_INLINE auto spans(const Axes& edges) {
+  const Lanes *a = edges.of[0], *b = edges.of[1], *c = edges.of[2];
+  const Lanes determinant = a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
+                            a[2] * (b[0] * c[1] - b[1] * c[0]);
+  const Lanes lengths = dot(a, a) * dot(b, b) * dot(c, c);
+  return (determinant * determinant >= kDegenerate * kDegenerate * lengths) & (lengths > 0);
+}
+
+}  // namespace
+
+FLEXEL_CLONES void span_bases(const Frame* frames, std::size_t count, const Vec3* points, bool orthonormal,
+                              Mat3* base) {
+  for (std::size_t begin = 0; begin < count; begin += kLanes) {
+    Axes axes;
+    gather_edges(frames, begin, count, points, axes);
+    if (orthonormal) orthonormalise(axes);
+    for (std::size_t f = begin; f < std::min(begin + kLanes, count); ++f)
+      for (int axis = 0; axis < 3; ++axis)
+        for (int c = 0; c < 3; ++c) base[f].data()[3 * axis + c] = axes.of[axis][c][f - begin];
+  }
+}
+
+FLEXEL_CLONES void move_frames(const Frame* frames, std::size_t count, const Mat3* rest_base,
+                               const Vec3* rest, const Vec3* position, bool orthonormal,
+                               FrameMotion* motion) {
+  for (std::size_t begin = 0; begin < count; begin += kLanes) {
+    Axes axes;
+    gather_edges(frames, begin, count, position, axes);
+    const auto spanned = spans(axes);
+    if (orthonormal) orthonormalise(axes);
+    for (std::size_t f = begin; f < std::min(begin + kLanes, count); ++f) {
+      if (frames[f].kind != FrameKind::full) continue;
+      const double *now = position[frames[f].elements[0]].data(),
+                   *before = rest[frames[f].elements[0]].data();
+      double *translation = motion[f].translation.data(), *change = motion[f].change.data();
+      for (int c = 0; c < 3; ++c) translation[c] = now[c] - before[c];
+      for (int axis = 0; axis < 3; ++axis)
+        for (int c = 0; c < 3; ++c)
+          change[3 * axis + c] =
+              spanned[f - begin] ? axes.of[axis][c][f - begin] - rest_base[f].data()[3 * axis + c] : 0;
+    }
+  }
+}
+
+}  // namespace flexel
