@@ -11,6 +11,7 @@
 #include "formats/error.h"
 #include "formats/program.h"
 #include "formats/topology.h"
+#include "mapping/crack_carved.h"
 #include "mapping/crack_pieces.h"
 
 namespace flexel {
@@ -217,15 +218,24 @@ void map_pieces(Body& body, const Fragments& fragments, const MapOptions& option
 }
 
 // What [[event]] carve took away leaves its surface behind (docs/events.md).
-void warn_of_carved(const Surface& surface, Progress& progress) {
-  const auto carved = surface.polygon_columns.find("carved");
-  if (carved == surface.polygon_columns.end()) return;
-  const auto gone = std::count(carved->second.values.begin(), carved->second.values.end(), 1);
-  if (gone > 0)
-    progress.warn(fmt::format(
-        "{} polygon(s) lie over matter that was carved away: they follow what is left around them, and the "
-        "walls of what was carved are missing",
-        gone));
+void warn_of_carved(const Body& body, Progress& progress) {
+  if (body.notes.count(kCarvedNote) > 0)
+    progress.warn(
+        "matter was carved away, its surface is still here and follows what is left around it: --crack cap "
+        "leaves it out and closes the part, where nothing broke as well");
+}
+
+void map_carved(Body& body, const MapOptions& options, CrackMode mode, MappedPart& mapped,
+                Progress& progress) {
+  const Fragments fragments = find_fragments(body, element_adjacency(body));
+  progress.update(0, "closing what was carved");
+  mapped.cracked = close_carved(body, fragments, mode);
+  map_pieces(body, fragments, options, mode, mapped, progress);
+  CrackReport& crack = mapped.report.crack;
+  crack.mode = mode;
+  for (const CrackPiece& piece : mapped.cracked->pieces)
+    if (!piece.dropped && fragments.in_pieces(piece.part)) crack.pieces.push_back(piece);
+  crack.fragments = crack.pieces.size();
 }
 
 }  // namespace
@@ -233,13 +243,18 @@ void warn_of_carved(const Surface& surface, Progress& progress) {
 bool may_be_broken(const Body& body) {
   const bool centre = std::any_of(body.parts.begin(), body.parts.end(),
                                   [](const Part& part) { return part.placement == Placement::centre; });
-  return centre || std::find(body.broken.begin(), body.broken.end(), 1) != body.broken.end();
+  return centre || body.notes.count(kCarvedNote) > 0 ||
+         std::find(body.broken.begin(), body.broken.end(), 1) != body.broken.end();
 }
 
 MappedPart map_part(Body& body, const MapOptions& options, const CrackOptions& crack, Progress& progress,
                     const Binding* known) {
   MappedPart mapped;
-  warn_of_carved(body.surface, progress);
+  if (crack.mode != CrackMode::keep && is_carved_cleanly(body)) {
+    map_carved(body, options, crack.mode, mapped, progress);
+    return mapped;
+  }
+  warn_of_carved(body, progress);
   std::optional<Fragments> fragments;
   std::size_t parted = 0;
   if (may_be_broken(body)) {

@@ -81,6 +81,25 @@ std::size_t renumber_surface(Body& body, const std::vector<std::uint32_t>& cell)
   return static_cast<std::size_t>(std::count(carved.values.begin(), carved.values.end(), 1));
 }
 
+// For the mapping, which closes the surface around them: the voxels that go, in the note "carved".
+void note_voxels(Body& body, const std::vector<std::uint8_t>& elements,
+                 const std::vector<std::uint8_t>& cells) {
+  std::string& note = body.notes["carved"];
+  for (std::size_t p = 0; p < body.parts.size(); ++p) {
+    const Part& part = body.parts[p];
+    const auto add = [&](std::uint32_t element) {
+      const Index3& index = body.lattice_index[element];
+      note += fmt::format("{} {} {} {}\n", p, index[0], index[1], index[2]);
+    };
+    if (part.placement == Placement::centre)
+      for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
+        if (!elements[e]) add(e);
+    for (std::uint32_t c = part.cell_begin; c < part.cell_end; ++c)
+      if (!cells[c]) add(body.cell_elements[c][0]);
+  }
+  if (note.empty()) body.notes.erase("carved");
+}
+
 void cut_connections(Body& body, const Setting& setting, const std::vector<std::uint8_t>& keep) {
   const Connections connections = make_connections(setting);
   for (std::size_t c = 0; c < connections.size(); ++c)
@@ -114,6 +133,7 @@ std::string Carve::happen(Stage& stage) const {
   const std::vector<std::uint8_t> elements = elements_left(body, chosen, cells);
   const std::size_t before = body.element_count() + body.cell_count();
   cut_connections(body, stage.setting, elements);
+  note_voxels(body, elements, cells);
   std::uint32_t next_element = 0, next_cell = 0;
   for (Part& part : body.parts) {
     renumber_range(part.element_begin, part.element_end, elements, next_element);

@@ -214,5 +214,34 @@ def test_words_that_do_not_fit():
         expect_error(run("flexel-map", "body.vtu", *options, "-o", "x.stl"), "flexel-map", fragment)
 
 
+DRILL = """material = "steel"
+[[fix]]
+where = "xmin"
+[gravity]
+acceleration = [0, 0, "-9.81 m/s2"]
+[[event]]
+at = "10 us"
+do = "carve"
+positions = "rest"
+where = { box = { min = ["14 mm", "-1 mm", "-1 mm"], max = ["21 mm", "6 mm", "11 mm"] } }
+[run]
+time = "20 us"
+"""
+
+
+def test_a_carved_part_comes_out_closed():
+    box()
+    expect_ok(run("flexel-voxelize", "box.stl", "--size", "2.5 mm", "-o", "rest.vtu"))
+    expect_ok(run("flexel-simulate", write("drill.toml", DRILL), "rest.vtu", "-o", "drilled.vtu"))
+    said = expect_ok(run("flexel-map", "drilled.vtu", "-o", "kept.stl"))
+    expect("carved away" in said.err and "--crack cap" in said.err, said.err)
+    closed = expect_ok(run("flexel-map", "drilled.vtu", "--crack", "cap", "--report", "report.json", "-o", "closed.stl"))
+    expect("carved away" not in closed.err, closed.err)
+    taken = volume(stl("box.stl")) - expect_solid("closed.stl")
+    # voxels whose middle is in the box: 2 x 2 x 4 of 2.5 mm
+    expect(abs(taken / (16 * 2.5 ** 3) - 1) < 0.01, f"{taken} mm^3 went")
+    expect(json.load(open("report.json"))["valid"], "the mapping can be used")
+
+
 if __name__ == "__main__":
     main(globals())

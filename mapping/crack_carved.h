@@ -1,0 +1,20 @@
+// What [[event]] carve took away (docs/events.md), as a piece of the part that is left out: the surface is
+// parted along the voxels that went, so that the part comes out closed.
+#pragma once
+#include "mapping/crack.h"
+
+namespace flexel {
+
+// The note that lists the voxels that went: "PART I J K" a line, PART counted from 0, I J K the voxel's
+// lattice index.
+constexpr const char* kCarvedNote = "carved";
+
+// True when voxels went and nothing else broke in their parts, which close_carved() does not treat.
+[[nodiscard]] bool is_carved_cleanly(const Body& body);
+
+// The surface without what lay over carved matter, with walls (`cap`, as part_surface(); faces "crack") where
+// it was. A part that hangs together keeps its name; one that fell apart comes as pieces. `fragments`: of the
+// body. Throws as part_surface(), and InputError: a note that is no list of voxels.
+[[nodiscard]] CrackedSurface close_carved(const Body& body, const Fragments& fragments, CrackMode mode);
+
+}  // namespace flexel
