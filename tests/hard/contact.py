@@ -56,17 +56,19 @@ def told(found, *names_and_unit):
     return ", ".join(f"{name} {significant(found[name])}{unit}" for name in names)
 
 
-def stack_of_plates(trial, count, friction, seconds):
-    h = 1e-2
+def stack_of_plates(trial, count, friction, seconds, shift=0.0):
+    """Plates of 2 x 2 x 1 cells; every other one is shifted aside by so many cells."""
+    h = 2e-2
 
     def world(view):
-        parts = {f"plate{n:02}": grid_box((2, 2, 1), h, (0, 0, n * h)) for n in range(count)}
+        parts = {f"plate{n:02}": grid_box((2, 2, 1), h, (shift * h * (n % 2), shift * h * (n % 2), n * h)) for n in range(count)}
         scene = gum(view, 0.3) + f'[contact]\nfriction = {friction}\ndamping = "50 us"\n[damping]\ntime = "0.2 ms"\n[[plane]]\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\n'
         scene += f'[gravity]\nacceleration = {view.vector("acceleration", (0, 0, -9.81))}\n'
         scene += "".join(f'[[probe]]\nname = "p{n}"\nat = {view.point((h, h, (n + 0.5) * h))}\n' for n in range(count))
         return Setup(parts, scene + f'[run]\ntime = "{seconds} s"\nhistory_every = "5 ms"\n', h)
 
     out = worked(trial.go(world(PLAIN)))
+    trial.show(out)
     sound_state(out)
     ratio = books(out, 1e-2)
     history = out.history
@@ -74,25 +76,25 @@ def stack_of_plates(trial, count, friction, seconds):
     path = np.array([[history[f"p{n} {axis}"][late] for axis in "xyz"] for n in range(count)])
     drift = np.abs(path[:, :, -1] - path[:, :, 0]).max() / h
     jitter = np.ptp(path, axis=2).max() / h
-    trial.figure(f"friction {friction}: drift {significant(drift)} h, jitter {significant(jitter)} h, books {significant(ratio)}")
-    trial.show(out)
+    trial.figure(f"{'shifted' if shift else 'flush'}, friction {friction}: drift {significant(drift)} h, jitter {significant(jitter)} h, books {significant(ratio)}")
     require(drift < 1e-3 and jitter < 1e-3, f"drift {significant(drift)} h, jitter {significant(jitter)} h")
-    # the stack is shorter by its own weight: m g over area and modulus, summed over the plates below
+    # The stack is shorter by its own weight: m g over area and modulus, summed over the plates below; and pressure begins to grow softly where the
+    # surfaces meet (docs/contact.md), over a hundredth of a cell at each.
     weight = 1000 * 9.81 * h / 1e6 * h * sum(count - n - 0.5 for n in range(count))
     top = -path[count - 1, 2, -1]
-    require(0.5 * weight < top < 3 * weight, f"the top plate sank by {significant(top)} m; {significant(weight)} m by the plates' compression alone")
+    require(0.5 * weight < top < 3 * weight + 0.01 * h * count, f"the top plate sank by {significant(top)} m; {significant(weight)} m by the plates' compression alone")
     return world
 
 
 @case("a stack of plates at rest",
-      known=all_of("flush sides that touch push each other", "friction 0.5", "friction 0"),
+      known={"flush, friction 0.5": "flush sides that touch push each other"},
       quick=False, peer="Bullet",
-      holds="ten rubber plates (1 MPa) on a floor, 10 s after 1 s of settling: drift and jitter under 1e-3 h, with friction and without",
+      holds="ten rubber plates (1 MPa) on a floor, 10 s after 1 s of settling: drift and jitter under 1e-3 h, with friction and without, every other one shifted by a quarter of a cell and all flush",
       breaks="contact forces that jump when patches come and go; friction that creeps; energy that trickles in")
 def stack(trial):
-    for friction in (0.5, 0):
-        with trial.section(f"friction {friction}"):
-            stack_of_plates(trial, 10, friction, 11)
+    for name, friction, shift in (("shifted", 0.5, 0.25), ("shifted", 0, 0.25), ("flush", 0.5, 0.0)):
+        with trial.section(f"{name}, friction {friction}"):
+            stack_of_plates(trial, 10, friction, 11, shift)
     with trial.peer("Bullet") as on:
         if on:
             for gap in (0, 0.05):
@@ -101,11 +103,12 @@ def stack(trial):
 
 
 @case("two plates at rest",
-      known=all_of("flush sides that touch push each other", "friction 0.5"),
+      known={"flush": "flush sides that touch push each other"},
       holds="the stack's small sister: two plates for 0.3 s after 1 s", breaks="what breaks the stack")
 def stack_quick(trial):
-    with trial.section("friction 0.5"):
-        stack_of_plates(trial, 2, 0.5, 1.3)
+    for name, shift in (("shifted", 0.25), ("flush", 0.0)):
+        with trial.section(name):
+            stack_of_plates(trial, 2, 0.5, 1.3, shift)
 
 
 @case("impact at 300 m/s",
@@ -197,8 +200,8 @@ def touching(trial):
             with trial.section(f"friction {friction}, {method}, still"):
                 moved = out.summary["largest_displacement"] / h
                 trial.figure(f"moved by {significant(moved)} h")
+                trial.show(out)
                 require(moved < 1e-9, f"moved by {moved} h")
-                trial.show(out, "--color", "none")
 
 
 @case("overlapping at the start",
@@ -224,11 +227,12 @@ def overlapping(trial):
             require(out.code == 0, f"stopped: {out.error}")
             speed = np.linalg.norm(out.arrays()["point/velocity"], axis=1).max() / np.sqrt(1e6 / 1000)
             trial.figure(f"{depth} cells: {significant(speed)} of the speed of sound")
+            if depth == 0.5:
+                trial.show(out)
             books(out, 2e-2)
             _, position = out.motion()
             require(np.ptp(position[:, 2]) > 5.9 * h, f"still {significant(6 - np.ptp(position[:, 2]) / h)} cells inside each other")
             require(speed < 0.1, f"thrown apart at {significant(speed)} of the speed of sound")
-            trial.show(out)
     with trial.peer("Bullet") as on:
         if on:
             for depth in (0.1, 0.5, 1.5):

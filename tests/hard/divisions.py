@@ -41,6 +41,8 @@ def coincident(trial):
             arrays = out.arrays()
             apart = np.abs(arrays["points/position"][arrays["point/part"] == 0] - arrays["points/position"][arrays["point/part"] == 1]).max()
             trial.figure(f"{model}: the twins {significant(apart / h)} h apart")
+            if model == "cells":
+                trial.show(out)
             require(apart < 1e-9 * h, f"the twins part by {apart} m")
         with trial.section(f"contact, {model}"):
             out = same_bits(trial, lambda view: world(view, '[run]\ntime = "10 ms"\n', model, "[contact]\nfriction = 0.3\n"), (7,))
@@ -78,6 +80,7 @@ def zero_velocity(trial):
     for method, out in outcomes.items():
         with trial.section(f"friction, {method}, no slip"):
             spread = np.ptp(out.arrays()["point/velocity"], axis=0).max()
+            trial.show(out)
             trial.figure(f"friction: speeds spread by {significant(spread)} m/s")
             require(spread < 1e-9, f"speeds spread by {spread} m/s")
     for model in ("cells", "springs", "paper"):
@@ -142,6 +145,8 @@ def zero_length(trial):
                         require("start" in out.error or "step 0" in out.error or "begin" in out.error, f"no word on the start: {out.error}")
                         continue
                     ends_well(out)
+                    if name.startswith("two") and model == "cells":
+                        trial.show(path, "--cells")
                     trial.figure(f"{model}, {name}, {method}: " + ("stops" if out.code else "holds"))
                     if out.code == 0 and method in ("symplectic", "verlet"):
                         momentum(out)
@@ -203,6 +208,8 @@ def flat_frames(trial):
                 require(code in (0, 4), f"exit {code}: {err.strip()[-200:]}")
                 if code == 0:
                     require(np.isfinite(vertices).all(), "vertices that are no numbers")
+                if name == "plane":
+                    trial.show(path)
                 require(report["failures"]["degenerate"] == report["vertices"], f"{report['failures']} of {report['vertices']} vertices")
                 code, *_ = mapped(trial, path, "--method", method, "--strict")
                 require(code == 4, f"--strict lets it through with exit {code}")
@@ -224,6 +231,7 @@ def voronoi(trial):
     with trial.section("threads"):
         out = worked(same_bits(trial, world))
         sound_state(out)
+        trial.show(out)
         for method in ("blended", "smooth", "affine", "gram-schmidt"):
             found = []
             for threads in (1, 2, 7):

@@ -119,6 +119,8 @@ def renormalise(trial):
         body = edited(base.folder / "body.vtu", trial.folder / f"inverted-{model}.vtu", invert)
         with trial.section(model):
             out = same_bits(trial, lambda view: Setup({}, head + '[[event]]\nat = "0 ms"\ndo = "renormalise"\n[run]\ntime = "5 ms"\n', H, bodies=(body,)), (7,))
+            if model == "cells":
+                trial.show(body, "--cells")
             require(out.code == 3, f"exit {out.code}: {out.err.strip()[-300:]}")
             require("inside out" in out.error and "near (" in out.error, f"no word or place: {out.error}")
             require(not out.out.exists(), "a result under the output's name")
