@@ -216,8 +216,6 @@ def flat_frames(trial):
 
 
 @case("a vertex on a Voronoi boundary",
-      known={"order of vertices, gram-schmidt": "the first polygon decides"},
-     
       holds="vertices exactly half way between two, four and eight elements: the same choice and bits at 1, 2 and 7 threads, for any order of the vertices, and the mirrored part mapped to the mirror image",
       breaks="ties that rounding or the order of a list decides")
 def voronoi(trial):
