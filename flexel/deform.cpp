@@ -4,11 +4,13 @@
 
 #include <nlohmann/json.hpp>
 
+#include "flexel/accuracy.h"
 #include "flexel/commands.h"
 #include "flexel/job.h"
 #include "formats/body_file.h"
 #include "formats/files.h"
 #include "formats/parallel.h"
+#include "formats/units.h"
 #include "mapping/options.h"
 #include "mapping/output.h"
 #include "simulate/simulate.h"
@@ -16,10 +18,12 @@
 namespace flexel {
 namespace {
 
+constexpr std::size_t kFirstCells = 2000;  // of the first run of --accuracy and --within
+
 struct Arguments {
   JobArguments job;
   std::vector<std::string> outputs;
-  std::string summary, body, timeout;
+  std::string summary, body, timeout, accuracy, within;
   MapArguments map;
   int threads = 0;
   bool quiet = false, estimate = true;
@@ -48,6 +52,12 @@ void declare_output(CLI::App& app, Arguments& arguments) {
                  "Stop the simulation after this time (\"90 s\"): exit 5, the last good state in "
                  "OUTPUT.failed.vtu")
       ->type_name("TIME");
+  app.add_option("--accuracy", arguments.accuracy,
+                 "Choose size and mapping from cheap runs so that the error is at most this (\"2%\")")
+      ->type_name("SHARE");
+  app.add_option("--within", arguments.within,
+                 "Choose the finest size whose run ends within this time, all in all (\"10s\")")
+      ->type_name("TIME");
   app.add_flag("!--no-estimate", arguments.estimate, "Leave out the error bars (docs/error-bars.md)");
   app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
 }
@@ -55,7 +65,8 @@ void declare_output(CLI::App& app, Arguments& arguments) {
 // What the arguments ask for, checked.
 struct Plan {
   Job job;
-  std::optional<double> timeout;  // s
+  std::optional<double> timeout;     // s
+  std::optional<AccuracyGoal> goal;  // of --accuracy and --within
   MapOptions map;
   CrackOptions crack;
   struct Output {
@@ -82,6 +93,27 @@ void plan_outputs(const Arguments& arguments, Plan& plan) {
       throw InputError("two results would go to \"" + paths[i] + "\"");
 }
 
+void plan_goal(const Arguments& arguments, Plan& plan) {
+  if (arguments.accuracy.empty() && arguments.within.empty()) return;
+  const std::string option = arguments.accuracy.empty() ? "--within" : "--accuracy";
+  if (plan.job.voxelize.size || plan.job.voxelize.count)
+    throw InputError(option + " chooses the size: leave --size and --count out");
+  if (plan.job.voxelize.placement != Placement::corner)
+    throw InputError(option + " needs error bars, which --placement centre does not have");
+  if (plan.job.scene.run.time)
+    throw InputError(plan.job.scene.name,
+                     option + " is for runs to equilibrium, and this scene is a timed run");
+  if (!arguments.estimate) throw InputError(option + " needs the error bars: leave --no-estimate out");
+  plan.goal.emplace();
+  plan.goal->began = std::chrono::steady_clock::now();
+  if (!arguments.accuracy.empty()) {
+    plan.goal->error = parse_quantity(arguments.accuracy, Dimension::share);
+    if (!(*plan.goal->error > 0 && *plan.goal->error < 1))
+      throw InputError("--accuracy: must lie above 0 % and below 100 %");
+  }
+  if (!arguments.within.empty()) plan.goal->within = parse_timeout(arguments.within, "--within");
+}
+
 Plan make_plan(const Arguments& arguments) {
   Plan plan;
   if (!arguments.timeout.empty()) plan.timeout = parse_timeout(arguments.timeout);
@@ -89,6 +121,7 @@ Plan make_plan(const Arguments& arguments) {
   plan.crack = crack_options(arguments.map);
   plan_outputs(arguments, plan);
   plan.job = plan_job(arguments.job);
+  plan_goal(arguments, plan);
   return plan;
 }
 
@@ -114,21 +147,76 @@ void write_outputs(const Plan& plan, const Body& body, const MappedPart& mapped,
       write_body(body, output.path);
 }
 
-int run_stages(const Arguments& arguments, Plan& plan, Progress& progress) {
-  progress.stage("import");
-  VoxelizeResult voxels =
-      voxelize(read_parts(arguments.job.parts, plan.job.import, progress), plan.job.voxelize, progress);
-  report(voxels, progress);
-  Body& body = voxels.body;
-  add_actions(plan.job, body);
-
+SimulateOptions simulate_options(const Arguments& arguments, const Plan& plan) {
   SimulateOptions options;
   options.threads = arguments.threads;
   options.failed_output = failed_name(plan);
   options.timeout = plan.timeout;
   options.estimate = arguments.estimate;
-  const SimulateResult simulated = simulate(body, plan.job.scene, options, progress);
-  for (const std::string& line : summary_lines(simulated)) progress.say(line);
+  return options;
+}
+
+// The size that --accuracy or --within asks for, and the run at it. The mapping is `smooth` where that moves
+// a vertex by more than a quarter of the error asked for beside what --method says.
+SolvedRun solve_to_goal(const Arguments& arguments, Plan& plan, const Surface& surface,
+                        AccuracyReport& accuracy, Progress& progress) {
+  Progress quiet("flexel", Progress::Mode::quiet);
+  bool first = true;
+  for (const Tie& tie : plan.job.scene.get<Ties>().ties) plan.goal->driven |= tie.is_move;
+  plan.goal->driven |= !plan.job.moves.empty();
+  MapOptions mapping;
+  mapping.method = plan.map.method;
+  const auto solve = [&](std::optional<double> size) {
+    SolvedRun run;
+    run.size = size.value_or(0);
+    VoxelizeOptions options = plan.job.voxelize;
+    options.size = size;
+    if (!size) options.count = kFirstCells;
+    auto began = std::chrono::steady_clock::now();
+    run.voxels = voxelize(surface, options, quiet);
+    run.voxelize_seconds = seconds_since(began);
+    if (!size) return run;  // only its spacing is wanted
+    if (std::exchange(first, false)) add_actions(plan.job, run.voxels.body);
+    run.simulated = simulate(run.voxels.body, plan.job.scene, simulate_options(arguments, plan), quiet);
+    began = std::chrono::steady_clock::now();
+    run.mapped = map_part(run.voxels.body, mapping, {}, quiet).result.displacement;
+    run.map_seconds = seconds_since(began);
+    return run;
+  };
+  SolvedRun run = choose_resolution(*plan.goal, solve, accuracy, progress);
+  if (plan.goal->error && plan.map.method == MapMethod::blended) {
+    mapping.method = MapMethod::smooth;
+    const MapResult smooth = map_part(run.voxels.body, mapping, {}, quiet).result;
+    if (mapping_difference(run.mapped, smooth.displacement) > 0.25 * *plan.goal->error)
+      plan.map.method = MapMethod::smooth;
+  }
+  accuracy.method = name_of(plan.map.method);
+  return run;
+}
+
+// Lattice and simulation; of --accuracy and --within what they chose.
+SolvedRun solve(const Arguments& arguments, Plan& plan, std::optional<AccuracyReport>& accuracy,
+                Progress& progress) {
+  progress.stage("import");
+  Surface surface = read_parts(arguments.job.parts, plan.job.import, progress);
+  if (plan.goal) {
+    progress.stage("choose the size");
+    return solve_to_goal(arguments, plan, surface, accuracy.emplace(), progress);
+  }
+  SolvedRun run;
+  run.voxels = voxelize(std::move(surface), plan.job.voxelize, progress);
+  report(run.voxels, progress);
+  add_actions(plan.job, run.voxels.body);
+  run.simulated = simulate(run.voxels.body, plan.job.scene, simulate_options(arguments, plan), progress);
+  return run;
+}
+
+int run_stages(const Arguments& arguments, Plan& plan, Progress& progress) {
+  std::optional<AccuracyReport> accuracy;
+  SolvedRun run = solve(arguments, plan, accuracy, progress);
+  Body& body = run.voxels.body;
+  if (accuracy) report(run.voxels, progress);
+  for (const std::string& line : summary_lines(run.simulated)) progress.say(line);
 
   progress.stage("map");
   const MappedPart mapped = map_part(body, plan.map, plan.crack, progress);
@@ -137,11 +225,16 @@ int run_stages(const Arguments& arguments, Plan& plan, Progress& progress) {
   say_report(found, arguments.map, plan.map, progress);
   write_report(found, arguments.map, plan.map, arguments.map.report);
   write_outputs(plan, body, mapped, progress);
+  if (accuracy) {
+    accuracy->seconds = seconds_since(plan.goal->began);
+    accuracy->met() ? progress.say(accuracy->sentence()) : progress.warn(accuracy->sentence());
+  }
   if (!arguments.summary.empty()) {
     nlohmann::ordered_json summary;
-    summary["voxelize"] = nlohmann::ordered_json::parse(summary_json(voxels));
-    summary["simulate"] = nlohmann::ordered_json::parse(summary_json(simulated, body));
+    summary["voxelize"] = nlohmann::ordered_json::parse(summary_json(run.voxels));
+    summary["simulate"] = nlohmann::ordered_json::parse(summary_json(run.simulated, body));
     summary["map"] = nlohmann::ordered_json::parse(report_json(found, plan.map));
+    if (accuracy) summary["accuracy"] = nlohmann::ordered_json::parse(accuracy->json());
     write_text(summary.dump(2) + "\n", arguments.summary);
   }
   progress.finish();

@@ -1,0 +1,330 @@
+// Sizes are kept to three digits, so that `--size` with what is printed gives the same run.
+#include "flexel/accuracy.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "formats/error.h"
+#include "formats/units.h"
+#include "simulate/estimate.h"
+#include "voxelize/memory.h"
+
+namespace flexel {
+namespace {
+
+constexpr double kConfirmed = 1.25, kUnconfirmed = 3;
+constexpr double kLeastOrder = 1, kMostOrder = 2, kUsualOrder = 1.5;
+constexpr double kAim = 0.7;                          // of the error asked for, when the next size is chosen
+constexpr double kLeastStep = 1.25, kMostStep = 1.7;  // between the spacings of two runs
+constexpr int kFinerRuns = 4, kFailures = 3;
+constexpr double kUsualLimit = 600;   // s, without --within
+constexpr double kMemoryShare = 0.8;  // of what is free
+constexpr double kTimePower = 1.1;    // of the cells: multigrid, with what caches lose
+constexpr double kTimeMargin = 0.85;  // of the time left: predictions are good to about that
+constexpr double kSmall = 1e-3;       // of the largest displacement: a probe that hardly moves
+
+double round3(double x) {
+  const double unit = std::pow(10, std::floor(std::log10(x)) - 2);
+  return std::round(x / unit) * unit;
+}
+
+// In words that --size takes.
+std::string size_text(double size) {
+  return fmt::format("{:.6g}mm", 1e3 * size);
+}
+
+struct Quantity {
+  std::string name;
+  double value = 0;
+  std::optional<Bar> bar;
+};
+
+// What the finest run found, and the same of the others.
+class Quantities {
+ public:
+  explicit Quantities(bool driven) : driven_(driven) {}
+
+  // Of every run the displacement at the vertex that moves most in the last one, along that.
+  [[nodiscard]] std::vector<Quantity> of(const SolvedRun& run, const SolvedRun& last) const {
+    std::vector<Quantity> found;
+    std::size_t most = 0;
+    for (std::size_t v = 0; v < last.mapped.size(); ++v)
+      if (last.mapped[v].squaredNorm() > last.mapped[most].squaredNorm()) most = v;
+    const double largest = last.mapped.empty() ? 0 : last.mapped[most].norm();
+    const auto along = [](const Vec3& moved, const Vec3& direction) {
+      return direction.norm() > 0 ? moved.dot(direction.normalized()) : moved.norm();
+    };
+    if (!last.mapped.empty())
+      found.push_back({"largest displacement", along(run.mapped[most], last.mapped[most]),
+                       bar_of(run, ErrorBar::Of::largest_displacement, 0)});
+    for (std::size_t p = 0; p < last.simulated.probes.size(); ++p) {
+      const Vec3& direction = last.simulated.probes[p].displacement;
+      if (direction.norm() < kSmall * largest) continue;
+      found.push_back({"probe " + last.simulated.probes[p].name,
+                       along(run.simulated.probes[p].displacement, direction),
+                       bar_of(run, ErrorBar::Of::probe, p)});
+    }
+    if (driven_ && last.simulated.elastic_energy > 0)
+      found.push_back(
+          {"elastic energy", run.simulated.elastic_energy, bar_of(run, ErrorBar::Of::elastic_energy, 0)});
+    return found;
+  }
+
+ private:
+  // Bars with an observed order only: the others are three times a difference that coarse lattices make.
+  [[nodiscard]] static std::optional<Bar> bar_of(const SolvedRun& run, ErrorBar::Of of, std::size_t probe) {
+    for (const ErrorBar& each : run.simulated.error_bars.bars)
+      if (each.of == of && each.probe == probe && each.bar.order) return each.bar;
+    return std::nullopt;
+  }
+  bool driven_;
+};
+
+struct Judged {
+  double error = 0;  // share
+  double order = kUsualOrder;
+  std::string of;
+};
+
+double spacing_of(const SolvedRun& run) {
+  double sum = 0;
+  for (const Part& part : run.voxels.body.parts) sum += std::log(part.lattice.spacing.prod()) / 3;
+  return std::exp(sum / static_cast<double>(run.voxels.body.parts.size()));
+}
+
+// The error of the last of the runs, from it and the one or two before it.
+std::optional<Judged> judge(const std::vector<SolvedRun>& runs, const Quantities& quantities) {
+  if (runs.size() < 2) return std::nullopt;
+  const SolvedRun& last = runs.back();
+  const std::size_t n = runs.size();
+  const double ratio = spacing_of(runs[n - 2]) / spacing_of(last);
+  if (!(ratio > 1)) return std::nullopt;
+  const std::vector<Quantity> fine = quantities.of(last, last), coarse = quantities.of(runs[n - 2], last);
+  const std::vector<Quantity> coarser = n > 2 ? quantities.of(runs[n - 3], last) : std::vector<Quantity>{};
+  std::optional<Judged> worst;
+  for (std::size_t q = 0; q < fine.size(); ++q) {
+    if (!(std::abs(fine[q].value) > 0)) continue;
+    const double step = std::abs(fine[q].value - coarse[q].value);
+    Judged each{kUnconfirmed * step / (ratio - 1), kLeastOrder, fine[q].name};
+    std::optional<double> order = fine[q].bar ? fine[q].bar->order : std::nullopt;
+    if (!order && !coarser.empty()) {
+      const double second = spacing_of(runs[n - 3]) / spacing_of(runs[n - 2]);
+      order = richardson({{fine[q].value, coarse[q].value, coarser[q].value}, {ratio, second}}).order;
+    }
+    if (order) {
+      each.order = std::clamp(*order, kLeastOrder, kMostOrder);
+      each.error = kConfirmed * step / (std::pow(ratio, each.order) - 1);
+    }
+    if (fine[q].bar) each.error = std::max(each.error, fine[q].bar->half_width);
+    each.error /= std::abs(fine[q].value);
+    if (!worst || each.error > worst->error) worst = each;
+  }
+  return worst;
+}
+
+class Search {
+ public:
+  Search(const AccuracyGoal& goal, const SolveAt& solve, AccuracyReport& report, Progress& progress)
+      : goal_(goal), solve_(solve), report_(report), progress_(progress), quantities_(goal.driven) {}
+
+  SolvedRun operator()() {
+    first_runs();
+    for (int finer = 0; finer < kFinerRuns; ++finer) {
+      const std::optional<double> size = next_size();
+      if (!size) return finish();
+      if (!run(*size)) break;
+    }
+    if (goal_.error && !met() && report_.stopped.empty())
+      report_.stopped = fmt::format("{} runs did not close in on a value", report_.runs.size());
+    return finish();
+  }
+
+ private:
+  [[nodiscard]] bool met() const { return goal_.error && judged_ && judged_->error <= *goal_.error; }
+
+  // About 2,000 cells, and half the spacing; finer where walls are lost at that.
+  void first_runs() {
+    double size = 0;
+    for (int failures = 0; runs_.empty(); ++failures) try {
+        if (size == 0) {
+          SolvedRun first = solve_(std::nullopt);
+          size = round3(spacing_of(first));
+        }
+        keep(solve_(size));
+      } catch (const InputError& error) {
+        fail(size, error.what(), failures);
+      } catch (const DivergedError& error) {
+        fail(size, error.what(), failures);
+      }
+    size = round3(runs_.back().size / 2);
+    if (affordable(size)) run(size);
+  }
+
+  void fail(double& size, const std::string& why, int failures) {
+    if (size == 0 || failures >= kFailures) throw;
+    report_.runs.push_back({size, 0, 0, std::nullopt, "", why});
+    size = round3(size / 2);
+  }
+
+  // False where the size cannot be solved.
+  bool run(double size) {
+    try {
+      keep(solve_(size));
+      return true;
+    } catch (const DivergedError& error) {
+      report_.stopped = fmt::format("the run at {} diverged", size_text(size));
+    }
+    return false;
+  }
+
+  void keep(SolvedRun solved) {
+    const double total = solved.voxelize_seconds + solved.simulated.seconds +
+                         solved.simulated.error_bars.seconds + solved.map_seconds;
+    seconds_ = total;
+    runs_.push_back(std::move(solved));
+    if (runs_.size() > 3) runs_.erase(runs_.begin());
+    judged_ = judge(runs_, quantities_);
+    TriedRun tried{runs_.back().size, runs_.back().voxels.body.cell_count(), total, std::nullopt, "", ""};
+    if (judged_) {
+      tried.error = judged_->error;
+      tried.of = judged_->of;
+    }
+    progress_.say(fmt::format(
+        "--size {}: {} cells, {:.2g} s{}", size_text(tried.size), human_count(tried.cells), total,
+        tried.error ? fmt::format(", error about {:.2g} % ({})", 100 * *tried.error, tried.of) : ""));
+    report_.runs.push_back(std::move(tried));
+  }
+
+  [[nodiscard]] double cells_at(double size) const {
+    const SolvedRun& last = runs_.back();
+    return static_cast<double>(last.voxels.body.cell_count()) * std::pow(last.size / size, 3);
+  }
+  [[nodiscard]] double seconds_at(double size) const {
+    const double ratio = std::pow(runs_.back().size / size, 3);
+    return seconds_ * std::pow(ratio, kTimePower);
+  }
+  [[nodiscard]] double seconds_left() const {
+    return goal_.within.value_or(kUsualLimit) - seconds_since(goal_.began);
+  }
+  [[nodiscard]] bool affordable(double size) const {
+    return seconds_at(size) <= kTimeMargin * seconds_left() &&
+           simulation_memory(cells_at(size), Placement::corner) <= kMemoryShare * available_memory();
+  }
+
+  // The finest size between two that is affordable; nothing where the coarser one is not.
+  [[nodiscard]] std::optional<double> finest(double fine, double coarse) const {
+    if (affordable(round3(fine))) return round3(fine);
+    if (!affordable(round3(coarse))) return std::nullopt;
+    for (int i = 0; i < 30; ++i) {
+      const double middle = std::sqrt(fine * coarse);
+      (affordable(middle) ? coarse : fine) = middle;
+    }
+    return round3(1.005 * coarse);
+  }
+
+  // The size of the next run; nothing where the search is over.
+  std::optional<double> next_size() {
+    const double last = runs_.back().size;
+    if ((goal_.error && met()) || chosen_) return std::nullopt;
+    double wanted = last / kMostStep;
+    if (goal_.error && judged_) {
+      const double step = std::pow(judged_->error / (kAim * *goal_.error), 1 / judged_->order);
+      wanted = last / std::clamp(step, kLeastStep, kMostStep);
+    } else if (!goal_.error) {
+      wanted = last / 100;  // as fine as the time allows
+    }
+    const std::optional<double> size = finest(wanted, last / kLeastStep);
+    if (!size && goal_.error) {
+      const double least = last / kLeastStep;
+      const double bytes = simulation_memory(cells_at(least), Placement::corner);
+      report_.stopped = bytes > kMemoryShare * available_memory()
+                            ? fmt::format("the next run would need {} of memory", human_bytes(bytes))
+                            : fmt::format("the next run would take about {:.2g} s, of {:.2g} s that are left",
+                                          seconds_at(least), std::max(0.0, seconds_left()));
+    }
+    chosen_ = !goal_.error;
+    return size;
+  }
+
+  SolvedRun finish() { return std::move(runs_.back()); }
+
+  const AccuracyGoal& goal_;
+  const SolveAt& solve_;
+  AccuracyReport& report_;
+  Progress& progress_;
+  Quantities quantities_;
+  double seconds_ = 0;           // of the last run
+  std::vector<SolvedRun> runs_;  // the last three that went well
+  std::optional<Judged> judged_;
+  bool chosen_ = false;  // the one run that --within asks for was made
+};
+
+}  // namespace
+
+bool AccuracyReport::met() const {
+  const std::optional<double> reached = runs.empty() ? std::nullopt : runs.back().error;
+  return (!goal.error || (reached && *reached <= *goal.error)) && (!goal.within || seconds <= *goal.within);
+}
+
+std::string AccuracyReport::sentence() const {
+  const TriedRun& last = runs.back();
+  std::string asked = goal.error ? fmt::format("--accuracy {:.3g}%", 100 * *goal.error) : "";
+  if (goal.within) asked += fmt::format("{}--within {:.3g}s", asked.empty() ? "" : ", ", *goal.within);
+  std::string text =
+      fmt::format("{}: chose --size {} ({} cells) and --method {}; {:.2g} s with {} run(s) before it", asked,
+                  size_text(last.size), human_count(last.cells), method, seconds, runs.size() - 1);
+  text += last.error ? fmt::format("; the error reached is about {:.2g} % ({})", 100 * *last.error, last.of)
+                     : "; its error is not known: no coarser run to compare with";
+  if (!met())
+    text += goal.error && !(last.error && *last.error <= *goal.error)
+                ? fmt::format(", NOT the {:.3g} % asked for{}", 100 * *goal.error,
+                              stopped.empty() ? "" : ": " + stopped)
+                : ", and it took longer than predicted";
+  return text;
+}
+
+std::string AccuracyReport::json() const {
+  nlohmann::ordered_json json;
+  json["asked"] = goal.error ? nlohmann::ordered_json(*goal.error) : nullptr;
+  json["within"] = goal.within ? nlohmann::ordered_json(*goal.within) : nullptr;
+  json["size"] = runs.back().size;
+  json["method"] = method;
+  json["reached"] = runs.back().error ? nlohmann::ordered_json(*runs.back().error) : nullptr;
+  json["of"] = runs.back().of;
+  json["met"] = met();
+  json["seconds"] = seconds;
+  json["stopped"] = stopped;
+  json["runs"] = nlohmann::ordered_json::array();
+  for (const TriedRun& each : runs)
+    json["runs"].push_back({{"size", each.size},
+                            {"cells", each.cells},
+                            {"seconds", each.seconds},
+                            {"error", each.error ? nlohmann::ordered_json(*each.error) : nullptr},
+                            {"failure", each.failure}});
+  json["sentence"] = sentence();
+  return json.dump();
+}
+
+SolvedRun choose_resolution(const AccuracyGoal& goal, const SolveAt& solve, AccuracyReport& report,
+                            Progress& progress) {
+  report.goal = goal;
+  return Search(goal, solve, report, progress)();
+}
+
+double seconds_since(std::chrono::steady_clock::time_point began) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+}
+
+double mapping_difference(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
+  double difference = 0, largest = 0;
+  for (std::size_t v = 0; v < a.size() && v < b.size(); ++v) {
+    difference = std::max(difference, (a[v] - b[v]).norm());
+    largest = std::max(largest, a[v].norm());
+  }
+  return largest > 0 ? difference / largest : 0;
+}
+
+}  // namespace flexel

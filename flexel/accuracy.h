@@ -1,0 +1,74 @@
+// `flexel deform --accuracy 2%` and `--within 10s`: the resolution and the mapping method are chosen from
+// cheap runs (docs/deform.md, "How exact, how long").
+//
+// What is asked of every run: the displacement of the vertex that moves most, those of the scene's probes,
+// and, where a move drives the part, the elastic energy. The error of run i beside the coarser run i - 1 at
+// the ratio r of their spacings is
+//     confirmed order p (the run's own error bars or three runs): 1.25 |f_i - f_(i-1)| / (r^p - 1)
+//     else                                                        3    |f_i - f_(i-1)| / (r - 1)
+// (the grid convergence index with the safety factors of Roache, J. Fluids Eng. 116, 1994), and never less
+// than a confirmed error bar of the run itself. Which of the quantities is worst counts.
+#pragma once
+#include <chrono>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mapping/map.h"
+#include "simulate/simulate.h"
+#include "voxelize/voxelize.h"
+
+namespace flexel {
+
+// One run at one size, its body deformed.
+struct SolvedRun {
+  double size = 0;  // m, asked for
+  VoxelizeResult voxels;
+  SimulateResult simulated;
+  std::vector<Vec3> mapped;  // (vertices) m
+  double voxelize_seconds = 0, map_seconds = 0;
+};
+
+// Runs the stages at `size`; nothing: about 2,000 cells.
+using SolveAt = std::function<SolvedRun(std::optional<double> size)>;
+
+struct AccuracyGoal {
+  std::optional<double> error;   // share, of --accuracy
+  std::optional<double> within;  // s, of --within: from `began` to the end
+  std::chrono::steady_clock::time_point began;
+  bool driven = false;  // by moves: the elastic energy counts
+};
+
+struct TriedRun {
+  double size = 0;  // m
+  std::size_t cells = 0;
+  double seconds = 0;
+  std::optional<double> error;  // share
+  std::string of;               // the quantity that is worst: "probe tip", "largest displacement"
+  std::string failure;          // why there is nothing at this size
+};
+
+struct AccuracyReport {
+  AccuracyGoal goal;
+  std::vector<TriedRun> runs;  // in the order they were made; the last is the one that counts
+  std::string stopped;         // why no finer run was made, where the goal is not met
+  std::string method;          // of mapping
+  double seconds = 0;          // of all runs, until the result was written
+  [[nodiscard]] bool met() const;
+  // One sentence for people.
+  [[nodiscard]] std::string sentence() const;
+  [[nodiscard]] std::string json() const;  // docs/summary.md, "accuracy"
+};
+
+// Makes runs until the goal is met, or the next would take too long or need too much memory, or four finer
+// ones did not help. Returns the last good one. Throws what the first sizes threw where none can be solved.
+[[nodiscard]] SolvedRun choose_resolution(const AccuracyGoal& goal, const SolveAt& solve,
+                                          AccuracyReport& report, Progress& progress);
+
+[[nodiscard]] double seconds_since(std::chrono::steady_clock::time_point began);
+
+// Largest difference of two mappings of the same run, as a share of the largest displacement.
+[[nodiscard]] double mapping_difference(const std::vector<Vec3>& a, const std::vector<Vec3>& b);
+
+}  // namespace flexel

@@ -1,0 +1,100 @@
+// The choice of a resolution, on runs that are made up: a value that approaches its limit as c h^p.
+#include "flexel/accuracy.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "formats/error.h"
+
+namespace flexel {
+namespace {
+
+// A cube of side 1 m whose vertex moves by value(h), with `per_cell` seconds a cell.
+SolveAt made_up(const std::function<double(double)>& value, double per_cell = 0) {
+  return [=](std::optional<double> size) {
+    SolvedRun run;
+    run.size = size.value_or(0.08);
+    Part part;
+    part.name = "cube";
+    part.lattice.spacing = Vec3::Constant(run.size);
+    run.voxels.body.parts.push_back(part);
+    run.voxels.body.cell_elements.resize(static_cast<std::size_t>(std::pow(1 / run.size, 3)));
+    run.mapped = {Vec3(0, 0, value(run.size)), Vec3(0, 0, 0.1)};
+    run.simulated.seconds = per_cell * static_cast<double>(run.voxels.body.cell_count());
+    return run;
+  };
+}
+
+AccuracyReport choose(const SolveAt& solve, std::optional<double> error, double within = 1e5) {
+  AccuracyGoal goal;
+  goal.error = error;
+  goal.within = within;
+  goal.began = std::chrono::steady_clock::now();
+  AccuracyReport report;
+  Progress silent("", Progress::Mode::silent);
+  const SolvedRun last = choose_resolution(goal, solve, report, silent);
+  EXPECT_EQ(last.size, report.runs.back().size);
+  return report;
+}
+
+TEST(Accuracy, ReachesWhatWasAskedForAndSaysNoLessThanTheTrueError) {
+  for (const double order : {1.0, 1.5, 2.0})
+    for (const double wrong : {-3.0, 0.5, 5.0}) {
+      const auto value = [&](double h) { return 1 + wrong * std::pow(h, order); };
+      const AccuracyReport report = choose(made_up(value), 0.02);
+      const TriedRun& last = report.runs.back();
+      const double true_error = std::abs(1 / value(last.size) - 1);
+      ASSERT_TRUE(last.error.has_value());
+      EXPECT_GE(*last.error, 0.99 * true_error) << order << ' ' << wrong;
+      if (report.met()) {
+        EXPECT_LE(true_error, 0.02);
+      }
+      EXPECT_TRUE(report.met() || !report.stopped.empty()) << report.sentence();
+    }
+}
+
+TEST(Accuracy, ValuesThatJumpAreNotTrusted) {
+  int count = 0;
+  const auto value = [&](double) { return ++count % 2 ? 1.0 : 1.2; };
+  const AccuracyReport report = choose(made_up(value), 0.02);
+  EXPECT_FALSE(report.met());
+  EXPECT_NE(report.sentence().find("NOT the 2 % asked for"), std::string::npos) << report.sentence();
+}
+
+TEST(Accuracy, WithinIsTheFinestThatFits) {
+  const auto value = [](double h) { return 1 + h; };
+  const AccuracyReport report = choose(made_up(value, 1e-4), std::nullopt, 20);
+  // The runs take no time of their own: about 0.85 x 20 s at 1e-4 s a cell
+  EXPECT_LT(report.runs.back().seconds, 20);
+  EXPECT_GT(report.runs.back().seconds, 8);
+}
+
+TEST(Accuracy, SizesAreThoseThatAreSaid) {
+  const AccuracyReport report = choose(made_up([](double h) { return 1 + h; }), 0.02);
+  EXPECT_NE(report.sentence().find("--size"), std::string::npos);
+  for (const TriedRun& run : report.runs)
+    EXPECT_NEAR(run.size, std::stod(fmt::format("{:.3g}", run.size)), 1e-12);
+}
+
+TEST(Accuracy, SizesThatCannotBeSolvedAreLeftOut) {
+  const SolveAt solve = made_up([](double h) { return 1 + h * h; });
+  const SolveAt picky = [&](std::optional<double> size) {
+    if (size && *size > 0.05) throw InputError("too coarse");
+    return solve(size);
+  };
+  const AccuracyReport report = choose(picky, 0.02);
+  EXPECT_EQ(report.runs.front().failure, "too coarse");
+  EXPECT_TRUE(report.met());
+  EXPECT_THROW(choose(
+                   [](std::optional<double> size) -> SolvedRun {
+                     if (size) throw InputError("never");
+                     return made_up([](double) { return 1.0; })(size);
+                   },
+                   0.02),
+               InputError);
+}
+
+}  // namespace
+}  // namespace flexel
