@@ -1,6 +1,6 @@
 // The edge of a program. run_program() is the only place where exceptions become words and exit codes;
-// parse_arguments() turns what CLI11 throws into InputError; the signal handlers only set a flag (first
-// SIGINT) or remove the temporary outputs and end the process (second SIGINT, SIGTERM, SIGHUP).
+// parse_arguments() turns what CLI11 throws into InputError; the signal handlers only set a flag (the first
+// SIGINT, and where it waits SIGTERM or SIGHUP) or remove the temporary outputs and end the process.
 #include "formats/program.h"
 
 #include <fcntl.h>
@@ -17,21 +17,30 @@
 #include <numeric>
 
 #include "formats/files.h"
+#include "formats/termination.h"
 
 namespace flexel {
 namespace {
 
-volatile std::sig_atomic_t interrupt_count = 0;
+volatile std::sig_atomic_t interrupt_count = 0, interrupting_signal = SIGINT, termination_waits = 0;
 
-void on_interrupt(int) {
+// As a shell gives it.
+int exit_code_of(int signal) {
+  return 128 + signal;
+}
+static_assert(128 + SIGINT == kExitInterrupted);
+
+void on_interrupt(int signal) {
   interrupt_count = interrupt_count + 1;
   if (interrupt_count > 1) {
     remove_temporary_outputs();
-    _exit(kExitInterrupted);
+    _exit(exit_code_of(signal));
   }
+  interrupting_signal = signal;
 }
 
 void on_termination(int signal) {
+  if (termination_waits > 0) return on_interrupt(signal);
   remove_temporary_outputs();
   std::signal(signal, SIG_DFL);
   std::raise(signal);
@@ -167,8 +176,9 @@ int run_program(const std::string& name, const std::function<int()>& body) {
   } catch (const InvalidMappingError& error) {
     return report(name, error.what(), kExitInvalidMapping);
   } catch (const Interrupted&) {
-    std::fprintf(stderr, "%s: interrupted\n", name.c_str());
-    return kExitInterrupted;
+    const int signal = interrupting_signal;
+    std::fprintf(stderr, "%s: %s\n", name.c_str(), signal == SIGINT ? "interrupted" : "terminated");
+    return exit_code_of(signal);
   } catch (const ReaderClosedPipe&) {
     return kExitReaderClosedPipe;
   } catch (const std::bad_alloc&) {
@@ -202,6 +212,13 @@ bool parse_arguments(CLI::App& app, int argc, char** argv) {
     throw InputError(fmt::format("{}; --help shows what is accepted", one_line(error.what())));
   }
   return false;
+}
+
+TerminationWaits::TerminationWaits() {
+  termination_waits = termination_waits + 1;
+}
+TerminationWaits::~TerminationWaits() {
+  termination_waits = termination_waits - 1;
 }
 
 bool interrupted() {

@@ -4,6 +4,7 @@
 #include "simulate/cells.h"
 
 #include <Eigen/Eigenvalues>
+#include <cmath>
 #include <limits>
 #include <memory>
 
@@ -235,9 +236,10 @@ SmallestJacobian Cells::smallest_jacobian(const State& state) const {
       [&](std::size_t c) {
         if (!active_[c]) return Smallest{};
         const auto cell = static_cast<std::uint32_t>(c);
-        return Smallest{1 + volume_change(displacement_gradient(kinds_[part_[c]],
-                                                                corner_values(cell, state.displacement))),
-                        cell};
+        const double value = 1 + volume_change(displacement_gradient(
+                                     kinds_[part_[c]], corner_values(cell, state.displacement)));
+        // one that is not a number must win
+        return Smallest{std::isnan(value) ? -std::numeric_limits<double>::infinity() : value, cell};
       },
       kGrain);
   return found(smallest);

@@ -12,6 +12,7 @@
 #include "simulate/central_spring.h"
 #include "simulate/greatest.h"
 #include "simulate/rest_shape.h"
+#include "simulate/time/damping_factors.h"
 
 namespace flexel {
 namespace {
@@ -125,19 +126,20 @@ void PaperModel::add_forces(const State& state, std::vector<Vec3>& forces) const
 
 void PaperModel::add_damping(const State& state, const std::vector<double>& damping,
                              std::vector<Vec3>& forces) const {
+  const std::vector<double> factor = element_damping_factors(body_);
   parallel_for_each(
       rows_.offsets.size() - 1,
       [&](std::size_t e) {
         const auto element = static_cast<std::uint32_t>(e);
-        const double tau = damping[part_[e]];
-        if (tau == 0) return;
+        if (damping[part_[e]] == 0) return;
         for (const ConnectionRows::Entry& entry : rows_.of(element)) {
+          const double change = factor.empty() ? 1 : 0.5 * (factor[e] + factor[entry.other]);
           const ConnectionKind& connection = kind(element, entry.kind);
           const Vec3 direction =
               (entry.sign * connection.rest + (state.displacement[entry.other] - state.displacement[e]))
                   .normalized();
           const double rate = direction.dot(state.velocity[entry.other] - state.velocity[e]);
-          forces[e] += (tau * stiffness(element, entry) * rate) * direction;
+          forces[e] += (damping[part_[e]] * change * stiffness(element, entry) * rate) * direction;
         }
       },
       kGrain);

@@ -46,12 +46,14 @@ ProbePoints place_point(const Probe& probe, const Setting& setting) {
     const double spacing = part.lattice.spacing.maxCoeff();
     for (std::uint32_t c = part.cell_begin; c < part.cell_end; ++c) {
       const double distance = distance_from_voxel(part.lattice, lowest_corner(body, c), *probe.at);
-      if (distance < found.distance && !setting.stray_cell[c]) found = {distance, spacing, p, c};
+      if (distance < found.distance && !(c < setting.stray_cell.size() && setting.stray_cell[c]))
+        found = {distance, spacing, p, c};
     }
     if (part.placement == Placement::corner) continue;
     for (std::uint32_t e = part.element_begin; e < part.element_end; ++e) {
       const double distance = distance_from_voxel(part.lattice, body.lattice_index[e], *probe.at);
-      if (distance < found.distance && !setting.stray_element[e]) found = {distance, spacing, p, 0};
+      if (distance < found.distance && !(e < setting.stray_element.size() && setting.stray_element[e]))
+        found = {distance, spacing, p, 0};
     }
   }
   if (!(found.distance <= found.spacing))

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "formats/units.h"
@@ -67,6 +68,34 @@ void measure_stress(const Setting& setting, const State& state, Body& body, Simu
   result.stress = StressSummary{largest->value, largest->at, body.parts[largest->part].name, {}};
   if (yield > 0) result.stress->yield_share = largest->value / yield;
   write_stress_columns(computed, body);
+}
+
+void add_shares(const std::vector<PassShare>& shares, std::vector<PassShare>& all) {
+  std::vector<bool> free(all.size(), true);  // two of one name are two
+  for (const PassShare& share : shares) {
+    std::size_t i = 0;
+    while (i < free.size() && !(free[i] && all[i].name == share.name)) ++i;
+    if (i == free.size()) {
+      all.push_back(share);
+      continue;
+    }
+    free[i] = false;
+    all[i].why = share.why;
+    all[i].seconds += share.seconds;
+  }
+}
+
+void explain_times(const std::vector<PassShare>& shares, double seconds, Progress& progress) {
+  double rest = seconds;
+  const auto line = [&](const std::string& name, double taken) {
+    progress.say(
+        fmt::format("time: {:<14} {:8.3f} s {:5.1f} %", name, taken, 100 * taken / std::max(seconds, 1e-9)));
+  };
+  for (const PassShare& share : shares) {
+    line(share.name, share.seconds);
+    rest -= share.seconds;
+  }
+  line("the rest", std::max(rest, 0.0));
 }
 
 double body_extent(const Body& body) {

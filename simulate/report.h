@@ -21,6 +21,13 @@ void measure_corners(const Cells& cells, const Body& body, const State& state, S
 // The stresses of the final state: columns of the body, and the largest. Model `paper` has none.
 void measure_stress(const Setting& setting, const State& state, Body& body, SimulateResult& result);
 
+// Adds the times that effects took in one stretch of a run to those of the stretches before: an effect that
+// was there already goes on.
+void add_shares(const std::vector<PassShare>& shares, std::vector<PassShare>& all);
+
+// What --explain says after a run of so many seconds: the time of each share, and what is in none of them.
+void explain_times(const std::vector<PassShare>& shares, double seconds, Progress& progress);
+
 // Diagonal of the box around the elements at rest [m].
 [[nodiscard]] double body_extent(const Body& body);
 

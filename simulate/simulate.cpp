@@ -74,15 +74,6 @@ void explain_before(const std::vector<Pass>& passes, Progress& progress) {
   for (const Pass& pass : passes) progress.say(fmt::format("plan: {} ({})", pass.name, pass.why));
 }
 
-void explain_after(const SimulateResult& result, double linear_seconds, Progress& progress) {
-  const auto line = [&](const std::string& name, double seconds) {
-    progress.say(fmt::format("time: {:<14} {:8.3f} s {:5.1f} %", name, seconds,
-                             100 * seconds / std::max(result.seconds, 1e-9)));
-  };
-  for (const PassShare& pass : result.passes) line(pass.name, pass.seconds);
-  line("linear solver", linear_seconds);
-}
-
 double mass_of(const Setting& setting) {
   const std::vector<std::uint32_t> part = cell_parts(setting.body);
   const std::vector<double> share = mass_shares(setting.body), factor = mass_factors(setting.body);
@@ -233,7 +224,11 @@ SimulateResult Run::operator()() {
   result.cg_iterations = solved.cg_iterations;
   result.relative_residual = solved.relative_residual;
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
-  if (options_.explain) explain_after(result, solved.linear_seconds, progress_);
+  if (options_.explain) {
+    std::vector<PassShare> shares = result.passes;
+    shares.push_back({"linear solver", "", solved.linear_seconds});
+    explain_times(shares, result.seconds, progress_);
+  }
   return result;
 }
 

@@ -190,6 +190,10 @@ void Ties::add_stiffness(const State&, BlockMatrix& matrix) const {
 
 void Ties::constrain(Constraints& constraints) const {
   constraints.start = start_;
+  if (constraints.mask.empty()) {  // a timed run, where nothing else holds elements
+    constraints.mask.assign(body_->element_count(), 0);
+    constraints.motion.assign(body_->element_count(), {0, 0, 0});
+  }
   for (std::size_t t = 0; t < ties_.size(); ++t) {
     const auto motion = static_cast<std::uint32_t>(constraints.motions.size());
     constraints.motions.push_back(ties_[t].motion);

@@ -33,10 +33,12 @@ Edit Edit::parse(TableReader& reader) {
   Edit made;
   made.region_ = parse_region(reader);
   made.stiffness_ = factor(reader, "stiffness");
+  made.damping_ = factor(reader, "damping");
   made.density_ = factor(reader, "density");
-  if (made.stiffness_ == 1 && made.density_ == 1)
+  if (made.stiffness_ == 1 && made.damping_ == 1 && made.density_ == 1)
     reader.fail(
-        "edit needs \"stiffness\" or \"density\", factors on what there is, for example stiffness = 2");
+        "edit needs \"stiffness\", \"damping\" or \"density\", factors on what there is, for example "
+        "stiffness = 2");
   return made;
 }
 
@@ -47,11 +49,14 @@ std::string Edit::happen(Stage& stage) const {
     if (part.placement == Placement::corner)
       std::fill(elements.begin() + part.element_begin, elements.begin() + part.element_end, 0);
   const bool by_elements = std::find(elements.begin(), elements.end(), 1) != elements.end();
-  for (const auto& [column, by] : {std::pair{"stiffness_change", stiffness_}, {"density_change", density_}}) {
+  for (const auto& [column, by] : {std::pair{"stiffness_change", stiffness_},
+                                   {"damping_change", damping_},
+                                   {"density_change", density_}}) {
     multiply(stage.body.cell_columns, column, chosen.cells, by);
     if (by_elements) multiply(stage.body.element_columns, column, elements, by);
   }
-  return fmt::format("{}: stiffness times {}, density times {}", describe(region_), stiffness_, density_);
+  return fmt::format("{}: stiffness times {}, damping times {}, density times {}", describe(region_),
+                     stiffness_, damping_, density_);
 }
 
 }  // namespace flexel

@@ -3,6 +3,10 @@
 
 #include <fmt/format.h>
 
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -19,56 +23,21 @@ namespace {
 
 constexpr double kSafety = 0.9;       // of the bound: it may fall between two checks
 constexpr int kImplicitSteps = 200;   // in a run, unless the scene says otherwise
+constexpr int kFailures = 30;         // of Newton's method within an implicit step
 constexpr std::uint64_t kRenew = 10;  // implicit steps that one tangent may serve
 constexpr double kRunaway = 1e4;      // of the body's diagonal: a displacement that no scene means
 
-Constraints no_constraints(const Body& body) {
-  Constraints constraints;
-  constraints.mask.assign(body.element_count(), 0);
-  constraints.motion.assign(body.element_count(), {0, 0, 0});
-  return constraints;
-}
-
 }  // namespace
 
-State beginning(const Body& body) {
-  State state;
-  state.time = 0;
-  state.displacement.resize(body.element_count());
-  for (std::size_t e = 0; e < body.element_count(); ++e)
-    state.displacement[e] = body.position[e] - body.rest[e];
-  state.velocity.assign(body.element_count(), Vec3::Zero());
-  const auto found = body.element_columns.find("velocity");
-  if (found == body.element_columns.end() || found->second.components != 3) return state;
-  const std::vector<double>& values = found->second.values;
-  for (std::size_t e = 0; e < body.element_count(); ++e)
-    state.velocity[e] = Vec3(values[3 * e], values[3 * e + 1], values[3 * e + 2]);
-  return state;
-}
-
-Setting timed_setting(const Body& body, const Scene& scene, const Beginning& beginning) {
-  return {body,
-          materials_of_parts(scene, body),
-          std::vector<std::uint8_t>(body.cell_count(), 0),
-          models_of_parts(scene, body),
-          hooke_of_parts(scene, body),
-          std::vector<std::uint8_t>(body.element_count(), 0),
-          scene.run.time,
-          beginning.settled,
-          beginning.bonding_parts,
-          RigidParts::rigidity(scene.get<RigidParts>(), body)};
-}
-
 Act::Act(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress,
-         const Beginning& beginning)
+         const Beginning& beginning, State state)
     : body_(body),
       scene_(scene),
       progress_(progress),
       setting_(timed_setting(body, scene, beginning)),
       probes_(place_probes(scene, setting_)),
       passes_(Effects::passes(scene.effects, setting_)),
-      constraints_(no_constraints(body)),
-      state_(beginning.state) {
+      state_(std::move(state)) {
   const bool fresh = beginning.fresh;
   if (!beginning.fused.empty()) passes_.push_back(make_pass(FusedPoints(body, beginning.fused)));
   if (fresh) warn_of_springs(setting_, progress_);
@@ -94,9 +63,17 @@ Act::Act(Body& body, const Scene& scene, const SimulateOptions& options, Progres
   if (!by_steps) implicit_.emplace(*stepper_, *held_);
   make_forces();
   if (implicit) make_implicit();
+  if (options.history.empty() && !asks_for_mass()) stepper_->drop_mass();
+}
+
+bool Act::asks_for_mass() const {
+  return paper_ || implicit_ || euler_ || !constraints_.mask.empty() ||
+         std::any_of(passes_.begin(), passes_.end(),
+                     [](const Pass& pass) { return pass.added_frequency || pass.finish_step; });
 }
 
 void Act::refuse_held_rigid() const {
+  if (constraints_.mask.empty()) return;
   for (std::size_t p = 0; p < setting_.rigidity.size(); ++p)
     for (std::uint32_t e = body_.parts[p].element_begin; e < body_.parts[p].element_end; ++e)
       if (setting_.rigidity[p] != Rigidity::none && constraints_.mask[e])
@@ -153,7 +130,7 @@ void Act::look() {
 void Act::choose_step(Clock& clock) {
   look();
   const double longest = bound_->longest(implicit_.has_value());
-  if (!(longest > 0)) throw DivergedError(where_it_folds(body_, state_.displacement));
+  if (!(longest > 0)) throw DivergedError(where_it_folds(setting_, state_));
   double step = kSafety * longest;
   if (euler_) {
     step = scene_.run.step.value_or(*scene_.run.time / kImplicitSteps);
@@ -170,20 +147,25 @@ void Act::choose_step(Clock& clock) {
   // without stiffness there is no bound: a thousand steps draw the path
   if (!std::isfinite(step)) step = *scene_.run.time / 1000;
   if (!(step > 1e-12 * *scene_.run.time))
-    throw DivergedError(fmt::format("the stable step has fallen to {:.3g} s: {}", step,
-                                    where_it_folds(body_, state_.displacement)));
+    throw DivergedError(
+        fmt::format("the stable step has fallen to {:.3g} s: {}", step, where_it_folds(setting_, state_)));
   clock.step = left / std::ceil(left / step - 1e-9);
 }
 
 void Act::refuse_unsound() {
   double farthest = 0;
-  for (const Vec3& u : state_.displacement)
-    farthest = u.allFinite() ? std::max(farthest, u.squaredNorm()) : std::numeric_limits<double>::infinity();
-  if (!(std::sqrt(farthest) < kRunaway * (1 + body_extent(body_))))
-    throw DivergedError("the motion ran away: look at loads and units, or give a shorter [run] step");
+  std::size_t where = 0;
+  for (std::size_t e = 0; e < state_.displacement.size(); ++e) {
+    const Vec3& u = state_.displacement[e];
+    const double far = u.allFinite() ? u.norm() : std::numeric_limits<double>::infinity();
+    if (!(far > farthest)) continue;
+    farthest = far;
+    where = e;
+  }
+  if (!(farthest < kRunaway * (1 + body_extent(body_))))
+    throw DivergedError(runs_away_at(body_.rest[where], scene_.run.method));
   look();
-  if (!(bound_->longest(implicit_.has_value()) > 0))
-    throw DivergedError(where_it_folds(body_, state_.displacement));
+  if (!(bound_->longest(implicit_.has_value()) > 0)) throw DivergedError(where_it_folds(setting_, state_));
 }
 
 void Act::adapt_step(Clock& clock) {
@@ -237,15 +219,18 @@ void Act::step_implicitly(Clock& clock, History* history, bool row) {
   if (history && row) history->add_row_of(state_);
   if (renews(clock)) euler_->forget();
   const double end = clock.epoch + static_cast<double>(clock.in_epoch + 1) * clock.step;
+  int failures = 0;
   while (*state_.time < end) {
-    const ImplicitStep told = euler_->advance(state_, end, hear_);
+    const ImplicitStep told = euler_->advance(state_, end, clock.step, hear_);
     newton_iterations_ += told.newton_iterations;
     cg_iterations_ += told.cg_iterations;
-    if (told.step == 0)
+    failures += told.failures;
+    if (told.step == 0 || failures > kFailures)
       throw DivergedError(fmt::format(
-          "Newton's method ends nowhere, with steps of {:.3g} s and down to 1/1024 of it: {}; load "
-          "it more slowly or give a shorter [run] step",
-          clock.step, told.trouble));
+          "Newton's method ends nowhere, with steps of {:.3g} s and {}: {}{}; load it more slowly "
+          "or give a shorter [run] step",
+          clock.step, told.step == 0 ? "down to 1/1024 of it" : fmt::format("{} shorter ones", failures),
+          told.trouble, squeezed_most(setting_, state_)));
     held_->settle(state_, euler_->supports());
     if (!history) continue;
     for (std::size_t p = 0; p < passes_.size(); ++p)
@@ -322,7 +307,7 @@ void Act::step(Clock& clock, History* history, bool row) {
                    clock.step);
   }
   clock.previous = clock.step;
-  if (!(outcome.smallest_jacobian > 0)) throw DivergedError(where_it_folds(body_, state_.displacement));
+  if (!(outcome.smallest_jacobian > 0)) throw DivergedError(where_it_folds(setting_, state_));
 }
 
 void Act::slow(double factor) {
@@ -364,6 +349,18 @@ void Act::store(const State& state) {
   stepper_->write_memory(body_.cell_count(), body_.cell_columns);
 }
 
+bool Act::damps() const {
+  return std::any_of(plan_.damping.begin(), plan_.damping.end(), [](double tau) { return tau > 0; });
+}
+
+void Act::unload() {
+  body_.position = {};
+  body_.element_columns.erase("velocity");
+#ifdef __GLIBC__
+  malloc_trim(0);  // likewise what was freed since the body was read
+#endif
+}
+
 void Act::report(const Clock& clock, bool stress, SimulateResult& result) {
   tell_forces(result);
   for (const ProbePoints& probe : probes_) result.probes.push_back(measure(probe, state_));
@@ -378,17 +375,21 @@ void Act::report(const Clock& clock, bool stress, SimulateResult& result) {
   measure_corners(cells, body_, state_, result, progress_);
   if (stress) measure_stress(setting_, state_, body_, result);
   measure_displacement(body_, state_, result);
-  for (const double mass : stepper_->mass()) result.mass += mass;
+  for (const double mass : lumped_masses(setting_)) result.mass += mass;
   result.timed = TimedSummary{*state_.time, clock.steps, clock.step, stepper_->isa(), {}};
-  result.newton_iterations = newton_iterations_;
-  result.cg_iterations = cg_iterations_;
+}
+
+void Act::add_effort(SimulateResult& result) {
+  result.newton_iterations += newton_iterations_;
+  result.cg_iterations += cg_iterations_;
   if (euler_) euler_->add_seconds(passes_);
-  result.passes.push_back({"cells",
-                           euler_ ? "model of every part, Newton's method and its linear solver"
-                                  : fmt::format("model of every part, kernel {}", stepper_->isa()),
-                           kernel_seconds_});
-  if (paper_) result.passes.push_back({"connections", "model of centre-placed parts", paper_seconds_});
-  for (const Pass& pass : passes_) result.passes.push_back({pass.name, pass.why, pass.seconds});
+  std::vector<PassShare> shares{{"cells",
+                                 euler_ ? "model of every part, Newton's method and its linear solver"
+                                        : fmt::format("model of every part, kernel {}", stepper_->isa()),
+                                 kernel_seconds_}};
+  if (paper_) shares.push_back({"connections", "model of centre-placed parts", paper_seconds_});
+  for (const Pass& pass : passes_) shares.push_back({pass.name, pass.why, pass.seconds});
+  add_shares(shares, result.passes);
 }
 
 }  // namespace flexel

@@ -31,9 +31,8 @@ struct Clock {
 // one, at time 0.
 [[nodiscard]] State beginning(const Body& body);
 
-// What an act begins with, beside the body.
+// What an act begins with, beside the body and the state.
 struct Beginning {
-  State state;
   // The run begins: effects that change the state at its start do, and held elements are put on their paths.
   bool fresh = true;
   std::vector<Vec3> settled = {};        // Setting::settled
@@ -48,7 +47,7 @@ class Act {
  public:
   // Refers to the others while it lives. Throws InputError.
   Act(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress,
-      const Beginning& beginning);
+      const Beginning& beginning, State state);
   Act(const Act&) = delete;
   Act& operator=(const Act&) = delete;
 
@@ -90,6 +89,10 @@ class Act {
 
   // Moves the body to `state`: positions, velocities, what broke, what the cells remember.
   void store(const State& state);
+  // Frees what the next store() makes anew: positions and velocities of the body.
+  void unload();
+  // Adds the time of everything that acted, and the iterations, to `result`; once.
+  void add_effort(SimulateResult& result);
   // What can be measured now, with the stresses where they are asked for. `unbalanced` forces are those of
   // the last step.
   void report(const Clock& clock, bool stress, SimulateResult& result);
@@ -98,6 +101,7 @@ class Act {
   [[nodiscard]] const std::vector<Pass>& passes() const { return passes_; }
   [[nodiscard]] const Stepper& stepper() const { return *stepper_; }
   [[nodiscard]] bool solves() const { return implicit_.has_value(); }
+  [[nodiscard]] bool damps() const;  // internally
   [[nodiscard]] bool is_implicit() const { return euler_.has_value(); }
   [[nodiscard]] std::unique_ptr<History> make_history(Ledger ledger) const;
 
@@ -105,6 +109,7 @@ class Act {
   void make_forces();
   void make_implicit();
   void refuse_held_rigid() const;
+  [[nodiscard]] bool asks_for_mass() const;
   void step_implicitly(Clock& clock, History* history, bool row);
   void look();
   template <class Add>

@@ -14,6 +14,7 @@
 #include "formats/parallel.h"
 #include "simulate/cells.h"
 #include "simulate/rest_shape.h"
+#include "simulate/time/damping_factors.h"
 
 namespace flexel {
 namespace {
@@ -73,7 +74,9 @@ void set_damping(const Setting& setting, const Stencil& stencil, const std::vect
                  const std::vector<Vec3>& displacement, BlockMatrix& matrix) {
   const Body& body = setting.body;
   const std::vector<std::uint32_t> part = element_parts(body);
-  const std::vector<double> share = stiffness_shares(body);
+  std::vector<double> share = stiffness_shares(body);
+  const std::vector<double> factor = damping_factors(body);
+  for (std::size_t c = 0; c < factor.size(); ++c) share[c] *= factor[c];
   std::vector<CellKind> cells;
   std::vector<std::optional<SpringKind>> springs(body.parts.size());
   for (std::size_t p = 0; p < body.parts.size(); ++p) {

@@ -1,16 +1,22 @@
-// What a timed run says of matter that turned inside out.
+// What a timed run says of matter that turned inside out or ran away.
 #pragma once
 #include <string>
-#include <vector>
 
-#include "formats/body.h"
+#include "simulate/scene.h"
+#include "simulate/state.h"
 
 namespace flexel {
 
 // "`what` near (...) turned inside out", `at` [m] at rest, and what to do about it.
 [[nodiscard]] std::string folds_at(const char* what, const Vec3& at);
 
-// That of the cell with the least volume, its elements displaced by `displacement` [m] (elements).
-[[nodiscard]] std::string where_it_folds(const Body& body, const std::vector<Vec3>& displacement);
+// "the motion ran away near (...)", `at` [m] at rest, and what to do about it.
+[[nodiscard]] std::string runs_away_at(const Vec3& at, TimeMethod method);
+
+// That of the cell with the least volume.
+[[nodiscard]] std::string where_it_folds(const Setting& setting, const State& state);
+
+// ", squeezed most near (...), to J = 0.02", of the same cell; nothing without cells.
+[[nodiscard]] std::string squeezed_most(const Setting& setting, const State& state);
 
 }  // namespace flexel

@@ -12,7 +12,6 @@ namespace flexel {
 namespace {
 
 constexpr double kTolerance = 1e-6;  // of the residual in the norm of the inverse masses
-constexpr int kIterations = 5000;
 
 double weighted(const std::vector<Vec3>& a, const std::vector<Vec3>& b, const std::vector<double>& weight) {
   return parallel_sum<double>(a.size(), [&](std::size_t e) { return weight[e] * a[e].dot(b[e]); });
@@ -59,7 +58,7 @@ StepOutcome ImplicitDamping::advance(State& state, const std::vector<Vec3>& oute
   double norm = weighted(residual_, residual_, inverse);
   parallel_for_each(n, [&](std::size_t e) { direction_[e] = inverse[e] * residual_[e]; });
   for (int i = 0; norm > enough; ++i) {
-    if (i == kIterations || !std::isfinite(norm))
+    if (i == most_ || !std::isfinite(norm))
       throw DivergedError(
           fmt::format("the damping of the step was not solved in {} iterations: give a shorter [damping] "
                       "time or [run] step",

@@ -16,12 +16,16 @@ namespace flexel {
 
 class ImplicitDamping {
  public:
-  // `stepper` needs a book (its damping forces are read), and must outlive it, as must `held`.
-  ImplicitDamping(Stepper& stepper, const Held& held) : stepper_(stepper), held_(held) {}
+  static constexpr int kIterations = 5000;
+
+  // `stepper` needs a book (its damping forces are read), and must outlive it, as must `held`. `iterations`:
+  // of a step, at most.
+  ImplicitDamping(Stepper& stepper, const Held& held, int iterations = kIterations)
+      : stepper_(stepper), held_(held), most_(iterations) {}
 
   // One step: velocities to v+, displacements by `drift` times them. `state.time` becomes `time`. Velocities
-  // of held components are left as if free, for Held::impose. Throws std::runtime_error where the search does
-  // not end.
+  // of held components are left as if free, for Held::impose. Throws DivergedError where the search does not
+  // end.
   StepOutcome advance(State& state, const std::vector<Vec3>& outer, const step::Advance& advance,
                       double time);
 
@@ -39,6 +43,7 @@ class ImplicitDamping {
   std::vector<Vec3> change_;                                         // x of the last step [m/s]
   std::vector<Vec3> before_, right_, residual_, direction_, image_;  // kept from step to step
   State probe_;
+  int most_;
   std::uint64_t iterations_ = 0;
 };
 

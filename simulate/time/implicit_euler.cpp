@@ -170,19 +170,22 @@ bool ImplicitEuler::attempt(State& state, double step, double end,
   return true;
 }
 
-ImplicitStep ImplicitEuler::advance(State& state, double end,
+ImplicitStep ImplicitEuler::advance(State& state, double end, double whole,
                                     const std::function<void(const std::string&)>& progress) {
   ImplicitStep told;
-  const double whole = end - *state.time;
-  double step = std::min(whole, reach_);
-  if (whole - step < 0.25 * step) step = whole;
-  for (const double shortest = kShortest * step; step >= shortest; step /= 2) {
-    if (attempt(state, step, step == whole ? end : *state.time + step, progress, told)) {
+  const double left = end - *state.time;
+  double step = std::min(left, reach_);
+  if (left - step < 0.25 * step) step = left;
+  // Steps that shrink without end would come nearer and nearer to what stops them, until nothing is left of
+  // them but rounding.
+  for (const double shortest = std::min(left, kShortest * whole); step >= shortest; step /= 2) {
+    if (attempt(state, step, step == left ? end : *state.time + step, progress, told)) {
       told.step = step;
-      reach_ = step == whole ? std::max(reach_, 2 * step) : 2 * step;
+      reach_ = step == left ? std::max(reach_, 2 * step) : 2 * step;
       return told;
     }
     forget();
+    ++told.failures;
     reach_ = step / 2;
   }
   return told;

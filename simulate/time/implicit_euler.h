@@ -19,7 +19,8 @@ namespace flexel {
 struct ImplicitStep {
   double step = 0;  // s it went; 0: Newton's method failed for every length that was tried
   int newton_iterations = 0, cg_iterations = 0;
-  std::string trouble;  // of the last failure
+  int failures = 0;     // of Newton's method, each at another length
+  std::string trouble;  // of the last one
 };
 
 class ImplicitEuler {
@@ -32,9 +33,10 @@ class ImplicitEuler {
   ImplicitEuler& operator=(const ImplicitEuler&) = delete;
 
   // Advances `state` to the time `end` [s], or where Newton's method fails part of the way there: a half, a
-  // quarter ... of it, and later steps grow back. On failure `state` is untouched. `progress` hears of every
-  // iteration and may throw.
-  ImplicitStep advance(State& state, double end, const std::function<void(const std::string&)>& progress);
+  // quarter ... of it, but no less than 1/1024 of `whole` [s], and later steps grow back. On failure `state`
+  // is untouched. `progress` hears of every iteration and may throw.
+  ImplicitStep advance(State& state, double end, double whole,
+                       const std::function<void(const std::string&)>& progress);
 
   // The next step makes its tangent anew, so that it depends on the state and reach() alone.
   void forget() { memory_ = {}; }

@@ -45,7 +45,7 @@ struct CellsModel {
     Lanes matter = fill;  // the share of the voxel; that volume in the rest shape
     Corners corners;
     Modes u[3], v[3];
-    read_corners(block, scratch.column + kDisplacement, corners);
+    read_corners(chunk, block, scratch.column + kDisplacement, corners);
     for (int i = 0; i < 3; ++i) u[i] = transform(corners, i);
     const Gradient g = gradient_of(u, k, fill, sums);
     Matrix stress;
@@ -66,7 +66,7 @@ struct CellsModel {
       if constexpr (has.fracture) now = elastic_state(g, u, g.change, log_volume, k);
     }
     if constexpr (has.damping != Damping::none) {
-      read_corners(block, scratch.column + kVelocity, corners);
+      read_corners(chunk, block, scratch.column + kVelocity, corners);
       for (int i = 0; i < 3; ++i) v[i] = transform(corners, i);
     }
     if constexpr (has.fracture) {
@@ -93,7 +93,7 @@ struct CellsModel {
       add_damping(g, u, v, k, viscous, spin_free);
       if constexpr (has.damping == Damping::book) {
         forces_of(viscous, spin_free, matter, k, corners);
-        add_to_corners(block, corners, scratch.column + kDampingForce);
+        add_to_corners(chunk, block, corners, scratch.column + kDampingForce);
       }
       for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) stress.at[i][j] += viscous.at[i][j];
@@ -101,7 +101,7 @@ struct CellsModel {
         for (int i = 0; i < 3; ++i) mode_force[m][i] += spin_free[m][i];
     }
     forces_of(stress, mode_force, matter, k, corners);
-    add_to_corners(block, corners, scratch.column + kForce);
+    add_to_corners(chunk, block, corners, scratch.column + kForce);
   }
 
  private:

@@ -15,10 +15,10 @@ constexpr std::size_t kLanes = 8;  // cells that are computed side by side, on e
 
 // Eight cells of a chunk. Lanes without a cell have fill 0 and corners 0.
 struct CellBlock {
-  std::uint16_t corner[8][kLanes];  // elements, numbered within the chunk
-  double fill[kLanes];              // times what an edit made of it; 0: absent or broken, resists nothing
-  // 1: corner[a][l] = corner[a][0] + l for every corner: neighbours along a row
-  std::uint64_t is_run;
+  double fill[kLanes];    // times what an edit made of it; 0: absent or broken, resists nothing
+  std::uint32_t corners;  // place in ChunkView::corners, where there are (8 x kLanes) of the block's
+  // 1: (8), those of lane 0: lane l has each of them l further on, as neighbours along a row do
+  std::uint32_t is_run;
 };
 
 // Connections of one direction of the lattice, eight side by side (simulate/time/connection_runs.h). The
@@ -78,10 +78,11 @@ struct SpringFlow {
 // A set of cells that one thread computes at a time, and the elements at their corners. Elements that no
 // other chunk touches are advanced with it; the forces on the others go to `shared_force`.
 struct ChunkView {
-  CellBlock* blocks;        // fracture sets the fill of cells that break to 0
-  PlasticBlock* plastic;    // (block_count); null in the variants without plasticity
-  SpringBlock* springs;     // (block_count); null but with fracture of springs
-  SpringFlow* spring_flow;  // (block_count); null but with plasticity of springs
+  CellBlock* blocks;             // fracture sets the fill of cells that break to 0
+  const std::uint16_t* corners;  // elements, numbered within the chunk
+  PlasticBlock* plastic;         // (block_count); null in the variants without plasticity
+  SpringBlock* springs;          // (block_count); null but with fracture of springs
+  SpringFlow* spring_flow;       // (block_count); null but with plasticity of springs
   std::size_t block_count;
   const ConnectionRun* runs;  // in place of blocks where connections are computed one by one
   std::size_t run_count;

@@ -119,8 +119,8 @@ struct SpringsModel {
     const CellConstants& k = *chunk.constants;
     const Lanes fill = load(block.fill);
     Corners u, v, force = {}, damped = {};
-    read_corners(block, scratch.column + kDisplacement, u);
-    if constexpr (damping != Damping::none) read_corners(block, scratch.column + kVelocity, v);
+    read_corners(chunk, block, scratch.column + kDisplacement, u);
+    if constexpr (damping != Damping::none) read_corners(chunk, block, scratch.column + kVelocity, v);
     [[maybe_unused]] LaneBits before = {}, broken = {};
     if constexpr (has.fracture) {
       before = break_springs(u, k, block, chunk.springs[number], sums);
@@ -181,8 +181,9 @@ struct SpringsModel {
     // A length that is not a number makes the forces so; the first one tells.
     const Lanes told = fill > 0 ? 1 + 0 * force.at[0][0] : Lanes{} + __builtin_huge_val();
     sums.smallest_jacobian = told >= sums.smallest_jacobian ? sums.smallest_jacobian : told;
-    if constexpr (damping == Damping::book) add_to_corners(block, damped, scratch.column + kDampingForce);
-    add_to_corners(block, force, scratch.column + kForce);
+    if constexpr (damping == Damping::book)
+      add_to_corners(chunk, block, damped, scratch.column + kDampingForce);
+    add_to_corners(chunk, block, force, scratch.column + kForce);
   }
 };
 

@@ -25,30 +25,34 @@ enum Column {
   kDampingReaction = 15
 };
 
-FLEXEL_INLINE void read_corners(const CellBlock& block, double* const* column, Corners& corners) {
+FLEXEL_INLINE void read_corners(const ChunkView& chunk, const CellBlock& block, double* const* column,
+                                Corners& corners) {
+  const std::uint16_t* corner = chunk.corners + block.corners;
   if (block.is_run) {
     for (int a = 0; a < 8; ++a)
-      for (int c = 0; c < 3; ++c) corners.at[a][c] = load(column[c] + block.corner[a][0]);
+      for (int c = 0; c < 3; ++c) corners.at[a][c] = load(column[c] + corner[a]);
   } else {
     for (int a = 0; a < 8; ++a)
-      for (int c = 0; c < 3; ++c) corners.at[a][c] = gather(column[c], block.corner[a]);
+      for (int c = 0; c < 3; ++c) corners.at[a][c] = gather(column[c], corner + kLanes * a);
   }
 }
 
-FLEXEL_INLINE void add_to_corners(const CellBlock& block, const Corners& corners, double* const* column) {
+FLEXEL_INLINE void add_to_corners(const ChunkView& chunk, const CellBlock& block, const Corners& corners,
+                                  double* const* column) {
+  const std::uint16_t* corner = chunk.corners + block.corners;
   if (block.is_run) {
     // Corner a + 1 of a cell is corner a of the next one: both are added in one go.
     constexpr LaneBits one_on = {0, 8, 9, 10, 11, 12, 13, 14};
     for (int a = 0; a < 8; a += 2)
       for (int c = 0; c < 3; ++c) {
-        double* row = column[c] + block.corner[a][0];
+        double* row = column[c] + corner[a];
         const Lanes& next = corners.at[a + 1][c];
         store(row, load(row) + (corners.at[a][c] + __builtin_shuffle(Lanes{}, next, one_on)));
         row[8] += next[7];
       }
   } else {
     for (int a = 0; a < 8; ++a)
-      for (int c = 0; c < 3; ++c) scatter_add(column[c], block.corner[a], corners.at[a][c]);
+      for (int c = 0; c < 3; ++c) scatter_add(column[c], corner + kLanes * a, corners.at[a][c]);
   }
 }
 

@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 
 #include "simulate/cells.h"
 #include "simulate/rest_shape.h"
 #include "simulate/time/connection_runs.h"
+#include "simulate/time/damping_factors.h"
 
 namespace flexel {
 namespace {
@@ -50,18 +52,26 @@ step::CellConstants constants_of(const Part& part, const Material& material, dou
   return c;
 }
 
-// Cells of a part that resist, tile by tile; within a tile in the body's order.
+// Cells of a part that resist, in the body's order, by the factor that edits made of their damping.
+std::map<double, std::vector<std::uint32_t>> cells_by_damping(const Body& body, const Part& part,
+                                                              const std::vector<std::uint8_t>& active,
+                                                              double damping) {
+  const std::vector<double> factor = damping > 0 ? damping_factors(body) : std::vector<double>();
+  std::map<double, std::vector<std::uint32_t>> cells;
+  for (std::uint32_t c = part.cell_begin; c < part.cell_end; ++c)
+    if (active[c]) cells[factor.empty() ? 1 : factor[c]].push_back(c);
+  return cells;
+}
+
+// Cells tile by tile; within a tile in the order given.
 struct TiledCells {
   std::vector<std::uint32_t> cells;
   std::vector<std::size_t> tile_begin;  // and the end
 };
 
-TiledCells tiled_cells(const Body& body, const Part& part, const std::vector<std::uint8_t>& active,
-                       const Index3& largest) {
+TiledCells tiled_cells(const Body& body, const std::vector<std::uint32_t>& cells, const Index3& largest) {
   TiledCells result;
-  for (std::uint32_t c = part.cell_begin; c < part.cell_end; ++c)
-    if (active[c]) result.cells.push_back(c);
-  if (result.cells.empty()) return result;
+  result.cells = cells;
   const auto index = [&](std::uint32_t cell) { return body.lattice_index[body.cell_elements[cell][0]]; };
   Index3 low = index(result.cells[0]), high = low;
   for (const std::uint32_t c : result.cells)
@@ -97,17 +107,19 @@ TiledCells tiled_cells(const Body& body, const Part& part, const std::vector<std
 
 class Builder {
  public:
-  Builder(const Setting& setting, StepLayout& layout)
+  Builder(const Setting& setting, bool remembers, StepLayout& layout)
       : body_(setting.body),
+        remembers_(remembers),
         share_(stiffness_shares(setting.body)),
         layout_(layout),
         local_(setting.body.element_count()),
         users_(local_.size(), 0) {}
 
-  void add_chunk(std::uint32_t part, std::span<const std::uint32_t> cells, bool by_connection);
-  // Cells that share their lowest corner with another one of their chunk, which runs cannot tell apart: where
-  // pieces branch.
-  void add_left_over(std::uint32_t part);
+  // Cells of the kind that was added to the layout last.
+  void add_chunk(std::span<const std::uint32_t> cells, bool by_connection);
+  // Likewise those that share their lowest corner with another one of their chunk, which runs cannot tell
+  // apart: where pieces branch.
+  void add_left_over();
   void share();
 
  private:
@@ -118,11 +130,13 @@ class Builder {
   [[nodiscard]] bool continues(std::uint32_t cell, std::uint32_t next) const;
 
   const Body& body_;
+  bool remembers_;
   std::vector<double> share_;  // (cells) of the stiffness of a whole cell
   StepLayout& layout_;
   std::vector<std::uint16_t> local_;  // (elements) number within the chunk that is built
   std::vector<std::uint8_t> users_;   // (elements) chunks that touch it, up to 2
   std::vector<std::uint32_t> left_over_;
+  std::size_t corner_begin_ = 0;  // of the chunk that is built
 };
 
 void Builder::add_block(std::span<const std::uint32_t> cells, bool is_run) {
@@ -130,13 +144,18 @@ void Builder::add_block(std::span<const std::uint32_t> cells, bool is_run) {
   std::array<std::uint32_t, kLanes> lanes;
   lanes.fill(StepLayout::kNoCell);
   block.is_run = is_run;
+  block.corners = static_cast<std::uint32_t>(layout_.corners.size() - corner_begin_);
+  const std::size_t listed = is_run ? 1 : kLanes;
+  layout_.corners.resize(layout_.corners.size() + 8 * listed);
+  std::uint16_t* corners = layout_.corners.data() + corner_begin_ + block.corners;
   for (std::size_t l = 0; l < cells.size(); ++l) {
     lanes[l] = cells[l];
     block.fill[l] = share_[cells[l]];
-    for (std::size_t a = 0; a < 8; ++a) block.corner[a][l] = local_[body_.cell_elements[cells[l]][a]];
+    for (std::size_t a = 0; a < 8 && l < listed; ++a)
+      corners[listed * a + l] = local_[body_.cell_elements[cells[l]][a]];
   }
   layout_.blocks.push_back(block);
-  layout_.block_cells.push_back(lanes);
+  if (remembers_) layout_.block_cells.push_back(lanes);
 }
 
 bool Builder::continues(std::uint32_t cell, std::uint32_t next) const {
@@ -173,10 +192,12 @@ void Builder::add_runs(std::span<const std::uint32_t> cells, std::size_t count) 
   layout_.cell_fill.insert(layout_.cell_fill.end(), made.fill.begin(), made.fill.end());
 }
 
-void Builder::add_chunk(std::uint32_t part, std::span<const std::uint32_t> cells, bool by_connection) {
+void Builder::add_chunk(std::span<const std::uint32_t> cells, bool by_connection) {
   StepLayout::Chunk chunk;
-  chunk.part = part;
+  chunk.kind = static_cast<std::uint32_t>(layout_.constants.size() - 1);
+  chunk.part = layout_.kind_part[chunk.kind];
   chunk.block_begin = layout_.blocks.size();
+  chunk.corner_begin = corner_begin_ = layout_.corners.size();
   chunk.run_begin = layout_.runs.size();
   chunk.fill_begin = layout_.cell_fill.size();
   chunk.element_begin = layout_.elements.size();
@@ -222,12 +243,12 @@ std::vector<std::uint32_t> Builder::take_apart(std::span<const std::uint32_t> ce
   return kept;
 }
 
-void Builder::add_left_over(std::uint32_t part) {
+void Builder::add_left_over() {
   while (!left_over_.empty()) {
     const std::vector<std::uint32_t> cells = std::move(left_over_);
     left_over_.clear();
     for (std::size_t i = 0; i < cells.size(); i += StepLayout::kChunkCells)
-      add_chunk(part, std::span(cells).subspan(i, std::min(StepLayout::kChunkCells, cells.size() - i)), true);
+      add_chunk(std::span(cells).subspan(i, std::min(StepLayout::kChunkCells, cells.size() - i)), true);
   }
 }
 
@@ -268,8 +289,8 @@ void Builder::share() {
 
 std::size_t StepLayout::bytes() const {
   const auto of = [](const auto& v) { return v.capacity() * sizeof(v[0]); };
-  return of(chunks) + of(blocks) + of(block_cells) + of(runs) + of(cell_fill) + of(elements) + of(owned) +
-         of(shared) + of(shared_elements) + of(slot_offsets) + of(slots) + of(lone_elements);
+  return of(chunks) + of(blocks) + of(corners) + of(block_cells) + of(runs) + of(cell_fill) + of(elements) +
+         of(owned) + of(shared) + of(shared_elements) + of(slot_offsets) + of(slots) + of(lone_elements);
 }
 
 bool steps_by_connection(const Setting& setting, const StepPlan& plan, std::size_t part) {
@@ -282,24 +303,27 @@ StepLayout step_layout(const Setting& setting, const StepPlan& plan) {
   StepLayout layout;
   const Body& body = setting.body;
   const std::vector<std::uint8_t> active = active_cells(setting);
-  Builder builder(setting, layout);
+  Builder builder(setting, plan.remembers(), layout);
   for (std::uint32_t p = 0; p < body.parts.size(); ++p) {
-    layout.constants.push_back(constants_of(body.parts[p], setting.materials[p], plan.damping[p]));
     const bool by_connection = steps_by_connection(setting, plan, p);
-    const TiledCells tiled =
-        tiled_cells(body, body.parts[p], active, by_connection ? kConnectionTile : kTile);
-    for (std::size_t t = 0; t + 1 < tiled.tile_begin.size();) {
-      const std::size_t begin = tiled.tile_begin[t];
-      std::size_t end = tiled.tile_begin[++t];
-      while (t + 1 < tiled.tile_begin.size() && tiled.tile_begin[t + 1] - begin <= StepLayout::kChunkCells)
-        end = tiled.tile_begin[++t];
-      builder.add_chunk(p, std::span(tiled.cells).subspan(begin, end - begin), by_connection);
+    for (const auto& [factor, cells] : cells_by_damping(body, body.parts[p], active, plan.damping[p])) {
+      layout.constants.push_back(constants_of(body.parts[p], setting.materials[p], factor * plan.damping[p]));
+      layout.kind_part.push_back(p);
+      const TiledCells tiled = tiled_cells(body, cells, by_connection ? kConnectionTile : kTile);
+      for (std::size_t t = 0; t + 1 < tiled.tile_begin.size();) {
+        const std::size_t begin = tiled.tile_begin[t];
+        std::size_t end = tiled.tile_begin[++t];
+        while (t + 1 < tiled.tile_begin.size() && tiled.tile_begin[t + 1] - begin <= StepLayout::kChunkCells)
+          end = tiled.tile_begin[++t];
+        builder.add_chunk(std::span(tiled.cells).subspan(begin, end - begin), by_connection);
+      }
+      builder.add_left_over();
     }
-    builder.add_left_over(p);
   }
   builder.share();
   layout.elements.shrink_to_fit();
   layout.blocks.shrink_to_fit();
+  layout.corners.shrink_to_fit();
   layout.block_cells.shrink_to_fit();
   layout.runs.shrink_to_fit();
   layout.cell_fill.shrink_to_fit();

@@ -18,8 +18,9 @@ struct StepLayout {
   static constexpr std::size_t kChunkCells = 2048;
 
   struct Chunk {
-    std::uint32_t part = 0;
+    std::uint32_t part = 0, kind = 0;
     std::size_t block_begin = 0, block_end = 0;      // of `blocks`
+    std::size_t corner_begin = 0;                    // of `corners`
     std::size_t run_begin = 0, run_end = 0;          // of `runs`
     std::size_t fill_begin = 0;                      // of `cell_fill`
     std::size_t element_begin = 0, element_end = 0;  // of `elements`
@@ -29,13 +30,17 @@ struct StepLayout {
 
   std::vector<Chunk> chunks;
   std::vector<step::CellBlock> blocks;
-  std::vector<std::array<std::uint32_t, step::kLanes>> block_cells;  // cells of the lanes; kNoCell: none
+  std::vector<std::uint16_t> corners;  // by chunk and block, numbers within the chunk
+  // (blocks) cells of the lanes, kNoCell: none; empty where cells remember nothing (StepPlan::remembers)
+  std::vector<std::array<std::uint32_t, step::kLanes>> block_cells;
   // Parts of model `springs` in which nothing flows or breaks have no blocks, but runs.
   std::vector<step::ConnectionRun> runs;
   std::vector<double> cell_fill;
-  std::vector<std::uint32_t> elements;         // by chunk, ascending
-  std::vector<std::uint16_t> owned, shared;    // by chunk, numbers within it
-  std::vector<step::CellConstants> constants;  // (parts)
+  std::vector<std::uint32_t> elements;       // by chunk, ascending
+  std::vector<std::uint16_t> owned, shared;  // by chunk, numbers within it
+  // (kinds) cells of a part with one damping time: as many a part as edits made different
+  std::vector<step::CellConstants> constants;
+  std::vector<std::uint32_t> kind_part;
 
   // Elements of several chunks, ascending, and the slots of their forces (compressed rows, ascending).
   std::vector<std::uint32_t> shared_elements;

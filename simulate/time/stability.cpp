@@ -124,7 +124,13 @@ std::vector<double> stiffening(const Setting& setting, const std::vector<Vec3>& 
   const Body& body = setting.body;
   const std::vector<std::uint8_t> active = active_cells(setting);
   const RestShapes shapes(body);
-  const std::vector<double> stiffness = stiffness_shares(body), mass = mass_shares(body);
+  std::vector<double> stiffness, mass;
+  const bool edited =
+      body.cell_columns.contains("stiffness_change") || body.cell_columns.contains("density_change");
+  if (edited) {
+    stiffness = stiffness_shares(body);
+    mass = mass_shares(body);
+  }
   std::vector<double> result;
   for (std::size_t p = 0; p < body.parts.size(); ++p) {
     const Part& part = body.parts[p];
@@ -140,13 +146,13 @@ std::vector<double> stiffening(const Setting& setting, const std::vector<Vec3>& 
       if (by_springs && !breaks && !(1 + volume_change(displacement_gradient(cells, u)) > 0))
         return Greatest{std::numeric_limits<double>::infinity()};
       const auto cell = static_cast<std::uint32_t>(c);
-      const double edited = stiffness[c] / mass[c];
+      const double factor = edited ? stiffness[c] / mass[c] : 1;
       if (!shapes.any())
-        return Greatest{edited * (by_springs ? springs_stiffening(springs, u)
+        return Greatest{factor * (by_springs ? springs_stiffening(springs, u)
                                              : cell_stiffening(cells, u, plastic, std::nullopt))};
       if (by_springs)
-        return Greatest{edited * springs_stiffening(shapes.of(springs, cell).value_or(springs), u)};
-      return Greatest{edited * cell_stiffening(cells, u, plastic, shapes.of(cells, part, cell))};
+        return Greatest{factor * springs_stiffening(shapes.of(springs, cell).value_or(springs), u)};
+      return Greatest{factor * cell_stiffening(cells, u, plastic, shapes.of(cells, part, cell))};
     });
     result.push_back(std::max(1.0, greatest.value));
   }

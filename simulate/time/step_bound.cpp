@@ -4,9 +4,29 @@
 #include <algorithm>
 #include <limits>
 
+#include "simulate/time/damping_factors.h"
 #include "simulate/time/stability.h"
 
 namespace flexel {
+namespace {
+
+// Of each part, by what edits made of that of its cells and elements.
+std::vector<double> longest_damping(const Body& body, const std::vector<double>& of_parts) {
+  std::vector<double> longest = of_parts;
+  const std::vector<double> cells = damping_factors(body), elements = element_damping_factors(body);
+  for (std::size_t p = 0; p < longest.size(); ++p) {
+    const Part& part = body.parts[p];
+    const bool by_cells = part.placement == Placement::corner;
+    const std::vector<double>& factor = by_cells ? cells : elements;
+    if (factor.empty()) continue;
+    const auto from = static_cast<std::ptrdiff_t>(by_cells ? part.cell_begin : part.element_begin);
+    const auto to = static_cast<std::ptrdiff_t>(by_cells ? part.cell_end : part.element_end);
+    if (from < to) longest[p] *= *std::max_element(factor.begin() + from, factor.begin() + to);
+  }
+  return longest;
+}
+
+}  // namespace
 
 StepBound::StepBound(const Setting& setting, const std::vector<Pass>& passes, const StepPlan& plan)
     : setting_(setting),
@@ -14,13 +34,14 @@ StepBound::StepBound(const Setting& setting, const std::vector<Pass>& passes, co
       plan_(plan),
       cells_(cell_frequencies(setting)),
       stiffening_(cells_.size(), 1),
-      connections_(cells_.size(), 0) {}
+      connections_(cells_.size(), 0),
+      damping_(longest_damping(setting.body, plan.damping)) {}
 
 bool StepBound::damps_explicitly() const {
   double bare = std::numeric_limits<double>::infinity(), damped = bare;
   for (std::size_t p = 0; p < cells_.size(); ++p) {
     bare = std::min(bare, stable_step(cells_[p], 0));
-    damped = std::min(damped, stable_step(cells_[p], plan_.damping[p]));
+    damped = std::min(damped, stable_step(cells_[p], damping_[p]));
   }
   return damped >= 0.5 * bare;
 }
@@ -38,7 +59,7 @@ double StepBound::longest(bool implicit_damping) const {
   for (std::size_t p = 0; p < cells_.size(); ++p) {
     // a part has cells or connections
     const double own = cells_[p] * stiffening_[p] + connections_[p];
-    const double damping = implicit_damping && connections_[p] == 0 ? 0 : plan_.damping[p];
+    const double damping = implicit_damping && connections_[p] == 0 ? 0 : damping_[p];
     // what effects add is not damped: total dt^2 / 4 + tau own dt / 2 <= 1
     const double total = own + added_;
     longest = std::min(longest, stable_step(total, total > 0 ? damping * (own / total) : 0));

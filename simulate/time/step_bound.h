@@ -27,6 +27,7 @@ class StepBound {
   const std::vector<Pass>& passes_;
   const StepPlan& plan_;
   std::vector<double> cells_, stiffening_, connections_;  // (parts) 1/s^2 at rest, its growth; 1/s^2
+  std::vector<double> damping_;                           // (parts) s, the longest time of a cell
   double added_ = 0;                                      // 1/s^2
 };
 

@@ -100,7 +100,7 @@ Stepper::Stepper(const Setting& setting, const StepPlan& plan, bool book, const 
 
 void Stepper::make_room_for_books() {
   shared_damping_.resize(shared_force_.size());
-  damping_force_.resize(mass_.size(), Vec3::Zero());
+  damping_force_.resize(inverse_mass_.size(), Vec3::Zero());
 }
 
 void Stepper::choose_kernels(const Setting& setting, const StepPlan& plan) {
@@ -110,8 +110,9 @@ void Stepper::choose_kernels(const Setting& setting, const StepPlan& plan) {
   for (const PlasticFlow& flow : plan.plasticity) plastic = plastic || std::isfinite(flow.yield);
   for (const FractureLimits& limits : plan.fracture) fractures_ = fractures_ || limits.any();
   fractures_ = fractures_ || plan.broken_springs;
-  for (std::size_t p = 0; p < plan.damping.size(); ++p) {
-    step::CellConstants& c = layout_.constants[p];
+  for (std::size_t kind = 0; kind < layout_.constants.size(); ++kind) {
+    step::CellConstants& c = layout_.constants[kind];
+    const std::uint32_t p = layout_.kind_part[kind];
     const PlasticFlow flow = plan.plasticity.empty() ? PlasticFlow{} : plan.plasticity[p];
     const FractureLimits limits = plan.fracture.empty() ? FractureLimits{} : plan.fracture[p];
     const bool springs = setting.models.size() > p && setting.models[p] == Model::springs;
@@ -183,6 +184,7 @@ StepOutcome Stepper::advance(State& state, const std::vector<Vec3>& outer, const
         const StepLayout::Chunk& chunk = layout_.chunks[i];
         const step::ChunkView chunk_view{
             layout_.blocks.data() + chunk.block_begin,
+            layout_.corners.data() + chunk.corner_begin,
             plastic_.empty() ? nullptr : plastic_.data() + chunk.block_begin,
             springs_.empty() ? nullptr : springs_.data() + chunk.block_begin,
             spring_flow_.empty() ? nullptr : spring_flow_.data() + chunk.block_begin,
@@ -198,8 +200,8 @@ StepOutcome Stepper::advance(State& state, const std::vector<Vec3>& outer, const
             chunk.shared_end - chunk.shared_begin,
             shared_force_.data() + 3 * chunk.shared_begin,
             book_ ? shared_damping_.data() + 3 * chunk.shared_begin : nullptr,
-            &layout_.constants[chunk.part]};
-        const step::ChunkOutcome outcome = kernel_[chunk.part](chunk_view, view, advance, aligned(scratch));
+            &layout_.constants[chunk.kind]};
+        const step::ChunkOutcome outcome = kernel_[chunk.kind](chunk_view, view, advance, aligned(scratch));
         return Lowest{outcome.smallest_jacobian, chunk.part,       outcome.elastic,
                       outcome.plastic_work,      outcome.released, outcome.broken};
       },

@@ -48,7 +48,9 @@ class Stepper {
   // (cells) equivalent plastic strain; empty without plasticity of cells.
   [[nodiscard]] std::vector<double> plastic_strain(std::size_t cells) const;
 
-  [[nodiscard]] const std::vector<double>& mass() const { return mass_; }                  // (elements) kg
+  // (elements) kg; a step needs its inverse only, so where nothing else asks for it it can go.
+  [[nodiscard]] const std::vector<double>& mass() const { return mass_; }
+  void drop_mass() { mass_ = {}; }
   [[nodiscard]] const std::vector<double>& inverse_mass() const { return inverse_mass_; }  // (elements) 1/kg
   // Of the internal damping in the last advance [N] (elements); empty without a book or without damping.
   [[nodiscard]] const std::vector<Vec3>& damping_force() const { return damping_force_; }
@@ -64,11 +66,10 @@ class Stepper {
 
   StepLayout layout_;
   const step::KernelTable* table_;
-  // (parts)
-  std::vector<step::ChunkKernel> kernel_, booking_;
-  std::vector<step::PlasticBlock> plastic_;    // (blocks); empty without plasticity
-  std::vector<step::SpringBlock> springs_;     // (blocks); empty without fracture of springs
-  std::vector<step::SpringFlow> spring_flow_;  // (blocks); empty without plasticity of springs
+  std::vector<step::ChunkKernel> kernel_, booking_;  // (kinds)
+  std::vector<step::PlasticBlock> plastic_;          // (blocks); empty without plasticity
+  std::vector<step::SpringBlock> springs_;           // (blocks); empty without fracture of springs
+  std::vector<step::SpringFlow> spring_flow_;        // (blocks); empty without plasticity of springs
   bool fractures_ = false, inelastic_ = false;
   std::vector<double> mass_, inverse_mass_;
   std::vector<double> shared_force_, shared_damping_;  // (slots x 3) N

@@ -12,10 +12,13 @@
 #include "formats/error.h"
 #include "formats/files.h"
 #include "formats/program.h"
+#include "formats/termination.h"
 #include "simulate/live/live_link.h"
+#include "simulate/report.h"
 #include "simulate/rest_shape.h"
 #include "simulate/time/act.h"
 #include "simulate/time/checkpoint.h"
+#include "simulate/time/last_sound.h"
 #include "simulate/time/series.h"
 #include "simulate/time/settling.h"
 
@@ -25,6 +28,10 @@ namespace {
 constexpr int kCheck = 100;          // steps between checks; implicit ones are checked one by one
 constexpr std::size_t kRows = 1000;  // of the history, unless the scene says otherwise
 constexpr std::size_t kFrames = 50;  // likewise
+
+bool edits_damping(const Body& body) {
+  return body.cell_columns.contains("damping_change") || body.element_columns.contains("damping_change");
+}
 
 class TimedRun {
  public:
@@ -49,6 +56,8 @@ class TimedRun {
   void step();
   void write_frame();
   void write_history();
+  [[nodiscard]] double now() const;
+  [[nodiscard]] std::string save(const State& state);
   [[nodiscard]] std::string save_failed();
   [[nodiscard]] std::string stop();
   SimulateResult report();
@@ -66,7 +75,8 @@ class TimedRun {
   std::optional<Settling> settling_;  // nothing: a run in time
   std::unique_ptr<LiveLink> live_;    // null: neither poses nor frames
   std::optional<Series> series_;
-  State good_;
+  LastSound sound_;
+  SimulateResult result_;           // what acts that are over added to it
   std::optional<Checkpoint> kept_;  // with --checkpoint: where the run can go on from
   Bytes act_body_;                  // likewise: the body as the present act began, to be made with it
   std::chrono::steady_clock::time_point saved_ = began_;
@@ -107,16 +117,15 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
 }
 
 void TimedRun::begin() {
-  beginning_.state = beginning(body_);
-  act_.emplace(body_, scene_, options_, progress_, beginning_);
+  act_.emplace(body_, scene_, options_, progress_, beginning_, beginning(body_));
   if (!options_.history.empty()) history_ = act_->make_history({});
 }
 
 void TimedRun::resume(const Checkpoint& from) {
   clock_ = from.clock;
-  beginning_ = {from.state, false, from.settled, from.fused, from.bonding_parts};
+  beginning_ = {false, from.settled, from.fused, from.bonding_parts};
   events_ = std::min<std::size_t>(from.events, scene_.events.size());
-  act_.emplace(body_, scene_, options_, progress_, beginning_);
+  act_.emplace(body_, scene_, options_, progress_, beginning_, from.state);
   act_->restore(from.memory);
   if (!options_.history.empty()) history_ = act_->make_history(from.ledger);
   if (series_) series_->resume(from.frames);
@@ -195,7 +204,7 @@ void TimedRun::check() {
   const std::chrono::duration<double> since = std::chrono::steady_clock::now() - saved_;
   if (kept_ && since.count() > options_.checkpoint_every) (void)save_checkpoint();
   act_->refuse_unsound();
-  good_ = act_->state();
+  sound_.keep(act_->state());
   act_->adapt_step(clock_);
   const double time = *act_->state().time;
   if (settling_)
@@ -222,6 +231,7 @@ void TimedRun::write_frame() {
   if (!series_) return;
   act_->store(act_->state());
   series_->add(body_, *act_->state().time);
+  act_->unload();
   next_frame_ = duration_ * static_cast<double>(series_->size()) / scene_.run.frames.value_or(kFrames);
 }
 
@@ -231,18 +241,31 @@ void TimedRun::write_history() {
   file.commit();
 }
 
-std::string TimedRun::save_failed() {
+// Without an act an event is happening.
+double TimedRun::now() const {
+  return act_ ? *act_->state().time : scene_.events[events_].at;
+}
+
+// Leaves the body at `state`, and in the file for runs that end early; says where that is.
+std::string TimedRun::save(const State& state) {
   if (history_) write_history();
-  if (options_.failed_output.empty() || good_.displacement.empty()) return "";
-  if (act_) act_->store(good_);  // else an event failed, and the body is what it was before that
+  if (act_) act_->store(state);  // else an event failed, and the body is what it was before that
+  if (options_.failed_output.empty()) return "";
   write_body(body_, options_.failed_output);
-  return fmt::format("; the state at {:.6g} s is in {}", *good_.time, options_.failed_output);
+  return fmt::format("; the state at {:.6g} s is in {}", *state.time, options_.failed_output);
+}
+
+std::string TimedRun::save_failed() {
+  if (!sound_.empty()) return save(sound_.state());
+  if (history_) write_history();
+  return "";
 }
 
 SimulateResult TimedRun::report() {
-  SimulateResult result;
+  SimulateResult& result = result_;
   act_->report(clock_, options_.stress, result);
   result.timed->live = live_summary_;
+  act_->add_effort(result);
   if (history_) {
     const Ledger& ledger = history_->ledger();
     const Energies& last = ledger.rows.back().energies;
@@ -256,6 +279,11 @@ SimulateResult TimedRun::report() {
   }
   if (settling_) settling_->report(result);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
+  if (!beginning_.fused.empty())
+    progress_.say(fmt::format(
+        "{} points that events fused hold in this run only: a later run of its body has to fuse them again",
+        beginning_.fused.size()));
+  if (options_.explain) explain_times(result.passes, result.seconds, progress_);
   return result;
 }
 
@@ -269,7 +297,8 @@ void TimedRun::play_until(double end, bool resumed) {
   if (first) write_frame();
   if (live_ && (first || resumed)) live_->start(act_->state());
   if (kept_) keep();
-  good_ = act_->state();
+  sound_.keep(act_->state());
+  act_->unload();
   const std::uint64_t between = act_->is_implicit() ? 1 : kCheck;
   while (goes_on()) {
     if (clock_.steps % between == 0 || act_->hurried()) check();
@@ -282,8 +311,7 @@ void TimedRun::play_until(double end, bool resumed) {
 
 // Saves what a run that is stopped leaves; says where it is.
 std::string TimedRun::stop() {
-  if (act_) good_ = act_->state();
-  std::string saved = save_failed();
+  std::string saved = save(act_ ? act_->state() : sound_.state());
   if (save_checkpoint()) saved += fmt::format("; go on with --resume {}", options_.checkpoint);
   return saved;
 }
@@ -298,13 +326,15 @@ void TimedRun::happen(std::size_t end) {
     history_.reset();
   }
   act_->store(act_->state());
-  beginning_.state = act_->state();
+  act_->add_effort(result_);
+  State state = act_->state();
   beginning_.fresh = false;
   act_.reset();
+  const bool was_edited = edits_damping(body_);
   for (; events_ < end; ++events_) {
     const Event& event = scene_.events[events_];
     const Setting setting = timed_setting(body_, scene_, beginning_);
-    Stage stage{body_, beginning_.state, beginning_.fused, beginning_.settled, setting, progress_};
+    Stage stage{body_, state, beginning_.fused, beginning_.settled, setting, progress_};
     const std::string what = event.happen(stage);
     progress_.say(fmt::format("at {:.4g} s {}: {}", event.at, event.name, what));
   }
@@ -312,7 +342,10 @@ void TimedRun::happen(std::size_t end) {
     kept_->state.time.reset();  // until the act has begun, what was kept is of another body
     act_body_ = body_bytes(body_, options_.checkpoint);
   }
-  act_.emplace(body_, scene_, options_, progress_, beginning_);
+  act_.emplace(body_, scene_, options_, progress_, beginning_, std::move(state));
+  sound_.keep(act_->state());  // of the elements that there are now
+  if (!was_edited && edits_damping(body_) && !act_->damps())
+    progress_.warn("edit: the scene has no [damping] that \"damping\" could change");
   act_->set_hear([this](const std::string& note) { listen(note); });
   if (!options_.history.empty()) history_ = act_->make_history(std::move(ledger));
 }
@@ -334,23 +367,22 @@ void TimedRun::play() {
 }
 
 SimulateResult TimedRun::operator()() {
+  const TerminationWaits waits;
   try {
     play();
   } catch (const DivergedError& error) {
-    const double time = act_ ? *act_->state().time : *beginning_.state.time;
-    throw DivergedError(
-        fmt::format("step {} at {:.6g} s: {}{}", clock_.steps, time, error.what(), save_failed()));
+    const std::string where = fmt::format("step {} at {:.6g} s", clock_.steps, now());
+    throw DivergedError(fmt::format("{}: {}{}", where, error.what(), save_failed()));
   } catch (const TimeoutError&) {
     throw TimeoutError(fmt::format("stopped by --timeout after {} steps at {:.4g} s of {:.4g} s{}",
-                                   clock_.steps, act_ ? *act_->state().time : *beginning_.state.time,
-                                   duration_, stop()));
+                                   clock_.steps, now(), duration_, stop()));
   } catch (const Interrupted&) {
     if (const std::string saved = stop(); !saved.empty())
-      progress_.say(fmt::format("interrupted at step {}{}", clock_.steps, saved));
+      progress_.say(fmt::format("stopped at step {}{}", clock_.steps, saved));
     throw;
   }
-  if (history_) write_history();
   act_->store(act_->state());
+  if (history_) write_history();
   SimulateResult result = report();
   if (scene_.run.renormalise)
     renormalise_all(body_, timed_setting(body_, scene_, beginning_), act_->state().displacement);

@@ -12,6 +12,7 @@
 
 #include "formats/files.h"
 #include "formats/progress.h"
+#include "formats/termination.h"
 
 namespace flexel {
 namespace {
@@ -157,6 +158,37 @@ TEST(Program, AKilledProgramLeavesNoTemporaryFile) {
     EXPECT_TRUE(std::filesystem::is_empty(folder));
   }
   std::filesystem::remove_all(folder);
+}
+
+TEST(Program, TerminationThatWaitsAsks) {
+  for (const int signal : {SIGTERM, SIGHUP}) {
+    const Outcome asked = run([&] {
+      {
+        const TerminationWaits outer;
+        { const TerminationWaits inner; }
+        raise(signal);
+      }
+      if (!interrupted()) return 8;
+      throw_if_interrupted();
+      return 7;
+    });
+    EXPECT_EQ(asked.code, 128 + signal);
+    EXPECT_EQ(asked.err, "flexel-test: terminated\n");
+    const Outcome ended = run([&] {
+      const TerminationWaits waits;
+      raise(signal);
+      raise(signal);
+      return 7;
+    });
+    EXPECT_EQ(ended.code, 128 + signal);
+    EXPECT_EQ(ended.err, "") << "it ended within the handler";
+    const Outcome over = run([&] {
+      { const TerminationWaits waits; }
+      raise(signal);
+      return 7;
+    });
+    EXPECT_EQ(over.code, 1000 + signal);
+  }
 }
 
 TEST(Program, ReadingASilentPipeCanBeInterrupted) {

@@ -56,16 +56,16 @@ def whole(name, *options):
     return {path.name: path.read_bytes() for path in pathlib.Path("whole").iterdir()}
 
 
-def interrupt(arguments, ready, **options):
+def interrupt(arguments, ready, by=signal.SIGINT, **options):
     """Starts a run and interrupts it once `ready` is there. False: it ended before."""
     process = subprocess.Popen([BIN / "flexel-simulate", *arguments], stderr=subprocess.PIPE, **options)
     while not os.path.exists(ready) and process.poll() is None:
         time.sleep(0.002)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(by)
     error = process.communicate(timeout=60)[1].decode()
     if process.returncode == 0:
         return False
-    expect(process.returncode == 130 and "--resume run.checkpoint" in error, f"exit {process.returncode}: {error}")
+    expect(process.returncode == 128 + by and "--resume run.checkpoint" in error, f"exit {process.returncode}: {error}")
     return True
 
 
@@ -80,9 +80,9 @@ def stop_and_go(model, *placement):
     wanted = whole("swing.pvd")
     stops = 0
     stops += interrupt(["scene.toml", "body.vtu", "-o", "swing.pvd", "--history", "h.csv", "--checkpoint", "run.checkpoint"], "swing_00007.vtu")
-    for frame in (19, 31):
+    for frame, by in ((19, signal.SIGTERM), (31, signal.SIGHUP)):
         if stops:
-            stops += interrupt(["--resume", "run.checkpoint", "--threads", "1"], f"swing_{frame:05}.vtu")
+            stops += interrupt(["--resume", "run.checkpoint", "--threads", "1"], f"swing_{frame:05}.vtu", by)
     expect(stops > 0, "the run was too short to be stopped")
     expect_ok(run("flexel-simulate", "--resume", "run.checkpoint"))
     expect_same(wanted)

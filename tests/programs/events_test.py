@@ -2,7 +2,8 @@
 
 import json
 
-from harness import body, expect, expect_error, expect_ok, expect_only, main, run, scene
+from harness import body, expect, expect_error, expect_ok, expect_only, main, run, scene, write
+from shapes import binary_stl, box_triangles
 
 # A part of 40 x 10 x 10 mm of 5 mm cells, pulled longer by a move and then let be.
 PULLED = """material = "rubber"
@@ -57,6 +58,18 @@ def test_carving_half_takes_half_the_mass():
     expect_only(*inputs, "out.vtu", "s.json", "h.csv")
     mapped = expect_ok(run("flexel-map", "out.vtu", "--format", "stl"))
     expect("carved away" in mapped.err, f"the mapping should tell, too: {mapped}")
+
+
+def test_fused_parts_are_said_to_part_again():
+    """A body file has no connections between parts: the run that fused says that the next one has to."""
+    body()
+    write("twin.stl", binary_stl([[[x + 40.1, y, z] for x, y, z in triangle] for triangle in box_triangles()]))
+    expect_ok(run("flexel-voxelize", "twin.stl", "--size", "5 mm", "-o", "twin.vtu"))
+    scene(text=FREE + '[[event]]\nat = "0 s"\ndo = "fuse"\nwithin = "0.5 mm"\n')
+    result = expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "twin.vtu", "-o", "out.vtu"))
+    expect(result.err.count("hold in this run only") == 1, result)
+    result = expect_ok(run("flexel-simulate", scene(text=FREE), "out.vtu", "-o", "on.vtu"))
+    expect("this run only" not in result.err, result)
 
 
 def test_refusals():

@@ -4,12 +4,15 @@ import csv
 import json
 import math
 import os
+import pathlib
+import re
 import signal
 import subprocess
 import time
 import xml.etree.ElementTree
 
-from harness import BIN, Skip, body, expect, expect_error, expect_ok, expect_only, main, run, scene
+from harness import BIN, Skip, body, expect, expect_error, expect_ok, expect_only, main, run, scene, write
+from shapes import binary_stl, box_triangles
 
 SWING = """material = "rubber"
 [[fix]]
@@ -24,6 +27,13 @@ name = "tip"
 where = "xmax"
 [run]
 time = "5 ms"
+"""
+# Names no effect; steps for hours.
+BARE = """material = "rubber"
+[parts.block]
+model = "{}"
+[run]
+time = "1000 s"
 """
 LONG = SWING.replace('"5 ms"', '"1000 s"')
 
@@ -143,13 +153,18 @@ def test_timeout():
 
 def test_interrupt():
     inputs = [body(), scene(text=LONG)]
-    process = subprocess.Popen([BIN / "flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu"], stderr=subprocess.PIPE)
-    time.sleep(1)
-    process.send_signal(signal.SIGINT)
-    text = process.communicate(timeout=30)[1].decode()
-    expect(process.returncode == 130 and "out.failed.vtu" in text, f"exit {process.returncode}: {text}")
-    expect_only(*inputs, "out.failed.vtu")
-    expect_ok(run("flexel-simulate", scene("short.toml", SWING), "out.failed.vtu", "-o", "on.vtu"))
+    for by in (signal.SIGINT, signal.SIGTERM):
+        process = subprocess.Popen([BIN / "flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu", "--explain"], stderr=subprocess.PIPE)
+        text = process.stderr.readline().decode()
+        while text and "plan: " not in text.splitlines()[-1]:  # said when it begins to step
+            text += process.stderr.readline().decode()
+        process.send_signal(by)
+        text += process.communicate(timeout=30)[1].decode()
+        expect(process.returncode == 128 + by and "out.failed.vtu" in text, f"exit {process.returncode}: {text}")
+        expect_only(*inputs, "out.failed.vtu")
+        expect_ok(run("flexel-simulate", scene("short.toml", SWING), "out.failed.vtu", "-o", "on.vtu"))
+        for name in ("short.toml", "on.vtu", "out.failed.vtu"):
+            os.remove(name)
 
 
 def test_explain():
@@ -158,9 +173,48 @@ def test_explain():
     lines = expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu", "--explain")).err
     for word in ("steps of", "kernel", "damping (1 [damping])", "loads (1 [[load]])"):
         expect(word in lines, f"\"{word}\" is missing in: {lines}")
+    for word in ("cells", "damping", "loads", "the rest"):
+        expect(re.search(rf"time: {word} +[0-9.]+ s +[0-9.]+ %", lines), f"no time of \"{word}\" in: {lines}")
     bare = SWING.replace('[damping]\ntime = "2 us"', "")
     lines = expect_ok(run("flexel-simulate", scene(text=bare), "body.vtu", "-o", "out.vtu", "--explain")).err
     expect("damping" not in lines, f"nothing that the scene does not name belongs in the plan: {lines}")
+
+
+def resident_bytes(process):
+    text = pathlib.Path(f"/proc/{process.pid}/status").read_text(encoding="utf-8")
+    return 1024 * int(re.search(r"RssAnon:\s+(\d+) kB", text).group(1))
+
+
+def processor_seconds(process):
+    fields = pathlib.Path(f"/proc/{process.pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def stepping_bytes(cells, model):
+    """Of a bare run of a block of cells^3 once it steps."""
+    write("block.stl", binary_stl(box_triangles(3 * (float(cells),))))
+    expect_ok(run("flexel-voxelize", "block.stl", "--size", "1 mm", "--align", "none", "-o", "block.vtu"))
+    scene(text=BARE.format(model))
+    command = [BIN / "flexel-simulate", "scene.toml", "block.vtu", "-o", "out.vtu", "--threads", "1", "--explain"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE) as process:
+        try:
+            while b"plan: " not in process.stderr.readline():
+                expect(process.poll() is None, "the run ended")
+            begun = processor_seconds(process)
+            while processor_seconds(process) < begun + 0.5:  # it steps
+                time.sleep(0.05)
+            return resident_bytes(process)
+        finally:
+            process.kill()
+
+
+def test_memory():
+    """What a run takes while it steps grows by at most 200 bytes an element, the body and all else included."""
+    for model in ("cells", "springs"):
+        small, large = (stepping_bytes(n, model) for n in (24, 48))
+        each = (large - small) / (49**3 - 25**3)
+        print(f"{model}: {each:.0f} bytes an element")
+        expect(each <= 200, f"{model}: {each:.0f} bytes an element")
 
 
 if __name__ == "__main__":

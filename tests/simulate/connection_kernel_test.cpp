@@ -8,20 +8,20 @@
 #include <random>
 #include <tuple>
 
-#include "formats/error.h"
-#include "formats/parallel.h"
 #include "simulate/cells.h"
 #include "simulate/time/connection_runs.h"
-#include "simulate/time/stability.h"
 #include "simulate/time/step_bound.h"
-#include "simulate/time/stepper.h"
-#include "tests/simulate/box_body.h"
+#include "tests/simulate/stepped.h"
 
 namespace flexel {
 namespace {
 
 using testing::box_body;
 using testing::BoxOptions;
+using testing::forces_in_step;
+using testing::largest;
+using testing::largest_difference;
+using testing::shaken;
 
 const Material kGum{"gum", 12.1e5, 0.25, 580, "test"};
 
@@ -83,19 +83,6 @@ Setting setting_of(const Body& body, std::vector<Model> models = {Model::springs
           std::vector<std::uint8_t>(body.cell_count(), 0), std::move(models)};
 }
 
-State shaken(const Body& body, double amplitude, unsigned seed) {
-  std::mt19937 random(seed);
-  std::uniform_real_distribution<double> any(-1, 1);
-  const auto vector = [&] { return Vec3(any(random), any(random), any(random)); };
-  State state;
-  state.time = 0;
-  for (std::size_t e = 0; e < body.element_count(); ++e) {
-    state.displacement.push_back(amplitude * vector());
-    state.velocity.push_back(vector());
-  }
-  return state;
-}
-
 // [N] (elements), spring by spring, cell by cell; of elasticity and damping.
 std::vector<Vec3> brute_force(const Setting& setting, const State& state, double tau) {
   const Body& body = setting.body;
@@ -111,23 +98,6 @@ std::vector<Vec3> brute_force(const Setting& setting, const State& state, double
       result[a] += force;
       result[b] -= force;
     }
-  return result;
-}
-
-std::vector<Vec3> forces(const Setting& setting, const State& before, double tau, bool book = false) {
-  Stepper stepper(setting, {{tau}}, book);
-  State state = before;
-  EXPECT_GT(stepper.advance(state, {}, {1e-3, 0, false}).smallest_jacobian, 0);
-  std::vector<Vec3> result;
-  for (std::size_t e = 0; e < state.velocity.size(); ++e)
-    result.push_back((state.velocity[e] - before.velocity[e]) * stepper.mass()[e] / 1e-3);
-  return result;
-}
-
-double largest_difference(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
-  double result = 0;
-  for (std::size_t i = 0; i < a.size(); ++i)
-    if (const double size = (a[i] - b[i]).norm(); !(size <= result)) result = size;
   return result;
 }
 
@@ -148,9 +118,9 @@ TEST(ConnectionKernel, ForcesAreThoseOfTheSpringsOfAllCells) {
     const State state = shaken(body, 1e-3, 1);
     for (const double tau : {0.0, 1e-3}) {
       const std::vector<Vec3> expected = brute_force(setting, state, tau);
-      const double size = largest_difference(expected, std::vector<Vec3>(expected.size(), Vec3::Zero()));
-      EXPECT_LT(largest_difference(forces(setting, state, tau), expected), 1e-11 * size) << name << tau;
-      EXPECT_EQ(forces(setting, state, tau, true), forces(setting, state, tau)) << name << tau;
+      const std::vector<Vec3> found = forces_in_step(setting, state, tau);
+      EXPECT_LT(largest_difference(found, expected), 1e-11 * largest(expected)) << name << tau;
+      EXPECT_EQ(forces_in_step(setting, state, tau, true), found) << name << tau;
     }
   }
 }
@@ -163,23 +133,9 @@ TEST(ConnectionKernel, BodiesOfThisTestHaveSeveralChunks) {
   EXPECT_EQ(step_layout(of_leaves, {{0}}).chunks.size(), 2u);  // one of the leaves by itself
 }
 
-// Forces between elements, along their distance: neither momentum changes.
 TEST(ConnectionKernel, KeepsMomentaAndDampingTakesEnergy) {
   const Body body = crumbs({23, 11, 20}, 0.5, 4);
-  const Setting setting = setting_of(body);
-  const State state = shaken(body, 2e-3, 2);
-  const std::vector<Vec3> elastic = forces(setting, state, 0), all = forces(setting, state, 1e-3);
-  Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
-  double power = 0, size = 0;
-  for (std::size_t e = 0; e < all.size(); ++e) {
-    force += all[e];
-    torque += (body.rest[e] + state.displacement[e]).cross(all[e]);
-    power += (all[e] - elastic[e]).dot(state.velocity[e]);
-    size += all[e].norm();
-  }
-  EXPECT_LT(force.norm(), 1e-11 * size);
-  EXPECT_LT(torque.norm(), 1e-11 * size * 0.2);
-  EXPECT_LT(power, 0);
+  testing::expect_inner_forces(setting_of(body), shaken(body, 2e-3, 2), 1e-3);
 }
 
 // Every connection of the cells once, with the fills of all cells around it.
@@ -228,32 +184,7 @@ TEST(ConnectionKernel, RunsHoldEveryConnectionOnce) {
 
 TEST(ConnectionKernel, SameBitsForAnyThreadsInstructionsAndBooks) {
   const Body body = crumbs({30, 19, 20}, 0.8, 5);
-  const Setting setting = setting_of(body);
-  const double tau = 1e-5, dt = 0.5 * stable_step(setting, {tau});
-  const auto after = [&](const std::string& isa, int threads, bool book) {
-    const ThreadLimit limit(threads);
-    Stepper stepper(setting, {{tau}}, book, isa);
-    State state = shaken(body, 1e-4, 6);
-    for (int i = 0; i < 3; ++i) (void)stepper.advance(state, {}, {dt, dt, false});
-    return state;
-  };
-  const State reference = after("portable", 1, false);
-  for (const auto& [isa, threads, book] : {std::tuple{"portable", 2, true},
-                                           {"portable", 7, false},
-                                           {"avx2", 1, false},
-                                           {"avx2", 7, true},
-                                           {"avx512", 1, true},
-                                           {"avx512", 2, false},
-                                           {"avx512", 7, false}}) {
-    State other;
-    try {
-      other = after(isa, threads, book);
-    } catch (const InputError&) {
-      continue;  // a machine without that instruction set
-    }
-    EXPECT_EQ(other.displacement, reference.displacement) << isa << threads;
-    EXPECT_EQ(other.velocity, reference.velocity) << isa << threads;
-  }
+  testing::expect_same_bits(setting_of(body));
 }
 
 // Where another part breaks, the stepper tells the energy of all: also of those computed by connection.

@@ -47,13 +47,8 @@ Scene scene_for(double time, double density = kDensity) {
 }
 
 using testing::expect_books_close;
+using testing::run_timed;
 using testing::TimedCase;
-
-TimedCase run(Body body, const Scene& scene, int threads = 0) {
-  SimulateOptions options;
-  options.threads = threads;
-  return testing::run_timed(std::move(body), scene, options);
-}
 
 void throw_at(Body& body, const Vec3& velocity) {
   Column column;
@@ -73,7 +68,7 @@ TEST(Drag, AFallingCubeReachesTheTextbooksSpeedAtAnyResolution) {
     Scene scene = scene_for(6 * terminal / kGravity);
     scene.get<Gravity>().acceleration = Vec3(0, 0, -kGravity);
     scene.get<Damping>().entries.push_back({1e-4, std::nullopt, ""});
-    const TimedCase made = run(std::move(body), scene);
+    const TimedCase made = run_timed(std::move(body), scene);
     EXPECT_NEAR(-made.history.column("momentum z").back() / mass, terminal, 1e-3 * terminal) << cells;
     EXPECT_NEAR(made.history.column("momentum x").back() / mass, 0, 1e-6 * terminal) << cells;
     EXPECT_GT(made.history.column("drag dissipated").back(), 0.5 * mass * terminal * terminal);
@@ -88,7 +83,7 @@ TEST(Drag, AnElementOfModelPaperFallsAsPrinted) {
   Scene scene = scene_for(8 * terminal / kGravity);
   scene.run.step = 1e-3 * terminal / kGravity;
   scene.get<Gravity>().acceleration = Vec3(0, 0, -kGravity);
-  const TimedCase made = run(single_voxel(), scene);
+  const TimedCase made = run_timed(single_voxel(), scene);
   const std::vector<double>& time = made.history.column("time");
   for (std::size_t i = 0; i < time.size(); ++i)
     ASSERT_NEAR(-made.history.column("momentum z")[i] / mass,
@@ -142,7 +137,7 @@ TEST(Drag, ALightBodyInADenseMediumIsSlowedNotThrownBack) {
   throw_at(body, Vec3(20, 0, 0));
   Scene scene = scene_for(0.05, 0.01);  // lighter than the medium by 1e7
   scene.get<Drag>() = {1e5, 1};
-  const TimedCase made = run(body, scene);
+  const TimedCase made = run_timed(body, scene);
   const std::vector<double>& momentum = made.history.column("momentum x");
   const std::vector<double>&kinetic = made.history.column("kinetic"),
         &elastic = made.history.column("elastic");
@@ -158,7 +153,10 @@ TEST(Drag, SameBitsForAnyNumberOfThreads) {
   Body body = cube(12);
   throw_at(body, Vec3(5, 4, 3));
   const Scene scene = scene_for(2e-3);
-  const TimedCase one = run(body, scene, 1), two = run(body, scene, 2);
+  SimulateOptions alone, together;
+  alone.threads = 1;
+  together.threads = 2;
+  const TimedCase one = run_timed(body, scene, alone), two = run_timed(body, scene, together);
   for (std::size_t e = 0; e < one.body.element_count(); ++e)
     ASSERT_EQ(one.body.position[e], two.body.position[e]);
 }

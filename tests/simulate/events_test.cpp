@@ -135,6 +135,27 @@ TEST(Events, EditOfMassAndStiffnessChangesTheFrequency) {
       plain, 0.001 * plain);
 }
 
+// An edit of the whole is a scene with another time, whether the damping is stepped or solved for.
+TEST(Events, EditOfDampingIsAnotherDamping) {
+  for (const char* model : {"cells", "springs"})
+    for (const double tau : {20e-6, 5e-3}) {
+      const auto swung = [&](double time, const std::string& events) {
+        return run_timed(lively_bar(),
+                         scene_of("[parts.bar]\nmodel = \"" + std::string(model) +
+                                  "\"\n[damping]\ntime = \"" + std::to_string(1e6 * time) +
+                                  " us\"\n[run]\nstep = \"20 us\"\ntime = \"4 ms\"\n" + events));
+      };
+      const TimedCase edited = swung(tau, event("0 s", "do = \"edit\"\ndamping = 2"));
+      const TimedCase other = swung(2 * tau, "");
+      expect_books_close(edited.result);
+      EXPECT_EQ(edited.body.position, other.body.position) << model << tau;
+      EXPECT_NE(edited.body.position, swung(tau, "").body.position) << model << tau;
+      // from the file on as in the run, without an edit
+      EXPECT_EQ(edited.body.cell_columns.at("damping_change").values,
+                std::vector<double>(edited.body.cell_count(), 1));
+    }
+}
+
 TEST(Events, EditOfMassKeepsVelocities) {
   Body body = bar();
   set_velocity(body, std::vector<Vec3>(body.element_count(), Vec3(2, 0, 0)));
@@ -285,7 +306,7 @@ TEST(Events, WrongEntriesAreRefused) {
               HasSubstr("did you mean \"renormalise\"?"));
   EXPECT_THAT(message(event("0.2 s", "do = \"renormalise\"")), HasSubstr("timed runs only"));
   EXPECT_THAT(message(run + event("0.2 s", "do = \"edit\"")),
-              HasSubstr("needs \"stiffness\" or \"density\""));
+              HasSubstr("needs \"stiffness\", \"damping\" or \"density\""));
   EXPECT_THAT(message(run + event("0.2 s", "do = \"edit\"\nstiffness = 0")), HasSubstr("is a factor"));
   EXPECT_THAT(message(run + event("0.2 s", "do = \"carve\"")), HasSubstr("where"));
   EXPECT_THAT(message(run + event("0.2 s", "do = \"fuse\"")), HasSubstr("within"));

@@ -18,21 +18,16 @@ namespace {
 
 using testing::at_rest;
 using testing::box_body;
+using testing::box_of;
 using testing::BoxOptions;
 using testing::forces_of;
 using ::testing::HasSubstr;
 using testing::random_displacements;
+using testing::refusal;
 using testing::setting_of;
 
 const Material kGlass{"glass", 1e9, 0.25, 1000, "test"};
 constexpr double kStrength = 5e6;
-
-Body box(std::array<int, 3> cells, double h = 1e-3) {
-  BoxOptions options;
-  options.cells = cells;
-  options.spacing = Vec3::Constant(h);
-  return box_body(options);
-}
 
 StepPlan plan_with(double strength, double damping = 0) {
   FractureLimits limits;
@@ -102,7 +97,7 @@ Broke run(Body& body, const Scene& scene) {
 }
 
 TEST(Fracture, BarPartsAtItsStrength) {
-  Body body = box({8, 2, 2});
+  Body body = box_of({8, 2, 2});
   const Broke broke = run(body, parse_scene(kBar, "bar.toml"));
   // 22 N / 3.6 ms over 4 mm2 at rest, drawn in by Poisson's effect
   const double strain = kStrength / kGlass.young, area = 4e-6 * std::pow(1 - kGlass.poisson * strain, 2);
@@ -155,7 +150,7 @@ TEST(Fracture, DuctileBarPartsAtItsElongation) {
                "[[move]]\nwhere = \"xmax\"\ndisplacement = [\"0.4 mm\", \"free\", \"free\"]\n"
                "time = [\"0 s\", \"4 ms\"]\nfactor = [0, 1]\n");
   text.replace(text.find("3.35 ms"), 7, "2.2 ms");
-  Body body = box({8, 2, 2});
+  Body body = box_of({8, 2, 2});
   const Broke broke = run(body, parse_scene(text, "bar.toml"));
   const double strain = std::log1p(0.4 * broke.time / 4e-3 / 8);
   const double exact = 0.02 + (2e6 + 100e6 * 0.02) / kGlass.young;
@@ -168,7 +163,7 @@ TEST(Fracture, DuctileBarPartsAtItsElongation) {
 TEST(Fracture, BreaksByTheLargestPrincipalStress) {
   int broke = 0;
   for (unsigned seed = 0; seed < 200; ++seed) {
-    const Body body = box({1, 1, 1});
+    const Body body = box_of({1, 1, 1});
     const Setting setting = setting_of(body, kGlass);
     State state = at_rest(body);
     const std::vector<Vec3> rows = random_displacements(body, 0.006, seed);
@@ -197,7 +192,7 @@ TEST(Fracture, SpringsPartAtTheirLength) {
     std::string text = kBar;
     text.replace(text.find("strength = \"5 MPa\""), 18, limit);
     text += "[parts.box]\nmodel = \"springs\"\n";
-    Body body = box({8, 2, 2});
+    Body body = box_of({8, 2, 2});
     const Broke broke = run(body, parse_scene(text, "bar.toml"));
     const double stress = 22 * broke.time / 3.6e-3 / 4e-6;
     EXPECT_NEAR(stress, kStrength, 0.01 * kStrength) << limit;
@@ -228,7 +223,7 @@ Outcome burst(const Body& body, double strength, const std::string& isa, int thr
 }
 
 TEST(Fracture, BitsDoNotDependOnThreadsInstructionsOrBooks) {
-  const Body body = box({20, 13, 12});
+  const Body body = box_of({20, 13, 12});
   const Outcome one = burst(body, kStrength, "portable", 1);
   const auto count = std::accumulate(one.broken.begin(), one.broken.end(), 0u);
   EXPECT_GT(count, 100u);
@@ -244,7 +239,7 @@ TEST(Fracture, BitsDoNotDependOnThreadsInstructionsOrBooks) {
 // The kernel with fracture is the one without as long as nothing breaks, to the bit. Of springs it is another
 // one: those that break are summed cell by cell, the others connection by connection.
 TEST(Fracture, NothingChangesWhereNothingBreaks) {
-  const Body body = box({7, 5, 6});
+  const Body body = box_of({7, 5, 6});
   constexpr double never = std::numeric_limits<double>::infinity();
   EXPECT_EQ(burst(body, 1e12, "", 2).displacement, burst(body, never, "", 2).displacement);
   const std::vector<Vec3> with = burst(body, 1e12, "", 2, true, Model::springs).displacement;
@@ -258,7 +253,7 @@ TEST(Fracture, NothingChangesWhereNothingBreaks) {
 }
 
 TEST(Fracture, BitsOfSpringsDoNotDependOnThreadsInstructionsOrBooks) {
-  const Body body = box({20, 13, 12});
+  const Body body = box_of({20, 13, 12});
   const Outcome one = burst(body, 2e6, "portable", 1, true, Model::springs);
   const auto count = std::accumulate(one.broken.begin(), one.broken.end(), 0u);
   EXPECT_GT(count, 10u);
@@ -271,7 +266,7 @@ TEST(Fracture, BitsOfSpringsDoNotDependOnThreadsInstructionsOrBooks) {
 }
 
 TEST(Fracture, DebrisKeepsMomentum) {
-  const Body body = box({5, 4, 4});
+  const Body body = box_of({5, 4, 4});
   const Setting setting = setting_of(body, kGlass);
   const StepPlan plan = plan_with(kStrength, 1e-7);
   Stepper stepper(setting, plan, false);
@@ -295,17 +290,6 @@ TEST(Fracture, DebrisKeepsMomentum) {
   for (const double mass : stepper.mass()) scale += mass * 20;
   EXPECT_LT(linear.norm(), 1e-12 * scale);
   EXPECT_LT(angular.norm(), 1e-12 * scale * 5e-3);
-}
-
-std::string refusal(const std::string& text) {
-  Body body = box({2, 1, 1});
-  Progress progress("test", Progress::Mode::quiet);
-  try {
-    (void)simulate(body, parse_scene(text, "s.toml"), {}, progress);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "accepted";
 }
 
 TEST(Fracture, RefusesWhatCannotBreak) {

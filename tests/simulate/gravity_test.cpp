@@ -120,13 +120,8 @@ Scene scene_for(double time, double constant) {
 }
 
 using testing::expect_books_close;
+using testing::run_timed;
 using testing::TimedCase;
-
-TimedCase run(Body body, const Scene& scene, int threads = 0) {
-  SimulateOptions options;
-  options.threads = threads;
-  return testing::run_timed(std::move(body), scene, options);
-}
 
 void set_velocity(Body& body, const std::vector<Vec3>& velocity) {
   Column column;
@@ -146,7 +141,7 @@ TEST(MutualGravity, TwoElementsCircleAHundredTimes) {
   probe.name = "second";
   probe.at = body.rest[1];
   scene.probes.push_back(probe);
-  const TimedCase made = run(body, scene);
+  const TimedCase made = run_timed(body, scene);
   for (std::size_t i = 0; i < made.history.columns[0].size(); ++i) {
     const Vec3 way(0.5 + made.history.column("second x")[i], made.history.column("second y")[i], 0);
     ASSERT_NEAR(way.norm(), 0.5, 0.5e-3);
@@ -171,7 +166,7 @@ TEST(SourceGravity, AnElementFollowsKeplersEllipse) {
   probe.name = "it";
   probe.at = body.rest[0];
   scene.probes.push_back(probe);
-  const TimedCase made = run(body, scene);
+  const TimedCase made = run_timed(body, scene);
   double nearest = far;
   for (std::size_t i = 0; i < made.history.columns[0].size(); ++i)
     nearest = std::min(nearest,
@@ -185,7 +180,7 @@ TEST(SourceGravity, OfTheEarthIsItsWeight) {
   const Body body = pieces_of_gum();
   Scene scene = scene_for(1e-3, Gravity::kNewton);
   scene.get<Gravity>().sources = {{Vec3(0, 0, -6371e3), 5.9722e24}};
-  const TimedCase made = run(body, scene);
+  const TimedCase made = run_timed(body, scene);
   const double weight = made.result.mass * 6.6743e-11 * 5.9722e24 / (6371e3 * 6371e3);
   ASSERT_EQ(made.result.loads.size(), 1u);
   EXPECT_NEAR(made.result.loads[0].force.z(), -weight, 1e-6 * weight);
@@ -196,7 +191,7 @@ TEST(SourceGravity, OfTheEarthIsItsWeight) {
 TEST(MutualGravity, BlocksMeetHalfwayWithoutMomentum) {
   Scene scene = scene_for(0.5, 0.02);
   scene.get<Gravity>().mutual = true;
-  const TimedCase made = run(pieces_of_gum(), scene);
+  const TimedCase made = run_timed(pieces_of_gum(), scene);
   const double start = made.body.rest.back().x(), fallen = start - made.body.position.back().x();
   EXPECT_GT(fallen, 0.03);
   const double size = made.result.mass * fallen;
@@ -215,7 +210,7 @@ TEST(MutualGravity, LargeBlocksFallByTheTree) {
   options.fill = [](int i, int, int) { return i < 10 || i >= 20 ? 1.0 : 0.0; };
   Scene scene = scene_for(0.4, 0.004);
   scene.get<Gravity>().mutual = true;
-  const TimedCase made = run(testing::box_body(options), scene);
+  const TimedCase made = run_timed(testing::box_body(options), scene);
   ASSERT_GT(made.body.element_count(), 2000u);
   EXPECT_THAT(made.result.passes[1].why, HasSubstr("by a tree"));
   // 1 t each, centres 2 m apart: they draw each other with 1 N per kg or so
@@ -234,7 +229,11 @@ TEST(MutualGravity, SameBitsForAnyNumberOfThreads) {
   Scene scene = scene_for(0.1, 0.02);
   scene.get<Gravity>().mutual = true;
   scene.get<Gravity>().sources = {{Vec3(1, 2, 3), 50}};
-  const TimedCase one = run(pieces_of_gum(), scene, 1), two = run(pieces_of_gum(), scene, 2);
+  SimulateOptions alone, together;
+  alone.threads = 1;
+  together.threads = 2;
+  const TimedCase one = run_timed(pieces_of_gum(), scene, alone),
+                  two = run_timed(pieces_of_gum(), scene, together);
   for (std::size_t e = 0; e < one.body.element_count(); ++e)
     ASSERT_EQ(one.body.position[e], two.body.position[e]);
   EXPECT_NE(one.body.position[0], one.body.rest[0]);

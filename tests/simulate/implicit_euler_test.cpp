@@ -1,7 +1,7 @@
 // Implicit steps: the damping matrix against the kernel's damping, and whole runs against analytic answers.
 #include "simulate/time/implicit_euler.h"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <Eigen/Geometry>
 #include <cmath>
@@ -29,7 +29,10 @@ TEST(DampingMatrix, IsTheKernelsDamping) {
     options.spacing = model == Model::springs ? Vec3(0.01, 0.01, 0.01) : Vec3(0.01, 0.012, 0.009);
     options.axes = Eigen::AngleAxisd(0.7, Vec3(1, -2, 0.5).normalized()).toRotationMatrix();
     options.fill = [](int i, int j, int k) { return (i + j + k) % 2 == 0 ? 0.3 : 1.0; };
-    const Body body = box_body(options);
+    Body body = box_body(options);
+    body.cell_columns["damping_change"] = {1, std::vector<double>(body.cell_count(), 0)};  // as edits do
+    for (std::size_t c = 0; c < body.cell_count(); c += 3)
+      body.cell_columns["damping_change"].values[c] = 1.5;
     const Setting setting = testing::setting_of(body, {"gum", 1e6, 0.25, 1000, "test"}, model);
     const StepPlan plan{{3e-4}};
     Stepper stepper(setting, plan, true, "");
@@ -228,6 +231,21 @@ TEST(ImplicitEuler, DragIsTakenAtTheEndOfTheStep) {
   EXPECT_NEAR(-made.history.column("momentum z").back() / made.result.mass / speed, 1, 1e-3);
 }
 
+// Newton's iterations of all stretches of a run are told, and what acts in several of them is told once.
+TEST(ImplicitEuler, EffortIsThatOfAllActs) {
+  Scene scene = implicit_scene(kGum, 0.04, 0.002);
+  scene.get<Ties>().ties.push_back(make_fix(select_by_name("x0")));
+  scene.get<Gravity>().acceleration = Vec3(0, 0, -9.81);
+  const TimedCase whole = testing::run_timed(small_box(), scene);
+  Event nothing{0.02, "nothing", "", {}, [](Stage&) { return std::string(); }};
+  scene.events.push_back(nothing);
+  const TimedCase parted = testing::run_timed(small_box(), scene);
+  EXPECT_GT(parted.result.newton_iterations, 0.8 * whole.result.newton_iterations);
+  ASSERT_EQ(parted.result.passes.size(), whole.result.passes.size());
+  for (std::size_t p = 0; p < whole.result.passes.size(); ++p)
+    EXPECT_EQ(parted.result.passes[p].name, whole.result.passes[p].name);
+}
+
 TEST(ImplicitEuler, SameBitsForAnyNumberOfThreads) {
   BoxOptions options;
   options.cells = {16, 8, 8};
@@ -254,6 +272,26 @@ TEST(ImplicitEuler, RefusesWhatItDoesNotTake) {
 }
 
 // Squeezed flat: no step ends with every cell the right way round.
+// A corner that is thrown through its cell: no step lets it, however short, and none makes it stand still.
+TEST(ImplicitEuler, MatterThrownThroughItselfEndsTheRun) {
+  Scene scene = implicit_scene({"gum", 1e6, 0.25, 1000, "test"}, 0.01, 5e-5);
+  scene.parts["box"].model = "springs";
+  BoxOptions options;
+  options.cells = {3, 3, 3};
+  options.spacing = Vec3::Constant(0.005);
+  Body body = box_body(options);
+  Column velocity{3, std::vector<double>(3 * body.element_count(), 0)};
+  for (const std::size_t axis : {0u, 1u, 2u}) velocity.values[axis] = 100;
+  body.element_columns["velocity"] = velocity;
+  Progress progress("test", Progress::Mode::quiet);
+  try {
+    (void)simulate(body, scene, {}, progress);
+    FAIL() << "stood still";
+  } catch (const DivergedError& error) {
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("squeezed most near (0 mm, 0 mm, 0 mm), to J = 0.0"));
+  }
+}
+
 TEST(ImplicitEuler, TellsWhereItEnds) {
   Scene scene = implicit_scene(kGum, 0.01, 1e-3);
   scene.get<Ties>().ties.push_back(make_fix(select_by_name("x0")));

@@ -1,25 +1,22 @@
 // The kernel of timed runs against the models' own forces, cell by cell, and its laws: damping that no rigid
 // motion feels, the same bits for any thread count and instruction set.
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <Eigen/Geometry>
 
-#include <algorithm>
-#include <limits>
-#include <random>
-
-#include "formats/error.h"
-#include "formats/parallel.h"
 #include "simulate/cells.h"
-#include "simulate/time/stability.h"
-#include "simulate/time/stepper.h"
-#include "tests/simulate/box_body.h"
+#include "simulate/time/implicit_damping.h"
+#include "tests/simulate/stepped.h"
 
 namespace flexel {
 namespace {
 
 using testing::box_body;
 using testing::BoxOptions;
+using testing::forces_in_step;
+using testing::largest;
+using testing::largest_difference;
+using testing::shaken;
 
 const Material kGum{"gum", 12.1e5, 0.3, 580, "test"};
 
@@ -36,34 +33,8 @@ Body rough_body(const std::array<int, 3>& cells, const Vec3& spacing) {
   return box_body(options);
 }
 
-State shaken(const Body& body, double amplitude, unsigned seed) {
-  std::mt19937 random(seed);
-  std::uniform_real_distribution<double> any(-1, 1);
-  const auto vector = [&] { return Vec3(any(random), any(random), any(random)); };
-  State state;
-  state.time = 0;
-  for (std::size_t e = 0; e < body.element_count(); ++e) {
-    state.displacement.push_back(amplitude * vector());
-    state.velocity.push_back(vector());
-  }
-  return state;
-}
-
 Setting setting_of(const Body& body, Model model) {
-  return {body, {kGum}, std::vector<std::uint8_t>(body.cell_count(), 0), {model}};
-}
-
-// The forces that the kernel used [N], out of one advance.
-std::vector<Vec3> forces(const Setting& setting, const State& before, double tau, const std::string& isa = "",
-                         bool book = false) {
-  Stepper stepper(setting, {{tau}}, book, isa);
-  State state = before;
-  const double kick = 1e-3;
-  (void)stepper.advance(state, {}, {kick, 0, false});
-  std::vector<Vec3> result;
-  for (std::size_t e = 0; e < state.velocity.size(); ++e)
-    result.push_back((state.velocity[e] - before.velocity[e]) * stepper.mass()[e] / kick);
-  return result;
+  return testing::setting_of(body, kGum, model);
 }
 
 std::vector<Vec3> brute_force(const Setting& setting, const State& state) {
@@ -81,20 +52,6 @@ std::vector<Vec3> brute_force(const Setting& setting, const State& state) {
   return result;
 }
 
-double largest(const std::vector<Vec3>& values) {
-  double result = 0;
-  for (const Vec3& value : values) result = std::max(result, value.norm());
-  return std::any_of(values.begin(), values.end(), [](const Vec3& value) { return !value.allFinite(); })
-             ? std::numeric_limits<double>::infinity()
-             : result;
-}
-
-double largest_difference(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
-  double result = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) result = std::max(result, (a[i] - b[i]).norm());
-  return result;
-}
-
 class KernelOf : public ::testing::TestWithParam<Model> {};
 
 TEST_P(KernelOf, AgreesWithTheModelsCellByCell) {
@@ -103,7 +60,7 @@ TEST_P(KernelOf, AgreesWithTheModelsCellByCell) {
   for (const double amplitude : {1e-3, 1e-9}) {
     const State state = shaken(body, amplitude, 1);
     const std::vector<Vec3> expected = brute_force(setting, state);
-    EXPECT_LT(largest_difference(forces(setting, state, 0), expected), 1e-11 * largest(expected));
+    EXPECT_LT(largest_difference(forces_in_step(setting, state, 0), expected), 1e-11 * largest(expected));
   }
 }
 
@@ -113,27 +70,13 @@ TEST_P(KernelOf, DampingFeelsNoRigidMotion) {
   State state = shaken(body, 1e-3, 2);  // strained
   for (std::size_t e = 0; e < body.element_count(); ++e)
     state.velocity[e] = Vec3(1, 2, 3) + Vec3(4, -5, 6).cross(body.rest[e] + state.displacement[e]);
-  const std::vector<Vec3> elastic = forces(setting, state, 0);
-  EXPECT_LT(largest_difference(forces(setting, state, 1e-2), elastic), 1e-10 * largest(elastic));
+  const std::vector<Vec3> elastic = forces_in_step(setting, state, 0);
+  EXPECT_LT(largest_difference(forces_in_step(setting, state, 1e-2), elastic), 1e-10 * largest(elastic));
 }
 
-TEST_P(KernelOf, DampingKeepsMomentaAndTakesEnergy) {
+TEST_P(KernelOf, ForcesKeepMomentaAndDampingTakesEnergy) {
   const Body body = rough_body({9, 7, 5}, Vec3::Constant(0.01));
-  const Setting setting = setting_of(body, GetParam());
-  const State state = shaken(body, 1e-3, 3);
-  const std::vector<Vec3> elastic = forces(setting, state, 0), all = forces(setting, state, 1e-3);
-  Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
-  double power = 0, size = 0;
-  for (std::size_t e = 0; e < all.size(); ++e) {
-    const Vec3 damping = all[e] - elastic[e];
-    force += damping;
-    torque += (body.rest[e] + state.displacement[e]).cross(damping);
-    power += damping.dot(state.velocity[e]);
-    size += damping.norm();
-  }
-  EXPECT_LT(force.norm(), 1e-11 * size);
-  EXPECT_LT(torque.norm(), 1e-11 * size * 0.1);
-  EXPECT_LT(power, 0);
+  testing::expect_inner_forces(setting_of(body, GetParam()), shaken(body, 1e-3, 3), 1e-3);
 }
 
 TEST_P(KernelOf, DampingIsTheRateOfTheForcesAtRest) {
@@ -142,7 +85,7 @@ TEST_P(KernelOf, DampingIsTheRateOfTheForcesAtRest) {
   const Setting setting = setting_of(body, GetParam());
   State state = shaken(body, 0, 4);
   const double tau = 1e-3, dt = 1e-9;
-  const std::vector<Vec3> damped = forces(setting, state, tau);
+  const std::vector<Vec3> damped = forces_in_step(setting, state, tau);
   State ahead = state;
   for (std::size_t e = 0; e < body.element_count(); ++e) ahead.displacement[e] = dt * state.velocity[e];
   std::vector<Vec3> rate = brute_force(setting, ahead);
@@ -150,31 +93,9 @@ TEST_P(KernelOf, DampingIsTheRateOfTheForcesAtRest) {
   EXPECT_LT(largest_difference(damped, rate), 1e-5 * largest(rate));
 }
 
-TEST_P(KernelOf, SameBitsForAnyThreadsAndInstructions) {
+TEST_P(KernelOf, SameBitsForAnyThreadsInstructionsAndBooks) {
   const Body body = rough_body({37, 19, 11}, Vec3::Constant(0.01));
-  const Setting setting = setting_of(body, GetParam());
-  const double tau = 1e-5, dt = 0.5 * stable_step(setting, {tau});
-  const auto after = [&](const std::string& isa, int threads, bool book) {
-    const ThreadLimit limit(threads);
-    Stepper stepper(setting, {{tau}}, book, isa);
-    State state = shaken(body, 1e-4, 5);
-    for (int i = 0; i < 5; ++i) (void)stepper.advance(state, {}, {dt, dt, false});
-    return state;
-  };
-  const State reference = after("portable", 1, false);
-  for (const auto& [isa, threads, book] :
-       {std::tuple{"portable", 2, false}, {"portable", 7, true}, {"", 2, false}, {"avx2", 2, false}}) {
-    State other;
-    try {
-      other = after(isa, threads, book);
-    } catch (const InputError&) {
-      continue;  // a machine without that instruction set
-    }
-    for (std::size_t e = 0; e < body.element_count(); ++e) {
-      ASSERT_EQ(other.displacement[e], reference.displacement[e]) << isa << threads;
-      ASSERT_EQ(other.velocity[e], reference.velocity[e]) << isa << threads;
-    }
-  }
+  testing::expect_same_bits(setting_of(body, GetParam()));
 }
 
 // Stable a little below the bound, not above it.
@@ -201,6 +122,27 @@ TEST_P(KernelOf, BoundIsSafeAndNotWasteful) {
   }
 }
 
+// Of some cells thrice as long: as if they damped twice once more by themselves, the others broken.
+TEST_P(KernelOf, DampingOfEditedCells) {
+  Body body = rough_body({9, 7, 5}, Vec3::Constant(0.01)), others = body;
+  const Setting setting = setting_of(body, GetParam()), edited = setting_of(others, GetParam());
+  const State state = shaken(body, 1e-3, 9);
+  const double tau = 1e-3;
+  std::vector<Vec3> expected = forces_in_step(setting, state, tau);
+  Column change{1, std::vector<double>(body.cell_count(), 0)};
+  for (std::size_t c = 0; c < body.cell_count(); ++c) {
+    change.values[c] = c % 3 == 1 ? 2 : 0;
+    others.broken[c] = c % 3 != 1;
+  }
+  const std::vector<Vec3> all = forces_in_step(edited, state, tau),
+                          elastic = forces_in_step(edited, state, 0);
+  for (std::size_t e = 0; e < expected.size(); ++e) expected[e] += 2 * (all[e] - elastic[e]);
+  body.cell_columns["damping_change"] = change;
+  const std::vector<Vec3> found = forces_in_step(setting, state, tau);
+  EXPECT_LT(largest_difference(found, expected), 1e-11 * largest(expected));
+  EXPECT_GT(largest_difference(found, forces_in_step(setting, state, 0)), 1e-3 * largest(expected));
+}
+
 std::string name_of(const ::testing::TestParamInfo<Model>& info) {
   return info.param == Model::cells ? "cells" : "springs";
 }
@@ -217,6 +159,27 @@ TEST(Kernel, FoldedCellIsTold) {
   EXPECT_LE(stepper.advance(state, {}, {1e-6, 1e-6, false}).smallest_jacobian, 0);
 }
 
+TEST(Kernel, DampingThatIsNotSolvedIsTold) {
+  const Body body = box_body({{4, 4, 4}, Vec3::Constant(0.01)});
+  const Setting setting = setting_of(body, Model::cells);
+  Stepper stepper(setting, {{1}}, true);  // a second, of steps of 10 us
+  State state = shaken(body, 0, 10);
+  const Constraints none;
+  const Held held(none, body, state);
+  const auto advance = [&](int iterations) {
+    State copy = state;
+    (void)ImplicitDamping(stepper, held, iterations).advance(copy, {}, {1e-5, 1e-5, false}, 1e-5);
+  };
+  EXPECT_NO_THROW(advance(ImplicitDamping::kIterations));
+  try {
+    advance(3);
+    FAIL() << "solved";
+  } catch (const DivergedError& error) {
+    EXPECT_THAT(error.what(),
+                ::testing::HasSubstr("not solved in 3 iterations: give a shorter [damping] time"));
+  }
+}
+
 TEST(Kernel, UnknownInstructionSetIsRefused) {
   EXPECT_THROW((void)kernel_table("sse9"), InputError);
 }
@@ -227,7 +190,7 @@ TEST(Kernel, UnevenSpacing) {
   const Setting setting = setting_of(body, Model::cells);
   const State state = shaken(body, 8e-4, 8);
   const std::vector<Vec3> expected = brute_force(setting, state);
-  EXPECT_LT(largest_difference(forces(setting, state, 0), expected), 1e-11 * largest(expected));
+  EXPECT_LT(largest_difference(forces_in_step(setting, state, 0), expected), 1e-11 * largest(expected));
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // Timed runs against analytic answers: what the books, momenta, waves and swings of real bodies must show.
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <Eigen/Geometry>
 #include <cmath>
@@ -23,6 +23,7 @@ using testing::box_body;
 using testing::BoxOptions;
 using testing::expect_books_close;
 using testing::expect_momenta_kept;
+using ::testing::HasSubstr;
 using testing::TimedCase;
 
 Scene scene_of(const Material& material, double time) {
@@ -294,6 +295,25 @@ TEST(Motion, FoldInTheLastStepIsTold) {
   body.element_columns["velocity"] = velocity;
   Progress progress("test", Progress::Mode::quiet);
   EXPECT_THROW((void)simulate(body, scene_of(kGum, step), {}, progress), DivergedError);
+}
+
+TEST(Motion, RunawayTellsWhereAndWhy) {
+  Scene scene = scene_of(kGum, 1);
+  scene.parts["box"].model = "springs";
+  scene.get<InitialVelocity>() = thrown(Vec3::Zero(), Vec3(0, 0, 30), Vec3(0.015, 0.01, 0.01));
+  scene.run.method = TimeMethod::explicit_euler;
+  Body body = small_box();
+  Progress progress("test", Progress::Mode::quiet);
+  try {
+    (void)simulate(body, scene, {}, progress);
+    FAIL() << "stayed";
+  } catch (const DivergedError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("farthest near ("));
+    EXPECT_THAT(error.what(), HasSubstr("\"explicit\" gains energy by itself"));
+  }
+  // the caller has the last state that was sound
+  ASSERT_EQ(body.position.size(), body.element_count());
+  for (const Vec3& at : body.position) EXPECT_TRUE(at.allFinite());
 }
 
 TEST(Motion, EffectsOfTimeAreRefusedAtEquilibrium) {

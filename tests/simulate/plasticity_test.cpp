@@ -15,10 +15,12 @@ namespace {
 
 using testing::at_rest;
 using testing::box_body;
+using testing::box_of;
 using testing::BoxOptions;
 using testing::forces_of;
 using ::testing::HasSubstr;
 using testing::random_displacements;
+using testing::refusal;
 using testing::setting_of;
 
 const Material kMetal{"metal", 1e9, 0.3, 1000, "test"};
@@ -26,13 +28,6 @@ constexpr double kYield = 2e6;
 
 StepPlan plan_with(double hardening, double damping = 0) {
   return {{damping}, {{kYield, hardening}}, {}};
-}
-
-Body box(std::array<int, 3> cells, double h = 1e-3) {
-  BoxOptions options;
-  options.cells = cells;
-  options.spacing = Vec3::Constant(h);
-  return box_body(options);
 }
 
 // Pulled beyond yield and let go within a scene, slowly, over tens of its periods.
@@ -70,7 +65,7 @@ time = "3 ms"
 
 TEST(Plasticity, BarKeepsItsSet) {
   for (const int n : {1, 2, 3}) {
-    Body body = box({3 * n, n, n}, 2e-3 / n);
+    Body body = box_of({3 * n, n, n}, 2e-3 / n);
     const Scene scene = parse_scene(kBar, "bar.toml");
     SimulateOptions options;
     options.history = ::testing::TempDir() + "plastic_bar.csv";
@@ -97,7 +92,7 @@ TEST(Plasticity, BarKeepsItsSet) {
 // Model springs, held from narrowing: the springs along the bar flow alone. With their share k of the
 // stiffness 6/5 E (8/15 of E) a stress between yields leaves the strain k p / (6/5 E), p what they flowed.
 TEST(Plasticity, SpringsKeepTheirSet) {
-  Body body = box({4, 2, 2});
+  Body body = box_of({4, 2, 2});
   std::string text = kBar;
   for (const char* side : {"ymax", "zmax"})
     text += std::string("[[fix]]\nwhere = \"") + side + "\"\naxes = \"" + side[0] + "\"\n";
@@ -119,7 +114,7 @@ TEST(Plasticity, SpringsKeepTheirSet) {
 
 // What cells remember travels in the body's columns.
 TEST(Plasticity, GoesOnFromWhatTheBodyRemembers) {
-  const Body body = box({5, 3, 3});
+  const Body body = box_of({5, 3, 3});
   for (const Model model : {Model::cells, Model::springs}) {
     const Setting setting = setting_of(body, kMetal, model);
     StepPlan plan = plan_with(1e7);
@@ -142,7 +137,7 @@ TEST(Plasticity, GoesOnFromWhatTheBodyRemembers) {
 // Cross-sections of a beam of n cells are turned, and turned back until no moment is left.
 double residual_curvature(int n, double curvature) {
   const double h = 1e-3;
-  const Body body = box({2, n, 1}, h);
+  const Body body = box_of({2, n, 1}, h);
   const Setting setting = setting_of(body, kMetal);
   const StepPlan plan = plan_with(0, 1e-6);
   Stepper stepper(setting, plan, false);
@@ -225,7 +220,7 @@ TEST(Plasticity, ForcesAreTheDerivativeOfTheElasticEnergy) {
 }
 
 TEST(Plasticity, FlowDoesNotSeeARotation) {
-  const Body body = box({3, 2, 2});
+  const Body body = box_of({3, 2, 2});
   const Setting setting = setting_of(body, kMetal);
   const Mat3 turn = Eigen::AngleAxisd(1.1, Vec3(1, -2, 0.5).normalized()).toRotationMatrix();
   Stepper one(setting, plan_with(1e8), false), two(setting, plan_with(1e8), false);
@@ -268,7 +263,7 @@ Momenta momenta(const Body& body, const Stepper& stepper, const State& state) {
 }
 
 TEST(Plasticity, KeepsMomentum) {
-  const Body body = box({4, 3, 3});
+  const Body body = box_of({4, 3, 3});
   const Setting setting = setting_of(body, kMetal);
   const StepPlan plan = plan_with(0, 1e-7);
   Stepper stepper(setting, plan, false);
@@ -301,7 +296,7 @@ std::vector<Vec3> after_steps(const Body& body, const std::string& isa, int thre
 }
 
 TEST(Plasticity, BitsDoNotDependOnThreadsOrInstructions) {
-  const Body body = box({20, 13, 12});
+  const Body body = box_of({20, 13, 12});
   const std::vector<Vec3> one = after_steps(body, "portable", 1);
   EXPECT_GT(one.back().x(), 0);
   EXPECT_EQ(one, after_steps(body, "portable", 3));
@@ -314,7 +309,7 @@ TEST(Plasticity, BitsDoNotDependOnThreadsOrInstructions) {
 
 // Below its yield stress a body moves as without plasticity but for rounding.
 TEST(Plasticity, BelowYieldThereIsNone) {
-  const Body body = box({6, 3, 3});
+  const Body body = box_of({6, 3, 3});
   const Setting setting = setting_of(body, kMetal);
   Stepper bare(setting, {{0}}, false), plastic(setting, {{0}, {{1e8, 0}}, {}}, false);
   const double dt = 0.5 * stable_step(setting, {0});
@@ -330,17 +325,6 @@ TEST(Plasticity, BelowYieldThereIsNone) {
   for (std::size_t e = 0; e < a.displacement.size(); ++e)
     EXPECT_LT((a.displacement[e] - b.displacement[e]).norm(), 1e-9 * size);
   for (const double strain : plastic.plastic_strain(body.cell_count())) EXPECT_EQ(strain, 0);
-}
-
-std::string refusal(const std::string& text) {
-  Body body = box({2, 1, 1});
-  Progress progress("test", Progress::Mode::quiet);
-  try {
-    (void)simulate(body, parse_scene(text, "s.toml"), {}, progress);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "accepted";
 }
 
 TEST(Plasticity, RefusesWhatCannotFlow) {

@@ -8,9 +8,9 @@
 #include <Eigen/Geometry>
 
 #include "formats/error.h"
-#include "simulate/mechanics.h"
 #include "simulate/scene.h"
 #include "tests/simulate/centre_body.h"
+#include "tests/simulate/derivatives.h"
 #include "tests/simulate/stepped.h"
 
 namespace flexel {
@@ -79,27 +79,7 @@ TEST_P(RestShapeOf, ForcesAndStiffnessAreTheDerivatives) {
   const Body body = renormalised(deformed(part(), 3));
   const Setting setting = setting_of(body);
   Mechanics mechanics(setting, {});
-  State state{deformed(body, 8)};
-  const std::vector<Vec3> forces = mechanics.forces(state).total;
-  mechanics.assemble(state);
-  const BlockMatrix tangent = mechanics.stiffness();
-  const double step = 1e-6;
-  for (std::uint32_t e = 0; e < body.element_count(); e += 7)
-    for (int axis = 0; axis < 3; ++axis) {
-      State more = state, less = state;
-      more.displacement[e][axis] += step;
-      less.displacement[e][axis] -= step;
-      EXPECT_NEAR(forces[e][axis], -(mechanics.energy(more) - mechanics.energy(less)) / (2 * step),
-                  1e-6 * kForce);
-      const std::vector<Vec3> up = mechanics.forces(more).total, down = mechanics.forces(less).total;
-      for (std::uint32_t row = 0; row < body.element_count(); ++row) {
-        const Vec3 slope = -(up[row] - down[row]) / (2 * step);
-        Vec3 column = Vec3::Zero();
-        for (std::uint64_t q = tangent.row_offsets[row]; q < tangent.row_offsets[row + 1]; ++q)
-          if (tangent.columns[q] == e) column = tangent.values[q].col(axis);
-        EXPECT_LT((slope - column).norm(), 1e-6 * kYoung * kSpacing) << row << " by " << e;
-      }
-    }
+  testing::expect_derivatives(mechanics, {deformed(body, 8)}, kYoung, kSpacing, 7);
 }
 
 TEST_P(RestShapeOf, HotLoopAgreesWithEquilibrium) {

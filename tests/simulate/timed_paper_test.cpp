@@ -96,7 +96,9 @@ std::pair<Vec3, Vec3> momenta(const Body& body) {
 
 // -dR/dv of R = 1/2 sum tau k (rate of length)^2.
 TEST(TimedPaper, DampingIsTheDerivativeOfItsDissipation) {
-  const Body body = centre_body(turned_box());
+  Body body = centre_body(turned_box());
+  Column& change = body.element_columns["damping_change"];  // as edits do
+  for (std::size_t e = 0; e < body.element_count(); ++e) change.values.push_back(e % 3 == 0 ? 1.5 : 0);
   const PaperModel model(setting_of(body));
   const State state = random_state(body.element_count(), 0.2 * kSpacing, 1.5);
   const double tau = 3e-4;
@@ -112,7 +114,8 @@ TEST(TimedPaper, DampingIsTheDerivativeOfItsDissipation) {
             .norm();
       };
       const double rate = (length(dt) - length(-dt)) / (2 * dt);
-      sum += 0.5 * tau * connections.parts[0].kinds[connections.kind[c]].stiffness * rate * rate;
+      const double factor = 1 + 0.5 * (change.values[a] + change.values[b]);
+      sum += 0.5 * tau * factor * connections.parts[0].kinds[connections.kind[c]].stiffness * rate * rate;
     }
     return sum;
   };
