@@ -50,9 +50,10 @@ Mat3 virial(const SpringKind& kind, const CellVectors& u, double volume) {
   for (const Spring& spring : kind.springs) {
     const Stretch now = stretch(spring.rest, u[spring.b] - u[spring.a]);
     const Vec3 way = spring.rest + u[spring.b] - u[spring.a];
+    if (!(now.length > 0)) continue;  // two elements at one place: no arm
     sum += spring.stiffness * (now.elongation - spring.flowed) * now.direction * way.transpose();
   }
-  return sum / volume;
+  return volume > 0 ? Mat3(sum / volume) : Mat3::Zero();  // a folded cell has none
 }
 
 std::vector<SymmetricStress> cell_stresses(const Setting& setting, const State& state,

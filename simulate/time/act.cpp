@@ -3,10 +3,6 @@
 
 #include <fmt/format.h>
 
-#ifdef __GLIBC__
-#include <malloc.h>
-#endif
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -63,13 +59,13 @@ Act::Act(Body& body, const Scene& scene, const SimulateOptions& options, Progres
   if (!by_steps) implicit_.emplace(*stepper_, *held_);
   make_forces();
   if (implicit) make_implicit();
-  if (options.history.empty() && !asks_for_mass()) stepper_->drop_mass();
 }
 
-bool Act::asks_for_mass() const {
-  return paper_ || implicit_ || euler_ || !constraints_.mask.empty() ||
-         std::any_of(passes_.begin(), passes_.end(),
-                     [](const Pass& pass) { return pass.added_frequency || pass.finish_step; });
+void Act::spare_mass() {
+  const bool asked = paper_ || implicit_ || euler_ || !constraints_.mask.empty() ||
+                     std::any_of(passes_.begin(), passes_.end(),
+                                 [](const Pass& pass) { return pass.added_frequency || pass.finish_step; });
+  if (!asked) stepper_->drop_mass();
 }
 
 void Act::refuse_held_rigid() const {
@@ -149,7 +145,7 @@ void Act::choose_step(Clock& clock) {
   if (!(step > 1e-12 * *scene_.run.time))
     throw DivergedError(
         fmt::format("the stable step has fallen to {:.3g} s: {}", step, where_it_folds(setting_, state_)));
-  clock.step = left / std::ceil(left / step - 1e-9);
+  clock.step = left / std::max(1.0, std::ceil(left / step - 1e-9));
 }
 
 void Act::refuse_unsound() {
@@ -324,6 +320,22 @@ void Act::tell_forces(SimulateResult& result) const {
     if (pass.report) pass.report(state_, unbalanced, result);
 }
 
+bool Act::kicks() const {
+  return !euler_ && !implicit_ && scene_.run.method != TimeMethod::explicit_euler &&
+         std::none_of(passes_.begin(), passes_.end(),
+                      [](const Pass& pass) { return bool(pass.finish_step); });
+}
+
+void Act::kick(double time) {
+  const Stepper::Memory memory = stepper_->memory();
+  const std::vector<Vec3> before = state_.velocity;
+  state_.kick = std::abs(time);
+  sum_forces(nullptr);
+  (void)stepper_->advance(state_, varies_ ? outer_ : steady_, {time, 0, false});
+  held_->copy(before, state_.velocity);
+  stepper_->restore(memory);
+}
+
 void Act::close_books(const Clock& clock, History& history) {
   if (euler_) return history.add_row_of(state_);
   State last = state_;
@@ -335,30 +347,8 @@ void Act::close_books(const Clock& clock, History& history) {
   stepper_->restore(memory);
 }
 
-void Act::store(const State& state) {
-  body_.position.resize(body_.element_count());
-  Column velocity;
-  velocity.components = 3;
-  velocity.values.reserve(3 * body_.element_count());
-  for (std::size_t e = 0; e < body_.element_count(); ++e) {
-    body_.position[e] = body_.rest[e] + state.displacement[e];
-    velocity.values.insert(velocity.values.end(), state.velocity[e].begin(), state.velocity[e].end());
-  }
-  body_.element_columns["velocity"] = std::move(velocity);
-  if (stepper_->mark_broken(body_.broken)) derive_connections(body_);
-  stepper_->write_memory(body_.cell_count(), body_.cell_columns);
-}
-
 bool Act::damps() const {
   return std::any_of(plan_.damping.begin(), plan_.damping.end(), [](double tau) { return tau > 0; });
-}
-
-void Act::unload() {
-  body_.position = {};
-  body_.element_columns.erase("velocity");
-#ifdef __GLIBC__
-  malloc_trim(0);  // likewise what was freed since the body was read
-#endif
 }
 
 void Act::report(const Clock& clock, bool stress, SimulateResult& result) {

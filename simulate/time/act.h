@@ -83,12 +83,18 @@ class Act {
   void slow(double factor);
   // Loads and reactions, as of the last step.
   void tell_forces(SimulateResult& result) const;
+  // Whether kick() can: velocities are those of half steps, and nothing but forces changes them.
+  [[nodiscard]] bool kicks() const;
+  // The velocities change by the forces of the present state for so many seconds, before or after it.
+  void kick(double time);
 
   // The books of the present state need the forces there, hence a step that is thrown away.
   void close_books(const Clock& clock, History& history);
 
   // Moves the body to `state`: positions, velocities, what broke, what the cells remember.
   void store(const State& state);
+  // Frees the masses (Stepper::drop_mass) where no effect asks for them; neither may the caller then.
+  void spare_mass();
   // Frees what the next store() makes anew: positions and velocities of the body.
   void unload();
   // Adds the time of everything that acted, and the iterations, to `result`; once.
@@ -109,7 +115,6 @@ class Act {
   void make_forces();
   void make_implicit();
   void refuse_held_rigid() const;
-  [[nodiscard]] bool asks_for_mass() const;
   void step_implicitly(Clock& clock, History* history, bool row);
   void look();
   template <class Add>

@@ -50,7 +50,7 @@ class Stepper {
 
   // (elements) kg; a step needs its inverse only, so where nothing else asks for it it can go.
   [[nodiscard]] const std::vector<double>& mass() const { return mass_; }
-  void drop_mass() { mass_ = {}; }
+  void drop_mass() { std::vector<double>().swap(mass_); }
   [[nodiscard]] const std::vector<double>& inverse_mass() const { return inverse_mass_; }  // (elements) 1/kg
   // Of the internal damping in the last advance [N] (elements); empty without a book or without damping.
   [[nodiscard]] const std::vector<Vec3>& damping_force() const { return damping_force_; }

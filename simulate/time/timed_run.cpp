@@ -51,6 +51,7 @@ class TimedRun {
   [[nodiscard]] bool over() const { return (live_ && live_->ended()) || (settling_ && settling_->done()); }
   void play();
   void play_until(double end, bool resumed);
+  void enter_half_step();
   void happen(std::size_t end);
   void check();
   void step();
@@ -80,7 +81,8 @@ class TimedRun {
   std::optional<Checkpoint> kept_;  // with --checkpoint: where the run can go on from
   Bytes act_body_;                  // likewise: the body as the present act began, to be made with it
   std::chrono::steady_clock::time_point saved_ = began_;
-  std::size_t events_ = 0;  // that have happened
+  std::size_t events_ = 0;      // that have happened
+  bool at_whole_step_ = false;  // velocities are of the time of the state, after an event
   double next_row_ = 0, next_frame_ = 0;
   std::optional<LiveSummary> live_summary_;
 };
@@ -287,18 +289,28 @@ SimulateResult TimedRun::report() {
   return result;
 }
 
+// An event is met with velocities of its own time, for the forces after it act from then on and with steps of
+// their own: back by half of such a step.
+void TimedRun::enter_half_step() {
+  at_whole_step_ = false;
+  clock_.previous = act_->kicks() ? clock_.step : 0;
+  if (act_->kicks()) act_->kick(-0.5 * clock_.step);
+}
+
 // From the beginning of an act to its end, or from where a checkpoint has it to there.
 void TimedRun::play_until(double end, bool resumed) {
   const auto goes_on = [&] { return *act_->state().time < end * (1 - 1e-12) && !over(); };
   const bool first = clock_.steps == 0 && goes_on() && !resumed;
   clock_.until = end;
   if (goes_on() && !resumed) act_->choose_step(clock_);
+  if (goes_on() && at_whole_step_) enter_half_step();
   if (first || resumed) explain();
   if (first) write_frame();
   if (live_ && (first || resumed)) live_->start(act_->state());
   if (kept_) keep();
   sound_.keep(act_->state());
   act_->unload();
+  if (!history_ && !settling_) act_->spare_mass();
   const std::uint64_t between = act_->is_implicit() ? 1 : kCheck;
   while (goes_on()) {
     if (clock_.steps % between == 0 || act_->hurried()) check();
@@ -325,6 +337,8 @@ void TimedRun::happen(std::size_t end) {
     ledger.changed = !ledger.rows.empty();
     history_.reset();
   }
+  at_whole_step_ = clock_.steps > 0 && act_->kicks();
+  if (at_whole_step_) act_->kick(0.5 * clock_.previous);
   act_->store(act_->state());
   act_->add_effort(result_);
   State state = act_->state();

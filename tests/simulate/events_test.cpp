@@ -156,6 +156,17 @@ TEST(Events, EditOfDampingIsAnotherDamping) {
     }
 }
 
+// Steps become ten times as short: the new forces act from the event on, not for half of the step before it.
+TEST(Events, EditThatShortensTheStepClosesItsBooks) {
+  Body body = bar();  // stretched in its first mode, and let go
+  for (Vec3& at : body.position) at.x() -= 4e-4 * std::cos(M_PI * at.x() / 0.08);
+  const TimedCase made =
+      run_timed(std::move(body),
+                scene_of("[run]\ntime = \"4 ms\"\n" + event("2 ms", "do = \"edit\"\nstiffness = 100")));
+  expect_books_close(made.result);
+  EXPECT_GT(made.history.column("events work").back(), 0.1);  // J
+}
+
 TEST(Events, EditOfMassKeepsVelocities) {
   Body body = bar();
   set_velocity(body, std::vector<Vec3>(body.element_count(), Vec3(2, 0, 0)));

@@ -297,6 +297,14 @@ TEST(Motion, FoldInTheLastStepIsTold) {
   EXPECT_THROW((void)simulate(body, scene_of(kGum, step), {}, progress), DivergedError);
 }
 
+TEST(Motion, TimeBelowAnyStepIsOneStep) {
+  Body body = small_box();
+  Progress progress("test", Progress::Mode::quiet);
+  const SimulateResult result = simulate(body, scene_of(kGum, 1e-15), {}, progress);
+  EXPECT_EQ(result.timed->steps, 1u);
+  EXPECT_EQ(result.timed->time, 1e-15);
+}
+
 TEST(Motion, RunawayTellsWhereAndWhy) {
   Scene scene = scene_of(kGum, 1);
   scene.parts["box"].model = "springs";

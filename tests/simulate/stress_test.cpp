@@ -89,6 +89,17 @@ TEST(Stress, TurnsWithTheBody) {
   }
 }
 
+// Springs resist also where their cell has no shape: nothing in a file may then be no number.
+TEST(Stress, OfPinchedAndFoldedSpringsIsANumber) {
+  const Body body = box_body({{1, 1, 1}, Vec3::Constant(0.1)});
+  State pinched{std::vector<Vec3>(8, Vec3::Zero())};
+  pinched.displacement[1] = body.rest[0] - body.rest[1];
+  EXPECT_TRUE(matrix(stresses(setting_of(body, Model::springs), pinched).cell[0]).allFinite());
+  State folded = pinched;
+  for (std::size_t e = 0; e < 8; ++e) folded.displacement[e] = Vec3(0, 0, -2 * body.rest[e].z());
+  EXPECT_EQ(matrix(stresses(setting_of(body, Model::springs), folded).cell[0]), Mat3::Zero());
+}
+
 // The virial of an isotropic lattice of springs is Hooke's law with Poisson's ratio 1/4.
 TEST(Stress, SpringsFollowHookesLaw) {
   const Body body = box_body({.cells = {2, 2, 2}, .spacing = Vec3::Constant(0.01)});

@@ -1,5 +1,9 @@
-// What an act is made from: the state of a body, and the setting.
+// Between an act and its body: what it is made from, and what it leaves there.
 #include "simulate/time/act.h"
+
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 namespace flexel {
 
@@ -29,6 +33,28 @@ Setting timed_setting(const Body& body, const Scene& scene, const Beginning& beg
           beginning.settled,
           beginning.bonding_parts,
           RigidParts::rigidity(scene.get<RigidParts>(), body)};
+}
+
+void Act::store(const State& state) {
+  body_.position.resize(body_.element_count());
+  Column velocity;
+  velocity.components = 3;
+  velocity.values.reserve(3 * body_.element_count());
+  for (std::size_t e = 0; e < body_.element_count(); ++e) {
+    body_.position[e] = body_.rest[e] + state.displacement[e];
+    velocity.values.insert(velocity.values.end(), state.velocity[e].begin(), state.velocity[e].end());
+  }
+  body_.element_columns["velocity"] = std::move(velocity);
+  if (stepper_->mark_broken(body_.broken)) derive_connections(body_);
+  stepper_->write_memory(body_.cell_count(), body_.cell_columns);
+}
+
+void Act::unload() {
+  std::vector<Vec3>().swap(body_.position);
+  body_.element_columns.erase("velocity");
+#ifdef __GLIBC__
+  malloc_trim(0);  // likewise what was freed since the body was read
+#endif
 }
 
 }  // namespace flexel
