@@ -110,7 +110,6 @@ def zero_mass(trial):
 
 
 @case("connections of zero length",
-      known={"two at one place, springs, implicit": "stresses that are no numbers"},
       peer="LAMMPS",
       holds="two neighbours of a lattice of springs begin at one place, and all of a body does: finite, momenta kept, or the run stops as it should (cells: at once)",
       breaks="(d - l) d / |d| at |d| = 0")

@@ -32,7 +32,6 @@ def bound(trial, setup):
 
 
 @case("a step at the bound",
-      known={"springs, explicit": "a motion that runs away is told without its place"},
       peer="LAMMPS",
       holds="0.99 of the bound that the refusal tells: 20,000 steps (2,000 in the quick half), energy within 2 % and sound; 1.01 of it: refused with the bound; each model and integrator",
       breaks="a bound that is not safe, or that is asked of the shape at rest only; a refusal that rounds the bound up")
@@ -65,8 +64,6 @@ def at_the_bound(trial):
 
 
 @case("stiffness that appears mid-run",
-      known=all_of("the first half kick after an edit takes the new force over the old step", "edit, symplectic", "edit, verlet", "both, symplectic", "both, verlet"),
-     
       holds="cells made 100 times stiffer at half time, a block that meets a floor at half time, both at once: the step follows, books within 1 % (3 % where a floor is met: docs/contact.md), the same in other units",
       breaks="a step chosen once; a bound that is looked at every hundred steps only")
 def appearing(trial):
@@ -300,7 +297,6 @@ def far(trial):
 
 
 @case("next to no time",
-      known=all_of("a step of -inf", *(f"{m}, {t}, {n}" for m in ("cells", "springs", "paper") for t in ("1e-30 s", "1e-15 s") for n in ("symplectic", "verlet", "explicit"))),
       holds="runs of 1e-30 s, 1e-15 s, half a step and exactly one step: done, the body where its velocity takes it",
       breaks="a number of steps that rounds to none; a step divided by it")
 def next_to_no_time(trial):

@@ -236,7 +236,6 @@ def needle(trial):
 
 
 @case("a single cell",
-      known={"spun, springs, explicit": "a motion that runs away is told without its place"},
       quick=True,
       holds="one cell, pulled, twisted and spun free: F / (E A) at nu = 0 within 1e-6; momenta, books",
       breaks="hierarchies, mappings, estimates and free-motion tests that expect neighbours")
@@ -268,7 +267,6 @@ def single_cell(trial):
 
 
 @case("two cells joined by an edge",
-      known={"springs, explicit": "a motion that runs away is told without its place"},
       quick=True, peer="LAMMPS",
       holds="two cells that share two elements: held by one, the hinge is refused with its motion; timed, the other swings about the edge; momenta, books",
       breaks="a singular matrix that is solved; a surface with edges of four sides; a motion that is not told")
