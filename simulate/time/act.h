@@ -91,6 +91,8 @@ class Act {
   // The books of the present state need the forces there, hence a step that is thrown away.
   void close_books(const Clock& clock, History& history);
 
+  // Says what the steps to clock.until do, and the events of the run.
+  void explain(const Clock& clock) const;
   // Moves the body to `state`: positions, velocities, what broke, what the cells remember.
   void store(const State& state);
   // Frees the masses (Stepper::drop_mass) where no effect asks for them; neither may the caller then.

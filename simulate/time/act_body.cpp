@@ -1,5 +1,9 @@
-// Between an act and its body: what it is made from, and what it leaves there.
+// Between an act and what is around it: what it is made from, what it leaves in the body, its plan in words.
 #include "simulate/time/act.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
 
 #ifdef __GLIBC__
 #include <malloc.h>
@@ -55,6 +59,21 @@ void Act::unload() {
 #ifdef __GLIBC__
   malloc_trim(0);  // likewise what was freed since the body was read
 #endif
+}
+
+void Act::explain(const Clock& clock) const {
+  const double left = clock.until - *state_.time;
+  progress_.say(fmt::format(
+      "plan: cells (the parts' models), {} {}steps of {:.4g} s, {}",
+      static_cast<std::uint64_t>(std::llround(left / clock.step)), is_implicit() ? "implicit " : "",
+      clock.step,
+      is_implicit() ? std::string("Newton's method") : fmt::format("kernel {}", stepper().isa())));
+  if (solves())
+    progress_.say(
+        "plan: every step solves for the damping, which taken explicitly would cut it by more than 2");
+  for (const Pass& pass : passes_) progress_.say(fmt::format("plan: {} ({})", pass.name, pass.why));
+  for (const Event& event : scene_.events)
+    progress_.say(fmt::format("plan: at {:.4g} s {} ({})", event.at, event.name, event.origin));
 }
 
 }  // namespace flexel

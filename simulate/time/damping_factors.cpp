@@ -22,4 +22,8 @@ std::vector<double> element_damping_factors(const Body& body) {
   return factors(body.element_columns);
 }
 
+bool edits_damping(const Body& body) {
+  return body.cell_columns.contains("damping_change") || body.element_columns.contains("damping_change");
+}
+
 }  // namespace flexel

@@ -9,5 +9,6 @@ namespace flexel {
 
 [[nodiscard]] std::vector<double> damping_factors(const Body& body);          // (cells); empty: none
 [[nodiscard]] std::vector<double> element_damping_factors(const Body& body);  // (elements); empty: none
+[[nodiscard]] bool edits_damping(const Body& body);                           // whether it has either column
 
 }  // namespace flexel

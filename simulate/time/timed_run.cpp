@@ -18,6 +18,7 @@
 #include "simulate/rest_shape.h"
 #include "simulate/time/act.h"
 #include "simulate/time/checkpoint.h"
+#include "simulate/time/damping_factors.h"
 #include "simulate/time/last_sound.h"
 #include "simulate/time/series.h"
 #include "simulate/time/settling.h"
@@ -29,10 +30,6 @@ constexpr int kCheck = 100;          // steps between checks; implicit ones are 
 constexpr std::size_t kRows = 1000;  // of the history, unless the scene says otherwise
 constexpr std::size_t kFrames = 50;  // likewise
 
-bool edits_damping(const Body& body) {
-  return body.cell_columns.contains("damping_change") || body.element_columns.contains("damping_change");
-}
-
 class TimedRun {
  public:
   TimedRun(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress,
@@ -42,7 +39,6 @@ class TimedRun {
  private:
   void begin();
   void resume(const Checkpoint& from);
-  void explain();
   void listen(const std::string& note);
   void keep();
   [[nodiscard]] bool save_checkpoint();
@@ -133,22 +129,6 @@ void TimedRun::resume(const Checkpoint& from) {
   if (series_) series_->resume(from.frames);
   next_row_ = from.next_row;
   next_frame_ = from.next_frame;
-}
-
-void TimedRun::explain() {
-  if (!options_.explain) return;
-  const double left = clock_.until - *act_->state().time;
-  progress_.say(fmt::format("plan: cells (the parts' models), {} {}steps of {:.4g} s, {}",
-                            static_cast<std::uint64_t>(std::llround(left / clock_.step)),
-                            act_->is_implicit() ? "implicit " : "", clock_.step,
-                            act_->is_implicit() ? std::string("Newton's method")
-                                                : fmt::format("kernel {}", act_->stepper().isa())));
-  if (act_->solves())
-    progress_.say(
-        "plan: every step solves for the damping, which taken explicitly would cut it by more than 2");
-  for (const Pass& pass : act_->passes()) progress_.say(fmt::format("plan: {} ({})", pass.name, pass.why));
-  for (const Event& event : scene_.events)
-    progress_.say(fmt::format("plan: at {:.4g} s {} ({})", event.at, event.name, event.origin));
 }
 
 bool TimedRun::out_of_time() const {
@@ -282,9 +262,8 @@ SimulateResult TimedRun::report() {
   if (settling_) settling_->report(result);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
   if (!beginning_.fused.empty())
-    progress_.say(fmt::format(
-        "{} points that events fused hold in this run only: a later run of its body has to fuse them again",
-        beginning_.fused.size()));
+    progress_.say(fmt::format("{} fused points hold in this run only: a later one has to fuse again",
+                              beginning_.fused.size()));
   if (options_.explain) explain_times(result.passes, result.seconds, progress_);
   return result;
 }
@@ -304,7 +283,7 @@ void TimedRun::play_until(double end, bool resumed) {
   clock_.until = end;
   if (goes_on() && !resumed) act_->choose_step(clock_);
   if (goes_on() && at_whole_step_) enter_half_step();
-  if (first || resumed) explain();
+  if ((first || resumed) && options_.explain) act_->explain(clock_);
   if (first) write_frame();
   if (live_ && (first || resumed)) live_->start(act_->state());
   if (kept_) keep();
