@@ -31,7 +31,7 @@ double bound(const Point& point) {
 }
 
 std::string percent(double share) {
-  return fmt::format("{:.2g} %", 100 * share);
+  return share < 0.995 ? fmt::format("{:.2g} %", 100 * share) : fmt::format("{:.0f} %", 100 * share);
 }
 
 std::string factor(double value) {
@@ -64,8 +64,7 @@ Reference extrapolate(const std::string& name, const std::string& unit,
   result.value = bar.extrapolated;
   result.uncertainty = bar.half_width;
   result.order = bar.order;
-  result.from =
-      bar.order ? "extrapolated from 3 sizes" : "finest of 3 sizes that do not approach a limit evenly";
+  result.from = bar.order ? "extrapolated from 3 sizes" : "finest of 3 sizes, no even limit";
   if (n > 3) {
     const Bar before = bar_of(values, n - 2);
     result.uncertainty = std::max(result.uncertainty, 0.5 * std::abs(before.extrapolated - bar.extrapolated));
@@ -187,7 +186,7 @@ std::string option_length(double metres) {
 
 std::string human_seconds(double seconds) {
   if (seconds < 1) return fmt::format("{:.0f} ms", 1e3 * seconds);
-  if (seconds < 100) return fmt::format("{:.2g} s", seconds);
+  if (seconds < 9.95) return fmt::format("{:.1f} s", seconds);
   if (seconds < 120) return fmt::format("{:.0f} s", seconds);
   const auto whole = static_cast<long>(std::lround(seconds));
   return fmt::format("{} min {} s", whole / 60, whole % 60);

@@ -39,7 +39,7 @@ std::string base64(const std::string& bytes) {
 // "1.4 %", "<0.01 %"
 std::string percent(double share) {
   if (share > 0 && share < 1e-5) return "&lt;0.001 %";
-  return fmt::format("{:.2g} %", 100 * share);
+  return share < 0.995 ? fmt::format("{:.2g} %", 100 * share) : fmt::format("{:.0f} %", 100 * share);
 }
 
 std::string quantity(double value, const std::string& unit) {
@@ -80,8 +80,7 @@ std::string references_table(const Study& study) {
                     each.order ? fmt::format("{:.1f}", *each.order) : "", escaped(each.from),
                     each.decides ? "yes" : ""});
   return "<div class=\"wide\">" +
-         table({"quantity", "reference", "uncertain by", "observed order", "from", "counts for the error"},
-               rows) +
+         table({"quantity", "reference", "uncertain by", "observed order", "from", "counts"}, rows) +
          "</div>";
 }
 

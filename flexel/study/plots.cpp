@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <regex>
 #include <sstream>
 
@@ -142,18 +143,22 @@ std::string for_page(std::string svg, const std::string& name) {
   return svg;
 }
 
+// "" where it cannot be read. Unlike read_all() it does not heed an interrupt, after which the page is still
+// to be made.
+std::string text_of(const fs::path& path) {
+  std::ifstream in(path);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
 std::string draw(const std::string& gnuplot, const std::string& name, const std::string& script,
                  const fs::path& folder) {
   const fs::path script_file = folder / (name + ".gp"), svg = folder / (name + ".svg");
   write_text(script, script_file.string());
   const ChildRun run = run_child({gnuplot, script_file.string()}, folder / "gnuplot.log", kNever, false);
-  const Bytes log =
-      fs::file_size(folder / "gnuplot.log") > 0 ? read_all((folder / "gnuplot.log").string()) : Bytes();
-  if (run.exit_code != 0 || !fs::exists(svg) || fs::file_size(svg) == 0)
-    throw InputError("gnuplot failed: " +
-                     std::string(reinterpret_cast<const char*>(log.data()), log.size()).substr(0, 400));
-  const Bytes bytes = read_all(svg.string());
-  return for_page({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, name);
+  const std::string drawn = run.exit_code == 0 ? text_of(svg) : "";
+  if (drawn.find("</svg>") == std::string::npos)
+    throw InputError("gnuplot failed: " + text_of(folder / "gnuplot.log").substr(0, 400));
+  return for_page(drawn, name);
 }
 
 }  // namespace

@@ -104,7 +104,8 @@ void Session::run() {
     repeat_all(sweep);
   } catch (const Interrupted&) {
     interrupted_ = true;
-    study_.notes.emplace_back("This study was interrupted; it holds the runs that had ended.");
+    study_.notes.emplace_back(
+        "This study was interrupted: it holds the runs that had ended, and no comparison of surfaces.");
   }
   finish();
 }
@@ -124,28 +125,39 @@ void Session::run_all(Sweep& sweep) {
   }
 }
 
+std::ptrdiff_t Session::sizes_done() const {
+  return std::count_if(study_.rows.begin(), study_.rows.end(), [](const Row& row) {
+    return row.trial.sweep == "resolution" && row.repeat == 1 && row.found.ok();
+  });
+}
+
 // False when nothing is open any more.
 bool Session::run_cheapest(Sweep& sweep) {
   const std::vector<Trial> open = sweep.open();
   if (open.empty()) return false;
   std::vector<Prediction> predicted;
   for (const Trial& trial : open) predicted.push_back(sweep.predict(trial));
-  const auto best =
-      std::min_element(predicted.begin(), predicted.end(),
-                       [](const Prediction& a, const Prediction& b) { return a.seconds < b.seconds; });
-  const Trial& trial = open[static_cast<std::size_t>(best - predicted.begin())];
+  // The first three sizes go before all else: without them there is nothing to compare with.
+  std::size_t best = 0;
+  for (std::size_t i = 1; i < open.size(); ++i)
+    if (predicted[i].seconds < predicted[best].seconds) best = i;
+  if (sizes_done() < 3)
+    for (std::size_t i = 0; i < open.size(); ++i)
+      if (open[i].sweep == "resolution") best = i;
+  const Trial& trial = open[best];
+  const Prediction& told = predicted[best];
   std::string why;
   const double time_left = kFirstShare * wanted_.budget - spent();
-  if (best->seconds > time_left)
+  if (told.seconds > time_left)
     why = fmt::format("time: {} were left for first runs", human_seconds(std::max(0.0, time_left)));
-  else if (trial.sweep != "resolution" && best->seconds > kSideShare * wanted_.budget)
+  else if (trial.sweep != "resolution" && told.seconds > kSideShare * wanted_.budget)
     why = "time: beside the sizes no run may take more than a tenth of the budget";
-  else if (best->bytes > kMemoryShare * available_memory())
+  else if (told.bytes > kMemoryShare * available_memory())
     why = fmt::format("memory: {} are free", human_bytes(available_memory()));
   if (why.empty()) {
-    run_one(sweep, trial, *best);
+    run_one(sweep, trial, told);
   } else {
-    study_.left_out.push_back({trial, *best, why});
+    study_.left_out.push_back({trial, told, why});
     sweep.leave_out(trial);
   }
   return true;
@@ -287,9 +299,12 @@ void Session::finish() {
   progress_.stage("page");
   if (const Row* finest = finest_row()) {
     const Row reference = *finest;
-    measure_surfaces(reference);
     measure_lags(reference);
-    if (!interrupted_) draw_pictures(*finest);
+    // Reading surfaces heeds the interrupt, which has come already.
+    if (!interrupted_) {
+      measure_surfaces(reference);
+      draw_pictures(*finest);
+    }
   }
   conclude(study_, wanted_.references);
   study_.spent = spent();

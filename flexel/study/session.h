@@ -32,6 +32,7 @@ class Session {
 
   [[nodiscard]] Sweep look();
   void run_all(Sweep& sweep);
+  [[nodiscard]] std::ptrdiff_t sizes_done() const;
   bool run_cheapest(Sweep& sweep);
   void repeat_all(Sweep& sweep);
   void run_one(Sweep& sweep, const Trial& trial, const Prediction& predicted);

@@ -2,6 +2,7 @@
 // point in each, so no search is needed.
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
