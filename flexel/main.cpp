@@ -74,10 +74,7 @@ int run(int argc, char** argv) {
   if (argc < 2)
     throw InputError(
         "a command is missing: deform, export, info, picture, materials, measure, study, voxelize, simulate "
-        "or "
-        "map "
-        "(`flexel "
-        "help`)");
+        "or map (`flexel help`)");
   const std::string command = argv[1];
   if (command == "--version") {
     print(fmt::format("flexel {}\n", version()));
