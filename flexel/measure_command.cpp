@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "flexel/commands.h"
 #include "formats/error.h"
@@ -26,6 +27,7 @@ struct Measured {
   double spacing = 0;
   std::vector<MeasuredDirection> inside;
   std::vector<MeasuredBar> bars;
+  std::optional<MeasuredBar> limit;  // of a model whose order is two
 };
 
 Model model_named(const std::string& name) {
@@ -60,6 +62,7 @@ Measured measured(const Arguments& arguments) {
   result.inside = measure_inside(model, hooke, result.material, result.spacing);
   for (const int cells : kCells)
     result.bars.push_back(measure_bar(model, hooke, result.material, result.spacing, cells));
+  if (model != Model::paper) result.limit = limit_of(result.bars.end()[-2], result.bars.back());
   return result;
 }
 
@@ -84,11 +87,15 @@ std::string text_of(const Arguments& arguments, const Measured& found) {
   for (const MeasuredDirection& each : found.inside)
     text += fmt::format("{:<7} {:<7} {:<20} {:<8.4f} {}\n", direction(each.along), direction(each.across),
                         modulus(each.young, young), each.poisson, modulus(each.shear, shear));
-  text += fmt::format("\n{:<15} {:<20} {:<8} {:<20} {}\n", "cells through", "E drawn", "nu", "E bent",
-                      "G twisted");
-  for (const MeasuredBar& each : found.bars)
-    text += fmt::format("{:<15} {:<20} {:<8.4f} {:<20} {}\n", each.cells, modulus(each.tension, young),
-                        each.poisson, modulus(each.bending, young), modulus(each.torsion, shear));
+  text += fmt::format("\n{:<14} {:<17} {:<7} {:<17} {:<17} {}\n", "cells through", "E drawn", "nu",
+                      "G sheared", "E bent", "G twisted");
+  const auto row = [&](const std::string& name, const MeasuredBar& each) {
+    text += fmt::format("{:<14} {:<17} {:<7.4f} {:<17} {:<17} {}\n", name, modulus(each.tension, young),
+                        each.poisson, modulus(each.shear, shear), modulus(each.bending, young),
+                        modulus(each.torsion, shear));
+  };
+  for (const MeasuredBar& each : found.bars) row(std::to_string(each.cells), each);
+  if (found.limit) row("ever more", *found.limit);
   return text;
 }
 
@@ -104,12 +111,18 @@ std::string json_of(const Arguments& arguments, const Measured& found) {
                               {"young", each.young},
                               {"poisson", each.poisson},
                               {"shear", each.shear}});
-  for (const MeasuredBar& each : found.bars)
-    json["bars"].push_back({{"cells", each.cells},
-                            {"young_drawn", each.tension},
-                            {"poisson", each.poisson},
-                            {"young_bent", each.bending},
-                            {"shear_twisted", each.torsion}});
+  const auto bar = [](const MeasuredBar& each) {
+    return nlohmann::ordered_json{{"young_drawn", each.tension},
+                                  {"poisson", each.poisson},
+                                  {"shear_sheared", each.shear},
+                                  {"young_bent", each.bending},
+                                  {"shear_twisted", each.torsion}};
+  };
+  for (const MeasuredBar& each : found.bars) {
+    json["bars"].push_back({{"cells", each.cells}});
+    json["bars"].back().update(bar(each));
+  }
+  if (found.limit) json["limit"] = bar(*found.limit);
   return json.dump(2) + "\n";
 }
 

@@ -14,10 +14,10 @@ namespace flexel {
 namespace {
 
 constexpr double kLeastPitch = 1.5, kLargestPitch = 3;  // coarse spacings in fine ones
-constexpr double kWantedPitch = 2;
-constexpr std::size_t kHeavyPlanes = 6;  // whose distances are tried
-constexpr double kOnPlane = 1e-6;        // fine spacings
-// Of the flat faces, what another pitch than 2 must gain, at a factor 1.5 from 2.
+constexpr double kDoubled = 2;                          // the pitch that is wanted
+constexpr std::size_t kHeavyPlanes = 6;                 // whose distances are tried
+constexpr double kOnPlane = 1e-6;                       // fine spacings
+// Of the flat faces, what another pitch than the wanted one must gain, at a factor 1.5 from it.
 constexpr double kGain = 0.1;
 
 bool share_face(const std::array<std::uint32_t, 8>& low, const std::array<std::uint32_t, 8>& high,
@@ -61,7 +61,7 @@ FlatFaces flat_faces(const Body& body, const Part& part, const FacePairs& pairs,
   return result;
 }
 
-CoarseGrid choose_grid(const FlatFaces& faces, const std::string& part) {
+CoarseGrid choose_grid(const FlatFaces& faces, double wanted, const std::string& part) {
   const auto planes = static_cast<std::int32_t>(faces.area.size());
   if (planes < 3) throw InputError(fmt::format("part \"{}\" is one cell thick", part));
   const double total = std::accumulate(faces.area.begin(), faces.area.end(), 0.0);
@@ -69,8 +69,7 @@ CoarseGrid choose_grid(const FlatFaces& faces, const std::string& part) {
     double on = 0;
     for (std::int32_t i = 0; i < planes; ++i)
       if (holds(grid, faces.begin + i)) on += faces.area[static_cast<std::size_t>(i)];
-    return (total > 0 ? on / total : 0) -
-           kGain * std::abs(std::log(grid.pitch / kWantedPitch)) / std::log(1.5);
+    return (total > 0 ? on / total : 0) - kGain * std::abs(std::log(grid.pitch / wanted)) / std::log(1.5);
   };
   std::vector<std::int32_t> heavy(static_cast<std::size_t>(planes));
   std::iota(heavy.begin(), heavy.end(), 0);
@@ -78,7 +77,7 @@ CoarseGrid choose_grid(const FlatFaces& faces, const std::string& part) {
     return faces.area[static_cast<std::size_t>(a)] > faces.area[static_cast<std::size_t>(b)];
   });
   heavy.resize(std::min<std::size_t>(heavy.size(), kHeavyPlanes));
-  CoarseGrid best{static_cast<double>(faces.begin), kWantedPitch};
+  CoarseGrid best{static_cast<double>(faces.begin), wanted};
   double most = score(best);
   const auto consider = [&](const CoarseGrid& grid) {
     if (const double value = score(grid); value > most + 1e-12) {
@@ -86,7 +85,7 @@ CoarseGrid choose_grid(const FlatFaces& faces, const std::string& part) {
       best = grid;
     }
   };
-  consider({static_cast<double>(faces.begin - 1), kWantedPitch});
+  consider({static_cast<double>(faces.begin - 1), wanted});
   for (const std::int32_t a : heavy)
     for (const std::int32_t b : heavy) {
       const double distance = b - a;
@@ -135,11 +134,20 @@ GridCut cut(const CoarseGrid& grid, std::int32_t index) {
 }
 
 std::array<CoarseGrid, 3> choose_grids(const Body& body, const Part& part, const FacePairs& pairs) {
+  std::array<FlatFaces, 3> faces;
   std::array<CoarseGrid, 3> grids;
+  std::size_t thinnest = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const FlatFaces faces = flat_faces(body, part, pairs, axis);
-    CoarseGrid& grid = grids[axis] = choose_grid(faces, part.name);
-    grid.begin += grid.pitch * std::floor((faces.begin - grid.begin) / grid.pitch + kOnPlane);
+    faces[axis] = flat_faces(body, part, pairs, axis);
+    grids[axis] = choose_grid(faces[axis], kDoubled, part.name);
+    if (faces[axis].area.size() < faces[thinnest].area.size()) thinnest = axis;
+  }
+  // Cells of another shape have another error: where the part is thin and must stay finer, all axes do.
+  const double wanted = std::min(kDoubled, grids[thinnest].pitch);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    CoarseGrid& grid = grids[axis];
+    if (grid.pitch > wanted) grid = choose_grid(faces[axis], wanted, part.name);
+    grid.begin += grid.pitch * std::floor((faces[axis].begin - grid.begin) / grid.pitch + kOnPlane);
   }
   return grids;
 }

@@ -25,7 +25,8 @@ struct GridCut {
 [[nodiscard]] GridCut cut(const CoarseGrid& grid, std::int32_t index);
 
 // By axis, moved so that the first coarse plane at or below all cells has index 0. The pitch is 2 unless
-// another from 1.5 to 3 puts more flat faces of the part on planes. Throws InputError: a part one cell thick.
+// another from 1.5 to 3 puts more flat faces of the part on planes; where the axis along which the part is
+// thinnest takes less, the others come near to that. Throws InputError: a part one cell thick.
 [[nodiscard]] std::array<CoarseGrid, 3> choose_grids(const Body& body, const Part& part,
                                                      const FacePairs& pairs);
 

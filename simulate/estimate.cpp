@@ -39,9 +39,11 @@ Bar richardson(const Sequence& s) {
   const double order = observed_order(e21, e32, s.ratio);
   if (!(order >= kLeastOrder)) return wide_bar(s);
   const double away = -e21 / (std::pow(s.ratio[0], std::min(order, kModelOrder)) - 1);
-  // Values that close in faster than the model's order may be about to pass the limit.
-  const double safety = order > kSuspiciousOrder ? kWideSafety : kSafety;
-  return {safety * std::abs(away), s.value[0] + away, order};
+  if (order <= kSuspiciousOrder) return {kSafety * std::abs(away), s.value[0] + away, order};
+  // Values that close in faster than the model's order may be about to pass the limit, or agree by chance:
+  // the coarser difference says how large the finer one should be.
+  const double expected = std::abs(e32) / std::pow(s.ratio[0], kModelOrder);
+  return {std::max(kWideSafety * std::abs(away), expected), s.value[0] + away, order};
 }
 
 }  // namespace flexel

@@ -26,7 +26,7 @@ struct Bar {
 };
 
 // Where the order is under 1/2 the bar is wide_bar(). Above 2, the models' own, it is taken as 2; above 2.1
-// the bar is 3 times the distance, as for an order that was not confirmed.
+// the bar is 3 times the distance, and at least what the coarser difference becomes at order 2.
 [[nodiscard]] Bar richardson(const Sequence& sequence);
 
 // Three times the larger difference; what is extrapolated is the finest value.

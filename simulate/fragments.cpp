@@ -202,6 +202,10 @@ std::vector<std::uint8_t> stray_elements(const Fragments& fragments, const Body&
 void refuse_loose_fragments(const Fragments& fragments, const Body& body,
                             const std::vector<std::uint8_t>& tied_elements,
                             const std::vector<CoupledElements>& coupled, const std::string& scene) {
+  if (fragments.list.empty())
+    throw InputError(scene,
+                     "every cell of the body is broken: nothing is left that resists a load, so there is no "
+                     "equilibrium; take the body from before it broke");
   std::vector<std::uint8_t> held(fragments.list.size(), 0);
   std::vector<std::size_t> fragments_of_part(body.parts.size(), 0);
   for (std::size_t e = 0; e < tied_elements.size(); ++e)

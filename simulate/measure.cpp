@@ -106,11 +106,11 @@ Body bar(Model model, double h, const std::array<int, 3>& cells) {
   return body;
 }
 
-Selection plane(double x, double side) {
+Selection beyond(const Vec3& point, const Vec3& normal) {
   Selection selection;
   selection.kind = Selection::Kind::half_space;
-  selection.point = Vec3(x, 0, 0);
-  selection.normal = Vec3(side, 0, 0);
+  selection.point = point;
+  selection.normal = normal;
   return selection;
 }
 
@@ -167,7 +167,8 @@ class Beam {
       way.through = middle_ + Vec3(end * length_ / 2, 0, 0);
       way.translation *= end;
       way.angle *= end;
-      scene.get<Ties>().ties.push_back(tie(plane(way.through.x() - 0.25 * end * h_, end), axes, way));
+      scene.get<Ties>().ties.push_back(
+          tie(beyond(way.through - Vec3(0.25 * end * h_, 0, 0), Vec3(end, 0, 0)), axes, way));
     }
     for (const Tie& each : others) scene.get<Ties>().ties.push_back(each);
     scene.run.tolerance = 1e-10;
@@ -176,6 +177,19 @@ class Beam {
     Progress progress("flexel", Progress::Mode::silent);
     body_.position = body_.rest;
     return simulate(body_, scene, options, progress).elastic_energy;
+  }
+
+  // The two sides across y, led along x by `way` and its opposite, and an element that holds z.
+  [[nodiscard]] std::vector<Tie> frame_sides(double way) const {
+    std::vector<Tie> ties{tie(ball(low_, 0.25 * h_), {false, false, true})};
+    for (const double side : {-1.0, 1.0}) {
+      Motion motion;
+      motion.translation = Vec3(side * way, 0, 0);
+      const double y = side < 0 ? low_.y() : high_.y();
+      ties.push_back(
+          tie(beyond(Vec3(0, y - 0.25 * side * h_, 0), Vec3(0, side, 0)), {true, false, false}, motion));
+    }
+    return ties;
   }
 
   // Holds the ways that a drawn or bent bar is free to go as a whole, at two elements of its middle.
@@ -251,6 +265,11 @@ MeasuredBar measure_bar(Model model, HookeConstant hooke, const Material& materi
     }
   }
   result.poisson = -moved / count / (kStrain * (beam.high().y() - beam.low().y()));
+  Motion slide;
+  slide.translation = Vec3(0, kStrain * length / 4, 0);
+  const double height = beam.high().y() - beam.low().y();
+  result.shear = 2 * beam.energy({false, true, false}, slide, beam.frame_sides(kStrain * height / 4)) /
+                 (kStrain * kStrain * length * side * side);
   Motion bend;
   bend.axis = Vec3::UnitZ();
   bend.angle = kStrain * length / side;  // a strain of kStrain at the faces
@@ -264,6 +283,18 @@ MeasuredBar measure_bar(Model model, HookeConstant hooke, const Material& materi
   Tie still = tie(ball(beam.low() + Vec3(length / 2, 0, 0), 0.8 * spacing), {true, false, false});
   result.torsion = 2 * beam.energy({false, true, true}, turn, {still}) /
                    (twist * twist * length * kSquareTorsion * std::pow(side, 4));
+  return result;
+}
+
+MeasuredBar limit_of(const MeasuredBar& coarse, const MeasuredBar& fine) {
+  const double ratio = static_cast<double>(fine.cells) / coarse.cells, weight = 1 / (ratio * ratio - 1);
+  const auto limit = [&](double MeasuredBar::*what) {
+    return fine.*what + weight * (fine.*what - coarse.*what);
+  };
+  MeasuredBar result;
+  for (const auto what : {&MeasuredBar::tension, &MeasuredBar::bending, &MeasuredBar::poisson,
+                          &MeasuredBar::shear, &MeasuredBar::torsion})
+    result.*what = limit(what);
   return result;
 }
 

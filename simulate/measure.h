@@ -3,10 +3,12 @@
 // Inside: the elasticity tensor of an unbounded lattice, from its energy under affine strains, and Young's
 // modulus, Poisson's ratio and the shear modulus that it has along and across a direction.
 //
-// Bars: n x n x 4n cells (centre placement: elements) along the lattice, led at both ends so that the exact
-// solution of a homogeneous bar fits: drawn (u_x given), bent (u_x = kappa x y), twisted (ends turned, free
-// to warp: Saint-Venant). The moduli follow from the energy over that of the homogeneous bar, Poisson's ratio
-// from the contraction of the drawn one.
+// Bars: n x n x 4n cells (centre placement: elements) along the lattice, led so that the exact solution of a
+// homogeneous bar fits: drawn (u_x given at the ends), sheared in a frame (ends and two sides led along
+// themselves: u_x = gamma y / 2, u_y = gamma x / 2), bent (u_x = kappa x y), twisted (ends turned, free to
+// warp: Saint-Venant). The moduli follow from the energy over that of the homogeneous bar, Poisson's ratio
+// from the contraction of the drawn one. Strains that are even across a cell are the lattice's material at
+// any n; those of bending and twisting vary inside a cell, and what that adds falls with n^2 (limit_of).
 #pragma once
 #include <vector>
 
@@ -25,7 +27,7 @@ struct MeasuredBar {
   int cells = 0;                    // through the bar
   double tension = 0, bending = 0;  // Pa, Young's modulus
   double poisson = 0;
-  double torsion = 0;  // Pa, shear modulus
+  double shear = 0, torsion = 0;  // Pa, shear modulus
 };
 
 // Directions [100], [110] and [111], each across two directions where they differ.
@@ -35,5 +37,9 @@ struct MeasuredBar {
 // `cells` even, at least 2.
 [[nodiscard]] MeasuredBar measure_bar(Model model, HookeConstant hooke, const Material& material,
                                       double spacing, int cells);
+
+// What bars of ever more cells come to, from two of them: an error that falls with the square of the spacing
+// (Richardson 1911). For models whose order is two: cells, springs. `cells` of the result is 0.
+[[nodiscard]] MeasuredBar limit_of(const MeasuredBar& coarse, const MeasuredBar& fine);
 
 }  // namespace flexel

@@ -35,8 +35,9 @@ constexpr double kSmallestStep = 1.0 / 4096;
 constexpr int kMaxCgIterations = 3000;
 // Full steps
 constexpr double kLooseForcing = 1e-3;
-constexpr int kMaxCgOfFullStep = 400;  // more: the tangent has become nearly singular
-constexpr int kStepsToShrink = 8;      // from then on a step is a quarter of the longest, or it has failed
+constexpr int kMaxCgOfFullStep = 400;   // more: the tangent has become nearly singular
+constexpr int kMoreCgOfProjected = 40;  // than four times the usual: no use, a smaller load is cheaper
+constexpr int kStepsToShrink = 8;       // from then on a step is a quarter of the longest, or it has failed
 constexpr double kShrunk = 0.25;
 
 double dot(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
@@ -147,19 +148,28 @@ std::vector<Vec3> Solver::right_hand_side() {
 }
 
 void Solver::solve_linear(const std::vector<Vec3>& rhs, double forcing) {
-  const PassTimer timer(outcome_.linear_seconds);
   const bool fresh = !kept_.preconditioner;
-  if (!kept_.factored) factor();
-  direction_.assign(rhs.size(), Vec3::Zero());
-  const LinearResult result = conjugate_gradients(
-      mechanics_.stiffness(), rhs, direction_, *kept_.preconditioner, forcing,
-      full() ? kMaxCgOfFullStep : kMaxCgIterations, [&](int iteration, double relative) {
-        progress_(fmt::format("newton {}, cg {}, {:.0e}", outcome_.iterations + 1, iteration, relative));
-      });
+  const double decades = std::max(1.0, -std::log10(forcing));
+  const int most = !full() ? kMaxCgIterations
+                   : kept_.projected
+                       ? std::min(kMaxCgOfFullStep, 4 * kept_.usual_iterations + kMoreCgOfProjected)
+                       : kMaxCgOfFullStep;
+  LinearResult result;
+  {
+    const PassTimer timer(outcome_.linear_seconds);
+    if (!kept_.factored) factor();
+    direction_.assign(rhs.size(), Vec3::Zero());
+    result = conjugate_gradients(
+        mechanics_.stiffness(), rhs, direction_, *kept_.preconditioner, forcing, most,
+        [&](int iteration, double relative) {
+          progress_(fmt::format("newton {}, cg {}, {:.0e}", outcome_.iterations + 1, iteration, relative));
+        });
+  }
   outcome_.cg_iterations += result.iterations;
-  indefinite_ = result.indefinite || (full() && result.iterations == kMaxCgOfFullStep);
-  if (fresh) kept_.usual_iterations = result.iterations;
-  const bool poor = result.iterations > 2 * kept_.usual_iterations + 20;
+  indefinite_ = result.indefinite || (full() && result.iterations == most);
+  // A new hierarchy costs a third more than a refreshed one: a few iterations too many are worth it.
+  if (fresh) kept_.usual_iterations = static_cast<int>(std::lround(4 * result.iterations / decades));
+  const bool poor = result.iterations > 1.5 * kept_.usual_iterations * decades / 4 + 4;
   if (result.indefinite && !kept_.projected) {
     prepare_tangent(true);
     const std::vector<Vec3> again = right_hand_side();

@@ -26,7 +26,7 @@ struct NewtonMemory {
   std::unique_ptr<Preconditioner> preconditioner;
   // the preconditioner is that of the matrix, whose prescribed components are eliminated
   bool factored = false;
-  int usual_iterations = 0;  // of conjugate gradients with a preconditioner made anew
+  int usual_iterations = 0;  // of conjugate gradients to 1e-4 with a preconditioner made anew
   double model_error = 1;    // of the last step, relative
   bool projected = false;    // the tangent's indefinite cells were made positive
 };

@@ -77,8 +77,15 @@ std::vector<SurfacePoint> surface_points(const Setting& setting, const std::vect
         }
       },
       16);
+  // There are some fifty to a cell under a large face: no second copy of all of them.
+  std::size_t count = 0;
+  for (const auto& each : found) count += each.size();
   std::vector<SurfacePoint> points;
-  for (const auto& each : found) points.insert(points.end(), each.begin(), each.end());
+  points.reserve(count);
+  for (auto& each : found) {
+    points.insert(points.end(), each.begin(), each.end());
+    std::vector<SurfacePoint>().swap(each);
+  }
   return points;
 }
 

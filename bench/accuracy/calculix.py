@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
 """Flexel beside CalculiX on the same parts: error, error bar, seconds, memory.
 
-    PATH=build/release/bin:$PATH bench/accuracy/calculix.py [--quick] [CASE...]
+    PATH=build/release/bin:$PATH bench/accuracy/calculix.py [--quick] [--parts DIR] [CASE...]
 
-Each part is made by gmsh (OpenCASCADE). CalculiX gets its mesh of quadratic tetrahedra (C3D10) at three sizes, Flexel the STEP file at
+Each part is made by gmsh (OpenCASCADE) or is a STEP file of ../shared/parts (left out, and said so, where that folder is not there; it is
+held and drawn by 10 N along (1, 1, 1) at the flat faces at the two ends of its longest side). CalculiX gets its mesh of quadratic tetrahedra (C3D10) at three sizes, Flexel the STEP file at
 two spacings, both one thread and the same faces, material and load. What is compared is the mean displacement of a face, or that of a
 point. The reference is Lame's solution for the tube, otherwise CalculiX's three values extrapolated (Aitken), or the finest where they
-do not approach a limit. Seconds are the processor's, which other jobs do not change, and hold everything from the file with the part or
-mesh to the result; those of CalculiX leave out gmsh's meshing. --quick leaves out the finest mesh and spacing. Needs ccx and gmsh (tools/setup --tests).
+do not approach a limit. Seconds are the processor's, which other jobs change little, and hold everything from the file with the part or
+mesh to the result; those of gmsh's meshing stand beside CalculiX's. --quick leaves out the finest mesh and spacing. Needs ccx and gmsh (tools/setup --tests).
 """
 
 import json
@@ -20,6 +21,8 @@ import sys
 import tempfile
 
 import numpy as np
+
+from end_faces import end_faces
 
 TOLERANCE = 1e-6  # mm, a node lies on a face
 
@@ -42,22 +45,23 @@ def cylinder(radius):
 
 class Case:
     """Lengths in mm before `turn`. faces: name -> (nodes of it, its middle). fix: [(face, axes)]. load: (face, kind, value), N, N m or
-    MPa. asked: a face, or a point."""
+    MPa. asked: a face, or a point. align: Flexel's lattice to the part or not. step: the part's file, where it has one; `geometry` then
+    merges it."""
 
-    def __init__(self, geometry, faces, fix, load, asked, sizes, spacings, poisson=0.3, turn=None, reference=None):
+    def __init__(self, geometry, faces, fix, load, asked, sizes, spacings, poisson=0.3, turn=None, reference=None, align="snap", step=None):
         self.geometry, self.faces, self.fix, self.load, self.asked = geometry, faces, fix, load, asked
         self.sizes, self.spacings, self.poisson, self.reference = sizes, spacings, poisson, reference
-        self.angles = turn
+        self.angles, self.align, self.step = turn, align, step
         self.turn = turned(turn) if turn else np.eye(3)
 
 
 YOUNG = 210e3  # MPa
 
 
-def beam(poisson, turn=None):
+def beam(poisson, turn=None, align="snap"):
     faces = {"held": (plane(0, 0), (0, 12.5, 12.5)), "end": (plane(0, 100), (100, 12.5, 12.5))}
     return Case("Box(1) = {0, 0, 0, 100, 25, 25};", faces, [("held", "xyz")], ("end", "force", (0, 0, -1000)), "end",
-                (12.5, 8, 5), (25 / 4, 25 / 8), poisson, turn)
+                (12.5, 8, 5), (25 / 4, 25 / 8), poisson, turn, align=align)
 
 
 def bracket():
@@ -93,15 +97,50 @@ BooleanDifference(3) = { Volume{1}; Delete; }{ Volume{2}; Delete; };"""
                 (6, 4, 2.5), (2, 1), nu, reference=radial * 2 * math.sqrt(2) / math.pi)
 
 
+PARTS = pathlib.Path(__file__).resolve().parents[2] / "../shared/parts"
+
+
+def on_face(face):
+    """Nodes on the plane of a flat face of `flexel info`."""
+    middle, normal = 1e3 * np.array(face["centroid"]), np.array(face["normal"])
+    return lambda p: np.abs((p - middle) @ normal) < 1e-4
+
+
+def real_part(name, sizes, spacings):
+    """A STEP part, held and drawn at its ends. Only faces that are alone in their plane are taken: gmsh's are known by their plane."""
+    step = PARTS / name
+    if not step.exists():
+        return None
+    info = json.loads(subprocess.run(["flexel", "info", step, "--json"], check=True, capture_output=True, text=True).stdout)
+    (solid,) = info["files"][0]["parts"]
+    flat = [face for face in solid["faces"] if face["kind"] == "flat"]
+
+    def alone(face):
+        normal = np.array(face["normal"])
+        return sum(abs(np.dot(normal, other["normal"])) > 1 - 1e-6 and
+                   abs(np.dot(normal, np.subtract(other["centroid"], face["centroid"]))) < 1e-6 for other in flat) == 1
+
+    held, end = end_faces(solid, alone)
+    faces = {each: (on_face(face), 1e3 * np.array(face["centroid"])) for each, face in (("held", held), ("end", end))}
+    force = (10 / math.sqrt(3),) * 3
+    # Straight edges: curved ones turn elements inside out at small fillets.
+    return Case(f'Merge "{step.resolve()}"; Mesh.SecondOrderLinear = 1;', faces, [("held", "xyz")], ("end", "force", force), "end", sizes, spacings, step=step)
+
+
 CASES = {
     "beam": lambda: beam(0.3),
     "beam, nu 0": lambda: beam(0.0),
+    "beam, nu 0.25": lambda: beam(0.25),
     "beam, nu 0.45": lambda: beam(0.45),
+    "beam, nu 0.49": lambda: beam(0.49),
     "beam turned": lambda: beam(0.3, (30, 30)),
+    "beam turned, lattice not": lambda: beam(0.3, (30, 30), "none"),
     "L-bracket with a hole": bracket,
     "plate with a hole": plate,
     "bar twisted": torsion,
     "thick tube": tube,
+    "fork (STEP)": lambda: real_part("lower_leg_structure_fork.STEP", (3, 2, 1.4), (0.5, 0.35)),
+    "featuretype (STEP)": lambda: real_part("featuretype.STEP", (8, 5.5, 4), (2, 1.4)),
 }
 
 
@@ -149,8 +188,8 @@ class Mesh:
             turn = (f"Rotate {{ {{1, 0, 0}}, {{0, 0, 0}}, {x} * Pi / 180 }} {{ Volume{{:}}; }}\n"
                     f"Rotate {{ {{0, 0, 1}}, {{0, 0, 0}}, {z} * Pi / 180 }} {{ Volume{{:}}; }}\n")
         geo.write_text(f'SetFactory("OpenCASCADE");\n{case.geometry}\n{turn}Mesh.SaveAll = 1; Mesh.CharacteristicLengthMax = {size};\n'
-                       "Mesh.ElementOrder = 2; Mesh.HighOrderOptimize = 1;\n")
-        subprocess.run(["gmsh", geo, "-3", "-format", "inp", "-o", folder / "mesh.inp", "-v", "1"], check=True, stdout=subprocess.DEVNULL)
+                       f"Mesh.ElementOrder = 2; Mesh.HighOrderOptimize = {0 if case.step else 1};\n")
+        self.seconds, _ = measured(["gmsh", geo, "-3", "-format", "inp", "-o", folder / "mesh.inp", "-v", "1"])
         found, self.solids, triangles = read_mesh(folder / "mesh.inp")
         used = sorted({node for solid in self.solids for node in solid})
         self.number = used
@@ -229,7 +268,7 @@ def calculix(case, folder, size):
         mean = (weights[:, None] * moved).sum(axis=0) / weights.sum()
     else:
         mean = moved[np.argmin(np.linalg.norm(mesh.rest - np.array(case.asked, float), axis=1))]
-    return np.linalg.norm(mean), seconds, memory, len(mesh.solids)
+    return np.linalg.norm(mean), seconds, memory, len(mesh.solids), mesh.seconds
 
 
 # Flexel
@@ -249,7 +288,7 @@ def quantities(vector, unit):
 
 
 def flexel(case, folder, spacing):
-    step = folder / "part.step"
+    step = case.step or folder / "part.step"
     if not step.exists():
         geo = (folder / "part.geo").read_text() + 'Save "part.step";\n'
         (folder / "export.geo").write_text(geo)
@@ -274,7 +313,8 @@ name = "asked"
 {asked}
 """)
     body = folder / "body.vtu"
-    first, memory = measured(["flexel-voxelize", step, "--size", f"{spacing} mm", "-o", body, "--threads", "1"])
+    first, memory = measured(["flexel-voxelize", step, "--size", f"{spacing} mm", "--align", case.align, "-o", body,
+                              "--threads", "1"])
     second, more = measured(["flexel-simulate", scene, body, "-o", folder / "bent.vtu", "--threads", "1", "--summary", folder / "s.json"])
     found = json.loads((folder / "s.json").read_text())
     bars = found.get("error_bars", {}).get("bars", [])
@@ -292,25 +332,35 @@ def limit(values):
 
 def run(name, quick):
     case = CASES[name]()
+    if not case:
+        print(f"| {name} | left out: no ../shared/parts |", flush=True)
+        return
     with tempfile.TemporaryDirectory() as place:
         folder = pathlib.Path(place)
         rows = [calculix(case, folder, size) for size in case.sizes[: 2 if quick else 3]]
         ours = [flexel(case, folder, spacing) for spacing in case.spacings[: 1 if quick else 2]]
     reference = case.reference or limit([row[0] for row in rows])
-    for size, (value, seconds, memory, count) in zip(case.sizes, rows):
-        print(f"| {name} | CalculiX, C3D10 of {size:g} mm | {count:,} | {100 * (value / reference - 1):+.2f} | | {seconds:.2f} | {memory:.0f} |")
+    for size, (value, seconds, memory, count, meshing) in zip(case.sizes, rows):
+        print(f"| {name} | CalculiX, C3D10 of {size:g} mm | {count:,} | {100 * (value / reference - 1):+.2f} | | {meshing:.2f} | {seconds:.2f} |"
+              f" {memory:.0f} |")
     for spacing, (value, bar, seconds, memory, cells) in zip(case.spacings, ours):
         print(f"| {name} | Flexel, cells of {spacing:g} mm | {cells:,} | {100 * (value / reference - 1):+.2f} | {100 * bar / reference:.2f} |"
-              f" {seconds:.2f} | {memory:.0f} |", flush=True)
+              f" | {seconds:.2f} | {memory:.0f} |", flush=True)
 
 
 def main():
-    wanted = [argument for argument in sys.argv[1:] if not argument.startswith("-")] or list(CASES)
+    global PARTS
+    given = sys.argv[1:]
+    if "--parts" in given[:-1]:
+        at = given.index("--parts")
+        PARTS = pathlib.Path(given[at + 1])
+        del given[at:at + 2]
+    wanted = [argument for argument in given if not argument.startswith("-")] or list(CASES)
     unknown = [name for name in wanted if name not in CASES]
     if unknown or "--help" in sys.argv:
         print(__doc__ + "\nCases: " + ", ".join(CASES), file=sys.stderr)
         sys.exit(0 if "--help" in sys.argv else 2)
-    print("| part | by | elements, cells | error % | bar % | s | MB |\n|---|---|---|---|---|---|---|")
+    print("| part | by | elements, cells | error % | bar % | mesh s | s | MB |\n|---|---|---|---|---|---|---|---|")
     for name in wanted:
         run(name, "--quick" in sys.argv)
 

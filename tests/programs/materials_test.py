@@ -29,6 +29,10 @@ def test_measure_finds_the_material():
         expect(abs(each["young"] / 210e9 - 1) < 0.01 and abs(each["poisson"] - 0.3) < 0.003, each)
         expect(abs(each["shear"] / (210e9 / 2.6) - 1) < 0.01, each)
     expect([bar["cells"] for bar in found["bars"]] == [2, 4, 8], found)
+    for bar in found["bars"]:
+        expect(abs(bar["young_drawn"] / 210e9 - 1) < 0.01 and abs(bar["shear_sheared"] / (210e9 / 2.6) - 1) < 0.01, bar)
+    limit = found["limit"]
+    expect(abs(limit["young_bent"] / 210e9 - 1) < 0.01 and abs(limit["shear_twisted"] / (210e9 / 2.6) - 1) < 0.01, limit)
     expect("G twisted" in run("flexel", "measure", "--model", "paper", "--size", "1 mm").out.decode(), "no table")
 
 

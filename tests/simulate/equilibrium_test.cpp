@@ -155,6 +155,19 @@ TEST(Equilibrium, FreeMotionsAreNamed) {
   EXPECT_THAT(message, HasSubstr("rotate about x"));
 }
 
+TEST(Equilibrium, DustIsRefused) {
+  Body dust = box_body();
+  std::fill(dust.broken.begin(), dust.broken.end(), std::uint8_t{1});
+  Scene scene = steel_scene();
+  Selection low;
+  low.kind = Selection::Kind::half_space;
+  low.point = Vec3(1e-6, 0, 0);
+  low.normal = -Vec3::UnitX();
+  scene.get<Ties>().ties.push_back(make_fix(low));
+  scene.get<Gravity>().acceleration = Vec3(0, 0, -9.81);
+  EXPECT_THAT(refusal(dust, scene), HasSubstr("every cell of the body is broken"));
+}
+
 TEST(Equilibrium, SecondBodyNeedsItsOwnFix) {
   Body body = box_body();
   BoxOptions other;

@@ -37,10 +37,14 @@ TEST(Richardson, UnevenSequencesGetWideBars) {
   EXPECT_EQ(richardson({{2, 2, 2}, {2, 2}}).half_width, 0);
 }
 
-TEST(Richardson, SuddenArrivalKeepsTheWholeDifference) {
+TEST(Richardson, SuddenArrivalKeepsWhatOrderTwoWouldLeave) {
   const Bar bar = richardson({{1.0, 1.01, 1.5}, {2, 2}});
   EXPECT_GT(*bar.order, 3);
-  EXPECT_NEAR(bar.half_width, 0.01, 1e-12);
+  EXPECT_NEAR(bar.half_width, 0.49 / 4, 1e-12);
+  // Just above order 2 the two differences agree: three times the distance, which is the whole difference.
+  const Bar near = richardson({{1.0, 1.01, 1.055}, {2, 2}});
+  EXPECT_GT(*near.order, 2.1);
+  EXPECT_NEAR(near.half_width, 0.45 / 40, 1e-12);
 }
 
 SimulateResult end_loaded(Body body, Scene scene) {

@@ -1,0 +1,203 @@
+#!/usr/bin/env python3
+"""What Flexel's answers are off by, measured and written as docs/verification.md with its figures.
+
+    PATH=build/release/bin:$PATH bench/accuracy/verification.py [--quick] [-o FILE]
+
+Always: the lattice tested as a material (`flexel measure`), the paper's cantilever against its reference and a thick tube against Lame's
+solution, each at several spacings with its error bar. Without --quick also the tables of accuracy_table and error_bars (a
+build with FLEXEL_BENCH=ON), of bench/accuracy/step_parts.py and of bench/accuracy/calculix.py (ccx and gmsh). A section whose programs or
+parts are not there says so. Figures are SVG by gnuplot, in a folder beside FILE named after it. Exit code 1 when a true error lies outside
+its bar in more than one case of ten, or a material is off by more than 1 %.
+"""
+
+import argparse
+import concurrent.futures
+import json
+import math
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+
+
+def command(*words, accept=(0,)):
+    done = subprocess.run([str(word) for word in words], capture_output=True, text=True)
+    if done.returncode not in accept:
+        raise RuntimeError(f"{' '.join(map(str, words))}: {(done.stderr.strip().splitlines() or ['no message'])[-1]}")
+    return done.stdout
+
+
+# The lattice as a material
+
+
+def materials():
+    text = ("## The lattice as a material\n\nE, Poisson's ratio and G that a lattice has, by `flexel measure` ([accuracy.md](accuracy.md)), in % of the "
+            "material's. Even strains: drawn bars and\nbars sheared in a frame. In the limit: bent and twisted bars of 4 and 8 cells, extrapolated.\n\n"
+            "| model | nu | worst direction, E | nu off by | G | drawn, 8 cells, E | sheared, G | bent, 8 cells, E | limit | twisted, 8 cells, G | limit |\n"
+            "|---|---|---|---|---|---|---|---|---|---|---|\n")
+    good = True
+    for model, poisson in (("cells", 0.0), ("cells", 0.3), ("cells", 0.45), ("springs", 0.25)):
+        found = json.loads(command("flexel", "measure", "--model", model, "--size", "2 mm", "--poisson", poisson, "--json"))
+        young, shear = found["young"], found["shear"]
+        off = lambda value, wanted: 100 * (value / wanted - 1)
+        inside = [max((off(each[key], wanted) for each in found["inside"]), key=abs) for key, wanted in (("young", young), ("shear", shear))]
+        ratio = max(abs(each["poisson"] - poisson) for each in found["inside"])
+        bar, limit = found["bars"][-1], found["limit"]
+        held = inside + [off(bar["young_drawn"], young), off(bar["shear_sheared"], shear), off(limit["young_bent"], young),
+                         off(limit["shear_twisted"], shear)]
+        good &= max(map(abs, held)) <= 1 and ratio <= 0.01
+        text += (f"| `{model}` | {poisson:g} | {inside[0]:+.2f} | {ratio:.4f} | {inside[1]:+.2f} | {held[2]:+.2f} | {held[3]:+.2f} |"
+                 f" {off(bar['young_bent'], young):+.2f} | {held[4]:+.2f} | {off(bar['shear_twisted'], shear):+.2f} | {held[5]:+.2f} |\n")
+    return text, good
+
+
+# Bodies whose answer is known
+
+
+def box(path, sides):
+    x, y, z = sides
+    corners = [(a, b, c) for c in (0, z) for b in (0, y) for a in (0, x)]
+    quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    lines = [f"v {a} {b} {c}" for a, b, c in corners] + ["f " + " ".join(str(i + 1) for i in quad) for quad in quads]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def quarter_tube(path, inner, outer, high, steps=180):
+    """Faces: inner, outer, low, high, along (y = 0), across (x = 0)."""
+    lines = []
+    for i in range(steps + 1):
+        angle = math.pi / 2 * i / steps
+        lines += [f"v {r * math.cos(angle):.9g} {r * math.sin(angle):.9g} {z}" for z in (0, high) for r in (inner, outer)]
+    at = lambda i, up, out: 4 * i + 2 * up + out + 1
+    quads = {"inner": [(at(i, 0, 0), at(i, 1, 0), at(i + 1, 1, 0), at(i + 1, 0, 0)) for i in range(steps)],
+             "outer": [(at(i, 0, 1), at(i + 1, 0, 1), at(i + 1, 1, 1), at(i, 1, 1)) for i in range(steps)],
+             "low": [(at(i, 0, 0), at(i + 1, 0, 0), at(i + 1, 0, 1), at(i, 0, 1)) for i in range(steps)],
+             "high": [(at(i, 1, 0), at(i, 1, 1), at(i + 1, 1, 1), at(i + 1, 1, 0)) for i in range(steps)],
+             "along": [(at(0, 0, 0), at(0, 0, 1), at(0, 1, 1), at(0, 1, 0))],
+             "across": [(at(steps, 0, 0), at(steps, 1, 0), at(steps, 1, 1), at(steps, 0, 1))]}
+    for name, group in quads.items():
+        lines += [f"g {name}"] + ["f " + " ".join(map(str, quad)) for quad in group]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def solve(folder, part, size, scene):
+    """The probe's displacement [m] and its error bar (None where there is none), the number of cells."""
+    (folder / "scene.toml").write_text(scene)
+    command("flexel-voxelize", part, "--size", size, "--quiet", "-o", folder / "body.vtu")
+    command("flexel-simulate", folder / "scene.toml", folder / "body.vtu", "--quiet", "--no-stress", "--summary", folder / "s.json",
+            "-o", folder / "out.vtu")
+    found = json.loads((folder / "s.json").read_text())
+    bars = [each["bar"] for each in found["error_bars"].get("bars", []) if each["of"] == "probe asked"]
+    return math.hypot(*found["probes"][0]["displacement"]), bars[0] if bars else None, found["cells"]
+
+
+def cantilever(folder, n):
+    """The paper's beam (section 5), 2 x 0.75 x 0.5 m, n cells through the 0.5 m: displacement, bar, cells, reference. The reference is
+    Timoshenko's beam times 0.98522, its ratio to C3D20R runs of CalculiX, extrapolated (docs/accuracy.md)."""
+    box(folder / "beam.obj", (2000, 750, 500))
+    young, nu, force, width, height, length = 12.1e5, 0.25, 1e-3, 0.75, 0.5, 2.0
+    inertia, shear, factor = width * height**3 / 12, young / 2 / (1 + nu), 10 * (1 + nu) / (12 + 11 * nu)
+    reference = 0.98522 * force * (length**3 / (3 * young * inertia) + length / (factor * shear * width * height))
+    scene = (f'material = "gum"\n[materials.gum]\nyoung = "{young} Pa"\npoisson = {nu}\ndensity = "580 kg/m3"\n[[fix]]\nwhere = "xmin"\n'
+             f'[[load]]\nwhere = "xmax"\nforce = ["0 N", "0 N", "{force} N"]\n[[probe]]\nname = "asked"\nwhere = "xmax"\n')
+    return *solve(folder, folder / "beam.obj", f"{500 / n} mm", scene), reference
+
+
+def tube(folder, n):
+    """A quarter of a thick tube under inner pressure in plane strain, n cells through its wall of 20 mm; Lame's solution."""
+    quarter_tube(folder / "tube.obj", 20, 40, 4)
+    young, nu, inner, outer, pressure = 210e9, 0.3, 0.02, 0.04, 1e6
+    radial = (1 + nu) * pressure * inner**2 / (young * (outer**2 - inner**2)) * ((1 - 2 * nu) * inner + outer**2 / inner)
+    fixes = "".join(f'[[fix]]\nwhere = "{face}"\naxes = "{axis}"\n' for face, axis in (("along", "y"), ("across", "x"), ("low", "z"), ("high", "z")))
+    scene = (f'material = "metal"\n[materials.metal]\nyoung = "{young} Pa"\npoisson = {nu}\ndensity = "7850 kg/m3"\n{fixes}'
+             f'[[load]]\nwhere = "inner"\npressure = "{pressure} Pa"\n[[probe]]\nname = "asked"\nwhere = "inner"\n')
+    return *solve(folder, folder / "tube.obj", f"{20 / n} mm", scene), radial * 2 * math.sqrt(2) / math.pi
+
+
+def plot(path, title, across, rows):
+    """Error and bar [%] over the cells through the part, both axes logarithmic; nothing where gnuplot is missing."""
+    if not shutil.which("gnuplot"):
+        return ""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    data = "\n".join(f"{n} {max(abs(error), 1e-3)} {bar if bar else 'NaN'}" for n, _, error, bar in rows)
+    script = (f"set terminal svg size 560,360 background 'white'\nset output '{path}'\nset logscale xy\nset grid\nset title \"{title}\"\n"
+              f"set xlabel '{across}'\nset ylabel '% of the answer'\nset xtics ({', '.join(str(row[0]) for row in rows)})\n$data << EOD\n{data}\nEOD\n"
+              "plot $data using 1:2 with linespoints title 'true error', $data using 1:3 with linespoints dashtype 2 title 'error bar'\n")
+    subprocess.run(["gnuplot"], input=script, text=True, check=True)
+    return f"![{title}]({path.parent.name}/{path.name})\n\n"
+
+
+def known(name, title, what, across, run, counts, output):
+    rows = []
+    with tempfile.TemporaryDirectory() as place:
+        for n in counts:
+            value, bar, cells, reference = run(pathlib.Path(place), n)
+            rows.append((n, cells, 100 * (value / reference - 1), 100 * bar / reference if bar is not None else None))
+    inside = sum(bar is not None and abs(error) <= bar for _, _, error, bar in rows)
+    text = f"## {title}\n\n{what}\n\n" + plot(output.with_suffix("") / f"{name}.svg", title, across, rows)
+    text += f"| {across} | cells | error % | bar % | holds |\n|---|---|---|---|---|\n"
+    for n, cells, error, bar in rows:
+        text += f"| {n} | {cells:,} | {error:+.2f} | {f'{bar:.2f}' if bar is not None else 'none'} | {'yes' if bar is not None and abs(error) <= bar else 'no'} |\n"
+    return text, inside, len(rows)
+
+
+# Tables of the other programs
+
+
+def captured(title, what, words, needs=()):
+    missing = [need for need in (words[0], *needs) if not (shutil.which(str(need)) or pathlib.Path(need).exists())]
+    if missing:
+        return f"## {title}\n\n{what}\n\nLeft out: {', '.join(pathlib.Path(each).name for each in missing)} is not there.\n"
+    print(f"verification.py: {title}", file=sys.stderr)
+    # 1 is a finding of theirs, which their table shows
+    return f"## {title}\n\n{what}\n\n{command(*words, accept=(0, 1)).strip()}\n"
+
+
+def main():
+    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    arguments.add_argument("--quick", action="store_true", help="leave out what takes more than a minute")
+    arguments.add_argument("--jobs", default=1, type=int, help="programs that run at once")
+    arguments.add_argument("--parts", default=ROOT / "../shared/parts", type=pathlib.Path)
+    arguments.add_argument("-o", "--output", default=ROOT / "docs/verification.md", type=pathlib.Path)
+    options = arguments.parse_args()
+    sections = ["# Verification\n\nWritten by `bench/accuracy/verification.py`" + (" --quick" if options.quick else "") +
+                f", {command('flexel', '--version').strip()}. Errors are against the named reference; above 0 is too soft. What error\n"
+                "bars are is in [error-bars.md](error-bars.md), what the models are in [accuracy.md](accuracy.md).\n"]
+    try:
+        text, good = materials()
+        sections.append(text)
+        cases = [known("cantilever", "The paper's cantilever",
+                       "2 x 0.75 x 0.5 m, Poisson's ratio 1/4, held at one end and pushed across at the other, small deflection. Mean deflection of the end\n"
+                       "against Timoshenko's beam times its ratio to CalculiX's C3D20R, extrapolated.",
+                       "cells through 0.5 m", cantilever, (2, 4, 6, 8) if options.quick else (2, 4, 6, 8, 12, 16), options.output),
+                 known("tube", "A thick tube under pressure",
+                       "Radii 20 and 40 mm, plane strain, a quarter of it; the lattice does not follow its walls. Mean displacement of the inner face against\n"
+                       "Lame's solution.", "cells through the wall", tube, (10, 20) if options.quick else (10, 20, 40), options.output)]
+        sections += [case[0] for case in cases]
+        inside, count = sum(case[1] for case in cases), sum(case[2] for case in cases)
+        sections.append(f"In {inside} of these {count} runs the true error lies within the bar.\n")
+        if not options.quick:
+            tables = [("Models", "Tip of the same cantilever by model, elements on its faces ([accuracy.md](accuracy.md)).", ["accuracy_table"]),
+                      ("Error bars", "Cases whose answer is known ([error-bars.md](error-bars.md)).", ["error_bars"]),
+                      ("STEP parts", "Every closed STEP part with an error bar, nothing set by hand; processor seconds.",
+                       [HERE / "step_parts.py", "--parts", options.parts], [options.parts]),
+                      ("Beside CalculiX", "The same parts by CalculiX and by Flexel; processor seconds, one thread each ([accuracy.md](accuracy.md)).",
+                       [HERE / "calculix.py", "--parts", options.parts], ["ccx", "gmsh"])]
+            with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
+                sections += pool.map(lambda table: captured(*table), tables)
+    except (OSError, RuntimeError, subprocess.SubprocessError) as error:
+        print(f"verification.py: {error}", file=sys.stderr)
+        return 1
+    part = options.output.with_name(options.output.name + ".part")
+    part.write_text("\n".join(sections), encoding="utf-8")
+    part.replace(options.output)
+    print(f"verification.py: wrote {options.output}; {inside} of {count} bars hold", file=sys.stderr)
+    return 0 if good and 10 * inside >= 9 * count else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
