@@ -52,7 +52,6 @@ def crush(trial, share):
 
 
 @case("60 % crush and release",
-      known={"springs, implicit": "Newton's method takes minutes to give up"},
       peer="LAMMPS", holds="pressed to 40 % of its height between held faces and let go, a cube comes back to its shape within 1e-3 of its side, or the run stops as it should",
       breaks="springs, which resist as well inside out and stay so; a step that does not follow the stiffening")
 def crush_60(trial):
