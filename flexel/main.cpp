@@ -25,6 +25,8 @@ constexpr const char* kHelp =
     "  flexel materials      the materials that --material and scenes know, with their sources\n"
     "  flexel measure --model NAME --size LENGTH\n"
     "                        what the lattice makes of a material: E, nu and G by direction and resolution\n"
+    "  flexel study PART... --scene FILE -o FOLDER\n"
+    "                        what accuracy costs in time: a page with plots and the size to use\n"
     "  flexel voxelize ...   part -> lattice of elements      (the program flexel-voxelize)\n"
     "  flexel simulate ...   lattice + scene -> deformed      (flexel-simulate)\n"
     "  flexel map ...        deformed lattice -> the part     (flexel-map)\n"
@@ -42,8 +44,9 @@ bool is_stage(const std::string& command) {
 }
 
 [[noreturn]] void unknown_command(const std::string& command) {
-  const std::vector<std::string> commands = {"deform",  "export",   "info",     "picture", "materials",
-                                             "measure", "voxelize", "simulate", "map",     "help"};
+  const std::vector<std::string> commands = {"deform",    "export",  "info",  "picture",
+                                             "materials", "measure", "study", "voxelize",
+                                             "simulate",  "map",     "help"};
   throw InputError(fmt::format("unknown command \"{}\"; the commands are {}{}", command,
                                fmt::join(commands, ", "), did_you_mean(command, commands)));
 }
@@ -60,6 +63,7 @@ int help(int argc, char** argv) {
   if (command == "export") return export_command(2, arguments);
   if (command == "materials") return materials_command(2, arguments);
   if (command == "measure") return measure_command(2, arguments);
+  if (command == "study") return study_command(2, arguments);
   if (command == "info") return info_command(2, arguments);
   if (command == "picture") return picture_command(2, arguments);
   if (is_stage(command)) run_stage_program(argv[1], arguments);
@@ -69,9 +73,8 @@ int help(int argc, char** argv) {
 int run(int argc, char** argv) {
   if (argc < 2)
     throw InputError(
-        "a command is missing: deform, export, info, picture, materials, measure, voxelize, simulate or map "
-        "(`flexel "
-        "help`)");
+        "a command is missing: deform, export, info, picture, materials, measure, study, voxelize, simulate "
+        "or map (`flexel help`)");
   const std::string command = argv[1];
   if (command == "--version") {
     print(fmt::format("flexel {}\n", version()));
@@ -82,6 +85,7 @@ int run(int argc, char** argv) {
   if (command == "materials") return materials_command(argc - 1, argv + 1);
   if (command == "measure") return measure_command(argc - 1, argv + 1);
   if (command == "export") return export_command(argc - 1, argv + 1);
+  if (command == "study") return study_command(argc - 1, argv + 1);
   if (command == "info") return info_command(argc - 1, argv + 1);
   if (command == "picture") return picture_command(argc - 1, argv + 1);
   if (is_stage(command)) run_stage_program(argv[1], argv + 1);

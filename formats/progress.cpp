@@ -89,8 +89,10 @@ void Progress::warn(const std::string& line) {
 
 void Progress::finish() {
   clear_bar();
-  if (mode_ == Mode::lines && !stage_.empty())
-    print(fmt::format("{}: {}: {:.2f} s\n", program_, stage_, now() - stage_began_));
+  if (mode_ == Mode::lines && !stage_.empty()) {
+    const double seconds = now() - stage_began_;
+    print(fmt::format("{}: {}: {:.{}f} s\n", program_, stage_, seconds, seconds < 1 ? 4 : 2));
+  }
   stage_.clear();
 }
 

@@ -169,6 +169,7 @@ int run(int argc, char** argv) {
       throw InputError(
           "--live writes frames to stdout: name the body's file with -o, or give --live tcp:PORT");
   }
+  progress.stage("read");
   auto [scene, body] = read_input(arguments);
   if (arguments.output.empty()) arguments.output = "-";
   options.output = arguments.output;
@@ -178,6 +179,7 @@ int run(int argc, char** argv) {
   if (series) options.series = arguments.output;
   const SimulateResult result = simulate(body, scene, options, progress);
   for (const std::string& line : summary_lines(result)) progress.say(line);
+  progress.stage("write");
   BodyFileOptions file_options;
   file_options.compress = arguments.compress;
   if (!series) write_body(body, arguments.output, file_options);

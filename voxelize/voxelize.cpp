@@ -290,9 +290,10 @@ Placement placement_choice(const std::string& word) {
 }
 
 VoxelizeResult voxelize(Surface surface, const VoxelizeOptions& options, Progress& progress) {
-  progress.stage("voxelize");
+  progress.stage("heal");
   std::vector<HealedPart> meshes = heal_parts(surface, options.heal);
   check_meshes(meshes, surface);
+  progress.stage("voxelize");
   const std::vector<PartExtent> extents = extents_of(meshes);
   const double limit = options.max_memory.value_or(.8 * available_memory());
   const double spacing = choose_spacing(options, extents);

@@ -1,0 +1,141 @@
+// Child processes. The child is in a process group of its own, so that Ctrl-C reaches it through us alone and
+// ends it once; it dies with us, whatever ends us.
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+
+#include "flexel/study/runner.h"
+#include "formats/error.h"
+#include "formats/program.h"
+
+namespace flexel::study {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr auto kGrace = std::chrono::seconds(2);
+constexpr Clock::duration kGlance = std::chrono::milliseconds(100);
+
+double seconds(const timeval& time) {
+  return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+}
+
+// Becomes the program. Only what is safe between fork and exec is called.
+[[noreturn]] void become(char* const* argv, int log, int nothing, pid_t parent) {
+  setpgid(0, 0);
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (getppid() != parent) _exit(127);  // it ended before we asked to end with it
+  dup2(nothing, STDIN_FILENO);
+  dup2(log, STDOUT_FILENO);
+  dup2(log, STDERR_FILENO);
+  struct sigaction usual = {};
+  usual.sa_handler = SIG_DFL;
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGPIPE}) sigaction(signal, &usual, nullptr);
+  execv(argv[0], argv);
+  _exit(127);
+}
+
+struct Descriptor {
+  int number = -1;
+  explicit Descriptor(int n) : number(n) {}
+  ~Descriptor() {
+    if (number >= 0) close(number);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+};
+
+// Milliseconds that poll() may wait: to the deadline, but never so long that an interrupt which came just
+// before it is seen late.
+int patience(Deadline until) {
+  const auto left = until == kNever ? kGlance : std::min<Clock::duration>(kGlance, until - Clock::now());
+  return static_cast<int>(std::max<long long>(0, std::chrono::ceil<std::chrono::milliseconds>(left).count()));
+}
+
+// For kernels without pidfd_open: there poll() watches nothing.
+bool has_ended(pid_t child) {
+  siginfo_t info = {};
+  return waitid(P_PID, static_cast<id_t>(child), &info, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+         info.si_pid == child;
+}
+
+}  // namespace
+
+ChildRun run_child(const std::vector<std::string>& argv, const std::filesystem::path& log, Deadline deadline,
+                   bool heed_interrupts) {
+  if (heed_interrupts) throw_if_interrupted();
+  std::vector<char*> arguments;
+  for (const std::string& each : argv) arguments.push_back(const_cast<char*>(each.c_str()));
+  arguments.push_back(nullptr);
+  if (access(argv.front().c_str(), X_OK) != 0)
+    throw InputError(argv.front(), fmt::format("cannot be run: {}", std::strerror(errno)));
+  const Descriptor out(open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+  if (out.number < 0)
+    throw InputError(log.string(), fmt::format("cannot be written: {}", std::strerror(errno)));
+  const Descriptor nothing(open("/dev/null", O_RDONLY | O_CLOEXEC));
+  const Clock::time_point begin = Clock::now();
+  const pid_t parent = getpid();
+  const pid_t child = fork();
+  if (child < 0) throw InputError(argv.front(), fmt::format("cannot be started: {}", std::strerror(errno)));
+  if (child == 0) become(arguments.data(), out.number, nothing.number, parent);
+  // by its number: the header of glibc 2.36 declares pidfd_open for C alone
+  const Descriptor handle(static_cast<int>(syscall(SYS_pidfd_open, child, 0)));
+  ChildRun result;
+  bool told = false;  // it was asked to end
+  Deadline until = deadline;
+  pollfd watched = {handle.number, POLLIN, 0};
+  while (poll(&watched, 1, patience(until)) <= 0 && !has_ended(child)) {
+    const bool late = Clock::now() >= until;
+    if (told && late) {
+      kill(child, SIGKILL);
+      until = kNever;
+    } else if (!told && (late || (heed_interrupts && interrupted()))) {
+      result.out_of_time = late;
+      kill(child, SIGINT);
+      told = true;
+      until = Clock::now() + kGrace;
+    }
+  }
+  int status = 0;
+  rusage usage = {};
+  while (wait4(child, &status, 0, &usage) < 0 && errno == EINTR) {
+  }
+  result.wall = std::chrono::duration<double>(Clock::now() - begin).count();
+  result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  result.cpu = seconds(usage.ru_utime) + seconds(usage.ru_stime);
+  result.memory = 1024.0 * static_cast<double>(usage.ru_maxrss);
+  if (heed_interrupts) throw_if_interrupted();
+  return result;
+}
+
+std::string own_program(const std::string& name) {
+  std::error_code error;
+  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
+  const std::filesystem::path program = self.parent_path() / name;
+  if (error || access(program.c_str(), X_OK) != 0)
+    throw InputError("cannot run " + program.string() + "; the stage programs are installed beside flexel");
+  return program.string();
+}
+
+TemporaryFolder::TemporaryFolder(const std::filesystem::path& parent) {
+  std::string name = (parent / ".flexel-XXXXXX").string();
+  if (mkdtemp(name.data()) == nullptr)
+    throw InputError(parent.string(), fmt::format("no folder can be made there: {}", std::strerror(errno)));
+  path_ = name;
+}
+
+TemporaryFolder::~TemporaryFolder() {
+  std::error_code ignored;
+  std::filesystem::remove_all(path_, ignored);
+}
+
+}  // namespace flexel::study

@@ -1,0 +1,195 @@
+// Errors and what they cost. Extrapolation is that of the error bars (simulate/estimate.h).
+#include "flexel/study/measure.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "formats/units.h"
+#include "simulate/estimate.h"
+
+namespace flexel::study {
+namespace {
+
+constexpr double kTargets[] = {0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5};
+constexpr double kUsualTarget = 0.01;
+
+Bar bar_of(const std::vector<SizeValue>& values, std::size_t finest) {
+  Sequence sequence;
+  for (std::size_t i = 0; i < 3; ++i) sequence.value.at(i) = values[finest - i].value;
+  for (std::size_t i = 0; i < 2; ++i)
+    sequence.ratio.at(i) = values[finest - i - 1].spacing / values[finest - i].spacing;
+  return richardson(sequence);
+}
+
+// What a point's error is known to be at most.
+double bound(const Point& point) {
+  return point.error->error + point.error->uncertainty;
+}
+
+std::string percent(double share) {
+  return share < 0.995 ? fmt::format("{:.2g} %", 100 * share) : fmt::format("{:.0f} %", 100 * share);
+}
+
+std::string factor(double value) {
+  if (value < 10) return fmt::format("{:.1f}", value);
+  if (value < 10'000) return fmt::format("{:.0f}", value);
+  return "over 10,000";
+}
+
+}  // namespace
+
+Reference extrapolate(const std::string& name, const std::string& unit,
+                      const std::vector<SizeValue>& values) {
+  Reference result;
+  result.name = name;
+  result.unit = unit;
+  if (values.empty()) return result;
+  const std::size_t n = values.size();
+  result.value = values.back().value;
+  if (n == 1) {
+    result.uncertainty = std::abs(result.value);
+    result.from = "the only size";
+    return result;
+  }
+  if (n == 2) {
+    result.uncertainty = 3 * std::abs(values[1].value - values[0].value);
+    result.from = "finest of 2 sizes";
+    return result;
+  }
+  const Bar bar = bar_of(values, n - 1);
+  result.value = bar.extrapolated;
+  result.uncertainty = bar.half_width;
+  result.order = bar.order;
+  result.from = bar.order ? "extrapolated from 3 sizes" : "finest of 3 sizes, no even limit";
+  if (n > 3) {
+    const Bar before = bar_of(values, n - 2);
+    result.uncertainty = std::max(result.uncertainty, 0.5 * std::abs(before.extrapolated - bar.extrapolated));
+  }
+  return result;
+}
+
+std::optional<RunError> error_of(const RunResult& run, const std::vector<Reference>& references) {
+  std::optional<RunError> result;
+  for (const Reference& reference : references) {
+    if (!reference.decides || reference.value == 0) continue;
+    const Quantity* found = run.find(reference.name);
+    if (found == nullptr) continue;
+    if (!result) result.emplace();
+    const double size = std::abs(reference.value);
+    result->error = std::max(result->error, std::abs(found->value - reference.value) / size);
+    result->uncertainty = std::max(result->uncertainty, reference.uncertainty / size);
+  }
+  return result;
+}
+
+std::vector<std::size_t> frontier(const std::vector<Point>& points) {
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (points[i].choosable && points[i].error) order.push_back(i);
+  const auto shown = [&](std::size_t i) {
+    return std::max(points[i].error->error, points[i].error->uncertainty);
+  };
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return points[a].seconds != points[b].seconds ? points[a].seconds < points[b].seconds
+                                                  : shown(a) < shown(b);
+  });
+  std::vector<std::size_t> result;
+  double best = std::numeric_limits<double>::infinity();
+  for (const std::size_t i : order)
+    if (shown(i) < best) {
+      best = shown(i);
+      result.push_back(i);
+    }
+  return result;
+}
+
+std::optional<std::size_t> cheapest_within(const std::vector<Point>& points, double target) {
+  std::optional<std::size_t> best;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!points[i].choosable || !points[i].error || bound(points[i]) > target) continue;
+    if (!best || points[i].seconds < points[*best].seconds) best = i;
+  }
+  return best;
+}
+
+std::optional<double> cost_of_tenfold(const std::vector<Point>& points) {
+  double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, least = 1e300, most = 0;
+  for (const Point& point : points) {
+    if (point.sweep != "resolution" || !point.error) continue;
+    const double error = point.error->error;
+    if (!(error > point.error->uncertainty) || !(error > 0)) continue;
+    const double x = -std::log10(error), y = std::log10(point.seconds);
+    n += 1;
+    sx += x;
+    sy += y;
+    sxx += x * x;
+    sxy += x * y;
+    least = std::min(least, error);
+    most = std::max(most, error);
+  }
+  if (n < 2 || most < 2 * least) return std::nullopt;
+  const double slope = (n * sxy - sx * sy) / (n * sxx - sx * sx);
+  if (!(slope > 0)) return std::nullopt;
+  return std::pow(10.0, slope);
+}
+
+std::vector<std::string> sentences(const std::vector<Point>& points) {
+  std::vector<std::string> result;
+  std::optional<std::size_t> best;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (points[i].choosable && points[i].error && (!best || bound(points[i]) < bound(points[*best])))
+      best = i;
+  if (!best) return {"No run tells an error: a probe, or a second size, is needed."};
+  double target = kUsualTarget;
+  std::optional<std::size_t> chosen = cheapest_within(points, target);
+  if (!chosen) {
+    result.push_back(fmt::format("No run is known to be within 1 %; the best is {}: {} off, give or take {}.",
+                                 points[*best].options, percent(points[*best].error->error),
+                                 percent(points[*best].error->uncertainty)));
+    for (const double each : kTargets)
+      if (!chosen && each > kUsualTarget) {
+        chosen = cheapest_within(points, each);
+        target = each;
+      }
+  }
+  if (chosen)
+    result.push_back(fmt::format("For {} use {}: {}, {}.", percent(target), points[*chosen].options,
+                                 human_seconds(points[*chosen].seconds),
+                                 human_bytes(points[*chosen].memory)));
+  if (const std::optional<double> cost = cost_of_tenfold(points))
+    result.push_back(fmt::format("Ten times the accuracy costs {} times the time.", factor(*cost)));
+  else
+    result.emplace_back("The sizes that were run do not tell what ten times the accuracy costs.");
+  return result;
+}
+
+Median median(std::vector<double> values) {
+  if (values.empty()) return {0, std::numeric_limits<double>::infinity()};
+  std::sort(values.begin(), values.end());
+  const std::size_t n = values.size();
+  const double middle = n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
+  if (n < 3 || !(middle > 0)) return {middle, std::numeric_limits<double>::infinity()};
+  const double count = static_cast<double>(n);
+  const double mean = std::accumulate(values.begin(), values.end(), 0.0) / count;
+  double squares = 0;
+  for (const double each : values) squares += (each - mean) * (each - mean);
+  return {middle, 1.2533 * std::sqrt(squares / (count - 1) / count) / middle};
+}
+
+std::string option_length(double metres) {
+  return metres >= 1e-3 ? fmt::format("{:.3g}mm", 1e3 * metres) : fmt::format("{:.3g}um", 1e6 * metres);
+}
+
+std::string human_seconds(double seconds) {
+  if (seconds < 1) return fmt::format("{:.0f} ms", 1e3 * seconds);
+  if (seconds < 9.95) return fmt::format("{:.1f} s", seconds);
+  if (seconds < 120) return fmt::format("{:.0f} s", seconds);
+  const auto whole = static_cast<long>(std::lround(seconds));
+  return fmt::format("{} min {} s", whole / 60, whole % 60);
+}
+
+}  // namespace flexel::study

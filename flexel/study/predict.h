@@ -1,0 +1,62 @@
+// How long the next run will take and how much memory it will need, from the runs that are done.
+//
+// Each stage is taken as seconds = c + a x^p with x the cells, of the stages that step in time the cells
+// times the steps; each program's memory as bytes = c + a n. c, a and p come from the runs by least squares
+// of the relative error, the larger runs weighing more, drawn weakly towards a prior: constants measured
+// once, or what another kind of run showed.
+#pragma once
+#include <array>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "flexel/study/runner.h"
+
+namespace flexel::study {
+
+// seconds (or bytes) = constant + slope x^power
+struct PowerLaw {
+  double constant = 0, slope = 0, power = 1;
+  [[nodiscard]] double at(double x) const;
+};
+
+struct Observation {
+  double x = 0, y = 0;  // both above 0
+};
+
+// The law that fits best among powers near the prior's (`powers_vary`), or of its own power. Without
+// observations the prior.
+[[nodiscard]] PowerLaw fit(const std::vector<Observation>& observations, const PowerLaw& prior,
+                           bool powers_vary);
+
+struct RunSize {
+  double cells = 0;  // at centre placement elements
+  double steps = 1;  // in time
+};
+
+struct Prediction {
+  double seconds = 0;  // wall
+  double bytes = 0;    // the largest of the programs
+  std::vector<Stage> stages;
+};
+
+class Predictor {
+ public:
+  // A run that went well. `kind` tells apart runs that cost differently at the same size: the model, the
+  // integrator, the threads; "" is the ordinary one, which is the prior of all others.
+  void add(const std::string& kind, const RunSize& size, const RunResult& run);
+  // Never throws; with no run so far it is the prior alone, good to a factor of a few.
+  [[nodiscard]] Prediction predict(const std::string& kind, const RunSize& size) const;
+  [[nodiscard]] bool knows(const std::string& kind) const { return kinds_.count(kind) > 0; }
+
+ private:
+  struct Kind {
+    std::map<std::string, std::vector<Observation>> stages;
+    std::array<std::vector<Observation>, 3> memory;
+  };
+  [[nodiscard]] PowerLaw stage_law(const std::string& kind, const std::string& stage, bool timed) const;
+  [[nodiscard]] PowerLaw memory_law(const std::string& kind, std::size_t program) const;
+  std::map<std::string, Kind> kinds_;
+};
+
+}  // namespace flexel::study

@@ -1,0 +1,141 @@
+// Runs one configuration of a part and a scene the way a user does: flexel-voxelize, flexel-simulate and
+// flexel-map, one after the other, as child processes. What each took (wall and processor time, peak memory)
+// comes from the kernel (wait4), what it found from the summaries that it wrote.
+#pragma once
+#include <array>
+#include <chrono>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "formats/vec.h"
+
+namespace flexel::study {
+
+// A folder of its own under `parent`, removed with all that is in it.
+class TemporaryFolder {
+ public:
+  // Throws InputError: `parent` cannot be written to.
+  explicit TemporaryFolder(const std::filesystem::path& parent = std::filesystem::temp_directory_path());
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+// How a child process ended and what it used.
+struct ChildRun {
+  int exit_code = 0;         // 128 + signal where a signal ended it
+  bool out_of_time = false;  // it was stopped at the deadline
+  double wall = 0, cpu = 0;  // s; cpu of all its threads, user and system
+  double memory = 0;         // bytes, largest resident set
+};
+
+// When a child is stopped.
+using Deadline = std::chrono::steady_clock::time_point;
+inline constexpr Deadline kNever = Deadline::max();
+
+// Runs the program (argv[0] its path) with stdin from /dev/null and stdout and stderr into the file `log`,
+// and waits for it. An interrupt (SIGINT) is passed on; when the child has ended Interrupted is thrown. At
+// the deadline the child gets SIGINT, two seconds later SIGKILL. With `heed_interrupts` false an interrupt
+// that has come already does not count. Throws InputError: it cannot be started.
+[[nodiscard]] ChildRun run_child(const std::vector<std::string>& argv, const std::filesystem::path& log,
+                                 Deadline deadline = kNever, bool heed_interrupts = true);
+
+// The path of a program of ours: `name` ("flexel-simulate") beside this one. Throws InputError.
+[[nodiscard]] std::string own_program(const std::string& name);
+
+// What all runs of a study have in common.
+struct Case {
+  std::vector<std::string> parts;             // files
+  std::vector<std::string> voxelize_options;  // for every run: "--unit", "mm", "--heal", "wrap" ...
+  std::string scene;                          // file
+  std::string scene_text;                     // what it holds
+};
+
+// What a user can choose. The defaults are those of the programs, but for the error bars, which a run within
+// a study leaves out.
+struct Configuration {
+  double size = 0;                  // m, asked for
+  std::string model;                // "cells", "springs", "paper"; "": as the scene has it
+  std::string hooke;                // of model paper: "paper", "ganovelli"; "": as the scene has it
+  std::string method = "blended";   // mapping
+  std::string integrator;           // timed runs: "symplectic" ...; "": as the scene has it
+  std::optional<double> step;       // timed runs: s
+  std::optional<double> tolerance;  // equilibrium; nothing: as the scene has it
+  int threads = 0;                  // 0: every core
+  std::string without;              // an effect of the scene that is left out (study/scene_edit.h); "": none
+  bool error_bars = false, stress = true;
+
+  [[nodiscard]] bool centre_placement() const { return model == "paper"; }
+  [[nodiscard]] bool operator==(const Configuration&) const = default;
+};
+
+// One figure that a run found.
+struct Quantity {
+  std::string name;  // "tip", "largest displacement", "reaction bracket/1" ...
+  std::string unit;  // SI
+  double value = 0;
+};
+
+struct Stage {
+  std::string name;  // kStages
+  double wall = 0;   // s
+};
+
+// The stages of a run, in their order: loading the programs; reading the part, the bodies and the scene;
+// repairing the surface; the lattice; assembling (forces and their derivatives, loads and supports; of timed
+// runs: all of the steps); the linear solver and what is between; error bars; mapping; writing.
+inline constexpr const char* kStages[] = {"start", "read",       "heal", "voxelize", "assemble",
+                                          "solve", "error bars", "map",  "write"};
+
+struct PartFound {
+  std::string name;
+  double volume = 0;                    // m^3, of the surface
+  std::optional<double> thinnest_wall;  // m
+};
+
+struct RunResult {
+  std::string failure;                     // "" when all went well, else the program's own line
+  int exit_code = 0;                       // of the program that failed
+  bool out_of_time = false;                // stopped at the deadline
+  double wall = 0, cpu = 0;                // s, of the three programs together
+  double memory = 0;                       // bytes, the largest of the three
+  std::array<double, 3> program_memory{};  // bytes: flexel-voxelize, flexel-simulate, flexel-map
+  std::vector<Stage> stages;
+  std::size_t elements = 0, cells = 0;  // at centre placement cells are 0: count elements
+  double spacing = 0;                   // m, geometric mean over the axes of the first part's lattice
+  std::vector<PartFound> parts;
+  double area = 0;  // m^2, of the surface at rest
+  std::vector<Quantity> quantities;
+  int newton_iterations = 0, cg_iterations = 0;
+  std::size_t steps = 0;               // timed runs
+  double step = 0;                     // s
+  double simulate_seconds = 0;         // s, without reading and writing
+  std::optional<double> energy_drift;  // timed runs: worst residual of the books over their largest term
+
+  [[nodiscard]] bool ok() const { return failure.empty(); }
+  [[nodiscard]] const Quantity* find(const std::string& name) const;
+  // Cells, or elements where there are none.
+  [[nodiscard]] std::size_t size() const { return cells > 0 ? cells : elements; }
+  // Timed runs: millions of element-steps a second.
+  [[nodiscard]] double element_steps_per_second() const;
+};
+
+struct RunOptions {
+  std::filesystem::path folder;   // for temporary files; those are gone when the run has ended
+  std::filesystem::path surface;  // where the mapped surface is kept (.ply); "": nowhere
+  std::filesystem::path history;  // timed runs: where the books are kept (.csv); "": nowhere
+  Deadline deadline = kNever;
+};
+
+// Runs the configuration. A run that fails is a result with `failure`; throws Interrupted, and InputError
+// where a program cannot be started.
+[[nodiscard]] RunResult run_configuration(const Case& study, const Configuration& configuration,
+                                          const RunOptions& options);
+
+}  // namespace flexel::study

@@ -1,0 +1,335 @@
+// The loop: predict what is open, run the cheapest that fits, write its row; then repeat what is not known to
+// 5 %; then sum up.
+#include "flexel/study/session.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "flexel/study/history.h"
+#include "formats/error.h"
+#include "formats/files.h"
+#include "formats/units.h"
+#include "voxelize/memory.h"
+
+namespace flexel::study {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kLookCells = 2000, kFewestCells = 60;
+constexpr int kRungs = 12;
+constexpr double kFirstShare = 0.7;    // of the budget, for the first run of each trial
+constexpr double kFinishShare = 0.08;  // of the budget, for the page
+constexpr double kMemoryShare = 0.8;   // of what is free
+constexpr double kSideShare = 0.1;     // of the budget, the most that one run beside the ladder may take
+constexpr double kKnown = 0.05;        // how well a median should be known
+constexpr int kMostRepeats = 9;
+
+// What an earlier study that was killed left behind.
+void remove_stale(const fs::path& output) {
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(output, ignored))
+    if (entry.path().filename().string().rfind(".flexel-", 0) == 0) fs::remove_all(entry.path(), ignored);
+}
+
+}  // namespace
+
+Session::Session(const Assignment& wanted, Progress& progress) : wanted_(wanted), progress_(progress) {
+  remove_stale(wanted.output);
+  folder_.emplace(wanted.output);
+  std::error_code ignored;
+  for (const char* name : {"study.csv", "study.json", "study.html"})
+    fs::remove(wanted.output / name, ignored);
+  study_.parts = wanted.part_names;
+  study_.scene = fs::path(wanted.study_case.scene).filename().string();
+  study_.budget = wanted.budget;
+  study_.facts = scene_facts(wanted.study_case.scene_text, wanted.study_case.scene);
+  study_.machine = this_machine();
+}
+
+double Session::spent() const {
+  return std::chrono::duration<double>(Clock::now() - begin_).count();
+}
+
+double Session::left() const {
+  return wanted_.budget * (1 - kFinishShare) - spent();
+}
+
+// A coarse lattice says how thick the walls are and how many cells a size gives.
+Sweep Session::look() {
+  progress_.stage("look");
+  std::vector<std::string> arguments = {own_program("flexel-voxelize")};
+  const std::string summary = (folder_->path() / "look.json").string();
+  arguments.insert(arguments.end(), wanted_.study_case.parts.begin(), wanted_.study_case.parts.end());
+  arguments.insert(arguments.end(), wanted_.study_case.voxelize_options.begin(),
+                   wanted_.study_case.voxelize_options.end());
+  arguments.insert(arguments.end(), {"--quiet", "--count", fmt::format("{:.0f}", kLookCells), "--summary",
+                                     summary, "-o", (folder_->path() / "look.vtu").string()});
+  const fs::path log = folder_->path() / "look.log";
+  const ChildRun run = run_child(arguments, log);
+  if (run.exit_code != 0) {
+    std::ifstream in(log);
+    std::string line, last;
+    while (std::getline(in, line)) last = line;
+    const std::size_t error = last.find("error: ");
+    throw InputError(error == std::string::npos ? "flexel-voxelize failed: " + last : last.substr(error + 7));
+  }
+  std::ifstream in(summary);
+  const auto found = nlohmann::json::parse(in);
+  double cells = 0, spacing = 0, volume = 0, thinnest = 1e300;
+  for (const auto& part : found["parts"]) {
+    cells += part["cells"].get<double>();
+    volume = std::max(volume, part["surface_volume"].get<double>());
+    const auto& h = part["spacing"];
+    spacing = std::max(spacing, std::cbrt(h[0].get<double>() * h[1].get<double>() * h[2].get<double>()));
+    if (!part["thinnest_wall"].is_null())
+      thinnest = std::min(thinnest, part["thinnest_wall"]["thickness"].get<double>());
+  }
+  const double wall = thinnest < 1e300 ? thinnest : std::cbrt(volume);
+  Configuration first;
+  if (study_.facts.model == "paper") first.model = "paper";
+  return {study_.facts, first, ladder_of_sizes(wall, spacing, cells, kFewestCells, kRungs), wanted_.budget,
+          study_.machine.cores};
+}
+
+void Session::run() {
+  try {
+    Sweep sweep = look();
+    run_all(sweep);
+    repeat_all(sweep);
+  } catch (const Interrupted&) {
+    interrupted_ = true;
+    study_.notes.emplace_back(
+        "This study was interrupted: it holds the runs that had ended, and no comparison of surfaces.");
+  }
+  finish();
+}
+
+void Session::run_all(Sweep& sweep) {
+  progress_.stage("runs");
+  while (run_cheapest(sweep)) {
+  }
+  if (std::none_of(study_.rows.begin(), study_.rows.end(), [](const Row& row) { return row.found.ok(); })) {
+    std::string why = study_.rows.empty()
+                          ? fmt::format(
+                                "the first run is predicted to take more than the "
+                                "budget of {}: give more with --budget",
+                                human_seconds(wanted_.budget))
+                          : "no run went well; the first: " + study_.rows.front().found.failure;
+    throw InputError(why);
+  }
+}
+
+std::ptrdiff_t Session::sizes_done() const {
+  return std::count_if(study_.rows.begin(), study_.rows.end(), [](const Row& row) {
+    return row.trial.sweep == "resolution" && row.repeat == 1 && row.found.ok();
+  });
+}
+
+// False when nothing is open any more.
+bool Session::run_cheapest(Sweep& sweep) {
+  const std::vector<Trial> open = sweep.open();
+  if (open.empty()) return false;
+  std::vector<Prediction> predicted;
+  for (const Trial& trial : open) predicted.push_back(sweep.predict(trial));
+  // The first three sizes go before all else: without them there is nothing to compare with.
+  std::size_t best = 0;
+  for (std::size_t i = 1; i < open.size(); ++i)
+    if (predicted[i].seconds < predicted[best].seconds) best = i;
+  if (sizes_done() < 3)
+    for (std::size_t i = 0; i < open.size(); ++i)
+      if (open[i].sweep == "resolution") best = i;
+  const Trial& trial = open[best];
+  const Prediction& told = predicted[best];
+  std::string why;
+  const double time_left = kFirstShare * wanted_.budget - spent();
+  if (told.seconds > time_left)
+    why = fmt::format("time: {} were left for first runs", human_seconds(std::max(0.0, time_left)));
+  else if (trial.sweep != "resolution" && told.seconds > kSideShare * wanted_.budget)
+    why = "time: beside the sizes no run may take more than a tenth of the budget";
+  else if (told.bytes > kMemoryShare * available_memory())
+    why = fmt::format("memory: {} are free", human_bytes(available_memory()));
+  if (why.empty()) {
+    run_one(sweep, trial, told);
+  } else {
+    study_.left_out.push_back({trial, told, why});
+    sweep.leave_out(trial);
+  }
+  return true;
+}
+
+void Session::repeat_all(Sweep& sweep) {
+  for (;;) {
+    std::map<std::string, std::pair<const Row*, std::vector<double>>> seen;
+    for (const Row& row : study_.rows)
+      if (row.found.ok()) {
+        auto& entry = seen[row.trial.label];
+        if (entry.first == nullptr) entry.first = &row;
+        entry.second.push_back(row.found.wall);
+      }
+    const Row* next = nullptr;
+    double shortest = left() / 1.2;  // a margin: a repeat that is cut off tells nothing
+    for (const auto& [label, entry] : seen) {
+      const Median wall = median(entry.second);
+      if (wall.relative_error <= kKnown || entry.second.size() >= kMostRepeats || wall.value >= shortest)
+        continue;
+      next = entry.first;
+      shortest = wall.value;
+    }
+    if (next == nullptr) return;
+    const Trial trial = next->trial;
+    run_one(sweep, trial, sweep.predict(trial));
+  }
+}
+
+std::string Session::kept(const char* what, const Trial& trial, const char* ending) const {
+  return (folder_->path() / fmt::format("{}-{}{}", what, numbers_.at(trial.label), ending)).string();
+}
+
+void Session::run_one(Sweep& sweep, const Trial& trial, const Prediction& predicted) {
+  const bool first = numbers_.try_emplace(trial.label, numbers_.size()).second;
+  Row row;
+  row.trial = trial;
+  row.predicted = predicted;
+  for (const Row& each : study_.rows) row.repeat += each.trial.label == trial.label;
+  RunOptions options;
+  options.folder = folder_->path();
+  if (first) {
+    options.surface = kept("surface", trial, ".ply");
+    options.history = kept("history", trial, ".csv");
+  }
+  options.deadline =
+      Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(left()));
+  row.found = run_configuration(wanted_.study_case, trial.configuration, options);
+  sweep.done(trial, row.found);
+  study_.rows.push_back(row);
+  append(row);
+  if (row.found.ok())
+    progress_.say(fmt::format("{}{}: {} cells, {} (predicted {}), {} (predicted {})", trial.label,
+                              first ? "" : fmt::format(", run {}", row.repeat), human_count(row.found.size()),
+                              human_seconds(row.found.wall), human_seconds(predicted.seconds),
+                              human_bytes(row.found.memory), human_bytes(predicted.bytes)));
+  else
+    progress_.say(fmt::format("{}: {}", trial.label, row.found.failure));
+}
+
+// study.csv grows as runs end, so that whatever happens the rows are there.
+void Session::append(const Row& row) {
+  waiting_.push_back(row);
+  if (!columns_ && !row.found.ok()) return;
+  const std::string path = (wanted_.output / "study.csv").string();
+  std::string text;
+  if (!columns_) {
+    columns_ = row.found.quantities;
+    text = csv_header(*columns_);
+  }
+  std::size_t number = study_.rows.size() - waiting_.size();
+  for (const Row& each : waiting_) text += csv_line(++number, each, *columns_);
+  waiting_.clear();
+  std::ofstream out(path, std::ios::app);
+  out << text << std::flush;
+  if (!out) throw InputError(path, "cannot be written: is the disk full?");
+}
+
+const Row* Session::finest_row() const {
+  const Row* finest = nullptr;
+  for (const Row& row : study_.rows)
+    if (row.found.ok() && row.trial.sweep == "resolution" &&
+        (finest == nullptr || row.found.spacing < finest->found.spacing))
+      finest = &row;
+  return finest;
+}
+
+void Session::measure_surfaces(const Row& finest) {
+  const std::string reference = kept("surface", finest.trial, ".ply");
+  for (Row& row : study_.rows) {
+    const std::string surface = kept("surface", row.trial, ".ply");
+    if (!row.found.ok() || row.repeat > 1 || !fs::exists(surface)) continue;
+    const SurfaceDistance found = surface_distance(surface, reference);
+    row.surface_rms = found.rms;
+    row.surface_largest = found.largest;
+  }
+}
+
+void Session::measure_lags(const Row& finest) {
+  if (!study_.facts.timed || study_.facts.probes.empty()) return;
+  const std::string probe = study_.facts.probes.front();
+  const History reference = read_history(kept("history", finest.trial, ".csv"));
+  for (Row& row : study_.rows) {
+    const std::string path = kept("history", row.trial, ".csv");
+    if (!row.found.ok() || row.repeat > 1 || !fs::exists(path)) continue;
+    const History history = read_history(path);
+    row.lag = lag(history.time, probe_motion(history, probe), reference.time, probe_motion(reference, probe));
+  }
+}
+
+// The coarsest, one in the middle and the finest but one of the sizes, against the finest.
+void Session::draw_pictures(const Row& finest) {
+  std::vector<const Row*> rows;
+  for (const Row& row : study_.rows)
+    if (row.found.ok() && row.trial.sweep == "resolution" && row.repeat == 1 && &row != &finest)
+      rows.push_back(&row);
+  if (rows.size() > 3) rows = {rows.front(), rows[(rows.size() - 1) / 2], rows.back()};
+  const Quantity* largest = finest.found.find("largest displacement");
+  if (largest == nullptr || !(largest->value > 0)) return;
+  for (const Row* row : rows) {
+    const std::string surface = (folder_->path() / "error.ply").string();
+    const std::string png = (folder_->path() / "error.png").string();
+    write_error_surface(kept("surface", row->trial, ".ply"), kept("surface", finest.trial, ".ply"),
+                        largest->value, surface);
+    const ChildRun run = run_child({own_program("flexel"), "picture", surface, "-o", png, "--color",
+                                    kErrorAttribute, "--size", "560x420", "--quiet"},
+                                   folder_->path() / "picture.log");
+    if (run.exit_code != 0) {
+      study_.notes.push_back("The picture of " + row->trial.label + " could not be drawn.");
+      continue;
+    }
+    const Bytes bytes = read_all(png);
+    study_.pictures.push_back({fmt::format("{}, {} cells", row->trial.label, human_count(row->found.size())),
+                               {reinterpret_cast<const char*>(bytes.data()), bytes.size()}});
+  }
+}
+
+void Session::finish() {
+  progress_.stage("page");
+  if (const Row* finest = finest_row()) {
+    const Row reference = *finest;
+    measure_lags(reference);
+    // Reading surfaces heeds the interrupt, which has come already.
+    if (!interrupted_) {
+      measure_surfaces(reference);
+      draw_pictures(*finest);
+    }
+  }
+  conclude(study_, wanted_.references);
+  study_.spent = spent();
+  write_all();
+  progress_.finish();
+  for (const std::string& sentence : study_.sentences) progress_.say(sentence);
+}
+
+void Session::write_all() {
+  std::map<std::string, std::string> plots;
+  try {
+    plots = draw_plots(study_, folder_->path());
+  } catch (const InputError& error) {
+    study_.notes.push_back(std::string("The plots are left out: ") + error.what());
+    progress_.warn(study_.notes.back());
+  }
+  if (columns_) {
+    std::string csv = csv_header(*columns_);
+    for (std::size_t r = 0; r < study_.rows.size(); ++r) csv += csv_line(r + 1, study_.rows[r], *columns_);
+    write_text(csv, (wanted_.output / "study.csv").string());
+  }
+  write_text(study_json(study_), (wanted_.output / "study.json").string());
+  write_text(page(study_, plots), (wanted_.output / "study.html").string());
+  std::istringstream lines(prediction_table(study_));
+  for (std::string line; std::getline(lines, line);) progress_.say(line);
+}
+
+}  // namespace flexel::study

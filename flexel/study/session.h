@@ -1,0 +1,61 @@
+// One study from its first look at the part to its page.
+#pragma once
+#include <chrono>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "flexel/study/study.h"
+#include "formats/progress.h"
+
+namespace flexel::study {
+
+struct Assignment {
+  Case study_case;
+  std::vector<std::string> part_names;  // for people
+  double budget = 120;                  // s
+  std::filesystem::path output;         // a folder that exists
+  std::vector<Reference> references;    // given ones
+};
+
+class Session {
+ public:
+  Session(const Assignment& wanted, Progress& progress);
+  // Throws InputError: the part or the scene cannot be run at all, the budget is too small for one run. An
+  // interrupt ends the runs; what is done is written.
+  void run();
+  [[nodiscard]] bool interrupted() const { return interrupted_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  [[nodiscard]] Sweep look();
+  void run_all(Sweep& sweep);
+  [[nodiscard]] std::ptrdiff_t sizes_done() const;
+  bool run_cheapest(Sweep& sweep);
+  void repeat_all(Sweep& sweep);
+  void run_one(Sweep& sweep, const Trial& trial, const Prediction& predicted);
+  void append(const Row& row);
+  void finish();
+  void measure_surfaces(const Row& finest);
+  void measure_lags(const Row& finest);
+  void draw_pictures(const Row& finest);
+  void write_all();
+  [[nodiscard]] const Row* finest_row() const;
+  [[nodiscard]] std::string kept(const char* what, const Trial& trial, const char* ending) const;
+  [[nodiscard]] double spent() const;
+  [[nodiscard]] double left() const;  // s, for runs
+
+  const Assignment& wanted_;
+  Progress& progress_;
+  const Clock::time_point begin_ = Clock::now();
+  std::optional<TemporaryFolder> folder_;
+  std::optional<std::vector<Quantity>> columns_;  // of study.csv, once a run has shown them
+  std::vector<Row> waiting_;                      // failed before that
+  std::map<std::string, std::size_t> numbers_;    // of labels, for the names of kept files
+  Study study_;
+  bool interrupted_ = false;
+};
+
+}  // namespace flexel::study

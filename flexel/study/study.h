@@ -1,0 +1,99 @@
+// A whole study: its runs, and what they add up to.
+#pragma once
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "flexel/study/measure.h"
+#include "flexel/study/sweep.h"
+
+namespace flexel::study {
+
+// One run, which is one row of study.csv.
+struct Row {
+  Trial trial;
+  int repeat = 1;
+  Prediction predicted;
+  RunResult found;
+  // Filled at the end:
+  std::optional<double> lag;          // s, of the first probe behind the reference; timed runs
+  std::optional<double> surface_rms;  // m, distance from the finest surface, weighted by area
+  std::optional<double>
+      surface_largest;  // m, of corresponding vertices: the Hausdorff distance is at most that
+  std::optional<RunError> error;
+};
+
+struct Machine {
+  std::string processor, system, version;  // of Flexel
+  int cores = 1;
+  double memory = 0;         // bytes
+  double load_at_start = 0;  // runnable processes, mean of a minute
+  std::string date;          // UTC, ISO 8601
+};
+[[nodiscard]] Machine this_machine();
+
+// All rows of one configuration.
+struct Summed {
+  Point point;
+  std::size_t row = 0;  // the first of its rows that went well
+  int runs = 0;
+  Median wall;
+};
+
+struct Picture {
+  std::string title;
+  std::string png;  // its bytes
+};
+
+struct Study {
+  std::vector<std::string> parts;  // as they were given
+  std::string scene;
+  double budget = 0, spent = 0;  // s
+  SceneFacts facts;
+  Machine machine;
+  std::vector<Row> rows;  // in the order of the runs
+  std::vector<LeftOut> left_out;
+  std::vector<Reference> references;
+  std::vector<Summed> summed;
+  std::vector<std::string> sentences;
+  std::vector<Picture> pictures;
+  std::vector<std::string> notes;  // for the reader: interrupted, plots left out ...
+};
+
+// References from the rows (`given` go first), errors of the rows, the summed points and the sentences.
+void conclude(Study& study, const std::vector<Reference>& given);
+
+// study.csv (docs/study.md gives its columns): one line of names, one line a row. `quantities` are the names
+// of the last columns.
+[[nodiscard]] std::string csv_header(const std::vector<Quantity>& quantities);
+[[nodiscard]] std::string csv_line(std::size_t number, const Row& row,
+                                   const std::vector<Quantity>& quantities);
+// All of it, as JSON in SI units.
+[[nodiscard]] std::string study_json(const Study& study);
+// What was told of each run before it began, beside what it took: a table for a terminal.
+[[nodiscard]] std::string prediction_table(const Study& study);
+
+// Distances of the mapped surface `path` from `finest` (both .ply of the same part): root of the mean square,
+// weighted by the area around each vertex, and the largest. Throws InputError where they do not correspond.
+struct SurfaceDistance {
+  double rms = 0, largest = 0;  // m
+};
+[[nodiscard]] SurfaceDistance surface_distance(const std::string& path, const std::string& finest);
+// Writes `path` to `out` (.ply) with the distance of each vertex from `finest` as the attribute
+// kErrorAttribute, in percent of `whole` [m].
+inline constexpr const char* kErrorAttribute = "error_in_percent";
+void write_error_surface(const std::string& path, const std::string& finest, double whole,
+                         const std::string& out);
+
+// study.html: the page. `plots` are SVG texts by name ("error", "stages", "effects"); those that are missing
+// are said to be.
+[[nodiscard]] std::string page(const Study& study, const std::map<std::string, std::string>& plots);
+
+// Draws the plots with gnuplot in `folder`. Throws InputError: gnuplot is missing or failed.
+[[nodiscard]] std::map<std::string, std::string> draw_plots(const Study& study,
+                                                            const std::filesystem::path& folder);
+// The path of gnuplot, or "".
+[[nodiscard]] std::string find_gnuplot();
+
+}  // namespace flexel::study

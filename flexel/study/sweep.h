@@ -1,0 +1,85 @@
+// Which configurations a study runs, and in which order: always the one that is predicted to be cheapest
+// next, as long as time and memory allow it.
+//
+// One ladder of sizes carries the study. Its wider choices are run beside it: the models at every size of the
+// ladder that is done, all else at one size in the middle.
+#pragma once
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "flexel/study/predict.h"
+#include "flexel/study/runner.h"
+#include "flexel/study/scene_edit.h"
+
+namespace flexel::study {
+
+// A configuration with its place in the study.
+struct Trial {
+  std::string sweep;  // "resolution", "model", "mapping", "tolerance", "threads", "integrator", "step",
+                      // "effect"
+  std::string label;  // "1.5 mm", "springs 3 mm", "without gravity"
+  Configuration configuration;
+
+  // Of the predictor: what makes it cost differently at the same size.
+  [[nodiscard]] std::string kind() const;
+};
+
+// What was left out, and why.
+struct LeftOut {
+  Trial trial;
+  Prediction predicted;
+  std::string why;
+};
+
+// Sizes from coarse to fine [m], at which a wall of the given thickness is 1, 2, 3, 4, 6, 8, 12, ... cells;
+// each of three digits. From the first with about `fewest` cells, `cells_at` (spacing) of them.
+[[nodiscard]] std::vector<double> ladder_of_sizes(double wall, double spacing, double cells_there,
+                                                  double fewest, int rungs);
+
+class Sweep {
+ public:
+  // `first`: the configuration that the user would have without choosing; its size is not used. `sizes`: the
+  // ladder. `budget` [s] decides what the middle is.
+  Sweep(SceneFacts facts, Configuration first, std::vector<double> sizes, double budget, int cores);
+
+  // The trials that can be run next.
+  [[nodiscard]] std::vector<Trial> open() const;
+  // What the next run of this trial takes.
+  [[nodiscard]] Prediction predict(const Trial& trial) const;
+  // The run ended (well or not).
+  void done(const Trial& trial, const RunResult& found);
+  // The trial is not going to be run; of the ladder, nor is any finer size.
+  void leave_out(const Trial& trial);
+
+  [[nodiscard]] const SceneFacts& facts() const { return facts_; }
+
+ private:
+  struct Rung {
+    double size = 0;
+    bool done = false;
+    std::optional<RunSize> found;  // of a run that went well
+    double spacing = 0, step = 0, wall = 0;
+  };
+  [[nodiscard]] RunSize size_of(const Trial& trial) const;
+  [[nodiscard]] std::optional<std::size_t> middle() const;
+  void add_models(std::vector<Trial>& trials) const;
+  void add_choices(std::vector<Trial>& trials, std::size_t rung) const;
+  void add_timed(std::vector<Trial>& trials, const Rung& rung) const;
+  void add_effects(std::vector<Trial>& trials, const Rung& rung) const;
+  [[nodiscard]] Trial trial(const std::string& sweep, const std::string& choice, double size,
+                            const Configuration& configuration) const;
+
+  SceneFacts facts_;
+  Configuration first_;
+  std::vector<Rung> rungs_;
+  double budget_ = 0;
+  int cores_ = 1;
+  bool ladder_ended_ = false;
+  std::set<std::string> closed_;  // labels of trials that are done or left out
+  Predictor predictor_;
+};
+
+}  // namespace flexel::study

@@ -1,0 +1,108 @@
+// What the next run will take: laws that are met exactly, and laws with noise within a factor 1.5.
+#include "flexel/study/predict.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+namespace flexel::study {
+namespace {
+
+TEST(Predict, ALawWithoutNoiseIsFound) {
+  for (const double power : {1.0, 1.1, 1.25}) {
+    const PowerLaw law{0.2, 3e-5, power};
+    std::vector<Observation> seen;
+    for (const double x : {1e3, 4e3, 16e3, 64e3}) seen.push_back({x, law.at(x)});
+    // The prior is wrong by factors of 3 and 4, and draws a little.
+    const PowerLaw found = fit(seen, {0.6, 12e-5, 1.05}, true);
+    EXPECT_NEAR(found.at(200e3) / law.at(200e3), 1, 0.1) << power;
+  }
+}
+
+TEST(Predict, WithoutObservationsThePriorHolds) {
+  const PowerLaw prior{0.1, 2e-6, 1};
+  EXPECT_EQ(fit({}, prior, true).at(1e5), prior.at(1e5));
+}
+
+TEST(Predict, OneObservationScalesThePrior) {
+  const PowerLaw found = fit({{1e4, 5.0}}, {0.1, 5e-5, 1}, true);  // the prior says 0.6
+  EXPECT_NEAR(found.at(1e4), 5.0, 0.3);
+  EXPECT_GT(found.at(4e4), 12);  // it grows
+}
+
+TEST(Predict, NothingIsEverNegative) {
+  const PowerLaw found = fit({{1e3, 1.0}, {1e4, 0.9}, {1e5, 0.8}}, {0, 1e-5, 1}, true);
+  EXPECT_GE(found.constant, 0);
+  EXPECT_GE(found.slope, 0);
+}
+
+RunResult run_at(double cells, std::mt19937& random) {
+  std::normal_distribution<double> noise(0, 0.1);
+  RunResult run;
+  for (const char* stage : kStages) run.stages.push_back({stage, 0.02 * std::exp(noise(random))});
+  for (Stage& stage : run.stages) {
+    if (stage.name == "assemble") stage.wall = 1e-5 * cells * std::exp(noise(random));
+    if (stage.name == "solve") stage.wall = (0.01 + 3e-5 * std::pow(cells, 1.08)) * std::exp(noise(random));
+    if (stage.name == "voxelize")
+      stage.wall = (0.05 + 1e-4 * std::pow(cells, 0.67)) * std::exp(noise(random));
+    run.wall += stage.wall;
+  }
+  run.program_memory = {80e6 + 100 * cells, 30e6 + 4300 * cells, 18e6 + 400 * cells};
+  return run;
+}
+
+double largest(const std::array<double, 3>& values) {
+  return *std::max_element(values.begin(), values.end());
+}
+
+// Every stage with a noise of 10 %: a few runs in a thousand lie beyond.
+TEST(Predict, TheNextRunOfASweepIsWithinAFactor) {
+  std::mt19937 random(7);
+  int runs = 0, beyond = 0;
+  for (int trial = 0; trial < 100; ++trial) {
+    Predictor predictor;
+    for (double cells = 500; cells < 1.1e6; cells *= 2.5) {
+      const RunResult run = run_at(cells, random);
+      const Prediction told = predictor.predict("", {cells});
+      if (cells > 1e4) {
+        const double time = std::abs(std::log(told.seconds / run.wall));
+        const double memory = std::abs(std::log(told.bytes / largest(run.program_memory)));
+        EXPECT_LT(time, std::log(2.0)) << cells;
+        EXPECT_LT(memory, std::log(1.5)) << cells;
+        ++runs;
+        beyond += time > std::log(1.5);
+      }
+      predictor.add("", {cells}, run);
+    }
+  }
+  EXPECT_LT(beyond, runs / 100);
+}
+
+TEST(Predict, AnotherKindStartsFromTheOrdinaryOne) {
+  std::mt19937 random(3);
+  Predictor predictor;
+  for (const double cells : {1e3, 1e4}) predictor.add("", {cells}, run_at(cells, random));
+  EXPECT_EQ(predictor.predict("springs", {3e4}).seconds, predictor.predict("", {3e4}).seconds);
+  RunResult slow = run_at(1e4, random);
+  for (Stage& stage : slow.stages) stage.wall *= 4;
+  predictor.add("springs", {1e4}, slow);
+  EXPECT_NEAR(predictor.predict("springs", {2e4}).seconds / predictor.predict("", {2e4}).seconds, 4, 1);
+}
+
+TEST(Predict, StepsCountInTimedRuns) {
+  Predictor predictor;
+  for (const double cells : {1e3, 4e3}) {
+    RunResult run;
+    const double steps = 100 * std::cbrt(cells);
+    for (const char* stage : kStages) run.stages.push_back({stage, 0.01});
+    for (Stage& stage : run.stages)
+      if (stage.name == "assemble") stage.wall = 0.01 + 5e-8 * cells * steps;
+    predictor.add("", {cells, steps}, run);
+  }
+  const double steps = 100 * std::cbrt(64e3);
+  EXPECT_NEAR(predictor.predict("", {64e3, steps}).seconds, 0.09 + 5e-8 * 64e3 * steps, 3);
+}
+
+}  // namespace
+}  // namespace flexel::study

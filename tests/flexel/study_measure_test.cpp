@@ -1,0 +1,145 @@
+// References, errors, the frontier and the sentences of a study, on numbers that are known.
+#include "flexel/study/measure.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace flexel::study {
+namespace {
+
+std::vector<SizeValue> sequence(double limit, double factor, double order, std::vector<double> sizes) {
+  std::vector<SizeValue> values;
+  for (const double h : sizes) values.push_back({h, limit + factor * std::pow(h, order)});
+  return values;
+}
+
+TEST(StudyMeasure, RichardsonFindsTheLimitAndTheOrder) {
+  for (const double order : {0.8, 1.0, 1.5, 2.0})
+    for (const double sign : {-1.0, 1.0}) {
+      const Reference found = extrapolate("tip", "m", sequence(5, sign * 0.3, order, {4, 3, 2, 1.5, 1}));
+      EXPECT_NEAR(found.value, 5, 1e-6) << order;
+      ASSERT_TRUE(found.order);
+      EXPECT_NEAR(*found.order, order, 1e-6);
+      EXPECT_GE(found.uncertainty, std::abs(0.3 * 0.2));  // a quarter of the finest error at least: honest
+    }
+}
+
+TEST(StudyMeasure, ValuesThatSwingHaveNoOrderAndAWideUncertainty) {
+  const Reference found = extrapolate("tip", "m", {{4, 1.0}, {2, 1.2}, {1, 1.1}});
+  EXPECT_FALSE(found.order);
+  EXPECT_DOUBLE_EQ(found.value, 1.1);
+  EXPECT_NEAR(found.uncertainty, 0.6, 1e-12);
+}
+
+TEST(StudyMeasure, FewerSizesAreSaidToBeFewer) {
+  EXPECT_DOUBLE_EQ(extrapolate("tip", "m", {{1, 2.0}}).uncertainty, 2);
+  const Reference two = extrapolate("tip", "m", {{2, 2.0}, {1, 2.1}});
+  EXPECT_DOUBLE_EQ(two.value, 2.1);
+  EXPECT_NEAR(two.uncertainty, 0.3, 1e-12);
+}
+
+// The extrapolation that a finer run moves far is not sure, however even the last three look.
+TEST(StudyMeasure, AnExtrapolationThatMovesIsUncertain) {
+  const std::vector<SizeValue> values = {{8, 9.0}, {4, 6.0}, {2, 5.10}, {1, 5.09}};
+  const Reference found = extrapolate("tip", "m", values);
+  const Reference before = extrapolate("tip", "m", {values.begin(), values.end() - 1});
+  EXPECT_GE(found.uncertainty, 0.5 * std::abs(found.value - before.value));
+}
+
+RunResult run_with(std::vector<Quantity> quantities) {
+  RunResult run;
+  run.quantities = std::move(quantities);
+  return run;
+}
+
+TEST(StudyMeasure, TheWorstDecidingQuantityIsTheError) {
+  std::vector<Reference> references(3);
+  references[0] = {"a", "m", 2, 0.002, std::nullopt, "", true};
+  references[1] = {"b", "m", -1, 0.02, std::nullopt, "", true};
+  references[2] = {"c", "m", 1, 9, std::nullopt, "", false};
+  const RunResult run = run_with({{"a", "m", 2.2}, {"b", "m", -0.95}, {"c", "m", 50}});
+  EXPECT_NEAR(error_of(run, references)->error, 0.1, 1e-12);
+  EXPECT_NEAR(error_of(run, references)->uncertainty, 0.02, 1e-12);
+  EXPECT_FALSE(error_of(run_with({{"d", "m", 1}}), references));
+}
+
+Point point(double seconds, double error, double uncertainty = 0, const std::string& sweep = "resolution") {
+  Point result;
+  result.sweep = sweep;
+  result.options = "--size " + std::to_string(static_cast<int>(100 * seconds));
+  result.seconds = seconds;
+  result.memory = 420e6;
+  result.error = RunError{error, uncertainty};
+  return result;
+}
+
+TEST(StudyMeasure, NothingOnTheFrontierIsBeaten) {
+  std::vector<Point> points;
+  for (int i = 0; i < 60; ++i)
+    points.push_back(point(0.1 + std::fmod(i * 0.618, 1.0), 0.001 + std::fmod(i * 0.414, 1.0)));
+  points[7].choosable = false;
+  points[8].error.reset();
+  const std::vector<std::size_t> front = frontier(points);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const bool on = std::count(front.begin(), front.end(), i) > 0;
+    bool beaten = !points[i].choosable || !points[i].error;
+    for (std::size_t j = 0; j < points.size() && !beaten; ++j)
+      beaten = points[j].choosable && points[j].error && points[j].seconds < points[i].seconds &&
+               points[j].error->error <= points[i].error->error;
+    EXPECT_NE(on, beaten) << i;
+  }
+}
+
+TEST(StudyMeasure, TheUncertaintyCountsAgainstATarget) {
+  const std::vector<Point> points = {point(1, 0.009, 0.002), point(2, 0.007, 0.002), point(3, 0.001, 0.002)};
+  EXPECT_EQ(*cheapest_within(points, 0.01), 1u);
+  EXPECT_FALSE(cheapest_within(points, 0.002));
+}
+
+TEST(StudyMeasure, TenfoldIsThePowerOfTheSweep) {
+  std::vector<Point> points;
+  for (const double h : {4.0, 2.0, 1.0, 0.5}) points.push_back(point(std::pow(h, -3), 0.01 * h * h));
+  EXPECT_NEAR(*cost_of_tenfold(points), std::pow(10, 1.5), 1e-9);
+  points.push_back(point(1000, 0.5, 0, "model"));  // other curves do not count
+  points.push_back(point(1000, 0.001, 0.01));      // nor what is not known
+  EXPECT_NEAR(*cost_of_tenfold(points), std::pow(10, 1.5), 1e-9);
+  EXPECT_FALSE(cost_of_tenfold({point(1, 0.1)}));
+  EXPECT_FALSE(cost_of_tenfold({point(1, 0.1), point(2, 0.09)}));
+  EXPECT_FALSE(cost_of_tenfold({point(1, 0.01), point(2, 0.1)}));
+}
+
+TEST(StudyMeasure, TheSentence) {
+  std::vector<Point> points = {point(0.5, 0.08), point(3.1, 0.008), point(60, 0.0009)};
+  const std::vector<std::string> said = sentences(points);
+  ASSERT_EQ(said.size(), 2u);
+  EXPECT_EQ(said[0], "For 1 % use --size 310: 3.1 s, 420 MB.");
+  // The slope of (log 1/error, log time) is 1.064, and 10^1.064 = 11.6.
+  EXPECT_EQ(said[1].substr(0, 32), "Ten times the accuracy costs 12 ");
+  for (Point& each : points) each.error->uncertainty = 0.03;
+  const std::vector<std::string> unsure = sentences(points);
+  EXPECT_EQ(unsure[0],
+            "No run is known to be within 1 %; the best is --size 6000: 0.09 % off, give or take 3 %.");
+  EXPECT_EQ(unsure[1], "For 5 % use --size 310: 3.1 s, 420 MB.");
+}
+
+TEST(StudyMeasure, TheMedianIsKnownWhenItRepeats) {
+  EXPECT_DOUBLE_EQ(median({3, 1, 2}).value, 2);
+  EXPECT_DOUBLE_EQ(median({4, 1, 2, 3}).value, 2.5);
+  EXPECT_TRUE(std::isinf(median({1, 1}).relative_error));
+  EXPECT_DOUBLE_EQ(median({1, 1, 1}).relative_error, 0);
+  EXPECT_GT(median({1, 2, 3}).relative_error, 0.05);
+  EXPECT_LT(median({1, 1.01, 0.99, 1}).relative_error, 0.05);
+}
+
+TEST(StudyMeasure, LengthsAndTimesForPeople) {
+  EXPECT_EQ(option_length(1.5e-3), "1.5mm");
+  EXPECT_EQ(option_length(7.5e-4), "750um");
+  EXPECT_EQ(option_length(0.0333333), "33.3mm");
+  EXPECT_EQ(human_seconds(0.0123), "12 ms");
+  EXPECT_EQ(human_seconds(3.14), "3.1 s");
+  EXPECT_EQ(human_seconds(250), "4 min 10 s");
+}
+
+}  // namespace
+}  // namespace flexel::study

@@ -1,0 +1,166 @@
+// Child processes and whole runs. The programs lie beside this one; where they are not built the runs are
+// skipped.
+#include "flexel/study/runner.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "formats/error.h"
+#include "formats/surface_file.h"
+
+namespace flexel::study {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string text_of(const fs::path& path) {
+  std::ifstream in(path);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+TEST(StudyRunner, AChildIsMeasured) {
+  const TemporaryFolder folder;
+  const fs::path log = folder.path() / "log";
+  const ChildRun run = run_child(
+      {"/bin/sh", "-c", "echo said; i=0; while [ $i -lt 20000 ]; do i=$((i+1)); done; exit 7"}, log);
+  EXPECT_EQ(run.exit_code, 7);
+  EXPECT_FALSE(run.out_of_time);
+  EXPECT_GT(run.cpu, 0);
+  EXPECT_GT(run.wall, 0);
+  EXPECT_GT(run.memory, 100e3);
+  EXPECT_EQ(text_of(log), "said\n");
+  EXPECT_EQ(run_child({"/bin/sh", "-c", "kill -9 $$"}, log).exit_code, 128 + 9);
+  EXPECT_THROW((void)run_child({"/no/such/program"}, log), InputError);
+}
+
+TEST(StudyRunner, AChildIsStoppedAtTheDeadlineEvenIfItDoesNotListen) {
+  const TemporaryFolder folder;
+  const auto begin = std::chrono::steady_clock::now();
+  const ChildRun quick =
+      run_child({"/bin/sleep", "60"}, folder.path() / "log", begin + std::chrono::milliseconds(50));
+  EXPECT_TRUE(quick.out_of_time);
+  const ChildRun deaf =
+      run_child({"/bin/sh", "-c", "trap '' INT; sleep 60 & wait; sleep 60"}, folder.path() / "log",
+                std::chrono::steady_clock::now() + std::chrono::milliseconds(50));
+  EXPECT_TRUE(deaf.out_of_time);
+  EXPECT_EQ(deaf.exit_code, 128 + 9);
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(20));
+}
+
+TEST(StudyRunner, TemporaryFoldersGo) {
+  fs::path path;
+  {
+    const TemporaryFolder folder;
+    path = folder.path();
+    std::ofstream(path / "file") << "x";
+    EXPECT_TRUE(fs::exists(path / "file"));
+  }
+  EXPECT_FALSE(fs::exists(path));
+}
+
+// A bar of 40 x 10 x 10 mm.
+void write_bar(const fs::path& path) {
+  std::ofstream out(path);
+  for (int i = 0; i < 8; ++i)
+    out << "v " << 40 * (i & 1) << ' ' << 5 * (i & 2) << ' ' << 2.5 * (i & 4) << '\n';
+  out << "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
+}
+
+constexpr const char* kScene = R"(material = "steel"
+[[fix]]
+where = "xmin"
+[[load]]
+where = "xmax"
+force = [0, 0, "-100 N"]
+[[probe]]
+name = "tip"
+where = "xmax"
+)";
+
+class StudyRuns : public testing::Test {
+ protected:
+  void SetUp() override {
+    for (const char* program : {"flexel-voxelize", "flexel-simulate", "flexel-map"}) {
+      try {
+        (void)own_program(program);
+      } catch (const InputError&) {
+        GTEST_SKIP() << program << " is not built beside this test";
+      }
+    }
+    write_bar(folder_.path() / "bar.obj");
+    case_ = {{(folder_.path() / "bar.obj").string()}, {}, (folder_.path() / "bend.toml").string(), kScene};
+    wanted_.size = 2.5e-3;
+    options_.folder = folder_.path();
+  }
+  TemporaryFolder folder_;
+  Case case_;
+  Configuration wanted_;
+  RunOptions options_;
+};
+
+TEST_F(StudyRuns, EquilibriumGivesItsFigures) {
+  options_.surface = folder_.path() / "bent.ply";
+  const RunResult run = run_configuration(case_, wanted_, options_);
+  ASSERT_TRUE(run.ok()) << run.failure;
+  EXPECT_EQ(run.cells, 16u * 4 * 4);
+  EXPECT_NEAR(run.spacing, 2.5e-3, 1e-9);
+  EXPECT_NEAR(run.parts.at(0).volume, 4e-6, 1e-12);
+  // F L^3 / (3 E I) = 12.2 um and some percent of shear
+  EXPECT_NEAR(run.find("tip")->value, 12.6e-6, 0.8e-6);
+  EXPECT_NEAR(run.find("reaction xmin")->value, 100, 1e-3);
+  EXPECT_NEAR(run.find("elastic energy")->value, 0.5 * 100 * run.find("tip")->value, 2e-5);
+  EXPECT_NEAR(run.find("volume")->value, 4e-6, 1e-9);
+  EXPECT_GT(run.newton_iterations, 0);
+  double sum = 0;
+  for (const Stage& stage : run.stages) sum += stage.wall;
+  EXPECT_NEAR(sum, run.wall, 0.02 * run.wall);  // every second has its stage
+  EXPECT_TRUE(fs::exists(options_.surface));
+  int left = 0;
+  for (const auto& entry : fs::directory_iterator(folder_.path())) left += entry.is_directory();
+  EXPECT_EQ(left, 0);  // the run's own folder is gone
+}
+
+TEST_F(StudyRuns, ModelsAreChosen) {
+  wanted_.model = "springs";
+  const RunResult springs = run_configuration(case_, wanted_, options_);
+  ASSERT_TRUE(springs.ok()) << springs.failure;
+  wanted_.model = "paper";
+  const RunResult paper = run_configuration(case_, wanted_, options_);
+  ASSERT_TRUE(paper.ok()) << paper.failure;
+  EXPECT_EQ(paper.cells, 0u);
+  EXPECT_EQ(paper.size(), 16u * 4 * 4);
+  wanted_.model = "";
+  const RunResult cells = run_configuration(case_, wanted_, options_);
+  // docs/accuracy.md, 4 cells through: springs too stiff by some percent, the paper's model by half.
+  EXPECT_LT(springs.find("tip")->value, 0.98 * cells.find("tip")->value);
+  EXPECT_LT(paper.find("tip")->value, 0.8 * springs.find("tip")->value);
+}
+
+TEST_F(StudyRuns, TimedRunsHaveStepsAndDrift) {
+  case_.scene_text += "[run]\ntime = \"20 us\"\n";
+  const RunResult run = run_configuration(case_, wanted_, options_);
+  ASSERT_TRUE(run.ok()) << run.failure;
+  EXPECT_GT(run.steps, 10u);
+  EXPECT_GT(run.element_steps_per_second(), 0);
+  ASSERT_TRUE(run.energy_drift);
+  EXPECT_LT(*run.energy_drift, 0.01);
+  ASSERT_NE(run.find("tip peak"), nullptr);
+  EXPECT_GE(run.find("tip peak")->value, run.find("tip")->value * (1 - 1e-6));
+}
+
+TEST_F(StudyRuns, AFailureIsAResultWithTheProgramsOwnLine) {
+  wanted_.size = 1e-7;
+  const RunResult huge = run_configuration(case_, wanted_, options_);
+  EXPECT_FALSE(huge.ok());
+  EXPECT_EQ(huge.exit_code, 2);
+  EXPECT_NE(huge.failure.find("flexel-voxelize: "), std::string::npos) << huge.failure;
+  wanted_.size = 2.5e-3;
+  case_.scene_text += "[[load]]\nwhere = \"nowhere\"\nforce = [0, 0, \"1 N\"]\n";
+  const RunResult wrong = run_configuration(case_, wanted_, options_);
+  EXPECT_NE(wrong.failure.find("bend.toml"), std::string::npos) << wrong.failure;
+  EXPECT_EQ(wrong.failure.find("scene.toml"), std::string::npos) << wrong.failure;
+}
+
+}  // namespace
+}  // namespace flexel::study
