@@ -1,7 +1,9 @@
-// Points near one another, in time linear in their number: they are put into the cubes of a grid by a hash of
-// the cube (Teschner et al. 2003), and each looks into the 27 around it.
+// Points near one another, in time and memory linear in their number however far apart they lie: points are
+// sorted by the cube of a grid that they lie in, so that those of a row of cubes lie together in memory; each
+// looks into the nine rows of three cubes around its own, which move on through the sorted points as it does.
 #pragma once
-#include <cmath>
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -20,71 +22,87 @@ struct Neighbours {
   }
 };
 
-// Points by the cube of the grid that they lie in.
-class HashGrid {
+// Points in the order of their cubes, x fastest, and in a cube by their numbers.
+class CubeOrder {
  public:
-  using Cube = std::array<std::int64_t, 3>;
+  // `width` [m] of a cube, or more where the points would need over 2^20 of them along an axis.
+  CubeOrder(const std::vector<Vec3>& points, double width);
 
-  // `width` [m] of a cube. Keeps a reference to `points`.
-  HashGrid(const std::vector<Vec3>& points, double width);
+  [[nodiscard]] std::size_t size() const { return points_.size(); }
+  [[nodiscard]] std::uint32_t point(std::size_t place) const { return points_[place]; }
 
-  // visit(j) for each point j in the 27 cubes around `at`; ascending within a cube.
-  template <class Visit>
-  void visit_near(const Vec3& at, const Visit& visit) const {
-    const Cube middle = cube(at);
-    for (std::int64_t n = 0; n < 27; ++n) {
-      const Cube wanted{middle[0] + n % 3 - 1, middle[1] + n / 3 % 3 - 1, middle[2] + n / 9 - 1};
-      const std::size_t b = bucket(wanted);
-      for (std::size_t slot = begin_[b]; slot < begin_[b + 1]; ++slot)
-        if (cubes_[slot] == wanted) visit(points_[slot]);
-    }
-  }
+  // visit(a, b) for the places a of [begin, end) and those b of all points in the 27 cubes around that of a.
+  template <class Visit, class Done>
+  void visit_near(std::size_t begin, std::size_t end, const Visit& visit, const Done& done) const;
 
  private:
-  [[nodiscard]] Cube cube(const Vec3& at) const {
-    Cube result;
-    for (int axis = 0; axis < 3; ++axis)
-      result[static_cast<std::size_t>(axis)] = static_cast<std::int64_t>(std::floor(at[axis] * per_width_));
-    return result;
-  }
-  [[nodiscard]] std::size_t bucket(const Cube& cube) const {
-    std::uint64_t hash = 0;
-    for (const std::int64_t each : cube)
-      hash = (hash ^ static_cast<std::uint64_t>(each)) * 0x9e3779b97f4a7c15u;
-    return static_cast<std::size_t>((hash ^ hash >> 32) & mask_);
-  }
-
-  double per_width_;
-  std::uint64_t mask_ = 0;
-  std::vector<std::size_t> begin_;     // (buckets + 1)
-  std::vector<std::uint32_t> points_;  // by bucket, then ascending
-  std::vector<Cube> cubes_;            // of points_
+  std::vector<std::uint64_t> keys_;    // of the cubes, ascending
+  std::vector<std::uint32_t> points_;  // numbers
+  std::array<std::uint64_t, 9> rows_;  // key of the first cube of each row around a cube, less that cube's
 };
+
+template <class Visit, class Done>
+void CubeOrder::visit_near(std::size_t begin, std::size_t end, const Visit& visit, const Done& done) const {
+  struct Row {
+    std::size_t first = 0, last = 0;
+  };
+  std::array<Row, 9> rows;
+  const auto place_of = [&](std::uint64_t key) {
+    return static_cast<std::size_t>(std::lower_bound(keys_.begin(), keys_.end(), key) - keys_.begin());
+  };
+  for (std::size_t r = 0; r < 9 && begin < end; ++r)
+    rows[r].first = rows[r].last = place_of(keys_[begin] + rows_[r]);
+  for (std::size_t a = begin; a < end; ++a) {
+    if (a == begin || keys_[a] != keys_[a - 1])
+      for (std::size_t r = 0; r < 9; ++r) {
+        const std::uint64_t from = keys_[a] + rows_[r];
+        while (rows[r].first < size() && keys_[rows[r].first] < from) ++rows[r].first;
+        rows[r].last = std::max(rows[r].last, rows[r].first);
+        while (rows[r].last < size() && keys_[rows[r].last] < from + 3) ++rows[r].last;
+      }
+    for (const Row& row : rows)
+      for (std::size_t b = row.first; b < row.last; ++b) visit(a, b);
+    done(a);
+  }
+}
 
 // All pairs i < j at most `reach` [m] apart for which keep(i, j).
 template <class Keep>
 [[nodiscard]] Neighbours neighbours_within(const std::vector<Vec3>& points, double reach, const Keep& keep) {
-  const HashGrid grid(points, reach);
-  constexpr std::size_t kGrain = 512;
+  const CubeOrder order(points, reach);
+  std::vector<Vec3> sorted(points.size());
+  parallel_for_each(points.size(), [&](std::size_t a) { sorted[a] = points[order.point(a)]; });
+  constexpr std::size_t kGrain = 2048;
   std::vector<std::vector<std::uint32_t>> found((points.size() + kGrain - 1) / kGrain);
   Neighbours result;
   result.offsets.assign(points.size() + 1, 0);
   parallel_chunks(points.size(), kGrain, [&](std::size_t begin, std::size_t end) {
     std::vector<std::uint32_t>& own = found[begin / kGrain];
-    for (std::size_t i = begin; i < end; ++i) {
-      const std::size_t first = own.size();
-      grid.visit_near(points[i], [&](std::uint32_t j) {
-        if (j > i && (points[j] - points[i]).squaredNorm() <= reach * reach &&
-            keep(static_cast<std::uint32_t>(i), j))
-          own.push_back(j);
-      });
-      std::sort(own.begin() + static_cast<std::ptrdiff_t>(first), own.end());
-      result.offsets[i + 1] = own.size() - first;
-    }
+    std::size_t first = 0;
+    order.visit_near(
+        begin, end,
+        [&](std::size_t a, std::size_t b) {
+          if ((sorted[b] - sorted[a]).squaredNorm() > reach * reach) return;
+          const std::uint32_t i = order.point(a), j = order.point(b);
+          if (j > i && keep(i, j)) own.push_back(j);
+        },
+        [&](std::size_t a) {
+          std::sort(own.begin() + static_cast<std::ptrdiff_t>(first), own.end());
+          result.offsets[order.point(a) + 1] = own.size() - first;
+          first = own.size();
+        });
   });
   for (std::size_t i = 0; i < points.size(); ++i) result.offsets[i + 1] += result.offsets[i];
-  result.others.reserve(result.offsets.back());
-  for (const auto& own : found) result.others.insert(result.others.end(), own.begin(), own.end());
+  result.others.resize(result.offsets.back());
+  parallel_chunks(points.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    const std::uint32_t* from = found[begin / kGrain].data();
+    for (std::size_t a = begin; a < end; ++a) {
+      const std::uint32_t i = order.point(a);
+      const std::size_t count = result.offsets[i + 1] - result.offsets[i];
+      std::copy(from, from + count, result.others.begin() + static_cast<std::ptrdiff_t>(result.offsets[i]));
+      from += count;
+    }
+  });
   return result;
 }
 

@@ -78,16 +78,16 @@ class Sampler {
 
   std::vector<ContactPoint> operator()() {
     // corners first, for they are the outermost
-    std::map<std::uint32_t, std::vector<std::size_t>> at;
+    std::map<std::array<std::uint32_t, 2>, std::vector<std::size_t>> at;  // by part and vertex
     for (std::size_t e = 0; e < edges_.size(); ++e)
-      for (const std::uint32_t end : edges_[e].ends) at[end].push_back(e);
+      for (const std::uint32_t end : edges_[e].ends) at[{part_of(edges_[e].polygon), end}].push_back(e);
     for (const bool corners : {true, false})
       for (const auto& [vertex, edges] : at) {
         if ((edges.size() > 2) != corners) continue;
         std::vector<Vec3> normals;
         for (const std::size_t e : edges)
           normals.insert(normals.end(), edges_[e].normals.begin(), edges_[e].normals.end());
-        add(setting_.body.surface.vertices[vertex], normals, edges_[edges.front()].polygon);
+        add(setting_.body.surface.vertices[vertex[1]], normals, edges_[edges.front()].polygon);
       }
     for (const Edge& edge : edges_) {
       const Vec3 &a = setting_.body.surface.vertices[edge.ends[0]],

@@ -5,13 +5,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <map>
 
 #include "simulate/effects/contact.h"
+#include "simulate/time/layout.h"
+#include "simulate/time/stability.h"
 #include "simulate/touching.h"
 
 namespace flexel {
 namespace {
+
+constexpr double kMostOfCells = 2;  // of the square of their frequency, in timed runs
 
 using Weights = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 16, 1>;
 
@@ -36,6 +41,35 @@ double foundation(const TouchingPoint& point, const Setting& setting) {
     return setting.materials[part].young / setting.body.parts[part].lattice.spacing.mean();
   };
   return std::min(of(point.part[0]), of(point.part[1]));
+}
+
+// What resists at an element: itself; of a rigid part all of it, and for what turns it a quarter.
+struct Resisting {
+  std::vector<std::uint32_t> node;  // (elements)
+  std::vector<double> mass;         // (elements) kg, of nodes
+  std::vector<double> most;         // (elements) 1/s^2, likewise: the square of the frequency that is allowed
+};
+
+Resisting resisting(const Setting& setting) {
+  const std::vector<double> own = cell_frequencies(setting);
+  Resisting made{{}, lumped_masses(setting), {}};
+  for (std::size_t p = 0; p < own.size(); ++p) {
+    const Part& part = setting.body.parts[p];
+    const bool rigid = setting.rigidity.size() > p && setting.rigidity[p] != Rigidity::none;
+    const double width = part.lattice.spacing.mean();
+    // connections of model `paper` give no bound of their own here
+    const double omega2 =
+        own[p] > 0 ? own[p]
+                   : 10 * setting.materials[p].young / (setting.materials[p].density * width * width);
+    double whole = 0;
+    for (std::uint32_t e = part.element_begin; e < part.element_end; ++e) {
+      whole += made.mass[e];
+      made.node.push_back(rigid ? part.element_begin : e);
+      made.most.push_back(rigid ? std::numeric_limits<double>::infinity() : kMostOfCells * omega2);
+    }
+    if (rigid) made.mass[part.element_begin] = 0.25 * whole;
+  }
+  return made;
 }
 
 }  // namespace
@@ -71,7 +105,32 @@ std::optional<Bonds> Bonds::make(const Parameters& parameters, const Setting& se
   for (const auto& [elements, stiffness] : by_elements) made.bonds_.push_back({elements, stiffness});
   for (const auto& [parts, shared] : area)
     made.parts_.push_back({{setting.body.parts[parts[0]].name, setting.body.parts[parts[1]].name}, shared});
+  if (setting.duration) made.soften(setting);
   return made;
+}
+
+// Lowers each matrix so that no element's rows together are stiffer than what is allowed times its mass.
+void Bonds::soften(const Setting& setting) {
+  const Resisting resists = resisting(setting);
+  const auto rows = [&] {
+    std::vector<double> sum(resists.mass.size(), 0);
+    for (const BondedElements& bond : bonds_)
+      for (Eigen::Index a = 0; a < bond.stiffness.rows(); ++a)
+        sum[resists.node[bond.element(a)]] += bond.stiffness.row(a).cwiseAbs().sum();
+    return sum;
+  };
+  const std::vector<double> stiff = rows();
+  for (BondedElements& bond : bonds_) {
+    double scale = 1;
+    for (Eigen::Index a = 0; a < bond.stiffness.rows(); ++a) {
+      const std::uint32_t node = resists.node[bond.element(a)];
+      if (stiff[node] > 0) scale = std::min(scale, resists.most[node] * resists.mass[node] / stiff[node]);
+    }
+    bond.stiffness *= scale;
+  }
+  const std::vector<double> soft = rows();
+  for (std::size_t e = 0; e < soft.size(); ++e)
+    if (soft[e] > 0) frequency_ = std::max(frequency_, soft[e] / resists.mass[e]);
 }
 
 std::string Bonds::why() const {

@@ -7,6 +7,9 @@
 // lattices. A bond yields like a twentieth of a cell more of the softer part; stiffer ones (300, as the ties
 // to the ground) take four times the iterations and change a bar's end by 0.1
 // %. One matrix holds all the points between the same carriers.
+//
+// In a timed run k_q is lowered, matrix by matrix, until its frequency squared is twice that of the cells:
+// the step is cut by at most sqrt(3), and a bond yields like a fifth of a cell.
 #pragma once
 #include "simulate/effects/effect.h"
 
@@ -24,6 +27,7 @@ class Bonds {
   [[nodiscard]] static std::optional<Bonds> make(const Parameters& parameters, const Setting& setting);
   [[nodiscard]] std::string why() const;
 
+  [[nodiscard]] double added_frequency(const std::vector<double>&) const { return frequency_; }
   [[nodiscard]] double energy(const State& state) const;
   void add_forces(const State& state, std::vector<Vec3>& forces) const;
   void add_stiffness(const State& state, BlockMatrix& matrix) const;
@@ -40,10 +44,12 @@ class Bonds {
     }
   };
   using Displacements = Eigen::Matrix<double, Eigen::Dynamic, 3, 0, 16, 3>;
+  void soften(const Setting& setting);
   [[nodiscard]] static Displacements displacements(const BondedElements& bond, const State& state);
 
   std::vector<BondedElements> bonds_;  // ascending by the elements
   std::vector<BondedParts> parts_;     // who is bonded with whom
+  double frequency_ = 0;               // 1/s^2, in timed runs
 };
 
 }  // namespace flexel

@@ -10,6 +10,7 @@
 #include "simulate/simulate.h"
 #include "simulate/touching.h"
 #include "tests/simulate/box_body.h"
+#include "tests/simulate/timed_case.h"
 
 namespace flexel {
 namespace {
@@ -70,6 +71,28 @@ TEST(Bonds, LargeDeflectionOfACutBar) {
   const Vec3 whole = tip(bar(true), force);
   EXPECT_GT(whole.norm(), 0.08);
   EXPECT_LT((tip(bar(false, 5), force) - whole).norm(), 0.015 * whole.norm());
+}
+
+// Let go under its weight, the cut bar swings as far as the whole one.
+TEST(Bonds, ACutBarSwingsAsTheWholeBar) {
+  const auto swing = [](const Body& body) {
+    Scene scene = pull(Vec3::Zero());
+    scene.get<Loads>().loads.clear();
+    scene.get<Gravity>().acceleration = Vec3(0, 0, -0.5);
+    scene.run.time = 0.2;
+    return testing::run_timed(body, scene);
+  };
+  const testing::TimedCase whole = swing(bar(true));
+  for (const int n : {4, 5, 3}) {
+    const testing::TimedCase cut = swing(bar(false, n));
+    EXPECT_NEAR(cut.result.probes[0].displacement.z(), whole.result.probes[0].displacement.z(),
+                0.03 * std::abs(whole.result.probes[0].displacement.z()))
+        << n;
+    testing::expect_books_close(cut.result);
+    if (n == 4) {
+      EXPECT_GT(cut.result.timed->step, whole.result.timed->step / 1.8);
+    }
+  }
 }
 
 TEST(Bonds, SaysWhoIsBondedOverWhatArea) {
