@@ -288,8 +288,8 @@ void TimedRun::play_until(double end, bool resumed) {
   if (live_ && (first || resumed)) live_->start(act_->state());
   if (kept_) keep();
   sound_.keep(act_->state());
-  act_->unload();
   if (!history_ && !settling_) act_->spare_mass();
+  act_->unload();
   const std::uint64_t between = act_->is_implicit() ? 1 : kCheck;
   while (goes_on()) {
     if (clock_.steps % between == 0 || act_->hurried()) check();
