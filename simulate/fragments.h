@@ -32,8 +32,8 @@ constexpr std::uint32_t kNoFragment = 0xffffffffu;
 [[nodiscard]] std::vector<std::uint8_t> stray_elements(const Fragments& fragments, const Body& body);
 
 // Throws InputError naming the part, and the fragment where there are several, when no element of a fragment
-// that is not stray is tied, nor any of those that it is bonded with (`coupled` elements), and when no cell is
-// whole. `scene` is the scene's name for the message.
+// that is not stray is tied, nor any of those that it is bonded with (`coupled` elements), and when no cell
+// is whole. `scene` is the scene's name for the message.
 void refuse_loose_fragments(const Fragments& fragments, const Body& body,
                             const std::vector<std::uint8_t>& tied_elements,
                             const std::vector<CoupledElements>& coupled, const std::string& scene);

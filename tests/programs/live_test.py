@@ -19,6 +19,7 @@ PAT = """material = "rubber"
 part = "plate"
 path = "stdin"
 [contact]
+friction = 0.5  # without it the block slides out from under the plate
 [[plane]]
 point = ["0 mm", "0 mm", "0 mm"]
 normal = [0, 0, 1]
