@@ -201,6 +201,20 @@ def touching(trial):
                 require(moved < 1e-9, f"moved by {moved} h")
 
 
+@case("pressed without friction", known={"books": "a block that slides out from under a plate of its outline is given energy where their edges cross"},
+      holds="a block between a floor and a plate of its own outline that comes down by a fifth of a cell: whether it stays or slides out, books within 2 %",
+      breaks="a side that takes over a contact from the face beside it at once, as deep as it is")
+def pressed(trial):
+    h = 1e-2
+    scene = ("[contact]\n[[plane]]\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\n[[manipulator]]\npart = \"plate\"\n"
+             'time = ["0 s", "250 ms"]\ndisplacement = [[0, 0, 0], [0, 0, "-4 mm"]]\n[damping]\ntime = "20 us"\n[run]\ntime = "220 ms"\n')
+    with trial.section("books"):
+        out = same_bits(trial, lambda view: Setup({"block": grid_box((4, 2, 2), h), "plate": grid_box((4, 2, 1), h, (0, 0, 2.02 * h))}, gum(view) + scene, h), (7,))
+        ends_well(out)
+        trial.show(out)
+        books(out, 2e-2)
+
+
 @case("overlapping at the start",
       known=all_of("parts that overlap are neither refused nor parted gently", "0.1 cells", "0.5 cells", "1.5 cells"),
       peer="Bullet",
