@@ -46,8 +46,10 @@ std::string curve_of(const Summed& each) {
   return "model " + label.substr(0, label.find(' '));
 }
 
+// What lies far below its uncertainty, above all the run that is the reference itself, is drawn at a tenth of
+// it: a logarithmic axis has no place for none.
 double shown_error(const Point& point) {
-  return 100 * std::max(point.error->error, 1e-9);
+  return 100 * std::max({point.error->error, 0.1 * point.error->uncertainty, 1e-9});
 }
 
 std::string label_at(const Point& point) {
@@ -82,8 +84,10 @@ std::string error_script(const Study& study, const std::string& out) {
   const std::vector<std::size_t> front = frontier(points);
   for (const std::size_t i : front)
     data += fmt::format("{:.9g} {:.9g}\n", points[i].seconds, shown_error(points[i]));
+  // The others are told by their colour: where all are written none can be read.
   for (std::size_t i = 0; i < points.size(); ++i)
-    if (points[i].error && (points[i].sweep == "resolution" || points[i].sweep == "model"))
+    if (points[i].error &&
+        (points[i].sweep == "resolution" || std::find(front.begin(), front.end(), i) != front.end()))
       labels += label_at(points[i]);
   data += "EOD\n" + labels + "EOD\n";
   if (!front.empty()) plots += "$front with linespoints lw 7 lc rgb '#55e0c000' pt 6 ps 2 title 'frontier', ";
