@@ -1,12 +1,14 @@
 // Prints how well each method of mapping follows known motions of all elements, as the Markdown table of
 // docs/mapping.md: root mean square error of the vertices by spacing, its order of convergence, the normal
-// jump between neighbouring triangles. Rows in brackets are no methods of the product: they are what
-// `blended` would give with other frames.
+// jump between neighbouring triangles; then what each method costs there. Rows in brackets are no methods of
+// the product: they are what `blended` would give with other frames.
 //
 //   convergence [corner|centre]
 #include <fmt/format.h>
 
 #include <Eigen/LU>
+#include <algorithm>
+#include <chrono>
 #include <cstring>
 
 #include "mapping/bind.h"
@@ -86,6 +88,47 @@ void print_table(const char* title, std::vector<Body>& bodies, const std::vector
   }
 }
 
+// Median of repetitions, ns a vertex.
+template <typename Work>
+double cost(const Body& body, const Work& work) {
+  std::array<double, 7> times{};
+  for (double& time : times) {
+    const auto begin = std::chrono::steady_clock::now();
+    work();
+    time = std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - begin).count() /
+           static_cast<double>(body.surface.vertices.size());
+  }
+  std::sort(times.begin(), times.end());
+  return times[times.size() / 2];
+}
+
+// The same surface on finer and finer lattices: what grows belongs to the elements, not to the vertices.
+void print_costs(const std::vector<Body>& bodies, const std::vector<int>& across) {
+  fmt::print("\nRound bar, {} vertices, all cores: ns a vertex\n\n| method |",
+             bodies[0].surface.vertices.size());
+  for (const char* what : {"bind", "apply"})
+    for (const int n : across) fmt::print(" {}, h = 1/{} |", what, n);
+  fmt::print("\n|---|");
+  for (std::size_t i = 0; i < 2 * across.size(); ++i) fmt::print("---|");
+  fmt::print("\n");
+  for (const auto& [name, method] : {std::pair{"gram-schmidt", MapMethod::gram_schmidt},
+                                     {"affine", MapMethod::affine},
+                                     {"blended", MapMethod::blended},
+                                     {"smooth", MapMethod::smooth}}) {
+    fmt::print("| `{}` |", name);
+    // as bench_mapping does: with weights kept for states to come
+    for (const Body& body : bodies) fmt::print(" {:.0f} |", cost(body, [&] { (void)bind(body, method, 2); }));
+    for (const Body& body : bodies) {
+      const Binding bound = bind(body, method, 2);
+      fmt::print(" {:.0f} |", cost(body, [&] { (void)apply(bound, body, body.position); }));
+    }
+    fmt::print("\n");
+  }
+  fmt::print("\nElements: ");
+  for (const Body& body : bodies) fmt::print("{} ", body.element_count());
+  fmt::print("\n");
+}
+
 }  // namespace
 }  // namespace flexel
 
@@ -106,5 +149,6 @@ int main(int argc, char** argv) {
   for (const int n : knot_across) knots.push_back(test::knot(n, placement));
   for (const Motion& motion : {Motion{"bent", test::bend}, {"twisted", test::twist}})
     print_table("Trefoil knot", knots, knot_across, motion);
+  print_costs(bars, across);
   return 0;
 }
