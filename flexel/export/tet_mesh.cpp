@@ -2,7 +2,6 @@
 // STL, which gmsh cuts into faces and parametrises. Which CAD face a surface of gmsh is, is told by place:
 // most of its triangles' middles are nearest to that face's polygons, with the normal the same way.
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -15,6 +14,7 @@
 #include "formats/distance.h"
 #include "formats/error.h"
 #include "formats/surface_file.h"
+#include "formats/temporary_folder.h"
 
 namespace flexel {
 namespace {
@@ -23,26 +23,6 @@ constexpr double kRegionAngle = 30;   // degrees, as regions of meshes are told 
 constexpr std::size_t kSamples = 25;  // triangles of a surface that are asked which face they are on
 constexpr double kFacing = 0.3;       // cosine
 constexpr double kBoxTolerance = 0.02;
-
-// A folder of our own under the system's temporary one, removed with all in it.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "flexel-XXXXXX").string();
-    if (!mkdtemp(pattern.data())) throw InputError(pattern, "no temporary folder can be made there");
-    path_ = pattern;
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  [[nodiscard]] const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
-};
 
 bool is_cad(const SurfaceSource& source) {
   return source.format == "step" || source.format == "iges" || source.format == "brep";
@@ -104,11 +84,11 @@ GmshMesh mesh_all(const std::vector<std::string>& paths, const Surface& surface,
         throw InputError("--mesh tet: gmsh reads the part's file itself; give the file, not stdin");
       const TemporaryFolder folder;
       const std::string name = "part." + source.format;
-      std::filesystem::create_symlink(std::filesystem::absolute(paths[s]), folder.path() + "/" + name);
+      std::filesystem::create_symlink(std::filesystem::absolute(paths[s]), folder.path() / name);
       // gmsh reads STEP and IGES in millimetres, BREP as it is
       const double unit = source.format == "brep" ? source.unit : 1e-3;
       append(all,
-             mesh_with_gmsh(folder.path(),
+             mesh_with_gmsh(folder.path().string(),
                             fmt::format("SetFactory(\"OpenCASCADE\");\nMerge \"{}\";\n{}", name,
                                         settings(options, unit)),
                             source.file),
@@ -120,10 +100,10 @@ GmshMesh mesh_all(const std::vector<std::string>& paths, const Surface& surface,
       const TemporaryFolder folder;
       const Surface one = part_surface(surface, part);
       write_surface(one, std::vector<Vec3>(one.vertices.size(), Vec3::Zero()), SurfaceFormat::stl_binary,
-                    1e-3, folder.path() + "/part.stl");
+                    1e-3, (folder.path() / "part.stl").string());
       append(
           all,
-          mesh_with_gmsh(folder.path(),
+          mesh_with_gmsh(folder.path().string(),
                          fmt::format("Merge \"part.stl\";\nClassifySurfaces{{{0} * Pi / 180, 1, 1, {0} * Pi "
                                      "/ 180}};\nCreateGeometry;\nSurface Loop(1) = Surface{{:}};\nVolume(1) "
                                      "= {{1}};\n{1}",

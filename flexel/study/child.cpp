@@ -126,16 +126,4 @@ std::string own_program(const std::string& name) {
   return program.string();
 }
 
-TemporaryFolder::TemporaryFolder(const std::filesystem::path& parent) {
-  std::string name = (parent / ".flexel-XXXXXX").string();
-  if (mkdtemp(name.data()) == nullptr)
-    throw InputError(parent.string(), fmt::format("no folder can be made there: {}", std::strerror(errno)));
-  path_ = name;
-}
-
-TemporaryFolder::~TemporaryFolder() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
-}
-
 }  // namespace flexel::study

@@ -9,23 +9,10 @@
 #include <string>
 #include <vector>
 
+#include "formats/temporary_folder.h"
 #include "formats/vec.h"
 
 namespace flexel::study {
-
-// A folder of its own under `parent`, removed with all that is in it.
-class TemporaryFolder {
- public:
-  // Throws InputError: `parent` cannot be written to.
-  explicit TemporaryFolder(const std::filesystem::path& parent = std::filesystem::temp_directory_path());
-  ~TemporaryFolder();
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
 
 // How a child process ended and what it used.
 struct ChildRun {
