@@ -300,7 +300,7 @@ void Act::step(Clock& clock, History* history, bool row) {
     for (const Pass& pass : passes_)
       if (pass.add_support_forces) pass.add_support_forces(supports);
     history->after(state_, outcome, stepper_->damping_force(), supports, first ? 0 : clock.previous,
-                   clock.step);
+                   clock.step, before == 0);
   }
   clock.previous = clock.step;
   if (!(outcome.smallest_jacobian > 0)) throw DivergedError(where_it_folds(setting_, state_));

@@ -53,4 +53,11 @@ std::string squeezed_most(const Setting& setting, const State& state) {
                      most.value);
 }
 
+std::string damping_unsolved_at(const Vec3& at, int iterations) {
+  return fmt::format(
+      "the damping of the step was not solved in {} iterations, worst near {}: give a shorter [damping] time "
+      "or [run] step",
+      iterations, place(at));
+}
+
 }  // namespace flexel

@@ -19,4 +19,7 @@ namespace flexel {
 // ", squeezed most near (...), to J = 0.02", of the same cell; nothing without cells.
 [[nodiscard]] std::string squeezed_most(const Setting& setting, const State& state);
 
+// Damping that its conjugate gradients did not solve for in so many iterations, worst at `at` [m].
+[[nodiscard]] std::string damping_unsolved_at(const Vec3& at, int iterations);
+
 }  // namespace flexel

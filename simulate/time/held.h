@@ -31,6 +31,8 @@ class Held {
   // Adds the supports' forces at the time before the last advance [N] (elements); 0 for free components.
   void add_forces(std::vector<Vec3>& forces) const;
 
+  [[nodiscard]] const Body& body() const { return body_; }
+
  private:
   struct Entry {
     std::uint32_t element = 0;

@@ -101,7 +101,12 @@ void History::before(const State& state, bool sample) {
 }
 
 void History::after(const State& state, const StepOutcome& outcome, const std::vector<Vec3>& damping,
-                    const std::vector<Vec3>& supports, double previous_step, double step) {
+                    const std::vector<Vec3>& supports, double previous_step, double step, bool half_kick) {
+  // A half kick from v(0) makes v(1/2); the same forces for as long before it would have made v(0) from
+  // v(-1/2) = 2 v(0) - v(1/2), and with that one the kinetic energy changes by the work of whole kicks.
+  if (half_kick)
+    parallel_for_each(velocity_.size(),
+                      [&](std::size_t e) { velocity_[e] = 2 * velocity_[e] - state.velocity[e]; });
   const auto add_powers = [&](const std::vector<Vec3>& velocity, double time) {
     const auto enter = [&](std::size_t account, const std::vector<Vec3>& forces) {
       ledger_.accounts[account].energy += time * parallel_sum<double>(forces.size(), [&](std::size_t e) {

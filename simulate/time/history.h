@@ -72,9 +72,10 @@ class History {
   // Likewise of the damping of connections.
   [[nodiscard]] std::vector<Vec3>& connection_damping() { return connection_damping_; }
   // After it: what the stepper says of its energies, the forces of damping and supports [N] (elements; or
-  // none), the length [s] of the step before it (0 for the first), and its own.
+  // none), the length [s] of the step before it (0 for the first), and its own. `half_kick`: the velocities
+  // before it were those of the state's own time, as Verlet's first ones are.
   void after(const State& state, const StepOutcome& outcome, const std::vector<Vec3>& damping,
-             const std::vector<Vec3>& supports, double previous_step, double step);
+             const std::vector<Vec3>& supports, double previous_step, double step, bool half_kick);
 
   // In place of before() and after() where the velocities are those of the state's own time, as in implicit
   // steps: a row of `state`, and the forces there times how far they moved [m] (elements), with what the

@@ -1,12 +1,12 @@
 // Conjugate gradients preconditioned by the masses; sums in a fixed order.
 #include "simulate/time/implicit_damping.h"
 
-#include <fmt/format.h>
-
+#include <algorithm>
 #include <cmath>
 
 #include "formats/error.h"
 #include "formats/parallel.h"
+#include "simulate/time/folds.h"
 
 namespace flexel {
 namespace {
@@ -19,6 +19,20 @@ double weighted(const std::vector<Vec3>& a, const std::vector<Vec3>& b, const st
 
 double dot(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
   return parallel_sum<double>(a.size(), [&](std::size_t e) { return a[e].dot(b[e]); });
+}
+
+bool is_zero(const std::vector<Vec3>& values) {
+  return std::all_of(values.begin(), values.end(), [](const Vec3& v) { return v == Vec3::Zero(); });
+}
+
+// The first that is not finite, or else the longest.
+std::size_t largest(const std::vector<Vec3>& values) {
+  std::size_t at = 0;
+  for (std::size_t e = 0; e < values.size(); ++e) {
+    if (!values[e].allFinite()) return e;
+    if (values[e].squaredNorm() > values[at].squaredNorm()) at = e;
+  }
+  return at;
 }
 
 }  // namespace
@@ -44,25 +58,29 @@ StepOutcome ImplicitDamping::advance(State& state, const std::vector<Vec3>& oute
   image_.resize(n);
   parallel_for_each(n, [&](std::size_t e) { right_[e] = mass[e] * (state.velocity[e] - before_[e]); });
 
+  // Held components are known: what their change pulls along goes to the right-hand side of the others.
   if (change_.size() != n) change_.assign(n, Vec3::Zero());
-  parallel_for_each(n, [&](std::size_t e) { direction_[e] = before_[e] + change_[e]; });
+  direction_ = before_;
   held_.impose_velocity(state, advance.drift, direction_);
-  parallel_for_each(n, [&](std::size_t e) { change_[e] = direction_[e] - before_[e]; });
-
-  const std::vector<Vec3>& first = damping(change_);
-  parallel_for_each(n,
-                    [&](std::size_t e) { residual_[e] = right_[e] + dt * first[e] - mass[e] * change_[e]; });
-  held_.clear(residual_);
+  parallel_for_each(n, [&](std::size_t e) { direction_[e] -= before_[e]; });
+  held_.copy(direction_, change_);
+  if (!is_zero(direction_)) {
+    const std::vector<Vec3>& pulled = damping(direction_);
+    parallel_for_each(n, [&](std::size_t e) { right_[e] += dt * pulled[e]; });
+  }
   held_.clear(right_);
+  image_ = change_;
+  held_.clear(image_);
+  const std::vector<Vec3>& first = damping(image_);
+  parallel_for_each(n,
+                    [&](std::size_t e) { residual_[e] = right_[e] + dt * first[e] - mass[e] * image_[e]; });
+  held_.clear(residual_);
   const double enough = kTolerance * kTolerance * weighted(right_, right_, inverse);
   double norm = weighted(residual_, residual_, inverse);
   parallel_for_each(n, [&](std::size_t e) { direction_[e] = inverse[e] * residual_[e]; });
   for (int i = 0; norm > enough; ++i) {
     if (i == most_ || !std::isfinite(norm))
-      throw DivergedError(
-          fmt::format("the damping of the step was not solved in {} iterations: give a shorter [damping] "
-                      "time or [run] step",
-                      i));
+      throw DivergedError(damping_unsolved_at(held_.body().rest[largest(residual_)], i));
     ++iterations_;
     const std::vector<Vec3>& damped = damping(direction_);
     parallel_for_each(n, [&](std::size_t e) { image_[e] = mass[e] * direction_[e] - dt * damped[e]; });

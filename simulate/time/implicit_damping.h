@@ -5,7 +5,8 @@
 //     (M - dt D) x = dt (f + D v-),   v+ = v- + x
 // by conjugate gradients, D without a matrix by the kernel. M - dt D is symmetric and positive definite, for
 // damping only takes energy; its condition is 1 + dt tau omega^2. The previous step's x is where the search
-// starts.
+// starts. Components that follow a path are no unknowns: the right-hand side of the others, against which
+// their residual is measured, has what they pull along.
 #pragma once
 #include <vector>
 

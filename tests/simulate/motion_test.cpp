@@ -369,6 +369,19 @@ TEST(Motion, OrderOfTheMethods) {
   EXPECT_NEAR(error(TimeMethod::explicit_euler, 0.5) / error(TimeMethod::explicit_euler, 0.25), 2, 0.05);
 }
 
+// Its books begin between two half kicks; without damping, with it, and with it solved for.
+TEST(Motion, BooksOfVerletClose) {
+  for (const double tau : {0.0, 2e-5, 1e-3}) {
+    Scene scene = scene_of(kGum, 0.01);
+    scene.run.method = TimeMethod::verlet;
+    scene.get<InitialVelocity>() = thrown(Vec3(0, 0, 1), Vec3(0, 0, 30), Vec3(0.015, 0.01, 0.01));
+    scene.get<Gravity>().acceleration = Vec3(0, 0, -9.81);
+    scene.get<Ties>().ties.push_back(make_fix(select_by_name("x0")));
+    if (tau > 0) scene.get<Damping>().entries.push_back({tau, {}, ""});
+    expect_books_close(testing::run_timed(small_box(), scene).result);
+  }
+}
+
 TEST(Motion, ExplicitEulerGainsEnergy) {
   Scene scene = scene_of(kGum, 0.02);
   scene.get<InitialVelocity>() = thrown(Vec3::Zero(), Vec3(0, 0, 30), Vec3(0.015, 0.01, 0.01));
