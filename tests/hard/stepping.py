@@ -8,7 +8,7 @@ import numpy as np
 import peers
 from invariants import books, ends_well, integrators, momentum, refused, require, same_bits, sound_state, worked
 from solids import bar, grid_box
-from suite import all_of, case
+from suite import case
 from world import PLAIN, Setup, call, simulate, significant
 
 CENTRE = ("--placement", "centre", "--align", "none")
@@ -90,8 +90,6 @@ def appearing(trial):
 
 
 @case("damping ratios up to 5",
-      known=all_of("the half kick with which verlet begins is not in the books of damping", *(f"zeta {z}, verlet" for z in (0.1, 1.0, 5.0))),
-     
       holds="a bar's slowest swing damped by tau omega / 2 = 0.1, 1 and 5: the decay of the damped oscillator within 5 %; 0.1 to 5 of the stiffest cell: energy only falls; momenta to 1e-9",
       breaks="dashpots taken explicitly beyond their bound; damping that brakes what flies")
 def damping(trial):
