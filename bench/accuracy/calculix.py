@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 """Flexel beside CalculiX on the same parts: error, error bar, seconds, memory.
 
-    PATH=build/release/bin:$PATH bench/accuracy/calculix.py [--quick] [--parts DIR] [CASE...]
+    PATH=build/release/bin:$PATH bench/accuracy/calculix.py [--quick] [--parts DIR] [--list] [CASE...]
 
 Each part is made by gmsh (OpenCASCADE) or is a STEP file of ../shared/parts (left out, and said so, where that folder is not there; it is
 held and drawn by 10 N along (1, 1, 1) at the flat faces at the two ends of its longest side). CalculiX gets its mesh of quadratic tetrahedra (C3D10) at three sizes, Flexel the STEP file at
 two spacings, both one thread and the same faces, material and load. What is compared is the mean displacement of a face, or that of a
-point. The reference is Lame's solution for the tube, otherwise CalculiX's three values extrapolated (Aitken), or the finest where they
-do not approach a limit. Seconds are the processor's, which other jobs change little, and hold everything from the file with the part or
+point. The reference is Lame's solution for the tube, bracket_reference.py's for the L-bracket, otherwise CalculiX's three values extrapolated
+(Aitken), or the finest where they do not approach a limit. Seconds are the processor's, which other jobs change little, and hold everything from the file with the part or
 mesh to the result; those of gmsh's meshing stand beside CalculiX's. --quick leaves out the finest mesh and spacing. Needs ccx and gmsh (tools/setup --tests).
 """
 
@@ -64,12 +64,16 @@ def beam(poisson, turn=None, align="snap"):
                 (12.5, 8, 5), (25 / 4, 25 / 8), poisson, turn, align=align)
 
 
+BRACKET = 15.969e-3  # mm, the limit that bracket_reference.py prints
+
+
 def bracket():
     geometry = """Box(1) = {0, 0, 0, 8, 40, 60}; Box(2) = {0, 0, 0, 60, 40, 8}; Cylinder(3) = {-1, 20, 40, 20, 0, 0, 6};
 BooleanUnion(4) = { Volume{1}; Delete; }{ Volume{2}; Delete; };
 BooleanDifference(5) = { Volume{4}; Delete; }{ Volume{3}; Delete; };"""
     faces = {"held": (plane(0, 0), (0, 20, 30)), "end": (plane(0, 60), (60, 20, 4))}
-    return Case(geometry, faces, [("held", "xyz")], ("end", "force", (0, 0, -100)), "end", (5, 3.5, 2.5), (2, 1))
+    return Case(geometry, faces, [("held", "xyz")], ("end", "force", (0, 0, -100)), "end", (5, 3.5, 2.5), (2, 1),
+                reference=BRACKET)
 
 
 def plate():
@@ -351,6 +355,9 @@ def run(name, quick):
 def main():
     global PARTS
     given = sys.argv[1:]
+    if "--list" in given:
+        print("\n".join(CASES))
+        return
     if "--parts" in given[:-1]:
         at = given.index("--parts")
         PARTS = pathlib.Path(given[at + 1])

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The closed STEP parts, each solved with an error bar and nothing set by hand but the number of cells.
 
-    PATH=build/release/bin:$PATH bench/accuracy/step_parts.py [--parts DIR] [--cells N[,N...]] [PART...]
+    PATH=build/release/bin:$PATH bench/accuracy/step_parts.py [--parts DIR] [--cells N[,N...]] [--list] [PART...]
 
 Every solid of a part is held by the flat face at one end of its longest side and drawn by 10 N along (1, 1, 1) on that at the other
 (end_faces.py); the material is aluminium. Prints, for each number of cells (default 30000): the cells
@@ -76,8 +76,12 @@ def main():
     arguments.add_argument("--parts", default=pathlib.Path(__file__).resolve().parents[2] / "../shared/parts", type=pathlib.Path)
     arguments.add_argument("--cells", default="30000", help="numbers of cells, separated by commas")
     arguments.add_argument("--timeout", default=3600, type=int, help="s, of each program")
+    arguments.add_argument("--list", action="store_true", help="name the parts")
     arguments.add_argument("names", nargs="*", metavar="PART")
     options = arguments.parse_args()
+    if options.list:
+        print("\n".join(PARTS))
+        return 0
     if not options.parts.is_dir():
         print(f"step_parts.py: {options.parts} is not there: give --parts DIR", file=sys.stderr)
         return 2

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """What Flexel's answers are off by, measured and written as docs/verification.md with its figures.
 
-    PATH=build/release/bin:$PATH bench/accuracy/verification.py [--quick] [-o FILE]
+    PATH=build/release/bin:$PATH bench/accuracy/verification.py [--quick] [--keep FOLDER] [-o FILE]
 
 Always: the lattice tested as a material (`flexel measure`), the paper's cantilever against its reference and a thick tube against Lame's
 solution, each at several spacings with its error bar. Without --quick also the tables of accuracy_table and error_bars (a
 build with FLEXEL_BENCH=ON), of bench/accuracy/step_parts.py and of bench/accuracy/calculix.py (ccx and gmsh). A section whose programs or
-parts are not there says so. Figures are SVG by gnuplot, in a folder beside FILE named after it. Exit code 1 when a true error lies outside
+parts are not there says so. With --keep every case is written to FOLDER as soon as it is done, and a later run takes it from there: a run
+of half an hour can be stopped and goes on. Figures are SVG by gnuplot, in a folder beside FILE named after it. Exit code 1 when a true error lies outside
 its bar in more than one case of ten, or a material is off by more than 1 %.
 """
 
@@ -15,6 +16,7 @@ import concurrent.futures
 import json
 import math
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -29,6 +31,26 @@ def command(*words, accept=(0,)):
     if done.returncode not in accept:
         raise RuntimeError(f"{' '.join(map(str, words))}: {(done.stderr.strip().splitlines() or ['no message'])[-1]}")
     return done.stdout
+
+
+class Kept:
+    """What is done already, in a folder that a later run goes on from; without one nothing is kept."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        if folder:
+            folder.mkdir(parents=True, exist_ok=True)
+
+    def __call__(self, name, make):
+        path = self.folder and self.folder / (re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-") + ".json")
+        if path and path.exists():
+            return json.loads(path.read_text(encoding="utf-8"))
+        result = make()
+        if path:
+            part = path.with_name(path.name + ".part")
+            part.write_text(json.dumps(result), encoding="utf-8")
+            part.replace(path)
+        return result
 
 
 # The lattice as a material
@@ -131,12 +153,13 @@ def plot(path, title, across, rows):
     return f"![{title}]({path.parent.name}/{path.name})\n\n"
 
 
-def known(name, title, what, across, run, counts, output):
-    rows = []
-    with tempfile.TemporaryDirectory() as place:
-        for n in counts:
+def known(name, title, what, across, run, counts, output, kept):
+    def row(n):
+        with tempfile.TemporaryDirectory() as place:
             value, bar, cells, reference = run(pathlib.Path(place), n)
-            rows.append((n, cells, 100 * (value / reference - 1), 100 * bar / reference if bar is not None else None))
+        return n, cells, 100 * (value / reference - 1), 100 * bar / reference if bar is not None else None
+
+    rows = [kept(f"{name} {n}", lambda n=n: row(n)) for n in counts]
     inside = sum(bar is not None and abs(error) <= bar for _, _, error, bar in rows)
     text = f"## {title}\n\n{what}\n\n" + plot(output.with_suffix("") / f"{name}.svg", title, across, rows)
     text += f"| {across} | cells | error % | bar % | holds |\n|---|---|---|---|---|\n"
@@ -148,19 +171,25 @@ def known(name, title, what, across, run, counts, output):
 # Tables of the other programs
 
 
-def captured(title, what, words, needs=()):
+def captured(kept, title, what, words, needs=(), cases=None):
+    """The table that a program prints. `cases` lists what it is run for one by one, each kept."""
     missing = [need for need in (words[0], *needs) if not (shutil.which(str(need)) or pathlib.Path(need).exists())]
     if missing:
         return f"## {title}\n\n{what}\n\nLeft out: {', '.join(pathlib.Path(each).name for each in missing)} is not there.\n"
-    print(f"verification.py: {title}", file=sys.stderr)
-    # 1 is a finding of theirs, which their table shows
-    return f"## {title}\n\n{what}\n\n{command(*words, accept=(0, 1)).strip()}\n"
+    lines = []
+    for case in cases() if cases else [None]:
+        print(f"verification.py: {title}" + (f", {case}" if case else ""), file=sys.stderr)
+        # 1 is a finding of theirs, which their table shows
+        more = kept(f"{title} {case or ''}", lambda case=case: command(*words, *([case] if case else []), accept=(0, 1))).strip().splitlines()
+        lines += more[2:] if lines else more  # one head
+    return f"## {title}\n\n{what}\n\n" + "\n".join(lines) + "\n"
 
 
 def main():
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("--quick", action="store_true", help="leave out what takes more than a minute")
     arguments.add_argument("--jobs", default=1, type=int, help="programs that run at once")
+    arguments.add_argument("--keep", type=pathlib.Path, metavar="FOLDER", help="write each case there when it is done; go on from what is there")
     arguments.add_argument("--parts", default=ROOT / "../shared/parts", type=pathlib.Path)
     arguments.add_argument("-o", "--output", default=ROOT / "docs/verification.md", type=pathlib.Path)
     options = arguments.parse_args()
@@ -168,15 +197,18 @@ def main():
                 f", {command('flexel', '--version').strip()}. Errors are against the named reference; above 0 is too soft. What error\n"
                 "bars are is in [error-bars.md](error-bars.md), what the models are in [accuracy.md](accuracy.md).\n"]
     try:
-        text, good = materials()
+        kept = Kept(options.keep)
+        text, good = kept("materials", materials)
         sections.append(text)
         cases = [known("cantilever", "The paper's cantilever",
                        "2 x 0.75 x 0.5 m, Poisson's ratio 1/4, held at one end and pushed across at the other, small deflection. Mean deflection of the end\n"
                        "against Timoshenko's beam times its ratio to CalculiX's C3D20R, extrapolated.",
-                       "cells through 0.5 m", cantilever, (2, 4, 6, 8) if options.quick else (2, 4, 6, 8, 12, 16), options.output),
+                       "cells through 0.5 m", cantilever, (2, 4, 6, 8) if options.quick else (2, 4, 6, 8, 12, 16), options.output,
+                       kept),
                  known("tube", "A thick tube under pressure",
                        "Radii 20 and 40 mm, plane strain, a quarter of it; the lattice does not follow its walls. Mean displacement of the inner face against\n"
-                       "Lame's solution.", "cells through the wall", tube, (10, 20) if options.quick else (10, 20, 40), options.output)]
+                       "Lame's solution.", "cells through the wall", tube, (10, 20) if options.quick else (10, 20, 40), options.output,
+                       kept)]
         sections += [case[0] for case in cases]
         inside, count = sum(case[1] for case in cases), sum(case[2] for case in cases)
         sections.append(f"In {inside} of these {count} runs the true error lies within the bar.\n")
@@ -184,11 +216,13 @@ def main():
             tables = [("Models", "Tip of the same cantilever by model, elements on its faces ([accuracy.md](accuracy.md)).", ["accuracy_table"]),
                       ("Error bars", "Cases whose answer is known ([error-bars.md](error-bars.md)).", ["error_bars"]),
                       ("STEP parts", "Every closed STEP part with an error bar, nothing set by hand; processor seconds.",
-                       [HERE / "step_parts.py", "--parts", options.parts], [options.parts]),
+                       [HERE / "step_parts.py", "--parts", options.parts], [options.parts],
+                       lambda: command(HERE / "step_parts.py", "--list").split()),
                       ("Beside CalculiX", "The same parts by CalculiX and by Flexel; processor seconds, one thread each ([accuracy.md](accuracy.md)).",
-                       [HERE / "calculix.py", "--parts", options.parts], ["ccx", "gmsh"])]
+                       [HERE / "calculix.py", "--parts", options.parts], ["ccx", "gmsh"],
+                       lambda: command(HERE / "calculix.py", "--list").splitlines())]
             with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
-                sections += pool.map(lambda table: captured(*table), tables)
+                sections += pool.map(lambda table: captured(kept, *table), tables)
     except (OSError, RuntimeError, subprocess.SubprocessError) as error:
         print(f"verification.py: {error}", file=sys.stderr)
         return 1
