@@ -14,7 +14,7 @@
 #include "formats/error.h"
 #include "formats/program.h"
 #include "formats/units.h"
-#include "simulate/newton.h"
+#include "simulate/link_balance.h"
 
 namespace flexel {
 namespace {
@@ -104,7 +104,7 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   options.max_iterations = std::min(max_iterations, iterations_left());
   trial_ = state_;
   trial_.share = done_ + increment_ > 1 - 1e-9 ? 1 : done_ + increment_;
-  outcome_ = newton(mechanics_, trial_, options, [&](const std::string& note) {
+  outcome_ = newton_with_links(mechanics_, trial_, options, [&](const std::string& note) {
     stop_when_asked();
     progress_.update(done_, fmt::format("load {:.3g} %, {}", 100 * trial_.share, note));
   });

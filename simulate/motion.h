@@ -2,20 +2,23 @@
 // in a timed run to the factor of a course.
 #pragma once
 #include <Eigen/Geometry>
+#include <memory>
 
-#include "formats/vec.h"
+#include "simulate/rigid_link.h"
 
 namespace flexel {
 
 struct Motion {
-  Vec3 translation = Vec3::Zero();  // m
-  Vec3 axis = Vec3::UnitZ();        // unit
-  Vec3 through = Vec3::Zero();      // m, a point of the axis
-  double angle = 0;                 // rad, right-handed about axis
+  Vec3 translation = Vec3::Zero();            // m
+  Vec3 axis = Vec3::UnitZ();                  // unit
+  Vec3 through = Vec3::Zero();                // m, a point of the axis
+  double angle = 0;                           // rad, right-handed about axis
+  std::shared_ptr<RigidLink> link = nullptr;  // it leads, at any share, in place of all above
 
   // Displacement [m] of the material point that rested at `rest` when `share` of the motion is done. Affine
   // in `rest`.
   [[nodiscard]] Vec3 displacement(const Vec3& rest, double share) const {
+    if (link) return link->displacement(rest);
     Vec3 moved = share * translation;
     if (angle != 0) {
       const Vec3 arm = rest - through;

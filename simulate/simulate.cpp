@@ -93,7 +93,7 @@ double mass_of(const Setting& setting) {
 
 bool anything_acts(const Scene& scene) {
   bool acts = scene.get<Gravity>().acceleration.has_value() || !scene.get<Loads>().loads.empty();
-  for (const Tie& tie : scene.get<Ties>().ties) acts = acts || tie.is_move;
+  for (const Tie& tie : scene.get<Ties>().ties) acts = acts || tie.is_move || tie.link;
   return acts;
 }
 

@@ -31,6 +31,8 @@ struct AppliedLoad {  // of one [[load]], or of gravity
   std::string name;
   Vec3 force = Vec3::Zero();   // N, in total
   Vec3 moment = Vec3::Zero();  // N m, about the world's origin, where the body is now
+  // Of a rigid link: how far its point went [m] and the rotation vector that the link turned by [rad]
+  std::optional<Vec3> displacement = {}, rotation = {};
 };
 
 // Adds a force at a place to a resultant and its moment about the origin.

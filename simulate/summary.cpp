@@ -44,6 +44,14 @@ std::string resultant(const Vec3& force, const Vec3& moment) {
   return fmt::format("({:.3g}, {:.3g}, {:.3g}) N m", shown.x(), shown.y(), shown.z());
 }
 
+// "; its point moves by (...) and turns by (...) deg" of a rigid link, or nothing.
+std::string link_motion(const AppliedLoad& load) {
+  if (!load.displacement || !load.rotation) return "";
+  const Vec3 shown = 180 / M_PI * without_rounding(*load.rotation);
+  return fmt::format("; its point moves by {} and turns by ({:.3g}, {:.3g}, {:.3g}) deg",
+                     lengths(*load.displacement), shown.x(), shown.y(), shown.z());
+}
+
 // " +- 12 um", or nothing.
 std::string bar_of(const SimulateResult& result, ErrorBar::Of of, std::size_t probe = 0) {
   for (const ErrorBar& each : result.error_bars.bars)
@@ -147,9 +155,12 @@ std::string summary_json(const SimulateResult& result, const Body& body) {
     json["probes"].push_back(
         {{"name", probe.name}, {"at", vector(probe.where)}, {"displacement", vector(probe.displacement)}});
   json["loads"] = Json::array();
-  for (const AppliedLoad& load : result.loads)
+  for (const AppliedLoad& load : result.loads) {
     json["loads"].push_back(
         {{"name", load.name}, {"force", vector(load.force)}, {"moment", vector(load.moment)}});
+    if (load.displacement) json["loads"].back()["displacement"] = vector(*load.displacement);
+    if (load.rotation) json["loads"].back()["rotation"] = vector(*load.rotation);
+  }
   json["reactions"] = Json::array();
   for (const Reaction& reaction : result.reactions)
     json["reactions"].push_back(
@@ -218,7 +229,8 @@ std::vector<std::string> summary_lines(const SimulateResult& result) {
                                 lengths(result.stress->at), share));
   }
   for (const AppliedLoad& load : result.loads)
-    lines.push_back(fmt::format("load \"{}\": {}", load.name, resultant(load.force, load.moment)));
+    lines.push_back(
+        fmt::format("load \"{}\": {}{}", load.name, resultant(load.force, load.moment), link_motion(load)));
   for (const Reaction& reaction : result.reactions)
     lines.push_back(
         fmt::format("reaction of \"{}\": {}", reaction.name, resultant(reaction.force, reaction.moment)));

@@ -74,6 +74,10 @@ void scale_actions(Scene& scene, double factor) {
   for (Tie& tie : scene.get<Ties>().ties) {
     tie.motion.translation *= factor;
     tie.motion.angle *= factor;
+    if (tie.link) {
+      tie.link->force *= factor;
+      tie.link->torque *= factor;
+    }
   }
   if (auto& g = scene.get<Gravity>().acceleration) *g *= factor;
 }
@@ -88,6 +92,11 @@ void refuse_untranslatable(const Scene& scene, const Setting& setting) {
         "what needs it out, or use --scene with another file");
   if (!scene.events.empty())
     throw InputError(scene.name, "[[event]] has no translation: only equilibrium is exported");
+  for (const Tie& tie : scene.get<Ties>().ties)
+    if (tie.link)
+      throw InputError(tie.origin, fmt::format("load \"{}\": a rigid link has no translation; export it with "
+                                               "link = \"averaging\"",
+                                               tie.name));
   Effects::Parameters others = scene.effects;
   std::get<Gravity::Parameters>(others).acceleration.reset();
   std::get<Loads::Parameters>(others) = {};

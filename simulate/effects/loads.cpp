@@ -27,6 +27,11 @@ Load parse_load(TableReader& reader) {
   load.pressure = reader.quantity("pressure", Dimension::pressure);
   const std::optional<Vec3> pin = reader.vector("bearing", Dimension::force);
   load.course = parse_course(reader);
+  const std::string link = reader.text("link").value_or("averaging");
+  if (link != "averaging")
+    reader.fail(fmt::format("\"link\" = \"{}\": use \"averaging\" or \"rigid\"", link));
+  if (reader.find("link") && !load.force && !load.torque)
+    reader.fail("\"link\" goes with \"force\" or \"torque\"");
   reader.finish();
   if ((load.force || load.torque ? 1 : 0) + (load.pressure ? 1 : 0) + (pin ? 1 : 0) != 1)
     reader.fail(
@@ -109,6 +114,7 @@ void add_volume_load(const Load& load, const std::vector<std::uint32_t>& element
 void Loads::parse(TableReader& scene, Parameters& parameters) {
   for (const SceneValue* table : scene.tables("load")) {
     TableReader reader(*table, scene.file(), "[[load]]");
+    if (reader.text("link") == "rigid") continue;  // of Ties
     parameters.loads.push_back(parse_load(reader));
   }
 }

@@ -5,9 +5,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "formats/error.h"
+#include "simulate/effects/load_distribution.h"
 #include "simulate/surface_points.h"
 #include "simulate/time/layout.h"
 #include "simulate/time/stability.h"
@@ -19,8 +21,9 @@ bool share_an_axis(const Tie& a, const Tie& b) {
   return (a.axes[0] && b.axes[0]) || (a.axes[1] && b.axes[1]) || (a.axes[2] && b.axes[2]);
 }
 
-bool same_motion(const Motion& a, const Motion& b) {
-  return a.translation == b.translation && a.angle == b.angle &&
+bool same_motion(const Tie& one, const Tie& other) {
+  const Motion &a = one.motion, &b = other.motion;
+  return !one.link && !other.link && a.translation == b.translation && a.angle == b.angle &&
          (a.angle == 0 || (a.axis == b.axis && a.through == b.through));
 }
 
@@ -35,7 +38,7 @@ bool intersect(const std::vector<std::uint32_t>& a, const std::vector<std::uint3
 void refuse_conflicts(const std::vector<Tie>& ties, const std::vector<Selected>& selected) {
   for (std::size_t i = 0; i < ties.size(); ++i)
     for (std::size_t j = 0; j < i; ++j) {
-      if (!share_an_axis(ties[i], ties[j]) || same_motion(ties[i].motion, ties[j].motion)) continue;
+      if (!share_an_axis(ties[i], ties[j]) || same_motion(ties[i], ties[j])) continue;
       if (intersect(selected[i].polygons, selected[j].polygons) ||
           intersect(selected[i].elements, selected[j].elements))
         throw InputError(ties[i].origin,
@@ -67,13 +70,65 @@ std::optional<Ties> Ties::make(const Parameters& parameters, const Setting& sett
   for (const Tie& tie : made.ties_) selected.push_back(resolve(tie.where, setting.body));
   refuse_conflicts(made.ties_, selected);
   for (std::uint32_t t = 0; t < made.ties_.size(); ++t) {
+    if (made.ties_[t].link) made.make_link(made.ties_[t], selected[t], setting);
     if (!selected[t].polygons.empty()) made.add_surface_tie(t, selected[t].polygons, setting);
-    std::vector<std::uint32_t>& held = made.held_elements_[t];
-    held.insert(held.end(), selected[t].elements.begin(), selected[t].elements.end());
-    std::sort(held.begin(), held.end());
-    held.erase(std::unique(held.begin(), held.end()), held.end());
+    made.hold(t, selected[t].elements);
   }
   return made;
+}
+
+// Adds to the elements that a tie is followed by. A link leaves those to the others that they hold already.
+void Ties::hold(std::uint32_t tie, const std::vector<std::uint32_t>& elements) {
+  std::vector<std::uint32_t>& held = held_elements_[tie];
+  held.insert(held.end(), elements.begin(), elements.end());
+  std::sort(held.begin(), held.end());
+  held.erase(std::unique(held.begin(), held.end()), held.end());
+  if (!ties_[tie].link) return;
+  for (std::size_t other = 0; other < tie; ++other)
+    std::erase_if(held, [&](std::uint32_t e) {
+      return std::binary_search(held_elements_[other].begin(), held_elements_[other].end(), e);
+    });
+}
+
+// The middle and the extent of what the link holds, from its points of the surface or its elements' matter.
+void Ties::make_link(Tie& tie, const Selected& selected, const Setting& setting) const {
+  if (setting.duration)
+    throw InputError(tie.origin,
+                     fmt::format("load \"{}\": a rigid link needs equilibrium without contact; in time make "
+                                 "the loaded matter a part with rigid = true, or use link = \"averaging\"",
+                                 tie.name));
+  std::vector<LoadedPoint> points;
+  if (!selected.polygons.empty())
+    for (const SurfacePoint& point : surface_points(setting, selected.polygons))
+      points.push_back({point.position, point.area_vector.norm()});
+  if (!selected.elements.empty()) {
+    const std::vector<double> volume = element_volumes(setting);
+    for (const std::uint32_t e : selected.elements)
+      points.push_back({setting.body.rest[e], std::cbrt(volume[e] * volume[e])});
+  }
+  double total = 0, squared = 0;
+  const auto link = std::make_shared<RigidLink>();
+  for (const LoadedPoint& point : points) {
+    total += point.weight;
+    link->middle += point.weight * point.position;
+  }
+  if (!(total > 0))
+    throw InputError(tie.origin, fmt::format("load \"{}\": no matter lies under what is selected; use a "
+                                             "smaller spacing",
+                                             tie.name));
+  link->middle /= total;
+  for (const LoadedPoint& point : points)
+    squared += point.weight * (point.position - link->middle).squaredNorm();
+  link->reach = std::sqrt(squared / total);
+  if (!(link->reach > 1e-9 * bounding_box(setting.body.rest).diagonal()))
+    throw InputError(tie.origin,
+                     fmt::format("load \"{}\": a rigid link needs more than one element", tie.name));
+  link->at = tie.link->at.value_or(link->middle);
+  link->force = tie.link->force;
+  link->torque = tie.link->torque;
+  link->name = tie.name;
+  link->origin = tie.origin;
+  tie.motion.link = link;
 }
 
 void Ties::add_surface_tie(std::uint32_t tie, const std::vector<std::uint32_t>& polygons,
@@ -87,7 +142,7 @@ void Ties::add_surface_tie(std::uint32_t tie, const std::vector<std::uint32_t>& 
   std::map<std::array<std::uint32_t, 8>, TiedElements> by_elements;
   const std::size_t first = tied_.size();
   for (const SurfacePoint& point : points) {
-    if (setting.duration && lies_on_face(point.at)) {
+    if ((setting.duration || ties_[tie].link) && lies_on_face(point.at)) {
       for (std::size_t a = 0; a < point.at.count; ++a)
         if (point.at.weights[a] > kOffFace) held_elements_[tie].push_back(point.at.elements[a]);
       continue;
@@ -141,7 +196,11 @@ double Ties::factor(const Tie& tie, const State& state) const {
 
 std::string Ties::why() const {
   const auto moves = std::count_if(ties_.begin(), ties_.end(), [](const Tie& tie) { return tie.is_move; });
-  return fmt::format("{} [[fix]], {} [[move]]", static_cast<std::ptrdiff_t>(ties_.size()) - moves, moves);
+  const auto links =
+      std::count_if(ties_.begin(), ties_.end(), [](const Tie& tie) { return tie.link.has_value(); });
+  const std::string rigid = links > 0 ? fmt::format(", {} rigid link(s)", links) : "";
+  return fmt::format("{} [[fix]], {} [[move]]{}", static_cast<std::ptrdiff_t>(ties_.size()) - moves - links,
+                     moves, rigid);
 }
 
 // u_a - d(X_a) on the tied axes, 0 on the others. (count x 3) m
@@ -230,7 +289,18 @@ void Ties::report(const State& state, const std::vector<Vec3>& unbalanced, Simul
       }
       add(t, held, e);
     }
-  result.reactions.insert(result.reactions.end(), reaction.begin(), reaction.end());
+  for (std::size_t t = 0; t < ties_.size(); ++t) {
+    if (!ties_[t].link) {
+      result.reactions.push_back(reaction[t]);
+      continue;
+    }
+    RigidLink& link = *ties_[t].motion.link;
+    link.pull = reaction[t].force;
+    link.pull_moment = reaction[t].moment - (link.middle + link.translation).cross(link.pull);
+    const Vec3 moved = link.displacement(link.at), force = state.share * link.force;
+    result.loads.push_back(
+        {ties_[t].name, force, state.share * link.torque + (link.at + moved).cross(force), moved, link.turn});
+  }
 }
 
 }  // namespace flexel

@@ -9,6 +9,10 @@
 // number an element that carries by itself, which is led to d(X) of its own place). Element
 // selections (box, sphere, half-space, part) are followed exactly and eliminated.
 //
+// A rigid link ([[load]] with link = "rigid") is a tie too, to a motion that follows from its force and
+// couple (simulate/rigid_link.h). Its elements on a cell face that the surface lies on are followed exactly,
+// as in a timed run.
+//
 // In a timed run so stiff a penalty would cut the step by 17. There the elements of a cell face that the
 // surface lies on are followed exactly, and where the surface cuts through cells k_q is lowered, cell by
 // cell, until its frequency is that of the cells: the step is cut by at most sqrt(2).
@@ -19,6 +23,12 @@
 
 namespace flexel {
 
+// What drives a rigid link.
+struct LinkLoad {
+  Vec3 force = Vec3::Zero(), torque = Vec3::Zero();  // N, N m
+  std::optional<Vec3> at = {};                       // m, rest: where the force acts; nothing: the middle
+};
+
 struct Tie {
   Selection where;
   std::array<bool, 3> axes{true, true, true};  // world axes that are held or led; the others are free
@@ -27,6 +37,7 @@ struct Tie {
   std::string name;
   std::string origin;  // "beam.toml:12"
   bool is_move = false;
+  std::optional<LinkLoad> link = {};  // a rigid link: its motion is found, all axes are led
 };
 
 class Ties {
@@ -61,6 +72,8 @@ class Ties {
   [[nodiscard]] Displacements violation(const TiedElements& tied, const State& state) const;
   [[nodiscard]] double factor(const Tie& tie, const State& state) const;
   void soften(std::size_t first, const Setting& setting);
+  void make_link(Tie& tie, const Selected& selected, const Setting& setting) const;
+  void hold(std::uint32_t tie, const std::vector<std::uint32_t>& elements);
   void add_surface_tie(std::uint32_t tie, const std::vector<std::uint32_t>& polygons, const Setting& setting);
 
   const Body* body_ = nullptr;

@@ -1,4 +1,4 @@
-// [[fix]] and [[move]] of a scene.
+// [[fix]], [[move]], and [[load]] by a rigid link, of a scene.
 #include <fmt/format.h>
 
 #include "simulate/effects/ties.h"
@@ -52,6 +52,29 @@ void parse_rotation(TableReader& reader, Tie& tie) {
     reader.fail("[[move]] has a rotation and a free axis; a rotation leads all three");
 }
 
+Tie parse_link(TableReader& reader) {
+  Tie tie;
+  tie.origin = reader.place();
+  tie.where = require_where(reader);
+  tie.name = reader.text("name").value_or(describe(tie.where));
+  (void)reader.text("link");
+  const std::optional<Vec3> force = reader.vector("force", Dimension::force);
+  const std::optional<Vec3> torque = reader.vector("torque", Dimension::torque);
+  tie.link = LinkLoad{force.value_or(Vec3::Zero()), torque.value_or(Vec3::Zero()),
+                      reader.vector("at", Dimension::length)};
+  tie.course = parse_course(reader);
+  for (const char* other : {"pressure", "bearing"})
+    if (reader.find(other))
+      reader.fail(fmt::format("a rigid link takes \"force\" and \"torque\", not \"{}\"", other));
+  reader.finish();
+  if (!force && !torque)
+    reader.fail(
+        "[[load]] with a rigid link needs \"force\" or \"torque\", for example [\"0 N\", \"0 N\", \"-100 "
+        "N\"]");
+  if (tie.link->at && !force) reader.fail("\"at\" says where a \"force\" acts; give one");
+  return tie;
+}
+
 }  // namespace
 
 void Ties::parse(TableReader& scene, Parameters& parameters) {
@@ -81,6 +104,10 @@ void Ties::parse(TableReader& scene, Parameters& parameters) {
           "[[move]] needs \"displacement\" (for example [\"1 mm\", \"0 mm\", \"0 mm\"]) or \"rotation\"");
     if (!tie.axes[0] && !tie.axes[1] && !tie.axes[2]) reader.fail("[[move]] leaves every axis free");
     parameters.ties.push_back(tie);
+  }
+  for (const SceneValue* table : scene.tables("load")) {
+    TableReader reader(*table, scene.file(), "[[load]]");
+    if (reader.text("link") == "rigid") parameters.ties.push_back(parse_link(reader));
   }
 }
 

@@ -1,0 +1,171 @@
+// Loads through a rigid link: the loaded face moves as one rigid body, in balance with its force and torque.
+#include "simulate/rigid_link.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "formats/error.h"
+#include "simulate/scene.h"
+#include "simulate/simulate.h"
+#include "tests/simulate/box_body.h"
+
+namespace flexel {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr const char* kNoContraction =
+    "material = \"it\"\n[materials.it]\nyoung = \"210 GPa\"\npoisson = 0\ndensity = \"7850 kg/m3\"\n";
+constexpr const char* kHeld =
+    "[[fix]]\nwhere = { half_space = { point = [0, 0, 0], normal = [-1, 0, 0] } }\n";
+
+SimulateResult solve(Body& body, const std::string& scene) {
+  Progress progress("test", Progress::Mode::quiet);
+  SimulateOptions how;
+  how.estimate = false;
+  return simulate(body, parse_scene(scene, "s.toml"), how, progress);
+}
+
+std::string link(const std::string& rest, const std::string& kind = "rigid") {
+  return "[[load]]\nwhere = \"box/x1\"\nlink = \"" + kind + "\"\n" + rest + "\n";
+}
+
+Mat3 turned_by(const Vec3& rotation) {
+  const double angle = rotation.norm();
+  return angle > 0 ? Eigen::AngleAxisd(angle, rotation / angle).toRotationMatrix() : Mat3(Mat3::Identity());
+}
+
+// Largest distance [m] of the elements at x = `x` from where the link takes them.
+double out_of_place(const Body& body, const AppliedLoad& load, const Vec3& at, double x) {
+  const Mat3 turned = turned_by(*load.rotation);
+  double most = 0;
+  for (std::size_t e = 0; e < body.element_count(); ++e)
+    if (std::abs(body.rest[e].x() - x) < 1e-9)
+      most =
+          std::max(most, (body.position[e] - at - *load.displacement - turned * (body.rest[e] - at)).norm());
+  return most;
+}
+
+// Without contraction across, a cantilever under an end moment is bent evenly: theta = M L / (E I), and the
+// end goes theta L / 2.
+TEST(RigidLink, EndMomentBendsACantilever) {
+  Body body = testing::box_body({.cells = {20, 4, 4}, .spacing = Vec3::Constant(0.005)});
+  const SimulateResult result =
+      solve(body, std::string(kNoContraction) + kHeld + link("torque = [0, \"10 N m\", 0]"));
+  const double theta = 10 * 0.1 / (210e9 * std::pow(0.02, 4) / 12);
+  const AppliedLoad& load = result.loads[0];
+  EXPECT_LT((*load.rotation - Vec3(0, theta, 0)).norm(), 2e-3 * theta);
+  EXPECT_LT((*load.displacement - Vec3(0, 0, -theta * 0.05)).norm(), 2e-3 * theta * 0.05);
+  EXPECT_LT(out_of_place(body, load, Vec3(0.1, 0.01, 0.01), 0.1), 1e-6 * result.largest_displacement);
+  EXPECT_LE(result.newton_iterations, 6);  // the links' slope is that of the body
+}
+
+TEST(RigidLink, ARemoteForceIsAForceAndItsMoment) {
+  testing::BoxOptions options{.cells = {6, 3, 3}, .spacing = Vec3::Constant(0.005)};
+  Body remote = testing::box_body(options), near = testing::box_body(options);
+  const std::string scene = std::string("material = \"steel\"\n") + kHeld;
+  const SimulateResult far =
+      solve(remote, scene + link("force = [0, 0, \"20 N\"]\nat = [\"130 mm\", \"7.5 mm\", \"7.5 mm\"]"));
+  const SimulateResult same =
+      solve(near, scene + link("force = [0, 0, \"20 N\"]\ntorque = [0, \"-2 N m\", 0]"));
+  for (std::size_t e = 0; e < near.element_count(); ++e)
+    EXPECT_LT((remote.position[e] - near.position[e]).norm(), 1e-6 * far.largest_displacement);
+  // The remote point goes further: with the link.
+  EXPECT_LT((*far.loads[0].displacement - *same.loads[0].displacement -
+             (turned_by(*same.loads[0].rotation) - Mat3::Identity()) * Vec3(0.1, 0, 0))
+                .norm(),
+            1e-5 * far.loads[0].displacement->norm());
+}
+
+TEST(RigidLink, IsStifferThanAnAveragingLink) {
+  const std::string scene = std::string("material = \"steel\"\n") + kHeld;
+  const std::string load =
+      "force = [0, \"20 N\", 0]\nat = [\"40 mm\", 0, \"10 mm\"]\ntorque = [\"1 N m\", 0, 0]";
+  double energy[2];
+  for (const bool rigid : {false, true}) {
+    Body body = testing::box_body({.cells = {4, 4, 4}, .spacing = Vec3::Constant(0.005)});
+    energy[rigid] = solve(body, scene + link(load, rigid ? "rigid" : "averaging")).elastic_energy;
+  }
+  EXPECT_LT(energy[1], 0.99 * energy[0]);
+  EXPECT_GT(energy[1], 0.5 * energy[0]);
+}
+
+// What a force moves about an axis, a torque about it moves along the force (Betti 1872).
+TEST(RigidLink, AnswersAreReciprocal) {
+  testing::BoxOptions options{.cells = {8, 3, 2}, .spacing = Vec3::Constant(0.005)};
+  const std::string scene = std::string("material = \"steel\"\n") + kHeld;
+  Body pushed = testing::box_body(options), turned = testing::box_body(options);
+  const std::string at = "at = [\"60 mm\", \"30 mm\", \"-10 mm\"]\n";
+  const AppliedLoad push = solve(pushed, scene + link(at + "force = [0, 0, \"1 N\"]")).loads[0];
+  const AppliedLoad turn =
+      solve(turned, scene + link(at + "force = [0, 0, 0]\ntorque = [0, \"1 N m\", 0]")).loads[0];
+  EXPECT_NEAR(turn.displacement->z() / push.rotation->y(), 1, 1e-4);
+}
+
+// Far out: half the way to a quarter of a circle, exact for an inextensible bar.
+TEST(RigidLink, LargeRotation) {
+  Body body = testing::box_body({.cells = {40, 2, 2}, .spacing = Vec3::Constant(0.0025)});
+  const double moment = 210e9 * std::pow(0.005, 4) / 12 * (M_PI / 2) / 0.1;
+  const SimulateResult result =
+      solve(body, std::string(kNoContraction) + kHeld +
+                      link("torque = [0, \"" + std::to_string(moment) + " N m\", 0]"));
+  const AppliedLoad& load = result.loads[0];
+  EXPECT_NEAR(load.rotation->y(), M_PI / 2, 0.02);
+  const double way = 2 * 0.1 / M_PI;
+  EXPECT_LT((*load.displacement - Vec3(way - 0.1, 0, -way)).norm(), 0.01 * 0.1);
+  EXPECT_LT(out_of_place(body, load, Vec3(0.1, 0.0025, 0.0025), 0.1), 1e-6 * result.largest_displacement);
+}
+
+// A turned bar with two links that share an edge, bent far: loads and reactions balance where it is.
+TEST(RigidLink, ReactionsBalance) {
+  testing::BoxOptions options{.cells = {8, 3, 3}, .spacing = Vec3::Constant(0.005)};
+  options.axes = Eigen::AngleAxisd(0.5, Vec3(1, 2, 0.5).normalized()).toRotationMatrix();
+  Body body = testing::box_body(options);
+  const SimulateResult result = solve(
+      body,
+      "material = \"rubber\"\n[[fix]]\nwhere = \"box/x0\"\n" +
+          link("force = [\"1 N\", \"-0.5 N\", \"0.5 N\"]\nat = [\"60 mm\", \"30 mm\", \"-20 mm\"]\n"
+               "torque = [0, \"0.02 N m\", 0]") +
+          "[[load]]\nwhere = { sphere = { centre = [0, 0, 0], radius = \"12 mm\" } }\nlink = \"rigid\"\n"
+          "torque = [\"0.01 N m\", 0, 0]\n[gravity]\nacceleration = [0, 0, \"-9.81 m/s2\"]\n");
+  double force = 0, moment = 0;
+  for (const Reaction& reaction : result.reactions) {
+    force += reaction.force.norm();
+    moment += reaction.moment.norm();
+  }
+  EXPECT_GT(result.largest_displacement, 1e-3);
+  EXPECT_LT(result.imbalance.norm(), 1e-6 * force);
+  EXPECT_LT(result.moment_imbalance.norm(), 1e-6 * moment);
+}
+
+TEST(RigidLink, RefusesWhatDoesNotFit) {
+  const auto message = [](const std::string& text) -> std::string {
+    try {
+      Body body = testing::box_body();
+      (void)solve(body, "material = \"steel\"\n" + text);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  const std::string fix = "[[fix]]\nwhere = \"box/x0\"\n";
+  EXPECT_THAT(message(link("force = [\"1 N\", 0, 0]")), HasSubstr("free to"));
+  EXPECT_THAT(message(fix + link("force = [\"1 N\", 0, 0]") + "[run]\ntime = \"1 ms\"\n"),
+              HasSubstr("needs equilibrium"));
+  EXPECT_THAT(message("[[fix]]\nwhere = \"box/x1\"\n" + link("force = [\"1 N\", 0, 0]")),
+              HasSubstr("lead the same place"));
+  EXPECT_THAT(message(fix + link("pressure = \"1 Pa\"")), HasSubstr("not \"pressure\""));
+  EXPECT_THAT(message(fix + link("at = [0, 0, 0]\ntorque = [\"1 N m\", 0, 0]")), HasSubstr("\"at\""));
+  EXPECT_THAT(message(fix + link("force = [\"1 N\", 0, 0]", "stiff")),
+              HasSubstr("\"averaging\" or \"rigid\""));
+  EXPECT_THAT(
+      message(fix + "[[load]]\nwhere = { sphere = { centre = [\"2 m\", 0, 0], radius = \"10 mm\" } }\n"
+                    "link = \"rigid\"\nforce = [\"1 N\", 0, 0]\n"),
+      HasSubstr("more than one element"));
+}
+
+}  // namespace
+}  // namespace flexel
