@@ -15,6 +15,7 @@
 #include <algorithm>
 
 #include "formats/error.h"
+#include "formats/parallel.h"
 
 namespace flexel {
 namespace {
@@ -24,9 +25,10 @@ constexpr double kLooser = 10;        // tolerance of the links over that of the
 constexpr double kServes = 0.1;       // a step that leaves more than this of b: take the slope anew
 constexpr double kAstray = 4;         // ... and more than this: give up
 constexpr double kDifference = 1e-7;  // of the reach
-constexpr double kResponse = 1e-10;   // relative residual of the linear solutions
+constexpr double kResponse = 1e-8;    // relative residual of the linear solutions
 constexpr int kMaxCgIterations = 3000;
-constexpr double kFree = 1e-8;  // of the stiffest motion: nothing resists
+// Of the elements' mean stiffness: nothing resists. A cantilever a thousand times as long as thick has that.
+constexpr double kFree = 1e-9;
 
 using Vector = Eigen::VectorXd;
 
@@ -57,6 +59,7 @@ class Balance {
   std::vector<Vec3> free_forces(const State& state);
   Eigen::MatrixXd slope();
   bool add_column(const Preconditioner& preconditioner, Eigen::Index j, Eigen::MatrixXd& slope);
+  void correct(Eigen::MatrixXd& slope) const;
   void refuse_free(const Eigen::MatrixXd& slope) const;
   bool find();
 
@@ -67,6 +70,9 @@ class Balance {
   std::vector<std::shared_ptr<RigidLink>> links_;
   NewtonOutcome outcome_;
   double scale_ = 0;  // N: loads and reactions
+  double stiff_ = 0;  // N/m, mean of the tangent's diagonal
+  // (unknowns) answers of the elements to a unit of each [m/m], and what their linear solutions left [N/m]
+  std::vector<std::vector<Vec3>> response_, left_over_;
 };
 
 void Balance::move(const Vector& step) {
@@ -137,7 +143,23 @@ bool Balance::add_column(const Preconditioner& preconditioner, Eigen::Index j, E
   const Vector behind = lacking(led(response, -step));
   move(along);
   slope.col(j) = (ahead - behind) / (2 * step);
+  std::vector<Vec3> resisted(pushed.size());
+  multiply(mechanics_.stiffness(), response, resisted);
+  for (std::size_t e = 0; e < pushed.size(); ++e) pushed[e] -= resisted[e];
+  response_.push_back(std::move(response));
+  left_over_.push_back(std::move(pushed));
   return true;
+}
+
+// Makes the slope the energy's second derivative along the answers: what the linear solutions left over
+// enters squared then, and a motion that nothing resists stands out.
+void Balance::correct(Eigen::MatrixXd& slope) const {
+  for (Eigen::Index i = 0; i < unknowns(); ++i)
+    for (Eigen::Index j = 0; j < unknowns(); ++j) {
+      const std::vector<Vec3>& x = response_[static_cast<std::size_t>(i)];
+      const std::vector<Vec3>& r = left_over_[static_cast<std::size_t>(j)];
+      slope(i, j) += parallel_sum<double>(x.size(), [&](std::size_t e) { return x[e].dot(r[e]); });
+    }
 }
 
 // db/dq [N/m], the free elements following. A tangent with negative curvature is taken with the cells' moduli
@@ -150,16 +172,27 @@ Eigen::MatrixXd Balance::slope() {
     mechanics_.eliminate_prescribed();
     const auto preconditioner =
         aggregation_multigrid(mechanics_.stiffness(), node_geometry(mechanics_.body(), state_));
+    const BlockMatrix& matrix = mechanics_.stiffness();
+    stiff_ = parallel_sum<double>(
+                 matrix.rows(),
+                 [&](std::size_t e) { return matrix.values[diagonal_position(matrix, e)].trace(); }) /
+             (3.0 * static_cast<double>(matrix.rows()));
+    response_.clear();
+    left_over_.clear();
     bool good = true;
     for (Eigen::Index j = 0; good && j < unknowns(); ++j) good = add_column(*preconditioner, j, slope);
-    if (good) break;
+    if (!good) continue;
+    correct(slope);
+    break;
   }
+  response_.clear();
+  left_over_.clear();
   return slope;
 }
 
 void Balance::refuse_free(const Eigen::MatrixXd& slope) const {
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(slope, Eigen::ComputeFullV);
-  if (svd.singularValues().minCoeff() > kFree * svd.singularValues().maxCoeff()) return;
+  if (svd.singularValues().minCoeff() > kFree * stiff_) return;
   const Vector freest = svd.matrixV().col(unknowns() - 1);
   Eigen::Index most = 0;
   freest.cwiseAbs().maxCoeff(&most);

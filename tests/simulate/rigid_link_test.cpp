@@ -141,6 +141,26 @@ TEST(RigidLink, ReactionsBalance) {
   EXPECT_LT(result.moment_imbalance.norm(), 1e-6 * moment);
 }
 
+// Nothing holds the bar but the link, of a lattice that fits it and of one that is turned against its
+// surface.
+TEST(RigidLink, RefusesWhatNothingHolds) {
+  for (const double turn : {0.0, 0.3}) {
+    testing::BoxOptions options{.cells = {8, 3, 3}, .spacing = Vec3::Constant(0.005)};
+    Body body = testing::box_body(options);
+    // the surface alone, about the bar's middle: its points lie inside cells then
+    for (Vec3& vertex : body.surface.vertices)
+      vertex = Eigen::AngleAxisd(turn, Vec3::UnitX()) * (vertex - Vec3(0.02, 0.0075, 0.0075)) *
+                   (turn > 0 ? 0.9 : 1) +
+               Vec3(0.02, 0.0075, 0.0075);
+    try {
+      (void)solve(body, "material = \"steel\"\n" + link("torque = [0, \"1 N m\", 0]"));
+      ADD_FAILURE() << "accepted, turned by " << turn;
+    } catch (const InputError& error) {
+      EXPECT_THAT(error.what(), HasSubstr("is free to")) << turn;
+    }
+  }
+}
+
 TEST(RigidLink, RefusesWhatDoesNotFit) {
   const auto message = [](const std::string& text) -> std::string {
     try {
