@@ -2,11 +2,13 @@
 #include "flexel/accuracy.h"
 
 #include <fmt/format.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "flexel/study/predict.h"
 #include "formats/error.h"
 #include "formats/units.h"
 #include "simulate/estimate.h"
@@ -22,7 +24,6 @@ constexpr double kLeastStep = 1.25, kMostStep = 1.7;  // between the spacings of
 constexpr int kFinerRuns = 4, kFailures = 3;
 constexpr double kUsualLimit = 600;   // s, without --within
 constexpr double kMemoryShare = 0.8;  // of what is free
-constexpr double kTimePower = 1.1;    // of the cells: multigrid, with what caches lose
 constexpr double kTimeMargin = 0.85;  // of the time left: predictions are good to about that
 constexpr double kSmall = 1e-3;       // of the largest displacement: a probe that hardly moves
 
@@ -125,6 +126,17 @@ std::optional<Judged> judge(const std::vector<SolvedRun>& runs, const Quantities
   return worst;
 }
 
+// What the process has needed at most so far [bytes].
+double peak_memory() {
+  rusage usage = {};
+  getrusage(RUSAGE_SELF, &usage);
+  return 1024.0 * static_cast<double>(usage.ru_maxrss);
+}
+
+nlohmann::ordered_json json_of(const std::optional<double>& value) {
+  return value ? nlohmann::ordered_json(*value) : nullptr;
+}
+
 class Search {
  public:
   Search(const AccuracyGoal& goal, const SolveAt& solve, AccuracyReport& report, Progress& progress)
@@ -165,29 +177,47 @@ class Search {
 
   void fail(double& size, const std::string& why, int failures) {
     if (size == 0 || failures >= kFailures) throw;
-    report_.runs.push_back({size, 0, 0, std::nullopt, "", why});
+    TriedRun failed;
+    failed.size = size;
+    failed.failure = why;
+    report_.runs.push_back(failed);
     size = round3(size / 2);
   }
 
   // False where the size cannot be solved.
   bool run(double size) {
     try {
+      const study::Prediction told = prediction(size);
       keep(solve_(size));
+      report_.runs.back().predicted_seconds = told.seconds;
+      report_.runs.back().predicted_memory = told.bytes;
       return true;
-    } catch (const DivergedError& error) {
+    } catch (const DivergedError&) {
       report_.stopped = fmt::format("the run at {} diverged", size_text(size));
+    } catch (const InputError& error) {
+      report_.stopped = fmt::format("the run at {} cannot be made: {}", size_text(size), error.what());
     }
     return false;
   }
 
   void keep(SolvedRun solved) {
+    study::RunResult observed;
+    observed.stages = {{"voxelize", solved.voxelize_seconds},
+                       {"solve", solved.simulated.seconds},
+                       {"error bars", solved.simulated.error_bars.seconds},
+                       {"map", solved.map_seconds}};
+    observed.program_memory[0] = peak_memory();
+    predictor_.add(study::kOneProcess, {static_cast<double>(solved.voxels.body.cell_count()), 1}, observed);
     const double total = solved.voxelize_seconds + solved.simulated.seconds +
                          solved.simulated.error_bars.seconds + solved.map_seconds;
-    seconds_ = total;
     runs_.push_back(std::move(solved));
     if (runs_.size() > 3) runs_.erase(runs_.begin());
     judged_ = judge(runs_, quantities_);
-    TriedRun tried{runs_.back().size, runs_.back().voxels.body.cell_count(), total, std::nullopt, "", ""};
+    TriedRun tried;
+    tried.size = runs_.back().size;
+    tried.cells = runs_.back().voxels.body.cell_count();
+    tried.seconds = total;
+    tried.memory = observed.program_memory[0];
     if (judged_) {
       tried.error = judged_->error;
       tried.of = judged_->of;
@@ -202,16 +232,18 @@ class Search {
     const SolvedRun& last = runs_.back();
     return static_cast<double>(last.voxels.body.cell_count()) * std::pow(last.size / size, 3);
   }
-  [[nodiscard]] double seconds_at(double size) const {
-    const double ratio = std::pow(runs_.back().size / size, 3);
-    return seconds_ * std::pow(ratio, kTimePower);
+  // As the study does (study/predict.h), from the runs that were made.
+  [[nodiscard]] study::Prediction prediction(double size) const {
+    return predictor_.predict(study::kOneProcess, {cells_at(size), 1});
   }
   [[nodiscard]] double seconds_left() const {
     return goal_.within.value_or(kUsualLimit) - seconds_since(goal_.began);
   }
+  // What the runs that are kept hold already is part of the prediction.
+  [[nodiscard]] double memory_limit() const { return kMemoryShare * (available_memory() + peak_memory()); }
   [[nodiscard]] bool affordable(double size) const {
-    return seconds_at(size) <= kTimeMargin * seconds_left() &&
-           simulation_memory(cells_at(size), Placement::corner) <= kMemoryShare * available_memory();
+    const study::Prediction told = prediction(size);
+    return told.seconds <= kTimeMargin * seconds_left() && told.bytes <= memory_limit();
   }
 
   // The finest size between two that is affordable; nothing where the coarser one is not.
@@ -239,11 +271,11 @@ class Search {
     const std::optional<double> size = finest(wanted, last / kLeastStep);
     if (!size && goal_.error) {
       const double least = last / kLeastStep;
-      const double bytes = simulation_memory(cells_at(least), Placement::corner);
-      report_.stopped = bytes > kMemoryShare * available_memory()
-                            ? fmt::format("the next run would need {} of memory", human_bytes(bytes))
+      const study::Prediction told = prediction(least);
+      report_.stopped = told.bytes > memory_limit()
+                            ? fmt::format("the next run would need {} of memory", human_bytes(told.bytes))
                             : fmt::format("the next run would take about {:.2g} s, of {:.2g} s that are left",
-                                          seconds_at(least), std::max(0.0, seconds_left()));
+                                          told.seconds, std::max(0.0, seconds_left()));
     }
     chosen_ = !goal_.error;
     return size;
@@ -256,7 +288,7 @@ class Search {
   AccuracyReport& report_;
   Progress& progress_;
   Quantities quantities_;
-  double seconds_ = 0;           // of the last run
+  study::Predictor predictor_;
   std::vector<SolvedRun> runs_;  // the last three that went well
   std::optional<Judged> judged_;
   bool chosen_ = false;  // the one run that --within asks for was made
@@ -288,11 +320,11 @@ std::string AccuracyReport::sentence() const {
 
 std::string AccuracyReport::json() const {
   nlohmann::ordered_json json;
-  json["asked"] = goal.error ? nlohmann::ordered_json(*goal.error) : nullptr;
-  json["within"] = goal.within ? nlohmann::ordered_json(*goal.within) : nullptr;
+  json["asked"] = json_of(goal.error);
+  json["within"] = json_of(goal.within);
   json["size"] = runs.back().size;
   json["method"] = method;
-  json["reached"] = runs.back().error ? nlohmann::ordered_json(*runs.back().error) : nullptr;
+  json["reached"] = json_of(runs.back().error);
   json["of"] = runs.back().of;
   json["met"] = met();
   json["seconds"] = seconds;
@@ -302,7 +334,10 @@ std::string AccuracyReport::json() const {
     json["runs"].push_back({{"size", each.size},
                             {"cells", each.cells},
                             {"seconds", each.seconds},
-                            {"error", each.error ? nlohmann::ordered_json(*each.error) : nullptr},
+                            {"memory", each.memory},
+                            {"predicted_seconds", json_of(each.predicted_seconds)},
+                            {"predicted_memory", json_of(each.predicted_memory)},
+                            {"error", json_of(each.error)},
                             {"failure", each.failure}});
   json["sentence"] = sentence();
   return json.dump();

@@ -44,9 +44,11 @@ struct TriedRun {
   double size = 0;  // m
   std::size_t cells = 0;
   double seconds = 0;
-  std::optional<double> error;  // share
-  std::string of;               // the quantity that is worst: "probe tip", "largest displacement"
-  std::string failure;          // why there is nothing at this size
+  double memory = 0;                                          // bytes, of the process until its end
+  std::optional<double> predicted_seconds, predicted_memory;  // before it; nothing for the first
+  std::optional<double> error;                                // share
+  std::string of;       // the quantity that is worst: "probe tip", "largest displacement"
+  std::string failure;  // why there is nothing at this size
 };
 
 struct AccuracyReport {

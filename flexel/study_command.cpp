@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 
 struct Arguments {
   std::vector<std::string> parts, references;
-  std::string scene, budget = "2 min", output, material, unit, heal, edge;
+  std::string scene, budget = "2 min", output, against, material, unit, heal, edge;
   bool quiet = false;
 };
 
@@ -45,6 +45,9 @@ void declare(CLI::App& app, Arguments& a) {
                  "(JSON) of another run of flexel-simulate; without it the finest runs are extrapolated")
       ->type_name("NAME=VALUE|FILE")
       ->allow_extra_args(false);
+  app.add_option("--against", a.against,
+                 "calculix: run CalculiX (ccx) on the same scene too, on meshes by gmsh, and draw it beside")
+      ->type_name("PROGRAM");
   app.add_option("--material", a.material, "What the parts are made of, where the scene does not say")
       ->type_name("NAME");
   app.add_option("--unit", a.unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
@@ -118,6 +121,10 @@ study::Assignment assignment(const Arguments& a) {
   pass("--unit", a.unit);
   pass("--heal", a.heal);
   pass("--edge", a.edge);
+  if (!a.against.empty() && a.against != "calculix")
+    throw InputError(fmt::format("--against: no \"{}\"{}; known: calculix", a.against,
+                                 did_you_mean(a.against, {"calculix"})));
+  result.against_calculix = !a.against.empty();
   result.budget = parse_timeout(a.budget, "--budget");
   const study::SceneFacts facts = study::scene_facts(scene.text, a.scene);
   for (const std::string& text : a.references) add_references(text, facts, result.references);

@@ -2,61 +2,21 @@
 // version of it writes.
 #include "flexel/export/gmsh.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <signal.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
-#include <chrono>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
-#include <thread>
 #include <unordered_map>
 
+#include "flexel/process/child.h"
 #include "formats/error.h"
 #include "formats/files.h"
-#include "formats/program.h"
-
-extern char** environ;
 
 namespace flexel {
 namespace {
 
 constexpr int kTriangle6 = 9, kTetrahedron10 = 11;
-constexpr auto kPoll = std::chrono::milliseconds(20);
-
-// Runs a program in `folder`, all that it says in `log`. Its exit status; 127 where it is not there. Killed
-// when we are interrupted.
-int run_in(const std::string& folder, std::vector<std::string> words, const std::string& log) {
-  std::vector<char*> arguments;
-  for (std::string& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addchdir_np(&actions, folder.c_str());
-  posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, 1, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
-  posix_spawn_file_actions_adddup2(&actions, 1, 2);
-  pid_t child = 0;
-  const int failed = posix_spawnp(&child, arguments[0], &actions, nullptr, arguments.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  if (failed == ENOENT) return 127;
-  if (failed != 0) throw InputError(fmt::format("{} cannot be started: {}", words[0], std::strerror(failed)));
-  int status = 0;
-  while (waitpid(child, &status, WNOHANG) == 0) {
-    if (interrupted()) {
-      kill(child, SIGKILL);
-      waitpid(child, &status, 0);
-      throw Interrupted();
-    }
-    std::this_thread::sleep_for(kPoll);
-  }
-  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-}
 
 // The last line that gmsh marked as an error, without its mark.
 std::string last_error(const std::string& log) {
@@ -140,15 +100,19 @@ GmshMesh read_msh(const std::string& path) {
 
 GmshMesh mesh_with_gmsh(const std::string& folder, const std::string& script, const std::string& part) {
   write_text(script, folder + "/mesh.geo");
-  const int status = run_in(
-      folder, {"gmsh", "mesh.geo", "-3", "-format", "msh22", "-o", "mesh.msh", "-v", "3"}, folder + "/log");
-  if (status == 127)
+  const std::string gmsh = find_program("gmsh");
+  if (gmsh.empty())
     throw InputError(
         "--mesh tet needs the program gmsh, which is not installed: install Debian's package gmsh, or use "
         "--mesh hex");
+  ChildOptions options;
+  options.log = folder + "/log";
+  options.folder = folder;
+  const ChildRun run =
+      run_child({gmsh, "mesh.geo", "-3", "-format", "msh22", "-o", "mesh.msh", "-v", "3"}, options);
   const std::string mesh_file = folder + "/mesh.msh";
   GmshMesh mesh;
-  if (status == 0 && std::filesystem::exists(mesh_file)) mesh = read_msh(mesh_file);
+  if (run.exit_code == 0 && std::filesystem::exists(mesh_file)) mesh = read_msh(mesh_file);
   if (mesh.tetrahedra.empty())
     throw InputError(part, fmt::format("gmsh cannot fill it with tetrahedra ({}); use another --size, or "
                                        "--mesh hex, which broken surfaces do not stop",

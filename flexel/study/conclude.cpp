@@ -12,18 +12,22 @@ namespace {
 
 constexpr double kStill = 1e-3;  // a probe that moves less than this share of the most does not decide
 
-bool of_ladder(const Row& row) {
-  return row.trial.sweep == "resolution" && row.found.ok();
-}
-
-// The first row of each size of the ladder, the coarsest first.
-std::vector<const Row*> ladder(const Study& study) {
+// The first row of each size of a sweep, the coarsest first.
+std::vector<const Row*> sizes_of(const Study& study, const std::string& sweep) {
   std::vector<const Row*> rows;
   for (const Row& row : study.rows)
-    if (of_ladder(row) && row.repeat == 1) rows.push_back(&row);
+    if (row.trial.sweep == sweep && row.found.ok() && row.repeat == 1) rows.push_back(&row);
   std::stable_sort(rows.begin(), rows.end(),
                    [](const Row* a, const Row* b) { return a->found.spacing > b->found.spacing; });
   return rows;
+}
+
+std::vector<SizeValue> values_of(const std::vector<const Row*>& rows, const std::string& quantity) {
+  std::vector<SizeValue> values;
+  for (const Row* row : rows)
+    if (const Quantity* found = row->found.find(quantity))
+      values.push_back({row->found.spacing, found->value});
+  return values;
 }
 
 // Probes (of timed runs: the most that they moved), or the largest displacement where there are none.
@@ -37,15 +41,11 @@ bool may_decide(const Study& study, const std::string& name) {
 
 std::vector<Reference> references_of(const Study& study, const std::vector<Reference>& given) {
   std::vector<Reference> result;
-  const std::vector<const Row*> rows = ladder(study);
+  const std::vector<const Row*> rows = sizes_of(study, "resolution");
   if (rows.empty()) return result;
   double most = 0;
   for (const Quantity& quantity : rows.back()->found.quantities) {
-    std::vector<SizeValue> values;
-    for (const Row* row : rows)
-      if (const Quantity* found = row->found.find(quantity.name))
-        values.push_back({row->found.spacing, found->value});
-    Reference reference = extrapolate(quantity.name, quantity.unit, values);
+    Reference reference = extrapolate(quantity.name, quantity.unit, values_of(rows, quantity.name));
     for (const Reference& each : given)
       if (each.name == quantity.name) reference = each;
     reference.decides = may_decide(study, quantity.name);
@@ -60,6 +60,7 @@ std::vector<Reference> references_of(const Study& study, const std::vector<Refer
 // "--size 1.5mm --method affine"; what belongs into the scene in words behind it.
 std::string options_of(const Trial& trial) {
   const Configuration& c = trial.configuration;
+  if (trial.sweep == "calculix") return "tetrahedra with edges of " + option_length(c.size);
   std::string text = "--size " + option_length(c.size);
   if (trial.sweep == "mapping") text += " --method " + c.method;
   if (trial.sweep == "threads") text += " --threads " + std::to_string(c.threads);
@@ -90,7 +91,7 @@ std::vector<Summed> sum_up(const Study& study) {
       each.point.sweep = row.trial.sweep;
       each.point.options = options_of(row.trial);
       each.point.error = row.error;
-      each.point.choosable = row.trial.sweep != "effect";
+      each.point.choosable = row.trial.sweep != "effect" && row.trial.sweep != "calculix";
       result.push_back(each);
       walls.emplace_back();
     }
@@ -106,6 +107,27 @@ std::vector<Summed> sum_up(const Study& study) {
   return result;
 }
 
+std::string range(const Reference& reference) {
+  return fmt::format("{:.5g} +- {:.2g} {}", reference.value, reference.uncertainty, reference.unit);
+}
+
+// What CalculiX found beside our references; what counts and does not agree is said at the top of the page.
+void conclude_against(Study& study) {
+  const std::vector<const Row*> rows = sizes_of(study, "calculix");
+  if (rows.empty()) return;
+  for (const Reference& ours : study.references) {
+    const std::vector<SizeValue> values = values_of(rows, ours.name);
+    if (values.empty()) continue;
+    const Agreement found = compare(ours, values);
+    study.against.agreements.push_back(found);
+    if (ours.decides && !found.agree)
+      study.notes.push_back(fmt::format(
+          "CalculiX and Flexel differ in \"{}\" by more than both uncertainties: {} from {} sizes, "
+          "and {}. Which of the two is nearer this study does not tell.",
+          ours.name, range(found.theirs), values.size(), range(ours)));
+  }
+}
+
 }  // namespace
 
 void conclude(Study& study, const std::vector<Reference>& given) {
@@ -116,6 +138,9 @@ void conclude(Study& study, const std::vector<Reference>& given) {
   std::vector<Point> points;
   for (const Summed& each : study.summed) points.push_back(each.point);
   study.sentences = sentences(points);
+  if (const std::string sentence = against_sentence(points); !sentence.empty())
+    study.sentences.push_back(sentence);
+  conclude_against(study);
 }
 
 }  // namespace flexel::study

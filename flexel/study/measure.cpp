@@ -167,6 +167,30 @@ std::vector<std::string> sentences(const std::vector<Point>& points) {
   return result;
 }
 
+Agreement compare(const Reference& ours, const std::vector<SizeValue>& theirs) {
+  Agreement result{ours, extrapolate(ours.name, ours.unit, theirs), 0, false};
+  if (theirs.empty()) return result;
+  result.finest = theirs.back().value;
+  result.agree = std::abs(result.theirs.value - ours.value) <= result.theirs.uncertainty + ours.uncertainty;
+  return result;
+}
+
+std::string against_sentence(const std::vector<Point>& points) {
+  std::vector<Point> theirs;
+  for (const Point& each : points)
+    if (each.sweep == "calculix" && each.error) theirs.push_back(each);
+  if (theirs.empty()) return "";
+  for (Point& each : theirs) each.choosable = true;
+  for (const double target : kTargets) {
+    if (target < kUsualTarget) continue;
+    if (const std::optional<std::size_t> chosen = cheapest_within(theirs, target))
+      return fmt::format("For {} CalculiX takes {}: {} with meshing, {}.", percent(target),
+                         theirs[*chosen].options, human_seconds(theirs[*chosen].seconds),
+                         human_bytes(theirs[*chosen].memory));
+  }
+  return "No run of CalculiX is known to be within 50 %.";
+}
+
 Median median(std::vector<double> values) {
   if (values.empty()) return {0, std::numeric_limits<double>::infinity()};
   std::sort(values.begin(), values.end());

@@ -49,7 +49,7 @@ struct Point {
   double seconds = 0;   // median wall time
   double memory = 0;    // bytes, the largest
   std::optional<RunError> error;
-  bool choosable = true;  // false: not the user's problem any more (an effect left out)
+  bool choosable = true;  // false: not the user's problem any more (an effect left out), or not ours
 };
 
 // Indices of the points that no other beats in both time and error (errors below the uncertainty count as
@@ -66,6 +66,18 @@ struct Point {
 
 // "For 1 % use --size 1.5mm: 3.1 s, 420 MB. Ten times the accuracy costs 22 times the time."
 [[nodiscard]] std::vector<std::string> sentences(const std::vector<Point>& points);
+
+// One quantity as another program has it beside ours.
+struct Agreement {
+  Reference ours, theirs;  // theirs extrapolated from its own sizes
+  double finest = 0;       // what its finest run found
+  bool agree = false;      // the two ranges meet
+};
+[[nodiscard]] Agreement compare(const Reference& ours, const std::vector<SizeValue>& theirs);
+
+// "For 1 % CalculiX takes tetrahedra of 3 mm: 2.1 s with meshing, 100 MB.": of the points of sweep
+// "calculix"; where none keeps 1 %, for what the best one keeps. Nothing without such points.
+[[nodiscard]] std::string against_sentence(const std::vector<Point>& points);
 
 // Median, and how well it is known: 1.2533 s / sqrt(n) over the median, s the standard deviation (the
 // standard error of a normal sample's median); infinite for fewer than three.

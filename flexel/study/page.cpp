@@ -72,6 +72,12 @@ std::string error_of_point(const Point& point) {
   return percent(point.error->error) + " &plusmn; " + percent(point.error->uncertainty);
 }
 
+std::string paragraphs(const std::vector<std::string>& lines, const std::string& name) {
+  std::string out;
+  for (const std::string& line : lines) out += "<p class=\"" + name + "\">" + escaped(line) + "</p>\n";
+  return out;
+}
+
 std::string references_table(const Study& study) {
   std::vector<std::vector<std::string>> rows;
   for (const Reference& each : study.references)
@@ -126,6 +132,45 @@ std::string points_table(const Study& study) {
     rows.push_back(line);
   }
   return table(head, rows, bold);
+}
+
+std::string against_part(const Study& study) {
+  const Against& against = study.against;
+  if (!against.asked) return "";
+  std::string out = "<h2>Beside CalculiX</h2>\n";
+  if (!against.refused.empty())
+    return out + "<p>There is nothing of CalculiX here: " + escaped(against.refused) + ".</p>\n";
+  std::vector<std::vector<std::string>> rows;
+  for (const Summed& each : study.summed) {
+    if (each.point.sweep != "calculix") continue;
+    const Row& row = study.rows[each.row];
+    std::vector<std::string> line = {escaped(each.point.label), human_count(row.found.cells),
+                                     human_count(row.found.elements), time_of(each)};
+    for (const Stage& stage : row.found.stages) line.push_back(human_seconds(stage.wall));
+    line.insert(line.end(),
+                {human_bytes(each.point.memory), error_of_point(each.point), std::to_string(each.runs)});
+    rows.push_back(line);
+  }
+  out += table({"edges", "tetrahedra", "nodes", "wall", "export and mesh", "ccx", "memory", "error", "runs"},
+               rows);
+  rows.clear();
+  for (const Agreement& each : against.agreements)
+    rows.push_back({escaped(each.ours.name), quantity(each.ours.value, each.ours.unit),
+                    quantity(each.ours.uncertainty, each.ours.unit), quantity(each.finest, each.ours.unit),
+                    quantity(each.theirs.value, each.ours.unit),
+                    quantity(each.theirs.uncertainty, each.ours.unit), each.agree ? "yes" : "no"});
+  out += "<div class=\"wide\">" +
+         table({"quantity", "reference", "uncertain by", "CalculiX, finest", "CalculiX, extrapolated",
+                "uncertain by", "they agree"},
+               rows) +
+         "</div>\n<p class=\"faint\">" +
+         escaped(fmt::format(
+             "{}, through flexel export --calculix --mesh tet: second-order tetrahedra (C3D10), {}, {} "
+             "threads. Its errors are against the same reference as all others; that is Flexel's own "
+             "extrapolation unless it was given. They agree where the two ranges meet.",
+             against.versions, against.nlgeom, study.machine.cores)) +
+         "</p>\n";
+  return out + paragraphs(against.warnings, "faint");
 }
 
 // Against the run of the ladder at the same size.
@@ -200,12 +245,6 @@ std::string left_out(const Study& study) {
          table({"run", "predicted", "memory", "why"}, rows) + "</div>\n";
 }
 
-std::string paragraphs(const std::vector<std::string>& lines, const std::string& name) {
-  std::string out;
-  for (const std::string& line : lines) out += "<p class=\"" + name + "\">" + escaped(line) + "</p>\n";
-  return out;
-}
-
 std::string plot(const std::map<std::string, std::string>& plots, const std::string& name) {
   const auto found = plots.find(name);
   if (found == plots.end()) return "<p class=\"faint\">The plot is left out: see the note above.</p>";
@@ -232,6 +271,7 @@ std::string page(const Study& study, const std::map<std::string, std::string>& p
        "the grey line is not told apart from the reference."},
       {"REFERENCES", references_table(study)},
       {"POINTS", points_table(study)},
+      {"AGAINST", against_part(study)},
       {"PLOT_STAGES", plot(plots, "stages")},
       {"EFFECTS", effects_part(study)},
       {"PICTURES", pictures_part(study)},

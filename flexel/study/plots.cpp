@@ -1,15 +1,12 @@
 // Plots by gnuplot (its svg terminal). The data go into the script as data blocks; colours that gnuplot has
 // for text and frames become the page's own, so that the plots are read on light and on dark.
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <regex>
-#include <sstream>
 
 #include "flexel/study/study.h"
 #include "formats/error.h"
@@ -38,9 +35,19 @@ std::string head(const std::string& name, int width, int height) {
       width, height, name);
 }
 
+// Nobody of ours has it.
+constexpr const char* kAgainstColour = "#8a5cd0";
+constexpr int kAgainstMarker = 13;  // a filled diamond
+
+// What has a place in the plot of errors.
+bool is_drawn(const Point& point) {
+  return point.error && (point.choosable || point.sweep == "calculix");
+}
+
 // The curve that a point belongs to: models one by one, all else by its sweep.
 std::string curve_of(const Summed& each) {
   if (each.point.sweep == "resolution") return "size";
+  if (each.point.sweep == "calculix") return "CalculiX";
   if (each.point.sweep != "model") return each.point.sweep;
   const std::string& label = each.point.label;  // "springs 3 mm"
   return "model " + label.substr(0, label.find(' '));
@@ -62,7 +69,7 @@ std::string error_script(const Study& study, const std::string& out) {
   double floor = 0;
   for (const Summed& each : study.summed) {
     points.push_back(each.point);
-    if (!each.point.error || !each.point.choosable) continue;
+    if (!is_drawn(each.point)) continue;
     floor = std::max(floor, 100 * each.point.error->uncertainty);
     const std::string name = curve_of(each);
     auto found = std::find_if(curves.begin(), curves.end(), [&](const auto& c) { return c.first == name; });
@@ -86,8 +93,8 @@ std::string error_script(const Study& study, const std::string& out) {
     data += fmt::format("{:.9g} {:.9g}\n", points[i].seconds, shown_error(points[i]));
   // The others are told by their colour: where all are written none can be read.
   for (std::size_t i = 0; i < points.size(); ++i)
-    if (points[i].error &&
-        (points[i].sweep == "resolution" || std::find(front.begin(), front.end(), i) != front.end()))
+    if (points[i].error && (points[i].sweep == "resolution" || points[i].sweep == "calculix" ||
+                            std::find(front.begin(), front.end(), i) != front.end()))
       labels += label_at(points[i]);
   data += "EOD\n" + labels + "EOD\n";
   if (!front.empty()) plots += "$front with linespoints lw 7 lc rgb '#55e0c000' pt 6 ps 2 title 'frontier', ";
@@ -99,10 +106,15 @@ std::string error_script(const Study& study, const std::string& out) {
     for (const Summed* each : sorted)
       data += fmt::format("{:.9g} {:.9g}\n", each->point.seconds, shown_error(each->point));
     data += "EOD\n";
-    const bool joined = curves[c].first == "size" || curves[c].first.rfind("model", 0) == 0;
-    plots += fmt::format("$curve{} with {} lw 1.6 pt {} ps 0.7 lc rgb '{}' title {}, ", c,
-                         joined ? "linespoints" : "points", c == 0 ? 7 : static_cast<int>(c) + 4,
-                         kColours[c % std::size(kColours)], in_quotes(curves[c].first));
+    const bool against = curves[c].first == "CalculiX";
+    const bool joined = against || curves[c].first == "size" || curves[c].first.rfind("model", 0) == 0;
+    plots += fmt::format("$curve{} with {} lw 1.6 pt {} ps {} lc rgb '{}' title {}, ", c,
+                         joined ? "linespoints" : "points",
+                         against  ? kAgainstMarker
+                         : c == 0 ? 7
+                                  : static_cast<int>(c) + 4,
+                         against ? 1.1 : 0.7, against ? kAgainstColour : kColours[c % std::size(kColours)],
+                         in_quotes(curves[c].first));
   }
   plots += "$labels with labels left offset 0.6,0.5 font ',10' notitle";
   return script + data + "plot " + plots + "\n";
@@ -158,7 +170,10 @@ std::string draw(const std::string& gnuplot, const std::string& name, const std:
                  const fs::path& folder) {
   const fs::path script_file = folder / (name + ".gp"), svg = folder / (name + ".svg");
   write_text(script, script_file.string());
-  const ChildRun run = run_child({gnuplot, script_file.string()}, folder / "gnuplot.log", kNever, false);
+  ChildOptions options;
+  options.log = folder / "gnuplot.log";
+  options.heed_interrupts = false;
+  const ChildRun run = run_child({gnuplot, script_file.string()}, options);
   const std::string drawn = run.exit_code == 0 ? text_of(svg) : "";
   if (drawn.find("</svg>") == std::string::npos)
     throw InputError("gnuplot failed: " + text_of(folder / "gnuplot.log").substr(0, 400));
@@ -167,20 +182,12 @@ std::string draw(const std::string& gnuplot, const std::string& name, const std:
 
 }  // namespace
 
-std::string find_gnuplot() {
-  const char* paths = std::getenv("PATH");
-  std::istringstream in(paths != nullptr ? paths : "/usr/bin");
-  for (std::string folder; std::getline(in, folder, ':');)
-    if (const std::string path = folder + "/gnuplot"; access(path.c_str(), X_OK) == 0) return path;
-  return "";
-}
-
 std::map<std::string, std::string> draw_plots(const Study& study, const fs::path& folder) {
-  const std::string gnuplot = find_gnuplot();
+  const std::string gnuplot = find_program("gnuplot");
   if (gnuplot.empty()) throw InputError("gnuplot is not installed: apt-get install gnuplot-nox");
   std::map<std::string, std::string> plots;
   const bool errors = std::any_of(study.summed.begin(), study.summed.end(),
-                                  [](const Summed& s) { return s.point.error && s.point.choosable; });
+                                  [](const Summed& s) { return is_drawn(s.point); });
   if (errors)
     plots["error"] = draw(gnuplot, "error", error_script(study, (folder / "error.svg").string()), folder);
   if (!study.summed.empty())

@@ -40,10 +40,17 @@ struct Prediction {
   std::vector<Stage> stages;
 };
 
+// Kinds of runs whose costs follow laws of their own: CalculiX's direct solver, cells being tetrahedra; and
+// `flexel deform`, which has all stages in one process, its memory being that of program 0, and knows them as
+// "voxelize", "solve" (with what assembles), "error bars" and "map".
+inline constexpr const char* kCalculix = "calculix";
+inline constexpr const char* kOneProcess = "one process";
+
 class Predictor {
  public:
   // A run that went well. `kind` tells apart runs that cost differently at the same size: the model, the
-  // integrator, the threads; "" is the ordinary one, which is the prior of all others.
+  // integrator, the threads; "" is the ordinary one, which is the prior of all others but of kCalculix and
+  // kOneProcess.
   void add(const std::string& kind, const RunSize& size, const RunResult& run);
   // Never throws; with no run so far it is the prior alone, good to a factor of a few.
   [[nodiscard]] Prediction predict(const std::string& kind, const RunSize& size) const;

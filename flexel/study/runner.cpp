@@ -29,14 +29,12 @@ struct Log {
 
 Log read_log(const fs::path& path) {
   static const std::regex stage("[a-z-]+: ([a-z ]+): ([0-9.]+) s");
-  static const std::string mark = ": error: ";
   Log log;
+  log.error = error_in_log(path);
   std::ifstream in(path);
   for (std::string line; std::getline(in, line);) {
     std::smatch found;
     if (std::regex_match(line, found, stage)) log.stages[found[1]] += std::stod(found[2]);
-    if (const std::size_t at = line.find(mark); at != std::string::npos)
-      log.error = line.substr(at + mark.size());
   }
   return log;
 }
@@ -58,7 +56,11 @@ class Run {
 
   RunResult result() {
     for (const char* stage : kStages) result_.stages.push_back({stage, 0});
-    if (voxelize() && simulate()) map();
+    try {
+      if (voxelize() && simulate()) map();
+    } catch (const Json::exception& error) {
+      result_.failure = fmt::format("a summary cannot be read, is the disk full? {}", error.what());
+    }
     return std::move(result_);
   }
 
@@ -75,7 +77,10 @@ class Run {
     arguments.insert(arguments.begin(), own_program(program));
     if (wanted_.threads > 0)
       arguments.insert(arguments.end(), {"--threads", std::to_string(wanted_.threads)});
-    const ChildRun child = run_child(arguments, file("log"), options_.deadline);
+    ChildOptions options;
+    options.log = file("log");
+    options.deadline = options_.deadline;
+    const ChildRun child = run_child(arguments, options);
     result_.wall += child.wall;
     result_.cpu += child.cpu;
     result_.memory = std::max(result_.memory, child.memory);
@@ -224,6 +229,16 @@ const Quantity* RunResult::find(const std::string& name) const {
 double RunResult::element_steps_per_second() const {
   return simulate_seconds > 0 ? static_cast<double>(elements) * static_cast<double>(steps) / simulate_seconds
                               : 0;
+}
+
+std::string error_in_log(const fs::path& log) {
+  static const std::string mark = ": error: ";
+  std::ifstream in(log);
+  std::string found;
+  for (std::string line; std::getline(in, line);)
+    if (const std::size_t at = line.find(mark); at != std::string::npos)
+      found = line.substr(at + mark.size());
+  return found;
 }
 
 RunResult run_configuration(const Case& study, const Configuration& configuration,

@@ -3,38 +3,16 @@
 // comes from the kernel (wait4), what it found from the summaries that it wrote.
 #pragma once
 #include <array>
-#include <chrono>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "flexel/process/child.h"
 #include "formats/temporary_folder.h"
 #include "formats/vec.h"
 
 namespace flexel::study {
-
-// How a child process ended and what it used.
-struct ChildRun {
-  int exit_code = 0;         // 128 + signal where a signal ended it
-  bool out_of_time = false;  // it was stopped at the deadline
-  double wall = 0, cpu = 0;  // s; cpu of all its threads, user and system
-  double memory = 0;         // bytes, largest resident set
-};
-
-// When a child is stopped.
-using Deadline = std::chrono::steady_clock::time_point;
-inline constexpr Deadline kNever = Deadline::max();
-
-// Runs the program (argv[0] its path) with stdin from /dev/null and stdout and stderr into the file `log`,
-// and waits for it. An interrupt (SIGINT) is passed on; when the child has ended Interrupted is thrown. At
-// the deadline the child gets SIGINT, two seconds later SIGKILL. With `heed_interrupts` false an interrupt
-// that has come already does not count. Throws InputError: it cannot be started.
-[[nodiscard]] ChildRun run_child(const std::vector<std::string>& argv, const std::filesystem::path& log,
-                                 Deadline deadline = kNever, bool heed_interrupts = true);
-
-// The path of a program of ours: `name` ("flexel-simulate") beside this one. Throws InputError.
-[[nodiscard]] std::string own_program(const std::string& name);
 
 // What all runs of a study have in common.
 struct Case {
@@ -124,5 +102,8 @@ struct RunOptions {
 // where a program cannot be started.
 [[nodiscard]] RunResult run_configuration(const Case& study, const Configuration& configuration,
                                           const RunOptions& options);
+
+// What the log of one of our programs says after ": error: ", the last time; "" where it says nothing.
+[[nodiscard]] std::string error_in_log(const std::filesystem::path& log);
 
 }  // namespace flexel::study

@@ -8,8 +8,10 @@
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 
+#include "flexel/study/calculix.h"
 #include "flexel/study/history.h"
 #include "formats/error.h"
 #include "formats/files.h"
@@ -29,6 +31,7 @@ constexpr double kMemoryShare = 0.8;   // of what is free
 constexpr double kSideShare = 0.1;     // of the budget, the most that one run beside the ladder may take
 constexpr double kKnown = 0.05;        // how well a median should be known
 constexpr int kMostRepeats = 9;
+constexpr double kLongest = 1e9;  // s
 
 // What an earlier study that was killed left behind.
 void remove_stale(const fs::path& output) {
@@ -42,9 +45,6 @@ void remove_stale(const fs::path& output) {
 Session::Session(const Assignment& wanted, Progress& progress) : wanted_(wanted), progress_(progress) {
   remove_stale(wanted.output);
   folder_.emplace(wanted.output);
-  std::error_code ignored;
-  for (const char* name : {"study.csv", "study.json", "study.html"})
-    fs::remove(wanted.output / name, ignored);
   study_.parts = wanted.part_names;
   study_.scene = fs::path(wanted.study_case.scene).filename().string();
   study_.budget = wanted.budget;
@@ -54,6 +54,13 @@ Session::Session(const Assignment& wanted, Progress& progress) : wanted_(wanted)
 
 double Session::spent() const {
   return std::chrono::duration<double>(Clock::now() - begin_).count();
+}
+
+Deadline Session::deadline() const {
+  // A clock counts nanoseconds: what it cannot hold is never.
+  const double seconds = left();
+  if (seconds > kLongest) return kNever;
+  return Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
 }
 
 double Session::left() const {
@@ -70,21 +77,21 @@ Sweep Session::look() {
                    wanted_.study_case.voxelize_options.end());
   arguments.insert(arguments.end(), {"--quiet", "--count", fmt::format("{:.0f}", kLookCells), "--summary",
                                      summary, "-o", (folder_->path() / "look.vtu").string()});
-  const fs::path log = folder_->path() / "look.log";
-  const ChildRun run = run_child(arguments, log);
+  ChildOptions options;
+  options.log = folder_->path() / "look.log";
+  const ChildRun run = run_child(arguments, options);
   if (run.exit_code != 0) {
-    std::ifstream in(log);
-    std::string line, last;
-    while (std::getline(in, line)) last = line;
-    const std::size_t error = last.find("error: ");
-    throw InputError(error == std::string::npos ? "flexel-voxelize failed: " + last : last.substr(error + 7));
+    const std::string error = error_in_log(options.log);
+    throw InputError(!error.empty() ? error
+                                    : fmt::format("flexel-voxelize ended with exit code {}", run.exit_code));
   }
   std::ifstream in(summary);
   const auto found = nlohmann::json::parse(in);
-  double cells = 0, spacing = 0, volume = 0, thinnest = 1e300;
+  double cells = 0, spacing = 0, volume = 0, together = 0, thinnest = 1e300;
   for (const auto& part : found["parts"]) {
     cells += part["cells"].get<double>();
     volume = std::max(volume, part["surface_volume"].get<double>());
+    together += part["surface_volume"].get<double>();
     const auto& h = part["spacing"];
     spacing = std::max(spacing, std::cbrt(h[0].get<double>() * h[1].get<double>() * h[2].get<double>()));
     if (!part["thinnest_wall"].is_null())
@@ -93,21 +100,32 @@ Sweep Session::look() {
   const double wall = thinnest < 1e300 ? thinnest : std::cbrt(volume);
   Configuration first;
   if (study_.facts.model == "paper") first.model = "paper";
-  return {study_.facts, first, ladder_of_sizes(wall, spacing, cells, kFewestCells, kRungs), wanted_.budget,
-          study_.machine.cores};
+  Sweep sweep(study_.facts, first, ladder_of_sizes(wall, spacing, cells, kFewestCells, kRungs),
+              wanted_.budget, study_.machine.cores);
+  if (wanted_.against_calculix) look_at_other(sweep, together);
+  return sweep;
 }
 
 void Session::run() {
   try {
     Sweep sweep = look();
+    // Now that there is something to run, what an earlier study left goes.
+    std::error_code ignored;
+    for (const char* name : {"study.csv", "study.json", "study.html"})
+      fs::remove(wanted_.output / name, ignored);
     run_all(sweep);
     repeat_all(sweep);
   } catch (const Interrupted&) {
-    interrupted_ = true;
-    study_.notes.emplace_back(
-        "This study was interrupted: it holds the runs that had ended, and no comparison of surfaces.");
+    if (study_.rows.empty()) throw;  // there is nothing to keep
+    note_interrupt();
   }
   finish();
+}
+
+void Session::note_interrupt() {
+  interrupted_ = true;
+  study_.notes.emplace_back(
+      "This study was interrupted: it holds the runs that had ended, and no comparison of surfaces.");
 }
 
 void Session::run_all(Sweep& sweep) {
@@ -150,7 +168,8 @@ bool Session::run_cheapest(Sweep& sweep) {
   const double time_left = kFirstShare * wanted_.budget - spent();
   if (told.seconds > time_left)
     why = fmt::format("time: {} were left for first runs", human_seconds(std::max(0.0, time_left)));
-  else if (trial.sweep != "resolution" && told.seconds > kSideShare * wanted_.budget)
+  else if (trial.sweep != "resolution" && trial.sweep != "calculix" &&
+           told.seconds > kSideShare * wanted_.budget)
     why = "time: beside the sizes no run may take more than a tenth of the budget";
   else if (told.bytes > kMemoryShare * available_memory())
     why = fmt::format("memory: {} are free", human_bytes(available_memory()));
@@ -166,8 +185,11 @@ bool Session::run_cheapest(Sweep& sweep) {
 void Session::repeat_all(Sweep& sweep) {
   for (;;) {
     std::map<std::string, std::pair<const Row*, std::vector<double>>> seen;
+    std::set<std::string> failed;  // once: they would again
     for (const Row& row : study_.rows)
-      if (row.found.ok()) {
+      if (!row.found.ok()) {
+        failed.insert(row.trial.label);
+      } else {
         auto& entry = seen[row.trial.label];
         if (entry.first == nullptr) entry.first = &row;
         entry.second.push_back(row.found.wall);
@@ -176,7 +198,8 @@ void Session::repeat_all(Sweep& sweep) {
     double shortest = left() / 1.2;  // a margin: a repeat that is cut off tells nothing
     for (const auto& [label, entry] : seen) {
       const Median wall = median(entry.second);
-      if (wall.relative_error <= kKnown || entry.second.size() >= kMostRepeats || wall.value >= shortest)
+      if (failed.count(label) > 0 || wall.relative_error <= kKnown || entry.second.size() >= kMostRepeats ||
+          wall.value >= shortest)
         continue;
       next = entry.first;
       shortest = wall.value;
@@ -197,15 +220,7 @@ void Session::run_one(Sweep& sweep, const Trial& trial, const Prediction& predic
   row.trial = trial;
   row.predicted = predicted;
   for (const Row& each : study_.rows) row.repeat += each.trial.label == trial.label;
-  RunOptions options;
-  options.folder = folder_->path();
-  if (first) {
-    options.surface = kept("surface", trial, ".ply");
-    options.history = kept("history", trial, ".csv");
-  }
-  options.deadline =
-      Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(left()));
-  row.found = run_configuration(wanted_.study_case, trial.configuration, options);
+  row.found = run_trial(trial, first);
   sweep.done(trial, row.found);
   study_.rows.push_back(row);
   append(row);
@@ -218,10 +233,24 @@ void Session::run_one(Sweep& sweep, const Trial& trial, const Prediction& predic
     progress_.say(fmt::format("{}: {}", trial.label, row.found.failure));
 }
 
+RunResult Session::run_trial(const Trial& trial, bool first) const {
+  RunOptions options;
+  options.folder = folder_->path();
+  options.deadline = deadline();
+  if (trial.sweep == "calculix")
+    return run_calculix(wanted_.study_case, trial.configuration.size, large_deflection_, study_.machine.cores,
+                        options);
+  if (first) {
+    options.surface = kept("surface", trial, ".ply");
+    options.history = kept("history", trial, ".csv");
+  }
+  return run_configuration(wanted_.study_case, trial.configuration, options);
+}
+
 // study.csv grows as runs end, so that whatever happens the rows are there.
 void Session::append(const Row& row) {
   waiting_.push_back(row);
-  if (!columns_ && !row.found.ok()) return;
+  if (!columns_ && (!row.found.ok() || row.trial.sweep == "calculix")) return;
   const std::string path = (wanted_.output / "study.csv").string();
   std::string text;
   if (!columns_) {
@@ -282,9 +311,11 @@ void Session::draw_pictures(const Row& finest) {
     const std::string png = (folder_->path() / "error.png").string();
     write_error_surface(kept("surface", row->trial, ".ply"), kept("surface", finest.trial, ".ply"),
                         largest->value, surface);
+    ChildOptions options;
+    options.log = folder_->path() / "picture.log";
     const ChildRun run = run_child({own_program("flexel"), "picture", surface, "-o", png, "--color",
                                     kErrorAttribute, "--size", "560x420", "--quiet"},
-                                   folder_->path() / "picture.log");
+                                   options);
     if (run.exit_code != 0) {
       study_.notes.push_back("The picture of " + row->trial.label + " could not be drawn.");
       continue;
@@ -301,11 +332,17 @@ void Session::finish() {
     const Row reference = *finest;
     measure_lags(reference);
     // Reading surfaces heeds the interrupt, which has come already.
-    if (!interrupted_) {
-      measure_surfaces(reference);
-      draw_pictures(*finest);
+    try {
+      if (!interrupted_) measure_surfaces(reference);
+      if (!interrupted_) draw_pictures(*finest);
+    } catch (const Interrupted&) {
+      note_interrupt();
+    } catch (const InputError& error) {
+      study_.notes.push_back(fmt::format("Surfaces are not compared: {}", error.what()));
+      progress_.warn(study_.notes.back());
     }
   }
+  note_against();
   conclude(study_, wanted_.references);
   study_.spent = spent();
   write_all();

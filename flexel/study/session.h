@@ -17,6 +17,7 @@ struct Assignment {
   double budget = 120;                  // s
   std::filesystem::path output;         // a folder that exists
   std::vector<Reference> references;    // given ones
+  bool against_calculix = false;
 };
 
 class Session {
@@ -31,11 +32,15 @@ class Session {
   using Clock = std::chrono::steady_clock;
 
   [[nodiscard]] Sweep look();
+  void look_at_other(Sweep& sweep, double volume);
   void run_all(Sweep& sweep);
   [[nodiscard]] std::ptrdiff_t sizes_done() const;
   bool run_cheapest(Sweep& sweep);
   void repeat_all(Sweep& sweep);
   void run_one(Sweep& sweep, const Trial& trial, const Prediction& predicted);
+  [[nodiscard]] RunResult run_trial(const Trial& trial, bool first) const;
+  void note_against();
+  void note_interrupt();
   void append(const Row& row);
   void finish();
   void measure_surfaces(const Row& finest);
@@ -45,7 +50,8 @@ class Session {
   [[nodiscard]] const Row* finest_row() const;
   [[nodiscard]] std::string kept(const char* what, const Trial& trial, const char* ending) const;
   [[nodiscard]] double spent() const;
-  [[nodiscard]] double left() const;  // s, for runs
+  [[nodiscard]] double left() const;        // s, for runs
+  [[nodiscard]] Deadline deadline() const;  // when those end
 
   const Assignment& wanted_;
   Progress& progress_;
@@ -55,6 +61,7 @@ class Session {
   std::vector<Row> waiting_;                      // failed before that
   std::map<std::string, std::size_t> numbers_;    // of labels, for the names of kept files
   Study study_;
+  bool large_deflection_ = false;  // of CalculiX
   bool interrupted_ = false;
 };
 

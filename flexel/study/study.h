@@ -46,6 +46,15 @@ struct Picture {
   std::string png;  // its bytes
 };
 
+// CalculiX on the same part and scene (--against calculix).
+struct Against {
+  bool asked = false;
+  std::string refused;           // why there is nothing of it; "": there is
+  std::string versions, nlgeom;  // "CalculiX 2.20, gmsh 4.8.4"; how large rotations were treated, and why
+  std::vector<std::string> warnings;  // what is not exactly as in the scene
+  std::vector<Agreement> agreements;  // of the quantities that both have
+};
+
 struct Study {
   std::vector<std::string> parts;  // as they were given
   std::string scene;
@@ -57,6 +66,7 @@ struct Study {
   std::vector<Reference> references;
   std::vector<Summed> summed;
   std::vector<std::string> sentences;
+  Against against;
   std::vector<Picture> pictures;
   std::vector<std::string> notes;  // for the reader: interrupted, plots left out ...
 };
@@ -93,7 +103,5 @@ void write_error_surface(const std::string& path, const std::string& finest, dou
 // Draws the plots with gnuplot in `folder`. Throws InputError: gnuplot is missing or failed.
 [[nodiscard]] std::map<std::string, std::string> draw_plots(const Study& study,
                                                             const std::filesystem::path& folder);
-// The path of gnuplot, or "".
-[[nodiscard]] std::string find_gnuplot();
 
 }  // namespace flexel::study

@@ -18,21 +18,21 @@ constexpr double kModelShare = 1.0 / 30;   // the same of a size at which other 
 constexpr double kTolerances[] = {1e-2, 1e-4, 1e-6};
 constexpr const char* kIntegrators[] = {"symplectic", "verlet", "explicit", "implicit"};
 
-// To three digits, as people write it.
-double rounded(double size) {
-  const double unit = std::pow(10.0, std::floor(std::log10(size)) - 2);
-  return std::round(size / unit) * unit;
-}
-
 std::string human_size(double size) {
   return human_length(size);
 }
 
 }  // namespace
 
+double rounded(double size) {
+  const double unit = std::pow(10.0, std::floor(std::log10(size)) - 2);
+  return std::round(size / unit) * unit;
+}
+
 std::string Trial::kind() const {
   const Configuration& c = configuration;
   std::string kind;
+  if (sweep == "calculix") kind = kCalculix;
   if (sweep == "model") kind = c.model + c.hooke;
   if (sweep == "integrator") kind = c.integrator;
   if (sweep == "threads") kind = fmt::format("{} threads", c.threads);
@@ -78,11 +78,27 @@ std::vector<Trial> Sweep::open() const {
         all.push_back(trial("resolution", "", rung.size, first_));
         break;
       }
+  if (const std::optional<Trial> next = next_against()) all.push_back(*next);
   add_models(all);
   if (const std::optional<std::size_t> rung = middle()) add_choices(all, *rung);
   for (const Trial& each : all)
     if (closed_.count(each.label) == 0) result.push_back(each);
   return result;
+}
+
+void Sweep::set_against(std::vector<double> edges, double volume) {
+  edges_ = std::move(edges);
+  volume_ = volume;
+}
+
+std::optional<Trial> Sweep::next_against() const {
+  Configuration bare;
+  bare.method = "";  // nothing is mapped
+  for (const double edge : edges_) {
+    const Trial next = trial("calculix", "CalculiX", edge, bare);
+    if (closed_.count(next.label) == 0 && !against_ended_) return next;
+  }
+  return std::nullopt;
 }
 
 void Sweep::add_models(std::vector<Trial>& trials) const {
@@ -183,6 +199,12 @@ void Sweep::add_effects(std::vector<Trial>& trials, const Rung& rung) const {
 }
 
 RunSize Sweep::size_of(const Trial& wanted) const {
+  if (wanted.sweep == "calculix") {
+    const double edge = wanted.configuration.size;
+    const auto [known, cells] =
+        edge_and_cells_.value_or(std::pair(edge, kTetrahedraInCube * volume_ / std::pow(edge, 3)));
+    return {cells * std::pow(known / edge, 3), 1};
+  }
   // From the nearest size that is known; cells go with the third power of the size, explicit steps with it.
   const Rung* nearest = nullptr;
   const auto away = [&](const Rung& rung) {
@@ -211,6 +233,14 @@ Prediction Sweep::predict(const Trial& wanted) const {
 
 void Sweep::done(const Trial& ended, const RunResult& found) {
   closed_.insert(ended.label);
+  if (ended.sweep == "calculix") {
+    if (found.ok()) {
+      edge_and_cells_ = {ended.configuration.size, static_cast<double>(found.cells)};
+      predictor_.add(kCalculix, {static_cast<double>(found.cells), 1}, found);
+    }
+    against_ended_ = against_ended_ || found.out_of_time;
+    return;
+  }
   for (Rung& rung : rungs_)
     if (ended.sweep == "resolution" && rung.size == ended.configuration.size) {
       rung.done = true;
@@ -233,6 +263,7 @@ void Sweep::done(const Trial& ended, const RunResult& found) {
 void Sweep::leave_out(const Trial& trial) {
   closed_.insert(trial.label);
   if (trial.sweep == "resolution") ladder_ended_ = true;
+  if (trial.sweep == "calculix") against_ended_ = true;
 }
 
 }  // namespace flexel::study

@@ -19,7 +19,7 @@ namespace flexel::study {
 // A configuration with its place in the study.
 struct Trial {
   std::string sweep;  // "resolution", "model", "mapping", "tolerance", "threads", "integrator", "step",
-                      // "effect"
+                      // "effect", "calculix"
   std::string label;  // "1.5 mm", "springs 3 mm", "without gravity"
   Configuration configuration;
 
@@ -34,6 +34,12 @@ struct LeftOut {
   std::string why;
 };
 
+// To three digits, as people write sizes.
+[[nodiscard]] double rounded(double size);
+
+// How many tetrahedra of an edge gmsh puts into a cube of that edge, about, on bulky parts.
+inline constexpr double kTetrahedraInCube = 6;
+
 // Sizes from coarse to fine [m], at which a wall of the given thickness is 1, 2, 3, 4, 6, 8, 12, ... cells;
 // each of three digits. From the first with about `fewest` cells, `cells_at` (spacing) of them.
 [[nodiscard]] std::vector<double> ladder_of_sizes(double wall, double spacing, double cells_there,
@@ -45,13 +51,16 @@ class Sweep {
   // ladder. `budget` [s] decides what the middle is.
   Sweep(SceneFacts facts, Configuration first, std::vector<double> sizes, double budget, int cores);
 
+  // CalculiX beside it: edges of tetrahedra [m] from coarse to fine, of a part of `volume` [m^3].
+  void set_against(std::vector<double> edges, double volume);
+
   // The trials that can be run next.
   [[nodiscard]] std::vector<Trial> open() const;
   // What the next run of this trial takes.
   [[nodiscard]] Prediction predict(const Trial& trial) const;
   // The run ended (well or not).
   void done(const Trial& trial, const RunResult& found);
-  // The trial is not going to be run; of the ladder, nor is any finer size.
+  // The trial is not going to be run; of the ladder, nor is any finer size. The same of CalculiX's.
   void leave_out(const Trial& trial);
 
   [[nodiscard]] const SceneFacts& facts() const { return facts_; }
@@ -69,6 +78,7 @@ class Sweep {
   void add_choices(std::vector<Trial>& trials, std::size_t rung) const;
   void add_timed(std::vector<Trial>& trials, const Rung& rung) const;
   void add_effects(std::vector<Trial>& trials, const Rung& rung) const;
+  [[nodiscard]] std::optional<Trial> next_against() const;
   [[nodiscard]] Trial trial(const std::string& sweep, const std::string& choice, double size,
                             const Configuration& configuration) const;
 
@@ -78,6 +88,10 @@ class Sweep {
   double budget_ = 0;
   int cores_ = 1;
   bool ladder_ended_ = false;
+  std::vector<double> edges_;                                // of CalculiX's tetrahedra, m
+  double volume_ = 0;                                        // m^3
+  std::optional<std::pair<double, double>> edge_and_cells_;  // of its last run that went well
+  bool against_ended_ = false;
   std::set<std::string> closed_;  // labels of trials that are done or left out
   Predictor predictor_;
 };

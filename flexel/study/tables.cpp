@@ -100,6 +100,28 @@ Json json_of(const Summed& each) {
   return json;
 }
 
+Json json_of(const Reference& each) {
+  return {{"name", each.name},
+          {"unit", each.unit},
+          {"value", each.value},
+          {"uncertainty", each.uncertainty},
+          {"order", json_of(each.order)},
+          {"from", each.from},
+          {"decides", each.decides}};
+}
+
+Json json_of(const Against& against) {
+  Json json = {{"program", "calculix"},    {"versions", against.versions}, {"refused", against.refused},
+               {"nlgeom", against.nlgeom}, {"warnings", against.warnings}, {"quantities", Json::array()}};
+  for (const Agreement& each : against.agreements) {
+    json["quantities"].push_back(json_of(each.theirs));
+    json["quantities"].back()["finest"] = each.finest;
+    json["quantities"].back()["decides"] = each.ours.decides;
+    json["quantities"].back()["agrees"] = each.agree;
+  }
+  return json;
+}
+
 }  // namespace
 
 std::string csv_header(const std::vector<Quantity>& quantities) {
@@ -130,14 +152,8 @@ std::string study_json(const Study& study) {
                      {"date", study.machine.date}};
   json["sentences"] = study.sentences;
   json["references"] = Json::array();
-  for (const Reference& each : study.references)
-    json["references"].push_back({{"name", each.name},
-                                  {"unit", each.unit},
-                                  {"value", each.value},
-                                  {"uncertainty", each.uncertainty},
-                                  {"order", json_of(each.order)},
-                                  {"from", each.from},
-                                  {"decides", each.decides}});
+  for (const Reference& each : study.references) json["references"].push_back(json_of(each));
+  if (study.against.asked) json["against"] = json_of(study.against);
   json["points"] = Json::array();
   for (const Summed& each : study.summed) json["points"].push_back(json_of(each));
   json["left_out"] = Json::array();

@@ -104,5 +104,38 @@ TEST(Predict, StepsCountInTimedRuns) {
   EXPECT_NEAR(predictor.predict("", {64e3, steps}).seconds, 0.09 + 5e-8 * 64e3 * steps, 3);
 }
 
+// Stages that a kind does not have cost it nothing, and a direct solver's memory grows faster than its cells.
+TEST(Predict, CalculixAndOneProcessHaveLawsOfTheirOwn) {
+  for (const double power : {1.2, 1.45, 1.7}) {
+    Predictor predictor;
+    const auto run_at = [&](double cells) {
+      RunResult run;
+      run.stages = {{"voxelize", 0.3 + 1e-4 * cells}, {"solve", 3e-6 * std::pow(cells, power)}};
+      run.program_memory = {70e6 + 2000 * cells, 25e6 + 500 * std::pow(cells, 1.3), 0};
+      return run;
+    };
+    for (const double cells : {400.0, 1400.0, 5000.0, 17000.0})
+      predictor.add(kCalculix, {cells, 1}, run_at(cells));
+    const RunResult next = run_at(60e3);
+    const Prediction told = predictor.predict(kCalculix, {60e3, 1});
+    EXPECT_NEAR(std::log(told.seconds / (next.stages[0].wall + next.stages[1].wall)), 0, std::log(1.5))
+        << power;
+    EXPECT_NEAR(std::log(told.bytes / largest(next.program_memory)), 0, std::log(1.5)) << power;
+  }
+  Predictor predictor;
+  for (const double cells : {2e3, 16e3, 60e3}) {
+    RunResult run;
+    run.stages = {{"voxelize", 0.03 + 1e-6 * cells},
+                  {"solve", 2e-5 * cells},
+                  {"error bars", 1e-5 * cells},
+                  {"map", 0.05}};
+    run.program_memory[0] = 100e6 + 5000 * cells;
+    predictor.add(kOneProcess, {cells, 1}, run);
+  }
+  const Prediction told = predictor.predict(kOneProcess, {250e3, 1});
+  EXPECT_NEAR(told.seconds / (0.08 + 31e-6 * 250e3), 1, 0.25);
+  EXPECT_NEAR(told.bytes / (100e6 + 5000 * 250e3), 1, 0.1);
+}
+
 }  // namespace
 }  // namespace flexel::study

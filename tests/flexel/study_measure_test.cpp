@@ -141,5 +141,33 @@ TEST(StudyMeasure, LengthsAndTimesForPeople) {
   EXPECT_EQ(human_seconds(250), "4 min 10 s");
 }
 
+TEST(StudyMeasure, AnotherProgramAgreesWhereTheRangesMeet) {
+  const Reference ours = extrapolate("tip", "m", sequence(5, 0.3, 2, {4, 2, 1}));
+  const Agreement same = compare(ours, sequence(5, -0.2, 2, {3, 2, 1}));
+  EXPECT_TRUE(same.agree);
+  EXPECT_NEAR(same.theirs.value, 5, 1e-6);
+  EXPECT_DOUBLE_EQ(same.finest, 4.8);
+  const double apart = ours.uncertainty + same.theirs.uncertainty;
+  EXPECT_TRUE(compare(ours, sequence(5 + 0.99 * apart, -0.2, 2, {3, 2, 1})).agree);
+  EXPECT_FALSE(compare(ours, sequence(5 + 1.01 * apart, -0.2, 2, {3, 2, 1})).agree);
+  EXPECT_FALSE(compare(ours, {}).agree);
+}
+
+TEST(StudyMeasure, AnotherProgramsSentenceIsOfItsOwnPoints) {
+  Point ours{"1 mm", "resolution", "--size 1mm", 1, 1e8, RunError{0.001, 0.001}};
+  Point coarse{"CalculiX 5 mm", "calculix", "edges of 5mm", 2, 1e8, RunError{0.03, 0.001}, false};
+  Point fine{"CalculiX 3 mm", "calculix", "edges of 3mm", 8, 3e8, RunError{0.004, 0.001}, false};
+  EXPECT_EQ(against_sentence({ours}), "");
+  EXPECT_EQ(against_sentence({ours, coarse}),
+            "For 5 % CalculiX takes edges of 5mm: 2.0 s with meshing, 100 MB.");
+  EXPECT_EQ(against_sentence({ours, coarse, fine}),
+            "For 1 % CalculiX takes edges of 3mm: 8.0 s with meshing, 300 MB.");
+  coarse.error->error = 0.9;
+  EXPECT_NE(against_sentence({coarse}).find("No run of CalculiX"), std::string::npos);
+  // It is on no frontier of ours and no answer of ours.
+  EXPECT_EQ(frontier({ours, fine}).size(), 1u);
+  EXPECT_EQ(sentences({fine}).front().find("No run tells an error"), 0u);
+}
+
 }  // namespace
 }  // namespace flexel::study

@@ -1,5 +1,4 @@
-// Child processes and whole runs. The programs lie beside this one; where they are not built the runs are
-// skipped.
+// Whole runs. The programs lie beside this one; where they are not built the runs are skipped.
 #include "flexel/study/runner.h"
 
 #include <gtest/gtest.h>
@@ -13,40 +12,6 @@ namespace flexel::study {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string text_of(const fs::path& path) {
-  std::ifstream in(path);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
-TEST(StudyRunner, AChildIsMeasured) {
-  const TemporaryFolder folder;
-  const fs::path log = folder.path() / "log";
-  const ChildRun run = run_child(
-      {"/bin/sh", "-c", "echo said; i=0; while [ $i -lt 20000 ]; do i=$((i+1)); done; exit 7"}, log);
-  EXPECT_EQ(run.exit_code, 7);
-  EXPECT_FALSE(run.out_of_time);
-  EXPECT_GT(run.cpu, 0);
-  EXPECT_GT(run.wall, 0);
-  EXPECT_GT(run.memory, 100e3);
-  EXPECT_EQ(text_of(log), "said\n");
-  EXPECT_EQ(run_child({"/bin/sh", "-c", "kill -9 $$"}, log).exit_code, 128 + 9);
-  EXPECT_THROW((void)run_child({"/no/such/program"}, log), InputError);
-}
-
-TEST(StudyRunner, AChildIsStoppedAtTheDeadlineEvenIfItDoesNotListen) {
-  const TemporaryFolder folder;
-  const auto begin = std::chrono::steady_clock::now();
-  const ChildRun quick =
-      run_child({"/bin/sleep", "60"}, folder.path() / "log", begin + std::chrono::milliseconds(50));
-  EXPECT_TRUE(quick.out_of_time);
-  const ChildRun deaf =
-      run_child({"/bin/sh", "-c", "trap '' INT; sleep 60 & wait; sleep 60"}, folder.path() / "log",
-                std::chrono::steady_clock::now() + std::chrono::milliseconds(50));
-  EXPECT_TRUE(deaf.out_of_time);
-  EXPECT_EQ(deaf.exit_code, 128 + 9);
-  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(20));
-}
 
 TEST(StudyRunner, TemporaryFoldersGo) {
   fs::path path;

@@ -14,7 +14,7 @@ import statistics
 import subprocess
 import time
 
-from harness import BIN, SCENE, Skip, box, expect, expect_error, expect_ok, expect_only, main, run, scene, write
+from harness import BIN, SCENE, Skip, box, expect, expect_error, expect_ok, expect_only, main, need, run, scene, write
 
 TARGETS = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5]
 
@@ -255,6 +255,66 @@ def test_timed_runs_have_drift_and_lag():
     expect(any(r["lag [s]"] for r in rows), "the phase")
 
 
+def test_calculix_stands_beside():
+    """Its points are in the table, the plot and on the page, and on a plain box it agrees with Flexel."""
+    need("gmsh", "ccx")
+    box()
+    for budget in ("25 s", "70 s"):  # on a busy machine a run takes many times as long
+        result = expect_ok(run("flexel", "study", "box.stl", "--scene", scene(), "--budget", budget, "-o", "study", "--against", "calculix",
+                               timeout=110))
+        theirs = [r for r in rows_of() if r["sweep"] == "calculix" and r["status"] == "ok"]
+        if len({r["label"] for r in theirs}) >= 3:
+            break
+    expect(len({r["label"] for r in theirs}) >= 2, f"two meshes at least: {theirs} {result.err}")
+    for row in theirs:
+        expect(float(row["reaction xmin [N]"]) - 100 < 0.01, f"the load is held: {row}")
+        expect(abs(float(row["tip [m]"]) / 12.9e-6 - 1) < 0.12, f"Euler and Bernoulli and some shear: {row}")
+        expect(float(row["largest displacement [m]"]) >= 0.999 * float(row["tip [m]"]), f"{row}")
+        expect(int(row["cells"]) > 10 and int(row["elements"]) > int(row["cells"]), f"nodes of C3D10: {row}")
+        stages = sum(float(v) for k, v in row.items() if k.endswith(" stage [s]"))
+        expect(abs(stages / float(row["wall [s]"]) - 1) < 0.05 and float(row["solve stage [s]"]) > 0, f"{row}")
+        expect(float(row["memory [B]"]) > 1e6 and float(row["predicted wall [s]"]) > 0 and row["error"], f"{row}")
+    summary, page = json.load(open("study/study.json")), parsed()
+    told = summary["against"]
+    expect(told["refused"] == "" and "CalculiX" in told["versions"] and "gmsh" in told["versions"], f"{told}")
+    (tip,) = [q for q in told["quantities"] if q["name"] == "tip"]
+    (ours,) = [r for r in summary["references"] if r["name"] == "tip"]
+    agrees = abs(tip["value"] - ours["value"]) <= tip["uncertainty"] + ours["uncertainty"]
+    expect(tip["agrees"] == agrees and tip["decides"], f"{tip} {ours}")
+    expect(agrees != any("differ in \"tip\"" in note for note in summary["notes"]), f"{summary['notes']}")
+    expect({"reaction xmin", "largest displacement"} <= {q["name"] for q in told["quantities"]}, f"{told}")
+    expect("Beside CalculiX" in page.text and any("CalculiX" in s for s in page.sentences), f"{page.sentences}")
+    if shutil.which("gnuplot"):
+        expect("#8a5cd0" in page.text.lower() or "rgb(138, 92, 208)" in page.text.replace("138,  92", "138, 92"), "its colour is in the plot")
+    # It takes no part in what the page says of Flexel.
+    expect("CalculiX" not in page.sentences[0], f"{page.sentences}")
+
+
+def test_what_calculix_cannot_run_is_said():
+    """A missing program, a scene without a translation: one line, and the study goes on."""
+    box()
+    environment = dict(os.environ, PATH="/nowhere")
+    result = expect_ok(run("flexel", "study", "box.stl", "--scene", scene(), "--budget", "8 s", "-o", "study", "--against", "calculix",
+                           env=environment, timeout=110))
+    expect("CalculiX is left out" in result.err and "ccx is not installed" in result.err, result.err)
+    expect("ccx is not installed" in parsed().text, "the page says it too")
+    expect(not [r for r in rows_of() if r["sweep"] == "calculix"], "no row")
+    need("gmsh", "ccx")
+    write("timed.toml", SCENE + "[run]\ntime = \"40 us\"\n")
+    result = expect_ok(run("flexel", "study", "box.stl", "--scene", "timed.toml", "--budget", "8 s", "-o", "study", "--against", "calculix",
+                           timeout=110))
+    expect("CalculiX is left out" in result.err and "time" in result.err, result.err)
+    expect(json.load(open("study/study.json"))["against"]["refused"] in parsed().text.replace("&quot;", '"'), "the page says why")
+
+
+def test_a_study_that_cannot_begin_leaves_the_last_one():
+    expect_ok(study(budget="8 s"))
+    before = {p.name: p.read_bytes() for p in pathlib.Path("study").iterdir()}
+    write("broken.stl", "solid x\nfacet\n")
+    expect_error(run("flexel", "study", "broken.stl", "--scene", "scene.toml", "-o", "study"), "flexel", "broken.stl")
+    expect(before == {p.name: p.read_bytes() for p in pathlib.Path("study").iterdir()}, "what was there is there")
+
+
 def test_without_gnuplot_the_page_says_so():
     box()
     environment = dict(os.environ, PATH="/nowhere")
@@ -276,6 +336,13 @@ def test_bad_arguments_are_refused_at_once():
                              (["box.stl", "--scene", "wrong.toml", "-o", "study"], ["wrong.toml:2", "fxi"]),
                              ([*good, "--budget", "5"], ["unit", "time"]),
                              ([*good, "--budget", "-5 s"], ["--budget"]),
+                             ([*good, "--budget", "0 s"], ["--budget"]),
+                             ([*good, "--budget", "nan s"], ["nan"]),
+                             ([*good, "--against", "calculx"], ["calculx", "did you mean \"calculix\""]),
+                             (["box.stl", "--scene", "no.toml", "-o", "study"], ["no.toml"]),
+                             (["box.stl", "--scene", "scene.toml", "-o", "/proc/study"], ["/proc/study"]),
+                             (["box.stl", "--scene", "scene.toml", "-o", "/proc"], ["/proc"]),
+                             (["box.stl", "--scene", "scene.toml", "-o", "/dev/full"], ["/dev/full", "folder"]),
                              ([*good, "--reference", "tpi=1 mm"], ["tpi", "did you mean \"tip\""]),
                              ([*good, "--reference", "tip=1 N"], ["N"]),
                              ([*good, "--reference", "not.json"], ["not.json", "summary"]),

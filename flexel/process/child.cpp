@@ -1,5 +1,7 @@
-// Child processes. The child is in a process group of its own, so that Ctrl-C reaches it through us alone and
+// The child is in a process group of its own, so that Ctrl-C reaches it through us alone and
 // ends it once; it dies with us, whatever ends us.
+#include "flexel/process/child.h"
+
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
@@ -9,16 +11,17 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
+#include <sstream>
 
-#include "flexel/study/runner.h"
 #include "formats/error.h"
 #include "formats/program.h"
 
-namespace flexel::study {
+namespace flexel {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -30,7 +33,8 @@ double seconds(const timeval& time) {
 }
 
 // Becomes the program. Only what is safe between fork and exec is called.
-[[noreturn]] void become(char* const* argv, int log, int nothing, pid_t parent) {
+[[noreturn]] void become(char* const* argv, char* const* environment, const char* folder, int log,
+                         int nothing, pid_t parent) {
   setpgid(0, 0);
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(127);  // it ended before we asked to end with it
@@ -40,7 +44,7 @@ double seconds(const timeval& time) {
   struct sigaction usual = {};
   usual.sa_handler = SIG_DFL;
   for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGPIPE}) sigaction(signal, &usual, nullptr);
-  execv(argv[0], argv);
+  if (*folder == 0 || chdir(folder) == 0) execve(argv[0], argv, environment);
   _exit(127);
 }
 
@@ -68,37 +72,56 @@ bool has_ended(pid_t child) {
          info.si_pid == child;
 }
 
+// As the kernel wants them: a null pointer at the end.
+std::vector<char*> pointers(const std::vector<std::string>& texts) {
+  std::vector<char*> result;
+  for (const std::string& each : texts) result.push_back(const_cast<char*>(each.c_str()));
+  result.push_back(nullptr);
+  return result;
+}
+
+// Ours, with `more` in the place of what has the same name.
+std::vector<std::string> environment_with(const std::vector<std::string>& more) {
+  std::vector<std::string> result = more;
+  for (char** each = environ; *each != nullptr; ++each) {
+    const std::string_view ours = *each, name = ours.substr(0, ours.find('=') + 1);
+    if (std::none_of(more.begin(), more.end(), [&](const auto& text) { return text.rfind(name, 0) == 0; }))
+      result.emplace_back(ours);
+  }
+  return result;
+}
+
 }  // namespace
 
-ChildRun run_child(const std::vector<std::string>& argv, const std::filesystem::path& log, Deadline deadline,
-                   bool heed_interrupts) {
-  if (heed_interrupts) throw_if_interrupted();
-  std::vector<char*> arguments;
-  for (const std::string& each : argv) arguments.push_back(const_cast<char*>(each.c_str()));
-  arguments.push_back(nullptr);
+ChildRun run_child(const std::vector<std::string>& argv, const ChildOptions& options) {
+  if (options.heed_interrupts) throw_if_interrupted();
+  const std::vector<char*> arguments = pointers(argv);
+  const std::vector<std::string> variables = environment_with(options.environment);
+  const std::vector<char*> environment = pointers(variables);
   if (access(argv.front().c_str(), X_OK) != 0)
     throw InputError(argv.front(), fmt::format("cannot be run: {}", std::strerror(errno)));
-  const Descriptor out(open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+  const Descriptor out(open(options.log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
   if (out.number < 0)
-    throw InputError(log.string(), fmt::format("cannot be written: {}", std::strerror(errno)));
+    throw InputError(options.log.string(), fmt::format("cannot be written: {}", std::strerror(errno)));
   const Descriptor nothing(open("/dev/null", O_RDONLY | O_CLOEXEC));
   const Clock::time_point begin = Clock::now();
   const pid_t parent = getpid();
   const pid_t child = fork();
   if (child < 0) throw InputError(argv.front(), fmt::format("cannot be started: {}", std::strerror(errno)));
-  if (child == 0) become(arguments.data(), out.number, nothing.number, parent);
+  if (child == 0)
+    become(arguments.data(), environment.data(), options.folder.c_str(), out.number, nothing.number, parent);
   // by its number: the header of glibc 2.36 declares pidfd_open for C alone
   const Descriptor handle(static_cast<int>(syscall(SYS_pidfd_open, child, 0)));
   ChildRun result;
   bool told = false;  // it was asked to end
-  Deadline until = deadline;
+  Deadline until = options.deadline;
   pollfd watched = {handle.number, POLLIN, 0};
   while (poll(&watched, 1, patience(until)) <= 0 && !has_ended(child)) {
     const bool late = Clock::now() >= until;
     if (told && late) {
       kill(child, SIGKILL);
       until = kNever;
-    } else if (!told && (late || (heed_interrupts && interrupted()))) {
+    } else if (!told && (late || (options.heed_interrupts && interrupted()))) {
       result.out_of_time = late;
       kill(child, SIGINT);
       told = true;
@@ -113,7 +136,7 @@ ChildRun run_child(const std::vector<std::string>& argv, const std::filesystem::
   result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   result.cpu = seconds(usage.ru_utime) + seconds(usage.ru_stime);
   result.memory = 1024.0 * static_cast<double>(usage.ru_maxrss);
-  if (heed_interrupts) throw_if_interrupted();
+  if (options.heed_interrupts) throw_if_interrupted();
   return result;
 }
 
@@ -126,4 +149,16 @@ std::string own_program(const std::string& name) {
   return program.string();
 }
 
-}  // namespace flexel::study
+std::string find_program(const std::string& name) {
+  const char* paths = std::getenv("PATH");
+  std::istringstream in(paths != nullptr ? paths : "/usr/bin:/bin");
+  for (std::string folder; std::getline(in, folder, ':');) {
+    const std::filesystem::path program = std::filesystem::path(folder) / name;
+    std::error_code ignored;
+    if (access(program.c_str(), X_OK) == 0 && std::filesystem::is_regular_file(program, ignored))
+      return program.string();
+  }
+  return "";
+}
+
+}  // namespace flexel
