@@ -159,7 +159,7 @@ std::string against_part(const Study& study) {
                     quantity(each.ours.uncertainty, each.ours.unit), quantity(each.finest, each.ours.unit),
                     quantity(each.theirs.value, each.ours.unit),
                     quantity(each.theirs.uncertainty, each.ours.unit), each.agree ? "yes" : "no"});
-  out += "<div class=\"wide\">" +
+  out += "<div class=\"wide\" style=\"margin-top:0.8rem\">" +
          table({"quantity", "reference", "uncertain by", "CalculiX, finest", "CalculiX, extrapolated",
                 "uncertain by", "they agree"},
                rows) +

@@ -225,8 +225,9 @@ void Session::run_one(Sweep& sweep, const Trial& trial, const Prediction& predic
   study_.rows.push_back(row);
   append(row);
   if (row.found.ok())
-    progress_.say(fmt::format("{}{}: {} cells, {} (predicted {}), {} (predicted {})", trial.label,
+    progress_.say(fmt::format("{}{}: {} {}, {} (predicted {}), {} (predicted {})", trial.label,
                               first ? "" : fmt::format(", run {}", row.repeat), human_count(row.found.size()),
+                              trial.sweep == "calculix" ? "tetrahedra" : "cells",
                               human_seconds(row.found.wall), human_seconds(predicted.seconds),
                               human_bytes(row.found.memory), human_bytes(predicted.bytes)));
   else
