@@ -28,8 +28,8 @@ PowerLaw prior_of(const std::string& stage, bool timed) {
 
 // Of the L-bracket of docs/accuracy.md, 1,664 to 12,428 tetrahedra.
 PowerLaw calculix_prior(const std::string& stage) {
-  if (stage == "voxelize") return {0.4, 6e-5, 1};
-  if (stage == "solve") return {0.05, 5.5e-6, 1.45};
+  if (stage == "voxelize") return {0.6, 6e-5, 1};
+  if (stage == "solve") return {0.1, 5.5e-6, 1.45};
   return {0, 0, 1};
 }
 

@@ -143,9 +143,9 @@ void Session::run_all(Sweep& sweep) {
   }
 }
 
-std::ptrdiff_t Session::sizes_done() const {
-  return std::count_if(study_.rows.begin(), study_.rows.end(), [](const Row& row) {
-    return row.trial.sweep == "resolution" && row.repeat == 1 && row.found.ok();
+std::ptrdiff_t Session::sizes_done(const std::string& sweep) const {
+  return std::count_if(study_.rows.begin(), study_.rows.end(), [&](const Row& row) {
+    return row.trial.sweep == sweep && row.repeat == 1 && row.found.ok();
   });
 }
 
@@ -155,13 +155,15 @@ bool Session::run_cheapest(Sweep& sweep) {
   if (open.empty()) return false;
   std::vector<Prediction> predicted;
   for (const Trial& trial : open) predicted.push_back(sweep.predict(trial));
-  // The first three sizes go before all else: without them there is nothing to compare with.
+  // The first three sizes go before all else, then the first three of CalculiX: without them there is nothing
+  // to compare with.
   std::size_t best = 0;
   for (std::size_t i = 1; i < open.size(); ++i)
     if (predicted[i].seconds < predicted[best].seconds) best = i;
-  if (sizes_done() < 3)
-    for (std::size_t i = 0; i < open.size(); ++i)
-      if (open[i].sweep == "resolution") best = i;
+  for (const char* sweep : {"calculix", "resolution"})
+    if (sizes_done(sweep) < 3)
+      for (std::size_t i = 0; i < open.size(); ++i)
+        if (open[i].sweep == sweep) best = i;
   const Trial& trial = open[best];
   const Prediction& told = predicted[best];
   std::string why;

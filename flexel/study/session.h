@@ -34,7 +34,7 @@ class Session {
   [[nodiscard]] Sweep look();
   void look_at_other(Sweep& sweep, double volume);
   void run_all(Sweep& sweep);
-  [[nodiscard]] std::ptrdiff_t sizes_done() const;
+  [[nodiscard]] std::ptrdiff_t sizes_done(const std::string& sweep) const;
   bool run_cheapest(Sweep& sweep);
   void repeat_all(Sweep& sweep);
   void run_one(Sweep& sweep, const Trial& trial, const Prediction& predicted);
