@@ -160,10 +160,10 @@ bool Session::run_cheapest(Sweep& sweep) {
   std::size_t best = 0;
   for (std::size_t i = 1; i < open.size(); ++i)
     if (predicted[i].seconds < predicted[best].seconds) best = i;
-  for (const char* sweep : {"calculix", "resolution"})
-    if (sizes_done(sweep) < 3)
+  for (const char* ladder : {"calculix", "resolution"})
+    if (sizes_done(ladder) < 3)
       for (std::size_t i = 0; i < open.size(); ++i)
-        if (open[i].sweep == sweep) best = i;
+        if (open[i].sweep == ladder) best = i;
   const Trial& trial = open[best];
   const Prediction& told = predicted[best];
   std::string why;
