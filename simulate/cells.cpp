@@ -21,6 +21,7 @@ struct PreparedCell {
   double coupling = 0;  // mu - lambda ln J [Pa]
   std::unique_ptr<Mat9> projected;
   std::unique_ptr<Mat3> added_stress;  // to that of the state in the geometric stiffness [Pa]
+  std::unique_ptr<FoldTangent> folding;
 };
 
 Mat3 positive_part(const Mat3& symmetric) {
@@ -49,6 +50,8 @@ PreparedCell prepare(const CellKind& kind, const Mat3& gradient, bool project, c
 
 void add_cell_row(const CellKind& kind, const PreparedCell& cell, double fill, std::size_t a,
                   const std::array<std::uint16_t, 64>& slot, Block* row) {
+  if (cell.folding)
+    for (std::size_t b = 0; b < 8; ++b) row[slot[8 * a + b]] += fill * (*cell.folding)[8 * a + b];
   if (cell.projected) {
     for (std::size_t b = 0; b < 8; ++b)
       row[slot[8 * a + b]] += fill * projected_block(kind, *cell.projected, a, b);
@@ -147,6 +150,16 @@ auto Cells::with_kind(std::uint32_t cell, const Visit& visit) const {
   return visit(kinds_[part]);
 }
 
+bool Cells::may_fold(std::uint32_t cell, const CellVectors& u) const {
+  return !springs_[part_[cell]] && !far_from_folding(kinds_[part_[cell]], u);
+}
+
+CornerThresholds Cells::thresholds(std::uint32_t cell) const {
+  const CellKind& kind = kinds_[part_[cell]];
+  return fold_thresholds(
+      kind, rest_shapes_.any() ? rest_shapes_.of(kind, body_.parts[part_[cell]], cell) : std::nullopt);
+}
+
 double Cells::energy(const State& state) const {
   return parallel_sum<double>(
       body_.cell_count(),
@@ -157,7 +170,9 @@ double Cells::energy(const State& state) const {
         // Springs alone would let a cell turn inside out and stay so.
         if (springs_[part_[c]] && !(volume_change(displacement_gradient(kinds_[part_[c]], u)) > -1))
           return std::numeric_limits<double>::infinity();
-        return share_[c] * with_kind(cell, [&](const auto& kind) { return cell_energy(kind, u); });
+        double energy = with_kind(cell, [&](const auto& kind) { return cell_energy(kind, u); });
+        if (may_fold(cell, u)) energy += fold_energy(kinds_[part_[c]], thresholds(cell), u);
+        return share_[c] * energy;
       },
       kGrain);
 }
@@ -171,6 +186,7 @@ void Cells::add_forces(const State& state, std::vector<Vec3>& forces) {
         const auto cell = static_cast<std::uint32_t>(c);
         const CellVectors u = corner_values(cell, state.displacement);
         corner_force_[c] = with_kind(cell, [&](const auto& kind) { return cell_forces(kind, u); });
+        if (may_fold(cell, u)) add_fold_forces(kinds_[part_[c]], thresholds(cell), u, corner_force_[c]);
         for (Vec3& force : corner_force_[c]) force *= share_[c];
       },
       kGrain);
@@ -193,6 +209,9 @@ void Cells::set_stiffness(const State& state, const TangentOptions& tangent, Blo
             prepared[c] = prepare(kind, displacement_gradient(kind, u), tangent.project,
                                   tangent.stress ? &(*tangent.stress)[c] : nullptr);
         });
+        if (!may_fold(cell, u)) return;
+        if (const auto folding = fold_tangent(kinds_[part_[c]], thresholds(cell), u, tangent.project))
+          prepared[c].folding = std::make_unique<FoldTangent>(*folding);
       },
       kGrain);
   parallel_for_each(

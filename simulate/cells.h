@@ -1,10 +1,10 @@
 // The cells of a body: every unbroken one resists by its part's model, simulate/cell_model.h or
-// simulate/spring_model.h, from its own rest shape where it has one (simulate/rest_shape.h), scaled by its
-// fill and what an edit made of its stiffness.
+// simulate/spring_model.h, with what keeps corners from folding (simulate/fold_barrier.h), from its own rest
+// shape where it has one (simulate/rest_shape.h), scaled by its fill and what an edit made of its stiffness.
 #pragma once
 #include <optional>
 
-#include "simulate/cell_model.h"
+#include "simulate/fold_barrier.h"
 #include "simulate/rest_shape.h"
 #include "simulate/spring_model.h"
 #include "simulate/state.h"
@@ -49,6 +49,9 @@ class Cells {
   [[nodiscard]] SmallestJacobian smallest_corner_jacobian(const State& state) const;
 
  private:
+  // What keeps the corners of a cell that moves by `displacement` [m] from folding; 0 or nothing elsewhere.
+  [[nodiscard]] bool may_fold(std::uint32_t cell, const CellVectors& displacement) const;
+  [[nodiscard]] CornerThresholds thresholds(std::uint32_t cell) const;
   [[nodiscard]] CellVectors corner_values(std::uint32_t cell, const std::vector<Vec3>& values) const;
   // Calls visit(kind) with what the cell is: a CellKind or a SpringKind.
   template <class Visit>

@@ -3,6 +3,12 @@
 // with steps that lower the energy too, which also pass a buckling or a snap. One that succeeds lets the next
 // be twice as long. The Newton iterations of a run are bounded: a scene without an equilibrium ends in the
 // time of some hundred linear solutions.
+//
+// A rotation is followed along its arc, a quarter of a turn a load step at most: further on the straight way
+// to its end is none, and a whole turn would end where it began. Where the load steps shrink to nothing
+// though the forces are all but balanced, the part buckles, and symmetry keeps Newton's method on the branch
+// that is not stable any more. There a small, smooth push to a side starts steps that lower the energy; what
+// they end in is an equilibrium like any other, without the push.
 #include "simulate/equilibrium.h"
 
 #include <fmt/format.h>
@@ -10,6 +16,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "formats/error.h"
 #include "formats/program.h"
@@ -26,8 +33,14 @@ constexpr int kFullStepIterations = 20;
 constexpr int kIterations = 100;            // of Newton in a run, unless the scene says
 constexpr int kOverloadIterations = 40;     // likewise where the load is out of proportion
 constexpr int kIterationsPerLoadStep = 10;  // that one which ends in equilibrium adds to those of the run
-constexpr double kUnsupported = 1e-9;       // of the stiffness of an element in its stiffest direction
-constexpr double kOverload = 3;  // diagonals: a first linear answer beyond this suggests a wrong unit
+constexpr double kLargestTurn = 0.25;       // turns, of a rotation in one load step
+constexpr double kBalanced = 1e-3;          // relative residual of an attempt that fails as buckling does
+constexpr double kPush = 0.01;              // of the spacing, to leave a branch with
+constexpr double kPushedIncrement = 0.25;   // of the first load step: how far beyond the branching
+constexpr int kPushedIterations = 300;
+constexpr int kMostPushes = 4;         // of a run
+constexpr double kUnsupported = 1e-9;  // of the stiffness of an element in its stiffest direction
+constexpr double kOverload = 3;        // diagonals: a first linear answer beyond this suggests a wrong unit
 
 std::string axis_name(const Vec3& direction) {
   for (int axis = 0; axis < 3; ++axis)
@@ -44,6 +57,14 @@ std::string point_name(const Vec3& at) {
   return fmt::format("({}, {}, {})", human_length(at.x()), human_length(at.y()), human_length(at.z()));
 }
 
+// Load steps that follow every rotation along its arc.
+int least_load_steps(const Constraints& constraints) {
+  double turns = 0;
+  for (const Motion& motion : constraints.motions)
+    turns = std::max(turns, std::abs(motion.angle) / (2 * std::numbers::pi));
+  return static_cast<int>(std::ceil(turns / kLargestTurn - 1e-9));
+}
+
 // A run over load steps.
 class LoadStepping {
  public:
@@ -54,7 +75,7 @@ class LoadStepping {
         settings_(settings),
         deadline_(deadline),
         progress_(progress),
-        first_(1.0 / settings.load_steps),
+        first_(1.0 / std::max(settings.load_steps, least_load_steps(mechanics.constraints()))),
         increment_(first_) {}
 
   EquilibriumResult operator()();
@@ -65,6 +86,9 @@ class LoadStepping {
   [[nodiscard]] bool gives_up() const {
     return increment_ <= kSmallestIncrement * first_ || iterations_left() <= 0;
   }
+  // Tries to leave a branch that is not stable beyond what is done; true and moved on when it was left.
+  bool branch_off();
+  void push(State& state) const;
   [[nodiscard]] bool overloaded() const {
     return reach_ > kOverload * bounding_box(mechanics_.body().rest).diagonal();
   }
@@ -81,12 +105,15 @@ class LoadStepping {
   EquilibriumResult result_;
   State trial_;  // of the last attempt
   NewtonOutcome outcome_;
-  double reach_ = 0;  // m: of the first linear answer, for the whole load
+  double reach_ = 0;     // m: of the first linear answer, for the whole load
+  bool pushed_ = false;  // the next attempt starts beside the last equilibrium
+  int pushes_ = 0;
 };
 
 int LoadStepping::iterations_left() const {
   const int allowed = settings_.newton_iterations.value_or(overloaded() ? kOverloadIterations : kIterations);
-  return allowed + kIterationsPerLoadStep * result_.load_steps - result_.newton_iterations;
+  return allowed + kIterationsPerLoadStep * result_.load_steps + kPushedIterations * pushes_ -
+         result_.newton_iterations;
 }
 
 void LoadStepping::stop_when_asked() const {
@@ -104,6 +131,7 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   options.max_iterations = std::min(max_iterations, iterations_left());
   trial_ = state_;
   trial_.share = done_ + increment_ > 1 - 1e-9 ? 1 : done_ + increment_;
+  if (pushed_) push(trial_);
   outcome_ = newton_with_links(mechanics_, trial_, options, [&](const std::string& note) {
     stop_when_asked();
     progress_.update(done_, fmt::format("load {:.3g} %, {}", 100 * trial_.share, note));
@@ -144,14 +172,51 @@ void LoadStepping::diverge() const {
                   point_name(worst.rest), body.parts[worst.part].name, worst.value, advice));
 }
 
+// Linear over the body, in directions that no symmetry of a part is likely to have.
+void LoadStepping::push(State& state) const {
+  const Body& body = mechanics_.body();
+  const Box box = bounding_box(body.rest);
+  const Vec3 middle = 0.5 * (box.min + box.max), half = 0.5 * (box.max - box.min).cwiseMax(1e-300);
+  const std::vector<std::uint32_t> part = element_parts(body);
+  const Constraints& constraints = mechanics_.constraints();
+  Mat3 slope;
+  slope << 0.2, 0.5, -0.7, -0.3, 0.1, 0.6, 0.4, -0.6, 0.3;
+  for (std::size_t e = 0; e < body.element_count(); ++e) {
+    const Vec3 at = (body.rest[e] - middle).cwiseQuotient(half);
+    const Vec3 way = Vec3(0.6, 0.7, 0.4) + slope * at;
+    for (int axis = 0; axis < 3; ++axis)
+      if (!(constraints.mask[e] >> axis & 1))
+        state.displacement[e][axis] += kPush * body.parts[part[e]].lattice.spacing.mean() * way[axis];
+  }
+}
+
+bool LoadStepping::branch_off() {
+  if (!(done_ > 0) || overloaded() || outcome_.relative_residual > kBalanced || pushes_ == kMostPushes)
+    return false;
+  ++pushes_;
+  const double from = done_;
+  increment_ = kPushedIncrement * first_;
+  pushed_ = true;
+  const bool left = attempt(NewtonSteps::lowering, kPushedIterations);
+  pushed_ = false;
+  if (left)
+    progress_.say(
+        fmt::format("the part buckles at {:.4g} % of the load; beyond it, one of several shapes "
+                    "that it may take",
+                    100 * from));
+  return left;
+}
+
 EquilibriumResult LoadStepping::operator()() {
   while (done_ < 1) {
     if (attempt(NewtonSteps::full, kFullStepIterations)) continue;
     if (iterations_left() > 0 && increment_ <= kLoweringIncrement * first_ &&
         attempt(NewtonSteps::lowering, NewtonOptions().max_iterations))
       continue;
-    if (gives_up()) diverge();
-    increment_ /= 2;
+    if (!gives_up())
+      increment_ /= 2;
+    else if (!branch_off())
+      diverge();
   }
   return result_;
 }

@@ -18,6 +18,7 @@ namespace flexel {
 namespace {
 
 constexpr double kSafety = 0.9;       // of the bound: it may fall between two checks
+constexpr double kAhead = 100;        // steps from one of them to the next
 constexpr int kImplicitSteps = 200;   // in a run, unless the scene says otherwise
 constexpr int kFailures = 30;         // of Newton's method within an implicit step
 constexpr std::uint64_t kRenew = 10;  // implicit steps that one tangent may serve
@@ -58,7 +59,10 @@ Act::Act(Body& body, const Scene& scene, const SimulateOptions& options, Progres
   held_.emplace(constraints_, body_, state_, fresh);
   if (!by_steps) implicit_.emplace(*stepper_, *held_);
   make_forces();
-  if (implicit) make_implicit();
+  if (implicit)
+    make_implicit();
+  else if (body.cell_count() > 0)
+    guard_.emplace(setting_);
 }
 
 void Act::spare_mass() {
@@ -121,6 +125,8 @@ std::unique_ptr<History> Act::make_history(Ledger ledger) const {
 void Act::look() {
   stepper_->mark_broken(body_.broken);
   bound_->look(state_, paper_ ? &*paper_ : nullptr, stepper_->mass());
+  if (guard_)
+    guard_->look(state_, kAhead * std::min(bound_->longest(implicit_.has_value()), *scene_.run.time));
 }
 
 void Act::choose_step(Clock& clock) {
@@ -172,6 +178,7 @@ void Act::adapt_step(Clock& clock) {
 }
 
 bool Act::hurried() const {
+  if (guard_ && guard_->hurried()) return true;
   return std::any_of(passes_.begin(), passes_.end(),
                      [&](const Pass& pass) { return pass.wants_check && pass.wants_check(state_); });
 }
@@ -188,8 +195,10 @@ void Act::add_apart(std::vector<Vec3>* own, const Add& add) {
 // Forces of the passes at the present state; with a history also one by one, those that are constant but
 // once.
 void Act::sum_forces(History* history) {
-  if (!varies_) return;
+  const bool guarded = guard_ && guard_->watches();
+  if (!varies_ && !guarded) return;
   outer_ = steady_;
+  if (outer_.empty()) outer_.assign(body_.element_count(), Vec3::Zero());
   for (std::size_t p = 0; p < passes_.size(); ++p) {
     Pass& pass = passes_[p];
     if (!pass.add_forces || pass.constant) continue;
@@ -198,6 +207,13 @@ void Act::sum_forces(History* history) {
               [&](std::vector<Vec3>& sum) { pass.add_forces(state_, sum); });
   }
   if (paper_) add_connection_forces(history);
+  if (!guarded) return;
+  const PassTimer timer(kernel_seconds_);
+  guard_->add_forces(state_, outer_);
+}
+
+const std::vector<Vec3>& Act::outer() const {
+  return varies_ || (guard_ && guard_->watches()) ? outer_ : steady_;
 }
 
 void Act::add_connection_forces(History* history) {
@@ -273,7 +289,7 @@ void Act::restore(const Memory& memory) {
 
 void Act::step(Clock& clock, History* history, bool row) {
   if (euler_) return step_implicitly(clock, history, row);
-  if (history) history->before(state_, row);
+  if (history) history->before(state_, row, row && guard_ ? guard_->energy(state_) : 0);
   const bool first = clock.steps == 0;
   const double before = first ? (scene_.run.method == TimeMethod::verlet ? 0 : clock.step) : clock.previous;
   const step::Advance advance{0.5 * (before + clock.step), clock.step,
@@ -284,9 +300,11 @@ void Act::step(Clock& clock, History* history, bool row) {
   const double end = clock.epoch + static_cast<double>(clock.in_epoch + 1) * clock.step;
   {
     const PassTimer timer(kernel_seconds_);
-    const std::vector<Vec3>& outer = varies_ ? outer_ : steady_;
-    outcome = implicit_ ? implicit_->advance(state_, outer, advance, end)
-                        : stepper_->advance(state_, outer, advance);
+    const std::vector<Vec3>& forces = outer();
+    outcome = implicit_ ? implicit_->advance(state_, forces, advance, end)
+                        : stepper_->advance(state_, forces, advance);
+    if (outcome.broken > 0 && guard_ && guard_->watches() && stepper_->mark_broken(body_.broken))
+      outcome.released += guard_->drop_broken(state_);
   }
   ++clock.in_epoch;
   ++clock.steps;
@@ -312,14 +330,6 @@ void Act::slow(double factor) {
     if (pass.begin) pass.begin(state_);
 }
 
-void Act::tell_forces(SimulateResult& result) const {
-  std::vector<Vec3> unbalanced(body_.element_count(), Vec3::Zero());
-  held_->add_forces(unbalanced);
-  for (Vec3& force : unbalanced) force = -force;
-  for (const Pass& pass : passes_)
-    if (pass.report) pass.report(state_, unbalanced, result);
-}
-
 bool Act::kicks() const {
   return !euler_ && !implicit_ && scene_.run.method != TimeMethod::explicit_euler &&
          std::none_of(passes_.begin(), passes_.end(),
@@ -331,7 +341,7 @@ void Act::kick(double time) {
   const std::vector<Vec3> before = state_.velocity;
   state_.kick = std::abs(time);
   sum_forces(nullptr);
-  (void)stepper_->advance(state_, varies_ ? outer_ : steady_, {time, 0, false});
+  (void)stepper_->advance(state_, outer(), {time, 0, false});
   held_->copy(before, state_.velocity);
   stepper_->restore(memory);
 }
@@ -349,37 +359,6 @@ void Act::close_books(const Clock& clock, History& history) {
 
 bool Act::damps() const {
   return std::any_of(plan_.damping.begin(), plan_.damping.end(), [](double tau) { return tau > 0; });
-}
-
-void Act::report(const Clock& clock, bool stress, SimulateResult& result) {
-  tell_forces(result);
-  for (const ProbePoints& probe : probes_) result.probes.push_back(measure(probe, state_));
-  const Stencil none;
-  const Cells cells(setting_, none);
-  const std::optional<double> inelastic = stepper_->elastic_energy(state_);
-  result.elastic_energy =
-      (inelastic ? *inelastic : cells.energy(state_)) + (paper_ ? paper_->energy(state_) : 0);
-  if (body_.cell_count() > 0) result.smallest_jacobian = cells.smallest_jacobian(state_).value;
-  if (paper_)
-    result.smallest_jacobian = std::min(result.smallest_jacobian, paper_->smallest_volume(state_).value);
-  measure_corners(cells, body_, state_, result, progress_);
-  if (stress) measure_stress(setting_, state_, body_, result);
-  measure_displacement(body_, state_, result);
-  for (const double mass : lumped_masses(setting_)) result.mass += mass;
-  result.timed = TimedSummary{*state_.time, clock.steps, clock.step, stepper_->isa(), {}};
-}
-
-void Act::add_effort(SimulateResult& result) {
-  result.newton_iterations += newton_iterations_;
-  result.cg_iterations += cg_iterations_;
-  if (euler_) euler_->add_seconds(passes_);
-  std::vector<PassShare> shares{{"cells",
-                                 euler_ ? "model of every part, Newton's method and its linear solver"
-                                        : fmt::format("model of every part, kernel {}", stepper_->isa()),
-                                 kernel_seconds_}};
-  if (paper_) shares.push_back({"connections", "model of centre-placed parts", paper_seconds_});
-  for (const Pass& pass : passes_) shares.push_back({pass.name, pass.why, pass.seconds});
-  add_shares(shares, result.passes);
 }
 
 }  // namespace flexel

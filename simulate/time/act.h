@@ -9,6 +9,7 @@
 #include "simulate/events/event.h"
 #include "simulate/scene.h"
 #include "simulate/simulate.h"
+#include "simulate/time/fold_guard.h"
 #include "simulate/time/held.h"
 #include "simulate/time/history.h"
 #include "simulate/time/implicit_damping.h"
@@ -99,8 +100,9 @@ class Act {
   void spare_mass();
   // Frees what the next store() makes anew: positions and velocities of the body.
   void unload();
-  // Adds the time of everything that acted, and the iterations, to `result`; once.
-  void add_effort(SimulateResult& result);
+  // Adds the time of everything that acted, and the iterations, to `result`; once. `explained`: the time of
+  // the effects in the hot loop apart from that of the model, which takes some steps more to tell.
+  void add_effort(SimulateResult& result, bool explained);
   // What can be measured now, with the stresses where they are asked for. `unbalanced` forces are those of
   // the last step.
   void report(const Clock& clock, bool stress, SimulateResult& result);
@@ -119,9 +121,12 @@ class Act {
   void refuse_held_rigid() const;
   void step_implicitly(Clock& clock, History* history, bool row);
   void look();
+  void tell_loop_apart();
   template <class Add>
   void add_apart(std::vector<Vec3>* own, const Add& add);
   void sum_forces(History* history);
+  // Forces of the passes at the present state; none: empty.
+  [[nodiscard]] const std::vector<Vec3>& outer() const;
   void add_connection_forces(History* history);
 
   Body& body_;
@@ -141,6 +146,7 @@ class Act {
   std::optional<ImplicitEuler> euler_;
   std::function<void(const std::string&)> hear_ = [](const std::string&) {};
   std::optional<StepBound> bound_;
+  std::optional<FoldGuard> guard_;    // of explicit steps of model `cells`
   std::vector<Vec3> steady_, outer_;  // (elements) N, of the passes that are constant; of all
   bool varies_ = false;
   double kernel_seconds_ = 0, paper_seconds_ = 0;

@@ -87,14 +87,14 @@ History::History(const Setting& setting, const std::vector<Pass>& passes,
     ledger_.columns.insert(ledger_.columns.end(), pass.history_columns.begin(), pass.history_columns.end());
 }
 
-void History::before(const State& state, bool sample) {
+void History::before(const State& state, bool sample, double folding) {
   velocity_ = state.velocity;
   sample_ = sample;
   time_ = *state.time;
   if (!sample) return;
   sampled_.displacement = state.displacement;
   // with plasticity, fracture or rest shapes the step tells that of the cells
-  elastic_ = (remembers_ ? 0 : cells_.energy(state)) + (paper_ ? paper_->energy(state) : 0);
+  elastic_ = (remembers_ ? folding : cells_.energy(state)) + (paper_ ? paper_->energy(state) : 0);
   potential_ = 0;
   for (const Pass& pass : passes_)
     if (pass.book == Book::potential && pass.energy) potential_ += pass.energy(state);

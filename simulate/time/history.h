@@ -65,8 +65,9 @@ class History {
   History(const Setting& setting, const std::vector<Pass>& passes, const std::vector<ProbePoints>& probes,
           const std::vector<double>& mass, const PaperModel* paper, const StepPlan& plan, Ledger ledger = {});
 
-  // Before a step: keeps the velocities and, where `sample`, the energies of the state.
-  void before(const State& state, bool sample);
+  // Before a step: keeps the velocities and, where `sample`, the energies of the state. `folding`: of the
+  // barriers of cells [J], which those that the step itself tells the energy of do not know.
+  void before(const State& state, bool sample, double folding = 0);
   // The forces of pass p [N] (elements) at the state before the step.
   [[nodiscard]] std::vector<Vec3>& forces_of(std::size_t pass) { return forces_[pass]; }
   // Likewise of the damping of connections.

@@ -31,6 +31,7 @@ class ImplicitDamping {
                       double time);
 
   [[nodiscard]] std::uint64_t iterations() const { return iterations_; }  // of all steps
+  [[nodiscard]] double seconds() const { return seconds_; }  // likewise, beyond those of an explicit step
   // Where the next search starts [m/s] (elements; or none before the first step).
   [[nodiscard]] const std::vector<Vec3>& change() const { return change_; }
   void set_change(std::vector<Vec3> change) { change_ = std::move(change); }
@@ -46,6 +47,7 @@ class ImplicitDamping {
   State probe_;
   int most_;
   std::uint64_t iterations_ = 0;
+  double seconds_ = 0;
 };
 
 }  // namespace flexel

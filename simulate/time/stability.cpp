@@ -8,6 +8,7 @@
 
 #include "formats/parallel.h"
 #include "simulate/cells.h"
+#include "simulate/fold_barrier.h"
 #include "simulate/greatest.h"
 #include "simulate/rest_shape.h"
 
@@ -147,12 +148,17 @@ std::vector<double> stiffening(const Setting& setting, const std::vector<Vec3>& 
         return Greatest{std::numeric_limits<double>::infinity()};
       const auto cell = static_cast<std::uint32_t>(c);
       const double factor = edited ? stiffness[c] / mass[c] : 1;
-      if (!shapes.any())
-        return Greatest{factor * (by_springs ? springs_stiffening(springs, u)
-                                             : cell_stiffening(cells, u, plastic, std::nullopt))};
       if (by_springs)
-        return Greatest{factor * springs_stiffening(shapes.of(springs, cell).value_or(springs), u)};
-      return Greatest{factor * cell_stiffening(cells, u, plastic, shapes.of(cells, part, cell))};
+        return Greatest{factor * springs_stiffening(
+                                     shapes.any() ? shapes.of(springs, cell).value_or(springs) : springs, u)};
+      if (!shapes.any()) {
+        double stiffer = cell_stiffening(cells, u, plastic, std::nullopt);
+        stiffer += fold_stiffening(cells, fold_thresholds(cells, std::nullopt), u);
+        return Greatest{factor * stiffer};
+      }
+      const std::optional<CellKind> shaped = shapes.of(cells, part, cell);
+      return Greatest{factor * (cell_stiffening(cells, u, plastic, shaped) +
+                                fold_stiffening(cells, fold_thresholds(cells, shaped), u))};
     });
     result.push_back(std::max(1.0, greatest.value));
   }

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 
@@ -49,6 +50,8 @@ struct Lowest {
     return *this;
   }
 };
+
+constexpr int kTimedRuns = 5;
 
 void move_element(std::size_t e, const double* force, const step::StateView& view,
                   const step::Advance& advance) {
@@ -136,6 +139,7 @@ void Stepper::choose_kernels(const Setting& setting, const StepPlan& plan) {
     springs_break = springs_break || (springs && booking.fracture);
     if (book_ && (plastic || fractures_ || plan.damping[p] > 0)) has = booking;
     kernel_.push_back(kernels[step::variant_number(has)]);
+    composition_.push_back(has);
     booking_.push_back(kernels[step::variant_number(booking)]);
   }
   book_ = book_ && (damped || plastic || fractures_);
@@ -160,6 +164,38 @@ std::optional<double> Stepper::elastic_energy(const State& state) {
   book_ = book;
   restore(kept);
   return outcome.elastic;
+}
+
+Stepper::Shares Stepper::time_shares(const State& state) {
+  const Memory kept = memory();
+  const std::vector<step::ChunkKernel> kernels = kernel_;
+  State copy = state;
+  // `with`: damping, plasticity, fracture in this order, as many of them
+  const auto seconds = [&](int with) {
+    for (std::size_t kind = 0; kind < kernels.size(); ++kind) {
+      step::Composition has = composition_[kind];
+      const bool springs = std::find(table_->springs, table_->springs + step::kVariants, kernels[kind]) !=
+                           table_->springs + step::kVariants;
+      if (with < 1) has.damping = step::Damping::none;
+      if (with < 2 && !springs) has.plasticity = false;
+      if (with < 3 && !springs) has.fracture = false;
+      kernel_[kind] = (springs ? table_->springs : table_->cells)[step::variant_number(has)];
+    }
+    double least = std::numeric_limits<double>::infinity();
+    for (int i = 0; i < kTimedRuns; ++i) {
+      const auto began = std::chrono::steady_clock::now();
+      (void)advance(copy, {}, {0, 0, false});
+      least =
+          std::min(least, std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count());
+      restore(kept);
+    }
+    return least;
+  };
+  (void)seconds(3);
+  const double all = seconds(3), flowing = seconds(2), damped = seconds(1), bare = seconds(0);
+  kernel_ = kernels;
+  const auto share = [&](double more, double less) { return std::max(0.0, (more - less) / all); };
+  return {share(damped, bare), share(flowing, damped), share(all, flowing)};
 }
 
 std::size_t Stepper::bytes() const {

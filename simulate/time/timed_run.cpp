@@ -247,7 +247,7 @@ SimulateResult TimedRun::report() {
   SimulateResult& result = result_;
   act_->report(clock_, options_.stress, result);
   result.timed->live = live_summary_;
-  act_->add_effort(result);
+  act_->add_effort(result, options_.explain);
   if (history_) {
     const Ledger& ledger = history_->ledger();
     const Energies& last = ledger.rows.back().energies;
@@ -319,7 +319,7 @@ void TimedRun::happen(std::size_t end) {
   at_whole_step_ = clock_.steps > 0 && act_->kicks();
   if (at_whole_step_) act_->kick(0.5 * clock_.previous);
   act_->store(act_->state());
-  act_->add_effort(result_);
+  act_->add_effort(result_, options_.explain);
   State state = act_->state();
   beginning_.fresh = false;
   act_.reset();
