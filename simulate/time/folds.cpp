@@ -5,6 +5,7 @@
 
 #include "formats/units.h"
 #include "simulate/cells.h"
+#include "simulate/paper_model.h"
 
 namespace flexel {
 
@@ -41,13 +42,26 @@ std::string runs_away_at(const Vec3& at, TimeMethod method) {
           : "look at loads and units, or give a shorter [run] step");
 }
 
+std::string fastest_near(const Body& body, const State& state) {
+  std::size_t fastest = 0;
+  for (std::size_t e = 0; e < state.velocity.size(); ++e)
+    if (!(state.velocity[e].squaredNorm() <= state.velocity[fastest].squaredNorm())) fastest = e;
+  return place(body.rest[fastest]);
+}
+
 std::string where_it_folds(const Setting& setting, const State& state) {
   if (setting.body.cell_count() == 0) return "an element's position is not a number";
   return folds_at("a cell", rest_of(setting, smallest(setting, state).cell));
 }
 
 std::string squeezed_most(const Setting& setting, const State& state) {
-  if (setting.body.cell_count() == 0) return "";
+  if (setting.body.cell_count() == 0) {
+    const PaperModel paper(setting);
+    if (paper.rows().entries.empty()) return "";
+    const PaperModel::SmallestVolume least = paper.smallest_volume(state);
+    return fmt::format(", squeezed most near {}, to J = {:.2g}", place(setting.body.rest[least.element]),
+                       least.value);
+  }
   const SmallestJacobian most = smallest(setting, state);
   return fmt::format(", squeezed most near {}, to J = {:.2g}", place(rest_of(setting, most.cell)),
                      most.value);

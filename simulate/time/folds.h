@@ -16,7 +16,10 @@ namespace flexel {
 // That of the cell with the least volume.
 [[nodiscard]] std::string where_it_folds(const Setting& setting, const State& state);
 
-// ", squeezed most near (...), to J = 0.02", of the same cell; nothing without cells.
+// "(...)": where the element rests that moves fastest.
+[[nodiscard]] std::string fastest_near(const Body& body, const State& state);
+
+// ", squeezed most near (...), to J = 0.02", of the same cell, or of an element where there are none.
 [[nodiscard]] std::string squeezed_most(const Setting& setting, const State& state);
 
 // Damping that its conjugate gradients did not solve for in so many iterations, worst at `at` [m].

@@ -9,6 +9,7 @@
 #include "formats/error.h"
 #include "formats/parallel.h"
 #include "simulate/report.h"
+#include "simulate/time/folds.h"
 
 namespace flexel {
 namespace {
@@ -120,12 +121,14 @@ void Settling::report(SimulateResult& result) const {
   }
 }
 
-std::string Settling::failure() const {
+std::string Settling::failure(const Body& body, const State& state) const {
   return fmt::format(
       "the body does not come to rest: after {} steps the forces left over are {:.2g} of loads and reactions "
-      "(tolerance {:.2g}), the kinetic energy {:.3g} J; look for a part that nothing stops, or give [run] a "
+      "(tolerance {:.2g}), the kinetic energy {:.3g} J, fastest near {}; look for a part that nothing stops, "
+      "or "
+      "give [run] a "
       "larger tolerance",
-      summary_.steps, summary_.residual, summary_.tolerance, summary_.kinetic);
+      summary_.steps, summary_.residual, summary_.tolerance, summary_.kinetic, fastest_near(body, state));
 }
 
 }  // namespace flexel

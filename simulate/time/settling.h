@@ -38,7 +38,7 @@ class Settling {
   [[nodiscard]] const SettleSummary& summary() const { return summary_; }
   void report(SimulateResult& result) const;
   // Why the run, which has come to its end, has failed.
-  [[nodiscard]] std::string failure() const;
+  [[nodiscard]] std::string failure(const Body& body, const State& state) const;
 
  private:
   static constexpr std::uint64_t kLook = 20;  // steps between two looks at the residual

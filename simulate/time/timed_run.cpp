@@ -354,7 +354,7 @@ void TimedRun::play() {
     happen(end);
   }
   play_until(duration_, resumed);
-  if (settling_ && !settling_->done()) throw DivergedError(settling_->failure());
+  if (settling_ && !settling_->done()) throw DivergedError(settling_->failure(body_, act_->state()));
   if (live_) live_summary_ = live_->finish(act_->state());
   if (history_) act_->close_books(clock_, *history_);
 }
