@@ -51,7 +51,10 @@ void Session::note_against() {
     if (row.found.ok()) return;
     if (failed == nullptr) failed = &row;
   }
-  study_.against.refused = failed != nullptr ? failed->found.failure : "the budget did not reach for a run";
+  std::string why = interrupted_ ? "the study was interrupted before" : "the budget did not reach for it";
+  for (const LeftOut& each : study_.left_out)
+    if (each.trial.sweep == "calculix") why = each.why;
+  study_.against.refused = failed != nullptr ? failed->found.failure : why;
   study_.notes.push_back("There is no run of CalculiX: " + study_.against.refused);
   progress_.warn(study_.notes.back());
 }
