@@ -121,11 +121,14 @@ bool has_large_hole(const HealedPart& part) {
 }
 
 std::string why_undecided(const HealedPart& part, const std::string& name) {
+  // A small shell that is open says nothing of the part.
+  const auto weight = [](const Hole& hole) { return std::pair{hole.shell_share > kMajorShell, hole.share}; };
   const auto largest = std::max_element(part.holes.begin(), part.holes.end(),
-                                        [](const Hole& a, const Hole& b) { return a.share < b.share; });
+                                        [&](const Hole& a, const Hole& b) { return weight(a) < weight(b); });
   constexpr double kSheet = .3;
   const std::string edges = fmt::format("{} open edges", human_count(part.mesh.open_edges));
-  if (largest != part.holes.end() && part.holes.size() <= 4 && largest->share >= kSheet)
+  if (largest != part.holes.end() && part.holes.size() <= 4 && largest->share >= kSheet &&
+      largest->shell_share > kMajorShell)
     return fmt::format(
         "part \"{}\" encloses no volume: its surface is a sheet with {}; give it a thickness or close it",
         name, edges);

@@ -1,5 +1,8 @@
 // The vote is taken if the winding numbers confirm it, else the flood if they confirm that, else the vote if
-// the flood confirms it (orientation is unusable then). Fill counts samples by their distance to the surface:
+// the flood confirms it (orientation is unusable then). Where the lattice is so coarse that its samples pass
+// over what the surface bounds, and nobody agrees, they are asked once more on a finer one: what a surface
+// encloses does not depend on the cells that somebody wants. Fill counts samples by their distance to the
+// surface:
 // a sample is a small cube of which a plane at distance d from its centre leaves 1/2 - d on average over
 // directions.
 #include "voxelize/judge.h"
@@ -7,6 +10,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <optional>
 
 #include "formats/parallel.h"
 #include "voxelize/heal_vdb.h"
@@ -17,7 +21,9 @@
 namespace flexel {
 namespace {
 
-constexpr std::size_t kJudged = 100000;  // samples judged by all three
+constexpr std::size_t kJudged = 100000;       // samples judged by all three
+constexpr std::size_t kJudgedVoxels = 15000;  // of a lattice that is fine enough to judge by
+constexpr int kFinest = 9;                    // times as fine
 
 struct Counts {
   double vote = 0, flood = 0, winding = 0, vote_flood = 0, vote_winding = 0, flood_winding = 0, unsure = 0;
@@ -116,13 +122,44 @@ Sampled::By decide(const Agreement& a, bool unanimous) {
   return Sampled::By::nobody;
 }
 
-VoxelSamples decided(const Judges& judges, Sampled::By by, int i, int j, int k) {
+// The same surface on a lattice `times` as fine as the one that it lies on.
+PartMesh refined(PartMesh mesh, int times) {
+  for (Vec3& vertex : mesh.vertices) vertex *= times;
+  return mesh;
+}
+
+// How much finer a lattice has to be to be judged by: an odd number, so that samples lie on samples.
+int refinement(std::size_t voxels) {
+  int times = 1;
+  while (times < kFinest && voxels * static_cast<std::size_t>(times * times * times) < kJudgedVoxels)
+    times += 2;
+  return times;
+}
+
+// Who is right, and the flood that said so: that of a lattice `times` as fine.
+struct Verdict {
+  Sampled::By by = Sampled::By::nobody;
+  const Judges* flood = nullptr;
+  int times = 1;
+  // Sample `bit` of voxel (i, j, k) is not reached by the flood.
+  [[nodiscard]] bool encloses(const Range& range, const std::array<int, 3>& voxel, std::size_t bit) const {
+    const std::size_t offset[3] = {bit & 3, bit >> 2 & 3, bit >> 4};
+    std::array<int, 3> at{};
+    for (int a = 0; a < 3; ++a)
+      at[a] = times * (kSamples * (range.begin[a] + voxel[a]) + static_cast<int>(offset[a])) + times / 2 -
+              kSamples * flood->range.begin[a];
+    return flood->distances.at(at[0], at[1], at[2]) < 0;
+  }
+};
+
+VoxelSamples decided(const Judges& judges, const Verdict& verdict, int i, int j, int k) {
   VoxelSamples samples = judges.vote.samples(i, j, k);
   std::array<float, 64> distance;
   judges.distances.voxel(i, j, k, distance);
-  if (by == Sampled::By::flood) {
+  if (verdict.by == Sampled::By::flood) {
     samples.inside = 0;
-    for (std::size_t bit = 0; bit < 64; ++bit) samples.inside |= std::uint64_t{distance[bit] < 0} << bit;
+    for (std::size_t bit = 0; bit < 64; ++bit)
+      samples.inside |= std::uint64_t{verdict.encloses(judges.range, {i, j, k}, bit)} << bit;
   }
   samples.fill = 0;
   std::uint64_t touched = 0;
@@ -143,10 +180,19 @@ Sampled classify_sampled(const PartMesh& mesh, bool unanimous) {
   const Judges judges(mesh);
   Sampled result;
   result.agreement = agreement(judges);
-  result.by = decide(result.agreement, unanimous);
+  Verdict verdict{decide(result.agreement, unanimous), &judges, 1};
+  std::optional<PartMesh> fine;
+  std::optional<Judges> finer;
+  if (const int times = refinement(judges.range.voxels()); verdict.by == Sampled::By::nobody && times > 1) {
+    fine = refined(mesh, times);
+    finer.emplace(*fine);
+    result.agreement = agreement(*finer);
+    verdict = {decide(result.agreement, unanimous), &*finer, times};
+  }
+  result.by = verdict.by;
   if (result.by == Sampled::By::nobody) return result;
-  result.voxels = voxels_from_samples(
-      judges.range, [&](int i, int j, int k) { return decided(judges, result.by, i, j, k); });
+  result.voxels = voxels_from_samples(judges.range,
+                                      [&](int i, int j, int k) { return decided(judges, verdict, i, j, k); });
   trace_missing(mesh, result.voxels);
   return result;
 }

@@ -21,7 +21,7 @@ struct Agreement {
 
 struct Sampled {
   Voxels voxels;
-  Agreement agreement;
+  Agreement agreement;  // on the lattice, or on the finer one that was asked where nobody agreed
   enum class By { vote, flood, nobody } by = By::nobody;  // nobody: no two agree, voxels are empty
 };
 

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <limits>
 
+#include "formats/error.h"
 #include "formats/import.h"
 #include "formats/locate.h"
 #include "formats/parallel.h"
@@ -60,6 +61,25 @@ TEST_F(Parts, ClosedOnesKeepTheirVolumeAtAThirdOfTheThinnestWall) {
     EXPECT_NEAR(total(result.parts[0]) / result.parts[0].surface_volume, 1, 1e-6) << file;
     EXPECT_EQ(result.parts[0].undecided_voxels, 0u) << file;
     EXPECT_EQ(result.parts[0].overlapping_voxels, 0u) << file;
+  }
+}
+
+// A block with open edges, and two open rings. The thickness of the cells decides nothing.
+TEST_F(Parts, WhatIsASheetIsOneOnEveryLattice) {
+  double finest = 0;
+  for (const std::size_t count : {3000, 600, 200, 50}) {
+    VoxelizeOptions options;
+    options.count = count;
+    const VoxelizedPart block = run_surface(import_surface(kParts / "featuretype.3MF"), options).parts[0];
+    EXPECT_FALSE(block.closed);
+    if (finest == 0) finest = total(block);
+    EXPECT_NEAR(total(block) / finest, 1, .02) << count;
+    try {
+      (void)run_surface(import_surface(kParts / "planar-geom-03.stl"), options);
+      ADD_FAILURE() << count;
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find("is a sheet"), std::string::npos) << error.what();
+    }
   }
 }
 
