@@ -10,6 +10,11 @@
 #include <limits>
 
 namespace flexel {
+namespace {
+
+constexpr double kTie = 1e-9;  // of a squared distance
+
+}  // namespace
 
 ElementGrid::ElementGrid(const Body& body, std::uint32_t part) {
   const Part& of = body.parts[part];
@@ -60,7 +65,12 @@ void ElementGrid::look_into(std::int64_t i_begin, std::int64_t i_end, std::int64
   const std::uint32_t end = offsets_[row + static_cast<std::size_t>(i_end)];
   for (std::uint32_t slot = offsets_[row + static_cast<std::size_t>(i_begin)]; slot < end; ++slot) {
     const double squared_distance = (local_[slot] - local).squaredNorm();
-    if (squared_distance < best.squared_distance) best = {squared_distance, elements_[slot]};
+    if (squared_distance > best.squared_distance * (1 + kTie)) continue;
+    const double from_middle = (local_[slot] - 0.5 * size_).squaredNorm();
+    const bool nearer = squared_distance < best.squared_distance * (1 - kTie);
+    const bool inner = from_middle < best.from_middle * (1 - kTie);
+    const bool lower = from_middle <= best.from_middle * (1 + kTie) && elements_[slot] < best.element;
+    if (nearer || inner || lower) best = {squared_distance, from_middle, elements_[slot]};
   }
 }
 
@@ -98,11 +108,12 @@ std::uint32_t ElementGrid::nearest(const Vec3& point) const {
   const Vec3 inside = local.cwiseMax(Vec3::Zero()).cwiseMin(size_);
   const double squared_outside = (local - inside).squaredNorm();
   const std::array<std::int64_t, 3> home = bucket_of(inside);
-  Best best{std::numeric_limits<double>::infinity(), elements_.front()};
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  Best best{kFar, kFar, elements_.front()};
   for (std::int64_t radius = 0;; ++radius) {
     look_into_shell(home, radius, local, best);
     const double beyond = distance_beyond(home, radius, inside);
-    if (best.squared_distance <= squared_outside + beyond * beyond) return best.element;
+    if (best.squared_distance * (1 + 2 * kTie) <= squared_outside + beyond * beyond) return best.element;
   }
 }
 

@@ -13,12 +13,13 @@ class ElementGrid {
   // `body` must outlive nothing: the rest positions are copied. The part must have at least one element.
   ElementGrid(const Body& body, std::uint32_t part);
 
-  // The nearest element at rest to `point` (m, world frame), wherever the point lies.
+  // The nearest element at rest to `point` (m, world frame), wherever the point lies; of those equally near
+  // (within 1e-9) the one nearest to the middle of the part, then the lowest.
   [[nodiscard]] std::uint32_t nearest(const Vec3& point) const;
 
  private:
   struct Best {
-    double squared_distance;
+    double squared_distance, from_middle;  // m^2
     std::uint32_t element;
   };
   [[nodiscard]] std::array<std::int64_t, 3> bucket_of(const Vec3& local) const;

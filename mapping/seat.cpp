@@ -58,9 +58,11 @@ Corners corners_of(const Surface& surface) {
   return corners;
 }
 
-// The nearest voxel so far; of those equally near, the cell of lowest number.
+// The nearest voxel so far; of those equally near, the one nearest to the middle of the part, then the cell
+// of lowest number.
 struct Home {
   double squared_distance = kFar;  // m^2, 0 inside
+  double from_middle = kFar;       // squared, of the voxel's own middle, spacings^2
   bool on_face = false;            // inside, but another voxel may hold the point as well
   Seat seat;
   [[nodiscard]] bool certain() const { return squared_distance == 0 && !on_face; }
@@ -71,53 +73,85 @@ struct Home {
 // rounding (another unit, a turned part) decides nothing.
 constexpr double kTie = 1e-9;
 
+// (parts x 3) The middle of each part's elements, in lattice coordinates. Where nothing else decides, what is
+// nearer to it is taken: so the mirrored or turned part decides alike. Only on a part's own plane of symmetry
+// is there no such choice, and the higher side is taken.
+std::vector<Vec3> middles(const Body& body) {
+  std::vector<Vec3> result;
+  for (const Part& part : body.parts) {
+    Index3 low{}, high{};
+    for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
+      for (int a = 0; a < 3; ++a) {
+        const std::int32_t i = body.lattice_index[e][a];
+        low[a] = e == part.element_begin ? i : std::min(low[a], i);
+        high[a] = e == part.element_begin ? i : std::max(high[a], i);
+      }
+    const double half = part.placement == Placement::centre ? 0.5 : 0;
+    result.push_back(0.5 * Vec3(low[0] + high[0], low[1] + high[1], low[2] + high[2]) + Vec3::Constant(half));
+  }
+  return result;
+}
+
+// Whether a point at `at`, `offset` above the place half-way between two elements (spacings), goes with the
+// higher one.
+bool goes_up(double offset, double at, double middle) {
+  if (std::abs(offset) < kTie) return middle >= at - kTie;
+  return offset > 0;
+}
+
 // Compares `cell` with the nearest so far; `u` is a point in lattice coordinates.
-void consider(const Body& body, std::uint32_t cell, const Vec3& u, const Vec3& spacing, Home& home) {
+void consider(const Body& body, std::uint32_t cell, const Vec3& u, const Vec3& spacing, const Vec3& middle,
+              Home& home) {
   const Index3& index = body.lattice_index[body.cell_elements[cell][0]];
   const Vec3 within = u - Vec3(index[0], index[1], index[2]);
   const Vec3 clamped = within.cwiseMax(Vec3::Zero()).cwiseMin(Vec3::Ones());
   const bool inside = (within - clamped).cwiseAbs().maxCoeff() < kTie;
   const double squared_distance = inside ? 0 : (within - clamped).cwiseProduct(spacing).squaredNorm();
   const bool nearer = squared_distance < (1 - kTie) * home.squared_distance;
-  const bool tie = squared_distance <= (1 + kTie) * home.squared_distance && cell < home.seat.owner;
-  if (!nearer && !tie) return;
+  if (!nearer && squared_distance > (1 + kTie) * home.squared_distance) return;
+  const double from_middle =
+      (Vec3(index[0], index[1], index[2]) + Vec3::Constant(0.5) - middle).squaredNorm();
+  if (!nearer && (from_middle > home.from_middle + kTie ||
+                  (from_middle > home.from_middle - kTie && cell > home.seat.owner)))
+    return;
   const bool on_face = inside && within.cwiseMin(Vec3::Ones() - within).minCoeff() < kTie;
-  constexpr double kHalf = 0.5 - kTie;
-  const int corner =
-      (within.x() >= kHalf ? 1 : 0) + (within.y() >= kHalf ? 2 : 0) + (within.z() >= kHalf ? 4 : 0);
-  home = {squared_distance, on_face, {cell, true, static_cast<std::uint8_t>(corner)}};
+  int corner = 0;
+  for (int a = 0; a < 3; ++a) corner += goes_up(within[a] - 0.5, u[a], middle[a]) << a;
+  home = {squared_distance, from_middle, on_face, {cell, true, static_cast<std::uint8_t>(corner)}};
 }
 
 // Beyond this many cells under a polygon a search by bisection is faster than looking at each.
 constexpr std::size_t kManyCells = 64;
 
 // Looks through the cells that polygon `p` bounds for one nearer to `point`.
-void look_under(const Body& body, std::size_t p, const Vec3& point, Home& home) {
+void look_under(const Body& body, std::size_t p, const Vec3& point, const std::vector<Vec3>& middle,
+                Home& home) {
   if (body.surface_cell_offsets.empty()) return;
   const std::uint32_t begin = body.surface_cell_offsets[p], end = body.surface_cell_offsets[p + 1];
-  const Lattice& lattice = body.parts[body.surface.polygon_part(p)].lattice;
+  const std::uint32_t part = body.surface.polygon_part(p);
+  const Lattice& lattice = body.parts[part].lattice;
   const Vec3 u = lattice.to_lattice(point);
   if (end - begin > kManyCells) {
-    consider(body, locate_on_surface(body, p, point)->cell, u, lattice.spacing, home);
+    consider(body, locate_on_surface(body, p, point)->cell, u, lattice.spacing, middle[part], home);
     if (!home.on_face) return;
   }
   for (std::uint32_t s = begin; s < end && !home.certain(); ++s)
-    consider(body, body.surface_cells[s], u, lattice.spacing, home);
+    consider(body, body.surface_cells[s], u, lattice.spacing, middle[part], home);
 }
 
 // Of the cells around `element`, the nearest element to `point`: the one that the point is in, or nearest to;
 // where there is none, the element itself.
 Seat seat_near_element(const Body& body, const Buckets<std::uint32_t>& cells_of, std::uint32_t part,
-                       std::uint32_t element, const Vec3& point) {
+                       std::uint32_t element, const Vec3& point, const Vec3& middle) {
   const Lattice& lattice = body.parts[part].lattice;
   if (body.parts[part].placement == Placement::corner && !cells_of.begin.empty()) {
     Home home;
     const Vec3 u = lattice.to_lattice(point);
     for (std::uint32_t i = cells_of.begin[element]; i < cells_of.begin[element + 1]; ++i)
-      consider(body, cells_of.values[i], u, lattice.spacing, home);
+      consider(body, cells_of.values[i], u, lattice.spacing, middle, home);
     if (home.squared_distance < kFar) return home.seat;
   }
-  return seat_at_element(body, part, element, point);
+  return seat_at_element(body, part, element, point, middle);
 }
 
 // Polygons around some of the vertices.
@@ -152,7 +186,7 @@ Around polygons_around(const Surface& surface, const Corners& corners,
 class Seating {
  public:
   explicit Seating(const Body& body)
-      : body_(body), corners_(corners_of(body.surface)), grids_(body.parts.size()) {
+      : body_(body), corners_(corners_of(body.surface)), middle_(middles(body)), grids_(body.parts.size()) {
     const std::size_t n = body.surface.vertices.size();
     resize_touched(seats_.seat, n);
     resize_touched(seats_.referenced, n);
@@ -171,7 +205,7 @@ class Seating {
 
  private:
   [[nodiscard]] Home look(std::uint32_t v, std::size_t polygon, Home home) const {
-    look_under(body_, polygon, body_.surface.vertices[v], home);
+    look_under(body_, polygon, body_.surface.vertices[v], middle_, home);
     return home;
   }
 
@@ -243,7 +277,7 @@ class Seating {
     const Vec3& point = body_.surface.vertices[v];
     if (corners_.first_polygon[v] != kNone) {
       const std::uint32_t part = part_of(v);
-      return seat_near_element(body_, cells_of_, part, grids_[part]->nearest(point), point);
+      return seat_near_element(body_, cells_of_, part, grids_[part]->nearest(point), point, middle_[part]);
     }
     std::uint32_t best_part = 0, best = kNone;
     for (std::uint32_t part = 0; part < grids_.size(); ++part) {
@@ -254,11 +288,12 @@ class Seating {
       best = element;
       best_part = part;
     }
-    return seat_near_element(body_, cells_of_, best_part, best, point);
+    return seat_near_element(body_, cells_of_, best_part, best, point, middle_[best_part]);
   }
 
   const Body& body_;
   Corners corners_;
+  std::vector<Vec3> middle_;                         // (parts x 3) lattice coordinates
   std::vector<std::unique_ptr<ElementGrid>> grids_;  // (parts)
   Buckets<std::uint32_t> cells_of_;                  // (elements) cells around each, where grids are needed
   std::vector<std::uint8_t> certain_;                // (vertices) 1: its first polygon has settled its seat
@@ -267,10 +302,14 @@ class Seating {
 
 }  // namespace
 
-Seat seat_at_element(const Body& body, std::uint32_t part, std::uint32_t element, const Vec3& point) {
+Seat seat_at_element(const Body& body, std::uint32_t part, std::uint32_t element, const Vec3& point,
+                     const Vec3& middle) {
   const Lattice& lattice = body.parts[part].lattice;
-  const Vec3 offset = lattice.axes.transpose() * (point - body.rest[element]) + kTie * lattice.spacing;
-  const int octant = (offset.x() >= 0 ? 1 : 0) + (offset.y() >= 0 ? 2 : 0) + (offset.z() >= 0 ? 4 : 0);
+  const Vec3 offset =
+      (lattice.axes.transpose() * (point - body.rest[element])).cwiseQuotient(lattice.spacing);
+  const Vec3 at = lattice.to_lattice(point);
+  int octant = 0;
+  for (int a = 0; a < 3; ++a) octant += goes_up(offset[a], at[a], middle[a]) << a;
   return {element, false, static_cast<std::uint8_t>(octant)};
 }
 

@@ -13,14 +13,17 @@ struct Seat {
       0;  // of a cell: its corner a = i + 2 j + 4 k; of an element: bits set on its high sides
 };
 
+constexpr double kHigher = 1e300;  // beyond every lattice
+
 struct Seats {
   std::vector<Seat> seat;                // (vertices)
   std::vector<std::uint8_t> referenced;  // (vertices) 1: some polygon uses it
 };
 
-// At `element` of `part`, for a vertex at `point` (m).
+// At `element` of `part`, for a vertex at `point` (m). Half-way between two octants the side of `middle`
+// (lattice coordinates) is taken, by default the higher one.
 [[nodiscard]] Seat seat_at_element(const Body& body, std::uint32_t part, std::uint32_t element,
-                                   const Vec3& point);
+                                   const Vec3& point, const Vec3& middle = Vec3::Constant(kHigher));
 
 // Throws InputError: no surface, a part without elements.
 [[nodiscard]] Seats take_seats(const Body& body);

@@ -136,6 +136,45 @@ TEST(Degenerate, TheOrderOfThePolygonsDoesNotMatter) {
     EXPECT_EQ(map(body, {method}).displacement, map(backwards, {method}).displacement) << name_of(method);
 }
 
+// The same block, and the mirror image of it and of its motion.
+TEST(Degenerate, TheMirroredPartIsMappedToTheMirrorImage) {
+  const auto field = [](const Vec3& x) -> Vec3 {
+    return x + Vec3(x.y() * x.z(), x.x() * x.x(), -x.x() * x.y());
+  };
+  const auto mirrored = [](const Vec3& x) -> Vec3 { return {-x.x(), x.y(), x.z()}; };
+  for (const Placement placement : {Placement::corner, Placement::centre}) {
+    Lattice lattice;
+    lattice.spacing = Vec3::Constant(0.1);
+    const auto make = [&](const Vec3& origin) {
+      lattice.origin = origin;
+      return test::make_body(
+          lattice, {0, 0, 0}, {6, 4, 4}, [](const Vec3&) { return true; }, placement);
+    };
+    Body body = make(Vec3::Zero()), mirror = make(Vec3(-0.6, 0, 0));
+    test::add_box_surface(body, Vec3::Zero(), Vec3(0.6, 0.4, 0.4), 8);
+    test::add_box_surface(body, Vec3(0.05, 0.05, 0.05), Vec3(0.55, 0.35, 0.35), 5);
+    mirror.surface = body.surface;
+    for (Vec3& x : mirror.surface.vertices) x = mirrored(x);
+    test::derive_surface_cells(mirror);
+    test::deform(body, field);
+    test::deform(mirror, [&](const Vec3& x) { return mirrored(field(mirrored(x))); });
+    for (const MapMethod method : test::kEveryMethod) {
+      const MapResult one = map(body, {method}), other = map(mirror, {method});
+      double largest = 0;
+      for (std::size_t v = 0; v < one.displacement.size(); ++v) {
+        // On the part's own plane of symmetry one frame lies on one side of it: in corner placement the first
+        // axis of Gram-Schmidt points there, in centre placement the origin lies there.
+        const bool symmetric = std::abs(body.surface.vertices[v].x() - 0.3) < 1e-9;
+        const bool one_frame = method == MapMethod::gram_schmidt ||
+                               (method == MapMethod::affine && placement == Placement::centre);
+        if (symmetric && one_frame) continue;
+        largest = std::max(largest, (one.displacement[v] - mirrored(other.displacement[v])).norm());
+      }
+      EXPECT_LT(largest, 1e-8) << name_of(method) << (placement == Placement::corner ? " corner" : " centre");
+    }
+  }
+}
+
 TEST(FarVertices, AreFollowedTurnedOrRefused) {
   Body body = test::block(4, 4, 4, 0.1, Placement::corner, 2);
   const auto far = static_cast<std::uint32_t>(body.surface.vertices.size());
