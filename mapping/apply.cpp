@@ -37,21 +37,23 @@ std::vector<Vec3> apply(const Binding& binding, const Body& body, const std::vec
                  element_motions(binding.blend.moving, body, binding.connections, position));
   if (binding.method == MapMethod::smooth)
     return apply_smooth(binding.groups, body, binding.frames, binding.frame, position);
-  constexpr std::size_t kFramesAtATime = 1024;
-  std::vector<FrameMotion> motion;
-  resize_touched(motion, binding.frames.size());
-  parallel_chunks(motion.size(), kFramesAtATime, [&](std::size_t begin, std::size_t end) {
+  constexpr std::size_t kFramesAtATime = 1024, kVerticesAtATime = 8192;
+  std::vector<Carrier> carrier;
+  resize_touched(carrier, binding.frames.size() + 1);
+  parallel_chunks(binding.frames.size(), kFramesAtATime, [&](std::size_t begin, std::size_t end) {
     move_frames(&binding.frames[begin], end - begin, &binding.rest_base[begin], body.rest.data(),
-                position.data(), binding.method == MapMethod::gram_schmidt, &motion[begin]);
-    for (std::size_t f = begin; f < end; ++f)
-      if (binding.frames[f].kind != FrameKind::full)
-        motion[f] = frame_motion(binding.frames[f], body.rest, position, binding.method);
+                position.data(), binding.method == MapMethod::gram_schmidt, &carrier[begin]);
+    for (std::size_t f = begin; f < end; ++f) {
+      if (binding.frames[f].kind == FrameKind::full) continue;
+      const FrameMotion motion = frame_motion(binding.frames[f], body.rest, position, binding.method);
+      carrier[f] << motion.translation, motion.change;
+    }
   });
   std::vector<Vec3> displacement;
   resize_touched(displacement, binding.frame.size());
-  parallel_for_each(displacement.size(), [&](std::size_t v) {
-    const FrameMotion& by = motion[binding.frame[v]];
-    displacement[v] = by.translation + by.change * binding.coordinates[v];
+  parallel_chunks(displacement.size(), kVerticesAtATime, [&](std::size_t begin, std::size_t end) {
+    carry(carrier.data(), &binding.frame[begin], &binding.coordinates[begin], end - begin,
+          &displacement[begin]);
   });
   return displacement;
 }

@@ -8,21 +8,19 @@
 namespace flexel {
 namespace {
 
-using Four = double __attribute__((vector_size(32)));
-
 // The columns of a motion, which has no room behind its last.
 struct MotionColumns {
-  Four displacement{}, gradient[3]{};
+  FourDoubles displacement{}, gradient[3]{};
 };
 static_assert(sizeof(ElementMotion) == 12 * sizeof(double));
 
 FLEXEL_INLINE void read(const ElementMotion& motion, MotionColumns& columns) {
   const auto* from = reinterpret_cast<const double*>(&motion);
-  columns.displacement = load<Four>(from);
-  columns.gradient[0] = load<Four>(from + 3);
-  columns.gradient[1] = load<Four>(from + 6);
-  const Four last = load<Four>(from + 8);
-  columns.gradient[2] = Four{last[1], last[2], last[3], 0};
+  columns.displacement = load<FourDoubles>(from);
+  columns.gradient[0] = load<FourDoubles>(from + 3);
+  columns.gradient[1] = load<FourDoubles>(from + 6);
+  const FourDoubles last = load<FourDoubles>(from + 8);
+  columns.gradient[2] = FourDoubles{last[1], last[2], last[3], 0};
 }
 
 }  // namespace
@@ -37,15 +35,15 @@ FLEXEL_CLONES void make_blend_rows(const std::uint32_t* elements, std::size_t co
     MotionColumns own;
     read(motions[slot_of[elements[i]]], own);
     const double* at = rest[elements[i]].data();
-    Four displacement = own.displacement - first.displacement;
+    FourDoubles displacement = own.displacement - first.displacement;
     for (int k = 0; k < 3; ++k) displacement -= own.gradient[k] * (at[k] - centre[k]);
     double* row = rows[i].value;
     __builtin_memcpy(row, &displacement, sizeof displacement);
     for (int k = 0; k < 2; ++k) {
-      const Four column = own.gradient[k] - first.gradient[k];
+      const FourDoubles column = own.gradient[k] - first.gradient[k];
       __builtin_memcpy(row + 3 * (k + 1), &column, sizeof column);
     }
-    const Four last = own.gradient[2] - first.gradient[2];
+    const FourDoubles last = own.gradient[2] - first.gradient[2];
     for (int c = 0; c < 3; ++c) row[9 + c] = last[c];
   }
 }
@@ -56,12 +54,12 @@ FLEXEL_CLONES void sum_blend_rows(const BlendRow* rows, const std::uint32_t* beg
   for (std::size_t v = 0; v < vertices; ++v) {
     // Two sums, so that an addition need not wait for the one before it.
     Lanes low[2]{};
-    Four high[2]{};
+    FourDoubles high[2]{};
     const auto add = [&](std::uint32_t k, int to) __attribute__((always_inline)) {
       const auto by = static_cast<double>(weight[k]);
       const double* row = rows[element[k]].value;
       low[to] += by * load<Lanes>(row);
-      high[to] += by * load<Four>(row + kLanes);
+      high[to] += by * load<FourDoubles>(row + kLanes);
     };
     std::uint32_t k = begin[v];
     for (; k + 1 < begin[v + 1]; k += 2) add(k, 0), add(k + 1, 1);
@@ -93,8 +91,8 @@ FLEXEL_CLONES void fit_gradients(const std::uint32_t* element, const std::uint32
     if (frame[i] != kNoSlot) continue;
     const std::uint32_t own = element[i];
     const double* from = rest[own].data();
-    const Four moved = load<Four>(displacement + 4 * std::size_t{own});
-    Four sum[3]{};
+    const FourDoubles moved = load<FourDoubles>(displacement + 4 * std::size_t{own});
+    FourDoubles sum[3]{};
     for (std::uint32_t c = connections.offsets[own]; c < connections.offsets[own + 1]; ++c) {
       const std::uint32_t other = connections.neighbours[c];
       const double* to = rest[other].data();
@@ -102,7 +100,7 @@ FLEXEL_CLONES void fit_gradients(const std::uint32_t* element, const std::uint32
       const double squared_length = x * x + y * y + z * z;
       if (!(squared_length > 0)) continue;
       const double inverse = 1 / squared_length;
-      const Four by = load<Four>(displacement + 4 * std::size_t{other}) - moved;
+      const FourDoubles by = load<FourDoubles>(displacement + 4 * std::size_t{other}) - moved;
       sum[0] += by * (x * inverse);
       sum[1] += by * (y * inverse);
       sum[2] += by * (z * inverse);
@@ -110,7 +108,8 @@ FLEXEL_CLONES void fit_gradients(const std::uint32_t* element, const std::uint32
     const double* moments = inverse_moments[i].data();
     double columns[13];
     for (int k = 0; k < 3; ++k) {
-      const Four column = sum[0] * moments[3 * k] + sum[1] * moments[3 * k + 1] + sum[2] * moments[3 * k + 2];
+      const FourDoubles column =
+          sum[0] * moments[3 * k] + sum[1] * moments[3 * k + 1] + sum[2] * moments[3 * k + 2];
       __builtin_memcpy(columns + 3 * k, &column, sizeof column);
     }
     for (int k = 0; k < 9; ++k) motion[i].gradient.data()[k] = columns[k];

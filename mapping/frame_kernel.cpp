@@ -72,8 +72,7 @@ FLEXEL_CLONES void span_bases(const Frame* frames, std::size_t count, const Vec3
 }
 
 FLEXEL_CLONES void move_frames(const Frame* frames, std::size_t count, const Mat3* rest_base,
-                               const Vec3* rest, const Vec3* position, bool orthonormal,
-                               FrameMotion* motion) {
+                               const Vec3* rest, const Vec3* position, bool orthonormal, Carrier* carrier) {
   for (std::size_t begin = 0; begin < count; begin += kLanes) {
     Axes axes;
     gather_edges(frames, begin, count, position, axes);
@@ -83,13 +82,26 @@ FLEXEL_CLONES void move_frames(const Frame* frames, std::size_t count, const Mat
       if (frames[f].kind != FrameKind::full) continue;
       const double *now = position[frames[f].elements[0]].data(),
                    *before = rest[frames[f].elements[0]].data();
-      double *translation = motion[f].translation.data(), *change = motion[f].change.data();
+      double *translation = carrier[f].data(), *change = translation + 3;
       for (int c = 0; c < 3; ++c) translation[c] = now[c] - before[c];
       for (int axis = 0; axis < 3; ++axis)
         for (int c = 0; c < 3; ++c)
           change[3 * axis + c] =
               spanned[f - begin] ? axes.of[axis][c][f - begin] - rest_base[f].data()[3 * axis + c] : 0;
     }
+  }
+}
+
+// Columns are read four numbers at a time, of which the last belongs to what follows, and so are
+// displacements written: the next vertex overwrites it.
+FLEXEL_CLONES void carry(const Carrier* carrier, const std::uint32_t* frame, const Vec3* coordinates,
+                         std::size_t count, Vec3* displacement) {
+  for (std::size_t v = 0; v < count; ++v) {
+    const double *by = carrier[frame[v]].data(), *c = coordinates[v].data();
+    const FourDoubles moved =
+        load<FourDoubles>(by) + ((load<FourDoubles>(by + 3) * c[0] + load<FourDoubles>(by + 6) * c[1]) +
+                                 load<FourDoubles>(by + 9) * c[2]);
+    __builtin_memcpy(displacement[v].data(), &moved, v + 1 < count ? sizeof moved : sizeof(Vec3));
   }
 }
 

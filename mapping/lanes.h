@@ -17,6 +17,7 @@ using Lanes = double __attribute__((vector_size(64)));
 constexpr int kLanes = 8;
 using FloatLanes = float __attribute__((vector_size(64)));
 constexpr int kFloatLanes = 16;
+using FourDoubles = double __attribute__((vector_size(32)));
 
 FLEXEL_INLINE Lanes square_root(const Lanes& x) {
   Lanes root;
