@@ -60,6 +60,7 @@ void refuse_open(const Part& part, const PartSurface& own, const std::vector<Vec
 struct Cutting {
   const Body& body;
   const Fragments& fragments;
+  const PartedPairs& parted;
   const CrackOptions& options;
   const std::vector<std::uint32_t>& welded;
 };
@@ -70,25 +71,24 @@ CapOutcome cut_part(const Cutting& cutting, std::uint32_t part, const PartSurfac
   std::vector<std::array<Vec3, 3>> corners;
   for (const auto& triangle : own.triangles)
     corners.push_back({u[triangle[0]], u[triangle[1]], u[triangle[2]]});
-  const CrackBoxes boxes(cutting.body, part, cutting.fragments, shift, corners);
+  const CrackBoxes boxes(cutting.body, part, cutting.fragments, cutting.parted, shift, corners);
   const Part& of = cutting.body.parts[part];
   CrackMesh mesh(surface, cutting.welded, u, of.lattice, of.placement == Placement::centre ? 0.5 : 0,
                  own.triangles, boxes);
   if (!mesh.split()) return CapOutcome::degenerate;
+  const bool cap = cutting.options.mode == CrackMode::cap;
+  CrackEdges edges;
+  if (!cap) edges.find_ends(mesh);
+  CapOutcome outcome = cap ? edges.find(mesh) : CapOutcome::done;
+  if (outcome != CapOutcome::done) return outcome;
+  mesh.halve_cuts();
+  mesh.insert_points();
   std::vector<CrackCap> caps;
-  if (cutting.options.mode == CrackMode::cap) {
-    CrackEdges edges;
-    CapOutcome outcome = edges.find(mesh);
-    if (outcome != CapOutcome::done) return outcome;
-    mesh.insert_points();
-    outcome = make_caps(mesh, edges, caps);
-    if (outcome != CapOutcome::done) return outcome;
-  } else {
-    mesh.insert_points();
-  }
+  if (cap) outcome = make_caps(mesh, edges, caps);
+  if (outcome != CapOutcome::done) return outcome;
   resolve_mixed(cutting.body, own.polygon, cutting.fragments, mesh, caps);
   const CrackPolygons polygons = gather_polygons(surface, mesh, own.polygon, caps);
-  if (cutting.options.mode == CrackMode::cap && !is_closed(mesh, polygons)) return CapOutcome::degenerate;
+  if (cap && !is_closed(mesh, polygons)) return CapOutcome::degenerate;
   builder.add_pieces(mesh, polygons);
   return CapOutcome::done;
 }
@@ -142,13 +142,20 @@ std::vector<double> piece_volumes(const CrackedSurface& cracked, const std::vect
 
 }  // namespace
 
-CrackedSurface part_surface(const Body& body, const Fragments& fragments, const CrackOptions& options) {
-  PieceBuilder builder(body, fragments, options, take_seats(body));
+CrackedSurface part_surface(const Body& body, const Fragments& fragments, const PartedPairs& parted,
+                            const CrackOptions& options) {
+  return part_surface(body, fragments, parted, options, take_seats(body));
+}
+
+CrackedSurface part_surface(const Body& body, const Fragments& fragments, const PartedPairs& parted,
+                            const CrackOptions& options, Seats seats,
+                            std::vector<CrackedSurface::Shift> shifts) {
+  PieceBuilder builder(body, fragments, options, std::move(seats), std::move(shifts));
   const Triangles triangles = triangulate(body.surface);
   const std::vector<std::uint32_t> welded = weld(body.surface.vertices);
-  const Cutting cutting{body, fragments, options, welded};
+  const Cutting cutting{body, fragments, parted, options, welded};
   for (std::uint32_t part = 0; part < body.parts.size(); ++part) {
-    if (fragments.in_pieces(part))
+    if (fragments.in_pieces(part) || parted.inside(part))
       cut_broken_part(cutting, part, triangles, builder);
     else
       builder.add_whole(part);
@@ -165,34 +172,67 @@ CrackedSurface part_surface(const Body& body, const Fragments& fragments, const 
 
 namespace {
 
-// Triangles of the body's surface whose corners go with different fragments.
-std::size_t spanning_triangles(const Body& body, const MapResult& result, const Fragments& fragments) {
+// Triangles of the body's surface whose corners go with different fragments, or with elements on the two
+// sides of a crack inside one: `parted`, of a surface that was not opened there.
+std::size_t spanning_triangles(const Body& body, const MapResult& result, const Fragments& fragments,
+                               const PartedPairs* parted) {
   const Triangles triangles = triangulate(body.surface);
   std::size_t count = 0;
   for (const auto& corner : triangles.corners) {
-    const auto fragment = [&](int c) { return fragments.of[result.frame_of(corner[c]).elements[0]]; };
-    count += fragment(0) != fragment(1) || fragment(1) != fragment(2);
+    bool spans = false;
+    for (int c = 0; c < 3; ++c) {
+      const std::uint32_t a = result.frame_of(corner[c]).elements[0],
+                          b = result.frame_of(corner[(c + 1) % 3]).elements[0];
+      spans = spans || fragments.of[a] != fragments.of[b] || (parted && parted->contains(a, b));
+    }
+    count += spans;
   }
   return count;
 }
 
-// Puts a body's own surface back, whatever happens.
-class SurfaceLoan {
+// What hangs together, and what does not.
+struct Broken {
+  Adjacency connections;
+  Fragments fragments;
+  PartedPairs parted;
+  explicit Broken(const Body& body)
+      : connections(element_adjacency(body)),
+        fragments(find_fragments(body, connections)),
+        parted(body, fragments, connections) {}
+  Broken(const Broken&) = delete;
+  Broken& operator=(const Broken&) = delete;
+  // Of parts that are in more than one.
+  [[nodiscard]] std::size_t pieces() const {
+    std::size_t count = 0;
+    for (std::uint32_t part = 0; part + 1 < fragments.offset.size(); ++part)
+      if (fragments.in_pieces(part)) count += fragments.offset[part + 1] - fragments.offset[part];
+    return count;
+  }
+  [[nodiscard]] bool cracked_inside() const {
+    for (std::uint32_t part = 0; part + 1 < fragments.offset.size(); ++part)
+      if (parted.inside(part)) return true;
+    return false;
+  }
+};
+
+// Puts what is a body's own back, whatever happens.
+template <class Value>
+class Loan {
  public:
-  SurfaceLoan(Surface& own, Surface& lent) : own_(own), lent_(lent) { std::swap(own_, lent_); }
-  SurfaceLoan(const SurfaceLoan&) = delete;
-  SurfaceLoan& operator=(const SurfaceLoan&) = delete;
-  ~SurfaceLoan() { std::swap(own_, lent_); }
+  Loan(Value& own, Value& lent) : own_(own), lent_(lent) { std::swap(own_, lent_); }
+  Loan(const Loan&) = delete;
+  Loan& operator=(const Loan&) = delete;
+  ~Loan() { std::swap(own_, lent_); }
 
  private:
-  Surface &own_, &lent_;
+  Value &own_, &lent_;
 };
 
 void map_pieces(Body& body, const Fragments& fragments, const MapOptions& options, CrackMode mode,
                 MappedPart& mapped, Progress& progress) {
   CrackedSurface& cracked = *mapped.cracked;
   {
-    const SurfaceLoan loan(body.surface, cracked.surface);
+    const Loan loan(body.surface, cracked.surface);
     std::vector<Vec3>& vertices = body.surface.vertices;
     std::vector<Vec3> at_rest;
     for (const auto& [vertex, by] : cracked.shifts) {
@@ -205,7 +245,7 @@ void map_pieces(Body& body, const Fragments& fragments, const MapOptions& option
       mapped.result.displacement[cracked.shifts[s].vertex] += cracked.shifts[s].by;
     }
     mapped.report = report(body, mapped.result);
-    mapped.report.crack.spanning_triangles = spanning_triangles(body, mapped.result, fragments);
+    mapped.report.crack.spanning_triangles = spanning_triangles(body, mapped.result, fragments, nullptr);
     // What is open encloses nothing.
     if (mode == CrackMode::open)
       mapped.report.quality.volume_after = std::numeric_limits<double>::quiet_NaN();
@@ -222,7 +262,7 @@ void warn_of_carved(const Body& body, Progress& progress) {
   if (body.notes.count(kCarvedNote) > 0)
     progress.warn(
         "matter was carved away, its surface is still here and follows what is left around it: --crack cap "
-        "leaves it out and closes the part, where nothing broke as well");
+        "leaves it out and closes the part");
 }
 
 void map_carved(Body& body, const MapOptions& options, CrackMode mode, MappedPart& mapped,
@@ -236,6 +276,20 @@ void map_carved(Body& body, const MapOptions& options, CrackMode mode, MappedPar
   for (const CrackPiece& piece : mapped.cracked->pieces)
     if (!piece.dropped && fragments.in_pieces(piece.part)) crack.pieces.push_back(piece);
   crack.fragments = crack.pieces.size();
+}
+
+// Carved and broken: the part is closed around what went, then that surface is parted along the cracks, whose
+// faces lie elsewhere (between elements, not voxels).
+CrackedSurface part_carved(Body& body, const Broken& broken, const CrackOptions& options) {
+  CrackedSurface closed = close_carved(body, whole_parts(body), options.mode);
+  for (std::uint32_t part = 0; part < body.parts.size(); ++part)
+    if (part >= closed.part_piece.size() || closed.pieces[closed.part_piece[part]].part != part)
+      throw InputError("--crack: nothing is left of the surface of part \"" + body.parts[part].name + "\"");
+  std::vector<std::uint32_t> no_offsets, no_cells;  // the cells under the polygons are those of others
+  const Loan surface(body.surface, closed.surface);
+  const Loan offsets(body.surface_cell_offsets, no_offsets), cells(body.surface_cells, no_cells);
+  return part_surface(body, broken.fragments, broken.parted, options, std::move(closed.seats),
+                      std::move(closed.shifts));
 }
 
 }  // namespace
@@ -254,19 +308,20 @@ MappedPart map_part(Body& body, const MapOptions& options, const CrackOptions& c
     map_carved(body, options, crack.mode, mapped, progress);
     return mapped;
   }
-  warn_of_carved(body, progress);
-  std::optional<Fragments> fragments;
-  std::size_t parted = 0;
-  if (may_be_broken(body)) {
-    fragments = find_fragments(body, element_adjacency(body));
-    for (std::uint32_t part = 0; part < body.parts.size(); ++part)
-      if (fragments->in_pieces(part)) parted += fragments->offset[part + 1] - fragments->offset[part];
-  }
-  if (parted > 0 && crack.mode != CrackMode::keep) {
+  if (crack.mode == CrackMode::keep) warn_of_carved(body, progress);
+  std::optional<Broken> broken;
+  if (may_be_broken(body)) broken.emplace(body);
+  const std::size_t pieces = broken ? broken->pieces() : 0;
+  // Broken cells may part nothing, and what was carved has to go all the same.
+  const bool carved = crack.mode != CrackMode::keep && body.notes.count(kCarvedNote) > 0;
+  const bool anything = carved || pieces > 0 || (broken && broken->cracked_inside());
+  if (anything && crack.mode != CrackMode::keep) {
     progress.update(0, "parting the surface");
-    mapped.cracked = part_surface(body, *fragments, crack);
-    map_pieces(body, *fragments, options, crack.mode, mapped, progress);
-    mapped.report.crack.pieces = mapped.cracked->pieces;
+    mapped.cracked = body.notes.count(kCarvedNote) > 0
+                         ? part_carved(body, *broken, crack)
+                         : part_surface(body, broken->fragments, broken->parted, crack);
+    map_pieces(body, broken->fragments, options, crack.mode, mapped, progress);
+    if (pieces > 0) mapped.report.crack.pieces = mapped.cracked->pieces;
   } else {
     if (known) {
       mapped.result = map_state(*known, body);
@@ -275,11 +330,14 @@ MappedPart map_part(Body& body, const MapOptions& options, const CrackOptions& c
       mapped.result = map_surface(body, options, progress);
     }
     mapped.report = report(body, mapped.result);
-    if (parted > 0)
-      mapped.report.crack.spanning_triangles = spanning_triangles(body, mapped.result, *fragments);
+    if (anything)
+      mapped.report.crack.spanning_triangles =
+          spanning_triangles(body, mapped.result, broken->fragments, &broken->parted);
   }
   mapped.report.crack.mode = crack.mode;
-  mapped.report.crack.fragments = parted;
+  mapped.report.crack.fragments = pieces;
+  for (std::uint32_t part = 0; broken && part < body.parts.size(); ++part)
+    mapped.report.crack.cracked_parts += broken->parted.inside(part);
   return mapped;
 }
 

@@ -5,8 +5,8 @@
 
 #include "formats/surface_file.h"
 #include "mapping/bind.h"
+#include "mapping/crack_parted.h"
 #include "mapping/crack_report.h"
-#include "mapping/fragments.h"
 #include "mapping/map.h"
 #include "mapping/seat.h"
 
@@ -40,15 +40,21 @@ struct CrackedSurface {
 };
 constexpr double kDrawnApart = 1e-3;
 
-// Throws InputError: no surface; `cap` of a part in fragments whose surface is not closed or crosses itself.
+// `parted`: cracks that end inside a part are opened up to their ends, where there are any.
+// Throws InputError: no surface; `cap` of a part in fragments or with cracks inside whose surface is not
+// closed or crosses itself.
 [[nodiscard]] CrackedSurface part_surface(const Body& body, const Fragments& fragments,
-                                          const CrackOptions& options);
+                                          const PartedPairs& parted, const CrackOptions& options);
+// The same with seats of the body's vertices that are known, and shifts that some of them have already.
+[[nodiscard]] CrackedSurface part_surface(const Body& body, const Fragments& fragments,
+                                          const PartedPairs& parted, const CrackOptions& options, Seats seats,
+                                          std::vector<CrackedSurface::Shift> shifts = {});
 
 // A surface and where its vertices go.
 struct MappedPart {
   MapResult result;
   MapReport report;
-  std::optional<CrackedSurface> cracked;  // `open` and `cap`, where a part is in more than one fragment
+  std::optional<CrackedSurface> cracked;  // `open` and `cap`, where a part is in fragments or cracked
   [[nodiscard]] const Surface& surface(const Body& body) const {
     return cracked ? cracked->surface : body.surface;
   }

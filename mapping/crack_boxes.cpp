@@ -82,9 +82,22 @@ std::uint32_t CrackBoxes::owner_in(std::uint32_t box, std::uint32_t fragment) co
   return found;
 }
 
-CrackBoxes::CrackBoxes(const Body& body, std::uint32_t part, const Fragments& fragments, const Vec3& shift,
+// Of leaves that share a box all have to be parted.
+bool CrackBoxes::parted_boxes(std::uint32_t box, std::uint32_t next) const {
+  bool any = false, joined = false;
+  for_each_owner(box, [&](std::uint32_t a) {
+    for_each_owner(next, [&](std::uint32_t b) {
+      any = any || parted_.contains(a, b);
+      joined = joined || parted_.connected(a, b);
+    });
+  });
+  return any && !joined;
+}
+
+CrackBoxes::CrackBoxes(const Body& body, std::uint32_t part, const Fragments& fragments,
+                       const PartedPairs& parted, const Vec3& shift,
                        const std::vector<std::array<Vec3, 3>>& triangles)
-    : body_(body), fragments_(fragments), shift_(shift) {
+    : body_(body), fragments_(fragments), parted_(parted), shift_(shift) {
   const Part& of = body.parts[part];
   for (std::uint32_t e = of.element_begin; e < of.element_end; ++e)
     for (const std::int32_t i : body.lattice_index[e])
@@ -124,7 +137,9 @@ CrackBoxes::CrackBoxes(const Body& body, std::uint32_t part, const Fragments& fr
       Index3 high = low;
       ++high[axis];
       const std::uint32_t next = find(high);
-      if (next == kNoBox || (fragment_[next] == fragment_[box] && fragment_[box] != kMixed)) continue;
+      if (next == kNoBox || (fragment_[next] == fragment_[box] && fragment_[box] != kMixed &&
+                             !parted_boxes(static_cast<std::uint32_t>(box), next)))
+        continue;
       squares_.push_back({axis, low});
       square_keys_[axis].push_back(key(low[axis], low[(axis + 1) % 3], low[(axis + 2) % 3]));
     }
@@ -140,6 +155,62 @@ std::uint32_t CrackBoxes::find(const Index3& index) const {
 bool CrackBoxes::is_square(int axis, const Index3& low) const {
   return std::binary_search(square_keys_[axis].begin(), square_keys_[axis].end(),
                             key(low[axis], low[(axis + 1) % 3], low[(axis + 2) % 3]));
+}
+
+CrackBoxes::Face CrackBoxes::face(int axis, const Index3& low) const {
+  if (!is_square(axis, low)) return Face::whole;
+  Index3 high = low;
+  ++high[axis];
+  const std::uint32_t below = fragment_[find(low)], above = fragment_[find(high)];
+  if (below == kMixed || above == kMixed) return Face::mixed;
+  return below == above ? Face::inside : Face::fragments;
+}
+
+std::array<Index3, 4> CrackBoxes::around_line(int along, int p, int q, int at) const {
+  const int first = along == 0 ? 1 : 0, second = along == 2 ? 1 : 2;
+  std::array<Index3, 4> index{};
+  for (int k = 0; k < 4; ++k) {
+    index[k][along] = at;
+    index[k][first] = p + (k & 1);
+    index[k][second] = q + (k >> 1);
+  }
+  return index;
+}
+
+std::optional<CrackBoxes::Sectors> CrackBoxes::sectors(int along, int p, int q, int at) const {
+  const int first = along == 0 ? 1 : 0, second = along == 2 ? 1 : 2;
+  const std::array<Index3, 4> index = around_line(along, p, q, at);
+  std::array<bool, 4> matter{};
+  for (int k = 0; k < 4; ++k) {
+    const std::uint32_t box = find(index[k]);
+    matter[k] = box != kNoBox;
+    if (matter[k] && fragment_[box] == kMixed) return std::nullopt;
+  }
+  Sectors sector{0, 1, 2, 3};
+  const auto join = [&](int low, int high, int axis) {
+    if (!matter[low] || !matter[high] || is_square(axis, index[low])) return;
+    const std::uint8_t from = std::max(sector[low], sector[high]), to = std::min(sector[low], sector[high]);
+    std::replace(sector.begin(), sector.end(), from, to);
+  };
+  join(0, 1, first);
+  join(2, 3, first);
+  join(0, 2, second);
+  join(1, 3, second);
+  return sector;
+}
+
+bool CrackBoxes::touches_itself(int along, int p, int q, int at) const {
+  const std::optional<Sectors> sector = sectors(along, p, q, at);
+  if (!sector) return true;  // it may
+  const std::array<Index3, 4> index = around_line(along, p, q, at);
+  for (int a = 0; a < 4; ++a)
+    for (int b = 0; b < a; ++b) {
+      const std::uint32_t one = find(index[a]), other = find(index[b]);
+      if (one != kNoBox && other != kNoBox && (*sector)[a] != (*sector)[b] &&
+          fragment_[one] == fragment_[other])
+        return true;
+    }
+  return false;
 }
 
 bool CrackBoxes::has_square(int axis, int plane, const BoxRange& range) const {

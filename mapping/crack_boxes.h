@@ -9,9 +9,10 @@
 #pragma once
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
-#include "mapping/fragments.h"
+#include "mapping/crack_parted.h"
 
 namespace flexel {
 
@@ -27,8 +28,8 @@ struct BoxRange {
 class CrackBoxes {
  public:
   // `triangles`: corners in box coordinates of every triangle of the part's surface.
-  CrackBoxes(const Body& body, std::uint32_t part, const Fragments& fragments, const Vec3& shift,
-             const std::vector<std::array<Vec3, 3>>& triangles);
+  CrackBoxes(const Body& body, std::uint32_t part, const Fragments& fragments, const PartedPairs& parted,
+             const Vec3& shift, const std::vector<std::array<Vec3, 3>>& triangles);
 
   [[nodiscard]] double plane(int axis, int i) const { return i + 0.5 + shift_[axis]; }
   [[nodiscard]] int box_of(int axis, double u) const {
@@ -46,13 +47,29 @@ class CrackBoxes {
   // The first of a box's elements that is of `fragment`; kNoBox: none.
   [[nodiscard]] std::uint32_t owner_in(std::uint32_t box, std::uint32_t fragment) const;
 
-  // A square between a box and the next one along `axis`, of another fragment, or one of which is mixed.
+  // A square between a box and the next one along `axis`: of another fragment, or parted from it by a crack
+  // that ends inside the fragment; or one of which is mixed.
   struct Square {
     int axis = 0;
     Index3 low{};  // the box below
   };
   [[nodiscard]] const std::vector<Square>& squares() const { return squares_; }
   [[nodiscard]] bool is_square(int axis, const Index3& low) const;
+  // The square there: none; between two fragments; of a crack inside one; or with a mixed box.
+  enum class Face { whole, fragments, inside, mixed };
+  [[nodiscard]] Face face(int axis, const Index3& low) const;
+  // The four boxes around a lattice line (along `along`, planes `p`, `q` of the other two axes, ascending; at
+  // box `at` along it), as numbers that are equal where matter hangs together around the line: by
+  // [high along the first axis + 2 high along the second]. A box without matter has one of its own. Nothing
+  // where one of them is mixed.
+  using Sectors = std::array<std::uint8_t, 4>;
+  [[nodiscard]] std::optional<Sectors> sectors(int along, int p, int q, int at) const;
+  // True when two of the sectors are of one fragment: a piece touches itself along the line.
+  [[nodiscard]] bool touches_itself(int along, int p, int q, int at) const;
+  // True when a crack that ends inside passes between the two elements.
+  [[nodiscard]] bool parted(std::uint32_t element, std::uint32_t other) const {
+    return parted_.contains(element, other);
+  }
   // The plane to cut `range` along so that it comes to lie in boxes of one fragment: one that has a square in
   // range, near the middle of the longest such axis. axis < 0: there is none.
   struct Plane {
@@ -67,9 +84,12 @@ class CrackBoxes {
                          std::vector<std::uint64_t>& keys) const;
   [[nodiscard]] std::uint64_t key(std::int64_t slow, std::int64_t middle, std::int64_t fast) const;
   [[nodiscard]] bool has_square(int axis, int plane, const BoxRange& range) const;
+  [[nodiscard]] bool parted_boxes(std::uint32_t box, std::uint32_t next) const;
+  [[nodiscard]] std::array<Index3, 4> around_line(int along, int p, int q, int at) const;
 
   const Body& body_;
   const Fragments& fragments_;
+  const PartedPairs& parted_;
   Vec3 shift_;
   std::vector<std::uint64_t> keys_;      // (boxes) ascending
   std::vector<std::uint32_t> owner_;     // (boxes)

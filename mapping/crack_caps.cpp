@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <atomic>
+#include <map>
 
 #include "formats/parallel.h"
 #include "mapping/crack_triangulate.h"
@@ -36,9 +37,10 @@ std::array<std::array<int, 4>, 4> sides(const CrackBoxes::Square& square) {
 
 }  // namespace
 
-void CrackEdges::list_places(const CrackBoxes& boxes) {
+void CrackEdges::list_places(const CrackBoxes& boxes, bool inside_only) {
   for (const CrackBoxes::Square& square : boxes.squares())
-    for (const Place& side : sides(square)) places_.push_back(side);
+    if (!inside_only || boxes.face(square.axis, square.low) == CrackBoxes::Face::inside)
+      for (const Place& side : sides(square)) places_.push_back(side);
   std::sort(places_.begin(), places_.end());
   places_.erase(std::unique(places_.begin(), places_.end()), places_.end());
   for (const Place& place : places_) {
@@ -75,22 +77,6 @@ void CrackEdges::pierce(const CrackMesh& mesh) {
   }
 }
 
-// True when a fragment has two boxes around this side that touch along it only: the piece would touch itself.
-bool CrackEdges::touches_itself(const CrackBoxes& boxes, const Place& place) {
-  const auto [p, q] = other_axes(place[0]);
-  const auto fragment = [&](int on_p, int on_q) {
-    Index3 index{};
-    index[place[0]] = place[3];
-    index[p] = place[1] + on_p;
-    index[q] = place[2] + on_q;
-    const std::uint32_t box = boxes.find(index);
-    return box == kNoBox ? kNoBox : boxes.fragment(box);
-  };
-  const std::uint32_t f00 = fragment(0, 0), f10 = fragment(1, 0), f01 = fragment(0, 1), f11 = fragment(1, 1);
-  if (f00 == kMixed || f10 == kMixed || f01 == kMixed || f11 == kMixed) return true;  // it may
-  return (f00 == f11 && f00 != f10 && f00 != f01) || (f10 == f01 && f10 != f00 && f10 != f11);
-}
-
 void CrackEdges::make_stretches(CrackMesh& mesh, std::size_t number) {
   const Place& place = places_[number];
   const auto [p, q] = other_axes(place[0]);
@@ -125,7 +111,7 @@ void CrackEdges::make_stretches(CrackMesh& mesh, std::size_t number) {
   }
   if (ends.empty() && inside) ends.push_back(corner(place[3] - 1));
   if (inside) ends.push_back(corner(place[3]));
-  const bool halve = !ends.empty() && touches_itself(boxes, place);
+  const bool halve = !ends.empty() && boxes.touches_itself(along, place[1], place[2], place[3]);
   for (std::size_t k = 0; k + 1 < ends.size(); k += 2) {
     if (halve) {
       // A point of its own lets each of the piece's two sides have an edge of its own.
@@ -141,8 +127,22 @@ void CrackEdges::make_stretches(CrackMesh& mesh, std::size_t number) {
   }
 }
 
+void CrackEdges::find_ends(CrackMesh& mesh) {
+  list_places(mesh.boxes(), true);
+  pierce(mesh);
+  for (const Place& place : places_) {
+    const auto [p, q] = other_axes(place[0]);
+    const double low = mesh.boxes().plane(place[0], place[3] - 1),
+                 high = mesh.boxes().plane(place[0], place[3]);
+    const auto line = std::lower_bound(lines_.begin(), lines_.end(), Line{place[0], place[1], place[2]});
+    for (const Pierce& pierce : pierces_[static_cast<std::size_t>(line - lines_.begin())])
+      if (pierce.at >= low && pierce.at < high)
+        (void)mesh.pierce_node(pierce.triangle, p, place[1], q, place[2]);
+  }
+}
+
 CapOutcome CrackEdges::find(CrackMesh& mesh) {
-  list_places(mesh.boxes());
+  list_places(mesh.boxes(), false);
   pierce(mesh);
   for (std::vector<Pierce>& along : pierces_) {
     std::sort(along.begin(), along.end(), [](const Pierce& a, const Pierce& b) {
@@ -234,7 +234,50 @@ bool fill(const CrackMesh& mesh, const CrackBoxes::Square& square, std::vector<E
 
 }  // namespace
 
-CapOutcome make_caps(const CrackMesh& mesh, const CrackEdges& edges, std::vector<CrackCap>& caps) {
+namespace {
+
+// A node that the sides of a crack may share, at its end.
+bool may_be_shared(const CrackMesh& mesh, std::uint32_t node) {
+  int planes = 0;
+  for (int axis = 0; axis < 3; ++axis) planes += mesh.plane(node, axis) != kNoPlane;
+  return planes > 1;
+}
+
+// Halves the edges between triangles of a wall whose ends may both be shared: else both sides would have the
+// same edge, or the same triangle.
+void halve_inner_edges(CrackMesh& mesh, const CrackBoxes::Square& square, std::vector<CrackCap>& caps) {
+  std::map<Edge, std::pair<int, std::uint32_t>> edges;  // uses, node in the middle
+  const auto key = [](std::uint32_t a, std::uint32_t b) { return Edge{std::min(a, b), std::max(a, b)}; };
+  for (const CrackCap& cap : caps)
+    for (int k = 0; k < 3; ++k) ++edges[key(cap.corners[k], cap.corners[(k + 1) % 3])].first;
+  std::array<int, 3> plane{kNoPlane, kNoPlane, kNoPlane};
+  plane[square.axis] = square.low[square.axis];
+  for (auto& [edge, of] : edges)
+    of.second = of.first == 2 && may_be_shared(mesh, edge[0]) && may_be_shared(mesh, edge[1])
+                    ? mesh.add_node(0.5 * (mesh.u(edge[0]) + mesh.u(edge[1])), plane)
+                    : kNoBox;
+  std::vector<CrackCap> halved;
+  for (const CrackCap& cap : caps) {
+    // Around the triangle, beginning at a middle: a fan from there has every middle in a triangle's corner.
+    std::vector<std::uint32_t> around;
+    std::size_t first = 0;
+    for (int k = 0; k < 3; ++k) {
+      around.push_back(cap.corners[k]);
+      const std::uint32_t middle = edges[key(cap.corners[k], cap.corners[(k + 1) % 3])].second;
+      if (middle == kNoBox) continue;
+      first = around.size();
+      around.push_back(middle);
+    }
+    std::rotate(around.begin(), around.begin() + static_cast<std::ptrdiff_t>(first), around.end());
+    for (std::size_t k = 1; k + 1 < around.size(); ++k)
+      halved.push_back({0, square.low, {around[0], around[k], around[k + 1]}});
+  }
+  caps = std::move(halved);
+}
+
+}  // namespace
+
+CapOutcome make_caps(CrackMesh& mesh, const CrackEdges& edges, std::vector<CrackCap>& caps) {
   const CrackBoxes& boxes = mesh.boxes();
   const std::vector<Cut> cuts = find_cuts(mesh);
   std::vector<std::vector<CrackCap>> found(boxes.squares().size());
@@ -259,6 +302,8 @@ CapOutcome make_caps(const CrackMesh& mesh, const CrackEdges& edges, std::vector
     const CrackBoxes::Square& square = boxes.squares()[s];
     Index3 high = square.low;
     ++high[square.axis];
+    if (boxes.face(square.axis, square.low) == CrackBoxes::Face::inside)
+      halve_inner_edges(mesh, square, found[s]);
     for (CrackCap cap : found[s]) {
       cap.fragment = boxes.fragment(boxes.find(square.low));
       caps.push_back(cap);

@@ -19,6 +19,9 @@ enum class CapOutcome { done, degenerate, crosses_itself };
 class CrackEdges {
  public:
   [[nodiscard]] CapOutcome find(CrackMesh& mesh);
+  // For a surface that stays open: only gives `mesh` the points where the sides of squares inside a fragment
+  // meet the surface, so that a cut ends where its crack does.
+  void find_ends(CrackMesh& mesh);
   // The stretches inside the part of one side of a square, as pairs of nodes, end to end.
   // `along`: its direction; `planes` (of the other two axes, ascending); `box`: along it.
   [[nodiscard]] std::span<const std::array<std::uint32_t, 2>> of(int along, int first_plane, int second_plane,
@@ -32,10 +35,9 @@ class CrackEdges {
     std::uint32_t triangle;
     bool leaves;  // the part, going up the line
   };
-  void list_places(const CrackBoxes& boxes);
+  void list_places(const CrackBoxes& boxes, bool inside_only);
   void pierce(const CrackMesh& mesh);
   void make_stretches(CrackMesh& mesh, std::size_t place);
-  [[nodiscard]] static bool touches_itself(const CrackBoxes& boxes, const Place& place);
 
   std::vector<Place> places_;                 // ascending
   std::vector<Line> lines_;                   // ascending
@@ -50,8 +52,8 @@ class CrackEdges {
 void resolve_mixed(const Body& body, const std::vector<std::uint32_t>& polygon_of, const Fragments& fragments,
                    CrackMesh& mesh, std::vector<CrackCap>& caps);
 
-// After CrackMesh::insert_points().
-[[nodiscard]] CapOutcome make_caps(const CrackMesh& mesh, const CrackEdges& edges,
-                                   std::vector<CrackCap>& caps);
+// After CrackMesh::insert_points(). Walls inside a fragment get points of their own between those that both
+// sides share at the end of the crack, so that they can open.
+[[nodiscard]] CapOutcome make_caps(CrackMesh& mesh, const CrackEdges& edges, std::vector<CrackCap>& caps);
 
 }  // namespace flexel

@@ -105,11 +105,24 @@ bool is_carved_cleanly(const Body& body) {
          std::find(body.broken.begin(), body.broken.end(), 1) == body.broken.end();
 }
 
+Fragments whole_parts(const Body& body) {
+  Fragments fragments;
+  fragments.of = element_parts(body);
+  fragments.offset.push_back(0);
+  for (std::uint32_t part = 0; part < body.parts.size(); ++part) {
+    fragments.list.push_back({part, body.parts[part].element_end - body.parts[part].element_begin});
+    fragments.offset.push_back(part + 1);
+  }
+  return fragments;
+}
+
 CrackedSurface close_carved(const Body& body, const Fragments& fragments, CrackMode mode) {
   const VoxelBody voxels = voxel_body(body, fragments);
   CrackOptions options;
   options.mode = mode;
-  CrackedSurface cracked = part_surface(voxels.body, voxels.fragments, options);
+  const Adjacency none{std::vector<std::uint32_t>(voxels.body.element_count() + 1, 0), {}};
+  const PartedPairs parted(voxels.body, voxels.fragments, none);
+  CrackedSurface cracked = part_surface(voxels.body, voxels.fragments, parted, options);
   // The part's own vertices sit where they always do, others in the cell whose voxel they bound.
   const Seats own = take_seats(body);
   const std::vector<std::uint32_t> part_of = element_parts(voxels.body);

@@ -9,8 +9,10 @@ namespace flexel {
 // lattice index.
 constexpr const char* kCarvedNote = "carved";
 
-// True when voxels went and nothing else broke in their parts, which close_carved() does not treat.
+// True when voxels went and no cell broke.
 [[nodiscard]] bool is_carved_cleanly(const Body& body);
+// Every part as one fragment, whatever broke in it: close_carved() then only takes away what was carved.
+[[nodiscard]] Fragments whole_parts(const Body& body);
 
 // The surface without what lay over carved matter, with walls (`cap`, as part_surface(); faces "crack") where
 // it was. A part that hangs together keeps its name; one that fell apart comes as pieces. `fragments`: of the

@@ -105,10 +105,11 @@ void resolve_mixed(const Body& body, const std::vector<std::uint32_t>& polygon_o
       if (count > most) most = count, fragment = candidate;
     (item.bit != kNoBox ? mesh.bits()[item.bit].fragment : caps[item.cap].fragment) = fragment;
   }
-  // Caps come in pairs, one for each side: where both are of one fragment there is no wall.
+  // Caps come in pairs, one for each side: where both turn out to be of one fragment there is no wall.
+  const auto mixed_box = [&](const CrackCap& cap) { return boxes.fragment(boxes.find(cap.box)) == kMixed; };
   std::size_t kept = 0;
   for (std::size_t c = 0; c + 1 < caps.size(); c += 2)
-    if (caps[c].fragment != caps[c + 1].fragment) {
+    if (caps[c].fragment != caps[c + 1].fragment || (!mixed_box(caps[c]) && !mixed_box(caps[c + 1]))) {
       caps[kept] = caps[c];
       caps[kept + 1] = caps[c + 1];
       kept += 2;

@@ -1,7 +1,8 @@
 // A vertex of the body's surface stays what it is: it lies in one box, so in one piece. A point on a cut is a
-// vertex in each piece that it bounds. Around a point on two planes or three a piece may touch itself: the
-// polygons around it are grouped by the edges that they share, four walls at an edge by their box, and each
-// group gets a vertex of its own.
+// vertex in each piece that it bounds. There a piece may touch itself, or have a crack that ends inside it:
+// the polygons around the point are grouped by the edges that they share, as far as they bound the same
+// matter there, and each group gets a vertex of its own. At the end of a crack both its sides are in one
+// group.
 #include "mapping/crack_pieces.h"
 
 #include <fmt/format.h>
@@ -16,7 +17,7 @@
 namespace flexel {
 
 PieceBuilder::PieceBuilder(const Body& body, const Fragments& fragments, const CrackOptions& options,
-                           Seats seats)
+                           Seats seats, std::vector<CrackedSurface::Shift> shifts)
     : body_(body), fragments_(fragments), options_(options) {
   Surface& surface = result_.surface;
   surface.vertices = body.surface.vertices;
@@ -25,6 +26,7 @@ PieceBuilder::PieceBuilder(const Body& body, const Fragments& fragments, const C
   // The file's bytes have other polygons.
   for (SurfaceSource& source : surface.sources) source.bytes.clear();
   result_.seats = std::move(seats);
+  result_.shifts = std::move(shifts);
   std::fill(result_.seats.referenced.begin(), result_.seats.referenced.end(), std::uint8_t{0});
   seen_.assign(surface.vertices.size(), kNoBox);
   part_of_.assign(fragments.list.size(), kNoBox);
@@ -114,27 +116,21 @@ std::uint32_t PieceBuilder::add_vertex(const CrackMesh& mesh, std::uint32_t node
   return static_cast<std::uint32_t>(surface.vertices.size() - 1);
 }
 
-// A vertex of the body's surface goes with its own seat, unless that is in another fragment: then with the
-// owner of its box.
+// A vertex of the body's surface goes with its own seat, unless that is in another fragment or beyond a
+// crack: then with the owner of its box.
 void PieceBuilder::place_vertex(const CrackMesh& mesh, const CrackPolygon& polygon, std::uint32_t vertex) {
   if (seen_[vertex] != kNoBox) return;
   seen_[vertex] = polygon.fragment;
   const Seat& seat = result_.seats.seat[vertex];
   const std::uint32_t origin = seat.in_cell ? body_.cell_elements[seat.owner][seat.octant] : seat.owner;
-  if (fragments_.of[origin] == polygon.fragment) return;
   const std::uint32_t element = holder(mesh, polygon, vertex).element;
+  if (fragments_.of[origin] == polygon.fragment && !mesh.boxes().parted(origin, element)) return;
   if (element != kNoBox)
     result_.seats.seat[vertex] = seat_at_element(body_, fragments_.list[polygon.fragment].part, element,
                                                  body_.surface.vertices[vertex]);
 }
 
 namespace {
-
-int planes_at(const CrackMesh& mesh, std::uint32_t node) {
-  int count = 0;
-  for (int axis = 0; axis < 3; ++axis) count += mesh.plane(node, axis) != kNoPlane;
-  return count;
-}
 
 // Of a triangle.
 double least_height(const Vec3& a, const Vec3& b, const Vec3& c) {
@@ -143,39 +139,49 @@ double least_height(const Vec3& a, const Vec3& b, const Vec3& c) {
   return longest > 0 ? (b - a).cross(c - a).norm() / longest : 0;
 }
 
-}  // namespace
-
-// Points on an edge of the surface: one vertex in each fragment.
-void PieceBuilder::place_edge_nodes(const CrackMesh& mesh, const CrackPolygons& polygons,
-                                    std::vector<std::uint32_t>& vertex) {
-  struct Use {
-    std::uint32_t fragment, node, slot;
-    const CrackPolygon* polygon;
-  };
-  std::vector<Use> uses;
-  for (const CrackPolygon& polygon : polygons.list)
-    for (std::uint32_t slot = polygon.begin; slot < polygon.end; ++slot) {
-      const std::uint32_t node = polygons.corners[slot];
-      if (mesh.is_vertex(node)) {
-        place_vertex(mesh, polygon, node);
-        vertex[slot] = node;
-      } else if (planes_at(mesh, node) < 2) {
-        uses.push_back({polygon.fragment, node, slot, &polygon});
-      }
-    }
-  std::stable_sort(uses.begin(), uses.end(), [](const Use& a, const Use& b) {
-    return a.fragment != b.fragment ? a.fragment < b.fragment : a.node < b.node;
-  });
-  for (std::size_t begin = 0, end = 0; begin < uses.size(); begin = end) {
-    Holder held;
-    for (end = begin; end < uses.size() && uses[end].fragment == uses[begin].fragment &&
-                      uses[end].node == uses[begin].node;
-         ++end)
-      held += holder(mesh, *uses[end].polygon, uses[end].node);
-    const std::uint32_t added = add_vertex(mesh, uses[begin].node, held.element);
-    for (std::size_t k = begin; k < end; ++k) vertex[uses[k].slot] = added;
-  }
+// On which side of a plane a polygon with an edge on it lies.
+bool is_above(const CrackPolygon& polygon, int axis, int on) {
+  return polygon.range.low[axis] > on;
 }
+
+constexpr int kUnknown = -1;
+
+// Of the polygons that share the edge from `a` to `b`, those with equal numbers bound the same matter there.
+int sector(const CrackMesh& mesh, std::uint32_t a, std::uint32_t b, const CrackPolygon& polygon) {
+  const CrackBoxes& boxes = mesh.boxes();
+  std::array<int, 3> on{kNoPlane, kNoPlane, kNoPlane};
+  int planes = 0, axis = 0, along = 0;
+  for (int k = 0; k < 3; ++k) {
+    const int plane = mesh.plane(a, k);
+    if (plane == kNoPlane || plane != mesh.plane(b, k)) {
+      along = k;
+      continue;
+    }
+    on[k] = plane;
+    axis = k;
+    ++planes;
+  }
+  if (planes == 0) return 0;
+  Index3 low = boxes.box_of(Vec3(0.5 * (mesh.u(a) + mesh.u(b))));
+  if (planes == 1) {
+    low[axis] = on[axis];
+    switch (boxes.face(axis, low)) {
+      case CrackBoxes::Face::whole:
+        return 0;
+      case CrackBoxes::Face::mixed:
+        return kUnknown;
+      default:
+        return is_above(polygon, axis, on[axis]);
+    }
+  }
+  if (planes > 2) return kUnknown;
+  const int p = along == 0 ? 1 : 0, q = along == 2 ? 1 : 2;
+  const auto sectors = boxes.sectors(along, on[p], on[q], low[along]);
+  if (!sectors) return kUnknown;
+  return (*sectors)[is_above(polygon, p, on[p]) + 2 * is_above(polygon, q, on[q])];
+}
+
+}  // namespace
 
 // `around`: all corners at one node in one fragment.
 void PieceBuilder::place_fans(const CrackMesh& mesh, std::span<const Corner> around,
@@ -191,9 +197,12 @@ void PieceBuilder::place_fans(const CrackMesh& mesh, std::span<const Corner> aro
     for (end = begin; end < spokes.size() && spokes[end].first == spokes[begin].first;) ++end;
     for (std::size_t a = begin; a < end; ++a)
       for (std::size_t b = a + 1; b < end; ++b) {
-        const BoxRange &p = around[spokes[a].second].polygon->range,
-                       &q = around[spokes[b].second].polygon->range;
-        if (end - begin == 2 || (p.low == q.low && p.high == q.high))
+        const CrackPolygon &one = *around[spokes[a].second].polygon,
+                           &other = *around[spokes[b].second].polygon;
+        const int mine = sector(mesh, around[0].node, spokes[a].first, one);
+        const bool same_box = one.range.low == other.range.low && one.range.high == other.range.high;
+        if (mine != kUnknown ? mine == sector(mesh, around[0].node, spokes[b].first, other)
+                             : end - begin == 2 || same_box)
           fans.unite(spokes[a].second, spokes[b].second);
       }
   }
@@ -213,7 +222,9 @@ void PieceBuilder::place_fans(const CrackMesh& mesh, std::span<const Corner> aro
     const std::uint32_t root = fans.root(k);
     if (root == k) {
       added[k] = add_vertex(mesh, around[k].node, held[k].element);
-      const Vec3 inward = held[k].centre / held[k].boxes - mesh.u(around[k].node);
+      Vec3 inward = held[k].centre / held[k].boxes - mesh.u(around[k].node);
+      for (int axis = 0; axis < 3; ++axis)
+        if (mesh.plane(around[k].node, axis) == kNoPlane) inward[axis] = 0;
       if (count > 1 && options_.mode == CrackMode::cap && inward.norm() > 0) {
         const Lattice& lattice = body_.parts[result_.pieces[around[k].fragment].part].lattice;
         result_.shifts.push_back(
@@ -226,14 +237,19 @@ void PieceBuilder::place_fans(const CrackMesh& mesh, std::span<const Corner> aro
 
 void PieceBuilder::add_pieces(const CrackMesh& mesh, const CrackPolygons& polygons) {
   std::vector<std::uint32_t> vertex(polygons.corners.size(), kNoBox);
-  place_edge_nodes(mesh, polygons, vertex);
   std::vector<Corner> corners;
   for (const CrackPolygon& polygon : polygons.list)
-    for (std::uint32_t slot = polygon.begin; slot < polygon.end; ++slot)
-      if (vertex[slot] == kNoBox)
-        corners.push_back({polygon.fragment, polygons.corners[slot], slot,
+    for (std::uint32_t slot = polygon.begin; slot < polygon.end; ++slot) {
+      const std::uint32_t node = polygons.corners[slot];
+      if (mesh.is_vertex(node)) {
+        place_vertex(mesh, polygon, node);
+        vertex[slot] = node;
+      } else {
+        corners.push_back({polygon.fragment, node, slot,
                            polygons.corners[slot > polygon.begin ? slot - 1 : polygon.end - 1],
                            polygons.corners[slot + 1 < polygon.end ? slot + 1 : polygon.begin], &polygon});
+      }
+    }
   std::sort(corners.begin(), corners.end(), [](const Corner& a, const Corner& b) {
     return std::array{a.fragment, a.node, a.slot} < std::array{b.fragment, b.node, b.slot};
   });

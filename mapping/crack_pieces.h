@@ -35,15 +35,16 @@ void drop_debris(CrackedSurface& cracked);
 
 class PieceBuilder {
  public:
-  // `seats`: of the vertices of the body's surface.
-  PieceBuilder(const Body& body, const Fragments& fragments, const CrackOptions& options, Seats seats);
+  // `seats`, `shifts`: of the vertices of the body's surface.
+  PieceBuilder(const Body& body, const Fragments& fragments, const CrackOptions& options, Seats seats,
+               std::vector<CrackedSurface::Shift> shifts);
   // A part that did not break.
   void add_whole(std::uint32_t part);
   void add_pieces(const CrackMesh& mesh, const CrackPolygons& polygons);
   [[nodiscard]] CrackedSurface take();
 
  private:
-  // A polygon around a point that lies on two planes or three.
+  // A polygon around a point on a plane.
   struct Corner {
     std::uint32_t fragment, node, slot, previous, next;
     const CrackPolygon* polygon;
@@ -58,8 +59,6 @@ class PieceBuilder {
   [[nodiscard]] Holder holder(const CrackMesh& mesh, const CrackPolygon& polygon, std::uint32_t node) const;
   [[nodiscard]] std::uint32_t add_vertex(const CrackMesh& mesh, std::uint32_t node, std::uint32_t element);
   void place_vertex(const CrackMesh& mesh, const CrackPolygon& polygon, std::uint32_t vertex);
-  void place_edge_nodes(const CrackMesh& mesh, const CrackPolygons& polygons,
-                        std::vector<std::uint32_t>& vertex);
   void place_fans(const CrackMesh& mesh, std::span<const Corner> around, std::vector<std::uint32_t>& vertex);
   void add_polygon(std::uint32_t fragment, std::uint32_t source, std::span<const std::uint32_t> corners);
   [[nodiscard]] std::uint32_t face(std::uint32_t fragment, std::uint32_t source);

@@ -72,6 +72,10 @@ std::vector<std::string> crack_lines(const CrackReport& report) {
     lines.push_back(
         fmt::format("{} triangles are stretched across a crack: --crack open or cap parts the surface there",
                     human_count(report.spanning_triangles)));
+  else if (report.mode == CrackMode::keep && report.cracked_parts > 0)
+    lines.push_back(fmt::format(
+        "{} {} cracks that end inside, over which the surface is stretched: --crack open or cap opens them",
+        human_count(report.cracked_parts), report.cracked_parts == 1 ? "part has" : "parts have"));
   return lines;
 }
 
@@ -79,6 +83,7 @@ std::string crack_json(const CrackReport& report) {
   nlohmann::ordered_json json;
   json["mode"] = name_of(report.mode);
   json["fragments"] = report.fragments;
+  json["cracked_parts"] = report.cracked_parts;
   json["spanning_triangles"] = report.spanning_triangles;
   if (report.pieces.empty()) return json.dump();
   const bool volumes = report.mode == CrackMode::cap;

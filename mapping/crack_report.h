@@ -30,7 +30,8 @@ struct CrackPiece {
 struct CrackReport {
   CrackMode mode = CrackMode::keep;
   std::size_t fragments = 0;           // of parts that are in more than one; 0: nothing broke in two
-  std::size_t spanning_triangles = 0;  // whose corners go with different fragments
+  std::size_t cracked_parts = 0;       // with cracks that end inside them
+  std::size_t spanning_triangles = 0;  // whose corners go with different fragments or sides of a crack
   std::vector<CrackPiece> pieces;      // open and cap, where a part is in more than one
   // Sums over the pieces that are left out.
   [[nodiscard]] std::size_t dropped() const;

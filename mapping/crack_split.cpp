@@ -270,6 +270,48 @@ void CrackMesh::points_between(std::uint32_t triangle, const Corner& from, std::
   if (!forward) std::reverse(result.begin(), result.end());
 }
 
+void CrackMesh::halve_cuts() {
+  struct Stretch {
+    std::uint32_t triangle, from, to;
+    int axis, on;
+  };
+  std::vector<Stretch> stretches;
+  std::vector<std::uint32_t> between;
+  const auto planes = [&](std::uint32_t node) {
+    return (plane(node, 0) != kNoPlane) + (plane(node, 1) != kNoPlane) + (plane(node, 2) != kNoPlane);
+  };
+  for (const CrackBit& bit : bits_)
+    for (std::uint32_t k = bit.begin; k < bit.end; ++k) {
+      const Corner& corner = cut_corners_[k];
+      const std::uint32_t last = cut_corners_[k + 1 < bit.end ? k + 1 : bit.begin].node;
+      if (corner.edge < 3) continue;
+      for (int axis = 0; axis < 3; ++axis) {
+        const int on = plane(corner.node, axis);
+        if (on == kNoPlane || on != plane(last, axis) || bit.range.high[axis] != on) continue;
+        points_between(bit.triangle, corner, last, between);
+        between.insert(between.begin(), corner.node);
+        between.push_back(last);
+        for (std::size_t i = 0; i + 1 < between.size(); ++i) {
+          if (planes(between[i]) < 2 || planes(between[i + 1]) < 2) continue;
+          Index3 low = boxes_.box_of(Vec3(0.5 * (u(between[i]) + u(between[i + 1]))));
+          low[axis] = on;
+          if (boxes_.face(axis, low) == CrackBoxes::Face::inside)
+            stretches.push_back({bit.triangle, between[i], between[i + 1], axis, on});
+        }
+      }
+    }
+  for (const Stretch& stretch : stretches) {
+    const CrackNode from = nodes_[stretch.from - vertex_count_], to = nodes_[stretch.to - vertex_count_];
+    std::array<int, 3> plane{kNoPlane, kNoPlane, kNoPlane};
+    plane[stretch.axis] = stretch.on;
+    const std::uint32_t node = add_node(0.5 * (from.u + to.u), plane);
+    CrackNode& middle = nodes_[node - vertex_count_];
+    middle.from = triangles_[stretch.triangle];
+    middle.weight = 0.5 * (from.weight + to.weight);
+    line_[cut_key(stretch.triangle, stretch.axis, stretch.on)].push_back(node);
+  }
+}
+
 void CrackMesh::insert_points() {
   std::vector<std::uint32_t> between;
   for (CrackBit& bit : bits_) {

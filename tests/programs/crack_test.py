@@ -86,6 +86,35 @@ def test_torn_bar_is_two_solids():
     expect(len(stl("torn.stl")) == len(stl("out/box-1.stl")) + len(stl("out/box-2.stl")), "one file with all pieces")
 
 
+def notched_bar():
+    """A bar of 40 x 10 x 10 mm whose cells broke half-way through at x = 20 mm, and that is bent there."""
+    box()
+    expect_ok(run("flexel-voxelize", "box.stl", "--size", "1.25 mm", "-o", "rest.vtu"))
+    angle, tip = 0.1, np.array([0.0206, 0.005, 0])
+    turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+    tear("rest.vtu", "notched.vtu", half(20.6), lambda x: (x - tip) @ turn.T + tip, lambda x: x[:, 1] < 0.005)
+
+
+def test_a_notch_opens_up_to_its_tip():
+    notched_bar()
+    expect_ok(run("flexel-map", "notched.vtu", "--crack", "cap", "--report", "report.json", "-o", "open.stl"))
+    found = json.load(open("report.json"))
+    expect(found["crack"]["fragments"] == 0 and found["crack"]["cracked_parts"] == 1 and "pieces" not in found["crack"], f"{found}")
+    expect(abs(found["volume_before"] - 4e-6) < 1e-18, f"{found['volume_before']}")
+    volume_now = expect_solid("open.stl")
+    expect(abs(volume_now * 1e-9 - found["volume_after"]) < 1e-12, f"{volume_now} mm^3, {found['volume_after']} m^3")
+    said = expect_ok(run("flexel-map", "notched.vtu", "--report", "kept.json", "-o", "kept.stl"))
+    expect("--crack open or cap" in said.err and json.load(open("kept.json"))["crack"]["cracked_parts"] == 1, said.err)
+    # The mouth: nothing between its sides, which are 5 mm from the tip and 0.1 rad apart.
+    x = sorted(corner[0] for triangle in stl("open.stl") for corner in triangle if corner[1] < 0.2 and 20 < corner[0] < 22)
+    gap = max(high - low for low, high in zip(x, x[1:]))
+    expect(abs(gap / 0.5 - 1) < 0.15, f"the mouth is {gap} mm wide")
+    expect_ok(run("flexel-map", "notched.vtu", "--crack", "cap", "--threads", "1", "-o", "one.stl"))
+    expect(open("one.stl", "rb").read() == open("open.stl", "rb").read(), "any number of threads")
+    expect_ok(run("flexel-map", "notched.vtu", "--crack", "open", "-o", "walls.stl"))
+    expect(len(stl("walls.stl")) < len(stl("open.stl")), "no walls")
+
+
 def test_pieces_in_every_format():
     torn_bar(2.0)
     for name in ("torn.obj", "torn.ply", "torn.off", "torn.glb"):
@@ -241,6 +270,20 @@ def test_a_carved_part_comes_out_closed():
     # voxels whose middle is in the box: 2 x 2 x 4 of 2.5 mm
     expect(abs(taken / (16 * 2.5 ** 3) - 1) < 0.01, f"{taken} mm^3 went")
     expect(json.load(open("report.json"))["valid"], "the mapping can be used")
+
+
+def test_a_carved_and_torn_part_is_parted_and_closed():
+    box()
+    expect_ok(run("flexel-voxelize", "box.stl", "--size", "2.5 mm", "-o", "rest.vtu"))
+    expect_ok(run("flexel-simulate", write("drill.toml", DRILL), "rest.vtu", "-o", "drilled.vtu"))
+    tear("drilled.vtu", "torn.vtu", half(26), away)
+    os.mkdir("out")
+    expect_ok(run("flexel-map", "torn.vtu", "--crack", "cap", "--pieces", "out", "--report", "report.json", "-o", "torn.stl"))
+    expect(sorted(os.listdir("out")) == ["box-1.stl", "box-2.stl"], f"{os.listdir('out')}")
+    for name in os.listdir("out"):
+        expect_solid(f"out/{name}")
+    left = sum(p["volume_before"] for p in json.load(open("report.json"))["crack"]["pieces"])
+    expect(abs((4000 - left * 1e9) / (16 * 2.5 ** 3) - 1) < 0.01, f"{left} m^3 are left")
 
 
 if __name__ == "__main__":

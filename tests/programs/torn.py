@@ -26,16 +26,18 @@ STEPS = [(1, 0, 0), (-1, 1, 0), (0, 1, 0), (1, 1, 0), (-1, -1, 1), (0, -1, 1), (
          (0, 1, 1), (1, 1, 1)]  # of the bits of `connections` (docs/body-file.md)
 
 
-def tear(rest, torn, side, move):
+def tear(rest, torn, side, move, only=None):
     """Writes `torn`: the body `rest`, broken where cells or connections have elements on both sides, and one side moved. `side`: rest
-    positions (n x 3, m) to booleans; `move`: the positions of that side to where they go."""
+    positions (n x 3, m) to booleans; `move`: the positions of that side to where they go; `only`: middles of cells (n x 3, m) to which of
+    them may break: a crack that ends inside."""
     data = bytearray(open(rest, "rb").read())
     arrays = arrays_in(data)
     assert b"vtkZLibDataCompressor" not in data[:2000]
     high = side(arrays["rest"])
     m = int((arrays["types"] == 12).sum())
     cells = arrays["connectivity"][:8 * m].reshape(-1, 8)
-    arrays["broken"][:m] = high[cells].any(axis=1) & ~high[cells].all(axis=1)
+    broken = high[cells].any(axis=1) & ~high[cells].all(axis=1)
+    arrays["broken"][:m] = broken if only is None else broken & only(arrays["rest"][cells].mean(axis=1))
     if m == 0:
         at = {tuple(index): e for e, index in enumerate(arrays["lattice_index"].tolist())}
         for index, e in at.items():
