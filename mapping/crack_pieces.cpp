@@ -181,6 +181,24 @@ int sector(const CrackMesh& mesh, std::uint32_t a, std::uint32_t b, const CrackP
   return (*sectors)[is_above(polygon, p, on[p]) + 2 * is_above(polygon, q, on[q])];
 }
 
+// The side of the plane of `axis` at the node on which a polygon bounds a crack: 1 above, -1 below; 0 where
+// it is no wall there, nor meets one in an edge that ends at the node.
+int side_of_wall(const CrackMesh& mesh, std::uint32_t node, std::uint32_t previous, std::uint32_t next,
+                 const CrackPolygon& polygon, int axis) {
+  const int on = mesh.plane(node, axis);
+  if (on == kNoPlane) return 0;
+  const auto lies_on = [&](std::uint32_t other) { return mesh.plane(other, axis) == on; };
+  const auto along_crack = [&](std::uint32_t other) {
+    if (!lies_on(other)) return false;
+    Index3 low = mesh.boxes().box_of(Vec3(0.5 * (mesh.u(node) + mesh.u(other))));
+    low[axis] = on;
+    return mesh.boxes().face(axis, low) != CrackBoxes::Face::whole;
+  };
+  const bool wall = polygon.polygon == kNoPolygon;
+  const bool bounds = wall ? lies_on(previous) && lies_on(next) : along_crack(previous) || along_crack(next);
+  return !bounds ? 0 : is_above(polygon, axis, on) ? 1 : -1;
+}
+
 }  // namespace
 
 // `around`: all corners at one node in one fragment.
@@ -206,6 +224,15 @@ void PieceBuilder::place_fans(const CrackMesh& mesh, std::span<const Corner> aro
           fans.unite(spokes[a].second, spokes[b].second);
       }
   }
+  // Away from the walls, once for each side of a plane.
+  std::vector<Vec3> towards(around.size()), above(around.size(), Vec3::Zero()), below = above;
+  for (std::uint32_t k = 0; k < around.size(); ++k)
+    for (int axis = 0; axis < 3; ++axis)
+      if (const int side = side_of_wall(mesh, around[k].node, around[k].previous, around[k].next,
+                                        *around[k].polygon, axis);
+          side != 0)
+        (side > 0 ? above : below)[fans.root(k)][axis] = 1;
+  for (std::uint32_t k = 0; k < around.size(); ++k) towards[k] = above[k] - below[k];
   std::vector<Holder> held(around.size());
   std::vector<double> room(around.size(), kDrawnApart);  // how far a fan's vertex may be drawn, in spacings
   for (std::uint32_t k = 0; k < around.size(); ++k) {
@@ -222,7 +249,9 @@ void PieceBuilder::place_fans(const CrackMesh& mesh, std::span<const Corner> aro
     const std::uint32_t root = fans.root(k);
     if (root == k) {
       added[k] = add_vertex(mesh, around[k].node, held[k].element);
-      Vec3 inward = held[k].centre / held[k].boxes - mesh.u(around[k].node);
+      Vec3 inward = towards[k];
+      // All round the end of a crack: towards its own matter.
+      if (inward.isZero(0)) inward = held[k].centre / held[k].boxes - mesh.u(around[k].node);
       for (int axis = 0; axis < 3; ++axis)
         if (mesh.plane(around[k].node, axis) == kNoPlane) inward[axis] = 0;
       if (count > 1 && options_.mode == CrackMode::cap && inward.norm() > 0) {

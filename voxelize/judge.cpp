@@ -88,10 +88,10 @@ Counts judge_voxel(const Judges& judges, std::size_t voxel, int count) {
   return sum;
 }
 
-Agreement agreement(const Judges& judges) {
+Agreement agreement(const Judges& judges, std::size_t samples) {
   const std::size_t voxels = judges.range.voxels();
   const int each =
-      static_cast<int>(std::clamp<std::size_t>(kJudged / std::max<std::size_t>(1, voxels), 1, 64));
+      static_cast<int>(std::clamp<std::size_t>(samples / std::max<std::size_t>(1, voxels), 1, 64));
   const Counts sum = parallel_sum<Counts>(
       voxels, [&](std::size_t voxel) { return judge_voxel(judges, voxel, each); }, 256);
   const auto share = [](double count, double a, double b) {
@@ -179,14 +179,14 @@ VoxelSamples decided(const Judges& judges, const Verdict& verdict, int i, int j,
 Sampled classify_sampled(const PartMesh& mesh, bool unanimous) {
   const Judges judges(mesh);
   Sampled result;
-  result.agreement = agreement(judges);
+  result.agreement = agreement(judges, kJudged);
   Verdict verdict{decide(result.agreement, unanimous), &judges, 1};
   std::optional<PartMesh> fine;
   std::optional<Judges> finer;
   if (const int times = refinement(judges.range.voxels()); verdict.by == Sampled::By::nobody && times > 1) {
     fine = refined(mesh, times);
     finer.emplace(*fine);
-    result.agreement = agreement(*finer);
+    result.agreement = agreement(*finer, kJudgedVoxels);
     verdict = {decide(result.agreement, unanimous), &*finer, times};
   }
   result.by = verdict.by;
