@@ -62,7 +62,6 @@ Corners corners_of(const Surface& surface) {
 // of lowest number.
 struct Home {
   double squared_distance = kFar;  // m^2, 0 inside
-  double from_middle = kFar;       // squared, of the voxel's own middle, spacings^2
   bool on_face = false;            // inside, but another voxel may hold the point as well
   Seat seat;
   [[nodiscard]] bool certain() const { return squared_distance == 0 && !on_face; }
@@ -99,6 +98,16 @@ bool goes_up(double offset, double at, double middle) {
   return offset > 0;
 }
 
+// Whether of two cells equally near the first is taken.
+bool is_preferred(const Body& body, std::uint32_t cell, std::uint32_t other, const Vec3& middle) {
+  const auto squared_distance = [&](std::uint32_t c) {
+    const Index3& index = body.lattice_index[body.cell_elements[c][0]];
+    return (Vec3(index[0], index[1], index[2]) + Vec3::Constant(0.5) - middle).squaredNorm();
+  };
+  const double mine = squared_distance(cell), its = squared_distance(other);
+  return mine < its - kTie || (mine <= its + kTie && cell < other);
+}
+
 // Compares `cell` with the nearest so far; `u` is a point in lattice coordinates.
 void consider(const Body& body, std::uint32_t cell, const Vec3& u, const Vec3& spacing, const Vec3& middle,
               Home& home) {
@@ -109,15 +118,11 @@ void consider(const Body& body, std::uint32_t cell, const Vec3& u, const Vec3& s
   const double squared_distance = inside ? 0 : (within - clamped).cwiseProduct(spacing).squaredNorm();
   const bool nearer = squared_distance < (1 - kTie) * home.squared_distance;
   if (!nearer && squared_distance > (1 + kTie) * home.squared_distance) return;
-  const double from_middle =
-      (Vec3(index[0], index[1], index[2]) + Vec3::Constant(0.5) - middle).squaredNorm();
-  if (!nearer && (from_middle > home.from_middle + kTie ||
-                  (from_middle > home.from_middle - kTie && cell > home.seat.owner)))
-    return;
+  if (!nearer && !is_preferred(body, cell, home.seat.owner, middle)) return;
   const bool on_face = inside && within.cwiseMin(Vec3::Ones() - within).minCoeff() < kTie;
   int corner = 0;
   for (int a = 0; a < 3; ++a) corner += goes_up(within[a] - 0.5, u[a], middle[a]) << a;
-  home = {squared_distance, from_middle, on_face, {cell, true, static_cast<std::uint8_t>(corner)}};
+  home = {squared_distance, on_face, {cell, true, static_cast<std::uint8_t>(corner)}};
 }
 
 // Beyond this many cells under a polygon a search by bisection is faster than looking at each.
