@@ -213,6 +213,21 @@ void welding(benchmark::State& state) {
   count(state, body);
 }
 
+// The least that gram-schmidt and affine can take: an index and coordinates read, a displacement written.
+void traffic(benchmark::State& state) {
+  const Body& body = ring(Placement::corner);
+  const ThreadLimit limit(static_cast<int>(state.range(0)));
+  const Binding binding = bind(body, MapMethod::affine);
+  std::vector<Vec3> out(body.surface.vertices.size());
+  for (auto _ : state) {
+    parallel_for_each(
+        out.size(), [&](std::size_t v) { out[v] = binding.coordinates[v] * binding.frame[v]; }, 8192);
+    benchmark::DoNotOptimize(out.data());
+  }
+  count(state, body);
+  state.counters["frames"] = static_cast<double>(binding.frames.size());
+}
+
 // The nearest element of every vertex, which centre placement needs.
 void nearest(benchmark::State& state) {
   const Body& body = ring(Placement::centre);
@@ -261,6 +276,7 @@ void register_all() {
   add("judge", judging);
   add("part/connections", connections);
   add("part/welding", welding);
+  add("part/traffic", traffic);
   add("part/nearest", nearest);
 }
 
