@@ -36,6 +36,7 @@ Material parse_material(TableReader& reader, const std::string& name) {
   material.strength = optional_limit("strength");
   material.elongation = reader.number("elongation").value_or(0);
   material.contact_friction = reader.number("friction");
+  (void)reader.find("stick");  // simulate/effects/contact.cpp
   reader.finish();
   if (material.contact_friction && !(*material.contact_friction >= 0))
     reader.fail("\"friction\" needs to be 0 or more");

@@ -68,12 +68,21 @@ class Grid {
 
 class Search {
  public:
-  explicit Search(const Setting& setting);
+  Search(const Setting& setting, const std::vector<TouchingGap>& wider);
   std::vector<TouchingPoint> operator()();
 
  private:
   [[nodiscard]] double tolerance(std::uint32_t part) const {
     return std::max(kOfDiagonal * diagonal_, kOfSpacing * body_.parts[part].lattice.spacing.minCoeff());
+  }
+  [[nodiscard]] double wider_gap(std::uint32_t a, std::uint32_t b) const {
+    double gap = 0;
+    for (const TouchingGap& each : wider_)
+      if (each.parts == std::array{std::min(a, b), std::max(a, b)}) gap = std::max(gap, each.gap);
+    return gap;
+  }
+  [[nodiscard]] double margin(std::uint32_t a, std::uint32_t b) const {
+    return std::max({tolerance(a), tolerance(b), wider_gap(a, b)});
   }
   void sample(std::uint32_t part);
   void touch(std::uint32_t finer, std::uint32_t coarser);
@@ -81,6 +90,7 @@ class Search {
 
   const Setting& setting_;
   const Body& body_;
+  const std::vector<TouchingGap>& wider_;
   double diagonal_ = 0;
   Triangles triangles_;
   std::vector<std::uint32_t> first_triangle_;      // (polygons + 1)
@@ -89,9 +99,10 @@ class Search {
   std::vector<TouchingPoint> found_;
 };
 
-Search::Search(const Setting& setting)
+Search::Search(const Setting& setting, const std::vector<TouchingGap>& wider)
     : setting_(setting),
       body_(setting.body),
+      wider_(wider),
       diagonal_(bounding_box(setting.body.surface.vertices).diagonal()) {
   const Surface& surface = body_.surface;
   box_.resize(body_.parts.size());
@@ -112,7 +123,7 @@ void Search::sample(std::uint32_t part) {
     if (body_.surface.polygon_part(p) != part) continue;
     const Box box = polygon_box(body_.surface, p);
     for (std::uint32_t other = 0; other < body_.parts.size(); ++other)
-      if (other != part && overlap(box, box_[other], tolerance(part))) {
+      if (other != part && overlap(box, box_[other], margin(part, other))) {
         polygons.push_back(p);
         break;
       }
@@ -132,7 +143,7 @@ double Search::distance(const Vec3& point, std::uint32_t polygon) const {
 }
 
 void Search::touch(std::uint32_t finer, std::uint32_t coarser) {
-  const double limit = tolerance(finer);
+  const double limit = std::max(tolerance(finer), wider_gap(finer, coarser));
   std::unordered_map<std::uint32_t, Vec3> normal;
   for (const SurfacePoint& point : points_[coarser])
     normal.try_emplace(point.polygon, point.area_vector.normalized());
@@ -164,7 +175,7 @@ std::vector<TouchingPoint> Search::operator()() {
   for (std::uint32_t a = 0; a < body_.parts.size(); ++a)
     for (std::uint32_t b = a + 1; b < body_.parts.size(); ++b) {
       if (points_[a].empty() || points_[b].empty()) continue;
-      if (!overlap(box_[a], box_[b], std::max(tolerance(a), tolerance(b)))) continue;
+      if (!overlap(box_[a], box_[b], margin(a, b))) continue;
       spacing(a) <= spacing(b) ? touch(a, b) : touch(b, a);
     }
   return std::move(found_);
@@ -172,9 +183,9 @@ std::vector<TouchingPoint> Search::operator()() {
 
 }  // namespace
 
-std::vector<TouchingPoint> touching_points(const Setting& setting) {
+std::vector<TouchingPoint> touching_points(const Setting& setting, const std::vector<TouchingGap>& wider) {
   if (setting.body.parts.size() < 2) return {};
-  return Search(setting)();
+  return Search(setting, wider)();
 }
 
 }  // namespace flexel

@@ -16,6 +16,13 @@ struct TouchingPoint {
 // Points of the finer part's surface (surface_points()) that lie within 1e-6 of the body's diagonal, or 0.01
 // of the finer spacing, of a polygon of the other part that faces them within 45 degrees. Each point touches
 // the nearest such polygon. Stray matter is left out. Order: by pair of parts, then by polygon.
-[[nodiscard]] std::vector<TouchingPoint> touching_points(const Setting& setting);
+//
+// `wider`: pairs of parts (lower number first) whose surfaces count as touching over a gap [m].
+struct TouchingGap {
+  std::array<std::uint32_t, 2> parts{};
+  double gap = 0;
+};
+[[nodiscard]] std::vector<TouchingPoint> touching_points(const Setting& setting,
+                                                         const std::vector<TouchingGap>& wider = {});
 
 }  // namespace flexel

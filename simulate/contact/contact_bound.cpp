@@ -2,8 +2,9 @@
 //
 // Stiffness: the largest eigenvalue of M^-1 sum k b b^T over the pairs, b the derivative of the gap by the
 // elements, is at most the largest row sum of absolute values, sum k |b_a| sum_c |b_c| / m_a (Gershgorin).
-// Pairs that are listed but do not touch yet count as if they did. Motion: points pass at most a fifth of the
-// smallest spacing a step, against one another.
+// Pairs that are listed but do not touch yet count as if they did. Motion: points pass at most an eighth of
+// the smallest spacing a step, against one another: what an impact gains or loses for want of a step at the
+// moment of touching grows with the square of that.
 #include <algorithm>
 
 #include "simulate/contact/contacts.h"
@@ -11,8 +12,8 @@
 namespace flexel {
 namespace {
 
-constexpr double kAhead = 1.3;                      // of what hardens now, until it is looked at again
-constexpr double kTravel = 0.2, kMostTravel = 0.3;  // spacings a step: what is asked for, what is borne
+constexpr double kAhead = 1.3;                       // of what hardens now, until it is looked at again
+constexpr double kTravel = 0.12, kMostTravel = 0.2;  // spacings a step: what is asked for, what is borne
 
 // omega^2 that bounds the step like a dashpot of tau beside a stiffness of omega^2 (time/stability.h).
 double damped(double omega2, double tau) {

@@ -12,7 +12,8 @@ constexpr double kTurning = 0.4;  // by which the cosine between normals may cha
 constexpr double kNearMatter =
     2.5;                  // spacings at rest; nearer points of one part that matter joins do not touch
 constexpr int kHops = 2;  // connections along which matter joins the cells of two such points
-constexpr double kSameSide = 0.3;  // cosine between normals at rest above which points are of one side
+constexpr double kMostDrawn = 0.35;  // spacings that what sticks can be drawn out by
+constexpr double kSameSide = 0.3;    // cosine between normals at rest above which points are of one side
 
 }  // namespace
 
@@ -22,13 +23,34 @@ double Contacts::reach(std::uint32_t i, std::uint32_t j) const {
   return std::hypot(std::max(a.width, b.width), a.depth + b.depth + a.radius + b.radius);
 }
 
+// Springs in series, so that two alike make that of each; two balls the mean, as in the paper (section 3.2).
+double Contacts::foundation(std::uint32_t i, std::uint32_t j) const {
+  const double a = foundation_[points_[i].part], b = foundation_[points_[j].part];
+  const bool balls = points_[i].radius > 0 && points_[j].radius > 0;
+  return balls ? 0.5 * (a + b) : 2 * a * b / (a + b);
+}
+
+// Of the part, and what events have added to it in the elements' column "stick_change" [Pa].
+double Contacts::stick_of(std::uint32_t point) const {
+  const ContactPoint& at = points_[point];
+  double stick = stick_[at.part];
+  const auto column = body_.element_columns.find("stick_change");
+  if (column == body_.element_columns.end() || column->second.components != 1) return stick;
+  for (std::uint32_t a = 0; a < at.at.count; ++a)
+    stick += at.at.weights[a] * column->second.values[at.at.elements[a]];
+  return std::max(stick, 0.0);
+}
+
+// m, that a traction of `stick` draws a contact of stiffness `foundation` out.
+double Contacts::holds(std::uint32_t i, double stick, double foundation) const {
+  return stick > 0 ? std::min(stick / foundation, kMostDrawn * points_[i].width) : 0;
+}
+
 PairConstants Contacts::constants(std::uint32_t i, std::uint32_t j) const {
   const ContactPoint &a = points_[i], &b = points_[j];
-  const double ka = foundation_[a.part], kb = foundation_[b.part];
   const bool balls = a.radius > 0 && b.radius > 0;
   PairConstants pair;
-  // springs in series, so that two alike make that of each
-  pair.stiffness = 2 * ka * kb / (ka + kb) * (balls ? 0.5 * (a.area + b.area) : a.area * b.area);
+  pair.stiffness = foundation(i, j) * (balls ? 0.5 * (a.area + b.area) : a.area * b.area);
   pair.width = balls ? 0 : std::max(a.width, b.width);
   pair.facing_from = std::min(a.facing_from, b.facing_from);
   pair.facing_fully = std::min(a.facing_fully, b.facing_fully);
@@ -101,6 +123,13 @@ bool Contacts::near_in_matter(std::uint32_t i, std::uint32_t j) const {
   return std::binary_search(joined.begin(), joined.end(), std::max(i, j));
 }
 
+bool Contacts::bonded(std::uint32_t i, std::uint32_t j) const {
+  const ContactPoint &a = points_[i], &b = points_[j];
+  const std::array parts{std::min(a.part, b.part), std::max(a.part, b.part)};
+  return std::find(settings_.bonded.begin(), settings_.bonded.end(), parts) != settings_.bonded.end() &&
+         (a.rest - b.rest).norm() < kNearMatter * std::max(a.width, b.width);
+}
+
 // How far elements have moved since the pairs were found: half the diagonal of the box of their moves, which
 // is nothing where all move together.
 void Contacts::refresh(const State& state) {
@@ -118,13 +147,14 @@ void Contacts::refresh(const State& state) {
       return one;
     });
     if (!settings_.planes.empty()) moves.add(Vec3::Zero());
-    if (0.5 * moves.diagonal() <= slack_) return;
+    if (0.5 * moves.diagonal() <= slack_ && broken_cells() == built_with_) return;
   }
   build(state);
 }
 
 void Contacts::build(const State& state) {
   built_ = true;
+  built_with_ = broken_cells();
   ++builds_;
   for (std::size_t e = 0; e < elements_.size(); ++e) built_at_[e] = state.displacement[elements_[e]];
   std::vector<Vec3> positions(points_.size()), normals(points_.size());
@@ -141,16 +171,16 @@ void Contacts::build(const State& state) {
   add_pairs(positions, normals);
   add_plane_pairs(positions, normals);
   std::sort(pairs_.begin(), pairs_.end(), [](const Pair& a, const Pair& b) { return a.key < b.key; });
-  if (loses()) {
-    std::vector<Memory> kept;
-    auto old = memory_.begin();
-    for (const Pair& pair : pairs_) {
-      while (old != memory_.end() && old->key < pair.key) ++old;
-      const bool known = old != memory_.end() && old->key == pair.key;
-      kept.push_back(known ? *old : Memory{pair.key, Vec3::Zero()});
-    }
-    memory_ = std::move(kept);
+  std::vector<Memory> kept;
+  kept.reserve(pairs_.size());
+  auto old = memory_.begin();
+  for (const Pair& pair : pairs_) {
+    while (old != memory_.end() && old->key < pair.key) ++old;
+    const bool known = old != memory_.end() && old->key == pair.key;
+    kept.push_back(known ? *old : Memory{pair.key});
+    if (!(pair.holds > 0)) kept.back().stuck = kFree;
   }
+  memory_ = std::move(kept);
   number_near();
 }
 
@@ -193,17 +223,20 @@ void Contacts::add_pairs(const std::vector<Vec3>& positions, const std::vector<V
     if (points_[i].shape == ContactShape::edge && points_[j].shape == ContactShape::edge) return false;
     const double near = reach(i, j) + skin;
     if ((at[b] - at[a]).squaredNorm() > near * near) return false;
-    const bool faces = points_[i].shape != ContactShape::ball && points_[j].shape != ContactShape::ball;
-    if (faces &&
+    const auto directed = [&](std::uint32_t point) { return normals[point] != Vec3::Zero(); };
+    if (directed(i) && directed(j) &&
         -normals[i].dot(normals[j]) < std::min(points_[i].facing_from, points_[j].facing_from) - kTurning)
       return false;
-    return !same || !near_in_matter(i, j);
+    return same ? !near_in_matter(i, j) : !bonded(i, j);
   });
   for (std::uint32_t a = 0; a < in_grid.size(); ++a)
     for (const std::uint32_t b : found.of(a)) {
       const std::uint32_t i = in_grid[a], j = in_grid[b];
-      pairs_.push_back(
-          {i, j, 0, std::uint64_t{i} << 32 | j, 0.5 * (friction_of(i) + friction_of(j)), constants(i, j)});
+      // the faces beside an edge have all of the area that sticks
+      const bool edged = points_[i].shape == ContactShape::edge || points_[j].shape == ContactShape::edge;
+      pairs_.push_back({i, j, 0, std::uint64_t{i} << 32 | j, 0.5 * (friction_of(i) + friction_of(j)),
+                        constants(i, j),
+                        edged ? 0 : holds(i, 0.5 * (stick_of(i) + stick_of(j)), foundation(i, j))});
     }
 }
 
@@ -214,12 +247,15 @@ void Contacts::add_plane_pairs(const std::vector<Vec3>& positions, const std::ve
     for (std::uint32_t i = 0; i < points_.size(); ++i) {
       if (led(points_[i].part)) continue;
       if ((positions[i] - plane.point).dot(plane.normal) - points_[i].radius > skin) continue;
-      if (points_[i].shape != ContactShape::ball &&
-          -normals[i].dot(plane.normal) < points_[i].facing_from - kTurning)
+      if (normals[i] != Vec3::Zero() && -normals[i].dot(plane.normal) < points_[i].facing_from - kTurning)
         continue;
       const double own = friction_of(i);
+      const double stick = points_[i].shape == ContactShape::edge
+                               ? 0
+                               : 0.5 * (stick_of(i) + plane.stick.value_or(stick_of(i)));
       pairs_.push_back({i, kNoPoint, p, std::uint64_t{i} << 32 | (points_.size() + p),
-                        0.5 * (own + plane.friction.value_or(own)), plane_constants(i)});
+                        0.5 * (own + plane.friction.value_or(own)), plane_constants(i),
+                        holds(i, stick, foundation_[points_[i].part])});
     }
   }
 }

@@ -1,4 +1,4 @@
-// Friction and damping of contacts.
+// Friction and damping of contacts, and what sticks.
 //
 // Both act at one place for either side, half way between the points, and along one line: momentum and
 // angular momentum are kept. A force f at a place o from a point of a cell, o as it is now, moves element a
@@ -8,7 +8,12 @@
 // what touches where it first touched, stiff as 0.8 of the contact itself (Mindlin 1949: 0.8 at Poisson's
 // ratio 1/3); where its force would pass mu N it slides and keeps that of mu N. Damping: a dashpot of tau
 // times the contact's stiffness, along the normal and, while it sticks, along the surface. It never pulls.
+//
+// Sticking for good (Jansson and Vergeest, section 3.2: a connection made when elements meet, destroyed when
+// they are t apart): what has touched is a spring, as stiff as the contact, that pulls until it is drawn out
+// by t, where the traction is `stick`; along the surface it holds that traction beside mu N, and slides on.
 #include <algorithm>
+#include <utility>
 
 #include "simulate/contact/contacts.h"
 
@@ -24,12 +29,14 @@ Vec3 at_most(const Vec3& value, double most) {
 
 }  // namespace
 
-// From each point to the place where they meet. A ball meets at its centre, which alone can carry a force.
+// From each point to the place where they meet. A ball meets at its centre, which alone can carry a force,
+// and so does what has no shape.
 std::array<Vec3, 2> Contacts::meeting(const Pair& pair) const {
   if (pair.j == kNoPoint) return {Vec3::Zero(), Vec3::Zero()};
   const ContactSide &i = sides_[pair.i].at, &j = sides_[pair.j].at;
   const Vec3 d = j.position - i.position;
-  const bool ball_i = i.radius > 0, ball_j = j.radius > 0;
+  const bool ball_i = i.radius > 0 || sides_[pair.i].shapeless;
+  const bool ball_j = j.radius > 0 || sides_[pair.j].shapeless;
   const double share = ball_i == ball_j ? 0.5 : ball_i ? 0 : 1;
   return {share * d, (share - 1) * d};
 }
@@ -62,6 +69,27 @@ Vec3 Contacts::relative_velocity(const Pair& pair, const std::vector<Motion>& mo
   return pair.j == kNoPoint ? Vec3(-of_i) : Vec3(at(pair.j, place[1]) - of_i);
 }
 
+// m, that a pair that sticks is drawn out; 0 of others.
+double Contacts::drawn(std::size_t pair) const {
+  const double stuck = memory_[pair].stuck;
+  return stuck == kFree ? 0 : std::max(states_[pair].gap - stuck, 0.0);
+}
+
+// N/m, of a pair that is pressed together or sticks: from the first touch on what it is where it is linear,
+// so that what rests on little pressure does not sway.
+double Contacts::secant(std::size_t pair) const {
+  const PairState& now = states_[pair];
+  return std::max(now.pressure > 0 ? now.pressure / -now.gap : 0, now.weight);
+}
+
+// N, along the surface, at which a pair slides: mu N and what sticks holds, less as it is drawn out.
+double Contacts::most_across(std::size_t pair) const {
+  const double most = pairs_[pair].friction * states_[pair].pressure;
+  if (memory_[pair].stuck == kFree) return most;
+  const double share = drawn(pair) / pairs_[pair].holds;
+  return most + states_[pair].weight * pairs_[pair].holds * std::sqrt(std::max(1 - share * share, 0.0));
+}
+
 void Contacts::add_losses(const State& state, std::vector<Vec3>& forces) {
   look(state);
   if (pairs_.empty()) return;
@@ -71,16 +99,20 @@ void Contacts::add_losses(const State& state, std::vector<Vec3>& forces) {
       pairs_.size(),
       [&](std::size_t p) {
         const PairState& now = states_[p];
-        if (!(now.pressure > 0)) return;
+        const bool pressed = now.pressure > 0, sticks = now.near && memory_[p].stuck != kFree;
+        if (!pressed && !sticks) return;
         const Pair& pair = pairs_[p];
-        const double secant = now.pressure / -now.gap;  // N/m
+        const double stiffness = secant(p);
+        // of the dashpot: as stiff as the contact is where it begins softly
+        const double depth = sticks ? 1 : std::min(-now.gap / pair.constants.law.soft, 1.0);
         const Vec3 velocity = settings_.damping > 0 ? relative_velocity(pair, moving) : Vec3(Vec3::Zero());
         const double apart = velocity.dot(now.normal);
-        const double along =
-            std::max(-settings_.damping * secant * apart, -now.pressure);  // on j, along the normal
+        // on j, along the normal
+        double along = -settings_.damping * now.stiffness * depth * apart - stiffness * drawn(p);
+        if (!sticks) along = std::max(along, -now.pressure);
         const Vec3 across = velocity - apart * now.normal;
-        const Vec3 held = -kAcross * secant * (memory_[p].stretch + settings_.damping * across);
-        found[p] = along * now.normal + at_most(held, pair.friction * now.pressure);
+        const Vec3 held = memory_[p].stretch + settings_.damping * across;
+        found[p] = along * now.normal - at_most(kAcross * stiffness * held, most_across(p));
       },
       512);
   std::vector<Total> totals(near_.size());
@@ -99,20 +131,29 @@ void Contacts::add_losses(const State& state, std::vector<Vec3>& forces) {
 
 void Contacts::remember(const State& state, double drift) {
   look(state);
+  const bool fresh = std::exchange(fresh_, false);
   if (pairs_.empty() || !loses()) return;
   const std::vector<Motion> moving = motions(state);
   parallel_for_each(
       pairs_.size(),
       [&](std::size_t p) {
         const PairState& now = states_[p];
-        Vec3& stretch = memory_[p].stretch;
-        if (!(now.pressure > 0) || !(pairs_[p].friction > 0)) {
-          stretch = Vec3::Zero();
-          return;
-        }
-        stretch += drift * relative_velocity(pairs_[p], moving);
+        const Pair& pair = pairs_[p];
+        Memory& memory = memory_[p];
+        // at the beginning what lies there touches, give or take
+        const bool touches = now.near && now.gap < (fresh ? pair.constants.law.soft : 0);
+        if (!now.near || !(pair.holds > 0))
+          memory.stuck = kFree;
+        else if (memory.stuck == kFree && touches)
+          memory.stuck = std::max(now.gap, 0.0);
+        Vec3 stretch = memory.stretch + drift * relative_velocity(pair, moving);
         stretch -= stretch.dot(now.normal) * now.normal;
-        stretch = at_most(stretch, pairs_[p].friction * -now.gap / kAcross);
+        if (!(now.pressure > 0) && std::hypot(drawn(p), kAcross * stretch.norm()) > pair.holds)
+          memory.stuck = kFree;
+        const bool rubs = now.pressure > 0 && pair.friction > 0;
+        memory.stretch = rubs || memory.stuck != kFree
+                             ? at_most(stretch, most_across(p) / (kAcross * secant(p)))
+                             : Vec3(Vec3::Zero());
       },
       512);
 }

@@ -16,8 +16,11 @@
 namespace flexel {
 namespace {
 
-constexpr double kStiffness = 3;       // of a contact, in E / h an area
-constexpr double kLeastWeight = 1e-3;  // of a point on an element
+constexpr double kStiffness = 3;          // of a contact, in E / h an area
+constexpr double kLeastVolume = 0.05;     // of a cell at rest, and
+constexpr double kMostStretch = 25;       // of the squares of its stretches: else it tells no directions
+constexpr double kShapelessEntry = 0.05;  // spacings; deeper, what has no shape is behind what it meets
+constexpr double kLeastWeight = 1e-3;     // of a point on an element
 
 }  // namespace
 
@@ -31,6 +34,7 @@ Contacts::Contacts(ContactSettings settings, const Setting& setting)
     foundation_.push_back(kStiffness * settings_.stiffness * material.young /
                           body_.parts[p].lattice.spacing.mean());
     friction_.push_back(material.contact_friction.value_or(settings_.friction));
+    stick_.push_back(settings_.stick.empty() ? 0 : settings_.stick[p]);
   }
   mass_ = lumped_masses(setting);
   rigid_.resize(body_.parts.size());
@@ -58,15 +62,41 @@ Contacts::Contacts(ContactSettings settings, const Setting& setting)
   for (std::uint32_t e = 0; e < carries.size(); ++e)
     if (carries[e]) elements_.push_back(e);
   built_at_.resize(elements_.size());
+  find_cells();
   if (settings_.self) find_near_matter(setting);
 }
 
+void Contacts::find_cells() {
+  std::vector<std::uint32_t> order;
+  for (std::uint32_t i = 0; i < points_.size(); ++i)
+    if (points_[i].at.count == 8) order.push_back(i);
+  const auto less = [](const auto& a, const auto& b) { return a < b; };
+  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return less(points_[a].at.elements, points_[b].at.elements);
+  });
+  cell_.assign(points_.size(), kNoPoint);
+  for (std::uint32_t c = 0; c < body_.cell_count() && !order.empty(); ++c) {
+    const std::array<std::uint32_t, 8>& corners = body_.cell_elements[c];
+    auto at = std::lower_bound(order.begin(), order.end(), corners, [&](std::uint32_t i, const auto& key) {
+      return points_[i].at.elements < key;
+    });
+    if (at != order.end() && points_[*at].at.elements == corners) cells_.push_back(c);
+    for (; at != order.end() && points_[*at].at.elements == corners; ++at) cell_[*at] = c;
+  }
+}
+
+std::size_t Contacts::broken_cells() const {
+  return parallel_sum<std::size_t>(cells_.size(),
+                                   [&](std::size_t c) { return body_.broken[cells_[c]] != 0; });
+}
+
 bool Contacts::loses() const {
-  bool friction = settings_.damping > 0;
+  bool loses = settings_.damping > 0 || body_.element_columns.contains("stick_change");
   for (std::size_t p = 0; p < friction_.size(); ++p)
-    friction = friction || (settings_.parts[p] && friction_[p] > 0);
-  for (const ContactPlane& plane : settings_.planes) friction = friction || plane.friction.value_or(0) > 0;
-  return friction;
+    loses = loses || (settings_.parts[p] && (friction_[p] > 0 || stick_[p] > 0));
+  for (const ContactPlane& plane : settings_.planes)
+    loses = loses || plane.friction.value_or(0) > 0 || plane.stick.value_or(0) > 0;
+  return loses;
 }
 
 Vec3 Contacts::position(const ContactPoint& point, const State& state) const {
@@ -91,7 +121,16 @@ Contacts::Side Contacts::side(std::uint32_t point, const State& state) const {
   made.at.own_plane = from.shape == ContactShape::face ? 1 : 0;
   made.at.radius = from.radius;
   if (from.shape == ContactShape::ball) return made;
-  made.inverse = gradient(from, state.displacement).inverse();
+  const Mat3 f = gradient(from, state.displacement);
+  // What is left of a broken cell may be in any shape and turned any way: its points are met by whole faces
+  // and planes as those of edges are, and from all sides.
+  const bool broken = cell_[point] != kNoPoint && body_.broken[cell_[point]] != 0;
+  if (broken || !(f.determinant() > kLeastVolume && f.squaredNorm() < kMostStretch)) {
+    made.shapeless = true;
+    made.at.own_plane = 0;
+    return made;
+  }
+  made.inverse = f.inverse();
   made.at.normal = (made.inverse.transpose() * from.normal).normalized();
   return made;
 }
@@ -128,8 +167,29 @@ void Contacts::look(const State& state) {
         ContactSide from = sides_[pairs_[p].i].at;
         if (pairs_[p].j == kNoPoint) from.own_plane = 0;  // the plane's normal is the exact one
         states_[p] = pair_state(from, other_side(pairs_[p]), pairs_[p].constants);
+        stand(p);
       },
       512);
+}
+
+// How the pair stands after its state of now; one that is passed does nothing.
+void Contacts::stand(std::size_t pair) {
+  const Pair& at = pairs_[pair];
+  PairState& now = states_[pair];
+  Standing& standing = memory_[pair].standing;
+  if (!now.near) {
+    standing = Standing::apart;
+  } else if (now.deep) {
+    standing = Standing::passed;
+  } else if (now.gap >= 0) {
+    standing = Standing::meeting;
+  } else if (standing == Standing::apart) {
+    double entry = at.constants.law.hard;
+    if (sides_[at.i].shapeless || (at.j != kNoPoint && sides_[at.j].shapeless))
+      entry = at.j == kNoPoint ? 0 : kShapelessEntry * at.constants.width;
+    standing = -now.gap > entry ? Standing::passed : Standing::meeting;
+  }
+  if (standing == Standing::passed) now = {};
 }
 
 double Contacts::energy(const State& state) {
@@ -172,19 +232,21 @@ void Contacts::spread(const std::vector<Total>& totals, std::vector<Vec3>& force
 
 std::vector<double> Contacts::memory() const {
   std::vector<double> memory{built_ ? 1.0 : 0.0, promised_, looked_at_ == builds_ ? 1.0 : 0.0,
-                             static_cast<double>(memory_.size())};
+                             fresh_ ? 1.0 : 0.0, static_cast<double>(memory_.size())};
   for (const Memory& entry : memory_) {
     memory.push_back(static_cast<double>(entry.key >> 32));
     memory.push_back(static_cast<double>(entry.key & 0xffffffff));
     memory.insert(memory.end(), entry.stretch.begin(), entry.stretch.end());
+    memory.push_back(entry.stuck);
+    memory.push_back(static_cast<double>(entry.standing));
   }
   for (const Vec3& at : built_at_) memory.insert(memory.end(), at.begin(), at.end());
   return memory;
 }
 
 void Contacts::restore(const std::vector<double>& memory) {
-  constexpr std::size_t kHead = 4, kEntry = 5;
-  const std::size_t entries = memory.size() < kHead ? 0 : static_cast<std::size_t>(memory[3]);
+  constexpr std::size_t kHead = 5, kEntry = 7;
+  const std::size_t entries = memory.size() < kHead ? 0 : static_cast<std::size_t>(memory[4]);
   if (memory.size() != kHead + kEntry * entries + 3 * built_at_.size())
     throw InputError("the checkpoint's contacts are not those of its scene");
   memory_.resize(entries);
@@ -192,6 +254,8 @@ void Contacts::restore(const std::vector<double>& memory) {
   for (Memory& entry : memory_) {
     entry.key = static_cast<std::uint64_t>(from[0]) << 32 | static_cast<std::uint64_t>(from[1]);
     entry.stretch = Vec3(from[2], from[3], from[4]);
+    entry.stuck = from[5];
+    entry.standing = static_cast<Standing>(static_cast<int>(from[6]));
     from += kEntry;
   }
   State then;
@@ -201,6 +265,7 @@ void Contacts::restore(const std::vector<double>& memory) {
     from += 3;
   }
   built_ = false;
+  fresh_ = memory[3] == 1;
   if (memory[0] == 0) return;
   build(then);
   promised_ = memory[1];

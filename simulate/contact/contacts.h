@@ -26,18 +26,26 @@ class Contacts {
   Contacts& operator=(const Contacts&) = delete;
 
   [[nodiscard]] bool empty() const { return points_.empty(); }
-  [[nodiscard]] bool loses() const;  // there is friction or damping
+  [[nodiscard]] bool loses() const;  // there is friction, damping or what sticks
   [[nodiscard]] const std::vector<ContactPoint>& points() const { return points_; }
 
   [[nodiscard]] double energy(const State& state);  // J, of the forces along the normals
   void add_forces(const State& state, std::vector<Vec3>& forces);
-  // Friction and damping.
+  // Friction, damping and what pulls because it sticks.
   void add_losses(const State& state, std::vector<Vec3>& forces);
-  // After a step of `drift` s that led to `state`: what slid, slid.
+  // After a step of `drift` s that led to `state`: what slid, slid; what touched, sticks; what was torn off
+  // is free.
   void remember(const State& state, double drift);
   // All that the next steps depend on besides the state, and back.
   [[nodiscard]] std::vector<double> memory() const;
   void restore(const std::vector<double>& memory);
+  // What friction and glue remember, by the places of the points at rest, to go on with in the contacts of a
+  // body that an event has changed; what is not there any more is forgotten.
+  [[nodiscard]] std::vector<double> keepsake() const;
+  void take_over(const std::vector<double>& keepsake);
+
+  // Throws InputError: parts that are inside each other, or a part inside a plane, deeper than contact bears.
+  void refuse_overlap(const State& state) const;
 
   // 1/s^2, what the contacts add to the square of the largest frequency; at least what keeps the motion of a
   // step small against the contact spheres.
@@ -50,17 +58,24 @@ class Contacts {
 
  private:
   static constexpr std::uint32_t kNoPoint = 0xffffffff;
+  static constexpr double kFree = -1;
+  // Surfaces meet from outside. A pair that is deep behind the surface where it comes near is that of a place
+  // which something else keeps apart, or of a wall that was passed: `passed`, it does nothing until it has
+  // come out. Otherwise the way out would give energy that no way in took.
+  enum class Standing : std::uint8_t { apart, meeting, passed };
   struct Pair {
     std::uint32_t i = 0, j = kNoPoint;  // numbers in near_; j kNoPoint: of a plane
     std::uint32_t plane = 0;
     std::uint64_t key = 0;
     double friction = 0;
     PairConstants constants;
+    double holds = 0;  // m, apart, until what sticks lets go; 0: it does not stick
   };
   // A near point as it is now.
   struct Side {
     ContactSide at;
     Mat3 inverse = Mat3::Identity();  // F^-1 of its cell
+    bool shapeless = false;           // the cell is broken, or tells no directions
   };
   // Sums over the pairs of a near point.
   struct Total {
@@ -74,20 +89,27 @@ class Contacts {
   void build(const State& state);
   void find_near_matter(const Setting& setting);
   [[nodiscard]] bool near_in_matter(std::uint32_t i, std::uint32_t j) const;
+  [[nodiscard]] bool bonded(std::uint32_t i, std::uint32_t j) const;
   [[nodiscard]] PairConstants constants(std::uint32_t i, std::uint32_t j) const;
   [[nodiscard]] PairConstants plane_constants(std::uint32_t i) const;
   [[nodiscard]] bool led(std::uint32_t part) const { return rigid_[part] && !rigid_[part]->free; }
   [[nodiscard]] double friction_of(std::uint32_t point) const { return friction_[points_[point].part]; }
+  [[nodiscard]] double foundation(std::uint32_t i, std::uint32_t j) const;
+  [[nodiscard]] double stick_of(std::uint32_t point) const;
+  [[nodiscard]] double holds(std::uint32_t i, double stick, double foundation) const;
   [[nodiscard]] double reach(std::uint32_t i, std::uint32_t j) const;
   void add_pairs(const std::vector<Vec3>& positions, const std::vector<Vec3>& normals);
   void add_plane_pairs(const std::vector<Vec3>& positions, const std::vector<Vec3>& normals);
   void number_near();
 
   // contacts.cpp
+  void find_cells();
+  [[nodiscard]] std::size_t broken_cells() const;
   [[nodiscard]] Vec3 position(const ContactPoint& point, const State& state) const;
   [[nodiscard]] Mat3 gradient(const ContactPoint& point, const std::vector<Vec3>& displacement) const;
   [[nodiscard]] Side side(std::uint32_t point, const State& state) const;
   void look(const State& state);
+  void stand(std::size_t pair);
   bool seen(const State& state);
   [[nodiscard]] ContactSide other_side(const Pair& pair) const;
   void spread(const std::vector<Total>& totals, std::vector<Vec3>& forces) const;
@@ -98,6 +120,9 @@ class Contacts {
   };
   [[nodiscard]] std::vector<Motion> motions(const State& state) const;
   [[nodiscard]] std::array<Vec3, 2> meeting(const Pair& pair) const;
+  [[nodiscard]] double drawn(std::size_t pair) const;
+  [[nodiscard]] double secant(std::size_t pair) const;
+  [[nodiscard]] double most_across(std::size_t pair) const;
   [[nodiscard]] Vec3 relative_velocity(const Pair& pair, const std::vector<Motion>& motions) const;
   // contact_bound.cpp
   [[nodiscard]] double stiffness_bound() const;
@@ -106,14 +131,17 @@ class Contacts {
   ContactSettings settings_;
   const Body& body_;
   std::vector<ContactPoint> points_;
-  std::vector<std::array<Vec3, 8>> gradients_;  // (parts) 1/m, of the corners' weights
-  std::vector<double> foundation_, friction_;   // (parts) kappa [Pa/m]; mu
-  Neighbours near_matter_;                      // pairs that look at each other through less than three cells
+  std::vector<std::array<Vec3, 8>> gradients_;         // (parts) 1/m, of the corners' weights
+  std::vector<double> foundation_, friction_, stick_;  // (parts) kappa [Pa/m]; mu; Pa, infinity: glue
+  Neighbours near_matter_;  // pairs that look at each other through less than three cells
   double widest_ = 0, narrowest_ = std::numeric_limits<double>::infinity();  // m, spacings
 
+  std::vector<std::uint32_t> cell_;      // (points_) that carries it; kNoPoint: none
+  std::vector<std::uint32_t> cells_;     // that carry points, ascending
   std::vector<std::uint32_t> elements_;  // that carry points, ascending
   std::vector<Vec3> built_at_;           // (elements_) their displacements when the pairs were found
   bool built_ = false;
+  std::size_t built_with_ = 0;       // broken cells then
   double slack_ = 0;                 // m, by which they may move before new ones can touch
   std::vector<Pair> pairs_;          // ascending by key
   std::vector<std::uint32_t> near_;  // points of pairs, ascending
@@ -128,8 +156,11 @@ class Contacts {
   struct Memory {
     std::uint64_t key = 0;
     Vec3 stretch = Vec3::Zero();  // m, of the spring along the surface that resists sliding
+    double stuck = kFree;         // m, the gap at which what sticks pulls nothing; kFree: it does not stick
+    Standing standing = Standing::apart;
   };
-  std::vector<Memory> memory_;  // (pairs_) where there is friction or damping
+  std::vector<Memory> memory_;  // (pairs_); before the first list what was taken over
+  bool fresh_ = true;           // nothing has been remembered yet
   std::vector<double> mass_;    // (elements) kg
   struct Whole {                // of a rigid part
     bool free = false;

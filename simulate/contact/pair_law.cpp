@@ -43,14 +43,16 @@ PairState pair_state(const ContactSide& i, const ContactSide& j, const PairConst
   const Vec3 b = i.own_plane * i.normal - j.own_plane * j.normal;
   const double length = b.norm();
   const bool balls = i.radius > 0 && j.radius > 0;
-  if (!balls && !(length > 0)) return now;  // two edges
+  if (!balls && !(length > 0)) return now;  // two that have no plane of their own
   now.normal = balls ? d.normalized() : Vec3(b / length);
   const double along = d.dot(now.normal);
   now.gap = along - i.radius - j.radius;
   now.offset = balls ? Vec3(Vec3::Zero()) : Vec3(d - along * now.normal);
   const Smooth k = kernel(now.offset.squaredNorm(), pair.width);
-  if (!(k.value > 0) || now.gap < -pair.limit) return now;
+  if (!(k.value > 0)) return now;
   now.near = true;
+  now.deep = now.gap < -pair.limit;
+  if (now.deep) return now;
   now.weight = pair.stiffness * k.value * facing.value;
   const NormalLaw::Value law = pair.law.at(-now.gap);
   now.stiffness = now.weight * law.stiffness;

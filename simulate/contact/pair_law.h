@@ -59,6 +59,7 @@ struct PairConstants {
 
 struct PairState {
   bool near = false;     // within the kernel, facing; else nothing below holds
+  bool deep = false;     // near, but deeper than the limit: nothing below but the gap holds
   double gap = 0;        // m
   double weight = 0;     // kappa A_i A_j K w [N/m]
   double energy = 0;     // J

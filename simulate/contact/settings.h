@@ -1,5 +1,7 @@
 // What a scene says of contact, resolved to the parts of a body.
 #pragma once
+#include <array>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,6 +15,7 @@ struct ContactPlane {
   Vec3 point = Vec3::Zero();            // m
   Vec3 normal = Vec3::UnitZ();          // unit, out of it
   std::optional<double> friction = {};  // its own constant; none: that of what touches it
+  std::optional<double> stick = {};     // Pa, likewise
   std::string name = {}, origin = {};
 };
 
@@ -21,8 +24,12 @@ struct ContactSettings {
   bool self = true;                      // also itself
   double stiffness = 1;                  // factor on that of the contacts
   double friction = 0;                   // mu, of materials that give none
-  double damping = 0;                    // s, tau
+  std::vector<double> stick =
+      {};              // (parts) Pa, or empty: the traction that pulls off what has touched; infinity: glue
+  double damping = 0;  // s, tau
   std::vector<ContactPlane> planes = {};
+  // Pairs of parts, lower number first, that are bonded: they do not touch where they are near at rest.
+  std::vector<std::array<std::uint32_t, 2>> bonded = {};
 };
 
 }  // namespace flexel

@@ -8,6 +8,8 @@
 #include <limits>
 #include <map>
 
+#include "formats/error.h"
+#include "formats/program.h"
 #include "simulate/effects/contact.h"
 #include "simulate/time/layout.h"
 #include "simulate/time/stability.h"
@@ -41,6 +43,51 @@ double foundation(const TouchingPoint& point, const Setting& setting) {
     return setting.materials[part].young / setting.body.parts[part].lattice.spacing.mean();
   };
   return std::min(of(point.part[0]), of(point.part[1]));
+}
+
+// Bonds of [[bond]].
+std::vector<Bonds::Named> parse_named(TableReader& scene) {
+  std::vector<Bonds::Named> named;
+  if (const SceneValue::Kind kind = scene.find("bond")->kind;
+      kind != SceneValue::Kind::table && kind != SceneValue::Kind::array)
+    scene.fail(scene.find("bond")->line, "\"bond\" needs to be true, false or written as [[bond]]");
+  for (const SceneValue* table : scene.tables("bond")) {
+    TableReader reader(*table, scene.file(), "[[bond]]");
+    Bonds::Named one;
+    one.origin = reader.place();
+    const SceneValue& parts = reader.require("parts", "[\"a\", \"b\"]");
+    if (parts.kind != SceneValue::Kind::array || parts.items.size() != 2 ||
+        parts.items[0].kind != SceneValue::Kind::string || parts.items[1].kind != SceneValue::Kind::string ||
+        parts.items[0].text == parts.items[1].text)
+      reader.fail(parts.line, "\"parts\" needs the names of two parts, for example [\"a\", \"b\"]");
+    one.parts = {parts.items[0].text, parts.items[1].text};
+    one.gap = reader.quantity("gap", Dimension::length).value_or(0);
+    if (!(one.gap >= 0)) reader.fail("\"gap\" in [[bond]] needs to be 0 or more");
+    reader.finish();
+    named.push_back(one);
+  }
+  return named;
+}
+
+// Throws InputError: no such part, or a gap wider than half a spacing.
+TouchingGap named_gap(const Bonds::Named& named, const Body& body) {
+  TouchingGap made{{}, named.gap};
+  std::vector<std::string> names;
+  for (const Part& part : body.parts) names.push_back(part.name);
+  for (std::size_t side = 0; side < 2; ++side) {
+    const auto found = std::find(names.begin(), names.end(), named.parts[side]);
+    if (found == names.end())
+      throw InputError(named.origin, fmt::format("[[bond]] names part \"{}\", which the body does not have{}",
+                                                 named.parts[side], did_you_mean(named.parts[side], names)));
+    made.parts[side] = static_cast<std::uint32_t>(found - names.begin());
+  }
+  std::sort(made.parts.begin(), made.parts.end());
+  const double most = 0.5 * std::max(body.parts[made.parts[0]].lattice.spacing.minCoeff(),
+                                     body.parts[made.parts[1]].lattice.spacing.minCoeff());
+  if (named.gap > most)
+    throw InputError(named.origin,
+                     fmt::format("the gap of a [[bond]] can be half a spacing, {:.4g} mm here", 1e3 * most));
+  return made;
 }
 
 // What resists at an element: itself; of a rigid part all of it, and for what turns it a quarter.
@@ -77,8 +124,11 @@ Resisting resisting(const Setting& setting) {
 void Bonds::parse(TableReader& scene, Parameters& parameters) {
   const bool contact = asks_for_contact(scene);
   const SceneValue* bond = scene.find("bond");
-  if (bond && bond->kind != SceneValue::Kind::boolean)
-    scene.fail(bond->line, "\"bond\" needs to be true or false");
+  if (bond && bond->kind != SceneValue::Kind::boolean) {
+    parameters.named = parse_named(scene);
+    parameters.bond = !contact;
+    return;
+  }
   if (bond && bond->flag && contact)
     scene.fail(bond->line,
                "\"bond\" = true, but with contact parts that touch are not bonded; give one of them");
@@ -86,21 +136,36 @@ void Bonds::parse(TableReader& scene, Parameters& parameters) {
 }
 
 std::optional<Bonds> Bonds::make(const Parameters& parameters, const Setting& setting) {
-  if (!parameters.bond) return std::nullopt;
-  const std::vector<TouchingPoint> points = touching_points(setting);
-  if (points.empty()) return std::nullopt;
+  if (!parameters.bond && parameters.named.empty()) return std::nullopt;
+  std::vector<TouchingGap> named;
+  for (const Named& each : parameters.named) named.push_back(named_gap(each, setting.body));
+  const auto is_named = [&](const std::array<std::uint32_t, 2>& parts) {
+    return std::any_of(named.begin(), named.end(), [&](const TouchingGap& each) {
+      return each.parts == std::array{std::min(parts[0], parts[1]), std::max(parts[0], parts[1])};
+    });
+  };
+  const std::vector<TouchingPoint> points = touching_points(setting, named);
   Bonds made;
   using Matrix = decltype(BondedElements::stiffness);
   std::map<std::vector<std::uint32_t>, Matrix> by_elements;
   std::map<std::array<std::uint32_t, 2>, double> area;
   for (const TouchingPoint& point : points) {
-    if (std::max(point.part[0], point.part[1]) >= setting.bonding_parts) continue;
+    if (!is_named(point.part) &&
+        (!parameters.bond || std::max(point.part[0], point.part[1]) >= setting.bonding_parts))
+      continue;
     const Weights weights = jump(point);
     auto [entry, fresh] =
         by_elements.try_emplace(elements_of(point), Matrix::Zero(weights.size(), weights.size()));
     entry->second += kPenalty * foundation(point, setting) * point.area * weights * weights.transpose();
     area[{std::min(point.part[0], point.part[1]), std::max(point.part[0], point.part[1])}] += point.area;
   }
+  for (std::size_t n = 0; n < named.size(); ++n)
+    if (!area.contains(named[n].parts))
+      throw InputError(parameters.named[n].origin,
+                       fmt::format("parts \"{}\" and \"{}\" of a [[bond]] do not touch: no face of one looks "
+                                   "at one of the other{}",
+                                   parameters.named[n].parts[0], parameters.named[n].parts[1],
+                                   named[n].gap > 0 ? " over its gap" : "; give a \"gap\""));
   if (by_elements.empty()) return std::nullopt;
   for (const auto& [elements, stiffness] : by_elements) made.bonds_.push_back({elements, stiffness});
   for (const auto& [parts, shared] : area)
@@ -134,7 +199,7 @@ void Bonds::soften(const Setting& setting) {
 }
 
 std::string Bonds::why() const {
-  return fmt::format("{} pair(s) of parts touch; bond = false leaves them apart", parts_.size());
+  return fmt::format("{} pair(s) of parts touch or are named by [[bond]]", parts_.size());
 }
 
 Bonds::Displacements Bonds::displacements(const BondedElements& bond, const State& state) {

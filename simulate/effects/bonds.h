@@ -11,14 +11,22 @@
 // In a timed run k_q is lowered, matrix by matrix, until its frequency squared is twice that of the cells:
 // the step is cut by at most sqrt(3), and a bond yields like a fifth of a cell.
 #pragma once
+#include <array>
+
 #include "simulate/effects/effect.h"
 
 namespace flexel {
 
 class Bonds {
  public:
+  struct Named {  // [[bond]]
+    std::array<std::string, 2> parts;
+    double gap = 0;  // m, over which they are bonded; 0: only where they touch
+    std::string origin;
+  };
   struct Parameters {
-    bool bond = true;
+    bool bond = true;  // all parts that touch
+    std::vector<Named> named;
   };
   static constexpr const char* name = "bonds";
   static constexpr double kPenalty = 20;  // stiffness per area, in E / h

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "formats/error.h"
 #include "formats/program.h"
 #include "simulate/contact/contacts.h"
@@ -22,6 +24,55 @@ double at_least_0(TableReader& reader, const char* key, double fallback) {
   const double value = reader.number(key).value_or(fallback);
   if (!(value >= 0)) reader.fail(reader.find(key)->line, fmt::format("\"{}\" needs to be 0 or more", key));
   return value;
+}
+
+double parse_stick(TableReader& reader) {
+  const double stick = reader.quantity("stick", Dimension::pressure).value_or(0);
+  if (!(stick >= 0)) reader.fail(reader.find("stick")->line, "\"stick\" needs to be 0 or more");
+  return stick;
+}
+
+// `stick` of [materials.NAME].
+std::map<std::string, double> sticky_materials(TableReader& scene) {
+  std::map<std::string, double> sticky;
+  const SceneValue* materials = scene.find("materials");
+  if (!materials) return sticky;
+  for (const auto& [name, value] : materials->members) {
+    if (value.kind != SceneValue::Kind::table) continue;
+    TableReader reader(value, scene.file(), fmt::format("[materials.{}]", name));
+    if (reader.find("stick")) sticky[name] = parse_stick(reader);
+  }
+  return sticky;
+}
+
+double stick_of(const Contact::Parameters& parameters, const Part& part, const Material& material) {
+  if (std::count(parameters.glued.begin(), parameters.glued.end(), part.name) > 0)
+    return std::numeric_limits<double>::infinity();
+  const auto own = parameters.sticky.find(material.name);
+  return own == parameters.sticky.end() ? parameters.stick : own->second;
+}
+
+// `glue = true` of [[manipulator]], which simulate/effects/rigid.cpp reads.
+std::vector<std::string> glued_parts(TableReader& scene) {
+  std::vector<std::string> glued;
+  for (const SceneValue* table : scene.tables("manipulator")) {
+    TableReader reader(*table, scene.file(), "[[manipulator]]");
+    if (flag(reader, "glue", false)) glued.push_back(reader.text("part").value_or(""));
+  }
+  return glued;
+}
+
+// `parts` of [[bond]], which simulate/effects/bonds.cpp reads.
+std::vector<std::array<std::string, 2>> bonded_parts(TableReader& scene) {
+  std::vector<std::array<std::string, 2>> bonded;
+  if (const SceneValue* bond = scene.find("bond"); !bond || bond->kind == SceneValue::Kind::boolean)
+    return {};
+  for (const SceneValue* table : scene.tables("bond")) {
+    TableReader reader(*table, scene.file(), "[[bond]]");
+    const SceneValue& parts = reader.require("parts", "[\"a\", \"b\"]");
+    bonded.push_back({parts.items.at(0).text, parts.items.at(1).text});
+  }
+  return bonded;
 }
 
 std::optional<std::vector<std::string>> parse_names(TableReader& reader) {
@@ -49,6 +100,7 @@ ContactPlane parse_plane(TableReader& reader, std::size_t number) {
   (void)reader.require("normal", "[0, 0, 1]");
   plane.normal = *reader.direction("normal");
   if (reader.find("friction")) plane.friction = at_least_0(reader, "friction", 0);
+  if (reader.find("stick")) plane.stick = parse_stick(reader);
   reader.finish();
   return plane;
 }
@@ -83,6 +135,11 @@ void Contact::parse(TableReader& scene, Parameters& parameters) {
     parameters.planes.push_back(parse_plane(reader, parameters.planes.size() + 1));
   }
   parameters.on = asks_for_contact(scene);
+  parameters.glued = glued_parts(scene);
+  parameters.sticky = sticky_materials(scene);
+  parameters.bonded = bonded_parts(scene);
+  if (!parameters.on && !parameters.glued.empty())
+    scene.fail("\"glue\" of a [[manipulator]] needs \"contact\" = true: what touches it stays");
   const SceneValue* contact = scene.find("contact");
   if (contact && !parameters.on && !parameters.planes.empty())
     scene.fail(contact->line, "\"contact\" = false, but there is a [[plane]], which only contact feels");
@@ -94,6 +151,7 @@ void Contact::parse(TableReader& scene, Parameters& parameters) {
   parameters.stiffness = at_least_0(reader, "stiffness", 1);
   if (!(parameters.stiffness > 0)) reader.fail("\"stiffness\" in [contact] needs to be above 0");
   parameters.friction = at_least_0(reader, "friction", 0);
+  parameters.stick = parse_stick(reader);
   parameters.damping = reader.quantity("damping", Dimension::time).value_or(0);
   if (!(parameters.damping >= 0)) reader.fail("\"damping\" in [contact] needs to be 0 or more");
   reader.finish();
@@ -107,6 +165,16 @@ std::optional<Contact> Contact::make(const Parameters& parameters, const Setting
   settings.stiffness = parameters.stiffness;
   settings.friction = parameters.friction;
   settings.damping = parameters.damping;
+  for (const std::array<std::string, 2>& each : parameters.bonded) {
+    std::array<std::uint32_t, 2> parts{};
+    for (std::uint32_t p = 0; p < setting.body.parts.size(); ++p)
+      for (std::size_t side = 0; side < 2; ++side)
+        if (setting.body.parts[p].name == each[side]) parts[side] = p;
+    std::sort(parts.begin(), parts.end());
+    settings.bonded.push_back(parts);
+  }
+  for (const Part& part : setting.body.parts)
+    settings.stick.push_back(stick_of(parameters, part, setting.materials[settings.stick.size()]));
   settings.planes = parameters.planes;
   Contact made;
   made.contacts_ = std::make_shared<Contacts>(std::move(settings), setting);
@@ -126,6 +194,7 @@ void Contact::add_forces(const State& state, std::vector<Vec3>& forces) const {
 }
 
 double Contact::added_frequency(const State& state, const std::vector<double>&) const {
+  if (state.time && *state.time == 0) contacts_->refuse_overlap(state);
   return contacts_->frequency(state);
 }
 
@@ -139,6 +208,14 @@ std::vector<double> Contact::memory() const {
 
 void Contact::restore(const std::vector<double>& memory) const {
   contacts_->restore(memory);
+}
+
+std::vector<double> Contact::keepsake() const {
+  return contacts_->keepsake();
+}
+
+void Contact::take_over(const std::vector<double>& keepsake) const {
+  contacts_->take_over(keepsake);
 }
 
 std::optional<ContactLosses> Contact::companion() const {

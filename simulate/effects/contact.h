@@ -1,7 +1,9 @@
 // Contact: parts that touch push each other apart, slide and stick (docs/contact.md). simulate/contact has
 // the mechanics; here are the keys and the hooks. Forces along the normals have a potential; friction and
-// damping are an effect of their own that shares the contacts.
+// damping and what sticks are an effect of their own that shares the contacts.
 #pragma once
+#include <map>
+
 #include "simulate/contact/settings.h"
 #include "simulate/effects/effect.h"
 
@@ -9,7 +11,7 @@ namespace flexel {
 
 class Contacts;  // simulate/contact/contacts.h
 
-// Friction and damping of the contacts of a run.
+// Friction, damping and sticking of the contacts of a run.
 class ContactLosses {
  public:
   static constexpr const char* name = "contact friction";
@@ -17,7 +19,7 @@ class ContactLosses {
   static constexpr Book book = Book::dissipation;
 
   explicit ContactLosses(std::shared_ptr<Contacts> contacts) : contacts_(std::move(contacts)) {}
-  [[nodiscard]] std::string why() const { return "friction and damping of [contact]"; }
+  [[nodiscard]] std::string why() const { return "friction, damping and sticking of [contact]"; }
   void add_forces(const State& state, std::vector<Vec3>& forces) const;
   void finish_step(State& state, const StepDone& done) const;
 
@@ -33,13 +35,17 @@ class Contact {
     bool self = true;
     double stiffness = 1;
     double friction = 0;
-    double damping = 0;  // s
+    double stick = 0;                                // Pa, of materials that give none
+    std::map<std::string, double> sticky;            // Pa, by material
+    double damping = 0;                              // s
+    std::vector<std::array<std::string, 2>> bonded;  // parts of [[bond]]
+    std::vector<std::string> glued;                  // parts of [[manipulator]] with glue
     std::vector<ContactPlane> planes;
     std::string origin;
   };
   static constexpr const char* name = "contact";
   static constexpr bool needs_time = true;
-  static constexpr Book book = Book::potential;
+  static constexpr Book book = Book::stored;
 
   static void parse(TableReader& scene, Parameters& parameters);
   [[nodiscard]] static std::optional<Contact> make(const Parameters& parameters, const Setting& setting);
@@ -51,6 +57,8 @@ class Contact {
   [[nodiscard]] bool wants_check(const State& state) const;
   [[nodiscard]] std::vector<double> memory() const;
   void restore(const std::vector<double>& memory) const;
+  [[nodiscard]] std::vector<double> keepsake() const;
+  void take_over(const std::vector<double>& keepsake) const;
   [[nodiscard]] std::optional<ContactLosses> companion() const;
 
  private:

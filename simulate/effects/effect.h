@@ -44,8 +44,13 @@
 //   std::vector<double> memory() const, void restore(const std::vector<double>&) const
 //                                                                     what goes on from step to step, for
 //                                                                     checkpoints
-//   std::vector<std::string> history_columns() const, std::vector<double> history_values() const
-//                                                                     of the last step, for the books
+//   std::vector<double> keepsake() const, void take_over(const std::vector<double>&) const
+//                                                                     likewise, from an act to the next,
+//                                                                     whose body an event has changed
+//   std::vector<std::string> history_columns() const,
+//   std::vector<double> history_values(const State&, const std::vector<Vec3>& unbalanced) const
+//                                                                     of the last step and the state it began
+//                                                                     with, for the books
 // and, where its forces are entered in two books,
 //   std::optional<F> companion() const                                another effect that runs after it
 // An effect that a scene does not name makes no object, no array and no pass.
@@ -68,8 +73,10 @@
 namespace flexel {
 
 // Where the energy that an effect's forces give or take is entered: as potential energy (its energy() is
-// that), as work done on the body, or as energy dissipated.
-enum class Book { potential, work, dissipation };
+// that), as potential energy that is the work of its forces step by step (energy() follows that to second
+// order in the step; what differs when it is 0 again is entered as numerical), as work done on the body, or
+// as energy dissipated.
+enum class Book { potential, stored, work, dissipation };
 
 // The step that led to a state.
 struct StepDone {
@@ -150,9 +157,14 @@ concept Remembers = requires(const E& e, const std::vector<double>& m) {
   e.restore(m);
 };
 template <class E>
-concept TellsHistory = requires(const E& e) {
+concept HandsOver = requires(const E& e, const std::vector<double>& m) {
+  { e.keepsake() } -> std::same_as<std::vector<double>>;
+  e.take_over(m);
+};
+template <class E>
+concept TellsHistory = requires(const E& e, const State& s, const std::vector<Vec3>& u) {
   { e.history_columns() } -> std::same_as<std::vector<std::string>>;
-  { e.history_values() } -> std::same_as<std::vector<double>>;
+  { e.history_values(s, u) } -> std::same_as<std::vector<double>>;
 };
 template <class E>
 concept TellsNeedOfTime = requires(const E& e) {
@@ -179,8 +191,10 @@ struct Pass {
   std::function<void(std::vector<Vec3>&)> add_support_forces;
   std::function<std::vector<double>()> memory;
   std::function<void(const std::vector<double>&)> restore;
+  std::function<std::vector<double>()> keepsake;
+  std::function<void(const std::vector<double>&)> take_over;
   std::vector<std::string> history_columns;
-  std::function<std::vector<double>()> history_values;
+  std::function<std::vector<double>(const State&, const std::vector<Vec3>&)> history_values;
   Book book = Book::work;
   bool constant = false, needs_time = false;
   double seconds = 0;
@@ -227,9 +241,15 @@ template <class E>
     pass.memory = [effect] { return effect->memory(); };
     pass.restore = [effect](const std::vector<double>& m) { effect->restore(m); };
   }
+  if constexpr (HandsOver<E>) {
+    pass.keepsake = [effect] { return effect->keepsake(); };
+    pass.take_over = [effect](const std::vector<double>& m) { effect->take_over(m); };
+  }
   if constexpr (TellsHistory<E>) {
     pass.history_columns = effect->history_columns();
-    pass.history_values = [effect] { return effect->history_values(); };
+    pass.history_values = [effect](const State& s, const std::vector<Vec3>& u) {
+      return effect->history_values(s, u);
+    };
   }
   if constexpr (TellsConstant<E>) pass.constant = effect->constant();
   if constexpr (requires { E::book; }) pass.book = E::book;

@@ -41,6 +41,7 @@ void RigidParts::parse(TableReader& scene, Parameters& parameters) {
     made.part = *reader.text("part");
     made.name = reader.text("name").value_or(made.part);
     made.path = parse_path(reader);
+    (void)reader.find("glue");  // simulate/effects/contact.cpp
     if (reader.text("path") == "stdin")
       made.live = std::make_shared<LiveTool>(LiveTool{made.name, true, made.path});
     reader.finish();
@@ -217,7 +218,7 @@ std::vector<std::string> RigidParts::history_columns() const {
   return columns;
 }
 
-std::vector<double> RigidParts::history_values() const {
+std::vector<double> RigidParts::history_values(const State&, const std::vector<Vec3>&) const {
   std::vector<double> values;
   for (const Moving& moving : *moving_) {
     if (!moving.led) continue;

@@ -44,7 +44,8 @@ class RigidParts {
   // Reactions in the last step: force and torque on the manipulator, by what leads it, about `about` as it is
   // now.
   [[nodiscard]] std::vector<std::string> history_columns() const;
-  [[nodiscard]] std::vector<double> history_values() const;
+  [[nodiscard]] std::vector<double> history_values(const State& state,
+                                                   const std::vector<Vec3>& unbalanced) const;
 
  private:
   struct Moving {

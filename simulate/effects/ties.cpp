@@ -266,7 +266,7 @@ void Ties::constrain(Constraints& constraints) const {
   }
 }
 
-void Ties::report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) const {
+std::vector<Reaction> Ties::reactions(const State& state, const std::vector<Vec3>& unbalanced) const {
   std::vector<Reaction> reaction;
   for (const Tie& tie : ties_) reaction.push_back({tie.name, Vec3::Zero(), Vec3::Zero()});
   const auto add = [&](std::size_t tie, const Vec3& force, std::uint32_t e) {
@@ -289,6 +289,11 @@ void Ties::report(const State& state, const std::vector<Vec3>& unbalanced, Simul
       }
       add(t, held, e);
     }
+  return reaction;
+}
+
+void Ties::report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) const {
+  const std::vector<Reaction> reaction = reactions(state, unbalanced);
   for (std::size_t t = 0; t < ties_.size(); ++t) {
     if (!ties_[t].link) {
       result.reactions.push_back(reaction[t]);
@@ -301,6 +306,23 @@ void Ties::report(const State& state, const std::vector<Vec3>& unbalanced, Simul
     result.loads.push_back(
         {ties_[t].name, force, state.share * link.torque + (link.at + moved).cross(force), moved, link.turn});
   }
+}
+
+std::vector<std::string> Ties::history_columns() const {
+  std::vector<std::string> columns;
+  for (const Tie& tie : ties_)
+    for (const auto& [what, unit] : {std::pair{"force", "N"}, {"moment", "N m"}})
+      for (const char axis : {'x', 'y', 'z'})
+        columns.push_back(fmt::format("{} {} {} [{}]", tie.name, what, axis, unit));
+  return columns;
+}
+
+std::vector<double> Ties::history_values(const State& state, const std::vector<Vec3>& unbalanced) const {
+  std::vector<double> values;
+  for (const Reaction& reaction : reactions(state, unbalanced))
+    for (const Vec3& each : {reaction.force, reaction.moment})
+      values.insert(values.end(), each.begin(), each.end());
+  return values;
 }
 
 }  // namespace flexel

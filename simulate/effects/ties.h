@@ -59,8 +59,14 @@ class Ties {
   void constrain(Constraints& constraints) const;
   // Reactions: penalty forces, and minus the unbalanced forces on eliminated elements.
   void report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) const;
+  // The same in timed runs, of each row of the books.
+  [[nodiscard]] std::vector<std::string> history_columns() const;
+  [[nodiscard]] std::vector<double> history_values(const State& state,
+                                                   const std::vector<Vec3>& unbalanced) const;
 
  private:
+  [[nodiscard]] std::vector<Reaction> reactions(const State& state,
+                                                const std::vector<Vec3>& unbalanced) const;
   struct TiedElements {
     std::uint32_t tie = 0;
     std::uint32_t count = 0;

@@ -1,4 +1,4 @@
-// Factors are kept in columns, less 1, so that 0 is what was never edited.
+// Factors are kept in columns, less 1, so that 0 is what was never edited; tractions as they are.
 #include "simulate/events/edit.h"
 
 #include <fmt/format.h>
@@ -27,6 +27,16 @@ void multiply(Columns& columns, const char* name, const std::vector<std::uint8_t
     if (chosen[i]) column.values[i] = (1 + column.values[i]) * by - 1;
 }
 
+// Of elements, whatever their placement: contact reads it at the points of the surface.
+void add_stick(Body& body, const std::vector<std::uint8_t>& chosen, double more) {
+  if (more == 0) return;
+  Column& column = body.element_columns["stick_change"];
+  if (column.components != 1 || column.values.size() != chosen.size())
+    column = {1, std::vector<double>(chosen.size(), 0)};
+  for (std::size_t e = 0; e < chosen.size(); ++e)
+    if (chosen[e]) column.values[e] += more;
+}
+
 }  // namespace
 
 Edit Edit::parse(TableReader& reader) {
@@ -35,10 +45,11 @@ Edit Edit::parse(TableReader& reader) {
   made.stiffness_ = factor(reader, "stiffness");
   made.damping_ = factor(reader, "damping");
   made.density_ = factor(reader, "density");
-  if (made.stiffness_ == 1 && made.damping_ == 1 && made.density_ == 1)
+  made.stick_ = reader.quantity("stick", Dimension::pressure).value_or(0);
+  if (made.stiffness_ == 1 && made.damping_ == 1 && made.density_ == 1 && made.stick_ == 0)
     reader.fail(
         "edit needs \"stiffness\", \"damping\" or \"density\", factors on what there is, for example "
-        "stiffness = 2");
+        "stiffness = 2, or \"stick\", a traction more");
   return made;
 }
 
@@ -55,8 +66,10 @@ std::string Edit::happen(Stage& stage) const {
     multiply(stage.body.cell_columns, column, chosen.cells, by);
     if (by_elements) multiply(stage.body.element_columns, column, elements, by);
   }
-  return fmt::format("{}: stiffness times {}, damping times {}, density times {}", describe(region_),
-                     stiffness_, damping_, density_);
+  add_stick(stage.body, chosen.elements, stick_);
+  return fmt::format("{}: stiffness times {}, damping times {}, density times {}{}", describe(region_),
+                     stiffness_, damping_, density_,
+                     stick_ != 0 ? fmt::format(", sticks with {} Pa more", stick_) : "");
 }
 
 }  // namespace flexel

@@ -1,5 +1,6 @@
 // edit: what cells and elements are made of changes, by factors on stiffness (and with it damping, strength
-// and yield stress), on the time of the damping and on mass. Velocities stay. docs/events.md
+// and yield stress), on the time of the damping and on mass, and by a traction more or less that their
+// surface sticks with. Velocities stay. docs/events.md
 #pragma once
 #include "simulate/events/event.h"
 
@@ -14,6 +15,7 @@ class Edit {
  private:
   EventRegion region_;
   double stiffness_ = 1, damping_ = 1, density_ = 1;  // factors
+  double stick_ = 0;                                  // Pa, more
 };
 
 }  // namespace flexel

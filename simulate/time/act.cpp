@@ -45,6 +45,8 @@ Act::Act(Body& body, const Scene& scene, const SimulateOptions& options, Progres
     if (pass.start && fresh) pass.start(state_);
     if (pass.begin) pass.begin(state_);
     if (pass.constrain) pass.constrain(constraints_);
+    for (const auto& [name, keepsake] : beginning.keepsakes)
+      if (pass.take_over && name == pass.name) pass.take_over(keepsake);
   }
   plan_.rest_shapes = RestShapes(body).any();
   plan_.broken_springs = body.cell_columns.contains("broken_springs");
@@ -228,7 +230,7 @@ void Act::add_connection_forces(History* history) {
 
 void Act::step_implicitly(Clock& clock, History* history, bool row) {
   const PassTimer timer(kernel_seconds_);
-  if (history && row) history->add_row_of(state_);
+  if (history && row) history->add_row_of(state_, euler_->supports());
   if (renews(clock)) euler_->forget();
   const double end = clock.epoch + static_cast<double>(clock.in_epoch + 1) * clock.step;
   int failures = 0;
@@ -272,6 +274,13 @@ Act::Memory Act::memory() const {
   return memory;
 }
 
+std::vector<std::pair<std::string, std::vector<double>>> Act::keepsakes() const {
+  std::vector<std::pair<std::string, std::vector<double>>> kept;
+  for (const Pass& pass : passes_)
+    if (pass.keepsake) kept.emplace_back(pass.name, pass.keepsake());
+  return kept;
+}
+
 void Act::restore(const Memory& memory) {
   const Stepper::Memory own = stepper_->memory();
   const std::size_t change = memory.damping_change.size();
@@ -281,6 +290,7 @@ void Act::restore(const Memory& memory) {
       (change != 0 && (!implicit_ || change != body_.element_count())))
     throw InputError("the checkpoint's memory is not that of its scene and body: it is damaged");
   stepper_->restore(memory.cells);
+  stepper_->mark_broken(body_.broken);
   for (std::size_t p = 0; p < passes_.size() && p < memory.passes.size(); ++p)
     if (passes_[p].restore) passes_[p].restore(memory.passes[p]);
   if (implicit_) implicit_->set_change(memory.damping_change);
@@ -306,6 +316,7 @@ void Act::step(Clock& clock, History* history, bool row) {
     if (outcome.broken > 0 && guard_ && guard_->watches() && stepper_->mark_broken(body_.broken))
       outcome.released += guard_->drop_broken(state_);
   }
+  if (outcome.broken > 0) stepper_->mark_broken(body_.broken);
   ++clock.in_epoch;
   ++clock.steps;
   state_.time = end;
@@ -347,14 +358,16 @@ void Act::kick(double time) {
 }
 
 void Act::close_books(const Clock& clock, History& history) {
-  if (euler_) return history.add_row_of(state_);
+  if (euler_) return history.add_row_of(state_, euler_->supports());
   State last = state_;
-  const Stepper::Memory memory = stepper_->memory();
+  const Memory before = memory();
+  const std::vector<std::uint8_t> broken = body_.broken;
   Clock beyond = clock;
   history.close();
   step(beyond, &history, true);
   state_ = std::move(last);
-  stepper_->restore(memory);
+  body_.broken = broken;
+  restore(before);
 }
 
 bool Act::damps() const {

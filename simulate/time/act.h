@@ -39,6 +39,8 @@ struct Beginning {
   std::vector<Vec3> settled = {};        // Setting::settled
   std::vector<FusedPoint> fused = {};    // by events so far
   std::size_t bonding_parts = SIZE_MAX;  // Setting::bonding_parts
+  // What passes hand over, by their names, across an event.
+  std::vector<std::pair<std::string, std::vector<double>>> keepsakes = {};
 };
 
 // The setting of a timed run with the body as it is now.
@@ -94,6 +96,8 @@ class Act {
 
   // Says what the steps to clock.until do, and the events of the run.
   void explain(const Clock& clock) const;
+  [[nodiscard]] std::vector<std::pair<std::string, std::vector<double>>> keepsakes() const;
+
   // Moves the body to `state`: positions, velocities, what broke, what the cells remember.
   void store(const State& state);
   // Frees the masses (Stepper::drop_mass) where no effect asks for them; neither may the caller then.

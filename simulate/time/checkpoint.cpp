@@ -20,7 +20,7 @@ namespace {
 static_assert(std::endian::native == std::endian::little);
 
 constexpr char kMagic[8] = {'f', 'l', 'e', 'x', 'e', 'l', 'C', 'P'};
-constexpr std::uint64_t kVersion = 1;
+constexpr std::uint64_t kVersion = 2;
 
 struct Head {
   char magic[8];
@@ -107,7 +107,7 @@ void visit(Archive& archive, std::optional<double>& value) {
 template <class Archive>
 void visit(Archive& archive, Account& account) {
   visit(archive, account.name);
-  visit(archive, account.dissipates);
+  visit(archive, account.kind);
   visit(archive, account.energy);
 }
 
@@ -164,6 +164,9 @@ void visit(Archive& archive, Checkpoint& c) {
   visit(archive, c.ledger.start);
   visit(archive, c.ledger.changed);
   visit(archive, c.ledger.worst_residual);
+  visit(archive, c.ledger.unstored);
+  visit(archive, c.ledger.unstored_now);
+  visit(archive, c.ledger.worst_unstored);
   visit(archive, c.ledger.largest_term);
   visit(archive, c.next_row);
   visit(archive, c.next_frame);

@@ -5,11 +5,19 @@
 
 #include <cmath>
 #include <iterator>
+#include <utility>
 
+#include "formats/error.h"
 #include "formats/parallel.h"
+#include "simulate/time/folds.h"
 
 namespace flexel {
 namespace {
+
+constexpr std::size_t kFirstJudged =
+    20;                            // row; at the start energies are small and steps meet what moves at once
+constexpr double kMostLost = 0.5;  // of the largest energy, that the books may lack
+constexpr double kLeastStrain = 1e-6;  // of all matter, whose energy is too little to be judged
 
 struct Momenta {
   double kinetic = 0;
@@ -22,12 +30,30 @@ struct Momenta {
   }
 };
 
+const char* called(Account::Kind kind) {
+  switch (kind) {
+    case Account::Kind::work:
+      return "work";
+    case Account::Kind::dissipation:
+      return "dissipated";
+    case Account::Kind::storage:
+      break;
+  }
+  return "stored";
+}
+
+Account::Kind kind_of(Book book) {
+  return book == Book::stored        ? Account::Kind::storage
+         : book == Book::dissipation ? Account::Kind::dissipation
+                                     : Account::Kind::work;
+}
+
 }  // namespace
 
-std::size_t Ledger::account(const std::string& name, bool dissipates) {
+std::size_t Ledger::account(const std::string& name, Account::Kind kind) {
   for (std::size_t a = 0; a < accounts.size(); ++a)
     if (accounts[a].name == name) return a;
-  accounts.push_back({name, dissipates, 0});
+  accounts.push_back({name, kind, 0});
   return accounts.size() - 1;
 }
 
@@ -35,7 +61,7 @@ std::string Ledger::csv() const {
   std::string text = "time [s],kinetic [J],elastic [J],potential [J],work [J],dissipated [J],residual [J]";
   auto out = std::back_inserter(text);
   for (const Account& account : accounts)
-    fmt::format_to(out, ",{} {} [J]", account.name, account.dissipates ? "dissipated" : "work");
+    fmt::format_to(out, ",{} {} [J]", account.name, called(account.kind));
   for (const char* name : {"momentum", "angular momentum"})
     for (const char axis : {'x', 'y', 'z'})
       fmt::format_to(out, ",{} {} [{}]", name, axis, std::string(name) == "momentum" ? "kg m/s" : "kg m2/s");
@@ -58,6 +84,18 @@ std::string Ledger::csv() const {
   return text;
 }
 
+std::vector<std::pair<std::string, double>> Ledger::sums() const {
+  const Energies& last = rows.back().energies;
+  return {{"kinetic", last.kinetic},
+          {"elastic", last.elastic},
+          {"potential", last.potential},
+          {"work", last.work},
+          {"dissipated", last.dissipated},
+          {"worst_residual", worst_residual},
+          {"worst_contact_error", worst_unstored},
+          {"largest_term", largest_term}};
+}
+
 History::History(const Setting& setting, const std::vector<Pass>& passes,
                  const std::vector<ProbePoints>& probes, const std::vector<double>& mass,
                  const PaperModel* paper, const StepPlan& plan, Ledger ledger)
@@ -71,15 +109,22 @@ History::History(const Setting& setting, const std::vector<Pass>& passes,
       remembers_(plan.remembers()),
       ledger_(std::move(ledger)) {
   own_.assign(passes.size(), 0);
+  stored_.assign(passes.size(), 0);
+  for (const Part& part : setting.body.parts)
+    for (std::uint32_t e = part.element_begin; e < part.element_end; ++e) {
+      const Material& material =
+          setting.materials[static_cast<std::size_t>(&part - setting.body.parts.data())];
+      least_ += kLeastStrain * kLeastStrain * material.young * mass[e] / material.density;
+    }
   for (std::size_t p = 0; p < passes.size(); ++p) {
     if (!passes[p].add_forces || passes[p].book == Book::potential) continue;
     forces_[p].assign(setting.body.element_count(), Vec3::Zero());
-    own_[p] = ledger_.account(passes[p].name, passes[p].book == Book::dissipation);
+    own_[p] = ledger_.account(passes[p].name, kind_of(passes[p].book));
   }
-  supports_ = ledger_.account("supports", false);
-  damping_ = ledger_.account("damping", true);
-  if (!plan.plasticity.empty()) plasticity_ = ledger_.account("plasticity", true);
-  if (!plan.fracture.empty()) fracture_ = ledger_.account("fracture", true);
+  supports_ = ledger_.account("supports", Account::Kind::work);
+  damping_ = ledger_.account("damping", Account::Kind::dissipation);
+  if (!plan.plasticity.empty()) plasticity_ = ledger_.account("plasticity", Account::Kind::dissipation);
+  if (!plan.fracture.empty()) fracture_ = ledger_.account("fracture", Account::Kind::dissipation);
   ledger_.probes.clear();
   for (const ProbePoints& probe : probes) ledger_.probes.push_back(probe.name);
   ledger_.columns.clear();
@@ -93,11 +138,15 @@ void History::before(const State& state, bool sample, double folding) {
   time_ = *state.time;
   if (!sample) return;
   sampled_.displacement = state.displacement;
+  sampled_.time = state.time;
   // with plasticity, fracture or rest shapes the step tells that of the cells
   elastic_ = (remembers_ ? folding : cells_.energy(state)) + (paper_ ? paper_->energy(state) : 0);
   potential_ = 0;
-  for (const Pass& pass : passes_)
-    if (pass.book == Book::potential && pass.energy) potential_ += pass.energy(state);
+  for (std::size_t p = 0; p < passes_.size(); ++p) {
+    if (!passes_[p].energy) continue;
+    if (passes_[p].book == Book::potential) potential_ += passes_[p].energy(state);
+    if (passes_[p].book == Book::stored) stored_[p] = passes_[p].energy(state);
+  }
 }
 
 void History::after(const State& state, const StepOutcome& outcome, const std::vector<Vec3>& damping,
@@ -125,17 +174,17 @@ void History::after(const State& state, const StepOutcome& outcome, const std::v
   if (plasticity_) ledger_.accounts[*plasticity_].energy -= outcome.plastic_work;
   if (fracture_) ledger_.accounts[*fracture_].energy -= outcome.released;
   if (outcome.elastic) elastic_ += *outcome.elastic;
-  if (sample_) add_row(state);
+  if (sample_) add_row(state, supports);
   if (closing_)
     ledger_.accounts = kept;
   else
     add_powers(state.velocity, 0.5 * step);
 }
 
-void History::add_row_of(const State& state) {
+void History::add_row_of(const State& state, const std::vector<Vec3>& supports) {
   before(state, true);
   if (remembers_) elastic_ += cells_.energy(state);  // no step tells it
-  add_row(state);
+  add_row(state, supports);
 }
 
 void History::enter(const std::vector<Vec3>& moved, const std::vector<Vec3>& damping,
@@ -148,10 +197,10 @@ void History::enter(const std::vector<Vec3>& moved, const std::vector<Vec3>& dam
     if (!forces_[p].empty()) add(own_[p], forces_[p]);
   add(supports_, supports);
   add(damping_, damping);
-  ledger_.accounts[ledger_.account("numerical", true)].energy -= numerical;
+  ledger_.accounts[ledger_.account("numerical", Account::Kind::dissipation)].energy -= numerical;
 }
 
-void History::add_row(const State& state) {
+void History::add_row(const State& state, const std::vector<Vec3>& supports) {
   const Momenta sum = parallel_sum<Momenta>(mass_.size(), [&](std::size_t e) {
     const Vec3 mean = 0.5 * (velocity_[e] + state.velocity[e]);
     const Vec3 at = setting_.body.rest[e] + sampled_.displacement[e];
@@ -164,15 +213,34 @@ void History::add_row(const State& state) {
   row.angular = sum.angular;
   Energies& now = row.energies;
   now = {sum.kinetic, elastic_, potential_, 0, 0, 0};
+  double unstored = 0;
+  for (std::size_t p = 0; p < passes_.size(); ++p) {
+    if (passes_[p].book != Book::stored || forces_[p].empty()) continue;
+    if (!ledger_.start) ledger_.accounts[own_[p]].energy -= stored_[p];  // that it begins with
+    if (stored_[p] == 0 && ledger_.accounts[own_[p]].energy != 0) {
+      const double left = std::exchange(ledger_.accounts[own_[p]].energy, 0);
+      ledger_.accounts[ledger_.account("numerical", Account::Kind::dissipation)].energy += left;
+      ledger_.unstored -= left;
+    }
+    unstored -= ledger_.accounts[own_[p]].energy + stored_[p];
+  }
+  // an event may change what a store holds
+  if (ledger_.changed && !ledger_.rows.empty()) ledger_.unstored = ledger_.unstored_now - unstored;
+  ledger_.unstored_now = ledger_.unstored + unstored;
+  ledger_.worst_unstored = std::max(ledger_.worst_unstored, std::abs(ledger_.unstored_now));
   double book = now.kinetic + now.elastic + now.potential;
   for (const Account& account : ledger_.accounts) book -= account.energy;
   if (ledger_.changed && !ledger_.rows.empty())
-    ledger_.accounts[ledger_.account("events", false)].energy +=
+    ledger_.accounts[ledger_.account("events", Account::Kind::work)].energy +=
         book - *ledger_.start - ledger_.rows.back().energies.residual;
   ledger_.changed = false;
   for (const Account& account : ledger_.accounts) {
-    (account.dissipates ? now.dissipated : now.work) += account.dissipates ? -account.energy : account.energy;
-    row.accounts.push_back(account.dissipates ? 0.0 - account.energy : account.energy);
+    const bool gives = account.kind == Account::Kind::work;
+    double& term = gives                                        ? now.work
+                   : account.kind == Account::Kind::dissipation ? now.dissipated
+                                                                : now.potential;
+    term += gives ? account.energy : -account.energy;
+    row.accounts.push_back(gives ? account.energy : 0.0 - account.energy);
   }
   book = now.kinetic + now.elastic + now.potential + now.dissipated - now.work;
   if (!ledger_.start) ledger_.start = book;
@@ -182,10 +250,24 @@ void History::add_row(const State& state) {
     ledger_.largest_term = std::max(ledger_.largest_term, std::abs(term));
   for (const ProbePoints& probe : probes_)
     for (const double value : measure(probe, sampled_).displacement) row.probes.push_back(value);
+  std::vector<Vec3> unbalanced(setting_.body.element_count(), Vec3::Zero());
+  for (std::size_t e = 0; e < supports.size(); ++e) unbalanced[e] = -supports[e];
   for (const Pass& pass : passes_)
     if (pass.history_values)
-      for (const double value : pass.history_values()) row.values.push_back(value);
+      for (const double value : pass.history_values(sampled_, unbalanced)) row.values.push_back(value);
   ledger_.rows.push_back(std::move(row));
+}
+
+void History::refuse_broken_books(const State& state) const {
+  if (ledger_.rows.size() < kFirstJudged || !(ledger_.largest_term > least_)) return;
+  const double lost =
+      std::max(std::abs(ledger_.rows.back().energies.residual), std::abs(ledger_.unstored_now));
+  if (lost < kMostLost * ledger_.largest_term) return;
+  throw DivergedError(fmt::format(
+      "{:.3g} J of at most {:.3g} J in the books of energy have come from nowhere or gone there, the "
+      "fastest element rests near {}: give a shorter [run] step, load it more slowly or damp it "
+      "([damping])",
+      lost, ledger_.largest_term, fastest_near(setting_.body, state)));
 }
 
 }  // namespace flexel

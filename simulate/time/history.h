@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "simulate/cells.h"
@@ -26,17 +27,18 @@ struct Energies {
   double residual = 0;
 };
 
-// A column of energy that one kind of force, or what happens in cells, gave the body (work) or took from it.
+// A column of energy that one kind of force, or what happens in cells, gave the body (work), took from it, or
+// took to give it back.
 struct Account {
   std::string name;  // "loads"
-  bool dissipates = false;
+  enum class Kind : std::uint8_t { work, dissipation, storage } kind = Kind::work;
   double energy = 0;  // J, given to the body so far
 };
 
 struct BookRow {
   double time = 0;  // s
   Energies energies;
-  std::vector<double> accounts;  // J, work or dissipated energy; of those that were there
+  std::vector<double> accounts;  // J, work, dissipated or stored energy; of those that were there
   Vec3 momentum = Vec3::Zero(), angular = Vec3::Zero();
   std::vector<double> probes;  // m, (probes x 3)
   std::vector<double> values;  // (columns)
@@ -52,10 +54,15 @@ struct Ledger {
   bool changed = false;       // an event came since the last row: what it gave is entered as work of "events"
   double worst_residual = 0;  // J, largest absolute one
   double largest_term = 0;    // J, of any energy
+  double unstored = 0;        // J, what stores gave back short of what they took, until they were last empty
+  double unstored_now = 0;    // J, with what is stored at the last row
+  double worst_unstored = 0;  // J, largest absolute one of these
 
   [[nodiscard]] std::string csv() const;
+  // What the summary tells: the energies of the last row, and the worst [J].
+  [[nodiscard]] std::vector<std::pair<std::string, double>> sums() const;
   // Place of the account of that name; a new one is made at the end.
-  std::size_t account(const std::string& name, bool dissipates);
+  std::size_t account(const std::string& name, Account::Kind kind);
 };
 
 class History {
@@ -79,20 +86,23 @@ class History {
              const std::vector<Vec3>& supports, double previous_step, double step, bool half_kick);
 
   // In place of before() and after() where the velocities are those of the state's own time, as in implicit
-  // steps: a row of `state`, and the forces there times how far they moved [m] (elements), with what the
-  // method itself dissipated [J].
-  void add_row_of(const State& state);
+  // steps: a row of `state` with the forces of supports [N] (elements; or none) there, and the forces there
+  // times how far they moved [m] (elements), with what the method itself dissipated [J].
+  void add_row_of(const State& state, const std::vector<Vec3>& supports);
   void enter(const std::vector<Vec3>& moved, const std::vector<Vec3>& damping,
              const std::vector<Vec3>& supports, double numerical);
 
   // The next step is thrown away: what it says of the state before it counts, nothing else.
   void close() { closing_ = true; }
 
+  // Throws DivergedError where more than half of the largest energy has come from nowhere or gone there.
+  void refuse_broken_books(const State& state) const;
+
   [[nodiscard]] const Ledger& ledger() const { return ledger_; }
   [[nodiscard]] Ledger take_ledger() { return std::move(ledger_); }
 
  private:
-  void add_row(const State& state);
+  void add_row(const State& state, const std::vector<Vec3>& supports);
 
   const Setting& setting_;
   const std::vector<Pass>& passes_;
@@ -107,6 +117,8 @@ class History {
   std::vector<Vec3> velocity_;            // before the step
   Ledger ledger_;
   std::vector<std::size_t> own_;  // (passes) places in the ledger
+  std::vector<double> stored_;    // (passes) J, in those that store, at the sample
+  double least_ = 0;              // J, less is not judged
   std::size_t supports_ = 0, damping_ = 0;
   std::optional<std::size_t> plasticity_, fracture_;
   bool sample_ = false, closing_ = false;

@@ -203,6 +203,7 @@ void TimedRun::step() {
   if (live_) live_->await(clock_.epoch + static_cast<double>(clock_.in_epoch + 1) * clock_.step);
   if (settling_) settling_->before(act_->state());
   act_->step(clock_, history_.get(), row);
+  if (row) history_->refuse_broken_books(act_->state());
   if (settling_)
     act_->slow(settling_->after(act_->state(), act_->stepper().mass(),
                                 [&](SimulateResult& told) { act_->tell_forces(told); }));
@@ -248,17 +249,7 @@ SimulateResult TimedRun::report() {
   act_->report(clock_, options_.stress, result);
   result.timed->live = live_summary_;
   act_->add_effort(result, options_.explain);
-  if (history_) {
-    const Ledger& ledger = history_->ledger();
-    const Energies& last = ledger.rows.back().energies;
-    result.timed->books = {{"kinetic", last.kinetic},
-                           {"elastic", last.elastic},
-                           {"potential", last.potential},
-                           {"work", last.work},
-                           {"dissipated", last.dissipated},
-                           {"worst_residual", ledger.worst_residual},
-                           {"largest_term", ledger.largest_term}};
-  }
+  if (history_) result.timed->books = history_->ledger().sums();
   if (settling_) settling_->report(result);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
   if (!beginning_.fused.empty())
@@ -320,6 +311,7 @@ void TimedRun::happen(std::size_t end) {
   if (at_whole_step_) act_->kick(0.5 * clock_.previous);
   act_->store(act_->state());
   act_->add_effort(result_, options_.explain);
+  beginning_.keepsakes = act_->keepsakes();
   State state = act_->state();
   beginning_.fresh = false;
   act_.reset();

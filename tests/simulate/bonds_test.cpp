@@ -53,8 +53,21 @@ SimulateResult run(Body& body, const Scene& scene) {
   return simulate(body, scene, {}, progress);
 }
 
+Vec3 tip_of(Body body, const Scene& scene) {
+  return run(body, scene).probes[0].displacement;
+}
+
 Vec3 tip(Body body, const Vec3& force) {
-  return run(body, pull(force)).probes[0].displacement;
+  return tip_of(std::move(body), pull(force));
+}
+
+std::string refusal(Body body, const Scene& scene) {
+  try {
+    (void)run(body, scene);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "accepted";
 }
 
 TEST(Bonds, CutBarIsTheWholeBar) {
@@ -95,6 +108,54 @@ TEST(Bonds, ACutBarSwingsAsTheWholeBar) {
   }
 }
 
+// [[bond]]: also over a gap, which makes the bar longer by a fortieth (and its bending by a thirteenth).
+TEST(Bonds, NamedBondsHold) {
+  const Vec3 force(0, 0, 1e-3);
+  const Vec3 whole = tip(bar(true), force);
+  Scene scene = pull(force);
+  scene.get<Bonds>().bond = false;
+  scene.get<Bonds>().named = {{{"far", "near"}, 0.06, "s.toml:3"}};
+  for (const double gap : {0.0, 0.05}) {
+    Body body = bar(false, 5, gap);
+    const Vec3 bonded = run(body, scene).probes[0].displacement;
+    EXPECT_LT((bonded - whole).norm(), (0.015 + 2.5 * gap) * whole.norm()) << gap;
+  }
+  EXPECT_THAT(refusal(bar(false, 5, 0.07), scene), HasSubstr("do not touch"));
+  scene.get<Bonds>().named[0].gap = 0.1;
+  EXPECT_THAT(refusal(bar(false, 5, 0.05), scene), HasSubstr("half a spacing"));
+  scene.get<Bonds>().named[0].parts[0] = "fat";
+  EXPECT_THAT(refusal(bar(false, 5), scene), HasSubstr("did you mean \"far\""));
+}
+
+TEST(Bonds, PartsOfDifferentModelsAreBonded) {
+  Scene scene = pull(Vec3(1e-3, 0, 0));
+  scene.materials["gum"].poisson = 0.25;
+  const auto pulled = [&](const std::string& model) {
+    Scene own = parse_scene("[parts.far]\nmodel = \"" + model + "\"\n", "s.toml");
+    scene.parts = own.parts;
+    return tip_of(bar(false, 4), scene);
+  };
+  const double cells = pulled("cells").x();
+  EXPECT_NEAR(pulled("springs").x(), cells, 0.02 * cells);
+}
+
+// In a timed run with contact the bonded faces do not press each other as well.
+TEST(Bonds, NamedBondsBesideContact) {
+  Scene scene = pull(Vec3::Zero());
+  scene.get<Loads>().loads.clear();
+  scene.get<Gravity>().acceleration = Vec3(0, 0, -0.5);
+  scene.run.time = 0.2;
+  scene.get<Bonds>().bond = true;
+  const Vec3 bonded = testing::run_timed(bar(false, 5), scene).result.probes[0].displacement;
+  scene.get<Bonds>().bond = false;
+  scene.get<Bonds>().named = {{{"near", "far"}, 0, "s.toml:3"}};
+  scene.get<Contact>().on = true;
+  scene.get<Contact>().bonded = {{"near", "far"}};
+  const Vec3 both = testing::run_timed(bar(false, 5), scene).result.probes[0].displacement;
+  EXPECT_LT(bonded.z(), -1e-3);
+  EXPECT_NEAR(both.z(), bonded.z(), 1e-6 * std::abs(bonded.z()));
+}
+
 TEST(Bonds, SaysWhoIsBondedOverWhatArea) {
   Body body = bar(false, 5);
   const SimulateResult result = run(body, pull(Vec3(0, 0, 1)));
@@ -122,15 +183,6 @@ TEST(Bonds, RotationOfBondedPartsIsFree) {
   EXPECT_LT(result.elastic_energy, 1e-6);
 }
 
-std::string refusal(Body body, const Scene& scene) {
-  try {
-    (void)run(body, scene);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "accepted";
-}
-
 TEST(Bonds, OnlyPartsThatTouchAreBonded) {
   EXPECT_TRUE(touching_points({bar(true), {}, {}}).empty());
   EXPECT_FALSE(touching_points({bar(false, 4, 0.0005), {}, {}}).empty());  // under a hundredth of the spacing
@@ -146,6 +198,17 @@ TEST(Bonds, CanBeLeftOut) {
   EXPECT_TRUE(parse_scene("", "s.toml").get<Bonds>().bond);
   EXPECT_THROW((void)parse_scene("contact = true\nbond = true\n", "s.toml"), InputError);
   EXPECT_THROW((void)parse_scene("bond = 1\n", "s.toml"), InputError);
+  const Scene named = parse_scene(
+      "contact = true\n[[bond]]\nparts = [\"a\", \"b\"]\n[[bond]]\nparts = [\"b\", \"c\"]\ngap = \"1 mm\"\n",
+      "s.toml");
+  EXPECT_FALSE(named.get<Bonds>().bond);
+  ASSERT_EQ(named.get<Bonds>().named.size(), 2u);
+  EXPECT_EQ(named.get<Bonds>().named[1].gap, 1e-3);
+  EXPECT_EQ(named.get<Contact>().bonded.size(), 2u);
+  EXPECT_TRUE(parse_scene("[[bond]]\nparts = [\"a\", \"b\"]\n", "s.toml").get<Bonds>().bond);
+  EXPECT_THROW((void)parse_scene("[[bond]]\nparts = [\"a\"]\n", "s.toml"), InputError);
+  EXPECT_THROW((void)parse_scene("[[bond]]\nparts = [\"a\", \"a\"]\n", "s.toml"), InputError);
+  EXPECT_THROW((void)parse_scene("contact = true\n[[bond]]\nwith = 1\n", "s.toml"), InputError);
 }
 
 }  // namespace

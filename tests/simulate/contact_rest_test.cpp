@@ -1,0 +1,239 @@
+// Contact over long times and across events: a block that rests, memory that an event does not take, blocks
+// that lie flush or inside each other, balls of model `paper`.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+
+#include "formats/error.h"
+#include "simulate/scene_selection.h"
+#include "tests/simulate/centre_body.h"
+#include "tests/simulate/contact_case.h"
+
+namespace flexel {
+namespace {
+
+using namespace flexel::testing;
+using ::testing::HasSubstr;
+
+// A block on a slope of 0.3 rad with mu = 0.4, above tan 0.3 = 0.31; its way down is the probe's.
+struct Slope {
+  Scene scene;
+  Body body;
+  Vec3 down;
+};
+
+Slope slope(double time, double turned, std::array<int, 3> cells = {3, 3, 2}) {
+  const Mat3 tilt = turn(0.3, Vec3::UnitY());
+  Slope made{scene_of(time), block("block", cells, Vec3::Zero(), tilt * turn(turned, Vec3::UnitZ())),
+             tilt.col(0)};
+  made.scene.get<Gravity>().acceleration = Vec3(0, 0, -9.81);
+  made.scene.get<Contact>().friction = 0.4;
+  ContactPlane plane;
+  plane.normal = tilt.col(2);
+  made.scene.get<Contact>().planes.push_back(plane);
+  Probe probe;
+  probe.name = "middle";
+  probe.at = made.body.rest[made.body.element_count() / 2];
+  made.scene.probes.push_back(probe);
+  return made;
+}
+
+std::vector<double> way_down(const TimedCase& made, const Vec3& down) {
+  const std::vector<double>&x = made.history.column("middle x"), &z = made.history.column("middle z");
+  std::vector<double> way;
+  for (std::size_t row = 0; row < x.size(); ++row) way.push_back(x[row] * down.x() + z[row] * down.z());
+  return way;
+}
+
+TEST(ContactFriction, ABlockRestsForTenSeconds) {
+  for (const double turned : {0.0, 0.4, 0.9}) {
+    Slope made = slope(10, turned, {2, 2, 1});
+    made.scene.get<RigidParts>().parts = {"block"};
+    made.scene.get<Contact>().stiffness = 0.005;  // of 3 E/h: longer steps
+    made.scene.get<Contact>().damping = 3e-3;
+    const TimedCase run = testing::run_timed(made.body, made.scene);
+    const std::vector<double> way = way_down(run, made.down);
+    EXPECT_LT(std::abs(way.back()), 0.02 * kSide) << turned;
+    // after a second it does not drift
+    EXPECT_LT(std::abs(way.back() - way[way.size() / 10]), 1e-9 * kSide) << turned;
+    expect_books_close(run.result);
+  }
+}
+
+// The springs that hold it are stretched; an event that forgot them would let it slip on.
+TEST(ContactFriction, WhatHoldsOutlivesAnEvent) {
+  const auto rest = [](const std::string& event) {
+    Slope made = slope(0.1, 0.4);
+    made.scene.get<Damping>().entries.push_back({5e-4, std::nullopt, ""});
+    made.scene.get<Contact>().damping = 5e-4;
+    made.scene.events = parse_scene(event + "[run]\ntime = \"0.1 s\"\n", "test").events;
+    return way_down(testing::run_timed(made.body, made.scene), made.down);
+  };
+  const std::vector<double> plain = rest("");
+  const std::vector<double> edited = rest("[[event]]\nat = \"60 ms\"\ndo = \"edit\"\nstiffness = 1.000001\n");
+  ASSERT_GT(plain.back(), 1e-5 * kSide);
+  EXPECT_NEAR(edited.back(), plain.back(), 1e-3 * plain.back());
+}
+
+// Matter does not rub against itself: neither pairs nor forces of friction in a part that is pressed flat and
+// turns (the paper's elements would, where "paper" is asked for).
+TEST(ContactFriction, NoneInsideAPartThatIsCompressedAndRotated) {
+  const Body body = block("a", {4, 4, 3}, Vec3::Zero(), turn(0.3, Vec3::UnitX()));
+  const Setting setting = setting_of(body);
+  ContactSettings settings = all_parts(body);
+  settings.friction = 0.5;
+  settings.damping = 1e-4;
+  Contacts contacts(settings, setting);
+  State state = at_rest(body);
+  for (const double angle : {0.0, 0.7, 2.5}) {
+    const Mat3 shape = turn(angle, Vec3(1, 2, 3)) * Vec3(0.5, 1.3, 0.6).asDiagonal();
+    for (std::size_t e = 0; e < body.element_count(); ++e) {
+      state.displacement[e] = shape * body.rest[e] - body.rest[e];
+      state.velocity[e] = Vec3(3, -2, 5).cross(shape * body.rest[e]) - 0.5 * body.rest[e];
+    }
+    contacts.remember(state, 1e-3);
+    std::vector<Vec3> forces(body.element_count(), Vec3::Zero());
+    contacts.add_forces(state, forces);
+    contacts.add_losses(state, forces);
+    for (const Vec3& force : forces) EXPECT_EQ(force, Vec3::Zero());
+    EXPECT_TRUE(contacts.touching(state).empty());
+  }
+}
+
+// A block whose surface is cut along its cells, so that blocks side by side share vertices.
+Body cut_block(const std::string& name, std::array<int, 3> cells, const Vec3& origin) {
+  std::map<std::array<int, 3>, std::uint32_t> numbers;
+  std::vector<Vec3> vertices;
+  std::vector<std::vector<std::uint32_t>> polygons;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const int side : {0, 1}) {
+      const auto u = static_cast<std::size_t>((axis + 1) % 3), v = static_cast<std::size_t>((axis + 2) % 3);
+      for (int a = 0; a < cells[u]; ++a)
+        for (int b = 0; b < cells[v]; ++b) {
+          std::vector<std::uint32_t> quad;
+          for (const auto& [du, dv] : {std::pair{0, 0}, {1, 0}, {1, 1}, {0, 1}}) {
+            std::array<int, 3> corner{};
+            corner[static_cast<std::size_t>(axis)] = side * cells[static_cast<std::size_t>(axis)];
+            corner[u] = a + du;
+            corner[v] = b + dv;
+            const auto [entry, fresh] =
+                numbers.try_emplace(corner, static_cast<std::uint32_t>(vertices.size()));
+            if (fresh) vertices.push_back(origin + kSide * Vec3(corner[0], corner[1], corner[2]));
+            quad.push_back(entry->second);
+          }
+          if (side == 0) std::reverse(quad.begin(), quad.end());
+          polygons.push_back(quad);
+        }
+    }
+  return within_block(block(name, cells, origin), vertices, polygons);
+}
+
+TEST(Contact, BlocksThatLieFlushFeelNothing) {
+  Body body = cut_block("a", {3, 3, 2}, Vec3::Zero());
+  append(body, cut_block("b", {3, 3, 2}, Vec3(3 * kSide, 0, 0)));
+  append(body, cut_block("c", {3, 3, 4}, Vec3(0, 3 * kSide, 0)));
+  const Setting setting = setting_of(body);
+  Contacts contacts(all_parts(body), setting);
+  EXPECT_LT(contacts.energy(at_rest(body)), 1e-20);
+}
+
+// The sides of a block that is pressed and slides out look at each other while they are far inside: the way
+// out gives no more than the pressing took.
+TEST(Contact, ABlockThatSlidesOutFromUnderAnotherIsNotThrown) {
+  Body body = block("low", {4, 2, 2}, Vec3::Zero());
+  append(body, block("high", {4, 2, 1}, Vec3(0, 0, 1.97 * kSide)));
+  const Setting setting = setting_of(body);
+  Contacts contacts(all_parts(body), setting);
+  State state = at_rest(body);
+  const double pressed = contacts.energy(state);
+  ASSERT_GT(pressed, 0);
+  double before = pressed, work = 0, force_before = 0;
+  for (double way = 0; way < 5.5 * kSide; way += 0.01 * kSide) {
+    for (std::uint32_t e = body.parts[1].element_begin; e < body.parts[1].element_end; ++e)
+      state.displacement[e] = Vec3(way, 0.1 * way, 0);
+    const double energy = contacts.energy(state);
+    std::vector<Vec3> forces(body.element_count(), Vec3::Zero());
+    contacts.add_forces(state, forces);
+    double force = 0;
+    for (std::uint32_t e = body.parts[1].element_begin; e < body.parts[1].element_end; ++e)
+      force += forces[e].x() + 0.1 * forces[e].y();
+    if (way > 0) work += 0.5 * (force + force_before) * 0.01 * kSide;
+    force_before = force;
+    EXPECT_LT(energy, 1.2 * pressed) << way;
+    EXPECT_NEAR(energy + work, pressed, 0.02 * pressed) << way;
+    before = energy;
+  }
+  EXPECT_EQ(before, 0);
+}
+
+TEST(Contact, PartsThatBeginInsideEachOtherAreRefused) {
+  const auto refusal = [](const Vec3& origin, double floor) {
+    Body body = block("a", {3, 3, 3}, Vec3::Zero());
+    append(body, block("b", {3, 3, 3}, origin));
+    Scene scene = scene_of(1e-4);
+    scene.get<Contact>().planes.emplace_back();
+    scene.get<Contact>().planes[0].name = "floor";
+    scene.get<Contact>().planes[0].point = Vec3(0, 0, floor);
+    try {
+      (void)testing::run_timed(std::move(body), scene);
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(refusal(Vec3(0, 0, 3 * kSide), 0), "");
+  EXPECT_EQ(refusal(Vec3(3 * kSide, 0.004, 0), 0), "");
+  EXPECT_THAT(refusal(Vec3(0, 0, 2.9 * kSide), 0), HasSubstr("parts \"a\" and \"b\" overlap"));
+  EXPECT_THAT(refusal(Vec3(0.003, 0.002, 1.5 * kSide), 0), HasSubstr("overlap"));
+  EXPECT_THAT(refusal(Vec3(0, 0, 3 * kSide), 0.2 * kSide), HasSubstr("inside floor"));
+}
+
+Body balls(const std::string& name, std::array<int, 3> voxels, const Vec3& origin, double turned = 0) {
+  CentreOptions options;
+  options.name = name;
+  options.voxels = voxels;
+  options.spacing = kSide;
+  options.origin = origin;
+  options.axes = turn(turned, Vec3(0.1, 0.2, 1));
+  return centre_body(options);
+}
+
+// Two balls push along the line of their centres, with the mean of what their materials give.
+TEST(ContactOfPaper, BallsPushAlongTheirCentresWithTheMeanStiffness) {
+  Body body = balls("a", {1, 1, 1}, Vec3::Zero());
+  append(body, balls("b", {1, 1, 1}, Vec3(0.006, 0.007, 0)));
+  State state = at_rest(body);
+  const auto force = [&](double young_a, double young_b) {
+    Setting setting = setting_of(body);
+    setting.materials[0].young = young_a;
+    setting.materials[1].young = young_b;
+    Contacts contacts(all_parts(body), setting);
+    std::vector<Vec3> forces(2, Vec3::Zero());
+    contacts.add_forces(state, forces);
+    EXPECT_LT((forces[0] + forces[1]).norm(), 1e-12 * forces[0].norm());
+    const Vec3 line = (body.rest[1] - body.rest[0]).normalized();
+    EXPECT_LT(forces[1].cross(line).norm(), 1e-12 * forces[1].norm());
+    return forces[1].dot(line);
+  };
+  const double soft = force(1e6, 1e6), hard = force(3e6, 3e6);
+  EXPECT_GT(soft, 0);
+  EXPECT_NEAR(force(1e6, 3e6), 0.5 * (soft + hard), 1e-9 * hard);
+}
+
+TEST(ContactOfPaper, ACollisionKeepsMomentaAndBooks) {
+  Body body = balls("a", {4, 3, 3}, Vec3::Zero());
+  append(body, balls("b", {3, 3, 3}, Vec3(0.003, 0.002, 0.034), 0.2));
+  Scene scene = scene_of(0.02);
+  throw_part(scene, "b", Vec3(0.3, -0.1, -1), Vec3(5, 2, 3));
+  const TimedCase made = testing::run_timed(body, scene);
+  expect_momenta_kept(made.history, 1e-9);
+  expect_books_close(made.result);
+  double met = 0;
+  for (const double stored : made.history.column("contact stored")) met = std::max(met, stored);
+  EXPECT_GT(met, 0.05 * book(made.result, "largest_term"));
+}
+
+}  // namespace
+}  // namespace flexel
