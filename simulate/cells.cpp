@@ -3,50 +3,16 @@
 // every sum has a fixed order and the bits do not depend on the number of threads.
 #include "simulate/cells.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <limits>
-#include <memory>
 
 #include "formats/parallel.h"
+#include "simulate/prepared_cell.h"
 
 namespace flexel {
 namespace {
 
 constexpr std::size_t kGrain = 512;
-
-// What the rows need of a cell: its tangent, and where it is indefinite the projected moduli.
-struct PreparedCell {
-  CellTangent tangent;
-  double coupling = 0;  // mu - lambda ln J [Pa]
-  std::unique_ptr<Mat9> projected;
-  std::unique_ptr<Mat3> added_stress;  // to that of the state in the geometric stiffness [Pa]
-  std::unique_ptr<FoldTangent> folding;
-};
-
-Mat3 positive_part(const Mat3& symmetric) {
-  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(0.5 * (symmetric + symmetric.transpose()));
-  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() *
-         eigen.eigenvectors().transpose();
-}
-
-PreparedCell prepare(const CellKind& kind, const Mat3& gradient, bool project, const Mat3* stress) {
-  PreparedCell cell;
-  cell.tangent = cell_tangent(gradient);
-  cell.coupling = kind.mu - kind.lambda * cell.tangent.log_volume;
-  if (stress) {
-    Mat3 added = (project ? positive_part(*stress) : *stress) - second_stress(kind, gradient);
-    if (project && cell.coupling < 0) {
-      // The material's part stays positive without its shear.
-      added -= cell.coupling * cell.tangent.inverse_transpose.transpose() * cell.tangent.inverse_transpose;
-      cell.coupling = 0;
-    }
-    cell.added_stress = std::make_unique<Mat3>(added);
-  } else if (project) {
-    cell.projected = std::make_unique<Mat9>(projected_elasticity(kind, cell.tangent));
-  }
-  return cell;
-}
 
 void add_cell_row(const CellKind& kind, const PreparedCell& cell, double fill, std::size_t a,
                   const std::array<std::uint16_t, 64>& slot, Block* row) {
@@ -206,8 +172,8 @@ void Cells::set_stiffness(const State& state, const TangentOptions& tangent, Blo
         const CellVectors u = corner_values(cell, state.displacement);
         with_kind(cell, [&](const auto& kind) {
           if constexpr (std::is_same_v<std::decay_t<decltype(kind)>, CellKind>)
-            prepared[c] = prepare(kind, displacement_gradient(kind, u), tangent.project,
-                                  tangent.stress ? &(*tangent.stress)[c] : nullptr);
+            prepared[c] = prepare_cell(kind, displacement_gradient(kind, u), tangent.project,
+                                       tangent.stress ? &(*tangent.stress)[c] : nullptr);
         });
         if (!may_fold(cell, u)) return;
         if (const auto folding = fold_tangent(kinds_[part_[c]], thresholds(cell), u, tangent.project))

@@ -227,7 +227,7 @@ void refuse_free_motions(Mechanics& mechanics, const State& start, const std::st
   mechanics.assemble(start);
   mechanics.eliminate_prescribed();
   const std::vector<FreeMotion> free =
-      free_motions(mechanics.stiffness(), node_geometry(mechanics.body(), start));
+      free_motions(mechanics.tangent(), node_geometry(mechanics.body(), start));
   if (free.empty()) return;
   std::vector<std::string> names;
   for (const FreeMotion& motion : free) {

@@ -11,6 +11,8 @@
 namespace flexel {
 namespace {
 
+constexpr std::size_t kStoredElements = 1000;  // a tangent up to this size is factorised at once anyway
+
 double squared_norm(const std::vector<Vec3>& values) {
   return parallel_sum<double>(values.size(), [&](std::size_t e) { return values[e].squaredNorm(); });
 }
@@ -30,15 +32,25 @@ Constraints initial_constraints(const Setting& setting, const Stencil& stencil, 
 
 }  // namespace
 
-Mechanics::Mechanics(const Setting& setting, std::vector<Pass> passes)
+Mechanics::Mechanics(const Setting& setting, std::vector<Pass> passes, StiffnessStorage storage)
     : body_(setting.body),
       paper_(setting),
-      pattern_(stiffness_pattern(setting.body, active_cells(setting), paper_.rows(), coupled(passes))),
+      stored_(storage == StiffnessStorage::stored ||
+              (storage == StiffnessStorage::automatic &&
+               (body_.element_count() <= kStoredElements || !CellStiffness::fits(setting, paper_, passes)))),
+      pattern_(
+          stiffness_pattern(setting.body, active_cells(setting), paper_.rows(), coupled(passes), stored_)),
       cells_(setting, pattern_.stencil),
       passes_(std::move(passes)),
       constraints_(initial_constraints(setting, pattern_.stencil, paper_)) {
   for (const Pass& pass : passes_)
     if (pass.constrain) pass.constrain(constraints_);
+  if (stored_) {
+    stored_tangent_ = std::make_unique<StoredMatrix>(pattern_.matrix);
+    tangent_ = stored_tangent_.get();
+  } else {
+    tangent_ = &made_.emplace(setting, pattern_, passes_);
+  }
 }
 
 std::vector<CoupledElements> Mechanics::coupled(const std::vector<Pass>& passes) {
@@ -99,17 +111,27 @@ Forces Mechanics::forces(const State& state) {
 void Mechanics::assemble(const State& state, const TangentOptions& tangent) {
   {
     const PassTimer timer(cell_seconds_);
-    cells_.set_stiffness(state, tangent, pattern_.matrix);
+    if (made_)
+      made_->linearise(state, tangent);
+    else
+      cells_.set_stiffness(state, tangent, pattern_.matrix);
   }
-  {
+  if (!made_) {
     const PassTimer timer(paper_seconds_);
     paper_.add_stiffness(state, tangent.project, pattern_.matrix);
   }
   for (Pass& pass : passes_)
     if (pass.add_stiffness) {
       const PassTimer timer(pass.seconds);
-      pass.add_stiffness(state, pattern_.matrix);
+      pass.add_stiffness(state, added_stiffness());
     }
+}
+
+void Mechanics::eliminate_prescribed() {
+  if (made_)
+    made_->eliminate_prescribed(constraints_);
+  else
+    eliminate(constraints_, pattern_.matrix);
 }
 
 MostCompressed Mechanics::most_compressed(const State& state) const {
@@ -129,7 +151,7 @@ MostCompressed Mechanics::most_compressed(const State& state) const {
 
 std::vector<std::uint8_t> Mechanics::tied_elements() {
   std::vector<std::uint8_t> tied(body_.element_count(), 0);
-  BlockMatrix& matrix = pattern_.matrix;
+  BlockMatrix& matrix = added_stiffness();
   std::fill(matrix.values.begin(), matrix.values.end(), Block::Zero());
   const State rest{std::vector<Vec3>(body_.element_count(), Vec3::Zero()), 1};
   for (const Pass& pass : passes_)

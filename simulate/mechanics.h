@@ -1,5 +1,8 @@
 // Everything that acts on a body in a run: the models of its parts and the passes of its effects, summed up.
 #pragma once
+#include <optional>
+
+#include "simulate/cell_stiffness.h"
 #include "simulate/cells.h"
 #include "simulate/effects/effect.h"
 #include "simulate/paper_model.h"
@@ -20,10 +23,14 @@ struct MostCompressed {
   std::uint32_t part = 0;
 };
 
+// Whether the tangent stiffness is stored: `automatic` where it is small or CellStiffness does not fit.
+enum class StiffnessStorage { automatic, stored, made };
+
 class Mechanics {
  public:
-  // `setting`'s body must outlive it.
-  Mechanics(const Setting& setting, std::vector<Pass> passes);
+  // `setting`'s body must outlive it. `made`: CellStiffness must fit.
+  Mechanics(const Setting& setting, std::vector<Pass> passes,
+            StiffnessStorage storage = StiffnessStorage::automatic);
   Mechanics(const Mechanics&) = delete;
   Mechanics& operator=(const Mechanics&) = delete;
 
@@ -32,6 +39,9 @@ class Mechanics {
   [[nodiscard]] const Stencil& stencil() const { return pattern_.stencil; }
   [[nodiscard]] const Cells& cells() const { return cells_; }
   [[nodiscard]] const PaperModel& paper() const { return paper_; }
+  // The tangent at the last assemble().
+  [[nodiscard]] const LinearOperator& tangent() const { return *tangent_; }
+  // Likewise; has values only where the tangent is stored.
   [[nodiscard]] const BlockMatrix& stiffness() const { return pattern_.matrix; }
   [[nodiscard]] const std::vector<Pass>& passes() const { return passes_; }
 
@@ -44,9 +54,9 @@ class Mechanics {
   void add_elastic_forces(const State& state, std::vector<Vec3>& forces);
   [[nodiscard]] MostCompressed most_compressed(const State& state) const;
   [[nodiscard]] Forces forces(const State& state);
-  // Tangent stiffness into stiffness(), prescribed components not yet eliminated.
+  // Tangent stiffness into tangent(), prescribed components not yet eliminated.
   void assemble(const State& state, const TangentOptions& tangent = {});
-  void eliminate_prescribed() { eliminate(constraints_, pattern_.matrix); }
+  void eliminate_prescribed();
   // Groups of elements that effects couple (bonds).
   [[nodiscard]] std::vector<CoupledElements> coupled_elements() const { return coupled(passes_); }
   // 1 for each element that a tie holds or leads.
@@ -56,12 +66,18 @@ class Mechanics {
 
  private:
   static std::vector<CoupledElements> coupled(const std::vector<Pass>& passes);
+  // Where passes add their stiffness.
+  [[nodiscard]] BlockMatrix& added_stiffness() { return made_ ? made_->added() : pattern_.matrix; }
 
   const Body& body_;
   PaperModel paper_;
+  bool stored_;
   StiffnessPattern pattern_;
   Cells cells_;
   std::vector<Pass> passes_;
+  std::optional<CellStiffness> made_;  // nothing where the matrix of the pattern has values
+  std::unique_ptr<LinearOperator> stored_tangent_;
+  const LinearOperator* tangent_ = nullptr;
   Constraints constraints_;
   double cell_seconds_ = 0, paper_seconds_ = 0;
 };

@@ -33,6 +33,7 @@ constexpr double kKeepTangentBelow = 1e-3;  // model error of the last step unde
 constexpr double kArmijo = 1e-4;
 constexpr double kSmallestStep = 1.0 / 4096;
 constexpr int kMaxCgIterations = 3000;
+constexpr int kIterationsOfARefresh = 10;  // of conjugate gradients, that take as long
 // Full steps
 constexpr double kLooseForcing = 1e-3;
 constexpr int kMaxCgOfFullStep = 400;   // more: the tangent has become nearly singular
@@ -50,12 +51,10 @@ double norm(const std::vector<Vec3>& a) {
 
 // What a force computed at `u` cannot be better than: rounding in displacements times the stiffness that they
 // meet.
-double rounding_floor(const BlockMatrix& matrix, const std::vector<Vec3>& u) {
+double rounding_floor(const LinearOperator& matrix, const std::vector<Vec3>& u) {
+  const std::vector<Block> diagonal = matrix.diagonal();
   const double squared = parallel_sum<double>(matrix.rows(), [&](std::size_t e) {
-    for (std::size_t entry = matrix.row_offsets[e]; entry < matrix.row_offsets[e + 1]; ++entry)
-      if (matrix.columns[entry] == e)
-        return matrix.values[entry].diagonal().squaredNorm() * u[e].squaredNorm();
-    return 0.0;
+    return diagonal[e].diagonal().squaredNorm() * u[e].squaredNorm();
   });
   return 16 * std::numeric_limits<double>::epsilon() * std::sqrt(squared);
 }
@@ -122,15 +121,21 @@ void Solver::prepare_tangent(bool project) {
   kept_.projected = project;
 }
 
-// A refreshed preconditioner keeps the aggregates and the rigid motions of the positions it was made at; it
-// is made anew when turning has made it poor.
+// The coarser levels are kept while they save more than they cost in iterations. A refreshed preconditioner
+// keeps the aggregates and the rigid motions of the positions it was made at; it is made anew when turning
+// has made it poor.
 void Solver::factor() {
   mechanics_.eliminate_prescribed();
-  if (kept_.preconditioner)
+  const bool keeps = kept_.preconditioner && !kept_.outdated;
+  if (keeps)
+    kept_.preconditioner->refresh_smoother();
+  else if (kept_.preconditioner)
     kept_.preconditioner->refresh();
   else
     kept_.preconditioner =
-        aggregation_multigrid(mechanics_.stiffness(), node_geometry(mechanics_.body(), state_));
+        aggregation_multigrid(mechanics_.tangent(), node_geometry(mechanics_.body(), state_));
+  kept_.stale = keeps;
+  kept_.outdated = false;
   kept_.factored = true;
 }
 
@@ -140,7 +145,7 @@ std::vector<Vec3> Solver::right_hand_side() {
   std::vector<Vec3> rhs = residual_;
   if (!gap_.empty()) {
     std::vector<Vec3> pulled(rhs.size());
-    multiply(mechanics_.stiffness(), gap_, pulled);
+    multiply(mechanics_.tangent(), gap_, pulled);
     for (std::size_t e = 0; e < rhs.size(); ++e) rhs[e] -= pulled[e];
     clear_prescribed(mechanics_.constraints(), rhs);
   }
@@ -150,26 +155,33 @@ std::vector<Vec3> Solver::right_hand_side() {
 void Solver::solve_linear(const std::vector<Vec3>& rhs, double forcing) {
   const bool fresh = !kept_.preconditioner;
   const double decades = std::max(1.0, -std::log10(forcing));
-  const int most = !full() ? kMaxCgIterations
-                   : kept_.projected
-                       ? std::min(kMaxCgOfFullStep, 4 * kept_.usual_iterations + kMoreCgOfProjected)
-                       : kMaxCgOfFullStep;
+  int most = !full()           ? kMaxCgIterations
+             : kept_.projected ? std::min(kMaxCgOfFullStep, 4 * kept_.usual_iterations + kMoreCgOfProjected)
+                               : kMaxCgOfFullStep;
+  const double usual_before = kept_.usual_iterations * decades / 4;
   LinearResult result;
   {
     const PassTimer timer(outcome_.linear_seconds);
     if (!kept_.factored) factor();
+    if (kept_.stale) most = std::min(most, static_cast<int>(usual_before) + 3 * kIterationsOfARefresh);
     direction_.assign(rhs.size(), Vec3::Zero());
     result = conjugate_gradients(
-        mechanics_.stiffness(), rhs, direction_, *kept_.preconditioner, forcing, most,
+        mechanics_.tangent(), rhs, direction_, *kept_.preconditioner, forcing, most,
         [&](int iteration, double relative) {
           progress_(fmt::format("newton {}, cg {}, {:.0e}", outcome_.iterations + 1, iteration, relative));
         });
   }
   outcome_.cg_iterations += result.iterations;
+  if (kept_.stale && result.iterations > usual_before + kIterationsOfARefresh) kept_.outdated = true;
+  if (kept_.stale && result.iterations == most && !result.converged && !result.indefinite) {
+    kept_.factored = false;
+    return solve_linear(rhs, forcing);
+  }
   indefinite_ = result.indefinite || (full() && result.iterations == most);
   // A new hierarchy costs a third more than a refreshed one: a few iterations too many are worth it.
   if (fresh) kept_.usual_iterations = static_cast<int>(std::lround(4 * result.iterations / decades));
-  const bool poor = result.iterations > 1.5 * kept_.usual_iterations * decades / 4 + 4;
+  const double usual = kept_.usual_iterations * decades / 4;
+  const bool poor = !kept_.stale && result.iterations > 1.5 * usual + 4;
   if (result.indefinite && !kept_.projected) {
     prepare_tangent(true);
     const std::vector<Vec3> again = right_hand_side();
@@ -271,7 +283,7 @@ bool Solver::arrived() {
   const bool led = gap_.empty();
   if (led && (residual_norm_ <= options_.tolerance * scale_ || residual_norm_ == 0)) return true;
   if (!kept_.factored || kept_.model_error > kKeepTangentBelow || !led) prepare_tangent(false);
-  return led && residual_norm_ <= rounding_floor(mechanics_.stiffness(), state_.displacement);
+  return led && residual_norm_ <= rounding_floor(mechanics_.tangent(), state_.displacement);
 }
 
 // One iteration. False when there is no step to take.
@@ -286,7 +298,7 @@ bool Solver::advance() {
     for (const Vec3& step : direction_) outcome_.first_reach = std::max(outcome_.first_reach, step.norm());
   // What the linear model predicts for the residual after a full step.
   std::vector<Vec3> predicted(rhs.size());
-  if (kept_.factored) multiply(mechanics_.stiffness(), direction_, predicted);
+  if (kept_.factored) multiply(mechanics_.tangent(), direction_, predicted);
   parallel_for_each(rhs.size(), [&](std::size_t e) { predicted[e] = rhs[e] - predicted[e]; });
   const double before = led ? residual_norm_ : norm(rhs);
   if (!(full() ? full_step() : led ? line_search(residual_) : lead_prescribed())) return false;

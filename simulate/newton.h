@@ -21,11 +21,13 @@ struct NewtonOptions {
 };
 
 // What one solution may leave to the next, of the same mechanics nearby: the tangent, eliminated, in
-// Mechanics::stiffness() and its preconditioner. Empty: everything is made anew.
+// Mechanics::tangent() and its preconditioner. Empty: everything is made anew.
 struct NewtonMemory {
   std::unique_ptr<Preconditioner> preconditioner;
   // the preconditioner is that of the matrix, whose prescribed components are eliminated
   bool factored = false;
+  bool stale = false;        // its coarser levels are of an earlier tangent
+  bool outdated = false;     // and too far from it: they are made from the next one
   int usual_iterations = 0;  // of conjugate gradients to 1e-4 with a preconditioner made anew
   double model_error = 1;    // of the last step, relative
   bool projected = false;    // the tangent's indefinite cells were made positive

@@ -58,7 +58,7 @@ void collect_row(const Neighbourhood& near, std::uint32_t element, std::vector<s
 
 StiffnessPattern stiffness_pattern(const Body& body, const std::vector<std::uint8_t>& active,
                                    const ConnectionRows& connections,
-                                   const std::vector<CoupledElements>& coupled) {
+                                   const std::vector<CoupledElements>& coupled, bool stored) {
   StiffnessPattern pattern;
   Stencil& stencil = pattern.stencil;
   BlockMatrix& matrix = pattern.matrix;
@@ -76,7 +76,7 @@ StiffnessPattern stiffness_pattern(const Body& body, const std::vector<std::uint
   matrix.row_offsets.assign(n + 1, 0);
   for (std::size_t e = 0; e < n; ++e) matrix.row_offsets[e + 1] = matrix.row_offsets[e] + length[e];
   matrix.columns.resize(matrix.row_offsets[n]);
-  matrix.values.assign(matrix.row_offsets[n], Block::Zero());
+  if (stored) matrix.values.assign(matrix.row_offsets[n], Block::Zero());
   stencil.slot.resize(body.cell_count());
   parallel_chunks(n, 4096, [&](std::size_t begin, std::size_t end) {
     std::vector<std::uint32_t> row;

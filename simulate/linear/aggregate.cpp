@@ -236,29 +236,48 @@ Graph quotient_graph(const Graph& links, const std::vector<std::uint32_t>& of, c
 
 }  // namespace
 
-Graph coupled_rows(const BlockMatrix& matrix, double threshold) {
-  const std::size_t n = matrix.rows();
-  std::vector<double> diagonal(n);
-  parallel_for_each(n,
-                    [&](std::size_t i) { diagonal[i] = matrix.values[diagonal_position(matrix, i)].norm(); });
-  const auto coupled = [&](std::size_t i, std::uint64_t q) {
-    const std::uint32_t j = matrix.columns[q];
-    return j != i && matrix.values[q].squaredNorm() > threshold * threshold * diagonal[i] * diagonal[j];
-  };
-  Graph graph{std::vector<std::uint64_t>(n + 1, 0), {}};
-  parallel_for_each(n, [&](std::size_t i) {
-    for (std::uint64_t q = matrix.row_offsets[i]; q < matrix.row_offsets[i + 1]; ++q)
-      graph.offsets[i + 1] += coupled(i, q);
+std::vector<Graph> coupled_rows(const LinearOperator& matrix, std::span<const double> thresholds) {
+  constexpr std::size_t kGrain = 1024;
+  const std::size_t n = matrix.rows(), chunks = (n + kGrain - 1) / kGrain;
+  const auto offsets = matrix.row_offsets();
+  const auto columns = matrix.columns();
+  std::vector<double> size(n);
+  {
+    const std::vector<Block> diagonal = matrix.diagonal();
+    parallel_for_each(n, [&](std::size_t i) { size[i] = diagonal[i].norm(); });
+  }
+  std::vector<Graph> graphs(thresholds.size());
+  for (Graph& graph : graphs) graph.offsets.assign(n + 1, 0);
+  std::vector<std::vector<std::vector<std::uint32_t>>> found(thresholds.size(),
+                                                             std::vector<std::vector<std::uint32_t>>(chunks));
+  parallel_chunks(n, kGrain, [&](std::size_t begin, std::size_t end) {
+    std::vector<Block> room;
+    const Block* block = matrix.blocks(begin, end, room);
+    for (std::size_t i = begin; i < end; ++i)
+      for (std::uint64_t q = offsets[i]; q < offsets[i + 1]; ++q) {
+        const std::uint32_t j = columns[q];
+        const double squared = (block++)->squaredNorm();
+        for (std::size_t t = 0; t < graphs.size() && j != i; ++t) {
+          if (!(squared > thresholds[t] * thresholds[t] * size[i] * size[j])) continue;
+          ++graphs[t].offsets[i + 1];
+          found[t][begin / kGrain].push_back(j);
+        }
+      }
   });
-  accumulate_counts(graph.offsets);
-  graph.neighbours.resize(graph.offsets.back());
-  parallel_for_each(n, [&](std::size_t i) {
-    std::uint64_t next = graph.offsets[i];
-    for (std::uint64_t q = matrix.row_offsets[i]; q < matrix.row_offsets[i + 1]; ++q) {
-      if (coupled(i, q)) graph.neighbours[next++] = matrix.columns[q];
-    }
-  });
-  return graph;
+  for (std::size_t t = 0; t < graphs.size(); ++t) {
+    accumulate_counts(graphs[t].offsets);
+    graphs[t].neighbours.resize(graphs[t].offsets.back());
+    parallel_for_each(
+        chunks,
+        [&](std::size_t c) {
+          std::copy(
+              found[t][c].begin(), found[t][c].end(),
+              graphs[t].neighbours.begin() + static_cast<std::ptrdiff_t>(graphs[t].offsets[c * kGrain]));
+          found[t][c] = {};
+        },
+        1);
+  }
+  return graphs;
 }
 
 Aggregates aggregate(const LevelNodes& nodes, const Graph& links, const Graph& strong,

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "formats/vec.h"
-#include "simulate/linear/block_matrix.h"
+#include "simulate/linear/operator.h"
 
 namespace flexel {
 
@@ -37,8 +37,9 @@ struct Aggregates {
   [[nodiscard]] std::size_t count() const { return nodes.index.size(); }
 };
 
-// Pairs of rows with |A_ij| > threshold sqrt(|A_ii| |A_jj|) (Frobenius norms).
-[[nodiscard]] Graph coupled_rows(const BlockMatrix& matrix, double threshold);
+// For each threshold: pairs of rows with |A_ij| > threshold sqrt(|A_ii| |A_jj|) (Frobenius norms).
+[[nodiscard]] std::vector<Graph> coupled_rows(const LinearOperator& matrix,
+                                              std::span<const double> thresholds);
 
 struct AggregateOptions {
   int width = 3;               // nodes along each edge of a block

@@ -3,6 +3,7 @@
 // residual is updated by recursion; when it says "converged" the true residual is computed, and where
 // rounding made the two differ the iteration restarts from the true one. For slender parts the smallest
 // residual that double precision allows can lie above the tolerance; reaching it counts as converged.
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -30,30 +31,38 @@ void turn(const Vector& correction, double beta, Vector& direction) {
 }
 
 // residual = b - A x; returns its norm.
-double true_residual(const BlockMatrix& matrix, const Vector& b, const Vector& x, Vector& residual) {
+double true_residual(const LinearOperator& matrix, const Vector& b, const Vector& x, Vector& residual) {
   multiply(matrix, x, residual);
   parallel_for_each(b.size(), [&](std::size_t i) { residual[i] = b[i] - residual[i]; });
   return std::sqrt(dot(residual, residual));
 }
 
 // Size of the error that rounding alone leaves in b - A x (Rigal and Gaches 1967): eps | |A| |x| |.
-double rounding_level(const BlockMatrix& matrix, const Vector& x) {
+double rounding_level(const LinearOperator& matrix, const Vector& x) {
+  constexpr std::size_t kGrain = 256;
+  const std::size_t chunks = (matrix.rows() + kGrain - 1) / kGrain;
   const double squared = parallel_sum<double>(
-      matrix.rows(),
-      [&](std::size_t row) {
-        Vec3 sum = Vec3::Zero();
-        for (std::uint64_t q = matrix.row_offsets[row]; q < matrix.row_offsets[row + 1]; ++q) {
-          sum.noalias() += matrix.values[q].cwiseAbs() * x[matrix.columns[q]].cwiseAbs();
+      chunks,
+      [&](std::size_t chunk) {
+        const std::size_t begin = chunk * kGrain, end = std::min(matrix.rows(), begin + kGrain);
+        std::vector<Block> room;
+        const Block* block = matrix.blocks(begin, end, room);
+        double sum_of_squares = 0;
+        for (std::size_t row = begin; row < end; ++row) {
+          Vec3 sum = Vec3::Zero();
+          for (std::uint64_t q = matrix.row_offsets()[row]; q < matrix.row_offsets()[row + 1]; ++q)
+            sum.noalias() += (block++)->cwiseAbs() * x[matrix.columns()[q]].cwiseAbs();
+          sum_of_squares += sum.squaredNorm();
         }
-        return sum.squaredNorm();
+        return sum_of_squares;
       },
-      512);
+      1);
   return std::numeric_limits<double>::epsilon() * std::sqrt(squared);
 }
 
 }  // namespace
 
-LinearResult conjugate_gradients(const BlockMatrix& matrix, const Vector& b, Vector& x,
+LinearResult conjugate_gradients(const LinearOperator& matrix, const Vector& b, Vector& x,
                                  const Preconditioner& preconditioner, double tolerance, int max_iterations,
                                  const std::function<void(int, double)>& progress) {
   LinearResult result;
@@ -95,6 +104,12 @@ LinearResult conjugate_gradients(const BlockMatrix& matrix, const Vector& b, Vec
   }
   result.relative_residual = true_residual(matrix, b, x, residual) / scale;
   return result;
+}
+
+LinearResult conjugate_gradients(const BlockMatrix& matrix, const Vector& b, Vector& x,
+                                 const Preconditioner& preconditioner, double tolerance, int max_iterations,
+                                 const std::function<void(int, double)>& progress) {
+  return conjugate_gradients(StoredMatrix(matrix), b, x, preconditioner, tolerance, max_iterations, progress);
 }
 
 }  // namespace flexel

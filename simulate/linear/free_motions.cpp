@@ -7,6 +7,7 @@
 #include <Eigen/QR>
 #include <Eigen/SVD>
 #include <algorithm>
+#include <array>
 
 #include "formats/parallel.h"
 #include "simulate/linear/aggregate.h"
@@ -22,8 +23,8 @@ using Rows = std::vector<std::uint32_t>;
 constexpr double kCoupled = 1e-12;
 
 // Connected groups of rows, each ascending, in order of their first row.
-std::vector<Rows> connected_groups(const BlockMatrix& matrix) {
-  const Graph graph = coupled_rows(matrix, kCoupled);
+std::vector<Rows> connected_groups(const LinearOperator& matrix) {
+  const Graph graph = std::move(coupled_rows(matrix, std::array{kCoupled}).front());
   std::vector<std::uint8_t> seen(graph.nodes(), 0);
   std::vector<Rows> groups;
   for (std::uint32_t seed = 0; seed < graph.nodes(); ++seed) {
@@ -75,20 +76,38 @@ struct Restriction {
   }
 };
 
-Restriction restrict_to_rigid(const BlockMatrix& matrix, const Rows& rows, const Frame& frame,
+// A times each of the six motions, each group moving about its own centre.
+std::array<std::vector<Vec3>, 6> forces_of_motions(const LinearOperator& matrix,
+                                                   const std::vector<Rows>& groups,
+                                                   const std::vector<Frame>& frames,
+                                                   const std::vector<Vec3>& position) {
+  std::array<std::vector<Vec3>, 6> forces;
+  std::vector<Vec3> moved(matrix.rows());
+  for (std::size_t motion = 0; motion < 6; ++motion) {
+    for (std::size_t g = 0; g < groups.size(); ++g)
+      parallel_for_each(groups[g].size(), [&](std::size_t r) {
+        const std::uint32_t i = groups[g][r];
+        moved[i] = frames[g].at(position[i]).col(static_cast<Eigen::Index>(motion));
+      });
+    multiply(matrix, moved, forces[motion]);
+  }
+  return forces;
+}
+
+Restriction restrict_to_rigid(const std::array<std::vector<Vec3>, 6>& forces,
+                              const std::vector<Block>& diagonal, const Rows& rows, const Frame& frame,
                               const std::vector<Vec3>& position) {
   const double share = 1 / static_cast<double>(rows.size());
   return parallel_sum<Restriction>(rows.size(), [&](std::size_t r) {
     const std::uint32_t i = rows[r];
     const Motions own = frame.at(position[i]);
-    Motions force = Motions::Zero();
-    for (std::uint64_t q = matrix.row_offsets[i]; q < matrix.row_offsets[i + 1]; ++q) {
-      force.noalias() += matrix.values[q] * frame.at(position[matrix.columns[q]]);
-    }
+    Motions force;
+    for (std::size_t motion = 0; motion < 6; ++motion)
+      force.col(static_cast<Eigen::Index>(motion)) = forces[motion][i];
     Restriction term;
     term.energy = own.transpose() * force;
     term.size = share * own.transpose() * own;
-    term.stiffness = share * matrix.values[diagonal_position(matrix, i)].trace() / 3;
+    term.stiffness = share * diagonal[i].trace() / 3;
     return term;
   });
 }
@@ -147,16 +166,27 @@ void tell(const Eigen::MatrixXd& space, std::uint32_t part, std::vector<FreeMoti
 
 }  // namespace
 
-std::vector<FreeMotion> free_motions(const BlockMatrix& matrix, const NodeGeometry& geometry,
+std::vector<FreeMotion> free_motions(const LinearOperator& matrix, const NodeGeometry& geometry,
                                      double threshold) {
   std::vector<FreeMotion> motions;
-  for (const Rows& rows : connected_groups(matrix)) {
-    const Frame frame = group_frame(rows, geometry.position);
-    const Restriction restriction = restrict_to_rigid(matrix, rows, frame, geometry.position);
+  const std::vector<Rows> groups = connected_groups(matrix);
+  std::vector<Frame> frames;
+  for (const Rows& rows : groups) frames.push_back(group_frame(rows, geometry.position));
+  const auto forces = forces_of_motions(matrix, groups, frames, geometry.position);
+  const std::vector<Block> diagonal = matrix.diagonal();
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const Restriction restriction =
+        restrict_to_rigid(forces, diagonal, groups[g], frames[g], geometry.position);
     // The energy of a motion of unit mean square size, beside that of one element moved alone.
-    tell(free_space(restriction, threshold * restriction.stiffness), geometry.part[rows.front()], motions);
+    tell(free_space(restriction, threshold * restriction.stiffness), geometry.part[groups[g].front()],
+         motions);
   }
   return motions;
+}
+
+std::vector<FreeMotion> free_motions(const BlockMatrix& matrix, const NodeGeometry& geometry,
+                                     double threshold) {
+  return free_motions(StoredMatrix(matrix), geometry, threshold);
 }
 
 }  // namespace flexel

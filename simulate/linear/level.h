@@ -33,13 +33,22 @@ struct Level {
   Chebyshev smoother;
   Transfer<R> transfer;
   mutable std::vector<double> rhs, x, next;  // (rows x R) work of one cycle
+  mutable std::vector<double> image;         // (rows x R) likewise, of an operator
 };
 
 constexpr std::size_t kRowGrain = 256;
 
-// body(i, (A x)_i) for every row.
+// body(i, (A x)_i) for every row; `image` (rows x R) may be overwritten.
+template <int R, class Body>
+void for_each_product(const LinearOperator& matrix, const double* x, double* image, const Body& body) {
+  matrix.multiply(x, image);
+  parallel_for_each(matrix.rows(), [&](std::size_t i) {
+    body(i, Eigen::Map<const Eigen::Matrix<double, R, 1>>(image + i * R));
+  });
+}
+
 template <int R, class View, class Body>
-void for_each_product(const View& matrix, const double* x, const Body& body) {
+void for_each_product(const View& matrix, const double* x, double*, const Body& body) {
   parallel_for_each(
       matrix.rows(),
       [&](std::size_t i) {
@@ -87,20 +96,15 @@ template <int R>
 }
 
 // Inverts the diagonal blocks and estimates the largest eigenvalue of D^-1 A by power iteration.
-template <int R, class View>
-void prepare_smoother(const View& matrix, Level<R>& level) {
-  const std::size_t n = matrix.rows();
-  const auto diagonal_block = [&](std::size_t i) -> const Square<R>& {
-    const auto begin = matrix.columns.begin() + static_cast<std::ptrdiff_t>(matrix.offsets[i]);
-    const auto end = matrix.columns.begin() + static_cast<std::ptrdiff_t>(matrix.offsets[i + 1]);
-    return matrix.values[static_cast<std::size_t>(std::lower_bound(begin, end, i) - matrix.columns.begin())];
-  };
+// `multiply(x, y)`: y = A x.
+template <int R, class BlockType, class Multiply>
+void prepare_smoother(const std::vector<BlockType>& diagonal, const Multiply& multiply, Level<R>& level) {
+  const std::size_t n = diagonal.size();
   double largest = 0;
-  for (std::size_t i = 0; i < n; ++i)
-    largest = std::max(largest, diagonal_block(i).diagonal().cwiseAbs().maxCoeff());
+  for (const BlockType& block : diagonal) largest = std::max(largest, block.diagonal().cwiseAbs().maxCoeff());
   level.inverse_diagonal.resize(n);
   parallel_for_each(n, [&](std::size_t i) {
-    const Eigen::Matrix<double, R, R> block = diagonal_block(i);
+    const Eigen::Matrix<double, R, R> block = diagonal[i];
     level.inverse_diagonal[i] = guarded_inverse<R>(block, 1e-14 * largest).template cast<float>();
   });
   constexpr int kSteps = 12;
@@ -108,8 +112,9 @@ void prepare_smoother(const View& matrix, Level<R>& level) {
   parallel_for_each(n * R, [&](std::size_t k) { v[k] = scattered(k); });
   level.largest_eigenvalue = 1;
   for (int step = 0; step < kSteps; ++step) {
-    for_each_product<R>(matrix, v.data(), [&](std::size_t i, const auto& product) {
-      entry<R>(w.data(), i) = times<R>(level.inverse_diagonal[i], product);
+    multiply(v.data(), w.data());
+    parallel_for_each(n, [&](std::size_t i) {
+      entry<R>(w.data(), i) = times<R>(level.inverse_diagonal[i], entry<R>(w.data(), i));
     });
     const double before = parallel_sum<double>(n * R, [&](std::size_t k) { return v[k] * v[k]; });
     const double after = parallel_sum<double>(n * R, [&](std::size_t k) { return w[k] * w[k]; });
@@ -127,7 +132,7 @@ void smooth_from_zero(const View& matrix, const Level<R>& level, const double* b
   parallel_for_each(matrix.rows(), [&](std::size_t i) {
     entry<R>(work, i) = c.inverse_centre * times<R>(level.inverse_diagonal[i], entry<R>(b, i));
   });
-  for_each_product<R>(matrix, work, [&](std::size_t i, const auto& product) {
+  for_each_product<R>(matrix, work, level.image.data(), [&](std::size_t i, const auto& product) {
     const Eigen::Matrix<double, R, 1> residual = entry<R>(b, i) - product;
     entry<R>(x, i) =
         (1 + c.momentum) * entry<R>(work, i) + c.gain * times<R>(level.inverse_diagonal[i], residual);
@@ -138,11 +143,11 @@ void smooth_from_zero(const View& matrix, const Level<R>& level, const double* b
 template <int R, class View>
 void smooth(const View& matrix, const Level<R>& level, const double* b, double* x, double* work) {
   const Chebyshev& c = level.smoother;
-  for_each_product<R>(matrix, x, [&](std::size_t i, const auto& product) {
+  for_each_product<R>(matrix, x, level.image.data(), [&](std::size_t i, const auto& product) {
     const Eigen::Matrix<double, R, 1> residual = entry<R>(b, i) - product;
     entry<R>(work, i) = entry<R>(x, i) + c.inverse_centre * times<R>(level.inverse_diagonal[i], residual);
   });
-  for_each_product<R>(matrix, work, [&](std::size_t i, const auto& product) {
+  for_each_product<R>(matrix, work, level.image.data(), [&](std::size_t i, const auto& product) {
     const Eigen::Matrix<double, R, 1> residual = entry<R>(b, i) - product;
     const Eigen::Matrix<double, R, 1> first = entry<R>(work, i);
     entry<R>(x, i) = first + c.momentum * (first - entry<R>(x, i)) +
@@ -154,8 +159,9 @@ void smooth(const View& matrix, const Level<R>& level, const double* b, double* 
 template <int R, class View>
 void restrict_residual(const View& matrix, const Level<R>& level, const double* b, const double* x,
                        double* work, double* coarse) {
-  for_each_product<R>(
-      matrix, x, [&](std::size_t i, const auto& product) { entry<R>(work, i) = entry<R>(b, i) - product; });
+  for_each_product<R>(matrix, x, level.image.data(), [&](std::size_t i, const auto& product) {
+    entry<R>(work, i) = entry<R>(b, i) - product;
+  });
   const Transfer<R>& t = level.transfer;
   parallel_for_each(
       t.coarse_rows,

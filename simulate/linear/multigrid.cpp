@@ -23,12 +23,7 @@ constexpr std::size_t kCoarsestRows = 500;  // aggregates of six unknowns
 constexpr double kStrongLink = .01;         // weaker couplings do not hold an aggregate together
 constexpr double kAnyLink = 1e-12;          // weaker couplings are rounding
 
-using FineView = MatrixView<Block>;
 using CoarseBlock = Eigen::Matrix<float, 6, 6>;
-
-FineView view(const BlockMatrix& matrix) {
-  return {matrix.row_offsets, matrix.columns, matrix.values};
-}
 
 template <class BlockType>
 MatrixView<BlockType> view(const Pattern& pattern, const std::vector<BlockType>& values) {
@@ -64,13 +59,9 @@ Grouping grouping(const LevelNodes& fine, const Aggregates& aggregates) {
 // the projector on the other directions. A coarse motion must leave held elements alone: one that drags them
 // against a penalty of hundreds of E / h would cost so much that the free elements of the same aggregate
 // would get no coarse motion either.
-Mat3 free_directions(const FineView& matrix, std::size_t i) {
+// `sum`: of the blocks of its row, `own`: the diagonal one.
+Mat3 free_directions(const Mat3& sum, const Mat3& own) {
   constexpr double kHeld = .5;
-  Mat3 sum = Mat3::Zero(), own = Mat3::Zero();
-  for (std::uint64_t q = matrix.offsets[i]; q < matrix.offsets[i + 1]; ++q) {
-    sum += matrix.values[q];
-    if (matrix.columns[q] == i) own = matrix.values[q];
-  }
   if (sum.norm() < .1 * own.norm()) return Mat3::Identity();
   const Eigen::SelfAdjointEigenSolver<Mat3> eigen(.5 * (sum + sum.transpose()));
   Mat3 projector = Mat3::Identity();
@@ -82,21 +73,56 @@ Mat3 free_directions(const FineView& matrix, std::size_t i) {
   return projector;
 }
 
-void refresh_transfer(const FineView& matrix, const Grouping& groups, Level<3>& level) {
-  prepare_smoother<3>(matrix, level);
-  std::vector<Eigen::Matrix3f> free(matrix.rows());
-  parallel_for_each(matrix.rows(),
-                    [&](std::size_t i) { free[i] = free_directions(matrix, i).cast<float>(); });
+// The projectors of all rows. The sum of a row's blocks is what moving everything together is resisted with.
+std::vector<Eigen::Matrix3f> free_directions(const LinearOperator& matrix,
+                                             const std::vector<Block>& diagonal) {
+  const std::size_t n = matrix.rows();
+  std::vector<Eigen::Matrix3f> free(n);
+  std::vector<double> together(3 * n), force(3 * n);
+  for (int axis = 0; axis < 3; ++axis) {
+    parallel_for_each(3 * n, [&](std::size_t k) { together[k] = static_cast<int>(k % 3) == axis; });
+    matrix.multiply(together.data(), force.data());
+    parallel_for_each(n, [&](std::size_t i) { free[i].col(axis) = entry<3>(force.data(), i).cast<float>(); });
+  }
+  parallel_for_each(n, [&](std::size_t i) {
+    free[i] = free_directions(free[i].cast<double>(), diagonal[i]).cast<float>();
+  });
+  return free;
+}
+
+// Returns the diagonal blocks.
+std::vector<Block> make_smoother(const LinearOperator& matrix, Level<3>& level) {
+  std::vector<Block> diagonal = matrix.diagonal();
+  prepare_smoother<3>(
+      diagonal, [&](const double* x, double* y) { matrix.multiply(x, y); }, level);
+  return diagonal;
+}
+
+void refresh_transfer(const LinearOperator& matrix, const Grouping& groups, Level<3>& level) {
+  const std::vector<Block> diagonal = make_smoother(matrix, level);
+  const std::vector<Eigen::Matrix3f> free = free_directions(matrix, diagonal);
   const auto tentative = [&](std::size_t i) -> Eigen::Matrix<double, 6, 3> {
     const double reach = groups.coarse_reach[groups.aggregate_of[i]];
     return rigid_motion<3>(groups.offset[i], 0, reach) * free[i].cast<double>();
   };
-  smooth_prolongator<3>(matrix, level.inverse_diagonal, smoothing_weight(level.largest_eigenvalue),
-                        groups.aggregate_of, tentative, level.transfer);
+  smooth_prolongator<3>(OperatorView(matrix), level.inverse_diagonal,
+                        smoothing_weight(level.largest_eigenvalue), groups.aggregate_of, tentative,
+                        level.transfer);
 }
 
 void refresh_transfer(const MatrixView<Square<6>>& matrix, const Grouping& groups, Level<6>& level) {
-  prepare_smoother<6>(matrix, level);
+  std::vector<Square<6>> diagonal(matrix.rows());
+  parallel_for_each(diagonal.size(), [&](std::size_t i) {
+    const auto begin = matrix.columns.begin() + static_cast<std::ptrdiff_t>(matrix.offsets[i]);
+    const auto end = matrix.columns.begin() + static_cast<std::ptrdiff_t>(matrix.offsets[i + 1]);
+    diagonal[i] =
+        matrix.values[static_cast<std::size_t>(std::lower_bound(begin, end, i) - matrix.columns.begin())];
+  });
+  const auto multiply = [&](const double* x, double* y) {
+    for_each_product<6>(matrix, x, nullptr,
+                        [&](std::size_t i, const auto& product) { entry<6>(y, i) = product; });
+  };
+  prepare_smoother<6>(diagonal, multiply, level);
   const auto tentative = [&](std::size_t i) {
     return rigid_motion<6>(groups.offset[i], groups.fine_reach[i],
                            groups.coarse_reach[groups.aggregate_of[i]]);
@@ -114,7 +140,7 @@ struct CoarseLevel {
 
 class Multigrid : public Preconditioner {
  public:
-  Multigrid(const BlockMatrix& matrix, const NodeGeometry& geometry) : matrix_(matrix) {
+  Multigrid(const LinearOperator& matrix, const NodeGeometry& geometry) : matrix_(matrix) {
     assert(geometry.position.size() == matrix.rows() && geometry.index.size() == matrix.rows());
     if (matrix.rows() > kDirectRows) build_structure(geometry);
     refresh();
@@ -131,7 +157,7 @@ class Multigrid : public Preconditioner {
     const double* b = residual.front().data();
     double* x = correction.front().data();
     double* work = fine_.next.data();
-    const FineView fine = view(matrix_);
+    const LinearOperator& fine = matrix_;
     smooth_from_zero<3>(fine, fine_, b, x, work);
     restrict_residual<3>(fine, fine_, b, x, work, coarse_.front().level.rhs.data());
     cycle(0);
@@ -139,11 +165,21 @@ class Multigrid : public Preconditioner {
     smooth<3>(fine, fine_, b, x, work);
   }
 
+  // The hierarchy stays positive definite: it is for any coarse matrix that is, as long as the smoother
+  // converges.
+  void refresh_smoother() override {
+    if (coarse_.empty())
+      refresh();
+    else
+      (void)make_smoother(matrix_, fine_);
+  }
+
   void refresh() override {
     if (matrix_.rows() == 0) return;
-    if (coarse_.empty()) return coarsest_.factorise(lower_half(view(matrix_)));
-    refresh_transfer(view(matrix_), groups_, fine_);
-    std::vector<Square<6>> values = galerkin<3>(view(matrix_), fine_.transfer, coarse_.front().pattern);
+    if (coarse_.empty()) return factorise_at_once();
+    refresh_transfer(matrix_, groups_, fine_);
+    std::vector<Square<6>> values =
+        galerkin<3>(OperatorView(matrix_), fine_.transfer, coarse_.front().pattern);
     for (std::size_t l = 0; l < coarse_.size(); ++l) {
       CoarseLevel& coarse = coarse_[l];
       const auto exact = view(coarse.pattern, values);
@@ -160,17 +196,25 @@ class Multigrid : public Preconditioner {
   }
 
  private:
+  void factorise_at_once() {
+    std::vector<Block> room;
+    const Block* blocks = matrix_.blocks(0, matrix_.rows(), room);
+    coarsest_.factorise(lower_half(MatrixView<Block>{matrix_.row_offsets(), matrix_.columns(),
+                                                     std::span(blocks, matrix_.columns().size())}));
+  }
+
   // Aggregates and patterns of every level.
   void build_structure(const NodeGeometry& geometry) {
     LevelNodes nodes{geometry.index, geometry.part, geometry.position,
                      std::vector<double>(matrix_.rows(), 0)};
-    const FineView fine = view(matrix_);
+    const OperatorView fine(matrix_);
+    const std::vector<Graph> graphs = coupled_rows(matrix_, std::array{kAnyLink, kStrongLink});
     Aggregates aggregates =
-        aggregate(nodes, coupled_rows(matrix_, kAnyLink), coupled_rows(matrix_, kStrongLink),
-                  {.width = 3, .smallest = 4, .drop_isolated = true});
+        aggregate(nodes, graphs[0], graphs[1], {.width = 3, .smallest = 4, .drop_isolated = true});
     groups_ = grouping(nodes, aggregates);
     fine_.transfer = transfer_pattern<3>(fine, aggregates.of, aggregates.count());
     fine_.next.resize(3 * matrix_.rows());
+    fine_.image.resize(3 * matrix_.rows());
     coarse_.emplace_back().pattern = coarse_pattern<3>(fine, fine_.transfer);
     while (aggregates.count() > kCoarsestRows) {
       nodes = std::move(aggregates.nodes);
@@ -209,7 +253,7 @@ class Multigrid : public Preconditioner {
     smooth<6>(matrix, level, level.rhs.data(), level.x.data(), level.next.data());
   }
 
-  const BlockMatrix& matrix_;
+  const LinearOperator& matrix_;
   Grouping groups_;
   Level<3> fine_;
   std::vector<CoarseLevel> coarse_;  // empty where the matrix itself is factorised
@@ -218,9 +262,34 @@ class Multigrid : public Preconditioner {
 
 }  // namespace
 
-std::unique_ptr<Preconditioner> aggregation_multigrid(const BlockMatrix& matrix,
+std::unique_ptr<Preconditioner> aggregation_multigrid(const LinearOperator& matrix,
                                                       const NodeGeometry& geometry) {
   return std::make_unique<Multigrid>(matrix, geometry);
+}
+
+namespace {
+
+// With the operator that it needs.
+class MultigridOfStored : public Preconditioner {
+ public:
+  MultigridOfStored(const BlockMatrix& matrix, const NodeGeometry& geometry)
+      : operator_(matrix), multigrid_(operator_, geometry) {}
+  void apply(const std::vector<Vec3>& residual, std::vector<Vec3>& correction) const override {
+    multigrid_.apply(residual, correction);
+  }
+  void refresh() override { multigrid_.refresh(); }
+  void refresh_smoother() override { multigrid_.refresh_smoother(); }
+
+ private:
+  StoredMatrix operator_;
+  Multigrid multigrid_;
+};
+
+}  // namespace
+
+std::unique_ptr<Preconditioner> aggregation_multigrid(const BlockMatrix& matrix,
+                                                      const NodeGeometry& geometry) {
+  return std::make_unique<MultigridOfStored>(matrix, geometry);
 }
 
 }  // namespace flexel

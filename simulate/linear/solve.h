@@ -4,7 +4,7 @@
 #include <functional>
 #include <memory>
 
-#include "simulate/linear/block_matrix.h"
+#include "simulate/linear/operator.h"
 
 namespace flexel {
 
@@ -24,6 +24,9 @@ class Preconditioner {
   // Takes up new values of the matrix (Newton's next tangent), whose pattern must be the one it was made for.
   // Cheaper than a new preconditioner: what depends on the pattern alone is kept.
   virtual void refresh() = 0;
+  // Likewise, but what the coarser levels know of the matrix stays: a fraction of the time, and more
+  // iterations the more it has changed.
+  virtual void refresh_smoother() { refresh(); }
 };
 
 // Inverse of the diagonal blocks (small eigenvalues dropped).
@@ -32,6 +35,8 @@ class Preconditioner {
 // Smoothed aggregation with six rigid motions an aggregate (Vanek, Mandel, Brezina 1996; notes in
 // docs/solver.md): the paper's reduction of a group of elements to one (section 3.1), with its rotation. A
 // direct factorisation where the matrix is small. Keeps a reference to `matrix`.
+[[nodiscard]] std::unique_ptr<Preconditioner> aggregation_multigrid(const LinearOperator& matrix,
+                                                                    const NodeGeometry& geometry);
 [[nodiscard]] std::unique_ptr<Preconditioner> aggregation_multigrid(const BlockMatrix& matrix,
                                                                     const NodeGeometry& geometry);
 
@@ -48,6 +53,10 @@ struct LinearResult {
 
 // Preconditioned conjugate gradients from x = 0. `progress` is called now and then with the iteration and
 // relative residual; it may throw to interrupt.
+[[nodiscard]] LinearResult conjugate_gradients(const LinearOperator& matrix, const std::vector<Vec3>& b,
+                                               std::vector<Vec3>& x, const Preconditioner& preconditioner,
+                                               double tolerance, int max_iterations,
+                                               const std::function<void(int, double)>& progress = {});
 [[nodiscard]] LinearResult conjugate_gradients(const BlockMatrix& matrix, const std::vector<Vec3>& b,
                                                std::vector<Vec3>& x, const Preconditioner& preconditioner,
                                                double tolerance, int max_iterations,
@@ -61,6 +70,8 @@ struct FreeMotion {
   Vec3 translation = Vec3::Zero();  // unit direction, or zero
   Vec3 rotation = Vec3::Zero();     // unit axis, or zero
 };
+[[nodiscard]] std::vector<FreeMotion> free_motions(const LinearOperator& matrix, const NodeGeometry& geometry,
+                                                   double threshold = 1e-9);
 [[nodiscard]] std::vector<FreeMotion> free_motions(const BlockMatrix& matrix, const NodeGeometry& geometry,
                                                    double threshold = 1e-9);
 

@@ -14,12 +14,22 @@
 #include <vector>
 
 #include "formats/parallel.h"
+#include "simulate/instruction_set.h"
 #include "simulate/linear/aggregate.h"
+#include "simulate/linear/kernel_galerkin.h"
 
 namespace flexel {
 
 template <int R>
 using Square = Eigen::Matrix<double, R, R, R == 3 ? Eigen::RowMajor : Eigen::ColMajor>;
+
+[[nodiscard]] inline const galerkin_kernel::Table& galerkin_table() {
+#if defined(__x86_64__)
+  return best_table(&galerkin_kernel::portable, &galerkin_kernel::avx2, &galerkin_kernel::avx512);
+#else
+  return galerkin_kernel::portable();
+#endif
+}
 
 // Compressed rows without values.
 struct Pattern {
@@ -35,6 +45,28 @@ struct MatrixView {
   std::span<const BlockType> values;
   [[nodiscard]] std::size_t rows() const { return offsets.empty() ? 0 : offsets.size() - 1; }
 };
+
+// The blocks of rows [begin, end), as LinearOperator::blocks gives them.
+template <class BlockType>
+[[nodiscard]] const BlockType* row_blocks(const MatrixView<BlockType>& matrix, std::size_t begin, std::size_t,
+                                          std::vector<Block>&) {
+  return matrix.values.data() + matrix.offsets[begin];
+}
+
+// A matrix of 3x3 blocks, with its pattern at hand.
+struct OperatorView {
+  explicit OperatorView(const LinearOperator& of)
+      : matrix(of), offsets(of.row_offsets()), columns(of.columns()) {}
+  const LinearOperator& matrix;
+  std::span<const std::uint64_t> offsets;
+  std::span<const std::uint32_t> columns;
+  [[nodiscard]] std::size_t rows() const { return matrix.rows(); }
+};
+
+[[nodiscard]] inline const Block* row_blocks(const OperatorView& view, std::size_t begin, std::size_t end,
+                                             std::vector<Block>& room) {
+  return view.matrix.blocks(begin, end, room);
+}
 
 template <int R>
 struct Transfer {
@@ -140,9 +172,12 @@ void smooth_prolongator(const View& matrix, const std::vector<Inverse>& inverse_
                         const std::vector<std::uint32_t>& aggregate_of, const Tentative& tentative,
                         Transfer<R>& transfer) {
   using Transposed = Eigen::Matrix<double, 6, R>;
-  transfer.values.resize(transfer.pattern.columns.size());
+  transfer.values.resize(transfer.pattern.columns.size() + 1);  // the kernels read past a block's end
+  transfer.values.back().setZero();
   parallel_chunks(matrix.rows(), 256, [&](std::size_t begin, std::size_t end) {
     std::vector<Transposed> sums;
+    std::vector<Block> room;
+    const auto* blocks = row_blocks(matrix, begin, end, room) - matrix.offsets[begin];
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint64_t first = transfer.pattern.offsets[i];
       if (transfer.pattern.offsets[i + 1] == first) continue;
@@ -151,7 +186,7 @@ void smooth_prolongator(const View& matrix, const std::vector<Inverse>& inverse_
         const std::uint32_t j = matrix.columns[q];
         if (aggregate_of[j] == kNoAggregate) continue;
         sums[position_in_row(transfer.pattern, i, aggregate_of[j]) - first].noalias() +=
-            tentative(j) * matrix.values[q].transpose();
+            tentative(j) * blocks[q].transpose();
       }
       const Eigen::Matrix<double, R, R> inverse = inverse_diagonal[i].template cast<double>();
       for (std::size_t s = 0; s < sums.size(); ++s) {
@@ -185,39 +220,52 @@ template <int R, class View>
   });
 }
 
-// Rows [begin, end) of A P, transposed blocks.
-template <int R>
-struct ProductRows {
-  std::size_t begin = 0;
-  std::vector<std::vector<std::pair<std::uint32_t, Eigen::Matrix<double, 6, R>>>> rows;
+// One row of A P: blocks (R x kWidth), in the order of `columns`.
+struct ProductRow {
+  std::vector<std::uint32_t> columns;
+  std::vector<double> values;
 };
 
+// Rows [begin, end) of A P.
 template <int R, class View>
 void product_rows(const View& matrix, const Transfer<R>& transfer, std::size_t begin, std::size_t end,
-                  ProductRows<R>& product) {
+                  std::vector<ProductRow>& rows) {
+  const auto add = galerkin_table().products[R / 6];
+  constexpr std::size_t kBlock = R * galerkin_kernel::kWidth;
   const Pattern& p = transfer.pattern;
-  product.begin = begin;
-  product.rows.resize(std::max(product.rows.size(), end - begin));
+  rows.resize(std::max(rows.size(), end - begin));
   parallel_chunks(end - begin, 512, [&](std::size_t chunk_begin, std::size_t chunk_end) {
-    std::vector<std::uint32_t> slot(transfer.coarse_rows, kNoAggregate);
+    thread_local std::vector<std::uint32_t> slot;  // kNoAggregate between two uses
+    thread_local std::vector<galerkin_kernel::Product> products;
+    if (slot.size() < transfer.coarse_rows) slot.resize(transfer.coarse_rows, kNoAggregate);
+    std::vector<Block> room;
+    const std::size_t first = begin + chunk_begin;
+    const auto* blocks = row_blocks(matrix, first, begin + chunk_end, room) - matrix.offsets[first];
     for (std::size_t r = chunk_begin; r < chunk_end; ++r) {
-      auto& row = product.rows[r];
-      row.clear();
+      ProductRow& row = rows[r];
+      row.columns.clear();
       // A row that no aggregate reaches takes no part in P^T (A P).
       if (p.offsets[begin + r] == p.offsets[begin + r + 1]) continue;
-      for (std::uint64_t q = matrix.offsets[begin + r]; q < matrix.offsets[begin + r + 1]; ++q) {
-        const Eigen::Matrix<double, R, R> transposed = matrix.values[q].transpose();
+      const std::uint64_t row_begin = matrix.offsets[begin + r], row_end = matrix.offsets[begin + r + 1];
+      for (std::uint64_t q = row_begin; q < row_end; ++q) {
         const std::uint32_t k = matrix.columns[q];
         for (std::uint64_t s = p.offsets[k]; s < p.offsets[k + 1]; ++s) {
           std::uint32_t& at = slot[p.columns[s]];
-          if (at == kNoAggregate) {
-            at = static_cast<std::uint32_t>(row.size());
-            row.emplace_back(p.columns[s], Eigen::Matrix<double, 6, R>::Zero());
-          }
-          row[at].second.noalias() += transfer.values[s].template cast<double>() * transposed;
+          if (at != kNoAggregate) continue;
+          at = static_cast<std::uint32_t>(row.columns.size());
+          row.columns.push_back(p.columns[s]);
         }
       }
-      for (const auto& entry : row) slot[entry.first] = kNoAggregate;
+      row.values.assign(kBlock * row.columns.size(), 0);
+      products.clear();
+      for (std::uint64_t q = row_begin; q < row_end; ++q) {
+        const std::uint32_t k = matrix.columns[q];
+        for (std::uint64_t s = p.offsets[k]; s < p.offsets[k + 1]; ++s)
+          products.push_back(
+              {blocks[q].data(), transfer.values[s].data(), row.values.data() + kBlock * slot[p.columns[s]]});
+      }
+      add(products.data(), products.size());
+      for (const std::uint32_t column : row.columns) slot[column] = kNoAggregate;
     }
   });
 }
@@ -228,27 +276,41 @@ void product_rows(const View& matrix, const Transfer<R>& transfer, std::size_t b
 template <int R, class View>
 [[nodiscard]] std::vector<Square<6>> galerkin(const View& matrix, const Transfer<R>& transfer,
                                               const Pattern& pattern) {
-  constexpr std::size_t kBatch = 8192;
+  constexpr std::size_t kBatch = 8192, kWidth = galerkin_kernel::kWidth, kBlock = 6 * kWidth;
+  const auto add = galerkin_table().pairs[R / 6];
   std::vector<Square<6>> values(pattern.columns.size(), Square<6>::Zero());
   std::vector<std::uint64_t> next(transfer.transposed_offsets.begin(), transfer.transposed_offsets.end() - 1);
-  ProductRows<R> product;
+  std::vector<ProductRow> product;
   for (std::size_t begin = 0; begin < matrix.rows(); begin += kBatch) {
     const std::size_t end = std::min(matrix.rows(), begin + kBatch);
     product_rows(matrix, transfer, begin, end, product);
     parallel_chunks(transfer.coarse_rows, 64, [&](std::size_t chunk_begin, std::size_t chunk_end) {
-      std::vector<std::uint64_t> slot(transfer.coarse_rows, 0);
+      thread_local std::vector<std::uint32_t> slot;
+      thread_local std::vector<galerkin_kernel::Pair> pairs;
+      thread_local std::vector<double> sums;
       for (std::size_t a = chunk_begin; a < chunk_end; ++a) {
         const std::uint64_t last = transfer.transposed_offsets[a + 1];
         if (next[a] == last || transfer.transposed_rows[next[a]] >= end) continue;
-        for (std::uint64_t q = pattern.offsets[a]; q < pattern.offsets[a + 1]; ++q)
-          slot[pattern.columns[q]] = q;
+        if (slot.size() < transfer.coarse_rows) slot.resize(transfer.coarse_rows);
+        const std::uint64_t first = pattern.offsets[a], count = pattern.offsets[a + 1] - first;
+        for (std::uint64_t q = 0; q < count; ++q)
+          slot[pattern.columns[first + q]] = static_cast<std::uint32_t>(q);
+        sums.assign(kBlock * count, 0);
+        pairs.clear();
         for (; next[a] < last && transfer.transposed_rows[next[a]] < end; ++next[a]) {
-          const Eigen::Matrix<double, 6, R> p =
-              transfer.values[transfer.transposed_positions[next[a]]].template cast<double>();
-          for (const auto& [column, block] : product.rows[transfer.transposed_rows[next[a]] - begin]) {
-            if (column >= a) values[slot[column]].noalias() += p * block.transpose();
-          }
+          const float* p = transfer.values[transfer.transposed_positions[next[a]]].data();
+          const ProductRow& row = product[transfer.transposed_rows[next[a]] - begin];
+          for (std::size_t c = 0; c < row.columns.size(); ++c)
+            if (row.columns[c] >= a)
+              pairs.push_back(
+                  {p, row.values.data() + R * kWidth * c, sums.data() + kBlock * slot[row.columns[c]]});
         }
+        add(pairs.data(), pairs.size());
+        for (std::uint64_t q = 0; q < count; ++q)
+          for (int m = 0; m < 6; ++m)
+            for (int n = 0; n < 6; ++n)
+              values[first + q](m, n) +=
+                  sums[kBlock * q + kWidth * static_cast<std::size_t>(m) + static_cast<std::size_t>(n)];
       }
     });
   }

@@ -1,0 +1,348 @@
+// Products go over the chunks of simulate/time/layout.h: a chunk writes the rows of the elements that it owns
+// and hands over what it adds to those that it shares; those are summed in a fixed order. Rows are made for
+// each element from the cells around it, in ascending order, so neither depends on the threads.
+//
+// Everything about a cell is in its lattice's frame; a row's blocks are turned to the world's at its end.
+#include "simulate/cell_stiffness.h"
+
+#include <algorithm>
+
+#include "formats/parallel.h"
+#include "simulate/instruction_set.h"
+#include "simulate/linear/aggregate.h"
+#include "simulate/prepared_cell.h"
+
+namespace flexel {
+namespace {
+
+using step::kLanes;
+using step::TangentForm;
+
+const step::ProductTable& product_table() {
+#if defined(__x86_64__)
+  return best_table(&step::products_portable, &step::products_avx2, &step::products_avx512);
+#else
+  return step::products_portable();
+#endif
+}
+
+StepLayout layout_of(const Setting& setting) {
+  StepPlan plan;
+  plan.damping.assign(setting.body.parts.size(), 0);
+  plan.rest_shapes = true;  // so that it says which cell each lane holds
+  return step_layout(setting, plan);
+}
+
+const std::vector<CoupledElements>& groups_of(const Pass& pass) {
+  return pass.stiffens ? *pass.stiffens : pass.couples;
+}
+
+// A matrix of zeros with a row for every element: each with each of the passes' groups.
+BlockMatrix matrix_of_passes(std::size_t elements, const std::vector<Pass>& passes) {
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
+  for (const Pass& pass : passes)
+    if (pass.add_stiffness)
+      for (const CoupledElements& group : groups_of(pass))
+        for (const std::uint32_t a : group)
+          for (const std::uint32_t b : group) pairs.emplace_back(a, b);
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  BlockMatrix matrix;
+  matrix.row_offsets.assign(elements + 1, 0);
+  for (const auto& [row, column] : pairs) {
+    ++matrix.row_offsets[row + 1];
+    matrix.columns.push_back(column);
+  }
+  for (std::size_t e = 0; e < elements; ++e) matrix.row_offsets[e + 1] += matrix.row_offsets[e];
+  matrix.values.assign(pairs.size(), Block::Zero());
+  return matrix;
+}
+
+// The first aligned double.
+double* aligned(std::vector<double>& scratch) {
+  const auto address = reinterpret_cast<std::uintptr_t>(scratch.data());
+  return scratch.data() + (step::kScratchAlignment - address % step::kScratchAlignment) %
+                              step::kScratchAlignment / sizeof(double);
+}
+
+constexpr int kStressOf[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}};
+
+}  // namespace
+
+bool CellStiffness::fits(const Setting& setting, const PaperModel& paper, const std::vector<Pass>& passes) {
+  const auto cells = [](Model model) { return model == Model::cells; };
+  return setting.body.cell_count() > 0 && paper.rows().entries.empty() &&
+         std::find(paper.active().begin(), paper.active().end(), 1) == paper.active().end() &&
+         std::all_of(setting.models.begin(), setting.models.end(), cells) &&
+         !RestShapes(setting.body).any() && std::all_of(passes.begin(), passes.end(), [](const Pass& pass) {
+           return !pass.add_stiffness || pass.stiffens || !pass.couples.empty();
+         });
+}
+
+CellStiffness::CellStiffness(const Setting& setting, const StiffnessPattern& pattern,
+                             const std::vector<Pass>& passes)
+    : body_(setting.body),
+      pattern_(pattern),
+      layout_(layout_of(setting)),
+      kernels_(&product_table()),
+      part_(cell_parts(setting.body)),
+      share_(stiffness_shares(setting.body)),
+      place_(setting.body.cell_count()),
+      added_(matrix_of_passes(setting.body.element_count(), passes)),
+      shared_force_(3 * layout_.shared.size()) {
+  for (std::size_t block = 0; block < layout_.block_cells.size(); ++block)
+    for (std::size_t lane = 0; lane < kLanes; ++lane)
+      if (const std::uint32_t cell = layout_.block_cells[block][lane]; cell != StepLayout::kNoCell)
+        place_[cell] = static_cast<std::uint32_t>(block * kLanes + lane);
+  for (std::size_t p = 0; p < body_.parts.size(); ++p) {
+    Lattice straight = body_.parts[p].lattice;
+    PartKind made{{}, straight.axes, {}};
+    const CellKind turned = cell_kind(straight, setting.materials[p]);
+    for (std::size_t ab = 0; ab < 64; ++ab) made.at_rest[ab] = tangent_block(turned, {}, ab / 8, ab % 8);
+    straight.axes = Mat3::Identity();
+    made.kind = cell_kind(straight, setting.materials[p]);
+    kinds_.push_back(made);
+  }
+  for (std::uint32_t e = 0; e < body_.element_count(); ++e)
+    if (added_.row_offsets[e + 1] > added_.row_offsets[e]) added_rows_.push_back(e);
+}
+
+// The columns of one lane.
+void CellStiffness::prepare_lane(std::uint32_t cell, const State& state, const TangentOptions& tangent,
+                                 double* to) const {
+  const PartKind& part = kinds_[part_[cell]];
+  const Mat3& axes = part.axes;
+  CellVectors u;
+  for (std::size_t a = 0; a < 8; ++a)
+    u[a] = axes.transpose() * state.displacement[body_.cell_elements[cell][a]];
+  Mat3 stress;
+  if (tangent.stress) stress = axes.transpose() * (*tangent.stress)[cell] * axes;
+  const PreparedCell prepared = prepare_cell(part.kind, displacement_gradient(part.kind, u), tangent.project,
+                                             tangent.stress ? &stress : nullptr);
+  if (prepared.projected) {
+    for (std::size_t c = 0; c < 81; ++c)
+      to[kLanes * c] =
+          (*prepared.projected)(static_cast<Eigen::Index>(c / 9), static_cast<Eigen::Index>(c % 9));
+    return;
+  }
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      to[kLanes * static_cast<std::size_t>(3 * i + j)] = prepared.tangent.inverse_transpose(i, j);
+      if (prepared.added_stress && j >= i)
+        to[kLanes * static_cast<std::size_t>(10 + kStressOf[i][j])] = (*prepared.added_stress)(i, j);
+    }
+  to[kLanes * 9] = prepared.coupling;
+}
+
+void CellStiffness::linearise(const State& state, const TangentOptions& tangent) {
+  std::fill(added_.values.begin(), added_.values.end(), Block::Zero());
+  mask_.clear();
+  held_.clear();
+  const bool rest = std::all_of(state.displacement.begin(), state.displacement.end(),
+                                [](const Vec3& u) { return u == Vec3::Zero(); });
+  form_ = rest && !tangent.stress              ? TangentForm::at_rest
+          : tangent.project && !tangent.stress ? TangentForm::moduli
+                                               : TangentForm::deformed;
+  const std::size_t width = kLanes * step::kTangentColumns[static_cast<std::size_t>(form_)];
+  tangents_.assign(width * layout_.blocks.size(), 0);
+  if (form_ == TangentForm::at_rest) {
+    tangents_.shrink_to_fit();
+    return;
+  }
+  parallel_for_each(
+      layout_.blocks.size(),
+      [&](std::size_t block) {
+        for (std::size_t lane = 0; lane < kLanes; ++lane)
+          if (const std::uint32_t cell = layout_.block_cells[block][lane]; cell != StepLayout::kNoCell)
+            prepare_lane(cell, state, tangent, tangents_.data() + width * block + lane);
+      },
+      64);
+}
+
+void CellStiffness::eliminate_prescribed(const Constraints& constraints) {
+  if (!mask_.empty()) return;
+  for (std::uint32_t e = 0; e < constraints.mask.size(); ++e)
+    if (constraints.mask[e]) held_.push_back(e);
+  if (held_.empty()) return;
+  held_diagonal_.resize(held_.size());
+  const std::vector<Block> own = diagonal();
+  for (std::size_t h = 0; h < held_.size(); ++h)
+    for (int axis = 0; axis < 3; ++axis) {
+      const double value = own[held_[h]](axis, axis);
+      held_diagonal_[h][axis] = value > 0 ? value : 1;
+    }
+  mask_ = constraints.mask;
+}
+
+void CellStiffness::products_of_cells(const double* x, double* y) const {
+  const std::size_t doubles = step::kProductColumns * step::scratch_stride(layout_.largest_chunk) +
+                              step::kScratchAlignment / sizeof(double);
+  const auto form = static_cast<std::size_t>(form_);
+  const std::size_t width = kLanes * step::kTangentColumns[form];
+  parallel_for_each(
+      layout_.chunks.size(),
+      [&](std::size_t i) {
+        thread_local std::vector<double> scratch;
+        if (scratch.size() < doubles) scratch.resize(doubles);
+        const StepLayout::Chunk& chunk = layout_.chunks[i];
+        step::ChunkView view = {};
+        view.blocks = const_cast<step::CellBlock*>(layout_.blocks.data()) + chunk.block_begin;  // only read
+        view.block_count = chunk.block_end - chunk.block_begin;
+        view.corners = layout_.corners.data() + chunk.corner_begin;
+        view.elements = layout_.elements.data() + chunk.element_begin;
+        view.count = chunk.element_end - chunk.element_begin;
+        view.owned = layout_.owned.data() + chunk.owned_begin;
+        view.owned_count = chunk.owned_end - chunk.owned_begin;
+        view.shared = layout_.shared.data() + chunk.shared_begin;
+        view.shared_count = chunk.shared_end - chunk.shared_begin;
+        view.shared_force = shared_force_.data() + 3 * chunk.shared_begin;
+        view.constants = &layout_.constants[chunk.kind];
+        kernels_->of[form](view, tangents_.data() + width * chunk.block_begin, x, y, aligned(scratch));
+      },
+      1);
+  parallel_for_each(layout_.shared_elements.size(), [&](std::size_t i) {
+    double* to = y + 3 * std::size_t{layout_.shared_elements[i]};
+    to[0] = to[1] = to[2] = 0;
+    for (std::uint32_t s = layout_.slot_offsets[i]; s < layout_.slot_offsets[i + 1]; ++s)
+      for (std::size_t c = 0; c < 3; ++c) to[c] += shared_force_[3 * std::size_t{layout_.slots[s]} + c];
+  });
+  for (const std::uint32_t e : layout_.lone_elements)
+    for (std::size_t c = 0; c < 3; ++c) y[3 * std::size_t{e} + c] = 0;
+}
+
+void CellStiffness::multiply(const double* x, double* y) const {
+  const double* from = x;
+  if (!held_.empty()) {
+    masked_.resize(3 * body_.element_count());
+    parallel_for_each(masked_.size(),
+                      [&](std::size_t k) { masked_[k] = mask_[k / 3] >> k % 3 & 1 ? 0 : x[k]; });
+    from = masked_.data();
+  }
+  products_of_cells(from, y);
+  parallel_for_each(added_rows_.size(), [&](std::size_t r) {
+    const std::size_t row = added_rows_[r];
+    Vec3 sum = Vec3::Zero();
+    for (std::uint64_t q = added_.row_offsets[row]; q < added_.row_offsets[row + 1]; ++q)
+      sum += added_.values[q] * Eigen::Map<const Vec3>(from + 3 * std::size_t{added_.columns[q]});
+    Eigen::Map<Vec3>(y + 3 * row) += sum;
+  });
+  for (std::size_t h = 0; h < held_.size(); ++h)
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      if (mask_[held_[h]] >> axis & 1) {
+        const std::size_t k = 3 * std::size_t{held_[h]} + axis;
+        y[k] = held_diagonal_[h][static_cast<Eigen::Index>(axis)] * x[k];
+      }
+}
+
+void CellStiffness::deformed_blocks(const PartKind& part, const double* from, double share, std::size_t a,
+                                    std::size_t begin, std::size_t end, Block* out) const {
+  const CellKind& kind = part.kind;
+  if (form_ == TangentForm::moduli) {
+    Mat9 moduli;
+    for (std::size_t c = 0; c < 81; ++c)
+      moduli(static_cast<Eigen::Index>(c / 9), static_cast<Eigen::Index>(c % 9)) = from[kLanes * c];
+    for (std::size_t b = begin; b < end; ++b) out[b] = share * projected_block(kind, moduli, a, b);
+    return;
+  }
+  Mat3 g, added;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      g(i, j) = from[kLanes * static_cast<std::size_t>(3 * i + j)];
+      added(i, j) = from[kLanes * static_cast<std::size_t>(10 + kStressOf[i][j])];
+    }
+  const double scale = share * kind.volume / 16;
+  std::array<Vec3, 8> w;
+  for (std::size_t b = 0; b < 4; ++b) {
+    w[b] = g * kind.gradient[b];
+    w[7 - b] = -w[b];
+  }
+  const Vec3 symmetric = (scale * kind.lambda) * w[a], swapped = (scale * from[kLanes * 9]) * w[a];
+  const Vec3 stressed = scale * (added * kind.gradient[a]);
+  for (std::size_t b = begin; b < end; ++b) {
+    out[b].noalias() = symmetric * w[b].transpose();
+    out[b].noalias() += w[b] * swapped.transpose();
+    out[b].diagonal().array() += share * kind.diagonal[8 * a + b] + stressed.dot(kind.gradient[b]);
+  }
+}
+
+void CellStiffness::cell_blocks(const Incidence& at, std::size_t begin, std::size_t end, Block* out) const {
+  const PartKind& part = kinds_[part_[at.cell]];
+  const double share = share_[at.cell];
+  if (form_ == TangentForm::at_rest) {
+    for (std::size_t b = begin; b < end; ++b) out[b] = share * part.at_rest[8 * at.corner + b];
+    return;
+  }
+  const std::size_t width = kLanes * step::kTangentColumns[static_cast<std::size_t>(form_)];
+  const std::uint32_t place = place_[at.cell];
+  deformed_blocks(part, tangents_.data() + width * (place / kLanes) + place % kLanes, share, at.corner, begin,
+                  end, out);
+}
+
+// To the world's frame, where the blocks of cells are in the lattice's.
+void CellStiffness::turn(std::size_t element, Block* block, std::size_t count) const {
+  const std::span<const Incidence> cells = pattern_.stencil.of(static_cast<std::uint32_t>(element));
+  if (form_ == TangentForm::at_rest || cells.empty()) return;
+  const Mat3& axes = kinds_[part_[cells.front().cell]].axes;
+  if (axes == Mat3::Identity()) return;
+  for (std::size_t b = 0; b < count; ++b) block[b] = (axes * block[b] * axes.transpose()).eval();
+}
+
+void CellStiffness::add_effects(std::size_t element, Block* row) const {
+  const std::uint64_t first = row_offsets()[element];
+  for (std::uint64_t q = added_.row_offsets[element]; q < added_.row_offsets[element + 1]; ++q)
+    row[position_of(pattern_.matrix, element, added_.columns[q]) - first] += added_.values[q];
+}
+
+void CellStiffness::eliminate_row(std::size_t element, Block* row) const {
+  const std::uint64_t begin = row_offsets()[element], end = row_offsets()[element + 1];
+  for (std::uint64_t q = begin; q < end; ++q) {
+    const std::uint32_t column = columns()[q];
+    if (!mask_[element] && !mask_[column]) continue;
+    Block& block = row[q - begin];
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        if (!(mask_[element] >> i & 1) && !(mask_[column] >> j & 1)) continue;
+        const bool stays = element == column && i == j;
+        block(i, j) = !stays ? 0 : block(i, j) > 0 ? block(i, j) : 1;
+      }
+  }
+}
+
+const Block* CellStiffness::blocks(std::size_t begin, std::size_t end, std::vector<Block>& room) const {
+  room.assign(row_offsets()[end] - row_offsets()[begin], Block::Zero());
+  std::array<Block, 8> own;
+  for (std::size_t e = begin; e < end; ++e) {
+    Block* row = room.data() + (row_offsets()[e] - row_offsets()[begin]);
+    for (const Incidence& at : pattern_.stencil.of(static_cast<std::uint32_t>(e))) {
+      cell_blocks(at, 0, 8, own.data());
+      const std::uint16_t* slot = pattern_.stencil.slot[at.cell].data() + 8 * at.corner;
+      for (std::size_t b = 0; b < 8; ++b) row[slot[b]] += own[b];
+    }
+    turn(e, row, row_offsets()[e + 1] - row_offsets()[e]);
+    add_effects(e, row);
+    if (!mask_.empty()) eliminate_row(e, row);
+  }
+  return room.data();
+}
+
+std::vector<Block> CellStiffness::diagonal() const {
+  std::vector<Block> diagonal(rows(), Block::Zero());
+  parallel_for_each(rows(), [&](std::size_t e) {
+    std::array<Block, 8> own;
+    for (const Incidence& at : pattern_.stencil.of(static_cast<std::uint32_t>(e))) {
+      cell_blocks(at, at.corner, at.corner + 1, own.data());
+      diagonal[e] += own[at.corner];
+    }
+    turn(e, &diagonal[e], 1);
+    if (added_.row_offsets[e + 1] > added_.row_offsets[e])
+      diagonal[e] += added_.values[diagonal_position(added_, e)];
+    if (!mask_.empty() && mask_[e])
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j)
+          if ((mask_[e] >> i & 1) || (mask_[e] >> j & 1))
+            diagonal[e](i, j) = i != j ? 0 : diagonal[e](i, j) > 0 ? diagonal[e](i, j) : 1;
+  });
+  return diagonal;
+}
+
+}  // namespace flexel

@@ -1,0 +1,58 @@
+// A row of a block is one vector of eight doubles; each sum goes on in the order of the list, so that the
+// bits are those of any instruction set (contraction is off).
+#include "simulate/linear/kernel_galerkin.h"
+
+#include "simulate/time/lanes.h"
+
+#ifndef FLEXEL_ISA
+#error "compiled once per instruction set: simulate/CMakeLists.txt sets FLEXEL_ISA"
+#endif
+
+namespace flexel::galerkin_kernel {
+namespace {
+
+using step::Lanes;
+using step::load;
+using step::store;
+using Floats = float __attribute__((vector_size(32)));
+
+FLEXEL_INLINE Lanes widened(const float* from) {
+  Floats value;
+  __builtin_memcpy(&value, from, sizeof value);
+  return __builtin_convertvector(value, Lanes);
+}
+
+template <std::size_t R>
+void products(const Product* list, std::size_t count) {
+  for (const Product* each = list; each != list + count; ++each) {
+    Lanes p[R];
+    for (std::size_t c = 0; c < R; ++c) p[c] = widened(each->p + 6 * c);
+    for (std::size_t r = 0; r < R; ++r) {
+      Lanes sum = load(each->sum + kWidth * r);
+      for (std::size_t c = 0; c < R; ++c) sum += each->a[R == 3 ? R * r + c : R * c + r] * p[c];
+      store(each->sum + kWidth * r, sum);
+    }
+  }
+}
+
+template <std::size_t R>
+void pairs(const Pair* list, std::size_t count) {
+  for (const Pair* each = list; each != list + count; ++each) {
+    Lanes b[R];
+    for (std::size_t c = 0; c < R; ++c) b[c] = load(each->b + kWidth * c);
+    for (std::size_t m = 0; m < 6; ++m) {
+      Lanes sum = load(each->sum + kWidth * m);
+      for (std::size_t c = 0; c < R; ++c) sum += static_cast<double>(each->p[6 * c + m]) * b[c];
+      store(each->sum + kWidth * m, sum);
+    }
+  }
+}
+
+}  // namespace
+
+const Table& FLEXEL_ISA() {
+  static constexpr Table table = {{&products<3>, &products<6>}, {&pairs<3>, &pairs<6>}};
+  return table;
+}
+
+}  // namespace flexel::galerkin_kernel

@@ -1,0 +1,36 @@
+// The sums of small blocks that the Galerkin product consists of, as plain data; linear/kernel_galerkin.cpp
+// is compiled once per instruction set (the reasons are in simulate/time/kernel.h). R: unknowns of a fine
+// node, 3 or 6. Blocks of P are transposed (6 x R), column-major, and may be read two floats past their end.
+// Rows of six are kept eight doubles wide, of which the last two mean nothing.
+#pragma once
+#include <cstddef>
+
+namespace flexel::galerkin_kernel {
+
+constexpr std::size_t kWidth = 8;
+
+// sum += a p^T: a block of A (R x R; 3 x 3 row-major, 6 x 6 column-major), one of P, one of A P (R x kWidth).
+struct Product {
+  const double* a;
+  const float* p;
+  double* sum;
+};
+
+// sum += p b: a block of P, one of A P (R x kWidth), one of the coarse matrix (6 x kWidth).
+struct Pair {
+  const float* p;
+  const double* b;
+  double* sum;
+};
+
+// One after the other, for R = 3 and 6.
+struct Table {
+  void (*products[2])(const Product* list, std::size_t count);
+  void (*pairs[2])(const Pair* list, std::size_t count);
+};
+
+[[nodiscard]] const Table& portable();
+[[nodiscard]] const Table& avx2();
+[[nodiscard]] const Table& avx512();
+
+}  // namespace flexel::galerkin_kernel

@@ -1,0 +1,146 @@
+// The tangent stiffness that is made on demand is the one that Cells stores.
+#include "simulate/cell_stiffness.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <random>
+
+#include "formats/parallel.h"
+#include "simulate/effects/all.h"
+#include "simulate/mechanics.h"
+#include "simulate/merge.h"
+#include "simulate/scene.h"
+#include "tests/simulate/box_body.h"
+
+namespace flexel {
+namespace {
+
+using testing::box_body;
+using testing::BoxOptions;
+
+constexpr double kYoung = 1e6;
+
+// Two parts that touch, turned in space, with slivers and a hole, spacings that differ.
+Body two_boxes() {
+  BoxOptions near;
+  near.name = "near";
+  near.cells = {19, 7, 6};
+  near.spacing = Vec3(0.1, 0.11, 0.09);
+  near.axes =
+      (Eigen::AngleAxisd(0.5, Vec3::UnitX()) * Eigen::AngleAxisd(0.4, Vec3::UnitY())).toRotationMatrix();
+  near.fill = [](int i, int j, int k) {
+    return i == 4 && j == 3 ? 0 : 0.05 + 0.9 * ((i + 2 * j + 3 * k) % 7) / 7;
+  };
+  BoxOptions far = near;
+  far.name = "far";
+  far.cells = {5, 7, 6};
+  far.origin = near.axes * Vec3(19 * 0.1, 0, 0);
+  far.fill = {};
+  Body body = box_body(near);
+  append(body, box_body(far));
+  return body;
+}
+
+Scene held_scene() {
+  Scene scene;
+  scene.materials["gum"] = {"gum", kYoung, 0.3, 580, "test"};
+  scene.material = "gum";
+  scene.get<Ties>().ties.push_back(make_fix(select_by_name("near/x0")));
+  Selection ball;
+  ball.kind = Selection::Kind::sphere;
+  ball.radius = 0.3;
+  Tie slide = make_fix(ball);
+  slide.axes = {true, false, true};
+  scene.get<Ties>().ties.push_back(slide);
+  return scene;
+}
+
+std::vector<Vec3> random_vectors(std::size_t count, double size) {
+  std::mt19937 engine(5);
+  std::uniform_real_distribution<double> uniform(-size, size);
+  std::vector<Vec3> values;
+  for (std::size_t e = 0; e < count; ++e)
+    values.emplace_back(uniform(engine), uniform(engine), uniform(engine));
+  return values;
+}
+
+struct Case {
+  bool moved, project, stressed;
+};
+
+class CellStiffnessOf : public ::testing::TestWithParam<Case> {
+ protected:
+  CellStiffnessOf()
+      : body_(two_boxes()),
+        scene_(held_scene()),
+        setting_{body_, materials_of_parts(scene_, body_), {}, {}, {}, {}},
+        stored_(setting_, Effects::passes(scene_.effects, setting_), StiffnessStorage::stored),
+        made_(setting_, Effects::passes(scene_.effects, setting_), StiffnessStorage::made) {
+    State state{random_vectors(body_.element_count(), GetParam().moved ? 0.02 : 0), 1};
+    for (std::size_t e = 0; GetParam().moved && e < body_.element_count(); ++e)
+      state.displacement[e] -= 0.2 * body_.rest[e];  // compressed: indefinite
+    const std::vector<Vec3> step = random_vectors(body_.element_count(), 0.01);
+    stress_ = stored_.cells().predicted_stress(state, step);
+    for (Mechanics* each : {&stored_, &made_})
+      each->assemble(state, {GetParam().project, GetParam().stressed ? &stress_ : nullptr});
+  }
+
+  void expect_same() const {
+    const LinearOperator &a = stored_.tangent(), &b = made_.tangent();
+    ASSERT_NE(dynamic_cast<const CellStiffness*>(&b), nullptr);
+    double largest = 0;
+    for (const Block& block : a.diagonal()) largest = std::max(largest, block.norm());
+    const std::vector<Vec3> x = random_vectors(a.rows(), 1);
+    std::vector<Vec3> stored, made;
+    multiply(a, x, stored);
+    multiply(b, x, made);
+    const std::vector<Block> diagonal = a.diagonal(), other = b.diagonal();
+    for (std::size_t e = 0; e < a.rows(); ++e) {
+      ASSERT_LT((stored[e] - made[e]).norm(), 1e-12 * largest) << e;
+      ASSERT_LT((diagonal[e] - other[e]).norm(), 1e-12 * largest) << e;
+    }
+    std::vector<Block> room;
+    const std::size_t begin = 7, end = a.rows() - 3;
+    const Block* expected = a.blocks(begin, end, room);
+    const Block* found = b.blocks(begin, end, room);
+    for (std::uint64_t q = 0; q < a.row_offsets()[end] - a.row_offsets()[begin]; ++q)
+      ASSERT_LT((expected[q] - found[q]).norm(), 1e-12 * largest) << q;
+  }
+
+  Body body_;
+  Scene scene_;
+  Setting setting_;
+  Mechanics stored_, made_;
+  std::vector<Mat3> stress_;
+};
+
+INSTANTIATE_TEST_SUITE_P(Forms, CellStiffnessOf,
+                         ::testing::Values(Case{false, false, false}, Case{true, false, false},
+                                           Case{true, true, false}, Case{true, false, true},
+                                           Case{true, true, true}));
+
+TEST_P(CellStiffnessOf, IsTheStoredOne) {
+  expect_same();
+}
+
+TEST_P(CellStiffnessOf, IsTheStoredOneWithPrescribedComponentsEliminated) {
+  stored_.eliminate_prescribed();
+  made_.eliminate_prescribed();
+  expect_same();
+}
+
+TEST_P(CellStiffnessOf, HasTheSameBitsForAnyNumberOfThreads) {
+  const std::vector<Vec3> x = random_vectors(body_.element_count(), 1);
+  std::vector<Vec3> one, four;
+  {
+    const ThreadLimit limit(1);
+    multiply(made_.tangent(), x, one);
+  }
+  const ThreadLimit limit(4);
+  multiply(made_.tangent(), x, four);
+  EXPECT_EQ(one, four);
+}
+
+}  // namespace
+}  // namespace flexel
