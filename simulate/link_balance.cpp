@@ -131,7 +131,7 @@ bool Balance::add_column(const Preconditioner& preconditioner, Eigen::Index j, E
   for (std::size_t e = 0; e < pushed.size(); ++e) pushed[e] = (pushed[e] - back[e]) / (2 * step);
   std::vector<Vec3> response(pushed.size(), Vec3::Zero());
   const LinearResult solved = conjugate_gradients(
-      mechanics_.stiffness(), pushed, response, preconditioner, kResponse, kMaxCgIterations,
+      mechanics_.tangent(), pushed, response, preconditioner, kResponse, kMaxCgIterations,
       [&](int iteration, double relative) {
         progress_(fmt::format("rigid link {}, cg {}, {:.0e}", j / 6 + 1, iteration, relative));
       });
@@ -144,7 +144,7 @@ bool Balance::add_column(const Preconditioner& preconditioner, Eigen::Index j, E
   move(along);
   slope.col(j) = (ahead - behind) / (2 * step);
   std::vector<Vec3> resisted(pushed.size());
-  multiply(mechanics_.stiffness(), response, resisted);
+  multiply(mechanics_.tangent(), response, resisted);
   for (std::size_t e = 0; e < pushed.size(); ++e) pushed[e] -= resisted[e];
   response_.push_back(std::move(response));
   left_over_.push_back(std::move(pushed));
@@ -171,12 +171,10 @@ Eigen::MatrixXd Balance::slope() {
     mechanics_.assemble(state_, {project, nullptr});
     mechanics_.eliminate_prescribed();
     const auto preconditioner =
-        aggregation_multigrid(mechanics_.stiffness(), node_geometry(mechanics_.body(), state_));
-    const BlockMatrix& matrix = mechanics_.stiffness();
-    stiff_ = parallel_sum<double>(
-                 matrix.rows(),
-                 [&](std::size_t e) { return matrix.values[diagonal_position(matrix, e)].trace(); }) /
-             (3.0 * static_cast<double>(matrix.rows()));
+        aggregation_multigrid(mechanics_.tangent(), node_geometry(mechanics_.body(), state_));
+    const std::vector<Block> diagonal = mechanics_.tangent().diagonal();
+    stiff_ = parallel_sum<double>(diagonal.size(), [&](std::size_t e) { return diagonal[e].trace(); }) /
+             (3.0 * static_cast<double>(diagonal.size()));
     response_.clear();
     left_over_.clear();
     bool good = true;

@@ -1,5 +1,6 @@
 // Everything that acts on a body in a run: the models of its parts and the passes of its effects, summed up.
 #pragma once
+#include <cassert>
 #include <optional>
 
 #include "simulate/cell_stiffness.h"
@@ -41,8 +42,11 @@ class Mechanics {
   [[nodiscard]] const PaperModel& paper() const { return paper_; }
   // The tangent at the last assemble().
   [[nodiscard]] const LinearOperator& tangent() const { return *tangent_; }
-  // Likewise; has values only where the tangent is stored.
-  [[nodiscard]] const BlockMatrix& stiffness() const { return pattern_.matrix; }
+  // Likewise, where it is stored.
+  [[nodiscard]] const BlockMatrix& stiffness() const {
+    assert(stored_);
+    return pattern_.matrix;
+  }
   [[nodiscard]] const std::vector<Pass>& passes() const { return passes_; }
 
   // Total energy [J]; infinity where a cell or an element has J <= 0.
