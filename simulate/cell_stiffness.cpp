@@ -9,7 +9,7 @@
 
 #include "formats/parallel.h"
 #include "simulate/instruction_set.h"
-#include "simulate/linear/aggregate.h"
+#include "simulate/linear/level.h"
 #include "simulate/prepared_cell.h"
 
 namespace flexel {
@@ -33,28 +33,40 @@ StepLayout layout_of(const Setting& setting) {
   return step_layout(setting, plan);
 }
 
-const std::vector<CoupledElements>& groups_of(const Pass& pass) {
-  return pass.stiffens ? *pass.stiffens : pass.couples;
+// Elements that the passes pull at when all are moved, each its own way, and their neighbours: a tie of a
+// cell may leave some of its corners alone.
+std::vector<std::uint8_t> touched_elements(const Body& body, const BlockMatrix& pattern,
+                                           const std::vector<Pass>& passes) {
+  const std::size_t n = body.element_count();
+  State state{std::vector<Vec3>(n), 1};
+  for (std::size_t e = 0; e < n; ++e)
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      state.displacement[e][static_cast<Eigen::Index>(axis)] = scattered(3 * e + axis);
+  std::vector<Vec3> forces(n, Vec3::Zero());
+  for (const Pass& pass : passes)
+    if (pass.add_stiffness && pass.add_forces) pass.add_forces(state, forces);
+  std::vector<std::uint8_t> touched(n, 0);
+  for (std::size_t e = 0; e < n; ++e)
+    if (forces[e] != Vec3::Zero())
+      for (std::uint64_t q = pattern.row_offsets[e]; q < pattern.row_offsets[e + 1]; ++q)
+        touched[pattern.columns[q]] = 1;
+  return touched;
 }
 
-// A matrix of zeros with a row for every element: each with each of the passes' groups.
-BlockMatrix matrix_of_passes(std::size_t elements, const std::vector<Pass>& passes) {
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
-  for (const Pass& pass : passes)
-    if (pass.add_stiffness)
-      for (const CoupledElements& group : groups_of(pass))
-        for (const std::uint32_t a : group)
-          for (const std::uint32_t b : group) pairs.emplace_back(a, b);
-  std::sort(pairs.begin(), pairs.end());
-  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+// A matrix of zeros with the rows and columns of `pattern` that passes add to.
+BlockMatrix matrix_of_passes(const Body& body, const BlockMatrix& pattern, const std::vector<Pass>& passes) {
   BlockMatrix matrix;
-  matrix.row_offsets.assign(elements + 1, 0);
-  for (const auto& [row, column] : pairs) {
-    ++matrix.row_offsets[row + 1];
-    matrix.columns.push_back(column);
+  matrix.row_offsets.assign(body.element_count() + 1, 0);
+  const auto adds = [](const Pass& pass) { return static_cast<bool>(pass.add_stiffness); };
+  if (std::none_of(passes.begin(), passes.end(), adds)) return matrix;
+  const std::vector<std::uint8_t> touched = touched_elements(body, pattern, passes);
+  for (std::size_t e = 0; e < touched.size(); ++e) {
+    if (touched[e])
+      for (std::uint64_t q = pattern.row_offsets[e]; q < pattern.row_offsets[e + 1]; ++q)
+        if (touched[pattern.columns[q]]) matrix.columns.push_back(pattern.columns[q]);
+    matrix.row_offsets[e + 1] = matrix.columns.size();
   }
-  for (std::size_t e = 0; e < elements; ++e) matrix.row_offsets[e + 1] += matrix.row_offsets[e];
-  matrix.values.assign(pairs.size(), Block::Zero());
+  matrix.values.assign(matrix.columns.size(), Block::Zero());
   return matrix;
 }
 
@@ -69,14 +81,11 @@ constexpr int kStressOf[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}};
 
 }  // namespace
 
-bool CellStiffness::fits(const Setting& setting, const PaperModel& paper, const std::vector<Pass>& passes) {
+bool CellStiffness::fits(const Setting& setting, const PaperModel& paper) {
   const auto cells = [](Model model) { return model == Model::cells; };
   return setting.body.cell_count() > 0 && paper.rows().entries.empty() &&
          std::find(paper.active().begin(), paper.active().end(), 1) == paper.active().end() &&
-         std::all_of(setting.models.begin(), setting.models.end(), cells) &&
-         !RestShapes(setting.body).any() && std::all_of(passes.begin(), passes.end(), [](const Pass& pass) {
-           return !pass.add_stiffness || pass.stiffens || !pass.couples.empty();
-         });
+         std::all_of(setting.models.begin(), setting.models.end(), cells) && !RestShapes(setting.body).any();
 }
 
 CellStiffness::CellStiffness(const Setting& setting, const StiffnessPattern& pattern,
@@ -88,7 +97,7 @@ CellStiffness::CellStiffness(const Setting& setting, const StiffnessPattern& pat
       part_(cell_parts(setting.body)),
       share_(stiffness_shares(setting.body)),
       place_(setting.body.cell_count()),
-      added_(matrix_of_passes(setting.body.element_count(), passes)),
+      added_(matrix_of_passes(setting.body, pattern.matrix, passes)),
       shared_force_(3 * layout_.shared.size()) {
   for (std::size_t block = 0; block < layout_.block_cells.size(); ++block)
     for (std::size_t lane = 0; lane < kLanes; ++lane)

@@ -15,19 +15,23 @@
 
 namespace flexel {
 
+// As stiffness_pattern() of simulate/stiffness.h; the matrix has values only where it is `stored`.
+[[nodiscard]] StiffnessPattern stiffness_pattern(const Body& body, const std::vector<std::uint8_t>& active,
+                                                 const ConnectionRows& connections,
+                                                 const std::vector<CoupledElements>& coupled, bool stored);
+
 class CellStiffness final : public LinearOperator {
  public:
-  // Whether every cell is of model `cells` at the lattice's rest shape, and every pass says between which
-  // elements its stiffness acts.
-  [[nodiscard]] static bool fits(const Setting& setting, const PaperModel& paper,
-                                 const std::vector<Pass>& passes);
+  // Whether every cell is of model `cells` at the lattice's rest shape.
+  [[nodiscard]] static bool fits(const Setting& setting, const PaperModel& paper);
 
   // Keeps references to the setting's body and to `pattern`, whose matrix needs no values.
   CellStiffness(const Setting& setting, const StiffnessPattern& pattern, const std::vector<Pass>& passes);
 
   // Takes up the cells' tangents at `state`, nothing added and nothing eliminated.
   void linearise(const State& state, const TangentOptions& tangent);
-  // What passes add: rows and columns of the elements between which they act. Zero after linearise().
+  // What passes add: rows and columns of the elements that they pull at, and of their neighbours. Zero after
+  // linearise().
   [[nodiscard]] BlockMatrix& added() { return added_; }
   // As eliminate() of simulate/constraints.h does.
   void eliminate_prescribed(const Constraints& constraints);

@@ -37,7 +37,7 @@ Mechanics::Mechanics(const Setting& setting, std::vector<Pass> passes, Stiffness
       paper_(setting),
       stored_(storage == StiffnessStorage::stored ||
               (storage == StiffnessStorage::automatic &&
-               (body_.element_count() <= kStoredElements || !CellStiffness::fits(setting, paper_, passes)))),
+               (body_.element_count() <= kStoredElements || !CellStiffness::fits(setting, paper_)))),
       pattern_(
           stiffness_pattern(setting.body, active_cells(setting), paper_.rows(), coupled(passes), stored_)),
       cells_(setting, pattern_.stencil),
@@ -45,11 +45,24 @@ Mechanics::Mechanics(const Setting& setting, std::vector<Pass> passes, Stiffness
       constraints_(initial_constraints(setting, pattern_.stencil, paper_)) {
   for (const Pass& pass : passes_)
     if (pass.constrain) pass.constrain(constraints_);
+  if (!stored_) make_tangent(setting);
   if (stored_) {
     stored_tangent_ = std::make_unique<StoredMatrix>(pattern_.matrix);
     tangent_ = stored_tangent_.get();
-  } else {
-    tangent_ = &made_.emplace(setting, pattern_, passes_);
+  }
+}
+
+// Where a pass adds to elements that it does not pull at, the matrix is stored after all.
+void Mechanics::make_tangent(const Setting& setting) {
+  tangent_ = &made_.emplace(setting, pattern_, passes_);
+  const State rest{std::vector<Vec3>(body_.element_count(), Vec3::Zero()), 1};
+  try {
+    for (const Pass& pass : passes_)
+      if (pass.add_stiffness) pass.add_stiffness(rest, made_->added());
+  } catch (const MissingBlock&) {
+    made_.reset();
+    stored_ = true;
+    pattern_.matrix.values.assign(pattern_.matrix.columns.size(), Block::Zero());
   }
 }
 

@@ -70,6 +70,7 @@ class Mechanics {
 
  private:
   static std::vector<CoupledElements> coupled(const std::vector<Pass>& passes);
+  void make_tangent(const Setting& setting);
   // Where passes add their stiffness.
   [[nodiscard]] BlockMatrix& added_stiffness() { return made_ ? made_->added() : pattern_.matrix; }
 

@@ -7,6 +7,7 @@
 #include <unordered_map>
 
 #include "formats/parallel.h"
+#include "simulate/cell_stiffness.h"
 
 namespace flexel {
 namespace {
@@ -92,6 +93,12 @@ StiffnessPattern stiffness_pattern(const Body& body, const std::vector<std::uint
     }
   });
   return pattern;
+}
+
+StiffnessPattern stiffness_pattern(const Body& body, const std::vector<std::uint8_t>& active,
+                                   const ConnectionRows& connections,
+                                   const std::vector<CoupledElements>& coupled) {
+  return stiffness_pattern(body, active, connections, coupled, true);
 }
 
 }  // namespace flexel

@@ -31,16 +31,15 @@ struct Stencil {
   }
 };
 
-// The stencil of the cells with active[cell] != 0, and a matrix of zeros with its pattern (without values
-// unless `stored`): a row per element, its diagonal always present. Connected elements, and those of a group
-// of `coupled`, are neighbours as those of one cell are.
+// The stencil of the cells with active[cell] != 0, and a matrix of zeros with its pattern: a row per element,
+// its diagonal always present. Connected elements, and those of a group of `coupled`, are neighbours as those
+// of one cell are.
 struct StiffnessPattern {
   Stencil stencil;
   BlockMatrix matrix;
 };
 [[nodiscard]] StiffnessPattern stiffness_pattern(const Body& body, const std::vector<std::uint8_t>& active,
                                                  const ConnectionRows& connections,
-                                                 const std::vector<CoupledElements>& coupled = {},
-                                                 bool stored = true);
+                                                 const std::vector<CoupledElements>& coupled = {});
 
 }  // namespace flexel

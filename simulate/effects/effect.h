@@ -13,9 +13,6 @@
 //   double energy(const State&) const                                 J
 //   void add_forces(const State&, std::vector<Vec3>&) const           N, minus the energy's derivative
 //   void add_stiffness(const State&, BlockMatrix&) const              N/m, minus the forces' derivative
-//   std::vector<CoupledElements> stiffens() const                     elements among which its stiffness acts
-//                                                                     where it couples none; without either
-//                                                                     the tangent of all cells is stored
 //   void constrain(Constraints&) const                                elements that follow a path exactly
 //   std::vector<CoupledElements> couples() const                      elements between which its forces act;
 //                                                                     they are inner ones then, and hold
@@ -108,10 +105,6 @@ concept Couples = requires(const E& e) {
   { e.couples() } -> std::same_as<std::vector<CoupledElements>>;
 };
 template <class E>
-concept Stiffens = requires(const E& e) {
-  { e.stiffens() } -> std::same_as<std::vector<CoupledElements>>;
-};
-template <class E>
 concept Reports = requires(const E& e, const State& s, const std::vector<Vec3>& u, SimulateResult& r) {
   e.report(s, u, r);
 };
@@ -187,7 +180,6 @@ struct Pass {
   std::function<void(Constraints&)> constrain;
   std::function<void(const State&, const std::vector<Vec3>&, SimulateResult&)> report;
   std::vector<CoupledElements> couples;
-  std::optional<std::vector<CoupledElements>> stiffens;
   std::function<void(StepPlan&)> compose;
   std::function<void(State&)> start;
   std::function<double(const State&)> resistance;
@@ -221,7 +213,6 @@ template <class E>
     pass.add_stiffness = [effect](const State& s, BlockMatrix& m) { effect->add_stiffness(s, m); };
   if constexpr (Constrains<E>) pass.constrain = [effect](Constraints& c) { effect->constrain(c); };
   if constexpr (Couples<E>) pass.couples = effect->couples();
-  if constexpr (Stiffens<E>) pass.stiffens = effect->stiffens();
   if constexpr (Composes<E>) pass.compose = [effect](StepPlan& p) { effect->compose(p); };
   if constexpr (Starts<E>) pass.start = [effect](State& s) { effect->start(s); };
   if constexpr (Resists<E>) {

@@ -247,16 +247,6 @@ void Ties::add_stiffness(const State&, BlockMatrix& matrix) const {
       }
 }
 
-std::vector<CoupledElements> Ties::stiffens() const {
-  std::vector<CoupledElements> groups;
-  for (const TiedElements& tied : tied_) {
-    groups.emplace_back(tied.elements.begin(),
-                        tied.elements.begin() + static_cast<std::ptrdiff_t>(tied.count));
-    std::sort(groups.back().begin(), groups.back().end());
-  }
-  return groups;
-}
-
 void Ties::constrain(Constraints& constraints) const {
   constraints.start = start_;
   if (constraints.mask.empty()) {  // a timed run, where nothing else holds elements

@@ -56,7 +56,6 @@ class Ties {
   [[nodiscard]] double energy(const State& state) const;
   void add_forces(const State& state, std::vector<Vec3>& forces) const;
   void add_stiffness(const State& state, BlockMatrix& matrix) const;
-  [[nodiscard]] std::vector<CoupledElements> stiffens() const;
   void constrain(Constraints& constraints) const;
   // Reactions: penalty forces, and minus the unbalanced forces on eliminated elements.
   void report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) const;

@@ -251,7 +251,7 @@ std::vector<Graph> coupled_rows(const LinearOperator& matrix, std::span<const do
   std::vector<std::vector<std::vector<std::uint32_t>>> found(thresholds.size(),
                                                              std::vector<std::vector<std::uint32_t>>(chunks));
   parallel_chunks(n, kGrain, [&](std::size_t begin, std::size_t end) {
-    std::vector<Block> room;
+    thread_local std::vector<Block> room;
     const Block* block = matrix.blocks(begin, end, room);
     for (std::size_t i = begin; i < end; ++i)
       for (std::uint64_t q = offsets[i]; q < offsets[i + 1]; ++q) {

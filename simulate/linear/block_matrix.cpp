@@ -48,7 +48,7 @@ std::size_t position_of(const BlockMatrix& matrix, std::size_t row, std::uint32_
   const auto begin = matrix.columns.begin() + static_cast<std::ptrdiff_t>(matrix.row_offsets[row]);
   const auto end = matrix.columns.begin() + static_cast<std::ptrdiff_t>(matrix.row_offsets[row + 1]);
   const auto found = std::lower_bound(begin, end, column);
-  assert(found != end && *found == column);
+  if (found == end || *found != column) throw MissingBlock("no block at that place of the matrix");
   return static_cast<std::size_t>(found - matrix.columns.begin());
 }
 

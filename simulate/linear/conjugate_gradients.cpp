@@ -45,7 +45,7 @@ double rounding_level(const LinearOperator& matrix, const Vector& x) {
       chunks,
       [&](std::size_t chunk) {
         const std::size_t begin = chunk * kGrain, end = std::min(matrix.rows(), begin + kGrain);
-        std::vector<Block> room;
+        thread_local std::vector<Block> room;
         const Block* block = matrix.blocks(begin, end, room);
         double sum_of_squares = 0;
         for (std::size_t row = begin; row < end; ++row) {

@@ -1,9 +1,11 @@
-// The sums of small blocks that the Galerkin product consists of, as plain data; linear/kernel_galerkin.cpp
-// is compiled once per instruction set (the reasons are in simulate/time/kernel.h). R: unknowns of a fine
-// node, 3 or 6. Blocks of P are transposed (6 x R), column-major, and may be read two floats past their end.
-// Rows of six are kept eight doubles wide, of which the last two mean nothing.
+// The sums of small blocks that the Galerkin product and the transfers between two levels consist of, as
+// plain data; linear/kernel_galerkin.cpp is compiled once per instruction set (the reasons are in
+// simulate/time/kernel.h). R: unknowns of a fine node, 3 or 6. Blocks of P are transposed (6 x R),
+// column-major, and may be read two floats past their end. Rows of six are kept eight doubles wide, of which
+// the last two mean nothing.
 #pragma once
 #include <cstddef>
+#include <cstdint>
 
 namespace flexel::galerkin_kernel {
 
@@ -23,10 +25,17 @@ struct Pair {
   double* sum;
 };
 
-// One after the other, for R = 3 and 6.
+// For R = 3 and 6.
 struct Table {
+  // one after the other
   void (*products[2])(const Product* list, std::size_t count);
   void (*pairs[2])(const Pair* list, std::size_t count);
+  // One row of P^T r: sum (6) = sum over t of the block at positions[t] times the entry rows[t] of r.
+  void (*restrictions[2])(const float* blocks, const std::uint64_t* positions, const std::uint32_t* rows,
+                          std::size_t count, const double* r, double* sum);
+  // One row of P c: adds to x (R) the blocks, transposed, times the entries columns[t] of c.
+  void (*prolongations[2])(const float* blocks, const std::uint32_t* columns, std::size_t count,
+                           const double* c, double* x);
 };
 
 [[nodiscard]] const Table& portable();

@@ -163,15 +163,13 @@ void restrict_residual(const View& matrix, const Level<R>& level, const double* 
     entry<R>(work, i) = entry<R>(b, i) - product;
   });
   const Transfer<R>& t = level.transfer;
+  const auto one_row = galerkin_table().restrictions[R / 6];
   parallel_for_each(
       t.coarse_rows,
       [&](std::size_t a) {
-        Eigen::Matrix<double, 6, 1> sum = Eigen::Matrix<double, 6, 1>::Zero();
-        for (std::uint64_t q = t.transposed_offsets[a]; q < t.transposed_offsets[a + 1]; ++q) {
-          sum.noalias() += t.values[t.transposed_positions[q]].template cast<double>() *
-                           entry<R>(work, t.transposed_rows[q]);
-        }
-        entry<6>(coarse, a) = sum;
+        const std::uint64_t first = t.transposed_offsets[a];
+        one_row(t.values.front().data(), t.transposed_positions.data() + first,
+                t.transposed_rows.data() + first, t.transposed_offsets[a + 1] - first, work, coarse + 6 * a);
       },
       32);
 }
@@ -180,13 +178,11 @@ void restrict_residual(const View& matrix, const Level<R>& level, const double* 
 template <int R>
 void prolong(const Level<R>& level, const double* coarse, double* x) {
   const Transfer<R>& t = level.transfer;
+  const auto one_row = galerkin_table().prolongations[R / 6];
   parallel_for_each(t.pattern.offsets.size() - 1, [&](std::size_t i) {
-    Eigen::Matrix<double, R, 1> sum = Eigen::Matrix<double, R, 1>::Zero();
-    for (std::uint64_t q = t.pattern.offsets[i]; q < t.pattern.offsets[i + 1]; ++q) {
-      sum.noalias() +=
-          t.values[q].template cast<double>().transpose() * entry<6>(coarse, t.pattern.columns[q]);
-    }
-    entry<R>(x, i) += sum;
+    const std::uint64_t first = t.pattern.offsets[i];
+    one_row(t.values.front().data() + 6 * R * first, t.pattern.columns.data() + first,
+            t.pattern.offsets[i + 1] - first, coarse, x + R * i);
   });
 }
 

@@ -3,11 +3,17 @@
 #pragma once
 #include <cstdint>
 #include <span>
+#include <stdexcept>
 #include <vector>
 
 #include "simulate/linear/block_matrix.h"
 
 namespace flexel {
+
+// What position_of() throws where there is no block: our own fault, unless it is asked for (Mechanics).
+struct MissingBlock : std::logic_error {
+  using std::logic_error::logic_error;
+};
 
 class LinearOperator {
  public:

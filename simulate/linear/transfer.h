@@ -176,7 +176,7 @@ void smooth_prolongator(const View& matrix, const std::vector<Inverse>& inverse_
   transfer.values.back().setZero();
   parallel_chunks(matrix.rows(), 256, [&](std::size_t begin, std::size_t end) {
     std::vector<Transposed> sums;
-    std::vector<Block> room;
+    thread_local std::vector<Block> room;
     const auto* blocks = row_blocks(matrix, begin, end, room) - matrix.offsets[begin];
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint64_t first = transfer.pattern.offsets[i];
@@ -204,19 +204,31 @@ template <int R, class View>
   const Pattern& p = transfer.pattern;
   return collect_pattern(transfer.coarse_rows, 64, [&](std::size_t coarse, std::vector<std::uint32_t>& out) {
     // Nodes coupled with the support of P's column, each once; then the aggregates that they reach.
-    std::vector<std::uint32_t> nodes;
+    thread_local std::vector<std::uint8_t> seen;  // all 0 between two uses
+    thread_local std::vector<std::uint32_t> nodes;
+    if (seen.size() < matrix.rows()) seen.resize(matrix.rows(), 0);
+    nodes.clear();
     for (std::uint64_t t = transfer.transposed_offsets[coarse]; t < transfer.transposed_offsets[coarse + 1];
          ++t) {
       const std::uint32_t i = transfer.transposed_rows[t];
-      nodes.insert(nodes.end(), matrix.columns.begin() + static_cast<std::ptrdiff_t>(matrix.offsets[i]),
-                   matrix.columns.begin() + static_cast<std::ptrdiff_t>(matrix.offsets[i + 1]));
+      for (std::uint64_t q = matrix.offsets[i]; q < matrix.offsets[i + 1]; ++q) {
+        const std::uint32_t j = matrix.columns[q];
+        if (seen[j]) continue;
+        seen[j] = 1;
+        nodes.push_back(j);
+      }
     }
-    std::sort(nodes.begin(), nodes.end());
-    nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+    thread_local std::vector<std::uint8_t> reached;  // likewise
+    if (reached.size() < transfer.coarse_rows) reached.resize(transfer.coarse_rows, 0);
     for (const std::uint32_t j : nodes) {
-      out.insert(out.end(), p.columns.begin() + static_cast<std::ptrdiff_t>(p.offsets[j]),
-                 p.columns.begin() + static_cast<std::ptrdiff_t>(p.offsets[j + 1]));
+      seen[j] = 0;
+      for (std::uint64_t s = p.offsets[j]; s < p.offsets[j + 1]; ++s) {
+        if (reached[p.columns[s]]) continue;
+        reached[p.columns[s]] = 1;
+        out.push_back(p.columns[s]);
+      }
     }
+    for (const std::uint32_t a : out) reached[a] = 0;
   });
 }
 
@@ -238,7 +250,7 @@ void product_rows(const View& matrix, const Transfer<R>& transfer, std::size_t b
     thread_local std::vector<std::uint32_t> slot;  // kNoAggregate between two uses
     thread_local std::vector<galerkin_kernel::Product> products;
     if (slot.size() < transfer.coarse_rows) slot.resize(transfer.coarse_rows, kNoAggregate);
-    std::vector<Block> room;
+    thread_local std::vector<Block> room;
     const std::size_t first = begin + chunk_begin;
     const auto* blocks = row_blocks(matrix, first, begin + chunk_end, room) - matrix.offsets[first];
     for (std::size_t r = chunk_begin; r < chunk_end; ++r) {

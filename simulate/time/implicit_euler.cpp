@@ -29,7 +29,7 @@ ImplicitEuler::ImplicitEuler(const Setting& setting, const std::vector<Pass>& pa
       tolerance_(tolerance),
       outer_passes_(passes.size()),
       reach_(std::numeric_limits<double>::infinity()),
-      mechanics_(setting, all_passes(passes)) {
+      mechanics_(setting, all_passes(passes), StiffnessStorage::stored) {
   if (damped_) damping_matrix_ = mechanics_.stiffness();
 }
 
