@@ -8,6 +8,7 @@
 #include <algorithm>
 
 #include "formats/parallel.h"
+#include "simulate/fold_barrier.h"
 #include "simulate/instruction_set.h"
 #include "simulate/linear/level.h"
 #include "simulate/prepared_cell.h"
@@ -94,6 +95,7 @@ CellStiffness::CellStiffness(const Setting& setting, const StiffnessPattern& pat
       pattern_(pattern),
       layout_(layout_of(setting)),
       kernels_(&product_table()),
+      active_(active_cells(setting)),
       part_(cell_parts(setting.body)),
       share_(stiffness_shares(setting.body)),
       place_(setting.body.cell_count()),
@@ -105,9 +107,8 @@ CellStiffness::CellStiffness(const Setting& setting, const StiffnessPattern& pat
         place_[cell] = static_cast<std::uint32_t>(block * kLanes + lane);
   for (std::size_t p = 0; p < body_.parts.size(); ++p) {
     Lattice straight = body_.parts[p].lattice;
-    PartKind made{{}, straight.axes, {}};
-    const CellKind turned = cell_kind(straight, setting.materials[p]);
-    for (std::size_t ab = 0; ab < 64; ++ab) made.at_rest[ab] = tangent_block(turned, {}, ab / 8, ab % 8);
+    PartKind made{{}, cell_kind(straight, setting.materials[p]), straight.axes, {}};
+    for (std::size_t ab = 0; ab < 64; ++ab) made.at_rest[ab] = tangent_block(made.turned, {}, ab / 8, ab % 8);
     straight.axes = Mat3::Identity();
     made.kind = cell_kind(straight, setting.materials[p]);
     kinds_.push_back(made);
@@ -143,8 +144,35 @@ void CellStiffness::prepare_lane(std::uint32_t cell, const State& state, const T
   to[kLanes * 9] = prepared.coupling;
 }
 
+void CellStiffness::find_folding(const State& state, bool project) {
+  constexpr std::size_t kGrain = 4096;
+  std::vector<std::vector<Folding>> found((body_.cell_count() + kGrain - 1) / kGrain);
+  parallel_chunks(body_.cell_count(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t c = begin; c < end; ++c) {
+      if (!active_[c]) continue;
+      const CellKind& kind = kinds_[part_[c]].turned;
+      CellVectors u;
+      for (std::size_t a = 0; a < 8; ++a) u[a] = state.displacement[body_.cell_elements[c][a]];
+      if (far_from_folding(kind, u)) continue;
+      auto blocks = fold_tangent(kind, fold_thresholds(kind, std::nullopt), u, project);
+      if (!blocks) continue;
+      for (Block& block : *blocks) block *= share_[c];
+      found[begin / kGrain].push_back({static_cast<std::uint32_t>(c), *blocks});
+    }
+  });
+  for (const std::vector<Folding>& chunk : found) folding_.insert(folding_.end(), chunk.begin(), chunk.end());
+}
+
+// Null where it does not fold.
+const FoldTangent* CellStiffness::folding_of(std::uint32_t cell) const {
+  const auto at = std::lower_bound(folding_.begin(), folding_.end(), cell,
+                                   [](const Folding& each, std::uint32_t c) { return each.cell < c; });
+  return at != folding_.end() && at->cell == cell ? &at->blocks : nullptr;
+}
+
 void CellStiffness::linearise(const State& state, const TangentOptions& tangent) {
   std::fill(added_.values.begin(), added_.values.end(), Block::Zero());
+  folding_.clear();
   mask_.clear();
   held_.clear();
   const bool rest = std::all_of(state.displacement.begin(), state.displacement.end(),
@@ -158,6 +186,7 @@ void CellStiffness::linearise(const State& state, const TangentOptions& tangent)
     tangents_.shrink_to_fit();
     return;
   }
+  find_folding(state, tangent.project);
   parallel_for_each(
       layout_.blocks.size(),
       [&](std::size_t block) {
@@ -228,6 +257,12 @@ void CellStiffness::multiply(const double* x, double* y) const {
     from = masked_.data();
   }
   products_of_cells(from, y);
+  for (const Folding& each : folding_) {
+    const auto& elements = body_.cell_elements[each.cell];
+    for (std::size_t ab = 0; ab < 64; ++ab)
+      Eigen::Map<Vec3>(y + 3 * std::size_t{elements[ab / 8]}) +=
+          each.blocks[ab] * Eigen::Map<const Vec3>(from + 3 * std::size_t{elements[ab % 8]});
+  }
   parallel_for_each(added_rows_.size(), [&](std::size_t r) {
     const std::size_t row = added_rows_[r];
     Vec3 sum = Vec3::Zero();
@@ -328,6 +363,11 @@ const Block* CellStiffness::blocks(std::size_t begin, std::size_t end, std::vect
       for (std::size_t b = 0; b < 8; ++b) row[slot[b]] += own[b];
     }
     turn(e, row, row_offsets()[e + 1] - row_offsets()[e]);
+    if (!folding_.empty())
+      for (const Incidence& at : pattern_.stencil.of(static_cast<std::uint32_t>(e)))
+        if (const FoldTangent* blocks = folding_of(at.cell))
+          for (std::size_t b = 0; b < 8; ++b)
+            row[pattern_.stencil.slot[at.cell][8 * at.corner + b]] += (*blocks)[8 * at.corner + b];
     add_effects(e, row);
     if (!mask_.empty()) eliminate_row(e, row);
   }
@@ -343,6 +383,9 @@ std::vector<Block> CellStiffness::diagonal() const {
       diagonal[e] += own[at.corner];
     }
     turn(e, &diagonal[e], 1);
+    if (!folding_.empty())
+      for (const Incidence& at : pattern_.stencil.of(static_cast<std::uint32_t>(e)))
+        if (const FoldTangent* blocks = folding_of(at.cell)) diagonal[e] += (*blocks)[9 * at.corner];
     if (added_.row_offsets[e + 1] > added_.row_offsets[e])
       diagonal[e] += added_.values[diagonal_position(added_, e)];
     if (!mask_.empty() && mask_[e])

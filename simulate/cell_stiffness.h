@@ -49,10 +49,19 @@ class CellStiffness final : public LinearOperator {
   // What the cells of a part have in common, lattice frame but for `at_rest`.
   struct PartKind {
     CellKind kind;
+    CellKind turned;  // the same in the world's frame
     Mat3 axes;
     std::array<Block, 64> at_rest;  // blocks (a, b) of a whole cell at rest, world frame [N/m]
   };
 
+  // A cell near folding (simulate/fold_barrier.h): blocks of its barrier, its share taken in.
+  struct Folding {
+    std::uint32_t cell = 0;
+    FoldTangent blocks;
+  };
+
+  void find_folding(const State& state, bool project);
+  [[nodiscard]] const FoldTangent* folding_of(std::uint32_t cell) const;
   void prepare_lane(std::uint32_t cell, const State& state, const TangentOptions& tangent, double* to) const;
   void products_of_cells(const double* x, double* y) const;
   // Blocks (a, b) of a cell for b in [begin, end), a its corner at the element, into out[b]; deformed ones in
@@ -69,11 +78,13 @@ class CellStiffness final : public LinearOperator {
   StepLayout layout_;
   const step::ProductTable* kernels_;
   std::vector<PartKind> kinds_;       // (parts)
+  std::vector<std::uint8_t> active_;  // (cells) 1: resists
   std::vector<std::uint32_t> part_;   // (cells)
   std::vector<double> share_;         // (cells) of the stiffness of a whole cell of its material
   std::vector<std::uint32_t> place_;  // (cells) block x kLanes + lane
   step::TangentForm form_ = step::TangentForm::at_rest;
   std::vector<double> tangents_;  // by block: columns of kLanes
+  std::vector<Folding> folding_;  // ascending
   BlockMatrix added_;
   std::vector<std::uint32_t> added_rows_;              // those of `added_` with blocks
   std::vector<std::uint8_t> mask_;                     // (elements) prescribed components; empty: none
