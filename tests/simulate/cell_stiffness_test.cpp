@@ -127,7 +127,9 @@ INSTANTIATE_TEST_SUITE_P(Forms, CellStiffnessOf,
                                            Case{0.035, 0, true, true}));
 
 TEST_P(CellStiffnessOf, IsTheStoredOne) {
-  if (GetParam().size == kFolding.size) EXPECT_LT(corner_, 0.1);
+  if (GetParam().size == kFolding.size) {
+    EXPECT_LT(corner_, 0.1);
+  }
   expect_same();
 }
 
