@@ -74,9 +74,13 @@ void FoldGuard::look(const State& state, double ahead) {
     });
     for (std::uint32_t c = part.cell_begin; c < part.cell_end; ++c) {
       if (!folds[c]) continue;
-      watched_.push_back({c, p, body.fill[c] * (change ? 1 + (*change)[c] : 1), thresholds(c), {}, 0});
-      least_seen_ = std::min(least_seen_, nearest_to_folding(kinds_[p], watched_.back().thresholds,
-                                                             corners(c, state.displacement)));
+      Watched& at = watched_.emplace_back();
+      at.cell = c;
+      at.part = p;
+      at.share = body.fill[c] * (change ? 1 + (*change)[c] : 1);
+      at.thresholds = thresholds(c);
+      least_seen_ =
+          std::min(least_seen_, nearest_to_folding(kinds_[p], at.thresholds, corners(c, state.displacement)));
     }
   }
   least_seen_ = std::min(least_seen_, 1 / (1 - kLoss));
