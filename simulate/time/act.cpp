@@ -268,7 +268,10 @@ Act::Memory Act::memory() const {
   Memory memory;
   memory.cells = stepper_->memory();
   if (implicit_) memory.damping_change = implicit_->change();
-  if (euler_) memory.reach = euler_->reach();
+  if (euler_) {
+    memory.reach = euler_->reach();
+    memory.supports = euler_->supports();
+  }
   for (const Pass& pass : passes_)
     memory.passes.push_back(pass.memory ? pass.memory() : std::vector<double>());
   return memory;
@@ -287,14 +290,17 @@ void Act::restore(const Memory& memory) {
   if (memory.cells.fill.size() != own.fill.size() || memory.cells.plastic.size() != own.plastic.size() ||
       memory.cells.springs.size() != own.springs.size() ||
       memory.cells.spring_flow.size() != own.spring_flow.size() ||
-      (change != 0 && (!implicit_ || change != body_.element_count())))
+      (change != 0 && (!implicit_ || change != body_.element_count())) ||
+      (!memory.supports.empty() && (!euler_ || memory.supports.size() != body_.element_count())))
     throw InputError("the checkpoint's memory is not that of its scene and body: it is damaged");
   stepper_->restore(memory.cells);
   stepper_->mark_broken(body_.broken);
   for (std::size_t p = 0; p < passes_.size() && p < memory.passes.size(); ++p)
     if (passes_[p].restore) passes_[p].restore(memory.passes[p]);
   if (implicit_) implicit_->set_change(memory.damping_change);
-  if (euler_) euler_->set_reach(memory.reach);
+  if (!euler_) return;
+  euler_->set_reach(memory.reach);
+  euler_->set_supports(memory.supports);
 }
 
 void Act::step(Clock& clock, History* history, bool row) {

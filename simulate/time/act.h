@@ -71,6 +71,7 @@ class Act {
     Stepper::Memory cells;
     std::vector<Vec3> damping_change;         // m/s, of ImplicitDamping
     double reach = 0;                         // s, of ImplicitEuler
+    std::vector<Vec3> supports;               // N, of its last step
     std::vector<std::vector<double>> passes;  // what each remembers
   };
   [[nodiscard]] Memory memory() const;

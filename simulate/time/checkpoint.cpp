@@ -152,6 +152,7 @@ void visit(Archive& archive, Checkpoint& c) {
   visit(archive, c.memory.cells.spring_flow);
   visit(archive, c.memory.damping_change);
   visit(archive, c.memory.reach);
+  visit(archive, c.memory.supports);
   visit(archive, c.events);
   visit(archive, c.settled);
   visit(archive, c.fused);

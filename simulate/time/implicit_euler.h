@@ -48,6 +48,8 @@ class ImplicitEuler {
   [[nodiscard]] const std::vector<Vec3>& moved() const { return moved_; }
   [[nodiscard]] std::vector<Vec3> damping_force() const;
   [[nodiscard]] const std::vector<Vec3>& supports() const { return supports_; }
+  // As another run's last advance left them.
+  void set_supports(std::vector<Vec3> supports) { supports_ = std::move(supports); }
   // J, what the method itself took: 1/2 |v - v-|^2_M, and what the elastic energy fell short of its work
   // E- - E + grad E(u) . (u - u-). `state`: after the advance.
   [[nodiscard]] double numerical_dissipation(const State& state);
