@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <map>
 #include <numbers>
 #include <random>
 
@@ -195,43 +194,6 @@ TEST(Contact, ABallTouchesAPlaneAndABlockWhereItsSurfaceIs) {
     append(body, std::move(alone));
     EXPECT_NEAR(first_touch(body, 0), 0, 0.1 * kSide) << shift;
   }
-}
-
-// A block whose surface is cut along its cells, so that blocks side by side share vertices.
-Body cut_block(const std::string& name, std::array<int, 3> cells, const Vec3& origin) {
-  std::map<std::array<int, 3>, std::uint32_t> numbers;
-  std::vector<Vec3> vertices;
-  std::vector<std::vector<std::uint32_t>> polygons;
-  for (int axis = 0; axis < 3; ++axis)
-    for (const int side : {0, 1}) {
-      const auto u = static_cast<std::size_t>((axis + 1) % 3), v = static_cast<std::size_t>((axis + 2) % 3);
-      for (int a = 0; a < cells[u]; ++a)
-        for (int b = 0; b < cells[v]; ++b) {
-          std::vector<std::uint32_t> quad;
-          for (const auto& [du, dv] : {std::pair{0, 0}, {1, 0}, {1, 1}, {0, 1}}) {
-            std::array<int, 3> corner{};
-            corner[static_cast<std::size_t>(axis)] = side * cells[static_cast<std::size_t>(axis)];
-            corner[u] = a + du;
-            corner[v] = b + dv;
-            const auto [entry, fresh] =
-                numbers.try_emplace(corner, static_cast<std::uint32_t>(vertices.size()));
-            if (fresh) vertices.push_back(origin + kSide * Vec3(corner[0], corner[1], corner[2]));
-            quad.push_back(entry->second);
-          }
-          if (side == 0) std::reverse(quad.begin(), quad.end());
-          polygons.push_back(quad);
-        }
-    }
-  return within_block(block(name, cells, origin), vertices, polygons);
-}
-
-TEST(Contact, BlocksThatLieFlushFeelNothing) {
-  Body body = cut_block("a", {3, 3, 2}, Vec3::Zero());
-  append(body, cut_block("b", {3, 3, 2}, Vec3(3 * kSide, 0, 0)));
-  append(body, cut_block("c", {3, 3, 4}, Vec3(0, 3 * kSide, 0)));
-  const Setting setting = setting_of(body);
-  Contacts contacts(all_parts(body), setting);
-  EXPECT_LT(contacts.energy(at_rest(body)), 1e-20);
 }
 
 }  // namespace
