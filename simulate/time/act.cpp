@@ -24,6 +24,13 @@ constexpr int kFailures = 30;         // of Newton's method within an implicit s
 constexpr std::uint64_t kRenew = 10;  // implicit steps that one tangent may serve
 constexpr double kRunaway = 1e4;      // of the body's diagonal: a displacement that no scene means
 
+bool has_cells_of_model_cells(const Setting& setting) {
+  const auto is_springs = [](Model model) { return model == Model::springs; };
+  return setting.body.cell_count() > 0 &&
+         !(setting.models.size() == setting.body.parts.size() &&
+           std::all_of(setting.models.begin(), setting.models.end(), is_springs));
+}
+
 }  // namespace
 
 Act::Act(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress,
@@ -63,7 +70,7 @@ Act::Act(Body& body, const Scene& scene, const SimulateOptions& options, Progres
   make_forces();
   if (implicit)
     make_implicit();
-  else if (body.cell_count() > 0)
+  else if (has_cells_of_model_cells(setting_))
     guard_.emplace(setting_);
 }
 
