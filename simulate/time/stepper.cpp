@@ -10,24 +10,18 @@
 
 #include "formats/error.h"
 #include "formats/parallel.h"
+#include "simulate/instruction_set.h"
 
 namespace flexel {
 namespace {
-
-#if defined(__x86_64__)
-bool has_avx512() {
-  return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-         __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw");
-}
-#endif
 
 // Those that this machine runs, the best one first. The others are not so much as asked for: what fills in a
 // table is compiled for its instruction set too.
 std::vector<const step::KernelTable*> tables() {
   std::vector<const step::KernelTable*> found;
 #if defined(__x86_64__)
-  if (has_avx512()) found.push_back(&step::kernels_avx512());
-  if (__builtin_cpu_supports("avx2")) found.push_back(&step::kernels_avx2());
+  if (runs(InstructionSet::avx512)) found.push_back(&step::kernels_avx512());
+  if (runs(InstructionSet::avx2)) found.push_back(&step::kernels_avx2());
 #endif
   found.push_back(&step::kernels_portable());
   return found;
