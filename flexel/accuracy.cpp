@@ -19,10 +19,11 @@ namespace {
 
 constexpr double kConfirmed = 1.25, kUnconfirmed = 3;
 constexpr double kLeastOrder = 1, kMostOrder = 2, kUsualOrder = 1.5;
+constexpr double kMostConfirmed = 2.1;                // a higher order is chance (simulate/estimate.h)
 constexpr double kAim = 0.7;                          // of the error asked for, when the next size is chosen
 constexpr double kLeastStep = 1.25, kMostStep = 1.7;  // between the spacings of two runs
 constexpr int kFinerRuns = 4, kFailures = 3;
-constexpr double kUsualLimit = 600;   // s, without --within
+constexpr double kUsualLimit = 180;   // s, without --within
 constexpr double kMemoryShare = 0.8;  // of what is free
 constexpr double kTimeMargin = 0.85;  // of the time left: predictions are good to about that
 constexpr double kSmall = 1e-3;       // of the largest displacement: a probe that hardly moves
@@ -48,7 +49,8 @@ class Quantities {
  public:
   explicit Quantities(bool driven) : driven_(driven) {}
 
-  // Of every run the displacement at the vertex that moves most in the last one, along that.
+  // The probes; where none moves, of every run the displacement at the vertex that moves most in the last
+  // one, along that.
   [[nodiscard]] std::vector<Quantity> of(const SolvedRun& run, const SolvedRun& last) const {
     std::vector<Quantity> found;
     std::size_t most = 0;
@@ -58,9 +60,6 @@ class Quantities {
     const auto along = [](const Vec3& moved, const Vec3& direction) {
       return direction.norm() > 0 ? moved.dot(direction.normalized()) : moved.norm();
     };
-    if (!last.mapped.empty())
-      found.push_back({"largest displacement", along(run.mapped[most], last.mapped[most]),
-                       bar_of(run, ErrorBar::Of::largest_displacement, 0)});
     for (std::size_t p = 0; p < last.simulated.probes.size(); ++p) {
       const Vec3& direction = last.simulated.probes[p].displacement;
       if (direction.norm() < kSmall * largest) continue;
@@ -68,6 +67,9 @@ class Quantities {
                        along(run.simulated.probes[p].displacement, direction),
                        bar_of(run, ErrorBar::Of::probe, p)});
     }
+    if (found.empty() && !last.mapped.empty())
+      found.push_back({"largest displacement", along(run.mapped[most], last.mapped[most]),
+                       bar_of(run, ErrorBar::Of::largest_displacement, 0)});
     if (driven_ && last.simulated.elastic_energy > 0)
       found.push_back(
           {"elastic energy", run.simulated.elastic_energy, bar_of(run, ErrorBar::Of::elastic_energy, 0)});
@@ -75,10 +77,9 @@ class Quantities {
   }
 
  private:
-  // Bars with an observed order only: the others are three times a difference that coarse lattices make.
   [[nodiscard]] static std::optional<Bar> bar_of(const SolvedRun& run, ErrorBar::Of of, std::size_t probe) {
     for (const ErrorBar& each : run.simulated.error_bars.bars)
-      if (each.of == of && each.probe == probe && each.bar.order) return each.bar;
+      if (each.of == of && each.probe == probe) return each.bar;
     return std::nullopt;
   }
   bool driven_;
@@ -96,31 +97,46 @@ double spacing_of(const SolvedRun& run) {
   return std::exp(sum / static_cast<double>(run.voxels.body.parts.size()));
 }
 
+// The ratio of the spacings of run i and the next, finer one.
+double ratio_after(const std::vector<SolvedRun>& runs, std::size_t i) {
+  return spacing_of(runs[i]) / spacing_of(runs[i + 1]);
+}
+
+// Of one quantity; `coarser` is that of the run before the coarse one, where there is one. A bar of the run
+// itself speaks of its own lattice made coarser, the runs of lattices laid anew: neither is believed to be
+// nearer than the other says.
+Judged judge(const Quantity& fine, const Quantity& coarse, const Quantity* coarser,
+             const std::array<double, 2>& ratio) {
+  const double step = std::abs(fine.value - coarse.value);
+  Judged found{kUnconfirmed * step / (ratio[0] - 1), kLeastOrder, fine.name};
+  const auto confirmed = [](const std::optional<double>& order) { return order && *order <= kMostConfirmed; };
+  if (fine.bar && confirmed(fine.bar->order)) {
+    found.order = std::clamp(*fine.bar->order, kLeastOrder, kMostOrder);
+    found.error = kConfirmed * step / (std::pow(ratio[0], found.order) - 1);
+  }
+  if (coarser != nullptr)
+    if (const Bar three = richardson({{fine.value, coarse.value, coarser->value}, ratio}); three.order) {
+      found.error = three.half_width;
+      found.order = std::clamp(*three.order, kLeastOrder, kMostOrder);
+    }
+  if (fine.bar) found.error = std::max(found.error, fine.bar->half_width);
+  found.error /= std::abs(fine.value);
+  return found;
+}
+
 // The error of the last of the runs, from it and the one or two before it.
 std::optional<Judged> judge(const std::vector<SolvedRun>& runs, const Quantities& quantities) {
-  if (runs.size() < 2) return std::nullopt;
-  const SolvedRun& last = runs.back();
   const std::size_t n = runs.size();
-  const double ratio = spacing_of(runs[n - 2]) / spacing_of(last);
-  if (!(ratio > 1)) return std::nullopt;
+  if (n < 2 || !(ratio_after(runs, n - 2) > 1)) return std::nullopt;
+  const SolvedRun& last = runs.back();
+  const bool three = n > 2 && ratio_after(runs, n - 3) > 1;
+  const std::array<double, 2> ratio = {ratio_after(runs, n - 2), three ? ratio_after(runs, n - 3) : 0};
   const std::vector<Quantity> fine = quantities.of(last, last), coarse = quantities.of(runs[n - 2], last);
-  const std::vector<Quantity> coarser = n > 2 ? quantities.of(runs[n - 3], last) : std::vector<Quantity>{};
+  const std::vector<Quantity> coarser = three ? quantities.of(runs[n - 3], last) : std::vector<Quantity>{};
   std::optional<Judged> worst;
   for (std::size_t q = 0; q < fine.size(); ++q) {
     if (!(std::abs(fine[q].value) > 0)) continue;
-    const double step = std::abs(fine[q].value - coarse[q].value);
-    Judged each{kUnconfirmed * step / (ratio - 1), kLeastOrder, fine[q].name};
-    std::optional<double> order = fine[q].bar ? fine[q].bar->order : std::nullopt;
-    if (!order && !coarser.empty()) {
-      const double second = spacing_of(runs[n - 3]) / spacing_of(runs[n - 2]);
-      order = richardson({{fine[q].value, coarse[q].value, coarser[q].value}, {ratio, second}}).order;
-    }
-    if (order) {
-      each.order = std::clamp(*order, kLeastOrder, kMostOrder);
-      each.error = kConfirmed * step / (std::pow(ratio, each.order) - 1);
-    }
-    if (fine[q].bar) each.error = std::max(each.error, fine[q].bar->half_width);
-    each.error /= std::abs(fine[q].value);
+    const Judged each = judge(fine[q], coarse[q], three ? &coarser[q] : nullptr, ratio);
     if (!worst || each.error > worst->error) worst = each;
   }
   return worst;
@@ -218,6 +234,8 @@ class Search {
     tried.cells = runs_.back().voxels.body.cell_count();
     tried.seconds = total;
     tried.memory = observed.program_memory[0];
+    for (const Quantity& each : quantities_.of(runs_.back(), runs_.back()))
+      tried.found.emplace_back(each.name, each.value);
     if (judged_) {
       tried.error = judged_->error;
       tried.of = judged_->of;
@@ -338,6 +356,7 @@ std::string AccuracyReport::json() const {
                             {"predicted_seconds", json_of(each.predicted_seconds)},
                             {"predicted_memory", json_of(each.predicted_memory)},
                             {"error", json_of(each.error)},
+                            {"quantities", each.found},
                             {"failure", each.failure}});
   json["sentence"] = sentence();
   return json.dump();

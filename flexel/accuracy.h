@@ -1,18 +1,20 @@
 // `flexel deform --accuracy 2%` and `--within 10s`: the resolution and the mapping method are chosen from
 // cheap runs (docs/deform.md, "How exact, how long").
 //
-// What is asked of every run: the displacement of the vertex that moves most, those of the scene's probes,
-// and, where a move drives the part, the elastic energy. The error of run i beside the coarser run i - 1 at
-// the ratio r of their spacings is
-//     confirmed order p (the run's own error bars or three runs): 1.25 |f_i - f_(i-1)| / (r^p - 1)
-//     else                                                        3    |f_i - f_(i-1)| / (r - 1)
-// (the grid convergence index with the safety factors of Roache, J. Fluids Eng. 116, 1994), and never less
-// than a confirmed error bar of the run itself. Which of the quantities is worst counts.
+// What is asked of every run: the displacements of the scene's probes, along what they are in the last run;
+// where none moves, that of the vertex that moves most; and, where a move drives the part, the elastic
+// energy. The error of run i beside the coarser run i - 1 at the ratio r of their spacings is
+//     three runs that approach a limit:           their grid convergence index (simulate/estimate.h)
+//     order p <= 2.1 of the run's own error bars: 1.25 |f_i - f_(i-1)| / (r^p - 1), p between 1 and 2
+//     else:                                       3 |f_i - f_(i-1)| / (r - 1)
+// (safety factors of Roache, J. Fluids Eng. 116, 1994), and never less than the run's own error bar. Which
+// of the quantities is worst counts.
 #pragma once
 #include <chrono>
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "mapping/map.h"
@@ -47,8 +49,9 @@ struct TriedRun {
   double memory = 0;                                          // bytes, of the process until its end
   std::optional<double> predicted_seconds, predicted_memory;  // before it; nothing for the first
   std::optional<double> error;                                // share
-  std::string of;       // the quantity that is worst: "probe tip", "largest displacement"
-  std::string failure;  // why there is nothing at this size
+  std::string of;  // the quantity that is worst: "probe tip", "largest displacement"
+  std::vector<std::pair<std::string, double>> found;  // quantities by name: m, of energies J
+  std::string failure;                                // why there is nothing at this size
 };
 
 struct AccuracyReport {

@@ -1,5 +1,5 @@
 // From a surface point to the cell under it. The cells that a polygon bounds are ascending and cells are
-// sorted by (k, j, i), so the voxel that holds the point is found by bisection; next the 26 voxels around it
+// sorted by (k, j, i), so the voxel that holds the point is found by bisection; next the voxels around it
 // are tried, nearest first. A voxel beyond those is at least one spacing away, so only a point without a cell
 // that close needs the scan over all cells of the polygon.
 #include "formats/locate.h"
@@ -68,6 +68,13 @@ std::array<Candidate, 27> voxels_around(const Vec3& at, const Vec3& spacing) {
 
 std::uint32_t nearest_cell(const Body& body, std::span<const std::uint32_t> cells, const Vec3& at,
                            const Vec3& spacing) {
+  // Mostly the point lies in one of the first voxels looked at, or on its face.
+  const Voxel home = at.array().floor().matrix().cast<std::int64_t>();
+  const auto on_face = [&](Eigen::Index axis) { return at[axis] == static_cast<double>(home[axis]); };
+  for (int k = on_face(2) ? -1 : 0; k <= 0; ++k)
+    for (int j = on_face(1) ? -1 : 0; j <= 0; ++j)
+      for (int i = on_face(0) ? -1 : 0; i <= 0; ++i)
+        if (const auto cell = cell_at(body, cells, home + Voxel(i, j, k))) return *cell;
   const double one_spacing = spacing.minCoeff();
   for (const Candidate& candidate : voxels_around(at, spacing)) {
     if (candidate.squared_distance > one_spacing * one_spacing) break;

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "formats/error.h"
+#include "formats/words.h"
 
 namespace flexel {
 namespace {
@@ -27,13 +28,6 @@ std::size_t continuation(std::string_view text) {
 
 [[noreturn]] void fail(const std::string& where, const ObjLine& line, const std::string& what) {
   throw InputError(fmt::format("{}:{}", where, line.number), what);
-}
-
-std::string shown(std::string_view word) {
-  std::string text(word.substr(0, 40));
-  std::replace_if(
-      text.begin(), text.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
-  return text;
 }
 
 ObjKeyword keyword_of(std::string_view word) {

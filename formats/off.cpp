@@ -11,20 +11,10 @@
 #include <cmath>
 
 #include "formats/error.h"
+#include "formats/words.h"
 
 namespace flexel {
 namespace {
-
-bool blank(char c) {
-  return c == ' ' || (c >= '\t' && c <= '\r') || c == '\0';
-}
-
-std::string shown(std::string_view word) {
-  std::string text(word.substr(0, 40));
-  std::replace_if(
-      text.begin(), text.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
-  return text;
-}
 
 // What the keyword says of the vertices.
 struct Kind {

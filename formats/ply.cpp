@@ -15,25 +15,15 @@
 
 #include "formats/error.h"
 #include "formats/parallel.h"
+#include "formats/words.h"
 
 namespace flexel {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "bytes are swapped for big-endian files only");
 
-bool blank(char c) {
-  return c == ' ' || (c >= '\t' && c <= '\r') || c == '\0';
-}
-
 std::string_view text_of(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
-std::string shown(std::string_view word) {
-  std::string text(word.substr(0, 40));
-  std::replace_if(
-      text.begin(), text.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
-  return text;
 }
 
 std::vector<std::string_view> words_of(std::string_view line) {

@@ -59,7 +59,7 @@ void refuse_open(const Part& part, const PartSurface& own, const std::vector<Vec
 
 struct Cutting {
   const Body& body;
-  const Fragments& fragments;
+  const Components& fragments;
   const PartedPairs& parted;
   const CrackOptions& options;
   const std::vector<std::uint32_t>& welded;
@@ -142,12 +142,12 @@ std::vector<double> piece_volumes(const CrackedSurface& cracked, const std::vect
 
 }  // namespace
 
-CrackedSurface part_surface(const Body& body, const Fragments& fragments, const PartedPairs& parted,
+CrackedSurface part_surface(const Body& body, const Components& fragments, const PartedPairs& parted,
                             const CrackOptions& options) {
   return part_surface(body, fragments, parted, options, take_seats(body));
 }
 
-CrackedSurface part_surface(const Body& body, const Fragments& fragments, const PartedPairs& parted,
+CrackedSurface part_surface(const Body& body, const Components& fragments, const PartedPairs& parted,
                             const CrackOptions& options, Seats seats,
                             std::vector<CrackedSurface::Shift> shifts) {
   PieceBuilder builder(body, fragments, options, std::move(seats), std::move(shifts));
@@ -174,7 +174,7 @@ namespace {
 
 // Triangles of the body's surface whose corners go with different fragments, or with elements on the two
 // sides of a crack inside one: `parted`, of a surface that was not opened there.
-std::size_t spanning_triangles(const Body& body, const MapResult& result, const Fragments& fragments,
+std::size_t spanning_triangles(const Body& body, const MapResult& result, const Components& fragments,
                                const PartedPairs* parted) {
   const Triangles triangles = triangulate(body.surface);
   std::size_t count = 0;
@@ -193,11 +193,11 @@ std::size_t spanning_triangles(const Body& body, const MapResult& result, const 
 // What hangs together, and what does not.
 struct Broken {
   Adjacency connections;
-  Fragments fragments;
+  Components fragments;
   PartedPairs parted;
   explicit Broken(const Body& body)
       : connections(element_adjacency(body)),
-        fragments(find_fragments(body, connections)),
+        fragments(find_components(body, connections)),
         parted(body, fragments, connections) {}
   Broken(const Broken&) = delete;
   Broken& operator=(const Broken&) = delete;
@@ -228,7 +228,7 @@ class Loan {
   Value &own_, &lent_;
 };
 
-void map_pieces(Body& body, const Fragments& fragments, const MapOptions& options, CrackMode mode,
+void map_pieces(Body& body, const Components& fragments, const MapOptions& options, CrackMode mode,
                 MappedPart& mapped, Progress& progress) {
   CrackedSurface& cracked = *mapped.cracked;
   {
@@ -267,7 +267,7 @@ void warn_of_carved(const Body& body, Progress& progress) {
 
 void map_carved(Body& body, const MapOptions& options, CrackMode mode, MappedPart& mapped,
                 Progress& progress) {
-  const Fragments fragments = find_fragments(body, element_adjacency(body));
+  const Components fragments = find_components(body, element_adjacency(body));
   progress.update(0, "closing what was carved");
   mapped.cracked = close_carved(body, fragments, mode);
   map_pieces(body, fragments, options, mode, mapped, progress);

@@ -43,10 +43,10 @@ constexpr double kDrawnApart = 1e-3;
 // `parted`: cracks that end inside a part are opened up to their ends, where there are any.
 // Throws InputError: no surface; `cap` of a part in fragments or with cracks inside whose surface is not
 // closed or crosses itself.
-[[nodiscard]] CrackedSurface part_surface(const Body& body, const Fragments& fragments,
+[[nodiscard]] CrackedSurface part_surface(const Body& body, const Components& fragments,
                                           const PartedPairs& parted, const CrackOptions& options);
 // The same with seats of the body's vertices that are known, and shifts that some of them have already.
-[[nodiscard]] CrackedSurface part_surface(const Body& body, const Fragments& fragments,
+[[nodiscard]] CrackedSurface part_surface(const Body& body, const Components& fragments,
                                           const PartedPairs& parted, const CrackOptions& options, Seats seats,
                                           std::vector<CrackedSurface::Shift> shifts = {});
 
@@ -60,7 +60,8 @@ struct MappedPart {
   }
 };
 
-// Fragments are looked for where something may have broken: a body without broken cells is spared the search.
+// Components are looked for where something may have broken: a body without broken cells is spared the
+// search.
 [[nodiscard]] bool may_be_broken(const Body& body);
 
 // Maps the deformed state of `body` onto its surface, parted as `crack` says, and reports on it. While it

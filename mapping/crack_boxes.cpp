@@ -94,7 +94,7 @@ bool CrackBoxes::parted_boxes(std::uint32_t box, std::uint32_t next) const {
   return any && !joined;
 }
 
-CrackBoxes::CrackBoxes(const Body& body, std::uint32_t part, const Fragments& fragments,
+CrackBoxes::CrackBoxes(const Body& body, std::uint32_t part, const Components& fragments,
                        const PartedPairs& parted, const Vec3& shift,
                        const std::vector<std::array<Vec3, 3>>& triangles)
     : body_(body), fragments_(fragments), parted_(parted), shift_(shift) {

@@ -28,7 +28,7 @@ struct BoxRange {
 class CrackBoxes {
  public:
   // `triangles`: corners in box coordinates of every triangle of the part's surface.
-  CrackBoxes(const Body& body, std::uint32_t part, const Fragments& fragments, const PartedPairs& parted,
+  CrackBoxes(const Body& body, std::uint32_t part, const Components& fragments, const PartedPairs& parted,
              const Vec3& shift, const std::vector<std::array<Vec3, 3>>& triangles);
 
   [[nodiscard]] double plane(int axis, int i) const { return i + 0.5 + shift_[axis]; }
@@ -88,7 +88,7 @@ class CrackBoxes {
   [[nodiscard]] std::array<Index3, 4> around_line(int along, int p, int q, int at) const;
 
   const Body& body_;
-  const Fragments& fragments_;
+  const Components& fragments_;
   const PartedPairs& parted_;
   Vec3 shift_;
   std::vector<std::uint64_t> keys_;      // (boxes) ascending

@@ -49,8 +49,8 @@ class CrackEdges {
 
 // Gives bits and caps in mixed boxes their fragments: what hangs together in a box is of one, and the cells
 // under its surface say which. `polygon_of`: (triangles of the mesh).
-void resolve_mixed(const Body& body, const std::vector<std::uint32_t>& polygon_of, const Fragments& fragments,
-                   CrackMesh& mesh, std::vector<CrackCap>& caps);
+void resolve_mixed(const Body& body, const std::vector<std::uint32_t>& polygon_of,
+                   const Components& fragments, CrackMesh& mesh, std::vector<CrackCap>& caps);
 
 // After CrackMesh::insert_points(). Walls inside a fragment get points of their own between those that both
 // sides share at the end of the crack, so that they can open.

@@ -44,12 +44,12 @@ std::vector<Voxel> voxels_left(const Body& body, const Part& part) {
 // The body whose elements are the voxels.
 struct VoxelBody {
   Body body;
-  Fragments fragments;
+  Components fragments;
   std::vector<std::uint32_t> origin;  // (elements) Voxel::origin
   std::vector<std::uint8_t> carved;   // (fragments)
 };
 
-void add_part(const Body& body, const Fragments& fragments, std::uint32_t p, std::vector<Voxel> voxels,
+void add_part(const Body& body, const Components& fragments, std::uint32_t p, std::vector<Voxel> voxels,
               VoxelBody& result) {
   const Part& of = body.parts[p];
   for (const Voxel& voxel : voxels_left(body, of)) voxels.push_back(voxel);
@@ -88,7 +88,7 @@ void add_part(const Body& body, const Fragments& fragments, std::uint32_t p, std
   if (any) result.carved.back() = 1;
 }
 
-VoxelBody voxel_body(const Body& body, const Fragments& fragments) {
+VoxelBody voxel_body(const Body& body, const Components& fragments) {
   VoxelBody result;
   result.fragments.offset.push_back(0);
   std::vector<std::vector<Voxel>> carved = read_note(body);
@@ -105,8 +105,8 @@ bool is_carved_cleanly(const Body& body) {
          std::find(body.broken.begin(), body.broken.end(), 1) == body.broken.end();
 }
 
-Fragments whole_parts(const Body& body) {
-  Fragments fragments;
+Components whole_parts(const Body& body) {
+  Components fragments;
   fragments.of = element_parts(body);
   fragments.offset.push_back(0);
   for (std::uint32_t part = 0; part < body.parts.size(); ++part) {
@@ -116,7 +116,7 @@ Fragments whole_parts(const Body& body) {
   return fragments;
 }
 
-CrackedSurface close_carved(const Body& body, const Fragments& fragments, CrackMode mode) {
+CrackedSurface close_carved(const Body& body, const Components& fragments, CrackMode mode) {
   const VoxelBody voxels = voxel_body(body, fragments);
   CrackOptions options;
   options.mode = mode;

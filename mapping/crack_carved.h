@@ -12,11 +12,11 @@ constexpr const char* kCarvedNote = "carved";
 // True when voxels went and no cell broke.
 [[nodiscard]] bool is_carved_cleanly(const Body& body);
 // Every part as one fragment, whatever broke in it: close_carved() then only takes away what was carved.
-[[nodiscard]] Fragments whole_parts(const Body& body);
+[[nodiscard]] Components whole_parts(const Body& body);
 
 // The surface without what lay over carved matter, with walls (`cap`, as part_surface(); faces "crack") where
 // it was. A part that hangs together keeps its name; one that fell apart comes as pieces. `fragments`: of the
 // body. Throws as part_surface(), and InputError: a note that is no list of voxels.
-[[nodiscard]] CrackedSurface close_carved(const Body& body, const Fragments& fragments, CrackMode mode);
+[[nodiscard]] CrackedSurface close_carved(const Body& body, const Components& fragments, CrackMode mode);
 
 }  // namespace flexel

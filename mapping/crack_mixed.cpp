@@ -73,7 +73,7 @@ class Mixed {
 // visit(fragment) for the elements at the box's index in the cells under polygon `p`.
 template <class Visit>
 void for_each_element_under(const Body& body, std::uint32_t p, const Index3& index,
-                            const Fragments& fragments, const Visit& visit) {
+                            const Components& fragments, const Visit& visit) {
   if (body.surface_cell_offsets.empty()) return;
   for (std::uint32_t s = body.surface_cell_offsets[p]; s < body.surface_cell_offsets[p + 1]; ++s)
     for (const std::uint32_t e : body.cell_elements[body.surface_cells[s]])
@@ -82,8 +82,8 @@ void for_each_element_under(const Body& body, std::uint32_t p, const Index3& ind
 
 }  // namespace
 
-void resolve_mixed(const Body& body, const std::vector<std::uint32_t>& polygon_of, const Fragments& fragments,
-                   CrackMesh& mesh, std::vector<CrackCap>& caps) {
+void resolve_mixed(const Body& body, const std::vector<std::uint32_t>& polygon_of,
+                   const Components& fragments, CrackMesh& mesh, std::vector<CrackCap>& caps) {
   Mixed mixed(mesh, caps);
   if (mixed.items.empty()) return;
   const CrackBoxes& boxes = mesh.boxes();

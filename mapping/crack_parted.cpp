@@ -6,7 +6,7 @@
 
 namespace flexel {
 
-PartedPairs::PartedPairs(const Body& body, const Fragments& fragments, const Adjacency& connections)
+PartedPairs::PartedPairs(const Body& body, const Components& fragments, const Adjacency& connections)
     : connections_(connections), inside_(body.parts.size(), 0) {
   for (std::size_t c = 0; c < body.cell_count(); ++c) {
     if (!body.broken[c]) continue;

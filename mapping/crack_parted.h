@@ -4,14 +4,14 @@
 #include <cstdint>
 #include <vector>
 
-#include "mapping/fragments.h"
+#include "mapping/components.h"
 
 namespace flexel {
 
 class PartedPairs {
  public:
   // `connections`: element_adjacency(body); must outlive this.
-  PartedPairs(const Body& body, const Fragments& fragments, const Adjacency& connections);
+  PartedPairs(const Body& body, const Components& fragments, const Adjacency& connections);
   [[nodiscard]] bool connected(std::uint32_t a, std::uint32_t b) const;
   // In corner placement: a broken cell holds both, and no whole one. In centre placement none are known: a
   // connection that broke and one that never was (across a slot) look the same in a body.

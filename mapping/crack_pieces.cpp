@@ -16,7 +16,7 @@
 
 namespace flexel {
 
-PieceBuilder::PieceBuilder(const Body& body, const Fragments& fragments, const CrackOptions& options,
+PieceBuilder::PieceBuilder(const Body& body, const Components& fragments, const CrackOptions& options,
                            Seats seats, std::vector<CrackedSurface::Shift> shifts)
     : body_(body), fragments_(fragments), options_(options) {
   Surface& surface = result_.surface;

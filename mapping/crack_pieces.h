@@ -36,7 +36,7 @@ void drop_debris(CrackedSurface& cracked);
 class PieceBuilder {
  public:
   // `seats`, `shifts`: of the vertices of the body's surface.
-  PieceBuilder(const Body& body, const Fragments& fragments, const CrackOptions& options, Seats seats,
+  PieceBuilder(const Body& body, const Components& fragments, const CrackOptions& options, Seats seats,
                std::vector<CrackedSurface::Shift> shifts);
   // A part that did not break.
   void add_whole(std::uint32_t part);
@@ -65,7 +65,7 @@ class PieceBuilder {
   void fill_columns();
 
   const Body& body_;
-  const Fragments& fragments_;
+  const Components& fragments_;
   CrackOptions options_;
   CrackedSurface result_;
   std::vector<std::uint32_t> seen_;     // (vertices of the body's surface) fragment, or kNoBox

@@ -19,7 +19,7 @@ enum class CrackMode {
 struct CrackPiece {
   std::string name;            // the part's; "bar-2" for the second of its pieces, largest first
   std::uint32_t part = 0;      // of the body
-  std::uint32_t fragment = 0;  // index into Fragments::list
+  std::uint32_t fragment = 0;  // index into Components::list
   std::uint32_t elements = 0;
   bool debris = false;       // one element that nothing holds
   bool dropped = false;      // not in the surface

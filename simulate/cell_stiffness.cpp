@@ -10,7 +10,7 @@
 #include "formats/parallel.h"
 #include "simulate/fold_barrier.h"
 #include "simulate/instruction_set.h"
-#include "simulate/linear/level.h"
+#include "simulate/pass_matrix.h"
 #include "simulate/prepared_cell.h"
 
 namespace flexel {
@@ -34,41 +34,20 @@ StepLayout layout_of(const Setting& setting) {
   return step_layout(setting, plan);
 }
 
-// Elements that the passes pull at when all are moved, each its own way, and their neighbours: a tie of a
-// cell may leave some of its corners alone.
-std::vector<std::uint8_t> touched_elements(const Body& body, const BlockMatrix& pattern,
-                                           const std::vector<Pass>& passes) {
-  const std::size_t n = body.element_count();
-  State state{std::vector<Vec3>(n), 1};
-  for (std::size_t e = 0; e < n; ++e)
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      state.displacement[e][static_cast<Eigen::Index>(axis)] = scattered(3 * e + axis);
-  std::vector<Vec3> forces(n, Vec3::Zero());
-  for (const Pass& pass : passes)
-    if (pass.add_stiffness && pass.add_forces) pass.add_forces(state, forces);
-  std::vector<std::uint8_t> touched(n, 0);
-  for (std::size_t e = 0; e < n; ++e)
-    if (forces[e] != Vec3::Zero())
-      for (std::uint64_t q = pattern.row_offsets[e]; q < pattern.row_offsets[e + 1]; ++q)
-        touched[pattern.columns[q]] = 1;
-  return touched;
-}
-
-// A matrix of zeros with the rows and columns of `pattern` that passes add to.
-BlockMatrix matrix_of_passes(const Body& body, const BlockMatrix& pattern, const std::vector<Pass>& passes) {
-  BlockMatrix matrix;
-  matrix.row_offsets.assign(body.element_count() + 1, 0);
-  const auto adds = [](const Pass& pass) { return static_cast<bool>(pass.add_stiffness); };
-  if (std::none_of(passes.begin(), passes.end(), adds)) return matrix;
-  const std::vector<std::uint8_t> touched = touched_elements(body, pattern, passes);
-  for (std::size_t e = 0; e < touched.size(); ++e) {
-    if (touched[e])
-      for (std::uint64_t q = pattern.row_offsets[e]; q < pattern.row_offsets[e + 1]; ++q)
-        if (touched[pattern.columns[q]]) matrix.columns.push_back(pattern.columns[q]);
-    matrix.row_offsets[e + 1] = matrix.columns.size();
-  }
-  matrix.values.assign(matrix.columns.size(), Block::Zero());
-  return matrix;
+// Whether rows `e` and `other` hold the same blocks of cells at rest at the same places: inside a part most
+// do.
+bool same_row(const StiffnessPattern& pattern, const std::vector<std::uint32_t>& part,
+              const std::vector<double>& share, std::size_t e, std::size_t other) {
+  const auto cells = pattern.stencil.of(static_cast<std::uint32_t>(e));
+  const auto others = pattern.stencil.of(static_cast<std::uint32_t>(other));
+  const auto& offsets = pattern.matrix.row_offsets;
+  if (offsets[e + 1] - offsets[e] != offsets[other + 1] - offsets[other]) return false;
+  return std::equal(
+      cells.begin(), cells.end(), others.begin(), others.end(), [&](const Incidence& a, const Incidence& b) {
+        const std::uint16_t* slot = pattern.stencil.slot[a.cell].data() + 8 * a.corner;
+        return a.corner == b.corner && share[a.cell] == share[b.cell] && part[a.cell] == part[b.cell] &&
+               std::equal(slot, slot + 8, pattern.stencil.slot[b.cell].data() + 8 * b.corner);
+      });
 }
 
 // The first aligned double.
@@ -353,16 +332,26 @@ void CellStiffness::eliminate_row(std::size_t element, Block* row) const {
 }
 
 const Block* CellStiffness::blocks(std::size_t begin, std::size_t end, std::vector<Block>& room) const {
-  room.assign(row_offsets()[end] - row_offsets()[begin], Block::Zero());
+  room.resize(row_offsets()[end] - row_offsets()[begin]);
+  thread_local std::vector<Block> last;  // the cells' share of row `made`
+  std::size_t made = end;
   std::array<Block, 8> own;
   for (std::size_t e = begin; e < end; ++e) {
     Block* row = room.data() + (row_offsets()[e] - row_offsets()[begin]);
-    for (const Incidence& at : pattern_.stencil.of(static_cast<std::uint32_t>(e))) {
-      cell_blocks(at, 0, 8, own.data());
-      const std::uint16_t* slot = pattern_.stencil.slot[at.cell].data() + 8 * at.corner;
-      for (std::size_t b = 0; b < 8; ++b) row[slot[b]] += own[b];
+    Block* row_end = room.data() + (row_offsets()[e + 1] - row_offsets()[begin]);
+    if (form_ == TangentForm::at_rest && made != end && same_row(pattern_, part_, share_, e, made)) {
+      std::copy(last.begin(), last.end(), row);
+    } else {
+      std::fill(row, row_end, Block::Zero());
+      for (const Incidence& at : pattern_.stencil.of(static_cast<std::uint32_t>(e))) {
+        cell_blocks(at, 0, 8, own.data());
+        const std::uint16_t* slot = pattern_.stencil.slot[at.cell].data() + 8 * at.corner;
+        for (std::size_t b = 0; b < 8; ++b) row[slot[b]] += own[b];
+      }
+      turn(e, row, row_offsets()[e + 1] - row_offsets()[e]);
+      last.assign(row, row_end);
+      made = e;
     }
-    turn(e, row, row_offsets()[e + 1] - row_offsets()[e]);
     if (!folding_.empty())
       for (const Incidence& at : pattern_.stencil.of(static_cast<std::uint32_t>(e)))
         if (const FoldTangent* blocks = folding_of(at.cell))

@@ -5,8 +5,6 @@
 
 #include <fmt/format.h>
 
-#include <map>
-
 #include "formats/error.h"
 #include "formats/units.h"
 #include "simulate/surface_points.h"
@@ -73,7 +71,7 @@ ProbePoints place_point(const Probe& probe, const Setting& setting) {
 
 ProbePoints place_selection(const Probe& probe, const Setting& setting) {
   const Selected selected = resolve(*probe.where, setting.body);
-  std::map<std::uint32_t, double> weights;
+  std::vector<double> weights(setting.body.element_count(), 0);
   double total = 0;
   ProbePoints points{probe.name, Vec3::Zero(), {}};
   for (const SurfacePoint& point : surface_points(setting, selected.polygons)) {
@@ -93,7 +91,8 @@ ProbePoints place_selection(const Probe& probe, const Setting& setting) {
   if (!(total > 0))
     throw InputError(probe.origin, fmt::format("probe \"{}\": no matter lies under its surface", probe.name));
   points.where /= total;
-  for (const auto& [element, weight] : weights) points.weights.emplace_back(element, weight / total);
+  for (std::uint32_t e = 0; e < weights.size(); ++e)
+    if (weights[e] != 0) points.weights.emplace_back(e, weights[e] / total);
   return points;
 }
 

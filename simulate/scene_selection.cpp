@@ -99,7 +99,7 @@ Selection parse_where(const std::string& text, const std::string& origin) {
     throw InputError(origin, fmt::format("{}: {}", text, error.what()));
   }
   root.line = 0;
-  for (auto& member : root.members) member.second.line = 0;
+  for (auto& member : root.members) member.value.line = 0;
   TableReader reader(root, origin, origin);
   return require_where(reader);
 }

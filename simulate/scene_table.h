@@ -11,15 +11,22 @@
 
 namespace flexel {
 
+struct SceneMember;
+
 struct SceneValue {
   enum class Kind { string, number, boolean, array, table, other };
   Kind kind = Kind::other;
-  std::string text;                                         // of a string
-  double number = 0;                                        // of an integer or a float
-  bool flag = false;                                        // of a boolean
-  std::vector<SceneValue> items;                            // of an array
-  std::vector<std::pair<std::string, SceneValue>> members;  // of a table, in order of the file
-  int line = 0;                                             // where it begins; 0: not from a file
+  std::string text;                  // of a string
+  double number = 0;                 // of an integer or a float
+  bool flag = false;                 // of a boolean
+  std::vector<SceneValue> items;     // of an array
+  std::vector<SceneMember> members;  // of a table, in order of the file
+  int line = 0;                      // where it begins; 0: not from a file
+};
+
+struct SceneMember {
+  std::string key;
+  SceneValue value;
 };
 
 // Parses TOML. `name` is the file's name for messages. Throws InputError("name:line", ...) for wrong TOML.

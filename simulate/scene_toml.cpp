@@ -20,10 +20,10 @@ void convert_table(const toml::table& table, SceneValue& value) {
     SceneValue converted = convert(member);
     // The key's own line says where a mistyped key is, also where its value begins further down.
     converted.line = static_cast<int>(key.source().begin.line);
-    value.members.emplace_back(std::string(key.str()), std::move(converted));
+    value.members.push_back({std::string(key.str()), std::move(converted)});
   }
   std::stable_sort(value.members.begin(), value.members.end(),
-                   [](const auto& a, const auto& b) { return a.second.line < b.second.line; });
+                   [](const auto& a, const auto& b) { return a.value.line < b.value.line; });
 }
 
 SceneValue convert(const toml::node& node) {

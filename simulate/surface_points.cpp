@@ -1,11 +1,14 @@
-// Longest-edge bisection keeps the pieces of long slender triangles (which CAD tessellation is full of) few:
-// their number grows with length over h, not with its square. The centroid rule on such small pieces
-// integrates the piecewise trilinear weights of the cells to well under a percent of one cell's share, and
-// exactly in sum, since the weights of a point sum to 1.
+// Bisection goes in two goes, the first to pieces large enough to be shared out to threads: one face may be
+// two triangles. Depth first both times, so that the order is that of one go. Longest-edge bisection keeps
+// the pieces of long slender triangles (which CAD tessellation is full of) few: their number grows with
+// length over h, not with its square. The centroid rule on such small pieces integrates the piecewise
+// trilinear weights of the cells to well under a percent of one cell's share, and exactly in sum, since the
+// weights of a point sum to 1.
 #include "simulate/surface_points.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <numeric>
 
 #include "formats/parallel.h"
 
@@ -13,6 +16,7 @@ namespace flexel {
 namespace {
 
 constexpr double kLongestEdge = 0.3;  // of a piece, in spacings
+constexpr double kShare = 32;         // longest edge of what one thread cuts at a time, in those of a piece
 
 using Corners = std::array<Vec3, 3>;
 
@@ -58,34 +62,51 @@ std::vector<SurfacePoint> surface_points(const Setting& setting, const std::vect
   const Body& body = setting.body;
   const Triangles triangles = triangulate(body.surface);
   const std::vector<std::uint32_t> list = selected_triangles(body, triangles, polygons);
-  std::vector<std::vector<SurfacePoint>> found(list.size());
+  struct Share {
+    std::uint32_t polygon = 0;
+    Corners corners;
+  };
+  const auto longest = [&](std::uint32_t polygon) {
+    return kLongestEdge * body.parts[body.surface.polygon_part(polygon)].lattice.spacing.minCoeff();
+  };
+  std::vector<Share> shares;
+  std::vector<Corners> pieces_of_one;
+  for (const std::uint32_t t : list) {
+    const std::uint32_t polygon = triangles.polygon[t];
+    Corners corners;
+    for (std::size_t c = 0; c < 3; ++c) corners[c] = body.surface.vertices[triangles.corners[t][c]];
+    pieces_of_one.clear();
+    add_pieces(corners, kShare * longest(polygon), pieces_of_one);
+    for (const Corners& piece : pieces_of_one) shares.push_back({polygon, piece});
+  }
+  // There are some fifty points to a cell under a large face: they are counted first, so that no second copy
+  // is needed.
+  std::vector<std::size_t> begin(shares.size() + 1, 0);
+  const auto cut = [&](const Share& share) {
+    std::vector<Corners> pieces;
+    add_pieces(share.corners, longest(share.polygon), pieces);
+    return pieces;
+  };
   parallel_for_each(
-      list.size(),
-      [&](std::size_t t) {
-        const std::uint32_t polygon = triangles.polygon[list[t]];
-        Corners corners;
-        for (std::size_t c = 0; c < 3; ++c) corners[c] = body.surface.vertices[triangles.corners[list[t]][c]];
-        std::vector<Corners> pieces;
-        add_pieces(corners,
-                   kLongestEdge * body.parts[body.surface.polygon_part(polygon)].lattice.spacing.minCoeff(),
-                   pieces);
-        for (const Corners& piece : pieces) {
+      shares.size(), [&](std::size_t s) { begin[s + 1] = cut(shares[s]).size(); }, 16);
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  std::vector<SurfacePoint> points(begin.back());
+  parallel_for_each(
+      shares.size(),
+      [&](std::size_t s) {
+        const std::uint32_t polygon = shares[s].polygon;
+        std::size_t next = begin[s];
+        for (const Corners& piece : cut(shares[s])) {
           const Vec3 centre = (piece[0] + piece[1] + piece[2]) / 3;
           const Vec3 area = 0.5 * (piece[1] - piece[0]).cross(piece[2] - piece[0]);
           if (const auto at = carrier_on_surface(setting, polygon, centre, area))
-            found[t].push_back({*at, centre, area, polygon});
+            points[next] = {*at, centre, area, polygon};
+          ++next;
         }
       },
       16);
-  // There are some fifty to a cell under a large face: no second copy of all of them.
-  std::size_t count = 0;
-  for (const auto& each : found) count += each.size();
-  std::vector<SurfacePoint> points;
-  points.reserve(count);
-  for (auto& each : found) {
-    points.insert(points.end(), each.begin(), each.end());
-    std::vector<SurfacePoint>().swap(each);
-  }
+  std::erase_if(points,
+                [](const SurfacePoint& point) { return point.at.count == 0; });  // nothing carries them
   return points;
 }
 

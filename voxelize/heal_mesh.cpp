@@ -25,11 +25,6 @@ Corners sorted(Corners c) {
   return c;
 }
 
-double triangle_area(const PartMesh& mesh, std::uint32_t t) {
-  const Vec3& a = mesh.world[mesh.corners[t][0]];
-  return (mesh.world[mesh.corners[t][1]] - a).cross(mesh.world[mesh.corners[t][2]] - a).norm() / 2;
-}
-
 // Vertices (by index) that lie on edges with an odd number of triangles.
 std::vector<std::uint32_t> vertices_of_open_edges(const PartMesh& mesh) {
   const std::vector<std::uint32_t> degree = edge_degrees(mesh);

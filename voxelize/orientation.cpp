@@ -40,11 +40,6 @@ bool ascends_edge(const PartMesh& mesh, std::uint32_t t, std::uint32_t edge) {
   return false;
 }
 
-double triangle_area(const PartMesh& mesh, std::uint32_t t) {
-  const Vec3& a = mesh.world[mesh.corners[t][0]];
-  return (mesh.world[mesh.corners[t][1]] - a).cross(mesh.world[mesh.corners[t][2]] - a).norm() / 2;
-}
-
 // Which triangles to turn so that neighbours agree (triangles: 1 turn).
 std::vector<std::uint8_t> agreeing_turns(const PartMesh& mesh) {
   const Incidence incidence = manifold_edges(mesh);

@@ -228,10 +228,18 @@ double enclosed_volume(const PartMesh& mesh) {
 }
 
 double surface_area(const PartMesh& mesh) {
-  return parallel_sum<double>(mesh.corners.size(), [&](std::size_t t) {
-    const Vec3& a = mesh.world[mesh.corners[t][0]];
-    return (mesh.world[mesh.corners[t][1]] - a).cross(mesh.world[mesh.corners[t][2]] - a).norm() / 2;
-  });
+  return parallel_sum<double>(
+      mesh.corners.size(), [&](std::size_t t) { return triangle_area(mesh, static_cast<std::uint32_t>(t)); });
+}
+
+double triangle_area(const PartMesh& mesh, std::uint32_t triangle) {
+  const Corners& c = mesh.corners[triangle];
+  return (mesh.world[c[1]] - mesh.world[c[0]]).cross(mesh.world[c[2]] - mesh.world[c[0]]).norm() / 2;
+}
+
+Vec3 unit_normal(const PartMesh& mesh, std::uint32_t triangle) {
+  const Corners& c = mesh.corners[triangle];
+  return (mesh.world[c[1]] - mesh.world[c[0]]).cross(mesh.world[c[2]] - mesh.world[c[0]]).normalized();
 }
 
 }  // namespace flexel

@@ -56,5 +56,7 @@ void place_on_lattice(PartMesh& mesh, const Lattice& lattice, double tolerance =
 // Volume enclosed [m^3], signed, of one part (each shell by its orientation), and its area [m^2].
 [[nodiscard]] double enclosed_volume(const PartMesh& mesh);
 [[nodiscard]] double surface_area(const PartMesh& mesh);
+[[nodiscard]] double triangle_area(const PartMesh& mesh, std::uint32_t triangle);
+[[nodiscard]] Vec3 unit_normal(const PartMesh& mesh, std::uint32_t triangle);
 
 }  // namespace flexel

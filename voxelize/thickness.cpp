@@ -22,11 +22,6 @@ struct Least {
   double opposed = kNone, any = kNone;
 };
 
-Vec3 unit_normal(const PartMesh& mesh, std::uint32_t t) {
-  const Corners& c = mesh.corners[t];
-  return (mesh.world[c[1]] - mesh.world[c[0]]).cross(mesh.world[c[2]] - mesh.world[c[0]]).normalized();
-}
-
 // The least way from each vertex of the mesh.
 std::vector<Least> least_ways(const PartMesh& mesh) {
   std::vector<Least> least(mesh.world.size());

@@ -11,11 +11,6 @@
 namespace flexel {
 namespace {
 
-Vec3 unit_normal(const PartMesh& mesh, std::uint32_t triangle) {
-  const Corners& c = mesh.corners[triangle];
-  return (mesh.world[c[1]] - mesh.world[c[0]]).cross(mesh.world[c[2]] - mesh.world[c[0]]).normalized();
-}
-
 void add_samples(const PartMesh& mesh, const LineGrid& grid, double negligible,
                  std::vector<WallSample>& samples) {
   constexpr double kOpposed = -.985;  // cosine of 170 degrees

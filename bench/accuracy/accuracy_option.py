@@ -3,8 +3,8 @@
 
     PATH=build/release/bin:$PATH bench/accuracy/accuracy_option.py [--accuracy SHARE] [--within TIME] [--cells N] [--parts DIR] [--work DIR] [CASE...]
 
-Each part and scene is run with the option, and once with about --cells cells: the reference. References are kept in the folder --work, so that
-a bench that was stopped goes on where it was. The true error is the largest relative difference of a probe, or of the elastic energy where
+Each part and scene is run with the option, and once at half the spacing that was chosen, or with about --cells cells where that would be
+more: the reference. References are kept in the folder --work, so that a bench that was stopped goes on where it was. The true error is the largest relative difference of a probe, or of the elastic energy where
 moves drive the part; "reference" says how much finer the reference's spacing is than the chosen one's, and its own error bar. Parts that
 are not there are skipped, and said so. So is a case whose reference is less than 1.4 times as fine. Ends with 1 where fewer than nine of
 ten are truly within the accuracy asked for, or where a run claims it whose true error is over 2.5 times as large.
@@ -127,13 +127,19 @@ def make_part(source, folder, arguments):
     return (part, "") if part.exists() else (None, f"{part} is not there")
 
 
-def reference(part, scene_file, driven, arguments):
-    """What about --cells cells give: {"values", "bar" (share), "cells"}; or a line of error."""
+def reference_cells(cells, most):
+    """Of a reference for a run of so many cells: half the spacing, or as near to that as `most` allows. In steps of two, so that kept ones
+    serve when the chosen size changes a little."""
+    return min(most, max(125_000, 125_000 * 2 ** math.ceil(math.log2(8 * cells / 125_000))))
+
+
+def reference(part, scene_file, driven, cells, arguments):
+    """What about so many cells give: {"values", "bar" (share), "cells"}; or a line of error."""
     content = part.read_bytes().rpartition(b"DATA;")[2]  # the head of a STEP file has its date
-    key = hashlib.sha256(content + scene_file.read_bytes() + str(arguments.cells).encode()).hexdigest()[:16]
+    key = hashlib.sha256(content + scene_file.read_bytes() + str(cells).encode()).hexdigest()[:16]
     kept = arguments.work / f"{part.stem}-{key}.json"
     if not kept.exists():
-        summary, error = flexel(part, scene_file, "--count", str(arguments.cells))
+        summary, error = flexel(part, scene_file, "--count", str(cells))
         if summary is None:
             return None, error
         wanted = {"probe asked"} | ({"elastic_energy"} if driven else set())
@@ -162,19 +168,17 @@ def run(name, arguments):
         scene_file = folder / "scene.toml"
         scene_file.write_text(text)
         driven = "[[move]]" in text
-        fine, error = reference(part, scene_file, driven, arguments)
-        if fine is None:
-            print(f"| {name} | the reference: {error} | | | | | | |", flush=True)
-            return None
-        if arguments.references:
-            return None
         options = ["--accuracy", arguments.accuracy] + (["--within", arguments.within] if arguments.within else [])
         summary, error = flexel(part, scene_file, *options)
         if summary is None:
             print(f"| {name} | {error} | | | | | | |", flush=True)
             return False, False
-    told = summary["accuracy"]
-    cells = told["runs"][-1]["cells"]
+        told = summary["accuracy"]
+        cells = told["runs"][-1]["cells"]
+        fine, error = reference(part, scene_file, driven, reference_cells(cells, arguments.cells), arguments)
+        if fine is None:
+            print(f"| {name} | the reference: {error} | | | | | | |", flush=True)
+            return None
     finer = (fine["cells"] / cells) ** (1 / 3)
     true = max(abs(a / b - 1) for a, b in zip(asked_of(summary, driven), fine["values"]) if b)
     wanted = told["asked"]
@@ -191,10 +195,9 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--accuracy", default="2%")
     parser.add_argument("--within", default="")
-    parser.add_argument("--cells", type=int, default=250_000)
+    parser.add_argument("--cells", type=int, default=1_000_000, help="of a reference, at most")
     parser.add_argument("--parts", type=pathlib.Path, default=pathlib.Path(__file__).resolve().parents[2].parent / "shared/parts")
     parser.add_argument("--work", type=pathlib.Path, default=pathlib.Path("out/accuracy-option"))
-    parser.add_argument("--references", action="store_true", help="make the references only")
     parser.add_argument("cases", nargs="*", metavar="CASE")
     arguments = parser.parse_args()
     unknown = [name for name in arguments.cases if name not in CASES]
@@ -202,8 +205,6 @@ def main():
         parser.error(f"no case {', '.join(unknown)}; there are {', '.join(CASES)}")
     print(f"| part and scene | size mm | cells | error told % | claims {arguments.accuracy} | true error % | reference | s |\n|---|---|---|---|---|---|---|---|")
     found = [run(name, arguments) for name in arguments.cases or CASES]
-    if arguments.references:
-        sys.exit(0)
     judged = [each for each in found if each is not None]
     within = sum(each[0] for each in judged)
     false = sum(each[1] for each in judged)

@@ -98,7 +98,7 @@ std::string points_table(const Study& study) {
   std::vector<std::string> head = {"choice", "cells or elements", "wall", "cpu", "memory", "error"};
   for (const Reference& each : study.references)
     if (each.decides) head.push_back(escaped(each.name));
-  head.insert(head.end(), {"surface, rms", "surface, largest"});
+  head.insert(head.end(), {"surface, rms", "surface, Hausdorff"});
   if (timed)
     head.insert(head.end(), {"energy drift", "lag", "element-steps/s"});
   else
@@ -120,7 +120,7 @@ std::string points_table(const Study& study) {
         line.push_back(found != nullptr ? quantity(found->value, found->unit) : "");
       }
     line.push_back(row.surface_rms ? human_length(*row.surface_rms) : "");
-    line.push_back(row.surface_largest ? human_length(*row.surface_largest) : "");
+    line.push_back(row.surface_hausdorff ? human_length(*row.surface_hausdorff) : "");
     if (timed) {
       line.push_back(row.found.energy_drift ? fmt::format("{:.1e}", *row.found.energy_drift) : "");
       line.push_back(row.lag ? fmt::format("{:.2g} ms", 1e3 * *row.lag) : "");

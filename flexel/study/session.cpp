@@ -284,7 +284,7 @@ void Session::measure_surfaces(const Row& finest) {
     if (!row.found.ok() || row.repeat > 1 || !fs::exists(surface)) continue;
     const SurfaceDistance found = surface_distance(surface, reference);
     row.surface_rms = found.rms;
-    row.surface_largest = found.largest;
+    row.surface_hausdorff = found.hausdorff;
   }
 }
 

@@ -17,10 +17,9 @@ struct Row {
   Prediction predicted;
   RunResult found;
   // Filled at the end:
-  std::optional<double> lag;          // s, of the first probe behind the reference; timed runs
-  std::optional<double> surface_rms;  // m, distance from the finest surface, weighted by area
-  std::optional<double>
-      surface_largest;  // m, of corresponding vertices: the Hausdorff distance is at most that
+  std::optional<double> lag;                // s, of the first probe behind the reference; timed runs
+  std::optional<double> surface_rms;        // m, of corresponding points, from the finest surface
+  std::optional<double> surface_hausdorff;  // m, from the finest surface
   std::optional<RunError> error;
 };
 
@@ -84,10 +83,11 @@ void conclude(Study& study, const std::vector<Reference>& given);
 // What was told of each run before it began, beside what it took: a table for a terminal.
 [[nodiscard]] std::string prediction_table(const Study& study);
 
-// Distances of the mapped surface `path` from `finest` (both .ply of the same part): root of the mean square,
-// weighted by the area around each vertex, and the largest. Throws InputError where they do not correspond.
+// Distances of the mapped surface `path` from `finest` (both .ply of the same part): of the same points of
+// matter the root of the mean square over the area; and the Hausdorff distance of the two surfaces
+// (study/hausdorff.h). Throws InputError where they do not correspond.
 struct SurfaceDistance {
-  double rms = 0, largest = 0;  // m
+  double rms = 0, hausdorff = 0;  // m
 };
 [[nodiscard]] SurfaceDistance surface_distance(const std::string& path, const std::string& finest);
 // Writes `path` to `out` (.ply) with the distance of each vertex from `finest` as the attribute

@@ -73,7 +73,7 @@ std::vector<Field> fields(std::size_t run, const Row& row, const std::vector<Qua
                                    {"energy drift", number(found.energy_drift)},
                                    {"lag [s]", number(row.lag)},
                                    {"surface rms [m]", number(row.surface_rms)},
-                                   {"surface largest [m]", number(row.surface_largest)},
+                                   {"surface hausdorff [m]", number(row.surface_hausdorff)},
                                    {"error", row.error ? number(row.error->error) : ""},
                                    {"error uncertainty", row.error ? number(row.error->uncertainty) : ""}};
   out.insert(out.end(), rest.begin(), rest.end());

@@ -93,7 +93,7 @@ SortedBlocks sort_into_blocks(const LevelNodes& nodes, int width) {
 
 // Labels the connected pieces of each block 0, 1, ... in order of their first node; returns the number of
 // pieces per block.
-std::vector<std::uint32_t> label_pieces(const SortedBlocks& sorted, const Graph& links, const Graph& strong,
+std::vector<std::uint32_t> label_pieces(const SortedBlocks& sorted, const Links& links, const Links& strong,
                                         bool drop_isolated, std::vector<std::uint32_t>& label) {
   const std::size_t groups = sorted.begin.size() - 1;
   std::vector<std::uint32_t> pieces(groups, 0);
@@ -105,7 +105,7 @@ std::vector<std::uint32_t> label_pieces(const SortedBlocks& sorted, const Graph&
       for (std::uint32_t s = sorted.begin[g]; s < sorted.begin[g + 1]; ++s) {
         const std::uint32_t seed = sorted.order[s];
         if (label[seed] != kUnseen) continue;
-        if (drop_isolated && links.of(seed).empty()) {
+        if (drop_isolated && !links.any(seed)) {
           label[seed] = kNoAggregate;
           continue;
         }
@@ -114,11 +114,11 @@ std::vector<std::uint32_t> label_pieces(const SortedBlocks& sorted, const Graph&
         while (!stack.empty()) {
           const std::uint32_t node = stack.back();
           stack.pop_back();
-          for (const std::uint32_t other : strong.of(node)) {
-            if (sorted.group[other] != g || label[other] != kUnseen) continue;
+          strong.for_each(node, [&](std::uint32_t other) {
+            if (sorted.group[other] != g || label[other] != kUnseen) return;
             label[other] = pieces[g];
             stack.push_back(other);
-          }
+          });
         }
         ++pieces[g];
       }
@@ -151,7 +151,7 @@ Members members_of(const std::vector<std::uint32_t>& of, std::size_t count) {
 
 // Joins aggregates under `smallest` nodes to the neighbour of the same part with most links. Renumbers
 // without gaps; returns the number left.
-std::size_t join_small(const LevelNodes& nodes, const Graph& links, std::size_t smallest, std::size_t count,
+std::size_t join_small(const LevelNodes& nodes, const Links& links, std::size_t smallest, std::size_t count,
                        std::vector<std::uint32_t>& of) {
   const Members members = members_of(of, count);
   std::vector<std::uint32_t> root(count);
@@ -167,11 +167,11 @@ std::size_t join_small(const LevelNodes& nodes, const Graph& links, std::size_t 
     if (root[a] != a || size[a] >= smallest) continue;
     std::map<std::uint32_t, std::size_t> votes;
     for (const std::uint32_t node : members.of(a)) {
-      for (const std::uint32_t other : links.of(node)) {
-        if (of[other] == kNoAggregate || nodes.part[other] != nodes.part[node]) continue;
+      links.for_each(node, [&](std::uint32_t other) {
+        if (of[other] == kNoAggregate || nodes.part[other] != nodes.part[node]) return;
         const std::uint32_t target = find(of[other]);
         if (target != a) ++votes[target];
-      }
+      });
     }
     const auto best = std::max_element(votes.begin(), votes.end(),
                                        [](const auto& x, const auto& y) { return x.second < y.second; });
@@ -210,7 +210,7 @@ LevelNodes aggregate_nodes(const LevelNodes& fine, const std::vector<Index3>& bl
   return nodes;
 }
 
-Graph quotient_graph(const Graph& links, const std::vector<std::uint32_t>& of, const Members& members) {
+Graph quotient_graph(const Links& links, const std::vector<std::uint32_t>& of, const Members& members) {
   const std::size_t count = members.begin.size() - 1;
   std::vector<std::vector<std::uint32_t>> rows(count);
   parallel_for_each(
@@ -218,9 +218,10 @@ Graph quotient_graph(const Graph& links, const std::vector<std::uint32_t>& of, c
       [&](std::size_t a) {
         std::vector<std::uint32_t>& row = rows[a];
         for (const std::uint32_t node : members.of(a)) {
-          for (const std::uint32_t other : links.of(node)) {
-            if (of[other] != a && of[other] != kNoAggregate) row.push_back(of[other]);
-          }
+          links.for_each(node, [&](std::uint32_t other) {
+            const std::uint32_t b = of[other];
+            if (b != a && b != kNoAggregate && (row.empty() || row.back() != b)) row.push_back(b);
+          });
         }
         std::sort(row.begin(), row.end());
         row.erase(std::unique(row.begin(), row.end()), row.end());
@@ -236,9 +237,8 @@ Graph quotient_graph(const Graph& links, const std::vector<std::uint32_t>& of, c
 
 }  // namespace
 
-std::vector<Graph> coupled_rows(const LinearOperator& matrix, std::span<const double> thresholds) {
-  constexpr std::size_t kGrain = 1024;
-  const std::size_t n = matrix.rows(), chunks = (n + kGrain - 1) / kGrain;
+std::vector<std::uint8_t> link_strengths(const LinearOperator& matrix, std::span<const double> thresholds) {
+  const std::size_t n = matrix.rows();
   const auto offsets = matrix.row_offsets();
   const auto columns = matrix.columns();
   std::vector<double> size(n);
@@ -246,41 +246,21 @@ std::vector<Graph> coupled_rows(const LinearOperator& matrix, std::span<const do
     const std::vector<Block> diagonal = matrix.diagonal();
     parallel_for_each(n, [&](std::size_t i) { size[i] = diagonal[i].norm(); });
   }
-  std::vector<Graph> graphs(thresholds.size());
-  for (Graph& graph : graphs) graph.offsets.assign(n + 1, 0);
-  std::vector<std::vector<std::vector<std::uint32_t>>> found(thresholds.size(),
-                                                             std::vector<std::vector<std::uint32_t>>(chunks));
-  parallel_chunks(n, kGrain, [&](std::size_t begin, std::size_t end) {
+  std::vector<std::uint8_t> strength(columns.size(), 0);
+  parallel_chunks(n, 256, [&](std::size_t begin, std::size_t end) {
     thread_local std::vector<Block> room;
     const Block* block = matrix.blocks(begin, end, room);
     for (std::size_t i = begin; i < end; ++i)
       for (std::uint64_t q = offsets[i]; q < offsets[i + 1]; ++q) {
         const std::uint32_t j = columns[q];
-        const double squared = (block++)->squaredNorm();
-        for (std::size_t t = 0; t < graphs.size() && j != i; ++t) {
-          if (!(squared > thresholds[t] * thresholds[t] * size[i] * size[j])) continue;
-          ++graphs[t].offsets[i + 1];
-          found[t][begin / kGrain].push_back(j);
-        }
+        const double squared = (block++)->squaredNorm(), scale = size[i] * size[j];
+        for (const double t : thresholds) strength[q] += j != i && squared > t * t * scale;
       }
   });
-  for (std::size_t t = 0; t < graphs.size(); ++t) {
-    accumulate_counts(graphs[t].offsets);
-    graphs[t].neighbours.resize(graphs[t].offsets.back());
-    parallel_for_each(
-        chunks,
-        [&](std::size_t c) {
-          std::copy(
-              found[t][c].begin(), found[t][c].end(),
-              graphs[t].neighbours.begin() + static_cast<std::ptrdiff_t>(graphs[t].offsets[c * kGrain]));
-          found[t][c] = {};
-        },
-        1);
-  }
-  return graphs;
+  return strength;
 }
 
-Aggregates aggregate(const LevelNodes& nodes, const Graph& links, const Graph& strong,
+Aggregates aggregate(const LevelNodes& nodes, const Links& links, const Links& strong,
                      const AggregateOptions& options) {
   Aggregates result;
   const SortedBlocks sorted = sort_into_blocks(nodes, options.width);

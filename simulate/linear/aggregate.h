@@ -11,14 +11,33 @@ namespace flexel {
 
 constexpr std::uint32_t kNoAggregate = 0xffffffffu;
 
+// Links between nodes, both directions: those entries of compressed rows that are as strong as `least`. The
+// rows live elsewhere.
+struct Links {
+  std::span<const std::uint64_t> offsets;     // (nodes + 1)
+  std::span<const std::uint32_t> neighbours;  // ascending within a row
+  std::span<const std::uint8_t> strength;     // (neighbours); empty: every entry counts
+  std::uint8_t least = 1;
+
+  [[nodiscard]] bool holds(std::uint64_t entry) const { return strength.empty() || strength[entry] >= least; }
+  // body(neighbour)
+  template <class Body>
+  void for_each(std::size_t node, const Body& body) const {
+    for (std::uint64_t q = offsets[node]; q < offsets[node + 1]; ++q)
+      if (holds(q)) body(neighbours[q]);
+  }
+  [[nodiscard]] bool any(std::size_t node) const {
+    for (std::uint64_t q = offsets[node]; q < offsets[node + 1]; ++q)
+      if (holds(q)) return true;
+    return false;
+  }
+};
+
 // Compressed rows of neighbours, both directions, without the node itself.
 struct Graph {
   std::vector<std::uint64_t> offsets;     // (nodes + 1)
   std::vector<std::uint32_t> neighbours;  // ascending within a row
-  [[nodiscard]] std::size_t nodes() const { return offsets.empty() ? 0 : offsets.size() - 1; }
-  [[nodiscard]] std::span<const std::uint32_t> of(std::size_t node) const {
-    return {neighbours.data() + offsets[node], static_cast<std::size_t>(offsets[node + 1] - offsets[node])};
-  }
+  [[nodiscard]] Links links() const { return {offsets, neighbours, {}, 1}; }
 };
 
 // The unknowns of one level: elements, or aggregates of the level below.
@@ -37,9 +56,10 @@ struct Aggregates {
   [[nodiscard]] std::size_t count() const { return nodes.index.size(); }
 };
 
-// For each threshold: pairs of rows with |A_ij| > threshold sqrt(|A_ii| |A_jj|) (Frobenius norms).
-[[nodiscard]] std::vector<Graph> coupled_rows(const LinearOperator& matrix,
-                                              std::span<const double> thresholds);
+// (blocks) For each block A_ij, i != j, how many of the ascending thresholds t it exceeds: |A_ij| > t
+// sqrt(|A_ii| |A_jj|) (Frobenius norms). 0 on the diagonal.
+[[nodiscard]] std::vector<std::uint8_t> link_strengths(const LinearOperator& matrix,
+                                                       std::span<const double> thresholds);
 
 struct AggregateOptions {
   int width = 3;               // nodes along each edge of a block
@@ -49,7 +69,7 @@ struct AggregateOptions {
 
 // Cuts each part into blocks of about `width`^3 nodes, evenly along each axis, and each block into the pieces
 // that `strong` connects. Aggregates are numbered along x, then y, then z, part by part.
-[[nodiscard]] Aggregates aggregate(const LevelNodes& nodes, const Graph& links, const Graph& strong,
+[[nodiscard]] Aggregates aggregate(const LevelNodes& nodes, const Links& links, const Links& strong,
                                    const AggregateOptions& options);
 
 }  // namespace flexel

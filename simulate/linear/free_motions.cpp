@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 
+#include "formats/disjoint_sets.h"
 #include "formats/parallel.h"
 #include "simulate/linear/aggregate.h"
 #include "simulate/linear/solve.h"
@@ -24,22 +25,22 @@ constexpr double kCoupled = 1e-12;
 
 // Connected groups of rows, each ascending, in order of their first row.
 std::vector<Rows> connected_groups(const LinearOperator& matrix) {
-  const Graph graph = std::move(coupled_rows(matrix, std::array{kCoupled}).front());
-  std::vector<std::uint8_t> seen(graph.nodes(), 0);
+  const std::vector<std::uint8_t> strength = link_strengths(matrix, std::array{kCoupled});
+  const auto offsets = matrix.row_offsets();
+  const auto columns = matrix.columns();
+  DisjointSets sets(matrix.rows());
+  for (std::uint32_t i = 0; i < matrix.rows(); ++i)
+    for (std::uint64_t q = offsets[i]; q < offsets[i + 1]; ++q)
+      if (columns[q] < i && strength[q] > 0) sets.unite(i, columns[q]);
   std::vector<Rows> groups;
-  for (std::uint32_t seed = 0; seed < graph.nodes(); ++seed) {
-    if (seen[seed]) continue;
-    seen[seed] = 1;
-    Rows rows{seed};
-    for (std::size_t next = 0; next < rows.size(); ++next) {
-      for (const std::uint32_t other : graph.of(rows[next])) {
-        if (seen[other]) continue;
-        seen[other] = 1;
-        rows.push_back(other);
-      }
+  std::vector<std::uint32_t> number(matrix.rows(), kNoAggregate);  // of the group, by root
+  for (std::uint32_t i = 0; i < matrix.rows(); ++i) {
+    std::uint32_t& group = number[sets.root(i)];
+    if (group == kNoAggregate) {
+      group = static_cast<std::uint32_t>(groups.size());
+      groups.emplace_back();
     }
-    std::sort(rows.begin(), rows.end());
-    groups.push_back(std::move(rows));
+    groups[group].push_back(i);
   }
   return groups;
 }
@@ -76,40 +77,45 @@ struct Restriction {
   }
 };
 
-// A times each of the six motions, each group moving about its own centre.
-std::array<std::vector<Vec3>, 6> forces_of_motions(const LinearOperator& matrix,
-                                                   const std::vector<Rows>& groups,
-                                                   const std::vector<Frame>& frames,
-                                                   const std::vector<Vec3>& position) {
-  std::array<std::vector<Vec3>, 6> forces;
-  std::vector<Vec3> moved(matrix.rows());
-  for (std::size_t motion = 0; motion < 6; ++motion) {
+struct Work {
+  Motion of = Motion::Zero();
+  void operator+=(const Work& other) { of += other.of; }
+};
+
+// Each group moves about its own centre, one motion after the other: A times all six is never held.
+std::vector<Restriction> restrict_to_rigid(const LinearOperator& matrix, const std::vector<Rows>& groups,
+                                           const std::vector<Frame>& frames,
+                                           const std::vector<Vec3>& position) {
+  std::vector<Restriction> result(groups.size());
+  std::vector<Vec3> moved(matrix.rows()), force(matrix.rows());
+  for (Eigen::Index motion = 0; motion < 6; ++motion) {
     for (std::size_t g = 0; g < groups.size(); ++g)
       parallel_for_each(groups[g].size(), [&](std::size_t r) {
         const std::uint32_t i = groups[g][r];
-        moved[i] = frames[g].at(position[i]).col(static_cast<Eigen::Index>(motion));
+        moved[i] = frames[g].at(position[i]).col(motion);
       });
-    multiply(matrix, moved, forces[motion]);
+    multiply(matrix, moved, force);
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      const Work work = parallel_sum<Work>(groups[g].size(), [&](std::size_t r) {
+        const std::uint32_t i = groups[g][r];
+        return Work{frames[g].at(position[i]).transpose() * force[i]};
+      });
+      result[g].energy.col(motion) = work.of;
+    }
   }
-  return forces;
-}
-
-Restriction restrict_to_rigid(const std::array<std::vector<Vec3>, 6>& forces,
-                              const std::vector<Block>& diagonal, const Rows& rows, const Frame& frame,
-                              const std::vector<Vec3>& position) {
-  const double share = 1 / static_cast<double>(rows.size());
-  return parallel_sum<Restriction>(rows.size(), [&](std::size_t r) {
-    const std::uint32_t i = rows[r];
-    const Motions own = frame.at(position[i]);
-    Motions force;
-    for (std::size_t motion = 0; motion < 6; ++motion)
-      force.col(static_cast<Eigen::Index>(motion)) = forces[motion][i];
-    Restriction term;
-    term.energy = own.transpose() * force;
-    term.size = share * own.transpose() * own;
-    term.stiffness = share * diagonal[i].trace() / 3;
-    return term;
-  });
+  const std::vector<Block> diagonal = matrix.diagonal();
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const double share = 1 / static_cast<double>(groups[g].size());
+    result[g] += parallel_sum<Restriction>(groups[g].size(), [&](std::size_t r) {
+      const std::uint32_t i = groups[g][r];
+      const Motions own = frames[g].at(position[i]);
+      Restriction term;
+      term.size = share * own.transpose() * own;
+      term.stiffness = share * diagonal[i].trace() / 3;
+      return term;
+    });
+  }
+  return result;
 }
 
 // Orthonormal base of the motions of non-zero size whose energy per size is at most `limit`.
@@ -172,15 +178,11 @@ std::vector<FreeMotion> free_motions(const LinearOperator& matrix, const NodeGeo
   const std::vector<Rows> groups = connected_groups(matrix);
   std::vector<Frame> frames;
   for (const Rows& rows : groups) frames.push_back(group_frame(rows, geometry.position));
-  const auto forces = forces_of_motions(matrix, groups, frames, geometry.position);
-  const std::vector<Block> diagonal = matrix.diagonal();
-  for (std::size_t g = 0; g < groups.size(); ++g) {
-    const Restriction restriction =
-        restrict_to_rigid(forces, diagonal, groups[g], frames[g], geometry.position);
-    // The energy of a motion of unit mean square size, beside that of one element moved alone.
-    tell(free_space(restriction, threshold * restriction.stiffness), geometry.part[groups[g].front()],
+  const std::vector<Restriction> restrictions = restrict_to_rigid(matrix, groups, frames, geometry.position);
+  // The energy of a motion of unit mean square size, beside that of one element moved alone.
+  for (std::size_t g = 0; g < groups.size(); ++g)
+    tell(free_space(restrictions[g], threshold * restrictions[g].stiffness), geometry.part[groups[g].front()],
          motions);
-  }
   return motions;
 }
 

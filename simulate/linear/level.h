@@ -33,7 +33,8 @@ struct Level {
   Chebyshev smoother;
   Transfer<R> transfer;
   mutable std::vector<double> rhs, x, next;  // (rows x R) work of one cycle
-  mutable std::vector<double> image;         // (rows x R) likewise, of an operator
+  // (rows x R) likewise, of an operator: A times a vector, and D^-1 times a residual
+  mutable std::vector<double> image, scaled;
 };
 
 constexpr std::size_t kRowGrain = 256;

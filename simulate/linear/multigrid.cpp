@@ -10,9 +10,11 @@
 // values before they are rounded.
 #include <array>
 #include <cassert>
+#include <optional>
 
 #include "simulate/linear/direct.h"
 #include "simulate/linear/level.h"
+#include "simulate/linear/rigid_transfer.h"
 #include "simulate/linear/solve.h"
 
 namespace flexel {
@@ -34,14 +36,6 @@ MatrixView<BlockType> view(const Pattern& pattern, const std::vector<BlockType>&
 double smoothing_weight(double largest_eigenvalue) {
   return 4. / 3 / (1.05 * largest_eigenvalue);
 }
-
-// What a level's prolongator is made from, besides the matrix.
-struct Grouping {
-  std::vector<std::uint32_t> aggregate_of;  // (rows)
-  std::vector<Vec3> offset;                 // (rows x 3) m, from the aggregate's centre
-  std::vector<float> fine_reach;            // (rows); empty for elements
-  std::vector<double> coarse_reach;         // (aggregates)
-};
 
 Grouping grouping(const LevelNodes& fine, const Aggregates& aggregates) {
   Grouping result{
@@ -73,21 +67,30 @@ Mat3 free_directions(const Mat3& sum, const Mat3& own) {
   return projector;
 }
 
-// The projectors of all rows. The sum of a row's blocks is what moving everything together is resisted with.
-std::vector<Eigen::Matrix3f> free_directions(const LinearOperator& matrix,
-                                             const std::vector<Block>& diagonal) {
+// The projectors of those rows that a support holds, ascending. The sum of a row's blocks is what moving
+// everything together is resisted with. The level's work vectors are overwritten.
+std::vector<std::pair<std::uint32_t, Mat3>> free_directions(const LinearOperator& matrix,
+                                                            const std::vector<Block>& diagonal,
+                                                            Level<3>& level) {
+  constexpr std::size_t kGrain = 4096;
   const std::size_t n = matrix.rows();
-  std::vector<Eigen::Matrix3f> free(n);
-  std::vector<double> together(3 * n), force(3 * n);
+  std::vector<Eigen::Matrix3f> sum(n);
   for (int axis = 0; axis < 3; ++axis) {
-    parallel_for_each(3 * n, [&](std::size_t k) { together[k] = static_cast<int>(k % 3) == axis; });
-    matrix.multiply(together.data(), force.data());
-    parallel_for_each(n, [&](std::size_t i) { free[i].col(axis) = entry<3>(force.data(), i).cast<float>(); });
+    parallel_for_each(3 * n, [&](std::size_t k) { level.next[k] = static_cast<int>(k % 3) == axis; });
+    matrix.multiply(level.next.data(), level.image.data());
+    parallel_for_each(
+        n, [&](std::size_t i) { sum[i].col(axis) = entry<3>(level.image.data(), i).cast<float>(); });
   }
-  parallel_for_each(n, [&](std::size_t i) {
-    free[i] = free_directions(free[i].cast<double>(), diagonal[i]).cast<float>();
+  std::vector<std::vector<std::pair<std::uint32_t, Mat3>>> found((n + kGrain - 1) / kGrain);
+  parallel_chunks(n, kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Mat3 free = free_directions(sum[i].cast<double>(), diagonal[i]);
+      if (free != Mat3::Identity()) found[begin / kGrain].emplace_back(static_cast<std::uint32_t>(i), free);
+    }
   });
-  return free;
+  std::vector<std::pair<std::uint32_t, Mat3>> result;
+  for (const auto& chunk : found) result.insert(result.end(), chunk.begin(), chunk.end());
+  return result;
 }
 
 // Returns the diagonal blocks.
@@ -98,16 +101,12 @@ std::vector<Block> make_smoother(const LinearOperator& matrix, Level<3>& level) 
   return diagonal;
 }
 
-void refresh_transfer(const LinearOperator& matrix, const Grouping& groups, Level<3>& level) {
-  const std::vector<Block> diagonal = make_smoother(matrix, level);
-  const std::vector<Eigen::Matrix3f> free = free_directions(matrix, diagonal);
-  const auto tentative = [&](std::size_t i) -> Eigen::Matrix<double, 6, 3> {
-    const double reach = groups.coarse_reach[groups.aggregate_of[i]];
-    return rigid_motion<3>(groups.offset[i], 0, reach) * free[i].cast<double>();
-  };
-  smooth_prolongator<3>(OperatorView(matrix), level.inverse_diagonal,
-                        smoothing_weight(level.largest_eigenvalue), groups.aggregate_of, tentative,
-                        level.transfer);
+// Values of the prolongator, for the coarse matrix alone: the cycle applies it as RigidTransfer says.
+void refresh_transfer(const LinearOperator& matrix, RigidTransfer& rigid, Level<3>& level) {
+  rigid.restrain(free_directions(matrix, make_smoother(matrix, level), level));
+  smooth_prolongator<3>(
+      OperatorView(matrix), level.inverse_diagonal, smoothing_weight(level.largest_eigenvalue),
+      rigid.aggregate_of(), [&](std::size_t i) { return rigid.at(i); }, level.transfer);
 }
 
 void refresh_transfer(const MatrixView<Square<6>>& matrix, const Grouping& groups, Level<6>& level) {
@@ -159,9 +158,9 @@ class Multigrid : public Preconditioner {
     double* work = fine_.next.data();
     const LinearOperator& fine = matrix_;
     smooth_from_zero<3>(fine, fine_, b, x, work);
-    restrict_residual<3>(fine, fine_, b, x, work, coarse_.front().level.rhs.data());
+    restrict_elements(b, x);
     cycle(0);
-    prolong<3>(fine_, coarse_.front().level.x.data(), x);
+    prolong_elements(x);
     smooth<3>(fine, fine_, b, x, work);
   }
 
@@ -177,9 +176,10 @@ class Multigrid : public Preconditioner {
   void refresh() override {
     if (matrix_.rows() == 0) return;
     if (coarse_.empty()) return factorise_at_once();
-    refresh_transfer(matrix_, groups_, fine_);
+    refresh_transfer(matrix_, *rigid_, fine_);
     std::vector<Square<6>> values =
         galerkin<3>(OperatorView(matrix_), fine_.transfer, coarse_.front().pattern);
+    fine_.transfer.values = {};
     for (std::size_t l = 0; l < coarse_.size(); ++l) {
       CoarseLevel& coarse = coarse_[l];
       const auto exact = view(coarse.pattern, values);
@@ -190,7 +190,7 @@ class Multigrid : public Preconditioner {
       refresh_transfer(exact, coarse.groups, coarse.level);
       std::vector<Square<6>> next = galerkin<6>(exact, coarse.level.transfer, coarse_[l + 1].pattern);
       coarse.values.resize(values.size());
-      for (std::size_t q = 0; q < values.size(); ++q) coarse.values[q] = values[q].cast<float>();
+      parallel_for_each(values.size(), [&](std::size_t q) { coarse.values[q] = values[q].cast<float>(); });
       values = std::move(next);
     }
   }
@@ -208,18 +208,24 @@ class Multigrid : public Preconditioner {
     LevelNodes nodes{geometry.index, geometry.part, geometry.position,
                      std::vector<double>(matrix_.rows(), 0)};
     const OperatorView fine(matrix_);
-    const std::vector<Graph> graphs = coupled_rows(matrix_, std::array{kAnyLink, kStrongLink});
-    Aggregates aggregates =
-        aggregate(nodes, graphs[0], graphs[1], {.width = 3, .smallest = 4, .drop_isolated = true});
-    groups_ = grouping(nodes, aggregates);
+    Aggregates aggregates;
+    {
+      const std::vector<std::uint8_t> strength = link_strengths(matrix_, std::array{kAnyLink, kStrongLink});
+      aggregates = aggregate(nodes, {fine.offsets, fine.columns, strength, 1},
+                             {fine.offsets, fine.columns, strength, 2},
+                             {.width = 3, .smallest = 4, .drop_isolated = true});
+    }
+    rigid_.emplace(grouping(nodes, aggregates));
     fine_.transfer = transfer_pattern<3>(fine, aggregates.of, aggregates.count());
     fine_.next.resize(3 * matrix_.rows());
     fine_.image.resize(3 * matrix_.rows());
+    fine_.scaled.resize(3 * matrix_.rows());
     coarse_.emplace_back().pattern = coarse_pattern<3>(fine, fine_.transfer);
     while (aggregates.count() > kCoarsestRows) {
       nodes = std::move(aggregates.nodes);
       const Graph links = std::move(aggregates.links);
-      aggregates = aggregate(nodes, links, links, {.width = 2, .smallest = 2, .drop_isolated = false});
+      aggregates =
+          aggregate(nodes, links.links(), links.links(), {.width = 2, .smallest = 2, .drop_isolated = false});
       if (aggregates.count() > nodes.index.size() * 4 / 5) break;  // nothing left to group: many small parts
       CoarseLevel& last = coarse_.back();
       last.groups = grouping(nodes, aggregates);
@@ -234,6 +240,35 @@ class Multigrid : public Preconditioner {
       coarse.level.x.resize(size);
       coarse.level.next.resize(size);
     }
+  }
+
+  // The right-hand side of the first coarser level: P^T (b - A x) = T^T (r - w A D^-1 r).
+  void restrict_elements(const double* b, const double* x) const {
+    const double weight = smoothing_weight(fine_.largest_eigenvalue);
+    double *residual = fine_.next.data(), *scaled = fine_.scaled.data(), *image = fine_.image.data();
+    for_each_product<3>(matrix_, x, image, [&](std::size_t i, const auto& product) {
+      const Vec3 left = entry<3>(b, i) - product;
+      entry<3>(residual, i) = left;
+      entry<3>(scaled, i) = times<3>(fine_.inverse_diagonal[i], left);
+    });
+    matrix_.multiply(scaled, image);
+    rigid_->collect(
+        [&](std::size_t i) -> Vec3 {
+          return entry<3>(static_cast<const double*>(residual), i) -
+                 weight * entry<3>(static_cast<const double*>(image), i);
+        },
+        coarse_.front().level.rhs.data());
+  }
+
+  // x += P c, c the answer of the first coarser level: e = T c, x += e - w D^-1 A e.
+  void prolong_elements(double* x) const {
+    const double weight = smoothing_weight(fine_.largest_eigenvalue);
+    double* moved = fine_.next.data();
+    rigid_->spread(coarse_.front().level.x.data(), moved);
+    for_each_product<3>(matrix_, moved, fine_.image.data(), [&](std::size_t i, const auto& product) {
+      const Vec3 force = weight * product;
+      entry<3>(x, i) += entry<3>(moved, i) - times<3>(fine_.inverse_diagonal[i], force);
+    });
   }
 
   // Solves level l approximately: from its rhs to its x.
@@ -254,7 +289,7 @@ class Multigrid : public Preconditioner {
   }
 
   const LinearOperator& matrix_;
-  Grouping groups_;
+  std::optional<RigidTransfer> rigid_;  // nothing where the matrix itself is factorised
   Level<3> fine_;
   std::vector<CoarseLevel> coarse_;  // empty where the matrix itself is factorised
   DirectSolver coarsest_;

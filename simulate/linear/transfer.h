@@ -165,33 +165,48 @@ template <int R, class View>
   return transfer;
 }
 
-// Values of P = T - weight D^-1 A T. `tentative(i)` is the transposed (6 x R) block of T in row i;
-// `inverse_diagonal` holds D^-1.
+// Values of P = T - weight D^-1 A T. `tentative(i)` is the transposed (6 x R) block of T in row i, which has
+// an aggregate; `inverse_diagonal` holds D^-1.
 template <int R, class View, class Inverse, class Tentative>
 void smooth_prolongator(const View& matrix, const std::vector<Inverse>& inverse_diagonal, double weight,
                         const std::vector<std::uint32_t>& aggregate_of, const Tentative& tentative,
                         Transfer<R>& transfer) {
-  using Transposed = Eigen::Matrix<double, 6, R>;
-  transfer.values.resize(transfer.pattern.columns.size() + 1);  // the kernels read past a block's end
+  using Transposed = Eigen::Matrix<float, 6, R>;
+  constexpr std::size_t kWidth = galerkin_kernel::kWidth, kBlock = R * kWidth;
+  const auto add = galerkin_table().products[R / 6];
+  const Pattern& pattern = transfer.pattern;
+  std::vector<Transposed> rigid(matrix.rows() + 1);  // the kernels read past a block's end
+  rigid.back().setZero();
+  parallel_for_each(matrix.rows(), [&](std::size_t i) {
+    if (aggregate_of[i] != kNoAggregate) rigid[i] = tentative(i).template cast<float>();
+  });
+  transfer.values.resize(pattern.columns.size() + 1);  // likewise
   transfer.values.back().setZero();
   parallel_chunks(matrix.rows(), 256, [&](std::size_t begin, std::size_t end) {
-    std::vector<Transposed> sums;
+    thread_local std::vector<std::uint32_t> slot;  // of an aggregate in the row; stale elsewhere
+    thread_local std::vector<double> sums;
+    thread_local std::vector<galerkin_kernel::Product> products;
     thread_local std::vector<Block> room;
+    if (slot.size() < transfer.coarse_rows) slot.resize(transfer.coarse_rows);
     const auto* blocks = row_blocks(matrix, begin, end, room) - matrix.offsets[begin];
     for (std::size_t i = begin; i < end; ++i) {
-      const std::uint64_t first = transfer.pattern.offsets[i];
-      if (transfer.pattern.offsets[i + 1] == first) continue;
-      sums.assign(transfer.pattern.offsets[i + 1] - first, Transposed::Zero());
+      const std::uint64_t first = pattern.offsets[i], count = pattern.offsets[i + 1] - first;
+      if (count == 0) continue;
+      for (std::uint64_t s = 0; s < count; ++s)
+        slot[pattern.columns[first + s]] = static_cast<std::uint32_t>(s);
+      sums.assign(kBlock * count, 0);
+      products.clear();
       for (std::uint64_t q = matrix.offsets[i]; q < matrix.offsets[i + 1]; ++q) {
-        const std::uint32_t j = matrix.columns[q];
-        if (aggregate_of[j] == kNoAggregate) continue;
-        sums[position_in_row(transfer.pattern, i, aggregate_of[j]) - first].noalias() +=
-            tentative(j) * blocks[q].transpose();
+        const std::uint32_t j = matrix.columns[q], a = aggregate_of[j];
+        if (a != kNoAggregate)
+          products.push_back({blocks[q].data(), rigid[j].data(), sums.data() + kBlock * slot[a]});
       }
-      const Eigen::Matrix<double, R, R> inverse = inverse_diagonal[i].template cast<double>();
-      for (std::size_t s = 0; s < sums.size(); ++s) {
-        Transposed block = -weight * (sums[s] * inverse);  // D^-1 is symmetric
-        if (transfer.pattern.columns[first + s] == aggregate_of[i]) block += tentative(i);
+      add(products.data(), products.size());
+      const Eigen::Matrix<double, R, R> step = -weight * inverse_diagonal[i].template cast<double>();
+      for (std::uint64_t s = 0; s < count; ++s) {
+        const Eigen::Map<const Eigen::Matrix<double, kWidth, R>> sum(sums.data() + kBlock * s);
+        Eigen::Matrix<double, 6, R> block = sum.template topRows<6>() * step;  // D^-1 is symmetric
+        if (pattern.columns[first + s] == aggregate_of[i]) block += rigid[i].template cast<double>();
         transfer.values[first + s] = block.template cast<float>();
       }
     }

@@ -41,7 +41,7 @@ FLEXEL_INLINE bool is_row(const T* numbers, std::size_t at, std::size_t count) {
 FLEXEL_INLINE Triple<Lanes> split(const double* from) {
   const Lanes m0 = load(from), m1 = load(from + kLanes), m2 = load(from + 2 * kLanes);
   const auto pick = [&](const LaneBits& of_two, const LaneBits& of_last) __attribute__((always_inline)) {
-    return __builtin_shuffle(__builtin_shuffle(m0, m1, of_two), m2, of_last);
+    return shuffle(shuffle(m0, m1, of_two), m2, of_last);
   };
   return {{pick(LaneBits{0, 3, 6, 9, 12, 15, 0, 0}, LaneBits{0, 1, 2, 3, 4, 5, 10, 13}),
            pick(LaneBits{1, 4, 7, 10, 13, 0, 0, 0}, LaneBits{0, 1, 2, 3, 4, 8, 11, 14}),
@@ -50,7 +50,7 @@ FLEXEL_INLINE Triple<Lanes> split(const double* from) {
 
 FLEXEL_INLINE Triple<Lanes> join(const Triple<Lanes>& v) {
   const auto pick = [&](const LaneBits& of_two, const LaneBits& of_last) __attribute__((always_inline)) {
-    return __builtin_shuffle(__builtin_shuffle(v.at[0], v.at[1], of_two), v.at[2], of_last);
+    return shuffle(shuffle(v.at[0], v.at[1], of_two), v.at[2], of_last);
   };
   return {{pick(LaneBits{0, 8, 0, 1, 9, 0, 2, 10}, LaneBits{0, 1, 8, 3, 4, 9, 6, 7}),
            pick(LaneBits{0, 3, 11, 0, 4, 12, 0, 5}, LaneBits{10, 1, 2, 11, 4, 5, 12, 7}),
@@ -107,7 +107,7 @@ FLEXEL_INLINE void advance_row(const ChunkView& chunk, const StateView& state, c
     Lanes total = force.at[c];
     if (state.outer) total += load(state.outer + at);
     const Lanes before = load(state.velocity + at);
-    const Lanes after = before + __builtin_shuffle(gain, own[c]) * total;
+    const Lanes after = before + shuffle(gain, gain, own[c]) * total;
     store(state.velocity + at, after);
     store(state.displacement + at,
           load(state.displacement + at) + advance.drift * (advance.explicit_drift ? before : after));

@@ -158,7 +158,7 @@ struct SpringsModel {
         if constexpr (damping == Damping::book) {
           // As cells do (kernel.cpp): the energy of half a step ago.
           const Lanes released = 0.5 * stiffness * stretch * stretch - 0.5 * advance.kick * pull * along;
-          sums.released += gone & ((before >> spring & 1) == 0) & (fill > 0) ? released : Lanes{};
+          sums.released += (gone & ((before >> spring & 1) == 0) & (fill > 0)) ? released : Lanes{};
         }
         pull = gone ? Lanes{} : pull;
         viscous = gone ? Lanes{} : viscous;

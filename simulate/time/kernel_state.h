@@ -47,7 +47,7 @@ FLEXEL_INLINE void add_to_corners(const ChunkView& chunk, const CellBlock& block
       for (int c = 0; c < 3; ++c) {
         double* row = column[c] + corner[a];
         const Lanes& next = corners.at[a + 1][c];
-        store(row, load(row) + (corners.at[a][c] + __builtin_shuffle(Lanes{}, next, one_on)));
+        store(row, load(row) + (corners.at[a][c] + shuffle(Lanes{}, next, one_on)));
         row[8] += next[7];
       }
   } else {

@@ -39,6 +39,18 @@ FLEXEL_INLINE Lanes square_root(const Lanes& x) {
   return root;
 }
 
+// Lane l is the one of a, b (0 to 7, 8 to 15) that `from` names for it; Clang knows no such built-in for
+// vectors of indices.
+FLEXEL_INLINE Lanes shuffle(const Lanes& a, const Lanes& b, const LaneBits& from) {
+#if defined(__clang__)
+  Lanes picked;
+  for (int l = 0; l < 8; ++l) picked[l] = from[l] < 8 ? a[from[l]] : b[from[l] - 8];
+  return picked;
+#else
+  return __builtin_shuffle(a, b, from);
+#endif
+}
+
 FLEXEL_INLINE double sum(const Lanes& x) {
   return ((x[0] + x[1]) + (x[2] + x[3])) + ((x[4] + x[5]) + (x[6] + x[7]));
 }

@@ -63,6 +63,30 @@ TEST(Accuracy, ValuesThatJumpAreNotTrusted) {
   EXPECT_NE(report.sentence().find("NOT the 2 % asked for"), std::string::npos) << report.sentence();
 }
 
+// Walls of one to two cells: two coarse lattices that happen to agree, 13 % from the limit (the fork of the
+// real parts did so). An order far above the model's own is no order.
+TEST(Accuracy, ValuesThatCloseInTooFastAreNotTrusted) {
+  const auto value = [](double h) { return h > 0.06 ? 3.88 : h > 0.03 ? 4.858 : h > 0.02 ? 4.898 : 5.6; };
+  const AccuracyReport report = choose(made_up(value), 0.02);
+  ASSERT_GT(report.runs.size(), 3u);
+  EXPECT_GT(*report.runs[2].error, 0.05);
+}
+
+TEST(Accuracy, ProbesCountWhereThereAreSome) {
+  const SolveAt solve = made_up([](double h) { return 1 + std::log(h); });  // a vertex that has no limit
+  const SolveAt with_probe = [&](std::optional<double> size) {
+    SolvedRun run = solve(size);
+    run.simulated.probes.emplace_back();
+    run.simulated.probes.back().name = "tip";
+    run.simulated.probes.back().displacement = Vec3(0, 1 + run.size * run.size, 0);
+    return run;
+  };
+  const AccuracyReport report = choose(with_probe, 0.02);
+  EXPECT_TRUE(report.met());
+  EXPECT_EQ(report.runs.back().of, "probe tip");
+  EXPECT_FALSE(choose(solve, 0.02).met());
+}
+
 TEST(Accuracy, WithinIsTheFinestThatFits) {
   const auto value = [](double h) { return 1 + h; };
   const AccuracyReport report = choose(made_up(value, 1e-4), std::nullopt, 20);

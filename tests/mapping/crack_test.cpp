@@ -290,7 +290,7 @@ TEST(Crack, ALeafThatBreaksOffTakesNothingOfTheOther) {
     cut = 0.5 * (box.min.x() + box.max.x());
   }
   derive_connections(body);
-  const Fragments fragments = find_fragments(body, element_adjacency(body));
+  const Components fragments = find_components(body, element_adjacency(body));
   ASSERT_EQ(fragments.list.size(), 2u);
   std::set<Index3> first, second;
   for (std::uint32_t e = 0; e < body.element_count(); ++e)

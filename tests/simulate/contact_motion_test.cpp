@@ -58,13 +58,6 @@ TEST(Contact, SameBitsForAnyNumberOfThreads) {
   }
 }
 
-ContactPlane floor_at(double height, const Vec3& normal = Vec3::UnitZ()) {
-  ContactPlane plane;
-  plane.point = Vec3(0, 0, height);
-  plane.normal = normal;
-  return plane;
-}
-
 // Mean velocity of a part.
 Vec3 mean_velocity(const Body& body, std::size_t part) {
   const Column& column = body.element_columns.at("velocity");
@@ -83,7 +76,7 @@ TimedCase bounce(int cells, double step = 0) {
   Scene scene = scene_of(0.012);
   if (step > 0) scene.run.step = step;
   throw_part(scene, "a", Vec3(0, 0, -0.3));
-  scene.get<Contact>().planes.push_back(floor_at(-0.0005));
+  scene.get<Contact>().planes.push_back(plane_at(-0.0005));
   return testing::run_timed(block("a", {3, 3, cells}, Vec3::Zero()), scene);
 }
 
@@ -111,7 +104,7 @@ TEST(Contact, ABlockBouncesOffAPlane) {
 TEST(Contact, TheStepIsAtLeastHalfOfTheBareOne) {
   const Body body = block("a", {3, 3, 3}, Vec3::Zero());
   Scene scene = scene_of(1e-4);
-  scene.get<Contact>().planes.push_back(floor_at(0));
+  scene.get<Contact>().planes.push_back(plane_at(0));
   const double touching = testing::run_timed(body, scene).result.timed->step;
   scene.get<Contact>() = {};
   const double bare = testing::run_timed(body, scene).result.timed->step;
@@ -199,7 +192,7 @@ Slope slide(double angle, double friction, double time, double turned, double st
     append(body, block("ramp", {9, 5, 1}, tilt * Vec3(-0.02, -0.012, -kSide), tilt));
     scene.get<Ties>().ties.push_back(make_fix(select_by_name("ramp")));
   } else {
-    scene.get<Contact>().planes.push_back(floor_at(0, tilt.col(2)));
+    scene.get<Contact>().planes.push_back(plane_at(0, tilt.col(2)));
   }
   const Vec3 down = tilt.col(0);
   if (start != 0) throw_part(scene, "block", start * down);

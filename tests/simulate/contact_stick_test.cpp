@@ -19,13 +19,6 @@ namespace {
 using namespace flexel::testing;
 using ::testing::HasSubstr;
 
-ContactPlane plane_at(double height, const Vec3& normal = Vec3::UnitZ()) {
-  ContactPlane plane;
-  plane.point = Vec3(0, 0, height);
-  plane.normal = normal;
-  return plane;
-}
-
 // Mean displacement of a part.
 Vec3 way_of(const Body& body, std::size_t part) {
   Vec3 sum = Vec3::Zero();

@@ -9,6 +9,7 @@
 #include "simulate/scene.h"
 #include "simulate/simulate.h"
 #include "tests/simulate/box_body.h"
+#include "tests/simulate/scene_case.h"
 
 namespace flexel {
 namespace {
@@ -16,6 +17,8 @@ namespace {
 using testing::box_body;
 using testing::BoxOptions;
 using ::testing::HasSubstr;
+using testing::refusal;
+using testing::run;
 
 BoxOptions small_box() {
   BoxOptions options;
@@ -31,20 +34,6 @@ Scene steel_scene() {
   Scene scene;
   scene.material = "steel";
   return scene;
-}
-
-SimulateResult run(Body& body, const Scene& scene) {
-  Progress progress("test", Progress::Mode::quiet);
-  return simulate(body, scene, {}, progress);
-}
-
-std::string refusal(Body body, const Scene& scene) {
-  try {
-    (void)run(body, scene);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "accepted";
 }
 
 Selection face(const char* name) {

@@ -7,14 +7,14 @@
 
 namespace flexel {
 
-struct Fragment {
+struct Component {
   std::uint32_t part = 0;
   std::uint32_t elements = 0;
 };
 
-struct Fragments {
+struct Components {
   std::vector<std::uint32_t> of;      // (elements) index into list
-  std::vector<Fragment> list;         // by part, then most elements first, then lowest element
+  std::vector<Component> list;        // by part, then most elements first, then lowest element
   std::vector<std::uint32_t> offset;  // (parts + 1) a part's fragments in list
   // Debris: an element that nothing holds any more, in a part that has other fragments.
   [[nodiscard]] bool debris(std::uint32_t fragment) const {
@@ -25,6 +25,6 @@ struct Fragments {
 };
 
 // Connected components of `connections`, which element_adjacency(body) gives.
-[[nodiscard]] Fragments find_fragments(const Body& body, const Adjacency& connections);
+[[nodiscard]] Components find_components(const Body& body, const Adjacency& connections);
 
 }  // namespace flexel

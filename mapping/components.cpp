@@ -1,5 +1,5 @@
 // Union-find over the connections, then a sort of the components of each part.
-#include "mapping/fragments.h"
+#include "mapping/components.h"
 
 #include <algorithm>
 
@@ -7,12 +7,12 @@
 
 namespace flexel {
 
-Fragments find_fragments(const Body& body, const Adjacency& connections) {
+Components find_components(const Body& body, const Adjacency& connections) {
   const auto n = static_cast<std::uint32_t>(body.element_count());
   DisjointSets sets(n);
   for (std::uint32_t e = 0; e < n; ++e)
     for (const std::uint32_t other : connections.of(e)) sets.unite(e, other);
-  Fragments fragments;
+  Components fragments;
   std::vector<std::uint32_t> size(n, 0), number(n, 0);
   for (std::uint32_t e = 0; e < n; ++e) ++size[sets.root(e)];
   fragments.offset.push_back(0);
