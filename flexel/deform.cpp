@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::size_t kFirstCells = 2000;  // of the first run of --accuracy and --within
 
-struct Arguments {
+struct DeformArguments {
   JobArguments job;
   std::vector<std::string> outputs;
   std::string summary, body, timeout, accuracy, within;
@@ -37,7 +37,7 @@ void declare_input(CLI::App& app, JobArguments& arguments) {
       ->capture_default_str();
 }
 
-void declare_output(CLI::App& app, Arguments& arguments) {
+void declare_output(CLI::App& app, DeformArguments& arguments) {
   app.add_option("-o,--output", arguments.outputs,
                  "The deformed part (.stl, .obj) or body (.vtu); again for more; -: stdout")
       ->type_name("FILE")
@@ -76,7 +76,7 @@ struct Plan {
   std::vector<Output> outputs;
 };
 
-void plan_outputs(const Arguments& arguments, Plan& plan) {
+void plan_outputs(const DeformArguments& arguments, Plan& plan) {
   for (const std::string& path : arguments.outputs)
     if (extension(path) == "vtu")
       plan.outputs.push_back({path, std::nullopt});
@@ -93,7 +93,7 @@ void plan_outputs(const Arguments& arguments, Plan& plan) {
       throw InputError("two results would go to \"" + paths[i] + "\"");
 }
 
-void plan_goal(const Arguments& arguments, Plan& plan) {
+void plan_goal(const DeformArguments& arguments, Plan& plan) {
   if (arguments.accuracy.empty() && arguments.within.empty()) return;
   const std::string option = arguments.accuracy.empty() ? "--within" : "--accuracy";
   if (plan.job.voxelize.size || plan.job.voxelize.count)
@@ -114,7 +114,7 @@ void plan_goal(const Arguments& arguments, Plan& plan) {
   if (!arguments.within.empty()) plan.goal->within = parse_timeout(arguments.within, "--within");
 }
 
-Plan make_plan(const Arguments& arguments) {
+Plan make_plan(const DeformArguments& arguments) {
   Plan plan;
   if (!arguments.timeout.empty()) plan.timeout = parse_timeout(arguments.timeout);
   plan.map = map_options(arguments.map);
@@ -147,7 +147,7 @@ void write_outputs(const Plan& plan, const Body& body, const MappedPart& mapped,
       write_body(body, output.path);
 }
 
-SimulateOptions simulate_options(const Arguments& arguments, const Plan& plan) {
+SimulateOptions simulate_options(const DeformArguments& arguments, const Plan& plan) {
   SimulateOptions options;
   options.threads = arguments.threads;
   options.failed_output = failed_name(plan);
@@ -158,7 +158,7 @@ SimulateOptions simulate_options(const Arguments& arguments, const Plan& plan) {
 
 // The size that --accuracy or --within asks for, and the run at it. The mapping is `smooth` where that moves
 // a vertex by more than a quarter of the error asked for beside what --method says.
-SolvedRun solve_to_goal(const Arguments& arguments, Plan& plan, const Surface& surface,
+SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surface& surface,
                         AccuracyReport& accuracy, Progress& progress) {
   Progress quiet("flexel", Progress::Mode::quiet);
   bool first = true;
@@ -195,7 +195,7 @@ SolvedRun solve_to_goal(const Arguments& arguments, Plan& plan, const Surface& s
 }
 
 // Lattice and simulation; of --accuracy and --within what they chose.
-SolvedRun solve(const Arguments& arguments, Plan& plan, std::optional<AccuracyReport>& accuracy,
+SolvedRun solve(const DeformArguments& arguments, Plan& plan, std::optional<AccuracyReport>& accuracy,
                 Progress& progress) {
   progress.stage("import");
   Surface surface = read_parts(arguments.job.parts, plan.job.import, progress);
@@ -211,7 +211,7 @@ SolvedRun solve(const Arguments& arguments, Plan& plan, std::optional<AccuracyRe
   return run;
 }
 
-int run_stages(const Arguments& arguments, Plan& plan, Progress& progress) {
+int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress) {
   std::optional<AccuracyReport> accuracy;
   SolvedRun run = solve(arguments, plan, accuracy, progress);
   Body& body = run.voxels.body;
@@ -244,7 +244,7 @@ int run_stages(const Arguments& arguments, Plan& plan, Progress& progress) {
 }  // namespace
 
 int deform_command(int argc, char** argv) {
-  Arguments arguments;
+  DeformArguments arguments;
   CLI::App app{"Deforms a part as its material would be: import, lattice, simulation and mapping in one run.",
                "flexel deform"};
   declare_input(app, arguments.job);

@@ -7,6 +7,7 @@
 #include "flexel/commands.h"
 #include "flexel/export/calculix_file.h"
 #include "flexel/job.h"
+#include "flexel/json_of.h"
 #include "formats/files.h"
 #include "formats/parallel.h"
 #include "formats/units.h"
@@ -18,14 +19,14 @@ namespace {
 constexpr double kTetrahedraAcross = 30;  // of the part's diagonal, without --size
 constexpr std::size_t kLookCells = 3000;
 
-struct Arguments {
+struct ExportArguments {
   JobArguments job;
   std::string output, mesh = "hex", element = "C3D8I", nlgeom = "auto", summary;
   bool calculix = false, quiet = false;
   int threads = 0;
 };
 
-void declare(CLI::App& app, Arguments& arguments) {
+void declare(CLI::App& app, ExportArguments& arguments) {
   declare_job(app, arguments.job);
   app.add_flag("--calculix", arguments.calculix, "For CalculiX (ccx), as an .inp file (docs/export.md)")
       ->required();
@@ -52,7 +53,7 @@ void choose(const char* option, const std::string& word, const std::vector<std::
                                  fmt::join(known, ", ")));
 }
 
-void check(const Arguments& arguments) {
+void check(const ExportArguments& arguments) {
   choose("--mesh", arguments.mesh, {"hex", "tet"});
   choose("--element", arguments.element, {"C3D8I", "C3D8"});
   choose("--nlgeom", arguments.nlgeom, {"auto", "on", "off"});
@@ -76,7 +77,7 @@ Setting setting_of(const Body& body, const Scene& scene) {
           {}};
 }
 
-std::vector<std::string> head(const Arguments& arguments, const Analysis& analysis) {
+std::vector<std::string> head(const ExportArguments& arguments, const Analysis& analysis) {
   std::vector<std::string> lines;
   lines.push_back(fmt::format("CalculiX input by flexel {}: {}{}", version(),
                               fmt::join(arguments.job.parts, ", "),
@@ -93,11 +94,7 @@ std::vector<std::string> head(const Arguments& arguments, const Analysis& analys
 
 using Json = nlohmann::ordered_json;
 
-Json json_of(const Vec3& vector) {
-  return Json::array({vector.x(), vector.y(), vector.z()});
-}
-
-std::string summary(const Analysis& analysis, const Arguments& arguments) {
+std::string summary(const Analysis& analysis, const ExportArguments& arguments) {
   const AnalysisMesh& mesh = analysis.mesh;
   const CalculixNames names = calculix_names(analysis);
   const std::vector<double> volumes = section_volumes(mesh), areas = side_areas(mesh);
@@ -184,7 +181,7 @@ void report(const Analysis& analysis, Progress& progress) {
 
 // Voxelised, or meshed by gmsh; the scene gets its pushes and moves, and is refused where it has no
 // translation.
-Analysis analyse(const Arguments& arguments, Job& job, const Surface& surface, Progress& progress) {
+Analysis analyse(const ExportArguments& arguments, Job& job, const Surface& surface, Progress& progress) {
   const std::vector<std::string> dropped = drop_models(job.scene);
   Analysis analysis;
   if (arguments.mesh == "hex") {
@@ -223,7 +220,7 @@ Analysis analyse(const Arguments& arguments, Job& job, const Surface& surface, P
 }  // namespace
 
 int export_command(int argc, char** argv) {
-  Arguments arguments;
+  ExportArguments arguments;
   CLI::App app{"Writes the part and its scene as the input of another program, for detailed analysis.",
                "flexel export"};
   declare(app, arguments);

@@ -23,14 +23,6 @@ struct Sums {
   Mat3 normals = Mat3::Zero();
 };
 
-Vec3 area_vector(const Surface& surface, std::span<const std::uint32_t> corners) {
-  Vec3 sum = Vec3::Zero();
-  const Vec3& first = surface.vertices[corners[0]];
-  for (std::size_t c = 1; c + 1 < corners.size(); ++c)
-    sum += 0.5 * (surface.vertices[corners[c]] - first).cross(surface.vertices[corners[c + 1]] - first);
-  return sum;
-}
-
 Vec3 middle(const Surface& surface, std::span<const std::uint32_t> corners) {
   Vec3 sum = Vec3::Zero();
   for (const std::uint32_t v : corners) sum += surface.vertices[v];
@@ -41,7 +33,7 @@ std::vector<Sums> sum_up(const Surface& surface) {
   std::vector<Sums> sums(surface.faces.size());
   for (std::size_t p = 0; p < surface.polygon_count(); ++p) {
     Sums& face = sums[surface.polygon_face[p]];
-    const Vec3 vector = area_vector(surface, surface.polygon(p));
+    const Vec3 vector = area_vector(surface.vertices, surface.polygon(p));
     const double area = vector.norm();
     ++face.polygons;
     if (area == 0) continue;
@@ -64,7 +56,7 @@ std::vector<std::vector<std::uint32_t>> polygons_of(const Surface& surface) {
 template <class Good>
 bool all_normals(const Surface& surface, const std::vector<std::uint32_t>& polygons, const Good& good) {
   for (const std::uint32_t p : polygons) {
-    const Vec3 vector = area_vector(surface, surface.polygon(p));
+    const Vec3 vector = area_vector(surface.vertices, surface.polygon(p));
     if (vector.norm() > 0 && !good(vector.normalized())) return false;
   }
   return true;
@@ -116,7 +108,7 @@ void fit_circle(const Surface& surface, const std::vector<std::uint32_t>& polygo
   for (const std::uint32_t p : polygons) {
     Vec3 from_axis = middle(surface, surface.polygon(p)) - shape.axis_point;
     from_axis -= from_axis.dot(axis) * axis;
-    outward += from_axis.dot(area_vector(surface, surface.polygon(p)));
+    outward += from_axis.dot(area_vector(surface.vertices, surface.polygon(p)));
   }
   shape.hollow = outward < 0;
 }
@@ -140,6 +132,14 @@ FaceShape shape_of(const Surface& surface, const Sums& sums, const std::vector<s
 }
 
 }  // namespace
+
+Vec3 area_vector(const std::vector<Vec3>& vertices, std::span<const std::uint32_t> corners) {
+  Vec3 sum = Vec3::Zero();
+  const Vec3& first = vertices[corners[0]];
+  for (std::size_t c = 1; c + 1 < corners.size(); ++c)
+    sum += 0.5 * (vertices[corners[c]] - first).cross(vertices[corners[c + 1]] - first);
+  return sum;
+}
 
 std::vector<FaceShape> face_shapes(const Surface& surface) {
   const std::vector<Sums> sums = sum_up(surface);

@@ -7,6 +7,7 @@
 
 #include "flexel/commands.h"
 #include "flexel/face_shape.h"
+#include "flexel/json_of.h"
 #include "formats/import.h"
 #include "formats/program.h"
 #include "formats/progress.h"
@@ -151,10 +152,6 @@ std::string info_text(const Surface& surface) {
 }
 
 using Json = nlohmann::ordered_json;
-
-Json json_of(const Vec3& vector) {
-  return {vector.x(), vector.y(), vector.z()};
-}
 
 Json face_json(const SurfaceFace& face, std::uint32_t number, const std::string& part,
                const FaceShape& shape) {

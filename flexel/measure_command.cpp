@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kCells[] = {2, 4, 8};
 
-struct Arguments {
+struct MeasureArguments {
   std::string model = "cells", hooke = "paper", material = "steel", size;
   std::optional<double> poisson;
   bool json = false;
@@ -45,7 +45,7 @@ HookeConstant hooke_named(const std::string& name) {
                                did_you_mean(name, {"paper", "ganovelli"})));
 }
 
-Measured measured(const Arguments& arguments) {
+Measured measured(const MeasureArguments& arguments) {
   const Model model = model_named(arguments.model);
   const HookeConstant hooke = hooke_named(arguments.hooke);
   Measured result;
@@ -78,7 +78,7 @@ std::string direction(const Vec3& unit) {
   return text + "]";
 }
 
-std::string text_of(const Arguments& arguments, const Measured& found) {
+std::string text_of(const MeasureArguments& arguments, const Measured& found) {
   const double young = found.material.young, shear = shear_modulus(found.material);
   std::string text = fmt::format("model {}, {} as given: E {}, nu {:.4f}, G {}; cells of {}\n\n",
                                  arguments.model, found.material.name, human_pressure(young),
@@ -110,7 +110,7 @@ std::string text_of(const Arguments& arguments, const Measured& found) {
              shape(fine.bending, found.limit->bending), shape(fine.torsion, found.limit->torsion));
 }
 
-std::string json_of(const Arguments& arguments, const Measured& found) {
+std::string json_of(const MeasureArguments& arguments, const Measured& found) {
   nlohmann::ordered_json json = {{"model", arguments.model},
                                  {"young", found.material.young},
                                  {"poisson", found.material.poisson},
@@ -140,7 +140,7 @@ std::string json_of(const Arguments& arguments, const Measured& found) {
 }  // namespace
 
 int measure_command(int argc, char** argv) {
-  Arguments arguments;
+  MeasureArguments arguments;
   CLI::App app{
       "Draws, bends and twists bars of lattice and prints the E, nu and G that they have, beside those of "
       "the "

@@ -20,7 +20,7 @@ namespace {
 constexpr int kLargestSide = 16384, kSmallestSide = 64;
 constexpr double kMostPixels = 40e6;  // about a hundred bytes each while the picture is made
 
-struct Arguments {
+struct PictureArguments {
   std::vector<std::string> files;
   std::string output, colour, range, scale = "1", view = "auto", up = "z", size = "1600x1200", unit,
                                      input_format;
@@ -28,7 +28,7 @@ struct Arguments {
   int threads = 0;
 };
 
-void declare(CLI::App& app, Arguments& a) {
+void declare(CLI::App& app, PictureArguments& a) {
   app.add_option("file", a.files, "Parts (STEP, STL, OBJ ...) and bodies (.vtu); -: stdin")
       ->required()
       ->type_name("FILE");
@@ -88,7 +88,7 @@ void parse_size(const std::string& text, PictureOptions& options) {
     throw InputError(fmt::format("--size {}: at most {:g} million pixels", text, kMostPixels / 1e6));
 }
 
-PictureOptions options_of(const Arguments& a) {
+PictureOptions options_of(const PictureArguments& a) {
   PictureOptions options;
   parse_size(a.size, options);
   options.view = parse_view(a.view);
@@ -174,7 +174,7 @@ void check_output(const std::string& output) {
 }  // namespace
 
 int picture_command(int argc, char** argv) {
-  Arguments arguments;
+  PictureArguments arguments;
   CLI::App app{"A picture (PNG) of parts and bodies, made without a display.", "flexel picture"};
   declare(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;

@@ -23,13 +23,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct StudyArguments {
   std::vector<std::string> parts, references;
   std::string scene, budget = "2 min", output, against, material, unit, heal, edge;
   bool quiet = false;
 };
 
-void declare(CLI::App& app, Arguments& a) {
+void declare(CLI::App& app, StudyArguments& a) {
   app.add_option("part", a.parts, "STEP, IGES, BREP, STL, OBJ, PLY, OFF, glTF or 3MF files")
       ->required()
       ->type_name("PART");
@@ -100,7 +100,7 @@ void add_references(const std::string& text, const study::SceneFacts& facts,
   references.push_back(given("elastic energy", "J", json["elastic_energy"]));
 }
 
-study::Assignment assignment(const Arguments& a) {
+study::Assignment assignment(const StudyArguments& a) {
   study::Assignment result;
   if (std::count(a.parts.begin(), a.parts.end(), "-") > 0 || a.scene == "-")
     throw InputError("flexel study runs the part and the scene many times: give files, not stdin");
@@ -140,7 +140,7 @@ study::Assignment assignment(const Arguments& a) {
 }  // namespace
 
 int study_command(int argc, char** argv) {
-  Arguments arguments;
+  StudyArguments arguments;
   CLI::App app{
       "Runs a part and a scene at many sizes and with many choices, and writes what each costs and how exact "
       "it is: study.csv, study.json and the page study.html (docs/study.md).",

@@ -23,7 +23,7 @@ double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-void print(const std::string& text) {
+void print_error(const std::string& text) {
   std::fwrite(text.data(), 1, text.size(), stderr);
 }
 
@@ -71,33 +71,33 @@ void Progress::update(double share, const std::string& note) {
   if (!note.empty()) line += "  " + note;
   const std::size_t columns = terminal_columns();
   if (line.size() >= columns) line.resize(columns - 1);  // a wrapped line could not be rewritten
-  print("\r" + line + "\033[K");
+  print_error("\r" + line + "\033[K");
   bar_drawn_ = true;
 }
 
 void Progress::say(const std::string& line) {
   if (mode_ == Mode::quiet || mode_ == Mode::silent) return;
   clear_bar();
-  print(fmt::format("{}: {}\n", program_, line));
+  print_error(fmt::format("{}: {}\n", program_, line));
 }
 
 void Progress::warn(const std::string& line) {
   if (mode_ == Mode::silent) return;
   clear_bar();
-  print(fmt::format("{}: warning: {}\n", program_, line));
+  print_error(fmt::format("{}: warning: {}\n", program_, line));
 }
 
 void Progress::finish() {
   clear_bar();
   if (mode_ == Mode::lines && !stage_.empty()) {
     const double seconds = now() - stage_began_;
-    print(fmt::format("{}: {}: {:.{}f} s\n", program_, stage_, seconds, seconds < 1 ? 4 : 2));
+    print_error(fmt::format("{}: {}: {:.{}f} s\n", program_, stage_, seconds, seconds < 1 ? 4 : 2));
   }
   stage_.clear();
 }
 
 void Progress::clear_bar() {
-  if (bar_drawn_) print("\r\033[K");
+  if (bar_drawn_) print_error("\r\033[K");
   bar_drawn_ = false;
 }
 

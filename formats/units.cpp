@@ -41,7 +41,7 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr double kPoundForce = 4.4482216152605;           // N, exact: 0.45359237 kg x 9.80665 m/s^2
 constexpr double kPsi = kPoundForce / (0.0254 * 0.0254);  // Pa
 
-constexpr NamedUnit kUnits[] = {
+constexpr NamedUnit kNamedUnits[] = {
     {"m", true, false, {1, 0, kLength}},
     {"metre", true, true, {1, 0, kLength}},
     {"meter", true, true, {1, 0, kLength}},
@@ -173,10 +173,10 @@ bool named(const NamedUnit& unit, std::string_view name) {
 }
 
 std::optional<Unit> find_unit(std::string_view name) {
-  for (const NamedUnit& unit : kUnits)
+  for (const NamedUnit& unit : kNamedUnits)
     if (named(unit, name)) return unit.unit;
   for (const Prefix& prefix : kPrefixes) {
-    for (const NamedUnit& unit : kUnits) {
+    for (const NamedUnit& unit : kNamedUnits) {
       if (!unit.prefixed) continue;
       const std::string_view start = unit.word ? prefix.word : prefix.symbol;
       const std::string begun =

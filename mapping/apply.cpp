@@ -13,7 +13,7 @@ namespace flexel {
 namespace {
 
 // Differences under this share of the distance between the two elements are ties and rounding.
-constexpr double kTie = 1e-6;
+constexpr double kLeftTie = 1e-6;
 
 // True when an element connected with `origin` is now nearer to the moved vertex, and was not at rest.
 bool left_its_cell(const Binding& binding, const Body& body, const std::vector<Vec3>& position,
@@ -23,7 +23,7 @@ bool left_its_cell(const Binding& binding, const Body& body, const std::vector<V
   for (const std::uint32_t other : binding.connections.of(origin)) {
     const double nearer = now - (vertex - position[other]).squaredNorm();
     if (nearer <= 0) continue;
-    const double tie = kTie * (body.rest[other] - body.rest[origin]).squaredNorm();
+    const double tie = kLeftTie * (body.rest[other] - body.rest[origin]).squaredNorm();
     if (nearer > tie && at_rest - (rest_vertex - body.rest[other]).squaredNorm() <= tie) return true;
   }
   return false;

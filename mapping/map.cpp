@@ -59,15 +59,16 @@ void make_checks(const Body& body, const MapOptions& options, MapResult& result)
     result.new_self_intersections = new_self_intersections(body.surface, result.displacement);
 }
 
-const std::vector<std::string> kFar = {"follow", "rigid", "refuse"};  // by FarVertices
+const std::vector<std::string> kFarNames = {"follow", "rigid", "refuse"};  // by FarVertices
 const std::vector<std::string> kChecks = {"voronoi", "self-intersection"};
 
 }  // namespace
 
 FarVertices far_vertices(const std::string& name) {
-  const auto found = std::find(kFar.begin(), kFar.end(), name);
-  if (found != kFar.end()) return static_cast<FarVertices>(found - kFar.begin());
-  throw InputError(fmt::format("--far \"{}\": {}{}", name, fmt::join(kFar, ", "), did_you_mean(name, kFar)));
+  const auto found = std::find(kFarNames.begin(), kFarNames.end(), name);
+  if (found != kFarNames.end()) return static_cast<FarVertices>(found - kFarNames.begin());
+  throw InputError(
+      fmt::format("--far \"{}\": {}{}", name, fmt::join(kFarNames, ", "), did_you_mean(name, kFarNames)));
 }
 
 void add_checks(MapOptions& options, const std::string& names) {

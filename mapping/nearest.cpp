@@ -12,7 +12,7 @@
 namespace flexel {
 namespace {
 
-constexpr double kTie = 1e-9;  // of a squared distance
+constexpr double kNearestTie = 1e-9;  // of a squared distance
 
 }  // namespace
 
@@ -65,11 +65,11 @@ void ElementGrid::look_into(std::int64_t i_begin, std::int64_t i_end, std::int64
   const std::uint32_t end = offsets_[row + static_cast<std::size_t>(i_end)];
   for (std::uint32_t slot = offsets_[row + static_cast<std::size_t>(i_begin)]; slot < end; ++slot) {
     const double squared_distance = (local_[slot] - local).squaredNorm();
-    if (squared_distance > best.squared_distance * (1 + kTie)) continue;
+    if (squared_distance > best.squared_distance * (1 + kNearestTie)) continue;
     const double from_middle = (local_[slot] - 0.5 * size_).squaredNorm();
-    const bool nearer = squared_distance < best.squared_distance * (1 - kTie);
-    const bool inner = from_middle < best.from_middle * (1 - kTie);
-    const bool lower = from_middle <= best.from_middle * (1 + kTie) && elements_[slot] < best.element;
+    const bool nearer = squared_distance < best.squared_distance * (1 - kNearestTie);
+    const bool inner = from_middle < best.from_middle * (1 - kNearestTie);
+    const bool lower = from_middle <= best.from_middle * (1 + kNearestTie) && elements_[slot] < best.element;
     if (nearer || inner || lower) best = {squared_distance, from_middle, elements_[slot]};
   }
 }
@@ -113,7 +113,8 @@ std::uint32_t ElementGrid::nearest(const Vec3& point) const {
   for (std::int64_t radius = 0;; ++radius) {
     look_into_shell(home, radius, local, best);
     const double beyond = distance_beyond(home, radius, inside);
-    if (best.squared_distance * (1 + 2 * kTie) <= squared_outside + beyond * beyond) return best.element;
+    if (best.squared_distance * (1 + 2 * kNearestTie) <= squared_outside + beyond * beyond)
+      return best.element;
   }
 }
 

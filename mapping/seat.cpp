@@ -22,7 +22,7 @@ namespace flexel {
 namespace {
 
 constexpr std::uint32_t kNone = 0xffffffffu;
-constexpr double kFar = std::numeric_limits<double>::infinity();
+constexpr double kUnreached = std::numeric_limits<double>::infinity();
 
 // First polygon around each vertex, and the vertex whose seat it shares.
 struct Corners {
@@ -61,8 +61,8 @@ Corners corners_of(const Surface& surface) {
 // The nearest voxel so far; of those equally near, the one nearest to the middle of the part, then the cell
 // of lowest number.
 struct Home {
-  double squared_distance = kFar;  // m^2, 0 inside
-  bool on_face = false;            // inside, but another voxel may hold the point as well
+  double squared_distance = kUnreached;  // m^2, 0 inside
+  bool on_face = false;                  // inside, but another voxel may hold the point as well
   Seat seat;
   [[nodiscard]] bool certain() const { return squared_distance == 0 && !on_face; }
 };
@@ -70,7 +70,7 @@ struct Home {
 // Parts are modelled in round numbers and lattices snapped to them: vertices lie on the faces of voxels and
 // half-way between elements. What is closer than this to such a place, in spacings, counts as on it, so that
 // rounding (another unit, a turned part) decides nothing.
-constexpr double kTie = 1e-9;
+constexpr double kSeatTie = 1e-9;
 
 // (parts x 3) The middle of each part's elements, in lattice coordinates. Where nothing else decides, what is
 // nearer to it is taken: so the mirrored or turned part decides alike. Only on a part's own plane of symmetry
@@ -94,7 +94,7 @@ std::vector<Vec3> middles(const Body& body) {
 // Whether a point at `at`, `offset` above the place half-way between two elements (spacings), goes with the
 // higher one.
 bool goes_up(double offset, double at, double middle) {
-  if (std::abs(offset) < kTie) return middle >= at - kTie;
+  if (std::abs(offset) < kSeatTie) return middle >= at - kSeatTie;
   return offset > 0;
 }
 
@@ -105,7 +105,7 @@ bool is_preferred(const Body& body, std::uint32_t cell, std::uint32_t other, con
     return (Vec3(index[0], index[1], index[2]) + Vec3::Constant(0.5) - middle).squaredNorm();
   };
   const double mine = squared_distance(cell), its = squared_distance(other);
-  return mine < its - kTie || (mine <= its + kTie && cell < other);
+  return mine < its - kSeatTie || (mine <= its + kSeatTie && cell < other);
 }
 
 // Compares `cell` with the nearest so far; `u` is a point in lattice coordinates.
@@ -114,12 +114,12 @@ void consider(const Body& body, std::uint32_t cell, const Vec3& u, const Vec3& s
   const Index3& index = body.lattice_index[body.cell_elements[cell][0]];
   const Vec3 within = u - Vec3(index[0], index[1], index[2]);
   const Vec3 clamped = within.cwiseMax(Vec3::Zero()).cwiseMin(Vec3::Ones());
-  const bool inside = (within - clamped).cwiseAbs().maxCoeff() < kTie;
+  const bool inside = (within - clamped).cwiseAbs().maxCoeff() < kSeatTie;
   const double squared_distance = inside ? 0 : (within - clamped).cwiseProduct(spacing).squaredNorm();
-  const bool nearer = squared_distance < (1 - kTie) * home.squared_distance;
-  if (!nearer && squared_distance > (1 + kTie) * home.squared_distance) return;
+  const bool nearer = squared_distance < (1 - kSeatTie) * home.squared_distance;
+  if (!nearer && squared_distance > (1 + kSeatTie) * home.squared_distance) return;
   if (!nearer && !is_preferred(body, cell, home.seat.owner, middle)) return;
-  const bool on_face = inside && within.cwiseMin(Vec3::Ones() - within).minCoeff() < kTie;
+  const bool on_face = inside && within.cwiseMin(Vec3::Ones() - within).minCoeff() < kSeatTie;
   int corner = 0;
   for (int a = 0; a < 3; ++a) corner += goes_up(within[a] - 0.5, u[a], middle[a]) << a;
   home = {squared_distance, on_face, {cell, true, static_cast<std::uint8_t>(corner)}};
@@ -154,7 +154,7 @@ Seat seat_near_element(const Body& body, const Buckets<std::uint32_t>& cells_of,
     const Vec3 u = lattice.to_lattice(point);
     for (std::uint32_t i = cells_of.begin[element]; i < cells_of.begin[element + 1]; ++i)
       consider(body, cells_of.values[i], u, lattice.spacing, middle, home);
-    if (home.squared_distance < kFar) return home.seat;
+    if (home.squared_distance < kUnreached) return home.seat;
   }
   return seat_at_element(body, part, element, point, middle);
 }
@@ -237,7 +237,7 @@ class Seating {
         [&](std::size_t i) {
           const std::uint32_t v = remaining[i];
           const Home home = nearest_under(v, around);
-          seats_.seat[v] = home.squared_distance < kFar ? home.seat : seat_nearest(v);
+          seats_.seat[v] = home.squared_distance < kUnreached ? home.seat : seat_nearest(v);
         },
         256);
   }
@@ -268,7 +268,7 @@ class Seating {
     for (const std::uint32_t v : remaining) {
       if (corners_.first_polygon[v] == kNone)
         std::fill(needed.begin(), needed.end(), std::uint8_t{1});
-      else if (nearest_under(v, around).squared_distance == kFar)
+      else if (nearest_under(v, around).squared_distance == kUnreached)
         needed[part_of(v)] = 1;
     }
     for (std::uint32_t part = 0; part < needed.size(); ++part)

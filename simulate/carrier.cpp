@@ -3,13 +3,13 @@
 // nothing nearer than the ring could be.
 #include "simulate/carrier.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <tuple>
 
 #include "simulate/cells.h"
 #include "simulate/rest_shape.h"
+#include "simulate/small_matrices.h"
 
 namespace flexel {
 namespace {
@@ -64,21 +64,6 @@ std::vector<std::uint32_t> neighbours(const Setting& setting, const Part& part, 
         found.push_back(*other);
   }
   return found;
-}
-
-// Inverse on the range of a symmetric matrix, and whether that is all of space.
-std::pair<Mat3, bool> inverse_on_range(const Mat3& matrix) {
-  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(matrix);
-  Mat3 inverse = Mat3::Zero();
-  bool whole = true;
-  for (int i = 0; i < 3; ++i) {
-    const double value = eigen.eigenvalues()[i];
-    if (value > 1e-9 * eigen.eigenvalues()[2] && value > 0)
-      inverse += eigen.eigenvectors().col(i) * eigen.eigenvectors().col(i).transpose() / value;
-    else
-      whole = false;
-  }
-  return {inverse, whole};
 }
 
 }  // namespace

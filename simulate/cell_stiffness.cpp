@@ -12,6 +12,7 @@
 #include "simulate/instruction_set.h"
 #include "simulate/pass_matrix.h"
 #include "simulate/prepared_cell.h"
+#include "simulate/time/scratch.h"
 
 namespace flexel {
 namespace {
@@ -48,13 +49,6 @@ bool same_row(const StiffnessPattern& pattern, const std::vector<std::uint32_t>&
         return a.corner == b.corner && share[a.cell] == share[b.cell] && part[a.cell] == part[b.cell] &&
                std::equal(slot, slot + 8, pattern.stencil.slot[b.cell].data() + 8 * b.corner);
       });
-}
-
-// The first aligned double.
-double* aligned(std::vector<double>& scratch) {
-  const auto address = reinterpret_cast<std::uintptr_t>(scratch.data());
-  return scratch.data() + (step::kScratchAlignment - address % step::kScratchAlignment) %
-                              step::kScratchAlignment / sizeof(double);
 }
 
 constexpr int kStressOf[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}};
@@ -214,7 +208,8 @@ void CellStiffness::products_of_cells(const double* x, double* y) const {
         view.shared_count = chunk.shared_end - chunk.shared_begin;
         view.shared_force = shared_force_.data() + 3 * chunk.shared_begin;
         view.constants = &layout_.constants[chunk.kind];
-        kernels_->of[form](view, tangents_.data() + width * chunk.block_begin, x, y, aligned(scratch));
+        kernels_->of[form](view, tangents_.data() + width * chunk.block_begin, x, y,
+                           step::first_aligned(scratch));
       },
       1);
   parallel_for_each(layout_.shared_elements.size(), [&](std::size_t i) {

@@ -12,7 +12,7 @@
 namespace flexel {
 namespace {
 
-constexpr std::size_t kGrain = 512;
+constexpr std::size_t kCellGrain = 512;
 
 void add_cell_row(const CellKind& kind, const PreparedCell& cell, double fill, std::size_t a,
                   const std::array<std::uint16_t, 64>& slot, Block* row) {
@@ -140,7 +140,7 @@ double Cells::energy(const State& state) const {
         if (may_fold(cell, u)) energy += fold_energy(kinds_[part_[c]], thresholds(cell), u);
         return share_[c] * energy;
       },
-      kGrain);
+      kCellGrain);
 }
 
 void Cells::add_forces(const State& state, std::vector<Vec3>& forces) {
@@ -155,7 +155,7 @@ void Cells::add_forces(const State& state, std::vector<Vec3>& forces) {
         if (may_fold(cell, u)) add_fold_forces(kinds_[part_[c]], thresholds(cell), u, corner_force_[c]);
         for (Vec3& force : corner_force_[c]) force *= share_[c];
       },
-      kGrain);
+      kCellGrain);
   parallel_for_each(body_.element_count(), [&](std::size_t e) {
     for (const Incidence& at : stencil_.of(static_cast<std::uint32_t>(e)))
       forces[e] += corner_force_[at.cell][at.corner];
@@ -179,7 +179,7 @@ void Cells::set_stiffness(const State& state, const TangentOptions& tangent, Blo
         if (const auto folding = fold_tangent(kinds_[part_[c]], thresholds(cell), u, tangent.project))
           prepared[c].folding = std::make_unique<FoldTangent>(*folding);
       },
-      kGrain);
+      kCellGrain);
   parallel_for_each(
       body_.element_count(),
       [&](std::size_t e) {
@@ -194,7 +194,7 @@ void Cells::set_stiffness(const State& state, const TangentOptions& tangent, Blo
                              tangent.project, stencil_.slot[at.cell], row);
           });
       },
-      kGrain);
+      kCellGrain);
 }
 
 std::vector<Mat3> Cells::predicted_stress(const State& state, const std::vector<Vec3>& step) const {
@@ -211,7 +211,7 @@ std::vector<Mat3> Cells::predicted_stress(const State& state, const std::vector<
                 displacement_gradient(kind, corner_values(cell, step)) - kind.offset);
         });
       },
-      kGrain);
+      kCellGrain);
   return stress;
 }
 
@@ -226,7 +226,7 @@ SmallestJacobian Cells::smallest_jacobian(const State& state) const {
         // one that is not a number must win
         return Smallest{std::isnan(value) ? -std::numeric_limits<double>::infinity() : value, cell};
       },
-      kGrain);
+      kCellGrain);
   return found(smallest);
 }
 
@@ -242,7 +242,7 @@ SmallestJacobian Cells::smallest_corner_jacobian(const State& state) const {
           least += Smallest{1 + volume_change(corner_gradient(kinds_[part_[c]], u, a)), cell, a};
         return least;
       },
-      kGrain);
+      kCellGrain);
   return found(smallest);
 }
 

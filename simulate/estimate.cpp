@@ -10,12 +10,12 @@ namespace {
 
 constexpr double kSafety = 1.25, kWideSafety = 3;
 constexpr double kLeastOrder = 0.5, kModelOrder = 2, kSuspiciousOrder = 2.1;
-constexpr int kIterations = 50;
+constexpr int kOrderIterations = 50;
 
 // p with e32 / e21 = (r32^p - 1) / (r21^p - 1) r21^p, by fixed-point iteration (Celik et al. 2008).
 double observed_order(double e21, double e32, const std::array<double, 2>& ratio) {
   double p = std::log(e32 / e21) / std::log(ratio[0]);
-  for (int i = 0; i < kIterations; ++i) {
+  for (int i = 0; i < kOrderIterations; ++i) {
     const double q = std::abs(ratio[0] - ratio[1]) < 1e-9
                          ? 0
                          : std::log((std::pow(ratio[0], std::max(p, 0.1)) - 1) /

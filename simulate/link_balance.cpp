@@ -20,17 +20,17 @@
 namespace flexel {
 namespace {
 
-constexpr int kMost = 12;             // steps of the links
+constexpr int kMostLinkSteps = 12;    // steps of the links
 constexpr double kLooser = 10;        // tolerance of the links over that of the elements
 constexpr double kServes = 0.1;       // a step that leaves more than this of b: take the slope anew
 constexpr double kAstray = 4;         // ... and more than this: give up
 constexpr double kDifference = 1e-7;  // of the reach
 constexpr double kResponse = 1e-8;    // relative residual of the linear solutions
-constexpr int kMaxCgIterations = 3000;
+constexpr int kMaxLinkCgIterations = 3000;
 // Of the elements' mean stiffness: nothing resists. A cantilever a thousand times as long as thick has that.
 constexpr double kFree = 1e-9;
 
-using Vector = Eigen::VectorXd;
+using LinkVector = Eigen::VectorXd;
 
 std::vector<std::shared_ptr<RigidLink>> rigid_links(const Constraints& constraints) {
   std::vector<std::shared_ptr<RigidLink>> links;
@@ -53,9 +53,9 @@ class Balance {
 
  private:
   [[nodiscard]] Eigen::Index unknowns() const { return static_cast<Eigen::Index>(6 * links_.size()); }
-  void move(const Vector& step);
+  void move(const LinkVector& step);
   [[nodiscard]] State led(const std::vector<Vec3>& response, double step) const;
-  Vector lacking(const State& state);
+  LinkVector lacking(const State& state);
   std::vector<Vec3> free_forces(const State& state);
   Eigen::MatrixXd slope();
   bool add_column(const Preconditioner& preconditioner, Eigen::Index j, Eigen::MatrixXd& slope);
@@ -75,7 +75,7 @@ class Balance {
   std::vector<std::vector<Vec3>> response_, left_over_;
 };
 
-void Balance::move(const Vector& step) {
+void Balance::move(const LinkVector& step) {
   for (std::size_t l = 0; l < links_.size(); ++l) {
     const auto at = static_cast<Eigen::Index>(6 * l);
     links_[l]->translation += step.segment<3>(at);
@@ -92,10 +92,10 @@ State Balance::led(const std::vector<Vec3>& response, double step) const {
 }
 
 // What each link's load has more than its ties pull: force, and moment about the middle over the reach. [N]
-Vector Balance::lacking(const State& state) {
+LinkVector Balance::lacking(const State& state) {
   SimulateResult told;
   mechanics_.report(state, told);
-  Vector result(unknowns());
+  LinkVector result(unknowns());
   scale_ = 0;
   for (const AppliedLoad& load : told.loads) scale_ += load.force.norm();
   for (const Reaction& reaction : told.reactions) scale_ += reaction.force.norm();
@@ -121,7 +121,7 @@ std::vector<Vec3> Balance::free_forces(const State& state) {
 // One column of db/dq. False when the tangent has negative curvature.
 bool Balance::add_column(const Preconditioner& preconditioner, Eigen::Index j, Eigen::MatrixXd& slope) {
   const double step = kDifference * links_[static_cast<std::size_t>(j / 6)]->reach;
-  const Vector along = Vector::Unit(unknowns(), j) * step;
+  const LinkVector along = LinkVector::Unit(unknowns(), j) * step;
   const std::vector<Vec3> none;
   move(along);
   std::vector<Vec3> pushed = free_forces(led(none, 0));
@@ -131,16 +131,16 @@ bool Balance::add_column(const Preconditioner& preconditioner, Eigen::Index j, E
   for (std::size_t e = 0; e < pushed.size(); ++e) pushed[e] = (pushed[e] - back[e]) / (2 * step);
   std::vector<Vec3> response(pushed.size(), Vec3::Zero());
   const LinearResult solved = conjugate_gradients(
-      mechanics_.tangent(), pushed, response, preconditioner, kResponse, kMaxCgIterations,
+      mechanics_.tangent(), pushed, response, preconditioner, kResponse, kMaxLinkCgIterations,
       [&](int iteration, double relative) {
         progress_(fmt::format("rigid link {}, cg {}, {:.0e}", j / 6 + 1, iteration, relative));
       });
   outcome_.cg_iterations += solved.iterations;
   if (solved.indefinite) return false;
   move(along);
-  const Vector ahead = lacking(led(response, step));
+  const LinkVector ahead = lacking(led(response, step));
   move(-2 * along);
-  const Vector behind = lacking(led(response, -step));
+  const LinkVector behind = lacking(led(response, -step));
   move(along);
   slope.col(j) = (ahead - behind) / (2 * step);
   std::vector<Vec3> resisted(pushed.size());
@@ -191,7 +191,7 @@ Eigen::MatrixXd Balance::slope() {
 void Balance::refuse_free(const Eigen::MatrixXd& slope) const {
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(slope, Eigen::ComputeFullV);
   if (svd.singularValues().minCoeff() > kFree * stiff_) return;
-  const Vector freest = svd.matrixV().col(unknowns() - 1);
+  const LinkVector freest = svd.matrixV().col(unknowns() - 1);
   Eigen::Index most = 0;
   freest.cwiseAbs().maxCoeff(&most);
   throw InputError(
@@ -205,15 +205,15 @@ void Balance::refuse_free(const Eigen::MatrixXd& slope) const {
 
 // Moves the links until nothing is lacking. False when it did not get there.
 bool Balance::find() {
-  Vector left = lacking(state_);
+  LinkVector left = lacking(state_);
   Eigen::MatrixXd slope;
   bool serves = false;
-  for (int k = 0; k < kMost; ++k) {
+  for (int k = 0; k < kMostLinkSteps; ++k) {
     if (!serves) {
       slope = this->slope();
       refuse_free(slope);
     }
-    const Vector step = -slope.fullPivLu().solve(left);
+    const LinkVector step = -slope.fullPivLu().solve(left);
     move(step);
     const NewtonOutcome one = newton(mechanics_, state_, options_, progress_);
     if (outcome_.iterations == 0) outcome_.first_reach = one.first_reach;
@@ -223,7 +223,7 @@ bool Balance::find() {
     outcome_.relative_residual = one.relative_residual;
     outcome_.trouble = one.trouble;
     if (!one.converged) return false;
-    const Vector now = lacking(state_);
+    const LinkVector now = lacking(state_);
     if (now.norm() <= kLooser * options_.tolerance * scale_) return true;
     outcome_.trouble =
         fmt::format("the rigid link \"{}\" lacks {:.1e} of its load", links_[0]->name, now.norm() / scale_);

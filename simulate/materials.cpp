@@ -57,8 +57,8 @@ struct Strength {
   double yield = 0, strength = 0, elongation = 0;
 };
 
-Material entry(const char* name, double young, double poisson, double density, const Strength& strength,
-               const char* source) {
+Material library_entry(const char* name, double young, double poisson, double density,
+                       const Strength& strength, const char* source) {
   Material material;
   material.name = name;
   material.young = young;
@@ -86,97 +86,118 @@ Material with_damping(Material material, double damping) {
 const std::vector<Material>& material_library() {
   static const std::vector<Material> library = {
       with_damping(
-          with_friction(entry("steel", 210e9, 0.30, 7850, {235e6, 360e6, 0.26},
-                              "S235JR. EN 1993-1-1, 3.2.6, read at eurocodeapplied.com; strengths EN 10025-2 "
-                              "(3 to 16 mm), read at ilongma.com; not read: friction EN 1993-1-8, table 3.7, "
-                              "class D, damping EN 1991-1-4, F.2 (welded stack, 0.012 / 2 pi)"),
-                        0.2),
+          with_friction(
+              library_entry("steel", 210e9, 0.30, 7850, {235e6, 360e6, 0.26},
+                            "S235JR. EN 1993-1-1, 3.2.6, read at eurocodeapplied.com; strengths EN 10025-2 "
+                            "(3 to 16 mm), read at ilongma.com; not read: friction EN 1993-1-8, table 3.7, "
+                            "class D, damping EN 1991-1-4, F.2 (welded stack, 0.012 / 2 pi)"),
+              0.2),
           0.0019),
-      with_friction(entry("steel S355", 210e9, 0.30, 7850, {355e6, 470e6, 0.22},
-                          "S355JR. As steel; strengths EN 10025-2 (3 to 16 mm), read at balingsteel.com; not "
-                          "read: friction EN 1993-1-8, table 3.7, class D"),
-                    0.2),
-      entry("steel 42CrMo4", 210e9, 0.30, 7850, {900e6, 1100e6, 0.10},
-            "Quenched and tempered, to 16 mm. Strengths EN 10083, read in Saarstahl's data sheet; elastic "
-            "figures as steel"),
-      entry("spring steel", 206e9, 0.264, 7850, {},
-            "EN 10270-1 (E 206, G 81.5 GPa, hence poisson), read at mollificiomodenese.it"),
-      entry("stainless", 200e9, 0.30, 7900, {210e6, 520e6, 0.45},
-            "1.4301, plate. E read at makeitfrom.com; not read: EN 1993-1-4, 2.1.3 and table 2.1, density EN "
-            "10088-1, elongation EN 10088-2"),
-      entry("stainless 316", 200e9, 0.30, 8000, {220e6, 520e6, 0.45},
-            "1.4401, plate. Not read: EN 1993-1-4, 2.1.3 and table 2.1, density EN 10088-1, elongation EN "
-            "10088-2"),
-      entry("cast iron", 110e9, 0.26, 7200, {0, 250e6, 0},
-            "EN-GJL-250. EN 1561 (E 103 to 118 GPa), read at sn-castiron.nl"),
-      entry("ductile iron", 169e9, 0.275, 7100, {250e6, 400e6, 0.15},
-            "EN-GJS-400-15. EN 1563, read at iron-foundry.com; not read: poisson (sn-castiron.nl has 0.28)"),
-      entry("aluminium 6061", 68.9e9, 0.33, 2700, {240e6, 290e6, 0.10},
-            "T6. Aluminum Association, typical, read at glemco.com (there strengths of 276 and 310 MPa, 12 "
-            "%); not read: ASTM B209, sheet, for the least strengths given here"),
-      entry("aluminium 6082", 70e9, 0.30, 2700, {250e6, 290e6, 0.08},
-            "T6. EN 755-2 (extruded, to 5 mm), read at top-factories.com; not read: poisson EN 1999-1-1, "
-            "3.2.5"),
-      entry("aluminium 5083", 70e9, 0.30, 2700, {125e6, 275e6, 0.11},
-            "O/H111. Strengths EN 485-2 (to 50 mm), read at euralliage.com; not read: the others EN "
-            "1999-1-1, 3.2.5 (suppliers have 72 GPa, 2650 kg/m3)"),
-      entry("aluminium 2024", 73.1e9, 0.33, 2780, {345e6, 483e6, 0.18},
-            "T3, typical. E (10600 ksi) read at substech.com, density and strength at matweb.com, yield and "
-            "elongation at princeton.edu; not read: poisson"),
-      entry("aluminium 7075", 71.7e9, 0.33, 2810, {503e6, 572e6, 0.11},
-            "T6, typical. E (10400 ksi), density, strengths read at substech.com, poisson at wikipedia.org"),
-      entry("titanium", 113.8e9, 0.33, 4430, {827e6, 896e6, 0.10},
-            "Ti-6Al-4V annealed. E (16500 ksi), poisson, density read at asm.matweb.com, least strengths "
-            "(120, 130 ksi) at nickel-systems.com"),
-      entry("magnesium", 45e9, 0.35, 1770, {}, "AZ31B, read at alloysintl.com"),
-      entry("nickel alloy 718", 200e9, 0.29, 8220, {1034e6, 1276e6, 0.12},
-            "Aged. E (29.0e3 ksi), poisson read in Special Metals SMC-045, density at hightempmetals.com; "
-            "not read: strengths AMS 5663"),
-      entry("brass", 97e9, 0.31, 8490, {}, "C36000, read at ezlok.com"),
-      entry("copper", 117e9, 0.34, 8910, {},
-            "C11000. E (17.0e3 ksi), density read in Hussey Copper's data sheet, poisson at shlionmetal.com"),
-      entry("bronze", 110e9, 0.34, 8860, {},
-            "C51000. E, density read in Olin Brass's data sheet, poisson at makeitfrom.com"),
-      entry("tungsten", 411e9, 0.28, 19300, {},
-            "Pure. CRC Handbook and Cardarelli 2018, read at matmake.com"),
-      entry("PLA", 3.25e9, 0.36, 1240, {},
-            "Printed, XY. Not read: Ultimaker's data sheet, poisson (additive.tools has 3 to 4 GPa, 1220 to "
-            "1260 kg/m3)"),
-      entry("ABS", 2.0e9, 0.37, 1040, {38e6, 0, 0.5},
-            "SUSTAABS data sheet (ISO 527), read at studylib.net; not read: poisson"),
-      entry("PETG", 1.9e9, 0.38, 1270, {},
-            "Printed, XY. Not read: Ultimaker's data sheet, poisson (additive.tools has 2 to 3 GPa, 1250 to "
-            "1290 kg/m3)"),
-      entry("PA12", 1.65e9, 0.39, 930, {0, 48e6, 0.18},
-            "Laser sintered, EOS PA 2200. Strength, elongation read at layerx3d.in, density at "
-            "additive.tools; not read: E (renato.design has 1.7 to 1.9 GPa), poisson"),
-      entry("polycarbonate", 2.4e9, 0.38, 1200, {65e6, 0, 0},
-            "Makrolon 2405. Covestro's data sheet (ISO 527), read at scribd.com; not read: poisson"),
-      entry("POM", 3.1e9, 0.37, 1420, {70e6, 0, 0},
-            "Delrin 500P. DuPont's figures (ISO 527), read at a dealer's (zjxxg.cn); not read: poisson"),
-      entry("PMMA", 3.3e9, 0.37, 1190, {0, 80e6, 0.055},
-            "Cast. Not read: Plexiglas GS data sheet (designerdata.nl has 2.9 GPa, 75 MPa, 4.5 %)"),
-      entry("PEEK", 4.0e9, 0.40, 1300, {98e6, 0, 0.45},
-            "Not read: Victrex 450G data sheet (ISO 527), poisson"),
-      entry("rubber", 1.2e6, 0.49, 930, {},
-            "Natural. Not read: Treloar 1975 (G near 0.4 MPa); nearly incompressible, poisson taken as 0.49"),
-      entry("silicone", 2.5e6, 0.48, 1150, {},
-            "Gent 1958's relation at 50 Shore A, computed (Ruess's, read at josephborrello.com, gives 3.4 "
-            "MPa); not read: density; nearly incompressible, poisson taken as 0.48"),
-      entry("TPU", 19.3e6, 0.45, 1180, {},
-            "80 Shore A. BASF Elastollan C78A data sheet (E 2800 psi), read at scribd.com; poisson taken as "
-            "0.45"),
-      with_damping(with_friction(
-                       entry("concrete", 33e9, 0.20, 2400, {0, 2.9e6, 0},
-                             "C30/37. EN 1992-1-1, table 3.1 (strength: mean axial tension), read at "
-                             "buildinghow.com; not read: poisson 3.1.3, density EN 1991-1-1, A.1, friction "
-                             "EN 1992-1-1, 6.2.5 (smooth), damping EN 1991-1-4, F.2 (building, 0.10 / 2 pi)"),
-                       0.6),
-                   0.016),
-      entry("glass", 70e9, 0.20, 2500, {0, 45e6, 0},
-            "Soda lime, annealed. EN 572 (strength: in bending), read at vasglass.gr"),
-      entry("borosilicate glass", 63e9, 0.20, 2230, {}, "ISO 3585, SCHOTT Duran, read at matmatch.com"),
-      entry("alumina", 370e9, 0.22, 3900, {}, "99.5 %, read at vertebr.ae"),
+      with_friction(
+          library_entry("steel S355", 210e9, 0.30, 7850, {355e6, 470e6, 0.22},
+                        "S355JR. As steel; strengths EN 10025-2 (3 to 16 mm), read at balingsteel.com; not "
+                        "read: friction EN 1993-1-8, table 3.7, class D"),
+          0.2),
+      library_entry(
+          "steel 42CrMo4", 210e9, 0.30, 7850, {900e6, 1100e6, 0.10},
+          "Quenched and tempered, to 16 mm. Strengths EN 10083, read in Saarstahl's data sheet; elastic "
+          "figures as steel"),
+      library_entry("spring steel", 206e9, 0.264, 7850, {},
+                    "EN 10270-1 (E 206, G 81.5 GPa, hence poisson), read at mollificiomodenese.it"),
+      library_entry(
+          "stainless", 200e9, 0.30, 7900, {210e6, 520e6, 0.45},
+          "1.4301, plate. E read at makeitfrom.com; not read: EN 1993-1-4, 2.1.3 and table 2.1, density EN "
+          "10088-1, elongation EN 10088-2"),
+      library_entry(
+          "stainless 316", 200e9, 0.30, 8000, {220e6, 520e6, 0.45},
+          "1.4401, plate. Not read: EN 1993-1-4, 2.1.3 and table 2.1, density EN 10088-1, elongation EN "
+          "10088-2"),
+      library_entry("cast iron", 110e9, 0.26, 7200, {0, 250e6, 0},
+                    "EN-GJL-250. EN 1561 (E 103 to 118 GPa), read at sn-castiron.nl"),
+      library_entry(
+          "ductile iron", 169e9, 0.275, 7100, {250e6, 400e6, 0.15},
+          "EN-GJS-400-15. EN 1563, read at iron-foundry.com; not read: poisson (sn-castiron.nl has 0.28)"),
+      library_entry(
+          "aluminium 6061", 68.9e9, 0.33, 2700, {240e6, 290e6, 0.10},
+          "T6. Aluminum Association, typical, read at glemco.com (there strengths of 276 and 310 MPa, 12 "
+          "%); not read: ASTM B209, sheet, for the least strengths given here"),
+      library_entry(
+          "aluminium 6082", 70e9, 0.30, 2700, {250e6, 290e6, 0.08},
+          "T6. EN 755-2 (extruded, to 5 mm), read at top-factories.com; not read: poisson EN 1999-1-1, "
+          "3.2.5"),
+      library_entry("aluminium 5083", 70e9, 0.30, 2700, {125e6, 275e6, 0.11},
+                    "O/H111. Strengths EN 485-2 (to 50 mm), read at euralliage.com; not read: the others EN "
+                    "1999-1-1, 3.2.5 (suppliers have 72 GPa, 2650 kg/m3)"),
+      library_entry(
+          "aluminium 2024", 73.1e9, 0.33, 2780, {345e6, 483e6, 0.18},
+          "T3, typical. E (10600 ksi) read at substech.com, density and strength at matweb.com, yield and "
+          "elongation at princeton.edu; not read: poisson"),
+      library_entry(
+          "aluminium 7075", 71.7e9, 0.33, 2810, {503e6, 572e6, 0.11},
+          "T6, typical. E (10400 ksi), density, strengths read at substech.com, poisson at wikipedia.org"),
+      library_entry(
+          "titanium", 113.8e9, 0.33, 4430, {827e6, 896e6, 0.10},
+          "Ti-6Al-4V annealed. E (16500 ksi), poisson, density read at asm.matweb.com, least strengths "
+          "(120, 130 ksi) at nickel-systems.com"),
+      library_entry("magnesium", 45e9, 0.35, 1770, {}, "AZ31B, read at alloysintl.com"),
+      library_entry(
+          "nickel alloy 718", 200e9, 0.29, 8220, {1034e6, 1276e6, 0.12},
+          "Aged. E (29.0e3 ksi), poisson read in Special Metals SMC-045, density at hightempmetals.com; "
+          "not read: strengths AMS 5663"),
+      library_entry("brass", 97e9, 0.31, 8490, {}, "C36000, read at ezlok.com"),
+      library_entry(
+          "copper", 117e9, 0.34, 8910, {},
+          "C11000. E (17.0e3 ksi), density read in Hussey Copper's data sheet, poisson at shlionmetal.com"),
+      library_entry("bronze", 110e9, 0.34, 8860, {},
+                    "C51000. E, density read in Olin Brass's data sheet, poisson at makeitfrom.com"),
+      library_entry("tungsten", 411e9, 0.28, 19300, {},
+                    "Pure. CRC Handbook and Cardarelli 2018, read at matmake.com"),
+      library_entry(
+          "PLA", 3.25e9, 0.36, 1240, {},
+          "Printed, XY. Not read: Ultimaker's data sheet, poisson (additive.tools has 3 to 4 GPa, 1220 to "
+          "1260 kg/m3)"),
+      library_entry("ABS", 2.0e9, 0.37, 1040, {38e6, 0, 0.5},
+                    "SUSTAABS data sheet (ISO 527), read at studylib.net; not read: poisson"),
+      library_entry(
+          "PETG", 1.9e9, 0.38, 1270, {},
+          "Printed, XY. Not read: Ultimaker's data sheet, poisson (additive.tools has 2 to 3 GPa, 1250 to "
+          "1290 kg/m3)"),
+      library_entry("PA12", 1.65e9, 0.39, 930, {0, 48e6, 0.18},
+                    "Laser sintered, EOS PA 2200. Strength, elongation read at layerx3d.in, density at "
+                    "additive.tools; not read: E (renato.design has 1.7 to 1.9 GPa), poisson"),
+      library_entry("polycarbonate", 2.4e9, 0.38, 1200, {65e6, 0, 0},
+                    "Makrolon 2405. Covestro's data sheet (ISO 527), read at scribd.com; not read: poisson"),
+      library_entry(
+          "POM", 3.1e9, 0.37, 1420, {70e6, 0, 0},
+          "Delrin 500P. DuPont's figures (ISO 527), read at a dealer's (zjxxg.cn); not read: poisson"),
+      library_entry("PMMA", 3.3e9, 0.37, 1190, {0, 80e6, 0.055},
+                    "Cast. Not read: Plexiglas GS data sheet (designerdata.nl has 2.9 GPa, 75 MPa, 4.5 %)"),
+      library_entry("PEEK", 4.0e9, 0.40, 1300, {98e6, 0, 0.45},
+                    "Not read: Victrex 450G data sheet (ISO 527), poisson"),
+      library_entry(
+          "rubber", 1.2e6, 0.49, 930, {},
+          "Natural. Not read: Treloar 1975 (G near 0.4 MPa); nearly incompressible, poisson taken as 0.49"),
+      library_entry(
+          "silicone", 2.5e6, 0.48, 1150, {},
+          "Gent 1958's relation at 50 Shore A, computed (Ruess's, read at josephborrello.com, gives 3.4 "
+          "MPa); not read: density; nearly incompressible, poisson taken as 0.48"),
+      library_entry(
+          "TPU", 19.3e6, 0.45, 1180, {},
+          "80 Shore A. BASF Elastollan C78A data sheet (E 2800 psi), read at scribd.com; poisson taken as "
+          "0.45"),
+      with_damping(
+          with_friction(
+              library_entry("concrete", 33e9, 0.20, 2400, {0, 2.9e6, 0},
+                            "C30/37. EN 1992-1-1, table 3.1 (strength: mean axial tension), read at "
+                            "buildinghow.com; not read: poisson 3.1.3, density EN 1991-1-1, A.1, friction "
+                            "EN 1992-1-1, 6.2.5 (smooth), damping EN 1991-1-4, F.2 (building, 0.10 / 2 pi)"),
+              0.6),
+          0.016),
+      library_entry("glass", 70e9, 0.20, 2500, {0, 45e6, 0},
+                    "Soda lime, annealed. EN 572 (strength: in bending), read at vasglass.gr"),
+      library_entry("borosilicate glass", 63e9, 0.20, 2230, {},
+                    "ISO 3585, SCHOTT Duran, read at matmatch.com"),
+      library_entry("alumina", 370e9, 0.22, 3900, {}, "99.5 %, read at vertebr.ae"),
   };
   return library;
 }

@@ -23,6 +23,7 @@
 #include <limits>
 
 #include "formats/parallel.h"
+#include "simulate/linear/vector_products.h"
 
 namespace flexel {
 namespace {
@@ -40,10 +41,6 @@ constexpr int kMaxCgOfFullStep = 400;   // more: the tangent has become nearly s
 constexpr int kMoreCgOfProjected = 40;  // than four times the usual: no use, a smaller load is cheaper
 constexpr int kStepsToShrink = 8;       // from then on a step is a quarter of the longest, or it has failed
 constexpr double kShrunk = 0.25;
-
-double dot(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
-  return parallel_sum<double>(a.size(), [&](std::size_t e) { return a[e].dot(b[e]); });
-}
 
 double norm(const std::vector<Vec3>& a) {
   return std::sqrt(dot(a, a));

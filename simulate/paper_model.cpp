@@ -17,7 +17,7 @@
 namespace flexel {
 namespace {
 
-constexpr std::size_t kGrain = 512;
+constexpr std::size_t kPaperGrain = 512;
 
 // Axis of a kind of connection along one axis of the lattice, or 3. Kinds are 1 + the bit of
 // half_neighbourhood.
@@ -108,7 +108,7 @@ double PaperModel::energy(const State& state) const {
         }
         return energy;
       },
-      kGrain);
+      kPaperGrain);
 }
 
 void PaperModel::add_forces(const State& state, std::vector<Vec3>& forces) const {
@@ -121,7 +121,7 @@ void PaperModel::add_forces(const State& state, std::vector<Vec3>& forces) const
           forces[e] += (stiffness(element, entry) * now.elongation) * now.direction;
         }
       },
-      kGrain);
+      kPaperGrain);
 }
 
 void PaperModel::add_damping(const State& state, const std::vector<double>& damping,
@@ -142,7 +142,7 @@ void PaperModel::add_damping(const State& state, const std::vector<double>& damp
           forces[e] += (damping[part_[e]] * change * stiffness(element, entry) * rate) * direction;
         }
       },
-      kGrain);
+      kPaperGrain);
 }
 
 std::vector<double> PaperModel::frequencies(const State& state, const std::vector<double>& mass) const {
@@ -165,7 +165,7 @@ std::vector<double> PaperModel::frequencies(const State& state, const std::vecto
           eigen.computeDirect(own, Eigen::EigenvaluesOnly);
           return Greatest{2 * eigen.eigenvalues()[2] / mass[element]};
         },
-        kGrain);
+        kPaperGrain);
     result.push_back(largest.value);
   }
   return result;
@@ -186,7 +186,7 @@ void PaperModel::add_stiffness(const State& state, bool project, BlockMatrix& ma
         }
         matrix.values[diagonal_position(matrix, e)] += own;
       },
-      kGrain);
+      kPaperGrain);
 }
 
 PaperModel::SmallestVolume PaperModel::smallest_volume(const State& state) const {
@@ -197,7 +197,7 @@ PaperModel::SmallestVolume PaperModel::smallest_volume(const State& state) const
         const auto element = static_cast<std::uint32_t>(e);
         return Least{volume_ratio(state, element), element};
       },
-      kGrain);
+      kPaperGrain);
   if (!(least.value < std::numeric_limits<double>::infinity())) return {};
   return {least.value, least.element};
 }

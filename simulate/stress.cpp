@@ -22,7 +22,7 @@ constexpr double kHalfFull = 0.5;
 // Of the patch's weight, on the squared gradient per spacing: where the cells lie in one layer the field is
 // constant across it.
 constexpr double kRidge = 1e-3;
-constexpr std::size_t kGrain = 256;
+constexpr std::size_t kStressGrain = 256;
 
 SymmetricStress components(const Mat3& m) {
   SymmetricStress s;
@@ -84,7 +84,7 @@ std::vector<SymmetricStress> cell_stresses(const Setting& setting, const State& 
           const auto c = static_cast<std::uint32_t>(part.cell_begin + n);
           if (active[c]) result[c] = components(share[c] / body.fill[c] * stress_of(c));
         },
-        kGrain);
+        kStressGrain);
   }
   return result;
 }
@@ -199,7 +199,7 @@ Stresses stresses(const Setting& setting, const State& state) {
   const Recovery recover(body, around, result.cell);
   parallel_for_each(
       body.element_count(),
-      [&](std::size_t e) { result.element[e] = recover(static_cast<std::uint32_t>(e)); }, kGrain);
+      [&](std::size_t e) { result.element[e] = recover(static_cast<std::uint32_t>(e)); }, kStressGrain);
   return result;
 }
 

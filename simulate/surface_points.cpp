@@ -16,7 +16,7 @@ namespace flexel {
 namespace {
 
 constexpr double kLongestEdge = 0.3;  // of a piece, in spacings
-constexpr double kShare = 32;         // longest edge of what one thread cuts at a time, in those of a piece
+constexpr double kThreadShare = 32;   // longest edge of what one thread cuts at a time, in those of a piece
 
 using Corners = std::array<Vec3, 3>;
 
@@ -76,7 +76,7 @@ std::vector<SurfacePoint> surface_points(const Setting& setting, const std::vect
     Corners corners;
     for (std::size_t c = 0; c < 3; ++c) corners[c] = body.surface.vertices[triangles.corners[t][c]];
     pieces_of_one.clear();
-    add_pieces(corners, kShare * longest(polygon), pieces_of_one);
+    add_pieces(corners, kThreadShare * longest(polygon), pieces_of_one);
     for (const Corners& piece : pieces_of_one) shares.push_back({polygon, piece});
   }
   // There are some fifty points to a cell under a large face: they are counted first, so that no second copy

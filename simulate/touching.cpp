@@ -66,9 +66,9 @@ class Grid {
   std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cubes_;
 };
 
-class Search {
+class TouchingSearch {
  public:
-  Search(const Setting& setting, const std::vector<TouchingGap>& wider);
+  TouchingSearch(const Setting& setting, const std::vector<TouchingGap>& wider);
   std::vector<TouchingPoint> operator()();
 
  private:
@@ -99,7 +99,7 @@ class Search {
   std::vector<TouchingPoint> found_;
 };
 
-Search::Search(const Setting& setting, const std::vector<TouchingGap>& wider)
+TouchingSearch::TouchingSearch(const Setting& setting, const std::vector<TouchingGap>& wider)
     : setting_(setting),
       body_(setting.body),
       wider_(wider),
@@ -117,7 +117,7 @@ Search::Search(const Setting& setting, const std::vector<TouchingGap>& wider)
   for (std::uint32_t part = 0; part < body_.parts.size(); ++part) sample(part);
 }
 
-void Search::sample(std::uint32_t part) {
+void TouchingSearch::sample(std::uint32_t part) {
   std::vector<std::uint32_t> polygons;
   for (std::uint32_t p = 0; p < body_.surface.polygon_count(); ++p) {
     if (body_.surface.polygon_part(p) != part) continue;
@@ -131,7 +131,7 @@ void Search::sample(std::uint32_t part) {
   if (!polygons.empty()) points_[part] = surface_points(setting_, polygons);
 }
 
-double Search::distance(const Vec3& point, std::uint32_t polygon) const {
+double TouchingSearch::distance(const Vec3& point, std::uint32_t polygon) const {
   double least = 1e300;
   for (std::uint32_t t = first_triangle_[polygon]; t < first_triangle_[polygon + 1]; ++t) {
     const auto& corners = triangles_.corners[t];
@@ -142,7 +142,7 @@ double Search::distance(const Vec3& point, std::uint32_t polygon) const {
   return least;
 }
 
-void Search::touch(std::uint32_t finer, std::uint32_t coarser) {
+void TouchingSearch::touch(std::uint32_t finer, std::uint32_t coarser) {
   const double limit = std::max(tolerance(finer), wider_gap(finer, coarser));
   std::unordered_map<std::uint32_t, Vec3> normal;
   for (const SurfacePoint& point : points_[coarser])
@@ -170,7 +170,7 @@ void Search::touch(std::uint32_t finer, std::uint32_t coarser) {
   }
 }
 
-std::vector<TouchingPoint> Search::operator()() {
+std::vector<TouchingPoint> TouchingSearch::operator()() {
   const auto spacing = [&](std::uint32_t part) { return body_.parts[part].lattice.spacing.mean(); };
   for (std::uint32_t a = 0; a < body_.parts.size(); ++a)
     for (std::uint32_t b = a + 1; b < body_.parts.size(); ++b) {
@@ -185,7 +185,7 @@ std::vector<TouchingPoint> Search::operator()() {
 
 std::vector<TouchingPoint> touching_points(const Setting& setting, const std::vector<TouchingGap>& wider) {
   if (setting.body.parts.size() < 2) return {};
-  return Search(setting, wider)();
+  return TouchingSearch(setting, wider)();
 }
 
 }  // namespace flexel

@@ -10,11 +10,11 @@ namespace flexel {
 namespace {
 
 constexpr double kFlat = 1e-9;  // least over greatest spread of the connections
-constexpr double kShare = 1e-3;
+constexpr double kSupportShare = 1e-3;
 
-class Search {
+class UnsupportedSearch {
  public:
-  explicit Search(const Setting& setting)
+  explicit UnsupportedSearch(const Setting& setting)
       : setting_(setting),
         connections_(make_connections(setting)),
         rows_(connection_rows(connections_, setting.body.element_count())),
@@ -45,7 +45,7 @@ class Search {
   void search(std::size_t p) {
     const Part& part = setting_.body.parts[p];
     const ConnectionKinds& kinds = connections_.parts[p].kinds;
-    const double most = kShare * (part.element_end - part.element_begin);
+    const double most = kSupportShare * (part.element_end - part.element_begin);
     std::vector<std::uint32_t> pending, marked;
     for (std::uint32_t e = part.element_end; e > part.element_begin; --e) pending.push_back(e - 1);
     while (!pending.empty()) {
@@ -71,7 +71,7 @@ class Search {
 }  // namespace
 
 std::vector<std::uint8_t> unsupported_elements(const Setting& setting) {
-  return Search(setting)();
+  return UnsupportedSearch(setting)();
 }
 
 }  // namespace flexel

@@ -157,11 +157,6 @@ double volume_with(PartMesh mesh, const std::vector<Corners>& closing) {
   return std::abs(enclosed_volume(mesh));
 }
 
-Corners sorted(Corners c) {
-  std::sort(c.begin(), c.end());
-  return c;
-}
-
 }  // namespace
 
 FilledHoles fill_holes(PartMesh& mesh) {
@@ -172,7 +167,7 @@ FilledHoles fill_holes(PartMesh& mesh) {
   for (std::uint32_t t = 0; t < mesh.corners.size(); ++t)
     shell_area[mesh.shell[t]] += area(mesh.world, mesh.corners[t]);
   for (std::uint32_t n = 0; n < walker.edge_count(); ++n)
-    at_holes.insert(sorted(mesh.corners[walker.edge(n).triangle]));
+    at_holes.insert(sorted_corners(mesh.corners[walker.edge(n).triangle]));
   const double whole = std::accumulate(shell_area.begin(), shell_area.end(), 0.);
   std::size_t in_loops = 0;
   std::vector<std::vector<Corners>> closings;  // (holes)
@@ -197,7 +192,7 @@ FilledHoles fill_holes(PartMesh& mesh) {
       std::sort(c.begin(), c.end());  // now it runs as the loop does
       if (loop.along > 0) std::swap(c[1], c[2]);
       for (std::uint32_t& v : c) v = loop.vertices[v];
-      doubles = doubles || at_holes.count(sorted(c)) > 0;
+      doubles = doubles || at_holes.count(sorted_corners(c)) > 0;
     }
     const std::uint32_t shell = mesh.shell[walker.edge(edges[0]).triangle];
     hole.share = closing.empty() || doubles ? 1 : sum / shell_area[shell];

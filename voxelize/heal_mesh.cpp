@@ -20,11 +20,6 @@ bool repeats(const Corners& c) {
   return c[0] == c[1] || c[1] == c[2] || c[2] == c[0];
 }
 
-Corners sorted(Corners c) {
-  std::sort(c.begin(), c.end());
-  return c;
-}
-
 // Vertices (by index) that lie on edges with an odd number of triangles.
 std::vector<std::uint32_t> vertices_of_open_edges(const PartMesh& mesh) {
   const std::vector<std::uint32_t> degree = edge_degrees(mesh);
@@ -39,9 +34,9 @@ std::vector<std::uint32_t> vertices_of_open_edges(const PartMesh& mesh) {
   return result;
 }
 
-using Cell = std::array<std::int64_t, 3>;
+using GridCell = std::array<std::int64_t, 3>;
 struct CellHash {
-  std::size_t operator()(const Cell& c) const {
+  std::size_t operator()(const GridCell& c) const {
     std::uint64_t h = 0x9e3779b97f4a7c15u;
     for (const std::int64_t x : c)
       h = (h ^ static_cast<std::uint64_t>(x)) * 0xff51afd7ed558ccdu, h ^= h >> 32;
@@ -54,10 +49,10 @@ std::vector<std::uint32_t> join_near(const std::vector<Vec3>& points,
                                      const std::vector<std::uint32_t>& chosen, double tolerance) {
   std::vector<std::uint32_t> result(points.size());
   std::iota(result.begin(), result.end(), 0u);
-  std::unordered_map<Cell, std::vector<std::uint32_t>, CellHash> cells;
+  std::unordered_map<GridCell, std::vector<std::uint32_t>, CellHash> cells;
   const Vec3 base = points.empty() ? Vec3(Vec3::Zero()) : points[0];
   for (const std::uint32_t v : chosen) {
-    Cell cell;
+    GridCell cell;
     for (int a = 0; a < 3; ++a)
       cell[a] = static_cast<std::int64_t>(std::floor((points[v][a] - base[a]) / tolerance));
     for (int n = 0; n < 27 && result[v] == v; ++n) {
@@ -169,6 +164,11 @@ std::size_t drop_fins_once(PartMesh& mesh, double& budget) {
 
 }  // namespace
 
+Corners sorted_corners(Corners corners) {
+  std::sort(corners.begin(), corners.end());
+  return corners;
+}
+
 std::vector<std::uint32_t> edge_degrees(const PartMesh& mesh) {
   std::vector<std::uint32_t> degree(mesh.edge_count, 0);
   for (const Corners& edges : mesh.edges)
@@ -203,7 +203,7 @@ std::size_t drop_duplicates(PartMesh& mesh) {
   std::vector<std::uint32_t> order(mesh.corners.size());
   std::iota(order.begin(), order.end(), 0u);
   std::vector<Corners> key(mesh.corners.size());
-  for (std::size_t t = 0; t < key.size(); ++t) key[t] = sorted(mesh.corners[t]);
+  for (std::size_t t = 0; t < key.size(); ++t) key[t] = sorted_corners(mesh.corners[t]);
   std::sort(order.begin(), order.end(),
             [&](std::uint32_t a, std::uint32_t b) { return key[a] != key[b] ? key[a] < key[b] : a < b; });
   std::vector<std::uint32_t> degree;

@@ -30,6 +30,9 @@ std::size_t drop_loose_sheets(PartMesh& mesh);
 // Keeps the triangles marked 1, and the vertices that they use; numbers the edges anew.
 void keep_triangles(PartMesh& mesh, const std::vector<std::uint8_t>& keep);
 
+// In ascending order: the same for the same three vertices.
+[[nodiscard]] Corners sorted_corners(Corners corners);
+
 // Number of triangles at each edge (edges).
 [[nodiscard]] std::vector<std::uint32_t> edge_degrees(const PartMesh& mesh);
 

@@ -11,8 +11,8 @@
 namespace flexel {
 namespace {
 
-constexpr int kLines = 64;          // across a voxel
-constexpr double kTouching = 1e-6;  // in cells
+constexpr int kLines = 64;                   // across a voxel
+constexpr double kTouchingCrossings = 1e-6;  // in cells
 
 // Sum of the changes of `line` at coordinates in [low, high).
 int change_between(std::span<const LineCrossing> crossings, double low, double high) {
@@ -37,7 +37,7 @@ LineFill length_inside(std::span<const LineCrossing> crossings, double low, doub
     if (crossing.at < low || crossing.at >= high) continue;
     if (winding > 0) length.fill += crossing.at - from;
     // Surfaces that touch may be met in either order: a winding number over no length is no overlap.
-    if (winding != 0 && winding != 1 && crossing.at - from > kTouching) length.overlap = true;
+    if (winding != 0 && winding != 1 && crossing.at - from > kTouchingCrossings) length.overlap = true;
     winding += crossing.change;
     from = crossing.at;
   }

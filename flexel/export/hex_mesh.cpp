@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "flexel/export/mesh.h"
+#include "flexel/face_shape.h"
 #include "formats/units.h"
 #include "simulate/cells.h"
 
@@ -16,7 +17,7 @@ namespace {
 
 constexpr double kWhole = 1 - 1e-9;
 constexpr int kClasses = 20;
-constexpr double kFacing = 0.1;  // cosine between a side and the surface that it stands for
+constexpr double kSideFacing = 0.1;  // cosine between a side and the surface that it stands for
 // Corner a = i + 2 j + 4 k of a cell by its place in C3D8.
 constexpr std::array<std::uint8_t, 8> kOrder = {0, 1, 3, 2, 4, 5, 7, 6};
 
@@ -56,13 +57,6 @@ std::vector<std::vector<std::uint32_t>> polygons_of_cells(const Body& body) {
   return result;
 }
 
-Vec3 area_vector(const std::vector<Vec3>& at, std::span<const std::uint32_t> corners) {
-  Vec3 area = Vec3::Zero();
-  for (std::size_t c = 1; c + 1 < corners.size(); ++c)
-    area += 0.5 * (at[corners[c]] - at[corners[0]]).cross(at[corners[c + 1]] - at[corners[0]]);
-  return area;
-}
-
 void find_sides(const std::vector<std::uint32_t>& cells, AnalysisMesh& mesh) {
   const Body& body = mesh.body;
   std::map<std::array<std::uint32_t, 4>, std::pair<int, ElementSide>> skin;
@@ -87,7 +81,7 @@ void find_sides(const std::vector<std::uint32_t>& cells, AnalysisMesh& mesh) {
     std::map<std::uint32_t, double> facing;  // by CAD face
     for (const std::uint32_t p : polygons[cells[entry.second.element]]) {
       const Vec3 area = area_vector(body.surface.vertices, body.surface.polygon(p));
-      if (const double along = area.dot(outward); along > kFacing * area.norm())
+      if (const double along = area.dot(outward); along > kSideFacing * area.norm())
         facing[body.surface.polygon_face[p]] += along;
     }
     const auto most = std::max_element(facing.begin(), facing.end(),

@@ -21,7 +21,7 @@ namespace {
 
 constexpr double kRegionAngle = 30;   // degrees, as regions of meshes are told (formats/surface.h)
 constexpr std::size_t kSamples = 25;  // triangles of a surface that are asked which face they are on
-constexpr double kFacing = 0.3;       // cosine
+constexpr double kTetFacing = 0.3;    // cosine
 constexpr double kBoxTolerance = 0.02;
 
 bool is_cad(const SurfaceSource& source) {
@@ -141,7 +141,7 @@ std::uint32_t nearest_face(const Surface& surface, const Triangles& triangles, c
     const auto& x = surface.vertices;
     double away = distance_to_triangle(middle, x[a], x[b], x[c]);
     if (!(away < least)) continue;
-    if (normal.dot(normal_of(x, a, b, c)) < kFacing) continue;
+    if (normal.dot(normal_of(x, a, b, c)) < kTetFacing) continue;
     least = away;
     face = surface.polygon_face[triangles.polygon[t]];
   }

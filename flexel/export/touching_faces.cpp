@@ -4,25 +4,18 @@
 #include <algorithm>
 
 #include "flexel/export/analysis.h"
+#include "flexel/face_shape.h"
 #include "formats/distance.h"
 
 namespace flexel {
 namespace {
 
-constexpr double kFacing = -0.7;  // cosine between the normals
+constexpr double kOpposed = -0.7;  // cosine between the normals
 
 struct FacePolygons {
   std::vector<std::uint32_t> polygons;
   Box box;
 };
-
-Vec3 area_vector(const Surface& surface, std::span<const std::uint32_t> corners) {
-  Vec3 area = Vec3::Zero();
-  for (std::size_t c = 1; c + 1 < corners.size(); ++c)
-    area += 0.5 * (surface.vertices[corners[c]] - surface.vertices[corners[0]])
-                      .cross(surface.vertices[corners[c + 1]] - surface.vertices[corners[0]]);
-  return area;
-}
 
 bool overlap(const Box& a, const Box& b, double margin) {
   return (a.min.array() <= b.max.array() + margin).all() && (b.min.array() <= a.max.array() + margin).all();
@@ -37,10 +30,10 @@ bool touch(const Surface& surface, const FacePolygons& f, const FacePolygons& g,
     Box at;
     at.add(middle);
     if (!overlap(at, g.box, tolerance)) continue;
-    const Vec3 normal = area_vector(surface, corners).normalized();
+    const Vec3 normal = area_vector(surface.vertices, corners).normalized();
     for (const std::uint32_t q : g.polygons) {
       const auto others = surface.polygon(q);
-      if (!(normal.dot(area_vector(surface, others).normalized()) < kFacing)) continue;
+      if (!(normal.dot(area_vector(surface.vertices, others).normalized()) < kOpposed)) continue;
       for (std::size_t c = 1; c + 1 < others.size(); ++c)
         if (distance_to_triangle(middle, surface.vertices[others[0]], surface.vertices[others[c]],
                                  surface.vertices[others[c + 1]]) <= tolerance)

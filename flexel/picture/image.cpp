@@ -7,10 +7,10 @@
 namespace flexel {
 namespace {
 
-float to_linear(float s) {
+float linear_component(float s) {
   return s <= 0.04045f ? s / 12.92f : std::pow((s + 0.055f) / 1.055f, 2.4f);
 }
-float to_srgb(float l) {
+float srgb_component(float l) {
   const float c = std::clamp(l, 0.0f, 1.0f);
   return c <= 0.0031308f ? 12.92f * c : 1.055f * std::pow(c, 1 / 2.4f) - 0.055f;
 }
@@ -50,10 +50,10 @@ void for_each_covered(int width, int height, const Eigen::Vector2f& from, const 
 
 // IEC 61966-2-1.
 Colour to_linear(const Colour& srgb) {
-  return srgb.unaryExpr([](float s) { return to_linear(s); });
+  return srgb.unaryExpr([](float s) { return linear_component(s); });
 }
 Colour to_srgb(const Colour& linear) {
-  return linear.unaryExpr([](float l) { return to_srgb(l); });
+  return linear.unaryExpr([](float l) { return srgb_component(l); });
 }
 
 void fill_rectangle(Image& image, float left, float top, float right, float bottom, const Colour& fill,

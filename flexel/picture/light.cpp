@@ -12,7 +12,7 @@
 namespace flexel {
 namespace {
 
-constexpr int kTile = 16, kBlock = 4;
+constexpr int kLightTile = 16, kBlock = 4;
 constexpr int kSkyRays = 3, kLampRays = 1;  // a pixel
 constexpr float kSkyReach = 0.7f;           // of the part's radius: what is farther away darkens nothing
 constexpr float kLampSize = 0.22f;          // tangent of the lamp's half angle
@@ -63,8 +63,8 @@ struct Group {
 Group gather(const PixelBuffer& buffer, const Viewport& viewport, const Camera& camera, const Drawable& drawn,
              int left, int top) {
   Group group;
-  for (int y = top; y < std::min(top - top % kBlock + kTile, buffer.height); y += kBlock)
-    for (int x = left; x < std::min(left - left % kBlock + kTile, buffer.width); x += kBlock) {
+  for (int y = top; y < std::min(top - top % kBlock + kLightTile, buffer.height); y += kBlock)
+    for (int x = left; x < std::min(left - left % kBlock + kLightTile, buffer.width); x += kBlock) {
       const std::size_t i = buffer.index(x, y);
       if (buffer.hits[i].primitive == kNoHit) continue;
       const Ray ray =
@@ -157,13 +157,14 @@ Vec3f lamp_direction(const Camera& camera) {
 std::vector<Light> trace_light(const PixelBuffer& buffer, const Viewport& viewport, const Camera& camera,
                                const Drawable& drawn, const Tracer& tracer) {
   std::vector<Light> light(buffer.hits.size());
-  const int across = (buffer.width + kTile - 1) / kTile, down = (buffer.height + kTile - 1) / kTile;
+  const int across = (buffer.width + kLightTile - 1) / kLightTile,
+            down = (buffer.height + kLightTile - 1) / kLightTile;
   const Vec3f lamp = lamp_direction(camera);
   parallel_for_each(
       static_cast<std::size_t>(across) * static_cast<std::size_t>(down),
       [&](std::size_t tile) {
-        const int left = static_cast<int>(tile) % across * kTile,
-                  top = static_cast<int>(tile) / across * kTile;
+        const int left = static_cast<int>(tile) % across * kLightTile,
+                  top = static_cast<int>(tile) / across * kLightTile;
         for (int place = 0; place < kBlock * kBlock; ++place) {
           // A permutation of the places, so that neighbours get distant points of the sequence.
           const Group group =

@@ -11,9 +11,9 @@
 namespace flexel {
 namespace {
 
-constexpr float kPiece = 1.5f;   // pixels
-constexpr float kLift = 3e-4f;   // towards the camera, of the part's radius
-constexpr float kDrop = 0.012f;  // beside an outline
+constexpr float kPiece = 1.5f;      // pixels
+constexpr float kLineLift = 3e-4f;  // towards the camera, of the part's radius
+constexpr float kDrop = 0.012f;     // beside an outline
 constexpr int kMostPieces = 4000;
 
 struct Edge {
@@ -114,7 +114,7 @@ void judge(const Edge& edge, const Tracer& tracer, const Moved* moved, const Cam
   for (int k = 0; k < pieces.count; ++k) {
     const float s = (static_cast<float>(k) + 0.5f) / static_cast<float>(pieces.count);
     pieces.rays.push_back(
-        {edge.from + s * (edge.to - edge.from) - kLift * camera.forward, -camera.forward, 0, 1e30f});
+        {edge.from + s * (edge.to - edge.from) - kLineLift * camera.forward, -camera.forward, 0, 1e30f});
   }
   pieces.hidden.resize(pieces.rays.size());
   tracer.occluded(pieces.rays, pieces.hidden);

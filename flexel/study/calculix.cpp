@@ -22,7 +22,7 @@ using Json = nlohmann::json;
 namespace fs = std::filesystem;
 
 constexpr double kMillimetre = 1e-3;
-constexpr int kLookCells = 2000;
+constexpr int kFirstLook = 2000;
 
 // Node -> m, of the last step that was written.
 std::map<long, Vec3> displacements(const fs::path& frd) {
@@ -143,7 +143,7 @@ CalculixLook look_at_calculix(const Case& study, const RunOptions& options) {
   child.log = folder.path() / "log";
   child.deadline = options.deadline;
   const ChildRun run =
-      run_child(export_words(study, job, {"--mesh", "hex", "--count", std::to_string(kLookCells)}), child);
+      run_child(export_words(study, job, {"--mesh", "hex", "--count", std::to_string(kFirstLook)}), child);
   if (run.exit_code != 0) {
     look.refused = run.out_of_time ? "the time was up" : error_in_log(child.log);
     return look;

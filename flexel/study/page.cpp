@@ -37,7 +37,7 @@ std::string base64(const std::string& bytes) {
 }
 
 // "1.4 %", "<0.01 %"
-std::string percent(double share) {
+std::string percent_html(double share) {
   if (share > 0 && share < 1e-5) return "&lt;0.001 %";
   return share < 0.995 ? fmt::format("{:.2g} %", 100 * share) : fmt::format("{:.0f} %", 100 * share);
 }
@@ -69,7 +69,7 @@ std::string time_of(const Summed& each) {
 
 std::string error_of_point(const Point& point) {
   if (!point.error) return "";
-  return percent(point.error->error) + " &plusmn; " + percent(point.error->uncertainty);
+  return percent_html(point.error->error) + " &plusmn; " + percent_html(point.error->uncertainty);
 }
 
 std::string paragraphs(const std::vector<std::string>& lines, const std::string& name) {
@@ -193,7 +193,7 @@ std::string effects_part(const Study& study) {
     }
     const double saved = whole->point.seconds - each.point.seconds;
     rows.push_back({escaped(each.point.label), time_of(*whole), time_of(each),
-                    fmt::format("{:+.0f} %", -100 * saved / whole->point.seconds), percent(change)});
+                    fmt::format("{:+.0f} %", -100 * saved / whole->point.seconds), percent_html(change)});
   }
   if (rows.empty()) return "";
   return "<h2>What each effect costs</h2>\n" +

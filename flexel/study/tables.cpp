@@ -3,13 +3,15 @@
 
 #include <nlohmann/json.hpp>
 
+#include "flexel/json_of.h"
 #include "flexel/study/study.h"
 #include "formats/units.h"
 
 namespace flexel::study {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
+using flexel::json_of;
 
 // Commas and quotes in names, as RFC 4180 has it.
 std::string quoted(const std::string& text) {
@@ -84,14 +86,11 @@ std::vector<Field> fields(std::size_t run, const Row& row, const std::vector<Qua
   return out;
 }
 
-Json json_of(const std::optional<double>& value) {
-  return value ? Json(*value) : Json();
-}
-
-Json json_of(const Summed& each) {
-  Json json = {{"label", each.point.label},   {"sweep", each.point.sweep}, {"options", each.point.options},
-               {"runs", each.runs},           {"wall", each.wall.value},   {"wall_known_to", nullptr},
-               {"memory", each.point.memory}, {"error", nullptr},          {"error_uncertainty", nullptr}};
+OrderedJson json_of(const Summed& each) {
+  OrderedJson json = {
+      {"label", each.point.label},   {"sweep", each.point.sweep}, {"options", each.point.options},
+      {"runs", each.runs},           {"wall", each.wall.value},   {"wall_known_to", nullptr},
+      {"memory", each.point.memory}, {"error", nullptr},          {"error_uncertainty", nullptr}};
   if (std::isfinite(each.wall.relative_error)) json["wall_known_to"] = each.wall.relative_error;
   if (each.point.error) {
     json["error"] = each.point.error->error;
@@ -100,7 +99,7 @@ Json json_of(const Summed& each) {
   return json;
 }
 
-Json json_of(const Reference& each) {
+OrderedJson json_of(const Reference& each) {
   return {{"name", each.name},
           {"unit", each.unit},
           {"value", each.value},
@@ -110,9 +109,10 @@ Json json_of(const Reference& each) {
           {"decides", each.decides}};
 }
 
-Json json_of(const Against& against) {
-  Json json = {{"program", "calculix"},    {"versions", against.versions}, {"refused", against.refused},
-               {"nlgeom", against.nlgeom}, {"warnings", against.warnings}, {"quantities", Json::array()}};
+OrderedJson json_of(const Against& against) {
+  OrderedJson json = {{"program", "calculix"},        {"versions", against.versions},
+                      {"refused", against.refused},   {"nlgeom", against.nlgeom},
+                      {"warnings", against.warnings}, {"quantities", OrderedJson::array()}};
   for (const Agreement& each : against.agreements) {
     json["quantities"].push_back(json_of(each.theirs));
     json["quantities"].back()["finest"] = each.finest;
@@ -137,7 +137,7 @@ std::string csv_line(std::size_t run, const Row& row, const std::vector<Quantity
 }
 
 std::string study_json(const Study& study) {
-  Json json;
+  OrderedJson json;
   json["program"] = "flexel study";
   json["version"] = study.machine.version;
   json["parts"] = study.parts;
@@ -151,12 +151,12 @@ std::string study_json(const Study& study) {
                      {"load_at_start", study.machine.load_at_start},
                      {"date", study.machine.date}};
   json["sentences"] = study.sentences;
-  json["references"] = Json::array();
+  json["references"] = OrderedJson::array();
   for (const Reference& each : study.references) json["references"].push_back(json_of(each));
   if (study.against.asked) json["against"] = json_of(study.against);
-  json["points"] = Json::array();
+  json["points"] = OrderedJson::array();
   for (const Summed& each : study.summed) json["points"].push_back(json_of(each));
-  json["left_out"] = Json::array();
+  json["left_out"] = OrderedJson::array();
   for (const LeftOut& each : study.left_out)
     json["left_out"].push_back({{"label", each.trial.label},
                                 {"predicted_wall", each.predicted.seconds},

@@ -12,7 +12,7 @@
 namespace flexel {
 namespace {
 
-constexpr double kAhead = 1.3;                       // of what hardens now, until it is looked at again
+constexpr double kHardeningAhead = 1.3;              // of what hardens now, until it is looked at again
 constexpr double kTravel = 0.12, kMostTravel = 0.2;  // spacings a step: what is asked for, what is borne
 
 // omega^2 that bounds the step like a dashpot of tau beside a stiffness of omega^2 (time/stability.h).
@@ -49,7 +49,7 @@ double Contacts::stiffness_bound() const {
     const PairState& now = states_[p];
     if (!now.near) continue;
     const bool plane = pairs_[p].j == kNoPoint;
-    const double stiffness = (plane ? 1 : 2) * (now.weight + kAhead * (now.stiffness - now.weight));
+    const double stiffness = (plane ? 1 : 2) * (now.weight + kHardeningAhead * (now.stiffness - now.weight));
     const Vec3 lever = 0.5 * now.offset;
     add(pairs_[p].i, lever, stiffness);
     if (!plane) add(pairs_[p].j, lever, stiffness);
@@ -84,7 +84,7 @@ bool Contacts::hurried(const State& state) {
   double hardest = 0;
   for (const PairState& now : states_)
     if (now.near && now.weight > 0) hardest = std::max(hardest, now.stiffness / now.weight);
-  if (looked_at_ == builds_ && hardest < kAhead) return false;
+  if (looked_at_ == builds_ && hardest < kHardeningAhead) return false;
   looked_at_ = builds_;
   return stiffness_bound() > 1.001 * promised_;
 }

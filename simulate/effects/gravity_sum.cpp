@@ -10,16 +10,16 @@
 namespace flexel {
 namespace {
 
-constexpr std::size_t kLanes = 8, kGrain = 32;
+constexpr std::size_t kGravityLanes = 8, kGravityGrain = 32;
 
 // The masses by component, filled up with masses of 0.
-struct Columns {
+struct LaneMasses {
   std::vector<double> x, y, z, mass, radius;
 };
 
-Columns columns_of(const PointMasses& points) {
-  const std::size_t count = (points.mass.size() + kLanes - 1) / kLanes * kLanes;
-  Columns columns;
+LaneMasses columns_of(const PointMasses& points) {
+  const std::size_t count = (points.mass.size() + kGravityLanes - 1) / kGravityLanes * kGravityLanes;
+  LaneMasses columns;
   for (auto* column : {&columns.x, &columns.y, &columns.z, &columns.mass}) column->assign(count, 0);
   columns.radius.assign(count, 1);
   for (std::size_t i = 0; i < points.mass.size(); ++i) {
@@ -32,7 +32,7 @@ Columns columns_of(const PointMasses& points) {
   return columns;
 }
 
-using Sums = std::array<double, kLanes>;
+using Sums = std::array<double, kGravityLanes>;
 
 double total(const Sums& sums) {
   double sum = 0;
@@ -50,7 +50,7 @@ Pull pull_of(double mass, const Vec3& offset, double reach) {
 
 Attraction attraction_by_pairs(const PointMasses& points) {
   const std::size_t count = points.mass.size();
-  const Columns all = columns_of(points);
+  const LaneMasses all = columns_of(points);
   Attraction result;
   result.field.resize(count);
   result.potential.resize(count);
@@ -59,8 +59,8 @@ Attraction attraction_by_pairs(const PointMasses& points) {
       count,
       [&](std::size_t i) {
         Sums x{}, y{}, z{}, potential{}, tide{};
-        for (std::size_t begin = 0; begin < all.x.size(); begin += kLanes)
-          for (std::size_t l = 0; l < kLanes; ++l) {
+        for (std::size_t begin = 0; begin < all.x.size(); begin += kGravityLanes)
+          for (std::size_t l = 0; l < kGravityLanes; ++l) {
             const std::size_t j = begin + l;
             const double dx = all.x[j] - all.x[i], dy = all.y[j] - all.y[i], dz = all.z[j] - all.z[i];
             const double distance = std::sqrt(dx * dx + dy * dy + dz * dz),
@@ -77,7 +77,7 @@ Attraction attraction_by_pairs(const PointMasses& points) {
         result.potential[i] = total(potential);
         result.tide[i] = total(tide);
       },
-      kGrain);
+      kGravityGrain);
   return result;
 }
 

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::uint32_t kLeaf = 16;  // points
 constexpr int kDepth = 21;           // bits an axis
-constexpr std::size_t kGrain = 256;
+constexpr std::size_t kTreeGrain = 256;
 
 std::uint64_t spread(std::uint64_t bits) {  // two zeros between any two bits
   bits &= 0x1fffff;
@@ -25,7 +25,7 @@ std::uint64_t spread(std::uint64_t bits) {  // two zeros between any two bits
   return (bits | bits << 2) & 0x1249249249249249;
 }
 
-struct Box {
+struct NodeBox {
   Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity());
   Vec3 high = -low;
   void add(const Vec3& point) {
@@ -38,7 +38,7 @@ struct Node {
   std::uint32_t begin = 0, end = 0;  // points, in Morton order
   std::uint32_t next = 0;            // node to go on with once this one is done with
   bool leaf = false;
-  Box box;
+  NodeBox box;
   double mass = 0;                 // kg
   Vec3 centre = Vec3::Zero();      // m, of mass
   Mat3 quadrupole = Mat3::Zero();  // kg m^2, sum m (3 x x^T - |x|^2 I) about the centre
@@ -70,7 +70,7 @@ Tree::Tree(const PointMasses& points, double opening) : points_(points), opening
 }
 
 void Tree::sort() {
-  Box box;
+  NodeBox box;
   for (const Vec3& point : points_.position) box.add(point);
   const double side = std::max((box.high - box.low).maxCoeff(), std::numeric_limits<double>::min());
   const double scale = static_cast<double>((1 << kDepth) - 1) / side;
@@ -196,7 +196,7 @@ Attraction attraction_by_tree(const PointMasses& points, double opening) {
         result.potential[point] = pull.potential;
         result.tide[point] = pull.tide;
       },
-      kGrain);
+      kTreeGrain);
   Vec3 net = Vec3::Zero();
   double mass = 0;
   for (std::size_t i = 0; i < count; ++i) {

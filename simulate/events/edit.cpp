@@ -8,12 +8,13 @@
 namespace flexel {
 namespace {
 
-constexpr double kMost = 1e6;  // of a factor, and one over it
+constexpr double kMostFactor = 1e6;  // of a factor, and one over it
 
 double factor(TableReader& reader, const char* key) {
   const double value = reader.number(key).value_or(1);
-  if (!(value >= 1 / kMost && value <= kMost))
-    reader.fail(fmt::format("\"{}\" is a factor, above 0 (from {} to {})", key, 1 / kMost, kMost));
+  if (!(value >= 1 / kMostFactor && value <= kMostFactor))
+    reader.fail(
+        fmt::format("\"{}\" is a factor, above 0 (from {} to {})", key, 1 / kMostFactor, kMostFactor));
   return value;
 }
 

@@ -9,15 +9,12 @@
 
 #include "formats/parallel.h"
 #include "simulate/linear/solve.h"
+#include "simulate/linear/vector_products.h"
 
 namespace flexel {
 namespace {
 
 using Vector = std::vector<Vec3>;
-
-double dot(const Vector& a, const Vector& b) {
-  return parallel_sum<double>(a.size(), [&](std::size_t i) { return a[i].dot(b[i]); });
-}
 
 // y += factor x
 void add(double factor, const Vector& x, Vector& y) {

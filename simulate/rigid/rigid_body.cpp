@@ -1,30 +1,14 @@
 // Poses and momenta of rigid parts.
 #include "simulate/rigid/rigid_body.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
 #include <cmath>
 
+#include "simulate/small_matrices.h"
+
 namespace flexel {
 namespace {
-
-Mat3 cross_matrix(const Vec3& a) {
-  Mat3 m;
-  m << 0, -a.z(), a.y(), a.z(), 0, -a.x(), -a.y(), a.x(), 0;
-  return m;
-}
-
-// Inverse on the range: about an axis that all elements lie on nothing turns.
-Mat3 inverse_on_range(const Mat3& inertia) {
-  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(inertia);
-  Mat3 inverse = Mat3::Zero();
-  for (int i = 0; i < 3; ++i)
-    if (eigen.eigenvalues()[i] > 1e-9 * eigen.eigenvalues()[2])
-      inverse +=
-          eigen.eigenvectors().col(i) * eigen.eigenvectors().col(i).transpose() / eigen.eigenvalues()[i];
-  return inverse;
-}
 
 Vec3 angular_velocity(const RigidBody& rigid, const Mat3& rotation) {
   return rotation * rigid.inverse_inertia * rotation.transpose() * rigid.spin;
@@ -66,7 +50,8 @@ RigidBody rigid_body(const Body& body, std::uint32_t part, const std::vector<dou
     made.arms.push_back(arm);
     made.inertia += mass[e] * (arm.squaredNorm() * Mat3::Identity() - arm * arm.transpose());
   }
-  made.inverse_inertia = inverse_on_range(made.inertia);
+  // About an axis that all elements lie on nothing turns.
+  made.inverse_inertia = inverse_on_range(made.inertia).first;
   return made;
 }
 

@@ -17,12 +17,12 @@
 namespace flexel {
 namespace {
 
-constexpr double kSafety = 0.9;       // of the bound: it may fall between two checks
-constexpr double kAhead = 100;        // steps from one of them to the next
-constexpr int kImplicitSteps = 200;   // in a run, unless the scene says otherwise
-constexpr int kFailures = 30;         // of Newton's method within an implicit step
-constexpr std::uint64_t kRenew = 10;  // implicit steps that one tangent may serve
-constexpr double kRunaway = 1e4;      // of the body's diagonal: a displacement that no scene means
+constexpr double kShareOfBound = 0.9;  // of the bound: it may fall between two checks
+constexpr double kStepsAhead = 100;    // steps from one of them to the next
+constexpr int kImplicitSteps = 200;    // in a run, unless the scene says otherwise
+constexpr int kFailures = 30;          // of Newton's method within an implicit step
+constexpr std::uint64_t kRenew = 10;   // implicit steps that one tangent may serve
+constexpr double kRunaway = 1e4;       // of the body's diagonal: a displacement that no scene means
 
 bool has_cells_of_model_cells(const Setting& setting) {
   const auto is_springs = [](Model model) { return model == Model::springs; };
@@ -135,14 +135,14 @@ void Act::look() {
   stepper_->mark_broken(body_.broken);
   bound_->look(state_, paper_ ? &*paper_ : nullptr, stepper_->mass());
   if (guard_)
-    guard_->look(state_, kAhead * std::min(bound_->longest(implicit_.has_value()), *scene_.run.time));
+    guard_->look(state_, kStepsAhead * std::min(bound_->longest(implicit_.has_value()), *scene_.run.time));
 }
 
 void Act::choose_step(Clock& clock) {
   look();
   const double longest = bound_->longest(implicit_.has_value());
   if (!(longest > 0)) throw DivergedError(where_it_folds(setting_, state_));
-  double step = kSafety * longest;
+  double step = kShareOfBound * longest;
   if (euler_) {
     step = scene_.run.step.value_or(*scene_.run.time / kImplicitSteps);
   } else if (scene_.run.step) {
@@ -182,7 +182,7 @@ void Act::refuse_unsound() {
 void Act::adapt_step(Clock& clock) {
   if (euler_) return;
   const double longest = bound_->longest(implicit_.has_value());
-  if (clock.step > 0.97 * longest || (!scene_.run.step && clock.step < 0.6 * kSafety * longest))
+  if (clock.step > 0.97 * longest || (!scene_.run.step && clock.step < 0.6 * kShareOfBound * longest))
     choose_step(clock);
 }
 

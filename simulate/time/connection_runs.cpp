@@ -49,10 +49,10 @@ std::vector<Pair> make_pairs() {
   return pairs;
 }
 
-class Builder {
+class RunBuilder {
  public:
-  Builder(std::span<const std::array<std::uint16_t, 8>> cells, std::span<const double> fill,
-          std::size_t count);
+  RunBuilder(std::span<const std::array<std::uint16_t, 8>> cells, std::span<const double> fill,
+             std::size_t count);
   ConnectionRuns operator()();
 
  private:
@@ -86,8 +86,8 @@ class Builder {
   std::vector<Branch> branches_;  // what an element has besides: where pieces branch
 };
 
-Builder::Builder(std::span<const std::array<std::uint16_t, 8>> cells, std::span<const double> fill,
-                 std::size_t count)
+RunBuilder::RunBuilder(std::span<const std::array<std::uint16_t, 8>> cells, std::span<const double> fill,
+                       std::size_t count)
     : count_(count) {
   static const std::vector<Pair> pairs = make_pairs();
   if (kLanes + count_ > std::numeric_limits<std::uint16_t>::max())
@@ -101,7 +101,7 @@ Builder::Builder(std::span<const std::array<std::uint16_t, 8>> cells, std::span<
   }
 }
 
-void Builder::add(const Pair& pair, const std::array<std::uint16_t, 8>& corners) {
+void RunBuilder::add(const Pair& pair, const std::array<std::uint16_t, 8>& corners) {
   const auto number = [&](std::size_t corner) { return static_cast<std::int32_t>(kLanes + corners[corner]); };
   const std::size_t from = corners[pair.from];
   const auto accepts = [&](Link& link) {
@@ -118,7 +118,7 @@ void Builder::add(const Pair& pair, const std::array<std::uint16_t, 8>& corners)
 }
 
 // Whether a run of that shape finds at `a` this connection's neighbour, its cells and no others.
-bool Builder::holds(const Shape& shape, std::int32_t a, const Link& link) const {
+bool RunBuilder::holds(const Shape& shape, std::int32_t a, const Link& link) const {
   if (link.b != a + shape.b) return false;
   for (std::size_t s = 0; s < 4; ++s) {
     const std::int32_t at = shape.cell[s] == kNoOffset ? kNone : a + shape.cell[s];
@@ -129,14 +129,14 @@ bool Builder::holds(const Shape& shape, std::int32_t a, const Link& link) const 
 }
 
 // Whether it finds no cell there, and so no stiffness.
-bool Builder::is_empty(const Shape& shape, std::int32_t a) const {
+bool RunBuilder::is_empty(const Shape& shape, std::int32_t a) const {
   return std::all_of(shape.cell.begin(), shape.cell.end(), [&](std::int32_t offset) {
     return offset == kNoOffset || result_.fill[static_cast<std::size_t>(a + offset)] == 0;
   });
 }
 
 // Whether a run may go on over the block that begins with `links`: some connection there, all of that shape.
-bool Builder::continues(const Shape& shape, const Link* links, std::int32_t a) const {
+bool RunBuilder::continues(const Shape& shape, const Link* links, std::int32_t a) const {
   const auto size = static_cast<std::int32_t>(result_.fill.size());
   bool any = false;
   for (std::int32_t l = 0; l < static_cast<std::int32_t>(kLanes); ++l) {
@@ -148,7 +148,7 @@ bool Builder::continues(const Shape& shape, const Link* links, std::int32_t a) c
   return any;
 }
 
-Builder::Taken Builder::take(const Link* links, std::int32_t a) const {
+RunBuilder::Taken RunBuilder::take(const Link* links, std::int32_t a) const {
   Shape shape;
   unsigned taken = 0;
   for (unsigned l = 0; l < kLanes; ++l) {
@@ -168,7 +168,7 @@ Builder::Taken Builder::take(const Link* links, std::int32_t a) const {
   return {shape, taken};
 }
 
-void Builder::add_run(std::size_t direction, std::int32_t a, const Shape& shape, unsigned lanes) {
+void RunBuilder::add_run(std::size_t direction, std::int32_t a, const Shape& shape, unsigned lanes) {
   ConnectionRun run{};
   run.a = static_cast<std::uint16_t>(a);
   run.b = static_cast<std::uint16_t>(a + shape.b);
@@ -183,7 +183,7 @@ void Builder::add_run(std::size_t direction, std::int32_t a, const Shape& shape,
 
 // From the first connection that is left: a run from there, or one that begins at a multiple of eight where
 // that takes as many or goes on, for aligned loads are cheaper.
-void Builder::add_runs(std::size_t direction, std::size_t first, std::size_t last) {
+void RunBuilder::add_runs(std::size_t direction, std::size_t first, std::size_t last) {
   Link* links = links_[direction].data();
   const auto number = [](std::size_t element) { return static_cast<std::int32_t>(kLanes + element); };
   for (std::size_t e = first; e < last;) {
@@ -215,7 +215,7 @@ void Builder::add_runs(std::size_t direction, std::size_t first, std::size_t las
   }
 }
 
-ConnectionRuns Builder::operator()() {
+ConnectionRuns RunBuilder::operator()() {
   for (std::size_t first = 0; first < count_; first += kGroup)
     for (std::size_t d = 0; d < links_.size(); ++d) add_runs(d, first, std::min(count_, first + kGroup));
   for (const Branch& branch : branches_) {
@@ -233,7 +233,7 @@ ConnectionRuns Builder::operator()() {
 
 ConnectionRuns connection_runs(std::span<const std::array<std::uint16_t, 8>> cells,
                                std::span<const double> fill, std::size_t count) {
-  return Builder(cells, fill, count)();
+  return RunBuilder(cells, fill, count)();
 }
 
 }  // namespace flexel

@@ -14,16 +14,11 @@
 #include "formats/parallel.h"
 #include "simulate/cells.h"
 #include "simulate/rest_shape.h"
+#include "simulate/small_matrices.h"
 #include "simulate/time/damping_factors.h"
 
 namespace flexel {
 namespace {
-
-Mat3 cross_matrix(const Vec3& a) {
-  Mat3 m;
-  m << 0, -a.z(), a.y(), a.z(), 0, -a.x(), -a.y(), a.x(), 0;
-  return m;
-}
 
 Vec3 hourglass(const CellVectors& u, int mode) {
   Vec3 sum = Vec3::Zero();

@@ -7,20 +7,13 @@
 #include "formats/error.h"
 #include "formats/parallel.h"
 #include "simulate/effects/effect.h"
+#include "simulate/linear/vector_products.h"
 #include "simulate/time/folds.h"
 
 namespace flexel {
 namespace {
 
-constexpr double kTolerance = 1e-6;  // of the residual in the norm of the inverse masses
-
-double weighted(const std::vector<Vec3>& a, const std::vector<Vec3>& b, const std::vector<double>& weight) {
-  return parallel_sum<double>(a.size(), [&](std::size_t e) { return weight[e] * a[e].dot(b[e]); });
-}
-
-double dot(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
-  return parallel_sum<double>(a.size(), [&](std::size_t e) { return a[e].dot(b[e]); });
-}
+constexpr double kDampingTolerance = 1e-6;  // of the residual in the norm of the inverse masses
 
 bool is_zero(const std::vector<Vec3>& values) {
   return std::all_of(values.begin(), values.end(), [](const Vec3& v) { return v == Vec3::Zero(); });
@@ -77,8 +70,8 @@ StepOutcome ImplicitDamping::advance(State& state, const std::vector<Vec3>& oute
   parallel_for_each(n,
                     [&](std::size_t e) { residual_[e] = right_[e] + dt * first[e] - mass[e] * image_[e]; });
   held_.clear(residual_);
-  const double enough = kTolerance * kTolerance * weighted(right_, right_, inverse);
-  double norm = weighted(residual_, residual_, inverse);
+  const double enough = kDampingTolerance * kDampingTolerance * weighted_dot(right_, right_, inverse);
+  double norm = weighted_dot(residual_, residual_, inverse);
   parallel_for_each(n, [&](std::size_t e) { direction_[e] = inverse[e] * residual_[e]; });
   for (int i = 0; norm > enough; ++i) {
     if (i == most_ || !std::isfinite(norm))
@@ -92,7 +85,7 @@ StepOutcome ImplicitDamping::advance(State& state, const std::vector<Vec3>& oute
       change_[e] += length * direction_[e];
       residual_[e] -= length * image_[e];
     });
-    const double next = weighted(residual_, residual_, inverse);
+    const double next = weighted_dot(residual_, residual_, inverse);
     const double share = next / norm;
     parallel_for_each(
         n, [&](std::size_t e) { direction_[e] = inverse[e] * residual_[e] + share * direction_[e]; });

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "formats/parallel.h"
+#include "simulate/linear/vector_products.h"
 #include "simulate/time/damping_matrix.h"
 
 namespace flexel {
@@ -14,10 +15,6 @@ namespace {
 
 constexpr double kShortest = 1.0 / 1024;  // of a step
 constexpr int kFullIterations = 12;
-
-double dot(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
-  return parallel_sum<double>(a.size(), [&](std::size_t e) { return a[e].dot(b[e]); });
-}
 
 }  // namespace
 

@@ -105,9 +105,9 @@ TiledCells tiled_cells(const Body& body, const std::vector<std::uint32_t>& cells
   return result;
 }
 
-class Builder {
+class LayoutBuilder {
  public:
-  Builder(const Setting& setting, bool remembers, StepLayout& layout)
+  LayoutBuilder(const Setting& setting, bool remembers, StepLayout& layout)
       : body_(setting.body),
         remembers_(remembers),
         share_(stiffness_shares(setting.body)),
@@ -139,7 +139,7 @@ class Builder {
   std::size_t corner_begin_ = 0;  // of the chunk that is built
 };
 
-void Builder::add_block(std::span<const std::uint32_t> cells, bool is_run) {
+void LayoutBuilder::add_block(std::span<const std::uint32_t> cells, bool is_run) {
   CellBlock block{};
   std::array<std::uint32_t, kLanes> lanes;
   lanes.fill(StepLayout::kNoCell);
@@ -158,13 +158,13 @@ void Builder::add_block(std::span<const std::uint32_t> cells, bool is_run) {
   if (remembers_) layout_.block_cells.push_back(lanes);
 }
 
-bool Builder::continues(std::uint32_t cell, std::uint32_t next) const {
+bool LayoutBuilder::continues(std::uint32_t cell, std::uint32_t next) const {
   for (std::size_t a = 0; a < 8; ++a)
     if (local_[body_.cell_elements[next][a]] != local_[body_.cell_elements[cell][a]] + 1) return false;
   return true;
 }
 
-void Builder::add_blocks(std::span<const std::uint32_t> cells) {
+void LayoutBuilder::add_blocks(std::span<const std::uint32_t> cells) {
   std::vector<std::uint32_t> rest;
   for (std::size_t i = 0; i < cells.size();) {
     std::size_t end = i + 1;
@@ -180,7 +180,7 @@ void Builder::add_blocks(std::span<const std::uint32_t> cells) {
     add_block(std::span(rest).subspan(i, std::min(kLanes, rest.size() - i)), false);
 }
 
-void Builder::add_runs(std::span<const std::uint32_t> cells, std::size_t count) {
+void LayoutBuilder::add_runs(std::span<const std::uint32_t> cells, std::size_t count) {
   std::vector<std::array<std::uint16_t, 8>> corners(cells.size());
   std::vector<double> fill(cells.size());
   for (std::size_t i = 0; i < cells.size(); ++i) {
@@ -192,7 +192,7 @@ void Builder::add_runs(std::span<const std::uint32_t> cells, std::size_t count) 
   layout_.cell_fill.insert(layout_.cell_fill.end(), made.fill.begin(), made.fill.end());
 }
 
-void Builder::add_chunk(std::span<const std::uint32_t> cells, bool by_connection) {
+void LayoutBuilder::add_chunk(std::span<const std::uint32_t> cells, bool by_connection) {
   StepLayout::Chunk chunk;
   chunk.kind = static_cast<std::uint32_t>(layout_.constants.size() - 1);
   chunk.part = layout_.kind_part[chunk.kind];
@@ -230,7 +230,7 @@ void Builder::add_chunk(std::span<const std::uint32_t> cells, bool by_connection
 }
 
 // Cells with a lowest corner of their own; the others are left over.
-std::vector<std::uint32_t> Builder::take_apart(std::span<const std::uint32_t> cells) {
+std::vector<std::uint32_t> LayoutBuilder::take_apart(std::span<const std::uint32_t> cells) {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> by_corner;  // lowest corner, cell
   by_corner.reserve(cells.size());
   for (const std::uint32_t c : cells) by_corner.emplace_back(body_.cell_elements[c][0], c);
@@ -243,7 +243,7 @@ std::vector<std::uint32_t> Builder::take_apart(std::span<const std::uint32_t> ce
   return kept;
 }
 
-void Builder::add_left_over() {
+void LayoutBuilder::add_left_over() {
   while (!left_over_.empty()) {
     const std::vector<std::uint32_t> cells = std::move(left_over_);
     left_over_.clear();
@@ -253,7 +253,7 @@ void Builder::add_left_over() {
 }
 
 // Once all chunks are there: who owns what.
-void Builder::share() {
+void LayoutBuilder::share() {
   std::vector<std::uint32_t> place(users_.size(), 0);  // of a shared element in shared_elements
   for (std::uint32_t e = 0; e < users_.size(); ++e) {
     if (users_[e] == 0) layout_.lone_elements.push_back(e);
@@ -303,7 +303,7 @@ StepLayout step_layout(const Setting& setting, const StepPlan& plan) {
   StepLayout layout;
   const Body& body = setting.body;
   const std::vector<std::uint8_t> active = active_cells(setting);
-  Builder builder(setting, plan.remembers(), layout);
+  LayoutBuilder builder(setting, plan.remembers(), layout);
   for (std::uint32_t p = 0; p < body.parts.size(); ++p) {
     const bool by_connection = steps_by_connection(setting, plan, p);
     for (const auto& [factor, cells] : cells_by_damping(body, body.parts[p], active, plan.damping[p])) {

@@ -14,8 +14,8 @@
 namespace flexel {
 namespace {
 
-constexpr double kTolerance = 1e-5;         // unless the scene says otherwise
-constexpr double kRamp = 10, kMost = 3000;  // times that sound takes through the body
+constexpr double kSettledTolerance = 1e-5;         // unless the scene says otherwise
+constexpr double kRamp = 10, kMostTravels = 3000;  // times that sound takes through the body
 
 // s, that sound takes along the body's diagonal in its slowest part.
 double sound_time(const Scene& scene, const Body& body) {
@@ -50,8 +50,8 @@ Settling::Settling(Scene& scene, const Body& body) {
   }
   for (Manipulator& each : scene.get<RigidParts>().manipulators)
     for (double& key : each.path.time) key *= whole > 0 ? ramp_ / whole : 1;
-  scene.run.time = ramp_ + kMost * sound;
-  summary_.tolerance = scene.run.tolerance_given ? scene.run.tolerance : kTolerance;
+  scene.run.time = ramp_ + kMostTravels * sound;
+  summary_.tolerance = scene.run.tolerance_given ? scene.run.tolerance : kSettledTolerance;
 }
 
 void Settling::before(const State& state) {

@@ -11,6 +11,7 @@
 #include "formats/error.h"
 #include "formats/parallel.h"
 #include "simulate/instruction_set.h"
+#include "simulate/time/scratch.h"
 
 namespace flexel {
 namespace {
@@ -57,13 +58,6 @@ void move_element(std::size_t e, const double* force, const step::StateView& vie
     v[c] = before + gain * (view.outer ? force[c] + view.outer[3 * e + c] : force[c]);
     u[c] += advance.drift * (advance.explicit_drift ? before : v[c]);
   }
-}
-
-// The first aligned double.
-double* aligned(std::vector<double>& scratch) {
-  const auto address = reinterpret_cast<std::uintptr_t>(scratch.data());
-  return scratch.data() + (step::kScratchAlignment - address % step::kScratchAlignment) %
-                              step::kScratchAlignment / sizeof(double);
 }
 
 void add_slots(const std::vector<double>& values, std::span<const std::uint32_t> slots, double* sum) {
@@ -231,7 +225,8 @@ StepOutcome Stepper::advance(State& state, const std::vector<Vec3>& outer, const
             shared_force_.data() + 3 * chunk.shared_begin,
             book_ ? shared_damping_.data() + 3 * chunk.shared_begin : nullptr,
             &layout_.constants[chunk.kind]};
-        const step::ChunkOutcome outcome = kernel_[chunk.kind](chunk_view, view, advance, aligned(scratch));
+        const step::ChunkOutcome outcome =
+            kernel_[chunk.kind](chunk_view, view, advance, step::first_aligned(scratch));
         return Lowest{outcome.smallest_jacobian, chunk.part,       outcome.elastic,
                       outcome.plastic_work,      outcome.released, outcome.broken};
       },

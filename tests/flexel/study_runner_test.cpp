@@ -32,7 +32,7 @@ void write_bar(const fs::path& path) {
   out << "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
 }
 
-constexpr const char* kScene = R"(material = "steel"
+constexpr const char* kBendScene = R"(material = "steel"
 [[fix]]
 where = "xmin"
 [[load]]
@@ -54,7 +54,8 @@ class StudyRuns : public testing::Test {
       }
     }
     write_bar(folder_.path() / "bar.obj");
-    case_ = {{(folder_.path() / "bar.obj").string()}, {}, (folder_.path() / "bend.toml").string(), kScene};
+    case_ = {
+        {(folder_.path() / "bar.obj").string()}, {}, (folder_.path() / "bend.toml").string(), kBendScene};
     wanted_.size = 2.5e-3;
     options_.folder = folder_.path();
   }

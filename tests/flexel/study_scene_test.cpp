@@ -9,7 +9,7 @@
 namespace flexel::study {
 namespace {
 
-constexpr const char* kScene = R"(material = "steel"
+constexpr const char* kFallScene = R"(material = "steel"
 [parts.lid]
 hooke = "ganovelli"
 model = "paper"
@@ -37,7 +37,7 @@ step = "1 us"
 )";
 
 TEST(StudyScene, FactsAreTheScenes) {
-  const SceneFacts facts = scene_facts(kScene, "s.toml");
+  const SceneFacts facts = scene_facts(kFallScene, "s.toml");
   EXPECT_TRUE(facts.timed);
   EXPECT_DOUBLE_EQ(facts.duration, 2e-3);
   EXPECT_EQ(facts.integrator, "symplectic");
@@ -54,7 +54,7 @@ TEST(StudyScene, EditsAreReadByTheSimulation) {
   wanted.integrator = "verlet";
   wanted.step = 2.5e-7;
   wanted.tolerance = 1e-4;
-  const Scene scene = parse_scene(edited_scene(kScene, "s.toml", "/a", {"lid", "box"}, wanted), "s.toml");
+  const Scene scene = parse_scene(edited_scene(kFallScene, "s.toml", "/a", {"lid", "box"}, wanted), "s.toml");
   EXPECT_EQ(scene.parts.at("lid").model, "springs");
   EXPECT_EQ(scene.parts.at("lid").hooke, "");
   EXPECT_EQ(scene.parts.at("box").model, "springs");
@@ -65,31 +65,31 @@ TEST(StudyScene, EditsAreReadByTheSimulation) {
 }
 
 TEST(StudyScene, NothingChangedIsTheSameScene) {
-  const Scene scene = parse_scene(edited_scene(kScene, "s.toml", "/a", {"lid"}, {}), "s.toml");
+  const Scene scene = parse_scene(edited_scene(kFallScene, "s.toml", "/a", {"lid"}, {}), "s.toml");
   EXPECT_EQ(scene.parts.at("lid").model, "paper");
   EXPECT_EQ(scene.parts.at("lid").hooke, "ganovelli");
   EXPECT_DOUBLE_EQ(*scene.run.step, 1e-6);
 }
 
 TEST(StudyScene, OneEffectIsLeftOut) {
-  for (const SceneEffect& effect : scene_facts(kScene, "s.toml").effects) {
+  for (const SceneEffect& effect : scene_facts(kFallScene, "s.toml").effects) {
     Configuration wanted;
     wanted.without = effect.name;
-    const std::string text = edited_scene(kScene, "s.toml", "/a", {}, wanted);
-    const std::size_t before = scene_facts(kScene, "s.toml").effects.size();
+    const std::string text = edited_scene(kFallScene, "s.toml", "/a", {}, wanted);
+    const std::size_t before = scene_facts(kFallScene, "s.toml").effects.size();
     EXPECT_EQ(scene_facts(text, "s.toml").effects.size(), before - 1) << effect.name;
   }
   Configuration wanted;
   wanted.without = "load 2";
-  const Scene scene = parse_scene(edited_scene(kScene, "s.toml", "/a", {}, wanted), "s.toml");
+  const Scene scene = parse_scene(edited_scene(kFallScene, "s.toml", "/a", {}, wanted), "s.toml");
   ASSERT_EQ(scene.get<Loads>().loads.size(), 1u);
   EXPECT_EQ(scene.get<Loads>().loads[0].name, "hand");
   wanted.without = "drag";
-  EXPECT_THROW((void)edited_scene(kScene, "s.toml", "/a", {}, wanted), InputError);
+  EXPECT_THROW((void)edited_scene(kFallScene, "s.toml", "/a", {}, wanted), InputError);
 }
 
 TEST(StudyScene, FilesStayThoseOfTheScene) {
-  EXPECT_NE(edited_scene(kScene, "s.toml", "/a/b", {}, {}).find("/a/b/drop.vtu"), std::string::npos);
+  EXPECT_NE(edited_scene(kFallScene, "s.toml", "/a/b", {}, {}).find("/a/b/drop.vtu"), std::string::npos);
 }
 
 TEST(StudyHistory, AShiftedMotionLagsByTheShift) {

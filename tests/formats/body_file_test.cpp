@@ -9,9 +9,12 @@
 
 #include "formats/error.h"
 #include "tests/formats/bodies.h"
+#include "tests/formats/import_help.h"
 
 namespace flexel {
 namespace {
+
+using test::replaced;
 
 class BodyFile : public testing::Test {
  protected:
@@ -233,12 +236,6 @@ TEST_F(BodyFile, RandomDamageNeverPassesUnchecked) {
     }
     EXPECT_GT(refused, 200);
   }
-}
-
-std::string replaced(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t at = text.find(from);
-  EXPECT_NE(at, std::string::npos) << from;
-  return text.replace(at, from.size(), to);
 }
 
 TEST_F(BodyFile, WrongSizesNameTheField) {

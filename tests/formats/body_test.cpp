@@ -102,7 +102,7 @@ TEST(BodyParts, FollowTheRanges) {
     for (const std::uint32_t e : body.cell_elements[c]) EXPECT_EQ(elements[e], cells[c]);
 }
 
-std::string failure(const Body& body) {
+std::string check_failure(const Body& body) {
   try {
     check(body, "x.vtu");
   } catch (const InputError& error) {
@@ -113,7 +113,7 @@ std::string failure(const Body& body) {
 }
 
 TEST(BodyCheck, GoodBodiesPass) {
-  for (std::uint64_t seed = 1; seed <= 20; ++seed) EXPECT_EQ(failure(test::random_body(seed)), "");
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) EXPECT_EQ(check_failure(test::random_body(seed)), "");
 }
 
 TEST(BodyCheck, EachFieldThatIsWrongIsNamed) {
@@ -171,7 +171,7 @@ TEST(BodyCheck, EachFieldThatIsWrongIsNamed) {
   for (const Case& c : cases) {
     Body body = test::random_body(4);
     c.damage(body);
-    EXPECT_THAT(failure(body), HasSubstr(c.field));
+    EXPECT_THAT(check_failure(body), HasSubstr(c.field));
   }
 }
 

@@ -76,12 +76,6 @@ TEST(ImportGltf, BuffersMayBeElsewhere) {
               HasSubstr("d.gltf|"));
 }
 
-std::string replaced(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t at = text.find(from);
-  EXPECT_NE(at, std::string::npos) << from;
-  return text.replace(at, from.size(), to);
-}
-
 TEST(ImportGltf, StripsFansAndBareVerticesAreTriangles) {
   const Scratch scratch;
   const auto corners = [&](const std::string& change) {

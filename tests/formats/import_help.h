@@ -41,6 +41,18 @@ inline std::string read_file(const std::string& path) {
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
+// `text` with `to` in place of the first `from`, which is there.
+inline std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+// No displacement of any vertex.
+inline std::vector<Vec3> nothing(const Surface& surface) {
+  return std::vector<Vec3>(surface.vertices.size(), Vec3::Zero());
+}
+
 inline std::string part_path(const std::string& name) {
   return std::string(FLEXEL_PARTS_DIR) + "/" + name;
 }

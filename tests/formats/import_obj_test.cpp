@@ -83,7 +83,7 @@ TEST(ImportObj, BadFilesGiveOneClearErrorWithTheLine) {
   EXPECT_THAT(error("v 0 0 1,5\n"), HasSubstr("\"1,5\" is not a number"));
 }
 
-struct Expected {
+struct ExpectedObj {
   const char* file;
   std::size_t triangles, vertices, polygons, shells, open, non_manifold, degenerate;
 };
@@ -91,11 +91,11 @@ struct Expected {
 // The numbers of the parts' README. Its vertex counts are of welded vertices in use.
 TEST(ImportObj, PartsHaveTheirDocumentedTopology) {
   SKIP_WITHOUT_PARTS();
-  for (const Expected& e : {Expected{"spot_triangulated.obj", 5856, 2930, 5856, 1, 0, 0, 0},
-                            {"spot_quadrangulated.obj", 5856, 2930, 2928, 1, 0, 0, 0},
-                            {"quadknot.obj", 2880, 1440, 1440, 1, 0, 0, 0},
-                            {"openscad-nonmanifold-crash.obj", 1442, 658, 1442, 2, 0, 18, 0},
-                            {"rabbit.obj", 1252, 644, 678, 9, 0, 0, 0}}) {
+  for (const ExpectedObj& e : {ExpectedObj{"spot_triangulated.obj", 5856, 2930, 5856, 1, 0, 0, 0},
+                               {"spot_quadrangulated.obj", 5856, 2930, 2928, 1, 0, 0, 0},
+                               {"quadknot.obj", 2880, 1440, 1440, 1, 0, 0, 0},
+                               {"openscad-nonmanifold-crash.obj", 1442, 658, 1442, 2, 0, 18, 0},
+                               {"rabbit.obj", 1252, 644, 678, 9, 0, 0, 0}}) {
     const Surface surface = import_surface(part_path(e.file));
     const Shape found = shape(surface);
     EXPECT_EQ(found.triangles.corners.size(), e.triangles) << e.file;

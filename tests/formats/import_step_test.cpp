@@ -42,7 +42,7 @@ TEST(ImportStep, WithoutOpenCascadeTheMessageSaysHowToGetIt) {
 
 #else
 
-struct Expected {
+struct ExpectedSolid {
   const char* file;
   const char* part;
   std::size_t faces;
@@ -50,7 +50,7 @@ struct Expected {
   double volume;  // mm^3 of the exact solid, by OpenCASCADE's BRepGProp::VolumeProperties at 1e-8
 };
 
-constexpr Expected kSingles[] = {
+constexpr ExpectedSolid kSingles[] = {
     {"4040_base_mount.step", "SOARM100-4040-Adapter-V2", 178, 1, 45514.278},
     {"Moving_Jaw_SO101.step", "Moving_Jaw_SO101 v1", 189, 2, 20692.667},
     {"base_interface_AP203.STEP", "base_interface_AP203", 30, 1, 1257991.53},
@@ -59,7 +59,7 @@ constexpr Expected kSingles[] = {
 
 TEST(ImportStep, PartsAreClosedAndHaveTheirSolidsVolume) {
   SKIP_WITHOUT_PARTS();
-  for (const Expected& e : kSingles) {
+  for (const ExpectedSolid& e : kSingles) {
     const Surface surface = import_surface(part_path(e.file));
     const Shape found = shape(surface);
     ASSERT_EQ(surface.parts.size(), 1u) << e.file;
@@ -141,12 +141,6 @@ TEST(ImportStep, SameForAnyThreadCountAndSilentOnStdout) {
   EXPECT_EQ(first.vertices, second.vertices);
   EXPECT_EQ(first.polygon_vertices, second.polygon_vertices);
   EXPECT_EQ(first.polygon_face, second.polygon_face);
-}
-
-std::string replaced(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t at = text.find(from);
-  EXPECT_NE(at, std::string::npos);
-  return text.replace(at, from.size(), to);
 }
 
 TEST(ImportStep, AClosedShellStandsForASolid) {

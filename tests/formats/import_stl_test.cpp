@@ -170,7 +170,7 @@ TEST(ImportStl, SameForAnyThreadCount) {
   EXPECT_EQ(first.polygon_face, second.polygon_face);
 }
 
-struct Expected {
+struct ExpectedStl {
   const char* file;
   std::size_t triangles, vertices, shells, open, non_manifold, misoriented, parts;
 };
@@ -178,19 +178,19 @@ struct Expected {
 // The numbers of the parts' README.
 TEST(ImportStl, PartsHaveTheirDocumentedTopology) {
   SKIP_WITHOUT_PARTS();
-  for (const Expected& e : {Expected{"lower_leg_structure_fork.STL", 46950, 23471, 1, 0, 0, 0, 1},
-                            {"lower_leg_structure_200mm.STL", 25102, 12543, 1, 0, 0, 0, 1},
-                            {"conrod.stl", 1044, 524, 3, 0, 0, 0, 1},
-                            {"transmission_pulley_at3_t30_output.STL", 19054, 9523, 1, 0, 0, 0, 1},
-                            {"hip_aa_module_shell_cover.STL", 50872, 25422, 1, 0, 0, 0, 1},
-                            {"Springy_Trigger.STL", 8002, 3993, 1, 0, 0, 0, 1},
-                            {"hook.stl", 7588, 3766, 1, 0, 0, 0, 1},
-                            {"ADIS16480.STL", 7436, 3672, 1, 0, 0, 0, 1},
-                            {"foot_structure.STL", 14676, 7373, 1, 140, 0, 0, 1},
-                            {"angle_block.STL", 704, 398, 1, 166, 0, 0, 1},
-                            {"multibody.stl", 32, 20, 2, 0, 0, 12, 2},
-                            {"yarn_guide.stl", 252, 126, 1, 0, 1, 0, 1},
-                            {"planar-geom-03.stl", 146, 92, 1, 36, 0, 0, 1}}) {
+  for (const ExpectedStl& e : {ExpectedStl{"lower_leg_structure_fork.STL", 46950, 23471, 1, 0, 0, 0, 1},
+                               {"lower_leg_structure_200mm.STL", 25102, 12543, 1, 0, 0, 0, 1},
+                               {"conrod.stl", 1044, 524, 3, 0, 0, 0, 1},
+                               {"transmission_pulley_at3_t30_output.STL", 19054, 9523, 1, 0, 0, 0, 1},
+                               {"hip_aa_module_shell_cover.STL", 50872, 25422, 1, 0, 0, 0, 1},
+                               {"Springy_Trigger.STL", 8002, 3993, 1, 0, 0, 0, 1},
+                               {"hook.stl", 7588, 3766, 1, 0, 0, 0, 1},
+                               {"ADIS16480.STL", 7436, 3672, 1, 0, 0, 0, 1},
+                               {"foot_structure.STL", 14676, 7373, 1, 140, 0, 0, 1},
+                               {"angle_block.STL", 704, 398, 1, 166, 0, 0, 1},
+                               {"multibody.stl", 32, 20, 2, 0, 0, 12, 2},
+                               {"yarn_guide.stl", 252, 126, 1, 0, 1, 0, 1},
+                               {"planar-geom-03.stl", 146, 92, 1, 36, 0, 0, 1}}) {
     const Surface surface = import_surface(part_path(e.file));
     const Topology found = shape(surface).topology;
     EXPECT_EQ(surface.polygon_count(), e.triangles) << e.file;

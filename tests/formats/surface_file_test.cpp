@@ -16,10 +16,6 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
 
-std::vector<Vec3> nothing(const Surface& surface) {
-  return std::vector<Vec3>(surface.vertices.size(), Vec3::Zero());
-}
-
 std::vector<Vec3> random_motion(const Surface& surface, unsigned seed = 1) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> pick(-1e-3, 1e-3);

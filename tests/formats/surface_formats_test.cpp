@@ -17,10 +17,6 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-std::vector<Vec3> nothing(const Surface& surface) {
-  return std::vector<Vec3>(surface.vertices.size(), Vec3::Zero());
-}
-
 // A quarter turn about z and a shift, with something of a bend, in metres.
 std::vector<Vec3> bend(const Surface& surface) {
   std::vector<Vec3> displacement;
@@ -29,8 +25,8 @@ std::vector<Vec3> bend(const Surface& surface) {
   return displacement;
 }
 
-std::string written(const Surface& surface, const std::vector<Vec3>& displacement, SurfaceFormat format,
-                    const Scratch& scratch, const std::string& name) {
+std::string written_as(const Surface& surface, const std::vector<Vec3>& displacement, SurfaceFormat format,
+                       const Scratch& scratch, const std::string& name) {
   write_surface(surface, displacement, format, default_unit(surface), scratch.path(name));
   return read_file(scratch.path(name));
 }
@@ -55,10 +51,10 @@ constexpr const char* kPly =
 TEST(WritePly, FromPlyEverythingButPositionsAndNormalsStays) {
   const Scratch scratch;
   const Surface surface = import_surface(scratch.write("a.ply", kPly));
-  EXPECT_EQ(written(surface, nothing(surface), SurfaceFormat::ply, scratch, "b.ply"), kPly);
+  EXPECT_EQ(written_as(surface, nothing(surface), SurfaceFormat::ply, scratch, "b.ply"), kPly);
   std::vector<Vec3> motion = nothing(surface);
   motion[1] = Vec3(0, 0.25e-3, 0);
-  const std::string text = written(surface, motion, SurfaceFormat::ply, scratch, "c.ply");
+  const std::string text = written_as(surface, motion, SurfaceFormat::ply, scratch, "c.ply");
   EXPECT_THAT(text, StartsWith(std::string(kPly).substr(0, std::string(kPly).find("end_header"))));
   EXPECT_THAT(text, HasSubstr("\r\n 0 1.50 0.25 0 7 9 "));
   EXPECT_THAT(text, HasSubstr("\r\n255 0 0 0.000 7 9 "));
@@ -71,7 +67,7 @@ TEST(WritePly, NormalsTurnWithTheSurface) {
   const Surface surface = import_surface(scratch.write("a.ply", kPly));
   std::vector<Vec3> motion;
   for (const Vec3& v : surface.vertices) motion.push_back(Vec3(-v.y(), v.x(), v.z()) - v);
-  const std::string text = written(surface, motion, SurfaceFormat::ply, scratch, "b.ply");
+  const std::string text = written_as(surface, motion, SurfaceFormat::ply, scratch, "b.ply");
   // The second vertex's normal, x, is now y.
   const std::string line = text.substr(text.find("\r\n 0 ") + 2);
   double red, x, y, z, green, blue, nx, ny, nz;
@@ -106,8 +102,8 @@ TEST(WritePly, BinaryKeepsTypesAndByteOrder) {
       for (const std::int32_t v : t) add(v);
     }
     const Surface surface = import_surface(scratch.write("a.ply", data));
-    EXPECT_EQ(written(surface, nothing(surface), SurfaceFormat::ply, scratch, "b.ply"), data);
-    const std::string moved = written(surface, bend(surface), SurfaceFormat::ply, scratch, "c.ply");
+    EXPECT_EQ(written_as(surface, nothing(surface), SurfaceFormat::ply, scratch, "b.ply"), data);
+    const std::string moved = written_as(surface, bend(surface), SurfaceFormat::ply, scratch, "c.ply");
     EXPECT_EQ(moved.size(), data.size());
     const Surface after = import_surface(scratch.path("c.ply"));
     expect_moved(surface, bend(surface), after, 1e-10);
@@ -131,7 +127,7 @@ TEST(WritePly, ANewFileHasColoursNumbersPartsAndFaces) {
   const Scratch scratch;
   const Surface surface = two_parts(scratch);
   for (const SurfaceFormat format : {SurfaceFormat::ply, SurfaceFormat::ply_ascii}) {
-    const std::string text = written(surface, bend(surface), format, scratch, "n.ply");
+    const std::string text = written_as(surface, bend(surface), format, scratch, "n.ply");
     EXPECT_THAT(text, HasSubstr("comment part 1 is two\n"));
     const Surface again = import_surface(scratch.path("n.ply"));
     expect_moved(surface, bend(surface), again, 1e-18);
@@ -150,20 +146,20 @@ TEST(WriteOff, FromOffEverythingButPositionsAndNormalsStays) {
       "NOFF # a tetrahedron\n4 4\n0 0 0.0 0 0 1\n1.00 0 0 1 0 0\n0 1 0 0 1 0\n0 0 1 0 0 1\n\n3 0 2 1 7\n"
       "3 0 1 3 0.5 0.5 0.5 # grey\n3 1 2 3\n3 2 0 3";
   const Surface surface = import_surface(scratch.write("a.off", text));
-  EXPECT_EQ(written(surface, nothing(surface), SurfaceFormat::off, scratch, "b.off"), text);
+  EXPECT_EQ(written_as(surface, nothing(surface), SurfaceFormat::off, scratch, "b.off"), text);
   std::vector<Vec3> shift(4, Vec3(0, 0, 1e-3));
-  const std::string moved = written(surface, shift, SurfaceFormat::off, scratch, "c.off");
+  const std::string moved = written_as(surface, shift, SurfaceFormat::off, scratch, "c.off");
   EXPECT_EQ(moved,
             "NOFF # a tetrahedron\n4 4\n0 0 1 0 0 1\n1.00 0 1 1 0 0\n0 1 1 0 1 0\n0 0 2 0 0 1\n\n3 0 2 1 7\n"
             "3 0 1 3 0.5 0.5 0.5 # grey\n3 1 2 3\n3 2 0 3");
-  static_cast<void>(written(surface, bend(surface), SurfaceFormat::off, scratch, "d.off"));
+  static_cast<void>(written_as(surface, bend(surface), SurfaceFormat::off, scratch, "d.off"));
   expect_moved(surface, bend(surface), import_surface(scratch.path("d.off")), 1e-18);
 }
 
 TEST(WriteOff, ANewFileHasColours) {
   const Scratch scratch;
   const Surface surface = two_parts(scratch);
-  EXPECT_THAT(written(surface, bend(surface), SurfaceFormat::off, scratch, "n.off"), StartsWith("COFF\n"));
+  EXPECT_THAT(written_as(surface, bend(surface), SurfaceFormat::off, scratch, "n.off"), StartsWith("COFF\n"));
   const Surface again = import_surface(scratch.path("n.off"));
   expect_moved(surface, bend(surface), again, 1e-18);
   EXPECT_EQ(again.vertex_columns.at("color").values, surface.vertex_columns.at("color").values);
@@ -173,7 +169,7 @@ TEST(WriteOff, ANewFileHasColours) {
 TEST(WriteGlb, ANewFileHasPartsColoursAndNumbers) {
   const Scratch scratch;
   Surface surface = two_parts(scratch);
-  static_cast<void>(written(surface, bend(surface), SurfaceFormat::glb, scratch, "n.glb"));
+  static_cast<void>(written_as(surface, bend(surface), SurfaceFormat::glb, scratch, "n.glb"));
   const Surface again = import_surface(scratch.path("n.glb"));
   ASSERT_EQ(again.parts.size(), 2u);
   EXPECT_EQ(again.parts[1].name, "two");
@@ -210,8 +206,8 @@ std::string instanced() {
 TEST(WriteGlb, FromGlbInstancesGetMeshesOfTheirOwn) {
   const Scratch scratch;
   const Surface surface = import_surface(scratch.write("a.glb", instanced()));
-  EXPECT_EQ(written(surface, nothing(surface), SurfaceFormat::glb, scratch, "b.glb"), instanced());
-  const std::string text = written(surface, bend(surface), SurfaceFormat::glb, scratch, "c.glb");
+  EXPECT_EQ(written_as(surface, nothing(surface), SurfaceFormat::glb, scratch, "b.glb"), instanced());
+  const std::string text = written_as(surface, bend(surface), SurfaceFormat::glb, scratch, "c.glb");
   EXPECT_THAT(text, HasSubstr("\"generator\":\"hand\""));
   EXPECT_THAT(text, HasSubstr("\"translation\":[4,0,0]"));
   const Surface after = import_surface(scratch.path("c.glb"));
@@ -220,7 +216,7 @@ TEST(WriteGlb, FromGlbInstancesGetMeshesOfTheirOwn) {
   // Only the second instance moves: the first keeps the mesh that it had.
   std::vector<Vec3> second = nothing(surface);
   for (std::size_t v = 4; v < 8; ++v) second[v] = Vec3(0, 0, 0.5);
-  const std::string partly = written(surface, second, SurfaceFormat::glb, scratch, "d.glb");
+  const std::string partly = written_as(surface, second, SurfaceFormat::glb, scratch, "d.glb");
   EXPECT_THAT(partly, HasSubstr(R"({"mesh":0,"name":"a"})"));
   expect_moved(surface, second, import_surface(scratch.path("d.glb")), 1e-6);
 }
@@ -231,7 +227,7 @@ TEST(WriteGlb, AMeshOfOneNodeIsOverwrittenInPlace) {
   one.replace(one.find("{\"mesh\":0,\"name\":\"a\"}"), 21, std::string("{}") + std::string(19, ' '));
   const Surface surface = import_surface(scratch.write("a.glb", one));
   ASSERT_EQ(surface.parts.size(), 1u);
-  const std::string moved = written(surface, bend(surface), SurfaceFormat::glb, scratch, "b.glb");
+  const std::string moved = written_as(surface, bend(surface), SurfaceFormat::glb, scratch, "b.glb");
   EXPECT_EQ(moved.size() - moved.find("BIN"), one.size() - one.find("BIN"));
   expect_moved(surface, bend(surface), import_surface(scratch.path("b.glb")), 2e-5);
 }
@@ -243,7 +239,8 @@ TEST(WriteSurface, RealFilesComeOutAsTheyWentIn) {
                                      {"ballA.off", SurfaceFormat::off},
                                      {"pins.glb", SurfaceFormat::glb}}) {
     const Surface surface = import_surface(part_path(file));
-    EXPECT_EQ(written(surface, nothing(surface), format, scratch, file), read_file(part_path(file))) << file;
+    EXPECT_EQ(written_as(surface, nothing(surface), format, scratch, file), read_file(part_path(file)))
+        << file;
     write_surface(surface, bend(surface), format, default_unit(surface), scratch.path(file));
     const Surface after = import_surface(scratch.path(file));
     expect_moved(surface, bend(surface), after, 2e-7 * bounding_box(after.vertices).size().norm());

@@ -12,7 +12,7 @@ namespace {
 
 using testing::HasSubstr;
 
-std::string failure(const std::string& text, Dimension dimension) {
+std::string quantity_failure(const std::string& text, Dimension dimension) {
   try {
     (void)parse_quantity(text, dimension);
   } catch (const InputError& error) {
@@ -65,7 +65,7 @@ TEST(Units, EveryListedNameIsReadAndEveryOtherDimensionRefusesIt) {
         const bool same_kind = o == d || (dimension == Dimension::torque && other == Dimension::energy) ||
                                (dimension == Dimension::energy && other == Dimension::torque);
         if (same_kind) continue;
-        EXPECT_THAT(failure("1 " + name, other), HasSubstr("is needed")) << name;
+        EXPECT_THAT(quantity_failure("1 " + name, other), HasSubstr("is needed")) << name;
       }
     }
   }
@@ -83,21 +83,22 @@ TEST(Units, ValueIsLinearInTheNumber) {
 }
 
 TEST(Units, MessagesSayWhatToWrite) {
-  EXPECT_THAT(failure("5 N", Dimension::length), HasSubstr("\"5 N\" is a force; a length is needed"));
-  EXPECT_THAT(failure("5", Dimension::length), HasSubstr("has no unit"));
-  EXPECT_THAT(failure("5 mmm", Dimension::length), HasSubstr("did you mean \"mm\""));
-  EXPECT_THAT(failure("5 Mpa", Dimension::pressure), HasSubstr("did you mean \"MPa\""));
-  EXPECT_THAT(failure("5 furlongs", Dimension::length), HasSubstr("unknown unit \"furlongs\""));
-  EXPECT_THAT(failure("abc", Dimension::force), HasSubstr("such as \"5 N\""));
-  EXPECT_THAT(failure("mm", Dimension::length), HasSubstr("is not a length"));
-  EXPECT_THAT(failure("5 N^2", Dimension::force), HasSubstr("is not a force"));
+  EXPECT_THAT(quantity_failure("5 N", Dimension::length),
+              HasSubstr("\"5 N\" is a force; a length is needed"));
+  EXPECT_THAT(quantity_failure("5", Dimension::length), HasSubstr("has no unit"));
+  EXPECT_THAT(quantity_failure("5 mmm", Dimension::length), HasSubstr("did you mean \"mm\""));
+  EXPECT_THAT(quantity_failure("5 Mpa", Dimension::pressure), HasSubstr("did you mean \"MPa\""));
+  EXPECT_THAT(quantity_failure("5 furlongs", Dimension::length), HasSubstr("unknown unit \"furlongs\""));
+  EXPECT_THAT(quantity_failure("abc", Dimension::force), HasSubstr("such as \"5 N\""));
+  EXPECT_THAT(quantity_failure("mm", Dimension::length), HasSubstr("is not a length"));
+  EXPECT_THAT(quantity_failure("5 N^2", Dimension::force), HasSubstr("is not a force"));
 }
 
 TEST(Units, WhatIsNotAFiniteQuantityIsRefused) {
   for (const char* text :
        {"", " ", "nan mm", "inf mm", "-inf mm", "1e999 mm", "1e308 km", "1e-999 mm", "1,5 mm", "1 mm mm^",
         "1 /mm", "1 mm/", "1 mm//s", "1 mm^0", "1 mm^999999999999", "1 ^2", "--1 mm", "0x10 mm", "1 m m"})
-    EXPECT_NE(failure(text, Dimension::length), "") << text;
+    EXPECT_NE(quantity_failure(text, Dimension::length), "") << text;
 }
 
 TEST(Units, ZeroNeedsNoUnit) {

@@ -11,17 +11,9 @@
 namespace flexel {
 namespace {
 
-Progress& silent() {
-  static Progress progress("test", Progress::Mode::quiet);
-  return progress;
-}
-
-MapResult map(const Body& body, MapMethod method) {
-  return map_surface(body, {method}, silent());
-}
-
 using test::bend;
 using test::largest_error;
+using test::map_quietly;
 using test::rms_error;
 using test::round_bar;
 using test::stretch;
@@ -44,8 +36,8 @@ TEST_P(Order, IsThatOfTheMethod) {
     test::deform(fine, c.field);
     for (std::size_t m = 0; m < kOrders.size(); ++m) {
       const MapMethod method = test::kEveryMethod[m];
-      EXPECT_NEAR(std::log2(rms_error(coarse, map(coarse, method).displacement, c.field) /
-                            rms_error(fine, map(fine, method).displacement, c.field)),
+      EXPECT_NEAR(std::log2(rms_error(coarse, map_quietly(coarse, method).displacement, c.field) /
+                            rms_error(fine, map_quietly(fine, method).displacement, c.field)),
                   kOrders[m], 0.35)
           << c.name << ", " << name_of(method);
     }
@@ -58,8 +50,8 @@ TEST_P(Order, OnAKnotIsThatOfTheMethod) {
   test::deform(fine, twist);
   for (std::size_t m = 0; m < kOrders.size(); ++m) {
     const MapMethod method = test::kEveryMethod[m];
-    EXPECT_NEAR(std::log2(rms_error(coarse, map(coarse, method).displacement, twist) /
-                          rms_error(fine, map(fine, method).displacement, twist)),
+    EXPECT_NEAR(std::log2(rms_error(coarse, map_quietly(coarse, method).displacement, twist) /
+                          rms_error(fine, map_quietly(fine, method).displacement, twist)),
                 kOrders[m], 0.35)
         << name_of(method);
   }
@@ -79,7 +71,7 @@ TEST_P(Order, ErrorsAreThoseOfTheStudy) {
   for (std::size_t m = 0; m < kBounds.size(); ++m) {
     const auto expect = [&](const test::Field& field, double error, double jump) {
       test::deform(body, field);
-      const std::vector<Vec3> mapped = map(body, test::kEveryMethod[m]).displacement;
+      const std::vector<Vec3> mapped = map_quietly(body, test::kEveryMethod[m]).displacement;
       EXPECT_LT(rms_error(body, mapped, field), error) << name_of(test::kEveryMethod[m]);
       EXPECT_LT(test::normal_jump(body, mapped, field), jump) << name_of(test::kEveryMethod[m]);
     };
@@ -91,7 +83,7 @@ TEST_P(Order, ErrorsAreThoseOfTheStudy) {
 
 TEST_P(Order, EveryVertexOfTheBarHasFourElements) {
   const Body body = round_bar(8, GetParam());
-  const MapReport found = report(body, map(body, MapMethod::affine));
+  const MapReport found = report(body, map_quietly(body, MapMethod::affine));
   EXPECT_EQ(found.kinds[0], found.vertices);
   if (GetParam() == Placement::corner) {
     EXPECT_EQ(found.widened, 0u);
@@ -107,7 +99,7 @@ TEST(Exactness, UndeformedIsExactlyUndeformed) {
   for (const Placement placement : {Placement::corner, Placement::centre})
     for (const MapMethod method : test::kEveryMethod) {
       const Body body = round_bar(6, placement);
-      const MapResult result = map(body, method);
+      const MapResult result = map_quietly(body, method);
       for (const Vec3& displacement : result.displacement) EXPECT_EQ(displacement, Vec3::Zero().eval());
       EXPECT_LT(result.rest_residual, 1e-13);
       EXPECT_EQ(report(body, result).voronoi_cell_left, 0u);
@@ -119,7 +111,7 @@ TEST(Exactness, VerticesOfUnmovedElementsStayExactly) {
   for (std::size_t e = 0; e < body.element_count(); ++e)
     if (body.lattice_index[e][0] > 8) body.position[e] += Vec3(0.01, 0.02, 0.03);
   for (const MapMethod method : test::kEveryMethod) {
-    const MapResult result = map(body, method);
+    const MapResult result = map_quietly(body, method);
     for (std::size_t v = 0; v < body.surface.vertices.size(); ++v)
       if (body.surface.vertices[v].x() < 0.5) {  // farther than any method looks
         EXPECT_EQ(result.displacement[v], Vec3::Zero().eval());
@@ -145,15 +137,16 @@ TEST(Exactness, FollowsRigidAndAffineMotionsNearAndFar) {
         const Vec3 move(0.3, -7, 12);
         const auto rigid = [&](const Vec3& x) -> Vec3 { return turn * (x - shift) + move; };
         test::deform(body, rigid);
-        EXPECT_LT(largest_error(body, map(body, MapMethod::gram_schmidt).displacement, rigid),
+        EXPECT_LT(largest_error(body, map_quietly(body, MapMethod::gram_schmidt).displacement, rigid),
                   1e-9 * diagonal);
-        EXPECT_LT(largest_error(body, map(body, MapMethod::affine).displacement, rigid), 1e-9 * diagonal);
+        EXPECT_LT(largest_error(body, map_quietly(body, MapMethod::affine).displacement, rigid),
+                  1e-9 * diagonal);
         Mat3 shear;
         shear << 1.7, 0.4, -0.2, 0.1, 0.6, 0.3, 0, -0.5, 1.2;
         const auto affine = [&](const Vec3& x) -> Vec3 { return turn * (shear * (x - shift)) + move; };
         test::deform(body, affine);
         for (const MapMethod method : {MapMethod::affine, MapMethod::blended, MapMethod::smooth})
-          EXPECT_LT(largest_error(body, map(body, method).displacement, affine), 1e-9 * diagonal);
+          EXPECT_LT(largest_error(body, map_quietly(body, method).displacement, affine), 1e-9 * diagonal);
       }
     }
   }
@@ -165,14 +158,14 @@ TEST(Exactness, DoesNotDependOnTheWorldsAxes) {
   for (const MapMethod method : test::kEveryMethod) {
     Body body = round_bar(6, Placement::centre);
     test::deform(body, bend);
-    const MapResult here = map(body, method);
+    const MapResult here = map_quietly(body, method);
     Body turned = body;
     for (Vec3& x : turned.rest) x = turn * x;
     for (Vec3& x : turned.position) x = turn * x;
     for (Vec3& x : turned.surface.vertices) x = turn * x;
     turned.parts[0].lattice.axes = turn * body.parts[0].lattice.axes;
     turned.parts[0].lattice.origin = turn * body.parts[0].lattice.origin;
-    const MapResult there = map(turned, method);
+    const MapResult there = map_quietly(turned, method);
     double largest = 0;
     for (std::size_t v = 0; v < here.displacement.size(); ++v)
       largest = std::max(largest, (turn * here.displacement[v] - there.displacement[v]).norm());
@@ -186,7 +179,7 @@ TEST(Exactness, AnyNumberOfThreadsGivesTheSameBits) {
   for (const MapMethod method : test::kEveryMethod) {
     const auto with_threads = [&](int threads) {
       const ThreadLimit limit(threads);
-      return map(body, method);
+      return map_quietly(body, method);
     };
     const MapResult one = with_threads(1), four = with_threads(4);
     EXPECT_EQ(one.displacement, four.displacement);

@@ -17,7 +17,6 @@ namespace flexel {
 namespace {
 
 using namespace test;
-using Edge = std::pair<std::uint32_t, std::uint32_t>;
 
 TEST(Crack, APlaneOfBrokenCellsGivesTwoClosedPiecesThatMoveAsTheirElements) {
   for (const int n : {1, 7}) {

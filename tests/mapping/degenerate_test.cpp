@@ -9,17 +9,14 @@
 namespace flexel {
 namespace {
 
-MapResult map(const Body& body, const MapOptions& options) {
-  Progress progress("test", Progress::Mode::quiet);
-  return map_surface(body, options, progress);
-}
+using test::map_quietly;
 
 void expect_numbers(const Body& body, const char* what) {
   for (const MapMethod method : test::kEveryMethod) {
     MapOptions options{method};
     options.check_voronoi = true;
     options.check_intersection = true;
-    const MapResult result = map(body, options);
+    const MapResult result = map_quietly(body, options);
     for (const Vec3& u : result.displacement) ASSERT_TRUE(u.allFinite()) << what << ", " << name_of(method);
     const MapReport found = report(body, result);
     EXPECT_EQ(found.not_finite, 0u) << what;
@@ -82,7 +79,8 @@ TEST(Degenerate, AnInvertedCellIsSaidByEveryMethod) {
   Body body = test::block(5, 5, 5, 0.1, Placement::corner, 15);
   for (std::uint32_t e = 0; e < body.element_count(); ++e)
     if (body.lattice_index[e] == Index3{5, 5, 5}) body.position[e] -= Vec3::Constant(0.35);
-  for (const MapMethod method : test::kEveryMethod) EXPECT_GT(report(body, map(body, {method})).inverted, 0u);
+  for (const MapMethod method : test::kEveryMethod)
+    EXPECT_GT(report(body, map_quietly(body, {method})).inverted, 0u);
 }
 
 // A part in metres and the same in millimetres, or a thousand times as large.
@@ -97,7 +95,7 @@ TEST(Degenerate, TheUnitDoesNotMatter) {
       for (auto* points : {&other.rest, &other.position, &other.surface.vertices})
         for (Vec3& x : *points) x *= scale;
       for (const MapMethod method : test::kEveryMethod) {
-        const MapResult one = map(body, {method}), two = map(other, {method});
+        const MapResult one = map_quietly(body, {method}), two = map_quietly(other, {method});
         double largest = 0;
         for (std::size_t v = 0; v < one.displacement.size(); ++v)
           largest = std::max(largest, (two.displacement[v] / scale - one.displacement[v]).norm());
@@ -133,7 +131,8 @@ TEST(Degenerate, TheOrderOfThePolygonsDoesNotMatter) {
   test::deform(body, field);
   test::deform(backwards, field);
   for (const MapMethod method : test::kEveryMethod)
-    EXPECT_EQ(map(body, {method}).displacement, map(backwards, {method}).displacement) << name_of(method);
+    EXPECT_EQ(map_quietly(body, {method}).displacement, map_quietly(backwards, {method}).displacement)
+        << name_of(method);
 }
 
 // The same block, and the mirror image of it and of its motion.
@@ -159,7 +158,7 @@ TEST(Degenerate, TheMirroredPartIsMappedToTheMirrorImage) {
     test::deform(body, field);
     test::deform(mirror, [&](const Vec3& x) { return mirrored(field(mirrored(x))); });
     for (const MapMethod method : test::kEveryMethod) {
-      const MapResult one = map(body, {method}), other = map(mirror, {method});
+      const MapResult one = map_quietly(body, {method}), other = map_quietly(mirror, {method});
       double largest = 0;
       for (std::size_t v = 0; v < one.displacement.size(); ++v) {
         // On the part's own plane of symmetry one frame lies on one side of it: in corner placement the first
@@ -182,11 +181,11 @@ TEST(FarVertices, AreFollowedTurnedOrRefused) {
   const Mat3 turn = test::rotation(0.4, Vec3(0, 0, 1));
   test::deform(body, [&](const Vec3& x) -> Vec3 { return 1.5 * (turn * x); });
   MapOptions options;
-  const MapResult followed = map(body, options);
+  const MapResult followed = map_quietly(body, options);
   EXPECT_NEAR((body.surface.vertices[far] + followed.displacement[far]).norm(),
               1.5 * body.surface.vertices[far].norm(), 1e-9);
   options.far = FarVertices::rigid;
-  const MapResult rigid = map(body, options);
+  const MapResult rigid = map_quietly(body, options);
   EXPECT_EQ(rigid.far, 3u);
   const std::uint32_t origin = rigid.frame_of(far).elements[0];
   const Vec3 arm = body.surface.vertices[far] - body.rest[origin];
@@ -195,9 +194,9 @@ TEST(FarVertices, AreFollowedTurnedOrRefused) {
       1e-9);
   EXPECT_EQ(rigid.displacement[0], followed.displacement[0]);
   options.far = FarVertices::refuse;
-  EXPECT_THROW(map(body, options), InputError);
+  EXPECT_THROW(map_quietly(body, options), InputError);
   options.far_distance = 100;
-  EXPECT_EQ(map(body, options).displacement, followed.displacement);
+  EXPECT_EQ(map_quietly(body, options).displacement, followed.displacement);
 }
 
 }  // namespace

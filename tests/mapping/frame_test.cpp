@@ -13,14 +13,7 @@
 namespace flexel {
 namespace {
 
-Progress& silent() {
-  static Progress progress("test", Progress::Mode::quiet);
-  return progress;
-}
-
-MapResult map(const Body& body, MapMethod method = MapMethod::affine) {
-  return map_surface(body, {method}, silent());
-}
+using test::map_quietly;
 
 bool are_connected(const Adjacency& connections, std::uint32_t from, std::uint32_t to) {
   std::vector<std::uint32_t> known{from};
@@ -37,7 +30,7 @@ TEST_P(Thin, OneLayerGivesPlanesThatFollowRigidMotionAndKeepTheirThickness) {
   const Mat3 turn = test::rotation(2.5, Vec3(1, 1, 0.3));
   const auto rigid = [&](const Vec3& x) -> Vec3 { return turn * x + Vec3(1, 2, 3); };
   test::deform(body, rigid);
-  MapResult result = map(body, GetParam());
+  MapResult result = map_quietly(body, GetParam());
   for (std::size_t v = 0; v < result.frame.size(); ++v) {
     EXPECT_EQ(result.frame_of(v).kind, FrameKind::plane);
     EXPECT_LT((body.surface.vertices[v] + result.displacement[v] - rigid(body.surface.vertices[v])).norm(),
@@ -45,7 +38,7 @@ TEST_P(Thin, OneLayerGivesPlanesThatFollowRigidMotionAndKeepTheirThickness) {
   }
   // Stretched in its plane, the layer stays as thick as it was.
   test::deform(body, [](const Vec3& x) -> Vec3 { return {1.5 * x.x(), x.y(), x.z()}; });
-  result = map(body, GetParam());
+  result = map_quietly(body, GetParam());
   for (std::size_t v = 0; v < result.frame.size(); ++v) EXPECT_NEAR(result.displacement[v].z(), 0, 1e-15);
 }
 
@@ -56,7 +49,7 @@ TEST_P(Thin, OneRowGivesLinesThatFollowItsDirection) {
   const Vec3 middle(0, 0.05, 0.05);
   const auto rigid = [&](const Vec3& x) -> Vec3 { return turn * (x - middle) + middle; };
   test::deform(body, rigid);
-  const MapResult result = map(body, GetParam());
+  const MapResult result = map_quietly(body, GetParam());
   for (std::size_t v = 0; v < result.frame.size(); ++v) {
     EXPECT_EQ(result.frame_of(v).kind, FrameKind::line);
     EXPECT_LT((body.surface.vertices[v] + result.displacement[v] - rigid(body.surface.vertices[v])).norm(),
@@ -64,7 +57,7 @@ TEST_P(Thin, OneRowGivesLinesThatFollowItsDirection) {
   }
   // Turned right round, which has no smallest rotation: finite, and as far apart as before.
   test::deform(body, [](const Vec3& x) -> Vec3 { return {-x.x(), x.y(), x.z()}; });
-  const MapResult opposite = map(body, GetParam());
+  const MapResult opposite = map_quietly(body, GetParam());
   for (std::size_t v = 0; v < opposite.frame.size(); ++v) {
     const std::uint32_t origin = opposite.frame_of(v).elements[0];
     EXPECT_NEAR((body.surface.vertices[v] + opposite.displacement[v] - body.position[origin]).norm(),
@@ -75,7 +68,7 @@ TEST_P(Thin, OneRowGivesLinesThatFollowItsDirection) {
 TEST_P(Thin, OneElementCarriesItsVerticesAlong) {
   Body body = test::block(1, 1, 1, 0.1, Placement::centre);
   test::deform(body, [](const Vec3& x) -> Vec3 { return x + Vec3(1, -2, 3); });
-  const MapResult result = map(body, GetParam());
+  const MapResult result = map_quietly(body, GetParam());
   for (std::size_t v = 0; v < result.frame.size(); ++v) {
     EXPECT_EQ(result.frame_of(v).kind, FrameKind::rigid);
     EXPECT_LT((result.displacement[v] - Vec3(1, -2, 3)).norm(), 1e-15);
@@ -92,7 +85,7 @@ TEST(Search, WidensAlongConnections) {
   const auto solid = [](const Vec3& p) { return p.x() > 3 || (p.y() < 1 && p.z() < 1); };
   Body body = test::make_body({}, {0, 0, 0}, {4, 4, 4}, solid, Placement::centre);
   test::add_surface(body, {Vec3(0.4, 0.4, 0.1), Vec3(1.4, 0.4, 0.1), Vec3(2.4, 0.4, 0.2)}, {{0, 1, 2}});
-  const MapResult result = map(body);
+  const MapResult result = map_quietly(body);
   EXPECT_EQ(result.frame_of(0).kind, FrameKind::plane);
   EXPECT_EQ(result.frame_of(0).rings, kRings - 1);
   EXPECT_EQ(result.frame_of(1).kind, FrameKind::full);
@@ -111,7 +104,7 @@ TEST(Search, QuadruplesAreWellConditionedAndClose) {
       lattice, {0, 0, 0}, {12, 12, 12}, [&](const Vec3& p) { return (p - middle).norm() < 0.52; },
       Placement::centre);
   test::add_box_surface(body, middle - Vec3::Constant(0.3), middle + Vec3::Constant(0.3), 9);
-  const MapResult result = map(body);
+  const MapResult result = map_quietly(body);
   for (std::size_t v = 0; v < result.frame.size(); ++v) {
     const auto& q = result.frame_of(v).elements;
     const auto edge = [&](int i) -> Vec3 { return body.rest[q[i]] - body.rest[q[0]]; };
@@ -131,7 +124,7 @@ TEST(Cracks, BrokenCellsCutFrames) {
   for (std::size_t e = 0; e < body.element_count(); ++e)
     if (body.lattice_index[e][0] >= 5) body.position[e] += Vec3(0.3, 0, 0);
   for (const MapMethod method : test::kEveryMethod) {
-    const MapResult result = map(body, method);
+    const MapResult result = map_quietly(body, method);
     for (std::size_t v = 0; v < result.frame.size(); ++v) {
       EXPECT_EQ(result.frame_of(v).kind, FrameKind::full);
       for (const std::uint32_t element : result.frame_of(v).elements)
@@ -148,7 +141,7 @@ TEST(Cracks, AnElementLeftAloneCarriesItsVertices) {
   std::fill(body.broken.begin(), body.broken.end(), std::uint8_t{1});
   derive_connections(body);
   test::deform(body, [](const Vec3& x) -> Vec3 { return 3 * x; });
-  const MapResult result = map(body);
+  const MapResult result = map_quietly(body);
   for (std::size_t v = 0; v < result.frame.size(); ++v) {
     EXPECT_EQ(result.frame_of(v).kind, FrameKind::rigid);
     EXPECT_LT((result.displacement[v] - 2 * body.rest[result.frame_of(v).elements[0]]).norm(), 1e-15);
@@ -169,7 +162,7 @@ TEST(Parts, InTouchNeverShareFrames) {
     for (std::size_t e = 0; e < body.element_count(); ++e)
       if (e >= body.parts[0].element_end) body.position[e] += Vec3(0.3, 0, 0);
     for (const MapMethod method : test::kEveryMethod) {
-      const MapResult result = map(body, method);
+      const MapResult result = map_quietly(body, method);
       for (std::size_t v = 0; v < result.frame.size(); ++v) {
         for (const std::uint32_t element : result.frame_of(v).elements)
           EXPECT_EQ(element < body.parts[0].element_end, v < first);
@@ -222,7 +215,7 @@ TEST(Pieces, LeavesNearerThanASpacingKeepToTheirOwnElements) {
   for (std::size_t e = 0; e < split.element_count(); ++e)
     if (split.piece[e] == 1) split.position[e] += Vec3(0, 0, 0.2);
   for (const MapMethod method : test::kEveryMethod) {
-    const MapResult result = map(split, method);
+    const MapResult result = map_quietly(split, method);
     for (std::size_t v = 0; v < 8; ++v) {
       EXPECT_EQ(result.frame_of(v).kind, FrameKind::full);
       EXPECT_NEAR(result.displacement[v].z(), v < 4 ? 0 : 0.2, 1e-15);
@@ -248,7 +241,7 @@ TEST(Seams, VerticesAtOnePositionMoveAsOne) {
     return {x.x() + x.y() * x.y(), x.y() + x.z() * x.x(), x.z()};
   });
   for (const MapMethod method : test::kEveryMethod) {
-    const MapResult result = map(body, method);
+    const MapResult result = map_quietly(body, method);
     std::size_t pairs = 0;
     for (std::size_t a = 0; a < vertices.size(); ++a)
       for (std::size_t b = 0; b < a; ++b)
@@ -265,7 +258,7 @@ TEST(Unreferenced, VerticesFollowTheNearestElementOfAnyPart) {
   test::append_body(body, test::block(2, 2, 2, 0.1, Placement::corner));
   body.surface.vertices.push_back(Vec3(40, -3, 2));
   test::deform(body, [](const Vec3& x) -> Vec3 { return x + Vec3(0, 0, 0.5); });
-  const MapResult result = map(body);
+  const MapResult result = map_quietly(body);
   EXPECT_EQ(result.referenced.back(), 0);
   EXPECT_LT((result.displacement.back() - Vec3(0, 0, 0.5)).norm(), 1e-12);
   const MapReport found = report(body, result);
@@ -277,10 +270,10 @@ TEST(Refuses, ABodyWithoutASurfaceOrAPartWithoutElements) {
   Body body = test::block(2, 2, 2, 0.1, Placement::corner);
   Body bare = body;
   bare.surface = {};
-  EXPECT_THROW(map(bare), InputError);
+  EXPECT_THROW(map_quietly(bare), InputError);
   body.parts.push_back(body.parts[0]);
   body.parts[1].element_begin = body.parts[1].element_end;
-  EXPECT_THROW(map(body), InputError);
+  EXPECT_THROW(map_quietly(body), InputError);
 }
 
 }  // namespace

@@ -17,6 +17,17 @@ inline std::string test_name(MapMethod method) {
   return name;
 }
 
+inline Progress& silent() {
+  static Progress progress("test", Progress::Mode::quiet);
+  return progress;
+}
+inline MapResult map_quietly(const Body& body, const MapOptions& options) {
+  return map_surface(body, options, silent());
+}
+inline MapResult map_quietly(const Body& body, MapMethod method = MapMethod::affine) {
+  return map_quietly(body, MapOptions{method});
+}
+
 // The round bar of the study: diameter 1, length 8 along x, its lattice turned and shifted against it;
 // `across` voxels to the diameter.
 Body round_bar(int across, Placement placement, int along_vertices = 128, int around_vertices = 48);

@@ -15,10 +15,7 @@
 namespace flexel {
 namespace {
 
-Progress& silent() {
-  static Progress progress("test", Progress::Mode::quiet);
-  return progress;
-}
+using test::silent;
 
 // Sanitizers make all of this twenty times as slow: there the lattice is coarser, and of many polygons only
 // some are mapped.

@@ -13,8 +13,6 @@
 namespace flexel::test {
 namespace {
 
-using Edge = std::pair<std::uint32_t, std::uint32_t>;
-
 // Every edge has two sides, which run through it in opposite directions; every vertex has one fan.
 void expect_manifold(const Piece& piece) {
   std::map<Edge, int> uses;

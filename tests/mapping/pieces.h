@@ -2,12 +2,15 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "bodies.h"
 #include "mapping/crack.h"
 
 namespace flexel::test {
+
+using Edge = std::pair<std::uint32_t, std::uint32_t>;  // of two vertices
 
 // One part of a surface, by index.
 struct Piece {

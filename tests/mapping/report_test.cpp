@@ -11,10 +11,7 @@
 namespace flexel {
 namespace {
 
-MapResult map(const Body& body, MapMethod method) {
-  Progress progress("test", Progress::Mode::quiet);
-  return map_surface(body, {method}, progress);
-}
+using test::map_quietly;
 
 class Flags : public testing::TestWithParam<MapMethod> {};
 
@@ -25,7 +22,7 @@ TEST_P(Flags, ACellTurnedInsideOutIsInverted) {
   for (std::uint32_t e = 0; e < body.element_count(); ++e)
     if (body.lattice_index[e] == Index3{5, 5, 5}) corner = e;
   body.position[corner] -= Vec3::Constant(0.35);
-  const MapResult result = map(body, GetParam());
+  const MapResult result = map_quietly(body, GetParam());
   std::size_t around = 0;
   for (std::size_t v = 0; v < result.flags.size(); ++v) {
     const auto& held_by = result.frame_of(v).elements;
@@ -43,7 +40,7 @@ TEST_P(Flags, ACellTurnedInsideOutIsInverted) {
 TEST_P(Flags, AReflectionTurnsEveryFrameInsideOut) {
   Body body = test::block(3, 3, 3, 0.1, Placement::centre);
   test::deform(body, [](const Vec3& x) -> Vec3 { return {-x.x(), x.y(), x.z()}; });
-  const MapReport found = report(body, map(body, GetParam()));
+  const MapReport found = report(body, map_quietly(body, GetParam()));
   EXPECT_EQ(found.inverted, found.vertices);
 }
 
@@ -51,19 +48,19 @@ TEST_P(Flags, ABodyPressedFlatIsDegenerateAndStaysFinite) {
   for (const Placement placement : {Placement::corner, Placement::centre}) {
     Body body = test::block(4, 4, 4, 0.1, placement);
     test::deform(body, [](const Vec3& x) -> Vec3 { return {x.x(), x.y(), 0}; });
-    const MapResult result = map(body, GetParam());
+    const MapResult result = map_quietly(body, GetParam());
     const MapReport found = report(body, result);
     EXPECT_EQ(found.degenerate, found.vertices);
     EXPECT_EQ(found.not_finite, 0u);
     test::deform(body, [](const Vec3&) -> Vec3 { return Vec3::Zero(); });
-    EXPECT_EQ(report(body, map(body, GetParam())).degenerate, found.vertices);
+    EXPECT_EQ(report(body, map_quietly(body, GetParam())).degenerate, found.vertices);
   }
 }
 
 TEST_P(Flags, WhatIsNotFiniteIsSaid) {
   Body body = test::block(3, 3, 3, 0.1, Placement::centre);
   test::deform(body, [](const Vec3& x) -> Vec3 { return (x - Vec3::Constant(0.1)) * 1e308 * 1e3; });
-  const MapReport found = report(body, map(body, GetParam()));
+  const MapReport found = report(body, map_quietly(body, GetParam()));
   EXPECT_EQ(found.not_finite, found.vertices);
   EXPECT_FALSE(found.valid());
   EXPECT_TRUE(nlohmann::json::parse(report_json(found, {GetParam()}))["volume_after"].is_null());
@@ -76,7 +73,7 @@ TEST(Voronoi, RigidAndUniformMotionLeaveNoCellAndShearDoes) {
   Body body = test::block(6, 6, 6, 0.1, Placement::centre, 12);
   const auto left = [&](const test::Field& field) {
     test::deform(body, field);
-    return report(body, map(body, MapMethod::affine)).voronoi_cell_left;
+    return report(body, map_quietly(body, MapMethod::affine)).voronoi_cell_left;
   };
   const Mat3 turn = test::rotation(1.2, Vec3(1, 2, -1));
   EXPECT_EQ(left([&](const Vec3& x) -> Vec3 { return turn * x; }), 0u);
@@ -91,7 +88,7 @@ TEST(Voronoi, AgreesWithALookAtEveryElement) {
   test::deform(body, [](const Vec3& x) -> Vec3 {
     return {x.x() + 0.6 * x.y() - 0.3 * x.z(), x.y() * 0.9, x.z() + 0.1 * x.x()};
   });
-  const MapResult result = map(body, MapMethod::affine);
+  const MapResult result = map_quietly(body, MapMethod::affine);
   std::size_t flagged = 0;
   for (std::size_t v = 0; v < result.flags.size(); ++v) {
     const Vec3 now = body.surface.vertices[v] + result.displacement[v];
@@ -107,7 +104,7 @@ TEST(Voronoi, AgreesWithALookAtEveryElement) {
 TEST(Report, HoldsVolumeAndDisplacement) {
   Body body = test::block(4, 4, 4, 0.1, Placement::corner);
   test::deform(body, [](const Vec3& x) -> Vec3 { return {2 * x.x(), 3 * x.y(), x.z()}; });
-  const MapReport found = report(body, map(body, MapMethod::affine));
+  const MapReport found = report(body, map_quietly(body, MapMethod::affine));
   const double side = 0.4 - 0.003;
   EXPECT_NEAR(found.quality.volume_before, side * side * side, 1e-12);
   EXPECT_NEAR(found.quality.volume_after, 6 * side * side * side, 1e-12);

@@ -7,11 +7,13 @@
 #include "simulate/scene.h"
 #include "simulate/simulate.h"
 #include "tests/simulate/box_body.h"
+#include "tests/simulate/scene_case.h"
 
 namespace flexel {
 namespace {
 
 using testing::box_body;
+using testing::simulate_quietly;
 
 constexpr double kForce = 1e-3;  // N: the linear regime
 
@@ -35,13 +37,6 @@ Scene cantilever(double poisson, const Vec3& force) {
   return scene;
 }
 
-SimulateResult run(Body& body, const Scene& scene, int threads = 0) {
-  Progress progress("test", Progress::Mode::quiet);
-  SimulateOptions options;
-  options.threads = threads;
-  return simulate(body, scene, options, progress);
-}
-
 // Mean displacement of the end along the load, per newton: CalculiX 2.20, C3D20R, extrapolated from n = 2, 4,
 // 8 (tests/simulate/reference/beam_ccx.py makes and prints it).
 struct Reference {
@@ -52,22 +47,23 @@ struct Reference {
 constexpr Reference kReferences[] = {
     {0.25, 1, 1.66322e-4}, {0.25, 2, 3.11722e-4}, {0.3, 1, 1.65964e-4}, {0.3, 2, 3.10193e-4}};
 
-double tip(int n, const Reference& reference) {
+double tip_compliance(int n, const Reference& reference) {
   Body body = beam(n);
-  const SimulateResult result = run(body, cantilever(reference.poisson, kForce * Vec3::Unit(reference.axis)));
+  const SimulateResult result =
+      simulate_quietly(body, cantilever(reference.poisson, kForce * Vec3::Unit(reference.axis)));
   return result.probes[0].displacement[reference.axis] / kForce;
 }
 
 TEST(Beam, TipWithinOnePercentAtFourCells) {
   for (const Reference& reference : kReferences)
-    EXPECT_NEAR(tip(4, reference) / reference.compliance, 1, 0.01)
+    EXPECT_NEAR(tip_compliance(4, reference) / reference.compliance, 1, 0.01)
         << "nu " << reference.poisson << ", axis " << reference.axis;
 }
 
 TEST(Beam, ConvergesToTheReference) {
   for (const Reference& reference : kReferences) {
-    const double coarse = std::abs(tip(2, reference) / reference.compliance - 1);
-    const double fine = std::abs(tip(8, reference) / reference.compliance - 1);
+    const double coarse = std::abs(tip_compliance(2, reference) / reference.compliance - 1);
+    const double fine = std::abs(tip_compliance(8, reference) / reference.compliance - 1);
     EXPECT_LT(coarse, 0.04);
     EXPECT_LT(fine, 0.002);
   }
@@ -75,7 +71,7 @@ TEST(Beam, ConvergesToTheReference) {
 
 TEST(Beam, SmallLoadTakesTwoNewtonIterations) {
   Body body = beam(8);
-  const SimulateResult result = run(body, cantilever(0.3, kForce * Vec3::UnitZ()));
+  const SimulateResult result = simulate_quietly(body, cantilever(0.3, kForce * Vec3::UnitZ()));
   EXPECT_LE(result.newton_iterations, 2);
   EXPECT_LE(result.relative_residual, 1e-8);
 }
@@ -83,7 +79,7 @@ TEST(Beam, SmallLoadTakesTwoNewtonIterations) {
 TEST(Beam, ReactionsBalanceTheLoad) {
   Body body = beam(4);
   const Vec3 force(1, -2, 30);
-  const SimulateResult result = run(body, cantilever(0.3, force));
+  const SimulateResult result = simulate_quietly(body, cantilever(0.3, force));
   ASSERT_EQ(result.reactions.size(), 1u);
   EXPECT_LT((result.reactions[0].force + force).norm(), 1e-7 * force.norm());
   EXPECT_LT((result.loads[0].force - force).norm(), 1e-12 * force.norm());
@@ -92,8 +88,8 @@ TEST(Beam, ReactionsBalanceTheLoad) {
 TEST(Beam, SameBitsForAnyNumberOfThreads) {
   Body one = beam(8), two = beam(8);
   const Scene scene = cantilever(0.3, Vec3(0, 20, 50));
-  (void)run(one, scene, 1);
-  (void)run(two, scene, 2);
+  (void)simulate_quietly(one, scene, 1);
+  (void)simulate_quietly(two, scene, 2);
   for (std::size_t e = 0; e < one.element_count(); ++e) ASSERT_EQ(one.position[e], two.position[e]);
 }
 
@@ -105,7 +101,8 @@ TEST(Beam, LargeDeflectionFollowsTheElastica) {
   options.spacing = Vec3::Constant(0.01);
   Body body = box_body(options);
   const double inertia = std::pow(0.04, 4) / 12, length = 2;
-  const SimulateResult result = run(body, cantilever(0.0, Vec3(0, 0, -12.1e5 * inertia / (length * length))));
+  const SimulateResult result =
+      simulate_quietly(body, cantilever(0.0, Vec3(0, 0, -12.1e5 * inertia / (length * length))));
   EXPECT_NEAR(-result.probes[0].displacement.z() / length, 0.30172, 0.003);
   EXPECT_NEAR(-result.probes[0].displacement.x() / length, 0.05643, 0.001);
   EXPECT_LT(result.imbalance.norm(), 1e-6 * result.loads[0].force.norm());
@@ -120,7 +117,7 @@ TEST(Beam, PlateBendsFarPastItsThicknessInFewIterations) {
   Body body = box_body(options);
   Scene scene = cantilever(0.3, Vec3(0, 0, -0.1));
   scene.get<Ties>().ties.push_back(make_fix(select_by_name("box/y0")));
-  const SimulateResult result = run(body, scene);
+  const SimulateResult result = simulate_quietly(body, scene);
   EXPECT_GT(result.largest_displacement, 10 * 0.004);
   EXPECT_EQ(result.load_steps, 1);
   EXPECT_LE(result.newton_iterations, 12);

@@ -20,10 +20,10 @@ using testing::box_body;
 using testing::BoxOptions;
 using ::testing::HasSubstr;
 using testing::refusal;
-using testing::run;
+using testing::simulate_quietly;
 
 // A bar 2 x 0.5 x 0.5 m, whole or cut at x = 1, the far half `n` cells thick, `gap` away.
-Body bar(bool whole, int n = 4, double gap = 0) {
+Body bonded_bar(bool whole, int n = 4, double gap = 0) {
   BoxOptions near;
   near.name = "near";
   near.cells = {whole ? 16 : 8, 4, 4};
@@ -52,27 +52,27 @@ Scene pull(const Vec3& force) {
 }
 
 Vec3 tip_of(Body body, const Scene& scene) {
-  return run(body, scene).probes[0].displacement;
+  return simulate_quietly(body, scene).probes[0].displacement;
 }
 
-Vec3 tip(Body body, const Vec3& force) {
+Vec3 pulled_tip(Body body, const Vec3& force) {
   return tip_of(std::move(body), pull(force));
 }
 
 TEST(Bonds, CutBarIsTheWholeBar) {
   for (const Vec3& force : {Vec3(1e-3, 0, 0), Vec3(0, 0, 1e-3)}) {
-    const Vec3 whole = tip(bar(true), force);
-    EXPECT_LT((tip(bar(false), force) - whole).norm(), 0.005 * whole.norm());
-    EXPECT_LT((tip(bar(false, 5), force) - whole).norm(), 0.015 * whole.norm());
-    EXPECT_LT((tip(bar(false, 3), force) - whole).norm(), 0.015 * whole.norm());
+    const Vec3 whole = pulled_tip(bonded_bar(true), force);
+    EXPECT_LT((pulled_tip(bonded_bar(false), force) - whole).norm(), 0.005 * whole.norm());
+    EXPECT_LT((pulled_tip(bonded_bar(false, 5), force) - whole).norm(), 0.015 * whole.norm());
+    EXPECT_LT((pulled_tip(bonded_bar(false, 3), force) - whole).norm(), 0.015 * whole.norm());
   }
 }
 
 TEST(Bonds, LargeDeflectionOfACutBar) {
   const Vec3 force(0, 0, 400);
-  const Vec3 whole = tip(bar(true), force);
+  const Vec3 whole = pulled_tip(bonded_bar(true), force);
   EXPECT_GT(whole.norm(), 0.08);
-  EXPECT_LT((tip(bar(false, 5), force) - whole).norm(), 0.015 * whole.norm());
+  EXPECT_LT((pulled_tip(bonded_bar(false, 5), force) - whole).norm(), 0.015 * whole.norm());
 }
 
 // Let go under its weight, the cut bar swings as far as the whole one.
@@ -84,9 +84,9 @@ TEST(Bonds, ACutBarSwingsAsTheWholeBar) {
     scene.run.time = 0.2;
     return testing::run_timed(body, scene);
   };
-  const testing::TimedCase whole = swing(bar(true));
+  const testing::TimedCase whole = swing(bonded_bar(true));
   for (const int n : {4, 5, 3}) {
-    const testing::TimedCase cut = swing(bar(false, n));
+    const testing::TimedCase cut = swing(bonded_bar(false, n));
     EXPECT_NEAR(cut.result.probes[0].displacement.z(), whole.result.probes[0].displacement.z(),
                 0.03 * std::abs(whole.result.probes[0].displacement.z()))
         << n;
@@ -100,20 +100,20 @@ TEST(Bonds, ACutBarSwingsAsTheWholeBar) {
 // [[bond]]: also over a gap, which makes the bar longer by a fortieth (and its bending by a thirteenth).
 TEST(Bonds, NamedBondsHold) {
   const Vec3 force(0, 0, 1e-3);
-  const Vec3 whole = tip(bar(true), force);
+  const Vec3 whole = pulled_tip(bonded_bar(true), force);
   Scene scene = pull(force);
   scene.get<Bonds>().bond = false;
   scene.get<Bonds>().named = {{{"far", "near"}, 0.06, "s.toml:3"}};
   for (const double gap : {0.0, 0.05}) {
-    Body body = bar(false, 5, gap);
-    const Vec3 bonded = run(body, scene).probes[0].displacement;
+    Body body = bonded_bar(false, 5, gap);
+    const Vec3 bonded = simulate_quietly(body, scene).probes[0].displacement;
     EXPECT_LT((bonded - whole).norm(), (0.015 + 2.5 * gap) * whole.norm()) << gap;
   }
-  EXPECT_THAT(refusal(bar(false, 5, 0.07), scene), HasSubstr("do not touch"));
+  EXPECT_THAT(refusal(bonded_bar(false, 5, 0.07), scene), HasSubstr("do not touch"));
   scene.get<Bonds>().named[0].gap = 0.1;
-  EXPECT_THAT(refusal(bar(false, 5, 0.05), scene), HasSubstr("half a spacing"));
+  EXPECT_THAT(refusal(bonded_bar(false, 5, 0.05), scene), HasSubstr("half a spacing"));
   scene.get<Bonds>().named[0].parts[0] = "fat";
-  EXPECT_THAT(refusal(bar(false, 5), scene), HasSubstr("did you mean \"far\""));
+  EXPECT_THAT(refusal(bonded_bar(false, 5), scene), HasSubstr("did you mean \"far\""));
 }
 
 TEST(Bonds, PartsOfDifferentModelsAreBonded) {
@@ -122,7 +122,7 @@ TEST(Bonds, PartsOfDifferentModelsAreBonded) {
   const auto pulled = [&](const std::string& model) {
     Scene own = parse_scene("[parts.far]\nmodel = \"" + model + "\"\n", "s.toml");
     scene.parts = own.parts;
-    return tip_of(bar(false, 4), scene);
+    return tip_of(bonded_bar(false, 4), scene);
   };
   const double cells = pulled("cells").x();
   EXPECT_NEAR(pulled("springs").x(), cells, 0.02 * cells);
@@ -135,19 +135,19 @@ TEST(Bonds, NamedBondsBesideContact) {
   scene.get<Gravity>().acceleration = Vec3(0, 0, -0.5);
   scene.run.time = 0.2;
   scene.get<Bonds>().bond = true;
-  const Vec3 bonded = testing::run_timed(bar(false, 5), scene).result.probes[0].displacement;
+  const Vec3 bonded = testing::run_timed(bonded_bar(false, 5), scene).result.probes[0].displacement;
   scene.get<Bonds>().bond = false;
   scene.get<Bonds>().named = {{{"near", "far"}, 0, "s.toml:3"}};
   scene.get<Contact>().on = true;
   scene.get<Contact>().bonded = {{"near", "far"}};
-  const Vec3 both = testing::run_timed(bar(false, 5), scene).result.probes[0].displacement;
+  const Vec3 both = testing::run_timed(bonded_bar(false, 5), scene).result.probes[0].displacement;
   EXPECT_LT(bonded.z(), -1e-3);
   EXPECT_NEAR(both.z(), bonded.z(), 1e-6 * std::abs(bonded.z()));
 }
 
 TEST(Bonds, SaysWhoIsBondedOverWhatArea) {
-  Body body = bar(false, 5);
-  const SimulateResult result = run(body, pull(Vec3(0, 0, 1)));
+  Body body = bonded_bar(false, 5);
+  const SimulateResult result = simulate_quietly(body, pull(Vec3(0, 0, 1)));
   ASSERT_EQ(result.bonds.size(), 1u);
   EXPECT_EQ(result.bonds[0].parts, (std::array<std::string, 2>{"near", "far"}));
   EXPECT_NEAR(result.bonds[0].area, 0.25, 1e-12);
@@ -158,7 +158,7 @@ TEST(Bonds, SaysWhoIsBondedOverWhatArea) {
 
 // A rotation of everything costs nothing, whatever the lattices: the bond does not see it.
 TEST(Bonds, RotationOfBondedPartsIsFree) {
-  Body body = bar(false, 3);
+  Body body = bonded_bar(false, 3);
   Scene scene = pull(Vec3::Zero());
   scene.get<Loads>().loads.clear();
   scene.get<Ties>().ties.clear();
@@ -166,23 +166,25 @@ TEST(Bonds, RotationOfBondedPartsIsFree) {
   tie.motion.axis = Vec3(1, 2, 3).normalized();
   tie.motion.angle = 1;
   scene.get<Ties>().ties.push_back(tie);
-  const SimulateResult result = run(body, scene);
+  const SimulateResult result = simulate_quietly(body, scene);
   for (std::size_t e = 0; e < body.element_count(); ++e)
     EXPECT_LT((body.position[e] - body.rest[e] - tie.motion.displacement(body.rest[e], 1)).norm(), 1e-6);
   EXPECT_LT(result.elastic_energy, 1e-6);
 }
 
 TEST(Bonds, OnlyPartsThatTouchAreBonded) {
-  EXPECT_TRUE(touching_points({bar(true), {}, {}}).empty());
-  EXPECT_FALSE(touching_points({bar(false, 4, 0.0005), {}, {}}).empty());  // under a hundredth of the spacing
-  EXPECT_TRUE(touching_points({bar(false, 4, 0.002), {}, {}}).empty());
-  EXPECT_THAT(refusal(bar(false, 4, 0.002), pull(Vec3(0, 0, 1))), HasSubstr("nothing holds part \"far\""));
+  EXPECT_TRUE(touching_points({bonded_bar(true), {}, {}}).empty());
+  EXPECT_FALSE(
+      touching_points({bonded_bar(false, 4, 0.0005), {}, {}}).empty());  // under a hundredth of the spacing
+  EXPECT_TRUE(touching_points({bonded_bar(false, 4, 0.002), {}, {}}).empty());
+  EXPECT_THAT(refusal(bonded_bar(false, 4, 0.002), pull(Vec3(0, 0, 1))),
+              HasSubstr("nothing holds part \"far\""));
 }
 
 TEST(Bonds, CanBeLeftOut) {
   Scene scene = pull(Vec3(0, 0, 1));
   scene.get<Bonds>().bond = false;
-  EXPECT_THAT(refusal(bar(false), scene), HasSubstr("nothing holds part \"far\""));
+  EXPECT_THAT(refusal(bonded_bar(false), scene), HasSubstr("nothing holds part \"far\""));
   EXPECT_FALSE(parse_scene("bond = false\n", "s.toml").get<Bonds>().bond);
   EXPECT_TRUE(parse_scene("", "s.toml").get<Bonds>().bond);
   EXPECT_THROW((void)parse_scene("contact = true\nbond = true\n", "s.toml"), InputError);

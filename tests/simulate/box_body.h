@@ -1,7 +1,9 @@
 // Builds the body of a box, with its surface, for tests of the simulation.
 #pragma once
+#include <array>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "formats/body.h"
 
@@ -96,6 +98,19 @@ inline Body box_body(const BoxOptions& options = {}) {
   body.parts.push_back(part);
   derive_connections(body);
   return body;
+}
+
+// 3 x 2 x 2 cells of 10 mm.
+inline Body small_box() {
+  return box_body({.cells = {3, 2, 2}, .spacing = Vec3::Constant(0.01)});
+}
+
+// What a run starts with, in the body's columns [m/s].
+inline void set_velocity(Body& body, const std::vector<Vec3>& velocity) {
+  Column column;
+  column.components = 3;
+  for (const Vec3& v : velocity) column.values.insert(column.values.end(), v.begin(), v.end());
+  body.element_columns["velocity"] = column;
 }
 
 }  // namespace flexel::testing

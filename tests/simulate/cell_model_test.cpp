@@ -42,7 +42,7 @@ class Random {
   std::uniform_real_distribution<double> uniform_{-1, 1};
 };
 
-CellVectors affine(const Lattice& lattice, const Mat3& gradient, const Vec3& shift) {
+CellVectors affine_displacements(const Lattice& lattice, const Mat3& gradient, const Vec3& shift) {
   CellVectors u;
   const auto x = corners(lattice);
   for (int a = 0; a < 8; ++a) u[a] = gradient * x[a] + shift;
@@ -53,7 +53,7 @@ TEST(CellModel, RigidRotationHasNoEnergyAndNoForce) {
   const Lattice lattice = turned_lattice();
   const CellKind kind = cell_kind(lattice, rubbery(0.3));
   const Mat3 rotation = Eigen::AngleAxisd(2.1, Vec3(1, 2, -1).normalized()).toRotationMatrix();
-  const CellVectors u = affine(lattice, rotation - Mat3::Identity(), Vec3(3, -2, 1));
+  const CellVectors u = affine_displacements(lattice, rotation - Mat3::Identity(), Vec3(3, -2, 1));
   const double stiff = 12.1e5 * kind.volume;
   EXPECT_LT(cell_energy(kind, u), 1e-25 * stiff);
   for (const Vec3& force : cell_forces(kind, u)) EXPECT_LT(force.norm(), 1e-12 * 12.1e5 * 0.01);
@@ -94,7 +94,7 @@ TEST(CellModel, AffineFieldHasTheContinuumsEnergyAtAnySpacing) {
     const CellKind kind = cell_kind(lattice, rubbery(0.3));
     Mat3 h;
     h << 0.2, 0.1, -0.05, 0.03, -0.1, 0.2, 0.0, 0.15, 0.1;
-    const CellVectors u = affine(lattice, h, Vec3(1, 2, 3));
+    const CellVectors u = affine_displacements(lattice, h, Vec3(1, 2, 3));
     EXPECT_LT((displacement_gradient(kind, u) - h).norm(), 1e-13);
     const Mat3 f = Mat3::Identity() + h;
     const double log_j = std::log(f.determinant());
@@ -209,7 +209,7 @@ TEST(CellModel, CornerGradientIsThatOfAnAffineFieldAndSeesAFold) {
   const CellKind kind = cell_kind(lattice, rubbery(0.3));
   Mat3 h;
   h << 0.2, 0.1, -0.05, 0.03, -0.1, 0.2, 0.0, 0.15, 0.1;
-  CellVectors u = affine(lattice, h, Vec3(1, 2, 3));
+  CellVectors u = affine_displacements(lattice, h, Vec3(1, 2, 3));
   for (std::uint32_t a = 0; a < 8; ++a) EXPECT_LT((corner_gradient(kind, u, a) - h).norm(), 1e-13);
   u.fill(Vec3::Zero());
   const auto x = corners(lattice);
@@ -223,7 +223,7 @@ TEST(CellModel, InvertedCellHasInfiniteEnergy) {
   const CellKind kind = cell_kind(lattice, rubbery(0.3));
   Mat3 mirror = Mat3::Zero();
   mirror(0, 0) = -2;
-  EXPECT_TRUE(std::isinf(cell_energy(kind, affine(lattice, mirror, Vec3::Zero()))));
+  EXPECT_TRUE(std::isinf(cell_energy(kind, affine_displacements(lattice, mirror, Vec3::Zero()))));
 }
 
 }  // namespace

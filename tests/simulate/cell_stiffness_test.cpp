@@ -12,14 +12,14 @@
 #include "simulate/merge.h"
 #include "simulate/scene.h"
 #include "tests/simulate/box_body.h"
+#include "tests/simulate/scene_case.h"
 
 namespace flexel {
 namespace {
 
 using testing::box_body;
 using testing::BoxOptions;
-
-constexpr double kYoung = 1e6;
+using testing::kGumYoung;
 
 // Two parts that touch, turned in space, with slivers and a hole, spacings that differ.
 Body two_boxes() {
@@ -44,7 +44,7 @@ Body two_boxes() {
 
 Scene held_scene() {
   Scene scene;
-  scene.materials["gum"] = {"gum", kYoung, 0.3, 580, "test"};
+  scene.materials["gum"] = {"gum", kGumYoung, 0.3, 580, "test"};
   scene.material = "gum";
   scene.get<Ties>().ties.push_back(make_fix(select_by_name("near/x0")));
   Selection ball;
@@ -65,12 +65,12 @@ std::vector<Vec3> random_vectors(std::size_t count, double size) {
   return values;
 }
 
-struct Case {
+struct TangentCase {
   double size, squeeze;  // m, 1
   bool project, stressed;
 };
 
-class CellStiffnessOf : public ::testing::TestWithParam<Case> {
+class CellStiffnessOf : public ::testing::TestWithParam<TangentCase> {
  protected:
   CellStiffnessOf()
       : body_(two_boxes()),
@@ -118,13 +118,13 @@ class CellStiffnessOf : public ::testing::TestWithParam<Case> {
   double corner_ = 1;  // smallest J of one
 };
 
-constexpr Case kSqueezed{0.02, 0.2, false, false};  // indefinite
-constexpr Case kFolding{0.035, 0, false, false};
-INSTANTIATE_TEST_SUITE_P(Forms, CellStiffnessOf,
-                         ::testing::Values(Case{0, 0, false, false}, kSqueezed, Case{0.02, 0.2, true, false},
-                                           Case{0.02, 0.2, false, true}, Case{0.02, 0.2, true, true},
-                                           kFolding, Case{0.035, 0, true, false},
-                                           Case{0.035, 0, true, true}));
+constexpr TangentCase kSqueezed{0.02, 0.2, false, false};  // indefinite
+constexpr TangentCase kFolding{0.035, 0, false, false};
+INSTANTIATE_TEST_SUITE_P(
+    Forms, CellStiffnessOf,
+    ::testing::Values(TangentCase{0, 0, false, false}, kSqueezed, TangentCase{0.02, 0.2, true, false},
+                      TangentCase{0.02, 0.2, false, true}, TangentCase{0.02, 0.2, true, true}, kFolding,
+                      TangentCase{0.035, 0, true, false}, TangentCase{0.035, 0, true, true}));
 
 TEST_P(CellStiffnessOf, IsTheStoredOne) {
   if (GetParam().size == kFolding.size) {

@@ -9,6 +9,7 @@
 #include "simulate/carrier.h"
 #include "simulate/merge.h"
 #include "simulate/touching.h"
+#include "tests/simulate/scene_case.h"
 #include "tests/simulate/study_beam.h"
 
 namespace flexel {
@@ -16,11 +17,13 @@ namespace {
 
 using testing::centre_body;
 using testing::CentreOptions;
+using testing::gum_scene;
 using testing::half_space;
 using ::testing::HasSubstr;
+using testing::refusal;
 using testing::simulate_quietly;
 
-CentreOptions bar(std::array<int, 3> voxels = {8, 3, 3}) {
+CentreOptions bar_of_voxels(std::array<int, 3> voxels = {8, 3, 3}) {
   CentreOptions options;
   options.voxels = voxels;
   options.spacing = 0.1;
@@ -28,28 +31,12 @@ CentreOptions bar(std::array<int, 3> voxels = {8, 3, 3}) {
   return options;
 }
 
-Scene gum_scene() {
-  Scene scene;
-  scene.materials["gum"] = {"gum", 1e6, 0.3, 1000, "test"};
-  scene.material = "gum";
-  return scene;
-}
-
 void fix(Scene& scene, const std::string& where) {
   scene.get<Ties>().ties.push_back(make_fix(select_by_name(where)));
 }
 
-std::string refusal(Body body, const Scene& scene) {
-  try {
-    (void)simulate_quietly(body, scene);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "accepted";
-}
-
 TEST(Centre, NearestElementIsThatOfASearchOverAll) {
-  CentreOptions options = bar({6, 5, 4});
+  CentreOptions options = bar_of_voxels({6, 5, 4});
   options.axes = Eigen::AngleAxisd(0.6, Vec3(1, 2, 2).normalized()).toRotationMatrix();
   options.origin = Vec3(1, -2, 3);
   options.inside = [](int i, int j, int k) { return (i * 7 + j * 5 + k * 3) % 4 != 0; };
@@ -79,7 +66,7 @@ TEST(Centre, NearestElementIsThatOfASearchOverAll) {
 
 // Across a slit the element of the wrong leaf may be nearer; the normal tells which is meant.
 TEST(Centre, SurfaceOfASlitKeepsToItsOwnLeaf) {
-  CentreOptions options = bar({4, 4, 3});
+  CentreOptions options = bar_of_voxels({4, 4, 3});
   options.inside = [](int, int, int k) { return k != 1; };
   const Body body = centre_body(options);
   const Setting setting{body, {}, {}, {}, {}, {}};
@@ -92,7 +79,7 @@ TEST(Centre, SurfaceOfASlitKeepsToItsOwnLeaf) {
 }
 
 TEST(Centre, GradientCarriesAffineDisplacementsBeyondTheElements) {
-  const Body body = centre_body(bar());
+  const Body body = centre_body(bar_of_voxels());
   const Setting setting{body, {}, {}, {}, {}, {}};
   Mat3 gradient;
   gradient << 0.1, -0.2, 0.3, 0.05, 0.2, -0.1, 0.4, 0, 0.1;
@@ -112,7 +99,7 @@ TEST(Centre, GradientCarriesAffineDisplacementsBeyondTheElements) {
 }
 
 TEST(Centre, LoadsAndGravityKeepTheirTotals) {
-  Body body = centre_body(bar());
+  Body body = centre_body(bar_of_voxels());
   Scene scene = gum_scene();
   fix(scene, "bar/x0");
   scene.get<Loads>().loads.push_back(make_push(select_by_name("bar/x1"), Vec3(1, 2, -3)));
@@ -130,7 +117,7 @@ TEST(Centre, LoadsAndGravityKeepTheirTotals) {
 }
 
 TEST(Centre, TurnedAsAWholeItKeepsItsShape) {
-  Body body = centre_body(bar());
+  Body body = centre_body(bar_of_voxels());
   Scene scene = gum_scene();
   Tie turn = make_move(select_by_name("bar/x0"), Vec3(0.1, 0, 0));
   turn.motion.axis = Vec3::UnitZ();
@@ -150,7 +137,7 @@ TEST(Centre, TurnedAsAWholeItKeepsItsShape) {
 }
 
 TEST(Centre, ALooseVoxelIsCarriedAlong) {
-  CentreOptions options = bar({16, 10, 10});
+  CentreOptions options = bar_of_voxels({16, 10, 10});
   options.inside = [](int i, int j, int k) { return i < 13 || (i == 15 && j == 5 && k == 5); };
   Body body = centre_body(options);
   Scene scene = gum_scene();
@@ -173,7 +160,7 @@ TEST(Centre, ALooseVoxelIsCarriedAlong) {
 // A single element at the end of a fin hangs on three in a row, all in one plane with it: nothing holds it
 // across, but it is small and goes with the block.
 TEST(Centre, ATipOfOneElementTurnsWithTheRest) {
-  CentreOptions options = bar({15, 12, 10});
+  CentreOptions options = bar_of_voxels({15, 12, 10});
   options.inside = [](int i, int j, int k) {
     return i < 13 || (i == 13 && k == 5) || (i == 14 && j == 5 && k == 5);
   };
@@ -193,14 +180,15 @@ TEST(Centre, ATipOfOneElementTurnsWithTheRest) {
 TEST(Centre, RefusesWhatNothingHolds) {
   Scene scene = gum_scene();
   scene.get<Gravity>().acceleration = Vec3(0, 0, -9.81);
-  EXPECT_THAT(refusal(centre_body(bar()), scene), HasSubstr("nothing holds part \"bar\""));
+  EXPECT_THAT(refusal(centre_body(bar_of_voxels()), scene), HasSubstr("nothing holds part \"bar\""));
   fix(scene, "bar/x0");
-  CentreOptions parted = bar();
+  CentreOptions parted = bar_of_voxels();
   parted.inside = [](int i, int, int) { return i != 4; };
   EXPECT_THAT(refusal(centre_body(parted), scene), HasSubstr("the one of 27 elements near"));
-  EXPECT_THAT(refusal(centre_body(bar({6, 5, 1})), scene), HasSubstr("lie in one plane"));
+  EXPECT_THAT(refusal(centre_body(bar_of_voxels({6, 5, 1})), scene), HasSubstr("lie in one plane"));
   scene.get<Ties>().ties[0].axes = {true, false, true};
-  EXPECT_THAT(refusal(centre_body(bar()), scene), HasSubstr("\"bar\" is free to translate along y"));
+  EXPECT_THAT(refusal(centre_body(bar_of_voxels()), scene),
+              HasSubstr("\"bar\" is free to translate along y"));
 }
 
 TEST(Centre, RefusesModelsThatDoNotFit) {
@@ -208,13 +196,13 @@ TEST(Centre, RefusesModelsThatDoNotFit) {
   fix(scene, "bar/x0");
   for (const char* model : {"cells", "springs"}) {
     scene.parts["bar"].model = model;
-    EXPECT_THAT(refusal(centre_body(bar()), scene), HasSubstr("--placement corner"));
+    EXPECT_THAT(refusal(centre_body(bar_of_voxels()), scene), HasSubstr("--placement corner"));
   }
   scene.parts["bar"].model = "";
   scene.parts["bar"].hooke = "ganoveli";
-  EXPECT_THAT(refusal(centre_body(bar()), scene), HasSubstr("did you mean \"ganovelli\""));
+  EXPECT_THAT(refusal(centre_body(bar_of_voxels()), scene), HasSubstr("did you mean \"ganovelli\""));
   scene.parts["bar"].hooke = "";
-  Body uneven = centre_body(bar());
+  Body uneven = centre_body(bar_of_voxels());
   uneven.parts[0].lattice.spacing.z() *= 1.1;
   EXPECT_THAT(refusal(uneven, scene), HasSubstr("cubic"));
 }
@@ -223,7 +211,7 @@ TEST(Centre, RefusesModelsThatDoNotFit) {
 Body two_bars(Placement first, Placement second, double begin = 0.4) {
   const auto half = [&](Placement placement, double from, const std::string& name) {
     if (placement == Placement::centre) {
-      CentreOptions options = bar({4, 3, 3});
+      CentreOptions options = bar_of_voxels({4, 3, 3});
       options.origin.x() = from;
       options.name = name;
       return centre_body(options);
@@ -251,7 +239,7 @@ SimulateResult bent(Body body, bool one) {
 }
 
 TEST(Centre, PartsThatTouchAreBonded) {
-  const double whole = bent(centre_body(bar()), true).probes[0].displacement.z();
+  const double whole = bent(centre_body(bar_of_voxels()), true).probes[0].displacement.z();
   const SimulateResult both = bent(two_bars(Placement::centre, Placement::centre), false);
   ASSERT_EQ(both.bonds.size(), 1u);
   EXPECT_NEAR(both.bonds[0].area, 0.09, 1e-12);

@@ -12,6 +12,7 @@
 #include "simulate/time/connection_runs.h"
 #include "simulate/time/step_bound.h"
 #include "tests/simulate/stepped.h"
+#include "tests/simulate/study_beam.h"
 
 namespace flexel {
 namespace {
@@ -19,11 +20,10 @@ namespace {
 using testing::box_body;
 using testing::BoxOptions;
 using testing::forces_in_step;
+using testing::kStudyGum;
 using testing::largest;
 using testing::largest_difference;
 using testing::shaken;
-
-const Material kGum{"gum", 12.1e5, 0.25, 580, "test"};
 
 // A share of the voxels, each with a fill of its own; turned.
 Body crumbs(const std::array<int, 3>& cells, double share, unsigned seed) {
@@ -78,15 +78,15 @@ Body branching() {
   return body;
 }
 
-Setting setting_of(const Body& body, std::vector<Model> models = {Model::springs}) {
-  return {body, std::vector<Material>(body.parts.size(), kGum),
+Setting springs_setting(const Body& body, std::vector<Model> models = {Model::springs}) {
+  return {body, std::vector<Material>(body.parts.size(), kStudyGum),
           std::vector<std::uint8_t>(body.cell_count(), 0), std::move(models)};
 }
 
 // [N] (elements), spring by spring, cell by cell; of elasticity and damping.
-std::vector<Vec3> brute_force(const Setting& setting, const State& state, double tau) {
+std::vector<Vec3> spring_by_spring(const Setting& setting, const State& state, double tau) {
   const Body& body = setting.body;
-  const SpringKind kind = spring_kind(body.parts[0].lattice, kGum);
+  const SpringKind kind = spring_kind(body.parts[0].lattice, kStudyGum);
   std::vector<Vec3> result(body.element_count(), Vec3::Zero());
   for (std::size_t c = 0; c < body.cell_count(); ++c)
     for (const Spring& spring : kind.springs) {
@@ -114,10 +114,10 @@ std::vector<std::pair<const char*, Body>> bodies() {
 
 TEST(ConnectionKernel, ForcesAreThoseOfTheSpringsOfAllCells) {
   for (const auto& [name, body] : bodies()) {
-    const Setting setting = setting_of(body);
+    const Setting setting = springs_setting(body);
     const State state = shaken(body, 1e-3, 1);
     for (const double tau : {0.0, 1e-3}) {
-      const std::vector<Vec3> expected = brute_force(setting, state, tau);
+      const std::vector<Vec3> expected = spring_by_spring(setting, state, tau);
       const std::vector<Vec3> found = forces_in_step(setting, state, tau);
       EXPECT_LT(largest_difference(found, expected), 1e-11 * largest(expected)) << name << tau;
       EXPECT_EQ(forces_in_step(setting, state, tau, true), found) << name << tau;
@@ -127,7 +127,7 @@ TEST(ConnectionKernel, ForcesAreThoseOfTheSpringsOfAllCells) {
 
 TEST(ConnectionKernel, BodiesOfThisTestHaveSeveralChunks) {
   const Body many = crumbs({30, 19, 20}, 0.95, 2), leaves = branching();
-  const Setting of_many = setting_of(many), of_leaves = setting_of(leaves);
+  const Setting of_many = springs_setting(many), of_leaves = springs_setting(leaves);
   EXPECT_GT(step_layout(of_many, {{0}}).chunks.size(), 2u);
   EXPECT_TRUE(step_layout(of_many, {{0}}).blocks.empty());
   EXPECT_EQ(step_layout(of_leaves, {{0}}).chunks.size(), 2u);  // one of the leaves by itself
@@ -135,7 +135,7 @@ TEST(ConnectionKernel, BodiesOfThisTestHaveSeveralChunks) {
 
 TEST(ConnectionKernel, KeepsMomentaAndDampingTakesEnergy) {
   const Body body = crumbs({23, 11, 20}, 0.5, 4);
-  testing::expect_inner_forces(setting_of(body), shaken(body, 2e-3, 2), 1e-3);
+  testing::expect_inner_forces(springs_setting(body), shaken(body, 2e-3, 2), 1e-3);
 }
 
 // Every connection of the cells once, with the fills of all cells around it.
@@ -184,7 +184,7 @@ TEST(ConnectionKernel, RunsHoldEveryConnectionOnce) {
 
 TEST(ConnectionKernel, SameBitsForAnyThreadsInstructionsAndBooks) {
   const Body body = crumbs({30, 19, 20}, 0.8, 5);
-  testing::expect_same_bits(setting_of(body));
+  testing::expect_same_bits(springs_setting(body));
 }
 
 // Where another part breaks, the stepper tells the energy of all: also of those computed by connection.
@@ -212,7 +212,7 @@ TEST(ConnectionKernel, TellsItsEnergyWhereAnotherPartBreaks) {
   part.cell_begin = cells;
   part.cell_end = static_cast<std::uint32_t>(body.cell_count());
   body.parts.push_back(part);
-  const Setting setting = setting_of(body, {Model::springs, Model::springs});
+  const Setting setting = springs_setting(body, {Model::springs, Model::springs});
   StepPlan plan{{0, 0}};
   plan.fracture = {{}, {1e12, 1e12}};
   Stepper stepper(setting, plan, false);
@@ -225,7 +225,7 @@ TEST(ConnectionKernel, TellsItsEnergyWhereAnotherPartBreaks) {
 
 TEST(ConnectionKernel, LengthThatIsNoNumberIsTold) {
   const Body body = crumbs({9, 7, 5}, 0.9, 9);
-  const Setting setting = setting_of(body);
+  const Setting setting = springs_setting(body);
   for (const double bad : {std::nan(""), 1e300}) {
     State state = shaken(body, 1e-3, 10);
     state.displacement[body.cell_elements[20][3]].y() = bad;
@@ -237,7 +237,7 @@ TEST(ConnectionKernel, LengthThatIsNoNumberIsTold) {
 // Springs resist as well inside out: the check between steps has to see it, but for springs that break.
 TEST(ConnectionKernel, FoldedCellEndsTheStableStep) {
   const Body body = box_body({{2, 2, 2}, Vec3::Constant(0.01)});
-  const Setting setting = setting_of(body);
+  const Setting setting = springs_setting(body);
   State state = shaken(body, 0, 11);
   const std::vector<Pass> none;
   StepPlan plan{{0}};

@@ -12,29 +12,29 @@
 namespace flexel {
 namespace {
 
-constexpr double kYoung = 3e6, kSpacing = 0.25;
+constexpr double kConnectionYoung = 3e6, kConnectionSpacing = 0.25;
 
-testing::CentreOptions turned_box() {
+testing::CentreOptions turned_voxels() {
   testing::CentreOptions options;
   options.voxels = {3, 4, 2};
-  options.spacing = kSpacing;
+  options.spacing = kConnectionSpacing;
   options.axes =
       (Eigen::AngleAxisd(0.3, Vec3::UnitZ()) * Eigen::AngleAxisd(0.7, Vec3::UnitX())).toRotationMatrix();
   return options;
 }
 
 Material gum() {
-  return {"gum", kYoung, 0.25, 1000, "test"};
+  return {"gum", kConnectionYoung, 0.25, 1000, "test"};
 }
 
 TEST(Connections, JoinEveryPairOfNeighboursOnce) {
-  const Body body = testing::centre_body(turned_box());
+  const Body body = testing::centre_body(turned_voxels());
   const Setting setting{body, {gum()}, {}, {Model::paper}};
   const Connections connections = make_connections(setting);
   std::set<std::pair<std::uint32_t, std::uint32_t>> expected;
   for (std::uint32_t a = 0; a < body.element_count(); ++a)
     for (std::uint32_t b = a + 1; b < body.element_count(); ++b)
-      if ((body.rest[a] - body.rest[b]).norm() < 1.8 * kSpacing) expected.insert({a, b});
+      if ((body.rest[a] - body.rest[b]).norm() < 1.8 * kConnectionSpacing) expected.insert({a, b});
   std::set<std::pair<std::uint32_t, std::uint32_t>> found;
   for (std::size_t c = 0; c < connections.size(); ++c) {
     if (c > 0) {
@@ -48,8 +48,8 @@ TEST(Connections, JoinEveryPairOfNeighboursOnce) {
 }
 
 TEST(Connections, KindsHoldTheRestVectorAndTheHookeConstants) {
-  const Body body = testing::centre_body(turned_box());
-  const double eh = kYoung * kSpacing;
+  const Body body = testing::centre_body(turned_voxels());
+  const double eh = kConnectionYoung * kConnectionSpacing;
   const double paper[] = {0, eh, std::sqrt(2.0) * eh, std::sqrt(3.0) * eh};
   const double ganovelli[] = {0, eh, eh / 6, eh / 12};
   for (const HookeConstant hooke : {HookeConstant::paper, HookeConstant::ganovelli}) {
@@ -64,7 +64,7 @@ TEST(Connections, KindsHoldTheRestVectorAndTheHookeConstants) {
       const Vec3 rest = body.rest[connections.b[c]] - body.rest[connections.a[c]];
       EXPECT_LT((kind.rest - rest).norm(), 1e-14);
       EXPECT_NEAR(kind.length, rest.norm(), 1e-14);
-      const auto axes = std::lround(std::pow(rest.norm() / kSpacing, 2));
+      const auto axes = std::lround(std::pow(rest.norm() / kConnectionSpacing, 2));
       EXPECT_NEAR(kind.stiffness, (hooke == HookeConstant::paper ? paper : ganovelli)[axes], 1e-9 * eh);
     }
   }
@@ -90,17 +90,18 @@ TEST(Connections, GanovelliIsTheSumOverTheTetrahedraOfACube) {
     }
   // A face connection belongs to four cubes, an edge one to two, a corner one to one.
   const double cubes[4] = {0, 4, 2, 1};
-  const Body body = testing::centre_body(turned_box());
+  const Body body = testing::centre_body(turned_voxels());
   const ConnectionKinds kinds = connection_kinds(body.parts[0].lattice, gum(), HookeConstant::ganovelli);
   for (std::size_t kind = 1; kind < kinds.size(); ++kind) {
-    const auto axes = std::lround(std::pow(kinds[kind].length / kSpacing, 2));
-    EXPECT_NEAR(kinds[kind].stiffness, cubes[axes] * sum[axes] / pairs[axes] * kYoung * kSpacing,
-                1e-9 * kYoung * kSpacing);
+    const auto axes = std::lround(std::pow(kinds[kind].length / kConnectionSpacing, 2));
+    EXPECT_NEAR(kinds[kind].stiffness,
+                cubes[axes] * sum[axes] / pairs[axes] * kConnectionYoung * kConnectionSpacing,
+                1e-9 * kConnectionYoung * kConnectionSpacing);
   }
 }
 
 TEST(Connections, LeaveOutStrayElementsAndMissingBits) {
-  Body body = testing::centre_body(turned_box());
+  Body body = testing::centre_body(turned_voxels());
   Setting setting{body, {gum()}, {}, {Model::paper}};
   const std::size_t all = make_connections(setting).size();
   setting.stray_element.assign(body.element_count(), 0);

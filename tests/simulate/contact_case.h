@@ -18,7 +18,7 @@ inline Mat3 turn(double angle, const Vec3& axis) {
   return Eigen::AngleAxisd(angle, axis.normalized()).toRotationMatrix();
 }
 
-inline Body block(const std::string& name, std::array<int, 3> cells, const Vec3& origin,
+inline Body block(const std::string& name, std::array<int, 3> cells, const Vec3& origin = Vec3::Zero(),
                   const Mat3& axes = Mat3::Identity()) {
   BoxOptions options;
   options.name = name;
@@ -49,7 +49,7 @@ inline ContactSettings all_parts(const Body& body) {
   return settings;
 }
 
-inline State at_rest(const Body& body) {
+inline State starting_at_rest(const Body& body) {
   State state;
   state.displacement.assign(body.element_count(), Vec3::Zero());
   state.velocity.assign(body.element_count(), Vec3::Zero());
@@ -68,11 +68,12 @@ inline Scene scene_of(double time) {
 }
 
 inline void throw_part(Scene& scene, const std::string& part, const Vec3& velocity,
-                       const Vec3& spin = Vec3::Zero()) {
+                       const Vec3& spin = Vec3::Zero(), const Vec3& through = Vec3::Zero()) {
   StartingVelocity start;
   start.where = select_by_name(part);
   start.velocity = velocity;
   start.spin = spin;
+  start.through = through;
   scene.get<InitialVelocity>().velocities.push_back(start);
 }
 

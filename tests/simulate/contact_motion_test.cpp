@@ -172,14 +172,14 @@ TEST(Contact, APartTouchesItself) {
 }
 
 // A block on a plane at `angle`, under gravity, its lattice turned by `turned` about the plane's normal.
-struct Slope {
+struct SlideOnSlope {
   TimedCase made;
   Vec3 down;          // unit, along the slope
   double speed, way;  // m/s, m, along it
 };
 
-Slope slide(double angle, double friction, double time, double turned, double start = 0,
-            bool on_part = false) {
+SlideOnSlope slide(double angle, double friction, double time, double turned, double start = 0,
+                   bool on_part = false) {
   const Mat3 tilt = turn(angle, Vec3::UnitY());
   const Mat3 axes = tilt * turn(turned, Vec3::UnitZ());
   Scene scene = scene_of(time);
@@ -196,7 +196,7 @@ Slope slide(double angle, double friction, double time, double turned, double st
   }
   const Vec3 down = tilt.col(0);
   if (start != 0) throw_part(scene, "block", start * down);
-  Slope slope{testing::run_timed(std::move(body), scene), down, 0, 0};
+  SlideOnSlope slope{testing::run_timed(std::move(body), scene), down, 0, 0};
   slope.speed = mean_velocity(slope.made.body, 0).dot(down);
   for (std::uint32_t e = 0; e < slope.made.body.parts[0].element_end; ++e)
     slope.way += (slope.made.body.position[e] - slope.made.body.rest[e]).dot(down) /
@@ -206,7 +206,7 @@ Slope slide(double angle, double friction, double time, double turned, double st
 
 TEST(ContactFriction, ABlockRestsBelowTheAngleOfFriction) {
   for (const double turned : {0.0, 0.4}) {
-    const Slope slope = slide(0.3, 0.4, 0.15, turned);  // tan 0.3 = 0.31
+    const SlideOnSlope slope = slide(0.3, 0.4, 0.15, turned);  // tan 0.3 = 0.31
     EXPECT_LT(std::abs(slope.way), 0.01 * kSide) << turned;
     EXPECT_LT(std::abs(slope.speed), 1e-4) << turned;
   }
@@ -216,7 +216,7 @@ TEST(ContactFriction, ABlockSlidesAboveTheAngleOfFriction) {
   for (const bool on_part : {false, true})
     for (const double turned : on_part ? std::vector{0.4} : std::vector{0.0, 0.4, 0.9}) {
       const double angle = 0.5, mu = 0.3, time = 0.1;
-      const Slope slope = slide(angle, mu, time, turned, 0, on_part);
+      const SlideOnSlope slope = slide(angle, mu, time, turned, 0, on_part);
       const double expected = 9.81 * (std::sin(angle) - mu * std::cos(angle));
       EXPECT_NEAR(slope.speed / time, expected, 0.02 * expected) << turned << on_part;
       EXPECT_NEAR(2 * slope.way / time / time, expected, 0.02 * expected) << turned << on_part;
@@ -227,7 +227,7 @@ TEST(ContactFriction, ABlockSlidesAboveTheAngleOfFriction) {
 TEST(ContactFriction, ABlockThatSlidesStopsAfterItsDistance) {
   const double mu = 0.35, start = 0.12;
   for (const bool on_part : {false, true}) {
-    const Slope slope = slide(0, mu, 0.07, 0.3, start, on_part);
+    const SlideOnSlope slope = slide(0, mu, 0.07, 0.3, start, on_part);
     const double expected = start * start / (2 * mu * 9.81);
     EXPECT_NEAR(slope.way, expected, 0.02 * expected) << on_part;
     EXPECT_NEAR(slope.speed, 0, 0.02 * start) << on_part;  // it trembles on its springs

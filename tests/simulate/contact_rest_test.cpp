@@ -86,7 +86,7 @@ TEST(ContactFriction, NoneInsideAPartThatIsCompressedAndRotated) {
   settings.friction = 0.5;
   settings.damping = 1e-4;
   Contacts contacts(settings, setting);
-  State state = at_rest(body);
+  State state = starting_at_rest(body);
   for (const double angle : {0.0, 0.7, 2.5}) {
     const Mat3 shape = turn(angle, Vec3(1, 2, 3)) * Vec3(0.5, 1.3, 0.6).asDiagonal();
     for (std::size_t e = 0; e < body.element_count(); ++e) {
@@ -136,7 +136,7 @@ TEST(Contact, BlocksThatLieFlushFeelNothing) {
   append(body, cut_block("c", {3, 3, 4}, Vec3(0, 3 * kSide, 0)));
   const Setting setting = setting_of(body);
   Contacts contacts(all_parts(body), setting);
-  EXPECT_LT(contacts.energy(at_rest(body)), 1e-20);
+  EXPECT_LT(contacts.energy(starting_at_rest(body)), 1e-20);
 }
 
 // The sides of a block that is pressed and slides out look at each other while they are far inside: the way
@@ -146,7 +146,7 @@ TEST(Contact, ABlockThatSlidesOutFromUnderAnotherIsNotThrown) {
   append(body, block("high", {4, 2, 1}, Vec3(0, 0, 1.97 * kSide)));
   const Setting setting = setting_of(body);
   Contacts contacts(all_parts(body), setting);
-  State state = at_rest(body);
+  State state = starting_at_rest(body);
   const double pressed = contacts.energy(state);
   ASSERT_GT(pressed, 0);
   double before = pressed, work = 0, force_before = 0;
@@ -204,7 +204,7 @@ Body balls(const std::string& name, std::array<int, 3> voxels, const Vec3& origi
 TEST(ContactOfPaper, BallsPushAlongTheirCentresWithTheMeanStiffness) {
   Body body = balls("a", {1, 1, 1}, Vec3::Zero());
   append(body, balls("b", {1, 1, 1}, Vec3(0.006, 0.007, 0)));
-  State state = at_rest(body);
+  State state = starting_at_rest(body);
   const auto force = [&](double young_a, double young_b) {
     Setting setting = setting_of(body);
     setting.materials[0].young = young_a;

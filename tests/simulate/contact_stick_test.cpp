@@ -110,7 +110,7 @@ TEST(ContactStick, ForcesBalanceWithTheirMoments) {
   settings.stick.assign(2, 1e6);
   settings.damping = 1e-4;
   Contacts contacts(settings, setting);
-  State state = at_rest(body);
+  State state = starting_at_rest(body);
   contacts.remember(state, 0);
   std::mt19937 random(5);
   std::uniform_real_distribution<double> shake(-2e-5, 2e-5);
@@ -208,7 +208,7 @@ TEST(ContactDamping, ABounceLosesWhatItsDampingSays) {
   ContactSettings settings = all_parts(still);
   settings.planes = {plane_at(0)};
   Contacts contacts(settings, setting);
-  State state = at_rest(still);
+  State state = starting_at_rest(still);
   const double spacing = 1e-7;
   std::vector<double> table;
   for (int n = 0; n < 8000; ++n) {

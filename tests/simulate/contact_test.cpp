@@ -39,7 +39,7 @@ struct Shaken {
   Shaken(double sink, std::uint32_t seed) {
     const Mat3 axes = turn(0.4, Vec3(0.1, 0.05, 1));
     append(body, block("b", {2, 2, 2}, Vec3(0.006, 0.002, 0.02 - sink), axes));
-    state = at_rest(body);
+    state = starting_at_rest(body);
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> shake(-2e-4, 2e-4);
     for (Vec3& u : state.displacement) u = Vec3(shake(random), shake(random), shake(random));
@@ -136,7 +136,7 @@ double first_touch(const Body& body, double apart, const std::vector<ContactPlan
   double touching = -0.2 * kSide, free = 0.2 * kSide;
   for (int i = 0; i < 20; ++i) {
     const double gap = 0.5 * (touching + free);
-    State state = at_rest(body);
+    State state = starting_at_rest(body);
     for (std::uint32_t e = first; e < body.element_count(); ++e)
       state.displacement[e] = Vec3(0, 0, gap - apart);
     (contacts.energy(state) > 0 ? touching : free) = gap;

@@ -19,12 +19,12 @@ namespace {
 using std::numbers::pi;
 using ::testing::HasSubstr;
 
-constexpr double kSide = 0.2, kDensity = 100, kMedium = 50, kCoefficient = 1.3, kGravity = 9.81;
+constexpr double kCubeSide = 0.2, kCubeDensity = 100, kMedium = 50, kCoefficient = 1.3, kGravity = 9.81;
 
 Body cube(int cells, const Vec3& origin = Vec3::Zero(), const std::string& name = "box") {
   testing::BoxOptions options;
   options.cells = {cells, cells, cells};
-  options.spacing = Vec3::Constant(kSide / cells);
+  options.spacing = Vec3::Constant(kCubeSide / cells);
   options.origin = origin;
   options.name = name;
   return testing::box_body(options);
@@ -33,11 +33,11 @@ Body cube(int cells, const Vec3& origin = Vec3::Zero(), const std::string& name 
 Body single_voxel() {
   testing::CentreOptions options;
   options.voxels = {1, 1, 1};
-  options.spacing = kSide;
+  options.spacing = kCubeSide;
   return testing::centre_body(options);
 }
 
-Scene scene_for(double time, double density = kDensity) {
+Scene drag_scene(double time, double density = kCubeDensity) {
   Scene scene;
   scene.materials["gum"] = {"gum", 1e6, 0.25, density, "test"};
   scene.material = "gum";
@@ -60,12 +60,12 @@ void throw_at(Body& body, const Vec3& velocity) {
 
 // v = sqrt(2 m g / (rho C A)).
 TEST(Drag, AFallingCubeReachesTheTextbooksSpeedAtAnyResolution) {
-  const double mass = kDensity * kSide * kSide * kSide;
-  const double terminal = std::sqrt(2 * mass * kGravity / (kMedium * kCoefficient * kSide * kSide));
+  const double mass = kCubeDensity * kCubeSide * kCubeSide * kCubeSide;
+  const double terminal = std::sqrt(2 * mass * kGravity / (kMedium * kCoefficient * kCubeSide * kCubeSide));
   for (const int cells : {2, 5}) {
     Body body = cube(cells);
     throw_at(body, Vec3(0, 0, -0.8 * terminal));
-    Scene scene = scene_for(6 * terminal / kGravity);
+    Scene scene = drag_scene(6 * terminal / kGravity);
     scene.get<Gravity>().acceleration = Vec3(0, 0, -kGravity);
     scene.get<Damping>().entries.push_back({1e-4, std::nullopt, ""});
     const TimedCase made = run_timed(std::move(body), scene);
@@ -78,9 +78,9 @@ TEST(Drag, AFallingCubeReachesTheTextbooksSpeedAtAnyResolution) {
 
 // Model `paper` as printed: v = v_t tanh(g t / v_t), v_t = sqrt(m g / (pi r^2 rho)).
 TEST(Drag, AnElementOfModelPaperFallsAsPrinted) {
-  const double mass = kDensity * kSide * kSide * kSide;
-  const double terminal = std::sqrt(mass * kGravity / (pi * kSide * kSide / 4 * kMedium));
-  Scene scene = scene_for(8 * terminal / kGravity);
+  const double mass = kCubeDensity * kCubeSide * kCubeSide * kCubeSide;
+  const double terminal = std::sqrt(mass * kGravity / (pi * kCubeSide * kCubeSide / 4 * kMedium));
+  Scene scene = drag_scene(8 * terminal / kGravity);
   scene.run.step = 1e-3 * terminal / kGravity;
   scene.get<Gravity>().acceleration = Vec3(0, 0, -kGravity);
   const TimedCase made = run_timed(single_voxel(), scene);
@@ -94,7 +94,7 @@ TEST(Drag, AnElementOfModelPaperFallsAsPrinted) {
 
 // Total of the forces on a body that moves as a whole.
 Vec3 force_on(const Body& body, const Vec3& velocity, const Mat3& turn = Mat3::Identity()) {
-  Setting setting{body, std::vector<Material>(body.parts.size(), {"gum", 1e6, 0.25, kDensity, ""}),
+  Setting setting{body, std::vector<Material>(body.parts.size(), {"gum", 1e6, 0.25, kCubeDensity, ""}),
                   std::vector<std::uint8_t>(body.cell_count(), 0)};
   setting.duration = 1;
   const Drag drag = *Drag::make({kMedium, kCoefficient}, setting);
@@ -111,7 +111,7 @@ Vec3 force_on(const Body& body, const Vec3& velocity, const Mat3& turn = Mat3::I
 }
 
 TEST(Drag, TurnsWithTheBodyAndActsOnItsFrontOnly) {
-  const double speed = 3, flat = 0.5 * kMedium * kCoefficient * kSide * kSide * speed * speed;
+  const double speed = 3, flat = 0.5 * kMedium * kCoefficient * kCubeSide * kCubeSide * speed * speed;
   const Body body = cube(3);
   const Vec3 along = force_on(body, Vec3(speed, 0, 0));
   EXPECT_LT((along - Vec3(-flat, 0, 0)).norm(), 1e-12 * flat);
@@ -125,8 +125,8 @@ TEST(Drag, TurnsWithTheBodyAndActsOnItsFrontOnly) {
 
 TEST(Drag, FacesThatTouchAnotherPartAreNotExposed) {
   Body pair = cube(2, Vec3::Zero(), "one");
-  append(pair, cube(3, Vec3(kSide, 0, 0), "two"));
-  const double speed = 3, flat = 0.5 * kMedium * kCoefficient * kSide * kSide * speed * speed;
+  append(pair, cube(3, Vec3(kCubeSide, 0, 0), "two"));
+  const double speed = 3, flat = 0.5 * kMedium * kCoefficient * kCubeSide * kCubeSide * speed * speed;
   EXPECT_NEAR(force_on(pair, Vec3(speed, 0, 0)).x(), -flat, 0.03 * flat);
   EXPECT_NEAR(force_on(pair, Vec3(-speed, 0, 0)).x(), flat, 0.03 * flat);
   EXPECT_NEAR(force_on(pair, Vec3(0, speed, 0)).y(), -2 * flat, 1e-12 * flat);
@@ -135,7 +135,7 @@ TEST(Drag, FacesThatTouchAnotherPartAreNotExposed) {
 TEST(Drag, ALightBodyInADenseMediumIsSlowedNotThrownBack) {
   Body body = cube(2);
   throw_at(body, Vec3(20, 0, 0));
-  Scene scene = scene_for(0.05, 0.01);  // lighter than the medium by 1e7
+  Scene scene = drag_scene(0.05, 0.01);  // lighter than the medium by 1e7
   scene.get<Drag>() = {1e5, 1};
   const TimedCase made = run_timed(body, scene);
   const std::vector<double>& momentum = made.history.column("momentum x");
@@ -152,7 +152,7 @@ TEST(Drag, ALightBodyInADenseMediumIsSlowedNotThrownBack) {
 TEST(Drag, SameBitsForAnyNumberOfThreads) {
   Body body = cube(12);
   throw_at(body, Vec3(5, 4, 3));
-  const Scene scene = scene_for(2e-3);
+  const Scene scene = drag_scene(2e-3);
   SimulateOptions alone, together;
   alone.threads = 1;
   together.threads = 2;
@@ -168,7 +168,7 @@ TEST(Drag, IsReadFromTheSceneAndRefusedAtEquilibrium) {
   EXPECT_THROW((void)parse_scene("[drag]\n", "s"), InputError);
   EXPECT_THROW((void)parse_scene("[drag]\ndensity = \"-1 kg/m3\"\n", "s"), InputError);
   Body body = cube(2);
-  Scene still = scene_for(1);
+  Scene still = drag_scene(1);
   still.run = {};
   Progress progress("test", Progress::Mode::quiet);
   EXPECT_THROW((void)simulate(body, still, {}, progress), InputError);

@@ -18,9 +18,9 @@ using testing::box_body;
 using testing::BoxOptions;
 using ::testing::HasSubstr;
 using testing::refusal;
-using testing::run;
+using testing::simulate_quietly;
 
-BoxOptions small_box() {
+BoxOptions uneven_box() {
   BoxOptions options;
   options.cells = {5, 3, 4};
   options.spacing = Vec3(0.002, 0.0023, 0.0019);
@@ -43,7 +43,7 @@ Selection face(const char* name) {
 // Patch test: pulled evenly on two opposite faces, free to narrow, a turned box of uneven spacing has the
 // exact uniform strain.
 TEST(Equilibrium, UniformStretchIsExact) {
-  BoxOptions options = small_box();
+  BoxOptions options = uneven_box();
   options.axes = Mat3::Identity();
   Body body = box_body(options);
   Scene scene = steel_scene();
@@ -59,7 +59,7 @@ TEST(Equilibrium, UniformStretchIsExact) {
   scene.probes.push_back(probe);
   probe.where = face("x0");
   scene.probes.push_back(probe);
-  const SimulateResult result = run(body, scene);
+  const SimulateResult result = simulate_quietly(body, scene);
   const double strain = (result.probes[0].displacement.x() - result.probes[1].displacement.x()) / 0.01;
   EXPECT_NEAR(strain / (2e6 / 210e9), 1, 1e-4);  // neo-Hookean at a strain of 1e-5
   // Every cell alike: displacement is affine, so the middle of each row lies between its neighbours. The
@@ -74,7 +74,7 @@ TEST(Equilibrium, UniformStretchIsExact) {
 // A box led at both ends by the same rotation turns as a whole: no stress is left.
 TEST(Equilibrium, RigidRotationByMovesIsExact) {
   for (const bool by_surface : {true, false}) {
-    Body body = box_body(small_box());
+    Body body = box_body(uneven_box());
     Scene scene = steel_scene();
     Motion motion;
     motion.axis = Vec3(1, 1, 0).normalized();
@@ -92,7 +92,7 @@ TEST(Equilibrium, RigidRotationByMovesIsExact) {
       tie.motion = motion;
       scene.get<Ties>().ties.push_back(tie);
     }
-    const SimulateResult result = run(body, scene);
+    const SimulateResult result = simulate_quietly(body, scene);
     for (std::size_t e = 0; e < body.element_count(); ++e)
       EXPECT_LT((body.position[e] - body.rest[e] - motion.displacement(body.rest[e], 1)).norm(), 1e-11);
     EXPECT_LT(result.elastic_energy, 1e-12);
@@ -101,11 +101,11 @@ TEST(Equilibrium, RigidRotationByMovesIsExact) {
 }
 
 TEST(Equilibrium, GravityIsCarriedByTheFix) {
-  Body body = box_body(small_box());
+  Body body = box_body(uneven_box());
   Scene scene = steel_scene();
   scene.get<Ties>().ties.push_back(make_fix(face("z0")));
   scene.get<Gravity>().acceleration = Vec3(0, 0, -9.81);
-  const SimulateResult result = run(body, scene);
+  const SimulateResult result = simulate_quietly(body, scene);
   const double mass = 7850 * 60 * 0.002 * 0.0023 * 0.0019;
   EXPECT_NEAR(result.mass, mass, 1e-12 * mass);
   EXPECT_NEAR(result.reactions[0].force.z() / (9.81 * mass), 1, 1e-7);
@@ -121,7 +121,7 @@ TEST(Equilibrium, LargeMoveOfSelectedElementsIsFollowedExactly) {
   end.point = Vec3(0.0599, 0, 0);
   end.normal = Vec3::UnitX();
   scene.get<Ties>().ties.push_back(make_move(end, Vec3(0.03, 0.02, 0)));
-  const SimulateResult result = run(body, scene);
+  const SimulateResult result = simulate_quietly(body, scene);
   for (std::size_t e = 0; e < body.element_count(); ++e)
     if (body.lattice_index[e][0] == 6) {
       EXPECT_LT((body.position[e] - body.rest[e] - Vec3(0.03, 0.02, 0)).norm(), 1e-15);
@@ -188,7 +188,7 @@ TEST(Equilibrium, CrumbsAreCarriedAndLargePiecesRefused) {
   start.normal = -Vec3::UnitX();
   scene.get<Ties>().ties.push_back(make_fix(start));
   scene.get<Gravity>().acceleration = Vec3(0, 0, -9.81);
-  const SimulateResult result = run(body, scene);
+  const SimulateResult result = simulate_quietly(body, scene);
   EXPECT_EQ(result.stray_cells, 1u);
   double crumb = 0, tip = 0;
   for (std::size_t e = 0; e < body.element_count(); ++e) {
@@ -215,7 +215,7 @@ TEST(Equilibrium, MirroredCellDiverges) {
   end.normal = Vec3::UnitX();
   scene.get<Ties>().ties.push_back(make_move(end, Vec3(-2, 0, 0)));
   try {
-    (void)run(body, scene);
+    (void)simulate_quietly(body, scene);
     FAIL() << "a mirrored cell has no equilibrium";
   } catch (const DivergedError& error) {
     EXPECT_THAT(error.what(), HasSubstr("% of the load"));

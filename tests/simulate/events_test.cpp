@@ -18,9 +18,10 @@ using testing::expect_books_close;
 using ::testing::HasSubstr;
 using testing::random_displacements;
 using testing::run_timed;
+using testing::set_velocity;
 using testing::TimedCase;
 
-Body bar(std::array<int, 3> cells = {8, 2, 2}) {
+Body bar_of_cells(std::array<int, 3> cells = {8, 2, 2}) {
   BoxOptions options;
   options.cells = cells;
   options.spacing = Vec3::Constant(1e-2);
@@ -28,7 +29,7 @@ Body bar(std::array<int, 3> cells = {8, 2, 2}) {
   return box_body(options);
 }
 
-Scene scene_of(const std::string& rest) {
+Scene gum_scene_with(const std::string& rest) {
   return parse_scene(
       "material = \"gum\"\n[materials.gum]\nyoung = \"1 MPa\"\npoisson = 0.3\ndensity = \"1000 kg/m3\"\n" +
           rest,
@@ -39,15 +40,9 @@ std::string event(const std::string& at, const std::string& keys) {
   return "[[event]]\nat = \"" + at + "\"\n" + keys + "\n";
 }
 
-void set_velocity(Body& body, const std::vector<Vec3>& velocity) {
-  Column column{3, {}};
-  for (const Vec3& v : velocity) column.values.insert(column.values.end(), v.begin(), v.end());
-  body.element_columns["velocity"] = column;
-}
-
 // Thrown, spinning, with waves running in it.
 Body lively_bar() {
-  Body body = bar();
+  Body body = bar_of_cells();
   std::vector<Vec3> velocity;
   for (std::size_t e = 0; e < body.element_count(); ++e) {
     velocity.push_back(Vec3(1, 0.5, 0) + Vec3(0, 0, 20).cross(body.rest[e]));
@@ -72,28 +67,29 @@ Rows at_event(const Csv& history) {
 
 TEST(Events, RenormalisedBodyRestsAsItIs) {
   for (const char* model : {"cells", "springs"}) {
-    Body body = bar();
+    Body body = bar_of_cells();
     const std::vector<Vec3> bent = random_displacements(body, 2e-3, 1);
     for (std::size_t e = 0; e < bent.size(); ++e) body.position[e] += bent[e];
     const std::vector<Vec3> before = body.position;
-    const TimedCase made = run_timed(
-        std::move(body), scene_of(std::string("[parts.bar]\nmodel = \"") + model +
-                                  "\"\n[run]\ntime = \"20 ms\"\n" + event("0 s", "do = \"renormalise\"")));
+    const TimedCase made = run_timed(std::move(body), gum_scene_with(std::string("[parts.bar]\nmodel = \"") +
+                                                                     model + "\"\n[run]\ntime = \"20 ms\"\n" +
+                                                                     event("0 s", "do = \"renormalise\"")));
     for (std::size_t e = 0; e < before.size(); ++e)
       EXPECT_LT((made.body.position[e] - before[e]).norm(), 1e-13) << model;
     EXPECT_TRUE(
         made.body.cell_columns.contains(model == std::string("cells") ? "rest_volume" : "spring_flow"));
     // a run from the file goes on from there, with no word of plasticity or events
-    const TimedCase next = run_timed(
-        made.body, scene_of(std::string("[parts.bar]\nmodel = \"") + model + "\"\n[run]\ntime = \"5 ms\"\n"));
+    const TimedCase next = run_timed(made.body, gum_scene_with(std::string("[parts.bar]\nmodel = \"") +
+                                                               model + "\"\n[run]\ntime = \"5 ms\"\n"));
     for (std::size_t e = 0; e < before.size(); ++e)
       EXPECT_LT((next.body.position[e] - before[e]).norm(), 1e-13) << model;
   }
 }
 
 TEST(Events, RenormalisingKeepsMomentaAndBooks) {
-  const TimedCase made = run_timed(lively_bar(), scene_of("[run]\ntime = \"20 ms\"\nstep = \"50 us\"\n" +
-                                                          event("10 ms", "do = \"renormalise\"")));
+  const TimedCase made = run_timed(
+      lively_bar(),
+      gum_scene_with("[run]\ntime = \"20 ms\"\nstep = \"50 us\"\n" + event("10 ms", "do = \"renormalise\"")));
   testing::expect_momenta_kept(made.history, 1e-9);
   expect_books_close(made.result);
   const auto [before, after] = at_event(made.history);
@@ -109,14 +105,14 @@ TEST(Events, RenormalisingKeepsMomentaAndBooks) {
 TEST(Events, EditOfMassAndStiffnessChangesTheFrequency) {
   // Length changes of a held bar: omega ~ sqrt(E / rho).
   const auto period = [](const std::string& events) {
-    Body body = bar({8, 1, 1});
+    Body body = bar_of_cells({8, 1, 1});
     std::vector<Vec3> velocity;
     for (const Vec3& at : body.rest) velocity.emplace_back(1e-3 * std::sin(0.5 * M_PI * at.x() / 0.08), 0, 0);
     set_velocity(body, velocity);
     const TimedCase made = run_timed(
-        std::move(body), scene_of("[[fix]]\nwhere = \"x0\"\n[[probe]]\nname = \"end\"\nwhere = \"x1\"\n"
-                                  "[run]\ntime = \"100 ms\"\nhistory_every = \"50 us\"\n" +
-                                  events));
+        std::move(body), gum_scene_with("[[fix]]\nwhere = \"x0\"\n[[probe]]\nname = \"end\"\nwhere = \"x1\"\n"
+                                        "[run]\ntime = \"100 ms\"\nhistory_every = \"50 us\"\n" +
+                                        events));
     expect_books_close(made.result);
     const std::vector<double>& time = made.history.column("time");
     const std::vector<double>& x = made.history.column("end x");
@@ -141,9 +137,9 @@ TEST(Events, EditOfDampingIsAnotherDamping) {
     for (const double tau : {20e-6, 5e-3}) {
       const auto swung = [&](double time, const std::string& events) {
         return run_timed(lively_bar(),
-                         scene_of("[parts.bar]\nmodel = \"" + std::string(model) +
-                                  "\"\n[damping]\ntime = \"" + std::to_string(1e6 * time) +
-                                  " us\"\n[run]\nstep = \"20 us\"\ntime = \"4 ms\"\n" + events));
+                         gum_scene_with("[parts.bar]\nmodel = \"" + std::string(model) +
+                                        "\"\n[damping]\ntime = \"" + std::to_string(1e6 * time) +
+                                        " us\"\n[run]\nstep = \"20 us\"\ntime = \"4 ms\"\n" + events));
       };
       const TimedCase edited = swung(tau, event("0 s", "do = \"edit\"\ndamping = 2"));
       const TimedCase other = swung(2 * tau, "");
@@ -158,24 +154,25 @@ TEST(Events, EditOfDampingIsAnotherDamping) {
 
 // Steps become ten times as short: the new forces act from the event on, not for half of the step before it.
 TEST(Events, EditThatShortensTheStepClosesItsBooks) {
-  Body body = bar();  // stretched in its first mode, and let go
+  Body body = bar_of_cells();  // stretched in its first mode, and let go
   for (Vec3& at : body.position) at.x() -= 4e-4 * std::cos(M_PI * at.x() / 0.08);
   const TimedCase made =
       run_timed(std::move(body),
-                scene_of("[run]\ntime = \"4 ms\"\n" + event("2 ms", "do = \"edit\"\nstiffness = 100")));
+                gum_scene_with("[run]\ntime = \"4 ms\"\n" + event("2 ms", "do = \"edit\"\nstiffness = 100")));
   expect_books_close(made.result);
   EXPECT_GT(made.history.column("events work").back(), 0.1);  // J
 }
 
 TEST(Events, EditOfMassKeepsVelocities) {
-  Body body = bar();
+  Body body = bar_of_cells();
   set_velocity(body, std::vector<Vec3>(body.element_count(), Vec3(2, 0, 0)));
-  const TimedCase made = run_timed(
-      std::move(body), scene_of("[run]\ntime = \"10 ms\"\n" +
-                                event("5 ms",
-                                      "do = \"edit\"\ndensity = 3\nwhere = { box = { min = [\"39 mm\", "
-                                      "\"-9 mm\", \"-9 mm\"], max = [\"99 mm\", \"99 mm\", \"99 mm\"] } }\n"
-                                      "positions = \"rest\"")));
+  const TimedCase made =
+      run_timed(std::move(body),
+                gum_scene_with("[run]\ntime = \"10 ms\"\n" +
+                               event("5 ms",
+                                     "do = \"edit\"\ndensity = 3\nwhere = { box = { min = [\"39 mm\", "
+                                     "\"-9 mm\", \"-9 mm\"], max = [\"99 mm\", \"99 mm\", \"99 mm\"] } }\n"
+                                     "positions = \"rest\"")));
   const auto [before, after] = at_event(made.history);
   const double kinetic = made.history.column("kinetic")[before];
   EXPECT_NEAR(kinetic, 0.5 * 32e-6 * 1000 * 4, 1e-9);
@@ -189,10 +186,11 @@ TEST(Events, EditOfMassKeepsVelocities) {
 TEST(Events, CarvedHalfLeavesHalf) {
   const TimedCase made = run_timed(
       lively_bar(),
-      scene_of("[run]\ntime = \"20 ms\"\nstep = \"50 us\"\n" +
-               event("10 ms",
-                     "do = \"carve\"\npositions = \"rest\"\nwhere = { half_space = { point = [\"40 mm\", "
-                     "0, 0], normal = [1, 0, 0] } }")));
+      gum_scene_with(
+          "[run]\ntime = \"20 ms\"\nstep = \"50 us\"\n" +
+          event("10 ms",
+                "do = \"carve\"\npositions = \"rest\"\nwhere = { half_space = { point = [\"40 mm\", "
+                "0, 0], normal = [1, 0, 0] } }")));
   EXPECT_NEAR(made.result.mass, 0.016, 1e-12);
   EXPECT_EQ(made.body.cell_count(), 16u);
   EXPECT_EQ(made.body.element_count(), 45u);
@@ -214,10 +212,11 @@ TEST(Events, CarvedHalfLeavesHalf) {
 
 TEST(Events, CarvingEverythingIsRefused) {
   try {
-    (void)run_timed(bar(), scene_of("[run]\ntime = \"2 ms\"\n" +
-                                    event("1 ms",
-                                          "do = \"carve\"\nwhere = { sphere = { centre = [\"0 mm\", 0, 0], "
-                                          "radius = \"1 m\" } }")));
+    (void)run_timed(bar_of_cells(),
+                    gum_scene_with("[run]\ntime = \"2 ms\"\n" +
+                                   event("1 ms",
+                                         "do = \"carve\"\nwhere = { sphere = { centre = [\"0 mm\", 0, 0], "
+                                         "radius = \"1 m\" } }")));
     FAIL() << "accepted";
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), HasSubstr("leaves nothing of part \"bar\""));
@@ -239,7 +238,7 @@ TEST(Events, FusedBlocksFlyAsOne) {
   const std::string add = event("0 s", "do = \"add\"\nbody = \"" + path + "\"");
   const std::string run = "[run]\ntime = \"100 ms\"\n";
   const TimedCase made =
-      run_timed(body, scene_of(run + add + event("0 s", "do = \"fuse\"\nwithin = \"0.2 mm\"")));
+      run_timed(body, gum_scene_with(run + add + event("0 s", "do = \"fuse\"\nwithin = \"0.2 mm\"")));
   expect_books_close(made.result);
   const auto mean = [](const TimedCase& of, std::uint32_t part) {
     Vec3 sum = Vec3::Zero();
@@ -251,10 +250,11 @@ TEST(Events, FusedBlocksFlyAsOne) {
   ASSERT_EQ(made.body.parts.size(), 2u);
   EXPECT_NEAR(mean(made, 1).x(), 0.01 * 0.1, 2e-4) << "drawn along at half of the speed";
   testing::expect_momenta_kept(made.history, 1e-9);
-  const TimedCase apart = run_timed(body, scene_of(run + add));
+  const TimedCase apart = run_timed(body, gum_scene_with(run + add));
   EXPECT_EQ(mean(apart, 1).norm(), 0);
-  EXPECT_THROW((void)run_timed(body, scene_of(run + add + event("0 s", "do = \"fuse\"\nwithin = \"1 um\""))),
-               InputError);
+  EXPECT_THROW(
+      (void)run_timed(body, gum_scene_with(run + add + event("0 s", "do = \"fuse\"\nwithin = \"1 um\""))),
+      InputError);
 }
 
 TEST(Events, AddedBodyFallsLikeTheOthers) {
@@ -266,10 +266,11 @@ TEST(Events, AddedBodyFallsLikeTheOthers) {
   const std::string path = ::testing::TempDir() + "late.vtu";
   write_body(box_body(options), path);
   const TimedCase made = run_timed(
-      bar(), scene_of("[gravity]\nacceleration = [0, 0, \"-9.81 m/s2\"]\n[run]\ntime = \"100 ms\"\n" +
-                      event("50 ms", "do = \"add\"\nbody = \"" + path +
-                                         "\"\nvelocity = [\"0 m/s\", \"1 m/s\", \"0 "
-                                         "m/s\"]")));
+      bar_of_cells(),
+      gum_scene_with("[gravity]\nacceleration = [0, 0, \"-9.81 m/s2\"]\n[run]\ntime = \"100 ms\"\n" +
+                     event("50 ms", "do = \"add\"\nbody = \"" + path +
+                                        "\"\nvelocity = [\"0 m/s\", \"1 m/s\", \"0 "
+                                        "m/s\"]")));
   ASSERT_EQ(made.body.parts.size(), 2u);
   const std::vector<double>& v = made.body.element_columns.at("velocity").values;
   const std::size_t first = made.body.parts[1].element_begin;
@@ -281,7 +282,7 @@ TEST(Events, AddedBodyFallsLikeTheOthers) {
 }
 
 TEST(Events, BrokenCellsAreHealedWhereTheyAreWhole) {
-  Body body = bar();
+  Body body = bar_of_cells();
   for (std::uint32_t c = 0; c < body.cell_count(); ++c)
     body.broken[c] = body.lattice_index[body.cell_elements[c][0]][0] == 4;
   derive_connections(body);
@@ -290,7 +291,7 @@ TEST(Events, BrokenCellsAreHealedWhereTheyAreWhole) {
       "[\"10 "
       "mm/s\", 0, 0]\n[run]\ntime = \"50 ms\"\n";
   const auto stretch = [&](const std::string& events) {
-    const TimedCase made = run_timed(body, scene_of(pull + events));
+    const TimedCase made = run_timed(body, gum_scene_with(pull + events));
     double low = 0, high = 0;
     for (std::size_t e = 0; e < made.body.element_count(); ++e) {
       const double u = (made.body.position[e] - made.body.rest[e]).x();
@@ -305,7 +306,7 @@ TEST(Events, BrokenCellsAreHealedWhereTheyAreWhole) {
 TEST(Events, WrongEntriesAreRefused) {
   const auto message = [](const std::string& text) -> std::string {
     try {
-      (void)scene_of(text);
+      (void)gum_scene_with(text);
     } catch (const InputError& error) {
       return error.what();
     }

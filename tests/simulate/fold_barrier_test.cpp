@@ -15,26 +15,26 @@
 namespace flexel {
 namespace {
 
+using testing::kCauchyGum;
 using Matrix24 = Eigen::Matrix<double, 24, 24>;
 
-const Material kGum{"gum", 1e6, 0.25, 1000, "test"};
-constexpr double kSpacing = 0.01;
+constexpr double kFoldSpacing = 0.01;
 
 CellKind gum_cell() {
   Lattice lattice;
   lattice.axes = Eigen::AngleAxisd(0.7, Vec3(1, -2, 0.5).normalized()).toRotationMatrix();
-  lattice.spacing = kSpacing * Vec3(1, 1.1, 0.9);
-  return cell_kind(lattice, kGum);
+  lattice.spacing = kFoldSpacing * Vec3(1, 1.1, 0.9);
+  return cell_kind(lattice, kCauchyGum);
 }
 
 // Corner 0 is pushed so far towards its opposite one that J_0 is `volume`, the others a little at random,
 // and the whole is turned.
 CellVectors pushed(const CellKind& kind, double volume, unsigned seed) {
   std::mt19937 random(seed);
-  std::uniform_real_distribution<double> any(-0.02 * kSpacing, 0.02 * kSpacing);
+  std::uniform_real_distribution<double> any(-0.02 * kFoldSpacing, 0.02 * kFoldSpacing);
   CellVectors still;
   for (Vec3& u : still) u = Vec3(any(random), any(random), any(random));
-  const Vec3 way = kSpacing * kind.gradient[7].normalized();
+  const Vec3 way = kFoldSpacing * kind.gradient[7].normalized();
   CellVectors u;
   double low = 0, high = 2;
   for (int i = 0; i < 80; ++i) {
@@ -58,7 +58,7 @@ TEST_P(FoldBarrier, ForcesAndTangentAreDerivatives) {
     add_fold_forces(kind, kPlain, u, force);
     const auto tangent = fold_tangent(kind, kPlain, u, false);
     ASSERT_TRUE(tangent.has_value());
-    const double step = 1e-6 * kSpacing;
+    const double step = 1e-6 * kFoldSpacing;
     double most_force = 0, most_stiffness = 0;
     for (const Vec3& f : force) most_force = std::max(most_force, f.norm());
     for (const Block& block : *tangent) most_stiffness = std::max(most_stiffness, block.norm());
@@ -170,7 +170,7 @@ TEST(FoldBarrier, ARestShapeHasItsOwnThreshold) {
 // Two layers of cells are pressed to a tenth: nothing folds, and what they were given comes back.
 TEST(FoldBarrier, CrushedCellsKeepTheirCornersAndTheBooks) {
   Scene scene;
-  scene.materials["gum"] = kGum;
+  scene.materials["gum"] = kCauchyGum;
   scene.material = "gum";
   scene.run.time = 0.06;
   scene.get<Ties>().ties.push_back(make_fix(select_by_name("z0")));
@@ -178,15 +178,15 @@ TEST(FoldBarrier, CrushedCellsKeepTheirCornersAndTheBooks) {
   press.course = {{0, 0.03, 0.06}, {0, 1, 0}};
   scene.get<Ties>().ties.push_back(press);
   scene.get<Damping>().entries.push_back({5e-4, {}, ""});
-  const testing::TimedCase made = testing::run_timed(testing::box_of({2, 2, 2}, kSpacing), scene);
+  const testing::TimedCase made = testing::run_timed(testing::box_of({2, 2, 2}, kFoldSpacing), scene);
   testing::expect_books_close(made.result);
   for (std::size_t e = 0; e < made.body.element_count(); ++e)
-    EXPECT_LT((made.body.position[e] - made.body.rest[e]).norm(), 1e-3 * kSpacing);
+    EXPECT_LT((made.body.position[e] - made.body.rest[e]).norm(), 1e-3 * kFoldSpacing);
 }
 
 TEST(FoldGuard, WatchesWhatMayFoldOnly) {
-  const Body body = testing::box_of({3, 3, 3}, kSpacing);
-  const Setting setting = testing::setting_of(body, kGum);
+  const Body body = testing::box_of({3, 3, 3}, kFoldSpacing);
+  const Setting setting = testing::setting_of(body, kCauchyGum);
   FoldGuard guard(setting);
   EXPECT_TRUE(guard.hurried());  // it has not looked yet
   State state = testing::at_rest(body);

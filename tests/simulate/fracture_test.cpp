@@ -30,14 +30,14 @@ using testing::setting_of;
 const Material kGlass{"glass", 1e9, 0.25, 1000, "test"};
 constexpr double kStrength = 5e6;
 
-StepPlan plan_with(double strength, double damping = 0) {
+StepPlan fracture_plan(double strength, double damping = 0) {
   FractureLimits limits;
   limits.strength = strength;
   return {{damping}, {}, {limits}};
 }
 
 // A bar of 2 x 2 x 8 mm that is pulled ever harder; its wave runs through it and back in 16 us.
-const char* const kBar = R"(
+const char* const kTornBar = R"(
 material = "glass"
 [materials.glass]
 young = "1 GPa"
@@ -72,7 +72,7 @@ struct Broke {
 };
 
 // When the books first tell of energy released by fracture.
-Broke run(Body& body, const Scene& scene) {
+Broke run_to_fracture(Body& body, const Scene& scene) {
   SimulateOptions options;
   options.history = ::testing::TempDir() + "fracture.csv";
   Progress progress("test", Progress::Mode::quiet);
@@ -98,7 +98,7 @@ Broke run(Body& body, const Scene& scene) {
 
 TEST(Fracture, BarPartsAtItsStrength) {
   Body body = box_of({8, 2, 2});
-  const Broke broke = run(body, parse_scene(kBar, "bar.toml"));
+  const Broke broke = run_to_fracture(body, parse_scene(kTornBar, "bar.toml"));
   // 22 N / 3.6 ms over 4 mm2 at rest, drawn in by Poisson's effect
   const double strain = kStrength / kGlass.young, area = 4e-6 * std::pow(1 - kGlass.poisson * strain, 2);
   const double stress = 22 * broke.time / 3.6e-3 / area;
@@ -114,10 +114,10 @@ TEST(Fracture, NotchPartsAndTheRestFliesOff) {
   options.spacing = Vec3::Constant(1e-3);
   options.fill = [](int i, int j, int) { return i == 4 && j != 1 ? 0.0 : 1.0; };
   Body body = box_body(options);
-  Scene scene = parse_scene(kBar, "bar.toml");
+  Scene scene = parse_scene(kTornBar, "bar.toml");
   scene.get<Loads>().loads[0].force = Vec3(20, 0, 0);
   scene.run.time = 1.7e-3;
-  const Broke broke = run(body, scene);
+  const Broke broke = run_to_fracture(body, scene);
   EXPECT_GT(broke.time, 0.5e-3);
   EXPECT_LT(broke.worst, 1e-3);
   // no way through any more
@@ -143,7 +143,7 @@ elongation = 0.02
 )";
 
 TEST(Fracture, DuctileBarPartsAtItsElongation) {
-  std::string text = kBar;
+  std::string text = kTornBar;
   text.replace(text.find("strength = \"5 MPa\"\n"), 19, kDuctile);
   const std::size_t load = text.find("[[load]]"), end = text.find("[run]");
   text.replace(load, end - load,
@@ -151,7 +151,7 @@ TEST(Fracture, DuctileBarPartsAtItsElongation) {
                "time = [\"0 s\", \"4 ms\"]\nfactor = [0, 1]\n");
   text.replace(text.find("3.35 ms"), 7, "2.2 ms");
   Body body = box_of({8, 2, 2});
-  const Broke broke = run(body, parse_scene(text, "bar.toml"));
+  const Broke broke = run_to_fracture(body, parse_scene(text, "bar.toml"));
   const double strain = std::log1p(0.4 * broke.time / 4e-3 / 8);
   const double exact = 0.02 + (2e6 + 100e6 * 0.02) / kGlass.young;
   EXPECT_NEAR(strain, exact, 0.01 * exact);
@@ -176,7 +176,7 @@ TEST(Fracture, BreaksByTheLargestPrincipalStress) {
     const double largest = Eigen::SelfAdjointEigenSolver<Mat3>(cauchy).eigenvalues()[2];
     for (const double share : {1 - 1e-9, 1 + 1e-9}) {
       if (!(largest > 0)) continue;
-      Stepper stepper(setting, plan_with(share * largest), false);
+      Stepper stepper(setting, fracture_plan(share * largest), false);
       (void)forces_of(stepper, state);
       std::vector<std::uint8_t> broken(1, 0);
       EXPECT_EQ(stepper.mark_broken(broken), share < 1) << seed;
@@ -189,11 +189,11 @@ TEST(Fracture, BreaksByTheLargestPrincipalStress) {
 // Model springs: a bar parts where its springs along it have reached t = l (1 + strength / E).
 TEST(Fracture, SpringsPartAtTheirLength) {
   for (const char* limit : {"strength = \"5 MPa\"", "elongation = 0.005"}) {
-    std::string text = kBar;
+    std::string text = kTornBar;
     text.replace(text.find("strength = \"5 MPa\""), 18, limit);
     text += "[parts.box]\nmodel = \"springs\"\n";
     Body body = box_of({8, 2, 2});
-    const Broke broke = run(body, parse_scene(text, "bar.toml"));
+    const Broke broke = run_to_fracture(body, parse_scene(text, "bar.toml"));
     const double stress = 22 * broke.time / 3.6e-3 / 4e-6;
     EXPECT_NEAR(stress, kStrength, 0.01 * kStrength) << limit;
     EXPECT_LT(broke.worst, 1e-3);
@@ -210,7 +210,7 @@ Outcome burst(const Body& body, double strength, const std::string& isa, int thr
               Model model = Model::cells) {
   const ThreadLimit limit(threads);
   const Setting setting = setting_of(body, kGlass, model);
-  StepPlan plan = plan_with(strength, 2e-7);
+  StepPlan plan = fracture_plan(strength, 2e-7);
   if (model == Model::springs) plan.fracture[0] = {plan.fracture[0].elongation, strength / kGlass.young};
   Stepper stepper(setting, std::isfinite(strength) ? plan : StepPlan{plan.damping}, book, isa);
   const double dt = 0.5 * stable_step(setting, plan.damping);
@@ -268,7 +268,7 @@ TEST(Fracture, BitsOfSpringsDoNotDependOnThreadsInstructionsOrBooks) {
 TEST(Fracture, DebrisKeepsMomentum) {
   const Body body = box_of({5, 4, 4});
   const Setting setting = setting_of(body, kGlass);
-  const StepPlan plan = plan_with(kStrength, 1e-7);
+  const StepPlan plan = fracture_plan(kStrength, 1e-7);
   Stepper stepper(setting, plan, false);
   const double dt = 0.5 * stable_step(setting, plan.damping);
   State state = at_rest(body);

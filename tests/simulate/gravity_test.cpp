@@ -109,7 +109,7 @@ Body pieces_of_gum() {  // two blocks of 8 kg, 0.4 m apart
   return testing::box_body(options);
 }
 
-Scene scene_for(double time, double constant) {
+Scene gravity_scene(double time, double constant) {
   Scene scene;
   scene.materials["gum"] = {"gum", 1e5, 0.25, 1000, "test"};
   scene.material = "gum";
@@ -121,21 +121,15 @@ Scene scene_for(double time, double constant) {
 
 using testing::expect_books_close;
 using testing::run_timed;
+using testing::set_velocity;
 using testing::TimedCase;
-
-void set_velocity(Body& body, const std::vector<Vec3>& velocity) {
-  Column column;
-  column.components = 3;
-  for (const Vec3& v : velocity) column.values.insert(column.values.end(), v.begin(), v.end());
-  body.element_columns["velocity"] = column;
-}
 
 // Two masses m at distance d circle with omega^2 = 2 G m / d^3.
 TEST(MutualGravity, TwoElementsCircleAHundredTimes) {
   Body body = voxels({0, 10});
   const double constant = 0.7, omega = std::sqrt(2 * constant), period = 2 * pi / omega;
   set_velocity(body, {Vec3(0, -omega / 2, 0), Vec3(0, omega / 2, 0)});
-  Scene scene = scene_for(100 * period, constant);
+  Scene scene = gravity_scene(100 * period, constant);
   scene.get<Gravity>().mutual = true;
   Probe probe;
   probe.name = "second";
@@ -159,7 +153,7 @@ TEST(SourceGravity, AnElementFollowsKeplersEllipse) {
   const double constant = 2, mass = 3, e = 0.4, far = 1.4, a = far / (1 + e);
   const double period = 2 * pi * std::sqrt(a * a * a / (constant * mass));
   set_velocity(body, {Vec3(0, std::sqrt(constant * mass * (1 - e) / far), 0)});
-  Scene scene = scene_for(5 * period, constant);
+  Scene scene = gravity_scene(5 * period, constant);
   scene.get<Gravity>().sources = {{body.rest[0] - Vec3(far, 0, 0), mass}};
   scene.run.step = period / 2000;
   Probe probe;
@@ -178,7 +172,7 @@ TEST(SourceGravity, AnElementFollowsKeplersEllipse) {
 
 TEST(SourceGravity, OfTheEarthIsItsWeight) {
   const Body body = pieces_of_gum();
-  Scene scene = scene_for(1e-3, Gravity::kNewton);
+  Scene scene = gravity_scene(1e-3, Gravity::kNewton);
   scene.get<Gravity>().sources = {{Vec3(0, 0, -6371e3), 5.9722e24}};
   const TimedCase made = run_timed(body, scene);
   const double weight = made.result.mass * 6.6743e-11 * 5.9722e24 / (6371e3 * 6371e3);
@@ -189,7 +183,7 @@ TEST(SourceGravity, OfTheEarthIsItsWeight) {
 
 // Both blocks fall towards each other; in between them nothing moves.
 TEST(MutualGravity, BlocksMeetHalfwayWithoutMomentum) {
-  Scene scene = scene_for(0.5, 0.02);
+  Scene scene = gravity_scene(0.5, 0.02);
   scene.get<Gravity>().mutual = true;
   const TimedCase made = run_timed(pieces_of_gum(), scene);
   const double start = made.body.rest.back().x(), fallen = start - made.body.position.back().x();
@@ -208,7 +202,7 @@ TEST(MutualGravity, LargeBlocksFallByTheTree) {
   options.cells = {30, 10, 10};
   options.spacing = Vec3::Constant(0.1);
   options.fill = [](int i, int, int) { return i < 10 || i >= 20 ? 1.0 : 0.0; };
-  Scene scene = scene_for(0.4, 0.004);
+  Scene scene = gravity_scene(0.4, 0.004);
   scene.get<Gravity>().mutual = true;
   const TimedCase made = run_timed(testing::box_body(options), scene);
   ASSERT_GT(made.body.element_count(), 2000u);
@@ -226,7 +220,7 @@ TEST(MutualGravity, LargeBlocksFallByTheTree) {
 }
 
 TEST(MutualGravity, SameBitsForAnyNumberOfThreads) {
-  Scene scene = scene_for(0.1, 0.02);
+  Scene scene = gravity_scene(0.1, 0.02);
   scene.get<Gravity>().mutual = true;
   scene.get<Gravity>().sources = {{Vec3(1, 2, 3), 50}};
   SimulateOptions alone, together;
@@ -276,7 +270,7 @@ TEST(GravityScene, RefusesWhatItCannotUse) {
   EXPECT_THAT(message("[gravity]\nsource = { at = [0, 0, 0], mass = \"-1 kg\" }\n"), HasSubstr("above 0"));
   EXPECT_THAT(message("[gravity]\nsource = { at = [0, 0, 0] }\n"), HasSubstr("needs \"mass\""));
   Body body = pieces_of_gum();
-  Scene scene = scene_for(1, 1);
+  Scene scene = gravity_scene(1, 1);
   scene.run = {};
   scene.get<Gravity>().mutual = true;
   Progress progress("test", Progress::Mode::quiet);

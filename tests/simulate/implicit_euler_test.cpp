@@ -19,6 +19,8 @@ namespace {
 using std::numbers::pi;
 using testing::box_body;
 using testing::BoxOptions;
+using testing::kCauchyGum;
+using testing::small_box;
 using testing::TimedCase;
 
 // Sheared, squeezed, turned cells of partial fill on a turned lattice: C v is what the kernel brakes with.
@@ -66,14 +68,6 @@ Scene implicit_scene(const Material& material, double time, double step) {
 }
 
 const Material kSteel{"steel", 210e9, 0.3, 7850, "test"};
-const Material kGum{"gum", 1e6, 0.25, 1000, "test"};
-
-Body small_box() {
-  BoxOptions options;
-  options.cells = {3, 2, 2};
-  options.spacing = Vec3::Constant(0.01);
-  return box_body(options);
-}
 
 // A column of one cell, nu = 0, its top displaced and let go: implicit Euler of an oscillator of frequency
 // omega and damping ratio zeta is known exactly.
@@ -126,7 +120,7 @@ TEST(ImplicitEuler, OscillatorIsOfFirstOrder) {
 
 TEST(ImplicitEuler, FreeFallIsOfFirstOrder) {
   // exactly dt^2 g n (n + 1) / 2
-  Scene scene = implicit_scene(kGum, 0.2, 0.02);
+  Scene scene = implicit_scene(kCauchyGum, 0.2, 0.02);
   scene.get<Gravity>().acceleration = Vec3(1, -2, -9.81);
   scene.get<Damping>().entries.push_back({1e-3, {}, ""});
   const TimedCase made = testing::run_timed(small_box(), scene);
@@ -148,7 +142,7 @@ TEST(ImplicitEuler, MomentaOfAThrownBody) {
     start.velocity = Vec3(1, 0.5, -2);
     start.spin = Vec3(20, 10, 30);
     start.through = Vec3(0.015, 0.01, 0.01);
-    Scene scene = implicit_scene(kGum, 0.005, step);
+    Scene scene = implicit_scene(kCauchyGum, 0.005, step);
     scene.parts["box"].model = model == Model::springs ? "springs" : "cells";
     scene.get<InitialVelocity>() = {{start}};
     scene.get<Damping>().entries.push_back({1e-3, {}, ""});
@@ -233,7 +227,7 @@ TEST(ImplicitEuler, DragIsTakenAtTheEndOfTheStep) {
 
 // Newton's iterations of all stretches of a run are told, and what acts in several of them is told once.
 TEST(ImplicitEuler, EffortIsThatOfAllActs) {
-  Scene scene = implicit_scene(kGum, 0.04, 0.002);
+  Scene scene = implicit_scene(kCauchyGum, 0.04, 0.002);
   scene.get<Ties>().ties.push_back(make_fix(select_by_name("x0")));
   scene.get<Gravity>().acceleration = Vec3(0, 0, -9.81);
   const TimedCase whole = testing::run_timed(small_box(), scene);
@@ -251,7 +245,7 @@ TEST(ImplicitEuler, SameBitsForAnyNumberOfThreads) {
   options.cells = {16, 8, 8};
   options.spacing = Vec3::Constant(0.01);
   const auto positions = [&](int threads) {
-    Scene scene = implicit_scene(kGum, 0.02, 0.005);
+    Scene scene = implicit_scene(kCauchyGum, 0.02, 0.005);
     scene.get<Ties>().ties.push_back(make_fix(select_by_name("x0")));
     scene.get<Gravity>().acceleration = Vec3(0, 0, -9.81);
     scene.get<Damping>().entries.push_back({1e-3, {}, ""});
@@ -263,7 +257,7 @@ TEST(ImplicitEuler, SameBitsForAnyNumberOfThreads) {
 }
 
 TEST(ImplicitEuler, RefusesWhatItDoesNotTake) {
-  Scene scene = implicit_scene(kGum, 0.01, 1e-3);
+  Scene scene = implicit_scene(kCauchyGum, 0.01, 1e-3);
   scene.get<Plasticity>().entries.emplace_back();
   scene.materials["gum"].yield = 1e4;
   Body body = small_box();
@@ -293,7 +287,7 @@ TEST(ImplicitEuler, MatterThrownThroughItselfEndsTheRun) {
 }
 
 TEST(ImplicitEuler, TellsWhereItEnds) {
-  Scene scene = implicit_scene(kGum, 0.01, 1e-3);
+  Scene scene = implicit_scene(kCauchyGum, 0.01, 1e-3);
   scene.get<Ties>().ties.push_back(make_fix(select_by_name("x0")));
   Tie squeeze = make_move(select_by_name("x1"), Vec3(-0.05, 0, 0));
   scene.get<Ties>().ties.push_back(squeeze);

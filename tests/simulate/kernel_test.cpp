@@ -18,7 +18,7 @@ using testing::largest;
 using testing::largest_difference;
 using testing::shaken;
 
-const Material kGum{"gum", 12.1e5, 0.3, 580, "test"};
+const Material kKernelGum{"gum", 12.1e5, 0.3, 580, "test"};
 
 // Turned, partly filled, with holes: several chunks, rows of every length.
 Body rough_body(const std::array<int, 3>& cells, const Vec3& spacing) {
@@ -33,14 +33,14 @@ Body rough_body(const std::array<int, 3>& cells, const Vec3& spacing) {
   return box_body(options);
 }
 
-Setting setting_of(const Body& body, Model model) {
-  return testing::setting_of(body, kGum, model);
+Setting kernel_setting(const Body& body, Model model) {
+  return testing::setting_of(body, kKernelGum, model);
 }
 
-std::vector<Vec3> brute_force(const Setting& setting, const State& state) {
+std::vector<Vec3> cell_by_cell(const Setting& setting, const State& state) {
   const Body& body = setting.body;
-  const CellKind cells = cell_kind(body.parts[0].lattice, kGum);
-  const SpringKind springs = spring_kind(body.parts[0].lattice, kGum);
+  const CellKind cells = cell_kind(body.parts[0].lattice, kKernelGum);
+  const SpringKind springs = spring_kind(body.parts[0].lattice, kKernelGum);
   std::vector<Vec3> result(body.element_count(), Vec3::Zero());
   for (std::size_t c = 0; c < body.cell_count(); ++c) {
     CellVectors u;
@@ -56,17 +56,17 @@ class KernelOf : public ::testing::TestWithParam<Model> {};
 
 TEST_P(KernelOf, AgreesWithTheModelsCellByCell) {
   const Body body = rough_body({37, 19, 11}, Vec3::Constant(0.01));
-  const Setting setting = setting_of(body, GetParam());
+  const Setting setting = kernel_setting(body, GetParam());
   for (const double amplitude : {1e-3, 1e-9}) {
     const State state = shaken(body, amplitude, 1);
-    const std::vector<Vec3> expected = brute_force(setting, state);
+    const std::vector<Vec3> expected = cell_by_cell(setting, state);
     EXPECT_LT(largest_difference(forces_in_step(setting, state, 0), expected), 1e-11 * largest(expected));
   }
 }
 
 TEST_P(KernelOf, DampingFeelsNoRigidMotion) {
   const Body body = rough_body({9, 7, 5}, Vec3::Constant(0.01));
-  const Setting setting = setting_of(body, GetParam());
+  const Setting setting = kernel_setting(body, GetParam());
   State state = shaken(body, 1e-3, 2);  // strained
   for (std::size_t e = 0; e < body.element_count(); ++e)
     state.velocity[e] = Vec3(1, 2, 3) + Vec3(4, -5, 6).cross(body.rest[e] + state.displacement[e]);
@@ -76,26 +76,26 @@ TEST_P(KernelOf, DampingFeelsNoRigidMotion) {
 
 TEST_P(KernelOf, ForcesKeepMomentaAndDampingTakesEnergy) {
   const Body body = rough_body({9, 7, 5}, Vec3::Constant(0.01));
-  testing::expect_inner_forces(setting_of(body, GetParam()), shaken(body, 1e-3, 3), 1e-3);
+  testing::expect_inner_forces(kernel_setting(body, GetParam()), shaken(body, 1e-3, 3), 1e-3);
 }
 
 TEST_P(KernelOf, DampingIsTheRateOfTheForcesAtRest) {
   // near rest, damping with tau is tau times the rate of the elastic forces
   const Body body = rough_body({9, 7, 5}, Vec3::Constant(0.01));
-  const Setting setting = setting_of(body, GetParam());
+  const Setting setting = kernel_setting(body, GetParam());
   State state = shaken(body, 0, 4);
   const double tau = 1e-3, dt = 1e-9;
   const std::vector<Vec3> damped = forces_in_step(setting, state, tau);
   State ahead = state;
   for (std::size_t e = 0; e < body.element_count(); ++e) ahead.displacement[e] = dt * state.velocity[e];
-  std::vector<Vec3> rate = brute_force(setting, ahead);
+  std::vector<Vec3> rate = cell_by_cell(setting, ahead);
   for (Vec3& f : rate) f *= tau / dt;
   EXPECT_LT(largest_difference(damped, rate), 1e-5 * largest(rate));
 }
 
 TEST_P(KernelOf, SameBitsForAnyThreadsInstructionsAndBooks) {
   const Body body = rough_body({37, 19, 11}, Vec3::Constant(0.01));
-  testing::expect_same_bits(setting_of(body, GetParam()));
+  testing::expect_same_bits(kernel_setting(body, GetParam()));
 }
 
 // Stable a little below the bound, not above it.
@@ -106,7 +106,7 @@ TEST_P(KernelOf, BoundIsSafeAndNotWasteful) {
     options.spacing = Vec3::Constant(0.01);
     return box_body(options);
   }();
-  const Setting setting = setting_of(body, GetParam());
+  const Setting setting = kernel_setting(body, GetParam());
   const double omega = std::sqrt(cell_frequencies(setting)[0]);
   for (const double zeta : {0.0, 0.2, 1.0, 5.0}) {
     const double tau = 2 * zeta / omega, bound = stable_step(setting, {tau});
@@ -125,7 +125,7 @@ TEST_P(KernelOf, BoundIsSafeAndNotWasteful) {
 // Of some cells thrice as long: as if they damped twice once more by themselves, the others broken.
 TEST_P(KernelOf, DampingOfEditedCells) {
   Body body = rough_body({9, 7, 5}, Vec3::Constant(0.01)), others = body;
-  const Setting setting = setting_of(body, GetParam()), edited = setting_of(others, GetParam());
+  const Setting setting = kernel_setting(body, GetParam()), edited = kernel_setting(others, GetParam());
   const State state = shaken(body, 1e-3, 9);
   const double tau = 1e-3;
   std::vector<Vec3> expected = forces_in_step(setting, state, tau);
@@ -150,7 +150,7 @@ INSTANTIATE_TEST_SUITE_P(Models, KernelOf, ::testing::Values(Model::cells, Model
 
 TEST(Kernel, FoldedCellIsTold) {
   const Body body = box_body({{2, 2, 2}, Vec3::Constant(0.01)});
-  const Setting setting = setting_of(body, Model::cells);
+  const Setting setting = kernel_setting(body, Model::cells);
   State state = shaken(body, 0, 7);
   state.displacement[13] = Vec3(0.05, 0.05, 0.05);
   Stepper stepper(setting, {{0}}, false);
@@ -165,7 +165,7 @@ TEST(Kernel, FoldedCellIsTold) {
 TEST(Kernel, DampingFollowsWhatIsLed) {
   const Body body = box_body({{8, 4, 4}, Vec3::Constant(0.01)});
   for (const Model model : {Model::cells, Model::springs}) {
-    const Setting setting = setting_of(body, model);
+    const Setting setting = kernel_setting(body, model);
     const double dt = 1e-5, tau = 1e-3;
     Stepper stepper(setting, {{tau}}, true);
     Constraints led;
@@ -194,7 +194,7 @@ TEST(Kernel, DampingFollowsWhatIsLed) {
 
 TEST(Kernel, DampingThatIsNotSolvedIsTold) {
   const Body body = box_body({{4, 4, 4}, Vec3::Constant(0.01)});
-  const Setting setting = setting_of(body, Model::cells);
+  const Setting setting = kernel_setting(body, Model::cells);
   Stepper stepper(setting, {{1}}, true);  // a second, of steps of 10 us
   State state = shaken(body, 0, 10);
   const Constraints none;
@@ -219,9 +219,9 @@ TEST(Kernel, UnknownInstructionSetIsRefused) {
 // With unequal spacings too: only model cells takes those.
 TEST(Kernel, UnevenSpacing) {
   const Body body = rough_body({9, 7, 5}, Vec3(0.01, 0.013, 0.008));
-  const Setting setting = setting_of(body, Model::cells);
+  const Setting setting = kernel_setting(body, Model::cells);
   const State state = shaken(body, 8e-4, 8);
-  const std::vector<Vec3> expected = brute_force(setting, state);
+  const std::vector<Vec3> expected = cell_by_cell(setting, state);
   EXPECT_LT(largest_difference(forces_in_step(setting, state, 0), expected), 1e-11 * largest(expected));
 }
 

@@ -6,20 +6,15 @@
 #include "simulate/scene.h"
 #include "simulate/simulate.h"
 #include "tests/simulate/box_body.h"
+#include "tests/simulate/scene_case.h"
 
 namespace flexel {
 namespace {
 
-constexpr double kYoung = 1e6;
+using testing::gum_scene;
+using testing::kGumYoung;
 
-Scene gum_scene() {
-  Scene scene;
-  scene.materials["gum"] = {"gum", kYoung, 0.0, 1000, "test"};
-  scene.material = "gum";
-  return scene;
-}
-
-SimulateResult run(Body& body, const Scene& scene) {
+SimulateResult find_equilibrium(Body& body, const Scene& scene) {
   Progress progress("test", Progress::Mode::quiet);
   SimulateOptions options;
   options.estimate = options.stress = false;
@@ -31,7 +26,7 @@ SimulateResult run(Body& body, const Scene& scene) {
 struct Slender {
   int thick = 4, slender = 20;
   [[nodiscard]] double side() const { return 1.0 / slender; }
-  [[nodiscard]] double bending() const { return kYoung * std::pow(side(), 4) / 12; }  // E I
+  [[nodiscard]] double bending() const { return kGumYoung * std::pow(side(), 4) / 12; }  // E I
   [[nodiscard]] double euler() const { return M_PI * M_PI * bending() / 4; }  // P L^2 / (E I) = pi^2 / 4
 };
 
@@ -42,7 +37,7 @@ Body column(const Slender& bar) {
 
 // Held at x = 0, `force` on the free end, whose mean displacement is probed.
 Scene held(const Vec3& force) {
-  Scene scene = gum_scene();
+  Scene scene = gum_scene(0);
   scene.get<Ties>().ties.push_back(make_fix(select_by_name("xmin")));
   scene.get<Loads>().loads.push_back(make_push(select_by_name("xmax"), force));
   Probe probe;
@@ -51,9 +46,9 @@ Scene held(const Vec3& force) {
   return scene;
 }
 
-Vec3 tip(const Slender& bar, const Vec3& force) {
+Vec3 tip_displacement(const Slender& bar, const Vec3& force) {
   Body body = column(bar);
-  return run(body, held(force)).probes[0].displacement;
+  return find_equilibrium(body, held(force)).probes[0].displacement;
 }
 
 // A column with an axial load P and a small one across bends by 3 (tan x - x) /
@@ -62,7 +57,8 @@ Vec3 tip(const Slender& bar, const Vec3& force) {
 TEST(LargeDeflection, ColumnsCriticalLoad) {
   const Slender bar;
   const double across = 1e-6 * bar.euler(), axial = 0.9 * bar.euler();
-  const double ratio = tip(bar, Vec3(-axial, 0, across)).z() / tip(bar, Vec3(0, 0, across)).z();
+  const double ratio =
+      tip_displacement(bar, Vec3(-axial, 0, across)).z() / tip_displacement(bar, Vec3(0, 0, across)).z();
   double low = 0.1, high = M_PI / 2 - 1e-9;
   for (int i = 0; i < 60; ++i) {
     const double x = 0.5 * (low + high);
@@ -86,7 +82,7 @@ TEST(LargeDeflection, ColumnAfterBuckling) {
   Tie aside = make_move(middle, Vec3(0, 0, 0.593));
   aside.axes = {false, false, true};
   scene.get<Ties>().ties.push_back(aside);
-  const SimulateResult result = run(body, scene);
+  const SimulateResult result = find_equilibrium(body, scene);
   EXPECT_NEAR(result.reactions[1].force.z() / bar.euler(), 0, 0.02);
   EXPECT_NEAR(-result.probes[0].displacement.x(), 0.259, 0.005);
 }
@@ -94,7 +90,7 @@ TEST(LargeDeflection, ColumnAfterBuckling) {
 // F L^2 / (E I) = 10: down by 0.81061 L, in by 0.55500 L (Mattiasson 1981).
 TEST(LargeDeflection, CantileverToFourFifthsOfItsLength) {
   const Slender bar{4, 40};
-  const Vec3 moved = tip(bar, Vec3(0, 0, -10 * bar.bending()));
+  const Vec3 moved = tip_displacement(bar, Vec3(0, 0, -10 * bar.bending()));
   EXPECT_NEAR(-moved.z() / 0.81061, 1, 0.005);
   EXPECT_NEAR(-moved.x() / 0.55500, 1, 0.005);
 }
@@ -113,7 +109,7 @@ Snap crown_led_by(double down) {
     return k >= low && k < low + kThick ? 1.0 : 0.0;
   };
   Body body = testing::box_body({.cells = {60, 1, 9}, .spacing = Vec3::Constant(0.01), .fill = fill});
-  Scene scene = gum_scene();
+  Scene scene = gum_scene(0);
   const auto beyond = [](double x, double side) {
     Selection selection;
     selection.kind = Selection::Kind::half_space;
@@ -134,7 +130,7 @@ Snap crown_led_by(double down) {
   plane.axes = {false, true, false};
   scene.get<Ties>().ties.push_back(plane);
   scene.run.load_steps = 4;
-  const SimulateResult result = run(body, scene);
+  const SimulateResult result = find_equilibrium(body, scene);
   return {-result.reactions[2].force.z(), result.elastic_energy};
 }
 
@@ -157,7 +153,7 @@ TEST(LargeDeflection, ArchIsFollowedPastItsLimitPoint) {
 TEST(LargeDeflection, AWholeTurnIsFollowedBeyondBuckling) {
   const auto turned = [](double angle, int load_steps) {
     Body body = testing::box_body({.cells = {1, 1, 6}, .spacing = Vec3::Constant(0.01)});
-    Scene scene = gum_scene();
+    Scene scene = gum_scene(0);
     scene.materials["gum"].poisson = 0.25;
     scene.get<Ties>().ties.push_back(make_fix(select_by_name("zmin")));
     Tie turn = make_move(select_by_name("zmax"), Vec3::Zero());
@@ -165,7 +161,7 @@ TEST(LargeDeflection, AWholeTurnIsFollowedBeyondBuckling) {
     turn.motion.angle = angle;
     scene.get<Ties>().ties.push_back(turn);
     scene.run.load_steps = load_steps;
-    const SimulateResult result = run(body, scene);
+    const SimulateResult result = find_equilibrium(body, scene);
     Vec3 middle = Vec3::Zero();
     for (std::size_t e = 12; e < 16; ++e) middle += 0.25 * body.position[e];
     const double aside = (middle - Vec3(0.005, 0.005, 0.03)).head<2>().norm();

@@ -88,7 +88,7 @@ TEST(LoadDistribution, BearingPressureFallsWithTheCosine) {
   EXPECT_FALSE(bearing(points, Vec3(0, 0, 1)));  // along the axis
 }
 
-struct Case {
+struct LoadCase {
   const char* name;
   const char* load;
 };
@@ -96,7 +96,7 @@ struct Case {
 // A turned bar under each kind of load, by far enough to bend it: loads and
 // reactions balance where it is.
 TEST(Loads, ReactionsBalanceForcesAndMoments) {
-  const Case cases[] = {
+  const LoadCase cases[] = {
       {"force", "force = [\"3 N\", \"-2 N\", \"5 N\"]"},
       {"pressure", "pressure = \"40 kPa\""},
       {"torque", "torque = [\"0.2 N m\", \"0 N m\", \"0.1 N m\"]"},
@@ -107,7 +107,7 @@ TEST(Loads, ReactionsBalanceForcesAndMoments) {
        "force = [\"1 N\", 0, 0]\nat = [0, \"30 mm\", "
        "0]\ntorque = [0, 0, \"0.1 N m\"]"},
   };
-  for (const Case& each : cases) {
+  for (const LoadCase& each : cases) {
     testing::BoxOptions options{.cells = {10, 3, 3}, .spacing = Vec3::Constant(0.005)};
     options.axes = Eigen::AngleAxisd(0.5, Vec3(1, 2, 0.5).normalized()).toRotationMatrix();
     Body body = testing::box_body(options);

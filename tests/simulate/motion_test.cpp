@@ -13,6 +13,7 @@
 #include "simulate/time/stability.h"
 #include "simulate/time/stepper.h"
 #include "tests/simulate/box_body.h"
+#include "tests/simulate/study_beam.h"
 #include "tests/simulate/timed_case.h"
 
 namespace flexel {
@@ -24,17 +25,17 @@ using testing::BoxOptions;
 using testing::expect_books_close;
 using testing::expect_momenta_kept;
 using ::testing::HasSubstr;
+using testing::kStudyGum;
+using testing::small_box;
 using testing::TimedCase;
 
-Scene scene_of(const Material& material, double time) {
+Scene scene_made_of(const Material& material, double time) {
   Scene scene;
   scene.materials[material.name] = material;
   scene.material = material.name;
   scene.run.time = time;
   return scene;
 }
-
-const Material kGum{"gum", 12.1e5, 0.25, 580, "Jansson and Vergeest, section 5"};
 
 InitialVelocity::Parameters thrown(const Vec3& velocity, const Vec3& spin = Vec3::Zero(),
                                    const Vec3& through = Vec3::Zero()) {
@@ -46,15 +47,8 @@ InitialVelocity::Parameters thrown(const Vec3& velocity, const Vec3& spin = Vec3
   return {{start}};
 }
 
-Body small_box() {
-  BoxOptions options;
-  options.cells = {3, 2, 2};
-  options.spacing = Vec3::Constant(0.01);
-  return box_body(options);
-}
-
 TEST(Motion, FreeFall) {
-  Scene scene = scene_of(kGum, 0.2);
+  Scene scene = scene_made_of(kStudyGum, 0.2);
   scene.get<Gravity>().acceleration = Vec3(1, -2, -9.81);
   scene.get<Damping>().entries.push_back({1e-5, {}, ""});
   const TimedCase made = testing::run_timed(small_box(), scene);
@@ -71,7 +65,7 @@ TEST(Motion, ThrownBodyKeepsItsMomenta) {
   options.spacing = Vec3::Constant(0.01);
   options.axes = (Eigen::AngleAxisd(0.5, Vec3(1, 2, 3).normalized())).toRotationMatrix();
   options.fill = [](int i, int j, int k) { return (i + j + k) % 3 == 0 ? 0.4 : 1.0; };
-  Scene scene = scene_of(kGum, 0.25);
+  Scene scene = scene_made_of(kStudyGum, 0.25);
   const Vec3 centre(0.02, 0.01, 0.01);
   scene.get<InitialVelocity>() = thrown(Vec3(1, 0.5, -2), 40 * Vec3(0.3, 0.2, 1).normalized(), centre);
   scene.get<Damping>().entries.push_back({2e-5, {}, ""});
@@ -97,7 +91,7 @@ Swing swing_of_bar(Model model, double tau) {
   const Material material{"bar", 1e6, model == Model::springs ? 0.25 : 0.0, 1000, "test"};
   const double length = 0.4, wave_speed = std::sqrt(1e6 / 1000);
   const double omega = wave_speed * pi / 2 / length;
-  Scene scene = scene_of(material, 2.3 * 2 * pi / omega);
+  Scene scene = scene_made_of(material, 2.3 * 2 * pi / omega);
   scene.parts["box"].model = model == Model::springs ? "springs" : "cells";
   scene.get<Ties>().ties.push_back(make_fix(select_by_name("x0")));
   if (tau > 0) scene.get<Damping>().entries.push_back({tau, {}, ""});
@@ -141,7 +135,7 @@ TEST(Motion, LongDampingIsSolvedFor) {
 }
 
 TEST(Motion, LongDampingKeepsMomenta) {
-  Scene scene = scene_of(kGum, 0.02);
+  Scene scene = scene_made_of(kStudyGum, 0.02);
   scene.get<InitialVelocity>() = thrown(Vec3(1, 0.5, -2), Vec3(20, 10, 30), Vec3(0.01, 0.01, 0.01));
   scene.get<Damping>().entries.push_back({0.05, {}, ""});
   const TimedCase made = testing::run_timed(small_box(), scene);
@@ -159,7 +153,7 @@ TEST(Motion, LongDampingAgreesWithShortSteps) {
     Material material{"flowing", 1e9, 0.3, 1000, "test"};
     material.yield = 10e6;
     material.hardening = 100e6;
-    Scene scene = scene_of(material, 2e-3);
+    Scene scene = scene_made_of(material, 2e-3);
     scene.run.method = method;
     scene.run.step = step;
     scene.get<Ties>().ties.push_back(make_fix(select_by_name("x0")));
@@ -204,7 +198,8 @@ TEST(Motion, WaveSpeed) {
     for (const double v : {speed * 2 * x / width * u, 0.0, 0.0}) velocity.values.push_back(v);
   }
   body.element_columns["velocity"] = velocity;
-  const TimedCase made = testing::run_timed(std::move(body), scene_of({"bar", 1e6, 0, 1000, "test"}, time));
+  const TimedCase made =
+      testing::run_timed(std::move(body), scene_made_of({"bar", 1e6, 0, 1000, "test"}, time));
   double sum = 0, moment = 0;
   for (std::size_t e = 0; e < made.body.element_count(); ++e) {
     const double u = made.body.position[e].x() - made.body.rest[e].x();
@@ -227,7 +222,7 @@ TEST(Motion, BeamSwingsAtItsFrequency) {
     options.cells = {4 * n, static_cast<int>(std::lround(1.4 * n)), n};
     options.spacing = Vec3(2.0 / options.cells[0], 0.7 / options.cells[1], 0.5 / options.cells[2]);
     Body body = box_body(options);
-    Scene scene = scene_of(kGum, 3.2 / each.frequency);
+    Scene scene = scene_made_of(kStudyGum, 3.2 / each.frequency);
     scene.get<Ties>().ties.push_back(make_fix(select_by_name("x0")));
     Probe tip;
     tip.name = "tip";
@@ -263,9 +258,9 @@ TEST(Motion, BeamSwingsAtItsFrequency) {
 }
 
 TEST(Motion, StepAboveTheBoundIsRefused) {
-  Scene scene = scene_of(kGum, 0.01);
+  Scene scene = scene_made_of(kStudyGum, 0.01);
   Body body = small_box();
-  const Setting setting{body, {kGum}, std::vector<std::uint8_t>(body.cell_count(), 0)};
+  const Setting setting{body, {kStudyGum}, std::vector<std::uint8_t>(body.cell_count(), 0)};
   const double bound = stable_step(setting, {0});
   scene.run.step = 1.01 * bound;
   Progress progress("test", Progress::Mode::quiet);
@@ -278,7 +273,7 @@ TEST(Motion, StepAboveTheBoundIsRefused) {
 TEST(Motion, FoldAtTheStartIsTold) {
   Body body = small_box();
   body.position[0].x() += 0.1;  // ten cells further
-  Scene scene = scene_of(kGum, 0.01);
+  Scene scene = scene_made_of(kStudyGum, 0.01);
   scene.run.step = 1e-6;
   Progress progress("test", Progress::Mode::quiet);
   EXPECT_THROW((void)simulate(body, scene, {}, progress), DivergedError);
@@ -286,7 +281,7 @@ TEST(Motion, FoldAtTheStartIsTold) {
 
 TEST(Motion, FoldInTheLastStepIsTold) {
   Body body = small_box();
-  const Setting setting{body, {kGum}, std::vector<std::uint8_t>(body.cell_count(), 0)};
+  const Setting setting{body, {kStudyGum}, std::vector<std::uint8_t>(body.cell_count(), 0)};
   const double step = 0.5 * stable_step(setting, {0});
   Column velocity;
   velocity.components = 3;
@@ -294,19 +289,19 @@ TEST(Motion, FoldInTheLastStepIsTold) {
   velocity.values[0] = 0.1 / step;  // ten cells further
   body.element_columns["velocity"] = velocity;
   Progress progress("test", Progress::Mode::quiet);
-  EXPECT_THROW((void)simulate(body, scene_of(kGum, step), {}, progress), DivergedError);
+  EXPECT_THROW((void)simulate(body, scene_made_of(kStudyGum, step), {}, progress), DivergedError);
 }
 
 TEST(Motion, TimeBelowAnyStepIsOneStep) {
   Body body = small_box();
   Progress progress("test", Progress::Mode::quiet);
-  const SimulateResult result = simulate(body, scene_of(kGum, 1e-15), {}, progress);
+  const SimulateResult result = simulate(body, scene_made_of(kStudyGum, 1e-15), {}, progress);
   EXPECT_EQ(result.timed->steps, 1u);
   EXPECT_EQ(result.timed->time, 1e-15);
 }
 
 TEST(Motion, RunawayTellsWhereAndWhy) {
-  Scene scene = scene_of(kGum, 1);
+  Scene scene = scene_made_of(kStudyGum, 1);
   scene.parts["box"].model = "springs";
   scene.get<InitialVelocity>() = thrown(Vec3::Zero(), Vec3(0, 0, 30), Vec3(0.015, 0.01, 0.01));
   scene.run.method = TimeMethod::explicit_euler;
@@ -325,7 +320,7 @@ TEST(Motion, RunawayTellsWhereAndWhy) {
 }
 
 TEST(Motion, EffectsOfTimeAreRefusedAtEquilibrium) {
-  Scene scene = scene_of(kGum, 1);
+  Scene scene = scene_made_of(kStudyGum, 1);
   scene.run.time.reset();
   scene.get<Ties>().ties.push_back(make_fix(select_by_name("x0")));
   scene.get<Damping>().entries.push_back({1e-5, {}, ""});
@@ -335,7 +330,7 @@ TEST(Motion, EffectsOfTimeAreRefusedAtEquilibrium) {
 }
 
 TEST(Motion, MovesTakeTheirCourseAndSupportsDoTheWork) {
-  Scene scene = scene_of(kGum, 0.1);
+  Scene scene = scene_made_of(kStudyGum, 0.1);
   scene.get<Ties>().ties.push_back(make_fix(select_by_name("x0")));
   Tie pull = make_move(select_by_name("x1"), Vec3(0.003, 0, 0));
   pull.course = {{0, 0.05, 0.1}, {0, 1, 1}};
@@ -354,9 +349,9 @@ TEST(Motion, MovesTakeTheirCourseAndSupportsDoTheWork) {
 TEST(Motion, OrderOfTheMethods) {
   const auto error = [](TimeMethod method, double share) {
     Body body = small_box();
-    const Setting setting{body, {kGum}, std::vector<std::uint8_t>(body.cell_count(), 0)};
+    const Setting setting{body, {kStudyGum}, std::vector<std::uint8_t>(body.cell_count(), 0)};
     const double longest = stable_step(setting, {0});
-    Scene scene = scene_of(kGum, 64 * longest);
+    Scene scene = scene_made_of(kStudyGum, 64 * longest);
     scene.get<Gravity>().acceleration = Vec3(0, 0, -9.81);
     scene.run.method = method;
     scene.run.step = share * longest;
@@ -372,7 +367,7 @@ TEST(Motion, OrderOfTheMethods) {
 // Its books begin between two half kicks; without damping, with it, and with it solved for.
 TEST(Motion, BooksOfVerletClose) {
   for (const double tau : {0.0, 2e-5, 1e-3}) {
-    Scene scene = scene_of(kGum, 0.01);
+    Scene scene = scene_made_of(kStudyGum, 0.01);
     scene.run.method = TimeMethod::verlet;
     scene.get<InitialVelocity>() = thrown(Vec3(0, 0, 1), Vec3(0, 0, 30), Vec3(0.015, 0.01, 0.01));
     scene.get<Gravity>().acceleration = Vec3(0, 0, -9.81);
@@ -383,7 +378,7 @@ TEST(Motion, BooksOfVerletClose) {
 }
 
 TEST(Motion, ExplicitEulerGainsEnergy) {
-  Scene scene = scene_of(kGum, 0.02);
+  Scene scene = scene_made_of(kStudyGum, 0.02);
   scene.get<InitialVelocity>() = thrown(Vec3::Zero(), Vec3(0, 0, 30), Vec3(0.015, 0.01, 0.01));
   scene.run.method = TimeMethod::explicit_euler;
   scene.run.step = 1e-6;

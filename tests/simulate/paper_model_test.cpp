@@ -21,14 +21,15 @@ using testing::CentreOptions;
 using testing::half_space;
 using ::testing::HasSubstr;
 using testing::held_beam;
+using testing::kStudyYoung;
 using testing::simulate_quietly;
 
-constexpr double kYoung = 12.1e5, kSpacing = 0.1;
+constexpr double kPaperSpacing = 0.1;
 
-CentreOptions turned_box() {
+CentreOptions notched_box() {
   CentreOptions options;
   options.voxels = {3, 4, 3};
-  options.spacing = kSpacing;
+  options.spacing = kPaperSpacing;
   options.axes =
       (Eigen::AngleAxisd(0.5, Vec3::UnitX()) * Eigen::AngleAxisd(0.4, Vec3::UnitY())).toRotationMatrix();
   // A notch, so that not every element has every neighbour.
@@ -36,11 +37,11 @@ CentreOptions turned_box() {
   return options;
 }
 
-Setting setting_of(const Body& body, HookeConstant hooke) {
-  return {body, {{"gum", kYoung, 0.25, 580, ""}}, {}, {Model::paper}, {hooke}, {}};
+Setting paper_setting(const Body& body, HookeConstant hooke) {
+  return {body, {{"gum", kStudyYoung, 0.25, 580, ""}}, {}, {Model::paper}, {hooke}, {}};
 }
 
-State random_state(std::size_t elements, double size) {
+State random_displaced_state(std::size_t elements, double size) {
   std::mt19937 engine(5);
   std::uniform_real_distribution<double> uniform(-size, size);
   State state;
@@ -54,17 +55,17 @@ INSTANTIATE_TEST_SUITE_P(Hooke, PaperModelOf,
                          ::testing::Values(HookeConstant::paper, HookeConstant::ganovelli));
 
 TEST_P(PaperModelOf, ForcesAndStiffnessAreTheDerivatives) {
-  const Body body = centre_body(turned_box());
-  const Setting setting = setting_of(body, GetParam());
+  const Body body = centre_body(notched_box());
+  const Setting setting = paper_setting(body, GetParam());
   Mechanics mechanics(setting, {});
-  testing::expect_derivatives(mechanics, random_state(body.element_count(), 0.2 * kSpacing), kYoung, kSpacing,
-                              5);
+  testing::expect_derivatives(mechanics, random_displaced_state(body.element_count(), 0.2 * kPaperSpacing),
+                              kStudyYoung, kPaperSpacing, 5);
 }
 
 TEST_P(PaperModelOf, TangentIsSymmetricAndProjectedOneSemiDefinite) {
-  const Body body = centre_body(turned_box());
-  Mechanics mechanics(setting_of(body, GetParam()), {});
-  State state = random_state(body.element_count(), 0.1 * kSpacing);
+  const Body body = centre_body(notched_box());
+  Mechanics mechanics(paper_setting(body, GetParam()), {});
+  State state = random_displaced_state(body.element_count(), 0.1 * kPaperSpacing);
   for (std::size_t e = 0; e < body.element_count(); ++e)
     state.displacement[e] -= 0.3 * body.rest[e];  // compressed: the tangent itself is indefinite
   const auto size = static_cast<Eigen::Index>(3 * body.element_count());
@@ -90,9 +91,9 @@ TEST_P(PaperModelOf, TangentIsSymmetricAndProjectedOneSemiDefinite) {
 }
 
 TEST_P(PaperModelOf, KeepsMomentumAndAngularMomentum) {
-  const Body body = centre_body(turned_box());
-  Mechanics mechanics(setting_of(body, GetParam()), {});
-  const State state = random_state(body.element_count(), 0.2 * kSpacing);
+  const Body body = centre_body(notched_box());
+  Mechanics mechanics(paper_setting(body, GetParam()), {});
+  const State state = random_displaced_state(body.element_count(), 0.2 * kPaperSpacing);
   const std::vector<Vec3> forces = mechanics.forces(state).total;
   Vec3 sum = Vec3::Zero(), torque = Vec3::Zero();
   double size = 0;
@@ -101,29 +102,29 @@ TEST_P(PaperModelOf, KeepsMomentumAndAngularMomentum) {
     torque += (body.rest[e] + state.displacement[e]).cross(forces[e]);
     size += forces[e].norm();
   }
-  EXPECT_GT(size, 0.01 * kYoung * kSpacing * kSpacing);
+  EXPECT_GT(size, 0.01 * kStudyYoung * kPaperSpacing * kPaperSpacing);
   EXPECT_LT(sum.norm(), 1e-13 * size);
   EXPECT_LT(torque.norm(), 1e-13 * size);
 }
 
 TEST_P(PaperModelOf, RigidMotionHasNoForce) {
-  const Body body = centre_body(turned_box());
-  Mechanics mechanics(setting_of(body, GetParam()), {});
+  const Body body = centre_body(notched_box());
+  Mechanics mechanics(paper_setting(body, GetParam()), {});
   const Mat3 turn = Eigen::AngleAxisd(2.1, Vec3(1, 2, 3).normalized()).toRotationMatrix();
   State state;
   for (const Vec3& x : body.rest) state.displacement.push_back(turn * x + Vec3(3, -1, 2) - x);
   for (const Vec3& force : mechanics.forces(state).total)
-    EXPECT_LT(force.norm(), 1e-12 * kYoung * kSpacing * kSpacing);
-  EXPECT_LT(mechanics.energy(state), 1e-20 * kYoung);
+    EXPECT_LT(force.norm(), 1e-12 * kStudyYoung * kPaperSpacing * kPaperSpacing);
+  EXPECT_LT(mechanics.energy(state), 1e-20 * kStudyYoung);
 }
 
 // Uniform stretch along an axis of the lattice, held across: C11 of the homogenised lattice, inside.
 TEST_P(PaperModelOf, InsideItHasTheModuliOfTheStudy) {
   CentreOptions options;
   options.voxels = {5, 5, 5};
-  options.spacing = kSpacing;
+  options.spacing = kPaperSpacing;
   const Body body = centre_body(options);
-  Mechanics mechanics(setting_of(body, GetParam()), {});
+  Mechanics mechanics(paper_setting(body, GetParam()), {});
   const double strain = 1e-6;
   State state;
   for (const Vec3& x : body.rest) state.displacement.push_back(Vec3(strain * x.x(), 0, 0));
@@ -132,23 +133,23 @@ TEST_P(PaperModelOf, InsideItHasTheModuliOfTheStudy) {
   const std::uint32_t middle = 2 + 5 * (2 + 5 * 2);
   double pull = 0;
   const ConnectionRows& rows = mechanics.paper().rows();
-  const Connections connections = make_connections(setting_of(body, GetParam()));
+  const Connections connections = make_connections(paper_setting(body, GetParam()));
   for (const ConnectionRows::Entry& entry : rows.of(middle)) {
     const ConnectionKind& kind = connections.parts[0].kinds[entry.kind];
     const Vec3 way = entry.sign * kind.rest;
-    if (way.x() > 0.5 * kSpacing)
+    if (way.x() > 0.5 * kPaperSpacing)
       pull += kind.stiffness * strain * way.x() * way.x() / kind.length * way.x() / kind.length;
   }
   const double c11 = GetParam() == HookeConstant::paper ? 1 + 2 * std::sqrt(2.0) + 4 / std::sqrt(3.0)
                                                         : 1 + 2.0 / 6 + 4.0 / 36;
-  EXPECT_NEAR(pull / (strain * kSpacing * kSpacing), c11 * kYoung, 1e-9 * kYoung);
+  EXPECT_NEAR(pull / (strain * kPaperSpacing * kPaperSpacing), c11 * kStudyYoung, 1e-9 * kStudyYoung);
   EXPECT_NEAR(mechanics.forces(state).total[middle].norm() / pull, 0, 1e-6);
   EXPECT_NEAR(axial_stiffness(GetParam()), GetParam() == HookeConstant::paper ? 3.326 : 1.355, 1e-3);
 }
 
 TEST(PaperModel, EnergyRefusesMatterTurnedInsideOut) {
-  const Body body = centre_body(turned_box());
-  PaperModel model(setting_of(body, HookeConstant::paper));
+  const Body body = centre_body(notched_box());
+  PaperModel model(paper_setting(body, HookeConstant::paper));
   State state;
   for (const Vec3& x : body.rest) state.displacement.push_back(Vec3(-2 * x.x(), 0, 0));
   EXPECT_EQ(model.energy(state), std::numeric_limits<double>::infinity());

@@ -27,12 +27,12 @@ using testing::setting_of;
 const Material kMetal{"metal", 1e9, 0.3, 1000, "test"};
 constexpr double kYield = 2e6;
 
-StepPlan plan_with(double hardening, double damping = 0) {
+StepPlan hardening_plan(double hardening, double damping = 0) {
   return {{damping}, {{kYield, hardening}}, {}};
 }
 
 // Pulled beyond yield and let go within a scene, slowly, over tens of its periods.
-const char* const kBar = R"(
+const char* const kYieldingBar = R"(
 material = "metal"
 [materials.metal]
 young = "1 GPa"
@@ -67,7 +67,7 @@ time = "3 ms"
 TEST(Plasticity, BarKeepsItsSet) {
   for (const int n : {1, 2, 3}) {
     Body body = box_of({3 * n, n, n}, 2e-3 / n);
-    const Scene scene = parse_scene(kBar, "bar.toml");
+    const Scene scene = parse_scene(kYieldingBar, "bar.toml");
     SimulateOptions options;
     options.history = ::testing::TempDir() + "plastic_bar.csv";
     Progress progress("test", Progress::Mode::quiet);
@@ -93,7 +93,7 @@ TEST(Plasticity, BarKeepsItsSet) {
 // stiffness 6/5 E (8/15 of E) a stress between yields leaves the strain k p / (6/5 E), p what they flowed.
 TEST(Plasticity, SpringsKeepTheirSet) {
   Body body = box_of({4, 2, 2});
-  std::string text = kBar;
+  std::string text = kYieldingBar;
   for (const char* side : {"ymax", "zmax"})
     text += std::string("[[fix]]\nwhere = \"") + side + "\"\naxes = \"" + side[0] + "\"\n";
   text += "[parts.box]\nmodel = \"springs\"\n";
@@ -116,7 +116,7 @@ TEST(Plasticity, GoesOnFromWhatTheBodyRemembers) {
   const Body body = box_of({5, 3, 3});
   for (const Model model : {Model::cells, Model::springs}) {
     const Setting setting = setting_of(body, kMetal, model);
-    StepPlan plan = plan_with(1e7);
+    StepPlan plan = hardening_plan(1e7);
     plan.fracture = {{1e12, 0.3}};
     Stepper one(setting, plan, false), two(setting, plan, false), fresh(setting, plan, false);
     State state = at_rest(body);
@@ -138,7 +138,7 @@ double residual_curvature(int n, double curvature) {
   const double h = 1e-3;
   const Body body = box_of({2, n, 1}, h);
   const Setting setting = setting_of(body, kMetal);
-  const StepPlan plan = plan_with(0, 1e-6);
+  const StepPlan plan = hardening_plan(0, 1e-6);
   Stepper stepper(setting, plan, false);
   const double dt = 0.8 * stable_step(setting, plan.damping);
   State state = at_rest(body);
@@ -196,7 +196,7 @@ TEST(Plasticity, ForcesAreTheDerivativeOfTheElasticEnergy) {
   options.axes = Eigen::AngleAxisd(0.5, Vec3(1, 2, 3).normalized()).toRotationMatrix();
   const Body body = box_body(options);
   const Setting setting = setting_of(body, kMetal);
-  Stepper stepper(setting, plan_with(1e8), false);
+  Stepper stepper(setting, hardening_plan(1e8), false);
   State state = yielded(stepper, body, 1e-4);
   const std::vector<Vec3> force = forces_of(stepper, state);
   const Stepper::Memory before = stepper.memory();
@@ -222,7 +222,7 @@ TEST(Plasticity, FlowDoesNotSeeARotation) {
   const Body body = box_of({3, 2, 2});
   const Setting setting = setting_of(body, kMetal);
   const Mat3 turn = Eigen::AngleAxisd(1.1, Vec3(1, -2, 0.5).normalized()).toRotationMatrix();
-  Stepper one(setting, plan_with(1e8), false), two(setting, plan_with(1e8), false);
+  Stepper one(setting, hardening_plan(1e8), false), two(setting, hardening_plan(1e8), false);
   const std::vector<Vec3> u = random_displacements(body, 1e-4, 5), w = random_displacements(body, 1e-4, 6);
   for (const double share : {0.3, 0.7, 1.0}) {
     State a = at_rest(body), b = at_rest(body);
@@ -264,7 +264,7 @@ Momenta momenta(const Body& body, const Stepper& stepper, const State& state) {
 TEST(Plasticity, KeepsMomentum) {
   const Body body = box_of({4, 3, 3});
   const Setting setting = setting_of(body, kMetal);
-  const StepPlan plan = plan_with(0, 1e-7);
+  const StepPlan plan = hardening_plan(0, 1e-7);
   Stepper stepper(setting, plan, false);
   const double dt = 0.5 * stable_step(setting, plan.damping);
   State state = at_rest(body);
@@ -283,7 +283,7 @@ TEST(Plasticity, KeepsMomentum) {
 std::vector<Vec3> after_steps(const Body& body, const std::string& isa, int threads) {
   const ThreadLimit limit(threads);
   const Setting setting = setting_of(body, kMetal);
-  const StepPlan plan = plan_with(1e7, 1e-7);
+  const StepPlan plan = hardening_plan(1e7, 1e-7);
   Stepper stepper(setting, plan, true, isa);
   const double dt = 0.5 * stable_step(setting, plan.damping);
   State state = at_rest(body);

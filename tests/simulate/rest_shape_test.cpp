@@ -11,6 +11,7 @@
 #include "simulate/scene.h"
 #include "tests/simulate/centre_body.h"
 #include "tests/simulate/derivatives.h"
+#include "tests/simulate/scene_case.h"
 #include "tests/simulate/stepped.h"
 
 namespace flexel {
@@ -21,9 +22,10 @@ using testing::box_body;
 using testing::BoxOptions;
 using testing::forces_of;
 using ::testing::HasSubstr;
+using testing::kGumYoung;
 using testing::random_displacements;
 
-constexpr double kYoung = 1e6, kSpacing = 0.1;
+constexpr double kRestSpacing = 0.1;
 
 Mat3 turned_axes() {
   return (Eigen::AngleAxisd(0.5, Vec3::UnitX()) * Eigen::AngleAxisd(0.4, Vec3::UnitY())).toRotationMatrix();
@@ -35,24 +37,24 @@ class RestShapeOf : public ::testing::TestWithParam<Model> {
     if (GetParam() == Model::paper) {
       testing::CentreOptions options;
       options.voxels = {4, 3, 3};
-      options.spacing = kSpacing;
+      options.spacing = kRestSpacing;
       options.axes = turned_axes();
       return testing::centre_body(options);
     }
     BoxOptions options;
     options.cells = {3, 2, 2};
-    options.spacing = Vec3::Constant(kSpacing);
+    options.spacing = Vec3::Constant(kRestSpacing);
     options.axes = turned_axes();
     return box_body(options);
   }
   [[nodiscard]] static Setting setting_of(const Body& body) {
-    return {body, {{"gum", kYoung, 0.25, 1000, ""}}, {}, {GetParam()}, {HookeConstant::paper}, {}};
+    return {body, {{"gum", kGumYoung, 0.25, 1000, ""}}, {}, {GetParam()}, {HookeConstant::paper}, {}};
   }
   // Turned by 2 rad, stretched, and every element off by a tenth of a cell.
   [[nodiscard]] static std::vector<Vec3> deformed(const Body& body, unsigned seed) {
     const Mat3 turn = Eigen::AngleAxisd(2, Vec3(1, -2, 0.5).normalized()).toRotationMatrix();
     const Mat3 f = turn * Vec3(1.3, 0.9, 1.1).asDiagonal();
-    std::vector<Vec3> u = random_displacements(body, 0.1 * kSpacing, seed);
+    std::vector<Vec3> u = random_displacements(body, 0.1 * kRestSpacing, seed);
     for (std::size_t e = 0; e < u.size(); ++e) u[e] += f * body.rest[e] - body.rest[e];
     return u;
   }
@@ -61,7 +63,7 @@ class RestShapeOf : public ::testing::TestWithParam<Model> {
     renormalise_all(body, setting_of(body), at);
     return body;
   }
-  static constexpr double kForce = kYoung * kSpacing * kSpacing;
+  static constexpr double kForce = kGumYoung * kRestSpacing * kRestSpacing;
 };
 INSTANTIATE_TEST_SUITE_P(Models, RestShapeOf, ::testing::Values(Model::cells, Model::springs, Model::paper));
 
@@ -69,17 +71,18 @@ TEST_P(RestShapeOf, IsFreeOfForceAndEnergy) {
   const std::vector<Vec3> at = deformed(part(), 3);
   const Body body = renormalised(at);
   Mechanics mechanics(setting_of(body), {});
-  EXPECT_LT(mechanics.energy({at}), 1e-24 * kForce * kSpacing);
+  EXPECT_LT(mechanics.energy({at}), 1e-24 * kForce * kRestSpacing);
   for (const Vec3& force : mechanics.forces({at}).total) EXPECT_LT(force.norm(), 1e-13 * kForce);
   State rest{std::vector<Vec3>(body.element_count(), Vec3::Zero())};
-  EXPECT_GT(mechanics.energy(rest), 1e-3 * kForce * kSpacing) << "the lattice's shape is none of rest now";
+  EXPECT_GT(mechanics.energy(rest), 1e-3 * kForce * kRestSpacing)
+      << "the lattice's shape is none of rest now";
 }
 
 TEST_P(RestShapeOf, ForcesAndStiffnessAreTheDerivatives) {
   const Body body = renormalised(deformed(part(), 3));
   const Setting setting = setting_of(body);
   Mechanics mechanics(setting, {});
-  testing::expect_derivatives(mechanics, {deformed(body, 8)}, kYoung, kSpacing, 7);
+  testing::expect_derivatives(mechanics, {deformed(body, 8)}, kGumYoung, kRestSpacing, 7);
 }
 
 TEST_P(RestShapeOf, HotLoopAgreesWithEquilibrium) {

@@ -14,46 +14,28 @@
 #include "simulate/simulate.h"
 #include "simulate/time/layout.h"
 #include "tests/simulate/box_body.h"
+#include "tests/simulate/contact_case.h"
+#include "tests/simulate/scene_case.h"
 #include "tests/simulate/timed_case.h"
 
 namespace flexel {
 namespace {
 
 using std::numbers::pi;
+using testing::block;
 using testing::box_body;
-using testing::BoxOptions;
 using testing::expect_books_close;
 using testing::expect_momenta_kept;
+using testing::gum_scene;
 using ::testing::HasSubstr;
+using testing::kSide;
+using testing::throw_part;
 using testing::TimedCase;
 
-constexpr double kSide = 0.01;
-
-Body block(const std::string& name, std::array<int, 3> cells, const Vec3& origin = Vec3::Zero()) {
-  BoxOptions options;
-  options.name = name;
-  options.cells = cells;
-  options.spacing = Vec3::Constant(kSide);
-  options.origin = origin;
-  return box_body(options);
-}
-
-Scene scene_of(double time, double poisson = 0.3) {
-  Scene scene;
-  scene.materials["gum"] = {"gum", 1e6, poisson, 1000, "test"};
-  scene.material = "gum";
+Scene rigid_scene(double time, double poisson = 0.3) {
+  Scene scene = gum_scene(poisson);
   scene.run.time = time;
   return scene;
-}
-
-void throw_part(Scene& scene, const std::string& part, const Vec3& velocity, const Vec3& spin = Vec3::Zero(),
-                const Vec3& through = Vec3::Zero()) {
-  StartingVelocity start;
-  start.where = select_by_name(part);
-  start.velocity = velocity;
-  start.spin = spin;
-  start.through = through;
-  scene.get<InitialVelocity>().velocities.push_back(start);
 }
 
 Manipulator lead(const std::string& part, std::vector<double> time, std::vector<Vec3> displacement,
@@ -68,7 +50,7 @@ Manipulator lead(const std::string& part, std::vector<double> time, std::vector<
 
 // About the axis of middle inertia, which is unstable: it tumbles, and keeps its shape and momenta.
 TEST(Rigid, ATumblingBlockKeepsItsShapeAndMomenta) {
-  Scene scene = scene_of(0.5);
+  Scene scene = rigid_scene(0.5);
   scene.run.step = 2e-4;
   scene.get<RigidParts>().parts = {"box"};
   throw_part(scene, "box", Vec3(0.1, -0.2, 0.3), Vec3(0.2, 40, 0.1), Vec3(0.01, 0.02, 0.03));
@@ -89,7 +71,7 @@ TEST(Rigid, ATumblingBlockKeepsItsShapeAndMomenta) {
 }
 
 TEST(Rigid, FallsAsFreely) {
-  Scene scene = scene_of(0.2);
+  Scene scene = rigid_scene(0.2);
   scene.get<RigidParts>().parts = {"box"};
   scene.get<Gravity>().acceleration = Vec3(0, 0, -9.81);
   const TimedCase made = testing::run_timed(block("box", {2, 2, 2}), scene);
@@ -101,7 +83,7 @@ TEST(Rigid, FallsAsFreely) {
 TEST(Rigid, CollidesWithASoftBlockAndKeepsTheMomenta) {
   Body body = block("soft", {3, 3, 3});
   append(body, block("hard", {2, 2, 2}, Vec3(0.004, 0.007, 0.031)));
-  Scene scene = scene_of(0.02);
+  Scene scene = rigid_scene(0.02);
   scene.get<RigidParts>().parts = {"hard"};
   scene.get<Contact>().on = true;
   scene.get<Contact>().friction = 0.3;
@@ -123,7 +105,7 @@ TEST(Rigid, CollidesWithASoftBlockAndKeepsTheMomenta) {
 TEST(Rigid, AManipulatorFollowsItsPathAndFeelsWhatItPresses) {
   Body body = block("block", {3, 3, 4});
   append(body, block("plate", {5, 5, 1}, Vec3(-0.01, -0.01, 0.04)));
-  Scene scene = scene_of(0.4, 0);
+  Scene scene = rigid_scene(0.4, 0);
   scene.get<RigidParts>().manipulators = {lead("plate", {0, 0.3}, {Vec3::Zero(), Vec3(0, 0, -0.0008)})};
   ContactPlane plane;
   scene.get<Contact>().on = true;
@@ -143,7 +125,7 @@ TEST(Rigid, AManipulatorFollowsItsPathAndFeelsWhatItPresses) {
 }
 
 TEST(Rigid, ReactionsOfAManipulatorAreThoseOfItsMotion) {
-  Scene scene = scene_of(0.1);
+  Scene scene = rigid_scene(0.1);
   scene.run.step = 1e-4;
   // a turn at constant speed about an axis off its middle: centripetal force m omega^2 r
   const double omega = 20;
@@ -199,11 +181,11 @@ displacement = [["0 mm", "0 mm", "0 mm"], ["0 mm", "0 mm", "-5 mm"]]
   EXPECT_EQ(scene.get<RigidParts>().manipulators[0].path.displacement[1], Vec3(0, 0, -0.005));
   EXPECT_THROW((void)parse_scene("[parts.a]\nrigid = 1\n", "s.toml"), InputError);
   EXPECT_THROW((void)parse_scene("[[manipulator]]\npart = \"a\"\ntime = [\"0 s\"]\n", "s.toml"), InputError);
-  Scene held = scene_of(0.1);
+  Scene held = rigid_scene(0.1);
   held.get<RigidParts>().parts = {"box"};
   held.get<Ties>().ties.push_back(make_fix(select_by_name("box")));
   EXPECT_THROW((void)testing::run_timed(block("box", {2, 2, 2}), held), InputError);
-  Scene unknown = scene_of(0.1);
+  Scene unknown = rigid_scene(0.1);
   unknown.get<RigidParts>().parts = {"bix"};
   EXPECT_THROW((void)testing::run_timed(block("box", {2, 2, 2}), unknown), InputError);
 }

@@ -1,4 +1,4 @@
-// Runs a scene on a body, at equilibrium or in time, and tells what it says.
+// Scenes of gum; runs a scene on a body, at equilibrium or in time, and tells what it says.
 #pragma once
 #include <string>
 
@@ -8,15 +8,26 @@
 
 namespace flexel::testing {
 
-inline SimulateResult run(Body& body, const Scene& scene) {
+constexpr double kGumYoung = 1e6;  // Pa
+
+inline Scene gum_scene(double poisson = 0.3) {
+  Scene scene;
+  scene.materials["gum"] = {"gum", kGumYoung, poisson, 1000, "test"};
+  scene.material = "gum";
+  return scene;
+}
+
+inline SimulateResult simulate_quietly(Body& body, const Scene& scene, int threads = 0) {
   Progress progress("test", Progress::Mode::quiet);
-  return simulate(body, scene, {}, progress);
+  SimulateOptions options;
+  options.threads = threads;
+  return simulate(body, scene, options, progress);
 }
 
 // The message that the scene is refused with; "accepted" where it is not.
 inline std::string refusal(Body body, const Scene& scene) {
   try {
-    (void)run(body, scene);
+    (void)simulate_quietly(body, scene);
   } catch (const InputError& error) {
     return error.what();
   }

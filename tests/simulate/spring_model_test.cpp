@@ -15,8 +15,8 @@ namespace flexel {
 namespace {
 
 using ::testing::HasSubstr;
-
-constexpr double kYoung = 12.1e5, kPoisson = 0.25;
+using testing::kStudyPoisson;
+using testing::kStudyYoung;
 
 Lattice turned_cubes() {
   Lattice lattice;
@@ -35,7 +35,7 @@ CellVectors random_displacement(double size) {
 }
 
 TEST(SpringModel, ForcesAndStiffnessAreTheDerivatives) {
-  const SpringKind kind = spring_kind(turned_cubes(), {"m", kYoung, kPoisson, 580, ""});
+  const SpringKind kind = spring_kind(turned_cubes(), {"m", kStudyYoung, kStudyPoisson, 580, ""});
   const CellVectors u = random_displacement(0.02);
   const CellVectors forces = cell_forces(kind, u);
   const double step = 1e-6;
@@ -45,7 +45,7 @@ TEST(SpringModel, ForcesAndStiffnessAreTheDerivatives) {
       more[a][axis] += step;
       less[a][axis] -= step;
       EXPECT_NEAR(forces[a][axis], -(cell_energy(kind, more) - cell_energy(kind, less)) / (2 * step),
-                  1e-6 * kYoung * 0.01);
+                  1e-6 * kStudyYoung * 0.01);
       const Vec3 slope = -(cell_forces(kind, more)[a] - cell_forces(kind, less)[a]) / (2 * step);
       Vec3 column = Vec3::Zero();
       for (const Spring& spring : kind.springs)
@@ -57,7 +57,7 @@ TEST(SpringModel, ForcesAndStiffnessAreTheDerivatives) {
 // Uniform strains give the energy of the isotropic material with Poisson's ratio 1/4, in every direction.
 TEST(SpringModel, UniformStrainHasTheIsotropicEnergy) {
   const Lattice lattice = turned_cubes();
-  const Material material{"m", kYoung, kPoisson, 580, ""};
+  const Material material{"m", kStudyYoung, kStudyPoisson, 580, ""};
   const SpringKind kind = spring_kind(lattice, material);
   std::mt19937 engine(3);
   std::uniform_real_distribution<double> uniform(-1, 1);

@@ -36,6 +36,8 @@ inline std::string refusal(const std::string& scene) {
   return "accepted";
 }
 
+inline const Material kCauchyGum{"gum", 1e6, 0.25, 1000, "test"};  // Poisson's ratio of springs
+
 inline Setting setting_of(const Body& body, const Material& material, Model model = Model::cells) {
   return {body, std::vector<Material>(body.parts.size(), material),
           std::vector<std::uint8_t>(body.cell_count(), 0), std::vector<Model>(body.parts.size(), model)};

@@ -16,33 +16,33 @@ namespace {
 using testing::box_body;
 using testing::BoxOptions;
 
-constexpr double kYoung = 200e9;
+constexpr double kMetalYoung = 200e9;
 
-Scene scene_of(double poisson) {
+Scene metal_scene(double poisson) {
   Scene scene;
-  scene.materials["metal"] = {"metal", kYoung, poisson, 7800, "test"};
+  scene.materials["metal"] = {"metal", kMetalYoung, poisson, 7800, "test"};
   scene.materials["metal"].yield = 250e6;
   scene.material = "metal";
   return scene;
 }
 
-SimulateResult run(Body& body, const Scene& scene) {
+SimulateResult solve_stresses(Body& body, const Scene& scene) {
   Progress progress("test", Progress::Mode::quiet);
   SimulateOptions options;
   options.estimate = false;
   return simulate(body, scene, options, progress);
 }
 
-Setting setting_of(const Body& body, Model model = Model::cells) {
+Setting metal_setting(const Body& body, Model model = Model::cells) {
   return {body,
-          {{"metal", kYoung, 0.25, 7800, "test"}},
+          {{"metal", kMetalYoung, 0.25, 7800, "test"}},
           std::vector<std::uint8_t>(body.cell_count(), 0),
           {model},
           {},
           {}};
 }
 
-State affine(const Body& body, const Mat3& gradient) {
+State affine_state(const Body& body, const Mat3& gradient) {
   State state;
   for (const Vec3& at : body.rest) state.displacement.push_back(gradient * at);
   return state;
@@ -54,7 +54,7 @@ Mat3 matrix(const SymmetricStress& s) {
   return m;
 }
 
-BoxOptions turned_box() {
+BoxOptions turned_graded_box() {
   BoxOptions options;
   options.cells = {3, 4, 2};
   options.spacing = Vec3(0.002, 0.0023, 0.0019);
@@ -64,10 +64,10 @@ BoxOptions turned_box() {
 }
 
 TEST(Stress, UniformFieldIsExactInCellsAndElements) {
-  const Body body = box_body(turned_box());
+  const Body body = box_body(turned_graded_box());
   const Mat3 strain = (Mat3() << 3, 1, 0, 1, -2, 2, 0, 2, 1).finished() * 1e-7;
-  const Stresses found = stresses(setting_of(body), affine(body, strain));
-  const double mu = kYoung / 2.5, lambda = kYoung * 0.25 / (1.25 * 0.5);
+  const Stresses found = stresses(metal_setting(body), affine_state(body, strain));
+  const double mu = kMetalYoung / 2.5, lambda = kMetalYoung * 0.25 / (1.25 * 0.5);
   const Mat3 wanted = 2 * mu * strain + lambda * strain.trace() * Mat3::Identity();
   for (const SymmetricStress& each : found.cell)
     EXPECT_LT((matrix(each) - wanted).norm(), 2e-6 * wanted.norm());
@@ -77,14 +77,15 @@ TEST(Stress, UniformFieldIsExactInCellsAndElements) {
 
 TEST(Stress, TurnsWithTheBody) {
   for (const Model model : {Model::cells, Model::springs}) {
-    BoxOptions options = turned_box();
+    BoxOptions options = turned_graded_box();
     options.spacing = Vec3::Constant(0.002);
     const Body body = box_body(options);
     const Mat3 stretch = (Mat3() << 1.1, 0.05, 0, 0.05, 0.9, 0.02, 0, 0.02, 1).finished();
     const Mat3 turn = Eigen::AngleAxisd(1.3, Vec3(3, -1, 2).normalized()).toRotationMatrix();
-    const Setting setting = setting_of(body, model);
-    const SymmetricStress before = stresses(setting, affine(body, stretch - Mat3::Identity())).cell[0];
-    const SymmetricStress after = stresses(setting, affine(body, turn * stretch - Mat3::Identity())).cell[0];
+    const Setting setting = metal_setting(body, model);
+    const SymmetricStress before = stresses(setting, affine_state(body, stretch - Mat3::Identity())).cell[0];
+    const SymmetricStress after =
+        stresses(setting, affine_state(body, turn * stretch - Mat3::Identity())).cell[0];
     EXPECT_LT((matrix(after) - turn * matrix(before) * turn.transpose()).norm(), 1e-9 * before.norm());
   }
 }
@@ -94,18 +95,19 @@ TEST(Stress, OfPinchedAndFoldedSpringsIsANumber) {
   const Body body = box_body({{1, 1, 1}, Vec3::Constant(0.1)});
   State pinched{std::vector<Vec3>(8, Vec3::Zero())};
   pinched.displacement[1] = body.rest[0] - body.rest[1];
-  EXPECT_TRUE(matrix(stresses(setting_of(body, Model::springs), pinched).cell[0]).allFinite());
+  EXPECT_TRUE(matrix(stresses(metal_setting(body, Model::springs), pinched).cell[0]).allFinite());
   State folded = pinched;
   for (std::size_t e = 0; e < 8; ++e) folded.displacement[e] = Vec3(0, 0, -2 * body.rest[e].z());
-  EXPECT_EQ(matrix(stresses(setting_of(body, Model::springs), folded).cell[0]), Mat3::Zero());
+  EXPECT_EQ(matrix(stresses(metal_setting(body, Model::springs), folded).cell[0]), Mat3::Zero());
 }
 
 // The virial of an isotropic lattice of springs is Hooke's law with Poisson's ratio 1/4.
 TEST(Stress, SpringsFollowHookesLaw) {
   const Body body = box_body({.cells = {2, 2, 2}, .spacing = Vec3::Constant(0.01)});
   const Mat3 strain = (Mat3() << 3, 1, 0, 1, -2, 2, 0, 2, 1).finished() * 1e-7;
-  const Mat3 found = matrix(stresses(setting_of(body, Model::springs), affine(body, strain)).cell[0]);
-  const Mat3 wanted = 2 * kYoung / 2.5 * (strain + 0.5 * strain.trace() * Mat3::Identity());
+  const Mat3 found =
+      matrix(stresses(metal_setting(body, Model::springs), affine_state(body, strain)).cell[0]);
+  const Mat3 wanted = 2 * kMetalYoung / 2.5 * (strain + 0.5 * strain.trace() * Mat3::Identity());
   EXPECT_LT((found - wanted).norm(), 1e-5 * wanted.norm());
 }
 
@@ -123,10 +125,10 @@ TEST(Stress, BendingAtEightCells) {
   constexpr int n = 8;
   const double h = 0.01 / n, length = 4 * n * h, side = n * h;
   Body body = box_body({.cells = {4 * n, n, n}, .spacing = Vec3::Constant(h)});
-  Scene scene = scene_of(0.3);
+  Scene scene = metal_scene(0.3);
   scene.get<Ties>().ties.push_back(make_fix(select_by_name("xmin")));
   scene.get<Loads>().loads.push_back(make_push(select_by_name("xmax"), Vec3(0, 0, 10)));
-  const SimulateResult result = run(body, scene);
+  const SimulateResult result = solve_stresses(body, scene);
   const double inertia = std::pow(side, 4) / 12;
   const auto bending = [&](const Vec3& at) {
     return 10 * (length - at.x()) * std::abs(at.z() - side / 2) / inertia;
@@ -165,12 +167,12 @@ TEST(Stress, TorsionAtEightCells) {
   constexpr int n = 8;
   const double h = 0.01 / n, side = n * h;
   Body body = box_body({.cells = {3 * n, n, n}, .spacing = Vec3::Constant(h)});
-  Scene scene = scene_of(0.3);
+  Scene scene = metal_scene(0.3);
   scene.get<Ties>().ties.push_back(make_fix(select_by_name("xmin")));
   Tie turn = make_move(select_by_name("xmax"), Vec3::Zero());
   turn.motion = {Vec3::Zero(), Vec3::UnitX(), Vec3(0, side / 2, side / 2), 1e-4};
   scene.get<Ties>().ties.push_back(turn);
-  (void)run(body, scene);
+  (void)solve_stresses(body, scene);
   // The twist per length in the middle, from two elements on the axis' height at one side.
   const auto angle_at = [&](int i) {
     for (std::size_t e = 0; e < body.element_count(); ++e) {
@@ -180,7 +182,7 @@ TEST(Stress, TorsionAtEightCells) {
     return 0.0;
   };
   const double twist = (angle_at(3 * n / 2 + 1) - angle_at(3 * n / 2 - 1)) / (2 * h);
-  const double scale = std::sqrt(3.0) * kYoung / 2.6 * twist * side;
+  const double scale = std::sqrt(3.0) * kMetalYoung / 2.6 * twist * side;
   const auto wanted = [&](double y, double z) { return scale * torsion_shear(y / n - 0.5, z / n - 0.5); };
   for (std::size_t c = 0; c < body.cell_count(); ++c) {
     const Index3& at = body.lattice_index[body.cell_elements[c][0]];
@@ -207,14 +209,14 @@ TEST(Stress, HoopStressBesideAHole) {
     return outside < 4 ? 0 : outside / 256.0;
   };
   Body body = box_body({.cells = {wide, wide, 1}, .spacing = Vec3::Constant(h), .fill = fill});
-  Scene scene = scene_of(0.3);
+  Scene scene = metal_scene(0.3);
   for (const auto& [side, axis] : {std::pair{"xmin", 0}, {"ymin", 1}, {"zmin", 2}}) {
     Tie tie = make_fix(select_by_name(side));
     tie.axes = {axis == 0, axis == 1, axis == 2};
     scene.get<Ties>().ties.push_back(tie);
   }
   scene.get<Loads>().loads.push_back(make_pressure(select_by_name("xmax"), -stress));
-  (void)run(body, scene);
+  (void)solve_stresses(body, scene);
   const auto hoop = [&](double r, double angle) {
     const double a = n / r;
     return stress / 2 * (1 + a * a - (1 + 3 * std::pow(a, 4)) * std::cos(2 * angle));

@@ -7,10 +7,12 @@
 #include "simulate/scene.h"
 #include "simulate/simulate.h"
 #include "tests/simulate/centre_body.h"
+#include "tests/simulate/scene_case.h"
 
 namespace flexel::testing {
 
 constexpr double kStudyYoung = 12.1e5, kStudyPoisson = 0.25, kStudyForce = 1e-3;
+inline const Material kStudyGum{"gum", kStudyYoung, kStudyPoisson, 580, "Jansson and Vergeest, section 5"};
 
 inline double study_width(int n) {
   return static_cast<double>(std::lround(1.4 * n)) * 0.5 / n;
@@ -59,19 +61,12 @@ inline Selection half_space(const Vec3& point, const Vec3& normal) {
 // What the beam is made of, and its first layer held.
 inline Scene held_beam(const std::string& model, const std::string& hooke = "") {
   Scene scene;
-  scene.materials["gum"] = {"gum", kStudyYoung, kStudyPoisson, 580, "test"};
+  scene.materials["gum"] = kStudyGum;
   scene.material = "gum";
   scene.parts["box"].model = model;
   scene.parts["box"].hooke = hooke;
   scene.get<Ties>().ties.push_back(make_fix(half_space(Vec3(1e-6, 0, 0), -Vec3::UnitX())));
   return scene;
-}
-
-inline SimulateResult simulate_quietly(Body& body, const Scene& scene, int threads = 0) {
-  Progress progress("test", Progress::Mode::quiet);
-  SimulateOptions options;
-  options.threads = threads;
-  return simulate(body, scene, options, progress);
 }
 
 // 100 (u / u_reference - 1) of the loaded end: above 0 is too soft.

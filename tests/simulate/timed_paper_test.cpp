@@ -10,19 +10,22 @@
 #include "simulate/mechanics.h"
 #include "simulate/time/layout.h"
 #include "tests/simulate/study_beam.h"
+#include "tests/simulate/timed_case.h"
 
 namespace flexel {
 namespace {
 
+using testing::book;
 using testing::centre_body;
 using testing::CentreOptions;
+using testing::set_velocity;
 
-constexpr double kYoung = 2e5, kDensity = 900, kSpacing = 0.02;
+constexpr double kTimedYoung = 2e5, kTimedDensity = 900, kTimedSpacing = 0.02;
 
-CentreOptions turned_box() {
+CentreOptions timed_notched_box() {
   CentreOptions options;
   options.voxels = {4, 3, 3};
-  options.spacing = kSpacing;
+  options.spacing = kTimedSpacing;
   options.axes =
       (Eigen::AngleAxisd(0.5, Vec3::UnitX()) * Eigen::AngleAxisd(0.4, Vec3::UnitY())).toRotationMatrix();
   options.inside = [](int i, int j, int k) { return !(i == 2 && j == 2 && k > 0); };
@@ -31,14 +34,14 @@ CentreOptions turned_box() {
 
 Scene timed_scene(double time, double damping = 0) {
   Scene scene;
-  scene.materials["gum"] = {"gum", kYoung, 0.25, kDensity, "test"};
+  scene.materials["gum"] = {"gum", kTimedYoung, 0.25, kTimedDensity, "test"};
   scene.material = "gum";
   scene.run.time = time;
   if (damping > 0) scene.get<Damping>().entries.push_back({damping, std::nullopt, ""});
   return scene;
 }
 
-SimulateResult run(Body& body, const Scene& scene, int threads = 0) {
+SimulateResult run_with_books(Body& body, const Scene& scene, int threads = 0) {
   Progress progress("test", Progress::Mode::quiet);
   SimulateOptions options;
   options.threads = threads;
@@ -50,18 +53,12 @@ SimulateResult run(Body& body, const Scene& scene, int threads = 0) {
   return result;
 }
 
-double book(const SimulateResult& result, const std::string& name) {
-  for (const auto& [key, value] : result.timed->books)
-    if (key == name) return value;
-  ADD_FAILURE() << name;
-  return 0;
+Setting timed_setting(const Body& body) {
+  return {body, {{"gum", kTimedYoung, 0.25, kTimedDensity, ""}}, {}, {Model::paper}, {HookeConstant::paper},
+          {}};
 }
 
-Setting setting_of(const Body& body) {
-  return {body, {{"gum", kYoung, 0.25, kDensity, ""}}, {}, {Model::paper}, {HookeConstant::paper}, {}};
-}
-
-State random_state(std::size_t elements, double size, double speed) {
+State random_moving_state(std::size_t elements, double size, double speed) {
   std::mt19937 engine(5);
   std::uniform_real_distribution<double> uniform(-1, 1);
   State state;
@@ -72,20 +69,13 @@ State random_state(std::size_t elements, double size, double speed) {
   return state;
 }
 
-void set_velocity(Body& body, const std::vector<Vec3>& velocity) {
-  Column column;
-  column.components = 3;
-  for (const Vec3& v : velocity) column.values.insert(column.values.end(), v.begin(), v.end());
-  body.element_columns["velocity"] = column;
-}
-
 Vec3 velocity_of(const Body& body, std::size_t e) {
   const std::vector<double>& values = body.element_columns.at("velocity").values;
   return Vec3(values[3 * e], values[3 * e + 1], values[3 * e + 2]);
 }
 
 // Momentum and angular momentum over the mass of an element.
-std::pair<Vec3, Vec3> momenta(const Body& body) {
+std::pair<Vec3, Vec3> momenta_per_mass(const Body& body) {
   Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
   for (std::size_t e = 0; e < body.element_count(); ++e) {
     linear += velocity_of(body, e);
@@ -96,15 +86,15 @@ std::pair<Vec3, Vec3> momenta(const Body& body) {
 
 // -dR/dv of R = 1/2 sum tau k (rate of length)^2.
 TEST(TimedPaper, DampingIsTheDerivativeOfItsDissipation) {
-  Body body = centre_body(turned_box());
+  Body body = centre_body(timed_notched_box());
   Column& change = body.element_columns["damping_change"];  // as edits do
   for (std::size_t e = 0; e < body.element_count(); ++e) change.values.push_back(e % 3 == 0 ? 1.5 : 0);
-  const PaperModel model(setting_of(body));
-  const State state = random_state(body.element_count(), 0.2 * kSpacing, 1.5);
+  const PaperModel model(timed_setting(body));
+  const State state = random_moving_state(body.element_count(), 0.2 * kTimedSpacing, 1.5);
   const double tau = 3e-4;
   const auto length_rates = [&](const State& at) {
     double sum = 0;
-    const Connections connections = make_connections(setting_of(body));
+    const Connections connections = make_connections(timed_setting(body));
     const double dt = 1e-7;
     for (std::size_t c = 0; c < connections.size(); ++c) {
       const std::uint32_t a = connections.a[c], b = connections.b[c];
@@ -121,7 +111,7 @@ TEST(TimedPaper, DampingIsTheDerivativeOfItsDissipation) {
   };
   std::vector<Vec3> forces(body.element_count(), Vec3::Zero());
   model.add_damping(state, {tau}, forces);
-  const double step = 1e-3, scale = tau * kYoung * kSpacing;
+  const double step = 1e-3, scale = tau * kTimedYoung * kTimedSpacing;
   for (std::uint32_t e = 0; e < body.element_count(); e += 4)
     for (int axis = 0; axis < 3; ++axis) {
       State more = state, less = state;
@@ -132,12 +122,12 @@ TEST(TimedPaper, DampingIsTheDerivativeOfItsDissipation) {
 }
 
 TEST(TimedPaper, FrequencyBoundIsAboveTheLargestAndCloseToIt) {
-  const Body body = centre_body(turned_box());
+  const Body body = centre_body(timed_notched_box());
   for (const double size : {0.0, 0.1}) {
-    State state = random_state(body.element_count(), size * kSpacing, 0);
+    State state = random_moving_state(body.element_count(), size * kTimedSpacing, 0);
     for (std::size_t e = 0; e < body.element_count(); ++e)
       state.displacement[e] += size * body.rest[e];  // stretched: tension adds stiffness
-    Mechanics mechanics(setting_of(body), {});
+    Mechanics mechanics(timed_setting(body), {});
     mechanics.assemble(state);
     const BlockMatrix& blocks = mechanics.stiffness();
     const auto n = static_cast<Eigen::Index>(3 * body.element_count());
@@ -146,7 +136,7 @@ TEST(TimedPaper, FrequencyBoundIsAboveTheLargestAndCloseToIt) {
       for (std::uint64_t q = blocks.row_offsets[row]; q < blocks.row_offsets[row + 1]; ++q)
         matrix.block<3, 3>(static_cast<Eigen::Index>(3 * row),
                            static_cast<Eigen::Index>(3 * blocks.columns[q])) = blocks.values[q];
-    const std::vector<double> mass = lumped_masses(setting_of(body));
+    const std::vector<double> mass = lumped_masses(timed_setting(body));
     const double largest =
         Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(matrix).eigenvalues()[n - 1] / mass[0];
     const double bound = mechanics.paper().frequencies(state, mass)[0];
@@ -157,15 +147,15 @@ TEST(TimedPaper, FrequencyBoundIsAboveTheLargestAndCloseToIt) {
 
 TEST(TimedPaper, KeepsMomentumAndAngularMomentumDampedOrNot) {
   for (const double tau : {0.0, 2e-4}) {
-    Body body = centre_body(turned_box());
-    const State start = random_state(body.element_count(), 0.05 * kSpacing, 0.2);
+    Body body = centre_body(timed_notched_box());
+    const State start = random_moving_state(body.element_count(), 0.05 * kTimedSpacing, 0.2);
     for (std::size_t e = 0; e < body.element_count(); ++e) body.position[e] += start.displacement[e];
     set_velocity(body, start.velocity);
-    const auto [linear, angular] = momenta(body);
+    const auto [linear, angular] = momenta_per_mass(body);
     Scene scene = timed_scene(0.05, tau);
     scene.run.step = 2e-5;  // a twentieth of the bound: the start is rough
-    const SimulateResult result = run(body, scene);
-    const auto [linear_after, angular_after] = momenta(body);
+    const SimulateResult result = run_with_books(body, scene);
+    const auto [linear_after, angular_after] = momenta_per_mass(body);
     EXPECT_GT(result.timed->steps, 2000);
     EXPECT_LT((linear_after - linear).norm(), 1e-9 * linear.norm());
     EXPECT_LT((angular_after - angular).norm(), 1e-9 * angular.norm());
@@ -183,67 +173,68 @@ TEST(TimedPaper, AWaveRunsAlongARowAsInABar) {
   constexpr int n = 60, p = 2;
   CentreOptions options;
   options.voxels = {n, 1, 1};
-  options.spacing = kSpacing;
-  const double speed = std::sqrt(kYoung / kDensity), quarter = n * kSpacing / p / speed / 2;
+  options.spacing = kTimedSpacing;
+  const double speed = std::sqrt(kTimedYoung / kTimedDensity), quarter = n * kTimedSpacing / p / speed / 2;
   Body body = centre_body(options);
-  const double size = 1e-5 * kSpacing;
+  const double size = 1e-5 * kTimedSpacing;
   for (int j = 0; j < n; ++j) body.position[j].x() += size * std::cos(M_PI * p * (j + 0.5) / n);
   Scene scene = timed_scene(0.8 * quarter);
   scene.run.method = TimeMethod::verlet;
-  scene.run.step = 1e-2 * kSpacing / speed;
-  (void)run(body, scene);
+  scene.run.step = 1e-2 * kTimedSpacing / speed;
+  (void)run_with_books(body, scene);
   const double now = (body.position[0].x() - body.rest[0].x()) / (size * std::cos(M_PI * p * 0.5 / n));
   const double omega = std::acos(now) / (0.8 * quarter);
-  const double exact = 2 * speed / kSpacing * std::sin(M_PI * p / (2 * n));
+  const double exact = 2 * speed / kTimedSpacing * std::sin(M_PI * p / (2 * n));
   EXPECT_NEAR(omega, exact, 1e-5 * exact);
-  EXPECT_NEAR(omega * n * kSpacing / (M_PI * p), speed, 1e-3 * speed);
+  EXPECT_NEAR(omega * n * kTimedSpacing / (M_PI * p), speed, 1e-3 * speed);
 }
 
 TEST(TimedPaper, DampingDecaysAsOfOneSwing) {
   CentreOptions options;
   options.voxels = {2, 1, 1};
-  options.spacing = kSpacing;
+  options.spacing = kTimedSpacing;
   Body body = centre_body(options);
-  body.position[0].x() -= 1e-4 * kSpacing;
-  body.position[1].x() += 1e-4 * kSpacing;
-  const double omega = std::sqrt(2 * kYoung / kDensity) / kSpacing, zeta = 0.1, tau = 2 * zeta / omega;
+  body.position[0].x() -= 1e-4 * kTimedSpacing;
+  body.position[1].x() += 1e-4 * kTimedSpacing;
+  const double omega = std::sqrt(2 * kTimedYoung / kTimedDensity) / kTimedSpacing, zeta = 0.1,
+               tau = 2 * zeta / omega;
   const double damped = omega * std::sqrt(1 - zeta * zeta), period = 2 * M_PI / damped;
   Scene scene = timed_scene(3 * period, tau);
   scene.run.step = 1e-3 * period;
   scene.run.method = TimeMethod::verlet;
-  (void)run(body, scene);
-  const double left = (body.position[1].x() - body.rest[1].x()) / (1e-4 * kSpacing);
+  (void)run_with_books(body, scene);
+  const double left = (body.position[1].x() - body.rest[1].x()) / (1e-4 * kTimedSpacing);
   EXPECT_NEAR(left, std::exp(-zeta * omega * 3 * period), 2e-3);
 }
 
 TEST(TimedPaper, SameBitsForAnyNumberOfThreads) {
   CentreOptions options;
   options.voxels = {24, 16, 8};
-  options.spacing = kSpacing;
+  options.spacing = kTimedSpacing;
   Body one = centre_body(options), two = one;
   Scene scene = timed_scene(5e-3, 1e-4);
-  scene.get<Ties>().ties.push_back(make_fix(testing::half_space(Vec3(kSpacing, 0, 0), -Vec3::UnitX())));
+  scene.get<Ties>().ties.push_back(make_fix(testing::half_space(Vec3(kTimedSpacing, 0, 0), -Vec3::UnitX())));
   scene.get<Gravity>().acceleration = Vec3(0, 0, -98.1);
-  (void)run(one, scene, 1);
-  (void)run(two, scene, 2);
+  (void)run_with_books(one, scene, 1);
+  (void)run_with_books(two, scene, 2);
   double moved = 0;
   for (std::size_t e = 0; e < one.element_count(); ++e) {
     ASSERT_EQ(one.position[e], two.position[e]);
     moved = std::max(moved, (one.position[e] - one.rest[e]).norm());
   }
-  EXPECT_GT(moved, 1e-4 * kSpacing);
+  EXPECT_GT(moved, 1e-4 * kTimedSpacing);
 }
 
 TEST(TimedPaper, RefusesTooLongAStepAndMatterTurnedInsideOut) {
-  Body body = centre_body(turned_box());
+  Body body = centre_body(timed_notched_box());
   Scene scene = timed_scene(1);
   scene.run.step = 0.01;
-  EXPECT_THROW((void)run(body, scene), InputError);
+  EXPECT_THROW((void)run_with_books(body, scene), InputError);
   std::vector<Vec3> velocity;
   for (const Vec3& x : body.rest) velocity.push_back(Vec3(-2e4 * x.x(), 0, 0));
   set_velocity(body, velocity);
   scene.run.step.reset();
-  EXPECT_THROW((void)run(body, scene), DivergedError);
+  EXPECT_THROW((void)run_with_books(body, scene), DivergedError);
 }
 
 }  // namespace

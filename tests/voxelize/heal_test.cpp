@@ -17,10 +17,6 @@ namespace {
 using namespace shapes;
 using testing::Test;
 
-double total(const VoxelizeResult& result) {
-  return result.parts[0].lattice_volume + result.parts[0].dropped_volume;
-}
-
 VoxelizeResult run_healed(const Mesh& mesh, double size, Heal heal) {
   Progress progress("test", Progress::Mode::quiet);
   VoxelizeOptions options;
@@ -81,7 +77,7 @@ TEST(Heal, MissingTrianglesAreFilledExactly) {
   EXPECT_EQ(done.hole_triangles, 2u);
   EXPECT_EQ(done.flipped_facets, 0u);
   EXPECT_TRUE(result.parts[0].closed);
-  EXPECT_NEAR(total(result) / volume(ball), 1, 1e-9);
+  EXPECT_NEAR(total_volume(result) / volume(ball), 1, 1e-9);
   EXPECT_THAT(healing_lines(done),
               testing::ElementsAre(testing::StartsWith("2 holes filled with 2 triangles")));
 }
@@ -103,7 +99,7 @@ TEST(Heal, HolesThatTouchInAVertexComeApart) {
                        static_cast<std::ptrdiff_t>(std::min<std::size_t>(10, second)));
   const VoxelizeResult result = run(mesh, .1);
   EXPECT_EQ(result.parts[0].healing.holes, 2u);
-  EXPECT_NEAR(total(result) / volume(ball), 1, 1e-9);
+  EXPECT_NEAR(total_volume(result) / volume(ball), 1, 1e-9);
 }
 
 TEST(Heal, CracksOfFloatNoiseAreWelded) {
@@ -121,7 +117,7 @@ TEST(Heal, RepeatedFacetsAndFinsAreLeftOut) {
     const VoxelizeResult result = run(broken, .1);
     const Healing& done = result.parts[0].healing;
     EXPECT_EQ(done.fins + done.duplicate_facets, broken.triangles.size() - ball.triangles.size());
-    EXPECT_NEAR(total(result) / volume(ball), 1, 1e-9) << kDamages[kind];
+    EXPECT_NEAR(total_volume(result) / volume(ball), 1, 1e-9) << kDamages[kind];
   }
 }
 
@@ -159,7 +155,7 @@ TEST(Heal, SoupIsJudgedWithinOnePercent) {
   for (const double degree : {0., .5}) {
     const VoxelizeResult result = run(Damager(mesh, 3).damaged(3, degree), .08);
     EXPECT_FALSE(result.parts[0].closed);
-    EXPECT_NEAR(total(result) / volume(mesh), 1, .01);
+    EXPECT_NEAR(total_volume(result) / volume(mesh), 1, .01);
     EXPECT_EQ(component_count(result.body), 1u);
   }
 }
@@ -215,7 +211,7 @@ TEST(Heal, WrapSurroundsWhatIsThere) {
   // Every polygon finds the cells under it, though the lattice was made of the wrap.
   const auto& ends = result.body.surface_cell_offsets;
   for (std::size_t p = 0; p + 1 < ends.size(); ++p) EXPECT_GT(ends[p + 1], ends[p]) << p;
-  const double ratio = total(result) / volume(icosphere(3, 1));
+  const double ratio = total_volume(result) / volume(icosphere(3, 1));
   EXPECT_GT(ratio, 1);     // the wrap lies outside
   EXPECT_LT(ratio, 1.02);  // by a thirtieth of alpha
 }
@@ -223,7 +219,7 @@ TEST(Heal, WrapSurroundsWhatIsThere) {
 TEST(Heal, NoneTakesTheSurfaceAsItIs) {
   EXPECT_THAT(refusal(inverted(icosphere(2, 1)), .2, Heal::none), testing::HasSubstr("inside out"));
   const Mesh ball = icosphere(2, 1);
-  EXPECT_NEAR(total(run_healed(ball, .2, Heal::none)) / volume(ball), 1, 1e-9);
+  EXPECT_NEAR(total_volume(run_healed(ball, .2, Heal::none)) / volume(ball), 1, 1e-9);
 }
 
 // A short form of bench_heal: no result is more than 5 % wrong, and what the acceptance test names is within
@@ -236,7 +232,7 @@ TEST(Heal, DamageIsHealedOrRefused) {
     for (const double degree : {0., .6}) {
       const Mesh broken = Damager(mesh, static_cast<unsigned>(trial)).damaged(kind, degree);
       try {
-        const double ratio = total(run(broken, .15)) / volume(mesh);
+        const double ratio = total_volume(run(broken, .15)) / volume(mesh);
         EXPECT_NEAR(ratio, 1, degree == 0 && kind <= 3 ? .01 : .05) << kDamages[kind] << ' ' << degree;
       } catch (const InputError&) {
       }

@@ -41,10 +41,6 @@ class Parts : public testing::Test {
   }
 };
 
-double total(const VoxelizedPart& part) {
-  return part.lattice_volume + part.dropped_volume;
-}
-
 TEST_F(Parts, ClosedOnesKeepTheirVolumeAtAThirdOfTheThinnestWall) {
   for (const char* file :
        {"lower_leg_structure_200mm.STL", "lower_leg_structure_fork.STL", "hook.stl", "ADIS16480.STL",
@@ -58,7 +54,7 @@ TEST_F(Parts, ClosedOnesKeepTheirVolumeAtAThirdOfTheThinnestWall) {
     options.size = std::max(wall->thickness / 3, bounding_box(surface.vertices).diagonal() / 100);
     const VoxelizeResult result = run_surface(std::move(surface), options);
     EXPECT_TRUE(result.parts[0].closed) << file;
-    EXPECT_NEAR(total(result.parts[0]) / result.parts[0].surface_volume, 1, 1e-6) << file;
+    EXPECT_NEAR(shapes::total_volume(result.parts[0]) / result.parts[0].surface_volume, 1, 1e-6) << file;
     EXPECT_EQ(result.parts[0].undecided_voxels, 0u) << file;
     EXPECT_EQ(result.parts[0].overlapping_voxels, 0u) << file;
   }
@@ -70,8 +66,8 @@ TEST_F(Parts, WhatIsASheetIsOneOnEveryLattice) {
   for (const double size : {.008, .014, .03}) {
     const VoxelizedPart block = run_file("featuretype.3MF", size).parts[0];
     EXPECT_FALSE(block.closed);
-    if (finest == 0) finest = total(block);
-    EXPECT_NEAR(total(block) / finest, 1, .02) << size;
+    if (finest == 0) finest = shapes::total_volume(block);
+    EXPECT_NEAR(shapes::total_volume(block) / finest, 1, .02) << size;
   }
   for (const std::size_t count : {1000, 50}) {
     VoxelizeOptions options;
@@ -89,7 +85,7 @@ TEST_F(Parts, ConrodHasTheVolumeOfItsUnion) {
   const VoxelizeResult result = run_file("conrod.stl", .04e-3);
   EXPECT_EQ(result.parts[0].shells, 3u);
   EXPECT_GT(result.parts[0].overlapping_voxels, 0u);
-  EXPECT_NEAR(total(result.parts[0]) / result.parts[0].surface_volume, 1, 1e-3);
+  EXPECT_NEAR(shapes::total_volume(result.parts[0]) / result.parts[0].surface_volume, 1, 1e-3);
   EXPECT_EQ(shapes::component_count(result.body), 1u);
 }
 
@@ -102,7 +98,7 @@ TEST_F(Parts, MultibodyIsTurnedTheRightWayRound) {
   for (const VoxelizedPart& part : result.parts) {
     EXPECT_TRUE(part.closed);
     EXPECT_GT(part.surface_volume, 0);
-    EXPECT_NEAR(total(part) / part.surface_volume, 1, 1e-6);
+    EXPECT_NEAR(shapes::total_volume(part) / part.surface_volume, 1, 1e-6);
     flipped += part.healing.flipped_facets;
     inverted += part.healing.inverted_shells;
   }

@@ -173,6 +173,15 @@ inline VoxelizeResult run(const Mesh& mesh, double size, Align align = Align::no
   return result;
 }
 
+inline double total_volume(const VoxelizedPart& part) {
+  return part.lattice_volume + part.dropped_volume;
+}
+
+// Of the first part.
+inline double total_volume(const VoxelizeResult& result) {
+  return total_volume(result.parts[0]);
+}
+
 // Connected components of elements (through cells, or bits for centre placement), number of each element.
 inline std::vector<std::uint32_t> components(const Body& body, std::uint32_t& count) {
   const Adjacency graph = element_adjacency(body);

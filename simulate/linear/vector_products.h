@@ -1,0 +1,16 @@
+// Products of columns of vectors, one vector a row of a system.
+#pragma once
+#include <vector>
+
+#include "formats/vec.h"
+
+namespace flexel {
+
+// sum_i a_i . b_i, in parallel; the same bits for any thread count.
+[[nodiscard]] double dot(const std::vector<Vec3>& a, const std::vector<Vec3>& b);
+
+// sum_i weight_i a_i . b_i, likewise.
+[[nodiscard]] double weighted_dot(const std::vector<Vec3>& a, const std::vector<Vec3>& b,
+                                  const std::vector<double>& weight);
+
+}  // namespace flexel
