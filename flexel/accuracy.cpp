@@ -8,7 +8,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "flexel/json_of.h"
 #include "flexel/study/predict.h"
 #include "formats/error.h"
 #include "formats/units.h"
@@ -148,6 +147,10 @@ double peak_memory() {
   rusage usage = {};
   getrusage(RUSAGE_SELF, &usage);
   return 1024.0 * static_cast<double>(usage.ru_maxrss);
+}
+
+nlohmann::ordered_json json_of(const std::optional<double>& value) {
+  return value ? nlohmann::ordered_json(*value) : nullptr;
 }
 
 class Search {

@@ -5,9 +5,9 @@
 #include <nlohmann/json.hpp>
 
 #include "flexel/commands.h"
+#include "flexel/coordinates.h"
 #include "flexel/export/calculix_file.h"
 #include "flexel/job.h"
-#include "flexel/json_of.h"
 #include "formats/files.h"
 #include "formats/parallel.h"
 #include "formats/units.h"
@@ -139,8 +139,8 @@ std::string summary(const Analysis& analysis, const ExportArguments& arguments) 
     json["loads"].push_back({{"name", load.name},
                              {"kind", load.kind},
                              {"nodes", load.forces.size()},
-                             {"force", json_of(load.total)}});
-  json["gravity"] = analysis.gravity ? json_of(*analysis.gravity) : Json(nullptr);
+                             {"force", coordinates(load.total)}});
+  json["gravity"] = analysis.gravity ? Json(coordinates(*analysis.gravity)) : Json(nullptr);
   json["ties"] = Json::array();
   for (const TiedFaces& tie : analysis.ties)
     json["ties"].push_back({mesh.body.parts[tie.part[0]].name, mesh.body.parts[tie.part[1]].name});

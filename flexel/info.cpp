@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "flexel/commands.h"
+#include "flexel/coordinates.h"
 #include "flexel/face_shape.h"
-#include "flexel/json_of.h"
 #include "formats/import.h"
 #include "formats/program.h"
 #include "formats/progress.h"
@@ -157,13 +157,13 @@ Json face_json(const SurfaceFace& face, std::uint32_t number, const std::string&
                const FaceShape& shape) {
   Json json = {{"number", number},   {"selection", fmt::format("{}/{}", part, number)},
                {"name", face.name},  {"polygons", shape.polygons},
-               {"area", shape.area}, {"centroid", json_of(shape.centroid)}};
+               {"area", shape.area}, {"centroid", coordinates(shape.centroid)}};
   constexpr const char* kKinds[] = {"flat", "round", "curved"};
   json["kind"] = kKinds[static_cast<int>(shape.kind)];
-  if (shape.kind == FaceShape::Kind::flat) json["normal"] = json_of(shape.normal);
+  if (shape.kind == FaceShape::Kind::flat) json["normal"] = coordinates(shape.normal);
   if (shape.kind == FaceShape::Kind::round) {
-    json["axis"] = json_of(shape.axis);
-    json["axis_point"] = json_of(shape.axis_point);
+    json["axis"] = coordinates(shape.axis);
+    json["axis_point"] = coordinates(shape.axis_point);
     json["radius"] = shape.radius;
     json["hole"] = shape.hollow;
   }
@@ -175,8 +175,8 @@ Json part_json(const PartInfo& part) {
                {"vertices", part.vertices},
                {"polygons", part.polygons},
                {"triangles", part.triangles},
-               {"min", json_of(part.box.min)},
-               {"max", json_of(part.box.max)},
+               {"min", coordinates(part.box.min)},
+               {"max", coordinates(part.box.max)},
                {"area", part.area},
                {"volume", part.closed() ? Json(part.volume) : Json()},
                {"closed", part.closed()},
@@ -185,9 +185,9 @@ Json part_json(const PartInfo& part) {
                {"non_manifold_edges", part.topology.non_manifold_edges},
                {"misoriented_edges", part.topology.misoriented_edges},
                {"degenerate_triangles", part.topology.degenerate_triangles}};
-  json["thinnest_wall"] =
-      part.thinnest ? Json{{"thickness", part.thinnest->thickness}, {"where", json_of(part.thinnest->where)}}
-                    : Json();
+  json["thinnest_wall"] = part.thinnest ? Json{{"thickness", part.thinnest->thickness},
+                                               {"where", coordinates(part.thinnest->where)}}
+                                        : Json();
   return json;
 }
 

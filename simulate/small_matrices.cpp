@@ -1,3 +1,4 @@
+// Both are called some times a part or an element, never in a loop over time.
 #include "simulate/small_matrices.h"
 
 #include <Eigen/Eigenvalues>

@@ -3,7 +3,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "flexel/json_of.h"
 #include "flexel/study/study.h"
 #include "formats/units.h"
 
@@ -11,7 +10,6 @@ namespace flexel::study {
 namespace {
 
 using OrderedJson = nlohmann::ordered_json;
-using flexel::json_of;
 
 // Commas and quotes in names, as RFC 4180 has it.
 std::string quoted(const std::string& text) {
@@ -84,6 +82,10 @@ std::vector<Field> fields(std::size_t run, const Row& row, const std::vector<Qua
     out.push_back({fmt::format("{} [{}]", quantity.name, quantity.unit), value ? number(value->value) : ""});
   }
   return out;
+}
+
+OrderedJson json_of(const std::optional<double>& value) {
+  return value ? OrderedJson(*value) : nullptr;
 }
 
 OrderedJson json_of(const Summed& each) {

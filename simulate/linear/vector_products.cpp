@@ -1,3 +1,4 @@
+// Sums by blocks in a fixed order (formats/parallel.h).
 #include "simulate/linear/vector_products.h"
 
 #include "formats/parallel.h"

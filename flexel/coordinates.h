@@ -1,0 +1,14 @@
+// A vector as reports write it.
+#pragma once
+#include <array>
+
+#include "formats/vec.h"
+
+namespace flexel {
+
+// x, y, z: what JSON writes as a list.
+[[nodiscard]] inline std::array<double, 3> coordinates(const Vec3& vector) {
+  return {vector.x(), vector.y(), vector.z()};
+}
+
+}  // namespace flexel
