@@ -153,6 +153,8 @@ nlohmann::ordered_json json_of(const std::optional<double>& value) {
   return value ? nlohmann::ordered_json(*value) : nullptr;
 }
 
+constexpr int kGivenUp = 3;  // lattices that turn out too large, until the search ends
+
 class Search {
  public:
   Search(const AccuracyGoal& goal, const SolveAt& solve, AccuracyReport& report, Progress& progress)
@@ -160,10 +162,17 @@ class Search {
 
   SolvedRun operator()() {
     first_runs();
-    for (int finer = 0; finer < kFinerRuns; ++finer) {
+    for (int finer = 0; finer < kFinerRuns;) {
       const std::optional<double> size = next_size();
       if (!size) return finish();
-      if (!run(*size)) break;
+      const Outcome outcome = run(*size);
+      if (outcome == Outcome::failed) break;
+      if (outcome == Outcome::given_up) {
+        if (++given_up_ > kGivenUp) break;
+        continue;
+      }
+      chosen_ = !goal_.error;
+      ++finer;
     }
     if (goal_.error && !met() && report_.stopped.empty())
       report_.stopped = fmt::format("{} runs did not close in on a value", report_.runs.size());
@@ -178,10 +187,10 @@ class Search {
     double size = 0;
     for (int failures = 0; runs_.empty(); ++failures) try {
         if (size == 0) {
-          SolvedRun first = solve_(std::nullopt);
+          const SolvedRun first = solve_(std::nullopt, {});
           size = round3(spacing_of(first));
         }
-        keep(solve_(size));
+        keep(solve_(size, [](std::size_t) { return true; }));
       } catch (const InputError& error) {
         fail(size, error.what(), failures);
       } catch (const DivergedError& error) {
@@ -200,20 +209,32 @@ class Search {
     size = round3(size / 2);
   }
 
-  // False where the size cannot be solved.
-  bool run(double size) {
+  enum class Outcome { done, given_up, failed };
+
+  // Given up where the lattice has more cells than the time or the memory that is left allow.
+  Outcome run(double size) {
+    study::Prediction told;
     try {
-      const study::Prediction told = prediction(size);
-      keep(solve_(size));
+      SolvedRun solved = solve_(size, [&](std::size_t cells) {
+        counted_ = {size, static_cast<double>(cells)};
+        told = prediction(size);
+        return affordable(told);
+      });
+      if (solved.given_up) {
+        say_unaffordable(told);
+        return Outcome::given_up;
+      }
+      report_.stopped.clear();
+      keep(std::move(solved));
       report_.runs.back().predicted_seconds = told.seconds;
       report_.runs.back().predicted_memory = told.bytes;
-      return true;
+      return Outcome::done;
     } catch (const DivergedError&) {
       report_.stopped = fmt::format("the run at {} diverged", size_text(size));
     } catch (const InputError& error) {
       report_.stopped = fmt::format("the run at {} cannot be made: {}", size_text(size), error.what());
     }
-    return false;
+    return Outcome::failed;
   }
 
   void keep(SolvedRun solved) {
@@ -226,6 +247,7 @@ class Search {
     predictor_.add(study::kOneProcess, {static_cast<double>(solved.voxels.body.cell_count()), 1}, observed);
     const double total = solved.voxelize_seconds + solved.simulated.seconds +
                          solved.simulated.error_bars.seconds + solved.map_seconds;
+    counted_ = {solved.size, static_cast<double>(solved.voxels.body.cell_count())};
     runs_.push_back(std::move(solved));
     if (runs_.size() > 3) runs_.erase(runs_.begin());
     judged_ = judge(runs_, quantities_);
@@ -246,9 +268,10 @@ class Search {
     report_.runs.push_back(std::move(tried));
   }
 
+  // From the lattice that was made last: a cube of half the spacing has eight times the cells, walls of a
+  // cell or two may have any number.
   [[nodiscard]] double cells_at(double size) const {
-    const SolvedRun& last = runs_.back();
-    return static_cast<double>(last.voxels.body.cell_count()) * std::pow(last.size / size, 3);
+    return counted_.cells * std::pow(counted_.size / size, 3);
   }
   // As the study does (study/predict.h), from the runs that were made.
   [[nodiscard]] study::Prediction prediction(double size) const {
@@ -259,8 +282,8 @@ class Search {
   }
   // What the runs that are kept hold already is part of the prediction.
   [[nodiscard]] double memory_limit() const { return kMemoryShare * (available_memory() + peak_memory()); }
-  [[nodiscard]] bool affordable(double size) const {
-    const study::Prediction told = prediction(size);
+  [[nodiscard]] bool affordable(double size) const { return affordable(prediction(size)); }
+  [[nodiscard]] bool affordable(const study::Prediction& told) const {
     return told.seconds <= kTimeMargin * seconds_left() && told.bytes <= memory_limit();
   }
 
@@ -287,16 +310,15 @@ class Search {
       wanted = last / 100;  // as fine as the time allows
     }
     const std::optional<double> size = finest(wanted, last / kLeastStep);
-    if (!size && goal_.error) {
-      const double least = last / kLeastStep;
-      const study::Prediction told = prediction(least);
-      report_.stopped = told.bytes > memory_limit()
-                            ? fmt::format("the next run would need {} of memory", human_bytes(told.bytes))
-                            : fmt::format("the next run would take about {:.2g} s, of {:.2g} s that are left",
-                                          told.seconds, std::max(0.0, seconds_left()));
-    }
-    chosen_ = !goal_.error;
+    if (!size && goal_.error) say_unaffordable(prediction(last / kLeastStep));
     return size;
+  }
+
+  void say_unaffordable(const study::Prediction& told) {
+    report_.stopped = told.bytes > memory_limit()
+                          ? fmt::format("the next run would need {} of memory", human_bytes(told.bytes))
+                          : fmt::format("the next run would take about {:.2g} s, of {:.2g} s that are left",
+                                        told.seconds, std::max(0.0, seconds_left()));
   }
 
   SolvedRun finish() { return std::move(runs_.back()); }
@@ -309,6 +331,11 @@ class Search {
   study::Predictor predictor_;
   std::vector<SolvedRun> runs_;  // the last three that went well
   std::optional<Judged> judged_;
+  struct Counted {
+    double size = 0;  // m, asked for
+    double cells = 0;
+  } counted_;            // of the lattice that was made last
+  int given_up_ = 0;     // lattices that were not solved
   bool chosen_ = false;  // the one run that --within asks for was made
 };
 

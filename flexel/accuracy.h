@@ -30,10 +30,14 @@ struct SolvedRun {
   SimulateResult simulated;
   std::vector<Vec3> mapped;  // (vertices) m
   double voxelize_seconds = 0, map_seconds = 0;
+  bool given_up = false;
 };
 
-// Runs the stages at `size`; nothing: about 2,000 cells.
-using SolveAt = std::function<SolvedRun(std::optional<double> size)>;
+// Asked of a run when its lattice is made: whether so many cells are to be solved.
+using GoesOn = std::function<bool(std::size_t cells)>;
+// Runs the stages at `size`; nothing: makes a lattice of about 2,000 cells and no more. Where `goes_on` says
+// no, nor is anything solved: the run is `given_up`.
+using SolveAt = std::function<SolvedRun(std::optional<double> size, const GoesOn& goes_on)>;
 
 struct AccuracyGoal {
   std::optional<double> error;   // share, of --accuracy

@@ -166,7 +166,7 @@ SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surf
   plan.goal->driven |= !plan.job.moves.empty();
   MapOptions mapping;
   mapping.method = plan.map.method;
-  const auto solve = [&](std::optional<double> size) {
+  const auto solve = [&](std::optional<double> size, const GoesOn& goes_on) {
     SolvedRun run;
     run.size = size.value_or(0);
     VoxelizeOptions options = plan.job.voxelize;
@@ -176,6 +176,10 @@ SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surf
     run.voxels = voxelize(surface, options, quiet);
     run.voxelize_seconds = seconds_since(began);
     if (!size) return run;  // only its spacing is wanted
+    if (!goes_on(run.voxels.body.cell_count())) {
+      run.given_up = true;
+      return run;
+    }
     if (std::exchange(first, false)) add_actions(plan.job, run.voxels.body);
     run.simulated = simulate(run.voxels.body, plan.job.scene, simulate_options(arguments, plan), quiet);
     began = std::chrono::steady_clock::now();

@@ -1,5 +1,6 @@
 // Whether a study's predictions of time and memory hold (docs/study.md): the same part and scene at sizes
-// with 2.5 times the cells each, each one predicted from those before it and then run.
+// with 2.5 times the cells each, each one predicted from those before it, once its lattice is made and its
+// cells are counted, and then run.
 //
 //     build/release/bin/predictions PART SCENE.toml COARSEST-SIZE-MM [MOST-CELLS]
 //
@@ -47,8 +48,13 @@ int main(int argc, char** argv) {
   for (; cells * kGrowth < most; size /= std::cbrt(kGrowth)) {
     study::Configuration configuration;
     configuration.size = size;
-    const study::Prediction told = predictor.predict("", {kGrowth * cells});
-    study::RunResult run = study::run_configuration(wanted, configuration, {folder, {}, {}});
+    study::Prediction told;
+    study::RunOptions options{folder, {}, {}};
+    options.goes_on = [&](std::size_t counted) {
+      told = predictor.predict("", {static_cast<double>(counted)});
+      return true;
+    };
+    study::RunResult run = study::run_configuration(wanted, configuration, options);
     if (!run.ok()) {
       fmt::print(stderr, "{}\n", run.failure);
       return 1;

@@ -192,6 +192,8 @@ RunResult run_calculix(const Case& study, double size, bool large_deflection, in
   result.cells = told["elements"];
   result.elements = told["nodes"];
   result.spacing = size;
+  result.given_up = options.goes_on && !options.goes_on(result.cells);
+  if (result.given_up) return result;
   const std::string ccx = find_program("ccx");
   child.folder = folder.path();  // ccx leaves files where it is
   if (ccx.empty())

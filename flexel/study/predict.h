@@ -38,6 +38,9 @@ struct Prediction {
   double seconds = 0;  // wall
   double bytes = 0;    // the largest of the programs
   std::vector<Stage> stages;
+
+  // Of a run so many times as costly.
+  [[nodiscard]] Prediction scaled(double factor) const { return {factor * seconds, factor * bytes, stages}; }
 };
 
 // Kinds of runs whose costs follow laws of their own: CalculiX's direct solver, cells being tetrahedra; and

@@ -57,7 +57,9 @@ class Run {
   RunResult result() {
     for (const char* stage : kStages) result_.stages.push_back({stage, 0});
     try {
-      if (voxelize() && simulate()) map();
+      if (!voxelize()) return std::move(result_);
+      result_.given_up = options_.goes_on && !options_.goes_on(result_.size());
+      if (!result_.given_up && simulate()) map();
     } catch (const Json::exception& error) {
       result_.failure = fmt::format("a summary cannot be read, is the disk full? {}", error.what());
     }

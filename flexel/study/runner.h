@@ -4,6 +4,7 @@
 #pragma once
 #include <array>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -68,6 +69,7 @@ struct RunResult {
   std::string failure;                     // "" when all went well, else the program's own line
   int exit_code = 0;                       // of the program that failed
   bool out_of_time = false;                // stopped at the deadline
+  bool given_up = false;                   // by RunOptions::goes_on; not a failure
   double wall = 0, cpu = 0;                // s, of the three programs together
   double memory = 0;                       // bytes, the largest of the three
   std::array<double, 3> program_memory{};  // bytes: flexel-voxelize, flexel-simulate, flexel-map
@@ -83,7 +85,7 @@ struct RunResult {
   double simulate_seconds = 0;         // s, without reading and writing
   std::optional<double> energy_drift;  // timed runs: worst residual of the books over their largest term
 
-  [[nodiscard]] bool ok() const { return failure.empty(); }
+  [[nodiscard]] bool ok() const { return failure.empty() && !given_up; }
   [[nodiscard]] const Quantity* find(const std::string& name) const;
   // Cells, or elements where there are none.
   [[nodiscard]] std::size_t size() const { return cells > 0 ? cells : elements; }
@@ -96,6 +98,9 @@ struct RunOptions {
   std::filesystem::path surface;  // where the mapped surface is kept (.ply); "": nowhere
   std::filesystem::path history;  // timed runs: where the books are kept (.csv); "": nowhere
   Deadline deadline = kNever;
+  // Asked when the lattice is made (of CalculiX the mesh): whether so many cells are to be solved (elements
+  // where there are none, tetrahedra). The run ends there otherwise, `given_up`. Empty: they are.
+  std::function<bool(std::size_t size)> goes_on;
 };
 
 // Runs the configuration. A run that fails is a result with `failure`; throws Interrupted, and InputError

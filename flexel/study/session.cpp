@@ -29,6 +29,7 @@ constexpr double kFirstShare = 0.7;    // of the budget, for the first run of ea
 constexpr double kFinishShare = 0.08;  // of the budget, for the page
 constexpr double kMemoryShare = 0.8;   // of what is free
 constexpr double kSideShare = 0.1;     // of the budget, the most that one run beside the ladder may take
+constexpr double kFewerCells = 1.4;    // than a size is thought to give, by the size before it
 constexpr double kKnown = 0.05;        // how well a median should be known
 constexpr int kMostRepeats = 9;
 constexpr double kLongest = 1e9;  // s
@@ -166,22 +167,30 @@ bool Session::run_cheapest(Sweep& sweep) {
         if (open[i].sweep == ladder) best = i;
   const Trial& trial = open[best];
   const Prediction& told = predicted[best];
-  std::string why;
+  // Fewer cells than the size's cube are a chance to be looked at, once the lattice is made.
+  const std::string why = why_not(trial, told.scaled(1 / kFewerCells));
+  if (why.empty())
+    run_one(sweep, trial, told);
+  else
+    leave_out(sweep, trial, told, why);
+  return true;
+}
+
+// What speaks against a first run; "" where nothing does.
+std::string Session::why_not(const Trial& trial, const Prediction& told) const {
   const double time_left = kFirstShare * wanted_.budget - spent();
   if (told.seconds > time_left)
-    why = fmt::format("time: {} were left for first runs", human_seconds(std::max(0.0, time_left)));
-  else if (trial.sweep != "resolution" && trial.sweep != "calculix" &&
-           told.seconds > kSideShare * wanted_.budget)
-    why = "time: beside the sizes no run may take more than a tenth of the budget";
-  else if (told.bytes > kMemoryShare * available_memory())
-    why = fmt::format("memory: {} are free", human_bytes(available_memory()));
-  if (why.empty()) {
-    run_one(sweep, trial, told);
-  } else {
-    study_.left_out.push_back({trial, told, why});
-    sweep.leave_out(trial);
-  }
-  return true;
+    return fmt::format("time: {} were left for first runs", human_seconds(std::max(0.0, time_left)));
+  if (trial.sweep != "resolution" && trial.sweep != "calculix" && told.seconds > kSideShare * wanted_.budget)
+    return "time: beside the sizes no run may take more than a tenth of the budget";
+  if (told.bytes > kMemoryShare * available_memory())
+    return fmt::format("memory: {} are free", human_bytes(available_memory()));
+  return "";
+}
+
+void Session::leave_out(Sweep& sweep, const Trial& trial, const Prediction& told, const std::string& why) {
+  study_.left_out.push_back({trial, told, why});
+  sweep.leave_out(trial);
 }
 
 void Session::repeat_all(Sweep& sweep) {
@@ -216,13 +225,24 @@ std::string Session::kept(const char* what, const Trial& trial, const char* endi
   return (folder_->path() / fmt::format("{}-{}{}", what, numbers_.at(trial.label), ending)).string();
 }
 
-void Session::run_one(Sweep& sweep, const Trial& trial, const Prediction& predicted) {
+void Session::run_one(Sweep& sweep, const Trial& trial, Prediction predicted) {
   const bool first = numbers_.try_emplace(trial.label, numbers_.size()).second;
   Row row;
   row.trial = trial;
-  row.predicted = predicted;
   for (const Row& each : study_.rows) row.repeat += each.trial.label == trial.label;
-  row.found = run_trial(trial, first);
+  RunOptions options;
+  std::string why;
+  options.goes_on = [&](std::size_t size) {
+    predicted = sweep.predict(trial, size);
+    if (first) why = why_not(trial, predicted);
+    return why.empty();
+  };
+  row.found = run_trial(trial, first, options);
+  if (row.found.given_up) {
+    numbers_.erase(trial.label);
+    return leave_out(sweep, trial, predicted, why);
+  }
+  row.predicted = predicted;
   sweep.done(trial, row.found);
   study_.rows.push_back(row);
   append(row);
@@ -236,8 +256,8 @@ void Session::run_one(Sweep& sweep, const Trial& trial, const Prediction& predic
     progress_.say(fmt::format("{}: {}", trial.label, row.found.failure));
 }
 
-RunResult Session::run_trial(const Trial& trial, bool first) const {
-  RunOptions options;
+RunResult Session::run_trial(const Trial& trial, bool first, const RunOptions& asked) const {
+  RunOptions options = asked;
   options.folder = folder_->path();
   options.deadline = deadline();
   if (trial.sweep == "calculix")

@@ -227,8 +227,10 @@ RunSize Sweep::size_of(const Trial& wanted) const {
   return size;
 }
 
-Prediction Sweep::predict(const Trial& wanted) const {
-  return predictor_.predict(wanted.kind(), size_of(wanted));
+Prediction Sweep::predict(const Trial& wanted, std::optional<std::size_t> counted) const {
+  RunSize size = size_of(wanted);
+  if (counted) size.cells = static_cast<double>(*counted);
+  return predictor_.predict(wanted.kind(), size);
 }
 
 void Sweep::done(const Trial& ended, const RunResult& found) {

@@ -56,8 +56,9 @@ class Sweep {
 
   // The trials that can be run next.
   [[nodiscard]] std::vector<Trial> open() const;
-  // What the next run of this trial takes.
-  [[nodiscard]] Prediction predict(const Trial& trial) const;
+  // What the next run of this trial takes; of so many cells (elements where there are none), once they are
+  // counted.
+  [[nodiscard]] Prediction predict(const Trial& trial, std::optional<std::size_t> counted = {}) const;
   // The run ended (well or not).
   void done(const Trial& trial, const RunResult& found);
   // The trial is not going to be run; of the ladder, nor is any finer size. The same of CalculiX's.

@@ -13,7 +13,7 @@ namespace {
 
 // A cube of side 1 m whose vertex moves by value(h), with `per_cell` seconds a cell.
 SolveAt made_up(const std::function<double(double)>& value, double per_cell = 0) {
-  return [=](std::optional<double> size) {
+  return [=](std::optional<double> size, const GoesOn& goes_on) {
     SolvedRun run;
     run.size = size.value_or(0.08);
     Part part;
@@ -21,6 +21,8 @@ SolveAt made_up(const std::function<double(double)>& value, double per_cell = 0)
     part.lattice.spacing = Vec3::Constant(run.size);
     run.voxels.body.parts.push_back(part);
     run.voxels.body.cell_elements.resize(static_cast<std::size_t>(std::pow(1 / run.size, 3)));
+    run.given_up = size && !goes_on(run.voxels.body.cell_count());
+    if (run.given_up) return run;
     run.mapped = {Vec3(0, 0, value(run.size)), Vec3(0, 0, 0.1)};
     run.simulated.seconds = per_cell * static_cast<double>(run.voxels.body.cell_count());
     return run;
@@ -74,8 +76,8 @@ TEST(Accuracy, ValuesThatCloseInTooFastAreNotTrusted) {
 
 TEST(Accuracy, ProbesCountWhereThereAreSome) {
   const SolveAt solve = made_up([](double h) { return 1 + std::log(h); });  // a vertex that has no limit
-  const SolveAt with_probe = [&](std::optional<double> size) {
-    SolvedRun run = solve(size);
+  const SolveAt with_probe = [&](std::optional<double> size, const GoesOn& goes_on) {
+    SolvedRun run = solve(size, goes_on);
     run.simulated.probes.emplace_back();
     run.simulated.probes.back().name = "tip";
     run.simulated.probes.back().displacement = Vec3(0, 1 + run.size * run.size, 0);
@@ -95,6 +97,27 @@ TEST(Accuracy, WithinIsTheFinestThatFits) {
   EXPECT_GT(report.runs.back().seconds, 8);
 }
 
+// A wall that is cut once more below a size has twice the cells there: counted before anything is solved.
+TEST(Accuracy, ALatticeWithMoreCellsThanThoughtIsGivenUp) {
+  const SolveAt smooth = made_up([](double h) { return 1 + h; }, 1e-4);
+  int solved = 0, made = 0;
+  const SolveAt cut_once_more = [&](std::optional<double> size, const GoesOn& goes_on) {
+    ++made;
+    const bool twice = size && *size < 0.03;
+    SolvedRun run = smooth(size, [&](std::size_t cells) { return goes_on(twice ? 2 * cells : cells); });
+    if (twice) {
+      run.voxels.body.cell_elements.resize(2 * run.voxels.body.cell_count());
+      run.simulated.seconds *= 2;
+    }
+    solved += size && !run.given_up;
+    return run;
+  };
+  const AccuracyReport report = choose(cut_once_more, std::nullopt, 20);
+  EXPECT_GT(made, solved + 1);  // the first lattice is never solved
+  EXPECT_LT(report.runs.back().seconds, 20);
+  EXPECT_GT(report.runs.back().seconds, 8);
+}
+
 TEST(Accuracy, SizesAreThoseThatAreSaid) {
   const AccuracyReport report = choose(made_up([](double h) { return 1 + h; }), 0.02);
   EXPECT_NE(report.sentence().find("--size"), std::string::npos);
@@ -104,9 +127,9 @@ TEST(Accuracy, SizesAreThoseThatAreSaid) {
 
 TEST(Accuracy, SizesThatCannotBeSolvedAreLeftOut) {
   const SolveAt solve = made_up([](double h) { return 1 + h * h; });
-  const SolveAt picky = [&](std::optional<double> size) {
+  const SolveAt picky = [&](std::optional<double> size, const GoesOn& goes_on) {
     if (size && *size > 0.05) throw InputError("too coarse");
-    return solve(size);
+    return solve(size, goes_on);
   };
   const AccuracyReport report = choose(picky, 0.02);
   EXPECT_EQ(report.runs.front().failure, "too coarse");
