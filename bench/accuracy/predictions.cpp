@@ -49,7 +49,8 @@ int main(int argc, char** argv) {
     study::Configuration configuration;
     configuration.size = size;
     study::Prediction told;
-    study::RunOptions options{folder, {}, {}};
+    study::RunOptions options;
+    options.folder = folder;
     options.goes_on = [&](std::size_t counted) {
       told = predictor.predict("", {static_cast<double>(counted)});
       return true;

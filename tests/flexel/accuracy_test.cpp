@@ -135,9 +135,9 @@ TEST(Accuracy, SizesThatCannotBeSolvedAreLeftOut) {
   EXPECT_EQ(report.runs.front().failure, "too coarse");
   EXPECT_TRUE(report.met());
   EXPECT_THROW(choose(
-                   [](std::optional<double> size) -> SolvedRun {
+                   [](std::optional<double> size, const GoesOn& goes_on) -> SolvedRun {
                      if (size) throw InputError("never");
-                     return made_up([](double) { return 1.0; })(size);
+                     return made_up([](double) { return 1.0; })(size, goes_on);
                    },
                    0.02),
                InputError);
