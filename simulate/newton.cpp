@@ -21,6 +21,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <utility>
 
 #include "formats/parallel.h"
 #include "simulate/linear/vector_products.h"
@@ -103,6 +105,7 @@ class Solver {
   bool tangent_kept_ = false;
   bool indefinite_ = false;  // conjugate gradients met negative curvature in the last solve
   double longest_step_ = 0;
+  std::optional<State> before_;  // where the last full step began, until its stresses have been predicted
   // (cells) Pa, predicted by the last full step's linear model; empty before it and for lowering steps
   std::vector<Mat3> predicted_stress_;
 };
@@ -118,6 +121,8 @@ void Solver::update_residual() {
 
 void Solver::prepare_tangent(bool project) {
   kept_.factored = false;
+  if (before_) predicted_stress_ = mechanics_.cells().predicted_stress(*before_, direction_);
+  before_.reset();
   mechanics_.assemble(state_, {project, predicted_stress_.empty() ? nullptr : &predicted_stress_});
   kept_.projected = project;
 }
@@ -289,8 +294,7 @@ bool Solver::full_step() {
   if (indefinite_ || !shrinks) return false;
   State trial = moved(1);
   if (!std::isfinite(mechanics_.energy(trial))) return false;
-  predicted_stress_ = mechanics_.cells().predicted_stress(state_, direction_);
-  state_ = std::move(trial);
+  before_ = std::exchange(state_, std::move(trial));
   if (!gap_.empty()) {
     apply(mechanics_.constraints(), mechanics_.body(), state_, state_.displacement);
     gap_.clear();
@@ -327,7 +331,10 @@ bool Solver::arrived() {
   if (led && (residual_norm_ <= options_.tolerance * scale_ || residual_norm_ == 0)) return true;
   const double keep_below = std::clamp(last_forcing(), kKeepTangentBelow, kKeepLastTangentBelow);
   tangent_kept_ = kept_.factored && led && kept_.model_error <= keep_below;
-  if (!tangent_kept_) prepare_tangent(false);
+  if (tangent_kept_)
+    before_.reset();
+  else
+    prepare_tangent(false);
   return led && residual_norm_ <= rounding_floor(mechanics_.tangent(), state_.displacement);
 }
 

@@ -201,8 +201,11 @@ std::optional<std::vector<Vec3>> Run::coarse_equilibrium() const {
       *options.timeout -= std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
     Progress silent("", Progress::Mode::silent);
     Run run(coarse.body, same, options, silent);
-    (void)run();
+    const SimulateResult found = run();
     if (run.buckled_) return std::nullopt;  // the lattices may go to different sides
+    if (options_.explain)
+      progress_.say(fmt::format("start: from the equilibrium of {} cells, {} Newton iterations",
+                                human_count(coarse.body.cell_count()), found.newton_iterations));
     return prolonged_displacement(coarse, body_);
   } catch (const InputError&) {
   } catch (const DivergedError&) {
