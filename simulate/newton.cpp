@@ -163,7 +163,6 @@ std::vector<Vec3> Solver::right_hand_side() {
 LinearResult Solver::iterate(const std::vector<Vec3>& rhs, double forcing) {
   const double decades = std::max(1.0, -std::log10(forcing));
   const double usual = kept_.usual_iterations * decades / 4;
-  LinearResult result;
   std::vector<Vec3> left = rhs;
   double share = 1;  // of the right-hand side, that `left` is
   direction_.assign(rhs.size(), Vec3::Zero());
@@ -187,7 +186,7 @@ LinearResult Solver::iterate(const std::vector<Vec3>& rhs, double forcing) {
       return stopped;
     };
     std::vector<Vec3> step;
-    const LinearResult one = conjugate_gradients(
+    LinearResult one = conjugate_gradients(
         mechanics_.tangent(), left, step, *kept_.preconditioner, std::min(forcing / share, kLargestForcing),
         most,
         [&](int iteration, double relative) {
@@ -196,13 +195,11 @@ LinearResult Solver::iterate(const std::vector<Vec3>& rhs, double forcing) {
         },
         hopeless);
     outcome_.cg_iterations += one.iterations;
-    result.iterations = one.iterations;
-    result.indefinite = one.indefinite || (full() && (one.iterations == most || (stopped && !stale)));
     // An ascending direction is of no use beside what is there already.
     if (share == 1 || !(one.indefinite && one.iterations == 0))
       parallel_for_each(rhs.size(), [&](std::size_t e) { direction_[e] += step[e]; });
-    result.relative_residual = share * one.relative_residual;
-    if (!stopped || !stale) return result;
+    one.indefinite = one.indefinite || (full() && (one.iterations == most || (stopped && !stale)));
+    if (!stopped || !stale) return one;
     multiply(mechanics_.tangent(), direction_, left);
     parallel_for_each(rhs.size(), [&](std::size_t e) { left[e] = rhs[e] - left[e]; });
     share = norm(left) / norm(rhs);
