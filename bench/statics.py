@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Time and memory of statics: three runs of flexel-simulate at equilibrium, without error bars.
+"""Time and memory of statics: three runs of flexel-simulate at equilibrium, without error bars unless --bars asks for them.
 
-    PATH=build/release/bin:$PATH bench/statics.py [--threads N] [--parts DIR] [ROW...]
+    PATH=build/release/bin:$PATH bench/statics.py [--threads N] [--bars] [--parts DIR] [ROW...]
 
   solid   a bar of 1,048,576 cells, 4:1:1, held at one end, a small load across the other
   cover   the housing cover of the real parts at 200,000 cells, held below, a small load on top
@@ -41,7 +41,7 @@ ROWS = {
 }
 
 
-def run(name, parts, threads):
+def run(name, parts, threads, bars):
     what, size, scene = ROWS[name]
     with tempfile.TemporaryDirectory() as place:
         folder = pathlib.Path(place)
@@ -54,8 +54,8 @@ def run(name, parts, threads):
         (folder / "scene.toml").write_text(scene)
         subprocess.run(["flexel-voxelize", part, *size, "--quiet", "-o", folder / "body.vtu"], check=True, stderr=subprocess.DEVNULL)
         began = time.monotonic()
-        process = subprocess.Popen(["flexel-simulate", folder / "scene.toml", folder / "body.vtu", "--no-estimate", "--threads", str(threads),
-                                    "--quiet", "--summary", folder / "s.json", "-o", folder / "out.vtu"])
+        process = subprocess.Popen(["flexel-simulate", folder / "scene.toml", folder / "body.vtu", *([] if bars else ["--no-estimate"]),
+                                    "--threads", str(threads), "--quiet", "--summary", folder / "s.json", "-o", folder / "out.vtu"])
         _, status, usage = os.wait4(process.pid, 0)
         wall = time.monotonic() - began
         if status:
@@ -69,6 +69,7 @@ def run(name, parts, threads):
 def main():
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("--threads", default=2, type=int)
+    arguments.add_argument("--bars", action="store_true", help="with error bars, as flexel-simulate does by default")
     arguments.add_argument("--parts", default=pathlib.Path(__file__).resolve().parents[1] / "../shared/parts", type=pathlib.Path)
     arguments.add_argument("rows", nargs="*", metavar="ROW", help=", ".join(ROWS))
     options = arguments.parse_args()
@@ -76,7 +77,7 @@ def main():
         arguments.error(f"unknown row {unknown[0]}; there are {', '.join(ROWS)}")
     print("| row | cells | Newton | CG | wall s | processor s | MB | end moved |\n|---|---|---|---|---|---|---|---|")
     for row in options.rows or ROWS:
-        run(row, options.parts, options.threads)
+        run(row, options.parts, options.threads, options.bars)
 
 
 if __name__ == "__main__":

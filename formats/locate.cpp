@@ -49,6 +49,7 @@ std::optional<std::uint32_t> cell_at(const Body& body, std::span<const std::uint
 
 struct Candidate {
   double squared_distance;
+  int place;
   Voxel voxel;
 };
 
@@ -58,10 +59,10 @@ std::array<Candidate, 27> voxels_around(const Vec3& at, const Vec3& spacing) {
   std::array<Candidate, 27> result;
   for (int n = 0; n < 27; ++n) {
     const Voxel voxel = home + Voxel(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
-    result[n] = {squared_distance(at, voxel, spacing), voxel};
+    result[n] = {squared_distance(at, voxel, spacing), n, voxel};
   }
-  std::stable_sort(result.begin(), result.end(), [](const Candidate& a, const Candidate& b) {
-    return a.squared_distance < b.squared_distance;
+  std::sort(result.begin(), result.end(), [](const Candidate& a, const Candidate& b) {
+    return std::tie(a.squared_distance, a.place) < std::tie(b.squared_distance, b.place);
   });
   return result;
 }

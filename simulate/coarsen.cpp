@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <numeric>
 #include <tuple>
 
@@ -241,29 +242,30 @@ Surface without_bytes(const Surface& surface) {
 
 }  // namespace
 
-Body coarsened(const Body& body) {
+Coarsening coarsening(const Body& body) {
   refuse(body);
   const FacePairs pairs = face_pairs(body);
-  Body coarse;
-  std::vector<PartCoarsening> parts;
-  parts.reserve(body.parts.size());
+  Coarsening result{{}, {0}, {}};
+  Body& coarse = result.body;
   for (std::size_t p = 0; p < body.parts.size(); ++p) {
-    parts.emplace_back(body, p, pairs);
-    parts.back().append_to(coarse);
+    PartCoarsening part(body, p, pairs);
+    part.append_to(coarse);
+    for (std::uint32_t c = body.parts[p].cell_begin; c < body.parts[p].cell_end; ++c) {
+      part.cells_of(c, result.cells);
+      result.offsets.push_back(static_cast<std::uint32_t>(result.cells.size()));
+    }
   }
   coarse.position = coarse.rest;
   coarse.broken.assign(coarse.cell_count(), 0);
   coarse.surface = without_bytes(body.surface);
-  std::size_t part = 0;
   std::vector<std::uint32_t> under;
   for (std::size_t p = 0; p + 1 < body.surface_cell_offsets.size(); ++p) {
     coarse.surface_cell_offsets.push_back(static_cast<std::uint32_t>(coarse.surface_cells.size()));
     under.clear();
     for (std::uint32_t at = body.surface_cell_offsets[p]; at < body.surface_cell_offsets[p + 1]; ++at) {
       const std::uint32_t cell = body.surface_cells[at];
-      while (cell < body.parts[part].cell_begin) --part;
-      while (cell >= body.parts[part].cell_end) ++part;
-      parts[part].cells_of(cell, under);
+      under.insert(under.end(), result.cells.begin() + result.offsets[cell],
+                   result.cells.begin() + result.offsets[cell + 1]);
     }
     std::sort(under.begin(), under.end());
     under.erase(std::unique(under.begin(), under.end()), under.end());
@@ -272,7 +274,54 @@ Body coarsened(const Body& body) {
   if (!body.surface_cell_offsets.empty())
     coarse.surface_cell_offsets.push_back(static_cast<std::uint32_t>(coarse.surface_cells.size()));
   derive_connections(coarse);
-  return coarse;
+  return result;
+}
+
+Body coarsened(const Body& body) {
+  return coarsening(body).body;
+}
+
+namespace {
+
+// In units of the cell's edges, from its first corner.
+Vec3 place_in(const Body& body, const Part& part, std::uint32_t cell, const Vec3& rest) {
+  const Index3& first = body.lattice_index[body.cell_elements[cell][0]];
+  return part.lattice.to_lattice(rest) - Vec3(first[0], first[1], first[2]);
+}
+
+Vec3 moved_in(const Body& body, std::uint32_t cell, const Vec3& place) {
+  Vec3 sum = Vec3::Zero();
+  for (std::uint32_t a = 0; a < 8; ++a) {
+    double weight = 1;
+    for (int axis = 0; axis < 3; ++axis) weight *= a >> axis & 1u ? place[axis] : 1 - place[axis];
+    const std::uint32_t e = body.cell_elements[cell][a];
+    sum += weight * (body.position[e] - body.rest[e]);
+  }
+  return sum;
+}
+
+}  // namespace
+
+std::vector<Vec3> prolonged_displacement(const Coarsening& coarse, const Body& fine) {
+  std::vector<Vec3> moved(fine.element_count(), Vec3::Zero());
+  std::vector<std::uint8_t> found(fine.element_count(), 0);
+  for (std::size_t p = 0; p < fine.parts.size(); ++p) {
+    const Part& part = coarse.body.parts[p];
+    for (std::uint32_t c = fine.parts[p].cell_begin; c < fine.parts[p].cell_end; ++c)
+      for (const std::uint32_t e : fine.cell_elements[c]) {
+        if (found[e] || coarse.offsets[c] == coarse.offsets[c + 1]) continue;
+        found[e] = 1;
+        double nearest = std::numeric_limits<double>::infinity();
+        for (std::uint32_t at = coarse.offsets[c]; at < coarse.offsets[c + 1]; ++at) {
+          const Vec3 place = place_in(coarse.body, part, coarse.cells[at], fine.rest[e]);
+          const double outside = (place.array() - 0.5).abs().maxCoeff();
+          if (!(outside < nearest)) continue;
+          nearest = outside;
+          moved[e] = moved_in(coarse.body, coarse.cells[at], place);
+        }
+      }
+  }
+  return moved;
 }
 
 double share_of_thin_walls(const Body& body, double cells) {

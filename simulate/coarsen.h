@@ -17,6 +17,17 @@ namespace flexel {
 // where the body cannot be coarsened: centre placement, a part one cell thick, columns of an earlier run.
 [[nodiscard]] Body coarsened(const Body& body);
 
+// Likewise, with the coarse cells that each fine one overlaps.
+struct Coarsening {
+  Body body;
+  std::vector<std::uint32_t> offsets, cells;  // of fine cell c: cells[offsets[c]] to cells[offsets[c + 1]]
+};
+[[nodiscard]] Coarsening coarsening(const Body& body);
+
+// (elements) m: how far the matter under each element of `fine` has moved on the coarse body, trilinear in
+// the coarse cell that holds the element; zero for elements of broken cells alone.
+[[nodiscard]] std::vector<Vec3> prolonged_displacement(const Coarsening& coarse, const Body& fine);
+
 // Share of the matter in walls under `cells` cells: the least, over the lattice's axes, of the matter in the
 // row of cells through a cell. Corner placement.
 [[nodiscard]] double share_of_thin_walls(const Body& body, double cells);

@@ -40,7 +40,8 @@ constexpr double kPushedIncrement = 0.25;   // of the first load step: how far b
 constexpr int kPushedIterations = 300;
 constexpr int kMostPushes = 4;         // of a run
 constexpr double kUnsupported = 1e-9;  // of the stiffness of an element in its stiffest direction
-constexpr double kOverload = 3;        // diagonals: a first linear answer beyond this suggests a wrong unit
+constexpr double kFarReach = 0.1;  // diagonals: a first linear answer beyond this makes a start elsewhere pay
+constexpr double kOverload = 3;    // diagonals: a first linear answer beyond this suggests a wrong unit
 
 std::string axis_name(const Vec3& direction) {
   for (int axis = 0; axis < 3; ++axis)
@@ -69,12 +70,13 @@ int least_load_steps(const Constraints& constraints) {
 class LoadStepping {
  public:
   LoadStepping(Mechanics& mechanics, State& state, const RunSettings& settings, const Deadline& deadline,
-               Progress& progress)
+               Progress& progress, const CoarseStart& start)
       : mechanics_(mechanics),
         state_(state),
         settings_(settings),
         deadline_(deadline),
         progress_(progress),
+        start_(start),
         first_(1.0 / std::max(settings.load_steps, least_load_steps(mechanics.constraints()))),
         increment_(first_) {}
 
@@ -86,6 +88,9 @@ class LoadStepping {
   [[nodiscard]] bool gives_up() const {
     return increment_ <= kSmallestIncrement * first_ || iterations_left() <= 0;
   }
+  // After an attempt: where its linear answer reached too far, tries the whole load from what `start_` gives.
+  // True where the whole load is still to be tried, or done.
+  bool begin_near();
   // Tries to leave a branch that is not stable beyond what is done; true and moved on when it was left.
   bool branch_off();
   void push(State& state) const;
@@ -101,12 +106,15 @@ class LoadStepping {
   const RunSettings& settings_;
   const Deadline& deadline_;
   Progress& progress_;
+  const CoarseStart& start_;
   double first_, increment_, done_ = 0;
   EquilibriumResult result_;
   State trial_;  // of the last attempt
   NewtonOutcome outcome_;
-  double reach_ = 0;     // m: of the first linear answer, for the whole load
-  bool pushed_ = false;  // the next attempt starts beside the last equilibrium
+  double farthest_reach_ = std::numeric_limits<double>::infinity();  // m, of an attempt's linear answer
+  double reach_ = 0;                       // m: of the first linear answer, for the whole load
+  std::optional<std::vector<Vec3>> near_;  // m: where the next attempt starts in place of `state_`
+  bool pushed_ = false;                    // the next attempt starts beside the last equilibrium
   int pushes_ = 0;
 };
 
@@ -129,7 +137,9 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   options.steps = steps;
   options.tolerance = settings_.tolerance;
   options.max_iterations = std::min(max_iterations, iterations_left());
+  options.farthest_reach = farthest_reach_;
   trial_ = state_;
+  if (near_) trial_.displacement = *near_;
   trial_.share = done_ + increment_ > 1 - 1e-9 ? 1 : done_ + increment_;
   if (pushed_) push(trial_);
   outcome_ = newton_with_links(mechanics_, trial_, options, [&](const std::string& note) {
@@ -194,6 +204,7 @@ bool LoadStepping::branch_off() {
   if (!(done_ > 0) || overloaded() || outcome_.relative_residual > kBalanced || pushes_ == kMostPushes)
     return false;
   ++pushes_;
+  result_.buckled = true;
   const double from = done_;
   increment_ = kPushedIncrement * first_;
   pushed_ = true;
@@ -207,9 +218,24 @@ bool LoadStepping::branch_off() {
   return left;
 }
 
+bool LoadStepping::begin_near() {
+  const bool far = outcome_.first_reach > farthest_reach_;
+  farthest_reach_ = std::numeric_limits<double>::infinity();
+  if (!far) return false;
+  if (!overloaded()) near_ = start_();
+  if (near_) (void)attempt(NewtonSteps::full, kFullStepIterations);
+  near_.reset();
+  return true;
+}
+
 EquilibriumResult LoadStepping::operator()() {
+  const std::vector<Motion>& motions = mechanics_.constraints().motions;
+  const bool linked = std::any_of(motions.begin(), motions.end(),
+                                  [](const Motion& motion) { return motion.link != nullptr; });
+  if (start_ && first_ == 1 && !linked)
+    farthest_reach_ = kFarReach * bounding_box(mechanics_.body().rest).diagonal();
   while (done_ < 1) {
-    if (attempt(NewtonSteps::full, kFullStepIterations)) continue;
+    if (attempt(NewtonSteps::full, kFullStepIterations) || begin_near()) continue;
     if (iterations_left() > 0 && increment_ <= kLoweringIncrement * first_ &&
         attempt(NewtonSteps::lowering, NewtonOptions().max_iterations))
       continue;
@@ -267,8 +293,8 @@ void refuse_unsupported_elements(Mechanics& mechanics, const State& start, const
 }
 
 EquilibriumResult find_equilibrium(Mechanics& mechanics, State& state, const RunSettings& settings,
-                                   const Deadline& deadline, Progress& progress) {
-  return LoadStepping(mechanics, state, settings, deadline, progress)();
+                                   const Deadline& deadline, Progress& progress, const CoarseStart& start) {
+  return LoadStepping(mechanics, state, settings, deadline, progress, start)();
 }
 
 }  // namespace flexel

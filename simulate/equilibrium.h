@@ -1,6 +1,7 @@
 // Equilibrium: Newton's method under load steps that cut themselves.
 #pragma once
 #include <chrono>
+#include <functional>
 #include <optional>
 
 #include "formats/progress.h"
@@ -13,6 +14,7 @@ struct EquilibriumResult {
   int load_steps = 0, newton_iterations = 0, cg_iterations = 0;
   double relative_residual = 0;
   double linear_seconds = 0;
+  bool buckled = false;  // left a branch that was not stable any more
 };
 
 // The rigid motions that the ties leave free at `start`: throws InputError(scene, ...) naming part and
@@ -26,9 +28,13 @@ void refuse_unsupported_elements(Mechanics& mechanics, const State& start, const
 // Moves `state` to equilibrium under the whole load. Throws DivergedError naming load step, iteration, the
 // worst cell and a suggestion, and TimeoutError once `deadline` has passed; `state` is then the last one in
 // equilibrium. Throws Interrupted.
+//
+// `start` is asked for displacements (elements, m) near the equilibrium under the whole load, once, where the
+// linear answer reaches so far that the way there is long; it may be empty, or give nothing.
+using CoarseStart = std::function<std::optional<std::vector<Vec3>>()>;
 using Deadline = std::optional<std::chrono::steady_clock::time_point>;
 [[nodiscard]] EquilibriumResult find_equilibrium(Mechanics& mechanics, State& state,
                                                  const RunSettings& settings, const Deadline& deadline,
-                                                 Progress& progress);
+                                                 Progress& progress, const CoarseStart& start = {});
 
 }  // namespace flexel

@@ -1,5 +1,5 @@
 // A probe more than the scene's follows the material point that moved most, so that all lattices are asked
-// about the same point.
+// about the same point. The largest stress may be elsewhere on each lattice.
 #include "simulate/error_bars.h"
 
 #include <fmt/format.h>
@@ -24,12 +24,14 @@ constexpr double kCoarseTolerance = 1e-6;
 struct Answers {
   std::vector<Vec3> moved;  // m, the probes, then the point that moved most
   double energy = 0;        // J
+  double stress = 0;        // Pa, the largest
 };
 
 Answers answers(const SimulateResult& result) {
   Answers found;
   for (const ProbeResult& probe : result.probes) found.moved.push_back(probe.displacement);
   found.energy = result.elastic_energy;
+  if (result.stress) found.stress = result.stress->value;
   return found;
 }
 
@@ -72,7 +74,7 @@ class CoarseRuns {
     found_.push_back(answers(result));
     found_.back().moved.push_back(body.position[most] - body.rest[most]);
     if (left_) *left_ -= result.seconds;
-    options_.stress = options_.explain = false;
+    options_.explain = false;
     options_.failed_output.clear();
   }
 
@@ -106,6 +108,9 @@ class CoarseRuns {
     return sequence([&](const Answers& each) {
       return length > 0 ? each.moved[which].dot(fine) / length : each.moved[which].norm();
     });
+  }
+  [[nodiscard]] Sequence stress() const {
+    return sequence([](const Answers& each) { return each.stress; });
   }
   [[nodiscard]] Sequence energy() const {
     return sequence([](const Answers& each) { return each.energy; });
@@ -173,6 +178,8 @@ ErrorBars estimate_errors(const Body& body, const Scene& scene, const SimulateOp
   }
   const Sequence energy = runs.energy();
   errors.bars.push_back({ErrorBar::Of::elastic_energy, 0, "", energy.value[0], bar(energy)});
+  if (const Sequence stress = runs.stress(); !wide && stress.value[0] > 0)
+    errors.von_mises = {stress.value, stress_bar(stress)};
   errors.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   return errors;
 }

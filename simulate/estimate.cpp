@@ -11,6 +11,7 @@ namespace {
 constexpr double kSafety = 1.25, kWideSafety = 3;
 constexpr double kLeastOrder = 0.5, kModelOrder = 2, kSuspiciousOrder = 2.1;
 constexpr int kOrderIterations = 50;
+constexpr double kHardlyDiffer = 1e-3;  // stresses, relative
 
 // p with e32 / e21 = (r32^p - 1) / (r21^p - 1) r21^p, by fixed-point iteration (Celik et al. 2008).
 double observed_order(double e21, double e32, const std::array<double, 2>& ratio) {
@@ -44,6 +45,15 @@ Bar richardson(const Sequence& s) {
   // the coarser difference says how large the finer one should be.
   const double expected = std::abs(e32) / std::pow(s.ratio[0], kModelOrder);
   return {std::max(kWideSafety * std::abs(away), expected), s.value[0] + away, order};
+}
+
+std::optional<Bar> stress_bar(const Sequence& s) {
+  const double e21 = s.value[1] - s.value[0], e32 = s.value[2] - s.value[1];
+  if (std::max(std::abs(e21), std::abs(e32)) <= kHardlyDiffer * std::abs(s.value[0])) return wide_bar(s);
+  Bar bar = richardson(s);
+  if (!bar.order) return std::nullopt;
+  bar.half_width = std::max(kWideSafety * std::abs(bar.extrapolated - s.value[0]), std::abs(e21));
+  return bar;
 }
 
 }  // namespace flexel

@@ -32,6 +32,11 @@ struct Bar {
 // Three times the larger difference; what is extrapolated is the finest value.
 [[nodiscard]] Bar wide_bar(const Sequence& sequence);
 
+// Of the largest stress, which beside a re-entrant edge or the rim of a support has no limit: nothing unless
+// the values close in on one with an order of at least 1/2, or hardly differ. Three times Richardson's
+// distance, and at least the finer difference.
+[[nodiscard]] std::optional<Bar> stress_bar(const Sequence& sequence);
+
 struct ErrorBar {
   enum class Of { probe, largest_displacement, elastic_energy };
   Of of = Of::probe;
@@ -47,10 +52,17 @@ struct ErrorBar {
   }
 };
 
+// The largest von Mises stress of each lattice.
+struct StressBar {
+  std::array<double, 3> value{};  // Pa, the finest first
+  std::optional<Bar> bar;         // nothing where they do not converge
+};
+
 struct ErrorBars {
   std::vector<ErrorBar> bars;
-  std::string note;                // why there are none, or why they are wide; "" else
-  std::vector<std::size_t> cells;  // of each lattice, the finest first
+  std::optional<StressBar> von_mises;  // nothing without three lattices, with thin walls, without stresses
+  std::string note;                    // why there are none, or why they are wide; "" else
+  std::vector<std::size_t> cells;      // of each lattice, the finest first
   double seconds = 0;
 };
 

@@ -21,6 +21,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <utility>
 
 #include "formats/parallel.h"
 #include "simulate/linear/vector_products.h"
@@ -31,6 +33,7 @@ namespace {
 constexpr double kFirstForcing = 1e-4;  // relative residual of the first linear solve
 constexpr double kLargestForcing = 0.1;
 constexpr double kKeepTangentBelow = 1e-3;  // model error of the last step under which the tangent is kept
+constexpr double kKeepLastTangentBelow = 1e-2;  // ... where one more step with it suffices
 constexpr double kArmijo = 1e-4;
 constexpr double kSmallestStep = 1.0 / 4096;
 constexpr int kMaxCgIterations = 3000;
@@ -78,6 +81,7 @@ class Solver {
   void prepare_tangent(bool project);
   void factor();
   void solve_linear(const std::vector<Vec3>& rhs, double forcing);
+  LinearResult iterate(const std::vector<Vec3>& rhs, double forcing);
   std::vector<Vec3> right_hand_side();
   bool line_search(const std::vector<Vec3>& residual);
   bool lead_prescribed();
@@ -85,6 +89,7 @@ class Solver {
   [[nodiscard]] State moved(double step) const;
   void update_residual();
   [[nodiscard]] double forcing() const;
+  [[nodiscard]] double last_forcing() const;
 
   Mechanics& mechanics_;
   State& state_;
@@ -97,8 +102,10 @@ class Solver {
   std::vector<Vec3> residual_;  // forces on free components
   std::vector<Vec3> direction_;
   double residual_norm_ = 0, scale_ = 0;
+  bool tangent_kept_ = false;
   bool indefinite_ = false;  // conjugate gradients met negative curvature in the last solve
   double longest_step_ = 0;
+  std::optional<State> before_;  // where the last full step began, until its stresses have been predicted
   // (cells) Pa, predicted by the last full step's linear model; empty before it and for lowering steps
   std::vector<Mat3> predicted_stress_;
 };
@@ -114,6 +121,8 @@ void Solver::update_residual() {
 
 void Solver::prepare_tangent(bool project) {
   kept_.factored = false;
+  if (before_) predicted_stress_ = mechanics_.cells().predicted_stress(*before_, direction_);
+  before_.reset();
   mechanics_.assemble(state_, {project, predicted_stress_.empty() ? nullptr : &predicted_stress_});
   kept_.projected = project;
 }
@@ -149,32 +158,63 @@ std::vector<Vec3> Solver::right_hand_side() {
   return rhs;
 }
 
+// Goes on where it is while conjugate gradients promise to arrive. Where coarser levels of an earlier tangent
+// have become too poor they are made anew, and the iteration goes on from what it had reached.
+LinearResult Solver::iterate(const std::vector<Vec3>& rhs, double forcing) {
+  const double decades = std::max(1.0, -std::log10(forcing));
+  const double usual = kept_.usual_iterations * decades / 4;
+  std::vector<Vec3> left = rhs;
+  double share = 1;  // of the right-hand side, that `left` is
+  direction_.assign(rhs.size(), Vec3::Zero());
+  for (;;) {
+    const PassTimer timer(outcome_.linear_seconds);
+    if (!kept_.factored) factor();
+    const bool stale = kept_.stale, bounded = full() && kept_.projected;
+    const int most = bounded  ? std::min(kMaxCgOfFullStep, 4 * kept_.usual_iterations + kMoreCgOfProjected)
+                     : full() ? kMaxCgOfFullStep
+                              : kMaxCgIterations;
+    bool stopped = false;
+    const auto hopeless = [&](int iteration, double relative) {
+      if (!stale && !bounded) return false;
+      const double least = stale ? std::max<double>(kIterationsOfARefresh, usual / 2)
+                                 : 2 * kept_.usual_iterations + kIterationsOfARefresh;
+      const double gained = std::max(1e-3, -std::log10(relative));
+      const double more = iteration * std::max(0.0, -std::log10(forcing / share) / gained - 1);
+      stopped = iteration >= least && (stale ? more > usual + kIterationsOfARefresh ||
+                                                   iteration >= usual + 3 * kIterationsOfARefresh
+                                             : more > most);
+      return stopped;
+    };
+    std::vector<Vec3> step;
+    LinearResult one = conjugate_gradients(
+        mechanics_.tangent(), left, step, *kept_.preconditioner, std::min(forcing / share, kLargestForcing),
+        most,
+        [&](int iteration, double relative) {
+          progress_(
+              fmt::format("newton {}, cg {}, {:.0e}", outcome_.iterations + 1, iteration, share * relative));
+        },
+        hopeless);
+    outcome_.cg_iterations += one.iterations;
+    // An ascending direction is of no use beside what is there already.
+    if (share == 1 || !(one.indefinite && one.iterations == 0))
+      parallel_for_each(rhs.size(), [&](std::size_t e) { direction_[e] += step[e]; });
+    one.indefinite = one.indefinite || (full() && (one.iterations == most || (stopped && !stale)));
+    if (!stopped || !stale) return one;
+    multiply(mechanics_.tangent(), direction_, left);
+    parallel_for_each(rhs.size(), [&](std::size_t e) { left[e] = rhs[e] - left[e]; });
+    share = norm(left) / norm(rhs);
+    kept_.outdated = true;
+    kept_.factored = false;
+  }
+}
+
 void Solver::solve_linear(const std::vector<Vec3>& rhs, double forcing) {
   const bool fresh = !kept_.preconditioner;
   const double decades = std::max(1.0, -std::log10(forcing));
-  int most = !full()           ? kMaxCgIterations
-             : kept_.projected ? std::min(kMaxCgOfFullStep, 4 * kept_.usual_iterations + kMoreCgOfProjected)
-                               : kMaxCgOfFullStep;
-  const double usual_before = kept_.usual_iterations * decades / 4;
-  LinearResult result;
-  {
-    const PassTimer timer(outcome_.linear_seconds);
-    if (!kept_.factored) factor();
-    if (kept_.stale) most = std::min(most, static_cast<int>(usual_before) + 3 * kIterationsOfARefresh);
-    direction_.assign(rhs.size(), Vec3::Zero());
-    result = conjugate_gradients(
-        mechanics_.tangent(), rhs, direction_, *kept_.preconditioner, forcing, most,
-        [&](int iteration, double relative) {
-          progress_(fmt::format("newton {}, cg {}, {:.0e}", outcome_.iterations + 1, iteration, relative));
-        });
-  }
-  outcome_.cg_iterations += result.iterations;
-  if (kept_.stale && result.iterations > usual_before + kIterationsOfARefresh) kept_.outdated = true;
-  if (kept_.stale && result.iterations == most && !result.converged && !result.indefinite) {
-    kept_.factored = false;
-    return solve_linear(rhs, forcing);
-  }
-  indefinite_ = result.indefinite || (full() && result.iterations == most);
+  const LinearResult result = iterate(rhs, forcing);
+  indefinite_ = result.indefinite;
+  const double before = kept_.usual_iterations * decades / 4;
+  if (kept_.stale && result.iterations > before + kIterationsOfARefresh) kept_.outdated = true;
   // A new hierarchy costs a third more than a refreshed one: a few iterations too many are worth it.
   if (fresh) kept_.usual_iterations = static_cast<int>(std::lround(4 * result.iterations / decades));
   const double usual = kept_.usual_iterations * decades / 4;
@@ -251,8 +291,7 @@ bool Solver::full_step() {
   if (indefinite_ || !shrinks) return false;
   State trial = moved(1);
   if (!std::isfinite(mechanics_.energy(trial))) return false;
-  predicted_stress_ = mechanics_.cells().predicted_stress(state_, direction_);
-  state_ = std::move(trial);
+  before_ = std::exchange(state_, std::move(trial));
   if (!gap_.empty()) {
     apply(mechanics_.constraints(), mechanics_.body(), state_, state_.displacement);
     gap_.clear();
@@ -262,9 +301,17 @@ bool Solver::full_step() {
 
 double Solver::forcing() const {
   const double largest = full() ? kLooseForcing : kLargestForcing;
-  const double wanted = std::min(0.3 * options_.tolerance * scale_ / residual_norm_, kLargestForcing);
+  const double last = last_forcing();
+  // With the same tangent the model is as good as it was; a new one squares its error.
+  const double expected = tangent_kept_ ? kept_.model_error : kept_.model_error * kept_.model_error;
+  if (outcome_.iterations > 0 && expected <= last) return last;
   const double trusted = outcome_.iterations == 0 ? kFirstForcing : std::min(largest, kept_.model_error);
-  return std::max(trusted, wanted);
+  return std::max(trusted, last);
+}
+
+// Relative residual of a linear solution that suffices for this iteration to be the last one.
+double Solver::last_forcing() const {
+  return std::min(0.3 * options_.tolerance * scale_ / residual_norm_, kLargestForcing);
 }
 
 void Solver::begin() {
@@ -279,7 +326,12 @@ void Solver::begin() {
 bool Solver::arrived() {
   const bool led = gap_.empty();
   if (led && (residual_norm_ <= options_.tolerance * scale_ || residual_norm_ == 0)) return true;
-  if (!kept_.factored || kept_.model_error > kKeepTangentBelow || !led) prepare_tangent(false);
+  const double keep_below = std::clamp(last_forcing(), kKeepTangentBelow, kKeepLastTangentBelow);
+  tangent_kept_ = kept_.factored && led && kept_.model_error <= keep_below;
+  if (tangent_kept_)
+    before_.reset();
+  else
+    prepare_tangent(false);
   return led && residual_norm_ <= rounding_floor(mechanics_.tangent(), state_.displacement);
 }
 
@@ -293,6 +345,7 @@ bool Solver::advance() {
     direction_.assign(rhs.size(), Vec3::Zero());
   if (outcome_.iterations == 0)
     for (const Vec3& step : direction_) outcome_.first_reach = std::max(outcome_.first_reach, step.norm());
+  if (outcome_.first_reach > options_.farthest_reach) return false;
   // What the linear model predicts for the residual after a full step.
   std::vector<Vec3> predicted(rhs.size());
   if (kept_.factored) multiply(mechanics_.tangent(), direction_, predicted);

@@ -1,6 +1,7 @@
 // Newton's method for one load share.
 #pragma once
 #include <functional>
+#include <limits>
 #include <string>
 
 #include "simulate/linear/solve.h"
@@ -18,6 +19,8 @@ struct NewtonOptions {
   double tolerance = 1e-8;  // residual relative to loads and reactions
   int max_iterations = 40;
   double least_scale = 0;  // N, that the residual is measured against at least
+  // m: a first linear answer that reaches further ends the attempt
+  double farthest_reach = std::numeric_limits<double>::infinity();
 };
 
 // What one solution may leave to the next, of the same mechanics nearby: the tangent, eliminated, in

@@ -11,6 +11,7 @@
 #include "formats/error.h"
 #include "formats/parallel.h"
 #include "formats/units.h"
+#include "simulate/coarsen.h"
 #include "simulate/equilibrium.h"
 #include "simulate/error_bars.h"
 #include "simulate/fragments.h"
@@ -25,6 +26,11 @@
 
 namespace flexel {
 namespace {
+
+// Of a start from a coarser lattice
+constexpr std::size_t kLeastCellsToCoarsen = 4000;
+constexpr double kMostThinWalls = 0.2;  // share of the matter, in walls thinner than a coarse cell
+constexpr double kStartTolerance = 1e-5;
 
 void refuse_empty(const Body& body) {
   if (body.parts.empty() || body.element_count() == 0) throw InputError("the body holds no matter");
@@ -144,6 +150,7 @@ class Run {
 
  private:
   EquilibriumResult solve(Mechanics& mechanics);
+  [[nodiscard]] std::optional<std::vector<Vec3>> coarse_equilibrium() const;
   [[nodiscard]] std::string save_failed(const Mechanics& mechanics);
 
   Body& body_;
@@ -152,6 +159,7 @@ class Run {
   Progress& progress_;
   Fragments fragments_;
   Setting setting_;
+  bool buckled_ = false;
   std::size_t unsupported_ = 0;  // elements at tips and edges that springs do not hold
   State state_;
   std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
@@ -167,12 +175,43 @@ EquilibriumResult Run::solve(Mechanics& mechanics) {
     deadline = began_ + std::chrono::duration_cast<std::chrono::steady_clock::duration>(
                             std::chrono::duration<double>(*options_.timeout));
   try {
-    return find_equilibrium(mechanics, state_, scene_.run, deadline, progress_);
+    return find_equilibrium(mechanics, state_, scene_.run, deadline, progress_,
+                            [&] { return coarse_equilibrium(); });
   } catch (const DivergedError& error) {
     throw DivergedError(error.what() + save_failed(mechanics));
   } catch (const TimeoutError& error) {
     throw TimeoutError(error.what() + save_failed(mechanics));
   }
+}
+
+// Where the elements are in equilibrium on a lattice twice as coarse: nothing where there is none, or where
+// the coarse lattice says little of this one.
+std::optional<std::vector<Vec3>> Run::coarse_equilibrium() const {
+  if (body_.cell_count() < kLeastCellsToCoarsen) return std::nullopt;
+  try {
+    Coarsening coarse = coarsening(body_);
+    if (share_of_thin_walls(coarse.body, 1) > kMostThinWalls) return std::nullopt;
+    Scene same = scene_;
+    same.probes.clear();
+    same.run.tolerance = std::max(scene_.run.tolerance, kStartTolerance);
+    SimulateOptions options = options_;
+    options.stress = options.explain = false;
+    options.failed_output.clear();
+    if (options.timeout)
+      *options.timeout -= std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
+    Progress silent("", Progress::Mode::silent);
+    Run run(coarse.body, same, options, silent);
+    const SimulateResult found = run();
+    if (run.buckled_) return std::nullopt;  // the lattices may go to different sides
+    if (options_.explain)
+      progress_.say(fmt::format("start: from the equilibrium of {} cells, {} Newton iterations",
+                                human_count(coarse.body.cell_count()), found.newton_iterations));
+    return prolonged_displacement(coarse, body_);
+  } catch (const InputError&) {
+  } catch (const DivergedError&) {
+  } catch (const TimeoutError&) {
+  }
+  return std::nullopt;
 }
 
 // Writes the last state in equilibrium; says where it is.
@@ -200,6 +239,7 @@ SimulateResult Run::operator()() {
   Mechanics mechanics(setting_, std::move(passes));
   state_.displacement = where_to_begin(body_);
   const EquilibriumResult solved = solve(mechanics);
+  buckled_ = solved.buckled;
   mechanics.report(state_, result);
   result.elastic_energy = mechanics.elastic_energy(state_);
   result.smallest_jacobian = mechanics.most_compressed(state_).value;

@@ -61,6 +61,16 @@ std::string bar_of(const SimulateResult& result, ErrorBar::Of of, std::size_t pr
   return "";
 }
 
+// Likewise of the largest stress, or that it has none.
+std::string stress_bar_of(const SimulateResult& result) {
+  const std::optional<StressBar>& found = result.error_bars.von_mises;
+  if (!found) return "";
+  if (found->bar) return " +- " + human_pressure(found->bar->half_width);
+  return fmt::format(", which does not converge ({}, {}, {} as the cells get smaller),",
+                     human_pressure(found->value[2]), human_pressure(found->value[1]),
+                     human_pressure(found->value[0]));
+}
+
 Json error_bars_json(const ErrorBars& errors) {
   Json json;
   json["cells"] = errors.cells;
@@ -74,6 +84,14 @@ Json error_bars_json(const ErrorBars& errors) {
                 {"extrapolated", each.bar.extrapolated}};
     bar["order"] = each.bar.order ? Json(*each.bar.order) : Json(nullptr);
     json["bars"].push_back(bar);
+  }
+  if (errors.von_mises) {
+    const std::optional<Bar>& bar = errors.von_mises->bar;
+    const bool ordered = bar && bar->order;
+    json["largest_von_mises"] = {{"values", errors.von_mises->value},
+                                 {"bar", bar ? Json(bar->half_width) : Json(nullptr)},
+                                 {"extrapolated", bar ? Json(bar->extrapolated) : Json(nullptr)},
+                                 {"order", ordered ? Json(*bar->order) : Json(nullptr)}};
   }
   return json;
 }
@@ -224,9 +242,9 @@ std::vector<std::string> summary_lines(const SimulateResult& result) {
     const std::string share = result.stress->yield_share
                                   ? fmt::format(", {:.3g} % of yield", 100 * *result.stress->yield_share)
                                   : "";
-    lines.push_back(fmt::format("largest von Mises stress {} in \"{}\" at {}{}",
-                                human_pressure(result.stress->value), result.stress->part,
-                                lengths(result.stress->at), share));
+    lines.push_back(fmt::format("largest von Mises stress {}{} in \"{}\" at {}{}",
+                                human_pressure(result.stress->value), stress_bar_of(result),
+                                result.stress->part, lengths(result.stress->at), share));
   }
   for (const AppliedLoad& load : result.loads)
     lines.push_back(

@@ -61,7 +61,8 @@ double rounding_level(const LinearOperator& matrix, const Vector& x) {
 
 LinearResult conjugate_gradients(const LinearOperator& matrix, const Vector& b, Vector& x,
                                  const Preconditioner& preconditioner, double tolerance, int max_iterations,
-                                 const std::function<void(int, double)>& progress) {
+                                 const std::function<void(int, double)>& progress,
+                                 const std::function<bool(int, double)>& hopeless) {
   LinearResult result;
   x.assign(b.size(), Vec3::Zero());
   const double scale = std::sqrt(dot(b, b));
@@ -91,7 +92,10 @@ LinearResult conjugate_gradients(const LinearOperator& matrix, const Vector& b, 
     norm = std::sqrt(dot(residual, residual));
     ++result.iterations;
     if (progress) progress(result.iterations, norm / scale);
-    if (norm > tolerance * scale) continue;
+    if (norm > tolerance * scale) {
+      if (hopeless && hopeless(result.iterations, norm / scale)) break;
+      continue;
+    }
     norm = true_residual(matrix, b, x, residual);
     result.converged = norm <= tolerance * scale || norm <= rounding_level(matrix, x);
     // Another round only while it still helps: rounding sets a floor to the true residual.

@@ -48,37 +48,33 @@ void pairs(const Pair* list, std::size_t count) {
   }
 }
 
-template <std::size_t R>
 void restriction(const float* blocks, const std::uint64_t* positions, const std::uint32_t* rows,
                  std::size_t count, const double* r, double* to) {
   Lanes sum = {};
   for (std::size_t t = 0; t < count; ++t) {
-    const float* block = blocks + 6 * R * positions[t];
-    const double* from = r + R * std::size_t{rows[t]};
-    for (std::size_t c = 0; c < R; ++c) sum += from[c] * widened(block + 6 * c);
+    const float* block = blocks + 36 * positions[t];
+    const double* from = r + 6 * std::size_t{rows[t]};
+    for (std::size_t c = 0; c < 6; ++c) sum += from[c] * widened(block + 6 * c);
   }
   for (std::size_t m = 0; m < 6; ++m) to[m] = sum[m];
 }
 
-template <std::size_t R>
 void prolongation(const float* blocks, const std::uint32_t* columns, std::size_t count, const double* c,
                   double* x) {
-  Lanes sums[R] = {};
+  Lanes sums[6] = {};
   for (std::size_t t = 0; t < count; ++t) {
     const double* from = c + 6 * std::size_t{columns[t]};
     const Lanes entry = {from[0], from[1], from[2], from[3], from[4], from[5], 0, 0};
-    for (std::size_t r = 0; r < R; ++r) sums[r] += entry * widened(blocks + 6 * (R * t + r));
+    for (std::size_t r = 0; r < 6; ++r) sums[r] += entry * widened(blocks + 6 * (6 * t + r));
   }
-  for (std::size_t r = 0; r < R; ++r) x[r] += step::sum(sums[r]);
+  for (std::size_t r = 0; r < 6; ++r) x[r] += step::sum(sums[r]);
 }
 
 }  // namespace
 
 const Table& FLEXEL_ISA() {
-  static constexpr Table table = {{&products<3>, &products<6>},
-                                  {&pairs<3>, &pairs<6>},
-                                  {&restriction<3>, &restriction<6>},
-                                  {&prolongation<3>, &prolongation<6>}};
+  static constexpr Table table = {
+      {&products<3>, &products<6>}, {&pairs<3>, &pairs<6>}, &restriction, &prolongation};
   return table;
 }
 

@@ -25,17 +25,16 @@ struct Pair {
   double* sum;
 };
 
-// For R = 3 and 6.
 struct Table {
-  // one after the other
+  // For R = 3 and 6; one after the other.
   void (*products[2])(const Product* list, std::size_t count);
   void (*pairs[2])(const Pair* list, std::size_t count);
-  // One row of P^T r: sum (6) = sum over t of the block at positions[t] times the entry rows[t] of r.
-  void (*restrictions[2])(const float* blocks, const std::uint64_t* positions, const std::uint32_t* rows,
-                          std::size_t count, const double* r, double* sum);
-  // One row of P c: adds to x (R) the blocks, transposed, times the entries columns[t] of c.
-  void (*prolongations[2])(const float* blocks, const std::uint32_t* columns, std::size_t count,
-                           const double* c, double* x);
+  // R = 6. One row of P^T r: sum (6) = sum over t of the block at positions[t] times the entry rows[t] of r.
+  void (*restriction)(const float* blocks, const std::uint64_t* positions, const std::uint32_t* rows,
+                      std::size_t count, const double* r, double* sum);
+  // R = 6. One row of P c: adds to x (6) the blocks, transposed, times the entries columns[t] of c.
+  void (*prolongation)(const float* blocks, const std::uint32_t* columns, std::size_t count, const double* c,
+                       double* x);
 };
 
 [[nodiscard]] const Table& portable();

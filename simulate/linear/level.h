@@ -157,14 +157,14 @@ void smooth(const View& matrix, const Level<R>& level, const double* b, double* 
 }
 
 // coarse = P^T (b - A x); `work` is overwritten with the residual.
-template <int R, class View>
-void restrict_residual(const View& matrix, const Level<R>& level, const double* b, const double* x,
+template <class View>
+void restrict_residual(const View& matrix, const Level<6>& level, const double* b, const double* x,
                        double* work, double* coarse) {
-  for_each_product<R>(matrix, x, level.image.data(), [&](std::size_t i, const auto& product) {
-    entry<R>(work, i) = entry<R>(b, i) - product;
+  for_each_product<6>(matrix, x, level.image.data(), [&](std::size_t i, const auto& product) {
+    entry<6>(work, i) = entry<6>(b, i) - product;
   });
-  const Transfer<R>& t = level.transfer;
-  const auto one_row = galerkin_table().restrictions[R / 6];
+  const Transfer<6>& t = level.transfer;
+  const auto one_row = galerkin_table().restriction;
   parallel_for_each(
       t.coarse_rows,
       [&](std::size_t a) {
@@ -176,14 +176,13 @@ void restrict_residual(const View& matrix, const Level<R>& level, const double* 
 }
 
 // x += P coarse
-template <int R>
-void prolong(const Level<R>& level, const double* coarse, double* x) {
-  const Transfer<R>& t = level.transfer;
-  const auto one_row = galerkin_table().prolongations[R / 6];
+inline void prolong(const Level<6>& level, const double* coarse, double* x) {
+  const Transfer<6>& t = level.transfer;
+  const auto one_row = galerkin_table().prolongation;
   parallel_for_each(t.pattern.offsets.size() - 1, [&](std::size_t i) {
     const std::uint64_t first = t.pattern.offsets[i];
-    one_row(t.values.front().data() + 6 * R * first, t.pattern.columns.data() + first,
-            t.pattern.offsets[i + 1] - first, coarse, x + R * i);
+    one_row(t.values.front().data() + 36 * first, t.pattern.columns.data() + first,
+            t.pattern.offsets[i + 1] - first, coarse, x + 6 * i);
   });
 }
 

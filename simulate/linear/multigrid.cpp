@@ -281,10 +281,10 @@ class Multigrid : public Preconditioner {
     }
     const auto matrix = view(coarse.pattern, coarse.values);
     smooth_from_zero<6>(matrix, level, level.rhs.data(), level.x.data(), level.next.data());
-    restrict_residual<6>(matrix, level, level.rhs.data(), level.x.data(), level.next.data(),
-                         coarse_[l + 1].level.rhs.data());
+    restrict_residual(matrix, level, level.rhs.data(), level.x.data(), level.next.data(),
+                      coarse_[l + 1].level.rhs.data());
     cycle(l + 1);
-    prolong<6>(level, coarse_[l + 1].level.x.data(), level.x.data());
+    prolong(level, coarse_[l + 1].level.x.data(), level.x.data());
     smooth<6>(matrix, level, level.rhs.data(), level.x.data(), level.next.data());
   }
 

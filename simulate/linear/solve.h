@@ -51,12 +51,13 @@ struct LinearResult {
   bool indefinite = false;
 };
 
-// Preconditioned conjugate gradients from x = 0. `progress` is called now and then with the iteration and
-// relative residual; it may throw to interrupt.
+// Preconditioned conjugate gradients from x = 0. `progress` is called with every iteration and its relative
+// residual; it may throw to interrupt. `hopeless` is asked likewise and ends the iteration where it says so.
 [[nodiscard]] LinearResult conjugate_gradients(const LinearOperator& matrix, const std::vector<Vec3>& b,
                                                std::vector<Vec3>& x, const Preconditioner& preconditioner,
                                                double tolerance, int max_iterations,
-                                               const std::function<void(int, double)>& progress = {});
+                                               const std::function<void(int, double)>& progress = {},
+                                               const std::function<bool(int, double)>& hopeless = {});
 [[nodiscard]] LinearResult conjugate_gradients(const BlockMatrix& matrix, const std::vector<Vec3>& b,
                                                std::vector<Vec3>& x, const Preconditioner& preconditioner,
                                                double tolerance, int max_iterations,

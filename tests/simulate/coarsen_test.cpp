@@ -103,6 +103,36 @@ TEST(Coarsen, LeavesInOneVoxelStayApart) {
   EXPECT_EQ(std::set<std::uint32_t>(set.begin(), set.end()).size(), 2u);
 }
 
+TEST(Coarsen, AffineDisplacementsComeBackExactly) {
+  Mat3 slope;
+  slope << 0.1, 0.2, -0.3, 0.05, -0.1, 0.2, 0.3, 0.1, 0.4;
+  for (const std::array<int, 3>& cells : {std::array{8, 4, 6}, std::array{9, 3, 5}}) {
+    const Body fine = box_body({.cells = cells, .spacing = Vec3(1, 2, 3), .origin = Vec3(5, 6, 7)});
+    Coarsening coarse = coarsening(fine);
+    ASSERT_LT(coarse.body.cell_count(), fine.cell_count());
+    for (std::size_t e = 0; e < coarse.body.element_count(); ++e)
+      coarse.body.position[e] += Vec3(1, 2, 3) + slope * coarse.body.rest[e];
+    const std::vector<Vec3> moved = prolonged_displacement(coarse, fine);
+    for (std::size_t e = 0; e < fine.element_count(); ++e)
+      EXPECT_LT((moved[e] - Vec3(1, 2, 3) - slope * fine.rest[e]).norm(), 1e-12);
+  }
+}
+
+TEST(Coarsen, LeavesInOneVoxelMoveApart) {
+  testing::BoxOptions options{.cells = {8, 4, 5}};
+  options.fill = [](int, int, int k) { return k == 2 ? 0.0 : 1.0; };
+  const Body fine = box_body(options);
+  Coarsening coarse = coarsening(fine);
+  for (std::uint32_t c = 0; c < fine.cell_count(); ++c)
+    for (std::uint32_t at = coarse.offsets[c]; at < coarse.offsets[c + 1]; ++at)
+      for (const std::uint32_t e : coarse.body.cell_elements[coarse.cells[at]])
+        coarse.body.position[e][0] =
+            coarse.body.rest[e][0] + (fine.lattice_index[fine.cell_elements[c][0]][2] < 2 ? 1 : -1);
+  const std::vector<Vec3> moved = prolonged_displacement(coarse, fine);
+  for (std::size_t e = 0; e < fine.element_count(); ++e)
+    EXPECT_LT((moved[e] - Vec3(fine.lattice_index[e][2] <= 2 ? 1 : -1, 0, 0)).norm(), 1e-12);
+}
+
 TEST(Coarsen, SurfacePolygonsKeepTheirCells) {
   const Body fine = box_body({.cells = {6, 4, 4}}), coarse = coarsened(fine);
   ASSERT_EQ(coarse.surface_cell_offsets.size(), fine.surface_cell_offsets.size());

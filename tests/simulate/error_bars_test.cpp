@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 
 #include "simulate/estimate.h"
 #include "tests/simulate/study_beam.h"
@@ -54,6 +55,33 @@ SimulateResult end_loaded(Body body, Scene scene) {
   tip.where = select_by_name("box/x1");
   scene.probes.push_back(tip);
   return testing::simulate_quietly(body, scene);
+}
+
+// Of h, 2h, 4h.
+Sequence stresses(const std::function<double(double)>& at) {
+  return {{at(1), at(2), at(4)}, {2, 2}};
+}
+
+TEST(StressBar, HoldsTheLimitOrThereIsNone) {
+  const auto smooth = stress_bar(stresses([](double h) { return 5 + 0.1 * h; }));
+  ASSERT_TRUE(smooth.has_value());
+  EXPECT_NEAR(smooth->extrapolated, 5, 1e-9);
+  EXPECT_NEAR(smooth->half_width, 0.3, 1e-9);
+  // Beside a crack, a right re-entrant angle (Williams 1952), a clamped edge
+  for (const double power : {0.5, 0.456, 0.2})
+    EXPECT_FALSE(stress_bar(stresses([&](double h) { return std::pow(h, -power); })).has_value()) << power;
+  EXPECT_FALSE(stress_bar({{5, 6, 5}, {2, 2}}).has_value());
+  const auto same = stress_bar({{5, 5.001, 5}, {2, 2}});
+  ASSERT_TRUE(same.has_value());
+  EXPECT_NEAR(same->half_width, 0.003, 1e-9);
+}
+
+TEST(ErrorBars, TheStressAtAClampHasNone) {
+  const SimulateResult result = end_loaded(testing::corner_beam(16), testing::held_beam("cells"));
+  ASSERT_TRUE(result.error_bars.von_mises.has_value()) << result.error_bars.note;
+  EXPECT_EQ(result.error_bars.von_mises->value[0], result.stress->value);
+  EXPECT_GT(result.error_bars.von_mises->value[0], result.error_bars.von_mises->value[1]);
+  EXPECT_FALSE(result.error_bars.von_mises->bar.has_value());
 }
 
 TEST(ErrorBars, HoldTheCantileversReference) {

@@ -134,6 +134,24 @@ Snap crown_led_by(double down) {
   return {-result.reactions[2].force.z(), result.elastic_energy};
 }
 
+// A bar of enough cells to start from a coarser lattice, and the same in two load steps, which do not.
+TEST(LargeDeflection, TheStartDoesNotShow) {
+  const Slender bar{.thick = 6, .slender = 20};
+  Scene scene = held(Vec3(0, 0, -3 * bar.bending()));
+  scene.run.tolerance = 1e-9;
+  Body body = column(bar);
+  const SimulateResult once = find_equilibrium(body, scene);
+  EXPECT_EQ(once.load_steps, 1);
+  EXPECT_LE(once.newton_iterations, 5) << "not from a coarser lattice";
+  scene.run.load_steps = 2;
+  Body again = column(bar);
+  const SimulateResult twice = find_equilibrium(again, scene);
+  EXPECT_EQ(twice.load_steps, 2);
+  const Vec3 tip = twice.probes[0].displacement;
+  EXPECT_GT(tip.norm(), 0.5);
+  EXPECT_LT((once.probes[0].displacement - tip).norm(), 1e-6 * tip.norm());
+}
+
 // The force rises to a limit, falls and turns round: the arch would snap. It is
 // the slope of the energy all the way.
 TEST(LargeDeflection, ArchIsFollowedPastItsLimitPoint) {

@@ -165,6 +165,19 @@ TEST(ConjugateGradients, ProgressMayInterrupt) {
   EXPECT_EQ(calls, 3);
 }
 
+TEST(ConjugateGradients, HopelessEndsWithWhatWasReached) {
+  const VoxelProblem problem = beam(3000);
+  const auto multigrid = aggregation_multigrid(problem.matrix, problem.geometry);
+  Vector x;
+  const auto third = [](int iteration, double) { return iteration == 3; };
+  const LinearResult result =
+      conjugate_gradients(StoredMatrix(problem.matrix), problem.load, x, *multigrid, 1e-12, 100, {}, third);
+  EXPECT_EQ(result.iterations, 3);
+  EXPECT_FALSE(result.converged);
+  EXPECT_FALSE(result.indefinite);
+  EXPECT_LT(result.relative_residual, 1);
+}
+
 TEST(Multigrid, IsExactOnSmallSystems) {
   for (const double cells : {1., 30., 400.}) EXPECT_LE(iterations(beam(cells)), 2);
   EXPECT_LE(iterations(plate(300)), 2);

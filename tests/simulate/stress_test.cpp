@@ -9,6 +9,7 @@
 #include "simulate/scene.h"
 #include "simulate/simulate.h"
 #include "tests/simulate/box_body.h"
+#include "tests/simulate/scene_case.h"
 
 namespace flexel {
 namespace {
@@ -237,6 +238,20 @@ TEST(Stress, HoopStressBesideAHole) {
       EXPECT_NEAR(body.element_columns.at("principal_stress").values[3 * e] / hoop(n + 1, M_PI / 2), 1, 0.1);
     }
   }
+}
+
+// Without lateral contraction the stress of a drawn bar is the same everywhere, on every lattice.
+TEST(Stress, OfADrawnBarHasANarrowErrorBar) {
+  Body body = box_body({.cells = {16, 8, 8}, .spacing = Vec3::Constant(0.001)});
+  Scene scene = metal_scene(0);
+  scene.get<Ties>().ties.push_back(make_fix(select_by_name("xmin")));
+  scene.get<Loads>().loads.push_back(make_pressure(select_by_name("xmax"), -1e6));
+  const SimulateResult result = testing::simulate_quietly(body, scene);
+  ASSERT_TRUE(result.error_bars.von_mises.has_value()) << result.error_bars.note;
+  const StressBar& found = *result.error_bars.von_mises;
+  ASSERT_TRUE(found.bar.has_value()) << found.value[2] << " " << found.value[1] << " " << found.value[0];
+  EXPECT_NEAR(found.value[0], 1e6, 0.01e6);
+  EXPECT_LE(found.bar->half_width, 0.01e6);
 }
 
 }  // namespace
