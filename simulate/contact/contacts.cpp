@@ -157,25 +157,50 @@ bool Contacts::seen(const State& state) {
 void Contacts::look(const State& state) {
   refresh(state);
   if (seen(state)) return;
+  ++looks_;
   sides_.resize(near_.size());
-  states_.resize(pairs_.size());
   parallel_for_each(
       near_.size(), [&](std::size_t n) { sides_[n] = side(near_[n], state); }, 512);
   parallel_for_each(
       pairs_.size(),
       [&](std::size_t p) {
+        if (out_of_reach(pairs_[p])) {
+          if (is_close_[p]) states_[p] = {};
+          is_close_[p] = 0;
+          memory_[p].standing = Standing::apart;
+          return;
+        }
         ContactSide from = sides_[pairs_[p].i].at;
         if (pairs_[p].j == kNoPoint) from.own_plane = 0;  // the plane's normal is the exact one
-        states_[p] = pair_state(from, other_side(pairs_[p]), pairs_[p].constants);
-        stand(p);
+        PairState now = pair_state(from, other_side(pairs_[p]), pairs_[p].constants);
+        stand(p, now);
+        if (now.near)
+          states_[p] = now;
+        else if (is_close_[p])
+          states_[p] = {};
+        is_close_[p] = now.near;
       },
       512);
+  close_.clear();
+  for (std::uint32_t p = 0; p < pairs_.size(); ++p)
+    if (is_close_[p]) close_.push_back(p);
+}
+
+// Whether the kernel is 0 for certain: |t|^2 = d^2 - (d . b)^2 / b^2, in the terms of pair_law.h, is beyond
+// its width by more than rounding.
+bool Contacts::out_of_reach(const Pair& pair) const {
+  constexpr double kRounding = 1e-9;
+  if (pair.j == kNoPoint || !(pair.constants.width > 0)) return false;
+  const ContactSide &i = sides_[pair.i].at, &j = sides_[pair.j].at;
+  const Vec3 d = j.position - i.position, b = i.own_plane * i.normal - j.own_plane * j.normal;
+  const double d2 = d.squaredNorm(), b2 = b.squaredNorm(), along = d.dot(b);
+  const double width2 = pair.constants.width * pair.constants.width;
+  return d2 * b2 - along * along > (width2 + kRounding * (width2 + d2)) * b2;
 }
 
 // How the pair stands after its state of now; one that is passed does nothing.
-void Contacts::stand(std::size_t pair) {
+void Contacts::stand(std::size_t pair, PairState& now) {
   const Pair& at = pairs_[pair];
-  PairState& now = states_[pair];
   Standing& standing = memory_[pair].standing;
   if (!now.near) {
     standing = Standing::apart;
@@ -195,15 +220,15 @@ void Contacts::stand(std::size_t pair) {
 double Contacts::energy(const State& state) {
   look(state);
   double energy = 0;
-  for (const PairState& now : states_) energy += now.energy;
+  for (const std::uint32_t p : close_) energy += states_[p].energy;
   return energy;
 }
 
 void Contacts::add_forces(const State& state, std::vector<Vec3>& forces) {
   look(state);
-  if (pairs_.empty()) return;
+  if (close_.empty()) return;
   std::vector<Total> totals(near_.size());
-  for (std::size_t p = 0; p < pairs_.size(); ++p) {
+  for (const std::uint32_t p : close_) {
     const PairState& now = states_[p];
     if (!(now.pressure > 0)) continue;
     totals[pairs_[p].i].force -= now.force;
@@ -275,7 +300,7 @@ void Contacts::restore(const std::vector<double>& memory) {
 std::vector<std::array<std::uint32_t, 2>> Contacts::touching(const State& state) {
   look(state);
   std::vector<std::array<std::uint32_t, 2>> result;
-  for (std::size_t p = 0; p < pairs_.size(); ++p)
+  for (const std::uint32_t p : close_)
     if (states_[p].pressure > 0)
       result.push_back({static_cast<std::uint32_t>(pairs_[p].key >> 32),
                         static_cast<std::uint32_t>(pairs_[p].key & 0xffffffff)});
