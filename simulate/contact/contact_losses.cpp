@@ -134,7 +134,7 @@ void Contacts::add_losses(const State& state, std::vector<Vec3>& forces) {
     totals[pair.j].force += found[c];
     totals[pair.j].couple += found[c] * place[1].transpose();
   }
-  spread(totals, forces);
+  spread(state, totals, forces);
 }
 
 void Contacts::remember(const State& state, double drift) {
