@@ -45,9 +45,8 @@ double Contacts::stiffness_bound() const {
     }
     for (std::uint32_t a = 0; a < point.at.count; ++a) rows[point.at.elements[a]] += stiffness * of[a] * sum;
   };
-  for (std::size_t p = 0; p < pairs_.size(); ++p) {
+  for (const std::uint32_t p : close_) {
     const PairState& now = states_[p];
-    if (!now.near) continue;
     const bool plane = pairs_[p].j == kNoPoint;
     const double stiffness = (plane ? 1 : 2) * (now.weight + kHardeningAhead * (now.stiffness - now.weight));
     const Vec3 lever = 0.5 * now.offset;
@@ -82,8 +81,9 @@ bool Contacts::hurried(const State& state) {
   if (speed(state) * state.kick > kMostTravel * narrowest_) return true;
   look(state);
   double hardest = 0;
-  for (const PairState& now : states_)
-    if (now.near && now.weight > 0) hardest = std::max(hardest, now.stiffness / now.weight);
+  for (const std::uint32_t p : close_)
+    if (const PairState& now = states_[p]; now.weight > 0)
+      hardest = std::max(hardest, now.stiffness / now.weight);
   if (looked_at_ == builds_ && hardest < kHardeningAhead) return false;
   looked_at_ = builds_;
   return stiffness_bound() > 1.001 * promised_;

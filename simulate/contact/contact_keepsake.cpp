@@ -10,7 +10,7 @@
 namespace flexel {
 namespace {
 
-constexpr std::size_t kOfPoint = 7, kOfPair = 2 * kOfPoint + 5;
+constexpr std::size_t kOfPoint = 7, kOfPair = 2 * kOfPoint + 6;
 
 using PointName = std::array<double, kOfPoint>;
 
@@ -40,6 +40,7 @@ std::vector<double> Contacts::keepsake() const {
     kept.insert(kept.end(), memory.stretch.begin(), memory.stretch.end());
     kept.push_back(memory.stuck);
     kept.push_back(static_cast<double>(memory.standing));
+    kept.push_back(memory.inside);
   }
   return kept;
 }
@@ -50,6 +51,7 @@ void Contacts::take_over(const std::vector<double>& keepsake) {
   for (std::uint32_t p = 0; p < settings_.planes.size(); ++p)
     numbers.try_emplace({-1, static_cast<double>(p)}, static_cast<std::uint32_t>(points_.size() + p));
   memory_.clear();
+  begun_ = true;
   for (std::size_t at = 0; at + kOfPair <= keepsake.size(); at += kOfPair) {
     const double* from = keepsake.data() + at;
     std::array<std::uint64_t, 2> ends{};
@@ -64,7 +66,7 @@ void Contacts::take_over(const std::vector<double>& keepsake) {
     if (!there) continue;
     const Vec3 stretch = (ends[0] < ends[1] ? 1 : -1) * Vec3(from[0], from[1], from[2]);
     memory_.push_back({std::min(ends[0], ends[1]) << 32 | std::max(ends[0], ends[1]), stretch, from[3],
-                       static_cast<Standing>(static_cast<int>(from[4]))});
+                       static_cast<Standing>(static_cast<int>(from[4])), from[5]});
   }
   std::sort(memory_.begin(), memory_.end(), [](const Memory& a, const Memory& b) { return a.key < b.key; });
 }

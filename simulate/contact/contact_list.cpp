@@ -284,6 +284,9 @@ void Contacts::number_near() {
   }
   std::sort(near_elements_.begin(), near_elements_.end());
   near_elements_.erase(std::unique(near_elements_.begin(), near_elements_.end()), near_elements_.end());
+  states_.assign(pairs_.size(), PairState{});
+  is_close_.assign(pairs_.size(), 0);
+  close_.clear();
 }
 
 }  // namespace flexel

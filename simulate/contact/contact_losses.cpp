@@ -41,13 +41,21 @@ std::array<Vec3, 2> Contacts::meeting(const Pair& pair) const {
   return {share * d, (share - 1) * d};
 }
 
-std::vector<Contacts::Motion> Contacts::motions(const State& state) const {
-  std::vector<Motion> result(near_.size());
+// What remember() asks for at the end of a step add_losses() asks for at the beginning of the next.
+void Contacts::find_motions(const State& state) {
+  bool same = moved_looks_ == looks_ && moving_.size() == near_elements_.size();
+  for (std::size_t e = 0; same && e < moving_.size(); ++e)
+    same = moving_[e] == state.velocity[near_elements_[e]];
+  if (same) return;
+  moved_looks_ = looks_;
+  moving_.resize(near_elements_.size());
+  for (std::size_t e = 0; e < moving_.size(); ++e) moving_[e] = state.velocity[near_elements_[e]];
+  motions_.assign(near_.size(), Motion{});
   parallel_for_each(
       near_.size(),
       [&](std::size_t n) {
         const ContactPoint& point = points_[near_[n]];
-        Motion& motion = result[n];
+        Motion& motion = motions_[n];
         for (std::uint32_t a = 0; a < point.at.count; ++a)
           motion.velocity += point.at.weights[a] * state.velocity[point.at.elements[a]];
         if (point.at.count != 8) return;
@@ -56,14 +64,13 @@ std::vector<Contacts::Motion> Contacts::motions(const State& state) const {
         motion.gradient *= sides_[n].inverse;
       },
       512);
-  return result;
 }
 
 // Of j against i where they meet.
-Vec3 Contacts::relative_velocity(const Pair& pair, const std::vector<Motion>& motions) const {
+Vec3 Contacts::relative_velocity(const Pair& pair) const {
   const std::array<Vec3, 2> place = meeting(pair);
   const auto at = [&](std::uint32_t near, const Vec3& away) {
-    return Vec3(motions[near].velocity + motions[near].gradient * away);
+    return Vec3(motions_[near].velocity + motions_[near].gradient * away);
   };
   const Vec3 of_i = at(pair.i, place[0]);
   return pair.j == kNoPoint ? Vec3(-of_i) : Vec3(at(pair.j, place[1]) - of_i);
@@ -92,12 +99,13 @@ double Contacts::most_across(std::size_t pair) const {
 
 void Contacts::add_losses(const State& state, std::vector<Vec3>& forces) {
   look(state);
-  if (pairs_.empty()) return;
-  const std::vector<Motion> moving = settings_.damping > 0 ? motions(state) : std::vector<Motion>();
-  std::vector<Vec3> found(pairs_.size(), Vec3::Zero());  // N, on j
+  if (close_.empty()) return;
+  if (settings_.damping > 0) find_motions(state);
+  std::vector<Vec3> found(close_.size(), Vec3::Zero());  // N, on j
   parallel_for_each(
-      pairs_.size(),
-      [&](std::size_t p) {
+      close_.size(),
+      [&](std::size_t c) {
+        const std::uint32_t p = close_[c];
         const PairState& now = states_[p];
         const bool pressed = now.pressure > 0, sticks = now.near && memory_[p].stuck != kFree;
         if (!pressed && !sticks) return;
@@ -105,57 +113,78 @@ void Contacts::add_losses(const State& state, std::vector<Vec3>& forces) {
         const double stiffness = secant(p);
         // of the dashpot: as stiff as the contact is where it begins softly
         const double depth = sticks ? 1 : std::min(-now.gap / pair.constants.law.soft, 1.0);
-        const Vec3 velocity = settings_.damping > 0 ? relative_velocity(pair, moving) : Vec3(Vec3::Zero());
+        const Vec3 velocity = settings_.damping > 0 ? relative_velocity(pair) : Vec3(Vec3::Zero());
         const double apart = velocity.dot(now.normal);
         // on j, along the normal
         double along = -settings_.damping * now.stiffness * depth * apart - stiffness * drawn(p);
         if (!sticks) along = std::max(along, -now.pressure);
         const Vec3 across = velocity - apart * now.normal;
         const Vec3 held = memory_[p].stretch + settings_.damping * across;
-        found[p] = along * now.normal - at_most(kAcross * stiffness * held, most_across(p));
+        found[c] = along * now.normal - at_most(kAcross * stiffness * held, most_across(p));
       },
       512);
   std::vector<Total> totals(near_.size());
-  for (std::size_t p = 0; p < pairs_.size(); ++p) {
-    if (found[p] == Vec3::Zero()) continue;
-    const Pair& pair = pairs_[p];
+  for (std::size_t c = 0; c < close_.size(); ++c) {
+    if (found[c] == Vec3::Zero()) continue;
+    const Pair& pair = pairs_[close_[c]];
     const std::array<Vec3, 2> place = meeting(pair);
-    totals[pair.i].force -= found[p];
-    totals[pair.i].couple -= found[p] * place[0].transpose();
+    totals[pair.i].force -= found[c];
+    totals[pair.i].couple -= found[c] * place[0].transpose();
     if (pair.j == kNoPoint) continue;
-    totals[pair.j].force += found[p];
-    totals[pair.j].couple += found[p] * place[1].transpose();
+    totals[pair.j].force += found[c];
+    totals[pair.j].couple += found[c] * place[1].transpose();
   }
-  spread(totals, forces);
+  spread(state, totals, forces);
 }
 
 void Contacts::remember(const State& state, double drift) {
   look(state);
   const bool fresh = std::exchange(fresh_, false);
   if (pairs_.empty() || !loses()) return;
-  const std::vector<Motion> moving = motions(state);
+  forget_parted();
+  find_motions(state);
   parallel_for_each(
-      pairs_.size(),
-      [&](std::size_t p) {
+      close_.size(),
+      [&](std::size_t c) {
+        const std::uint32_t p = close_[c];
         const PairState& now = states_[p];
         const Pair& pair = pairs_[p];
         Memory& memory = memory_[p];
         // at the beginning what lies there touches, give or take
-        const bool touches = now.near && now.gap < (fresh ? pair.constants.law.soft : 0);
-        if (!now.near || !(pair.holds > 0))
+        const bool touches = now.gap < (fresh ? pair.constants.law.soft : 0);
+        if (!(pair.holds > 0))
           memory.stuck = kFree;
         else if (memory.stuck == kFree && touches)
           memory.stuck = std::max(now.gap, 0.0);
-        Vec3 stretch = memory.stretch + drift * relative_velocity(pair, moving);
-        stretch -= stretch.dot(now.normal) * now.normal;
+        const bool rubs = now.pressure > 0 && pair.friction > 0;
+        Vec3 stretch = Vec3::Zero();
+        if (rubs || memory.stuck != kFree) {
+          stretch = memory.stretch + drift * relative_velocity(pair);
+          stretch -= stretch.dot(now.normal) * now.normal;
+        }
         if (!(now.pressure > 0) && std::hypot(drawn(p), kAcross * stretch.norm()) > pair.holds)
           memory.stuck = kFree;
-        const bool rubs = now.pressure > 0 && pair.friction > 0;
         memory.stretch = rubs || memory.stuck != kFree
                              ? at_most(stretch, most_across(p) / (kAcross * secant(p)))
                              : Vec3(Vec3::Zero());
       },
       512);
+  remembered_ = close_;
+  remembered_builds_ = builds_;
+}
+
+// Pairs that are not near any more begin anew when they come back.
+void Contacts::forget_parted() {
+  const auto forget = [&](std::uint32_t p) {
+    if (is_close_[p]) return;
+    memory_[p].stuck = kFree;
+    memory_[p].stretch = Vec3::Zero();
+  };
+  if (remembered_builds_ == builds_) {
+    for (const std::uint32_t p : remembered_) forget(p);
+  } else {
+    for (std::uint32_t p = 0; p < pairs_.size(); ++p) forget(p);
+  }
 }
 
 }  // namespace flexel

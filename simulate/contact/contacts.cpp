@@ -7,6 +7,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <utility>
 
 #include "formats/error.h"
 #include "simulate/cell_model.h"
@@ -44,6 +45,7 @@ Contacts::Contacts(ContactSettings settings, const Setting& setting)
     const Eigen::SelfAdjointEigenSolver<Mat3> eigen(rigid.inverse_inertia, Eigen::EigenvaluesOnly);
     rigid_[p] =
         Whole{setting.rigidity[p] == Rigidity::free, rigid.centre, 1 / rigid.mass, eigen.eigenvalues()[2]};
+    if (rigid_[p]->free && settings_.parts[p]) felt_.push_back({p});
   }
   // Where an edge runs through a sliver of a cell its elements are light: a point there stands for no more
   // area than a face's would.
@@ -144,7 +146,8 @@ ContactSide Contacts::other_side(const Pair& pair) const {
 
 // The hooks of one step ask for the same state several times.
 bool Contacts::seen(const State& state) {
-  bool same = seen_builds_ == builds_ && seen_.size() == near_elements_.size();
+  bool same =
+      seen_builds_ == builds_ && share_inside(state) == share_ && seen_.size() == near_elements_.size();
   for (std::size_t e = 0; same && e < seen_.size(); ++e)
     same = seen_[e] == state.displacement[near_elements_[e]];
   if (same) return true;
@@ -157,25 +160,61 @@ bool Contacts::seen(const State& state) {
 void Contacts::look(const State& state) {
   refresh(state);
   if (seen(state)) return;
+  ++looks_;
+  const double share = share_inside(state);
   sides_.resize(near_.size());
-  states_.resize(pairs_.size());
   parallel_for_each(
       near_.size(), [&](std::size_t n) { sides_[n] = side(near_[n], state); }, 512);
+  if (!std::exchange(begun_, true)) find_inside(state);
   parallel_for_each(
       pairs_.size(),
       [&](std::size_t p) {
-        ContactSide from = sides_[pairs_[p].i].at;
-        if (pairs_[p].j == kNoPoint) from.own_plane = 0;  // the plane's normal is the exact one
-        states_[p] = pair_state(from, other_side(pairs_[p]), pairs_[p].constants);
-        stand(p);
+        if (out_of_reach(pairs_[p])) {
+          if (is_close_[p]) states_[p] = {};
+          is_close_[p] = 0;
+          memory_[p].standing = Standing::apart;
+          return;
+        }
+        PairState now = state_of(p, share * memory_[p].inside);
+        stand(p, now);
+        if (now.near)
+          states_[p] = now;
+        else if (is_close_[p])
+          states_[p] = {};
+        is_close_[p] = now.near;
       },
       512);
+  close_.clear();
+  for (std::uint32_t p = 0; p < pairs_.size(); ++p)
+    if (is_close_[p]) close_.push_back(p);
+  book_letting_out(share);
+}
+
+PairState Contacts::state_of(std::size_t pair, double allowed) const {
+  const Pair& at = pairs_[pair];
+  ContactSide from = sides_[at.i].at;
+  if (at.j == kNoPoint) from.own_plane = 0;  // the plane's normal is the exact one
+  if (!(allowed > 0)) return pair_state(from, other_side(at), at.constants);
+  PairConstants constants = at.constants;
+  constants.allowed = allowed;
+  return pair_state(from, other_side(at), constants);
+}
+
+// Whether the kernel is 0 for certain: |t|^2 = d^2 - (d . b)^2 / b^2, in the terms of pair_law.h, is beyond
+// its width by more than rounding.
+bool Contacts::out_of_reach(const Pair& pair) const {
+  constexpr double kRounding = 1e-9;
+  if (pair.j == kNoPoint || !(pair.constants.width > 0)) return false;
+  const ContactSide &i = sides_[pair.i].at, &j = sides_[pair.j].at;
+  const Vec3 d = j.position - i.position, b = i.own_plane * i.normal - j.own_plane * j.normal;
+  const double d2 = d.squaredNorm(), b2 = b.squaredNorm(), along = d.dot(b);
+  const double width2 = pair.constants.width * pair.constants.width;
+  return d2 * b2 - along * along > (width2 + kRounding * (width2 + d2)) * b2;
 }
 
 // How the pair stands after its state of now; one that is passed does nothing.
-void Contacts::stand(std::size_t pair) {
+void Contacts::stand(std::size_t pair, PairState& now) {
   const Pair& at = pairs_[pair];
-  PairState& now = states_[pair];
   Standing& standing = memory_[pair].standing;
   if (!now.near) {
     standing = Standing::apart;
@@ -195,15 +234,16 @@ void Contacts::stand(std::size_t pair) {
 double Contacts::energy(const State& state) {
   look(state);
   double energy = 0;
-  for (const PairState& now : states_) energy += now.energy;
+  for (const std::uint32_t p : close_) energy += states_[p].energy;
   return energy;
 }
 
 void Contacts::add_forces(const State& state, std::vector<Vec3>& forces) {
   look(state);
-  if (pairs_.empty()) return;
+  for (Felt& felt : felt_) felt.force = felt.torque = Vec3::Zero();
+  if (close_.empty()) return;
   std::vector<Total> totals(near_.size());
-  for (std::size_t p = 0; p < pairs_.size(); ++p) {
+  for (const std::uint32_t p : close_) {
     const PairState& now = states_[p];
     if (!(now.pressure > 0)) continue;
     totals[pairs_[p].i].force -= now.force;
@@ -212,41 +252,70 @@ void Contacts::add_forces(const State& state, std::vector<Vec3>& forces) {
     totals[pairs_[p].j].force += now.force;
     totals[pairs_[p].j].turning += now.turning[1];
   }
-  spread(totals, forces);
+  spread(state, totals, forces);
 }
 
-void Contacts::spread(const std::vector<Total>& totals, std::vector<Vec3>& forces) const {
+std::vector<Contacts::Felt> Contacts::felt_about_centres(const State& state) const {
+  std::vector<Felt> result = felt_;
+  for (Felt& felt : result) {
+    const Part& part = body_.parts[felt.part];
+    Vec3 centre = Vec3::Zero();
+    for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
+      centre += mass_[e] * rigid_[felt.part]->per_mass * (body_.rest[e] + state.displacement[e]);
+    felt.torque -= centre.cross(felt.force);
+  }
+  return result;
+}
+
+void Contacts::spread(const State& state, const std::vector<Total>& totals, std::vector<Vec3>& forces) {
   for (std::size_t n = 0; n < near_.size(); ++n) {
     const Total& total = totals[n];
     const ContactPoint& point = points_[near_[n]];
     if (total.force == Vec3::Zero() && total.turning == Vec3::Zero()) continue;
+    Felt* felt = nullptr;
+    for (Felt& each : felt_)
+      if (each.part == point.part) felt = &each;
+    const auto add = [&](std::uint32_t element, const Vec3& force) {
+      forces[element] += force;
+      if (!felt) return;
+      felt->force += force;
+      felt->torque += (body_.rest[element] + state.displacement[element]).cross(force);
+    };
     for (std::uint32_t a = 0; a < point.at.count; ++a)
-      forces[point.at.elements[a]] += point.at.weights[a] * total.force;
+      add(point.at.elements[a], point.at.weights[a] * total.force);
     if (point.at.count != 8) continue;
     const Vec3& normal = sides_[n].at.normal;
     const Vec3 turned = sides_[n].inverse * (total.turning - total.turning.dot(normal) * normal);
     const Mat3 couple = normal * turned.transpose() + total.couple * sides_[n].inverse.transpose();
-    for (std::size_t a = 0; a < 8; ++a) forces[point.at.elements[a]] += couple * gradients_[point.part][a];
+    for (std::size_t a = 0; a < 8; ++a) add(point.at.elements[a], couple * gradients_[point.part][a]);
   }
 }
 
 std::vector<double> Contacts::memory() const {
-  std::vector<double> memory{built_ ? 1.0 : 0.0, promised_, looked_at_ == builds_ ? 1.0 : 0.0,
-                             fresh_ ? 1.0 : 0.0, static_cast<double>(memory_.size())};
+  std::vector<double> memory{built_ ? 1.0 : 0.0,
+                             promised_,
+                             looked_at_ == builds_ ? 1.0 : 0.0,
+                             fresh_ ? 1.0 : 0.0,
+                             begun_ ? 1.0 : 0.0,
+                             share_,
+                             pressing_,
+                             put_in_,
+                             static_cast<double>(memory_.size())};
   for (const Memory& entry : memory_) {
     memory.push_back(static_cast<double>(entry.key >> 32));
     memory.push_back(static_cast<double>(entry.key & 0xffffffff));
     memory.insert(memory.end(), entry.stretch.begin(), entry.stretch.end());
     memory.push_back(entry.stuck);
     memory.push_back(static_cast<double>(entry.standing));
+    memory.push_back(entry.inside);
   }
   for (const Vec3& at : built_at_) memory.insert(memory.end(), at.begin(), at.end());
   return memory;
 }
 
 void Contacts::restore(const std::vector<double>& memory) {
-  constexpr std::size_t kHead = 5, kEntry = 7;
-  const std::size_t entries = memory.size() < kHead ? 0 : static_cast<std::size_t>(memory[4]);
+  constexpr std::size_t kHead = 9, kEntry = 8;
+  const std::size_t entries = memory.size() < kHead ? 0 : static_cast<std::size_t>(memory[8]);
   if (memory.size() != kHead + kEntry * entries + 3 * built_at_.size())
     throw InputError("the checkpoint's contacts are not those of its scene");
   memory_.resize(entries);
@@ -256,6 +325,7 @@ void Contacts::restore(const std::vector<double>& memory) {
     entry.stretch = Vec3(from[2], from[3], from[4]);
     entry.stuck = from[5];
     entry.standing = static_cast<Standing>(static_cast<int>(from[6]));
+    entry.inside = from[7];
     from += kEntry;
   }
   State then;
@@ -266,6 +336,10 @@ void Contacts::restore(const std::vector<double>& memory) {
   }
   built_ = false;
   fresh_ = memory[3] == 1;
+  begun_ = memory[4] == 1;
+  share_ = memory[5];
+  pressing_ = memory[6];
+  put_in_ = memory[7];
   if (memory[0] == 0) return;
   build(then);
   promised_ = memory[1];
@@ -275,7 +349,7 @@ void Contacts::restore(const std::vector<double>& memory) {
 std::vector<std::array<std::uint32_t, 2>> Contacts::touching(const State& state) {
   look(state);
   std::vector<std::array<std::uint32_t, 2>> result;
-  for (std::size_t p = 0; p < pairs_.size(); ++p)
+  for (const std::uint32_t p : close_)
     if (states_[p].pressure > 0)
       result.push_back({static_cast<std::uint32_t>(pairs_[p].key >> 32),
                         static_cast<std::uint32_t>(pairs_[p].key & 0xffffffff)});

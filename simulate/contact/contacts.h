@@ -44,8 +44,20 @@ class Contacts {
   [[nodiscard]] std::vector<double> keepsake() const;
   void take_over(const std::vector<double>& keepsake);
 
-  // Throws InputError: parts that are inside each other, or a part inside a plane, deeper than contact bears.
+  // Throws InputError: parts that are inside each other, or a part inside a plane, deeper than contact bears
+  // or lets out.
   void refuse_overlap(const State& state) const;
+  // J, that letting out has put into the contacts since this was asked last, beside the work of their forces.
+  [[nodiscard]] double put_in(const State& state);
+
+  // What contact did to the free rigid parts in the last step: N, and N m about the origin, or about the
+  // centre of mass as it is in `state`.
+  struct Felt {
+    std::uint32_t part = 0;
+    Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
+  };
+  [[nodiscard]] const std::vector<Felt>& felt() const { return felt_; }
+  [[nodiscard]] std::vector<Felt> felt_about_centres(const State& state) const;
 
   // 1/s^2, what the contacts add to the square of the largest frequency; at least what keeps the motion of a
   // step small against the contact spheres.
@@ -109,21 +121,28 @@ class Contacts {
   [[nodiscard]] Mat3 gradient(const ContactPoint& point, const std::vector<Vec3>& displacement) const;
   [[nodiscard]] Side side(std::uint32_t point, const State& state) const;
   void look(const State& state);
-  void stand(std::size_t pair);
+  void stand(std::size_t pair, PairState& now);
+  [[nodiscard]] bool out_of_reach(const Pair& pair) const;
   bool seen(const State& state);
   [[nodiscard]] ContactSide other_side(const Pair& pair) const;
-  void spread(const std::vector<Total>& totals, std::vector<Vec3>& forces) const;
+  [[nodiscard]] PairState state_of(std::size_t pair, double allowed) const;
+  void spread(const State& state, const std::vector<Total>& totals, std::vector<Vec3>& forces);
+  // contact_overlap.cpp
+  [[nodiscard]] double share_inside(const State& state) const;
+  void find_inside(const State& state);
+  void book_letting_out(double share);
   // contact_losses.cpp
   struct Motion {  // of a near point: its velocity [m/s] and that of the matter around it, dv/dx [1/s]
     Vec3 velocity = Vec3::Zero();
     Mat3 gradient = Mat3::Zero();
   };
-  [[nodiscard]] std::vector<Motion> motions(const State& state) const;
+  void find_motions(const State& state);
   [[nodiscard]] std::array<Vec3, 2> meeting(const Pair& pair) const;
+  void forget_parted();
   [[nodiscard]] double drawn(std::size_t pair) const;
   [[nodiscard]] double secant(std::size_t pair) const;
   [[nodiscard]] double most_across(std::size_t pair) const;
-  [[nodiscard]] Vec3 relative_velocity(const Pair& pair, const std::vector<Motion>& motions) const;
+  [[nodiscard]] Vec3 relative_velocity(const Pair& pair) const;
   // contact_bound.cpp
   [[nodiscard]] double stiffness_bound() const;
   [[nodiscard]] double speed(const State& state) const;
@@ -150,7 +169,15 @@ class Contacts {
   std::vector<Vec3> seen_;
   std::uint64_t seen_builds_ = 0;
   std::vector<Side> sides_;        // (near_)
-  std::vector<PairState> states_;  // (pairs_)
+  std::vector<PairState> states_;  // (pairs_) of those that are not near nothing
+  // The others, ascending: most that are listed only may come near, and the hooks pass them by.
+  std::vector<std::uint32_t> close_;
+  std::vector<std::uint8_t> is_close_;  // (pairs_)
+  std::uint64_t looks_ = 0;             // states looked at so far
+  // Motions of the near points, at the look and with the velocities of near_elements_ that they are of.
+  std::vector<Motion> motions_;
+  std::vector<Vec3> moving_;
+  std::uint64_t moved_looks_ = 0;
   // What pairs remember, ascending by key: with the places where the list was made the only state of contact
   // that is not a function of where everything is now.
   struct Memory {
@@ -158,11 +185,19 @@ class Contacts {
     Vec3 stretch = Vec3::Zero();  // m, of the spring along the surface that resists sliding
     double stuck = kFree;         // m, the gap at which what sticks pulls nothing; kFree: it does not stick
     Standing standing = Standing::apart;
+    double inside = 0;  // m, that they began in each other
   };
-  std::vector<Memory> memory_;  // (pairs_); before the first list what was taken over
-  bool fresh_ = true;           // nothing has been remembered yet
-  std::vector<double> mass_;    // (elements) kg
-  struct Whole {                // of a rigid part
+  std::vector<Memory> memory_;             // (pairs_); before the first list what was taken over
+  std::vector<std::uint32_t> remembered_;  // close_ of the last remember(), in the list
+  std::uint64_t remembered_builds_ = 0;    //   of this number
+  bool fresh_ = true;                      // nothing has been remembered yet
+  bool begun_ = false;                     // what begins inside something else has been looked for
+  double share_ = 1;     // of Memory::inside that is allowed for in the state last looked at
+  double put_in_ = 0;    // J
+  double pressing_ = 0;  // J a share, there: pressures times Memory::inside
+  std::vector<Felt> felt_;
+  std::vector<double> mass_;  // (elements) kg
+  struct Whole {              // of a rigid part
     bool free = false;
     Vec3 centre = Vec3::Zero();            // m, at rest
     double per_mass = 0, per_inertia = 0;  // 1/kg, 1/(kg m^2), the largest

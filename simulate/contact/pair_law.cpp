@@ -46,7 +46,7 @@ PairState pair_state(const ContactSide& i, const ContactSide& j, const PairConst
   if (!balls && !(length > 0)) return now;  // two that have no plane of their own
   now.normal = balls ? d.normalized() : Vec3(b / length);
   const double along = d.dot(now.normal);
-  now.gap = along - i.radius - j.radius;
+  now.gap = along - i.radius - j.radius + pair.allowed;
   now.offset = balls ? Vec3(Vec3::Zero()) : Vec3(d - along * now.normal);
   const Smooth k = kernel(now.offset.squaredNorm(), pair.width);
   if (!(k.value > 0)) return now;

@@ -3,7 +3,7 @@
 // Points x_i, x_j with outward unit normals n_i, n_j as they are now, d = x_j - x_i, c = -n_i . n_j. Contact
 // acts along n = b / |b|, b = a_i n_i - a_j n_j (a: 1 for a face, 0 for an edge or a ball; two balls: along
 // d).
-//     gap       g = d . n - R_i - R_j                 (R the radius of a ball)
+//     gap       g = d . n - R_i - R_j + a             (R the radius of a ball, a what is allowed for)
 //     offset    t = d - (d . n) n
 //     energy    U = kappa A_i A_j K(t) w(c) psi(-g)
 // K is a kernel of unit area, so that the double sum over the patches A of two faces in contact is kappa
@@ -53,7 +53,8 @@ struct PairConstants {
   double stiffness = 0;  // kappa A_i A_j [N m], or kappa A [N/m] where the kernel is 1
   double width = 0;      // rho [m]; 0: the kernel is 1
   double facing_from = 0, facing_fully = 0;
-  double limit = 0;  // m, deeper than this it is no contact
+  double limit = 0;    // m, deeper than this it is no contact
+  double allowed = 0;  // m, how deep they may be in each other before they press
   NormalLaw law;
 };
 

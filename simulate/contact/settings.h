@@ -27,6 +27,7 @@ struct ContactSettings {
   std::vector<double> stick =
       {};              // (parts) Pa, or empty: the traction that pulls off what has touched; infinity: glue
   double damping = 0;  // s, tau
+  double parting = 0;  // s, in which what begins inside something else is let out; 0: it is refused
   std::vector<ContactPlane> planes = {};
   // Pairs of parts, lower number first, that are bonded: they do not touch where they are near at rest.
   std::vector<std::array<std::uint32_t, 2>> bonded = {};

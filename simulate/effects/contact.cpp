@@ -32,6 +32,23 @@ double parse_stick(TableReader& reader) {
   return stick;
 }
 
+// `overlap` and `overlap_time`: s, or 0 where what overlaps at the start is refused.
+double parse_parting(TableReader& reader) {
+  const std::string how = reader.text("overlap").value_or("refuse");
+  const std::optional<double> time = reader.quantity("overlap_time", Dimension::time);
+  if (how != "refuse" && how != "part")
+    reader.fail(reader.find("overlap")->line, "\"overlap\" needs to be \"refuse\" or \"part\"");
+  if (how == "refuse" && time)
+    reader.fail(reader.find("overlap_time")->line, "\"overlap_time\" needs \"overlap\" = \"part\"");
+  if (how == "refuse") return 0;
+  if (!time || !(*time > 0))
+    reader.fail(
+        reader.find("overlap")->line,
+        "\"overlap\" = \"part\" needs \"overlap_time\" above 0, for example \"20 ms\": the time in which "
+        "they are let out");
+  return *time;
+}
+
 // `stick` of [materials.NAME].
 std::map<std::string, double> sticky_materials(TableReader& scene) {
   std::map<std::string, double> sticky;
@@ -154,6 +171,7 @@ void Contact::parse(TableReader& scene, Parameters& parameters) {
   parameters.stick = parse_stick(reader);
   parameters.damping = reader.quantity("damping", Dimension::time).value_or(0);
   if (!(parameters.damping >= 0)) reader.fail("\"damping\" in [contact] needs to be 0 or more");
+  parameters.parting = parse_parting(reader);
   reader.finish();
 }
 
@@ -165,6 +183,7 @@ std::optional<Contact> Contact::make(const Parameters& parameters, const Setting
   settings.stiffness = parameters.stiffness;
   settings.friction = parameters.friction;
   settings.damping = parameters.damping;
+  settings.parting = parameters.parting;
   for (const std::array<std::string, 2>& each : parameters.bonded) {
     std::array<std::uint32_t, 2> parts{};
     for (std::uint32_t p = 0; p < setting.body.parts.size(); ++p)
@@ -178,6 +197,7 @@ std::optional<Contact> Contact::make(const Parameters& parameters, const Setting
   settings.planes = parameters.planes;
   Contact made;
   made.contacts_ = std::make_shared<Contacts>(std::move(settings), setting);
+  for (const Part& part : setting.body.parts) made.names_.push_back(part.name);
   return made;
 }
 
@@ -216,6 +236,30 @@ std::vector<double> Contact::keepsake() const {
 
 void Contact::take_over(const std::vector<double>& keepsake) const {
   contacts_->take_over(keepsake);
+}
+
+// Of the free rigid parts; what leads a manipulator tells its own.
+std::vector<std::string> Contact::history_columns() const {
+  std::vector<std::string> columns;
+  for (const Contacts::Felt& felt : contacts_->felt())
+    for (const char* what : {"force", "torque"})
+      for (const char axis : {'x', 'y', 'z'})
+        columns.push_back(fmt::format("{} contact {} {} [{}]", names_[felt.part], what, axis,
+                                      std::string(what) == "force" ? "N" : "N m"));
+  return columns;
+}
+
+std::vector<double> Contact::history_values(const State& state, const std::vector<Vec3>&) const {
+  std::vector<double> values;
+  for (const Contacts::Felt& felt : contacts_->felt_about_centres(state)) {
+    values.insert(values.end(), felt.force.begin(), felt.force.end());
+    values.insert(values.end(), felt.torque.begin(), felt.torque.end());
+  }
+  return values;
+}
+
+double Contact::put_in(const State& state) const {
+  return contacts_->put_in(state);
 }
 
 std::optional<ContactLosses> Contact::companion() const {

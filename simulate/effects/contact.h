@@ -38,6 +38,7 @@ class Contact {
     double stick = 0;                                // Pa, of materials that give none
     std::map<std::string, double> sticky;            // Pa, by material
     double damping = 0;                              // s
+    double parting = 0;                              // s, of overlap = "part"; 0: refused
     std::vector<std::array<std::string, 2>> bonded;  // parts of [[bond]]
     std::vector<std::string> glued;                  // parts of [[manipulator]] with glue
     std::vector<ContactPlane> planes;
@@ -59,10 +60,15 @@ class Contact {
   void restore(const std::vector<double>& memory) const;
   [[nodiscard]] std::vector<double> keepsake() const;
   void take_over(const std::vector<double>& keepsake) const;
+  [[nodiscard]] std::vector<std::string> history_columns() const;
+  [[nodiscard]] std::vector<double> history_values(const State& state, const std::vector<Vec3>&) const;
+  static constexpr const char* put_in_by = "overlap";
+  [[nodiscard]] double put_in(const State& state) const;
   [[nodiscard]] std::optional<ContactLosses> companion() const;
 
  private:
   std::shared_ptr<Contacts> contacts_;
+  std::vector<std::string> names_;  // (parts)
 };
 
 // Whether the scene asks for contact: `contact = true`, [contact] or [[plane]]. Touching parts are not bonded

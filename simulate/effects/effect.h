@@ -51,6 +51,12 @@
 //   std::vector<double> history_values(const State&, const std::vector<Vec3>& unbalanced) const
 //                                                                     of the last step and the state it began
 //                                                                     with, for the books
+//   double put_in(const State&) const                                 J, what has come into what it stores
+//                                                                     since it was asked last, but for the
+//                                                                     work of its forces; the books ask
+//                                                                     before every step and have it as work
+//                                                                     of
+//   static constexpr const char* put_in_by
 // and, where its forces are entered in two books,
 //   std::optional<F> companion() const                                another effect that runs after it
 // An effect that a scene does not name makes no object, no array and no pass.
@@ -167,6 +173,11 @@ concept TellsHistory = requires(const E& e, const State& s, const std::vector<Ve
   { e.history_values(s, u) } -> std::same_as<std::vector<double>>;
 };
 template <class E>
+concept PutsIn = requires(const E& e, const State& s) {
+  { e.put_in(s) } -> std::same_as<double>;
+  { E::put_in_by } -> std::convertible_to<const char*>;
+};
+template <class E>
 concept TellsNeedOfTime = requires(const E& e) {
   { e.needs_time() } -> std::same_as<bool>;
 };
@@ -195,6 +206,8 @@ struct Pass {
   std::function<void(const std::vector<double>&)> take_over;
   std::vector<std::string> history_columns;
   std::function<std::vector<double>(const State&, const std::vector<Vec3>&)> history_values;
+  std::function<double(const State&)> put_in;
+  const char* put_in_by = "";
   Book book = Book::work;
   bool constant = false, needs_time = false;
   double seconds = 0;
@@ -250,6 +263,10 @@ template <class E>
     pass.history_values = [effect](const State& s, const std::vector<Vec3>& u) {
       return effect->history_values(s, u);
     };
+  }
+  if constexpr (PutsIn<E>) {
+    pass.put_in = [effect](const State& s) { return effect->put_in(s); };
+    pass.put_in_by = E::put_in_by;
   }
   if constexpr (TellsConstant<E>) pass.constant = effect->constant();
   if constexpr (requires { E::book; }) pass.book = E::book;

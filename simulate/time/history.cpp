@@ -133,6 +133,13 @@ History::History(const Setting& setting, const std::vector<Pass>& passes,
 }
 
 void History::before(const State& state, bool sample, double folding) {
+  for (std::size_t p = 0; p < passes_.size(); ++p) {
+    if (!passes_[p].put_in) continue;
+    const double more = passes_[p].put_in(state);
+    if (more == 0) continue;
+    ledger_.accounts[own_[p]].energy -= more;
+    ledger_.accounts[ledger_.account(passes_[p].put_in_by, Account::Kind::work)].energy += more;
+  }
   velocity_ = state.velocity;
   sample_ = sample;
   time_ = *state.time;

@@ -60,10 +60,10 @@ def tube_along(centres, radius, sides=12):
     return np.array(triangles)
 
 
-def helix(radius, pitch, turns, wire, points=24):
-    """A coil around z: the middle of the wire runs at `radius`, `pitch` a turn; `wire` is the wire's radius."""
+def helix(radius, pitch, turns, wire, points=24, sides=12):
+    """A coil around z: the middle of the wire runs at `radius`, `pitch` a turn; `wire` is the wire's radius, `sides` the corners of its outline."""
     angle = 2 * np.pi * np.arange(int(turns * points) + 1) / points
-    return tube_along(np.stack([radius * np.cos(angle), radius * np.sin(angle), pitch * angle / (2 * np.pi)], axis=1), wire)
+    return tube_along(np.stack([radius * np.cos(angle), radius * np.sin(angle), pitch * angle / (2 * np.pi)], axis=1), wire, sides)
 
 
 def prism(outline, y):

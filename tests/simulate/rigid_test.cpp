@@ -102,6 +102,52 @@ TEST(Rigid, CollidesWithASoftBlockAndKeepsTheMomenta) {
 
 // A rigid plate presses a block, without Poisson's ratio, onto a plane: F = E A strain, where each of the two
 // contacts yields by p h / (3 E) and 0.5 % of h.
+// What contact did to a part is what its momenta changed by: nothing else acts.
+TEST(Rigid, TheHistoryHasWhatContactDoesToAFreePart) {
+  Body body = block("soft", {3, 3, 3});
+  append(body, block("hard", {2, 2, 2}, Vec3(0.006, 0.013, 0.031)));
+  Scene scene = rigid_scene(0.02);
+  scene.run.step = 4e-5;
+  scene.run.history_every = 4e-5;
+  scene.get<RigidParts>().parts = {"hard"};
+  scene.get<Contact>().on = true;
+  scene.get<Contact>().friction = 0.3;
+  scene.get<Bonds>().bond = false;
+  throw_part(scene, "hard", Vec3(0.1, 0, -0.5));
+  const TimedCase made = testing::run_timed(std::move(body), scene);
+  const std::vector<double> mass = lumped_masses(testing::setting_of(made.body));
+  const Column& velocity = made.body.element_columns.at("velocity");
+  const Part& hard = made.body.parts[1];
+  Vec3 momentum = Vec3::Zero(), spin = Vec3::Zero(), centre = Vec3::Zero();
+  double whole = 0;
+  for (std::uint32_t e = hard.element_begin; e < hard.element_end; ++e) {
+    whole += mass[e];
+    centre += mass[e] * made.body.position[e];
+  }
+  centre /= whole;
+  for (std::uint32_t e = hard.element_begin; e < hard.element_end; ++e) {
+    const Vec3 p =
+        mass[e] * Vec3(velocity.values[3 * e], velocity.values[3 * e + 1], velocity.values[3 * e + 2]);
+    momentum += p;
+    spin += (made.body.position[e] - centre).cross(p);
+  }
+  const std::vector<double>& time = made.history.column("time");
+  const auto impulse = [&](const std::string& what) {
+    Vec3 sum = Vec3::Zero();
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::vector<double>& of = made.history.column("hard contact " + what + " " + "xyz"[axis]);
+      for (std::size_t row = 1; row < time.size(); ++row)
+        sum[axis] += 0.5 * (of[row] + of[row - 1]) * (time[row] - time[row - 1]);
+    }
+    return sum;
+  };
+  const Vec3 change = momentum - whole * Vec3(0.1, 0, -0.5);
+  EXPECT_GT(change.z(), 0.1 * whole);
+  EXPECT_LT((impulse("force") - change).norm(), 0.01 * change.norm());
+  EXPECT_GT(spin.norm(), 1e-3 * change.norm() * kSide);
+  EXPECT_LT((impulse("torque") - spin).norm(), 0.02 * spin.norm());
+}
+
 TEST(Rigid, AManipulatorFollowsItsPathAndFeelsWhatItPresses) {
   Body body = block("block", {3, 3, 4});
   append(body, block("plate", {5, 5, 1}, Vec3(-0.01, -0.01, 0.04)));
