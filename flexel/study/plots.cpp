@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -63,6 +64,58 @@ std::string label_at(const Point& point) {
   return fmt::format("{:.9g} {:.9g} {}\n", point.seconds, shown_error(point), in_quotes(point.label));
 }
 
+// Where a label may lie beside its point: alignment and offset in characters, as gnuplot has them.
+struct Slot {
+  const char* alignment;
+  double right, up;
+};
+constexpr Slot kSlots[] = {{"left", 0.6, 0.5},   {"left", 0.6, -0.6}, {"right", -0.6, -0.6},
+                           {"right", -0.6, 0.5}, {"left", 0.6, 1.4},  {"left", 0.6, -1.5},
+                           {"right", -0.6, -1.5}};
+
+// Labels of `wanted` in the first slot where they cover no other label, the first ones first; what has none
+// is left out: the table has it. Data of a plot for each slot.
+std::array<std::string, std::size(kSlots)> placed_labels(const std::vector<Point>& points,
+                                                         const std::vector<std::size_t>& wanted) {
+  // Of the plot, in points of an svg: about what gnuplot leaves beside tics and key. Characters of 10 points.
+  constexpr double kWidth = 600, kHeight = 480, kCharacter = 6, kLine = 12;
+  double low[2] = {1e300, 1e300}, high[2] = {0, 0};
+  const auto place = [](const Point& point) { return std::array{point.seconds, shown_error(point)}; };
+  for (const Point& point : points) {
+    if (!is_drawn(point)) continue;
+    for (int a = 0; a < 2; ++a) {
+      low[a] = std::min(low[a], place(point)[a]);
+      high[a] = std::max(high[a], place(point)[a]);
+    }
+  }
+  const double across = kWidth / (1.24 * std::max(std::log10(high[0] / low[0]), 0.1));
+  const double upward =
+      kHeight / std::max(std::ceil(std::log10(high[1])) - std::floor(std::log10(low[1])), 1.0);
+  struct Box {
+    double left, right, bottom, top;
+  };
+  std::vector<Box> taken;
+  std::array<std::string, std::size(kSlots)> data;
+  for (const std::size_t i : wanted) {
+    const double x = std::log10(points[i].seconds) * across, y = std::log10(shown_error(points[i])) * upward;
+    const double length = kCharacter * static_cast<double>(points[i].label.size());
+    for (std::size_t s = 0; s < data.size(); ++s) {
+      const double edge = x + kSlots[s].right * kCharacter, middle = y + kSlots[s].up * kLine;
+      const double left = edge - (kSlots[s].right < 0 ? length : 0);
+      const Box box{left, left + length, middle - kLine / 2, middle + kLine / 2};
+      if (std::any_of(taken.begin(), taken.end(), [&](const Box& other) {
+            return box.left < other.right && other.left < box.right && box.bottom < other.top &&
+                   other.bottom < box.top;
+          }))
+        continue;
+      taken.push_back(box);
+      data[s] += label_at(points[i]);
+      break;
+    }
+  }
+  return data;
+}
+
 std::string error_script(const Study& study, const std::string& out) {
   std::vector<std::pair<std::string, std::vector<const Summed*>>> curves;
   std::vector<Point> points;
@@ -87,16 +140,17 @@ std::string error_script(const Study& study, const std::string& out) {
     plots += "unsure with lines dt 3 lw 1.2 lc rgb '#888888' title 'uncertainty', ";
   }
   data += "$front << EOD\n";
-  std::string labels = "$labels << EOD\n";
   const std::vector<std::size_t> front = frontier(points);
   for (const std::size_t i : front)
     data += fmt::format("{:.9g} {:.9g}\n", points[i].seconds, shown_error(points[i]));
+  data += "EOD\n";
   // The others are told by their colour: where all are written none can be read.
+  std::vector<std::size_t> labelled;
   for (std::size_t i = 0; i < points.size(); ++i)
-    if (points[i].error && (points[i].sweep == "resolution" || points[i].sweep == "calculix" ||
-                            std::find(front.begin(), front.end(), i) != front.end()))
-      labels += label_at(points[i]);
-  data += "EOD\n" + labels + "EOD\n";
+    if (points[i].error && (points[i].sweep == "resolution" || points[i].sweep == "calculix"))
+      labelled.push_back(i);
+  for (const std::size_t i : front)
+    if (std::find(labelled.begin(), labelled.end(), i) == labelled.end()) labelled.push_back(i);
   if (!front.empty()) plots += "$front with linespoints lw 7 lc rgb '#55e0c000' pt 6 ps 2 title 'frontier', ";
   for (std::size_t c = 0; c < curves.size(); ++c) {
     data += fmt::format("$curve{} << EOD\n", c);
@@ -116,7 +170,14 @@ std::string error_script(const Study& study, const std::string& out) {
                          against ? 1.1 : 0.7, against ? kAgainstColour : kColours[c % std::size(kColours)],
                          in_quotes(curves[c].first));
   }
-  plots += "$labels with labels left offset 0.6,0.5 font ',10' notitle";
+  const auto labels = placed_labels(points, labelled);
+  for (std::size_t s = 0; s < labels.size(); ++s) {
+    if (labels[s].empty()) continue;
+    data += fmt::format("$labels{} << EOD\n{}EOD\n", s, labels[s]);
+    plots += fmt::format("$labels{} with labels {} offset {},{} font ',10' notitle, ", s, kSlots[s].alignment,
+                         kSlots[s].right, kSlots[s].up);
+  }
+  plots.erase(plots.size() - 2);  // the last comma
   return script + data + "plot " + plots + "\n";
 }
 

@@ -230,7 +230,19 @@ RunSize Sweep::size_of(const Trial& wanted) const {
 Prediction Sweep::predict(const Trial& wanted, std::optional<std::size_t> counted) const {
   RunSize size = size_of(wanted);
   if (counted) size.cells = static_cast<double>(*counted);
-  return predictor_.predict(wanted.kind(), size);
+  Prediction told = predictor_.predict(wanted.kind(), size);
+  if (wanted.sweep == "threads" && !predictor_.knows(wanted.kind())) told.seconds *= thread_factor(wanted);
+  return told;
+}
+
+// Amdahl, 1967: of the work of a run on all n cores, s + p, s is done by one thread and takes s + p / n.
+double Sweep::thread_factor(const Trial& wanted) const {
+  for (const Rung& rung : rungs_) {
+    if (!rung.found || rung.size != wanted.configuration.size || cores_ < 2) continue;
+    const double shared = std::clamp((rung.cpu - rung.wall) * cores_ / (cores_ - 1), 0.0, rung.cpu);
+    return (rung.cpu - shared + shared / wanted.configuration.threads) / rung.wall;
+  }
+  return 1;
 }
 
 void Sweep::done(const Trial& ended, const RunResult& found) {
@@ -255,6 +267,7 @@ void Sweep::done(const Trial& ended, const RunResult& found) {
       rung.spacing = found.spacing;
       rung.step = found.step;
       rung.wall = found.wall;
+      rung.cpu = found.cpu;
     }
   if (found.ok())
     predictor_.add(ended.kind(),

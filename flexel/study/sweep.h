@@ -71,9 +71,11 @@ class Sweep {
     double size = 0;
     bool done = false;
     std::optional<RunSize> found;  // of a run that went well
-    double spacing = 0, step = 0, wall = 0;
+    double spacing = 0, step = 0, wall = 0, cpu = 0;
   };
   [[nodiscard]] RunSize size_of(const Trial& trial) const;
+  // What a run takes on other threads over what one on every core takes.
+  [[nodiscard]] double thread_factor(const Trial& trial) const;
   [[nodiscard]] std::optional<std::size_t> middle() const;
   void add_models(std::vector<Trial>& trials) const;
   void add_choices(std::vector<Trial>& trials, std::size_t rung) const;

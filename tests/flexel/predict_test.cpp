@@ -6,6 +6,8 @@
 #include <cmath>
 #include <random>
 
+#include "flexel/study/sweep.h"
+
 namespace flexel::study {
 namespace {
 
@@ -135,6 +137,31 @@ TEST(Predict, CalculixAndOneProcessHaveLawsOfTheirOwn) {
   const Prediction told = predictor.predict(kOneProcess, {250e3, 1});
   EXPECT_NEAR(told.seconds / (0.08 + 31e-6 * 250e3), 1, 0.25);
   EXPECT_NEAR(told.bytes / (100e6 + 5000 * 250e3), 1, 0.1);
+}
+
+// 1.2 s of a run's work are done by one thread, 4 s by both: 3.2 s on two threads, 5.2 s on one.
+TEST(Predict, ARunOnOneThreadTakesTheWorkOfAll) {
+  Sweep sweep(SceneFacts{}, Configuration{}, {2e-3, 1e-3}, 100, 2);
+  bool found = false;
+  for (int rounds = 0; rounds < 20 && !found; ++rounds)
+    for (const Trial& trial : sweep.open()) {
+      if (trial.sweep == "resolution") {
+        RunResult run;
+        run.cells = trial.configuration.size < 1.5e-3 ? 80000 : 10000;
+        const double scale = static_cast<double>(run.cells) / 80000;
+        run.stages = {{"solve", 3.2 * scale}};
+        run.wall = 3.2 * scale;
+        run.cpu = 5.2 * scale;
+        sweep.done(trial, run);
+        break;
+      }
+      if (trial.label.find("1 thread") == std::string::npos) continue;
+      found = true;
+      Trial on_two = trial;
+      on_two.configuration.threads = 2;
+      EXPECT_NEAR(sweep.predict(trial).seconds / sweep.predict(on_two).seconds, 5.2 / 3.2, 1e-9);
+    }
+  EXPECT_TRUE(found);
 }
 
 }  // namespace
