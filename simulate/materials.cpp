@@ -108,10 +108,9 @@ const std::vector<Material>& material_library() {
           "stainless", 200e9, 0.30, 7900, {210e6, 520e6, 0.45},
           "1.4301, plate. E read at makeitfrom.com; not read: EN 1993-1-4, 2.1.3 and table 2.1, density EN "
           "10088-1, elongation EN 10088-2"),
-      library_entry(
-          "stainless 316", 200e9, 0.30, 8000, {220e6, 520e6, 0.45},
-          "1.4401, plate. Not read: EN 1993-1-4, 2.1.3 and table 2.1, density EN 10088-1, elongation EN "
-          "10088-2"),
+      library_entry("stainless 316", 200e9, 0.30, 8000, {220e6, 520e6, 0.45},
+                    "1.4401. E read at woite-edelstahl.com, density and least strengths at metalsupplies.com "
+                    "(there 193 GPa, 40 %); not read: poisson EN 1993-1-4, elongation EN 10088-2 (plate)"),
       library_entry("cast iron", 110e9, 0.26, 7200, {0, 250e6, 0},
                     "EN-GJL-250. EN 1561 (E 103 to 118 GPa), read at sn-castiron.nl"),
       library_entry(
@@ -157,7 +156,8 @@ const std::vector<Material>& material_library() {
           "Printed, XY. Not read: Ultimaker's data sheet, poisson (additive.tools has 3 to 4 GPa, 1220 to "
           "1260 kg/m3)"),
       library_entry("ABS", 2.0e9, 0.37, 1040, {38e6, 0, 0.5},
-                    "SUSTAABS data sheet (ISO 527), read at studylib.net; not read: poisson"),
+                    "SUSTAABS data sheet (ISO 527), read at studylib.net; not read: poisson (0.394 at "
+                    "themechanicalengineeringhandbook.com)"),
       library_entry(
           "PETG", 1.9e9, 0.38, 1270, {},
           "Printed, XY. Not read: Ultimaker's data sheet, poisson (additive.tools has 2 to 3 GPa, 1250 to "
@@ -166,7 +166,8 @@ const std::vector<Material>& material_library() {
                     "Laser sintered, EOS PA 2200. Strength, elongation read at layerx3d.in, density at "
                     "additive.tools; not read: E (renato.design has 1.7 to 1.9 GPa), poisson"),
       library_entry("polycarbonate", 2.4e9, 0.38, 1200, {65e6, 0, 0},
-                    "Makrolon 2405. Covestro's data sheet (ISO 527), read at scribd.com; not read: poisson"),
+                    "Makrolon 2405. Covestro's data sheet (ISO 527), read at scribd.com; not read: poisson "
+                    "(0.37 at themechanicalengineeringhandbook.com)"),
       library_entry(
           "POM", 3.1e9, 0.37, 1420, {70e6, 0, 0},
           "Delrin 500P. DuPont's figures (ISO 527), read at a dealer's (zjxxg.cn); not read: poisson"),
@@ -174,9 +175,9 @@ const std::vector<Material>& material_library() {
                     "Cast. Not read: Plexiglas GS data sheet (designerdata.nl has 2.9 GPa, 75 MPa, 4.5 %)"),
       library_entry("PEEK", 4.0e9, 0.40, 1300, {98e6, 0, 0.45},
                     "Not read: Victrex 450G data sheet (ISO 527), poisson"),
-      library_entry(
-          "rubber", 1.2e6, 0.49, 930, {},
-          "Natural. Not read: Treloar 1975 (G near 0.4 MPa); nearly incompressible, poisson taken as 0.49"),
+      library_entry("rubber", 1.2e6, 0.49, 930, {},
+                    "Natural. Not read: Treloar 1975 (G near 0.4 MPa; matweb.com has 0.5 MPa, 950 kg/m3); "
+                    "nearly incompressible, poisson taken as 0.49"),
       library_entry(
           "silicone", 2.5e6, 0.48, 1150, {},
           "Gent 1958's relation at 50 Shore A, computed (Ruess's, read at josephborrello.com, gives 3.4 "
