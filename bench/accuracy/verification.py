@@ -220,7 +220,7 @@ def main():
             tables = [("Models", "Tip of the same cantilever by model, elements on its faces ([accuracy.md](accuracy.md)).", ["accuracy_table"]),
                       ("Error bars", "Cases whose answer is known ([error-bars.md](error-bars.md)).", ["error_bars"]),
                       ("STEP parts", "Every closed STEP part with an error bar, nothing set by hand; processor seconds.",
-                       [HERE / "step_parts.py", "--parts", options.parts], [options.parts],
+                       [HERE / "step_parts.py", "--parts", options.parts, "--cells", "30000,300000"], [options.parts],
                        lambda: command(HERE / "step_parts.py", "--list").split()),
                       ("Beside CalculiX", "The same parts by CalculiX and by Flexel; processor seconds, one thread each ([accuracy.md](accuracy.md)).",
                        [HERE / "calculix.py", "--parts", options.parts], ["ccx", "gmsh"],
