@@ -56,7 +56,7 @@ Surface part_surface(const Surface& surface, std::uint32_t part) {
 }
 
 // Meshes from gmsh in metres, one after the other.
-void append(GmshMesh& all, GmshMesh one, double unit) {
+void append(GmshMesh& all, const GmshMesh& one, double unit) {
   const auto nodes = static_cast<std::uint32_t>(all.nodes.size());
   int surfaces = 0, volumes = 0;
   for (const GmshTriangle& each : all.triangles) surfaces = std::max(surfaces, each.surface);

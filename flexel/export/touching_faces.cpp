@@ -77,6 +77,7 @@ std::vector<TiedFaces> touching_faces(const AnalysisMesh& mesh, double tolerance
       }
     }
   std::vector<TiedFaces> result;
+  result.reserve(found.size());
   for (auto& [parts, tie] : found) result.push_back(std::move(tie));
   return result;
 }
