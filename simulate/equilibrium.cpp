@@ -114,13 +114,14 @@ class LoadStepping {
   double farthest_reach_ = std::numeric_limits<double>::infinity();  // m, of an attempt's linear answer
   double reach_ = 0;                       // m: of the first linear answer, for the whole load
   std::optional<std::vector<Vec3>> near_;  // m: where the next attempt starts in place of `state_`
+  int spent_near_ = 0;                     // iterations of an attempt from there that came to nothing
   bool pushed_ = false;                    // the next attempt starts beside the last equilibrium
   int pushes_ = 0;
 };
 
 int LoadStepping::iterations_left() const {
   const int allowed = settings_.newton_iterations.value_or(overloaded() ? kOverloadIterations : kIterations);
-  return allowed + kIterationsPerLoadStep * result_.load_steps + kPushedIterations * pushes_ -
+  return allowed + kIterationsPerLoadStep * result_.load_steps + kPushedIterations * pushes_ + spent_near_ -
          result_.newton_iterations;
 }
 
@@ -223,7 +224,9 @@ bool LoadStepping::begin_near() {
   farthest_reach_ = std::numeric_limits<double>::infinity();
   if (!far) return false;
   if (!overloaded()) near_ = start_();
-  if (near_) (void)attempt(NewtonSteps::full, kFullStepIterations);
+  const int before = result_.newton_iterations;
+  if (near_ && !attempt(NewtonSteps::full, kFullStepIterations))
+    spent_near_ = result_.newton_iterations - before;
   near_.reset();
   return true;
 }

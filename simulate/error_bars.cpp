@@ -70,7 +70,8 @@ class CoarseRuns {
     probe.at = body.rest[most];
     scene_.probes.push_back(probe);
     scene_.run.tolerance = std::max(scene.run.tolerance, kCoarseTolerance);
-    scene_.run.newton_iterations = 2 * result.newton_iterations + kAddedIterations;
+    scene_.run.newton_iterations =
+        2 * std::max(result.newton_iterations, result.start_newton_iterations) + kAddedIterations;
     found_.push_back(answers(result));
     found_.back().moved.push_back(body.position[most] - body.rest[most]);
     if (left_) *left_ -= result.seconds;
@@ -179,7 +180,7 @@ ErrorBars estimate_errors(const Body& body, const Scene& scene, const SimulateOp
   const Sequence energy = runs.energy();
   errors.bars.push_back({ErrorBar::Of::elastic_energy, 0, "", energy.value[0], bar(energy)});
   if (const Sequence stress = runs.stress(); !wide && stress.value[0] > 0)
-    errors.von_mises = {stress.value, stress_bar(stress)};
+    errors.von_mises = {stress.value, stress_bar(stress, !result.stress->beside.empty())};
   errors.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   return errors;
 }

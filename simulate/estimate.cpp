@@ -47,9 +47,10 @@ Bar richardson(const Sequence& s) {
   return {std::max(kWideSafety * std::abs(away), expected), s.value[0] + away, order};
 }
 
-std::optional<Bar> stress_bar(const Sequence& s) {
+std::optional<Bar> stress_bar(const Sequence& s, bool singular) {
   const double e21 = s.value[1] - s.value[0], e32 = s.value[2] - s.value[1];
   if (std::max(std::abs(e21), std::abs(e32)) <= kHardlyDiffer * std::abs(s.value[0])) return wide_bar(s);
+  if (singular) return std::nullopt;
   Bar bar = richardson(s);
   if (!bar.order) return std::nullopt;
   bar.half_width = std::max(kWideSafety * std::abs(bar.extrapolated - s.value[0]), std::abs(e21));

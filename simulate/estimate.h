@@ -32,10 +32,11 @@ struct Bar {
 // Three times the larger difference; what is extrapolated is the finest value.
 [[nodiscard]] Bar wide_bar(const Sequence& sequence);
 
-// Of the largest stress, which beside a re-entrant edge or the rim of a support has no limit: nothing unless
-// the values close in on one with an order of at least 1/2, or hardly differ. Three times Richardson's
-// distance, and at least the finer difference.
-[[nodiscard]] std::optional<Bar> stress_bar(const Sequence& sequence);
+// Of the largest stress: nothing unless the values close in on a limit with an order of at least 1/2, or
+// hardly differ. Three times Richardson's distance, and at least the finer difference. `singular`: beside a
+// re-entrant edge or a support there is no limit, whatever three values seem to close in on; it has to hardly
+// differ.
+[[nodiscard]] std::optional<Bar> stress_bar(const Sequence& sequence, bool singular = false);
 
 struct ErrorBar {
   enum class Of { probe, largest_displacement, elastic_energy };

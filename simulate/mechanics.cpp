@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
+
 #include <cmath>
 
 #include "formats/parallel.h"
@@ -11,10 +13,16 @@
 namespace flexel {
 namespace {
 
+constexpr double kHeldFast = 1e-3;             // of a tie's stiffness in its stiffest direction
 constexpr std::size_t kStoredElements = 1000;  // a tangent up to this size is factorised at once anyway
 
 double squared_norm(const std::vector<Vec3>& values) {
   return parallel_sum<double>(values.size(), [&](std::size_t e) { return values[e].squaredNorm(); });
+}
+
+bool holds_all_directions(const Block& tie) {
+  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(Mat3(tie), Eigen::EigenvaluesOnly);
+  return eigen.eigenvalues()[0] > kHeldFast * eigen.eigenvalues()[2];
 }
 
 // Elements that nothing resists at (of loose crumbs) stay where they are; in time their inertia carries them.
@@ -170,10 +178,10 @@ std::vector<std::uint8_t> Mechanics::tied_elements() {
   for (const Pass& pass : passes_)
     if (pass.add_stiffness && pass.couples.empty()) pass.add_stiffness(rest, matrix);
   for (std::uint32_t e = 0; e < tied.size(); ++e) {
-    bool held = constraints_.mask[e] != 0;
+    if (constraints_.mask[e] != 0) tied[e] = constraints_.mask[e] == 7 ? 2 : 1;
     for (std::size_t entry = matrix.row_offsets[e]; entry < matrix.row_offsets[e + 1]; ++entry)
-      held = held || (matrix.columns[entry] == e && matrix.values[entry].diagonal().maxCoeff() > 0);
-    tied[e] = held;
+      if (matrix.columns[entry] == e && matrix.values[entry].diagonal().maxCoeff() > 0)
+        tied[e] = tied[e] == 2 || holds_all_directions(matrix.values[entry]) ? 2 : 1;
   }
   return tied;
 }

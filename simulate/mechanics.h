@@ -63,7 +63,7 @@ class Mechanics {
   void eliminate_prescribed();
   // Groups of elements that effects couple (bonds).
   [[nodiscard]] std::vector<CoupledElements> coupled_elements() const { return coupled(passes_); }
-  // 1 for each element that a tie holds or leads.
+  // (elements) 1 where a tie holds or leads an element along some directions, 2 along all, else 0.
   [[nodiscard]] std::vector<std::uint8_t> tied_elements();
 
   void report(const State& state, SimulateResult& result);

@@ -20,6 +20,7 @@
 #include "simulate/rest_shape.h"
 #include "simulate/scene.h"
 #include "simulate/stress.h"
+#include "simulate/stress_singularity.h"
 #include "simulate/time/settling.h"
 #include "simulate/time/timed_run.h"
 #include "simulate/unsupported.h"
@@ -29,6 +30,7 @@ namespace {
 
 // Of a start from a coarser lattice
 constexpr std::size_t kLeastCellsToCoarsen = 4000;
+constexpr double kBesideCells = 5;      // coarse cells put the peak of a support or an edge that far from it
 constexpr double kMostThinWalls = 0.2;  // share of the matter, in walls thinner than a coarse cell
 constexpr double kStartTolerance = 1e-5;
 
@@ -150,7 +152,7 @@ class Run {
 
  private:
   EquilibriumResult solve(Mechanics& mechanics);
-  [[nodiscard]] std::optional<std::vector<Vec3>> coarse_equilibrium() const;
+  [[nodiscard]] std::optional<std::vector<Vec3>> coarse_equilibrium();
   [[nodiscard]] std::string save_failed(const Mechanics& mechanics);
 
   Body& body_;
@@ -160,14 +162,16 @@ class Run {
   Fragments fragments_;
   Setting setting_;
   bool buckled_ = false;
-  std::size_t unsupported_ = 0;  // elements at tips and edges that springs do not hold
+  int start_newton_iterations_ = 0;
+  std::size_t unsupported_ = 0;     // elements at tips and edges that springs do not hold
+  std::vector<std::uint8_t> tied_;  // (elements) Mechanics::tied_elements()
   State state_;
   std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
 };
 
 EquilibriumResult Run::solve(Mechanics& mechanics) {
-  refuse_loose_fragments(fragments_, body_, mechanics.tied_elements(), mechanics.coupled_elements(),
-                         scene_.name);
+  tied_ = mechanics.tied_elements();
+  refuse_loose_fragments(fragments_, body_, tied_, mechanics.coupled_elements(), scene_.name);
   refuse_unsupported_elements(mechanics, state_, scene_.name);
   refuse_free_motions(mechanics, state_, scene_.name);
   Deadline deadline;
@@ -175,8 +179,9 @@ EquilibriumResult Run::solve(Mechanics& mechanics) {
     deadline = began_ + std::chrono::duration_cast<std::chrono::steady_clock::duration>(
                             std::chrono::duration<double>(*options_.timeout));
   try {
-    return find_equilibrium(mechanics, state_, scene_.run, deadline, progress_,
-                            [&] { return coarse_equilibrium(); });
+    CoarseStart start;
+    if (body_.cell_count() >= kLeastCellsToCoarsen) start = [&] { return coarse_equilibrium(); };
+    return find_equilibrium(mechanics, state_, scene_.run, deadline, progress_, start);
   } catch (const DivergedError& error) {
     throw DivergedError(error.what() + save_failed(mechanics));
   } catch (const TimeoutError& error) {
@@ -186,8 +191,7 @@ EquilibriumResult Run::solve(Mechanics& mechanics) {
 
 // Where the elements are in equilibrium on a lattice twice as coarse: nothing where there is none, or where
 // the coarse lattice says little of this one.
-std::optional<std::vector<Vec3>> Run::coarse_equilibrium() const {
-  if (body_.cell_count() < kLeastCellsToCoarsen) return std::nullopt;
+std::optional<std::vector<Vec3>> Run::coarse_equilibrium() {
   try {
     Coarsening coarse = coarsening(body_);
     if (share_of_thin_walls(coarse.body, 1) > kMostThinWalls) return std::nullopt;
@@ -202,6 +206,7 @@ std::optional<std::vector<Vec3>> Run::coarse_equilibrium() const {
     Progress silent("", Progress::Mode::silent);
     Run run(coarse.body, same, options, silent);
     const SimulateResult found = run();
+    start_newton_iterations_ = std::max(found.newton_iterations, found.start_newton_iterations);
     if (run.buckled_) return std::nullopt;  // the lattices may go to different sides
     if (options_.explain)
       progress_.say(fmt::format("start: from the equilibrium of {} cells, {} Newton iterations",
@@ -245,6 +250,12 @@ SimulateResult Run::operator()() {
   result.smallest_jacobian = mechanics.most_compressed(state_).value;
   measure_corners(mechanics.cells(), body_, state_, result, progress_);
   if (options_.stress) measure_stress(setting_, state_, body_, result);
+  if (options_.estimate && result.stress) {
+    const auto part = std::find_if(body_.parts.begin(), body_.parts.end(),
+                                   [&](const Part& each) { return each.name == result.stress->part; });
+    const double reach = kBesideCells * part->lattice.spacing.maxCoeff();
+    result.stress->beside = singular_beside(body_, tied_, result.stress->at, reach);
+  }
   carry_strays(fragments_, setting_, mechanics.stencil(), state_);
   move_body(body_, state_);
   if (scene_.run.renormalise) renormalise_all(body_, setting_, state_.displacement);
@@ -262,6 +273,7 @@ SimulateResult Run::operator()() {
   result.load_steps = solved.load_steps;
   result.newton_iterations = solved.newton_iterations;
   result.cg_iterations = solved.cg_iterations;
+  result.start_newton_iterations = start_newton_iterations_;
   result.relative_residual = solved.relative_residual;
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
   if (options_.explain) {

@@ -56,6 +56,7 @@ struct StressSummary {     // of the largest von Mises stress
   Vec3 at = Vec3::Zero();  // m, rest position
   std::string part;
   std::optional<double> yield_share;  // of the part's material; nothing where it has no `yield`
+  std::string beside = {};  // why it grows without bound as cells get smaller (singular_beside()); "" if not
 };
 
 struct SettleSummary {  // of equilibrium with contact (simulate/time/settling.h)
@@ -105,6 +106,7 @@ struct SimulateResult {
   Vec3 smallest_corner_at = Vec3::Zero();  // m, rest position of that corner
   std::optional<StressSummary> stress;     // nothing where no part has stresses, or they were not asked for
   int load_steps = 0, newton_iterations = 0, cg_iterations = 0;
+  int start_newton_iterations = 0;  // the most on a coarser lattice that the run started from
   double relative_residual = 0;
   double seconds = 0;
   std::optional<TimedSummary> timed;

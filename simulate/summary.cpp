@@ -66,7 +66,9 @@ std::string stress_bar_of(const SimulateResult& result) {
   const std::optional<StressBar>& found = result.error_bars.von_mises;
   if (!found) return "";
   if (found->bar) return " +- " + human_pressure(found->bar->half_width);
-  return fmt::format(", which does not converge ({}, {}, {} as the cells get smaller),",
+  const std::string& beside = result.stress->beside;
+  return fmt::format(", which {} ({}, {}, {} as the cells get smaller),",
+                     beside.empty() ? "does not converge" : "has no limit beside " + beside,
                      human_pressure(found->value[2]), human_pressure(found->value[1]),
                      human_pressure(found->value[0]));
 }
@@ -200,6 +202,7 @@ std::string summary_json(const SimulateResult& result, const Body& body) {
     json["largest_von_mises"] = result.stress->value;
     json["largest_von_mises_at"] = vector(result.stress->at);
     json["largest_von_mises_part"] = result.stress->part;
+    if (!result.stress->beside.empty()) json["largest_von_mises_beside"] = result.stress->beside;
     if (result.stress->yield_share) json["largest_von_mises_yield_share"] = *result.stress->yield_share;
   }
   if (result.timed) {
