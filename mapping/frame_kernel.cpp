@@ -73,7 +73,10 @@ FLEXEL_CLONES void span_bases(const Frame* frames, std::size_t count, const Vec3
 
 FLEXEL_CLONES void move_frames(const Frame* frames, std::size_t count, const Mat3* rest_base,
                                const Vec3* rest, const Vec3* position, bool orthonormal, Carrier* carrier) {
+  constexpr std::size_t kFramesAhead = 32;
   for (std::size_t begin = 0; begin < count; begin += kLanes) {
+    fetch(rest_base + begin + kFramesAhead, kLanes * sizeof(Mat3));
+    fetch(carrier + begin + kFramesAhead, kLanes * sizeof(Carrier));
     Axes axes;
     gather_edges(frames, begin, count, position, axes);
     const auto spanned = spans(axes);
@@ -92,17 +95,33 @@ FLEXEL_CLONES void move_frames(const Frame* frames, std::size_t count, const Mat
   }
 }
 
-// Columns are read four numbers at a time, of which the last belongs to what follows, and so are
-// displacements written: the next vertex overwrites it.
+// Columns are read four numbers at a time, of which the last belongs to what follows. Four vertices are put
+// together to twelve numbers without gaps.
 FLEXEL_CLONES void carry(const Carrier* carrier, const std::uint32_t* frame, const Vec3* coordinates,
                          std::size_t count, Vec3* displacement) {
-  for (std::size_t v = 0; v < count; ++v) {
+  constexpr std::size_t kVerticesAhead = 96;
+  using Pick = long long __attribute__((vector_size(32)));
+  const auto moved = [&](std::size_t v) __attribute__((always_inline)) {
     const double *by = carrier[frame[v]].data(), *c = coordinates[v].data();
-    const FourDoubles moved =
-        load<FourDoubles>(by) + ((load<FourDoubles>(by + 3) * c[0] + load<FourDoubles>(by + 6) * c[1]) +
-                                 load<FourDoubles>(by + 9) * c[2]);
-    __builtin_memcpy(displacement[v].data(), &moved, v + 1 < count ? sizeof moved : sizeof(Vec3));
+    return load<FourDoubles>(by) + ((load<FourDoubles>(by + 3) * c[0] + load<FourDoubles>(by + 6) * c[1]) +
+                                    load<FourDoubles>(by + 9) * c[2]);
+  };
+  const auto write_one = [&](std::size_t v) __attribute__((always_inline)) {
+    const FourDoubles value = moved(v);
+    __builtin_memcpy(displacement[v].data(), &value, sizeof(Vec3));
+  };
+  std::size_t v = 0;
+  if (count > 0 && reinterpret_cast<std::uintptr_t>(displacement) % 16 != 0) write_one(v++);
+  for (; v + 4 <= count; v += 4) {
+    fetch(coordinates + v + kVerticesAhead, 4 * sizeof(Vec3));
+    const FourDoubles a = moved(v), b = moved(v + 1), c = moved(v + 2), d = moved(v + 3);
+    double* to = displacement[v].data();
+    stream(to, __builtin_shuffle(a, b, Pick{0, 1, 2, 4}));
+    stream(to + 4, __builtin_shuffle(b, c, Pick{1, 2, 4, 5}));
+    stream(to + 8, __builtin_shuffle(c, d, Pick{2, 4, 5, 6}));
   }
+  for (; v < count; ++v) write_one(v);
+  finish_streams();
 }
 
 }  // namespace flexel
