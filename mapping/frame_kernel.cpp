@@ -57,6 +57,18 @@ FLEXEL_INLINE auto spans(const Axes& edges) {
   return (determinant * determinant >= kDegenerate * kDegenerate * lengths) & (lengths > 0);
 }
 
+// A 3 x 3 matrix times the first three numbers of `by`; in the order of sums that Eigen has, so that the bits
+// are the same wherever coordinates are computed.
+FLEXEL_INLINE FourDoubles product(const double* matrix, const FourDoubles& by) {
+  const FourDoubles last = load<FourDoubles>(matrix + 5);
+  return load<FourDoubles>(matrix) * by[0] +
+         (load<FourDoubles>(matrix + 3) * by[1] + FourDoubles{last[1], last[2], last[3], 0} * by[2]);
+}
+
+FLEXEL_INLINE double squared_norm(const FourDoubles& of) {
+  return of[0] * of[0] + of[1] * of[1] + of[2] * of[2];
+}
+
 }  // namespace
 
 FLEXEL_CLONES void span_bases(const Frame* frames, std::size_t count, const Vec3* points, bool orthonormal,
@@ -69,6 +81,27 @@ FLEXEL_CLONES void span_bases(const Frame* frames, std::size_t count, const Vec3
       for (int axis = 0; axis < 3; ++axis)
         for (int c = 0; c < 3; ++c) base[f].data()[3 * axis + c] = axes.of[axis][c][f - begin];
   }
+}
+
+FLEXEL_CLONES Extremes coordinates_in(const RestFrames& rest, const std::uint32_t* frame,
+                                      const Vec3* vertices, const std::uint8_t* referenced, std::size_t count,
+                                      Vec3* coordinates) {
+  constexpr std::size_t kVerticesAhead = 96;
+  Extremes largest;
+  for (std::size_t v = 0; v < count; ++v) {
+    fetch(vertices + v + kVerticesAhead, sizeof(Vec3));
+    const std::uint32_t f = frame[v];
+    const double *to_base = rest.to_base[f].data(), *point = vertices[v].data();
+    const FourDoubles at{point[0], point[1], point[2], 0}, origin = load<FourDoubles>(to_base);
+    const FourDoubles away = at - origin, in_base = product(to_base + 3, away);
+    if (coordinates)
+      for (int c = 0; c < 3; ++c) coordinates[v].data()[c] = in_base[c];
+    if (!referenced[v]) continue;
+    const FourDoubles residual = origin + product(rest.base[f].data(), in_base) - at;
+    const FourDoubles outside = product(rest.to_spacings[rest.part[f]].data(), away);
+    largest.include({squared_norm(residual), squared_norm(outside)});
+  }
+  return largest;
 }
 
 FLEXEL_CLONES void move_frames(const Frame* frames, std::size_t count, const Mat3* rest_base,
