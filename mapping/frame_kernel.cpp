@@ -57,12 +57,11 @@ FLEXEL_INLINE auto spans(const Axes& edges) {
   return (determinant * determinant >= kDegenerate * kDegenerate * lengths) & (lengths > 0);
 }
 
-// A 3 x 3 matrix times the first three numbers of `by`; in the order of sums that Eigen has, so that the bits
-// are the same wherever coordinates are computed.
+// A 3 x 3 matrix times the first three numbers of `by`, summed from the left as Eigen does.
 FLEXEL_INLINE FourDoubles product(const double* matrix, const FourDoubles& by) {
   const FourDoubles last = load<FourDoubles>(matrix + 5);
-  return load<FourDoubles>(matrix) * by[0] +
-         (load<FourDoubles>(matrix + 3) * by[1] + FourDoubles{last[1], last[2], last[3], 0} * by[2]);
+  return (load<FourDoubles>(matrix) * by[0] + load<FourDoubles>(matrix + 3) * by[1]) +
+         FourDoubles{last[1], last[2], last[3], 0} * by[2];
 }
 
 FLEXEL_INLINE double squared_norm(const FourDoubles& of) {
