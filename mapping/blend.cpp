@@ -81,11 +81,6 @@ void weigh_block(const Body& body, const Groups& groups, const Groups::Block& bl
   }
 }
 
-// How far the blend departs from the first element's motion, at `offset` from it.
-Vec3 departure(const BlendRow& sum, const Vec3& offset) {
-  return Eigen::Map<const Vec3>(sum.value) + Eigen::Map<const Mat3>(sum.value + 3) * offset;
-}
-
 // Too far away to hear any element: the motion of the anchor nearest to the vertex, which the blend runs
 // into.
 Vec3 follow_nearest(const Body& body, const Blend& blend, const Group& group,
@@ -130,7 +125,7 @@ std::vector<Vec3> apply(const Blend& blend, const Body& body, const std::vector<
   parallel_chunks(groups.blocks.size(), kBlocksAtATime, [&](std::size_t begin, std::size_t end) {
     Around around;
     BlockWeights found;
-    std::vector<BlendRow> rows, sums(Groups::kBlock);
+    std::vector<BlendRow> rows;
     std::uint32_t gathered = kNoSlot;  // the group whose rows these are
     for (std::size_t b = begin; b < end; ++b) {
       const Groups::Block& block = groups.blocks[b];
@@ -146,18 +141,15 @@ std::vector<Vec3> apply(const Blend& blend, const Body& body, const std::vector<
       gathered = block.group;
       if (blend.weights.empty()) weigh_block(body, groups, block, around, found);
       const BlockWeights& weights = blend.weights.empty() ? found : blend.weights[b];
-      sum_blend_rows(rows.data(), weights.begin.data(), weights.element.data(), weights.weight.data(),
-                     block.end - block.begin, sums.data());
-      for (std::uint32_t i = block.begin; i < block.end; ++i) {
-        const std::uint32_t v = groups.vertices[i], k = i - block.begin;
-        const Vec3& vertex = body.surface.vertices[v];
-        if (weights.begin[k] == weights.begin[k + 1]) {
-          displacement[v] = follow_nearest(body, blend, group, motions, vertex);
-          continue;
+      flexel::blend(
+          {&groups.vertices[block.begin], block.end - block.begin, groups.vertices.size() - block.begin,
+           weights.begin.data(), weights.element.data(), weights.weight.data()},
+          rows.data(), first, centre, body.surface.vertices.data(), displacement.data());
+      for (std::uint32_t i = block.begin; i < block.end; ++i)
+        if (weights.begin[i - block.begin] == weights.begin[i - block.begin + 1]) {
+          const std::uint32_t v = groups.vertices[i];
+          displacement[v] = follow_nearest(body, blend, group, motions, body.surface.vertices[v]);
         }
-        const Vec3 offset = vertex - centre;
-        displacement[v] = first.displacement + first.gradient * offset + departure(sums[k], offset);
-      }
     }
   });
   return displacement;

@@ -23,6 +23,19 @@ FLEXEL_INLINE void read(const ElementMotion& motion, MotionColumns& columns) {
   columns.gradient[2] = FourDoubles{last[1], last[2], last[3], 0};
 }
 
+// Three numbers and a zero.
+FLEXEL_INLINE void write(const FourDoubles& from, float* to) {
+  const FourFloats value = __builtin_convertvector(from, FourFloats);
+  const FourFloats padded{value[0], value[1], value[2], 0};
+  __builtin_memcpy(to, &padded, sizeof padded);
+}
+
+// Four of sixteen lanes, from `first` on.
+FLEXEL_INLINE FourDoubles widen(const FloatLanes& lanes, int first) {
+  const FourFloats value{lanes[first], lanes[first + 1], lanes[first + 2], lanes[first + 3]};
+  return __builtin_convertvector(value, FourDoubles);
+}
+
 }  // namespace
 
 FLEXEL_CLONES void make_blend_rows(const std::uint32_t* elements, std::size_t count, const Vec3* rest,
@@ -37,37 +50,47 @@ FLEXEL_CLONES void make_blend_rows(const std::uint32_t* elements, std::size_t co
     const double* at = rest[elements[i]].data();
     FourDoubles displacement = own.displacement - first.displacement;
     for (int k = 0; k < 3; ++k) displacement -= own.gradient[k] * (at[k] - centre[k]);
-    double* row = rows[i].value;
-    __builtin_memcpy(row, &displacement, sizeof displacement);
-    for (int k = 0; k < 2; ++k) {
-      const FourDoubles column = own.gradient[k] - first.gradient[k];
-      __builtin_memcpy(row + 3 * (k + 1), &column, sizeof column);
-    }
-    const FourDoubles last = own.gradient[2] - first.gradient[2];
-    for (int c = 0; c < 3; ++c) row[9 + c] = last[c];
+    write(displacement, rows[i].value);
+    for (int k = 0; k < 3; ++k) write(own.gradient[k] - first.gradient[k], rows[i].value + 4 * (k + 1));
   }
 }
 
-FLEXEL_CLONES void sum_blend_rows(const BlendRow* rows, const std::uint32_t* begin,
-                                  const std::uint16_t* element, const float* weight, std::size_t vertices,
-                                  BlendRow* sums) {
-  for (std::size_t v = 0; v < vertices; ++v) {
-    // Two sums, so that an addition need not wait for the one before it.
-    Lanes low[2]{};
-    FourDoubles high[2]{};
+FLEXEL_CLONES void blend(const BlendedVertices& vertices, const BlendRow* rows, const ElementMotion& first,
+                         const Vec3& centre, const Vec3* position, Vec3* displacement) {
+  constexpr std::size_t kVerticesAhead = 12;
+  constexpr std::uint32_t kWeightsAhead = 256;
+  MotionColumns common;
+  read(first, common);
+  for (std::size_t i = 0; i < vertices.count; ++i) {
+    if (i + kVerticesAhead < vertices.listed) {
+      const std::uint32_t next = vertices.vertex[i + kVerticesAhead];
+      fetch(position + next, sizeof(Vec3));
+      fetch(displacement + next, sizeof(Vec3));
+    }
+    fetch(vertices.weight + vertices.begin[i] + kWeightsAhead, 2 * sizeof(FourDoubles));
+    fetch(vertices.element + vertices.begin[i] + kWeightsAhead, sizeof(FourDoubles));
+    // Four sums, so that an addition need not wait for the one before it.
+    FloatLanes sum[4]{};
     const auto add = [&](std::uint32_t k, int to) __attribute__((always_inline)) {
-      const auto by = static_cast<double>(weight[k]);
-      const double* row = rows[element[k]].value;
-      low[to] += by * load<Lanes>(row);
-      high[to] += by * load<FourDoubles>(row + kLanes);
+      sum[to] += vertices.weight[k] * load<FloatLanes>(rows[vertices.element[k]].value);
     };
-    std::uint32_t k = begin[v];
-    for (; k + 1 < begin[v + 1]; k += 2) add(k, 0), add(k + 1, 1);
-    if (k < begin[v + 1]) add(k, 0);
-    low[0] += low[1];
-    high[0] += high[1];
-    __builtin_memcpy(sums[v].value, &low[0], sizeof low[0]);
-    __builtin_memcpy(sums[v].value + kLanes, &high[0], sizeof high[0]);
+    const std::uint32_t end = vertices.begin[i + 1];
+    std::uint32_t k = vertices.begin[i];
+    for (; k + 4 <= end; k += 4) add(k, 0), add(k + 1, 1), add(k + 2, 2), add(k + 3, 3);
+    for (; k < end; ++k) add(k, 0);
+    const FloatLanes all = (sum[0] + sum[1]) + (sum[2] + sum[3]);
+    FourDoubles column[4];
+    for (int c = 0; c < 4; ++c) column[c] = widen(all, 4 * c);
+    const double* at = position[vertices.vertex[i]].data();
+    const double offset[3] = {at[0] - centre[0], at[1] - centre[1], at[2] - centre[2]};
+    FourDoubles moved = common.displacement, departure = column[0];
+    for (int c = 0; c < 3; ++c) {
+      moved += common.gradient[c] * offset[c];
+      departure += column[c + 1] * offset[c];
+    }
+    moved += departure;
+    double* to = displacement[vertices.vertex[i]].data();
+    for (int c = 0; c < 3; ++c) to[c] = moved[c];
   }
 }
 

@@ -7,19 +7,29 @@
 namespace flexel {
 
 // How far the motion of an element departs from that of its group's first element, seen from that element:
-// displacement, then the gradient by columns.
-struct BlendRow {
-  double value[12];
+// displacement, then the gradient by columns, each with a zero behind it.
+struct alignas(64) BlendRow {
+  float value[16];
 };
 
 // (count) `elements`: the group's; `slot_of` leads to their motions.
 void make_blend_rows(const std::uint32_t* elements, std::size_t count, const Vec3* rest,
                      const std::uint32_t* slot_of, const ElementMotion* motions, BlendRow* rows);
 
-// (vertices) The sums of the rows over the elements that each vertex hears: those that `element` lists from
-// begin[i] to begin[i + 1].
-void sum_blend_rows(const BlendRow* rows, const std::uint32_t* begin, const std::uint16_t* element,
-                    const float* weight, std::size_t vertices, BlendRow* sums);
+// The vertices of a block, and the elements that each hears: those that `element` lists from begin[i] to
+// begin[i + 1].
+struct BlendedVertices {
+  const std::uint32_t* vertex;  // (count)
+  std::size_t count, listed;    // `listed`: how many `vertex` goes on to list, which will be next
+  const std::uint32_t* begin;   // (count + 1)
+  const std::uint16_t* element;
+  const float* weight;
+};
+
+// The displacements of these vertices, which are at `position` at rest: by the motion of their group's first
+// element, which is at `centre`, and the blend of how the others depart from it.
+void blend(const BlendedVertices& vertices, const BlendRow* rows, const ElementMotion& first,
+           const Vec3& centre, const Vec3* position, Vec3* displacement);
 
 // (count, a multiple of 16) wendland(|x - point| / kBlendRadius), all in spacings.
 void weigh_elements(const float* x, const float* y, const float* z, std::size_t count, const float* point,

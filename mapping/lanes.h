@@ -21,6 +21,7 @@ using Lanes = double __attribute__((vector_size(64)));
 constexpr int kLanes = 8;
 using FloatLanes = float __attribute__((vector_size(64)));
 constexpr int kFloatLanes = 16;
+using FourFloats = float __attribute__((vector_size(16)));
 using FourDoubles = double __attribute__((vector_size(32)));
 
 FLEXEL_INLINE Lanes square_root(const Lanes& x) {
