@@ -1,8 +1,8 @@
 // A block of vertices shares its elements: their motions are gathered once, twelve numbers each, and a vertex
-// then needs one sum of twelve numbers over the elements it hears. The first element's motion is evaluated in
-// double precision; how the others depart from it, and the weights, are single precision
-// (mapping/blend_kernel.h): what all elements agree on comes out exactly, and a seventh digit of the rest is
-// far below what neighbouring frames differ by.
+// then needs one sum of twelve numbers over the elements it hears, and one of their weights. The first
+// element's motion is evaluated as it is, and only how the others depart from it is summed
+// (mapping/blend_kernel.h): what all elements agree on comes out exactly, although weights are single
+// precision.
 #include "mapping/blend.h"
 
 #include <algorithm>
@@ -40,43 +40,46 @@ struct Around {
 };
 
 // Elements that not every corner reaches count as far as the corners that do.
-void apply_shares(const std::array<double, 8>& share, Around& around) {
+void apply_shares(const std::array<double, 8>& share, const std::vector<std::uint8_t>& from,
+                  HeardElements heard) {
   constexpr std::uint8_t kAll = 0xff;
-  for (std::size_t i = 0; i < around.from.size(); ++i) {
-    if (around.from[i] == kAll || around.weight[i] == 0) continue;
+  for (std::size_t k = 0; k < heard.count; ++k) {
+    const unsigned corners = from[heard.element[k]];
+    if (corners == kAll) continue;
     double sum = 0;
-    for (unsigned a = 0; a < 8; ++a) sum += around.from[i] >> a & 1 ? share[a] : 0;
-    around.weight[i] *= static_cast<float>(sum);
+    for (unsigned a = 0; a < 8; ++a) sum += corners >> a & 1 ? share[a] : 0;
+    heard.weight[k] *= static_cast<float>(sum);
   }
 }
 
 void weigh_block(const Body& body, const Groups& groups, const Groups::Block& block, Around& around,
                  BlockWeights& weights) {
+  constexpr std::size_t kRoom = 16, kVerticesAhead = 12;
   const Group& group = groups.groups[block.group];
   around.gather(body, groups, group);
-  const std::size_t n = around.count;
   weights.begin.assign(1, 0);
   std::size_t used = 0;
   for (std::uint32_t i = block.begin; i < block.end; ++i) {
+    if (i + kVerticesAhead < groups.vertices.size())
+      __builtin_prefetch(&body.surface.vertices[groups.vertices[i + kVerticesAhead]]);
     const Vec3 point = within(body, group, body.surface.vertices[groups.vertices[i]]);
     const Eigen::Vector3f at = point.cast<float>();
     weigh_elements(around.x.data(), around.y.data(), around.z.data(), around.weight.size(), at.data(),
                    around.weight.data());
-    if (group.in_cell) apply_shares(shares(group, point), around);
-    if (weights.weight.size() < used + n) {
-      weights.weight.resize(2 * (used + n));
-      weights.element.resize(2 * (used + n));
+    if (weights.weight.size() < used + around.weight.size() + kRoom) {
+      weights.weight.resize(2 * (used + around.weight.size() + kRoom));
+      weights.element.resize(weights.weight.size());
     }
-    const std::size_t first = used;
-    double total = 0;
-    for (std::size_t e = 0; e < n; ++e) {  // every one is written, and overwritten where it is not heard
-      weights.element[used] = static_cast<std::uint16_t>(e);
-      weights.weight[used] = around.weight[e];
-      total += static_cast<double>(around.weight[e]);
-      used += around.weight[e] > 0;
+    HeardElements heard{&weights.element[used], &weights.weight[used], 0};
+    list_heard(around.weight.data(), around.weight.size(), heard);
+    if (group.in_cell) apply_shares(shares(group, point), around.from, heard);
+    if (std::none_of(heard.weight, heard.weight + heard.count, [](float weight) { return weight > 0; }))
+      heard.count = 0;
+    for (; heard.count % kBlendStep != 0; ++heard.count) {
+      heard.element[heard.count] = heard.element[0];
+      heard.weight[heard.count] = 0;
     }
-    for (std::size_t k = first; k < used; ++k)
-      weights.weight[k] = static_cast<float>(static_cast<double>(weights.weight[k]) / total);
+    used += heard.count;
     weights.begin.push_back(static_cast<std::uint32_t>(used));
   }
 }

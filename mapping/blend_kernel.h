@@ -7,14 +7,18 @@
 namespace flexel {
 
 // How far the motion of an element departs from that of its group's first element, seen from that element:
-// displacement, then the gradient by columns, each with a zero behind it.
+// displacement, 1 (whose sum is that of the weights), then the gradient by columns, each with a zero behind
+// it.
 struct alignas(64) BlendRow {
-  float value[16];
+  double value[16];
 };
 
 // (count) `elements`: the group's; `slot_of` leads to their motions.
 void make_blend_rows(const std::uint32_t* elements, std::size_t count, const Vec3* rest,
                      const std::uint32_t* slot_of, const ElementMotion* motions, BlendRow* rows);
+
+// A vertex hears this many elements, or a multiple: with weight 0 what is missing.
+constexpr std::size_t kBlendStep = 4;
 
 // The vertices of a block, and the elements that each hears: those that `element` lists from begin[i] to
 // begin[i + 1].
@@ -34,6 +38,17 @@ void blend(const BlendedVertices& vertices, const BlendRow* rows, const ElementM
 // (count, a multiple of 16) wendland(|x - point| / kBlendRadius), all in spacings.
 void weigh_elements(const float* x, const float* y, const float* z, std::size_t count, const float* point,
                     float* weight);
+
+// What one vertex hears: elements by their number in the group.
+struct HeardElements {
+  std::uint16_t* element;
+  float* weight;
+  std::size_t count;
+};
+
+// Lists the elements whose weight (count, a multiple of 16) is not 0, behind which there must be room for
+// sixteen more.
+void list_heard(const float* weight, std::size_t count, HeardElements& heard);
 
 // The least-squares gradients of `count` elements: element[i]'s from the displacements (x, y, z, 0; m) of
 // what it is connected with. `inverse_moments`, `motion`: (count); see mapping/element_motion.h. Elements

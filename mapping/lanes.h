@@ -10,6 +10,8 @@
 // No clones under the address sanitizer: it is not ready when their resolvers run.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
 #define FLEXEL_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))
+// What needs an instruction that the compiler does not find by itself; for machines that have it.
+#define FLEXEL_AVX512 __attribute__((target("avx512f")))
 #else
 #define FLEXEL_CLONES
 #endif
@@ -21,7 +23,6 @@ using Lanes = double __attribute__((vector_size(64)));
 constexpr int kLanes = 8;
 using FloatLanes = float __attribute__((vector_size(64)));
 constexpr int kFloatLanes = 16;
-using FourFloats = float __attribute__((vector_size(16)));
 using FourDoubles = double __attribute__((vector_size(32)));
 
 FLEXEL_INLINE Lanes square_root(const Lanes& x) {
