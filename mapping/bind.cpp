@@ -18,6 +18,14 @@
 namespace flexel {
 namespace {
 
+// How many bits a byte has set: the portable instruction set has nothing for it.
+constexpr std::array<std::uint8_t, 256> kBitsSet = [] {
+  std::array<std::uint8_t, 256> bits{};
+  for (unsigned byte = 0; byte < bits.size(); ++byte)
+    bits[byte] = static_cast<std::uint8_t>(std::popcount(byte));
+  return bits;
+}();
+
 // Numbers the octants that are taken, owner by owner.
 class OctantNumbers {
  public:
@@ -31,13 +39,13 @@ class OctantNumbers {
   std::uint32_t number(std::uint32_t next) {
     for (std::size_t owner = 0; owner < taken_.size(); ++owner) {
       first_[owner] = next;
-      next += static_cast<std::uint32_t>(std::popcount(taken_[owner]));
+      next += kBitsSet[taken_[owner]];
     }
     return next;
   }
   [[nodiscard]] std::uint32_t of(std::uint32_t owner, int octant) const {
     const unsigned below = taken_[owner] & ((1u << octant) - 1u);
-    return first_[owner] + static_cast<std::uint32_t>(std::popcount(below));
+    return first_[owner] + kBitsSet[below];
   }
   // visit(owner, octant, number) for each taken octant.
   template <class Visit>

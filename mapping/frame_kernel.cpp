@@ -85,11 +85,13 @@ FLEXEL_CLONES void span_bases(const Frame* frames, std::size_t count, const Vec3
 FLEXEL_CLONES Extremes coordinates_in(const RestFrames& rest, const std::uint32_t* frame,
                                       const Vec3* vertices, const std::uint8_t* referenced, std::size_t count,
                                       Vec3* coordinates) {
-  constexpr std::size_t kVerticesAhead = 96;
+  constexpr std::size_t kVerticesAhead = 96, kFramesAhead = 12;
   Extremes largest;
   for (std::size_t v = 0; v < count; ++v) {
     fetch(vertices + v + kVerticesAhead, sizeof(Vec3));
-    const std::uint32_t f = frame[v];
+    const std::uint32_t f = frame[v], next = frame[std::min(v + kFramesAhead, count - 1)];
+    fetch(&rest.to_base[next], sizeof(Carrier));
+    fetch(&rest.base[next], sizeof(Mat3));
     const double *to_base = rest.to_base[f].data(), *point = vertices[v].data();
     const FourDoubles at{point[0], point[1], point[2], 0}, origin = load<FourDoubles>(to_base);
     const FourDoubles away = at - origin, in_base = product(to_base + 3, away);
@@ -131,7 +133,7 @@ FLEXEL_CLONES void move_frames(const Frame* frames, std::size_t count, const Mat
 // together to twelve numbers without gaps.
 FLEXEL_CLONES void carry(const Carrier* carrier, const std::uint32_t* frame, const Vec3* coordinates,
                          std::size_t count, Vec3* displacement) {
-  constexpr std::size_t kVerticesAhead = 96;
+  constexpr std::size_t kVerticesAhead = 96, kFramesAhead = 16;
   using Pick = long long __attribute__((vector_size(32)));
   const auto moved = [&](std::size_t v) __attribute__((always_inline)) {
     const double *by = carrier[frame[v]].data(), *c = coordinates[v].data();
@@ -146,6 +148,7 @@ FLEXEL_CLONES void carry(const Carrier* carrier, const std::uint32_t* frame, con
   if (count > 0 && reinterpret_cast<std::uintptr_t>(displacement) % 16 != 0) write_one(v++);
   for (; v + 4 <= count; v += 4) {
     fetch(coordinates + v + kVerticesAhead, 4 * sizeof(Vec3));
+    fetch(&carrier[frame[std::min(v + kFramesAhead, count - 1)]], sizeof(Carrier));
     const FourDoubles a = moved(v), b = moved(v + 1), c = moved(v + 2), d = moved(v + 3);
     double* to = displacement[v].data();
     stream(to, __builtin_shuffle(a, b, Pick{0, 1, 2, 4}));
