@@ -11,6 +11,7 @@
 #include "formats/bucket.h"
 #include "mapping/blend_kernel.h"
 #include "mapping/kernel.h"
+#include "mapping/lanes.h"
 
 namespace flexel {
 namespace {

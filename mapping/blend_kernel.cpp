@@ -74,7 +74,7 @@ FLEXEL_CLONES void make_blend_rows(const std::uint32_t* elements, std::size_t co
 FLEXEL_CLONES void blend(const BlendedVertices& vertices, const BlendRow* rows, const ElementMotion& first,
                          const Vec3& centre, const Vec3* position, Vec3* displacement) {
   constexpr std::size_t kVerticesAhead = 12;
-  constexpr std::uint32_t kWeightsAhead = 256;
+  constexpr std::uint32_t kWeightsAhead = kWeightsFetched;
   MotionColumns common;
   read(first, common);
   for (std::size_t i = 0; i < vertices.count; ++i) {
@@ -83,8 +83,8 @@ FLEXEL_CLONES void blend(const BlendedVertices& vertices, const BlendRow* rows, 
       fetch(position + next, sizeof(Vec3));
       fetch(displacement + next, sizeof(Vec3));
     }
-    fetch(vertices.weight + vertices.begin[i] + kWeightsAhead, 2 * sizeof(FourDoubles));
-    fetch(vertices.element + vertices.begin[i] + kWeightsAhead, sizeof(FourDoubles));
+    fetch(vertices.weight + vertices.begin[i] + kWeightsAhead, 128);
+    fetch(vertices.element + vertices.begin[i] + kWeightsAhead, 64);
     // Two sums, so that an addition need not wait for the one before it.
     Lanes low[2]{}, high[2]{};
     const auto add = [&](std::uint32_t k, int to) __attribute__((always_inline)) {

@@ -30,6 +30,9 @@ struct BlendedVertices {
   const float* weight;
 };
 
+// blend() fetches weights this far ahead; those before that of a block are for its caller to fetch.
+constexpr std::uint32_t kWeightsFetched = 256;
+
 // The displacements of these vertices, which are at `position` at rest: by the motion of their group's first
 // element, which is at `centre`, and the blend of how the others depart from it.
 void blend(const BlendedVertices& vertices, const BlendRow* rows, const ElementMotion& first,
