@@ -145,6 +145,10 @@ std::vector<Vec3> apply(const Blend& blend, const Body& body, const std::vector<
       gathered = block.group;
       if (blend.weights.empty()) weigh_block(body, groups, block, around, found);
       const BlockWeights& weights = blend.weights.empty() ? found : blend.weights[b];
+      if (b + 1 < blend.weights.size()) {
+        fetch(blend.weights[b + 1].weight.data(), kWeightsFetched * sizeof(float));
+        fetch(blend.weights[b + 1].element.data(), kWeightsFetched * sizeof(std::uint16_t));
+      }
       flexel::blend(
           {&groups.vertices[block.begin], block.end - block.begin, groups.vertices.size() - block.begin,
            weights.begin.data(), weights.element.data(), weights.weight.data()},
