@@ -134,7 +134,6 @@ FLEXEL_CLONES void move_frames(const Frame* frames, std::size_t count, const Mat
 FLEXEL_CLONES void carry(const Carrier* carrier, const std::uint32_t* frame, const Vec3* coordinates,
                          std::size_t count, Vec3* displacement) {
   constexpr std::size_t kVerticesAhead = 96, kFramesAhead = 16;
-  using Pick = long long __attribute__((vector_size(32)));
   const auto moved = [&](std::size_t v) __attribute__((always_inline)) {
     const double *by = carrier[frame[v]].data(), *c = coordinates[v].data();
     return load<FourDoubles>(by) + ((load<FourDoubles>(by + 3) * c[0] + load<FourDoubles>(by + 6) * c[1]) +
@@ -151,9 +150,9 @@ FLEXEL_CLONES void carry(const Carrier* carrier, const std::uint32_t* frame, con
     fetch(&carrier[frame[std::min(v + kFramesAhead, count - 1)]], sizeof(Carrier));
     const FourDoubles a = moved(v), b = moved(v + 1), c = moved(v + 2), d = moved(v + 3);
     double* to = displacement[v].data();
-    stream(to, __builtin_shuffle(a, b, Pick{0, 1, 2, 4}));
-    stream(to + 4, __builtin_shuffle(b, c, Pick{1, 2, 4, 5}));
-    stream(to + 8, __builtin_shuffle(c, d, Pick{2, 4, 5, 6}));
+    stream(to, __builtin_shufflevector(a, b, 0, 1, 2, 4));
+    stream(to + 4, __builtin_shufflevector(b, c, 1, 2, 4, 5));
+    stream(to + 8, __builtin_shufflevector(c, d, 2, 4, 5, 6));
   }
   for (; v < count; ++v) write_one(v);
   finish_streams();
