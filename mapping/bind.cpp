@@ -18,25 +18,34 @@
 namespace flexel {
 namespace {
 
+// How many bits a byte has set: the portable instruction set has nothing for it.
+constexpr std::array<std::uint8_t, 256> kBitsSet = [] {
+  std::array<std::uint8_t, 256> bits{};
+  for (unsigned byte = 0; byte < bits.size(); ++byte)
+    bits[byte] = static_cast<std::uint8_t>(std::popcount(byte));
+  return bits;
+}();
+
 // Numbers the octants that are taken, owner by owner.
 class OctantNumbers {
  public:
   explicit OctantNumbers(std::size_t owners) : taken_(owners, 0), first_(owners) {}
   void take(std::uint32_t owner, int octant) {
-    std::atomic_ref<std::uint8_t>(taken_[owner])
-        .fetch_or(static_cast<std::uint8_t>(1u << octant), std::memory_order_relaxed);
+    const auto bit = static_cast<std::uint8_t>(1u << octant);
+    const std::atomic_ref<std::uint8_t> taken(taken_[owner]);
+    if (!(taken.load(std::memory_order_relaxed) & bit)) taken.fetch_or(bit, std::memory_order_relaxed);
   }
   // Numbers from `next`; returns what follows the last.
   std::uint32_t number(std::uint32_t next) {
     for (std::size_t owner = 0; owner < taken_.size(); ++owner) {
       first_[owner] = next;
-      next += static_cast<std::uint32_t>(std::popcount(taken_[owner]));
+      next += kBitsSet[taken_[owner]];
     }
     return next;
   }
   [[nodiscard]] std::uint32_t of(std::uint32_t owner, int octant) const {
     const unsigned below = taken_[owner] & ((1u << octant) - 1u);
-    return first_[owner] + static_cast<std::uint32_t>(std::popcount(below));
+    return first_[owner] + kBitsSet[below];
   }
   // visit(owner, octant, number) for each taken octant.
   template <class Visit>
@@ -78,15 +87,6 @@ void make_frames(const Body& body, const std::vector<Seat>& seats, Binding& bind
   });
 }
 
-// Largest values over the vertices: m^2, and spacings^2 from the origin of its frame.
-struct Extremes {
-  double squared_residual = 0, squared_outside = 0;
-  void operator+=(const Extremes& other) {
-    squared_residual = std::max(squared_residual, other.squared_residual);
-    squared_outside = std::max(squared_outside, other.squared_outside);
-  }
-};
-
 // (frames) Their bases at rest, as apply() builds them anew in each state.
 std::vector<Mat3> rest_bases(const Body& body, const Binding& binding) {
   constexpr std::size_t kFramesAtATime = 1024;
@@ -102,28 +102,40 @@ std::vector<Mat3> rest_bases(const Body& body, const Binding& binding) {
   return base;
 }
 
-void take_coordinates(const Body& body, Binding& binding) {
-  std::vector<Mat3> base = rest_bases(body, binding), inverse;
-  resize_touched(inverse, base.size());
-  parallel_for_each(base.size(), [&](std::size_t f) { inverse[f] = base[f].inverse(); });
-  std::vector<Mat3> to_spacings;  // (parts)
-  for (const Part& part : body.parts)
-    to_spacings.push_back(part.lattice.spacing.cwiseInverse().asDiagonal() * part.lattice.axes.transpose());
+// What brings vertices into the rest bases of their frames.
+RestFrames rest_frames(const Body& body, const Binding& binding) {
+  RestFrames rest;
+  rest.base = rest_bases(body, binding);
+  resize_touched(rest.to_base, rest.base.size() + 1);
+  resize_touched(rest.part, rest.base.size());
   const std::vector<std::uint32_t> part = element_parts(body);
-  const bool keep = binding.method == MapMethod::affine || binding.method == MapMethod::gram_schmidt;
-  if (keep) resize_touched(binding.coordinates, binding.frame.size());
-  const Extremes extremes = parallel_sum<Extremes>(binding.frame.size(), [&](std::size_t v) {
-    const std::uint32_t f = binding.frame[v], origin = binding.frames[f].elements[0];
-    const Vec3& point = body.surface.vertices[v];
-    const Vec3 away = point - body.rest[origin], coordinates = inverse[f] * away;
-    if (keep) binding.coordinates[v] = coordinates;
-    if (!binding.referenced[v]) return Extremes{};
-    return Extremes{(body.rest[origin] + base[f] * coordinates - point).squaredNorm(),
-                    (to_spacings[part[origin]] * away).squaredNorm()};
+  parallel_for_each(rest.base.size(), [&](std::size_t f) {
+    const std::uint32_t origin = binding.frames[f].elements[0];
+    rest.to_base[f] << body.rest[origin], rest.base[f].inverse();
+    rest.part[f] = part[origin];
   });
-  if (keep) binding.rest_base = std::move(base);
-  binding.rest_residual = std::sqrt(extremes.squared_residual);
-  binding.distance_outside = std::max(0.0, std::sqrt(extremes.squared_outside) - kHalfDiagonal);
+  for (const Part& p : body.parts)
+    rest.to_spacings.push_back(p.lattice.spacing.cwiseInverse().asDiagonal() * p.lattice.axes.transpose());
+  return rest;
+}
+
+void take_coordinates(const Body& body, Binding& binding) {
+  constexpr std::size_t kVerticesAtATime = 8192;
+  RestFrames rest = rest_frames(body, binding);
+  const std::size_t n = binding.frame.size();
+  const bool keep = binding.method == MapMethod::affine || binding.method == MapMethod::gram_schmidt;
+  if (keep) resize_touched(binding.coordinates, n);
+  std::vector<Extremes> found(n / kVerticesAtATime + 1);
+  parallel_chunks(n, kVerticesAtATime, [&](std::size_t begin, std::size_t end) {
+    found[begin / kVerticesAtATime] =
+        coordinates_in(rest, &binding.frame[begin], &body.surface.vertices[begin], &binding.referenced[begin],
+                       end - begin, keep ? &binding.coordinates[begin] : nullptr);
+  });
+  if (keep) binding.rest_base = std::move(rest.base);
+  Extremes largest;
+  for (const Extremes& chunk : found) largest.include(chunk);
+  binding.rest_residual = std::sqrt(largest.squared_residual);
+  binding.distance_outside = std::max(0.0, std::sqrt(largest.squared_outside) - kHalfDiagonal);
 }
 
 }  // namespace

@@ -1,8 +1,8 @@
 // A block of vertices shares its elements: their motions are gathered once, twelve numbers each, and a vertex
-// then needs one sum of twelve numbers over the elements it hears. The first element's motion is evaluated in
-// double precision; how the others depart from it, and the weights, are single precision
-// (mapping/blend_kernel.h): what all elements agree on comes out exactly, and a seventh digit of the rest is
-// far below what neighbouring frames differ by.
+// then needs one sum of twelve numbers over the elements it hears, and one of their weights. The first
+// element's motion is evaluated as it is, and only how the others depart from it is summed
+// (mapping/blend_kernel.h): what all elements agree on comes out exactly, although weights are single
+// precision.
 #include "mapping/blend.h"
 
 #include <algorithm>
@@ -11,6 +11,7 @@
 #include "formats/bucket.h"
 #include "mapping/blend_kernel.h"
 #include "mapping/kernel.h"
+#include "mapping/lanes.h"
 
 namespace flexel {
 namespace {
@@ -40,50 +41,48 @@ struct Around {
 };
 
 // Elements that not every corner reaches count as far as the corners that do.
-void apply_shares(const std::array<double, 8>& share, Around& around) {
+void apply_shares(const std::array<double, 8>& share, const std::vector<std::uint8_t>& from,
+                  HeardElements heard) {
   constexpr std::uint8_t kAll = 0xff;
-  for (std::size_t i = 0; i < around.from.size(); ++i) {
-    if (around.from[i] == kAll || around.weight[i] == 0) continue;
+  for (std::size_t k = 0; k < heard.count; ++k) {
+    const unsigned corners = from[heard.element[k]];
+    if (corners == kAll) continue;
     double sum = 0;
-    for (unsigned a = 0; a < 8; ++a) sum += around.from[i] >> a & 1 ? share[a] : 0;
-    around.weight[i] *= static_cast<float>(sum);
+    for (unsigned a = 0; a < 8; ++a) sum += corners >> a & 1 ? share[a] : 0;
+    heard.weight[k] *= static_cast<float>(sum);
   }
 }
 
 void weigh_block(const Body& body, const Groups& groups, const Groups::Block& block, Around& around,
                  BlockWeights& weights) {
+  constexpr std::size_t kRoom = 16, kVerticesAhead = 12;
   const Group& group = groups.groups[block.group];
   around.gather(body, groups, group);
-  const std::size_t n = around.count;
   weights.begin.assign(1, 0);
   std::size_t used = 0;
   for (std::uint32_t i = block.begin; i < block.end; ++i) {
+    if (i + kVerticesAhead < groups.vertices.size())
+      __builtin_prefetch(&body.surface.vertices[groups.vertices[i + kVerticesAhead]]);
     const Vec3 point = within(body, group, body.surface.vertices[groups.vertices[i]]);
     const Eigen::Vector3f at = point.cast<float>();
     weigh_elements(around.x.data(), around.y.data(), around.z.data(), around.weight.size(), at.data(),
                    around.weight.data());
-    if (group.in_cell) apply_shares(shares(group, point), around);
-    if (weights.weight.size() < used + n) {
-      weights.weight.resize(2 * (used + n));
-      weights.element.resize(2 * (used + n));
+    if (weights.weight.size() < used + around.weight.size() + kRoom) {
+      weights.weight.resize(2 * (used + around.weight.size() + kRoom));
+      weights.element.resize(weights.weight.size());
     }
-    const std::size_t first = used;
-    double total = 0;
-    for (std::size_t e = 0; e < n; ++e) {  // every one is written, and overwritten where it is not heard
-      weights.element[used] = static_cast<std::uint16_t>(e);
-      weights.weight[used] = around.weight[e];
-      total += static_cast<double>(around.weight[e]);
-      used += around.weight[e] > 0;
+    HeardElements heard{&weights.element[used], &weights.weight[used], 0};
+    list_heard(around.weight.data(), around.weight.size(), heard);
+    if (group.in_cell) apply_shares(shares(group, point), around.from, heard);
+    if (std::none_of(heard.weight, heard.weight + heard.count, [](float weight) { return weight > 0; }))
+      heard.count = 0;
+    for (; heard.count % kBlendStep != 0; ++heard.count) {
+      heard.element[heard.count] = heard.element[0];
+      heard.weight[heard.count] = 0;
     }
-    for (std::size_t k = first; k < used; ++k)
-      weights.weight[k] = static_cast<float>(static_cast<double>(weights.weight[k]) / total);
+    used += heard.count;
     weights.begin.push_back(static_cast<std::uint32_t>(used));
   }
-}
-
-// How far the blend departs from the first element's motion, at `offset` from it.
-Vec3 departure(const BlendRow& sum, const Vec3& offset) {
-  return Eigen::Map<const Vec3>(sum.value) + Eigen::Map<const Mat3>(sum.value + 3) * offset;
 }
 
 // Too far away to hear any element: the motion of the anchor nearest to the vertex, which the blend runs
@@ -130,7 +129,7 @@ std::vector<Vec3> apply(const Blend& blend, const Body& body, const std::vector<
   parallel_chunks(groups.blocks.size(), kBlocksAtATime, [&](std::size_t begin, std::size_t end) {
     Around around;
     BlockWeights found;
-    std::vector<BlendRow> rows, sums(Groups::kBlock);
+    std::vector<BlendRow> rows;
     std::uint32_t gathered = kNoSlot;  // the group whose rows these are
     for (std::size_t b = begin; b < end; ++b) {
       const Groups::Block& block = groups.blocks[b];
@@ -146,18 +145,19 @@ std::vector<Vec3> apply(const Blend& blend, const Body& body, const std::vector<
       gathered = block.group;
       if (blend.weights.empty()) weigh_block(body, groups, block, around, found);
       const BlockWeights& weights = blend.weights.empty() ? found : blend.weights[b];
-      sum_blend_rows(rows.data(), weights.begin.data(), weights.element.data(), weights.weight.data(),
-                     block.end - block.begin, sums.data());
-      for (std::uint32_t i = block.begin; i < block.end; ++i) {
-        const std::uint32_t v = groups.vertices[i], k = i - block.begin;
-        const Vec3& vertex = body.surface.vertices[v];
-        if (weights.begin[k] == weights.begin[k + 1]) {
-          displacement[v] = follow_nearest(body, blend, group, motions, vertex);
-          continue;
-        }
-        const Vec3 offset = vertex - centre;
-        displacement[v] = first.displacement + first.gradient * offset + departure(sums[k], offset);
+      if (b + 1 < blend.weights.size()) {
+        fetch(blend.weights[b + 1].weight.data(), kWeightsFetched * sizeof(float));
+        fetch(blend.weights[b + 1].element.data(), kWeightsFetched * sizeof(std::uint16_t));
       }
+      flexel::blend(
+          {&groups.vertices[block.begin], block.end - block.begin, groups.vertices.size() - block.begin,
+           weights.begin.data(), weights.element.data(), weights.weight.data()},
+          rows.data(), first, centre, body.surface.vertices.data(), displacement.data());
+      for (std::uint32_t i = block.begin; i < block.end; ++i)
+        if (weights.begin[i - block.begin] == weights.begin[i - block.begin + 1]) {
+          const std::uint32_t v = groups.vertices[i];
+          displacement[v] = follow_nearest(body, blend, group, motions, body.surface.vertices[v]);
+        }
     }
   });
   return displacement;

@@ -9,7 +9,7 @@ namespace flexel {
 struct BlockWeights {
   std::vector<std::uint32_t> begin;    // (vertices of the block + 1)
   std::vector<std::uint16_t> element;  // within the reach of the group
-  std::vector<float> weight;           // those of a vertex sum to 1
+  std::vector<float> weight;           // relative to each other; a vertex's last may be 0 (kBlendStep)
 };
 
 // What `blended` knows at rest.

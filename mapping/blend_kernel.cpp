@@ -2,6 +2,10 @@
 // is overwritten or never looked at.
 #include "mapping/blend_kernel.h"
 
+#ifdef __x86_64__
+#include <immintrin.h>
+#endif
+
 #include "mapping/kernel.h"
 #include "mapping/lanes.h"
 
@@ -23,6 +27,31 @@ FLEXEL_INLINE void read(const ElementMotion& motion, MotionColumns& columns) {
   columns.gradient[2] = FourDoubles{last[1], last[2], last[3], 0};
 }
 
+// Three numbers and what is to be behind them.
+FLEXEL_INLINE void write(const FourDoubles& from, double behind, double* to) {
+  const FourDoubles padded{from[0], from[1], from[2], behind};
+  __builtin_memcpy(to, &padded, sizeof padded);
+}
+
+#ifdef FLEXEL_AVX512
+// list_heard(): sixteen at a time are pushed together.
+FLEXEL_AVX512 void list_heard_by_sixteen(const float* weight, std::size_t count, HeardElements& heard) {
+  std::size_t used = 0;
+  __m512i number = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+  for (std::size_t e = 0; e < count; e += 16) {
+    const __m512 here = _mm512_loadu_ps(weight + e);
+    const __mmask16 is_heard = _mm512_cmp_ps_mask(here, _mm512_setzero_ps(), _CMP_GT_OQ);
+    _mm512_storeu_ps(heard.weight + used, _mm512_maskz_compress_ps(is_heard, here));
+    const __m256i elements =
+        _mm512_maskz_cvtepi32_epi16(0xffff, _mm512_maskz_compress_epi32(is_heard, number));
+    __builtin_memcpy(heard.element + used, &elements, sizeof elements);
+    used += static_cast<std::size_t>(__builtin_popcount(is_heard));
+    number = _mm512_add_epi32(number, _mm512_set1_epi32(16));
+  }
+  heard.count = used;
+}
+#endif
+
 }  // namespace
 
 FLEXEL_CLONES void make_blend_rows(const std::uint32_t* elements, std::size_t count, const Vec3* rest,
@@ -37,37 +66,50 @@ FLEXEL_CLONES void make_blend_rows(const std::uint32_t* elements, std::size_t co
     const double* at = rest[elements[i]].data();
     FourDoubles displacement = own.displacement - first.displacement;
     for (int k = 0; k < 3; ++k) displacement -= own.gradient[k] * (at[k] - centre[k]);
-    double* row = rows[i].value;
-    __builtin_memcpy(row, &displacement, sizeof displacement);
-    for (int k = 0; k < 2; ++k) {
-      const FourDoubles column = own.gradient[k] - first.gradient[k];
-      __builtin_memcpy(row + 3 * (k + 1), &column, sizeof column);
-    }
-    const FourDoubles last = own.gradient[2] - first.gradient[2];
-    for (int c = 0; c < 3; ++c) row[9 + c] = last[c];
+    write(displacement, 1, rows[i].value);
+    for (int k = 0; k < 3; ++k) write(own.gradient[k] - first.gradient[k], 0, rows[i].value + 4 * (k + 1));
   }
 }
 
-FLEXEL_CLONES void sum_blend_rows(const BlendRow* rows, const std::uint32_t* begin,
-                                  const std::uint16_t* element, const float* weight, std::size_t vertices,
-                                  BlendRow* sums) {
-  for (std::size_t v = 0; v < vertices; ++v) {
+FLEXEL_CLONES void blend(const BlendedVertices& vertices, const BlendRow* rows, const ElementMotion& first,
+                         const Vec3& centre, const Vec3* position, Vec3* displacement) {
+  constexpr std::size_t kVerticesAhead = 12;
+  constexpr std::uint32_t kWeightsAhead = kWeightsFetched;
+  MotionColumns common;
+  read(first, common);
+  for (std::size_t i = 0; i < vertices.count; ++i) {
+    if (i + kVerticesAhead < vertices.listed) {
+      const std::uint32_t next = vertices.vertex[i + kVerticesAhead];
+      fetch(position + next, sizeof(Vec3));
+      fetch(displacement + next, sizeof(Vec3));
+    }
+    fetch(vertices.weight + vertices.begin[i] + kWeightsAhead, 128);
+    fetch(vertices.element + vertices.begin[i] + kWeightsAhead, 64);
     // Two sums, so that an addition need not wait for the one before it.
-    Lanes low[2]{};
-    FourDoubles high[2]{};
+    Lanes low[2]{}, high[2]{};
     const auto add = [&](std::uint32_t k, int to) __attribute__((always_inline)) {
-      const auto by = static_cast<double>(weight[k]);
-      const double* row = rows[element[k]].value;
+      const auto by = static_cast<double>(vertices.weight[k]);
+      const double* row = rows[vertices.element[k]].value;
       low[to] += by * load<Lanes>(row);
-      high[to] += by * load<FourDoubles>(row + kLanes);
+      high[to] += by * load<Lanes>(row + kLanes);
     };
-    std::uint32_t k = begin[v];
-    for (; k + 1 < begin[v + 1]; k += 2) add(k, 0), add(k + 1, 1);
-    if (k < begin[v + 1]) add(k, 0);
-    low[0] += low[1];
-    high[0] += high[1];
-    __builtin_memcpy(sums[v].value, &low[0], sizeof low[0]);
-    __builtin_memcpy(sums[v].value + kLanes, &high[0], sizeof high[0]);
+    static_assert(kBlendStep == 4);
+    for (std::uint32_t k = vertices.begin[i]; k < vertices.begin[i + 1]; k += kBlendStep)
+      add(k, 0), add(k + 1, 1), add(k + 2, 0), add(k + 3, 1);
+    const Lanes sum[2] = {low[0] + low[1], high[0] + high[1]};
+    FourDoubles column[4];
+    __builtin_memcpy(column, sum, sizeof sum);
+    const double share = 1 / column[0][3];
+    const double* at = position[vertices.vertex[i]].data();
+    const double offset[3] = {at[0] - centre[0], at[1] - centre[1], at[2] - centre[2]};
+    FourDoubles moved = common.displacement, departure = column[0];
+    for (int c = 0; c < 3; ++c) {
+      moved += common.gradient[c] * offset[c];
+      departure += column[c + 1] * offset[c];
+    }
+    moved += share * departure;
+    double* to = displacement[vertices.vertex[i]].data();
+    for (int c = 0; c < 3; ++c) to[c] = moved[c];
   }
 }
 
@@ -82,6 +124,20 @@ FLEXEL_CLONES void weigh_elements(const float* x, const float* y, const float* z
     const FloatLanes square = left * left, all = square * square * (4 * r + 1);
     __builtin_memcpy(weight + i, &all, sizeof all);
   }
+}
+
+void list_heard(const float* weight, std::size_t count, HeardElements& heard) {
+#ifdef FLEXEL_AVX512
+  static const bool by_sixteen = __builtin_cpu_supports("avx512f");
+  if (by_sixteen) return list_heard_by_sixteen(weight, count, heard);
+#endif
+  std::size_t used = 0;
+  for (std::size_t e = 0; e < count; ++e) {  // every one is written, and overwritten where it is not heard
+    heard.element[used] = static_cast<std::uint16_t>(e);
+    heard.weight[used] = weight[e];
+    used += weight[e] > 0;
+  }
+  heard.count = used;
 }
 
 FLEXEL_CLONES void fit_gradients(const std::uint32_t* element, const std::uint32_t* frame, std::size_t count,

@@ -57,6 +57,17 @@ FLEXEL_INLINE auto spans(const Axes& edges) {
   return (determinant * determinant >= kDegenerate * kDegenerate * lengths) & (lengths > 0);
 }
 
+// A 3 x 3 matrix times the first three numbers of `by`, summed from the left as Eigen does.
+FLEXEL_INLINE FourDoubles product(const double* matrix, const FourDoubles& by) {
+  const FourDoubles last = load<FourDoubles>(matrix + 5);
+  return (load<FourDoubles>(matrix) * by[0] + load<FourDoubles>(matrix + 3) * by[1]) +
+         FourDoubles{last[1], last[2], last[3], 0} * by[2];
+}
+
+FLEXEL_INLINE double squared_norm(const FourDoubles& of) {
+  return of[0] * of[0] + of[1] * of[1] + of[2] * of[2];
+}
+
 }  // namespace
 
 FLEXEL_CLONES void span_bases(const Frame* frames, std::size_t count, const Vec3* points, bool orthonormal,
@@ -71,9 +82,35 @@ FLEXEL_CLONES void span_bases(const Frame* frames, std::size_t count, const Vec3
   }
 }
 
+FLEXEL_CLONES Extremes coordinates_in(const RestFrames& rest, const std::uint32_t* frame,
+                                      const Vec3* vertices, const std::uint8_t* referenced, std::size_t count,
+                                      Vec3* coordinates) {
+  constexpr std::size_t kVerticesAhead = 96, kFramesAhead = 12;
+  Extremes largest;
+  for (std::size_t v = 0; v < count; ++v) {
+    fetch(vertices + v + kVerticesAhead, sizeof(Vec3));
+    const std::uint32_t f = frame[v], next = frame[std::min(v + kFramesAhead, count - 1)];
+    fetch(&rest.to_base[next], sizeof(Carrier));
+    fetch(&rest.base[next], sizeof(Mat3));
+    const double *to_base = rest.to_base[f].data(), *point = vertices[v].data();
+    const FourDoubles at{point[0], point[1], point[2], 0}, origin = load<FourDoubles>(to_base);
+    const FourDoubles away = at - origin, in_base = product(to_base + 3, away);
+    if (coordinates)
+      for (int c = 0; c < 3; ++c) coordinates[v].data()[c] = in_base[c];
+    if (!referenced[v]) continue;
+    const FourDoubles residual = origin + product(rest.base[f].data(), in_base) - at;
+    const FourDoubles outside = product(rest.to_spacings[rest.part[f]].data(), away);
+    largest.include({squared_norm(residual), squared_norm(outside)});
+  }
+  return largest;
+}
+
 FLEXEL_CLONES void move_frames(const Frame* frames, std::size_t count, const Mat3* rest_base,
                                const Vec3* rest, const Vec3* position, bool orthonormal, Carrier* carrier) {
+  constexpr std::size_t kFramesAhead = 32;
   for (std::size_t begin = 0; begin < count; begin += kLanes) {
+    fetch(rest_base + begin + kFramesAhead, kLanes * sizeof(Mat3));
+    fetch(carrier + begin + kFramesAhead, kLanes * sizeof(Carrier));
     Axes axes;
     gather_edges(frames, begin, count, position, axes);
     const auto spanned = spans(axes);
@@ -92,17 +129,33 @@ FLEXEL_CLONES void move_frames(const Frame* frames, std::size_t count, const Mat
   }
 }
 
-// Columns are read four numbers at a time, of which the last belongs to what follows, and so are
-// displacements written: the next vertex overwrites it.
+// Columns are read four numbers at a time, of which the last belongs to what follows. Four vertices are put
+// together to twelve numbers without gaps.
 FLEXEL_CLONES void carry(const Carrier* carrier, const std::uint32_t* frame, const Vec3* coordinates,
                          std::size_t count, Vec3* displacement) {
-  for (std::size_t v = 0; v < count; ++v) {
+  constexpr std::size_t kVerticesAhead = 96, kFramesAhead = 16;
+  const auto moved = [&](std::size_t v) __attribute__((always_inline)) {
     const double *by = carrier[frame[v]].data(), *c = coordinates[v].data();
-    const FourDoubles moved =
-        load<FourDoubles>(by) + ((load<FourDoubles>(by + 3) * c[0] + load<FourDoubles>(by + 6) * c[1]) +
-                                 load<FourDoubles>(by + 9) * c[2]);
-    __builtin_memcpy(displacement[v].data(), &moved, v + 1 < count ? sizeof moved : sizeof(Vec3));
+    return load<FourDoubles>(by) + ((load<FourDoubles>(by + 3) * c[0] + load<FourDoubles>(by + 6) * c[1]) +
+                                    load<FourDoubles>(by + 9) * c[2]);
+  };
+  const auto write_one = [&](std::size_t v) __attribute__((always_inline)) {
+    const FourDoubles value = moved(v);
+    __builtin_memcpy(displacement[v].data(), &value, sizeof(Vec3));
+  };
+  std::size_t v = 0;
+  if (count > 0 && reinterpret_cast<std::uintptr_t>(displacement) % 16 != 0) write_one(v++);
+  for (; v + 4 <= count; v += 4) {
+    fetch(coordinates + v + kVerticesAhead, 4 * sizeof(Vec3));
+    fetch(&carrier[frame[std::min(v + kFramesAhead, count - 1)]], sizeof(Carrier));
+    const FourDoubles a = moved(v), b = moved(v + 1), c = moved(v + 2), d = moved(v + 3);
+    double* to = displacement[v].data();
+    stream(to, __builtin_shufflevector(a, b, 0, 1, 2, 4));
+    stream(to + 4, __builtin_shufflevector(b, c, 1, 2, 4, 5));
+    stream(to + 8, __builtin_shufflevector(c, d, 2, 4, 5, 6));
   }
+  for (; v < count; ++v) write_one(v);
+  finish_streams();
 }
 
 }  // namespace flexel

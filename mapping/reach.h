@@ -27,15 +27,21 @@ class ReachFinder {
   [[nodiscard]] const Reach& find(std::span<const std::uint32_t> anchors, int steps);
 
  private:
-  [[nodiscard]] std::uint32_t number_of(std::uint32_t element);
+  struct Entry {
+    std::uint32_t number = 0;           // of the element + 1; 0: free
+    std::uint8_t from = 0, gained = 0;  // anchors that reached it, and those that do so in this step
+  };
+  [[nodiscard]] std::size_t insert(std::uint32_t element);
+  [[nodiscard]] std::size_t free_slot(std::uint32_t number) const;
   void grow();
-  void spread(std::uint32_t from, std::uint8_t mask);
+  // Anchors `mask` reach `element` in this step.
+  void hand(std::uint32_t element, std::uint8_t mask);
 
   const Adjacency& connections_;
   Reach reach_;
-  std::vector<std::uint32_t>
-      table_;  // open addressing: number + 1 of the element whose hash leads here, or 0
-  std::vector<std::uint8_t> gained_;  // (elements) anchors that reached it in this step
+  std::vector<Entry> table_;          // open addressing: an element is where its hash leads, or behind that
+  std::vector<std::uint32_t> slots_;  // those that are taken, in the order of Reach::elements
+  std::vector<std::uint8_t> mask_;    // (slots) what is handed on in this step
 };
 
 }  // namespace flexel

@@ -5,57 +5,66 @@
 // takes the nearest element of its part.
 //
 // Vertices at one position in one part (an OBJ has them along texture seams) have one representative, which
-// alone is seated.
+// alone is seated. Inside a voxel with one cell all of them find that cell, whoever is asked: representatives
+// are looked for only at the positions of the others.
 #include "mapping/seat.h"
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <limits>
 #include <memory>
+#include <numeric>
+#include <optional>
 
 #include "formats/bucket.h"
 #include "formats/error.h"
 #include "formats/locate.h"
-#include "formats/topology.h"
+#include "formats/weld.h"
 
 namespace flexel {
 namespace {
 
 constexpr std::uint32_t kNone = 0xffffffffu;
+constexpr std::size_t kPolygonsAtATime = 1 << 12;
 constexpr double kUnreached = std::numeric_limits<double>::infinity();
 
-// First polygon around each vertex, and the vertex whose seat it shares.
-struct Corners {
-  std::vector<std::uint32_t> first_polygon;   // (vertices) kNone: unused
-  std::vector<std::uint32_t> representative;  // (vertices) the first of those at this position in this part
-};
-
-Corners corners_of(const Surface& surface) {
-  constexpr std::size_t kGrain = 1 << 14;
-  Corners corners;
-  resize_touched(corners.first_polygon, surface.vertices.size());
-  std::fill(corners.first_polygon.begin(), corners.first_polygon.end(), kNone);
-  parallel_chunks(surface.polygon_count(), kGrain, [&](std::size_t begin, std::size_t end) {
+// (vertices) The first polygon around each, kNone where there is none.
+std::vector<std::uint32_t> first_polygons(const Surface& surface) {
+  std::vector<std::uint32_t> result;
+  resize_touched(result, surface.vertices.size());
+  std::fill(result.begin(), result.end(), kNone);
+  parallel_chunks(surface.polygon_count(), kPolygonsAtATime, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p < end; ++p)
       for (const std::uint32_t v : surface.polygon(p)) {
-        const std::atomic_ref<std::uint32_t> first(corners.first_polygon[v]);
+        const std::atomic_ref<std::uint32_t> first(result[v]);
         std::uint32_t known = first.load(std::memory_order_relaxed);
         while (p < known && !first.compare_exchange_weak(known, static_cast<std::uint32_t>(p),
                                                          std::memory_order_relaxed)) {
         }
       }
   });
-  corners.representative = weld(surface.vertices);
-  // A representative that is unused, or of another part, cannot speak for the vertex; the vertex then speaks
-  // for itself.
-  parallel_for_each(surface.vertices.size(), [&](std::size_t v) {
-    std::uint32_t& representative = corners.representative[v];
-    if (representative == v) return;
-    const std::uint32_t mine = corners.first_polygon[v], other = corners.first_polygon[representative];
-    if (mine == kNone || other == kNone || surface.polygon_part(mine) != surface.polygon_part(other))
-      representative = static_cast<std::uint32_t>(v);
-  });
-  return corners;
+  return result;
+}
+
+// Where a cell lies, and whether another piece has a cell there too.
+struct Voxel {
+  Index3 index{};
+  bool shared = false;
+};
+
+// (cells)
+std::vector<Voxel> voxels_of_cells(const Body& body) {
+  std::vector<Voxel> voxels(body.cell_count());
+  const auto index = [&](std::size_t c) { return body.lattice_index[body.cell_elements[c][0]]; };
+  for (const Part& part : body.parts)
+    parallel_for_each(part.cell_end - part.cell_begin, [&](std::size_t i) {
+      const std::size_t c = part.cell_begin + i;  // sorted by voxel
+      voxels[c].index = index(c);
+      voxels[c].shared = (c > part.cell_begin && index(c) == index(c - 1)) ||
+                         (c + 1 < part.cell_end && index(c) == index(c + 1));
+    });
+  return voxels;
 }
 
 // The nearest voxel so far; of those equally near, the one nearest to the middle of the part, then the cell
@@ -98,6 +107,13 @@ bool goes_up(double offset, double at, double middle) {
   return offset > 0;
 }
 
+// The corner of a cell that a point goes with; `within` is the point as seen from the cell's lowest corner.
+std::uint8_t corner_of(const Vec3& within, const Vec3& at, const Vec3& middle) {
+  int corner = 0;
+  for (int a = 0; a < 3; ++a) corner += goes_up(within[a] - 0.5, at[a], middle[a]) << a;
+  return static_cast<std::uint8_t>(corner);
+}
+
 // Whether of two cells equally near the first is taken.
 bool is_preferred(const Body& body, std::uint32_t cell, std::uint32_t other, const Vec3& middle) {
   const auto squared_distance = [&](std::uint32_t c) {
@@ -120,9 +136,7 @@ void consider(const Body& body, std::uint32_t cell, const Vec3& u, const Vec3& s
   if (!nearer && squared_distance > (1 + kSeatTie) * home.squared_distance) return;
   if (!nearer && !is_preferred(body, cell, home.seat.owner, middle)) return;
   const bool on_face = inside && within.cwiseMin(Vec3::Ones() - within).minCoeff() < kSeatTie;
-  int corner = 0;
-  for (int a = 0; a < 3; ++a) corner += goes_up(within[a] - 0.5, u[a], middle[a]) << a;
-  home = {squared_distance, on_face, {cell, true, static_cast<std::uint8_t>(corner)}};
+  home = {squared_distance, on_face, {cell, true, corner_of(within, u, middle)}};
 }
 
 // Beyond this many cells under a polygon a search by bisection is faster than looking at each.
@@ -166,8 +180,9 @@ struct Around {
   std::vector<std::uint32_t> polygons;  // ascending within a slot
 };
 
-// The polygons around each vertex of `wanted`, and around those that it speaks for.
-Around polygons_around(const Surface& surface, const Corners& corners,
+// The polygons around each vertex of `wanted`, and around those that it speaks for: `representative` (empty:
+// every vertex is its own).
+Around polygons_around(const Surface& surface, const std::vector<std::uint32_t>& representative,
                        const std::vector<std::uint32_t>& wanted) {
   Around around;
   around.slot.assign(surface.vertices.size(), kNone);
@@ -176,7 +191,7 @@ Around polygons_around(const Surface& surface, const Corners& corners,
   const auto for_each_corner = [&](const auto& visit) {
     for (std::size_t p = 0; p < surface.polygon_count(); ++p)
       for (const std::uint32_t v : surface.polygon(p)) {
-        const std::uint32_t slot = around.slot[corners.representative[v]];
+        const std::uint32_t slot = around.slot[representative.empty() ? v : representative[v]];
         if (slot != kNone) visit(slot, static_cast<std::uint32_t>(p));
       }
   };
@@ -188,27 +203,97 @@ Around polygons_around(const Surface& surface, const Corners& corners,
   return around;
 }
 
+// The vertices at positions that `wanted` are at, and some others, ascending.
+std::vector<std::uint32_t> at_positions_of(const std::vector<Vec3>& vertices,
+                                           const std::vector<std::uint32_t>& wanted) {
+  constexpr std::size_t kPlaces = 16;  // for each of them
+  constexpr std::size_t kMany = 8;     // one in so many: to leave the others out costs more than it spares
+  if (wanted.size() * kMany >= vertices.size()) {
+    std::vector<std::uint32_t> all(vertices.size());
+    std::iota(all.begin(), all.end(), 0u);
+    return all;
+  }
+  const std::size_t last = std::bit_ceil(kPlaces * wanted.size()) - 1;
+  const auto place = [&](std::size_t v) {
+    return hash_key(position_key(vertices[v].x(), vertices[v].y(), vertices[v].z())) & last;
+  };
+  std::vector<std::uint8_t> taken(last + 1, 0), found;
+  for (const std::uint32_t v : wanted) taken[place(v)] = 1;
+  resize_touched(found, vertices.size());
+  parallel_for_each(vertices.size(), [&](std::size_t v) { found[v] = taken[place(v)]; });
+  std::vector<std::uint32_t> result;
+  for (std::uint32_t v = 0; v < found.size(); ++v)
+    if (found[v]) result.push_back(v);
+  return result;
+}
+
 class Seating {
  public:
-  explicit Seating(const Body& body)
-      : body_(body), corners_(corners_of(body.surface)), middle_(middles(body)), grids_(body.parts.size()) {
+  explicit Seating(const Body& body) : body_(body), middle_(middles(body)), grids_(body.parts.size()) {
     const std::size_t n = body.surface.vertices.size();
     resize_touched(seats_.seat, n);
     resize_touched(seats_.referenced, n);
-    resize_touched(certain_, n);
+    resize_touched(settled_, n);
   }
 
   Seats take() {
-    seat_under_first_polygon();
-    seat_remaining();
+    if (!body_.surface_cell_offsets.empty()) seat_inside_voxels();
+    if (std::count(settled_.begin(), settled_.end(), kAlone) != std::ssize(settled_)) {
+      first_polygon_ = first_polygons(body_.surface);
+      seat_under_first_polygon();
+      find_representatives();
+      seat_remaining();
+    }
     parallel_for_each(seats_.seat.size(), [&](std::size_t v) {
-      seats_.referenced[v] = corners_.first_polygon[v] != kNone;
-      seats_.seat[v] = seats_.seat[corners_.representative[v]];
+      seats_.referenced[v] = settled_[v] != kUnused;
+      if (!representative_.empty()) seats_.seat[v] = seats_.seat[representative_[v]];
     });
     return std::move(seats_);
   }
 
  private:
+  // What the polygons around a vertex say of its seat.
+  enum Settled : std::uint8_t {
+    kOpen,
+    kAmongPieces,  // a cell that its first polygon bounds holds it
+    kAlone,        // so does the only cell of its voxel, which every vertex of the part at its position finds
+    kUnused,
+  };
+
+  // Of the vertices that lie inside a voxel with one cell, clear of its faces: any polygon around them that
+  // bounds the cell will do, so polygons are gone through as they come, and threads that meet at a vertex
+  // write the same.
+  void seat_inside_voxels() {
+    const std::vector<Voxel> voxels = voxels_of_cells(body_);
+    parallel_chunks(body_.surface.polygon_count(), kPolygonsAtATime, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t p = begin; p < end; ++p)
+        for (const std::uint32_t v : body_.surface.polygon(p)) {
+          const std::atomic_ref<Settled> settled(settled_[v]);
+          if (settled.load(std::memory_order_relaxed) == kAlone) continue;
+          const std::optional<Seat> seat = seat_inside(voxels, p, body_.surface.vertices[v]);
+          if (!seat) continue;
+          std::atomic_ref<Seat>(seats_.seat[v]).store(*seat, std::memory_order_relaxed);
+          settled.store(kAlone, std::memory_order_relaxed);
+        }
+    });
+  }
+
+  [[nodiscard]] std::optional<Seat> seat_inside(const std::vector<Voxel>& voxels, std::size_t p,
+                                                const Vec3& point) const {
+    const std::uint32_t begin = body_.surface_cell_offsets[p], end = body_.surface_cell_offsets[p + 1];
+    if (end - begin > kManyCells) return std::nullopt;
+    const std::uint32_t part = body_.surface.polygon_part(p);
+    const Vec3 u = body_.parts[part].lattice.to_lattice(point);
+    for (std::uint32_t s = begin; s < end; ++s) {
+      const Voxel& voxel = voxels[body_.surface_cells[s]];
+      const Vec3 within = u - Vec3(voxel.index[0], voxel.index[1], voxel.index[2]);
+      if (within.cwiseMin(Vec3::Ones() - within).minCoeff() < kSeatTie) continue;
+      if (voxel.shared) return std::nullopt;
+      return Seat{body_.surface_cells[s], true, corner_of(within, u, middle_[part])};
+    }
+    return std::nullopt;
+  }
+
   [[nodiscard]] Home look(std::uint32_t v, std::size_t polygon, Home home) const {
     look_under(body_, polygon, body_.surface.vertices[v], middle_, home);
     return home;
@@ -216,21 +301,48 @@ class Seating {
 
   void seat_under_first_polygon() {
     parallel_for_each(seats_.seat.size(), [&](std::size_t v) {
-      certain_[v] = 0;
-      if (corners_.first_polygon[v] == kNone || corners_.representative[v] != v) return;
-      const Home home = look(static_cast<std::uint32_t>(v), corners_.first_polygon[v], {});
+      if (settled_[v] == kAlone) return;
+      if (first_polygon_[v] == kNone) {
+        settled_[v] = kUnused;
+        return;
+      }
+      const Home home = look(static_cast<std::uint32_t>(v), first_polygon_[v], {});
       seats_.seat[v] = home.seat;
-      certain_[v] = home.certain();
+      if (home.certain()) settled_[v] = kAmongPieces;
+    });
+  }
+
+  // A representative that is unused, or of another part, cannot speak for a vertex; the vertex then speaks
+  // for itself.
+  void find_representatives() {
+    std::vector<std::uint32_t> doubtful;
+    for (std::uint32_t v = 0; v < settled_.size(); ++v)
+      if (settled_[v] == kOpen || settled_[v] == kAmongPieces) doubtful.push_back(v);
+    if (doubtful.empty()) return;
+    const std::vector<Vec3>& vertices = body_.surface.vertices;
+    const std::vector<std::uint32_t> members = at_positions_of(vertices, doubtful);
+    const std::vector<std::uint32_t> first = first_equal(members.size(), [&](std::size_t i) {
+      const Vec3& at = vertices[members[i]];
+      return position_key(at.x(), at.y(), at.z());
+    });
+    resize_touched(representative_, vertices.size());
+    std::iota(representative_.begin(), representative_.end(), 0u);
+    parallel_for_each(members.size(), [&](std::size_t i) {
+      const std::uint32_t v = members[i], other = members[first[i]];
+      const std::uint32_t mine = first_polygon_[v], its = first_polygon_[other];
+      if (mine != kNone && its != kNone &&
+          body_.surface.polygon_part(mine) == body_.surface.polygon_part(its))
+        representative_[v] = other;
     });
   }
 
   void seat_remaining() {
     std::vector<std::uint32_t> remaining;
     for (std::uint32_t v = 0; v < seats_.seat.size(); ++v)
-      if (corners_.representative[v] == v && !certain_[v]) remaining.push_back(v);
+      if (settled_[v] == kUnused || (settled_[v] == kOpen && representative_[v] == v)) remaining.push_back(v);
     if (remaining.empty()) return;
     const Around around =
-        body_.surface_cells.empty() ? Around{} : polygons_around(body_.surface, corners_, remaining);
+        body_.surface_cells.empty() ? Around{} : polygons_around(body_.surface, representative_, remaining);
     make_grids(remaining, around);
     parallel_for_each(
         remaining.size(),
@@ -259,14 +371,14 @@ class Seating {
   }
 
   [[nodiscard]] std::uint32_t part_of(std::uint32_t v) const {
-    return body_.surface.polygon_part(corners_.first_polygon[v]);
+    return body_.surface.polygon_part(first_polygon_[v]);
   }
 
   // Grids of the parts that a vertex without a cell belongs to.
   void make_grids(const std::vector<std::uint32_t>& remaining, const Around& around) {
     std::vector<std::uint8_t> needed(body_.parts.size(), 0);
     for (const std::uint32_t v : remaining) {
-      if (corners_.first_polygon[v] == kNone)
+      if (first_polygon_[v] == kNone)
         std::fill(needed.begin(), needed.end(), std::uint8_t{1});
       else if (nearest_under(v, around).squared_distance == kUnreached)
         needed[part_of(v)] = 1;
@@ -280,7 +392,7 @@ class Seating {
 
   [[nodiscard]] Seat seat_nearest(std::uint32_t v) const {
     const Vec3& point = body_.surface.vertices[v];
-    if (corners_.first_polygon[v] != kNone) {
+    if (first_polygon_[v] != kNone) {
       const std::uint32_t part = part_of(v);
       return seat_near_element(body_, cells_of_, part, grids_[part]->nearest(point), point, middle_[part]);
     }
@@ -297,11 +409,12 @@ class Seating {
   }
 
   const Body& body_;
-  Corners corners_;
+  std::vector<std::uint32_t> first_polygon_;         // (vertices) kNone: unused
+  std::vector<std::uint32_t> representative_;        // (vertices) whose seat each shares; empty: its own
   std::vector<Vec3> middle_;                         // (parts x 3) lattice coordinates
   std::vector<std::unique_ptr<ElementGrid>> grids_;  // (parts)
   Buckets<std::uint32_t> cells_of_;                  // (elements) cells around each, where grids are needed
-  std::vector<std::uint8_t> certain_;                // (vertices) 1: its first polygon has settled its seat
+  std::vector<Settled> settled_;                     // (vertices)
   Seats seats_;
 };
 

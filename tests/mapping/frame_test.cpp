@@ -253,6 +253,54 @@ TEST(Seams, VerticesAtOnePositionMoveAsOne) {
   }
 }
 
+TEST(Seams, APolygonThatNamesTheWrongCellHoldsItsVerticesLikeThoseAtTheirPositions) {
+  // Off the lattice's planes, so that nearly every vertex finds its voxel by itself; a few polygons name a
+  // cell far away, and their vertices go by what the others at their positions find.
+  Body body = test::block(6, 4, 4, 0.1, Placement::corner);
+  body.surface = {};
+  std::vector<Vec3> vertices;
+  std::vector<std::vector<std::uint32_t>> quads;
+  for (int i = 0; i < 12; ++i)
+    for (int j = 0; j < 8; ++j) {
+      const auto first = static_cast<std::uint32_t>(vertices.size());
+      for (const auto& [a, b] : {std::pair{0, 0}, {1, 0}, {1, 1}, {0, 1}})
+        vertices.emplace_back(0.013 + 0.045 * (i + a), 0.013 + 0.045 * (j + b), 0.337);
+      quads.push_back({first, first + 1, first + 2, first + 3});
+    }
+  test::add_surface(body, vertices, quads);
+  test::deform(body, [](const Vec3& x) -> Vec3 {
+    return {x.x() + x.y() * x.y(), x.y() + x.z() * x.x(), x.z()};
+  });
+  Body wrong = body;
+  wrong.surface_cells.clear();
+  wrong.surface_cell_offsets = {0};
+  const auto is_wrong = [](std::size_t quad) { return quad % 11 == 5; };
+  for (std::size_t p = 0; p < quads.size(); ++p) {
+    if (is_wrong(p))
+      wrong.surface_cells.push_back(0);  // at z = 0, two cells below
+    else
+      wrong.surface_cells.insert(wrong.surface_cells.end(),
+                                 body.surface_cells.begin() + body.surface_cell_offsets[p],
+                                 body.surface_cells.begin() + body.surface_cell_offsets[p + 1]);
+    wrong.surface_cell_offsets.push_back(static_cast<std::uint32_t>(wrong.surface_cells.size()));
+  }
+  check(wrong, "test");
+  const auto has_double = [&](std::size_t v) {
+    for (std::size_t other = 0; other < vertices.size(); ++other)
+      if (!is_wrong(other / 4) && vertices[other] == vertices[v]) return true;
+    return false;
+  };
+  const MapResult right = map_quietly(body, MapMethod::affine), held = map_quietly(wrong, MapMethod::affine);
+  std::size_t in_doubt = 0;
+  for (std::size_t v = 0; v < vertices.size(); ++v) {
+    if (!has_double(v)) continue;
+    in_doubt += is_wrong(v / 4);
+    EXPECT_EQ(held.displacement[v], right.displacement[v]) << v;
+  }
+  EXPECT_GT(in_doubt, 20u);
+  EXPECT_LT(in_doubt, vertices.size() / 8);
+}
+
 TEST(Unreferenced, VerticesFollowTheNearestElementOfAnyPart) {
   Body body = test::block(3, 3, 3, 0.1, Placement::corner);
   test::append_body(body, test::block(2, 2, 2, 0.1, Placement::corner));
