@@ -375,9 +375,10 @@ const Block* CellStiffness::blocks(std::size_t begin, std::size_t end, std::vect
 }
 
 std::vector<Block> CellStiffness::diagonal() const {
-  std::vector<Block> diagonal(rows(), Block::Zero());
+  std::vector<Block> diagonal(rows());  // touched first by several threads
   parallel_for_each(rows(), [&](std::size_t e) {
     std::array<Block, 8> own;
+    diagonal[e].setZero();
     for (const Incidence& at : pattern_.stencil.of(static_cast<std::uint32_t>(e))) {
       cell_blocks(at, at.corner, at.corner + 1, own.data());
       diagonal[e] += own[at.corner];

@@ -309,7 +309,8 @@ template <int R, class View>
   // Some 50 MB of A P
   constexpr std::size_t kBatch = R == 3 ? 16384 : 4096, kWidth = galerkin_kernel::kWidth, kBlock = 6 * kWidth;
   const auto add = galerkin_table().pairs[R / 6];
-  std::vector<Square<6>> values(pattern.columns.size() + 1, Square<6>::Zero());
+  std::vector<Square<6>> values(pattern.columns.size() + 1);
+  parallel_for_each(values.size(), [&](std::size_t q) { values[q].setZero(); });
   std::vector<std::uint64_t> next(transfer.transposed_offsets.begin(), transfer.transposed_offsets.end() - 1);
   std::vector<ProductRow> product;
   for (std::size_t begin = 0; begin < matrix.rows(); begin += kBatch) {
