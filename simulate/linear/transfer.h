@@ -306,8 +306,8 @@ void product_rows(const View& matrix, const Transfer<R>& transfer, std::size_t b
 template <int R, class View>
 [[nodiscard]] std::vector<Square<6>> galerkin(const View& matrix, const Transfer<R>& transfer,
                                               const Pattern& pattern) {
-  // Some 50 MB of A P
-  constexpr std::size_t kBatch = R == 3 ? 16384 : 4096, kWidth = galerkin_kernel::kWidth, kBlock = 6 * kWidth;
+  // Some 25 MB of A P
+  constexpr std::size_t kBatch = R == 3 ? 8192 : 4096, kWidth = galerkin_kernel::kWidth, kBlock = 6 * kWidth;
   const auto add = galerkin_table().pairs[R / 6];
   std::vector<Square<6>> values(pattern.columns.size() + 1);
   parallel_for_each(values.size(), [&](std::size_t q) { values[q].setZero(); });
