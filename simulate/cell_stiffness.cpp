@@ -1,7 +1,6 @@
 // Products go over the chunks of simulate/time/layout.h: a chunk writes the rows of the elements that it owns
 // and hands over what it adds to those that it shares; those are summed in a fixed order. Rows are made for
 // each element from the cells around it, in ascending order, so neither depends on the threads.
-//
 // Everything about a cell is in its lattice's frame; a row's blocks are turned to the world's at its end.
 #include "simulate/cell_stiffness.h"
 
