@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <tuple>
 
@@ -47,51 +48,33 @@ std::optional<std::uint32_t> cell_at(const Body& body, std::span<const std::uint
   return *found;
 }
 
-struct Candidate {
-  double squared_distance;
-  int place;
-  Voxel voxel;
-};
-
-// The 27 voxels about `at`, nearest first; equal distances in the order (k, j, i).
-std::array<Candidate, 27> voxels_around(const Vec3& at, const Vec3& spacing) {
-  const Voxel home = at.array().floor().matrix().cast<std::int64_t>();
-  std::array<Candidate, 27> result;
-  for (int n = 0; n < 27; ++n) {
-    const Voxel voxel = home + Voxel(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
-    result[n] = {squared_distance(at, voxel, spacing), n, voxel};
+// The nearest of `cells` among the voxels about `home`, no further than `most` [m] from `at`; of those at
+// equal distance the first in the order (k, j, i).
+std::optional<std::uint32_t> nearest_around(const Body& body, std::span<const std::uint32_t> cells,
+                                            const Voxel& home, const Vec3& at, const Vec3& spacing,
+                                            double most) {
+  std::array<std::array<double, 3>, 3> term;  // of the squared distance: axis, voxel before, at, after
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<Eigen::Index>(axis);
+    const double inside = at[a] - static_cast<double>(home[a]);
+    term[axis] = {inside * spacing[a], 0, (1 - inside) * spacing[a]};
+    for (double& each : term[axis]) each *= each;
   }
-  std::sort(result.begin(), result.end(), [](const Candidate& a, const Candidate& b) {
-    return std::tie(a.squared_distance, a.place) < std::tie(b.squared_distance, b.place);
-  });
-  return result;
+  std::array<double, 27> squared;
+  for (std::size_t n = 0; n < 27; ++n) squared[n] = term[0][n % 3] + term[1][n / 3 % 3] + term[2][n / 9];
+  for (;;) {
+    const auto nearest = std::min_element(squared.begin(), squared.end());
+    if (*nearest > most * most) return std::nullopt;
+    const auto n = nearest - squared.begin();
+    if (const auto cell = cell_at(body, cells, home + Voxel(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1)))
+      return *cell;
+    *nearest = std::numeric_limits<double>::infinity();
+  }
 }
 
-std::uint32_t nearest_cell(const Body& body, std::span<const std::uint32_t> cells, const Vec3& at,
-                           const Vec3& spacing) {
-  // Mostly the point lies in one of the first voxels looked at, or on its face.
-  const Voxel home = at.array().floor().matrix().cast<std::int64_t>();
-  const auto on_face = [&](Eigen::Index axis) { return at[axis] == static_cast<double>(home[axis]); };
-  for (int k = on_face(2) ? -1 : 0; k <= 0; ++k)
-    for (int j = on_face(1) ? -1 : 0; j <= 0; ++j)
-      for (int i = on_face(0) ? -1 : 0; i <= 0; ++i)
-        if (const auto cell = cell_at(body, cells, home + Voxel(i, j, k))) return *cell;
-  const double one_spacing = spacing.minCoeff();
-  for (const Candidate& candidate : voxels_around(at, spacing)) {
-    if (candidate.squared_distance > one_spacing * one_spacing) break;
-    if (const auto cell = cell_at(body, cells, candidate.voxel)) return *cell;
-  }
-  return *std::min_element(cells.begin(), cells.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return squared_distance(at, voxel_of(lowest_corner(body, a)), spacing) <
-           squared_distance(at, voxel_of(lowest_corner(body, b)), spacing);
-  });
-}
-
-}  // namespace
-
-CellPoint cell_point(const Body& body, std::uint32_t cell, const Vec3& point) {
-  const Lattice& lattice = part_of_cell(body, cell).lattice;
-  const Vec3 inside = lattice.to_lattice(point) - voxel_of(lowest_corner(body, cell)).cast<double>();
+// Trilinear weights in `cell` of a point in lattice coordinates.
+CellPoint weights_in(const Body& body, std::uint32_t cell, const Vec3& at) {
+  const Vec3 inside = at - voxel_of(lowest_corner(body, cell)).cast<double>();
   CellPoint result;
   result.cell = cell;
   for (int a = 0; a < 8; ++a) {
@@ -103,14 +86,54 @@ CellPoint cell_point(const Body& body, std::uint32_t cell, const Vec3& point) {
   return result;
 }
 
-std::optional<CellPoint> locate_on_surface(const Body& body, std::size_t polygon, const Vec3& point) {
-  if (polygon + 1 >= body.surface_cell_offsets.size()) return std::nullopt;
+}  // namespace
+
+CellPoint cell_point(const Body& body, std::uint32_t cell, const Vec3& point) {
+  return weights_in(body, cell, part_of_cell(body, cell).lattice.to_lattice(point));
+}
+
+SurfaceLocator::SurfaceLocator(const Body& body, std::size_t polygon) : body_(body) {
+  if (polygon + 1 >= body.surface_cell_offsets.size()) return;
   const std::uint32_t begin = body.surface_cell_offsets[polygon],
                       end = body.surface_cell_offsets[polygon + 1];
-  if (begin == end) return std::nullopt;
-  const std::span<const std::uint32_t> cells(body.surface_cells.data() + begin, end - begin);
-  const Lattice& lattice = part_of_cell(body, cells.front()).lattice;
-  return cell_point(body, nearest_cell(body, cells, lattice.to_lattice(point), lattice.spacing), point);
+  cells_ = std::span(body.surface_cells.data() + begin, end - begin);
+  if (!cells_.empty()) lattice_ = &part_of_cell(body, cells_.front()).lattice;
+}
+
+// Mostly the point lies in one of the first voxels looked at, or on its face; and the next point in the same.
+std::uint32_t SurfaceLocator::nearest_cell(const Vec3& at) {
+  const Voxel home = at.array().floor().matrix().cast<std::int64_t>();
+  std::array<int, 3> first{};  // 0, or -1 on a face
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<Eigen::Index>(axis);
+    first[axis] = at[a] == static_cast<double>(home[a]) ? -1 : 0;
+  }
+  if (last_ && home == last_home_ && first == last_first_) return *last_;
+  for (int k = first[2]; k <= 0; ++k)
+    for (int j = first[1]; j <= 0; ++j)
+      for (int i = first[0]; i <= 0; ++i)
+        if (const auto cell = cell_at(body_, cells_, home + Voxel(i, j, k))) {
+          last_ = cell;
+          last_home_ = home;
+          last_first_ = first;
+          return *cell;
+        }
+  const Vec3& spacing = lattice_->spacing;
+  if (const auto cell = nearest_around(body_, cells_, home, at, spacing, spacing.minCoeff())) return *cell;
+  return *std::min_element(cells_.begin(), cells_.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return squared_distance(at, voxel_of(lowest_corner(body_, a)), spacing) <
+           squared_distance(at, voxel_of(lowest_corner(body_, b)), spacing);
+  });
+}
+
+std::optional<CellPoint> SurfaceLocator::operator()(const Vec3& point) {
+  if (cells_.empty()) return std::nullopt;
+  const Vec3 at = lattice_->to_lattice(point);
+  return weights_in(body_, nearest_cell(at), at);
+}
+
+std::optional<CellPoint> locate_on_surface(const Body& body, std::size_t polygon, const Vec3& point) {
+  return SurfaceLocator(body, polygon)(point);
 }
 
 Vec3 interpolate(const CellPoint& at, const Body& body, const std::vector<Vec3>& element_values) {

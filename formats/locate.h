@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 
 #include "formats/body.h"
 
@@ -24,6 +25,25 @@ struct CellPoint {
 // its matter was dropped).
 [[nodiscard]] std::optional<CellPoint> locate_on_surface(const Body& body, std::size_t polygon,
                                                          const Vec3& point);
+
+// Likewise, for many points of one polygon: the cell of the last one is tried first. Keeps a reference to
+// `body`.
+class SurfaceLocator {
+ public:
+  SurfaceLocator(const Body& body, std::size_t polygon);
+  [[nodiscard]] std::optional<CellPoint> operator()(const Vec3& point);
+
+ private:
+  [[nodiscard]] std::uint32_t nearest_cell(const Vec3& at);
+
+  const Body& body_;
+  std::span<const std::uint32_t> cells_;  // that the polygon bounds, ascending
+  const Lattice* lattice_ = nullptr;
+  std::optional<std::uint32_t>
+      last_;  // found in voxel `last_home_` or beside its faces that the point lay on
+  Eigen::Matrix<std::int64_t, 3, 1> last_home_;
+  std::array<int, 3> last_first_{};
+};
 
 // Where the material point is now / was at rest.
 [[nodiscard]] Vec3 interpolate(const CellPoint& at, const Body& body,

@@ -108,17 +108,25 @@ std::optional<std::uint32_t> nearest_element(const Setting& setting, std::uint32
   return nearest;
 }
 
-std::optional<Carrier> carrier_on_surface(const Setting& setting, std::uint32_t polygon, const Vec3& point,
-                                          const Vec3& outward) {
-  const std::uint32_t part = setting.body.surface.polygon_part(polygon);
-  if (setting.body.parts[part].placement == Placement::corner) {
-    const auto at = locate_on_surface(setting.body, polygon, point);
-    if (!at || (at->cell < setting.stray_cell.size() && setting.stray_cell[at->cell])) return std::nullopt;
-    return cell_carrier(setting.body, *at);
+SurfaceCarriers::SurfaceCarriers(const Setting& setting, std::uint32_t polygon)
+    : setting_(setting), part_(setting.body.surface.polygon_part(polygon)) {
+  if (setting.body.parts[part_].placement == Placement::corner) locate_.emplace(setting.body, polygon);
+}
+
+std::optional<Carrier> SurfaceCarriers::operator()(const Vec3& point, const Vec3& outward) {
+  if (locate_) {
+    const auto at = (*locate_)(point);
+    if (!at || (at->cell < setting_.stray_cell.size() && setting_.stray_cell[at->cell])) return std::nullopt;
+    return cell_carrier(setting_.body, *at);
   }
-  const auto element = nearest_element(setting, part, point, outward);
+  const auto element = nearest_element(setting_, part_, point, outward);
   if (!element) return std::nullopt;
   return Carrier{{*element}, {1}, 1};
+}
+
+std::optional<Carrier> carrier_on_surface(const Setting& setting, std::uint32_t polygon, const Vec3& point,
+                                          const Vec3& outward) {
+  return SurfaceCarriers(setting, polygon)(point, outward);
 }
 
 Carrier with_gradient(const Setting& setting, const Carrier& carrier, const Vec3& point) {

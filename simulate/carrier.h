@@ -25,6 +25,18 @@ struct Carrier {
 [[nodiscard]] std::optional<Carrier> carrier_on_surface(const Setting& setting, std::uint32_t polygon,
                                                         const Vec3& point, const Vec3& outward);
 
+// Likewise, for many points of one polygon. Keeps a reference to `setting`.
+class SurfaceCarriers {
+ public:
+  SurfaceCarriers(const Setting& setting, std::uint32_t polygon);
+  [[nodiscard]] std::optional<Carrier> operator()(const Vec3& point, const Vec3& outward);
+
+ private:
+  const Setting& setting_;
+  std::uint32_t part_;
+  std::optional<SurfaceLocator> locate_;  // corner placement
+};
+
 // The element of a centre-placed part that rests nearest to `point`; nothing where none lies within two
 // voxels. Those with outward . (element - point) <= 0 go before all others; a zero vector tells none apart.
 [[nodiscard]] std::optional<std::uint32_t> nearest_element(const Setting& setting, std::uint32_t part,

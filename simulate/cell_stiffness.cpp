@@ -1,7 +1,6 @@
 // Products go over the chunks of simulate/time/layout.h: a chunk writes the rows of the elements that it owns
 // and hands over what it adds to those that it shares; those are summed in a fixed order. Rows are made for
 // each element from the cells around it, in ascending order, so neither depends on the threads.
-//
 // Everything about a cell is in its lattice's frame; a row's blocks are turned to the world's at its end.
 #include "simulate/cell_stiffness.h"
 
@@ -86,8 +85,6 @@ CellStiffness::CellStiffness(const Setting& setting, const StiffnessPattern& pat
     made.kind = cell_kind(straight, setting.materials[p]);
     kinds_.push_back(made);
   }
-  for (std::uint32_t e = 0; e < body_.element_count(); ++e)
-    if (added_.row_offsets[e + 1] > added_.row_offsets[e]) added_rows_.push_back(e);
 }
 
 // The columns of one lane.
@@ -145,6 +142,7 @@ const FoldTangent* CellStiffness::folding_of(std::uint32_t cell) const {
 
 void CellStiffness::linearise(const State& state, const TangentOptions& tangent) {
   std::fill(added_.values.begin(), added_.values.end(), Block::Zero());
+  adding_.reset();
   folding_.clear();
   mask_.clear();
   held_.clear();
@@ -222,6 +220,23 @@ void CellStiffness::products_of_cells(const double* x, double* y) const {
     for (std::size_t c = 0; c < 3; ++c) y[3 * std::size_t{e} + c] = 0;
 }
 
+CellStiffness::Adding CellStiffness::adding() const {
+  Adding result;
+  for (std::uint32_t e = 0; e < body_.element_count(); ++e) {
+    const std::size_t before = result.columns.size();
+    for (std::uint64_t q = added_.row_offsets[e]; q < added_.row_offsets[e + 1]; ++q)
+      if (added_.values[q] != Block::Zero()) {
+        result.columns.push_back(added_.columns[q]);
+        result.values.push_back(added_.values[q]);
+      }
+    if (result.columns.size() == before) continue;
+    result.rows.push_back(e);
+    result.offsets.push_back(before);
+  }
+  result.offsets.push_back(result.columns.size());
+  return result;
+}
+
 void CellStiffness::multiply(const double* x, double* y) const {
   const double* from = x;
   if (!held_.empty()) {
@@ -237,12 +252,12 @@ void CellStiffness::multiply(const double* x, double* y) const {
       Eigen::Map<Vec3>(y + 3 * std::size_t{elements[ab / 8]}) +=
           each.blocks[ab] * Eigen::Map<const Vec3>(from + 3 * std::size_t{elements[ab % 8]});
   }
-  parallel_for_each(added_rows_.size(), [&](std::size_t r) {
-    const std::size_t row = added_rows_[r];
+  if (!adding_) adding_ = adding();
+  parallel_for_each(adding_->rows.size(), [&](std::size_t r) {
     Vec3 sum = Vec3::Zero();
-    for (std::uint64_t q = added_.row_offsets[row]; q < added_.row_offsets[row + 1]; ++q)
-      sum += added_.values[q] * Eigen::Map<const Vec3>(from + 3 * std::size_t{added_.columns[q]});
-    Eigen::Map<Vec3>(y + 3 * row) += sum;
+    for (std::uint64_t q = adding_->offsets[r]; q < adding_->offsets[r + 1]; ++q)
+      sum += adding_->values[q] * Eigen::Map<const Vec3>(from + 3 * std::size_t{adding_->columns[q]});
+    Eigen::Map<Vec3>(y + 3 * std::size_t{adding_->rows[r]}) += sum;
   });
   for (std::size_t h = 0; h < held_.size(); ++h)
     for (std::size_t axis = 0; axis < 3; ++axis)
@@ -359,9 +374,10 @@ const Block* CellStiffness::blocks(std::size_t begin, std::size_t end, std::vect
 }
 
 std::vector<Block> CellStiffness::diagonal() const {
-  std::vector<Block> diagonal(rows(), Block::Zero());
+  std::vector<Block> diagonal(rows());  // touched first by several threads
   parallel_for_each(rows(), [&](std::size_t e) {
     std::array<Block, 8> own;
+    diagonal[e].setZero();
     for (const Incidence& at : pattern_.stencil.of(static_cast<std::uint32_t>(e))) {
       cell_blocks(at, at.corner, at.corner + 1, own.data());
       diagonal[e] += own[at.corner];

@@ -32,7 +32,10 @@ class CellStiffness final : public LinearOperator {
   void linearise(const State& state, const TangentOptions& tangent);
   // What passes add: rows and columns of the elements that they pull at, and of their neighbours. Zero after
   // linearise().
-  [[nodiscard]] BlockMatrix& added() { return added_; }
+  [[nodiscard]] BlockMatrix& added() {
+    adding_.reset();
+    return added_;
+  }
   // As eliminate() of simulate/constraints.h does.
   void eliminate_prescribed(const Constraints& constraints);
 
@@ -63,7 +66,16 @@ class CellStiffness final : public LinearOperator {
   void find_folding(const State& state, bool project);
   [[nodiscard]] const FoldTangent* folding_of(std::uint32_t cell) const;
   void prepare_lane(std::uint32_t cell, const State& state, const TangentOptions& tangent, double* to) const;
+  // The blocks of `added_` that are not zero: less than half, where a face lies on a plane of the lattice.
+  struct Adding {
+    std::vector<std::uint32_t> rows;     // those with some
+    std::vector<std::uint64_t> offsets;  // (rows + 1)
+    std::vector<std::uint32_t> columns;
+    std::vector<Block> values;
+  };
+
   void products_of_cells(const double* x, double* y) const;
+  [[nodiscard]] Adding adding() const;
   // Blocks (a, b) of a cell for b in [begin, end), a its corner at the element, into out[b]; deformed ones in
   // the lattice's frame.
   void cell_blocks(const Incidence& at, std::size_t begin, std::size_t end, Block* out) const;
@@ -86,7 +98,7 @@ class CellStiffness final : public LinearOperator {
   std::vector<double> tangents_;  // by block: columns of kLanes
   std::vector<Folding> folding_;  // ascending
   BlockMatrix added_;
-  std::vector<std::uint32_t> added_rows_;              // those of `added_` with blocks
+  mutable std::optional<Adding> adding_;               // made by the first product
   std::vector<std::uint8_t> mask_;                     // (elements) prescribed components; empty: none
   std::vector<std::uint32_t> held_;                    // elements with some
   std::vector<Vec3> held_diagonal_;                    // (held) diagonal entries that stay [N/m]

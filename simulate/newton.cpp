@@ -49,9 +49,9 @@ double norm(const std::vector<Vec3>& a) {
   return std::sqrt(dot(a, a));
 }
 
-// What a force computed at `u` cannot be better than: rounding in displacements times the stiffness that they
-// meet.
+// What a force at `u` cannot be better than: rounding in displacements times the stiffness that they meet.
 double rounding_floor(const LinearOperator& matrix, const std::vector<Vec3>& u) {
+  if (dot(u, u) == 0) return 0;
   const std::vector<Block> diagonal = matrix.diagonal();
   const double squared = parallel_sum<double>(matrix.rows(), [&](std::size_t e) {
     return diagonal[e].diagonal().squaredNorm() * u[e].squaredNorm();

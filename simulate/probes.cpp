@@ -74,7 +74,7 @@ ProbePoints place_selection(const Probe& probe, const Setting& setting) {
   std::vector<double> weights(setting.body.element_count(), 0);
   double total = 0;
   ProbePoints points{probe.name, Vec3::Zero(), {}};
-  for (const SurfacePoint& point : surface_points(setting, selected.polygons)) {
+  for (const SurfacePoint& point : gathered_surface_points(setting, selected.polygons)) {
     const double area = point.area_vector.norm();
     total += area;
     points.where += area * point.position;

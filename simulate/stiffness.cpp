@@ -8,6 +8,7 @@
 
 #include "formats/parallel.h"
 #include "simulate/cell_stiffness.h"
+#include "simulate/linear/transfer.h"
 
 namespace flexel {
 namespace {
@@ -41,18 +42,16 @@ Neighbourhood neighbourhood(const Body& body, const Stencil& stencil, const Conn
   return result;
 }
 
-// The neighbours of `element`, itself among them, ascending.
-void collect_row(const Neighbourhood& near, std::uint32_t element, std::vector<std::uint32_t>& row) {
-  row.assign(1, element);
-  for (const Incidence& at : near.stencil.of(element)) {
-    const auto& cell = near.body.cell_elements[at.cell];
-    row.insert(row.end(), cell.begin(), cell.end());
-  }
+// Appends the neighbours of `element`, itself among them. They are few, and most of them come up in several
+// cells: each is looked for at once.
+void append_neighbours(const Neighbourhood& near, std::uint32_t element, std::vector<std::uint32_t>& row) {
+  row.push_back(element);
+  for (const Incidence& at : near.stencil.of(element))
+    for (const std::uint32_t other : near.body.cell_elements[at.cell])
+      if (std::find(row.begin(), row.end(), other) == row.end()) row.push_back(other);
   for (const ConnectionRows::Entry& entry : near.connections.of(element)) row.push_back(entry.other);
   if (const auto groups = near.groups.find(element); groups != near.groups.end())
     for (const CoupledElements* group : groups->second) row.insert(row.end(), group->begin(), group->end());
-  std::sort(row.begin(), row.end());
-  row.erase(std::unique(row.begin(), row.end()), row.end());
 }
 
 }  // namespace
@@ -66,31 +65,20 @@ StiffnessPattern stiffness_pattern(const Body& body, const std::vector<std::uint
   const std::size_t n = body.element_count();
   fill_incidences(body, active, stencil);
   const Neighbourhood near = neighbourhood(body, stencil, connections, coupled);
-  std::vector<std::uint32_t> length(n);
-  parallel_chunks(n, 4096, [&](std::size_t begin, std::size_t end) {
-    std::vector<std::uint32_t> row;
-    for (std::size_t e = begin; e < end; ++e) {
-      collect_row(near, static_cast<std::uint32_t>(e), row);
-      length[e] = static_cast<std::uint32_t>(row.size());
-    }
+  Pattern rows = collect_pattern(n, 4096, [&](std::size_t e, std::vector<std::uint32_t>& row) {
+    append_neighbours(near, static_cast<std::uint32_t>(e), row);
   });
-  matrix.row_offsets.assign(n + 1, 0);
-  for (std::size_t e = 0; e < n; ++e) matrix.row_offsets[e + 1] = matrix.row_offsets[e] + length[e];
-  matrix.columns.resize(matrix.row_offsets[n]);
+  matrix.row_offsets = std::move(rows.offsets);
+  matrix.columns = std::move(rows.columns);
   if (stored) matrix.values.assign(matrix.row_offsets[n], Block::Zero());
   stencil.slot.resize(body.cell_count());
-  parallel_chunks(n, 4096, [&](std::size_t begin, std::size_t end) {
-    std::vector<std::uint32_t> row;
-    for (std::size_t e = begin; e < end; ++e) {
-      collect_row(near, static_cast<std::uint32_t>(e), row);
-      std::copy(row.begin(), row.end(),
-                matrix.columns.begin() + static_cast<std::ptrdiff_t>(matrix.row_offsets[e]));
-      for (const Incidence& at : stencil.of(static_cast<std::uint32_t>(e)))
-        for (std::size_t b = 0; b < 8; ++b) {
-          const auto found = std::lower_bound(row.begin(), row.end(), body.cell_elements[at.cell][b]);
-          stencil.slot[at.cell][8 * at.corner + b] = static_cast<std::uint16_t>(found - row.begin());
-        }
-    }
+  parallel_for_each(n, [&](std::size_t e) {
+    const auto begin = matrix.columns.begin() + static_cast<std::ptrdiff_t>(matrix.row_offsets[e]);
+    const auto end = matrix.columns.begin() + static_cast<std::ptrdiff_t>(matrix.row_offsets[e + 1]);
+    for (const Incidence& at : stencil.of(static_cast<std::uint32_t>(e)))
+      for (std::size_t b = 0; b < 8; ++b)
+        stencil.slot[at.cell][8 * at.corner + b] =
+            static_cast<std::uint16_t>(std::lower_bound(begin, end, body.cell_elements[at.cell][b]) - begin);
   });
   return pattern;
 }

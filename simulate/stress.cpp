@@ -131,16 +131,20 @@ class Recovery {
   }
 
  private:
-  // The cells around an element, and those that share an element with one of them.
+  // The cells around an element, and those that share an element with one of them; ascending.
   [[nodiscard]] std::vector<std::uint32_t> patch(std::span<const std::uint32_t> near) const {
+    thread_local std::vector<std::uint8_t> seen;  // all 0 between two uses
+    if (seen.size() < body_.cell_count()) seen.resize(body_.cell_count(), 0);
     std::vector<std::uint32_t> cells;
     for (const std::uint32_t c : near)
-      for (const std::uint32_t e : body_.cell_elements[c]) {
-        const auto more = around_.of(e);
-        cells.insert(cells.end(), more.begin(), more.end());
-      }
+      for (const std::uint32_t e : body_.cell_elements[c])
+        for (const std::uint32_t other : around_.of(e)) {
+          if (seen[other]) continue;
+          seen[other] = 1;
+          cells.push_back(other);
+        }
+    for (const std::uint32_t c : cells) seen[c] = 0;
     std::sort(cells.begin(), cells.end());
-    cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
     return cells;
   }
 

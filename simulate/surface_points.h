@@ -20,6 +20,12 @@ struct SurfacePoint {
 [[nodiscard]] std::vector<SurfacePoint> surface_points(const Setting& setting,
                                                        const std::vector<std::uint32_t>& polygons);
 
+// The same quadrature in few points, for what is linear in position and weights: of the points that one cell
+// (one element) carries within a piece of a polygon of some ten spacings, the mean by area. Sums of area, of
+// area times position and of area times weights stay as they are.
+[[nodiscard]] std::vector<SurfacePoint> gathered_surface_points(const Setting& setting,
+                                                                const std::vector<std::uint32_t>& polygons);
+
 [[nodiscard]] double total_area(const std::vector<SurfacePoint>& points);
 
 }  // namespace flexel

@@ -70,7 +70,7 @@ std::vector<Vec3> forces_at(const Load& load, const std::vector<LoadedPoint>& po
 
 void add_surface_load(const Load& load, const std::vector<std::uint32_t>& polygons, const Setting& setting,
                       std::vector<Vec3>& sum) {
-  const std::vector<SurfacePoint> points = surface_points(setting, polygons);
+  const std::vector<SurfacePoint> points = gathered_surface_points(setting, polygons);
   if (!(total_area(points) > 0))
     throw InputError(
         load.origin,
@@ -81,6 +81,7 @@ void add_surface_load(const Load& load, const std::vector<std::uint32_t>& polygo
     return;
   }
   std::vector<LoadedPoint> loaded;
+  loaded.reserve(points.size());
   for (const SurfacePoint& point : points)
     loaded.push_back({point.position, point.area_vector.norm(), point.area_vector.normalized()});
   const std::vector<Vec3> forces = forces_at(load, loaded);

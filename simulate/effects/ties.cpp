@@ -99,7 +99,7 @@ void Ties::make_link(Tie& tie, const Selected& selected, const Setting& setting)
                                  tie.name));
   std::vector<LoadedPoint> points;
   if (!selected.polygons.empty())
-    for (const SurfacePoint& point : surface_points(setting, selected.polygons))
+    for (const SurfacePoint& point : gathered_surface_points(setting, selected.polygons))
       points.push_back({point.position, point.area_vector.norm()});
   if (!selected.elements.empty()) {
     const std::vector<double> volume = element_volumes(setting);

@@ -16,9 +16,14 @@ namespace {
 
 using Vector = std::vector<Vec3>;
 
-// y += factor x
-void add(double factor, const Vector& x, Vector& y) {
-  parallel_for_each(x.size(), [&](std::size_t i) { y[i] += factor * x[i]; });
+// x += step direction, residual -= step image; returns the norm of the residual. In one go: these vectors are
+// larger than a cache.
+double advance(double step, const Vector& direction, const Vector& image, Vector& x, Vector& residual) {
+  return std::sqrt(parallel_sum<double>(x.size(), [&](std::size_t i) {
+    x[i] += step * direction[i];
+    residual[i] -= step * image[i];
+    return residual[i].squaredNorm();
+  }));
 }
 
 // direction = correction + beta direction
@@ -72,7 +77,7 @@ LinearResult conjugate_gradients(const LinearOperator& matrix, const Vector& b, 
   }
   Vector residual = b, correction, direction(b.size(), Vec3::Zero()), image;
   double rz = 0, norm = scale, checked = std::numeric_limits<double>::infinity();
-  bool restart = true;
+  bool restart = true, known = false;  // known: `norm` is that of b - A x
   while (result.iterations < max_iterations && std::isfinite(norm)) {
     preconditioner.apply(residual, correction);
     const double rz_before = rz;
@@ -87,9 +92,8 @@ LinearResult conjugate_gradients(const LinearOperator& matrix, const Vector& b, 
       if (result.indefinite && result.iterations == 0) x = direction;
       break;
     }
-    add(rz / curvature, direction, x);
-    add(-rz / curvature, image, residual);
-    norm = std::sqrt(dot(residual, residual));
+    norm = advance(rz / curvature, direction, image, x, residual);
+    known = false;
     ++result.iterations;
     if (progress) progress(result.iterations, norm / scale);
     if (norm > tolerance * scale) {
@@ -97,13 +101,14 @@ LinearResult conjugate_gradients(const LinearOperator& matrix, const Vector& b, 
       continue;
     }
     norm = true_residual(matrix, b, x, residual);
+    known = true;
     result.converged = norm <= tolerance * scale || norm <= rounding_level(matrix, x);
     // Another round only while it still helps: rounding sets a floor to the true residual.
     if (result.converged || norm > .5 * checked) break;
     checked = norm;
     restart = true;
   }
-  result.relative_residual = true_residual(matrix, b, x, residual) / scale;
+  result.relative_residual = (known ? norm : true_residual(matrix, b, x, residual)) / scale;
   return result;
 }
 

@@ -22,6 +22,22 @@ FLEXEL_INLINE Lanes widened(const float* from) {
   return __builtin_convertvector(value, Lanes);
 }
 
+FLEXEL_INLINE Lanes widened(const double* from) {
+  return load(from);
+}
+
+// Six sums side by side, one a column: each waits for itself alone.
+template <class Number>
+void row(const Number* blocks, const std::uint32_t* columns, std::size_t count, const double* x, double* to) {
+  Lanes sums[6] = {};
+  for (std::size_t t = 0; t < count; ++t) {
+    const double* from = x + 6 * std::size_t{columns[t]};
+    for (std::size_t c = 0; c < 6; ++c) sums[c] += from[c] * widened(blocks + 6 * (6 * t + c));
+  }
+  const Lanes sum = ((sums[0] + sums[1]) + (sums[2] + sums[3])) + (sums[4] + sums[5]);
+  for (std::size_t m = 0; m < 6; ++m) to[m] = sum[m];
+}
+
 template <std::size_t R>
 void products(const Product* list, std::size_t count) {
   for (const Product* each = list; each != list + count; ++each) {
@@ -74,7 +90,8 @@ void prolongation(const float* blocks, const std::uint32_t* columns, std::size_t
 
 const Table& FLEXEL_ISA() {
   static constexpr Table table = {
-      {&products<3>, &products<6>}, {&pairs<3>, &pairs<6>}, &restriction, &prolongation};
+      &row<float>,  &row<double>, {&products<3>, &products<6>}, {&pairs<3>, &pairs<6>},
+      &restriction, &prolongation};
   return table;
 }
 

@@ -1,8 +1,8 @@
 // The sums of small blocks that the Galerkin product and the transfers between two levels consist of, as
 // plain data; linear/kernel_galerkin.cpp is compiled once per instruction set (the reasons are in
 // simulate/time/kernel.h). R: unknowns of a fine node, 3 or 6. Blocks of P are transposed (6 x R),
-// column-major, and may be read two floats past their end. Rows of six are kept eight doubles wide, of which
-// the last two mean nothing.
+// column-major. Blocks of six rows may be read two numbers past their end. Rows of six are kept eight doubles
+// wide, of which the last two mean nothing.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -26,6 +26,12 @@ struct Pair {
 };
 
 struct Table {
+  // R = 6. One row of A x: sum (6) = sum over t of blocks[t] (column-major) times the entry columns[t] of x;
+  // in single and in double precision.
+  void (*row)(const float* blocks, const std::uint32_t* columns, std::size_t count, const double* x,
+              double* sum);
+  void (*row_of_doubles)(const double* blocks, const std::uint32_t* columns, std::size_t count,
+                         const double* x, double* sum);
   // For R = 3 and 6; one after the other.
   void (*products[2])(const Product* list, std::size_t count);
   void (*pairs[2])(const Pair* list, std::size_t count);

@@ -30,6 +30,7 @@ struct Level {
   using Vector = Eigen::Matrix<double, R, 1>;
   std::vector<Inverse> inverse_diagonal;  // (rows)
   double largest_eigenvalue = 0;          // of D^-1 A, estimated from below
+  std::vector<float> eigenvector;         // (rows x R) that the estimate is from; of elements only
   Chebyshev smoother;
   Transfer<R> transfer;
   mutable std::vector<double> rhs, x, next;  // (rows x R) work of one cycle
@@ -48,26 +49,24 @@ void for_each_product(const LinearOperator& matrix, const double* x, double* ima
   });
 }
 
-template <int R, class View, class Body>
-void for_each_product(const View& matrix, const double* x, double*, const Body& body) {
+// Blocks are read past their end: `values` has one more than there are.
+template <int R, class BlockType, class Body>
+void for_each_product(const MatrixView<BlockType>& matrix, const double* x, double*, const Body& body) {
+  static_assert(R == 6);
+  constexpr bool kFloat = std::is_same_v<typename BlockType::Scalar, float>;
+  const auto row = [] {
+    if constexpr (kFloat)
+      return galerkin_table().row;
+    else
+      return galerkin_table().row_of_doubles;
+  }();
   parallel_for_each(
       matrix.rows(),
       [&](std::size_t i) {
-        double sum[R] = {};
-        for (std::uint64_t q = matrix.offsets[i]; q < matrix.offsets[i + 1]; ++q) {
-          const auto* values = matrix.values[q].data();
-          const double* from = x + static_cast<std::size_t>(matrix.columns[q]) * R;
-          if constexpr (R == 3) {  // row major
-            for (int r = 0; r < R; ++r) {
-              sum[r] += double(values[3 * r]) * from[0] + double(values[3 * r + 1]) * from[1] +
-                        double(values[3 * r + 2]) * from[2];
-            }
-          } else {
-            for (int c = 0; c < R; ++c) {
-              for (int r = 0; r < R; ++r) sum[r] += double(values[R * c + r]) * from[c];
-            }
-          }
-        }
+        double sum[R];
+        const std::uint64_t first = matrix.offsets[i];
+        row(matrix.values[first].data(), matrix.columns.data() + first, matrix.offsets[i + 1] - first, x,
+            sum);
         body(i, Eigen::Map<const Eigen::Matrix<double, R, 1>>(sum));
       },
       kRowGrain);
@@ -96,10 +95,15 @@ template <int R>
   return static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-52 - 1;
 }
 
+// Where the estimate of the largest eigenvalue begins: anywhere, or at the eigenvector of a matrix that was
+// nearly the same, in a third of the steps.
+enum class Estimate { anew, onwards };
+
 // Inverts the diagonal blocks and estimates the largest eigenvalue of D^-1 A by power iteration.
-// `multiply(x, y)`: y = A x.
+// `multiply(x, y)`: y = A x. The level's work vectors are overwritten.
 template <int R, class BlockType, class Multiply>
-void prepare_smoother(const std::vector<BlockType>& diagonal, const Multiply& multiply, Level<R>& level) {
+void prepare_smoother(const std::vector<BlockType>& diagonal, const Multiply& multiply, Level<R>& level,
+                      Estimate estimate = Estimate::anew) {
   const std::size_t n = diagonal.size();
   double largest = 0;
   for (const BlockType& block : diagonal) largest = std::max(largest, block.diagonal().cwiseAbs().maxCoeff());
@@ -108,20 +112,29 @@ void prepare_smoother(const std::vector<BlockType>& diagonal, const Multiply& mu
     const Eigen::Matrix<double, R, R> block = diagonal[i];
     level.inverse_diagonal[i] = guarded_inverse<R>(block, 1e-14 * largest).template cast<float>();
   });
-  constexpr int kSteps = 12;
-  std::vector<double> v(n * R), w(n * R);
-  parallel_for_each(n * R, [&](std::size_t k) { v[k] = scattered(k); });
+  const bool onwards = estimate == Estimate::onwards && level.eigenvector.size() == n * R;
+  const int steps = onwards ? 4 : 12;
+  double* v = level.next.data();
+  double* w = (R == 3 ? level.image : level.x).data();
+  // Some of anything stays in it, should the stiffest motion have become another.
+  parallel_for_each(n * R, [&](std::size_t k) {
+    v[k] = onwards ? std::sqrt(double(n * R)) * level.eigenvector[k] + .1 * scattered(k) : scattered(k);
+  });
   level.largest_eigenvalue = 1;
-  for (int step = 0; step < kSteps; ++step) {
-    multiply(v.data(), w.data());
+  for (int step = 0; step < steps; ++step) {
+    multiply(v, w);
     parallel_for_each(n, [&](std::size_t i) {
-      entry<R>(w.data(), i) = times<R>(level.inverse_diagonal[i], entry<R>(w.data(), i));
+      entry<R>(w, i) = times<R>(level.inverse_diagonal[i], entry<R>(static_cast<const double*>(w), i));
     });
     const double before = parallel_sum<double>(n * R, [&](std::size_t k) { return v[k] * v[k]; });
     const double after = parallel_sum<double>(n * R, [&](std::size_t k) { return w[k] * w[k]; });
     if (!(after > 0) || !std::isfinite(after)) break;
     level.largest_eigenvalue = std::sqrt(after / before);
     parallel_for_each(n * R, [&](std::size_t k) { v[k] = w[k] / std::sqrt(after); });
+  }
+  if constexpr (R == 3) {
+    level.eigenvector.resize(n * R);
+    parallel_for_each(n * R, [&](std::size_t k) { level.eigenvector[k] = static_cast<float>(v[k]); });
   }
   level.smoother = chebyshev(1.1 * level.largest_eigenvalue);
 }

@@ -94,16 +94,16 @@ std::vector<std::pair<std::uint32_t, Mat3>> free_directions(const LinearOperator
 }
 
 // Returns the diagonal blocks.
-std::vector<Block> make_smoother(const LinearOperator& matrix, Level<3>& level) {
+std::vector<Block> make_smoother(const LinearOperator& matrix, Level<3>& level, Estimate estimate) {
   std::vector<Block> diagonal = matrix.diagonal();
   prepare_smoother<3>(
-      diagonal, [&](const double* x, double* y) { matrix.multiply(x, y); }, level);
+      diagonal, [&](const double* x, double* y) { matrix.multiply(x, y); }, level, estimate);
   return diagonal;
 }
 
 // Values of the prolongator, for the coarse matrix alone: the cycle applies it as RigidTransfer says.
 void refresh_transfer(const LinearOperator& matrix, RigidTransfer& rigid, Level<3>& level) {
-  rigid.restrain(free_directions(matrix, make_smoother(matrix, level), level));
+  rigid.restrain(free_directions(matrix, make_smoother(matrix, level, Estimate::anew), level));
   smooth_prolongator<3>(
       OperatorView(matrix), level.inverse_diagonal, smoothing_weight(level.largest_eigenvalue),
       rigid.aggregate_of(), [&](std::size_t i) { return rigid.at(i); }, level.transfer);
@@ -170,7 +170,7 @@ class Multigrid : public Preconditioner {
     if (coarse_.empty())
       refresh();
     else
-      (void)make_smoother(matrix_, fine_);
+      (void)make_smoother(matrix_, fine_, Estimate::onwards);
   }
 
   void refresh() override {

@@ -247,7 +247,8 @@ template <int R, class View>
   });
 }
 
-// One row of A P: blocks (R x kWidth), in the order of `columns`.
+// One row of A P: blocks (R x kWidth), in the order of `columns`. Of P^T (A P) the upper half is wanted, so
+// columns before the first of the row of P are left out.
 struct ProductRow {
   std::vector<std::uint32_t> columns;
   std::vector<double> values;
@@ -273,12 +274,13 @@ void product_rows(const View& matrix, const Transfer<R>& transfer, std::size_t b
       row.columns.clear();
       // A row that no aggregate reaches takes no part in P^T (A P).
       if (p.offsets[begin + r] == p.offsets[begin + r + 1]) continue;
+      const std::uint32_t least = p.columns[p.offsets[begin + r]];
       const std::uint64_t row_begin = matrix.offsets[begin + r], row_end = matrix.offsets[begin + r + 1];
       for (std::uint64_t q = row_begin; q < row_end; ++q) {
         const std::uint32_t k = matrix.columns[q];
         for (std::uint64_t s = p.offsets[k]; s < p.offsets[k + 1]; ++s) {
           std::uint32_t& at = slot[p.columns[s]];
-          if (at != kNoAggregate) continue;
+          if (at != kNoAggregate || p.columns[s] < least) continue;
           at = static_cast<std::uint32_t>(row.columns.size());
           row.columns.push_back(p.columns[s]);
         }
@@ -288,8 +290,9 @@ void product_rows(const View& matrix, const Transfer<R>& transfer, std::size_t b
       for (std::uint64_t q = row_begin; q < row_end; ++q) {
         const std::uint32_t k = matrix.columns[q];
         for (std::uint64_t s = p.offsets[k]; s < p.offsets[k + 1]; ++s)
-          products.push_back(
-              {blocks[q].data(), transfer.values[s].data(), row.values.data() + kBlock * slot[p.columns[s]]});
+          if (p.columns[s] >= least)
+            products.push_back({blocks[q].data(), transfer.values[s].data(),
+                                row.values.data() + kBlock * slot[p.columns[s]]});
       }
       add(products.data(), products.size());
       for (const std::uint32_t column : row.columns) slot[column] = kNoAggregate;
@@ -299,13 +302,15 @@ void product_rows(const View& matrix, const Transfer<R>& transfer, std::size_t b
 
 // Values of the coarse matrix P^T A P over `pattern`. Fine rows are taken in batches so that A P is never
 // stored whole; each coarse row adds its fine rows in ascending order, so the bits do not depend on the
-// threads. The lower half mirrors the upper.
+// threads. The lower half mirrors the upper. One block more than there are, zero: products read past the end.
 template <int R, class View>
 [[nodiscard]] std::vector<Square<6>> galerkin(const View& matrix, const Transfer<R>& transfer,
                                               const Pattern& pattern) {
-  constexpr std::size_t kBatch = 8192, kWidth = galerkin_kernel::kWidth, kBlock = 6 * kWidth;
+  // Some 25 MB of A P
+  constexpr std::size_t kBatch = R == 3 ? 8192 : 4096, kWidth = galerkin_kernel::kWidth, kBlock = 6 * kWidth;
   const auto add = galerkin_table().pairs[R / 6];
-  std::vector<Square<6>> values(pattern.columns.size(), Square<6>::Zero());
+  std::vector<Square<6>> values(pattern.columns.size() + 1);
+  parallel_for_each(values.size(), [&](std::size_t q) { values[q].setZero(); });
   std::vector<std::uint64_t> next(transfer.transposed_offsets.begin(), transfer.transposed_offsets.end() - 1);
   std::vector<ProductRow> product;
   for (std::size_t begin = 0; begin < matrix.rows(); begin += kBatch) {

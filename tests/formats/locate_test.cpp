@@ -82,5 +82,29 @@ TEST(Locate, NothingUnderASurfaceWithoutCells) {
   EXPECT_FALSE(locate_on_surface(body, 0, Vec3::Zero()).has_value());
 }
 
+// It tries the cell of the last point first: that must not show, whichever way the points go.
+TEST(Locate, ALocatorForManyPointsFindsWhatOneForEachFinds) {
+  std::mt19937_64 random(4);
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const Body body = test::random_body(seed);
+    for (std::size_t p = 0; p < body.surface.polygon_count(); ++p) {
+      const Lattice& lattice = body.parts[body.surface.polygon_part(p)].lattice;
+      SurfaceLocator locate(body, p);
+      Vec3 at(1, 1, 1);  // lattice coordinates; every third on faces of voxels
+      for (int step = 0; step < 300; ++step) {
+        at += Vec3(test::uniform(random, -.4, .4), test::uniform(random, -.4, .4),
+                   test::uniform(random, -.4, .4));
+        if (step % 3 == 0) at[step % 9 / 3] = std::round(at[step % 9 / 3]);
+        const auto one = locate_on_surface(body, p, lattice.to_world(at)),
+                   many = locate(lattice.to_world(at));
+        ASSERT_EQ(one.has_value(), many.has_value());
+        if (!one) continue;
+        EXPECT_EQ(one->cell, many->cell);
+        EXPECT_EQ(one->weights, many->weights);
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace flexel

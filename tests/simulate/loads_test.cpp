@@ -7,11 +7,13 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <numeric>
 
 #include "formats/error.h"
 #include "simulate/effects/load_distribution.h"
 #include "simulate/scene.h"
 #include "simulate/simulate.h"
+#include "simulate/surface_points.h"
 #include "tests/simulate/box_body.h"
 
 namespace flexel {
@@ -86,6 +88,49 @@ TEST(LoadDistribution, BearingPressureFallsWithTheCosine) {
   EXPECT_LT((sums(hole(7, 0.3), *bearing(hole(7, 0.3), Vec3(0, -5, 0))).force - Vec3(0, -5, 0)).norm(),
             1e-12);
   EXPECT_FALSE(bearing(points, Vec3(0, 0, 1)));  // along the axis
+}
+
+// Few points for many: the same area, the same first moments, the same weight at every element; and each
+// still lies where its weights say, so that what is statically equivalent at the points is so at the
+// elements.
+TEST(Loads, GatheredPointsSumUpToAllPoints) {
+  testing::BoxOptions options{.cells = {14, 12, 3}, .spacing = Vec3(.01, .012, .009)};
+  options.axes = Eigen::AngleAxisd(0.5, Vec3(1, 2, 0.5).normalized()).toRotationMatrix();
+  options.fill = [](int i, int j, int) { return i == 5 && j > 3 ? 0. : 1.; };  // points beside the matter
+  const Body body = testing::box_body(options);
+  const Setting setting{body, {}, {}, {}, {}, {}};
+  std::vector<std::uint32_t> polygons(body.surface.polygon_count());
+  std::iota(polygons.begin(), polygons.end(), 0u);
+  const std::vector<SurfacePoint> all = surface_points(setting, polygons);
+  const std::vector<SurfacePoint> few = gathered_surface_points(setting, polygons);
+  EXPECT_LT(10 * few.size(), all.size());
+  struct Sum {
+    Vec3 area = Vec3::Zero(), moment = Vec3::Zero();
+    std::vector<double> weights;
+  };
+  const auto sum = [&](const std::vector<SurfacePoint>& points) {
+    Sum result;
+    result.weights.assign(body.element_count(), 0);
+    for (const SurfacePoint& point : points) {
+      const double area = point.area_vector.norm();
+      result.area += point.area_vector.cwiseAbs();
+      result.moment += area * point.position;
+      for (std::size_t a = 0; a < point.at.count; ++a)
+        result.weights[point.at.elements[a]] += area * point.at.weights[a];
+    }
+    return result;
+  };
+  const Sum expected = sum(all), found = sum(few);
+  EXPECT_LT((found.area - expected.area).norm(), 1e-12 * expected.area.norm());
+  EXPECT_LT((found.moment - expected.moment).norm(), 1e-12 * expected.area.norm());
+  for (std::size_t e = 0; e < body.element_count(); ++e)
+    EXPECT_NEAR(found.weights[e], expected.weights[e], 1e-12 * expected.area.norm());
+  for (const SurfacePoint& point : few) {
+    Vec3 there = Vec3::Zero();
+    for (std::size_t a = 0; a < point.at.count; ++a)
+      there += point.at.weights[a] * body.rest[point.at.elements[a]];
+    EXPECT_LT((there - point.position).norm(), 1e-12);
+  }
 }
 
 struct LoadCase {
