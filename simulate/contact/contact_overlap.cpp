@@ -26,7 +26,8 @@ constexpr double kLookAt = 4;    // spacings, how deep is looked
 constexpr double kLetOut = 0.9;  // of the depth at which two surfaces do not feel one another any more
 constexpr double kFacing = 0.5;  // cosine from which surfaces face each other
 constexpr double kBeside = 1;    // spacings along a surface, within which what stands on it comes out with it
-constexpr double kSquashed = 0.05;  // of its volume: a cell below it is not looked into
+constexpr double kNearEnough = 1.5;  // spacings, from what faces it to a point in a cut cell
+constexpr double kSquashed = 0.05;   // of its volume: a cell below it is not looked into
 
 // m, that a point at `i` is behind the surface at `j`, along the mean of their normals as in pair_law.h.
 double behind(const ContactSide& i, const ContactSide& j) {
@@ -123,13 +124,15 @@ Contacts::Overlap Contacts::overlap(const std::array<std::uint32_t, 2>& parts, c
     return i == Vec3::Zero() || j == Vec3::Zero() ? 1 : -i.dot(j);
   };
   const Neighbours near = neighbours_within(at, kLookAt * widest_, [&](std::uint32_t a, std::uint32_t b) {
-    return a < of[0].size() && b >= of[0].size() && (in[a] || in[b]) && opposite(a, b) > -kFacing;
+    if (a >= of[0].size() || b < of[0].size() || opposite(a, b) < -kFacing) return false;
+    const bool close = opposite(a, b) > kFacing && (at[b] - at[a]).norm() < kNearEnough * widest_;
+    return in[a] || in[b] || close;
   });
   const auto for_each_way = [&](const auto& visit) {
     for (std::uint32_t a = 0; a < of[0].size(); ++a)
       for (const std::uint32_t b : near.of(a)) {
-        if (in[a]) visit(a, b);
-        if (in[b]) visit(b, a);
+        visit(a, b);
+        visit(b, a);
       }
   };
   struct Found {
@@ -146,7 +149,7 @@ Contacts::Overlap Contacts::overlap(const std::array<std::uint32_t, 2>& parts, c
   });
   for (Found& each : found) each.least = each.facing;
   for_each_way([&](std::uint32_t a, std::uint32_t b) {
-    if (!in[b] || opposite(a, b) > kFacing) return;
+    if (!in[a] || opposite(a, b) > kFacing) return;
     const ContactSide& on = sides[points[b]].at;
     const double depth = (on.position - at[a]).dot(on.normal);
     const Vec3 along = at[a] - on.position + depth * on.normal;

@@ -309,6 +309,15 @@ TEST(Contact, OverlapsDeeperThanContactFeelsAreRefusedEvenIfTheyAreToPart) {
   EXPECT_EQ(refusal_of_overlap(slab, turned(0.8), parting), "");
   EXPECT_EQ(refusal_of_overlap(low, block("b", {1, 1, 3}, Vec3(kSide, kSide, 2.2 * kSide)), parting), "");
   EXPECT_EQ(refusal_of_overlap(low, block("b", {3, 3, 3}, Vec3(0, 2.5 * kSide, 2.5 * kSide)), parting), "");
+  // the sides of what ends in a cut cell, which is not looked into, come out with that end
+  BoxOptions options{{3, 3, 3}, Vec3::Constant(kSide)};
+  options.name = "a";
+  options.fill = [](int, int, int k) { return k == 2 ? 0.9 : 1; };
+  Body cut = box_body(options);
+  for (Vec3& at : cut.surface.vertices) at.z() = std::min(at.z(), 2.9 * kSide);
+  EXPECT_EQ(refusal_of_overlap(cut, block("b", {3, 3, 3}, Vec3(0, 0, 2.5 * kSide)), parting), "");
+  EXPECT_NEAR(millimetres_in(refusal_of_overlap(cut, block("b", {3, 3, 3}, Vec3(0, 0, 2.5 * kSide)), 0)), 4,
+              1e-6);
   // and is not told to ask for what it asked for
   const std::string told = refusal_of_overlap(low, block("b", {3, 3, 3}, Vec3(0, 0, kSide)), parting);
   EXPECT_THAT(told, HasSubstr("larger cells: \"overlap\" = \"part\" lets out up to 9 mm"));
