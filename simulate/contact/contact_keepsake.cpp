@@ -1,6 +1,7 @@
 // What contact, friction and glue remember, from one body to the next that an event has made of it. Points
 // have other numbers there, so they are known by their part, place and normal at rest, a plane by -1 and its
-// number. A pair: both names, then what it remembers.
+// number. First the times when the parts joined, behind their number; then the pairs, both names and what
+// they remember.
 #include <algorithm>
 #include <array>
 #include <map>
@@ -27,9 +28,10 @@ PointName name_of(const ContactPoint& point) {
 }  // namespace
 
 std::vector<double> Contacts::keepsake() const {
-  std::vector<double> kept;
+  std::vector<double> kept{static_cast<double>(joined_.size())};
+  kept.insert(kept.end(), joined_.begin(), joined_.end());
   for (const Memory& memory : memory_) {
-    if (memory.standing == Standing::apart) continue;
+    if (memory.standing == Standing::apart && memory.inside == 0) continue;
     const std::uint64_t j = memory.key & 0xffffffff;
     const bool plane = j >= points_.size();
     const PointName one = name_of(points_[memory.key >> 32]);
@@ -51,8 +53,11 @@ void Contacts::take_over(const std::vector<double>& keepsake) {
   for (std::uint32_t p = 0; p < settings_.planes.size(); ++p)
     numbers.try_emplace({-1, static_cast<double>(p)}, static_cast<std::uint32_t>(points_.size() + p));
   memory_.clear();
-  begun_ = true;
-  for (std::size_t at = 0; at + kOfPair <= keepsake.size(); at += kOfPair) {
+  if (keepsake.empty()) return;
+  const double* pairs = keepsake.data() + 1 + static_cast<std::size_t>(keepsake[0]);
+  joined_.assign(keepsake.data() + 1, pairs);
+  for (std::size_t at = static_cast<std::size_t>(pairs - keepsake.data()); at + kOfPair <= keepsake.size();
+       at += kOfPair) {
     const double* from = keepsake.data() + at;
     std::array<std::uint64_t, 2> ends{};
     bool there = true;

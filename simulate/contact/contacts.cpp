@@ -146,8 +146,7 @@ ContactSide Contacts::other_side(const Pair& pair) const {
 
 // The hooks of one step ask for the same state several times.
 bool Contacts::seen(const State& state) {
-  bool same =
-      seen_builds_ == builds_ && share_inside(state) == share_ && seen_.size() == near_elements_.size();
+  bool same = seen_builds_ == builds_ && shares(state) == shares_ && seen_.size() == near_elements_.size();
   for (std::size_t e = 0; same && e < seen_.size(); ++e)
     same = seen_[e] == state.displacement[near_elements_[e]];
   if (same) return true;
@@ -161,11 +160,12 @@ void Contacts::look(const State& state) {
   refresh(state);
   if (seen(state)) return;
   ++looks_;
-  const double share = share_inside(state);
   sides_.resize(near_.size());
   parallel_for_each(
       near_.size(), [&](std::size_t n) { sides_[n] = side(near_[n], state); }, 512);
-  if (!std::exchange(begun_, true)) find_inside(state);
+  if (joined_.size() < body_.parts.size()) find_inside(state);
+  const std::vector<double> before = std::exchange(shares_, shares(state));
+  std::vector<std::uint8_t> comes(shares_.empty() ? 0 : pairs_.size(), 0);
   parallel_for_each(
       pairs_.size(),
       [&](std::size_t p) {
@@ -175,19 +175,31 @@ void Contacts::look(const State& state) {
           memory_[p].standing = Standing::apart;
           return;
         }
-        PairState now = state_of(p, share * memory_[p].inside);
-        stand(p, now);
-        if (now.near)
-          states_[p] = now;
-        else if (is_close_[p])
-          states_[p] = {};
-        is_close_[p] = now.near;
+        const PairState now = state_of(p, allowed(p));
+        const bool entering = now.near && !now.deep && now.gap < 0 && memory_[p].standing == Standing::apart;
+        if (entering && !comes.empty() && memory_[p].inside == 0 && shares_[later_part(pairs_[p])] > 0)
+          comes[p] = 1;
+        else
+          take_state(p, now);
       },
       512);
+  std::vector<std::uint32_t> coming;
+  for (std::uint32_t p = 0; p < comes.size(); ++p)
+    if (comes[p]) coming.push_back(p);
+  if (!coming.empty()) let_in(coming);
   close_.clear();
   for (std::uint32_t p = 0; p < pairs_.size(); ++p)
     if (is_close_[p]) close_.push_back(p);
-  book_letting_out(share);
+  book_letting_out(before);
+}
+
+void Contacts::take_state(std::size_t pair, PairState now) {
+  stand(pair, now);
+  if (now.near)
+    states_[pair] = now;
+  else if (is_close_[pair])
+    states_[pair] = {};
+  is_close_[pair] = now.near;
 }
 
 PairState Contacts::state_of(std::size_t pair, double allowed) const {
@@ -296,11 +308,12 @@ std::vector<double> Contacts::memory() const {
                              promised_,
                              looked_at_ == builds_ ? 1.0 : 0.0,
                              fresh_ ? 1.0 : 0.0,
-                             begun_ ? 1.0 : 0.0,
-                             share_,
-                             pressing_,
                              put_in_,
+                             static_cast<double>(joined_.size()),
+                             static_cast<double>(shares_.size()),
                              static_cast<double>(memory_.size())};
+  for (const std::vector<double>* each : {&joined_, &shares_, &pressing_})
+    memory.insert(memory.end(), each->begin(), each->end());
   for (const Memory& entry : memory_) {
     memory.push_back(static_cast<double>(entry.key >> 32));
     memory.push_back(static_cast<double>(entry.key & 0xffffffff));
@@ -314,12 +327,22 @@ std::vector<double> Contacts::memory() const {
 }
 
 void Contacts::restore(const std::vector<double>& memory) {
-  constexpr std::size_t kHead = 9, kEntry = 8;
-  const std::size_t entries = memory.size() < kHead ? 0 : static_cast<std::size_t>(memory[8]);
-  if (memory.size() != kHead + kEntry * entries + 3 * built_at_.size())
+  constexpr std::size_t kHead = 8, kEntry = 8;
+  const auto count = [&](std::size_t at) {
+    return memory.size() < kHead ? 0 : static_cast<std::size_t>(memory[at]);
+  };
+  const std::size_t joined = count(5), shares = count(6), entries = count(7);
+  if (memory.size() != kHead + joined + 2 * shares + kEntry * entries + 3 * built_at_.size())
     throw InputError("the checkpoint's contacts are not those of its scene");
-  memory_.resize(entries);
   const double* from = memory.data() + kHead;
+  const auto take = [&](std::size_t values) {
+    from += values;
+    return std::vector<double>(from - values, from);
+  };
+  joined_ = take(joined);
+  shares_ = take(shares);
+  pressing_ = take(shares);
+  memory_.resize(entries);
   for (Memory& entry : memory_) {
     entry.key = static_cast<std::uint64_t>(from[0]) << 32 | static_cast<std::uint64_t>(from[1]);
     entry.stretch = Vec3(from[2], from[3], from[4]);
@@ -336,10 +359,7 @@ void Contacts::restore(const std::vector<double>& memory) {
   }
   built_ = false;
   fresh_ = memory[3] == 1;
-  begun_ = memory[4] == 1;
-  share_ = memory[5];
-  pressing_ = memory[6];
-  put_in_ = memory[7];
+  put_in_ = memory[4];
   if (memory[0] == 0) return;
   build(then);
   promised_ = memory[1];

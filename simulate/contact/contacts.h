@@ -45,7 +45,7 @@ class Contacts {
   void take_over(const std::vector<double>& keepsake);
 
   // Throws InputError: parts that are inside each other, or a part inside a plane, deeper than contact bears
-  // or lets out.
+  // or lets out. Only at the first look, and in one after an event for the parts that have joined.
   void refuse_overlap(const State& state) const;
   // J, that letting out has put into the contacts since this was asked last, beside the work of their forces.
   [[nodiscard]] double put_in(const State& state);
@@ -122,15 +122,30 @@ class Contacts {
   [[nodiscard]] Side side(std::uint32_t point, const State& state) const;
   void look(const State& state);
   void stand(std::size_t pair, PairState& now);
+  void take_state(std::size_t pair, PairState now);
   [[nodiscard]] bool out_of_reach(const Pair& pair) const;
   bool seen(const State& state);
   [[nodiscard]] ContactSide other_side(const Pair& pair) const;
   [[nodiscard]] PairState state_of(std::size_t pair, double allowed) const;
   void spread(const State& state, const std::vector<Total>& totals, std::vector<Vec3>& forces);
   // contact_overlap.cpp
-  [[nodiscard]] double share_inside(const State& state) const;
+  struct Overlap {
+    double depth = 0, most = 0;  // m: how deep, how deep it may be to be let out; 0: none
+    bool over = false;           // deeper than looked
+  };
+  [[nodiscard]] std::vector<std::uint8_t> inside(const std::vector<std::uint32_t>& points,
+                                                 std::uint32_t other, const std::vector<Side>& sides,
+                                                 const State& state) const;
+  [[nodiscard]] Overlap overlap(const std::array<std::uint32_t, 2>& parts, const Box& common,
+                                const std::vector<Side>& sides, const State& state) const;
+  // contact_parting.cpp
+  [[nodiscard]] std::vector<double> shares(const State& state) const;
+  [[nodiscard]] double allowed(std::size_t pair) const;
+  [[nodiscard]] std::uint32_t later_part(const Pair& pair) const;
+  [[nodiscard]] std::uint64_t other_of(const Pair& pair) const;
   void find_inside(const State& state);
-  void book_letting_out(double share);
+  void let_in(const std::vector<std::uint32_t>& pairs);
+  void book_letting_out(const std::vector<double>& before);
   // contact_losses.cpp
   struct Motion {  // of a near point: its velocity [m/s] and that of the matter around it, dv/dx [1/s]
     Vec3 velocity = Vec3::Zero();
@@ -185,16 +200,20 @@ class Contacts {
     Vec3 stretch = Vec3::Zero();  // m, of the spring along the surface that resists sliding
     double stuck = kFree;         // m, the gap at which what sticks pulls nothing; kFree: it does not stick
     Standing standing = Standing::apart;
-    double inside = 0;  // m, that they began in each other
+    double inside = 0;  // m, that they began in each other: a share of it they may still be
   };
   std::vector<Memory> memory_;             // (pairs_); before the first list what was taken over
   std::vector<std::uint32_t> remembered_;  // close_ of the last remember(), in the list
   std::uint64_t remembered_builds_ = 0;    //   of this number
   bool fresh_ = true;                      // nothing has been remembered yet
-  bool begun_ = false;                     // what begins inside something else has been looked for
-  double share_ = 1;     // of Memory::inside that is allowed for in the state last looked at
-  double put_in_ = 0;    // J
-  double pressing_ = 0;  // J a share, there: pressures times Memory::inside
+  // s, when each part joined: those that are looked at already. What begins inside something else has been
+  // looked for among them.
+  std::vector<double> joined_;
+  // (parts) of Memory::inside that is allowed for, in the state last looked at, of pairs whose later part it
+  // is; empty before the first look of these contacts, or where nothing is let out.
+  std::vector<double> shares_;
+  std::vector<double> pressing_;  // (parts) J a share, there: pressures times Memory::inside
+  double put_in_ = 0;             // J
   std::vector<Felt> felt_;
   std::vector<double> mass_;  // (elements) kg
   struct Whole {              // of a rigid part

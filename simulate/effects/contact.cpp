@@ -214,7 +214,7 @@ void Contact::add_forces(const State& state, std::vector<Vec3>& forces) const {
 }
 
 double Contact::added_frequency(const State& state, const std::vector<double>&) const {
-  if (state.time && *state.time == 0) contacts_->refuse_overlap(state);
+  if (state.time) contacts_->refuse_overlap(state);
   return contacts_->frequency(state);
 }
 

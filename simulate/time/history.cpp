@@ -207,6 +207,18 @@ void History::enter(const std::vector<Vec3>& moved, const std::vector<Vec3>& dam
   ledger_.accounts[ledger_.account("numerical", Account::Kind::dissipation)].energy -= numerical;
 }
 
+// What an event changed of what is stored, it gave or took: the sum of what stores lack stays what it was.
+void History::book_stored_by_event() {
+  double lacking = ledger_.unstored_now - ledger_.unstored;
+  std::optional<std::size_t> store;
+  for (std::size_t p = 0; p < passes_.size(); ++p) {
+    if (passes_[p].book != Book::stored || forces_[p].empty()) continue;
+    store = own_[p];
+    lacking += ledger_.accounts[own_[p]].energy + stored_[p];
+  }
+  if (store) ledger_.accounts[*store].energy -= lacking;
+}
+
 void History::add_row(const State& state, const std::vector<Vec3>& supports) {
   const Momenta sum = parallel_sum<Momenta>(mass_.size(), [&](std::size_t e) {
     const Vec3 mean = 0.5 * (velocity_[e] + state.velocity[e]);
@@ -220,6 +232,7 @@ void History::add_row(const State& state, const std::vector<Vec3>& supports) {
   row.angular = sum.angular;
   Energies& now = row.energies;
   now = {sum.kinetic, elastic_, potential_, 0, 0, 0};
+  if (ledger_.changed && !ledger_.rows.empty()) book_stored_by_event();
   double unstored = 0;
   for (std::size_t p = 0; p < passes_.size(); ++p) {
     if (passes_[p].book != Book::stored || forces_[p].empty()) continue;
@@ -231,8 +244,6 @@ void History::add_row(const State& state, const std::vector<Vec3>& supports) {
     }
     unstored -= ledger_.accounts[own_[p]].energy + stored_[p];
   }
-  // an event may change what a store holds
-  if (ledger_.changed && !ledger_.rows.empty()) ledger_.unstored = ledger_.unstored_now - unstored;
   ledger_.unstored_now = ledger_.unstored + unstored;
   ledger_.worst_unstored = std::max(ledger_.worst_unstored, std::abs(ledger_.unstored_now));
   double book = now.kinetic + now.elastic + now.potential;

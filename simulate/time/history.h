@@ -102,6 +102,7 @@ class History {
   [[nodiscard]] Ledger take_ledger() { return std::move(ledger_); }
 
  private:
+  void book_stored_by_event();
   void add_row(const State& state, const std::vector<Vec3>& supports);
 
   const Setting& setting_;

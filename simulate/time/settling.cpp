@@ -50,6 +50,8 @@ Settling::Settling(Scene& scene, const Body& body) {
   }
   for (Manipulator& each : scene.get<RigidParts>().manipulators)
     for (double& key : each.path.time) key *= whole > 0 ? ramp_ / whole : 1;
+  // what begins inside something else is out when the rest is looked for
+  if (double& parting = scene.get<Contact>().parting; parting > 0) parting = ramp_;
   scene.run.time = ramp_ + kMostTravels * sound;
   summary_.tolerance = scene.run.tolerance_given ? scene.run.tolerance : kSettledTolerance;
 }

@@ -7,8 +7,8 @@
 // (F, F+ the forces before and after a way of v dt, M the masses): fast swings die first, and then it is that
 // of the slowest one left. What falls freely is not damped.
 //
-// Loads and moves grow evenly, and tools take their paths, in the first ten times that sound takes through
-// the body; the run then has 3000 such times to come to rest.
+// Loads and moves grow evenly, tools take their paths, and what begins inside something else is let out, in
+// the first ten times that sound takes through the body; the run then has 3000 such times to come to rest.
 #pragma once
 #include <functional>
 #include <vector>

@@ -94,6 +94,11 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
   for (const Event& event : scene_.events)
     if (event.prepare)
       for (std::string& name : event.prepare()) scene_.coming_parts.push_back(std::move(name));
+  if (const Contact::Parameters& contact = scene_.get<Contact>(); contact.on && contact.parting > duration_)
+    progress_.warn(
+        fmt::format("[contact] \"overlap_time\" is {:.4g} s, the run {:.4g} s: what begins inside "
+                    "something else is not out at its end",
+                    contact.parting, duration_));
   beginning_.settled = settled_displacement(body);
   beginning_.bonding_parts = body.parts.size();
   if (!options.series.empty()) series_.emplace(options.series, options.compress);

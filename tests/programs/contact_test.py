@@ -62,6 +62,11 @@ def test_refusals():
     scene("bond.toml", 'material = "rubber"\n[[bond]]\nparts = ["low", "hihg"]\n[run]\ntime = "1 ms"\n')
     expect_error(run("flexel-simulate", "bond.toml", "body.vtu", "-o", "o.vtu"), "flexel-simulate", 'bond.toml:2: [[bond]] names part "hihg", which the body does not have; did you mean "high"')
 
+    scene("short.toml", 'material = "rubber"\n[contact]\noverlap = "part"\noverlap_time = "20 ms"\n[run]\ntime = "1 ms"\n')
+    short = run("flexel-simulate", "short.toml", "body.vtu", "-o", "o.vtu")
+    expect_ok(short)
+    expect('"overlap_time" is 0.02 s, the run 0.001 s' in short.err, f"no word of a run that ends too early: {short.err}")
+
 
 if __name__ == "__main__":
     main(globals())

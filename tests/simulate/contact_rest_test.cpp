@@ -1,12 +1,10 @@
 // Contact over long times and across events: a block that rests, memory that an event does not take, blocks
-// that lie flush or inside each other, balls of model `paper`.
-#include <gmock/gmock.h>
+// that lie flush, balls of model `paper`.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <map>
 
-#include "formats/error.h"
 #include "simulate/scene_selection.h"
 #include "tests/simulate/centre_body.h"
 #include "tests/simulate/contact_case.h"
@@ -15,7 +13,6 @@ namespace flexel {
 namespace {
 
 using namespace flexel::testing;
-using ::testing::HasSubstr;
 
 // A block on a slope of 0.3 rad with mu = 0.4, above tan 0.3 = 0.31; its way down is the probe's.
 struct Slope {
@@ -166,77 +163,6 @@ TEST(Contact, ABlockThatSlidesOutFromUnderAnotherIsNotThrown) {
     before = energy;
   }
   EXPECT_EQ(before, 0);
-}
-
-TEST(Contact, PartsThatBeginInsideEachOtherAreRefused) {
-  const auto refusal = [](const Vec3& origin, double floor) {
-    Body body = block("a", {3, 3, 3}, Vec3::Zero());
-    append(body, block("b", {3, 3, 3}, origin));
-    Scene scene = scene_of(1e-4);
-    scene.get<Contact>().planes.emplace_back();
-    scene.get<Contact>().planes[0].name = "floor";
-    scene.get<Contact>().planes[0].point = Vec3(0, 0, floor);
-    try {
-      (void)testing::run_timed(std::move(body), scene);
-    } catch (const InputError& error) {
-      return std::string(error.what());
-    }
-    return std::string();
-  };
-  EXPECT_EQ(refusal(Vec3(0, 0, 3 * kSide), 0), "");
-  EXPECT_EQ(refusal(Vec3(3 * kSide, 0.004, 0), 0), "");
-  EXPECT_THAT(refusal(Vec3(0, 0, 2.9 * kSide), 0), HasSubstr("parts \"a\" and \"b\" overlap by 1 mm"));
-  EXPECT_THAT(refusal(Vec3(0.003, 0.002, 1.5 * kSide), 0), HasSubstr("overlap"));
-  EXPECT_THAT(refusal(Vec3(0, 0, 3 * kSide), 0.2 * kSide), HasSubstr("inside floor"));
-}
-
-TEST(Contact, PartsThatBeginInsideEachOtherAreLetOutGently) {
-  Body body = block("a", {2, 2, 2}, Vec3::Zero());
-  append(body, block("b", {2, 2, 2}, Vec3(0.002, 0, 1.6 * kSide)));
-  Scene scene = scene_of(0.012);
-  scene.get<Contact>().parting = 0.008;
-  const TimedCase made = testing::run_timed(std::move(body), scene);
-  double low = -1, high = 1, fastest = 0;
-  const Column& velocity = made.body.element_columns.at("velocity");
-  for (std::uint32_t e = 0; e < made.body.element_count(); ++e) {
-    const double z = made.body.position[e].z();
-    if (e < made.body.parts[0].element_end)
-      low = std::max(low, z);
-    else
-      high = std::min(high, z);
-    fastest = std::max(fastest, std::abs(velocity.values[3 * e + 2]));
-  }
-  EXPECT_GT(high - low, 0);
-  EXPECT_LT(fastest, 0.05 * std::sqrt(kGum.young / kGum.density));
-  // all of their energy is the work of the letting out, and has been booked as such
-  const double work = made.history.column("overlap work").back();
-  EXPECT_GT(work, 0);
-  EXPECT_NEAR(made.history.column("kinetic").back() + made.history.column("elastic").back(), work,
-              0.01 * work);
-  expect_books_close(made.result);
-  EXPECT_LT(book(made.result, "worst_contact_error"), 0.01 * work);
-  for (const char* axis : {"momentum x", "momentum y", "momentum z"})
-    EXPECT_LT(std::abs(made.history.column(axis).back()), 1e-12) << axis;
-}
-
-TEST(Contact, APartThatBeginsInsideAPlaneIsLetOutGently) {
-  Scene scene = scene_of(0.02);
-  scene.get<Contact>().planes.push_back(plane_at(0.4 * kSide));
-  scene.get<Contact>().parting = 0.01;
-  const TimedCase made = testing::run_timed(block("a", {2, 2, 2}), scene);
-  double low = 1;
-  for (const Vec3& at : made.body.position) low = std::min(low, at.z());
-  EXPECT_GT(low, 0.4 * kSide);
-  EXPECT_LT(low, 1.5 * kSide);  // not thrown
-  expect_books_close(made.result);
-}
-
-TEST(Contact, OverlapsDeeperThanContactFeelsAreRefusedEvenIfTheyAreToPart) {
-  Body body = block("a", {3, 3, 3}, Vec3::Zero());
-  append(body, block("b", {3, 3, 3}, Vec3(0, 0, 1.5 * kSide)));
-  Scene scene = scene_of(0.01);
-  scene.get<Contact>().parting = 0.01;
-  EXPECT_THROW((void)testing::run_timed(std::move(body), scene), InputError);
 }
 
 Body balls(const std::string& name, std::array<int, 3> voxels, const Vec3& origin, double turned = 0) {
