@@ -20,8 +20,10 @@ inline void prefer_large_pages([[maybe_unused]] void* begin, [[maybe_unused]] st
 #ifdef MADV_HUGEPAGE
   constexpr std::uintptr_t kLarge = std::uintptr_t{1} << 21;
   const auto at = reinterpret_cast<std::uintptr_t>(begin);
-  const std::uintptr_t first = (at + kLarge - 1) / kLarge * kLarge, last = (at + bytes) / kLarge * kLarge;
-  if (first < last) madvise(reinterpret_cast<void*>(first), last - first, MADV_HUGEPAGE);  // advice only
+  const std::uintptr_t skipped = (at + kLarge - 1) / kLarge * kLarge - at;
+  if (skipped + kLarge > bytes) return;
+  madvise(static_cast<std::byte*>(begin) + skipped, (bytes - skipped) / kLarge * kLarge,
+          MADV_HUGEPAGE);  // advice only
 #endif
 }
 

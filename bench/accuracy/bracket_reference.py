@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """The reference of the L-bracket in calculix.py: meshes that are ever finer, and finer still where the stress has no bound.
 
     bench/accuracy/bracket_reference.py [--sizes MM[,MM...]]

@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """Flexel beside CalculiX on the same parts: error, error bar, seconds, memory.
 
     PATH=build/release/bin:$PATH bench/accuracy/calculix.py [--quick] [--parts DIR] [--list] [CASE...]

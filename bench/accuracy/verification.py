@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """What Flexel's answers are off by, measured and written as docs/verification.md with its figures.
 
     PATH=build/release/bin:$PATH bench/accuracy/verification.py [--quick] [--keep FOLDER] [--leave-out CASE] [-o FILE]

@@ -58,7 +58,8 @@ std::vector<double> ladder_of_sizes(double wall, double spacing, double cells_th
   return sizes;
 }
 
-Sweep::Sweep(SceneFacts facts, Configuration first, std::vector<double> sizes, double budget, int cores)
+Sweep::Sweep(SceneFacts facts, Configuration first, const std::vector<double>& sizes, double budget,
+             int cores)
     : facts_(std::move(facts)), first_(std::move(first)), budget_(budget), cores_(cores) {
   for (const double size : sizes) rungs_.emplace_back().size = size;
 }

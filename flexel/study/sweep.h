@@ -49,7 +49,7 @@ class Sweep {
  public:
   // `first`: the configuration that the user would have without choosing; its size is not used. `sizes`: the
   // ladder. `budget` [s] decides what the middle is.
-  Sweep(SceneFacts facts, Configuration first, std::vector<double> sizes, double budget, int cores);
+  Sweep(SceneFacts facts, Configuration first, const std::vector<double>& sizes, double budget, int cores);
 
   // CalculiX beside it: edges of tetrahedra [m] from coarse to fine, of a part of `volume` [m^3].
   void set_against(std::vector<double> edges, double volume);

@@ -118,6 +118,7 @@ Contacts::Overlap Contacts::overlap(const std::array<std::uint32_t, 2>& parts, c
   if (std::count(in.begin(), in.end(), 1) == 0) return {};
 
   std::vector<Vec3> at;
+  at.reserve(points.size());
   for (const std::uint32_t i : points) at.push_back(sides[i].at.position);
   const auto opposite = [&](std::uint32_t a, std::uint32_t b) {  // cosine; of a ball 1
     const Vec3 &i = sides[points[a]].at.normal, &j = sides[points[b]].at.normal;
