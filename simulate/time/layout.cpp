@@ -158,9 +158,12 @@ void LayoutBuilder::add_block(std::span<const std::uint32_t> cells, bool is_run)
   if (remembers_) layout_.block_cells.push_back(lanes);
 }
 
+// A block that is a run adds both faces of two neighbours at once: they have to share the elements between
+// them, which cells numbered in a row beside a gap do not.
 bool LayoutBuilder::continues(std::uint32_t cell, std::uint32_t next) const {
+  const auto &here = body_.cell_elements[cell], &there = body_.cell_elements[next];
   for (std::size_t a = 0; a < 8; ++a)
-    if (local_[body_.cell_elements[next][a]] != local_[body_.cell_elements[cell][a]] + 1) return false;
+    if (local_[there[a]] != local_[here[a]] + 1 || here[a | 1] != there[a & ~std::size_t{1}]) return false;
   return true;
 }
 
