@@ -12,6 +12,7 @@
 #include "simulate/merge.h"
 #include "simulate/scene.h"
 #include "tests/simulate/box_body.h"
+#include "tests/simulate/numbered_body.h"
 #include "tests/simulate/scene_case.h"
 
 namespace flexel {
@@ -151,27 +152,9 @@ TEST_P(CellStiffnessOf, HasTheSameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(one, four);
 }
 
-// Cells that share no element, numbered so that each corner's elements are in a row all the same: the lowest
-// corners first, then the next.
 TEST(CellStiffness, CellsBesideGapsAreNoRun) {
-  constexpr std::uint32_t kCells = 16;
-  BoxOptions options;
-  options.name = "near";
-  options.cells = {2 * kCells, 1, 1};
-  options.spacing = Vec3::Constant(0.1);
-  options.fill = [](int i, int, int) { return i % 2 == 0 ? 1.0 : 0.0; };
-  const Body apart = box_body(options);
-  ASSERT_EQ(apart.cell_count(), kCells);
-  ASSERT_EQ(apart.element_count(), 8 * kCells);
-  Body body = apart;
-  for (std::uint32_t c = 0; c < kCells; ++c)
-    for (std::uint32_t a = 0; a < 8; ++a) {
-      const std::uint32_t from = apart.cell_elements[c][a], to = a * kCells + c;
-      body.cell_elements[c][a] = to;
-      body.lattice_index[to] = apart.lattice_index[from];
-      body.rest[to] = apart.rest[from];
-      body.position[to] = apart.position[from];
-    }
+  const Body body = testing::cells_beside_gaps(16, 0.1);
+  ASSERT_EQ(body.element_count(), 8 * body.cell_count());
   const Scene scene = held_scene();
   const Setting setting{body, materials_of_parts(scene, body), {}, {}, {}, {}};
   Mechanics stored(setting, {}, StiffnessStorage::stored), made(setting, {}, StiffnessStorage::made);
