@@ -8,6 +8,7 @@
 #include <charconv>
 #include <sstream>
 
+#include "formats/area_vector.h"
 #include "formats/error.h"
 #include "formats/units.h"
 
@@ -98,11 +99,7 @@ Vec3 inward_normal(const Selection& selection, const Body& body) {
   Vec3 sum = Vec3::Zero();
   double area = 0;
   for (const std::uint32_t p : selected.polygons) {
-    const auto corners = surface.polygon(p);
-    const Vec3& first = surface.vertices[corners[0]];
-    Vec3 vector = Vec3::Zero();
-    for (std::size_t c = 1; c + 1 < corners.size(); ++c)
-      vector += 0.5 * (surface.vertices[corners[c]] - first).cross(surface.vertices[corners[c + 1]] - first);
+    const Vec3 vector = area_vector(surface.vertices, surface.polygon(p));
     sum += vector;
     area += vector.norm();
   }

@@ -8,6 +8,9 @@
 
 #include <Eigen/Dense>
 #include <cmath>
+#include <span>
+
+#include "formats/area_vector.h"
 
 namespace flexel {
 namespace {
@@ -132,14 +135,6 @@ FaceShape shape_of(const Surface& surface, const Sums& sums, const std::vector<s
 }
 
 }  // namespace
-
-Vec3 area_vector(const std::vector<Vec3>& vertices, std::span<const std::uint32_t> corners) {
-  Vec3 sum = Vec3::Zero();
-  const Vec3& first = vertices[corners[0]];
-  for (std::size_t c = 1; c + 1 < corners.size(); ++c)
-    sum += 0.5 * (vertices[corners[c]] - first).cross(vertices[corners[c + 1]] - first);
-  return sum;
-}
 
 std::vector<FaceShape> face_shapes(const Surface& surface) {
   const std::vector<Sums> sums = sum_up(surface);

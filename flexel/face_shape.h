@@ -2,7 +2,6 @@
 #pragma once
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -22,10 +21,6 @@ struct FaceShape {
   double radius = 0;               // round: m
   bool hollow = false;             // round: the matter is outside (a hole)
 };
-
-// Area times unit normal of a polygon [m^2]; of one that is not flat, that of its triangles from the first
-// corner.
-[[nodiscard]] Vec3 area_vector(const std::vector<Vec3>& vertices, std::span<const std::uint32_t> corners);
 
 // (faces) A face is flat when its normals differ by less than 0.2 degrees, round when they stand square to an
 // axis within a degree and its corners lie within 1 % of a radius from it.

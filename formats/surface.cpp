@@ -10,6 +10,7 @@
 #include <set>
 #include <utility>
 
+#include "formats/area_vector.h"
 #include "formats/error.h"
 #include "formats/parallel.h"
 
@@ -23,9 +24,7 @@ using Outline = std::vector<Eigen::Vector2d>;
 
 Outline flatten(const Surface& surface, std::span<const std::uint32_t> polygon) {
   const Vec3 origin = surface.vertices[polygon[0]];
-  Vec3 area = Vec3::Zero();
-  for (std::size_t i = 1; i + 1 < polygon.size(); ++i)
-    area += (surface.vertices[polygon[i]] - origin).cross(surface.vertices[polygon[i + 1]] - origin);
+  const Vec3 area = area_vector(surface.vertices, polygon);
   // Dropping the largest component of the area vector keeps every orientation without a rotation's rounding.
   Eigen::Index dropped = 0;
   area.cwiseAbs().maxCoeff(&dropped);

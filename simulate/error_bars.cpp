@@ -75,7 +75,7 @@ class CoarseRuns {
     found_.push_back(answers(result));
     found_.back().moved.push_back(body.position[most] - body.rest[most]);
     if (left_) *left_ -= result.seconds;
-    options_.explain = false;
+    options_.explain = options_.estimate = false;
     options_.failed_output.clear();
   }
 

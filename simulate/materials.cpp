@@ -88,16 +88,16 @@ const std::vector<Material>& material_library() {
       with_damping(
           with_friction(
               library_entry("steel", 210e9, 0.30, 7850, {235e6, 360e6, 0.26},
-                            "S235JR. EN 1993-1-1, 3.2.6, read at eurocodeapplied.com; strengths EN 10025-2 "
-                            "(3 to 16 mm), read at ilongma.com; not read: friction EN 1993-1-8, table 3.7, "
-                            "class D, damping EN 1991-1-4, F.2 (welded stack, 0.012 / 2 pi)"),
+                            "S235JR. EN 1993-1-1, 3.2.6, read at eurocodeapplied.com, strengths EN 10025-2 "
+                            "(3 to 16 mm) at ilongma.com, friction EN 1090-2, table 18, class D, at "
+                            "scribd.com; not read: damping EN 1991-1-4, F.2 (welded stack, 0.012 / 2 pi; "
+                            "help.scia.net has the prestandard's 0.015)"),
               0.2),
           0.0019),
-      with_friction(
-          library_entry("steel S355", 210e9, 0.30, 7850, {355e6, 470e6, 0.22},
-                        "S355JR. As steel; strengths EN 10025-2 (3 to 16 mm), read at balingsteel.com; not "
-                        "read: friction EN 1993-1-8, table 3.7, class D"),
-          0.2),
+      with_friction(library_entry("steel S355", 210e9, 0.30, 7850, {355e6, 470e6, 0.22},
+                                  "S355JR. As steel; strengths EN 10025-2 (3 to 16 mm), read at "
+                                  "balingsteel.com, friction EN 1090-2, table 18, class D, at scribd.com"),
+                    0.2),
       library_entry(
           "steel 42CrMo4", 210e9, 0.30, 7850, {900e6, 1100e6, 0.10},
           "Quenched and tempered, to 16 mm. Strengths EN 10083, read in Saarstahl's data sheet; elastic "
@@ -106,31 +106,28 @@ const std::vector<Material>& material_library() {
                     "EN 10270-1 (E 206, G 81.5 GPa, hence poisson), read at mollificiomodenese.it"),
       library_entry(
           "stainless", 200e9, 0.30, 7900, {210e6, 520e6, 0.45},
-          "1.4301, plate. E read at makeitfrom.com; not read: EN 1993-1-4, 2.1.3 and table 2.1, density EN "
-          "10088-1, elongation EN 10088-2"),
-      library_entry("stainless 316", 200e9, 0.30, 8000, {220e6, 520e6, 0.45},
+          "1.4301, plate. E, poisson (from G 77 GPa) read at makeitfrom.com, least strengths, elongation "
+          "(hot rolled) at wixsteel.com, density at agst.de"),
+      library_entry("stainless 316", 200e9, 0.30, 8000, {220e6, 520e6, 0.40},
                     "1.4401. E read at woite-edelstahl.com, density and least strengths at metalsupplies.com "
-                    "(there 193 GPa, 40 %); not read: poisson EN 1993-1-4, elongation EN 10088-2 (plate)"),
+                    "(there 193 GPa); poisson as 1.4301"),
       library_entry("cast iron", 110e9, 0.26, 7200, {0, 250e6, 0},
                     "EN-GJL-250. EN 1561 (E 103 to 118 GPa), read at sn-castiron.nl"),
+      library_entry("ductile iron", 169e9, 0.28, 7100, {250e6, 400e6, 0.15},
+                    "EN-GJS-400-15. EN 1563, read at iron-foundry.com, poisson at sn-castiron.nl"),
       library_entry(
-          "ductile iron", 169e9, 0.275, 7100, {250e6, 400e6, 0.15},
-          "EN-GJS-400-15. EN 1563, read at iron-foundry.com; not read: poisson (sn-castiron.nl has 0.28)"),
-      library_entry(
-          "aluminium 6061", 68.9e9, 0.33, 2700, {240e6, 290e6, 0.10},
-          "T6. Aluminum Association, typical, read at glemco.com (there strengths of 276 and 310 MPa, 12 "
-          "%); not read: ASTM B209, sheet, for the least strengths given here"),
-      library_entry(
-          "aluminium 6082", 70e9, 0.30, 2700, {250e6, 290e6, 0.08},
-          "T6. EN 755-2 (extruded, to 5 mm), read at top-factories.com; not read: poisson EN 1999-1-1, "
-          "3.2.5"),
-      library_entry("aluminium 5083", 70e9, 0.30, 2700, {125e6, 275e6, 0.11},
-                    "O/H111. Strengths EN 485-2 (to 50 mm), read at euralliage.com; not read: the others EN "
-                    "1999-1-1, 3.2.5 (suppliers have 72 GPa, 2650 kg/m3)"),
-      library_entry(
-          "aluminium 2024", 73.1e9, 0.33, 2780, {345e6, 483e6, 0.18},
-          "T3, typical. E (10600 ksi) read at substech.com, density and strength at matweb.com, yield and "
-          "elongation at princeton.edu; not read: poisson"),
+          "aluminium 6061", 68.9e9, 0.33, 2700, {241e6, 262e6, 0.10},
+          "T6, extruded, from 6.4 mm. Strengths ASTM B221 (35, 38 ksi), read at h2abc.com; the others "
+          "Aluminum Association, typical, at glemco.com (there strengths of 276 and 310 MPa, 12 %)"),
+      library_entry("aluminium 6082", 70e9, 0.33, 2700, {250e6, 290e6, 0.08},
+                    "T6. EN 755-2 (extruded, to 5 mm), read at top-factories.com, poisson (6000 series) at "
+                    "mfgrobots.com"),
+      library_entry("aluminium 5083", 71e9, 0.33, 2660, {125e6, 275e6, 0.11},
+                    "O/H111. Strengths EN 485-2 (to 50 mm), read at euralliage.com; E, density (Aluminum "
+                    "Association, typical), poisson (estimated) at ratnamsteels.com"),
+      library_entry("aluminium 2024", 73.1e9, 0.33, 2780, {345e6, 483e6, 0.18},
+                    "T3, typical. E (10600 ksi) read at substech.com, density and strength at matweb.com, "
+                    "yield and elongation at princeton.edu, poisson (T361) at makeitfrom.com"),
       library_entry(
           "aluminium 7075", 71.7e9, 0.33, 2810, {503e6, 572e6, 0.11},
           "T6, typical. E (10400 ksi), density, strengths read at substech.com, poisson at wikipedia.org"),
@@ -151,47 +148,52 @@ const std::vector<Material>& material_library() {
                     "C51000. E, density read in Olin Brass's data sheet, poisson at makeitfrom.com"),
       library_entry("tungsten", 411e9, 0.28, 19300, {},
                     "Pure. CRC Handbook and Cardarelli 2018, read at matmake.com"),
-      library_entry(
-          "PLA", 3.25e9, 0.36, 1240, {},
-          "Printed, XY. Not read: Ultimaker's data sheet, poisson (additive.tools has 3 to 4 GPa, 1220 to "
-          "1260 kg/m3)"),
+      library_entry("PLA", 3.25e9, 0.36, 1240, {},
+                    "Printed. E (data sheets' example) read at filamentspecs.com, poisson, density in "
+                    "FreeCAD's library (additive.tools has 3 to 4 GPa)"),
       library_entry("ABS", 2.0e9, 0.37, 1040, {38e6, 0, 0.5},
-                    "SUSTAABS data sheet (ISO 527), read at studylib.net; not read: poisson (0.394 at "
-                    "themechanicalengineeringhandbook.com)"),
+                    "SUSTAABS data sheet (ISO 527), read at studylib.net, poisson in FreeCAD's library "
+                    "(0.394 at themechanicalengineeringhandbook.com)"),
+      library_entry("PETG", 1.94e9, 0.38, 1270, {},
+                    "Printed. E (data sheets' example) read at filamentspecs.com, density in UltiMaker's "
+                    "fdm_materials (github.com); not read: poisson"),
       library_entry(
-          "PETG", 1.9e9, 0.38, 1270, {},
-          "Printed, XY. Not read: Ultimaker's data sheet, poisson (additive.tools has 2 to 3 GPa, 1250 to "
-          "1290 kg/m3)"),
-      library_entry("PA12", 1.65e9, 0.39, 930, {0, 48e6, 0.18},
-                    "Laser sintered, EOS PA 2200. Strength, elongation read at layerx3d.in, density at "
-                    "additive.tools; not read: E (renato.design has 1.7 to 1.9 GPa), poisson"),
-      library_entry("polycarbonate", 2.4e9, 0.38, 1200, {65e6, 0, 0},
-                    "Makrolon 2405. Covestro's data sheet (ISO 527), read at scribd.com; not read: poisson "
-                    "(0.37 at themechanicalengineeringhandbook.com)"),
+          "PA12", 1.65e9, 0.408, 930, {0, 48e6, 0.18},
+          "Laser sintered, EOS PA 2200. Strength, elongation read at layerx3d.in, density at additive.tools, "
+          "poisson (Duraform PA, dense) at nowpublishers.com (Rapid Prototyping J. 14/5); not read: E "
+          "(renato.design has 1.7 to 1.9 GPa)"),
+      library_entry("polycarbonate", 2.4e9, 0.37, 1200, {65e6, 0, 0},
+                    "Makrolon 2405. Covestro's data sheet (ISO 527), read at scribd.com, poisson at "
+                    "themechanicalengineeringhandbook.com"),
+      library_entry("POM", 3.1e9, 0.37, 1420, {70e6, 0, 0},
+                    "Delrin 500P. DuPont's figures (ISO 527), read at a dealer's (zjxxg.cn), poisson "
+                    "(MatWeb's) in FreeCAD's library"),
+      library_entry("PMMA", 2.86e9, 0.38, 1190, {0, 75e6, 0.045},
+                    "Cast; read at designerdata.nl, poisson (MatWeb's) in FreeCAD's library"),
+      library_entry("PEEK", 4.2e9, 0.40, 1310, {116e6, 116e6, 0.15},
+                    "TECAPEEK natural. Ensinger's data sheet (ISO 527), quoted, read at github.com "
+                    "(TempestOS-Core); not read: poisson"),
       library_entry(
-          "POM", 3.1e9, 0.37, 1420, {70e6, 0, 0},
-          "Delrin 500P. DuPont's figures (ISO 527), read at a dealer's (zjxxg.cn); not read: poisson"),
-      library_entry("PMMA", 3.3e9, 0.37, 1190, {0, 80e6, 0.055},
-                    "Cast. Not read: Plexiglas GS data sheet (designerdata.nl has 2.9 GPa, 75 MPa, 4.5 %)"),
-      library_entry("PEEK", 4.0e9, 0.40, 1300, {98e6, 0, 0.45},
-                    "Not read: Victrex 450G data sheet (ISO 527), poisson"),
-      library_entry("rubber", 1.2e6, 0.49, 930, {},
-                    "Natural. Not read: Treloar 1975 (G near 0.4 MPa; matweb.com has 0.5 MPa, 950 kg/m3); "
-                    "nearly incompressible, poisson taken as 0.49"),
+          "rubber", 1.2e6, 0.49, 930, {},
+          "Natural, soft. E chosen in the range 1 to 5 MPa, read at polymers.netzsch.com (matweb.com has G "
+          "0.5 MPa), density at thermopedia.com; nearly incompressible, poisson taken as 0.49"),
       library_entry(
-          "silicone", 2.5e6, 0.48, 1150, {},
+          "silicone", 2.5e6, 0.48, 1170, {},
           "Gent 1958's relation at 50 Shore A, computed (Ruess's, read at josephborrello.com, gives 3.4 "
-          "MPa); not read: density; nearly incompressible, poisson taken as 0.48"),
+          "MPa); density (Silastic 55U) read at archive.org; nearly incompressible, poisson taken as 0.48"),
       library_entry(
           "TPU", 19.3e6, 0.45, 1180, {},
           "80 Shore A. BASF Elastollan C78A data sheet (E 2800 psi), read at scribd.com; poisson taken as "
           "0.45"),
       with_damping(
           with_friction(
-              library_entry("concrete", 33e9, 0.20, 2400, {0, 2.9e6, 0},
-                            "C30/37. EN 1992-1-1, table 3.1 (strength: mean axial tension), read at "
-                            "buildinghow.com; not read: poisson 3.1.3, density EN 1991-1-1, A.1, friction "
-                            "EN 1992-1-1, 6.2.5 (smooth), damping EN 1991-1-4, F.2 (building, 0.10 / 2 pi)"),
+              library_entry(
+                  "concrete", 33e9, 0.20, 2400, {0, 2.9e6, 0},
+                  "C30/37. EN 1992-1-1, table 3.1 (strength: mean axial tension), read at "
+                  "buildinghow.com, poisson 3.1.3 in BHoM's datasets (github.com), density (C25) "
+                  "in FreeCAD's library; not read: friction EN 1992-1-1, 6.2.5 (smooth; hindawi.com has "
+                  "0.64), damping EN 1991-1-4, F.2 (building, 0.10 / 2 pi; help.scia.net has the "
+                  "prestandard's 0.08)"),
               0.6),
           0.016),
       library_entry("glass", 70e9, 0.20, 2500, {0, 45e6, 0},

@@ -15,6 +15,7 @@
 #include <charconv>
 #include <optional>
 
+#include "formats/area_vector.h"
 #include "formats/error.h"
 #include "formats/program.h"
 #include "formats/units.h"
@@ -35,14 +36,6 @@ std::optional<Side> side_of(const std::string& name) {
   if (end == "min") return Side{name[0] - 'x', -1};
   if (end == "max") return Side{name[0] - 'x', 1};
   return std::nullopt;
-}
-
-Vec3 area_vector(const Surface& surface, std::span<const std::uint32_t> corners) {
-  Vec3 area = Vec3::Zero();
-  const Vec3& first = surface.vertices[corners[0]];
-  for (std::size_t c = 1; c + 1 < corners.size(); ++c)
-    area += 0.5 * (surface.vertices[corners[c]] - first).cross(surface.vertices[corners[c + 1]] - first);
-  return area;
 }
 
 // Polygons of the parts for which `part` is empty or equal, at the extreme of those parts.
@@ -68,7 +61,7 @@ std::vector<std::uint32_t> polygons_of_side(const Surface& surface, Side side,
       if (!(whole ? std::all_of(corners.begin(), corners.end(), reaches)
                   : std::any_of(corners.begin(), corners.end(), reaches)))
         continue;
-      const Vec3 area = area_vector(surface, corners);
+      const Vec3 area = area_vector(surface.vertices, corners);
       const double facing = inside_out ? std::abs(area[side.axis]) : side.sign * area[side.axis];
       if (area.norm() > 0 && facing >= least_cosine * area.norm())
         found.push_back(static_cast<std::uint32_t>(p));

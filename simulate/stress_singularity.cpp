@@ -7,6 +7,8 @@
 #include <map>
 #include <numbers>
 
+#include "formats/area_vector.h"
+
 namespace flexel {
 namespace {
 
@@ -21,12 +23,7 @@ double distance_to_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
 }
 
 Vec3 facet_normal(const Surface& surface, std::size_t polygon) {
-  const auto corners = surface.polygon(polygon);
-  const Vec3& origin = surface.vertices[corners[0]];
-  Vec3 area = Vec3::Zero();
-  for (std::size_t i = 1; i + 1 < corners.size(); ++i)
-    area += (surface.vertices[corners[i]] - origin).cross(surface.vertices[corners[i + 1]] - origin);
-  return area.normalized();
+  return area_vector(surface.vertices, surface.polygon(polygon)).normalized();
 }
 
 using Ends = std::array<std::array<double, 3>, 2>;

@@ -3,19 +3,19 @@
 
     PATH=build/release/bin:$PATH bench/accuracy/calculix.py [--quick] [--parts DIR] [--list] [CASE...]
 
-Each part is made by gmsh (OpenCASCADE) or is a STEP file of ../shared/parts (left out, and said so, where that folder is not there; it is
-held and drawn by 10 N along (1, 1, 1) at the flat faces at the two ends of its longest side). CalculiX gets its mesh of quadratic tetrahedra (C3D10) at three sizes, Flexel the STEP file at
-two spacings, both one thread and the same faces, material and load. What is compared is the mean displacement of a face, or that of a
-point. The reference is Lame's solution for the tube, bracket_reference.py's for the L-bracket, otherwise CalculiX's three values extrapolated
-(Aitken), or the finest where they do not approach a limit. Seconds are the processor's, which other jobs change little, and hold everything from the file with the part or
-mesh to the result; those of gmsh's meshing stand beside CalculiX's. --quick leaves out the finest mesh and spacing. Needs ccx and gmsh (tools/setup --tests).
+Each part is made by gmsh (OpenCASCADE) or is a STEP file of ../shared/parts (left out, and said so, where that folder is not there; it is held
+and drawn by 10 N along (1, 1, 1) at the flat faces at the two ends of its longest side). CalculiX gets its mesh of quadratic
+tetrahedra (C3D10) at three sizes, of a STEP file with curved edges but where those fold an element; Flexel the STEP file at two spacings, both
+one thread and the same faces, material and load. What is compared is the mean displacement of a face, or that of a point. The
+reference is Lame's solution for the tube, reference.py's for the L-bracket and the STEP files, otherwise CalculiX's three values extrapolated (Aitken),
+or the finest where they do not approach a limit. Seconds are the processor's, which other jobs change little, and hold everything from the file with the part or mesh
+to the result; those of gmsh's meshing stand beside CalculiX's. --quick leaves out the finest mesh and spacing. Needs ccx and gmsh (tools/setup --tests).
 """
 
 import json
 import math
 import os
 import pathlib
-import re
 import subprocess
 import sys
 import tempfile
@@ -23,8 +23,7 @@ import tempfile
 import numpy as np
 
 from end_faces import end_faces
-
-TOLERANCE = 1e-6  # mm, a node lies on a face
+from gmsh_mesh import Mesh, cad_face, cylinder, measured, plane
 
 
 def turned(angles):
@@ -35,16 +34,8 @@ def turned(angles):
     return about_z @ about_x
 
 
-def plane(axis, value):
-    return lambda p: np.abs(p[:, axis] - value) < TOLERANCE
-
-
-def cylinder(radius):
-    return lambda p: np.abs(np.hypot(p[:, 0], p[:, 1]) - radius) < 1e-3
-
-
 class Case:
-    """Lengths in mm before `turn`. faces: name -> (nodes of it, its middle). fix: [(face, axes)]. load: (face, kind, value), N, N m or
+    """Lengths in mm before `turn`. faces: name -> (triangles of it, its middle). fix: [(face, axes)]. load: (face, kind, value), N, N m or
     MPa. asked: a face, or a point. align: Flexel's lattice to the part or not. step: the part's file, where it has one; `geometry` then
     merges it."""
 
@@ -64,7 +55,7 @@ def beam(poisson, turn=None, align="snap"):
                 (12.5, 8, 5), (25 / 4, 25 / 8), poisson, turn, align=align)
 
 
-BRACKET = 15.969e-3  # mm, the limit that bracket_reference.py prints
+BRACKET, FORK, FEATURETYPE = 15.97e-3, 6.56e-3, 0.3324e-3  # mm, limits that reference.py prints
 
 
 def bracket():
@@ -104,31 +95,16 @@ BooleanDifference(3) = { Volume{1}; Delete; }{ Volume{2}; Delete; };"""
 PARTS = pathlib.Path(__file__).resolve().parents[2] / "../shared/parts"
 
 
-def on_face(face):
-    """Nodes on the plane of a flat face of `flexel info`."""
-    middle, normal = 1e3 * np.array(face["centroid"]), np.array(face["normal"])
-    return lambda p: np.abs((p - middle) @ normal) < 1e-4
-
-
-def real_part(name, sizes, spacings):
-    """A STEP part, held and drawn at its ends. Only faces that are alone in their plane are taken: gmsh's are known by their plane."""
+def real_part(name, sizes, spacings, reference):
+    """A STEP part, held and drawn at its ends."""
     step = PARTS / name
     if not step.exists():
         return None
-    info = json.loads(subprocess.run(["flexel", "info", step, "--json"], check=True, capture_output=True, text=True).stdout)
-    (solid,) = info["files"][0]["parts"]
-    flat = [face for face in solid["faces"] if face["kind"] == "flat"]
-
-    def alone(face):
-        normal = np.array(face["normal"])
-        return sum(abs(np.dot(normal, other["normal"])) > 1 - 1e-6 and
-                   abs(np.dot(normal, np.subtract(other["centroid"], face["centroid"]))) < 1e-6 for other in flat) == 1
-
-    held, end = end_faces(solid, alone)
-    faces = {each: (on_face(face), 1e3 * np.array(face["centroid"])) for each, face in (("held", held), ("end", end))}
+    solid = solid_of(step)
+    faces = {each: (cad_face(face), 1e3 * np.array(face["centroid"])) for each, face in zip(("held", "end"), end_faces(solid))}
     force = (10 / math.sqrt(3),) * 3
-    # Straight edges: curved ones turn elements inside out at small fillets.
-    return Case(f'Merge "{step.resolve()}"; Mesh.SecondOrderLinear = 1;', faces, [("held", "xyz")], ("end", "force", force), "end", sizes, spacings, step=step)
+    return Case(f'Merge "{step.resolve()}";', faces, [("held", "xyz")], ("end", "force", force), "end", sizes, spacings, reference=reference,
+                step=step)
 
 
 CASES = {
@@ -143,82 +119,12 @@ CASES = {
     "plate with a hole": plate,
     "bar twisted": torsion,
     "thick tube": tube,
-    "fork (STEP)": lambda: real_part("lower_leg_structure_fork.STEP", (3, 2, 1.4), (0.5, 0.35)),
-    "featuretype (STEP)": lambda: real_part("featuretype.STEP", (8, 5.5, 4), (2, 1.4)),
+    "fork (STEP)": lambda: real_part("lower_leg_structure_fork.STEP", (2, 1.4, 1), (0.5, 0.25), FORK),
+    "featuretype (STEP)": lambda: real_part("featuretype.STEP", (8, 5.5, 4), (2, 1.4), FEATURETYPE),
 }
 
 
-def measured(command, **options):
-    """Processor seconds and MB of a process."""
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, **options)
-    text = process.stderr.read().decode(errors="replace")
-    _, status, usage = os.wait4(process.pid, 0)
-    if status != 0:
-        raise RuntimeError(f"{' '.join(map(str, command))}: {text[-400:]}")
-    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1000
-
-
 # CalculiX
-
-
-def read_mesh(path):
-    """Nodes by number, tetrahedra of ten and triangles of six, from gmsh's .inp."""
-    nodes, solids, faces = {}, [], []
-    into = None
-    for line in path.read_text().splitlines():
-        if line.startswith("*"):
-            upper = line.upper()
-            into = "node" if upper.startswith("*NODE") else "C3D10" if "C3D10" in upper else "CPS6" if "CPS6" in upper else None
-            rest = []
-            continue
-        values = [value for value in line.replace(",", " ").split()]
-        if into == "node":
-            nodes[int(values[0])] = [float(value) for value in values[1:4]]
-        elif into:
-            rest += [int(value) for value in values]
-            want = 11 if into == "C3D10" else 7
-            if len(rest) >= want:
-                (solids if into == "C3D10" else faces).append(rest[1:want])
-                rest = []
-    return nodes, solids, faces
-
-
-class Mesh:
-    def __init__(self, case, folder, size):
-        geo = folder / "part.geo"
-        turn = ""
-        if case.angles:
-            x, z = case.angles
-            turn = (f"Rotate {{ {{1, 0, 0}}, {{0, 0, 0}}, {x} * Pi / 180 }} {{ Volume{{:}}; }}\n"
-                    f"Rotate {{ {{0, 0, 1}}, {{0, 0, 0}}, {z} * Pi / 180 }} {{ Volume{{:}}; }}\n")
-        geo.write_text(f'SetFactory("OpenCASCADE");\n{case.geometry}\n{turn}Mesh.SaveAll = 1; Mesh.CharacteristicLengthMax = {size};\n'
-                       f"Mesh.ElementOrder = 2; Mesh.HighOrderOptimize = {0 if case.step else 1};\n")
-        self.seconds, _ = measured(["gmsh", geo, "-3", "-format", "inp", "-o", folder / "mesh.inp", "-v", "1"])
-        found, self.solids, triangles = read_mesh(folder / "mesh.inp")
-        used = sorted({node for solid in self.solids for node in solid})
-        self.number = used
-        self.place = {node: i for i, node in enumerate(used)}
-        self.points = np.array([found[node] for node in used])
-        self.rest = self.points @ case.turn  # turned back
-        self.triangles = np.array([[self.place[node] for node in triangle] for triangle in triangles])
-
-    def triangles_on(self, holds):
-        on = holds(self.rest)
-        return self.triangles[on[self.triangles].all(axis=1)]
-
-    def areas(self, triangles):
-        """Area vectors, outward."""
-        a, b, c = (self.rest[triangles[:, i]] for i in range(3))
-        area = 0.5 * np.cross(b - a, c - a)
-        return area
-
-    def weights(self, triangles):
-        """Of the mean over a face: a third of each triangle's area at its middle nodes."""
-        weights = np.zeros(len(self.points))
-        area = np.linalg.norm(self.areas(triangles), axis=1)
-        for i in range(3, 6):
-            np.add.at(weights, triangles[:, i], area / 3)
-        return weights
 
 
 def nodal_loads(case, mesh):
@@ -254,7 +160,7 @@ def calculix(case, folder, size):
             out.write(f"{i + 1}," + ",".join(str(mesh.place[node] + 1) for node in solid) + "\n")
         out.write(f"*MATERIAL,NAME=M\n*ELASTIC\n{YOUNG},{case.poisson}\n*SOLID SECTION,ELSET=E,MATERIAL=M\n*BOUNDARY\n")
         for face, axes in case.fix:
-            for i in np.flatnonzero(case.faces[face][0](mesh.rest)):
+            for i in np.unique(mesh.triangles_on(case.faces[face][0])):
                 for axis in axes:
                     out.write(f"{i + 1},{'xyz'.index(axis) + 1},{'xyz'.index(axis) + 1}\n")
         out.write("*STEP\n*STATIC\n*CLOAD\n")
@@ -278,12 +184,17 @@ def calculix(case, folder, size):
 # Flexel
 
 
+def solid_of(step):
+    """The only part of a STEP file, as `flexel info` has it."""
+    info = json.loads(subprocess.run(["flexel", "info", step, "--json"], check=True, capture_output=True, text=True).stdout)
+    (solid,) = info["files"][0]["parts"]
+    return solid
+
+
 def face_names(case, step):
     """The faces of the part as Flexel numbers them, by their middles."""
-    text = subprocess.run(["flexel", "info", step], check=True, capture_output=True, text=True).stdout
-    found = {name: np.array([float(value) for value in middle.split(",")])
-             for name, middle in re.findall(r"^\s+(\S+/\d+)\s+[\d.]+\s+\(([^)]*)\)", text, re.M)}
-    return {name: min(found, key=lambda each, at=case.turn @ np.array(middle, float): np.linalg.norm(found[each] - at))
+    faces = solid_of(step)["faces"]
+    return {name: min(faces, key=lambda face, at=case.turn @ np.array(middle, float): np.linalg.norm(1e3 * np.array(face["centroid"]) - at))["selection"]
             for name, (_, middle) in case.faces.items()}
 
 

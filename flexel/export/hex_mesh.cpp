@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "flexel/export/mesh.h"
-#include "flexel/face_shape.h"
+#include "formats/area_vector.h"
 #include "formats/units.h"
 #include "simulate/cells.h"
 

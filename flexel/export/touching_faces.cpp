@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "flexel/export/analysis.h"
-#include "flexel/face_shape.h"
+#include "formats/area_vector.h"
 #include "formats/distance.h"
 
 namespace flexel {

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "formats/area_vector.h"
 #include "formats/disjoint_sets.h"
 #include "formats/parallel.h"
 
@@ -15,10 +16,6 @@ namespace {
 
 constexpr double kCrease = 30 * std::numbers::pi / 180;
 constexpr float kSmooth = 0.819f;  // cosine of 35 degrees
-
-Vec3 area_vector(const std::vector<Vec3>& vertices, const std::array<std::uint32_t, 3>& c) {
-  return (vertices[c[1]] - vertices[c[0]]).cross(vertices[c[2]] - vertices[c[0]]);
-}
 
 // Which way triangles t and u, that share edge `i` of t, run it: the same way when one of them is flipped.
 bool flipped(const MeshTopology& mesh, std::size_t t, std::size_t i, std::uint32_t u) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "formats/area_vector.h"
 #include "tests/formats/import_help.h"
 
 namespace flexel::test {
@@ -21,12 +22,6 @@ double longest_edge(const Surface& surface) {
   return longest;
 }
 
-Vec3 polygon_area_vector(const Surface& surface, std::size_t p) {
-  const auto c = surface.polygon(p);
-  return 0.5 * (surface.vertices[c[1]] - surface.vertices[c[0]])
-                   .cross(surface.vertices[c[2]] - surface.vertices[c[0]]);
-}
-
 struct FaceSum {
   double area = 0;
   Vec3 vector = Vec3::Zero();
@@ -35,8 +30,8 @@ struct FaceSum {
 std::vector<FaceSum> face_sums(const Surface& surface) {
   std::vector<FaceSum> sums(surface.faces.size());
   for (std::size_t p = 0; p < surface.polygon_count(); ++p) {
-    sums[surface.polygon_face[p]].area += polygon_area_vector(surface, p).norm();
-    sums[surface.polygon_face[p]].vector += polygon_area_vector(surface, p);
+    sums[surface.polygon_face[p]].area += area_vector(surface.vertices, surface.polygon(p)).norm();
+    sums[surface.polygon_face[p]].vector += area_vector(surface.vertices, surface.polygon(p));
   }
   return sums;
 }

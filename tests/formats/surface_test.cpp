@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 
+#include "formats/area_vector.h"
 #include "formats/error.h"
 
 namespace flexel {
@@ -25,12 +26,6 @@ Surface one_polygon(const std::vector<Vec3>& outline) {
   return surface;
 }
 
-Vec3 area_vector(const Surface& surface, const std::array<std::uint32_t, 3>& t) {
-  return (surface.vertices[t[1]] - surface.vertices[t[0]])
-             .cross(surface.vertices[t[2]] - surface.vertices[t[0]]) /
-         2;
-}
-
 // All triangles of a plane simple polygon turn the same way and add up to its area: that leaves no overlap
 // and no gap.
 void expect_exact_cover(const std::vector<Vec3>& outline, double area) {
@@ -40,8 +35,8 @@ void expect_exact_cover(const std::vector<Vec3>& outline, double area) {
   Vec3 sum = Vec3::Zero();
   double absolute = 0;
   for (const auto& t : triangles.corners) {
-    sum += area_vector(surface, t);
-    absolute += area_vector(surface, t).norm();
+    sum += area_vector(surface.vertices, t);
+    absolute += area_vector(surface.vertices, t).norm();
   }
   EXPECT_NEAR(sum.norm(), area, 1e-12 * area);
   EXPECT_NEAR(absolute, area, 1e-12 * area);
@@ -78,7 +73,7 @@ TEST(Triangulate, CoversConvexAndConcavePolygonsExactlyInAnyPose) {
 
 TEST(Triangulate, ACornerOnAStraightEdgeGivesNoTriangleWithoutArea) {
   const Surface surface = one_polygon({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0}});
-  for (const auto& t : triangulate(surface).corners) EXPECT_GT(area_vector(surface, t).z(), 0.1);
+  for (const auto& t : triangulate(surface).corners) EXPECT_GT(area_vector(surface.vertices, t).z(), 0.1);
 }
 
 TEST(Triangulate, PolygonsWithoutAreaOrCrossingThemselvesStillGiveTheirTriangles) {

@@ -223,23 +223,30 @@ TEST(Pieces, LeavesNearerThanASpacingKeepToTheirOwnElements) {
   }
 }
 
-TEST(Seams, VerticesAtOnePositionMoveAsOne) {
-  // A quad strip whose quads share no vertex numbers, as in an OBJ with texture seams, across lattice planes.
+// A deformed block with quads along x and y that share no vertex numbers, as in an OBJ with texture seams.
+// first: m, their lowest corner; side: m, of each.
+Body block_under_loose_quads(const Vec3& first, double side) {
   Body body = test::block(6, 4, 4, 0.1, Placement::corner);
   body.surface = {};
   std::vector<Vec3> vertices;
   std::vector<std::vector<std::uint32_t>> quads;
   for (int i = 0; i < 12; ++i)
     for (int j = 0; j < 8; ++j) {
-      const auto first = static_cast<std::uint32_t>(vertices.size());
+      const auto corner = static_cast<std::uint32_t>(vertices.size());
       for (const auto& [a, b] : {std::pair{0, 0}, {1, 0}, {1, 1}, {0, 1}})
-        vertices.emplace_back(0.05 * (i + a), 0.05 * (j + b), 0.4);
-      quads.push_back({first, first + 1, first + 2, first + 3});
+        vertices.emplace_back(first + side * Vec3(i + a, j + b, 0));
+      quads.push_back({corner, corner + 1, corner + 2, corner + 3});
     }
   test::add_surface(body, vertices, quads);
   test::deform(body, [](const Vec3& x) -> Vec3 {
     return {x.x() + x.y() * x.y(), x.y() + x.z() * x.x(), x.z()};
   });
+  return body;
+}
+
+TEST(Seams, VerticesAtOnePositionMoveAsOne) {  // across the lattice's planes
+  const Body body = block_under_loose_quads(Vec3(0, 0, 0.4), 0.05);
+  const std::vector<Vec3>& vertices = body.surface.vertices;
   for (const MapMethod method : test::kEveryMethod) {
     const MapResult result = map_quietly(body, method);
     std::size_t pairs = 0;
@@ -256,26 +263,13 @@ TEST(Seams, VerticesAtOnePositionMoveAsOne) {
 TEST(Seams, APolygonThatNamesTheWrongCellHoldsItsVerticesLikeThoseAtTheirPositions) {
   // Off the lattice's planes, so that nearly every vertex finds its voxel by itself; a few polygons name a
   // cell far away, and their vertices go by what the others at their positions find.
-  Body body = test::block(6, 4, 4, 0.1, Placement::corner);
-  body.surface = {};
-  std::vector<Vec3> vertices;
-  std::vector<std::vector<std::uint32_t>> quads;
-  for (int i = 0; i < 12; ++i)
-    for (int j = 0; j < 8; ++j) {
-      const auto first = static_cast<std::uint32_t>(vertices.size());
-      for (const auto& [a, b] : {std::pair{0, 0}, {1, 0}, {1, 1}, {0, 1}})
-        vertices.emplace_back(0.013 + 0.045 * (i + a), 0.013 + 0.045 * (j + b), 0.337);
-      quads.push_back({first, first + 1, first + 2, first + 3});
-    }
-  test::add_surface(body, vertices, quads);
-  test::deform(body, [](const Vec3& x) -> Vec3 {
-    return {x.x() + x.y() * x.y(), x.y() + x.z() * x.x(), x.z()};
-  });
+  const Body body = block_under_loose_quads(Vec3(0.013, 0.013, 0.337), 0.045);
+  const std::vector<Vec3>& vertices = body.surface.vertices;
   Body wrong = body;
   wrong.surface_cells.clear();
   wrong.surface_cell_offsets = {0};
   const auto is_wrong = [](std::size_t quad) { return quad % 11 == 5; };
-  for (std::size_t p = 0; p < quads.size(); ++p) {
+  for (std::size_t p = 0; p < body.surface.polygon_count(); ++p) {
     if (is_wrong(p))
       wrong.surface_cells.push_back(0);  // at z = 0, two cells below
     else

@@ -1,6 +1,7 @@
 // Blocks and scenes that the tests of contact share.
 #pragma once
 #include <Eigen/Geometry>
+#include <numbers>
 #include <string>
 
 #include "simulate/contact/contacts.h"
@@ -95,6 +96,24 @@ inline Body within_block(Body body, const std::vector<Vec3>& vertices,
     body.surface_cell_offsets.push_back(static_cast<std::uint32_t>(body.surface_cells.size()));
   }
   return body;
+}
+
+// A tessellated ball of radius `radius` [m], within `body`, a block of cells around it.
+inline Body ball_within(Body body, const Vec3& centre, double radius) {
+  std::vector<Vec3> vertices;
+  std::vector<std::vector<std::uint32_t>> polygons;
+  constexpr std::uint32_t kRings = 32, kAround = 48;
+  for (std::uint32_t ring = 0; ring <= kRings; ++ring)
+    for (std::uint32_t a = 0; a < kAround; ++a) {
+      const double theta = std::numbers::pi * ring / kRings, phi = 2 * std::numbers::pi * a / kAround;
+      vertices.push_back(centre + radius * Vec3(std::sin(theta) * std::cos(phi),
+                                                std::sin(theta) * std::sin(phi), std::cos(theta)));
+      if (ring == kRings) continue;
+      const std::uint32_t i = ring * kAround + a, j = ring * kAround + (a + 1) % kAround;
+      polygons.push_back({i, i + kAround, j + kAround});
+      polygons.push_back({i, j + kAround, j});
+    }
+  return within_block(std::move(body), vertices, polygons);
 }
 
 }  // namespace flexel::testing

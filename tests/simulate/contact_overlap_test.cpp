@@ -97,21 +97,7 @@ Body solid_ball(const std::string& name, const Vec3& centre) {
     }
     return nearest >= kRadius ? 0 : farthest > kRadius ? 0.5 : 1;
   };
-  std::vector<Vec3> vertices;
-  std::vector<std::vector<std::uint32_t>> polygons;
-  constexpr std::uint32_t kRings = 24, kAround = 36;
-  for (std::uint32_t ring = 0; ring <= kRings; ++ring)
-    for (std::uint32_t a = 0; a < kAround; ++a) {
-      const double theta = std::numbers::pi * ring / kRings, phi = 2 * std::numbers::pi * a / kAround;
-      vertices.push_back(centre + kRadius * kSide *
-                                      Vec3(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi),
-                                           std::cos(theta)));
-      if (ring == kRings) continue;
-      const std::uint32_t i = ring * kAround + a, j = ring * kAround + (a + 1) % kAround;
-      polygons.push_back({i, i + kAround, j + kAround});
-      polygons.push_back({i, j + kAround, j});
-    }
-  return within_block(box_body(options), vertices, polygons);
+  return testing::ball_within(box_body(options), centre, kRadius * kSide);
 }
 
 // Why a run that lets out, or does not, refuses; "": it does not.

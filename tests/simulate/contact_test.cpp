@@ -164,23 +164,10 @@ TEST(Contact, FlatFacesMeetWhereTheirSurfacesDoAtAnyAngleToTheLattice) {
   }
 }
 
-// A ball of radius R in a block, finely tessellated.
+// A ball in a block.
 Body ball(const std::string& name, double radius, int cells, const Vec3& shift = Vec3::Zero()) {
-  std::vector<Vec3> vertices;
-  std::vector<std::vector<std::uint32_t>> polygons;
-  constexpr std::uint32_t kRings = 32, kAround = 48;
-  for (std::uint32_t ring = 0; ring <= kRings; ++ring)
-    for (std::uint32_t a = 0; a < kAround; ++a) {
-      const double theta = std::numbers::pi * ring / kRings, phi = 2 * std::numbers::pi * a / kAround;
-      vertices.push_back(
-          radius * Vec3(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)));
-      if (ring == kRings) continue;
-      const std::uint32_t i = ring * kAround + a, j = ring * kAround + (a + 1) % kAround;
-      polygons.push_back({i, i + kAround, j + kAround});
-      polygons.push_back({i, j + kAround, j});
-    }
-  return within_block(block(name, {cells, cells, cells}, Vec3::Constant(-0.5 * cells * kSide) + shift),
-                      vertices, polygons);
+  return testing::ball_within(
+      block(name, {cells, cells, cells}, Vec3::Constant(-0.5 * cells * kSide) + shift), Vec3::Zero(), radius);
 }
 
 TEST(Contact, ABallTouchesAPlaneAndABlockWhereItsSurfaceIs) {
