@@ -9,7 +9,7 @@ import os
 import sys
 
 import numpy as np
-from harness import PARTS, SOURCE, Skip, expect, expect_ok, main, run, scene
+from harness import PARTS, SOURCE, Skip, expect, expect_ok, main, need_step, run, scene
 
 sys.path.insert(0, str(SOURCE / "tests/interop"))
 from files import any_stl_triangles, obj_parts  # noqa: E402
@@ -56,6 +56,8 @@ def through_the_chain(file, count, unit="mm", metres=1e-3, parts=()):
         raise Skip(f"{part} is not here")
     mesh = "obj" if file.lower().endswith(".obj") else "stl"
     step = file.lower().endswith((".step", ".stp"))
+    if step:
+        need_step()
     options = [] if step else ["--unit", unit]
     expect_ok(run("flexel-voxelize", part, "--count", count, *options, "-o", "rest.vtu", "--quiet"))
     expect_ok(run("flexel-map", "rest.vtu", "-o", f"rest.{mesh}", "--quiet"))
