@@ -6,6 +6,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 #include "formats/body_file.h"
@@ -37,11 +38,11 @@ class TimedRun {
   SimulateResult operator()();
 
  private:
-  void begin();
   void resume(const Checkpoint& from);
   void listen(const std::string& note);
   void keep();
   [[nodiscard]] bool save_checkpoint();
+  bool attempt(const std::string& what, const std::function<void()>& write);
   [[nodiscard]] bool out_of_time() const;
   void throw_if_stopped() const;
   [[nodiscard]] bool over() const { return (live_ && live_->ended()) || (settling_ && settling_->done()); }
@@ -54,8 +55,7 @@ class TimedRun {
   void write_frame();
   void write_history();
   [[nodiscard]] double now() const;
-  [[nodiscard]] std::string save(const State& state);
-  [[nodiscard]] std::string save_failed();
+  [[nodiscard]] std::string save(const std::optional<State>& state);
   [[nodiscard]] std::string stop();
   SimulateResult report();
 
@@ -114,14 +114,11 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
   if (options.resume)
     resume(*options.resume);
   else
-    begin();
+    act_.emplace(body_, scene_, options_, progress_, beginning_, beginning(body_));
+  if (!options.history.empty())
+    history_ = act_->make_history(options.resume ? options.resume->ledger : Ledger{});
   act_->set_hear([this](const std::string& note) { listen(note); });
   if (settling_) Settling::refuse(act_->passes(), scene_.name);
-}
-
-void TimedRun::begin() {
-  act_.emplace(body_, scene_, options_, progress_, beginning_, beginning(body_));
-  if (!options_.history.empty()) history_ = act_->make_history({});
 }
 
 void TimedRun::resume(const Checkpoint& from) {
@@ -130,7 +127,6 @@ void TimedRun::resume(const Checkpoint& from) {
   events_ = std::min<std::size_t>(from.events, scene_.events.size());
   act_.emplace(body_, scene_, options_, progress_, beginning_, from.state);
   act_->restore(from.memory);
-  if (!options_.history.empty()) history_ = act_->make_history(from.ledger);
   if (series_) series_->resume(from.frames);
   next_row_ = from.next_row;
   next_frame_ = from.next_frame;
@@ -176,11 +172,16 @@ bool TimedRun::save_checkpoint() {
   kept_->output = options_.output;
   kept_->history = options_.history;
   kept_->compress = options_.compress;
+  return attempt("checkpoint", [&] { write_checkpoint(*kept_, act_body_, options_.checkpoint); });
+}
+
+// A full disk is no reason to lose the run, nor what goes elsewhere.
+bool TimedRun::attempt(const std::string& what, const std::function<void()>& write) {
   try {
-    write_checkpoint(*kept_, act_body_, options_.checkpoint);
+    write();
     return true;
-  } catch (const InputError& error) {  // a full disk is no reason to lose the run
-    progress_.warn(fmt::format("no checkpoint: {}: {}", error.where(), error.what()));
+  } catch (const InputError& error) {
+    progress_.warn(fmt::format("no {}: {}: {}", what, error.where(), error.what()));
     return false;
   }
 }
@@ -218,7 +219,11 @@ void TimedRun::step() {
 void TimedRun::write_frame() {
   if (!series_) return;
   act_->store(act_->state());
-  series_->add(body_, *act_->state().time);
+  try {
+    series_->add(body_, *act_->state().time);
+  } catch (const InputError& error) {
+    throw InputError(error.where(), error.what() + (clock_.steps > 0 ? stop() : ""));
+  }
   act_->unload();
   next_frame_ = duration_ * static_cast<double>(series_->size()) / scene_.run.frames.value_or(kFrames);
 }
@@ -234,19 +239,15 @@ double TimedRun::now() const {
   return act_ ? *act_->state().time : scene_.events[events_].at;
 }
 
-// Leaves the body at `state`, and in the file for runs that end early; says where that is.
-std::string TimedRun::save(const State& state) {
-  if (history_) write_history();
-  if (act_) act_->store(state);  // else an event failed, and the body is what it was before that
-  if (options_.failed_output.empty()) return "";
-  write_body(body_, options_.failed_output);
-  return fmt::format("; the state at {:.6g} s is in {}", *state.time, options_.failed_output);
-}
-
-std::string TimedRun::save_failed() {
-  if (!sound_.empty()) return save(sound_.state());
-  if (history_) write_history();
-  return "";
+// Leaves the body at `state` (nothing: none was sound), and in the file for runs that end early; says where
+// that is.
+std::string TimedRun::save(const std::optional<State>& state) {
+  if (history_) attempt("history", [&] { write_history(); });
+  if (!state) return "";
+  if (act_) act_->store(*state);  // else an event failed, and the body is what it was before that
+  if (options_.failed_output.empty() || !attempt("state", [&] { write_body(body_, options_.failed_output); }))
+    return "";
+  return fmt::format("; the state at {:.6g} s is in {}", *state->time, options_.failed_output);
 }
 
 SimulateResult TimedRun::report() {
@@ -362,7 +363,8 @@ SimulateResult TimedRun::operator()() {
     play();
   } catch (const DivergedError& error) {
     const std::string where = fmt::format("step {} at {:.6g} s", clock_.steps, now());
-    throw DivergedError(fmt::format("{}: {}{}", where, error.what(), save_failed()));
+    throw DivergedError(fmt::format("{}: {}{}", where, error.what(),
+                                    save(sound_.empty() ? std::nullopt : std::optional(sound_.state()))));
   } catch (const TimeoutError&) {
     throw TimeoutError(fmt::format("stopped by --timeout after {} steps at {:.4g} s of {:.4g} s{}",
                                    clock_.steps, now(), duration_, stop()));

@@ -6,7 +6,7 @@ import signal
 import subprocess
 import time
 
-from harness import (BIN, SCENE, Skip, bracket, body, box, expect, expect_error, expect_ok, expect_only, main, run, scene, shell)
+from harness import (BIN, SCENE, Skip, bracket, body, box, expect, expect_error, expect_ok, expect_only, main, run, scene, shell, write)
 
 # Big enough to overflow any pipe's buffer.
 FINE = ["--size", "0.4 mm"]
@@ -27,16 +27,35 @@ def test_full_disk_as_stdout():
         expect_error(run("flexel-map", "body.vtu", "--format", "stl", stdout=full), "flexel-map", "no space")
 
 
-def test_full_disk():
-    box()
+def with_disk(size, command):
+    """Runs a program of ours while the folder "disk" is a disk of `size`, and what is on it then."""
     os.mkdir("disk")
-    program = BIN / "flexel-voxelize"
     result = run("unshare", "-m", "bash", "-c",
-                 f"mount -t tmpfs -o size=64k none disk || exit 99; {program} box.stl --size 0.4mm -o disk/out.vtu; "
-                 "code=$?; ls -A disk; exit $code")
+                 f"mount -t tmpfs -o size={size} none disk || exit 99; {BIN}/{command}; code=$?; ls -A disk >left; exit $code")
     if result.code in (1, 99) and "error: disk" not in result.err:
         raise Skip("mounting is not permitted here")
+    return result, open("left", encoding="utf-8").read().split()
+
+
+def test_full_disk():
+    box()
+    result, left = with_disk("64k", "flexel-voxelize box.stl --size 0.4mm -o disk/out.vtu")
     expect_error(result, "flexel-voxelize", "disk/out.vtu", "no space")
+    expect(not left, f"nothing may stay: {left}")
+
+
+def test_a_disk_that_fills_up_takes_frames_only():
+    body()
+    falls = write("falls.toml", 'material = "steel"\n[gravity]\nacceleration = ["0 m/s2", "0 m/s2", "-9.81 m/s2"]\n'
+                                '[run]\ntime = "1 ms"\nframes = 500\n')
+    out = "-o disk/f.pvd --history h.csv --checkpoint on.checkpoint --quiet"
+    result, left = with_disk("300k", f"flexel-simulate {falls} body.vtu {out}")
+    expect_error(result, "flexel-simulate", "disk/f_", "no space", "--resume on.checkpoint")
+    expect(left == ["f.pvd", *(f"f_{i:05}.vtu" for i in range(len(left) - 1))] and len(left) > 5, f"whole frames wanted: {left}")
+    rows = open("h.csv", encoding="utf-8").read().splitlines()
+    expect(len(rows) > 10, f"the history up to there wanted: {rows}")
+    expect_ok(run("flexel-simulate", "--resume", "on.checkpoint", "--quiet"))
+    expect(len(open("h.csv", encoding="utf-8").read().splitlines()) > len(rows), "more rows wanted")
 
 
 def test_terminal_as_stdout():
