@@ -91,6 +91,8 @@ void plan_outputs(const DeformArguments& arguments, Plan& plan) {
   for (std::size_t i = 1; i < paths.size(); ++i)
     if (!paths[i].empty() && paths[i] == paths[i - 1])
       throw InputError("two results would go to \"" + paths[i] + "\"");
+  for (const std::string& path : paths)
+    if (path.find("{part}") == std::string::npos) refuse_unwritable(path, false);
 }
 
 void plan_goal(const DeformArguments& arguments, Plan& plan) {

@@ -42,6 +42,10 @@ class OutputFile {
   std::vector<char> buffer_;
 };
 
+// Throws now what OutputFile would throw of `path` when it is made: the end of a long run is late to learn of
+// a folder that is not there. Devices and FIFOs are not opened; "": no output.
+void refuse_unwritable(const std::string& path, bool binary = true);
+
 // A whole text to `path`, as OutputFile does.
 void write_text(const std::string& text, const std::string& path);
 

@@ -182,6 +182,13 @@ void OutputFile::commit() {
   temporary_.clear();
 }
 
+void refuse_unwritable(const std::string& path, bool binary) {
+  struct stat status = {};
+  const bool exists = !means_stdout(path) && ::stat(path.c_str(), &status) == 0;
+  const bool opening_tells_others = exists && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode);
+  if (!path.empty() && !opening_tells_others) OutputFile(path, binary);
+}
+
 void write_text(const std::string& text, const std::string& path) {
   OutputFile file(path, false);
   file.write(text);

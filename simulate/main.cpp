@@ -172,6 +172,9 @@ int run(int argc, char** argv) {
   progress.stage("read");
   auto [scene, body] = read_input(arguments);
   if (arguments.output.empty()) arguments.output = "-";
+  refuse_unwritable(arguments.output);
+  for (const std::string& path : {arguments.summary, options.history, options.checkpoint})
+    refuse_unwritable(path, false);
   options.output = arguments.output;
   options.failed_output = failed_name(arguments.output);
   options.compress = arguments.compress;

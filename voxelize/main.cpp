@@ -141,6 +141,8 @@ int run(int argc, char** argv) {
     throw InputError("--vdb: centre placement has no cells; use --placement corner");
   if (arguments.summary == "-" && arguments.output == "-")
     throw InputError("the summary and the body cannot both go to stdout: give one of them a file");
+  for (const std::string& path : {arguments.output, arguments.vdb}) refuse_unwritable(path);
+  refuse_unwritable(arguments.summary, false);
   const ThreadLimit threads(arguments.threads);
   Progress progress(kName, arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
   progress.stage("import");

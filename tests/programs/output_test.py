@@ -77,6 +77,18 @@ def test_missing_folder():
     expect_error(run("flexel-voxelize", box(), "-o", "absent/out.vtu"), "flexel-voxelize", "absent/out.vtu", "no such file")
 
 
+def test_missing_folder_is_told_before_the_work():
+    simulate = ["flexel-simulate", scene(), body()]
+    deform = ["flexel", "deform", box(), "--fix", "xmin", "--push", "xmax: 0 0 -1 N"]
+    for command, option, path in ((["flexel-voxelize", "box.stl"], "-o", "absent/out.vtu"), (["flexel-voxelize", "box.stl"], "--summary", "absent/s.json"),
+                                  (simulate, "-o", "absent/out.vtu"), (simulate, "--summary", "absent/s.json"), (deform, "-o", "absent/out.stl")):
+        given = ["-o", "out.vtu"] if option != "-o" else []
+        result = run(*command, option, path, *given)
+        expect_error(result, command[0], path, "no such file")
+        expect(result.err.count("\n") == 1, f"one line and no work wanted: {result}")
+        expect_only("body.vtu", "box.stl", "scene.toml")
+
+
 def test_folder_as_output():
     os.mkdir("out.vtu")
     expect_error(run("flexel-voxelize", box(), "-o", "out.vtu"), "flexel-voxelize", "out.vtu", "folder")
