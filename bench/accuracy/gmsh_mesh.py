@@ -96,7 +96,7 @@ def straighten_folded(points, solids):
         at = points[left]
         straight = np.linalg.det(at[:, 1:4] - at[:, :1])
         jacobians = np.linalg.det(np.einsum("enx,pni->epxi", at, derivatives))
-        folded = left[jacobians.min(axis=1) < 0.05 * straight]
+        folded = left[(straight > 0) & (jacobians.min(axis=1) < 0.05 * straight)]
         for k, (i, j) in enumerate(EDGES):
             points[folded[:, 4 + k]] = (points[folded[:, i]] + points[folded[:, j]]) / 2
         left = solids[np.isin(solids, folded[:, 4:]).any(axis=1)]
