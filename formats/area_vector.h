@@ -15,7 +15,7 @@ namespace flexel {
 template <class At>
 [[nodiscard]] Vec3 area_vector(std::size_t n, const At& at) {
   Vec3 sum = Vec3::Zero();
-  const Vec3 origin = at(0);
+  const Vec3& origin = at(0);
   for (std::size_t i = 1; i + 1 < n; ++i) sum += 0.5 * (at(i) - origin).cross(at(i + 1) - origin);
   return sum;
 }
