@@ -61,7 +61,7 @@ def read_mesh(path):
                 surface = int(re.search(r"ELSET=SURFACE(\d+)", upper)[1])
             rest = []
             continue
-        values = [value for value in line.replace(",", " ").split()]
+        values = line.replace(",", " ").split()
         if into == "node":
             nodes[int(values[0])] = [float(value) for value in values[1:4]]
         elif into:
@@ -115,7 +115,6 @@ class Mesh:
         self.seconds, _ = measured(["gmsh", geo, "-3", "-format", "inp", "-o", folder / "mesh.inp", "-v", "1"])
         found, self.solids, triangles, surfaces = read_mesh(folder / "mesh.inp")
         used = sorted({node for solid in self.solids for node in solid})
-        self.number = used
         self.place = {node: i for i, node in enumerate(used)}
         self.points = np.array([found[node] for node in used])
         straighten_folded(self.points, np.array([[self.place[node] for node in solid] for solid in self.solids]))
