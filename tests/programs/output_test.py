@@ -89,6 +89,15 @@ def test_missing_folder_is_told_before_the_work():
         expect_only("body.vtu", "box.stl", "scene.toml")
 
 
+def test_fifo_as_output_is_opened_once():
+    os.mkfifo("out.vtu")
+    with subprocess.Popen(["cat", "out.vtu"], stdout=subprocess.PIPE) as reader:
+        expect_ok(run("flexel-simulate", scene(), body(), "-o", "out.vtu", "--quiet"))
+        read = reader.stdout.read()
+    expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "file.vtu", "--quiet"))
+    expect(read == open("file.vtu", "rb").read(), f"the whole body wanted, not {len(read)} bytes")
+
+
 def test_folder_as_output():
     os.mkdir("out.vtu")
     expect_error(run("flexel-voxelize", box(), "-o", "out.vtu"), "flexel-voxelize", "out.vtu", "folder")
