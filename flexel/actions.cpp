@@ -95,6 +95,7 @@ Action parse_move(const std::string& text) {
 
 Vec3 inward_normal(const Selection& selection, const Body& body) {
   const Selected selected = resolve(selection, body);
+  if (const auto axis = side_axis(selection, body)) return -*axis;
   const Surface& surface = body.surface;
   Vec3 sum = Vec3::Zero();
   double area = 0;

@@ -170,6 +170,8 @@ std::string summary_json(const SimulateResult& result, const Body& body) {
   json["mass"] = result.mass;
   json["largest_displacement"] = result.largest_displacement;
   json["largest_displacement_at"] = vector(result.largest_displacement_at);
+  json["largest_strain"] = result.largest_strain;
+  json["warnings"] = result.warnings;
   json["probes"] = Json::array();
   for (const ProbeResult& probe : result.probes)
     json["probes"].push_back(

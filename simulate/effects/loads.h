@@ -44,10 +44,13 @@ class Loads {
     Vec3 force = Vec3::Zero();  // N
   };
   struct Spread {  // one load
-    std::string name;
+    std::string name, origin;
     Course course;
+    bool turns = false;  // a couple or a pressure, which would turn with the surface
+    bool pressure = false;
     std::vector<ElementForce> forces;  // ascending by element
   };
+  [[nodiscard]] std::optional<std::string> turned(const Spread& load, const State& state) const;
   const Body* body_ = nullptr;
   std::vector<Spread> loads_;
 };
