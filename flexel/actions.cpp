@@ -11,6 +11,7 @@
 #include "formats/area_vector.h"
 #include "formats/error.h"
 #include "formats/units.h"
+#include "simulate/scene_checks.h"
 
 namespace flexel {
 namespace {

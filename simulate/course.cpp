@@ -1,11 +1,7 @@
 // Courses: parsing and linear interpolation.
 #include "simulate/course.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-
-#include "formats/error.h"
 
 namespace flexel {
 
@@ -18,15 +14,6 @@ double Course::at(const State& state) const {
   const auto i = static_cast<std::size_t>(next - time.begin());
   const double share = (*state.time - time[i - 1]) / (time[i] - time[i - 1]);
   return factor[i - 1] + share * (factor[i] - factor[i - 1]);
-}
-
-void refuse_course(const Course& course, const std::string& origin, const std::string& what) {
-  if (course.time.empty()) return;
-  throw InputError(
-      origin,
-      fmt::format("{} has \"time\" and \"factor\", and equilibrium has no time: leave them out (all of it "
-                  "acts then), or give [run] time = \"{:.6g} s\"",
-                  what, course.time.back() > 0 ? course.time.back() : 1));
 }
 
 Course parse_course(TableReader& reader) {

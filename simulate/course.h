@@ -1,6 +1,6 @@
 // How a load or a move goes on in time: a factor, linear between given times.
 #pragma once
-#include <string>
+#include <optional>
 #include <vector>
 
 #include "simulate/scene_table.h"
@@ -16,11 +16,6 @@ struct Course {
   // share.
   [[nodiscard]] double at(const State& state) const;
 };
-
-// Refuses a course in a run to equilibrium, which would take the whole load whatever `factor` says. `what`:
-// "load
-// \"push\"". Throws InputError(origin, ...).
-void refuse_course(const Course& course, const std::string& origin, const std::string& what);
 
 // The keys `time` and `factor` of a table: ["0 s", "1 s"] and [0, 1]. Throws InputError: one without the
 // other, lengths that differ, times that do not ascend.

@@ -8,6 +8,7 @@
 #include "formats/units.h"
 #include "simulate/material_names.h"
 #include "simulate/scene.h"
+#include "simulate/scene_checks.h"
 
 namespace flexel {
 namespace {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "formats/error.h"
 #include "formats/fields.h"
@@ -39,7 +40,24 @@ void measure_displacement(const Body& body, const State& state, SimulateResult& 
   const LargestDisplacement largest = largest_displacement(body, state.displacement);
   result.largest_displacement = largest.value();
   result.largest_displacement_at = largest.at;
-  result.largest_strain = largest_strain(body);
+}
+
+// A couple is spread by forces that keep their direction: turned about its axis by an angle, the angle's
+// cosine of it is left.
+std::vector<std::string> warnings_of(const SimulateResult& result) {
+  constexpr double kLargestTurn = 10 * std::numbers::pi / 180;
+  std::vector<std::string> warnings;
+  for (const AppliedLoad& load : result.loads) {
+    if (!load.rotation || load.displacement) continue;  // nothing, or of a rigid link
+    if (const double turn = load.rotation->norm(); turn > kLargestTurn)
+      warnings.push_back(
+          fmt::format("load \"{}\" turned what it acts on by {:.0f} degrees, and its forces keep the "
+                      "direction that they have at rest: about {:.0f} % of its torque is left, and the "
+                      "result is that of so much; lead the place with [[move]] and \"rotation\" instead, or "
+                      "take a torque that turns it by less than 10 degrees",
+                      load.name, 180 / std::numbers::pi * turn, std::max(0.0, 100 * std::cos(turn))));
+  }
+  return warnings;
 }
 
 void refuse_not_finite(const SimulateResult& result, const std::string& scene) {

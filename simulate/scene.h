@@ -10,7 +10,6 @@
 #include <string>
 #include <vector>
 
-#include "formats/progress.h"
 #include "simulate/effects/all.h"
 #include "simulate/events/event.h"
 #include "simulate/materials.h"
@@ -95,8 +94,5 @@ struct Scene {
 [[nodiscard]] std::vector<Model> models_of_parts(const Scene& scene, const Body& body);
 [[nodiscard]] std::vector<HookeConstant> hooke_of_parts(const Scene& scene, const Body& body);
 [[nodiscard]] std::vector<Material> materials_of_parts(const Scene& scene, const Body& body);
-
-// Warns of each of the scene's own materials that no part is made of.
-void warn_of_unused_materials(const Scene& scene, const Body& body, Progress& progress);
 
 }  // namespace flexel

@@ -20,6 +20,15 @@ constexpr double kOffAxis = 10;                    // degrees
 constexpr double kCarries = 1e-6;                  // weight of an element
 
 // Loads and moves act whole at equilibrium.
+void refuse_course(const Course& course, const std::string& origin, const std::string& what) {
+  if (course.time.empty()) return;
+  throw InputError(
+      origin,
+      fmt::format("{} has \"time\" and \"factor\", and equilibrium has no time: leave them out (all of it "
+                  "acts then), or give [run] time = \"{:.6g} s\"",
+                  what, course.time.back() > 0 ? course.time.back() : 1));
+}
+
 void refuse_courses(const Scene& scene) {
   for (const Load& load : scene.get<Loads>().loads)
     refuse_course(load.course, load.origin, fmt::format("load \"{}\"", load.name));

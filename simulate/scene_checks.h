@@ -12,4 +12,11 @@ namespace flexel {
 // average, with the angle; a material of the scene is used by no part.
 void check_actions(const Scene& scene, const Body& body, Progress& progress);
 
+// Warns of each of the scene's own materials that no part is made of.
+void warn_of_unused_materials(const Scene& scene, const Body& body, Progress& progress);
+
+// The outward unit axis of a side ("zmax", "part/zmax", "#zmax"); nothing where the selection is anything
+// else.
+[[nodiscard]] std::optional<Vec3> side_axis(const Selection& selection, const Body& body);
+
 }  // namespace flexel

@@ -19,6 +19,7 @@
 #include "formats/error.h"
 #include "formats/program.h"
 #include "formats/units.h"
+#include "simulate/scene_checks.h"
 
 namespace flexel {
 namespace {

@@ -1,7 +1,6 @@
 // Selections: which part of a body a fix, load, move or probe acts on (docs/scene.md, "Selections").
 #pragma once
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,9 +11,7 @@ namespace flexel {
 struct Selection {
   enum class Kind { name, box, sphere, half_space, any_of, complement };
   Kind kind = Kind::name;
-  // "bracket/12", "bracket/flange", "flange", "xmin", "bracket/xmin", "bracket"; "#" before the last word: a
-  // number or a side ("bracket/#12"), "=": a name of the file ("bracket/=12")
-  std::string name;
+  std::string name;  // "bracket/12", "bracket/#12", "flange", "=flange", "xmin", "bracket/xmin", "bracket"
   Vec3 min = Vec3::Zero();  // m, box, rest, world frame
   Vec3 max = Vec3::Zero();
   Vec3 point = Vec3::Zero();       // m, centre of the sphere; a point of the half-space's plane
@@ -33,15 +30,11 @@ struct Selected {
   std::vector<std::uint32_t> elements;
 };
 
-// Throws InputError(selection.origin, ...) when a name is unknown (with the nearest that exists), means two
-// things (with how to say which), or when nothing is selected (with what to change). `at` (elements) [m]:
-// where boxes, spheres and half-spaces look for elements; nothing: where they rest.
+// Throws InputError(selection.origin, ...) when a name is unknown (with the nearest), means two things,
+// or when nothing is selected; each with what to write. `at` (elements) [m]: where boxes, spheres and
+// half-spaces look for elements; nothing: where they rest.
 [[nodiscard]] Selected resolve(const Selection& selection, const Body& body,
                                const std::vector<Vec3>* at = nullptr);
-
-// The outward unit axis of a side ("zmax", "part/zmax", "#zmax"); nothing where the selection is anything
-// else.
-[[nodiscard]] std::optional<Vec3> side_axis(const Selection& selection, const Body& body);
 
 // The selection in words, for summaries: `"bracket/12"`, `box`, `2 selections`.
 [[nodiscard]] std::string describe(const Selection& selection);

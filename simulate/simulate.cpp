@@ -247,7 +247,7 @@ SimulateResult Run::operator()() {
   const EquilibriumResult solved = solve(mechanics);
   buckled_ = solved.buckled;
   mechanics.report(state_, result);
-  for (const std::string& warning : result.warnings) progress_.warn(warning);
+  for (const std::string& warning : warnings_of(result)) progress_.warn(scene_.name + ": " + warning);
   result.elastic_energy = mechanics.elastic_energy(state_);
   result.smallest_jacobian = mechanics.most_compressed(state_).value;
   measure_corners(mechanics.cells(), body_, state_, result, progress_);

@@ -95,14 +95,11 @@ struct SimulateResult {
   Vec3 imbalance = Vec3::Zero();         // N, sum of loads and reactions; 0 but for the tolerance
   Vec3 moment_imbalance = Vec3::Zero();  // N m, likewise
   std::vector<PassShare> passes;
-  std::size_t stray_cells = 0;        // in loose crumbs that were carried along, not simulated
-  std::vector<std::string> warnings;  // what makes a figure below another than was asked for
-  // Of the part's matter (formats/fields.h)
-  double largest_displacement = 0;              // m
-  Vec3 largest_displacement_at = Vec3::Zero();  // m, rest position
-  double largest_strain = 0;                    // equivalent logarithmic strain of a cell
-  double elastic_energy = 0;                    // J
-  double mass = 0;                              // kg
+  std::size_t stray_cells = 0;      // in loose crumbs that were carried along, not simulated
+  double largest_displacement = 0;  // m, of the matter (formats/fields.h)
+  Vec3 largest_displacement_at = Vec3::Zero();
+  double elastic_energy = 0;     // J
+  double mass = 0;               // kg
   double smallest_jacobian = 1;  // of all cells' mean gradients, and those around elements at centres
   // of the trilinear map at the cells' corners; <= 0: folded there; nothing without cells
   std::optional<double> smallest_corner_jacobian;

@@ -98,11 +98,12 @@ std::optional<Attribute> body_attribute(const Body& body, const std::string& nam
 }
 
 std::optional<double> largest_in_matter(const Body& body, const std::string& name) {
-  if (body.element_columns.contains(name) || body.cell_columns.contains(name)) {
-    if (name != "von_mises") return std::nullopt;
-    const std::vector<double>& values = body.element_columns.at(name).values;
+  if (const auto column = body.element_columns.find(name); column != body.element_columns.end()) {
+    const std::vector<double>& values = column->second.values;
+    if (name != "von_mises" || values.empty()) return std::nullopt;
     return *std::max_element(values.begin(), values.end());
   }
+  if (body.cell_columns.contains(name)) return std::nullopt;
   if (name == "displacement") return largest_displacement(body).value();
   if (name == "strain") return largest_strain(body);
   return std::nullopt;

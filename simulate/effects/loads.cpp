@@ -10,7 +10,6 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "formats/error.h"
 #include "simulate/effects/load_distribution.h"
@@ -49,9 +48,6 @@ Load parse_load(TableReader& reader) {
   }
   return load;
 }
-
-constexpr double kLargestTurn =
-    10;  // degrees, of what a couple or a pressure acts on: 1.5 % of the couple is lost
 
 void spread(const Carrier& at, const Vec3& force, std::vector<Vec3>& sum) {
   for (std::uint32_t a = 0; a < at.count; ++a) sum[at.elements[a]] += at.weights[a] * force;
@@ -117,6 +113,38 @@ void add_volume_load(const Load& load, const std::vector<std::uint32_t>& element
   for (std::size_t q = 0; q < elements.size(); ++q) sum[elements[q]] += forces[q];
 }
 
+constexpr double kCouple = 1e-3;  // of forces times arms: less moment about their middle is rounding
+
+// The rotation vector [rad] of what a couple acts on: of the rigid motion nearest to the elements' own, each
+// with the weight of its force (Kabsch 1976). Nothing for forces that have no moment about their own middle.
+template <class ElementForces>
+std::optional<Vec3> turn_of_couple(const ElementForces& forces, const Body& body, const State& state) {
+  double whole = 0, arms = 0;
+  Vec3 middle = Vec3::Zero(), moved = Vec3::Zero(), moment = Vec3::Zero();
+  for (const auto& at : forces) {
+    const double weight = at.force.norm();
+    whole += weight;
+    middle += weight * body.rest[at.element];
+    moved += weight * state.displacement[at.element];
+  }
+  middle /= whole;
+  moved /= whole;
+  Mat3 product = Mat3::Zero();
+  for (const auto& at : forces) {
+    const Vec3 arm = body.rest[at.element] - middle;
+    product += at.force.norm() * (arm + state.displacement[at.element] - moved) * arm.transpose();
+    moment += arm.cross(at.force);
+    arms += arm.norm() * at.force.norm();
+  }
+  if (!(moment.norm() > kCouple * arms)) return std::nullopt;
+  const Eigen::JacobiSVD<Mat3> svd(product, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  if (!(svd.singularValues()[1] > 1e-9 * svd.singularValues()[0])) return std::nullopt;  // a line
+  Mat3 sense = Mat3::Identity();
+  sense(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
+  const Eigen::AngleAxisd turn(Mat3(svd.matrixU() * sense * svd.matrixV().transpose()));
+  return Vec3(turn.angle() * turn.axis());
+}
+
 }  // namespace
 
 void Loads::parse(TableReader& scene, Parameters& parameters) {
@@ -141,12 +169,7 @@ std::optional<Loads> Loads::make(const Parameters& parameters, const Setting& se
       add_surface_load(load, selected.polygons, setting, sum);
     else
       add_volume_load(load, selected.elements, setting, sum);
-    Spread made{load.name,
-                load.origin,
-                load.course,
-                load.torque || load.at || load.pressure,
-                load.pressure.has_value(),
-                {}};
+    Spread made{load.name, load.course, {}};
     for (std::uint32_t e = 0; e < sum.size(); ++e)
       if (sum[e] != Vec3::Zero()) made.forces.push_back({e, sum[e]});
     loads.loads_.push_back(std::move(made));
@@ -180,48 +203,6 @@ void Loads::add_forces(const State& state, std::vector<Vec3>& forces) const {
   }
 }
 
-// A couple is spread by forces that keep their direction; where the loaded matter turns they keep less of the
-// couple. The turn is that of the rigid motion nearest to the elements' own (Kabsch 1976).
-std::optional<std::string> Loads::turned(const Spread& load, const State& state) const {
-  if (!load.turns || load.forces.empty()) return std::nullopt;
-  double whole = 0;
-  Vec3 middle = Vec3::Zero(), moved = Vec3::Zero();
-  for (const ElementForce& at : load.forces) {
-    const double weight = at.force.norm();
-    whole += weight;
-    middle += weight * body_->rest[at.element];
-    moved += weight * state.displacement[at.element];
-  }
-  middle /= whole;
-  moved /= whole;
-  Mat3 product = Mat3::Zero();
-  Vec3 first = Vec3::Zero(), now = Vec3::Zero();  // moments about the middle
-  for (const ElementForce& at : load.forces) {
-    const Vec3 arm = body_->rest[at.element] - middle;
-    const Vec3 turned = arm + state.displacement[at.element] - moved;
-    product += at.force.norm() * turned * arm.transpose();
-    first += arm.cross(at.force);
-    now += turned.cross(at.force);
-  }
-  const Eigen::JacobiSVD<Mat3> svd(product, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Mat3 sense = Mat3::Identity();
-  sense(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
-  const Eigen::AngleAxisd turn(Mat3(svd.matrixU() * sense * svd.matrixV().transpose()));
-  const double degrees = 180 / std::numbers::pi * turn.angle();
-  if (!(degrees > kLargestTurn)) return std::nullopt;
-  if (load.pressure)
-    return fmt::format(
-        "{}: the surface under load \"{}\" turned by {:.0f} degrees, and its pressure keeps the direction "
-        "that it had at rest: where it should turn with the surface the result is wrong by up to {:.0f} % "
-        "of the load",
-        load.origin, load.name, degrees, 100 * 2 * std::sin(turn.angle() / 2));
-  return fmt::format(
-      "{}: what load \"{}\" acts on turned by {:.0f} degrees, and the forces that its torque is spread by "
-      "keep their direction: {:.0f} % of the torque is left, and the deformation is that of so much; "
-      "lead the place with [[move]] and \"rotation\" instead",
-      load.origin, load.name, degrees, 100 * now.dot(first) / first.squaredNorm());
-}
-
 void Loads::report(const State& state, const std::vector<Vec3>&, SimulateResult& result) const {
   for (const Spread& load : loads_) {
     const double factor = load.course.at(state);
@@ -229,8 +210,8 @@ void Loads::report(const State& state, const std::vector<Vec3>&, SimulateResult&
     for (const ElementForce& at : load.forces)
       add_at(factor * at.force, body_->rest[at.element] + state.displacement[at.element], total.force,
              total.moment);
+    total.rotation = turn_of_couple(load.forces, *body_, state);
     result.loads.push_back(total);
-    if (auto warning = turned(load, state)) result.warnings.push_back(std::move(*warning));
   }
 }
 

@@ -44,13 +44,10 @@ class Loads {
     Vec3 force = Vec3::Zero();  // N
   };
   struct Spread {  // one load
-    std::string name, origin;
+    std::string name;
     Course course;
-    bool turns = false;  // a couple or a pressure, which would turn with the surface
-    bool pressure = false;
     std::vector<ElementForce> forces;  // ascending by element
   };
-  [[nodiscard]] std::optional<std::string> turned(const Spread& load, const State& state) const;
   const Body* body_ = nullptr;
   std::vector<Spread> loads_;
 };
