@@ -11,6 +11,7 @@
 #include "formats/area_vector.h"
 #include "formats/error.h"
 #include "formats/units.h"
+#include "simulate/scene_checks.h"
 
 namespace flexel {
 namespace {
@@ -95,6 +96,7 @@ Action parse_move(const std::string& text) {
 
 Vec3 inward_normal(const Selection& selection, const Body& body) {
   const Selected selected = resolve(selection, body);
+  if (const auto axis = side_axis(selection, body)) return -*axis;
   const Surface& surface = body.surface;
   Vec3 sum = Vec3::Zero();
   double area = 0;

@@ -112,9 +112,20 @@ std::string part_text(const PartInfo& part, const Unit& unit) {
   return text;
 }
 
+// How a scene selects a face by its number: "part/2", or "part/#2" where the file calls another face "2".
+std::string selection_of(std::uint32_t face, const std::vector<std::uint32_t>& numbers,
+                         const Surface& surface, const std::string& part) {
+  const std::string number = std::to_string(numbers[face]);
+  bool taken = false;
+  for (std::uint32_t f = 0; f < surface.faces.size(); ++f)
+    taken |=
+        f != face && surface.faces[f].part == surface.faces[face].part && surface.faces[f].name == number;
+  return fmt::format("{}/{}{}", part, taken ? "#" : "", number);
+}
+
 std::string faces_text(const PartInfo& part, const Surface& surface, const std::vector<FaceShape>& shapes,
                        const std::vector<std::uint32_t>& numbers, const Unit& unit) {
-  const auto selection = [&](std::uint32_t f) { return fmt::format("{}/{}", part.name, numbers[f]); };
+  const auto selection = [&](std::uint32_t f) { return selection_of(f, numbers, surface, part.name); };
   std::size_t width = 4;
   for (const std::uint32_t f : part.faces) width = std::max(width, selection(f).size());
   std::string text = fmt::format("  {:<{}} {:>12}  {:<28} {}\n", "face", width, "area " + unit.name + "^2",
@@ -147,15 +158,16 @@ std::string info_text(const Surface& surface) {
   }
   text +=
       "A scene or an option can name a part, a face, a group, or a side: xmin, xmax, ymin, ymax, zmin, "
-      "zmax.\n";
+      "zmax. Where a name means two things, \"part/#2\" is face number 2 and \"part/=2\" what the file calls "
+      "\"2\".\n";
   return text;
 }
 
 using Json = nlohmann::ordered_json;
 
-Json face_json(const SurfaceFace& face, std::uint32_t number, const std::string& part,
+Json face_json(const SurfaceFace& face, std::uint32_t number, const std::string& selection,
                const FaceShape& shape) {
-  Json json = {{"number", number},   {"selection", fmt::format("{}/{}", part, number)},
+  Json json = {{"number", number},   {"selection", selection},
                {"name", face.name},  {"polygons", shape.polygons},
                {"area", shape.area}, {"centroid", coordinates(shape.centroid)}};
   constexpr const char* kKinds[] = {"flat", "round", "curved"};

@@ -3,9 +3,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "formats/error.h"
 #include "formats/size_warning.h"
 #include "formats/units.h"
+#include "simulate/material_names.h"
 
 namespace flexel {
 namespace {
@@ -18,8 +21,9 @@ void check_material(const JobArguments& arguments, const Scene& scene) {
   if (arguments.material.empty() && arguments.scene.empty())
     throw InputError(
         fmt::format("no material: add --material NAME; the library has {}", fmt::join(known, ", ")));
-  if (arguments.material.empty() || scene.materials.count(arguments.material) ||
-      library_material(arguments.material))
+  if (arguments.material.empty() || library_material(arguments.material) ||
+      std::any_of(scene.materials.begin(), scene.materials.end(),
+                  [&](const auto& own) { return same_material_name(own.first, arguments.material); }))
     return;
   const std::string hint = did_you_mean(arguments.material, known);
   throw InputError(

@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "formats/error.h"
+#include "formats/number_range.h"
 #include "formats/program.h"
 
 namespace flexel {
@@ -291,13 +292,19 @@ double parse_quantity(std::string_view text, Dimension dimension) {
   if (error != std::errc())
     throw InputError(fmt::format("\"{}\" is not {}, such as \"{}\"", whole, wanted.name, wanted.example));
   const std::string_view name = trim(whole.substr(static_cast<std::size_t>(end - whole.data())));
-  if (name.empty() && (value == 0 || dimension == Dimension::share)) return value;
+  const auto within = [&](double number) {
+    if (!is_readable_quantity(number))
+      throw InputError(
+          fmt::format("\"{}\" is too {}: a quantity is 0, or from 1e-35 to 1e35 in size in SI units", whole,
+                      std::abs(number) > 1 ? "large" : "small"));
+    return number;
+  };
+  if (name.empty() && (value == 0 || dimension == Dimension::share)) return within(value);
   if (name.empty())
     throw InputError(
         fmt::format("\"{}\" has no unit: write {} such as \"{}\"", whole, wanted.name, wanted.example));
   const double result = scaled(value, unit_of(name, whole, dimension));
-  if (!std::isfinite(result)) throw InputError(fmt::format("\"{}\" is not a finite number", whole));
-  return result;
+  return within(result);
 }
 
 double length_unit(std::string_view name) {

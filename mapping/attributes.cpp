@@ -33,8 +33,8 @@ Columns vertex_attributes(const Surface& surface, const Body& body, const MapRes
   displacement.components = 3;
   for (const Vec3& u : result.displacement)
     displacement.values.insert(displacement.values.end(), {u.x(), u.y(), u.z()});
-  columns["strain"] = column(n, [&](std::size_t v) {
-    const double value = strain(gradients[result.frame[v]]);
+  columns["stretch"] = column(n, [&](std::size_t v) {
+    const double value = stretch(gradients[result.frame[v]]);
     return std::isfinite(value) ? value : -1.0;
   });
   columns["frame_kind"] =

@@ -133,7 +133,7 @@ LatticeVolume lattice_volume(const Body& body) {
   return {sum.before, sum.after};
 }
 
-double strain(const Mat3& gradient) {
+double stretch(const Mat3& gradient) {
   if (!gradient.allFinite()) return std::numeric_limits<double>::quiet_NaN();
   Eigen::SelfAdjointEigenSolver<Mat3> solver;
   solver.computeDirect(gradient.transpose() * gradient, Eigen::EigenvaluesOnly);

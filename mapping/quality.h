@@ -16,6 +16,6 @@ struct LatticeVolume {
 [[nodiscard]] LatticeVolume lattice_volume(const Body& body);
 
 // Largest |principal stretch - 1| of a deformation gradient.
-[[nodiscard]] double strain(const Mat3& gradient);
+[[nodiscard]] double stretch(const Mat3& gradient);
 
 }  // namespace flexel

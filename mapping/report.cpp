@@ -19,13 +19,13 @@ double largest_norm(const std::vector<Vec3>& vectors) {
 }
 
 // Over the frames that hold a vertex some polygon uses.
-double largest_strain(const MapResult& result, const std::vector<Mat3>& gradients) {
+double largest_stretch(const MapResult& result, const std::vector<Mat3>& gradients) {
   std::vector<std::uint8_t> used(gradients.size(), 0);
   for (std::size_t v = 0; v < result.frame.size(); ++v)
     if (result.referenced[v]) used[result.frame[v]] = 1;
   double largest = 0;
   for (std::size_t f = 0; f < gradients.size(); ++f)
-    if (used[f]) largest = std::max(largest, strain(gradients[f]));
+    if (used[f]) largest = std::max(largest, stretch(gradients[f]));
   return largest;
 }
 
@@ -86,7 +86,7 @@ MapReport report(const Body& body, const MapResult& result) {
   report.distance_outside = result.distance_outside;
   report.largest_displacement = largest_norm(result.displacement);
   const std::vector<Mat3> gradients = deformation_gradients(result.frames, body.rest, body.position);
-  report.largest_strain = largest_strain(result, gradients);
+  report.largest_strain = largest_stretch(result, gradients);
   report.quality = surface_quality(body.surface, result, gradients);
   const LatticeVolume lattice = lattice_volume(body);
   report.lattice_volume_before = lattice.before;
@@ -114,7 +114,7 @@ void add_triangle_lines(const MapReport& report, std::vector<std::string>& lines
 
 std::string volume_line(const MapReport& report) {
   const SurfaceQuality& quality = report.quality;
-  std::string line = fmt::format("largest displacement {}, strain {:.3g} %",
+  std::string line = fmt::format("vertices move by up to {}, stretched by up to {:.3g} %",
                                  human_length(report.largest_displacement), 100 * report.largest_strain);
   if (!(quality.volume_before > 0) || !std::isfinite(quality.volume_after)) return line;
   const double change = 100 * (quality.volume_after / quality.volume_before - 1);
@@ -193,8 +193,8 @@ Json report_object(const MapReport& report, const MapOptions& options) {
                         {"folded_triangles", quality.folded}};
   json["rest_residual"] = report.rest_residual;
   json["distance_outside"] = report.distance_outside;
-  json["largest_displacement"] = report.largest_displacement;
-  json["largest_strain"] = report.largest_strain;
+  json["largest_vertex_displacement"] = report.largest_displacement;
+  json["largest_stretch"] = report.largest_strain;
   json["triangles"] = quality.triangles;
   json["smallest_angle_before"] = quality.smallest_angle_before;
   json["smallest_angle_after"] = quality.smallest_angle_after;

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "formats/error.h"
+#include "formats/fields.h"
 #include "simulate/coarsen.h"
 
 namespace flexel {
@@ -35,17 +36,6 @@ Answers answers(const SimulateResult& result) {
   return found;
 }
 
-std::size_t most_moved(const Body& body) {
-  std::size_t most = 0;
-  double length = -1;
-  for (std::size_t e = 0; e < body.element_count(); ++e)
-    if (const double each = (body.position[e] - body.rest[e]).norm(); each > length) {
-      length = each;
-      most = e;
-    }
-  return most;
-}
-
 // Ratio of the spacings of two lattices of the same matter.
 double ratio_of(const Body& fine, const Body& coarse) {
   double volumes = 0, weights = 0;
@@ -64,16 +54,16 @@ class CoarseRuns {
   CoarseRuns(const Body& body, const Scene& scene, const SimulateOptions& options,
              const SimulateResult& result, const SolveCoarse& solve)
       : options_(options), solve_(solve), scene_(scene) {
-    const std::size_t most = most_moved(body);
+    const LargestDisplacement most = largest_displacement(body);
     Probe probe;
     probe.name = "largest displacement";
-    probe.at = body.rest[most];
+    probe.at = most.at;
     scene_.probes.push_back(probe);
     scene_.run.tolerance = std::max(scene.run.tolerance, kCoarseTolerance);
     scene_.run.newton_iterations =
         2 * std::max(result.newton_iterations, result.start_newton_iterations) + kAddedIterations;
     found_.push_back(answers(result));
-    found_.back().moved.push_back(body.position[most] - body.rest[most]);
+    found_.back().moved.push_back(most.displacement);
     options_.explain = options_.estimate = false;
     options_.failed_output.clear();
   }

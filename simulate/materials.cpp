@@ -6,6 +6,8 @@
 #include <cctype>
 #include <utility>
 
+#include "simulate/material_names.h"
+
 namespace flexel {
 namespace {
 
@@ -203,6 +205,10 @@ const std::vector<Material>& material_library() {
       library_entry("alumina", 370e9, 0.22, 3900, {}, "99.5 %, read at vertebr.ae"),
   };
   return library;
+}
+
+bool same_material_name(const std::string& one, const std::string& other) {
+  return folded(one) == folded(other);
 }
 
 const Material* library_material(const std::string& name) {

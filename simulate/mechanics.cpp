@@ -7,6 +7,7 @@
 #include <Eigen/Eigenvalues>
 
 #include <cmath>
+#include <limits>
 
 #include "formats/parallel.h"
 
@@ -125,6 +126,8 @@ Forces Mechanics::forces(const State& state) {
     return sum;
   });
   result.scale = std::sqrt(outer + held);
+  // Beside an infinite scale every residual would be 0: NaN is below no tolerance.
+  if (!std::isfinite(result.scale)) result.scale = std::numeric_limits<double>::quiet_NaN();
   parallel_for_each(inner.size(), [&](std::size_t e) { result.total[e] += inner[e]; });
   return result;
 }

@@ -116,7 +116,7 @@ void Solver::update_residual() {
   clear_prescribed(mechanics_.constraints(), residual_);
   residual_norm_ = norm(residual_);
   scale_ = std::max(forces.scale, options_.least_scale);
-  outcome_.relative_residual = scale_ > 0 ? residual_norm_ / scale_ : 0;
+  outcome_.relative_residual = scale_ == 0 ? 0 : residual_norm_ / scale_;
 }
 
 void Solver::prepare_tangent(bool project) {

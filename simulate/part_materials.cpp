@@ -1,17 +1,21 @@
 // Which material each part is made of, and whether its model can be run.
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "formats/error.h"
 #include "formats/program.h"
 #include "formats/units.h"
+#include "simulate/material_names.h"
 #include "simulate/scene.h"
+#include "simulate/scene_checks.h"
 
 namespace flexel {
 namespace {
 
 Material material_named(const Scene& scene, const std::string& name, const std::string& origin) {
-  const auto own = scene.materials.find(name);
-  if (own != scene.materials.end()) return own->second;
+  for (const auto& [own, material] : scene.materials)
+    if (same_material_name(own, name)) return material;
   if (const Material* material = library_material(name)) return *material;
   std::vector<std::string> names;
   for (const auto& [each, material] : scene.materials) names.push_back(each);
@@ -20,6 +24,13 @@ Material material_named(const Scene& scene, const std::string& name, const std::
   if (hint.empty())
     hint = fmt::format("; known: {}; or give [materials.\"{}\"]", fmt::join(names, ", "), name);
   throw InputError(origin, fmt::format("no material \"{}\"{}", name, hint));
+}
+
+// What [parts.NAME], the scene or the body says; "" where nothing does.
+const std::string& name_of_material(const Scene& scene, const Part& part) {
+  const auto own = scene.parts.find(part.name);
+  if (own != scene.parts.end() && !own->second.material.empty()) return own->second.material;
+  return scene.material.empty() ? part.material : scene.material;
 }
 
 const char* default_model(const Part& part) {
@@ -110,9 +121,7 @@ std::vector<Material> materials_of_parts(const Scene& scene, const Body& body) {
     settings.origin = scene.name;
     if (const auto found = scene.parts.find(part.name); found != scene.parts.end()) settings = found->second;
     refuse_model(settings, part);
-    const std::string& name = !settings.material.empty() ? settings.material
-                              : !scene.material.empty()  ? scene.material
-                                                         : part.material;
+    const std::string& name = name_of_material(scene, part);
     if (name.empty())
       throw InputError(
           scene.name, fmt::format("part \"{}\" has no material: write material = \"steel\" at the top of the "
@@ -121,6 +130,22 @@ std::vector<Material> materials_of_parts(const Scene& scene, const Body& body) {
     materials.push_back(material_named(scene, name, settings.origin));
   }
   return materials;
+}
+
+void warn_of_unused_materials(const Scene& scene, const Body& body, Progress& progress) {
+  std::vector<std::string> used;
+  for (const Part& part : body.parts) used.push_back(name_of_material(scene, part));
+  if (!scene.events.empty()) {  // a part that joins later
+    used.push_back(scene.material);
+    for (const auto& [name, settings] : scene.parts) used.push_back(settings.material);
+  }
+  for (const auto& [name, material] : scene.materials)
+    if (std::none_of(used.begin(), used.end(),
+                     [&own = name](const std::string& each) { return same_material_name(each, own); }))
+      progress.warn(
+          fmt::format("{}: [materials.{}] is used by no part: write material = \"{}\" at the top of the "
+                      "scene or in [parts.NAME], or leave it out",
+                      scene.name, name, name));
 }
 
 }  // namespace flexel

@@ -5,7 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
+#include "formats/error.h"
+#include "formats/fields.h"
 #include "formats/units.h"
 #include "simulate/connections.h"
 #include "simulate/stress.h"
@@ -34,11 +37,48 @@ void warn_of_springs(const Setting& setting, Progress& progress) {
 }
 
 void measure_displacement(const Body& body, const State& state, SimulateResult& result) {
-  for (std::size_t e = 0; e < body.element_count(); ++e)
-    if (const double length = state.displacement[e].norm(); length > result.largest_displacement) {
-      result.largest_displacement = length;
-      result.largest_displacement_at = body.rest[e];
+  const LargestDisplacement largest = largest_displacement(body, state.displacement);
+  result.largest_displacement = largest.value();
+  result.largest_displacement_at = largest.at;
+}
+
+// A couple is spread by forces that keep their direction: turned about its axis by an angle, the angle's
+// cosine of it is left.
+std::vector<std::string> warnings_of(const SimulateResult& result) {
+  constexpr double kLargestTurn = 10 * std::numbers::pi / 180;
+  std::vector<std::string> warnings;
+  for (const AppliedLoad& load : result.loads) {
+    if (!load.rotation || load.displacement) continue;  // nothing, or of a rigid link
+    if (const double turn = load.rotation->norm(); turn > kLargestTurn)
+      warnings.push_back(
+          fmt::format("load \"{}\" turned what it acts on by {:.0f} degrees, and its forces keep the "
+                      "direction that they have at rest: about {:.0f} % of its torque is left, and the "
+                      "result is that of so much; lead the place with [[move]] and \"rotation\" instead, or "
+                      "take a torque that turns it by less than 10 degrees",
+                      load.name, 180 / std::numbers::pi * turn, std::max(0.0, 100 * std::cos(turn))));
+  }
+  return warnings;
+}
+
+void refuse_not_finite(const SimulateResult& result, const std::string& scene) {
+  double sum = result.elastic_energy + result.mass + result.largest_displacement + result.imbalance.norm() +
+               result.moment_imbalance.norm() + (result.stress ? result.stress->value : 0);
+  for (const ProbeResult& probe : result.probes) sum += probe.displacement.norm();
+  for (const Reaction& reaction : result.reactions) sum += reaction.force.norm() + reaction.moment.norm();
+  std::string largest = "a move, gravity or a part's motion";
+  double most = 0;
+  for (const AppliedLoad& load : result.loads) {
+    sum += load.force.norm() + load.moment.norm();
+    if (const double force = load.force.norm(); !(force <= most)) {
+      most = force;
+      largest = fmt::format("load \"{}\" ({:.3g} N)", load.name, force);
     }
+  }
+  if (std::isfinite(sum)) return;
+  throw DivergedError(
+      fmt::format("{}: the result is not finite: {} is beyond what can be computed with; check its "
+                  "unit and that of the part",
+                  scene, largest));
 }
 
 // A cell resists by its mean deformation gradient; a corner of it may fold unnoticed, and with it the surface
@@ -62,7 +102,7 @@ void measure_corners(const Cells& cells, const Body& body, const State& state, S
 void measure_stress(const Setting& setting, const State& state, Body& body, SimulateResult& result) {
   if (body.cell_count() == 0) return;
   const Stresses computed = stresses(setting, state);
-  const std::optional<LargestStress> largest = largest_stress(setting, computed);
+  const std::optional<LargestStress> largest = largest_stress(body, computed);
   if (!largest) return;
   const double yield = setting.materials[largest->part].yield;
   result.stress = StressSummary{largest->value, largest->at, body.parts[largest->part].name, {}};

@@ -11,7 +11,7 @@ void name_materials(Body& body, const std::vector<Material>& materials);
 // What models `springs` and `paper` cannot follow of a material.
 void warn_of_springs(const Setting& setting, Progress& progress);
 
-// Largest displacement over the elements, and where.
+// Largest displacement of the part's matter. `body` is at the state already.
 void measure_displacement(const Body& body, const State& state, SimulateResult& result);
 
 // Smallest J at the corners of the cells, with a warning where one is folded or nearly so.
@@ -20,6 +20,13 @@ void measure_corners(const Cells& cells, const Body& body, const State& state, S
 
 // The stresses of the final state: columns of the body, and the largest. Model `paper` has none.
 void measure_stress(const Setting& setting, const State& state, Body& body, SimulateResult& result);
+
+// What makes figures of a result worth less than they look, for people: torques that turn what they act on by
+// more than 10 degrees.
+[[nodiscard]] std::vector<std::string> warnings_of(const SimulateResult& result);
+
+// Throws DivergedError where a figure of the result is NaN or infinite, naming the largest load.
+void refuse_not_finite(const SimulateResult& result, const std::string& scene);
 
 // Adds the times that effects took in one stretch of a run to those of the stretches before: an effect that
 // was there already goes on.

@@ -10,6 +10,7 @@
 #include "formats/error.h"
 #include "formats/files.h"
 #include "simulate/events/all.h"
+#include "simulate/material_names.h"
 
 namespace flexel {
 namespace {
@@ -55,6 +56,12 @@ void parse_materials(TableReader& root, Scene& scene) {
   TableReader materials(*table, root.file(), "[materials]");
   for (const auto& [name, value] : table->members) {
     TableReader reader(value, root.file(), fmt::format("[materials.{}]", name));
+    for (const auto& [other, material] : scene.materials)
+      if (same_material_name(other, name))
+        reader.fail(
+            fmt::format("[materials.{}] and [materials.{}] are one name: case, blanks, \"-\" and \"_\" do "
+                        "not matter; rename one",
+                        other, name));
     scene.materials[name] = parse_material(reader, name);
   }
 }

@@ -2,7 +2,12 @@
 #define TOML_EXCEPTIONS 1
 #include <toml++/toml.h>
 
+#include <fmt/format.h>
+
+#include <cmath>
+
 #include "formats/error.h"
+#include "formats/number_range.h"
 #include "simulate/scene_table.h"
 
 namespace flexel {
@@ -50,12 +55,23 @@ SceneValue convert(const toml::node& node) {
   return value;
 }
 
+// NaN, infinity and numbers beyond all measure mean nothing in any key.
+void refuse_wild_numbers(const SceneValue& value, const std::string& key, const std::string& name) {
+  if (value.kind == SceneValue::Kind::number && !is_readable_number(value.number))
+    throw InputError(name + ":" + std::to_string(value.line),
+                     fmt::format("\"{}\" holds {}: a number needs to be finite, and at most 1e35 in size",
+                                 key, value.number));
+  for (const SceneValue& item : value.items) refuse_wild_numbers(item, key, name);
+  for (const auto& [own, member] : value.members) refuse_wild_numbers(member, own, name);
+}
+
 }  // namespace
 
 SceneValue read_toml(const std::string& text, const std::string& name) {
   try {
     SceneValue root = convert(toml::parse(text, name));
     root.line = 1;
+    refuse_wild_numbers(root, name, name);
     return root;
   } catch (const toml::parse_error& error) {
     throw InputError(name + ":" + std::to_string(error.source().begin.line),

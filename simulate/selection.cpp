@@ -1,6 +1,6 @@
-// Finds polygons by name and elements by region. A name is looked up in this order: "part/number" and
-// "part/name" of a face, "part/side", the name of a part, a side of the whole body, the name of a face or
-// group of any part.
+// Finds polygons by name and elements by region. What Flexel itself calls faces ("part/2", sides: "xmin",
+// "part/xmin") and what the file calls them ("part/flange", "flange") is looked up in both; a name that means
+// one thing there and another here is refused, and "#" or "=" before its last word says which.
 //
 // A side is the set of polygons that lie within 1e-3 of the body's extent of the extreme and face that way
 // within 45 degrees. Where no polygon lies there whole (the end of a ball), those that reach it and face that
@@ -19,6 +19,7 @@
 #include "formats/error.h"
 #include "formats/program.h"
 #include "formats/units.h"
+#include "simulate/scene_checks.h"
 
 namespace flexel {
 namespace {
@@ -97,17 +98,62 @@ std::optional<std::uint32_t> number_in(const std::string& text) {
   return number;
 }
 
-// Faces called `name` (or numbered so, within `part`); ascending.
-std::vector<std::uint32_t> faces_called(const Surface& surface, const std::string& name,
-                                        std::optional<std::uint32_t> part) {
-  std::vector<std::uint32_t> found;
+// The last word of a name, and who calls it so.
+struct Word {
+  enum class By { either, flexel, file };
+  By by = By::either;  // "#2", "#xmin": numbers and sides; "=2": names of the file
+  std::string text;
+};
+
+Word parse_word(const std::string& text) {
+  if (!text.empty() && text.front() == '#') return {Word::By::flexel, text.substr(1)};
+  if (!text.empty() && text.front() == '=') return {Word::By::file, text.substr(1)};
+  return {Word::By::either, text};
+}
+
+// Polygons that the file calls so, of all parts or one.
+std::vector<std::uint32_t> polygons_of_file(const Surface& surface, const Word& word,
+                                            std::optional<std::uint32_t> part) {
+  std::vector<std::uint32_t> faces;
+  if (word.by == Word::By::flexel || word.text.empty()) return faces;  // a face without a name has no name
+  for (std::uint32_t f = 0; f < surface.faces.size(); ++f)
+    if ((!part || surface.faces[f].part == *part) && surface.faces[f].name == word.text) faces.push_back(f);
+  return polygons_of_faces(surface, faces);
+}
+
+// Polygons that Flexel calls so: a side of all parts or of one, a face of one part by its number.
+std::vector<std::uint32_t> polygons_of_flexel(const Surface& surface, const Word& word,
+                                              std::optional<std::uint32_t> part) {
+  if (word.by == Word::By::file) return {};
+  if (const auto side = side_of(word.text)) return polygons_of_side(surface, *side, part);
+  const std::optional<std::uint32_t> number = part ? number_in(word.text) : std::nullopt;
+  if (!number) return {};
   const std::vector<std::uint32_t> numbers = face_numbers(surface);
-  const std::optional<std::uint32_t> number = part ? number_in(name) : std::nullopt;
-  for (std::uint32_t f = 0; f < surface.faces.size(); ++f) {
-    if (part && surface.faces[f].part != *part) continue;
-    if (surface.faces[f].name == name || (number && numbers[f] == *number)) found.push_back(f);
-  }
-  return found;
+  std::vector<std::uint32_t> faces;
+  for (std::uint32_t f = 0; f < surface.faces.size(); ++f)
+    if (surface.faces[f].part == *part && numbers[f] == *number) faces.push_back(f);
+  return polygons_of_faces(surface, faces);
+}
+
+// The polygons of the word, which must not mean two things. `before`: "part/", or nothing.
+std::vector<std::uint32_t> polygons_called(const Selection& selection, const Surface& surface,
+                                           const std::string& before, const std::string& text,
+                                           std::optional<std::uint32_t> part) {
+  const Word word = parse_word(text);
+  std::vector<std::uint32_t> own = polygons_of_flexel(surface, word, part);
+  std::vector<std::uint32_t> named = polygons_of_file(surface, word, part);
+  if (word.by != Word::By::either && named.empty())  // the file's name may begin so
+    named = polygons_of_file(surface, {Word::By::file, text}, part);
+  if (!own.empty() && !named.empty() && own != named)
+    throw InputError(
+        selection.origin,
+        fmt::format("\"{0}{1}\" means two things: {2}, and the face or group that the file calls "
+                    "\"{1}\"; write \"{0}#{3}\" for the first, \"{0}={1}\" for the second",
+                    before, text,
+                    side_of(word.text) ? "the side of that name"
+                                       : fmt::format("face number {} of `flexel info`", word.text),
+                    word.text));
+  return own.empty() ? named : own;
 }
 
 std::vector<std::string> every_name(const Body& body) {
@@ -129,7 +175,7 @@ std::vector<std::string> every_name(const Body& body) {
     if (const auto part = part_named(body, name.substr(0, slash))) {
       const auto count = std::count_if(body.surface.faces.begin(), body.surface.faces.end(),
                                        [&](const SurfaceFace& face) { return face.part == *part; });
-      if (number_in(name.substr(slash + 1)))
+      if (number_in(parse_word(name.substr(slash + 1)).text))
         throw InputError(selection.origin, fmt::format("no face \"{}\"; part \"{}\" has faces 1 to {}", name,
                                                        body.parts[*part].name, count));
     } else {
@@ -159,21 +205,40 @@ std::vector<std::uint32_t> range(std::uint32_t begin, std::uint32_t end) {
 
 Selected resolve_name(const Selection& selection, const Body& body) {
   const std::string& name = selection.name;
-  if (const auto part = part_named(body, name))
+  const Word whole = parse_word(name);
+  std::optional<std::uint32_t> part = part_named(body, name);
+  if (!part && whole.by == Word::By::file) part = part_named(body, whole.text);
+  if (part) {
+    if (side_of(name))
+      throw InputError(selection.origin,
+                       fmt::format("\"{0}\" means two things: a part and a side; write \"={0}\" "
+                                   "for the part, \"#{0}\" for the side",
+                                   name));
     return {{}, range(body.parts[*part].element_begin, body.parts[*part].element_end)};
-  if (const auto side = side_of(name)) return {polygons_of_side(body.surface, *side, std::nullopt), {}};
+  }
+  std::vector<std::uint32_t> found = polygons_called(selection, body.surface, "", name, std::nullopt);
   // The part's own name may hold a slash: try every one.
   for (std::size_t slash = name.find('/'); slash != std::string::npos; slash = name.find('/', slash + 1)) {
-    const auto part = part_named(body, name.substr(0, slash));
+    part = part_named(body, name.substr(0, slash));
     if (!part) continue;
-    const std::string rest = name.substr(slash + 1);
-    const std::vector<std::uint32_t> faces = faces_called(body.surface, rest, part);
-    if (!faces.empty()) return {polygons_of_faces(body.surface, faces), {}};
-    if (const auto side = side_of(rest)) return {polygons_of_side(body.surface, *side, part), {}};
+    if (slash + 1 == name.size())
+      throw InputError(
+          selection.origin,
+          fmt::format("\"{0}\" names no face: write \"{0}1\" for a face, \"{0}xmin\" for a side, "
+                      "\"{1}\" for the whole part",
+                      name, body.parts[*part].name));
+    const std::vector<std::uint32_t> of_part =
+        polygons_called(selection, body.surface, name.substr(0, slash + 1), name.substr(slash + 1), part);
+    if (!found.empty() && !of_part.empty() && found != of_part)
+      throw InputError(
+          selection.origin,
+          fmt::format("\"{}\" means two things: names with a slash can be split in two ways here; "
+                      "rename a part or a group of the file",
+                      name));
+    if (!of_part.empty()) found = of_part;
   }
-  const std::vector<std::uint32_t> faces = faces_called(body.surface, name, std::nullopt);
-  if (faces.empty()) unknown_name(selection, body);
-  return {polygons_of_faces(body.surface, faces), {}};
+  if (found.empty()) unknown_name(selection, body);
+  return {found, {}};
 }
 
 bool holds(const Selection& selection, const Vec3& point) {
@@ -224,6 +289,18 @@ Selection select_by_name(std::string name, std::string origin) {
   selection.name = std::move(name);
   selection.origin = std::move(origin);
   return selection;
+}
+
+std::optional<Vec3> side_axis(const Selection& selection, const Body& body) {
+  if (selection.kind != Selection::Kind::name || part_named(body, selection.name)) return std::nullopt;
+  const std::size_t slash = selection.name.rfind('/');
+  const std::string before = slash == std::string::npos ? "" : selection.name.substr(0, slash);
+  const std::optional<std::uint32_t> part = part_named(body, before);
+  if (slash != std::string::npos && !part) return std::nullopt;
+  const Word word = parse_word(selection.name.substr(slash == std::string::npos ? 0 : slash + 1));
+  const std::optional<Side> side = side_of(word.text);
+  if (!side || word.by == Word::By::file) return std::nullopt;
+  return side->sign * Vec3::Unit(side->axis);
 }
 
 std::string describe(const Selection& selection) {

@@ -20,6 +20,7 @@
 #include "simulate/report.h"
 #include "simulate/rest_shape.h"
 #include "simulate/scene.h"
+#include "simulate/scene_checks.h"
 #include "simulate/stress.h"
 #include "simulate/stress_singularity.h"
 #include "simulate/time/settling.h"
@@ -241,6 +242,7 @@ SimulateResult Run::operator()() {
   const EquilibriumResult solved = solve(mechanics);
   buckled_ = solved.buckled;
   mechanics.report(state_, result);
+  for (const std::string& warning : warnings_of(result)) progress_.warn(scene_.name + ": " + warning);
   result.elastic_energy = mechanics.elastic_energy(state_);
   result.smallest_jacobian = mechanics.most_compressed(state_).value;
   measure_corners(mechanics.cells(), body_, state_, result, progress_);
@@ -265,6 +267,7 @@ SimulateResult Run::operator()() {
   }
   measure_displacement(body_, state_, result);
   result.mass = mass_of(setting_);
+  refuse_not_finite(result, scene_.name);
   result.load_steps = solved.load_steps;
   result.newton_iterations = solved.newton_iterations;
   result.cg_iterations = solved.cg_iterations;
@@ -294,6 +297,7 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
   progress.stage("simulate");
   std::optional<StopAfter> time_limit;
   if (options.timeout) time_limit.emplace(*options.timeout, "--timeout", LimitOf::command);
+  check_actions(scene, body, progress);
   if (scene.run.time) {
     SimulateResult result = run_in_time(body, scene, options, progress);
     progress.finish();

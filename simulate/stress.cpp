@@ -7,6 +7,8 @@
 #include <cmath>
 #include <span>
 
+#include "formats/distance.h"
+#include "formats/fields.h"
 #include "formats/parallel.h"
 #include "simulate/cells.h"
 #include "simulate/central_spring.h"
@@ -17,8 +19,8 @@ namespace {
 
 constexpr const char* kMises = "von_mises";
 constexpr const char* kPrincipal = "principal_stress";
+constexpr const char* kOfCell = "cell_";  // before a name: in the middle of each cell
 constexpr double kFull = 1 - 1e-9;
-constexpr double kHalfFull = 0.5;
 // Of the patch's weight, on the squared gradient per spacing: where the cells lie in one layer the field is
 // constant across it.
 constexpr double kRidge = 1e-3;
@@ -112,19 +114,58 @@ CellsOfElements cells_of_elements(const Body& body, const std::vector<std::uint8
   return result;
 }
 
-// Recovers the stress at an element.
+// The part's surface in each cell (compressed rows).
+class SurfaceOfCells {
+ public:
+  explicit SurfaceOfCells(const Body& body)
+      : body_(body), triangles_(triangulate(body.surface)), offsets_(body.cell_count() + 1, 0) {
+    const bool known = body.surface_cell_offsets.size() == body.surface.polygon_count() + 1;
+    const auto for_each = [&](const auto& each) {
+      for (std::uint32_t t = 0; known && t < triangles_.polygon.size(); ++t)
+        for (std::uint32_t i = body.surface_cell_offsets[triangles_.polygon[t]];
+             i < body.surface_cell_offsets[triangles_.polygon[t] + 1]; ++i)
+          each(body.surface_cells[i], t);
+    };
+    for_each([&](std::uint32_t c, std::uint32_t) { ++offsets_[c + 1]; });
+    for (std::size_t c = 0; c < body.cell_count(); ++c) offsets_[c + 1] += offsets_[c];
+    list_.resize(offsets_.back());
+    std::vector<std::uint32_t> next(offsets_.begin(), offsets_.end() - 1);
+    for_each([&](std::uint32_t c, std::uint32_t t) { list_[next[c]++] = t; });
+  }
+
+  // The point of the surface in `cells` that is nearest to `point`.
+  [[nodiscard]] std::optional<Vec3> nearest(std::span<const std::uint32_t> cells, const Vec3& point) const {
+    std::optional<Vec3> found;
+    for (const std::uint32_t c : cells)
+      for (std::uint32_t i = offsets_[c]; i < offsets_[c + 1]; ++i) {
+        const auto& corners = triangles_.corners[list_[i]];
+        const std::vector<Vec3>& at = body_.surface.vertices;
+        const Vec3 here = nearest_of_triangle(point, at[corners[0]], at[corners[1]], at[corners[2]]);
+        if (!found || (here - point).squaredNorm() < (*found - point).squaredNorm()) found = here;
+      }
+    return found;
+  }
+
+ private:
+  const Body& body_;
+  Triangles triangles_;
+  std::vector<std::uint32_t> offsets_, list_;
+};
+
+// Recovers the stress at an element, or at a point beside it.
 class Recovery {
  public:
   Recovery(const Body& body, const CellsOfElements& around, const std::vector<SymmetricStress>& cell)
       : body_(body), around_(around), cell_(cell) {}
 
-  [[nodiscard]] SymmetricStress operator()(std::uint32_t e) const {
+  // `beside`: where, from the element, in spacings of the lattice.
+  [[nodiscard]] SymmetricStress operator()(std::uint32_t e, const Vec3& beside) const {
     const std::span<const std::uint32_t> near = around_.of(e);
     if (near.empty()) return SymmetricStress::Zero();
     const bool full = near.size() == 8 && std::all_of(near.begin(), near.end(), [&](std::uint32_t c) {
                         return body_.fill[c] >= kFull;
                       });
-    if (!full) return fitted(e, patch(near));
+    if (!full) return fitted(e, beside, patch(near));
     SymmetricStress sum = SymmetricStress::Zero();
     for (const std::uint32_t c : near) sum += cell_[c];
     return sum / 8;
@@ -148,7 +189,8 @@ class Recovery {
     return cells;
   }
 
-  [[nodiscard]] SymmetricStress fitted(std::uint32_t e, const std::vector<std::uint32_t>& cells) const {
+  [[nodiscard]] SymmetricStress fitted(std::uint32_t e, const Vec3& beside,
+                                       const std::vector<std::uint32_t>& cells) const {
     using Vec4 = Eigen::Vector4d;
     Eigen::Matrix4d moments = Eigen::Matrix4d::Zero();
     Eigen::Matrix<double, 4, 6> values = Eigen::Matrix<double, 4, 6>::Zero();
@@ -168,7 +210,7 @@ class Recovery {
     spread.diagonal().array() += ridge;
     const Eigen::Matrix<double, 3, 6> slope =
         spread.ldlt().solve(values.bottomRows<3>() - moments(0, 0) * middle * mean);
-    return (mean - middle.transpose() * slope).transpose();
+    return (mean + (beside - middle).transpose() * slope).transpose();
   }
 
   const Body& body_;
@@ -176,19 +218,15 @@ class Recovery {
   const std::vector<SymmetricStress>& cell_;
 };
 
-Vec3 cell_middle(const Body& body, std::size_t cell) {
-  return 0.5 * (body.rest[body.cell_elements[cell][0]] + body.rest[body.cell_elements[cell][7]]);
-}
-
-void add_columns(const std::vector<SymmetricStress>& stress, Columns& columns) {
+void add_columns(const std::vector<SymmetricStress>& stress, const std::string& before, Columns& columns) {
   Column mises{1, std::vector<double>(stress.size())}, principal{3, std::vector<double>(3 * stress.size())};
   parallel_for_each(stress.size(), [&](std::size_t i) {
     mises.values[i] = von_mises(stress[i]);
     const Vec3 each = principal_stresses(stress[i]);
     std::copy(each.begin(), each.end(), principal.values.begin() + static_cast<std::ptrdiff_t>(3 * i));
   });
-  columns[kMises] = std::move(mises);
-  columns[kPrincipal] = std::move(principal);
+  columns[before + kMises] = std::move(mises);
+  columns[before + kPrincipal] = std::move(principal);
 }
 
 }  // namespace
@@ -200,10 +238,23 @@ Stresses stresses(const Setting& setting, const State& state) {
   result.cell = cell_stresses(setting, state, active);
   const CellsOfElements around = cells_of_elements(body, active);
   result.element.assign(body.element_count(), SymmetricStress::Zero());
+  result.element_at = body.rest;
   const Recovery recover(body, around, result.cell);
+  const std::vector<std::uint8_t> inside = elements_in_matter(body);
+  const std::vector<std::uint32_t> part = element_parts(body);
+  std::optional<SurfaceOfCells> surface;
+  if (std::find(inside.begin(), inside.end(), 0) != inside.end()) surface.emplace(body);
   parallel_for_each(
       body.element_count(),
-      [&](std::size_t e) { result.element[e] = recover(static_cast<std::uint32_t>(e)); }, kStressGrain);
+      [&](std::size_t i) {
+        const auto e = static_cast<std::uint32_t>(i);
+        if (inside[e] == 0)
+          result.element_at[e] = surface->nearest(around.of(e), body.rest[e]).value_or(body.rest[e]);
+        const Lattice& lattice = body.parts[part[e]].lattice;
+        result.element[e] = recover(e, (lattice.axes.transpose() * (result.element_at[e] - body.rest[e]))
+                                           .cwiseQuotient(lattice.spacing));
+      },
+      kStressGrain);
   return result;
 }
 
@@ -217,36 +268,31 @@ Vec3 principal_stresses(const SymmetricStress& stress) {
   return solver.eigenvalues().reverse();
 }
 
-std::optional<LargestStress> largest_stress(const Setting& setting, const Stresses& stresses) {
-  const Body& body = setting.body;
-  const std::vector<std::uint8_t> active = active_cells(setting);
+std::optional<LargestStress> largest_stress(const Body& body, const Stresses& stresses) {
   std::optional<LargestStress> largest;
-  const auto look = [&](const SymmetricStress& stress, const Vec3& at, std::uint32_t part) {
-    if (const double value = von_mises(stress); !largest || value > largest->value)
-      largest = LargestStress{value, at, part};
-  };
-  for (std::uint32_t p = 0; p < body.parts.size(); ++p)
-    for (std::uint32_t c = body.parts[p].cell_begin; c < body.parts[p].cell_end; ++c) {
-      if (!active[c]) continue;
-      if (body.fill[c] >= kFull)
-        for (const std::uint32_t e : body.cell_elements[c]) look(stresses.element[e], body.rest[e], p);
-      if (body.fill[c] >= kHalfFull) look(stresses.cell[c], cell_middle(body, c), p);
-    }
+  for (std::uint32_t p = 0; p < body.parts.size(); ++p) {
+    if (body.parts[p].placement == Placement::centre) continue;
+    for (std::uint32_t e = body.parts[p].element_begin; e < body.parts[p].element_end; ++e)
+      if (const double value = von_mises(stresses.element[e]); !largest || value > largest->value)
+        largest = LargestStress{value, stresses.element_at[e], p};
+  }
   return largest;
 }
 
 void write_stress_columns(const Stresses& stresses, Body& body) {
-  add_columns(stresses.cell, body.cell_columns);
-  add_columns(stresses.element, body.element_columns);
+  add_columns(stresses.cell, kOfCell, body.cell_columns);
+  add_columns(stresses.element, "", body.element_columns);
 }
 
 bool is_stress_column(const std::string& name) {
-  return name == kMises || name == kPrincipal;
+  for (const std::string column : {kMises, kPrincipal})
+    if (name == column || name == kOfCell + column) return true;
+  return false;
 }
 
 void erase_stress_columns(Body& body) {
   for (Columns* columns : {&body.cell_columns, &body.element_columns})
-    for (const char* name : {kMises, kPrincipal}) columns->erase(name);
+    std::erase_if(*columns, [](const auto& column) { return is_stress_column(column.first); });
 }
 
 }  // namespace flexel

@@ -7,6 +7,7 @@
 
 #include "formats/program.h"
 #include "formats/units.h"
+#include "simulate/report.h"
 #include "simulate/simulate.h"
 
 namespace flexel {
@@ -170,6 +171,7 @@ std::string summary_json(const SimulateResult& result, const Body& body) {
   json["mass"] = result.mass;
   json["largest_displacement"] = result.largest_displacement;
   json["largest_displacement_at"] = vector(result.largest_displacement_at);
+  json["warnings"] = warnings_of(result);
   json["probes"] = Json::array();
   for (const ProbeResult& probe : result.probes)
     json["probes"].push_back(

@@ -1,62 +1,27 @@
 // Body attributes, and their way from cells to elements to the vertices of the surface.
 #include "flexel/picture/attribute.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <limits>
 
-#include "formats/locate.h"
+#include "formats/fields.h"
 #include "formats/parallel.h"
 
 namespace flexel {
 namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-constexpr std::uint32_t kNoPolygon = 0xffffffffu;
-
-double equivalent_strain(const Mat3& gradient) {
-  if (!gradient.allFinite() || !(gradient.determinant() > 0)) return kUnknown;
-  const Eigen::SelfAdjointEigenSolver<Mat3> solver(gradient.transpose() * gradient, Eigen::EigenvaluesOnly);
-  if (!(solver.eigenvalues().minCoeff() > 0)) return kUnknown;
-  const Vec3 logarithms = 0.5 * solver.eigenvalues().array().log();
-  return std::sqrt(2.0 / 3.0) * (logarithms.array() - logarithms.mean()).matrix().norm();
-}
-
-Mat3 cell_gradient(const Body& body, const Part& part, std::size_t cell) {
-  Mat3 gradient = Mat3::Zero();
-  for (std::size_t a = 0; a < 8; ++a) {
-    const Vec3 side((a & 1) != 0 ? 1 : -1, (a & 2) != 0 ? 1 : -1, (a & 4) != 0 ? 1 : -1);
-    gradient +=
-        body.position[body.cell_elements[cell][a]] * side.cwiseQuotient(4 * part.lattice.spacing).transpose();
-  }
-  return gradient;
-}
-
-Mat3 fitted_gradient(const Body& body, const Adjacency& adjacency, std::uint32_t element) {
-  Mat3 moved = Mat3::Zero(), rest = Mat3::Zero();
-  for (const std::uint32_t other : adjacency.of(element)) {
-    const Vec3 arm = body.rest[other] - body.rest[element];
-    moved += (body.position[other] - body.position[element]) * arm.transpose();
-    rest += arm * arm.transpose();
-  }
-  const double scale = rest.trace() / 3;
-  if (!(rest.determinant() > 1e-6 * scale * scale * scale)) return Mat3::Constant(kUnknown);
-  return moved * rest.inverse();
-}
 
 // The cell under each vertex, by the first polygon that has one.
 std::vector<std::optional<CellPoint>> cell_points(const Body& body) {
   const Surface& surface = body.surface;
-  std::vector<std::uint32_t> polygon(surface.vertices.size(), kNoPolygon);
-  for (std::uint32_t p = 0; p < surface.polygon_count(); ++p)
-    for (const std::uint32_t v : surface.polygon(p))
-      if (polygon[v] == kNoPolygon && body.surface_cell_offsets[p + 1] > body.surface_cell_offsets[p])
-        polygon[v] = p;
+  const std::vector<std::uint32_t> polygon = polygons_around_vertices(body);
   std::vector<std::optional<CellPoint>> points(surface.vertices.size());
   parallel_for_each(points.size(), [&](std::size_t v) {
-    if (polygon[v] != kNoPolygon) points[v] = locate_on_surface(body, polygon[v], surface.vertices[v]);
+    if (polygon[v] != kNoPolygonAround) points[v] = locate_on_surface(body, polygon[v], surface.vertices[v]);
   });
   return points;
 }
@@ -103,21 +68,7 @@ std::vector<double> scalars(const Column& column, std::optional<int> component) 
 }
 
 Attribute strain(const Body& body) {
-  if (body.cell_count() == 0) {
-    const Adjacency adjacency = element_adjacency(body);
-    Attribute result{Attribute::At::elements, std::vector<double>(body.element_count())};
-    parallel_for_each(result.values.size(), [&](std::size_t e) {
-      result.values[e] = equivalent_strain(fitted_gradient(body, adjacency, static_cast<std::uint32_t>(e)));
-    });
-    return result;
-  }
-  Attribute result{Attribute::At::cells, std::vector<double>(body.cell_count(), kUnknown)};
-  for (const Part& part : body.parts)
-    parallel_for_each(part.cell_end - part.cell_begin, [&](std::size_t i) {
-      const std::size_t c = part.cell_begin + i;
-      result.values[c] = equivalent_strain(cell_gradient(body, part, c));
-    });
-  return result;
+  return {body.cell_count() == 0 ? Attribute::At::elements : Attribute::At::cells, strains(body)};
 }
 
 std::vector<std::string> surface_attribute_names(const Surface& surface) {
@@ -144,6 +95,18 @@ std::optional<Attribute> body_attribute(const Body& body, const std::string& nam
   parallel_for_each(moved.size(), [&](std::size_t e) { moved[e] = body.position[e] - body.rest[e]; });
   auto values = displacement_values(moved, component);
   return values ? std::optional(Attribute{Attribute::At::elements, std::move(*values)}) : std::nullopt;
+}
+
+std::optional<double> largest_in_matter(const Body& body, const std::string& name) {
+  if (const auto column = body.element_columns.find(name); column != body.element_columns.end()) {
+    const std::vector<double>& values = column->second.values;
+    if (name != "von_mises" || values.empty()) return std::nullopt;
+    return *std::max_element(values.begin(), values.end());
+  }
+  if (body.cell_columns.contains(name)) return std::nullopt;
+  if (name == "displacement") return largest_displacement(body).value();
+  if (name == "strain") return largest_strain(body);
+  return std::nullopt;
 }
 
 std::optional<std::vector<double>> displacement_values(const std::vector<Vec3>& displacement,
@@ -182,8 +145,7 @@ std::vector<double> at_vertices(const Body& body, const Attribute& attribute,
                                 const std::vector<std::uint32_t>& nearest_element) {
   const std::vector<double> elements = at_elements(body, attribute);
   std::vector<double> values(body.surface.vertices.size(), kUnknown);
-  const bool with_cells = body.surface_cell_offsets.size() == body.surface.polygon_count() + 1;
-  const auto points = with_cells ? cell_points(body) : std::vector<std::optional<CellPoint>>(values.size());
+  const auto points = cell_points(body);
   parallel_for_each(values.size(), [&](std::size_t v) {
     if (!points[v]) {
       values[v] = elements[nearest_element[v]];

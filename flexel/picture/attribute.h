@@ -24,10 +24,12 @@ struct Attribute {
 [[nodiscard]] std::optional<Attribute> body_attribute(const Body& body, const std::string& name);
 [[nodiscard]] std::vector<std::string> body_attribute_names(const Body& body);
 
-// Equivalent (von Mises) logarithmic strain of every cell, sqrt(2/3 e : e) with e the deviator of 1/2 ln(F^T
-// F), F the cell's mean deformation gradient; of every element in centre placement, F fitted to its
-// connections by least squares. NaN where F has no inverse.
+// strains() of formats/fields.h, of cells or elements.
 [[nodiscard]] Attribute strain(const Body& body);
+
+// The largest "displacement", "strain" or "von_mises" of the part's matter, as the summary of a run gives it
+// (formats/fields.h, simulate/stress.h); nothing for other names.
+[[nodiscard]] std::optional<double> largest_in_matter(const Body& body, const std::string& name);
 
 // Values of cells at the elements: the mean over the element's cells, weighted by fill; and of elements in
 // the cells: the mean of the eight.

@@ -185,6 +185,11 @@ void find_range(const ColourBy& by, Panel& panel) {
     panel.low = std::min(panel.low.value_or(value), value);
     panel.high = std::max(panel.high.value_or(value), value);
   }
+  // Vertices are samples, and elements beside the part carry it without being of it: the largest is that of
+  // its matter.
+  if (!panel.subject->body || !panel.high) return;
+  if (const auto largest = largest_in_matter(*panel.subject->body, by.name))
+    panel.high = static_cast<float>(*largest);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "formats/error.h"
+#include "formats/number_range.h"
 #include "simulate/rigid/rigid_body.h"
 
 namespace flexel {
@@ -32,7 +33,7 @@ std::optional<double> number_of(const std::string& word) {
   const char* end = word.data() + word.size();
   const char* begin = word.data() + (word.size() > 1 && word[0] == '+' ? 1 : 0);
   const auto [stop, error] = std::from_chars(begin, end, value);
-  if (error != std::errc() || stop != end || !std::isfinite(value)) return std::nullopt;
+  if (error != std::errc() || stop != end || !is_readable_number(value)) return std::nullopt;
   return value;
 }
 

@@ -11,6 +11,7 @@
 
 #include "formats/error.h"
 #include "formats/files.h"
+#include "formats/number_range.h"
 
 namespace flexel {
 namespace {
@@ -129,8 +130,9 @@ ManipulatorPath read_path(const std::string& text, const std::string& name) {
       double value = 0;
       const char* end = fields[f].data() + fields[f].size();
       const auto [stop, error] = std::from_chars(fields[f].data(), end, value);
-      if (error != std::errc() || stop != end || !std::isfinite(value))
-        throw InputError(place, fmt::format("\"{}\" is no number", fields[f]));
+      if (error != std::errc() || stop != end || !is_readable_number(value * columns[f].factor))
+        throw InputError(place,
+                         fmt::format("\"{}\" is no finite number of at most 1e35 in SI units", fields[f]));
       values[static_cast<std::size_t>(columns[f].place)] = value * columns[f].factor;
     }
     path.time.push_back(values[0]);

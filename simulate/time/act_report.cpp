@@ -21,6 +21,7 @@ void Act::tell_forces(SimulateResult& result) const {
 
 void Act::report(const Clock& clock, bool stress, SimulateResult& result) {
   tell_forces(result);
+  for (const std::string& warning : warnings_of(result)) progress_.warn(scene_.name + ": " + warning);
   for (const ProbePoints& probe : probes_) result.probes.push_back(measure(probe, state_));
   const Stencil none;
   const Cells cells(setting_, none);

@@ -252,6 +252,7 @@ SimulateResult TimedRun::report() {
   act_->add_effort(result, options_.explain);
   if (history_) result.timed->books = history_->ledger().sums();
   if (settling_) settling_->report(result);
+  refuse_not_finite(result, scene_.name);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
   if (!beginning_.fused.empty())
     progress_.say(fmt::format("{} fused points hold in this run only: a later one has to fuse again",

@@ -84,6 +84,20 @@ TEST(Actions, TheInwardNormalIsAgainstTheAreaVector) {
   EXPECT_EQ(scene.get<Ties>().ties.size(), 1u);
 }
 
+// A slanted top: its polygon looks 45 degrees away from z, but "zmax" is a side, whose push is along z.
+TEST(Actions, APushOnASideGoesAlongItsAxis) {
+  const Body body = with_faces(
+      {{Vec3(0, 0, 0), Vec3(1, 0, 1), Vec3(0, 1, 0)}, {Vec3(1, 0, 1), Vec3(1, 1, 1), Vec3(0, 1, 0)}});
+  Scene scene;
+  add_push(scene, parse_push("zmax: 50 N"), body);
+  add_push(scene, parse_push("group: 50 N"), body);
+  add_move(scene, parse_move("part/zmax: 2 mm"), body);
+  const std::vector<Load>& loads = scene.get<Loads>().loads;
+  EXPECT_EQ(*loads[0].force, Vec3(0, 0, -50));
+  EXPECT_LT((*loads[1].force - 50 * Vec3(1, 0, -1).normalized()).norm(), 1e-12);
+  EXPECT_EQ(scene.get<Ties>().ties[0].motion.translation, Vec3(0, 0, -2e-3));
+}
+
 TEST(Actions, FacesThatLookBothWaysHaveNoDirection) {
   const Body body = with_faces(
       {{Vec3(0, 0, 1), Vec3(1, 0, 1), Vec3(0, 1, 1)}, {Vec3(0, 0, 0), Vec3(0, 1, 0), Vec3(1, 0, 0)}});

@@ -133,7 +133,7 @@ TEST(Attributes, HoldWhatIsKnownOfEachVertex) {
   const Columns columns = vertex_attributes(body.surface, body, map_surface(body, {}, progress));
   check_columns(columns, body.surface.vertices.size(), "vertex_columns", "test");
   EXPECT_EQ(columns.at("displacement").components, 3);
-  for (const double value : columns.at("strain").values) EXPECT_NEAR(value, 0.2, 1e-9);
+  for (const double value : columns.at("stretch").values) EXPECT_NEAR(value, 0.2, 1e-9);
   for (const double value : columns.at("frame_kind").values) EXPECT_EQ(value, 0);
   for (const double value : columns.at("rest_residual").values) EXPECT_LT(value, 1e-15);
   EXPECT_EQ(columns.count("voronoi_changed"), 0u);

@@ -140,12 +140,12 @@ def test_attributes_checks_and_the_table():
     result = expect_ok(run("flexel-map", bent(), "-o", "a.ply", "--ascii", "--attributes", "--table", "--check",
                            "voronoi,self-intersection", "--report", "r.json"))
     head = open("a.ply").read().split("end_header")[0]
-    for name in ["strain", "frame_kind", "distance_outside", "rest_residual", "voronoi_changed"]:
+    for name in ["stretch", "frame_kind", "distance_outside", "rest_residual", "voronoi_changed"]:
         expect(f"property double {name}" in head, head)
     report = json.load(open("r.json"))
     expect(report["failures"]["new_self_intersections"] == 0 and report["advisories"]["voronoi_changed"] > 0, f"{report}")
     expect(report["smallest_angle_before"] > 10 and report["lattice_volume_before"] > 0, f"{report}")
-    for key in ["failures.new_self_intersections", "smallest_angle_after", "largest_strain"]:
+    for key in ["failures.new_self_intersections", "smallest_angle_after", "largest_stretch"]:
         expect(key in result.err, result.err)
     expect_error(run("flexel-map", "bent.vtu", "-o", "a.stl", "--attributes"), "flexel-map", "PLY")
     expect_error(run("flexel-map", "bent.vtu", "-o", "a.stl", "--check", "voroni"), "flexel-map", "voronoi")

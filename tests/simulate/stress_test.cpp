@@ -134,7 +134,7 @@ TEST(Stress, BendingAtEightCells) {
   const auto bending = [&](const Vec3& at) {
     return 10 * (length - at.x()) * std::abs(at.z() - side / 2) / inertia;
   };
-  const std::vector<double>& mises = body.cell_columns.at("von_mises").values;
+  const std::vector<double>& mises = body.cell_columns.at("cell_von_mises").values;
   for (std::size_t c = 0; c < body.cell_count(); ++c) {
     const Index3& at = body.lattice_index[body.cell_elements[c][0]];
     if (at[0] != 2 * n || (at[2] > 1 && at[2] < n - 2)) continue;
@@ -188,7 +188,8 @@ TEST(Stress, TorsionAtEightCells) {
   for (std::size_t c = 0; c < body.cell_count(); ++c) {
     const Index3& at = body.lattice_index[body.cell_elements[c][0]];
     if (at[0] == 3 * n / 2 && at[1] == n / 2 && (at[2] < 2 || at[2] > n - 3)) {
-      EXPECT_NEAR(body.cell_columns.at("von_mises").values[c] / wanted(at[1] + 0.5, at[2] + 0.5), 1, 0.05);
+      EXPECT_NEAR(body.cell_columns.at("cell_von_mises").values[c] / wanted(at[1] + 0.5, at[2] + 0.5), 1,
+                  0.05);
     }
   }
   for (std::size_t e = 0; e < body.element_count(); ++e) {
@@ -228,7 +229,7 @@ TEST(Stress, HoopStressBesideAHole) {
     const double x = at[0] + 0.5, y = at[1] + 0.5, r = std::hypot(x, y), angle = std::atan2(y, x);
     if (r < n + 0.75 || r > n + 1.75 || angle < M_PI / 3) continue;
     // Largest principal stress: the hoop stress there, to the second order of the shear beside it.
-    EXPECT_NEAR(body.cell_columns.at("principal_stress").values[3 * c] / hoop(r, angle), 1, 0.1)
+    EXPECT_NEAR(body.cell_columns.at("cell_principal_stress").values[3 * c] / hoop(r, angle), 1, 0.1)
         << r << " " << angle;
     ++judged;
   }

@@ -1,0 +1,143 @@
+// Selections are compared polygon by polygon and element by element; a polygon lies on held elements where
+// all that carry its middle are held. Each polygon counts by its area, each element once.
+#include "simulate/scene_checks.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "formats/area_vector.h"
+#include "formats/error.h"
+#include "formats/locate.h"
+
+namespace flexel {
+namespace {
+
+constexpr double kHeld = 0.99, kPartlyHeld = 0.1;  // of a load
+constexpr double kOffAxis = 10;                    // degrees
+constexpr double kCarries = 1e-6;                  // weight of an element
+
+// Loads and moves act whole at equilibrium.
+void refuse_course(const Course& course, const std::string& origin, const std::string& what) {
+  if (course.time.empty()) return;
+  throw InputError(
+      origin,
+      fmt::format("{} has \"time\" and \"factor\", and equilibrium has no time: leave them out (all of it "
+                  "acts then), or give [run] time = \"{:.6g} s\"",
+                  what, course.time.back() > 0 ? course.time.back() : 1));
+}
+
+void refuse_courses(const Scene& scene) {
+  for (const Load& load : scene.get<Loads>().loads)
+    refuse_course(load.course, load.origin, fmt::format("load \"{}\"", load.name));
+  for (const Tie& tie : scene.get<Ties>().ties)
+    refuse_course(tie.course, tie.origin, fmt::format("{} \"{}\"", tie.link ? "load" : "move", tie.name));
+}
+
+// Bit a: world axis a is held or led.
+struct HeldMasks {
+  std::vector<std::uint8_t> polygon, element;
+};
+
+HeldMasks held_masks(const std::vector<Tie>& ties, const Body& body) {
+  HeldMasks held{std::vector<std::uint8_t>(body.surface.polygon_count(), 0),
+                 std::vector<std::uint8_t>(body.element_count(), 0)};
+  for (const Tie& tie : ties) {
+    if (tie.link) continue;
+    const auto mask = static_cast<std::uint8_t>(tie.axes[0] | tie.axes[1] << 1 | tie.axes[2] << 2);
+    const Selected selected = resolve(tie.where, body);
+    for (const std::uint32_t p : selected.polygons) held.polygon[p] |= mask;
+    for (const std::uint32_t e : selected.elements) held.element[e] |= mask;
+  }
+  return held;
+}
+
+// Axes along which the elements under a polygon's middle are held.
+std::uint8_t held_under(const HeldMasks& held, const Body& body, std::uint32_t polygon) {
+  const auto corners = body.surface.polygon(polygon);
+  Vec3 middle = Vec3::Zero();
+  for (const std::uint32_t v : corners)
+    middle += body.surface.vertices[v] / static_cast<double>(corners.size());
+  const auto at = locate_on_surface(body, polygon, middle);
+  if (!at) return 0;
+  std::uint8_t mask = 7;
+  for (std::size_t a = 0; a < 8; ++a)
+    if (std::abs(at->weights[a]) > kCarries) mask &= held.element[body.cell_elements[at->cell][a]];
+  return mask;
+}
+
+// Of what acts along `along`, with that weight on each axis.
+double along_axes(const Vec3& along, std::uint8_t mask) {
+  double sum = 0;
+  for (int axis = 0; axis < 3; ++axis)
+    if ((mask >> axis & 1) != 0) sum += std::abs(along[axis]);
+  return sum;
+}
+
+// The share of a load that acts where supports hold the body along it.
+double held_share(const Load& load, const HeldMasks& held, const Body& body) {
+  const Selected selected = resolve(load.where, body);
+  const Vec3 force = load.force.value_or(Vec3::Zero());
+  double straight = 0, whole = 0;
+  const auto count = [&](const Vec3& along, std::uint8_t mask) {
+    straight += along_axes(along, mask);
+    whole += along_axes(along, 7);
+  };
+  for (const std::uint32_t p : selected.polygons) {
+    const Vec3 area = area_vector(body.surface.vertices, body.surface.polygon(p));
+    const Vec3 along = load.pressure                          ? area
+                       : force == Vec3::Zero() || load.torque ? Vec3(area.norm() * Vec3::Ones())
+                                                              : Vec3(area.norm() * force.normalized());
+    count(along, static_cast<std::uint8_t>(held.polygon[p] | held_under(held, body, p)));
+  }
+  for (const std::uint32_t e : selected.elements)
+    count(force == Vec3::Zero() || load.torque ? Vec3(Vec3::Ones()) : force, held.element[e]);
+  return whole > 0 ? straight / whole : 0;
+}
+
+void check_held(const Load& load, double share, Progress& progress) {
+  if (share >= kHeld)
+    throw InputError(load.origin,
+                     fmt::format("load \"{}\" does nothing: a [[fix]] or [[move]] holds the place where "
+                                 "it acts; select another face, or fix other axes",
+                                 load.name));
+  if (share >= kPartlyHeld)
+    progress.warn(
+        fmt::format("{}: {:.0f} % of load \"{}\" goes straight into a support: a [[fix]] or [[move]] holds "
+                    "that share of the place where it acts",
+                    load.origin, 100 * share, load.name));
+}
+
+// Degrees between the mean normal of a side's polygons and its axis.
+void check_side(const Load& load, const Body& body, Progress& progress) {
+  const std::optional<Vec3> axis = side_axis(load.where, body);
+  if (!load.pressure || !axis) return;
+  Vec3 sum = Vec3::Zero();
+  for (const std::uint32_t p : resolve(load.where, body).polygons)
+    sum += area_vector(body.surface.vertices, body.surface.polygon(p));
+  if (!(sum.norm() > 0)) return;
+  // A mesh whose polygons face inwards is no slanted side.
+  const double off =
+      180 / std::numbers::pi * std::acos(std::clamp(std::abs(sum.normalized().dot(*axis)), 0.0, 1.0));
+  if (off > kOffAxis)
+    progress.warn(
+        fmt::format("{}: the faces of \"{}\" look {:.0f} degrees away from that axis on average, and the "
+                    "pressure pushes along their normals; give a \"force\" for another direction",
+                    load.origin, load.name, off));
+}
+
+}  // namespace
+
+void check_actions(const Scene& scene, const Body& body, Progress& progress) {
+  warn_of_unused_materials(scene, body, progress);
+  if (!scene.run.time) refuse_courses(scene);
+  const HeldMasks held = held_masks(scene.get<Ties>().ties, body);
+  for (const Load& load : scene.get<Loads>().loads) {
+    check_held(load, held_share(load, held, body), progress);
+    check_side(load, body, progress);
+  }
+}
+
+}  // namespace flexel

@@ -1,0 +1,22 @@
+// What a scene asks of a body that would do nothing, or something else than it says.
+#pragma once
+#include "formats/progress.h"
+#include "simulate/scene.h"
+
+namespace flexel {
+
+// Before a run. Throws InputError: a load or move has a course where there is no time; a load acts only on
+// what a
+// [[fix]] or [[move]] holds along its direction. Warns: a tenth of a load's area or more does so, with the
+// share; a pressure on a side acts along normals that are off the side's axis by more than 10 degrees on
+// average, with the angle; a material of the scene is used by no part.
+void check_actions(const Scene& scene, const Body& body, Progress& progress);
+
+// Warns of each of the scene's own materials that no part is made of.
+void warn_of_unused_materials(const Scene& scene, const Body& body, Progress& progress);
+
+// The outward unit axis of a side ("zmax", "part/zmax", "#zmax"); nothing where the selection is anything
+// else.
+[[nodiscard]] std::optional<Vec3> side_axis(const Selection& selection, const Body& body);
+
+}  // namespace flexel
