@@ -14,7 +14,7 @@
 #include <filesystem>
 
 #include "formats/error.h"
-#include "formats/program.h"
+#include "formats/stop.h"
 
 namespace flexel {
 namespace {
@@ -25,7 +25,7 @@ class Descriptor {
  public:
   explicit Descriptor(const std::string& path) : owned_(path != "-") {
     do {
-      throw_if_interrupted();
+      check_stop();
       value_ = owned_ ? ::open(path.c_str(), O_RDONLY | O_CLOEXEC) : STDIN_FILENO;
     } while (value_ < 0 && errno == EINTR);
     if (value_ < 0) throw InputError(path, fmt::format("cannot read: {}", std::strerror(errno)));
@@ -49,7 +49,7 @@ void wait_until_readable(int descriptor) {
   pollfd wait = {descriptor, POLLIN, 0};
   int ready = 0;
   while (ready == 0 || (ready < 0 && errno == EINTR)) {
-    throw_if_interrupted();
+    check_stop();
     ready = ::poll(&wait, 1, kInterval);
   }
 }
@@ -71,7 +71,7 @@ Bytes read_to_end(int descriptor, std::size_t expected, const std::string& where
     if (got > 0) {
       size += static_cast<std::size_t>(got);
     } else if (errno == EINTR) {
-      throw_if_interrupted();
+      check_stop();
     } else {
       throw InputError(where, fmt::format("cannot read: {}", std::strerror(errno)));
     }

@@ -12,10 +12,11 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <utility>
 
 #include "formats/error.h"
 #include "formats/files.h"
-#include "formats/program.h"
+#include "formats/stop.h"
 
 namespace flexel {
 namespace {
@@ -80,7 +81,7 @@ int open_or_refuse(const std::string& name, int flags, mode_t mode, const std::s
     const int descriptor = ::open(name.c_str(), flags | O_CLOEXEC, mode);
     if (descriptor >= 0) return descriptor;
     if (errno != EINTR) refuse(path, errno);
-    throw_if_interrupted();
+    check_stop();
   }
 }
 
@@ -161,7 +162,7 @@ void OutputFile::write_through(const char* data, std::size_t size) {
     } else if (errno == EPIPE) {
       throw ReaderClosedPipe();
     } else if (errno == EINTR) {
-      throw_if_interrupted();
+      check_stop();
     } else {
       refuse(path_, errno);
     }

@@ -9,20 +9,27 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
+#include <condition_variable>
 #include <csignal>
 #include <cstdio>
 #include <cstring>
+#include <mutex>
 #include <new>
 #include <numeric>
+#include <thread>
 
 #include "formats/files.h"
+#include "formats/stop.h"
 #include "formats/termination.h"
 
 namespace flexel {
 namespace {
 
 volatile std::sig_atomic_t interrupt_count = 0, interrupting_signal = SIGINT, termination_waits = 0;
+volatile std::sig_atomic_t stop_ends_process = 0;
+std::array<char, 64> program_name{};  // of this program, for the signal handlers
 
 // As a shell gives it.
 int exit_code_of(int signal) {
@@ -30,13 +37,25 @@ int exit_code_of(int signal) {
 }
 static_assert(128 + SIGINT == kExitInterrupted);
 
+// Only what a signal handler may call.
+void write_words(std::initializer_list<const char*> words) {
+  for (const char* word : words) (void)!::write(STDERR_FILENO, word, std::strlen(word));
+}
+
+const char* word_of(int signal) {
+  return signal == SIGINT ? "interrupted" : "terminated";
+}
+
 void on_interrupt(int signal) {
+  const bool at_once = interrupt_count == 0 && stop_ends_process > 0;
   interrupt_count = interrupt_count + 1;
-  if (interrupt_count > 1) {
+  if (interrupt_count > 1 || at_once) {
+    if (at_once) write_words({program_name.data(), ": ", word_of(signal), "\n"});
     remove_temporary_outputs();
     _exit(exit_code_of(signal));
   }
   interrupting_signal = signal;
+  request_stop();
 }
 
 void on_termination(int signal) {
@@ -160,6 +179,7 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
 }  // namespace
 
 int run_program(const std::string& name, const std::function<int()>& body) {
+  name.copy(program_name.data(), program_name.size() - 1);
   hold_standard_descriptors();
   install_handlers();
   try {
@@ -177,7 +197,7 @@ int run_program(const std::string& name, const std::function<int()>& body) {
     return report(name, error.what(), kExitInvalidMapping);
   } catch (const Interrupted&) {
     const int signal = interrupting_signal;
-    std::fprintf(stderr, "%s: %s\n", name.c_str(), signal == SIGINT ? "interrupted" : "terminated");
+    std::fprintf(stderr, "%s: %s\n", name.c_str(), word_of(signal));
     return exit_code_of(signal);
   } catch (const ReaderClosedPipe&) {
     return kExitReaderClosedPipe;
@@ -221,12 +241,44 @@ TerminationWaits::~TerminationWaits() {
   termination_waits = termination_waits - 1;
 }
 
-bool interrupted() {
-  return interrupt_count > 0;
-}
+// Ends the process when the limit of the command is over before the call is.
+class StopEndsProcess::Watch {
+ public:
+  explicit Watch(std::int64_t limit) : thread_([this, limit] { wait(limit); }) {}
+  ~Watch() {
+    {
+      const std::lock_guard lock(mutex_);
+      done_ = true;
+    }
+    changed_.notify_one();
+    thread_.join();
+  }
+  Watch(const Watch&) = delete;
+  Watch& operator=(const Watch&) = delete;
 
-void throw_if_interrupted() {
-  if (interrupted()) throw Interrupted();
+ private:
+  void wait(std::int64_t limit) {
+    std::unique_lock lock(mutex_);
+    const std::chrono::nanoseconds left(limit - stop_detail::now());
+    if (changed_.wait_for(lock, left, [this] { return done_; })) return;
+    write_words({program_name.data(), ": error: stopped by --timeout\n"});
+    remove_temporary_outputs();
+    _exit(kExitTimeout);
+  }
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool done_ = false;
+  std::thread thread_;
+};
+
+StopEndsProcess::StopEndsProcess() {
+  check_stop();
+  const std::int64_t limit = stop_detail::command_limit();
+  if (limit != stop_detail::kNever) watch_ = std::make_unique<Watch>(limit);
+  stop_ends_process = stop_ends_process + 1;
+}
+StopEndsProcess::~StopEndsProcess() {
+  stop_ends_process = stop_ends_process - 1;
 }
 
 std::string nearest_word(const std::string& word, const std::vector<std::string>& candidates) {

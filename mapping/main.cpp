@@ -5,6 +5,7 @@
 #include "formats/import.h"
 #include "formats/parallel.h"
 #include "formats/program.h"
+#include "formats/stop.h"
 #include "formats/units.h"
 #include "mapping/binding_file.h"
 #include "mapping/crack.h"
@@ -228,7 +229,7 @@ void map_series(const Arguments& arguments, Plan& plan, Progress& progress) {
   Body body;
   std::optional<Binding> binding;
   for (std::size_t f = 0; f < files.size(); ++f) {
-    throw_if_interrupted();
+    check_stop();
     progress.stage(fmt::format("frame {} of {}", f + 1, files.size()));
     Body next = read_body(files[f]);
     if (f == 0) {

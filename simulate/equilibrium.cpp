@@ -19,7 +19,7 @@
 #include <numbers>
 
 #include "formats/error.h"
-#include "formats/program.h"
+#include "formats/stop.h"
 #include "formats/units.h"
 #include "simulate/link_balance.h"
 
@@ -69,12 +69,11 @@ int least_load_steps(const Constraints& constraints) {
 // A run over load steps.
 class LoadStepping {
  public:
-  LoadStepping(Mechanics& mechanics, State& state, const RunSettings& settings, const Deadline& deadline,
-               Progress& progress, const CoarseStart& start)
+  LoadStepping(Mechanics& mechanics, State& state, const RunSettings& settings, Progress& progress,
+               const CoarseStart& start)
       : mechanics_(mechanics),
         state_(state),
         settings_(settings),
-        deadline_(deadline),
         progress_(progress),
         start_(start),
         first_(1.0 / std::max(settings.load_steps, least_load_steps(mechanics.constraints()))),
@@ -83,6 +82,7 @@ class LoadStepping {
   EquilibriumResult operator()();
 
  private:
+  void solve();
   // Tries the next share; true and moved on when it converged.
   bool attempt(NewtonSteps steps, int max_iterations);
   [[nodiscard]] bool gives_up() const {
@@ -98,13 +98,11 @@ class LoadStepping {
     return reach_ > kOverload * bounding_box(mechanics_.body().rest).diagonal();
   }
   [[nodiscard]] int iterations_left() const;
-  void stop_when_asked() const;
   [[noreturn]] void diverge() const;
 
   Mechanics& mechanics_;
   State& state_;
   const RunSettings& settings_;
-  const Deadline& deadline_;
   Progress& progress_;
   const CoarseStart& start_;
   double first_, increment_, done_ = 0;
@@ -125,14 +123,6 @@ int LoadStepping::iterations_left() const {
          result_.newton_iterations;
 }
 
-void LoadStepping::stop_when_asked() const {
-  throw_if_interrupted();
-  if (deadline_ && std::chrono::steady_clock::now() > *deadline_)
-    throw TimeoutError(
-        fmt::format("stopped by --timeout in equilibrium with {:.4g} % of the load, {} Newton iterations",
-                    100 * done_, result_.newton_iterations));
-}
-
 bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   NewtonOptions options;
   options.steps = steps;
@@ -144,7 +134,7 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   trial_.share = done_ + increment_ > 1 - 1e-9 ? 1 : done_ + increment_;
   if (pushed_) push(trial_);
   outcome_ = newton_with_links(mechanics_, trial_, options, [&](const std::string& note) {
-    stop_when_asked();
+    check_stop();
     progress_.update(done_, fmt::format("load {:.3g} %, {}", 100 * trial_.share, note));
   });
   if (result_.newton_iterations == 0) reach_ = outcome_.first_reach / trial_.share;
@@ -232,6 +222,16 @@ bool LoadStepping::begin_near() {
 }
 
 EquilibriumResult LoadStepping::operator()() {
+  try {
+    solve();
+  } catch (const TimeoutError& error) {
+    throw TimeoutError(fmt::format("{} in equilibrium with {:.4g} % of the load, {} Newton iterations",
+                                   error.what(), 100 * done_, result_.newton_iterations));
+  }
+  return result_;
+}
+
+void LoadStepping::solve() {
   const std::vector<Motion>& motions = mechanics_.constraints().motions;
   const bool linked = std::any_of(motions.begin(), motions.end(),
                                   [](const Motion& motion) { return motion.link != nullptr; });
@@ -247,7 +247,6 @@ EquilibriumResult LoadStepping::operator()() {
     else if (!branch_off())
       diverge();
   }
-  return result_;
 }
 
 }  // namespace
@@ -296,8 +295,8 @@ void refuse_unsupported_elements(Mechanics& mechanics, const State& start, const
 }
 
 EquilibriumResult find_equilibrium(Mechanics& mechanics, State& state, const RunSettings& settings,
-                                   const Deadline& deadline, Progress& progress, const CoarseStart& start) {
-  return LoadStepping(mechanics, state, settings, deadline, progress, start)();
+                                   Progress& progress, const CoarseStart& start) {
+  return LoadStepping(mechanics, state, settings, progress, start)();
 }
 
 }  // namespace flexel
