@@ -1,4 +1,5 @@
-// Sizes are kept to three digits, so that `--size` with what is printed gives the same run.
+// Sizes are preferred numbers, so that predictions that differ a little choose the same one, and `--size`
+// with what is printed gives the same run. What people and programs are told is in accuracy_report.cpp.
 #include "flexel/accuracy.h"
 
 #include <fmt/format.h>
@@ -6,32 +7,41 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "flexel/judged_error.h"
 #include "flexel/study/predict.h"
 #include "formats/error.h"
+#include "formats/human.h"
+#include "formats/parallel.h"
 #include "formats/units.h"
 #include "voxelize/memory.h"
 
 namespace flexel {
 namespace {
 
-constexpr double kAim = 0.7;                          // of the error asked for, when the next size is chosen
-constexpr double kLeastStep = 1.25, kMostStep = 1.7;  // between the spacings of two runs
+constexpr double kAim = 0.7;  // of the error asked for, when the next size is chosen
+// Between the spacings of two runs. Closer ones differ by how their cells meet the surface; the largest step
+// is made where the error bars tell the order. 2 gives eight times the cells: one run of that costs a seventh
+// of the next.
+constexpr double kLeastStep = 1.4, kUsualStep = 2, kMostStep = 4;
+constexpr double kCellsThroughWalls = 4;  // of which a lattice four times as coarse has one left
+constexpr double kBelow = 1.06;           // half a step between preferred numbers
 constexpr int kFinerRuns = 4, kFailures = 3;
 constexpr double kUsualLimit = 180;   // s, without --within
 constexpr double kMemoryShare = 0.8;  // of what is free
 constexpr double kTimeMargin = 0.85;  // of the time left: predictions are good to about that
+constexpr double kParallel = 0.85;    // share of the work that all threads do
+constexpr double kPatience = 600;     // s: longer runs are not advised
 
-double round3(double x) {
-  const double unit = std::pow(10, std::floor(std::log10(x)) - 2);
-  return std::round(x / unit) * unit;
+double nearest_size(double size) {
+  return preferred_number(size, 20, Rounded::nearest);
 }
 
-// In words that --size takes.
-std::string size_text(double size) {
-  return fmt::format("{:.6g}mm", 1e3 * size);
+// What the machine takes for so much work if nobody else uses it: no more than it did take.
+double undisturbed(double wall, double processor) {
+  if (!(processor > 0)) return wall;
+  const double threads = static_cast<double>(thread_count());
+  return std::min(wall, processor * (1 - kParallel + kParallel / threads));
 }
 
 // What the process has needed at most so far [bytes].
@@ -41,16 +51,17 @@ double peak_memory() {
   return 1024.0 * static_cast<double>(usage.ru_maxrss);
 }
 
-nlohmann::ordered_json json_of(const std::optional<double>& value) {
-  return value ? nlohmann::ordered_json(*value) : nullptr;
-}
-
 constexpr int kGivenUp = 3;  // lattices that turn out too large, until the search ends
 
 class Search {
  public:
   Search(const AccuracyGoal& goal, const SolveAt& solve, AccuracyReport& report, Progress& progress)
-      : goal_(goal), solve_(solve), report_(report), progress_(progress), quantities_(goal.driven) {}
+      : goal_(goal),
+        solve_(solve),
+        report_(report),
+        progress_(progress),
+        quantities_(goal.driven),
+        processor_before_(processor_seconds()) {}
 
   SolvedRun operator()() {
     first_runs();
@@ -74,13 +85,13 @@ class Search {
  private:
   [[nodiscard]] bool met() const { return goal_.error && judged_ && judged_->error <= *goal_.error; }
 
-  // About 2,000 cells, and half the spacing; finer where walls are lost at that.
+  // The usual count of cells; finer where walls are lost at that. For --within half the spacing too.
   void first_runs() {
     double size = 0;
     for (int failures = 0; runs_.empty(); ++failures) try {
         if (size == 0) {
           const SolvedRun first = solve_(std::nullopt, {});
-          size = round3(spacing_of(first));
+          size = nearest_size(spacing_of(first));
         }
         keep(solve_(size, [](std::size_t) { return true; }));
       } catch (const InputError& error) {
@@ -88,17 +99,18 @@ class Search {
       } catch (const DivergedError& error) {
         fail(size, error.what(), failures);
       }
-    size = round3(runs_.back().size / 2);
+    if (goal_.error) return;
+    size = nearest_size(runs_.back().size / kUsualStep);
     if (affordable(size)) run(size);
   }
 
   void fail(double& size, const std::string& why, int failures) {
-    if (size == 0 || failures >= kFailures) throw;
+    if (size == 0 || failures >= kFailures || goal_.by_default) throw;
     TriedRun failed;
     failed.size = size;
     failed.failure = why;
     report_.runs.push_back(failed);
-    size = round3(size / 2);
+    size = nearest_size(size / 2);
   }
 
   enum class Outcome { done, given_up, failed };
@@ -123,6 +135,8 @@ class Search {
       return Outcome::done;
     } catch (const DivergedError&) {
       report_.stopped = fmt::format("the run at {} diverged", size_text(size));
+    } catch (const TimeoutError&) {
+      report_.stopped = fmt::format("the run at {} took longer than predicted", size_text(size));
     } catch (const InputError& error) {
       report_.stopped = fmt::format("the run at {} cannot be made: {}", size_text(size), error.what());
     }
@@ -130,15 +144,17 @@ class Search {
   }
 
   void keep(SolvedRun solved) {
-    study::RunResult observed;
-    observed.stages = {{"voxelize", solved.voxelize_seconds},
-                       {"solve", solved.simulated.seconds},
-                       {"error bars", solved.simulated.error_bars.seconds},
-                       {"map", solved.map_seconds}};
-    observed.program_memory[0] = peak_memory();
-    predictor_.add(study::kOneProcess, {static_cast<double>(solved.voxels.body.cell_count()), 1}, observed);
     const double total = solved.voxelize_seconds + solved.simulated.seconds +
                          solved.simulated.error_bars.seconds + solved.map_seconds;
+    const double free =
+        goal_.by_default && total > 0 ? undisturbed(total, solved.processor_seconds) / total : 1;
+    study::RunResult observed;
+    observed.stages = {{"voxelize", free * solved.voxelize_seconds},
+                       {"solve", free * solved.simulated.seconds},
+                       {"error bars", free * solved.simulated.error_bars.seconds},
+                       {"map", free * solved.map_seconds}};
+    observed.program_memory[0] = peak_memory();
+    predictor_.add(study::kOneProcess, {static_cast<double>(solved.voxels.body.cell_count()), 1}, observed);
     counted_ = {solved.size, static_cast<double>(solved.voxels.body.cell_count())};
     runs_.push_back(std::move(solved));
     if (runs_.size() > 3) runs_.erase(runs_.begin());
@@ -153,10 +169,11 @@ class Search {
     if (judged_) {
       tried.error = judged_->error;
       tried.of = judged_->of;
+      tried.order = judged_->order;
     }
     progress_.say(fmt::format(
-        "--size {}: {} cells, {:.2g} s{}", size_text(tried.size), human_count(tried.cells), total,
-        tried.error ? fmt::format(", error about {:.2g} % ({})", 100 * *tried.error, tried.of) : ""));
+        "--size {}: {} cells, {}{}", size_text(tried.size), human_count(tried.cells), human_seconds(total),
+        tried.error ? fmt::format(", error about {} ({})", human_share(*tried.error), tried.of) : ""));
     report_.runs.push_back(std::move(tried));
   }
 
@@ -170,7 +187,9 @@ class Search {
     return predictor_.predict(study::kOneProcess, {cells_at(size), 1});
   }
   [[nodiscard]] double seconds_left() const {
-    return goal_.within.value_or(kUsualLimit) - seconds_since(goal_.began);
+    const double wall = seconds_since(goal_.began);
+    const double gone = goal_.by_default ? undisturbed(wall, processor_seconds() - processor_before_) : wall;
+    return goal_.within.value_or(kUsualLimit) - gone;
   }
   // What the runs that are kept hold already is part of the prediction.
   [[nodiscard]] double memory_limit() const { return kMemoryShare * (available_memory() + peak_memory()); }
@@ -181,39 +200,74 @@ class Search {
 
   // The finest size between two that is affordable; nothing where the coarser one is not.
   [[nodiscard]] std::optional<double> finest(double fine, double coarse) const {
-    if (affordable(round3(fine))) return round3(fine);
-    if (!affordable(round3(coarse))) return std::nullopt;
+    if (affordable(nearest_size(fine))) return nearest_size(fine);
+    if (!affordable(coarse)) return std::nullopt;
     for (int i = 0; i < 30; ++i) {
       const double middle = std::sqrt(fine * coarse);
       (affordable(middle) ? coarse : fine) = middle;
     }
-    return round3(1.005 * coarse);
+    return preferred_number(coarse, 10, Rounded::up);
   }
 
   // The size of the next run; nothing where the search is over.
   std::optional<double> next_size() {
-    const double last = runs_.back().size;
+    const SolvedRun& last = runs_.back();
     if ((goal_.error && met()) || chosen_) return std::nullopt;
-    double wanted = last / kMostStep;
-    if (goal_.error && judged_) {
+    const double coarsest = last.size / kLeastStep;
+    const std::optional<double> size = finest(wanted_size(), coarsest);
+    if (!size && goal_.error) say_unaffordable(prediction(coarsest));
+    return size && *size > coarsest ? nearest_size(coarsest) : size;
+  }
+
+  // Without regard to time and memory.
+  [[nodiscard]] double wanted_size() const {
+    const SolvedRun& last = runs_.back();
+    if (!goal_.error) return last.size / 100;  // as fine as the time allows
+    double wanted = last.size / kUsualStep;
+    if (judged_ && knows_order()) {
       const double step = std::pow(judged_->error / (kAim * *goal_.error), 1 / judged_->order);
-      wanted = last / std::clamp(step, kLeastStep, kMostStep);
-    } else if (!goal_.error) {
-      wanted = last / 100;  // as fine as the time allows
+      wanted = last.size / std::clamp(step, kLeastStep, kMostStep);
     }
-    const std::optional<double> size = finest(wanted, last / kLeastStep);
-    if (!size && goal_.error) say_unaffordable(prediction(last / kLeastStep));
-    return size;
+    // Not a little above it: three cells become one and a half on the coarser lattice of an error bar.
+    return std::min(wanted, last.wall / kCellsThroughWalls / kBelow);
+  }
+  // Of the error bars: three times a difference tells no order.
+  [[nodiscard]] bool knows_order() const {
+    for (const Quantity& each : quantities_.of(runs_.back(), runs_.back()))
+      if (each.name == judged_->of) return !each.bar || each.bar->order.has_value();
+    return false;
   }
 
   void say_unaffordable(const study::Prediction& told) {
-    report_.stopped = told.bytes > memory_limit()
-                          ? fmt::format("the next run would need {} of memory", human_bytes(told.bytes))
-                          : fmt::format("the next run would take about {:.2g} s, of {:.2g} s that are left",
-                                        told.seconds, std::max(0.0, seconds_left()));
+    report_.stopped =
+        told.bytes > memory_limit()
+            ? fmt::format("the next run would need {} of memory", human_bytes(told.bytes))
+            : fmt::format("the next run would take about {}, of {} that are left",
+                          human_seconds(told.seconds), human_seconds(std::max(0.0, seconds_left())));
   }
 
-  SolvedRun finish() { return std::move(runs_.back()); }
+  // What would make the result surer, as far as the machine can.
+  [[nodiscard]] std::string advice() const {
+    if (!judged_) return "";
+    const double goal = goal_.error && !met() ? *goal_.error : finer_goal(judged_->error);
+    const double step = std::pow(judged_->error / (kAim * goal), 1 / judged_->order);
+    const study::Prediction told = prediction(runs_.back().size / std::max(step, kLeastStep));
+    const double seconds = 1.2 * told.seconds;  // and the runs before it
+    if (told.bytes > memory_limit() || seconds > kPatience) return "";
+    return fmt::format("--accuracy {}{} takes about {}", fmt::format("{:.6g}%", 100 * goal),
+                       seconds > kTimeMargin * kUsualLimit ? " --within 10min" : "", human_seconds(seconds));
+  }
+  static double finer_goal(double error) {
+    for (const double each : {0.1, 0.05, 0.02, 0.01, 0.005, 0.002})
+      if (each < 0.7 * error) return each;
+    return 0.001;
+  }
+
+  SolvedRun finish() {
+    report_.advice = advice();
+    widen_bars(runs_, quantities_);
+    return std::move(runs_.back());
+  }
 
   const AccuracyGoal& goal_;
   const SolveAt& solve_;
@@ -229,57 +283,10 @@ class Search {
   } counted_;            // of the lattice that was made last
   int given_up_ = 0;     // lattices that were not solved
   bool chosen_ = false;  // the one run that --within asks for was made
+  double processor_before_;
 };
 
 }  // namespace
-
-bool AccuracyReport::met() const {
-  const std::optional<double> reached = runs.empty() ? std::nullopt : runs.back().error;
-  return (!goal.error || (reached && *reached <= *goal.error)) && (!goal.within || seconds <= *goal.within);
-}
-
-std::string AccuracyReport::sentence() const {
-  const TriedRun& last = runs.back();
-  std::string asked = goal.error ? fmt::format("--accuracy {:.3g}%", 100 * *goal.error) : "";
-  if (goal.within) asked += fmt::format("{}--within {:.3g}s", asked.empty() ? "" : ", ", *goal.within);
-  std::string text =
-      fmt::format("{}: chose --size {} ({} cells) and --method {}; {:.2g} s with {} run(s) before it", asked,
-                  size_text(last.size), human_count(last.cells), method, seconds, runs.size() - 1);
-  text += last.error ? fmt::format("; the error reached is about {:.2g} % ({})", 100 * *last.error, last.of)
-                     : "; its error is not known: no coarser run to compare with";
-  if (!met())
-    text += goal.error && !(last.error && *last.error <= *goal.error)
-                ? fmt::format(", NOT the {:.3g} % asked for{}", 100 * *goal.error,
-                              stopped.empty() ? "" : ": " + stopped)
-                : ", and it took longer than predicted";
-  return text;
-}
-
-std::string AccuracyReport::json() const {
-  nlohmann::ordered_json json;
-  json["asked"] = json_of(goal.error);
-  json["within"] = json_of(goal.within);
-  json["size"] = runs.back().size;
-  json["method"] = method;
-  json["reached"] = json_of(runs.back().error);
-  json["of"] = runs.back().of;
-  json["met"] = met();
-  json["seconds"] = seconds;
-  json["stopped"] = stopped;
-  json["runs"] = nlohmann::ordered_json::array();
-  for (const TriedRun& each : runs)
-    json["runs"].push_back({{"size", each.size},
-                            {"cells", each.cells},
-                            {"seconds", each.seconds},
-                            {"memory", each.memory},
-                            {"predicted_seconds", json_of(each.predicted_seconds)},
-                            {"predicted_memory", json_of(each.predicted_memory)},
-                            {"error", json_of(each.error)},
-                            {"quantities", each.found},
-                            {"failure", each.failure}});
-  json["sentence"] = sentence();
-  return json.dump();
-}
 
 SolvedRun choose_resolution(const AccuracyGoal& goal, const SolveAt& solve, AccuracyReport& report,
                             Progress& progress) {
@@ -289,6 +296,40 @@ SolvedRun choose_resolution(const AccuracyGoal& goal, const SolveAt& solve, Accu
 
 double seconds_since(std::chrono::steady_clock::time_point began) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+}
+
+double processor_seconds() {
+  rusage usage = {};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& time) {
+    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+std::string size_text(double metres) {
+  return fmt::format("{:.6g}mm", 1e3 * metres);
+}
+
+double preferred_number(double value, int to_a_decade, Rounded rounded) {
+  // ISO 3: the rounded ones are no exact powers
+  constexpr double kTwenty[] = {1,    1.12, 1.25, 1.4, 1.6, 1.8, 2,   2.24, 2.5, 2.8,
+                                3.15, 3.55, 4,    4.5, 5,   5.6, 6.3, 7.1,  8,   9};
+  const int every = 20 / to_a_decade;
+  const int near = static_cast<int>(std::floor(to_a_decade * std::log10(value)));
+  const auto number = [&](int n) {
+    const int decade = n >= 0 ? n / to_a_decade : -((to_a_decade - 1 - n) / to_a_decade);
+    const double digits = kTwenty[every * (n - decade * to_a_decade)];
+    // Divided where the power is below one: 8 / 100 is the double that "0.08" is
+    return decade < 0 ? digits / std::pow(10, -decade) : digits * std::pow(10, decade);
+  };
+  double best = 0;
+  for (int n = near - 1; n <= near + 2; ++n) {
+    const double each = number(n);
+    if (rounded == Rounded::up && each >= value * (1 - 1e-9)) return each;
+    if (best == 0 || std::abs(std::log(each / value)) < std::abs(std::log(best / value))) best = each;
+  }
+  return best;
 }
 
 double mapping_difference(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {

@@ -8,17 +8,25 @@
 #include "flexel/commands.h"
 #include "flexel/job.h"
 #include "formats/body_file.h"
+#include "formats/brief_output.h"
 #include "formats/files.h"
+#include "formats/human.h"
 #include "formats/parallel.h"
 #include "formats/units.h"
 #include "mapping/options.h"
 #include "mapping/output.h"
+#include "simulate/answer.h"
 #include "simulate/simulate.h"
+#include "simulate/time/settling.h"
 
 namespace flexel {
 namespace {
 
-constexpr std::size_t kFirstCells = 2000;  // of the first run of --accuracy and --within
+// Of the first run when a size is chosen: enough for most error bars, or for one that takes a tenth of a
+// second.
+constexpr std::size_t kFirstCells = 20000, kFewCells = 2000;
+constexpr double kShort = 5;                              // s
+constexpr double kUsualError = 0.05, kUsualSeconds = 20;  // aimed at where nothing is asked for
 
 struct DeformArguments {
   JobArguments job;
@@ -26,7 +34,7 @@ struct DeformArguments {
   std::string summary, body, timeout, accuracy, within;
   MapArguments map;
   int threads = 0;
-  bool quiet = false, estimate = true;
+  bool quiet = false, verbose = false, estimate = true;
 };
 
 void declare_input(CLI::App& app, JobArguments& arguments) {
@@ -60,6 +68,7 @@ void declare_output(CLI::App& app, DeformArguments& arguments) {
       ->type_name("TIME");
   app.add_flag("!--no-estimate", arguments.estimate, "Leave out the error bars (docs/error-bars.md)");
   app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
+  app.add_flag("--verbose", arguments.verbose, "Say all that each stage found");
 }
 
 // What the arguments ask for, checked.
@@ -95,8 +104,22 @@ void plan_outputs(const DeformArguments& arguments, Plan& plan) {
     if (path.find("{part}") == std::string::npos) refuse_unwritable(path, false);
 }
 
+// Nothing is asked for: a size is chosen where error bars can judge it.
+void plan_usual_goal(const DeformArguments& arguments, Plan& plan) {
+  const Scene& scene = plan.job.scene;
+  if (plan.job.voxelize.size || plan.job.voxelize.count || !arguments.estimate ||
+      plan.job.voxelize.placement != Placement::corner || scene.run.time || settles(scene) ||
+      !arguments.timeout.empty())
+    return;
+  plan.goal.emplace();
+  plan.goal->by_default = true;
+  plan.goal->began = std::chrono::steady_clock::now();
+  plan.goal->error = kUsualError;
+  plan.goal->within = kUsualSeconds;
+}
+
 void plan_goal(const DeformArguments& arguments, Plan& plan) {
-  if (arguments.accuracy.empty() && arguments.within.empty()) return;
+  if (arguments.accuracy.empty() && arguments.within.empty()) return plan_usual_goal(arguments, plan);
   const std::string option = arguments.accuracy.empty() ? "--within" : "--accuracy";
   if (plan.job.voxelize.size || plan.job.voxelize.count)
     throw InputError(option + " chooses the size: leave --size and --count out");
@@ -163,6 +186,7 @@ SimulateOptions simulate_options(const DeformArguments& arguments, const Plan& p
 SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surface& surface,
                         AccuracyReport& accuracy, Progress& progress) {
   Progress quiet("flexel", Progress::Mode::quiet);
+  HeldWarnings warnings;  // of runs that are only tried
   bool first = true;
   for (const Tie& tie : plan.job.scene.get<Ties>().ties) plan.goal->driven |= tie.is_move;
   plan.goal->driven |= !plan.job.moves.empty();
@@ -170,10 +194,13 @@ SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surf
   mapping.method = plan.map.method;
   const auto solve = [&](std::optional<double> size, const GoesOn& goes_on) {
     SolvedRun run;
+    progress.update(0, size ? "--size " + size_text(*size) : "");
+    (void)warnings.take();
     run.size = size.value_or(0);
     VoxelizeOptions options = plan.job.voxelize;
     options.size = size;
-    if (!size) options.count = kFirstCells;
+    if (!size) options.count = plan.goal->within.value_or(kShort) < kShort ? kFewCells : kFirstCells;
+    const double processor = processor_seconds();
     auto began = std::chrono::steady_clock::now();
     run.voxels = voxelize(surface, options, quiet);
     run.voxelize_seconds = seconds_since(began);
@@ -187,9 +214,13 @@ SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surf
     began = std::chrono::steady_clock::now();
     run.mapped = map_part(run.voxels.body, mapping, {}, quiet).result.displacement;
     run.map_seconds = seconds_since(began);
+    run.processor_seconds = processor_seconds() - processor;
+    run.wall = wall_thickness(run.voxels);
+    run.warnings = warnings.take();
     return run;
   };
   SolvedRun run = choose_resolution(*plan.goal, solve, accuracy, progress);
+  (void)warnings.take();
   if (plan.goal->error && plan.map.method == MapMethod::blended) {
     mapping.method = MapMethod::smooth;
     const MapResult smooth = map_part(run.voxels.body, mapping, {}, quiet).result;
@@ -217,23 +248,43 @@ SolvedRun solve(const DeformArguments& arguments, Plan& plan, std::optional<Accu
   return run;
 }
 
+// What to do next, of this run.
+std::string next_step(const std::optional<AccuracyReport>& accuracy) {
+  if (!accuracy) return "";
+  const std::string repeat = fmt::format("--size {} repeats this run", size_text(accuracy->runs.back().size));
+  return accuracy->advice.empty() ? repeat : accuracy->advice + "; " + repeat;
+}
+
 int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress) {
   std::optional<AccuracyReport> accuracy;
-  SolvedRun run = solve(arguments, plan, accuracy, progress);
+  SolvedRun run;
+  {
+    const BriefOutput brief(!arguments.verbose);
+    run = solve(arguments, plan, accuracy, progress);
+  }
   Body& body = run.voxels.body;
-  if (accuracy) report(run.voxels, progress);
-  for (const std::string& line : summary_lines(run.simulated)) progress.say(line);
-
-  progress.stage("map");
-  const MappedPart mapped = map_part(body, plan.map, plan.crack, progress);
+  for (const std::string& line : run.warnings) progress.warn(line);
+  MappedPart mapped;
+  {
+    const BriefOutput brief(!arguments.verbose);
+    if (accuracy) report(run.voxels, progress);
+    for (const std::string& line : summary_lines(run.simulated)) progress.say(line);
+    progress.stage("map");
+    mapped = map_part(body, plan.map, plan.crack, progress);
+    progress.finish();
+    say_report(mapped.report, arguments.map, plan.map, progress);
+  }
   const MapReport& found = mapped.report;
-  progress.finish();
-  say_report(found, arguments.map, plan.map, progress);
   write_report(found, arguments.map, plan.map, arguments.map.report);
-  write_outputs(plan, body, mapped, progress);
-  if (accuracy) {
-    accuracy->seconds = seconds_since(plan.goal->began);
-    accuracy->met() ? progress.say(accuracy->sentence()) : progress.warn(accuracy->sentence());
+  {
+    const BriefOutput brief(!arguments.verbose);
+    write_outputs(plan, body, mapped, progress);
+    if (accuracy) {
+      accuracy->seconds = seconds_since(plan.goal->began);
+      accuracy->met() || accuracy->goal.by_default ? progress.say(accuracy->sentence())
+                                                   : progress.warn(accuracy->sentence());
+    }
+    progress.finish();
   }
   if (!arguments.summary.empty()) {
     nlohmann::ordered_json summary;
@@ -243,7 +294,7 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
     if (accuracy) summary["accuracy"] = nlohmann::ordered_json::parse(accuracy->json());
     write_text(summary.dump(2) + "\n", arguments.summary);
   }
-  progress.finish();
+  for (const std::string& line : answer_lines(run.simulated, body, next_step(accuracy))) progress.say(line);
   return kExitDone;
 }
 

@@ -46,6 +46,38 @@ Judged judge(const Quantity& fine, const Quantity& coarse, const Quantity* coars
   return found;
 }
 
+// Of one quantity by the run's own error bar.
+std::optional<Judged> judge_alone(const Quantity& fine) {
+  if (!fine.bar) return std::nullopt;
+  return Judged{fine.bar->half_width / std::abs(fine.value),
+                std::clamp(fine.bar->order.value_or(kLeastOrder), kLeastOrder, kMostOrder), fine.name};
+}
+
+// Of each quantity that is not zero, with its index.
+std::vector<std::pair<Quantity, Judged>> judge_each(const std::vector<SolvedRun>& runs,
+                                                    const Quantities& quantities) {
+  const std::size_t n = runs.size();
+  const SolvedRun& last = runs.back();
+  const auto compares = [&](std::size_t i) { return ratio_after(runs, i) > 1 && resolves_walls(runs[i]); };
+  const bool two = n > 1 && compares(n - 2), three = two && n > 2 && compares(n - 3);
+  const std::vector<Quantity> fine = quantities.of(last, last);
+  const auto before = [&](bool there, std::size_t back) {
+    return there ? quantities.of(runs[n - back], last) : std::vector<Quantity>{};
+  };
+  const std::vector<Quantity> coarse = before(two, 2), coarser = before(three, 3);
+  const std::array<double, 2> ratio = {two ? ratio_after(runs, n - 2) : 0,
+                                       three ? ratio_after(runs, n - 3) : 0};
+  std::vector<std::pair<Quantity, Judged>> found;
+  for (std::size_t q = 0; q < fine.size(); ++q) {
+    if (!(std::abs(fine[q].value) > 0)) continue;
+    if (two)
+      found.emplace_back(fine[q], judge(fine[q], coarse[q], three ? &coarser[q] : nullptr, ratio));
+    else if (const std::optional<Judged> alone = judge_alone(fine[q]))
+      found.emplace_back(fine[q], *alone);
+  }
+  return found;
+}
+
 }  // namespace
 
 std::vector<Quantity> Quantities::of(const SolvedRun& run, const SolvedRun& last) const {
@@ -62,14 +94,14 @@ std::vector<Quantity> Quantities::of(const SolvedRun& run, const SolvedRun& last
     if (direction.norm() < kSmall * largest) continue;
     found.push_back({"probe " + last.simulated.probes[p].name,
                      along(run.simulated.probes[p].displacement, direction),
-                     bar_of(run, ErrorBar::Of::probe, p)});
+                     bar_of(run, ErrorBar::Of::probe, p), ErrorBar::Of::probe, p});
   }
   if (found.empty() && !last.mapped.empty())
     found.push_back({"largest displacement", along(run.mapped[most], last.mapped[most]),
                      bar_of(run, ErrorBar::Of::largest_displacement, 0)});
   if (driven_ && last.simulated.elastic_energy > 0)
-    found.push_back(
-        {"elastic energy", run.simulated.elastic_energy, bar_of(run, ErrorBar::Of::elastic_energy, 0)});
+    found.push_back({"elastic energy", run.simulated.elastic_energy,
+                     bar_of(run, ErrorBar::Of::elastic_energy, 0), ErrorBar::Of::elastic_energy});
   return found;
 }
 
@@ -79,21 +111,38 @@ double spacing_of(const SolvedRun& run) {
   return std::exp(sum / static_cast<double>(run.voxels.body.parts.size()));
 }
 
-std::optional<Judged> judge(const std::vector<SolvedRun>& runs, const Quantities& quantities) {
-  const std::size_t n = runs.size();
-  if (n < 2 || !(ratio_after(runs, n - 2) > 1)) return std::nullopt;
-  const SolvedRun& last = runs.back();
-  const bool three = n > 2 && ratio_after(runs, n - 3) > 1;
-  const std::array<double, 2> ratio = {ratio_after(runs, n - 2), three ? ratio_after(runs, n - 3) : 0};
-  const std::vector<Quantity> fine = quantities.of(last, last), coarse = quantities.of(runs[n - 2], last);
-  const std::vector<Quantity> coarser = three ? quantities.of(runs[n - 3], last) : std::vector<Quantity>{};
-  std::optional<Judged> worst;
-  for (std::size_t q = 0; q < fine.size(); ++q) {
-    if (!(std::abs(fine[q].value) > 0)) continue;
-    const Judged each = judge(fine[q], coarse[q], three ? &coarser[q] : nullptr, ratio);
-    if (!worst || each.error > worst->error) worst = each;
+double wall_thickness(const VoxelizeResult& voxels) {
+  constexpr double kShare = 0.2;
+  std::vector<const VoxelizedPart*> parts;
+  double all = 0, thinner = 0;
+  for (const VoxelizedPart& part : voxels.parts) {
+    parts.push_back(&part);
+    all += part.lattice_volume;
   }
+  std::sort(parts.begin(), parts.end(),
+            [](const VoxelizedPart* a, const VoxelizedPart* b) { return a->fifth_wall < b->fifth_wall; });
+  for (const VoxelizedPart* part : parts)
+    if ((thinner += part->lattice_volume) > kShare * all) return part->fifth_wall;
+  return 1e300;
+}
+
+bool resolves_walls(const SolvedRun& run) {
+  return run.wall >= spacing_of(run) * (1 - 1e-6);
+}
+
+std::optional<Judged> judge(const std::vector<SolvedRun>& runs, const Quantities& quantities) {
+  std::optional<Judged> worst;
+  for (const auto& [quantity, each] : judge_each(runs, quantities))
+    if (!worst || each.error > worst->error) worst = each;
   return worst;
+}
+
+void widen_bars(std::vector<SolvedRun>& runs, const Quantities& quantities) {
+  std::vector<ErrorBar>& bars = runs.back().simulated.error_bars.bars;
+  for (const auto& [quantity, judged] : judge_each(runs, quantities))
+    for (ErrorBar& each : bars)
+      if (each.of == quantity.kind && each.probe == quantity.probe)
+        each.bar.half_width = std::max(each.bar.half_width, judged.error * std::abs(quantity.value));
 }
 
 }  // namespace flexel

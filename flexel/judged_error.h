@@ -13,6 +13,8 @@ struct Quantity {
   std::string name;
   double value = 0;
   std::optional<Bar> bar;
+  ErrorBar::Of kind = ErrorBar::Of::largest_displacement;
+  std::size_t probe = 0;
 };
 
 // What is asked of every run.
@@ -37,8 +39,16 @@ struct Judged {
 // m, geometric mean over parts and axes.
 [[nodiscard]] double spacing_of(const SolvedRun& run);
 
-// The error of the last of the runs, from it and the one or two before it; nothing where it is the only one,
-// or no finer than the one before.
+// Whether its cells are no wider than most walls.
+[[nodiscard]] bool resolves_walls(const SolvedRun& run);
+
+// The error of the last of the runs, the worst of its quantities: from its own error bars, and from the one
+// or two runs before it where they are coarser and resolve the walls. Nothing where neither tells. `runs` is
+// not empty.
 [[nodiscard]] std::optional<Judged> judge(const std::vector<SolvedRun>& runs, const Quantities& quantities);
+
+// Widens the error bars of the last run to what judge() says of each quantity, so that no two figures of one
+// run contradict each other.
+void widen_bars(std::vector<SolvedRun>& runs, const Quantities& quantities);
 
 }  // namespace flexel

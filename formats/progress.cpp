@@ -12,9 +12,15 @@
 #include <cstdlib>
 #include <exception>
 #include <string_view>
+#include <utility>
+
+#include "formats/brief_output.h"
 
 namespace flexel {
 namespace {
+
+bool brief_output = false, holds_warnings = false;
+std::vector<std::string> held_warnings;
 
 constexpr double kDrawInterval = 0.1;  // s
 constexpr int kBarWidth = 24;          // characters
@@ -40,6 +46,29 @@ std::size_t terminal_columns() {
 }
 
 }  // namespace
+
+BriefOutput::BriefOutput(bool brief) {
+  brief_output = brief;
+}
+
+BriefOutput::~BriefOutput() {
+  brief_output = false;
+}
+
+HeldWarnings::HeldWarnings() : exceptions_(std::uncaught_exceptions()) {
+  holds_warnings = true;
+}
+
+HeldWarnings::~HeldWarnings() {
+  holds_warnings = false;
+  if (std::uncaught_exceptions() > exceptions_)
+    for (const std::string& line : held_warnings) print_error(fmt::format("warning: {}\n", line));
+  held_warnings.clear();
+}
+
+std::vector<std::string> HeldWarnings::take() {
+  return std::exchange(held_warnings, {});
+}
 
 Progress::Progress(std::string program, Mode mode) : program_(std::move(program)), mode_(resolve(mode)) {}
 
@@ -76,20 +105,25 @@ void Progress::update(double share, const std::string& note) {
 }
 
 void Progress::say(const std::string& line) {
-  if (mode_ == Mode::quiet || mode_ == Mode::silent) return;
+  if (mode_ == Mode::quiet || mode_ == Mode::silent || brief_output) return;
   clear_bar();
   print_error(fmt::format("{}: {}\n", program_, line));
 }
 
 void Progress::warn(const std::string& line) {
   if (mode_ == Mode::silent) return;
+  if (holds_warnings) {
+    if (std::find(held_warnings.begin(), held_warnings.end(), line) == held_warnings.end())
+      held_warnings.push_back(line);
+    return;
+  }
   clear_bar();
   print_error(fmt::format("{}: warning: {}\n", program_, line));
 }
 
 void Progress::finish() {
   clear_bar();
-  if (mode_ == Mode::lines && !stage_.empty()) {
+  if (mode_ == Mode::lines && !stage_.empty() && !brief_output) {
     const double seconds = now() - stage_began_;
     print_error(fmt::format("{}: {}: {:.{}f} s\n", program_, stage_, seconds, seconds < 1 ? 4 : 2));
   }

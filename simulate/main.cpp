@@ -4,6 +4,7 @@
 #include "formats/body_file.h"
 #include "formats/files.h"
 #include "formats/program.h"
+#include "simulate/answer.h"
 #include "simulate/merge.h"
 #include "simulate/scene.h"
 #include "simulate/simulate.h"
@@ -20,7 +21,7 @@ struct Arguments {
   std::string output, summary, timeout, resume, checkpoint_every;
   std::vector<std::string> live;
   SimulateOptions options;
-  bool quiet = false, compress = false;
+  bool quiet = false, verbose = false, compress = false;
 };
 
 void declare(CLI::App& app, Arguments& arguments) {
@@ -70,6 +71,7 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_flag("!--no-estimate", arguments.options.estimate,
                "Leave out the error bars, and the two coarser runs that they come from (docs/error-bars.md)");
   app.add_flag("--quiet", arguments.quiet, "Say nothing but warnings and errors");
+  app.add_flag("--verbose", arguments.verbose, "Say all that was found");
   app.add_flag("--compress", arguments.compress, "Compress the arrays of the body file");
 }
 
@@ -181,7 +183,8 @@ int run(int argc, char** argv) {
   const bool series = extension(arguments.output) == "pvd";
   if (series) options.series = arguments.output;
   const SimulateResult result = simulate(body, scene, options, progress);
-  for (const std::string& line : summary_lines(result)) progress.say(line);
+  const bool all = arguments.verbose || options.explain;
+  for (const std::string& line : all ? summary_lines(result) : answer_lines(result, body)) progress.say(line);
   progress.stage("write");
   BodyFileOptions file_options;
   file_options.compress = arguments.compress;

@@ -123,6 +123,7 @@ void measure_walls(const PartMesh& mesh, std::uint32_t part, VoxelizedPart& foun
   found.thin_walls = thinner_than(2 * kWhole * cell);
   found.lost_walls = thinner_than(kWhole * cell);
   found.wall_samples = samples.size();
+  found.fifth_wall = std::min(found.fifth_wall, fifth_wall(samples, found.surface_volume));
 }
 
 // What does not depend on the lattice but where shells interpenetrate: volumes and walls.

@@ -73,6 +73,7 @@ struct VoxelizedPart {
       0;  // voxels where the votes of the three axes differ (surfaces that are not closed)
   Vec3 spacing = Vec3::Zero();
   std::optional<ThinWall> thinnest;  // thinnest wall found
+  double fifth_wall = 1e300;         // m: a fifth of the matter lies in thinner walls
   std::size_t thin_walls = 0;        // sampled places thinner than two cells
   std::size_t lost_walls = 0;        // of them, thinner than one cell: the lattice does not have their shape
   std::size_t wall_samples = 0;      // places sampled

@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <limits>
 
 #include "voxelize/heal.h"
 #include "voxelize/lines.h"
@@ -25,7 +26,7 @@ void add_samples(const PartMesh& mesh, const LineGrid& grid, double negligible,
     if (normal.dot(unit_normal(mesh, leave.triangle)) > kOpposed) continue;
     const double thickness = (leave.at - enter.at) * -normal[grid.axis];
     if (!(thickness > negligible)) continue;
-    WallSample sample{thickness, Vec3::Zero()};
+    WallSample sample{thickness, (leave.at - enter.at) * grid.u_step * grid.v_step, Vec3::Zero()};
     sample.where[grid.axis] = enter.at;
     sample.where[u] = grid.u_begin + enter.line % static_cast<unsigned>(grid.u_count) * grid.u_step;
     sample.where[v] = grid.v_begin + enter.line / static_cast<unsigned>(grid.u_count) * grid.v_step;
@@ -46,6 +47,16 @@ std::vector<WallSample> wall_samples(const PartMesh& mesh, int lines) {
                 1e-6 * box.diagonal(), samples);
   }
   return samples;
+}
+
+double fifth_wall(std::vector<WallSample> samples, double volume) {
+  constexpr double kShare = 0.2;
+  std::sort(samples.begin(), samples.end(),
+            [](const WallSample& a, const WallSample& b) { return a.thickness < b.thickness; });
+  double matter = 0;
+  for (const WallSample& each : samples)
+    if ((matter += each.matter) > kShare * volume) return each.thickness;
+  return std::numeric_limits<double>::infinity();
 }
 
 std::size_t thinnest_sample(const std::vector<WallSample>& samples) {

@@ -1,0 +1,33 @@
+// What a run says is cut to what a user needs.
+#pragma once
+#include <string>
+#include <vector>
+
+namespace flexel {
+
+// While one lives, Progress::say() prints nothing and stages leave no line; warnings and the bar stay.
+// Process-wide, as ThreadLimit is; not nested.
+class BriefOutput {
+ public:
+  explicit BriefOutput(bool brief);
+  ~BriefOutput();
+  BriefOutput(const BriefOutput&) = delete;
+  BriefOutput& operator=(const BriefOutput&) = delete;
+};
+
+// While one lives, Progress::warn() prints nothing but keeps each different line: those of a run that is only
+// tried. An exception that leaves its scope prints them. Process-wide; not nested.
+class HeldWarnings {
+ public:
+  HeldWarnings();
+  ~HeldWarnings();
+  HeldWarnings(const HeldWarnings&) = delete;
+  HeldWarnings& operator=(const HeldWarnings&) = delete;
+  // The lines held so far, which are then forgotten.
+  [[nodiscard]] std::vector<std::string> take();
+
+ private:
+  int exceptions_;
+};
+
+}  // namespace flexel

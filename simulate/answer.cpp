@@ -1,0 +1,208 @@
+// Words follow the error bar: a value whose bar is half of it is a guess, and is called that.
+#include "simulate/answer.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "formats/human.h"
+#include "formats/units.h"
+
+namespace flexel {
+namespace {
+
+constexpr double kGuess = 0.5;     // a bar over this share of the value: hardly more than its size is known
+constexpr std::size_t kNamed = 2;  // probes, supports: so many are named, the others counted
+
+const ErrorBar* bar_of(const SimulateResult& result, ErrorBar::Of of, std::size_t probe = 0) {
+  for (const ErrorBar& each : result.error_bars.bars)
+    if (each.of == of && each.probe == probe) return &each;
+  return nullptr;
+}
+
+// The bar as a share of the value; nothing where there is no bar, or nothing that it is a share of.
+std::optional<double> share_of(const ErrorBar* bar) {
+  if (bar == nullptr || !(std::abs(bar->value) > 0)) return std::nullopt;
+  return bar->bar.half_width / std::abs(bar->value);
+}
+
+// "(80, 20, 6) mm", in one unit; components that are only rounding beside the largest are 0.
+std::string place(const Vec3& at) {
+  const double largest = at.cwiseAbs().maxCoeff();
+  const bool metres = largest >= 10, microns = largest > 0 && largest < 1e-4;
+  const double unit = metres ? 1 : microns ? 1e-6 : 1e-3;
+  const auto number = [&](double value) {
+    return std::abs(value) < 1e-6 * largest ? "0" : human_number(value / unit);
+  };
+  return fmt::format("({}, {}, {}) {}", number(at.x()), number(at.y()), number(at.z()),
+                     metres    ? "m"
+                     : microns ? "um"
+                               : "mm");
+}
+
+// "5.28 mm +- 0.54 mm (10 %)", or what a guess is worth.
+std::string moved(double length, const ErrorBar* bar) {
+  const std::optional<double> share = share_of(bar);
+  if (!share) return human_length(length);
+  const double width = *share * length;
+  if (*share > kGuess)
+    return fmt::format("no more than a first guess: {}, could be {}", human_length(length),
+                       length_range(length - width, length + width));
+  return fmt::format("{} ({})", length_with_bar(length, width), human_share(*share));
+}
+
+// A force along an axis by that axis.
+std::string directed(const Vec3& force) {
+  constexpr const char* kAxes[] = {"x", "y", "z"};
+  const double size = force.norm();
+  for (int axis = 0; axis < 3; ++axis)
+    if (size > 0 && std::abs(force[axis]) > (1 - 1e-4) * size)
+      return fmt::format("{} along {}{}", human_force(size), force[axis] < 0 ? "-" : "+", kAxes[axis]);
+  const double largest = force.cwiseAbs().maxCoeff();
+  const double unit = largest >= 999.5 ? 1e3 : largest > 0 && largest < 0.9995 ? 1e-3 : 1;
+  const auto number = [&](double value) {
+    return std::abs(value) < 1e-3 * largest ? "0" : human_number(value / unit);
+  };
+  return fmt::format("({}, {}, {}) {}", number(force.x()), number(force.y()), number(force.z()),
+                     unit == 1e3    ? "kN"
+                     : unit == 1e-3 ? "mN"
+                                    : "N");
+}
+
+// The force of a support, or its moment where that is all that it bears.
+std::string borne(const Reaction& reaction) {
+  constexpr double kLever = 1e-6;  // 1/m, force over moment: a lever no part has
+  if (reaction.moment.norm() == 0 || reaction.force.norm() > kLever * reaction.moment.norm())
+    return directed(reaction.force);
+  return human_number(reaction.moment.norm()) + " N m";
+}
+
+std::string more(std::size_t all) {
+  return all > kNamed ? fmt::format(", and {} more (--verbose)", all - kNamed) : "";
+}
+
+std::string how_far(const SimulateResult& result) {
+  if (!(result.largest_displacement > 0)) return "nothing moves";
+  const std::string when =
+      result.timed ? fmt::format(" at the end, {}", human_seconds(result.timed->time)) : "";
+  return fmt::format("{}, at {}{}",
+                     moved(result.largest_displacement, bar_of(result, ErrorBar::Of::largest_displacement)),
+                     place(result.largest_displacement_at), when);
+}
+
+std::string probes(const SimulateResult& result) {
+  std::string text;
+  for (std::size_t p = 0; p < std::min(kNamed, result.probes.size()); ++p)
+    text += fmt::format("{}\"{}\" {}", text.empty() ? "" : "; ", result.probes[p].name,
+                        moved(result.probes[p].displacement.norm(), bar_of(result, ErrorBar::Of::probe, p)));
+  return text + more(result.probes.size());
+}
+
+// The worst bar of the displacements.
+std::optional<double> worst_share(const SimulateResult& result) {
+  std::optional<double> worst;
+  for (const ErrorBar& each : result.error_bars.bars) {
+    if (each.of == ErrorBar::Of::elastic_energy) continue;
+    if (each.of == ErrorBar::Of::probe && std::abs(each.value) < 1e-3 * result.largest_displacement) continue;
+    if (const std::optional<double> share = share_of(&each)) worst = std::max(worst.value_or(0), *share);
+  }
+  return worst;
+}
+
+// Why a bar is wide, of the note of simulate/error_bars.cpp.
+std::string reason(const SimulateResult& result) {
+  const std::string& note = result.error_bars.note;
+  if (note.find("wall") != std::string::npos || note.find("one cell thick") != std::string::npos)
+    return ": its walls are only a few cells thick";
+  return "";
+}
+
+std::string how_sure(const SimulateResult& result, const Body& body) {
+  if (result.timed) return "not known: runs in time have no error bars; compare with half the size";
+  if (result.settled) return "not known: runs with contact have no error bars; compare with half the size";
+  const std::optional<double> worst = worst_share(result);
+  if (!worst) {
+    const std::string& note = result.error_bars.note;
+    return "not known: " + (note.empty() ? "no error bars (--no-estimate)" : note);
+  }
+  const std::string cells = fmt::format("{} cells beside coarser ones", human_count(body.cell_count()));
+  if (*worst <= 0.05) return fmt::format("well, within {}: {}", human_share(*worst), cells);
+  if (*worst <= 0.2) return fmt::format("fairly, within {}: {}", human_share(*worst), cells);
+  if (*worst <= kGuess) return fmt::format("roughly, within {}{}", human_share(*worst), reason(result));
+  return fmt::format("hardly, off by up to {}{}", human_share(*worst), reason(result));
+}
+
+const std::string& material_of(const Body& body, const std::string& part) {
+  static const std::string kNone;
+  for (const Part& each : body.parts)
+    if (each.name == part) return each.material;
+  return kNone;
+}
+
+// Whether the largest stress has a value that smaller cells would confirm.
+bool stress_settles(const SimulateResult& result) {
+  return result.error_bars.von_mises && result.error_bars.von_mises->bar;
+}
+
+std::string strength(const SimulateResult& result, const Body& body) {
+  if (!result.stress) return "not known: this model has no stresses";
+  const StressSummary& stress = *result.stress;
+  const std::string material = material_of(body, stress.part);
+  const std::string peak = stress_settles(result)
+                               ? pressure_with_bar(stress.value, result.error_bars.von_mises->bar->half_width)
+                               : "about " + human_pressure(stress.value);
+  std::string unsure;
+  if (!stress_settles(result))
+    unsure = stress.beside.empty() ? "; finer cells may show more"
+                                   : "; beside " + stress.beside + ", finer cells show more";
+  if (!stress.yield_share)
+    return fmt::format("unknown of {}: the stress is {} at {}{}", material, peak, place(stress.at), unsure);
+  if (!(*stress.yield_share > 0)) return "nothing is stressed";
+  const double factor = 1 / *stress.yield_share;
+  const std::string verdict =
+      factor < 1 ? fmt::format("{} YIELDS, safety factor {}", material, human_number(factor, 2))
+                 : fmt::format("safety factor {}", human_number(factor, 2));
+  return fmt::format("{}: {} of {} that {} bears, at {}{}", verdict, peak,
+                     human_pressure(stress.value * factor), material, place(stress.at), unsure);
+}
+
+std::string held_by(const SimulateResult& result) {
+  if (result.reactions.empty()) return "nothing";
+  std::string text;
+  for (std::size_t r = 0; r < std::min(kNamed, result.reactions.size()); ++r)
+    text += fmt::format("{}\"{}\" with {}", text.empty() ? "" : ", ", result.reactions[r].name,
+                        borne(result.reactions[r]));
+  return text + more(result.reactions.size());
+}
+
+// Three digits, as an option takes them.
+std::string size_digits(double value) {
+  const double unit = std::pow(10, std::floor(std::log10(value)) - 2);
+  return fmt::format("{:.9g}", std::round(value / unit) * unit);
+}
+
+// Of a run of flexel-simulate, whose lattice another program makes.
+std::string usual_next(const SimulateResult& result, const Body& body) {
+  const std::optional<double> worst = worst_share(result);
+  if (result.timed || (worst && *worst <= 0.05) || body.parts.empty())
+    return "--verbose says all that was found, --summary FILE as JSON";
+  const double spacing = std::cbrt(body.parts.front().lattice.spacing.prod());
+  return fmt::format("flexel-voxelize --size {}mm{}", size_digits(1e3 * spacing / 2),
+                     worst ? " makes this surer" : " shows how sure this is");
+}
+
+}  // namespace
+
+std::vector<std::string> answer_lines(const SimulateResult& result, const Body& body,
+                                      const std::string& next) {
+  std::vector<std::string> lines{"how far    " + how_far(result)};
+  if (!result.probes.empty()) lines.push_back("probes     " + probes(result));
+  lines.push_back("how sure   " + how_sure(result, body));
+  lines.push_back("strength   " + strength(result, body));
+  lines.push_back("held by    " + held_by(result));
+  lines.push_back("next       " + (next.empty() ? usual_next(result, body) : next));
+  return lines;
+}
+
+}  // namespace flexel

@@ -1,0 +1,16 @@
+// The answer of a run as its user needs it: at most six lines (docs/deform.md, "What is said").
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "simulate/simulate.h"
+
+namespace flexel {
+
+// "how far", "how sure", "strength", "held by", "next" and one more for probes. `next` says what to do next,
+// "" for what this result suggests itself. `body` gives the names of materials.
+[[nodiscard]] std::vector<std::string> answer_lines(const SimulateResult& result, const Body& body,
+                                                    const std::string& next = "");
+
+}  // namespace flexel
