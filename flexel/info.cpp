@@ -253,7 +253,7 @@ int info_command(int argc, char** argv) {
       ->type_name("PART");
   app.add_flag("--json", json, "As JSON, in SI units (docs/info.md)");
   app.add_option("--unit", unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
-  app.add_option("--edge", edge, "STEP: split the mesh to this longest edge (default: not split)")
+  app.add_option("--edge", edge, "Split the mesh to this longest edge (default: not split)")
       ->type_name("LENGTH");
   app.add_option("--thickness", thickness,
                  "Also write the surface as PLY with the wall thickness at its vertices")

@@ -75,8 +75,9 @@ void declare_job(CLI::App& app, JobArguments& arguments) {
       ->type_name("HOW")
       ->capture_default_str();
   app.add_option("--unit", arguments.unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
-  app.add_option("--edge", arguments.edge,
-                 "STEP: longest edge of the mesh (default a 64th of the solid's diagonal)")
+  app.add_option(
+         "--edge", arguments.edge,
+         "Split the mesh to this longest edge (default: STEP a 64th of the solid's diagonal, meshes not)")
       ->type_name("LENGTH");
 }
 
@@ -106,6 +107,7 @@ Surface read_parts(const std::vector<std::string>& paths, const ImportOptions& o
   Surface surface = import_surface(paths.front(), options);
   for (std::size_t p = 1; p < paths.size(); ++p) append(surface, import_surface(paths[p], options));
   for (const std::string& line : size_warnings(surface)) progress.warn(line);
+  for (const std::string& line : refinement_notes(surface)) progress.say(line);
   return surface;
 }
 

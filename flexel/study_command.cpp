@@ -52,7 +52,7 @@ void declare(CLI::App& app, StudyArguments& a) {
       ->type_name("NAME");
   app.add_option("--unit", a.unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
   app.add_option("--heal", a.heal, "Broken surfaces: auto, wrap or none (docs/healing.md)")->type_name("HOW");
-  app.add_option("--edge", a.edge, "STEP: longest edge of the mesh")->type_name("LENGTH");
+  app.add_option("--edge", a.edge, "Split the mesh to this longest edge")->type_name("LENGTH");
   app.add_flag("--quiet", a.quiet, "Say only warnings and errors");
 }
 

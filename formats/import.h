@@ -17,9 +17,10 @@ struct ImportOptions {
   // between neighbouring normals. No deflection given: a thousandth of the part's diagonal.
   std::optional<double> deflection;
   double angular_deflection = 0.35;
-  // STEP: the tessellation is then split until no edge is longer than this [m], so that flat faces can bend
-  // too. Not given: a 64th of each solid's diagonal, or what 2 million triangles for the file allow; given,
-  // more triangles than that are an error. Meshes (STL, OBJ, ...) are the user's and are never split.
+  // The mesh is split until no edge is longer than this [m], so that flat faces can bend too; more than 2
+  // million triangles are an error. Not given: meshes (STL, OBJ, ...) are the user's and stay as they are,
+  // STEP's tessellation is split to a 64th of each solid's diagonal, or to what 2 million triangles for the
+  // file allow.
   std::optional<double> largest_edge;
   // s of processor time that OpenCASCADE may take over a file; not given: a minute and 10 s a megabyte
   std::optional<double> occt_seconds;
@@ -30,5 +31,9 @@ struct ImportOptions {
 // unreadable, empty, truncated, unknown format, not finite, STEP without OpenCASCADE (the message says how to
 // get it), a `unit` given for a file that carries another.
 [[nodiscard]] Surface import_surface(const std::string& path, const ImportOptions& options = {});
+
+// A line for each file of a format that is otherwise written again as it came, whose triangles were split
+// (ImportOptions::largest_edge): what its new file does not hold.
+[[nodiscard]] std::vector<std::string> refinement_notes(const Surface& surface);
 
 }  // namespace flexel

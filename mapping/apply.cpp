@@ -12,19 +12,22 @@
 namespace flexel {
 namespace {
 
-// Differences under this share of the distance between the two elements are ties and rounding.
-constexpr double kLeftTie = 1e-6;
+// A vertex within this share of the distance between two elements from the plane half-way between them is as
+// near to one as to the other.
+constexpr double kTie = 0.01;
 
-// True when an element connected with `origin` is now nearer to the moved vertex, and was not at rest.
+// True when an element connected with `origin` is now nearer to the moved vertex, and was farther at rest: a
+// vertex that lay half-way between two has no cell that it could leave.
 bool left_its_cell(const Binding& binding, const Body& body, const std::vector<Vec3>& position,
                    std::uint32_t origin, const Vec3& rest_vertex, const Vec3& vertex) {
   const double now = (vertex - position[origin]).squaredNorm();
   const double at_rest = (rest_vertex - body.rest[origin]).squaredNorm();
   for (const std::uint32_t other : binding.connections.of(origin)) {
-    const double nearer = now - (vertex - position[other]).squaredNorm();
-    if (nearer <= 0) continue;
-    const double tie = kLeftTie * (body.rest[other] - body.rest[origin]).squaredNorm();
-    if (nearer > tie && at_rest - (rest_vertex - body.rest[other]).squaredNorm() <= tie) return true;
+    // The difference of squared distances is twice the distance of the elements times that from the plane.
+    const double tie = 2 * kTie * (body.rest[other] - body.rest[origin]).squaredNorm();
+    if (now - (vertex - position[other]).squaredNorm() > tie &&
+        at_rest - (rest_vertex - body.rest[other]).squaredNorm() < -tie)
+      return true;
   }
   return false;
 }

@@ -244,7 +244,7 @@ void map_pieces(Body& body, const Components& fragments, const MapOptions& optio
       vertices[cracked.shifts[s].vertex] = at_rest[s];
       mapped.result.displacement[cracked.shifts[s].vertex] += cracked.shifts[s].by;
     }
-    mapped.report = report(body, mapped.result);
+    mapped.report = report(body, mapped.result, true);
     mapped.report.crack.spanning_triangles = spanning_triangles(body, mapped.result, fragments, nullptr);
     // What is open encloses nothing.
     if (mode == CrackMode::open)

@@ -20,7 +20,7 @@ namespace {
 constexpr const char* kProgram = "flexel-map";
 
 struct Arguments {
-  std::string body = "-", output, unit, onto, points, far, binding, save_binding;
+  std::string body = "-", output, unit, onto, edge, points, far, binding, save_binding;
   double far_distance = 3;
   MapArguments map;
   bool quiet = false;
@@ -34,6 +34,8 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_option("--onto", arguments.onto,
                  "Deform this mesh (STL, OBJ, PLY, OFF, glTF, 3MF) instead of the body's own")
       ->type_name("FILE");
+  app.add_option("--edge", arguments.edge, "Of --onto: split that mesh to this longest edge")
+      ->type_name("LENGTH");
   app.add_option("--points", arguments.points, "Deform the points of this table (CSV) instead; CSV comes out")
       ->type_name("FILE");
   app.add_option("--far", arguments.far,
@@ -67,6 +69,7 @@ struct Plan {
   CrackOptions crack;
   std::optional<MapOutput> output;  // nothing: points, or only the pieces are wanted
   double unit = 0;                  // of the numbers written, m; 0: that of the surface
+  std::optional<double> edge;       // m, longest of the mesh of --onto
   bool series = false;
 };
 
@@ -113,6 +116,14 @@ Plan make_plan(Arguments& arguments) {
   if (arguments.output.empty() && arguments.map.pieces.empty()) arguments.output = "-";
   if (!arguments.onto.empty() && !arguments.points.empty())
     throw InputError("--onto and --points exclude each other: give one of them");
+  if (!arguments.edge.empty()) {
+    if (arguments.onto.empty())
+      throw InputError(
+          "--edge is of the mesh of --onto: the body's own is split where it is read, by flexel-voxelize "
+          "--edge");
+    plan.edge = parse_quantity(arguments.edge, Dimension::length);
+    if (!(*plan.edge > 0)) throw InputError("--edge: must be above zero");
+  }
   if ((arguments.body == "-") + (arguments.onto == "-") + (arguments.points == "-") > 1)
     throw InputError("only one input can come from stdin");
   if (plan.series && arguments.output == "-")
@@ -129,8 +140,9 @@ Plan make_plan(Arguments& arguments) {
 }
 
 // Reads a mesh in the part's frame; a file without a unit is in the part's.
-Surface read_onto(const std::string& path, const Body& body) {
+Surface read_onto(const std::string& path, const Body& body, std::optional<double> edge) {
   ImportOptions options;
+  options.largest_edge = edge;
   const std::string ending = extension(path);
   if (ending == "stl" || ending == "obj" || ending == "ply" || ending == "off")
     options.unit = default_unit(body.surface);
@@ -147,7 +159,8 @@ class Run {
   void take_surface(Body& body) {
     unit_ = plan_.unit > 0 ? plan_.unit : default_unit(body.surface);
     if (!arguments_.onto.empty()) {
-      foreign_ = read_onto(arguments_.onto, body);
+      foreign_ = read_onto(arguments_.onto, body, plan_.edge);
+      for (const std::string& line : refinement_notes(*foreign_)) progress_.say(line);
       map_onto(body, *foreign_);
     }
     if (!arguments_.points.empty()) {

@@ -96,6 +96,16 @@ struct SurfaceQuality {
   double largest_normal_jump_added = 0;        // between neighbouring triangles
 };
 
+// How far points of the surface lie, deformed, from the flat triangles of their deformed corners.
+struct ChordError {
+  double largest = 0;                // m
+  Vec3 at = Vec3::Zero();            // m, where that point is at rest
+  double longest_edge = 0;           // m, at rest, of the triangle that it is on
+  double largest_displacement = 0;   // m, of vertices and of the points that were looked at
+  std::size_t coarse_triangles = 0;  // that miss more than kCoarseShare of it (mapping/chord.h)
+  [[nodiscard]] double share() const { return largest_displacement > 0 ? largest / largest_displacement : 0; }
+};
+
 struct MapReport {
   std::size_t vertices = 0;
   std::size_t unreferenced = 0;  // of them, used by no polygon; they carry no flags
@@ -110,14 +120,19 @@ struct MapReport {
   double largest_displacement = 0;                                     // m
   double largest_strain = 0;                                           // |principal stretch - 1| at a vertex
   SurfaceQuality quality;
+  std::optional<ChordError> chord;  // nothing of a surface that was cut along cracks
   double lattice_volume_before = 0, lattice_volume_after = 0;  // m^3 of matter in whole cells; 0: no cells
   CrackReport crack;
-  [[nodiscard]] bool valid() const {
+  // The places of the vertices can be trusted.
+  [[nodiscard]] bool placed() const {
     return inverted == 0 && degenerate == 0 && not_finite == 0 && new_self_intersections.value_or(0) == 0;
   }
+  // And so can the triangles between them.
+  [[nodiscard]] bool valid() const { return placed() && (!chord || chord->coarse_triangles == 0); }
 };
 
-[[nodiscard]] MapReport report(const Body& body, const MapResult& result);
+// `cut`: the surface in the body is not its own but was cut along cracks (mapping/crack.h).
+[[nodiscard]] MapReport report(const Body& body, const MapResult& result, bool cut = false);
 // For people: first a sentence that says whether the mapping can be used and why, then the figures worth a
 // look.
 [[nodiscard]] std::vector<std::string> report_lines(const MapReport& report);

@@ -6,6 +6,7 @@
 
 #include "formats/program.h"
 #include "formats/units.h"
+#include "mapping/chord.h"
 #include "mapping/frame.h"
 #include "mapping/quality.h"
 
@@ -34,8 +35,26 @@ std::string share(std::size_t count, std::size_t of) {
   return fmt::format("{} of {} vertices ({:.3g} %)", human_count(count), human_count(of), percent);
 }
 
+// "4mm", as options take it.
+std::string as_option(double metres) {
+  std::string text = human_length(metres);
+  std::erase(text, ' ');
+  return text;
+}
+
+// What the triangles do not show, and with which edges they would.
+std::string coarseness(const ChordError& chord) {
+  return fmt::format(
+      "its triangles, up to {} long, stay flat where the part bends and miss it by up to {} ({:.2g} % of the "
+      "largest displacement) at ({}, {}, {}); read the mesh with --edge {} to split them",
+      human_length(chord.longest_edge), human_length(chord.largest), 100 * chord.share(),
+      human_length(chord.at.x()), human_length(chord.at.y()), human_length(chord.at.z()),
+      as_option(sufficient_edge(chord)));
+}
+
 // Why a mapping that fails must not be used.
 std::string failure(const MapReport& report) {
+  if (report.placed()) return coarseness(*report.chord);
   std::vector<std::string> causes;
   if (report.inverted > 0)
     causes.push_back(share(report.inverted, report.vertices) +
@@ -62,7 +81,7 @@ std::string fewer_elements(const MapReport& report) {
 
 }  // namespace
 
-MapReport report(const Body& body, const MapResult& result) {
+MapReport report(const Body& body, const MapResult& result, bool cut) {
   MapReport report;
   report.vertices = result.displacement.size();
   report.distinct_frames = result.frames.size();
@@ -88,6 +107,7 @@ MapReport report(const Body& body, const MapResult& result) {
   const std::vector<Mat3> gradients = deformation_gradients(result.frames, body.rest, body.position);
   report.largest_strain = largest_stretch(result, gradients);
   report.quality = surface_quality(body.surface, result, gradients);
+  if (!cut) report.chord = chord_error(body, result);
   const LatticeVolume lattice = lattice_volume(body);
   report.lattice_volume_before = lattice.before;
   report.lattice_volume_after = lattice.after;
@@ -139,10 +159,13 @@ std::vector<std::string> report_lines(const MapReport& report) {
   else
     lines.push_back("the mapped surface cannot be used as it is: " + failure(report));
   if (report.kinds[0] < report.vertices) lines.push_back(fewer_elements(report));
-  if (report.voronoi_cell_left > 0)
-    lines.push_back(share(report.voronoi_cell_left, report.vertices) +
-                    " are now nearer to another element than to the one that holds them (Voronoi cell left): "
-                    "expected under strong shear, worth a look where it is not");
+  constexpr double kStrongStrain = 0.1;
+  if (report.voronoi_cell_left > 0 && report.largest_strain > kStrongStrain)
+    lines.push_back(
+        fmt::format("{} are now nearer to another element than to the one that holds them (Voronoi cell "
+                    "left), at strains "
+                    "of up to {:.2g} %: a finer lattice shows whether their place depends on it",
+                    share(report.voronoi_cell_left, report.vertices), 100 * report.largest_strain));
   if (report.voronoi_changed.value_or(0) > 0)
     lines.push_back(
         share(*report.voronoi_changed, report.vertices) +
@@ -155,6 +178,8 @@ std::vector<std::string> report_lines(const MapReport& report) {
     lines.push_back(
         fmt::format("the farthest vertex lies {:.2g} spacings outside the lattice: its place is extrapolated",
                     report.distance_outside));
+  if (!report.placed() && report.chord && report.chord->coarse_triangles > 0)
+    lines.push_back(coarseness(*report.chord));
   add_triangle_lines(report, lines);
   lines.push_back(volume_line(report));
   for (const std::string& line : crack_lines(report.crack)) lines.push_back(line);
@@ -167,6 +192,13 @@ using Json = nlohmann::ordered_json;
 
 Json optional_count(const std::optional<std::size_t>& count) {
   return count ? Json(*count) : Json(nullptr);
+}
+
+Json chord_object(const ChordError& chord) {
+  return {{"largest", chord.largest},
+          {"share", chord.share()},
+          {"at", {chord.at.x(), chord.at.y(), chord.at.z()}},
+          {"longest_edge", chord.longest_edge}};
 }
 
 Json report_object(const MapReport& report, const MapOptions& options) {
@@ -182,10 +214,12 @@ Json report_object(const MapReport& report, const MapOptions& options) {
   json["frames"] = {{"distinct", report.distinct_frames}, {"full", report.kinds[0]},
                     {"plane", report.kinds[1]},           {"line", report.kinds[2]},
                     {"rigid", report.kinds[3]},           {"widened", report.widened}};
-  json["failures"] = {{"inverted", report.inverted},
-                      {"degenerate", report.degenerate},
-                      {"not_finite", report.not_finite},
-                      {"new_self_intersections", optional_count(report.new_self_intersections)}};
+  json["failures"] = {
+      {"inverted", report.inverted},
+      {"degenerate", report.degenerate},
+      {"not_finite", report.not_finite},
+      {"new_self_intersections", optional_count(report.new_self_intersections)},
+      {"coarse_triangles", report.chord ? Json(report.chord->coarse_triangles) : Json(nullptr)}};
   json["advisories"] = {{"voronoi_cell_left", report.voronoi_cell_left},
                         {"voronoi_changed", optional_count(report.voronoi_changed)},
                         {"far_vertices", report.far},
@@ -199,6 +233,7 @@ Json report_object(const MapReport& report, const MapOptions& options) {
   json["smallest_angle_before"] = quality.smallest_angle_before;
   json["smallest_angle_after"] = quality.smallest_angle_after;
   json["largest_normal_jump_added"] = quality.largest_normal_jump_added;
+  json["chord_error"] = report.chord ? chord_object(*report.chord) : Json(nullptr);
   json["area_before"] = quality.area_before;
   json["area_after"] = quality.area_after;
   json["volume_before"] = quality.volume_before;

@@ -45,8 +45,9 @@ void declare(CLI::App& app, Arguments& arguments) {
                  "refuse what needs more to simulate, for example 4GB (default 80 % of what is free)");
   app.add_option("--deflection", arguments.deflection,
                  "STEP: largest distance of the triangles from the CAD surface");
-  app.add_option("--edge", arguments.edge,
-                 "STEP: longest edge of the triangles (default a 64th of the solid's diagonal)");
+  app.add_option(
+      "--edge", arguments.edge,
+      "split the mesh to this longest edge (default: STEP a 64th of the solid's diagonal, meshes not)");
   app.add_option(
       "--input-format,--format", arguments.format,
       "format of the input (step, iges, brep, stl, obj, ply, off, glb, 3mf) instead of what its bytes tell");
@@ -148,6 +149,7 @@ int run(int argc, char** argv) {
   progress.stage("import");
   Surface surface = import_all(arguments, import);
   for (const std::string& line : size_warnings(surface)) progress.warn(line);
+  for (const std::string& line : refinement_notes(surface)) progress.say(line);
   const VoxelizeResult result = voxelize(std::move(surface), options, progress);
   report(result, progress);
   progress.stage("write");

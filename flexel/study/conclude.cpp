@@ -12,24 +12,6 @@ namespace {
 
 constexpr double kStill = 1e-3;  // a probe that moves less than this share of the most does not decide
 
-// The first row of each size of a sweep, the coarsest first.
-std::vector<const Row*> sizes_of(const Study& study, const std::string& sweep) {
-  std::vector<const Row*> rows;
-  for (const Row& row : study.rows)
-    if (row.trial.sweep == sweep && row.found.ok() && row.repeat == 1) rows.push_back(&row);
-  std::stable_sort(rows.begin(), rows.end(),
-                   [](const Row* a, const Row* b) { return a->found.spacing > b->found.spacing; });
-  return rows;
-}
-
-std::vector<SizeValue> values_of(const std::vector<const Row*>& rows, const std::string& quantity) {
-  std::vector<SizeValue> values;
-  for (const Row* row : rows)
-    if (const Quantity* found = row->found.find(quantity))
-      values.push_back({row->found.spacing, found->value});
-  return values;
-}
-
 // Probes (of timed runs: the most that they moved), or the largest displacement where there are none.
 bool may_decide(const Study& study, const std::string& name) {
   const std::vector<std::string>& probes = study.facts.probes;
@@ -130,6 +112,23 @@ void conclude_against(Study& study) {
 
 }  // namespace
 
+std::vector<const Row*> sizes_of(const Study& study, const std::string& sweep) {
+  std::vector<const Row*> rows;
+  for (const Row& row : study.rows)
+    if (row.trial.sweep == sweep && row.found.ok() && row.repeat == 1) rows.push_back(&row);
+  std::stable_sort(rows.begin(), rows.end(),
+                   [](const Row* a, const Row* b) { return a->found.spacing > b->found.spacing; });
+  return rows;
+}
+
+std::vector<SizeValue> values_of(const std::vector<const Row*>& rows, const std::string& quantity) {
+  std::vector<SizeValue> values;
+  for (const Row* row : rows)
+    if (const Quantity* found = row->found.find(quantity))
+      values.push_back({row->found.spacing, found->value, row->found.thin_matter <= kThinMatter});
+  return values;
+}
+
 void conclude(Study& study, const std::vector<Reference>& given) {
   study.references = references_of(study, given);
   for (Row& row : study.rows)
@@ -137,7 +136,8 @@ void conclude(Study& study, const std::vector<Reference>& given) {
   study.summed = sum_up(study);
   std::vector<Point> points;
   for (const Summed& each : study.summed) points.push_back(each.point);
-  study.sentences = sentences(points);
+  study.sentences = doubtful_sentences(study.references);
+  if (study.sentences.empty()) study.sentences = sentences(points);
   if (const std::string sentence = against_sentence(points); !sentence.empty())
     study.sentences.push_back(sentence);
   conclude_against(study);

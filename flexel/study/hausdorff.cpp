@@ -27,6 +27,7 @@ using Facets = std::vector<Kernel::Triangle_3>;
 using Primitive = CGAL::AABB_triangle_primitive<Kernel, Facets::const_iterator>;
 using Tree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
 
+constexpr int kBetweenLooks = 256;    // pieces, at the clock
 constexpr int kMostPieces = 100'000;  // a side: about a second, beside runs of seconds
 
 Kernel::Point_3 point(const Vec3& v) {
@@ -73,7 +74,10 @@ std::array<Piece, 2> halves(const Piece& piece) {
 
 class OneSide {
  public:
-  explicit OneSide(const Facets& other) : tree_(other.begin(), other.end()) { tree_.build(); }
+  OneSide(const Facets& other, std::chrono::steady_clock::time_point deadline)
+      : tree_(other.begin(), other.end()), deadline_(deadline) {
+    tree_.build();
+  }
 
   // Of the surface `from`: at most the result, and no more than the margin below it or below `known`, which
   // is a distance that the whole has for certain.
@@ -90,7 +94,9 @@ class OneSide {
     }
     std::priority_queue<Piece> open({}, std::move(first));
     for (int pieces = 0; !open.empty() && open.top().at_most > (1 + kHausdorffMargin) * at_least_; ++pieces) {
-      if (pieces == kMostPieces) return open.top().at_most;
+      if (pieces == kMostPieces ||
+          (pieces % kBetweenLooks == 0 && std::chrono::steady_clock::now() > deadline_))
+        return open.top().at_most;
       Piece piece = open.top();
       open.pop();
       look_at(piece);
@@ -125,16 +131,18 @@ class OneSide {
   }
 
   Tree tree_;
+  std::chrono::steady_clock::time_point deadline_;
   double at_least_ = 0, settled_ = 0;
 };
 
 }  // namespace
 
 double hausdorff_distance(std::span<const Vec3> a, std::span<const Vec3> b,
-                          std::span<const Corners> triangles) {
+                          std::span<const Corners> triangles,
+                          std::chrono::steady_clock::time_point deadline) {
   const Facets on_a = facets_of(a, triangles), on_b = facets_of(b, triangles);
   if (on_a.empty() || on_b.empty()) return 0;
-  OneSide to_b(on_b), to_a(on_a);
+  OneSide to_b(on_b, deadline), to_a(on_a, deadline);
   const double first = to_b(a, b, triangles, 0);
   const double second = to_a(b, a, triangles, to_b.at_least());
   return std::max(first, second);

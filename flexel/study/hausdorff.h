@@ -1,6 +1,7 @@
 // How far apart two surfaces are, every point of their triangles counted.
 #pragma once
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -12,11 +13,13 @@ namespace flexel::study {
 // The Hausdorff distance of two surfaces that share their triangles and differ in their vertices:
 //     max( max over p on A of d(p, B), max over q on B of d(q, A) ).
 // Never less than the true one and at most kHausdorffMargin above it, but for surfaces that would need more
-// than 100,000 pieces a side for that, which are told the bound that those gave. Branch and bound over pieces
-// of triangles (Tang, Lee, Kim 2009, "Interactive Hausdorff distance computation for general polygonal
-// models", ACM Trans. Graph. 28). a, b: (vertices) m; triangles: indices into both. 0 without triangles.
+// than 100,000 pieces a side, or more time than until `deadline`, which are told the bound that those gave.
+// Branch and bound over pieces of triangles (Tang, Lee, Kim 2009, "Interactive Hausdorff distance computation
+// for general polygonal models", ACM Trans. Graph. 28). a, b: (vertices) m; triangles: indices into both. 0
+// without triangles.
 inline constexpr double kHausdorffMargin = 0.05;
-[[nodiscard]] double hausdorff_distance(std::span<const Vec3> a, std::span<const Vec3> b,
-                                        std::span<const std::array<std::uint32_t, 3>> triangles);
+[[nodiscard]] double hausdorff_distance(
+    std::span<const Vec3> a, std::span<const Vec3> b, std::span<const std::array<std::uint32_t, 3>> triangles,
+    std::chrono::steady_clock::time_point deadline = std::chrono::steady_clock::time_point::max());
 
 }  // namespace flexel::study

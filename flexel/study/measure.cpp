@@ -16,13 +16,38 @@ namespace {
 
 constexpr double kTargets[] = {0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5};
 constexpr double kUsualTarget = 0.01;
+constexpr double kMostOrder = 3;         // cells close in with order 2: more is chance
+constexpr double kMostUncertain = 0.25;  // of the value: a reference that is known worse is none
 
-Bar bar_of(const std::vector<SizeValue>& values, std::size_t finest) {
+// Of three sizes. `believed`: false where they close in faster than cells can.
+Bar bar_of(const std::vector<SizeValue>& values, std::size_t finest, bool& believed) {
   Sequence sequence;
   for (std::size_t i = 0; i < 3; ++i) sequence.value.at(i) = values[finest - i].value;
   for (std::size_t i = 0; i < 2; ++i)
     sequence.ratio.at(i) = values[finest - i - 1].spacing / values[finest - i].spacing;
-  return richardson(sequence);
+  const Bar bar = richardson(sequence);
+  believed = !bar.order || *bar.order <= kMostOrder;
+  return believed ? bar : wide_bar(sequence);
+}
+
+// Three times the largest difference of the finest three; of one value its whole size.
+double wide_range(const std::vector<SizeValue>& values) {
+  if (values.size() == 1) return std::abs(values.back().value);
+  double largest = 0;
+  for (std::size_t i = values.size() - 1; i > 0 && i + 3 > values.size(); --i)
+    largest = std::max(largest, std::abs(values[i].value - values[i - 1].value));
+  return 3 * largest;
+}
+
+std::vector<SizeValue> resolved_of(const std::vector<SizeValue>& values) {
+  std::vector<SizeValue> result;
+  std::copy_if(values.begin(), values.end(), std::back_inserter(result),
+               [](const SizeValue& each) { return each.resolved; });
+  return result;
+}
+
+std::string quantity_text(double value, const std::string& unit) {
+  return unit == "m" ? human_length(value) : fmt::format("{:.3g} {}", value, unit);
 }
 
 // What a point's error is known to be at most.
@@ -42,33 +67,60 @@ std::string factor(double value) {
 
 }  // namespace
 
-Reference extrapolate(const std::string& name, const std::string& unit,
-                      const std::vector<SizeValue>& values) {
+Reference extrapolate(const std::string& name, const std::string& unit, const std::vector<SizeValue>& all) {
   Reference result;
   result.name = name;
   result.unit = unit;
-  if (values.empty()) return result;
+  if (all.empty()) return result;
+  const std::vector<SizeValue> values = resolved_of(all);
   const std::size_t n = values.size();
-  result.value = values.back().value;
-  if (n == 1) {
-    result.uncertainty = std::abs(result.value);
-    result.from = "the only size";
+  if (n < 3) {
+    result.value = all.back().value;
+    result.uncertainty = wide_range(all);
+    result.from = all.size() == 1 ? "the only size" : fmt::format("finest of {} sizes", all.size());
+    result.doubt = n == all.size()
+                       ? "three sizes are needed to tell how far a value is from its limit"
+                       : fmt::format(
+                             "only {} of {} sizes have two cells or more through the walls, and three are "
+                             "needed",
+                             n, all.size());
     return result;
   }
-  if (n == 2) {
-    result.uncertainty = 3 * std::abs(values[1].value - values[0].value);
-    result.from = "finest of 2 sizes";
-    return result;
-  }
-  const Bar bar = bar_of(values, n - 1);
+  bool believed = true, before_believed = true;
+  const Bar bar = bar_of(values, n - 1, believed);
   result.value = bar.extrapolated;
   result.uncertainty = bar.half_width;
   result.order = bar.order;
-  result.from = bar.order ? "extrapolated from 3 sizes" : "finest of 3 sizes, no even limit";
+  result.from = bar.order  ? "extrapolated from 3 sizes"
+                : believed ? "finest of 3 sizes, no even limit"
+                           : "finest of 3 sizes, which close in faster than cells do";
   if (n > 3) {
-    const Bar before = bar_of(values, n - 2);
+    const Bar before = bar_of(values, n - 2, before_believed);
     result.uncertainty = std::max(result.uncertainty, 0.5 * std::abs(before.extrapolated - bar.extrapolated));
   }
+  if (!(result.uncertainty <= kMostUncertain * std::abs(result.value)) && result.uncertainty > 0)
+    result.doubt = "its values have not come near a limit yet";
+  return result;
+}
+
+double half_range(const std::vector<SizeValue>& values) {
+  const std::vector<SizeValue> resolved = resolved_of(values);
+  if (resolved.size() < 3 || !values.back().resolved) return wide_range(values);
+  const Reference limit = extrapolate("", "", values);
+  return std::abs(limit.value - values.back().value) + limit.uncertainty;
+}
+
+std::vector<std::string> doubtful_sentences(const std::vector<Reference>& references) {
+  std::vector<std::string> result;
+  for (const Reference& each : references)
+    if (each.decides && !each.doubt.empty()) {
+      if (result.empty()) result.push_back(fmt::format("The error of no run is known: {}.", each.doubt));
+      result.push_back(fmt::format("{}: {} by the finest size; it may be anything from {} to {}.", each.name,
+                                   quantity_text(each.value, each.unit),
+                                   quantity_text(std::max(0.0, each.value - each.uncertainty), each.unit),
+                                   quantity_text(each.value + each.uncertainty, each.unit)));
+    }
+  if (!result.empty()) result.emplace_back("A larger --budget goes on to finer sizes.");
   return result;
 }
 
@@ -76,6 +128,7 @@ std::optional<RunError> error_of(const RunResult& run, const std::vector<Referen
   std::optional<RunError> result;
   for (const Reference& reference : references) {
     if (!reference.decides || reference.value == 0) continue;
+    if (!reference.doubt.empty()) return std::nullopt;
     const Quantity* found = run.find(reference.name);
     if (found == nullptr) continue;
     if (!result) result.emplace();

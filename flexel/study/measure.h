@@ -18,23 +18,29 @@ struct Reference {
   std::optional<double> order;  // observed; nothing where the values do not approach a limit evenly
   std::string from;             // "given", "extrapolated from 3 sizes", "finest of 2 sizes" ...
   bool decides = false;         // it counts for the error of a run
+  std::string doubt;            // why no error can be measured against it; "": one can
 };
 
 // One quantity over the sizes of a sweep; the coarsest first.
 struct SizeValue {
   double spacing = 0;  // m
   double value = 0;
+  bool resolved = true;  // at most kThinMatter of the matter lies in walls of fewer than two cells
 };
+inline constexpr double kThinMatter = 0.2;  // as the error bars have it
 
-// Of the finest three by Richardson's extrapolation with the observed order; the uncertainty is the grid
-// convergence index (simulate/estimate.h gives sources and exceptions), at least half the difference of the
-// extrapolation from what the next coarser three give, where there are four. Of two the finest, within three
-// times their difference; of one itself, within its whole size.
+// Of the finest three that are resolved, by Richardson's extrapolation with the observed order, or 2 where
+// that is more; the uncertainty is the grid convergence index (simulate/estimate.h gives sources and
+// exceptions), at least half the difference of the extrapolation from what the next coarser three give, where
+// there are four. Orders above 3 are none: values that close in so fast agree by chance, and the finest is
+// taken within three times the larger difference. With fewer than three resolved sizes, or an uncertainty
+// above a quarter of the value, there is `doubt`: the finest of all within three times the largest
+// difference; of one itself, within its whole size.
 [[nodiscard]] Reference extrapolate(const std::string& name, const std::string& unit,
                                     const std::vector<SizeValue>& values);
 
 // The largest relative error among the deciding quantities that the run has, and the largest relative
-// uncertainty of those; nothing where there is none.
+// uncertainty of those; nothing where there is none, or where one of them is in doubt.
 struct RunError {
   double error = 0, uncertainty = 0;
 };
@@ -66,6 +72,14 @@ struct Point {
 
 // "For 1 % use --size 1.5mm: 3.1 s, 420 MB. Ten times the accuracy costs 22 times the time."
 [[nodiscard]] std::vector<std::string> sentences(const std::vector<Point>& points);
+
+// What the sizes know of each deciding quantity, and what of all their values is known only as a range, where
+// one of them is in doubt: "The error of no run is known: ...". Nothing where none is.
+[[nodiscard]] std::vector<std::string> doubtful_sentences(const std::vector<Reference>& references);
+
+// The range in which a size's value leaves the limit, by the sizes up to it, the coarsest first:
+// half its width. As extrapolate() has it, about its own value.
+[[nodiscard]] double half_range(const std::vector<SizeValue>& values);
 
 // One quantity as another program has it beside ours.
 struct Agreement {

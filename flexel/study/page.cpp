@@ -83,7 +83,8 @@ std::string references_table(const Study& study) {
   for (const Reference& each : study.references)
     rows.push_back({escaped(each.name), quantity(each.value, each.unit),
                     quantity(each.uncertainty, each.unit),
-                    each.order ? fmt::format("{:.1f}", *each.order) : "", escaped(each.from),
+                    each.order ? fmt::format("{:.1f}", *each.order) : "",
+                    escaped(each.from + (each.doubt.empty() ? "" : "; no reference: " + each.doubt)),
                     each.decides ? "yes" : ""});
   return "<div class=\"wide\">" +
          table({"quantity", "reference", "uncertain by", "observed order", "from", "counts"}, rows) +
@@ -263,7 +264,16 @@ std::string page(const Study& study, const std::map<std::string, std::string>& p
                                     human_seconds(study.budget)))},
       {"SENTENCES", paragraphs(study.sentences, "sentence")},
       {"NOTES", paragraphs(study.notes, "faint")},
-      {"PLOT_ERROR", plot(plots, "error")},
+      {"PLOT_SIZE", plot(plots, "size")},
+      {"SIZE_WORDS",
+       "What each size found. Its bar is the range in which the limit lies by the sizes up to it "
+       "(docs/study.md); "
+       "the band is the reference. Hollow: a fifth of the matter or more lies in walls of fewer than two "
+       "cells, "
+       "and the size has no part in the reference."},
+      {"PLOT_ERROR", plots.count("error") == 0 && plots.count("size") > 0
+                         ? "<p class=\"faint\">No reference, no errors: see above.</p>"
+                         : plot(plots, "error")},
       {"ERROR_WORDS",
        "The error of a run is the largest relative one among the quantities that count (the probes; in timed "
        "runs the most that "

@@ -181,6 +181,72 @@ std::string error_script(const Study& study, const std::string& out) {
   return script + data + "plot " + plots + "\n";
 }
 
+// The unit in which human_length() would write `metres`.
+std::pair<double, const char*> unit_of(double metres) {
+  const std::pair<double, const char*> units[] = {{1, "m"}, {1e-3, "mm"}, {1e-6, "um"}, {1e-9, "nm"}};
+  for (const auto& unit : units)
+    if (metres >= unit.first) return unit;
+  return units[3];
+}
+
+// The quantity that decides, of the sizes; the first where there are several.
+std::string size_script(const Study& study, const std::string& out) {
+  const auto reference = std::find_if(study.references.begin(), study.references.end(),
+                                      [](const Reference& each) { return each.decides && each.unit == "m"; });
+  if (reference == study.references.end()) return "";
+  const std::vector<SizeValue> values = values_of(sizes_of(study, "resolution"), reference->name);
+  if (values.size() < 2) return "";
+  double most = 0;
+  for (const SizeValue& each : values) most = std::max(most, std::abs(each.value));
+  const auto [y_unit, y_name] = unit_of(most);
+  const auto [x_unit, x_name] = unit_of(values.front().spacing);
+  std::string script = head("size", 860, 360);
+  script += fmt::format(
+      "set output '{}'\nset xlabel 'spacing of the lattice ({})'\nset ylabel {}\nset grid lt 1 lw 0.4 lc rgb "
+      "'#888888'\nset key outside right top samplen 2 spacing 1.1\nset xrange [0:{:.9g}]\n",
+      out, x_name, in_quotes(fmt::format("{} ({})", reference->name, y_name)),
+      1.06 * values.front().spacing / x_unit);
+  // Bars of many times the values would hide the values.
+  double low = 1e300, high = -1e300;
+  for (const SizeValue& each : values) {
+    low = std::min(low, each.value / y_unit);
+    high = std::max(high, each.value / y_unit);
+  }
+  if (reference->doubt.empty()) {
+    low = std::min(low, (reference->value - reference->uncertainty) / y_unit);
+    high = std::max(high, (reference->value + reference->uncertainty) / y_unit);
+  }
+  const double room = 0.5 * std::max(high - low, 0.02 * high);
+  script += fmt::format("set yrange [{:.9g}:{:.9g}]\n", std::max(0.0, low - room), high + room);
+  std::string resolved = "$resolved << EOD\n", thin = "$thin << EOD\n", all = "$all << EOD\n", plots;
+  bool any_resolved = false, any_thin = false;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const double half =
+        half_range({values.begin(), values.begin() + static_cast<std::ptrdiff_t>(i) + 1}) / y_unit;
+    const std::string line =
+        fmt::format("{:.9g} {:.9g} {:.9g}\n", values[i].spacing / x_unit, values[i].value / y_unit, half);
+    (values[i].resolved ? resolved : thin) += line;
+    (values[i].resolved ? any_resolved : any_thin) = true;
+    all += line;
+  }
+  script += resolved + "EOD\n" + thin + "EOD\n" + all + "EOD\n";
+  if (reference->doubt.empty()) {
+    script += fmt::format(
+        "set object 1 rectangle from graph 0, first {:.9g} to graph 1, first {:.9g} fc rgb '#56a9dd' fs "
+        "solid 0.25 "
+        "noborder behind\nlimit = {:.9g}\n",
+        (reference->value - reference->uncertainty) / y_unit,
+        (reference->value + reference->uncertainty) / y_unit, reference->value / y_unit);
+    plots += "limit with lines dt 3 lw 1.4 lc rgb '#56a9dd' title 'reference', ";
+  }
+  plots += "$all with lines lw 1 lc rgb '#0b84c8' notitle";
+  if (any_resolved)
+    plots += ", $resolved with yerrorbars pt 7 ps 0.7 lw 1.4 lc rgb '#0b84c8' title 'size, with its bar'";
+  if (any_thin)
+    plots += ", $thin with yerrorbars pt 6 ps 0.7 lw 1 lc rgb '#8a8a8a' title 'coarser than the walls'";
+  return script + "plot " + plots + "\n";
+}
+
 std::string stages_script(const Study& study, const std::string& out) {
   std::vector<const Summed*> bars;
   for (const Summed& each : study.summed)
@@ -251,6 +317,8 @@ std::map<std::string, std::string> draw_plots(const Study& study, const fs::path
                                   [](const Summed& s) { return is_drawn(s.point); });
   if (errors)
     plots["error"] = draw(gnuplot, "error", error_script(study, (folder / "error.svg").string()), folder);
+  if (const std::string script = size_script(study, (folder / "size.svg").string()); !script.empty())
+    plots["size"] = draw(gnuplot, "size", script, folder);
   if (!study.summed.empty())
     plots["stages"] = draw(gnuplot, "stages", stages_script(study, (folder / "stages.svg").string()), folder);
   return plots;

@@ -13,8 +13,10 @@
 
 #include "flexel/study/history.h"
 #include "flexel/study/scene_edit.h"
+#include "formats/body_file.h"
 #include "formats/error.h"
 #include "formats/files.h"
+#include "simulate/coarsen.h"
 
 namespace flexel::study {
 namespace {
@@ -43,6 +45,8 @@ Json read_json(const fs::path& path) {
   std::ifstream in(path);
   return Json::parse(in);
 }
+
+constexpr double kThinWall = 2;  // cells
 
 double length(const Json& vector) {
   return std::hypot(vector[0].get<double>(), vector[1].get<double>(), vector[2].get<double>());
@@ -116,13 +120,21 @@ class Run {
     add("voxelize", log_.stages["voxelize"]);
     add("write", log_.stages["write"]);
     const Json found_parts = read_json(file("voxelize.json"));
+    double samples = 0,
+           thin = 0;  // places where walls were measured, and where they are thinner than two cells
     for (const Json& part : found_parts["parts"]) {
       PartFound found{part["name"], part["surface_volume"], std::nullopt};
       if (!part["thinnest_wall"].is_null()) found.thinnest_wall = part["thinnest_wall"]["thickness"];
       result_.parts.push_back(found);
       result_.elements += part["elements"].get<std::size_t>();
       result_.cells += part["cells"].get<std::size_t>();
+      samples += part["wall_samples"].get<double>();
+      thin += part["thin_walls"].get<double>();
     }
+    // Where no wall is thin there is no need to look at the matter. Centre placement has no cells to ask.
+    if (thin > 0)
+      result_.thin_matter =
+          result_.cells == 0 ? thin / samples : share_of_thin_walls(read_body(file("rest.vtu")), kThinWall);
     return true;
   }
 

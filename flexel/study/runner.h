@@ -77,7 +77,8 @@ struct RunResult {
   std::size_t elements = 0, cells = 0;  // at centre placement cells are 0: count elements
   double spacing = 0;                   // m, geometric mean over the axes of the first part's lattice
   std::vector<PartFound> parts;
-  double area = 0;  // m^2, of the surface at rest
+  double thin_matter = 0;  // share of the matter in walls of fewer than two cells
+  double area = 0;         // m^2, of the surface at rest
   std::vector<Quantity> quantities;
   int newton_iterations = 0, cg_iterations = 0;
   std::size_t steps = 0;               // timed runs

@@ -23,15 +23,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kLookCells = 2000, kFewestCells = 60;
+constexpr double kLookCells = 2000, kFewestCells = 200;
 constexpr int kRungs = 12;
-constexpr double kFirstShare = 0.7;    // of the budget, for the first run of each trial
-constexpr double kFinishShare = 0.08;  // of the budget, for the page
-constexpr double kMemoryShare = 0.8;   // of what is free
-constexpr double kSideShare = 0.1;     // of the budget, the most that one run beside the ladder may take
-constexpr double kFewerCells = 1.4;    // than a size is thought to give, by the size before it
-constexpr double kKnown = 0.05;        // how well a median should be known
-constexpr int kMostRepeats = 9;
+constexpr double kLadderShare = 0.65;  // of the budget, until when another size begins
+constexpr double kFirstShare = 0.8;    // the same of the first run of any other trial
+// Of the budget, for comparing the surfaces, for pictures and the page; at least so many seconds.
+constexpr double kFinishShare = 0.12, kFinishLeast = 3;
+constexpr double kPageShare = 0.04, kPageLeast = 1.5;  // of that, for the plots and the page alone
+constexpr double kMemoryShare = 0.8;                   // of what is free
+constexpr double kSideShare = 0.1;   // of the budget, the most that one run beside the ladder may take
+constexpr double kFewerCells = 1.4;  // than a size is thought to give, by the size before it
+constexpr double kKnown = 0.05;      // how well a median should be known
+constexpr int kMostRepeats = 5;
 constexpr double kLongest = 1e9;  // s
 
 // What an earlier study that was killed left behind.
@@ -58,14 +61,21 @@ double Session::spent() const {
 }
 
 Deadline Session::deadline() const {
+  return in(left());
+}
+
+Deadline Session::in(double seconds) const {
   // A clock counts nanoseconds: what it cannot hold is never.
-  const double seconds = left();
   if (seconds > kLongest) return kNever;
   return Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
 }
 
 double Session::left() const {
-  return wanted_.budget * (1 - kFinishShare) - spent();
+  return wanted_.budget - std::max(kFinishShare * wanted_.budget, kFinishLeast) - spent();
+}
+
+double Session::left_to_look() const {
+  return wanted_.budget - std::max(kPageShare * wanted_.budget, kPageLeast) - spent();
 }
 
 // A coarse lattice says how thick the walls are and how many cells a size gives.
@@ -80,7 +90,13 @@ Sweep Session::look() {
                                      summary, "-o", (folder_->path() / "look.vtu").string()});
   ChildOptions options;
   options.log = folder_->path() / "look.log";
+  options.deadline = in(left_to_look());
   const ChildRun run = run_child(arguments, options);
+  if (run.out_of_time)
+    throw InputError(
+        fmt::format("a first look at the part takes more than the budget of {}: give more with "
+                    "--budget",
+                    human_seconds(wanted_.budget)));
   if (run.exit_code != 0) {
     const std::string error = error_in_log(options.log);
     throw InputError(!error.empty() ? error
@@ -178,10 +194,12 @@ bool Session::run_cheapest(Sweep& sweep) {
 
 // What speaks against a first run; "" where nothing does.
 std::string Session::why_not(const Trial& trial, const Prediction& told) const {
-  const double time_left = kFirstShare * wanted_.budget - spent();
+  const bool size = trial.sweep == "resolution" || trial.sweep == "calculix";
+  const double time_left = (size ? kLadderShare : kFirstShare) * wanted_.budget - spent();
   if (told.seconds > time_left)
-    return fmt::format("time: {} were left for first runs", human_seconds(std::max(0.0, time_left)));
-  if (trial.sweep != "resolution" && trial.sweep != "calculix" && told.seconds > kSideShare * wanted_.budget)
+    return fmt::format("time: {} were left for {}", human_seconds(std::max(0.0, time_left)),
+                       size ? "another size" : "first runs");
+  if (!size && told.seconds > kSideShare * wanted_.budget)
     return "time: beside the sizes no run may take more than a tenth of the budget";
   if (told.bytes > kMemoryShare * available_memory())
     return fmt::format("memory: {} are free", human_bytes(available_memory()));
@@ -200,7 +218,7 @@ void Session::repeat_all(Sweep& sweep) {
     for (const Row& row : study_.rows)
       if (!row.found.ok()) {
         failed.insert(row.trial.label);
-      } else {
+      } else if (row.trial.sweep == "resolution" || row.trial.sweep == "calculix") {
         auto& entry = seen[row.trial.label];
         if (entry.first == nullptr) entry.first = &row;
         entry.second.push_back(row.found.wall);
@@ -299,12 +317,26 @@ const Row* Session::finest_row() const {
 
 void Session::measure_surfaces(const Row& finest) {
   const std::string reference = kept("surface", finest.trial, ".ply");
-  for (Row& row : study_.rows) {
-    const std::string surface = kept("surface", row.trial, ".ply");
-    if (!row.found.ok() || row.repeat > 1 || !fs::exists(surface)) continue;
-    const SurfaceDistance found = surface_distance(surface, reference);
-    row.surface_rms = found.rms;
-    row.surface_hausdorff = found.hausdorff;
+  std::vector<Row*> rows;
+  for (Row& row : study_.rows)
+    if (row.found.ok() && row.repeat == 1 && fs::exists(kept("surface", row.trial, ".ply")))
+      rows.push_back(&row);
+  // Sizes first: where the time ends it is the other choices that go without.
+  std::stable_partition(rows.begin(), rows.end(),
+                        [](const Row* row) { return row->trial.sweep == "resolution"; });
+  double slowest = 0;
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    const double share = left_to_look() / static_cast<double>(rows.size() - r), began = spent();
+    if (left_to_look() < 1.5 * slowest || share <= 0) {
+      study_.notes.push_back(fmt::format("{} of {} surfaces were not compared: the budget was spent.",
+                                         rows.size() - r, rows.size()));
+      return;
+    }
+    const SurfaceDistance found =
+        surface_distance(kept("surface", rows[r]->trial, ".ply"), reference, in(share));
+    rows[r]->surface_rms = found.rms;
+    rows[r]->surface_hausdorff = found.hausdorff;
+    slowest = std::max(slowest, spent() - began);
   }
 }
 
@@ -330,12 +362,17 @@ void Session::draw_pictures(const Row& finest) {
   const Quantity* largest = finest.found.find("largest displacement");
   if (largest == nullptr || !(largest->value > 0)) return;
   for (const Row* row : rows) {
+    if (left_to_look() <= 0) {
+      study_.notes.emplace_back("Pictures were left out: the budget was spent.");
+      return;
+    }
     const std::string surface = (folder_->path() / "error.ply").string();
     const std::string png = (folder_->path() / "error.png").string();
     write_error_surface(kept("surface", row->trial, ".ply"), kept("surface", finest.trial, ".ply"),
                         largest->value, surface);
     ChildOptions options;
     options.log = folder_->path() / "picture.log";
+    options.deadline = in(left_to_look());
     const ChildRun run = run_child({own_program("flexel"), "picture", surface, "-o", png, "--color",
                                     kErrorAttribute, "--size", "560x420", "--quiet"},
                                    options);
@@ -356,8 +393,8 @@ void Session::finish() {
     measure_lags(reference);
     // Reading surfaces heeds the interrupt, which has come already.
     try {
-      if (!interrupted_) measure_surfaces(reference);
       if (!interrupted_) draw_pictures(*finest);
+      if (!interrupted_) measure_surfaces(reference);
     } catch (const Interrupted&) {
       note_interrupt();
     } catch (const InputError& error) {

@@ -46,14 +46,16 @@ class Session {
   void append(const Row& row);
   void finish();
   void measure_surfaces(const Row& finest);
+  [[nodiscard]] Deadline in(double seconds) const;  // from now
   void measure_lags(const Row& finest);
   void draw_pictures(const Row& finest);
   void write_all();
   [[nodiscard]] const Row* finest_row() const;
   [[nodiscard]] std::string kept(const char* what, const Trial& trial, const char* ending) const;
   [[nodiscard]] double spent() const;
-  [[nodiscard]] double left() const;        // s, for runs
-  [[nodiscard]] Deadline deadline() const;  // when those end
+  [[nodiscard]] double left() const;          // s, for runs
+  [[nodiscard]] double left_to_look() const;  // s, until the page itself has to be made
+  [[nodiscard]] Deadline deadline() const;    // when those end
 
   const Assignment& wanted_;
   Progress& progress_;

@@ -70,6 +70,12 @@ struct Study {
   std::vector<std::string> notes;  // for the reader: interrupted, plots left out ...
 };
 
+// The first row of each size of a sweep that went well, the coarsest first.
+[[nodiscard]] std::vector<const Row*> sizes_of(const Study& study, const std::string& sweep);
+// What they found, of the rows that have the quantity.
+[[nodiscard]] std::vector<SizeValue> values_of(const std::vector<const Row*>& rows,
+                                               const std::string& quantity);
+
 // References from the rows (`given` go first), errors of the rows, the summed points and the sentences.
 void conclude(Study& study, const std::vector<Reference>& given);
 
@@ -85,18 +91,20 @@ void conclude(Study& study, const std::vector<Reference>& given);
 
 // Distances of the mapped surface `path` from `finest` (both .ply of the same part): of the same points of
 // matter the root of the mean square over the area; and the Hausdorff distance of the two surfaces
-// (study/hausdorff.h). Throws InputError where they do not correspond.
+// (study/hausdorff.h), for which there is time until `deadline`. Throws InputError where they do not
+// correspond.
 struct SurfaceDistance {
   double rms = 0, hausdorff = 0;  // m
 };
-[[nodiscard]] SurfaceDistance surface_distance(const std::string& path, const std::string& finest);
+[[nodiscard]] SurfaceDistance surface_distance(const std::string& path, const std::string& finest,
+                                               Deadline deadline);
 // Writes `path` to `out` (.ply) with the distance of each vertex from `finest` as the attribute
 // kErrorAttribute, in percent of `whole` [m].
 inline constexpr const char* kErrorAttribute = "error_in_percent";
 void write_error_surface(const std::string& path, const std::string& finest, double whole,
                          const std::string& out);
 
-// study.html: the page. `plots` are SVG texts by name ("error", "stages", "effects"); those that are missing
+// study.html: the page. `plots` are SVG texts by name ("size", "error", "stages"); those that are missing
 // are said to be.
 [[nodiscard]] std::string page(const Study& study, const std::map<std::string, std::string>& plots);
 

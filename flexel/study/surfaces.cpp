@@ -29,7 +29,7 @@ void check_same_mesh(const Surface& surface, const Surface& finest, const std::s
 
 // The difference d is linear over a triangle of corners i: the integral of |d|^2 is the area times
 // (|d1|^2 + |d2|^2 + |d3|^2 + |d1 + d2 + d3|^2) / 12.
-SurfaceDistance surface_distance(const std::string& path, const std::string& finest) {
+SurfaceDistance surface_distance(const std::string& path, const std::string& finest, Deadline deadline) {
   const Surface reference = read(finest), surface = read(path);
   check_same_mesh(surface, reference, path);
   const auto triangles = triangulate(reference).corners;
@@ -49,7 +49,7 @@ SurfaceDistance surface_distance(const std::string& path, const std::string& fin
   }
   SurfaceDistance result;
   if (area > 0) result.rms = std::sqrt(integral / area);
-  result.hausdorff = hausdorff_distance(surface.vertices, reference.vertices, triangles);
+  result.hausdorff = hausdorff_distance(surface.vertices, reference.vertices, triangles, deadline);
   return result;
 }
 

@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kCellsThrough[] = {1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128};
 constexpr double kMiddleShare = 1.0 / 60;  // of the budget, what one run of the middle may take
-constexpr double kModelShare = 1.0 / 30;   // the same of a size at which other models are run
+constexpr double kMiddleMost = 1.0 / 20;   // the same where no size takes less
 constexpr double kTolerances[] = {1e-2, 1e-4, 1e-6};
 constexpr const char* kIntegrators[] = {"symplectic", "verlet", "explicit", "implicit"};
 
@@ -73,15 +73,17 @@ Trial Sweep::trial(const std::string& sweep, const std::string& choice, double s
 
 std::vector<Trial> Sweep::open() const {
   std::vector<Trial> all, result;
-  if (!ladder_ended_)
+  if (climbing())
     for (const Rung& rung : rungs_)
       if (!rung.done) {
         all.push_back(trial("resolution", "", rung.size, first_));
         break;
       }
   if (const std::optional<Trial> next = next_against()) all.push_back(*next);
-  add_models(all);
-  if (const std::optional<std::size_t> rung = middle()) add_choices(all, *rung);
+  if (const std::optional<std::size_t> rung = climbing() ? std::nullopt : middle()) {
+    add_models(all, *rung);
+    add_choices(all, *rung);
+  }
   for (const Trial& each : all)
     if (closed_.count(each.label) == 0) result.push_back(each);
   return result;
@@ -102,38 +104,37 @@ std::optional<Trial> Sweep::next_against() const {
   return std::nullopt;
 }
 
-void Sweep::add_models(std::vector<Trial>& trials) const {
+void Sweep::add_models(std::vector<Trial>& trials, std::size_t r) const {
   const std::string own = first_.model.empty() ? "cells" : first_.model;
-  for (const Rung& rung : rungs_) {
-    if (!rung.found || rung.wall > kModelShare * budget_) continue;  // the ladder goes first
-    for (const auto& [model, hooke] : {std::pair<const char*, const char*>{"cells", ""},
-                                       {"springs", ""},
-                                       {"paper", "paper"},
-                                       {"paper", "ganovelli"}}) {
-      if (model == own && (*hooke == 0 || first_.hooke == hooke)) continue;
-      Configuration each = first_;
-      each.model = model;
-      each.hooke = hooke;
-      trials.push_back(
-          trial("model", *hooke != 0 && each.hooke != "paper" ? each.hooke : model, rung.size, each));
-    }
+  for (const auto& [model, hooke] : {std::pair<const char*, const char*>{"cells", ""},
+                                     {"springs", ""},
+                                     {"paper", "paper"},
+                                     {"paper", "ganovelli"}}) {
+    if (model == own && (*hooke == 0 || first_.hooke == hooke)) continue;
+    Configuration each = first_;
+    each.model = model;
+    each.hooke = hooke;
+    trials.push_back(
+        trial("model", *hooke != 0 && each.hooke != "paper" ? each.hooke : model, rungs_[r].size, each));
   }
 }
 
-// The finest size of the ladder at which a run takes a small share of the budget, once the next one would
-// not.
+bool Sweep::climbing() const {
+  return !ladder_ended_ &&
+         std::any_of(rungs_.begin(), rungs_.end(), [](const Rung& rung) { return !rung.done; });
+}
+
+// The finest size of use at which a run takes a small share of the budget; where none does, the coarsest of
+// use if that is not out of proportion.
 std::optional<std::size_t> Sweep::middle() const {
-  std::optional<std::size_t> best, first;
+  std::optional<std::size_t> best;
   for (std::size_t r = 0; r < rungs_.size(); ++r) {
-    if (!rungs_[r].found) continue;
-    if (!first) first = r;
-    if (rungs_[r].wall <= kMiddleShare * budget_) best = r;
+    const Rung& rung = rungs_[r];
+    if (!rung.found || rung.found->cells < static_cast<double>(kFewestOfUse) ||
+        rung.thin_matter > kThinMatter)
+      continue;
+    if (rung.wall <= (best ? kMiddleShare : kMiddleMost) * budget_) best = r;
   }
-  if (!best) best = first;
-  if (!best) return std::nullopt;
-  if (ladder_ended_ || *best + 1 >= rungs_.size() || rungs_[*best + 1].done) return best;
-  const Trial next = trial("resolution", "", rungs_[*best + 1].size, first_);
-  if (predict(next).seconds <= kMiddleShare * budget_) return std::nullopt;  // the ladder goes first
   return best;
 }
 
@@ -269,6 +270,7 @@ void Sweep::done(const Trial& ended, const RunResult& found) {
       rung.step = found.step;
       rung.wall = found.wall;
       rung.cpu = found.cpu;
+      rung.thin_matter = found.thin_matter;
     }
   if (found.ok())
     predictor_.add(ended.kind(),

@@ -1,8 +1,8 @@
-// Which configurations a study runs, and in which order: always the one that is predicted to be cheapest
-// next, as long as time and memory allow it.
+// Which configurations a study runs, and in which order: the sizes first, as fine as time and memory allow;
+// then the other choices, the cheapest next.
 //
-// One ladder of sizes carries the study. Its wider choices are run beside it: the models at every size of the
-// ladder that is done, all else at one size in the middle.
+// One ladder of sizes carries the study. Its wider choices are run beside it at one size, of which people
+// ask: one that resolves the walls, has kFewestOfUse cells or more and takes a small share of the budget.
 #pragma once
 #include <map>
 #include <optional>
@@ -45,6 +45,8 @@ inline constexpr double kTetrahedraInCube = 6;
 [[nodiscard]] std::vector<double> ladder_of_sizes(double wall, double spacing, double cells_there,
                                                   double fewest, int rungs);
 
+inline constexpr std::size_t kFewestOfUse = 2000;
+
 class Sweep {
  public:
   // `first`: the configuration that the user would have without choosing; its size is not used. `sizes`: the
@@ -71,13 +73,14 @@ class Sweep {
     double size = 0;
     bool done = false;
     std::optional<RunSize> found;  // of a run that went well
-    double spacing = 0, step = 0, wall = 0, cpu = 0;
+    double spacing = 0, step = 0, wall = 0, cpu = 0, thin_matter = 0;
   };
   [[nodiscard]] RunSize size_of(const Trial& trial) const;
   // What a run takes on other threads over what one on every core takes.
   [[nodiscard]] double thread_factor(const Trial& trial) const;
+  [[nodiscard]] bool climbing() const;  // the ladder is not at its end
   [[nodiscard]] std::optional<std::size_t> middle() const;
-  void add_models(std::vector<Trial>& trials) const;
+  void add_models(std::vector<Trial>& trials, std::size_t rung) const;
   void add_choices(std::vector<Trial>& trials, std::size_t rung) const;
   void add_timed(std::vector<Trial>& trials, const Rung& rung) const;
   void add_effects(std::vector<Trial>& trials, const Rung& rung) const;

@@ -63,6 +63,7 @@ std::vector<Field> fields(std::size_t run, const Row& row, const std::vector<Qua
   const std::vector<Field> rest = {{"cells", std::to_string(found.cells)},
                                    {"elements", std::to_string(found.elements)},
                                    {"spacing [m]", number(found.spacing)},
+                                   {"thin matter", number(found.thin_matter)},
                                    {"newton iterations", std::to_string(found.newton_iterations)},
                                    {"cg iterations", std::to_string(found.cg_iterations)},
                                    {"steps", std::to_string(found.steps)},
@@ -108,7 +109,8 @@ OrderedJson json_of(const Reference& each) {
           {"uncertainty", each.uncertainty},
           {"order", json_of(each.order)},
           {"from", each.from},
-          {"decides", each.decides}};
+          {"decides", each.decides},
+          {"doubt", each.doubt}};
 }
 
 OrderedJson json_of(const Against& against) {

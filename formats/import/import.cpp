@@ -12,6 +12,7 @@
 #include "formats/body_file.h"
 #include "formats/error.h"
 #include "formats/import/readers.h"
+#include "formats/import/subdivide.h"
 #include "formats/off.h"
 #include "formats/parallel.h"
 #include "formats/program.h"
@@ -115,6 +116,11 @@ Surface read(const std::string& format, ImportInput& input, const ImportOptions&
   return read_3mf(input, options);
 }
 
+// Tessellated on import, and split there (formats/import/occt_mesh.cpp).
+bool is_cad(const std::string& format) {
+  return format == "step" || format == "iges" || format == "brep";
+}
+
 std::string sniff(const ImportInput& input, const std::string& path) {
   const std::string_view text = beginning(input, 4096);
   if (begins_with_word(text, "iso-10303-21")) return "step";
@@ -181,6 +187,7 @@ Surface import_surface(const std::string& path, const ImportOptions& options) {
   Surface& surface = read.surface;
   surface.sources.at(0).file = input.file;
   surface.sources.at(0).hash = read.hash;
+  if (options.largest_edge && !is_cad(format)) subdivide_mesh(surface, *options.largest_edge, input.where);
   surface.part_source.assign(surface.parts.size(), 0);
   make_part_names_unique(surface, input.stem.empty() ? "part" : input.stem);
   check(surface, input.where);
@@ -188,6 +195,21 @@ Surface import_surface(const std::string& path, const ImportOptions& options) {
                                     [&](const Vec3& vertex) { return vertex != surface.vertices.front(); });
   if (!has_area) throw InputError(input.where, "all its vertices are at one point: nothing to work on");
   return std::move(read.surface);
+}
+
+std::vector<std::string> refinement_notes(const Surface& surface) {
+  std::vector<std::string> lines;
+  for (const SurfaceSource& source : surface.sources) {
+    const bool rewritten = source.format == "obj" || source.format == "off" || source.format == "glb" ||
+                           source.format.starts_with("ply");
+    if (rewritten && source.bytes.empty())
+      lines.push_back(fmt::format(
+          "{}: its triangles were split, so the part comes out as a new file: vertices keep their "
+          "order and new ones follow; groups, names and colours stay, textures, materials and "
+          "normals do not",
+          source.file));
+  }
+  return lines;
 }
 
 }  // namespace flexel

@@ -218,32 +218,12 @@ void add_solid(Surface& surface, const TopoDS_Shape& solid, double unit, const S
 
 // Default for the largest edge: a share of the solid's diagonal.
 constexpr double kDefaultEdges = 64;
-// No file becomes more triangles by subdivision.
-constexpr std::size_t kMostTriangles = 2'000'000;
 
 // Subdivides the last solid. Without a limit of the user's it gets its share of the triangles and what edges
 // they allow.
 void refine(Surface& surface, std::size_t first_polygon, std::size_t solids, const ImportOptions& options,
             const ImportInput& input) {
-  if (options.largest_edge) {
-    // A triangle without an edge above L has at most the area of the equilateral one: a bound from below.
-    double area = 0;
-    for (std::size_t p = first_polygon; p < surface.polygon_count(); ++p) {
-      const auto corners = surface.polygon(p);
-      area += (surface.vertices[corners[1]] - surface.vertices[corners[0]])
-                  .cross(surface.vertices[corners[2]] - surface.vertices[corners[0]])
-                  .norm() /
-              2;
-    }
-    const double most = std::sqrt(3.0) / 4 * *options.largest_edge * *options.largest_edge;
-    const std::size_t left = kMostTriangles - std::min(kMostTriangles, first_polygon);
-    if (area > most * static_cast<double>(left) ||
-        !subdivide(surface, first_polygon, *options.largest_edge, left))
-      throw InputError(input.where, fmt::format("edges of at most {:g} mm would take more than {} triangles: "
-                                                "give a larger --edge",
-                                                *options.largest_edge / 1e-3, kMostTriangles));
-    return;
-  }
+  if (options.largest_edge) return subdivide(surface, first_polygon, *options.largest_edge, input.where);
   Box box;
   for (std::size_t i = surface.polygon_offsets[first_polygon]; i < surface.polygon_vertices.size(); ++i)
     box.add(surface.vertices[surface.polygon_vertices[i]]);
@@ -267,8 +247,6 @@ void add_colors(Surface& surface, const std::vector<std::optional<ShapeColor>>& 
 
 Surface mesh_of(const TopoDS_Shape& shape, double unit, const ShapeLabels& labels,
                 const ImportOptions& options, const ImportInput& input) {
-  if (options.largest_edge && !(*options.largest_edge > 0))
-    throw InputError(input.where, "the largest edge of the mesh must be above zero");
   const std::vector<TopoDS_Shape> solids = solids_of(shape, input);
   Surface surface;
   surface.polygon_offsets.push_back(0);

@@ -6,11 +6,18 @@
 // order is the same on every run. Only edges over the limit are kept in the table.
 #include "formats/import/subdivide.h"
 
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <numeric>
 #include <queue>
 #include <unordered_map>
+
+#include "formats/error.h"
+#include "formats/units.h"
 
 namespace flexel {
 namespace {
@@ -25,10 +32,22 @@ struct LongEdge {
   }
 };
 
+// The first `kept` rows of a column, then those that `row` names.
+Column picked_rows(const Column& column, std::size_t kept, const std::vector<std::uint32_t>& row) {
+  const auto n = static_cast<std::size_t>(column.components);
+  Column result{column.components, {}};
+  result.values.assign(column.values.begin(), column.values.begin() + static_cast<std::ptrdiff_t>(kept * n));
+  for (const std::uint32_t r : row)
+    for (std::size_t i = 0; i < n; ++i) result.values.push_back(column.values[r * n + i]);
+  return result;
+}
+
 class Bisection {
  public:
   Bisection(Surface& surface, std::size_t first_polygon, double largest_edge)
-      : vertices_(surface.vertices), limit2_(largest_edge * largest_edge) {
+      : vertices_(surface.vertices),
+        vertex_columns_(surface.vertex_columns),
+        limit2_(largest_edge * largest_edge) {
     for (std::size_t p = first_polygon; p < surface.polygon_count(); ++p) {
       const auto corners = surface.polygon(p);
       triangles_.push_back({corners[0], corners[1], corners[2]});
@@ -49,6 +68,11 @@ class Bisection {
     users_.erase(entry);
     const auto middle = static_cast<std::uint32_t>(vertices_.size());
     vertices_.push_back(0.5 * (vertices_[edge.a] + vertices_[edge.b]));
+    for (auto& [name, column] : vertex_columns_) {
+      const auto n = static_cast<std::size_t>(column.components);
+      for (std::size_t i = 0; i < n; ++i)
+        column.values.push_back(0.5 * (column.values[edge.a * n + i] + column.values[edge.b * n + i]));
+    }
     for (const std::uint32_t t : users) split(t, edge, middle);
   }
 
@@ -68,6 +92,11 @@ class Bisection {
                                       triangles_[t].end());
       surface.polygon_offsets.push_back(static_cast<std::uint32_t>(surface.polygon_vertices.size()));
       surface.polygon_face.push_back(face[origin_[t] - first_polygon]);
+    }
+    for (auto& [name, column] : surface.polygon_columns) {
+      std::vector<std::uint32_t> row;
+      for (const std::uint32_t t : order) row.push_back(origin_[t]);
+      column = picked_rows(column, first_polygon, row);
     }
   }
 
@@ -103,6 +132,7 @@ class Bisection {
   }
 
   std::vector<Vec3>& vertices_;
+  Columns& vertex_columns_;
   double limit2_;                                        // m^2
   std::vector<std::array<std::uint32_t, 3>> triangles_;  // corners
   std::vector<std::uint32_t> origin_;                    // (triangles) polygon it is a piece of
@@ -117,6 +147,47 @@ bool subdivide(Surface& surface, std::size_t first_polygon, double largest_edge,
   while (!bisection.done() && bisection.count() < most_triangles) bisection.split_longest();
   bisection.write(surface, first_polygon);
   return bisection.done();
+}
+
+void subdivide(Surface& surface, std::size_t first_polygon, double largest_edge, const std::string& where) {
+  if (!(largest_edge > 0)) throw InputError(where, "the largest edge of the mesh must be above zero");
+  // A triangle without an edge above L has at most the area of the equilateral one: a bound from below.
+  double area = 0;
+  for (std::size_t p = first_polygon; p < surface.polygon_count(); ++p) {
+    const auto corners = surface.polygon(p);
+    area += (surface.vertices[corners[1]] - surface.vertices[corners[0]])
+                .cross(surface.vertices[corners[2]] - surface.vertices[corners[0]])
+                .norm() /
+            2;
+  }
+  const double most = std::sqrt(3.0) / 4 * largest_edge * largest_edge;
+  const std::size_t left = kMostTriangles - std::min(kMostTriangles, first_polygon);
+  if (area > most * static_cast<double>(left) || !subdivide(surface, first_polygon, largest_edge, left))
+    throw InputError(where,
+                     fmt::format("edges of at most {} would take more than {} triangles: give a larger "
+                                 "--edge",
+                                 human_length(largest_edge), kMostTriangles));
+}
+
+void subdivide_mesh(Surface& surface, double largest_edge, const std::string& where) {
+  const Triangles triangles = triangulate(surface);
+  double longest = 0;
+  for (const auto& t : triangles.corners)
+    for (std::size_t i = 0; i < 3; ++i)
+      longest = std::max(longest, (surface.vertices[t[i]] - surface.vertices[t[(i + 1) % 3]]).norm());
+  if (longest <= largest_edge) return;
+  std::vector<std::uint32_t> face, offsets{0}, corners;
+  for (std::size_t t = 0; t < triangles.corners.size(); ++t) {
+    corners.insert(corners.end(), triangles.corners[t].begin(), triangles.corners[t].end());
+    offsets.push_back(static_cast<std::uint32_t>(corners.size()));
+    face.push_back(surface.polygon_face[triangles.polygon[t]]);
+  }
+  for (auto& [name, column] : surface.polygon_columns) column = picked_rows(column, 0, triangles.polygon);
+  surface.polygon_face = std::move(face);
+  surface.polygon_offsets = std::move(offsets);
+  surface.polygon_vertices = std::move(corners);
+  subdivide(surface, 0, largest_edge, where);
+  for (SurfaceSource& source : surface.sources) source.bytes.clear();
 }
 
 }  // namespace flexel

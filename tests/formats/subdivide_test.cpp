@@ -2,11 +2,14 @@
 
 #include <gmock/gmock.h>
 
+#include <fmt/format.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <limits>
 
 #include "formats/area_vector.h"
+#include "formats/surface_file.h"
 #include "tests/formats/import_help.h"
 
 namespace flexel::test {
@@ -110,12 +113,91 @@ TEST(Subdivide, PolygonsBeforeTheFirstStayAsTheyAre) {
   expect_same_solid(before, two);
 }
 
-TEST(Subdivide, MeshesAreNotSplitOnImport) {
+// A box of six quads, of 40 x 30 x 2 mm, with a group a side.
+std::string box_of_quads() {
+  std::string text = "o box\n";
+  for (int v = 0; v < 8; ++v)
+    text += fmt::format("v {} {} {}\n", v & 1 ? 40 : 0, v & 2 ? 30 : 0, v & 4 ? 2 : 0);
+  int side = 0;
+  for (const char* quad : {"1 3 4 2", "5 6 8 7", "1 2 6 5", "3 7 8 4", "1 5 7 3", "2 4 8 6"})
+    text += fmt::format("g side{}\nf {}\n", ++side, quad);
+  return text;
+}
+
+TEST(SubdivideImport, MeshesAreSplitWhereTheUserAsks) {
   const Scratch scratch;
   ImportOptions options;
+  options.largest_edge = 4e-3;
+  for (const auto& [name, bytes] :
+       {std::pair<std::string, std::string>{"plate.stl", binary_stl(box_facets({0, 0, 0}, {40, 30, 2}))},
+        {"plate.obj", box_of_quads()}}) {
+    SCOPED_TRACE(name);
+    const std::string path = scratch.write(name, bytes);
+    const Surface coarse = import_surface(path), fine = import_surface(path, options);
+    EXPECT_LE(coarse.polygon_count(), 12u);
+    EXPECT_TRUE(refinement_notes(coarse).empty());
+    EXPECT_LE(longest_edge(fine), 4e-3);
+    EXPECT_TRUE(std::equal(coarse.vertices.begin(), coarse.vertices.end(), fine.vertices.begin()));
+    expect_same_solid(coarse, fine);
+    EXPECT_EQ(fine.parts[0].name, coarse.parts[0].name);
+    for (std::size_t f = 0; f < coarse.faces.size(); ++f) EXPECT_EQ(fine.faces[f].name, coarse.faces[f].name);
+  }
+}
+
+// The file in the source is the coarse one: it must not be written again.
+TEST(SubdivideImport, WhatWasSplitIsANewFile) {
+  const Scratch scratch;
+  const std::string path = scratch.write("plate.obj", box_of_quads());
+  ImportOptions options;
+  options.largest_edge = 4e-3;
+  const Surface fine = import_surface(path, options);
+  EXPECT_TRUE(fine.sources[0].bytes.empty());
+  ASSERT_EQ(refinement_notes(fine).size(), 1u);
+  EXPECT_THAT(refinement_notes(fine)[0], ::testing::HasSubstr("plate.obj: its triangles were split"));
+  const std::string out = scratch.path("out.obj");
+  write_surface(fine, std::vector<Vec3>(fine.vertices.size(), Vec3::Zero()), SurfaceFormat::obj, 1e-3, out);
+  const Surface again = import_surface(out);
+  EXPECT_EQ(again.polygon_count(), fine.polygon_count());
+  EXPECT_EQ(again.faces.size(), 6u);
+  options.largest_edge = 0.06;  // longer than the sides, and than the diagonals that would split the quads
+  const Surface whole = import_surface(path, options);
+  EXPECT_EQ(whole.polygon_count(), 6u);
+  EXPECT_FALSE(whole.sources[0].bytes.empty());
+}
+
+TEST(SubdivideImport, ColoursAndNumbersGoAlong) {
+  const Scratch scratch;
+  const std::string path = scratch.write(
+      "two.ply",
+      "ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\nproperty double z\n"
+      "property double heat\nelement face 2\nproperty list uchar int vertex_indices\nproperty uchar red\n"
+      "property uchar green\nproperty uchar blue\nend_header\n"
+      "0 0 0 1\n8 0 0 9\n8 8 0 17\n0 8 0 9\n3 0 1 2 255 0 0\n3 0 2 3 0 0 255\n");
+  ImportOptions options;
   options.largest_edge = 1e-3;
+  const Surface fine = import_surface(path, options);
+  ASSERT_GT(fine.polygon_count(), 100u);
+  const Column& heat = fine.vertex_columns.at("heat");
+  ASSERT_EQ(heat.values.size(), fine.vertices.size());
+  for (std::size_t v = 0; v < fine.vertices.size(); ++v)
+    EXPECT_NEAR(heat.values[v], 1 + 1e3 * (fine.vertices[v].x() + fine.vertices[v].y()), 1e-9);
+  const Column& color = fine.polygon_columns.at(kColorColumn);
+  ASSERT_EQ(color.values.size(), 3 * fine.polygon_count());
+  for (std::size_t p = 0; p < fine.polygon_count(); ++p) {
+    Vec3 middle = Vec3::Zero();
+    for (const std::uint32_t v : fine.polygon(p)) middle += fine.vertices[v] / 3;
+    EXPECT_EQ(color.values[3 * p], middle.y() < middle.x() ? 1 : 0);
+  }
+}
+
+TEST(SubdivideImport, TooManyTrianglesAndNoLengthAreErrors) {
+  const Scratch scratch;
   const std::string path = scratch.write("plate.stl", binary_stl(box_facets({0, 0, 0}, {40, 30, 2})));
-  EXPECT_EQ(import_surface(path, options).polygon_count(), 12u);
+  ImportOptions options;
+  options.largest_edge = 1e-6;
+  EXPECT_THAT(import_error(path, options), ::testing::HasSubstr("give a larger --edge"));
+  options.largest_edge = 0;
+  EXPECT_THAT(import_error(path, options), ::testing::HasSubstr("above zero"));
 }
 
 #ifdef FLEXEL_STEP

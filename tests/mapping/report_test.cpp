@@ -82,7 +82,8 @@ TEST(Voronoi, RigidAndUniformMotionLeaveNoCellAndShearDoes) {
 }
 
 // The neighbours of the origin decide as a look at every element does, in a body that is sheared but not
-// folded.
+// folded: a vertex left where another element is nearer now, and the origin was at rest, both by a hundredth
+// of their distance.
 TEST(Voronoi, AgreesWithALookAtEveryElement) {
   Body body = test::block(6, 6, 6, 0.1, Placement::centre, 10);
   test::deform(body, [](const Vec3& x) -> Vec3 {
@@ -91,14 +92,47 @@ TEST(Voronoi, AgreesWithALookAtEveryElement) {
   const MapResult result = map_quietly(body, MapMethod::affine);
   std::size_t flagged = 0;
   for (std::size_t v = 0; v < result.flags.size(); ++v) {
-    const Vec3 now = body.surface.vertices[v] + result.displacement[v];
-    const double own = (now - body.position[result.frame_of(v).elements[0]]).norm();
-    double nearest = own;
-    for (const Vec3& x : body.position) nearest = std::min(nearest, (now - x).norm());
-    EXPECT_EQ((result.flags[v] & kVoronoiCellLeft) != 0, nearest < own * (1 - 1e-9)) << own - nearest;
-    flagged += (result.flags[v] & kVoronoiCellLeft) != 0;
+    const Vec3& rest = body.surface.vertices[v];
+    const Vec3 now = rest + result.displacement[v];
+    const std::uint32_t origin = result.frame_of(v).elements[0];
+    bool left = false;
+    for (std::uint32_t e = 0; e < body.element_count(); ++e) {
+      const Vec3 way = body.rest[e] - body.rest[origin];
+      const double before = way.normalized().dot(rest - (body.rest[e] + body.rest[origin]) / 2);
+      const double nearer =
+          (now - body.position[origin]).squaredNorm() - (now - body.position[e]).squaredNorm();
+      left = left || (e != origin && before < -0.01 * way.norm() && nearer > 0.02 * way.squaredNorm());
+    }
+    EXPECT_EQ((result.flags[v] & kVoronoiCellLeft) != 0, left);
+    flagged += left;
   }
   EXPECT_GT(flagged, 0u);
+}
+
+// Vertices half-way between elements are on one side or the other after the least motion.
+TEST(Voronoi, TiesAtRestAndSmallStrainsLeaveNoCell) {
+  for (const Placement placement : {Placement::corner, Placement::centre}) {
+    Body body = test::block(6, 6, 6, 0.1, placement, 12);
+    for (Vec3& vertex : body.surface.vertices)
+      vertex = (vertex / 0.05).array().round().matrix() * 0.05;  // corners and middles of the voxels
+    const auto sheared = [&](double by) {
+      test::deform(body, [&](const Vec3& x) -> Vec3 {
+        return {x.x() + by * x.y(), x.y() - by * x.z(), x.z()};
+      });
+      return report(body, map_quietly(body, MapMethod::affine));
+    };
+    for (const double by : {4e-4, 4e-3}) EXPECT_EQ(sheared(by).voronoi_cell_left, 0u) << by;
+    const auto said = [](const MapReport& found) {
+      for (const std::string& line : report_lines(found))
+        if (line.find("Voronoi cell left") != std::string::npos) return true;
+      return false;
+    };
+    for (Vec3& vertex : body.surface.vertices) vertex += Vec3(0.013, 0.017, 0.011);
+    EXPECT_FALSE(said(sheared(0.05)));  // whatever was counted
+    const MapReport strong = sheared(1.5);
+    EXPECT_GT(strong.voronoi_cell_left, 0u);
+    EXPECT_TRUE(said(strong));
+  }
 }
 
 TEST(Report, HoldsVolumeAndDisplacement) {
