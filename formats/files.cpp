@@ -10,8 +10,10 @@
 #include <zlib.h>
 
 #include <cerrno>
+#include <charconv>
 #include <cstring>
 #include <filesystem>
+#include <string_view>
 
 #include "formats/error.h"
 #include "formats/stop.h"
@@ -82,6 +84,27 @@ Bytes read_to_end(int descriptor, std::size_t expected, const std::string& where
 
 }  // namespace
 
+namespace {
+
+constexpr std::string_view kFailure = "flexel: failed, exit code ";
+
+void throw_failure_before(const Bytes& bytes) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  int code = 0;
+  if (!text.starts_with(kFailure)) return;
+  const std::string_view number = text.substr(kFailure.size());
+  const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), code);
+  if (error == std::errc() && std::string_view(end, number.data() + number.size()) == "\n" && code > 0 &&
+      code < 256)
+    throw ProgramBeforeFailed(code);
+}
+
+}  // namespace
+
+std::string failure_line(int code) {
+  return fmt::format("{}{}\n", kFailure, code);
+}
+
 Bytes read_all(const std::string& path) {
   const bool from_stdin = path == "-";
   if (from_stdin && isatty(STDIN_FILENO) != 0)
@@ -99,6 +122,7 @@ Bytes read_all(const std::string& path) {
   if (bytes.empty() && from_stdin)
     throw InputError("stdin is empty: the program before it in the pipe failed or wrote nothing");
   if (bytes.empty()) throw InputError(where, "is empty");
+  if (from_stdin) throw_failure_before(bytes);
   return bytes;
 }
 

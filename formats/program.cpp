@@ -6,6 +6,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -47,7 +48,7 @@ const char* word_of(int signal) {
 }
 
 void on_interrupt(int signal) {
-  const bool at_once = interrupt_count == 0 && stop_ends_process > 0;
+  const bool at_once = interrupt_count == 0 && stop_ends_process > 0 && termination_waits == 0;
   interrupt_count = interrupt_count + 1;
   if (interrupt_count > 1 || at_once) {
     if (at_once) write_words({program_name.data(), ": ", word_of(signal), "\n"});
@@ -128,6 +129,53 @@ void flush_stdout() {
                                          reason != 0 ? std::strerror(reason) : "an earlier write failed"));
 }
 
+// The body's exit code, or that of what it throws.
+int code_of(const std::string& name, const std::function<int()>& body) {
+  try {
+    const int code = body();
+    flush_stdout();
+    return code;
+  } catch (const InputError& error) {
+    return report(name, error.where().empty() ? error.what() : error.where() + ": " + error.what(),
+                  kExitInput);
+  } catch (const DivergedError& error) {
+    return report(name, error.what(), kExitDiverged);
+  } catch (const TimeoutError& error) {
+    return report(name, error.what(), kExitTimeout);
+  } catch (const InvalidMappingError& error) {
+    return report(name, error.what(), kExitInvalidMapping);
+  } catch (const Interrupted&) {
+    const int signal = interrupting_signal;
+    std::fprintf(stderr, "%s: %s\n", name.c_str(), word_of(signal));
+    return exit_code_of(signal);
+  } catch (const ReaderClosedPipe&) {
+    return kExitReaderClosedPipe;
+  } catch (const ProgramBeforeFailed& failed) {
+    return failed.code();
+  } catch (const std::bad_alloc&) {
+    return report(name, "not enough memory: a larger spacing (--size) or fewer elements (--count) needs less",
+                  kExitInput);
+  } catch (const std::exception& error) {
+    return report(name, fmt::format("internal error, please report it with the input: {}", error.what()),
+                  kExitOurFault);
+  } catch (...) {
+    return report(name, "internal error of an unknown kind, please report it with the input", kExitOurFault);
+  }
+}
+
+bool downstream_is_told = false;
+
+// Only a pipe: a file would hold what is no result.
+int tell_downstream(int code) {
+  struct stat status = {};
+  if (code == kExitDone || !downstream_is_told || ::fstat(STDOUT_FILENO, &status) != 0 ||
+      !S_ISFIFO(status.st_mode))
+    return code;
+  const std::string line = failure_line(code);
+  (void)!::write(STDOUT_FILENO, line.data(), line.size());
+  return code;
+}
+
 void print(const std::string& text) {
   std::fwrite(text.data(), 1, text.size(), stdout);
   flush_stdout();
@@ -178,38 +226,15 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
 
 }  // namespace
 
+void tell_failures_downstream() {
+  downstream_is_told = true;
+}
+
 int run_program(const std::string& name, const std::function<int()>& body) {
   name.copy(program_name.data(), program_name.size() - 1);
   hold_standard_descriptors();
   install_handlers();
-  try {
-    const int code = body();
-    flush_stdout();
-    return code;
-  } catch (const InputError& error) {
-    return report(name, error.where().empty() ? error.what() : error.where() + ": " + error.what(),
-                  kExitInput);
-  } catch (const DivergedError& error) {
-    return report(name, error.what(), kExitDiverged);
-  } catch (const TimeoutError& error) {
-    return report(name, error.what(), kExitTimeout);
-  } catch (const InvalidMappingError& error) {
-    return report(name, error.what(), kExitInvalidMapping);
-  } catch (const Interrupted&) {
-    const int signal = interrupting_signal;
-    std::fprintf(stderr, "%s: %s\n", name.c_str(), word_of(signal));
-    return exit_code_of(signal);
-  } catch (const ReaderClosedPipe&) {
-    return kExitReaderClosedPipe;
-  } catch (const std::bad_alloc&) {
-    return report(name, "not enough memory: a larger spacing (--size) or fewer elements (--count) needs less",
-                  kExitInput);
-  } catch (const std::exception& error) {
-    return report(name, fmt::format("internal error, please report it with the input: {}", error.what()),
-                  kExitOurFault);
-  } catch (...) {
-    return report(name, "internal error of an unknown kind, please report it with the input", kExitOurFault);
-  }
+  return tell_downstream(code_of(name, body));
 }
 
 bool parse_arguments(CLI::App& app, int argc, char** argv) {
