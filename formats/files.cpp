@@ -10,12 +10,11 @@
 #include <zlib.h>
 
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <filesystem>
-#include <string_view>
 
 #include "formats/error.h"
+#include "formats/pipe_code.h"
 #include "formats/stop.h"
 
 namespace flexel {
@@ -71,6 +70,8 @@ Bytes read_to_end(int descriptor, std::size_t expected, const std::string& where
     const ssize_t got = ::read(descriptor, bytes.data() + size, bytes.size() - size);
     if (got == 0) break;
     if (got > 0) {
+      // A larger pipe lets the program before this one run ahead. Only a wish, of regular files too.
+      if (size == 0) (void)::fcntl(descriptor, F_SETPIPE_SZ, static_cast<int>(kStep));
       size += static_cast<std::size_t>(got);
     } else if (errno == EINTR) {
       check_stop();
@@ -84,27 +85,6 @@ Bytes read_to_end(int descriptor, std::size_t expected, const std::string& where
 
 }  // namespace
 
-namespace {
-
-constexpr std::string_view kFailure = "flexel: failed, exit code ";
-
-void throw_failure_before(const Bytes& bytes) {
-  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  int code = 0;
-  if (!text.starts_with(kFailure)) return;
-  const std::string_view number = text.substr(kFailure.size());
-  const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), code);
-  if (error == std::errc() && std::string_view(end, number.data() + number.size()) == "\n" && code > 0 &&
-      code < 256)
-    throw ProgramBeforeFailed(code);
-}
-
-}  // namespace
-
-std::string failure_line(int code) {
-  return fmt::format("{}{}\n", kFailure, code);
-}
-
 Bytes read_all(const std::string& path) {
   const bool from_stdin = path == "-";
   if (from_stdin && isatty(STDIN_FILENO) != 0)
@@ -115,14 +95,14 @@ Bytes read_all(const std::string& path) {
   if (::fstat(descriptor.value(), &status) != 0)
     throw InputError(where, fmt::format("cannot read: {}", std::strerror(errno)));
   if (S_ISDIR(status.st_mode)) throw InputError(where, "is a folder; name a file in it");
-  // A larger pipe lets the program before this one run ahead. Only a wish: it may be refused.
-  if (S_ISFIFO(status.st_mode)) (void)::fcntl(descriptor.value(), F_SETPIPE_SZ, static_cast<int>(kStep));
   const std::size_t expected = S_ISREG(status.st_mode) ? static_cast<std::size_t>(status.st_size) : 0;
   Bytes bytes = read_to_end(descriptor.value(), expected, where);
   if (bytes.empty() && from_stdin)
+    if (const std::optional<int> code = code_told_through_pipe(descriptor.value()))
+      throw ProgramBeforeFailed(*code);
+  if (bytes.empty() && from_stdin)
     throw InputError("stdin is empty: the program before it in the pipe failed or wrote nothing");
   if (bytes.empty()) throw InputError(where, "is empty");
-  if (from_stdin) throw_failure_before(bytes);
   return bytes;
 }
 

@@ -13,7 +13,7 @@ namespace flexel {
 
 using Bytes = std::vector<std::byte>;
 
-// The program of ours before this one in a pipe has failed with `code`, and said why (formats/program.h).
+// The program of ours before this one in a pipe has failed with `code`, and said why (formats/pipe_code.h).
 class ProgramBeforeFailed : public std::runtime_error {
  public:
   explicit ProgramBeforeFailed(int code) : std::runtime_error("the program before it failed"), code_(code) {}
@@ -22,9 +22,6 @@ class ProgramBeforeFailed : public std::runtime_error {
  private:
   int code_;
 };
-
-// What it writes to the pipe to say so.
-[[nodiscard]] std::string failure_line(int code);
 
 // The whole of a file, or of stdin for "-". Throws InputError: missing, a directory, unreadable, empty (for
 // stdin: "the program before it in the pipe failed or wrote nothing"). Throws ProgramBeforeFailed.

@@ -6,7 +6,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -22,6 +21,7 @@
 #include <thread>
 
 #include "formats/files.h"
+#include "formats/pipe_code.h"
 #include "formats/stop.h"
 #include "formats/termination.h"
 
@@ -53,6 +53,7 @@ void on_interrupt(int signal) {
   if (interrupt_count > 1 || at_once) {
     if (at_once) write_words({program_name.data(), ": ", word_of(signal), "\n"});
     remove_temporary_outputs();
+    tell_code_through_pipe(STDOUT_FILENO, exit_code_of(signal));
     _exit(exit_code_of(signal));
   }
   interrupting_signal = signal;
@@ -64,6 +65,12 @@ void on_termination(int signal) {
   remove_temporary_outputs();
   std::signal(signal, SIG_DFL);
   std::raise(signal);
+}
+
+// The handler is gone once it has begun: the crash happens again, and ends the program as ever.
+void on_crash_of_program(int signal) {
+  remove_temporary_outputs();
+  tell_code_through_pipe(STDOUT_FILENO, exit_code_of(signal));
 }
 
 // Without SA_RESTART, so that a read from a silent pipe ends when the user interrupts it. A signal that was
@@ -91,6 +98,10 @@ void hold_standard_descriptors() {
 void install_handlers() {
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);  // a limit on the size of files then surfaces as EFBIG
+  struct sigaction crash = {};
+  crash.sa_handler = on_crash_of_program;
+  crash.sa_flags = static_cast<int>(SA_RESETHAND);
+  sigaction(SIGSEGV, &crash, nullptr);
   handle(SIGINT, on_interrupt);
   handle(SIGTERM, on_termination);
   handle(SIGHUP, on_termination);
@@ -163,19 +174,6 @@ int code_of(const std::string& name, const std::function<int()>& body) {
   }
 }
 
-bool downstream_is_told = false;
-
-// Only a pipe: a file would hold what is no result.
-int tell_downstream(int code) {
-  struct stat status = {};
-  if (code == kExitDone || !downstream_is_told || ::fstat(STDOUT_FILENO, &status) != 0 ||
-      !S_ISFIFO(status.st_mode))
-    return code;
-  const std::string line = failure_line(code);
-  (void)!::write(STDOUT_FILENO, line.data(), line.size());
-  return code;
-}
-
 void print(const std::string& text) {
   std::fwrite(text.data(), 1, text.size(), stdout);
   flush_stdout();
@@ -226,15 +224,13 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
 
 }  // namespace
 
-void tell_failures_downstream() {
-  downstream_is_told = true;
-}
-
 int run_program(const std::string& name, const std::function<int()>& body) {
   name.copy(program_name.data(), program_name.size() - 1);
   hold_standard_descriptors();
   install_handlers();
-  return tell_downstream(code_of(name, body));
+  const int code = code_of(name, body);
+  tell_code_through_pipe(STDOUT_FILENO, code);
+  return code;
 }
 
 bool parse_arguments(CLI::App& app, int argc, char** argv) {
@@ -288,6 +284,7 @@ class StopEndsProcess::Watch {
     if (changed_.wait_for(lock, left, [this] { return done_; })) return;
     write_words({program_name.data(), ": error: stopped by --timeout\n"});
     remove_temporary_outputs();
+    tell_code_through_pipe(STDOUT_FILENO, kExitTimeout);
     _exit(kExitTimeout);
   }
   std::mutex mutex_;

@@ -14,12 +14,6 @@ namespace flexel {
 // code for main.
 [[nodiscard]] int run_program(const std::string& name, const std::function<int()>& body);
 
-// The result of this program goes to stdout. Where that is a pipe and nothing has been written to it, a
-// failure puts one line into it that tells the program of ours behind it the exit code, with which that ends
-// in turn without another message: what was said stands alone, and the code is the pipe's
-// (docs/exit-codes.md).
-void tell_failures_downstream();
-
 // Parses the arguments with CLI11. --help and --version print and yield their exit code (0); a wrong argument
 // throws InputError with the nearest valid option where one is near. Returns true when the program should go
 // on, false when it is done (help or version was printed).

@@ -181,8 +181,6 @@ int run(int argc, char** argv) {
   declare(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   const StopEndsProcess nothing_is_left;  // runs in time leave something, and see to it themselves
-  if (arguments.resume.empty() && (arguments.output.empty() || means_stdout(arguments.output)))
-    tell_failures_downstream();
   Progress progress("flexel-simulate", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
   SimulateOptions& options = arguments.options;
   if (!arguments.timeout.empty()) options.timeout = parse_timeout(arguments.timeout);

@@ -139,7 +139,6 @@ int run(int argc, char** argv) {
   declare(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   const StopEndsProcess nothing_is_left;
-  if (means_stdout(arguments.output)) tell_failures_downstream();
   const VoxelizeOptions options = voxelize_options(arguments);
   const ImportOptions import = import_options(arguments);
   if (!arguments.vdb.empty() && options.placement != Placement::corner)
