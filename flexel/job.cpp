@@ -79,6 +79,7 @@ void declare_job(CLI::App& app, JobArguments& arguments) {
          "--edge", arguments.edge,
          "Split the mesh to this longest edge (default: STEP a 64th of the solid's diagonal, meshes not)")
       ->type_name("LENGTH");
+  app.add_flag("--force", arguments.force, "Let results replace files that are read");
 }
 
 Job plan_job(const JobArguments& arguments) {

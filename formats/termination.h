@@ -16,10 +16,10 @@ class TerminationWaits {
   TerminationWaits& operator=(const TerminationWaits&) = delete;
 };
 
-// While one lives, Ctrl-C and the time limits of the command end the process at once, with the line and the
-// exit code that check_stop() would have led to; temporary files are removed. For calls of libraries that
-// cannot be asked to stop, while nothing has been reached that would be saved. A limit of an attempt is heard
-// only after the call.
+// While one lives, and no TerminationWaits, Ctrl-C and the time limits of the command that were set before it
+// end the process at once, with the line and the exit code that check_stop() would have led to; temporary
+// files are removed. For commands that leave nothing when they are stopped, and for calls of libraries that
+// cannot be asked to stop. A limit of an attempt is heard only after the call.
 class StopEndsProcess {
  public:
   StopEndsProcess();

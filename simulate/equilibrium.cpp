@@ -22,6 +22,7 @@
 #include "formats/stop.h"
 #include "formats/units.h"
 #include "simulate/link_balance.h"
+#include "simulate/simulate.h"
 
 namespace flexel {
 namespace {
@@ -42,6 +43,9 @@ constexpr int kMostPushes = 4;         // of a run
 constexpr double kUnsupported = 1e-9;  // of the stiffness of an element in its stiffest direction
 constexpr double kFarReach = 0.1;  // diagonals: a first linear answer beyond this makes a start elsewhere pay
 constexpr double kOverload = 3;    // diagonals: a first linear answer beyond this suggests a wrong unit
+// ... and one beyond this many diagonals, or times the way that moves lead, is one. A strip rolled up by two
+// turns is at 6; a foil that membrane forces hold may be further, and can be asked for by load steps.
+constexpr double kOutOfProportion = 30;
 
 std::string axis_name(const Vec3& direction) {
   for (int axis = 0; axis < 3; ++axis)
@@ -98,6 +102,9 @@ class LoadStepping {
     return reach_ > kOverload * bounding_box(mechanics_.body().rest).diagonal();
   }
   [[nodiscard]] int iterations_left() const;
+  // Beyond this only a mistake puts the first linear answer [m]; infinite where the scene says how to go on.
+  [[nodiscard]] double out_of_proportion() const;
+  [[noreturn]] void refuse_load() const;
   [[noreturn]] void diverge() const;
 
   Mechanics& mechanics_;
@@ -110,6 +117,7 @@ class LoadStepping {
   State trial_;  // of the last attempt
   NewtonOutcome outcome_;
   double farthest_reach_ = std::numeric_limits<double>::infinity();  // m, of an attempt's linear answer
+  double hopeless_reach_ = std::numeric_limits<double>::infinity();  // m, likewise, for the whole load
   double reach_ = 0;                       // m: of the first linear answer, for the whole load
   std::optional<std::vector<Vec3>> near_;  // m: where the next attempt starts in place of `state_`
   int spent_near_ = 0;                     // iterations of an attempt from there that came to nothing
@@ -123,12 +131,40 @@ int LoadStepping::iterations_left() const {
          result_.newton_iterations;
 }
 
+double LoadStepping::out_of_proportion() const {
+  if (settings_.load_steps > 1 || settings_.newton_iterations) return std::numeric_limits<double>::infinity();
+  State whole = state_;
+  whole.share = 1;
+  apply(mechanics_.constraints(), mechanics_.body(), whole, whole.displacement);
+  double largest = bounding_box(mechanics_.body().rest).diagonal();
+  for (const Vec3& moved : whole.displacement) largest = std::max(largest, moved.norm());
+  return kOutOfProportion * largest;
+}
+
+void LoadStepping::refuse_load() const {
+  SimulateResult told;
+  mechanics_.report(trial_, told);
+  double force = 0;
+  for (const AppliedLoad& load : told.loads) force += load.force.norm();
+  std::vector<std::string> materials;
+  for (const Part& part : mechanics_.body().parts)
+    if (std::find(materials.begin(), materials.end(), part.material) == materials.end())
+      materials.push_back(part.material);
+  const double diagonal = bounding_box(mechanics_.body().rest).diagonal();
+  throw DivergedError(fmt::format(
+      "the load{} would move the part by {} at its first stiffness, {:.3g} times its size of {}: check the "
+      "unit of "
+      "the part (--unit), the load, and the stiffness of {}; [run] load_steps = 10 tries it all the same",
+      force > 0 ? fmt::format(" ({} in all)", human_force(force)) : "", human_length(reach_),
+      reach_ / diagonal, human_length(diagonal), fmt::join(materials, ", ")));
+}
+
 bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   NewtonOptions options;
   options.steps = steps;
   options.tolerance = settings_.tolerance;
   options.max_iterations = std::min(max_iterations, iterations_left());
-  options.farthest_reach = farthest_reach_;
+  options.farthest_reach = std::min(farthest_reach_, hopeless_reach_ * (done_ + increment_));
   trial_ = state_;
   if (near_) trial_.displacement = *near_;
   trial_.share = done_ + increment_ > 1 - 1e-9 ? 1 : done_ + increment_;
@@ -237,8 +273,12 @@ void LoadStepping::solve() {
                                   [](const Motion& motion) { return motion.link != nullptr; });
   if (start_ && first_ == 1 && !linked)
     farthest_reach_ = kFarReach * bounding_box(mechanics_.body().rest).diagonal();
+  hopeless_reach_ = out_of_proportion();
   while (done_ < 1) {
-    if (attempt(NewtonSteps::full, kFullStepIterations) || begin_near()) continue;
+    if (attempt(NewtonSteps::full, kFullStepIterations)) continue;
+    if (reach_ > hopeless_reach_) refuse_load();
+    hopeless_reach_ = std::numeric_limits<double>::infinity();  // the first answer alone counts
+    if (begin_near()) continue;
     if (iterations_left() > 0 && increment_ <= kLoweringIncrement * first_ &&
         attempt(NewtonSteps::lowering, NewtonOptions().max_iterations))
       continue;

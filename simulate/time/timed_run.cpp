@@ -105,7 +105,7 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
   if (!options.checkpoint.empty()) {
     kept_.emplace();
     kept_->input = options.resume ? options.resume->input : body_fingerprint(body);
-    act_body_ = body_bytes(body, options.checkpoint);
+    act_body_ = body_bytes(body);
   }
   if (LiveLink::wanted(scene_, options)) {
     live_ = std::make_unique<LiveLink>(scene_, body, options, progress, check_stop);
@@ -237,7 +237,7 @@ double TimedRun::now() const {
 // Leaves the body at `state` (nothing: none was sound), and in the file for runs that end early; says where
 // that is.
 std::string TimedRun::save(const std::optional<State>& state) {
-  if (history_) attempt("history", [&] { write_text(history_->ledger().csv(), options_.history); });
+  if (history_) attempt("history", [&] { write_text(history_->ledger().csv(), options_.history, true); });
   if (!state) return "";
   if (act_) act_->store(*state);  // else an event failed, and the body is what it was before that
   if (options_.failed_output.empty() || !attempt("state", [&] { write_body(body_, options_.failed_output); }))
@@ -328,7 +328,7 @@ void TimedRun::happen(std::size_t end) {
   }
   if (kept_) {
     kept_->state.time.reset();  // until the act has begun, what was kept is of another body
-    act_body_ = body_bytes(body_, options_.checkpoint);
+    act_body_ = body_bytes(body_);
   }
   act_.emplace(body_, scene_, options_, progress_, beginning_, std::move(state));
   sound_.keep(act_->state());  // of the elements that there are now
