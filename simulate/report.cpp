@@ -50,6 +50,10 @@ void measure_displacement(const Body& body, const State& state, SimulateResult& 
 // cosine of it is left.
 std::vector<std::string> warnings_of(const SimulateResult& result) {
   constexpr double kLargestTurn = 10 * std::numbers::pi / 180;
+  // Rigid links are for equilibrium without contact.
+  const char* advice = result.timed || result.settled
+                           ? "lead the place with [[move]] and \"rotation\" instead"
+                           : "write link = \"rigid\", whose torque turns with it";
   std::vector<std::string> warnings;
   for (const AppliedLoad& load : result.loads) {
     if (!load.rotation || load.displacement) continue;  // nothing, or of a rigid link
@@ -57,9 +61,8 @@ std::vector<std::string> warnings_of(const SimulateResult& result) {
       warnings.push_back(
           fmt::format("load \"{}\" turned what it acts on by {:.0f} degrees, and its forces keep the "
                       "direction that they have at rest: about {:.0f} % of its torque is left, and the "
-                      "result is that of so much; lead the place with [[move]] and \"rotation\" instead, or "
-                      "take a torque that turns it by less than 10 degrees",
-                      load.name, 180 / std::numbers::pi * turn, std::max(0.0, 100 * std::cos(turn))));
+                      "result is that of so much; {}",
+                      load.name, 180 / std::numbers::pi * turn, std::max(0.0, 100 * std::cos(turn)), advice));
   }
   return warnings;
 }

@@ -39,23 +39,31 @@ void refuse_courses(const Scene& scene) {
 // Bit a: world axis a is held or led.
 struct HeldMasks {
   std::vector<std::uint8_t> polygon, element;
+  bool elements = false;  // any of them
 };
 
-HeldMasks held_masks(const std::vector<Tie>& ties, const Body& body) {
+std::uint8_t axes_of(const Tie& tie) {
+  return static_cast<std::uint8_t>(tie.axes[0] | tie.axes[1] << 1 | tie.axes[2] << 2);
+}
+
+// Of fixes, and with `moves` of those too.
+HeldMasks held_masks(const std::vector<Tie>& ties, bool moves, const Body& body) {
   HeldMasks held{std::vector<std::uint8_t>(body.surface.polygon_count(), 0),
                  std::vector<std::uint8_t>(body.element_count(), 0)};
   for (const Tie& tie : ties) {
-    if (tie.link) continue;
-    const auto mask = static_cast<std::uint8_t>(tie.axes[0] | tie.axes[1] << 1 | tie.axes[2] << 2);
+    if (tie.link || (tie.is_move && !moves)) continue;
+    const std::uint8_t mask = axes_of(tie);
     const Selected selected = resolve(tie.where, body);
     for (const std::uint32_t p : selected.polygons) held.polygon[p] |= mask;
     for (const std::uint32_t e : selected.elements) held.element[e] |= mask;
+    held.elements = held.elements || !selected.elements.empty();
   }
   return held;
 }
 
 // Axes along which the elements under a polygon's middle are held.
 std::uint8_t held_under(const HeldMasks& held, const Body& body, std::uint32_t polygon) {
+  if (!held.elements) return 0;
   const auto corners = body.surface.polygon(polygon);
   Vec3 middle = Vec3::Zero();
   for (const std::uint32_t v : corners)
@@ -110,6 +118,23 @@ void check_held(const Load& load, double share, Progress& progress) {
                     load.origin, 100 * share, load.name));
 }
 
+// A surface that is led, on elements that are held: neither gets its way. (What is led and held by the same
+// kind of selection is refused where ties are made.)
+void check_move(const Tie& move, const HeldMasks& fixes, const Body& body) {
+  if (move.motion.translation == Vec3::Zero() && move.motion.angle == 0) return;
+  double both = 0, whole = 0;
+  for (const std::uint32_t p : resolve(move.where, body).polygons) {
+    const double area = area_vector(body.surface.vertices, body.surface.polygon(p)).norm();
+    if ((held_under(fixes, body, p) & axes_of(move)) != 0) both += area;
+    whole += area;
+  }
+  if (both > kPartlyHeld * whole)
+    throw InputError(move.origin,
+                     fmt::format("move \"{}\": a [[fix]] of elements holds {:.0f} % of the place that is to "
+                                 "move; give the fix other elements or axes",
+                                 move.name, 100 * both / whole));
+}
+
 // Degrees between the mean normal of a side's polygons and its axis.
 void check_side(const Load& load, const Body& body, Progress& progress) {
   const std::optional<Vec3> axis = side_axis(load.where, body);
@@ -133,7 +158,10 @@ void check_side(const Load& load, const Body& body, Progress& progress) {
 void check_actions(const Scene& scene, const Body& body, Progress& progress) {
   warn_of_unused_materials(scene, body, progress);
   if (!scene.run.time) refuse_courses(scene);
-  const HeldMasks held = held_masks(scene.get<Ties>().ties, body);
+  const std::vector<Tie>& ties = scene.get<Ties>().ties;
+  const HeldMasks held = held_masks(ties, true, body), fixes = held_masks(ties, false, body);
+  for (const Tie& tie : ties)
+    if (tie.is_move) check_move(tie, fixes, body);
   for (const Load& load : scene.get<Loads>().loads) {
     check_held(load, held_share(load, held, body), progress);
     check_side(load, body, progress);

@@ -21,7 +21,6 @@ void Act::tell_forces(SimulateResult& result) const {
 
 void Act::report(const Clock& clock, bool stress, SimulateResult& result) {
   tell_forces(result);
-  for (const std::string& warning : warnings_of(result)) progress_.warn(scene_.name + ": " + warning);
   for (const ProbePoints& probe : probes_) result.probes.push_back(measure(probe, state_));
   const Stencil none;
   const Cells cells(setting_, none);
@@ -37,6 +36,7 @@ void Act::report(const Clock& clock, bool stress, SimulateResult& result) {
   measure_displacement(body_, state_, result);
   for (const double mass : lumped_masses(setting_)) result.mass += mass;
   result.timed = TimedSummary{*state_.time, clock.steps, clock.step, stepper_->isa(), {}};
+  for (const std::string& warning : warnings_of(result)) progress_.warn(scene_.name + ": " + warning);
 }
 
 // Of the time of the hot loop, to each pass in it the share that it has of a step from the present state.

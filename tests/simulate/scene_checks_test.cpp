@@ -177,6 +177,18 @@ TEST(HeldLoads, ALoadOnAHeldFaceIsRefused) {
       HasSubstr("does nothing"));
 }
 
+TEST(HeldLoads, AMoveOfAFaceWhoseElementsAreHeldIsRefused) {
+  const std::string head =
+      "material = \"steel\"\n[[fix]]\nwhere = { box = { min = [0, 0, 0], max = [\"1 mm\", \"1 m\", \"1 m\"] "
+      "} }\n";
+  const std::string move = "[[move]]\nwhere = \"xmin\"\ndisplacement = [\"1 um\", 0, 0]\n";
+  EXPECT_THAT(refusal(small(), parse_scene(head + move, "s.toml")), HasSubstr("holds 100 % of the place"));
+  EXPECT_EQ(refusal(small(),
+                    parse_scene(head + "axes = \"yz\"\n" + move + "[[fix]]\nwhere = \"xmax\"\naxes = \"x\"\n",
+                                "s.toml")),
+            "accepted");
+}
+
 // A face that slides on its plane takes a force along it.
 TEST(HeldLoads, AxesThatAreFreeTakeTheirPart) {
   const std::string fixes =
