@@ -2,7 +2,7 @@
 
 import json
 
-from harness import ascii_stl, binary_stl, box_triangles, expect, expect_error, expect_ok, expect_only, main, run, write
+from harness import PARTS, Skip, ascii_stl, binary_stl, box_triangles, expect, expect_error, expect_ok, expect_only, main, run, write
 
 
 def grid_box(cells=8, size=40.0):
@@ -65,6 +65,46 @@ def test_a_part_inside_out_is_turned():
     said, part = healed([[a, c, b] for a, b, c in grid_box()])
     expect("1 shell inside out and turned" in said and part["healing"]["inverted_shells"] == 1, f"{said} {part}")
     expect_volume(part)
+
+
+def pressed(name, triangles):
+    """Displacements of a box that is pressed along the inward normal, by force, by pressure and by a move: largest, and its direction."""
+    write(name, binary_stl(triangles))
+    found = []
+    for push in (["--push", "ymax: 10 N"], ["--push", "ymax: 2 MPa"], ["--move", "ymax: 0.1 mm"]):
+        expect_ok(run("flexel", "deform", name, "--material", "steel", "--fix", "ymin", *push, "--size", "2.5 mm", "--no-estimate", "--summary",
+                      "summary.json", "-o", "out.obj", "--quiet"))
+        with open("out.obj", encoding="utf-8") as file:
+            found.append([float(line.split()[2]) for line in file if line.startswith("v ")])
+    return found
+
+
+def test_loads_along_the_normal_are_those_of_an_outward_box():
+    sound = box_triangles((10.0, 10.0, 10.0))
+    expected = pressed("sound.stl", sound)
+    for force in expected:
+        expect(min(force) >= -1e-9 and max(force) < 10, f"a push inward moves the top down: {force}")
+    one_a_face = [[a, c, b] if n % 2 else [a, b, c] for n, (a, b, c) in enumerate(sound)]
+    one = [[a, c, b] if n == 6 else [a, b, c] for n, (a, b, c) in enumerate(sound)]
+    for name, mesh in (("inside_out.stl", [[a, c, b] for a, b, c in sound]), ("one_a_face.stl", one_a_face), ("one.stl", one)):
+        got = pressed(name, mesh)
+        for mine, theirs in zip(got, expected):
+            # STL has no vertex order but that of the corners: compare the sorted heights.
+            expect(max(abs(a - b) for a, b in zip(sorted(mine), sorted(theirs))) < 1e-9, f"{name}: {sorted(mine)}, not {sorted(theirs)}")
+
+
+def test_a_real_part_with_turned_shells_is_pushed_inward():
+    """video_part.stl: 358 edges whose triangles face opposite ways; a push on ymax went outward."""
+    part = PARTS / "video_part.stl"
+    if not part.exists():
+        raise Skip("real parts are not there")
+    expect_ok(run("flexel", "deform", part, "--material", "steel", "--fix", "ymin", "--move", "ymax: 1 mm", "--count", "2000", "--no-estimate",
+                  "-o", "bent.obj", "--quiet"))
+    rest = expect_ok(run("flexel", "info", part, "--json"))
+    with open("bent.obj", encoding="utf-8") as file:
+        top = max(float(line.split()[2]) for line in file if line.startswith("v "))
+    before = json.loads(rest.out)["files"][0]["parts"][0]["max"][1] / 1e-3
+    expect(abs(before - 1 - top) < 0.2, f"the top went from {before} to {top} mm")
 
 
 def test_a_sheet_is_refused_with_what_to_do():
