@@ -72,7 +72,7 @@ void declare_job(CLI::App& app, JobArguments& arguments) {
       ->capture_default_str();
   app.add_option("--unit", arguments.unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
   app.add_option("--edge", arguments.edge,
-                 "STEP: longest edge of the mesh (default a 64th of the solid's diagonal)")
+                 "STEP: longest edge of the mesh (default a 64th of the file's diagonal)")
       ->type_name("LENGTH");
 }
 
@@ -99,8 +99,10 @@ Job plan_job(const JobArguments& arguments) {
 }
 
 Surface read_parts(const std::vector<std::string>& paths, const ImportOptions& options, Progress& progress) {
-  Surface surface = import_surface(paths.front(), options);
-  for (std::size_t p = 1; p < paths.size(); ++p) append(surface, import_surface(paths[p], options));
+  ImportOptions heard = options;
+  heard.warn = [&](const std::string& line) { progress.warn(line); };
+  Surface surface = import_surface(paths.front(), heard);
+  for (std::size_t p = 1; p < paths.size(); ++p) append(surface, import_surface(paths[p], heard));
   for (const std::string& line : size_warnings(surface)) progress.warn(line);
   return surface;
 }

@@ -46,7 +46,7 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_option("--deflection", arguments.deflection,
                  "STEP: largest distance of the triangles from the CAD surface");
   app.add_option("--edge", arguments.edge,
-                 "STEP: longest edge of the triangles (default a 64th of the solid's diagonal)");
+                 "STEP: longest edge of the triangles (default a 64th of the file's diagonal)");
   app.add_option(
       "--input-format,--format", arguments.format,
       "format of the input (step, iges, brep, stl, obj, ply, off, glb, 3mf) instead of what its bytes tell");
@@ -136,7 +136,7 @@ int run(int argc, char** argv) {
   declare(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   const VoxelizeOptions options = voxelize_options(arguments);
-  const ImportOptions import = import_options(arguments);
+  ImportOptions import = import_options(arguments);
   if (!arguments.vdb.empty() && options.placement != Placement::corner)
     throw InputError("--vdb: centre placement has no cells; use --placement corner");
   if (arguments.summary == "-" && arguments.output == "-")
@@ -145,20 +145,22 @@ int run(int argc, char** argv) {
   refuse_unwritable(arguments.summary, false);
   const ThreadLimit threads(arguments.threads);
   Progress progress(kName, arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
-  progress.stage("import");
-  Surface surface = import_all(arguments, import);
-  for (const std::string& line : size_warnings(surface)) progress.warn(line);
-  const VoxelizeResult result = voxelize(std::move(surface), options, progress);
-  report(result, progress);
-  progress.stage("write");
-  if (!arguments.vdb.empty()) write_vdb(result.body, arguments.vdb);
-  if (!arguments.summary.empty()) write_text(summary_json(result), arguments.summary);
-  write_body(result.body, arguments.output, {.compress = arguments.compress});
-  progress.finish();
-  return kExitDone;
-}
-
+  import.warn = [&](const std::string& line) { progress.warn(line);
+};
+progress.stage("import");
+Surface surface = import_all(arguments, import);
+for (const std::string& line : size_warnings(surface)) progress.warn(line);
+const VoxelizeResult result = voxelize(std::move(surface), options, progress);
+report(result, progress);
+progress.stage("write");
+if (!arguments.vdb.empty()) write_vdb(result.body, arguments.vdb);
+if (!arguments.summary.empty()) write_text(summary_json(result), arguments.summary);
+write_body(result.body, arguments.output, {.compress = arguments.compress});
+progress.finish();
+return kExitDone;
 }  // namespace
+
+}  // namespace flexel
 }  // namespace flexel
 
 int main(int argc, char** argv) {
