@@ -66,7 +66,7 @@ class Comparison {
   void compare(int axis) {
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
     const double u_step = box_.size()[u] / kLines, v_step = box_.size()[v] / kLines;
-    if (!(u_step > 0) || !(v_step > 0)) return;
+    if (std::min(u_step, v_step) * kLines <= tolerance_) return;  // they only touch along this axis
     const LineGrid grid{axis,  box_.min[u] + u_step / 2, box_.min[v] + v_step / 2, u_step, v_step, kLines,
                         kLines};
     const auto of_a = intervals(*mesh_[0], grid), of_b = intervals(*mesh_[1], grid);
@@ -106,10 +106,11 @@ class Comparison {
   bool touching_ = false;
 };
 
+// What both boxes have in common; along an axis on which they miss each other by at most `reach`, the gap.
 Box common_box(const Box& a, const Box& b, double reach) {
   Box box;
-  const Vec3 low = a.min.cwiseMax(b.min).array() - reach, high = a.max.cwiseMin(b.max).array() + reach;
-  if ((low.array() > high.array()).any()) return box;
+  const Vec3 low = a.min.cwiseMax(b.min), high = a.max.cwiseMin(b.max);
+  if ((low.array() > high.array() + reach).any()) return box;
   box.add(low);
   box.add(high);
   return box;
@@ -130,7 +131,7 @@ std::vector<PartPair> noteworthy_pairs(const std::vector<HealedPart>& parts,
   for (std::uint32_t a = 0; a < parts.size(); ++a)
     for (std::uint32_t b = a + 1; b < parts.size(); ++b) {
       const double cell = std::max(spacing[a], spacing[b]);
-      const Box common = common_box(box[a], box[b], cell / 2);
+      const Box common = common_box(box[a], box[b], cell);
       if (common.empty()) continue;
       const double tolerance = std::max(kOfDiagonal * all.diagonal(), kOfSpacing * cell);
       Comparison lines(parts[a].mesh, parts[b].mesh, common, tolerance);
@@ -155,10 +156,11 @@ void refuse_duplicates(const std::vector<PartPair>& pairs, const Surface& surfac
   }
   if (count == 0) return;
   if (count > 3) names += fmt::format(" and {} pairs more", count - 3);
-  throw InputError(fmt::format(
-      "parts {} are each the same body twice in one place, and would be twice as stiff and as heavy: leave "
-      "one of each out of the input",
-      names));
+  throw InputError(
+      fmt::format("parts {} are one body twice in one place{}, and would be twice as stiff and as heavy: "
+                  "leave one of {} out "
+                  "of the input",
+                  names, count == 1 ? "" : ", pair by pair", count == 1 ? "them" : "each pair"));
 }
 
 }  // namespace flexel

@@ -18,6 +18,8 @@
 #include <TCollection_HAsciiString.hxx>
 #include <TopExp_Explorer.hxx>
 #include <TopoDS_Shape.hxx>
+#include <TransferBRep.hxx>
+#include <Transfer_TransientProcess.hxx>
 #include <XSControl_TransferReader.hxx>
 #include <XSControl_WorkSession.hxx>
 
@@ -86,11 +88,11 @@ std::string check_loaded(const STEPControl_Reader& reader, const ImportInput& in
 // Whether every solid of the file came out, closed and valid.
 bool solids_are_sound(const STEPControl_Reader& reader, const TopoDS_Shape& shape) {
   const Handle(Interface_InterfaceModel) model = reader.WS()->Model();
-  const Handle(XSControl_TransferReader) transferred = reader.WS()->TransferReader();
+  const Handle(Transfer_TransientProcess) process = reader.WS()->TransferReader()->TransientProcess();
   bool any = false;
   for (Standard_Integer i = 1; i <= model->NbEntities(); ++i) {
     if (!model->Value(i)->IsKind(STANDARD_TYPE(StepShape_SolidModel))) continue;
-    const TopoDS_Shape solid = transferred->ShapeResult(model->Value(i));
+    const TopoDS_Shape solid = TransferBRep::ShapeResult(process, model->Value(i));
     if (solid.IsNull() || solid.ShapeType() != TopAbs_SOLID) return false;
     for (TopExp_Explorer shells(solid, TopAbs_SHELL); shells.More(); shells.Next())
       if (!BRep_Tool::IsClosed(shells.Current())) return false;

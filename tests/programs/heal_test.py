@@ -113,15 +113,61 @@ def test_a_sheet_is_refused_with_what_to_do():
     for option in ("auto", "wrap", "none"):
         expect_error(run("flexel-voxelize", "sheet.stl", "--size", "4 mm", "--heal", option, "-o", "body.vtu"), "flexel-voxelize", "plate",
                      *{"auto": ["encloses no volume", "sheet", "open edges", "give it a thickness or close it"],
-                       "wrap": ["sheet", "close it", "wrap:"], "none": ["plate"]}[option])
+                       "wrap": ["sheet", "close it", "no wrap closes it"], "none": ["plate"]}[option])
         expect_only("sheet.stl")
 
 
 def test_an_open_box_is_refused_with_the_hole():
     write("part.stl", binary_stl([t for t in grid_box() if not all(corner[2] == 40 for corner in t)]))
     expect_error(run("flexel-voxelize", "part.stl", "--size", "4 mm", "-o", "body.vtu"), "flexel-voxelize",
-                 "inside cannot be told from outside", "32 open edges", "56.6 mm wide", "(20 mm, 20 mm, 40 mm)", "--heal wrap")
+                 "inside cannot be told from outside", "32 open edges", "56.6 mm wide", "(20 mm, 20 mm, 40 mm)", "--heal \"wrap:62.2 mm\"")
     expect_only("part.stl")
+    said, part = healed([t for t in grid_box() if not all(corner[2] == 40 for corner in t)], "--heal", "wrap:62.2 mm")  # as advised
+    expect(part["healing"]["wrapped"], f"{said}")
+
+
+def test_parts_among_each_other_are_told():
+    def block(low, high):
+        return [[tuple(c + l for c, l in zip(corner, low)) for corner in t]
+                for t in box_triangles(tuple(h - l for l, h in zip(low, high)))]
+
+    left = ascii_stl(block((0, 0, 0), (20, 10, 10)), "left")
+    for name, begin, words in (
+            ("overlap.stl", 18.0, ["parts \"left\" and \"right\" overlap: 200 mm^3 lies in both"]),
+            ("gap.stl", 20.3, ["parts \"left\" and \"right\" miss each other by 300 um", "[[bond]] with gap = \"315 um\""]),
+            ("wide.stl", 20.8, ["miss each other by 800 um", "close the gap in CAD"])):
+        write(name, left + ascii_stl(block((begin, 0, 0), (40, 10, 10)), "right"))
+        result = expect_ok(run("flexel-voxelize", name, "--size", "1 mm", "--summary", "summary.json", "-o", "body.vtu"))
+        for word in words:
+            expect(word in result.err, f"\"{word}\" is missing in {result.err}")
+        with open("summary.json", encoding="utf-8") as file:
+            summary = json.load(file)
+        found = summary["overlaps"] + summary["gaps"]
+        expect(len(found) == 1 and found[0]["parts"] == ["left", "right"], f"{summary['overlaps']} {summary['gaps']}")
+    # As advised.
+    write("scene.toml", b'''material = "steel"
+[[fix]]
+where = "xmin"
+[[load]]
+where = "xmax"
+force = ["1 N", "0 N", "0 N"]
+[[bond]]
+parts = ["left", "right"]
+gap = "315 um"
+''')
+    expect_ok(run("flexel", "deform", "gap.stl", "--scene", "scene.toml", "--size", "1 mm", "--no-estimate", "-o", "bent.stl"))
+    write("twice.stl", left + left.replace(b"left", b"again"))
+    expect_error(run("flexel-voxelize", "twice.stl", "--size", "1 mm", "-o", "none.vtu"), "flexel-voxelize", "\"left\" and \"again\"",
+                 "are one body twice in one place", "leave one of them out")
+
+
+def test_what_is_said_of_many_parts_is_said_once():
+    blocks = [[[tuple(c + s for c, s in zip(corner, (12.0 * n, 0, 0))) for corner in t] for t in box_triangles((10.0, 10.0, 10.0))] for n in range(8)]
+    write("many.stl", b"".join(ascii_stl([[a, c, b] for a, b, c in block], f"block{n}") for n, block in enumerate(blocks)))
+    said = expect_ok(run("flexel-voxelize", "many.stl", "--size", "2.5 mm", "-o", "body.vtu")).err
+    expect("8 parts: 1,000 elements, 512 cells of 2.5 mm" in said, said)
+    expect("healed in 8 of 8 parts (\"block0\", \"block1\", \"block2\", ...): 8 shells inside out and turned" in said, said)
+    expect(len(said.splitlines()) <= 10, said)
 
 
 def test_wrap_spans_what_it_is_told_to():
