@@ -16,6 +16,7 @@
 #include "formats/termination.h"
 #include "formats/topology.h"
 #include "formats/units.h"
+#include "voxelize/heal.h"
 #include "voxelize/thickness.h"
 #include "voxelize/voxelize.h"
 
@@ -26,26 +27,30 @@ struct PartInfo {
   std::string name;
   std::size_t vertices = 0, polygons = 0, triangles = 0;
   Box box;
-  double area = 0, volume = 0;  // SI; volume is meaningless where the surface is open
-  Topology topology;
-  std::optional<ThinWall> thinnest;
+  double area = 0;    // m^2
+  Topology topology;  // as in the file
+  MeasuredPart healed;
   std::vector<std::uint32_t> faces;  // indices into Surface::faces
   [[nodiscard]] bool closed() const { return topology.closed(); }
 };
 
-std::vector<PartInfo> look_at(const Surface& surface, const std::vector<FaceShape>& shapes) {
-  std::vector<PartInfo> parts(surface.parts.size());
+// A surface whose polygons face outward, and what is known of it.
+struct Known {
+  std::vector<FaceShape> shapes;       // (faces)
+  std::vector<std::uint32_t> numbers;  // (faces) within their part
+  std::vector<PartInfo> parts;
+};
+
+Known look_at(Surface& surface) {
+  Known known;
+  std::vector<PartInfo>& parts = known.parts;
+  parts.resize(surface.parts.size());
   const Triangles triangles = triangulate(surface);
   const std::vector<std::uint32_t> welded = weld(surface.vertices);
   std::vector<std::vector<std::array<std::uint32_t, 3>>> corners(parts.size());
   for (std::size_t t = 0; t < triangles.corners.size(); ++t)
     corners[surface.polygon_part(triangles.polygon[t])].push_back(triangles.corners[t]);
   for (std::size_t p = 0; p < surface.polygon_count(); ++p) ++parts[surface.polygon_part(p)].polygons;
-  for (std::uint32_t f = 0; f < surface.faces.size(); ++f) {
-    parts[surface.faces[f].part].faces.push_back(f);
-    parts[surface.faces[f].part].area += shapes[f].area;
-  }
-  const std::vector<std::optional<ThinWall>> thinnest = thinnest_walls(surface);
   std::vector<std::uint32_t> used_by(surface.vertices.size(), 0xffffffffu);
   for (std::uint32_t p = 0; p < parts.size(); ++p) {
     PartInfo& part = parts[p];
@@ -57,10 +62,16 @@ std::vector<PartInfo> look_at(const Surface& surface, const std::vector<FaceShap
         part.vertices += std::exchange(used_by[v], p) != p;
       }
     part.topology = topology(corners[p], welded);
-    part.volume = signed_volume(surface.vertices, corners[p]);
-    part.thinnest = thinnest[p];
   }
-  return parts;
+  std::vector<MeasuredPart> healed = heal_and_measure(surface);
+  for (std::size_t p = 0; p < parts.size(); ++p) parts[p].healed = std::move(healed[p]);
+  known.shapes = face_shapes(surface);
+  known.numbers = face_numbers(surface);
+  for (std::uint32_t f = 0; f < surface.faces.size(); ++f) {
+    parts[surface.faces[f].part].faces.push_back(f);
+    parts[surface.faces[f].part].area += known.shapes[f].area;
+  }
+  return known;
 }
 
 struct Unit {
@@ -102,14 +113,15 @@ std::string part_text(const PartInfo& part, const Unit& unit) {
   text += fmt::format("  mesh       {} vertices, {} polygons; {}\n", human_count(part.vertices),
                       human_count(part.polygons), closedness(part));
   text += fmt::format("  area       {:.6g} {}^2\n", part.area / (unit.metres * unit.metres), unit.name);
-  if (part.closed())
-    text += fmt::format("  volume     {:.6g} {}^3{}\n", std::abs(part.volume) / std::pow(unit.metres, 3),
-                        unit.name, part.volume < 0 ? " (inside out)" : "");
+  const MeasuredPart& healed = part.healed;
+  if (healed.volume)
+    text += fmt::format("  volume     {:.6g} {}^3\n", *healed.volume / std::pow(unit.metres, 3), unit.name);
   else
     text += "  volume     none: the surface is not closed\n";
-  if (part.thinnest)
-    text += fmt::format("  thinnest   wall {:.4g} {} at {}\n", part.thinnest->thickness / unit.metres,
-                        unit.name, place(part.thinnest->where, unit));
+  for (const std::string& line : healing_lines(healed.healing)) text += "  healed     " + line + "\n";
+  if (healed.thinnest)
+    text += fmt::format("  thinnest   wall {:.4g} {} at {}\n", healed.thinnest->thickness / unit.metres,
+                        unit.name, place(healed.thinnest->where, unit));
   return text;
 }
 
@@ -145,10 +157,8 @@ std::string source_text(const SurfaceSource& source, const Unit& unit) {
                      source.unit_given ? "" : " (assumed: the file carries none; --unit)");
 }
 
-std::string info_text(const Surface& surface) {
-  const std::vector<FaceShape> shapes = face_shapes(surface);
-  const std::vector<std::uint32_t> numbers = face_numbers(surface);
-  const std::vector<PartInfo> parts = look_at(surface, shapes);
+std::string info_text(const Surface& surface, const Known& known) {
+  const auto& [shapes, numbers, parts] = known;
   std::string text;
   for (std::uint32_t s = 0; s < surface.sources.size(); ++s) {
     const Unit unit = unit_of(surface.sources[s]);
@@ -191,23 +201,21 @@ Json part_json(const PartInfo& part) {
                {"min", coordinates(part.box.min)},
                {"max", coordinates(part.box.max)},
                {"area", part.area},
-               {"volume", part.closed() ? Json(part.volume) : Json()},
+               {"volume", part.healed.volume ? Json(*part.healed.volume) : Json()},
                {"closed", part.closed()},
                {"shells", part.topology.shell_count},
                {"open_edges", part.topology.open_edges},
                {"non_manifold_edges", part.topology.non_manifold_edges},
                {"misoriented_edges", part.topology.misoriented_edges},
                {"degenerate_triangles", part.topology.degenerate_triangles}};
-  json["thinnest_wall"] = part.thinnest ? Json{{"thickness", part.thinnest->thickness},
-                                               {"where", coordinates(part.thinnest->where)}}
-                                        : Json();
+  const std::optional<ThinWall>& thinnest = part.healed.thinnest;
+  json["thinnest_wall"] =
+      thinnest ? Json{{"thickness", thinnest->thickness}, {"where", coordinates(thinnest->where)}} : Json();
   return json;
 }
 
-std::string info_json(const Surface& surface) {
-  const std::vector<FaceShape> shapes = face_shapes(surface);
-  const std::vector<std::uint32_t> numbers = face_numbers(surface);
-  const std::vector<PartInfo> parts = look_at(surface, shapes);
+std::string info_json(const Surface& surface, const Known& known) {
+  const auto& [shapes, numbers, parts] = known;
   Json files = Json::array();
   for (std::uint32_t s = 0; s < surface.sources.size(); ++s) {
     const SurfaceSource& source = surface.sources[s];
@@ -271,13 +279,15 @@ int info_command(int argc, char** argv) {
     options.largest_edge = parse_quantity(edge, Dimension::length);
     if (!(*options.largest_edge > 0)) throw InputError("--edge: must be above zero");
   }
+  Progress progress("flexel", Progress::Mode::quiet);
+  options.warn = [&](const std::string& line) { progress.warn(line); };
   Surface surface = import_surface(files.front(), options);
   for (std::size_t f = 1; f < files.size(); ++f) append(surface, import_surface(files[f], options));
-  Progress progress("flexel", Progress::Mode::quiet);
   for (const std::string& line : size_warnings(surface)) progress.warn(line);
+  const Known known = look_at(surface);
   if (!thickness.empty()) write_thickness(surface, thickness);
   OutputFile out("-", false);
-  out.write(json ? info_json(surface) : info_text(surface));
+  out.write(json ? info_json(surface, known) : info_text(surface, known));
   out.commit();
   return kExitDone;
 }

@@ -77,7 +77,7 @@ void declare_job(CLI::App& app, JobArguments& arguments) {
   app.add_option("--unit", arguments.unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
   app.add_option(
          "--edge", arguments.edge,
-         "Split the mesh to this longest edge (default: STEP a 64th of the solid's diagonal, meshes not)")
+         "Split the mesh to this longest edge (default: STEP a 64th of the file's diagonal, meshes not)")
       ->type_name("LENGTH");
   app.add_flag("--force", arguments.force, "Let results replace files that are read");
 }
@@ -105,8 +105,10 @@ Job plan_job(const JobArguments& arguments) {
 }
 
 Surface read_parts(const std::vector<std::string>& paths, const ImportOptions& options, Progress& progress) {
-  Surface surface = import_surface(paths.front(), options);
-  for (std::size_t p = 1; p < paths.size(); ++p) append(surface, import_surface(paths[p], options));
+  ImportOptions heard = options;
+  heard.warn = [&](const std::string& line) { progress.warn(line); };
+  Surface surface = import_surface(paths.front(), heard);
+  for (std::size_t p = 1; p < paths.size(); ++p) append(surface, import_surface(paths[p], heard));
   for (const std::string& line : size_warnings(surface)) progress.warn(line);
   for (const std::string& line : refinement_notes(surface)) progress.say(line);
   return surface;

@@ -1,6 +1,7 @@
 // Reads CAD and mesh files into a Surface. Implemented by flexel_import (OpenCASCADE), declared here so that
 // no program sees that library.
 #pragma once
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -19,11 +20,13 @@ struct ImportOptions {
   double angular_deflection = 0.35;
   // The mesh is split until no edge is longer than this [m], so that flat faces can bend too; more than 2
   // million triangles are an error. Not given: meshes (STL, OBJ, ...) are the user's and stay as they are,
-  // STEP's tessellation is split to a 64th of each solid's diagonal, or to what 2 million triangles for the
-  // file allow.
+  // STEP's tessellation is split to a 64th of the diagonal of all solids together, or to what 2 million
+  // triangles for the file allow.
   std::optional<double> largest_edge;
   // s of processor time that OpenCASCADE may take over a file; not given: a minute and 10 s a megabyte
   std::optional<double> occt_seconds;
+  // Told, a line each, what a reader passed over and the user should know.
+  std::function<void(const std::string&)> warn;
 };
 
 // Reads one file ("-": stdin). The format is told by its bytes, then by its extension. Solids become parts;

@@ -144,6 +144,25 @@ Json live_json(const LiveSummary& live) {
   return json;
 }
 
+// A line each for a few; of more their sum and the least, where an assembly gives way first.
+void add_bonds(const std::vector<BondedParts>& bonds, std::vector<std::string>& lines) {
+  constexpr std::size_t kFew = 3;
+  if (bonds.size() <= kFew) {
+    for (const BondedParts& bond : bonds)
+      lines.push_back(fmt::format("\"{}\" and \"{}\" are bonded over {:.4g} mm2", bond.parts[0],
+                                  bond.parts[1], bond.area * 1e6));
+    return;
+  }
+  const auto less = [](const BondedParts& a, const BondedParts& b) { return a.area < b.area; };
+  const BondedParts& least = *std::min_element(bonds.begin(), bonds.end(), less);
+  double sum = 0;
+  for (const BondedParts& bond : bonds) sum += bond.area;
+  lines.push_back(fmt::format(
+      "{} pairs of parts are bonded, over {:.4g} mm2 in all, \"{}\" and \"{}\" over the least, {:.4g} "
+      "mm2",
+      bonds.size(), sum * 1e6, least.parts[0], least.parts[1], least.area * 1e6));
+}
+
 std::string live_line(const LiveSummary& live) {
   const std::string poses = fmt::format("live: {} pose(s)", human_count(live.poses));
   if (live.rate == 0) return poses;
@@ -257,9 +276,7 @@ std::vector<std::string> summary_lines(const SimulateResult& result) {
   for (const Reaction& reaction : result.reactions)
     lines.push_back(
         fmt::format("reaction of \"{}\": {}", reaction.name, resultant(reaction.force, reaction.moment)));
-  for (const BondedParts& bond : result.bonds)
-    lines.push_back(fmt::format("\"{}\" and \"{}\" are bonded over {:.4g} mm2", bond.parts[0], bond.parts[1],
-                                bond.area * 1e6));
+  add_bonds(result.bonds, lines);
   const std::string corner = result.smallest_corner_jacobian
                                  ? fmt::format(" (at a corner {:.4g})", *result.smallest_corner_jacobian)
                                  : "";

@@ -27,11 +27,19 @@ Box polygon_box(const Surface& surface, std::size_t polygon) {
   return box;
 }
 
-// Sample points by the cube of a grid that they lie in.
+bool holds(const Box& box, const Vec3& point, double margin) {
+  return (point.array() >= box.min.array() - margin).all() &&
+         (point.array() <= box.max.array() + margin).all();
+}
+
+// The polygons that have sample points in each cube of a grid.
 class Grid {
  public:
-  Grid(const std::vector<SurfacePoint>& points, double width) : points_(points), width_(width) {
-    for (std::uint32_t i = 0; i < points.size(); ++i) cubes_[key(cube(points[i].position))].push_back(i);
+  Grid(const std::vector<SurfacePoint>& points, double width) : width_(width) {
+    for (const SurfacePoint& point : points) {
+      std::vector<std::uint32_t>& polygons = cubes_[key(cube(point.position))];
+      if (polygons.empty() || polygons.back() != point.polygon) polygons.push_back(point.polygon);
+    }
   }
   // Polygons with a sample in the cubes around `point`, ascending.
   [[nodiscard]] std::vector<std::uint32_t> polygons_near(const Vec3& point) const {
@@ -41,7 +49,7 @@ class Grid {
       const auto found =
           cubes_.find(key({middle[0] + n % 3 - 1, middle[1] + n / 3 % 3 - 1, middle[2] + n / 9 - 1}));
       if (found == cubes_.end()) continue;
-      for (const std::uint32_t i : found->second) polygons.push_back(points_[i].polygon);
+      polygons.insert(polygons.end(), found->second.begin(), found->second.end());
     }
     std::sort(polygons.begin(), polygons.end());
     polygons.erase(std::unique(polygons.begin(), polygons.end()), polygons.end());
@@ -61,7 +69,6 @@ class Grid {
       hash = (hash ^ static_cast<std::uint64_t>(each)) * 0x9e3779b97f4a7c15u;
     return hash;
   }
-  const std::vector<SurfacePoint>& points_;
   double width_;
   std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cubes_;
 };
@@ -144,23 +151,30 @@ double TouchingSearch::distance(const Vec3& point, std::uint32_t polygon) const 
 
 void TouchingSearch::touch(std::uint32_t finer, std::uint32_t coarser) {
   const double limit = std::max(tolerance(finer), wider_gap(finer, coarser));
-  std::unordered_map<std::uint32_t, Vec3> normal;
+  struct Facing {
+    Vec3 normal;
+    Box box;
+  };
+  std::unordered_map<std::uint32_t, Facing> facing;
   for (const SurfacePoint& point : points_[coarser])
-    normal.try_emplace(point.polygon, point.area_vector.normalized());
+    if (facing.count(point.polygon) == 0)
+      facing[point.polygon] = {point.area_vector.normalized(), polygon_box(body_.surface, point.polygon)};
   const Grid grid(points_[coarser], 0.5 * body_.parts[coarser].lattice.spacing.minCoeff());
   for (const SurfacePoint& point : points_[finer]) {
+    if (!holds(box_[coarser], point.position, limit)) continue;
     const Vec3 own = point.area_vector.normalized();
     double least = limit;
     std::optional<std::uint32_t> nearest;
     for (const std::uint32_t polygon : grid.polygons_near(point.position)) {
-      if (own.dot(normal.at(polygon)) > kFacing) continue;
+      const Facing& other = facing.at(polygon);
+      if (own.dot(other.normal) > kFacing || !holds(other.box, point.position, limit)) continue;
       const double away = distance(point.position, polygon);
       if (away > least || (nearest && away == least)) continue;
       least = away;
       nearest = polygon;
     }
     if (!nearest) continue;
-    const auto at = carrier_on_surface(setting_, *nearest, point.position, normal.at(*nearest));
+    const auto at = carrier_on_surface(setting_, *nearest, point.position, facing.at(*nearest).normal);
     if (!at) continue;
     found_.push_back(
         {{finer, coarser},

@@ -59,13 +59,14 @@ Lattice snapped(const PartMesh& mesh, double size, bool cubic) {
   return lattice;
 }
 
-// The plane of a triangle that lies across `axis`.
+// The plane of a triangle that lies across `axis`; none where it has no area.
 std::optional<FacePlane> flat_across(const PartMesh& mesh, const Corners& c, const Vec3& axis,
                                      double tolerance) {
   constexpr double kSine = 1.75e-3;  // of 0.1 degree
   const Vec3& a = mesh.world[c[0]];
   const Vec3 normal = (mesh.world[c[1]] - a).cross(mesh.world[c[2]] - a) / 2;
-  if (normal.cross(axis).squaredNorm() > kSine * kSine * normal.squaredNorm()) return {};
+  if (!(normal.squaredNorm() > 0) || normal.cross(axis).squaredNorm() > kSine * kSine * normal.squaredNorm())
+    return {};
   const double u = axis.dot(a), v = axis.dot(mesh.world[c[1]]), w = axis.dot(mesh.world[c[2]]);
   if (std::max({u, v, w}) - std::min({u, v, w}) > tolerance) return {};
   return FacePlane{(u + v + w) / 3, normal.norm()};
@@ -96,7 +97,6 @@ std::vector<FacePlane> face_planes(const PartMesh& mesh, const Vec3& axis, doubl
     plane.offset += (face.offset - plane.offset) * (face.area / (plane.area + face.area));
     plane.area += face.area;
   }
-  std::erase_if(planes, [](const FacePlane& plane) { return !(plane.area > 0); });
   return planes;
 }
 

@@ -4,7 +4,9 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <optional>
 
 #include "formats/error.h"
 #include "formats/program.h"
@@ -59,33 +61,134 @@ void heal_automatically(HealedPart& part) {
   done.left_open = mesh.open_edges;
 }
 
+// The mesh wrapped; nothing where the wrap is a skin: around a sheet, or through an opening and along the
+// inside, it is twice the offset thick everywhere.
+std::optional<PartMesh> wrapped(const PartMesh& mesh, double alpha) {
+  constexpr double kNoThicker = 4;  // offsets
+  PartMesh wrap = alpha_wrap(mesh, alpha, kOffset * alpha);
+  const double area = surface_area(wrap), volume = enclosed_volume(wrap);
+  if (!wrap.balanced() || !(2 * volume > kNoThicker * kOffset * alpha * area)) return std::nullopt;
+  return wrap;
+}
+
+// The widest hole of a shell that matters, or null.
+const Hole* widest_hole(const HealedPart& part) {
+  const Hole* widest = nullptr;
+  for (const Hole& hole : part.holes)
+    if (hole.shell_share > kMajorShell && (!widest || hole.width > widest->width)) widest = &hole;
+  return widest;
+}
+
+double diagonal_of(const PartMesh& mesh) {
+  return bounding_box(mesh.world).diagonal();
+}
+
+// The least width above `least` that a wrap has to span to keep a volume, tried; nothing where none of those
+// up to the part's own size does.
+std::optional<double> width_to_span(const HealedPart& part, double least) {
+  std::vector<double> widths;
+  if (const Hole* widest = widest_hole(part); widest && 1.1 * widest->width > least)
+    widths = {1.1 * widest->width};
+  else
+    widths = {2 * least, 8 * least};
+  for (const double width : widths)
+    if (width <= diagonal_of(part.mesh) && wrapped(part.mesh, width)) return width;
+  return std::nullopt;
+}
+
 // Holes that can be filled are, so that the wrap does not get in by them; a wider one is refused before
 // minutes are spent inside the part.
 void wrap(HealedPart& part, double alpha, const std::string& name) {
   const PartMesh original = part.mesh;
   heal_automatically(part);
-  const Hole* widest = nullptr;
-  for (const Hole& hole : part.holes)
-    if (hole.shell_share > kMajorShell && hole.width > alpha && (!widest || hole.width > widest->width))
-      widest = &hole;
-  const std::string opening =
-      widest ? fmt::format("an opening {} wide at {}", human_length(widest->width), place(widest->centre))
-             : "an opening";
-  const std::string refusal = fmt::format(
-      "part \"{}\": its surface is a sheet, or has {}, through which a wrap of {} gets inside; close it, or "
-      "give "
-      "the width to span: --heal \"wrap:{}\"",
-      name, opening, human_length(alpha), human_length(widest ? 1.1 * widest->width : 2 * alpha));
-  if (widest) throw InputError(refusal);
+  const auto refuse = [&] {
+    const Hole* widest = widest_hole(part);
+    const std::optional<double> width = width_to_span(part, alpha);
+    throw InputError(fmt::format(
+        "part \"{}\": its surface is a sheet, or has {}, through which a wrap of {} gets inside: close it in "
+        "a "
+        "mesh program{}",
+        name,
+        widest ? fmt::format("an opening {} wide at {}", human_length(widest->width), place(widest->centre))
+               : "an opening",
+        human_length(alpha),
+        width ? fmt::format(", or give the width to span: --heal \"wrap:{}\"", human_length(*width))
+              : "; no wrap closes it"));
+  };
+  if (const Hole* widest = widest_hole(part); widest && widest->width > alpha) refuse();
+  std::optional<PartMesh> found = wrapped(part.mesh, alpha);
+  if (!found) refuse();
   part.original = original;
-  part.mesh = alpha_wrap(part.mesh, alpha, kOffset * alpha);
+  part.mesh = std::move(*found);
   part.done.wrapped = true;
   part.done.wrap_alpha = alpha;
   part.done.left_open = 0;
-  const double area = surface_area(part.mesh), volume = enclosed_volume(part.mesh);
-  // Around a sheet, or through an opening and along the inside, a wrap is twice the offset thick everywhere.
-  constexpr double kNoThicker = 4;  // offsets
-  if (!part.mesh.balanced() || !(2 * volume > kNoThicker * kOffset * alpha * area)) throw InputError(refusal);
+}
+
+// What is wrong at the edges, by how many triangles they have and which way those face.
+std::string faults_of(const PartMesh& mesh) {
+  std::size_t open = 0, crowded = 0;
+  for (const std::uint32_t degree : edge_degrees(mesh)) {
+    open += degree == 1;
+    crowded += degree > 2;
+  }
+  std::string text;
+  const auto add = [&](std::size_t count, const char* one, const char* many) {
+    if (count > 0)
+      text += fmt::format("{}{} {}", text.empty() ? "" : ", ", human_count(count), count == 1 ? one : many);
+  };
+  add(open, "open edge", "open edges");
+  add(crowded, "edge where more than two triangles meet", "edges where more than two triangles meet");
+  if (text.empty())
+    add(mesh.unbalanced_edges, "edge whose triangles face ways that do not fit together",
+        "edges whose triangles face ways that do not fit together");
+  return text;
+}
+
+// A small shell that is open says nothing of the part.
+const Hole* largest_hole(const HealedPart& part) {
+  const auto weight = [](const Hole& hole) { return std::pair{hole.shell_share > kMajorShell, hole.share}; };
+  const auto largest = std::max_element(part.holes.begin(), part.holes.end(),
+                                        [&](const Hole& a, const Hole& b) { return weight(a) < weight(b); });
+  return largest == part.holes.end() ? nullptr : &*largest;
+}
+
+bool is_sheet(const HealedPart& part) {
+  constexpr double kSheet = .3;
+  const Hole* largest = largest_hole(part);
+  return largest && part.holes.size() <= 4 && largest->share >= kSheet && largest->shell_share > kMajorShell;
+}
+
+std::string why_undecided(const HealedPart& part) {
+  const std::string faults = faults_of(part.mesh);
+  if (is_sheet(part)) return fmt::format("its surface is a sheet with {}", faults);
+  const Hole* largest = largest_hole(part);
+  if (largest && part.holes.size() <= 64)
+    return fmt::format("{}, the largest hole {} wide at {}", faults, human_length(largest->width),
+                       place(largest->centre));
+  return faults;
+}
+
+// What to do about parts that are open, tried for as long as nobody gets impatient.
+std::string cure(const std::vector<UndecidedPart>& parts) {
+  constexpr std::chrono::seconds kPatience(10);
+  const auto begin = std::chrono::steady_clock::now();
+  std::size_t closed = 0, tried = 0;
+  for (const UndecidedPart& each : parts) {
+    if (std::chrono::steady_clock::now() - begin > kPatience) break;
+    ++tried;
+    closed += wrapped(each.part->mesh, kAlpha * diagonal_of(each.part->mesh)).has_value();
+  }
+  if (tried == closed)
+    return fmt::format("repair {} in a mesh program, or take a wrap of {}: --heal wrap",
+                       parts.size() == 1 ? "it" : "them", parts.size() == 1 ? "it" : "each");
+  if (parts.size() == 1)
+    if (const auto width = width_to_span(*parts[0].part, kAlpha * diagonal_of(parts[0].part->mesh)))
+      return fmt::format("close it in a mesh program, or span it: --heal \"wrap:{}\"", human_length(*width));
+  return parts.size() == 1
+             ? "close it in a mesh program; no wrap closes it"
+             : fmt::format("close them in a mesh program; --heal wrap closes {} of the {} tried", closed,
+                           tried);
 }
 
 }  // namespace
@@ -120,35 +223,20 @@ bool has_large_hole(const HealedPart& part) {
   });
 }
 
-std::string why_undecided(const HealedPart& part, const std::string& name) {
-  // A small shell that is open says nothing of the part.
-  const auto weight = [](const Hole& hole) { return std::pair{hole.shell_share > kMajorShell, hole.share}; };
-  const auto largest = std::max_element(part.holes.begin(), part.holes.end(),
-                                        [&](const Hole& a, const Hole& b) { return weight(a) < weight(b); });
-  constexpr double kSheet = .3;
-  const std::string edges = fmt::format("{} open edges", human_count(part.mesh.open_edges));
-  if (largest != part.holes.end() && part.holes.size() <= 4 && largest->share >= kSheet &&
-      largest->shell_share > kMajorShell)
-    return fmt::format(
-        "part \"{}\" encloses no volume: its surface is a sheet with {}; give it a thickness or close it",
-        name, edges);
-  if (largest != part.holes.end() && part.holes.size() <= 64)
-    return fmt::format(
-        "part \"{}\": inside cannot be told from outside: {}, the largest hole {} wide at {}; close it, or "
-        "try "
-        "--heal wrap",
-        name, edges, human_length(largest->width), place(largest->centre));
-  if (part.mesh.open_edges == 0)
-    return fmt::format(
-        "part \"{}\": inside cannot be told from outside: no open edges, but {} edges whose triangles face "
-        "ways that "
-        "do not fit together; repair it in a mesh program, or try --heal wrap",
-        name, human_count(part.mesh.unbalanced_edges));
-  return fmt::format(
-      "part \"{}\": inside cannot be told from outside: {}, and lines, flood and winding numbers disagree "
-      "about what "
-      "they enclose; repair it in a mesh program, or try --heal wrap",
-      name, edges);
+InputError undecided(const std::vector<UndecidedPart>& parts, std::size_t all) {
+  if (parts.size() == 1 && is_sheet(*parts[0].part))
+    return InputError(fmt::format("part \"{}\" encloses no volume: {}; give it a thickness or close it",
+                                  parts[0].name, why_undecided(*parts[0].part)));
+  if (parts.size() == 1)
+    return InputError(fmt::format("part \"{}\": inside cannot be told from outside: {}; {}", parts[0].name,
+                                  why_undecided(*parts[0].part), cure(parts)));
+  constexpr std::size_t kNamed = 4;
+  std::string names;
+  for (std::size_t p = 0; p < std::min(kNamed, parts.size()); ++p)
+    names += fmt::format("{}\"{}\" ({})", p == 0 ? "" : ", ", parts[p].name, why_undecided(*parts[p].part));
+  if (parts.size() > kNamed) names += fmt::format(" and {} more", parts.size() - kNamed);
+  return InputError(fmt::format("inside cannot be told from outside in {} of {} parts: {}; {}", parts.size(),
+                                all, names, cure(parts)));
 }
 
 std::vector<std::string> healing_lines(const Healing& done) {

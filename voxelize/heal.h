@@ -1,6 +1,7 @@
-// Healing: what is done to a part's surface so that inside can be told from outside. The surface that the
-// user gets back is never touched.
+// Healing: what is done to a part's surface so that inside can be told from outside. Of the surface that the
+// user gets back only the polygons' orientation changes (outward.h).
 #pragma once
+#include "formats/error.h"
 #include "voxelize/heal_holes.h"
 #include "voxelize/part_mesh.h"
 #include "voxelize/voxelize.h"
@@ -23,8 +24,15 @@ struct HealedPart {
 // Whether a hole that is too large to fill is left in a shell of a tenth of the area or more.
 [[nodiscard]] bool has_large_hole(const HealedPart& part);
 
-// Why inside cannot be told from outside, and what to try; one line.
-[[nodiscard]] std::string why_undecided(const HealedPart& part, const std::string& name);
+// A part of which inside cannot be told from outside.
+struct UndecidedPart {
+  std::string name;
+  const HealedPart* part = nullptr;
+};
+
+// Why, in one line for all of them (at least one, of `all` parts), and what to do: a wrap is advised where it
+// was tried and keeps a volume, for 10 s in all.
+[[nodiscard]] InputError undecided(const std::vector<UndecidedPart>& parts, std::size_t all);
 
 // What was healed, one phrase each: "140 open edges closed by welding at 1e-7 of the diagonal". Empty:
 // nothing.

@@ -48,11 +48,11 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_option("--deflection", arguments.deflection,
                  "STEP: largest distance of the triangles from the CAD surface");
   app.add_option(
-      "--edge", arguments.edge,
-      "split the mesh to this longest edge (default: STEP a 64th of the solid's diagonal, meshes not)");
-  app.add_option(
-      "--input-format,--format", arguments.format,
-      "format of the input (step, iges, brep, stl, obj, ply, off, glb, 3mf) instead of what its bytes tell");
+         "--edge", arguments.edge,
+         "split the mesh to this longest edge (default: STEP a 64th of the file's diagonal, meshes not)")
+      app.add_option("--input-format,--format", arguments.format,
+                     "format of the input (step, iges, brep, stl, obj, ply, off, glb, 3mf) instead of what "
+                     "its bytes tell");
   app.add_option("--threads", arguments.threads, "threads; 0 (default): every core");
   app.add_flag("--compress", arguments.compress, "compress the arrays of the body file");
   app.add_flag("--quiet", arguments.quiet, "say warnings only");
@@ -141,30 +141,32 @@ int run(int argc, char** argv) {
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   const StopEndsProcess nothing_is_left;
   const VoxelizeOptions options = voxelize_options(arguments);
-  const ImportOptions import = import_options(arguments);
+  ImportOptions import = import_options(arguments);
   if (!arguments.vdb.empty() && options.placement != Placement::corner)
     throw InputError("--vdb: centre placement has no cells; use --placement corner");
   check_outputs({{arguments.output, true}, {arguments.vdb, true}, {arguments.summary}}, arguments.parts,
                 arguments.force);
   const ThreadLimit threads(arguments.threads);
   Progress progress(kName, arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
-  progress.stage("import");
-  Surface surface = import_all(arguments, import);
-  for (const std::string& line : size_warnings(surface)) progress.warn(line);
-  for (const std::string& line : refinement_notes(surface)) progress.say(line);
-  const VoxelizeResult result = voxelize(std::move(surface), options, progress);
-  report(result, progress);
-  progress.stage("write");
-  OutputsTogether outputs({arguments.output, arguments.vdb, arguments.summary});
-  if (!arguments.vdb.empty()) write_vdb(result.body, arguments.vdb);
-  if (!arguments.summary.empty()) write_text(summary_json(result), arguments.summary);
-  write_body(result.body, arguments.output, {.compress = arguments.compress});
-  outputs.appear();
-  progress.finish();
-  return kExitDone;
-}
-
+  import.warn = [&](const std::string& line) { progress.warn(line);
+};
+progress.stage("import");
+Surface surface = import_all(arguments, import);
+for (const std::string& line : size_warnings(surface)) progress.warn(line);
+for (const std::string& line : refinement_notes(surface)) progress.say(line);
+const VoxelizeResult result = voxelize(std::move(surface), options, progress);
+report(result, progress);
+progress.stage("write");
+OutputsTogether outputs({arguments.output, arguments.vdb, arguments.summary});
+if (!arguments.vdb.empty()) write_vdb(result.body, arguments.vdb);
+if (!arguments.summary.empty()) write_text(summary_json(result), arguments.summary);
+write_body(result.body, arguments.output, {.compress = arguments.compress});
+outputs.appear();
+progress.finish();
+return kExitDone;
 }  // namespace
+
+}  // namespace flexel
 }  // namespace flexel
 
 int main(int argc, char** argv) {

@@ -40,36 +40,6 @@ bool ascends_edge(const PartMesh& mesh, std::uint32_t t, std::uint32_t edge) {
   return false;
 }
 
-// Which triangles to turn so that neighbours agree (triangles: 1 turn).
-std::vector<std::uint8_t> agreeing_turns(const PartMesh& mesh) {
-  const Incidence incidence = manifold_edges(mesh);
-  std::vector<std::uint8_t> turn(mesh.corners.size(), 0), seen(mesh.corners.size(), 0);
-  std::vector<std::uint32_t> region;
-  for (std::uint32_t seed = 0; seed < mesh.corners.size(); ++seed) {
-    if (seen[seed]) continue;
-    region.assign(1, seed);
-    seen[seed] = 1;
-    double turned_area = 0, total_area = 0;
-    for (std::size_t n = 0; n < region.size(); ++n) {
-      const std::uint32_t t = region[n];
-      total_area += triangle_area(mesh, t);
-      if (turn[t]) turned_area += triangle_area(mesh, t);
-      for (int e = 0; e < 3; ++e) {
-        const auto& pair = incidence[mesh.edges[t][e]];
-        const std::uint32_t other = pair[0] == t ? pair[1] : pair[0];
-        if (pair[0] == kNoTriangle || seen[other]) continue;
-        seen[other] = 1;
-        turn[other] = turn[t] ^ static_cast<std::uint8_t>(ascends(mesh, t, e) ==
-                                                          ascends_edge(mesh, other, mesh.edges[t][e]));
-        region.push_back(other);
-      }
-    }
-    if (2 * turned_area > total_area)
-      for (const std::uint32_t t : region) turn[t] ^= 1;
-  }
-  return turn;
-}
-
 void turn_over(PartMesh& mesh, std::uint32_t t) {
   std::swap(mesh.corners[t][1], mesh.corners[t][2]);
   std::swap(mesh.edges[t][0], mesh.edges[t][2]);
@@ -103,10 +73,42 @@ bool outermost(const PartMesh& mesh, std::uint32_t shell) {
 
 }  // namespace
 
+FacingRegions facing_regions(const PartMesh& mesh) {
+  const Incidence incidence = manifold_edges(mesh);
+  FacingRegions found{std::vector<std::uint8_t>(mesh.corners.size(), 0),
+                      std::vector<std::uint32_t>(mesh.corners.size(), kNoTriangle)};
+  std::vector<std::uint32_t> members;
+  for (std::uint32_t seed = 0; seed < mesh.corners.size(); ++seed) {
+    if (found.region[seed] != kNoTriangle) continue;
+    const std::uint32_t region = found.count++;
+    members.assign(1, seed);
+    found.region[seed] = region;
+    double turned_area = 0, total_area = 0;
+    for (std::size_t n = 0; n < members.size(); ++n) {
+      const std::uint32_t t = members[n];
+      total_area += triangle_area(mesh, t);
+      if (found.turn[t]) turned_area += triangle_area(mesh, t);
+      for (int e = 0; e < 3; ++e) {
+        const auto& pair = incidence[mesh.edges[t][e]];
+        const std::uint32_t other = pair[0] == t ? pair[1] : pair[0];
+        if (pair[0] == kNoTriangle || found.region[other] != kNoTriangle) continue;
+        found.region[other] = region;
+        found.turn[other] =
+            found.turn[t] ^
+            static_cast<std::uint8_t>(ascends(mesh, t, e) == ascends_edge(mesh, other, mesh.edges[t][e]));
+        members.push_back(other);
+      }
+    }
+    if (2 * turned_area > total_area)
+      for (const std::uint32_t t : members) found.turn[t] ^= 1;
+  }
+  return found;
+}
+
 void repair_orientation(PartMesh& mesh) {
   if (mesh.corners.empty() || mesh.open_edges > 0) return;
   if (!mesh.balanced()) {
-    const std::vector<std::uint8_t> turn = agreeing_turns(mesh);
+    const std::vector<std::uint8_t> turn = facing_regions(mesh).turn;
     for (std::uint32_t t = 0; t < turn.size(); ++t)
       if (turn[t]) {
         turn_over(mesh, t);

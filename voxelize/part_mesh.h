@@ -48,6 +48,15 @@ void number_edges(PartMesh& mesh);
 // enclose positive volume. A shell inside another one may be inside out: it bounds a void.
 void repair_orientation(PartMesh& mesh);
 
+// Regions of triangles that hang together across edges with two triangles, and which triangles to turn so
+// that all of a region face the same side of it: the side that most of its area faces.
+struct FacingRegions {
+  std::vector<std::uint8_t> turn;     // (triangles) 1: turn it over
+  std::vector<std::uint32_t> region;  // (triangles) from 0, in order of first triangle
+  std::uint32_t count = 0;
+};
+[[nodiscard]] FacingRegions facing_regions(const PartMesh& mesh);
+
 // Fills mesh.vertices. Coordinates within `tolerance` of a lattice plane are put on it, so that faces meant
 // to lie there do.
 constexpr double kSnapTolerance = 1e-6;  // in spacings

@@ -4,6 +4,7 @@
 
 #include "formats/units.h"
 #include "voxelize/heal.h"
+#include "voxelize/report_assembly.h"
 #include "voxelize/voxelize.h"
 
 namespace flexel {
@@ -33,12 +34,9 @@ void say_repairs(const VoxelizedPart& part, const std::string& name, Progress& p
   for (const std::string& line : healing_lines(part.healing))
     progress.warn(fmt::format("{}: healed: {}", name, line));
   if (!part.closed)
-    progress.warn(fmt::format("{}: the surface is not closed ({} open edges left); inside and outside by {}",
-                              name, human_count(part.healing.left_open),
-                              part.healing.by == Healing::By::flood
-                                  ? "flooding from outside (OpenVDB), confirmed by winding numbers"
-                                  : fmt::format("vote of lines along three axes, which differ in {} voxels",
-                                                human_count(part.disagreements))));
+    progress.warn(
+        fmt::format("{}: the surface is not closed ({} open edges left): what is inside is judged by samples",
+                    name, human_count(part.healing.left_open)));
   if (part.overlapping_voxels > 0)
     progress.say(fmt::format("{}: shells interpenetrate in {} voxels; their union is taken", name,
                              human_count(part.overlapping_voxels)));
@@ -80,16 +78,10 @@ void say_lost_matter(const VoxelizedPart& part, const std::string& name, Progres
                   name, 100 * part.dropped_volume / part.surface_volume));
 }
 
-}  // namespace
-
-void report(const VoxelizeResult& result, Progress& progress) {
+void report_each(const VoxelizeResult& result, Progress& progress) {
   for (std::size_t p = 0; p < result.parts.size(); ++p) {
     const VoxelizedPart& part = result.parts[p];
     const Part& lattice = result.body.parts[p];
-    const SurfaceSource& source = result.body.surface.sources[result.body.surface.part_source[p]];
-    if (!source.unit_given)
-      progress.say(fmt::format("{}: {} has no unit: {} assumed (--unit)", lattice.name, source.file,
-                               human_length(source.unit)));
     progress.say(lattice.placement == Placement::corner
                      ? fmt::format("{}: {} elements, {} cells of {}", lattice.name,
                                    human_count(part.elements), human_count(part.cells),
@@ -104,6 +96,18 @@ void report(const VoxelizeResult& result, Progress& progress) {
     say_walls(part, lattice.name, progress);
     if (lattice.placement == Placement::corner) say_lost_matter(part, lattice.name, progress);
   }
+}
+
+}  // namespace
+
+void report(const VoxelizeResult& result, Progress& progress) {
+  constexpr std::size_t kFew = 3;  // parts: of more, what is said of each is said once
+  for (const SurfaceSource& source : result.body.surface.sources)
+    if (!source.unit_given)
+      progress.say(
+          fmt::format("{} has no unit: {} assumed (--unit)", source.file, human_length(source.unit)));
+  result.parts.size() <= kFew ? report_each(result, progress) : report_together(result, progress);
+  report_pairs(result, progress);
   progress.say(fmt::format("simulating this needs about {}", human_bytes(result.simulation_memory)));
 }
 

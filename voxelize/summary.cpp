@@ -52,7 +52,15 @@ std::string summary_json(const VoxelizeResult& result) {
                      {"wall_samples", part.wall_samples},
                      {"healing", json_of(part.healing)}});
   }
-  return Json{{"parts", parts}}.dump(2) + "\n";
+  Json overlaps = Json::array(), gaps = Json::array();
+  for (const PartPair& pair : result.pairs) {
+    const Json names = {result.body.parts[pair.parts[0]].name, result.body.parts[pair.parts[1]].name};
+    if (pair.overlap > 0)
+      overlaps.push_back({{"parts", names}, {"volume", pair.overlap}});
+    else
+      gaps.push_back({{"parts", names}, {"width", pair.gap}});
+  }
+  return Json{{"parts", parts}, {"overlaps", overlaps}, {"gaps", gaps}}.dump(2) + "\n";
 }
 
 }  // namespace flexel

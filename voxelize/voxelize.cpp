@@ -18,6 +18,8 @@
 #include "voxelize/heal.h"
 #include "voxelize/judge.h"
 #include "voxelize/memory.h"
+#include "voxelize/neighbours.h"
+#include "voxelize/outward.h"
 #include "voxelize/overlap.h"
 #include "voxelize/part_mesh.h"
 #include "voxelize/trace.h"
@@ -45,11 +47,24 @@ double choose_spacing(const VoxelizeOptions& options, const std::vector<PartExte
 
 void check_spacing(double spacing, const std::vector<HealedPart>& meshes, const Surface& surface) {
   if (!(spacing > 0) || !std::isfinite(spacing)) throw InputError("the size must be a length above zero");
+  std::size_t smaller = 0, smallest = 0;
+  double least = std::numeric_limits<double>::infinity();  // m, the smallest part's longest side
   for (std::size_t p = 0; p < meshes.size(); ++p) {
     const double longest = bounding_box(meshes[p].mesh.world).size().maxCoeff();
-    if (spacing > longest)
-      throw InputError(fmt::format("size {} is larger than part \"{}\" ({} long); choose a smaller size",
-                                   human_length(spacing), surface.parts[p].name, human_length(longest)));
+    smaller += spacing > longest;
+    if (longest < least) {
+      least = longest;
+      smallest = p;
+    }
+  }
+  if (smaller > 0)
+    throw InputError(fmt::format(
+        "a size of {} is larger than {}\"{}\" ({} long): --size \"{}\" gives it two cells",
+        human_length(spacing),
+        smaller == 1 ? "part " : fmt::format("{} of {} parts, the smallest ", smaller, meshes.size()),
+        surface.parts[smallest].name, human_length(least), human_length(least / 2)));
+  for (std::size_t p = 0; p < meshes.size(); ++p) {
+    const double longest = bounding_box(meshes[p].mesh.world).size().maxCoeff();
     if (longest / spacing > 1e6)
       throw InputError(fmt::format(
           "size {} would cut part \"{}\" into more than a million cells along one side; choose a larger size",
@@ -138,16 +153,17 @@ void measure(const std::vector<HealedPart>& meshes, VoxelizeResult& result) {
   }
 }
 
-std::vector<HealedPart> heal_parts(const Surface& surface, const HealChoice& how) {
+// The parts, healed; the polygons of `surface` face as they do then.
+std::vector<HealedPart> heal_parts(Surface& surface, const HealChoice& how) {
   std::vector<HealedPart> healed;
   for (PartMesh& mesh : exact_part_meshes(surface))
     healed.push_back(heal(std::move(mesh), how, surface.parts[healed.size()].name));
+  face_outward(healed, surface);
   return healed;
 }
 
-// Inside and outside of a part whose mesh lies on the lattice.
-Voxels classify(HealedPart& part, const Lattice& lattice, const VoxelizeOptions& options,
-                const std::string& name) {
+// Inside and outside of a part whose mesh lies on the lattice; nothing where they cannot be told apart.
+std::optional<Voxels> classify(HealedPart& part, const Lattice& lattice, const VoxelizeOptions& options) {
   if (part.mesh.balanced()) {
     Voxels voxels = classify_closed(part.mesh, {.with_centres = options.placement == Placement::centre});
     if (!part.original.corners.empty()) {
@@ -159,18 +175,18 @@ Voxels classify(HealedPart& part, const Lattice& lattice, const VoxelizeOptions&
   if (options.heal.mode == Heal::none) {
     Voxels voxels = classify_open(part.mesh);
     part.done.by = Healing::By::vote;
-    if (voxels.piece_count() == 0) throw InputError(why_undecided(part, name));
+    if (voxels.piece_count() == 0) return std::nullopt;
     return voxels;
   }
   Sampled sampled = classify_sampled(part.mesh, has_large_hole(part));
-  if (sampled.by == Sampled::By::nobody) throw InputError(why_undecided(part, name));
+  if (sampled.by == Sampled::By::nobody) return std::nullopt;
   part.done.by = sampled.by == Sampled::By::vote ? Healing::By::vote : Healing::By::flood;
   return std::move(sampled.voxels);
 }
 
-// One part onto the body.
-VoxelizedPart voxelize_part(HealedPart& healed, double spacing, const VoxelizeOptions& options,
-                            const std::string& name, Body& body, PolygonCells& polygon_cells) {
+// One part onto the body; nothing where its inside cannot be told from outside.
+std::optional<VoxelizedPart> voxelize_part(HealedPart& healed, double spacing, const VoxelizeOptions& options,
+                                           const std::string& name, Body& body, PolygonCells& polygon_cells) {
   const bool centre = options.placement == Placement::centre;
   PartMesh& mesh = healed.mesh;
   Part part;
@@ -179,14 +195,15 @@ VoxelizedPart voxelize_part(HealedPart& healed, double spacing, const VoxelizeOp
   part.placement = options.placement;
   part.lattice = align_lattice(mesh, spacing, options.align, centre);
   place_on_lattice(mesh, part.lattice);
-  const Voxels voxels = classify(healed, part.lattice, options, name);
-  const AssembledPart assembled = assemble_part(voxels, part, body, polygon_cells);
+  const std::optional<Voxels> voxels = classify(healed, part.lattice, options);
+  if (!voxels) return std::nullopt;
+  const AssembledPart assembled = assemble_part(*voxels, part, body, polygon_cells);
   if (assembled.elements == 0 && enclosed_volume(mesh) < 0)
     throw InputError(fmt::format("part \"{}\" is inside out; --heal auto turns it", name));
   if (assembled.elements == 0)
     throw InputError(fmt::format("nothing of part \"{}\" is left at size {}; choose a smaller size", name,
                                  human_length(spacing)));
-  return describe(healed, voxels, assembled, part);
+  return describe(healed, *voxels, assembled, part);
 }
 
 // All parts at one spacing.
@@ -194,12 +211,17 @@ VoxelizeResult build(Surface& surface, std::vector<HealedPart>& meshes, double s
                      const VoxelizeOptions& options, Progress& progress) {
   VoxelizeResult result;
   PolygonCells polygon_cells;
+  std::vector<UndecidedPart> open;
   for (std::size_t p = 0; p < meshes.size(); ++p) {
     check_stop();
     progress.update(static_cast<double>(p) / static_cast<double>(meshes.size()), surface.parts[p].name);
-    result.parts.push_back(
-        voxelize_part(meshes[p], spacing, options, surface.parts[p].name, result.body, polygon_cells));
+    if (auto part =
+            voxelize_part(meshes[p], spacing, options, surface.parts[p].name, result.body, polygon_cells))
+      result.parts.push_back(std::move(*part));
+    else
+      open.push_back({surface.parts[p].name, &meshes[p]});
   }
+  if (!open.empty()) throw undecided(open, meshes.size());
   Body& body = result.body;
   std::swap(body.surface, surface);
   if (options.placement == Placement::corner) {
@@ -308,6 +330,10 @@ VoxelizeResult voxelize(Surface surface, const VoxelizeOptions& options, Progres
   const double cells = total_cells(result, options.placement);
   check_memory(cells, limit, extents, options.placement);
   measure(meshes, result);
+  std::vector<double> cell;
+  for (const VoxelizedPart& part : result.parts) cell.push_back(part.spacing.maxCoeff());
+  result.pairs = noteworthy_pairs(meshes, cell);
+  refuse_duplicates(result.pairs, result.body.surface);
   result.simulation_memory = simulation_memory(cells, options.placement);
   progress.finish();
   return result;

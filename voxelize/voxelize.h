@@ -1,5 +1,6 @@
 // Surface -> Body: inside and outside, fill fractions, pieces, lattice.
 #pragma once
+#include <array>
 #include <optional>
 #include <string>
 
@@ -79,14 +80,24 @@ struct VoxelizedPart {
   std::size_t wall_samples = 0;      // places sampled
 };
 
+// Two parts that lie in each other, or that miss each other by less than a cell.
+struct PartPair {
+  std::array<std::uint32_t, 2> parts{};
+  bool same = false;   // one body twice
+  double overlap = 0;  // m^3 in both; 0: none
+  double gap = 0;      // m, where nothing is in both
+};
+
 struct VoxelizeResult {
   Body body;
   std::vector<VoxelizedPart> parts;
+  std::vector<PartPair> pairs;
   double simulation_memory = 0;  // bytes that simulate will need at equilibrium, estimated
 };
 
-// Voxelises every part of `surface`, which is moved into the body. Throws InputError: no size that fits the
-// part (a spacing larger than it), nothing inside, memory beyond the limit (before allocating).
+// Voxelises every part of `surface`, which is moved into the body, its polygons turned outward (outward.h).
+// Throws InputError: no size that fits the part (a spacing larger than it), nothing inside, memory beyond the
+// limit (before allocating), two parts that are one body in one place.
 [[nodiscard]] VoxelizeResult voxelize(Surface surface, const VoxelizeOptions& options, Progress& progress);
 
 // Says what was found, a few lines a part.
@@ -94,9 +105,16 @@ void report(const VoxelizeResult& result, Progress& progress);
 // The same as JSON, in SI units (docs/voxelize.md).
 [[nodiscard]] std::string summary_json(const VoxelizeResult& result);
 
-// Thinnest wall of each part, measured along rays through the surface on a grid of `rays` lines per axis:
-// distance between an entry and the next exit whose normals oppose each other, times the cosine to the ray.
-// Healed as the voxelizer does (Heal::automatic); nothing where a part is not closed then.
-[[nodiscard]] std::vector<std::optional<ThinWall>> thinnest_walls(const Surface& surface, int rays = 256);
+// A part as healing makes it, without a lattice.
+struct MeasuredPart {
+  std::optional<double> volume;  // m^3, of the union where shells interpenetrate; none where it stays open
+  std::optional<ThinWall> thinnest;
+  Healing healing;
+};
+// Heals every part as the voxelizer does (Heal::automatic), turns the polygons of `surface` outward
+// (outward.h), and measures: the volume, and the thinnest wall along rays through the surface on a grid of
+// `rays` lines per axis: distance between an entry and the next exit whose normals oppose each other, times
+// the cosine to the ray.
+[[nodiscard]] std::vector<MeasuredPart> heal_and_measure(Surface& surface, int rays = 256);
 
 }  // namespace flexel

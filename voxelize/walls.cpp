@@ -3,10 +3,13 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "voxelize/heal.h"
 #include "voxelize/lines.h"
+#include "voxelize/outward.h"
+#include "voxelize/overlap.h"
 #include "voxelize/voxelize.h"
 
 namespace flexel {
@@ -66,16 +69,23 @@ std::size_t thinnest_sample(const std::vector<WallSample>& samples) {
   return static_cast<std::size_t>(least - samples.begin());
 }
 
-std::vector<std::optional<ThinWall>> thinnest_walls(const Surface& surface, int rays) {
-  std::vector<std::optional<ThinWall>> result;
-  for (PartMesh& unhealed : exact_part_meshes(surface)) {
-    result.emplace_back();
-    const PartMesh mesh = heal(std::move(unhealed), {}, "").mesh;
+std::vector<MeasuredPart> heal_and_measure(Surface& surface, int rays) {
+  std::vector<HealedPart> healed;
+  for (PartMesh& mesh : exact_part_meshes(surface)) healed.push_back(heal(std::move(mesh), {}, ""));
+  face_outward(healed, surface);
+  std::vector<MeasuredPart> result(healed.size());
+  for (std::size_t p = 0; p < healed.size(); ++p) {
+    const PartMesh& mesh = healed[p].mesh;
+    result[p].healing = healed[p].done;
     if (mesh.corners.empty() || !mesh.balanced()) continue;
+    result[p].volume = enclosed_volume(mesh);
+    constexpr double kLinesDiffer = .01;  // lines alone may be off by that around thin walls
+    const double joined = mesh.shell_count > 1 ? union_volume(mesh) : *result[p].volume;
+    if (std::abs(joined - *result[p].volume) > kLinesDiffer * joined) result[p].volume = joined;
     const std::vector<WallSample> samples = wall_samples(mesh, rays);
     if (samples.empty()) continue;
     const WallSample& least = samples[thinnest_sample(samples)];
-    result.back() = ThinWall{least.thickness, least.where, static_cast<std::uint32_t>(result.size() - 1)};
+    result[p].thinnest = ThinWall{least.thickness, least.where, static_cast<std::uint32_t>(p)};
   }
   return result;
 }

@@ -41,20 +41,64 @@ std::string_view beginning(const ImportInput& input, std::size_t size) {
   return {reinterpret_cast<const char*>(input.bytes.data()), std::min(size, input.bytes.size())};
 }
 
-bool begins_with_word(std::string_view text, std::string_view word) {
-  std::size_t at = 0;
-  while (at < text.size() && std::isspace(static_cast<unsigned char>(text[at])) != 0) ++at;
-  return text.size() - at >= word.size() &&
-         std::equal(word.begin(), word.end(), text.begin() + static_cast<std::ptrdiff_t>(at),
-                    [](char w, char t) { return w == std::tolower(static_cast<unsigned char>(t)); });
-}
-
 // A binary STL of n triangles is 84 + 50 n bytes long.
 bool sized_like_binary_stl(const ImportInput& input) {
   if (input.bytes.size() < 84) return false;
   std::uint32_t count = 0;
   std::copy_n(input.bytes.data() + 80, 4, reinterpret_cast<std::byte*>(&count));
   return input.bytes.size() == 84 + std::size_t{50} * count;
+}
+
+// The encoding of text whose characters are two or four bytes wide, by where its bytes are 0; "" for others.
+std::string wide_encoding(const ImportInput& input) {
+  constexpr std::size_t kLooked = 256;
+  const std::size_t size = std::min(input.bytes.size(), kLooked) / 4 * 4;
+  std::array<std::size_t, 4> zeros{};
+  for (std::size_t i = 0; i < size; ++i) zeros[i % 4] += input.bytes[i] == std::byte{0};
+  std::array<bool, 4> blank{};  // bytes of a place in the character that are 0 but for a few
+  for (std::size_t i = 0; i < 4; ++i) blank[i] = size > 0 && 10 * zeros[i] >= 9 * (size / 4);
+  const auto is = [&](bool a, bool b, bool c, bool d) { return blank == std::array{a, b, c, d}; };
+  if (is(false, true, false, true)) return "UTF-16LE";
+  if (is(true, false, true, false)) return "UTF-16BE";
+  if (is(false, true, true, true)) return "UTF-32LE";
+  if (is(true, true, true, false)) return "UTF-32BE";
+  return "";
+}
+
+// Takes off the mark of UTF-8 at the front, which says nothing, and refuses wider characters.
+void check_encoding(ImportInput& input) {
+  constexpr std::array kMark = {std::byte{0xef}, std::byte{0xbb}, std::byte{0xbf}};
+  if (sized_like_binary_stl(input)) return;
+  if (const std::string encoding = wide_encoding(input); !encoding.empty())
+    throw InputError(input.where,
+                     fmt::format("is text in {}, which is not read: save it as UTF-8 (iconv -f {} "
+                                 "-t UTF-8 {} > NEW)",
+                                 encoding, encoding, input.file));
+  if (input.bytes.size() >= kMark.size() && std::equal(kMark.begin(), kMark.end(), input.bytes.begin()))
+    input.bytes.erase(input.bytes.begin(), input.bytes.begin() + kMark.size());
+}
+
+// No text holds a NUL, but some writers pad its end with them.
+void check_text(const ImportInput& input, const std::string& format) {
+  const bool text =
+      format == "obj" || format == "off" || format == "step" || format == "iges" ||
+      (format == "ply" && beginning(input, 4096).find("format ascii") != std::string_view::npos);
+  if (!text) return;
+  const auto begin = input.bytes.begin();
+  const auto nul = std::find(begin, input.bytes.end(), std::byte{0});
+  if (std::all_of(nul, input.bytes.end(), [](std::byte byte) { return byte == std::byte{0}; })) return;
+  throw InputError(
+      fmt::format("{}:{}", input.where, 1 + std::count(begin, nul, static_cast<std::byte>('\n'))),
+      "holds a byte that is 0, which no text has: the file is damaged, or in another format or encoding; "
+      "export it anew, in UTF-8");
+}
+
+bool begins_with_word(std::string_view text, std::string_view word) {
+  std::size_t at = 0;
+  while (at < text.size() && std::isspace(static_cast<unsigned char>(text[at])) != 0) ++at;
+  return text.size() - at >= word.size() &&
+         std::equal(word.begin(), word.end(), text.begin() + static_cast<std::ptrdiff_t>(at),
+                    [](char w, char t) { return w == std::tolower(static_cast<unsigned char>(t)); });
 }
 
 // The first line that is neither empty nor a comment begins with a word of OBJ.
@@ -182,7 +226,9 @@ HashedSurface read_and_hash(ImportInput& input, const std::string& format, const
 
 Surface import_surface(const std::string& path, const ImportOptions& options) {
   ImportInput input = load(path);
+  check_encoding(input);
   const std::string format = format_of(input, options, path);
+  check_text(input, format);
   HashedSurface read = read_and_hash(input, format, options);
   Surface& surface = read.surface;
   surface.sources.at(0).file = input.file;

@@ -26,6 +26,7 @@
 #include <cmath>
 #include <utility>
 
+#include "formats/area_vector.h"
 #include "formats/disjoint_sets.h"
 #include "formats/error.h"
 #include "formats/import/crash_guard.h"
@@ -217,19 +218,16 @@ void add_solid(Surface& surface, const TopoDS_Shape& solid, double unit, const S
   orient_outward(surface, first_polygon);
 }
 
-// Default for the largest edge: a share of the solid's diagonal.
+// Default for the largest edge: a share of the diagonal of all solids together. A lattice has cells of one
+// size for all of them, so the bolts of a machine need no finer mesh than its frame to bend as their cells
+// do.
 constexpr double kDefaultEdges = 64;
 
-// Subdivides the last solid. Without a limit of the user's it gets its share of the triangles and what edges
-// they allow.
-void refine(Surface& surface, std::size_t first_polygon, std::size_t solids, const ImportOptions& options,
-            const ImportInput& input) {
-  if (options.largest_edge) return subdivide(surface, first_polygon, *options.largest_edge, input.where);
-  Box box;
-  for (std::size_t i = surface.polygon_offsets[first_polygon]; i < surface.polygon_vertices.size(); ++i)
-    box.add(surface.vertices[surface.polygon_vertices[i]]);
-  const double largest = box.size().norm() / kDefaultEdges;
-  if (largest > 0) static_cast<void>(subdivide(surface, first_polygon, largest, kMostTriangles / solids));
+// Without a limit of the user's the edges become as short as kMostTriangles allow.
+void refine(Surface& surface, const ImportOptions& options, const ImportInput& input) {
+  if (options.largest_edge) return subdivide(surface, 0, *options.largest_edge, input.where);
+  const double largest = bounding_box(surface.vertices).diagonal() / kDefaultEdges;
+  if (largest > 0) static_cast<void>(subdivide(surface, 0, largest, kMostTriangles));
 }
 
 // The colours of the faces as those of their polygons; white where there is none.
@@ -253,12 +251,10 @@ Surface mesh_of(const TopoDS_Shape& shape, double unit, const ShapeLabels& label
   surface.polygon_offsets.push_back(0);
   std::vector<std::optional<ShapeColor>> colors;  // (faces)
   for (const TopoDS_Shape& solid : solids) {
-    const std::size_t first_polygon = surface.polygon_count();
     tessellate(solid, unit, options, input);
     add_solid(surface, solid, unit, labels, colors);
-    if (surface.polygon_count() > first_polygon)
-      refine(surface, first_polygon, solids.size(), options, input);
   }
+  refine(surface, options, input);
   add_colors(surface, colors);
   return surface;
 }

@@ -1,6 +1,8 @@
 // STEP through OpenCASCADE, which only this file, step_names.cpp and the other readers of its formats see.
 #include <fmt/format.h>
 
+#include <BRepCheck_Analyzer.hxx>
+#include <BRep_Tool.hxx>
 #include <Interface_Check.hxx>
 #include <Interface_CheckIterator.hxx>
 #include <Interface_InterfaceModel.hxx>
@@ -8,11 +10,17 @@
 #include <Message.hxx>
 #include <Message_Messenger.hxx>
 #include <STEPControl_Reader.hxx>
+#include <Standard_Version.hxx>
 #include <StepGeom_GeometricRepresentationItem.hxx>
 #include <StepRepr_Representation.hxx>
+#include <StepShape_SolidModel.hxx>
 #include <StepShape_TopologicalRepresentationItem.hxx>
 #include <TCollection_HAsciiString.hxx>
+#include <TopExp_Explorer.hxx>
 #include <TopoDS_Shape.hxx>
+#include <TransferBRep.hxx>
+#include <Transfer_TransientProcess.hxx>
+#include <XSControl_TransferReader.hxx>
 #include <XSControl_WorkSession.hxx>
 
 #include "formats/error.h"
@@ -54,38 +62,84 @@ void check_references(const Handle(Interface_InterfaceModel) & model, const Impo
   for (Standard_Integer i = 1; i <= check->NbWarnings(); ++i) examine(check->CWarning(i));
 }
 
-// OpenCASCADE loads what it can and later follows the references that are missing, so a solid of which a part
-// did not load is refused here. Damage elsewhere in the file (drawings, tolerances, colours) does no harm.
-void check_loaded(const STEPControl_Reader& reader, const ImportInput& input) {
+// OpenCASCADE loads what it can and later follows the references that are missing, so a file with such is
+// refused, and so is one whose solids or representations did not load. Returns what did not load of the
+// geometry below them, "" for nothing. Damage elsewhere in the file (drawings, tolerances, colours) does no
+// harm.
+std::string check_loaded(const STEPControl_Reader& reader, const ImportInput& input) {
   const Handle(Interface_InterfaceModel) model = reader.WS()->Model();
   check_references(model, input);
+  std::string damage;
   const Interface_CheckIterator checks = reader.WS()->ModelCheckList(Standard_False);
   for (checks.Start(); checks.More(); checks.Next()) {
     if (!checks.Value()->HasFailed() || checks.Number() < 1) continue;
     const Handle(Standard_Transient) entity = model->Value(checks.Number());
-    if (is_geometry(entity))
-      throw InputError(input.where,
-                       damage_message(fmt::format("{}: {}", model->StringLabel(entity)->ToCString(),
-                                                  checks.Value()->CFail(1))));
+    if (!is_geometry(entity)) continue;
+    const std::string found =
+        fmt::format("{}: {}", model->StringLabel(entity)->ToCString(), checks.Value()->CFail(1));
+    if (!entity->IsKind(STANDARD_TYPE(StepGeom_GeometricRepresentationItem)) ||
+        entity->IsKind(STANDARD_TYPE(StepShape_SolidModel)))
+      throw InputError(input.where, damage_message(found));
+    if (damage.empty()) damage = found;
   }
+  return damage;
 }
 
-TopoDS_Shape transfer(STEPControl_Reader& reader, ImportInput& input) {
+// Whether every solid of the file came out, closed and valid.
+bool solids_are_sound(const STEPControl_Reader& reader, const TopoDS_Shape& shape) {
+  const Handle(Interface_InterfaceModel) model = reader.WS()->Model();
+  const Handle(Transfer_TransientProcess) process = reader.WS()->TransferReader()->TransientProcess();
+  bool any = false;
+  for (Standard_Integer i = 1; i <= model->NbEntities(); ++i) {
+    if (!model->Value(i)->IsKind(STANDARD_TYPE(StepShape_SolidModel))) continue;
+    const TopoDS_Shape solid = TransferBRep::ShapeResult(process, model->Value(i));
+    if (solid.IsNull() || solid.ShapeType() != TopAbs_SOLID) return false;
+    for (TopExp_Explorer shells(solid, TopAbs_SHELL); shells.More(); shells.Next())
+      if (!BRep_Tool::IsClosed(shells.Current())) return false;
+    any = true;
+  }
+  return any && BRepCheck_Analyzer(shape).IsValid();
+}
+
+TopoDS_Shape transfer(STEPControl_Reader& reader, ImportInput& input, const ImportOptions& options) {
   // OpenCASCADE reports on stdout, which belongs to the result.
   Message::DefaultMessenger()->ChangePrinters().Clear();
   Interface_Static::SetCVal("xstep.cascade.unit", "MM");
   MemoryStream stream(input.bytes);
   if (reader.ReadStream(input.file.c_str(), stream) != IFSelect_RetDone)
     throw InputError(input.where, "is damaged: OpenCASCADE cannot make sense of it as STEP");
-  check_loaded(reader, input);
+  const std::string damage = check_loaded(reader, input);
   reader.TransferRoots();
-  return reader.OneShape();
+  const TopoDS_Shape shape = reader.OneShape();
+  if (damage.empty()) return shape;
+  if (shape.IsNull() || !solids_are_sound(reader, shape))
+    throw InputError(input.where, damage_message(damage));
+  if (options.warn)
+    options.warn(
+        fmt::format("{} {}; its solids are closed and valid all the same: compare their volume with "
+                    "that in the CAD program",
+                    input.file, damage_message(damage)));
+  return shape;
+}
+
+// OpenCASCADE passes over the triangles of AP242 without a word (release 7.7 reads them).
+void refuse_tessellated(const ImportInput& input) {
+  const std::string_view text(reinterpret_cast<const char*>(input.bytes.data()), input.bytes.size());
+  for (const char* kind :
+       {"TESSELLATED_SOLID", "TESSELLATED_SHELL", "TRIANGULATED_FACE", "TRIANGULATED_SURFACE_SET"})
+    if (text.find(kind) != std::string_view::npos)
+      throw InputError(
+          input.where,
+          fmt::format("holds tessellated geometry only ({}), which OpenCASCADE " OCC_VERSION_COMPLETE
+                      " does not read: export the part with its exact geometry (B-rep), or as STL",
+                      kind));
 }
 
 Surface read_solids(ImportInput& input, const ImportOptions& options) {
   constexpr double kMillimetre = 1e-3;
   STEPControl_Reader reader;
-  const TopoDS_Shape shape = transfer(reader, input);
+  const TopoDS_Shape shape = transfer(reader, input, options);
+  if (shape.IsNull()) refuse_tessellated(input);
   const StepNames names(reader);
   Surface surface = mesh_of(shape, kMillimetre,
                             {[&](const TopoDS_Shape& solid) { return names.solid(solid); },

@@ -10,8 +10,10 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <numeric>
 
+#include "formats/disjoint_sets.h"
 #include "formats/error.h"
 #include "formats/import/readers.h"
 #include "formats/parallel.h"
@@ -49,18 +51,31 @@ void add_solid(Surface& surface, std::size_t triangles, double unit, const Posit
       1 << 15);
 }
 
-// Offsets, parts' polygons and faces, once all solids are in.
-void finish(Surface& surface, const std::vector<std::size_t>& solid_sizes) {
+// Offsets, parts' polygons and faces, once all solids are in: those of a part of several patches are its
+// patches.
+struct Patches {
+  std::vector<std::size_t> triangles;  // (patches)
+  std::vector<std::uint32_t> part;     // (patches)
+  std::vector<std::string> name;       // (patches)
+};
+
+void finish(Surface& surface, const Patches& patches) {
   const std::size_t triangles = surface.polygon_vertices.size() / 3;
   surface.polygon_offsets.resize(triangles + 1);
   for (std::size_t t = 0; t <= triangles; ++t) surface.polygon_offsets[t] = static_cast<std::uint32_t>(3 * t);
-  std::vector<std::uint32_t> polygon_part;
+  std::vector<std::uint32_t> polygon_part, polygon_patch;
   polygon_part.reserve(triangles);
-  for (std::size_t s = 0; s < solid_sizes.size(); ++s)
-    polygon_part.insert(polygon_part.end(), solid_sizes[s], static_cast<std::uint32_t>(s));
+  polygon_patch.reserve(triangles);
+  for (std::uint32_t p = 0; p < patches.triangles.size(); ++p) {
+    polygon_part.insert(polygon_part.end(), patches.triangles[p], patches.part[p]);
+    polygon_patch.insert(polygon_patch.end(), patches.triangles[p], p);
+  }
   std::vector<std::uint32_t> welded(surface.vertices.size());
   std::iota(welded.begin(), welded.end(), 0u);
-  assign_dihedral_faces(surface, polygon_part, welded);
+  if (surface.parts.size() == patches.triangles.size())
+    assign_dihedral_faces(surface, polygon_part, welded);
+  else
+    assign_group_faces(surface, polygon_part, polygon_patch, patches.name, welded);
 }
 
 // --- binary
@@ -118,7 +133,7 @@ Surface read_binary(const ImportInput& input, const ImportOptions& options) {
         const auto xyz = floats(c);
         return position_key(xyz[0], xyz[1], xyz[2]);
       });
-  finish(surface, {triangles});
+  finish(surface, {{triangles}, {0}, {""}});
   return surface;
 }
 
@@ -129,7 +144,14 @@ char lower(char c) {
 }
 
 bool blank(char c) {
-  return c == ' ' || (c >= '\t' && c <= '\r') || c == '\0' || c == '\x1a';
+  return c == ' ' || (c >= '\t' && c <= '\r');
+}
+
+// The file as text, without the NULs or the end-of-file mark of CP/M that some writers pad it with.
+std::string_view text_of(const ImportInput& input) {
+  std::string_view text(reinterpret_cast<const char*>(input.bytes.data()), input.bytes.size());
+  while (!text.empty() && (text.back() == '\0' || text.back() == '\x1a')) text.remove_suffix(1);
+  return text;
 }
 
 // Words of a text, with the line they are on.
@@ -222,28 +244,87 @@ AsciiSolid read_solid(Words& words, std::size_t& triangles) {
   return solid;
 }
 
-Surface read_ascii(const ImportInput& input, const ImportOptions& options) {
-  Words words({reinterpret_cast<const char*>(input.bytes.data()), input.bytes.size()}, input.where);
-  Surface surface;
-  surface.sources.push_back(unitless_source("stl-ascii", options));
-  std::vector<std::size_t> sizes;
+std::vector<AsciiSolid> read_solids(const ImportInput& input) {
+  Words words(text_of(input), input.where);
+  std::vector<AsciiSolid> solids;
   std::size_t triangles = 0;
   for (std::string_view word = words.next(); !word.empty(); word = words.next()) {
     if (!Words::same(word, "solid"))
       words.fail(fmt::format("\"solid\" expected, \"{}\" found", clean_name(word.substr(0, 40))));
-    const AsciiSolid solid = read_solid(words, triangles);
-    if (solid.corners.empty()) continue;
-    add_solid(
-        surface, solid.corners.size() / 3, surface.sources[0].unit,
-        [&](std::size_t c) { return solid.corners[c]; },
-        [&](std::size_t c) {
-          return position_key(solid.corners[c].x(), solid.corners[c].y(), solid.corners[c].z());
-        });
-    surface.parts.push_back({solid.name});
-    sizes.push_back(solid.corners.size() / 3);
+    AsciiSolid solid = read_solid(words, triangles);
+    if (!solid.corners.empty()) solids.push_back(std::move(solid));
   }
-  if (triangles == 0) throw InputError(input.where, "holds no triangles");
-  finish(surface, sizes);
+  if (solids.empty()) throw InputError(input.where, "holds no triangles");
+  return solids;
+}
+
+PositionKey key_of(const Vec3& position) {
+  return position_key(position.x(), position.y(), position.z());
+}
+
+// Solids that have an open edge in common are patches of one surface, as mesh generators write a body's
+// boundary conditions: the first solid of the body that each belongs to (solids).
+std::vector<std::uint32_t> bodies_of(const std::vector<AsciiSolid>& solids) {
+  std::vector<std::uint32_t> body(solids.size());
+  std::iota(body.begin(), body.end(), 0u);
+  if (solids.size() < 2) return body;
+  std::vector<Vec3> corners;
+  for (const AsciiSolid& solid : solids)
+    corners.insert(corners.end(), solid.corners.begin(), solid.corners.end());
+  const std::vector<std::uint32_t> vertex =
+      first_equal(corners.size(), [&](std::size_t c) { return key_of(corners[c]); });
+  struct Edge {
+    std::uint32_t low, high, solid;
+    auto operator<=>(const Edge&) const = default;
+  };
+  std::vector<Edge> edges;
+  std::size_t corner = 0;
+  for (std::uint32_t s = 0; s < solids.size(); ++s)
+    for (std::size_t c = 0; c < solids[s].corners.size(); ++c, ++corner) {
+      const std::size_t next = c % 3 == 2 ? corner - 2 : corner + 1;
+      const auto [low, high] = std::minmax(vertex[corner], vertex[next]);
+      if (low != high) edges.push_back({low, high, s});
+    }
+  parallel_sort(edges.begin(), edges.end(), std::less<>());
+  DisjointSets sets(solids.size());
+  for (std::size_t n = 0, end; n < edges.size(); n = end) {
+    std::uint32_t open = 0xffffffffu;  // the solid that is open at this edge
+    for (end = n; end < edges.size() && edges[end].low == edges[n].low && edges[end].high == edges[n].high;) {
+      const std::size_t first = end;
+      while (end < edges.size() && edges[end] == edges[first]) ++end;
+      if ((end - first) % 2 == 0) continue;
+      if (open != 0xffffffffu) sets.unite(open, edges[first].solid);
+      open = edges[first].solid;
+    }
+  }
+  for (std::uint32_t s = 0; s < body.size(); ++s) body[s] = sets.root(s);
+  return body;
+}
+
+Surface read_ascii(const ImportInput& input, const ImportOptions& options) {
+  const std::vector<AsciiSolid> solids = read_solids(input);
+  const std::vector<std::uint32_t> body = bodies_of(solids);
+  Surface surface;
+  surface.sources.push_back(unitless_source("stl-ascii", options));
+  Patches patches;
+  for (std::uint32_t first = 0; first < solids.size(); ++first) {
+    if (body[first] != first) continue;
+    std::vector<Vec3> corners;
+    std::string name = solids[first].name;  // of all patches, else the file's
+    for (std::uint32_t s = first; s < solids.size(); ++s) {
+      if (body[s] != first) continue;
+      corners.insert(corners.end(), solids[s].corners.begin(), solids[s].corners.end());
+      patches.triangles.push_back(solids[s].corners.size() / 3);
+      patches.part.push_back(static_cast<std::uint32_t>(surface.parts.size()));
+      patches.name.push_back(solids[s].name);
+      if (solids[s].name != name) name.clear();
+    }
+    add_solid(
+        surface, corners.size() / 3, surface.sources[0].unit, [&](std::size_t c) { return corners[c]; },
+        [&](std::size_t c) { return key_of(corners[c]); });
+    surface.parts.push_back({name});
+  }
+  finish(surface, patches);
   return surface;
 }
 
@@ -251,8 +332,7 @@ Surface read_ascii(const ImportInput& input, const ImportOptions& options) {
 // count would be: many binary files begin with "solid" too.
 bool is_ascii(const ImportInput& input) {
   const std::size_t size = input.bytes.size();
-  const std::string_view text(reinterpret_cast<const char*>(input.bytes.data()),
-                              std::min<std::size_t>(size, 1024));
+  const std::string_view text = text_of(input).substr(0, 1024);
   std::size_t begin = 0;
   while (begin < text.size() && blank(text[begin])) ++begin;
   if (!Words::same(text.substr(begin, std::min<std::size_t>(5, text.size() - begin)), "solid")) return false;
@@ -261,7 +341,7 @@ bool is_ascii(const ImportInput& input) {
     std::memcpy(&count, input.bytes.data() + kHeaderSize, sizeof count);
     if (size == kPreambleSize + kRecordSize * count) return false;
   }
-  const auto binary = [](char c) { return (c >= 0 && c < ' ' && !blank(c)) || c == '\0'; };
+  const auto binary = [](char c) { return c >= 0 && c < ' ' && !blank(c); };
   return std::none_of(text.begin(), text.end(), binary);
 }
 

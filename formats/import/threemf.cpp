@@ -1,16 +1,19 @@
 // 3MF (3MF Consortium, "3D Manufacturing Format, Core Specification", 1.3): XML in a ZIP archive. Read with
 // libzip and pugixml; lib3mf, the format's own library, keeps coordinates in single precision
 // (docs/surfaces.md). Every mesh that the build shows is a part, an object shown twice two parts. Read of the
-// extensions: colour groups (materials), and meshes in other files of the archive (production). A row vector
-// times a 4 x 3 matrix transforms a point.
+// extensions: colour groups (materials), and meshes in other files of the archive (production). An object
+// that uses another extension which its file requires, and one whose matter is not triangles, is refused. A
+// row vector times a 4 x 3 matrix transforms a point.
 #include <fmt/format.h>
 
 #include <Eigen/LU>
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <pugixml.hpp>
+#include <sstream>
 #include <utility>
 
 #include "formats/error.h"
@@ -57,6 +60,40 @@ std::string normal_path(std::string_view path) {
   return std::string(path);
 }
 
+// "beamlattice" of "http://schemas.microsoft.com/3dmanufacturing/beamlattice/2017/02"; the namespace of
+// another kind as it is.
+std::string extension_name(std::string_view space) {
+  constexpr std::string_view kOurs = "/3dmanufacturing/";
+  const std::size_t at = space.find(kOurs);
+  if (at == std::string_view::npos) return clean_name(space);
+  const std::string_view name = space.substr(at + kOurs.size());
+  return clean_name(name.substr(0, name.find('/')));
+}
+
+// Extensions that a reader of shapes may pass over, or that this one reads: prefix to name of all others that
+// the model requires.
+std::map<std::string, std::string> unread_extensions(const pugi::xml_node& model) {
+  constexpr std::array<std::string_view, 4> kKnown = {"core", "production", "material", "trianglesets"};
+  std::map<std::string, std::string> unread;
+  std::istringstream prefixes{std::string(attribute(model, "requiredextensions"))};
+  for (std::string prefix; prefixes >> prefix;) {
+    const std::string name = extension_name(model.attribute(("xmlns:" + prefix).c_str()).value());
+    if (std::find(kKnown.begin(), kKnown.end(), name) == kKnown.end())
+      unread[prefix] = name.empty() ? prefix : name;
+  }
+  return unread;
+}
+
+// Whether the node, one of its attributes, or anything below it has the prefix.
+bool uses(const pugi::xml_node& node, const std::string& prefix) {
+  const auto has = [&](std::string_view name) { return name.starts_with(prefix + ":"); };
+  if (has(node.name())) return true;
+  for (const pugi::xml_attribute& found : node.attributes())
+    if (has(found.name())) return true;
+  return std::any_of(node.begin(), node.end(),
+                     [&](const pugi::xml_node& below) { return uses(below, prefix); });
+}
+
 class ThreeMfReader {
  public:
   explicit ThreeMfReader(const ImportInput& input) : input_(input), archive_(input.bytes, input.where) {}
@@ -87,6 +124,7 @@ class ThreeMfReader {
     pugi::xml_node node;
     std::map<std::string, pugi::xml_node, std::less<>> objects;
     std::map<std::string, std::vector<Rgba>, std::less<>> colors;  // of a group, by index
+    std::map<std::string, std::string> unread;                     // unread_extensions()
   };
 
   [[noreturn]] void fail(const std::string& what) const { throw InputError(input_.where, what); }
@@ -136,6 +174,7 @@ class ThreeMfReader {
     const pugi::xml_parse_result parsed = model.document.load_buffer(bytes->data(), bytes->size());
     if (!parsed) fail(fmt::format("is damaged: its XML does not parse ({})", parsed.description()));
     model.node = child(model.document, "model");
+    model.unread = unread_extensions(model.node);
     const pugi::xml_node resources = child(model.node, "resources");
     for (const pugi::xml_node& resource : resources.children()) {
       const std::string id(attribute(resource, "id"));
@@ -205,6 +244,7 @@ class ThreeMfReader {
     const pugi::xml_node object = found->second;
     const std::string own = clean_name(attribute(object, "name"));
     const std::string& name = own.empty() ? fallback : own;
+    check_readable(model, object, name.empty() ? id.second : name);
     if (const pugi::xml_node mesh = child(object, "mesh")) add_mesh(model, object, mesh, transform, name);
     for_each_child(child(object, "components"), "component", [&](const pugi::xml_node& component) {
       const std::string_view path = attribute(component, "path");
@@ -213,9 +253,33 @@ class ThreeMfReader {
     });
   }
 
+  // An object is its triangles, or its components, and nothing else that has matter.
+  void check_readable(const Model& model, const pugi::xml_node& object, const std::string& name) const {
+    constexpr const char* kCure = "export the part as a triangle mesh, or leave the object out of the build";
+    const pugi::xml_node mesh = child(object, "mesh");
+    if (const pugi::xml_node beams = child(child(mesh, "beamlattice"), "beams"))
+      fail(fmt::format(
+          "object \"{}\" is a lattice of {} beams (extension \"beamlattice\"), and only triangles "
+          "are read: {}",
+          name, std::distance(beams.begin(), beams.end()), kCure));
+    for (const auto& [prefix, extension] : model.unread)
+      if (uses(object, prefix))
+        fail(
+            fmt::format("object \"{}\" uses the extension \"{}\", which the file requires and which is not "
+                        "read: {}",
+                        name, extension, kCure));
+    if (child(child(mesh, "triangles"), "triangle") || child(child(object, "components"), "component"))
+      return;
+    std::string instead;
+    for (const pugi::xml_node& found : object.children())
+      if (local(found.name()) != "mesh" && local(found.name()) != "metadatagroup")
+        instead = fmt::format(", only a \"{}\"", clean_name(local(found.name()).substr(0, 40)));
+    fail(fmt::format("object \"{}\" has no triangles{}: {}", name, instead, kCure));
+  }
+
   void add_mesh(const Model& model, const pugi::xml_node& object, const pugi::xml_node& mesh,
                 const Transform& transform, const std::string& name) {
-    const std::size_t first = surface_.vertices.size(), first_polygon = surface_.polygon_count();
+    const std::size_t first = surface_.vertices.size();
     std::vector<Vec3> own;
     for_each_child(child(mesh, "vertices"), "vertex", [&](const pugi::xml_node& vertex) {
       const std::string what = fmt::format("vertex {}: coordinate", own.size() + 1);
@@ -230,7 +294,6 @@ class ThreeMfReader {
       add_triangle(triangle, first, own.size(), mirrored);
       add_color(model, object, triangle);
     });
-    if (surface_.polygon_count() == first_polygon) return;
     for (const std::uint32_t vertex : weld(own))
       welded_.push_back(static_cast<std::uint32_t>(first + vertex));
     surface_.vertices.insert(surface_.vertices.end(), own.begin(), own.end());

@@ -226,6 +226,43 @@ TEST(Import3mf, DamageIsNamed) {
   EXPECT_THAT(import_error(scratch.write("e.3mf", good), options), HasSubstr("leave out --unit"));
 }
 
+// A required extension that is used must be understood, and matter that is no triangles is not left out.
+TEST(Import3mf, WhatIsNotReadIsRefusedByName) {
+  const Scratch scratch;
+  const auto error = [&](const std::string& required, const std::string& in_object, const std::string& mesh) {
+    std::string text = model("millimeter", "<object id=\"1\" name=\"foam\"" + in_object + mesh + "</object>",
+                             "<item objectid=\"1\"/>");
+    text = replaced(text, "xmlns:m=\"x\"",
+                    "xmlns:b=\"http://schemas.microsoft.com/3dmanufacturing/beamlattice/2017/02\" "
+                    "xmlns:s=\"http://schemas.microsoft.com/3dmanufacturing/slice/2015/07\" "
+                    "xmlns:p=\"http://schemas.microsoft.com/3dmanufacturing/production/2015/06\" "
+                    "xmlns:q=\"http://example.org/foam\" requiredextensions=\"" +
+                        required + "\"");
+    return import_error(scratch.write("a.3mf", threemf(text)));
+  };
+  EXPECT_EQ(error("p", " p:UUID=\"7\">", kMesh), "");
+  EXPECT_EQ(error("p s", ">", kMesh), "");  // required, but this object does without
+  EXPECT_THAT(error("p s", " s:slicestackid=\"2\">", kMesh),
+              HasSubstr("object \"foam\" uses the extension \"slice\", which the file requires"));
+  EXPECT_EQ(error("p", " s:slicestackid=\"2\">", kMesh), "");  // the triangles say the same
+  EXPECT_THAT(error("q", ">", replaced(kMesh, "<mesh>", "<mesh><q:pores/>")),
+              HasSubstr("the extension \"http://example.org/foam\""));
+  const std::string beams =
+      "<b:beamlattice><b:beams><b:beam v1=\"0\" v2=\"1\"/></b:beams></b:beamlattice></mesh>";
+  for (const char* required : {"b", ""})
+    EXPECT_THAT(error(required, ">", replaced(kMesh, "</mesh>", beams)),
+                HasSubstr("object \"foam\" is a lattice of 1 beams"));
+  EXPECT_THAT(error("", ">", "<q:foam/>"), HasSubstr("object \"foam\" has no triangles, only a \"foam\""));
+  EXPECT_THAT(error("", ">", "<mesh><vertices/><triangles/></mesh>"),
+              HasSubstr("object \"foam\" has no triangles"));
+}
+
+TEST(Import3mf, TheRealImplantsLatticeOfBeamsIsRefused) {
+  SKIP_WITHOUT_PARTS();
+  EXPECT_THAT(import_error(part_path("spinal_implant.3mf")),
+              HasSubstr("object \"Thick_lattice\" is a lattice of 11821 beams"));
+}
+
 TEST(Import3mf, TheRealBlockIsInInches) {
   SKIP_WITHOUT_PARTS();
   const Surface block = import_surface(part_path("featuretype.3MF"));

@@ -66,6 +66,38 @@ TEST(ImportStl, TheContentTellsTheFormatWhateverTheName) {
   expect_box(import_surface(scratch.write("wrong.obj", ascii_solid("a", unit_box()))), "ascii");
 }
 
+// Mesh generators write a body's boundary as one solid a patch: closed only when read together.
+TEST(ImportStl, SolidsThatCloseOnlyTogetherAreOnePart) {
+  const Scratch scratch;
+  const Facets box = unit_box();
+  const Facets rest(box.begin() + 4, box.end()), bottom(box.begin(), box.begin() + 2),
+      top(box.begin() + 2, box.begin() + 4);
+  const std::string other = ascii_solid("other", box_facets({5, 0, 0}, {6, 2, 4}));
+  const Surface surface =
+      import_surface(scratch.write("patched.stl", ascii_solid("inlet", bottom) + ascii_solid("wall", rest) +
+                                                      other + ascii_solid("outlet", top)));
+  ASSERT_EQ(surface.parts.size(), 2u);
+  EXPECT_EQ(surface.parts[0].name, "patched");
+  EXPECT_EQ(surface.parts[1].name, "other");
+  EXPECT_EQ(surface.vertices.size(), 16u);
+  EXPECT_TRUE(shape(surface).topology.closed());
+  ASSERT_EQ(surface.faces.size(), 3u + 6u);
+  EXPECT_EQ(surface.faces[0].name, "inlet");
+  EXPECT_EQ(surface.faces[1].name, "wall");
+  EXPECT_EQ(surface.faces[2].name, "outlet");
+  // Each alone stays what it is: an open part.
+  EXPECT_EQ(import_surface(scratch.write("open.stl", ascii_solid("wall", rest) + other)).parts.size(), 2u);
+}
+
+TEST(ImportStl, TheRealFlangeOfFourPatchesIsOnePart) {
+  SKIP_WITHOUT_PARTS();
+  const Surface flange = import_surface(part_path("flange.stl"));
+  ASSERT_EQ(flange.parts.size(), 1u);
+  EXPECT_EQ(flange.parts[0].name, "flange");
+  EXPECT_EQ(flange.faces.size(), 4u);
+  EXPECT_TRUE(shape(flange).topology.closed());
+}
+
 TEST(ImportStl, SolidsBecomePartsThatShareNoVertex) {
   const Scratch scratch;
   const std::string text = ascii_solid("left leg", unit_box()) + "solid empty\nendsolid\n" +

@@ -218,6 +218,19 @@ TEST(SubdivideStep, PartsAreSplitToASixtyFourthOfTheirDiagonal) {
   }
 }
 
+// A lattice has one spacing for all parts: a nut needs no edges of a 64th of itself.
+TEST(SubdivideStep, AnAssemblyIsSplitToASixtyFourthOfItsWhole) {
+  SKIP_WITHOUT_PARTS();
+  ImportOptions whole;
+  whole.largest_edge = std::numeric_limits<double>::infinity();
+  const std::string path = part_path("as1-oc-214.stp");
+  const Surface coarse = import_surface(path, whole), fine = import_surface(path);
+  EXPECT_EQ(fine.parts.size(), 18u);
+  EXPECT_LE(longest_edge(fine), bounding_box(coarse.vertices).diagonal() / 64 * (1 + 1e-12));
+  EXPECT_LT(fine.polygon_count(), 60'000u);  // 1,170,000 when each solid's own diagonal counted
+  EXPECT_NEAR(shape(fine).volume / shape(coarse).volume, 1, 1e-12);
+}
+
 TEST(SubdivideStep, TheLargestEdgeIsTheUsersAndTooManyTrianglesAreAnError) {
   SKIP_WITHOUT_PARTS();
   const std::string path = part_path("red_cube_blue_cylinder.step");

@@ -4,7 +4,7 @@ import json
 import os
 import struct
 
-from harness import bracket, box, expect, expect_error, expect_ok, expect_only, main, run, scene, write
+from harness import binary_stl, bracket, box, box_triangles, expect, expect_error, expect_ok, expect_only, main, run, scene, write
 
 CASE = ["--material", "steel", "--fix", "xmin", "--push", "xmax: 0 0 -100 N", "--count", "4000"]
 
@@ -105,9 +105,25 @@ def test_info_of_a_bracket():
 
 
 def test_info_of_an_open_part():
-    write("open.stl", b"".join([open(box(), "rb").read()[:80], struct.pack("<I", 11), open("box.stl", "rb").read()[84:84 + 550]]))
+    data = open(box(), "rb").read()
+    write("open.stl", data[:80] + struct.pack("<I", 11) + data[84:84 + 550])
     text = expect_ok(run("flexel", "info", "open.stl")).out.decode()
-    expect("NOT closed" in text and "3 open edges" in text and "volume     none" in text, text)
+    expect("NOT closed" in text and "3 open edges" in text and "volume     4000 mm^3" in text and "healed     1 hole filled" in text, text)
+    write("torn.stl", data[:80] + struct.pack("<I", 10) + data[84:84 + 500])
+    text = expect_ok(run("flexel", "info", "torn.stl")).out.decode()
+    expect("NOT closed" in text and "4 open edges" in text and "volume     none" in text, text)
+
+
+def test_info_is_that_of_the_healed_part():
+    triangles = [[a, c, b] if n % 2 else [a, b, c] for n, (a, b, c) in enumerate(box_triangles())]
+    for name, mesh in (("mixed.stl", triangles), ("inside_out.stl", [[a, c, b] for a, b, c in box_triangles()])):
+        write(name, binary_stl(mesh))
+        part = json.loads(expect_ok(run("flexel", "info", name, "--json")).out)["files"][0]["parts"][0]
+        expect(abs(part["volume"] / 4e-6 - 1) < 1e-6, f"{name}: volume {part['volume']}")
+        middle = [20e-3, 5e-3, 5e-3]
+        for face in part["faces"]:
+            outward = sum(n * (c - m) for n, c, m in zip(face["normal"], face["centroid"], middle))
+            expect(outward > 0, f"{name}: a face looks inward: {face}")
 
 
 def test_commands():

@@ -2,7 +2,7 @@
 
 import json
 
-from harness import ascii_stl, binary_stl, box_triangles, expect, expect_error, expect_ok, expect_only, main, run, write
+from harness import PARTS, Skip, ascii_stl, binary_stl, box_triangles, expect, expect_error, expect_ok, expect_only, main, run, write
 
 
 def grid_box(cells=8, size=40.0):
@@ -67,21 +67,107 @@ def test_a_part_inside_out_is_turned():
     expect_volume(part)
 
 
+def pressed(name, triangles):
+    """Displacements of a box that is pressed along the inward normal, by force, by pressure and by a move: largest, and its direction."""
+    write(name, binary_stl(triangles))
+    found = []
+    for push in (["--push", "ymax: 10 N"], ["--push", "ymax: 2 MPa"], ["--move", "ymax: 0.1 mm"]):
+        expect_ok(run("flexel", "deform", name, "--material", "steel", "--fix", "ymin", *push, "--size", "2.5 mm", "--no-estimate", "--summary",
+                      "summary.json", "-o", "out.obj", "--quiet"))
+        with open("out.obj", encoding="utf-8") as file:
+            found.append([float(line.split()[2]) for line in file if line.startswith("v ")])
+    return found
+
+
+def test_loads_along_the_normal_are_those_of_an_outward_box():
+    sound = box_triangles((10.0, 10.0, 10.0))
+    expected = pressed("sound.stl", sound)
+    for force in expected:
+        expect(min(force) >= -1e-9 and max(force) < 10, f"a push inward moves the top down: {force}")
+    one_a_face = [[a, c, b] if n % 2 else [a, b, c] for n, (a, b, c) in enumerate(sound)]
+    one = [[a, c, b] if n == 6 else [a, b, c] for n, (a, b, c) in enumerate(sound)]
+    for name, mesh in (("inside_out.stl", [[a, c, b] for a, b, c in sound]), ("one_a_face.stl", one_a_face), ("one.stl", one)):
+        got = pressed(name, mesh)
+        for mine, theirs in zip(got, expected):
+            # STL has no vertex order but that of the corners: compare the sorted heights.
+            expect(max(abs(a - b) for a, b in zip(sorted(mine), sorted(theirs))) < 1e-9, f"{name}: {sorted(mine)}, not {sorted(theirs)}")
+
+
+def test_a_real_part_with_turned_shells_is_pushed_inward():
+    """video_part.stl: 358 edges whose triangles face opposite ways; a push on ymax went outward."""
+    part = PARTS / "video_part.stl"
+    if not part.exists():
+        raise Skip("real parts are not there")
+    expect_ok(run("flexel", "deform", part, "--material", "steel", "--fix", "ymin", "--move", "ymax: 1 mm", "--count", "2000", "--no-estimate",
+                  "-o", "bent.obj", "--quiet"))
+    rest = expect_ok(run("flexel", "info", part, "--json"))
+    with open("bent.obj", encoding="utf-8") as file:
+        top = max(float(line.split()[2]) for line in file if line.startswith("v "))
+    before = json.loads(rest.out)["files"][0]["parts"][0]["max"][1] / 1e-3
+    expect(abs(before - 1 - top) < 0.2, f"the top went from {before} to {top} mm")
+
+
 def test_a_sheet_is_refused_with_what_to_do():
     sheet = [t for t in grid_box() if all(corner[2] == 0 for corner in t)]
     write("sheet.stl", ascii_stl(sheet, "plate"))
     for option in ("auto", "wrap", "none"):
         expect_error(run("flexel-voxelize", "sheet.stl", "--size", "4 mm", "--heal", option, "-o", "body.vtu"), "flexel-voxelize", "plate",
                      *{"auto": ["encloses no volume", "sheet", "open edges", "give it a thickness or close it"],
-                       "wrap": ["sheet", "close it", "wrap:"], "none": ["plate"]}[option])
+                       "wrap": ["sheet", "close it", "no wrap closes it"], "none": ["plate"]}[option])
         expect_only("sheet.stl")
 
 
 def test_an_open_box_is_refused_with_the_hole():
     write("part.stl", binary_stl([t for t in grid_box() if not all(corner[2] == 40 for corner in t)]))
     expect_error(run("flexel-voxelize", "part.stl", "--size", "4 mm", "-o", "body.vtu"), "flexel-voxelize",
-                 "inside cannot be told from outside", "32 open edges", "56.6 mm wide", "(20 mm, 20 mm, 40 mm)", "--heal wrap")
+                 "inside cannot be told from outside", "32 open edges", "56.6 mm wide", "(20 mm, 20 mm, 40 mm)", "--heal \"wrap:62.2 mm\"")
     expect_only("part.stl")
+    said, part = healed([t for t in grid_box() if not all(corner[2] == 40 for corner in t)], "--heal", "wrap:62.2 mm")  # as advised
+    expect(part["healing"]["wrapped"], f"{said}")
+
+
+def test_parts_among_each_other_are_told():
+    def block(low, high):
+        return [[tuple(c + l for c, l in zip(corner, low)) for corner in t]
+                for t in box_triangles(tuple(h - l for l, h in zip(low, high)))]
+
+    left = ascii_stl(block((0, 0, 0), (20, 10, 10)), "left")
+    for name, begin, words in (
+            ("overlap.stl", 18.0, ["parts \"left\" and \"right\" overlap: 200 mm^3 lies in both"]),
+            ("gap.stl", 20.3, ["parts \"left\" and \"right\" miss each other by 300 um", "[[bond]] with gap = \"315 um\""]),
+            ("wide.stl", 20.8, ["miss each other by 800 um", "close the gap in CAD"])):
+        write(name, left + ascii_stl(block((begin, 0, 0), (40, 10, 10)), "right"))
+        result = expect_ok(run("flexel-voxelize", name, "--size", "1 mm", "--summary", "summary.json", "-o", "body.vtu"))
+        for word in words:
+            expect(word in result.err, f"\"{word}\" is missing in {result.err}")
+        with open("summary.json", encoding="utf-8") as file:
+            summary = json.load(file)
+        found = summary["overlaps"] + summary["gaps"]
+        expect(len(found) == 1 and found[0]["parts"] == ["left", "right"], f"{summary['overlaps']} {summary['gaps']}")
+    # As advised.
+    write("scene.toml", b'''material = "steel"
+[[fix]]
+where = "xmin"
+[[load]]
+where = "xmax"
+force = ["1 N", "0 N", "0 N"]
+[[bond]]
+parts = ["left", "right"]
+gap = "315 um"
+''')
+    expect_ok(run("flexel", "deform", "gap.stl", "--scene", "scene.toml", "--size", "1 mm", "--no-estimate", "-o", "bent.stl"))
+    write("twice.stl", left + left.replace(b"left", b"again"))
+    expect_error(run("flexel-voxelize", "twice.stl", "--size", "1 mm", "-o", "none.vtu"), "flexel-voxelize", "\"left\" and \"again\"",
+                 "are one body twice in one place", "leave one of them out")
+
+
+def test_what_is_said_of_many_parts_is_said_once():
+    blocks = [[[tuple(c + s for c, s in zip(corner, (12.0 * n, 0, 0))) for corner in t] for t in box_triangles((10.0, 10.0, 10.0))] for n in range(8)]
+    write("many.stl", b"".join(ascii_stl([[a, c, b] for a, b, c in block], f"block{n}") for n, block in enumerate(blocks)))
+    said = expect_ok(run("flexel-voxelize", "many.stl", "--size", "2.5 mm", "-o", "body.vtu")).err
+    expect("8 parts: 1,000 elements, 512 cells of 2.5 mm" in said, said)
+    expect("healed in 8 of 8 parts (\"block0\", \"block1\", \"block2\", ...): 8 shells inside out and turned" in said, said)
+    expect(len(said.splitlines()) <= 10, said)
 
 
 def test_wrap_spans_what_it_is_told_to():

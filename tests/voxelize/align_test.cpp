@@ -20,6 +20,19 @@ TEST(Align, ATurnedBoxBecomesWholeFullCells) {
   }
 }
 
+// Files of merged facets have triangles with three corners in a line: they lie on no plane.
+TEST(Align, TrianglesWithoutAnAreaAreNoPlane) {
+  Mesh mesh = box({0, 0, 0}, {2, .7, .5});
+  mesh.vertices.insert(mesh.vertices.end(), {{.5, 0, 0}, {1.5, 0, 0}});  // on the edge (0, 1)
+  mesh.triangles[0] = {0, 2, 8};
+  mesh.triangles.push_back({8, 2, 9});
+  mesh.triangles.push_back({9, 2, 1});
+  // The side on the other face of that edge still has the whole edge: slivers stand between.
+  mesh.triangles.insert(mesh.triangles.end(), {{0, 8, 9}, {0, 9, 1}});
+  const VoxelizeResult result = run(mesh, .1, Align::snap);
+  EXPECT_EQ(result.parts[0].cells, 20u * 7u * 5u);
+}
+
 TEST(Align, WorldAxesStayExact) {
   const VoxelizeResult result = run(box({0, 0, 0}, {2, .7, .5}), .11, Align::snap);
   EXPECT_EQ(result.body.parts[0].lattice.axes, Mat3(Mat3::Identity()));

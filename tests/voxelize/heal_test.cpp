@@ -49,10 +49,14 @@ TEST(Heal, ACleanMeshIsLeftAlone) {
   EXPECT_EQ(healed.mesh.corners, part(mesh).corners);
 }
 
+// But for the polygons' orientation (outward_test.cpp).
 void expect_own_surface(const VoxelizeResult& result, const Mesh& mesh) {
   const Surface before = surface(mesh), &after = result.body.surface;
   EXPECT_EQ(after.vertices, before.vertices);
-  EXPECT_EQ(after.polygon_vertices, before.polygon_vertices);
+  EXPECT_EQ(after.polygon_offsets, before.polygon_offsets);
+  for (std::size_t p = 0; p < before.polygon_count(); ++p)
+    EXPECT_TRUE(std::is_permutation(before.polygon(p).begin(), before.polygon(p).end(),
+                                    after.polygon(p).begin(), after.polygon(p).end()));
   EXPECT_EQ(result.body.surface_cell_offsets.size(), before.polygon_offsets.size());
 }
 
@@ -172,11 +176,45 @@ TEST(Heal, ALargeHoleIsRefusedWithItsPlace) {
   open_box.triangles.erase(open_box.triangles.begin(), open_box.triangles.begin() + 2);
   const std::string message = refusal(open_box, .1);
   EXPECT_THAT(message, testing::HasSubstr("4 open edges, the largest hole 1.41 m wide"));
-  EXPECT_THAT(message, testing::HasSubstr("--heal wrap"));
+  EXPECT_THAT(message, testing::HasSubstr("--heal \"wrap:1.56 m\""));  // tried
   EXPECT_THAT(refusal(open_box, .1, Heal::wrap), testing::HasSubstr("an opening 1.41 m wide"));
   Mesh bitten = icosphere(4, 1);
   std::erase_if(bitten.triangles, [&](const auto& t) { return bitten.vertices[t[0]].z() > .7; });
   EXPECT_THAT(refusal(bitten, .1), testing::HasSubstr("the largest hole"));
+}
+
+// Walls inside matter have no outside: three triangles meet at their rims, and no edge is open.
+TEST(Heal, EdgesOfManyTrianglesAreNotCalledOpen) {
+  Mesh cells = box({0, 0, 0}, {1, 1, 1});
+  cells.triangles.push_back({1, 2, 6});
+  cells.triangles.push_back({1, 6, 5});
+  const std::string message = refusal(cells, .1);
+  EXPECT_THAT(message, testing::HasSubstr("edges where more than two triangles meet"));
+  EXPECT_THAT(message, testing::Not(testing::HasSubstr("open edge")));
+  EXPECT_THAT(message, testing::EndsWith("take a wrap of it: --heal wrap"));
+  EXPECT_GT(total_volume(run_healed(cells, .1, Heal::wrap)), 1);  // as advised
+}
+
+// All that is wrong, in one go.
+TEST(Heal, OpenPartsAreRefusedTogether) {
+  Mesh open_box = box({0, 0, 0}, {1, 1, 1});
+  open_box.triangles.erase(open_box.triangles.begin(), open_box.triangles.begin() + 2);
+  Surface parts = surface(open_box);
+  for (int n = 1; n < 7; ++n)
+    append(parts, surface(transformed(n == 3 ? box({0, 0, 0}, {1, 1, 1}) : open_box, Mat3::Identity(),
+                                      {2. * n, 0, 0})));
+  Progress progress("test", Progress::Mode::quiet);
+  VoxelizeOptions options;
+  options.size = .2;
+  try {
+    static_cast<void>(voxelize(parts, options, progress));
+    FAIL() << "not refused";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("in 6 of 7 parts: \"part\" (4 open edges"));
+    EXPECT_THAT(error.what(), testing::HasSubstr("\"part-5\""));
+    EXPECT_THAT(error.what(), testing::HasSubstr(" and 2 more; close them"));
+    EXPECT_THAT(error.what(), testing::HasSubstr("--heal wrap closes 0 of the 6 tried"));
+  }
 }
 
 // A ring of which a piece was torn out: two small holes, and an eighth of the volume missing between them.

@@ -47,7 +47,7 @@ TEST_F(Parts, ClosedOnesKeepTheirVolumeAtAThirdOfTheThinnestWall) {
         "Springy_Trigger.STL", "transmission_pulley_at3_t30_output.STL", "hip_aa_module_shell_cover.STL",
         "spot_triangulated.obj", "spot_quadrangulated.obj", "quadknot.obj", "yarn_guide.stl"}) {
     Surface surface = import_surface(kParts / file);
-    const auto wall = thinnest_walls(surface, 64)[0];
+    const auto wall = heal_and_measure(surface, 64)[0].thinnest;
     ASSERT_TRUE(wall) << file;
     // Not below 1/100 of the diagonal: a test takes seconds.
     VoxelizeOptions options;
