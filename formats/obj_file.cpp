@@ -96,6 +96,14 @@ std::string obj_name(std::string name) {
   return name;
 }
 
+// Of a face: the group's own name where the part came from OBJ, else "part/12".
+std::string written_group(const Surface& surface, std::uint32_t face, std::uint32_t number) {
+  const auto& [name, part] = surface.faces[face];
+  const bool own = !name.empty() && part < surface.part_source.size() &&
+                   surface.sources[surface.part_source[part]].format == "obj";
+  return obj_name(own ? name : fmt::format("{}/{}", surface.parts[part].name, number));
+}
+
 }  // namespace
 
 void rewrite_obj(const DeformedSurface& deformed, OutputFile& out) {
@@ -140,7 +148,7 @@ void write_new_obj(const DeformedSurface& deformed, OutputFile& out) {
     if (p == 0 || part != surface.polygon_part(p - 1))
       fmt::format_to(std::back_inserter(text), "o {}\n", name);
     if (p == 0 || face != surface.polygon_face[p - 1])
-      fmt::format_to(std::back_inserter(text), "g {}/{}\n", name, numbers[face]);
+      fmt::format_to(std::back_inserter(text), "g {}\n", written_group(surface, face, numbers[face]));
     text += 'f';
     for (const std::uint32_t vertex : surface.polygon(p))
       fmt::format_to(std::back_inserter(text), " {}", std::uint64_t{vertex} + 1);

@@ -33,13 +33,13 @@ int pieces_inside(double spacings) {
   return 3 * static_cast<int>(std::clamp(std::ceil(spacings / (3 * kLongEdge)), 1.0, kMostInside));
 }
 
-struct Candidate {
+struct LongTriangle {
   Triangle corners{};
   std::uint32_t polygon = 0, part = 0;
   double longest = 0, height = 0;  // m
 };
 
-struct Found {
+struct Missed {
   double largest = 0;  // m
   Vec3 at = Vec3::Zero();
   double displacement = 0;  // m, the largest of a point
@@ -59,7 +59,7 @@ bool spans_fracture(const Components& fragments, const MapResult& result, const 
 }
 
 // Triangles with a long edge.
-std::vector<Candidate> candidates(const Body& body, const MapResult& result) {
+std::vector<LongTriangle> long_triangles(const Body& body, const MapResult& result) {
   const Surface& surface = body.surface;
   std::vector<double> least;  // (parts) m
   for (const Part& part : body.parts) least.push_back(kLongEdge * part.lattice.spacing.minCoeff());
@@ -71,13 +71,13 @@ std::vector<Candidate> candidates(const Body& body, const MapResult& result) {
   };
   bool any = false;
   for (std::size_t p = 0; p < surface.polygon_count() && !any; ++p) any = may_be_long(p);
-  std::vector<Candidate> found;
+  std::vector<LongTriangle> found;
   if (!any) return found;
   std::optional<Components> fragments;
   if (may_be_broken(body)) fragments = find_components(body, element_adjacency(body));
   const Triangles triangles = triangulate(surface);
   for (std::size_t t = 0; t < triangles.corners.size(); ++t) {
-    Candidate each;
+    LongTriangle each;
     each.corners = triangles.corners[t];
     each.polygon = triangles.polygon[t];
     each.part = surface.polygon_part(each.polygon);
@@ -97,8 +97,8 @@ class Look {
  public:
   Look(const Body& body, const SpaceMap& map) : body_(body), probe_(map) {}
 
-  Found operator()(const Candidate& triangle) {
-    Found found;
+  Missed operator()(const LongTriangle& triangle) {
+    Missed found;
     const double spacing = body_.parts[triangle.part].lattice.spacing.minCoeff();
     std::array<Vec3, 3> rest, moved;
     for (std::size_t i = 0; i < 3; ++i) {
@@ -149,10 +149,10 @@ ChordError chord_error(const Body& body, const MapResult& result) {
   for (const Vec3& each : result.displacement)
     if (each.allFinite()) error.largest_displacement = std::max(error.largest_displacement, each.norm());
   if (body.position == body.rest) return error;
-  const std::vector<Candidate> triangles = candidates(body, result);
+  const std::vector<LongTriangle> triangles = long_triangles(body, result);
   if (triangles.empty()) return error;
   const SpaceMap map(body);
-  std::vector<Found> found(triangles.size());
+  std::vector<Missed> found(triangles.size());
   parallel_chunks(triangles.size(), kTrianglesAtATime, [&](std::size_t begin, std::size_t end) {
     Look look(body, map);
     for (std::size_t t = begin; t < end; ++t) found[t] = look(triangles[t]);
@@ -167,7 +167,7 @@ ChordError chord_error(const Body& body, const MapResult& result) {
     error.longest_edge = triangles[t].longest;
   }
   const double least = std::max(kCoarseShare * error.largest_displacement, kNoise * box.size().norm());
-  for (const Found& each : found) error.coarse_triangles += each.largest > least;
+  for (const Missed& each : found) error.coarse_triangles += each.largest > least;
   return error;
 }
 

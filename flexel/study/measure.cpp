@@ -16,8 +16,8 @@ namespace {
 
 constexpr double kTargets[] = {0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5};
 constexpr double kUsualTarget = 0.01;
-constexpr double kMostOrder = 3;         // cells close in with order 2: more is chance
-constexpr double kMostUncertain = 0.25;  // of the value: a reference that is known worse is none
+constexpr double kMostBelievedOrder = 3;  // cells close in with order 2: more is chance
+constexpr double kMostUncertain = 0.25;   // of the value: a reference that is known worse is none
 
 // Of three sizes. `believed`: false where they close in faster than cells can.
 Bar bar_of(const std::vector<SizeValue>& values, std::size_t finest, bool& believed) {
@@ -26,7 +26,7 @@ Bar bar_of(const std::vector<SizeValue>& values, std::size_t finest, bool& belie
   for (std::size_t i = 0; i < 2; ++i)
     sequence.ratio.at(i) = values[finest - i - 1].spacing / values[finest - i].spacing;
   const Bar bar = richardson(sequence);
-  believed = !bar.order || *bar.order <= kMostOrder;
+  believed = !bar.order || *bar.order <= kMostBelievedOrder;
   return believed ? bar : wide_bar(sequence);
 }
 

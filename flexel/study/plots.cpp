@@ -182,7 +182,7 @@ std::string error_script(const Study& study, const std::string& out) {
 }
 
 // The unit in which human_length() would write `metres`.
-std::pair<double, const char*> unit_of(double metres) {
+std::pair<double, const char*> shown_unit(double metres) {
   const std::pair<double, const char*> units[] = {{1, "m"}, {1e-3, "mm"}, {1e-6, "um"}, {1e-9, "nm"}};
   for (const auto& unit : units)
     if (metres >= unit.first) return unit;
@@ -198,8 +198,8 @@ std::string size_script(const Study& study, const std::string& out) {
   if (values.size() < 2) return "";
   double most = 0;
   for (const SizeValue& each : values) most = std::max(most, std::abs(each.value));
-  const auto [y_unit, y_name] = unit_of(most);
-  const auto [x_unit, x_name] = unit_of(values.front().spacing);
+  const auto [y_unit, y_name] = shown_unit(most);
+  const auto [x_unit, x_name] = shown_unit(values.front().spacing);
   std::string script = head("size", 860, 360);
   script += fmt::format(
       "set output '{}'\nset xlabel 'spacing of the lattice ({})'\nset ylabel {}\nset grid lt 1 lw 0.4 lc rgb "

@@ -47,6 +47,67 @@ TEST(StudyMeasure, AnExtrapolationThatMovesIsUncertain) {
   EXPECT_GE(found.uncertainty, 0.5 * std::abs(found.value - before.value));
 }
 
+// Cells close in with order 2: an order of 5 is chance, and the finest two say nothing of the limit.
+TEST(StudyMeasure, OrdersThatCellsDoNotHaveAreNotBelieved) {
+  // 13 % below the truth of 1, though the last two differ by half a percent.
+  const std::vector<SizeValue> values = {{4, 0.72}, {3, 0.865}, {2.5, 0.87}};
+  const Reference found = extrapolate("tip", "m", values);
+  EXPECT_FALSE(found.order);
+  EXPECT_DOUBLE_EQ(found.value, 0.87);
+  EXPECT_GE(found.uncertainty, 0.13);
+  EXPECT_NE(found.from.find("faster than cells"), std::string::npos);
+  EXPECT_FALSE(found.doubt.empty());  // 50 % is no reference
+  for (const double order : {2.3, 2.9}) {
+    const Reference near = extrapolate("tip", "m", sequence(5, 0.3, order, {4, 2, 1}));
+    ASSERT_TRUE(near.order);
+    EXPECT_LE(std::abs(near.value - 5), near.uncertainty);
+  }
+  EXPECT_FALSE(extrapolate("tip", "m", sequence(5, 0.3, 4.8, {4, 2, 1})).order);
+}
+
+TEST(StudyMeasure, SizesCoarserThanTheWallsCarryNoReference) {
+  std::vector<SizeValue> values = sequence(5, 0.3, 2, {8, 4, 2, 1, 0.5});
+  values[0].value = values[1].value = -20;  // they would spoil it
+  values[0].resolved = values[1].resolved = false;
+  const Reference found = extrapolate("tip", "m", values);
+  EXPECT_NEAR(found.value, 5, 1e-9);
+  EXPECT_TRUE(found.doubt.empty());
+  values[2].resolved = false;
+  const Reference none = extrapolate("tip", "m", values);
+  EXPECT_FALSE(none.order);
+  EXPECT_DOUBLE_EQ(none.value, values.back().value);
+  EXPECT_NE(none.doubt.find("only 2 of 5 sizes"), std::string::npos) << none.doubt;
+}
+
+TEST(StudyMeasure, WithoutAReferenceThereIsNoErrorButARange) {
+  Reference tip = extrapolate("tip", "m", {{4, 1e-3, false}, {2, 1.4e-3, false}, {1, 2e-3, false}});
+  EXPECT_TRUE(doubtful_sentences({tip}).empty());  // it does not decide
+  tip.decides = true;
+  RunResult run;
+  run.quantities = {{"tip", "m", 2e-3}};
+  EXPECT_FALSE(error_of(run, {tip}));
+  const std::vector<std::string> said = doubtful_sentences({tip});
+  ASSERT_EQ(said.size(), 3u);
+  EXPECT_EQ(
+      said[0],
+      "The error of no run is known: only 0 of 3 sizes have two cells or more through the walls, and three "
+      "are needed.");
+  EXPECT_EQ(said[1], "tip: 2 mm by the finest size; it may be anything from 200 um to 3.8 mm.");
+  tip.doubt.clear();
+  EXPECT_TRUE(doubtful_sentences({tip}).empty());
+  EXPECT_TRUE(error_of(run, {tip}));
+}
+
+TEST(StudyMeasure, TheBarOfASizeHoldsTheLimit) {
+  const std::vector<SizeValue> values = sequence(5, 0.3, 2, {4, 2, 1, 0.5});
+  for (std::size_t n = 2; n <= values.size(); ++n) {
+    const double half = half_range({values.begin(), values.begin() + static_cast<std::ptrdiff_t>(n)});
+    EXPECT_GE(half, std::abs(values[n - 1].value - 5)) << n;
+    EXPECT_LE(half, 4 * std::abs(values[n - 1].value - 5) + 9) << n;
+  }
+  EXPECT_DOUBLE_EQ(half_range({values[0]}), values[0].value);
+}
+
 RunResult run_with(std::vector<Quantity> quantities) {
   RunResult run;
   run.quantities = std::move(quantities);

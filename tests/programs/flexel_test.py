@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import struct
 
 from harness import binary_stl, bracket, box, box_triangles, expect, expect_error, expect_ok, expect_only, main, run, scene, write
@@ -28,7 +29,43 @@ def test_deform_writes_every_output():
     expect(11.5e-3 < drop < 14.5e-3, f"the tip sinks by 12 to 14 um: {drop} mm, {lowest}")
     summary = json.load(open("summary.json"))
     expect(set(summary) == {"voxelize", "simulate", "map"}, f"{summary.keys()}")
-    expect(summary["map"] == json.load(open("report.json")) and summary["map"]["valid"], "one mapping, one report")
+    expect(summary["map"] == json.load(open("report.json")), "one mapping, one report")
+
+
+def test_large_flat_triangles_are_told_and_the_advice_mends_them():
+    """Twelve triangles around a box that bends: nothing between its ends shows it."""
+    box()
+    bend = ["--material", "PLA", "--fix", "xmin", "--push", "zmax: 0 0 -20 N", "--count", "4000"]
+    coarse = expect_ok(run("flexel", "deform", "box.stl", *bend, "-o", "bent.stl", "--report", "report.json"))
+    found = json.load(open("report.json"))
+    expect(not found["valid"] and found["failures"]["coarse_triangles"] > 3, f"{found}")
+    # Under an even load w the middle of a cantilever moves by 17/48 of its end, and the chord is at a half.
+    expect(0.10 < found["chord_error"]["share"] < 0.2, f"{found['chord_error']}")
+    advice = re.search(r"warning: the mapped surface cannot be used as it is: its triangles, up to 41.2 mm long, .* read the mesh with "
+                       r"(--edge) (\S+) to split them", coarse.err)
+    expect(advice, coarse.err)
+    expect_error(run("flexel", "deform", "box.stl", *bend, "-o", "strict.stl", "--strict"), "flexel", "--edge", code=4)
+    expect(not os.path.exists("strict.stl"), "nothing is written")
+    fine = expect_ok(run("flexel", "deform", "box.stl", *bend, *advice.groups(), "-o", "fine.stl", "--strict", "--report", "report.json"))
+    found = json.load(open("report.json"))
+    expect(found["valid"] and found["chord_error"]["share"] < 0.02 and "can be used" in fine.err, f"{found} {fine.err}")
+
+
+def test_edge_splits_meshes_of_every_format():
+    box()
+    expect_ok(run("flexel-voxelize", "box.stl", "--size", "5 mm", "-o", "rest.vtu", "--quiet"))
+    for ending in ("obj", "ply", "off", "glb"):
+        expect_ok(run("flexel-map", "rest.vtu", "--quiet", "-o", f"box.{ending}"))
+    for ending in ("stl", "obj", "ply", "off", "glb"):
+        read = expect_ok(run("flexel-voxelize", f"box.{ending}", "--edge", "6 mm", "--size", "5 mm", "-o", "split.vtu"))
+        expect(("its triangles were split" in read.err) == (ending != "stl"), read.err)
+        expect_ok(run("flexel-map", "split.vtu", "--quiet", "-o", f"split.{ending}"))
+        found = json.loads(expect_ok(run("flexel", "info", f"split.{ending}", "--json")).out)["files"][0]["parts"][0]
+        expect(found["closed"] and abs(found["volume"] / 4e-6 - 1) < 1e-6 and found["triangles"] > 100, f"{ending}: {found}")
+        whole = expect_ok(run("flexel-voxelize", f"box.{ending}", "--edge", "60 mm", "--size", "5 mm", "-o", "whole.vtu"))
+        expect("were split" not in whole.err, "short enough already")
+    expect_error(run("flexel-voxelize", "box.obj", "--edge", "1 um", "-o", "x.vtu"), "flexel-voxelize", "box.obj", "larger --edge")
+    expect_error(run("flexel", "deform", "box.obj", *CASE, "--edge", "0 mm", "-o", "x.stl"), "flexel", "--edge")
 
 
 def test_deform_equals_the_pipe():

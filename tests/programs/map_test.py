@@ -42,6 +42,16 @@ def test_another_mesh_follows_the_same_deformation():
     expect("can be used" in own.err, own.err)
 
 
+def test_another_mesh_is_split_too():
+    coarse = expect_ok(run("flexel-map", bent(), "-o", "own.obj"))
+    expect("stay flat where the part bends" in coarse.err, coarse.err)
+    expect_ok(run("flexel-map", "body.vtu", "--quiet", "-o", "box.obj"))
+    fine = expect_ok(run("flexel-map", "bent.vtu", "--onto", "box.obj", "--edge", "4 mm", "-o", "fine.obj", "--strict"))
+    expect("can be used" in fine.err and "its triangles were split" in fine.err, fine.err)
+    expect(len(vertices("fine.obj")) > 100, "and written")
+    expect_error(run("flexel-map", "bent.vtu", "--edge", "4 mm", "-o", "x.obj"), "flexel-map", "--onto", "flexel-voxelize")
+
+
 def test_points_come_out_as_the_table_they_were_in():
     write("p.csv", "# sensors\nname,x,y,z,colour\nroot,0,5,5,red\ntip,40,5,5,blue\n")
     expect_ok(run("flexel-map", bent(), "--points", "p.csv", "-o", "out.csv"))
@@ -93,7 +103,8 @@ def test_a_series_gives_a_file_for_each_frame():
     for name in ["frame_00001.stl", "n00001.stl"]:
         expect(open(name, "rb").read() == open("alone.stl", "rb").read(), f"{name} is what the frame alone gives")
     expect(open("frame_00000.stl", "rb").read() == open("rest.stl", "rb").read(), "the first frame is at rest")
-    expect(json.load(open("r_00001.json"))["valid"], "a report for each frame")
+    expect(json.load(open("r_00001.json"))["failures"]["inverted"] == 0, "a report for each frame")
+    expect(json.load(open("r_00000.json"))["valid"], "at rest even twelve triangles show all there is")
     expect_error(run("flexel-map", "run.pvd", "--format", "stl"), "flexel-map", "-o")
     write("empty.pvd", "<VTKFile><Collection/></VTKFile>")
     expect_error(run("flexel-map", "empty.pvd", "-o", "x.stl"), "flexel-map", "empty.pvd", "no frame")

@@ -152,7 +152,8 @@ def errors_follow_from_values_and_references():
     tip = references["tip"]
     checked = 0
     for row in rows_of():
-        if row["status"] == "ok":
+        expect(bool(row["error"]) == (row["status"] == "ok" and not tip["doubt"]), f"no error without a reference: {row}")
+        if row["error"]:
             error = abs(float(row["tip [m]"]) - tip["value"]) / abs(tip["value"])
             expect(abs(error - float(row["error"])) < 1e-6, f"{error} {row}")
             stages = sum(float(v) for k, v in row.items() if k.endswith(" stage [s]"))
@@ -206,7 +207,7 @@ def test_the_page_is_one_file_that_fetches_nothing():
         expect(address.startswith("http://www.w3.org/"), f"only the names of XML namespaces: {address}")
     expect("prefers-color-scheme: dark" in page.text and "@media print" in page.text and "size: A4" in page.text, "styles")
     if shutil.which("gnuplot"):
-        expect(page.text.count("<svg") == 2, "two plots")
+        expect(page.text.count("<svg") >= 2, "displacement against size, and where the time goes")
     for picture in re.findall(r"data:image/png;base64,([A-Za-z0-9+/=]+)", page.text):
         expect(base64.b64decode(picture, validate=True).startswith(b"\x89PNG\r\n"), "a picture is a PNG")
     expect(len(page.text) < 900_000, f"{len(page.text)} bytes")
@@ -217,7 +218,7 @@ def test_the_budget_is_kept():
     took = sum(float(row["wall [s]"]) for row in rows_of())
     expect(took < 12, f"the runs fit into 12 s: {took} s")
     summary = json.load(open("study/study.json"))
-    expect(summary["spent"] < 12 + 30, f"what is left is for the page: {summary['spent']} s")
+    expect(summary["spent"] < 12 + 8, f"the page is within it too, but for what a busy machine takes: {summary['spent']} s")
     expect(summary["left_out"], "what did not fit is named")
     result = study(budget="10 ms")
     expect_error(result, "flexel", "--budget")
