@@ -294,7 +294,9 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
     if (accuracy) summary["accuracy"] = nlohmann::ordered_json::parse(accuracy->json());
     write_text(summary.dump(2) + "\n", arguments.summary);
   }
-  for (const std::string& line : answer_lines(run.simulated, body, next_step(accuracy))) progress.say(line);
+  for (const std::string& line :
+       answer_lines(run.simulated, body, materials_of_parts(plan.job.scene, body), next_step(accuracy)))
+    progress.say(line);
   return kExitDone;
 }
 

@@ -184,7 +184,9 @@ int run(int argc, char** argv) {
   if (series) options.series = arguments.output;
   const SimulateResult result = simulate(body, scene, options, progress);
   const bool all = arguments.verbose || options.explain;
-  for (const std::string& line : all ? summary_lines(result) : answer_lines(result, body)) progress.say(line);
+  for (const std::string& line :
+       all ? summary_lines(result) : answer_lines(result, body, materials_of_parts(scene, body)))
+    progress.say(line);
   progress.stage("write");
   BodyFileOptions file_options;
   file_options.compress = arguments.compress;
