@@ -8,6 +8,7 @@
 #include "simulate/merge.h"
 #include "simulate/scene.h"
 #include "simulate/simulate.h"
+#include "simulate/strength.h"
 #include "simulate/stress.h"
 #include "simulate/time/checkpoint.h"
 
@@ -183,10 +184,8 @@ int run(int argc, char** argv) {
   const bool series = extension(arguments.output) == "pvd";
   if (series) options.series = arguments.output;
   const SimulateResult result = simulate(body, scene, options, progress);
-  const bool all = arguments.verbose || options.explain;
-  for (const std::string& line :
-       all ? summary_lines(result) : answer_lines(result, body, materials_of_parts(scene, body)))
-    progress.say(line);
+  if (arguments.verbose || options.explain)
+    for (const std::string& line : summary_lines(result)) progress.say(line);
   progress.stage("write");
   BodyFileOptions file_options;
   file_options.compress = arguments.compress;
@@ -196,6 +195,8 @@ int run(int argc, char** argv) {
     file.write(summary_json(result, body));
     file.commit();
   }
+  progress.finish();
+  for (const std::string& line : answer_lines(result, body, known_materials(scene, body))) progress.say(line);
   return kExitDone;
 }
 

@@ -3,6 +3,9 @@
 
 #include <algorithm>
 
+#include "formats/error.h"
+#include "simulate/scene.h"
+
 namespace flexel {
 namespace {
 
@@ -39,6 +42,16 @@ std::optional<StrengthSummary> nearest_to_strength(const Body& body, const std::
                             part.name, material.name};
   }
   return found;
+}
+
+std::vector<Material> known_materials(const Scene& scene, const Body& body) {
+  try {
+    return materials_of_parts(scene, body);
+  } catch (const InputError&) {
+    std::vector<Material> named(body.parts.size());
+    for (std::size_t p = 0; p < named.size(); ++p) named[p].name = body.parts[p].material;
+    return named;
+  }
 }
 
 }  // namespace flexel

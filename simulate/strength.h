@@ -9,6 +9,8 @@
 
 namespace flexel {
 
+struct Scene;  // simulate/scene.h
+
 struct StrengthSummary {   // of the part that is nearest to what its material bears
   double share = 0;        // stress / limit
   double stress = 0;       // Pa, von Mises
@@ -24,5 +26,9 @@ struct StrengthSummary {   // of the part that is nearest to what its material b
 [[nodiscard]] std::optional<StrengthSummary> nearest_to_strength(const Body& body,
                                                                  const std::vector<Material>& materials,
                                                                  std::vector<std::string>& unknown);
+
+// The materials of the deformed body's parts. Where events brought parts that the scene gives no material,
+// only names are known. Never throws InputError.
+[[nodiscard]] std::vector<Material> known_materials(const Scene& scene, const Body& body);
 
 }  // namespace flexel
