@@ -20,6 +20,7 @@
 #include "mapping/output.h"
 #include "simulate/answer.h"
 #include "simulate/simulate.h"
+#include "simulate/strength.h"
 #include "simulate/time/settling.h"
 
 namespace flexel {
@@ -310,7 +311,9 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
     write_text(summary.dump(2) + "\n", arguments.summary);
   }
   outputs.appear();
-  for (const std::string& line : answer_lines(run.simulated, body, next_step(accuracy))) progress.say(line);
+  for (const std::string& line :
+       answer_lines(run.simulated, body, known_materials(plan.job.scene, body), next_step(accuracy)))
+    progress.say(line);
   return kExitDone;
 }
 

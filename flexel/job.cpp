@@ -70,7 +70,7 @@ void declare_job(CLI::App& app, JobArguments& arguments) {
                  "What the parts are made of: steel, PLA, ... (docs/scene.md)")
       ->type_name("NAME");
   app.add_option("--size", arguments.size, "Spacing of the lattice (\"2 mm\")")->type_name("LENGTH");
-  app.add_option("--count", arguments.count, "Or: about this many cells (default 20000)")->type_name("N");
+  app.add_option("--count", arguments.count, "Or: about this many cells")->type_name("N");
   app.add_option("--heal", arguments.heal, "Broken surfaces: auto, wrap or none (docs/healing.md)")
       ->type_name("HOW")
       ->capture_default_str();

@@ -8,6 +8,7 @@
 
 #include "formats/human.h"
 #include "formats/units.h"
+#include "simulate/strength.h"
 
 namespace flexel {
 namespace {
@@ -145,26 +146,34 @@ bool stress_settles(const SimulateResult& result) {
   return result.error_bars.von_mises && result.error_bars.von_mises->bar;
 }
 
-std::string strength(const SimulateResult& result, const Body& body) {
-  if (!result.stress) return "not known: this model has no stresses";
-  const StressSummary& stress = *result.stress;
-  const std::string material = material_of(body, stress.part);
-  const std::string peak = stress_settles(result)
-                               ? pressure_with_bar(stress.value, result.error_bars.von_mises->bar->half_width)
-                               : "about " + human_pressure(stress.value);
-  std::string unsure;
-  if (!stress_settles(result))
-    unsure = stress.beside.empty() ? "; finer cells may show more"
-                                   : "; beside " + stress.beside + ", finer cells show more";
-  if (!stress.yield_share)
-    return fmt::format("unknown of {}: the stress is {} at {}{}", material, peak, place(stress.at), unsure);
-  if (!(*stress.yield_share > 0)) return "nothing is stressed";
-  const double factor = 1 / *stress.yield_share;
-  const std::string verdict =
-      factor < 1 ? fmt::format("{} YIELDS, safety factor {}", material, human_number(factor, 2))
-                 : fmt::format("safety factor {}", human_number(factor, 2));
-  return fmt::format("{}: {} of {} that {} bears, at {}{}", verdict, peak,
-                     human_pressure(stress.value * factor), material, place(stress.at), unsure);
+// What is said of the largest stress where smaller cells would not confirm it.
+std::string unsure(const SimulateResult& result) {
+  if (stress_settles(result)) return "";
+  const std::string& beside = result.stress->beside;
+  return beside.empty() ? "; smaller cells may show more"
+                        : fmt::format("; smaller cells show more beside {}", beside);
+}
+
+std::string peak_stress(const SimulateResult& result, double stress) {
+  if (!stress_settles(result) || stress != result.stress->value) return "about " + human_pressure(stress);
+  return pressure_with_bar(stress, result.error_bars.von_mises->bar->half_width);
+}
+
+std::string strength(const SimulateResult& result, const Body& body, const std::vector<Material>& materials) {
+  if (!result.stress) return "not known: no stresses of this model, or --no-stress";
+  if (!(result.stress->value > 0)) return "nothing is stressed";
+  std::vector<std::string> unknown;
+  const std::optional<StrengthSummary> found = nearest_to_strength(body, materials, unknown);
+  if (!found)
+    return fmt::format("unknown of {}: its stress is {} at {}{}", material_of(body, result.stress->part),
+                       peak_stress(result, result.stress->value), place(result.stress->at), unsure(result));
+  if (!(found->share > 0)) return "nothing is stressed";
+  std::string text = fmt::format(
+      "{}safety factor {}: {} of {} at which {} {}, at {}{}", found->share > 1 ? "TOO WEAK, " : "",
+      human_number(1 / found->share, 2), peak_stress(result, found->stress), human_pressure(found->limit),
+      found->material, found->yields ? "yields" : "breaks", place(found->at), unsure(result));
+  if (!unknown.empty()) text += fmt::format("; unknown of {}", fmt::join(unknown, ", "));
+  return text;
 }
 
 std::string held_by(const SimulateResult& result) {
@@ -195,11 +204,11 @@ std::string usual_next(const SimulateResult& result, const Body& body) {
 }  // namespace
 
 std::vector<std::string> answer_lines(const SimulateResult& result, const Body& body,
-                                      const std::string& next) {
+                                      const std::vector<Material>& materials, const std::string& next) {
   std::vector<std::string> lines{"how far    " + how_far(result)};
   if (!result.probes.empty()) lines.push_back("probes     " + probes(result));
   lines.push_back("how sure   " + how_sure(result, body));
-  lines.push_back("strength   " + strength(result, body));
+  lines.push_back("strength   " + strength(result, body, materials));
   lines.push_back("held by    " + held_by(result));
   lines.push_back("next       " + (next.empty() ? usual_next(result, body) : next));
   return lines;

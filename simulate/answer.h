@@ -4,13 +4,16 @@
 #include <string>
 #include <vector>
 
+#include "simulate/materials.h"
 #include "simulate/simulate.h"
 
 namespace flexel {
 
 // "how far", "how sure", "strength", "held by", "next" and one more for probes. `next` says what to do next,
-// "" for what this result suggests itself. `body` gives the names of materials.
+// "" for what this result suggests itself. `body` is the deformed one, `materials` (parts) those of its
+// parts.
 [[nodiscard]] std::vector<std::string> answer_lines(const SimulateResult& result, const Body& body,
+                                                    const std::vector<Material>& materials,
                                                     const std::string& next = "");
 
 }  // namespace flexel

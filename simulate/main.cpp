@@ -10,6 +10,7 @@
 #include "simulate/merge.h"
 #include "simulate/scene.h"
 #include "simulate/simulate.h"
+#include "simulate/strength.h"
 #include "simulate/stress.h"
 #include "simulate/time/checkpoint.h"
 
@@ -208,14 +209,16 @@ int run(int argc, char** argv) {
   if (series) options.series = arguments.output;
   OutputsTogether outputs({series ? "" : arguments.output, options.history, arguments.summary});
   const SimulateResult result = simulate(body, scene, options, progress);
-  const bool all = arguments.verbose || options.explain;
-  for (const std::string& line : all ? summary_lines(result) : answer_lines(result, body)) progress.say(line);
+  if (arguments.verbose || options.explain)
+    for (const std::string& line : summary_lines(result)) progress.say(line);
   progress.stage("write");
   BodyFileOptions file_options;
   file_options.compress = arguments.compress;
   if (!series) write_body(body, arguments.output, file_options);
   if (!arguments.summary.empty()) write_text(summary_json(result, body), arguments.summary);
   outputs.appear();
+  progress.finish();
+  for (const std::string& line : answer_lines(result, body, known_materials(scene, body))) progress.say(line);
   return kExitDone;
 }
 

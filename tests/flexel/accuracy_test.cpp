@@ -143,5 +143,128 @@ TEST(Accuracy, SizesThatCannotBeSolvedAreLeftOut) {
                InputError);
 }
 
+// The same runs with error bars of their own: `share` of the value at spacing h, of order 1.
+SolveAt with_bars(const SolveAt& solve, const std::function<double(double)>& share) {
+  return [=](std::optional<double> size, const GoesOn& goes_on) {
+    SolvedRun run = solve(size, goes_on);
+    if (run.mapped.empty()) return run;
+    ErrorBar bar;
+    bar.of = ErrorBar::Of::largest_displacement;
+    bar.value = run.mapped[0].z();
+    bar.bar = {share(run.size) * std::abs(bar.value), bar.value, 1.0};
+    run.simulated.error_bars.bars.push_back(bar);
+    return run;
+  };
+}
+
+struct Chosen {
+  SolvedRun last;
+  AccuracyReport report;
+};
+
+Chosen choose_by_default(const SolveAt& solve, double error = 0.05, double within = 20) {
+  AccuracyGoal goal;
+  goal.by_default = true;
+  goal.error = error;
+  goal.within = within;
+  goal.began = std::chrono::steady_clock::now();
+  Chosen chosen;
+  Progress silent("", Progress::Mode::silent);
+  chosen.last = choose_resolution(goal, solve, chosen.report, silent);
+  return chosen;
+}
+
+TEST(PreferredNumbers, AreNearAndStayWhatTheyAre) {
+  EXPECT_DOUBLE_EQ(preferred_number(0.00117, 20, Rounded::nearest), 0.00112);
+  EXPECT_DOUBLE_EQ(preferred_number(0.00101, 10, Rounded::up), 0.00125);
+  EXPECT_DOUBLE_EQ(preferred_number(9.6, 20, Rounded::nearest), 10);
+  for (double value = 1e-6; value < 1e3; value *= 1.037) {
+    const double near = preferred_number(value, 20, Rounded::nearest),
+                 up = preferred_number(value, 10, Rounded::up);
+    EXPECT_NEAR(near / value, 1, 0.07) << value;
+    EXPECT_GE(up, value * (1 - 1e-6));
+    EXPECT_LE(up, value * 1.29);
+    EXPECT_EQ(preferred_number(near, 20, Rounded::nearest), near) << value;
+    EXPECT_EQ(preferred_number(up, 10, Rounded::up), up) << value;
+  }
+}
+
+TEST(UsualSize, ANarrowBarIsEnough) {
+  const auto value = [](double h) { return 1 + h; };
+  EXPECT_EQ(choose_by_default(with_bars(made_up(value), [](double) { return 0.03; })).report.runs.size(), 1u);
+  const AccuracyReport wide =
+      choose_by_default(with_bars(made_up(value), [](double h) { return 3 * h; })).report;
+  EXPECT_GT(wide.runs.size(), 1u);
+  EXPECT_LE(*wide.runs.back().error, 0.05);
+  EXPECT_TRUE(wide.met());
+}
+
+TEST(UsualSize, AFinerTargetIsNoCoarserAndMoreTimeIsNoCoarser) {
+  const SolveAt solve =
+      with_bars(made_up([](double h) { return 1 + h; }, 1e-5), [](double h) { return 3 * h; });
+  double last = 1;
+  for (const double error : {0.3, 0.1, 0.05, 0.02, 0.01}) {
+    const double size = choose_by_default(solve, error).last.size;
+    EXPECT_LE(size, last) << error;
+    last = size;
+  }
+  last = 1;
+  for (const double within : {1.0, 3.0, 10.0, 30.0, 100.0}) {
+    const Chosen chosen = choose_by_default(solve, 0.01, within);
+    EXPECT_LE(chosen.last.size, last) << within;
+    last = chosen.last.size;
+    for (const TriedRun& run : chosen.report.runs) EXPECT_LE(run.seconds, within);
+  }
+}
+
+// What counts is the work, not how long others kept the machine busy.
+TEST(UsualSize, IsTheSameOnABusyMachine) {
+  const auto on_machine = [](double slower) {
+    const SolveAt solve =
+        with_bars(made_up([](double h) { return 1 + h; }, 1e-4), [](double h) { return 9 * h; });
+    return choose_by_default([=](std::optional<double> size, const GoesOn& goes_on) {
+             SolvedRun run = solve(size, goes_on);
+             run.processor_seconds = run.simulated.seconds;
+             run.simulated.seconds *= slower;
+             return run;
+           })
+        .last.size;
+  };
+  EXPECT_EQ(on_machine(1), on_machine(5));
+}
+
+TEST(UsualSize, FourCellsThroughWallsAndNoWordOfLatticesThatMissThem) {
+  const SolveAt solve = with_bars(made_up([](double h) { return h > 0.05 ? 30.0 : 1 + 0.1 * h; }),
+                                  [](double h) { return h > 0.05 ? 2.0 : 0.03; });
+  const Chosen chosen = choose_by_default([&](std::optional<double> size, const GoesOn& goes_on) {
+    SolvedRun run = solve(size, goes_on);
+    run.wall = 0.06;
+    return run;
+  });
+  EXPECT_LE(chosen.last.size, 0.06 / 4);
+  EXPECT_EQ(chosen.report.runs.size(), 2u);
+  EXPECT_NEAR(*chosen.report.runs.back().error, 0.03, 1e-12);  // beside 30 it would be 100 and more
+}
+
+TEST(UsualSize, BarsAreAsWideAsTheRunsAreApart) {
+  const SolveAt solve =
+      with_bars(made_up([](double h) { return h > 0.05 ? 1.5 : 1.0; }), [](double h) { return h; });
+  const Chosen chosen = choose_by_default(solve, 0.05);
+  const Bar& bar = chosen.last.simulated.error_bars.bars.front().bar;
+  EXPECT_NEAR(bar.half_width, *chosen.report.runs.back().error * chosen.last.mapped[0].z(), 1e-12);
+  EXPECT_GT(bar.half_width, chosen.last.size);
+}
+
+TEST(UsualSize, WhatIsWrongIsSaidAtOnce) {
+  int made = 0;
+  const SolveAt refused = [&](std::optional<double> size, const GoesOn& goes_on) -> SolvedRun {
+    ++made;
+    if (size) throw InputError("no face \"top\"");
+    return made_up([](double) { return 1.0; })(size, goes_on);
+  };
+  EXPECT_THROW(choose_by_default(refused), InputError);
+  EXPECT_EQ(made, 2);  // the spacing, and one run
+}
+
 }  // namespace
 }  // namespace flexel

@@ -1,0 +1,128 @@
+// The words of a result: what its error bar lets them say, in at most six lines.
+#include "simulate/answer.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace flexel {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr double kMoved = 1.7e-3;  // m
+
+struct Case {
+  SimulateResult result;
+  Body body;
+  std::vector<Material> materials;
+
+  [[nodiscard]] std::string text() const {
+    std::string all;
+    for (const std::string& line : answer_lines(result, body, materials)) all += line + "\n";
+    return all;
+  }
+};
+
+// One part of steel that moves 1.7 mm under 5 N, `share` of it uncertain.
+Case with_bar(double share) {
+  Case made;
+  Part part;
+  part.name = "lever";
+  part.material = "steel";
+  part.lattice.spacing = Vec3::Constant(2e-3);
+  part.element_end = 2;
+  made.body.parts.push_back(part);
+  made.body.rest = {Vec3(0, 0, 0), Vec3(0.08, 0.02, 0)};
+  made.body.element_columns["von_mises"].values = {47e6, 12e6};
+  Material steel;
+  steel.name = "steel";
+  steel.yield = 235e6;
+  made.materials.push_back(steel);
+  SimulateResult& result = made.result;
+  result.largest_displacement = kMoved;
+  result.largest_displacement_at = Vec3(0.08, 0.02, 0);
+  ErrorBar bar;
+  bar.of = ErrorBar::Of::largest_displacement;
+  bar.value = kMoved;
+  bar.bar.half_width = share * kMoved;
+  result.error_bars.bars.push_back(bar);
+  result.stress = StressSummary{47e6, Vec3(0, 0, 0), "lever", 0.2};
+  result.reactions.push_back({"xmin", Vec3(0, 1e-9, 5), Vec3(0, 0.4, 0)});
+  return made;
+}
+
+TEST(Answer, TheBarDecidesTheWords) {
+  EXPECT_THAT(with_bar(0.03).text(), HasSubstr("1.700 mm +- 0.051 mm (3 %), at (80, 20, 0) mm"));
+  EXPECT_THAT(with_bar(0.03).text(), HasSubstr("well, within 3 %"));
+  EXPECT_THAT(with_bar(0.1).text(), HasSubstr("fairly, within 10 %"));
+  EXPECT_THAT(with_bar(0.3).text(), HasSubstr("roughly, within 30 %"));
+  const std::string guess = with_bar(2.37).text();
+  EXPECT_THAT(guess, HasSubstr("no more than a first guess: 1.7 mm, could be 0 to 5.7 mm"));
+  EXPECT_THAT(guess, HasSubstr("hardly, off by up to 240 %"));
+  EXPECT_THAT(guess, Not(HasSubstr("+-")));
+}
+
+TEST(Answer, WithoutABarNothingIsPromised) {
+  Case bare = with_bar(0.03);
+  bare.result.error_bars = {};
+  EXPECT_THAT(bare.text(), HasSubstr("how sure   not known"));
+  bare.result.error_bars.note = "part \"lever\" is one cell thick";
+  EXPECT_THAT(bare.text(), HasSubstr("one cell thick"));
+  bare.result.timed.emplace();
+  EXPECT_THAT(bare.text(), HasSubstr("runs in time have no error bars"));
+}
+
+TEST(Answer, HowNearToFailing) {
+  Case made = with_bar(0.03);
+  EXPECT_THAT(made.text(), HasSubstr("safety factor 5: about 47 MPa of 235 MPa at which steel yields"));
+  EXPECT_THAT(made.text(), HasSubstr("smaller cells may show more"));  // no bar of the stress
+  made.result.error_bars.von_mises = StressBar{{47e6, 46e6, 40e6}, Bar{1e6, 47.5e6, 2}};
+  EXPECT_THAT(made.text(), HasSubstr("47.0 MPa +- 1.0 MPa of 235 MPa"));
+  EXPECT_THAT(made.text(), Not(HasSubstr("may show more")));
+  made.body.element_columns["von_mises"].values[0] = 470e6;
+  EXPECT_THAT(made.text(), HasSubstr("TOO WEAK, safety factor 0.5"));
+  made.materials[0].yield = 0;
+  EXPECT_THAT(made.text(), HasSubstr("strength   unknown of steel"));
+  made.materials[0].strength = 940e6;
+  EXPECT_THAT(made.text(), HasSubstr("safety factor 2: about 470 MPa of 940 MPa at which steel breaks"));
+  made.result.stress.reset();  // model `paper`
+  EXPECT_THAT(made.text(), HasSubstr("strength   not known"));
+}
+
+// The part with the largest stress need not be the one that fails.
+TEST(Answer, TheWeakestPartCounts) {
+  Case two = with_bar(0.03);
+  Part knob;
+  knob.name = "knob";
+  knob.element_begin = 2;
+  knob.element_end = 3;
+  two.body.parts.push_back(knob);
+  two.body.rest.emplace_back(0.01, 0, 0);
+  two.body.element_columns["von_mises"].values.push_back(20e6);
+  Material plastic;
+  plastic.name = "PLA";
+  two.materials.push_back(plastic);
+  EXPECT_THAT(two.text(), HasSubstr("steel yields"));
+  EXPECT_THAT(two.text(), HasSubstr("unknown of PLA"));
+  two.materials[1].strength = 40e6;
+  EXPECT_THAT(two.text(),
+              HasSubstr("safety factor 2: about 20 MPa of 40 MPa at which PLA breaks, at (10, 0, 0) mm"));
+}
+
+TEST(Answer, AtMostSixLinesHoweverMuchThereIs) {
+  Case made = with_bar(0.3);
+  for (int i = 0; i < 9; ++i) {
+    made.result.probes.push_back({"p" + std::to_string(i), Vec3::Zero(), Vec3(0, 0, 1e-3)});
+    made.result.reactions.push_back({"fix " + std::to_string(i), Vec3(3, 4, 0), Vec3::Zero()});
+  }
+  const std::vector<std::string> lines = answer_lines(made.result, made.body, made.materials, "look");
+  EXPECT_EQ(lines.size(), 6u);
+  EXPECT_THAT(made.text(), HasSubstr("and 7 more (--verbose)"));
+  EXPECT_THAT(made.text(), HasSubstr("\"xmin\" with 5 N along +z, \"fix 0\" with (3, 4, 0) N"));
+  EXPECT_EQ(lines.back(), "next       look");
+  for (const std::string& line : lines) EXPECT_EQ(line.find("e+"), std::string::npos) << line;
+}
+
+}  // namespace
+}  // namespace flexel
