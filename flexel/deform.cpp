@@ -165,7 +165,7 @@ SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surf
   Progress quiet("flexel", Progress::Mode::quiet);
   bool first = true;
   for (const Tie& tie : plan.job.scene.get<Ties>().ties) plan.goal->driven |= tie.is_move;
-  plan.goal->driven |= !plan.job.moves.empty();
+  plan.goal->driven |= !plan.job.moves.empty() || !plan.job.twists.empty();
   MapOptions mapping;
   mapping.method = plan.map.method;
   const auto solve = [&](std::optional<double> size, const GoesOn& goes_on) {
@@ -205,6 +205,7 @@ SolvedRun solve(const DeformArguments& arguments, Plan& plan, std::optional<Accu
                 Progress& progress) {
   progress.stage("import");
   Surface surface = read_parts(arguments.job.parts, plan.job.import, progress);
+  check_parts(plan.job, surface);
   if (plan.goal) {
     progress.stage("choose the size");
     return solve_to_goal(arguments, plan, surface, accuracy.emplace(), progress);
