@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "flexel/accuracy.h"
+#include "flexel/bent_picture.h"
 #include "flexel/commands.h"
 #include "flexel/job.h"
 #include "formats/body_file.h"
@@ -38,8 +39,10 @@ void declare_input(CLI::App& app, JobArguments& arguments) {
 }
 
 void declare_output(CLI::App& app, DeformArguments& arguments) {
-  app.add_option("-o,--output", arguments.outputs,
-                 "The deformed part (.stl, .obj) or body (.vtu); again for more; -: stdout")
+  app.add_option(
+         "-o,--output", arguments.outputs,
+         "The deformed part (.stl, .obj ...), body (.vtu) or a picture of it (.png); again for more; -: "
+         "stdout")
       ->type_name("FILE")
       ->required()
       ->allow_extra_args(false);
@@ -71,14 +74,15 @@ struct Plan {
   CrackOptions crack;
   struct Output {
     std::string path;
-    std::optional<MapOutput> surface;  // nothing: the body
+    std::optional<MapOutput> surface;  // nothing: the body, or its picture
+    [[nodiscard]] bool is_picture() const { return extension(path) == "png"; }
   };
   std::vector<Output> outputs;
 };
 
 void plan_outputs(const DeformArguments& arguments, Plan& plan) {
   for (const std::string& path : arguments.outputs)
-    if (extension(path) == "vtu")
+    if (extension(path) == "vtu" || extension(path) == "png")
       plan.outputs.push_back({path, std::nullopt});
     else
       plan.outputs.push_back(
@@ -137,7 +141,7 @@ std::string failed_name(const Plan& plan) {
   return "";
 }
 
-void write_outputs(const Plan& plan, const Body& body, const MappedPart& mapped, Progress& progress) {
+void write_outputs(const Plan& plan, Body& body, const MappedPart& mapped, Progress& progress) {
   progress.stage("write");
   if (!plan.crack.pieces.empty())
     write_parts(mapped.surface(body), mapped.result.displacement, plan.crack.pieces_format,
@@ -145,6 +149,8 @@ void write_outputs(const Plan& plan, const Body& body, const MappedPart& mapped,
   for (const Plan::Output& output : plan.outputs)
     if (output.surface)
       write_mapped(mapped.surface(body), body, mapped.result, *output.surface);
+    else if (output.is_picture())
+      write_bent_picture(body, output.path, progress);
     else
       write_body(body, output.path);
 }

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "flexel/picture/annotate.h"
 #include "flexel/picture/text.h"
 
 namespace flexel {

@@ -76,6 +76,7 @@ Layout lay_out(std::size_t panels, const PictureOptions& options, const Legend* 
 
 Framing frame_panels(const std::vector<Panel>& panels, const Layout& layout, const std::vector<View>& views) {
   Framing framing;
+  framing.common_view = views.size() == 1;
   const auto view_of = [&](std::size_t p) { return views.size() > 1 ? views[p] : views[0]; };
   std::vector<Eigen::Vector4f> boxes;
   std::vector<double> fit;  // pixels a metre

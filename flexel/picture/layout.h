@@ -24,6 +24,7 @@ struct Layout {
 struct Framing {
   std::vector<Camera> cameras;
   bool common_scale = true;
+  bool common_view = true;
 };
 // views: (panels), or one for all.
 [[nodiscard]] Framing frame_panels(const std::vector<Panel>& panels, const Layout& layout,

@@ -133,7 +133,8 @@ void annotate(Image& image, const std::vector<Panel>& panels, const Layout& layo
               const Legend* legend, double exaggeration) {
   const float size = layout.text;
   if (legend != nullptr) draw_legend(image, layout.legend, size, *legend);
-  draw_triad(image, 4.2f * size, layout.foot - 0.5f * size, size, framing.cameras.front());
+  if (framing.common_view)
+    draw_triad(image, 4.2f * size, layout.foot - 0.5f * size, size, framing.cameras.front());
   const float most = 0.2f * static_cast<float>(image.width);
   for (std::size_t p = 0; p < panels.size(); ++p) {
     const Viewport& room = layout.panels[p];
@@ -142,6 +143,9 @@ void annotate(Image& image, const std::vector<Panel>& panels, const Layout& layo
     if (layout.labels)
       draw_text(image, left + width / 2, static_cast<float>(room.y) - size,
                 shortened(panels[p].subject->label, size, width), size, colour(kInk), Anchor::middle);
+    if (!framing.common_view)
+      draw_triad(image, left + 3 * size, static_cast<float>(room.y + room.height) - 2.5f * size, 0.8f * size,
+                 framing.cameras[p]);
     if (!framing.common_scale) {
       draw_scale_bar(image, left, static_cast<float>(room.y + room.height) + 0.2f * size, 0.85f * size,
                      pixels, std::min(most, width / 3));

@@ -14,6 +14,7 @@
 #include "formats/import/readers.h"
 #include "formats/off.h"
 #include "formats/parallel.h"
+#include "formats/part_name.h"
 #include "formats/program.h"
 
 namespace flexel {
@@ -182,6 +183,8 @@ Surface import_surface(const std::string& path, const ImportOptions& options) {
   surface.sources.at(0).file = input.file;
   surface.sources.at(0).hash = read.hash;
   surface.part_source.assign(surface.parts.size(), 0);
+  for (SurfacePart& part : surface.parts)
+    if (says_nothing(part.name)) part.name.clear();
   make_part_names_unique(surface, input.stem.empty() ? "part" : input.stem);
   check(surface, input.where);
   const bool has_area = std::any_of(surface.vertices.begin(), surface.vertices.end(),
