@@ -1,17 +1,17 @@
 #include "formats/part_name.h"
 
 #include <algorithm>
-#include <array>
 #include <cctype>
+#include <iterator>
 #include <string_view>
 
 namespace flexel {
 namespace {
 
-constexpr std::array<std::string_view, 19> kKinds = {
+constexpr std::string_view kKinds[] = {
     "compound", "compsolid", "solid",  "shell",   "shape", "mesh",  "object",  "geometry", "model", "default",
-    "unnamed",  "untitled",  "noname", "no name", "none",  "ascii", "product", "brep",     "null"};
-constexpr std::array<std::string_view, 14> kWriters = {
+    "unnamed",  "untitled",  "noname", "no name", "none",  "ascii", "product", "document", "brep",  "null"};
+constexpr std::string_view kWriters[] = {
     "open cascade",  "exported ", "created by ", "generated ", "visualization toolkit",
     "vcg",           "openscad",  "stl ",        "ascii stl",  "binary stl",
     "stl_generated", "stlb",      "converted ",  "meshlab"};
@@ -26,7 +26,7 @@ bool says_nothing(const std::string& name) {
   // without a number at its end: "mesh_0", "object.001"
   const std::size_t end = text.find_last_not_of("0123456789 _-.#:()");
   text = end == std::string::npos ? "" : text.substr(0, end + 1);
-  return std::find(kKinds.begin(), kKinds.end(), text) != kKinds.end();
+  return std::find(std::begin(kKinds), std::end(kKinds), text) != std::end(kKinds);
 }
 
 }  // namespace flexel
