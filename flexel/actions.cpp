@@ -8,6 +8,7 @@
 #include <charconv>
 #include <sstream>
 
+#include "flexel/face_shape.h"
 #include "formats/area_vector.h"
 #include "formats/error.h"
 #include "formats/units.h"
@@ -46,6 +47,8 @@ Amount split_amount(std::string text) {
   return amount;
 }
 
+constexpr double kStandardGravity = 9.80665;  // m/s^2, ISO 80000-3
+
 bool has_unit(Dimension dimension, const std::string& unit) {
   const std::vector<std::string> units = unit_names(dimension);
   return std::find(units.begin(), units.end(), unit) != units.end();
@@ -82,21 +85,10 @@ Action parse_action(const std::string& text, const std::string& option, Dimensio
   return action;
 }
 
-}  // namespace
-
-Action parse_push(const std::string& text) {
-  return parse_action(text, "--push", Dimension::force,
-                      "--push \"xmax: 0 0 -50 N\" or --push \"part/3: 50 N\"");
-}
-
-Action parse_move(const std::string& text) {
-  return parse_action(text, "--move", Dimension::length,
-                      "--move \"xmax: 0 0 -2 mm\" or --move \"part/3: 2 mm\"");
-}
-
-Vec3 inward_normal(const Selection& selection, const Body& body) {
-  const Selected selected = resolve(selection, body);
-  if (const auto axis = side_axis(selection, body)) return -*axis;
+// Unit, outward; of a side its axis.
+Vec3 mean_normal(const Selection& selection, const Selected& selected, const Body& body,
+                 const std::string& example) {
+  if (const auto axis = side_axis(selection, body)) return *axis;
   const Surface& surface = body.surface;
   Vec3 sum = Vec3::Zero();
   double area = 0;
@@ -109,9 +101,107 @@ Vec3 inward_normal(const Selection& selection, const Body& body) {
   if (!(sum.norm() > 0.1 * area))
     throw InputError(
         selection.origin,
-        fmt::format("\"{}\" has no direction of its own: give three components, as in \"{}: 0 0 -50 N\"",
-                    describe(selection), describe(selection)));
-  return -sum.normalized();
+        fmt::format("\"{}\" has no direction of its own: give three components, as in \"{}: {}\"",
+                    describe(selection), describe(selection), example));
+  return sum.normalized();
+}
+
+}  // namespace
+
+Action parse_push(const std::string& text) {
+  return parse_action(text, "--push", Dimension::force,
+                      "--push \"xmax: 0 0 -50 N\" or --push \"part/3: 50 N\"");
+}
+
+Action parse_move(const std::string& text) {
+  return parse_action(text, "--move", Dimension::length,
+                      "--move \"xmax: 0 0 -2 mm\" or --move \"part/3: 2 mm\"");
+}
+
+Action parse_torque(const std::string& text) {
+  return parse_action(text, "--torque", Dimension::torque,
+                      "--torque \"xmax: 5 N m\" or --torque \"part/3: 0 0 5 N m\"");
+}
+
+Action parse_twist(const std::string& text) {
+  return parse_action(text, "--twist", Dimension::angle,
+                      "--twist \"xmax: 10 deg\" or --twist \"part/3: 0 0 10 deg\"");
+}
+
+Action parse_bearing(const std::string& text) {
+  const char* example = "--bearing \"part/3: 0 0 -200 N\"";
+  Action action = parse_action(text, "--bearing", Dimension::force, example);
+  if (!action.vector || *action.vector == Vec3::Zero())
+    throw InputError(
+        fmt::format("--bearing \"{}\": a pin presses in a direction: give three components, for example {}",
+                    text, example));
+  return action;
+}
+
+Vec3 parse_gravity(const std::string& text) {
+  Amount amount = split_amount(text);
+  double scale = 1;
+  if (amount.unit == "g") {  // not the gram
+    scale = kStandardGravity;
+    amount.unit = "m/s^2";
+  }
+  std::vector<double> values;
+  for (const std::string& number : amount.numbers) try {
+      values.push_back(scale * parse_quantity(number + " " + amount.unit, Dimension::acceleration));
+    } catch (const InputError& error) {
+      throw InputError(fmt::format("--gravity \"{}\": {}", text, error.what()));
+    }
+  if (values.size() == 1) return {0, 0, -values[0]};
+  if (values.size() == 3) return {values[0], values[1], values[2]};
+  throw InputError(
+      fmt::format("--gravity \"{}\": {} numbers, not one or three; write for example --gravity \"1 g\" or "
+                  "--gravity \"0 0 "
+                  "-9.81 m/s^2\"",
+                  text, values.size()));
+}
+
+Probe parse_probe(const std::string& text) {
+  Probe probe;
+  probe.origin = "--probe";
+  const std::size_t colon = text.find(':');
+  probe.name = trimmed(text.substr(0, colon));
+  const std::string rest = colon == std::string::npos ? probe.name : trimmed(text.substr(colon + 1));
+  if (probe.name.empty() || rest.empty())
+    throw InputError(
+        fmt::format("--probe \"{}\": write for example --probe \"tip: 10 5 3 mm\" or --probe \"tip: "
+                    "part/3\"",
+                    text));
+  const Amount amount = split_amount(rest);
+  if (!amount.numbers.empty() && has_unit(Dimension::length, amount.unit)) {
+    if (amount.numbers.size() != 3)
+      throw InputError(fmt::format(
+          "--probe \"{}\": a point has three coordinates, for example \"{}: 10 5 3 mm\"", text, probe.name));
+    probe.at = Vec3::Zero();
+    for (int i = 0; i < 3; ++i)
+      (*probe.at)[i] =
+          parse_quantity(amount.numbers[static_cast<std::size_t>(i)] + " " + amount.unit, Dimension::length);
+  } else {
+    probe.where = parse_where(rest, probe.origin);
+    if (colon == std::string::npos) probe.name = describe(*probe.where);
+  }
+  return probe;
+}
+
+Vec3 inward_normal(const Selection& selection, const Body& body) {
+  return -mean_normal(selection, resolve(selection, body), body, "0 0 -50 N");
+}
+
+FaceAxis face_axis(const Selection& selection, const Body& body, const std::optional<Vec3>& given) {
+  const Selected selected = resolve(selection, body);
+  if (selected.polygons.empty())
+    throw InputError(
+        selection.origin,
+        fmt::format("{} selects elements: name a face or a side, which has an axis", describe(selection)));
+  const FaceShape shape = face_shape(body.surface, selected.polygons);
+  if (given && *given != Vec3::Zero())
+    return {given->normalized(), shape.kind == FaceShape::Kind::round ? shape.axis_point : shape.centroid};
+  if (shape.kind == FaceShape::Kind::round) return {shape.axis, shape.axis_point};
+  return {mean_normal(selection, selected, body, "0 0 5 N m"), shape.centroid};
 }
 
 void add_push(Scene& scene, const Action& action, const Body& body) {
@@ -129,6 +219,30 @@ void add_move(Scene& scene, const Action& action, const Body& body) {
   const Selection where = parse_where(action.where, "--move");
   scene.get<Ties>().ties.push_back(
       make_move(where, action.vector ? *action.vector : Vec3(*action.along * inward_normal(where, body))));
+}
+
+void add_torque(Scene& scene, const Action& action, const Body& body) {
+  Load load;
+  load.where = parse_where(action.where, "--torque");
+  load.name = describe(load.where);
+  load.origin = load.where.origin;
+  load.torque = action.vector ? *action.vector : Vec3(*action.along * face_axis(load.where, body).direction);
+  scene.get<Loads>().loads.push_back(std::move(load));
+}
+
+void add_twist(Scene& scene, const Action& action, const Body& body) {
+  Tie tie = make_move(parse_where(action.where, "--twist"), Vec3::Zero());
+  const FaceAxis axis = face_axis(tie.where, body, action.vector);
+  tie.motion.angle = action.along ? *action.along : action.vector->norm();
+  tie.motion.axis = axis.direction;
+  tie.motion.through = axis.through;
+  scene.get<Ties>().ties.push_back(std::move(tie));
+}
+
+void add_bearing(Scene& scene, const Action& action) {
+  Load load = make_push(parse_where(action.where, "--bearing"), *action.vector);
+  load.bearing = true;
+  scene.get<Loads>().loads.push_back(std::move(load));
 }
 
 }  // namespace flexel

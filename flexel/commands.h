@@ -3,6 +3,7 @@
 
 namespace flexel {
 
+int compare_command(int argc, char** argv);
 int deform_command(int argc, char** argv);
 int export_command(int argc, char** argv);
 int info_command(int argc, char** argv);

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "flexel/accuracy.h"
+#include "flexel/bent_picture.h"
 #include "flexel/commands.h"
 #include "flexel/job.h"
 #include "formats/body_file.h"
@@ -50,8 +51,10 @@ void declare_input(CLI::App& app, JobArguments& arguments) {
 }
 
 void declare_output(CLI::App& app, DeformArguments& arguments) {
-  app.add_option("-o,--output", arguments.outputs,
-                 "The deformed part (.stl, .obj) or body (.vtu); again for more; -: stdout")
+  app.add_option(
+         "-o,--output", arguments.outputs,
+         "The deformed part (.stl, .obj ...), body (.vtu) or a picture of it (.png); again for more; -: "
+         "stdout")
       ->type_name("FILE")
       ->required()
       ->allow_extra_args(false);
@@ -84,7 +87,8 @@ struct Plan {
   CrackOptions crack;
   struct Output {
     std::string path;
-    std::optional<MapOutput> surface;  // nothing: the body
+    std::optional<MapOutput> surface;  // nothing: the body, or its picture
+    [[nodiscard]] bool is_picture() const { return extension(path) == "png"; }
   };
   std::vector<Output> outputs;
 };
@@ -101,7 +105,7 @@ std::string failed_name(const Plan& plan) {
 
 void plan_outputs(const DeformArguments& arguments, Plan& plan) {
   for (const std::string& path : arguments.outputs)
-    if (extension(path) == "vtu")
+    if (extension(path) == "vtu" || extension(path) == "png")
       plan.outputs.push_back({path, std::nullopt});
     else
       plan.outputs.push_back(
@@ -161,7 +165,7 @@ Plan make_plan(const DeformArguments& arguments) {
   return plan;
 }
 
-void write_outputs(const Plan& plan, const Body& body, const MappedPart& mapped, Progress& progress) {
+void write_outputs(const Plan& plan, Body& body, const MappedPart& mapped, Progress& progress) {
   progress.stage("write");
   if (!plan.crack.pieces.empty())
     write_parts(mapped.surface(body), mapped.result.displacement, plan.crack.pieces_format,
@@ -169,6 +173,8 @@ void write_outputs(const Plan& plan, const Body& body, const MappedPart& mapped,
   for (const Plan::Output& output : plan.outputs)
     if (output.surface)
       write_mapped(mapped.surface(body), body, mapped.result, *output.surface);
+    else if (output.is_picture())
+      write_bent_picture(body, output.path, progress);
     else
       write_body(body, output.path);
 }
@@ -189,7 +195,7 @@ SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surf
   HeldWarnings warnings;  // of runs that are only tried
   bool first = true;
   for (const Tie& tie : plan.job.scene.get<Ties>().ties) plan.goal->driven |= tie.is_move;
-  plan.goal->driven |= !plan.job.moves.empty();
+  plan.goal->driven |= !plan.job.moves.empty() || !plan.job.twists.empty();
   MapOptions mapping;
   mapping.method = plan.map.method;
   const auto solve = [&](std::optional<double> size, const GoesOn& goes_on) {
@@ -241,6 +247,7 @@ SolvedRun solve(const DeformArguments& arguments, Plan& plan, std::optional<Accu
                 Progress& progress) {
   progress.stage("import");
   Surface surface = read_part_files(arguments, plan, progress);
+  check_parts(plan.job, surface);
   if (plan.goal) {
     progress.stage("choose the size");
     return solve_to_goal(arguments, plan, surface, accuracy.emplace(), progress);

@@ -238,6 +238,7 @@ int export_command(int argc, char** argv) {
   if (arguments.mesh == "tet" && arguments.job.edge.empty())
     job.import.largest_edge = std::numeric_limits<double>::infinity();
   const Surface surface = read_parts(arguments.job.parts, job.import, progress);
+  check_parts(job, surface);
   Analysis analysis = analyse(arguments, job, surface, progress);
   if (arguments.nlgeom == "auto") {
     progress.stage("look at the deflection");

@@ -2,12 +2,19 @@
 // normal has a part in (smallest eigenvalue of the area-weighted normals' second moment) is the axis of a
 // round one. Its circle is then fitted to the corners in the plane across the axis by linear least squares
 // (Kasa 1976).
+//
+// How far round its cylinder a face goes is counted in steps of half a degree that its polygons cover. A hole
+// is a hollow whose faces, one or several of one cylinder side by side, go all the way round; a fillet does
+// not.
 #include "flexel/face_shape.h"
 
 #include <fmt/format.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
+#include <bitset>
 #include <cmath>
+#include <numeric>
 #include <span>
 
 #include "formats/area_vector.h"
@@ -18,6 +25,9 @@ namespace {
 const double kFlatCosine = std::cos(0.2 * M_PI / 180);
 const double kRoundSine = std::sin(1.0 * M_PI / 180);
 constexpr double kRoundDeviation = 0.01;
+constexpr std::size_t kSteps = 720;                  // round a cylinder
+constexpr std::size_t kAllRound = kSteps - 10;       // steps: closed but for what rounding leaves
+constexpr double kLargestFillet = 125 * M_PI / 180;  // a hollow that goes further round is no fillet
 
 struct Sums {
   std::size_t polygons = 0;
@@ -32,10 +42,9 @@ Vec3 middle(const Surface& surface, std::span<const std::uint32_t> corners) {
   return sum / static_cast<double>(corners.size());
 }
 
-std::vector<Sums> sum_up(const Surface& surface) {
-  std::vector<Sums> sums(surface.faces.size());
-  for (std::size_t p = 0; p < surface.polygon_count(); ++p) {
-    Sums& face = sums[surface.polygon_face[p]];
+Sums sum_up(const Surface& surface, const std::vector<std::uint32_t>& polygons) {
+  Sums face;
+  for (const std::uint32_t p : polygons) {
     const Vec3 vector = area_vector(surface.vertices, surface.polygon(p));
     const double area = vector.norm();
     ++face.polygons;
@@ -45,10 +54,10 @@ std::vector<Sums> sum_up(const Surface& surface) {
     face.moment += area * middle(surface, surface.polygon(p));
     face.normals += vector * vector.transpose() / area;
   }
-  return sums;
+  return face;
 }
 
-// The polygons of each face, for a second look.
+// The polygons of each face.
 std::vector<std::vector<std::uint32_t>> polygons_of(const Surface& surface) {
   std::vector<std::vector<std::uint32_t>> polygons(surface.faces.size());
   for (std::size_t p = 0; p < surface.polygon_count(); ++p)
@@ -116,7 +125,74 @@ void fit_circle(const Surface& surface, const std::vector<std::uint32_t>& polygo
   shape.hollow = outward < 0;
 }
 
-FaceShape shape_of(const Surface& surface, const Sums& sums, const std::vector<std::uint32_t>& polygons) {
+// The part of a cylinder that a face covers.
+struct Reach {
+  std::bitset<kSteps> steps;          // round the axis
+  double low = 1e300, high = -1e300;  // m, along it
+};
+
+Reach reach_of(const Surface& surface, const std::vector<std::uint32_t>& polygons,
+               const FaceShape& cylinder) {
+  const Vec3 e1 = cylinder.axis.unitOrthogonal(), e2 = cylinder.axis.cross(e1);
+  Reach reach;
+  for (const std::uint32_t p : polygons) {
+    double first = 0, low = 0, high = 0;  // rad; the last two from the first corner
+    for (std::size_t i = 0; i < surface.polygon(p).size(); ++i) {
+      const Vec3 arm = surface.vertices[surface.polygon(p)[i]] - cylinder.axis_point;
+      const double angle = std::atan2(arm.dot(e2), arm.dot(e1));
+      if (i == 0) first = angle;
+      const double turned = std::remainder(angle - first, 2 * M_PI);
+      low = std::min(low, turned);
+      high = std::max(high, turned);
+      reach.low = std::min(reach.low, arm.dot(cylinder.axis));
+      reach.high = std::max(reach.high, arm.dot(cylinder.axis));
+    }
+    constexpr double kStep = 2 * M_PI / kSteps;
+    const auto begin = static_cast<std::ptrdiff_t>(std::floor((first + low + 4 * M_PI) / kStep + 0.5));
+    const auto end = static_cast<std::ptrdiff_t>(std::floor((first + high + 4 * M_PI) / kStep + 0.5));
+    for (std::ptrdiff_t s = begin; s < end; ++s) reach.steps.set(static_cast<std::size_t>(s) % kSteps);
+  }
+  return reach;
+}
+
+// Whether two round faces lie on one cylinder, on the same side of it.
+bool on_one_cylinder(const FaceShape& a, const FaceShape& b) {
+  if (a.hollow != b.hollow || std::abs(a.radius - b.radius) > kRoundDeviation * a.radius) return false;
+  if (a.axis.cross(b.axis).norm() > kRoundSine) return false;
+  const Vec3 between = b.axis_point - a.axis_point;
+  return (between - between.dot(a.axis) * a.axis).norm() <= 2 * kRoundDeviation * a.radius;
+}
+
+// Sets `closed` of the round faces whose cylinder is closed by them and those beside them.
+void close_cylinders(const Surface& surface, const std::vector<std::vector<std::uint32_t>>& polygons,
+                     std::vector<FaceShape>& shapes) {
+  std::vector<std::uint32_t> open;  // round, not closed by itself; ascending in radius
+  for (std::uint32_t f = 0; f < shapes.size(); ++f)
+    if (shapes[f].kind == FaceShape::Kind::round && !shapes[f].closed) open.push_back(f);
+  std::sort(open.begin(), open.end(), [&](auto a, auto b) { return shapes[a].radius < shapes[b].radius; });
+  for (std::size_t i = 0; i < open.size(); ++i) {
+    const FaceShape& shape = shapes[open[i]];
+    Reach all = reach_of(surface, polygons[open[i]], shape);
+    std::vector<std::uint32_t> members{open[i]};
+    for (std::size_t k = i + 1; k < open.size(); ++k) {
+      const std::uint32_t other = open[k];
+      if (shapes[other].radius > (1 + kRoundDeviation) * shape.radius) break;
+      if (surface.faces[other].part != surface.faces[open[i]].part || !on_one_cylinder(shape, shapes[other]))
+        continue;
+      const Reach more = reach_of(surface, polygons[other], shape);
+      if (more.low >= all.high || more.high <= all.low) continue;
+      all.steps |= more.steps;
+      members.push_back(other);
+    }
+    if (all.steps.count() >= kAllRound)
+      for (const std::uint32_t f : members) shapes[f].closed = true;
+  }
+}
+
+}  // namespace
+
+FaceShape face_shape(const Surface& surface, const std::vector<std::uint32_t>& polygons) {
+  const Sums sums = sum_up(surface, polygons);
   FaceShape shape;
   shape.polygons = sums.polygons;
   shape.area = sums.area;
@@ -131,16 +207,18 @@ FaceShape shape_of(const Surface& surface, const Sums& sums, const std::vector<s
   const Vec3 axis = axis_of(sums.normals);
   if (all_normals(surface, polygons, [&](const Vec3& n) { return std::abs(n.dot(axis)) <= kRoundSine; }))
     fit_circle(surface, polygons, axis, shape);
+  if (shape.kind != FaceShape::Kind::round) return shape;
+  const std::size_t steps = reach_of(surface, polygons, shape).steps.count();
+  shape.angle = 2 * M_PI * static_cast<double>(steps) / kSteps;
+  shape.closed = steps >= kAllRound;
   return shape;
 }
 
-}  // namespace
-
 std::vector<FaceShape> face_shapes(const Surface& surface) {
-  const std::vector<Sums> sums = sum_up(surface);
   const std::vector<std::vector<std::uint32_t>> polygons = polygons_of(surface);
   std::vector<FaceShape> shapes;
-  for (std::size_t f = 0; f < sums.size(); ++f) shapes.push_back(shape_of(surface, sums[f], polygons[f]));
+  for (const std::vector<std::uint32_t>& face : polygons) shapes.push_back(face_shape(surface, face));
+  close_cylinders(surface, polygons, shapes);
   return shapes;
 }
 
@@ -158,8 +236,14 @@ std::string describe(const FaceShape& shape, double unit, const std::string& uni
   if (shape.kind == FaceShape::Kind::curved) return "curved";
   std::string axis = direction_name(shape.axis);
   if (axis.front() == '+') axis.erase(0, 1);
-  return fmt::format("round, {} of diameter {:.4g} {} along {}", shape.hollow ? "hole" : "outside",
-                     2 * shape.radius / unit, unit_name, axis);
+  if (shape.closed)
+    return fmt::format("round, {} of diameter {:.4g} {} along {}", shape.hollow ? "hole" : "outside",
+                       2 * shape.radius / unit, unit_name, axis);
+  const char* what = shape.angle > kLargestFillet ? (shape.hollow ? "hollow" : "outside")
+                     : shape.hollow               ? "fillet"
+                                                  : "rounded edge";
+  return fmt::format("round, {} of radius {:.4g} {} ({:.0f} degrees) along {}", what, shape.radius / unit,
+                     unit_name, shape.angle * 180 / M_PI, axis);
 }
 
 }  // namespace flexel

@@ -19,15 +19,21 @@ struct FaceShape {
   Vec3 axis = Vec3::Zero();  // round (part of a circular cylinder): unit; its largest component is positive
   Vec3 axis_point = Vec3::Zero();  // round: the point of the axis beside the centroid, m
   double radius = 0;               // round: m
-  bool hollow = false;             // round: the matter is outside (a hole)
+  bool hollow = false;             // round: the matter is outside
+  double angle = 0;                // round: rad of the cylinder that the face goes round
+  bool closed = false;             // round: with the faces beside it on the same cylinder, all of it
+  [[nodiscard]] bool is_hole() const { return kind == Kind::round && hollow && closed; }
 };
 
 // (faces) A face is flat when its normals differ by less than 0.2 degrees, round when they stand square to an
 // axis within a degree and its corners lie within 1 % of a radius from it.
 [[nodiscard]] std::vector<FaceShape> face_shapes(const Surface& surface);
 
-// "flat, normal +z", "round, hole of diameter 8 mm along x", "curved"; lengths in `unit` metres, called
-// `unit_name`.
+// The same of any polygons, as one face; `closed` tells of these alone.
+[[nodiscard]] FaceShape face_shape(const Surface& surface, const std::vector<std::uint32_t>& polygons);
+
+// "flat, normal +z", "round, hole of diameter 8 mm along x", "round, fillet of radius 2 mm (90 degrees) along
+// y", "curved"; lengths in `unit` metres, called `unit_name`.
 [[nodiscard]] std::string describe(const FaceShape& shape, double unit, const std::string& unit_name);
 
 // "+z", "-x", or "(0.71, 0, 0.71)".

@@ -188,7 +188,8 @@ Json face_json(const SurfaceFace& face, std::uint32_t number, const std::string&
     json["axis"] = coordinates(shape.axis);
     json["axis_point"] = coordinates(shape.axis_point);
     json["radius"] = shape.radius;
-    json["hole"] = shape.hollow;
+    json["angle"] = shape.angle;
+    json["hole"] = shape.is_hole();
   }
   return json;
 }

@@ -8,67 +8,13 @@
 #include "formats/error.h"
 #include "formats/size_warning.h"
 #include "formats/units.h"
-#include "simulate/material_names.h"
 
 namespace flexel {
-namespace {
-
-// The material must be known before the work begins: without one there is no resistance to compute.
-void check_material(const JobArguments& arguments, const Scene& scene) {
-  std::vector<std::string> known;
-  for (const auto& [name, material] : scene.materials) known.push_back(name);
-  for (const Material& material : material_library()) known.push_back(material.name);
-  if (arguments.material.empty() && arguments.scene.empty())
-    throw InputError(
-        fmt::format("no material: add --material NAME; the library has {}", fmt::join(known, ", ")));
-  if (arguments.material.empty() || library_material(arguments.material) ||
-      std::any_of(scene.materials.begin(), scene.materials.end(),
-                  [&](const auto& own) { return same_material_name(own.first, arguments.material); }))
-    return;
-  const std::string hint = did_you_mean(arguments.material, known);
-  throw InputError(
-      fmt::format("--material: no material \"{}\"{}", arguments.material,
-                  hint.empty() ? fmt::format("; the library has {}", fmt::join(known, ", ")) : hint));
-}
-
-void plan_scene(const JobArguments& arguments, Job& job) {
-  if (!arguments.scene.empty())
-    job.scene = read_scene(arguments.scene);
-  else
-    job.scene.name = "flexel deform";
-  check_material(arguments, job.scene);
-  if (!arguments.material.empty()) job.scene.material = arguments.material;
-  for (const std::string& where : arguments.fixes)
-    job.scene.get<Ties>().ties.push_back(make_fix(parse_where(where, "--fix")));
-  for (const std::string& text : arguments.pushes) job.pushes.push_back(parse_push(text));
-  for (const std::string& text : arguments.moves) job.moves.push_back(parse_move(text));
-  if (arguments.scene.empty() && job.pushes.empty() && job.moves.empty())
-    throw InputError(
-        "nothing acts on the part: add --push \"WHERE: 0 0 -50 N\", --move \"WHERE: 0 0 -2 mm\" or --scene "
-        "FILE");
-}
-
-}  // namespace
-
 void declare_job(CLI::App& app, JobArguments& arguments) {
   app.add_option("part", arguments.parts, "STEP, IGES, BREP, STL, OBJ, PLY, OFF, glTF or 3MF files; -: stdin")
       ->required()
       ->type_name("PART");
-  app.add_option("--scene", arguments.scene, "Scene file (TOML; docs/scene.md)")->type_name("FILE");
-  app.add_option("--fix", arguments.fixes,
-                 "Hold this surface: \"xmin\", \"part/3\" (`flexel info` lists faces)")
-      ->type_name("WHERE")
-      ->allow_extra_args(false);
-  app.add_option("--push", arguments.pushes,
-                 "Push a surface: \"xmax: 0 0 -50 N\", \"part/3: 50 N\" (inwards), \"part/3: 2 MPa\"")
-      ->type_name("WHERE:FORCE")
-      ->allow_extra_args(false);
-  app.add_option("--move", arguments.moves, "Move a surface: \"xmax: 0 0 -2 mm\", \"part/3: 2 mm\" (inwards)")
-      ->type_name("WHERE:LENGTH")
-      ->allow_extra_args(false);
-  app.add_option("--material", arguments.material,
-                 "What the parts are made of: steel, PLA, ... (docs/scene.md)")
-      ->type_name("NAME");
+  declare_scene(app, arguments);
   app.add_option("--size", arguments.size, "Spacing of the lattice (\"2 mm\")")->type_name("LENGTH");
   app.add_option("--count", arguments.count, "Or: about this many cells")->type_name("N");
   app.add_option("--heal", arguments.heal, "Broken surfaces: auto, wrap or none (docs/healing.md)")
@@ -112,11 +58,6 @@ Surface read_parts(const std::vector<std::string>& paths, const ImportOptions& o
   for (const std::string& line : size_warnings(surface)) progress.warn(line);
   for (const std::string& line : refinement_notes(surface)) progress.say(line);
   return surface;
-}
-
-void add_actions(Job& job, const Body& body) {
-  for (const Action& push : job.pushes) add_push(job.scene, push, body);
-  for (const Action& move : job.moves) add_move(job.scene, move, body);
 }
 
 }  // namespace flexel

@@ -1,4 +1,5 @@
-// Parts and what happens to them, as the commands that take both spell it (`flexel deform`, `flexel export`).
+// Parts and what happens to them, as the commands that take both spell it (`flexel deform`, `flexel export`,
+// `flexel compare`; what happens: `flexel study` too).
 #pragma once
 #include <optional>
 #include <string>
@@ -13,13 +14,16 @@
 namespace flexel {
 
 struct JobArguments {
-  std::vector<std::string> parts, fixes, pushes, moves;
-  std::string scene, material, size, heal = "auto", placement = "corner", unit, edge;
+  std::vector<std::string> parts, fixes, pushes, moves, torques, twists, bearings, probes, materials, infills;
+  std::string scene, gravity, shell, size, heal = "auto", placement = "corner", unit, edge;
   std::optional<std::size_t> count;
   bool force = false;  // results may replace files that are read
 };
 
-// Adds their options to the program, but for --placement, which not every command has.
+// Adds the options of what happens: --scene to --shell.
+void declare_scene(CLI::App& app, JobArguments& arguments);
+
+// Adds all of their options to the program, but for --placement, which not every command has.
 void declare_job(CLI::App& app, JobArguments& arguments);
 
 // What they ask for, checked.
@@ -27,8 +31,19 @@ struct Job {
   ImportOptions import;
   VoxelizeOptions voxelize;
   Scene scene;
-  std::vector<Action> pushes, moves;  // not in the scene before the part is known: add_actions()
+  // Not in the scene before the part is known: add_actions()
+  std::vector<Action> pushes, moves, torques, twists;
+  [[nodiscard]] bool acts_along_faces() const {
+    return !(pushes.empty() && moves.empty() && torques.empty() && twists.empty());
+  }
 };
+
+// The scene of the arguments. Throws InputError: see plan_job().
+void plan_scene(const JobArguments& arguments, Job& job);
+// What options add to the scene of `job`.
+void add_options(const JobArguments& arguments, Job& job);
+// Throws InputError where options alone, without a scene's file, name no material or nothing that acts.
+void refuse_idle(const JobArguments& arguments);
 
 // Reads the scene, not the parts. Throws InputError: wrong or missing arguments, nothing that acts, no
 // material, an unknown one.
@@ -38,7 +53,10 @@ struct Job {
 [[nodiscard]] Surface read_parts(const std::vector<std::string>& paths, const ImportOptions& options,
                                  Progress& progress);
 
-// Adds --push and --move to the scene; `body` gives the normals.
+// Throws InputError: --material or --infill of a part that is not there, a part without a material.
+void check_parts(const Job& job, const Surface& surface);
+
+// Adds --push, --move, --torque and --twist to the scene; `body` gives the normals.
 void add_actions(Job& job, const Body& body);
 
 }  // namespace flexel

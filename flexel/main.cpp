@@ -15,7 +15,10 @@ constexpr const char* kHelp =
     "\n"
     "  flexel deform PART... --fix WHERE --push \"WHERE: 0 0 -50 N\" --material NAME -o OUT\n"
     "                        the part, deformed as its material would be (STL, OBJ, PLY, OFF, GLB; .vtu for "
-    "the body)\n"
+    "the body,\n"
+    "                        .png for a picture)\n"
+    "  flexel compare PART PART... --scene FILE\n"
+    "                        which is stiffer: mass, displacement, stiffness and stress in one table\n"
     "  flexel export PART... --scene FILE --calculix -o OUT.inp\n"
     "                        mesh, sets, material, supports and loads for detailed analysis by CalculiX\n"
     "  flexel info PART...   solids, faces, unit, size, volume, closedness, thinnest wall: what a scene can "
@@ -44,9 +47,9 @@ bool is_stage(const std::string& command) {
 }
 
 [[noreturn]] void unknown_command(const std::string& command) {
-  const std::vector<std::string> commands = {"deform",    "export",  "info",  "picture",
-                                             "materials", "measure", "study", "voxelize",
-                                             "simulate",  "map",     "help"};
+  const std::vector<std::string> commands = {"deform",   "compare",   "export",  "info",
+                                             "picture",  "materials", "measure", "study",
+                                             "voxelize", "simulate",  "map",     "help"};
   throw InputError(fmt::format("unknown command \"{}\"; the commands are {}{}", command,
                                fmt::join(commands, ", "), did_you_mean(command, commands)));
 }
@@ -60,6 +63,7 @@ int help(int argc, char** argv) {
   char* arguments[] = {argv[1], option.data(), nullptr};
   const std::string command = argv[1];
   if (command == "deform") return deform_command(2, arguments);
+  if (command == "compare") return compare_command(2, arguments);
   if (command == "export") return export_command(2, arguments);
   if (command == "materials") return materials_command(2, arguments);
   if (command == "measure") return measure_command(2, arguments);
@@ -73,7 +77,8 @@ int help(int argc, char** argv) {
 int run(int argc, char** argv) {
   if (argc < 2)
     throw InputError(
-        "a command is missing: deform, export, info, picture, materials, measure, study, voxelize, simulate "
+        "a command is missing: deform, compare, export, info, picture, materials, measure, study, voxelize, "
+        "simulate "
         "or map (`flexel help`)");
   const std::string command = argv[1];
   if (command == "--version") {
@@ -82,6 +87,7 @@ int run(int argc, char** argv) {
   }
   if (command == "help" || command == "--help" || command == "-h") return help(argc - 1, argv + 1);
   if (command == "deform") return deform_command(argc - 1, argv + 1);
+  if (command == "compare") return compare_command(argc - 1, argv + 1);
   if (command == "materials") return materials_command(argc - 1, argv + 1);
   if (command == "measure") return measure_command(argc - 1, argv + 1);
   if (command == "export") return export_command(argc - 1, argv + 1);

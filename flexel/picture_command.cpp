@@ -26,7 +26,7 @@ struct PictureArguments {
   std::vector<std::string> files;
   std::string output, colour, range, scale = "1", view = "auto", up = "z", size = "1600x1200", unit,
                                      input_format;
-  bool cells = false, elements = false, no_outline = false, quiet = false, force = false;
+  bool cells = false, elements = false, faces = false, no_outline = false, quiet = false, force = false;
   int threads = 0;
 };
 
@@ -55,6 +55,8 @@ void declare(CLI::App& app, PictureArguments& a) {
   app.add_option("--size", a.size, "Pixels")->type_name("WIDTHxHEIGHT")->capture_default_str();
   app.add_flag("--cells", a.cells, "Draw the cells of a body instead of its surface");
   app.add_flag("--elements", a.elements, "Draw the elements of a body instead of its surface");
+  app.add_flag("--faces", a.faces,
+               "Write the numbers of the faces on them (part/3), from four sides without --view");
   app.add_flag("--no-outline", a.no_outline, "Leave out the shape at rest");
   app.add_option("--unit", a.unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
   app.add_option("--input-format", a.input_format, "Format of the files, where their bytes do not tell")
@@ -99,6 +101,7 @@ PictureOptions options_of(const PictureArguments& a) {
   if (a.cells && a.elements) throw InputError("--cells and --elements exclude each other: give one of them");
   if (a.cells) options.show = PictureOptions::Show::cells;
   if (a.elements) options.show = PictureOptions::Show::elements;
+  options.faces = a.faces;
   if (!a.colour.empty()) options.colour = a.colour;
   options.outline_at_rest = !a.no_outline;
   options.exaggeration = std::nullopt;

@@ -10,6 +10,9 @@
 #include <thread>
 
 #include "flexel/commands.h"
+#include "flexel/job.h"
+#include "flexel/scene_text.h"
+#include "flexel/study/scene_edit.h"
 #include "flexel/study/session.h"
 #include "formats/files.h"
 #include "formats/program.h"
@@ -25,16 +28,17 @@ namespace {
 namespace fs = std::filesystem;
 
 struct StudyArguments {
-  std::vector<std::string> parts, references;
-  std::string scene, budget = "2 min", output, against, material, unit, heal, edge;
+  JobArguments job;  // parts, and what happens to them
+  std::vector<std::string> references;
+  std::string budget = "2 min", output, against, heal;
   bool quiet = false;
 };
 
 void declare(CLI::App& app, StudyArguments& a) {
-  app.add_option("part", a.parts, "STEP, IGES, BREP, STL, OBJ, PLY, OFF, glTF or 3MF files")
+  app.add_option("part", a.job.parts, "STEP, IGES, BREP, STL, OBJ, PLY, OFF, glTF or 3MF files")
       ->required()
       ->type_name("PART");
-  app.add_option("--scene", a.scene, "Scene file (TOML; docs/scene.md)")->required()->type_name("FILE");
+  declare_scene(app, a.job);
   app.add_option("-o,--output", a.output, "Folder for study.csv, study.json and study.html")
       ->required()
       ->type_name("FOLDER");
@@ -49,11 +53,9 @@ void declare(CLI::App& app, StudyArguments& a) {
   app.add_option("--against", a.against,
                  "calculix: run CalculiX (ccx) on the same scene too, on meshes by gmsh, and draw it beside")
       ->type_name("PROGRAM");
-  app.add_option("--material", a.material, "What the parts are made of, where the scene does not say")
-      ->type_name("NAME");
-  app.add_option("--unit", a.unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
+  app.add_option("--unit", a.job.unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
   app.add_option("--heal", a.heal, "Broken surfaces: auto, wrap or none (docs/healing.md)")->type_name("HOW");
-  app.add_option("--edge", a.edge, "Split the mesh to this longest edge")->type_name("LENGTH");
+  app.add_option("--edge", a.job.edge, "Split the mesh to this longest edge")->type_name("LENGTH");
   app.add_flag("--quiet", a.quiet, "Say only warnings and errors");
 }
 
@@ -101,39 +103,86 @@ void add_references(const std::string& text, const study::SceneFacts& facts,
   references.push_back(given("elastic energy", "J", json["elastic_energy"]));
 }
 
+// What options ask for, as text around that of the scene's file, and the facts of both together.
+std::string whole_scene(const JobArguments& given, const Scene& file) {
+  Job added;
+  added.scene.materials = file.materials;  // for their names
+  add_options(given, added);
+  const auto refuse_both = [&](bool both, const char* option, const std::string& key) {
+    if (both) throw InputError(given.scene, fmt::format("has {} already: leave {} out", key, option));
+  };
+  refuse_both(!file.material.empty() && !added.scene.material.empty(), "--material", "material");
+  refuse_both(file.infill.share && added.scene.infill.share, "--infill", "infill");
+  refuse_both(file.get<Gravity>().acceleration && added.scene.get<Gravity>().acceleration, "--gravity",
+              "[gravity] acceleration");
+  for (const auto& [name, part] : added.scene.parts)
+    refuse_both(file.parts.count(name) > 0, part.origin.c_str(), fmt::format("[parts.\"{}\"]", name));
+  if (added.acts_along_faces()) {
+    ImportOptions import;
+    if (!given.unit.empty()) import.unit = length_unit(given.unit);
+    Progress silent("", Progress::Mode::silent);
+    Body body;
+    body.surface = read_parts(given.parts, import, silent);
+    body.parts.resize(body.surface.parts.size());
+    for (std::size_t p = 0; p < body.parts.size(); ++p) body.parts[p].name = body.surface.parts[p].name;
+    add_actions(added, body);
+  }
+  const SceneText text = scene_text(added.scene);
+  return text.keys + file.text + text.tables;
+}
+
+void make_folder(const std::string& output) {
+  if (fs::exists(output) && !fs::is_directory(output))
+    throw InputError(output, "is a file; -o names the folder of the study");
+  std::error_code error;
+  fs::create_directories(output, error);
+  if (error) throw InputError(output, "cannot be made: " + error.message());
+}
+
+// The scene's file, or, where options add to it or stand for it, one to be written in the study's folder.
+void read_scenes(const StudyArguments& a, study::Case& study_case) {
+  const Scene file = a.job.scene.empty() ? Scene{} : read_scene(a.job.scene);
+  if (a.job.scene.empty()) refuse_idle(a.job);
+  study_case.scene = a.job.scene;
+  study_case.scene_text = whole_scene(a.job, file);
+  if (study_case.scene_text == file.text) return;
+  study_case.scene = (fs::path(a.output) / "study-scene.toml").string();
+  std::error_code none;
+  if (fs::equivalent(a.job.scene, study_case.scene, none))
+    throw InputError(a.job.scene, "is where the study writes its own scene: use another name");
+  study_case.scene_text = study::edited_scene(study_case.scene_text, study_case.scene,
+                                              fs::absolute(a.job.scene).parent_path(), {}, {});
+  (void)parse_scene(study_case.scene_text, study_case.scene);  // all that is wrong with it is said now
+}
+
 study::Assignment assignment(const StudyArguments& a) {
   study::Assignment result;
-  if (std::count(a.parts.begin(), a.parts.end(), "-") > 0 || a.scene == "-")
+  const JobArguments& job = a.job;
+  if (std::count(job.parts.begin(), job.parts.end(), "-") > 0 || job.scene == "-")
     throw InputError("flexel study runs the part and the scene many times: give files, not stdin");
-  for (const std::string& part : a.parts) {
+  for (const std::string& part : job.parts) {
     if (!fs::is_regular_file(part)) throw InputError(part, "no such file");
     result.study_case.parts.push_back(fs::absolute(part).string());
     result.part_names.push_back(fs::path(part).filename().string());
   }
-  const Scene scene = read_scene(a.scene);  // all that is wrong with it is said now
-  result.study_case.scene = a.scene;
-  result.study_case.scene_text = scene.text;
+  read_scenes(a, result.study_case);
   const auto pass = [&](const char* option, const std::string& value) {
     if (value.empty()) return;
     result.study_case.voxelize_options.emplace_back(option);
     result.study_case.voxelize_options.push_back(value);
   };
-  pass("--material", a.material);
-  pass("--unit", a.unit);
+  pass("--unit", job.unit);
   pass("--heal", a.heal);
-  pass("--edge", a.edge);
+  pass("--edge", job.edge);
   if (!a.against.empty() && a.against != "calculix")
     throw InputError(fmt::format("--against: no \"{}\"{}; known: calculix", a.against,
                                  did_you_mean(a.against, {"calculix"})));
   result.against_calculix = !a.against.empty();
   result.budget = parse_timeout(a.budget, "--budget");
-  const study::SceneFacts facts = study::scene_facts(scene.text, a.scene);
+  const study::SceneFacts facts = study::scene_facts(result.study_case.scene_text, result.study_case.scene);
   for (const std::string& text : a.references) add_references(text, facts, result.references);
-  if (fs::exists(a.output) && !fs::is_directory(a.output))
-    throw InputError(a.output, "is a file; -o names the folder of the study");
-  std::error_code error;
-  fs::create_directories(a.output, error);
-  if (error) throw InputError(a.output, "cannot be made: " + error.message());
+  make_folder(a.output);
+  if (result.study_case.scene != job.scene) write_text(result.study_case.scene_text, result.study_case.scene);
   result.output = a.output;
   return result;
 }

@@ -116,6 +116,7 @@ std::vector<Material> materials_of_parts(const Scene& scene, const Body& body) {
       throw InputError(settings.origin, fmt::format("the body has no part \"{}\"{}", name, hint));
     }
   std::vector<Material> materials;
+  bool infill_used = false;  // the scene's
   for (const Part& part : body.parts) {
     PartSettings settings;
     settings.origin = scene.name;
@@ -130,6 +131,7 @@ std::vector<Material> materials_of_parts(const Scene& scene, const Body& body) {
     // an infill belongs to the material that is named with it
     const Infill& infill =
         settings.infill.share || !settings.material.empty() ? settings.infill : scene.infill;
+    infill_used = infill_used || &infill == &scene.infill;
     Material material = material_named(scene, name, settings.origin);
     if (infill.share) {
       const auto index = static_cast<std::size_t>(&part - body.parts.data());
@@ -139,6 +141,10 @@ std::vector<Material> materials_of_parts(const Scene& scene, const Body& body) {
     }
     materials.push_back(std::move(material));
   }
+  if (scene.infill.share && !infill_used)
+    throw InputError(scene.name,
+                     "the infill is that of the scene's material, which no part takes: give it to a part, "
+                     "[parts.NAME] infill = \"20 %\" or --infill \"PART=20%\"");
   return materials;
 }
 

@@ -74,12 +74,14 @@ Layout lay_out(std::size_t panels, const PictureOptions& options, const Legend* 
   return layout;
 }
 
-Framing frame_panels(const std::vector<Panel>& panels, const Layout& layout, const View& view) {
+Framing frame_panels(const std::vector<Panel>& panels, const Layout& layout, const std::vector<View>& views) {
   Framing framing;
+  framing.common_view = views.size() == 1;
+  const auto view_of = [&](std::size_t p) { return views.size() > 1 ? views[p] : views[0]; };
   std::vector<Eigen::Vector4f> boxes;
   std::vector<double> fit;  // pixels a metre
   for (std::size_t p = 0; p < panels.size(); ++p) {
-    const Camera camera = camera_towards(view);
+    const Camera camera = camera_towards(view_of(p));
     const Eigen::Vector4f box = extent_of(panels[p], camera);
     const double width = std::max(1e-6f, box[2] - box[0]), height = std::max(1e-6f, box[3] - box[1]);
     const double pixels =
@@ -91,7 +93,7 @@ Framing frame_panels(const std::vector<Panel>& panels, const Layout& layout, con
                most = *std::max_element(fit.begin(), fit.end());
   framing.common_scale = most <= 4 * least;
   for (std::size_t p = 0; p < panels.size(); ++p) {
-    Camera camera = camera_towards(view);
+    Camera camera = camera_towards(view_of(p));
     const Viewport& room = layout.panels[p];
     camera.pixels = static_cast<float>((framing.common_scale ? least : fit[p]) * panels[p].frame.radius);
     camera.x = static_cast<float>(room.x) + static_cast<float>(room.width) / 2 -

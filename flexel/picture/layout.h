@@ -24,7 +24,10 @@ struct Layout {
 struct Framing {
   std::vector<Camera> cameras;
   bool common_scale = true;
+  bool common_view = true;
 };
-[[nodiscard]] Framing frame_panels(const std::vector<Panel>& panels, const Layout& layout, const View& view);
+// views: (panels), or one for all.
+[[nodiscard]] Framing frame_panels(const std::vector<Panel>& panels, const Layout& layout,
+                                   const std::vector<View>& views);
 
 }  // namespace flexel

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "flexel/picture/face_labels.h"
 #include "flexel/picture/layout.h"
 #include "flexel/picture/lines.h"
 #include "flexel/picture/panel.h"
@@ -132,7 +133,8 @@ void annotate(Image& image, const std::vector<Panel>& panels, const Layout& layo
               const Legend* legend, double exaggeration) {
   const float size = layout.text;
   if (legend != nullptr) draw_legend(image, layout.legend, size, *legend);
-  draw_triad(image, 4.2f * size, layout.foot - 0.5f * size, size, framing.cameras.front());
+  if (framing.common_view)
+    draw_triad(image, 4.2f * size, layout.foot - 0.5f * size, size, framing.cameras.front());
   const float most = 0.2f * static_cast<float>(image.width);
   for (std::size_t p = 0; p < panels.size(); ++p) {
     const Viewport& room = layout.panels[p];
@@ -141,6 +143,9 @@ void annotate(Image& image, const std::vector<Panel>& panels, const Layout& layo
     if (layout.labels)
       draw_text(image, left + width / 2, static_cast<float>(room.y) - size,
                 shortened(panels[p].subject->label, size, width), size, colour(kInk), Anchor::middle);
+    if (!framing.common_view)
+      draw_triad(image, left + 3 * size, static_cast<float>(room.y + room.height) - 2.5f * size, 0.8f * size,
+                 framing.cameras[p]);
     if (!framing.common_scale) {
       draw_scale_bar(image, left, static_cast<float>(room.y + room.height) + 0.2f * size, 0.85f * size,
                      pixels, std::min(most, width / 3));
@@ -153,6 +158,33 @@ void annotate(Image& image, const std::vector<Panel>& panels, const Layout& layo
   for (auto line = lines.rbegin(); line != lines.rend(); ++line, y -= 1.4f * size)
     draw_text(image, static_cast<float>(image.width) - 2.4f * size, y, *line, size, colour(kFaintInk),
               Anchor::right);
+}
+
+// Four sides, one from each corner: every face of most parts is seen in one of them.
+std::vector<View> four_sides(Up up) {
+  return {{45, 30, up}, {225, 30, up}, {135, -30, up}, {315, -30, up}};
+}
+
+// The numbers of the faces, and a note of those that got none.
+void number_faces(Image& image, const std::vector<Panel>& panels, const Layout& layout,
+                  const Framing& framing, std::vector<std::string>& notes) {
+  for (std::size_t p = 0; p < panels.size();) {
+    const PictureSubject* subject = panels[p].subject;
+    const Surface& surface = subject->body ? subject->body->surface : subject->surface;
+    const std::vector<std::string> texts = face_texts(surface);
+    std::vector<std::uint8_t> shown(texts.size(), 0);
+    for (; p < panels.size() && panels[p].subject == subject; ++p)
+      label_faces(image, layout.panels[p], framing.cameras[p], panels[p], texts, 0.95f * layout.text, shown);
+    std::vector<std::string> missing;
+    for (std::size_t f = 0; f < texts.size(); ++f)
+      if (!shown[f]) missing.push_back(texts[f]);
+    const std::size_t count = missing.size();
+    if (count == 0) continue;
+    if (count > 20) missing.resize(20);
+    notes.push_back(
+        fmt::format("{} of {} faces are hidden or too small for a number: {}{}; `flexel info` lists them",
+                    count, texts.size(), fmt::join(missing, ", "), count > 20 ? ", ..." : ""));
+  }
 }
 
 // One factor for all panels, so that they can be compared.
@@ -168,12 +200,13 @@ double exaggeration_of(const std::vector<PictureSubject>& subjects, const Pictur
 }
 
 std::vector<Panel> make_panels(const std::vector<PictureSubject>& subjects, const PictureOptions& options,
-                               const ColourBy& by, Progress& progress) {
+                               const ColourBy& by, std::size_t sides, Progress& progress) {
   std::vector<Panel> panels;
-  for (const PictureSubject& subject : subjects) {
-    panels.push_back(make_panel(subject, options, by, progress));
-    check_stop();
-  }
+  for (const PictureSubject& subject : subjects)
+    for (std::size_t side = 0; side < sides; ++side) {
+      panels.push_back(make_panel(subject, options, by, progress));
+      check_stop();
+    }
   return panels;
 }
 
@@ -190,15 +223,26 @@ PictureResult draw_picture(const std::vector<PictureSubject>& subjects, const Pi
     options.show = PictureOptions::Show::cells;
   const ColourBy by = colour_by(subjects, options);
   if (options.range && by.name.empty()) throw InputError("--range needs a --color to be the range of");
-  std::vector<Panel> panels = make_panels(subjects, options, by, progress);
+  if (options.faces && options.show != PictureOptions::Show::surface)
+    throw InputError("--faces numbers the faces of the surface: leave --cells and --elements out");
+  std::vector<View> views;
+  if (options.faces && !options.view) views = four_sides(options.up);
+  std::vector<Panel> panels =
+      make_panels(subjects, options, by, std::max<std::size_t>(1, views.size()), progress);
   PictureResult result{Image(options.width, options.height, colour(kPaper)), {}};
   std::optional<Legend> legend;
   if (!by.name.empty()) legend = make_legend(panels, by, options, result.notes);
   hint_at_scale(panels, *options.exaggeration, result.notes);
   progress.update(0.4, "choosing the view");
-  const View view = choose_view(panels, options, result.notes);
   const Layout layout = lay_out(panels.size(), options, legend ? &*legend : nullptr);
-  const Framing framing = frame_panels(panels, layout, view);
+  if (views.empty()) {
+    views = {choose_view(panels, options, result.notes)};
+  } else {
+    const std::vector<View> sides = views;
+    for (std::size_t subject = 1; subject < subjects.size(); ++subject)
+      views.insert(views.end(), sides.begin(), sides.end());
+  }
+  const Framing framing = frame_panels(panels, layout, views);
   progress.update(0.5, "casting rays");
   for (std::size_t p = 0; p < panels.size(); ++p) {
     ShadeOptions shade;
@@ -211,6 +255,7 @@ PictureResult draw_picture(const std::vector<PictureSubject>& subjects, const Pi
     }
     draw_panel(result.image, panels[p], layout.panels[p], framing.cameras[p], shade, layout.text / 21);
   }
+  if (options.faces) number_faces(result.image, panels, layout, framing, result.notes);
   annotate(result.image, panels, layout, framing, legend ? &*legend : nullptr, *options.exaggeration);
   return result;
 }

@@ -31,6 +31,7 @@ struct PictureOptions {
       range;                               // as written: numbers with units; else that of the values
   std::optional<double> exaggeration = 1;  // of the displacement; nothing: as chosen for it to be seen
   bool outline_at_rest = true;
+  bool faces = false;  // the numbers of the faces on them, from four sides where no view is given
 };
 
 struct PictureResult {

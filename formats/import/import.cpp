@@ -15,6 +15,7 @@
 #include "formats/import/subdivide.h"
 #include "formats/off.h"
 #include "formats/parallel.h"
+#include "formats/part_name.h"
 #include "formats/program.h"
 
 namespace flexel {
@@ -235,6 +236,8 @@ Surface import_surface(const std::string& path, const ImportOptions& options) {
   surface.sources.at(0).hash = read.hash;
   if (options.largest_edge && !is_cad(format)) subdivide_mesh(surface, *options.largest_edge, input.where);
   surface.part_source.assign(surface.parts.size(), 0);
+  for (SurfacePart& part : surface.parts)
+    if (says_nothing(part.name)) part.name.clear();
   make_part_names_unique(surface, input.stem.empty() ? "part" : input.stem);
   check(surface, input.where);
   const bool has_area = std::any_of(surface.vertices.begin(), surface.vertices.end(),

@@ -98,6 +98,43 @@ TEST(Actions, APushOnASideGoesAlongItsAxis) {
   EXPECT_EQ(scene.get<Ties>().ties[0].motion.translation, Vec3(0, 0, -2e-3));
 }
 
+TEST(Actions, TorquesAndTwistsTurnAboutTheOutwardNormal) {
+  const Body body = with_faces(
+      {{Vec3(0, 0, 1), Vec3(1, 0, 1), Vec3(0, 1, 1)}, {Vec3(1, 0, 1), Vec3(1, 1, 1), Vec3(0, 1, 1)}});
+  Scene scene;
+  add_torque(scene, parse_torque("group: 5 N m"), body);
+  add_torque(scene, parse_torque("group: 1 2 3 Nm"), body);
+  add_twist(scene, parse_twist("group: 10 deg"), body);
+  add_twist(scene, parse_twist("group: 0 -10 0 deg"), body);
+  const std::vector<Load>& loads = scene.get<Loads>().loads;
+  EXPECT_LT((*loads[0].torque - Vec3(0, 0, 5)).norm(), 1e-12);
+  EXPECT_LT((*loads[1].torque - Vec3(1, 2, 3)).norm(), 1e-12);
+  const std::vector<Tie>& ties = scene.get<Ties>().ties;
+  EXPECT_TRUE(ties[0].is_move && ties[1].is_move);
+  EXPECT_LT((ties[0].motion.axis - Vec3::UnitZ()).norm(), 1e-12);
+  EXPECT_LT((ties[0].motion.through - Vec3(0.5, 0.5, 1)).norm(), 1e-12);
+  EXPECT_NEAR(ties[0].motion.angle, M_PI / 18, 1e-12);
+  EXPECT_LT((ties[1].motion.axis + Vec3::UnitY()).norm(), 1e-12);
+  EXPECT_NEAR(ties[1].motion.angle, M_PI / 18, 1e-12);
+}
+
+TEST(Actions, GravityPinsAndProbes) {
+  EXPECT_LT((parse_gravity("1 g") - Vec3(0, 0, -9.80665)).norm(), 1e-12);
+  EXPECT_LT((parse_gravity("0 -2 0 g") - Vec3(0, -2 * 9.80665, 0)).norm(), 1e-12);
+  EXPECT_LT((parse_gravity("0 0 -9.81 m/s^2") - Vec3(0, 0, -9.81)).norm(), 1e-12);
+  for (const char* text : {"9.81", "1 2 m/s^2", "g", "5 N", ""})
+    EXPECT_THROW((void)parse_gravity(text), InputError) << text;
+  EXPECT_THROW((void)parse_bearing("part/3: 200 N"), InputError);
+  EXPECT_THROW((void)parse_bearing("part/3: 0 0 0 N"), InputError);
+  EXPECT_EQ(*parse_bearing("part/3: 0 0 -200 N").vector, Vec3(0, 0, -200));
+  EXPECT_LT((*parse_probe("tip: 10 5 3 mm").at - Vec3(0.010, 0.005, 0.003)).norm(), 1e-15);
+  EXPECT_EQ(parse_probe("tip: part/3").where->name, "part/3");
+  EXPECT_EQ(parse_probe("tip: part/3").name, "tip");
+  EXPECT_EQ(parse_probe("part/3").name, "part/3");
+  for (const char* text : {"tip: 1 2 mm", "", "tip:", ": 1 2 3 mm"})
+    EXPECT_THROW((void)parse_probe(text), InputError) << text;
+}
+
 TEST(Actions, FacesThatLookBothWaysHaveNoDirection) {
   const Body body = with_faces(
       {{Vec3(0, 0, 1), Vec3(1, 0, 1), Vec3(0, 1, 1)}, {Vec3(0, 0, 0), Vec3(0, 1, 0), Vec3(1, 0, 0)}});

@@ -50,8 +50,39 @@ TEST(FaceShape, PartsOfCylindersGiveAxisRadiusAndSide) {
       EXPECT_NEAR(std::abs(shape.axis.dot(kTurn.col(2))), 1, 1e-9);
       EXPECT_NEAR(shape.radius, 0.3, 1e-9);
       EXPECT_EQ(shape.hollow, hollow);
+      EXPECT_NEAR(shape.angle, angle, 0.02);
+      EXPECT_EQ(shape.is_hole(), hollow && angle > 6);
       EXPECT_LT((shape.axis_point - kShift).cross(shape.axis).norm(), 1e-9);
     }
+}
+
+// A hole that the CAD program cut into two faces, and two hollows of half a circle that lie one behind the
+// other.
+TEST(FaceShape, TwoHalvesAreAHoleOnlyWhereTheyLieSideBySide) {
+  for (const double shift : {0.0, 2.0}) {
+    Surface surface;
+    for (int half = 0; half < 2; ++half) {
+      const Surface more = patch(24, [&](double u, double v) -> Vec3 {
+        const double a = M_PI * (1 - u + half);
+        return {0.3 * std::cos(a), 0.3 * std::sin(a), v + half * shift};
+      });
+      const auto base = static_cast<std::uint32_t>(surface.vertices.size());
+      surface.vertices.insert(surface.vertices.end(), more.vertices.begin(), more.vertices.end());
+      if (half == 0) surface.polygon_offsets = {0};
+      for (std::size_t p = 0; p < more.polygon_count(); ++p) {
+        for (const std::uint32_t v : more.polygon(p)) surface.polygon_vertices.push_back(base + v);
+        surface.polygon_offsets.push_back(static_cast<std::uint32_t>(surface.polygon_vertices.size()));
+        surface.polygon_face.push_back(static_cast<std::uint32_t>(half));
+      }
+      surface.faces.push_back({"", 0});
+    }
+    surface.parts = {{"part"}};
+    for (const FaceShape& shape : face_shapes(surface)) {
+      EXPECT_TRUE(shape.hollow);
+      EXPECT_NEAR(shape.angle, M_PI, 0.02);
+      EXPECT_EQ(shape.is_hole(), shift == 0);
+    }
+  }
 }
 
 TEST(FaceShape, OthersAreCurved) {
@@ -75,7 +106,17 @@ TEST(FaceShape, InWords) {
   shape.axis = Vec3::UnitX();
   shape.radius = 4e-3;
   shape.hollow = true;
+  shape.angle = M_PI / 2;
+  EXPECT_EQ(describe(shape, 1e-3, "mm"), "round, fillet of radius 4 mm (90 degrees) along x");
+  shape.angle = M_PI;
+  EXPECT_EQ(describe(shape, 1e-3, "mm"), "round, hollow of radius 4 mm (180 degrees) along x");
+  shape.closed = true;
   EXPECT_EQ(describe(shape, 1e-3, "mm"), "round, hole of diameter 8 mm along x");
+  shape.hollow = false;
+  EXPECT_EQ(describe(shape, 1e-3, "mm"), "round, outside of diameter 8 mm along x");
+  shape.closed = false;
+  shape.angle = 0.5;
+  EXPECT_EQ(describe(shape, 1e-3, "mm"), "round, rounded edge of radius 4 mm (29 degrees) along x");
   EXPECT_EQ(direction_name(Vec3(1, 0, 1).normalized()), "(0.707, 0, 0.707)");
 }
 

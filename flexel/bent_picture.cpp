@@ -1,0 +1,26 @@
+// The body travels in the picture's subject, so that it is not held twice.
+#include "flexel/bent_picture.h"
+
+#include <fmt/format.h>
+
+#include "flexel/picture/picture.h"
+#include "formats/files.h"
+
+namespace flexel {
+
+void write_bent_picture(Body& body, const std::string& path, Progress& progress) {
+  PictureOptions options;
+  options.colour = "displacement";
+  options.exaggeration = std::nullopt;
+  std::vector<PictureSubject> subjects(1);
+  subjects[0].where = path;
+  subjects[0].body = std::move(body);
+  const PictureResult picture = draw_picture(subjects, options, progress);
+  body = std::move(*subjects[0].body);
+  const Bytes bytes = encode_png(picture.image);
+  OutputFile out(path);
+  out.write(bytes.data(), bytes.size());
+  out.commit();
+}
+
+}  // namespace flexel

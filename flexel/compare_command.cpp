@@ -1,0 +1,302 @@
+// flexel compare: which of several parts is stiffer under one scene. Every part gets the same number of cells
+// (or the same spacing), so that their errors are alike, and each its error bars: where those overlap the
+// order is not sure.
+//
+// Stiffness is the resultant of all loads (or of what the moves take) over the largest displacement. Its bar
+// is that of the displacement, or, where a move drives the part, of the elastic energy.
+#include <fmt/format.h>
+
+#include <chrono>
+#include <filesystem>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "flexel/commands.h"
+#include "flexel/job.h"
+#include "formats/error.h"
+#include "formats/files.h"
+#include "formats/parallel.h"
+#include "formats/units.h"
+#include "simulate/simulate.h"
+
+namespace flexel {
+namespace {
+
+struct CompareArguments {
+  JobArguments job;
+  bool json = false, quiet = false;
+  int threads = 0;
+};
+
+// What one part came to; SI.
+struct Finding {
+  std::string file;
+  double mass = 0, volume = 0, displacement = 0, force = 0, seconds = 0, spacing = 0;
+  std::optional<double> bar;        // of the displacement
+  std::optional<double> share;      // of the stiffness: its bar
+  std::optional<double> stiffness;  // nothing without a resultant, or where nothing moves
+  double least = 0, most = std::numeric_limits<double>::infinity();  // of the stiffness
+  std::optional<double> stress, limit;  // largest von Mises stress; what its part yields or breaks at
+  std::string limit_name;               // "yield" or "strength"
+  std::size_t cells = 0;
+};
+
+std::optional<ErrorBar> bar_of(const SimulateResult& result, ErrorBar::Of of) {
+  for (const ErrorBar& each : result.error_bars.bars)
+    if (each.of == of) return each;
+  return std::nullopt;
+}
+
+// Of the loads, else what the moves take.
+double resultant(const SimulateResult& result, const Scene& scene, bool& driven) {
+  Vec3 sum = Vec3::Zero();
+  for (const AppliedLoad& load : result.loads) sum += load.force;
+  driven = false;
+  for (const Tie& tie : scene.get<Ties>().ties) driven = driven || tie.is_move;
+  if (!driven) return sum.norm();
+  sum.setZero();
+  for (const Tie& tie : scene.get<Ties>().ties)
+    for (const Reaction& reaction : result.reactions)
+      if (tie.is_move && reaction.name == tie.name) sum += reaction.force;
+  return sum.norm();
+}
+
+void judge_stiffness(const SimulateResult& result, const Scene& scene, Finding& found) {
+  bool driven = false;
+  found.force = resultant(result, scene, driven);
+  if (const auto bar = bar_of(result, ErrorBar::Of::largest_displacement)) found.bar = bar->bar.half_width;
+  const auto judge =
+      bar_of(result, driven ? ErrorBar::Of::elastic_energy : ErrorBar::Of::largest_displacement);
+  if (judge && judge->value != 0) found.share = judge->bar.half_width / std::abs(judge->value);
+  if (!(found.force > 0 && found.displacement > 0)) return;
+  found.stiffness = found.force / found.displacement;
+  if (!found.share) return;
+  found.least = *found.stiffness / (1 + *found.share);
+  if (*found.share < 1) found.most = *found.stiffness / (1 - *found.share);
+}
+
+void judge_stress(const SimulateResult& result, const Scene& scene, const Body& body, Finding& found) {
+  if (!result.stress) return;
+  found.stress = result.stress->value;
+  const std::vector<Material> materials = materials_of_parts(scene, body);
+  for (std::size_t p = 0; p < body.parts.size(); ++p) {
+    if (body.parts[p].name != result.stress->part) continue;
+    const Material& material = materials[p];
+    if (!(material.yield > 0 || material.strength > 0)) continue;
+    found.limit = material.yield > 0 ? material.yield : material.strength;
+    found.limit_name = material.yield > 0 ? "yield" : "strength";
+  }
+}
+
+// One part's run. A file of one part goes by the name of the first file's, so that one scene fits all.
+Finding run(const CompareArguments& arguments, const std::string& file, std::string& name,
+            Progress& progress) {
+  const auto began = std::chrono::steady_clock::now();
+  JobArguments own = arguments.job;
+  own.parts = {file};
+  Job job = plan_job(own);
+  Surface surface = read_parts(own.parts, job.import, progress);
+  if (surface.parts.size() == 1) {
+    if (name.empty()) name = surface.parts[0].name;
+    surface.parts[0].name = name;
+  }
+  check_parts(job, surface);
+  VoxelizeResult voxels = voxelize(std::move(surface), job.voxelize, progress);
+  Body& body = voxels.body;
+  add_actions(job, body);
+  SimulateOptions options;
+  options.threads = arguments.threads;
+  const SimulateResult result = simulate(body, job.scene, options, progress);
+  Finding found;
+  found.file = std::filesystem::path(file).filename().string();
+  found.mass = result.mass;
+  for (const Part& part : body.parts) found.volume += part.surface_volume;
+  found.displacement = result.largest_displacement;
+  found.cells = body.cell_count();
+  found.spacing = std::cbrt(body.parts.front().lattice.spacing.prod());
+  judge_stiffness(result, job.scene, found);
+  judge_stress(result, job.scene, body, found);
+  found.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  return found;
+}
+
+Finding run_named(const CompareArguments& arguments, const std::string& file, std::string& name,
+                  Progress& progress) {
+  try {
+    return run(arguments, file, name, progress);
+  } catch (const InputError& error) {
+    if (error.where() == file) throw;
+    throw InputError(file, (error.where().empty() ? "" : error.where() + ": ") + error.what());
+  }
+}
+
+std::string mass_text(double kilograms) {
+  return kilograms >= 1 ? fmt::format("{:.4g} kg", kilograms) : fmt::format("{:.4g} g", 1e3 * kilograms);
+}
+
+// "12.3 N/mm"
+std::string stiffness_text(double value) {
+  const double per_mm = 1e-3 * value;
+  return per_mm >= 1000 ? fmt::format("{:.3g} kN/mm", 1e-3 * per_mm) : fmt::format("{:.3g} N/mm", per_mm);
+}
+
+std::vector<std::pair<std::string, std::vector<std::string>>> rows_of(const std::vector<Finding>& all) {
+  std::vector<std::pair<std::string, std::vector<std::string>>> rows;
+  const auto add = [&](const char* title, const auto& text) {
+    std::vector<std::string> row;
+    for (const Finding& each : all) row.push_back(text(each));
+    rows.emplace_back(title, row);
+  };
+  add("mass", [](const Finding& f) { return mass_text(f.mass); });
+  add("volume", [](const Finding& f) { return f.volume > 0 ? human_volume(f.volume) : "open"; });
+  add("largest displacement", [](const Finding& f) {
+    return human_length(f.displacement) + (f.bar ? " +- " + human_length(*f.bar) : "");
+  });
+  add("stiffness", [](const Finding& f) {
+    if (!f.stiffness) return std::string("-");
+    return stiffness_text(*f.stiffness) + (f.share ? fmt::format(" +- {:.2g} %", 100 * *f.share) : "");
+  });
+  add("stiffness by mass", [](const Finding& f) {
+    return f.stiffness ? fmt::format("{:.3g} N/mm/g", 1e-6 * *f.stiffness / f.mass) : std::string("-");
+  });
+  add("largest von Mises stress",
+      [](const Finding& f) { return f.stress ? human_pressure(*f.stress) : "-"; });
+  add("safety factor", [](const Finding& f) {
+    return f.stress && f.limit && *f.stress > 0
+               ? fmt::format("{:.2g} to {}", *f.limit / *f.stress, f.limit_name)
+               : std::string("-");
+  });
+  add("cells", [](const Finding& f) {
+    return fmt::format("{} of {}", human_count(f.cells), human_length(f.spacing));
+  });
+  add("time", [](const Finding& f) { return fmt::format("{:.1f} s", f.seconds); });
+  return rows;
+}
+
+std::string table_of(const std::vector<Finding>& all) {
+  auto rows = rows_of(all);
+  std::vector<std::string> head;
+  for (const Finding& each : all) head.push_back(each.file);
+  rows.insert(rows.begin(), {"", head});
+  std::size_t first = 0;
+  std::vector<std::size_t> width(all.size(), 0);
+  for (const auto& [title, cells] : rows) {
+    first = std::max(first, title.size());
+    for (std::size_t c = 0; c < cells.size(); ++c) width[c] = std::max(width[c], cells[c].size());
+  }
+  std::string text;
+  for (const auto& [title, cells] : rows) {
+    std::string line = fmt::format("{:<{}}", title, first);
+    for (std::size_t c = 0; c < cells.size(); ++c) line += fmt::format("  {:<{}}", cells[c], width[c]);
+    text += line.substr(0, line.find_last_not_of(' ') + 1) + "\n";
+  }
+  return text;
+}
+
+// Indices, the stiffest first.
+std::vector<std::size_t> order_of(const std::vector<Finding>& all) {
+  std::vector<std::size_t> order(all.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return all[a].stiffness.value_or(0) > all[b].stiffness.value_or(0);
+  });
+  return order;
+}
+
+bool clearly_stiffer(const Finding& a, const Finding& b) {
+  return a.share && b.share && a.least > b.most;
+}
+
+std::vector<std::string> verdict(const std::vector<Finding>& all) {
+  for (const Finding& each : all)
+    if (!each.stiffness)
+      return {"no stiffness to compare: the loads of " + each.file +
+              " have no resultant, or nothing moves; compare displacements and stresses above"};
+  const std::vector<std::size_t> order = order_of(all);
+  std::vector<std::string> lines;
+  for (std::size_t i = 0; i + 1 < order.size(); ++i) {
+    const Finding &a = all[order[i]], &b = all[order[i + 1]];
+    const double times = *a.stiffness / *b.stiffness;
+    const std::string mass = fmt::format("{:.2g} times the mass", a.mass / b.mass);
+    if (clearly_stiffer(a, b))
+      lines.push_back(fmt::format("{} is {:.3g} times as stiff as {}, with {}", a.file, times, b.file, mass));
+    else
+      lines.push_back(fmt::format(
+          "not sure which of {} and {} is stiffer: {}; a smaller --size or a larger --count "
+          "makes the bars narrower",
+          a.file, b.file, a.share && b.share ? "their error bars overlap" : "there are no error bars"));
+  }
+  return lines;
+}
+
+using Json = nlohmann::ordered_json;
+
+Json number(const std::optional<double>& value) {
+  return value && std::isfinite(*value) ? Json(*value) : Json();
+}
+
+std::string json_of(const std::vector<Finding>& all) {
+  Json parts = Json::array(), order = Json::array();
+  for (const Finding& f : all)
+    parts.push_back(
+        {{"file", f.file},
+         {"mass", f.mass},
+         {"volume", f.volume},
+         {"largest_displacement", f.displacement},
+         {"largest_displacement_bar", number(f.bar)},
+         {"force", f.force},
+         {"stiffness", number(f.stiffness)},
+         {"stiffness_bar", {f.share ? number(f.least) : Json(), f.share ? number(f.most) : Json()}},
+         {"von_mises", number(f.stress)},
+         {"limit", number(f.limit)},
+         {"limit_is", f.limit_name},
+         {"cells", f.cells},
+         {"spacing", f.spacing},
+         {"seconds", f.seconds}});
+  const std::vector<std::size_t> stiffest = order_of(all);
+  bool sure = true;
+  for (std::size_t i = 0; i < stiffest.size(); ++i) {
+    order.push_back(all[stiffest[i]].file);
+    if (i > 0) sure = sure && clearly_stiffer(all[stiffest[i - 1]], all[stiffest[i]]);
+  }
+  return Json{{"parts", parts}, {"stiffest_first", order}, {"sure", sure}}.dump(2) + "\n";
+}
+
+}  // namespace
+
+int compare_command(int argc, char** argv) {
+  CompareArguments arguments;
+  CLI::App app{"Which of several parts is stiffer under one scene: mass, displacement, stiffness, stress.",
+               "flexel compare"};
+  declare_job(app, arguments.job);
+  app.add_flag("--json", arguments.json, "As JSON, in SI units (docs/compare.md)");
+  app.add_option("--threads", arguments.threads, "Threads; 0 is every core")->check(CLI::NonNegativeNumber);
+  app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
+  if (!parse_arguments(app, argc, argv)) return kExitDone;
+  if (arguments.job.parts.size() < 2) throw InputError("two parts at least are compared: name another file");
+  if (std::count(arguments.job.parts.begin(), arguments.job.parts.end(), "-") > 0 ||
+      arguments.job.scene == "-")
+    throw InputError("flexel compare reads its scene once for each part: give files, not stdin");
+  if (plan_job(arguments.job).scene.run.time)
+    throw InputError(arguments.job.scene,
+                     "flexel compare is for runs to equilibrium, and this scene is a timed run");
+  const ThreadLimit limit(arguments.threads);
+  Progress progress("flexel", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
+  Progress inner("flexel", Progress::Mode::quiet);
+  std::vector<Finding> all;
+  std::string name;
+  for (const std::string& file : arguments.job.parts) {
+    progress.stage(std::filesystem::path(file).filename().string());
+    all.push_back(run_named(arguments, file, name, inner));
+  }
+  progress.finish();
+  std::string text = arguments.json ? json_of(all) : table_of(all);
+  if (!arguments.json)
+    for (const std::string& line : verdict(all)) text += line + "\n";
+  OutputFile out("-", false);
+  out.write(text);
+  out.commit();
+  return kExitDone;
+}
+
+}  // namespace flexel

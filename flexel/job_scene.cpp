@@ -1,0 +1,172 @@
+// What happens to the parts, from a scene file and from options on top of it.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "flexel/job.h"
+#include "formats/error.h"
+#include "formats/units.h"
+#include "simulate/material_names.h"
+
+namespace flexel {
+namespace {
+
+// "knob=PLA" is of part "knob", "PLA" of every part that has none of its own ("").
+struct OfPart {
+  std::string part, value;
+};
+
+OfPart split_part(const std::string& text, const char* option, const char* example) {
+  const std::size_t equals = text.rfind('=');
+  OfPart split;
+  if (equals != std::string::npos) split.part = text.substr(0, equals);
+  split.value = equals == std::string::npos ? text : text.substr(equals + 1);
+  if (split.value.empty() || (equals != std::string::npos && split.part.empty()))
+    throw InputError(
+        fmt::format("{} \"{}\": write {} {} or {} PART={}", option, text, option, example, option, example));
+  return split;
+}
+
+PartSettings& settings_of(Scene& scene, const std::string& part, const char* option) {
+  PartSettings& settings = scene.parts[part];
+  if (settings.origin.empty()) settings.origin = option;
+  return settings;
+}
+
+// A material must be known before the work begins.
+void plan_materials(const JobArguments& arguments, Scene& scene) {
+  std::vector<std::string> known;
+  for (const auto& [name, material] : scene.materials) known.push_back(name);
+  for (const Material& material : material_library()) known.push_back(material.name);
+  for (const std::string& text : arguments.materials) {
+    const OfPart given = split_part(text, "--material", "PLA");
+    const auto is_given = [&](const auto& own) { return same_material_name(own.first, given.value); };
+    if (!library_material(given.value) &&
+        std::none_of(scene.materials.begin(), scene.materials.end(), is_given)) {
+      const std::string hint = did_you_mean(given.value, known);
+      throw InputError(
+          fmt::format("--material: no material \"{}\"{}", given.value,
+                      hint.empty() ? fmt::format("; the library has {}", fmt::join(known, ", ")) : hint));
+    }
+    (given.part.empty() ? scene.material : settings_of(scene, given.part, "--material").material) =
+        given.value;
+  }
+}
+
+void plan_infill(const JobArguments& arguments, Scene& scene) {
+  const std::optional<double> shell =
+      arguments.shell.empty() ? std::nullopt
+                              : std::optional<double>(parse_quantity(arguments.shell, Dimension::length));
+  for (const std::string& text : arguments.infills) {
+    const OfPart given = split_part(text, "--infill", "20%");
+    Infill& infill = given.part.empty() ? scene.infill : settings_of(scene, given.part, "--infill").infill;
+    infill.share = parse_quantity(given.value, Dimension::share);
+    if (shell) infill.shell = shell;
+    check_infill(infill, "--infill");
+  }
+  if (shell && arguments.infills.empty()) scene.infill.shell = shell;
+  check_infill(scene.infill, "--shell");
+}
+
+}  // namespace
+
+void declare_scene(CLI::App& app, JobArguments& arguments) {
+  const auto add = [&](const char* name, std::vector<std::string>& values, const char* what,
+                       const char* type) {
+    app.add_option(name, values, what)->type_name(type)->allow_extra_args(false);
+  };
+  app.add_option("--scene", arguments.scene, "Scene file (TOML; docs/scene.md)")->type_name("FILE");
+  add("--fix", arguments.fixes, "Hold this surface: \"xmin\", \"part/3\" (`flexel info` lists faces)",
+      "WHERE");
+  add("--push", arguments.pushes,
+      "Push a surface: \"xmax: 0 0 -50 N\", \"part/3: 50 N\" (inwards), \"part/3: 2 MPa\"", "WHERE:FORCE");
+  add("--move", arguments.moves, "Move a surface: \"xmax: 0 0 -2 mm\", \"part/3: 2 mm\" (inwards)",
+      "WHERE:LENGTH");
+  add("--torque", arguments.torques,
+      "Turn a surface by a couple: \"xmax: 5 N m\" (about its axis), \"part/3: 0 0 5 N m\"", "WHERE:TORQUE");
+  add("--twist", arguments.twists,
+      "Turn a surface by an angle: \"xmax: 10 deg\" (about its axis), \"part/3: 0 0 10 deg\"", "WHERE:ANGLE");
+  add("--bearing", arguments.bearings, "Press on a hole as a pin does: \"part/3: 0 0 -200 N\"",
+      "WHERE:FORCE");
+  app.add_option("--gravity", arguments.gravity, "Weight: \"1 g\" (along -z), \"0 -9.81 0 m/s^2\"")
+      ->type_name("ACCELERATION");
+  add("--probe", arguments.probes,
+      "Say how far a point or a surface moves: \"tip: 80 5 3 mm\", \"tip: part/3\"", "NAME:POINT");
+  add("--material", arguments.materials,
+      "What the parts are made of: steel, PLA, ... (docs/scene.md); of one part: \"knob=PLA\"",
+      "[PART=]NAME");
+  add("--infill", arguments.infills, "Printed with this infill: 20%; of one part: \"knob=20%\" (an estimate)",
+      "[PART=]SHARE");
+  app.add_option("--shell", arguments.shell, "With --infill: thickness of the solid walls (\"1 mm\")")
+      ->type_name("LENGTH");
+}
+
+void refuse_idle(const JobArguments& arguments) {
+  if (arguments.materials.empty()) {
+    std::vector<std::string> known;
+    for (const Material& material : material_library()) known.push_back(material.name);
+    throw InputError(
+        fmt::format("no material: add --material NAME; the library has {}", fmt::join(known, ", ")));
+  }
+  if (arguments.gravity.empty() && arguments.pushes.empty() && arguments.moves.empty() &&
+      arguments.torques.empty() && arguments.twists.empty() && arguments.bearings.empty())
+    throw InputError(
+        "nothing acts on the part: add --push \"WHERE: 0 0 -50 N\", --move \"WHERE: 0 0 -2 mm\", --torque, "
+        "--twist, --bearing, --gravity or --scene FILE");
+}
+
+void add_options(const JobArguments& arguments, Job& job) {
+  plan_materials(arguments, job.scene);
+  plan_infill(arguments, job.scene);
+  for (const std::string& where : arguments.fixes)
+    job.scene.get<Ties>().ties.push_back(make_fix(parse_where(where, "--fix")));
+  for (const std::string& text : arguments.pushes) job.pushes.push_back(parse_push(text));
+  for (const std::string& text : arguments.moves) job.moves.push_back(parse_move(text));
+  for (const std::string& text : arguments.torques) job.torques.push_back(parse_torque(text));
+  for (const std::string& text : arguments.twists) job.twists.push_back(parse_twist(text));
+  for (const std::string& text : arguments.bearings) add_bearing(job.scene, parse_bearing(text));
+  for (const std::string& text : arguments.probes) job.scene.probes.push_back(parse_probe(text));
+  if (arguments.gravity.empty()) return;
+  std::optional<Vec3>& acceleration = job.scene.get<Gravity>().acceleration;
+  if (acceleration)
+    throw InputError(job.scene.name, "has [gravity] acceleration already: leave --gravity out");
+  acceleration = parse_gravity(arguments.gravity);
+}
+
+void plan_scene(const JobArguments& arguments, Job& job) {
+  if (arguments.scene.empty()) {
+    job.scene.name = "the command line";
+    refuse_idle(arguments);
+  } else {
+    job.scene = read_scene(arguments.scene);
+  }
+  add_options(arguments, job);
+}
+
+void check_parts(const Job& job, const Surface& surface) {
+  std::vector<std::string> names;
+  for (const SurfacePart& part : surface.parts) names.push_back(part.name);
+  for (const auto& [name, settings] : job.scene.parts)
+    if (settings.origin.rfind("--", 0) == 0 && std::find(names.begin(), names.end(), name) == names.end())
+      throw InputError(fmt::format("{}: no part \"{}\"{}", settings.origin, name,
+                                   did_you_mean(name, names).empty()
+                                       ? fmt::format("; the file has {}", fmt::join(names, ", "))
+                                       : did_you_mean(name, names)));
+  if (!job.scene.material.empty()) return;
+  for (const std::string& name : names)
+    if (const auto found = job.scene.parts.find(name);
+        found == job.scene.parts.end() || found->second.material.empty())
+      throw InputError(
+          fmt::format("part \"{}\" has no material: add --material NAME for every part that has none "
+                      "of its own, or --material \"{}=NAME\"",
+                      name, name));
+}
+
+void add_actions(Job& job, const Body& body) {
+  for (const Action& push : job.pushes) add_push(job.scene, push, body);
+  for (const Action& move : job.moves) add_move(job.scene, move, body);
+  for (const Action& torque : job.torques) add_torque(job.scene, torque, body);
+  for (const Action& twist : job.twists) add_twist(job.scene, twist, body);
+}
+
+}  // namespace flexel

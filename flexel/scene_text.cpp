@@ -1,0 +1,109 @@
+// Numbers with all their digits: what is read is what was written.
+#include "flexel/scene_text.h"
+
+#include <fmt/format.h>
+
+namespace flexel {
+namespace {
+
+// A TOML string.
+std::string quoted(const std::string& text) {
+  std::string result = "\"";
+  for (const char letter : text) {
+    if (letter == '"' || letter == '\\') result += '\\';
+    if (static_cast<unsigned char>(letter) < 0x20)
+      result += fmt::format("\\u{:04x}", static_cast<unsigned>(letter));
+    else
+      result += letter;
+  }
+  return result + "\"";
+}
+
+std::string quantity(double value, const char* unit) {
+  return fmt::format("\"{:.17g} {}\"", value, unit);
+}
+
+std::string vector(const Vec3& value, const char* unit) {
+  return fmt::format("[{}, {}, {}]", quantity(value.x(), unit), quantity(value.y(), unit),
+                     quantity(value.z(), unit));
+}
+
+std::string direction(const Vec3& value) {
+  return fmt::format("[{:.17g}, {:.17g}, {:.17g}]", value.x(), value.y(), value.z());
+}
+
+std::string where_text(const Selection& selection) {
+  switch (selection.kind) {
+    case Selection::Kind::name:
+      return quoted(selection.name);
+    case Selection::Kind::box:
+      return fmt::format("{{ box = {{ min = {}, max = {} }} }}", vector(selection.min, "m"),
+                         vector(selection.max, "m"));
+    case Selection::Kind::sphere:
+      return fmt::format("{{ sphere = {{ centre = {}, radius = {} }} }}", vector(selection.point, "m"),
+                         quantity(selection.radius, "m"));
+    case Selection::Kind::half_space:
+      return fmt::format("{{ half_space = {{ point = {}, normal = {} }} }}", vector(selection.point, "m"),
+                         direction(selection.normal));
+    case Selection::Kind::complement:
+      return fmt::format("{{ not = {} }}", where_text(selection.members.front()));
+    case Selection::Kind::any_of:
+      break;
+  }
+  std::string members;
+  for (const Selection& member : selection.members)
+    members += (members.empty() ? "" : ", ") + where_text(member);
+  return "[" + members + "]";
+}
+
+std::string infill_text(const Infill& infill) {
+  std::string text;
+  if (infill.share) text += fmt::format("infill = {:.17g}\n", *infill.share);
+  if (infill.shell) text += fmt::format("shell = {}\n", quantity(*infill.shell, "m"));
+  return text;
+}
+
+std::string tie_text(const Tie& tie) {
+  std::string text = fmt::format("\n[[{}]]\nname = {}\nwhere = {}\n", tie.is_move ? "move" : "fix",
+                                 quoted(tie.name), where_text(tie.where));
+  if (!tie.is_move) return text;
+  if (tie.motion.angle == 0)
+    return text + fmt::format("displacement = {}\n", vector(tie.motion.translation, "m"));
+  return text + fmt::format("rotation = {{ axis = {}, through = {}, angle = {} }}\n",
+                            direction(tie.motion.axis), vector(tie.motion.through, "m"),
+                            quantity(tie.motion.angle, "rad"));
+}
+
+std::string load_text(const Load& load) {
+  std::string text =
+      fmt::format("\n[[load]]\nname = {}\nwhere = {}\n", quoted(load.name), where_text(load.where));
+  if (load.force)
+    text += fmt::format("{} = {}\n", load.bearing ? "bearing" : "force", vector(*load.force, "N"));
+  if (load.torque) text += fmt::format("torque = {}\n", vector(*load.torque, "N m"));
+  if (load.pressure) text += fmt::format("pressure = {}\n", quantity(*load.pressure, "Pa"));
+  return text;
+}
+
+}  // namespace
+
+SceneText scene_text(const Scene& scene) {
+  SceneText text;
+  if (!scene.material.empty()) text.keys += fmt::format("material = {}\n", quoted(scene.material));
+  text.keys += infill_text(scene.infill);
+  for (const auto& [name, part] : scene.parts) {
+    text.tables += fmt::format("\n[parts.{}]\n", quoted(name));
+    if (!part.material.empty()) text.tables += fmt::format("material = {}\n", quoted(part.material));
+    text.tables += infill_text(part.infill);
+  }
+  for (const Tie& tie : scene.get<Ties>().ties) text.tables += tie_text(tie);
+  for (const Load& load : scene.get<Loads>().loads) text.tables += load_text(load);
+  for (const Probe& probe : scene.probes)
+    text.tables +=
+        fmt::format("\n[[probe]]\nname = {}\n{}\n", quoted(probe.name),
+                    probe.at ? "at = " + vector(*probe.at, "m") : "where = " + where_text(*probe.where));
+  if (const std::optional<Vec3>& acceleration = scene.get<Gravity>().acceleration)
+    text.tables += fmt::format("\n[gravity]\nacceleration = {}\n", vector(*acceleration, "m/s^2"));
+  return text;
+}
+
+}  // namespace flexel
