@@ -48,11 +48,11 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_option("--deflection", arguments.deflection,
                  "STEP: largest distance of the triangles from the CAD surface");
   app.add_option(
-         "--edge", arguments.edge,
-         "split the mesh to this longest edge (default: STEP a 64th of the file's diagonal, meshes not)")
-      app.add_option("--input-format,--format", arguments.format,
-                     "format of the input (step, iges, brep, stl, obj, ply, off, glb, 3mf) instead of what "
-                     "its bytes tell");
+      "--edge", arguments.edge,
+      "split the mesh to this longest edge (default: STEP a 64th of the file's diagonal, meshes not)");
+  app.add_option("--input-format,--format", arguments.format,
+                 "format of the input (step, iges, brep, stl, obj, ply, off, glb, 3mf) instead of what "
+                 "its bytes tell");
   app.add_option("--threads", arguments.threads, "threads; 0 (default): every core");
   app.add_flag("--compress", arguments.compress, "compress the arrays of the body file");
   app.add_flag("--quiet", arguments.quiet, "say warnings only");
