@@ -32,28 +32,31 @@ bool holds(const Box& box, const Vec3& point, double margin) {
          (point.array() <= box.max.array() + margin).all();
 }
 
-// The polygons that have sample points in each cube of a grid.
+// A polygon of the coarser part, with the normal of its first sample point.
+struct Facing {
+  std::uint32_t polygon = 0;
+  Vec3 normal = Vec3::Zero();
+  Box box;
+};
+
+// Polygons by the cubes of a grid in which they have sample points.
 class Grid {
  public:
-  Grid(const std::vector<SurfacePoint>& points, double width) : width_(width) {
-    for (const SurfacePoint& point : points) {
-      std::vector<std::uint32_t>& polygons = cubes_[key(cube(point.position))];
-      if (polygons.empty() || polygons.back() != point.polygon) polygons.push_back(point.polygon);
-    }
+  explicit Grid(double width) : width_(width) {}
+  void add(const Vec3& point, std::uint32_t polygon) {
+    std::vector<std::uint32_t>& polygons = cubes_[key(cube(point))];
+    if (polygons.empty() || polygons.back() != polygon) polygons.push_back(polygon);
   }
-  // Polygons with a sample in the cubes around `point`, ascending.
-  [[nodiscard]] std::vector<std::uint32_t> polygons_near(const Vec3& point) const {
-    std::vector<std::uint32_t> polygons;
+  // use(polygon) for those with a sample in the cubes around `point`, some more than once.
+  template <class Use>
+  void for_each_near(const Vec3& point, const Use& use) const {
     const std::array<std::int64_t, 3> middle = cube(point);
     for (std::int64_t n = 0; n < 27; ++n) {
       const auto found =
           cubes_.find(key({middle[0] + n % 3 - 1, middle[1] + n / 3 % 3 - 1, middle[2] + n / 9 - 1}));
       if (found == cubes_.end()) continue;
-      polygons.insert(polygons.end(), found->second.begin(), found->second.end());
+      for (const std::uint32_t polygon : found->second) use(polygon);
     }
-    std::sort(polygons.begin(), polygons.end());
-    polygons.erase(std::unique(polygons.begin(), polygons.end()), polygons.end());
-    return polygons;
   }
 
  private:
@@ -151,30 +154,33 @@ double TouchingSearch::distance(const Vec3& point, std::uint32_t polygon) const 
 
 void TouchingSearch::touch(std::uint32_t finer, std::uint32_t coarser) {
   const double limit = std::max(tolerance(finer), wider_gap(finer, coarser));
-  struct Facing {
-    Vec3 normal;
-    Box box;
-  };
-  std::unordered_map<std::uint32_t, Facing> facing;
-  for (const SurfacePoint& point : points_[coarser])
-    if (facing.count(point.polygon) == 0)
-      facing[point.polygon] = {point.area_vector.normalized(), polygon_box(body_.surface, point.polygon)};
-  const Grid grid(points_[coarser], 0.5 * body_.parts[coarser].lattice.spacing.minCoeff());
+  const double width = 0.5 * body_.parts[coarser].lattice.spacing.minCoeff();
+  std::vector<Facing> facing;
+  std::unordered_map<std::uint32_t, std::uint32_t> number;  // of a polygon in `facing`
+  Grid grid(width);
+  for (const SurfacePoint& point : points_[coarser]) {
+    const auto [entry, added] = number.try_emplace(point.polygon, static_cast<std::uint32_t>(facing.size()));
+    if (added)
+      facing.push_back(
+          {point.polygon, point.area_vector.normalized(), polygon_box(body_.surface, point.polygon)});
+    // No point of the finer part looks further than into the next cube.
+    if (holds(box_[finer], point.position, 2 * width)) grid.add(point.position, entry->second);
+  }
   for (const SurfacePoint& point : points_[finer]) {
     if (!holds(box_[coarser], point.position, limit)) continue;
     const Vec3 own = point.area_vector.normalized();
     double least = limit;
-    std::optional<std::uint32_t> nearest;
-    for (const std::uint32_t polygon : grid.polygons_near(point.position)) {
-      const Facing& other = facing.at(polygon);
-      if (own.dot(other.normal) > kFacing || !holds(other.box, point.position, limit)) continue;
-      const double away = distance(point.position, polygon);
-      if (away > least || (nearest && away == least)) continue;
+    const Facing* nearest = nullptr;
+    grid.for_each_near(point.position, [&](std::uint32_t n) {
+      const Facing& other = facing[n];
+      if (own.dot(other.normal) > kFacing || !holds(other.box, point.position, limit)) return;
+      const double away = distance(point.position, other.polygon);
+      if (away > least || (nearest && away == least && other.polygon >= nearest->polygon)) return;
       least = away;
-      nearest = polygon;
-    }
+      nearest = &other;
+    });
     if (!nearest) continue;
-    const auto at = carrier_on_surface(setting_, *nearest, point.position, facing.at(*nearest).normal);
+    const auto at = carrier_on_surface(setting_, nearest->polygon, point.position, nearest->normal);
     if (!at) continue;
     found_.push_back(
         {{finer, coarser},

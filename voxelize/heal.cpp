@@ -177,7 +177,10 @@ std::string cure(const std::vector<UndecidedPart>& parts) {
   for (const UndecidedPart& each : parts) {
     if (std::chrono::steady_clock::now() - begin > kPatience) break;
     ++tried;
-    closed += wrapped(each.part->mesh, kAlpha * diagonal_of(each.part->mesh)).has_value();
+    const double alpha = kAlpha * diagonal_of(each.part->mesh);
+    const Hole* widest = widest_hole(*each.part);
+    const bool gets_inside = widest && widest->width > alpha;
+    closed += !gets_inside && wrapped(each.part->mesh, alpha);
   }
   if (tried == closed)
     return fmt::format("repair {} in a mesh program, or take a wrap of {}: --heal wrap",

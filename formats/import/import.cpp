@@ -50,19 +50,33 @@ bool sized_like_binary_stl(const ImportInput& input) {
   return input.bytes.size() == 84 + std::size_t{50} * count;
 }
 
-// The encoding of text whose characters are two or four bytes wide, by where its bytes are 0; "" for others.
+// The encoding of text whose characters are two or four bytes wide, by which of their bytes are 0 and which
+// are letters; "" for all else. Most of a part's text is ASCII.
 std::string wide_encoding(const ImportInput& input) {
   constexpr std::size_t kLooked = 256;
-  const std::size_t size = std::min(input.bytes.size(), kLooked) / 4 * 4;
-  std::array<std::size_t, 4> zeros{};
-  for (std::size_t i = 0; i < size; ++i) zeros[i % 4] += input.bytes[i] == std::byte{0};
-  std::array<bool, 4> blank{};  // bytes of a place in the character that are 0 but for a few
-  for (std::size_t i = 0; i < 4; ++i) blank[i] = size > 0 && 10 * zeros[i] >= 9 * (size / 4);
-  const auto is = [&](bool a, bool b, bool c, bool d) { return blank == std::array{a, b, c, d}; };
-  if (is(false, true, false, true)) return "UTF-16LE";
-  if (is(true, false, true, false)) return "UTF-16BE";
-  if (is(false, true, true, true)) return "UTF-32LE";
-  if (is(true, true, true, false)) return "UTF-32BE";
+  const auto at = [&](std::size_t i) { return static_cast<unsigned char>(input.bytes[i]); };
+  const bool short_mark =
+      input.bytes.size() >= 4 && ((at(0) == 0xff && at(1) == 0xfe) || (at(0) == 0xfe && at(1) == 0xff));
+  const bool long_mark =
+      (short_mark && at(2) == 0 && at(3) == 0) ||
+      (input.bytes.size() >= 4 && at(0) == 0 && at(1) == 0 && at(2) == 0xfe && at(3) == 0xff);
+  const std::size_t begin = long_mark ? 4 : short_mark ? 2 : 0;
+  const std::size_t quads = std::min(input.bytes.size() - begin, kLooked) / 4;
+  std::array<std::size_t, 4> zeros{}, letters{};
+  for (std::size_t i = 0; i < 4 * quads; ++i) {
+    const unsigned char byte = at(begin + i);
+    zeros[i % 4] += byte == 0;
+    letters[i % 4] += (byte >= ' ' && byte < 0x7f) || (byte >= '\t' && byte <= '\r');
+  }
+  const auto is = [&](std::string_view kinds) {  // 0: a zero, c: a letter
+    for (std::size_t i = 0; i < 4; ++i)
+      if (10 * (kinds[i] == '0' ? zeros : letters)[i] < 9 * quads) return false;
+    return quads > 0;
+  };
+  if (is("c0c0")) return "UTF-16LE";
+  if (is("0c0c")) return "UTF-16BE";
+  if (is("c000")) return "UTF-32LE";
+  if (is("000c")) return "UTF-32BE";
   return "";
 }
 

@@ -39,6 +39,11 @@ bool is_geometry(const Handle(Standard_Transient) & entity) {
          entity->IsKind(STANDARD_TYPE(StepShape_TopologicalRepresentationItem));
 }
 
+// Units come from far outside the geometry, and without them lengths are wrong.
+bool is_unit(const Handle(Standard_Transient) & entity) {
+  return std::string_view(entity->DynamicType()->Name()).find("Unit") != std::string_view::npos;
+}
+
 // "#176" of "Unresolved Reference, Ent.Id.#176 Param.n0 4 (Id.#225)", or "".
 std::string label_in(std::string_view message) {
   constexpr std::string_view kBefore = "Ent.Id.";
@@ -48,14 +53,14 @@ std::string label_in(std::string_view message) {
   return std::string(label.substr(0, label.find(' ')));
 }
 
-// A reference from a solid to something that is not in the file. OpenCASCADE keeps these apart, as messages
-// on the whole.
+// A reference from a solid or a unit to something that is not in the file. OpenCASCADE keeps these apart, as
+// messages on the whole.
 void check_references(const Handle(Interface_InterfaceModel) & model, const ImportInput& input) {
   const Handle(Interface_Check) check = model->GlobalCheck();
   const auto examine = [&](Standard_CString message) {
     const std::string label = label_in(message);
     const Standard_Integer number = label.empty() ? 0 : model->NextNumberForLabel(label.c_str());
-    if (number > 0 && is_geometry(model->Value(number)))
+    if (number > 0 && (is_geometry(model->Value(number)) || is_unit(model->Value(number))))
       throw InputError(input.where, damage_message(message));
   };
   for (Standard_Integer i = 1; i <= check->NbFails(); ++i) examine(check->CFail(i));
@@ -74,7 +79,7 @@ std::string check_loaded(const STEPControl_Reader& reader, const ImportInput& in
   for (checks.Start(); checks.More(); checks.Next()) {
     if (!checks.Value()->HasFailed() || checks.Number() < 1) continue;
     const Handle(Standard_Transient) entity = model->Value(checks.Number());
-    if (!is_geometry(entity)) continue;
+    if (!is_geometry(entity) && !is_unit(entity)) continue;
     const std::string found =
         fmt::format("{}: {}", model->StringLabel(entity)->ToCString(), checks.Value()->CFail(1));
     if (!entity->IsKind(STANDARD_TYPE(StepGeom_GeometricRepresentationItem)) ||
@@ -85,20 +90,29 @@ std::string check_loaded(const STEPControl_Reader& reader, const ImportInput& in
   return damage;
 }
 
-// Whether every solid of the file came out, closed and valid.
-bool solids_are_sound(const STEPControl_Reader& reader, const TopoDS_Shape& shape) {
+// The file's solids, by what OpenCASCADE made of them.
+struct SolidCount {
+  std::size_t sound = 0;  // closed
+  std::size_t unsound = 0, missing = 0;
+};
+
+SolidCount count_solids(const STEPControl_Reader& reader) {
   const Handle(Interface_InterfaceModel) model = reader.WS()->Model();
   const Handle(Transfer_TransientProcess) process = reader.WS()->TransferReader()->TransientProcess();
-  bool any = false;
+  SolidCount count;
   for (Standard_Integer i = 1; i <= model->NbEntities(); ++i) {
     if (!model->Value(i)->IsKind(STANDARD_TYPE(StepShape_SolidModel))) continue;
     const TopoDS_Shape solid = TransferBRep::ShapeResult(process, model->Value(i));
-    if (solid.IsNull() || solid.ShapeType() != TopAbs_SOLID) return false;
+    if (solid.IsNull()) {
+      ++count.missing;
+      continue;
+    }
+    bool closed = solid.ShapeType() == TopAbs_SOLID;
     for (TopExp_Explorer shells(solid, TopAbs_SHELL); shells.More(); shells.Next())
-      if (!BRep_Tool::IsClosed(shells.Current())) return false;
-    any = true;
+      closed = closed && BRep_Tool::IsClosed(shells.Current());
+    ++(closed ? count.sound : count.unsound);
   }
-  return any && BRepCheck_Analyzer(shape).IsValid();
+  return count;
 }
 
 TopoDS_Shape transfer(STEPControl_Reader& reader, ImportInput& input, const ImportOptions& options) {
@@ -111,14 +125,18 @@ TopoDS_Shape transfer(STEPControl_Reader& reader, ImportInput& input, const Impo
   const std::string damage = check_loaded(reader, input);
   reader.TransferRoots();
   const TopoDS_Shape shape = reader.OneShape();
-  if (damage.empty()) return shape;
-  if (shape.IsNull() || !solids_are_sound(reader, shape))
+  const SolidCount solids = count_solids(reader);
+  if (!damage.empty() && (shape.IsNull() || solids.sound == 0 || solids.unsound + solids.missing > 0 ||
+                          !BRepCheck_Analyzer(shape).IsValid()))
     throw InputError(input.where, damage_message(damage));
-  if (options.warn)
+  if (!damage.empty() && options.warn)
     options.warn(
         fmt::format("{} {}; its solids are closed and valid all the same: compare their volume with "
                     "that in the CAD program",
                     input.file, damage_message(damage)));
+  if (solids.sound > 0 && solids.missing > 0 && options.warn)
+    options.warn(fmt::format("{} holds {} solids that belong to no product and are left out; {} are read",
+                             input.file, solids.missing, solids.sound));
   return shape;
 }
 
