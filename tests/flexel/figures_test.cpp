@@ -121,7 +121,7 @@ INSTANTIATE_TEST_SUITE_P(OfEveryModel, Figures,
                          ::testing::Values(ModelCase{"cells", Placement::corner},
                                            ModelCase{"springs", Placement::corner},
                                            ModelCase{"paper", Placement::centre}),
-                         [](const auto& info) { return std::string(info.param.model); });
+                         [](const auto& each) { return std::string(each.param.model); });
 
 // Tension is the same everywhere: so is the stress, at elements beside the part as well.
 TEST(FiguresOfStress, UniformTensionIsUniform) {
