@@ -163,9 +163,13 @@ void check_actions(const Scene& scene, const Body& body, Progress& progress) {
   warn_of_unused_materials(scene, body, progress);
   if (!scene.run.time) refuse_courses(scene);
   const std::vector<Tie>& ties = scene.get<Ties>().ties;
-  const HeldMasks held = held_masks(ties, true, body), fixes = held_masks(ties, false, body);
-  for (const Tie& tie : ties)
-    if (tie.is_move) check_move(tie, fixes, body);
+  if (std::any_of(ties.begin(), ties.end(), [](const Tie& tie) { return tie.is_move; })) {
+    const HeldMasks fixes = held_masks(ties, false, body);
+    for (const Tie& tie : ties)
+      if (tie.is_move) check_move(tie, fixes, body);
+  }
+  if (scene.get<Loads>().loads.empty()) return;
+  const HeldMasks held = held_masks(ties, true, body);
   for (const Load& load : scene.get<Loads>().loads) {
     check_held(load, held_share(load, held, body), progress);
     check_side(load, body, progress);
