@@ -230,7 +230,8 @@ std::string info_json(const Surface& surface, const Known& known) {
       Json part = part_json(parts[p]);
       part["faces"] = Json::array();
       for (const std::uint32_t f : parts[p].faces)
-        part["faces"].push_back(face_json(surface.faces[f], numbers[f], parts[p].name, shapes[f]));
+        part["faces"].push_back(face_json(surface.faces[f], numbers[f],
+                                          selection_of(f, numbers, surface, parts[p].name), shapes[f]));
       file["parts"].push_back(part);
     }
     files.push_back(file);

@@ -121,11 +121,15 @@ void check_held(const Load& load, double share, Progress& progress) {
 // A surface that is led, on elements that are held: neither gets its way. (What is led and held by the same
 // kind of selection is refused where ties are made.)
 void check_move(const Tie& move, const HeldMasks& fixes, const Body& body) {
-  if (move.motion.translation == Vec3::Zero() && move.motion.angle == 0) return;
+  std::uint8_t moving = 0;  // axes along which it goes somewhere
+  for (int axis = 0; axis < 3; ++axis)
+    if (move.motion.angle != 0 || move.motion.translation[axis] != 0)
+      moving = static_cast<std::uint8_t>(moving | (axes_of(move) & 1 << axis));
+  if (moving == 0) return;
   double both = 0, whole = 0;
   for (const std::uint32_t p : resolve(move.where, body).polygons) {
     const double area = area_vector(body.surface.vertices, body.surface.polygon(p)).norm();
-    if ((held_under(fixes, body, p) & axes_of(move)) != 0) both += area;
+    if ((held_under(fixes, body, p) & moving) != 0) both += area;
     whole += area;
   }
   if (both > kPartlyHeld * whole)
@@ -159,9 +163,13 @@ void check_actions(const Scene& scene, const Body& body, Progress& progress) {
   warn_of_unused_materials(scene, body, progress);
   if (!scene.run.time) refuse_courses(scene);
   const std::vector<Tie>& ties = scene.get<Ties>().ties;
-  const HeldMasks held = held_masks(ties, true, body), fixes = held_masks(ties, false, body);
-  for (const Tie& tie : ties)
-    if (tie.is_move) check_move(tie, fixes, body);
+  if (std::any_of(ties.begin(), ties.end(), [](const Tie& tie) { return tie.is_move; })) {
+    const HeldMasks fixes = held_masks(ties, false, body);
+    for (const Tie& tie : ties)
+      if (tie.is_move) check_move(tie, fixes, body);
+  }
+  if (scene.get<Loads>().loads.empty()) return;
+  const HeldMasks held = held_masks(ties, true, body);
   for (const Load& load : scene.get<Loads>().loads) {
     check_held(load, held_share(load, held, body), progress);
     check_side(load, body, progress);

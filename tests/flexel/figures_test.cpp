@@ -121,9 +121,10 @@ INSTANTIATE_TEST_SUITE_P(OfEveryModel, Figures,
                          ::testing::Values(ModelCase{"cells", Placement::corner},
                                            ModelCase{"springs", Placement::corner},
                                            ModelCase{"paper", Placement::centre}),
-                         [](const auto& info) { return std::string(info.param.model); });
+                         [](const auto& each) { return std::string(each.param.model); });
 
-// Tension is the same everywhere: so is the stress, at elements beside the part as well.
+// Away from the ends tension is the same everywhere, and so is the stress, at elements beside the part as
+// well.
 TEST(FiguresOfStress, UniformTensionIsUniform) {
   VoxelizeOptions options;
   options.size = 0.0021;
@@ -139,9 +140,14 @@ TEST(FiguresOfStress, UniformTensionIsUniform) {
   const SimulateResult result = simulate(body, scene, run, quiet);
   EXPECT_NEAR(result.stress->value, 1e6, 0.25e6);
   const std::vector<double>& column = body.element_columns.at("von_mises").values;
-  double least = 1e300;
-  for (const double each : column) least = std::min(least, each);
-  EXPECT_GT(least, 0.75e6);
+  int judged = 0;
+  for (std::size_t e = 0; e < column.size(); ++e) {
+    const double along = (askew().transpose() * body.rest[e]).x() / kLength;
+    if (std::abs(along - 0.5) > 0.25) continue;  // from the ends, where cells are pulled through cut faces
+    EXPECT_NEAR(column[e], 1e6, 0.1e6) << along;
+    ++judged;
+  }
+  EXPECT_GT(judged, 100);
 }
 
 TEST(FiguresOfStress, AnInsideOutGradientHasNoStrain) {

@@ -89,7 +89,11 @@ TEST(Courses, AreRefusedAtEquilibrium) {
   EXPECT_THAT(load, ::testing::AllOf(HasSubstr("load \"xmax\""), HasSubstr("[run] time = \"2 s\"")));
   EXPECT_THAT(refusal(small(), bar("[[move]]\nwhere = \"xmax\"\ndisplacement = [\"1 um\", 0, 0]\n" + course)),
               HasSubstr("move \"xmax\""));
-  EXPECT_THAT(refusal(small(), bar("contact = true\n" + kPush + course)), HasSubstr("unknown key"));
+  EXPECT_THAT(
+      refusal(small(), parse_scene("contact = true\nmaterial = \"steel\"\n[[fix]]\nwhere = \"xmin\"\n" +
+                                       kPush + course,
+                                   "s.toml")),
+      HasSubstr("load \"xmax\""));
   EXPECT_EQ(refusal(small(), bar(kPush)), "accepted");
 }
 
@@ -254,8 +258,8 @@ TEST(Torques, ThatTurnWhatTheyActOnAreTold) {
       EXPECT_GT(std::abs(found / height - 1), 0.05);
       ASSERT_EQ(warnings_of(result).size(), 1u);
       EXPECT_THAT(warnings_of(result)[0], ::testing::AllOf(HasSubstr("load \"end\""), HasSubstr("degrees"),
-                                                           HasSubstr("% of the torque is left")));
-      EXPECT_THAT(summary_json(result, body), HasSubstr("% of the torque is left"));
+                                                           HasSubstr("% of its torque is left")));
+      EXPECT_THAT(summary_json(result, body), HasSubstr("% of its torque is left"));
     }
   }
 }

@@ -114,7 +114,7 @@ TEST(Scene, RefusesWithLineAndReason) {
       {"[run]\nuntil = \"tomorrow\"\n", "s.toml:2", "equilibrium"},
       {"[run]\ntolerance = 5\n", "s.toml:1", "tolerance"},
       {"[[probe]]\nname = \"p\"\n", "s.toml:1", "either \"at\""},
-      {"[gravity]\nacceleration = [0, 0, nan]\n", "s.toml:2", "bare number"},
+      {"[gravity]\nacceleration = [0, 0, nan]\n", "s.toml:2", "finite"},
       {"gravity = 3\n", "s.toml:1", "table"},
   };
   for (const Wrong& wrong : cases) {
