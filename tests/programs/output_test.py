@@ -229,7 +229,7 @@ def test_newton_iterations_are_bounded():
 def test_timeout():
     box()
     expect_ok(run("flexel-voxelize", "box.stl", "--size", "1 mm", "-o", "body.vtu"))
-    inputs = ["box.stl", "body.vtu", scene(text=SCENE + "[run]\nload_steps = 100000\n")]
+    inputs = ["box.stl", "body.vtu", scene(text=SCENE + "[run]\nload_steps = 10000\n")]
     began = time.monotonic()
     result = run("flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu", "--timeout", "4 s")
     expect(time.monotonic() - began < 40, "it took too long to stop")
@@ -238,7 +238,7 @@ def test_timeout():
 
 
 def test_timeout_of_deform():
-    inputs = [box(), scene(text=SCENE + "[run]\nload_steps = 100000\n")]
+    inputs = [box(), scene(text=SCENE + "[run]\nload_steps = 10000\n")]
     result = run("flexel", "deform", "box.stl", "--size", "1 mm", "--scene", "scene.toml", "--timeout", "4s", "-o", "out.stl")
     expect_error(result, "flexel", "stopped by --timeout", "out.failed.vtu", code=5)
     expect_failed_state("out.failed.vtu", *inputs)
