@@ -152,11 +152,12 @@ void LoadStepping::refuse_load() const {
       materials.push_back(part.material);
   const double diagonal = bounding_box(mechanics_.body().rest).diagonal();
   throw DivergedError(fmt::format(
-      "the load{} would move the part by {} at its first stiffness, {:.3g} times its size of {}: check the "
-      "unit of "
+      "the load{} would move the part by {} at its first stiffness, {} times its size of {}: check the unit "
+      "of "
       "the part (--unit), the load, and the stiffness of {}; [run] load_steps = 10 tries it all the same",
       force > 0 ? fmt::format(" ({} in all)", human_force(force)) : "", human_length(reach_),
-      reach_ / diagonal, human_length(diagonal), fmt::join(materials, ", ")));
+      human_count(static_cast<std::size_t>(std::min(reach_ / diagonal, 1e15))), human_length(diagonal),
+      fmt::join(materials, ", ")));
 }
 
 bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {

@@ -228,18 +228,18 @@ def test_newton_iterations_are_bounded():
 
 def test_timeout():
     box()
-    expect_ok(run("flexel-voxelize", "box.stl", *FINE, "-o", "body.vtu"))
-    inputs = ["box.stl", "body.vtu", scene(text=SCENE + "[run]\nload_steps = 100\n")]
+    expect_ok(run("flexel-voxelize", "box.stl", "--size", "1 mm", "-o", "body.vtu"))
+    inputs = ["box.stl", "body.vtu", scene(text=SCENE + "[run]\nload_steps = 10000\n")]
     began = time.monotonic()
-    result = run("flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu", "--timeout", "2 s")
+    result = run("flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu", "--timeout", "4 s")
     expect(time.monotonic() - began < 40, "it took too long to stop")
     expect_error(result, "flexel-simulate", "stopped by --timeout", "% of the load", "out.failed.vtu", code=5)
     expect_failed_state("out.failed.vtu", *inputs)
 
 
 def test_timeout_of_deform():
-    inputs = [box(), scene(text=SCENE + "[run]\nload_steps = 100\n")]
-    result = run("flexel", "deform", "box.stl", *FINE, "--scene", "scene.toml", "--timeout", "1s", "-o", "out.stl")
+    inputs = [box(), scene(text=SCENE + "[run]\nload_steps = 10000\n")]
+    result = run("flexel", "deform", "box.stl", "--size", "1 mm", "--scene", "scene.toml", "--timeout", "4s", "-o", "out.stl")
     expect_error(result, "flexel", "stopped by --timeout", "out.failed.vtu", code=5)
     expect_failed_state("out.failed.vtu", *inputs)
 
