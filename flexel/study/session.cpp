@@ -23,8 +23,8 @@ namespace fs = std::filesystem;
 
 constexpr double kLookCells = 2000, kFewestCells = 200;
 constexpr int kRungs = 12;
-constexpr double kLadderShare = 0.65;  // of the budget, until when another size begins
-constexpr double kFirstShare = 0.8;    // the same of the first run of any other trial
+constexpr double kLadderShare = 0.7;  // of the budget, until when another size begins
+constexpr double kFirstShare = 0.83;  // the same of the first run of any other trial
 // Of the budget, for comparing the surfaces, for pictures and the page; at least so many seconds.
 constexpr double kFinishShare = 0.12, kFinishLeast = 3;
 constexpr double kMemoryShare = 0.8;  // of what is free
@@ -211,7 +211,8 @@ void Session::repeat_all(Sweep& sweep) {
     for (const Row& row : study_.rows)
       if (!row.found.ok()) {
         failed.insert(row.trial.label);
-      } else if (row.trial.sweep == "resolution" || row.trial.sweep == "calculix") {
+      } else if ((row.trial.sweep == "resolution" || row.trial.sweep == "calculix") &&
+                 row.found.thin_matter <= kThinMatter) {
         auto& entry = seen[row.trial.label];
         if (entry.first == nullptr) entry.first = &row;
         entry.second.push_back(row.found.wall);
