@@ -188,7 +188,9 @@ bool Session::run_cheapest(Sweep& sweep) {
 // What speaks against a first run; "" where nothing does.
 std::string Session::why_not(const Trial& trial, const Prediction& told) const {
   const bool size = trial.sweep == "resolution" || trial.sweep == "calculix";
-  const double time_left = (size ? kLadderShare : kFirstShare) * wanted_.budget - spent();
+  // Something is better than nothing: the first of all may take what there is.
+  const double time_left =
+      study_.rows.empty() ? left() : (size ? kLadderShare : kFirstShare) * wanted_.budget - spent();
   if (told.seconds > time_left)
     return fmt::format("time: {} were left for {}", human_seconds(std::max(0.0, time_left)),
                        size ? "another size" : "first runs");
