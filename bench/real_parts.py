@@ -60,7 +60,7 @@ def chain(part, unit, size, scene, folder):
     """Runs the pipe; gives the summary and the wall seconds."""
     summary, mapped = folder / "summary.json", folder / "out.stl"
     began = time.monotonic()
-    command = (f'set -o pipefail; flexel-voxelize "{part}" {unit} --size "{size:.9g} m" --quiet | '
+    command = (f'set -o pipefail; flexel-voxelize "{part}" {unit} --size "{size:.9g} m" --edge "{4 * size:.9g} m" --quiet | '
                f'flexel-simulate "{scene}" --summary "{summary}" --quiet | flexel-map --format stl --quiet --strict > "{mapped}"')
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=1500)
     if done.returncode:

@@ -23,8 +23,8 @@ namespace fs = std::filesystem;
 
 constexpr double kLookCells = 2000, kFewestCells = 200;
 constexpr int kRungs = 12;
-constexpr double kLadderShare = 0.65;  // of the budget, until when another size begins
-constexpr double kFirstShare = 0.8;    // the same of the first run of any other trial
+constexpr double kLadderShare = 0.7;  // of the budget, until when another size begins
+constexpr double kFirstShare = 0.83;  // the same of the first run of any other trial
 // Of the budget, for comparing the surfaces, for pictures and the page; at least so many seconds.
 constexpr double kFinishShare = 0.12, kFinishLeast = 3;
 constexpr double kMemoryShare = 0.8;  // of what is free
@@ -188,7 +188,9 @@ bool Session::run_cheapest(Sweep& sweep) {
 // What speaks against a first run; "" where nothing does.
 std::string Session::why_not(const Trial& trial, const Prediction& told) const {
   const bool size = trial.sweep == "resolution" || trial.sweep == "calculix";
-  const double time_left = (size ? kLadderShare : kFirstShare) * wanted_.budget - spent();
+  // Something is better than nothing: the first of all may take what there is.
+  const double time_left =
+      study_.rows.empty() ? left() : (size ? kLadderShare : kFirstShare) * wanted_.budget - spent();
   if (told.seconds > time_left)
     return fmt::format("time: {} were left for {}", human_seconds(std::max(0.0, time_left)),
                        size ? "another size" : "first runs");
@@ -211,7 +213,8 @@ void Session::repeat_all(Sweep& sweep) {
     for (const Row& row : study_.rows)
       if (!row.found.ok()) {
         failed.insert(row.trial.label);
-      } else if (row.trial.sweep == "resolution" || row.trial.sweep == "calculix") {
+      } else if ((row.trial.sweep == "resolution" || row.trial.sweep == "calculix") &&
+                 row.found.thin_matter <= kThinMatter) {
         auto& entry = seen[row.trial.label];
         if (entry.first == nullptr) entry.first = &row;
         entry.second.push_back(row.found.wall);

@@ -9,6 +9,7 @@
 #include "flexel/study/session.h"
 #include "formats/error.h"
 #include "formats/files.h"
+#include "formats/units.h"
 
 namespace flexel::study {
 namespace {

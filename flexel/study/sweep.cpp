@@ -80,12 +80,20 @@ std::vector<Trial> Sweep::open() const {
         break;
       }
   if (const std::optional<Trial> next = next_against()) all.push_back(*next);
-  if (const std::optional<std::size_t> rung = climbing() ? std::nullopt : middle()) {
+  const std::optional<std::size_t> rung = climbing() ? std::nullopt : middle();
+  if (rung) {
     add_models(all, *rung);
-    add_choices(all, *rung);
+    if (facts_.timed) add_timed(all, rungs_[*rung]);
+    add_effects(all, rungs_[*rung]);
   }
-  for (const Trial& each : all)
-    if (closed_.count(each.label) == 0) result.push_back(each);
+  const auto take_open = [&] {
+    for (const Trial& each : all)
+      if (closed_.count(each.label) == 0) result.push_back(each);
+  };
+  take_open();
+  if (!result.empty() || !rung) return result;
+  add_switches(all, *rung);
+  take_open();
   return result;
 }
 
@@ -138,7 +146,8 @@ std::optional<std::size_t> Sweep::middle() const {
   return best;
 }
 
-void Sweep::add_choices(std::vector<Trial>& trials, std::size_t r) const {
+// What changes the time or the last digits only.
+void Sweep::add_switches(std::vector<Trial>& trials, std::size_t r) const {
   const Rung& rung = rungs_[r];
   for (const char* method : {"gram-schmidt", "affine", "smooth", "blended"}) {
     if (method == first_.method) continue;
@@ -152,16 +161,13 @@ void Sweep::add_choices(std::vector<Trial>& trials, std::size_t r) const {
     trials.push_back(
         trial("threads", threads == 1 ? "1 thread" : fmt::format("{} threads", threads), rung.size, each));
   }
-  if (facts_.timed)
-    add_timed(trials, rung);
-  else
-    for (const double tolerance : kTolerances) {
-      if (tolerance == facts_.tolerance) continue;
-      Configuration each = first_;
-      each.tolerance = tolerance;
-      trials.push_back(trial("tolerance", fmt::format("tolerance {:.0e}", tolerance), rung.size, each));
-    }
-  add_effects(trials, rung);
+  if (facts_.timed) return;
+  for (const double tolerance : kTolerances) {
+    if (tolerance == facts_.tolerance) continue;
+    Configuration each = first_;
+    each.tolerance = tolerance;
+    trials.push_back(trial("tolerance", fmt::format("tolerance {:.0e}", tolerance), rung.size, each));
+  }
 }
 
 void Sweep::add_timed(std::vector<Trial>& trials, const Rung& rung) const {

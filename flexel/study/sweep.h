@@ -81,7 +81,7 @@ class Sweep {
   [[nodiscard]] bool climbing() const;  // the ladder is not at its end
   [[nodiscard]] std::optional<std::size_t> middle() const;
   void add_models(std::vector<Trial>& trials, std::size_t rung) const;
-  void add_choices(std::vector<Trial>& trials, std::size_t rung) const;
+  void add_switches(std::vector<Trial>& trials, std::size_t rung) const;
   void add_timed(std::vector<Trial>& trials, const Rung& rung) const;
   void add_effects(std::vector<Trial>& trials, const Rung& rung) const;
   [[nodiscard]] std::optional<Trial> next_against() const;

@@ -116,9 +116,9 @@ RunResult run_with(std::vector<Quantity> quantities) {
 
 TEST(StudyMeasure, TheWorstDecidingQuantityIsTheError) {
   std::vector<Reference> references(3);
-  references[0] = {"a", "m", 2, 0.002, std::nullopt, "", true};
-  references[1] = {"b", "m", -1, 0.02, std::nullopt, "", true};
-  references[2] = {"c", "m", 1, 9, std::nullopt, "", false};
+  references[0] = {"a", "m", 2, 0.002, std::nullopt, "", true, ""};
+  references[1] = {"b", "m", -1, 0.02, std::nullopt, "", true, ""};
+  references[2] = {"c", "m", 1, 9, std::nullopt, "", false, ""};
   const RunResult run = run_with({{"a", "m", 2.2}, {"b", "m", -0.95}, {"c", "m", 50}});
   EXPECT_NEAR(error_of(run, references)->error, 0.1, 1e-12);
   EXPECT_NEAR(error_of(run, references)->uncertainty, 0.02, 1e-12);
