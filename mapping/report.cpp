@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "formats/human.h"
 #include "formats/program.h"
 #include "formats/units.h"
 #include "mapping/frame.h"
@@ -30,8 +31,8 @@ double largest_strain(const MapResult& result, const std::vector<Mat3>& gradient
 }
 
 std::string share(std::size_t count, std::size_t of) {
-  const double percent = 100.0 * static_cast<double>(count) / static_cast<double>(of);
-  return fmt::format("{} of {} vertices ({:.3g} %)", human_count(count), human_count(of), percent);
+  return fmt::format("{} of {} vertices ({})", human_count(count), human_count(of),
+                     human_share(static_cast<double>(count) / static_cast<double>(of)));
 }
 
 // Why a mapping that fails must not be used.
@@ -114,8 +115,9 @@ void add_triangle_lines(const MapReport& report, std::vector<std::string>& lines
 
 std::string volume_line(const MapReport& report) {
   const SurfaceQuality& quality = report.quality;
-  std::string line = fmt::format("largest displacement {}, strain {:.3g} %",
-                                 human_length(report.largest_displacement), 100 * report.largest_strain);
+  std::string line =
+      fmt::format("largest displacement {}, strain {}", human_length(report.largest_displacement),
+                  human_share(report.largest_strain));
   if (!(quality.volume_before > 0) || !std::isfinite(quality.volume_after)) return line;
   const double change = 100 * (quality.volume_after / quality.volume_before - 1);
   line += fmt::format(", volume {} -> {} ({:+.3g} %", human_volume(quality.volume_before),
