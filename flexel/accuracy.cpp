@@ -20,9 +20,8 @@ namespace flexel {
 namespace {
 
 constexpr double kAim = 0.7;  // of the error asked for, when the next size is chosen
-// Between the spacings of two runs. Closer ones differ by how their cells meet the surface; the largest step
-// is made where the error bars tell the order. 2 gives eight times the cells: one run of that costs a seventh
-// of the next.
+// Between the spacings of two runs: closer ones differ by how their cells meet the surface; the usual step
+// where no error is known yet.
 constexpr double kLeastStep = 1.4, kUsualStep = 2, kMostStep = 4;
 constexpr double kCellsThroughWalls = 4;  // of which a lattice four times as coarse has one left
 constexpr double kBelow = 1.06;           // half a step between preferred numbers
@@ -223,21 +222,14 @@ class Search {
   [[nodiscard]] double wanted_size() const {
     const SolvedRun& last = runs_.back();
     if (!goal_.error) return last.size / 100;  // as fine as the time allows
-    double wanted = last.size / kUsualStep;
-    if (judged_ && knows_order()) {
-      const double step = std::pow(judged_->error / (kAim * *goal_.error), 1 / judged_->order);
-      wanted = last.size / std::clamp(step, kLeastStep, kMostStep);
-    }
+    double step = kUsualStep;
+    if (judged_)  // of order 1 where the bars show none
+      step = std::clamp(std::pow(judged_->error / (kAim * *goal_.error), 1 / judged_->order), kLeastStep,
+                        kMostStep);
+    const double wanted = last.size / step;
     // Not a little above it: three cells become one and a half on the coarser lattice of an error bar.
     return std::min(wanted, last.wall / kCellsThroughWalls / kBelow);
   }
-  // Of the error bars: three times a difference tells no order.
-  [[nodiscard]] bool knows_order() const {
-    for (const Quantity& each : quantities_.of(runs_.back(), runs_.back()))
-      if (each.name == judged_->of) return !each.bar || each.bar->order.has_value();
-    return false;
-  }
-
   void say_unaffordable(const study::Prediction& told) {
     report_.stopped =
         told.bytes > memory_limit()

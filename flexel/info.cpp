@@ -8,6 +8,7 @@
 #include "flexel/commands.h"
 #include "flexel/coordinates.h"
 #include "flexel/face_shape.h"
+#include "formats/human.h"
 #include "formats/import.h"
 #include "formats/program.h"
 #include "formats/progress.h"
@@ -88,7 +89,8 @@ Unit unit_of(const SurfaceSource& source) {
 
 std::string place(const Vec3& at, const Unit& unit) {
   const auto tidy = [&](double x) { return std::abs(x) < 1e-9 * unit.metres ? 0.0 : x / unit.metres; };
-  return fmt::format("({:.4g}, {:.4g}, {:.4g})", tidy(at.x()), tidy(at.y()), tidy(at.z()));
+  return fmt::format("({}, {}, {})", human_number(tidy(at.x()), 4), human_number(tidy(at.y()), 4),
+                     human_number(tidy(at.z()), 4));
 }
 
 std::string closedness(const PartInfo& part) {
@@ -107,21 +109,25 @@ std::string closedness(const PartInfo& part) {
 
 std::string part_text(const PartInfo& part, const Unit& unit) {
   const Vec3 size = part.box.size() / unit.metres;
-  std::string text = fmt::format("part \"{}\"\n  size       {:.6g} x {:.6g} x {:.6g} {}, from {} to {}\n",
-                                 part.name, size.x(), size.y(), size.z(), unit.name,
-                                 place(part.box.min, unit), place(part.box.max, unit));
+  std::string text =
+      fmt::format("part \"{}\"\n  size       {} x {} x {} {}, from {} to {}\n", part.name,
+                  human_number(size.x(), 6), human_number(size.y(), 6), human_number(size.z(), 6), unit.name,
+                  place(part.box.min, unit), place(part.box.max, unit));
   text += fmt::format("  mesh       {} vertices, {} polygons; {}\n", human_count(part.vertices),
                       human_count(part.polygons), closedness(part));
-  text += fmt::format("  area       {:.6g} {}^2\n", part.area / (unit.metres * unit.metres), unit.name);
+  text += fmt::format("  area       {} {}^2\n", human_number(part.area / (unit.metres * unit.metres), 6),
+                      unit.name);
   const MeasuredPart& healed = part.healed;
   if (healed.volume)
-    text += fmt::format("  volume     {:.6g} {}^3\n", *healed.volume / std::pow(unit.metres, 3), unit.name);
+    text += fmt::format("  volume     {} {}^3\n", human_number(*healed.volume / std::pow(unit.metres, 3), 6),
+                        unit.name);
   else
     text += "  volume     none: the surface is not closed\n";
   for (const std::string& line : healing_lines(healed.healing)) text += "  healed     " + line + "\n";
   if (healed.thinnest)
-    text += fmt::format("  thinnest   wall {:.4g} {} at {}\n", healed.thinnest->thickness / unit.metres,
-                        unit.name, place(healed.thinnest->where, unit));
+    text += fmt::format("  thinnest   wall {} {} at {}\n",
+                        human_number(healed.thinnest->thickness / unit.metres, 4), unit.name,
+                        place(healed.thinnest->where, unit));
   return text;
 }
 

@@ -73,6 +73,7 @@ std::string with_bar(double value, double bar, std::span<const Scale> ascending)
 std::string with_separators(std::string digits) {
   const std::size_t begin = digits.find_first_of("0123456789");
   std::size_t at = std::min(digits.find('.'), digits.size());
+  if (at - begin < 5) return digits;  // 4000, but 40,000
   while (at > begin + 3) digits.insert(at -= 3, 1, ',');
   return digits;
 }

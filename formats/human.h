@@ -6,7 +6,8 @@
 
 namespace flexel {
 
-// `digits` significant digits, never an exponent, trailing zeros left out: 637500 is "637,500".
+// `digits` significant digits, never an exponent, trailing zeros left out: 637500 is "637,500",
+// 4000 "4000".
 [[nodiscard]] std::string human_number(double value, int digits = 3);
 
 // Two significant digits: 0.0234 is "2.3 %", 2.37 "240 %"; from ten on "24 times"; below a hundredth of a

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "formats/human.h"
 #include "formats/program.h"
 #include "formats/units.h"
 #include "mapping/chord.h"
@@ -31,8 +32,8 @@ double largest_stretch(const MapResult& result, const std::vector<Mat3>& gradien
 }
 
 std::string share(std::size_t count, std::size_t of) {
-  const double percent = 100.0 * static_cast<double>(count) / static_cast<double>(of);
-  return fmt::format("{} of {} vertices ({:.3g} %)", human_count(count), human_count(of), percent);
+  return fmt::format("{} of {} vertices ({})", human_count(count), human_count(of),
+                     human_share(static_cast<double>(count) / static_cast<double>(of)));
 }
 
 // "4mm", as options take it.
@@ -45,9 +46,9 @@ std::string as_option(double metres) {
 // What the triangles do not show, and with which edges they would.
 std::string coarseness(const ChordError& chord) {
   return fmt::format(
-      "its triangles, up to {} long, stay flat where the part bends and miss it by up to {} ({:.2g} % of the "
+      "its triangles, up to {} long, stay flat where the part bends and miss it by up to {} ({} of the "
       "largest displacement) at ({}, {}, {}); read the mesh with --edge {} to split them",
-      human_length(chord.longest_edge), human_length(chord.largest), 100 * chord.share(),
+      human_length(chord.longest_edge), human_length(chord.largest), human_share(chord.share()),
       human_length(chord.at.x()), human_length(chord.at.y()), human_length(chord.at.z()),
       as_option(sufficient_edge(chord)));
 }
@@ -134,8 +135,8 @@ void add_triangle_lines(const MapReport& report, std::vector<std::string>& lines
 
 std::string volume_line(const MapReport& report) {
   const SurfaceQuality& quality = report.quality;
-  std::string line = fmt::format("vertices move by up to {}, stretched by up to {:.3g} %",
-                                 human_length(report.largest_displacement), 100 * report.largest_strain);
+  std::string line = fmt::format("vertices move by up to {}, stretched by up to {}",
+                                 human_length(report.largest_displacement), human_share(report.largest_strain));
   if (!(quality.volume_before > 0) || !std::isfinite(quality.volume_after)) return line;
   const double change = 100 * (quality.volume_after / quality.volume_before - 1);
   line += fmt::format(", volume {} -> {} ({:+.3g} %", human_volume(quality.volume_before),

@@ -19,6 +19,7 @@
 #include <numbers>
 
 #include "formats/error.h"
+#include "formats/human.h"
 #include "formats/stop.h"
 #include "formats/units.h"
 #include "simulate/link_balance.h"
@@ -198,9 +199,9 @@ void LoadStepping::diverge() const {
   const std::string advice =
       overloaded()
           ? fmt::format(
-                "At its first stiffness the load would move the part by {}, {:.2g} times its size: "
+                "At its first stiffness the load would move the part by {}, {} times its size: "
                 "check the unit of the part and the load",
-                human_length(reach_), reach_ / diagonal)
+                human_length(reach_), human_number(reach_ / diagonal, 2))
           : "Use a smaller load or move, a smaller spacing or a stiffer material; a part that buckles or "
             "snaps through has no equilibrium nearby";
   throw DivergedError(

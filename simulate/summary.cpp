@@ -5,6 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "formats/human.h"
 #include "formats/program.h"
 #include "formats/units.h"
 #include "simulate/report.h"
@@ -264,7 +265,7 @@ std::vector<std::string> summary_lines(const SimulateResult& result) {
   }
   if (result.stress) {
     const std::string share = result.stress->yield_share
-                                  ? fmt::format(", {:.3g} % of yield", 100 * *result.stress->yield_share)
+                                  ? fmt::format(", {} of yield", human_share(*result.stress->yield_share))
                                   : "";
     lines.push_back(fmt::format("largest von Mises stress {}{} in \"{}\" at {}{}",
                                 human_pressure(result.stress->value), stress_bar_of(result),

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <cmath>
 
+#include "formats/human.h"
 #include "formats/units.h"
 #include "voxelize/heal.h"
 #include "voxelize/report_assembly.h"
@@ -19,15 +20,14 @@ std::string spacing_text(const Vec3& spacing) {
 void say_volume(const VoxelizedPart& part, const std::string& name, Placement placement, Progress& progress) {
   if (!part.closed) return;
   const double lattice = part.lattice_volume + part.dropped_volume;
-  progress.say(fmt::format("{}: volume of the lattice {}, of the surface {}{} (relative difference {:.1e})",
-                           name, human_volume(lattice), human_volume(part.surface_volume),
+  progress.say(fmt::format("{}: volume of the lattice {}, of the surface {}{} ({} apart)", name,
+                           human_volume(lattice), human_volume(part.surface_volume),
                            part.overlapping_voxels > 0 ? " (union of its shells)" : "",
-                           std::abs(lattice / part.surface_volume - 1)));
+                           human_share(std::abs(lattice / part.surface_volume - 1))));
   if (placement == Placement::corner && part.dropped_cells > 0)
-    progress.say(
-        fmt::format("{}: {} slivers under 1/64 of a cell dropped, {} together ({:.1e} of the volume)", name,
-                    human_count(part.dropped_cells), human_volume(part.dropped_volume),
-                    part.dropped_volume / part.surface_volume));
+    progress.say(fmt::format("{}: {} under 1/64 of a cell dropped, {} together ({} of the volume)", name,
+                             counted(part.dropped_cells, "sliver"), human_volume(part.dropped_volume),
+                             human_share(part.dropped_volume / part.surface_volume)));
 }
 
 void say_repairs(const VoxelizedPart& part, const std::string& name, Progress& progress) {
@@ -38,11 +38,11 @@ void say_repairs(const VoxelizedPart& part, const std::string& name, Progress& p
         fmt::format("{}: the surface is not closed ({} open edges left): what is inside is judged by samples",
                     name, human_count(part.healing.left_open)));
   if (part.overlapping_voxels > 0)
-    progress.say(fmt::format("{}: shells interpenetrate in {} voxels; their union is taken", name,
-                             human_count(part.overlapping_voxels)));
+    progress.say(fmt::format("{}: shells interpenetrate in {}; their union is taken", name,
+                             counted(part.overlapping_voxels, "voxel")));
   if (part.undecided_voxels > 0)
-    progress.warn(fmt::format("{}: the pieces of {} voxels could not be told apart; taken as one", name,
-                              human_count(part.undecided_voxels)));
+    progress.warn(fmt::format("{}: the pieces of {} could not be told apart; taken as one", name,
+                              counted(part.undecided_voxels, "voxel")));
 }
 
 void say_walls(const VoxelizedPart& part, const std::string& name, Progress& progress) {
@@ -51,8 +51,7 @@ void say_walls(const VoxelizedPart& part, const std::string& name, Progress& pro
   const std::string place =
       fmt::format("({}, {}, {})", human_length(at.x()), human_length(at.y()), human_length(at.z()));
   const auto share = [&](std::size_t count) {
-    return fmt::format("{:.2g} %",
-                       100. * static_cast<double>(count) / static_cast<double>(part.wall_samples));
+    return human_share(static_cast<double>(count) / static_cast<double>(part.wall_samples));
   };
   if (part.lost_walls > 0) {
     progress.warn(
@@ -73,9 +72,9 @@ void say_lost_matter(const VoxelizedPart& part, const std::string& name, Progres
   constexpr double kNotable = 1e-2;  // of the volume
   if (!part.closed || !(part.dropped_volume > kNotable * part.surface_volume)) return;
   progress.warn(
-      fmt::format("{}: features lost: {:.2g} % of the volume is in cells filled by less than 1/64, which "
+      fmt::format("{}: features lost: {} of the volume is in cells filled by less than 1/64, which "
                   "are dropped; a smaller size keeps it",
-                  name, 100 * part.dropped_volume / part.surface_volume));
+                  name, human_share(part.dropped_volume / part.surface_volume)));
 }
 
 void report_each(const VoxelizeResult& result, Progress& progress) {
@@ -90,8 +89,8 @@ void report_each(const VoxelizeResult& result, Progress& progress) {
                                    spacing_text(part.spacing)));
     say_volume(part, lattice.name, lattice.placement, progress);
     if (part.split_voxels > 0)
-      progress.say(fmt::format("{}: {} voxels hold several pieces, kept apart", lattice.name,
-                               human_count(part.split_voxels)));
+      progress.say(fmt::format("{}: {} with several pieces, kept apart", lattice.name,
+                               counted(part.split_voxels, "voxel")));
     say_repairs(part, lattice.name, progress);
     say_walls(part, lattice.name, progress);
     if (lattice.placement == Placement::corner) say_lost_matter(part, lattice.name, progress);

@@ -6,6 +6,7 @@
 
 #include "flexel/export/analysis.h"
 #include "formats/error.h"
+#include "formats/human.h"
 #include "formats/units.h"
 #include "simulate/simulate.h"
 #include "voxelize/voxelize.h"
@@ -187,8 +188,8 @@ bool large_deflection(const Surface& surface, Scene scene, int threads, std::str
     return false;
   }
   const double difference = std::abs(moved[0] / moved[1] - 1);
-  why = fmt::format("in a coarse run of Flexel large rotations change the largest displacement by {:.2g} %",
-                    100 * difference);
+  why = fmt::format("in a coarse run of Flexel large rotations change the largest displacement by {}",
+                    human_share(difference));
   return difference > kDifference;
 }
 

@@ -13,6 +13,7 @@
 #include "flexel/picture/panel.h"
 #include "flexel/picture/text.h"
 #include "formats/error.h"
+#include "formats/human.h"
 #include "formats/stop.h"
 
 namespace flexel {
@@ -113,8 +114,8 @@ void hint_at_scale(const std::vector<Panel>& panels, double exaggeration, std::v
       share = std::max(share, exaggeration * panel.largest_displacement / panel.diagonal);
   if (share > 0 && share < 0.01)
     notes.push_back(
-        fmt::format("the displacement is drawn as {:.2g} % of the part's size: --scale auto makes it visible",
-                    100 * share));
+        fmt::format("the displacement is drawn as {} of the part's size: --scale auto makes it visible",
+                    human_share(share)));
 }
 
 // What the picture has to say of itself, bottom right.

@@ -71,7 +71,7 @@ TEST(Human, NumbersHaveNoExponent) {
   EXPECT_EQ(human_number(637500), "637,500");
   EXPECT_EQ(human_number(6.375e5, 6), "637,500");
   EXPECT_EQ(human_number(0.00012345), "0.000123");
-  EXPECT_EQ(human_number(-1234.5), "-1,235");
+  EXPECT_EQ(human_number(-1234.5), "-1235");
   EXPECT_EQ(human_number(0), "0");
   EXPECT_EQ(human_number(9.996), "10");
 }

@@ -19,7 +19,7 @@ def deform(options, name="out.stl"):
 def test_accuracy_is_the_run_of_its_size():
     """The result is that of the size that is said, to the last bit; and a finer run agrees."""
     options = beam()
-    summary, said = deform([*options, "--accuracy", "10%"])
+    summary, said = deform([*options, "--accuracy", "10%", "--verbose"])
     told = summary["accuracy"]
     expect(told["met"] and told["reached"] <= 0.1 and told["asked"] == 0.1, told)
     expect(told["sentence"] in said, said)
@@ -37,7 +37,7 @@ def test_accuracy_is_the_run_of_its_size():
 
 
 def test_within():
-    summary, said = deform([*beam(), "--within", "20s"])
+    summary, said = deform([*beam(), "--within", "20s", "--verbose"])
     told = summary["accuracy"]
     runs = told["runs"]
     # How long the last run really takes is up to who else is busy here; that it was to end in time is not.
@@ -50,6 +50,77 @@ def test_what_cannot_be_reached_is_not_claimed():
     summary, said = deform([*beam(), "--accuracy", "0.001%", "--within", "0.5s"])
     told = summary["accuracy"]
     expect(not told["met"] and "NOT the 0.001 % asked for" in told["sentence"] and "warning" in said, told)
+
+
+ROWS = ("how far", "probes", "how sure", "strength", "held by", "next")
+
+
+def box(text, program="flexel"):
+    """The lines of the answer; none of them is anything else."""
+    lines = [line.removeprefix(f"{program}: ") for line in text.splitlines() if "warning: " not in line]
+    expect(0 < len(lines) <= 6 and all(line.startswith(ROWS) for line in lines), text)
+    for odd in ("e+", "e-0", "nan", "Newton", " CG ", "lattice"):
+        expect(odd not in "\n".join(lines), f"{odd} in: {text}")
+    return {name: line[len(name):].strip() for line in lines for name in ROWS if line.startswith(name)}
+
+
+def test_by_default_a_size_is_chosen_and_said():
+    options = beam()
+    summary, said = deform(options)
+    told, answer = summary["accuracy"], box(said)
+    expect(told["by_default"] and told["asked"] == 0.05 and told["within"] == 20, told)
+    expect(told["reached"] <= 0.05 and answer["how sure"].startswith("well"), f"{told}\n{said}")
+    expect("N along +z" in answer["held by"] and "safety factor" in answer["strength"], said)
+    words = answer["next"].split()
+    size = words[words.index("--size") + 1]
+    expect("chosen for 5 % within 20 s" in answer["next"], said)
+    again, repeated = deform([*options, "--size", size], "again.stl")
+    with open("out.stl", "rb") as one, open("again.stl", "rb") as other:
+        expect(one.read() == other.read(), f"--size {size} does not repeat the run")
+    expect("accuracy" not in again and box(repeated)["how far"] == answer["how far"], repeated)
+
+
+def test_what_next_suggests_works():
+    options = beam()
+    _, said = deform(options)
+    words = box(said)["next"].split()
+    asked = words[words.index("--accuracy") + 1]
+    summary, _ = deform([*options, "--accuracy", asked])
+    expect(summary["accuracy"]["met"], summary["accuracy"])
+
+
+def test_every_model_answers_in_six_lines():
+    beam()
+    for model, options in (("cells", []), ("springs", []), ("paper", ["--placement", "centre", "--count", "2000"])):
+        name = scene(f"{model}.toml", f'material = "steel"\n[parts.beam]\nmodel = "{model}"\n[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\n'
+                     'force = ["0 N", "0 N", "-100 N"]\n[[probe]]\nname = "tip"\nat = ["60 mm", "10 mm", "10 mm"]\n')
+        _, said = deform(["beam.stl", "--scene", name, *options])
+        answer = box(said)
+        expect(set(answer) == set(ROWS), f"{model}: {said}")
+        expect(("not known" in answer["how sure"]) == (model == "paper"), f"{model}: {said}")
+
+
+def test_a_guess_is_called_one():
+    """A plate of 0.6 mm on cells of 1.5 mm: its bar is larger than its value."""
+    write("plate.stl", binary_stl(box_triangles((60, 40, 0.6))))
+    _, said = deform(["plate.stl", "--material", "steel", "--fix", "xmin", "--push", "xmax: 0 0 -1 N", "--size", "0.3mm"])
+    answer = box(said)
+    sure = answer["how sure"]
+    expect(("first guess" in answer["how far"]) == sure.startswith("hardly") or sure.startswith("not known"), said)
+
+
+def test_verbose_and_quiet():
+    options = [*beam(), "--count", "1000"]
+    _, said = deform([*options, "--verbose"])
+    for words in ("elements,", "reaction of", "error bars from", "the mapped surface can be used", "how far"):
+        expect(words in said, f"{words} is missing in: {said}")
+    _, said = deform([*options, "--quiet"])
+    expect(said == "", said)
+    expect_ok(run("flexel-voxelize", "beam.stl", "--count", "1000", "-o", "body.vtu"))
+    scene("push.toml", 'material = "steel"\n[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\nforce = ["0 N", "0 N", "-100 N"]\n')
+    said = expect_ok(run("flexel-simulate", "push.toml", "body.vtu", "-o", "o.vtu")).err
+    answer = box("\n".join(line for line in said.splitlines() if ROWS[0] in line or any(row in line for row in ROWS[1:])), "flexel-simulate")
+    expect("how far" in answer and "reaction of" not in said, said)
 
 
 def test_refusals():

@@ -27,7 +27,7 @@ force = [0, 0, "-100 N"]
 [[probe]]
 where = {{ {half.format(79 * c, 79 * s, c, s)} }}
 """
-    return run("flexel-simulate", scene("bend.toml", text), "body.vtu", "-o", "bent.vtu", "--summary", "summary.json")
+    return run("flexel-simulate", scene("bend.toml", text), "body.vtu", "-o", "bent.vtu", "--summary", "summary.json", "--verbose")
 
 
 def summary():

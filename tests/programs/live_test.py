@@ -59,7 +59,7 @@ def first_frame(live):
 
 def test_poses_lead_as_a_path_does():
     prepare()
-    done = expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "poses.vtu", "--history", "poses.csv", stdin=LINES))
+    done = expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "poses.vtu", "--history", "poses.csv", "--verbose", stdin=LINES))
     expect("live: 3 pose(s)" in done.err, f"the summary should count the poses: {done.err}")
     scene("keys.toml", PAT.replace('path = "stdin"', KEYED).replace("TIME", "50 ms"))
     expect_ok(run("flexel-simulate", "keys.toml", "body.vtu", "-o", "keys.vtu", "--history", "keys.csv"))
