@@ -107,7 +107,8 @@ std::vector<std::string> face_texts(const Surface& surface) {
 }
 
 void label_faces(Image& image, const Viewport& viewport, const Camera& camera, const Panel& panel,
-                 const std::vector<std::string>& texts, float size, std::vector<std::uint8_t>& shown) {
+                 const std::vector<std::string>& texts, float size, bool beside,
+                 std::vector<std::uint8_t>& shown) {
   const FaceMap map = look(viewport, camera, panel);
   const std::vector<int> distance = distances(map);
   std::vector<Widest> widest(texts.size());
@@ -152,6 +153,7 @@ void label_faces(Image& image, const Viewport& viewport, const Camera& camera, c
       break;
     }
   }
+  if (!beside) return;
   // Beside a dot on the face, at the end of a short line.
   for (const std::uint32_t face : order) {
     const Widest& place = widest[face];
