@@ -54,6 +54,15 @@ bool has_unit(Dimension dimension, const std::string& unit) {
   return std::find(units.begin(), units.end(), unit) != units.end();
 }
 
+// The option that takes such a unit, where people mean that one.
+std::string other_option(Dimension dimension, const std::string& unit) {
+  if (dimension == Dimension::force && has_unit(Dimension::torque, unit)) return "; --torque takes torques";
+  if (dimension == Dimension::force && has_unit(Dimension::length, unit)) return "; --move takes lengths";
+  if (dimension == Dimension::length && has_unit(Dimension::angle, unit)) return "; --twist takes angles";
+  if (dimension == Dimension::length && has_unit(Dimension::force, unit)) return "; --push takes forces";
+  return "";
+}
+
 Action parse_action(const std::string& text, const std::string& option, Dimension dimension,
                     const std::string& example) {
   const auto fail = [&](const std::string& what) {
@@ -69,7 +78,8 @@ Action parse_action(const std::string& text, const std::string& option, Dimensio
     try {
       return parse_quantity(amount.numbers[i] + " " + amount.unit, of);
     } catch (const InputError& error) {
-      throw InputError(fmt::format("{} \"{}\": {}", option, text, error.what()));
+      throw InputError(
+          fmt::format("{} \"{}\": {}{}", option, text, error.what(), other_option(dimension, amount.unit)));
     }
   };
   if (amount.numbers.size() == 3) {

@@ -41,7 +41,7 @@ struct Finding {
   std::size_t cells = 0;
 };
 
-std::optional<ErrorBar> bar_of(const SimulateResult& result, ErrorBar::Of of) {
+std::optional<ErrorBar> error_bar_of(const SimulateResult& result, ErrorBar::Of of) {
   for (const ErrorBar& each : result.error_bars.bars)
     if (each.of == of) return each;
   return std::nullopt;
@@ -64,9 +64,10 @@ double resultant(const SimulateResult& result, const Scene& scene, bool& driven)
 void judge_stiffness(const SimulateResult& result, const Scene& scene, Finding& found) {
   bool driven = false;
   found.force = resultant(result, scene, driven);
-  if (const auto bar = bar_of(result, ErrorBar::Of::largest_displacement)) found.bar = bar->bar.half_width;
+  if (const auto bar = error_bar_of(result, ErrorBar::Of::largest_displacement))
+    found.bar = bar->bar.half_width;
   const auto judge =
-      bar_of(result, driven ? ErrorBar::Of::elastic_energy : ErrorBar::Of::largest_displacement);
+      error_bar_of(result, driven ? ErrorBar::Of::elastic_energy : ErrorBar::Of::largest_displacement);
   if (judge && judge->value != 0) found.share = judge->bar.half_width / std::abs(judge->value);
   if (!(found.force > 0 && found.displacement > 0)) return;
   found.stiffness = found.force / found.displacement;
@@ -89,8 +90,8 @@ void judge_stress(const SimulateResult& result, const Scene& scene, const Body& 
 }
 
 // One part's run. A file of one part goes by the name of the first file's, so that one scene fits all.
-Finding run(const CompareArguments& arguments, const std::string& file, std::string& name,
-            Progress& progress) {
+Finding run_part(const CompareArguments& arguments, const std::string& file, std::string& name,
+                 Progress& progress) {
   const auto began = std::chrono::steady_clock::now();
   JobArguments own = arguments.job;
   own.parts = {file};
@@ -123,7 +124,7 @@ Finding run(const CompareArguments& arguments, const std::string& file, std::str
 Finding run_named(const CompareArguments& arguments, const std::string& file, std::string& name,
                   Progress& progress) {
   try {
-    return run(arguments, file, name, progress);
+    return run_part(arguments, file, name, progress);
   } catch (const InputError& error) {
     if (error.where() == file) throw;
     throw InputError(file, (error.where().empty() ? "" : error.where() + ": ") + error.what());
@@ -231,11 +232,11 @@ std::vector<std::string> verdict(const std::vector<Finding>& all) {
 
 using Json = nlohmann::ordered_json;
 
-Json number(const std::optional<double>& value) {
+Json json_number(const std::optional<double>& value) {
   return value && std::isfinite(*value) ? Json(*value) : Json();
 }
 
-std::string json_of(const std::vector<Finding>& all) {
+std::string comparison_json(const std::vector<Finding>& all) {
   Json parts = Json::array(), order = Json::array();
   for (const Finding& f : all)
     parts.push_back(
@@ -243,12 +244,12 @@ std::string json_of(const std::vector<Finding>& all) {
          {"mass", f.mass},
          {"volume", f.volume},
          {"largest_displacement", f.displacement},
-         {"largest_displacement_bar", number(f.bar)},
+         {"largest_displacement_bar", json_number(f.bar)},
          {"force", f.force},
-         {"stiffness", number(f.stiffness)},
-         {"stiffness_bar", {f.share ? number(f.least) : Json(), f.share ? number(f.most) : Json()}},
-         {"von_mises", number(f.stress)},
-         {"limit", number(f.limit)},
+         {"stiffness", json_number(f.stiffness)},
+         {"stiffness_bar", {f.share ? json_number(f.least) : Json(), f.share ? json_number(f.most) : Json()}},
+         {"von_mises", json_number(f.stress)},
+         {"limit", json_number(f.limit)},
          {"limit_is", f.limit_name},
          {"cells", f.cells},
          {"spacing", f.spacing},
@@ -290,7 +291,7 @@ int compare_command(int argc, char** argv) {
     all.push_back(run_named(arguments, file, name, inner));
   }
   progress.finish();
-  std::string text = arguments.json ? json_of(all) : table_of(all);
+  std::string text = arguments.json ? comparison_json(all) : table_of(all);
   if (!arguments.json)
     for (const std::string& line : verdict(all)) text += line + "\n";
   OutputFile out("-", false);

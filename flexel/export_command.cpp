@@ -178,6 +178,9 @@ void report(const Analysis& analysis, Progress& progress) {
       std::count_if(mesh.sides.begin(), mesh.sides.end(), [](const auto& each) { return !each.empty(); }),
       analysis.supports.size(), analysis.loads.size(), analysis.large_deflection ? "large" : "small",
       analysis.why_deflection));
+  for (std::size_t p = 0; p < analysis.materials.size(); ++p)
+    if (const std::string line = infill_line(mesh.body.parts[p].name, analysis.materials[p]); !line.empty())
+      progress.say(line);
   for (const std::string& each : mesh.notes) progress.say(each);
   for (const std::string& each : analysis.warnings) progress.warn(each);
 }

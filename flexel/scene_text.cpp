@@ -28,7 +28,7 @@ std::string vector(const Vec3& value, const char* unit) {
                      quantity(value.z(), unit));
 }
 
-std::string direction(const Vec3& value) {
+std::string direction_text(const Vec3& value) {
   return fmt::format("[{:.17g}, {:.17g}, {:.17g}]", value.x(), value.y(), value.z());
 }
 
@@ -44,7 +44,7 @@ std::string where_text(const Selection& selection) {
                          quantity(selection.radius, "m"));
     case Selection::Kind::half_space:
       return fmt::format("{{ half_space = {{ point = {}, normal = {} }} }}", vector(selection.point, "m"),
-                         direction(selection.normal));
+                         direction_text(selection.normal));
     case Selection::Kind::complement:
       return fmt::format("{{ not = {} }}", where_text(selection.members.front()));
     case Selection::Kind::any_of:
@@ -70,7 +70,7 @@ std::string tie_text(const Tie& tie) {
   if (tie.motion.angle == 0)
     return text + fmt::format("displacement = {}\n", vector(tie.motion.translation, "m"));
   return text + fmt::format("rotation = {{ axis = {}, through = {}, angle = {} }}\n",
-                            direction(tie.motion.axis), vector(tie.motion.through, "m"),
+                            direction_text(tie.motion.axis), vector(tie.motion.through, "m"),
                             quantity(tie.motion.angle, "rad"));
 }
 

@@ -150,8 +150,8 @@ void read_scenes(const StudyArguments& a, study::Case& study_case) {
   std::error_code none;
   if (fs::equivalent(a.job.scene, study_case.scene, none))
     throw InputError(a.job.scene, "is where the study writes its own scene: use another name");
-  study_case.scene_text = study::edited_scene(study_case.scene_text, study_case.scene,
-                                              fs::absolute(a.job.scene).parent_path(), {}, {});
+  const fs::path folder = a.job.scene.empty() ? fs::current_path() : fs::absolute(a.job.scene).parent_path();
+  study_case.scene_text = study::edited_scene(study_case.scene_text, study_case.scene, folder, {}, {});
   (void)parse_scene(study_case.scene_text, study_case.scene);  // all that is wrong with it is said now
 }
 

@@ -1,3 +1,4 @@
+// A name is compared in small letters and without the number at its end.
 #include "formats/part_name.h"
 
 #include <algorithm>

@@ -131,7 +131,7 @@ std::vector<Material> materials_of_parts(const Scene& scene, const Body& body) {
     // an infill belongs to the material that is named with it
     const Infill& infill =
         settings.infill.share || !settings.material.empty() ? settings.infill : scene.infill;
-    infill_used = infill_used || &infill == &scene.infill;
+    infill_used = infill_used || settings.material.empty();
     Material material = material_named(scene, name, settings.origin);
     if (infill.share) {
       const auto index = static_cast<std::size_t>(&part - body.parts.data());

@@ -7,6 +7,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <numeric>
 
 #include "flexel/picture/annotate.h"
@@ -18,6 +20,9 @@ namespace {
 constexpr int kStepX = 4, kStepY = 2;       // pixels
 constexpr float kLeastSize = 10;            // pixels to the em
 constexpr float kCapHeight = 0.72f;         // of the em, of digits
+constexpr float kLeaderSize = 13;           // pixels to the em, of a text beside its face
+constexpr int kTurns = 12, kReaches = 4;    // places that are tried for it
+constexpr std::size_t kLeastPoints = 4;     // of the grid: less of a face is not seen
 constexpr std::uint32_t kPlate = 0xffffff;  // behind the text
 constexpr float kPlateShare = 0.78f;
 
@@ -77,6 +82,12 @@ struct Plate {
   }
 };
 
+// Of a text with its middle at `at`.
+Plate plate_at(const Eigen::Vector2f& at, const std::string& text, float em) {
+  const float edge = 0.15f * em, half = text_width(text, em) / 2 + edge, tall = kCapHeight * em / 2 + edge;
+  return {at.x() - half, at.y() - tall, at.x() + half, at.y() + tall};
+}
+
 struct Widest {
   std::size_t points = 0;  // of the grid, seen
   int distance = 0;        // steps
@@ -96,7 +107,8 @@ std::vector<std::string> face_texts(const Surface& surface) {
 }
 
 void label_faces(Image& image, const Viewport& viewport, const Camera& camera, const Panel& panel,
-                 const std::vector<std::string>& texts, float size, std::vector<std::uint8_t>& shown) {
+                 const std::vector<std::string>& texts, float size, bool beside,
+                 std::vector<std::uint8_t>& shown) {
   const FaceMap map = look(viewport, camera, panel);
   const std::vector<int> distance = distances(map);
   std::vector<Widest> widest(texts.size());
@@ -114,25 +126,52 @@ void label_faces(Image& image, const Viewport& viewport, const Camera& camera, c
   std::stable_sort(order.begin(), order.end(),
                    [&](auto a, auto b) { return widest[a].points > widest[b].points; });
   std::vector<Plate> taken;
+  const auto free = [&](const Plate& plate) {
+    return std::none_of(taken.begin(), taken.end(), [&](const Plate& other) { return plate.meets(other); });
+  };
+  const auto write = [&](std::uint32_t face, const Plate& plate, float em) {
+    fill_rectangle(image, plate.left, plate.top, plate.right, plate.bottom, colour(kPlate), kPlateShare);
+    draw_text(image, (plate.left + plate.right) / 2, (plate.top + plate.bottom) / 2 + kCapHeight * em / 2,
+              texts[face], em, colour(kInk), Anchor::middle);
+    taken.push_back(plate);
+    shown[face] = 1;
+  };
+  const auto pixel = [&](const Widest& place) {
+    return Eigen::Vector2f(static_cast<float>(viewport.x + place.column * kStepX),
+                           static_cast<float>(viewport.y + place.row * kStepY));
+  };
   for (const std::uint32_t face : order) {
     const Widest& place = widest[face];
     if (place.points == 0) break;
-    const auto x = static_cast<float>(viewport.x + place.column * kStepX),
-               y = static_cast<float>(viewport.y + place.row * kStepY);
-    const auto room_x = static_cast<float>((place.distance - 1) * kStepX),
-               room_y = static_cast<float>((place.distance - 1) * kStepY);
+    const auto room = static_cast<float>(place.distance - 1);
     for (float em = size; em >= kLeastSize; em *= 0.85f) {
-      const float half = text_width(texts[face], em) / 2, tall = kCapHeight * em / 2;
-      if (half > room_x || tall > room_y) continue;
-      const float edge = 0.15f * em;
-      const Plate plate{x - half - edge, y - tall - edge, x + half + edge, y + tall + edge};
-      if (std::any_of(taken.begin(), taken.end(), [&](const Plate& other) { return plate.meets(other); }))
+      const Plate plate = plate_at(pixel(place), texts[face], em);
+      if (text_width(texts[face], em) / 2 > room * kStepX || kCapHeight * em / 2 > room * kStepY ||
+          !free(plate))
         continue;
-      fill_rectangle(image, plate.left, plate.top, plate.right, plate.bottom, colour(kPlate), kPlateShare);
-      draw_text(image, x, y + tall, texts[face], em, colour(kInk), Anchor::middle);
-      taken.push_back(plate);
-      shown[face] = 1;
+      write(face, plate, em);
       break;
+    }
+  }
+  if (!beside) return;
+  // Beside a dot on the face, at the end of a short line.
+  for (const std::uint32_t face : order) {
+    const Widest& place = widest[face];
+    if (place.points < kLeastPoints) break;
+    if (shown[face]) continue;
+    const Eigen::Vector2f dot = pixel(place);
+    for (int turn = 0; turn < kTurns * kReaches && !shown[face]; ++turn) {
+      const float angle = 2 * std::numbers::pi_v<float> * static_cast<float>(turn % kTurns) / kTurns;
+      const float reach = kLeaderSize * (1.5f + 0.9f * static_cast<float>(turn / kTurns));
+      const Eigen::Vector2f end = dot + reach * Eigen::Vector2f(std::cos(angle), std::sin(angle));
+      const Plate plate = plate_at(end, texts[face], kLeaderSize);
+      if (!free(plate) || plate.left < 0 || plate.top < 0 || plate.right > static_cast<float>(image.width) ||
+          plate.bottom > static_cast<float>(image.height))
+        continue;
+      draw_stroke(image, dot, end, 1.2f, colour(kInk));
+      draw_stroke(image, dot, dot, 4.5f, colour(kInk));
+      taken.push_back({dot.x() - 3, dot.y() - 3, dot.x() + 3, dot.y() + 3});
+      write(face, plate, kLeaderSize);
     }
   }
 }

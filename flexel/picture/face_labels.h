@@ -15,6 +15,7 @@ namespace flexel {
 // picture, as far as they have room there without covering one another. Sets shown[f] of the faces that got
 // theirs.
 void label_faces(Image& image, const Viewport& viewport, const Camera& camera, const Panel& panel,
-                 const std::vector<std::string>& texts, float size, std::vector<std::uint8_t>& shown);
+                 const std::vector<std::string>& texts, float size, bool beside,
+                 std::vector<std::uint8_t>& shown);
 
 }  // namespace flexel

@@ -174,8 +174,15 @@ void number_faces(Image& image, const std::vector<Panel>& panels, const Layout& 
     const Surface& surface = subject->body ? subject->body->surface : subject->surface;
     const std::vector<std::string> texts = face_texts(surface);
     std::vector<std::uint8_t> shown(texts.size(), 0);
-    for (; p < panels.size() && panels[p].subject == subject; ++p)
-      label_faces(image, layout.panels[p], framing.cameras[p], panels[p], texts, 0.95f * layout.text, shown);
+    std::size_t end = p;
+    while (end < panels.size() && panels[end].subject == subject) ++end;
+    // first which have room on them in some view, so that no other view writes them beside
+    Image scratch = image;
+    for (const bool beside : {false, true})
+      for (std::size_t view = p; view < end; ++view)
+        label_faces(beside ? image : scratch, layout.panels[view], framing.cameras[view], panels[view], texts,
+                    0.95f * layout.text, beside, shown);
+    p = end;
     std::vector<std::string> missing;
     for (std::size_t f = 0; f < texts.size(); ++f)
       if (!shown[f]) missing.push_back(texts[f]);

@@ -60,12 +60,14 @@ TEST(Infill, SceneAndPartsNameIt) {
           .young,
       0.04 * solid, 1);
   // the infill is that of the scene's material, not of another one that the part names
-  EXPECT_EQ(materials_of_parts(parse_scene("material = \"PLA\"\ninfill = 0.2\n[parts.\"" + part +
-                                               "\"]\nmaterial = \"steel\"\n",
-                                           "s"),
-                               body)[0]
-                .young,
-            210e9);
+  const std::string steel =
+      "material = \"PLA\"\ninfill = 0.2\n[parts.\"" + part + "\"]\nmaterial = \"steel\"\n";
+  EXPECT_THROW((void)materials_of_parts(parse_scene(steel, "s"), body), InputError);
+  body.parts.push_back(body.parts[0]);
+  body.parts.back().name = "other";
+  const std::vector<Material> materials = materials_of_parts(parse_scene(steel, "s"), body);
+  EXPECT_EQ(materials[0].young, 210e9);
+  EXPECT_NEAR(materials[1].young, 0.04 * solid, 1);
 }
 
 TEST(Infill, RefusesWhatIsNone) {
