@@ -135,8 +135,9 @@ void add_triangle_lines(const MapReport& report, std::vector<std::string>& lines
 
 std::string volume_line(const MapReport& report) {
   const SurfaceQuality& quality = report.quality;
-  std::string line = fmt::format("vertices move by up to {}, stretched by up to {}",
-                                 human_length(report.largest_displacement), human_share(report.largest_strain));
+  std::string line =
+      fmt::format("vertices move by up to {}, stretched by up to {}",
+                  human_length(report.largest_displacement), human_share(report.largest_strain));
   if (!(quality.volume_before > 0) || !std::isfinite(quality.volume_after)) return line;
   const double change = 100 * (quality.volume_after / quality.volume_before - 1);
   line += fmt::format(", volume {} -> {} ({:+.3g} %", human_volume(quality.volume_before),

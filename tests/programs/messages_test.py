@@ -1,0 +1,35 @@
+"""docs/messages.md: what each row says a program prints is still in the program's text."""
+
+import re
+
+from harness import SOURCE, expect, main
+
+FOLDERS = ("formats", "voxelize", "simulate", "mapping", "flexel")
+
+
+def literals():
+    """The string literals of all sources, neighbours joined as the compiler joins them."""
+    text = "\n".join(path.read_text(encoding="utf-8") for folder in FOLDERS for path in sorted((SOURCE / folder).rglob("*.cpp")))
+    return re.sub(r'"\s*\n\s*"', "", text).replace('\\"', '"')
+
+
+def fragments(message):
+    """Runs of at least four words without figures, names or quotes, which are the same in every run."""
+    fixed = re.split(r'"[^"]*"|\([^)]*\)|[^\s]*[\d=/#][^\s]*|`', message)
+    return [" ".join(words) for words in (piece.strip(" ,;:.").split() for piece in fixed) if len(words) >= 4]
+
+
+def test_every_message_of_the_table_is_still_said():
+    rows = [line for line in (SOURCE / "docs/messages.md").read_text(encoding="utf-8").splitlines() if line.startswith("| ")][1:]
+    expect(len(rows) >= 30, f"{len(rows)} messages, 30 wanted")
+    known = literals()
+    for row in rows:
+        after = re.split(r"(?<!\\)\|", row)[2].replace("\\|", "|")
+        if after.strip().startswith("nothing"):
+            continue
+        found = fragments(after)
+        expect(any(piece in known for piece in found), f"no source says: {after.strip()}")
+
+
+if __name__ == "__main__":
+    main(globals())
