@@ -22,8 +22,9 @@ struct Action {
 // `text` of --move: a displacement.
 [[nodiscard]] Action parse_move(const std::string& text);
 
-// Unit vector against the mean outward normal of the selected polygons. Throws InputError when they have none
-// (elements selected by a region, faces whose normals cancel): a direction has to be given.
+// Unit vector against the mean outward normal of the selected polygons; of a side ("zmax") against its axis,
+// however its polygons look. Throws InputError when they have none (elements selected by a region, faces
+// whose normals cancel): a direction has to be given.
 [[nodiscard]] Vec3 inward_normal(const Selection& selection, const Body& body);
 
 // Adds the action to the scene. `body` gives the normals.
