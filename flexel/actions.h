@@ -32,8 +32,9 @@ struct Action {
 // `text` of --probe: "NAME: 10 5 3 mm" (a material point), "NAME: WHERE" or "WHERE".
 [[nodiscard]] Probe parse_probe(const std::string& text);
 
-// Unit vector against the mean outward normal of the selected polygons. Throws InputError when they have none
-// (elements selected by a region, faces whose normals cancel): a direction has to be given.
+// Unit vector against the mean outward normal of the selected polygons; of a side ("zmax") against its axis,
+// however its polygons look. Throws InputError when they have none (elements selected by a region, faces
+// whose normals cancel): a direction has to be given.
 [[nodiscard]] Vec3 inward_normal(const Selection& selection, const Body& body);
 
 // The axis that a torque or a twist of the selected polygons turns about: that of a round face (the largest

@@ -11,7 +11,7 @@ namespace flexel {
 struct Selection {
   enum class Kind { name, box, sphere, half_space, any_of, complement };
   Kind kind = Kind::name;
-  std::string name;         // "bracket/12", "bracket/flange", "flange", "xmin", "bracket/xmin", "bracket"
+  std::string name;  // "bracket/12", "bracket/#12", "flange", "=flange", "xmin", "bracket/xmin", "bracket"
   Vec3 min = Vec3::Zero();  // m, box, rest, world frame
   Vec3 max = Vec3::Zero();
   Vec3 point = Vec3::Zero();       // m, centre of the sphere; a point of the half-space's plane
@@ -30,8 +30,8 @@ struct Selected {
   std::vector<std::uint32_t> elements;
 };
 
-// Throws InputError(selection.origin, ...) when a name is unknown (with the nearest that exists), ambiguous,
-// or when nothing is selected (with what to change). `at` (elements) [m]: where boxes, spheres and
+// Throws InputError(selection.origin, ...) when a name is unknown (with the nearest), means two things,
+// or when nothing is selected; each with what to write. `at` (elements) [m]: where boxes, spheres and
 // half-spaces look for elements; nothing: where they rest.
 [[nodiscard]] Selected resolve(const Selection& selection, const Body& body,
                                const std::vector<Vec3>* at = nullptr);

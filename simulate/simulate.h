@@ -96,7 +96,7 @@ struct SimulateResult {
   Vec3 moment_imbalance = Vec3::Zero();  // N m, likewise
   std::vector<PassShare> passes;
   std::size_t stray_cells = 0;      // in loose crumbs that were carried along, not simulated
-  double largest_displacement = 0;  // m, over the elements
+  double largest_displacement = 0;  // m, of the matter (formats/fields.h)
   Vec3 largest_displacement_at = Vec3::Zero();
   double elastic_energy = 0;     // J
   double mass = 0;               // kg

@@ -141,13 +141,17 @@ TEST(FiguresOfStress, UniformTensionIsUniform) {
   EXPECT_NEAR(result.stress->value, 1e6, 0.25e6);
   const std::vector<double>& column = body.element_columns.at("von_mises").values;
   int judged = 0;
+  double sum = 0;
   for (std::size_t e = 0; e < column.size(); ++e) {
     const double along = (askew().transpose() * body.rest[e]).x() / kLength;
     if (std::abs(along - 0.5) > 0.25) continue;  // from the ends, where cells are pulled through cut faces
-    EXPECT_NEAR(column[e], 1e6, 0.1e6) << along;
+    EXPECT_NEAR(column[e], 1e6, 0.2e6)
+        << along;  // cells that the surface cuts are that good (docs/stress.md)
+    sum += column[e];
     ++judged;
   }
   EXPECT_GT(judged, 100);
+  EXPECT_NEAR(sum / judged, 1e6, 0.05e6);
 }
 
 TEST(FiguresOfStress, AnInsideOutGradientHasNoStrain) {
