@@ -16,11 +16,14 @@
 #include "formats/error.h"
 #include "formats/files.h"
 #include "formats/parallel.h"
+#include "formats/topology.h"
 #include "formats/units.h"
 #include "simulate/simulate.h"
 
 namespace flexel {
 namespace {
+
+constexpr double kRounding = 1e-6;
 
 struct CompareArguments {
   JobArguments job;
@@ -31,6 +34,7 @@ struct CompareArguments {
 // What one part came to; SI.
 struct Finding {
   std::string file;
+  double size = 0;  // m, of the bounding box's diagonal
   double mass = 0, volume = 0, displacement = 0, force = 0, seconds = 0, spacing = 0;
   std::optional<double> bar;        // of the displacement
   std::optional<double> share;      // of the stiffness: its bar
@@ -64,6 +68,10 @@ double resultant(const SimulateResult& result, const Scene& scene, bool& driven)
 void judge_stiffness(const SimulateResult& result, const Scene& scene, Finding& found) {
   bool driven = false;
   found.force = resultant(result, scene, driven);
+  // What rounding leaves of a couple is no force.
+  double moment = 0;
+  for (const AppliedLoad& load : result.loads) moment = std::max(moment, load.moment.norm());
+  if (!(found.force * found.size > kRounding * moment)) found.force = 0;
   if (const auto bar = error_bar_of(result, ErrorBar::Of::largest_displacement))
     found.bar = bar->bar.half_width;
   const auto judge =
@@ -111,6 +119,7 @@ Finding run_part(const CompareArguments& arguments, const std::string& file, std
   Finding found;
   found.file = std::filesystem::path(file).filename().string();
   found.mass = result.mass;
+  found.size = bounding_box(body.rest).diagonal();
   for (const Part& part : body.parts) found.volume += part.surface_volume;
   found.displacement = result.largest_displacement;
   found.cells = body.cell_count();

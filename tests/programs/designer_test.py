@@ -157,6 +157,14 @@ def test_overlapping_bars_are_not_sure():
     expect_error(run("flexel", "compare", "a.stl", "absent.stl", *case), "flexel", "absent.stl")
 
 
+def test_a_couple_gives_no_stiffness():
+    write("a.stl", binary_stl(box_triangles((40, 10, 10))))
+    write("b.stl", binary_stl(box_triangles((40, 10, 12))))
+    text = expect_ok(run("flexel", "compare", "a.stl", "b.stl", "--material", "steel", "--fix", "xmin", "--torque", "xmax: 5 N m", "--count",
+                         "500")).out.decode()
+    expect("no stiffness to compare" in text and "times as stiff" not in text, text)
+
+
 def test_study_takes_options():
     box()
     expect_ok(run("flexel", "study", "box.stl", "--material", "steel", "--fix", "xmin", "--torque", "xmax: 5 N m", "--probe",
