@@ -193,8 +193,7 @@ void TimedRun::check() {
     progress_.update(time / duration_, fmt::format("{:.4g} s, step {}", time, clock_.steps));
 }
 
-// Explicit steps are short and end before the run is stopped. Those that solve for damping may be stopped
-// within, which leaves a state that is none; implicit ones leave what was reached before them.
+// Steps that solve for damping may be stopped within, and leave no state; other explicit ones end first.
 void TimedRun::advance(bool row) {
   std::optional<StopWaits> whole;
   if (!act_->is_implicit() && !act_->solves_damping()) whole.emplace();
