@@ -27,7 +27,7 @@ Box polygon_box(const Surface& surface, std::size_t polygon) {
   return box;
 }
 
-bool holds(const Box& box, const Vec3& point, double margin) {
+bool box_holds(const Box& box, const Vec3& point, double margin) {
   return (point.array() >= box.min.array() - margin).all() &&
          (point.array() <= box.max.array() + margin).all();
 }
@@ -164,16 +164,16 @@ void TouchingSearch::touch(std::uint32_t finer, std::uint32_t coarser) {
       facing.push_back(
           {point.polygon, point.area_vector.normalized(), polygon_box(body_.surface, point.polygon)});
     // No point of the finer part looks further than into the next cube.
-    if (holds(box_[finer], point.position, 2 * width)) grid.add(point.position, entry->second);
+    if (box_holds(box_[finer], point.position, 2 * width)) grid.add(point.position, entry->second);
   }
   for (const SurfacePoint& point : points_[finer]) {
-    if (!holds(box_[coarser], point.position, limit)) continue;
+    if (!box_holds(box_[coarser], point.position, limit)) continue;
     const Vec3 own = point.area_vector.normalized();
     double least = limit;
     const Facing* nearest = nullptr;
     grid.for_each_near(point.position, [&](std::uint32_t n) {
       const Facing& other = facing[n];
-      if (own.dot(other.normal) > kFacing || !holds(other.box, point.position, limit)) return;
+      if (own.dot(other.normal) > kFacing || !box_holds(other.box, point.position, limit)) return;
       const double away = distance(point.position, other.polygon);
       if (away > least || (nearest && away == least && other.polygon >= nearest->polygon)) return;
       least = away;

@@ -16,11 +16,11 @@
 namespace flexel {
 namespace {
 
-constexpr int kLines = 64;                               // across the common box, in each direction
+constexpr int kLinesAcross = 64;                         // across the common box, in each direction
 constexpr double kSame = .99;                            // of either volume: two parts are one body twice
 constexpr double kOfDiagonal = 1e-6, kOfSpacing = 1e-2;  // touching: that of simulate's search for bonds
-constexpr double kNotable = .01;  // of the smaller volume: less, of parts that touch, is tessellation
-constexpr double kFacing = -.7;   // cosine between normals that look at each other
+constexpr double kNotableOverlap = .01;  // of the smaller volume: less, of parts that touch, is tessellation
+constexpr double kFacing = -.7;          // cosine between normals that look at each other
 
 struct Interval {
   double begin = 0, end = 0;
@@ -50,7 +50,7 @@ std::vector<std::vector<Interval>> intervals(const PartMesh& mesh, const LineGri
   return found;
 }
 
-double length(const std::vector<std::vector<Interval>>& lines) {
+double total_length(const std::vector<std::vector<Interval>>& lines) {
   double sum = 0;
   for (const auto& line : lines)
     for (const Interval& each : line) sum += each.end - each.begin;
@@ -65,17 +65,17 @@ class Comparison {
 
   void compare(int axis) {
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-    const double u_step = box_.size()[u] / kLines, v_step = box_.size()[v] / kLines;
-    if (std::min(u_step, v_step) * kLines <= tolerance_) return;  // they only touch along this axis
-    const LineGrid grid{axis,  box_.min[u] + u_step / 2, box_.min[v] + v_step / 2, u_step, v_step, kLines,
-                        kLines};
+    const double u_step = box_.size()[u] / kLinesAcross, v_step = box_.size()[v] / kLinesAcross;
+    if (std::min(u_step, v_step) * kLinesAcross <= tolerance_) return;  // they only touch along this axis
+    const LineGrid grid{
+        axis, box_.min[u] + u_step / 2, box_.min[v] + v_step / 2, u_step, v_step, kLinesAcross, kLinesAcross};
     const auto of_a = intervals(*mesh_[0], grid), of_b = intervals(*mesh_[1], grid);
     double overlap = 0;
     for (std::size_t line = 0; line < of_a.size(); ++line)
       for (const Interval& mine : of_a[line])
         for (const Interval& other : of_b[line]) overlap += meet(axis, mine, other);
     overlap_ += overlap * u_step * v_step / 3;
-    for (int n = 0; n < 2; ++n) volume_[n] += length(n == 0 ? of_a : of_b) * u_step * v_step / 3;
+    for (int n = 0; n < 2; ++n) volume_[n] += total_length(n == 0 ? of_a : of_b) * u_step * v_step / 3;
   }
 
   [[nodiscard]] double overlap() const { return overlap_; }
@@ -138,7 +138,7 @@ std::vector<PartPair> noteworthy_pairs(const std::vector<HealedPart>& parts,
       for (int axis = 0; axis < 3; ++axis) lines.compare(axis);
       const double smaller =
           std::min(std::abs(enclosed_volume(parts[a].mesh)), std::abs(enclosed_volume(parts[b].mesh)));
-      if (lines.overlap() > kNotable * smaller || (lines.overlap() > 0 && !lines.touching()))
+      if (lines.overlap() > kNotableOverlap * smaller || (lines.overlap() > 0 && !lines.touching()))
         pairs.push_back({{a, b}, lines.same(), lines.overlap(), 0});
       else if (lines.overlap() == 0 && !lines.touching() && lines.gap() < cell)
         pairs.push_back({{a, b}, false, 0, lines.gap()});

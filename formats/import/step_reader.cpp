@@ -135,7 +135,7 @@ TopoDS_Shape transfer(STEPControl_Reader& reader, ImportInput& input, const Impo
                     "that in the CAD program",
                     input.file, damage_message(damage)));
   if (solids.sound > 0 && solids.missing > 0 && options.warn)
-    options.warn(fmt::format("{} holds {} solids that belong to no product and are left out; {} are read",
+    options.warn(fmt::format("{}: solids that belong to no product are left out: {}, beside {} that are read",
                              input.file, solids.missing, solids.sound));
   return shape;
 }
