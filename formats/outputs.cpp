@@ -26,8 +26,11 @@ bool can_be_shared(const std::string& path) {
 bool same_file(const std::string& a, const std::string& b) {
   std::error_code none;
   if (fs::exists(a, none) && fs::exists(b, none)) return fs::equivalent(a, b, none);
-  const fs::path first = fs::weakly_canonical(follow_links(a), none);
-  return !none && first == fs::weakly_canonical(follow_links(b), none);
+  const auto place = [&](const std::string& path) {
+    return fs::weakly_canonical(fs::absolute(follow_links(path), none), none);
+  };
+  const fs::path first = place(a);
+  return !first.empty() && first == place(b);
 }
 
 }  // namespace

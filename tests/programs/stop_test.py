@@ -11,18 +11,21 @@ FINE = ["--size", "0.3 mm"]
 HEARD = 3.0  # s: half a second, on a machine that does much else
 
 
-def interrupted(*command, after=0.5):
-    """Exit code 130, one line, at once, and no file more than before."""
+def interrupted(*command, once):
+    """Stopped soon after the stage `once` has ended: exit code 130, one line, at once, and no file more than before."""
     before = sorted(os.listdir("."))
     with subprocess.Popen([str(BIN / command[0]), *command[1:]], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
                           stderr=subprocess.PIPE) as process:
-        time.sleep(after)
-        expect(process.poll() is None, f"{command} ended before it was stopped: {process.stderr.read() if process.poll() else ''}")
+        said = []
+        while not said or f": {once}: " not in said[-1]:
+            said.append(process.stderr.readline().decode())
+            expect(said[-1] != "", f"{command} ended before it was stopped: {said}")
+        time.sleep(0.3)
         process.send_signal(signal.SIGINT)
         began = time.monotonic()
         process.wait(timeout=60)
         took = time.monotonic() - began
-        said = process.stderr.read().decode().splitlines()
+        said += process.stderr.read().decode().splitlines()
     expect(process.returncode == 130, f"{command}: exit code 130 wanted, not {process.returncode}: {said}")
     expect(took < HEARD, f"{command}: it took {took:.1f} s to stop")
     expect(said[-1].endswith(": interrupted"), f"{command}: {said}")
@@ -31,24 +34,24 @@ def interrupted(*command, after=0.5):
 
 def test_interrupt_while_voxelizing():
     box()
-    interrupted("flexel-voxelize", "box.stl", "--size", "0.1 mm", "--max-memory", "1TB", "--quiet", "-o", "out.vtu")
+    interrupted("flexel-voxelize", "box.stl", "--size", "0.1 mm", "--max-memory", "1TB", "-o", "out.vtu", once="import")
 
 
 def test_interrupt_while_wrapping():
     box()
-    interrupted("flexel-voxelize", "box.stl", "--size", "5 mm", "--heal", "wrap:0.02mm", "--quiet", "-o", "out.vtu", after=1.5)
+    interrupted("flexel-voxelize", "box.stl", "--size", "5 mm", "--heal", "wrap:0.02mm", "-o", "out.vtu", once="import")
 
 
 def test_interrupt_while_mapping():
     box()
     expect_ok(run("flexel-voxelize", "box.stl", *FINE, "--quiet", "-o", "body.vtu"))
-    interrupted("flexel-map", "body.vtu", "--check", "voronoi", "--quiet", "-o", "out.stl")
+    interrupted("flexel-map", "body.vtu", "--check", "voronoi", "-o", "out.stl", once="read")
 
 
 def test_interrupt_of_flexel():
     box()
-    interrupted("flexel", "deform", "box.stl", "--material", "steel", "--fix", "xmin", "--push", "xmax: 0 0 -1 N", *FINE, "--quiet", "-o",
-                "out.stl")
+    interrupted("flexel", "deform", "box.stl", "--material", "steel", "--fix", "xmin", "--push", "xmax: 0 0 -1 N", *FINE, "-o", "out.stl",
+                once="import")
 
 
 def test_timeout_is_heard_within_a_step():
