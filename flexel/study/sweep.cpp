@@ -80,20 +80,18 @@ std::vector<Trial> Sweep::open() const {
         break;
       }
   if (const std::optional<Trial> next = next_against()) all.push_back(*next);
-  const std::optional<std::size_t> rung = climbing() ? std::nullopt : middle();
-  if (rung) {
-    add_models(all, *rung);
-    if (facts_.timed) add_timed(all, rungs_[*rung]);
-    add_effects(all, rungs_[*rung]);
-  }
   const auto take_open = [&] {
     for (const Trial& each : all)
       if (closed_.count(each.label) == 0) result.push_back(each);
   };
-  take_open();
-  if (!result.empty() || !rung) return result;
-  add_switches(all, *rung);
-  take_open();
+  if (const std::optional<std::size_t> rung = middle()) {
+    add_models(all, *rung);
+    if (facts_.timed) add_timed(all, rungs_[*rung]);
+    add_effects(all, rungs_[*rung]);
+    take_open();
+    if (result.empty()) add_switches(all, *rung);
+  }
+  if (result.empty()) take_open();
   return result;
 }
 
@@ -136,6 +134,7 @@ bool Sweep::climbing() const {
 // use if that is not out of proportion.
 std::optional<std::size_t> Sweep::middle() const {
   std::optional<std::size_t> best;
+  if (climbing()) return best;
   for (std::size_t r = 0; r < rungs_.size(); ++r) {
     const Rung& rung = rungs_[r];
     if (!rung.found || rung.found->cells < static_cast<double>(kFewestOfUse) ||
