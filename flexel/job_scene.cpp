@@ -102,17 +102,17 @@ void declare_scene(CLI::App& app, JobArguments& arguments) {
 }
 
 void refuse_idle(const JobArguments& arguments) {
+  if (arguments.gravity.empty() && arguments.pushes.empty() && arguments.moves.empty() &&
+      arguments.torques.empty() && arguments.twists.empty() && arguments.bearings.empty())
+    throw InputError(
+        "nothing acts on the part: add --push \"WHERE: 0 0 -50 N\", --move \"WHERE: 0 0 -2 mm\", --torque, "
+        "--twist, --bearing, --gravity or --scene FILE");
   if (arguments.materials.empty()) {
     std::vector<std::string> known;
     for (const Material& material : material_library()) known.push_back(material.name);
     throw InputError(
         fmt::format("no material: add --material NAME; the library has {}", fmt::join(known, ", ")));
   }
-  if (arguments.gravity.empty() && arguments.pushes.empty() && arguments.moves.empty() &&
-      arguments.torques.empty() && arguments.twists.empty() && arguments.bearings.empty())
-    throw InputError(
-        "nothing acts on the part: add --push \"WHERE: 0 0 -50 N\", --move \"WHERE: 0 0 -2 mm\", --torque, "
-        "--twist, --bearing, --gravity or --scene FILE");
 }
 
 void add_options(const JobArguments& arguments, Job& job) {

@@ -174,7 +174,7 @@ def test_study_takes_options():
     scene("scene.toml")
     expect_error(run("flexel", "study", "box.stl", "--scene", "scene.toml", "--material", "PLA", "-o", "s2"), "flexel", "scene.toml",
                  "leave --material out")
-    expect_error(run("flexel", "study", "box.stl", "--fix", "xmin", "-o", "s3"), "flexel", "material")
+    expect_error(run("flexel", "study", "box.stl", "--fix", "xmin", "--gravity", "1 g", "-o", "s3"), "flexel", "--material")
 
 
 def test_fillets_are_no_holes():
