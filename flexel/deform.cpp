@@ -11,7 +11,10 @@
 #include "formats/brief_output.h"
 #include "formats/files.h"
 #include "formats/human.h"
+#include "formats/outputs.h"
 #include "formats/parallel.h"
+#include "formats/stop.h"
+#include "formats/termination.h"
 #include "formats/units.h"
 #include "mapping/options.h"
 #include "mapping/output.h"
@@ -58,7 +61,7 @@ void declare_output(CLI::App& app, DeformArguments& arguments) {
       ->type_name("FILE");
   app.add_option("--threads", arguments.threads, "Threads; 0 is every core")->check(CLI::NonNegativeNumber);
   app.add_option("--timeout", arguments.timeout,
-                 "Stop the simulation after this time (\"90 s\"): exit 5, the last good state in "
+                 "Stop after this time (\"90 s\"): exit 5, of a simulation the last good state in "
                  "OUTPUT.failed.vtu")
       ->type_name("TIME");
   app.add_option("--accuracy", arguments.accuracy,
@@ -86,6 +89,16 @@ struct Plan {
   std::vector<Output> outputs;
 };
 
+// Where the last good state goes when the simulation diverges: beside the first file that is written.
+std::string failed_name(const Plan& plan) {
+  for (const Plan::Output& output : plan.outputs) {
+    if (output.path == "-") continue;
+    const std::string ending = "." + extension(output.path);
+    return output.path.substr(0, output.path.size() - ending.size()) + ".failed.vtu";
+  }
+  return "";
+}
+
 void plan_outputs(const DeformArguments& arguments, Plan& plan) {
   for (const std::string& path : arguments.outputs)
     if (extension(path) == "vtu")
@@ -95,14 +108,11 @@ void plan_outputs(const DeformArguments& arguments, Plan& plan) {
           {path, map_output(path == "-" ? arguments.map.format : "", path, arguments.map.ascii, 0,
                             arguments.map.scale, arguments.map.attributes)});
   if (!arguments.body.empty()) plan.outputs.push_back({arguments.body, std::nullopt});
-  std::vector<std::string> paths{arguments.map.report, arguments.summary};
-  for (const Plan::Output& output : plan.outputs) paths.push_back(output.path);
-  std::sort(paths.begin(), paths.end());
-  for (std::size_t i = 1; i < paths.size(); ++i)
-    if (!paths[i].empty() && paths[i] == paths[i - 1])
-      throw InputError("two results would go to \"" + paths[i] + "\"");
-  for (const std::string& path : paths)
-    if (path.find("{part}") == std::string::npos) refuse_unwritable(path, false);
+  std::vector<OutputName> names{{arguments.map.report}, {arguments.summary}, {failed_name(plan)}};
+  for (const Plan::Output& output : plan.outputs) names.push_back({output.path});
+  std::vector<std::string> inputs = arguments.job.parts;
+  inputs.push_back(arguments.job.scene);
+  check_outputs(names, inputs, arguments.job.force);
 }
 
 // Nothing is asked for: a size is chosen where error bars can judge it.
@@ -151,16 +161,6 @@ Plan make_plan(const DeformArguments& arguments) {
   return plan;
 }
 
-// Where the last good state goes when the simulation diverges: beside the first file that is written.
-std::string failed_name(const Plan& plan) {
-  for (const Plan::Output& output : plan.outputs) {
-    if (output.path == "-") continue;
-    const std::string ending = "." + extension(output.path);
-    return output.path.substr(0, output.path.size() - ending.size()) + ".failed.vtu";
-  }
-  return "";
-}
-
 void write_outputs(const Plan& plan, const Body& body, const MappedPart& mapped, Progress& progress) {
   progress.stage("write");
   if (!plan.crack.pieces.empty())
@@ -177,7 +177,6 @@ SimulateOptions simulate_options(const DeformArguments& arguments, const Plan& p
   SimulateOptions options;
   options.threads = arguments.threads;
   options.failed_output = failed_name(plan);
-  options.timeout = plan.timeout;
   options.estimate = arguments.estimate;
   return options;
 }
@@ -232,11 +231,16 @@ SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surf
   return run;
 }
 
+Surface read_part_files(const DeformArguments& arguments, const Plan& plan, Progress& progress) {
+  const StopEndsProcess at_once;
+  return read_parts(arguments.job.parts, plan.job.import, progress);
+}
+
 // Lattice and simulation; of --accuracy and --within what they chose.
 SolvedRun solve(const DeformArguments& arguments, Plan& plan, std::optional<AccuracyReport>& accuracy,
                 Progress& progress) {
   progress.stage("import");
-  Surface surface = read_parts(arguments.job.parts, plan.job.import, progress);
+  Surface surface = read_part_files(arguments, plan, progress);
   if (plan.goal) {
     progress.stage("choose the size");
     return solve_to_goal(arguments, plan, surface, accuracy.emplace(), progress);
@@ -257,6 +261,8 @@ std::string next_step(const std::optional<AccuracyReport>& accuracy) {
 }
 
 int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress) {
+  std::optional<StopAfter> limit;
+  if (plan.timeout) limit.emplace(*plan.timeout, "--timeout", LimitOf::command);
   std::optional<AccuracyReport> accuracy;
   SolvedRun run;
   {
@@ -265,6 +271,7 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
   }
   Body& body = run.voxels.body;
   for (const std::string& line : run.warnings) progress.warn(line);
+  const StopEndsProcess at_once;
   MappedPart mapped;
   {
     const BriefOutput brief(!arguments.verbose);
@@ -276,7 +283,15 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
     say_report(mapped.report, arguments.map, plan.map, progress);
   }
   const MapReport& found = mapped.report;
-  write_report(found, arguments.map, plan.map, arguments.map.report);
+  std::vector<std::string> paths{arguments.map.report, arguments.summary};
+  for (const Plan::Output& output : plan.outputs) paths.push_back(output.path);
+  OutputsTogether outputs(std::move(paths));
+  try {
+    write_report(found, arguments.map, plan.map, arguments.map.report);
+  } catch (const InvalidMappingError&) {
+    outputs.appear();
+    throw;
+  }
   {
     const BriefOutput brief(!arguments.verbose);
     write_outputs(plan, body, mapped, progress);
@@ -295,6 +310,7 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
     if (accuracy) summary["accuracy"] = nlohmann::ordered_json::parse(accuracy->json());
     write_text(summary.dump(2) + "\n", arguments.summary);
   }
+  outputs.appear();
   for (const std::string& line :
        answer_lines(run.simulated, body, known_materials(plan.job.scene, body), next_step(accuracy)))
     progress.say(line);
@@ -310,6 +326,7 @@ int deform_command(int argc, char** argv) {
   declare_input(app, arguments.job);
   declare_output(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
+  const StopEndsProcess nothing_is_left;  // runs in time leave something, and see to it themselves
   Plan plan = make_plan(arguments);
   const ThreadLimit limit(arguments.threads);
   Progress progress("flexel", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);

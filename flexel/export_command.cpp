@@ -9,7 +9,9 @@
 #include "flexel/export/calculix_file.h"
 #include "flexel/job.h"
 #include "formats/files.h"
+#include "formats/outputs.h"
 #include "formats/parallel.h"
+#include "formats/termination.h"
 #include "formats/units.h"
 #include "simulate/fragments.h"
 
@@ -61,8 +63,9 @@ void check(const ExportArguments& arguments) {
     throw InputError("--count is for --mesh hex; give --size, the largest edge of a tetrahedron");
   if (arguments.mesh == "tet" && arguments.element == "C3D8")
     throw InputError("--element is for --mesh hex; tetrahedra are C3D10");
-  if (!arguments.summary.empty() && arguments.summary == arguments.output)
-    throw InputError("two results would go to \"" + arguments.output + "\"");
+  std::vector<std::string> inputs = arguments.job.parts;
+  inputs.push_back(arguments.job.scene);
+  check_outputs({{arguments.output}, {arguments.summary}}, inputs, arguments.job.force);
 }
 
 Setting setting_of(const Body& body, const Scene& scene) {
@@ -225,6 +228,7 @@ int export_command(int argc, char** argv) {
                "flexel export"};
   declare(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
+  const StopEndsProcess nothing_is_left;
   check(arguments);
   Job job = plan_job(arguments.job);
   const ThreadLimit limit(arguments.threads);
@@ -248,10 +252,10 @@ int export_command(int argc, char** argv) {
   CalculixOptions options;
   options.element = arguments.element;
   options.head = head(arguments, analysis);
-  OutputFile out(arguments.output, false);
-  out.write(calculix_file(analysis, options));
-  out.commit();
+  OutputsTogether outputs({arguments.output, arguments.summary});
+  write_text(calculix_file(analysis, options), arguments.output);
   if (!arguments.summary.empty()) write_text(summary(analysis, arguments), arguments.summary);
+  outputs.appear();
   return kExitDone;
 }
 

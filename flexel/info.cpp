@@ -14,6 +14,7 @@
 #include "formats/progress.h"
 #include "formats/size_warning.h"
 #include "formats/surface_file.h"
+#include "formats/termination.h"
 #include "formats/topology.h"
 #include "formats/units.h"
 #include "voxelize/thickness.h"
@@ -253,6 +254,7 @@ int info_command(int argc, char** argv) {
                  "Also write the surface as PLY with the wall thickness at its vertices")
       ->type_name("FILE.ply");
   if (!parse_arguments(app, argc, argv)) return kExitDone;
+  const StopEndsProcess nothing_is_left;
   if (!thickness.empty() && extension(thickness) != "ply")
     throw InputError("--thickness: the file must end in .ply");
   ImportOptions options;

@@ -74,6 +74,7 @@ void declare_job(CLI::App& app, JobArguments& arguments) {
   app.add_option("--edge", arguments.edge,
                  "STEP: longest edge of the mesh (default a 64th of the solid's diagonal)")
       ->type_name("LENGTH");
+  app.add_flag("--force", arguments.force, "Let results replace files that are read");
 }
 
 Job plan_job(const JobArguments& arguments) {

@@ -16,6 +16,7 @@ struct JobArguments {
   std::vector<std::string> parts, fixes, pushes, moves;
   std::string scene, material, size, heal = "auto", placement = "corner", unit, edge;
   std::optional<std::size_t> count;
+  bool force = false;  // results may replace files that are read
 };
 
 // Adds their options to the program, but for --placement, which not every command has.

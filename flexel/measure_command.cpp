@@ -8,6 +8,7 @@
 #include "formats/error.h"
 #include "formats/files.h"
 #include "formats/program.h"
+#include "formats/termination.h"
 #include "formats/units.h"
 #include "simulate/measure.h"
 
@@ -162,6 +163,7 @@ int measure_command(int argc, char** argv) {
       ->capture_default_str();
   app.add_flag("--json", arguments.json, "As JSON, in SI units");
   if (!parse_arguments(app, argc, argv)) return kExitDone;
+  const StopEndsProcess nothing_is_left;
   const Measured found = measured(arguments);
   OutputFile out("-", false);
   out.write(arguments.json ? json_of(arguments, found) : text_of(arguments, found));

@@ -10,8 +10,10 @@
 #include "flexel/picture/picture.h"
 #include "formats/body_file.h"
 #include "formats/import.h"
+#include "formats/outputs.h"
 #include "formats/parallel.h"
 #include "formats/program.h"
+#include "formats/termination.h"
 #include "formats/units.h"
 
 namespace flexel {
@@ -24,7 +26,7 @@ struct PictureArguments {
   std::vector<std::string> files;
   std::string output, colour, range, scale = "1", view = "auto", up = "z", size = "1600x1200", unit,
                                      input_format;
-  bool cells = false, elements = false, no_outline = false, quiet = false;
+  bool cells = false, elements = false, no_outline = false, quiet = false, force = false;
   int threads = 0;
 };
 
@@ -59,6 +61,7 @@ void declare(CLI::App& app, PictureArguments& a) {
       ->type_name("NAME");
   app.add_option("--threads", a.threads, "Threads; 0 is every core")->check(CLI::NonNegativeNumber);
   app.add_flag("--quiet", a.quiet, "Say only warnings and errors");
+  app.add_flag("--force", a.force, "Let the picture replace a file that is read");
 }
 
 double number(const std::string& text, const std::string& option) {
@@ -178,7 +181,9 @@ int picture_command(int argc, char** argv) {
   CLI::App app{"A picture (PNG) of parts and bodies, made without a display.", "flexel picture"};
   declare(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
+  const StopEndsProcess nothing_is_left;
   check_output(arguments.output);
+  check_outputs({{arguments.output, true}}, arguments.files, arguments.force);
   const PictureOptions options = options_of(arguments);
   ImportOptions import;
   // Flat faces need no splitting to be drawn.

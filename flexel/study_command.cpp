@@ -14,6 +14,7 @@
 #include "formats/files.h"
 #include "formats/program.h"
 #include "formats/progress.h"
+#include "formats/termination.h"
 #include "formats/units.h"
 #include "simulate/scene.h"
 #include "simulate/simulate.h"
@@ -149,6 +150,7 @@ int study_command(int argc, char** argv) {
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   const study::Assignment wanted = assignment(arguments);
   Progress progress("flexel", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
+  const TerminationWaits waits;  // the folder of its runs is removed
   study::Session session(wanted, progress);
   session.run();
   return session.interrupted() ? kExitInterrupted : kExitDone;

@@ -17,6 +17,9 @@ struct BodyFileOptions {
 // Writes `body` ("-": stdout). The round trip is bit-exact.
 void write_body(const Body& body, const std::string& path, const BodyFileOptions& options = {});
 
+// The bytes of such a file.
+[[nodiscard]] Bytes body_bytes(const Body& body);
+
 // Reads a body ("-": stdin). Throws InputError: not a body file, empty or truncated (for stdin: the program
 // before it failed), an unknown version, a size that does not agree (naming the field).
 [[nodiscard]] Body read_body(const std::string& path);

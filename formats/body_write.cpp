@@ -183,9 +183,7 @@ void require_sizes(const Body& body) {
   if (!agree) throw std::logic_error("write_body: the sizes of the body's arrays do not agree");
 }
 
-}  // namespace
-
-void write_body(const Body& body, const std::string& path, const BodyFileOptions& options) {
+void write_to(OutputFile& output, const Body& body, const BodyFileOptions& options) {
   require_sizes(body);
   const bool with_surface = options.embed_surface && has_surface(body.surface);
   const Workspace work = prepare(body, with_surface);
@@ -195,10 +193,23 @@ void write_body(const Body& body, const std::string& path, const BodyFileOptions
   if (with_surface) add_surface(body, work, arrays);
   add_elements(body, work, arrays);
   add_cells(body, work, arrays);
-  OutputFile output(path);
   vtu::write(output, body.element_count(), body.cell_count() + work.vertex_elements.size(), arrays,
              options.compress);
   output.commit();
+}
+
+}  // namespace
+
+void write_body(const Body& body, const std::string& path, const BodyFileOptions& options) {
+  OutputFile output(path);
+  write_to(output, body, options);
+}
+
+Bytes body_bytes(const Body& body) {
+  Bytes bytes;
+  OutputFile output(bytes);
+  write_to(output, body, {});
+  return bytes;
 }
 
 }  // namespace flexel

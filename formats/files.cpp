@@ -14,7 +14,8 @@
 #include <filesystem>
 
 #include "formats/error.h"
-#include "formats/program.h"
+#include "formats/pipe_code.h"
+#include "formats/stop.h"
 
 namespace flexel {
 namespace {
@@ -25,7 +26,7 @@ class Descriptor {
  public:
   explicit Descriptor(const std::string& path) : owned_(path != "-") {
     do {
-      throw_if_interrupted();
+      check_stop();
       value_ = owned_ ? ::open(path.c_str(), O_RDONLY | O_CLOEXEC) : STDIN_FILENO;
     } while (value_ < 0 && errno == EINTR);
     if (value_ < 0) throw InputError(path, fmt::format("cannot read: {}", std::strerror(errno)));
@@ -49,7 +50,7 @@ void wait_until_readable(int descriptor) {
   pollfd wait = {descriptor, POLLIN, 0};
   int ready = 0;
   while (ready == 0 || (ready < 0 && errno == EINTR)) {
-    throw_if_interrupted();
+    check_stop();
     ready = ::poll(&wait, 1, kInterval);
   }
 }
@@ -69,9 +70,11 @@ Bytes read_to_end(int descriptor, std::size_t expected, const std::string& where
     const ssize_t got = ::read(descriptor, bytes.data() + size, bytes.size() - size);
     if (got == 0) break;
     if (got > 0) {
+      // A larger pipe lets the program before this one run ahead. Only a wish, of regular files too.
+      if (size == 0) (void)::fcntl(descriptor, F_SETPIPE_SZ, static_cast<int>(kStep));
       size += static_cast<std::size_t>(got);
     } else if (errno == EINTR) {
-      throw_if_interrupted();
+      check_stop();
     } else {
       throw InputError(where, fmt::format("cannot read: {}", std::strerror(errno)));
     }
@@ -92,10 +95,11 @@ Bytes read_all(const std::string& path) {
   if (::fstat(descriptor.value(), &status) != 0)
     throw InputError(where, fmt::format("cannot read: {}", std::strerror(errno)));
   if (S_ISDIR(status.st_mode)) throw InputError(where, "is a folder; name a file in it");
-  // A larger pipe lets the program before this one run ahead. Only a wish: it may be refused.
-  if (S_ISFIFO(status.st_mode)) (void)::fcntl(descriptor.value(), F_SETPIPE_SZ, static_cast<int>(kStep));
   const std::size_t expected = S_ISREG(status.st_mode) ? static_cast<std::size_t>(status.st_size) : 0;
   Bytes bytes = read_to_end(descriptor.value(), expected, where);
+  if (bytes.empty() && from_stdin)
+    if (const std::optional<int> code = code_told_through_pipe(descriptor.value()))
+      throw ProgramBeforeFailed(*code);
   if (bytes.empty() && from_stdin)
     throw InputError("stdin is empty: the program before it in the pipe failed or wrote nothing");
   if (bytes.empty()) throw InputError(where, "is empty");

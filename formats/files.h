@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -12,8 +13,18 @@ namespace flexel {
 
 using Bytes = std::vector<std::byte>;
 
+// The program of ours before this one in a pipe has failed with `code`, and said why (formats/pipe_code.h).
+class ProgramBeforeFailed : public std::runtime_error {
+ public:
+  explicit ProgramBeforeFailed(int code) : std::runtime_error("the program before it failed"), code_(code) {}
+  [[nodiscard]] int code() const { return code_; }
+
+ private:
+  int code_;
+};
+
 // The whole of a file, or of stdin for "-". Throws InputError: missing, a directory, unreadable, empty (for
-// stdin: "the program before it in the pipe failed or wrote nothing").
+// stdin: "the program before it in the pipe failed or wrote nothing"). Throws ProgramBeforeFailed.
 [[nodiscard]] Bytes read_all(const std::string& path);
 
 // Where a result goes. Data is appended in pieces; nothing appears under the target's name until commit().
@@ -23,17 +34,22 @@ using Bytes = std::vector<std::byte>;
 class OutputFile {
  public:
   explicit OutputFile(const std::string& path, bool binary = true);
+  // Into `memory`, which must outlive it.
+  explicit OutputFile(Bytes& memory) : memory_(&memory) {}
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
   void write(const void* data, std::size_t size);
   void write(const std::string& text) { write(text.data(), text.size()); }
-  void commit();
+  // Where an OutputsTogether (formats/outputs.h) waits for the file, it appears with the others; `alone`:
+  // now.
+  void commit(bool alone = false);
 
  private:
   void open_file();
   void flush_buffer();
   void write_through(const char* data, std::size_t size);
+  Bytes* memory_ = nullptr;
   std::string path_;       // as given
   std::string target_;     // what it stands for once links are followed
   std::string temporary_;  // "" for stdout, devices and FIFOs, and once committed
@@ -47,7 +63,13 @@ class OutputFile {
 void refuse_unwritable(const std::string& path, bool binary = true);
 
 // A whole text to `path`, as OutputFile does.
-void write_text(const std::string& text, const std::string& path);
+void write_text(const std::string& text, const std::string& path, bool alone = false);
+
+// What `path` stands for once links are followed; it need not exist. Throws InputError: a ring of links.
+[[nodiscard]] std::string follow_links(const std::string& path);
+
+// Whether `path` names stdout: "-", "/dev/stdout".
+[[nodiscard]] bool means_stdout(const std::string& path);
 
 // Removes the temporary files of all writers. Only for a signal handler that ends the process: safe there,
 // and nowhere needed else.

@@ -7,15 +7,18 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <utility>
 
 #include "formats/error.h"
 #include "formats/files.h"
-#include "formats/program.h"
+#include "formats/outputs.h"
+#include "formats/stop.h"
 
 namespace flexel {
 namespace {
@@ -57,30 +60,12 @@ void forget_temporary(const std::string& name) {
                                full ? "; free some space or write to another disk" : ""));
 }
 
-bool means_stdout(const std::string& path) {
-  return path == "-" || path == "/dev/stdout" || path == "/dev/fd/1" || path == "/proc/self/fd/1";
-}
-
-// The file that `path` stands for once links are followed; it need not exist.
-std::string follow_links(const std::string& path) {
-  constexpr int kMostLinks = 40;  // as the kernel
-  std::filesystem::path target = path;
-  std::error_code none;
-  for (int links = 0; std::filesystem::is_symlink(target, none); ++links) {
-    if (links == kMostLinks) refuse(path, ELOOP);
-    const std::filesystem::path next = std::filesystem::read_symlink(target, none);
-    if (none) refuse(path, none.value());
-    target = next.is_absolute() ? next : target.parent_path() / next;
-  }
-  return target.string();
-}
-
 int open_or_refuse(const std::string& name, int flags, mode_t mode, const std::string& path) {
   for (;;) {
     const int descriptor = ::open(name.c_str(), flags | O_CLOEXEC, mode);
     if (descriptor >= 0) return descriptor;
     if (errno != EINTR) refuse(path, errno);
-    throw_if_interrupted();
+    check_stop();
   }
 }
 
@@ -93,7 +78,33 @@ std::string temporary_beside(const std::string& target) {
   return (path.parent_path() / hidden).string();
 }
 
+// A name that the file system cannot hold would be seen only when the temporary file is renamed.
+void refuse_long_name(const std::string& target, const std::string& path) {
+  const std::filesystem::path name = target;
+  const std::string folder = name.has_parent_path() ? name.parent_path().string() : ".";
+  const long longest = ::pathconf(folder.c_str(), _PC_NAME_MAX);
+  if (longest > 0 && name.filename().string().size() > static_cast<std::size_t>(longest))
+    refuse(path, ENAMETOOLONG);
+}
+
 }  // namespace
+
+bool means_stdout(const std::string& path) {
+  return path == "-" || path == "/dev/stdout" || path == "/dev/fd/1" || path == "/proc/self/fd/1";
+}
+
+std::string follow_links(const std::string& path) {
+  constexpr int kMostLinks = 40;  // as the kernel
+  std::filesystem::path target = path;
+  std::error_code none;
+  for (int links = 0; std::filesystem::is_symlink(target, none); ++links) {
+    if (links == kMostLinks) refuse(path, ELOOP);
+    const std::filesystem::path next = std::filesystem::read_symlink(target, none);
+    if (none) refuse(path, none.value());
+    target = next.is_absolute() ? next : target.parent_path() / next;
+  }
+  return target.string();
+}
 
 void remove_temporary_outputs() {
   for (const TemporaryName& entry : temporary_names)
@@ -124,6 +135,7 @@ void OutputFile::open_file() {
   }
   if (exists && ::access(path_.c_str(), W_OK) != 0) refuse(path_, errno);
   target_ = follow_links(path_);
+  refuse_long_name(target_, path_);
   const std::string name = temporary_beside(target_);
   descriptor_ = open_or_refuse(name, O_WRONLY | O_CREAT | O_TRUNC, 0666, path_);  // narrowed by the umask
   temporary_ = name;
@@ -153,6 +165,11 @@ void OutputFile::flush_buffer() {
 }
 
 void OutputFile::write_through(const char* data, std::size_t size) {
+  if (memory_ != nullptr) {
+    const auto* bytes = reinterpret_cast<const std::byte*>(data);
+    memory_->insert(memory_->end(), bytes, bytes + size);
+    return;
+  }
   while (size > 0) {
     const ssize_t written = ::write(descriptor_, data, size);
     if (written >= 0) {
@@ -161,25 +178,58 @@ void OutputFile::write_through(const char* data, std::size_t size) {
     } else if (errno == EPIPE) {
       throw ReaderClosedPipe();
     } else if (errno == EINTR) {
-      throw_if_interrupted();
+      check_stop();
     } else {
       refuse(path_, errno);
     }
   }
 }
 
-void OutputFile::commit() {
+void OutputFile::commit(bool alone) {
   if (committed_) return;
   flush_buffer();
   committed_ = true;
-  if (descriptor_ == STDOUT_FILENO) return;
+  if (descriptor_ == STDOUT_FILENO || memory_ != nullptr) return;
   const int closed =
       ::close(std::exchange(descriptor_, -1));  // some disks report only here that they are full
   if (closed != 0 && errno != EINTR) refuse(path_, errno);
   if (temporary_.empty()) return;
-  if (::rename(temporary_.c_str(), target_.c_str()) != 0) refuse(path_, errno);
-  forget_temporary(temporary_);
+  if (alone || !OutputsTogether::takes(path_, temporary_, target_)) {
+    if (::rename(temporary_.c_str(), target_.c_str()) != 0) refuse(path_, errno);
+    forget_temporary(temporary_);
+  }
   temporary_.clear();
+}
+
+OutputsTogether* OutputsTogether::present_ = nullptr;
+
+OutputsTogether::OutputsTogether(std::vector<std::string> paths) : paths_(std::move(paths)) {
+  present_ = this;
+}
+
+OutputsTogether::~OutputsTogether() {
+  present_ = nullptr;
+  for (const Waiting& each : waiting_) {
+    ::unlink(each.temporary.c_str());
+    forget_temporary(each.temporary);
+  }
+}
+
+bool OutputsTogether::takes(const std::string& path, const std::string& temporary,
+                            const std::string& target) {
+  if (present_ == nullptr || std::count(present_->paths_.begin(), present_->paths_.end(), path) == 0)
+    return false;
+  present_->waiting_.push_back({path, temporary, target});
+  return true;
+}
+
+void OutputsTogether::appear() {
+  while (!waiting_.empty()) {
+    const Waiting next = waiting_.front();
+    if (::rename(next.temporary.c_str(), next.target.c_str()) != 0) refuse(next.path, errno);
+    forget_temporary(next.temporary);
+    waiting_.erase(waiting_.begin());
+  }
 }
 
 void refuse_unwritable(const std::string& path, bool binary) {
@@ -189,10 +239,10 @@ void refuse_unwritable(const std::string& path, bool binary) {
   if (!path.empty() && !opening_tells_others) OutputFile(path, binary);
 }
 
-void write_text(const std::string& text, const std::string& path) {
+void write_text(const std::string& text, const std::string& path, bool alone) {
   OutputFile file(path, false);
   file.write(text);
-  file.commit();
+  file.commit(alone);
 }
 
 }  // namespace flexel

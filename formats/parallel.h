@@ -1,5 +1,6 @@
 // All use of oneTBB is here. Every function gives the same bits for any number of threads: work is cut into
-// chunks whose size depends on n only, and reductions add the chunks' sums in order.
+// chunks whose size depends on n only, and reductions add the chunks' sums in order. Before every chunk is
+// asked whether the work is to stop (formats/stop.h): any of them may throw Interrupted and TimeoutError.
 #pragma once
 #include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/global_control.h>
@@ -13,6 +14,8 @@
 #include <cstddef>
 #include <memory>
 #include <vector>
+
+#include "formats/stop.h"
 
 namespace flexel {
 
@@ -49,12 +52,15 @@ void parallel_both(const First& first, const Second& second) {
 template <class Body>
 void parallel_chunks(std::size_t n, std::size_t grain, const Body& body) {
   const std::size_t chunks = (n + grain - 1) / grain;
+  check_stop();
   if (chunks <= 1) {
     if (n > 0) body(std::size_t{0}, n);
     return;
   }
-  tbb::parallel_for(std::size_t{0}, chunks,
-                    [&](std::size_t c) { body(c * grain, std::min(n, (c + 1) * grain)); });
+  tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t c) {
+    check_stop();
+    body(c * grain, std::min(n, (c + 1) * grain));
+  });
 }
 
 // body(i) for each i in [0, n).
@@ -71,6 +77,7 @@ template <class Value, class Term>
   const std::size_t chunks = (n + grain - 1) / grain;
   std::vector<Value> partial(chunks, Value{});
   tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t c) {
+    check_stop();
     Value sum{};
     for (std::size_t i = c * grain; i < std::min(n, (c + 1) * grain); ++i) sum += term(i);
     partial[c] = sum;
@@ -83,6 +90,7 @@ template <class Value, class Term>
 // Sorts by `less`, which must be a strict total order for repeatable results.
 template <class Iterator, class Less>
 void parallel_sort(Iterator begin, Iterator end, const Less& less) {
+  check_stop();
   tbb::parallel_sort(begin, end, less);
 }
 

@@ -9,20 +9,28 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
+#include <condition_variable>
 #include <csignal>
 #include <cstdio>
 #include <cstring>
+#include <mutex>
 #include <new>
 #include <numeric>
+#include <thread>
 
 #include "formats/files.h"
+#include "formats/pipe_code.h"
+#include "formats/stop.h"
 #include "formats/termination.h"
 
 namespace flexel {
 namespace {
 
 volatile std::sig_atomic_t interrupt_count = 0, interrupting_signal = SIGINT, termination_waits = 0;
+volatile std::sig_atomic_t stop_ends_process = 0;
+std::array<char, 64> program_name{};  // of this program, for the signal handlers
 
 // As a shell gives it.
 int exit_code_of(int signal) {
@@ -30,13 +38,26 @@ int exit_code_of(int signal) {
 }
 static_assert(128 + SIGINT == kExitInterrupted);
 
+// Only what a signal handler may call.
+void write_words(std::initializer_list<const char*> words) {
+  for (const char* word : words) (void)!::write(STDERR_FILENO, word, std::strlen(word));
+}
+
+const char* word_of(int signal) {
+  return signal == SIGINT ? "interrupted" : "terminated";
+}
+
 void on_interrupt(int signal) {
+  const bool at_once = interrupt_count == 0 && stop_ends_process > 0 && termination_waits == 0;
   interrupt_count = interrupt_count + 1;
-  if (interrupt_count > 1) {
+  if (interrupt_count > 1 || at_once) {
+    if (at_once) write_words({program_name.data(), ": ", word_of(signal), "\n"});
     remove_temporary_outputs();
+    tell_code_through_pipe(STDOUT_FILENO, exit_code_of(signal));
     _exit(exit_code_of(signal));
   }
   interrupting_signal = signal;
+  request_stop();
 }
 
 void on_termination(int signal) {
@@ -44,6 +65,12 @@ void on_termination(int signal) {
   remove_temporary_outputs();
   std::signal(signal, SIG_DFL);
   std::raise(signal);
+}
+
+// The handler is gone once it has begun: the crash happens again, and ends the program as ever.
+void on_crash_of_program(int signal) {
+  remove_temporary_outputs();
+  tell_code_through_pipe(STDOUT_FILENO, exit_code_of(signal));
 }
 
 // Without SA_RESTART, so that a read from a silent pipe ends when the user interrupts it. A signal that was
@@ -71,6 +98,10 @@ void hold_standard_descriptors() {
 void install_handlers() {
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);  // a limit on the size of files then surfaces as EFBIG
+  struct sigaction crash = {};
+  crash.sa_handler = on_crash_of_program;
+  crash.sa_flags = static_cast<int>(SA_RESETHAND);
+  sigaction(SIGSEGV, &crash, nullptr);
   handle(SIGINT, on_interrupt);
   handle(SIGTERM, on_termination);
   handle(SIGHUP, on_termination);
@@ -107,6 +138,40 @@ void flush_stdout() {
   if (reason == EPIPE || reader_of_stdout_is_gone()) throw ReaderClosedPipe();
   throw InputError("stdout", fmt::format("cannot write: {}",
                                          reason != 0 ? std::strerror(reason) : "an earlier write failed"));
+}
+
+// The body's exit code, or that of what it throws.
+int code_of(const std::string& name, const std::function<int()>& body) {
+  try {
+    const int code = body();
+    flush_stdout();
+    return code;
+  } catch (const InputError& error) {
+    return report(name, error.where().empty() ? error.what() : error.where() + ": " + error.what(),
+                  kExitInput);
+  } catch (const DivergedError& error) {
+    return report(name, error.what(), kExitDiverged);
+  } catch (const TimeoutError& error) {
+    return report(name, error.what(), kExitTimeout);
+  } catch (const InvalidMappingError& error) {
+    return report(name, error.what(), kExitInvalidMapping);
+  } catch (const Interrupted&) {
+    const int signal = interrupting_signal;
+    std::fprintf(stderr, "%s: %s\n", name.c_str(), word_of(signal));
+    return exit_code_of(signal);
+  } catch (const ReaderClosedPipe&) {
+    return kExitReaderClosedPipe;
+  } catch (const ProgramBeforeFailed& failed) {
+    return failed.code();
+  } catch (const std::bad_alloc&) {
+    return report(name, "not enough memory: a larger spacing (--size) or fewer elements (--count) needs less",
+                  kExitInput);
+  } catch (const std::exception& error) {
+    return report(name, fmt::format("internal error, please report it with the input: {}", error.what()),
+                  kExitOurFault);
+  } catch (...) {
+    return report(name, "internal error of an unknown kind, please report it with the input", kExitOurFault);
+  }
 }
 
 void print(const std::string& text) {
@@ -160,36 +225,12 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
 }  // namespace
 
 int run_program(const std::string& name, const std::function<int()>& body) {
+  name.copy(program_name.data(), program_name.size() - 1);
   hold_standard_descriptors();
   install_handlers();
-  try {
-    const int code = body();
-    flush_stdout();
-    return code;
-  } catch (const InputError& error) {
-    return report(name, error.where().empty() ? error.what() : error.where() + ": " + error.what(),
-                  kExitInput);
-  } catch (const DivergedError& error) {
-    return report(name, error.what(), kExitDiverged);
-  } catch (const TimeoutError& error) {
-    return report(name, error.what(), kExitTimeout);
-  } catch (const InvalidMappingError& error) {
-    return report(name, error.what(), kExitInvalidMapping);
-  } catch (const Interrupted&) {
-    const int signal = interrupting_signal;
-    std::fprintf(stderr, "%s: %s\n", name.c_str(), signal == SIGINT ? "interrupted" : "terminated");
-    return exit_code_of(signal);
-  } catch (const ReaderClosedPipe&) {
-    return kExitReaderClosedPipe;
-  } catch (const std::bad_alloc&) {
-    return report(name, "not enough memory: a larger spacing (--size) or fewer elements (--count) needs less",
-                  kExitInput);
-  } catch (const std::exception& error) {
-    return report(name, fmt::format("internal error, please report it with the input: {}", error.what()),
-                  kExitOurFault);
-  } catch (...) {
-    return report(name, "internal error of an unknown kind, please report it with the input", kExitOurFault);
-  }
+  const int code = code_of(name, body);
+  tell_code_through_pipe(STDOUT_FILENO, code);
+  return code;
 }
 
 bool parse_arguments(CLI::App& app, int argc, char** argv) {
@@ -221,12 +262,45 @@ TerminationWaits::~TerminationWaits() {
   termination_waits = termination_waits - 1;
 }
 
-bool interrupted() {
-  return interrupt_count > 0;
-}
+// Ends the process when the limit of the command is over before the call is.
+class StopEndsProcess::Watch {
+ public:
+  explicit Watch(std::int64_t limit) : thread_([this, limit] { wait(limit); }) {}
+  ~Watch() {
+    {
+      const std::lock_guard lock(mutex_);
+      done_ = true;
+    }
+    changed_.notify_one();
+    thread_.join();
+  }
+  Watch(const Watch&) = delete;
+  Watch& operator=(const Watch&) = delete;
 
-void throw_if_interrupted() {
-  if (interrupted()) throw Interrupted();
+ private:
+  void wait(std::int64_t limit) {
+    std::unique_lock lock(mutex_);
+    const std::chrono::nanoseconds left(limit - stop_detail::now());
+    if (changed_.wait_for(lock, left, [this] { return done_; })) return;
+    write_words({program_name.data(), ": error: stopped by --timeout\n"});
+    remove_temporary_outputs();
+    tell_code_through_pipe(STDOUT_FILENO, kExitTimeout);
+    _exit(kExitTimeout);
+  }
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool done_ = false;
+  std::thread thread_;
+};
+
+StopEndsProcess::StopEndsProcess() {
+  check_stop();
+  const std::int64_t limit = stop_detail::command_limit();
+  if (limit != stop_detail::kNever) watch_ = std::make_unique<Watch>(limit);
+  stop_ends_process = stop_ends_process + 1;
+}
+StopEndsProcess::~StopEndsProcess() {
+  stop_ends_process = stop_ends_process - 1;
 }
 
 std::string nearest_word(const std::string& word, const std::vector<std::string>& candidates) {

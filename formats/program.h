@@ -10,17 +10,14 @@ namespace flexel {
 
 // Runs `body` and turns whatever it throws into one line `NAME: error: [WHERE: ]WHAT` on stderr and the
 // design's exit code. Installs the handlers: SIGPIPE is ignored (a closed pipe surfaces as ReaderClosedPipe),
-// SIGINT sets `interrupted()`; a second SIGINT ends the process at once. Returns the exit code for main.
+// SIGINT is heard by check_stop() (formats/stop.h); a second one ends the process at once. Returns the exit
+// code for main.
 [[nodiscard]] int run_program(const std::string& name, const std::function<int()>& body);
 
 // Parses the arguments with CLI11. --help and --version print and yield their exit code (0); a wrong argument
 // throws InputError with the nearest valid option where one is near. Returns true when the program should go
 // on, false when it is done (help or version was printed).
 [[nodiscard]] bool parse_arguments(CLI::App& app, int argc, char** argv);
-
-// True once SIGINT has arrived. Long loops call throw_if_interrupted().
-[[nodiscard]] bool interrupted();
-void throw_if_interrupted();
 
 // The candidate nearest to `word` by edit distance, or "" where none is within a third of its length (at
 // least 2 edits).

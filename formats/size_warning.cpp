@@ -51,8 +51,19 @@ std::vector<std::string> size_warnings(const Surface& surface) {
   std::vector<std::string> lines;
   for (std::size_t s = 0; s < extents.size(); ++s) {
     const double extent = extents[s];
-    if (!(extent > 0) || (extent >= kSuspiciouslySmall && extent <= kSuspiciouslyLarge)) continue;
     const SurfaceSource& source = surface.sources[s];
+    const bool assumed = !carries_unit(source) && !source.unit_given;
+    if (assumed && extent >= kSuspiciouslySmall && extent < kSmallWithoutUnit) {
+      const double numbers = extent / source.unit;
+      lines.push_back(
+          fmt::format("{} is {} long in {}, the unit for files that carry none: if the file is in metres add "
+                      "--unit m ({}), "
+                      "if in inches --unit in ({})",
+                      source.file, human_length(extent), name_of(source.unit), human_length(numbers),
+                      human_length(0.0254 * numbers)));
+      continue;
+    }
+    if (!(extent > 0) || (extent >= kSuspiciouslySmall && extent <= kSuspiciouslyLarge)) continue;
     const std::string likely = likely_unit(extent / source.unit), unit = name_of(source.unit);
     const std::string size = fmt::format("{} is {} across in {}", source.file, human_length(extent), unit);
     if (carries_unit(source))

@@ -9,7 +9,7 @@
 #include <limits>
 
 #include "formats/error.h"
-#include "formats/program.h"
+#include "formats/stop.h"
 #include "formats/topology.h"
 #include "mapping/crack_carved.h"
 #include "mapping/crack_pieces.h"
@@ -159,7 +159,7 @@ CrackedSurface part_surface(const Body& body, const Components& fragments, const
       cut_broken_part(cutting, part, triangles, builder);
     else
       builder.add_whole(part);
-    throw_if_interrupted();
+    check_stop();
   }
   CrackedSurface cracked = builder.take();
   if (options.mode == CrackMode::cap) {

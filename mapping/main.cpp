@@ -1,10 +1,15 @@
 // flexel-map: a deformed body in, its surface deformed out; or any other surface, points, or a series of
 // bodies.
+#include <cmath>
+
 #include "formats/body_file.h"
 #include "formats/files.h"
 #include "formats/import.h"
+#include "formats/outputs.h"
 #include "formats/parallel.h"
 #include "formats/program.h"
+#include "formats/stop.h"
+#include "formats/termination.h"
 #include "formats/units.h"
 #include "mapping/binding_file.h"
 #include "mapping/crack.h"
@@ -22,9 +27,17 @@ struct Arguments {
   std::string body = "-", output, unit, onto, points, far, binding, save_binding;
   double far_distance = 3;
   MapArguments map;
-  bool quiet = false;
+  bool quiet = false, force = false;
   int threads = 0;
 };
+
+// CLI11's checks let "nan" pass.
+std::string is_distance(const std::string& text) {
+  double distance = 0;
+  return CLI::detail::lexical_cast(text, distance) && distance >= 0 && std::isfinite(distance)
+             ? ""
+             : fmt::format("\"{}\" is no number from 0 on", text);
+}
 
 void declare(CLI::App& app, Arguments& arguments) {
   app.add_option("body", arguments.body,
@@ -40,7 +53,7 @@ void declare(CLI::App& app, Arguments& arguments) {
                  "--onto and --points)")
       ->type_name("HOW");
   app.add_option("--far-distance", arguments.far_distance, "How far that is, in spacings")
-      ->check(CLI::NonNegativeNumber)
+      ->check(is_distance)
       ->capture_default_str();
   declare_map_options(app, arguments.map);
   app.add_option("--save-binding", arguments.save_binding,
@@ -53,6 +66,7 @@ void declare(CLI::App& app, Arguments& arguments) {
       ->type_name("UNIT");
   app.add_option("--threads", arguments.threads, "Threads; 0 is every core")->check(CLI::NonNegativeNumber);
   app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
+  app.add_flag("--force", arguments.force, "Let results replace files that are read");
   app.add_option("-o,--output", arguments.output,
                  "Where the surface goes; -: stdout, also without it unless --pieces is given. A series: "
                  "bent.stl gives "
@@ -122,8 +136,11 @@ Plan make_plan(Arguments& arguments) {
   else if (!arguments.points.empty() &&
            (arguments.map.attributes || arguments.map.ascii || !arguments.map.format.empty()))
     throw InputError("--points: a table comes out; --format, --ascii and --attributes are for surfaces");
-  if (arguments.map.report == "-" && arguments.output == "-")
-    throw InputError("the report and the surface cannot both go to stdout: give one of them a file");
+  const std::vector<std::string> inputs = {arguments.body, arguments.onto, arguments.points,
+                                           arguments.binding};
+  std::vector<OutputName> outputs = {{arguments.save_binding, true}, {arguments.map.pieces}};
+  if (!plan.series) outputs.insert(outputs.end(), {{arguments.map.report}, {arguments.output}});
+  check_outputs(outputs, inputs, arguments.force);
   return plan;
 }
 
@@ -162,9 +179,15 @@ class Run {
               const std::string& path) {
     progress_.finish();
     if (!table_) say_report(found, arguments_.map, plan_.options, progress_);
-    const std::string& report = arguments_.map.report;
-    write_report(found, arguments_.map, plan_.options,
-                 plan_.series && !report.empty() ? frame_name(report, frame_) : report);
+    std::string report = arguments_.map.report;
+    if (plan_.series && !report.empty()) report = frame_name(report, frame_);
+    OutputsTogether outputs({report, path});
+    try {
+      write_report(found, arguments_.map, plan_.options, report);
+    } catch (const InvalidMappingError&) {
+      outputs.appear();
+      throw;
+    }
     progress_.stage("write");
     if (table_) {
       std::vector<Vec3> displacement = result.displacement;
@@ -178,6 +201,7 @@ class Run {
       output.path = path;
       write_mapped(foreign_ ? *foreign_ : surface, body, result, output);
     }
+    outputs.appear();
     progress_.finish();
     ++frame_;
   }
@@ -225,10 +249,15 @@ void map_one(const Arguments& arguments, Plan& plan, Progress& progress) {
 void map_series(const Arguments& arguments, Plan& plan, Progress& progress) {
   Run run(arguments, plan, progress);
   const std::vector<std::string> files = series_files(arguments.body);
+  for (std::size_t f = 0; f < files.size(); ++f) {
+    std::vector<OutputName> outputs = {{frame_name(arguments.output, f)}};
+    if (!arguments.map.report.empty()) outputs.push_back({frame_name(arguments.map.report, f)});
+    check_outputs(outputs, {files.begin(), files.end()}, arguments.force);
+  }
   Body body;
   std::optional<Binding> binding;
   for (std::size_t f = 0; f < files.size(); ++f) {
-    throw_if_interrupted();
+    check_stop();
     progress.stage(fmt::format("frame {} of {}", f + 1, files.size()));
     Body next = read_body(files[f]);
     if (f == 0) {
@@ -265,6 +294,7 @@ int run(int argc, char** argv) {
   CLI::App app{"Maps the deformation of a body onto the surface that it was made from.", kProgram};
   declare(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
+  const StopEndsProcess nothing_is_left;
   Plan plan = make_plan(arguments);
   const ThreadLimit limit(arguments.threads);
   Progress progress(kProgram, arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);

@@ -9,6 +9,7 @@
 #include <algorithm>
 
 #include "formats/program.h"
+#include "formats/stop.h"
 #include "mapping/bind.h"
 #include "mapping/cgal_checks.h"
 
@@ -100,7 +101,7 @@ std::string name_of(MapMethod method) {
 MapResult map_state(const Binding& binding, const Body& body) {
   MapResult result;
   result.displacement = apply(binding, body, body.position);
-  throw_if_interrupted();
+  check_stop();
   result.flags = judge(binding, body, body.position, result.displacement);
   result.frames = binding.frames;
   result.frame = binding.frame;

@@ -20,9 +20,10 @@
 
 #include "formats/error.h"
 #include "formats/human.h"
-#include "formats/program.h"
+#include "formats/stop.h"
 #include "formats/units.h"
 #include "simulate/link_balance.h"
+#include "simulate/simulate.h"
 
 namespace flexel {
 namespace {
@@ -43,6 +44,9 @@ constexpr int kMostPushes = 4;         // of a run
 constexpr double kUnsupported = 1e-9;  // of the stiffness of an element in its stiffest direction
 constexpr double kFarReach = 0.1;  // diagonals: a first linear answer beyond this makes a start elsewhere pay
 constexpr double kOverload = 3;    // diagonals: a first linear answer beyond this suggests a wrong unit
+// ... and one beyond this many diagonals, or times the way that moves lead, is one. A strip rolled up by two
+// turns is at 6; a foil that membrane forces hold may be further, and can be asked for by load steps.
+constexpr double kOutOfProportion = 30;
 
 std::string axis_name(const Vec3& direction) {
   for (int axis = 0; axis < 3; ++axis)
@@ -70,12 +74,11 @@ int least_load_steps(const Constraints& constraints) {
 // A run over load steps.
 class LoadStepping {
  public:
-  LoadStepping(Mechanics& mechanics, State& state, const RunSettings& settings, const Deadline& deadline,
-               Progress& progress, const CoarseStart& start)
+  LoadStepping(Mechanics& mechanics, State& state, const RunSettings& settings, Progress& progress,
+               const CoarseStart& start)
       : mechanics_(mechanics),
         state_(state),
         settings_(settings),
-        deadline_(deadline),
         progress_(progress),
         start_(start),
         first_(1.0 / std::max(settings.load_steps, least_load_steps(mechanics.constraints()))),
@@ -84,6 +87,7 @@ class LoadStepping {
   EquilibriumResult operator()();
 
  private:
+  void solve();
   // Tries the next share; true and moved on when it converged.
   bool attempt(NewtonSteps steps, int max_iterations);
   [[nodiscard]] bool gives_up() const {
@@ -99,13 +103,14 @@ class LoadStepping {
     return reach_ > kOverload * bounding_box(mechanics_.body().rest).diagonal();
   }
   [[nodiscard]] int iterations_left() const;
-  void stop_when_asked() const;
+  // Beyond this only a mistake puts the first linear answer [m]; infinite where the scene says how to go on.
+  [[nodiscard]] double out_of_proportion() const;
+  [[noreturn]] void refuse_load() const;
   [[noreturn]] void diverge() const;
 
   Mechanics& mechanics_;
   State& state_;
   const RunSettings& settings_;
-  const Deadline& deadline_;
   Progress& progress_;
   const CoarseStart& start_;
   double first_, increment_, done_ = 0;
@@ -113,6 +118,7 @@ class LoadStepping {
   State trial_;  // of the last attempt
   NewtonOutcome outcome_;
   double farthest_reach_ = std::numeric_limits<double>::infinity();  // m, of an attempt's linear answer
+  double hopeless_reach_ = std::numeric_limits<double>::infinity();  // m, likewise, for the whole load
   double reach_ = 0;                       // m: of the first linear answer, for the whole load
   std::optional<std::vector<Vec3>> near_;  // m: where the next attempt starts in place of `state_`
   int spent_near_ = 0;                     // iterations of an attempt from there that came to nothing
@@ -126,12 +132,32 @@ int LoadStepping::iterations_left() const {
          result_.newton_iterations;
 }
 
-void LoadStepping::stop_when_asked() const {
-  throw_if_interrupted();
-  if (deadline_ && std::chrono::steady_clock::now() > *deadline_)
-    throw TimeoutError(
-        fmt::format("stopped by --timeout in equilibrium with {:.4g} % of the load, {} Newton iterations",
-                    100 * done_, result_.newton_iterations));
+double LoadStepping::out_of_proportion() const {
+  if (settings_.load_steps > 1 || settings_.newton_iterations) return std::numeric_limits<double>::infinity();
+  State whole = state_;
+  whole.share = 1;
+  apply(mechanics_.constraints(), mechanics_.body(), whole, whole.displacement);
+  double largest = bounding_box(mechanics_.body().rest).diagonal();
+  for (const Vec3& moved : whole.displacement) largest = std::max(largest, moved.norm());
+  return kOutOfProportion * largest;
+}
+
+void LoadStepping::refuse_load() const {
+  SimulateResult told;
+  mechanics_.report(trial_, told);
+  double force = 0;
+  for (const AppliedLoad& load : told.loads) force += load.force.norm();
+  std::vector<std::string> materials;
+  for (const Part& part : mechanics_.body().parts)
+    if (std::find(materials.begin(), materials.end(), part.material) == materials.end())
+      materials.push_back(part.material);
+  const double diagonal = bounding_box(mechanics_.body().rest).diagonal();
+  throw DivergedError(fmt::format(
+      "the load{} would move the part by {} at its first stiffness, {:.3g} times its size of {}: check the "
+      "unit of "
+      "the part (--unit), the load, and the stiffness of {}; [run] load_steps = 10 tries it all the same",
+      force > 0 ? fmt::format(" ({} in all)", human_force(force)) : "", human_length(reach_),
+      reach_ / diagonal, human_length(diagonal), fmt::join(materials, ", ")));
 }
 
 bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
@@ -139,13 +165,13 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   options.steps = steps;
   options.tolerance = settings_.tolerance;
   options.max_iterations = std::min(max_iterations, iterations_left());
-  options.farthest_reach = farthest_reach_;
+  options.farthest_reach = std::min(farthest_reach_, hopeless_reach_ * (done_ + increment_));
   trial_ = state_;
   if (near_) trial_.displacement = *near_;
   trial_.share = done_ + increment_ > 1 - 1e-9 ? 1 : done_ + increment_;
   if (pushed_) push(trial_);
   outcome_ = newton_with_links(mechanics_, trial_, options, [&](const std::string& note) {
-    stop_when_asked();
+    check_stop();
     progress_.update(done_, fmt::format("load {:.3g} %, {}", 100 * trial_.share, note));
   });
   if (result_.newton_iterations == 0) reach_ = outcome_.first_reach / trial_.share;
@@ -233,13 +259,27 @@ bool LoadStepping::begin_near() {
 }
 
 EquilibriumResult LoadStepping::operator()() {
+  try {
+    solve();
+  } catch (const TimeoutError& error) {
+    throw TimeoutError(fmt::format("{} in equilibrium with {:.4g} % of the load, {} Newton iterations",
+                                   error.what(), 100 * done_, result_.newton_iterations));
+  }
+  return result_;
+}
+
+void LoadStepping::solve() {
   const std::vector<Motion>& motions = mechanics_.constraints().motions;
   const bool linked = std::any_of(motions.begin(), motions.end(),
                                   [](const Motion& motion) { return motion.link != nullptr; });
   if (start_ && first_ == 1 && !linked)
     farthest_reach_ = kFarReach * bounding_box(mechanics_.body().rest).diagonal();
+  hopeless_reach_ = out_of_proportion();
   while (done_ < 1) {
-    if (attempt(NewtonSteps::full, kFullStepIterations) || begin_near()) continue;
+    if (attempt(NewtonSteps::full, kFullStepIterations)) continue;
+    if (reach_ > hopeless_reach_) refuse_load();
+    hopeless_reach_ = std::numeric_limits<double>::infinity();  // the first answer alone counts
+    if (begin_near()) continue;
     if (iterations_left() > 0 && increment_ <= kLoweringIncrement * first_ &&
         attempt(NewtonSteps::lowering, NewtonOptions().max_iterations))
       continue;
@@ -248,7 +288,6 @@ EquilibriumResult LoadStepping::operator()() {
     else if (!branch_off())
       diverge();
   }
-  return result_;
 }
 
 }  // namespace
@@ -297,8 +336,8 @@ void refuse_unsupported_elements(Mechanics& mechanics, const State& start, const
 }
 
 EquilibriumResult find_equilibrium(Mechanics& mechanics, State& state, const RunSettings& settings,
-                                   const Deadline& deadline, Progress& progress, const CoarseStart& start) {
-  return LoadStepping(mechanics, state, settings, deadline, progress, start)();
+                                   Progress& progress, const CoarseStart& start) {
+  return LoadStepping(mechanics, state, settings, progress, start)();
 }
 
 }  // namespace flexel

@@ -1,6 +1,5 @@
 // Equilibrium: Newton's method under load steps that cut themselves.
 #pragma once
-#include <chrono>
 #include <functional>
 #include <optional>
 
@@ -26,15 +25,14 @@ void refuse_free_motions(Mechanics& mechanics, const State& start, const std::st
 void refuse_unsupported_elements(Mechanics& mechanics, const State& start, const std::string& scene);
 
 // Moves `state` to equilibrium under the whole load. Throws DivergedError naming load step, iteration, the
-// worst cell and a suggestion, and TimeoutError once `deadline` has passed; `state` is then the last one in
-// equilibrium. Throws Interrupted.
+// worst cell and a suggestion; Interrupted and TimeoutError (formats/stop.h). `state` is then the last one in
+// equilibrium.
 //
 // `start` is asked for displacements (elements, m) near the equilibrium under the whole load, once, where the
 // linear answer reaches so far that the way there is long; it may be empty, or give nothing.
 using CoarseStart = std::function<std::optional<std::vector<Vec3>>()>;
-using Deadline = std::optional<std::chrono::steady_clock::time_point>;
 [[nodiscard]] EquilibriumResult find_equilibrium(Mechanics& mechanics, State& state,
-                                                 const RunSettings& settings, const Deadline& deadline,
-                                                 Progress& progress, const CoarseStart& start = {});
+                                                 const RunSettings& settings, Progress& progress,
+                                                 const CoarseStart& start = {});
 
 }  // namespace flexel

@@ -63,7 +63,7 @@ class CoarseRuns {
  public:
   CoarseRuns(const Body& body, const Scene& scene, const SimulateOptions& options,
              const SimulateResult& result, const SolveCoarse& solve)
-      : options_(options), solve_(solve), scene_(scene), left_(options.timeout) {
+      : options_(options), solve_(solve), scene_(scene) {
     const std::size_t most = most_moved(body);
     Probe probe;
     probe.name = "largest displacement";
@@ -74,7 +74,6 @@ class CoarseRuns {
         2 * std::max(result.newton_iterations, result.start_newton_iterations) + kAddedIterations;
     found_.push_back(answers(result));
     found_.back().moved.push_back(body.position[most] - body.rest[most]);
-    if (left_) *left_ -= result.seconds;
     options_.explain = options_.estimate = false;
     options_.failed_output.clear();
   }
@@ -82,14 +81,11 @@ class CoarseRuns {
   // Adds one lattice; false, with the reason, where it cannot be done. A lattice whose cells are wider than
   // many walls says nothing: from the second on it is left out.
   bool add(const Body& finer, Body& coarse, std::string& reason) {
-    const auto began = std::chrono::steady_clock::now();
     try {
       coarse = coarsened(finer);
       if (found_.size() > 1 && share_of_thin_walls(coarse, 1) > kThinShare)
         throw InputError("walls are thinner than its cells");
       ratio_.push_back(ratio_of(finer, coarse));
-      options_.timeout = left_;
-      if (left_ && !(*left_ > 0)) throw TimeoutError("--timeout left no time");
       found_.push_back(answers(solve_(coarse, scene_, options_)));
     } catch (const InputError& error) {
       reason = error.what();
@@ -98,7 +94,6 @@ class CoarseRuns {
     } catch (const TimeoutError& error) {
       reason = error.what();
     }
-    if (left_) *left_ -= std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
     return reason.empty();
   }
 
@@ -129,7 +124,6 @@ class CoarseRuns {
   SimulateOptions options_;
   const SolveCoarse& solve_;
   Scene scene_;
-  std::optional<double> left_;  // s
   std::vector<Answers> found_;
   std::vector<double> ratio_;
 };

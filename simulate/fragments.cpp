@@ -1,5 +1,5 @@
-// Fragments by union-find over the elements of whole cells, or over the connections of centre-placed parts;
-// the smaller index is the root, so the numbering is repeatable.
+// Fragments are the firm groups of cells (simulate/firm_groups.h), or what hangs together by the connections
+// of centre-placed parts, by union-find; the smaller index is the root, so the numbering is repeatable.
 #include "simulate/fragments.h"
 
 #include <fmt/format.h>
@@ -11,6 +11,7 @@
 #include "formats/units.h"
 #include "simulate/carrier.h"
 #include "simulate/cell_model.h"
+#include "simulate/firm_groups.h"
 
 namespace flexel {
 namespace {
@@ -25,10 +26,6 @@ std::uint32_t root_of(std::vector<std::uint32_t>& parent, std::uint32_t e) {
   return e;
 }
 
-bool whole(const Body& body, std::size_t cell) {
-  return !(cell < body.broken.size() && body.broken[cell]);
-}
-
 void join(std::vector<std::uint32_t>& parent, std::uint32_t a, std::uint32_t b) {
   const std::uint32_t x = root_of(parent, a), y = root_of(parent, b);
   parent[std::max(x, y)] = std::min(x, y);
@@ -39,7 +36,7 @@ bool any_centre(const Body& body) {
                      [](const Part& part) { return part.placement == Placement::centre; });
 }
 
-std::vector<std::uint32_t> joined_elements(const Body& body) {
+std::vector<std::uint32_t> connected_elements(const Body& body) {
   std::vector<std::uint32_t> parent(body.element_count());
   std::iota(parent.begin(), parent.end(), 0u);
   if (any_centre(body)) {
@@ -49,10 +46,6 @@ std::vector<std::uint32_t> joined_elements(const Body& body) {
       for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
         for (const std::uint32_t other : adjacency.of(e)) join(parent, e, other);
     }
-  }
-  for (std::size_t c = 0; c < body.cell_count(); ++c) {
-    if (!whole(body, c)) continue;
-    for (std::size_t a = 1; a < 8; ++a) join(parent, body.cell_elements[c][0], body.cell_elements[c][a]);
   }
   return parent;
 }
@@ -144,26 +137,37 @@ void carry_stray_elements(const Setting& setting, State& state) {
   }
 }
 
+// Of the elements that several fragments share, one that is simulated has them.
+void number_elements(const Body& body, Fragments& found) {
+  for (std::uint32_t c = 0; c < body.cell_count(); ++c) {
+    const std::uint32_t which = found.of_cell[c];
+    if (which == kNoFragment) continue;
+    for (const std::uint32_t e : body.cell_elements[c]) {
+      std::uint32_t& own = found.of_element[e];
+      if (own != kNoFragment && own != which) {
+        found.list[own].hinged = found.list[which].hinged = true;
+        if (found.list[which].stray) continue;
+      }
+      own = which;
+    }
+  }
+}
+
 }  // namespace
 
 Fragments find_fragments(const Body& body) {
   Fragments found;
-  std::vector<std::uint32_t> parent = joined_elements(body);
+  std::vector<std::uint32_t> parent = connected_elements(body);
   std::vector<std::uint32_t> number(body.element_count(), kNoFragment);
-  found.of_cell.assign(body.cell_count(), kNoFragment);
+  found.of_cell = firm_groups(body);
   found.of_element.assign(body.element_count(), kNoFragment);
   const std::vector<std::uint32_t> part = cell_parts(body);
   for (std::uint32_t c = 0; c < body.cell_count(); ++c) {
-    if (!whole(body, c)) continue;
-    std::uint32_t& which = number[root_of(parent, body.cell_elements[c][0])];
-    if (which == kNoFragment) {
-      which = static_cast<std::uint32_t>(found.list.size());
-      found.list.push_back({part[c]});
-    }
-    Fragment& fragment = found.list[which];
-    add_matter(body.fill[c] * body.parts[part[c]].lattice.spacing.prod(), rest_centre(body, c), fragment);
-    found.of_cell[c] = which;
-    for (const std::uint32_t e : body.cell_elements[c]) found.of_element[e] = which;
+    const std::uint32_t which = found.of_cell[c];
+    if (which == kNoFragment) continue;
+    if (which == found.list.size()) found.list.push_back({part[c]});
+    add_matter(body.fill[c] * body.parts[part[c]].lattice.spacing.prod(), rest_centre(body, c),
+               found.list[which]);
   }
   for (std::uint32_t p = 0; p < body.parts.size(); ++p) {
     const Part& placed = body.parts[p];
@@ -180,6 +184,7 @@ Fragments find_fragments(const Body& body) {
   }
   for (Fragment& fragment : found.list) fragment.centre /= fragment.volume;
   mark_strays(body, found.list);
+  number_elements(body, found);
   return found;
 }
 
@@ -210,6 +215,10 @@ void refuse_loose_fragments(const Fragments& fragments, const Body& body,
   std::vector<std::size_t> fragments_of_part(body.parts.size(), 0);
   for (std::size_t e = 0; e < tied_elements.size(); ++e)
     if (tied_elements[e] && fragments.of_element[e] != kNoFragment) held[fragments.of_element[e]] = 1;
+  for (std::size_t c = 0; c < fragments.of_cell.size(); ++c)  // shared elements are of one fragment alone
+    if (fragments.of_cell[c] != kNoFragment)
+      for (const std::uint32_t e : body.cell_elements[c])
+        if (tied_elements[e]) held[fragments.of_cell[c]] = 1;
   hold_bonded(fragments, coupled, held);
   for (const Fragment& fragment : fragments.list) fragments_of_part[fragment.part] += !fragment.stray;
   for (std::size_t f = 0; f < fragments.list.size(); ++f) {
@@ -223,11 +232,14 @@ void refuse_loose_fragments(const Fragments& fragments, const Body& body,
                       part));
     throw InputError(
         scene,
-        fmt::format("part \"{}\" is in {} pieces that are not connected; the one of {} {} near {} hangs "
-                    "on nothing: fix it too, or voxelize with a smaller spacing if it should be joined",
-                    part, fragments_of_part[fragment.part], human_count(fragment.size),
+        fmt::format("part \"{}\" is in {} pieces that are not {}connected; the one of {} {} near {} hangs "
+                    "{}: fix it too, or voxelize with a smaller spacing if it should be joined",
+                    part, fragments_of_part[fragment.part], fragment.hinged ? "firmly " : "",
+                    human_count(fragment.size),
                     body.parts[fragment.part].placement == Placement::centre ? "elements" : "cells",
-                    near(fragment.centre)));
+                    near(fragment.centre),
+                    fragment.hinged ? "on the rest by edges and corners of cells alone, which let it turn"
+                                    : "on nothing"));
   }
 }
 

@@ -1,4 +1,4 @@
-// Pieces of a part that are not connected with one another, and loose crumbs among them.
+// Pieces of a part that are not firmly connected with one another, and loose crumbs among them.
 #pragma once
 #include <string>
 #include <vector>
@@ -9,19 +9,23 @@
 
 namespace flexel {
 
-// A connected set of whole cells, or of the elements of a centre-placed part.
+// A firm group of whole cells (simulate/firm_groups.h), or a connected set of the elements of a centre-placed
+// part.
 struct Fragment {
   std::uint32_t part = 0;
   std::size_t size = 0;        // cells; elements at centre placement
   double volume = 0;           // m^3, filled
   Vec3 centre = Vec3::Zero();  // m, rest, of its matter
   bool stray = false;          // under a thousandth of its part's volume, and not its largest
+  bool hinged = false;         // shares elements with another fragment
 };
 
 struct Fragments {
-  std::vector<Fragment> list;             // in order of their first cell, then of their first element
-  std::vector<std::uint32_t> of_cell;     // (cells) index into list; kNoFragment where broken
-  std::vector<std::uint32_t> of_element;  // (elements) likewise; kNoFragment where no whole cell is
+  std::vector<Fragment> list;          // in order of their first cell, then of their first element
+  std::vector<std::uint32_t> of_cell;  // (cells) index into list; kNoFragment where broken
+  // (elements) likewise; kNoFragment where no whole cell is; of fragments that share one, any that is
+  // simulated
+  std::vector<std::uint32_t> of_element;
 };
 constexpr std::uint32_t kNoFragment = 0xffffffffu;
 

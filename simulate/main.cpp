@@ -3,7 +3,9 @@
 
 #include "formats/body_file.h"
 #include "formats/files.h"
+#include "formats/outputs.h"
 #include "formats/program.h"
+#include "formats/termination.h"
 #include "simulate/answer.h"
 #include "simulate/merge.h"
 #include "simulate/scene.h"
@@ -22,8 +24,16 @@ struct Arguments {
   std::string output, summary, timeout, resume, checkpoint_every;
   std::vector<std::string> live;
   SimulateOptions options;
-  bool quiet = false, verbose = false, compress = false;
+  bool quiet = false, verbose = false, compress = false, force = false;
 };
+
+// CLI11's ranges let "nan" pass.
+std::string is_rate(const std::string& text) {
+  double rate = 0;
+  return CLI::detail::lexical_cast(text, rate) && rate >= 1e-3 && rate <= 1e5
+             ? ""
+             : fmt::format("\"{}\" is no number from 0.001 to 100000", text);
+}
 
 void declare(CLI::App& app, Arguments& arguments) {
   app.add_option("scene", arguments.scene, "Scene file (TOML; docs/scene.md gives every key)");
@@ -60,7 +70,7 @@ void declare(CLI::App& app, Arguments& arguments) {
       ->expected(0, 1)
       ->type_name("[WHERE]");
   app.add_option("--live-rate", arguments.options.live_rate, "Frames a second")
-      ->check(CLI::Range(1e-3, 1e5))
+      ->check(is_rate)
       ->capture_default_str();
   app.add_option("--live-state", arguments.options.live_state,
                  "Every so many frames hold the positions; 0: none does")
@@ -74,6 +84,7 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_flag("--quiet", arguments.quiet, "Say nothing but warnings and errors");
   app.add_flag("--verbose", arguments.verbose, "Say all that was found");
   app.add_flag("--compress", arguments.compress, "Compress the arrays of the body file");
+  app.add_flag("--force", arguments.force, "Let results replace files that are read");
 }
 
 Body read_bodies(std::vector<std::string> paths) {
@@ -142,6 +153,20 @@ void refuse_shared_streams(const Arguments& arguments, const Scene& scene) {
   }
 }
 
+// A run that is resumed goes on with its checkpoint.
+void check_files(const Arguments& arguments) {
+  const SimulateOptions& options = arguments.options;
+  const std::vector<OutputName> results = {
+      {arguments.output, true}, {arguments.summary}, {options.history}, {options.live == "-" ? "-" : ""}};
+  std::vector<OutputName> all = results;
+  all.push_back({options.checkpoint});
+  all.push_back({options.failed_output});
+  std::vector<std::string> inputs = arguments.bodies;
+  inputs.push_back(arguments.scene);
+  check_outputs(all, inputs, arguments.force);
+  check_outputs(results, {arguments.resume}, arguments.force);
+}
+
 Input read_input(Arguments& arguments) {
   if (arguments.scene == "-" && arguments.bodies.empty())
     throw InputError("scene and body cannot both come from stdin; give the body's file");
@@ -158,6 +183,7 @@ int run(int argc, char** argv) {
   Arguments arguments;
   declare(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
+  const StopEndsProcess nothing_is_left;  // runs in time leave something, and see to it themselves
   Progress progress("flexel-simulate", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
   SimulateOptions& options = arguments.options;
   if (!arguments.timeout.empty()) options.timeout = parse_timeout(arguments.timeout);
@@ -175,14 +201,13 @@ int run(int argc, char** argv) {
   progress.stage("read");
   auto [scene, body] = read_input(arguments);
   if (arguments.output.empty()) arguments.output = "-";
-  refuse_unwritable(arguments.output);
-  for (const std::string& path : {arguments.summary, options.history, options.checkpoint})
-    refuse_unwritable(path, false);
-  options.output = arguments.output;
   options.failed_output = failed_name(arguments.output);
+  check_files(arguments);
+  options.output = arguments.output;
   options.compress = arguments.compress;
   const bool series = extension(arguments.output) == "pvd";
   if (series) options.series = arguments.output;
+  OutputsTogether outputs({series ? "" : arguments.output, options.history, arguments.summary});
   const SimulateResult result = simulate(body, scene, options, progress);
   if (arguments.verbose || options.explain)
     for (const std::string& line : summary_lines(result)) progress.say(line);
@@ -190,11 +215,8 @@ int run(int argc, char** argv) {
   BodyFileOptions file_options;
   file_options.compress = arguments.compress;
   if (!series) write_body(body, arguments.output, file_options);
-  if (!arguments.summary.empty()) {
-    OutputFile file(arguments.summary, false);
-    file.write(summary_json(result, body));
-    file.commit();
-  }
+  if (!arguments.summary.empty()) write_text(summary_json(result, body), arguments.summary);
+  outputs.appear();
   progress.finish();
   for (const std::string& line : answer_lines(result, body, known_materials(scene, body))) progress.say(line);
   return kExitDone;

@@ -10,6 +10,7 @@
 #include "formats/body_file.h"
 #include "formats/error.h"
 #include "formats/parallel.h"
+#include "formats/stop.h"
 #include "formats/units.h"
 #include "simulate/coarsen.h"
 #include "simulate/equilibrium.h"
@@ -174,14 +175,10 @@ EquilibriumResult Run::solve(Mechanics& mechanics) {
   refuse_loose_fragments(fragments_, body_, tied_, mechanics.coupled_elements(), scene_.name);
   refuse_unsupported_elements(mechanics, state_, scene_.name);
   refuse_free_motions(mechanics, state_, scene_.name);
-  Deadline deadline;
-  if (options_.timeout)
-    deadline = began_ + std::chrono::duration_cast<std::chrono::steady_clock::duration>(
-                            std::chrono::duration<double>(*options_.timeout));
   try {
     CoarseStart start;
     if (body_.cell_count() >= kLeastCellsToCoarsen) start = [&] { return coarse_equilibrium(); };
-    return find_equilibrium(mechanics, state_, scene_.run, deadline, progress_, start);
+    return find_equilibrium(mechanics, state_, scene_.run, progress_, start);
   } catch (const DivergedError& error) {
     throw DivergedError(error.what() + save_failed(mechanics));
   } catch (const TimeoutError& error) {
@@ -201,8 +198,6 @@ std::optional<std::vector<Vec3>> Run::coarse_equilibrium() {
     SimulateOptions options = options_;
     options.stress = options.explain = false;
     options.failed_output.clear();
-    if (options.timeout)
-      *options.timeout -= std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
     Progress silent("", Progress::Mode::silent);
     Run run(coarse.body, same, options, silent);
     const SimulateResult found = run();
@@ -214,13 +209,13 @@ std::optional<std::vector<Vec3>> Run::coarse_equilibrium() {
     return prolonged_displacement(coarse, body_);
   } catch (const InputError&) {
   } catch (const DivergedError&) {
-  } catch (const TimeoutError&) {
   }
   return std::nullopt;
 }
 
 // Writes the last state in equilibrium; says where it is.
 std::string Run::save_failed(const Mechanics& mechanics) {
+  const StopWaits saving;
   if (options_.failed_output.empty()) return "";
   carry_strays(fragments_, setting_, mechanics.stencil(), state_);
   move_body(body_, state_);
@@ -297,6 +292,8 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
   refuse_empty(body);
   erase_stress_columns(body);
   progress.stage("simulate");
+  std::optional<StopAfter> time_limit;
+  if (options.timeout) time_limit.emplace(*options.timeout, "--timeout", LimitOf::command);
   if (scene.run.time) {
     SimulateResult result = run_in_time(body, scene, options, progress);
     progress.finish();

@@ -9,6 +9,8 @@
 #include <CGAL/Surface_mesh.h>
 #include <CGAL/alpha_wrap_3.h>
 
+#include "formats/stop.h"
+
 namespace flexel {
 namespace {
 
@@ -35,9 +37,22 @@ std::vector<Corners> close_loop(const std::vector<Vec3>& loop, const std::vector
   return triangles;
 }
 
+namespace {
+
+struct HearsStops : CGAL::Alpha_wraps_3::internal::Wrapping_default_visitor {
+  template <typename AlphaWrapper, typename Gate>
+  void before_facet_treatment(const AlphaWrapper&, const Gate&) {
+    check_stop();
+  }
+};
+
+}  // namespace
+
 PartMesh alpha_wrap(const PartMesh& mesh, double alpha, double offset) {
   CGAL::Surface_mesh<Point> wrap;
-  CGAL::alpha_wrap_3(points_of(mesh.world), mesh.corners, alpha, offset, wrap);
+  HearsStops visitor;
+  CGAL::alpha_wrap_3(points_of(mesh.world), mesh.corners, alpha, offset, wrap,
+                     CGAL::parameters::default_values(), CGAL::parameters::visitor(visitor));
   PartMesh result;
   for (const auto v : wrap.vertices()) {
     const Point& p = wrap.point(v);

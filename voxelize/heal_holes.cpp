@@ -8,6 +8,7 @@
 #include <numeric>
 #include <set>
 
+#include "formats/stop.h"
 #include "formats/topology.h"
 #include "voxelize/heal_cgal.h"
 #include "voxelize/heal_mesh.h"
@@ -174,6 +175,7 @@ FilledHoles fill_holes(PartMesh& mesh) {
   std::vector<double> reaches;  // (holes) m^3, what may be missing beyond the triangles that close it
   std::vector<Corners> all;
   for (const auto& edges : walker.walk()) {
+    check_stop();
     const Loop loop = loop_of(mesh, walker, edges);
     Hole hole{.loop = loop.vertices};
     Box box;

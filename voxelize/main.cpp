@@ -6,10 +6,12 @@
 #include "formats/error.h"
 #include "formats/files.h"
 #include "formats/import.h"
+#include "formats/outputs.h"
 #include "formats/parallel.h"
 #include "formats/program.h"
 #include "formats/progress.h"
 #include "formats/size_warning.h"
+#include "formats/termination.h"
 #include "formats/units.h"
 #include "voxelize/heal_vdb.h"
 #include "voxelize/voxelize.h"
@@ -25,7 +27,7 @@ struct Arguments {
                     deflection, edge, format, vdb, summary, output = "-";
   std::optional<long long> count;
   int threads = 0;
-  bool compress = false, quiet = false;
+  bool compress = false, quiet = false, force = false;
 };
 
 void declare(CLI::App& app, Arguments& arguments) {
@@ -53,6 +55,7 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_option("--threads", arguments.threads, "threads; 0 (default): every core");
   app.add_flag("--compress", arguments.compress, "compress the arrays of the body file");
   app.add_flag("--quiet", arguments.quiet, "say warnings only");
+  app.add_flag("--force", arguments.force, "let results replace files that are read");
   app.add_option("--vdb", arguments.vdb, "also write fill and distance as OpenVDB grids to this file");
   app.add_option("--summary", arguments.summary, "also write what was found as JSON (docs/voxelize.md)");
   app.add_option("-o,--output", arguments.output, "body file (.vtu); - or none: standard output");
@@ -135,14 +138,13 @@ int run(int argc, char** argv) {
   Arguments arguments;
   declare(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
+  const StopEndsProcess nothing_is_left;
   const VoxelizeOptions options = voxelize_options(arguments);
   const ImportOptions import = import_options(arguments);
   if (!arguments.vdb.empty() && options.placement != Placement::corner)
     throw InputError("--vdb: centre placement has no cells; use --placement corner");
-  if (arguments.summary == "-" && arguments.output == "-")
-    throw InputError("the summary and the body cannot both go to stdout: give one of them a file");
-  for (const std::string& path : {arguments.output, arguments.vdb}) refuse_unwritable(path);
-  refuse_unwritable(arguments.summary, false);
+  check_outputs({{arguments.output, true}, {arguments.vdb, true}, {arguments.summary}}, arguments.parts,
+                arguments.force);
   const ThreadLimit threads(arguments.threads);
   Progress progress(kName, arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
   progress.stage("import");
@@ -151,9 +153,11 @@ int run(int argc, char** argv) {
   const VoxelizeResult result = voxelize(std::move(surface), options, progress);
   report(result, progress);
   progress.stage("write");
+  OutputsTogether outputs({arguments.output, arguments.vdb, arguments.summary});
   if (!arguments.vdb.empty()) write_vdb(result.body, arguments.vdb);
   if (!arguments.summary.empty()) write_text(summary_json(result), arguments.summary);
   write_body(result.body, arguments.output, {.compress = arguments.compress});
+  outputs.appear();
   progress.finish();
   return kExitDone;
 }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "formats/stop.h"
 #include "voxelize/lines.h"
 
 namespace flexel {
@@ -81,6 +82,7 @@ double union_volume(const PartMesh& mesh, int lines) {
   const Box box = bounding_box(mesh.world);
   double volume = 0;
   for (int axis = 0; axis < 3; ++axis) {
+    check_stop();
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
     const double u_step = box.size()[u] / lines, v_step = box.size()[v] / lines;
     if (!(u_step > 0) || !(v_step > 0)) return 0;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "formats/stop.h"
 #include "voxelize/clip.h"
 #include "voxelize/samples.h"
 
@@ -64,6 +65,7 @@ void trace_triangle(const PartMesh& mesh, std::uint32_t t, Voxels& voxels, std::
   const TrianglePoints points = {&mesh.vertices[c[0]], &mesh.vertices[c[1]], &mesh.vertices[c[2]]};
   const auto [low, high] = std::minmax({points[0]->z(), points[1]->z(), points[2]->z()});
   for (int k = floor_int(low); k <= floor_int(high); ++k) {
+    check_stop();
     records.clear();
     clip_to_slab(points, t, k, records);
     for (const Record& record : records) {

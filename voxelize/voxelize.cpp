@@ -10,6 +10,7 @@
 #include "formats/error.h"
 #include "formats/program.h"
 #include "formats/resolution.h"
+#include "formats/stop.h"
 #include "formats/units.h"
 #include "voxelize/align.h"
 #include "voxelize/assemble.h"
@@ -194,7 +195,7 @@ VoxelizeResult build(Surface& surface, std::vector<HealedPart>& meshes, double s
   VoxelizeResult result;
   PolygonCells polygon_cells;
   for (std::size_t p = 0; p < meshes.size(); ++p) {
-    throw_if_interrupted();
+    check_stop();
     progress.update(static_cast<double>(p) / static_cast<double>(meshes.size()), surface.parts[p].name);
     result.parts.push_back(
         voxelize_part(meshes[p], spacing, options, surface.parts[p].name, result.body, polygon_cells));

@@ -13,7 +13,7 @@
 #include "flexel/picture/text.h"
 #include "formats/error.h"
 #include "formats/human.h"
-#include "formats/program.h"
+#include "formats/stop.h"
 
 namespace flexel {
 namespace {
@@ -90,7 +90,7 @@ void draw_panel(Image& image, const Panel& panel, const Viewport& viewport, cons
   room.width = std::min(image.width, viewport.x + viewport.width + spare) - room.x;
   room.height = std::min(image.height, viewport.y + viewport.height + spare) - room.y;
   render(image, room, camera, panel.drawn, *panel.tracer, shade);
-  throw_if_interrupted();
+  check_stop();
   LineStyle style;
   style.scale = scale;
   if (panel.rest) {
@@ -173,7 +173,7 @@ std::vector<Panel> make_panels(const std::vector<PictureSubject>& subjects, cons
   std::vector<Panel> panels;
   for (const PictureSubject& subject : subjects) {
     panels.push_back(make_panel(subject, options, by, progress));
-    throw_if_interrupted();
+    check_stop();
   }
   return panels;
 }

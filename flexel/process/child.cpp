@@ -19,7 +19,7 @@
 #include <sstream>
 
 #include "formats/error.h"
-#include "formats/program.h"
+#include "formats/stop.h"
 
 namespace flexel {
 namespace {
@@ -94,7 +94,7 @@ std::vector<std::string> environment_with(const std::vector<std::string>& more) 
 }  // namespace
 
 ChildRun run_child(const std::vector<std::string>& argv, const ChildOptions& options) {
-  if (options.heed_interrupts) throw_if_interrupted();
+  if (options.heed_interrupts && interrupted()) throw Interrupted();
   const std::vector<char*> arguments = pointers(argv);
   const std::vector<std::string> variables = environment_with(options.environment);
   const std::vector<char*> environment = pointers(variables);
@@ -136,7 +136,7 @@ ChildRun run_child(const std::vector<std::string>& argv, const ChildOptions& opt
   result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   result.cpu = seconds(usage.ru_utime) + seconds(usage.ru_stime);
   result.memory = 1024.0 * static_cast<double>(usage.ru_maxrss);
-  if (options.heed_interrupts) throw_if_interrupted();
+  if (options.heed_interrupts && interrupted()) throw Interrupted();
   return result;
 }
 

@@ -2,6 +2,7 @@
 // their edges first, at the smallest of a few tolerances that leaves no edge free, and the closed shells
 // stand for solids. Names are those of the entities.
 #include <fmt/format.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
 #include <BRepBndLib.hxx>
@@ -21,8 +22,8 @@
 #include <XSControl_TransferReader.hxx>
 #include <XSControl_WorkSession.hxx>
 #include <cmath>
-#include <filesystem>
 #include <map>
+#include <new>
 
 #include "formats/error.h"
 #include "formats/import/occt.h"
@@ -31,32 +32,28 @@
 namespace flexel {
 namespace {
 
-// OpenCASCADE reads IGES from files only.
-class TemporaryFile {
+// OpenCASCADE reads IGES from files only: this one is in memory and has a name while it is open, so that
+// nothing is left of it, however the program ends.
+class MemoryFile {
  public:
-  explicit TemporaryFile(const Bytes& bytes)
-      : path_((std::filesystem::temp_directory_path() / "flexel-XXXXXX").string()) {
-    const int descriptor = mkstemp(path_.data());
-    if (descriptor < 0) throw InputError(path_, "cannot be made: is the temporary folder writable?");
+  explicit MemoryFile(const Bytes& bytes) : descriptor_(::memfd_create("iges", MFD_CLOEXEC)) {
     std::size_t done = 0;
-    while (done < bytes.size()) {
-      const ssize_t written = ::write(descriptor, bytes.data() + done, bytes.size() - done);
+    while (descriptor_ >= 0 && done < bytes.size()) {
+      const ssize_t written = ::write(descriptor_, bytes.data() + done, bytes.size() - done);
       if (written <= 0) break;
       done += static_cast<std::size_t>(written);
     }
-    ::close(descriptor);
-    if (done < bytes.size()) {
-      ::unlink(path_.c_str());
-      throw InputError(path_, "cannot be written: is the temporary folder full?");
-    }
+    if (done == bytes.size()) return;
+    ::close(descriptor_);
+    throw std::bad_alloc();
   }
-  ~TemporaryFile() { ::unlink(path_.c_str()); }
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
-  [[nodiscard]] const std::string& path() const { return path_; }
+  ~MemoryFile() { ::close(descriptor_); }
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+  [[nodiscard]] std::string path() const { return fmt::format("/proc/self/fd/{}", descriptor_); }
 
  private:
-  std::string path_;
+  int descriptor_ = -1;
 };
 
 // The last line has a T in column 73; the first is one of the start section.
@@ -148,7 +145,7 @@ Surface read_entities(const std::string& path, const ImportOptions& options, con
 Surface read_iges(ImportInput& input, const ImportOptions& options) {
   if (options.unit) throw InputError(input.where, "an IGES file carries its own unit: leave out --unit");
   check_complete(input);
-  const TemporaryFile file(input.bytes);
+  const MemoryFile file(input.bytes);
   return read_with_occt(input, options, [&] { return read_entities(file.path(), options, input); });
 }
 

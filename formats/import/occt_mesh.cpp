@@ -33,6 +33,7 @@
 #include "formats/import/occt_help.h"
 #include "formats/import/readers.h"
 #include "formats/import/subdivide.h"
+#include "formats/termination.h"
 #include "formats/topology.h"
 
 namespace flexel {
@@ -293,6 +294,7 @@ Surface read_with_occt(const ImportInput& input, const ImportOptions& options,
   // Some damaged files send OpenCASCADE into loops without an end. Sound ones take it about a second a
   // megabyte.
   const double limit = options.occt_seconds.value_or(60 + 1e-5 * static_cast<double>(input.bytes.size()));
+  const StopEndsProcess at_once;
   try {
     Surface surface;
     guarded([&] { surface = read(); }, limit);

@@ -19,7 +19,7 @@
 #include <cstring>
 
 #include "formats/error.h"
-#include "formats/program.h"
+#include "formats/stop.h"
 
 namespace flexel {
 namespace {
@@ -185,7 +185,7 @@ void Outlets::flush() {
   const auto until = std::chrono::steady_clock::now() + kLastWait;
   for (Reader& reader : open_)
     while (!reader.gone && !reader.pending.empty() && std::chrono::steady_clock::now() < until) {
-      throw_if_interrupted();
+      check_stop();
       pollfd wait = {reader.descriptor, POLLOUT, 0};
       (void)::poll(&wait, 1, 50);
       push(reader);

@@ -118,6 +118,8 @@ class Act {
   [[nodiscard]] bool solves() const { return implicit_.has_value(); }
   [[nodiscard]] bool damps() const;  // internally
   [[nodiscard]] bool is_implicit() const { return euler_.has_value(); }
+  // A step solves for the velocity at its end: it may take seconds.
+  [[nodiscard]] bool solves_damping() const { return implicit_.has_value(); }
   [[nodiscard]] std::unique_ptr<History> make_history(Ledger ledger) const;
 
  private:

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
-#include <filesystem>
 #include <type_traits>
 
 #include "formats/body_file.h"
@@ -186,14 +185,6 @@ void write_checkpoint(const Checkpoint& checkpoint, const Bytes& body, const std
   file.write(packer.bytes.data(), packer.bytes.size());
   file.write(body.data(), body.size());
   file.commit();
-}
-
-Bytes body_bytes(const Body& body, const std::string& path) {
-  const std::string beside = path + ".body";
-  write_body(body, beside);
-  Bytes bytes = read_all(beside);
-  std::filesystem::remove(beside);
-  return bytes;
 }
 
 Resumed read_checkpoint(const std::string& path) {

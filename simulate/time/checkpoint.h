@@ -33,10 +33,6 @@ struct Checkpoint {
 // written.
 void write_checkpoint(const Checkpoint& checkpoint, const Bytes& body, const std::string& path);
 
-// The bytes of the body's file. It is written beside `path`, where the checkpoints will be, and removed: a
-// run that could not write them does not begin. Throws InputError.
-[[nodiscard]] Bytes body_bytes(const Body& body, const std::string& path);
-
 struct Resumed {
   Checkpoint checkpoint;
   Body body;

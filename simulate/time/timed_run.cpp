@@ -12,7 +12,7 @@
 #include "formats/body_file.h"
 #include "formats/error.h"
 #include "formats/files.h"
-#include "formats/program.h"
+#include "formats/stop.h"
 #include "formats/termination.h"
 #include "simulate/live/live_link.h"
 #include "simulate/report.h"
@@ -43,8 +43,6 @@ class TimedRun {
   void keep();
   [[nodiscard]] bool save_checkpoint();
   bool attempt(const std::string& what, const std::function<void()>& write);
-  [[nodiscard]] bool out_of_time() const;
-  void throw_if_stopped() const;
   [[nodiscard]] bool over() const { return (live_ && live_->ended()) || (settling_ && settling_->done()); }
   void play();
   void play_until(double end, bool resumed);
@@ -52,12 +50,13 @@ class TimedRun {
   void happen(std::size_t end);
   void check();
   void step();
+  void advance(bool row);
   void write_frame();
-  void write_history();
   [[nodiscard]] double now() const;
   [[nodiscard]] std::string save(const std::optional<State>& state);
   [[nodiscard]] std::string stop();
   SimulateResult report();
+  SimulateResult ended();
 
   Body& body_;
   Scene scene_;
@@ -78,6 +77,7 @@ class TimedRun {
   Bytes act_body_;                  // likewise: the body as the present act began, to be made with it
   std::chrono::steady_clock::time_point saved_ = began_;
   std::size_t events_ = 0;      // that have happened
+  bool torn_ = false;           // a step was begun and not ended: the act's state is none
   bool at_whole_step_ = false;  // velocities are of the time of the state, after an event
   double next_row_ = 0, next_frame_ = 0;
   std::optional<LiveSummary> live_summary_;
@@ -105,10 +105,10 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
   if (!options.checkpoint.empty()) {
     kept_.emplace();
     kept_->input = options.resume ? options.resume->input : body_fingerprint(body);
-    act_body_ = body_bytes(body, options.checkpoint);
+    act_body_ = body_bytes(body);
   }
   if (LiveLink::wanted(scene_, options)) {
-    live_ = std::make_unique<LiveLink>(scene_, body, options, progress, [this] { throw_if_stopped(); });
+    live_ = std::make_unique<LiveLink>(scene_, body, options, progress, check_stop);
     live_->await(0);
   }
   if (options.resume)
@@ -132,25 +132,16 @@ void TimedRun::resume(const Checkpoint& from) {
   next_frame_ = from.next_frame;
 }
 
-bool TimedRun::out_of_time() const {
-  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - began_;
-  return options_.timeout && taken.count() > *options_.timeout;
-}
-
-void TimedRun::throw_if_stopped() const {
-  throw_if_interrupted();
-  if (out_of_time()) throw TimeoutError("stopped by --timeout before the first pose came");
-}
-
 // Within an implicit step: what was reached before it stays.
 void TimedRun::listen(const std::string& note) {
-  throw_if_stopped();
+  check_stop();
   const double time = *act_->state().time;
   progress_.update(time / duration_, fmt::format("{:.4g} s, step {}, {}", time, clock_.steps, note));
 }
 
 // Where the run can go on from, to the bit.
 void TimedRun::keep() {
+  const StopWaits whole;
   kept_->state = act_->state();
   kept_->clock = clock_;
   kept_->memory = act_->memory();
@@ -188,7 +179,7 @@ bool TimedRun::attempt(const std::string& what, const std::function<void()>& wri
 
 void TimedRun::check() {
   if (kept_ && act_->renews(clock_)) keep();
-  throw_if_stopped();
+  check_stop();
   const std::chrono::duration<double> since = std::chrono::steady_clock::now() - saved_;
   if (kept_ && since.count() > options_.checkpoint_every) (void)save_checkpoint();
   act_->refuse_unsound();
@@ -202,13 +193,23 @@ void TimedRun::check() {
     progress_.update(time / duration_, fmt::format("{:.4g} s, step {}", time, clock_.steps));
 }
 
+// Explicit steps are short and end before the run is stopped. Those that solve for damping may be stopped
+// within, which leaves a state that is none; implicit ones leave what was reached before them.
+void TimedRun::advance(bool row) {
+  std::optional<StopWaits> whole;
+  if (!act_->is_implicit() && !act_->solves_damping()) whole.emplace();
+  torn_ = act_->solves_damping();
+  act_->step(clock_, history_.get(), row);
+  torn_ = false;
+}
+
 void TimedRun::step() {
   const bool due = history_ && *act_->state().time >= next_row_;
   const bool row = due || (history_ && history_->ledger().changed);
   if (due) next_row_ += scene_.run.history_every.value_or(duration_ / kRows);
   if (live_) live_->await(clock_.epoch + static_cast<double>(clock_.in_epoch + 1) * clock_.step);
   if (settling_) settling_->before(act_->state());
-  act_->step(clock_, history_.get(), row);
+  advance(row);
   if (row) history_->refuse_broken_books(act_->state());
   if (settling_)
     act_->slow(settling_->after(act_->state(), act_->stepper().mass(),
@@ -228,12 +229,6 @@ void TimedRun::write_frame() {
   next_frame_ = duration_ * static_cast<double>(series_->size()) / scene_.run.frames.value_or(kFrames);
 }
 
-void TimedRun::write_history() {
-  OutputFile file(options_.history, false);
-  file.write(history_->ledger().csv());
-  file.commit();
-}
-
 // Without an act an event is happening.
 double TimedRun::now() const {
   return act_ ? *act_->state().time : scene_.events[events_].at;
@@ -242,7 +237,7 @@ double TimedRun::now() const {
 // Leaves the body at `state` (nothing: none was sound), and in the file for runs that end early; says where
 // that is.
 std::string TimedRun::save(const std::optional<State>& state) {
-  if (history_) attempt("history", [&] { write_history(); });
+  if (history_) attempt("history", [&] { write_text(history_->ledger().csv(), options_.history, true); });
   if (!state) return "";
   if (act_) act_->store(*state);  // else an event failed, and the body is what it was before that
   if (options_.failed_output.empty() || !attempt("state", [&] { write_body(body_, options_.failed_output); }))
@@ -289,17 +284,17 @@ void TimedRun::play_until(double end, bool resumed) {
   act_->unload();
   const std::uint64_t between = act_->is_implicit() ? 1 : kCheck;
   while (goes_on()) {
-    if (clock_.steps % between == 0 || act_->hurried()) check();
+    if (clock_.steps % between == 0 || act_->hurried() || stop_is_due()) check();
     step();
     if (series_ && *act_->state().time >= next_frame_ * (1 - 1e-9)) write_frame();
   }
-  act_->refuse_unsound();  // a step looks at the state that it begins with; nothing has looked at the last
-                           // one
+  act_->refuse_unsound();  // a step looks at the state that it begins with: nothing has looked at the last
 }
 
 // Saves what a run that is stopped leaves; says where it is.
 std::string TimedRun::stop() {
-  std::string saved = save(act_ ? act_->state() : sound_.state());
+  const StopWaits saving;
+  std::string saved = save(act_ && !torn_ ? act_->state() : sound_.state());
   if (save_checkpoint()) saved += fmt::format("; go on with --resume {}", options_.checkpoint);
   return saved;
 }
@@ -326,12 +321,13 @@ void TimedRun::happen(std::size_t end) {
     const Event& event = scene_.events[events_];
     const Setting setting = timed_setting(body_, scene_, beginning_);
     Stage stage{body_, state, beginning_.fused, beginning_.settled, setting, progress_};
+    const StopWaits whole;
     const std::string what = event.happen(stage);
     progress_.say(fmt::format("at {:.4g} s {}: {}", event.at, event.name, what));
   }
   if (kept_) {
     kept_->state.time.reset();  // until the act has begun, what was kept is of another body
-    act_body_ = body_bytes(body_, options_.checkpoint);
+    act_body_ = body_bytes(body_);
   }
   act_.emplace(body_, scene_, options_, progress_, beginning_, std::move(state));
   sound_.keep(act_->state());  // of the elements that there are now
@@ -357,28 +353,33 @@ void TimedRun::play() {
   if (history_) act_->close_books(clock_, *history_);
 }
 
+// The body at the last state, the books written, and what is told of the run.
+SimulateResult TimedRun::ended() {
+  act_->store(act_->state());
+  if (history_) write_text(history_->ledger().csv(), options_.history);
+  SimulateResult result = report();
+  if (scene_.run.renormalise)
+    renormalise_all(body_, timed_setting(body_, scene_, beginning_), act_->state().displacement);
+  return result;
+}
+
 SimulateResult TimedRun::operator()() {
   const TerminationWaits waits;
   try {
     play();
+    return ended();
   } catch (const DivergedError& error) {
     const std::string where = fmt::format("step {} at {:.6g} s", clock_.steps, now());
     throw DivergedError(fmt::format("{}: {}{}", where, error.what(),
                                     save(sound_.empty() ? std::nullopt : std::optional(sound_.state()))));
-  } catch (const TimeoutError&) {
-    throw TimeoutError(fmt::format("stopped by --timeout after {} steps at {:.4g} s of {:.4g} s{}",
-                                   clock_.steps, now(), duration_, stop()));
+  } catch (const TimeoutError& error) {
+    throw TimeoutError(fmt::format("{} after {} steps at {:.4g} s of {:.4g} s{}", error.what(), clock_.steps,
+                                   now(), duration_, stop()));
   } catch (const Interrupted&) {
     if (const std::string saved = stop(); !saved.empty())
       progress_.say(fmt::format("stopped at step {}{}", clock_.steps, saved));
     throw;
   }
-  act_->store(act_->state());
-  if (history_) write_history();
-  SimulateResult result = report();
-  if (scene_.run.renormalise)
-    renormalise_all(body_, timed_setting(body_, scene_, beginning_), act_->state().displacement);
-  return result;
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
 #include "formats/program.h"
+#include "formats/stop.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -132,7 +133,7 @@ TEST(Program, OneInterruptAsksAndASecondEnds) {
     if (interrupted()) return 9;
     raise(SIGINT);
     if (!interrupted()) return 8;
-    throw_if_interrupted();
+    check_stop();
     return 7;
   });
   EXPECT_EQ(asked.code, 130);
@@ -143,6 +144,34 @@ TEST(Program, OneInterruptAsksAndASecondEnds) {
   });
   EXPECT_EQ(ended.code, 130);
   EXPECT_EQ(ended.err, "") << "it ended within the handler";
+}
+
+// For calls that cannot be asked to stop.
+TEST(Program, AStopMayEndTheProcessAtOnce) {
+  const Outcome interrupted = run([] {
+    const StopEndsProcess ends;
+    raise(SIGINT);
+    return 7;
+  });
+  EXPECT_EQ(interrupted.code, 130);
+  EXPECT_EQ(interrupted.err, "flexel-test: interrupted\n");
+  const auto sleeping = [](LimitOf of) {
+    const StopAfter limit(0.05, "--timeout", of);
+    const StopEndsProcess ends;
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    return 7;
+  };
+  const Outcome late = run([&] { return sleeping(LimitOf::command); });
+  EXPECT_EQ(late.code, 5);
+  EXPECT_EQ(late.err, "flexel-test: error: stopped by --timeout\n");
+  EXPECT_EQ(run([&] { return sleeping(LimitOf::attempt); }).code, 7) << "the command goes on";
+  const Outcome over = run([] {
+    { const StopEndsProcess ends; }
+    raise(SIGINT);
+    check_stop();
+    return 7;
+  });
+  EXPECT_EQ(over.err, "flexel-test: interrupted\n");
 }
 
 TEST(Program, AKilledProgramLeavesNoTemporaryFile) {
@@ -169,7 +198,7 @@ TEST(Program, TerminationThatWaitsAsks) {
         raise(signal);
       }
       if (!interrupted()) return 8;
-      throw_if_interrupted();
+      check_stop();
       return 7;
     });
     EXPECT_EQ(asked.code, 128 + signal);

@@ -310,6 +310,26 @@ TEST(SizeWarning, NamesTheLikelyUnit) {
                                     "numbers are likely mm")));
 }
 
+// A stirrer of 0.6 mm, a car of 4.6 mm.
+TEST(SizeWarning, PartsOfSomeMillimetresAreLikelyInMetresOrInches) {
+  const Scratch scratch;
+  const std::string text =
+      "OFF\n4 4 0\n0 0 0\n4.6 0 0\n0 0.04 0\n0 0 0.01\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n";
+  Surface surface = import_surface(scratch.write("car.off", text));
+  EXPECT_THAT(size_warnings(surface),
+              ElementsAre(HasSubstr(
+                  "car.off is 4.6 mm long in mm, the unit for files that carry none: if the file is "
+                  "in metres add --unit m (4.6 m), if in inches --unit in (117 mm)")));
+  ImportOptions options;
+  options.unit = 1e-3;
+  EXPECT_TRUE(size_warnings(import_surface(scratch.path("car.off"), options)).empty()) << "the user knows";
+  surface.sources[0].format = "step";
+  EXPECT_TRUE(size_warnings(surface).empty()) << "the file carries its unit";
+  surface.sources[0].format = "off";
+  for (Vec3& v : surface.vertices) v *= 1.1;
+  EXPECT_TRUE(size_warnings(surface).empty()) << "small parts are made";
+}
+
 TEST(Resolution, IsThatOfFloatsWhereTheFileHasThem) {
   const auto ply = [](const std::string& encoding, const std::string& type) {
     return "ply\nformat " + encoding + " 1.0\nelement vertex 3\nproperty " + type + " x\nproperty " + type +

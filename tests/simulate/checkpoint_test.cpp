@@ -64,7 +64,7 @@ class CheckpointFile : public ::testing::Test {
   void SetUp() override {
     body_ = testing::box_body({});
     path_ = ::testing::TempDir() + "/" + ::testing::UnitTest::GetInstance()->current_test_info()->name();
-    write_checkpoint(some_checkpoint(body_), body_bytes(body_, path_), path_);
+    write_checkpoint(some_checkpoint(body_), body_bytes(body_), path_);
     bytes_ = read_all(path_);
   }
   void put(const Bytes& bytes) const {
@@ -78,7 +78,7 @@ class CheckpointFile : public ::testing::Test {
 
 TEST_F(CheckpointFile, ComesBackToTheBit) {
   const Resumed resumed = read_checkpoint(path_);
-  write_checkpoint(resumed.checkpoint, body_bytes(resumed.body, path_), path_);
+  write_checkpoint(resumed.checkpoint, body_bytes(resumed.body), path_);
   EXPECT_EQ(read_all(path_), bytes_);
   const Checkpoint wanted = some_checkpoint(body_), &found = resumed.checkpoint;
   EXPECT_EQ(found.scene, wanted.scene);
