@@ -43,6 +43,8 @@ const std::vector<std::pair<const char*, const char*>> kAliases = {
     {"AZ31B", "magnesium"},
     {"phosphor bronze", "bronze"},
     {"nylon", "PA12"},
+    {"MJF PA12", "PA12 MJF"},
+    {"nylon MJF", "PA12 MJF"},
     {"nylon PA12", "PA12"},
     {"PC", "polycarbonate"},
     {"delrin", "POM"},
@@ -52,9 +54,10 @@ const std::vector<std::pair<const char*, const char*>> kAliases = {
     {"aluminum oxide", "alumina"},
 };
 
-// Yield and tensile strength [Pa], elongation; 0: not given.
+// Yield and tensile strength [Pa], elongation, tensile strength across the layers of a print [Pa]; 0: not
+// given.
 struct Strength {
-  double yield = 0, strength = 0, elongation = 0;
+  double yield = 0, strength = 0, elongation = 0, across_layers = 0;
 };
 
 Material library_entry(const char* name, double young, double poisson, double density,
@@ -67,6 +70,7 @@ Material library_entry(const char* name, double young, double poisson, double de
   material.yield = strength.yield;
   material.strength = strength.strength;
   material.elongation = strength.elongation;
+  material.layer_strength = strength.across_layers;
   material.source = source;
   return material;
 }
@@ -148,20 +152,36 @@ const std::vector<Material>& material_library() {
                     "C51000. E, density read in Olin Brass's data sheet, poisson at makeitfrom.com"),
       library_entry("tungsten", 411e9, 0.28, 19300, {},
                     "Pure. CRC Handbook and Cardarelli 2018, read at matmake.com"),
-      library_entry("PLA", 3.25e9, 0.36, 1240, {},
+      library_entry("PLA", 3.25e9, 0.36, 1240, {45e6, 48e6, 0.025, 26e6},
                     "Printed. E (data sheets' example) read at filamentspecs.com, poisson, density in "
-                    "FreeCAD's library (additive.tools has 3 to 4 GPa)"),
-      library_entry("ABS", 2.0e9, 0.37, 1040, {38e6, 0, 0.5},
-                    "SUSTAABS data sheet (ISO 527), read at studylib.net, poisson in FreeCAD's library "
-                    "(0.394 at themechanicalengineeringhandbook.com)"),
-      library_entry("PETG", 1.94e9, 0.38, 1270, {},
+                    "FreeCAD's library, strengths, elongation in Stratasys's data sheet (ASTM D638; E 3.04 "
+                    "GPa, 2.54 across layers) at pro3dcomposites.com (additive.tools has 50 to 65 MPa, 35 to "
+                    "45 across layers)"),
+      library_entry("PETG", 1.94e9, 0.38, 1270, {0, 44e6, 0, 25e6},
                     "Printed. E (data sheets' example) read at filamentspecs.com, density in UltiMaker's "
-                    "fdm_materials (github.com); not read: poisson"),
+                    "fdm_materials (github.com), strengths (least of 44 to 56 and 25 to 38 MPa) at "
+                    "additive.tools; not read: poisson"),
+      library_entry("ABS", 2.0e9, 0.37, 1040, {0, 33e6, 0.046},
+                    "Printed. E, density SUSTAABS data sheet (ISO 527; molded it yields at 38 MPa), read at "
+                    "studylib.net, poisson in FreeCAD's library (0.394 at "
+                    "themechanicalengineeringhandbook.com), strength Stratasys ABS-M30 (ISO 527, by "
+                    "Loughborough University; 36 MPa by ASTM D638) at pdfslide.net, elongation (UltiMaker) "
+                    "at github.com"),
+      library_entry("ASA", 2.0e9, 0.37, 1070, {0, 35e6, 0},
+                    "Molded. E, density, strength (least of 2.0 to 2.5 GPa and 35 to 50 MPa), read at "
+                    "renato.design (Polymaker's, printed, has 43.8 MPa at github.com); poisson taken as "
+                    "ABS"),
       library_entry(
           "PA12", 1.65e9, 0.408, 930, {0, 48e6, 0.18},
           "Laser sintered, EOS PA 2200. Strength, elongation read at layerx3d.in, density at additive.tools, "
           "poisson (Duraform PA, dense) at nowpublishers.com (Rapid Prototyping J. 14/5); not read: E "
           "(renato.design has 1.7 to 1.9 GPa)"),
+      library_entry("PA12 MJF", 1.8e9, 0.43, 1010, {0, 48e6, 0.12, 48e6},
+                    "Multi Jet Fusion, HP 3D High Reusability PA 12. HP's data sheet (ASTM D638, least of XY "
+                    "and Z), read at scribd.com"),
+      library_entry("durable resin", 1.26e9, 0.40, 1150, {0, 31.8e6, 0.49},
+                    "Stereolithography, Formlabs Durable, cured. Formlabs's data sheet (ASTM D638), read at "
+                    "manualmachine.com, density (of cured resins) at renato.design; poisson taken as 0.40"),
       library_entry("polycarbonate", 2.4e9, 0.37, 1200, {65e6, 0, 0},
                     "Makrolon 2405. Covestro's data sheet (ISO 527), read at scribd.com, poisson at "
                     "themechanicalengineeringhandbook.com"),
@@ -185,6 +205,10 @@ const std::vector<Material>& material_library() {
           "TPU", 19.3e6, 0.45, 1180, {},
           "80 Shore A. BASF Elastollan C78A data sheet (E 2800 psi), read at scribd.com; poisson taken as "
           "0.45"),
+      library_entry("TPU 86A", 60e6, 0.45, 1200, {0, 7e6, 0, 5e6},
+                    "86 Shore A, laser sintered. E, strengths (ISO 527) read at shapeways.com, density "
+                    "(printed TPU) at additive.tools; breaks at 250 %, 90 % across layers; poisson taken as "
+                    "0.45"),
       with_damping(
           with_friction(
               library_entry(

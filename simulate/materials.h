@@ -15,11 +15,15 @@ struct Material {
   // Of [plasticity] and [fracture]; 0: not given
   double yield = 0, hardening = 0;  // Pa
   double strength = 0;              // Pa, largest principal stress
+  double layer_strength = 0;        // Pa, of a print in tension across its layers; no effect takes it
   double elongation = 0;            // equivalent plastic strain at break
   // For people to choose from; no effect takes them by itself. 0: not given
   double friction = 0;                          // Coulomb's, against itself
   double damping = 0;                           // share of the critical
   std::optional<double> contact_friction = {};  // mu that a scene gives it, for [contact]
+  // Of a print that is not solid (simulate/infill.h): the figures above are those of the print as a whole
+  double infill = 1;  // share of the volume inside the walls
+  double walls = 0;   // share of the part's volume
 };
 
 // The library, in order of docs/materials.md. At room temperature; figures that are not known for certain are

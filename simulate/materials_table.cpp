@@ -25,13 +25,15 @@ std::vector<std::string> row(const Material& material) {
           pressure(material.yield),
           pressure(material.strength),
           percent(material.elongation),
+          pressure(material.layer_strength),
           material.friction > 0 ? fmt::format("{:.2g}", material.friction) : "",
           percent(material.damping),
           material.source};
 }
 
-const std::vector<std::string> kHead = {"name",     "young",      "poisson",  "density [kg/m3]", "yield",
-                                        "strength", "elongation", "friction", "damping",         "source"};
+const std::vector<std::string> kHead = {"name",     "young",    "poisson",    "density [kg/m3]",
+                                        "yield",    "strength", "elongation", "across layers",
+                                        "friction", "damping",  "source"};
 
 }  // namespace
 
@@ -68,6 +70,7 @@ std::string materials_json() {
     for (const auto& [key, value] : {std::pair{"yield", material.yield},
                                      {"strength", material.strength},
                                      {"elongation", material.elongation},
+                                     {"layer_strength", material.layer_strength},
                                      {"friction", material.friction},
                                      {"damping", material.damping}})
       if (value > 0) each[key] = value;

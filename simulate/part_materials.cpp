@@ -118,7 +118,17 @@ std::vector<Material> materials_of_parts(const Scene& scene, const Body& body) {
           scene.name, fmt::format("part \"{}\" has no material: write material = \"steel\" at the top of the "
                                   "scene, or [parts.\"{}\"] material = ...",
                                   part.name, part.name));
-    materials.push_back(material_named(scene, name, settings.origin));
+    // an infill belongs to the material that is named with it
+    const Infill& infill =
+        settings.infill.share || !settings.material.empty() ? settings.infill : scene.infill;
+    Material material = material_named(scene, name, settings.origin);
+    if (infill.share) {
+      const auto index = static_cast<std::size_t>(&part - body.parts.data());
+      const double walls =
+          infill.shell ? wall_share(*infill.shell, part, body.surface, index, settings.origin) : 0;
+      material = with_infill(std::move(material), *infill.share, walls);
+    }
+    materials.push_back(std::move(material));
   }
   return materials;
 }

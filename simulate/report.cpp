@@ -8,6 +8,7 @@
 
 #include "formats/units.h"
 #include "simulate/connections.h"
+#include "simulate/infill.h"
 #include "simulate/stress.h"
 
 namespace flexel {
@@ -16,7 +17,10 @@ void name_materials(Body& body, const std::vector<Material>& materials) {
   for (std::size_t p = 0; p < body.parts.size(); ++p) body.parts[p].material = materials[p].name;
 }
 
-void warn_of_springs(const Setting& setting, Progress& progress) {
+void report_materials(const Setting& setting, Progress& progress) {
+  for (std::size_t p = 0; p < setting.materials.size(); ++p)
+    if (const std::string line = infill_line(setting.body.parts[p].name, setting.materials[p]); !line.empty())
+      progress.say(line);
   for (std::size_t p = 0; p < setting.models.size(); ++p) {
     const Material& material = setting.materials[p];
     const std::string& part = setting.body.parts[p].name;

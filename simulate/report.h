@@ -8,8 +8,8 @@ namespace flexel {
 
 void name_materials(Body& body, const std::vector<Material>& materials);
 
-// What models `springs` and `paper` cannot follow of a material.
-void warn_of_springs(const Setting& setting, Progress& progress);
+// What an infill leaves of a part's material, and what models `springs` and `paper` cannot follow of one.
+void report_materials(const Setting& setting, Progress& progress);
 
 // Largest displacement over the elements, and where.
 void measure_displacement(const Body& body, const State& state, SimulateResult& result);

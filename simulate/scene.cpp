@@ -10,6 +10,7 @@
 #include "formats/error.h"
 #include "formats/files.h"
 #include "simulate/events/all.h"
+#include "simulate/infill.h"
 
 namespace flexel {
 namespace {
@@ -34,6 +35,7 @@ Material parse_material(TableReader& reader, const std::string& name) {
   material.yield = optional_limit("yield");
   material.hardening = reader.quantity("hardening", Dimension::pressure).value_or(0);
   material.strength = optional_limit("strength");
+  material.layer_strength = optional_limit("layer_strength");
   material.elongation = reader.number("elongation").value_or(0);
   material.contact_friction = reader.number("friction");
   (void)reader.find("stick");  // simulate/effects/contact.cpp
@@ -70,6 +72,7 @@ void parse_parts(TableReader& root, Scene& scene) {
     settings.material = reader.text("material").value_or("");
     settings.model = reader.text("model").value_or("");
     settings.hooke = reader.text("hooke").value_or("");
+    settings.infill = parse_infill(reader);
     (void)reader.find("rigid");  // simulate/effects/rigid.h
     reader.finish();
     scene.parts[name] = settings;
@@ -177,6 +180,7 @@ Scene parse_scene(const std::string& text, const std::string& name) {
   scene.name = name;
   scene.text = text;
   scene.material = root.text("material").value_or("");
+  scene.infill = parse_infill(root);
   parse_materials(root, scene);
   parse_parts(root, scene);
   for (const SceneValue* table : root.tables("probe")) {

@@ -12,6 +12,7 @@
 
 #include "simulate/effects/all.h"
 #include "simulate/events/event.h"
+#include "simulate/infill.h"
 #include "simulate/materials.h"
 #include "simulate/scene_selection.h"
 #include "simulate/state.h"
@@ -23,6 +24,7 @@ struct PartSettings {
   std::string material;  // "" : the scene's default, else the body's own
   std::string model;     // "" : cells at corner placement, paper at centre placement
   std::string hooke;     // of model paper: "paper" ("" too) or "ganovelli"
+  Infill infill = {};    // of its own `material`, else of the scene's
   std::string origin;
 };
 
@@ -57,6 +59,7 @@ struct Scene {
   std::string name = "scene";                 // for messages
   std::string text;                           // that it was parsed from; "" where a program filled it
   std::string material;                       // default of every part; "" : the body's own
+  Infill infill = {};                         // of `material`; nothing: solid
   std::map<std::string, Material> materials;  // the scene's own; they go before the library
   std::map<std::string, PartSettings> parts;
   std::vector<Probe> probes;
@@ -88,9 +91,10 @@ struct Scene {
 [[nodiscard]] Load make_push(Selection where, const Vec3& force);        // N, in total
 [[nodiscard]] Load make_pressure(Selection where, double pressure);      // Pa
 
-// The material of each part: that of [parts.NAME], else the scene's default, else the body's own. Throws
-// InputError: none (and what to write), an unknown name (with the nearest), a setting for a part that the
-// body does not have, a model or placement that cannot be run.
+// The material of each part: that of [parts.NAME], else the scene's default, else the body's own, with what
+// its infill leaves of it (simulate/infill.h). Throws InputError: none (and what to write), an unknown name
+// (with the nearest), a setting for a part that the body does not have, a model or placement that cannot be
+// run.
 [[nodiscard]] std::vector<Model> models_of_parts(const Scene& scene, const Body& body);
 [[nodiscard]] std::vector<HookeConstant> hooke_of_parts(const Scene& scene, const Body& body);
 [[nodiscard]] std::vector<Material> materials_of_parts(const Scene& scene, const Body& body);

@@ -225,7 +225,7 @@ std::string Run::save_failed(const Mechanics& mechanics) {
 
 SimulateResult Run::operator()() {
   SimulateResult result;
-  warn_of_springs(setting_, progress_);
+  report_materials(setting_, progress_);
   name_materials(body_, setting_.materials);
   const std::vector<ProbePoints> probes = place_probes(scene_, setting_);
   std::vector<Pass> passes = Effects::passes(scene_.effects, setting_);

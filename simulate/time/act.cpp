@@ -44,7 +44,7 @@ Act::Act(Body& body, const Scene& scene, const SimulateOptions& options, Progres
       state_(std::move(state)) {
   const bool fresh = beginning.fresh;
   if (!beginning.fused.empty()) passes_.push_back(make_pass(FusedPoints(body, beginning.fused)));
-  if (fresh) warn_of_springs(setting_, progress_);
+  if (fresh) report_materials(setting_, progress_);
   name_materials(body_, setting_.materials);
   plan_.damping.assign(body.parts.size(), 0);
   for (Pass& pass : passes_) {
