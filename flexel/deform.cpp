@@ -256,7 +256,13 @@ SolvedRun solve(const DeformArguments& arguments, Plan& plan, std::optional<Accu
 // What to do next, of this run.
 std::string next_step(const std::optional<AccuracyReport>& accuracy) {
   if (!accuracy) return "";
-  const std::string repeat = fmt::format("--size {} repeats this run", size_text(accuracy->runs.back().size));
+  std::string chosen_for;
+  if (accuracy->goal.error) chosen_for += human_share(*accuracy->goal.error);
+  if (accuracy->goal.within)
+    chosen_for +=
+        fmt::format("{}within {}", chosen_for.empty() ? "" : " ", human_seconds(*accuracy->goal.within));
+  const std::string repeat = fmt::format("--size {} repeats this run, chosen for {}",
+                                         size_text(accuracy->runs.back().size), chosen_for);
   return accuracy->advice.empty() ? repeat : accuracy->advice + "; " + repeat;
 }
 
@@ -311,8 +317,8 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
     write_text(summary.dump(2) + "\n", arguments.summary);
   }
   outputs.appear();
-  for (const std::string& line :
-       answer_lines(run.simulated, body, known_materials(plan.job.scene, body), next_step(accuracy)))
+  for (const std::string& line : answer_lines(run.simulated, body, known_materials(plan.job.scene, body),
+                                              next_step(accuracy), "--size"))
     progress.say(line);
   return kExitDone;
 }

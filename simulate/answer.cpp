@@ -125,7 +125,10 @@ std::string how_sure(const SimulateResult& result, const Body& body) {
   const std::optional<double> worst = worst_share(result);
   if (!worst) {
     const std::string& note = result.error_bars.note;
-    return "not known: " + (note.empty() ? "no error bars (--no-estimate)" : note);
+    const std::size_t why = note.find("solved: ");  // by a coarser lattice
+    return "not known: " + (note.empty()               ? "no error bars (--no-estimate)"
+                            : why == std::string::npos ? note
+                                                       : note.substr(why + 8));
   }
   const std::string cells = fmt::format("{} cells beside coarser ones", human_count(body.cell_count()));
   if (*worst <= 0.05) return fmt::format("well, within {}: {}", human_share(*worst), cells);
@@ -191,26 +194,26 @@ std::string size_digits(double value) {
   return fmt::format("{:.9g}", std::round(value / unit) * unit);
 }
 
-// Of a run of flexel-simulate, whose lattice another program makes.
-std::string usual_next(const SimulateResult& result, const Body& body) {
+std::string usual_next(const SimulateResult& result, const Body& body, const std::string& size_option) {
   const std::optional<double> worst = worst_share(result);
   if (result.timed || (worst && *worst <= 0.05) || body.parts.empty())
     return "--verbose says all that was found, --summary FILE as JSON";
   const double spacing = std::cbrt(body.parts.front().lattice.spacing.prod());
-  return fmt::format("flexel-voxelize --size {}mm{}", size_digits(1e3 * spacing / 2),
+  return fmt::format("{} {}mm{}", size_option, size_digits(1e3 * spacing / 2),
                      worst ? " makes this surer" : " shows how sure this is");
 }
 
 }  // namespace
 
 std::vector<std::string> answer_lines(const SimulateResult& result, const Body& body,
-                                      const std::vector<Material>& materials, const std::string& next) {
+                                      const std::vector<Material>& materials, const std::string& next,
+                                      const std::string& size_option) {
   std::vector<std::string> lines{"how far    " + how_far(result)};
   if (!result.probes.empty()) lines.push_back("probes     " + probes(result));
   lines.push_back("how sure   " + how_sure(result, body));
   lines.push_back("strength   " + strength(result, body, materials));
   lines.push_back("held by    " + held_by(result));
-  lines.push_back("next       " + (next.empty() ? usual_next(result, body) : next));
+  lines.push_back("next       " + (next.empty() ? usual_next(result, body, size_option) : next));
   return lines;
 }
 

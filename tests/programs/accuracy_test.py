@@ -19,7 +19,7 @@ def deform(options, name="out.stl"):
 def test_accuracy_is_the_run_of_its_size():
     """The result is that of the size that is said, to the last bit; and a finer run agrees."""
     options = beam()
-    summary, said = deform([*options, "--accuracy", "10%"])
+    summary, said = deform([*options, "--accuracy", "10%", "--verbose"])
     told = summary["accuracy"]
     expect(told["met"] and told["reached"] <= 0.1 and told["asked"] == 0.1, told)
     expect(told["sentence"] in said, said)
@@ -37,7 +37,7 @@ def test_accuracy_is_the_run_of_its_size():
 
 
 def test_within():
-    summary, said = deform([*beam(), "--within", "20s"])
+    summary, said = deform([*beam(), "--within", "20s", "--verbose"])
     told = summary["accuracy"]
     runs = told["runs"]
     # How long the last run really takes is up to who else is busy here; that it was to end in time is not.
@@ -73,6 +73,7 @@ def test_by_default_a_size_is_chosen_and_said():
     expect("N along +z" in answer["held by"] and "safety factor" in answer["strength"], said)
     words = answer["next"].split()
     size = words[words.index("--size") + 1]
+    expect("chosen for 5 % within 20 s" in answer["next"], said)
     again, repeated = deform([*options, "--size", size], "again.stl")
     with open("out.stl", "rb") as one, open("again.stl", "rb") as other:
         expect(one.read() == other.read(), f"--size {size} does not repeat the run")
