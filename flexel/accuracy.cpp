@@ -13,6 +13,7 @@
 #include "formats/error.h"
 #include "formats/human.h"
 #include "formats/parallel.h"
+#include "formats/stop.h"
 #include "formats/units.h"
 #include "voxelize/memory.h"
 
@@ -31,6 +32,7 @@ constexpr double kMemoryShare = 0.8;  // of what is free
 constexpr double kTimeMargin = 0.85;  // of the time left: predictions are good to about that
 constexpr double kParallel = 0.85;    // share of the work that all threads do
 constexpr double kPatience = 600;     // s: longer runs are not advised
+constexpr double kLeastPatience = 0.05, kFirstPatience = 2;  // s; without the first run there is no answer
 
 double nearest_size(double size) {
   return preferred_number(size, 20, Rounded::nearest);
@@ -92,6 +94,9 @@ class Search {
           const SolvedRun first = solve_(std::nullopt, {});
           size = nearest_size(spacing_of(first));
         }
+        std::optional<StopAfter> limit;
+        if (goal_.within && !goal_.by_default)
+          limit.emplace(std::max(patience_left(), kFirstPatience), "--within", LimitOf::command);
         keep(solve_(size, [](std::size_t) { return true; }));
       } catch (const InputError& error) {
         fail(size, error.what(), failures);
@@ -114,9 +119,11 @@ class Search {
 
   enum class Outcome { done, given_up, failed };
 
-  // Given up where the lattice has more cells than the time or the memory that is left allow.
+  // Given up where the lattice has more cells than the time or the memory that is left allow, and where it
+  // takes longer in spite of that.
   Outcome run(double size) {
     study::Prediction told;
+    const StopAfter limit(std::max(patience_left(), kLeastPatience), "--within");
     try {
       SolvedRun solved = solve_(size, [&](std::size_t cells) {
         counted_ = {size, static_cast<double>(cells)};
@@ -135,6 +142,7 @@ class Search {
     } catch (const DivergedError&) {
       report_.stopped = fmt::format("the run at {} diverged", size_text(size));
     } catch (const TimeoutError&) {
+      if (!limit.passed()) throw;
       report_.stopped = fmt::format("the run at {} took longer than predicted", size_text(size));
     } catch (const InputError& error) {
       report_.stopped = fmt::format("the run at {} cannot be made: {}", size_text(size), error.what());
@@ -189,6 +197,11 @@ class Search {
     const double wall = seconds_since(goal_.began);
     const double gone = goal_.by_default ? undisturbed(wall, processor_seconds() - processor_before_) : wall;
     return goal_.within.value_or(kUsualLimit) - gone;
+  }
+  // Until a run that is being tried is given up. By default sizes are chosen for a machine that nobody else
+  // uses; a busy one gets three times as long.
+  [[nodiscard]] double patience_left() const {
+    return (goal_.by_default ? 3 : 1) * goal_.within.value_or(kUsualLimit) - seconds_since(goal_.began);
   }
   // What the runs that are kept hold already is part of the prediction.
   [[nodiscard]] double memory_limit() const { return kMemoryShare * (available_memory() + peak_memory()); }

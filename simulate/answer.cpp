@@ -171,10 +171,14 @@ std::string strength(const SimulateResult& result, const Body& body, const std::
     return fmt::format("unknown of {}: its stress is {} at {}{}", material_of(body, result.stress->part),
                        peak_stress(result, result.stress->value), place(result.stress->at), unsure(result));
   if (!(found->share > 0)) return "nothing is stressed";
-  std::string text = fmt::format(
-      "{}safety factor {}: {} of {} at which {} {}, at {}{}", found->share > 1 ? "TOO WEAK, " : "",
-      human_number(1 / found->share, 2), peak_stress(result, found->stress), human_pressure(found->limit),
-      found->material, found->yields ? "yields" : "breaks", place(found->at), unsure(result));
+  const std::string layers = found->layer_share ? fmt::format(" ({} across printed layers)",
+                                                              human_number(1 / *found->layer_share, 2))
+                                                : "";
+  std::string text =
+      fmt::format("{}safety factor {}{}: {} of {} at which {} {}, at {}{}",
+                  found->share > 1 ? "TOO WEAK, " : "", human_number(1 / found->share, 2), layers,
+                  peak_stress(result, found->stress), human_pressure(found->limit), found->material,
+                  found->yields ? "yields" : "breaks", place(found->at), unsure(result));
   if (!unknown.empty()) text += fmt::format("; unknown of {}", fmt::join(unknown, ", "));
   return text;
 }

@@ -40,6 +40,7 @@ std::optional<StrengthSummary> nearest_to_strength(const Body& body, const std::
     if (found && share <= found->share) continue;
     found = StrengthSummary{share,     stress[most], body.rest[most], limit, material.yield > 0,
                             part.name, material.name};
+    if (material.layer_strength > 0) found->layer_share = stress[most] / material.layer_strength;
   }
   return found;
 }

@@ -18,6 +18,7 @@ struct StrengthSummary {   // of the part that is nearest to what its material b
   double limit = 0;        // Pa
   bool yields = false;     // there; else it breaks
   std::string part, material;
+  std::optional<double> layer_share = {};  // of the strength of a print across its layers
 };
 
 // The part whose largest von Mises stress (column "von_mises" of the elements) is the greatest share of its

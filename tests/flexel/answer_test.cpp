@@ -86,6 +86,8 @@ TEST(Answer, HowNearToFailing) {
   EXPECT_THAT(made.text(), HasSubstr("strength   unknown of steel"));
   made.materials[0].strength = 940e6;
   EXPECT_THAT(made.text(), HasSubstr("safety factor 2: about 470 MPa of 940 MPa at which steel breaks"));
+  made.materials[0].layer_strength = 470e6;
+  EXPECT_THAT(made.text(), HasSubstr("safety factor 2 (1 across printed layers)"));
   made.result.stress.reset();  // model `paper`
   EXPECT_THAT(made.text(), HasSubstr("strength   not known"));
 }
