@@ -253,7 +253,10 @@ SolvedRun solve(const DeformArguments& arguments, Plan& plan, std::optional<Accu
     return solve_to_goal(arguments, plan, surface, accuracy.emplace(), progress);
   }
   SolvedRun run;
-  run.voxels = voxelize(std::move(surface), plan.job.voxelize, progress);
+  {
+    const StopEndsProcess at_once;
+    run.voxels = voxelize(std::move(surface), plan.job.voxelize, progress);
+  }
   report(run.voxels, progress);
   add_actions(plan.job, run.voxels.body);
   run.simulated = simulate(run.voxels.body, plan.job.scene, simulate_options(arguments, plan), progress);

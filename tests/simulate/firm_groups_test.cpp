@@ -43,7 +43,7 @@ TEST(FirmGroups, AnEdgeIsAHingeAndACornerAJoint) {
 
 TEST(FirmGroups, TwoHingesThatAreNotInLineHold) {
   // a bridge that touches its feet along two edges
-  const Body bridge = cells({5, 1, 4}, [&](int i, int j, int k) {
+  const Body bridge = cells({5, 1, 4}, [](int i, int, int k) {
     return k == 0 || (k == 1 && (i == 0 || i == 4)) || (k == 2 && i > 0 && i < 4);
   });
   EXPECT_EQ(group_count(bridge), 1u);
