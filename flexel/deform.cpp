@@ -287,7 +287,6 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
   }
   Body& body = run.voxels.body;
   for (const std::string& line : run.warnings) progress.warn(line);
-  const StopEndsProcess at_once;
   MappedPart mapped;
   const StopEndsProcess at_once;
   {
