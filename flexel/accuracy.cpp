@@ -90,13 +90,13 @@ class Search {
   void first_runs() {
     double size = 0;
     for (int failures = 0; runs_.empty(); ++failures) try {
+        std::optional<StopAfter> limit;
+        if (goal_.within && !goal_.by_default)
+          limit.emplace(std::max(patience_left(), kFirstPatience), "--within", LimitOf::command);
         if (size == 0) {
           const SolvedRun first = solve_(std::nullopt, {});
           size = nearest_size(spacing_of(first));
         }
-        std::optional<StopAfter> limit;
-        if (goal_.within && !goal_.by_default)
-          limit.emplace(std::max(patience_left(), kFirstPatience), "--within", LimitOf::command);
         keep(solve_(size, [](std::size_t) { return true; }));
       } catch (const InputError& error) {
         fail(size, error.what(), failures);
@@ -257,7 +257,9 @@ class Search {
     const double goal = goal_.error && !met() ? *goal_.error : finer_goal(judged_->error);
     const double step = std::pow(judged_->error / (kAim * goal), 1 / judged_->order);
     const study::Prediction told = prediction(runs_.back().size / std::max(step, kLeastStep));
-    const double seconds = 1.2 * told.seconds;  // and the runs before it
+    const bool asked = goal_.error && !goal_.by_default && !met();
+    if (asked && !goal_.within && given_up_ == 0 && affordable(told)) return "";  // time was not the reason
+    const double seconds = told.seconds + (asked ? seconds_since(goal_.began) : 0.2 * told.seconds);
     if (told.bytes > memory_limit() || seconds > kPatience) return "";
     return fmt::format("--accuracy {}{} takes about {}", fmt::format("{:.6g}%", 100 * goal),
                        seconds > kTimeMargin * kUsualLimit ? " --within 10min" : "", human_seconds(seconds));

@@ -161,6 +161,10 @@ Vec3 parse_gravity(const std::string& text) {
     } catch (const InputError& error) {
       throw InputError(fmt::format("--gravity \"{}\": {}", text, error.what()));
     }
+  if (values.size() == 1 && values[0] < 0)
+    throw InputError(fmt::format(
+        "--gravity \"{}\": one number acts downwards (-z): leave the sign out, or give three components",
+        text));
   if (values.size() == 1) return {0, 0, -values[0]};
   if (values.size() == 3) return {values[0], values[1], values[2]};
   throw InputError(
@@ -208,9 +212,10 @@ FaceAxis face_axis(const Selection& selection, const Body& body, const std::opti
         selection.origin,
         fmt::format("{} selects elements: name a face or a side, which has an axis", describe(selection)));
   const FaceShape shape = face_shape(body.surface, selected.polygons);
+  const bool round = shape.kind == FaceShape::Kind::round && !side_axis(selection, body);
   if (given && *given != Vec3::Zero())
-    return {given->normalized(), shape.kind == FaceShape::Kind::round ? shape.axis_point : shape.centroid};
-  if (shape.kind == FaceShape::Kind::round) return {shape.axis, shape.axis_point};
+    return {given->normalized(), round ? shape.axis_point : shape.centroid};
+  if (round) return {shape.axis, shape.axis_point};
   return {mean_normal(selection, selected, body, "0 0 5 N m"), shape.centroid};
 }
 

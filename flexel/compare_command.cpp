@@ -15,10 +15,12 @@
 #include "flexel/job.h"
 #include "formats/error.h"
 #include "formats/files.h"
+#include "formats/human.h"
 #include "formats/parallel.h"
 #include "formats/topology.h"
 #include "formats/units.h"
 #include "simulate/simulate.h"
+#include "simulate/strength.h"
 
 namespace flexel {
 namespace {
@@ -40,8 +42,10 @@ struct Finding {
   std::optional<double> share;      // of the stiffness: its bar
   std::optional<double> stiffness;  // nothing without a resultant, or where nothing moves
   double least = 0, most = std::numeric_limits<double>::infinity();  // of the stiffness
-  std::optional<double> stress, limit;  // largest von Mises stress; what its part yields or breaks at
-  std::string limit_name;               // "yield" or "strength"
+  std::optional<double> stress;                                      // largest von Mises stress
+  // Of the part that is nearest to its limit: limit over stress, and what it yields or breaks at.
+  std::optional<double> factor, limit;
+  std::string limit_name;  // "yield" or "strength"
   std::size_t cells = 0;
 };
 
@@ -56,7 +60,12 @@ double resultant(const SimulateResult& result, const Scene& scene, bool& driven)
   Vec3 sum = Vec3::Zero();
   for (const AppliedLoad& load : result.loads) sum += load.force;
   driven = false;
-  for (const Tie& tie : scene.get<Ties>().ties) driven = driven || tie.is_move;
+  bool turned = false;
+  for (const Tie& tie : scene.get<Ties>().ties) {
+    driven = driven || tie.is_move;
+    turned = turned || (tie.is_move && tie.motion.angle != 0);
+  }
+  if (turned) return 0;  // a couple over an angle is no force over a displacement
   if (!driven) return sum.norm();
   sum.setZero();
   for (const Tie& tie : scene.get<Ties>().ties)
@@ -87,14 +96,12 @@ void judge_stiffness(const SimulateResult& result, const Scene& scene, Finding& 
 void judge_stress(const SimulateResult& result, const Scene& scene, const Body& body, Finding& found) {
   if (!result.stress) return;
   found.stress = result.stress->value;
-  const std::vector<Material> materials = materials_of_parts(scene, body);
-  for (std::size_t p = 0; p < body.parts.size(); ++p) {
-    if (body.parts[p].name != result.stress->part) continue;
-    const Material& material = materials[p];
-    if (!(material.yield > 0 || material.strength > 0)) continue;
-    found.limit = material.yield > 0 ? material.yield : material.strength;
-    found.limit_name = material.yield > 0 ? "yield" : "strength";
-  }
+  std::vector<std::string> unknown;
+  const auto near = nearest_to_strength(body, materials_of_parts(scene, body), unknown);
+  if (!near || !(near->share > 0)) return;
+  found.factor = 1 / near->share;
+  found.limit = near->limit;
+  found.limit_name = near->yields ? "yield" : "strength";
 }
 
 // One part's run. A file of one part goes by the name of the first file's, so that one scene fits all.
@@ -141,13 +148,13 @@ Finding run_named(const CompareArguments& arguments, const std::string& file, st
 }
 
 std::string mass_text(double kilograms) {
-  return kilograms >= 1 ? fmt::format("{:.4g} kg", kilograms) : fmt::format("{:.4g} g", 1e3 * kilograms);
+  return kilograms >= 1 ? human_number(kilograms, 4) + " kg" : human_number(1e3 * kilograms, 4) + " g";
 }
 
 // "12.3 N/mm"
 std::string stiffness_text(double value) {
   const double per_mm = 1e-3 * value;
-  return per_mm >= 1000 ? fmt::format("{:.3g} kN/mm", 1e-3 * per_mm) : fmt::format("{:.3g} N/mm", per_mm);
+  return per_mm >= 1000 ? human_number(1e-3 * per_mm) + " kN/mm" : human_number(per_mm) + " N/mm";
 }
 
 std::vector<std::pair<std::string, std::vector<std::string>>> rows_of(const std::vector<Finding>& all) {
@@ -160,21 +167,19 @@ std::vector<std::pair<std::string, std::vector<std::string>>> rows_of(const std:
   add("mass", [](const Finding& f) { return mass_text(f.mass); });
   add("volume", [](const Finding& f) { return f.volume > 0 ? human_volume(f.volume) : "open"; });
   add("largest displacement", [](const Finding& f) {
-    return human_length(f.displacement) + (f.bar ? " +- " + human_length(*f.bar) : "");
+    return f.bar ? length_with_bar(f.displacement, *f.bar) : human_length(f.displacement);
   });
   add("stiffness", [](const Finding& f) {
     if (!f.stiffness) return std::string("-");
-    return stiffness_text(*f.stiffness) + (f.share ? fmt::format(" +- {:.2g} %", 100 * *f.share) : "");
+    return stiffness_text(*f.stiffness) + (f.share ? " +- " + human_share(*f.share) : "");
   });
   add("stiffness by mass", [](const Finding& f) {
-    return f.stiffness ? fmt::format("{:.3g} N/mm/g", 1e-6 * *f.stiffness / f.mass) : std::string("-");
+    return f.stiffness ? human_number(1e-6 * *f.stiffness / f.mass) + " N/mm/g" : std::string("-");
   });
   add("largest von Mises stress",
       [](const Finding& f) { return f.stress ? human_pressure(*f.stress) : "-"; });
   add("safety factor", [](const Finding& f) {
-    return f.stress && f.limit && *f.stress > 0
-               ? fmt::format("{:.2g} to {}", *f.limit / *f.stress, f.limit_name)
-               : std::string("-");
+    return f.factor ? fmt::format("{} to {}", human_number(*f.factor, 2), f.limit_name) : std::string("-");
   });
   add("cells", [](const Finding& f) {
     return fmt::format("{} of {}", human_count(f.cells), human_length(f.spacing));
@@ -227,9 +232,10 @@ std::vector<std::string> verdict(const std::vector<Finding>& all) {
   for (std::size_t i = 0; i + 1 < order.size(); ++i) {
     const Finding &a = all[order[i]], &b = all[order[i + 1]];
     const double times = *a.stiffness / *b.stiffness;
-    const std::string mass = fmt::format("{:.2g} times the mass", a.mass / b.mass);
+    const std::string mass = human_number(a.mass / b.mass, 2) + " times the mass";
     if (clearly_stiffer(a, b))
-      lines.push_back(fmt::format("{} is {:.3g} times as stiff as {}, with {}", a.file, times, b.file, mass));
+      lines.push_back(
+          fmt::format("{} is {} times as stiff as {}, with {}", a.file, human_number(times), b.file, mass));
     else
       lines.push_back(fmt::format(
           "not sure which of {} and {} is stiffer: {}; a smaller --size or a larger --count "
@@ -258,6 +264,7 @@ std::string comparison_json(const std::vector<Finding>& all) {
          {"stiffness", json_number(f.stiffness)},
          {"stiffness_bar", {f.share ? json_number(f.least) : Json(), f.share ? json_number(f.most) : Json()}},
          {"von_mises", json_number(f.stress)},
+         {"safety_factor", json_number(f.factor)},
          {"limit", json_number(f.limit)},
          {"limit_is", f.limit_name},
          {"cells", f.cells},

@@ -20,6 +20,7 @@
 #include "mapping/options.h"
 #include "mapping/output.h"
 #include "simulate/answer.h"
+#include "simulate/infill.h"
 #include "simulate/simulate.h"
 #include "simulate/strength.h"
 #include "simulate/time/settling.h"
@@ -193,7 +194,6 @@ SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surf
                         AccuracyReport& accuracy, Progress& progress) {
   Progress quiet("flexel", Progress::Mode::quiet);
   HeldWarnings warnings;  // of runs that are only tried
-  bool first = true;
   for (const Tie& tie : plan.job.scene.get<Ties>().ties) plan.goal->driven |= tie.is_move;
   plan.goal->driven |= !plan.job.moves.empty() || !plan.job.twists.empty();
   MapOptions mapping;
@@ -215,8 +215,9 @@ SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surf
       run.given_up = true;
       return run;
     }
-    if (std::exchange(first, false)) add_actions(plan.job, run.voxels.body);
-    run.simulated = simulate(run.voxels.body, plan.job.scene, simulate_options(arguments, plan), quiet);
+    Job job = plan.job;  // anew for each body: an action that throws leaves none out
+    add_actions(job, run.voxels.body);
+    run.simulated = simulate(run.voxels.body, job.scene, simulate_options(arguments, plan), quiet);
     began = std::chrono::steady_clock::now();
     run.mapped = map_part(run.voxels.body, mapping, {}, quiet).result.displacement;
     run.map_seconds = seconds_since(began);
@@ -327,8 +328,12 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
     write_text(summary.dump(2) + "\n", arguments.summary);
   }
   outputs.appear();
-  for (const std::string& line : answer_lines(run.simulated, body, known_materials(plan.job.scene, body),
-                                              next_step(accuracy), "--size"))
+  const std::vector<Material> materials = known_materials(plan.job.scene, body);
+  if (accuracy || !arguments.verbose)  // else simulate() has said it
+    for (std::size_t p = 0; p < materials.size(); ++p)
+      if (const std::string line = infill_line(body.parts[p].name, materials[p]); !line.empty())
+        progress.say(line);
+  for (const std::string& line : answer_lines(run.simulated, body, materials, next_step(accuracy), "--size"))
     progress.say(line);
   return kExitDone;
 }

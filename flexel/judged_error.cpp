@@ -139,10 +139,23 @@ std::optional<Judged> judge(const std::vector<SolvedRun>& runs, const Quantities
 
 void widen_bars(std::vector<SolvedRun>& runs, const Quantities& quantities) {
   std::vector<ErrorBar>& bars = runs.back().simulated.error_bars.bars;
-  for (const auto& [quantity, judged] : judge_each(runs, quantities))
-    for (ErrorBar& each : bars)
-      if (each.of == quantity.kind && each.probe == quantity.probe)
-        each.bar.half_width = std::max(each.bar.half_width, judged.error * std::abs(quantity.value));
+  for (const auto& [quantity, judged] : judge_each(runs, quantities)) {
+    const double width = judged.error * std::abs(quantity.value);
+    bool known = false;
+    for (ErrorBar& each : bars) {
+      if (each.of != quantity.kind || each.probe != quantity.probe) continue;
+      each.bar.half_width = std::max(each.bar.half_width, width);
+      known = true;
+    }
+    if (known) continue;  // else its own lattices told nothing
+    ErrorBar bar;
+    bar.of = quantity.kind;
+    bar.probe = quantity.probe;
+    if (bar.of == ErrorBar::Of::probe) bar.probe_name = runs.back().simulated.probes[bar.probe].name;
+    bar.value = bar.bar.extrapolated = quantity.value;
+    bar.bar.half_width = width;
+    bars.push_back(bar);
+  }
 }
 
 }  // namespace flexel

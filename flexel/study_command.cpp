@@ -123,6 +123,7 @@ std::string whole_scene(const JobArguments& given, const Scene& file) {
     Progress silent("", Progress::Mode::silent);
     Body body;
     body.surface = read_parts(given.parts, import, silent);
+    (void)heal_and_measure(body.surface);  // outward, as every run of the study has it
     body.parts.resize(body.surface.parts.size());
     for (std::size_t p = 0; p < body.parts.size(); ++p) body.parts[p].name = body.surface.parts[p].name;
     add_actions(added, body);

@@ -282,6 +282,7 @@ class StopEndsProcess::Watch {
     std::unique_lock lock(mutex_);
     const std::chrono::nanoseconds left(limit - stop_detail::now());
     if (changed_.wait_for(lock, left, [this] { return done_; })) return;
+    if (termination_waits > 0) return;  // the work hears the limit itself
     write_words({program_name.data(), ": error: stopped by --timeout\n"});
     remove_temporary_outputs();
     tell_code_through_pipe(STDOUT_FILENO, kExitTimeout);

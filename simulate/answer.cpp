@@ -174,11 +174,14 @@ std::string strength(const SimulateResult& result, const Body& body, const std::
   const std::string layers = found->layer_share ? fmt::format(" ({} across printed layers)",
                                                               human_number(1 / *found->layer_share, 2))
                                                 : "";
-  std::string text =
-      fmt::format("{}safety factor {}{}: {} of {} at which {} {}, at {}{}",
-                  found->share > 1 ? "TOO WEAK, " : "", human_number(1 / found->share, 2), layers,
-                  peak_stress(result, found->stress), human_pressure(found->limit), found->material,
-                  found->yields ? "yields" : "breaks", place(found->at), unsure(result));
+  std::string text = fmt::format(
+      "{}safety factor {}{}: {} of {} at which {} {}, at {}{}",
+      found->share > 1                     ? "TOO WEAK, "
+      : found->layer_share.value_or(0) > 1 ? "TOO WEAK across its layers, "
+                                           : "",
+      human_number(1 / found->share, 2), layers, peak_stress(result, found->stress),
+      human_pressure(found->limit), found->material, found->yields ? "yields" : "breaks",
+      place(found->stress == result.stress->value ? result.stress->at : found->at), unsure(result));
   if (!unknown.empty()) text += fmt::format("; unknown of {}", fmt::join(unknown, ", "));
   return text;
 }

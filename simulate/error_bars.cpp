@@ -10,6 +10,7 @@
 
 #include "formats/error.h"
 #include "formats/fields.h"
+#include "formats/stop.h"
 #include "simulate/coarsen.h"
 
 namespace flexel {
@@ -54,6 +55,7 @@ class CoarseRuns {
   CoarseRuns(const Body& body, const Scene& scene, const SimulateOptions& options,
              const SimulateResult& result, const SolveCoarse& solve)
       : options_(options), solve_(solve), scene_(scene) {
+    const StopWaits answered;
     const LargestDisplacement most = largest_displacement(body);
     Probe probe;
     probe.name = "largest displacement";

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <array>
 #include <map>
+#include <optional>
 
 #include "formats/disjoint_sets.h"
 
@@ -113,6 +114,45 @@ bool join_planes(const Body& body, const std::vector<SharedElement>& shared,
   return joined;
 }
 
+using Joints = std::vector<const SharedElement*>;
+
+// Energy of relative motions at the joints of `groups` (ascending), six motions a group; a joint counts among
+// those of its groups that are in the list. Rigid motions are about `middle`, lengths in units of `reach`.
+Eigen::MatrixXd joint_energy(const Body& body, const std::vector<std::uint32_t>& groups, const Joints& joints,
+                             const Vec3& middle, double reach) {
+  const auto size = 6 * static_cast<Eigen::Index>(groups.size());
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(size, size);
+  for (const SharedElement* joint : joints) {
+    std::vector<Eigen::Index> place;
+    for (const std::uint32_t g : joint->groups)
+      if (const auto at = std::lower_bound(groups.begin(), groups.end(), g); at != groups.end() && *at == g)
+        place.push_back(6 * (at - groups.begin()));
+    const Vec3 r = (body.rest[joint->element] - middle) / reach;
+    Eigen::Matrix<double, 3, 6> moves;
+    moves << 1, 0, 0, 0, r[2], -r[1], 0, 1, 0, -r[2], 0, r[0], 0, 0, 1, r[1], -r[0], 0;
+    const Eigen::Matrix<double, 6, 6> own = moves.transpose() * moves;
+    for (std::size_t a = 0; a < place.size(); ++a)
+      for (std::size_t b = a + 1; b < place.size(); ++b) {
+        sum.block<6, 6>(place[a], place[a]) += own;
+        sum.block<6, 6>(place[b], place[b]) += own;
+        sum.block<6, 6>(place[a], place[b]) -= own;
+        sum.block<6, 6>(place[b], place[a]) -= own;
+      }
+  }
+  return sum;
+}
+
+// The first group that could move with every other one held: it says nothing of the others.
+std::optional<std::size_t> loose_group(const Eigen::MatrixXd& energy) {
+  const double least = kNoEnergy * energy.diagonal().maxCoeff();
+  for (Eigen::Index g = 0; g + 6 <= energy.rows(); g += 6) {
+    const Eigen::Matrix<double, 6, 6> own = energy.block<6, 6>(g, g);
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(own, Eigen::EigenvaluesOnly);
+    if (eigen.eigenvalues()[0] <= least) return static_cast<std::size_t>(g / 6);
+  }
+  return std::nullopt;
+}
+
 // Joins groups that hang together, directly or by others, where that is firm as a whole.
 void join_frames(const Body& body, const std::vector<SharedElement>& shared,
                  const std::vector<std::uint32_t>& cell_of, DisjointSets& sets) {
@@ -121,38 +161,21 @@ void join_frames(const Body& body, const std::vector<SharedElement>& shared,
     for (const std::uint32_t g : each.groups) hang.unite(each.groups.front(), g);
   std::map<std::uint32_t, std::vector<std::uint32_t>> frames;
   for (std::uint32_t g = 0; g < cell_of.size(); ++g) frames[hang.root(g)].push_back(g);
-  for (const auto& [root, groups] : frames) {
+  std::map<std::uint32_t, Joints> joints;
+  for (const SharedElement& each : shared) joints[hang.root(each.groups.front())].push_back(&each);
+  for (auto& [root, groups] : frames) {
     if (groups.size() < 3 || groups.size() > kMostGroups) continue;
-    std::vector<const SharedElement*> joints;
     Box box;
-    for (const SharedElement& each : shared)
-      if (hang.root(each.groups.front()) == root) {
-        joints.push_back(&each);
-        box.add(body.rest[each.element]);
-      }
-    const Vec3 middle = 0.5 * (box.min + box.max);
+    for (const SharedElement* joint : joints[root]) box.add(body.rest[joint->element]);
     const double reach = box.diagonal();
     if (!(reach > 0)) continue;  // one joint: they turn about it
-    const auto place = [&](std::uint32_t g) {
-      return 6 * (std::lower_bound(groups.begin(), groups.end(), g) - groups.begin());
-    };
-    Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(6 * static_cast<Eigen::Index>(groups.size()),
-                                                6 * static_cast<Eigen::Index>(groups.size()));
-    for (const SharedElement* joint : joints) {
-      const Vec3 r = (body.rest[joint->element] - middle) / reach;
-      Eigen::Matrix<double, 3, 6> moves;
-      moves << 1, 0, 0, 0, r[2], -r[1], 0, 1, 0, -r[2], 0, r[0], 0, 0, 1, r[1], -r[0], 0;
-      const Eigen::Matrix<double, 6, 6> own = moves.transpose() * moves;
-      for (std::size_t a = 0; a < joint->groups.size(); ++a)
-        for (std::size_t b = a + 1; b < joint->groups.size(); ++b) {
-          const Eigen::Index i = place(joint->groups[a]), j = place(joint->groups[b]);
-          sum.block<6, 6>(i, i) += own;
-          sum.block<6, 6>(j, j) += own;
-          sum.block<6, 6>(i, j) -= own;
-          sum.block<6, 6>(j, i) -= own;
-        }
+    Eigen::MatrixXd energy = joint_energy(body, groups, joints[root], 0.5 * (box.min + box.max), reach);
+    for (auto loose = loose_group(energy); loose && groups.size() > 2; loose = loose_group(energy)) {
+      groups.erase(groups.begin() + static_cast<std::ptrdiff_t>(*loose));
+      energy = joint_energy(body, groups, joints[root], 0.5 * (box.min + box.max), reach);
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(sum, Eigen::EigenvaluesOnly);
+    if (groups.size() < 3) continue;
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(energy, Eigen::EigenvaluesOnly);
     const double limit = kNoEnergy * eigen.eigenvalues()[eigen.eigenvalues().size() - 1];
     if (eigen.eigenvalues()[6] <= limit) continue;  // more than the six of one rigid body
     for (const std::uint32_t g : groups) sets.unite(cell_of[groups.front()], cell_of[g]);

@@ -87,7 +87,11 @@ double along_axes(const Vec3& along, std::uint8_t mask) {
 // The share of a load that acts where supports hold the body along it.
 double held_share(const Load& load, const HeldMasks& held, const Body& body) {
   const Selected selected = resolve(load.where, body);
-  const Vec3 force = load.force.value_or(Vec3::Zero());
+  const Vec3 force = load.force.value_or(Vec3::Zero()), torque = load.torque.value_or(Vec3::Zero());
+  // A torque acts across its axis.
+  const Vec3 acting = torque != Vec3::Zero()  ? Vec3(Vec3::Ones() - torque.normalized().cwiseAbs())
+                      : force == Vec3::Zero() ? Vec3(Vec3::Ones())
+                                              : force.normalized();
   double straight = 0, whole = 0;
   const auto count = [&](const Vec3& along, std::uint8_t mask) {
     straight += along_axes(along, mask);
@@ -95,13 +99,10 @@ double held_share(const Load& load, const HeldMasks& held, const Body& body) {
   };
   for (const std::uint32_t p : selected.polygons) {
     const Vec3 area = area_vector(body.surface.vertices, body.surface.polygon(p));
-    const Vec3 along = load.pressure                          ? area
-                       : force == Vec3::Zero() || load.torque ? Vec3(area.norm() * Vec3::Ones())
-                                                              : Vec3(area.norm() * force.normalized());
+    const Vec3 along = load.pressure ? area : Vec3(area.norm() * acting);
     count(along, static_cast<std::uint8_t>(held.polygon[p] | held_under(held, body, p)));
   }
-  for (const std::uint32_t e : selected.elements)
-    count(force == Vec3::Zero() || load.torque ? Vec3(Vec3::Ones()) : force, held.element[e]);
+  for (const std::uint32_t e : selected.elements) count(acting, held.element[e]);
   return whole > 0 ? straight / whole : 0;
 }
 
@@ -123,7 +124,8 @@ void check_held(const Load& load, double share, Progress& progress) {
 void check_move(const Tie& move, const HeldMasks& fixes, const Body& body) {
   std::uint8_t moving = 0;  // axes along which it goes somewhere
   for (int axis = 0; axis < 3; ++axis)
-    if (move.motion.angle != 0 || move.motion.translation[axis] != 0)
+    if ((move.motion.angle != 0 && std::abs(move.motion.axis[axis]) < 1 - 1e-9) ||
+        move.motion.translation[axis] != 0)
       moving = static_cast<std::uint8_t>(moving | (axes_of(move) & 1 << axis));
   if (moving == 0) return;
   double both = 0, whole = 0;

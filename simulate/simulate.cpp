@@ -210,6 +210,8 @@ std::optional<std::vector<Vec3>> Run::coarse_equilibrium() {
     return prolonged_displacement(coarse, body_);
   } catch (const InputError&) {
   } catch (const DivergedError&) {
+  } catch (const TimeoutError&) {
+    check_stop();  // said once, by the run itself
   }
   return std::nullopt;
 }
@@ -240,6 +242,7 @@ SimulateResult Run::operator()() {
   Mechanics mechanics(setting_, std::move(passes));
   state_.displacement = where_to_begin(body_);
   const EquilibriumResult solved = solve(mechanics);
+  const StopWaits answered;  // what is found is told: the rest takes moments
   buckled_ = solved.buckled;
   mechanics.report(state_, result);
   for (const std::string& warning : warnings_of(result)) progress_.warn(scene_.name + ": " + warning);

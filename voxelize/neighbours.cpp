@@ -122,7 +122,9 @@ std::vector<PartPair> noteworthy_pairs(const std::vector<HealedPart>& parts,
                                        const std::vector<double>& spacing) {
   std::vector<Box> box;
   Box all;
+  std::vector<double> volume;
   for (const HealedPart& part : parts) {
+    volume.push_back(std::abs(enclosed_volume(part.mesh)));
     box.push_back(bounding_box(part.mesh.world));
     all.add(box.back().min);
     all.add(box.back().max);
@@ -136,8 +138,7 @@ std::vector<PartPair> noteworthy_pairs(const std::vector<HealedPart>& parts,
       const double tolerance = std::max(kOfDiagonal * all.diagonal(), kOfSpacing * cell);
       Comparison lines(parts[a].mesh, parts[b].mesh, common, tolerance);
       for (int axis = 0; axis < 3; ++axis) lines.compare(axis);
-      const double smaller =
-          std::min(std::abs(enclosed_volume(parts[a].mesh)), std::abs(enclosed_volume(parts[b].mesh)));
+      const double smaller = std::min(volume[a], volume[b]);
       if (lines.overlap() > kNotableOverlap * smaller || (lines.overlap() > 0 && !lines.touching()))
         pairs.push_back({{a, b}, lines.same(), lines.overlap(), 0});
       else if (lines.overlap() == 0 && !lines.touching() && lines.gap() < cell)

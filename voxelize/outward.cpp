@@ -9,6 +9,7 @@
 #include <map>
 
 #include "formats/area_vector.h"
+#include "formats/stop.h"
 #include "voxelize/heal_cgal.h"
 #include "voxelize/heal_mesh.h"
 
@@ -74,6 +75,7 @@ std::vector<std::uint8_t> judged_turns(const PartMesh& mesh, const RayCaster& ra
     const std::uint32_t region = regions.region[t];
     const double area = triangle_area(mesh, t);
     if (seen[region]++ % (size[region] / kAsked + 1) != 0 || !(area > 0)) continue;
+    check_stop();
     outward[region] += (regions.turn[t] ? -1 : 1) * judge(rays, mesh, t) * area;
   }
   for (std::uint32_t t = 0; t < mesh.corners.size(); ++t)

@@ -169,7 +169,7 @@ std::optional<Loads> Loads::make(const Parameters& parameters, const Setting& se
       add_surface_load(load, selected.polygons, setting, sum);
     else
       add_volume_load(load, selected.elements, setting, sum);
-    Spread made{load.name, load.course, {}};
+    Spread made{load.name, load.course, {}, load.torque.has_value() || load.at.has_value()};
     for (std::uint32_t e = 0; e < sum.size(); ++e)
       if (sum[e] != Vec3::Zero()) made.forces.push_back({e, sum[e]});
     loads.loads_.push_back(std::move(made));
@@ -210,7 +210,7 @@ void Loads::report(const State& state, const std::vector<Vec3>&, SimulateResult&
     for (const ElementForce& at : load.forces)
       add_at(factor * at.force, body_->rest[at.element] + state.displacement[at.element], total.force,
              total.moment);
-    total.rotation = turn_of_couple(load.forces, *body_, state);
+    if (load.couple) total.rotation = turn_of_couple(load.forces, *body_, state);
     result.loads.push_back(total);
   }
 }

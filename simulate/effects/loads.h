@@ -47,6 +47,7 @@ class Loads {
     std::string name;
     Course course;
     std::vector<ElementForce> forces;  // ascending by element
+    bool couple = false;               // it was given a torque, or a point where its force acts
   };
   const Body* body_ = nullptr;
   std::vector<Spread> loads_;

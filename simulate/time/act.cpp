@@ -9,6 +9,7 @@
 
 #include "formats/error.h"
 #include "formats/parallel.h"
+#include "formats/stop.h"
 #include "simulate/events/fuse.h"
 #include "simulate/report.h"
 #include "simulate/rest_shape.h"
@@ -349,6 +350,7 @@ void Act::step(Clock& clock, History* history, bool row) {
 }
 
 void Act::slow(double factor) {
+  const StopWaits whole;
   parallel_for_each(state_.velocity.size(), [&](std::size_t e) { state_.velocity[e] *= factor; });
   for (const Pass& pass : passes_)
     if (pass.begin) pass.begin(state_);
@@ -361,6 +363,7 @@ bool Act::kicks() const {
 }
 
 void Act::kick(double time) {
+  const StopWaits whole;  // half a kick is no state
   const Stepper::Memory memory = stepper_->memory();
   const std::vector<Vec3> before = state_.velocity;
   state_.kick = std::abs(time);
@@ -372,6 +375,7 @@ void Act::kick(double time) {
 
 void Act::close_books(const Clock& clock, History& history) {
   if (euler_) return history.add_row_of(state_, euler_->supports());
+  const StopWaits whole;  // the step beyond is taken back
   State last = state_;
   const Memory before = memory();
   const std::vector<std::uint8_t> broken = body_.broken;

@@ -115,11 +115,10 @@ class Act {
   [[nodiscard]] const State& state() const { return state_; }
   [[nodiscard]] const std::vector<Pass>& passes() const { return passes_; }
   [[nodiscard]] const Stepper& stepper() const { return *stepper_; }
+  // A step solves for the velocity at its end: it may take seconds.
   [[nodiscard]] bool solves() const { return implicit_.has_value(); }
   [[nodiscard]] bool damps() const;  // internally
   [[nodiscard]] bool is_implicit() const { return euler_.has_value(); }
-  // A step solves for the velocity at its end: it may take seconds.
-  [[nodiscard]] bool solves_damping() const { return implicit_.has_value(); }
   [[nodiscard]] std::unique_ptr<History> make_history(Ledger ledger) const;
 
  private:

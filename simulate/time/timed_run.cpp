@@ -196,8 +196,8 @@ void TimedRun::check() {
 // Steps that solve for damping may be stopped within, and leave no state; other explicit ones end first.
 void TimedRun::advance(bool row) {
   std::optional<StopWaits> whole;
-  if (!act_->is_implicit() && !act_->solves_damping()) whole.emplace();
-  torn_ = act_->solves_damping();
+  if (!act_->is_implicit() && !act_->solves()) whole.emplace();
+  torn_ = act_->solves();
   act_->step(clock_, history_.get(), row);
   torn_ = false;
 }
@@ -230,7 +230,7 @@ void TimedRun::write_frame() {
 
 // Without an act an event is happening.
 double TimedRun::now() const {
-  return act_ ? *act_->state().time : scene_.events[events_].at;
+  return act_ ? *act_->state().time : scene_.events[std::min(events_, scene_.events.size() - 1)].at;
 }
 
 // Leaves the body at `state` (nothing: none was sound), and in the file for runs that end early; says where
@@ -301,6 +301,7 @@ std::string TimedRun::stop() {
 
 // Events up to `end` happen now, and another act begins.
 void TimedRun::happen(std::size_t end) {
+  const StopWaits whole;  // between two acts there is no state to save
   Ledger ledger;
   if (history_) {
     if (clock_.steps > 0) act_->close_books(clock_, *history_);
@@ -321,7 +322,6 @@ void TimedRun::happen(std::size_t end) {
     const Event& event = scene_.events[events_];
     const Setting setting = timed_setting(body_, scene_, beginning_);
     Stage stage{body_, state, beginning_.fused, beginning_.settled, setting, progress_};
-    const StopWaits whole;
     const std::string what = event.happen(stage);
     progress_.say(fmt::format("at {:.4g} s {}: {}", event.at, event.name, what));
   }

@@ -160,18 +160,18 @@ SolveAt with_bars(const SolveAt& solve, const std::function<double(double)>& sha
   };
 }
 
-struct Chosen {
+struct ChosenRun {
   SolvedRun last;
   AccuracyReport report;
 };
 
-Chosen choose_by_default(const SolveAt& solve, double error = 0.05, double within = 20) {
+ChosenRun choose_by_default(const SolveAt& solve, double error = 0.05, double within = 20) {
   AccuracyGoal goal;
   goal.by_default = true;
   goal.error = error;
   goal.within = within;
   goal.began = std::chrono::steady_clock::now();
-  Chosen chosen;
+  ChosenRun chosen;
   Progress silent("", Progress::Mode::silent);
   chosen.last = choose_resolution(goal, solve, chosen.report, silent);
   return chosen;
@@ -213,7 +213,7 @@ TEST(UsualSize, AFinerTargetIsNoCoarserAndMoreTimeIsNoCoarser) {
   }
   last = 1;
   for (const double within : {0.3, 1.0, 3.0, 10.0, 30.0}) {
-    const Chosen chosen = choose_by_default(solve, 0.01, within);
+    const ChosenRun chosen = choose_by_default(solve, 0.01, within);
     EXPECT_LE(chosen.last.size, last) << within;
     last = chosen.last.size;
     for (const TriedRun& run : chosen.report.runs) EXPECT_LE(run.seconds, within);
@@ -239,7 +239,7 @@ TEST(UsualSize, IsTheSameOnABusyMachine) {
 TEST(UsualSize, FourCellsThroughWallsAndNoWordOfLatticesThatMissThem) {
   const SolveAt solve = with_bars(made_up([](double h) { return h > 0.05 ? 30.0 : 1 + 0.1 * h; }),
                                   [](double h) { return h > 0.05 ? 2.0 : 0.03; });
-  const Chosen chosen = choose_by_default([&](std::optional<double> size, const GoesOn& goes_on) {
+  const ChosenRun chosen = choose_by_default([&](std::optional<double> size, const GoesOn& goes_on) {
     SolvedRun run = solve(size, goes_on);
     run.wall = 0.06;
     return run;
@@ -253,7 +253,7 @@ TEST(UsualSize, BarsAreAsWideAsTheRunsAreApart) {
   int count = 0;
   const SolveAt solve =
       with_bars(made_up([&](double) { return ++count % 2 ? 1.0 : 1.3; }), [](double h) { return h; });
-  const Chosen chosen = choose_by_default(solve, 0.05);
+  const ChosenRun chosen = choose_by_default(solve, 0.05);
   const Bar& bar = chosen.last.simulated.error_bars.bars.front().bar;
   ASSERT_GT(chosen.report.runs.size(), 1u);
   EXPECT_NEAR(bar.half_width, *chosen.report.runs.back().error * chosen.last.mapped[0].z(), 1e-12);

@@ -13,12 +13,12 @@ namespace {
 
 using test::map_quietly;
 
-constexpr double kLength = 4, kHeight = 0.4, kSpacing = 0.05, kAngle = 0.5;
+constexpr double kLength = 4, kHeight = 0.4, kChordSpacing = 0.05, kAngle = 0.5;
 
 // A bar of 80 x 8 x 8 cells along x with a surface of twelve triangles; cells under polygons so large are
 // looked for where the points are.
 Body bar() {
-  Body body = test::block(80, 8, 8, kSpacing, Placement::corner, 1);
+  Body body = test::block(80, 8, 8, kChordSpacing, Placement::corner, 1);
   body.surface_cell_offsets.clear();
   body.surface_cells.clear();
   return body;
@@ -62,7 +62,7 @@ TEST_P(Chord, IsGoneWithTheEdgesThatAreAdvised) {
   test::deform(body, along_circle);
   const ChordError coarse = *report(body, map_quietly(body, GetParam())).chord;
   const double edge = sufficient_edge(coarse);
-  EXPECT_GT(edge, 3 * kSpacing);  // or nothing would be looked at
+  EXPECT_GT(edge, 3 * kChordSpacing);  // or nothing would be looked at
   subdivide_mesh(body.surface, edge, "bar");
   const MapReport found = report(body, map_quietly(body, GetParam()));
   EXPECT_LT(found.chord->share(), 0.005);
@@ -109,7 +109,7 @@ TEST(ChordOfABrokenBar, LeavesOutWhatTheFractureTore) {
   for (std::uint32_t c = 0; c < body.cell_count(); ++c)
     body.broken[c] = body.lattice_index[body.cell_elements[c][0]][0] == 40;
   test::deform(body, [](const Vec3& p) -> Vec3 {
-    return p.x() < kLength / 2 + kSpacing / 2 ? p : Vec3(p + Vec3(1, 0, 0.5));
+    return p.x() < kLength / 2 + kChordSpacing / 2 ? p : Vec3(p + Vec3(1, 0, 0.5));
   });
   const MapReport found = report(body, map_quietly(body, MapMethod::blended));
   EXPECT_EQ(found.chord->coarse_triangles, 0u);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "formats/body_file.h"
 #include "formats/error.h"
 #include "formats/files.h"
 #include "tests/simulate/box_body.h"
