@@ -1,6 +1,7 @@
 """What a designer types: loads and materials on the command line, infill, pictures, and which of two parts is stiffer."""
 
 import json
+import math
 
 from harness import bracket, box, expect, expect_error, expect_ok, main, run, scene, write
 from picture_test import colours, read_png
@@ -47,6 +48,40 @@ def test_gravity_bearing_and_probe_are_a_scenes():
                        "end: xmax")
     expect([p["name"] for p in found["probes"]] == ["tip", "end"], found["probes"])
     expect(all(p["displacement"][2] < -10e-6 for p in found["probes"]), found["probes"])
+
+
+def test_an_action_that_cannot_be_placed_is_refused_whatever_chooses_the_size():
+    box()
+    for choice in (["--accuracy", "50%"], ["--within", "5s"], ["--count", "500"], []):
+        done = run("flexel", "deform", "box.stl", *choice, "--material", "steel", "--fix", "xmin", "--push", "xmax: 0 0 -50 N", "--push",
+                   "nosuch/99: 50 N", "-o", "out.stl")
+        expect_error(done, "flexel", "nosuch/99")
+
+
+def test_the_axis_of_a_side_is_its_own():
+    """A rounded end: however fine its facets are, a torque on the side turns about the side's axis."""
+    for facets in (15, 45, 90):
+        arc = [(40 + 5 * math.sin(math.pi * k / facets), 5 - 5 * math.cos(math.pi * k / facets)) for k in range(facets + 1)]
+        outline = [(0, 0), *arc, (0, 10)]
+        count = len(outline)
+        lines = [f"v {x} {y} {z}" for z in (0, 10) for x, y in outline]
+        lines += ["f " + " ".join(str(k + 1) for k in reversed(range(count))), "f " + " ".join(str(count + k + 1) for k in range(count))]
+        for k in range(count):
+            j = (k + 1) % count
+            lines.append(f"f {k + 1} {j + 1} {count + j + 1} {count + k + 1}")
+        write("lever.obj", ("\n".join(lines) + "\n").encode())
+        expect_ok(run("flexel", "deform", "lever.obj", *QUICK, "--material", "steel", "--fix", "xmin", "--torque", "xmax: 1 N m",
+                      "--summary", "s.json", "-o", "out.obj"))
+        moment = json.load(open("s.json"))["simulate"]["loads"][0]["moment"]
+        expect(abs(moment[0] - 1) < 1e-3 and abs(moment[2]) < 1e-2, f"{facets} facets: {moment}")
+
+
+def test_infill_is_told_as_an_estimate():
+    box()
+    for choice in (["--accuracy", "50%"], ["--count", "500"]):
+        done = expect_ok(run("flexel", "deform", "box.stl", *choice, "--material", "PLA", "--infill", "20%", "--fix", "xmin", "--push",
+                             "xmax: 0 0 -1 N", "-o", "out.stl"))
+        expect("estimate" in done.err, done.err)
 
 
 def test_material_and_infill_by_part():

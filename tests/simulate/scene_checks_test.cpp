@@ -217,6 +217,29 @@ Body wedge() {
   return body;
 }
 
+// Plane strain: what turns about z goes nowhere along z, where all is held.
+TEST(HeldLoads, ATurnAboutTheHeldAxisIsNotRefused) {
+  const std::string strain = "[[fix]]\nwhere = \"box\"\naxes = \"z\"\n";
+  EXPECT_THAT(
+      told(small(), bar(strain + "[[move]]\nwhere = \"xmax\"\nrotation = { axis = [0, 0, 1], "
+                                 "through = [\"40 mm\", \"10 mm\", \"0 mm\"], angle = \"1 deg\" }\n")),
+      Not(HasSubstr("refused")));
+  EXPECT_THAT(
+      told(small(), bar(strain + "[[load]]\nwhere = \"xmax\"\ntorque = [\"0 N m\", \"0 N m\", \"1 N m\"]\n")),
+      Not(HasSubstr("straight into")));
+}
+
+// A pressure has no torque of its own that could be lost.
+TEST(Torques, APressureThatTurnsIsNotTold) {
+  const std::string soft =
+      "material = \"jelly\"\n[materials.jelly]\nyoung = \"1 MPa\"\npoisson = 0.3\ndensity = \"1000 "
+      "kg/m3\"\n[[fix]]\nwhere = \"xmin\"\n";
+  const Scene scene =
+      parse_scene(soft + "[[load]]\nwhere = [\"xmax\", \"zmax\"]\npressure = \"30 kPa\"\n", "s.toml");
+  EXPECT_THAT(told(box_body({.cells = {8, 2, 2}, .spacing = Vec3::Constant(0.01)}), scene),
+              Not(HasSubstr("link = ")));
+}
+
 TEST(Sides, APressureOnASideThatLooksElsewhereIsTold) {
   EXPECT_THAT(told(wedge(), bar("[[load]]\nwhere = \"zmax\"\npressure = \"1 Pa\"\n")),
               HasSubstr("44 degrees"));
