@@ -1,6 +1,7 @@
 // The words of a result: what its error bar lets them say, in at most six lines.
 #include "simulate/answer.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -115,8 +116,8 @@ TEST(Answer, TheWeakestPartCounts) {
 TEST(Answer, AtMostSixLinesHoweverMuchThereIs) {
   Case made = with_bar(0.3);
   for (int i = 0; i < 9; ++i) {
-    made.result.probes.push_back({"p" + std::to_string(i), Vec3::Zero(), Vec3(0, 0, 1e-3)});
-    made.result.reactions.push_back({"fix " + std::to_string(i), Vec3(3, 4, 0), Vec3::Zero()});
+    made.result.probes.push_back({fmt::format("p{}", i), Vec3::Zero(), Vec3(0, 0, 1e-3)});
+    made.result.reactions.push_back({fmt::format("fix {}", i), Vec3(3, 4, 0), Vec3::Zero()});
   }
   const std::vector<std::string> lines = answer_lines(made.result, made.body, made.materials, "look");
   EXPECT_EQ(lines.size(), 6u);
