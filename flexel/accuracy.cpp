@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 
 #include "flexel/judged_error.h"
 #include "flexel/study/predict.h"
@@ -109,7 +110,8 @@ class Search {
   }
 
   void fail(double& size, const std::string& why, int failures) {
-    if (size == 0 || failures >= kFailures || goal_.by_default) throw;
+    if (!first_failure_) first_failure_ = std::current_exception();
+    if (size == 0 || failures >= kFailures || goal_.by_default) std::rethrow_exception(first_failure_);
     TriedRun failed;
     failed.size = size;
     failed.failure = why;
@@ -291,6 +293,7 @@ class Search {
   int given_up_ = 0;     // lattices that were not solved
   bool chosen_ = false;  // the one run that --within asks for was made
   double processor_before_;
+  std::exception_ptr first_failure_;  // finer lattices did not help
 };
 
 }  // namespace

@@ -113,8 +113,10 @@ void plan_outputs(const DeformArguments& arguments, Plan& plan) {
           {path, map_output(path == "-" ? arguments.map.format : "", path, arguments.map.ascii, 0,
                             arguments.map.scale, arguments.map.attributes)});
   if (!arguments.body.empty()) plan.outputs.push_back({arguments.body, std::nullopt});
-  std::vector<OutputName> names{{arguments.map.report}, {arguments.summary}, {failed_name(plan)}};
+  std::vector<OutputName> names;
   for (const Plan::Output& output : plan.outputs) names.push_back({output.path});
+  for (const std::string& path : {arguments.map.report, arguments.summary, failed_name(plan)})
+    names.push_back({path});
   std::vector<std::string> inputs = arguments.job.parts;
   inputs.push_back(arguments.job.scene);
   check_outputs(names, inputs, arguments.job.force);

@@ -149,7 +149,7 @@ Plan make_plan(Arguments& arguments) {
     throw InputError("--points: a table comes out; --format, --ascii and --attributes are for surfaces");
   const std::vector<std::string> inputs = {arguments.body, arguments.onto, arguments.points,
                                            arguments.binding};
-  std::vector<OutputName> outputs = {{arguments.save_binding, true}, {arguments.map.pieces}};
+  std::vector<OutputName> outputs = {{arguments.save_binding, true}};
   if (!plan.series) outputs.insert(outputs.end(), {{arguments.map.report}, {arguments.output}});
   check_outputs(outputs, inputs, arguments.force);
   return plan;

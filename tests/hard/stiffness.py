@@ -289,7 +289,7 @@ def edge_joined(trial):
     for model in ("cells", "springs"):
         with trial.section(f"hinge, {model}"):
             out = trial.go(hinge(PLAIN, model))
-            refused(out, "free to rotate")
+            refused(out, "let it turn")
             trial.figure("hinge refused")
         outcomes = integrators(trial, lambda view, run: swing(view, model, run), "30 ms", "0.1 ms", f"{model}, ", free=1e-9, units=1e-7)
         if model == "cells" and "symplectic" in outcomes:

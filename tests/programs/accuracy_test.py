@@ -110,7 +110,7 @@ def test_a_guess_is_called_one():
 
 
 def test_verbose_and_quiet():
-    options = [*beam(), "--count", "1000"]
+    options = [*beam(), "--count", "1000", "--edge", "6 mm"]
     _, said = deform([*options, "--verbose"])
     for words in ("elements,", "reaction of", "error bars from", "the mapped surface can be used", "how far"):
         expect(words in said, f"{words} is missing in: {said}")

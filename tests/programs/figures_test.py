@@ -43,7 +43,7 @@ def run_model(model, *options):
     write("scene.toml", f'material = "steel"\n[parts.box]\nmodel = "{model}"\n[[fix]]\nwhere = "{held}"\n'
                         f'[[load]]\nwhere = "{pushed}"\nforce = [0, 0, "-10 N"]\n')
     expect_ok(run("flexel-voxelize", "box.stl", "--size", "2.3 mm", "-o", "box.vtu", *options))
-    result = expect_ok(run("flexel-simulate", "scene.toml", "box.vtu", "-o", "bent.vtu", "--summary", "s.json", "--no-estimate"))
+    result = expect_ok(run("flexel-simulate", "scene.toml", "box.vtu", "-o", "bent.vtu", "--summary", "s.json", "--no-estimate", "--verbose"))
     summary = json.loads(pathlib.Path("s.json").read_text(encoding="utf-8"))
     near(said(result, "largest displacement"), summary["largest_displacement"], 6e-3, "printed and in the summary")
     mapped = expect_ok(run("flexel-map", "bent.vtu", "-o", "bent.ply", "--attributes", "--report", "map.json"))

@@ -46,7 +46,7 @@ def prepare(text=PAT, duration="50 ms"):
 
 
 def start(*options, to=(), **more):
-    return Run(BIN / "flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu", "--live", *to, "--threads", "1", *options, **more)
+    return Run(BIN / "flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu", "--verbose", "--live", *to, "--threads", "1", *options, **more)
 
 
 def first_frame(live):
@@ -70,7 +70,7 @@ def test_poses_lead_as_a_path_does():
 
 def test_a_run_without_real_time_waits_for_its_poses():
     prepare()
-    process = subprocess.Popen([BIN / "flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu"], stdin=subprocess.PIPE, stderr=subprocess.PIPE)
+    process = subprocess.Popen([BIN / "flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu", "--verbose"], stdin=subprocess.PIPE, stderr=subprocess.PIPE)
     process.stdin.write(b"0 0 0 0\n0.02 0 0 -0.002\n")
     process.stdin.flush()
     time.sleep(1)
@@ -237,7 +237,7 @@ def test_interrupt():
         live.process.send_signal(signal.SIGINT)
         code, said = live.finish()
         expect(code == 130 and "out.failed.vtu" in said, f"exit {code}: {said}")
-    process = subprocess.Popen([BIN / "flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu"], stdin=subprocess.PIPE, stderr=subprocess.PIPE)
+    process = subprocess.Popen([BIN / "flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu", "--verbose"], stdin=subprocess.PIPE, stderr=subprocess.PIPE)
     time.sleep(1)  # waiting for the first pose
     process.send_signal(signal.SIGINT)
     expect(process.wait(30) == 130, f"exit {process.returncode}")

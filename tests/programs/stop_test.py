@@ -51,7 +51,7 @@ def test_interrupt_while_mapping():
 def test_interrupt_of_flexel():
     box()
     interrupted("flexel", "deform", "box.stl", "--material", "steel", "--fix", "xmin", "--push", "xmax: 0 0 -1 N", *FINE, "-o", "out.stl",
-                once="import")
+                "--verbose", once="import")
 
 
 def test_timeout_is_heard_within_a_step():
