@@ -17,6 +17,7 @@
 #include "formats/files.h"
 #include "formats/human.h"
 #include "formats/parallel.h"
+#include "formats/termination.h"
 #include "formats/topology.h"
 #include "formats/units.h"
 #include "simulate/simulate.h"
@@ -297,6 +298,7 @@ int compare_command(int argc, char** argv) {
   if (plan_job(arguments.job).scene.run.time)
     throw InputError(arguments.job.scene,
                      "flexel compare is for runs to equilibrium, and this scene is a timed run");
+  const StopEndsProcess nothing_is_left;
   const ThreadLimit limit(arguments.threads);
   Progress progress("flexel", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
   Progress inner("flexel", Progress::Mode::quiet);

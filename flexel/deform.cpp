@@ -274,8 +274,10 @@ std::string next_step(const std::optional<AccuracyReport>& accuracy) {
   if (accuracy->goal.within)
     chosen_for +=
         fmt::format("{}within {}", chosen_for.empty() ? "" : " ", human_seconds(*accuracy->goal.within));
-  const std::string repeat = fmt::format("--size {} repeats this run, chosen for {}",
-                                         size_text(accuracy->runs.back().size), chosen_for);
+  const std::string method =
+      accuracy->method == name_of(MapMethod::blended) ? "" : " --method " + accuracy->method;
+  const std::string repeat = fmt::format("--size {}{} repeats this run, chosen for {}",
+                                         size_text(accuracy->runs.back().size), method, chosen_for);
   return accuracy->advice.empty() ? repeat : accuracy->advice + "; " + repeat;
 }
 

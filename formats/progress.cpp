@@ -21,6 +21,7 @@ namespace {
 
 bool brief_output = false, holds_warnings = false;
 std::vector<std::string> held_warnings;
+std::string held_program;  // that gave the last of them
 
 constexpr double kDrawInterval = 0.1;  // s
 constexpr int kBarWidth = 24;          // characters
@@ -62,7 +63,8 @@ HeldWarnings::HeldWarnings() : exceptions_(std::uncaught_exceptions()) {
 HeldWarnings::~HeldWarnings() {
   holds_warnings = false;
   if (std::uncaught_exceptions() > exceptions_)
-    for (const std::string& line : held_warnings) print_error(fmt::format("warning: {}\n", line));
+    for (const std::string& line : held_warnings)
+      print_error(fmt::format("{}: warning: {}\n", held_program, line));
   held_warnings.clear();
 }
 
@@ -113,6 +115,7 @@ void Progress::say(const std::string& line) {
 void Progress::warn(const std::string& line) {
   if (mode_ == Mode::silent) return;
   if (holds_warnings) {
+    held_program = program_;
     if (std::find(held_warnings.begin(), held_warnings.end(), line) == held_warnings.end())
       held_warnings.push_back(line);
     return;

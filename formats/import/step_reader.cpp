@@ -141,23 +141,29 @@ TopoDS_Shape transfer(STEPControl_Reader& reader, ImportInput& input, const Impo
 }
 
 // OpenCASCADE passes over the triangles of AP242 without a word (release 7.7 reads them).
-void refuse_tessellated(const ImportInput& input) {
+void tell_tessellated(const ImportInput& input, bool all, const ImportOptions& options) {
   const std::string_view text(reinterpret_cast<const char*>(input.bytes.data()), input.bytes.size());
-  for (const char* kind :
-       {"TESSELLATED_SOLID", "TESSELLATED_SHELL", "TRIANGULATED_FACE", "TRIANGULATED_SURFACE_SET"})
-    if (text.find(kind) != std::string_view::npos)
-      throw InputError(
-          input.where,
-          fmt::format("holds tessellated geometry only ({}), which OpenCASCADE " OCC_VERSION_COMPLETE
-                      " does not read: export the part with its exact geometry (B-rep), or as STL",
-                      kind));
+  const auto holds = [&](const char* kind) { return text.find(kind) != std::string_view::npos; };
+  constexpr const char* kAdvice =
+      "OpenCASCADE " OCC_VERSION_COMPLETE
+      " does not read: export the part with its exact geometry (B-rep), or as STL";
+  if (all)
+    for (const char* kind :
+         {"TESSELLATED_SOLID", "TESSELLATED_SHELL", "TRIANGULATED_FACE", "TRIANGULATED_SURFACE_SET"})
+      if (holds(kind))
+        throw InputError(input.where,
+                         fmt::format("holds tessellated geometry only ({}), which {}", kind, kAdvice));
+  for (const char* kind : {"TESSELLATED_SOLID", "TESSELLATED_SHELL"})
+    if (holds(kind) && options.warn)
+      return options.warn(fmt::format("{}: holds tessellated geometry too ({}), which {}; it is left out",
+                                      input.file, kind, kAdvice));
 }
 
 Surface read_solids(ImportInput& input, const ImportOptions& options) {
   constexpr double kMillimetre = 1e-3;
   STEPControl_Reader reader;
   const TopoDS_Shape shape = transfer(reader, input, options);
-  if (shape.IsNull()) refuse_tessellated(input);
+  tell_tessellated(input, shape.IsNull(), options);
   const StepNames names(reader);
   Surface surface = mesh_of(shape, kMillimetre,
                             {[&](const TopoDS_Shape& solid) { return names.solid(solid); },

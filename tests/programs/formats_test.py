@@ -107,6 +107,15 @@ def test_iges_and_brep_are_the_same_bracket_as_step():
         expect(abs(sunk / tip - 1) < 0.02 and tip > 0.1, f"{file}: the tip sinks by {sunk} mm, not {tip}")
 
 
+def test_tessellated_solids_beside_exact_ones_are_told():
+    bracket()
+    text = open("bracket.step", encoding="latin-1").read()
+    end = text.rindex("ENDSEC;")
+    write("both.step", (text[:end] + "#999999=TESSELLATED_SOLID('more',(),$);\n" + text[end:]).encode("latin-1"))
+    said = expect_ok(run("flexel-voxelize", "both.step", "--count", "500", "-o", "body.vtu")).err
+    expect("warning: both.step: holds tessellated geometry too (TESSELLATED_SOLID)" in said and "left out" in said, said)
+
+
 def test_one_file_a_part():
     lower = off_box("lower.off")
     vertices, triangles = indexed_box()
