@@ -73,14 +73,20 @@ PartMesh alpha_wrap(const PartMesh& mesh, double alpha, double offset) {
 struct RayCaster::Tree {
   using Triangle = Kernel::Triangle_3;
   using Primitive = CGAL::AABB_triangle_primitive<Kernel, std::vector<Triangle>::const_iterator>;
-  std::vector<Triangle> triangles;
+  std::vector<Triangle> triangles;     // without those whose corners lie on a line: no ray may ask them
+  std::vector<std::uint32_t> numbers;  // theirs in the mesh
   CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>> tree;
 };
 
 RayCaster::RayCaster(const PartMesh& mesh) : tree_(std::make_unique<Tree>()) {
   const std::vector<Point> points = points_of(mesh.world);
-  for (const Corners& c : mesh.corners)
-    tree_->triangles.emplace_back(points[c[0]], points[c[1]], points[c[2]]);
+  for (std::uint32_t t = 0; t < mesh.corners.size(); ++t) {
+    const Corners& c = mesh.corners[t];
+    const Tree::Triangle triangle(points[c[0]], points[c[1]], points[c[2]]);
+    if (triangle.is_degenerate()) continue;
+    tree_->triangles.push_back(triangle);
+    tree_->numbers.push_back(t);
+  }
   tree_->tree.rebuild(tree_->triangles.cbegin(), tree_->triangles.cend());
 }
 RayCaster::~RayCaster() = default;
@@ -91,7 +97,7 @@ std::optional<RayCaster::Hit> RayCaster::first(const Vec3& from, const Vec3& uni
   const Kernel::Ray_3 ray(origin,
                           Kernel::Vector_3(unit_direction.x(), unit_direction.y(), unit_direction.z()));
   const auto number = [&](const auto& id) {
-    return static_cast<std::uint32_t>(id - tree_->triangles.cbegin());
+    return tree_->numbers[static_cast<std::size_t>(id - tree_->triangles.cbegin())];
   };
   const auto met = tree_->tree.first_intersection(ray, [&](const auto& id) { return number(id) == own; });
   if (!met) return std::nullopt;
