@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "formats/surface.h"
+#include "formats/part/surface.h"
 
 namespace flexel {
 

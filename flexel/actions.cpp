@@ -8,13 +8,13 @@
 #include <charconv>
 #include <sstream>
 
+#include "base/error.h"
+#include "base/math/area_vector.h"
+#include "base/units.h"
 #include "flexel/face_shape.h"
-#include "formats/area_vector.h"
-#include "formats/error.h"
-#include "formats/units.h"
-#include "simulate/scene_checks.h"
+#include "simulate/scene/scene_checks.h"
 
-namespace flexel {
+namespace flexel::commands {
 namespace {
 
 struct Amount {
@@ -96,7 +96,7 @@ Action parse_action(const std::string& text, const std::string& option, Dimensio
 }
 
 // Unit, outward; of a side its axis.
-Vec3 mean_normal(const Selection& selection, const Selected& selected, const Body& body,
+Vec3 mean_normal(const simulate::Selection& selection, const simulate::Selected& selected, const Body& body,
                  const std::string& example) {
   if (const auto axis = side_axis(selection, body)) return *axis;
   const Surface& surface = body.surface;
@@ -174,8 +174,8 @@ Vec3 parse_gravity(const std::string& text) {
                   text, values.size()));
 }
 
-Probe parse_probe(const std::string& text) {
-  Probe probe;
+simulate::Probe parse_probe(const std::string& text) {
+  simulate::Probe probe;
   probe.origin = "--probe";
   const std::size_t colon = text.find(':');
   probe.name = trimmed(text.substr(0, colon));
@@ -195,18 +195,18 @@ Probe parse_probe(const std::string& text) {
       (*probe.at)[i] =
           parse_quantity(amount.numbers[static_cast<std::size_t>(i)] + " " + amount.unit, Dimension::length);
   } else {
-    probe.where = parse_where(rest, probe.origin);
+    probe.where = simulate::parse_where(rest, probe.origin);
     if (colon == std::string::npos) probe.name = describe(*probe.where);
   }
   return probe;
 }
 
-Vec3 inward_normal(const Selection& selection, const Body& body) {
+Vec3 inward_normal(const simulate::Selection& selection, const Body& body) {
   return -mean_normal(selection, resolve(selection, body), body, "0 0 -50 N");
 }
 
-FaceAxis face_axis(const Selection& selection, const Body& body, const std::optional<Vec3>& given) {
-  const Selected selected = resolve(selection, body);
+FaceAxis face_axis(const simulate::Selection& selection, const Body& body, const std::optional<Vec3>& given) {
+  const simulate::Selected selected = resolve(selection, body);
   if (selected.polygons.empty())
     throw InputError(
         selection.origin,
@@ -219,45 +219,45 @@ FaceAxis face_axis(const Selection& selection, const Body& body, const std::opti
   return {mean_normal(selection, selected, body, "0 0 5 N m"), shape.centroid};
 }
 
-void add_push(Scene& scene, const Action& action, const Body& body) {
-  const Selection where = parse_where(action.where, "--push");
-  std::vector<Load>& loads = scene.get<Loads>().loads;
+void add_push(simulate::Scene& scene, const Action& action, const Body& body) {
+  const simulate::Selection where = simulate::parse_where(action.where, "--push");
+  std::vector<simulate::Load>& loads = scene.get<simulate::Loads>().loads;
   if (action.pressure) {
     loads.push_back(make_pressure(where, *action.pressure));
   } else {
-    loads.push_back(
-        make_push(where, action.vector ? *action.vector : Vec3(*action.along * inward_normal(where, body))));
+    loads.push_back(simulate::make_push(
+        where, action.vector ? *action.vector : Vec3(*action.along * inward_normal(where, body))));
   }
 }
 
-void add_move(Scene& scene, const Action& action, const Body& body) {
-  const Selection where = parse_where(action.where, "--move");
-  scene.get<Ties>().ties.push_back(
-      make_move(where, action.vector ? *action.vector : Vec3(*action.along * inward_normal(where, body))));
+void add_move(simulate::Scene& scene, const Action& action, const Body& body) {
+  const simulate::Selection where = simulate::parse_where(action.where, "--move");
+  scene.get<simulate::Ties>().ties.push_back(simulate::make_move(
+      where, action.vector ? *action.vector : Vec3(*action.along * inward_normal(where, body))));
 }
 
-void add_torque(Scene& scene, const Action& action, const Body& body) {
-  Load load;
-  load.where = parse_where(action.where, "--torque");
+void add_torque(simulate::Scene& scene, const Action& action, const Body& body) {
+  simulate::Load load;
+  load.where = simulate::parse_where(action.where, "--torque");
   load.name = describe(load.where);
   load.origin = load.where.origin;
   load.torque = action.vector ? *action.vector : Vec3(*action.along * face_axis(load.where, body).direction);
-  scene.get<Loads>().loads.push_back(std::move(load));
+  scene.get<simulate::Loads>().loads.push_back(std::move(load));
 }
 
-void add_twist(Scene& scene, const Action& action, const Body& body) {
-  Tie tie = make_move(parse_where(action.where, "--twist"), Vec3::Zero());
+void add_twist(simulate::Scene& scene, const Action& action, const Body& body) {
+  simulate::Tie tie = simulate::make_move(simulate::parse_where(action.where, "--twist"), Vec3::Zero());
   const FaceAxis axis = face_axis(tie.where, body, action.vector);
   tie.motion.angle = action.along ? *action.along : action.vector->norm();
   tie.motion.axis = axis.direction;
   tie.motion.through = axis.through;
-  scene.get<Ties>().ties.push_back(std::move(tie));
+  scene.get<simulate::Ties>().ties.push_back(std::move(tie));
 }
 
-void add_bearing(Scene& scene, const Action& action) {
-  Load load = make_push(parse_where(action.where, "--bearing"), *action.vector);
+void add_bearing(simulate::Scene& scene, const Action& action) {
+  simulate::Load load = simulate::make_push(simulate::parse_where(action.where, "--bearing"), *action.vector);
   load.bearing = true;
-  scene.get<Loads>().loads.push_back(std::move(load));
+  scene.get<simulate::Loads>().loads.push_back(std::move(load));
 }
 
-}  // namespace flexel
+}  // namespace flexel::commands

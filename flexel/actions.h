@@ -3,10 +3,10 @@
 #include <optional>
 #include <string>
 
-#include "formats/vec.h"
-#include "simulate/scene.h"
+#include "base/math/vec.h"
+#include "simulate/scene/scene.h"
 
-namespace flexel {
+namespace flexel::commands {
 
 // "WHERE: AMOUNT", parsed; AMOUNT is "0 0 -50 N" (three components and a unit; commas will do) or "50 N"
 // (along the inward normal; of torques and twists: about the face's own axis).
@@ -30,12 +30,12 @@ struct Action {
 // 9.80665 m/s^2.
 [[nodiscard]] Vec3 parse_gravity(const std::string& text);
 // `text` of --probe: "NAME: 10 5 3 mm" (a material point), "NAME: WHERE" or "WHERE".
-[[nodiscard]] Probe parse_probe(const std::string& text);
+[[nodiscard]] simulate::Probe parse_probe(const std::string& text);
 
 // Unit vector against the mean outward normal of the selected polygons; of a side ("zmax") against its axis,
 // however its polygons look. Throws InputError when they have none (elements selected by a region, faces
 // whose normals cancel): a direction has to be given.
-[[nodiscard]] Vec3 inward_normal(const Selection& selection, const Body& body);
+[[nodiscard]] Vec3 inward_normal(const simulate::Selection& selection, const Body& body);
 
 // The axis that a torque or a twist of the selected polygons turns about: that of a round face (the largest
 // component of its direction is positive), else the mean outward normal, through the middle; `given` is
@@ -44,15 +44,15 @@ struct FaceAxis {
   Vec3 direction = Vec3::UnitZ();  // unit
   Vec3 through = Vec3::Zero();     // m
 };
-[[nodiscard]] FaceAxis face_axis(const Selection& selection, const Body& body,
+[[nodiscard]] FaceAxis face_axis(const simulate::Selection& selection, const Body& body,
                                  const std::optional<Vec3>& given = {});
 
 // Adds the action to the scene. `body` gives the normals and axes; its surface, and names of parts, are
 // enough.
-void add_push(Scene& scene, const Action& action, const Body& body);
-void add_move(Scene& scene, const Action& action, const Body& body);
-void add_torque(Scene& scene, const Action& action, const Body& body);
-void add_twist(Scene& scene, const Action& action, const Body& body);
-void add_bearing(Scene& scene, const Action& action);
+void add_push(simulate::Scene& scene, const Action& action, const Body& body);
+void add_move(simulate::Scene& scene, const Action& action, const Body& body);
+void add_torque(simulate::Scene& scene, const Action& action, const Body& body);
+void add_twist(simulate::Scene& scene, const Action& action, const Body& body);
+void add_bearing(simulate::Scene& scene, const Action& action);
 
-}  // namespace flexel
+}  // namespace flexel::commands

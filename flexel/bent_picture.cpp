@@ -3,19 +3,19 @@
 
 #include <fmt/format.h>
 
+#include "base/files/files.h"
 #include "flexel/picture/picture.h"
-#include "formats/files.h"
 
-namespace flexel {
+namespace flexel::commands {
 
 void write_bent_picture(Body& body, const std::string& path, Progress& progress) {
-  PictureOptions options;
+  picture::PictureOptions options;
   options.colour = "displacement";
   options.exaggeration = std::nullopt;
-  std::vector<PictureSubject> subjects(1);
+  std::vector<picture::PictureSubject> subjects(1);
   subjects[0].where = path;
   subjects[0].body = std::move(body);
-  const PictureResult picture = draw_picture(subjects, options, progress);
+  const picture::PictureResult picture = draw_picture(subjects, options, progress);
   body = std::move(*subjects[0].body);
   const Bytes bytes = encode_png(picture.image);
   OutputFile out(path);
@@ -23,4 +23,4 @@ void write_bent_picture(Body& body, const std::string& path, Progress& progress)
   out.commit();
 }
 
-}  // namespace flexel
+}  // namespace flexel::commands

@@ -2,14 +2,14 @@
 #pragma once
 #include <string>
 
-#include "formats/body.h"
-#include "formats/progress.h"
+#include "base/program/progress.h"
+#include "formats/lattice/body.h"
 
-namespace flexel {
+namespace flexel::commands {
 
 // The deformed part coloured by its displacement, with a legend and the part at rest in outline;
 // displacements that are too small to be seen are drawn larger, and it says so. `body` is lent to the
 // picture, unchanged after it.
 void write_bent_picture(Body& body, const std::string& path, Progress& progress);
 
-}  // namespace flexel
+}  // namespace flexel::commands

@@ -1,7 +1,7 @@
 // The commands of flexel. Each takes its own arguments (argv[0] is the command) and returns the exit code.
 #pragma once
 
-namespace flexel {
+namespace flexel::commands {
 
 int compare_command(int argc, char** argv);
 int deform_command(int argc, char** argv);
@@ -16,4 +16,4 @@ int study_command(int argc, char** argv);
 // not there.
 [[noreturn]] void run_stage_program(const char* name, char** argv);
 
-}  // namespace flexel
+}  // namespace flexel::commands

@@ -11,19 +11,22 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "base/error.h"
+#include "base/files/files.h"
+#include "base/human.h"
+#include "base/parallel.h"
+#include "base/program/termination.h"
+#include "base/units.h"
 #include "flexel/commands.h"
 #include "flexel/job.h"
-#include "formats/error.h"
-#include "formats/files.h"
-#include "formats/human.h"
-#include "formats/parallel.h"
-#include "formats/termination.h"
-#include "formats/topology.h"
-#include "formats/units.h"
+#include "formats/part/topology.h"
+#include "simulate/result/options.h"
+#include "simulate/result/result.h"
+#include "simulate/scene/strength.h"
 #include "simulate/simulate.h"
-#include "simulate/strength.h"
+#include "voxelize/voxelize.h"
 
-namespace flexel {
+namespace flexel::commands {
 namespace {
 
 constexpr double kRounding = 1e-6;
@@ -50,42 +53,43 @@ struct Finding {
   std::size_t cells = 0;
 };
 
-std::optional<ErrorBar> error_bar_of(const SimulateResult& result, ErrorBar::Of of) {
-  for (const ErrorBar& each : result.error_bars.bars)
+std::optional<simulate::ErrorBar> error_bar_of(const simulate::SimulateResult& result,
+                                               simulate::ErrorBar::Of of) {
+  for (const simulate::ErrorBar& each : result.error_bars.bars)
     if (each.of == of) return each;
   return std::nullopt;
 }
 
 // Of the loads, else what the moves take.
-double resultant(const SimulateResult& result, const Scene& scene, bool& driven) {
+double resultant(const simulate::SimulateResult& result, const simulate::Scene& scene, bool& driven) {
   Vec3 sum = Vec3::Zero();
-  for (const AppliedLoad& load : result.loads) sum += load.force;
+  for (const simulate::AppliedLoad& load : result.loads) sum += load.force;
   driven = false;
   bool turned = false;
-  for (const Tie& tie : scene.get<Ties>().ties) {
+  for (const simulate::Tie& tie : scene.get<simulate::Ties>().ties) {
     driven = driven || tie.is_move;
     turned = turned || (tie.is_move && tie.motion.angle != 0);
   }
   if (turned) return 0;  // a couple over an angle is no force over a displacement
   if (!driven) return sum.norm();
   sum.setZero();
-  for (const Tie& tie : scene.get<Ties>().ties)
-    for (const Reaction& reaction : result.reactions)
+  for (const simulate::Tie& tie : scene.get<simulate::Ties>().ties)
+    for (const simulate::Reaction& reaction : result.reactions)
       if (tie.is_move && reaction.name == tie.name) sum += reaction.force;
   return sum.norm();
 }
 
-void judge_stiffness(const SimulateResult& result, const Scene& scene, Finding& found) {
+void judge_stiffness(const simulate::SimulateResult& result, const simulate::Scene& scene, Finding& found) {
   bool driven = false;
   found.force = resultant(result, scene, driven);
   // What rounding leaves of a couple is no force.
   double moment = 0;
-  for (const AppliedLoad& load : result.loads) moment = std::max(moment, load.moment.norm());
+  for (const simulate::AppliedLoad& load : result.loads) moment = std::max(moment, load.moment.norm());
   if (!(found.force * found.size > kRounding * moment)) found.force = 0;
-  if (const auto bar = error_bar_of(result, ErrorBar::Of::largest_displacement))
+  if (const auto bar = error_bar_of(result, simulate::ErrorBar::Of::largest_displacement))
     found.bar = bar->bar.half_width;
-  const auto judge =
-      error_bar_of(result, driven ? ErrorBar::Of::elastic_energy : ErrorBar::Of::largest_displacement);
+  const auto judge = error_bar_of(
+      result, driven ? simulate::ErrorBar::Of::elastic_energy : simulate::ErrorBar::Of::largest_displacement);
   if (judge && judge->value != 0) found.share = judge->bar.half_width / std::abs(judge->value);
   if (!(found.force > 0 && found.displacement > 0)) return;
   found.stiffness = found.force / found.displacement;
@@ -94,7 +98,8 @@ void judge_stiffness(const SimulateResult& result, const Scene& scene, Finding& 
   if (*found.share < 1) found.most = *found.stiffness / (1 - *found.share);
 }
 
-void judge_stress(const SimulateResult& result, const Scene& scene, const Body& body, Finding& found) {
+void judge_stress(const simulate::SimulateResult& result, const simulate::Scene& scene, const Body& body,
+                  Finding& found) {
   if (!result.stress) return;
   found.stress = result.stress->value;
   std::vector<std::string> unknown;
@@ -118,12 +123,12 @@ Finding run_part(const CompareArguments& arguments, const std::string& file, std
     surface.parts[0].name = name;
   }
   check_parts(job, surface);
-  VoxelizeResult voxels = voxelize(std::move(surface), job.voxelize, progress);
+  voxelize::VoxelizeResult voxels = voxelize::voxelize(std::move(surface), job.voxelize, progress);
   Body& body = voxels.body;
   add_actions(job, body);
-  SimulateOptions options;
+  simulate::SimulateOptions options;
   options.threads = arguments.threads;
-  const SimulateResult result = simulate(body, job.scene, options, progress);
+  const simulate::SimulateResult result = simulate::simulate(body, job.scene, options, progress);
   Finding found;
   found.file = std::filesystem::path(file).filename().string();
   found.mass = result.mass;
@@ -318,4 +323,4 @@ int compare_command(int argc, char** argv) {
   return kExitDone;
 }
 
-}  // namespace flexel
+}  // namespace flexel::commands

@@ -4,28 +4,34 @@
 
 #include <nlohmann/json.hpp>
 
-#include "flexel/accuracy.h"
+#include "base/files/files.h"
+#include "base/files/outputs.h"
+#include "base/human.h"
+#include "base/parallel.h"
+#include "base/program/brief_output.h"
+#include "base/program/termination.h"
+#include "base/stop.h"
+#include "base/units.h"
+#include "flexel/accuracy/resolution_search.h"
 #include "flexel/bent_picture.h"
 #include "flexel/commands.h"
 #include "flexel/job.h"
-#include "formats/body_file.h"
-#include "formats/brief_output.h"
-#include "formats/files.h"
-#include "formats/human.h"
-#include "formats/outputs.h"
-#include "formats/parallel.h"
-#include "formats/stop.h"
-#include "formats/termination.h"
-#include "formats/units.h"
+#include "formats/exchange/part_files.h"
+#include "formats/lattice/body_file.h"
 #include "mapping/options.h"
 #include "mapping/output.h"
+#include "mapping/report/report.h"
 #include "simulate/answer.h"
-#include "simulate/infill.h"
+#include "simulate/input/infill.h"
+#include "simulate/result/options.h"
+#include "simulate/scene/strength.h"
 #include "simulate/simulate.h"
-#include "simulate/strength.h"
-#include "simulate/time/settling.h"
+#include "simulate/summary.h"
+#include "simulate/time/dynamic_relaxation.h"
+#include "voxelize/report.h"
+#include "voxelize/voxelize.h"
 
-namespace flexel {
+namespace flexel::commands {
 namespace {
 
 // Of the first run when a size is chosen: enough for most error bars, or for one that takes a tenth of a
@@ -38,7 +44,7 @@ struct DeformArguments {
   JobArguments job;
   std::vector<std::string> outputs;
   std::string summary, body, timeout, accuracy, within;
-  MapArguments map;
+  mapping::MapArguments map;
   int threads = 0;
   bool quiet = false, verbose = false, estimate = true;
 };
@@ -84,11 +90,11 @@ struct Plan {
   Job job;
   std::optional<double> timeout;     // s
   std::optional<AccuracyGoal> goal;  // of --accuracy and --within
-  MapOptions map;
-  CrackOptions crack;
+  mapping::MapOptions map;
+  mapping::CrackOptions crack;
   struct Output {
     std::string path;
-    std::optional<MapOutput> surface;  // nothing: the body, or its picture
+    std::optional<mapping::MapOutput> surface;  // nothing: the body, or its picture
     [[nodiscard]] bool is_picture() const { return extension(path) == "png"; }
   };
   std::vector<Output> outputs;
@@ -110,8 +116,8 @@ void plan_outputs(const DeformArguments& arguments, Plan& plan) {
       plan.outputs.push_back({path, std::nullopt});
     else
       plan.outputs.push_back(
-          {path, map_output(path == "-" ? arguments.map.format : "", path, arguments.map.ascii, 0,
-                            arguments.map.scale, arguments.map.attributes)});
+          {path, mapping::map_output(path == "-" ? arguments.map.format : "", path, arguments.map.ascii, 0,
+                                     arguments.map.scale, arguments.map.attributes)});
   if (!arguments.body.empty()) plan.outputs.push_back({arguments.body, std::nullopt});
   std::vector<OutputName> names;
   for (const Plan::Output& output : plan.outputs) names.push_back({output.path});
@@ -124,7 +130,7 @@ void plan_outputs(const DeformArguments& arguments, Plan& plan) {
 
 // Nothing is asked for: a size is chosen where error bars can judge it.
 void plan_usual_goal(const DeformArguments& arguments, Plan& plan) {
-  const Scene& scene = plan.job.scene;
+  const simulate::Scene& scene = plan.job.scene;
   if (plan.job.voxelize.size || plan.job.voxelize.count || !arguments.estimate ||
       plan.job.voxelize.placement != Placement::corner || scene.run.time || settles(scene) ||
       !arguments.timeout.empty())
@@ -154,12 +160,12 @@ void plan_goal(const DeformArguments& arguments, Plan& plan) {
     if (!(*plan.goal->error > 0 && *plan.goal->error < 1))
       throw InputError("--accuracy: must lie above 0 % and below 100 %");
   }
-  if (!arguments.within.empty()) plan.goal->within = parse_timeout(arguments.within, "--within");
+  if (!arguments.within.empty()) plan.goal->within = simulate::parse_timeout(arguments.within, "--within");
 }
 
 Plan make_plan(const DeformArguments& arguments) {
   Plan plan;
-  if (!arguments.timeout.empty()) plan.timeout = parse_timeout(arguments.timeout);
+  if (!arguments.timeout.empty()) plan.timeout = simulate::parse_timeout(arguments.timeout);
   plan.map = map_options(arguments.map);
   plan.crack = crack_options(arguments.map);
   plan_outputs(arguments, plan);
@@ -168,7 +174,7 @@ Plan make_plan(const DeformArguments& arguments) {
   return plan;
 }
 
-void write_outputs(const Plan& plan, Body& body, const MappedPart& mapped, Progress& progress) {
+void write_outputs(const Plan& plan, Body& body, const mapping::MappedPart& mapped, Progress& progress) {
   progress.stage("write");
   if (!plan.crack.pieces.empty())
     write_parts(mapped.surface(body), mapped.result.displacement, plan.crack.pieces_format,
@@ -182,8 +188,8 @@ void write_outputs(const Plan& plan, Body& body, const MappedPart& mapped, Progr
       write_body(body, output.path);
 }
 
-SimulateOptions simulate_options(const DeformArguments& arguments, const Plan& plan) {
-  SimulateOptions options;
+simulate::SimulateOptions simulate_options(const DeformArguments& arguments, const Plan& plan) {
+  simulate::SimulateOptions options;
   options.threads = arguments.threads;
   options.failed_output = failed_name(plan);
   options.estimate = arguments.estimate;
@@ -196,21 +202,21 @@ SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surf
                         AccuracyReport& accuracy, Progress& progress) {
   Progress quiet("flexel", Progress::Mode::quiet);
   HeldWarnings warnings;  // of runs that are only tried
-  for (const Tie& tie : plan.job.scene.get<Ties>().ties) plan.goal->driven |= tie.is_move;
+  for (const simulate::Tie& tie : plan.job.scene.get<simulate::Ties>().ties) plan.goal->driven |= tie.is_move;
   plan.goal->driven |= !plan.job.moves.empty() || !plan.job.twists.empty();
-  MapOptions mapping;
+  mapping::MapOptions mapping;
   mapping.method = plan.map.method;
   const auto solve = [&](std::optional<double> size, const GoesOn& goes_on) {
     SolvedRun run;
     progress.update(0, size ? "--size " + size_text(*size) : "");
     (void)warnings.take();
     run.size = size.value_or(0);
-    VoxelizeOptions options = plan.job.voxelize;
+    voxelize::VoxelizeOptions options = plan.job.voxelize;
     options.size = size;
     if (!size) options.count = plan.goal->within.value_or(kShort) < kShort ? kFewCells : kFirstCells;
     const double processor = processor_seconds();
     auto began = std::chrono::steady_clock::now();
-    run.voxels = voxelize(surface, options, quiet);
+    run.voxels = voxelize::voxelize(surface, options, quiet);
     run.voxelize_seconds = seconds_since(began);
     if (!size) return run;  // only its spacing is wanted
     if (!goes_on(run.voxels.body.cell_count())) {
@@ -219,7 +225,7 @@ SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surf
     }
     Job job = plan.job;  // anew for each body: an action that throws leaves none out
     add_actions(job, run.voxels.body);
-    run.simulated = simulate(run.voxels.body, job.scene, simulate_options(arguments, plan), quiet);
+    run.simulated = simulate::simulate(run.voxels.body, job.scene, simulate_options(arguments, plan), quiet);
     began = std::chrono::steady_clock::now();
     run.mapped = map_part(run.voxels.body, mapping, {}, quiet).result.displacement;
     run.map_seconds = seconds_since(began);
@@ -230,11 +236,11 @@ SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surf
   };
   SolvedRun run = choose_resolution(*plan.goal, solve, accuracy, progress);
   (void)warnings.take();
-  if (plan.goal->error && plan.map.method == MapMethod::blended) {
-    mapping.method = MapMethod::smooth;
-    const MapResult smooth = map_part(run.voxels.body, mapping, {}, quiet).result;
+  if (plan.goal->error && plan.map.method == mapping::MapMethod::blended) {
+    mapping.method = mapping::MapMethod::smooth;
+    const mapping::MapResult smooth = map_part(run.voxels.body, mapping, {}, quiet).result;
     if (mapping_difference(run.mapped, smooth.displacement) > 0.25 * *plan.goal->error)
-      plan.map.method = MapMethod::smooth;
+      plan.map.method = mapping::MapMethod::smooth;
   }
   accuracy.method = name_of(plan.map.method);
   return run;
@@ -258,11 +264,12 @@ SolvedRun solve(const DeformArguments& arguments, Plan& plan, std::optional<Accu
   SolvedRun run;
   {
     const StopEndsProcess at_once;
-    run.voxels = voxelize(std::move(surface), plan.job.voxelize, progress);
+    run.voxels = voxelize::voxelize(std::move(surface), plan.job.voxelize, progress);
   }
-  report(run.voxels, progress);
+  voxelize::report(run.voxels, progress);
   add_actions(plan.job, run.voxels.body);
-  run.simulated = simulate(run.voxels.body, plan.job.scene, simulate_options(arguments, plan), progress);
+  run.simulated =
+      simulate::simulate(run.voxels.body, plan.job.scene, simulate_options(arguments, plan), progress);
   return run;
 }
 
@@ -275,7 +282,7 @@ std::string next_step(const std::optional<AccuracyReport>& accuracy) {
     chosen_for +=
         fmt::format("{}within {}", chosen_for.empty() ? "" : " ", human_seconds(*accuracy->goal.within));
   const std::string method =
-      accuracy->method == name_of(MapMethod::blended) ? "" : " --method " + accuracy->method;
+      accuracy->method == name_of(mapping::MapMethod::blended) ? "" : " --method " + accuracy->method;
   const std::string repeat = fmt::format("--size {}{} repeats this run, chosen for {}",
                                          size_text(accuracy->runs.back().size), method, chosen_for);
   return accuracy->advice.empty() ? repeat : accuracy->advice + "; " + repeat;
@@ -292,7 +299,7 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
   }
   Body& body = run.voxels.body;
   for (const std::string& line : run.warnings) progress.warn(line);
-  MappedPart mapped;
+  mapping::MappedPart mapped;
   const StopEndsProcess at_once;
   {
     const BriefOutput brief(!arguments.verbose);
@@ -303,7 +310,7 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
     progress.finish();
     say_report(mapped.report, arguments.map, plan.map, progress);
   }
-  const MapReport& found = mapped.report;
+  const mapping::MapReport& found = mapped.report;
   std::vector<std::string> paths{arguments.map.report, arguments.summary};
   for (const Plan::Output& output : plan.outputs) paths.push_back(output.path);
   OutputsTogether outputs(std::move(paths));
@@ -325,14 +332,14 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
   }
   if (!arguments.summary.empty()) {
     nlohmann::ordered_json summary;
-    summary["voxelize"] = nlohmann::ordered_json::parse(summary_json(run.voxels));
-    summary["simulate"] = nlohmann::ordered_json::parse(summary_json(run.simulated, body));
-    summary["map"] = nlohmann::ordered_json::parse(report_json(found, plan.map));
+    summary["voxelize"] = nlohmann::ordered_json::parse(voxelize::summary_json(run.voxels));
+    summary["simulate"] = nlohmann::ordered_json::parse(simulate::summary_json(run.simulated, body));
+    summary["map"] = nlohmann::ordered_json::parse(mapping::report_json(found, plan.map));
     if (accuracy) summary["accuracy"] = nlohmann::ordered_json::parse(accuracy->json());
     write_text(summary.dump(2) + "\n", arguments.summary);
   }
   outputs.appear();
-  const std::vector<Material> materials = known_materials(plan.job.scene, body);
+  const std::vector<simulate::Material> materials = known_materials(plan.job.scene, body);
   if (accuracy || !arguments.verbose)  // else simulate() has said it
     for (std::size_t p = 0; p < materials.size(); ++p)
       if (const std::string line = infill_line(body.parts[p].name, materials[p]); !line.empty())
@@ -358,4 +365,4 @@ int deform_command(int argc, char** argv) {
   return run_stages(arguments, plan, progress);
 }
 
-}  // namespace flexel
+}  // namespace flexel::commands

@@ -4,18 +4,22 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "base/files/files.h"
+#include "base/files/outputs.h"
+#include "base/nearest_word.h"
+#include "base/parallel.h"
+#include "base/program/termination.h"
+#include "base/units.h"
+#include "base/version.h"
 #include "flexel/commands.h"
 #include "flexel/coordinates.h"
 #include "flexel/export/calculix_file.h"
 #include "flexel/job.h"
-#include "formats/files.h"
-#include "formats/outputs.h"
-#include "formats/parallel.h"
-#include "formats/termination.h"
-#include "formats/units.h"
-#include "simulate/fragments.h"
+#include "simulate/matter/fragments.h"
+#include "voxelize/report.h"
+#include "voxelize/voxelize.h"
 
-namespace flexel {
+namespace flexel::commands {
 namespace {
 
 constexpr double kTetrahedraAcross = 30;  // of the part's diagonal, without --size
@@ -37,7 +41,7 @@ void declare(CLI::App& app, ExportArguments& arguments) {
                  "hex: the lattice's cells; tet: second-order tetrahedra, by the program gmsh")
       ->type_name("KIND")
       ->capture_default_str();
-  app.add_option("--element", arguments.element, "Of hexahedra: C3D8I or C3D8")
+  app.add_option("--element", arguments.element, "Of mesh_export::hexahedra: C3D8I or C3D8")
       ->type_name("NAME")
       ->capture_default_str();
   app.add_option("--nlgeom", arguments.nlgeom, "Large deflections: on, off, or as a coarse run tells")
@@ -68,8 +72,8 @@ void check(const ExportArguments& arguments) {
   check_outputs({{arguments.output}, {arguments.summary}}, inputs, arguments.job.force);
 }
 
-Setting setting_of(const Body& body, const Scene& scene) {
-  const Fragments fragments = find_fragments(body);
+simulate::Problem problem_of(const Body& body, const simulate::Scene& scene) {
+  const simulate::Fragments fragments = simulate::find_fragments(body);
   return {body,
           materials_of_parts(scene, body),
           stray_cells(fragments),
@@ -80,13 +84,13 @@ Setting setting_of(const Body& body, const Scene& scene) {
           {}};
 }
 
-std::vector<std::string> head(const ExportArguments& arguments, const Analysis& analysis) {
+std::vector<std::string> head(const ExportArguments& arguments, const mesh_export::Analysis& analysis) {
   std::vector<std::string> lines;
   lines.push_back(fmt::format("CalculiX input by flexel {}: {}{}", version(),
                               fmt::join(arguments.job.parts, ", "),
                               arguments.job.scene.empty() ? "" : ", scene " + arguments.job.scene));
   for (const Part& part : analysis.mesh.body.parts)
-    if (analysis.mesh.kind == AnalysisMesh::Kind::hexahedra)
+    if (analysis.mesh.kind == mesh_export::AnalysisMesh::Kind::hexahedra)
       lines.push_back(fmt::format("part {}: {} of spacing {:.6g} x {:.6g} x {:.6g} mm", part.name,
                                   arguments.element, 1e3 * part.lattice.spacing.x(),
                                   1e3 * part.lattice.spacing.y(), 1e3 * part.lattice.spacing.z()));
@@ -97,22 +101,22 @@ std::vector<std::string> head(const ExportArguments& arguments, const Analysis& 
 
 using Json = nlohmann::ordered_json;
 
-std::string summary(const Analysis& analysis, const ExportArguments& arguments) {
-  const AnalysisMesh& mesh = analysis.mesh;
-  const CalculixNames names = calculix_names(analysis);
+std::string summary(const mesh_export::Analysis& analysis, const ExportArguments& arguments) {
+  const mesh_export::AnalysisMesh& mesh = analysis.mesh;
+  const mesh_export::CalculixNames names = calculix_names(analysis);
   const std::vector<double> volumes = section_volumes(mesh), areas = side_areas(mesh);
   const std::vector<std::uint8_t> used = used_nodes(mesh);
   Json json;
   json["program"] = "flexel export";
   json["version"] = version();
   json["file"] = arguments.output;
-  json["element"] = mesh.kind == AnalysisMesh::Kind::tetrahedra ? "C3D10" : arguments.element;
+  json["element"] = mesh.kind == mesh_export::AnalysisMesh::Kind::tetrahedra ? "C3D10" : arguments.element;
   json["nodes"] = std::count(used.begin(), used.end(), 1);
   json["elements"] = mesh.element_count();
   double mass = 0;
   json["sections"] = Json::array();
   for (std::size_t s = 0; s < mesh.sections.size(); ++s) {
-    const MeshSection& each = mesh.sections[s];
+    const mesh_export::MeshSection& each = mesh.sections[s];
     mass += volumes[s] * analysis.materials[each.part].density;
     json["sections"].push_back({{"part", mesh.body.parts[each.part].name},
                                 {"material", analysis.materials[each.part].name},
@@ -138,14 +142,14 @@ std::string summary(const Analysis& analysis, const ExportArguments& arguments) 
                                 {"nodes", analysis.supports[i].nodes.size()},
                                 {"equations", analysis.supports[i].equations.size()}});
   json["loads"] = Json::array();
-  for (const AnalysisLoad& load : analysis.loads)
+  for (const mesh_export::AnalysisLoad& load : analysis.loads)
     json["loads"].push_back({{"name", load.name},
                              {"kind", load.kind},
                              {"nodes", load.forces.size()},
                              {"force", coordinates(load.total)}});
   json["gravity"] = analysis.gravity ? Json(coordinates(*analysis.gravity)) : Json(nullptr);
   json["ties"] = Json::array();
-  for (const TiedFaces& tie : analysis.ties)
+  for (const mesh_export::TiedFaces& tie : analysis.ties)
     json["ties"].push_back({mesh.body.parts[tie.part[0]].name, mesh.body.parts[tie.part[1]].name});
   json["probes"] = Json::array();
   for (std::size_t i = 0; i < analysis.probes.size(); ++i) {
@@ -167,13 +171,13 @@ std::string summary(const Analysis& analysis, const ExportArguments& arguments) 
   return json.dump(2) + "\n";
 }
 
-void report(const Analysis& analysis, Progress& progress) {
-  const AnalysisMesh& mesh = analysis.mesh;
+void report(const mesh_export::Analysis& analysis, Progress& progress) {
+  const mesh_export::AnalysisMesh& mesh = analysis.mesh;
   const std::vector<std::uint8_t> used = used_nodes(mesh);
   progress.say(fmt::format(
       "{} {} on {} nodes, {} surfaces of CAD faces, {} support(s), {} load(s); {} deflection ({})",
       human_count(mesh.element_count()),
-      mesh.kind == AnalysisMesh::Kind::tetrahedra ? "tetrahedra" : "hexahedra",
+      mesh.kind == mesh_export::AnalysisMesh::Kind::tetrahedra ? "tetrahedra" : "hexahedra",
       human_count(static_cast<std::size_t>(std::count(used.begin(), used.end(), 1))),
       std::count_if(mesh.sides.begin(), mesh.sides.end(), [](const auto& each) { return !each.empty(); }),
       analysis.supports.size(), analysis.loads.size(), analysis.large_deflection ? "large" : "small",
@@ -187,37 +191,38 @@ void report(const Analysis& analysis, Progress& progress) {
 
 // Voxelised, or meshed by gmsh; the scene gets its pushes and moves, and is refused where it has no
 // translation.
-Analysis analyse(const ExportArguments& arguments, Job& job, const Surface& surface, Progress& progress) {
-  const std::vector<std::string> dropped = drop_models(job.scene);
-  Analysis analysis;
+mesh_export::Analysis analyse(const ExportArguments& arguments, Job& job, const Surface& surface,
+                              Progress& progress) {
+  const std::vector<std::string> dropped = mesh_export::drop_models(job.scene);
+  mesh_export::Analysis analysis;
   if (arguments.mesh == "hex") {
-    VoxelizeResult voxels = voxelize(surface, job.voxelize, progress);
-    report(voxels, progress);
+    voxelize::VoxelizeResult voxels = voxelize::voxelize(surface, job.voxelize, progress);
+    voxelize::report(voxels, progress);
     add_actions(job, voxels.body);
-    const Setting setting = setting_of(voxels.body, job.scene);
-    refuse_untranslatable(job.scene, setting);
+    const simulate::Problem problem = problem_of(voxels.body, job.scene);
+    mesh_export::refuse_untranslatable(job.scene, problem);
     progress.stage("translate");
-    analysis = translate(hexahedra(setting), job.scene, setting);
+    analysis = mesh_export::translate(mesh_export::hexahedra(problem), job.scene, problem);
   } else {
-    VoxelizeOptions look = job.voxelize;
+    voxelize::VoxelizeOptions look = job.voxelize;
     look.size.reset();
     look.count = kLookCells;
     Progress silent("", Progress::Mode::silent);
-    const Body body = voxelize(surface, look, silent).body;
+    const Body body = voxelize::voxelize(surface, look, silent).body;
     add_actions(job, body);
-    refuse_untranslatable(job.scene, setting_of(body, job.scene));
+    mesh_export::refuse_untranslatable(job.scene, problem_of(body, job.scene));
     progress.stage("gmsh");
-    TetrahedraOptions options;
+    mesh_export::TetrahedraOptions options;
     options.size = job.voxelize.size.value_or(bounding_box(surface.vertices).diagonal() / kTetrahedraAcross);
     options.threads = arguments.threads;
-    AnalysisMesh mesh = tetrahedra(arguments.job.parts, surface, options);
+    mesh_export::AnalysisMesh mesh = tetrahedra(arguments.job.parts, surface, options);
     if (const std::size_t folded = folded_tetrahedra(mesh); folded > 0)
       throw InputError(arguments.job.parts.front(),
                        fmt::format("gmsh's mesh folds in {} of {} tetrahedra; use a smaller --size",
                                    human_count(folded), human_count(mesh.element_count())));
     progress.stage("translate");
-    const Setting setting = setting_of(mesh.body, job.scene);
-    analysis = translate(std::move(mesh), job.scene, setting);
+    const simulate::Problem problem = problem_of(mesh.body, job.scene);
+    analysis = mesh_export::translate(std::move(mesh), job.scene, problem);
   }
   analysis.warnings.insert(analysis.warnings.end(), dropped.begin(), dropped.end());
   return analysis;
@@ -242,18 +247,18 @@ int export_command(int argc, char** argv) {
     job.import.largest_edge = std::numeric_limits<double>::infinity();
   const Surface surface = read_parts(arguments.job.parts, job.import, progress);
   check_parts(job, surface);
-  Analysis analysis = analyse(arguments, job, surface, progress);
+  mesh_export::Analysis analysis = analyse(arguments, job, surface, progress);
   if (arguments.nlgeom == "auto") {
     progress.stage("look at the deflection");
     analysis.large_deflection =
-        large_deflection(surface, job.scene, arguments.threads, analysis.why_deflection);
+        mesh_export::large_deflection(surface, job.scene, arguments.threads, analysis.why_deflection);
   } else {
     analysis.large_deflection = arguments.nlgeom == "on";
     analysis.why_deflection = "--nlgeom " + arguments.nlgeom;
   }
   progress.finish();
   report(analysis, progress);
-  CalculixOptions options;
+  mesh_export::CalculixOptions options;
   options.element = arguments.element;
   options.head = head(arguments, analysis);
   OutputsTogether outputs({arguments.output, arguments.summary});
@@ -263,4 +268,4 @@ int export_command(int argc, char** argv) {
   return kExitDone;
 }
 
-}  // namespace flexel
+}  // namespace flexel::commands

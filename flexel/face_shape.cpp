@@ -17,9 +17,9 @@
 #include <numeric>
 #include <span>
 
-#include "formats/area_vector.h"
+#include "base/math/area_vector.h"
 
-namespace flexel {
+namespace flexel::commands {
 namespace {
 
 const double kFlatCosine = std::cos(0.2 * M_PI / 180);
@@ -246,4 +246,4 @@ std::string describe(const FaceShape& shape, double unit, const std::string& uni
                      unit_name, shape.angle * 180 / M_PI, axis);
 }
 
-}  // namespace flexel
+}  // namespace flexel::commands

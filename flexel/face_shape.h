@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "formats/surface.h"
+#include "formats/part/surface.h"
 
-namespace flexel {
+namespace flexel::commands {
 
 struct FaceShape {
   enum class Kind { flat, round, curved };
@@ -39,4 +39,4 @@ struct FaceShape {
 // "+z", "-x", or "(0.71, 0, 0.71)".
 [[nodiscard]] std::string direction_name(const Vec3& direction);
 
-}  // namespace flexel
+}  // namespace flexel::commands

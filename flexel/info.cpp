@@ -5,23 +5,24 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "base/error.h"
+#include "base/human.h"
+#include "base/program/arguments.h"
+#include "base/program/progress.h"
+#include "base/program/termination.h"
+#include "base/units.h"
 #include "flexel/commands.h"
 #include "flexel/coordinates.h"
 #include "flexel/face_shape.h"
-#include "formats/human.h"
-#include "formats/import.h"
-#include "formats/program.h"
-#include "formats/progress.h"
-#include "formats/size_warning.h"
-#include "formats/surface_file.h"
-#include "formats/termination.h"
-#include "formats/topology.h"
-#include "formats/units.h"
-#include "voxelize/heal.h"
+#include "formats/exchange/import.h"
+#include "formats/exchange/size_warning.h"
+#include "formats/exchange/surface_file.h"
+#include "formats/part/topology.h"
+#include "voxelize/heal/heal.h"
 #include "voxelize/thickness.h"
 #include "voxelize/voxelize.h"
 
-namespace flexel {
+namespace flexel::commands {
 namespace {
 
 struct PartInfo {
@@ -30,7 +31,7 @@ struct PartInfo {
   Box box;
   double area = 0;    // m^2
   Topology topology;  // as in the file
-  MeasuredPart healed;
+  voxelize::MeasuredPart healed;
   std::vector<std::uint32_t> faces;  // indices into Surface::faces
   [[nodiscard]] bool closed() const { return topology.closed(); }
 };
@@ -64,7 +65,7 @@ Known look_at(Surface& surface) {
       }
     part.topology = topology(corners[p], welded);
   }
-  std::vector<MeasuredPart> healed = heal_and_measure(surface);
+  std::vector<voxelize::MeasuredPart> healed = voxelize::heal_and_measure(surface);
   for (std::size_t p = 0; p < parts.size(); ++p) parts[p].healed = std::move(healed[p]);
   known.shapes = face_shapes(surface);
   known.numbers = face_numbers(surface);
@@ -117,7 +118,7 @@ std::string part_text(const PartInfo& part, const Unit& unit) {
                       human_count(part.polygons), closedness(part));
   text += fmt::format("  area       {} {}^2\n", human_number(part.area / (unit.metres * unit.metres), 6),
                       unit.name);
-  const MeasuredPart& healed = part.healed;
+  const voxelize::MeasuredPart& healed = part.healed;
   if (healed.volume)
     text += fmt::format("  volume     {} {}^3\n", human_number(*healed.volume / std::pow(unit.metres, 3), 6),
                         unit.name);
@@ -215,7 +216,7 @@ Json part_json(const PartInfo& part) {
                {"non_manifold_edges", part.topology.non_manifold_edges},
                {"misoriented_edges", part.topology.misoriented_edges},
                {"degenerate_triangles", part.topology.degenerate_triangles}};
-  const std::optional<ThinWall>& thinnest = part.healed.thinnest;
+  const std::optional<voxelize::ThinWall>& thinnest = part.healed.thinnest;
   json["thinnest_wall"] =
       thinnest ? Json{{"thickness", thinnest->thickness}, {"where", coordinates(thinnest->where)}} : Json();
   return json;
@@ -249,7 +250,7 @@ std::string info_json(const Surface& surface, const Known& known) {
 // there is none.
 void write_thickness(Surface surface, const std::string& path) {
   const double unit = default_unit(surface);
-  std::vector<double> thickness = vertex_thickness(surface);
+  std::vector<double> thickness = voxelize::vertex_thickness(surface);
   for (double& value : thickness) value = std::isfinite(value) ? value / unit : 0;
   surface.vertex_columns["thickness"] = {1, std::move(thickness)};
   for (SurfaceSource& source : surface.sources)
@@ -300,4 +301,4 @@ int info_command(int argc, char** argv) {
   return kExitDone;
 }
 
-}  // namespace flexel
+}  // namespace flexel::commands

@@ -5,11 +5,11 @@
 
 #include <algorithm>
 
-#include "formats/error.h"
-#include "formats/size_warning.h"
-#include "formats/units.h"
+#include "base/error.h"
+#include "base/units.h"
+#include "formats/exchange/size_warning.h"
 
-namespace flexel {
+namespace flexel::commands {
 void declare_job(CLI::App& app, JobArguments& arguments) {
   app.add_option("part", arguments.parts, "STEP, IGES, BREP, STL, OBJ, PLY, OFF, glTF or 3MF files; -: stdin")
       ->required()
@@ -44,8 +44,8 @@ Job plan_job(const JobArguments& arguments) {
   }
   if (arguments.count && *arguments.count == 0) throw InputError("--count: must be above zero");
   job.voxelize.count = arguments.count;
-  job.voxelize.heal = heal_choice(arguments.heal);
-  job.voxelize.placement = placement_choice(arguments.placement);
+  job.voxelize.heal = voxelize::heal_choice(arguments.heal);
+  job.voxelize.placement = voxelize::placement_choice(arguments.placement);
   plan_scene(arguments, job);
   return job;
 }
@@ -60,4 +60,4 @@ Surface read_parts(const std::vector<std::string>& paths, const ImportOptions& o
   return surface;
 }
 
-}  // namespace flexel
+}  // namespace flexel::commands

@@ -5,13 +5,15 @@
 #include <string>
 #include <vector>
 
+#include "base/error.h"
+#include "base/program/arguments.h"
+#include "base/program/progress.h"
 #include "flexel/actions.h"
-#include "formats/import.h"
-#include "formats/program.h"
-#include "formats/progress.h"
-#include "voxelize/voxelize.h"
+#include "formats/exchange/import.h"
+#include "voxelize/types/options.h"
+#include "voxelize/types/result.h"
 
-namespace flexel {
+namespace flexel::commands {
 
 struct JobArguments {
   std::vector<std::string> parts, fixes, pushes, moves, torques, twists, bearings, probes, materials, infills;
@@ -29,8 +31,8 @@ void declare_job(CLI::App& app, JobArguments& arguments);
 // What they ask for, checked.
 struct Job {
   ImportOptions import;
-  VoxelizeOptions voxelize;
-  Scene scene;
+  voxelize::VoxelizeOptions voxelize;
+  simulate::Scene scene;
   // Not in the scene before the part is known: add_actions()
   std::vector<Action> pushes, moves, torques, twists;
   [[nodiscard]] bool acts_along_faces() const {
@@ -59,4 +61,4 @@ void check_parts(const Job& job, const Surface& surface);
 // Adds --push, --move, --torque and --twist to the scene; `body` gives the normals.
 void add_actions(Job& job, const Body& body);
 
-}  // namespace flexel
+}  // namespace flexel::commands

@@ -3,12 +3,13 @@
 
 #include <algorithm>
 
+#include "base/error.h"
+#include "base/nearest_word.h"
+#include "base/units.h"
 #include "flexel/job.h"
-#include "formats/error.h"
-#include "formats/units.h"
-#include "simulate/material_names.h"
+#include "simulate/input/material_names.h"
 
-namespace flexel {
+namespace flexel::commands {
 namespace {
 
 // "knob=PLA" is of part "knob", "PLA" of every part that has none of its own ("").
@@ -27,21 +28,23 @@ OfPart split_part(const std::string& text, const char* option, const char* examp
   return split;
 }
 
-PartSettings& settings_of(Scene& scene, const std::string& part, const char* option) {
-  PartSettings& settings = scene.parts[part];
+simulate::PartSettings& settings_of(simulate::Scene& scene, const std::string& part, const char* option) {
+  simulate::PartSettings& settings = scene.parts[part];
   if (settings.origin.empty()) settings.origin = option;
   return settings;
 }
 
 // A material must be known before the work begins.
-void plan_materials(const JobArguments& arguments, Scene& scene) {
+void plan_materials(const JobArguments& arguments, simulate::Scene& scene) {
   std::vector<std::string> known;
   for (const auto& [name, material] : scene.materials) known.push_back(name);
-  for (const Material& material : material_library()) known.push_back(material.name);
+  for (const simulate::Material& material : simulate::material_library()) known.push_back(material.name);
   for (const std::string& text : arguments.materials) {
     const OfPart given = split_part(text, "--material", "PLA");
-    const auto is_given = [&](const auto& own) { return same_material_name(own.first, given.value); };
-    if (!library_material(given.value) &&
+    const auto is_given = [&](const auto& own) {
+      return simulate::same_material_name(own.first, given.value);
+    };
+    if (!simulate::library_material(given.value) &&
         std::none_of(scene.materials.begin(), scene.materials.end(), is_given)) {
       const std::string hint = did_you_mean(given.value, known);
       throw InputError(
@@ -53,13 +56,14 @@ void plan_materials(const JobArguments& arguments, Scene& scene) {
   }
 }
 
-void plan_infill(const JobArguments& arguments, Scene& scene) {
+void plan_infill(const JobArguments& arguments, simulate::Scene& scene) {
   const std::optional<double> shell =
       arguments.shell.empty() ? std::nullopt
                               : std::optional<double>(parse_quantity(arguments.shell, Dimension::length));
   for (const std::string& text : arguments.infills) {
     const OfPart given = split_part(text, "--infill", "20%");
-    Infill& infill = given.part.empty() ? scene.infill : settings_of(scene, given.part, "--infill").infill;
+    simulate::Infill& infill =
+        given.part.empty() ? scene.infill : settings_of(scene, given.part, "--infill").infill;
     infill.share = parse_quantity(given.value, Dimension::share);
     if (shell) infill.shell = shell;
     check_infill(infill, "--infill");
@@ -109,7 +113,7 @@ void refuse_idle(const JobArguments& arguments) {
         "--twist, --bearing, --gravity or --scene FILE");
   if (arguments.materials.empty()) {
     std::vector<std::string> known;
-    for (const Material& material : material_library()) known.push_back(material.name);
+    for (const simulate::Material& material : simulate::material_library()) known.push_back(material.name);
     throw InputError(
         fmt::format("no material: add --material NAME; the library has {}", fmt::join(known, ", ")));
   }
@@ -119,7 +123,7 @@ void add_options(const JobArguments& arguments, Job& job) {
   plan_materials(arguments, job.scene);
   plan_infill(arguments, job.scene);
   for (const std::string& where : arguments.fixes)
-    job.scene.get<Ties>().ties.push_back(make_fix(parse_where(where, "--fix")));
+    job.scene.get<simulate::Ties>().ties.push_back(simulate::make_fix(simulate::parse_where(where, "--fix")));
   for (const std::string& text : arguments.pushes) job.pushes.push_back(parse_push(text));
   for (const std::string& text : arguments.moves) job.moves.push_back(parse_move(text));
   for (const std::string& text : arguments.torques) job.torques.push_back(parse_torque(text));
@@ -127,7 +131,7 @@ void add_options(const JobArguments& arguments, Job& job) {
   for (const std::string& text : arguments.bearings) add_bearing(job.scene, parse_bearing(text));
   for (const std::string& text : arguments.probes) job.scene.probes.push_back(parse_probe(text));
   if (arguments.gravity.empty()) return;
-  std::optional<Vec3>& acceleration = job.scene.get<Gravity>().acceleration;
+  std::optional<Vec3>& acceleration = job.scene.get<simulate::Gravity>().acceleration;
   if (acceleration)
     throw InputError(job.scene.name, "has [gravity] acceleration already: leave --gravity out");
   acceleration = parse_gravity(arguments.gravity);
@@ -138,7 +142,7 @@ void plan_scene(const JobArguments& arguments, Job& job) {
     job.scene.name = "the command line";
     refuse_idle(arguments);
   } else {
-    job.scene = read_scene(arguments.scene);
+    job.scene = simulate::read_scene(arguments.scene);
   }
   add_options(arguments, job);
 }
@@ -169,4 +173,4 @@ void add_actions(Job& job, const Body& body) {
   for (const Action& twist : job.twists) add_twist(job.scene, twist, body);
 }
 
-}  // namespace flexel
+}  // namespace flexel::commands

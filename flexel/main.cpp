@@ -3,11 +3,14 @@
 
 #include <string>
 
+#include "base/error.h"
+#include "base/files/files.h"
+#include "base/nearest_word.h"
+#include "base/program/program.h"
+#include "base/version.h"
 #include "flexel/commands.h"
-#include "formats/files.h"
-#include "formats/program.h"
 
-namespace flexel {
+namespace flexel::commands {
 namespace {
 
 constexpr const char* kHelp =
@@ -99,8 +102,8 @@ int run(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::commands
 
 int main(int argc, char** argv) {
-  return flexel::run_program("flexel", [&] { return flexel::run(argc, argv); });
+  return flexel::run_program("flexel", [&] { return flexel::commands::run(argc, argv); });
 }

@@ -6,17 +6,18 @@
 #include <filesystem>
 #include <memory>
 
+#include "base/error.h"
+#include "base/files/outputs.h"
+#include "base/parallel.h"
+#include "base/program/arguments.h"
+#include "base/program/termination.h"
+#include "base/units.h"
 #include "flexel/commands.h"
 #include "flexel/picture/picture.h"
-#include "formats/body_file.h"
-#include "formats/import.h"
-#include "formats/outputs.h"
-#include "formats/parallel.h"
-#include "formats/program.h"
-#include "formats/termination.h"
-#include "formats/units.h"
+#include "formats/exchange/import.h"
+#include "formats/lattice/body_file.h"
 
-namespace flexel {
+namespace flexel::commands {
 namespace {
 
 constexpr int kLargestSide = 16384, kSmallestSide = 64;
@@ -79,7 +80,7 @@ double number(const std::string& text, const std::string& option) {
   return value;
 }
 
-void parse_size(const std::string& text, PictureOptions& options) {
+void parse_size(const std::string& text, picture::PictureOptions& options) {
   int end = 0;
   if (std::sscanf(text.c_str(), "%5d%*1[xX]%5d%n", &options.width, &options.height, &end) != 2 ||
       static_cast<std::size_t>(end) != text.size())
@@ -93,14 +94,14 @@ void parse_size(const std::string& text, PictureOptions& options) {
     throw InputError(fmt::format("--size {}: at most {:g} million pixels", text, kMostPixels / 1e6));
 }
 
-PictureOptions options_of(const PictureArguments& a) {
-  PictureOptions options;
+picture::PictureOptions options_of(const PictureArguments& a) {
+  picture::PictureOptions options;
   parse_size(a.size, options);
-  options.view = parse_view(a.view);
-  options.up = a.up == "x" ? Up::x : a.up == "y" ? Up::y : Up::z;
+  options.view = picture::parse_view(a.view);
+  options.up = a.up == "x" ? picture::Up::x : a.up == "y" ? picture::Up::y : picture::Up::z;
   if (a.cells && a.elements) throw InputError("--cells and --elements exclude each other: give one of them");
-  if (a.cells) options.show = PictureOptions::Show::cells;
-  if (a.elements) options.show = PictureOptions::Show::elements;
+  if (a.cells) options.show = picture::PictureOptions::Show::cells;
+  if (a.elements) options.show = picture::PictureOptions::Show::elements;
   options.faces = a.faces;
   if (!a.colour.empty()) options.colour = a.colour;
   options.outline_at_rest = !a.no_outline;
@@ -160,9 +161,9 @@ class Input {
   std::unique_ptr<std::FILE, Close> spool_;
 };
 
-PictureSubject read_subject(const std::string& path, const ImportOptions& import) {
+picture::PictureSubject read_subject(const std::string& path, const ImportOptions& import) {
   const Input input(path);
-  PictureSubject subject;
+  picture::PictureSubject subject;
   subject.where = input.where();
   subject.label = path == "-" ? "stdin" : std::filesystem::path(path).filename().string();
   if (input.is_body())
@@ -187,7 +188,7 @@ int picture_command(int argc, char** argv) {
   const StopEndsProcess nothing_is_left;
   check_output(arguments.output);
   check_outputs({{arguments.output, true}}, arguments.files, arguments.force);
-  const PictureOptions options = options_of(arguments);
+  const picture::PictureOptions options = options_of(arguments);
   ImportOptions import;
   // Flat faces need no splitting to be drawn.
   import.largest_edge = std::numeric_limits<double>::infinity();
@@ -198,10 +199,10 @@ int picture_command(int argc, char** argv) {
   const ThreadLimit limit(arguments.threads);
   Progress progress("flexel", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
   progress.stage("read");
-  std::vector<PictureSubject> subjects;
+  std::vector<picture::PictureSubject> subjects;
   for (const std::string& file : arguments.files) subjects.push_back(read_subject(file, import));
   progress.stage("picture");
-  const PictureResult picture = draw_picture(subjects, options, progress);
+  const picture::PictureResult picture = draw_picture(subjects, options, progress);
   progress.finish();
   for (const std::string& note : picture.notes) progress.say(note);
   const Bytes bytes = encode_png(picture.image);
@@ -211,4 +212,4 @@ int picture_command(int argc, char** argv) {
   return kExitDone;
 }
 
-}  // namespace flexel
+}  // namespace flexel::commands

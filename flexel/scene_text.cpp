@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-namespace flexel {
+namespace flexel::commands {
 namespace {
 
 // A TOML string.
@@ -32,38 +32,38 @@ std::string direction_text(const Vec3& value) {
   return fmt::format("[{:.17g}, {:.17g}, {:.17g}]", value.x(), value.y(), value.z());
 }
 
-std::string where_text(const Selection& selection) {
+std::string where_text(const simulate::Selection& selection) {
   switch (selection.kind) {
-    case Selection::Kind::name:
+    case simulate::Selection::Kind::name:
       return quoted(selection.name);
-    case Selection::Kind::box:
+    case simulate::Selection::Kind::box:
       return fmt::format("{{ box = {{ min = {}, max = {} }} }}", vector(selection.min, "m"),
                          vector(selection.max, "m"));
-    case Selection::Kind::sphere:
+    case simulate::Selection::Kind::sphere:
       return fmt::format("{{ sphere = {{ centre = {}, radius = {} }} }}", vector(selection.point, "m"),
                          quantity(selection.radius, "m"));
-    case Selection::Kind::half_space:
+    case simulate::Selection::Kind::half_space:
       return fmt::format("{{ half_space = {{ point = {}, normal = {} }} }}", vector(selection.point, "m"),
                          direction_text(selection.normal));
-    case Selection::Kind::complement:
+    case simulate::Selection::Kind::complement:
       return fmt::format("{{ not = {} }}", where_text(selection.members.front()));
-    case Selection::Kind::any_of:
+    case simulate::Selection::Kind::any_of:
       break;
   }
   std::string members;
-  for (const Selection& member : selection.members)
+  for (const simulate::Selection& member : selection.members)
     members += (members.empty() ? "" : ", ") + where_text(member);
   return "[" + members + "]";
 }
 
-std::string infill_text(const Infill& infill) {
+std::string infill_text(const simulate::Infill& infill) {
   std::string text;
   if (infill.share) text += fmt::format("infill = {:.17g}\n", *infill.share);
   if (infill.shell) text += fmt::format("shell = {}\n", quantity(*infill.shell, "m"));
   return text;
 }
 
-std::string tie_text(const Tie& tie) {
+std::string tie_text(const simulate::Tie& tie) {
   std::string text = fmt::format("\n[[{}]]\nname = {}\nwhere = {}\n", tie.is_move ? "move" : "fix",
                                  quoted(tie.name), where_text(tie.where));
   if (!tie.is_move) return text;
@@ -74,7 +74,7 @@ std::string tie_text(const Tie& tie) {
                             quantity(tie.motion.angle, "rad"));
 }
 
-std::string load_text(const Load& load) {
+std::string load_text(const simulate::Load& load) {
   std::string text =
       fmt::format("\n[[load]]\nname = {}\nwhere = {}\n", quoted(load.name), where_text(load.where));
   if (load.force)
@@ -86,7 +86,7 @@ std::string load_text(const Load& load) {
 
 }  // namespace
 
-SceneText scene_text(const Scene& scene) {
+SceneText scene_text(const simulate::Scene& scene) {
   SceneText text;
   if (!scene.material.empty()) text.keys += fmt::format("material = {}\n", quoted(scene.material));
   text.keys += infill_text(scene.infill);
@@ -95,15 +95,15 @@ SceneText scene_text(const Scene& scene) {
     if (!part.material.empty()) text.tables += fmt::format("material = {}\n", quoted(part.material));
     text.tables += infill_text(part.infill);
   }
-  for (const Tie& tie : scene.get<Ties>().ties) text.tables += tie_text(tie);
-  for (const Load& load : scene.get<Loads>().loads) text.tables += load_text(load);
-  for (const Probe& probe : scene.probes)
+  for (const simulate::Tie& tie : scene.get<simulate::Ties>().ties) text.tables += tie_text(tie);
+  for (const simulate::Load& load : scene.get<simulate::Loads>().loads) text.tables += load_text(load);
+  for (const simulate::Probe& probe : scene.probes)
     text.tables +=
         fmt::format("\n[[probe]]\nname = {}\n{}\n", quoted(probe.name),
                     probe.at ? "at = " + vector(*probe.at, "m") : "where = " + where_text(*probe.where));
-  if (const std::optional<Vec3>& acceleration = scene.get<Gravity>().acceleration)
+  if (const std::optional<Vec3>& acceleration = scene.get<simulate::Gravity>().acceleration)
     text.tables += fmt::format("\n[gravity]\nacceleration = {}\n", vector(*acceleration, "m/s^2"));
   return text;
 }
 
-}  // namespace flexel
+}  // namespace flexel::commands

@@ -2,9 +2,9 @@
 #pragma once
 #include <string>
 
-#include "simulate/scene.h"
+#include "simulate/scene/scene.h"
 
-namespace flexel {
+namespace flexel::commands {
 
 struct SceneText {
   std::string keys;  // of the top level, which TOML takes before all tables
@@ -14,6 +14,6 @@ struct SceneText {
 // What options can add to a scene (flexel/job.h), in TOML and SI units: the default material and infill,
 // those of parts, fixes, moves, loads (a bearing load with its force), probes and the acceleration of
 // gravity. All else is left out.
-[[nodiscard]] SceneText scene_text(const Scene& scene);
+[[nodiscard]] SceneText scene_text(const simulate::Scene& scene);
 
-}  // namespace flexel
+}  // namespace flexel::commands

@@ -6,10 +6,10 @@
 #include <filesystem>
 #include <string>
 
+#include "base/error.h"
 #include "flexel/commands.h"
-#include "formats/error.h"
 
-namespace flexel {
+namespace flexel::commands {
 
 void run_stage_program(const char* name, char** argv) {
   std::error_code error;
@@ -22,4 +22,4 @@ void run_stage_program(const char* name, char** argv) {
                    "; the stage programs are installed beside flexel");
 }
 
-}  // namespace flexel
+}  // namespace flexel::commands

@@ -9,20 +9,23 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "base/error.h"
+#include "base/files/files.h"
+#include "base/nearest_word.h"
+#include "base/program/arguments.h"
+#include "base/program/progress.h"
+#include "base/program/termination.h"
+#include "base/units.h"
 #include "flexel/commands.h"
 #include "flexel/job.h"
 #include "flexel/scene_text.h"
 #include "flexel/study/scene_edit.h"
 #include "flexel/study/session.h"
-#include "formats/files.h"
-#include "formats/program.h"
-#include "formats/progress.h"
-#include "formats/termination.h"
-#include "formats/units.h"
-#include "simulate/scene.h"
+#include "simulate/scene/scene.h"
 #include "simulate/simulate.h"
+#include "voxelize/voxelize.h"
 
-namespace flexel {
+namespace flexel::commands {
 namespace {
 
 namespace fs = std::filesystem;
@@ -104,7 +107,7 @@ void add_references(const std::string& text, const study::SceneFacts& facts,
 }
 
 // What options ask for, as text around that of the scene's file, and the facts of both together.
-std::string whole_scene(const JobArguments& given, const Scene& file) {
+std::string whole_scene(const JobArguments& given, const simulate::Scene& file) {
   Job added;
   added.scene.materials = file.materials;  // for their names
   add_options(given, added);
@@ -113,8 +116,8 @@ std::string whole_scene(const JobArguments& given, const Scene& file) {
   };
   refuse_both(!file.material.empty() && !added.scene.material.empty(), "--material", "material");
   refuse_both(file.infill.share && added.scene.infill.share, "--infill", "infill");
-  refuse_both(file.get<Gravity>().acceleration && added.scene.get<Gravity>().acceleration, "--gravity",
-              "[gravity] acceleration");
+  refuse_both(file.get<simulate::Gravity>().acceleration && added.scene.get<simulate::Gravity>().acceleration,
+              "--gravity", "[gravity] acceleration");
   for (const auto& [name, part] : added.scene.parts)
     refuse_both(file.parts.count(name) > 0, part.origin.c_str(), fmt::format("[parts.\"{}\"]", name));
   if (added.acts_along_faces()) {
@@ -123,7 +126,7 @@ std::string whole_scene(const JobArguments& given, const Scene& file) {
     Progress silent("", Progress::Mode::silent);
     Body body;
     body.surface = read_parts(given.parts, import, silent);
-    (void)heal_and_measure(body.surface);  // outward, as every run of the study has it
+    (void)voxelize::heal_and_measure(body.surface);  // outward, as every run of the study has it
     body.parts.resize(body.surface.parts.size());
     for (std::size_t p = 0; p < body.parts.size(); ++p) body.parts[p].name = body.surface.parts[p].name;
     add_actions(added, body);
@@ -142,7 +145,7 @@ void make_folder(const std::string& output) {
 
 // The scene's file, or, where options add to it or stand for it, one to be written in the study's folder.
 void read_scenes(const StudyArguments& a, study::Case& study_case) {
-  const Scene file = a.job.scene.empty() ? Scene{} : read_scene(a.job.scene);
+  const simulate::Scene file = a.job.scene.empty() ? simulate::Scene{} : simulate::read_scene(a.job.scene);
   if (a.job.scene.empty()) refuse_idle(a.job);
   study_case.scene = a.job.scene;
   study_case.scene_text = whole_scene(a.job, file);
@@ -153,7 +156,8 @@ void read_scenes(const StudyArguments& a, study::Case& study_case) {
     throw InputError(a.job.scene, "is where the study writes its own scene: use another name");
   const fs::path folder = a.job.scene.empty() ? fs::current_path() : fs::absolute(a.job.scene).parent_path();
   study_case.scene_text = study::edited_scene(study_case.scene_text, study_case.scene, folder, {}, {});
-  (void)parse_scene(study_case.scene_text, study_case.scene);  // all that is wrong with it is said now
+  (void)simulate::parse_scene(study_case.scene_text,
+                              study_case.scene);  // all that is wrong with it is said now
 }
 
 study::Assignment assignment(const StudyArguments& a) {
@@ -179,7 +183,7 @@ study::Assignment assignment(const StudyArguments& a) {
     throw InputError(fmt::format("--against: no \"{}\"{}; known: calculix", a.against,
                                  did_you_mean(a.against, {"calculix"})));
   result.against_calculix = !a.against.empty();
-  result.budget = parse_timeout(a.budget, "--budget");
+  result.budget = simulate::parse_timeout(a.budget, "--budget");
   const study::SceneFacts facts = study::scene_facts(result.study_case.scene_text, result.study_case.scene);
   for (const std::string& text : a.references) add_references(text, facts, result.references);
   make_folder(a.output);
@@ -206,4 +210,4 @@ int study_command(int argc, char** argv) {
   return session.interrupted() ? kExitInterrupted : kExitDone;
 }
 
-}  // namespace flexel
+}  // namespace flexel::commands

@@ -2,23 +2,27 @@
 // bodies.
 #include <cmath>
 
-#include "formats/body_file.h"
-#include "formats/files.h"
-#include "formats/import.h"
-#include "formats/outputs.h"
-#include "formats/parallel.h"
-#include "formats/program.h"
-#include "formats/stop.h"
-#include "formats/termination.h"
-#include "formats/units.h"
-#include "mapping/binding_file.h"
-#include "mapping/crack.h"
-#include "mapping/foreign.h"
+#include "base/error.h"
+#include "base/files/files.h"
+#include "base/files/outputs.h"
+#include "base/parallel.h"
+#include "base/program/arguments.h"
+#include "base/program/program.h"
+#include "base/program/termination.h"
+#include "base/stop.h"
+#include "base/units.h"
+#include "formats/exchange/import.h"
+#include "formats/exchange/part_files.h"
+#include "formats/lattice/body_file.h"
+#include "mapping/anchors/other_surfaces.h"
+#include "mapping/map_part.h"
+#include "mapping/methods/binding_file.h"
 #include "mapping/options.h"
 #include "mapping/output.h"
+#include "mapping/report/report.h"
 #include "mapping/series.h"
 
-namespace flexel {
+namespace flexel::mapping {
 namespace {
 
 constexpr const char* kProgram = "flexel-map";
@@ -316,8 +320,8 @@ int run(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::mapping
 
 int main(int argc, char** argv) {
-  return flexel::run_program(flexel::kProgram, [&] { return flexel::run(argc, argv); });
+  return flexel::run_program(flexel::mapping::kProgram, [&] { return flexel::mapping::run(argc, argv); });
 }

@@ -5,10 +5,13 @@
 
 #include <filesystem>
 
-#include "formats/error.h"
-#include "formats/files.h"
+#include "base/error.h"
+#include "base/files/files.h"
+#include "base/nearest_word.h"
+#include "formats/exchange/part_files.h"
+#include "mapping/report/report.h"
 
-namespace flexel {
+namespace flexel::mapping {
 namespace {
 
 constexpr std::string_view kPlace = "{piece}";
@@ -109,4 +112,4 @@ void write_report(const MapReport& found, const MapArguments& arguments, const M
     throw InvalidMappingError(report_lines(found).front());
 }
 
-}  // namespace flexel
+}  // namespace flexel::mapping

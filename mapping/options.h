@@ -1,9 +1,10 @@
 // The command line's words for a mapping, the same in flexel-map and in flexel deform.
 #pragma once
-#include "formats/program.h"
-#include "mapping/crack.h"
+#include "base/error.h"
+#include "base/program/arguments.h"
+#include "mapping/map_part.h"
 
-namespace flexel {
+namespace flexel::mapping {
 
 struct MapArguments {
   std::string method;  // "": blended
@@ -27,4 +28,4 @@ void say_report(const MapReport& found, const MapArguments& arguments, const Map
 void write_report(const MapReport& found, const MapArguments& arguments, const MapOptions& options,
                   const std::string& path);
 
-}  // namespace flexel
+}  // namespace flexel::mapping

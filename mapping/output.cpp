@@ -6,10 +6,10 @@
 #include <cmath>
 #include <cstring>
 
-#include "formats/error.h"
-#include "mapping/attributes.h"
+#include "base/error.h"
+#include "mapping/report/attributes.h"
 
-namespace flexel {
+namespace flexel::mapping {
 namespace {
 
 // Puts `line` before the first line of a text file, or after its `skip` first lines.
@@ -83,4 +83,4 @@ void write_mapped(const Surface& surface, const Body& body, const MapResult& res
   write_surface(changed, displacement, *output.format, unit, output.path);
 }
 
-}  // namespace flexel
+}  // namespace flexel::mapping

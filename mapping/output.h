@@ -3,17 +3,18 @@
 #include <optional>
 #include <string>
 
-#include "formats/surface_file.h"
-#include "mapping/map.h"
+#include "formats/exchange/surface_file.h"
+#include "formats/lattice/body.h"
+#include "mapping/types/result.h"
 
-namespace flexel {
+namespace flexel::mapping {
 
 struct MapOutput {
   std::string path = "-";
   std::optional<SurfaceFormat> format;  // nothing: .vtu
   double unit = 0;                      // metres; 0: that of the surface
   double scale = 1;  // displacements are written this many times as large, which the file says where it can
-  bool attributes = false;  // what is known of each vertex (mapping/attributes.h), in PLY and .vtu
+  bool attributes = false;  // what is known of each vertex (mapping/report/attributes.h), in PLY and .vtu
 };
 
 // The output's format by `format` or the extension of `path`, ".vtu" too; throws InputError for one that
@@ -24,4 +25,4 @@ struct MapOutput {
 // `surface`: as it is to be written, the vertices that were mapped, in the same order.
 void write_mapped(const Surface& surface, const Body& body, const MapResult& result, const MapOutput& output);
 
-}  // namespace flexel
+}  // namespace flexel::mapping

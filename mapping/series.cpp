@@ -6,9 +6,9 @@
 #include <filesystem>
 #include <pugixml.hpp>
 
-#include "formats/error.h"
+#include "base/error.h"
 
-namespace flexel {
+namespace flexel::mapping {
 
 std::vector<std::string> series_files(const std::string& pvd) {
   const Bytes bytes = read_all(pvd);
@@ -43,4 +43,4 @@ bool same_lattice(const Body& a, const Body& b) {
          a.broken == b.broken && a.connections == b.connections;
 }
 
-}  // namespace flexel
+}  // namespace flexel::mapping

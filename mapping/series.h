@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
-#include "formats/body.h"
+#include "formats/lattice/body.h"
 
-namespace flexel {
+namespace flexel::mapping {
 
 // The frames' files, in order, with the folder of the .pvd. Throws InputError: unreadable, no collection, no
 // frame.
@@ -19,4 +19,4 @@ namespace flexel {
 // broken.
 [[nodiscard]] bool same_lattice(const Body& a, const Body& b);
 
-}  // namespace flexel
+}  // namespace flexel::mapping

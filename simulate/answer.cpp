@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "formats/human.h"
-#include "formats/units.h"
-#include "simulate/strength.h"
+#include "base/human.h"
+#include "base/units.h"
+#include "simulate/scene/strength.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 constexpr double kGuess = 0.5;     // a bar over this share of the value: hardly more than its size is known
@@ -111,7 +111,7 @@ std::optional<double> worst_share(const SimulateResult& result) {
   return worst;
 }
 
-// Why a bar is wide, of the note of simulate/error_bars.cpp.
+// Why a bar is wide, of the note of simulate/estimate/error_bars.cpp.
 std::string reason(const SimulateResult& result) {
   const std::string& note = result.error_bars.note;
   if (note.find("wall") != std::string::npos || note.find("one cell thick") != std::string::npos)
@@ -224,4 +224,4 @@ std::vector<std::string> answer_lines(const SimulateResult& result, const Body& 
   return lines;
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

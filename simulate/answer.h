@@ -4,10 +4,11 @@
 #include <string>
 #include <vector>
 
-#include "simulate/materials.h"
-#include "simulate/simulate.h"
+#include "formats/lattice/body.h"
+#include "simulate/input/materials.h"
+#include "simulate/result/result.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 // "how far", "how sure", "strength", "held by", "next" and one more for probes. `next` says what to do next,
 // "" for what this result suggests itself: cells of half the size, which `size_option` asks for. `body` is
@@ -16,4 +17,4 @@ namespace flexel {
     const SimulateResult& result, const Body& body, const std::vector<Material>& materials,
     const std::string& next = "", const std::string& size_option = "flexel-voxelize --size");
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -1,22 +1,28 @@
 // flexel-simulate: body + scene -> deformed body.
 #include <fmt/format.h>
 
-#include "formats/body_file.h"
-#include "formats/files.h"
-#include "formats/outputs.h"
-#include "formats/program.h"
-#include "formats/termination.h"
+#include "base/error.h"
+#include "base/files/files.h"
+#include "base/files/outputs.h"
+#include "base/program/arguments.h"
+#include "base/program/program.h"
+#include "base/program/termination.h"
+#include "formats/lattice/body_file.h"
+#include "formats/lattice/merge.h"
 #include "simulate/answer.h"
-#include "simulate/merge.h"
-#include "simulate/scene.h"
+#include "simulate/models/stress.h"
+#include "simulate/result/options.h"
+#include "simulate/result/result.h"
+#include "simulate/scene/scene.h"
+#include "simulate/scene/strength.h"
 #include "simulate/simulate.h"
-#include "simulate/strength.h"
-#include "simulate/stress.h"
+#include "simulate/summary.h"
 #include "simulate/time/checkpoint.h"
 
 namespace {
 
 using namespace flexel;
+using namespace flexel::simulate;
 
 struct Arguments {
   std::string scene;
@@ -208,7 +214,7 @@ int run(int argc, char** argv) {
   const bool series = extension(arguments.output) == "pvd";
   if (series) options.series = arguments.output;
   OutputsTogether outputs({series ? "" : arguments.output, options.history, arguments.summary});
-  const SimulateResult result = simulate(body, scene, options, progress);
+  const SimulateResult result = simulate::simulate(body, scene, options, progress);
   if (arguments.verbose || options.explain)
     for (const std::string& line : summary_lines(result)) progress.say(line);
   progress.stage("write");

@@ -1,5 +1,7 @@
 // The run: materials, loose crumbs, effects, the check for free motions, equilibrium, what is reported.
 #include "simulate/simulate.h"
+#include "simulate/result/options.h"
+#include "simulate/result/result.h"
 
 #include <fmt/format.h>
 
@@ -7,27 +9,27 @@
 #include <cmath>
 #include <numeric>
 
-#include "formats/body_file.h"
-#include "formats/error.h"
-#include "formats/parallel.h"
-#include "formats/stop.h"
-#include "formats/units.h"
-#include "simulate/coarsen.h"
-#include "simulate/equilibrium.h"
-#include "simulate/error_bars.h"
-#include "simulate/fragments.h"
-#include "simulate/probes.h"
-#include "simulate/report.h"
-#include "simulate/rest_shape.h"
-#include "simulate/scene.h"
-#include "simulate/scene_checks.h"
-#include "simulate/stress.h"
-#include "simulate/stress_singularity.h"
-#include "simulate/time/settling.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "base/stop.h"
+#include "base/units.h"
+#include "formats/lattice/body_file.h"
+#include "simulate/equilibrium/equilibrium.h"
+#include "simulate/estimate/coarsen.h"
+#include "simulate/estimate/error_bars.h"
+#include "simulate/estimate/stress_singularity.h"
+#include "simulate/matter/coplanar_elements.h"
+#include "simulate/matter/fragments.h"
+#include "simulate/models/rest_shape.h"
+#include "simulate/models/stress.h"
+#include "simulate/probes/probes.h"
+#include "simulate/probes/report.h"
+#include "simulate/scene/scene.h"
+#include "simulate/scene/scene_checks.h"
+#include "simulate/time/dynamic_relaxation.h"
 #include "simulate/time/timed_run.h"
-#include "simulate/unsupported.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 // Of a start from a coarser lattice
@@ -84,16 +86,16 @@ void explain_before(const std::vector<Pass>& passes, Progress& progress) {
   for (const Pass& pass : passes) progress.say(fmt::format("plan: {} ({})", pass.name, pass.why));
 }
 
-double mass_of(const Setting& setting) {
-  const std::vector<std::uint32_t> part = cell_parts(setting.body);
-  const std::vector<double> share = mass_shares(setting.body), factor = mass_factors(setting.body);
-  double mass = parallel_sum<double>(setting.body.cell_count(), [&](std::size_t c) {
-    return share[c] * setting.materials[part[c]].density * setting.body.parts[part[c]].lattice.spacing.prod();
+double mass_of(const Problem& problem) {
+  const std::vector<std::uint32_t> part = cell_parts(problem.body);
+  const std::vector<double> share = mass_shares(problem.body), factor = mass_factors(problem.body);
+  double mass = parallel_sum<double>(problem.body.cell_count(), [&](std::size_t c) {
+    return share[c] * problem.materials[part[c]].density * problem.body.parts[part[c]].lattice.spacing.prod();
   });
-  for (std::size_t p = 0; p < setting.body.parts.size(); ++p) {
-    const Part& each = setting.body.parts[p];
+  for (std::size_t p = 0; p < problem.body.parts.size(); ++p) {
+    const Part& each = problem.body.parts[p];
     if (each.placement != Placement::centre) continue;
-    const double whole = setting.materials[p].density * each.lattice.spacing.prod();
+    const double whole = problem.materials[p].density * each.lattice.spacing.prod();
     mass += factor.empty() ? (each.element_end - each.element_begin) * whole
                            : whole * std::accumulate(factor.begin() + each.element_begin,
                                                      factor.begin() + each.element_end, 0.0);
@@ -134,7 +136,7 @@ class Run {
         options_(options),
         progress_(progress),
         fragments_(find_fragments(body)),
-        setting_{body_,
+        problem_{body_,
                  materials_of_parts(scene, body),
                  stray_cells(fragments_),
                  models_of_parts(scene, body),
@@ -142,10 +144,10 @@ class Run {
                  stray_elements(fragments_, body),
                  {},
                  settled_displacement(body)} {
-    const std::vector<std::uint8_t> unsupported = unsupported_elements(setting_);
+    const std::vector<std::uint8_t> unsupported = unsupported_elements(problem_);
     for (std::size_t e = 0; e < unsupported.size(); ++e)
       if (unsupported[e]) {
-        setting_.stray_element[e] = 1;
+        problem_.stray_element[e] = 1;
         ++unsupported_;
       }
   }
@@ -162,7 +164,7 @@ class Run {
   const SimulateOptions& options_;
   Progress& progress_;
   Fragments fragments_;
-  Setting setting_;
+  Problem problem_;
   bool buckled_ = false;
   int start_newton_iterations_ = 0;
   std::size_t unsupported_ = 0;     // elements at tips and edges that springs do not hold
@@ -220,7 +222,7 @@ std::optional<std::vector<Vec3>> Run::coarse_equilibrium() {
 std::string Run::save_failed(const Mechanics& mechanics) {
   const StopWaits saving;
   if (options_.failed_output.empty()) return "";
-  carry_strays(fragments_, setting_, mechanics.stencil(), state_);
+  carry_strays(fragments_, problem_, mechanics.stencil(), state_);
   move_body(body_, state_);
   write_body(body_, options_.failed_output);
   return "; the last state in equilibrium is in " + options_.failed_output;
@@ -228,10 +230,10 @@ std::string Run::save_failed(const Mechanics& mechanics) {
 
 SimulateResult Run::operator()() {
   SimulateResult result;
-  report_materials(setting_, progress_);
-  name_materials(body_, setting_.materials);
-  const std::vector<ProbePoints> probes = place_probes(scene_, setting_);
-  std::vector<Pass> passes = Effects::passes(scene_.effects, setting_);
+  report_materials(problem_, progress_);
+  name_materials(body_, problem_.materials);
+  const std::vector<ProbePoints> probes = place_probes(scene_, problem_);
+  std::vector<Pass> passes = Effects::passes(scene_.effects, problem_);
   refuse_timed(passes, scene_.name);
   refuse_timed(options_, scene_.name);
   if (!anything_acts(scene_))
@@ -239,7 +241,7 @@ SimulateResult Run::operator()() {
   if (options_.explain) explain_before(passes, progress_);
   report_strays(fragments_, result, progress_);
   report_unsupported(unsupported_, result, progress_);
-  Mechanics mechanics(setting_, std::move(passes));
+  Mechanics mechanics(problem_, std::move(passes));
   state_.displacement = where_to_begin(body_);
   const EquilibriumResult solved = solve(mechanics);
   const StopWaits answered;  // what is found is told: the rest takes moments
@@ -249,16 +251,16 @@ SimulateResult Run::operator()() {
   result.elastic_energy = mechanics.elastic_energy(state_);
   result.smallest_jacobian = mechanics.most_compressed(state_).value;
   measure_corners(mechanics.cells(), body_, state_, result, progress_);
-  if (options_.stress) measure_stress(setting_, state_, body_, result);
+  if (options_.stress) measure_stress(problem_, state_, body_, result);
   if (options_.estimate && result.stress) {
     const auto part = std::find_if(body_.parts.begin(), body_.parts.end(),
                                    [&](const Part& each) { return each.name == result.stress->part; });
     const double reach = kBesideCells * part->lattice.spacing.maxCoeff();
     result.stress->beside = singular_beside(body_, tied_, result.stress->at, reach);
   }
-  carry_strays(fragments_, setting_, mechanics.stencil(), state_);
+  carry_strays(fragments_, problem_, mechanics.stencil(), state_);
   move_body(body_, state_);
-  if (scene_.run.renormalise) renormalise_all(body_, setting_, state_.displacement);
+  if (scene_.run.renormalise) renormalise_all(body_, problem_, state_.displacement);
   for (const ProbePoints& probe : probes) result.probes.push_back(measure(probe, state_));
   for (const AppliedLoad& load : result.loads) {
     result.imbalance += load.force;
@@ -269,7 +271,7 @@ SimulateResult Run::operator()() {
     result.moment_imbalance += reaction.moment;
   }
   measure_displacement(body_, state_, result);
-  result.mass = mass_of(setting_);
+  result.mass = mass_of(problem_);
   refuse_not_finite(result, scene_.name);
   result.load_steps = solved.load_steps;
   result.newton_iterations = solved.newton_iterations;
@@ -325,4 +327,4 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
   return result;
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

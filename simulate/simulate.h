@@ -1,142 +1,15 @@
 // Body + scene -> deformed body.
 #pragma once
-#include <Eigen/Geometry>
-#include <memory>
-#include <optional>
 #include <string>
-#include <vector>
 
-#include "formats/body.h"
-#include "formats/progress.h"
-#include "simulate/estimate.h"
+#include "base/program/progress.h"
+#include "formats/lattice/body.h"
+#include "simulate/result/options.h"
+#include "simulate/result/result.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
-struct Checkpoint;  // simulate/time/checkpoint.h
-struct Scene;       // simulate/scene.h
-
-struct ProbeResult {
-  std::string name;
-  Vec3 where = Vec3::Zero();         // m, rest position
-  Vec3 displacement = Vec3::Zero();  // m
-};
-
-struct Reaction {  // of one [[fix]] or [[move]]
-  std::string name;
-  Vec3 force = Vec3::Zero();   // N, by the support on the body
-  Vec3 moment = Vec3::Zero();  // N m, about the world's origin, where the body is now
-};
-
-struct AppliedLoad {  // of one [[load]], or of gravity
-  std::string name;
-  Vec3 force = Vec3::Zero();   // N, in total
-  Vec3 moment = Vec3::Zero();  // N m, about the world's origin, where the body is now
-  // Of a rigid link: how far its point went [m] and the rotation vector that the link turned by [rad]
-  std::optional<Vec3> displacement = {}, rotation = {};
-};
-
-// Adds a force at a place to a resultant and its moment about the origin.
-inline void add_at(const Vec3& force, const Vec3& place, Vec3& sum, Vec3& moment) {
-  sum += force;
-  moment += place.cross(force);
-}
-
-struct BondedParts {  // two parts that touch
-  std::array<std::string, 2> parts;
-  double area = 0;  // m^2, over which they do
-};
-
-struct PassShare {  // an effect that ran, why, and how long it took
-  std::string name, why;
-  double seconds = 0;
-};
-
-struct StressSummary {     // of the largest von Mises stress
-  double value = 0;        // Pa
-  Vec3 at = Vec3::Zero();  // m, rest position
-  std::string part;
-  std::optional<double> yield_share;  // of the part's material; nothing where it has no `yield`
-  std::string beside = {};  // why it grows without bound as cells get smaller (singular_beside()); "" if not
-};
-
-struct SettleSummary {  // of equilibrium with contact (simulate/time/settling.h)
-  std::uint64_t steps = 0;
-  double residual = 0;   // forces left over, relative to loads and reactions
-  double kinetic = 0;    // J, left over
-  double tolerance = 0;  // of both; that of the kinetic energy relative to its largest
-};
-
-struct LiveSummary {        // of a run with poses from stdin or --live (docs/live.md)
-  std::uint64_t poses = 0;  // that came in
-  bool poses_ended = false;
-  double rate = 0;  // 1/s, of frames; 0: none were written, and real time was not kept
-  std::uint64_t frames = 0, late = 0, missed = 0;
-  double behind = 0;                       // s, of real time that late frames let go
-  double jitter_squared = 0;               // s^2, sum over frames, of the time between two
-  double worst_jitter = 0;                 // s
-  std::uint64_t readers = 0, dropped = 0;  // that came; frames that one of them was too slow for
-};
-
-struct TimedSummary {  // of a run in time
-  double time = 0;     // s, reached
-  std::uint64_t steps = 0;
-  double step = 0;                                    // s, the last one
-  std::string isa;                                    // instruction set of the kernel
-  std::vector<std::pair<std::string, double>> books;  // J, by name; with a history only
-  std::optional<LiveSummary> live = {};
-};
-
-struct SimulateResult {
-  ErrorBars error_bars;  // at equilibrium
-  std::vector<ProbeResult> probes;
-  std::vector<Reaction> reactions;
-  std::vector<AppliedLoad> loads;
-  std::vector<BondedParts> bonds;
-  Vec3 imbalance = Vec3::Zero();         // N, sum of loads and reactions; 0 but for the tolerance
-  Vec3 moment_imbalance = Vec3::Zero();  // N m, likewise
-  std::vector<PassShare> passes;
-  std::size_t stray_cells = 0;      // in loose crumbs that were carried along, not simulated
-  double largest_displacement = 0;  // m, of the matter (formats/fields.h)
-  Vec3 largest_displacement_at = Vec3::Zero();
-  double elastic_energy = 0;     // J
-  double mass = 0;               // kg
-  double smallest_jacobian = 1;  // of all cells' mean gradients, and those around elements at centres
-  // of the trilinear map at the cells' corners; <= 0: folded there; nothing without cells
-  std::optional<double> smallest_corner_jacobian;
-  Vec3 smallest_corner_at = Vec3::Zero();  // m, rest position of that corner
-  std::optional<StressSummary> stress;     // nothing where no part has stresses, or they were not asked for
-  int load_steps = 0, newton_iterations = 0, cg_iterations = 0;
-  int start_newton_iterations = 0;  // the most on a coarser lattice that the run started from
-  double relative_residual = 0;
-  double seconds = 0;
-  std::optional<TimedSummary> timed;
-  std::optional<SettleSummary> settled;
-};
-
-struct SimulateOptions {
-  int threads = 0;                // 0: every core
-  std::string failed_output;      // where the last good state goes when the run fails; "" for nowhere
-  std::optional<double> timeout;  // s, after which the run stops
-  // Timed runs: where the books go (CSV), and the frames (.pvd); "" for nowhere. docs/motion.md
-  std::string history, series;
-  bool compress = false;  // the frames
-  // Timed runs: where checkpoints go ("" for nowhere), how many seconds of work lie between two, what the
-  // output is called, for them; and the one that the run goes on from, whose scene and body simulate() is
-  // given.
-  std::string checkpoint;
-  double checkpoint_every = 600;
-  std::string output;
-  std::shared_ptr<const Checkpoint> resume;
-  // Timed runs: where frames go at `live_rate` a second in real time, every `live_state`-th with the
-  // positions (0: none); "" for nowhere. docs/live.md
-  std::string live;
-  double live_rate = 100;
-  int live_state = 1;
-  std::string isa;       // "portable", "avx2", "avx512"; "" for the best that the machine has
-  bool stress = true;    // compute it, and give the body its columns
-  bool estimate = true;  // equilibrium: error bars, by two runs on coarser lattices
-  bool explain = false;  // say which effects run and why, and afterwards the share of time of each
-};
+struct Scene;  // simulate/scene/scene.h
 
 // Runs the scene on the body, which is moved to its new state. Throws InputError, DivergedError,
 // TimeoutError, Interrupted.
@@ -146,10 +19,4 @@ struct SimulateOptions {
 // "90 s", "5 min" in seconds, of `option`. Throws InputError: no time, or none above zero.
 [[nodiscard]] double parse_timeout(const std::string& text, const std::string& option = "--timeout");
 
-// The result as JSON (docs/summary.md gives every key and unit).
-[[nodiscard]] std::string summary_json(const SimulateResult& result, const Body& body);
-
-// The result in lines for people.
-[[nodiscard]] std::vector<std::string> summary_lines(const SimulateResult& result);
-
-}  // namespace flexel
+}  // namespace flexel::simulate

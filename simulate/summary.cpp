@@ -5,13 +5,15 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "formats/human.h"
-#include "formats/program.h"
-#include "formats/units.h"
-#include "simulate/report.h"
-#include "simulate/simulate.h"
+#include "base/error.h"
+#include "base/human.h"
+#include "base/units.h"
+#include "base/version.h"
+#include "simulate/probes/report.h"
+#include "simulate/result/result.h"
+#include "simulate/summary.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -316,4 +318,4 @@ std::vector<std::string> summary_lines(const SimulateResult& result) {
   return lines;
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -2,21 +2,24 @@
 #include <optional>
 #include <vector>
 
-#include "formats/body_file.h"
-#include "formats/error.h"
-#include "formats/files.h"
-#include "formats/import.h"
-#include "formats/outputs.h"
-#include "formats/parallel.h"
-#include "formats/program.h"
-#include "formats/progress.h"
-#include "formats/size_warning.h"
-#include "formats/termination.h"
-#include "formats/units.h"
-#include "voxelize/heal_vdb.h"
+#include "base/error.h"
+#include "base/files/files.h"
+#include "base/files/outputs.h"
+#include "base/nearest_word.h"
+#include "base/parallel.h"
+#include "base/program/arguments.h"
+#include "base/program/program.h"
+#include "base/program/progress.h"
+#include "base/program/termination.h"
+#include "base/units.h"
+#include "formats/exchange/import.h"
+#include "formats/exchange/size_warning.h"
+#include "formats/lattice/body_file.h"
+#include "voxelize/classify/sample_distances.h"
+#include "voxelize/report.h"
 #include "voxelize/voxelize.h"
 
-namespace flexel {
+namespace flexel::voxelize {
 namespace {
 
 constexpr const char* kName = "flexel-voxelize";
@@ -166,9 +169,9 @@ progress.finish();
 return kExitDone;
 }  // namespace
 
-}  // namespace flexel
-}  // namespace flexel
+}  // namespace flexel::voxelize
+}  // namespace flexel::voxelize
 
 int main(int argc, char** argv) {
-  return flexel::run_program(flexel::kName, [&] { return flexel::run(argc, argv); });
+  return flexel::run_program(flexel::voxelize::kName, [&] { return flexel::voxelize::run(argc, argv); });
 }

@@ -7,7 +7,7 @@
 #include <limits>
 #include <string>
 
-namespace flexel {
+namespace flexel::voxelize {
 
 double estimate_cells(const PartExtent& extent, double spacing, Placement placement) {
   const double inside = extent.volume / (spacing * spacing * spacing);
@@ -56,4 +56,4 @@ double available_memory() {
   return std::numeric_limits<double>::infinity();
 }
 
-}  // namespace flexel
+}  // namespace flexel::voxelize

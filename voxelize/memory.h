@@ -1,8 +1,8 @@
 // What the lattice and its simulation will need, before either is made.
 #pragma once
-#include "formats/body.h"
+#include "formats/lattice/body.h"
 
-namespace flexel {
+namespace flexel::voxelize {
 
 // Size of a part, for estimates.
 struct PartExtent {
@@ -33,4 +33,4 @@ struct PartExtent {
 // Bytes that can be used without swapping (MemAvailable); infinite where the system does not say.
 [[nodiscard]] double available_memory();
 
-}  // namespace flexel
+}  // namespace flexel::voxelize

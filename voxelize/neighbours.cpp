@@ -9,11 +9,10 @@
 #include <cmath>
 #include <limits>
 
-#include "formats/error.h"
-#include "formats/program.h"
-#include "voxelize/lines.h"
+#include "base/error.h"
+#include "voxelize/mesh/line_crossings.h"
 
-namespace flexel {
+namespace flexel::voxelize {
 namespace {
 
 constexpr int kLinesAcross = 64;                         // across the common box, in each direction
@@ -164,4 +163,4 @@ void refuse_duplicates(const std::vector<PartPair>& pairs, const Surface& surfac
                   names, count == 1 ? "" : ", pair by pair", count == 1 ? "them" : "each pair"));
 }
 
-}  // namespace flexel
+}  // namespace flexel::voxelize

@@ -3,9 +3,9 @@
 #include <array>
 #include <vector>
 
-#include "voxelize/heal.h"
+#include "voxelize/heal/heal.h"
 
-namespace flexel {
+namespace flexel::voxelize {
 
 // Pairs of parts that lie in each other, or nearer to each other than a cell without touching. The parts, in
 // world coordinates, are compared along lines through the box that a pair has in common, so volumes are those
@@ -19,4 +19,4 @@ namespace flexel {
 // Throws InputError where two parts are the same body in the same place.
 void refuse_duplicates(const std::vector<PartPair>& pairs, const Surface& surface);
 
-}  // namespace flexel
+}  // namespace flexel::voxelize

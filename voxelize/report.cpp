@@ -2,13 +2,14 @@
 #include <fmt/format.h>
 #include <cmath>
 
-#include "formats/human.h"
-#include "formats/units.h"
-#include "voxelize/heal.h"
+#include "base/human.h"
+#include "base/units.h"
+#include "voxelize/heal/heal.h"
 #include "voxelize/report_assembly.h"
-#include "voxelize/voxelize.h"
+#include "voxelize/types/options.h"
+#include "voxelize/types/result.h"
 
-namespace flexel {
+namespace flexel::voxelize {
 namespace {
 
 std::string spacing_text(const Vec3& spacing) {
@@ -110,4 +111,4 @@ void report(const VoxelizeResult& result, Progress& progress) {
   progress.say(fmt::format("simulating this needs about {}", human_bytes(result.simulation_memory)));
 }
 
-}  // namespace flexel
+}  // namespace flexel::voxelize

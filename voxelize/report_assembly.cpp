@@ -7,10 +7,10 @@
 #include <cmath>
 #include <functional>
 
-#include "formats/units.h"
-#include "voxelize/heal.h"
+#include "base/units.h"
+#include "voxelize/heal/heal.h"
 
-namespace flexel {
+namespace flexel::voxelize {
 namespace {
 
 using Has = std::function<bool(const VoxelizedPart&)>;
@@ -201,4 +201,4 @@ void report_pairs(const VoxelizeResult& result, Progress& progress) {
   say_gaps(result, progress);
 }
 
-}  // namespace flexel
+}  // namespace flexel::voxelize

@@ -1,9 +1,10 @@
 // What is said of assemblies: a line a finding, not a line a part.
 #pragma once
-#include "formats/progress.h"
-#include "voxelize/voxelize.h"
+#include "base/program/progress.h"
+#include "voxelize/types/options.h"
+#include "voxelize/types/result.h"
 
-namespace flexel {
+namespace flexel::voxelize {
 
 // Totals over the parts, and of what is wrong how many parts have it and the worst of them. All that is known
 // of each part is in the summary (docs/voxelize.md).
@@ -12,4 +13,4 @@ void report_together(const VoxelizeResult& result, Progress& progress);
 // Parts that overlap, and parts that miss each other.
 void report_pairs(const VoxelizeResult& result, Progress& progress);
 
-}  // namespace flexel
+}  // namespace flexel::voxelize

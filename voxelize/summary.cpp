@@ -1,9 +1,9 @@
 // What was found in every part, for programs to read.
 #include <nlohmann/json.hpp>
 
-#include "voxelize/voxelize.h"
+#include "voxelize/report.h"
 
-namespace flexel {
+namespace flexel::voxelize {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -63,4 +63,4 @@ std::string summary_json(const VoxelizeResult& result) {
   return Json{{"parts", parts}, {"overlaps", overlaps}, {"gaps", gaps}}.dump(2) + "\n";
 }
 
-}  // namespace flexel
+}  // namespace flexel::voxelize

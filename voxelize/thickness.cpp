@@ -8,10 +8,10 @@
 #include <limits>
 #include <map>
 
-#include "voxelize/heal.h"
-#include "voxelize/heal_cgal.h"
+#include "voxelize/heal/heal.h"
+#include "voxelize/heal/heal_cgal.h"
 
-namespace flexel {
+namespace flexel::voxelize {
 namespace {
 
 constexpr double kInside = .05;     // of the way from the corner to the triangle's centroid
@@ -67,4 +67,4 @@ std::vector<double> vertex_thickness(const Surface& surface) {
   return thickness;
 }
 
-}  // namespace flexel
+}  // namespace flexel::voxelize

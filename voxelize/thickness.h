@@ -2,9 +2,9 @@
 #pragma once
 #include <vector>
 
-#include "formats/surface.h"
+#include "formats/part/surface.h"
 
-namespace flexel {
+namespace flexel::voxelize {
 
 // Wall thickness [m] at every vertex (vertices): the least of the ways, along the inward normals of the
 // triangles at the vertex, to where matter ends; exact for the triangles as they are. A way counts where it
@@ -13,4 +13,4 @@ namespace flexel {
 // as `--heal auto` does; NaN where a vertex is in no triangle or every way misses.
 [[nodiscard]] std::vector<double> vertex_thickness(const Surface& surface);
 
-}  // namespace flexel
+}  // namespace flexel::voxelize

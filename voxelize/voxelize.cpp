@@ -7,26 +7,26 @@
 #include <cmath>
 #include <limits>
 
-#include "formats/error.h"
-#include "formats/program.h"
-#include "formats/resolution.h"
-#include "formats/stop.h"
-#include "formats/units.h"
-#include "voxelize/align.h"
-#include "voxelize/assemble.h"
-#include "voxelize/classify.h"
-#include "voxelize/heal.h"
-#include "voxelize/judge.h"
+#include "base/error.h"
+#include "base/nearest_word.h"
+#include "base/stop.h"
+#include "base/units.h"
+#include "formats/exchange/resolution.h"
+#include "voxelize/classify/assign_polygons.h"
+#include "voxelize/classify/axis_parity.h"
+#include "voxelize/classify/classify.h"
+#include "voxelize/classify/inside_consensus.h"
+#include "voxelize/classify/overlap.h"
+#include "voxelize/heal/heal.h"
+#include "voxelize/heal/outward.h"
+#include "voxelize/lattice/align.h"
+#include "voxelize/lattice/assemble.h"
 #include "voxelize/memory.h"
+#include "voxelize/mesh/part_mesh.h"
 #include "voxelize/neighbours.h"
-#include "voxelize/outward.h"
-#include "voxelize/overlap.h"
-#include "voxelize/part_mesh.h"
-#include "voxelize/trace.h"
-#include "voxelize/vote.h"
 #include "voxelize/walls.h"
 
-namespace flexel {
+namespace flexel::voxelize {
 namespace {
 
 constexpr std::size_t kDefaultCount = 20000;
@@ -339,4 +339,4 @@ VoxelizeResult voxelize(Surface surface, const VoxelizeOptions& options, Progres
   return result;
 }
 
-}  // namespace flexel
+}  // namespace flexel::voxelize

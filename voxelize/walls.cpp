@@ -6,13 +6,13 @@
 #include <cmath>
 #include <limits>
 
-#include "voxelize/heal.h"
-#include "voxelize/lines.h"
-#include "voxelize/outward.h"
-#include "voxelize/overlap.h"
+#include "voxelize/classify/overlap.h"
+#include "voxelize/heal/heal.h"
+#include "voxelize/heal/outward.h"
+#include "voxelize/mesh/line_crossings.h"
 #include "voxelize/voxelize.h"
 
-namespace flexel {
+namespace flexel::voxelize {
 namespace {
 
 void add_samples(const PartMesh& mesh, const LineGrid& grid, double negligible,
@@ -90,4 +90,4 @@ std::vector<MeasuredPart> heal_and_measure(Surface& surface, int rays) {
   return result;
 }
 
-}  // namespace flexel
+}  // namespace flexel::voxelize

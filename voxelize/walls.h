@@ -1,8 +1,8 @@
 // How thick the walls of a part are, where lines through it tell.
 #pragma once
-#include "voxelize/part_mesh.h"
+#include "voxelize/mesh/part_mesh.h"
 
-namespace flexel {
+namespace flexel::voxelize {
 
 struct WallSample {
   double thickness = 0;       // m
@@ -22,4 +22,4 @@ struct WallSample {
 // Index of the thinnest sample; samples is not empty.
 [[nodiscard]] std::size_t thinnest_sample(const std::vector<WallSample>& samples);
 
-}  // namespace flexel
+}  // namespace flexel::voxelize

@@ -10,6 +10,7 @@
 namespace {
 
 using namespace flexel;
+using namespace flexel::simulate;
 
 struct Row {
   const char* name;

@@ -14,8 +14,8 @@ namespace {
 using namespace flexel;
 
 struct Found {
-  ErrorBar bar;
-  ErrorBars all;
+  simulate::ErrorBar bar;
+  simulate::ErrorBars all;
   double seconds = 0;
   double reference = 0;
 };
@@ -26,8 +26,8 @@ struct Case {
 };
 
 // The bar of the first probe.
-Found solve(Body& body, const Scene& scene, double reference) {
-  const SimulateResult result = testing::simulate_quietly(body, scene);
+Found solve(Body& body, const simulate::Scene& scene, double reference) {
+  const simulate::SimulateResult result = simulate::testing::simulate_quietly(body, scene);
   Found found;
   found.all = result.error_bars;
   found.seconds = result.seconds;
@@ -36,55 +36,57 @@ Found solve(Body& body, const Scene& scene, double reference) {
   return found;
 }
 
-void probe_at(Scene& scene, Selection where) {
-  Probe probe;
+void probe_at(simulate::Scene& scene, simulate::Selection where) {
+  simulate::Probe probe;
   probe.name = "asked";
   probe.where = std::move(where);
   scene.probes.push_back(probe);
 }
 
-Scene loaded_end(Scene scene, const Selection& end, const Vec3& force) {
-  scene.get<Loads>().loads.push_back(make_push(end, force));
+simulate::Scene loaded_end(simulate::Scene scene, const simulate::Selection& end, const Vec3& force) {
+  scene.get<simulate::Loads>().loads.push_back(make_push(end, force));
   probe_at(scene, end);
   return scene;
 }
 
 Found study_beam(int n) {
-  Body body = testing::corner_beam(n);
+  Body body = simulate::testing::corner_beam(n);
   return solve(
       body,
-      loaded_end(testing::held_beam("cells"), select_by_name("box/x1"), Vec3(0, 0, testing::kStudyForce)),
-      testing::study_reference(testing::study_width(n)) * testing::kStudyForce);
+      loaded_end(simulate::testing::held_beam("cells"), simulate::select_by_name("box/x1"),
+                 Vec3(0, 0, simulate::testing::kStudyForce)),
+      simulate::testing::study_reference(simulate::testing::study_width(n)) * simulate::testing::kStudyForce);
 }
 
 // The beam of tests/simulate/beam_test.cpp, with Poisson's ratio 0.3, held by its face and pushed across its
 // width.
 Found wide_beam(int n) {
-  testing::BoxOptions options;
+  simulate::testing::BoxOptions options;
   options.cells = {4 * n, static_cast<int>(std::lround(1.4 * n)), n};
   options.spacing = Vec3(2.0 / options.cells[0], 0.7 / options.cells[1], 0.5 / options.cells[2]);
-  Body body = testing::box_body(options);
-  Scene scene;
-  scene.materials["gum"] = {"gum", testing::kStudyYoung, 0.3, 580, "test"};
+  Body body = simulate::testing::box_body(options);
+  simulate::Scene scene;
+  scene.materials["gum"] = {"gum", simulate::testing::kStudyYoung, 0.3, 580, "test"};
   scene.material = "gum";
-  scene.get<Ties>().ties.push_back(make_fix(select_by_name("xmin")));
-  return solve(body, loaded_end(scene, select_by_name("box/x1"), Vec3(0, 1e-3, 0)), 1.65964e-4 * 1e-3);
+  scene.get<simulate::Ties>().ties.push_back(simulate::make_fix(simulate::select_by_name("xmin")));
+  return solve(body, loaded_end(scene, simulate::select_by_name("box/x1"), Vec3(0, 1e-3, 0)),
+               1.65964e-4 * 1e-3);
 }
 
 // A bar drawn, its cells three across: F L / (E A) but for the ties, which yield by h / 300.
 Found drawn_bar(int n) {
-  Body body = testing::box_body({.cells = {4 * n, n, n}, .spacing = Vec3::Constant(1.0 / n)});
-  Scene scene;
+  Body body = simulate::testing::box_body({.cells = {4 * n, n, n}, .spacing = Vec3::Constant(1.0 / n)});
+  simulate::Scene scene;
   scene.materials["gum"] = {"gum", 1e6, 0.3, 1000, "test"};
   scene.material = "gum";
   for (const auto& [side, axis] : {std::pair{"xmin", 0}, {"ymin", 1}, {"zmin", 2}}) {
-    Tie tie = make_fix(select_by_name(side));
+    simulate::Tie tie = simulate::make_fix(simulate::select_by_name(side));
     tie.axes = {axis == 0, axis == 1, axis == 2};
-    scene.get<Ties>().ties.push_back(tie);
+    scene.get<simulate::Ties>().ties.push_back(tie);
   }
   // The mean over the end also draws in by nu F / E on either side of y = z = 0.
   const double drawn = 4 * 10 / 1e6, drawn_in = 0.3 * 10 / 1e6 / 2;
-  return solve(body, loaded_end(scene, select_by_name("xmax"), Vec3(10, 0, 0)),
+  return solve(body, loaded_end(scene, simulate::select_by_name("xmax"), Vec3(10, 0, 0)),
                std::hypot(drawn, drawn_in, drawn_in));
 }
 
@@ -108,12 +110,12 @@ struct Mesh {
   }
 };
 
-Body voxels(Surface surface, double spacing, Align align) {
+Body voxels(Surface surface, double spacing, voxelize::Align align) {
   Progress progress("bench", Progress::Mode::silent);
-  VoxelizeOptions options;
+  voxelize::VoxelizeOptions options;
   options.size = spacing;
   options.align = align;
-  return voxelize(std::move(surface), options, progress).body;
+  return voxelize::voxelize(std::move(surface), options, progress).body;
 }
 
 // 2 x 0.5 x 0.5 m, turned by 30 degrees about two axes against the lattice.
@@ -129,13 +131,13 @@ Found turned_beam(int n) {
     mesh.face(fmt::format("f{}", f));
     mesh.quad(quads[f][0], quads[f][1], quads[f][2], quads[f][3]);
   }
-  Body body = voxels(mesh.surface, 0.5 / n, Align::none);
-  Scene scene;
-  scene.materials["gum"] = {"gum", testing::kStudyYoung, 0.25, 580, "test"};
+  Body body = voxels(mesh.surface, 0.5 / n, voxelize::Align::none);
+  simulate::Scene scene;
+  scene.materials["gum"] = {"gum", simulate::testing::kStudyYoung, 0.25, 580, "test"};
   scene.material = "gum";
-  scene.get<Ties>().ties.push_back(make_fix(select_by_name("part/f0")));
-  return solve(body, loaded_end(scene, select_by_name("part/f1"), turn * Vec3(0, 0, 1e-3)),
-               testing::study_reference(0.5) * 1e-3);
+  scene.get<simulate::Ties>().ties.push_back(simulate::make_fix(simulate::select_by_name("part/f0")));
+  return solve(body, loaded_end(scene, simulate::select_by_name("part/f1"), turn * Vec3(0, 0, 1e-3)),
+               simulate::testing::study_reference(0.5) * 1e-3);
 }
 
 // A quarter of a thick tube under inner pressure, in plane strain (Lame). Mean displacement of the inner
@@ -166,18 +168,19 @@ Found ring(double spacing) {
   mesh.quad(at(0, 0, 0), at(0, 0, 1), at(0, 1, 1), at(0, 1, 0));
   mesh.face("across");
   mesh.quad(at(kSteps, 0, 0), at(kSteps, 1, 0), at(kSteps, 1, 1), at(kSteps, 0, 1));
-  Body body = voxels(mesh.surface, spacing, Align::none);
-  Scene scene;
+  Body body = voxels(mesh.surface, spacing, voxelize::Align::none);
+  simulate::Scene scene;
   scene.materials["metal"] = {"metal", kYoung, kPoisson, 7850, "test"};
   scene.material = "metal";
   for (const auto& [face, axis] :
        {std::pair{"part/along", 1}, {"part/across", 0}, {"part/low", 2}, {"part/high", 2}}) {
-    Tie tie = make_fix(select_by_name(face));
+    simulate::Tie tie = simulate::make_fix(simulate::select_by_name(face));
     tie.axes = {axis == 0, axis == 1, axis == 2};
-    scene.get<Ties>().ties.push_back(tie);
+    scene.get<simulate::Ties>().ties.push_back(tie);
   }
-  scene.get<Loads>().loads.push_back(make_pressure(select_by_name("part/inner"), kPressure));
-  probe_at(scene, select_by_name("part/inner"));
+  scene.get<simulate::Loads>().loads.push_back(
+      simulate::make_pressure(simulate::select_by_name("part/inner"), kPressure));
+  probe_at(scene, simulate::select_by_name("part/inner"));
   const double a2 = kInner * kInner, b2 = kOuter * kOuter;
   const double radial =
       (1 + kPoisson) * kPressure * a2 / (kYoung * (b2 - a2)) * ((1 - 2 * kPoisson) * kInner + b2 / kInner);

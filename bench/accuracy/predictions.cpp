@@ -4,7 +4,7 @@
 //
 //     build/release/bin/predictions PART SCENE.toml COARSEST-SIZE-MM [MOST-CELLS]
 //
-// Seconds are the processor's, which other jobs change little: the wall time of each stage is scaled by the
+// Seconds are the processor's, which other jobs change little: the wall time of each context is scaled by the
 // run's processor seconds over its wall time. Ends with 1 where a run of 10,000 cells or more was predicted
 // over 1.5 times too high or too low.
 #include <fmt/format.h>
@@ -14,9 +14,9 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "base/files/files.h"
 #include "flexel/study/predict.h"
 #include "flexel/study/runner.h"
-#include "formats/files.h"
 
 namespace {
 

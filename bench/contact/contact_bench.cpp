@@ -7,7 +7,7 @@
 #include "simulate/contact/contacts.h"
 #include "tests/simulate/box_body.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 // Points of 12 neighbours on the average.
@@ -36,18 +36,19 @@ void nothing_touches(benchmark::State& state) {
   options.cells = {cells, cells, cells};
   options.spacing = Vec3::Constant(1e-3);
   const Body body = testing::box_body(options);
-  Setting setting{body, {{"gum", 1e6, 0.25, 1000, "test"}}, std::vector<std::uint8_t>(body.cell_count(), 0)};
-  ContactSettings settings;
+  simulate::Problem problem{
+      body, {{"gum", 1e6, 0.25, 1000, "test"}}, std::vector<std::uint8_t>(body.cell_count(), 0)};
+  simulate::ContactSettings settings;
   settings.parts = {1};
-  Contacts contacts(settings, setting);
-  State now;
+  simulate::Contacts contacts(settings, problem);
+  simulate::State now;
   now.displacement.assign(body.element_count(), Vec3::Zero());
   now.velocity.assign(body.element_count(), Vec3(1, 0, 0));
   std::vector<Vec3> forces(body.element_count(), Vec3::Zero());
   (void)contacts.frequency(now);
   for (auto _ : state) {
     for (Vec3& u : now.displacement) u.x() += 1e-6;
-    benchmark::DoNotOptimize(contacts.hurried(now));
+    benchmark::DoNotOptimize(contacts.needs_step_recheck(now));
     contacts.add_forces(now, forces);
   }
   state.counters["time_an_element"] =
@@ -57,6 +58,6 @@ void nothing_touches(benchmark::State& state) {
 BENCHMARK(nothing_touches)->Arg(16)->Arg(46)->UseRealTime();
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate
 
 BENCHMARK_MAIN();

@@ -8,12 +8,12 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "formats/error.h"
-#include "formats/import.h"
+#include "base/error.h"
+#include "formats/exchange/import.h"
 #include "tests/voxelize/damage.h"
-#include "voxelize/heal.h"
+#include "voxelize/heal/heal.h"
 
-namespace flexel {
+namespace flexel::voxelize {
 namespace {
 
 using namespace shapes;
@@ -29,18 +29,18 @@ Mesh mesh_of(const std::string& file) {
   return {surface.vertices, triangulate(surface).corners};
 }
 
-double total(const VoxelizeResult& result) {
+double total(const voxelize::VoxelizeResult& result) {
   return result.parts[0].lattice_volume + result.parts[0].dropped_volume;
 }
 
 Clean clean(const std::string& name, const Mesh& mesh, std::size_t count) {
   Clean result{name, mesh, 0, 0};
   Progress progress("bench", Progress::Mode::quiet);
-  VoxelizeOptions options;
+  voxelize::VoxelizeOptions options;
   options.count = count;
-  options.align = Align::none;
+  options.align = voxelize::Align::none;
   options.max_memory = 1e12;
-  const VoxelizeResult voxels = voxelize(surface(mesh), options, progress);
+  const voxelize::VoxelizeResult voxels = voxelize(surface(mesh), options, progress);
   result.size = voxels.parts[0].spacing.x();
   result.volume = total(voxels);
   return result;
@@ -60,7 +60,7 @@ void judge(const Clean& part, int kind, int run, bool verbose, Row& row) {
   std::string outcome;
   ++row.runs;
   try {
-    const VoxelizeResult result = shapes::run(damaged, part.size);
+    const voxelize::VoxelizeResult result = shapes::run(damaged, part.size);
     const double difference = total(result) / part.volume - 1, error = std::abs(difference);
     ++(error <= .001 ? row.tenth : error <= .01 ? row.one : error <= .05 ? row.five : row.worse);
     row.largest = std::max(row.largest, error);
@@ -133,8 +133,8 @@ int bench(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::voxelize
 
 int main(int argc, char** argv) {
-  return flexel::bench(argc, argv);
+  return flexel::voxelize::bench(argc, argv);
 }

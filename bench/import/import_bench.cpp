@@ -10,10 +10,10 @@
 #include <filesystem>
 #include <numbers>
 
-#include "formats/import.h"
-#include "formats/parallel.h"
-#include "formats/surface_file.h"
-#include "formats/topology.h"
+#include "base/parallel.h"
+#include "formats/exchange/import.h"
+#include "formats/exchange/surface_file.h"
+#include "formats/part/topology.h"
 
 namespace {
 

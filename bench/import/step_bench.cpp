@@ -14,7 +14,7 @@
 #include <iterator>
 
 #include "bench/import/step_part.h"
-#include "formats/import.h"
+#include "formats/exchange/import.h"
 
 namespace flexel {
 namespace {

@@ -6,10 +6,10 @@
 
 #include <chrono>
 
-#include "formats/parallel.h"
+#include "base/parallel.h"
 #include "tests/simulate/voxel_problem.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 double allocated_bytes() {
@@ -38,12 +38,13 @@ void solve(benchmark::State& state, test::VoxelProblem (*make)(double)) {
     refresh = seconds_since(start);
     std::vector<Vec3> x;
     start = std::chrono::steady_clock::now();
-    const LinearResult result = conjugate_gradients(problem.matrix, problem.load, x, *multigrid, 1e-6, 500);
+    const simulate::LinearResult result =
+        conjugate_gradients(problem.matrix, problem.load, x, *multigrid, 1e-6, 500);
     state.SetIterationTime(seconds_since(start));
     iterations = result.iterations;
     if (!result.converged) state.SkipWithError("did not converge");
   }
-  const double matrix = static_cast<double>(problem.matrix.columns.size()) * (sizeof(Block) + 4);
+  const double matrix = static_cast<double>(problem.matrix.columns.size()) * (sizeof(simulate::Block) + 4);
   state.counters["cells"] = cells;
   state.counters["iterations"] = iterations;
   state.counters["setup_s"] = setup;
@@ -75,6 +76,6 @@ BENCHMARK_CAPTURE(solve, spring, test::spring)->Apply(sizes);
 BENCHMARK_CAPTURE(solve, tube, test::tube)->Apply(sizes);
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate
 
 BENCHMARK_MAIN();

@@ -11,11 +11,11 @@
 #include <chrono>
 #include <cstring>
 
-#include "mapping/bind.h"
-#include "mapping/search.h"
+#include "mapping/anchors/search.h"
+#include "mapping/methods/bind.h"
 #include "motions.h"
 
-namespace flexel {
+namespace flexel::mapping {
 namespace {
 
 struct Motion {
@@ -24,12 +24,13 @@ struct Motion {
 };
 
 // The motions of the quadruple of each element, in place of the least squares fit.
-std::vector<ElementMotion> quadruple_motions(const Body& body, const Binding& binding, MapMethod method) {
-  const MovingElements& moving = binding.blend.moving;
-  std::vector<ElementMotion> motions(moving.elements.size());
+std::vector<mapping::ElementMotion> quadruple_motions(const Body& body, const mapping::Binding& binding,
+                                                      mapping::MapMethod method) {
+  const mapping::MovingElements& moving = binding.blend.moving;
+  std::vector<mapping::ElementMotion> motions(moving.elements.size());
   for (std::size_t i = 0; i < motions.size(); ++i) {
     const std::uint32_t e = moving.elements[i];
-    const Frame frame = find_frame(body, binding.connections, body.parts[0], e, 7);
+    const mapping::Frame frame = find_frame(body, binding.connections, body.parts[0], e, 7);
     motions[i].displacement = body.position[e] - body.rest[e];
     motions[i].gradient = frame_motion(frame, body.rest, body.position, method).change *
                           rest_base(frame, body.rest, method).inverse();
@@ -42,23 +43,23 @@ struct Row {
   std::vector<Vec3> (*map)(const Body&);
 };
 
-template <MapMethod method>
+template <mapping::MapMethod method>
 std::vector<Vec3> mapped(const Body& body) {
   return apply(bind(body, method), body, body.position);
 }
-template <MapMethod frames>
+template <mapping::MapMethod frames>
 std::vector<Vec3> blended_with(const Body& body) {
-  const Binding binding = bind(body, MapMethod::blended);
+  const mapping::Binding binding = bind(body, mapping::MapMethod::blended);
   return apply(binding.blend, body, quadruple_motions(body, binding, frames));
 }
 
 constexpr std::array<Row, 6> kRows = {{
-    {"`gram-schmidt`", mapped<MapMethod::gram_schmidt>},
-    {"`affine`", mapped<MapMethod::affine>},
-    {"`blended`", mapped<MapMethod::blended>},
-    {"(blended, Gram-Schmidt frames)", blended_with<MapMethod::gram_schmidt>},
-    {"(blended, affine frames)", blended_with<MapMethod::affine>},
-    {"`smooth`", mapped<MapMethod::smooth>},
+    {"`gram-schmidt`", mapped<mapping::MapMethod::gram_schmidt>},
+    {"`affine`", mapped<mapping::MapMethod::affine>},
+    {"`blended`", mapped<mapping::MapMethod::blended>},
+    {"(blended, Gram-Schmidt frames)", blended_with<mapping::MapMethod::gram_schmidt>},
+    {"(blended, affine frames)", blended_with<mapping::MapMethod::affine>},
+    {"`smooth`", mapped<mapping::MapMethod::smooth>},
 }};
 
 void print_table(const char* title, std::vector<Body>& bodies, const std::vector<int>& across,
@@ -111,15 +112,15 @@ void print_costs(const std::vector<Body>& bodies, const std::vector<int>& across
   fmt::print("\n|---|");
   for (std::size_t i = 0; i < 2 * across.size(); ++i) fmt::print("---|");
   fmt::print("\n");
-  for (const auto& [name, method] : {std::pair{"gram-schmidt", MapMethod::gram_schmidt},
-                                     {"affine", MapMethod::affine},
-                                     {"blended", MapMethod::blended},
-                                     {"smooth", MapMethod::smooth}}) {
+  for (const auto& [name, method] : {std::pair{"gram-schmidt", mapping::MapMethod::gram_schmidt},
+                                     {"affine", mapping::MapMethod::affine},
+                                     {"blended", mapping::MapMethod::blended},
+                                     {"smooth", mapping::MapMethod::smooth}}) {
     fmt::print("| `{}` |", name);
     // as bench_mapping does: with weights kept for states to come
     for (const Body& body : bodies) fmt::print(" {:.0f} |", cost(body, [&] { (void)bind(body, method, 2); }));
     for (const Body& body : bodies) {
-      const Binding bound = bind(body, method, 2);
+      const mapping::Binding bound = bind(body, method, 2);
       fmt::print(" {:.0f} |", cost(body, [&] { (void)apply(bound, body, body.position); }));
     }
     fmt::print("\n");
@@ -130,10 +131,11 @@ void print_costs(const std::vector<Body>& bodies, const std::vector<int>& across
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::mapping
 
 int main(int argc, char** argv) {
   using namespace flexel;
+  using namespace flexel::mapping;
   const Placement placement =
       argc > 1 && std::strcmp(argv[1], "centre") == 0 ? Placement::centre : Placement::corner;
   fmt::print("Placement {}.\n", placement == Placement::centre ? "centre" : "corner");

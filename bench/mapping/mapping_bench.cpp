@@ -10,12 +10,12 @@
 #include <numeric>
 #include <string>
 
-#include "formats/parallel.h"
-#include "formats/topology.h"
-#include "mapping/bind.h"
-#include "mapping/nearest.h"
+#include "base/parallel.h"
+#include "formats/part/topology.h"
+#include "mapping/anchors/nearest.h"
+#include "mapping/methods/bind.h"
 
-namespace flexel {
+namespace flexel::mapping {
 namespace {
 
 constexpr double kRing = 1.0, kTube = 0.3, kSpacing = 0.0285;
@@ -181,7 +181,7 @@ void count(benchmark::State& state, const Body& body) {
       vertices, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
 }
 
-template <Placement placement, MapMethod method>
+template <Placement placement, mapping::MapMethod method>
 void bind_surface(benchmark::State& state) {
   const Body& body = ring(placement);
   const ThreadLimit limit(static_cast<int>(state.range(0)));
@@ -189,11 +189,11 @@ void bind_surface(benchmark::State& state) {
   count(state, body);
 }
 
-template <Placement placement, MapMethod method>
+template <Placement placement, mapping::MapMethod method>
 void apply_state(benchmark::State& state) {
   const Body& body = ring(placement);
   const ThreadLimit limit(static_cast<int>(state.range(0)));
-  const Binding binding = bind(body, method, 2);
+  const mapping::Binding binding = bind(body, method, 2);
   for (auto _ : state) benchmark::DoNotOptimize(apply(binding, body, body.position).data());
   count(state, body);
 }
@@ -217,7 +217,7 @@ void welding(benchmark::State& state) {
 void traffic(benchmark::State& state) {
   const Body& body = ring(Placement::corner);
   const ThreadLimit limit(static_cast<int>(state.range(0)));
-  const Binding binding = bind(body, MapMethod::affine);
+  const mapping::Binding binding = bind(body, mapping::MapMethod::affine);
   std::vector<Vec3> out(body.surface.vertices.size());
   for (auto _ : state) {
     parallel_for_each(
@@ -232,7 +232,7 @@ void traffic(benchmark::State& state) {
 void nearest(benchmark::State& state) {
   const Body& body = ring(Placement::centre);
   const ThreadLimit limit(static_cast<int>(state.range(0)));
-  const ElementGrid grid(body, 0);
+  const mapping::ElementGrid grid(body, 0);
   std::vector<std::uint32_t> found(body.surface.vertices.size());
   for (auto _ : state) {
     parallel_for_each(found.size(),
@@ -246,7 +246,7 @@ void nearest(benchmark::State& state) {
 void judging(benchmark::State& state) {
   const Body& body = ring(Placement::corner);
   const ThreadLimit limit(static_cast<int>(state.range(0)));
-  const Binding binding = bind(body, MapMethod::affine);
+  const mapping::Binding binding = bind(body, mapping::MapMethod::affine);
   const std::vector<Vec3> displacement = apply(binding, body, body.position);
   for (auto _ : state) benchmark::DoNotOptimize(judge(binding, body, body.position, displacement).data());
   count(state, body);
@@ -261,18 +261,18 @@ void register_all() {
           ->UseRealTime();
   };
   constexpr auto corner = Placement::corner, centre = Placement::centre;
-  add("bind/corner/gram-schmidt", bind_surface<corner, MapMethod::gram_schmidt>);
-  add("bind/corner/affine", bind_surface<corner, MapMethod::affine>);
-  add("bind/corner/blended", bind_surface<corner, MapMethod::blended>);
-  add("bind/corner/smooth", bind_surface<corner, MapMethod::smooth>);
-  add("bind/centre/gram-schmidt", bind_surface<centre, MapMethod::gram_schmidt>);
-  add("bind/centre/blended", bind_surface<centre, MapMethod::blended>);
-  add("apply/corner/gram-schmidt", apply_state<corner, MapMethod::gram_schmidt>);
-  add("apply/corner/affine", apply_state<corner, MapMethod::affine>);
-  add("apply/corner/blended", apply_state<corner, MapMethod::blended>);
-  add("apply/corner/smooth", apply_state<corner, MapMethod::smooth>);
-  add("apply/centre/gram-schmidt", apply_state<centre, MapMethod::gram_schmidt>);
-  add("apply/centre/blended", apply_state<centre, MapMethod::blended>);
+  add("bind/corner/gram-schmidt", bind_surface<corner, mapping::MapMethod::gram_schmidt>);
+  add("bind/corner/affine", bind_surface<corner, mapping::MapMethod::affine>);
+  add("bind/corner/blended", bind_surface<corner, mapping::MapMethod::blended>);
+  add("bind/corner/smooth", bind_surface<corner, mapping::MapMethod::smooth>);
+  add("bind/centre/gram-schmidt", bind_surface<centre, mapping::MapMethod::gram_schmidt>);
+  add("bind/centre/blended", bind_surface<centre, mapping::MapMethod::blended>);
+  add("apply/corner/gram-schmidt", apply_state<corner, mapping::MapMethod::gram_schmidt>);
+  add("apply/corner/affine", apply_state<corner, mapping::MapMethod::affine>);
+  add("apply/corner/blended", apply_state<corner, mapping::MapMethod::blended>);
+  add("apply/corner/smooth", apply_state<corner, mapping::MapMethod::smooth>);
+  add("apply/centre/gram-schmidt", apply_state<centre, mapping::MapMethod::gram_schmidt>);
+  add("apply/centre/blended", apply_state<centre, mapping::MapMethod::blended>);
   add("judge", judging);
   add("part/connections", connections);
   add("part/welding", welding);
@@ -292,7 +292,7 @@ void print_memory(const std::string& method) {
   const Body body = make_ring(Placement::corner, kLargeSide);
   const double before = peak_memory();
   const auto began = std::chrono::steady_clock::now();
-  const MapResult result = map_state(bind(body, map_method(method)), body);
+  const mapping::MapResult result = map_state(bind(body, map_method(method)), body);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
   fmt::print(
       "{}: {} vertices, {} elements: peak {:.0f} MiB with the body ({:.0f} MiB before mapping), {:.1f} s\n",
@@ -300,14 +300,14 @@ void print_memory(const std::string& method) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::mapping
 
 int main(int argc, char** argv) {
   if (argc == 3 && std::string(argv[1]) == "--memory") {
-    flexel::print_memory(argv[2]);
+    flexel::mapping::print_memory(argv[2]);
     return 0;
   }
   benchmark::Initialize(&argc, argv);
-  flexel::register_all();
+  flexel::mapping::register_all();
   benchmark::RunSpecifiedBenchmarks();
 }

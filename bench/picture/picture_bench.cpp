@@ -6,13 +6,13 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/parallel.h"
 #include "bench/knot.h"
-#include "flexel/picture/lines.h"
 #include "flexel/picture/picture.h"
-#include "flexel/picture/render.h"
-#include "formats/parallel.h"
+#include "flexel/picture/render/lines.h"
+#include "flexel/picture/render/render.h"
 
-namespace flexel {
+namespace flexel::picture {
 namespace {
 
 // A (2, 3) torus knot of 2 x along x around triangles, about 125 mm across, its tube fluted.
@@ -33,24 +33,25 @@ const Surface& million() {
 void whole(benchmark::State& state) {
   const ThreadLimit threads(static_cast<int>(state.range(0)));
   Progress progress("bench", Progress::Mode::quiet);
-  std::vector<PictureSubject> subjects(1);
+  std::vector<picture::PictureSubject> subjects(1);
   subjects[0].surface = million();
-  PictureOptions options;
-  if (state.range(1) == 0) options.view = View{};
+  picture::PictureOptions options;
+  if (state.range(1) == 0) options.view = picture::View{};
   for (auto _ : state) benchmark::DoNotOptimize(encode_png(draw_picture(subjects, options, progress).image));
   state.counters["triangles"] = static_cast<double>(million().polygon_count());
 }
 
-const DrawingFrame& frame() {
-  static const DrawingFrame one = [] {
+const picture::DrawingFrame& frame() {
+  static const picture::DrawingFrame one = [] {
     const Box box = bounding_box(million().vertices);
-    return DrawingFrame{(box.min + box.max) / 2, box.diagonal() / 2};
+    return picture::DrawingFrame{(box.min + box.max) / 2, box.diagonal() / 2};
   }();
   return one;
 }
 
-const Drawable& drawn() {
-  static const Drawable one = draw_surface(million(), mesh_topology(million()), million().vertices, frame());
+const picture::Drawable& drawn() {
+  static const picture::Drawable one =
+      draw_surface(million(), mesh_topology(million()), million().vertices, frame());
   return one;
 }
 
@@ -66,8 +67,8 @@ void build_tree(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(make_tracer(drawn()));
 }
 
-Camera camera() {
-  Camera one = camera_towards({});
+picture::Camera camera() {
+  picture::Camera one = camera_towards({});
   one.pixels = 700;
   one.x = 800;
   one.y = 600;
@@ -76,15 +77,15 @@ Camera camera() {
 
 void shade(benchmark::State& state) {
   const ThreadLimit threads(static_cast<int>(state.range(0)));
-  const Tracer tracer = make_tracer(drawn());
-  Image image(1600, 1200, colour(0xffffff));
+  const picture::Tracer tracer = make_tracer(drawn());
+  picture::Image image(1600, 1200, colour(0xffffff));
   for (auto _ : state) render(image, {0, 0, 1600, 1200}, camera(), drawn(), tracer, {});
 }
 
 void lines(benchmark::State& state) {
   const ThreadLimit threads(static_cast<int>(state.range(0)));
-  const Tracer tracer = make_tracer(drawn());
-  Image image(1600, 1200, colour(0xffffff));
+  const picture::Tracer tracer = make_tracer(drawn());
+  picture::Image image(1600, 1200, colour(0xffffff));
   for (auto _ : state) draw_lines(image, visible_lines(drawn(), tracer, camera()), {});
 }
 
@@ -102,6 +103,6 @@ BENCHMARK(shade)->Arg(2)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()
 BENCHMARK(lines)->Arg(2)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::picture
 
 BENCHMARK_MAIN();

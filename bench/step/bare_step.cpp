@@ -4,9 +4,9 @@
 
 #include <cstdlib>
 
-#include "formats/body_file.h"
-#include "formats/parallel.h"
-#include "simulate/time/stepper.h"
+#include "base/parallel.h"
+#include "formats/lattice/body_file.h"
+#include "simulate/stepping/stepper.h"
 
 int main(int argc, char** argv) {
   using namespace flexel;
@@ -16,14 +16,15 @@ int main(int argc, char** argv) {
   }
   const ThreadLimit limit(1);
   const Body body = read_body(argv[1]);
-  const Setting setting{body,
-                        std::vector<Material>(body.parts.size(), {"gum", 1.2e6, 0.25, 930, "test"}),
-                        std::vector<std::uint8_t>(body.cell_count(), 0),
-                        std::vector<Model>(body.parts.size(), Model::cells),
-                        {},
-                        {}};
-  Stepper stepper(setting, {std::vector<double>(body.parts.size(), 0)}, false);
-  State state;
+  const simulate::Problem problem{
+      body,
+      std::vector<simulate::Material>(body.parts.size(), {"gum", 1.2e6, 0.25, 930, "test"}),
+      std::vector<std::uint8_t>(body.cell_count(), 0),
+      std::vector<simulate::Model>(body.parts.size(), simulate::Model::cells),
+      {},
+      {}};
+  simulate::Stepper stepper(problem, {std::vector<double>(body.parts.size(), 0)}, false);
+  simulate::State state;
   state.displacement.assign(body.element_count(), Vec3::Zero());
   state.velocity.assign(body.element_count(), Vec3::Zero());
   for (int n = std::atoi(argv[2]); n > 0; --n) (void)stepper.advance(state, {}, {1e-5, 1e-5, false});

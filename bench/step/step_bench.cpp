@@ -5,17 +5,17 @@
 
 #include <filesystem>
 
-#include "formats/import.h"
-#include "formats/parallel.h"
-#include "simulate/time/stability.h"
-#include "simulate/time/stepper.h"
+#include "base/parallel.h"
+#include "formats/exchange/import.h"
+#include "simulate/models/stability.h"
+#include "simulate/stepping/stepper.h"
 #include "tests/simulate/box_body.h"
 #include "voxelize/voxelize.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
-const Material kRubber{"rubber", 1.2e6, 0.25, 930, "test"};
+const simulate::Material kRubber{"rubber", 1.2e6, 0.25, 930, "test"};
 
 Body block() {
   testing::BoxOptions options;
@@ -28,32 +28,32 @@ std::optional<Body> thin_part() {
   const std::filesystem::path path =
       std::filesystem::path(FLEXEL_PARTS_DIR) / "hip_aa_module_shell_cover.STL";
   if (!std::filesystem::exists(path)) return std::nullopt;
-  VoxelizeOptions options;
+  voxelize::VoxelizeOptions options;
   options.count = 100000;
-  options.align = Align::box;
+  options.align = voxelize::Align::box;
   Progress progress("bench", Progress::Mode::quiet);
-  return voxelize(import_surface(path.string(), {}), options, progress).body;
+  return voxelize::voxelize(import_surface(path.string(), {}), options, progress).body;
 }
 
 // Arguments: model (0 cells, 1 springs), damping (0, 1), threads.
 void step(benchmark::State& state, const Body& body) {
   const ThreadLimit limit(static_cast<int>(state.range(2)));
   const Model model = state.range(0) == 0 ? Model::cells : Model::springs;
-  const Setting setting{body, std::vector<Material>(body.parts.size(), kRubber),
-                        std::vector<std::uint8_t>(body.cell_count(), 0),
-                        std::vector<Model>(body.parts.size(), model)};
-  const double bare = stable_step(setting, std::vector<double>(body.parts.size(), 0));
+  const simulate::Problem problem{body, std::vector<simulate::Material>(body.parts.size(), kRubber),
+                                  std::vector<std::uint8_t>(body.cell_count(), 0),
+                                  std::vector<Model>(body.parts.size(), model)};
+  const double bare = stable_step(problem, std::vector<double>(body.parts.size(), 0));
   const std::vector<double> damping(body.parts.size(), state.range(1) ? 0.1 * bare : 0);
-  Stepper stepper(setting, {damping}, false);
-  const double dt = stable_step(setting, damping);
-  State now;
+  simulate::Stepper stepper(problem, {damping}, false);
+  const double dt = stable_step(problem, damping);
+  simulate::State now;
   now.displacement.assign(body.element_count(), Vec3::Zero());
   now.velocity.assign(body.element_count(), Vec3::Zero());
   for (std::size_t e = 0; e < body.element_count(); ++e)
     now.displacement[e] = 1e-3 * Vec3(body.rest[e].y(), body.rest[e].z(), body.rest[e].x());
   double steps = 0;
   for (auto _ : state) {
-    const StepOutcome outcome = stepper.advance(now, {}, {dt, dt, false});
+    const simulate::StepOutcome outcome = stepper.advance(now, {}, {dt, dt, false});
     if (!(outcome.smallest_jacobian > 0)) state.SkipWithError("a cell folded");
     ++steps;
   }
@@ -91,6 +91,6 @@ BENCHMARK(step_block)->Apply(arguments);
 BENCHMARK(step_thin)->Apply(arguments);
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate
 
 BENCHMARK_MAIN();

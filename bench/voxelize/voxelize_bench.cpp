@@ -9,17 +9,17 @@
 
 #include <Eigen/Geometry>
 
+#include "base/parallel.h"
 #include "bench/knot.h"
-#include "formats/body_file.h"
-#include "formats/import.h"
-#include "formats/parallel.h"
-#include "formats/surface_file.h"
-#include "voxelize/align.h"
-#include "voxelize/classify.h"
-#include "voxelize/elements.h"
+#include "formats/exchange/import.h"
+#include "formats/exchange/surface_file.h"
+#include "formats/lattice/body_file.h"
+#include "voxelize/classify/classify.h"
+#include "voxelize/lattice/align.h"
+#include "voxelize/lattice/elements.h"
 #include "voxelize/voxelize.h"
 
-namespace flexel {
+namespace flexel::voxelize {
 namespace {
 
 // A (2, 3) torus knot, outward-oriented, 2 * around * along triangles; about 210 mm long.
@@ -41,10 +41,10 @@ double size_for(int voxels) {
   return bounding_box(million().vertices).size().maxCoeff() / voxels;
 }
 
-PartMesh placed(int voxels) {
-  PartMesh mesh = part_meshes(million())[0];
+voxelize::PartMesh placed(int voxels) {
+  voxelize::PartMesh mesh = part_meshes(million())[0];
   repair_orientation(mesh);
-  place_on_lattice(mesh, align_lattice(mesh, size_for(voxels), Align::none, true));
+  place_on_lattice(mesh, align_lattice(mesh, size_for(voxels), voxelize::Align::none, true));
   return mesh;
 }
 
@@ -68,11 +68,11 @@ void stl_to_body(benchmark::State& state) {
   static const TemporaryFiles files;
   const ThreadLimit threads(static_cast<int>(state.range(1)));
   Progress progress("bench", Progress::Mode::quiet);
-  VoxelizeOptions options;
+  voxelize::VoxelizeOptions options;
   options.size = size_for(static_cast<int>(state.range(0)));
   options.max_memory = 1e12;
   for (auto _ : state) {
-    const VoxelizeResult result = voxelize(import_surface(files.part()), options, progress);
+    const voxelize::VoxelizeResult result = voxelize(import_surface(files.part()), options, progress);
     write_body(result.body, files.body());
     state.counters["cells"] = static_cast<double>(result.parts[0].cells);
   }
@@ -81,14 +81,14 @@ void stl_to_body(benchmark::State& state) {
 void whole(benchmark::State& state) {
   const ThreadLimit threads(static_cast<int>(state.range(1)));
   Progress progress("bench", Progress::Mode::quiet);
-  VoxelizeOptions options;
+  voxelize::VoxelizeOptions options;
   options.size = size_for(static_cast<int>(state.range(0)));
   options.max_memory = 1e12;
   for (auto _ : state) {
     state.PauseTiming();
     Surface surface = million();
     state.ResumeTiming();
-    const VoxelizeResult result = voxelize(std::move(surface), options, progress);
+    const voxelize::VoxelizeResult result = voxelize(std::move(surface), options, progress);
     state.counters["cells"] = static_cast<double>(result.parts[0].cells);
   }
 }
@@ -100,13 +100,13 @@ void meshes(benchmark::State& state) {
 
 void classify(benchmark::State& state) {
   const ThreadLimit threads(static_cast<int>(state.range(1)));
-  const PartMesh mesh = placed(static_cast<int>(state.range(0)));
+  const voxelize::PartMesh mesh = placed(static_cast<int>(state.range(0)));
   for (auto _ : state) benchmark::DoNotOptimize(classify_closed(mesh, {}));
 }
 
 void elements(benchmark::State& state) {
   const ThreadLimit threads(static_cast<int>(state.range(1)));
-  const Voxels voxels = classify_closed(placed(static_cast<int>(state.range(0))), {});
+  const voxelize::Voxels voxels = classify_closed(placed(static_cast<int>(state.range(0))), {});
   for (auto _ : state) benchmark::DoNotOptimize(make_elements(voxels));
 }
 
@@ -127,6 +127,6 @@ BENCHMARK(classify)
 BENCHMARK(elements)->Args({512, 1})->Args({512, 2})->Unit(benchmark::kMillisecond)->UseRealTime();
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::voxelize
 
 BENCHMARK_MAIN();

@@ -8,7 +8,7 @@
 #include <cctype>
 #include <set>
 
-namespace flexel {
+namespace flexel::mesh_export {
 namespace {
 
 constexpr double kLength = 1e3, kStress = 1e-6, kDensity = 1e-12;  // mm, MPa, tonne/mm^3 from SI
@@ -156,7 +156,7 @@ class Writer {
   void materials() {
     for (std::size_t s = 0; s < mesh_.sections.size(); ++s) {
       const MeshSection& section = mesh_.sections[s];
-      const Material& material = analysis_.materials[section.part];
+      const simulate::Material& material = analysis_.materials[section.part];
       comment(section.fill == 1 ? fmt::format("{}, {}", material.name, material.source)
                                 : fmt::format("{} times {:.6g}, the mean fill of {} elements", material.name,
                                               section.fill, section.elements));
@@ -311,4 +311,4 @@ std::string calculix_file(const Analysis& analysis, const CalculixOptions& optio
   return Writer(analysis, options)();
 }
 
-}  // namespace flexel
+}  // namespace flexel::mesh_export

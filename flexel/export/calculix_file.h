@@ -5,7 +5,7 @@
 
 #include "flexel/export/analysis.h"
 
-namespace flexel {
+namespace flexel::mesh_export {
 
 struct CalculixOptions {
   std::string element = "C3D8I";  // of hexahedra: "C3D8I" (incompatible modes) or "C3D8"
@@ -21,4 +21,4 @@ struct CalculixNames {
 // The file's text. Units: mm, N, s, tonne, MPa.
 [[nodiscard]] std::string calculix_file(const Analysis& analysis, const CalculixOptions& options);
 
-}  // namespace flexel
+}  // namespace flexel::mesh_export

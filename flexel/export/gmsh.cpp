@@ -9,11 +9,11 @@
 #include <sstream>
 #include <unordered_map>
 
+#include "base/error.h"
+#include "base/files/files.h"
 #include "flexel/process/child.h"
-#include "formats/error.h"
-#include "formats/files.h"
 
-namespace flexel {
+namespace flexel::mesh_export {
 namespace {
 
 constexpr int kTriangle6 = 9, kTetrahedron10 = 11;
@@ -120,4 +120,4 @@ GmshMesh mesh_with_gmsh(const std::string& folder, const std::string& script, co
   return mesh;
 }
 
-}  // namespace flexel
+}  // namespace flexel::mesh_export

@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "formats/vec.h"
+#include "base/math/vec.h"
 
-namespace flexel {
+namespace flexel::mesh_export {
 
 struct GmshTriangle {
   std::array<std::uint32_t, 6> nodes{};  // corners, then the middles of edges 01, 12, 20
@@ -30,4 +30,4 @@ struct GmshMesh {
 [[nodiscard]] GmshMesh mesh_with_gmsh(const std::string& folder, const std::string& script,
                                       const std::string& part);
 
-}  // namespace flexel
+}  // namespace flexel::mesh_export

@@ -7,12 +7,12 @@
 
 #include <fmt/format.h>
 
+#include "base/math/area_vector.h"
+#include "base/units.h"
 #include "flexel/export/mesh.h"
-#include "formats/area_vector.h"
-#include "formats/units.h"
-#include "simulate/cells.h"
+#include "simulate/models/cells.h"
 
-namespace flexel {
+namespace flexel::mesh_export {
 namespace {
 
 constexpr double kWhole = 1 - 1e-9;
@@ -22,21 +22,22 @@ constexpr double kSideFacing = 0.1;  // cosine between a side and the surface th
 constexpr std::array<std::uint8_t, 8> kOrder = {0, 1, 3, 2, 4, 5, 7, 6};
 
 // Sections by (part, class); class kClasses is that of whole cells and goes first.
-void assign_sections(const Setting& setting, const std::vector<std::uint32_t>& cells, AnalysisMesh& mesh) {
-  const std::vector<std::uint32_t> part = cell_parts(setting.body);
+void assign_sections(const simulate::Problem& problem, const std::vector<std::uint32_t>& cells,
+                     AnalysisMesh& mesh) {
+  const std::vector<std::uint32_t> part = cell_parts(problem.body);
   struct Found {
     double fill = 0;
     std::size_t count = 0;
   };
   const auto key = [&](std::uint32_t cell) {
-    const double fill = setting.body.fill[cell];
+    const double fill = problem.body.fill[cell];
     const int of = fill >= kWhole ? kClasses : std::min(kClasses - 1, static_cast<int>(fill * kClasses));
     return std::pair(part[cell], kClasses - of);
   };
   std::map<std::pair<std::uint32_t, int>, Found> found;
   for (const std::uint32_t cell : cells) {
     Found& each = found[key(cell)];
-    each.fill += setting.body.fill[cell];
+    each.fill += problem.body.fill[cell];
     ++each.count;
   }
   std::map<std::pair<std::uint32_t, int>, std::uint32_t> index;
@@ -96,23 +97,23 @@ void find_sides(const std::vector<std::uint32_t>& cells, AnalysisMesh& mesh) {
 
 }  // namespace
 
-AnalysisMesh hexahedra(const Setting& setting) {
+AnalysisMesh hexahedra(const simulate::Problem& problem) {
   AnalysisMesh mesh;
-  mesh.body = setting.body;
-  const std::vector<std::uint8_t> sound = sound_cells(setting);
+  mesh.body = problem.body;
+  const std::vector<std::uint8_t> sound = sound_cells(problem);
   std::vector<std::uint32_t> cells;
   for (std::uint32_t c = 0; c < sound.size(); ++c)
     if (sound[c]) cells.push_back(c);
   for (const std::uint32_t cell : cells)
     for (const std::uint8_t corner : kOrder) mesh.nodes.push_back(mesh.body.cell_elements[cell][corner]);
-  assign_sections(setting, cells, mesh);
+  assign_sections(problem, cells, mesh);
   find_sides(cells, mesh);
   std::size_t partial = 0;
   double least = 1;
   for (const std::uint32_t cell : cells)
-    if (setting.body.fill[cell] < kWhole) {
+    if (problem.body.fill[cell] < kWhole) {
       ++partial;
-      least = std::min(least, setting.body.fill[cell]);
+      least = std::min(least, problem.body.fill[cell]);
     }
   if (partial > 0)
     mesh.notes.push_back(
@@ -120,10 +121,10 @@ AnalysisMesh hexahedra(const Setting& setting) {
                     "whole shape; in classes of 0.05 their Young's modulus and density are the material's "
                     "times the mean fill, so stresses in them are those of that softer matter",
                     human_count(partial), human_count(cells.size()), least));
-  if (const std::size_t left_out = setting.body.cell_count() - cells.size(); left_out > 0)
+  if (const std::size_t left_out = problem.body.cell_count() - cells.size(); left_out > 0)
     mesh.notes.push_back(fmt::format("{} cells of loose crumbs that hang on nothing are left out of the mesh",
                                      human_count(left_out)));
   return mesh;
 }
 
-}  // namespace flexel
+}  // namespace flexel::mesh_export

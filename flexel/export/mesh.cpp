@@ -4,7 +4,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-namespace flexel {
+namespace flexel::mesh_export {
 namespace {
 
 // Determinants of the map of a quadratic tetrahedron at its four integration points.
@@ -86,4 +86,4 @@ std::size_t folded_tetrahedra(const AnalysisMesh& mesh) {
   return folded;
 }
 
-}  // namespace flexel
+}  // namespace flexel::mesh_export

@@ -1,15 +1,15 @@
 // A mesh for another program's analysis: our lattice's cells as hexahedra, or second-order tetrahedra made by
-// gmsh. Selections resolve on its `body` as they do in a run (simulate/selection.h).
+// gmsh. Selections resolve on its `body` as they do in a run (simulate/input/selection.h).
 #pragma once
 #include <array>
 #include <string>
 #include <vector>
 
-#include "formats/body.h"
-#include "formats/progress.h"
-#include "simulate/state.h"
+#include "base/program/progress.h"
+#include "formats/lattice/body.h"
+#include "simulate/state/state.h"
 
-namespace flexel {
+namespace flexel::mesh_export {
 
 // One side of an element, numbered from 0 in the order of CalculiX and Abaqus (S1 ...).
 struct ElementSide {
@@ -52,10 +52,10 @@ constexpr std::array<std::array<std::uint8_t, 4>, 6> kHexahedronSides = {
 constexpr std::array<std::array<std::uint8_t, 6>, 4> kTetrahedronSides = {
     {{0, 2, 1, 6, 5, 4}, {0, 1, 3, 4, 8, 7}, {1, 2, 3, 5, 9, 8}, {2, 0, 3, 6, 7, 9}}};
 
-// The sound cells of the setting's body. A cell whose fill is below 1 goes to one of 20 classes of 0.05 a
+// The sound cells of the problem's body. A cell whose fill is below 1 goes to one of 20 classes of 0.05 a
 // part, whose stiffness and density are those of the material times the mean fill: the mass is the part's
 // own.
-[[nodiscard]] AnalysisMesh hexahedra(const Setting& setting);
+[[nodiscard]] AnalysisMesh hexahedra(const simulate::Problem& problem);
 
 struct TetrahedraOptions {
   double size = 0;  // m, largest edge
@@ -77,4 +77,4 @@ struct TetrahedraOptions {
 // Tetrahedra whose quadratic map folds at a point where it is integrated: no program can use them.
 [[nodiscard]] std::size_t folded_tetrahedra(const AnalysisMesh& mesh);
 
-}  // namespace flexel
+}  // namespace flexel::mesh_export

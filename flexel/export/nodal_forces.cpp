@@ -6,12 +6,12 @@
 
 #include <fmt/format.h>
 
+#include "base/error.h"
 #include "flexel/export/analysis.h"
-#include "formats/error.h"
-#include "simulate/effects/load_distribution.h"
-#include "simulate/probes.h"
+#include "simulate/matter/load_distribution.h"
+#include "simulate/probes/probes.h"
 
-namespace flexel {
+namespace flexel::mesh_export {
 namespace {
 
 struct TrianglePoint {
@@ -43,7 +43,7 @@ std::array<TrianglePoint, 7> triangle_rule() {
 
 // A point that carries load, and the nodes that it hands it on to.
 struct Carried {
-  LoadedPoint point;
+  simulate::LoadedPoint point;
   std::array<std::uint32_t, 6> nodes{};
   std::array<double, 6> shape{};
   std::size_t count = 6;
@@ -89,8 +89,8 @@ std::vector<Carried> region_points_of(const AnalysisMesh& mesh, const std::vecto
   return result;
 }
 
-std::vector<Vec3> forces_on_tetrahedra(const Load& load, const AnalysisMesh& mesh) {
-  const Selected selected = resolve(load.where, mesh.body);
+std::vector<Vec3> forces_on_tetrahedra(const simulate::Load& load, const AnalysisMesh& mesh) {
+  const simulate::Selected selected = resolve(load.where, mesh.body);
   if (!selected.polygons.empty() && !selected.elements.empty())
     throw InputError(load.origin,
                      fmt::format("load \"{}\" mixes surface and elements; write two loads", load.name));
@@ -99,12 +99,13 @@ std::vector<Vec3> forces_on_tetrahedra(const Load& load, const AnalysisMesh& mes
                                               load.pressure ? "pressure" : "bearing load"));
   const std::vector<Carried> carried = selected.polygons.empty() ? region_points_of(mesh, selected.elements)
                                                                  : surface_points_of(mesh, selected.polygons);
-  std::vector<LoadedPoint> points;
+  std::vector<simulate::LoadedPoint> points;
   for (const Carried& each : carried) points.push_back(each.point);
   std::optional<std::vector<Vec3>> forces;
   if (load.pressure) {
     forces.emplace();
-    for (const LoadedPoint& each : points) forces->push_back(-*load.pressure * each.weight * each.normal);
+    for (const simulate::LoadedPoint& each : points)
+      forces->push_back(-*load.pressure * each.weight * each.normal);
   } else if (load.bearing) {
     forces = bearing(points, *load.force);
   } else {
@@ -126,18 +127,19 @@ std::vector<Vec3> forces_on_tetrahedra(const Load& load, const AnalysisMesh& mes
 
 }  // namespace
 
-AnalysisProbe place_probe(const Probe& probe, const AnalysisMesh& mesh, const Setting& setting) {
+AnalysisProbe place_probe(const simulate::Probe& probe, const AnalysisMesh& mesh,
+                          const simulate::Problem& problem) {
   AnalysisProbe result;
   result.name = probe.name;
   if (mesh.kind == AnalysisMesh::Kind::hexahedra) {
-    Scene only;
+    simulate::Scene only;
     only.probes.push_back(probe);
-    result.weights = place_probes(only, setting).front().weights;
+    result.weights = place_probes(only, problem).front().weights;
     return result;
   }
   std::map<std::uint32_t, double> weights;
   if (probe.where) {
-    const Selected selected = resolve(*probe.where, mesh.body);
+    const simulate::Selected selected = resolve(*probe.where, mesh.body);
     for (const Carried& each : surface_points_of(mesh, selected.polygons))
       for (std::size_t i = 0; i < each.count; ++i)
         weights[each.nodes[i]] += each.shape[i] * each.point.weight;
@@ -159,15 +161,16 @@ AnalysisProbe place_probe(const Probe& probe, const AnalysisMesh& mesh, const Se
   return result;
 }
 
-std::vector<Vec3> nodal_forces(const Load& load, const AnalysisMesh& mesh, const Setting& setting) {
+std::vector<Vec3> nodal_forces(const simulate::Load& load, const AnalysisMesh& mesh,
+                               const simulate::Problem& problem) {
   if (mesh.kind == AnalysisMesh::Kind::tetrahedra) return forces_on_tetrahedra(load, mesh);
-  Loads::Parameters only;
+  simulate::Loads::Parameters only;
   only.loads.push_back(load);
-  State state;
+  simulate::State state;
   state.displacement.assign(mesh.body.rest.size(), Vec3::Zero());
   std::vector<Vec3> forces(mesh.body.rest.size(), Vec3::Zero());
-  Loads::make(only, setting)->add_forces(state, forces);
+  simulate::Loads::make(only, problem)->add_forces(state, forces);
   return forces;
 }
 
-}  // namespace flexel
+}  // namespace flexel::mesh_export

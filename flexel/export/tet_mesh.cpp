@@ -9,17 +9,17 @@
 #include <filesystem>
 #include <map>
 
+#include "base/error.h"
+#include "base/files/temporary_folder.h"
+#include "base/math/distance.h"
 #include "flexel/export/gmsh.h"
 #include "flexel/export/mesh.h"
-#include "formats/distance.h"
-#include "formats/error.h"
-#include "formats/surface_file.h"
-#include "formats/temporary_folder.h"
+#include "formats/exchange/surface_file.h"
 
-namespace flexel {
+namespace flexel::mesh_export {
 namespace {
 
-constexpr double kRegionAngle = 30;   // degrees, as regions of meshes are told (formats/surface.h)
+constexpr double kRegionAngle = 30;   // degrees, as regions of meshes are told (formats/part/surface.h)
 constexpr std::size_t kSamples = 25;  // triangles of a surface that are asked which face they are on
 constexpr double kTetFacing = 0.3;    // cosine
 constexpr double kBoxTolerance = 0.02;
@@ -277,4 +277,4 @@ AnalysisMesh tetrahedra(const std::vector<std::string>& paths, const Surface& su
   return mesh;
 }
 
-}  // namespace flexel
+}  // namespace flexel::mesh_export

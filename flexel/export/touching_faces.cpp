@@ -3,11 +3,11 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
+#include "base/math/area_vector.h"
+#include "base/math/distance.h"
 #include "flexel/export/analysis.h"
-#include "formats/area_vector.h"
-#include "formats/distance.h"
 
-namespace flexel {
+namespace flexel::mesh_export {
 namespace {
 
 constexpr double kOpposed = -0.7;  // cosine between the normals
@@ -82,4 +82,4 @@ std::vector<TiedFaces> touching_faces(const AnalysisMesh& mesh, double tolerance
   return result;
 }
 
-}  // namespace flexel
+}  // namespace flexel::mesh_export

@@ -4,14 +4,15 @@
 
 #include <fmt/format.h>
 
+#include "base/error.h"
+#include "base/human.h"
+#include "base/units.h"
 #include "flexel/export/analysis.h"
-#include "formats/error.h"
-#include "formats/human.h"
-#include "formats/units.h"
+#include "simulate/result/options.h"
 #include "simulate/simulate.h"
 #include "voxelize/voxelize.h"
 
-namespace flexel {
+namespace flexel::mesh_export {
 namespace {
 
 constexpr double kTouching = 1e-2;  // of the spacing or the mesh's edge: surfaces this near touch
@@ -20,7 +21,7 @@ constexpr std::size_t kProbeCells = 3000;
 constexpr double kSmallShare = 1e-3, kDifference = 0.01;
 constexpr double kSmallAngle = 0.01;  // rad
 
-std::string kind_of(const Load& load) {
+std::string kind_of(const simulate::Load& load) {
   if (load.pressure) return "pressure";
   if (load.bearing) return "bearing load";
   if (load.torque && !load.force) return "torque";
@@ -28,11 +29,12 @@ std::string kind_of(const Load& load) {
   return "force";
 }
 
-AnalysisLoad translate_load(const Load& load, const AnalysisMesh& mesh, const Setting& setting) {
+AnalysisLoad translate_load(const simulate::Load& load, const AnalysisMesh& mesh,
+                            const simulate::Problem& problem) {
   AnalysisLoad result;
   result.name = load.name;
   result.kind = kind_of(load);
-  const std::vector<Vec3> forces = nodal_forces(load, mesh, setting);
+  const std::vector<Vec3> forces = nodal_forces(load, mesh, problem);
   for (std::uint32_t node = 0; node < forces.size(); ++node)
     if (forces[node] != Vec3::Zero()) {
       result.forces.emplace_back(node, forces[node]);
@@ -54,8 +56,8 @@ double mesh_size(const AnalysisMesh& mesh) {
   return sum / static_cast<double>(mesh.element_count());
 }
 
-void add_ties(const Scene& scene, Analysis& analysis) {
-  if (!scene.get<Bonds>().bond || analysis.mesh.body.parts.size() < 2) return;
+void add_ties(const simulate::Scene& scene, Analysis& analysis) {
+  if (!scene.get<simulate::Bonds>().bond || analysis.mesh.body.parts.size() < 2) return;
   const double size = mesh_size(analysis.mesh);
   const bool lattice = analysis.mesh.kind == AnalysisMesh::Kind::hexahedra;
   analysis.ties = touching_faces(analysis.mesh, kTouching * size);
@@ -66,13 +68,13 @@ void add_ties(const Scene& scene, Analysis& analysis) {
         "--mesh tet ties the faces themselves");
 }
 
-void scale_actions(Scene& scene, double factor) {
-  for (Load& load : scene.get<Loads>().loads) {
+void scale_actions(simulate::Scene& scene, double factor) {
+  for (simulate::Load& load : scene.get<simulate::Loads>().loads) {
     if (load.force) *load.force *= factor;
     if (load.torque) *load.torque *= factor;
     if (load.pressure) *load.pressure *= factor;
   }
-  for (Tie& tie : scene.get<Ties>().ties) {
+  for (simulate::Tie& tie : scene.get<simulate::Ties>().ties) {
     tie.motion.translation *= factor;
     tie.motion.angle *= factor;
     if (tie.link) {
@@ -80,12 +82,12 @@ void scale_actions(Scene& scene, double factor) {
       tie.link->torque *= factor;
     }
   }
-  if (auto& g = scene.get<Gravity>().acceleration) *g *= factor;
+  if (auto& g = scene.get<simulate::Gravity>().acceleration) *g *= factor;
 }
 
 }  // namespace
 
-void refuse_untranslatable(const Scene& scene, const Setting& setting) {
+void refuse_untranslatable(const simulate::Scene& scene, const simulate::Problem& problem) {
   if (scene.run.time)
     throw InputError(
         scene.name,
@@ -93,24 +95,24 @@ void refuse_untranslatable(const Scene& scene, const Setting& setting) {
         "what needs it out, or use --scene with another file");
   if (!scene.events.empty())
     throw InputError(scene.name, "[[event]] has no translation: only equilibrium is exported");
-  for (const Tie& tie : scene.get<Ties>().ties)
+  for (const simulate::Tie& tie : scene.get<simulate::Ties>().ties)
     if (tie.link)
       throw InputError(tie.origin, fmt::format("load \"{}\": a rigid link has no translation; export it with "
                                                "link = \"averaging\"",
                                                tie.name));
-  Effects::Parameters others = scene.effects;
-  std::get<Gravity::Parameters>(others).acceleration.reset();
-  std::get<Loads::Parameters>(others) = {};
-  std::get<Ties::Parameters>(others) = {};
-  std::get<Bonds::Parameters>(others).bond = false;
-  for (const Pass& pass : Effects::passes(others, setting))
+  simulate::Effects::Parameters others = scene.effects;
+  std::get<simulate::Gravity::Parameters>(others).acceleration.reset();
+  std::get<simulate::Loads::Parameters>(others) = {};
+  std::get<simulate::Ties::Parameters>(others) = {};
+  std::get<simulate::Bonds::Parameters>(others).bond = false;
+  for (const simulate::Pass& pass : simulate::Effects::passes(others, problem))
     throw InputError(scene.name,
                      fmt::format("{} ({}) has no translation: gravity, loads, fixes, moves and bonded parts "
                                  "are exported; leave it out",
                                  pass.name, pass.why));
 }
 
-std::vector<std::string> drop_models(Scene& scene) {
+std::vector<std::string> drop_models(simulate::Scene& scene) {
   std::vector<std::string> lines;
   for (auto& [name, settings] : scene.parts) {
     if (!settings.model.empty() && settings.model != "cells")
@@ -123,27 +125,27 @@ std::vector<std::string> drop_models(Scene& scene) {
   return lines;
 }
 
-Analysis translate(AnalysisMesh mesh, const Scene& scene, const Setting& setting) {
+Analysis translate(AnalysisMesh mesh, const simulate::Scene& scene, const simulate::Problem& problem) {
   Analysis analysis;
   analysis.mesh = std::move(mesh);
-  analysis.materials = setting.materials;
+  analysis.materials = problem.materials;
   HeldValues taken;
   std::size_t shared = 0;
-  for (const Tie& tie : scene.get<Ties>().ties)
-    analysis.supports.push_back(hold(tie, analysis.mesh, setting, taken, shared));
+  for (const simulate::Tie& tie : scene.get<simulate::Ties>().ties)
+    analysis.supports.push_back(hold(tie, analysis.mesh, problem, taken, shared));
   if (shared > 0)
     analysis.warnings.push_back(fmt::format(
         "{} displacement(s) of nodes that two supports share are led differently by them: the first holds",
         human_count(shared)));
-  for (const Load& load : scene.get<Loads>().loads) {
-    analysis.loads.push_back(translate_load(load, analysis.mesh, setting));
+  for (const simulate::Load& load : scene.get<simulate::Loads>().loads) {
+    analysis.loads.push_back(translate_load(load, analysis.mesh, problem));
     if (!load.course.time.empty())
       analysis.warnings.push_back(fmt::format("load \"{}\": its course in time is left out", load.name));
   }
-  analysis.gravity = scene.get<Gravity>().acceleration;
+  analysis.gravity = scene.get<simulate::Gravity>().acceleration;
   add_ties(scene, analysis);
-  for (const Probe& probe : scene.probes)
-    analysis.probes.push_back(place_probe(probe, analysis.mesh, setting));
+  for (const simulate::Probe& probe : scene.probes)
+    analysis.probes.push_back(place_probe(probe, analysis.mesh, problem));
   analysis.load_steps = scene.run.load_steps;
   if (scene.run.renormalise)
     analysis.warnings.push_back(
@@ -151,11 +153,11 @@ Analysis translate(AnalysisMesh mesh, const Scene& scene, const Setting& setting
   return analysis;
 }
 
-bool large_deflection(const Surface& surface, Scene scene, int threads, std::string& why) {
-  SimulateOptions options;
+bool large_deflection(const Surface& surface, simulate::Scene scene, int threads, std::string& why) {
+  simulate::SimulateOptions options;
   options.threads = threads;
   options.stress = options.estimate = false;
-  for (const Tie& tie : scene.get<Ties>().ties)
+  for (const simulate::Tie& tie : scene.get<simulate::Ties>().ties)
     if (std::abs(tie.motion.angle) > kSmallAngle) {
       why = fmt::format("\"{}\" is turned by {:.3g} degrees", tie.name, tie.motion.angle * 180 / M_PI);
       return true;
@@ -163,14 +165,15 @@ bool large_deflection(const Surface& surface, Scene scene, int threads, std::str
   Progress silent("", Progress::Mode::silent);
   double moved[2] = {0, 0};
   try {
-    VoxelizeOptions coarse;
+    voxelize::VoxelizeOptions coarse;
     coarse.count = kProbeCells;
-    Body body = voxelize(surface, coarse, silent).body;
+    Body body = voxelize::voxelize(surface, coarse, silent).body;
     for (const bool small : {true, false}) {
-      Scene scaled = scene;
+      simulate::Scene scaled = scene;
       if (small) scale_actions(scaled, kSmallShare);
       Body copy = body;
-      moved[small] = simulate(copy, scaled, options, silent).largest_displacement / (small ? kSmallShare : 1);
+      moved[small] =
+          simulate::simulate(copy, scaled, options, silent).largest_displacement / (small ? kSmallShare : 1);
     }
   } catch (const DivergedError&) {
     if (moved[1] > 0) {
@@ -193,4 +196,4 @@ bool large_deflection(const Surface& surface, Scene scene, int threads, std::str
   return difference > kDifference;
 }
 
-}  // namespace flexel
+}  // namespace flexel::mesh_export

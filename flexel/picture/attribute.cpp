@@ -7,10 +7,10 @@
 #include <cmath>
 #include <limits>
 
-#include "formats/fields.h"
-#include "formats/parallel.h"
+#include "base/parallel.h"
+#include "formats/lattice/fields.h"
 
-namespace flexel {
+namespace flexel::picture {
 namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
@@ -158,4 +158,4 @@ std::vector<double> at_vertices(const Body& body, const Attribute& attribute,
   return values;
 }
 
-}  // namespace flexel
+}  // namespace flexel::picture

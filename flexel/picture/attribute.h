@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "formats/body.h"
+#include "formats/lattice/body.h"
 
-namespace flexel {
+namespace flexel::picture {
 
 // One value for each element, cell, vertex or polygon; SI; NaN where nothing is known.
 struct Attribute {
@@ -24,11 +24,11 @@ struct Attribute {
 [[nodiscard]] std::optional<Attribute> body_attribute(const Body& body, const std::string& name);
 [[nodiscard]] std::vector<std::string> body_attribute_names(const Body& body);
 
-// strains() of formats/fields.h, of cells or elements.
+// strains() of formats/lattice/fields.h, of cells or elements.
 [[nodiscard]] Attribute strain(const Body& body);
 
 // The largest "displacement", "strain" or "von_mises" of the part's matter, as the summary of a run gives it
-// (formats/fields.h, simulate/stress.h); nothing for other names.
+// (formats/lattice/fields.h, simulate/models/stress.h); nothing for other names.
 [[nodiscard]] std::optional<double> largest_in_matter(const Body& body, const std::string& name);
 
 // Values of cells at the elements: the mean over the element's cells, weighted by fill; and of elements in
@@ -55,4 +55,4 @@ struct AttributeName {
 [[nodiscard]] std::optional<std::vector<double>> displacement_values(const std::vector<Vec3>& displacement,
                                                                      std::optional<int> component);
 
-}  // namespace flexel
+}  // namespace flexel::picture

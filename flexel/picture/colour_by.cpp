@@ -3,11 +3,11 @@
 
 #include <algorithm>
 
+#include "base/error.h"
+#include "base/nearest_word.h"
 #include "flexel/picture/panel.h"
-#include "formats/error.h"
-#include "formats/program.h"
 
-namespace flexel {
+namespace flexel::picture {
 namespace {
 
 std::vector<std::string> names_of(const PictureSubject& subject, PictureOptions::Show show) {
@@ -63,4 +63,4 @@ ColourBy colour_by(const std::vector<PictureSubject>& subjects, const PictureOpt
   return {name, !every};
 }
 
-}  // namespace flexel
+}  // namespace flexel::picture

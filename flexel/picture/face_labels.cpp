@@ -11,10 +11,10 @@
 #include <numbers>
 #include <numeric>
 
-#include "flexel/picture/annotate.h"
-#include "flexel/picture/text.h"
+#include "flexel/picture/canvas/text.h"
+#include "flexel/picture/render/annotate.h"
 
-namespace flexel {
+namespace flexel::picture {
 namespace {
 
 constexpr int kStepX = 4, kStepY = 2;       // pixels
@@ -176,4 +176,4 @@ void label_faces(Image& image, const Viewport& viewport, const Camera& camera, c
   }
 }
 
-}  // namespace flexel
+}  // namespace flexel::picture

@@ -5,7 +5,7 @@
 
 #include "flexel/picture/panel.h"
 
-namespace flexel {
+namespace flexel::picture {
 
 // What stands on each face of the subject's surface: its number as in `flexel info`, with the part's name
 // where there are several parts ("knob/3").
@@ -18,4 +18,4 @@ void label_faces(Image& image, const Viewport& viewport, const Camera& camera, c
                  const std::vector<std::string>& texts, float size, bool beside,
                  std::vector<std::uint8_t>& shown);
 
-}  // namespace flexel
+}  // namespace flexel::picture

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <numeric>
 
-#include "formats/parallel.h"
+#include "base/parallel.h"
 
-namespace flexel {
+namespace flexel::picture {
 namespace {
 
 // Corners of a cell's six faces, counter-clockwise from outside; corner a = i + 2 j + 4 k.
@@ -99,4 +99,4 @@ Drawable draw_elements(const Body& body, const std::vector<Vec3>& positions, con
   return drawn;
 }
 
-}  // namespace flexel
+}  // namespace flexel::picture

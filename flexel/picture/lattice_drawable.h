@@ -1,9 +1,9 @@
 // The lattice of a body as something to draw.
 #pragma once
-#include "flexel/picture/drawable.h"
-#include "formats/body.h"
+#include "flexel/picture/render/drawable.h"
+#include "formats/lattice/body.h"
 
-namespace flexel {
+namespace flexel::picture {
 
 // The faces of cells that no other cell shares, two triangles each, with the cells' edges as borders; broken
 // cells are left out (unless there are no others).
@@ -19,4 +19,4 @@ struct CellHull {
 [[nodiscard]] Drawable draw_elements(const Body& body, const std::vector<Vec3>& positions,
                                      const DrawingFrame& frame);
 
-}  // namespace flexel
+}  // namespace flexel::picture

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace flexel {
+namespace flexel::picture {
 namespace {
 
 struct Grid {
@@ -105,4 +105,4 @@ Framing frame_panels(const std::vector<Panel>& panels, const Layout& layout, con
   return framing;
 }
 
-}  // namespace flexel
+}  // namespace flexel::picture

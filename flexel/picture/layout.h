@@ -2,10 +2,10 @@
 #pragma once
 #include <vector>
 
-#include "flexel/picture/annotate.h"
 #include "flexel/picture/panel.h"
+#include "flexel/picture/render/annotate.h"
 
-namespace flexel {
+namespace flexel::picture {
 
 // The picture's text is `text` pixels to the em. Panels stand side by side, in as many rows as gives them the
 // most room; below them run the axes and the scale bar, at the right the legend.
@@ -30,4 +30,4 @@ struct Framing {
 [[nodiscard]] Framing frame_panels(const std::vector<Panel>& panels, const Layout& layout,
                                    const std::vector<View>& views);
 
-}  // namespace flexel
+}  // namespace flexel::picture

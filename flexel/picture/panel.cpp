@@ -7,15 +7,14 @@
 #include <cmath>
 #include <limits>
 
+#include "base/error.h"
+#include "base/parallel.h"
 #include "flexel/picture/lattice_drawable.h"
-#include "flexel/picture/quantity.h"
-#include "flexel/picture/thickness.h"
-#include "formats/error.h"
-#include "formats/parallel.h"
-#include "formats/program.h"
-#include "mapping/map.h"
+#include "flexel/picture/render/quantity.h"
+#include "flexel/picture/render/thickness.h"
+#include "mapping/methods/map_surface.h"
 
-namespace flexel {
+namespace flexel::picture {
 namespace {
 
 // The centre and half diagonal of everything drawn.
@@ -107,7 +106,7 @@ void set_surface_values(const Surface& surface, const MeshTopology& mesh, const 
 void draw_body_surface(const Body& body, const PictureOptions& options, const ColourBy& by,
                        Progress& progress, Panel& panel) {
   const Surface& surface = body.surface;
-  const MapResult mapped = map_surface(body, MapOptions{}, progress);
+  const mapping::MapResult mapped = map_surface(body, mapping::MapOptions{}, progress);
   for (const Vec3& u : mapped.displacement)
     if (!u.allFinite())
       throw InputError(panel.subject->where,
@@ -222,4 +221,4 @@ Panel make_panel(const PictureSubject& subject, const PictureOptions& options, c
   return panel;
 }
 
-}  // namespace flexel
+}  // namespace flexel::picture

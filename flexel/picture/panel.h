@@ -4,12 +4,12 @@
 #include <optional>
 
 #include "flexel/picture/attribute.h"
-#include "flexel/picture/best_view.h"
-#include "flexel/picture/drawable.h"
 #include "flexel/picture/picture.h"
-#include "flexel/picture/render.h"
+#include "flexel/picture/render/best_view.h"
+#include "flexel/picture/render/drawable.h"
+#include "flexel/picture/render/render.h"
 
-namespace flexel {
+namespace flexel::picture {
 
 // The quantity that all panels are coloured by.
 struct ColourBy {
@@ -40,4 +40,4 @@ struct Panel {
 [[nodiscard]] Panel make_panel(const PictureSubject& subject, const PictureOptions& options,
                                const ColourBy& by, Progress& progress);
 
-}  // namespace flexel
+}  // namespace flexel::picture

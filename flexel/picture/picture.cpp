@@ -7,16 +7,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/error.h"
+#include "base/human.h"
+#include "base/stop.h"
+#include "flexel/picture/canvas/text.h"
 #include "flexel/picture/face_labels.h"
 #include "flexel/picture/layout.h"
-#include "flexel/picture/lines.h"
 #include "flexel/picture/panel.h"
-#include "flexel/picture/text.h"
-#include "formats/error.h"
-#include "formats/human.h"
-#include "formats/stop.h"
+#include "flexel/picture/render/lines.h"
 
-namespace flexel {
+namespace flexel::picture {
 namespace {
 
 constexpr std::uint32_t kPaper = 0xfafbfc, kRestInk = 0x7a8794;
@@ -268,4 +268,4 @@ PictureResult draw_picture(const std::vector<PictureSubject>& subjects, const Pi
   return result;
 }
 
-}  // namespace flexel
+}  // namespace flexel::picture

@@ -5,12 +5,12 @@
 #include <utility>
 #include <vector>
 
-#include "flexel/picture/camera.h"
-#include "flexel/picture/image.h"
-#include "formats/body.h"
-#include "formats/progress.h"
+#include "base/program/progress.h"
+#include "flexel/picture/canvas/image.h"
+#include "flexel/picture/render/camera.h"
+#include "formats/lattice/body.h"
 
-namespace flexel {
+namespace flexel::picture {
 
 // One panel: a surface, or a body (whose own surface is drawn).
 struct PictureSubject {
@@ -44,4 +44,4 @@ struct PictureResult {
 [[nodiscard]] PictureResult draw_picture(const std::vector<PictureSubject>& subjects,
                                          const PictureOptions& options, Progress& progress);
 
-}  // namespace flexel
+}  // namespace flexel::picture

@@ -18,8 +18,8 @@
 #include <cstring>
 #include <sstream>
 
-#include "formats/error.h"
-#include "formats/stop.h"
+#include "base/error.h"
+#include "base/stop.h"
 
 namespace flexel {
 namespace {

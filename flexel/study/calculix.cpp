@@ -13,7 +13,7 @@
 #include <regex>
 #include <sstream>
 
-#include "formats/error.h"
+#include "base/error.h"
 
 namespace flexel::study {
 namespace {

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "formats/vec.h"
+#include "base/math/vec.h"
 
 namespace flexel::study {
 

@@ -7,8 +7,9 @@
 #include <fstream>
 #include <thread>
 
+#include "base/error.h"
+#include "base/version.h"
 #include "flexel/study/study.h"
-#include "formats/program.h"
 
 namespace flexel::study {
 

@@ -11,12 +11,12 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 
-#include "flexel/study/history.h"
+#include "base/error.h"
+#include "base/files/files.h"
+#include "flexel/study/history_csv.h"
 #include "flexel/study/scene_edit.h"
-#include "formats/body_file.h"
-#include "formats/error.h"
-#include "formats/files.h"
-#include "simulate/coarsen.h"
+#include "formats/lattice/body_file.h"
+#include "simulate/estimate/coarsen.h"
 
 namespace flexel::study {
 namespace {
@@ -133,8 +133,9 @@ class Run {
     }
     // Where no wall is thin there is no need to look at the matter. Centre placement has no cells to ask.
     if (thin > 0)
-      result_.thin_matter =
-          result_.cells == 0 ? thin / samples : share_of_thin_walls(read_body(file("rest.vtu")), kThinWall);
+      result_.thin_matter = result_.cells == 0
+                                ? thin / samples
+                                : simulate::share_of_thin_walls(read_body(file("rest.vtu")), kThinWall);
     return true;
   }
 

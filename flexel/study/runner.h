@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "base/files/temporary_folder.h"
+#include "base/math/vec.h"
 #include "flexel/process/child.h"
-#include "formats/temporary_folder.h"
-#include "formats/vec.h"
 
 namespace flexel::study {
 

@@ -7,9 +7,8 @@
 
 #include <sstream>
 
-#include "formats/error.h"
-#include "formats/program.h"
-#include "formats/units.h"
+#include "base/error.h"
+#include "base/units.h"
 
 namespace flexel::study {
 namespace {

@@ -10,10 +10,10 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "base/error.h"
+#include "base/files/files.h"
+#include "base/units.h"
 #include "flexel/study/calculix.h"
-#include "formats/error.h"
-#include "formats/files.h"
-#include "formats/units.h"
 #include "voxelize/memory.h"
 
 namespace flexel::study {
@@ -196,8 +196,8 @@ std::string Session::why_not(const Trial& trial, const Prediction& told) const {
                        size ? "another size" : "first runs");
   if (!size && told.seconds > kSideShare * wanted_.budget)
     return "time: beside the sizes no run may take more than a tenth of the budget";
-  if (told.bytes > kMemoryShare * available_memory())
-    return fmt::format("memory: {} are free", human_bytes(available_memory()));
+  if (told.bytes > kMemoryShare * voxelize::available_memory())
+    return fmt::format("memory: {} are free", human_bytes(voxelize::available_memory()));
   return "";
 }
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "base/program/progress.h"
 #include "flexel/study/study.h"
-#include "formats/progress.h"
 
 namespace flexel::study {
 

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <sstream>
 
-#include "flexel/study/history.h"
+#include "base/error.h"
+#include "base/files/files.h"
+#include "base/units.h"
+#include "flexel/study/history_csv.h"
 #include "flexel/study/session.h"
-#include "formats/error.h"
-#include "formats/files.h"
-#include "formats/units.h"
 
 namespace flexel::study {
 namespace {

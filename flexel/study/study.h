@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "flexel/study/measure.h"
+#include "flexel/study/accuracy_analysis.h"
 #include "flexel/study/sweep.h"
 
 namespace flexel::study {

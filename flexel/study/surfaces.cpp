@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/error.h"
 #include "flexel/study/hausdorff.h"
 #include "flexel/study/study.h"
-#include "formats/error.h"
-#include "formats/import.h"
-#include "formats/surface_file.h"
+#include "formats/exchange/import.h"
+#include "formats/exchange/surface_file.h"
 
 namespace flexel::study {
 namespace {

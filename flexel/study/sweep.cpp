@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "flexel/study/measure.h"
-#include "formats/units.h"
+#include "base/units.h"
+#include "flexel/study/accuracy_analysis.h"
 
 namespace flexel::study {
 namespace {

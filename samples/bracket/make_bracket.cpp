@@ -48,9 +48,10 @@
 #include <string>
 #include <vector>
 
-#include "formats/error.h"
-#include "formats/files.h"
-#include "formats/program.h"
+#include "base/error.h"
+#include "base/files/files.h"
+#include "base/program/arguments.h"
+#include "base/program/program.h"
 
 namespace {
 

@@ -4,7 +4,7 @@
 #include <bit>
 #include <cmath>
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 constexpr double kMostCubes = 1 << 20;  // along an axis, so that a key has room
@@ -58,4 +58,4 @@ CubeOrder::CubeOrder(const std::vector<Vec3>& points, double width) {
   }
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -8,10 +8,10 @@
 #include <span>
 #include <vector>
 
-#include "formats/parallel.h"
-#include "formats/vec.h"
+#include "base/math/vec.h"
+#include "base/parallel.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 // Compressed rows: those of point i that have a higher number, ascending.
 struct Neighbours {
@@ -106,4 +106,4 @@ template <class Keep>
   return result;
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

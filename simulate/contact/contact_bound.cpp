@@ -9,7 +9,7 @@
 
 #include "simulate/contact/contacts.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 constexpr double kHardeningAhead = 1.3;              // of what hardens now, until it is looked at again
@@ -76,7 +76,7 @@ double Contacts::frequency(const State& state) {
   return promised_ + motion * motion;
 }
 
-bool Contacts::hurried(const State& state) {
+bool Contacts::needs_step_recheck(const State& state) {
   if (points_.empty()) return false;
   if (speed(state) * state.kick > kMostTravel * narrowest_) return true;
   look(state);
@@ -89,4 +89,4 @@ bool Contacts::hurried(const State& state) {
   return stiffness_bound() > 1.001 * promised_;
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -9,7 +9,7 @@
 
 #include "simulate/contact/contact_points.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 constexpr double kSharp = 0.866;   // cosine of 30 degrees between the normals of the faces
@@ -74,7 +74,7 @@ std::vector<Edge> sharp_edges(const Surface& surface, const std::vector<std::uin
 
 class Sampler {
  public:
-  Sampler(const Setting& setting, std::vector<Edge> edges) : setting_(setting), edges_(std::move(edges)) {}
+  Sampler(const Problem& problem, std::vector<Edge> edges) : problem_(problem), edges_(std::move(edges)) {}
 
   std::vector<ContactPoint> operator()() {
     // corners first, for they are the outermost
@@ -87,11 +87,11 @@ class Sampler {
         std::vector<Vec3> normals;
         for (const std::size_t e : edges)
           normals.insert(normals.end(), edges_[e].normals.begin(), edges_[e].normals.end());
-        add(setting_.body.surface.vertices[vertex[1]], normals, edges_[edges.front()].polygon);
+        add(problem_.body.surface.vertices[vertex[1]], normals, edges_[edges.front()].polygon);
       }
     for (const Edge& edge : edges_) {
-      const Vec3 &a = setting_.body.surface.vertices[edge.ends[0]],
-                 &b = setting_.body.surface.vertices[edge.ends[1]];
+      const Vec3 &a = problem_.body.surface.vertices[edge.ends[0]],
+                 &b = problem_.body.surface.vertices[edge.ends[1]];
       const double width = width_of(edge.polygon);
       const auto pieces = static_cast<int>(std::ceil((b - a).norm() / (kSpacing * width)));
       for (int i = 1; i < pieces; ++i)
@@ -103,10 +103,10 @@ class Sampler {
 
  private:
   [[nodiscard]] std::uint32_t part_of(std::uint32_t polygon) const {
-    return setting_.body.surface.polygon_part(polygon);
+    return problem_.body.surface.polygon_part(polygon);
   }
   [[nodiscard]] double width_of(std::uint32_t polygon) const {
-    return setting_.body.parts[part_of(polygon)].lattice.spacing.mean();
+    return problem_.body.parts[part_of(polygon)].lattice.spacing.mean();
   }
 
   void add(const Vec3& position, const std::vector<Vec3>& normals, std::uint32_t polygon) {
@@ -116,7 +116,7 @@ class Sampler {
     for (const Vec3& each : normals) mean += each;
     if (!(mean.norm() > 1e-3) || crowded(part, position, width)) return;
     mean.normalize();
-    const auto at = carrier_on_surface(setting_, polygon, position, mean);
+    const auto at = carrier_on_surface(problem_, polygon, position, mean);
     if (!at) return;
     double widest = 1;
     for (const Vec3& each : normals) widest = std::min(widest, mean.dot(each));
@@ -151,7 +151,7 @@ class Sampler {
     return false;
   }
 
-  const Setting& setting_;
+  const Problem& problem_;
   std::vector<Edge> edges_;
   std::map<std::array<std::int64_t, 4>, std::vector<Vec3>> taken_;
   std::vector<ContactPoint> points_;
@@ -159,11 +159,11 @@ class Sampler {
 
 }  // namespace
 
-std::vector<ContactPoint> edge_points(const Setting& setting, const std::vector<std::uint8_t>& parts) {
+std::vector<ContactPoint> edge_points(const Problem& problem, const std::vector<std::uint8_t>& parts) {
   std::vector<std::uint8_t> wanted = parts;
   for (std::size_t p = 0; p < wanted.size(); ++p)
-    if (setting.body.parts[p].placement != Placement::corner) wanted[p] = 0;
-  return Sampler(setting, sharp_edges(setting.body.surface, wanted))();
+    if (problem.body.parts[p].placement != Placement::corner) wanted[p] = 0;
+  return Sampler(problem, sharp_edges(problem.body.surface, wanted))();
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

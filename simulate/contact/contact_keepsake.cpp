@@ -8,7 +8,7 @@
 
 #include "simulate/contact/contacts.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 constexpr std::size_t kOfPoint = 7, kOfPair = 2 * kOfPoint + 6;
@@ -27,11 +27,11 @@ PointName name_of(const ContactPoint& point) {
 
 }  // namespace
 
-std::vector<double> Contacts::keepsake() const {
+std::vector<double> Contacts::transfer_state() const {
   std::vector<double> kept{static_cast<double>(joined_.size())};
   kept.insert(kept.end(), joined_.begin(), joined_.end());
   for (const Memory& memory : memory_) {
-    if (memory.standing == Standing::apart && memory.inside == 0) continue;
+    if (memory.standing == PairPhase::apart && memory.inside == 0) continue;
     const std::uint64_t j = memory.key & 0xffffffff;
     const bool plane = j >= points_.size();
     const PointName one = name_of(points_[memory.key >> 32]);
@@ -47,18 +47,18 @@ std::vector<double> Contacts::keepsake() const {
   return kept;
 }
 
-void Contacts::take_over(const std::vector<double>& keepsake) {
+void Contacts::restore_from(const std::vector<double>& transfer_state) {
   std::map<PointName, std::uint32_t> numbers;
   for (std::uint32_t i = 0; i < points_.size(); ++i) numbers.try_emplace(name_of(points_[i]), i);
   for (std::uint32_t p = 0; p < settings_.planes.size(); ++p)
     numbers.try_emplace({-1, static_cast<double>(p)}, static_cast<std::uint32_t>(points_.size() + p));
   memory_.clear();
-  if (keepsake.empty()) return;
-  const double* pairs = keepsake.data() + 1 + static_cast<std::size_t>(keepsake[0]);
-  joined_.assign(keepsake.data() + 1, pairs);
-  for (std::size_t at = static_cast<std::size_t>(pairs - keepsake.data()); at + kOfPair <= keepsake.size();
-       at += kOfPair) {
-    const double* from = keepsake.data() + at;
+  if (transfer_state.empty()) return;
+  const double* pairs = transfer_state.data() + 1 + static_cast<std::size_t>(transfer_state[0]);
+  joined_.assign(transfer_state.data() + 1, pairs);
+  for (std::size_t at = static_cast<std::size_t>(pairs - transfer_state.data());
+       at + kOfPair <= transfer_state.size(); at += kOfPair) {
+    const double* from = transfer_state.data() + at;
     std::array<std::uint64_t, 2> ends{};
     bool there = true;
     for (std::size_t side = 0; side < 2; ++side, from += kOfPoint) {
@@ -71,9 +71,9 @@ void Contacts::take_over(const std::vector<double>& keepsake) {
     if (!there) continue;
     const Vec3 stretch = (ends[0] < ends[1] ? 1 : -1) * Vec3(from[0], from[1], from[2]);
     memory_.push_back({std::min(ends[0], ends[1]) << 32 | std::max(ends[0], ends[1]), stretch, from[3],
-                       static_cast<Standing>(static_cast<int>(from[4])), from[5]});
+                       static_cast<PairPhase>(static_cast<int>(from[4])), from[5]});
   }
   std::sort(memory_.begin(), memory_.end(), [](const Memory& a, const Memory& b) { return a.key < b.key; });
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -3,7 +3,7 @@
 
 #include "simulate/contact/contacts.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 constexpr double kSoft = 0.01;    // of a spacing, over which pressure begins
@@ -71,7 +71,7 @@ PairConstants Contacts::plane_constants(std::uint32_t i) const {
 }
 
 // Of the points of one part that look at each other at rest, those that matter joins within kHops.
-void Contacts::find_near_matter(const Setting& setting) {
+void Contacts::find_near_matter(const Problem& problem) {
   std::vector<Vec3> rest;
   for (const ContactPoint& point : points_) rest.push_back(point.rest);
   if (rest.empty()) return;
@@ -81,13 +81,13 @@ void Contacts::find_near_matter(const Setting& setting) {
         return a.part == b.part && (a.rest - b.rest).norm() < kNearMatter * a.width &&
                a.normal.dot(b.normal) < kSameSide;
       });
-  const Adjacency matter = element_adjacency(setting.body);
+  const Adjacency matter = element_adjacency(problem.body);
   std::vector<std::vector<std::uint32_t>> joined(points_.size());
   parallel_for_each(
       points_.size(),
       [&](std::size_t i) {
         if (facing.of(i).empty()) return;
-        const Carrier& from = points_[i].at;
+        const InterpolationWeights& from = points_[i].at;
         std::vector<std::uint32_t> reached(from.elements.begin(), from.elements.begin() + from.count);
         std::size_t begin = 0;
         for (int hop = 0; hop < kHops; ++hop) {
@@ -99,7 +99,7 @@ void Contacts::find_near_matter(const Setting& setting) {
           begin = 0;
         }
         for (const std::uint32_t j : facing.of(i)) {
-          const Carrier& to = points_[j].at;
+          const InterpolationWeights& to = points_[j].at;
           for (std::uint32_t a = 0; a < to.count; ++a)
             if (std::binary_search(reached.begin(), reached.end(), to.elements[a])) {
               joined[i].push_back(j);
@@ -279,7 +279,7 @@ void Contacts::number_near() {
   }
   near_elements_.clear();
   for (const std::uint32_t point : near_) {
-    const Carrier& at = points_[point].at;
+    const InterpolationWeights& at = points_[point].at;
     near_elements_.insert(near_elements_.end(), at.elements.begin(), at.elements.begin() + at.count);
   }
   std::sort(near_elements_.begin(), near_elements_.end());
@@ -289,4 +289,4 @@ void Contacts::number_near() {
   close_.clear();
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

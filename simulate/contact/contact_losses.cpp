@@ -17,7 +17,7 @@
 
 #include "simulate/contact/contacts.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 constexpr double kAcross = 0.8;  // stiffness along the surface, of that along the normal
@@ -187,4 +187,4 @@ void Contacts::forget_parted() {
   }
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -15,10 +15,10 @@
 
 #include <Eigen/LU>
 
-#include "formats/error.h"
+#include "base/error.h"
 #include "simulate/contact/contacts.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 constexpr double kBorne = 0.05;  // spacings
@@ -210,4 +210,4 @@ void Contacts::refuse_overlap(const State& state) const {
     }
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

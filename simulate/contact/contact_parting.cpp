@@ -8,7 +8,7 @@
 
 #include "simulate/contact/contacts.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 constexpr double kKeepsPressing = 0.25;  // spacings that a new pair may be deeper than is allowed for
@@ -110,9 +110,9 @@ void Contacts::book_letting_out(const std::vector<double>& before) {
   pressing_ = std::move(pressing);
 }
 
-double Contacts::put_in(const State& state) {
+double Contacts::injected_energy(const State& state) {
   look(state);
   return std::exchange(put_in_, 0);
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -6,9 +6,9 @@
 #include <tuple>
 
 #include "simulate/contact/broad_phase.h"
-#include "simulate/surface_points.h"
+#include "simulate/matter/surface_points.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 constexpr double kSamePatch = 0.94;   // cosine of 20 degrees
@@ -60,9 +60,9 @@ void gather(std::vector<Piece>::const_iterator begin, std::vector<Piece>::const_
   }
 }
 
-void add_faces(const Setting& setting, std::uint32_t part, const std::vector<SurfacePoint>& surface,
+void add_faces(const Problem& problem, std::uint32_t part, const std::vector<SurfacePoint>& surface,
                std::vector<ContactPoint>& points) {
-  const Lattice& lattice = setting.body.parts[part].lattice;
+  const Lattice& lattice = problem.body.parts[part].lattice;
   std::vector<Piece> pieces;
   for (const SurfacePoint& point : surface) {
     if (!(point.area_vector.squaredNorm() > 0)) continue;
@@ -83,13 +83,13 @@ void add_faces(const Setting& setting, std::uint32_t part, const std::vector<Sur
 }
 
 // Elements at centres that carry surface: a ball that reaches to the nearest of it.
-void add_balls(const Setting& setting, std::uint32_t part, const std::vector<SurfacePoint>& surface,
+void add_balls(const Problem& problem, std::uint32_t part, const std::vector<SurfacePoint>& surface,
                std::vector<ContactPoint>& points) {
-  const double width = setting.body.parts[part].lattice.spacing.mean();
+  const double width = problem.body.parts[part].lattice.spacing.mean();
   std::vector<std::pair<std::uint32_t, double>> reach;  // element, distance of a piece of surface
   for (const SurfacePoint& point : surface)
     reach.emplace_back(point.at.elements[0],
-                       (point.position - setting.body.rest[point.at.elements[0]]).norm());
+                       (point.position - problem.body.rest[point.at.elements[0]]).norm());
   std::sort(reach.begin(), reach.end());
   for (std::size_t i = 0; i < reach.size(); ++i) {
     if (i > 0 && reach[i].first == reach[i - 1].first) continue;
@@ -97,7 +97,7 @@ void add_balls(const Setting& setting, std::uint32_t part, const std::vector<Sur
     made.shape = ContactShape::ball;
     made.part = part;
     made.at = {{reach[i].first}, {1}, 1};
-    made.rest = setting.body.rest[reach[i].first];
+    made.rest = problem.body.rest[reach[i].first];
     made.area = width * width;
     made.radius = std::min(width, reach[i].second);
     made.depth = made.radius;
@@ -134,22 +134,22 @@ void measure_walls(std::vector<ContactPoint>& points) {
 
 }  // namespace
 
-std::vector<ContactPoint> contact_points(const Setting& setting, const std::vector<std::uint8_t>& parts) {
-  const Body& body = setting.body;
+std::vector<ContactPoint> contact_points(const Problem& problem, const std::vector<std::uint8_t>& parts) {
+  const Body& body = problem.body;
   std::vector<std::vector<std::uint32_t>> polygons(body.parts.size());
   for (std::uint32_t p = 0; p < body.surface.polygon_count(); ++p)
     polygons[body.surface.polygon_part(p)].push_back(p);
   std::vector<ContactPoint> points, balls;
   for (std::uint32_t part = 0; part < body.parts.size(); ++part) {
     if (!parts[part]) continue;
-    const std::vector<SurfacePoint> surface = surface_points(setting, polygons[part]);
+    const std::vector<SurfacePoint> surface = surface_points(problem, polygons[part]);
     if (body.parts[part].placement == Placement::corner)
-      add_faces(setting, part, surface, points);
+      add_faces(problem, part, surface, points);
     else
-      add_balls(setting, part, surface, balls);
+      add_balls(problem, part, surface, balls);
   }
   measure_walls(points);
-  const std::vector<ContactPoint> edges = edge_points(setting, parts);
+  const std::vector<ContactPoint> edges = edge_points(problem, parts);
   points.insert(points.end(), edges.begin(), edges.end());
   points.insert(points.end(), balls.begin(), balls.end());
   std::stable_sort(points.begin(), points.end(),
@@ -157,4 +157,4 @@ std::vector<ContactPoint> contact_points(const Setting& setting, const std::vect
   return points;
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

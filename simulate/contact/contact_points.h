@@ -8,16 +8,16 @@
 #pragma once
 #include <vector>
 
-#include "simulate/carrier.h"
+#include "simulate/matter/interpolation_weights.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 enum class ContactShape : std::uint8_t { face, edge, ball };
 
 struct ContactPoint {
   ContactShape shape = ContactShape::face;
   std::uint32_t part = 0;
-  Carrier at;                  // of the point
+  InterpolationWeights at;     // of the point
   Vec3 rest = Vec3::Zero();    // m, world frame
   Vec3 normal = Vec3::Zero();  // unit, outward, at rest; of an edge the mean of its faces'; of a ball 0
   double area = 0;             // m^2 that it stands for
@@ -29,11 +29,11 @@ struct ContactPoint {
 };
 
 // Of all `parts` that are set (parts). Order: by part, faces before edges.
-[[nodiscard]] std::vector<ContactPoint> contact_points(const Setting& setting,
+[[nodiscard]] std::vector<ContactPoint> contact_points(const Problem& problem,
                                                        const std::vector<std::uint8_t>& parts);
 
 // Those of sharp edges of corner-placed parts (contact_edges.cpp).
-[[nodiscard]] std::vector<ContactPoint> edge_points(const Setting& setting,
+[[nodiscard]] std::vector<ContactPoint> edge_points(const Problem& problem,
                                                     const std::vector<std::uint8_t>& parts);
 
-}  // namespace flexel
+}  // namespace flexel::simulate

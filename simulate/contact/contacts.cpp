@@ -9,12 +9,12 @@
 #include <Eigen/LU>
 #include <utility>
 
-#include "formats/error.h"
-#include "simulate/cell_model.h"
+#include "base/error.h"
+#include "simulate/kernels/chunk_layout.h"
+#include "simulate/models/cell_model.h"
 #include "simulate/rigid/rigid_body.h"
-#include "simulate/time/layout.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 constexpr double kStiffness = 3;          // of a contact, in E / h an area
@@ -25,10 +25,10 @@ constexpr double kLeastWeight = 1e-3;     // of a point on an element
 
 }  // namespace
 
-Contacts::Contacts(ContactSettings settings, const Setting& setting)
-    : settings_(std::move(settings)), body_(setting.body), points_(contact_points(setting, settings_.parts)) {
+Contacts::Contacts(ContactSettings settings, const Problem& problem)
+    : settings_(std::move(settings)), body_(problem.body), points_(contact_points(problem, settings_.parts)) {
   for (std::size_t p = 0; p < body_.parts.size(); ++p) {
-    const Material& material = setting.materials[p];
+    const Material& material = problem.materials[p];
     std::array<Vec3, 8> gradients = cell_kind(body_.parts[p].lattice, material).gradient;
     for (Vec3& each : gradients) each /= 4;
     gradients_.push_back(gradients);
@@ -37,14 +37,14 @@ Contacts::Contacts(ContactSettings settings, const Setting& setting)
     friction_.push_back(material.contact_friction.value_or(settings_.friction));
     stick_.push_back(settings_.stick.empty() ? 0 : settings_.stick[p]);
   }
-  mass_ = lumped_masses(setting);
+  mass_ = lumped_masses(problem);
   rigid_.resize(body_.parts.size());
-  for (std::uint32_t p = 0; p < setting.rigidity.size(); ++p) {
-    if (setting.rigidity[p] == Rigidity::none) continue;
+  for (std::uint32_t p = 0; p < problem.rigidity.size(); ++p) {
+    if (problem.rigidity[p] == Rigidity::none) continue;
     const RigidBody rigid = rigid_body(body_, p, mass_);
     const Eigen::SelfAdjointEigenSolver<Mat3> eigen(rigid.inverse_inertia, Eigen::EigenvaluesOnly);
     rigid_[p] =
-        Whole{setting.rigidity[p] == Rigidity::free, rigid.centre, 1 / rigid.mass, eigen.eigenvalues()[2]};
+        Whole{problem.rigidity[p] == Rigidity::free, rigid.centre, 1 / rigid.mass, eigen.eigenvalues()[2]};
     if (rigid_[p]->free && settings_.parts[p]) felt_.push_back({p});
   }
   // Where an edge runs through a sliver of a cell its elements are light: a point there stands for no more
@@ -53,7 +53,7 @@ Contacts::Contacts(ContactSettings settings, const Setting& setting)
     for (std::uint32_t a = 0; a < point.at.count && point.shape == ContactShape::edge; ++a)
       if (std::abs(point.at.weights[a]) > kLeastWeight)
         point.area = std::min(point.area, 0.5 * mass_[point.at.elements[a]] /
-                                              (setting.materials[point.part].density * point.width *
+                                              (problem.materials[point.part].density * point.width *
                                                std::abs(point.at.weights[a])));
   std::vector<std::uint8_t> carries(body_.element_count(), 0);
   for (const ContactPoint& point : points_) {
@@ -65,7 +65,7 @@ Contacts::Contacts(ContactSettings settings, const Setting& setting)
     if (carries[e]) elements_.push_back(e);
   built_at_.resize(elements_.size());
   find_cells();
-  if (settings_.self) find_near_matter(setting);
+  if (settings_.self) find_near_matter(problem);
 }
 
 void Contacts::find_cells() {
@@ -172,11 +172,11 @@ void Contacts::look(const State& state) {
         if (out_of_reach(pairs_[p])) {
           if (is_close_[p]) states_[p] = {};
           is_close_[p] = 0;
-          memory_[p].standing = Standing::apart;
+          memory_[p].standing = PairPhase::apart;
           return;
         }
         const PairState now = state_of(p, allowed(p));
-        const bool entering = now.near && !now.deep && now.gap < 0 && memory_[p].standing == Standing::apart;
+        const bool entering = now.near && !now.deep && now.gap < 0 && memory_[p].standing == PairPhase::apart;
         if (entering && !comes.empty() && memory_[p].inside == 0 && shares_[later_part(pairs_[p])] > 0)
           comes[p] = 1;
         else
@@ -227,20 +227,20 @@ bool Contacts::out_of_reach(const Pair& pair) const {
 // How the pair stands after its state of now; one that is passed does nothing.
 void Contacts::stand(std::size_t pair, PairState& now) {
   const Pair& at = pairs_[pair];
-  Standing& standing = memory_[pair].standing;
+  PairPhase& standing = memory_[pair].standing;
   if (!now.near) {
-    standing = Standing::apart;
+    standing = PairPhase::apart;
   } else if (now.deep) {
-    standing = Standing::passed;
+    standing = PairPhase::passed;
   } else if (now.gap >= 0) {
-    standing = Standing::meeting;
-  } else if (standing == Standing::apart) {
+    standing = PairPhase::meeting;
+  } else if (standing == PairPhase::apart) {
     double entry = at.constants.law.hard;
     if (sides_[at.i].shapeless || (at.j != kNoPoint && sides_[at.j].shapeless))
       entry = at.j == kNoPoint ? 0 : kShapelessEntry * at.constants.width;
-    standing = -now.gap > entry ? Standing::passed : Standing::meeting;
+    standing = -now.gap > entry ? PairPhase::passed : PairPhase::meeting;
   }
-  if (standing == Standing::passed) now = {};
+  if (standing == PairPhase::passed) now = {};
 }
 
 double Contacts::energy(const State& state) {
@@ -347,7 +347,7 @@ void Contacts::restore(const std::vector<double>& memory) {
     entry.key = static_cast<std::uint64_t>(from[0]) << 32 | static_cast<std::uint64_t>(from[1]);
     entry.stretch = Vec3(from[2], from[3], from[4]);
     entry.stuck = from[5];
-    entry.standing = static_cast<Standing>(static_cast<int>(from[6]));
+    entry.standing = static_cast<PairPhase>(static_cast<int>(from[6]));
     entry.inside = from[7];
     from += kEntry;
   }
@@ -376,4 +376,4 @@ std::vector<std::array<std::uint32_t, 2>> Contacts::touching(const State& state)
   return result;
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

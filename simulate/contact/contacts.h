@@ -17,11 +17,11 @@
 #include "simulate/contact/pair_law.h"
 #include "simulate/contact/settings.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 class Contacts {
  public:
-  Contacts(ContactSettings settings, const Setting& setting);
+  Contacts(ContactSettings settings, const Problem& problem);
   Contacts(const Contacts&) = delete;
   Contacts& operator=(const Contacts&) = delete;
 
@@ -41,14 +41,14 @@ class Contacts {
   void restore(const std::vector<double>& memory);
   // What friction and glue remember, by the places of the points at rest, to go on with in the contacts of a
   // body that an event has changed; what is not there any more is forgotten.
-  [[nodiscard]] std::vector<double> keepsake() const;
-  void take_over(const std::vector<double>& keepsake);
+  [[nodiscard]] std::vector<double> transfer_state() const;
+  void restore_from(const std::vector<double>& transfer_state);
 
   // Throws InputError: parts that are inside each other, or a part inside a plane, deeper than contact bears
   // or lets out. Only at the first look, and in one after an event for the parts that have joined.
   void refuse_overlap(const State& state) const;
   // J, that letting out has put into the contacts since this was asked last, beside the work of their forces.
-  [[nodiscard]] double put_in(const State& state);
+  [[nodiscard]] double injected_energy(const State& state);
 
   // What contact did to the free rigid parts in the last step: N, and N m about the origin, or about the
   // centre of mass as it is in `state`.
@@ -63,7 +63,7 @@ class Contacts {
   // step small against the contact spheres.
   [[nodiscard]] double frequency(const State& state);
   // Whether more is needed now than frequency() said last.
-  [[nodiscard]] bool hurried(const State& state);
+  [[nodiscard]] bool needs_step_recheck(const State& state);
 
   // Pairs whose spheres are near now, as numbers of points (a plane: after the last point), ascending.
   [[nodiscard]] std::vector<std::array<std::uint32_t, 2>> touching(const State& state);
@@ -74,7 +74,7 @@ class Contacts {
   // Surfaces meet from outside. A pair that is deep behind the surface where it comes near is that of a place
   // which something else keeps apart, or of a wall that was passed: `passed`, it does nothing until it has
   // come out. Otherwise the way out would give energy that no way in took.
-  enum class Standing : std::uint8_t { apart, meeting, passed };
+  enum class PairPhase : std::uint8_t { apart, meeting, passed };
   struct Pair {
     std::uint32_t i = 0, j = kNoPoint;  // numbers in near_; j kNoPoint: of a plane
     std::uint32_t plane = 0;
@@ -99,7 +99,7 @@ class Contacts {
   // contact_list.cpp
   void refresh(const State& state);
   void build(const State& state);
-  void find_near_matter(const Setting& setting);
+  void find_near_matter(const Problem& problem);
   [[nodiscard]] bool near_in_matter(std::uint32_t i, std::uint32_t j) const;
   [[nodiscard]] bool bonded(std::uint32_t i, std::uint32_t j) const;
   [[nodiscard]] PairConstants constants(std::uint32_t i, std::uint32_t j) const;
@@ -199,7 +199,7 @@ class Contacts {
     std::uint64_t key = 0;
     Vec3 stretch = Vec3::Zero();  // m, of the spring along the surface that resists sliding
     double stuck = kFree;         // m, the gap at which what sticks pulls nothing; kFree: it does not stick
-    Standing standing = Standing::apart;
+    PairPhase standing = PairPhase::apart;
     double inside = 0;  // m, that they began in each other: a share of it they may still be
   };
   std::vector<Memory> memory_;             // (pairs_); before the first list what was taken over
@@ -226,4 +226,4 @@ class Contacts {
   std::uint64_t builds_ = 0, looked_at_ = 0;  // lists so far, and when the bound was last looked at
 };
 
-}  // namespace flexel
+}  // namespace flexel::simulate

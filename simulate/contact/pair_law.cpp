@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 struct Smooth {
@@ -73,4 +73,4 @@ PairState pair_state(const ContactSide& i, const ContactSide& j, const PairConst
   return now;
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

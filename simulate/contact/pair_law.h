@@ -17,9 +17,9 @@
 // linear, and hard where the sphere under the surface would be squeezed by half:
 //     p = delta^2 / (2 delta_0) below delta_0, delta - delta_0 / 2 above it;  + delta^3 / delta_h^2
 #pragma once
-#include "formats/vec.h"
+#include "base/math/vec.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 struct NormalLaw {
   double soft = 0, hard = 0;  // m, delta_0 and delta_h
@@ -74,4 +74,4 @@ struct PairState {
 
 [[nodiscard]] PairState pair_state(const ContactSide& i, const ContactSide& j, const PairConstants& pair);
 
-}  // namespace flexel
+}  // namespace flexel::simulate

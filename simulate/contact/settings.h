@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "formats/vec.h"
+#include "base/math/vec.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 // A rigid half-space at rest.
 struct ContactPlane {
@@ -33,4 +33,4 @@ struct ContactSettings {
   std::vector<std::array<std::uint32_t, 2>> bonded = {};
 };
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -8,14 +8,14 @@
 #include <limits>
 #include <map>
 
-#include "formats/error.h"
-#include "formats/program.h"
+#include "base/error.h"
+#include "base/nearest_word.h"
 #include "simulate/effects/contact.h"
-#include "simulate/time/layout.h"
-#include "simulate/time/stability.h"
-#include "simulate/touching.h"
+#include "simulate/kernels/chunk_layout.h"
+#include "simulate/matter/interface_points.h"
+#include "simulate/models/stability.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 constexpr double kMostOfCells = 2;  // of the square of their frequency, in timed runs
@@ -24,7 +24,7 @@ using Weights = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 16, 1>;
 
 std::vector<std::uint32_t> elements_of(const TouchingPoint& point) {
   std::vector<std::uint32_t> elements;
-  for (const Carrier& carrier : point.at)
+  for (const InterpolationWeights& carrier : point.at)
     elements.insert(elements.end(), carrier.elements.begin(), carrier.elements.begin() + carrier.count);
   return elements;
 }
@@ -38,9 +38,9 @@ Weights jump(const TouchingPoint& point) {
 }
 
 // E / h of the softer side [Pa/m].
-double foundation(const TouchingPoint& point, const Setting& setting) {
+double foundation(const TouchingPoint& point, const Problem& problem) {
   const auto of = [&](std::uint32_t part) {
-    return setting.materials[part].young / setting.body.parts[part].lattice.spacing.mean();
+    return problem.materials[part].young / problem.body.parts[part].lattice.spacing.mean();
   };
   return std::min(of(point.part[0]), of(point.part[1]));
 }
@@ -97,17 +97,17 @@ struct Resisting {
   std::vector<double> most;         // (elements) 1/s^2, likewise: the square of the frequency that is allowed
 };
 
-Resisting resisting(const Setting& setting) {
-  const std::vector<double> own = cell_frequencies(setting);
-  Resisting made{{}, lumped_masses(setting), {}};
+Resisting resisting(const Problem& problem) {
+  const std::vector<double> own = cell_frequencies(problem);
+  Resisting made{{}, lumped_masses(problem), {}};
   for (std::size_t p = 0; p < own.size(); ++p) {
-    const Part& part = setting.body.parts[p];
-    const bool rigid = setting.rigidity.size() > p && setting.rigidity[p] != Rigidity::none;
+    const Part& part = problem.body.parts[p];
+    const bool rigid = problem.rigidity.size() > p && problem.rigidity[p] != Rigidity::none;
     const double width = part.lattice.spacing.mean();
     // connections of model `paper` give no bound of their own here
     const double omega2 =
         own[p] > 0 ? own[p]
-                   : 10 * setting.materials[p].young / (setting.materials[p].density * width * width);
+                   : 10 * problem.materials[p].young / (problem.materials[p].density * width * width);
     double whole = 0;
     for (std::uint32_t e = part.element_begin; e < part.element_end; ++e) {
       whole += made.mass[e];
@@ -135,28 +135,28 @@ void Bonds::parse(TableReader& scene, Parameters& parameters) {
   parameters.bond = bond ? bond->flag : !contact;
 }
 
-std::optional<Bonds> Bonds::make(const Parameters& parameters, const Setting& setting) {
+std::optional<Bonds> Bonds::make(const Parameters& parameters, const Problem& problem) {
   if (!parameters.bond && parameters.named.empty()) return std::nullopt;
   std::vector<TouchingGap> named;
-  for (const Named& each : parameters.named) named.push_back(named_gap(each, setting.body));
+  for (const Named& each : parameters.named) named.push_back(named_gap(each, problem.body));
   const auto is_named = [&](const std::array<std::uint32_t, 2>& parts) {
     return std::any_of(named.begin(), named.end(), [&](const TouchingGap& each) {
       return each.parts == std::array{std::min(parts[0], parts[1]), std::max(parts[0], parts[1])};
     });
   };
-  const std::vector<TouchingPoint> points = touching_points(setting, named);
+  const std::vector<TouchingPoint> points = touching_points(problem, named);
   Bonds made;
   using Matrix = decltype(BondedElements::stiffness);
   std::map<std::vector<std::uint32_t>, Matrix> by_elements;
   std::map<std::array<std::uint32_t, 2>, double> area;
   for (const TouchingPoint& point : points) {
     if (!is_named(point.part) &&
-        (!parameters.bond || std::max(point.part[0], point.part[1]) >= setting.bonding_parts))
+        (!parameters.bond || std::max(point.part[0], point.part[1]) >= problem.bonding_parts))
       continue;
     const Weights weights = jump(point);
     auto [entry, fresh] =
         by_elements.try_emplace(elements_of(point), Matrix::Zero(weights.size(), weights.size()));
-    entry->second += kPenalty * foundation(point, setting) * point.area * weights * weights.transpose();
+    entry->second += kPenalty * foundation(point, problem) * point.area * weights * weights.transpose();
     area[{std::min(point.part[0], point.part[1]), std::max(point.part[0], point.part[1])}] += point.area;
   }
   for (std::size_t n = 0; n < named.size(); ++n)
@@ -169,14 +169,14 @@ std::optional<Bonds> Bonds::make(const Parameters& parameters, const Setting& se
   if (by_elements.empty()) return std::nullopt;
   for (const auto& [elements, stiffness] : by_elements) made.bonds_.push_back({elements, stiffness});
   for (const auto& [parts, shared] : area)
-    made.parts_.push_back({{setting.body.parts[parts[0]].name, setting.body.parts[parts[1]].name}, shared});
-  if (setting.duration) made.soften(setting);
+    made.parts_.push_back({{problem.body.parts[parts[0]].name, problem.body.parts[parts[1]].name}, shared});
+  if (problem.duration) made.soften(problem);
   return made;
 }
 
 // Lowers each matrix so that no element's rows together are stiffer than what is allowed times its mass.
-void Bonds::soften(const Setting& setting) {
-  const Resisting resists = resisting(setting);
+void Bonds::soften(const Problem& problem) {
+  const Resisting resists = resisting(problem);
   const auto rows = [&] {
     std::vector<double> sum(resists.mass.size(), 0);
     for (const BondedElements& bond : bonds_)
@@ -245,4 +245,4 @@ void Bonds::report(const State&, const std::vector<Vec3>&, SimulateResult& resul
   result.bonds = parts_;
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -1,7 +1,7 @@
 // Bonds: parts that touch are held together where they do (docs/scene.md, "Parts that touch").
 //
 // At quadrature points q of the finer part's surface the same rest point is carried by matter of either part:
-// a cell with trilinear weights, or an element with its neighbours (simulate/carrier.h); the energy is 1/2
+// a cell with trilinear weights, or an element with its neighbours (simulate/matter/interpolation_weights.h); the energy is 1/2
 // k_q |u_q - u'_q|^2, with k_q = 20 min(E / h, E' / h') times the point's area. Both sides reproduce affine
 // displacements exactly, so that the bond resists no rotation, and the patch test holds across any two
 // lattices. A bond yields like a twentieth of a cell more of the softer part; stiffer ones (300, as the ties
@@ -15,7 +15,7 @@
 
 #include "simulate/effects/effect.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 class Bonds {
  public:
@@ -32,7 +32,7 @@ class Bonds {
   static constexpr double kPenalty = 20;  // stiffness per area, in E / h
 
   static void parse(TableReader& scene, Parameters& parameters);
-  [[nodiscard]] static std::optional<Bonds> make(const Parameters& parameters, const Setting& setting);
+  [[nodiscard]] static std::optional<Bonds> make(const Parameters& parameters, const Problem& problem);
   [[nodiscard]] std::string why() const;
 
   [[nodiscard]] double added_frequency(const std::vector<double>&) const { return frequency_; }
@@ -52,7 +52,7 @@ class Bonds {
     }
   };
   using Displacements = Eigen::Matrix<double, Eigen::Dynamic, 3, 0, 16, 3>;
-  void soften(const Setting& setting);
+  void soften(const Problem& problem);
   [[nodiscard]] static Displacements displacements(const BondedElements& bond, const State& state);
 
   std::vector<BondedElements> bonds_;  // ascending by the elements
@@ -60,4 +60,4 @@ class Bonds {
   double frequency_ = 0;               // 1/s^2, in timed runs
 };
 
-}  // namespace flexel
+}  // namespace flexel::simulate

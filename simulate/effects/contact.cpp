@@ -5,11 +5,11 @@
 
 #include <algorithm>
 
-#include "formats/error.h"
-#include "formats/program.h"
+#include "base/error.h"
+#include "base/nearest_word.h"
 #include "simulate/contact/contacts.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 bool flag(TableReader& reader, const char* key, bool fallback) {
@@ -175,10 +175,10 @@ void Contact::parse(TableReader& scene, Parameters& parameters) {
   reader.finish();
 }
 
-std::optional<Contact> Contact::make(const Parameters& parameters, const Setting& setting) {
+std::optional<Contact> Contact::make(const Parameters& parameters, const Problem& problem) {
   if (!parameters.on) return std::nullopt;
   ContactSettings settings;
-  settings.parts = chosen_parts(parameters, setting.body);
+  settings.parts = chosen_parts(parameters, problem.body);
   settings.self = parameters.self;
   settings.stiffness = parameters.stiffness;
   settings.friction = parameters.friction;
@@ -186,18 +186,18 @@ std::optional<Contact> Contact::make(const Parameters& parameters, const Setting
   settings.parting = parameters.parting;
   for (const std::array<std::string, 2>& each : parameters.bonded) {
     std::array<std::uint32_t, 2> parts{};
-    for (std::uint32_t p = 0; p < setting.body.parts.size(); ++p)
+    for (std::uint32_t p = 0; p < problem.body.parts.size(); ++p)
       for (std::size_t side = 0; side < 2; ++side)
-        if (setting.body.parts[p].name == each[side]) parts[side] = p;
+        if (problem.body.parts[p].name == each[side]) parts[side] = p;
     std::sort(parts.begin(), parts.end());
     settings.bonded.push_back(parts);
   }
-  for (const Part& part : setting.body.parts)
-    settings.stick.push_back(stick_of(parameters, part, setting.materials[settings.stick.size()]));
+  for (const Part& part : problem.body.parts)
+    settings.stick.push_back(stick_of(parameters, part, problem.materials[settings.stick.size()]));
   settings.planes = parameters.planes;
   Contact made;
-  made.contacts_ = std::make_shared<Contacts>(std::move(settings), setting);
-  for (const Part& part : setting.body.parts) made.names_.push_back(part.name);
+  made.contacts_ = std::make_shared<Contacts>(std::move(settings), problem);
+  for (const Part& part : problem.body.parts) made.names_.push_back(part.name);
   return made;
 }
 
@@ -218,8 +218,8 @@ double Contact::added_frequency(const State& state, const std::vector<double>&) 
   return contacts_->frequency(state);
 }
 
-bool Contact::wants_check(const State& state) const {
-  return contacts_->hurried(state);
+bool Contact::needs_step_recheck(const State& state) const {
+  return contacts_->needs_step_recheck(state);
 }
 
 std::vector<double> Contact::memory() const {
@@ -230,12 +230,12 @@ void Contact::restore(const std::vector<double>& memory) const {
   contacts_->restore(memory);
 }
 
-std::vector<double> Contact::keepsake() const {
-  return contacts_->keepsake();
+std::vector<double> Contact::transfer_state() const {
+  return contacts_->transfer_state();
 }
 
-void Contact::take_over(const std::vector<double>& keepsake) const {
-  contacts_->take_over(keepsake);
+void Contact::restore_from(const std::vector<double>& transfer_state) const {
+  contacts_->restore_from(transfer_state);
 }
 
 // Of the free rigid parts; what leads a manipulator tells its own.
@@ -258,8 +258,8 @@ std::vector<double> Contact::history_values(const State& state, const std::vecto
   return values;
 }
 
-double Contact::put_in(const State& state) const {
-  return contacts_->put_in(state);
+double Contact::injected_energy(const State& state) const {
+  return contacts_->injected_energy(state);
 }
 
 std::optional<ContactLosses> Contact::companion() const {
@@ -275,4 +275,4 @@ void ContactLosses::finish_step(State& state, const StepDone& done) const {
   contacts_->remember(state, done.drift);
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

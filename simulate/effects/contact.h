@@ -7,7 +7,7 @@
 #include "simulate/contact/settings.h"
 #include "simulate/effects/effect.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 class Contacts;  // simulate/contact/contacts.h
 
@@ -49,21 +49,21 @@ class Contact {
   static constexpr Book book = Book::stored;
 
   static void parse(TableReader& scene, Parameters& parameters);
-  [[nodiscard]] static std::optional<Contact> make(const Parameters& parameters, const Setting& setting);
+  [[nodiscard]] static std::optional<Contact> make(const Parameters& parameters, const Problem& problem);
   [[nodiscard]] std::string why() const;
 
   [[nodiscard]] double energy(const State& state) const;
   void add_forces(const State& state, std::vector<Vec3>& forces) const;
   [[nodiscard]] double added_frequency(const State& state, const std::vector<double>& mass) const;
-  [[nodiscard]] bool wants_check(const State& state) const;
+  [[nodiscard]] bool needs_step_recheck(const State& state) const;
   [[nodiscard]] std::vector<double> memory() const;
   void restore(const std::vector<double>& memory) const;
-  [[nodiscard]] std::vector<double> keepsake() const;
-  void take_over(const std::vector<double>& keepsake) const;
+  [[nodiscard]] std::vector<double> transfer_state() const;
+  void restore_from(const std::vector<double>& transfer_state) const;
   [[nodiscard]] std::vector<std::string> history_columns() const;
   [[nodiscard]] std::vector<double> history_values(const State& state, const std::vector<Vec3>&) const;
-  static constexpr const char* put_in_by = "overlap";
-  [[nodiscard]] double put_in(const State& state) const;
+  static constexpr const char* injected_by = "overlap";
+  [[nodiscard]] double injected_energy(const State& state) const;
   [[nodiscard]] std::optional<ContactLosses> companion() const;
 
  private:
@@ -75,4 +75,4 @@ class Contact {
 // then.
 [[nodiscard]] bool asks_for_contact(TableReader& scene);
 
-}  // namespace flexel
+}  // namespace flexel::simulate

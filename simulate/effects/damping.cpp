@@ -5,7 +5,7 @@
 
 #include "simulate/effects/part_entries.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 void Damping::parse(TableReader& scene, Parameters& parameters) {
   for (const SceneValue* table : scene.tables("damping")) {
@@ -20,13 +20,13 @@ void Damping::parse(TableReader& scene, Parameters& parameters) {
   }
 }
 
-std::optional<Damping> Damping::make(const Parameters& parameters, const Setting& setting) {
+std::optional<Damping> Damping::make(const Parameters& parameters, const Problem& problem) {
   Damping made;
   made.entries_ = parameters.entries.size();
-  made.time_.assign(setting.body.parts.size(), 0);
+  made.time_.assign(problem.body.parts.size(), 0);
   bool damped = false;
   for (const Entry& entry : parameters.entries) {
-    for (const std::size_t p : parts_of(entry, setting)) made.time_[p] = entry.time;
+    for (const std::size_t p : parts_of(entry, problem)) made.time_[p] = entry.time;
     damped = damped || entry.time > 0;
   }
   if (!damped) return std::nullopt;
@@ -37,8 +37,8 @@ std::string Damping::why() const {
   return fmt::format("{} [damping]", entries_);
 }
 
-void Damping::compose(StepPlan& plan) const {
+void Damping::compose(KernelEffects& plan) const {
   plan.damping = time_;
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -1,11 +1,11 @@
 // Internal damping: every connection and every cell resists the rate of its strain as a dashpot of tau times
 // its stiffness does (Jansson and Vergeest, equations 3 and 18, b = tau k). On relative velocities only: free
 // motion and momentum are untouched. A swing of angular frequency omega decays with the ratio zeta = tau
-// omega / 2. Lives in the kernel (simulate/time/kernel.cpp).
+// omega / 2. Lives in the kernel (simulate/kernels/kernel.cpp).
 #pragma once
 #include "simulate/effects/effect.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 class Damping {
  public:
@@ -21,13 +21,13 @@ class Damping {
   static constexpr bool needs_time = true;
 
   static void parse(TableReader& scene, Parameters& parameters);
-  [[nodiscard]] static std::optional<Damping> make(const Parameters& parameters, const Setting& setting);
+  [[nodiscard]] static std::optional<Damping> make(const Parameters& parameters, const Problem& problem);
   [[nodiscard]] std::string why() const;
-  void compose(StepPlan& plan) const;
+  void compose(KernelEffects& plan) const;
 
  private:
   std::vector<double> time_;  // (parts) s
   std::size_t entries_ = 0;
 };
 
-}  // namespace flexel
+}  // namespace flexel::simulate

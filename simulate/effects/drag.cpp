@@ -10,12 +10,12 @@
 #include <map>
 #include <numbers>
 
-#include "formats/parallel.h"
-#include "simulate/surface_points.h"
-#include "simulate/time/layout.h"
-#include "simulate/touching.h"
+#include "base/parallel.h"
+#include "simulate/kernels/chunk_layout.h"
+#include "simulate/matter/interface_points.h"
+#include "simulate/matter/surface_points.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 constexpr double kMostOfStep = 0.2;  // of the velocity, that drag may take in one step
@@ -40,12 +40,12 @@ void Drag::parse(TableReader& scene, Parameters& parameters) {
   if (!(parameters.coefficient >= 0)) reader.fail("\"coefficient\" in [drag] needs to be 0 or more");
 }
 
-std::vector<Drag::Face> Drag::faces(const Setting& setting) {
+std::vector<Drag::Face> Drag::faces(const Problem& problem) {
   std::vector<std::uint32_t> polygons;
-  for (std::uint32_t p = 0; p < setting.body.surface.polygon_count(); ++p)
-    if (setting.body.parts[setting.body.surface.polygon_part(p)].placement == Placement::corner)
+  for (std::uint32_t p = 0; p < problem.body.surface.polygon_count(); ++p)
+    if (problem.body.parts[problem.body.surface.polygon_part(p)].placement == Placement::corner)
       polygons.push_back(p);
-  std::vector<SurfacePoint> points = surface_points(setting, polygons);
+  std::vector<SurfacePoint> points = surface_points(problem, polygons);
   const auto key = [](const SurfacePoint& point) { return std::tie(point.polygon, point.at.elements); };
   std::stable_sort(points.begin(), points.end(),
                    [&](const SurfacePoint& a, const SurfacePoint& b) { return key(a) < key(b); });
@@ -53,7 +53,7 @@ std::vector<Drag::Face> Drag::faces(const Setting& setting) {
   for (std::size_t i = 0; i < points.size();) {
     Face face;
     face.elements = points[i].at.elements;
-    face.part = setting.body.surface.polygon_part(points[i].polygon);
+    face.part = problem.body.surface.polygon_part(points[i].polygon);
     double area = 0;
     std::size_t end = i;
     for (; end < points.size() && key(points[end]) == key(points[i]); ++end) {
@@ -70,8 +70,8 @@ std::vector<Drag::Face> Drag::faces(const Setting& setting) {
 }
 
 // Takes off what another part covers: of the faces in a cell the one that looks most the way of the contact.
-void Drag::uncover(const Setting& setting, std::vector<Face>& faces) {
-  const std::vector<TouchingPoint> touching = touching_points(setting);
+void Drag::uncover(const Problem& problem, std::vector<Face>& faces) {
+  const std::vector<TouchingPoint> touching = touching_points(problem);
   if (touching.empty()) return;
   std::multimap<std::array<std::uint32_t, 8>, std::size_t> of_cell;
   for (std::size_t f = 0; f < faces.size(); ++f) of_cell.emplace(faces[f].elements, f);
@@ -106,22 +106,22 @@ void Drag::weigh(const std::vector<double>& mass, std::vector<Face>& faces) {
   }
 }
 
-std::optional<Drag> Drag::make(const Parameters& parameters, const Setting& setting) {
+std::optional<Drag> Drag::make(const Parameters& parameters, const Problem& problem) {
   if (!parameters.density || *parameters.density == 0) return std::nullopt;
   Drag made;
   made.density_ = *parameters.density;
   made.coefficient_ = parameters.coefficient;
-  const std::vector<double> mass = lumped_masses(setting);
-  for (std::size_t p = 0; p < setting.body.parts.size(); ++p) {
-    const Part& part = setting.body.parts[p];
-    made.kinds_.push_back(cell_kind(part.lattice, setting.materials[p]));
+  const std::vector<double> mass = lumped_masses(problem);
+  for (std::size_t p = 0; p < problem.body.parts.size(); ++p) {
+    const Part& part = problem.body.parts[p];
+    made.kinds_.push_back(cell_kind(part.lattice, problem.materials[p]));
     if (part.placement == Placement::corner) continue;
     const double radius = 0.5 * part.lattice.spacing.mean();
     for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
       made.balls_.push_back({e, std::numbers::pi * radius * radius, mass[e]});
   }
-  made.faces_ = faces(setting);
-  uncover(setting, made.faces_);
+  made.faces_ = faces(problem);
+  uncover(problem, made.faces_);
   weigh(mass, made.faces_);
   return made;
 }
@@ -197,4 +197,4 @@ void Drag::add_forces(const State& state, std::vector<Vec3>& forces) const {
   });
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

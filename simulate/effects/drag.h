@@ -17,10 +17,10 @@
 // most 0.2 m v of every element. Implicit steps take the drag whole, at the velocity that they end with:
 // minus the derivative of 1/6 rho C A v_n^3, and of 1/3 pi r^2 rho |v|^3.
 #pragma once
-#include "simulate/cell_model.h"
 #include "simulate/effects/effect.h"
+#include "simulate/models/cell_model.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 class Drag {
  public:
@@ -33,7 +33,7 @@ class Drag {
   static constexpr Book book = Book::dissipation;
 
   static void parse(TableReader& scene, Parameters& parameters);
-  [[nodiscard]] static std::optional<Drag> make(const Parameters& parameters, const Setting& setting);
+  [[nodiscard]] static std::optional<Drag> make(const Parameters& parameters, const Problem& problem);
   [[nodiscard]] std::string why() const;
   void add_forces(const State& state, std::vector<Vec3>& forces) const;
   [[nodiscard]] double resistance(const State& state) const;
@@ -53,8 +53,8 @@ class Drag {
     std::uint32_t element = 0;
     double area = 0, mass = 0;  // m^2, kg
   };
-  [[nodiscard]] static std::vector<Face> faces(const Setting& setting);
-  static void uncover(const Setting& setting, std::vector<Face>& faces);
+  [[nodiscard]] static std::vector<Face> faces(const Problem& problem);
+  static void uncover(const Problem& problem, std::vector<Face>& faces);
   static void weigh(const std::vector<double>& mass, std::vector<Face>& faces);
   // Of one piece of surface as it is now.
   struct Front {
@@ -70,4 +70,4 @@ class Drag {
   std::vector<Ball> balls_;
 };
 
-}  // namespace flexel
+}  // namespace flexel::simulate

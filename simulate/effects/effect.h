@@ -1,12 +1,12 @@
 // What an effect is, and how a run holds those that its scene calls for.
 //
-// An effect E is one header (with its .cpp) in simulate/effects and one entry of simulate/effects/all.h. It
+// An effect E is one header (with its .cpp) in simulate/effects and one entry of simulate/scene/effects.h. It
 // owns
 //   E::Parameters                      what a scene says of it; default: nothing
 //   E::name                            what it is called in --explain
 //   static void parse(TableReader& scene, Parameters&)
 //                                      reads its own keys of the scene
-//   static std::optional<E> make(const Parameters&, const Setting&)
+//   static std::optional<E> make(const Parameters&, const Problem&)
 //                                      nothing when the scene does not call for it
 //   std::string why() const            "2 [[load]]", for --explain
 // and any of these hooks, found by concept; a hook that an effect lacks is never called:
@@ -22,7 +22,7 @@
 //   static constexpr bool needs_time, or bool needs_time() const      true: refused at equilibrium
 //   static constexpr Book book                                        where its energy is entered; default:
 //                                                                     work
-//   void compose(StepPlan&) const                                     what it asks of the hot kernel
+//   void compose(KernelEffects&) const                                     what it asks of the hot kernel
 //   void start(State&) const                                          changes the state before the first step
 //   double resistance(const State&) const                             W, minus whose derivative by the
 //                                                                     velocities its forces are: it resists
@@ -37,26 +37,26 @@
 //                                                                     asked anew at every check of the step
 //   void begin(const State&) const                                    at the beginning of every act, after
 //                                                                     start()
-//   bool wants_check(const State&) const                              asked before every step: it has to be
+//   bool needs_step_recheck(const State&) const                              asked before every step: it has to be
 //                                                                     chosen anew now
 //   void finish_step(State&, const StepDone&) const                   after every step, once
 //   void add_support_forces(std::vector<Vec3>&) const                 N, of supports in the last step
 //   std::vector<double> memory() const, void restore(const std::vector<double>&) const
 //                                                                     what goes on from step to step, for
 //                                                                     checkpoints
-//   std::vector<double> keepsake() const, void take_over(const std::vector<double>&) const
+//   std::vector<double> transfer_state() const, void restore_from(const std::vector<double>&) const
 //                                                                     likewise, from an act to the next,
 //                                                                     whose body an event has changed
 //   std::vector<std::string> history_columns() const,
 //   std::vector<double> history_values(const State&, const std::vector<Vec3>& unbalanced) const
 //                                                                     of the last step and the state it began
 //                                                                     with, for the books
-//   double put_in(const State&) const                                 J, what has come into what it stores
+//   double injected_energy(const State&) const                                 J, what has come into what it stores
 //                                                                     since it was asked last, but for the
 //                                                                     work of its forces; the books ask
 //                                                                     before every step and have it as work
 //                                                                     of
-//   static constexpr const char* put_in_by
+//   static constexpr const char* injected_by
 // and, where its forces are entered in two books,
 //   std::optional<F> companion() const                                another effect that runs after it
 // An effect that a scene does not name makes no object, no array and no pass.
@@ -69,14 +69,14 @@
 #include <string>
 #include <vector>
 
-#include "simulate/constraints.h"
-#include "simulate/scene_table.h"
-#include "simulate/simulate.h"
-#include "simulate/state.h"
-#include "simulate/stiffness.h"
-#include "simulate/time/plan.h"
+#include "simulate/conditions/constraints.h"
+#include "simulate/conditions/kernel_effects.h"
+#include "simulate/input/scene_table.h"
+#include "simulate/models/stiffness.h"
+#include "simulate/result/result.h"
+#include "simulate/state/state.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 // Where the energy that an effect's forces give or take is entered: as potential energy (its energy() is
 // that), as potential energy that is the work of its forces step by step (energy() follows that to second
@@ -116,7 +116,7 @@ concept Reports = requires(const E& e, const State& s, const std::vector<Vec3>& 
 };
 
 template <class E>
-concept Composes = requires(const E& e, StepPlan& p) {
+concept Composes = requires(const E& e, KernelEffects& p) {
   e.compose(p);
 };
 template <class E>
@@ -142,8 +142,8 @@ concept AddsFrequencyOfState = requires(const E& e, const State& s, const std::v
   { e.added_frequency(s, m) } -> std::same_as<double>;
 };
 template <class E>
-concept WantsCheck = requires(const E& e, const State& s) {
-  { e.wants_check(s) } -> std::same_as<bool>;
+concept NeedsStepRecheck = requires(const E& e, const State& s) {
+  { e.needs_step_recheck(s) } -> std::same_as<bool>;
 };
 template <class E>
 concept FinishesStep = requires(const E& e, State& s, const StepDone& d) {
@@ -164,8 +164,8 @@ concept Remembers = requires(const E& e, const std::vector<double>& m) {
 };
 template <class E>
 concept HandsOver = requires(const E& e, const std::vector<double>& m) {
-  { e.keepsake() } -> std::same_as<std::vector<double>>;
-  e.take_over(m);
+  { e.transfer_state() } -> std::same_as<std::vector<double>>;
+  e.restore_from(m);
 };
 template <class E>
 concept TellsHistory = requires(const E& e, const State& s, const std::vector<Vec3>& u) {
@@ -174,8 +174,8 @@ concept TellsHistory = requires(const E& e, const State& s, const std::vector<Ve
 };
 template <class E>
 concept PutsIn = requires(const E& e, const State& s) {
-  { e.put_in(s) } -> std::same_as<double>;
-  { E::put_in_by } -> std::convertible_to<const char*>;
+  { e.injected_energy(s) } -> std::same_as<double>;
+  { E::injected_by } -> std::convertible_to<const char*>;
 };
 template <class E>
 concept TellsNeedOfTime = requires(const E& e) {
@@ -191,23 +191,23 @@ struct Pass {
   std::function<void(Constraints&)> constrain;
   std::function<void(const State&, const std::vector<Vec3>&, SimulateResult&)> report;
   std::vector<CoupledElements> couples;
-  std::function<void(StepPlan&)> compose;
+  std::function<void(KernelEffects&)> compose;
   std::function<void(State&)> start;
   std::function<double(const State&)> resistance;
   std::function<void(const State&, double, BlockMatrix&)> add_resistance;
   std::function<double(const State&, const std::vector<double>&)> added_frequency;
-  std::function<bool(const State&)> wants_check;
+  std::function<bool(const State&)> needs_step_recheck;
   std::function<void(State&, const StepDone&)> finish_step;
   std::function<void(const State&)> begin;
   std::function<void(std::vector<Vec3>&)> add_support_forces;
   std::function<std::vector<double>()> memory;
   std::function<void(const std::vector<double>&)> restore;
-  std::function<std::vector<double>()> keepsake;
-  std::function<void(const std::vector<double>&)> take_over;
+  std::function<std::vector<double>()> transfer_state;
+  std::function<void(const std::vector<double>&)> restore_from;
   std::vector<std::string> history_columns;
   std::function<std::vector<double>(const State&, const std::vector<Vec3>&)> history_values;
-  std::function<double(const State&)> put_in;
-  const char* put_in_by = "";
+  std::function<double(const State&)> injected_energy;
+  const char* injected_by = "";
   Book book = Book::work;
   bool constant = false, needs_time = false;
   double seconds = 0;
@@ -226,7 +226,7 @@ template <class E>
     pass.add_stiffness = [effect](const State& s, BlockMatrix& m) { effect->add_stiffness(s, m); };
   if constexpr (Constrains<E>) pass.constrain = [effect](Constraints& c) { effect->constrain(c); };
   if constexpr (Couples<E>) pass.couples = effect->couples();
-  if constexpr (Composes<E>) pass.compose = [effect](StepPlan& p) { effect->compose(p); };
+  if constexpr (Composes<E>) pass.compose = [effect](KernelEffects& p) { effect->compose(p); };
   if constexpr (Starts<E>) pass.start = [effect](State& s) { effect->start(s); };
   if constexpr (Resists<E>) {
     pass.resistance = [effect](const State& s) { return effect->resistance(s); };
@@ -244,7 +244,8 @@ template <class E>
     pass.added_frequency = [effect](const State& s, const std::vector<double>& m) {
       return effect->added_frequency(s, m);
     };
-  if constexpr (WantsCheck<E>) pass.wants_check = [effect](const State& s) { return effect->wants_check(s); };
+  if constexpr (NeedsStepRecheck<E>)
+    pass.needs_step_recheck = [effect](const State& s) { return effect->needs_step_recheck(s); };
   if constexpr (FinishesStep<E>)
     pass.finish_step = [effect](State& s, const StepDone& d) { effect->finish_step(s, d); };
   if constexpr (Begins<E>) pass.begin = [effect](const State& s) { effect->begin(s); };
@@ -255,8 +256,8 @@ template <class E>
     pass.restore = [effect](const std::vector<double>& m) { effect->restore(m); };
   }
   if constexpr (HandsOver<E>) {
-    pass.keepsake = [effect] { return effect->keepsake(); };
-    pass.take_over = [effect](const std::vector<double>& m) { effect->take_over(m); };
+    pass.transfer_state = [effect] { return effect->transfer_state(); };
+    pass.restore_from = [effect](const std::vector<double>& m) { effect->restore_from(m); };
   }
   if constexpr (TellsHistory<E>) {
     pass.history_columns = effect->history_columns();
@@ -265,8 +266,8 @@ template <class E>
     };
   }
   if constexpr (PutsIn<E>) {
-    pass.put_in = [effect](const State& s) { return effect->put_in(s); };
-    pass.put_in_by = E::put_in_by;
+    pass.injected_energy = [effect](const State& s) { return effect->injected_energy(s); };
+    pass.injected_by = E::injected_by;
   }
   if constexpr (TellsConstant<E>) pass.constant = effect->constant();
   if constexpr (requires { E::book; }) pass.book = E::book;
@@ -296,4 +297,4 @@ class PassTimer {
   std::chrono::steady_clock::time_point began_;
 };
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -3,10 +3,10 @@
 
 #include <fmt/format.h>
 
-#include "formats/error.h"
+#include "base/error.h"
 #include "simulate/effects/part_entries.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 void Fracture::parse(TableReader& scene, Parameters& parameters) {
   for (const SceneValue* table : scene.tables("fracture")) {
@@ -23,18 +23,18 @@ void Fracture::parse(TableReader& scene, Parameters& parameters) {
   }
 }
 
-std::optional<Fracture> Fracture::make(const Parameters& parameters, const Setting& setting) {
+std::optional<Fracture> Fracture::make(const Parameters& parameters, const Problem& problem) {
   if (parameters.entries.empty()) return std::nullopt;
   Fracture made;
   made.origin_ = parameters.entries[0].origin;
-  made.limits_.resize(setting.body.parts.size());
-  made.needs_flow_.resize(setting.body.parts.size());
+  made.limits_.resize(problem.body.parts.size());
+  made.needs_flow_.resize(problem.body.parts.size());
   for (const Entry& entry : parameters.entries)
-    for (const std::size_t p : parts_of(entry, setting)) {
-      const Material& material = setting.materials[p];
+    for (const std::size_t p : parts_of(entry, problem)) {
+      const Material& material = problem.materials[p];
       const double strength = entry.strength.value_or(material.strength);
       const double elongation = entry.elongation.value_or(material.elongation);
-      const bool can_break = model_of(setting, p) != Model::paper;
+      const bool can_break = model_of(problem, p) != Model::paper;
       if (entry.part && !can_break)
         throw InputError(
             entry.origin,
@@ -48,7 +48,7 @@ std::optional<Fracture> Fracture::make(const Parameters& parameters, const Setti
       if (!can_break) continue;
       made.limits_[p] = {};
       made.needs_flow_[p] = false;
-      if (model_of(setting, p) == Model::springs) {  // t = l (1 + elongation)
+      if (model_of(problem, p) == Model::springs) {  // t = l (1 + elongation)
         if (strength > 0) made.limits_[p].elongation = strength / material.young;
         if (elongation > 0) made.limits_[p].elongation = elongation;
         continue;
@@ -70,7 +70,7 @@ std::string Fracture::why() const {
   return fmt::format("[fracture], {} part(s) that can break", parts);
 }
 
-void Fracture::compose(StepPlan& plan) const {
+void Fracture::compose(KernelEffects& plan) const {
   for (std::size_t p = 0; p < limits_.size(); ++p)
     if (needs_flow_[p] && (plan.plasticity.empty() || !std::isfinite(plan.plasticity[p].yield)))
       throw InputError(origin_,
@@ -79,4 +79,4 @@ void Fracture::compose(StepPlan& plan) const {
   plan.fracture = limits_;
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

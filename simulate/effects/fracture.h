@@ -1,11 +1,11 @@
 // Fracture: cells that are pulled beyond their strength, or flow beyond their elongation, resist no more;
 // their matter stays in the scene and moves on (Jansson and Vergeest, section 3.2: a connection ends where
-// its length passes a threshold, equation 2). Lives in the kernel (simulate/time/kernel_plastic.h);
+// its length passes a threshold, equation 2). Lives in the kernel (simulate/kernels/kernel_plastic.h);
 // docs/fracture-plasticity.md.
 #pragma once
 #include "simulate/effects/effect.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 class Fracture {
  public:
@@ -24,10 +24,10 @@ class Fracture {
   static void parse(TableReader& scene, Parameters& parameters);
   // Throws InputError: an unknown part, a part that is named but has neither limit or whose model cannot
   // break, no part that can.
-  [[nodiscard]] static std::optional<Fracture> make(const Parameters& parameters, const Setting& setting);
+  [[nodiscard]] static std::optional<Fracture> make(const Parameters& parameters, const Problem& problem);
   [[nodiscard]] std::string why() const;
   // After that of plasticity, without which a limit of elongation is refused in model `cells`.
-  void compose(StepPlan& plan) const;
+  void compose(KernelEffects& plan) const;
 
  private:
   std::vector<FractureLimits> limits_;  // (parts)
@@ -35,4 +35,4 @@ class Fracture {
   std::string origin_;
 };
 
-}  // namespace flexel
+}  // namespace flexel::simulate

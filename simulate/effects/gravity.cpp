@@ -3,13 +3,13 @@
 
 #include <fmt/format.h>
 
-#include "formats/parallel.h"
-#include "simulate/carrier.h"
-#include "simulate/effects/gravity_tree.h"
-#include "simulate/greatest.h"
-#include "simulate/time/layout.h"
+#include "base/math/greatest.h"
+#include "base/parallel.h"
+#include "simulate/gravitation/gravity_tree.h"
+#include "simulate/kernels/chunk_layout.h"
+#include "simulate/matter/interpolation_weights.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 constexpr std::size_t kMostByPairs = 2000;  // elements; more are summed up by a tree
@@ -52,7 +52,7 @@ void Gravity::parse(TableReader& scene, Parameters& parameters) {
   if (!(parameters.constant > 0)) reader.fail("\"constant\" in [gravity] needs to be above 0");
 }
 
-std::optional<Gravity> Gravity::make(const Parameters& parameters, const Setting& setting) {
+std::optional<Gravity> Gravity::make(const Parameters& parameters, const Problem& problem) {
   Gravity made;
   made.acceleration_ = parameters.acceleration.value_or(Vec3::Zero());
   made.sources_ = parameters.sources;
@@ -60,13 +60,13 @@ std::optional<Gravity> Gravity::make(const Parameters& parameters, const Setting
   made.constant_ = parameters.constant;
   if (!parameters.acceleration && !made.needs_time()) return std::nullopt;
   // in time broken matter falls too
-  made.mass_ = setting.duration ? lumped_masses(setting) : element_masses(setting);
+  made.mass_ = problem.duration ? lumped_masses(problem) : element_masses(problem);
   for (std::size_t e = 0; e < made.mass_.size(); ++e)
-    made.first_moment_ += made.mass_[e] * setting.body.rest[e];
+    made.first_moment_ += made.mass_[e] * problem.body.rest[e];
   if (!made.needs_time()) return made;
-  made.rest_ = setting.body.rest;
+  made.rest_ = problem.body.rest;
   made.radius_.resize(made.rest_.size());
-  for (const Part& part : setting.body.parts)
+  for (const Part& part : problem.body.parts)
     std::fill(made.radius_.begin() + part.element_begin, made.radius_.begin() + part.element_end,
               0.5 * part.lattice.spacing.minCoeff());
   for (std::uint32_t e = 0; made.mutual_ && e < made.mass_.size(); ++e)
@@ -170,4 +170,4 @@ void Gravity::report(const State& state, const std::vector<Vec3>&, SimulateResul
   result.loads.push_back(total);  // the mutual part sums up to 0
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

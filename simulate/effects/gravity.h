@@ -3,13 +3,13 @@
 // equations 1 and 13):
 //     uniform   F = m g, energy -m g . u
 //     source    F = G m M (s - x) / |s - x|^3, energy -G m M / |s - x|, for each mass M at a fixed point s
-//     mutual    the same of every element on every other (simulate/effects/gravity_sum.h)
+//     mutual    the same of every element on every other (simulate/gravitation/gravity_sum.h)
 // The last two act in timed runs only.
 #pragma once
 #include "simulate/effects/effect.h"
-#include "simulate/effects/gravity_sum.h"
+#include "simulate/gravitation/gravity_sum.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 class Gravity {
  public:
@@ -28,7 +28,7 @@ class Gravity {
   static constexpr Book book = Book::potential;
 
   static void parse(TableReader& scene, Parameters& parameters);
-  [[nodiscard]] static std::optional<Gravity> make(const Parameters& parameters, const Setting& setting);
+  [[nodiscard]] static std::optional<Gravity> make(const Parameters& parameters, const Problem& problem);
   [[nodiscard]] std::string why() const;
 
   [[nodiscard]] bool needs_time() const { return mutual_ || !sources_.empty(); }
@@ -56,4 +56,4 @@ class Gravity {
   std::vector<std::uint32_t> massive_;  // elements with mass, ascending; with mutual
 };
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -3,10 +3,10 @@
 
 #include <fmt/format.h>
 
-#include "formats/error.h"
-#include "simulate/scene_selection.h"
+#include "base/error.h"
+#include "simulate/input/scene_selection.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 void InitialVelocity::parse(TableReader& scene, Parameters& parameters) {
   for (const SceneValue* table : scene.tables("velocity")) {
@@ -35,19 +35,19 @@ void InitialVelocity::parse(TableReader& scene, Parameters& parameters) {
   }
 }
 
-std::optional<InitialVelocity> InitialVelocity::make(const Parameters& parameters, const Setting& setting) {
+std::optional<InitialVelocity> InitialVelocity::make(const Parameters& parameters, const Problem& problem) {
   if (parameters.velocities.empty()) return std::nullopt;
   InitialVelocity made;
   made.count_ = parameters.velocities.size();
-  made.velocity_.assign(setting.body.element_count(), Vec3::Zero());
+  made.velocity_.assign(problem.body.element_count(), Vec3::Zero());
   for (const StartingVelocity& start : parameters.velocities) {
-    const Selected selected = resolve(start.where, setting.body);
+    const Selected selected = resolve(start.where, problem.body);
     if (!selected.polygons.empty())
       throw InputError(start.origin,
                        fmt::format("[[velocity]] needs a part, box, sphere or half-space; {} selects surface",
                                    describe(start.where)));
     for (const std::uint32_t e : selected.elements)
-      made.velocity_[e] += start.velocity + start.spin.cross(setting.body.position[e] - start.through);
+      made.velocity_[e] += start.velocity + start.spin.cross(problem.body.position[e] - start.through);
   }
   return made;
 }
@@ -60,4 +60,4 @@ void InitialVelocity::start(State& state) const {
   for (std::size_t e = 0; e < velocity_.size(); ++e) state.velocity[e] += velocity_[e];
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

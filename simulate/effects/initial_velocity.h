@@ -1,9 +1,9 @@
 // [[velocity]]: what a selection moves with when a timed run begins. Costs nothing afterwards.
 #pragma once
 #include "simulate/effects/effect.h"
-#include "simulate/selection.h"
+#include "simulate/input/selection.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 struct StartingVelocity {
   Selection where;
@@ -23,7 +23,7 @@ class InitialVelocity {
 
   static void parse(TableReader& scene, Parameters& parameters);
   [[nodiscard]] static std::optional<InitialVelocity> make(const Parameters& parameters,
-                                                           const Setting& setting);
+                                                           const Problem& problem);
   [[nodiscard]] std::string why() const;
   void start(State& state) const;
 
@@ -32,4 +32,4 @@ class InitialVelocity {
   std::size_t count_ = 0;
 };
 
-}  // namespace flexel
+}  // namespace flexel::simulate

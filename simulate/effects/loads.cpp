@@ -11,12 +11,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "formats/error.h"
-#include "simulate/effects/load_distribution.h"
-#include "simulate/scene_selection.h"
-#include "simulate/surface_points.h"
+#include "base/error.h"
+#include "simulate/input/scene_selection.h"
+#include "simulate/matter/load_distribution.h"
+#include "simulate/matter/surface_points.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 Load parse_load(TableReader& reader) {
@@ -49,7 +49,7 @@ Load parse_load(TableReader& reader) {
   return load;
 }
 
-void spread(const Carrier& at, const Vec3& force, std::vector<Vec3>& sum) {
+void spread(const InterpolationWeights& at, const Vec3& force, std::vector<Vec3>& sum) {
   for (std::uint32_t a = 0; a < at.count; ++a) sum[at.elements[a]] += at.weights[a] * force;
 }
 
@@ -71,9 +71,9 @@ std::vector<Vec3> forces_at(const Load& load, const std::vector<LoadedPoint>& po
                   load.name));
 }
 
-void add_surface_load(const Load& load, const std::vector<std::uint32_t>& polygons, const Setting& setting,
+void add_surface_load(const Load& load, const std::vector<std::uint32_t>& polygons, const Problem& problem,
                       std::vector<Vec3>& sum) {
-  const std::vector<SurfacePoint> points = gathered_surface_points(setting, polygons);
+  const std::vector<SurfacePoint> points = gathered_surface_points(problem, polygons);
   if (!(total_area(points) > 0))
     throw InputError(
         load.origin,
@@ -92,18 +92,18 @@ void add_surface_load(const Load& load, const std::vector<std::uint32_t>& polygo
 }
 
 // On the selected elements, by the volume of the matter around them.
-void add_volume_load(const Load& load, const std::vector<std::uint32_t>& elements, const Setting& setting,
+void add_volume_load(const Load& load, const std::vector<std::uint32_t>& elements, const Problem& problem,
                      std::vector<Vec3>& sum) {
   if (load.pressure || load.bearing)
     throw InputError(
         load.origin,
         fmt::format("load \"{}\": a {} needs a face, group or side; {} selects elements", load.name,
                     load.pressure ? "pressure" : "bearing load", describe(load.where)));
-  const std::vector<double> volume = element_volumes(setting);
+  const std::vector<double> volume = element_volumes(problem);
   std::vector<LoadedPoint> loaded;
   double total = 0;
   for (const std::uint32_t e : elements) {
-    loaded.push_back({setting.body.rest[e], volume[e]});
+    loaded.push_back({problem.body.rest[e], volume[e]});
     total += volume[e];
   }
   if (!(total > 0))
@@ -155,20 +155,20 @@ void Loads::parse(TableReader& scene, Parameters& parameters) {
   }
 }
 
-std::optional<Loads> Loads::make(const Parameters& parameters, const Setting& setting) {
+std::optional<Loads> Loads::make(const Parameters& parameters, const Problem& problem) {
   if (parameters.loads.empty()) return std::nullopt;
   Loads loads;
-  loads.body_ = &setting.body;
+  loads.body_ = &problem.body;
   for (const Load& load : parameters.loads) {
-    const Selected selected = resolve(load.where, setting.body);
+    const Selected selected = resolve(load.where, problem.body);
     if (!selected.polygons.empty() && !selected.elements.empty())
       throw InputError(load.origin,
                        fmt::format("load \"{}\" mixes surface and elements; write two loads", load.name));
-    std::vector<Vec3> sum(setting.body.element_count(), Vec3::Zero());
+    std::vector<Vec3> sum(problem.body.element_count(), Vec3::Zero());
     if (selected.elements.empty())
-      add_surface_load(load, selected.polygons, setting, sum);
+      add_surface_load(load, selected.polygons, problem, sum);
     else
-      add_volume_load(load, selected.elements, setting, sum);
+      add_volume_load(load, selected.elements, problem, sum);
     Spread made{load.name, load.course, {}, load.torque.has_value() || load.at.has_value()};
     for (std::uint32_t e = 0; e < sum.size(); ++e)
       if (sum[e] != Vec3::Zero()) made.forces.push_back({e, sum[e]});
@@ -215,4 +215,4 @@ void Loads::report(const State& state, const std::vector<Vec3>&, SimulateResult&
   }
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -3,17 +3,17 @@
 // surface's normals; a pin's bearing load (effects/load_distribution.h). All are dead: they keep the
 // direction and the size that they have at rest.
 #pragma once
-#include "simulate/course.h"
+#include "simulate/conditions/time_curve.h"
 #include "simulate/effects/effect.h"
-#include "simulate/selection.h"
+#include "simulate/input/selection.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 struct Load {
   Selection where;
   std::optional<Vec3> force;       // N, in total
   std::optional<double> pressure;  // Pa, pushes against the surface
-  Course course = {};              // in timed runs; none: all of it from the start
+  TimeCurve course = {};           // in timed runs; none: all of it from the start
   std::string name;
   std::string origin;  // "beam.toml:12"
   // Of averaging links
@@ -30,7 +30,7 @@ class Loads {
   static constexpr const char* name = "loads";
 
   static void parse(TableReader& scene, Parameters& parameters);
-  [[nodiscard]] static std::optional<Loads> make(const Parameters& parameters, const Setting& setting);
+  [[nodiscard]] static std::optional<Loads> make(const Parameters& parameters, const Problem& problem);
   [[nodiscard]] std::string why() const;
 
   [[nodiscard]] bool constant() const;
@@ -45,7 +45,7 @@ class Loads {
   };
   struct Spread {  // one load
     std::string name;
-    Course course;
+    TimeCurve course;
     std::vector<ElementForce> forces;  // ascending by element
     bool couple = false;               // it was given a torque, or a point where its force acts
   };
@@ -53,4 +53,4 @@ class Loads {
   std::vector<Spread> loads_;
 };
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -2,24 +2,24 @@
 #pragma once
 #include <fmt/format.h>
 
-#include "formats/error.h"
-#include "formats/program.h"
+#include "base/error.h"
+#include "base/nearest_word.h"
 #include "simulate/effects/effect.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
-[[nodiscard]] inline Model model_of(const Setting& setting, std::size_t part) {
-  return setting.models.empty() ? Model::cells : setting.models[part];
+[[nodiscard]] inline Model model_of(const Problem& problem, std::size_t part) {
+  return problem.models.empty() ? Model::cells : problem.models[part];
 }
 
 // The parts that `entry`, with `part` and `origin`, is for. Throws InputError: the body has none of that
 // name.
 template <class Entry>
-[[nodiscard]] std::vector<std::size_t> parts_of(const Entry& entry, const Setting& setting) {
+[[nodiscard]] std::vector<std::size_t> parts_of(const Entry& entry, const Problem& problem) {
   std::vector<std::size_t> parts;
   std::vector<std::string> names;
-  for (std::size_t p = 0; p < setting.body.parts.size(); ++p) {
-    names.push_back(setting.body.parts[p].name);
+  for (std::size_t p = 0; p < problem.body.parts.size(); ++p) {
+    names.push_back(problem.body.parts[p].name);
     if (!entry.part || *entry.part == names[p]) parts.push_back(p);
   }
   if (parts.empty())
@@ -28,4 +28,4 @@ template <class Entry>
   return parts;
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -3,10 +3,10 @@
 
 #include <fmt/format.h>
 
-#include "formats/error.h"
+#include "base/error.h"
 #include "simulate/effects/part_entries.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 void Plasticity::parse(TableReader& scene, Parameters& parameters) {
   for (const SceneValue* table : scene.tables("plasticity")) {
@@ -23,15 +23,15 @@ void Plasticity::parse(TableReader& scene, Parameters& parameters) {
   }
 }
 
-std::optional<Plasticity> Plasticity::make(const Parameters& parameters, const Setting& setting) {
+std::optional<Plasticity> Plasticity::make(const Parameters& parameters, const Problem& problem) {
   if (parameters.entries.empty()) return std::nullopt;
   Plasticity made;
-  made.flow_.resize(setting.body.parts.size());
+  made.flow_.resize(problem.body.parts.size());
   for (const Entry& entry : parameters.entries)
-    for (const std::size_t p : parts_of(entry, setting)) {
-      const Material& material = setting.materials[p];
+    for (const std::size_t p : parts_of(entry, problem)) {
+      const Material& material = problem.materials[p];
       const double yield = entry.yield.value_or(material.yield);
-      const bool can_flow = model_of(setting, p) != Model::paper;
+      const bool can_flow = model_of(problem, p) != Model::paper;
       if (entry.part && !can_flow)
         throw InputError(
             entry.origin,
@@ -56,8 +56,8 @@ std::string Plasticity::why() const {
   return fmt::format("[plasticity], {} part(s) with a yield stress", parts);
 }
 
-void Plasticity::compose(StepPlan& plan) const {
+void Plasticity::compose(KernelEffects& plan) const {
   plan.plasticity = flow_;
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -1,10 +1,10 @@
 // Plasticity: parts whose material has a yield stress keep part of their deformation. J2 flow with isotropic,
 // linear hardening (Simo and Hughes 1998, box 9.1), cell by cell. Lives in the kernel
-// (simulate/time/kernel_plastic.h); docs/fracture-plasticity.md.
+// (simulate/kernels/kernel_plastic.h); docs/fracture-plasticity.md.
 #pragma once
 #include "simulate/effects/effect.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 class Plasticity {
  public:
@@ -22,12 +22,12 @@ class Plasticity {
   static void parse(TableReader& scene, Parameters& parameters);
   // Throws InputError: an unknown part, a part that is named but has no yield stress or whose model cannot
   // flow, no part that can.
-  [[nodiscard]] static std::optional<Plasticity> make(const Parameters& parameters, const Setting& setting);
+  [[nodiscard]] static std::optional<Plasticity> make(const Parameters& parameters, const Problem& problem);
   [[nodiscard]] std::string why() const;
-  void compose(StepPlan& plan) const;
+  void compose(KernelEffects& plan) const;
 
  private:
   std::vector<PlasticFlow> flow_;  // (parts)
 };
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -6,11 +6,11 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
-#include "formats/error.h"
-#include "formats/program.h"
-#include "simulate/time/layout.h"
+#include "base/error.h"
+#include "base/nearest_word.h"
+#include "simulate/kernels/chunk_layout.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 std::uint32_t part_named(const std::string& name, const Body& body, const std::string& origin) {
@@ -62,19 +62,19 @@ std::vector<Rigidity> RigidParts::rigidity(const Parameters& parameters, const B
   return result;
 }
 
-std::optional<RigidParts> RigidParts::make(const Parameters& parameters, const Setting& setting) {
+std::optional<RigidParts> RigidParts::make(const Parameters& parameters, const Problem& problem) {
   if (parameters.parts.empty() && parameters.manipulators.empty()) return std::nullopt;
   RigidParts made;
-  made.body_ = &setting.body;
-  made.mass_ = lumped_masses(setting);
+  made.body_ = &problem.body;
+  made.mass_ = lumped_masses(problem);
   made.moving_ = std::make_shared<std::vector<Moving>>();
   // at equilibrium, which refuses the effect, nothing is rigid
-  for (std::uint32_t p = 0; p < setting.rigidity.size(); ++p) {
-    if (setting.rigidity[p] == Rigidity::none) continue;
+  for (std::uint32_t p = 0; p < problem.rigidity.size(); ++p) {
+    if (problem.rigidity[p] == Rigidity::none) continue;
     Moving moving;
-    moving.body = rigid_body(setting.body, p, made.mass_);
+    moving.body = rigid_body(problem.body, p, made.mass_);
     for (const Manipulator& each : parameters.manipulators)
-      if (each.part == setting.body.parts[p].name) moving.led = each;
+      if (each.part == problem.body.parts[p].name) moving.led = each;
     moving.velocity.resize(moving.body.arms.size());
     moving.support.resize(moving.body.arms.size(), Vec3::Zero());
     made.moving_->push_back(std::move(moving));
@@ -228,4 +228,4 @@ std::vector<double> RigidParts::history_values(const State&, const std::vector<V
   return values;
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -3,11 +3,11 @@
 // what [contact] lets them.
 #pragma once
 #include "simulate/effects/effect.h"
-#include "simulate/live/live_tool.h"
+#include "simulate/rigid/live_tool.h"
 #include "simulate/rigid/path.h"
 #include "simulate/rigid/rigid_body.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 struct Manipulator {
   std::string part, name;
@@ -30,7 +30,7 @@ class RigidParts {
   // paths of one part.
   [[nodiscard]] static std::vector<Rigidity> rigidity(const Parameters& parameters, const Body& body);
 
-  [[nodiscard]] static std::optional<RigidParts> make(const Parameters& parameters, const Setting& setting);
+  [[nodiscard]] static std::optional<RigidParts> make(const Parameters& parameters, const Problem& problem);
   [[nodiscard]] std::string why() const;
 
   void start(State& state) const;
@@ -62,4 +62,4 @@ class RigidParts {
   std::vector<double> mass_;  // (elements) kg
 };
 
-}  // namespace flexel
+}  // namespace flexel::simulate

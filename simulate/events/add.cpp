@@ -5,13 +5,12 @@
 
 #include <filesystem>
 
-#include "formats/body_file.h"
-#include "formats/error.h"
-#include "simulate/merge.h"
-#include "simulate/rest_shape.h"
-#include "simulate/time/act.h"
+#include "base/error.h"
+#include "formats/lattice/body_file.h"
+#include "formats/lattice/merge.h"
+#include "simulate/models/rest_shape.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 // Columns of zeros in `columns` for those that only `others` has.
@@ -48,26 +47,26 @@ std::vector<std::string> Add::prepare() {
   return names;
 }
 
-std::string Add::happen(Stage& stage) const {
+std::string Add::apply(EventContext& context) const {
   Body other = body_;
-  State state = beginning(other);
+  State state = state_of(other);
   if (velocity_) state.velocity.assign(other.element_count(), *velocity_);
   const std::vector<Vec3> settled = settled_displacement(other);
-  if (!stage.settled.empty() || !settled.empty()) {
-    stage.settled.resize(stage.body.element_count(), Vec3::Zero());
-    stage.settled.insert(stage.settled.end(), settled.begin(), settled.end());
-    stage.settled.resize(stage.body.element_count() + other.element_count(), Vec3::Zero());
+  if (!context.settled.empty() || !settled.empty()) {
+    context.settled.resize(context.body.element_count(), Vec3::Zero());
+    context.settled.insert(context.settled.end(), settled.begin(), settled.end());
+    context.settled.resize(context.body.element_count() + other.element_count(), Vec3::Zero());
   }
-  level(other.element_columns, other.element_count(), stage.body.element_columns);
-  level(stage.body.element_columns, stage.body.element_count(), other.element_columns);
-  level(other.cell_columns, other.cell_count(), stage.body.cell_columns);
-  level(stage.body.cell_columns, stage.body.cell_count(), other.cell_columns);
+  level(other.element_columns, other.element_count(), context.body.element_columns);
+  level(context.body.element_columns, context.body.element_count(), other.element_columns);
+  level(other.cell_columns, other.cell_count(), context.body.cell_columns);
+  level(context.body.cell_columns, context.body.cell_count(), other.cell_columns);
   const std::size_t parts = other.parts.size();
-  append(stage.body, std::move(other));
-  stage.state.displacement.insert(stage.state.displacement.end(), state.displacement.begin(),
-                                  state.displacement.end());
-  stage.state.velocity.insert(stage.state.velocity.end(), state.velocity.begin(), state.velocity.end());
+  append(context.body, std::move(other));
+  context.state.displacement.insert(context.state.displacement.end(), state.displacement.begin(),
+                                    state.displacement.end());
+  context.state.velocity.insert(context.state.velocity.end(), state.velocity.begin(), state.velocity.end());
   return fmt::format("{} part(s) of {} joined", parts, path_);
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -2,7 +2,7 @@
 #pragma once
 #include "simulate/events/event.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 class Add {
  public:
@@ -10,7 +10,7 @@ class Add {
   [[nodiscard]] static Add parse(TableReader& reader);
   // Reads the file: the names of its parts. Throws InputError.
   [[nodiscard]] std::vector<std::string> prepare();
-  [[nodiscard]] std::string happen(Stage& stage) const;
+  [[nodiscard]] std::string apply(EventContext& context) const;
 
  private:
   std::string path_, origin_;
@@ -18,4 +18,4 @@ class Add {
   Body body_;
 };
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -7,10 +7,10 @@
 
 #include <algorithm>
 
-#include "formats/error.h"
-#include "simulate/connections.h"
+#include "base/error.h"
+#include "simulate/models/connections.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 constexpr std::uint32_t kGone = 0xffffffff;
@@ -100,8 +100,8 @@ void note_voxels(Body& body, const std::vector<std::uint8_t>& elements,
   if (note.empty()) body.notes.erase("carved");
 }
 
-void cut_connections(Body& body, const Setting& setting, const std::vector<std::uint8_t>& keep) {
-  const Connections connections = make_connections(setting);
+void cut_connections(Body& body, const Problem& problem, const std::vector<std::uint8_t>& keep) {
+  const Connections connections = make_connections(problem);
   for (std::size_t c = 0; c < connections.size(); ++c)
     if (!keep[connections.a[c]] || !keep[connections.b[c]])
       body.connections[connections.a[c]] &= ~(1u << (connections.kind[c] - 1));
@@ -125,14 +125,14 @@ Carve Carve::parse(TableReader& reader) {
   return made;
 }
 
-std::string Carve::happen(Stage& stage) const {
-  Body& body = stage.body;
-  const Chosen chosen = choose(region_, body, stage.state);
+std::string Carve::apply(EventContext& context) const {
+  Body& body = context.body;
+  const Chosen chosen = choose(region_, body, context.state);
   std::vector<std::uint8_t> cells = chosen.cells;
   for (std::uint8_t& cell : cells) cell = !cell;
   const std::vector<std::uint8_t> elements = elements_left(body, chosen, cells);
   const std::size_t before = body.element_count() + body.cell_count();
-  cut_connections(body, stage.setting, elements);
+  cut_connections(body, context.problem, elements);
   note_voxels(body, elements, cells);
   std::uint32_t next_element = 0, next_cell = 0;
   for (Part& part : body.parts) {
@@ -157,17 +157,17 @@ std::string Carve::happen(Stage& stage) const {
   keep_rows(body.broken, cells);
   keep_rows(body.cell_columns, cells);
   if (const std::size_t bare = renumber_surface(body, cell); bare > 0)
-    stage.progress.warn(fmt::format(
+    context.progress.warn(fmt::format(
         "carve: {} polygon(s) of the surface lie over nothing now (column \"carved\"): where a mapping puts "
         "them says nothing",
         bare));
   derive_connections(body);
-  keep_rows(stage.state.displacement, elements);
-  keep_rows(stage.state.velocity, elements);
-  keep_rows(stage.settled, elements);
-  renumber_fused(stage.fused, element);
+  keep_rows(context.state.displacement, elements);
+  keep_rows(context.state.velocity, elements);
+  keep_rows(context.settled, elements);
+  renumber_fused(context.fused, element);
   return fmt::format("{} of {} elements and cells taken away ({})",
                      before - body.element_count() - body.cell_count(), before, describe(region_));
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

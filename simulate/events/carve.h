@@ -3,18 +3,18 @@
 #pragma once
 #include "simulate/events/event.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 class Carve {
  public:
   static constexpr const char* name = "carve";
   [[nodiscard]] static Carve parse(TableReader& reader);
   // Throws InputError: nothing of a part is left.
-  [[nodiscard]] std::string happen(Stage& stage) const;
+  [[nodiscard]] std::string apply(EventContext& context) const;
 
  private:
   EventRegion region_;
   std::string origin_;
 };
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -3,9 +3,9 @@
 
 #include <fmt/format.h>
 
-#include "formats/column.h"
+#include "formats/part/column.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 constexpr double kMostFactor = 1e6;  // of a factor, and one over it
@@ -54,23 +54,23 @@ Edit Edit::parse(TableReader& reader) {
   return made;
 }
 
-std::string Edit::happen(Stage& stage) const {
-  const Chosen chosen = choose(region_, stage.body, stage.state);
+std::string Edit::apply(EventContext& context) const {
+  const Chosen chosen = choose(region_, context.body, context.state);
   std::vector<std::uint8_t> elements = chosen.elements;
-  for (const Part& part : stage.body.parts)
+  for (const Part& part : context.body.parts)
     if (part.placement == Placement::corner)
       std::fill(elements.begin() + part.element_begin, elements.begin() + part.element_end, 0);
   const bool by_elements = std::find(elements.begin(), elements.end(), 1) != elements.end();
   for (const auto& [column, by] : {std::pair{"stiffness_change", stiffness_},
                                    {"damping_change", damping_},
                                    {"density_change", density_}}) {
-    multiply(stage.body.cell_columns, column, chosen.cells, by);
-    if (by_elements) multiply(stage.body.element_columns, column, elements, by);
+    multiply(context.body.cell_columns, column, chosen.cells, by);
+    if (by_elements) multiply(context.body.element_columns, column, elements, by);
   }
-  add_stick(stage.body, chosen.elements, stick_);
+  add_stick(context.body, chosen.elements, stick_);
   return fmt::format("{}: stiffness times {}, damping times {}, density times {}{}", describe(region_),
                      stiffness_, damping_, density_,
                      stick_ != 0 ? fmt::format(", sticks with {} Pa more", stick_) : "");
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

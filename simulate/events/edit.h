@@ -4,13 +4,13 @@
 #pragma once
 #include "simulate/events/event.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 class Edit {
  public:
   static constexpr const char* name = "edit";
   [[nodiscard]] static Edit parse(TableReader& reader);
-  [[nodiscard]] std::string happen(Stage& stage) const;
+  [[nodiscard]] std::string apply(EventContext& context) const;
 
  private:
   EventRegion region_;
@@ -18,4 +18,4 @@ class Edit {
   double stick_ = 0;                                  // Pa, more
 };
 
-}  // namespace flexel
+}  // namespace flexel::simulate

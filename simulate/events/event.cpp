@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-namespace flexel {
+namespace flexel::simulate {
 
 EventRegion parse_region(TableReader& reader) {
   EventRegion region;
@@ -46,4 +46,4 @@ Chosen choose(const EventRegion& region, const Body& body, const State& state) {
   return chosen;
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -1,12 +1,12 @@
 // What an event is: something that changes the body itself at a time of a timed run (Jansson and Vergeest,
-// sections 4.1 and 6.1), between two acts (simulate/time/act.h). The kernel knows nothing of events, and a
+// sections 4.1 and 6.1), between two acts (simulate/time/time_segment.h). The kernel knows nothing of events, and a
 // run without any is one act.
 //
-// An event E is one header (with its .cpp) in simulate/events and one entry of simulate/events/all.h. It owns
+// An event E is one header (with its .cpp) in simulate/events and one entry of simulate/scene/events.h. It owns
 //   E::name                                 what a scene calls it, `do = "carve"`
 //   static E parse(TableReader&)            reads its own keys of [[event]]
 //   std::vector<std::string> prepare()      before the run: reads what it needs; the parts that it will add
-//   std::string happen(Stage&) const        changes the stage; says what it did
+//   std::string apply(EventContext&) const        changes the context; says what it did
 #pragma once
 #include <functional>
 #include <memory>
@@ -14,12 +14,12 @@
 #include <string>
 #include <vector>
 
-#include "formats/progress.h"
-#include "simulate/scene_selection.h"
-#include "simulate/scene_table.h"
-#include "simulate/state.h"
+#include "base/program/progress.h"
+#include "simulate/input/scene_selection.h"
+#include "simulate/input/scene_table.h"
+#include "simulate/state/state.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 // A point of one part and a point of another that are held together: sum of weights x positions = 0.
 struct FusedPoint {
@@ -29,12 +29,12 @@ struct FusedPoint {
 };
 
 // What an event acts on; all of it agrees when it begins and when it ends.
-struct Stage {
-  Body& body;                      // as Act::store leaves it
+struct EventContext {
+  Body& body;                      // as TimeSegment::store leaves it
   State& state;                    // displacement, velocity
   std::vector<FusedPoint>& fused;  // so far
-  std::vector<Vec3>& settled;      // (elements) m, or empty: Setting::settled
-  const Setting& setting;          // of the body as it was before the events of this time
+  std::vector<Vec3>& settled;      // (elements) m, or empty: Problem::settled
+  const Problem& problem;          // of the body as it was before the events of this time
   Progress& progress;
 };
 
@@ -42,13 +42,14 @@ struct Event {
   double at = 0;  // s, of the run
   std::string name, origin;
   std::function<std::vector<std::string>()> prepare;
-  std::function<std::string(Stage&)> happen;
+  std::function<std::string(EventContext&)> apply;
 };
 
 template <class E>
 [[nodiscard]] Event make_event(E made, double at, std::string origin) {
   const auto event = std::make_shared<E>(std::move(made));
-  Event result{at, E::name, std::move(origin), {}, [event](Stage& stage) { return event->happen(stage); }};
+  Event result{
+      at, E::name, std::move(origin), {}, [event](EventContext& context) { return event->apply(context); }};
   if constexpr (requires(E & e) { e.prepare(); }) result.prepare = [event] { return event->prepare(); };
   return result;
 }
@@ -69,4 +70,4 @@ struct Chosen {
 };
 [[nodiscard]] Chosen choose(const EventRegion& region, const Body& body, const State& state);
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -9,11 +9,11 @@
 #include <map>
 #include <unordered_map>
 
-#include "formats/error.h"
-#include "formats/units.h"
-#include "simulate/cells.h"
+#include "base/error.h"
+#include "base/units.h"
+#include "simulate/models/cells.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 std::array<double, 8> trilinear(const Vec3& at) {
@@ -99,15 +99,16 @@ class CellGrid {
 };
 
 // E h of the softer of two parts [N/m].
-double stiffness_between(const Setting& setting, std::uint32_t a, std::uint32_t b) {
+double stiffness_between(const Problem& problem, std::uint32_t a, std::uint32_t b) {
   const auto of = [&](std::uint32_t part) {
-    return setting.materials[part].young * setting.body.parts[part].lattice.spacing.mean();
+    return problem.materials[part].young * problem.body.parts[part].lattice.spacing.mean();
   };
   return std::min(of(a), of(b));
 }
 
-std::size_t fuse_parts(Stage& stage, const Chosen& chosen, const std::vector<Vec3>& now, double within) {
-  const Body& body = stage.body;
+std::size_t fuse_parts(EventContext& context, const Chosen& chosen, const std::vector<Vec3>& now,
+                       double within) {
+  const Body& body = context.body;
   double width = within;
   for (const Part& part : body.parts) width = std::max(width, part.lattice.spacing.maxCoeff());
   width = 2 * width;
@@ -117,7 +118,7 @@ std::size_t fuse_parts(Stage& stage, const Chosen& chosen, const std::vector<Vec
   for (std::size_t c = 0; c < body.cell_count(); ++c)
     if (!body.broken[c])
       for (const std::uint32_t e : body.cell_elements[c]) ++cells_at[e];
-  const std::size_t before = stage.fused.size();
+  const std::size_t before = context.fused.size();
   for (std::uint32_t e = 0; e < body.element_count(); ++e) {
     if (!chosen.elements[e] || cells_at[e] == 0 || cells_at[e] == 8) continue;  // inner ones touch nothing
     double nearest = within;
@@ -131,16 +132,16 @@ std::size_t fuse_parts(Stage& stage, const Chosen& chosen, const std::vector<Vec
       const double gap = (now[e] - point_of(x, at->cwiseMax(0).cwiseMin(1))).norm();
       if (!(gap <= nearest) || (best && gap == nearest)) return;
       nearest = gap;
-      best = FusedPoint{{e}, {1}, stiffness_between(stage.setting, part_of[e], part_of_cell[c])};
+      best = FusedPoint{{e}, {1}, stiffness_between(context.problem, part_of[e], part_of_cell[c])};
       const std::array<double, 8> weights = trilinear(*at);
       for (std::size_t a = 0; a < 8; ++a) {
         best->elements.push_back(body.cell_elements[c][a]);
         best->weights.push_back(-weights[a]);
       }
     });
-    if (best) stage.fused.push_back(std::move(*best));
+    if (best) context.fused.push_back(std::move(*best));
   }
-  return stage.fused.size() - before;
+  return context.fused.size() - before;
 }
 
 // Whether a broken cell has its shape back: every edge within `within` of its length at rest, not inside out.
@@ -165,8 +166,8 @@ bool is_whole(const Body& body, std::uint32_t cell, const std::vector<Vec3>& now
          0;
 }
 
-std::size_t heal(Stage& stage, const Chosen& chosen, const std::vector<Vec3>& now, double within) {
-  Body& body = stage.body;
+std::size_t heal(EventContext& context, const Chosen& chosen, const std::vector<Vec3>& now, double within) {
+  Body& body = context.body;
   std::vector<std::uint8_t> healed(body.cell_count(), 0);
   std::size_t count = 0;
   for (std::uint32_t c = 0; c < body.cell_count(); ++c)
@@ -180,7 +181,7 @@ std::size_t heal(Stage& stage, const Chosen& chosen, const std::vector<Vec3>& no
     for (std::size_t c = 0; c < healed.size(); ++c)
       if (healed[c]) found->second.values[c] = 0;
   const std::vector<Vec3> settled = settled_displacement(body);
-  renormalise(body, stage.setting, stage.state.displacement, healed,
+  renormalise(body, context.problem, context.state.displacement, healed,
               std::vector<std::uint8_t>(body.element_count(), 0));
   if (settled.empty()) body.element_columns.erase("settled");  // fixes are not led by what was healed
   derive_connections(body);
@@ -198,12 +199,12 @@ Fuse Fuse::parse(TableReader& reader) {
   return made;
 }
 
-std::string Fuse::happen(Stage& stage) const {
-  const Chosen chosen = choose(region_, stage.body, stage.state);
-  std::vector<Vec3> now(stage.body.element_count());
-  for (std::size_t e = 0; e < now.size(); ++e) now[e] = stage.body.rest[e] + stage.state.displacement[e];
-  const std::size_t points = fuse_parts(stage, chosen, now, within_);
-  const std::size_t cells = heal(stage, chosen, now, within_);
+std::string Fuse::apply(EventContext& context) const {
+  const Chosen chosen = choose(region_, context.body, context.state);
+  std::vector<Vec3> now(context.body.element_count());
+  for (std::size_t e = 0; e < now.size(); ++e) now[e] = context.body.rest[e] + context.state.displacement[e];
+  const std::size_t points = fuse_parts(context, chosen, now, within_);
+  const std::size_t cells = heal(context, chosen, now, within_);
   if (points + cells == 0)
     throw InputError(origin_, fmt::format("fuse: in {} nothing of one part is within {} of another, and no "
                                           "broken cell is nearly whole",
@@ -250,4 +251,4 @@ double FusedPoints::added_frequency(const std::vector<double>& mass) const {
   return largest;
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -4,14 +4,14 @@
 #include "simulate/effects/effect.h"
 #include "simulate/events/event.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 class Fuse {
  public:
   static constexpr const char* name = "fuse";
   [[nodiscard]] static Fuse parse(TableReader& reader);
   // Throws InputError: nothing in the region is near enough to anything.
-  [[nodiscard]] std::string happen(Stage& stage) const;
+  [[nodiscard]] std::string apply(EventContext& context) const;
 
  private:
   EventRegion region_;
@@ -40,4 +40,4 @@ class FusedPoints {
   std::vector<FusedPoint> points_;
 };
 
-}  // namespace flexel
+}  // namespace flexel::simulate

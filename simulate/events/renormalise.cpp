@@ -1,11 +1,11 @@
-// The work is done by simulate/rest_shape.h.
+// The work is done by simulate/models/rest_shape.h.
 #include "simulate/events/renormalise.h"
 
 #include <fmt/format.h>
 
-#include "simulate/rest_shape.h"
+#include "simulate/models/rest_shape.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 Renormalise Renormalise::parse(TableReader& reader) {
   Renormalise made;
@@ -13,10 +13,10 @@ Renormalise Renormalise::parse(TableReader& reader) {
   return made;
 }
 
-std::string Renormalise::happen(Stage& stage) const {
-  const Chosen chosen = choose(region_, stage.body, stage.state);
-  renormalise(stage.body, stage.setting, stage.state.displacement, chosen.cells, chosen.elements);
+std::string Renormalise::apply(EventContext& context) const {
+  const Chosen chosen = choose(region_, context.body, context.state);
+  renormalise(context.body, context.problem, context.state.displacement, chosen.cells, chosen.elements);
   return fmt::format("{} took its present shape as its rest shape", describe(region_));
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

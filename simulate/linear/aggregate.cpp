@@ -10,9 +10,9 @@
 #include <map>
 #include <numeric>
 
-#include "formats/parallel.h"
+#include "base/parallel.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 // Offsets (n + 1) from the counts stored in offsets[1..n].
@@ -278,4 +278,4 @@ Aggregates aggregate(const LevelNodes& nodes, const Links& links, const Links& s
   return result;
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

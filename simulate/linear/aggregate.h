@@ -4,10 +4,10 @@
 #include <span>
 #include <vector>
 
-#include "formats/vec.h"
+#include "base/math/vec.h"
 #include "simulate/linear/operator.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 constexpr std::uint32_t kNoAggregate = 0xffffffffu;
 
@@ -72,4 +72,4 @@ struct AggregateOptions {
 [[nodiscard]] Aggregates aggregate(const LevelNodes& nodes, const Links& links, const Links& strong,
                                    const AggregateOptions& options);
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -5,7 +5,7 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
-namespace flexel {
+namespace flexel::simulate {
 
 // Symmetric positive semi-definite (N x N) approximation of block^-1: the inverse where the block is positive
 // definite; where it is not, eigenvalues count by magnitude and those below 1e-8 N (of the block scaled to a
@@ -43,4 +43,4 @@ template <int N>
   return scale.asDiagonal() * (.5 * (result + result.transpose())) * scale.asDiagonal();
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -1,10 +1,10 @@
 // Block Jacobi: every unknown element is corrected by the inverse of its own 3x3 block. Cheap to set up, but
 // the iterations grow with the number of cells along the part.
-#include "formats/parallel.h"
+#include "base/parallel.h"
 #include "simulate/linear/block_inverse.h"
 #include "simulate/linear/solve.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 class BlockJacobi : public Preconditioner {
@@ -36,4 +36,4 @@ std::unique_ptr<Preconditioner> block_jacobi(const BlockMatrix& matrix) {
   return std::make_unique<BlockJacobi>(matrix);
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

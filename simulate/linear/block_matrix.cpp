@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cassert>
 
-#include "formats/parallel.h"
+#include "base/parallel.h"
 #include "simulate/linear/operator.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 void multiply(const BlockMatrix& matrix, const std::vector<Vec3>& x, std::vector<Vec3>& y) {
   multiply(StoredMatrix(matrix), x, y);
@@ -65,4 +65,4 @@ double largest_diagonal(const BlockMatrix& matrix) {
   return largest;
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

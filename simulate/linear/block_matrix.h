@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "formats/vec.h"
+#include "base/math/vec.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 using Block = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
@@ -26,4 +26,4 @@ void multiply(const BlockMatrix& matrix, const std::vector<Vec3>& x, std::vector
 // Largest magnitude among the diagonal entries.
 [[nodiscard]] double largest_diagonal(const BlockMatrix& matrix);
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -7,11 +7,11 @@
 #include <cmath>
 #include <limits>
 
-#include "formats/parallel.h"
+#include "base/parallel.h"
 #include "simulate/linear/solve.h"
 #include "simulate/linear/vector_products.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using Vector = std::vector<Vec3>;
@@ -118,4 +118,4 @@ LinearResult conjugate_gradients(const BlockMatrix& matrix, const Vector& b, Vec
   return conjugate_gradients(StoredMatrix(matrix), b, x, preconditioner, tolerance, max_iterations, progress);
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

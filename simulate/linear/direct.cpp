@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace flexel {
+namespace flexel::simulate {
 
 void DirectSolver::factorise(const Eigen::SparseMatrix<double>& lower) {
   constexpr double kShift = 1e-9;
@@ -37,4 +37,4 @@ void DirectSolver::solve(double* x) const {
   vector.noalias() = factor_.permutationPinv() * work_;
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -3,9 +3,9 @@
 #include <Eigen/SparseCholesky>
 #include <vector>
 
-#include "formats/vec.h"
+#include "base/math/vec.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 // LDL^T (Eigen's SimplicialLDLT, approximate minimum degree) of a symmetric matrix whose diagonal is raised
 // by one part in 1e9. Pivots count by magnitude, so that the solution operator is positive definite whatever
@@ -57,4 +57,4 @@ template <class View>
   return lower;
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -9,12 +9,12 @@
 #include <algorithm>
 #include <array>
 
-#include "formats/disjoint_sets.h"
-#include "formats/parallel.h"
+#include "base/disjoint_sets.h"
+#include "base/parallel.h"
 #include "simulate/linear/aggregate.h"
 #include "simulate/linear/solve.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using Motion = Eigen::Matrix<double, 6, 1>;   // translation, rotation x reach
@@ -191,4 +191,4 @@ std::vector<FreeMotion> free_motions(const BlockMatrix& matrix, const NodeGeomet
   return free_motions(StoredMatrix(matrix), geometry, threshold);
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

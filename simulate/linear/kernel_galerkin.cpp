@@ -2,18 +2,17 @@
 // bits are those of any instruction set (contraction is off).
 #include "simulate/linear/kernel_galerkin.h"
 
-#include "simulate/time/lanes.h"
+#include "base/simd.h"
 
 #ifndef FLEXEL_ISA
 #error "compiled once per instruction set: simulate/CMakeLists.txt sets FLEXEL_ISA"
 #endif
 
-namespace flexel::galerkin_kernel {
+namespace flexel::simulate::galerkin_kernel {
 namespace {
 
-using step::Lanes;
-using step::load;
-using step::store;
+using namespace simd;
+
 using Floats = float __attribute__((vector_size(32)));
 
 FLEXEL_INLINE Lanes widened(const float* from) {
@@ -83,7 +82,7 @@ void prolongation(const float* blocks, const std::uint32_t* columns, std::size_t
     const Lanes entry = {from[0], from[1], from[2], from[3], from[4], from[5], 0, 0};
     for (std::size_t r = 0; r < 6; ++r) sums[r] += entry * widened(blocks + 6 * (6 * t + r));
   }
-  for (std::size_t r = 0; r < 6; ++r) x[r] += step::sum(sums[r]);
+  for (std::size_t r = 0; r < 6; ++r) x[r] += simd::sum(sums[r]);
 }
 
 }  // namespace
@@ -95,4 +94,4 @@ const Table& FLEXEL_ISA() {
   return table;
 }
 
-}  // namespace flexel::galerkin_kernel
+}  // namespace flexel::simulate::galerkin_kernel

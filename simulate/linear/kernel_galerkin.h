@@ -1,13 +1,13 @@
 // The sums of small blocks that the Galerkin product and the transfers between two levels consist of, as
 // plain data; linear/kernel_galerkin.cpp is compiled once per instruction set (the reasons are in
-// simulate/time/kernel.h). R: unknowns of a fine node, 3 or 6. Blocks of P are transposed (6 x R),
+// simulate/kernels/kernel.h). R: unknowns of a fine node, 3 or 6. Blocks of P are transposed (6 x R),
 // column-major. Blocks of six rows may be read two numbers past their end. Rows of six are kept eight doubles
 // wide, of which the last two mean nothing.
 #pragma once
 #include <cstddef>
 #include <cstdint>
 
-namespace flexel::galerkin_kernel {
+namespace flexel::simulate::galerkin_kernel {
 
 constexpr std::size_t kWidth = 8;
 
@@ -47,4 +47,4 @@ struct Table {
 [[nodiscard]] const Table& avx2();
 [[nodiscard]] const Table& avx512();
 
-}  // namespace flexel::galerkin_kernel
+}  // namespace flexel::simulate::galerkin_kernel

@@ -6,7 +6,7 @@
 #include "simulate/linear/block_inverse.h"
 #include "simulate/linear/transfer.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 // Chebyshev polynomial of degree two in D^-1 A over [largest / 8, largest] (Adams, Brezina, Hu, Tuminaro
 // 2003):
@@ -199,4 +199,4 @@ inline void prolong(const Level<6>& level, const double* coarse, double* x) {
   });
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -17,7 +17,7 @@
 #include "simulate/linear/rigid_transfer.h"
 #include "simulate/linear/solve.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 constexpr std::size_t kDirectRows = 1000;   // elements; a matrix up to this size is factorised at once
@@ -327,4 +327,4 @@ std::unique_ptr<Preconditioner> aggregation_multigrid(const BlockMatrix& matrix,
   return std::make_unique<MultigridOfStored>(matrix, geometry);
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -1,5 +1,5 @@
 // A symmetric matrix of 3x3 blocks as the solver reads it: products, and rows made when they are asked for,
-// so that a tangent stiffness need not be stored (simulate/cell_stiffness.h).
+// so that a tangent stiffness need not be stored (simulate/equilibrium/cell_stiffness.h).
 #pragma once
 #include <cstdint>
 #include <span>
@@ -8,7 +8,7 @@
 
 #include "simulate/linear/block_matrix.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 // What position_of() throws where there is no block: our own fault, unless it is asked for (Mechanics).
 struct MissingBlock : std::logic_error {
@@ -52,4 +52,4 @@ class StoredMatrix final : public LinearOperator {
   const BlockMatrix& matrix_;
 };
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -1,10 +1,10 @@
 // The way from the elements to their groups and back without a stored prolongator. P = T - w D^-1 A T takes
-// one more product with A, which reads a tenth of what the blocks of P would be (simulate/cell_stiffness.h);
+// one more product with A, which reads a tenth of what the blocks of P would be (simulate/equilibrium/cell_stiffness.h);
 // T moves the members of each group as one rigid body, and all it needs is where they are.
 #pragma once
 #include "simulate/linear/transfer.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 // What a level's prolongator is made from, besides the matrix.
 struct Grouping {
@@ -106,4 +106,4 @@ void RigidTransfer::collect(const Residual& r, double* coarse) const {
       32);
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -6,7 +6,7 @@
 
 #include "simulate/linear/operator.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 // What the multigrid hierarchy needs to know of the unknowns besides the matrix.
 struct NodeGeometry {
@@ -76,4 +76,4 @@ struct FreeMotion {
 [[nodiscard]] std::vector<FreeMotion> free_motions(const BlockMatrix& matrix, const NodeGeometry& geometry,
                                                    double threshold = 1e-9);
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -13,12 +13,12 @@
 #include <type_traits>
 #include <vector>
 
-#include "formats/parallel.h"
-#include "simulate/instruction_set.h"
+#include "base/instruction_set.h"
+#include "base/parallel.h"
 #include "simulate/linear/aggregate.h"
 #include "simulate/linear/kernel_galerkin.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 template <int R>
 using Square = Eigen::Matrix<double, R, R, R == 3 ? Eigen::RowMajor : Eigen::ColMajor>;
@@ -356,4 +356,4 @@ template <int R, class View>
   return values;
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -1,9 +1,9 @@
-// Sums by blocks in a fixed order (formats/parallel.h).
+// Sums by blocks in a fixed order (base/parallel.h).
 #include "simulate/linear/vector_products.h"
 
-#include "formats/parallel.h"
+#include "base/parallel.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 double dot(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
   return parallel_sum<double>(a.size(), [&](std::size_t i) { return a[i].dot(b[i]); });
@@ -14,4 +14,4 @@ double weighted_dot(const std::vector<Vec3>& a, const std::vector<Vec3>& b,
   return parallel_sum<double>(a.size(), [&](std::size_t i) { return weight[i] * a[i].dot(b[i]); });
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

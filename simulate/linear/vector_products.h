@@ -2,9 +2,9 @@
 #pragma once
 #include <vector>
 
-#include "formats/vec.h"
+#include "base/math/vec.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 // sum_i a_i . b_i, in parallel; the same bits for any thread count.
 [[nodiscard]] double dot(const std::vector<Vec3>& a, const std::vector<Vec3>& b);
@@ -13,4 +13,4 @@ namespace flexel {
 [[nodiscard]] double weighted_dot(const std::vector<Vec3>& a, const std::vector<Vec3>& b,
                                   const std::vector<double>& weight);
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -12,10 +12,9 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "formats/error.h"
-#include "formats/program.h"
+#include "base/error.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 constexpr double kLook = 1e-4;         // s, on the wall, between two looks at stdin while the run steps
@@ -195,4 +194,4 @@ LiveSummary LiveLink::finish(const State& state) {
   return summary_;
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

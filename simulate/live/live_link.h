@@ -9,13 +9,14 @@
 #include <memory>
 #include <optional>
 
-#include "formats/progress.h"
-#include "simulate/live/outlets.h"
+#include "base/program/progress.h"
+#include "simulate/live/frame_sinks.h"
 #include "simulate/live/pose_feed.h"
-#include "simulate/scene.h"
-#include "simulate/simulate.h"
+#include "simulate/result/options.h"
+#include "simulate/result/result.h"
+#include "simulate/scene/scene.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 class LiveLink {
  public:
@@ -50,7 +51,7 @@ class LiveLink {
   std::function<void()> interrupt_;
   std::vector<std::shared_ptr<LiveTool>> tools_;  // all manipulators, in the scene's order
   std::optional<PoseFeed> feed_;
-  std::optional<Outlets> outlets_;
+  std::optional<FrameSinks> outlets_;
   Clock::time_point began_;
   Clock::time_point looked_;
   double anchor_ = 0;        // s: time of the run less that on the wall
@@ -61,4 +62,4 @@ class LiveLink {
   LiveSummary summary_;
 };
 
-}  // namespace flexel
+}  // namespace flexel::simulate

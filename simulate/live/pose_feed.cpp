@@ -10,9 +10,9 @@
 #include <cerrno>
 #include <cstring>
 
-#include "formats/error.h"
+#include "base/error.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 constexpr std::size_t kLongestLine = 4096;  // bytes
@@ -110,4 +110,4 @@ void PoseFeed::forget(double now) {
   for (const auto& tool : tools_) tool->forget(now);
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "simulate/live/live_tool.h"
+#include "simulate/rigid/live_tool.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 class PoseFeed {
  public:
@@ -40,4 +40,4 @@ class PoseFeed {
   std::uint64_t line_ = 0, poses_ = 0;
 };
 
-}  // namespace flexel
+}  // namespace flexel::simulate

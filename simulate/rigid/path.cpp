@@ -9,11 +9,11 @@
 #include <filesystem>
 #include <sstream>
 
-#include "formats/error.h"
-#include "formats/files.h"
-#include "formats/number_range.h"
+#include "base/error.h"
+#include "base/files/files.h"
+#include "base/number_range.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 Vec3 parse_turn(const SceneValue& value, const TableReader& parent) {
@@ -185,4 +185,4 @@ ManipulatorPath parse_path(TableReader& reader) {
   return path;
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

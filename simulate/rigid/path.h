@@ -3,10 +3,10 @@
 #include <string>
 #include <vector>
 
+#include "simulate/input/scene_table.h"
 #include "simulate/rigid/rigid_body.h"
-#include "simulate/scene_table.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 struct ManipulatorPath {
   std::vector<double> time;        // s, ascending; empty: it stays where it is
@@ -32,4 +32,4 @@ struct ManipulatorPath {
 // vector); each header with its unit: "time [s]", "x [mm]", "rx [deg]". Throws InputError("name:line", ...).
 [[nodiscard]] ManipulatorPath read_path(const std::string& text, const std::string& name);
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -5,9 +5,9 @@
 #include <Eigen/SVD>
 #include <cmath>
 
-#include "simulate/small_matrices.h"
+#include "base/math/small_matrices.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 Vec3 angular_velocity(const RigidBody& rigid, const Mat3& rotation) {
@@ -103,4 +103,4 @@ void move_to(RigidBody& rigid, const Pose& next, double step, std::vector<Vec3>&
   rigid.pose = {next.translation, Eigen::Quaterniond(next.rotation).normalized().toRotationMatrix()};
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -11,9 +11,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "formats/body.h"
+#include "formats/lattice/body.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 struct Pose {
   Vec3 translation = Vec3::Zero();   // m, of the centre of mass, from rest
@@ -53,4 +53,4 @@ void take_up(RigidBody& rigid, const Body& body, const std::vector<double>& mass
 void move_to(RigidBody& rigid, const Pose& next, double step, std::vector<Vec3>& displacement,
              std::vector<Vec3>& velocity);
 
-}  // namespace flexel
+}  // namespace flexel::simulate

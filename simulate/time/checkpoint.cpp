@@ -9,11 +9,11 @@
 #include <cstring>
 #include <type_traits>
 
-#include "formats/body_file.h"
-#include "formats/error.h"
-#include "formats/files.h"
+#include "base/error.h"
+#include "base/files/files.h"
+#include "formats/lattice/body_file.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 static_assert(std::endian::native == std::endian::little);
@@ -248,4 +248,4 @@ std::uint64_t body_fingerprint(const Body& body) {
   return content_hash(bytes_of(hashes.data(), hashes.size() * sizeof hashes[0]));
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

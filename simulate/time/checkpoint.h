@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "simulate/time/act.h"
+#include "simulate/time/time_segment.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 struct Checkpoint {
   std::string scene_name, scene;  // for messages; the scene's text
@@ -19,9 +19,9 @@ struct Checkpoint {
   std::uint64_t input = 0;        // body_fingerprint() of the body that the run was given
   State state;
   Clock clock;
-  Act::Memory memory;
+  TimeSegment::Memory memory;
   std::uint64_t events = 0;         // that have happened
-  std::vector<Vec3> settled;        // of Beginning, as are
+  std::vector<Vec3> settled;        // of SegmentStart, as are
   std::vector<FusedPoint> fused;    // these
   std::uint64_t bonding_parts = 0;  // and this
   Ledger ledger;
@@ -43,4 +43,4 @@ struct Resumed {
 // Tells bodies apart by what a run reads of them: elements, cells and columns.
 [[nodiscard]] std::uint64_t body_fingerprint(const Body& body);
 
-}  // namespace flexel
+}  // namespace flexel::simulate

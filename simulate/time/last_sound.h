@@ -3,10 +3,10 @@
 #include <array>
 #include <vector>
 
-#include "formats/parallel.h"
-#include "simulate/state.h"
+#include "base/parallel.h"
+#include "simulate/state/state.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 // In single precision: it is there to be looked at, and costs memory all along.
 class LastSound {
@@ -38,4 +38,4 @@ class LastSound {
   std::vector<std::array<float, 6>> values_;  // (elements) m, m/s
 };
 
-}  // namespace flexel
+}  // namespace flexel::simulate

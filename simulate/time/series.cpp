@@ -3,11 +3,11 @@
 
 #include <fmt/format.h>
 
-#include "formats/body_file.h"
-#include "formats/error.h"
-#include "formats/files.h"
+#include "base/error.h"
+#include "base/files/files.h"
+#include "formats/lattice/body_file.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 Series::Series(std::string path, bool compress) : path_(std::move(path)), compress_(compress) {
   if (extension(path_) != "pvd") throw InputError(path_, "a series of frames is a .pvd file");
@@ -44,4 +44,4 @@ void Series::add(const Body& body, double time) {
   out.commit();
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -3,9 +3,9 @@
 #pragma once
 #include <string>
 
-#include "formats/body.h"
+#include "formats/lattice/body.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 class Series {
  public:
@@ -26,4 +26,4 @@ class Series {
   std::size_t parts_ = 0;  // of the last frame
 };
 
-}  // namespace flexel
+}  // namespace flexel::simulate

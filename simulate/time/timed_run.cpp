@@ -9,22 +9,22 @@
 #include <functional>
 #include <utility>
 
-#include "formats/body_file.h"
-#include "formats/error.h"
-#include "formats/files.h"
-#include "formats/stop.h"
-#include "formats/termination.h"
+#include "base/error.h"
+#include "base/files/files.h"
+#include "base/program/termination.h"
+#include "base/stop.h"
+#include "formats/lattice/body_file.h"
 #include "simulate/live/live_link.h"
-#include "simulate/report.h"
-#include "simulate/rest_shape.h"
-#include "simulate/time/act.h"
+#include "simulate/models/damping_factors.h"
+#include "simulate/models/rest_shape.h"
+#include "simulate/probes/report.h"
 #include "simulate/time/checkpoint.h"
-#include "simulate/time/damping_factors.h"
+#include "simulate/time/dynamic_relaxation.h"
 #include "simulate/time/last_sound.h"
 #include "simulate/time/series.h"
-#include "simulate/time/settling.h"
+#include "simulate/time/time_segment.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 constexpr int kCheck = 100;          // steps between checks; implicit ones are checked one by one
@@ -47,7 +47,7 @@ class TimedRun {
   void play();
   void play_until(double end, bool resumed);
   void enter_half_step();
-  void happen(std::size_t end);
+  void apply(std::size_t end);
   void check();
   void step();
   void advance(bool row);
@@ -65,11 +65,11 @@ class TimedRun {
   std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
   double duration_;
   Clock clock_;
-  Beginning beginning_;  // of the act
-  std::optional<Act> act_;
-  std::unique_ptr<History> history_;  // of the act; null: none asked for
-  std::optional<Settling> settling_;  // nothing: a run in time
-  std::unique_ptr<LiveLink> live_;    // null: neither poses nor frames
+  SegmentStart start_;  // of the act
+  std::optional<TimeSegment> segment_;
+  std::unique_ptr<EnergyHistory> history_;  // of the act; null: none asked for
+  std::optional<Settling> settling_;        // nothing: a run in time
+  std::unique_ptr<LiveLink> live_;          // null: neither poses nor frames
   std::optional<Series> series_;
   LastSound sound_;
   SimulateResult result_;           // what acts that are over added to it
@@ -99,8 +99,8 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
         fmt::format("[contact] \"overlap_time\" is {:.4g} s, the run {:.4g} s: what begins inside "
                     "something else is not out at its end",
                     contact.parting, duration_));
-  beginning_.settled = settled_displacement(body);
-  beginning_.bonding_parts = body.parts.size();
+  start_.settled = settled_displacement(body);
+  start_.bonding_parts = body.parts.size();
   if (!options.series.empty()) series_.emplace(options.series, options.compress);
   if (!options.checkpoint.empty()) {
     kept_.emplace();
@@ -114,19 +114,19 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
   if (options.resume)
     resume(*options.resume);
   else
-    act_.emplace(body_, scene_, options_, progress_, beginning_, beginning(body_));
+    segment_.emplace(body_, scene_, options_, progress_, start_, state_of(body_));
   if (!options.history.empty())
-    history_ = act_->make_history(options.resume ? options.resume->ledger : Ledger{});
-  act_->set_hear([this](const std::string& note) { listen(note); });
-  if (settling_) Settling::refuse(act_->passes(), scene_.name);
+    history_ = segment_->make_history(options.resume ? options.resume->ledger : Ledger{});
+  segment_->set_hear([this](const std::string& note) { listen(note); });
+  if (settling_) Settling::refuse(segment_->passes(), scene_.name);
 }
 
 void TimedRun::resume(const Checkpoint& from) {
   clock_ = from.clock;
-  beginning_ = {false, from.settled, from.fused, from.bonding_parts};
+  start_ = {false, from.settled, from.fused, from.bonding_parts};
   events_ = std::min<std::size_t>(from.events, scene_.events.size());
-  act_.emplace(body_, scene_, options_, progress_, beginning_, from.state);
-  act_->restore(from.memory);
+  segment_.emplace(body_, scene_, options_, progress_, start_, from.state);
+  segment_->restore(from.memory);
   if (series_) series_->resume(from.frames);
   next_row_ = from.next_row;
   next_frame_ = from.next_frame;
@@ -135,20 +135,20 @@ void TimedRun::resume(const Checkpoint& from) {
 // Within an implicit step: what was reached before it stays.
 void TimedRun::listen(const std::string& note) {
   check_stop();
-  const double time = *act_->state().time;
+  const double time = *segment_->state().time;
   progress_.update(time / duration_, fmt::format("{:.4g} s, step {}, {}", time, clock_.steps, note));
 }
 
 // Where the run can go on from, to the bit.
 void TimedRun::keep() {
   const StopWaits whole;
-  kept_->state = act_->state();
+  kept_->state = segment_->state();
   kept_->clock = clock_;
-  kept_->memory = act_->memory();
+  kept_->memory = segment_->memory();
   kept_->events = events_;
-  kept_->settled = beginning_.settled;
-  kept_->fused = beginning_.fused;
-  kept_->bonding_parts = beginning_.bonding_parts;
+  kept_->settled = start_.settled;
+  kept_->fused = start_.fused;
+  kept_->bonding_parts = start_.bonding_parts;
   if (history_) kept_->ledger = history_->ledger();
   if (series_) kept_->frames = series_->times();
   kept_->next_row = next_row_;
@@ -178,14 +178,14 @@ bool TimedRun::attempt(const std::string& what, const std::function<void()>& wri
 }
 
 void TimedRun::check() {
-  if (kept_ && act_->renews(clock_)) keep();
+  if (kept_ && segment_->renews(clock_)) keep();
   check_stop();
   const std::chrono::duration<double> since = std::chrono::steady_clock::now() - saved_;
   if (kept_ && since.count() > options_.checkpoint_every) (void)save_checkpoint();
-  act_->refuse_unsound();
-  sound_.keep(act_->state());
-  act_->adapt_step(clock_);
-  const double time = *act_->state().time;
+  segment_->refuse_unsound();
+  sound_.keep(segment_->state());
+  segment_->adapt_step(clock_);
+  const double time = *segment_->state().time;
   if (settling_)
     progress_.update(time / duration_,
                      fmt::format("step {}, residual {:.2g}", clock_.steps, settling_->summary().residual));
@@ -196,41 +196,41 @@ void TimedRun::check() {
 // Steps that solve for damping may be stopped within, and leave no state; other explicit ones end first.
 void TimedRun::advance(bool row) {
   std::optional<StopWaits> whole;
-  if (!act_->is_implicit() && !act_->solves()) whole.emplace();
-  torn_ = act_->solves();
-  act_->step(clock_, history_.get(), row);
+  if (!segment_->is_implicit() && !segment_->solves()) whole.emplace();
+  torn_ = segment_->solves();
+  segment_->step(clock_, history_.get(), row);
   torn_ = false;
 }
 
 void TimedRun::step() {
-  const bool due = history_ && *act_->state().time >= next_row_;
+  const bool due = history_ && *segment_->state().time >= next_row_;
   const bool row = due || (history_ && history_->ledger().changed);
   if (due) next_row_ += scene_.run.history_every.value_or(duration_ / kRows);
   if (live_) live_->await(clock_.epoch + static_cast<double>(clock_.in_epoch + 1) * clock_.step);
-  if (settling_) settling_->before(act_->state());
+  if (settling_) settling_->before(segment_->state());
   advance(row);
-  if (row) history_->refuse_broken_books(act_->state());
+  if (row) history_->refuse_broken_books(segment_->state());
   if (settling_)
-    act_->slow(settling_->after(act_->state(), act_->stepper().mass(),
-                                [&](SimulateResult& told) { act_->tell_forces(told); }));
-  if (live_) live_->keep_pace(act_->state());
+    segment_->slow(settling_->after(segment_->state(), segment_->stepper().mass(),
+                                    [&](SimulateResult& told) { segment_->tell_forces(told); }));
+  if (live_) live_->keep_pace(segment_->state());
 }
 
 void TimedRun::write_frame() {
   if (!series_) return;
-  act_->store(act_->state());
+  segment_->store(segment_->state());
   try {
-    series_->add(body_, *act_->state().time);
+    series_->add(body_, *segment_->state().time);
   } catch (const InputError& error) {
     throw InputError(error.where(), error.what() + (clock_.steps > 0 ? stop() : ""));
   }
-  act_->unload();
+  segment_->unload();
   next_frame_ = duration_ * static_cast<double>(series_->size()) / scene_.run.frames.value_or(kFrames);
 }
 
 // Without an act an event is happening.
 double TimedRun::now() const {
-  return act_ ? *act_->state().time : scene_.events[std::min(events_, scene_.events.size() - 1)].at;
+  return segment_ ? *segment_->state().time : scene_.events[std::min(events_, scene_.events.size() - 1)].at;
 }
 
 // Leaves the body at `state` (nothing: none was sound), and in the file for runs that end early; says where
@@ -238,7 +238,7 @@ double TimedRun::now() const {
 std::string TimedRun::save(const std::optional<State>& state) {
   if (history_) attempt("history", [&] { write_text(history_->ledger().csv(), options_.history, true); });
   if (!state) return "";
-  if (act_) act_->store(*state);  // else an event failed, and the body is what it was before that
+  if (segment_) segment_->store(*state);  // else an event failed, and the body is what it was before that
   if (options_.failed_output.empty() || !attempt("state", [&] { write_body(body_, options_.failed_output); }))
     return "";
   return fmt::format("; the state at {:.6g} s is in {}", *state->time, options_.failed_output);
@@ -246,16 +246,16 @@ std::string TimedRun::save(const std::optional<State>& state) {
 
 SimulateResult TimedRun::report() {
   SimulateResult& result = result_;
-  act_->report(clock_, options_.stress, result);
+  segment_->report(clock_, options_.stress, result);
   result.timed->live = live_summary_;
-  act_->add_effort(result, options_.explain);
+  segment_->add_effort(result, options_.explain);
   if (history_) result.timed->books = history_->ledger().sums();
   if (settling_) settling_->report(result);
   refuse_not_finite(result, scene_.name);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
-  if (!beginning_.fused.empty())
+  if (!start_.fused.empty())
     progress_.say(fmt::format("{} fused points hold in this run only: a later one has to fuse again",
-                              beginning_.fused.size()));
+                              start_.fused.size()));
   if (options_.explain) explain_times(result.passes, result.seconds, progress_);
   return result;
 }
@@ -264,77 +264,78 @@ SimulateResult TimedRun::report() {
 // their own: back by half of such a step.
 void TimedRun::enter_half_step() {
   at_whole_step_ = false;
-  clock_.previous = act_->kicks() ? clock_.step : 0;
-  if (act_->kicks()) act_->kick(-0.5 * clock_.step);
+  clock_.previous = segment_->kicks() ? clock_.step : 0;
+  if (segment_->kicks()) segment_->kick(-0.5 * clock_.step);
 }
 
 // From the beginning of an act to its end, or from where a checkpoint has it to there.
 void TimedRun::play_until(double end, bool resumed) {
-  const auto goes_on = [&] { return *act_->state().time < end * (1 - 1e-12) && !over(); };
+  const auto goes_on = [&] { return *segment_->state().time < end * (1 - 1e-12) && !over(); };
   const bool first = clock_.steps == 0 && goes_on() && !resumed;
   clock_.until = end;
-  if (goes_on() && !resumed) act_->choose_step(clock_);
+  if (goes_on() && !resumed) segment_->choose_step(clock_);
   if (goes_on() && at_whole_step_) enter_half_step();
-  if ((first || resumed) && options_.explain) act_->explain(clock_);
+  if ((first || resumed) && options_.explain) segment_->explain(clock_);
   if (first) write_frame();
-  if (live_ && (first || resumed)) live_->start(act_->state());
+  if (live_ && (first || resumed)) live_->start(segment_->state());
   if (kept_) keep();
-  sound_.keep(act_->state());
-  if (!history_ && !settling_) act_->spare_mass();
-  act_->unload();
-  const std::uint64_t between = act_->is_implicit() ? 1 : kCheck;
+  sound_.keep(segment_->state());
+  if (!history_ && !settling_) segment_->spare_mass();
+  segment_->unload();
+  const std::uint64_t between = segment_->is_implicit() ? 1 : kCheck;
   while (goes_on()) {
-    if (clock_.steps % between == 0 || act_->hurried() || stop_is_due()) check();
+    if (clock_.steps % between == 0 || segment_->needs_step_recheck() || stop_is_due()) check();
     step();
-    if (series_ && *act_->state().time >= next_frame_ * (1 - 1e-9)) write_frame();
+    if (series_ && *segment_->state().time >= next_frame_ * (1 - 1e-9)) write_frame();
   }
-  act_->refuse_unsound();  // a step looks at the state that it begins with: nothing has looked at the last
+  segment_
+      ->refuse_unsound();  // a step looks at the state that it begins with: nothing has looked at the last
 }
 
 // Saves what a run that is stopped leaves; says where it is.
 std::string TimedRun::stop() {
   const StopWaits saving;
-  std::string saved = save(act_ && !torn_ ? act_->state() : sound_.state());
+  std::string saved = save(segment_ && !torn_ ? segment_->state() : sound_.state());
   if (save_checkpoint()) saved += fmt::format("; go on with --resume {}", options_.checkpoint);
   return saved;
 }
 
-// Events up to `end` happen now, and another act begins.
-void TimedRun::happen(std::size_t end) {
+// Events up to `end` apply now, and another act begins.
+void TimedRun::apply(std::size_t end) {
   const StopWaits whole;  // between two acts there is no state to save
   Ledger ledger;
   if (history_) {
-    if (clock_.steps > 0) act_->close_books(clock_, *history_);
+    if (clock_.steps > 0) segment_->close_books(clock_, *history_);
     ledger = history_->take_ledger();
     ledger.changed = !ledger.rows.empty();
     history_.reset();
   }
-  at_whole_step_ = clock_.steps > 0 && act_->kicks();
-  if (at_whole_step_) act_->kick(0.5 * clock_.previous);
-  act_->store(act_->state());
-  act_->add_effort(result_, options_.explain);
-  beginning_.keepsakes = act_->keepsakes();
-  State state = act_->state();
-  beginning_.fresh = false;
-  act_.reset();
+  at_whole_step_ = clock_.steps > 0 && segment_->kicks();
+  if (at_whole_step_) segment_->kick(0.5 * clock_.previous);
+  segment_->store(segment_->state());
+  segment_->add_effort(result_, options_.explain);
+  start_.transferred_states = segment_->transferred_states();
+  State state = segment_->state();
+  start_.fresh = false;
+  segment_.reset();
   const bool was_edited = edits_damping(body_);
   for (; events_ < end; ++events_) {
     const Event& event = scene_.events[events_];
-    const Setting setting = timed_setting(body_, scene_, beginning_);
-    Stage stage{body_, state, beginning_.fused, beginning_.settled, setting, progress_};
-    const std::string what = event.happen(stage);
+    const Problem problem = timed_problem(body_, scene_, start_);
+    EventContext context{body_, state, start_.fused, start_.settled, problem, progress_};
+    const std::string what = event.apply(context);
     progress_.say(fmt::format("at {:.4g} s {}: {}", event.at, event.name, what));
   }
   if (kept_) {
     kept_->state.time.reset();  // until the act has begun, what was kept is of another body
     act_body_ = body_bytes(body_);
   }
-  act_.emplace(body_, scene_, options_, progress_, beginning_, std::move(state));
-  sound_.keep(act_->state());  // of the elements that there are now
-  if (!was_edited && edits_damping(body_) && !act_->damps())
+  segment_.emplace(body_, scene_, options_, progress_, start_, std::move(state));
+  sound_.keep(segment_->state());  // of the elements that there are now
+  if (!was_edited && edits_damping(body_) && !segment_->damps())
     progress_.warn("edit: the scene has no [damping] that \"damping\" could change");
-  act_->set_hear([this](const std::string& note) { listen(note); });
-  if (!options_.history.empty()) history_ = act_->make_history(std::move(ledger));
+  segment_->set_hear([this](const std::string& note) { listen(note); });
+  if (!options_.history.empty()) history_ = segment_->make_history(std::move(ledger));
 }
 
 void TimedRun::play() {
@@ -345,21 +346,21 @@ void TimedRun::play() {
     while (end < scene_.events.size() && scene_.events[end].at == at) ++end;
     play_until(at, std::exchange(resumed, false));
     if (over()) break;
-    happen(end);
+    apply(end);
   }
   play_until(duration_, resumed);
-  if (settling_ && !settling_->done()) throw DivergedError(settling_->failure(body_, act_->state()));
-  if (live_) live_summary_ = live_->finish(act_->state());
-  if (history_) act_->close_books(clock_, *history_);
+  if (settling_ && !settling_->done()) throw DivergedError(settling_->failure(body_, segment_->state()));
+  if (live_) live_summary_ = live_->finish(segment_->state());
+  if (history_) segment_->close_books(clock_, *history_);
 }
 
 // The body at the last state, the books written, and what is told of the run.
 SimulateResult TimedRun::ended() {
-  act_->store(act_->state());
+  segment_->store(segment_->state());
   if (history_) write_text(history_->ledger().csv(), options_.history);
   SimulateResult result = report();
   if (scene_.run.renormalise)
-    renormalise_all(body_, timed_setting(body_, scene_, beginning_), act_->state().displacement);
+    renormalise_all(body_, timed_problem(body_, scene_, start_), segment_->state().displacement);
   return result;
 }
 
@@ -397,4 +398,4 @@ SimulateResult settle(Body& body, const Scene& scene, const SimulateOptions& opt
   return result;
 }
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -1,9 +1,10 @@
 // Motion in time: effects and cells are stepped explicitly until the time that the scene gives.
 #pragma once
-#include "simulate/scene.h"
-#include "simulate/simulate.h"
+#include "simulate/result/options.h"
+#include "simulate/result/result.h"
+#include "simulate/scene/scene.h"
 
-namespace flexel {
+namespace flexel::simulate {
 
 // Runs `scene`, whose [run] has a time, on `body`, from its present positions (and velocities, where it
 // carries the column "velocity"), and moves it to its last state. Throws InputError (a step above the stable
@@ -12,9 +13,9 @@ namespace flexel {
 [[nodiscard]] SimulateResult run_in_time(Body& body, const Scene& scene, const SimulateOptions& options,
                                          Progress& progress);
 
-// Brings a scene without a time, with contact or rigid parts, to rest (simulate/time/settling.h). Throws as
+// Brings a scene without a time, with contact or rigid parts, to rest (simulate/time/dynamic_relaxation.h). Throws as
 // well DivergedError: it does not come to rest.
 [[nodiscard]] SimulateResult settle(Body& body, const Scene& scene, const SimulateOptions& options,
                                     Progress& progress);
 
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -1,15 +1,15 @@
 // The choice of a resolution, on runs that are made up: a value that approaches its limit as c h^p.
-#include "flexel/accuracy.h"
+#include "flexel/accuracy/resolution_search.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "flexel/judged_error.h"
-#include "formats/error.h"
+#include "base/error.h"
+#include "flexel/accuracy/run_error.h"
 
-namespace flexel {
+namespace flexel::commands {
 namespace {
 
 // A cube of side 1 m whose vertex moves by value(h), with `per_cell` seconds a cell.
@@ -151,8 +151,8 @@ SolveAt with_bars(const SolveAt& solve, const std::function<double(double)>& sha
   return [=](std::optional<double> size, const GoesOn& goes_on) {
     SolvedRun run = solve(size, goes_on);
     if (run.mapped.empty()) return run;
-    ErrorBar bar;
-    bar.of = ErrorBar::Of::largest_displacement;
+    simulate::ErrorBar bar;
+    bar.of = simulate::ErrorBar::Of::largest_displacement;
     bar.value = run.mapped[0].z();
     bar.bar = {share(run.size) * std::abs(bar.value), bar.value, 1.0};
     run.simulated.error_bars.bars.push_back(bar);
@@ -254,7 +254,7 @@ TEST(UsualSize, BarsAreAsWideAsTheRunsAreApart) {
   const SolveAt solve =
       with_bars(made_up([&](double) { return ++count % 2 ? 1.0 : 1.3; }), [](double h) { return h; });
   const ChosenRun chosen = choose_by_default(solve, 0.05);
-  const Bar& bar = chosen.last.simulated.error_bars.bars.front().bar;
+  const simulate::Bar& bar = chosen.last.simulated.error_bars.bars.front().bar;
   ASSERT_GT(chosen.report.runs.size(), 1u);
   EXPECT_NEAR(bar.half_width, *chosen.report.runs.back().error * chosen.last.mapped[0].z(), 1e-12);
   EXPECT_GT(bar.half_width, chosen.last.size);
@@ -272,4 +272,4 @@ TEST(UsualSize, WhatIsWrongIsSaidAtOnce) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::commands

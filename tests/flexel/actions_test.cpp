@@ -3,9 +3,9 @@
 
 #include <gtest/gtest.h>
 
-#include "formats/error.h"
+#include "base/error.h"
 
-namespace flexel {
+namespace flexel::commands {
 namespace {
 
 TEST(Actions, ThreeComponentsAndOneUnit) {
@@ -72,44 +72,45 @@ Body with_faces(const std::vector<std::array<Vec3, 3>>& triangles) {
 TEST(Actions, TheInwardNormalIsAgainstTheAreaVector) {
   const Body body = with_faces(
       {{Vec3(0, 0, 1), Vec3(1, 0, 1), Vec3(0, 1, 1)}, {Vec3(1, 0, 1), Vec3(1, 1, 1), Vec3(0, 1, 1)}});
-  EXPECT_LT((inward_normal(select_by_name("group", "--push"), body) - Vec3(0, 0, -1)).norm(), 1e-15);
-  Scene scene;
+  EXPECT_LT((inward_normal(simulate::select_by_name("group", "--push"), body) - Vec3(0, 0, -1)).norm(),
+            1e-15);
+  simulate::Scene scene;
   add_push(scene, parse_push("group: 50 N"), body);
   add_push(scene, parse_push("group: 3 Pa"), body);
   add_move(scene, parse_move("group: 2 mm"), body);
-  const std::vector<Load>& loads = scene.get<Loads>().loads;
+  const std::vector<simulate::Load>& loads = scene.get<simulate::Loads>().loads;
   ASSERT_EQ(loads.size(), 2u);
   EXPECT_LT((*loads[0].force - Vec3(0, 0, -50)).norm(), 1e-12);
   EXPECT_EQ(*loads[1].pressure, 3);
-  EXPECT_EQ(scene.get<Ties>().ties.size(), 1u);
+  EXPECT_EQ(scene.get<simulate::Ties>().ties.size(), 1u);
 }
 
 // A slanted top: its polygon looks 45 degrees away from z, but "zmax" is a side, whose push is along z.
 TEST(Actions, APushOnASideGoesAlongItsAxis) {
   const Body body = with_faces(
       {{Vec3(0, 0, 0), Vec3(1, 0, 1), Vec3(0, 1, 0)}, {Vec3(1, 0, 1), Vec3(1, 1, 1), Vec3(0, 1, 0)}});
-  Scene scene;
+  simulate::Scene scene;
   add_push(scene, parse_push("zmax: 50 N"), body);
   add_push(scene, parse_push("group: 50 N"), body);
   add_move(scene, parse_move("part/zmax: 2 mm"), body);
-  const std::vector<Load>& loads = scene.get<Loads>().loads;
+  const std::vector<simulate::Load>& loads = scene.get<simulate::Loads>().loads;
   EXPECT_EQ(*loads[0].force, Vec3(0, 0, -50));
   EXPECT_LT((*loads[1].force - 50 * Vec3(1, 0, -1).normalized()).norm(), 1e-12);
-  EXPECT_EQ(scene.get<Ties>().ties[0].motion.translation, Vec3(0, 0, -2e-3));
+  EXPECT_EQ(scene.get<simulate::Ties>().ties[0].motion.translation, Vec3(0, 0, -2e-3));
 }
 
 TEST(Actions, TorquesAndTwistsTurnAboutTheOutwardNormal) {
   const Body body = with_faces(
       {{Vec3(0, 0, 1), Vec3(1, 0, 1), Vec3(0, 1, 1)}, {Vec3(1, 0, 1), Vec3(1, 1, 1), Vec3(0, 1, 1)}});
-  Scene scene;
+  simulate::Scene scene;
   add_torque(scene, parse_torque("group: 5 N m"), body);
   add_torque(scene, parse_torque("group: 1 2 3 Nm"), body);
   add_twist(scene, parse_twist("group: 10 deg"), body);
   add_twist(scene, parse_twist("group: 0 -10 0 deg"), body);
-  const std::vector<Load>& loads = scene.get<Loads>().loads;
+  const std::vector<simulate::Load>& loads = scene.get<simulate::Loads>().loads;
   EXPECT_LT((*loads[0].torque - Vec3(0, 0, 5)).norm(), 1e-12);
   EXPECT_LT((*loads[1].torque - Vec3(1, 2, 3)).norm(), 1e-12);
-  const std::vector<Tie>& ties = scene.get<Ties>().ties;
+  const std::vector<simulate::Tie>& ties = scene.get<simulate::Ties>().ties;
   EXPECT_TRUE(ties[0].is_move && ties[1].is_move);
   EXPECT_LT((ties[0].motion.axis - Vec3::UnitZ()).norm(), 1e-12);
   EXPECT_LT((ties[0].motion.through - Vec3(0.5, 0.5, 1)).norm(), 1e-12);
@@ -138,8 +139,8 @@ TEST(Actions, GravityPinsAndProbes) {
 TEST(Actions, FacesThatLookBothWaysHaveNoDirection) {
   const Body body = with_faces(
       {{Vec3(0, 0, 1), Vec3(1, 0, 1), Vec3(0, 1, 1)}, {Vec3(0, 0, 0), Vec3(0, 1, 0), Vec3(1, 0, 0)}});
-  EXPECT_THROW(inward_normal(select_by_name("group", "--push"), body), InputError);
+  EXPECT_THROW(inward_normal(simulate::select_by_name("group", "--push"), body), InputError);
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::commands

@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace flexel {
+namespace flexel::commands {
 namespace {
 
 using ::testing::HasSubstr;
@@ -14,9 +14,9 @@ using ::testing::Not;
 constexpr double kMoved = 1.7e-3;  // m
 
 struct Case {
-  SimulateResult result;
+  simulate::SimulateResult result;
   Body body;
-  std::vector<Material> materials;
+  std::vector<simulate::Material> materials;
 
   [[nodiscard]] std::string text() const {
     std::string all;
@@ -36,19 +36,19 @@ Case with_bar(double share) {
   made.body.parts.push_back(part);
   made.body.rest = {Vec3(0, 0, 0), Vec3(0.08, 0.02, 0)};
   made.body.element_columns["von_mises"].values = {47e6, 12e6};
-  Material steel;
+  simulate::Material steel;
   steel.name = "steel";
   steel.yield = 235e6;
   made.materials.push_back(steel);
-  SimulateResult& result = made.result;
+  simulate::SimulateResult& result = made.result;
   result.largest_displacement = kMoved;
   result.largest_displacement_at = Vec3(0.08, 0.02, 0);
-  ErrorBar bar;
-  bar.of = ErrorBar::Of::largest_displacement;
+  simulate::ErrorBar bar;
+  bar.of = simulate::ErrorBar::Of::largest_displacement;
   bar.value = kMoved;
   bar.bar.half_width = share * kMoved;
   result.error_bars.bars.push_back(bar);
-  result.stress = StressSummary{47e6, Vec3(0, 0, 0), "lever", 0.2};
+  result.stress = simulate::StressSummary{47e6, Vec3(0, 0, 0), "lever", 0.2};
   result.reactions.push_back({"xmin", Vec3(0, 1e-9, 5), Vec3(0, 0.4, 0)});
   return made;
 }
@@ -78,7 +78,7 @@ TEST(Answer, HowNearToFailing) {
   Case made = with_bar(0.03);
   EXPECT_THAT(made.text(), HasSubstr("safety factor 5: about 47 MPa of 235 MPa at which steel yields"));
   EXPECT_THAT(made.text(), HasSubstr("smaller cells may show more"));  // no bar of the stress
-  made.result.error_bars.von_mises = StressBar{{47e6, 46e6, 40e6}, Bar{1e6, 47.5e6, 2}};
+  made.result.error_bars.von_mises = simulate::StressBar{{47e6, 46e6, 40e6}, simulate::Bar{1e6, 47.5e6, 2}};
   EXPECT_THAT(made.text(), HasSubstr("47.0 MPa +- 1.0 MPa of 235 MPa"));
   EXPECT_THAT(made.text(), Not(HasSubstr("may show more")));
   made.body.element_columns["von_mises"].values[0] = 470e6;
@@ -103,7 +103,7 @@ TEST(Answer, TheWeakestPartCounts) {
   two.body.parts.push_back(knob);
   two.body.rest.emplace_back(0.01, 0, 0);
   two.body.element_columns["von_mises"].values.push_back(20e6);
-  Material plastic;
+  simulate::Material plastic;
   plastic.name = "PLA";
   two.materials.push_back(plastic);
   EXPECT_THAT(two.text(), HasSubstr("steel yields"));
@@ -128,4 +128,4 @@ TEST(Answer, AtMostSixLinesHoweverMuchThereIs) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::commands

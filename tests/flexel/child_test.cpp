@@ -6,10 +6,10 @@
 #include <cstdlib>
 #include <fstream>
 
-#include "formats/error.h"
-#include "formats/temporary_folder.h"
+#include "base/error.h"
+#include "base/files/temporary_folder.h"
 
-namespace flexel {
+namespace flexel::commands {
 namespace {
 
 namespace fs = std::filesystem;
@@ -84,4 +84,4 @@ TEST_F(Child, ProgramsAreFoundOnThePath) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::commands

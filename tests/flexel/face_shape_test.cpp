@@ -5,7 +5,7 @@
 
 #include <Eigen/Geometry>
 
-namespace flexel {
+namespace flexel::commands {
 namespace {
 
 // A patch z = f(u, v) of n x n quads, mapped by `place`.
@@ -121,4 +121,4 @@ TEST(FaceShape, InWords) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::commands

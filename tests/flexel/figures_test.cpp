@@ -7,12 +7,16 @@
 #include <nlohmann/json.hpp>
 
 #include "flexel/picture/attribute.h"
-#include "formats/fields.h"
-#include "simulate/scene.h"
+#include "formats/lattice/fields.h"
+#include "simulate/result/options.h"
+#include "simulate/result/result.h"
+#include "simulate/scene/scene.h"
 #include "simulate/simulate.h"
+#include "simulate/summary.h"
+#include "voxelize/report.h"
 #include "voxelize/voxelize.h"
 
-namespace flexel {
+namespace flexel::commands {
 namespace {
 
 constexpr double kLength = 0.04, kSide = 0.01;  // m
@@ -50,21 +54,21 @@ struct ModelCase {
 class Figures : public ::testing::TestWithParam<ModelCase> {
  protected:
   void SetUp() override {
-    VoxelizeOptions options;
+    voxelize::VoxelizeOptions options;
     options.size = 0.0021;
-    options.align = Align::none;
+    options.align = voxelize::Align::none;
     options.placement = GetParam().placement;
-    body_ = voxelize(bar(), options, quiet_).body;
+    body_ = voxelize::voxelize(bar(), options, quiet_).body;
   }
 
-  SimulateResult run(const std::string& scene) {
-    SimulateOptions options;
+  simulate::SimulateResult run(const std::string& scene) {
+    simulate::SimulateOptions options;
     options.estimate = false;
-    return simulate(body_,
-                    parse_scene("material = \"steel\"\n[parts.bar]\nmodel = \"" +
-                                    std::string(GetParam().model) + "\"\n" + scene,
-                                "s.toml"),
-                    options, quiet_);
+    return simulate::simulate(body_,
+                              simulate::parse_scene("material = \"steel\"\n[parts.bar]\nmodel = \"" +
+                                                        std::string(GetParam().model) + "\"\n" + scene,
+                                                    "s.toml"),
+                              options, quiet_);
   }
 
   Progress quiet_{"test", Progress::Mode::silent};
@@ -72,28 +76,28 @@ class Figures : public ::testing::TestWithParam<ModelCase> {
 };
 
 TEST_P(Figures, SummaryBodyAndLegendHaveOneValue) {
-  const SimulateResult result =
+  const simulate::SimulateResult result =
       run("[[fix]]\nwhere = \"x0\"\n[[load]]\nwhere = \"x1\"\nforce = [0, 0, \"-10 N\"]\n");
   const nlohmann::json summary = nlohmann::json::parse(summary_json(result, body_));
   const double moved = summary["largest_displacement"];
-  EXPECT_NEAR(moved / *largest_in_matter(body_, "displacement"), 1, 1e-9);
+  EXPECT_NEAR(moved / *picture::largest_in_matter(body_, "displacement"), 1, 1e-9);
   EXPECT_NEAR(moved / largest_displacement(body_).value(), 1, 1e-9);
   EXPECT_GT(largest_strain(body_), 0);
-  EXPECT_EQ(*largest_in_matter(body_, "strain"), largest_strain(body_));
+  EXPECT_EQ(*picture::largest_in_matter(body_, "strain"), largest_strain(body_));
   if (GetParam().placement == Placement::centre) {
     EXPECT_FALSE(summary.contains("largest_von_mises"));
     return;
   }
   const std::vector<double>& column = body_.element_columns.at("von_mises").values;
   EXPECT_EQ(*std::max_element(column.begin(), column.end()), summary["largest_von_mises"]);
-  EXPECT_EQ(*largest_in_matter(body_, "von_mises"), summary["largest_von_mises"]);
+  EXPECT_EQ(*picture::largest_in_matter(body_, "von_mises"), summary["largest_von_mises"]);
   const Vec3 at = askew().transpose() * result.stress->at;
   EXPECT_TRUE((at.array() > -1e-9).all() && at.x() < kLength + 1e-9 &&
               std::max(at.y(), at.z()) < kSide + 1e-9)
       << at.transpose();
   // The surface is coloured by values between those of elements: no vertex has more.
-  const std::vector<double> vertices =
-      at_vertices(body_, *body_attribute(body_, "von_mises"), std::vector<std::uint32_t>(8, 0));
+  const std::vector<double> vertices = picture::at_vertices(
+      body_, *picture::body_attribute(body_, "von_mises"), std::vector<std::uint32_t>(8, 0));
   EXPECT_LE(*std::max_element(vertices.begin(), vertices.end()),
             summary["largest_von_mises"].get<double>() * (1 + 1e-9));
   EXPECT_FALSE(body_.cell_columns.contains("von_mises"));
@@ -102,7 +106,7 @@ TEST_P(Figures, SummaryBodyAndLegendHaveOneValue) {
 // A small rotation led at one end turns the bar as a whole: the farthest corner of the part moves by angle x
 // arm, elements of cut cells beyond it by more.
 TEST_P(Figures, TheLargestDisplacementIsOfThePart) {
-  const SimulateResult result = run(
+  const simulate::SimulateResult result = run(
       "[[move]]\nwhere = \"x0\"\nrotation = { axis = [0, 0, 1], through = [0, 0, 0], angle = \"1 mrad\" }\n");
   double farthest = 0;
   const bool centre = GetParam().placement == Placement::centre;
@@ -126,18 +130,18 @@ INSTANTIATE_TEST_SUITE_P(OfEveryModel, Figures,
 // Away from the ends tension is the same everywhere, and so is the stress, at elements beside the part as
 // well.
 TEST(FiguresOfStress, UniformTensionIsUniform) {
-  VoxelizeOptions options;
+  voxelize::VoxelizeOptions options;
   options.size = 0.0021;
-  options.align = Align::none;
+  options.align = voxelize::Align::none;
   Progress quiet("test", Progress::Mode::silent);
-  Body body = voxelize(bar(), options, quiet).body;
-  Scene scene = parse_scene(
+  Body body = voxelize::voxelize(bar(), options, quiet).body;
+  simulate::Scene scene = simulate::parse_scene(
       "material = \"m\"\n[materials.m]\nyoung = \"200 GPa\"\npoisson = 0.0\ndensity = \"1 kg/m3\"\n"
       "[[fix]]\nwhere = \"x0\"\n[[load]]\nwhere = \"x1\"\npressure = \"-1 MPa\"\n",
       "s.toml");
-  SimulateOptions run;
+  simulate::SimulateOptions run;
   run.estimate = false;
-  const SimulateResult result = simulate(body, scene, run, quiet);
+  const simulate::SimulateResult result = simulate::simulate(body, scene, run, quiet);
   EXPECT_NEAR(result.stress->value, 1e6, 0.25e6);
   const std::vector<double>& column = body.element_columns.at("von_mises").values;
   int judged = 0;
@@ -160,4 +164,4 @@ TEST(FiguresOfStress, AnInsideOutGradientHasNoStrain) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::commands

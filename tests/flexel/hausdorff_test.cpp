@@ -51,7 +51,7 @@ TEST(Hausdorff, OfNoChangeIsNothing) {
 TEST(Hausdorff, OfAShiftAcrossIsTheShift) {
   const double found = distance(sheet(5), [](const Vec3&) { return Vec3(0, 0, 0.1); });
   EXPECT_GE(found, 0.1 - 1e-12);
-  EXPECT_LE(found, 0.1 * (1 + kHausdorffMargin) + 1e-12);
+  EXPECT_LE(found, 0.1 * (1 + study::kHausdorffMargin) + 1e-12);
 }
 
 // What slides within its own plane differs at the rim alone, by less than its vertices move.
@@ -62,7 +62,7 @@ TEST(Hausdorff, OfSlidingIsLessThanTheVerticesMove) {
   };
   const double found = distance(sheet(8), slide);
   EXPECT_GE(found, 0.0009);
-  EXPECT_LE(found, 0.001 * (1 + kHausdorffMargin));
+  EXPECT_LE(found, 0.001 * (1 + study::kHausdorffMargin));
 }
 
 // A sheet that is folded down along one diagonal, and up along the other: all corners are the same points.
@@ -73,7 +73,7 @@ TEST(Hausdorff, IsFoundBetweenVertices) {
   const double known = 0.3 * std::cos(std::atan(0.3 / std::sqrt(0.5)));  // from the middle, across a slope
   const double found = hausdorff_distance(valley, ridge, triangles);
   EXPECT_GE(found, known - 1e-12);
-  EXPECT_LE(found, known * (1 + kHausdorffMargin) + 1e-12);
+  EXPECT_LE(found, known * (1 + study::kHausdorffMargin) + 1e-12);
 }
 
 double from_dense_points(const std::vector<Vec3>& from, const std::vector<Vec3>& to,
@@ -118,7 +118,7 @@ TEST(Hausdorff, TrianglesWithoutAreaDoNoHarm) {
   plain.triangles.push_back({0, 1, 2});  // on a line
   const double found = distance(plain, [](const Vec3& at) { return Vec3(0, 0, 0.2 * at.x()); });
   EXPECT_GE(found, 0.2 - 1e-12);
-  EXPECT_LE(found, 0.2 * (1 + kHausdorffMargin));
+  EXPECT_LE(found, 0.2 * (1 + study::kHausdorffMargin));
   EXPECT_EQ(hausdorff_distance(plain.vertices, plain.vertices, {{Corners{0, 1, 2}}}), 0);
 }
 

@@ -5,8 +5,8 @@
 
 #include <fstream>
 
-#include "formats/error.h"
-#include "formats/surface_file.h"
+#include "base/error.h"
+#include "formats/exchange/surface_file.h"
 
 namespace flexel::study {
 namespace {
@@ -60,14 +60,14 @@ class StudyRuns : public testing::Test {
     options_.folder = folder_.path();
   }
   TemporaryFolder folder_;
-  Case case_;
-  Configuration wanted_;
-  RunOptions options_;
+  study::Case case_;
+  study::Configuration wanted_;
+  study::RunOptions options_;
 };
 
 TEST_F(StudyRuns, EquilibriumGivesItsFigures) {
   options_.surface = folder_.path() / "bent.ply";
-  const RunResult run = run_configuration(case_, wanted_, options_);
+  const study::RunResult run = run_configuration(case_, wanted_, options_);
   ASSERT_TRUE(run.ok()) << run.failure;
   EXPECT_EQ(run.cells, 16u * 4 * 4);
   EXPECT_NEAR(run.spacing, 2.5e-3, 1e-9);
@@ -79,7 +79,7 @@ TEST_F(StudyRuns, EquilibriumGivesItsFigures) {
   EXPECT_NEAR(run.find("volume")->value, 4e-6, 1e-9);
   EXPECT_GT(run.newton_iterations, 0);
   double sum = 0;
-  for (const Stage& stage : run.stages) sum += stage.wall;
+  for (const study::Stage& stage : run.stages) sum += stage.wall;
   EXPECT_NEAR(sum, run.wall, 0.02 * run.wall);  // every second has its stage
   EXPECT_TRUE(fs::exists(options_.surface));
   int left = 0;
@@ -89,15 +89,15 @@ TEST_F(StudyRuns, EquilibriumGivesItsFigures) {
 
 TEST_F(StudyRuns, ModelsAreChosen) {
   wanted_.model = "springs";
-  const RunResult springs = run_configuration(case_, wanted_, options_);
+  const study::RunResult springs = run_configuration(case_, wanted_, options_);
   ASSERT_TRUE(springs.ok()) << springs.failure;
   wanted_.model = "paper";
-  const RunResult paper = run_configuration(case_, wanted_, options_);
+  const study::RunResult paper = run_configuration(case_, wanted_, options_);
   ASSERT_TRUE(paper.ok()) << paper.failure;
   EXPECT_EQ(paper.cells, 0u);
   EXPECT_EQ(paper.size(), 16u * 4 * 4);
   wanted_.model = "";
-  const RunResult cells = run_configuration(case_, wanted_, options_);
+  const study::RunResult cells = run_configuration(case_, wanted_, options_);
   // docs/accuracy.md, 4 cells through: springs too stiff by some percent, the paper's model by half.
   EXPECT_LT(springs.find("tip")->value, 0.98 * cells.find("tip")->value);
   EXPECT_LT(paper.find("tip")->value, 0.8 * springs.find("tip")->value);
@@ -105,7 +105,7 @@ TEST_F(StudyRuns, ModelsAreChosen) {
 
 TEST_F(StudyRuns, TimedRunsHaveStepsAndDrift) {
   case_.scene_text += "[run]\ntime = \"20 us\"\n";
-  const RunResult run = run_configuration(case_, wanted_, options_);
+  const study::RunResult run = run_configuration(case_, wanted_, options_);
   ASSERT_TRUE(run.ok()) << run.failure;
   EXPECT_GT(run.steps, 10u);
   EXPECT_GT(run.element_steps_per_second(), 0);
@@ -117,13 +117,13 @@ TEST_F(StudyRuns, TimedRunsHaveStepsAndDrift) {
 
 TEST_F(StudyRuns, AFailureIsAResultWithTheProgramsOwnLine) {
   wanted_.size = 1e-7;
-  const RunResult huge = run_configuration(case_, wanted_, options_);
+  const study::RunResult huge = run_configuration(case_, wanted_, options_);
   EXPECT_FALSE(huge.ok());
   EXPECT_EQ(huge.exit_code, 2);
   EXPECT_NE(huge.failure.find("flexel-voxelize: "), std::string::npos) << huge.failure;
   wanted_.size = 2.5e-3;
   case_.scene_text += "[[load]]\nwhere = \"nowhere\"\nforce = [0, 0, \"1 N\"]\n";
-  const RunResult wrong = run_configuration(case_, wanted_, options_);
+  const study::RunResult wrong = run_configuration(case_, wanted_, options_);
   EXPECT_NE(wrong.failure.find("bend.toml"), std::string::npos) << wrong.failure;
   EXPECT_EQ(wrong.failure.find("scene.toml"), std::string::npos) << wrong.failure;
 }

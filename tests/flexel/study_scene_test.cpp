@@ -1,10 +1,10 @@
 // Scenes as the runs of a study want them.
 #include <gtest/gtest.h>
 
-#include "flexel/study/history.h"
+#include "base/error.h"
+#include "flexel/study/history_csv.h"
 #include "flexel/study/scene_edit.h"
-#include "formats/error.h"
-#include "simulate/scene.h"
+#include "simulate/scene/scene.h"
 
 namespace flexel::study {
 namespace {
@@ -37,53 +37,56 @@ step = "1 us"
 )";
 
 TEST(StudyScene, FactsAreTheScenes) {
-  const SceneFacts facts = scene_facts(kFallScene, "s.toml");
+  const study::SceneFacts facts = scene_facts(kFallScene, "s.toml");
   EXPECT_TRUE(facts.timed);
   EXPECT_DOUBLE_EQ(facts.duration, 2e-3);
   EXPECT_EQ(facts.integrator, "symplectic");
   EXPECT_EQ(facts.model, "paper");
   EXPECT_EQ(facts.probes, std::vector<std::string>{"tip"});
   std::vector<std::string> names;
-  for (const SceneEffect& effect : facts.effects) names.push_back(effect.name);
+  for (const study::SceneEffect& effect : facts.effects) names.push_back(effect.name);
   EXPECT_EQ(names, (std::vector<std::string>{"gravity", "load 1 (hand)", "load 2", "event"}));
 }
 
 TEST(StudyScene, EditsAreReadByTheSimulation) {
-  Configuration wanted;
+  study::Configuration wanted;
   wanted.model = "springs";
   wanted.integrator = "verlet";
   wanted.step = 2.5e-7;
   wanted.tolerance = 1e-4;
-  const Scene scene = parse_scene(edited_scene(kFallScene, "s.toml", "/a", {"lid", "box"}, wanted), "s.toml");
+  const simulate::Scene scene =
+      simulate::parse_scene(edited_scene(kFallScene, "s.toml", "/a", {"lid", "box"}, wanted), "s.toml");
   EXPECT_EQ(scene.parts.at("lid").model, "springs");
   EXPECT_EQ(scene.parts.at("lid").hooke, "");
   EXPECT_EQ(scene.parts.at("box").model, "springs");
-  EXPECT_EQ(scene.run.method, TimeMethod::verlet);
+  EXPECT_EQ(scene.run.method, simulate::TimeMethod::verlet);
   EXPECT_DOUBLE_EQ(*scene.run.step, 2.5e-7);
   EXPECT_DOUBLE_EQ(scene.run.tolerance, 1e-4);
-  EXPECT_EQ(scene.get<Loads>().loads.size(), 2u);
+  EXPECT_EQ(scene.get<simulate::Loads>().loads.size(), 2u);
 }
 
 TEST(StudyScene, NothingChangedIsTheSameScene) {
-  const Scene scene = parse_scene(edited_scene(kFallScene, "s.toml", "/a", {"lid"}, {}), "s.toml");
+  const simulate::Scene scene =
+      simulate::parse_scene(edited_scene(kFallScene, "s.toml", "/a", {"lid"}, {}), "s.toml");
   EXPECT_EQ(scene.parts.at("lid").model, "paper");
   EXPECT_EQ(scene.parts.at("lid").hooke, "ganovelli");
   EXPECT_DOUBLE_EQ(*scene.run.step, 1e-6);
 }
 
 TEST(StudyScene, OneEffectIsLeftOut) {
-  for (const SceneEffect& effect : scene_facts(kFallScene, "s.toml").effects) {
-    Configuration wanted;
+  for (const study::SceneEffect& effect : scene_facts(kFallScene, "s.toml").effects) {
+    study::Configuration wanted;
     wanted.without = effect.name;
     const std::string text = edited_scene(kFallScene, "s.toml", "/a", {}, wanted);
     const std::size_t before = scene_facts(kFallScene, "s.toml").effects.size();
     EXPECT_EQ(scene_facts(text, "s.toml").effects.size(), before - 1) << effect.name;
   }
-  Configuration wanted;
+  study::Configuration wanted;
   wanted.without = "load 2";
-  const Scene scene = parse_scene(edited_scene(kFallScene, "s.toml", "/a", {}, wanted), "s.toml");
-  ASSERT_EQ(scene.get<Loads>().loads.size(), 1u);
-  EXPECT_EQ(scene.get<Loads>().loads[0].name, "hand");
+  const simulate::Scene scene =
+      simulate::parse_scene(edited_scene(kFallScene, "s.toml", "/a", {}, wanted), "s.toml");
+  ASSERT_EQ(scene.get<simulate::Loads>().loads.size(), 1u);
+  EXPECT_EQ(scene.get<simulate::Loads>().loads[0].name, "hand");
   wanted.without = "drag";
   EXPECT_THROW((void)edited_scene(kFallScene, "s.toml", "/a", {}, wanted), InputError);
 }

@@ -9,8 +9,8 @@
 namespace flexel::study {
 namespace {
 
-RunResult run_of(std::size_t cells, double wall, double thin_matter = 0) {
-  RunResult run;
+study::RunResult run_of(std::size_t cells, double wall, double thin_matter = 0) {
+  study::RunResult run;
   run.cells = run.elements = cells;
   run.wall = run.cpu = wall;
   run.thin_matter = thin_matter;
@@ -18,36 +18,36 @@ RunResult run_of(std::size_t cells, double wall, double thin_matter = 0) {
   return run;
 }
 
-std::set<std::string> sweeps_of(const std::vector<Trial>& trials) {
+std::set<std::string> sweeps_of(const std::vector<study::Trial>& trials) {
   std::set<std::string> names;
-  for (const Trial& each : trials) names.insert(each.sweep);
+  for (const study::Trial& each : trials) names.insert(each.sweep);
   return names;
 }
 
 constexpr double kBudget = 120;
 
-Sweep sweep() {
-  return {SceneFacts{}, Configuration{}, {8e-3, 4e-3, 2e-3, 1e-3}, kBudget, 4};
+study::Sweep sweep() {
+  return {study::SceneFacts{}, study::Configuration{}, {8e-3, 4e-3, 2e-3, 1e-3}, kBudget, 4};
 }
 
 // Runs the sizes that are given, and leaves the next one out.
-Sweep climbed(const std::vector<RunResult>& runs) {
-  Sweep result = sweep();
-  for (const RunResult& run : runs) {
-    const std::vector<Trial> open = result.open();
+study::Sweep climbed(const std::vector<study::RunResult>& runs) {
+  study::Sweep result = sweep();
+  for (const study::RunResult& run : runs) {
+    const std::vector<study::Trial> open = result.open();
     EXPECT_EQ(open.size(), 1u);
     EXPECT_EQ(open[0].sweep, "resolution");
     result.done(open[0], run);
   }
-  if (const std::vector<Trial> open = result.open(); !open.empty() && open[0].sweep == "resolution")
+  if (const std::vector<study::Trial> open = result.open(); !open.empty() && open[0].sweep == "resolution")
     result.leave_out(open[0]);
   return result;
 }
 
 TEST(StudySweep, NothingButSizesRunsBeforeTheFinest) {
-  Sweep study = sweep();
+  study::Sweep study = sweep();
   for (const std::size_t cells : {100, 800, 6400, 51200}) {
-    const std::vector<Trial> open = study.open();
+    const std::vector<study::Trial> open = study.open();
     EXPECT_EQ(sweeps_of(open), (std::set<std::string>{"resolution"})) << cells;
     study.done(open.at(0), run_of(cells, 1e-4 * static_cast<double>(cells)));
   }
@@ -55,12 +55,12 @@ TEST(StudySweep, NothingButSizesRunsBeforeTheFinest) {
 }
 
 TEST(StudySweep, ChoicesAreMadeAtOneSizeOfUse) {
-  Sweep study = climbed({run_of(458, 0.1), run_of(2278, 0.4), run_of(18000, 3)});
+  study::Sweep study = climbed({run_of(458, 0.1), run_of(2278, 0.4), run_of(18000, 3)});
   std::set<std::string> run;
   while (!study.open().empty()) {
     // What changes the answer goes before what changes its last digits.
-    const std::vector<Trial> open = study.open();
-    for (const Trial& each : open) {
+    const std::vector<study::Trial> open = study.open();
+    for (const study::Trial& each : open) {
       EXPECT_DOUBLE_EQ(each.configuration.size, 4e-3) << each.label;
       EXPECT_NE(each.sweep == "model" || each.sweep == "effect",
                 open[0].sweep != "model" && open[0].sweep != "effect");

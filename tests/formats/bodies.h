@@ -4,7 +4,7 @@
 #include <random>
 #include <set>
 
-#include "formats/body.h"
+#include "formats/lattice/body.h"
 
 namespace flexel::test {
 

@@ -1,4 +1,4 @@
-#include "formats/body_file.h"
+#include "formats/lattice/body_file.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "formats/error.h"
+#include "base/error.h"
 #include "tests/formats/bodies.h"
 #include "tests/formats/import_help.h"
 

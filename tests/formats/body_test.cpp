@@ -1,9 +1,9 @@
-#include "formats/body.h"
+#include "formats/lattice/body.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "formats/error.h"
+#include "base/error.h"
 #include "tests/formats/bodies.h"
 
 namespace flexel {

@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "formats/error.h"
-#include "formats/import.h"
-#include "formats/topology.h"
+#include "base/error.h"
+#include "formats/exchange/import.h"
+#include "formats/part/topology.h"
 
 namespace flexel::test {
 

@@ -3,7 +3,7 @@
 
 #include <assimp/Importer.hpp>
 
-#include "formats/surface_file.h"
+#include "formats/exchange/surface_file.h"
 #include "tests/formats/import_help.h"
 
 namespace flexel::test {

@@ -3,8 +3,8 @@
 #include <csignal>
 #include <map>
 
-#include "formats/import/crash_guard.h"
-#include "formats/parallel.h"
+#include "base/parallel.h"
+#include "formats/cad/crash_guard.h"
 #include "tests/formats/import_help.h"
 
 namespace flexel::test {

@@ -1,6 +1,6 @@
 #include <gmock/gmock.h>
 
-#include "formats/parallel.h"
+#include "base/parallel.h"
 #include "tests/formats/import_help.h"
 
 namespace flexel::test {

@@ -1,4 +1,4 @@
-#include "formats/locate.h"
+#include "formats/lattice/locate.h"
 
 #include <gtest/gtest.h>
 

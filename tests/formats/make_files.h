@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "formats/vec.h"
+#include "base/math/vec.h"
 
 namespace flexel::test {
 

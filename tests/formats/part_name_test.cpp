@@ -1,5 +1,5 @@
 // Names that writers put where they have none.
-#include "formats/part_name.h"
+#include "formats/part/part_name.h"
 
 #include <gtest/gtest.h>
 

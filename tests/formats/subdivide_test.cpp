@@ -1,4 +1,4 @@
-#include "formats/import/subdivide.h"
+#include "formats/part/subdivide.h"
 
 #include <gmock/gmock.h>
 
@@ -8,8 +8,8 @@
 #include <algorithm>
 #include <limits>
 
-#include "formats/area_vector.h"
-#include "formats/surface_file.h"
+#include "base/math/area_vector.h"
+#include "formats/exchange/surface_file.h"
 #include "tests/formats/import_help.h"
 
 namespace flexel::test {

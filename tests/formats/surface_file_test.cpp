@@ -1,4 +1,4 @@
-#include "formats/surface_file.h"
+#include "formats/exchange/surface_file.h"
 
 #include <gmock/gmock.h>
 

@@ -4,9 +4,9 @@
 #include <Eigen/Geometry>
 #include <numbers>
 
-#include "formats/resolution.h"
-#include "formats/size_warning.h"
-#include "formats/surface_file.h"
+#include "formats/exchange/resolution.h"
+#include "formats/exchange/size_warning.h"
+#include "formats/exchange/surface_file.h"
 #include "tests/formats/import_help.h"
 #include "tests/formats/make_files.h"
 

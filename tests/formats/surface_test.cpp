@@ -1,4 +1,4 @@
-#include "formats/surface.h"
+#include "formats/part/surface.h"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
@@ -7,8 +7,8 @@
 #include <limits>
 #include <numbers>
 
-#include "formats/area_vector.h"
-#include "formats/error.h"
+#include "base/error.h"
+#include "base/math/area_vector.h"
 
 namespace flexel {
 namespace {

@@ -1,4 +1,4 @@
-#include "formats/topology.h"
+#include "formats/part/topology.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <random>
 #include <set>
 
-#include "formats/parallel.h"
+#include "base/parallel.h"
 
 namespace flexel {
 namespace {

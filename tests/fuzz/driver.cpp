@@ -15,7 +15,7 @@
 #include <fstream>
 #include <random>
 
-#include "formats/error.h"
+#include "base/error.h"
 
 namespace flexel::fuzz {
 namespace {

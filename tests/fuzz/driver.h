@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/files.h"
+#include "base/files/files.h"
 
 namespace flexel::fuzz {
 

@@ -2,9 +2,9 @@
 // the model of a 3MF file, which is put into an archive here: mutated archives end at their checksums.
 #include <filesystem>
 
-#include "formats/error.h"
-#include "formats/import.h"
-#include "formats/surface_file.h"
+#include "base/error.h"
+#include "formats/exchange/import.h"
+#include "formats/exchange/surface_file.h"
 #include "tests/formats/make_files.h"
 #include "tests/fuzz/driver.h"
 #include "tests/fuzz/tetrahedron.h"

@@ -3,8 +3,8 @@
 
 #include <filesystem>
 
-#include "formats/body_file.h"
-#include "formats/import.h"
+#include "formats/exchange/import.h"
+#include "formats/lattice/body_file.h"
 #include "tests/fuzz/driver.h"
 #include "tests/fuzz/tetrahedron.h"
 

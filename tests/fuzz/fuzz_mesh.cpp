@@ -1,6 +1,6 @@
 // Mutated PLY and OFF files, read and, moved, written again from their own bytes.
-#include "formats/import.h"
-#include "formats/surface_file.h"
+#include "formats/exchange/import.h"
+#include "formats/exchange/surface_file.h"
 #include "tests/fuzz/driver.h"
 #include "tests/fuzz/tetrahedron.h"
 

@@ -1,5 +1,5 @@
 // Mutated OBJ files.
-#include "formats/import.h"
+#include "formats/exchange/import.h"
 #include "tests/fuzz/driver.h"
 
 int main(int argc, char** argv) {

@@ -1,6 +1,6 @@
 // Mutated scenes that use every table.
-#include "formats/files.h"
-#include "simulate/scene.h"
+#include "base/files/files.h"
+#include "simulate/scene/scene.h"
 #include "tests/fuzz/driver.h"
 
 namespace {
@@ -48,5 +48,5 @@ load_steps = 3
 int main(int argc, char** argv) {
   using namespace flexel;
   return fuzz::run(argc, argv, "fuzz_scene", {fuzz::bytes_of(kScene)},
-                   [](const std::string& path) { (void)read_scene(path); });
+                   [](const std::string& path) { (void)simulate::read_scene(path); });
 }

@@ -1,5 +1,5 @@
 // Mutated STL files, ASCII and binary.
-#include "formats/import.h"
+#include "formats/exchange/import.h"
 #include "tests/fuzz/driver.h"
 #include "tests/fuzz/tetrahedron.h"
 

@@ -6,9 +6,9 @@
 #include <filesystem>
 #include <fstream>
 
-#include "formats/error.h"
-#include "formats/import.h"
-#include "formats/surface_file.h"
+#include "base/error.h"
+#include "formats/exchange/import.h"
+#include "formats/exchange/surface_file.h"
 #include "tests/fuzz/driver.h"
 
 namespace flexel::fuzz {

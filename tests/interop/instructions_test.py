@@ -14,10 +14,10 @@ MOST_VARIANTS = 16  # of the hot loop, a model
 
 def effects():
     """The classes in the list of effects."""
-    text = (SOURCE / "simulate/effects/all.h").read_text(encoding="utf-8")
+    text = (SOURCE / "simulate/scene/effects.h").read_text(encoding="utf-8")
     found = re.search(r"using Effects = EffectList<([^>]*)>", text).group(1)
     names = re.findall(r"\w+", found)
-    expect(len(names) >= 6, f"no list of effects in simulate/effects/all.h: {names}")
+    expect(len(names) >= 6, f"no list of effects in simulate/scene/effects.h: {names}")
     return names
 
 

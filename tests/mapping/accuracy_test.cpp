@@ -3,12 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/parallel.h"
 #include "bodies.h"
-#include "formats/parallel.h"
-#include "mapping/bind.h"
+#include "mapping/methods/bind.h"
+#include "mapping/report/report.h"
 #include "motions.h"
 
-namespace flexel {
+namespace flexel::mapping {
 namespace {
 
 using test::bend;
@@ -201,4 +202,4 @@ TEST(Exactness, KeptWeightsGiveTheSameBitsAsThoseFoundAgain) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::mapping

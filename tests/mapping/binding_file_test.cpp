@@ -1,17 +1,17 @@
 // A binding comes out of its file as it went in, and nothing else does.
-#include "mapping/binding_file.h"
+#include "mapping/methods/binding_file.h"
 
 #include <gtest/gtest.h>
 
 #include <filesystem>
 #include <functional>
 
+#include "base/error.h"
+#include "base/files/files.h"
 #include "bodies.h"
-#include "formats/error.h"
-#include "formats/files.h"
 #include "motions.h"
 
-namespace flexel {
+namespace flexel::mapping {
 namespace {
 
 class BindingFile : public testing::Test {
@@ -114,4 +114,4 @@ TEST_F(BindingFile, IsForTwoMethods) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::mapping

@@ -7,7 +7,7 @@
 #include <limits>
 #include <map>
 
-namespace flexel::test {
+namespace flexel::mapping::test {
 namespace {
 
 using Key = std::array<std::int32_t, 3>;  // (k, j, i)
@@ -249,4 +249,4 @@ Mat3 rotation(double angle, const Vec3& axis) {
   return Eigen::AngleAxisd(angle, axis.normalized()).toRotationMatrix();
 }
 
-}  // namespace flexel::test
+}  // namespace flexel::mapping::test

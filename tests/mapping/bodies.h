@@ -3,9 +3,9 @@
 #include <functional>
 #include <vector>
 
-#include "formats/body.h"
+#include "formats/lattice/body.h"
 
-namespace flexel::test {
+namespace flexel::mapping::test {
 
 using Solid = std::function<bool(const Vec3&)>;  // world point -> inside
 using Field = std::function<Vec3(const Vec3&)>;  // rest point -> deformed point
@@ -37,4 +37,4 @@ Body block(int nx, int ny, int nz, double h, Placement placement, int n = 8);
 void deform(Body& body, const Field& field);
 Mat3 rotation(double angle, const Vec3& axis);
 
-}  // namespace flexel::test
+}  // namespace flexel::mapping::test

@@ -1,15 +1,15 @@
 // Parts that were carved: their surface is closed around what went, and moves with what is left.
-#include "mapping/crack_carved.h"
+#include "mapping/crack/crack_carved.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "base/error.h"
 #include "cgal_solid.h"
-#include "formats/error.h"
-#include "formats/topology.h"
+#include "formats/part/topology.h"
 #include "pieces.h"
 
-namespace flexel {
+namespace flexel::mapping {
 namespace {
 
 using namespace test;
@@ -110,4 +110,4 @@ INSTANTIATE_TEST_SUITE_P(Placements, Carved, testing::Values(Placement::corner, 
                          });
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::mapping

@@ -10,7 +10,7 @@
 #include <iomanip>
 #include <sstream>
 
-namespace flexel::test {
+namespace flexel::mapping::test {
 
 namespace PMP = CGAL::Polygon_mesh_processing;
 using Point = CGAL::Exact_predicates_inexact_constructions_kernel::Point_3;
@@ -46,4 +46,4 @@ std::string what_cgal_minds(const std::vector<Vec3>& points,
   return "";
 }
 
-}  // namespace flexel::test
+}  // namespace flexel::mapping::test

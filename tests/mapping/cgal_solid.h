@@ -5,13 +5,13 @@
 #include <string>
 #include <vector>
 
-#include "formats/vec.h"
+#include "base/math/vec.h"
 
-namespace flexel::test {
+namespace flexel::mapping::test {
 
 // "" for triangles that, with points at one position joined as readers of STL do, are a closed manifold whose
 // shells bound a volume and do not cross; else what is wrong.
 std::string what_cgal_minds(const std::vector<Vec3>& points,
                             const std::vector<std::array<std::uint32_t, 3>>& triangles);
 
-}  // namespace flexel::test
+}  // namespace flexel::mapping::test

@@ -3,13 +3,14 @@
 
 #include <Eigen/LU>
 
-#include "formats/error.h"
-#include "mapping/attributes.h"
-#include "mapping/bind.h"
-#include "mapping/quality.h"
+#include "base/error.h"
+#include "mapping/methods/bind.h"
+#include "mapping/report/attributes.h"
+#include "mapping/report/quality.h"
+#include "mapping/report/report.h"
 #include "motions.h"
 
-namespace flexel {
+namespace flexel::mapping {
 namespace {
 
 MapReport mapped(const Body& body, const MapOptions& options = {}) {
@@ -140,4 +141,4 @@ TEST(Attributes, HoldWhatIsKnownOfEachVertex) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::mapping

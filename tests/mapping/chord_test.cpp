@@ -1,14 +1,15 @@
 // What flat triangles miss of a deformation, against what is known of a circle; and with finer ones.
-#include "mapping/chord.h"
+#include "mapping/report/chord.h"
 
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 
-#include "formats/import/subdivide.h"
+#include "formats/part/subdivide.h"
+#include "mapping/report/report.h"
 #include "motions.h"
 
-namespace flexel {
+namespace flexel::mapping {
 namespace {
 
 using test::map_quietly;
@@ -125,4 +126,4 @@ TEST(ChordOfACutSurface, IsNotMeasured) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::mapping

@@ -1,5 +1,5 @@
 // Parts that broke: pieces are closed, add up to the whole, and go with their own elements.
-#include "mapping/crack.h"
+#include "mapping/map_part.h"
 
 #include <gtest/gtest.h>
 
@@ -8,12 +8,12 @@
 #include <random>
 #include <set>
 
-#include "formats/error.h"
-#include "formats/topology.h"
+#include "base/error.h"
+#include "formats/part/topology.h"
 #include "pieces.h"
 #include "voxelize/voxelize.h"
 
-namespace flexel {
+namespace flexel::mapping {
 namespace {
 
 using namespace test;
@@ -267,10 +267,10 @@ TEST(Crack, ALeafThatBreaksOffTakesNothingOfTheOther) {
   bare.parts.resize(1);
   bare.parts[0].name = "leaves";
   add_surface(bare, vertices, polygons);
-  VoxelizeOptions options;
+  voxelize::VoxelizeOptions options;
   options.size = 0.1;
   Progress progress("test", Progress::Mode::quiet);
-  Body body = voxelize(bare.surface, options, progress).body;
+  Body body = voxelize::voxelize(bare.surface, options, progress).body;
   // Cells of the upper leaf: those well above the gap, and those that share elements with them.
   const auto range = [&](std::size_t c) {
     Box box;
@@ -352,4 +352,4 @@ TEST(Crack, AttributesComeAlong) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::mapping

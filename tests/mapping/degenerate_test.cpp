@@ -1,12 +1,13 @@
 // Bodies at the edge of what is a body: an answer or one clear line, never a number that is none.
 #include <gtest/gtest.h>
 
-#include "formats/error.h"
-#include "mapping/bind.h"
-#include "mapping/space_map.h"
+#include "base/error.h"
+#include "mapping/methods/bind.h"
+#include "mapping/methods/space_map.h"
+#include "mapping/report/report.h"
 #include "motions.h"
 
-namespace flexel {
+namespace flexel::mapping {
 namespace {
 
 using test::map_quietly;
@@ -200,4 +201,4 @@ TEST(FarVertices, AreFollowedTurnedOrRefused) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::mapping

@@ -4,13 +4,14 @@
 
 #include <algorithm>
 
+#include "base/error.h"
 #include "bodies.h"
-#include "formats/error.h"
-#include "mapping/bind.h"
-#include "mapping/search.h"
+#include "mapping/anchors/search.h"
+#include "mapping/methods/bind.h"
+#include "mapping/report/report.h"
 #include "motions.h"
 
-namespace flexel {
+namespace flexel::mapping {
 namespace {
 
 using test::map_quietly;
@@ -319,4 +320,4 @@ TEST(Refuses, ABodyWithoutASurfaceOrAPartWithoutElements) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::mapping

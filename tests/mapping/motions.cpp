@@ -3,9 +3,9 @@
 #include <Eigen/Geometry>
 #include <numbers>
 
-#include "formats/topology.h"
+#include "formats/part/topology.h"
 
-namespace flexel::test {
+namespace flexel::mapping::test {
 namespace {
 
 constexpr double kLength = 8, kRadius = 0.5;
@@ -149,4 +149,4 @@ double normal_jump(const Body& body, const std::vector<Vec3>& displacement, cons
   return std::sqrt(sum / count);
 }
 
-}  // namespace flexel::test
+}  // namespace flexel::mapping::test

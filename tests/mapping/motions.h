@@ -4,9 +4,10 @@
 #include <algorithm>
 
 #include "bodies.h"
-#include "mapping/map.h"
+#include "mapping/methods/map_surface.h"
+#include "mapping/types/result.h"
 
-namespace flexel::test {
+namespace flexel::mapping::test {
 
 constexpr std::array<MapMethod, 4> kEveryMethod = {MapMethod::gram_schmidt, MapMethod::affine,
                                                    MapMethod::blended, MapMethod::smooth};
@@ -46,4 +47,4 @@ double rms_error(const Body& body, const std::vector<Vec3>& displacement, const 
 // that of the exact surface [degrees].
 double normal_jump(const Body& body, const std::vector<Vec3>& displacement, const Field& field);
 
-}  // namespace flexel::test
+}  // namespace flexel::mapping::test

@@ -1,6 +1,6 @@
 // The grid finds what a look at every element finds, for points inside, outside and far away, in any shape of
 // part.
-#include "mapping/nearest.h"
+#include "mapping/anchors/nearest.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 
 #include "bodies.h"
 
-namespace flexel {
+namespace flexel::mapping {
 namespace {
 
 double brute_force(const Body& body, std::uint32_t part, const Vec3& point) {
@@ -81,4 +81,4 @@ TEST(Nearest, LooksAtItsOwnPartOnly) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::mapping

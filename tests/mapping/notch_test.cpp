@@ -6,11 +6,11 @@
 #include <random>
 
 #include "cgal_solid.h"
-#include "formats/topology.h"
-#include "mapping/crack_carved.h"
+#include "formats/part/topology.h"
+#include "mapping/crack/crack_carved.h"
 #include "pieces.h"
 
-namespace flexel {
+namespace flexel::mapping {
 namespace {
 
 using namespace test;
@@ -200,4 +200,4 @@ TEST(Notch, CarvedAndCrackedIsPartedAndClosed) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::mapping

@@ -5,14 +5,15 @@
 #include <filesystem>
 #include <set>
 
+#include "base/error.h"
 #include "bodies.h"
-#include "formats/error.h"
-#include "formats/import.h"
-#include "mapping/map.h"
+#include "formats/exchange/import.h"
+#include "mapping/methods/map_surface.h"
+#include "mapping/report/report.h"
 #include "motions.h"
 #include "voxelize/voxelize.h"
 
-namespace flexel {
+namespace flexel::mapping {
 namespace {
 
 using test::silent;
@@ -88,10 +89,10 @@ class RealPart : public testing::TestWithParam<std::string> {
 #ifndef FLEXEL_STEP
     if (ending_of(path) == ".step") GTEST_SKIP() << "built without OpenCASCADE";
 #endif
-    VoxelizeOptions options;
+    voxelize::VoxelizeOptions options;
     options.count = kCells;
     try {
-      body_ = voxelize(import_surface(path.string()), options, silent()).body;
+      body_ = voxelize::voxelize(import_surface(path.string()), options, silent()).body;
     } catch (const InputError& error) {
       ASSERT_TRUE(kRefused.count(GetParam())) << error.what();
       GTEST_SKIP() << error.what();
@@ -179,4 +180,4 @@ INSTANTIATE_TEST_SUITE_P(Parts, RealPart, testing::ValuesIn(parts()), [](const a
 });
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::mapping

@@ -8,9 +8,9 @@
 #include <set>
 
 #include "cgal_solid.h"
-#include "formats/topology.h"
+#include "formats/part/topology.h"
 
-namespace flexel::test {
+namespace flexel::mapping::test {
 namespace {
 
 // Every edge has two sides, which run through it in opposite directions; every vertex has one fan.
@@ -146,4 +146,4 @@ Body ball(Placement placement, const Mat3& axes, double hole) {
   return body;
 }
 
-}  // namespace flexel::test
+}  // namespace flexel::mapping::test

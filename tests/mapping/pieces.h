@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "bodies.h"
-#include "mapping/crack.h"
+#include "mapping/map_part.h"
 
-namespace flexel::test {
+namespace flexel::mapping::test {
 
 using Edge = std::pair<std::uint32_t, std::uint32_t>;  // of two vertices
 
@@ -33,4 +33,4 @@ void expect_whole(const Body& body, const MappedPart& mapped);
 // A ball of radius 0.5 about 0, and its surface of quads and triangles; `hole`: radius of a hollow.
 Body ball(Placement placement, const Mat3& axes, double hole = 0);
 
-}  // namespace flexel::test
+}  // namespace flexel::mapping::test

@@ -1,16 +1,16 @@
 // Which elements a vertex may use: against a search by brute force, and at slits.
-#include "mapping/reach.h"
+#include "mapping/anchors/connected_neighbourhood.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <random>
 
-#include "mapping/bind.h"
-#include "mapping/kernel.h"
+#include "mapping/anchors/blend_weights.h"
+#include "mapping/methods/bind.h"
 #include "motions.h"
 
-namespace flexel {
+namespace flexel::mapping {
 namespace {
 
 // Connections from `from` to every element; a large number where there is no way.
@@ -96,4 +96,4 @@ TEST(Reach, NothingJumpsAtTheRootOfASlit) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::mapping

@@ -5,10 +5,11 @@
 #include <nlohmann/json.hpp>
 
 #include "bodies.h"
-#include "mapping/bind.h"
+#include "mapping/methods/bind.h"
+#include "mapping/report/report.h"
 #include "motions.h"
 
-namespace flexel {
+namespace flexel::mapping {
 namespace {
 
 using test::map_quietly;
@@ -152,4 +153,4 @@ TEST(Report, HoldsVolumeAndDisplacement) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::mapping

@@ -1,16 +1,16 @@
 // The deformation as a map of space: its derivative against differences, its smoothness, and that it is what
 // blended vertices follow.
-#include "mapping/space_map.h"
+#include "mapping/methods/space_map.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "formats/error.h"
-#include "mapping/bind.h"
+#include "base/error.h"
+#include "mapping/methods/bind.h"
 #include "motions.h"
 
-namespace flexel {
+namespace flexel::mapping {
 namespace {
 
 Vec3 wave(const Vec3& p) {
@@ -130,4 +130,4 @@ TEST(SpaceMap, RefusesAPartWithoutElements) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::mapping

@@ -9,15 +9,15 @@
 #include "flexel/picture/lattice_drawable.h"
 #include "scenes.h"
 
-namespace flexel {
+namespace flexel::picture {
 namespace {
 
 TEST(Attributes, StrainOfAStretchIsTwoThirdsOfItsLogarithm) {
   for (const Placement placement : {Placement::corner, Placement::centre})
     for (const double stretch : {0.8, 1.0, 1.001, 1.7}) {
-      Body body = test::block(4, 3, 2, 0.01, placement);
-      const Mat3 turn = test::rotation(1.1, Vec3(1, 2, 3).normalized());
-      test::deform(body, [&](const Vec3& x) {
+      Body body = mapping::test::block(4, 3, 2, 0.01, placement);
+      const Mat3 turn = mapping::test::rotation(1.1, Vec3(1, 2, 3).normalized());
+      mapping::test::deform(body, [&](const Vec3& x) {
         return Vec3(turn * Vec3(stretch * x.x(), x.y(), x.z()) + Vec3(5, 6, 7));
       });
       for (const double value : strain(body).values)
@@ -26,19 +26,19 @@ TEST(Attributes, StrainOfAStretchIsTwoThirdsOfItsLogarithm) {
 }
 
 TEST(Attributes, ChangeOfVolumeAloneIsNoEquivalentStrain) {
-  Body body = test::block(3, 3, 3, 0.01, Placement::corner);
-  test::deform(body, [](const Vec3& x) { return Vec3(1.3 * x); });
+  Body body = mapping::test::block(3, 3, 3, 0.01, Placement::corner);
+  mapping::test::deform(body, [](const Vec3& x) { return Vec3(1.3 * x); });
   for (const double value : strain(body).values) EXPECT_NEAR(value, 0, 1e-9);
 }
 
 TEST(Attributes, AnInvertedCellHasNoStrain) {
-  Body body = test::block(2, 2, 2, 0.01, Placement::corner);
-  test::deform(body, [](const Vec3& x) { return Vec3(-x.x(), x.y(), x.z()); });
+  Body body = mapping::test::block(2, 2, 2, 0.01, Placement::corner);
+  mapping::test::deform(body, [](const Vec3& x) { return Vec3(-x.x(), x.y(), x.z()); });
   for (const double value : strain(body).values) EXPECT_TRUE(std::isnan(value));
 }
 
 TEST(Attributes, LinearValuesOfElementsAreExactAtVertices) {
-  Body body = test::block(4, 3, 2, 0.01, Placement::corner);
+  Body body = mapping::test::block(4, 3, 2, 0.01, Placement::corner);
   Column column{1, {}};
   const auto value = [](const Vec3& x) { return 3 + 40 * x.x() - 20 * x.y() + 7 * x.z(); };
   for (const Vec3& x : body.rest) column.values.push_back(value(x));
@@ -51,7 +51,7 @@ TEST(Attributes, LinearValuesOfElementsAreExactAtVertices) {
 }
 
 TEST(Attributes, NamesAndComponents) {
-  Body body = test::block(2, 2, 2, 0.01, Placement::corner);
+  Body body = mapping::test::block(2, 2, 2, 0.01, Placement::corner);
   body.element_columns["velocity"] = {3, std::vector<double>(3 * body.element_count(), 2)};
   EXPECT_NEAR(body_attribute(body, "velocity")->values.at(0), std::sqrt(12.0), 1e-12);
   EXPECT_EQ(body_attribute(body, "velocity.y")->values.at(0), 2);
@@ -62,7 +62,7 @@ TEST(Attributes, NamesAndComponents) {
 }
 
 TEST(Lattice, TheHullOfABlockIsItsOutside) {
-  const Body body = test::block(4, 3, 2, 0.01, Placement::corner);
+  const Body body = mapping::test::block(4, 3, 2, 0.01, Placement::corner);
   const CellHull hull = draw_cells(body, body.position, {Vec3::Zero(), 1});
   EXPECT_EQ(hull.drawn.triangles.size(), 2u * 2 * (4 * 3 + 3 * 2 + 2 * 4));
   std::vector<Vec3> vertices;
@@ -71,7 +71,7 @@ TEST(Lattice, TheHullOfABlockIsItsOutside) {
 }
 
 TEST(Lattice, BrokenCellsLeaveAGap) {
-  Body body = test::block(5, 2, 2, 0.01, Placement::corner);
+  Body body = mapping::test::block(5, 2, 2, 0.01, Placement::corner);
   for (std::size_t c = 0; c < body.cell_count(); ++c)
     body.broken[c] = body.lattice_index[body.cell_elements[c][0]][0] == 2 ? 1 : 0;
   // two blocks of 2 x 2 x 2
@@ -84,8 +84,8 @@ TEST(Lattice, BrokenCellsLeaveAGap) {
 TEST(Picture, TheDeformedBodyIsDrawnWhereItIs) {
   // A block that is moved to the right by its own length: the shading follows, the outline stays.
   PictureSubject moved = test::subject({}, "body");
-  moved.body = test::block(6, 3, 3, 0.01, Placement::corner);
-  test::deform(*moved.body, [](const Vec3& x) { return Vec3(x + Vec3(0.12, 0, 0)); });
+  moved.body = mapping::test::block(6, 3, 3, 0.01, Placement::corner);
+  mapping::test::deform(*moved.body, [](const Vec3& x) { return Vec3(x + Vec3(0.12, 0, 0)); });
   PictureOptions options;
   options.width = 600;
   options.height = 300;
@@ -107,4 +107,4 @@ TEST(Picture, TheDeformedBodyIsDrawnWhereItIs) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::picture

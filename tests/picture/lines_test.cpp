@@ -1,13 +1,13 @@
 // Which lines of a part are seen, and how the view is chosen.
-#include "flexel/picture/lines.h"
+#include "flexel/picture/render/lines.h"
 
 #include <gtest/gtest.h>
 
-#include "flexel/picture/best_view.h"
-#include "flexel/picture/render.h"
+#include "flexel/picture/render/best_view.h"
+#include "flexel/picture/render/render.h"
 #include "scenes.h"
 
-namespace flexel {
+namespace flexel::picture {
 namespace {
 
 struct Seen {
@@ -98,4 +98,4 @@ TEST(BestView, SeesIntoAnL) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::picture

@@ -6,14 +6,14 @@
 
 #include <Eigen/LU>
 
-#include "flexel/picture/camera.h"
-#include "flexel/picture/colour_map.h"
-#include "flexel/picture/quantity.h"
-#include "flexel/picture/text.h"
-#include "formats/error.h"
+#include "base/error.h"
+#include "flexel/picture/canvas/colour_map.h"
+#include "flexel/picture/canvas/text.h"
+#include "flexel/picture/render/camera.h"
+#include "flexel/picture/render/quantity.h"
 #include "scenes.h"
 
-namespace flexel {
+namespace flexel::picture {
 namespace {
 
 using testing::HasSubstr;
@@ -207,4 +207,4 @@ TEST(Picture, PngRoundTrips) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::picture

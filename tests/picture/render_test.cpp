@@ -1,13 +1,13 @@
 // What the picture must show, whatever it looks like: areas, places, order in depth, symmetry, colours.
-#include "flexel/picture/render.h"
+#include "flexel/picture/render/render.h"
 
 #include <gtest/gtest.h>
 
-#include "flexel/picture/colour_map.h"
-#include "formats/parallel.h"
+#include "base/parallel.h"
+#include "flexel/picture/canvas/colour_map.h"
 #include "scenes.h"
 
-namespace flexel {
+namespace flexel::picture {
 namespace {
 
 constexpr std::uint32_t kWhite = 0xffffff;
@@ -165,4 +165,4 @@ TEST(Render, HollowsAreDarkerThanTheOpen) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::picture

@@ -4,10 +4,10 @@
 #include <map>
 #include <numbers>
 
-#include "flexel/picture/drawable.h"
 #include "flexel/picture/picture.h"
+#include "flexel/picture/render/drawable.h"
 
-namespace flexel::test {
+namespace flexel::picture::test {
 
 inline Surface surface_of(std::vector<Vec3> vertices,
                           const std::vector<std::array<std::uint32_t, 3>>& triangles) {
@@ -80,4 +80,4 @@ inline Image picture(const std::vector<PictureSubject>& subjects, const PictureO
   return draw_picture(subjects, options, progress).image;
 }
 
-}  // namespace flexel::test
+}  // namespace flexel::picture::test

@@ -4,12 +4,12 @@
 
 #include <cmath>
 
-#include "simulate/scene.h"
-#include "simulate/simulate.h"
+#include "simulate/result/result.h"
+#include "simulate/scene/scene.h"
 #include "tests/simulate/box_body.h"
 #include "tests/simulate/scene_case.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using testing::box_body;
@@ -125,4 +125,4 @@ TEST(Beam, PlateBendsFarPastItsThicknessInFewIterations) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -4,16 +4,17 @@
 
 #include <Eigen/Geometry>
 
-#include "formats/error.h"
-#include "simulate/merge.h"
-#include "simulate/scene.h"
-#include "simulate/simulate.h"
-#include "simulate/touching.h"
+#include "base/error.h"
+#include "formats/lattice/merge.h"
+#include "simulate/matter/interface_points.h"
+#include "simulate/result/result.h"
+#include "simulate/scene/scene.h"
+#include "simulate/summary.h"
 #include "tests/simulate/box_body.h"
 #include "tests/simulate/scene_case.h"
 #include "tests/simulate/timed_case.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using testing::box_body;
@@ -203,4 +204,4 @@ TEST(Bonds, CanBeLeftOut) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

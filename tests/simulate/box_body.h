@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "formats/body.h"
+#include "formats/lattice/body.h"
 
-namespace flexel::testing {
+namespace flexel::simulate::testing {
 
 struct BoxOptions {
   std::array<int, 3> cells{2, 2, 2};
@@ -113,4 +113,4 @@ inline void set_velocity(Body& body, const std::vector<Vec3>& velocity) {
   body.element_columns["velocity"] = column;
 }
 
-}  // namespace flexel::testing
+}  // namespace flexel::simulate::testing

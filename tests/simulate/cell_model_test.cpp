@@ -1,5 +1,5 @@
 // Model `cells`, one cell: invariance, patch test, and every derivative against differences on random input.
-#include "simulate/cell_model.h"
+#include "simulate/models/cell_model.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <Eigen/Geometry>
 #include <random>
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 Material rubbery(double poisson) {
@@ -227,4 +227,4 @@ TEST(CellModel, InvertedCellHasInfiniteEnergy) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

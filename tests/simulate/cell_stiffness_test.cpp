@@ -1,21 +1,21 @@
 // The tangent stiffness that is made on demand is the one that Cells stores.
-#include "simulate/cell_stiffness.h"
+#include "simulate/equilibrium/cell_stiffness.h"
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
 #include <random>
 
-#include "formats/parallel.h"
-#include "simulate/effects/all.h"
-#include "simulate/mechanics.h"
-#include "simulate/merge.h"
-#include "simulate/scene.h"
+#include "base/parallel.h"
+#include "formats/lattice/merge.h"
+#include "simulate/equilibrium/mechanics.h"
+#include "simulate/scene/effects.h"
+#include "simulate/scene/scene.h"
 #include "tests/simulate/box_body.h"
 #include "tests/simulate/numbered_body.h"
 #include "tests/simulate/scene_case.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using testing::box_body;
@@ -76,9 +76,9 @@ class CellStiffnessOf : public ::testing::TestWithParam<TangentCase> {
   CellStiffnessOf()
       : body_(two_boxes()),
         scene_(held_scene()),
-        setting_{body_, materials_of_parts(scene_, body_), {}, {}, {}, {}},
-        stored_(setting_, Effects::passes(scene_.effects, setting_), StiffnessStorage::stored),
-        made_(setting_, Effects::passes(scene_.effects, setting_), StiffnessStorage::made) {
+        problem_{body_, materials_of_parts(scene_, body_), {}, {}, {}, {}},
+        stored_(problem_, Effects::passes(scene_.effects, problem_), StiffnessStorage::stored),
+        made_(problem_, Effects::passes(scene_.effects, problem_), StiffnessStorage::made) {
     State state{random_vectors(body_.element_count(), GetParam().size), 1};
     for (std::size_t e = 0; e < body_.element_count(); ++e)
       state.displacement[e] -= GetParam().squeeze * body_.rest[e];
@@ -113,7 +113,7 @@ class CellStiffnessOf : public ::testing::TestWithParam<TangentCase> {
 
   Body body_;
   Scene scene_;
-  Setting setting_;
+  Problem problem_;
   Mechanics stored_, made_;
   std::vector<Mat3> stress_;
   double corner_ = 1;  // smallest J of one
@@ -156,8 +156,8 @@ TEST(CellStiffness, CellsBesideGapsAreNoRun) {
   const Body body = testing::cells_beside_gaps(16, 0.1);
   ASSERT_EQ(body.element_count(), 8 * body.cell_count());
   const Scene scene = held_scene();
-  const Setting setting{body, materials_of_parts(scene, body), {}, {}, {}, {}};
-  Mechanics stored(setting, {}, StiffnessStorage::stored), made(setting, {}, StiffnessStorage::made);
+  const Problem problem{body, materials_of_parts(scene, body), {}, {}, {}, {}};
+  Mechanics stored(problem, {}, StiffnessStorage::stored), made(problem, {}, StiffnessStorage::made);
   const State state{std::vector<Vec3>(body.element_count(), Vec3::Zero()), 1};
   for (Mechanics* each : {&stored, &made}) each->assemble(state);
   const std::vector<Vec3> x = random_vectors(body.element_count(), 1);
@@ -169,4 +169,4 @@ TEST(CellStiffness, CellsBesideGapsAreNoRun) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -5,7 +5,7 @@
 
 #include "tests/simulate/box_body.h"
 
-namespace flexel::testing {
+namespace flexel::simulate::testing {
 
 struct CentreOptions {
   std::array<int, 3> voxels{2, 2, 2};
@@ -56,4 +56,4 @@ inline Body centre_body(const CentreOptions& options = {}) {
   return body;
 }
 
-}  // namespace flexel::testing
+}  // namespace flexel::simulate::testing

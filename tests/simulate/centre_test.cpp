@@ -5,14 +5,14 @@
 #include <Eigen/Geometry>
 #include <random>
 
-#include "formats/error.h"
-#include "simulate/carrier.h"
-#include "simulate/merge.h"
-#include "simulate/touching.h"
+#include "base/error.h"
+#include "formats/lattice/merge.h"
+#include "simulate/matter/interface_points.h"
+#include "simulate/matter/interpolation_weights.h"
 #include "tests/simulate/scene_case.h"
 #include "tests/simulate/study_beam.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using testing::centre_body;
@@ -41,7 +41,7 @@ TEST(Centre, NearestElementIsThatOfASearchOverAll) {
   options.origin = Vec3(1, -2, 3);
   options.inside = [](int i, int j, int k) { return (i * 7 + j * 5 + k * 3) % 4 != 0; };
   const Body body = centre_body(options);
-  const Setting setting{body, {}, {}, {}, {}, {}};
+  const Problem problem{body, {}, {}, {}, {}, {}};
   std::mt19937 engine(8);
   std::uniform_real_distribution<double> uniform(-0.5, 1.5);
   int found = 0;
@@ -55,7 +55,7 @@ TEST(Centre, NearestElementIsThatOfASearchOverAll) {
         least = distance;
         expected = e;
       }
-    const auto nearest = nearest_element(setting, 0, point, Vec3::Zero());
+    const auto nearest = nearest_element(problem, 0, point, Vec3::Zero());
     ASSERT_EQ(nearest.has_value(), least <= 0.2) << trial;
     if (!nearest) continue;
     EXPECT_EQ(*nearest, expected);
@@ -69,10 +69,10 @@ TEST(Centre, SurfaceOfASlitKeepsToItsOwnLeaf) {
   CentreOptions options = bar_of_voxels({4, 4, 3});
   options.inside = [](int, int, int k) { return k != 1; };
   const Body body = centre_body(options);
-  const Setting setting{body, {}, {}, {}, {}, {}};
+  const Problem problem{body, {}, {}, {}, {}, {}};
   const Vec3 near_upper(0.15, 0.15, 0.16);
-  const auto upper = nearest_element(setting, 0, near_upper, -Vec3::UnitZ());
-  const auto lower = nearest_element(setting, 0, near_upper, Vec3::UnitZ());
+  const auto upper = nearest_element(problem, 0, near_upper, -Vec3::UnitZ());
+  const auto lower = nearest_element(problem, 0, near_upper, Vec3::UnitZ());
   ASSERT_TRUE(upper && lower);
   EXPECT_EQ(body.lattice_index[*upper][2], 2);
   EXPECT_EQ(body.lattice_index[*lower][2], 0);
@@ -80,13 +80,13 @@ TEST(Centre, SurfaceOfASlitKeepsToItsOwnLeaf) {
 
 TEST(Centre, GradientCarriesAffineDisplacementsBeyondTheElements) {
   const Body body = centre_body(bar_of_voxels());
-  const Setting setting{body, {}, {}, {}, {}, {}};
+  const Problem problem{body, {}, {}, {}, {}, {}};
   Mat3 gradient;
   gradient << 0.1, -0.2, 0.3, 0.05, 0.2, -0.1, 0.4, 0, 0.1;
   for (const Vec3& point : {Vec3(0, 0, 0), Vec3(0.8, 0.15, 0.3), Vec3(0.41, 0.02, 0.17)}) {
-    const auto element = nearest_element(setting, 0, point, Vec3::Zero());
+    const auto element = nearest_element(problem, 0, point, Vec3::Zero());
     ASSERT_TRUE(element);
-    const Carrier carrier = with_gradient(setting, {{*element}, {1}, 1}, point);
+    const InterpolationWeights carrier = with_gradient(problem, {{*element}, {1}, 1}, point);
     Vec3 sum = Vec3::Zero();
     double weights = 0;
     for (std::uint32_t a = 0; a < carrier.count; ++a) {
@@ -273,4 +273,4 @@ TEST(Centre, PartsApartDoNotTouch) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

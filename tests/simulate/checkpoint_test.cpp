@@ -6,12 +6,12 @@
 #include <cmath>
 #include <fstream>
 
-#include "formats/body_file.h"
-#include "formats/error.h"
-#include "formats/files.h"
+#include "base/error.h"
+#include "base/files/files.h"
+#include "formats/lattice/body_file.h"
 #include "tests/simulate/box_body.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 // Every list of another length, every number another.
@@ -121,4 +121,4 @@ TEST_F(CheckpointFile, BodiesAreToldApart) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

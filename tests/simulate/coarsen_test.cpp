@@ -1,5 +1,5 @@
 // Coarsening: matter is kept, pieces stay apart, walls stay on planes.
-#include "simulate/coarsen.h"
+#include "simulate/estimate/coarsen.h"
 
 #include <gtest/gtest.h>
 
@@ -7,10 +7,10 @@
 #include <set>
 #include <tuple>
 
-#include "formats/error.h"
+#include "base/error.h"
 #include "tests/simulate/box_body.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using testing::box_body;
@@ -158,4 +158,4 @@ TEST(Coarsen, ThinWallsAreCounted) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

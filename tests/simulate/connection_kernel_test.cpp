@@ -8,13 +8,13 @@
 #include <random>
 #include <tuple>
 
-#include "simulate/cells.h"
-#include "simulate/time/connection_runs.h"
-#include "simulate/time/step_bound.h"
+#include "simulate/kernels/connection_runs.h"
+#include "simulate/models/cells.h"
+#include "simulate/stepping/step_bound.h"
 #include "tests/simulate/stepped.h"
 #include "tests/simulate/study_beam.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using testing::box_body;
@@ -78,14 +78,14 @@ Body branching() {
   return body;
 }
 
-Setting springs_setting(const Body& body, std::vector<Model> models = {Model::springs}) {
+Problem springs_setting(const Body& body, std::vector<Model> models = {Model::springs}) {
   return {body, std::vector<Material>(body.parts.size(), kStudyGum),
           std::vector<std::uint8_t>(body.cell_count(), 0), std::move(models)};
 }
 
 // [N] (elements), spring by spring, cell by cell; of elasticity and damping.
-std::vector<Vec3> spring_by_spring(const Setting& setting, const State& state, double tau) {
-  const Body& body = setting.body;
+std::vector<Vec3> spring_by_spring(const Problem& problem, const State& state, double tau) {
+  const Body& body = problem.body;
   const SpringKind kind = spring_kind(body.parts[0].lattice, kStudyGum);
   std::vector<Vec3> result(body.element_count(), Vec3::Zero());
   for (std::size_t c = 0; c < body.cell_count(); ++c)
@@ -114,20 +114,20 @@ std::vector<std::pair<const char*, Body>> bodies() {
 
 TEST(ConnectionKernel, ForcesAreThoseOfTheSpringsOfAllCells) {
   for (const auto& [name, body] : bodies()) {
-    const Setting setting = springs_setting(body);
+    const Problem problem = springs_setting(body);
     const State state = shaken(body, 1e-3, 1);
     for (const double tau : {0.0, 1e-3}) {
-      const std::vector<Vec3> expected = spring_by_spring(setting, state, tau);
-      const std::vector<Vec3> found = forces_in_step(setting, state, tau);
+      const std::vector<Vec3> expected = spring_by_spring(problem, state, tau);
+      const std::vector<Vec3> found = forces_in_step(problem, state, tau);
       EXPECT_LT(largest_difference(found, expected), 1e-11 * largest(expected)) << name << tau;
-      EXPECT_EQ(forces_in_step(setting, state, tau, true), found) << name << tau;
+      EXPECT_EQ(forces_in_step(problem, state, tau, true), found) << name << tau;
     }
   }
 }
 
 TEST(ConnectionKernel, BodiesOfThisTestHaveSeveralChunks) {
   const Body many = crumbs({30, 19, 20}, 0.95, 2), leaves = branching();
-  const Setting of_many = springs_setting(many), of_leaves = springs_setting(leaves);
+  const Problem of_many = springs_setting(many), of_leaves = springs_setting(leaves);
   EXPECT_GT(step_layout(of_many, {{0}}).chunks.size(), 2u);
   EXPECT_TRUE(step_layout(of_many, {{0}}).blocks.empty());
   EXPECT_EQ(step_layout(of_leaves, {{0}}).chunks.size(), 2u);  // one of the leaves by itself
@@ -212,24 +212,24 @@ TEST(ConnectionKernel, TellsItsEnergyWhereAnotherPartBreaks) {
   part.cell_begin = cells;
   part.cell_end = static_cast<std::uint32_t>(body.cell_count());
   body.parts.push_back(part);
-  const Setting setting = springs_setting(body, {Model::springs, Model::springs});
-  StepPlan plan{{0, 0}};
+  const Problem problem = springs_setting(body, {Model::springs, Model::springs});
+  KernelEffects plan{{0, 0}};
   plan.fracture = {{}, {1e12, 1e12}};
-  Stepper stepper(setting, plan, false);
+  Stepper stepper(problem, plan, false);
   const State state = shaken(body, 1e-3, 8);
   const Stencil none;
-  const double energy = Cells(setting, none).energy(state);
+  const double energy = Cells(problem, none).energy(state);
   ASSERT_TRUE(stepper.elastic_energy(state).has_value());
   EXPECT_NEAR(*stepper.elastic_energy(state), energy, 1e-12 * energy);
 }
 
 TEST(ConnectionKernel, LengthThatIsNoNumberIsTold) {
   const Body body = crumbs({9, 7, 5}, 0.9, 9);
-  const Setting setting = springs_setting(body);
+  const Problem problem = springs_setting(body);
   for (const double bad : {std::nan(""), 1e300}) {
     State state = shaken(body, 1e-3, 10);
     state.displacement[body.cell_elements[20][3]].y() = bad;
-    Stepper stepper(setting, {{0}}, false);
+    Stepper stepper(problem, {{0}}, false);
     EXPECT_LE(stepper.advance(state, {}, {1e-6, 1e-6, false}).smallest_jacobian, 0) << bad;
   }
 }
@@ -237,11 +237,11 @@ TEST(ConnectionKernel, LengthThatIsNoNumberIsTold) {
 // Springs resist as well inside out: the check between steps has to see it, but for springs that break.
 TEST(ConnectionKernel, FoldedCellEndsTheStableStep) {
   const Body body = box_body({{2, 2, 2}, Vec3::Constant(0.01)});
-  const Setting setting = springs_setting(body);
+  const Problem problem = springs_setting(body);
   State state = shaken(body, 0, 11);
   const std::vector<Pass> none;
-  StepPlan plan{{0}};
-  StepBound bound(setting, none, plan);
+  KernelEffects plan{{0}};
+  StepBound bound(problem, none, plan);
   bound.look(state, nullptr, {});
   EXPECT_GT(bound.longest(false), 0);
   for (std::size_t e = 0; e < body.element_count(); ++e)
@@ -254,4 +254,4 @@ TEST(ConnectionKernel, FoldedCellEndsTheStableStep) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -1,5 +1,5 @@
 // Connections of centre-placed parts: which elements they join, how stiff and how long they are.
-#include "simulate/connections.h"
+#include "simulate/models/connections.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 
 #include "tests/simulate/centre_body.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 constexpr double kConnectionYoung = 3e6, kConnectionSpacing = 0.25;
@@ -29,8 +29,8 @@ Material gum() {
 
 TEST(Connections, JoinEveryPairOfNeighboursOnce) {
   const Body body = testing::centre_body(turned_voxels());
-  const Setting setting{body, {gum()}, {}, {Model::paper}};
-  const Connections connections = make_connections(setting);
+  const Problem problem{body, {gum()}, {}, {Model::paper}};
+  const Connections connections = make_connections(problem);
   std::set<std::pair<std::uint32_t, std::uint32_t>> expected;
   for (std::uint32_t a = 0; a < body.element_count(); ++a)
     for (std::uint32_t b = a + 1; b < body.element_count(); ++b)
@@ -53,8 +53,8 @@ TEST(Connections, KindsHoldTheRestVectorAndTheHookeConstants) {
   const double paper[] = {0, eh, std::sqrt(2.0) * eh, std::sqrt(3.0) * eh};
   const double ganovelli[] = {0, eh, eh / 6, eh / 12};
   for (const HookeConstant hooke : {HookeConstant::paper, HookeConstant::ganovelli}) {
-    const Setting setting{body, {gum()}, {}, {Model::paper}, {hooke}};
-    const Connections connections = make_connections(setting);
+    const Problem problem{body, {gum()}, {}, {Model::paper}, {hooke}};
+    const Connections connections = make_connections(problem);
     const PartConnections& part = connections.parts[0];
     EXPECT_EQ(part.begin, 0u);
     EXPECT_EQ(part.end, connections.size());
@@ -102,18 +102,18 @@ TEST(Connections, GanovelliIsTheSumOverTheTetrahedraOfACube) {
 
 TEST(Connections, LeaveOutStrayElementsAndMissingBits) {
   Body body = testing::centre_body(turned_voxels());
-  Setting setting{body, {gum()}, {}, {Model::paper}};
-  const std::size_t all = make_connections(setting).size();
-  setting.stray_element.assign(body.element_count(), 0);
-  setting.stray_element[0] = 1;
-  EXPECT_EQ(make_connections(setting).size(), all - 7);  // a corner of the box has seven neighbours
-  setting.stray_element[0] = 0;
-  setting.stray_element.back() = 1;
-  EXPECT_EQ(make_connections(setting).size(), all - 7);
-  setting.stray_element.clear();
+  Problem problem{body, {gum()}, {}, {Model::paper}};
+  const std::size_t all = make_connections(problem).size();
+  problem.stray_element.assign(body.element_count(), 0);
+  problem.stray_element[0] = 1;
+  EXPECT_EQ(make_connections(problem).size(), all - 7);  // a corner of the box has seven neighbours
+  problem.stray_element[0] = 0;
+  problem.stray_element.back() = 1;
+  EXPECT_EQ(make_connections(problem).size(), all - 7);
+  problem.stray_element.clear();
   body.connections[0] &= ~1u;
-  EXPECT_EQ(make_connections(setting).size(), all - 1);
+  EXPECT_EQ(make_connections(problem).size(), all - 1);
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -4,13 +4,13 @@
 #include <numbers>
 #include <string>
 
+#include "formats/lattice/merge.h"
 #include "simulate/contact/contacts.h"
-#include "simulate/merge.h"
-#include "simulate/scene.h"
+#include "simulate/scene/scene.h"
 #include "tests/simulate/box_body.h"
 #include "tests/simulate/timed_case.h"
 
-namespace flexel::testing {
+namespace flexel::simulate::testing {
 
 constexpr double kSide = 0.01;
 inline const Material kGum{"gum", 1e6, 0.3, 1000, "test"};
@@ -37,11 +37,11 @@ inline ContactPlane plane_at(double height, const Vec3& normal = Vec3::UnitZ()) 
   return plane;
 }
 
-inline Setting setting_of(const Body& body) {
-  Setting setting{body, std::vector<Material>(body.parts.size(), kGum),
+inline Problem problem_of(const Body& body) {
+  Problem problem{body, std::vector<Material>(body.parts.size(), kGum),
                   std::vector<std::uint8_t>(body.cell_count(), 0)};
-  setting.duration = 1;
-  return setting;
+  problem.duration = 1;
+  return problem;
 }
 
 inline ContactSettings all_parts(const Body& body) {
@@ -116,4 +116,4 @@ inline Body ball_within(Body body, const Vec3& centre, double radius) {
   return within_block(std::move(body), vertices, polygons);
 }
 
-}  // namespace flexel::testing
+}  // namespace flexel::simulate::testing

@@ -4,15 +4,15 @@
 
 #include <cmath>
 
-#include "simulate/scene_selection.h"
-#include "simulate/simulate.h"
-#include "simulate/time/layout.h"
+#include "simulate/input/scene_selection.h"
+#include "simulate/kernels/chunk_layout.h"
+#include "simulate/result/options.h"
 #include "tests/simulate/contact_case.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
-using namespace flexel::testing;
+using namespace flexel::simulate::testing;
 
 Body two_blocks(double gap) {
   Body body = block("a", {4, 3, 3}, Vec3::Zero());
@@ -61,8 +61,8 @@ TEST(Contact, SameBitsForAnyNumberOfThreads) {
 // Mean velocity of a part.
 Vec3 mean_velocity(const Body& body, std::size_t part) {
   const Column& column = body.element_columns.at("velocity");
-  Setting setting = setting_of(body);
-  const std::vector<double> mass = lumped_masses(setting);
+  Problem problem = problem_of(body);
+  const std::vector<double> mass = lumped_masses(problem);
   Vec3 sum = Vec3::Zero();
   double total = 0;
   for (std::uint32_t e = body.parts[part].element_begin; e < body.parts[part].element_end; ++e) {
@@ -236,4 +236,4 @@ TEST(ContactFriction, ABlockThatSlidesStopsAfterItsDistance) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

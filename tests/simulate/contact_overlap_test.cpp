@@ -6,15 +6,15 @@
 #include <numbers>
 #include <optional>
 
-#include "formats/body_file.h"
-#include "formats/error.h"
-#include "simulate/scene_selection.h"
+#include "base/error.h"
+#include "formats/lattice/body_file.h"
+#include "simulate/input/scene_selection.h"
 #include "tests/simulate/contact_case.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
-using namespace flexel::testing;
+using namespace flexel::simulate::testing;
 using ::testing::HasSubstr;
 
 TEST(Contact, PartsThatBeginInsideEachOtherAreRefused) {
@@ -255,4 +255,4 @@ TEST(Contact, APartThatJoinsInsideAnotherIsRefusedOrLetOut) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -5,14 +5,14 @@
 #include <cmath>
 #include <map>
 
-#include "simulate/scene_selection.h"
+#include "simulate/input/scene_selection.h"
 #include "tests/simulate/centre_body.h"
 #include "tests/simulate/contact_case.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
-using namespace flexel::testing;
+using namespace flexel::simulate::testing;
 
 // A block on a slope of 0.3 rad with mu = 0.4, above tan 0.3 = 0.31; its way down is the probe's.
 struct Slope {
@@ -78,11 +78,11 @@ TEST(ContactFriction, WhatHoldsOutlivesAnEvent) {
 // turns (the paper's elements would, where "paper" is asked for).
 TEST(ContactFriction, NoneInsideAPartThatIsCompressedAndRotated) {
   const Body body = block("a", {4, 4, 3}, Vec3::Zero(), turn(0.3, Vec3::UnitX()));
-  const Setting setting = setting_of(body);
+  const Problem problem = problem_of(body);
   ContactSettings settings = all_parts(body);
   settings.friction = 0.5;
   settings.damping = 1e-4;
-  Contacts contacts(settings, setting);
+  Contacts contacts(settings, problem);
   State state = starting_at_rest(body);
   for (const double angle : {0.0, 0.7, 2.5}) {
     const Mat3 shape = turn(angle, Vec3(1, 2, 3)) * Vec3(0.5, 1.3, 0.6).asDiagonal();
@@ -131,8 +131,8 @@ TEST(Contact, BlocksThatLieFlushFeelNothing) {
   Body body = cut_block("a", {3, 3, 2}, Vec3::Zero());
   append(body, cut_block("b", {3, 3, 2}, Vec3(3 * kSide, 0, 0)));
   append(body, cut_block("c", {3, 3, 4}, Vec3(0, 3 * kSide, 0)));
-  const Setting setting = setting_of(body);
-  Contacts contacts(all_parts(body), setting);
+  const Problem problem = problem_of(body);
+  Contacts contacts(all_parts(body), problem);
   EXPECT_LT(contacts.energy(starting_at_rest(body)), 1e-20);
 }
 
@@ -141,8 +141,8 @@ TEST(Contact, BlocksThatLieFlushFeelNothing) {
 TEST(Contact, ABlockThatSlidesOutFromUnderAnotherIsNotThrown) {
   Body body = block("low", {4, 2, 2}, Vec3::Zero());
   append(body, block("high", {4, 2, 1}, Vec3(0, 0, 1.97 * kSide)));
-  const Setting setting = setting_of(body);
-  Contacts contacts(all_parts(body), setting);
+  const Problem problem = problem_of(body);
+  Contacts contacts(all_parts(body), problem);
   State state = starting_at_rest(body);
   const double pressed = contacts.energy(state);
   ASSERT_GT(pressed, 0);
@@ -181,10 +181,10 @@ TEST(ContactOfPaper, BallsPushAlongTheirCentresWithTheMeanStiffness) {
   append(body, balls("b", {1, 1, 1}, Vec3(0.006, 0.007, 0)));
   State state = starting_at_rest(body);
   const auto force = [&](double young_a, double young_b) {
-    Setting setting = setting_of(body);
-    setting.materials[0].young = young_a;
-    setting.materials[1].young = young_b;
-    Contacts contacts(all_parts(body), setting);
+    Problem problem = problem_of(body);
+    problem.materials[0].young = young_a;
+    problem.materials[1].young = young_b;
+    Contacts contacts(all_parts(body), problem);
     std::vector<Vec3> forces(2, Vec3::Zero());
     contacts.add_forces(state, forces);
     EXPECT_LT((forces[0] + forces[1]).norm(), 1e-12 * forces[0].norm());
@@ -211,4 +211,4 @@ TEST(ContactOfPaper, ACollisionKeepsMomentaAndBooks) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -8,15 +8,15 @@
 #include <functional>
 #include <random>
 
-#include "formats/error.h"
-#include "simulate/scene_selection.h"
-#include "simulate/time/layout.h"
+#include "base/error.h"
+#include "simulate/input/scene_selection.h"
+#include "simulate/kernels/chunk_layout.h"
 #include "tests/simulate/contact_case.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
-using namespace flexel::testing;
+using namespace flexel::simulate::testing;
 using ::testing::HasSubstr;
 
 // Mean displacement of a part.
@@ -105,11 +105,11 @@ TEST(ContactStick, AGluedManipulatorLiftsWhatItTouches) {
 TEST(ContactStick, ForcesBalanceWithTheirMoments) {
   Body body = block("a", {3, 3, 2}, Vec3::Zero());
   append(body, block("b", {2, 2, 2}, Vec3(0.006, 0.002, 0.02), turn(0.4, Vec3::UnitZ())));
-  const Setting setting = setting_of(body);
+  const Problem problem = problem_of(body);
   ContactSettings settings = all_parts(body);
   settings.stick.assign(2, 1e6);
   settings.damping = 1e-4;
-  Contacts contacts(settings, setting);
+  Contacts contacts(settings, problem);
   State state = starting_at_rest(body);
   contacts.remember(state, 0);
   std::mt19937 random(5);
@@ -204,10 +204,10 @@ TEST(ContactDamping, ABounceLosesWhatItsDampingSays) {
   };
   // the force over the depth, tabulated
   const Body still = block("a", {2, 2, 2}, Vec3::Zero());
-  const Setting setting = setting_of(still);
+  const Problem problem = problem_of(still);
   ContactSettings settings = all_parts(still);
   settings.planes = {plane_at(0)};
-  Contacts contacts(settings, setting);
+  Contacts contacts(settings, problem);
   State state = starting_at_rest(still);
   const double spacing = 1e-7;
   std::vector<double> table;
@@ -238,4 +238,4 @@ TEST(ContactDamping, ABounceLosesWhatItsDampingSays) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -8,10 +8,10 @@
 
 #include "tests/simulate/contact_case.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
-using namespace flexel::testing;
+using namespace flexel::simulate::testing;
 
 TEST(Contact, NeighboursAreThoseOfBruteForce) {
   std::mt19937 random(7);
@@ -51,10 +51,10 @@ struct Shaken {
 // to the bit, what a list found anew gives.
 TEST(Contact, AKeptListGivesWhatAFreshOneGives) {
   Shaken made(2e-4, 11);
-  const Setting setting = setting_of(made.body);
+  const Problem problem = problem_of(made.body);
   ContactSettings settings = all_parts(made.body);
   settings.planes.emplace_back();
-  Contacts kept(settings, setting);
+  Contacts kept(settings, problem);
   std::mt19937 random(2);
   std::uniform_real_distribution<double> way(-4e-4, 4e-4);
   std::size_t touched = 0;
@@ -63,7 +63,7 @@ TEST(Contact, AKeptListGivesWhatAFreshOneGives) {
     for (std::uint32_t e = 0; e < made.body.element_count(); ++e)
       made.state.displacement[e] += (e < made.body.parts[0].element_end ? 0.2 : 1) * drift +
                                     0.02 * Vec3(way(random), way(random), way(random));
-    Contacts fresh(settings, setting);
+    Contacts fresh(settings, problem);
     EXPECT_EQ(kept.touching(made.state), fresh.touching(made.state));
     touched += fresh.touching(made.state).size();
     std::vector<Vec3> one(made.body.element_count(), Vec3::Zero()), other = one;
@@ -76,8 +76,8 @@ TEST(Contact, AKeptListGivesWhatAFreshOneGives) {
 
 TEST(Contact, ForcesAreTheDerivativeOfTheEnergy) {
   Shaken made(8e-4, 3);
-  const Setting setting = setting_of(made.body);
-  Contacts contacts(all_parts(made.body), setting);
+  const Problem problem = problem_of(made.body);
+  Contacts contacts(all_parts(made.body), problem);
   std::vector<Vec3> forces(made.body.element_count(), Vec3::Zero());
   contacts.add_forces(made.state, forces);
   double largest = 0;
@@ -97,11 +97,11 @@ TEST(Contact, ForcesAreTheDerivativeOfTheEnergy) {
 
 TEST(Contact, ForcesAndLossesBalanceWithTheirMoments) {
   Shaken made(8e-4, 5);
-  const Setting setting = setting_of(made.body);
+  const Problem problem = problem_of(made.body);
   ContactSettings settings = all_parts(made.body);
   settings.friction = 0.5;
   settings.damping = 1e-4;
-  Contacts contacts(settings, setting);
+  Contacts contacts(settings, problem);
   for (const bool losses : {false, true}) {
     std::vector<Vec3> forces(made.body.element_count(), Vec3::Zero());
     if (losses)
@@ -127,11 +127,11 @@ TEST(Contact, ForcesAndLossesBalanceWithTheirMoments) {
 
 // The gap [m] along z between a body and the one below it (the first part) at which contact begins.
 double first_touch(const Body& body, double apart, const std::vector<ContactPlane>& planes = {}) {
-  const Setting setting = setting_of(body);
+  const Problem problem = problem_of(body);
   ContactSettings settings = all_parts(body);
   settings.planes = planes;
   settings.self = false;
-  Contacts contacts(settings, setting);
+  Contacts contacts(settings, problem);
   const std::uint32_t first = planes.empty() ? body.parts[0].element_end : 0;
   double touching = -0.2 * kSide, free = 0.2 * kSide;
   for (int i = 0; i < 20; ++i) {
@@ -184,4 +184,4 @@ TEST(Contact, ABallTouchesAPlaneAndABlockWhereItsSurfaceIs) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace flexel::testing {
+namespace flexel::simulate::testing {
 
 struct Csv {
   std::vector<std::string> names;  // without units
@@ -33,4 +33,4 @@ inline Csv read_csv(const std::string& path) {
   return csv;
 }
 
-}  // namespace flexel::testing
+}  // namespace flexel::simulate::testing

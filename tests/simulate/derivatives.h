@@ -2,9 +2,9 @@
 #pragma once
 #include <gtest/gtest.h>
 
-#include "simulate/mechanics.h"
+#include "simulate/equilibrium/mechanics.h"
 
-namespace flexel::testing {
+namespace flexel::simulate::testing {
 
 // At `state`, for every `stride`th element, with steps of 1e-6 m: to 1e-6 of `young` times the spacing, and
 // its square.
@@ -33,4 +33,4 @@ inline void expect_derivatives(Mechanics& mechanics, const State& state, double 
     }
 }
 
-}  // namespace flexel::testing
+}  // namespace flexel::simulate::testing

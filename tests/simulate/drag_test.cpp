@@ -6,14 +6,15 @@
 #include <cmath>
 #include <numbers>
 
-#include "formats/error.h"
-#include "simulate/merge.h"
-#include "simulate/scene.h"
+#include "base/error.h"
+#include "formats/lattice/merge.h"
+#include "simulate/result/options.h"
+#include "simulate/scene/scene.h"
 #include "simulate/simulate.h"
 #include "tests/simulate/centre_body.h"
 #include "tests/simulate/timed_case.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using std::numbers::pi;
@@ -94,10 +95,10 @@ TEST(Drag, AnElementOfModelPaperFallsAsPrinted) {
 
 // Total of the forces on a body that moves as a whole.
 Vec3 force_on(const Body& body, const Vec3& velocity, const Mat3& turn = Mat3::Identity()) {
-  Setting setting{body, std::vector<Material>(body.parts.size(), {"gum", 1e6, 0.25, kCubeDensity, ""}),
+  Problem problem{body, std::vector<Material>(body.parts.size(), {"gum", 1e6, 0.25, kCubeDensity, ""}),
                   std::vector<std::uint8_t>(body.cell_count(), 0)};
-  setting.duration = 1;
-  const Drag drag = *Drag::make({kMedium, kCoefficient}, setting);
+  problem.duration = 1;
+  const Drag drag = *Drag::make({kMedium, kCoefficient}, problem);
   State state;
   for (const Vec3& x : body.rest) {
     state.displacement.push_back(turn * x - x);
@@ -175,4 +176,4 @@ TEST(Drag, IsReadFromTheSceneAndRefusedAtEquilibrium) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -4,14 +4,14 @@
 
 #include <Eigen/Geometry>
 
-#include "formats/error.h"
-#include "simulate/merge.h"
-#include "simulate/scene.h"
-#include "simulate/simulate.h"
+#include "base/error.h"
+#include "formats/lattice/merge.h"
+#include "simulate/result/result.h"
+#include "simulate/scene/scene.h"
 #include "tests/simulate/box_body.h"
 #include "tests/simulate/scene_case.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using testing::box_body;
@@ -224,4 +224,4 @@ TEST(Equilibrium, MirroredCellDiverges) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -6,11 +6,11 @@
 #include <functional>
 #include <numbers>
 
-#include "simulate/estimate.h"
-#include "simulate/stress_singularity.h"
+#include "simulate/estimate/stress_singularity.h"
+#include "simulate/result/estimate.h"
 #include "tests/simulate/study_beam.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using ::testing::HasSubstr;
@@ -154,4 +154,4 @@ TEST(ErrorBars, AreLeftOutWhenNotAskedFor) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -1,13 +1,13 @@
 // Events of timed runs: what each leaves behind, momenta and books across them, and what is refused.
 #include <gmock/gmock.h>
 
-#include "formats/body_file.h"
-#include "formats/error.h"
+#include "base/error.h"
+#include "formats/lattice/body_file.h"
 #include "tests/simulate/box_body.h"
 #include "tests/simulate/stepped.h"
 #include "tests/simulate/timed_case.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using testing::book;
@@ -326,4 +326,4 @@ TEST(Events, WrongEntriesAreRefused) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -1,4 +1,4 @@
-#include "simulate/firm_groups.h"
+#include "simulate/matter/firm_groups.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include "tests/simulate/box_body.h"
 #include "tests/simulate/scene_case.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using ::testing::AllOf;
@@ -73,4 +73,4 @@ TEST(FirmGroups, APlateOnAHingeIsRefused) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

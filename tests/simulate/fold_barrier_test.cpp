@@ -1,6 +1,6 @@
 // The barrier against corners that fold: derivatives by differences, nothing above its threshold, rest shapes
 // of their own, the bound on the step, and bodies whose corners come near folding in time and at equilibrium.
-#include "simulate/fold_barrier.h"
+#include "simulate/models/corner_barrier.h"
 
 #include <gtest/gtest.h>
 
@@ -8,11 +8,11 @@
 #include <Eigen/Geometry>
 #include <random>
 
-#include "simulate/time/fold_guard.h"
+#include "simulate/stepping/explicit_barrier.h"
 #include "tests/simulate/stepped.h"
 #include "tests/simulate/timed_case.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using testing::kCauchyGum;
@@ -184,17 +184,17 @@ TEST(FoldBarrier, CrushedCellsKeepTheirCornersAndTheBooks) {
     EXPECT_LT((made.body.position[e] - made.body.rest[e]).norm(), 1e-3 * kFoldSpacing);
 }
 
-TEST(FoldGuard, WatchesWhatMayFoldOnly) {
+TEST(ExplicitBarrier, WatchesWhatMayFoldOnly) {
   const Body body = testing::box_of({3, 3, 3}, kFoldSpacing);
-  const Setting setting = testing::setting_of(body, kCauchyGum);
-  FoldGuard guard(setting);
-  EXPECT_TRUE(guard.hurried());  // it has not looked yet
+  const Problem problem = testing::problem_of(body, kCauchyGum);
+  ExplicitBarrier guard(problem);
+  EXPECT_TRUE(guard.needs_step_recheck());  // it has not looked yet
   State state = testing::at_rest(body);
   for (std::size_t e = 0; e < body.element_count(); ++e)
     state.displacement[e] = Vec3(0, 0, -0.3 * body.rest[e].z());
   guard.look(state, 1e-3);
   EXPECT_FALSE(guard.watches());
-  EXPECT_FALSE(guard.hurried());
+  EXPECT_FALSE(guard.needs_step_recheck());
   state.velocity[0] = Vec3(0, 0, 8);  // its corner is as good as flat after 1 ms
   guard.look(state, 1e-3);
   EXPECT_TRUE(guard.watches());
@@ -204,9 +204,9 @@ TEST(FoldGuard, WatchesWhatMayFoldOnly) {
   state.displacement[0].z() = 0.0068;
   guard.add_forces(state, forces);
   EXPECT_LT(forces[0].z(), 0);
-  EXPECT_TRUE(guard.hurried());
+  EXPECT_TRUE(guard.needs_step_recheck());
   EXPECT_GT(guard.energy(state), 0);
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

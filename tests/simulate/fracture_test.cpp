@@ -7,14 +7,14 @@
 #include <numeric>
 #include <sstream>
 
-#include "formats/error.h"
-#include "formats/parallel.h"
-#include "simulate/cell_model.h"
-#include "simulate/scene.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "simulate/models/cell_model.h"
+#include "simulate/scene/scene.h"
 #include "tests/simulate/stepped.h"
 #include "tests/simulate/timed_case.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using testing::at_rest;
@@ -23,14 +23,14 @@ using testing::box_of;
 using testing::BoxOptions;
 using testing::forces_of;
 using ::testing::HasSubstr;
+using testing::problem_of;
 using testing::random_displacements;
 using testing::refusal;
-using testing::setting_of;
 
 const Material kGlass{"glass", 1e9, 0.25, 1000, "test"};
 constexpr double kStrength = 5e6;
 
-StepPlan fracture_plan(double strength, double damping = 0) {
+KernelEffects fracture_plan(double strength, double damping = 0) {
   FractureLimits limits;
   limits.strength = strength;
   return {{damping}, {}, {limits}};
@@ -164,7 +164,7 @@ TEST(Fracture, BreaksByTheLargestPrincipalStress) {
   int broke = 0;
   for (unsigned seed = 0; seed < 200; ++seed) {
     const Body body = box_of({1, 1, 1});
-    const Setting setting = setting_of(body, kGlass);
+    const Problem problem = problem_of(body, kGlass);
     State state = at_rest(body);
     const std::vector<Vec3> rows = random_displacements(body, 0.006, seed);
     Mat3 h;
@@ -172,11 +172,11 @@ TEST(Fracture, BreaksByTheLargestPrincipalStress) {
     for (std::size_t e = 0; e < 8; ++e) state.displacement[e] = h * body.rest[e];
     const Mat3 f = Mat3::Identity() + h;
     const Mat3 cauchy =
-        flexel::stress(cell_kind(body.parts[0].lattice, kGlass), h) * f.transpose() / f.determinant();
+        simulate::stress(cell_kind(body.parts[0].lattice, kGlass), h) * f.transpose() / f.determinant();
     const double largest = Eigen::SelfAdjointEigenSolver<Mat3>(cauchy).eigenvalues()[2];
     for (const double share : {1 - 1e-9, 1 + 1e-9}) {
       if (!(largest > 0)) continue;
-      Stepper stepper(setting, fracture_plan(share * largest), false);
+      Stepper stepper(problem, fracture_plan(share * largest), false);
       (void)forces_of(stepper, state);
       std::vector<std::uint8_t> broken(1, 0);
       EXPECT_EQ(stepper.mark_broken(broken), share < 1) << seed;
@@ -209,11 +209,11 @@ struct Outcome {
 Outcome burst(const Body& body, double strength, const std::string& isa, int threads, bool book = true,
               Model model = Model::cells) {
   const ThreadLimit limit(threads);
-  const Setting setting = setting_of(body, kGlass, model);
-  StepPlan plan = fracture_plan(strength, 2e-7);
+  const Problem problem = problem_of(body, kGlass, model);
+  KernelEffects plan = fracture_plan(strength, 2e-7);
   if (model == Model::springs) plan.fracture[0] = {plan.fracture[0].elongation, strength / kGlass.young};
-  Stepper stepper(setting, std::isfinite(strength) ? plan : StepPlan{plan.damping}, book, isa);
-  const double dt = 0.5 * stable_step(setting, plan.damping);
+  Stepper stepper(problem, std::isfinite(strength) ? plan : KernelEffects{plan.damping}, book, isa);
+  const double dt = 0.5 * stable_step(problem, plan.damping);
   State state = at_rest(body);
   state.velocity = random_displacements(body, 15, 2);
   for (int i = 0; i < 60; ++i) stepper.advance(state, {}, {dt, dt, false});
@@ -267,10 +267,10 @@ TEST(Fracture, BitsOfSpringsDoNotDependOnThreadsInstructionsOrBooks) {
 
 TEST(Fracture, DebrisKeepsMomentum) {
   const Body body = box_of({5, 4, 4});
-  const Setting setting = setting_of(body, kGlass);
-  const StepPlan plan = fracture_plan(kStrength, 1e-7);
-  Stepper stepper(setting, plan, false);
-  const double dt = 0.5 * stable_step(setting, plan.damping);
+  const Problem problem = problem_of(body, kGlass);
+  const KernelEffects plan = fracture_plan(kStrength, 1e-7);
+  Stepper stepper(problem, plan, false);
+  const double dt = 0.5 * stable_step(problem, plan.damping);
   State state = at_rest(body);
   state.velocity = random_displacements(body, 20, 9);
   Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
@@ -302,4 +302,4 @@ TEST(Fracture, RefusesWhatCannotBreak) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

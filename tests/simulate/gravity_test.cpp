@@ -6,13 +6,14 @@
 #include <numbers>
 #include <random>
 
-#include "formats/error.h"
-#include "simulate/scene.h"
+#include "base/error.h"
+#include "simulate/result/options.h"
+#include "simulate/scene/scene.h"
 #include "simulate/simulate.h"
 #include "tests/simulate/centre_body.h"
 #include "tests/simulate/timed_case.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using std::numbers::pi;
@@ -283,4 +284,4 @@ TEST(GravityScene, RefusesWhatItCannotUse) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -1,5 +1,5 @@
 // The tree against the sum over all pairs.
-#include "simulate/effects/gravity_tree.h"
+#include "simulate/gravitation/gravity_tree.h"
 
 #include <gtest/gtest.h>
 
@@ -8,9 +8,9 @@
 #include <cstdio>
 #include <random>
 
-#include "formats/parallel.h"
+#include "base/parallel.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 // A lattice of n^3 elements, as of a body, or as many at random in two heaps.
@@ -125,4 +125,4 @@ TEST(GravityTree, SameBitsForAnyNumberOfThreads) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

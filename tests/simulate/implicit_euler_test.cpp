@@ -1,5 +1,5 @@
 // Implicit steps: the damping matrix against the kernel's damping, and whole runs against analytic answers.
-#include "simulate/time/implicit_euler.h"
+#include "simulate/implicit/implicit_euler.h"
 
 #include <gmock/gmock.h>
 
@@ -7,13 +7,13 @@
 #include <cmath>
 #include <numbers>
 
-#include "formats/error.h"
-#include "simulate/time/damping_matrix.h"
-#include "simulate/time/history.h"
+#include "base/error.h"
+#include "simulate/implicit/damping_matrix.h"
+#include "simulate/time/energy_history.h"
 #include "tests/simulate/stepped.h"
 #include "tests/simulate/timed_case.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using std::numbers::pi;
@@ -35,17 +35,17 @@ TEST(DampingMatrix, IsTheKernelsDamping) {
     body.cell_columns["damping_change"] = {1, std::vector<double>(body.cell_count(), 0)};  // as edits do
     for (std::size_t c = 0; c < body.cell_count(); c += 3)
       body.cell_columns["damping_change"].values[c] = 1.5;
-    const Setting setting = testing::setting_of(body, {"gum", 1e6, 0.25, 1000, "test"}, model);
-    const StepPlan plan{{3e-4}};
-    Stepper stepper(setting, plan, true, "");
+    const Problem problem = testing::problem_of(body, {"gum", 1e6, 0.25, 1000, "test"}, model);
+    const KernelEffects plan{{3e-4}};
+    Stepper stepper(problem, plan, true, "");
     State state = testing::at_rest(body);
     state.displacement = testing::random_displacements(body, 0.002, 1);
     state.velocity = testing::random_displacements(body, 1, 2);
     const std::vector<Vec3> velocity = state.velocity;
     const StiffnessPattern pattern =
-        stiffness_pattern(body, active_cells(setting), connection_rows({}, body.element_count()));
+        stiffness_pattern(body, active_cells(problem), connection_rows({}, body.element_count()));
     BlockMatrix matrix = pattern.matrix;
-    set_damping(setting, pattern.stencil, plan.damping, state.displacement, matrix);
+    set_damping(problem, pattern.stencil, plan.damping, state.displacement, matrix);
     std::vector<Vec3> pulled(body.element_count());
     multiply(matrix, velocity, pulled);
     (void)stepper.advance(state, {}, {0, 0, false});
@@ -175,7 +175,7 @@ TEST(ImplicitEuler, StiffBodyComesToRestInEquilibrium) {
   options.spacing = Vec3::Constant(0.002);
   options.axes = Eigen::AngleAxisd(0.4, Vec3(0, 1, 0)).toRotationMatrix();
   const Body body = box_body(options);
-  const double bound = stable_step(testing::setting_of(body, kSteel), {0});
+  const double bound = stable_step(testing::problem_of(body, kSteel), {0});
   Scene scene = implicit_scene(kSteel, 1e5 * bound, 1e3 * bound);
   // elements, which equilibrium holds exactly too
   Selection held, led;
@@ -231,7 +231,7 @@ TEST(ImplicitEuler, EffortIsThatOfAllActs) {
   scene.get<Ties>().ties.push_back(make_fix(select_by_name("x0")));
   scene.get<Gravity>().acceleration = Vec3(0, 0, -9.81);
   const TimedCase whole = testing::run_timed(small_box(), scene);
-  Event nothing{0.02, "nothing", "", {}, [](Stage&) { return std::string(); }};
+  Event nothing{0.02, "nothing", "", {}, [](EventContext&) { return std::string(); }};
   scene.events.push_back(nothing);
   const TimedCase parted = testing::run_timed(small_box(), scene);
   EXPECT_GT(parted.result.newton_iterations, 0.8 * whole.result.newton_iterations);
@@ -305,4 +305,4 @@ TEST(ImplicitEuler, TellsWhereItEnds) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -1,16 +1,16 @@
 // Prints that are not solid: the effective figures, the walls' share, and the scene's keys.
-#include "simulate/infill.h"
+#include "simulate/input/infill.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "formats/error.h"
-#include "simulate/scene.h"
+#include "base/error.h"
+#include "simulate/scene/scene.h"
 #include "tests/simulate/box_body.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using ::testing::HasSubstr;
@@ -99,4 +99,4 @@ TEST(Infill, WallsOfASquareBar) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -7,12 +7,12 @@
 #include <numeric>
 #include <random>
 
-#include "simulate/cells.h"
-#include "simulate/time/implicit_damping.h"
+#include "simulate/implicit/implicit_damping.h"
+#include "simulate/models/cells.h"
 #include "tests/simulate/numbered_body.h"
 #include "tests/simulate/stepped.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using testing::box_body;
@@ -37,12 +37,12 @@ Body rough_body(const std::array<int, 3>& cells, const Vec3& spacing) {
   return box_body(options);
 }
 
-Setting kernel_setting(const Body& body, Model model) {
-  return testing::setting_of(body, kKernelGum, model);
+Problem kernel_setting(const Body& body, Model model) {
+  return testing::problem_of(body, kKernelGum, model);
 }
 
-std::vector<Vec3> cell_by_cell(const Setting& setting, const State& state) {
-  const Body& body = setting.body;
+std::vector<Vec3> cell_by_cell(const Problem& problem, const State& state) {
+  const Body& body = problem.body;
   const CellKind cells = cell_kind(body.parts[0].lattice, kKernelGum);
   const SpringKind springs = spring_kind(body.parts[0].lattice, kKernelGum);
   std::vector<Vec3> result(body.element_count(), Vec3::Zero());
@@ -50,7 +50,7 @@ std::vector<Vec3> cell_by_cell(const Setting& setting, const State& state) {
     CellVectors u;
     for (std::size_t a = 0; a < 8; ++a) u[a] = state.displacement[body.cell_elements[c][a]];
     const CellVectors f =
-        setting.models[0] == Model::springs ? cell_forces(springs, u) : cell_forces(cells, u);
+        problem.models[0] == Model::springs ? cell_forces(springs, u) : cell_forces(cells, u);
     for (std::size_t a = 0; a < 8; ++a) result[body.cell_elements[c][a]] += body.fill[c] * f[a];
   }
   return result;
@@ -60,11 +60,11 @@ class KernelOf : public ::testing::TestWithParam<Model> {};
 
 TEST_P(KernelOf, AgreesWithTheModelsCellByCell) {
   const Body body = rough_body({37, 19, 11}, Vec3::Constant(0.01));
-  const Setting setting = kernel_setting(body, GetParam());
+  const Problem problem = kernel_setting(body, GetParam());
   for (const double amplitude : {1e-3, 1e-9}) {
     const State state = shaken(body, amplitude, 1);
-    const std::vector<Vec3> expected = cell_by_cell(setting, state);
-    EXPECT_LT(largest_difference(forces_in_step(setting, state, 0), expected), 1e-11 * largest(expected));
+    const std::vector<Vec3> expected = cell_by_cell(problem, state);
+    EXPECT_LT(largest_difference(forces_in_step(problem, state, 0), expected), 1e-11 * largest(expected));
   }
 }
 
@@ -74,21 +74,21 @@ TEST_P(KernelOf, AgreesHoweverTheElementsAreNumbered) {
   std::iota(to.begin(), to.end(), 0u);
   std::shuffle(to.begin(), to.end(), std::mt19937(6));
   for (const Body& body : {testing::renumbered(rough, to), testing::cells_beside_gaps(24, 0.01)}) {
-    const Setting setting = kernel_setting(body, GetParam());
+    const Problem problem = kernel_setting(body, GetParam());
     const State state = shaken(body, 1e-3, 1);
-    const std::vector<Vec3> expected = cell_by_cell(setting, state);
-    EXPECT_LT(largest_difference(forces_in_step(setting, state, 0), expected), 1e-11 * largest(expected));
+    const std::vector<Vec3> expected = cell_by_cell(problem, state);
+    EXPECT_LT(largest_difference(forces_in_step(problem, state, 0), expected), 1e-11 * largest(expected));
   }
 }
 
 TEST_P(KernelOf, DampingFeelsNoRigidMotion) {
   const Body body = rough_body({9, 7, 5}, Vec3::Constant(0.01));
-  const Setting setting = kernel_setting(body, GetParam());
+  const Problem problem = kernel_setting(body, GetParam());
   State state = shaken(body, 1e-3, 2);  // strained
   for (std::size_t e = 0; e < body.element_count(); ++e)
     state.velocity[e] = Vec3(1, 2, 3) + Vec3(4, -5, 6).cross(body.rest[e] + state.displacement[e]);
-  const std::vector<Vec3> elastic = forces_in_step(setting, state, 0);
-  EXPECT_LT(largest_difference(forces_in_step(setting, state, 1e-2), elastic), 1e-10 * largest(elastic));
+  const std::vector<Vec3> elastic = forces_in_step(problem, state, 0);
+  EXPECT_LT(largest_difference(forces_in_step(problem, state, 1e-2), elastic), 1e-10 * largest(elastic));
 }
 
 TEST_P(KernelOf, ForcesKeepMomentaAndDampingTakesEnergy) {
@@ -99,13 +99,13 @@ TEST_P(KernelOf, ForcesKeepMomentaAndDampingTakesEnergy) {
 TEST_P(KernelOf, DampingIsTheRateOfTheForcesAtRest) {
   // near rest, damping with tau is tau times the rate of the elastic forces
   const Body body = rough_body({9, 7, 5}, Vec3::Constant(0.01));
-  const Setting setting = kernel_setting(body, GetParam());
+  const Problem problem = kernel_setting(body, GetParam());
   State state = shaken(body, 0, 4);
   const double tau = 1e-3, dt = 1e-9;
-  const std::vector<Vec3> damped = forces_in_step(setting, state, tau);
+  const std::vector<Vec3> damped = forces_in_step(problem, state, tau);
   State ahead = state;
   for (std::size_t e = 0; e < body.element_count(); ++e) ahead.displacement[e] = dt * state.velocity[e];
-  std::vector<Vec3> rate = cell_by_cell(setting, ahead);
+  std::vector<Vec3> rate = cell_by_cell(problem, ahead);
   for (Vec3& f : rate) f *= tau / dt;
   EXPECT_LT(largest_difference(damped, rate), 1e-5 * largest(rate));
 }
@@ -123,12 +123,12 @@ TEST_P(KernelOf, BoundIsSafeAndNotWasteful) {
     options.spacing = Vec3::Constant(0.01);
     return box_body(options);
   }();
-  const Setting setting = kernel_setting(body, GetParam());
-  const double omega = std::sqrt(cell_frequencies(setting)[0]);
+  const Problem problem = kernel_setting(body, GetParam());
+  const double omega = std::sqrt(cell_frequencies(problem)[0]);
   for (const double zeta : {0.0, 0.2, 1.0, 5.0}) {
-    const double tau = 2 * zeta / omega, bound = stable_step(setting, {tau});
+    const double tau = 2 * zeta / omega, bound = stable_step(problem, {tau});
     const auto growth = [&](double dt) {
-      Stepper stepper(setting, {{tau}}, false);
+      Stepper stepper(problem, {{tau}}, false);
       State state = shaken(body, 0, 6);
       for (Vec3& v : state.velocity) v *= 1e-9;
       for (int i = 0; i < 400; ++i) (void)stepper.advance(state, {}, {dt, dt, false});
@@ -142,10 +142,10 @@ TEST_P(KernelOf, BoundIsSafeAndNotWasteful) {
 // Of some cells thrice as long: as if they damped twice once more by themselves, the others broken.
 TEST_P(KernelOf, DampingOfEditedCells) {
   Body body = rough_body({9, 7, 5}, Vec3::Constant(0.01)), others = body;
-  const Setting setting = kernel_setting(body, GetParam()), edited = kernel_setting(others, GetParam());
+  const Problem problem = kernel_setting(body, GetParam()), edited = kernel_setting(others, GetParam());
   const State state = shaken(body, 1e-3, 9);
   const double tau = 1e-3;
-  std::vector<Vec3> expected = forces_in_step(setting, state, tau);
+  std::vector<Vec3> expected = forces_in_step(problem, state, tau);
   Column change{1, std::vector<double>(body.cell_count(), 0)};
   for (std::size_t c = 0; c < body.cell_count(); ++c) {
     change.values[c] = c % 3 == 1 ? 2 : 0;
@@ -155,9 +155,9 @@ TEST_P(KernelOf, DampingOfEditedCells) {
                           elastic = forces_in_step(edited, state, 0);
   for (std::size_t e = 0; e < expected.size(); ++e) expected[e] += 2 * (all[e] - elastic[e]);
   body.cell_columns["damping_change"] = change;
-  const std::vector<Vec3> found = forces_in_step(setting, state, tau);
+  const std::vector<Vec3> found = forces_in_step(problem, state, tau);
   EXPECT_LT(largest_difference(found, expected), 1e-11 * largest(expected));
-  EXPECT_GT(largest_difference(found, forces_in_step(setting, state, 0)), 1e-3 * largest(expected));
+  EXPECT_GT(largest_difference(found, forces_in_step(problem, state, 0)), 1e-3 * largest(expected));
 }
 
 std::string name_of(const ::testing::TestParamInfo<Model>& info) {
@@ -167,10 +167,10 @@ INSTANTIATE_TEST_SUITE_P(Models, KernelOf, ::testing::Values(Model::cells, Model
 
 TEST(Kernel, FoldedCellIsTold) {
   const Body body = box_body({{2, 2, 2}, Vec3::Constant(0.01)});
-  const Setting setting = kernel_setting(body, Model::cells);
+  const Problem problem = kernel_setting(body, Model::cells);
   State state = shaken(body, 0, 7);
   state.displacement[13] = Vec3(0.05, 0.05, 0.05);
-  Stepper stepper(setting, {{0}}, false);
+  Stepper stepper(problem, {{0}}, false);
   EXPECT_LE(stepper.advance(state, {}, {1e-6, 1e-6, false}).smallest_jacobian, 0);
   state.displacement[13].x() = std::nan("");
   EXPECT_LE(stepper.advance(state, {}, {1e-6, 1e-6, false}).smallest_jacobian, 0);
@@ -182,9 +182,9 @@ TEST(Kernel, FoldedCellIsTold) {
 TEST(Kernel, DampingFollowsWhatIsLed) {
   const Body body = box_body({{8, 4, 4}, Vec3::Constant(0.01)});
   for (const Model model : {Model::cells, Model::springs}) {
-    const Setting setting = kernel_setting(body, model);
+    const Problem problem = kernel_setting(body, model);
     const double dt = 1e-5, tau = 1e-3;
-    Stepper stepper(setting, {{tau}}, true);
+    Stepper stepper(problem, {{tau}}, true);
     Constraints led;
     led.mask.assign(body.element_count(), 0);
     led.motion.assign(body.element_count(), {0, 0, 0});
@@ -194,7 +194,7 @@ TEST(Kernel, DampingFollowsWhatIsLed) {
       if (body.lattice_index[e][0] == 0) led.mask[e] = 7;
     State state = shaken(body, 0, 10);
     for (Vec3& v : state.velocity) v.setZero();
-    Held held(led, body, state);
+    PrescribedMotion held(led, body, state);
     (void)ImplicitDamping(stepper, held, 100).advance(state, {}, {dt, dt, false}, dt);
     held.impose(state, stepper.mass(), {dt, dt, false});
     const std::vector<Vec3>& pull = stepper.damping_force();  // D v+
@@ -211,11 +211,11 @@ TEST(Kernel, DampingFollowsWhatIsLed) {
 
 TEST(Kernel, DampingThatIsNotSolvedIsTold) {
   const Body body = box_body({{4, 4, 4}, Vec3::Constant(0.01)});
-  const Setting setting = kernel_setting(body, Model::cells);
-  Stepper stepper(setting, {{1}}, true);  // a second, of steps of 10 us
+  const Problem problem = kernel_setting(body, Model::cells);
+  Stepper stepper(problem, {{1}}, true);  // a second, of steps of 10 us
   State state = shaken(body, 0, 10);
   const Constraints none;
-  const Held held(none, body, state);
+  const PrescribedMotion held(none, body, state);
   const auto advance = [&](int iterations) {
     State copy = state;
     (void)ImplicitDamping(stepper, held, iterations).advance(copy, {}, {1e-5, 1e-5, false}, 1e-5);
@@ -236,11 +236,11 @@ TEST(Kernel, UnknownInstructionSetIsRefused) {
 // With unequal spacings too: only model cells takes those.
 TEST(Kernel, UnevenSpacing) {
   const Body body = rough_body({9, 7, 5}, Vec3(0.01, 0.013, 0.008));
-  const Setting setting = kernel_setting(body, Model::cells);
+  const Problem problem = kernel_setting(body, Model::cells);
   const State state = shaken(body, 8e-4, 8);
-  const std::vector<Vec3> expected = cell_by_cell(setting, state);
-  EXPECT_LT(largest_difference(forces_in_step(setting, state, 0), expected), 1e-11 * largest(expected));
+  const std::vector<Vec3> expected = cell_by_cell(problem, state);
+  EXPECT_LT(largest_difference(forces_in_step(problem, state, 0), expected), 1e-11 * largest(expected));
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

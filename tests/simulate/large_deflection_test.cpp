@@ -3,12 +3,14 @@
 
 #include <cmath>
 
-#include "simulate/scene.h"
+#include "simulate/result/options.h"
+#include "simulate/result/result.h"
+#include "simulate/scene/scene.h"
 #include "simulate/simulate.h"
 #include "tests/simulate/box_body.h"
 #include "tests/simulate/scene_case.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using testing::gum_scene;
@@ -35,7 +37,7 @@ Body column(const Slender& bar) {
                             .spacing = Vec3::Constant(bar.side() / bar.thick)});
 }
 
-// Held at x = 0, `force` on the free end, whose mean displacement is probed.
+// PrescribedMotion at x = 0, `force` on the free end, whose mean displacement is probed.
 Scene held(const Vec3& force) {
   Scene scene = gum_scene(0);
   scene.get<Ties>().ties.push_back(make_fix(select_by_name("xmin")));
@@ -197,4 +199,4 @@ TEST(LargeDeflection, AWholeTurnIsFollowedBeyondBuckling) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -4,7 +4,7 @@
 
 #include "tests/simulate/voxel_problem.h"
 
-namespace flexel::test {
+namespace flexel::simulate::test {
 namespace {
 
 struct Count {
@@ -104,4 +104,4 @@ TEST(FreeMotions, AnEliminatedElementIsNotFree) {
 }
 
 }  // namespace
-}  // namespace flexel::test
+}  // namespace flexel::simulate::test

@@ -6,10 +6,10 @@
 #include <Eigen/SparseCholesky>
 #include <random>
 
-#include "formats/parallel.h"
+#include "base/parallel.h"
 #include "tests/simulate/voxel_problem.h"
 
-namespace flexel::test {
+namespace flexel::simulate::test {
 namespace {
 
 using Vector = std::vector<Vec3>;
@@ -303,4 +303,4 @@ TEST(Multigrid, AnElementWithoutStiffnessDoesNoHarm) {
 }
 
 }  // namespace
-}  // namespace flexel::test
+}  // namespace flexel::simulate::test

@@ -7,10 +7,10 @@
 #include <numbers>
 #include <random>
 
-#include "formats/error.h"
-#include "simulate/live/live_tool.h"
+#include "base/error.h"
+#include "simulate/rigid/live_tool.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using std::numbers::pi;
@@ -116,4 +116,4 @@ TEST(LiveTool, IsLedWithoutAJump) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

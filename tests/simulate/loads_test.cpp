@@ -9,14 +9,16 @@
 #include <cmath>
 #include <numeric>
 
-#include "formats/error.h"
-#include "simulate/effects/load_distribution.h"
-#include "simulate/scene.h"
+#include "base/error.h"
+#include "simulate/matter/load_distribution.h"
+#include "simulate/matter/surface_points.h"
+#include "simulate/result/options.h"
+#include "simulate/result/result.h"
+#include "simulate/scene/scene.h"
 #include "simulate/simulate.h"
-#include "simulate/surface_points.h"
 #include "tests/simulate/box_body.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using ::testing::HasSubstr;
@@ -98,11 +100,11 @@ TEST(Loads, GatheredPointsSumUpToAllPoints) {
   options.axes = Eigen::AngleAxisd(0.5, Vec3(1, 2, 0.5).normalized()).toRotationMatrix();
   options.fill = [](int i, int j, int) { return i == 5 && j > 3 ? 0. : 1.; };  // points beside the matter
   const Body body = testing::box_body(options);
-  const Setting setting{body, {}, {}, {}, {}, {}};
+  const Problem problem{body, {}, {}, {}, {}, {}};
   std::vector<std::uint32_t> polygons(body.surface.polygon_count());
   std::iota(polygons.begin(), polygons.end(), 0u);
-  const std::vector<SurfacePoint> all = surface_points(setting, polygons);
-  const std::vector<SurfacePoint> few = gathered_surface_points(setting, polygons);
+  const std::vector<SurfacePoint> all = surface_points(problem, polygons);
+  const std::vector<SurfacePoint> few = gathered_surface_points(problem, polygons);
   EXPECT_LT(10 * few.size(), all.size());
   struct Sum {
     Vec3 area = Vec3::Zero(), moment = Vec3::Zero();
@@ -224,4 +226,4 @@ TEST(Loads, RefusesWhatDoesNotFit) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

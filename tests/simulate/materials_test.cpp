@@ -1,5 +1,5 @@
 // The library's figures belong together, and every row says where they were read and what was not.
-#include "simulate/materials.h"
+#include "simulate/input/materials.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include <cmath>
 #include <set>
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using ::testing::ContainsRegex;
@@ -58,4 +58,4 @@ TEST(Materials, PrintsHaveStrengths) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -5,18 +5,19 @@
 #include <cmath>
 #include <numbers>
 
-#include "formats/error.h"
-#include "formats/parallel.h"
-#include "simulate/scene.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "simulate/models/stability.h"
+#include "simulate/result/result.h"
+#include "simulate/scene/scene.h"
 #include "simulate/simulate.h"
-#include "simulate/time/history.h"
-#include "simulate/time/stability.h"
-#include "simulate/time/stepper.h"
+#include "simulate/stepping/stepper.h"
+#include "simulate/time/energy_history.h"
 #include "tests/simulate/box_body.h"
 #include "tests/simulate/study_beam.h"
 #include "tests/simulate/timed_case.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using std::numbers::pi;
@@ -260,8 +261,8 @@ TEST(Motion, BeamSwingsAtItsFrequency) {
 TEST(Motion, StepAboveTheBoundIsRefused) {
   Scene scene = scene_made_of(kStudyGum, 0.01);
   Body body = small_box();
-  const Setting setting{body, {kStudyGum}, std::vector<std::uint8_t>(body.cell_count(), 0)};
-  const double bound = stable_step(setting, {0});
+  const Problem problem{body, {kStudyGum}, std::vector<std::uint8_t>(body.cell_count(), 0)};
+  const double bound = stable_step(problem, {0});
   scene.run.step = 1.01 * bound;
   Progress progress("test", Progress::Mode::quiet);
   EXPECT_THROW((void)simulate(body, scene, {}, progress), InputError);
@@ -281,8 +282,8 @@ TEST(Motion, FoldAtTheStartIsTold) {
 
 TEST(Motion, FoldInTheLastStepIsTold) {
   Body body = small_box();
-  const Setting setting{body, {kStudyGum}, std::vector<std::uint8_t>(body.cell_count(), 0)};
-  const double step = 0.5 * stable_step(setting, {0});
+  const Problem problem{body, {kStudyGum}, std::vector<std::uint8_t>(body.cell_count(), 0)};
+  const double step = 0.5 * stable_step(problem, {0});
   Column velocity;
   velocity.components = 3;
   velocity.values.assign(3 * body.element_count(), 0);
@@ -359,8 +360,8 @@ TEST(Motion, MovesTakeTheirCourseAndSupportsDoTheWork) {
 TEST(Motion, OrderOfTheMethods) {
   const auto error = [](TimeMethod method, double share) {
     Body body = small_box();
-    const Setting setting{body, {kStudyGum}, std::vector<std::uint8_t>(body.cell_count(), 0)};
-    const double longest = stable_step(setting, {0});
+    const Problem problem{body, {kStudyGum}, std::vector<std::uint8_t>(body.cell_count(), 0)};
+    const double longest = stable_step(problem, {0});
     Scene scene = scene_made_of(kStudyGum, 64 * longest);
     scene.get<Gravity>().acceleration = Vec3(0, 0, -9.81);
     scene.run.method = method;
@@ -397,4 +398,4 @@ TEST(Motion, ExplicitEulerGainsEnergy) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

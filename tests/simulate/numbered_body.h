@@ -2,7 +2,7 @@
 #pragma once
 #include "tests/simulate/box_body.h"
 
-namespace flexel::testing {
+namespace flexel::simulate::testing {
 
 // (elements) `to[e]`: the number that element e gets.
 inline Body renumbered(const Body& body, const std::vector<std::uint32_t>& to) {
@@ -32,4 +32,4 @@ inline Body cells_beside_gaps(std::uint32_t count, double spacing) {
   return renumbered(body, to);
 }
 
-}  // namespace flexel::testing
+}  // namespace flexel::simulate::testing

@@ -1,6 +1,6 @@
 // Model `paper`: derivatives, symmetry, momentum, rigid motions, and the errors of the accuracy study for the
 // paper's cantilever.
-#include "simulate/paper_model.h"
+#include "simulate/models/paper_model.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,11 +9,11 @@
 #include <Eigen/Geometry>
 #include <random>
 
-#include "formats/error.h"
+#include "base/error.h"
 #include "tests/simulate/derivatives.h"
 #include "tests/simulate/study_beam.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using testing::centre_body;
@@ -37,7 +37,7 @@ CentreOptions notched_box() {
   return options;
 }
 
-Setting paper_setting(const Body& body, HookeConstant hooke) {
+Problem paper_setting(const Body& body, HookeConstant hooke) {
   return {body, {{"gum", kStudyYoung, 0.25, 580, ""}}, {}, {Model::paper}, {hooke}, {}};
 }
 
@@ -56,8 +56,8 @@ INSTANTIATE_TEST_SUITE_P(Hooke, PaperModelOf,
 
 TEST_P(PaperModelOf, ForcesAndStiffnessAreTheDerivatives) {
   const Body body = centre_body(notched_box());
-  const Setting setting = paper_setting(body, GetParam());
-  Mechanics mechanics(setting, {});
+  const Problem problem = paper_setting(body, GetParam());
+  Mechanics mechanics(problem, {});
   testing::expect_derivatives(mechanics, random_displaced_state(body.element_count(), 0.2 * kPaperSpacing),
                               kStudyYoung, kPaperSpacing, 5);
 }
@@ -194,4 +194,4 @@ TEST(PaperModel, LargeDeflectionBalancesTheLoad) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

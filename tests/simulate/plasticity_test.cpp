@@ -5,13 +5,13 @@
 #include <Eigen/Geometry>
 #include <cstring>
 
-#include "formats/error.h"
-#include "formats/parallel.h"
-#include "simulate/scene.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "simulate/scene/scene.h"
 #include "tests/simulate/stepped.h"
 #include "tests/simulate/timed_case.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using testing::at_rest;
@@ -20,14 +20,14 @@ using testing::box_of;
 using testing::BoxOptions;
 using testing::forces_of;
 using ::testing::HasSubstr;
+using testing::problem_of;
 using testing::random_displacements;
 using testing::refusal;
-using testing::setting_of;
 
 const Material kMetal{"metal", 1e9, 0.3, 1000, "test"};
 constexpr double kYield = 2e6;
 
-StepPlan hardening_plan(double hardening, double damping = 0) {
+KernelEffects hardening_plan(double hardening, double damping = 0) {
   return {{damping}, {{kYield, hardening}}, {}};
 }
 
@@ -115,10 +115,10 @@ TEST(Plasticity, SpringsKeepTheirSet) {
 TEST(Plasticity, GoesOnFromWhatTheBodyRemembers) {
   const Body body = box_of({5, 3, 3});
   for (const Model model : {Model::cells, Model::springs}) {
-    const Setting setting = setting_of(body, kMetal, model);
-    StepPlan plan = hardening_plan(1e7);
+    const Problem problem = problem_of(body, kMetal, model);
+    KernelEffects plan = hardening_plan(1e7);
     plan.fracture = {{1e12, 0.3}};
-    Stepper one(setting, plan, false), two(setting, plan, false), fresh(setting, plan, false);
+    Stepper one(problem, plan, false), two(problem, plan, false), fresh(problem, plan, false);
     State state = at_rest(body);
     state.displacement = random_displacements(body, 1e-4, 11);
     (void)forces_of(one, state);
@@ -137,10 +137,10 @@ TEST(Plasticity, GoesOnFromWhatTheBodyRemembers) {
 double residual_curvature(int n, double curvature) {
   const double h = 1e-3;
   const Body body = box_of({2, n, 1}, h);
-  const Setting setting = setting_of(body, kMetal);
-  const StepPlan plan = hardening_plan(0, 1e-6);
-  Stepper stepper(setting, plan, false);
-  const double dt = 0.8 * stable_step(setting, plan.damping);
+  const Problem problem = problem_of(body, kMetal);
+  const KernelEffects plan = hardening_plan(0, 1e-6);
+  Stepper stepper(problem, plan, false);
+  const double dt = 0.8 * stable_step(problem, plan.damping);
   State state = at_rest(body);
   const auto turn = [&](double k, double* moment) {
     const std::vector<Vec3> before = state.velocity;
@@ -195,8 +195,8 @@ TEST(Plasticity, ForcesAreTheDerivativeOfTheElasticEnergy) {
   options.spacing = Vec3(1e-3, 1.1e-3, 0.9e-3);
   options.axes = Eigen::AngleAxisd(0.5, Vec3(1, 2, 3).normalized()).toRotationMatrix();
   const Body body = box_body(options);
-  const Setting setting = setting_of(body, kMetal);
-  Stepper stepper(setting, hardening_plan(1e8), false);
+  const Problem problem = problem_of(body, kMetal);
+  Stepper stepper(problem, hardening_plan(1e8), false);
   State state = yielded(stepper, body, 1e-4);
   const std::vector<Vec3> force = forces_of(stepper, state);
   const Stepper::Memory before = stepper.memory();
@@ -220,15 +220,15 @@ TEST(Plasticity, ForcesAreTheDerivativeOfTheElasticEnergy) {
 
 TEST(Plasticity, FlowDoesNotSeeARotation) {
   const Body body = box_of({3, 2, 2});
-  const Setting setting = setting_of(body, kMetal);
+  const Problem problem = problem_of(body, kMetal);
   const Mat3 turn = Eigen::AngleAxisd(1.1, Vec3(1, -2, 0.5).normalized()).toRotationMatrix();
-  Stepper one(setting, hardening_plan(1e8), false), two(setting, hardening_plan(1e8), false);
+  Stepper one(problem, hardening_plan(1e8), false), two(problem, hardening_plan(1e8), false);
   const std::vector<Vec3> u = random_displacements(body, 1e-4, 5), w = random_displacements(body, 1e-4, 6);
   for (const double share : {0.3, 0.7, 1.0}) {
     State a = at_rest(body), b = at_rest(body);
     for (std::size_t e = 0; e < u.size(); ++e) {
       a.displacement[e] = share * u[e] + share * share * w[e];
-      // turned further at every stage
+      // turned further at every context
       const Mat3 now =
           share < 1 ? Mat3(Eigen::AngleAxisd(3 * share, Vec3::UnitY()).toRotationMatrix()) : turn;
       b.displacement[e] = now * (body.rest[e] + a.displacement[e]) - body.rest[e];
@@ -263,10 +263,10 @@ Momenta momenta(const Body& body, const Stepper& stepper, const State& state) {
 
 TEST(Plasticity, KeepsMomentum) {
   const Body body = box_of({4, 3, 3});
-  const Setting setting = setting_of(body, kMetal);
-  const StepPlan plan = hardening_plan(0, 1e-7);
-  Stepper stepper(setting, plan, false);
-  const double dt = 0.5 * stable_step(setting, plan.damping);
+  const Problem problem = problem_of(body, kMetal);
+  const KernelEffects plan = hardening_plan(0, 1e-7);
+  Stepper stepper(problem, plan, false);
+  const double dt = 0.5 * stable_step(problem, plan.damping);
   State state = at_rest(body);
   state.velocity = random_displacements(body, 20, 9);
   const Momenta before = momenta(body, stepper, state);
@@ -282,10 +282,10 @@ TEST(Plasticity, KeepsMomentum) {
 
 std::vector<Vec3> after_steps(const Body& body, const std::string& isa, int threads) {
   const ThreadLimit limit(threads);
-  const Setting setting = setting_of(body, kMetal);
-  const StepPlan plan = hardening_plan(1e7, 1e-7);
-  Stepper stepper(setting, plan, true, isa);
-  const double dt = 0.5 * stable_step(setting, plan.damping);
+  const Problem problem = problem_of(body, kMetal);
+  const KernelEffects plan = hardening_plan(1e7, 1e-7);
+  Stepper stepper(problem, plan, true, isa);
+  const double dt = 0.5 * stable_step(problem, plan.damping);
   State state = at_rest(body);
   state.velocity = random_displacements(body, 10, 2);
   for (int i = 0; i < 60; ++i) stepper.advance(state, {}, {dt, dt, false});
@@ -309,9 +309,9 @@ TEST(Plasticity, BitsDoNotDependOnThreadsOrInstructions) {
 // Below its yield stress a body moves as without plasticity but for rounding.
 TEST(Plasticity, BelowYieldThereIsNone) {
   const Body body = box_of({6, 3, 3});
-  const Setting setting = setting_of(body, kMetal);
-  Stepper bare(setting, {{0}}, false), plastic(setting, {{0}, {{1e8, 0}}, {}}, false);
-  const double dt = 0.5 * stable_step(setting, {0});
+  const Problem problem = problem_of(body, kMetal);
+  Stepper bare(problem, {{0}}, false), plastic(problem, {{0}, {{1e8, 0}}, {}}, false);
+  const double dt = 0.5 * stable_step(problem, {0});
   State a = at_rest(body);
   a.velocity = random_displacements(body, 1, 4);
   State b = a;
@@ -336,4 +336,4 @@ TEST(Plasticity, RefusesWhatCannotFlow) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

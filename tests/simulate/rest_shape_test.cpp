@@ -1,20 +1,20 @@
 // Rest shapes: free of force where they were taken, forces and stiffness as derivatives of the energy, the
 // hot loop against the cells of equilibrium, and parts that were renormalised against parts made that way.
-#include "simulate/rest_shape.h"
+#include "simulate/models/rest_shape.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
 
-#include "formats/error.h"
-#include "simulate/scene.h"
+#include "base/error.h"
+#include "simulate/scene/scene.h"
 #include "tests/simulate/centre_body.h"
 #include "tests/simulate/derivatives.h"
 #include "tests/simulate/scene_case.h"
 #include "tests/simulate/stepped.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using testing::at_rest;
@@ -47,7 +47,7 @@ class RestShapeOf : public ::testing::TestWithParam<Model> {
     options.axes = turned_axes();
     return box_body(options);
   }
-  [[nodiscard]] static Setting setting_of(const Body& body) {
+  [[nodiscard]] static Problem problem_of(const Body& body) {
     return {body, {{"gum", kGumYoung, 0.25, 1000, ""}}, {}, {GetParam()}, {HookeConstant::paper}, {}};
   }
   // Turned by 2 rad, stretched, and every element off by a tenth of a cell.
@@ -60,7 +60,7 @@ class RestShapeOf : public ::testing::TestWithParam<Model> {
   }
   [[nodiscard]] static Body renormalised(const std::vector<Vec3>& at) {
     Body body = part();
-    renormalise_all(body, setting_of(body), at);
+    renormalise_all(body, problem_of(body), at);
     return body;
   }
   static constexpr double kForce = kGumYoung * kRestSpacing * kRestSpacing;
@@ -70,7 +70,7 @@ INSTANTIATE_TEST_SUITE_P(Models, RestShapeOf, ::testing::Values(Model::cells, Mo
 TEST_P(RestShapeOf, IsFreeOfForceAndEnergy) {
   const std::vector<Vec3> at = deformed(part(), 3);
   const Body body = renormalised(at);
-  Mechanics mechanics(setting_of(body), {});
+  Mechanics mechanics(problem_of(body), {});
   EXPECT_LT(mechanics.energy({at}), 1e-24 * kForce * kRestSpacing);
   for (const Vec3& force : mechanics.forces({at}).total) EXPECT_LT(force.norm(), 1e-13 * kForce);
   State rest{std::vector<Vec3>(body.element_count(), Vec3::Zero())};
@@ -80,22 +80,22 @@ TEST_P(RestShapeOf, IsFreeOfForceAndEnergy) {
 
 TEST_P(RestShapeOf, ForcesAndStiffnessAreTheDerivatives) {
   const Body body = renormalised(deformed(part(), 3));
-  const Setting setting = setting_of(body);
-  Mechanics mechanics(setting, {});
+  const Problem problem = problem_of(body);
+  Mechanics mechanics(problem, {});
   testing::expect_derivatives(mechanics, {deformed(body, 8)}, kGumYoung, kRestSpacing, 7);
 }
 
 TEST_P(RestShapeOf, HotLoopAgreesWithEquilibrium) {
   if (GetParam() == Model::paper) return;  // has no loop of its own
   const Body body = renormalised(deformed(part(), 3));
-  const Setting setting = setting_of(body);
+  const Problem problem = problem_of(body);
   State state = at_rest(body);
   state.displacement = deformed(body, 8);
-  Mechanics mechanics(setting, {});
+  Mechanics mechanics(problem, {});
   const std::vector<Vec3> expected = mechanics.forces(state).total;
-  StepPlan plan{{0}};
+  KernelEffects plan{{0}};
   plan.rest_shapes = true;
-  Stepper stepper(setting, plan, false);
+  Stepper stepper(problem, plan, false);
   stepper.read_memory(body.cell_columns);
   const std::vector<Vec3> forces = forces_of(stepper, state);
   double largest = 0;
@@ -115,7 +115,7 @@ TEST_P(RestShapeOf, InsideOutIsRefused) {
   std::vector<Vec3> u(body.element_count());
   for (std::size_t e = 0; e < u.size(); ++e) u[e] = -2 * body.rest[e];
   try {
-    renormalise_all(body, setting_of(body), u);
+    renormalise_all(body, problem_of(body), u);
     FAIL() << "accepted";
   } catch (const DivergedError& error) {
     EXPECT_THAT(error.what(), HasSubstr("turned inside out"));
@@ -207,4 +207,4 @@ TEST(RestShape, FrozenBarIsLedFromItsShape) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -1,5 +1,5 @@
 // Loads through a rigid link: the loaded face moves as one rigid body, in balance with its force and torque.
-#include "simulate/rigid_link.h"
+#include "simulate/conditions/rigid_link.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,12 +7,14 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "formats/error.h"
-#include "simulate/scene.h"
+#include "base/error.h"
+#include "simulate/result/options.h"
+#include "simulate/result/result.h"
+#include "simulate/scene/scene.h"
 #include "simulate/simulate.h"
 #include "tests/simulate/box_body.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using ::testing::HasSubstr;
@@ -188,4 +190,4 @@ TEST(RigidLink, RefusesWhatDoesNotFit) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

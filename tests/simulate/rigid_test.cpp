@@ -7,18 +7,18 @@
 #include <numbers>
 #include <random>
 
-#include "formats/error.h"
-#include "simulate/merge.h"
+#include "base/error.h"
+#include "formats/lattice/merge.h"
+#include "simulate/kernels/chunk_layout.h"
+#include "simulate/result/result.h"
 #include "simulate/rigid/path.h"
-#include "simulate/scene.h"
-#include "simulate/simulate.h"
-#include "simulate/time/layout.h"
+#include "simulate/scene/scene.h"
 #include "tests/simulate/box_body.h"
 #include "tests/simulate/contact_case.h"
 #include "tests/simulate/scene_case.h"
 #include "tests/simulate/timed_case.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using std::numbers::pi;
@@ -115,7 +115,7 @@ TEST(Rigid, TheHistoryHasWhatContactDoesToAFreePart) {
   scene.get<Bonds>().bond = false;
   throw_part(scene, "hard", Vec3(0.1, 0, -0.5));
   const TimedCase made = testing::run_timed(std::move(body), scene);
-  const std::vector<double> mass = lumped_masses(testing::setting_of(made.body));
+  const std::vector<double> mass = lumped_masses(testing::problem_of(made.body));
   const Column& velocity = made.body.element_columns.at("velocity");
   const Part& hard = made.body.parts[1];
   Vec3 momentum = Vec3::Zero(), spin = Vec3::Zero(), centre = Vec3::Zero();
@@ -237,4 +237,4 @@ displacement = [["0 mm", "0 mm", "0 mm"], ["0 mm", "0 mm", "-5 mm"]]
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -2,11 +2,13 @@
 #pragma once
 #include <string>
 
-#include "formats/error.h"
-#include "simulate/scene.h"
+#include "base/error.h"
+#include "simulate/result/options.h"
+#include "simulate/result/result.h"
+#include "simulate/scene/scene.h"
 #include "simulate/simulate.h"
 
-namespace flexel::testing {
+namespace flexel::simulate::testing {
 
 constexpr double kGumYoung = 1e6;  // Pa
 
@@ -34,4 +36,4 @@ inline std::string refusal(Body body, const Scene& scene) {
   return "accepted";
 }
 
-}  // namespace flexel::testing
+}  // namespace flexel::simulate::testing

@@ -1,18 +1,19 @@
 // Scenes that would do nothing, or something else than they say: refused or told in one line.
-#include "simulate/scene_checks.h"
+#include "simulate/scene/scene_checks.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "formats/error.h"
-#include "simulate/report.h"
-#include "simulate/simulate.h"
+#include "base/error.h"
+#include "simulate/probes/report.h"
+#include "simulate/result/result.h"
+#include "simulate/summary.h"
 #include "tests/simulate/box_body.h"
 #include "tests/simulate/scene_case.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using testing::box_body;
@@ -288,4 +289,4 @@ TEST(Torques, ThatTurnWhatTheyActOnAreTold) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

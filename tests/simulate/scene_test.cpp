@@ -1,13 +1,13 @@
 // Scenes: values in SI, and one line with file:line for everything that is wrong.
-#include "simulate/scene.h"
+#include "simulate/scene/scene.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "formats/error.h"
+#include "base/error.h"
 #include "tests/simulate/box_body.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using ::testing::HasSubstr;
@@ -208,4 +208,4 @@ TEST(Selection, NothingSelectedSaysWhatExists) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -4,10 +4,10 @@
 
 #include <cmath>
 
-#include "formats/error.h"
+#include "base/error.h"
 #include "tests/simulate/contact_case.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using testing::block;
@@ -172,4 +172,4 @@ TEST(Settling, WhatActsInTimeIsRefused) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -1,5 +1,5 @@
 // Model `springs`: derivatives, and the errors of notes on accuracy for the paper's cantilever.
-#include "simulate/spring_model.h"
+#include "simulate/models/spring_model.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,10 +8,10 @@
 #include <cmath>
 #include <random>
 
-#include "formats/error.h"
+#include "base/error.h"
 #include "tests/simulate/study_beam.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using ::testing::HasSubstr;
@@ -104,4 +104,4 @@ TEST(SpringModel, LargeDeflectionConverges) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

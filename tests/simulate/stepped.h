@@ -7,15 +7,16 @@
 #include <random>
 #include <string>
 
-#include "formats/error.h"
-#include "formats/parallel.h"
-#include "simulate/scene.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "simulate/models/stability.h"
+#include "simulate/result/result.h"
+#include "simulate/scene/scene.h"
 #include "simulate/simulate.h"
-#include "simulate/time/stability.h"
-#include "simulate/time/stepper.h"
+#include "simulate/stepping/stepper.h"
 #include "tests/simulate/box_body.h"
 
-namespace flexel::testing {
+namespace flexel::simulate::testing {
 
 inline Body box_of(std::array<int, 3> cells, double spacing = 1e-3) {
   BoxOptions options;
@@ -38,7 +39,7 @@ inline std::string refusal(const std::string& scene) {
 
 inline const Material kCauchyGum{"gum", 1e6, 0.25, 1000, "test"};  // Poisson's ratio of springs
 
-inline Setting setting_of(const Body& body, const Material& material, Model model = Model::cells) {
+inline Problem problem_of(const Body& body, const Material& material, Model model = Model::cells) {
   return {body, std::vector<Material>(body.parts.size(), material),
           std::vector<std::uint8_t>(body.cell_count(), 0), std::vector<Model>(body.parts.size(), model)};
 }
@@ -74,9 +75,9 @@ inline State shaken(const Body& body, double amplitude, unsigned seed) {
 }
 
 // The forces that the kernel used [N], damping with time `tau` among them, out of one advance.
-inline std::vector<Vec3> forces_in_step(const Setting& setting, const State& before, double tau,
+inline std::vector<Vec3> forces_in_step(const Problem& problem, const State& before, double tau,
                                         bool book = false) {
-  Stepper stepper(setting, {{tau}}, book);
+  Stepper stepper(problem, {{tau}}, book);
   State state = before;
   const double kick = 1e-3;
   EXPECT_GT(stepper.advance(state, {}, {kick, 0, false}).smallest_jacobian, 0);
@@ -102,15 +103,15 @@ inline double largest_difference(const std::vector<Vec3>& a, const std::vector<V
 
 // Forces along the distance of the elements that they act between: neither momentum changes, and damping
 // takes energy.
-inline void expect_inner_forces(const Setting& setting, const State& state, double tau) {
-  const std::vector<Vec3> elastic = forces_in_step(setting, state, 0),
-                          all = forces_in_step(setting, state, tau);
+inline void expect_inner_forces(const Problem& problem, const State& state, double tau) {
+  const std::vector<Vec3> elastic = forces_in_step(problem, state, 0),
+                          all = forces_in_step(problem, state, tau);
   for (const bool damping : {false, true}) {
     Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
     double power = 0, size = 0, arm = 0;
     for (std::size_t e = 0; e < all.size(); ++e) {
       const Vec3 each = damping ? Vec3(all[e] - elastic[e]) : elastic[e];
-      const Vec3 at = setting.body.rest[e] + state.displacement[e];
+      const Vec3 at = problem.body.rest[e] + state.displacement[e];
       force += each;
       torque += at.cross(each);
       power += each.dot(state.velocity[e]);
@@ -127,12 +128,12 @@ inline void expect_inner_forces(const Setting& setting, const State& state, doub
 
 // Five steps from a shaken state end in the same bits whatever the threads, the instruction set and the
 // books.
-inline void expect_same_bits(const Setting& setting) {
-  const double tau = 1e-5, dt = 0.5 * stable_step(setting, {tau});
+inline void expect_same_bits(const Problem& problem) {
+  const double tau = 1e-5, dt = 0.5 * stable_step(problem, {tau});
   const auto after = [&](const std::string& isa, int threads, bool book) {
     const ThreadLimit limit(threads);
-    Stepper stepper(setting, {{tau}}, book, isa);
-    State state = shaken(setting.body, 1e-4, 5);
+    Stepper stepper(problem, {{tau}}, book, isa);
+    State state = shaken(problem.body, 1e-4, 5);
     for (int i = 0; i < 5; ++i) (void)stepper.advance(state, {}, {dt, dt, false});
     return state;
   };
@@ -163,4 +164,4 @@ inline std::vector<Vec3> random_displacements(const Body& body, double size, uns
   return u;
 }
 
-}  // namespace flexel::testing
+}  // namespace flexel::simulate::testing

@@ -1,17 +1,19 @@
 // Stresses against uniform fields, beam theory, Saint-Venant's torsion and Kirsch's plate.
-#include "simulate/stress.h"
+#include "simulate/models/stress.h"
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "simulate/scene.h"
+#include "simulate/result/options.h"
+#include "simulate/result/result.h"
+#include "simulate/scene/scene.h"
 #include "simulate/simulate.h"
 #include "tests/simulate/box_body.h"
 #include "tests/simulate/scene_case.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using testing::box_body;
@@ -34,7 +36,7 @@ SimulateResult solve_stresses(Body& body, const Scene& scene) {
   return simulate(body, scene, options, progress);
 }
 
-Setting metal_setting(const Body& body, Model model = Model::cells) {
+Problem metal_setting(const Body& body, Model model = Model::cells) {
   return {body,
           {{"metal", kMetalYoung, 0.25, 7800, "test"}},
           std::vector<std::uint8_t>(body.cell_count(), 0),
@@ -83,10 +85,10 @@ TEST(Stress, TurnsWithTheBody) {
     const Body body = box_body(options);
     const Mat3 stretch = (Mat3() << 1.1, 0.05, 0, 0.05, 0.9, 0.02, 0, 0.02, 1).finished();
     const Mat3 turn = Eigen::AngleAxisd(1.3, Vec3(3, -1, 2).normalized()).toRotationMatrix();
-    const Setting setting = metal_setting(body, model);
-    const SymmetricStress before = stresses(setting, affine_state(body, stretch - Mat3::Identity())).cell[0];
+    const Problem problem = metal_setting(body, model);
+    const SymmetricStress before = stresses(problem, affine_state(body, stretch - Mat3::Identity())).cell[0];
     const SymmetricStress after =
-        stresses(setting, affine_state(body, turn * stretch - Mat3::Identity())).cell[0];
+        stresses(problem, affine_state(body, turn * stretch - Mat3::Identity())).cell[0];
     EXPECT_LT((matrix(after) - turn * matrix(before) * turn.transpose()).norm(), 1e-9 * before.norm());
   }
 }
@@ -256,4 +258,4 @@ TEST(Stress, OfADrawnBarHasANarrowErrorBar) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

@@ -4,12 +4,12 @@
 #pragma once
 #include <cmath>
 
-#include "simulate/scene.h"
-#include "simulate/simulate.h"
+#include "simulate/result/result.h"
+#include "simulate/scene/scene.h"
 #include "tests/simulate/centre_body.h"
 #include "tests/simulate/scene_case.h"
 
-namespace flexel::testing {
+namespace flexel::simulate::testing {
 
 constexpr double kStudyYoung = 12.1e5, kStudyPoisson = 0.25, kStudyForce = 1e-3;
 inline const Material kStudyGum{"gum", kStudyYoung, kStudyPoisson, 580, "Jansson and Vergeest, section 5"};
@@ -92,4 +92,4 @@ inline double paper_error(int n, const std::string& hooke) {
   return tip_error(centre_beam(n), held_beam("paper", hooke), half_space(Vec3(last, 0, 0), Vec3::UnitX()), n);
 }
 
-}  // namespace flexel::testing
+}  // namespace flexel::simulate::testing

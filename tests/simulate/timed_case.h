@@ -6,11 +6,13 @@
 #include <cmath>
 #include <string>
 
-#include "simulate/scene.h"
+#include "simulate/result/options.h"
+#include "simulate/result/result.h"
+#include "simulate/scene/scene.h"
 #include "simulate/simulate.h"
 #include "tests/simulate/csv.h"
 
-namespace flexel::testing {
+namespace flexel::simulate::testing {
 
 struct TimedCase {
   Body body;
@@ -55,4 +57,4 @@ inline void expect_momenta_kept(const Csv& history, double tolerance) {
   }
 }
 
-}  // namespace flexel::testing
+}  // namespace flexel::simulate::testing

@@ -6,13 +6,13 @@
 #include <filesystem>
 #include <random>
 
-#include "formats/error.h"
-#include "simulate/mechanics.h"
-#include "simulate/time/layout.h"
+#include "base/error.h"
+#include "simulate/equilibrium/mechanics.h"
+#include "simulate/kernels/chunk_layout.h"
 #include "tests/simulate/study_beam.h"
 #include "tests/simulate/timed_case.h"
 
-namespace flexel {
+namespace flexel::simulate {
 namespace {
 
 using testing::book;
@@ -53,7 +53,7 @@ SimulateResult run_with_books(Body& body, const Scene& scene, int threads = 0) {
   return result;
 }
 
-Setting timed_setting(const Body& body) {
+Problem timed_problem(const Body& body) {
   return {body, {{"gum", kTimedYoung, 0.25, kTimedDensity, ""}}, {}, {Model::paper}, {HookeConstant::paper},
           {}};
 }
@@ -89,12 +89,12 @@ TEST(TimedPaper, DampingIsTheDerivativeOfItsDissipation) {
   Body body = centre_body(timed_notched_box());
   Column& change = body.element_columns["damping_change"];  // as edits do
   for (std::size_t e = 0; e < body.element_count(); ++e) change.values.push_back(e % 3 == 0 ? 1.5 : 0);
-  const PaperModel model(timed_setting(body));
+  const PaperModel model(timed_problem(body));
   const State state = random_moving_state(body.element_count(), 0.2 * kTimedSpacing, 1.5);
   const double tau = 3e-4;
   const auto length_rates = [&](const State& at) {
     double sum = 0;
-    const Connections connections = make_connections(timed_setting(body));
+    const Connections connections = make_connections(timed_problem(body));
     const double dt = 1e-7;
     for (std::size_t c = 0; c < connections.size(); ++c) {
       const std::uint32_t a = connections.a[c], b = connections.b[c];
@@ -127,7 +127,7 @@ TEST(TimedPaper, FrequencyBoundIsAboveTheLargestAndCloseToIt) {
     State state = random_moving_state(body.element_count(), size * kTimedSpacing, 0);
     for (std::size_t e = 0; e < body.element_count(); ++e)
       state.displacement[e] += size * body.rest[e];  // stretched: tension adds stiffness
-    Mechanics mechanics(timed_setting(body), {});
+    Mechanics mechanics(timed_problem(body), {});
     mechanics.assemble(state);
     const BlockMatrix& blocks = mechanics.stiffness();
     const auto n = static_cast<Eigen::Index>(3 * body.element_count());
@@ -136,7 +136,7 @@ TEST(TimedPaper, FrequencyBoundIsAboveTheLargestAndCloseToIt) {
       for (std::uint64_t q = blocks.row_offsets[row]; q < blocks.row_offsets[row + 1]; ++q)
         matrix.block<3, 3>(static_cast<Eigen::Index>(3 * row),
                            static_cast<Eigen::Index>(3 * blocks.columns[q])) = blocks.values[q];
-    const std::vector<double> mass = lumped_masses(timed_setting(body));
+    const std::vector<double> mass = lumped_masses(timed_problem(body));
     const double largest =
         Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(matrix).eigenvalues()[n - 1] / mass[0];
     const double bound = mechanics.paper().frequencies(state, mass)[0];
@@ -238,4 +238,4 @@ TEST(TimedPaper, RefusesTooLongAStepAndMatterTurnedInsideOut) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::simulate

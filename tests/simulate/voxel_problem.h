@@ -13,7 +13,7 @@
 
 #include "simulate/linear/solve.h"
 
-namespace flexel::test {
+namespace flexel::simulate::test {
 
 struct Voxel {
   Index3 at{};
@@ -240,4 +240,4 @@ inline VoxelProblem tube(
       0);
 }
 
-}  // namespace flexel::test
+}  // namespace flexel::simulate::test

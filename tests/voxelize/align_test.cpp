@@ -2,9 +2,9 @@
 #include <gtest/gtest.h>
 
 #include "tests/voxelize/shapes.h"
-#include "voxelize/align.h"
+#include "voxelize/lattice/align.h"
 
-namespace flexel {
+namespace flexel::voxelize {
 namespace {
 
 using namespace shapes;
@@ -76,4 +76,4 @@ TEST(Align, TheSameTriangleNoiseDoesNotTurnTheLattice) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::voxelize

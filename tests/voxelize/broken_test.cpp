@@ -1,12 +1,12 @@
 // Surfaces that are inside out, inconsistently oriented, interpenetrating or open.
 #include <gtest/gtest.h>
 
-#include "formats/error.h"
+#include "base/error.h"
 #include "tests/voxelize/shapes.h"
-#include "voxelize/part_mesh.h"
-#include "voxelize/vote.h"
+#include "voxelize/classify/axis_parity.h"
+#include "voxelize/mesh/part_mesh.h"
 
-namespace flexel {
+namespace flexel::voxelize {
 namespace {
 
 using namespace shapes;
@@ -125,4 +125,4 @@ TEST(Broken, ASizeThatFitsNothingIsRefused) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::voxelize

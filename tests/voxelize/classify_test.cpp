@@ -3,13 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "formats/error.h"
+#include "base/error.h"
 #include "tests/voxelize/shapes.h"
-#include "voxelize/classify.h"
-#include "voxelize/elements.h"
+#include "voxelize/classify/classify.h"
+#include "voxelize/lattice/elements.h"
 #include "voxelize/memory.h"
 
-namespace flexel {
+namespace flexel::voxelize {
 namespace {
 
 using namespace shapes;
@@ -142,4 +142,4 @@ TEST(Classify, MemoryBeyondTheLimitIsRefusedWithASizeThatFits) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::voxelize

@@ -7,7 +7,7 @@
 
 #include "tests/voxelize/shapes.h"
 
-namespace flexel::shapes {
+namespace flexel::voxelize::shapes {
 
 inline constexpr const char* kDamages[] = {"missing",
                                            "flipped",
@@ -182,4 +182,4 @@ class Damager {
   Box box_;
 };
 
-}  // namespace flexel::shapes
+}  // namespace flexel::voxelize::shapes

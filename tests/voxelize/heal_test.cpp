@@ -1,17 +1,17 @@
 // Broken surfaces: what is healed, what is judged by samples, what is refused.
-#include "voxelize/heal.h"
+#include "voxelize/heal/heal.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "formats/error.h"
+#include "base/error.h"
 #include "tests/voxelize/damage.h"
-#include "voxelize/heal_cgal.h"
-#include "voxelize/heal_mesh.h"
-#include "voxelize/judge.h"
-#include "voxelize/winding.h"
+#include "voxelize/classify/inside_consensus.h"
+#include "voxelize/classify/winding.h"
+#include "voxelize/heal/heal_cgal.h"
+#include "voxelize/heal/heal_mesh.h"
 
-namespace flexel {
+namespace flexel::voxelize {
 namespace {
 
 using namespace shapes;
@@ -280,4 +280,4 @@ TEST(Heal, DamageIsHealedOrRefused) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::voxelize

@@ -2,10 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "formats/error.h"
+#include "base/error.h"
 #include "tests/voxelize/shapes.h"
 
-namespace flexel {
+namespace flexel::voxelize {
 namespace {
 
 using namespace shapes;
@@ -76,4 +76,4 @@ TEST(Neighbours, ABodyThatIsThereTwiceIsRefusedByBothNames) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::voxelize

@@ -1,12 +1,12 @@
 // The polygons of the body's surface face out of the matter, whatever way they faced in the file.
-#include "voxelize/outward.h"
+#include "voxelize/heal/outward.h"
 
 #include <gtest/gtest.h>
 
-#include "formats/area_vector.h"
+#include "base/math/area_vector.h"
 #include "tests/voxelize/damage.h"
 
-namespace flexel {
+namespace flexel::voxelize {
 namespace {
 
 using namespace shapes;
@@ -101,4 +101,4 @@ TEST(Outward, MeasuresAreThoseOfTheHealedPart) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::voxelize

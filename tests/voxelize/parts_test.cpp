@@ -6,16 +6,16 @@
 #include <filesystem>
 #include <limits>
 
-#include "formats/error.h"
-#include "formats/import.h"
-#include "formats/locate.h"
-#include "formats/parallel.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "formats/exchange/import.h"
+#include "formats/lattice/locate.h"
 #include "tests/voxelize/shapes.h"
-#include "voxelize/align.h"
-#include "voxelize/part_mesh.h"
-#include "voxelize/vote.h"
+#include "voxelize/classify/axis_parity.h"
+#include "voxelize/lattice/align.h"
+#include "voxelize/mesh/part_mesh.h"
 
-namespace flexel {
+namespace flexel::voxelize {
 namespace {
 
 const std::filesystem::path kParts = FLEXEL_PARTS_DIR;
@@ -235,4 +235,4 @@ TEST_F(Parts, SameBitsForAnyNumberOfThreads) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::voxelize

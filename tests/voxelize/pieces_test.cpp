@@ -6,7 +6,7 @@
 
 #include "tests/voxelize/shapes.h"
 
-namespace flexel {
+namespace flexel::voxelize {
 namespace {
 
 using namespace shapes;
@@ -96,4 +96,4 @@ TEST(Pieces, PlacedAtCentresLeavesStayTwo) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::voxelize

@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "formats/progress.h"
+#include "base/program/progress.h"
 #include "tests/formats/import_help.h"
 #include "tests/formats/make_files.h"
 #include "tests/formats/occt_files.h"
@@ -15,9 +15,9 @@ namespace {
 
 Body body_of(const std::string& path, const ImportOptions& options = {}) {
   Progress progress("test", Progress::Mode::quiet);
-  VoxelizeOptions voxels;
+  voxelize::VoxelizeOptions voxels;
   voxels.size = 3e-3;
-  return voxelize(import_surface(path, options), voxels, progress).body;
+  return voxelize::voxelize(import_surface(path, options), voxels, progress).body;
 }
 
 void expect_same_body(const Body& a, const Body& b, const std::string& what) {

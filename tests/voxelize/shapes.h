@@ -9,11 +9,13 @@
 #include <random>
 #include <vector>
 
-#include "formats/body.h"
-#include "formats/progress.h"
+#include "base/program/progress.h"
+#include "formats/lattice/body.h"
+#include "voxelize/types/options.h"
+#include "voxelize/types/result.h"
 #include "voxelize/voxelize.h"
 
-namespace flexel::shapes {
+namespace flexel::voxelize::shapes {
 
 struct Mesh {
   std::vector<Vec3> vertices;
@@ -211,4 +213,4 @@ inline std::uint32_t component_count(const Body& body) {
   return count;
 }
 
-}  // namespace flexel::shapes
+}  // namespace flexel::voxelize::shapes

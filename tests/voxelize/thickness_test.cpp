@@ -5,7 +5,7 @@
 
 #include "tests/voxelize/shapes.h"
 
-namespace flexel {
+namespace flexel::voxelize {
 namespace {
 
 using namespace shapes;
@@ -32,4 +32,4 @@ TEST(Thickness, OfAForkIsThatOfItsLeaves) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::voxelize

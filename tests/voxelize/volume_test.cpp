@@ -4,7 +4,7 @@
 
 #include "tests/voxelize/shapes.h"
 
-namespace flexel {
+namespace flexel::voxelize {
 namespace {
 
 using namespace shapes;
@@ -102,4 +102,4 @@ TEST(Count, IsMetWithinATenth) {
 }
 
 }  // namespace
-}  // namespace flexel
+}  // namespace flexel::voxelize

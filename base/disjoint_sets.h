@@ -1,0 +1,33 @@
+// Union-find whose root is always the lowest member, so that numbering sets in order of first member is one
+// sweep.
+#pragma once
+#include <cstdint>
+#include <numeric>
+#include <vector>
+
+namespace flexel {
+
+class DisjointSets {
+ public:
+  explicit DisjointSets(std::size_t n = 0) { reset(n); }
+  // n sets of one member each.
+  void reset(std::size_t n) {
+    parent_.resize(n);
+    std::iota(parent_.begin(), parent_.end(), 0u);
+  }
+  [[nodiscard]] std::uint32_t root(std::uint32_t i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  }
+  void unite(std::uint32_t a, std::uint32_t b) {
+    a = root(a);
+    b = root(b);
+    if (a < b) parent_[b] = a;
+    if (b < a) parent_[a] = b;
+  }
+
+ private:
+  std::vector<std::uint32_t> parent_;
+};
+
+}  // namespace flexel

@@ -1,0 +1,60 @@
+// What CLI11 throws becomes an InputError, with the nearest option.
+#include "base/program/arguments.h"
+
+#include <fmt/format.h>
+
+#include "base/error.h"
+#include "base/files/files.h"
+#include "base/nearest_word.h"
+#include "base/program/standard_output.h"
+#include "base/text.h"
+#include "base/version.h"
+
+namespace flexel {
+namespace {
+
+void collect_options(const CLI::App& app, std::vector<std::string>& names) {
+  for (const CLI::Option* option : app.get_options()) {
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    for (const std::string& name : option->get_snames()) names.push_back("-" + name);
+  }
+  for (const CLI::App* subcommand : app.get_subcommands()) collect_options(*subcommand, names);
+}
+
+[[noreturn]] void refuse_extras(const CLI::App& app, const std::vector<std::string>& extras) {
+  const std::string word =
+      extras.empty() ? std::string() : extras.front().substr(0, extras.front().find('='));
+  if (word.size() < 2 || word.front() != '-')
+    throw InputError(fmt::format("unexpected argument \"{}\"; --help shows what is accepted", word));
+  std::vector<std::string> names;
+  collect_options(app, names);
+  const std::string hint = did_you_mean(word, names);
+  throw InputError(
+      fmt::format("unknown option \"{}\"{}", word, hint.empty() ? "; --help lists the options" : hint));
+}
+
+}  // namespace
+
+bool parse_arguments(CLI::App& app, int argc, char** argv) {
+  if (app.get_option_no_throw("--version") == nullptr) {
+    const std::string name = app.get_name().empty() ? stem(argv[0]) : app.get_name();
+    app.set_version_flag("--version", name + " " + version(), "Print the version and exit");
+  }
+  try {
+    app.parse(argc, argv);
+    return true;
+  } catch (const CLI::CallForHelp&) {
+    print_to_stdout(app.help());
+  } catch (const CLI::CallForAllHelp&) {
+    print_to_stdout(app.help("", CLI::AppFormatMode::All));
+  } catch (const CLI::CallForVersion& version_text) {
+    print_to_stdout(std::string(version_text.what()) + "\n");
+  } catch (const CLI::ExtrasError&) {
+    refuse_extras(app, app.remaining(true));
+  } catch (const CLI::ParseError& error) {
+    throw InputError(fmt::format("{}; --help shows what is accepted", one_line(error.what())));
+  }
+  return false;
+}
+
+}  // namespace flexel

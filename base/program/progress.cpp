@@ -1,0 +1,141 @@
+// Progress on stderr. The bar is one line that is rewritten in place (carriage return, erase to the end of
+// the line); anything else that is printed clears it first, and the next update draws it again.
+#include "base/program/progress.h"
+
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <string_view>
+#include <utility>
+
+#include "base/program/brief_output.h"
+
+namespace flexel {
+namespace {
+
+bool brief_output = false, holds_warnings = false;
+std::vector<std::string> held_warnings;
+std::string held_program;  // that gave the last of them
+
+constexpr double kDrawInterval = 0.1;  // s
+constexpr int kBarWidth = 24;          // characters
+
+double now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+void print_error(const std::string& text) {
+  std::fwrite(text.data(), 1, text.size(), stderr);
+}
+
+Progress::Mode resolve(Progress::Mode mode) {
+  if (mode != Progress::Mode::automatic) return mode;
+  const char* terminal = std::getenv("TERM");
+  const bool can_rewrite = terminal != nullptr && std::string_view(terminal) != "dumb";
+  return isatty(STDERR_FILENO) != 0 && can_rewrite ? Progress::Mode::bar : Progress::Mode::lines;
+}
+
+std::size_t terminal_columns() {
+  winsize size = {};
+  return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
+}
+
+}  // namespace
+
+BriefOutput::BriefOutput(bool brief) {
+  brief_output = brief;
+}
+
+BriefOutput::~BriefOutput() {
+  brief_output = false;
+}
+
+HeldWarnings::HeldWarnings() : exceptions_(std::uncaught_exceptions()) {
+  holds_warnings = true;
+}
+
+HeldWarnings::~HeldWarnings() {
+  holds_warnings = false;
+  if (std::uncaught_exceptions() > exceptions_)
+    for (const std::string& line : held_warnings)
+      print_error(fmt::format("{}: warning: {}\n", held_program, line));
+  held_warnings.clear();
+}
+
+std::vector<std::string> HeldWarnings::take() {
+  return std::exchange(held_warnings, {});
+}
+
+Progress::Progress(std::string program, Mode mode) : program_(std::move(program)), mode_(resolve(mode)) {}
+
+Progress::~Progress() {
+  // A stage that an exception ended was not finished.
+  if (std::uncaught_exceptions() > 0)
+    clear_bar();
+  else
+    finish();
+}
+
+void Progress::stage(const std::string& name) {
+  finish();
+  stage_ = name;
+  stage_began_ = now();
+  last_drawn_ = -1;
+  update(0);
+}
+
+void Progress::update(double share, const std::string& note) {
+  if (mode_ != Mode::bar || stage_.empty()) return;
+  const double time = now();
+  if (last_drawn_ >= 0 && time - last_drawn_ < kDrawInterval) return;
+  last_drawn_ = time;
+  const double done = std::isfinite(share) ? std::clamp(share, 0.0, 1.0) : 0.0;
+  const auto filled = static_cast<std::size_t>(std::lround(done * kBarWidth));
+  std::string line = fmt::format("{}: {} [{}{}] {:3.0f} %", program_, stage_, std::string(filled, '#'),
+                                 std::string(kBarWidth - filled, '.'), std::floor(100 * done));
+  if (!note.empty()) line += "  " + note;
+  const std::size_t columns = terminal_columns();
+  if (line.size() >= columns) line.resize(columns - 1);  // a wrapped line could not be rewritten
+  print_error("\r" + line + "\033[K");
+  bar_drawn_ = true;
+}
+
+void Progress::say(const std::string& line) {
+  if (mode_ == Mode::quiet || mode_ == Mode::silent || brief_output) return;
+  clear_bar();
+  print_error(fmt::format("{}: {}\n", program_, line));
+}
+
+void Progress::warn(const std::string& line) {
+  if (mode_ == Mode::silent) return;
+  if (holds_warnings) {
+    held_program = program_;
+    if (std::find(held_warnings.begin(), held_warnings.end(), line) == held_warnings.end())
+      held_warnings.push_back(line);
+    return;
+  }
+  clear_bar();
+  print_error(fmt::format("{}: warning: {}\n", program_, line));
+}
+
+void Progress::finish() {
+  clear_bar();
+  if (mode_ == Mode::lines && !stage_.empty() && !brief_output) {
+    const double seconds = now() - stage_began_;
+    print_error(fmt::format("{}: {}: {:.{}f} s\n", program_, stage_, seconds, seconds < 1 ? 4 : 2));
+  }
+  stage_.clear();
+}
+
+void Progress::clear_bar() {
+  if (bar_drawn_) print_error("\r\033[K");
+  bar_drawn_ = false;
+}
+
+}  // namespace flexel

@@ -1,0 +1,54 @@
+// The error of a run beside coarser ones (accuracy.h has the formulas).
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "flexel/accuracy/resolution_search.h"
+#include "simulate/result/estimate.h"
+
+namespace flexel::commands {
+
+struct Quantity {
+  std::string name;
+  double value = 0;
+  std::optional<simulate::Bar> bar;
+  simulate::ErrorBar::Of kind = simulate::ErrorBar::Of::largest_displacement;
+  std::size_t probe = 0;
+};
+
+// What is asked of every run.
+class Quantities {
+ public:
+  explicit Quantities(bool driven) : driven_(driven) {}
+
+  // The probes; where none moves, of every run the displacement at the vertex that moves most in the last
+  // one, along that.
+  [[nodiscard]] std::vector<Quantity> of(const SolvedRun& run, const SolvedRun& last) const;
+
+ private:
+  bool driven_;
+};
+
+struct Judged {
+  double error = 0;  // share
+  double order = 1;  // p: how the error falls with the spacing
+  std::string of;    // the quantity that is worst
+};
+
+// m, geometric mean over parts and axes.
+[[nodiscard]] double spacing_of(const SolvedRun& run);
+
+// Whether its cells are no wider than most walls.
+[[nodiscard]] bool resolves_walls(const SolvedRun& run);
+
+// The error of the last of the runs, the worst of its quantities: from its own error bars, and from the one
+// or two runs before it where they are coarser and resolve the walls. Nothing where neither tells. `runs` is
+// not empty.
+[[nodiscard]] std::optional<Judged> judge(const std::vector<SolvedRun>& runs, const Quantities& quantities);
+
+// Widens the error bars of the last run to what judge() says of each quantity, so that no two figures of one
+// run contradict each other.
+void widen_bars(std::vector<SolvedRun>& runs, const Quantities& quantities);
+
+}  // namespace flexel::commands

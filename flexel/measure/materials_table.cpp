@@ -1,0 +1,84 @@
+// The library of materials written out.
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "base/units.h"
+#include "flexel/measure/materials_table.h"
+#include "simulate/input/materials.h"
+
+namespace flexel::commands {
+namespace {
+
+std::string pressure(double value) {
+  return value > 0 ? human_pressure(value) : "";
+}
+
+std::string percent(double share) {
+  return share > 0 ? fmt::format("{:.3g} %", 100 * share) : "";
+}
+
+std::vector<std::string> row(const simulate::Material& material) {
+  return {material.name,
+          human_pressure(material.young),
+          fmt::format("{:.4g}", material.poisson),
+          fmt::format("{:.0f}", material.density),
+          pressure(material.yield),
+          pressure(material.strength),
+          percent(material.elongation),
+          pressure(material.layer_strength),
+          material.friction > 0 ? fmt::format("{:.2g}", material.friction) : "",
+          percent(material.damping),
+          material.source};
+}
+
+const std::vector<std::string> kHead = {"name",     "young",    "poisson",    "density [kg/m3]",
+                                        "yield",    "strength", "elongation", "across layers",
+                                        "friction", "damping",  "source"};
+
+}  // namespace
+
+std::string materials_text() {
+  std::vector<std::vector<std::string>> rows{kHead};
+  for (const simulate::Material& material : simulate::material_library()) rows.push_back(row(material));
+  std::vector<std::size_t> width(kHead.size(), 0);
+  for (const auto& each : rows)
+    for (std::size_t c = 0; c < width.size(); ++c) width[c] = std::max(width[c], each[c].size());
+  std::string text;
+  for (const auto& each : rows) {
+    for (std::size_t c = 0; c + 1 < width.size(); ++c) text += fmt::format("{:<{}}  ", each[c], width[c]);
+    text += each.back() + "\n";
+  }
+  return text;
+}
+
+std::string materials_markdown() {
+  std::string text = fmt::format("| {} |\n|", fmt::join(kHead, " | "));
+  for (std::size_t c = 0; c < kHead.size(); ++c) text += "---|";
+  text += "\n";
+  for (const simulate::Material& material : simulate::material_library())
+    text += fmt::format("| {} |\n", fmt::join(row(material), " | "));
+  return text;
+}
+
+std::string materials_json() {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const simulate::Material& material : simulate::material_library()) {
+    nlohmann::ordered_json each = {{"name", material.name},
+                                   {"young", material.young},
+                                   {"poisson", material.poisson},
+                                   {"density", material.density}};
+    for (const auto& [key, value] : {std::pair{"yield", material.yield},
+                                     {"strength", material.strength},
+                                     {"elongation", material.elongation},
+                                     {"layer_strength", material.layer_strength},
+                                     {"friction", material.friction},
+                                     {"damping", material.damping}})
+      if (value > 0) each[key] = value;
+    each["source"] = material.source;
+    list.push_back(each);
+  }
+  return list.dump(2) + "\n";
+}
+
+}  // namespace flexel::commands

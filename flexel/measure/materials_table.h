@@ -1,0 +1,12 @@
+// The library of materials for people and programs.
+#pragma once
+#include <string>
+
+namespace flexel::commands {
+
+// The library as lines for people, as a table in Markdown (docs/materials.md holds it), and as JSON (SI).
+[[nodiscard]] std::string materials_text();
+[[nodiscard]] std::string materials_markdown();
+[[nodiscard]] std::string materials_json();
+
+}  // namespace flexel::commands

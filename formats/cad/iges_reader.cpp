@@ -1,0 +1,152 @@
+// IGES through OpenCASCADE. Most files hold no solids but the trimmed surfaces of one; those are sewn along
+// their edges first, at the smallest of a few tolerances that leaves no edge free, and the closed shells
+// stand for solids. Names are those of the entities.
+#include <fmt/format.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <BRepBndLib.hxx>
+#include <BRepBuilderAPI_Sewing.hxx>
+#include <Bnd_Box.hxx>
+#include <IGESControl_Controller.hxx>
+#include <IGESControl_Reader.hxx>
+#include <IGESData_IGESEntity.hxx>
+#include <Interface_Static.hxx>
+#include <Message.hxx>
+#include <Message_Messenger.hxx>
+#include <TCollection_HAsciiString.hxx>
+#include <TopExp_Explorer.hxx>
+#include <TopoDS_Shape.hxx>
+#include <TransferBRep.hxx>
+#include <Transfer_TransientProcess.hxx>
+#include <XSControl_TransferReader.hxx>
+#include <XSControl_WorkSession.hxx>
+#include <cmath>
+#include <map>
+#include <new>
+
+#include "base/error.h"
+#include "formats/cad/occt.h"
+#include "formats/common/readers.h"
+
+namespace flexel {
+namespace {
+
+// OpenCASCADE reads IGES from files only: this one is in memory and has a name while it is open, so that
+// nothing is left of it, however the program ends.
+class MemoryFile {
+ public:
+  explicit MemoryFile(const Bytes& bytes) : descriptor_(::memfd_create("iges", MFD_CLOEXEC)) {
+    std::size_t done = 0;
+    while (descriptor_ >= 0 && done < bytes.size()) {
+      const ssize_t written = ::write(descriptor_, bytes.data() + done, bytes.size() - done);
+      if (written <= 0) break;
+      done += static_cast<std::size_t>(written);
+    }
+    if (done == bytes.size()) return;
+    ::close(descriptor_);
+    throw std::bad_alloc();
+  }
+  ~MemoryFile() { ::close(descriptor_); }
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+  [[nodiscard]] std::string path() const { return fmt::format("/proc/self/fd/{}", descriptor_); }
+
+ private:
+  int descriptor_ = -1;
+};
+
+// The last line has a T in column 73; the first is one of the start section.
+void check_complete(const ImportInput& input) {
+  constexpr std::size_t kLetter = 72;
+  std::string_view text(reinterpret_cast<const char*>(input.bytes.data()), input.bytes.size());
+  if (text.size() <= kLetter || text[kLetter] != 'S')
+    throw InputError(input.where, "is no IGES file: its first line does not have an S in column 73");
+  while (!text.empty() &&
+         (text.back() == '\n' || text.back() == '\r' || text.back() == ' ' || text.back() == '\0'))
+    text.remove_suffix(1);
+  const std::size_t line = text.rfind('\n') + 1;
+  if (text.size() - line <= kLetter || text[line + kLetter] != 'T')
+    throw InputError(input.where, "is cut off: an IGES file ends with a line that has a T in column 73");
+}
+
+using Names = std::map<const void*, std::string>;  // by the TShape
+
+Names names_in(const IGESControl_Reader& reader) {
+  Names names;
+  const Handle(Transfer_TransientProcess) process = reader.WS()->TransferReader()->TransientProcess();
+  for (Standard_Integer i = 1; i <= process->NbMapped(); ++i) {
+    const Handle(IGESData_IGESEntity) entity = Handle(IGESData_IGESEntity)::DownCast(process->Mapped(i));
+    if (entity.IsNull() || !entity->HasName() || entity->NameValue().IsNull()) continue;
+    const TopoDS_Shape shape = TransferBRep::ShapeResult(process, entity);
+    if (!shape.IsNull()) names.emplace(shape.TShape().get(), clean_name(entity->NameValue()->ToCString()));
+  }
+  return names;
+}
+
+std::size_t count(const TopoDS_Shape& shape, TopAbs_ShapeEnum kind) {
+  std::size_t found = 0;
+  for (TopExp_Explorer explorer(shape, kind); explorer.More(); explorer.Next()) ++found;
+  return found;
+}
+
+// The faces joined to shells, under the names of the faces that they came from.
+TopoDS_Shape sewn(const TopoDS_Shape& shape, Names& names) {
+  Bnd_Box box;
+  BRepBndLib::Add(shape, box, Standard_False);
+  const double diagonal = box.IsVoid() ? 0 : std::sqrt(box.SquareExtent());
+  TopoDS_Shape result = shape;
+  for (const double share : {1e-7, 1e-6, 1e-5, 1e-4}) {
+    BRepBuilderAPI_Sewing sewing(share * diagonal);
+    for (TopExp_Explorer face(shape, TopAbs_FACE); face.More(); face.Next()) sewing.Add(face.Current());
+    sewing.Perform();
+    result = sewing.SewedShape();
+    if (sewing.NbFreeEdges() > 0 && share < 1e-4) continue;
+    for (TopExp_Explorer face(shape, TopAbs_FACE); face.More(); face.Next()) {
+      const auto name = names.find(face.Current().TShape().get());
+      if (name != names.end() && sewing.IsModifiedSubShape(face.Current()))
+        names.emplace(sewing.ModifiedSubShape(face.Current()).TShape().get(), name->second);
+    }
+    break;
+  }
+  return result;
+}
+
+Surface read_entities(const std::string& path, const ImportOptions& options, const ImportInput& input) {
+  constexpr double kMillimetre = 1e-3;
+  Message::DefaultMessenger()->ChangePrinters().Clear();  // stdout belongs to the result
+  IGESControl_Controller::Init();
+  Interface_Static::SetCVal("xstep.cascade.unit", "MM");
+  IGESControl_Reader reader;
+  reader.SetReadVisible(Standard_False);
+  if (reader.ReadFile(path.c_str()) != IFSelect_RetDone)
+    throw InputError(input.where, "is damaged: OpenCASCADE cannot make sense of it as IGES");
+  reader.TransferRoots();
+  TopoDS_Shape shape = reader.OneShape();
+  if (shape.IsNull()) throw InputError(input.where, "holds no shape");
+  Names names = names_in(reader);
+  if (count(shape, TopAbs_SOLID) == 0) {
+    if (count(shape, TopAbs_FACE) == 0)
+      throw InputError(input.where, "holds curves or points but no faces: export the part as a solid");
+    shape = sewn(shape, names);
+  }
+  const auto name = [&](const TopoDS_Shape& item) {
+    const auto found = names.find(item.TShape().get());
+    return found == names.end() ? std::string() : found->second;
+  };
+  Surface surface = mesh_of(shape, kMillimetre,
+                            {name, name, [](const TopoDS_Shape&) { return std::nullopt; }}, options, input);
+  surface.sources.push_back(source_in_unit("iges", kMillimetre));
+  return surface;
+}
+
+}  // namespace
+
+Surface read_iges(ImportInput& input, const ImportOptions& options) {
+  if (options.unit) throw InputError(input.where, "an IGES file carries its own unit: leave out --unit");
+  check_complete(input);
+  const MemoryFile file(input.bytes);
+  return read_with_occt(input, options, [&] { return read_entities(file.path(), options, input); });
+}
+
+}  // namespace flexel

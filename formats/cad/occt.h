@@ -1,0 +1,37 @@
+// What the readers of OpenCASCADE's formats (STEP, IGES, BREP) share. Inside flexel_import; OpenCASCADE's
+// types are only declared.
+#pragma once
+#include <array>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "formats/common/readers.h"
+
+class TopoDS_Shape;
+
+namespace flexel {
+
+using ShapeColor = std::array<double, 3>;  // red, green, blue in [0, 1], as the file has them
+
+// What a file says of its solids and faces.
+struct ShapeLabels {
+  std::function<std::string(const TopoDS_Shape& solid)> solid_name;
+  std::function<std::string(const TopoDS_Shape& face)> face_name;
+  std::function<std::optional<ShapeColor>(const TopoDS_Shape& solid_or_face)> color;
+};
+
+// The solids of `shape`, tessellated: parts, faces, vertices in metres, colours; no sources. `unit`: metres
+// per unit of the shape. Throws InputError: no solid, a deflection or an edge that is not positive.
+[[nodiscard]] Surface mesh_of(const TopoDS_Shape& shape, double unit, const ShapeLabels& labels,
+                              const ImportOptions& options, const ImportInput& input);
+
+// The message for what OpenCASCADE found wrong with a file.
+[[nodiscard]] std::string damage_message(const std::string& what);
+
+// Runs `read`, which uses OpenCASCADE on the file; its exceptions, crashes and endless loops become
+// InputError.
+[[nodiscard]] Surface read_with_occt(const ImportInput& input, const ImportOptions& options,
+                                     const std::function<Surface()>& read);
+
+}  // namespace flexel

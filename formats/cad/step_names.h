@@ -1,0 +1,39 @@
+// Names and colours of solids and faces in a STEP file. Inside flexel_import; OpenCASCADE's types are only
+// declared.
+#pragma once
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "formats/cad/occt.h"
+
+class STEPControl_Reader;
+class StepBasic_ProductDefinition;
+class TopoDS_Shape;
+
+namespace flexel {
+
+class StepNames {
+ public:
+  // Of a file that has been transferred.
+  explicit StepNames(const STEPControl_Reader& reader);
+  // The name of a face or solid itself, or "".
+  [[nodiscard]] std::string own(const TopoDS_Shape& shape) const;
+  // A product with one solid gives it its name; the solids of one product are told apart by their own names.
+  [[nodiscard]] std::string solid(const TopoDS_Shape& solid) const;
+  // The colour of a face or solid itself, in sRGB as the file has it.
+  [[nodiscard]] std::optional<ShapeColor> color(const TopoDS_Shape& shape) const;
+
+ private:
+  void add_colors(const STEPControl_Reader& reader);
+  void add_product(const StepBasic_ProductDefinition& definition, const TopoDS_Shape& shape);
+
+  // By the TShape that a shape's instances share.
+  std::map<const void*, std::string> own_;
+  std::map<const void*, ShapeColor> color_;
+  // Of the smallest product that holds a solid, and how many solids that product holds.
+  std::map<const void*, std::pair<std::size_t, std::string>> product_;
+};
+
+}  // namespace flexel

@@ -1,0 +1,126 @@
+// Faces of meshes without groups, names, units: what several readers need.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <map>
+#include <set>
+
+#include "base/error.h"
+#include "base/math/weld.h"
+#include "formats/common/readers.h"
+#include "formats/part/topology.h"
+
+namespace flexel {
+
+void assign_dihedral_faces(Surface& surface, const std::vector<std::uint32_t>& polygon_part,
+                           const std::vector<std::uint32_t>& welded) {
+  constexpr std::uint32_t kNoFace = 0xffffffffu;
+  const Triangles triangles = triangulate(surface);
+  const auto regions =
+      dihedral_regions(surface.vertices, triangles.corners, topology(triangles.corners, welded), kFaceAngle);
+  const std::size_t polygons = surface.polygon_count();
+  surface.polygon_face.resize(polygons);
+  // A region may reach from one part into the next only by a degenerate triangle, so the last face made for
+  // it is enough.
+  std::vector<std::uint32_t> region_face(regions.size(), kNoFace);
+  for (std::size_t p = 0; p < polygons; ++p) {
+    const std::uint32_t region = regions[surface.polygon_offsets[p] - 2 * p];
+    if (region_face[region] == kNoFace || surface.faces[region_face[region]].part != polygon_part[p]) {
+      region_face[region] = static_cast<std::uint32_t>(surface.faces.size());
+      surface.faces.push_back({"", polygon_part[p]});
+    }
+    surface.polygon_face[p] = region_face[region];
+  }
+}
+
+void assign_group_faces(Surface& surface, const std::vector<std::uint32_t>& polygon_part,
+                        const std::vector<std::uint32_t>& polygon_group,
+                        const std::vector<std::string>& group_names,
+                        const std::vector<std::uint32_t>& welded) {
+  std::vector<std::set<std::uint32_t>> groups(surface.parts.size());
+  for (std::size_t p = 0; p < polygon_group.size(); ++p) groups[polygon_part[p]].insert(polygon_group[p]);
+  assign_dihedral_faces(surface, polygon_part, welded);
+  // The groups' numbers come after those of the regions.
+  const std::size_t regions = surface.faces.size();
+  std::map<std::size_t, std::uint32_t> face_of;
+  std::vector<SurfaceFace> faces;
+  for (std::size_t p = 0; p < polygon_group.size(); ++p) {
+    const bool grouped = groups[polygon_part[p]].size() > 1;
+    const std::size_t key = grouped ? regions + polygon_group[p] : surface.polygon_face[p];
+    const auto [face, added] = face_of.emplace(key, static_cast<std::uint32_t>(faces.size()));
+    if (added) faces.push_back({grouped ? group_names[polygon_group[p]] : "", polygon_part[p]});
+    surface.polygon_face[p] = face->second;
+  }
+  surface.faces = std::move(faces);
+}
+
+void check_indices(const Surface& surface, const ImportInput& input) {
+  for (const std::uint32_t vertex : surface.polygon_vertices)
+    if (vertex >= surface.vertices.size())
+      throw InputError(input.where, fmt::format("a face names vertex {}, but there are only {}",
+                                                std::uint64_t{vertex} + 1, surface.vertices.size()));
+}
+
+namespace {
+
+// Length of the UTF-8 sequence at the front of `text`, or 0 where there is none (RFC 3629).
+std::size_t utf8_length(std::string_view text) {
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned char lead = byte(0);
+  const std::size_t length = lead < 0x80   ? 1
+                             : lead < 0xc2 ? 0
+                             : lead < 0xe0 ? 2
+                             : lead < 0xf0 ? 3
+                             : lead < 0xf5 ? 4
+                                           : 0;
+  if (length > text.size()) return 0;
+  for (std::size_t i = 1; i < length; ++i)
+    if ((byte(i) & 0xc0) != 0x80) return 0;
+  if (length == 3 && ((lead == 0xe0 && byte(1) < 0xa0) || (lead == 0xed && byte(1) > 0x9f))) return 0;
+  if (length == 4 && ((lead == 0xf0 && byte(1) < 0x90) || (lead == 0xf4 && byte(1) > 0x8f))) return 0;
+  return length;
+}
+
+}  // namespace
+
+std::string clean_name(std::string_view text) {
+  std::string name;
+  while (!text.empty()) {
+    const std::size_t length = utf8_length(text);
+    const bool plain =
+        length > 1 || (length == 1 && static_cast<unsigned char>(text[0]) >= 0x20 && text[0] != 0x7f);
+    if (plain)
+      name.append(text.substr(0, length));
+    else
+      name.push_back(std::isspace(static_cast<unsigned char>(text[0])) != 0 ? ' ' : '?');
+    text.remove_prefix(std::max<std::size_t>(length, 1));
+  }
+  const std::size_t begin = name.find_first_not_of(' ');
+  return begin == std::string::npos ? "" : name.substr(begin, name.find_last_not_of(' ') - begin + 1);
+}
+
+SurfaceSource unitless_source(const char* format, const ImportOptions& options) {
+  SurfaceSource source;
+  source.format = format;
+  source.unit = options.unit.value_or(1e-3);
+  source.unit_given = options.unit.has_value();
+  return source;
+}
+
+SurfaceSource source_in_unit(const char* format, double unit) {
+  SurfaceSource source;
+  source.format = format;
+  source.unit = unit;
+  source.unit_given = true;
+  return source;
+}
+
+void complete_single_part(Surface& surface, ImportInput& input) {
+  surface.parts.push_back({""});
+  assign_dihedral_faces(surface, std::vector<std::uint32_t>(surface.polygon_count(), 0),
+                        weld(surface.vertices));
+  surface.sources[0].bytes = std::move(input.bytes);
+}
+
+}  // namespace flexel

@@ -1,0 +1,56 @@
+// Names of the arrays of a body file, for its writer and its reader; docs/body-file.md explains them.
+#pragma once
+#include <array>
+#include <string>
+
+#include "formats/lattice/vtu.h"
+#include "formats/part/column.h"
+
+namespace flexel::names {
+
+constexpr const char* version = "flexel_version";
+constexpr const char* metadata = "flexel_metadata";
+constexpr const char* surface_vertices = "surface_vertices";
+constexpr const char* surface_polygon_offsets = "surface_polygon_offsets";
+constexpr const char* surface_polygon_vertices = "surface_polygon_vertices";
+constexpr const char* surface_polygon_face = "surface_polygon_face";
+constexpr const char* surface_face_part = "surface_face_part";
+constexpr const char* surface_cell_offsets = "surface_cell_offsets";
+constexpr const char* surface_cells = "surface_cells";
+// Before the name of each attribute of the surface.
+constexpr const char* surface_vertex_columns = "surface_vertex_columns.";
+constexpr const char* surface_polygon_columns = "surface_polygon_columns.";
+constexpr const char* surface_source_bytes = "surface_source_bytes";
+constexpr const char* surface_source_headers = "surface_source_headers";
+constexpr const char* position = "position";
+constexpr const char* rest = "rest";
+constexpr const char* displacement = "displacement";
+constexpr const char* lattice_index = "lattice_index";
+constexpr const char* piece = "piece";
+constexpr const char* part = "part";
+constexpr const char* connections = "connections";
+constexpr const char* connectivity = "connectivity";
+constexpr const char* offsets = "offsets";
+constexpr const char* types = "types";
+constexpr const char* fill = "fill";
+constexpr const char* material = "material";
+constexpr const char* broken = "broken";
+
+// Our corner a = i + 2 j + 4 k at place v of VTK's hexahedron (which runs around the lower face, then the
+// upper). Its own inverse.
+constexpr std::array<std::size_t, 8> vtk_corner = {0, 1, 3, 2, 4, 5, 7, 6};
+constexpr std::uint8_t vtk_hexahedron = 12, vtk_vertex = 1;
+
+// True for the arrays of point or cell data that are not columns.
+[[nodiscard]] inline bool reserved(const std::string& name, vtu::Section section) {
+  if (section == vtu::Section::point_data)
+    return name == rest || name == displacement || name == lattice_index || name == piece || name == part ||
+           name == connections;
+  return name == fill || name == part || name == material || name == broken;
+}
+
+[[nodiscard]] inline bool valid_column(const std::string& name, vtu::Section section) {
+  return valid_column_name(name) && !reserved(name, section);
+}
+
+}  // namespace flexel::names

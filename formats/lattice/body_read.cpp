@@ -1,0 +1,181 @@
+// .vtu -> Body. The version is looked at first, then the metadata, then the arrays; check() has the last
+// word, so that a body that was read can be relied on. Displacement, part, material, offsets and types repeat
+// what other fields say and are not read back (their sizes are checked with all others).
+#include <fmt/format.h>
+
+#include <string_view>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "formats/lattice/body_file.h"
+#include "formats/lattice/body_file_names.h"
+#include "formats/lattice/body_metadata.h"
+#include "formats/lattice/vtu.h"
+
+namespace flexel {
+namespace {
+
+using vtu::Section;
+
+void require_version(const vtu::File& file) {
+  if (!file.has(Section::field, names::version))
+    file.fail("is a .vtu but not a body file: one written by flexel-voxelize or flexel-simulate is needed");
+  const std::vector<std::int32_t> version = file.read<std::int32_t>(Section::field, names::version);
+  if (version.size() != 1)
+    file.fail(fmt::format("damaged: field data \"{}\" has {} entries", names::version, version.size()));
+  if (version.front() != kBodyFileVersion)
+    file.fail(fmt::format(
+        "is a body file of version {}; this program reads version {}: use the programs of one release",
+        version.front(), kBodyFileVersion));
+}
+
+Metadata read_metadata(const vtu::File& file, const std::string& where) {
+  const std::vector<std::uint8_t> text = file.read<std::uint8_t>(Section::field, names::metadata);
+  return metadata_from_json(std::string(text.begin(), text.end()), where);
+}
+
+void read_sources(const vtu::File& file, const Metadata& metadata, Surface& surface) {
+  const Bytes packed = file.read<std::byte>(Section::field, names::surface_source_bytes);
+  const Bytes headers = file.read<std::byte>(Section::field, names::surface_source_headers);
+  std::size_t at = 0, header_at = 0;
+  for (std::size_t s = 0; s < surface.sources.size(); ++s) {
+    const PackedSource& source = metadata.sources[s];
+    const std::span<const std::byte> rest = std::span(packed).subspan(at);
+    std::uint64_t packed_size = 0;
+    for (const std::uint64_t size : source.block_sizes) {
+      if (size > rest.size() - packed_size)
+        file.fail(fmt::format("damaged: field data \"{}\" is too short for source {}",
+                              names::surface_source_bytes, s));
+      packed_size += size;
+    }
+    if (source.header_size > headers.size() - header_at || source.size / 1032 > packed_size)
+      file.fail(fmt::format("damaged: flexel_metadata: surface.sources[{}] has wrong sizes", s));
+    Bytes& bytes = surface.sources[s].bytes;
+    bytes.resize(source.size);
+    try {
+      vtu::unpack_blocks(rest, source.block_sizes, vtu::kBlockSize, source.size, bytes.data());
+    } catch (const InputError& error) {
+      file.fail(fmt::format("field data \"{}\": {}", names::surface_source_bytes, error.what()));
+    }
+    surface.sources[s].stl_header.assign(headers.begin() + header_at,
+                                         headers.begin() + header_at + source.header_size);
+    at += packed_size;
+    header_at += source.header_size;
+  }
+}
+
+// Attributes of the surface: the arrays of the field data whose names begin with `prefix`.
+void read_surface_columns(const vtu::File& file, const std::string& prefix, Columns& columns) {
+  for (const std::string& name : file.names(Section::field)) {
+    if (!name.starts_with(prefix)) continue;
+    Column column{static_cast<int>(file.components(Section::field, name)),
+                  file.read_flat(Section::field, name)};
+    columns.emplace(name.substr(prefix.size()), std::move(column));
+  }
+}
+
+void read_surface(const vtu::File& file, const Metadata& metadata, Body& body) {
+  Surface& surface = body.surface;
+  surface.vertices = file.read<Vec3>(Section::field, names::surface_vertices);
+  surface.polygon_offsets = file.read<std::uint32_t>(Section::field, names::surface_polygon_offsets);
+  surface.polygon_vertices = file.read<std::uint32_t>(Section::field, names::surface_polygon_vertices);
+  surface.polygon_face = file.read<std::uint32_t>(Section::field, names::surface_polygon_face);
+  for (const std::uint32_t part : file.read<std::uint32_t>(Section::field, names::surface_face_part))
+    surface.faces.push_back({"", part});
+  for (const auto& [face, name] : metadata.face_names) {
+    if (face >= surface.faces.size())
+      file.fail(fmt::format("damaged: flexel_metadata: face_names names face {}", face));
+    surface.faces[face].name = name;
+  }
+  body.surface_cell_offsets = file.read<std::uint32_t>(Section::field, names::surface_cell_offsets);
+  body.surface_cells = file.read<std::uint32_t>(Section::field, names::surface_cells);
+  read_sources(file, metadata, surface);
+  read_surface_columns(file, names::surface_vertex_columns, surface.vertex_columns);
+  read_surface_columns(file, names::surface_polygon_columns, surface.polygon_columns);
+}
+
+void read_columns(const vtu::File& file, Section section, std::size_t count, Columns& columns) {
+  for (const std::string& name : file.names(section)) {
+    if (names::reserved(name, section)) continue;
+    if (!names::valid_column(name, section))
+      file.fail(fmt::format("damaged: \"{}\" is not the name of a column", name));
+    Column column;
+    column.components = static_cast<int>(file.components(section, name));
+    column.values = file.read_flat(section, name);
+    column.values.resize(count * file.components(section, name));
+    columns.emplace(name, std::move(column));
+  }
+}
+
+// VTK's connectivity -> cells; `Index` is the type that the file has.
+template <class Index>
+void read_connectivity(const vtu::File& file, std::size_t cells, Body& body) {
+  const std::vector<Index> indices = file.read<Index>(Section::cells, names::connectivity);
+  if (indices.size() != 8 * cells + (file.cells() - cells))
+    file.fail(
+        fmt::format("damaged: cells \"connectivity\" has {} entries for {} cells", indices.size(), cells));
+  const Index most = static_cast<Index>(body.element_count());
+  const auto begin = indices.begin();
+  if (std::any_of(begin, begin + 8 * cells, [most](Index e) { return e < 0 || e >= most; }))
+    file.fail("damaged: cells \"connectivity\" names an element that is not there");
+  body.cell_elements.resize(cells);
+  parallel_for_each(cells, [&](std::size_t c) {
+    for (std::size_t v = 0; v < 8; ++v)
+      body.cell_elements[c][names::vtk_corner[v]] = static_cast<std::uint32_t>(indices[8 * c + v]);
+  });
+}
+
+void read_elements(const vtu::File& file, Body& body) {
+  body.position = file.read<Vec3>(Section::points, names::position);
+  body.rest = file.read<Vec3>(Section::point_data, names::rest);
+  body.lattice_index = file.read<Index3>(Section::point_data, names::lattice_index);
+  body.piece = file.read<std::uint16_t>(Section::point_data, names::piece);
+  body.connections = file.read<std::uint32_t>(Section::point_data, names::connections);
+  read_columns(file, Section::point_data, body.element_count(), body.element_columns);
+}
+
+void read_cells(const vtu::File& file, Body& body) {
+  const std::size_t cells = body.parts.empty() ? 0 : body.parts.back().cell_end;
+  if (cells > file.cells())
+    file.fail(fmt::format("damaged: there are {} cells for the parts' {}", file.cells(), cells));
+  if (file.type(Section::cells, names::connectivity) == vtu::type_name<std::int32_t>())
+    read_connectivity<std::int32_t>(file, cells, body);
+  else
+    read_connectivity<std::int64_t>(file, cells, body);
+  body.fill = file.read<double>(Section::cell_data, names::fill);
+  body.broken = file.read<std::uint8_t>(Section::cell_data, names::broken);
+  body.fill.resize(cells);
+  body.broken.resize(cells);
+  read_columns(file, Section::cell_data, cells, body.cell_columns);
+}
+
+}  // namespace
+
+Body read_body(const std::string& path) {
+  return read_body(read_all(path), path == "-" ? "stdin" : path);
+}
+
+Body read_body(Bytes bytes, const std::string& where) {
+  if (!looks_like_body(bytes))
+    throw InputError(where,
+                     "is not a body file: one written by flexel-voxelize or flexel-simulate is needed");
+  const vtu::File file(std::move(bytes), where);
+  require_version(file);
+  Metadata metadata = read_metadata(file, where);
+  Body body = std::move(metadata.body);
+  read_elements(file, body);
+  read_cells(file, body);
+  if (metadata.with_surface) read_surface(file, metadata, body);
+  check(body, where);
+  return body;
+}
+
+bool looks_like_body(std::span<const std::byte> bytes) {
+  constexpr std::size_t kHead = 1024;
+  std::string_view head(reinterpret_cast<const char*>(bytes.data()), std::min(bytes.size(), kHead));
+  head.remove_prefix(std::min(head.find_first_not_of(" \t\r\n"), head.size()));
+  return (head.starts_with("<?xml") || head.starts_with("<VTKFile")) && head.find("<VTKFile") != head.npos &&
+         head.find("\"UnstructuredGrid\"") != head.npos;
+}
+
+}  // namespace flexel

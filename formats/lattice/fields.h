@@ -1,0 +1,45 @@
+// Figures of a deformed body that every stage and picture gives alike: each is of the part's matter, never of
+// an element that only carries matter beside it.
+#pragma once
+#include <optional>
+#include <vector>
+
+#include "formats/lattice/locate.h"
+
+namespace flexel {
+
+// (elements) 1: it lies in the part's matter or on its surface: an element of a whole cell (fill 1), and
+// every element at centre placement.
+[[nodiscard]] std::vector<std::uint8_t> elements_in_matter(const Body& body);
+
+// (vertices) A polygon around each vertex of the surface under which a cell lies, the first; kNoPolygonAround
+// where there is none.
+constexpr std::uint32_t kNoPolygonAround = 0xffffffffu;
+[[nodiscard]] std::vector<std::uint32_t> polygons_around_vertices(const Body& body);
+
+struct LargestDisplacement {
+  Vec3 displacement = Vec3::Zero();  // m
+  Vec3 at = Vec3::Zero();            // m, at rest
+  [[nodiscard]] double value() const { return displacement.norm(); }
+};
+
+// The largest displacement of the part's matter: of the elements that lie in it and of the vertices of its
+// surface, each moved by the cell that carries it (trilinear weights). `displacement`: (elements x 3) m. Of
+// equal ones the first. A body without a surface and without a whole cell: of all elements.
+[[nodiscard]] LargestDisplacement largest_displacement(const Body& body,
+                                                       const std::vector<Vec3>& displacement);
+// Of the body's own positions.
+[[nodiscard]] LargestDisplacement largest_displacement(const Body& body);
+
+// Equivalent (von Mises) logarithmic strain of a deformation gradient F, sqrt(2/3 e : e) with e the deviator
+// of 1/2 ln(F^T F); NaN where F has no inverse or is turned inside out.
+[[nodiscard]] double equivalent_strain(const Mat3& gradient);
+
+// (cells) That of each cell's mean deformation gradient; or, of a body without cells, (elements) of a
+// gradient fitted to the element's connections by least squares. NaN where there is none.
+[[nodiscard]] std::vector<double> strains(const Body& body);
+
+// The largest of strains() over cells that are not broken; 0 where there is none.
+[[nodiscard]] double largest_strain(const Body& body);
+
+}  // namespace flexel

@@ -1,0 +1,73 @@
+// Appends body to body: every index of the second is shifted by what the first already holds.
+#include "formats/lattice/merge.h"
+
+#include <fmt/format.h>
+
+#include "base/error.h"
+
+namespace flexel {
+namespace {
+
+void append_columns(std::map<std::string, Column>& columns, std::map<std::string, Column>& others,
+                    const char* of) {
+  for (const auto& [name, column] : others)
+    if (!columns.contains(name) || columns[name].components != column.components)
+      throw InputError(
+          fmt::format("the bodies cannot be merged: only one has the {} attribute \"{}\"", of, name));
+  for (auto& [name, column] : columns) {
+    if (!others.contains(name))
+      throw InputError(
+          fmt::format("the bodies cannot be merged: only one has the {} attribute \"{}\"", of, name));
+    column.values.insert(column.values.end(), others[name].values.begin(), others[name].values.end());
+  }
+}
+
+template <class T>
+void append_all(std::vector<T>& all, const std::vector<T>& more) {
+  all.insert(all.end(), more.begin(), more.end());
+}
+
+void append_surface_cells(Body& body, const Body& other, std::uint32_t cells) {
+  // Either may have none (centre placement): its polygons then bound no cell.
+  body.surface_cell_offsets.resize(body.surface.polygon_count() + 1,
+                                   static_cast<std::uint32_t>(body.surface_cells.size()));
+  const std::uint32_t first = body.surface_cell_offsets.back();
+  for (std::size_t p = 0; p < other.surface.polygon_count(); ++p)
+    body.surface_cell_offsets.push_back(
+        first + (p + 1 < other.surface_cell_offsets.size() ? other.surface_cell_offsets[p + 1] : 0));
+  for (const std::uint32_t cell : other.surface_cells) body.surface_cells.push_back(cell + cells);
+}
+
+}  // namespace
+
+void append(Body& body, Body other) {
+  const auto elements = static_cast<std::uint32_t>(body.element_count());
+  const auto cells = static_cast<std::uint32_t>(body.cell_count());
+  const std::size_t parts = body.parts.size();
+  append_columns(body.element_columns, other.element_columns, "element");
+  append_columns(body.cell_columns, other.cell_columns, "cell");
+  for (Part part : other.parts) {
+    part.element_begin += elements;
+    part.element_end += elements;
+    part.cell_begin += cells;
+    part.cell_end += cells;
+    body.parts.push_back(part);
+  }
+  append_all(body.lattice_index, other.lattice_index);
+  append_all(body.piece, other.piece);
+  append_all(body.rest, other.rest);
+  append_all(body.position, other.position);
+  append_all(body.connections, other.connections);
+  for (auto corners : other.cell_elements) {
+    for (std::uint32_t& corner : corners) corner += elements;
+    body.cell_elements.push_back(corners);
+  }
+  append_all(body.fill, other.fill);
+  append_all(body.broken, other.broken);
+  append_surface_cells(body, other, cells);
+  append(body.surface, std::move(other.surface));
+  for (std::size_t p = parts; p < body.parts.size(); ++p) body.parts[p].name = body.surface.parts[p].name;
+  for (const auto& [key, note] : other.notes) body.notes.try_emplace(key, note);
+}
+
+}  // namespace flexel

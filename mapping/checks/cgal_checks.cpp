@@ -1,0 +1,140 @@
+// Self-intersection: boxes that meet (CGAL's box intersection), then the triangles with exact predicates;
+// only pairs that did not meet at rest are counted. Voronoi: the Delaunay triangulation's edges are the
+// candidates; the facet of an edge is the polygon of the circumcentres of the cells around it.
+#include "mapping/checks/cgal_checks.h"
+
+#include <CGAL/Delaunay_triangulation_3.h>
+#include <CGAL/Delaunay_triangulation_cell_base_3.h>
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Triangulation_vertex_base_with_info_3.h>
+#include <CGAL/box_intersection_d.h>
+#include <CGAL/intersections.h>
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "formats/part/topology.h"
+
+namespace flexel::mapping {
+namespace {
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Point = Kernel::Point_3;
+using Corners = std::array<std::uint32_t, 3>;
+
+Point point(const Vec3& v) {
+  return {v.x(), v.y(), v.z()};
+}
+
+Kernel::Triangle_3 triangle(const std::vector<Vec3>& at, const Corners& t) {
+  return {point(at[t[0]]), point(at[t[1]]), point(at[t[2]])};
+}
+
+bool meet(const std::vector<Vec3>& at, const Corners& a, const Corners& b) {
+  const Kernel::Triangle_3 first = triangle(at, a), second = triangle(at, b);
+  return !first.is_degenerate() && !second.is_degenerate() && CGAL::do_intersect(first, second);
+}
+
+bool share_a_corner(const Corners& a, const Corners& b) {
+  return std::any_of(a.begin(), a.end(),
+                     [&](std::uint32_t v) { return std::find(b.begin(), b.end(), v) != b.end(); });
+}
+
+using Vertex = CGAL::Triangulation_vertex_base_with_info_3<std::uint32_t, Kernel>;
+using Delaunay = CGAL::Delaunay_triangulation_3<
+    Kernel, CGAL::Triangulation_data_structure_3<Vertex, CGAL::Delaunay_triangulation_cell_base_3<Kernel>>>;
+
+constexpr double kSmallFacet = 0.05;  // of the spacing squared
+constexpr double kReach = 1.5;        // spacings
+
+// The four corners of a square of the lattice can make a cell without volume, whose circumcentre is rounding;
+// it lies between those of the cells beside it.
+bool is_sliver(const Delaunay& delaunay, const Delaunay::Cell_handle& cell, double reach) {
+  constexpr double kSliver = 1e-6;  // of the cubed spacing, nearly
+  return std::abs(delaunay.tetrahedron(cell).volume()) < kSliver * reach * reach * reach;
+}
+
+// Area of the Voronoi facet between the ends of `edge`, in m^2.
+double facet_area(const Delaunay& delaunay, const Delaunay::Edge& edge, const Vec3& middle, double reach) {
+  std::vector<Vec3> polygon;
+  auto cell = delaunay.incident_cells(edge);
+  const auto first = cell;
+  do {
+    if (delaunay.is_infinite(cell) || is_sliver(delaunay, cell, reach)) continue;
+    const Point centre = delaunay.dual(cell);
+    Vec3 away = Vec3(centre.x(), centre.y(), centre.z()) - middle;
+    if (!away.allFinite()) continue;
+    if (away.norm() > reach) away *= reach / away.norm();
+    polygon.push_back(away);
+  } while (++cell != first);
+  Vec3 area = Vec3::Zero();
+  for (std::size_t i = 2; i < polygon.size(); ++i)
+    area += (polygon[i - 1] - polygon[0]).cross(polygon[i] - polygon[0]) / 2;
+  return area.norm();
+}
+
+// (elements of the part) the elements, ascending, that each has a large facet with; nothing for elements that
+// hold no vertex.
+std::vector<std::vector<std::uint32_t>> large_neighbours(const Part& part, const std::vector<Vec3>& position,
+                                                         const std::vector<std::uint8_t>& holds) {
+  std::vector<std::pair<Point, std::uint32_t>> points;
+  for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
+    points.emplace_back(point(position[e]), e);
+  const Delaunay delaunay(points.begin(), points.end());
+  std::vector<std::vector<std::uint32_t>> neighbours(part.element_end - part.element_begin);
+  if (delaunay.dimension() < 3) return neighbours;
+  const double spacing = part.lattice.spacing.minCoeff();
+  for (auto edge = delaunay.finite_edges_begin(); edge != delaunay.finite_edges_end(); ++edge) {
+    const std::uint32_t a = edge->first->vertex(edge->second)->info(),
+                        b = edge->first->vertex(edge->third)->info();
+    if (!holds[a] && !holds[b]) continue;
+    const Vec3 middle = (position[a] + position[b]) / 2;
+    if (facet_area(delaunay, *edge, middle, kReach * spacing) < kSmallFacet * spacing * spacing) continue;
+    if (holds[a]) neighbours[a - part.element_begin].push_back(b);
+    if (holds[b]) neighbours[b - part.element_begin].push_back(a);
+  }
+  for (auto& list : neighbours) std::sort(list.begin(), list.end());
+  return neighbours;
+}
+
+}  // namespace
+
+std::size_t new_self_intersections(const Surface& surface, const std::vector<Vec3>& displacement) {
+  using TriangleBox = CGAL::Box_intersection_d::Box_with_info_d<double, 3, std::uint32_t>;
+  Triangles triangles = triangulate(surface);
+  const std::vector<std::uint32_t> welded = weld(surface.vertices);
+  std::vector<Vec3> moved = surface.vertices;
+  for (std::size_t v = 0; v < moved.size(); ++v) moved[v] += displacement[v];
+  std::vector<TriangleBox> boxes;
+  for (std::uint32_t t = 0; t < triangles.corners.size(); ++t) {
+    for (std::uint32_t& v : triangles.corners[t]) v = welded[v];
+    boxes.emplace_back(triangle(moved, triangles.corners[t]).bbox(), t);
+  }
+  std::size_t count = 0;
+  CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const TriangleBox& a, const TriangleBox& b) {
+    const Corners &first = triangles.corners[a.info()], &second = triangles.corners[b.info()];
+    if (!share_a_corner(first, second) && meet(moved, first, second) &&
+        !meet(surface.vertices, first, second))
+      ++count;
+  });
+  return count;
+}
+
+std::vector<std::uint8_t> voronoi_changes(const Body& body, const MapResult& result) {
+  std::vector<std::uint8_t> holds(body.element_count(), 0), changed(body.element_count(), 0);
+  for (std::size_t v = 0; v < result.frame.size(); ++v)
+    if (result.referenced[v]) holds[result.frame_of(v).elements[0]] = 1;
+  for (const Vec3& x : body.position)
+    if (!x.allFinite()) throw InputError("--check voronoi needs a body whose elements have finite positions");
+  for (const Part& part : body.parts) {
+    const auto before = large_neighbours(part, body.rest, holds);
+    const auto after = large_neighbours(part, body.position, holds);
+    for (std::size_t i = 0; i < before.size(); ++i) changed[part.element_begin + i] = before[i] != after[i];
+  }
+  return changed;
+}
+
+}  // namespace flexel::mapping

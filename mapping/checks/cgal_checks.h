@@ -1,0 +1,19 @@
+// Checks that are asked for by name (--check), with CGAL.
+#pragma once
+#include "formats/lattice/body.h"
+#include "mapping/types/result.h"
+
+namespace flexel::mapping {
+
+// Pairs of triangles, without a common corner, that meet in the deformed surface and did not at rest. Corners
+// at equal positions are one. `displacement`: (vertices x 3) m, finite.
+[[nodiscard]] std::size_t new_self_intersections(const Surface& surface,
+                                                 const std::vector<Vec3>& displacement);
+
+// (elements of the body) 1: the element holds a vertex and its neighbours in the Voronoi diagram of its
+// part's elements have changed. Neighbours are those whose common facet is larger than 5 % of the spacing
+// squared, so that the ties of a lattice (facets that are a line or a point) do not count. Facets that reach
+// away from the part are cut off 1.5 spacings from the middle of the two.
+[[nodiscard]] std::vector<std::uint8_t> voronoi_changes(const Body& body, const MapResult& result);
+
+}  // namespace flexel::mapping

@@ -1,0 +1,53 @@
+// Ties every vertex of the surface to a frame of elements, at rest. Done once; apply() then maps any deformed
+// state.
+#pragma once
+#include "mapping/anchors/vertex_anchor.h"
+#include "mapping/methods/blend.h"
+
+namespace flexel::mapping {
+
+struct Binding {
+  MapMethod method = MapMethod::blended;
+  std::vector<Frame> frames;         // distinct
+  std::vector<std::uint32_t> frame;  // (vertices) index into frames
+  // gram_schmidt, affine: (vertices x 3) in the rest base of the frame, m or edges
+  std::vector<Vec3> coordinates;
+  std::vector<Mat3> rest_base;           // gram_schmidt, affine: (frames)
+  Blend blend;                           // blended
+  Groups groups;                         // smooth
+  std::vector<std::uint8_t> referenced;  // (vertices) 1: some polygon uses it
+  Adjacency connections;                 // of the elements, as they are now
+  double rest_residual = 0;              // m, largest distance of a vertex rebuilt at rest from itself
+  double distance_outside = 0;           // in spacings; see MapResult
+};
+
+// Binds the surface that travels in `body`. `states`: how many will be mapped; where there are several,
+// weights are kept (Blend).
+//
+// Corner placement: the origin is the nearest corner of the cell under the vertex, which the polygons around
+// the vertex name (Body::surface_cells): two leaves nearer to each other than a spacing keep to their own
+// elements. Else, and where the polygons name no cell, it is the nearest element of the vertex's part.
+// Vertices at exactly the same position in the same part are bound alike, so that no seam opens. A vertex
+// that no polygon uses takes the nearest element of any part.
+//
+// Throws InputError: the body carries no surface, a part has no elements.
+[[nodiscard]] Binding bind(const Body& body, MapMethod method, std::size_t states = 1);
+// The same with seats that are known: those of a surface that is parted along cracks (mapping/crack/crack.h).
+[[nodiscard]] Binding bind(const Body& body, MapMethod method, VertexAnchors seats, std::size_t states = 1);
+
+// Maps the state `position` (elements x 3, m) onto the vertices: (vertices x 3) m.
+[[nodiscard]] std::vector<Vec3> apply(const Binding& binding, const Body& body,
+                                      const std::vector<Vec3>& position);
+
+// (vertices) bits of MapFlag: what became of the quadruple that holds each vertex, and of the vertex. 0 for
+// vertices that no polygon uses, unless they are not finite.
+[[nodiscard]] std::vector<std::uint8_t> judge(const Binding& binding, const Body& body,
+                                              const std::vector<Vec3>& position,
+                                              const std::vector<Vec3>& displacement);
+
+// apply() and judge(), and what the binding knows of each vertex.
+[[nodiscard]] MapResult map_state(const Binding& binding, const Body& body);
+// What `options` ask for beyond that: vertices far outside, checks by name. Throws InputError: --far refuse.
+void complete(const Body& body, const MapOptions& options, MapResult& result);
+
+}  // namespace flexel::mapping

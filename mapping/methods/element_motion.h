@@ -1,0 +1,36 @@
+// How the matter around an element moves, to first order: what `blended` blends.
+#pragma once
+#include "mapping/anchors/frame.h"
+
+namespace flexel::mapping {
+
+// The displacement around an element: u(x) = displacement + gradient (x - rest position of the element).
+struct ElementMotion {
+  Vec3 displacement = Vec3::Zero();  // m
+  Mat3 gradient = Mat3::Zero();      // F - I
+};
+
+// Elements whose motion is wanted, and how each is to be found. By least squares over the elements that it is
+// connected with, weighted by 1 / distance^2; where those do not span space (normalised determinant of their
+// moments below that of a quadruple that is taken), by the affine frame of the paper's quadruple, which
+// widens, or falls back to a plane, a line or a rigid frame.
+struct MovingElements {
+  std::vector<std::uint32_t> elements;  // ascending
+  std::vector<std::uint32_t> slot_of;   // (elements of the body) index into `elements`; kNoSlot
+  std::vector<Mat3> inverse_moments;    // (elements) of the edges at rest over their lengths; 0 with a frame
+  std::vector<std::uint32_t> frame;     // (elements) index into frames; kNoSlot: least squares
+  std::vector<Frame> frames;
+};
+constexpr std::uint32_t kNoSlot = 0xffffffffu;
+
+// `wanted` may hold an element more than once.
+[[nodiscard]] MovingElements find_moving_elements(const Body& body, const Adjacency& connections,
+                                                  const std::vector<std::uint32_t>& wanted);
+
+// (moving.elements) The motions in the state `position` (elements of the body x 3, m): exactly zero where
+// neither an element nor what it is connected with moved.
+[[nodiscard]] std::vector<ElementMotion> element_motions(const MovingElements& moving, const Body& body,
+                                                         const Adjacency& connections,
+                                                         const std::vector<Vec3>& position);
+
+}  // namespace flexel::mapping

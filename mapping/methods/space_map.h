@@ -1,0 +1,57 @@
+// The deformation as a map of space: phi(x) with its first derivatives at any point in or near the part, as
+// `blended` takes vertices there. Twice continuously differentiable, for fitting curves and surfaces to
+// (STEP).
+#pragma once
+#include <memory>
+#include <optional>
+
+#include "base/bucket.h"
+#include "mapping/anchors/nearest.h"
+#include "mapping/anchors/vertex_batches.h"
+#include "mapping/methods/element_motion.h"
+
+namespace flexel::mapping {
+
+class SpaceMap {
+ public:
+  // The state body.position. `body` must outlive this and stay as it is. Throws InputError: a part without
+  // elements.
+  explicit SpaceMap(const Body& body);
+
+  struct Value {
+    Vec3 position = Vec3::Zero();      // phi(x), m
+    Mat3 gradient = Mat3::Identity();  // d phi / d x; a determinant of 0 or less: space is folded there
+    bool heard = true;  // false: farther than kBlendRadius from every element, carried by the nearest frame
+  };
+
+  // Evaluates points; keeps what it gathered for the cell of the last one. One for each thread. It must not
+  // outlive the map.
+  class Probe {
+   public:
+    explicit Probe(const SpaceMap& map) : map_(map), finder_(map.connections_) {}
+    // `x` (m, world frame, at rest) of part `part`. `polygon`: of the surface, near which x lies; it tells
+    // which piece is meant where two walls are nearer to each other than a spacing.
+    [[nodiscard]] Value at(const Vec3& x, std::uint32_t part, std::optional<std::size_t> polygon = {});
+
+   private:
+    void gather(const Group& group);
+    [[nodiscard]] Value nearest(const Vec3& x) const;
+    [[nodiscard]] Value blend(const Vec3& x) const;
+    const SpaceMap& map_;
+    ReachFinder finder_;
+    Group group_;
+    bool gathered_ = false;
+    std::vector<std::uint32_t> elements_;
+    std::vector<std::uint8_t> from_;
+  };
+
+ private:
+  [[nodiscard]] Group group_at(const Vec3& x, std::uint32_t part, std::optional<std::size_t> polygon) const;
+  const Body& body_;
+  Adjacency connections_;
+  Buckets<std::uint32_t> cells_of_;                  // (elements) cells around each
+  std::vector<ElementMotion> motions_;               // (elements)
+  std::vector<std::unique_ptr<ElementGrid>> grids_;  // (parts)
+};
+
+}  // namespace flexel::mapping

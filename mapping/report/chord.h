@@ -1,0 +1,21 @@
+// How far the deformation lies from the flat triangles that show it.
+#pragma once
+#include "formats/lattice/body.h"
+#include "mapping/types/result.h"
+
+namespace flexel::mapping {
+
+// Triangles that miss more than this share of the largest displacement are too coarse.
+constexpr double kCoarseShare = 0.05;
+
+// Looks at points of every triangle with an edge of over two spacings, which is what a lattice can bend; of
+// shorter ones nothing is counted. Points are carried as `blended` carries vertices, whatever the method.
+// Triangles that are stretched across a fracture are left out (CrackReport::spanning_triangles has them).
+[[nodiscard]] ChordError chord_error(const Body& body, const MapResult& result);
+
+// Edges [m] with which the mesh would show the deformation: the share that is missed falls to a quarter of a
+// percent where it goes with the square of the edge, and below kCoarseShare where a kink lets it go with the
+// edge itself.
+[[nodiscard]] double sufficient_edge(const ChordError& error);
+
+}  // namespace flexel::mapping

@@ -1,0 +1,42 @@
+// How a deformation is to be mapped.
+#pragma once
+#include <cstdint>
+#include <string>
+
+namespace flexel::mapping {
+
+// How the elements around a vertex carry it (docs/mapping.md compares them).
+enum class MapMethod {
+  gram_schmidt,  // the paper's: the orthonormal base of four elements
+  affine,        // the edges of the same four elements
+  blended,       // the frames of all elements around, blended with two continuous derivatives
+  smooth,        // moving least squares, quadratic
+};
+
+// What holds a vertex. Later kinds are what is left when no four close elements span space.
+enum class FrameKind : std::uint8_t { full, plane, line, rigid };
+
+// "gram-schmidt", "affine", "blended" or "smooth"; InputError for any other word, with the nearest.
+[[nodiscard]] MapMethod map_method(const std::string& name);
+[[nodiscard]] std::string name_of(MapMethod method);
+
+// What becomes of vertices that lie too far outside the lattice.
+enum class FarVertices {
+  follow,  // their frames, extrapolated: a distance blows up what the elements say
+  rigid,   // the rotation of the frame of their origin, without its stretch
+  refuse,
+};
+// "follow", "rigid" or "refuse"; InputError for any other word, with the nearest.
+[[nodiscard]] FarVertices far_vertices(const std::string& name);
+
+struct MapOptions {
+  MapMethod method = MapMethod::blended;
+  FarVertices far = FarVertices::follow;
+  double far_distance = 3;          // in spacings, beyond half a voxel's diagonal from the nearest element
+  bool check_voronoi = false;       // compares the Voronoi neighbours of every origin
+  bool check_intersection = false;  // counts new self-intersections of the surface
+};
+// "voronoi" or "self-intersection", several with commas; InputError for any other word, with the nearest.
+void add_checks(MapOptions& options, const std::string& names);
+
+}  // namespace flexel::mapping

@@ -1,0 +1,34 @@
+// What the effects that live inside the hot kernel ask of a timed run. Filled by their `compose` hooks,
+// before the stepper is made.
+#pragma once
+#include <cmath>
+#include <limits>
+#include <vector>
+
+namespace flexel::simulate {
+
+struct PlasticFlow {
+  double yield = std::numeric_limits<double>::infinity();  // Pa; infinity: elastic
+  double hardening = 0;                                    // Pa
+};
+
+struct FractureLimits {                                         // infinity: none
+  double strength = std::numeric_limits<double>::infinity();    // Pa
+  double elongation = std::numeric_limits<double>::infinity();  // plastic strain
+  [[nodiscard]] bool any() const { return std::isfinite(strength) || std::isfinite(elongation); }
+};
+
+struct KernelEffects {
+  std::vector<double> damping;                // (parts) s, the time tau of the internal damping; 0: none
+  std::vector<PlasticFlow> plasticity = {};   // (parts); empty: none
+  std::vector<FractureLimits> fracture = {};  // (parts); empty: none
+  bool broken_springs = false;  // the body remembers springs that broke (simulate/models/rest_shape.h)
+  bool rest_shapes = false;     // cells have rest shapes of their own (simulate/models/rest_shape.h)
+
+  // Whether the elastic energy of the cells is another than that of the lattice's shape, unbroken.
+  [[nodiscard]] bool remembers() const {
+    return !plasticity.empty() || !fracture.empty() || rest_shapes || broken_springs;
+  }
+};
+
+}  // namespace flexel::simulate

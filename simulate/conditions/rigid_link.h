@@ -1,0 +1,40 @@
+// A rigid link: selected matter that moves as one rigid body, driven by a force and a couple at a point
+// (RBE2).
+//
+// The matter is tied (effects/ties.h) to a rigid motion whose six numbers nobody gives: a displacement of the
+// matter's middle and a rotation about it. The solver looks for those under which the ties pull with the
+// force and the couple (simulate/equilibrium/rigid_link_equilibrium.h).
+#pragma once
+#include <cmath>
+#include <string>
+
+#include "base/math/vec.h"
+
+namespace flexel::simulate {
+
+struct RigidLink {
+  std::string name, origin;  // of its load; "beam.toml:12"
+  // Given. Dead: force and couple keep their direction where the link turns, and act at `at`, which goes
+  // along.
+  Vec3 at = Vec3::Zero();                            // m, rest
+  Vec3 force = Vec3::Zero(), torque = Vec3::Zero();  // N, N m: the whole load
+  Vec3 middle = Vec3::Zero();                        // m, rest: of the matter
+  double reach = 1;                                  // m: how far the matter extends around it
+  // Found
+  Vec3 translation = Vec3::Zero();  // m, of `middle`
+  Vec3 turn = Vec3::Zero();         // rad: rotation vector
+  // Told by the ties: what they pull the matter with, the moment about the middle where it is now
+  Vec3 pull = Vec3::Zero(), pull_moment = Vec3::Zero();  // N, N m
+
+  // Displacement [m] of the material point that rested at `rest`.
+  [[nodiscard]] Vec3 displacement(const Vec3& rest) const {
+    const double angle = turn.norm();
+    if (angle == 0) return translation;
+    // (R - I) arm by half angles: no cancellation for a small angle.
+    const Vec3 axis = turn / angle, across = axis.cross(rest - middle);
+    const double sine = std::sin(0.5 * angle), cosine = std::cos(0.5 * angle);
+    return translation + 2 * sine * (cosine * across + sine * axis.cross(across));
+  }
+};
+
+}  // namespace flexel::simulate

@@ -1,0 +1,400 @@
+// Products go over the chunks of simulate/kernels/chunk_layout.h: a chunk writes the rows of the elements that it owns
+// and hands over what it adds to those that it shares; those are summed in a fixed order. Rows are made for
+// each element from the cells around it, in ascending order, so neither depends on the threads.
+// Everything about a cell is in its lattice's frame; a row's blocks are turned to the world's at its end.
+#include "simulate/equilibrium/cell_stiffness.h"
+
+#include <algorithm>
+
+#include "base/instruction_set.h"
+#include "base/parallel.h"
+#include "simulate/equilibrium/pass_matrix.h"
+#include "simulate/kernels/scratch.h"
+#include "simulate/models/corner_barrier.h"
+#include "simulate/models/prepared_cell.h"
+
+namespace flexel::simulate {
+namespace {
+
+using step::kLanes;
+using step::TangentForm;
+
+const step::ProductTable& product_table() {
+#if defined(__x86_64__)
+  return best_table(&step::products_portable, &step::products_avx2, &step::products_avx512);
+#else
+  return step::products_portable();
+#endif
+}
+
+StepLayout layout_of(const Problem& problem) {
+  KernelEffects plan;
+  plan.damping.assign(problem.body.parts.size(), 0);
+  plan.rest_shapes = true;  // so that it says which cell each lane holds
+  return step_layout(problem, plan);
+}
+
+// Whether rows `e` and `other` hold the same blocks of cells at rest at the same places: inside a part most
+// do.
+bool same_row(const StiffnessPattern& pattern, const std::vector<std::uint32_t>& part,
+              const std::vector<double>& share, std::size_t e, std::size_t other) {
+  const auto cells = pattern.stencil.of(static_cast<std::uint32_t>(e));
+  const auto others = pattern.stencil.of(static_cast<std::uint32_t>(other));
+  const auto& offsets = pattern.matrix.row_offsets;
+  if (offsets[e + 1] - offsets[e] != offsets[other + 1] - offsets[other]) return false;
+  return std::equal(
+      cells.begin(), cells.end(), others.begin(), others.end(), [&](const Incidence& a, const Incidence& b) {
+        const std::uint16_t* slot = pattern.stencil.slot[a.cell].data() + 8 * a.corner;
+        return a.corner == b.corner && share[a.cell] == share[b.cell] && part[a.cell] == part[b.cell] &&
+               std::equal(slot, slot + 8, pattern.stencil.slot[b.cell].data() + 8 * b.corner);
+      });
+}
+
+constexpr int kStressOf[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}};
+
+}  // namespace
+
+bool CellStiffness::fits(const Problem& problem, const PaperModel& paper) {
+  const auto cells = [](Model model) { return model == Model::cells; };
+  return problem.body.cell_count() > 0 && paper.rows().entries.empty() &&
+         std::find(paper.active().begin(), paper.active().end(), 1) == paper.active().end() &&
+         std::all_of(problem.models.begin(), problem.models.end(), cells) && !RestShapes(problem.body).any();
+}
+
+CellStiffness::CellStiffness(const Problem& problem, const StiffnessPattern& pattern,
+                             const std::vector<Pass>& passes)
+    : body_(problem.body),
+      pattern_(pattern),
+      layout_(layout_of(problem)),
+      kernels_(&product_table()),
+      active_(active_cells(problem)),
+      part_(cell_parts(problem.body)),
+      share_(stiffness_shares(problem.body)),
+      place_(problem.body.cell_count()),
+      added_(matrix_of_passes(problem.body, pattern.matrix, passes)),
+      shared_force_(3 * layout_.shared.size()) {
+  for (std::size_t block = 0; block < layout_.block_cells.size(); ++block)
+    for (std::size_t lane = 0; lane < kLanes; ++lane)
+      if (const std::uint32_t cell = layout_.block_cells[block][lane]; cell != StepLayout::kNoCell)
+        place_[cell] = static_cast<std::uint32_t>(block * kLanes + lane);
+  for (std::size_t p = 0; p < body_.parts.size(); ++p) {
+    Lattice straight = body_.parts[p].lattice;
+    PartKind made{{}, cell_kind(straight, problem.materials[p]), straight.axes, {}};
+    for (std::size_t ab = 0; ab < 64; ++ab) made.at_rest[ab] = tangent_block(made.turned, {}, ab / 8, ab % 8);
+    straight.axes = Mat3::Identity();
+    made.kind = cell_kind(straight, problem.materials[p]);
+    kinds_.push_back(made);
+  }
+}
+
+// The columns of one lane.
+void CellStiffness::prepare_lane(std::uint32_t cell, const State& state, const TangentOptions& tangent,
+                                 double* to) const {
+  const PartKind& part = kinds_[part_[cell]];
+  const Mat3& axes = part.axes;
+  CellVectors u;
+  for (std::size_t a = 0; a < 8; ++a)
+    u[a] = axes.transpose() * state.displacement[body_.cell_elements[cell][a]];
+  Mat3 stress;
+  if (tangent.stress) stress = axes.transpose() * (*tangent.stress)[cell] * axes;
+  const PreparedCell prepared = prepare_cell(part.kind, displacement_gradient(part.kind, u), tangent.project,
+                                             tangent.stress ? &stress : nullptr);
+  if (prepared.projected) {
+    for (std::size_t c = 0; c < 81; ++c)
+      to[kLanes * c] =
+          (*prepared.projected)(static_cast<Eigen::Index>(c / 9), static_cast<Eigen::Index>(c % 9));
+    return;
+  }
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      to[kLanes * static_cast<std::size_t>(3 * i + j)] = prepared.tangent.inverse_transpose(i, j);
+      if (prepared.added_stress && j >= i)
+        to[kLanes * static_cast<std::size_t>(10 + kStressOf[i][j])] = (*prepared.added_stress)(i, j);
+    }
+  to[kLanes * 9] = prepared.coupling;
+}
+
+void CellStiffness::find_folding(const State& state, bool project) {
+  constexpr std::size_t kGrain = 4096;
+  std::vector<std::vector<Folding>> found((body_.cell_count() + kGrain - 1) / kGrain);
+  parallel_chunks(body_.cell_count(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t c = begin; c < end; ++c) {
+      if (!active_[c]) continue;
+      const CellKind& kind = kinds_[part_[c]].turned;
+      CellVectors u;
+      for (std::size_t a = 0; a < 8; ++a) u[a] = state.displacement[body_.cell_elements[c][a]];
+      if (far_from_folding(kind, u)) continue;
+      auto blocks = fold_tangent(kind, fold_thresholds(kind, std::nullopt), u, project);
+      if (!blocks) continue;
+      for (Block& block : *blocks) block *= share_[c];
+      found[begin / kGrain].push_back({static_cast<std::uint32_t>(c), *blocks});
+    }
+  });
+  for (const std::vector<Folding>& chunk : found) folding_.insert(folding_.end(), chunk.begin(), chunk.end());
+}
+
+// Null where it does not fold.
+const FoldTangent* CellStiffness::folding_of(std::uint32_t cell) const {
+  const auto at = std::lower_bound(folding_.begin(), folding_.end(), cell,
+                                   [](const Folding& each, std::uint32_t c) { return each.cell < c; });
+  return at != folding_.end() && at->cell == cell ? &at->blocks : nullptr;
+}
+
+void CellStiffness::linearise(const State& state, const TangentOptions& tangent) {
+  std::fill(added_.values.begin(), added_.values.end(), Block::Zero());
+  adding_.reset();
+  folding_.clear();
+  mask_.clear();
+  held_.clear();
+  const bool rest = std::all_of(state.displacement.begin(), state.displacement.end(),
+                                [](const Vec3& u) { return u == Vec3::Zero(); });
+  form_ = rest && !tangent.stress              ? TangentForm::at_rest
+          : tangent.project && !tangent.stress ? TangentForm::moduli
+                                               : TangentForm::deformed;
+  const std::size_t width = kLanes * step::kTangentColumns[static_cast<std::size_t>(form_)];
+  tangents_.assign(width * layout_.blocks.size(), 0);
+  if (form_ == TangentForm::at_rest) {
+    tangents_.shrink_to_fit();
+    return;
+  }
+  find_folding(state, tangent.project);
+  parallel_for_each(
+      layout_.blocks.size(),
+      [&](std::size_t block) {
+        for (std::size_t lane = 0; lane < kLanes; ++lane)
+          if (const std::uint32_t cell = layout_.block_cells[block][lane]; cell != StepLayout::kNoCell)
+            prepare_lane(cell, state, tangent, tangents_.data() + width * block + lane);
+      },
+      64);
+}
+
+void CellStiffness::eliminate_prescribed(const Constraints& constraints) {
+  if (!mask_.empty()) return;
+  for (std::uint32_t e = 0; e < constraints.mask.size(); ++e)
+    if (constraints.mask[e]) held_.push_back(e);
+  if (held_.empty()) return;
+  held_diagonal_.resize(held_.size());
+  const std::vector<Block> own = diagonal();
+  for (std::size_t h = 0; h < held_.size(); ++h)
+    for (int axis = 0; axis < 3; ++axis) {
+      const double value = own[held_[h]](axis, axis);
+      held_diagonal_[h][axis] = value > 0 ? value : 1;
+    }
+  mask_ = constraints.mask;
+}
+
+void CellStiffness::products_of_cells(const double* x, double* y) const {
+  const std::size_t doubles = step::kProductColumns * step::scratch_stride(layout_.largest_chunk) +
+                              step::kScratchAlignment / sizeof(double);
+  const auto form = static_cast<std::size_t>(form_);
+  const std::size_t width = kLanes * step::kTangentColumns[form];
+  parallel_for_each(
+      layout_.chunks.size(),
+      [&](std::size_t i) {
+        thread_local std::vector<double> scratch;
+        if (scratch.size() < doubles) scratch.resize(doubles);
+        const StepLayout::Chunk& chunk = layout_.chunks[i];
+        step::ChunkView view = {};
+        view.blocks = const_cast<step::CellBlock*>(layout_.blocks.data()) + chunk.block_begin;  // only read
+        view.block_count = chunk.block_end - chunk.block_begin;
+        view.corners = layout_.corners.data() + chunk.corner_begin;
+        view.elements = layout_.elements.data() + chunk.element_begin;
+        view.count = chunk.element_end - chunk.element_begin;
+        view.owned = layout_.owned.data() + chunk.owned_begin;
+        view.owned_count = chunk.owned_end - chunk.owned_begin;
+        view.shared = layout_.shared.data() + chunk.shared_begin;
+        view.shared_count = chunk.shared_end - chunk.shared_begin;
+        view.shared_force = shared_force_.data() + 3 * chunk.shared_begin;
+        view.constants = &layout_.constants[chunk.kind];
+        kernels_->of[form](view, tangents_.data() + width * chunk.block_begin, x, y,
+                           step::first_aligned(scratch));
+      },
+      1);
+  parallel_for_each(layout_.shared_elements.size(), [&](std::size_t i) {
+    double* to = y + 3 * std::size_t{layout_.shared_elements[i]};
+    to[0] = to[1] = to[2] = 0;
+    for (std::uint32_t s = layout_.slot_offsets[i]; s < layout_.slot_offsets[i + 1]; ++s)
+      for (std::size_t c = 0; c < 3; ++c) to[c] += shared_force_[3 * std::size_t{layout_.slots[s]} + c];
+  });
+  for (const std::uint32_t e : layout_.lone_elements)
+    for (std::size_t c = 0; c < 3; ++c) y[3 * std::size_t{e} + c] = 0;
+}
+
+CellStiffness::Adding CellStiffness::adding() const {
+  Adding result;
+  for (std::uint32_t e = 0; e < body_.element_count(); ++e) {
+    const std::size_t before = result.columns.size();
+    for (std::uint64_t q = added_.row_offsets[e]; q < added_.row_offsets[e + 1]; ++q)
+      if (added_.values[q] != Block::Zero()) {
+        result.columns.push_back(added_.columns[q]);
+        result.values.push_back(added_.values[q]);
+      }
+    if (result.columns.size() == before) continue;
+    result.rows.push_back(e);
+    result.offsets.push_back(before);
+  }
+  result.offsets.push_back(result.columns.size());
+  return result;
+}
+
+void CellStiffness::multiply(const double* x, double* y) const {
+  const double* from = x;
+  if (!held_.empty()) {
+    masked_.resize(3 * body_.element_count());
+    parallel_for_each(masked_.size(),
+                      [&](std::size_t k) { masked_[k] = mask_[k / 3] >> k % 3 & 1 ? 0 : x[k]; });
+    from = masked_.data();
+  }
+  products_of_cells(from, y);
+  for (const Folding& each : folding_) {
+    const auto& elements = body_.cell_elements[each.cell];
+    for (std::size_t ab = 0; ab < 64; ++ab)
+      Eigen::Map<Vec3>(y + 3 * std::size_t{elements[ab / 8]}) +=
+          each.blocks[ab] * Eigen::Map<const Vec3>(from + 3 * std::size_t{elements[ab % 8]});
+  }
+  if (!adding_) adding_ = adding();
+  parallel_for_each(adding_->rows.size(), [&](std::size_t r) {
+    Vec3 sum = Vec3::Zero();
+    for (std::uint64_t q = adding_->offsets[r]; q < adding_->offsets[r + 1]; ++q)
+      sum += adding_->values[q] * Eigen::Map<const Vec3>(from + 3 * std::size_t{adding_->columns[q]});
+    Eigen::Map<Vec3>(y + 3 * std::size_t{adding_->rows[r]}) += sum;
+  });
+  for (std::size_t h = 0; h < held_.size(); ++h)
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      if (mask_[held_[h]] >> axis & 1) {
+        const std::size_t k = 3 * std::size_t{held_[h]} + axis;
+        y[k] = held_diagonal_[h][static_cast<Eigen::Index>(axis)] * x[k];
+      }
+}
+
+void CellStiffness::deformed_blocks(const PartKind& part, const double* from, double share, std::size_t a,
+                                    std::size_t begin, std::size_t end, Block* out) const {
+  const CellKind& kind = part.kind;
+  if (form_ == TangentForm::moduli) {
+    Mat9 moduli;
+    for (std::size_t c = 0; c < 81; ++c)
+      moduli(static_cast<Eigen::Index>(c / 9), static_cast<Eigen::Index>(c % 9)) = from[kLanes * c];
+    for (std::size_t b = begin; b < end; ++b) out[b] = share * projected_block(kind, moduli, a, b);
+    return;
+  }
+  Mat3 g, added;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      g(i, j) = from[kLanes * static_cast<std::size_t>(3 * i + j)];
+      added(i, j) = from[kLanes * static_cast<std::size_t>(10 + kStressOf[i][j])];
+    }
+  const double scale = share * kind.volume / 16;
+  std::array<Vec3, 8> w;
+  for (std::size_t b = 0; b < 4; ++b) {
+    w[b] = g * kind.gradient[b];
+    w[7 - b] = -w[b];
+  }
+  const Vec3 symmetric = (scale * kind.lambda) * w[a], swapped = (scale * from[kLanes * 9]) * w[a];
+  const Vec3 stressed = scale * (added * kind.gradient[a]);
+  for (std::size_t b = begin; b < end; ++b) {
+    out[b].noalias() = symmetric * w[b].transpose();
+    out[b].noalias() += w[b] * swapped.transpose();
+    out[b].diagonal().array() += share * kind.diagonal[8 * a + b] + stressed.dot(kind.gradient[b]);
+  }
+}
+
+void CellStiffness::cell_blocks(const Incidence& at, std::size_t begin, std::size_t end, Block* out) const {
+  const PartKind& part = kinds_[part_[at.cell]];
+  const double share = share_[at.cell];
+  if (form_ == TangentForm::at_rest) {
+    for (std::size_t b = begin; b < end; ++b) out[b] = share * part.at_rest[8 * at.corner + b];
+    return;
+  }
+  const std::size_t width = kLanes * step::kTangentColumns[static_cast<std::size_t>(form_)];
+  const std::uint32_t place = place_[at.cell];
+  deformed_blocks(part, tangents_.data() + width * (place / kLanes) + place % kLanes, share, at.corner, begin,
+                  end, out);
+}
+
+// To the world's frame, where the blocks of cells are in the lattice's.
+void CellStiffness::turn(std::size_t element, Block* block, std::size_t count) const {
+  const std::span<const Incidence> cells = pattern_.stencil.of(static_cast<std::uint32_t>(element));
+  if (form_ == TangentForm::at_rest || cells.empty()) return;
+  const Mat3& axes = kinds_[part_[cells.front().cell]].axes;
+  if (axes == Mat3::Identity()) return;
+  for (std::size_t b = 0; b < count; ++b) block[b] = (axes * block[b] * axes.transpose()).eval();
+}
+
+void CellStiffness::add_effects(std::size_t element, Block* row) const {
+  const std::uint64_t first = row_offsets()[element];
+  for (std::uint64_t q = added_.row_offsets[element]; q < added_.row_offsets[element + 1]; ++q)
+    row[position_of(pattern_.matrix, element, added_.columns[q]) - first] += added_.values[q];
+}
+
+void CellStiffness::eliminate_row(std::size_t element, Block* row) const {
+  const std::uint64_t begin = row_offsets()[element], end = row_offsets()[element + 1];
+  for (std::uint64_t q = begin; q < end; ++q) {
+    const std::uint32_t column = columns()[q];
+    if (!mask_[element] && !mask_[column]) continue;
+    Block& block = row[q - begin];
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        if (!(mask_[element] >> i & 1) && !(mask_[column] >> j & 1)) continue;
+        const bool stays = element == column && i == j;
+        block(i, j) = !stays ? 0 : block(i, j) > 0 ? block(i, j) : 1;
+      }
+  }
+}
+
+const Block* CellStiffness::blocks(std::size_t begin, std::size_t end, std::vector<Block>& room) const {
+  room.resize(row_offsets()[end] - row_offsets()[begin]);
+  thread_local std::vector<Block> last;  // the cells' share of row `made`
+  std::size_t made = end;
+  std::array<Block, 8> own;
+  for (std::size_t e = begin; e < end; ++e) {
+    Block* row = room.data() + (row_offsets()[e] - row_offsets()[begin]);
+    Block* row_end = room.data() + (row_offsets()[e + 1] - row_offsets()[begin]);
+    if (form_ == TangentForm::at_rest && made != end && same_row(pattern_, part_, share_, e, made)) {
+      std::copy(last.begin(), last.end(), row);
+    } else {
+      std::fill(row, row_end, Block::Zero());
+      for (const Incidence& at : pattern_.stencil.of(static_cast<std::uint32_t>(e))) {
+        cell_blocks(at, 0, 8, own.data());
+        const std::uint16_t* slot = pattern_.stencil.slot[at.cell].data() + 8 * at.corner;
+        for (std::size_t b = 0; b < 8; ++b) row[slot[b]] += own[b];
+      }
+      turn(e, row, row_offsets()[e + 1] - row_offsets()[e]);
+      last.assign(row, row_end);
+      made = e;
+    }
+    if (!folding_.empty())
+      for (const Incidence& at : pattern_.stencil.of(static_cast<std::uint32_t>(e)))
+        if (const FoldTangent* blocks = folding_of(at.cell))
+          for (std::size_t b = 0; b < 8; ++b)
+            row[pattern_.stencil.slot[at.cell][8 * at.corner + b]] += (*blocks)[8 * at.corner + b];
+    add_effects(e, row);
+    if (!mask_.empty()) eliminate_row(e, row);
+  }
+  return room.data();
+}
+
+std::vector<Block> CellStiffness::diagonal() const {
+  std::vector<Block> diagonal(rows());  // touched first by several threads
+  parallel_for_each(rows(), [&](std::size_t e) {
+    std::array<Block, 8> own;
+    diagonal[e].setZero();
+    for (const Incidence& at : pattern_.stencil.of(static_cast<std::uint32_t>(e))) {
+      cell_blocks(at, at.corner, at.corner + 1, own.data());
+      diagonal[e] += own[at.corner];
+    }
+    turn(e, &diagonal[e], 1);
+    if (!folding_.empty())
+      for (const Incidence& at : pattern_.stencil.of(static_cast<std::uint32_t>(e)))
+        if (const FoldTangent* blocks = folding_of(at.cell)) diagonal[e] += (*blocks)[9 * at.corner];
+    if (added_.row_offsets[e + 1] > added_.row_offsets[e])
+      diagonal[e] += added_.values[diagonal_position(added_, e)];
+    if (!mask_.empty() && mask_[e])
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j)
+          if ((mask_[e] >> i & 1) || (mask_[e] >> j & 1))
+            diagonal[e](i, j) = i != j ? 0 : diagonal[e](i, j) > 0 ? diagonal[e](i, j) : 1;
+  });
+  return diagonal;
+}
+
+}  // namespace flexel::simulate

@@ -1,0 +1,38 @@
+// Equilibrium: Newton's method under load steps that cut themselves.
+#pragma once
+#include <functional>
+#include <optional>
+
+#include "base/program/progress.h"
+#include "simulate/equilibrium/mechanics.h"
+#include "simulate/scene/scene.h"
+
+namespace flexel::simulate {
+
+struct EquilibriumResult {
+  int load_steps = 0, newton_iterations = 0, cg_iterations = 0;
+  double relative_residual = 0;
+  double linear_seconds = 0;
+  bool buckled = false;  // left a branch that was not stable any more
+};
+
+// The rigid motions that the ties leave free at `start`: throws InputError(scene, ...) naming part and
+// motion.
+void refuse_free_motions(Mechanics& mechanics, const State& start, const std::string& scene);
+
+// Elements of centre-placed parts whose connections lie in one plane or line, and that no tie holds across
+// it, resist nothing in that direction: throws InputError(scene, ...) naming part, number and place.
+void refuse_unsupported_elements(Mechanics& mechanics, const State& start, const std::string& scene);
+
+// Moves `state` to equilibrium under the whole load. Throws DivergedError naming load step, iteration, the
+// worst cell and a suggestion; Interrupted and TimeoutError (base/stop.h). `state` is then the last one in
+// equilibrium.
+//
+// `start` is asked for displacements (elements, m) near the equilibrium under the whole load, once, where the
+// linear answer reaches so far that the way there is long; it may be empty, or give nothing.
+using CoarseStart = std::function<std::optional<std::vector<Vec3>>()>;
+[[nodiscard]] EquilibriumResult find_equilibrium(Mechanics& mechanics, State& state,
+                                                 const RunSettings& settings, Progress& progress,
+                                                 const CoarseStart& start = {});
+
+}  // namespace flexel::simulate

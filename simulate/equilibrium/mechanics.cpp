@@ -1,0 +1,203 @@
+// Sums the models and the passes. A pass without a hook is skipped; an effect that the scene does not name
+// has no pass.
+#include "simulate/equilibrium/mechanics.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+
+#include <cmath>
+#include <limits>
+
+#include "base/parallel.h"
+
+namespace flexel::simulate {
+namespace {
+
+constexpr double kHeldFast = 1e-3;             // of a tie's stiffness in its stiffest direction
+constexpr std::size_t kStoredElements = 1000;  // a tangent up to this size is factorised at once anyway
+
+double squared_norm(const std::vector<Vec3>& values) {
+  return parallel_sum<double>(values.size(), [&](std::size_t e) { return values[e].squaredNorm(); });
+}
+
+bool holds_all_directions(const Block& tie) {
+  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(Mat3(tie), Eigen::EigenvaluesOnly);
+  return eigen.eigenvalues()[0] > kHeldFast * eigen.eigenvalues()[2];
+}
+
+// Elements that nothing resists at (of loose crumbs) stay where they are; in time their inertia carries them.
+Constraints initial_constraints(const Problem& problem, const Stencil& stencil, const PaperModel& paper) {
+  const Body& body = problem.body;
+  Constraints constraints;
+  constraints.mask.assign(body.element_count(), 0);
+  constraints.motion.assign(body.element_count(), {0, 0, 0});
+  constraints.motions.push_back({});
+  constraints.courses.push_back({});
+  for (std::uint32_t e = 0; !problem.duration && e < body.element_count(); ++e)
+    if (stencil.of(e).empty() && !paper.active()[e]) constraints.mask[e] = 7;
+  return constraints;
+}
+
+}  // namespace
+
+Mechanics::Mechanics(const Problem& problem, std::vector<Pass> passes, StiffnessStorage storage)
+    : body_(problem.body),
+      paper_(problem),
+      stored_(storage == StiffnessStorage::stored ||
+              (storage == StiffnessStorage::automatic &&
+               (body_.element_count() <= kStoredElements || !CellStiffness::fits(problem, paper_)))),
+      pattern_(
+          stiffness_pattern(problem.body, active_cells(problem), paper_.rows(), coupled(passes), stored_)),
+      cells_(problem, pattern_.stencil),
+      passes_(std::move(passes)),
+      constraints_(initial_constraints(problem, pattern_.stencil, paper_)) {
+  for (const Pass& pass : passes_)
+    if (pass.constrain) pass.constrain(constraints_);
+  if (!stored_) make_tangent(problem);
+  if (stored_) {
+    stored_tangent_ = std::make_unique<StoredMatrix>(pattern_.matrix);
+    tangent_ = stored_tangent_.get();
+  }
+}
+
+// Where a pass adds to elements that it does not pull at, the matrix is stored after all.
+void Mechanics::make_tangent(const Problem& problem) {
+  tangent_ = &made_.emplace(problem, pattern_, passes_);
+  const State rest{std::vector<Vec3>(body_.element_count(), Vec3::Zero()), 1};
+  try {
+    for (const Pass& pass : passes_)
+      if (pass.add_stiffness) pass.add_stiffness(rest, made_->added());
+  } catch (const MissingBlock&) {
+    made_.reset();
+    stored_ = true;
+    pattern_.matrix.values.assign(pattern_.matrix.columns.size(), Block::Zero());
+  }
+}
+
+std::vector<CoupledElements> Mechanics::coupled(const std::vector<Pass>& passes) {
+  std::vector<CoupledElements> groups;
+  for (const Pass& pass : passes) groups.insert(groups.end(), pass.couples.begin(), pass.couples.end());
+  return groups;
+}
+
+double Mechanics::energy(const State& state) {
+  double energy = 0;
+  {
+    const PassTimer timer(cell_seconds_);
+    energy = cells_.energy(state);
+  }
+  {
+    const PassTimer timer(paper_seconds_);
+    energy += paper_.energy(state);
+  }
+  for (Pass& pass : passes_)
+    if (pass.energy) {
+      const PassTimer timer(pass.seconds);
+      energy += pass.energy(state);
+    }
+  return energy;
+}
+
+void Mechanics::add_elastic_forces(const State& state, std::vector<Vec3>& forces) {
+  {
+    const PassTimer timer(cell_seconds_);
+    cells_.add_forces(state, forces);
+  }
+  const PassTimer timer(paper_seconds_);
+  paper_.add_forces(state, forces);
+}
+
+Forces Mechanics::forces(const State& state) {
+  Forces result;
+  std::vector<Vec3> inner(body_.element_count(), Vec3::Zero());
+  result.total.assign(body_.element_count(), Vec3::Zero());
+  for (Pass& pass : passes_)
+    if (pass.add_forces) {
+      const PassTimer timer(pass.seconds);
+      pass.add_forces(state, pass.couples.empty() ? result.total : inner);
+    }
+  add_elastic_forces(state, inner);
+  const double outer = squared_norm(result.total);
+  const double held = parallel_sum<double>(inner.size(), [&](std::size_t e) {
+    double sum = 0;
+    for (int axis = 0; axis < 3; ++axis)
+      if (constraints_.mask[e] >> axis & 1) sum += inner[e][axis] * inner[e][axis];
+    return sum;
+  });
+  result.scale = std::sqrt(outer + held);
+  // Beside an infinite scale every residual would be 0: NaN is below no tolerance.
+  if (!std::isfinite(result.scale)) result.scale = std::numeric_limits<double>::quiet_NaN();
+  parallel_for_each(inner.size(), [&](std::size_t e) { result.total[e] += inner[e]; });
+  return result;
+}
+
+void Mechanics::assemble(const State& state, const TangentOptions& tangent) {
+  {
+    const PassTimer timer(cell_seconds_);
+    if (made_)
+      made_->linearise(state, tangent);
+    else
+      cells_.set_stiffness(state, tangent, pattern_.matrix);
+  }
+  if (!made_) {
+    const PassTimer timer(paper_seconds_);
+    paper_.add_stiffness(state, tangent.project, pattern_.matrix);
+  }
+  for (Pass& pass : passes_)
+    if (pass.add_stiffness) {
+      const PassTimer timer(pass.seconds);
+      pass.add_stiffness(state, added_stiffness());
+    }
+}
+
+void Mechanics::eliminate_prescribed() {
+  if (made_)
+    made_->eliminate_prescribed(constraints_);
+  else
+    eliminate(constraints_, pattern_.matrix);
+}
+
+MostCompressed Mechanics::most_compressed(const State& state) const {
+  MostCompressed most;
+  if (body_.cell_count() > 0) {
+    const SmallestJacobian cell = cells_.smallest_jacobian(state);
+    const std::uint32_t element = body_.cell_elements[cell.cell][0];
+    most = {cell.value, fmt::format("cell {}", cell.cell), body_.rest[element],
+            element_parts(body_)[element]};
+  }
+  if (paper_.rows().entries.empty()) return most;
+  const PaperModel::SmallestVolume at = paper_.smallest_volume(state);
+  if (body_.cell_count() > 0 && most.value <= at.value) return most;
+  return {at.value, fmt::format("element {}", at.element), body_.rest[at.element],
+          element_parts(body_)[at.element]};
+}
+
+std::vector<std::uint8_t> Mechanics::tied_elements() {
+  std::vector<std::uint8_t> tied(body_.element_count(), 0);
+  BlockMatrix& matrix = added_stiffness();
+  std::fill(matrix.values.begin(), matrix.values.end(), Block::Zero());
+  const State rest{std::vector<Vec3>(body_.element_count(), Vec3::Zero()), 1};
+  for (const Pass& pass : passes_)
+    if (pass.add_stiffness && pass.couples.empty()) pass.add_stiffness(rest, matrix);
+  for (std::uint32_t e = 0; e < tied.size(); ++e) {
+    if (constraints_.mask[e] != 0) tied[e] = constraints_.mask[e] == 7 ? 2 : 1;
+    for (std::size_t entry = matrix.row_offsets[e]; entry < matrix.row_offsets[e + 1]; ++entry)
+      if (matrix.columns[entry] == e && matrix.values[entry].diagonal().maxCoeff() > 0)
+        tied[e] = tied[e] == 2 || holds_all_directions(matrix.values[entry]) ? 2 : 1;
+  }
+  return tied;
+}
+
+void Mechanics::report(const State& state, SimulateResult& result) {
+  const Forces unbalanced = forces(state);
+  for (const Pass& pass : passes_)
+    if (pass.report) pass.report(state, unbalanced.total, result);
+  if (body_.cell_count() > 0)
+    result.passes.push_back({"cells", "model of corner-placed parts", cell_seconds_});
+  if (!paper_.rows().entries.empty())
+    result.passes.push_back({"connections", "model of centre-placed parts", paper_seconds_});
+  for (const Pass& pass : passes_) result.passes.push_back({pass.name, pass.why, pass.seconds});
+}
+
+}  // namespace flexel::simulate

@@ -1,0 +1,14 @@
+// What effects (ties, bonds) add to a tangent stiffness whose cells are not stored
+// (simulate/equilibrium/cell_stiffness.h).
+#pragma once
+#include "simulate/effects/effect.h"
+#include "simulate/linear/block_matrix.h"
+
+namespace flexel::simulate {
+
+// A matrix of zeros with the rows and columns of `pattern` that passes add to: those of the elements that
+// they pull at, and of their neighbours.
+[[nodiscard]] BlockMatrix matrix_of_passes(const Body& body, const BlockMatrix& pattern,
+                                           const std::vector<Pass>& passes);
+
+}  // namespace flexel::simulate

@@ -1,0 +1,255 @@
+// The links' motions q (six numbers each, rotations times the reach) are the unknowns of an outer Newton
+// method; for each q the elements' own Newton method brings the body into equilibrium, the links leading
+// their matter there. What a link lacks, b(q) = load - pull, falls to 0 by dq = -(db/dq)^-1 b. The slope is
+// taken from the tangent (a Schur complement): the answer x of the free elements to dq, K x = df/dq, is one
+// linear solution per number with one preconditioner, and db/dq is the difference of b along (x, dq). It is
+// kept as long as it serves and mended by what each step shows (Broyden 1965). So the body's system is as
+// well conditioned as one with held faces, and a small deflection needs one equilibrium and six linear
+// solutions a link. Differences are central; their steps are a 1e-7 of the reach.
+#include "simulate/equilibrium/rigid_link_equilibrium.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <algorithm>
+
+#include "base/error.h"
+#include "base/parallel.h"
+
+namespace flexel::simulate {
+namespace {
+
+constexpr int kMostLinkSteps = 12;    // steps of the links
+constexpr double kLooser = 10;        // tolerance of the links over that of the elements
+constexpr double kServes = 0.1;       // a step that leaves more than this of b: take the slope anew
+constexpr double kAstray = 4;         // ... and more than this: give up
+constexpr double kDifference = 1e-7;  // of the reach
+constexpr double kResponse = 1e-8;    // relative residual of the linear solutions
+constexpr int kMaxLinkCgIterations = 3000;
+// Of the elements' mean stiffness: nothing resists. A cantilever a thousand times as long as thick has that.
+constexpr double kFree = 1e-9;
+
+using LinkVector = Eigen::VectorXd;
+
+std::vector<std::shared_ptr<RigidLink>> rigid_links(const Constraints& constraints) {
+  std::vector<std::shared_ptr<RigidLink>> links;
+  for (const Motion& motion : constraints.motions)
+    if (motion.link) links.push_back(motion.link);
+  return links;
+}
+
+class Balance {
+ public:
+  Balance(Mechanics& mechanics, State& state, const NewtonOptions& options,
+          const std::function<void(const std::string&)>& progress)
+      : mechanics_(mechanics),
+        state_(state),
+        options_(options),
+        progress_(progress),
+        links_(rigid_links(mechanics.constraints())) {}
+
+  NewtonOutcome run();
+
+ private:
+  [[nodiscard]] Eigen::Index unknowns() const { return static_cast<Eigen::Index>(6 * links_.size()); }
+  void move(const LinkVector& step);
+  [[nodiscard]] State led(const std::vector<Vec3>& response, double step) const;
+  LinkVector lacking(const State& state);
+  std::vector<Vec3> free_forces(const State& state);
+  Eigen::MatrixXd slope();
+  bool add_column(const Preconditioner& preconditioner, Eigen::Index j, Eigen::MatrixXd& slope);
+  void correct(Eigen::MatrixXd& slope) const;
+  void refuse_free(const Eigen::MatrixXd& slope) const;
+  bool find();
+
+  Mechanics& mechanics_;
+  State& state_;
+  const NewtonOptions& options_;
+  const std::function<void(const std::string&)>& progress_;
+  std::vector<std::shared_ptr<RigidLink>> links_;
+  NewtonOutcome outcome_;
+  double scale_ = 0;  // N: loads and reactions
+  double stiff_ = 0;  // N/m, mean of the tangent's diagonal
+  // (unknowns) answers of the elements to a unit of each [m/m], and what their linear solutions left [N/m]
+  std::vector<std::vector<Vec3>> response_, left_over_;
+};
+
+void Balance::move(const LinkVector& step) {
+  for (std::size_t l = 0; l < links_.size(); ++l) {
+    const auto at = static_cast<Eigen::Index>(6 * l);
+    links_[l]->translation += step.segment<3>(at);
+    links_[l]->turn += step.segment<3>(at + 3) / links_[l]->reach;
+  }
+}
+
+// `state_`, its free elements moved by step * response, the others led to where the links are.
+State Balance::led(const std::vector<Vec3>& response, double step) const {
+  State result = state_;
+  for (std::size_t e = 0; e < response.size(); ++e) result.displacement[e] += step * response[e];
+  apply(mechanics_.constraints(), mechanics_.body(), result, result.displacement);
+  return result;
+}
+
+// What each link's load has more than its ties pull: force, and moment about the middle over the reach. [N]
+LinkVector Balance::lacking(const State& state) {
+  SimulateResult told;
+  mechanics_.report(state, told);
+  LinkVector result(unknowns());
+  scale_ = 0;
+  for (const AppliedLoad& load : told.loads) scale_ += load.force.norm();
+  for (const Reaction& reaction : told.reactions) scale_ += reaction.force.norm();
+  for (std::size_t l = 0; l < links_.size(); ++l) {
+    const RigidLink& link = *links_[l];
+    const Vec3 arm = link.at - link.middle + link.displacement(link.at) - link.translation;
+    const Vec3 force = state.share * link.force;
+    const Vec3 moment = state.share * link.torque + arm.cross(force);
+    const auto at = static_cast<Eigen::Index>(6 * l);
+    result.segment<3>(at) = force - link.pull;
+    result.segment<3>(at + 3) = (moment - link.pull_moment) / link.reach;
+    scale_ += moment.norm() / link.reach;
+  }
+  return result;
+}
+
+std::vector<Vec3> Balance::free_forces(const State& state) {
+  std::vector<Vec3> forces = mechanics_.forces(state).total;
+  clear_prescribed(mechanics_.constraints(), forces);
+  return forces;
+}
+
+// One column of db/dq. False when the tangent has negative curvature.
+bool Balance::add_column(const Preconditioner& preconditioner, Eigen::Index j, Eigen::MatrixXd& slope) {
+  const double step = kDifference * links_[static_cast<std::size_t>(j / 6)]->reach;
+  const LinkVector along = LinkVector::Unit(unknowns(), j) * step;
+  const std::vector<Vec3> none;
+  move(along);
+  std::vector<Vec3> pushed = free_forces(led(none, 0));
+  move(-2 * along);
+  const std::vector<Vec3> back = free_forces(led(none, 0));
+  move(along);
+  for (std::size_t e = 0; e < pushed.size(); ++e) pushed[e] = (pushed[e] - back[e]) / (2 * step);
+  std::vector<Vec3> response(pushed.size(), Vec3::Zero());
+  const LinearResult solved = conjugate_gradients(
+      mechanics_.tangent(), pushed, response, preconditioner, kResponse, kMaxLinkCgIterations,
+      [&](int iteration, double relative) {
+        progress_(fmt::format("rigid link {}, cg {}, {:.0e}", j / 6 + 1, iteration, relative));
+      });
+  outcome_.cg_iterations += solved.iterations;
+  if (solved.indefinite) return false;
+  move(along);
+  const LinkVector ahead = lacking(led(response, step));
+  move(-2 * along);
+  const LinkVector behind = lacking(led(response, -step));
+  move(along);
+  slope.col(j) = (ahead - behind) / (2 * step);
+  std::vector<Vec3> resisted(pushed.size());
+  multiply(mechanics_.tangent(), response, resisted);
+  for (std::size_t e = 0; e < pushed.size(); ++e) pushed[e] -= resisted[e];
+  response_.push_back(std::move(response));
+  left_over_.push_back(std::move(pushed));
+  return true;
+}
+
+// Makes the slope the energy's second derivative along the answers: what the linear solutions left over
+// enters squared then, and a motion that nothing resists stands out.
+void Balance::correct(Eigen::MatrixXd& slope) const {
+  for (Eigen::Index i = 0; i < unknowns(); ++i)
+    for (Eigen::Index j = 0; j < unknowns(); ++j) {
+      const std::vector<Vec3>& x = response_[static_cast<std::size_t>(i)];
+      const std::vector<Vec3>& r = left_over_[static_cast<std::size_t>(j)];
+      slope(i, j) += parallel_sum<double>(x.size(), [&](std::size_t e) { return x[e].dot(r[e]); });
+    }
+}
+
+// db/dq [N/m], the free elements following. A tangent with negative curvature is taken with the cells' moduli
+// projected to their positive part.
+Eigen::MatrixXd Balance::slope() {
+  const PassTimer timer(outcome_.linear_seconds);
+  Eigen::MatrixXd slope = Eigen::MatrixXd::Zero(unknowns(), unknowns());
+  for (const bool project : {false, true}) {
+    mechanics_.assemble(state_, {project, nullptr});
+    mechanics_.eliminate_prescribed();
+    const auto preconditioner =
+        aggregation_multigrid(mechanics_.tangent(), node_geometry(mechanics_.body(), state_));
+    const std::vector<Block> diagonal = mechanics_.tangent().diagonal();
+    stiff_ = parallel_sum<double>(diagonal.size(), [&](std::size_t e) { return diagonal[e].trace(); }) /
+             (3.0 * static_cast<double>(diagonal.size()));
+    response_.clear();
+    left_over_.clear();
+    bool good = true;
+    for (Eigen::Index j = 0; good && j < unknowns(); ++j) good = add_column(*preconditioner, j, slope);
+    if (!good) continue;
+    correct(slope);
+    break;
+  }
+  response_.clear();
+  left_over_.clear();
+  return slope;
+}
+
+void Balance::refuse_free(const Eigen::MatrixXd& slope) const {
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(slope, Eigen::ComputeFullV);
+  if (svd.singularValues().minCoeff() > kFree * stiff_) return;
+  const LinkVector freest = svd.matrixV().col(unknowns() - 1);
+  Eigen::Index most = 0;
+  freest.cwiseAbs().maxCoeff(&most);
+  throw InputError(
+      links_[static_cast<std::size_t>(most / 6)]->origin,
+      fmt::format(
+          "load \"{}\": nothing holds what its rigid link moves, which is free to {} {}: add a [[fix]] "
+          "that stops it",
+          links_[static_cast<std::size_t>(most / 6)]->name, most % 6 < 3 ? "translate along" : "rotate about",
+          "xyz"[most % 3]));
+}
+
+// Moves the links until nothing is lacking. False when it did not get there.
+bool Balance::find() {
+  LinkVector left = lacking(state_);
+  Eigen::MatrixXd slope;
+  bool serves = false;
+  for (int k = 0; k < kMostLinkSteps; ++k) {
+    if (!serves) {
+      slope = this->slope();
+      refuse_free(slope);
+    }
+    const LinkVector step = -slope.fullPivLu().solve(left);
+    move(step);
+    const NewtonOutcome one = newton(mechanics_, state_, options_, progress_);
+    if (outcome_.iterations == 0) outcome_.first_reach = one.first_reach;
+    outcome_.iterations += one.iterations;
+    outcome_.cg_iterations += one.cg_iterations;
+    outcome_.linear_seconds += one.linear_seconds;
+    outcome_.relative_residual = one.relative_residual;
+    outcome_.trouble = one.trouble;
+    if (!one.converged) return false;
+    const LinkVector now = lacking(state_);
+    if (now.norm() <= kLooser * options_.tolerance * scale_) return true;
+    outcome_.trouble =
+        fmt::format("the rigid link \"{}\" lacks {:.1e} of its load", links_[0]->name, now.norm() / scale_);
+    if (!(now.norm() < kAstray * left.norm())) return false;
+    serves = now.norm() < kServes * left.norm();
+    slope += (now - left - slope * step) * step.transpose() / step.squaredNorm();
+    left = now;
+  }
+  return false;
+}
+
+NewtonOutcome Balance::run() {
+  std::vector<RigidLink> before;
+  for (const auto& link : links_) before.push_back(*link);
+  outcome_.converged = find();
+  if (!outcome_.converged)
+    for (std::size_t l = 0; l < links_.size(); ++l) *links_[l] = before[l];
+  return outcome_;
+}
+
+}  // namespace
+
+NewtonOutcome newton_with_links(Mechanics& mechanics, State& state, const NewtonOptions& options,
+                                const std::function<void(const std::string&)>& progress) {
+  if (rigid_links(mechanics.constraints()).empty()) return newton(mechanics, state, options, progress);
+  return Balance(mechanics, state, options, progress).run();
+}
+
+}  // namespace flexel::simulate

@@ -1,0 +1,14 @@
+// Equilibrium of a body with rigid links (simulate/conditions/rigid_link.h).
+#pragma once
+#include "simulate/equilibrium/newton.h"
+
+namespace flexel::simulate {
+
+// As newton(), with every rigid link where its force and its couple are in balance with what it pulls.
+// Without links it is newton(). On failure the links are where they were. Throws InputError, named for the
+// link, when nothing resists a motion of it.
+[[nodiscard]] NewtonOutcome newton_with_links(Mechanics& mechanics, State& state,
+                                              const NewtonOptions& options,
+                                              const std::function<void(const std::string&)>& progress);
+
+}  // namespace flexel::simulate

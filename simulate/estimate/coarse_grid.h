@@ -1,0 +1,33 @@
+// Where the planes of a coarser lattice lie (simulate/estimate/coarsen.h).
+#pragma once
+#include <vector>
+
+#include "formats/lattice/body.h"
+
+namespace flexel::simulate {
+
+// Pairs of cells that share a face, the lower one first, by axis and ascending; none of broken cells.
+using FacePairs = std::array<std::vector<std::array<std::uint32_t, 2>>, 3>;
+[[nodiscard]] FacePairs face_pairs(const Body& body);
+
+// Coarse planes of one axis at begin + k pitch, in fine spacings.
+struct CoarseGrid {
+  double begin = 0, pitch = 2;
+};
+
+// A cell of the fine lattice at `index` along one axis: the coarse voxels that it overlaps (`voxel` and,
+// where `count` is 2, the next), and how much of it lies in each.
+struct GridCut {
+  std::int32_t voxel = 0;
+  std::uint32_t count = 1;
+  std::array<double, 2> share{1, 0};
+};
+[[nodiscard]] GridCut cut(const CoarseGrid& grid, std::int32_t index);
+
+// By axis, moved so that the first coarse plane at or below all cells has index 0. The pitch is 2 unless
+// another from 1.5 to 3 puts more flat faces of the part on planes; where the axis along which the part is
+// thinnest takes less, the others come near to that. Throws InputError: a part one cell thick.
+[[nodiscard]] std::array<CoarseGrid, 3> choose_grids(const Body& body, const Part& part,
+                                                     const FacePairs& pairs);
+
+}  // namespace flexel::simulate

@@ -1,0 +1,174 @@
+// A probe more than the scene's follows the material point that moved most, so that all lattices are asked
+// about the same point. The largest stress may be elsewhere on each lattice.
+#include "simulate/estimate/error_bars.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "base/error.h"
+#include "base/stop.h"
+#include "formats/lattice/fields.h"
+#include "simulate/estimate/coarsen.h"
+
+namespace flexel::simulate {
+namespace {
+
+constexpr double kThinWall = 2;       // cells
+constexpr double kThinShare = 0.2;    // of the matter
+constexpr int kAddedIterations = 20;  // of Newton, to twice those of the fine run
+// Of the coarse runs: far below the differences between lattices.
+constexpr double kCoarseTolerance = 1e-6;
+
+// What is asked of every lattice.
+struct Answers {
+  std::vector<Vec3> moved;  // m, the probes, then the point that moved most
+  double energy = 0;        // J
+  double stress = 0;        // Pa, the largest
+};
+
+Answers answers(const SimulateResult& result) {
+  Answers found;
+  for (const ProbeResult& probe : result.probes) found.moved.push_back(probe.displacement);
+  found.energy = result.elastic_energy;
+  if (result.stress) found.stress = result.stress->value;
+  return found;
+}
+
+// Ratio of the spacings of two lattices of the same matter.
+double ratio_of(const Body& fine, const Body& coarse) {
+  double volumes = 0, weights = 0;
+  for (std::size_t p = 0; p < fine.parts.size(); ++p) {
+    const double cells = fine.parts[p].cell_end - fine.parts[p].cell_begin;
+    volumes +=
+        cells * std::log(coarse.parts[p].lattice.spacing.prod() / fine.parts[p].lattice.spacing.prod());
+    weights += cells;
+  }
+  return std::exp(volumes / weights / 3);
+}
+
+// The coarser runs, as many as can be done.
+class CoarseRuns {
+ public:
+  CoarseRuns(const Body& body, const Scene& scene, const SimulateOptions& options,
+             const SimulateResult& result, const SolveCoarse& solve)
+      : options_(options), solve_(solve), scene_(scene) {
+    const StopWaits answered;
+    const LargestDisplacement most = largest_displacement(body);
+    Probe probe;
+    probe.name = "largest displacement";
+    probe.at = most.at;
+    scene_.probes.push_back(probe);
+    scene_.run.tolerance = std::max(scene.run.tolerance, kCoarseTolerance);
+    scene_.run.newton_iterations =
+        2 * std::max(result.newton_iterations, result.start_newton_iterations) + kAddedIterations;
+    found_.push_back(answers(result));
+    found_.back().moved.push_back(most.displacement);
+    options_.explain = options_.estimate = false;
+    options_.failed_output.clear();
+  }
+
+  // Adds one lattice; false, with the reason, where it cannot be done. A lattice whose cells are wider than
+  // many walls says nothing: from the second on it is left out.
+  bool add(const Body& finer, Body& coarse, std::string& reason) {
+    try {
+      coarse = coarsened(finer);
+      if (found_.size() > 1 && share_of_thin_walls(coarse, 1) > kThinShare)
+        throw InputError("walls are thinner than its cells");
+      ratio_.push_back(ratio_of(finer, coarse));
+      found_.push_back(answers(solve_(coarse, scene_, options_)));
+    } catch (const InputError& error) {
+      reason = error.what();
+    } catch (const DivergedError& error) {
+      reason = error.what();
+    } catch (const TimeoutError& error) {
+      reason = error.what();
+    }
+    return reason.empty();
+  }
+
+  // The three values of a displacement along that on the finest lattice, or of the energy.
+  [[nodiscard]] Sequence moved(std::size_t which) const {
+    const Vec3& fine = found_[0].moved[which];
+    const double length = fine.norm();
+    return sequence([&](const Answers& each) {
+      return length > 0 ? each.moved[which].dot(fine) / length : each.moved[which].norm();
+    });
+  }
+  [[nodiscard]] Sequence stress() const {
+    return sequence([](const Answers& each) { return each.stress; });
+  }
+  [[nodiscard]] Sequence energy() const {
+    return sequence([](const Answers& each) { return each.energy; });
+  }
+
+ private:
+  template <class Value>
+  [[nodiscard]] Sequence sequence(const Value& value) const {
+    Sequence result;
+    for (std::size_t i = 0; i < 3; ++i) result.value[i] = value(found_[std::min(i, found_.size() - 1)]);
+    for (std::size_t i = 0; i < 2; ++i) result.ratio[i] = ratio_[std::min(i, ratio_.size() - 1)];
+    return result;
+  }
+
+  SimulateOptions options_;
+  const SolveCoarse& solve_;
+  Scene scene_;
+  std::vector<Answers> found_;
+  std::vector<double> ratio_;
+};
+
+std::string first_sentence(const std::string& text) {
+  return text.substr(0, text.find(": add "));
+}
+
+}  // namespace
+
+ErrorBars estimate_errors(const Body& body, const Scene& scene, const SimulateOptions& options,
+                          const SimulateResult& result, const SolveCoarse& solve) {
+  const auto began = std::chrono::steady_clock::now();
+  ErrorBars errors;
+  errors.cells.push_back(body.cell_count());
+  CoarseRuns runs(body, scene, options, result, solve);
+  Body half, quarter;
+  std::string reason;
+  if (!runs.add(body, half, reason)) {
+    errors.note = "a lattice twice as coarse cannot be solved: " + first_sentence(reason);
+    return errors;
+  }
+  errors.cells.push_back(half.cell_count());
+  bool wide = false;
+  if (runs.add(half, quarter, reason)) {
+    errors.cells.push_back(quarter.cell_count());
+    if (const double thin = share_of_thin_walls(body, kThinWall); thin > kThinShare) {
+      wide = true;
+      errors.note = fmt::format(
+          "{:.0f} % of the matter lies in walls under 2 cells: the bars are three times the "
+          "largest difference; use a smaller spacing",
+          100 * thin);
+    }
+  } else {
+    wide = true;
+    errors.note = fmt::format(
+        "a lattice four times as coarse is of no use ({}): the bars are three times the "
+        "only difference",
+        first_sentence(reason));
+  }
+  const auto bar = [&](const Sequence& values) { return wide ? wide_bar(values) : richardson(values); };
+  for (std::size_t p = 0; p <= result.probes.size(); ++p) {
+    const Sequence values = runs.moved(p);
+    const bool probe = p < result.probes.size();
+    errors.bars.push_back({probe ? ErrorBar::Of::probe : ErrorBar::Of::largest_displacement, probe ? p : 0,
+                           probe ? result.probes[p].name : "", values.value[0], bar(values)});
+  }
+  const Sequence energy = runs.energy();
+  errors.bars.push_back({ErrorBar::Of::elastic_energy, 0, "", energy.value[0], bar(energy)});
+  if (const Sequence stress = runs.stress(); !wide && stress.value[0] > 0)
+    errors.von_mises = {stress.value, stress_bar(stress, !result.stress->beside.empty())};
+  errors.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  return errors;
+}
+
+}  // namespace flexel::simulate

@@ -1,0 +1,16 @@
+// Where the largest stress has no limit as the cells get smaller.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "formats/lattice/body.h"
+
+namespace flexel::simulate {
+
+// What lies within `reach` [m] of `at` (m, rest) and makes stresses there grow without bound as cells get
+// smaller (Williams, J. Appl. Mech. 19, 1952): "a support", an element that `tied` (elements) says is held in
+// all directions (2), or "a re-entrant edge" of the surface, turning by more than 30 degrees. "" for neither.
+[[nodiscard]] std::string singular_beside(const Body& body, const std::vector<std::uint8_t>& tied,
+                                          const Vec3& at, double reach);
+
+}  // namespace flexel::simulate

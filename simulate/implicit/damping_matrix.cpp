@@ -1,0 +1,98 @@
+// With F = I + H of a cell and A = sym(F^T dF/dt), its dissipation tau V (lambda tr^2 A + 2 mu A:A) has the
+// blocks
+//     C_ab = tau V / 16 { lambda (F g_a)(F g_b)^T + mu (g_a . g_b) F F^T + mu (F g_b)(F g_a)^T },
+// g the gradients gamma of simulate/models/cell_model.h. The hourglass displacements q_m resist their rate as seen
+// by an observer that turns with the cell, q' = dq/dt - w x q = sum_b B_mb v_b with the spin w = 1/2 sum_b
+// F^-T g_b / 4 x v_b; they add tau c_m B_ma^T B_mb. A spring from a to b along the unit vector d adds tau k d
+// d^T. Each row is gathered by one thread from its cells in ascending order.
+#include "simulate/implicit/damping_matrix.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <optional>
+
+#include "base/math/small_matrices.h"
+#include "base/parallel.h"
+#include "simulate/models/cells.h"
+#include "simulate/models/damping_factors.h"
+#include "simulate/models/rest_shape.h"
+
+namespace flexel::simulate {
+namespace {
+
+Vec3 hourglass(const CellVectors& u, int mode) {
+  Vec3 sum = Vec3::Zero();
+  for (int a = 0; a < 8; ++a) sum += hourglass_sign(mode, a) * u[static_cast<std::size_t>(a)];
+  return sum / 8;
+}
+
+// Row a of one cell's C, over its tau and fill.
+std::array<Mat3, 8> damping_row(const CellKind& kind, const CellVectors& u, std::size_t a) {
+  const Mat3 f = Mat3::Identity() + displacement_gradient(kind, u);
+  const Mat3 turned = f.inverse().transpose(), metric = f * f.transpose();
+  const Vec3 at = f * kind.gradient[a];
+  std::array<Mat3, 8> row;
+  for (std::size_t b = 0; b < 8; ++b) {
+    const Vec3 other = f * kind.gradient[b];
+    row[b] = kind.volume / 16 *
+             (kind.lambda * at * other.transpose() +
+              kind.mu * (kind.gradient[a].dot(kind.gradient[b]) * metric + other * at.transpose()));
+  }
+  for (int mode = 0; mode < 4; ++mode) {
+    const Mat3 arm = cross_matrix(hourglass(u, mode));
+    const auto rate = [&](std::size_t corner) -> Mat3 {
+      return hourglass_sign(mode, static_cast<int>(corner)) / 8 * Mat3::Identity() +
+             arm * cross_matrix(turned * kind.gradient[corner]) / 8;
+    };
+    const Mat3 own = kind.hourglass[static_cast<std::size_t>(mode)] * rate(a).transpose();
+    for (std::size_t b = 0; b < 8; ++b) row[b] += own * rate(b);
+  }
+  return row;
+}
+
+std::array<Mat3, 8> damping_row(const SpringKind& kind, const CellVectors& u, std::size_t a) {
+  std::array<Mat3, 8> row;
+  row.fill(Mat3::Zero());
+  for (const Spring& spring : kind.springs) {
+    if (spring.a != a && spring.b != a) continue;
+    const Vec3 along = (spring.rest + u[spring.b] - u[spring.a]).normalized();
+    const Mat3 block = spring.stiffness * along * along.transpose();
+    row[a] += block;
+    row[spring.a == a ? spring.b : spring.a] -= block;
+  }
+  return row;
+}
+
+}  // namespace
+
+void set_damping(const Problem& problem, const Stencil& stencil, const std::vector<double>& damping,
+                 const std::vector<Vec3>& displacement, BlockMatrix& matrix) {
+  const Body& body = problem.body;
+  const std::vector<std::uint32_t> part = element_parts(body);
+  std::vector<double> share = stiffness_shares(body);
+  const std::vector<double> factor = damping_factors(body);
+  for (std::size_t c = 0; c < factor.size(); ++c) share[c] *= factor[c];
+  std::vector<CellKind> cells;
+  std::vector<std::optional<SpringKind>> springs(body.parts.size());
+  for (std::size_t p = 0; p < body.parts.size(); ++p) {
+    cells.push_back(cell_kind(body.parts[p].lattice, problem.materials[p]));
+    if (problem.models.size() > p && problem.models[p] == Model::springs)
+      springs[p] = spring_kind(body.parts[p].lattice, problem.materials[p]);
+  }
+  parallel_for_each(body.element_count(), [&](std::size_t e) {
+    Block* row = matrix.values.data() + matrix.row_offsets[e];
+    std::fill(row, matrix.values.data() + matrix.row_offsets[e + 1], Block::Zero());
+    const std::uint32_t p = part[e];
+    if (!(damping[p] > 0)) return;
+    for (const Incidence& at : stencil.of(static_cast<std::uint32_t>(e))) {
+      CellVectors u;
+      for (std::size_t a = 0; a < 8; ++a) u[a] = displacement[body.cell_elements[at.cell][a]];
+      const std::array<Mat3, 8> blocks =
+          springs[p] ? damping_row(*springs[p], u, at.corner) : damping_row(cells[p], u, at.corner);
+      const double scale = damping[p] * share[at.cell];
+      for (std::size_t b = 0; b < 8; ++b) row[stencil.slot[at.cell][8 * at.corner + b]] += scale * blocks[b];
+    }
+  });
+}
+
+}  // namespace flexel::simulate

@@ -1,0 +1,88 @@
+// Implicit Euler for stiff bodies: steps that no stability bound limits (docs/motion.md).
+//
+// With M the lumped masses, C the damping at u-, E the energy of the models and of every pass at the end of
+// the step, and x~ = u- + dt v-, a step is the least of the incremental potential
+//     1/2 |u - x~|^2_M / dt^2 + 1/2 |u - u-|^2_C / dt + E(u),      v = (u - u-) / dt
+// (Kane, Marsden, Ortiz, West 2000, section 3; Martin, Thomaszewski, Grinspun, Gross 2011, section 3.3),
+// found by Newton's method with every cell the right way round. First order in the step; it takes energy from
+// what swings faster than the step resolves, and the books tell how much.
+#pragma once
+#include <functional>
+#include <string>
+
+#include "simulate/equilibrium/mechanics.h"
+#include "simulate/equilibrium/newton.h"
+
+namespace flexel::simulate {
+
+// What one advance did.
+struct ImplicitStep {
+  double step = 0;  // s it went; 0: Newton's method failed for every length that was tried
+  int newton_iterations = 0, cg_iterations = 0;
+  int failures = 0;     // of Newton's method, each at another length
+  std::string trouble;  // of the last one
+};
+
+class ImplicitEuler {
+ public:
+  // Refers to `problem`, `plan` and `mass` [kg] (elements) while it lives. `tolerance`: of Newton's residual,
+  // relative to the forces.
+  ImplicitEuler(const Problem& problem, const std::vector<Pass>& passes, const KernelEffects& plan,
+                const std::vector<double>& mass, double tolerance);
+  ImplicitEuler(const ImplicitEuler&) = delete;
+  ImplicitEuler& operator=(const ImplicitEuler&) = delete;
+
+  // Advances `state` to the time `end` [s], or where Newton's method fails part of the way there: a half, a
+  // quarter ... of it, but no less than 1/1024 of `whole` [s], and later steps grow back. On failure `state`
+  // is untouched. `progress` hears of every iteration and may throw.
+  ImplicitStep advance(State& state, double end, double whole,
+                       const std::function<void(const std::string&)>& progress);
+
+  // The next step makes its tangent anew, so that it depends on the state and reach() alone.
+  void forget() { memory_ = {}; }
+  // The longest step [s] that is tried next; infinity unless one failed.
+  [[nodiscard]] double reach() const { return reach_; }
+  void set_reach(double reach) { reach_ = reach; }
+
+  // Of the last advance, (elements): m; N of the damping; N of the supports on prescribed components.
+  [[nodiscard]] const std::vector<Vec3>& moved() const { return moved_; }
+  [[nodiscard]] std::vector<Vec3> damping_force() const;
+  [[nodiscard]] const std::vector<Vec3>& supports() const { return supports_; }
+  // As another run's last advance left them.
+  void set_supports(std::vector<Vec3> supports) { supports_ = std::move(supports); }
+  // J, what the method itself took: 1/2 |v - v-|^2_M, and what the elastic energy fell short of its work
+  // E- - E + grad E(u) . (u - u-). `state`: after the advance.
+  [[nodiscard]] double numerical_dissipation(const State& state);
+  // Adds the forces of pass p of the constructor's [N] as the advance took them. `state`: after it.
+  void add_forces(std::size_t pass, const State& state, std::vector<Vec3>& forces) const;
+  // Adds the time that each pass took to `passes`, those of the constructor.
+  void add_seconds(std::vector<Pass>& passes) const;
+
+ private:
+  [[nodiscard]] std::vector<Pass> all_passes(const std::vector<Pass>& passes);
+  [[nodiscard]] Pass inertia();
+  [[nodiscard]] Pass damping();
+  [[nodiscard]] Pass resisting(const Pass& pass);
+  bool attempt(State& state, double step, double end, const std::function<void(const std::string&)>& progress,
+               ImplicitStep& told);
+  bool solve(State& trial, NewtonSteps steps, const std::function<void(const std::string&)>& progress,
+             ImplicitStep& told);
+  [[nodiscard]] double force_scale(const State& trial) const;
+  [[nodiscard]] State along_the_way(const State& trial) const;
+
+  const Problem& problem_;
+  const std::vector<double>& mass_;
+  const std::vector<double>& tau_;  // (parts) s
+  double tolerance_;
+  bool damped_ = false;
+  std::size_t outer_passes_;
+  double step_ = 0, reach_;     // s
+  State before_;                // at the start of the step
+  std::vector<Vec3> target_;    // x~, displacements without forces [m]
+  BlockMatrix damping_matrix_;  // at before_; empty without damping
+  Mechanics mechanics_;         // refers to the above
+  NewtonMemory memory_;
+  std::vector<Vec3> moved_, supports_;
+};
+
+}  // namespace flexel::simulate

@@ -1,0 +1,41 @@
+// Materials: isotropic elastic constants and density, from a library of named ones or from the scene.
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace flexel::simulate {
+
+struct Material {
+  std::string name;
+  double young = 0;    // Pa
+  double poisson = 0;  // in (-1, 0.5)
+  double density = 0;  // kg/m^3
+  std::string source;  // where the figures come from
+  // Of [plasticity] and [fracture]; 0: not given
+  double yield = 0, hardening = 0;  // Pa
+  double strength = 0;              // Pa, largest principal stress
+  double layer_strength = 0;        // Pa, of a print in tension across its layers; no effect takes it
+  double elongation = 0;            // equivalent plastic strain at break
+  // For people to choose from; no effect takes them by itself. 0: not given
+  double friction = 0;                          // Coulomb's, against itself
+  double damping = 0;                           // share of the critical
+  std::optional<double> contact_friction = {};  // mu that a scene gives it, for [contact]
+  // Of a print that is not solid (simulate/input/infill.h): the figures above are those of the print as a whole
+  double infill = 1;  // share of the volume inside the walls
+  double walls = 0;   // share of the part's volume
+};
+
+// The library, in order of docs/materials.md. At room temperature; figures that are not known for certain are
+// left out. A scene's own go before them.
+[[nodiscard]] const std::vector<Material>& material_library();
+
+// The library's material of that name or alias ("aluminum" = "aluminium 6061"; case, blanks, "-" and "_" do
+// not matter); nothing when there is none.
+[[nodiscard]] const Material* library_material(const std::string& name);
+
+// Lame's first parameter and the shear modulus [Pa].
+[[nodiscard]] double lame_lambda(const Material& material);
+[[nodiscard]] double shear_modulus(const Material& material);
+
+}  // namespace flexel::simulate

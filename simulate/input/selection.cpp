@@ -1,0 +1,354 @@
+// Finds polygons by name and elements by region. What Flexel itself calls faces ("part/2", sides: "xmin",
+// "part/xmin") and what the file calls them ("part/flange", "flange") is looked up in both; a name that means
+// one thing there and another here is refused, and "#" or "=" before its last word says which.
+//
+// A side is the set of polygons that lie within 1e-3 of the body's extent of the extreme and face that way
+// within 45 degrees. Where no polygon lies there whole (the end of a ball), those that reach it and face that
+// way within 60 degrees are taken.
+#include "simulate/input/selection.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <charconv>
+#include <optional>
+
+#include "base/error.h"
+#include "base/math/area_vector.h"
+#include "base/nearest_word.h"
+#include "base/units.h"
+
+namespace flexel::simulate {
+namespace {
+
+constexpr double kSideTolerance = 1e-3;  // of the extent along the axis
+
+struct Side {
+  int axis;
+  double sign;  // -1: min
+};
+
+std::optional<Side> side_of(const std::string& name) {
+  if (name.size() != 4 || name[0] < 'x' || name[0] > 'z') return std::nullopt;
+  const std::string end = name.substr(1);
+  if (end == "min") return Side{name[0] - 'x', -1};
+  if (end == "max") return Side{name[0] - 'x', 1};
+  return std::nullopt;
+}
+
+// Polygons of the parts for which `part` is empty or equal, at the extreme of those parts.
+std::vector<std::uint32_t> polygons_of_side(const Surface& surface, Side side,
+                                            std::optional<std::uint32_t> part) {
+  double low = 1e300, high = -1e300;
+  const auto height = [&](std::uint32_t vertex) { return side.sign * surface.vertices[vertex][side.axis]; };
+  const auto wanted = [&](std::size_t p) { return !part || surface.polygon_part(p) == *part; };
+  for (std::size_t p = 0; p < surface.polygon_count(); ++p) {
+    if (!wanted(p)) continue;
+    for (const std::uint32_t vertex : surface.polygon(p)) {
+      low = std::min(low, height(vertex));
+      high = std::max(high, height(vertex));
+    }
+  }
+  const double limit = high - kSideTolerance * (high - low);
+  const auto collect = [&](bool whole, double least_cosine, bool inside_out = false) {
+    std::vector<std::uint32_t> found;
+    for (std::size_t p = 0; p < surface.polygon_count(); ++p) {
+      if (!wanted(p)) continue;
+      const auto corners = surface.polygon(p);
+      const auto reaches = [&](std::uint32_t vertex) { return height(vertex) >= limit; };
+      if (!(whole ? std::all_of(corners.begin(), corners.end(), reaches)
+                  : std::any_of(corners.begin(), corners.end(), reaches)))
+        continue;
+      const Vec3 area = area_vector(surface.vertices, corners);
+      const double facing = inside_out ? std::abs(area[side.axis]) : side.sign * area[side.axis];
+      if (area.norm() > 0 && facing >= least_cosine * area.norm())
+        found.push_back(static_cast<std::uint32_t>(p));
+    }
+    return found;
+  };
+  std::vector<std::uint32_t> found = collect(true, 0.7);
+  if (found.empty()) found = collect(false, 0.5);
+  if (found.empty()) found = collect(true, 0.7, true);
+  if (found.empty()) found = collect(false, 0.5, true);
+  return found;
+}
+
+std::vector<std::uint32_t> polygons_of_faces(const Surface& surface,
+                                             const std::vector<std::uint32_t>& faces) {
+  std::vector<std::uint32_t> found;
+  for (std::size_t p = 0; p < surface.polygon_count(); ++p)
+    if (std::binary_search(faces.begin(), faces.end(), surface.polygon_face[p]))
+      found.push_back(static_cast<std::uint32_t>(p));
+  return found;
+}
+
+std::optional<std::uint32_t> part_named(const Body& body, const std::string& name) {
+  for (std::size_t p = 0; p < body.parts.size(); ++p)
+    if (body.parts[p].name == name) return static_cast<std::uint32_t>(p);
+  return std::nullopt;
+}
+
+std::optional<std::uint32_t> number_in(const std::string& text) {
+  std::uint32_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || end != text.data() + text.size() || text.empty()) return std::nullopt;
+  return number;
+}
+
+// The last word of a name, and who calls it so.
+struct Word {
+  enum class By { either, flexel, file };
+  By by = By::either;  // "#2", "#xmin": numbers and sides; "=2": names of the file
+  std::string text;
+};
+
+Word parse_word(const std::string& text) {
+  if (!text.empty() && text.front() == '#') return {Word::By::flexel, text.substr(1)};
+  if (!text.empty() && text.front() == '=') return {Word::By::file, text.substr(1)};
+  return {Word::By::either, text};
+}
+
+// Polygons that the file calls so, of all parts or one.
+std::vector<std::uint32_t> polygons_of_file(const Surface& surface, const Word& word,
+                                            std::optional<std::uint32_t> part) {
+  std::vector<std::uint32_t> faces;
+  if (word.by == Word::By::flexel || word.text.empty()) return faces;  // a face without a name has no name
+  for (std::uint32_t f = 0; f < surface.faces.size(); ++f)
+    if ((!part || surface.faces[f].part == *part) && surface.faces[f].name == word.text) faces.push_back(f);
+  return polygons_of_faces(surface, faces);
+}
+
+// Polygons that Flexel calls so: a side of all parts or of one, a face of one part by its number.
+std::vector<std::uint32_t> polygons_of_flexel(const Surface& surface, const Word& word,
+                                              std::optional<std::uint32_t> part) {
+  if (word.by == Word::By::file) return {};
+  if (const auto side = side_of(word.text)) return polygons_of_side(surface, *side, part);
+  const std::optional<std::uint32_t> number = part ? number_in(word.text) : std::nullopt;
+  if (!number) return {};
+  const std::vector<std::uint32_t> numbers = face_numbers(surface);
+  std::vector<std::uint32_t> faces;
+  for (std::uint32_t f = 0; f < surface.faces.size(); ++f)
+    if (surface.faces[f].part == *part && numbers[f] == *number) faces.push_back(f);
+  return polygons_of_faces(surface, faces);
+}
+
+// The polygons of the word, which must not mean two things. `before`: "part/", or nothing.
+std::vector<std::uint32_t> polygons_called(const Selection& selection, const Surface& surface,
+                                           const std::string& before, const std::string& text,
+                                           std::optional<std::uint32_t> part) {
+  const Word word = parse_word(text);
+  std::vector<std::uint32_t> own = polygons_of_flexel(surface, word, part);
+  std::vector<std::uint32_t> named = polygons_of_file(surface, word, part);
+  if (word.by != Word::By::either && named.empty())  // the file's name may begin so
+    named = polygons_of_file(surface, {Word::By::file, text}, part);
+  if (!own.empty() && !named.empty() && own != named)
+    throw InputError(
+        selection.origin,
+        fmt::format("\"{0}{1}\" means two things: {2}, and the face or group that the file calls "
+                    "\"{1}\"; write \"{0}#{3}\" for the first, \"{0}={1}\" for the second",
+                    before, text,
+                    side_of(word.text) ? "the side of that name"
+                                       : fmt::format("face number {} of `flexel info`", word.text),
+                    word.text));
+  return own.empty() ? named : own;
+}
+
+std::vector<std::string> every_name(const Body& body) {
+  std::vector<std::string> names;
+  for (const char* side : {"xmin", "xmax", "ymin", "ymax", "zmin", "zmax"}) names.emplace_back(side);
+  for (const Part& part : body.parts) names.push_back(part.name);
+  for (const SurfaceFace& face : body.surface.faces)
+    if (!face.name.empty()) {
+      names.push_back(face.name);
+      names.push_back(body.parts[face.part].name + "/" + face.name);
+    }
+  return names;
+}
+
+[[noreturn]] void unknown_name(const Selection& selection, const Body& body) {
+  const std::string& name = selection.name;
+  const std::size_t slash = name.rfind('/');
+  if (slash != std::string::npos) {
+    if (const auto part = part_named(body, name.substr(0, slash))) {
+      const auto count = std::count_if(body.surface.faces.begin(), body.surface.faces.end(),
+                                       [&](const SurfaceFace& face) { return face.part == *part; });
+      if (number_in(parse_word(name.substr(slash + 1)).text))
+        throw InputError(selection.origin, fmt::format("no face \"{}\"; part \"{}\" has faces 1 to {}", name,
+                                                       body.parts[*part].name, count));
+    } else {
+      std::vector<std::string> parts;
+      for (const Part& each : body.parts) parts.push_back(each.name);
+      throw InputError(selection.origin, fmt::format("no part \"{}\" for \"{}\"; the body has {}",
+                                                     name.substr(0, slash), name, fmt::join(parts, ", ")));
+    }
+  }
+  std::string hint = did_you_mean(name, every_name(body));
+  if (hint.empty()) {
+    std::vector<std::string> parts;
+    for (const Part& part : body.parts) parts.push_back('"' + part.name + '"');
+    if (parts.size() > 6) parts.resize(6);
+    hint = fmt::format(
+        "; use a side (\"xmin\" to \"zmax\"), a part ({}) or a face (\"{}/1\"); `flexel info` lists them",
+        fmt::join(parts, ", "), body.parts.empty() ? "part" : body.parts[0].name);
+  }
+  throw InputError(selection.origin, fmt::format("nothing is called \"{}\"{}", name, hint));
+}
+
+std::vector<std::uint32_t> range(std::uint32_t begin, std::uint32_t end) {
+  std::vector<std::uint32_t> all(end - begin);
+  for (std::uint32_t i = begin; i < end; ++i) all[i - begin] = i;
+  return all;
+}
+
+Selected resolve_name(const Selection& selection, const Body& body) {
+  const std::string& name = selection.name;
+  const Word whole = parse_word(name);
+  std::optional<std::uint32_t> part = part_named(body, name);
+  if (!part && whole.by == Word::By::file) part = part_named(body, whole.text);
+  if (part) {
+    if (side_of(name))
+      throw InputError(selection.origin,
+                       fmt::format("\"{0}\" means two things: a part and a side; write \"={0}\" "
+                                   "for the part, \"#{0}\" for the side",
+                                   name));
+    return {{}, range(body.parts[*part].element_begin, body.parts[*part].element_end)};
+  }
+  std::vector<std::uint32_t> found = polygons_called(selection, body.surface, "", name, std::nullopt);
+  // The part's own name may hold a slash: try every one.
+  for (std::size_t slash = name.find('/'); slash != std::string::npos; slash = name.find('/', slash + 1)) {
+    part = part_named(body, name.substr(0, slash));
+    if (!part) continue;
+    if (slash + 1 == name.size())
+      throw InputError(
+          selection.origin,
+          fmt::format("\"{0}\" names no face: write \"{0}1\" for a face, \"{0}xmin\" for a side, "
+                      "\"{1}\" for the whole part",
+                      name, body.parts[*part].name));
+    const std::vector<std::uint32_t> of_part =
+        polygons_called(selection, body.surface, name.substr(0, slash + 1), name.substr(slash + 1), part);
+    if (!found.empty() && !of_part.empty() && found != of_part)
+      throw InputError(
+          selection.origin,
+          fmt::format("\"{}\" means two things: names with a slash can be split in two ways here; "
+                      "rename a part or a group of the file",
+                      name));
+    if (!of_part.empty()) found = of_part;
+  }
+  if (found.empty()) unknown_name(selection, body);
+  return {found, {}};
+}
+
+bool holds(const Selection& selection, const Vec3& point) {
+  switch (selection.kind) {
+    case Selection::Kind::box:
+      return (point.array() >= selection.min.array()).all() && (point.array() <= selection.max.array()).all();
+    case Selection::Kind::sphere:
+      return (point - selection.point).squaredNorm() <= selection.radius * selection.radius;
+    default:
+      return selection.normal.dot(point - selection.point) >= 0;
+  }
+}
+
+Selected resolve_region(const Selection& selection, const std::vector<Vec3>& at) {
+  Selected selected;
+  for (std::uint32_t e = 0; e < at.size(); ++e)
+    if (holds(selection, at[e])) selected.elements.push_back(e);
+  if (selected.elements.empty()) {
+    const Box box = bounding_box(at);
+    throw InputError(
+        selection.origin,
+        fmt::format("the {} holds no element; the elements lie from ({}, {}, {}) to ({}, {}, {})",
+                    describe(selection), human_length(box.min.x()), human_length(box.min.y()),
+                    human_length(box.min.z()), human_length(box.max.x()), human_length(box.max.y()),
+                    human_length(box.max.z())));
+  }
+  return selected;
+}
+
+std::vector<std::uint32_t> united(const std::vector<std::uint32_t>& a, const std::vector<std::uint32_t>& b) {
+  std::vector<std::uint32_t> all;
+  std::set_union(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(all));
+  return all;
+}
+
+std::vector<std::uint32_t> without(std::size_t count, const std::vector<std::uint32_t>& left_out) {
+  if (left_out.empty()) return {};
+  const std::vector<std::uint32_t> all = range(0, static_cast<std::uint32_t>(count));
+  std::vector<std::uint32_t> rest;
+  std::set_difference(all.begin(), all.end(), left_out.begin(), left_out.end(), std::back_inserter(rest));
+  return rest;
+}
+
+}  // namespace
+
+Selection select_by_name(std::string name, std::string origin) {
+  Selection selection;
+  selection.name = std::move(name);
+  selection.origin = std::move(origin);
+  return selection;
+}
+
+std::optional<Vec3> side_axis(const Selection& selection, const Body& body) {
+  if (selection.kind != Selection::Kind::name || part_named(body, selection.name)) return std::nullopt;
+  const std::size_t slash = selection.name.rfind('/');
+  const std::string before = slash == std::string::npos ? "" : selection.name.substr(0, slash);
+  const std::optional<std::uint32_t> part = part_named(body, before);
+  if (slash != std::string::npos && !part) return std::nullopt;
+  const Word word = parse_word(selection.name.substr(slash == std::string::npos ? 0 : slash + 1));
+  const std::optional<Side> side = side_of(word.text);
+  if (!side || word.by == Word::By::file) return std::nullopt;
+  return side->sign * Vec3::Unit(side->axis);
+}
+
+std::string describe(const Selection& selection) {
+  switch (selection.kind) {
+    case Selection::Kind::name:
+      return selection.name;
+    case Selection::Kind::box:
+      return "box";
+    case Selection::Kind::sphere:
+      return "sphere";
+    case Selection::Kind::half_space:
+      return "half-space";
+    case Selection::Kind::complement:
+      return "all but " + describe(selection.members.front());
+    case Selection::Kind::any_of:
+      break;
+  }
+  std::vector<std::string> members;
+  for (const Selection& member : selection.members) members.push_back(describe(member));
+  return fmt::format("{}", fmt::join(members, " + "));
+}
+
+Selected resolve(const Selection& selection, const Body& body, const std::vector<Vec3>* at) {
+  switch (selection.kind) {
+    case Selection::Kind::name: {
+      Selected selected = resolve_name(selection, body);
+      if (selected.polygons.empty() && selected.elements.empty())
+        throw InputError(selection.origin, fmt::format("\"{}\" selects nothing", selection.name));
+      return selected;
+    }
+    case Selection::Kind::any_of: {
+      Selected all;
+      for (const Selection& member : selection.members) {
+        const Selected one = resolve(member, body, at);
+        all = {united(all.polygons, one.polygons), united(all.elements, one.elements)};
+      }
+      return all;
+    }
+    case Selection::Kind::complement: {
+      const Selected out = resolve(selection.members.front(), body, at);
+      Selected rest = {without(body.surface.polygon_count(), out.polygons),
+                       without(body.element_count(), out.elements)};
+      if (rest.polygons.empty() && rest.elements.empty())
+        throw InputError(selection.origin, "\"not\" leaves nothing: what it names is everything");
+      return rest;
+    }
+    default:
+      return resolve_region(selection, at ? *at : body.rest);
+  }
+}
+
+}  // namespace flexel::simulate

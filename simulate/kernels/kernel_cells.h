@@ -1,0 +1,170 @@
+// Model `cells`, elastic and damped, eight cells at a time; kernel.cpp has the formulas. Included by
+// kernel.cpp alone.
+#pragma once
+#include "simulate/kernels/kernel_state.h"
+
+namespace flexel::simulate::step {
+namespace {
+
+// The transform of one component: gradient sums D_x, D_y, D_z and hourglass sums Q of xy, yz, zx, xyz.
+struct Modes {
+  Lanes d[3], q[4];
+};
+
+FLEXEL_INLINE Modes transform(const Corners& u, int c) {
+  Lanes p[4], m[4];
+  for (int yz = 0; yz < 4; ++yz) {
+    p[yz] = u.at[2 * yz + 1][c] + u.at[2 * yz][c];
+    m[yz] = u.at[2 * yz + 1][c] - u.at[2 * yz][c];
+  }
+  const Lanes across[2] = {p[1] - p[0], p[3] - p[2]}, twist[2] = {m[1] - m[0], m[3] - m[2]};
+  const Lanes low = m[0] + m[1], high = m[2] + m[3];
+  return {{low + high, across[0] + across[1], (p[2] + p[3]) - (p[0] + p[1])},
+          {twist[0] + twist[1], across[1] - across[0], high - low, twist[1] - twist[0]}};
+}
+
+FLEXEL_INLINE void transform_back(const Modes& t, int c, Corners& f) {
+  for (int z = 0; z < 2; ++z) {
+    const Lanes y_even = z ? t.d[1] + t.q[1] : t.d[1] - t.q[1];
+    const Lanes y_odd = z ? t.q[0] + t.q[3] : t.q[0] - t.q[3];
+    const Lanes z_even = z ? t.d[2] : -t.d[2];
+    const Lanes z_odd = z ? t.d[0] + t.q[2] : t.d[0] - t.q[2];
+    for (int y = 0; y < 2; ++y) {
+      const Lanes even = y ? z_even + y_even : z_even - y_even;
+      const Lanes odd = y ? z_odd + y_odd : z_odd - y_odd;
+      f.at[4 * z + 2 * y][c] = even - odd;
+      f.at[4 * z + 2 * y + 1][c] = even + odd;
+    }
+  }
+}
+
+struct Matrix {
+  Lanes at[3][3];
+};
+
+FLEXEL_INLINE Matrix cofactor(const Matrix& m) {
+  Matrix c;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      const int i1 = (i + 1) % 3, i2 = (i + 2) % 3, j1 = (j + 1) % 3, j2 = (j + 2) % 3;
+      c.at[i][j] = m.at[i1][j1] * m.at[i2][j2] - m.at[i1][j2] * m.at[i2][j1];
+    }
+  return c;
+}
+
+struct Gradient {
+  Matrix h, cofactor, less_one;  // H; cof F; cof F - I without cancellation
+  Lanes jacobian, inverse;       // J, 1 / J
+  Lanes trace, change;           // tr H; J - 1
+};
+
+FLEXEL_INLINE Gradient gradient_of(const Modes modes[3], const CellConstants& k, const Lanes& fill,
+                                   Sums& sums) {
+  Gradient g;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) g.h.at[i][j] = modes[i].d[j] * (0.25 / k.spacing[j]);
+  const Matrix& h = g.h;
+  const Matrix second = cofactor(h);
+  g.trace = h.at[0][0] + h.at[1][1] + h.at[2][2];
+  const Lanes sum_of_minors = second.at[0][0] + second.at[1][1] + second.at[2][2];
+  const Lanes determinant =
+      h.at[0][0] * second.at[0][0] + h.at[0][1] * second.at[0][1] + h.at[0][2] * second.at[0][2];
+  g.change = g.trace + sum_of_minors + determinant;
+  const Lanes jacobian = 1 + g.change;
+  const Lanes counted = fill > 0 ? jacobian : Lanes{} + __builtin_huge_val();
+  // A jacobian that is not a number fails both comparisons and must win.
+  sums.smallest_jacobian = counted >= sums.smallest_jacobian ? sums.smallest_jacobian : counted;
+  // A cell that resists nothing may be folded: its numbers are not used, but they must stay finite.
+  g.change = fill > 0 ? g.change : Lanes{};
+  g.jacobian = 1 + g.change;
+  g.inverse = 1 / g.jacobian;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      g.less_one.at[i][j] = second.at[i][j] - h.at[j][i] + (i == j ? g.trace : Lanes{});
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) g.cofactor.at[i][j] = g.less_one.at[i][j] + (i == j ? 1.0 : 0.0);
+  return g;
+}
+
+// First Piola-Kirchhoff stress [Pa].
+FLEXEL_INLINE Matrix elastic_stress(const Gradient& g, const Lanes& log_volume, const CellConstants& k) {
+  const Lanes pressure = k.lambda * log_volume * g.inverse;
+  const Lanes shear = k.mu * g.inverse;
+  Matrix p;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      // J (F - F^-T), F^-T = cof F / J
+      const Lanes difference =
+          g.jacobian * g.h.at[i][j] - g.less_one.at[i][j] + (i == j ? g.change : Lanes{});
+      p.at[i][j] = shear * difference + pressure * g.cofactor.at[i][j];
+    }
+  return p;
+}
+
+// Adds the viscous stress [Pa] to `stress`; sets `spin_free`, the forces of the hourglass modes [N].
+FLEXEL_INLINE void add_damping(const Gradient& g, const Modes u[3], const Modes v[3], const CellConstants& k,
+                               Matrix& stress, Lanes spin_free[4][3]) {
+  Matrix rate, strain_rate;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) rate.at[i][j] = v[i].d[j] * (0.25 / k.spacing[j]);
+  // A = sym(F^T dF/dt), F^T dF/dt = dF/dt + H^T dF/dt
+  Matrix product;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      product.at[i][j] = rate.at[i][j] + (g.h.at[0][i] * rate.at[0][j] + g.h.at[1][i] * rate.at[1][j] +
+                                          g.h.at[2][i] * rate.at[2][j]);
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) strain_rate.at[i][j] = product.at[i][j] + product.at[j][i];  // 2 A
+  const Lanes pressure =
+      (0.5 * k.damping * k.lambda) * (strain_rate.at[0][0] + strain_rate.at[1][1] + strain_rate.at[2][2]);
+  Matrix s;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      s.at[i][j] = (k.damping * k.mu) * strain_rate.at[i][j] + (i == j ? pressure : Lanes{});
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      stress.at[i][j] +=
+          s.at[i][j] + (g.h.at[i][0] * s.at[0][j] + g.h.at[i][1] * s.at[1][j] + g.h.at[i][2] * s.at[2][j]);
+  // spin w of L = dF/dt F^-1, F^-1 = (cof F)^T / J
+  Matrix l;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      l.at[i][j] = g.inverse * (rate.at[i][0] * g.cofactor.at[j][0] + rate.at[i][1] * g.cofactor.at[j][1] +
+                                rate.at[i][2] * g.cofactor.at[j][2]);
+  const Lanes w[3] = {0.5 * (l.at[2][1] - l.at[1][2]), 0.5 * (l.at[0][2] - l.at[2][0]),
+                      0.5 * (l.at[1][0] - l.at[0][1])};
+  Lanes torque[3] = {};  // sum_m tau c_m q_m x q'_m
+  for (int m = 0; m < 4; ++m) {
+    const Lanes q[3] = {0.125 * u[0].q[m], 0.125 * u[1].q[m], 0.125 * u[2].q[m]};
+    const double viscosity = k.damping * k.hourglass[m];
+    for (int i = 0; i < 3; ++i) {
+      const int a = (i + 1) % 3, b = (i + 2) % 3;
+      spin_free[m][i] = viscosity * (0.125 * v[i].q[m] - (w[a] * q[b] - w[b] * q[a]));
+    }
+    for (int i = 0; i < 3; ++i) {
+      const int a = (i + 1) % 3, b = (i + 2) % 3;
+      torque[i] += q[a] * spin_free[m][b] - q[b] * spin_free[m][a];
+    }
+  }
+  // its reaction through w: P += G F^-T / V, G_ij = 1/2 eps_kij t_k
+  const Lanes share = (0.5 / k.volume) * g.inverse;
+  for (int j = 0; j < 3; ++j) {
+    const Lanes x = g.cofactor.at[0][j], y = g.cofactor.at[1][j], z = g.cofactor.at[2][j];
+    stress.at[0][j] += share * (torque[2] * y - torque[1] * z);
+    stress.at[1][j] += share * (torque[0] * z - torque[2] * x);
+    stress.at[2][j] += share * (torque[1] * x - torque[0] * y);
+  }
+}
+
+FLEXEL_INLINE void forces_of(const Matrix& stress, const Lanes mode_force[4][3], const Lanes& fill,
+                             const CellConstants& k, Corners& force) {
+  for (int i = 0; i < 3; ++i) {
+    Modes t;
+    for (int j = 0; j < 3; ++j) t.d[j] = -fill * stress.at[i][j] * (0.25 * k.volume / k.spacing[j]);
+    for (int m = 0; m < 4; ++m) t.q[m] = -fill * mode_force[m][i] * 0.125;
+    transform_back(t, i, force);
+  }
+}
+
+}  // namespace
+}  // namespace flexel::simulate::step

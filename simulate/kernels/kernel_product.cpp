@@ -1,0 +1,135 @@
+// One chunk of a product with the tangent stiffness: gather the displacements of its elements, sum the forces
+// of its cells eight at a time, hand them over. The formulas are those of simulate/kernels/kernel.cpp made
+// linear: H from the transform of the corners, dP of it, the transform backwards.
+#include "simulate/kernels/kernel_product.h"
+
+#include "simulate/kernels/kernel_cells.h"
+#include "simulate/kernels/kernel_elements.h"
+
+#ifndef FLEXEL_ISA
+#error "compiled once per instruction set: simulate/CMakeLists.txt sets FLEXEL_ISA"
+#endif
+
+namespace flexel::simulate::step {
+namespace {
+
+FLEXEL_INLINE Matrix stress_at_rest(const Matrix& h, const CellConstants& k) {
+  const Lanes pressure = k.lambda * (h.at[0][0] + h.at[1][1] + h.at[2][2]);
+  Matrix p;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) p.at[i][j] = k.mu * (h.at[i][j] + h.at[j][i]) + (i == j ? pressure : Lanes{});
+  return p;
+}
+
+FLEXEL_INLINE Matrix stress_deformed(const Matrix& h, const double* tangent, const CellConstants& k) {
+  Matrix g;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) g.at[i][j] = load(tangent + kLanes * static_cast<std::size_t>(3 * i + j));
+  const Lanes coupling = load(tangent + kLanes * 9);
+  Lanes added[6];
+  for (std::size_t c = 0; c < 6; ++c) added[c] = load(tangent + kLanes * (10 + c));
+  constexpr int of[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}};
+  Matrix turned;  // c H^T G
+  Lanes change = {};
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      turned.at[i][j] =
+          coupling * (h.at[0][i] * g.at[0][j] + h.at[1][i] * g.at[1][j] + h.at[2][i] * g.at[2][j]);
+      change += h.at[i][j] * g.at[i][j];
+    }
+  change *= k.lambda;
+  Matrix p;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      p.at[i][j] =
+          k.mu * h.at[i][j] + change * g.at[i][j] +
+          (g.at[i][0] * turned.at[0][j] + g.at[i][1] * turned.at[1][j] + g.at[i][2] * turned.at[2][j]) +
+          (h.at[i][0] * added[of[0][j]] + h.at[i][1] * added[of[1][j]] + h.at[i][2] * added[of[2][j]]);
+  return p;
+}
+
+FLEXEL_INLINE Matrix stress_by_moduli(const Matrix& h, const double* tangent) {
+  Matrix p;
+  for (int row = 0; row < 9; ++row) {
+    Lanes sum = {};
+    for (int column = 0; column < 9; ++column)
+      sum +=
+          load(tangent + kLanes * static_cast<std::size_t>(9 * row + column)) * h.at[column / 3][column % 3];
+    p.at[row / 3][row % 3] = sum;
+  }
+  return p;
+}
+
+template <TangentForm form>
+FLEXEL_INLINE void add_block(const ChunkView& chunk, const CellBlock& block, const double* tangent,
+                             const Scratch& scratch) {
+  const CellConstants& k = *chunk.constants;
+  Corners corners;
+  read_corners(chunk, block, scratch.column + kDisplacement, corners);
+  Modes u[3];
+  for (int i = 0; i < 3; ++i) u[i] = transform(corners, i);
+  Matrix h, stress;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) h.at[i][j] = u[i].d[j] * (0.25 / k.spacing[j]);
+  if constexpr (form == TangentForm::at_rest) {
+    stress = stress_at_rest(h, k);
+  } else if constexpr (form == TangentForm::deformed) {
+    stress = stress_deformed(h, tangent, k);
+  } else {
+    stress = stress_by_moduli(h, tangent);
+  }
+  Lanes mode_force[4][3];
+  for (int m = 0; m < 4; ++m)
+    for (int i = 0; i < 3; ++i) mode_force[m][i] = (0.125 * k.hourglass[m]) * u[i].q[m];
+  forces_of(stress, mode_force, -load(block.fill), k, corners);  // K u: against the forces
+  add_to_corners(chunk, block, corners, scratch.column + kForce);
+}
+
+void write_owned(const ChunkView& chunk, const Scratch& scratch, double* y) {
+  const CellConstants& k = *chunk.constants;
+  for (std::size_t o = 0; o < chunk.owned_count;) {
+    const std::size_t l = chunk.owned[o];
+    double* to = y + 3 * static_cast<std::size_t>(chunk.elements[l]);
+    if (is_row(chunk.owned, o, chunk.owned_count) && is_row(chunk.elements, l, chunk.count)) {
+      const Triple<Lanes> force = row_of(k, scratch.column + kForce, l);
+      for (std::size_t c = 0; c < 3; ++c) store(to + c * kLanes, force.at[c]);
+      o += kLanes;
+    } else {
+      const Triple<double> force = one_of(k, scratch.column + kForce, l);
+      for (int c = 0; c < 3; ++c) to[c] = force.at[c];
+      ++o;
+    }
+  }
+}
+
+template <TangentForm form>
+void run(const ChunkView& chunk, const double* tangent, const double* x, double* y, double* memory) {
+  Scratch scratch = {};
+  const std::size_t stride = scratch.stride = scratch_stride(chunk.count);
+  for (std::size_t c = 0; c < 3; ++c) {
+    scratch.column[kDisplacement + c] = memory + kLanes + c * stride;
+    scratch.column[kForce + c] = memory + kLanes + (3 + c) * stride;
+    __builtin_memset(scratch.column[kForce + c], 0, chunk.count * sizeof(double));
+  }
+  StateView state = {};
+  state.displacement = const_cast<double*>(x);  // only read
+  read_elements<Damping::none>(chunk, state, scratch);
+  constexpr std::size_t columns = kTangentColumns[static_cast<std::size_t>(form)];
+  for (std::size_t b = 0; b < chunk.block_count; ++b)
+    add_block<form>(chunk, chunk.blocks[b], tangent + kLanes * columns * b, scratch);
+  write_owned(chunk, scratch, y);
+  hand_over_shared(chunk, scratch.column + kForce, chunk.shared_force);
+}
+
+}  // namespace
+
+#define FLEXEL_JOIN(a, b) a##b
+#define FLEXEL_TABLE(isa) FLEXEL_JOIN(products_, isa)
+
+const ProductTable& FLEXEL_TABLE(FLEXEL_ISA)() {
+  static constexpr ProductTable table = {
+      {&run<TangentForm::at_rest>, &run<TangentForm::deformed>, &run<TangentForm::moduli>}};
+  return table;
+}
+
+}  // namespace flexel::simulate::step

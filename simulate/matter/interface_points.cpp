@@ -1,0 +1,211 @@
+// Only polygons near the box of another part are looked at. The coarser part's surface is cut into pieces
+// too; their centroids, in a grid of half a spacing, tell which of its polygons can be near a point of the
+// finer one; the distance is then taken from the polygons' triangles themselves.
+#include "simulate/matter/interface_points.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+
+#include "base/math/distance.h"
+#include "simulate/matter/surface_points.h"
+
+namespace flexel::simulate {
+namespace {
+
+constexpr double kOfDiagonal = 1e-6, kOfSpacing = 1e-2;
+constexpr double kFacing = -0.7;  // cosine between the normals
+
+bool overlap(const Box& a, const Box& b, double margin) {
+  return (a.min.array() <= b.max.array() + margin).all() && (b.min.array() <= a.max.array() + margin).all();
+}
+
+Box polygon_box(const Surface& surface, std::size_t polygon) {
+  Box box;
+  for (const std::uint32_t vertex : surface.polygon(polygon)) box.add(surface.vertices[vertex]);
+  return box;
+}
+
+bool box_holds(const Box& box, const Vec3& point, double margin) {
+  return (point.array() >= box.min.array() - margin).all() &&
+         (point.array() <= box.max.array() + margin).all();
+}
+
+// A polygon of the coarser part, with the normal of its first sample point.
+struct Facing {
+  std::uint32_t polygon = 0;
+  Vec3 normal = Vec3::Zero();
+  Box box;
+};
+
+// Polygons by the cubes of a grid in which they have sample points.
+class Grid {
+ public:
+  explicit Grid(double width) : width_(width) {}
+  void add(const Vec3& point, std::uint32_t polygon) {
+    std::vector<std::uint32_t>& polygons = cubes_[key(cube(point))];
+    if (polygons.empty() || polygons.back() != polygon) polygons.push_back(polygon);
+  }
+  // use(polygon) for those with a sample in the cubes around `point`, some more than once.
+  template <class Use>
+  void for_each_near(const Vec3& point, const Use& use) const {
+    const std::array<std::int64_t, 3> middle = cube(point);
+    for (std::int64_t n = 0; n < 27; ++n) {
+      const auto found =
+          cubes_.find(key({middle[0] + n % 3 - 1, middle[1] + n / 3 % 3 - 1, middle[2] + n / 9 - 1}));
+      if (found == cubes_.end()) continue;
+      for (const std::uint32_t polygon : found->second) use(polygon);
+    }
+  }
+
+ private:
+  [[nodiscard]] std::array<std::int64_t, 3> cube(const Vec3& point) const {
+    std::array<std::int64_t, 3> result;
+    for (int axis = 0; axis < 3; ++axis)
+      result[static_cast<std::size_t>(axis)] = static_cast<std::int64_t>(std::floor(point[axis] / width_));
+    return result;
+  }
+  static std::uint64_t key(const std::array<std::int64_t, 3>& cube) {
+    std::uint64_t hash = 0;
+    for (const std::int64_t each : cube)
+      hash = (hash ^ static_cast<std::uint64_t>(each)) * 0x9e3779b97f4a7c15u;
+    return hash;
+  }
+  double width_;
+  std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cubes_;
+};
+
+class TouchingSearch {
+ public:
+  TouchingSearch(const Problem& problem, const std::vector<TouchingGap>& wider);
+  std::vector<TouchingPoint> operator()();
+
+ private:
+  [[nodiscard]] double tolerance(std::uint32_t part) const {
+    return std::max(kOfDiagonal * diagonal_, kOfSpacing * body_.parts[part].lattice.spacing.minCoeff());
+  }
+  [[nodiscard]] double wider_gap(std::uint32_t a, std::uint32_t b) const {
+    double gap = 0;
+    for (const TouchingGap& each : wider_)
+      if (each.parts == std::array{std::min(a, b), std::max(a, b)}) gap = std::max(gap, each.gap);
+    return gap;
+  }
+  [[nodiscard]] double margin(std::uint32_t a, std::uint32_t b) const {
+    return std::max({tolerance(a), tolerance(b), wider_gap(a, b)});
+  }
+  void sample(std::uint32_t part);
+  void touch(std::uint32_t finer, std::uint32_t coarser);
+  [[nodiscard]] double distance(const Vec3& point, std::uint32_t polygon) const;
+
+  const Problem& problem_;
+  const Body& body_;
+  const std::vector<TouchingGap>& wider_;
+  double diagonal_ = 0;
+  Triangles triangles_;
+  std::vector<std::uint32_t> first_triangle_;      // (polygons + 1)
+  std::vector<Box> box_;                           // (parts)
+  std::vector<std::vector<SurfacePoint>> points_;  // (parts) near another part
+  std::vector<TouchingPoint> found_;
+};
+
+TouchingSearch::TouchingSearch(const Problem& problem, const std::vector<TouchingGap>& wider)
+    : problem_(problem),
+      body_(problem.body),
+      wider_(wider),
+      diagonal_(bounding_box(problem.body.surface.vertices).diagonal()) {
+  const Surface& surface = body_.surface;
+  box_.resize(body_.parts.size());
+  for (std::size_t p = 0; p < surface.polygon_count(); ++p)
+    for (const std::uint32_t vertex : surface.polygon(p))
+      box_[surface.polygon_part(p)].add(surface.vertices[vertex]);
+  triangles_ = triangulate(surface);
+  first_triangle_.assign(surface.polygon_count() + 1, 0);
+  for (const std::uint32_t polygon : triangles_.polygon) ++first_triangle_[polygon + 1];
+  for (std::size_t p = 0; p < surface.polygon_count(); ++p) first_triangle_[p + 1] += first_triangle_[p];
+  points_.resize(body_.parts.size());
+  for (std::uint32_t part = 0; part < body_.parts.size(); ++part) sample(part);
+}
+
+void TouchingSearch::sample(std::uint32_t part) {
+  std::vector<std::uint32_t> polygons;
+  for (std::uint32_t p = 0; p < body_.surface.polygon_count(); ++p) {
+    if (body_.surface.polygon_part(p) != part) continue;
+    const Box box = polygon_box(body_.surface, p);
+    for (std::uint32_t other = 0; other < body_.parts.size(); ++other)
+      if (other != part && overlap(box, box_[other], margin(part, other))) {
+        polygons.push_back(p);
+        break;
+      }
+  }
+  if (!polygons.empty()) points_[part] = surface_points(problem_, polygons);
+}
+
+double TouchingSearch::distance(const Vec3& point, std::uint32_t polygon) const {
+  double least = 1e300;
+  for (std::uint32_t t = first_triangle_[polygon]; t < first_triangle_[polygon + 1]; ++t) {
+    const auto& corners = triangles_.corners[t];
+    least = std::min(
+        least, distance_to_triangle(point, body_.surface.vertices[corners[0]],
+                                    body_.surface.vertices[corners[1]], body_.surface.vertices[corners[2]]));
+  }
+  return least;
+}
+
+void TouchingSearch::touch(std::uint32_t finer, std::uint32_t coarser) {
+  const double limit = std::max(tolerance(finer), wider_gap(finer, coarser));
+  const double width = 0.5 * body_.parts[coarser].lattice.spacing.minCoeff();
+  std::vector<Facing> facing;
+  std::unordered_map<std::uint32_t, std::uint32_t> number;  // of a polygon in `facing`
+  Grid grid(width);
+  for (const SurfacePoint& point : points_[coarser]) {
+    const auto [entry, added] = number.try_emplace(point.polygon, static_cast<std::uint32_t>(facing.size()));
+    if (added)
+      facing.push_back(
+          {point.polygon, point.area_vector.normalized(), polygon_box(body_.surface, point.polygon)});
+    // No point of the finer part looks further than into the next cube.
+    if (box_holds(box_[finer], point.position, 2 * width)) grid.add(point.position, entry->second);
+  }
+  for (const SurfacePoint& point : points_[finer]) {
+    if (!box_holds(box_[coarser], point.position, limit)) continue;
+    const Vec3 own = point.area_vector.normalized();
+    double least = limit;
+    const Facing* nearest = nullptr;
+    grid.for_each_near(point.position, [&](std::uint32_t n) {
+      const Facing& other = facing[n];
+      if (own.dot(other.normal) > kFacing || !box_holds(other.box, point.position, limit)) return;
+      const double away = distance(point.position, other.polygon);
+      if (away > least || (nearest && away == least && other.polygon >= nearest->polygon)) return;
+      least = away;
+      nearest = &other;
+    });
+    if (!nearest) continue;
+    const auto at = carrier_on_surface(problem_, nearest->polygon, point.position, nearest->normal);
+    if (!at) continue;
+    found_.push_back(
+        {{finer, coarser},
+         {with_gradient(problem_, point.at, point.position), with_gradient(problem_, *at, point.position)},
+         point.area_vector.norm(),
+         own});
+  }
+}
+
+std::vector<TouchingPoint> TouchingSearch::operator()() {
+  const auto spacing = [&](std::uint32_t part) { return body_.parts[part].lattice.spacing.mean(); };
+  for (std::uint32_t a = 0; a < body_.parts.size(); ++a)
+    for (std::uint32_t b = a + 1; b < body_.parts.size(); ++b) {
+      if (points_[a].empty() || points_[b].empty()) continue;
+      if (!overlap(box_[a], box_[b], margin(a, b))) continue;
+      spacing(a) <= spacing(b) ? touch(a, b) : touch(b, a);
+    }
+  return std::move(found_);
+}
+
+}  // namespace
+
+std::vector<TouchingPoint> touching_points(const Problem& problem, const std::vector<TouchingGap>& wider) {
+  if (problem.body.parts.size() < 2) return {};
+  return TouchingSearch(problem, wider)();
+}
+
+}  // namespace flexel::simulate

@@ -1,0 +1,58 @@
+// Which elements carry a material point of the body, and with what weights.
+//
+// Corner placement: the eight elements of a cell, trilinear. Centre placement: the nearest element, or, where
+// the half voxel between it and the surface matters, that element and its neighbours along the lattice's axes
+// (affine, exact for affine displacements).
+#pragma once
+#include <optional>
+
+#include "formats/lattice/locate.h"
+#include "simulate/state/state.h"
+
+namespace flexel::simulate {
+
+struct InterpolationWeights {
+  std::array<std::uint32_t, 8> elements{};
+  std::array<double, 8> weights{};  // sum 1
+  std::uint32_t count = 0;          // of both that are used
+};
+
+[[nodiscard]] InterpolationWeights cell_carrier(const Body& body, const CellPoint& point);
+
+// What carries `point` (m, rest, world frame) on polygon `polygon` of the surface, `outward` the polygon's
+// normal: the cell under it, or the nearest element of the polygon's part, one on the inner side of the
+// surface before any other. Nothing when no cell or no element within two voxels is there or it is stray.
+[[nodiscard]] std::optional<InterpolationWeights> carrier_on_surface(const Problem& problem,
+                                                                     std::uint32_t polygon, const Vec3& point,
+                                                                     const Vec3& outward);
+
+// Likewise, for many points of one polygon. Keeps a reference to `problem`.
+class SurfaceCarriers {
+ public:
+  SurfaceCarriers(const Problem& problem, std::uint32_t polygon);
+  [[nodiscard]] std::optional<InterpolationWeights> operator()(const Vec3& point, const Vec3& outward);
+
+ private:
+  const Problem& problem_;
+  std::uint32_t part_;
+  std::optional<SurfaceLocator> locate_;  // corner placement
+};
+
+// The element of a centre-placed part that rests nearest to `point`; nothing where none lies within two
+// voxels. Those with outward . (element - point) <= 0 go before all others; a zero vector tells none apart.
+[[nodiscard]] std::optional<std::uint32_t> nearest_element(const Problem& problem, std::uint32_t part,
+                                                           const Vec3& point, const Vec3& outward);
+
+// `carrier` of a point near one element of a centre-placed part, with the gradient fitted to its neighbours:
+// u(p) = u_e + sum_f w_f (u_f - u_e), w_f = (p - x_e) . M^-1 (x_f - x_e), M = sum_f (x_f - x_e)(x_f - x_e)^T.
+// A carrier of a cell stays as it is.
+[[nodiscard]] InterpolationWeights with_gradient(const Problem& problem, const InterpolationWeights& carrier,
+                                                 const Vec3& point);
+
+// (elements) m^3: the matter of each element that is simulated: its voxel (centre placement), or an eighth of
+// the filled volume of each unbroken cell around it.
+[[nodiscard]] std::vector<double> element_volumes(const Problem& problem);
+// (elements) kg, likewise.
+[[nodiscard]] std::vector<double> element_masses(const Problem& problem);
+
+}  // namespace flexel::simulate

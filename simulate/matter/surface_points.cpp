@@ -1,0 +1,192 @@
+// Bisection goes in two goes, the first to pieces large enough to be shared out to threads: one face may be
+// two triangles. Depth first both times, so that the order is that of one go. Longest-edge bisection keeps
+// the pieces of long slender triangles (which CAD tessellation is full of) few: their number grows with
+// length over h, not with its square. The centroid rule on such small pieces integrates the piecewise
+// trilinear weights of the cells to well under a percent of one cell's share, and exactly in sum, since the
+// weights of a point sum to 1.
+#include "simulate/matter/surface_points.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <numeric>
+
+#include "base/parallel.h"
+
+namespace flexel::simulate {
+namespace {
+
+constexpr double kLongestEdge = 0.3;  // of a piece, in spacings
+constexpr double kThreadShare = 32;   // longest edge of what one thread cuts at a time, in those of a piece
+
+using Corners = std::array<Vec3, 3>;
+
+// each(piece) for every piece of a triangle, depth first.
+template <class Each>
+void for_each_piece(const Corners& triangle, double longest, const Each& each) {
+  std::vector<Corners> pending{triangle};
+  while (!pending.empty()) {
+    const Corners corners = pending.back();
+    pending.pop_back();
+    std::size_t edge = 0;
+    double squared = 0;
+    for (std::size_t e = 0; e < 3; ++e) {
+      const double length = (corners[(e + 1) % 3] - corners[e]).squaredNorm();
+      if (length > squared) {
+        squared = length;
+        edge = e;
+      }
+    }
+    if (!(squared > longest * longest)) {
+      each(corners);
+      continue;
+    }
+    const Vec3 middle = 0.5 * (corners[edge] + corners[(edge + 1) % 3]);
+    const Vec3& apex = corners[(edge + 2) % 3];
+    pending.push_back({middle, corners[(edge + 1) % 3], apex});
+    pending.push_back({corners[edge], middle, apex});
+  }
+}
+
+// The triangles of the selected polygons, by polygon.
+std::vector<std::uint32_t> selected_triangles(const Body& body, const Triangles& triangles,
+                                              const std::vector<std::uint32_t>& polygons) {
+  std::vector<std::uint8_t> chosen(body.surface.polygon_count(), 0);
+  for (const std::uint32_t p : polygons) chosen[p] = 1;
+  std::vector<std::uint32_t> list;
+  for (std::uint32_t t = 0; t < triangles.polygon.size(); ++t)
+    if (chosen[triangles.polygon[t]]) list.push_back(t);
+  return list;
+}
+
+// What one thread cuts at a time.
+struct Share {
+  std::uint32_t polygon = 0;
+  Corners corners;
+};
+
+// Longest edge [m] of a piece of a polygon.
+double longest_edge(const Body& body, std::uint32_t polygon) {
+  return kLongestEdge * body.parts[body.surface.polygon_part(polygon)].lattice.spacing.minCoeff();
+}
+
+std::vector<Share> shares_of(const Body& body, const std::vector<std::uint32_t>& polygons) {
+  const Triangles triangles = triangulate(body.surface);
+  std::vector<Share> shares;
+  for (const std::uint32_t t : selected_triangles(body, triangles, polygons)) {
+    const std::uint32_t polygon = triangles.polygon[t];
+    Corners corners;
+    for (std::size_t c = 0; c < 3; ++c) corners[c] = body.surface.vertices[triangles.corners[t][c]];
+    for_each_piece(corners, kThreadShare * longest_edge(body, polygon), [&](const Corners& piece) {
+      shares.push_back({polygon, piece});
+    });
+  }
+  return shares;
+}
+
+// The point of a piece; its carrier has count 0 where nothing carries it.
+SurfacePoint point_of(SurfaceCarriers& carriers, std::uint32_t polygon, const Corners& piece) {
+  SurfacePoint point;
+  point.position = (piece[0] + piece[1] + piece[2]) / 3;
+  point.area_vector = 0.5 * (piece[1] - piece[0]).cross(piece[2] - piece[0]);
+  point.polygon = polygon;
+  if (const auto at = carriers(point.position, point.area_vector)) point.at = *at;
+  return point;
+}
+
+// Sums of a share's points by what carries them: of area, and of area times position and weights.
+class Gathered {
+ public:
+  void add(const SurfacePoint& point) {
+    const double area = point.area_vector.norm();
+    if (point.at.count == 0 || !(area > 0)) return;
+    if (last_ == points_.size() || points_[last_].at.elements != point.at.elements) {
+      last_ = static_cast<std::size_t>(
+          std::find_if(points_.begin(), points_.end(),
+                       [&](const SurfacePoint& each) { return each.at.elements == point.at.elements; }) -
+          points_.begin());
+      if (last_ == points_.size()) {
+        points_.emplace_back().polygon = point.polygon;
+        points_.back().at.elements = point.at.elements;
+        points_.back().at.count = point.at.count;
+        points_.back().at.weights.fill(0);
+        areas_.push_back(0);
+      }
+    }
+    SurfacePoint& sum = points_[last_];
+    areas_[last_] += area;
+    sum.area_vector += point.area_vector;
+    sum.position += area * point.position;
+    for (std::size_t a = 0; a < point.at.count; ++a) sum.at.weights[a] += area * point.at.weights[a];
+  }
+
+  // The means.
+  std::vector<SurfacePoint> take() {
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      points_[i].position /= areas_[i];
+      for (double& weight : points_[i].at.weights) weight /= areas_[i];
+    }
+    return std::move(points_);
+  }
+
+ private:
+  std::vector<SurfacePoint> points_;
+  std::vector<double> areas_;  // m^2
+  std::size_t last_ = 0;
+};
+
+}  // namespace
+
+std::vector<SurfacePoint> surface_points(const Problem& problem, const std::vector<std::uint32_t>& polygons) {
+  const std::vector<Share> shares = shares_of(problem.body, polygons);
+  const auto for_each_piece_of = [&](std::size_t s, const auto& each) {
+    for_each_piece(shares[s].corners, longest_edge(problem.body, shares[s].polygon), each);
+  };
+  // There are some fifty points to a cell under a large face: they are counted first, so that no second copy
+  // is needed.
+  std::vector<std::size_t> begin(shares.size() + 1, 0);
+  parallel_for_each(
+      shares.size(), [&](std::size_t s) { for_each_piece_of(s, [&](const Corners&) { ++begin[s + 1]; }); },
+      16);
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  std::vector<SurfacePoint> points(begin.back());
+  parallel_for_each(
+      shares.size(),
+      [&](std::size_t s) {
+        std::size_t next = begin[s];
+        SurfaceCarriers carriers(problem, shares[s].polygon);
+        for_each_piece_of(
+            s, [&](const Corners& piece) { points[next++] = point_of(carriers, shares[s].polygon, piece); });
+      },
+      16);
+  std::erase_if(points,
+                [](const SurfacePoint& point) { return point.at.count == 0; });  // nothing carries them
+  return points;
+}
+
+std::vector<SurfacePoint> gathered_surface_points(const Problem& problem,
+                                                  const std::vector<std::uint32_t>& polygons) {
+  const std::vector<Share> shares = shares_of(problem.body, polygons);
+  std::vector<std::vector<SurfacePoint>> gathered(shares.size());
+  parallel_for_each(
+      shares.size(),
+      [&](std::size_t s) {
+        Gathered sums;
+        SurfaceCarriers carriers(problem, shares[s].polygon);
+        for_each_piece(shares[s].corners, longest_edge(problem.body, shares[s].polygon),
+                       [&](const Corners& piece) { sums.add(point_of(carriers, shares[s].polygon, piece)); });
+        gathered[s] = sums.take();
+      },
+      16);
+  std::vector<SurfacePoint> points;
+  for (const std::vector<SurfacePoint>& share : gathered)
+    points.insert(points.end(), share.begin(), share.end());
+  return points;
+}
+
+double total_area(const std::vector<SurfacePoint>& points) {
+  double area = 0;
+  for (const SurfacePoint& point : points) area += point.area_vector.norm();
+  return area;
+}
+
+}  // namespace flexel::simulate

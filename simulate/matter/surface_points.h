@@ -1,0 +1,31 @@
+// Quadrature over selected polygons: points on the part's surface at rest, each carried by the cell under it,
+// or by the nearest element (centre placement).
+#pragma once
+#include <vector>
+
+#include "simulate/matter/interpolation_weights.h"
+
+namespace flexel::simulate {
+
+struct SurfacePoint {
+  InterpolationWeights at;
+  Vec3 position = Vec3::Zero();     // m, rest, world frame
+  Vec3 area_vector = Vec3::Zero();  // m^2, outward normal times the area that the point stands for
+  std::uint32_t polygon = 0;
+};
+
+// Triangles are cut in two at their longest edge until that edge is at most 0.3 of the smallest spacing of
+// their part; each piece gives its centroid. Points that nothing carries, or only stray matter, are left out.
+// Order: by polygon.
+[[nodiscard]] std::vector<SurfacePoint> surface_points(const Problem& problem,
+                                                       const std::vector<std::uint32_t>& polygons);
+
+// The same quadrature in few points, for what is linear in position and weights: of the points that one cell
+// (one element) carries within a piece of a polygon of some ten spacings, the mean by area. Sums of area, of
+// area times position and of area times weights stay as they are.
+[[nodiscard]] std::vector<SurfacePoint> gathered_surface_points(const Problem& problem,
+                                                                const std::vector<std::uint32_t>& polygons);
+
+[[nodiscard]] double total_area(const std::vector<SurfacePoint>& points);
+
+}  // namespace flexel::simulate

@@ -1,0 +1,68 @@
+// Model `paper`: the centre-placed parts of a body resist by central springs along their connections, and by
+// nothing else (Jansson and Vergeest, equations 2, 15 and 22; simulate/models/connections.h).
+//
+// Springs alone would let matter turn inside out and stay so. As a measure of that every element with
+// neighbours along each axis of the lattice has a deformation gradient: by differences between the two
+// neighbours along an axis, or between the one and itself. Its determinant J is the volume now over that at
+// rest; states with J <= 0 are refused.
+#pragma once
+#include "simulate/linear/block_matrix.h"
+#include "simulate/models/central_spring.h"
+#include "simulate/models/connections.h"
+
+namespace flexel::simulate {
+
+class PaperModel {
+ public:
+  // Keeps a reference to the problem's body.
+  explicit PaperModel(const Problem& problem);
+
+  [[nodiscard]] const ConnectionRows& rows() const { return rows_; }
+  // (elements) 1: of a centre-placed part, and simulated
+  [[nodiscard]] const std::vector<std::uint8_t>& active() const { return active_; }
+
+  // Elastic energy [J], 1/2 k (d - l)^2 over the connections; infinity where an element has J <= 0.
+  [[nodiscard]] double energy(const State& state) const;
+  // Adds the forces of the connections on their elements [N].
+  void add_forces(const State& state, std::vector<Vec3>& forces) const;
+  // Adds the damping of the connections [N] with b = tau k (equations 3, 16 and 18), from state.velocity;
+  // `damping`: tau of each part [s].
+  void add_damping(const State& state, const std::vector<double>& damping, std::vector<Vec3>& forces) const;
+  // (parts) 1/s^2: an upper bound on the square of the largest frequency in the state; 0: no connections.
+  // With the tension-only tangents k_c of the connections and B_e = sum over those of an element, the energy
+  // of a swing is sum_c 1/2 (u_a - u_b) k_c (u_a - u_b) <= sum_e u_e B_e u_e, hence omega^2 <= 2 max eig(B_e)
+  // / m_e. `mass` (elements) [kg].
+  [[nodiscard]] std::vector<double> frequencies(const State& state, const std::vector<double>& mass) const;
+  // Adds the tangent. With `project` without the negative part that compressed connections have.
+  void add_stiffness(const State& state, bool project, BlockMatrix& matrix) const;
+
+  struct SmallestVolume {
+    double value = 1;  // J
+    std::uint32_t element = 0;
+  };
+  [[nodiscard]] SmallestVolume smallest_volume(const State& state) const;
+  // J of an element; 1 where it lacks neighbours along an axis.
+  [[nodiscard]] double volume_ratio(const State& state, std::uint32_t element) const;
+
+ private:
+  [[nodiscard]] const ConnectionKind& kind(std::uint32_t element, std::uint8_t which) const {
+    return connections_.parts[part_[element]].kinds[which];
+  }
+  // A connection as it is now, from its own rest length (simulate/models/rest_shape.h), and its Hooke constant.
+  [[nodiscard]] Stretch stretched(const State& state, std::uint32_t element,
+                                  const ConnectionRows::Entry& entry) const;
+  [[nodiscard]] double stiffness(std::uint32_t element, const ConnectionRows::Entry& entry) const;
+  [[nodiscard]] std::size_t place(const ConnectionRows::Entry& entry) const {
+    return static_cast<std::size_t>(&entry - rows_.entries.data());
+  }
+
+  const Body& body_;
+  Connections connections_;
+  ConnectionRows rows_;
+  std::vector<std::uint32_t> part_;  // (elements)
+  std::vector<std::uint8_t> active_;
+  std::vector<double> flowed_;  // (entries of rows_) m, change of the rest length; empty: none
+  std::vector<double> factor_;  // (entries of rows_) of the Hooke constant; empty: none
+};
+
+}  // namespace flexel::simulate

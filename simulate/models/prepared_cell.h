@@ -1,0 +1,23 @@
+// The tangent of one cell of model `cells`, prepared for its blocks (simulate/models/cell_model.h).
+#pragma once
+#include <memory>
+
+#include "simulate/models/corner_barrier.h"
+
+namespace flexel::simulate {
+
+// What the rows need of a cell: its tangent, and where that is projected the moduli.
+struct PreparedCell {
+  CellTangent tangent;
+  double coupling = 0;  // mu - lambda ln J [Pa]
+  std::unique_ptr<Mat9> projected;
+  std::unique_ptr<Mat3> added_stress;  // to that of the state in the geometric stiffness [Pa]
+  std::unique_ptr<FoldTangent> folding;
+};
+
+// Of a cell with displacement gradient H. `stress`: that of the geometric stiffness in place of the state's,
+// second Piola-Kirchhoff [Pa]; null: the state's. `project`: to the positive part.
+[[nodiscard]] PreparedCell prepare_cell(const CellKind& kind, const Mat3& gradient, bool project,
+                                        const Mat3* stress);
+
+}  // namespace flexel::simulate

@@ -1,0 +1,64 @@
+// Rest shapes: a cell or connection that is free of stress at another shape than the lattice's, because it
+// flowed (docs/fracture-plasticity.md) or because its shape was renormalised (docs/events.md; Jansson and
+// Vergeest, section 4.1). The body remembers in columns, all 0 where the rest shape is the lattice's:
+//     plastic_flow       (cells x 6) Cp^-1 - I, Cp = Fp^T Fp: xx, yy, zz, xy, yz, zx in the lattice's axes
+//     rest_volume        (cells) Jp - 1, Jp = det Fp
+//     plastic_hourglass  (cells x 12) m, the hourglass displacements of the rest shape, drawn back by F
+//     spring_flow        (cells x 28) m, change of the rest length of each spring of model `springs`
+//     broken_springs     (cells) bits
+//     connection_rest    (elements x 13) m, the same of the connections of model `paper`, at the element that
+//                        has the bit in Body::connections
+//     settled            (elements x 3) m, displacement of the shape that was last renormalised: what a fix
+//     or
+//                        move of a later run starts from
+#pragma once
+#include <optional>
+
+#include "simulate/models/cell_model.h"
+#include "simulate/models/spring_model.h"
+#include "simulate/state/state.h"
+
+namespace flexel::simulate {
+
+// What the cells of a body remember. Refers to the body's columns while it lives.
+class RestShapes {
+ public:
+  explicit RestShapes(const Body& body);
+
+  // Whether any cell or connection can have a rest shape of its own.
+  [[nodiscard]] bool any() const { return any_; }
+  // `kind` for that cell; nothing where its rest shape is the lattice's.
+  [[nodiscard]] std::optional<CellKind> of(const CellKind& kind, const Part& part, std::uint32_t cell) const;
+  [[nodiscard]] std::optional<SpringKind> of(const SpringKind& kind, std::uint32_t cell) const;
+  // Change of the rest length of a connection of model `paper` [m]: of bit `bit` of element `element`.
+  [[nodiscard]] double of_connection(std::uint32_t element, std::size_t bit) const;
+
+ private:
+  const Column *flow_ = nullptr, *volume_ = nullptr, *hourglass_ = nullptr, *springs_ = nullptr,
+               *broken_ = nullptr, *connections_ = nullptr;
+  bool any_ = false;
+};
+
+// Makes the present shape, `displacement` (elements x 3, m), the rest shape of the cells with cells[c] != 0
+// and of the connections between elements with elements[e] != 0 (centre placement). Cells that are broken
+// stay as they are. Hardening (plastic_strain, spring_strain) does too. Throws DivergedError: a cell or an
+// element is turned inside out there.
+void renormalise(Body& body, const Problem& problem, const std::vector<Vec3>& displacement,
+                 const std::vector<std::uint8_t>& cells, const std::vector<std::uint8_t>& elements);
+
+// Likewise of everything that is simulated.
+void renormalise_all(Body& body, const Problem& problem, const std::vector<Vec3>& displacement);
+
+// (elements) m, column "settled"; empty: none.
+[[nodiscard]] std::vector<Vec3> settled_displacement(const Body& body);
+
+// (cells) what a cell's stiffness is beside that of its material: the fill, times the factor of edits
+// (column stiffness_change, the factor less 1).
+[[nodiscard]] std::vector<double> stiffness_shares(const Body& body);
+// (cells) likewise of its mass (column density_change).
+[[nodiscard]] std::vector<double> mass_shares(const Body& body);
+// (elements) the factors of edits at centre placement; empty: none.
+[[nodiscard]] std::vector<double> stiffness_factors(const Body& body);
+[[nodiscard]] std::vector<double> mass_factors(const Body& body);
+
+}  // namespace flexel::simulate

@@ -1,0 +1,157 @@
+// Measured once a run has ended.
+#include "simulate/probes/report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "base/error.h"
+#include "base/units.h"
+#include "formats/lattice/fields.h"
+#include "simulate/input/infill.h"
+#include "simulate/models/connections.h"
+#include "simulate/models/stress.h"
+
+namespace flexel::simulate {
+
+void name_materials(Body& body, const std::vector<Material>& materials) {
+  for (std::size_t p = 0; p < body.parts.size(); ++p) body.parts[p].material = materials[p].name;
+}
+
+void report_materials(const Problem& problem, Progress& progress) {
+  for (std::size_t p = 0; p < problem.materials.size(); ++p)
+    if (const std::string line = infill_line(problem.body.parts[p].name, problem.materials[p]); !line.empty())
+      progress.say(line);
+  for (std::size_t p = 0; p < problem.models.size(); ++p) {
+    const Material& material = problem.materials[p];
+    const std::string& part = problem.body.parts[p].name;
+    if (problem.models[p] == Model::springs && std::abs(material.poisson - 0.25) > 0.005)
+      progress.warn(
+          fmt::format("part \"{}\": model \"springs\" has Poisson's ratio 0.25, not the {:.3g} of {}", part,
+                      material.poisson, material.name));
+    if (problem.models[p] == Model::paper)
+      progress.warn(fmt::format(
+          "part \"{}\": model \"paper\" is stiffer than {} inside (Young's modulus {:.3g} times along the "
+          "lattice's axes) and softer at its surface; it is meant for comparison with the paper, not for "
+          "sizes",
+          part, material.name, axial_stiffness(problem.hooke[p])));
+  }
+}
+
+void measure_displacement(const Body& body, const State& state, SimulateResult& result) {
+  const LargestDisplacement largest = largest_displacement(body, state.displacement);
+  result.largest_displacement = largest.value();
+  result.largest_displacement_at = largest.at;
+}
+
+// A couple is spread by forces that keep their direction: turned about its axis by an angle, the angle's
+// cosine of it is left.
+std::vector<std::string> warnings_of(const SimulateResult& result) {
+  constexpr double kLargestTurn = 10 * std::numbers::pi / 180;
+  // Rigid links are for equilibrium without contact.
+  const char* advice = result.timed || result.settled
+                           ? "lead the place with [[move]] and \"rotation\" instead"
+                           : "write link = \"rigid\", whose torque turns with it";
+  std::vector<std::string> warnings;
+  for (const AppliedLoad& load : result.loads) {
+    if (!load.rotation || load.displacement) continue;  // nothing, or of a rigid link
+    if (const double turn = load.rotation->norm(); turn > kLargestTurn)
+      warnings.push_back(
+          fmt::format("load \"{}\" turned what it acts on by {:.0f} degrees, and its forces keep the "
+                      "direction that they have at rest: about {:.0f} % of its torque is left, and the "
+                      "result is that of so much; {}",
+                      load.name, 180 / std::numbers::pi * turn, std::max(0.0, 100 * std::cos(turn)), advice));
+  }
+  return warnings;
+}
+
+void refuse_not_finite(const SimulateResult& result, const std::string& scene) {
+  double sum = result.elastic_energy + result.mass + result.largest_displacement + result.imbalance.norm() +
+               result.moment_imbalance.norm() + (result.stress ? result.stress->value : 0);
+  for (const ProbeResult& probe : result.probes) sum += probe.displacement.norm();
+  for (const Reaction& reaction : result.reactions) sum += reaction.force.norm() + reaction.moment.norm();
+  std::string largest = "a move, gravity or a part's motion";
+  double most = 0;
+  for (const AppliedLoad& load : result.loads) {
+    sum += load.force.norm() + load.moment.norm();
+    if (const double force = load.force.norm(); !(force <= most)) {
+      most = force;
+      largest = fmt::format("load \"{}\" ({:.3g} N)", load.name, force);
+    }
+  }
+  if (std::isfinite(sum)) return;
+  throw DivergedError(
+      fmt::format("{}: the result is not finite: {} is beyond what can be computed with; check its "
+                  "unit and that of the part",
+                  scene, largest));
+}
+
+// A cell resists by its mean deformation gradient; a corner of it may fold unnoticed, and with it the surface
+// that is mapped through it.
+void measure_corners(const Cells& cells, const Body& body, const State& state, SimulateResult& result,
+                     Progress& progress) {
+  constexpr double kNearlyFolded = 0.2;
+  const SmallestJacobian smallest = cells.smallest_corner_jacobian(state);
+  if (smallest.cell >= body.cell_count()) return;
+  result.smallest_corner_jacobian = smallest.value;
+  result.smallest_corner_at = body.rest[body.cell_elements[smallest.cell][smallest.corner]];
+  if (smallest.value > kNearlyFolded) return;
+  const Vec3& at = result.smallest_corner_at;
+  progress.warn(
+      fmt::format("a corner of a cell near ({}, {}, {}) {} (J = {:.2g}): the result is coarse there; "
+                  "use a smaller spacing, or spread the load or the fix over a larger area",
+                  human_length(at.x()), human_length(at.y()), human_length(at.z()),
+                  smallest.value > 0 ? "is nearly folded" : "is folded", smallest.value));
+}
+
+void measure_stress(const Problem& problem, const State& state, Body& body, SimulateResult& result) {
+  if (body.cell_count() == 0) return;
+  const Stresses computed = stresses(problem, state);
+  const std::optional<LargestStress> largest = largest_stress(body, computed);
+  if (!largest) return;
+  const double yield = problem.materials[largest->part].yield;
+  result.stress = StressSummary{largest->value, largest->at, body.parts[largest->part].name, {}};
+  if (yield > 0) result.stress->yield_share = largest->value / yield;
+  write_stress_columns(computed, body);
+}
+
+void add_shares(const std::vector<PassShare>& shares, std::vector<PassShare>& all) {
+  std::vector<bool> free(all.size(), true);  // two of one name are two
+  for (const PassShare& share : shares) {
+    std::size_t i = 0;
+    while (i < free.size() && !(free[i] && all[i].name == share.name)) ++i;
+    if (i == free.size()) {
+      all.push_back(share);
+      continue;
+    }
+    free[i] = false;
+    all[i].why = share.why;
+    all[i].seconds += share.seconds;
+  }
+}
+
+void explain_times(const std::vector<PassShare>& shares, double seconds, Progress& progress) {
+  double rest = seconds;
+  const auto line = [&](const std::string& name, double taken) {
+    progress.say(
+        fmt::format("time: {:<14} {:8.3f} s {:5.1f} %", name, taken, 100 * taken / std::max(seconds, 1e-9)));
+  };
+  for (const PassShare& share : shares) {
+    line(share.name, share.seconds);
+    rest -= share.seconds;
+  }
+  line("the rest", std::max(rest, 0.0));
+}
+
+double body_extent(const Body& body) {
+  Vec3 low = body.rest[0], high = low;
+  for (const Vec3& at : body.rest) {
+    low = low.cwiseMin(at);
+    high = high.cwiseMax(at);
+  }
+  return (high - low).norm();
+}
+
+}  // namespace flexel::simulate

@@ -1,0 +1,41 @@
+// What every run measures and says, at equilibrium or in time.
+#pragma once
+#include "base/program/progress.h"
+#include "simulate/models/cells.h"
+#include "simulate/result/result.h"
+
+namespace flexel::simulate {
+
+void name_materials(Body& body, const std::vector<Material>& materials);
+
+// What an infill leaves of a part's material, and what models `springs` and `paper` cannot follow of one.
+void report_materials(const Problem& problem, Progress& progress);
+
+// Largest displacement of the part's matter. `body` is at the state already.
+void measure_displacement(const Body& body, const State& state, SimulateResult& result);
+
+// Smallest J at the corners of the cells, with a warning where one is folded or nearly so.
+void measure_corners(const Cells& cells, const Body& body, const State& state, SimulateResult& result,
+                     Progress& progress);
+
+// The stresses of the final state: columns of the body, and the largest. Model `paper` has none.
+void measure_stress(const Problem& problem, const State& state, Body& body, SimulateResult& result);
+
+// What makes figures of a result worth less than they look, for people: torques that turn what they act on by
+// more than 10 degrees.
+[[nodiscard]] std::vector<std::string> warnings_of(const SimulateResult& result);
+
+// Throws DivergedError where a figure of the result is NaN or infinite, naming the largest load.
+void refuse_not_finite(const SimulateResult& result, const std::string& scene);
+
+// Adds the times that effects took in one stretch of a run to those of the stretches before: an effect that
+// was there already goes on.
+void add_shares(const std::vector<PassShare>& shares, std::vector<PassShare>& all);
+
+// What --explain says after a run of so many seconds: the time of each share, and what is in none of them.
+void explain_times(const std::vector<PassShare>& shares, double seconds, Progress& progress);
+
+// Diagonal of the box around the elements at rest [m].
+[[nodiscard]] double body_extent(const Body& body);
+
+}  // namespace flexel::simulate

@@ -1,0 +1,36 @@
+// How a run is to be done, but for its scene.
+#pragma once
+#include <memory>
+#include <optional>
+#include <string>
+
+namespace flexel::simulate {
+
+struct Checkpoint;  // simulate/time/checkpoint.h
+
+struct SimulateOptions {
+  int threads = 0;                // 0: every core
+  std::string failed_output;      // where the last good state goes when the run fails; "" for nowhere
+  std::optional<double> timeout;  // s, after which the run stops
+  // Timed runs: where the books go (CSV), and the frames (.pvd); "" for nowhere. docs/motion.md
+  std::string history, series;
+  bool compress = false;  // the frames
+  // Timed runs: where checkpoints go ("" for nowhere), how many seconds of work lie between two, what the
+  // output is called, for them; and the one that the run goes on from, whose scene and body simulate() is
+  // given.
+  std::string checkpoint;
+  double checkpoint_every = 600;
+  std::string output;
+  std::shared_ptr<const Checkpoint> resume;
+  // Timed runs: where frames go at `live_rate` a second in real time, every `live_state`-th with the
+  // positions (0: none); "" for nowhere. docs/live.md
+  std::string live;
+  double live_rate = 100;
+  int live_state = 1;
+  std::string isa;       // "portable", "avx2", "avx512"; "" for the best that the machine has
+  bool stress = true;    // compute it, and give the body its columns
+  bool estimate = true;  // equilibrium: error bars, by two runs on coarser lattices
+  bool explain = false;  // say which effects run and why, and afterwards the share of time of each
+};
+
+}  // namespace flexel::simulate

@@ -1,0 +1,38 @@
+// The list of events. A new one is added here and nowhere else.
+#pragma once
+#include <fmt/format.h>
+
+#include "base/error.h"
+#include "base/nearest_word.h"
+#include "simulate/events/add.h"
+#include "simulate/events/carve.h"
+#include "simulate/events/edit.h"
+#include "simulate/events/fuse.h"
+#include "simulate/events/renormalise.h"
+
+namespace flexel::simulate {
+
+template <class... E>
+struct EventList {
+  // [[event]] of a scene, in order of time; of those at one time in order of the file. Throws InputError.
+  [[nodiscard]] static Event parse(TableReader& reader) {
+    const double at = reader.to_quantity(reader.require("at", "\"0.2 s\""), Dimension::time, "at");
+    const SceneValue& what = reader.require("do", "\"renormalise\"");
+    std::optional<Event> event;
+    const auto attempt = [&](auto parse, const char* name) {
+      if (!event && what.text == name) event = make_event(parse(reader), at, reader.place());
+    };
+    (attempt([](TableReader& r) { return E::parse(r); }, E::name), ...);
+    if (!event) {
+      const std::vector<std::string> names{E::name...};
+      reader.fail(what.line, fmt::format("no event \"{}\"{}; known: {}", what.text,
+                                         did_you_mean(what.text, names), fmt::join(names, ", ")));
+    }
+    reader.finish();
+    return std::move(*event);
+  }
+};
+
+using Events = EventList<Renormalise, Edit, Carve, Fuse, Add>;
+
+}  // namespace flexel::simulate

@@ -1,0 +1,167 @@
+// Which material each part is made of, and whether its model can be run.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "base/error.h"
+#include "base/nearest_word.h"
+#include "base/units.h"
+#include "simulate/input/material_names.h"
+#include "simulate/scene/scene.h"
+#include "simulate/scene/scene_checks.h"
+
+namespace flexel::simulate {
+namespace {
+
+Material material_named(const Scene& scene, const std::string& name, const std::string& origin) {
+  for (const auto& [own, material] : scene.materials)
+    if (same_material_name(own, name)) return material;
+  if (const Material* material = library_material(name)) return *material;
+  std::vector<std::string> names;
+  for (const auto& [each, material] : scene.materials) names.push_back(each);
+  for (const Material& material : material_library()) names.push_back(material.name);
+  std::string hint = did_you_mean(name, names);
+  if (hint.empty())
+    hint = fmt::format("; known: {}; or give [materials.\"{}\"]", fmt::join(names, ", "), name);
+  throw InputError(origin, fmt::format("no material \"{}\"{}", name, hint));
+}
+
+// What [parts.NAME], the scene or the body says; "" where nothing does.
+const std::string& name_of_material(const Scene& scene, const Part& part) {
+  const auto own = scene.parts.find(part.name);
+  if (own != scene.parts.end() && !own->second.material.empty()) return own->second.material;
+  return scene.material.empty() ? part.material : scene.material;
+}
+
+const char* default_model(const Part& part) {
+  return part.placement == Placement::corner ? "cells" : "paper";
+}
+
+void refuse_uneven(const PartSettings& settings, const std::string& model, const Part& part) {
+  const Vec3& h = part.lattice.spacing;
+  if (h.maxCoeff() <= (1 + 1e-6) * h.minCoeff()) return;
+  throw InputError(
+      settings.origin,
+      fmt::format("model \"{}\" needs a cubic lattice; the spacings of part \"{}\" are {} x {} "
+                  "x {}: voxelize with --align none",
+                  model, part.name, human_length(h.x()), human_length(h.y()), human_length(h.z())));
+}
+
+void refuse_placement(const PartSettings& settings, const std::string& model, const Part& part) {
+  const bool centre = part.placement == Placement::centre;
+  if (model == "paper" && !centre)
+    throw InputError(
+        settings.origin,
+        fmt::format("model \"paper\" needs an element at the centre of each voxel: voxelize part "
+                    "\"{}\" with --placement centre; with this one it can be \"cells\" or \"springs\"",
+                    part.name));
+  if (model != "paper" && centre)
+    throw InputError(
+        settings.origin,
+        fmt::format("model \"{}\" needs elements at the corners of the voxels: voxelize part "
+                    "\"{}\" with --placement corner; with --placement centre it can only be \"paper\"",
+                    model, part.name));
+}
+
+void refuse_model(const PartSettings& settings, const Part& part) {
+  const std::string model = settings.model.empty() ? default_model(part) : settings.model;
+  if (model != "cells" && model != "springs" && model != "paper")
+    throw InputError(settings.origin, fmt::format("no model \"{}\"{}", model,
+                                                  did_you_mean(model, {"cells", "springs", "paper"})));
+  refuse_placement(settings, model, part);
+  if (model != "cells") refuse_uneven(settings, model, part);
+  if (settings.hooke.empty()) return;
+  if (model != "paper")
+    throw InputError(
+        settings.origin,
+        fmt::format("\"hooke\" belongs to model \"paper\"; part \"{}\" has model \"{}\"", part.name, model));
+  if (settings.hooke != "paper" && settings.hooke != "ganovelli")
+    throw InputError(settings.origin,
+                     fmt::format("no Hooke constant \"{}\"{}; known: paper, ganovelli", settings.hooke,
+                                 did_you_mean(settings.hooke, {"paper", "ganovelli"})));
+}
+
+}  // namespace
+
+std::vector<Model> models_of_parts(const Scene& scene, const Body& body) {
+  std::vector<Model> models;
+  for (const Part& part : body.parts) {
+    const auto found = scene.parts.find(part.name);
+    const std::string model = found != scene.parts.end() && !found->second.model.empty()
+                                  ? found->second.model
+                                  : default_model(part);
+    models.push_back(model == "springs" ? Model::springs : model == "paper" ? Model::paper : Model::cells);
+  }
+  return models;
+}
+
+std::vector<HookeConstant> hooke_of_parts(const Scene& scene, const Body& body) {
+  std::vector<HookeConstant> constants;
+  for (const Part& part : body.parts) {
+    const auto found = scene.parts.find(part.name);
+    const bool ganovelli = found != scene.parts.end() && found->second.hooke == "ganovelli";
+    constants.push_back(ganovelli ? HookeConstant::ganovelli : HookeConstant::paper);
+  }
+  return constants;
+}
+
+std::vector<Material> materials_of_parts(const Scene& scene, const Body& body) {
+  std::vector<std::string> names;
+  for (const Part& part : body.parts) names.push_back(part.name);
+  for (const auto& [name, settings] : scene.parts)
+    if (std::find(names.begin(), names.end(), name) == names.end() &&
+        std::find(scene.coming_parts.begin(), scene.coming_parts.end(), name) == scene.coming_parts.end()) {
+      std::string hint = did_you_mean(name, names);
+      if (hint.empty()) hint = fmt::format("; it has {}", fmt::join(names, ", "));
+      throw InputError(settings.origin, fmt::format("the body has no part \"{}\"{}", name, hint));
+    }
+  std::vector<Material> materials;
+  bool infill_used = false;  // the scene's
+  for (const Part& part : body.parts) {
+    PartSettings settings;
+    settings.origin = scene.name;
+    if (const auto found = scene.parts.find(part.name); found != scene.parts.end()) settings = found->second;
+    refuse_model(settings, part);
+    const std::string& name = name_of_material(scene, part);
+    if (name.empty())
+      throw InputError(
+          scene.name, fmt::format("part \"{}\" has no material: write material = \"steel\" at the top of the "
+                                  "scene, or [parts.\"{}\"] material = ...",
+                                  part.name, part.name));
+    // an infill belongs to the material that is named with it
+    const Infill& infill =
+        settings.infill.share || !settings.material.empty() ? settings.infill : scene.infill;
+    infill_used = infill_used || settings.material.empty();
+    Material material = material_named(scene, name, settings.origin);
+    if (infill.share) {
+      const auto index = static_cast<std::size_t>(&part - body.parts.data());
+      const double walls =
+          infill.shell ? wall_share(*infill.shell, part, body.surface, index, settings.origin) : 0;
+      material = with_infill(std::move(material), *infill.share, walls);
+    }
+    materials.push_back(std::move(material));
+  }
+  if (scene.infill.share && !infill_used)
+    throw InputError(scene.name,
+                     "the infill is that of the scene's material, which no part takes: give it to a part, "
+                     "[parts.NAME] infill = \"20 %\" or --infill \"PART=20%\"");
+  return materials;
+}
+
+void warn_of_unused_materials(const Scene& scene, const Body& body, Progress& progress) {
+  std::vector<std::string> used;
+  for (const Part& part : body.parts) used.push_back(name_of_material(scene, part));
+  if (!scene.events.empty()) {  // a part that joins later
+    used.push_back(scene.material);
+    for (const auto& [name, settings] : scene.parts) used.push_back(settings.material);
+  }
+  for (const auto& [name, material] : scene.materials)
+    if (std::none_of(used.begin(), used.end(),
+                     [&own = name](const std::string& each) { return same_material_name(each, own); }))
+      progress.warn(
+          fmt::format("{}: [materials.{}] is used by no part: write material = \"{}\" at the top of the "
+                      "scene or in [parts.NAME], or leave it out",
+                      scene.name, name, name));
+}
+
+}  // namespace flexel::simulate

@@ -1,0 +1,58 @@
+// Materials whose strength is not known are named, so that nobody takes silence for safety.
+#include "simulate/scene/strength.h"
+
+#include <algorithm>
+
+#include "base/error.h"
+#include "simulate/scene/scene.h"
+
+namespace flexel::simulate {
+namespace {
+
+// Of the elements of part p: where the stress is largest.
+std::uint32_t most_stressed(const Part& part, const std::vector<double>& stress) {
+  std::uint32_t most = part.element_begin;
+  for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
+    if (stress[e] > stress[most]) most = e;
+  return most;
+}
+
+}  // namespace
+
+std::optional<StrengthSummary> nearest_to_strength(const Body& body, const std::vector<Material>& materials,
+                                                   std::vector<std::string>& unknown) {
+  const auto column = body.element_columns.find("von_mises");
+  if (column == body.element_columns.end()) return std::nullopt;
+  const auto& stress = column->second.values;
+  std::optional<StrengthSummary> found;
+  for (std::size_t p = 0; p < body.parts.size(); ++p) {
+    const Part& part = body.parts[p];
+    const Material& material = materials[p];
+    if (part.element_begin == part.element_end) continue;
+    const double limit = material.yield > 0 ? material.yield : material.strength;
+    if (!(limit > 0)) {
+      if (std::find(unknown.begin(), unknown.end(), material.name) == unknown.end())
+        unknown.push_back(material.name);
+      continue;
+    }
+    const std::uint32_t most = most_stressed(part, stress);
+    const double share = stress[most] / limit;
+    if (found && share <= found->share) continue;
+    found = StrengthSummary{share,     stress[most], body.rest[most], limit, material.yield > 0,
+                            part.name, material.name};
+    if (material.layer_strength > 0) found->layer_share = stress[most] / material.layer_strength;
+  }
+  return found;
+}
+
+std::vector<Material> known_materials(const Scene& scene, const Body& body) {
+  try {
+    return materials_of_parts(scene, body);
+  } catch (const InputError&) {
+    std::vector<Material> named(body.parts.size());
+    for (std::size_t p = 0; p < named.size(); ++p) named[p].name = body.parts[p].material;
+    return named;
+  }
+}
+
+}  // namespace flexel::simulate

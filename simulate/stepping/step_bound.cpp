@@ -1,0 +1,70 @@
+// Frequencies of cells, connections and effects, put together.
+#include "simulate/stepping/step_bound.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "simulate/models/damping_factors.h"
+#include "simulate/models/stability.h"
+
+namespace flexel::simulate {
+namespace {
+
+// Of each part, by what edits made of that of its cells and elements.
+std::vector<double> longest_damping(const Body& body, const std::vector<double>& of_parts) {
+  std::vector<double> longest = of_parts;
+  const std::vector<double> cells = damping_factors(body), elements = element_damping_factors(body);
+  for (std::size_t p = 0; p < longest.size(); ++p) {
+    const Part& part = body.parts[p];
+    const bool by_cells = part.placement == Placement::corner;
+    const std::vector<double>& factor = by_cells ? cells : elements;
+    if (factor.empty()) continue;
+    const auto from = static_cast<std::ptrdiff_t>(by_cells ? part.cell_begin : part.element_begin);
+    const auto to = static_cast<std::ptrdiff_t>(by_cells ? part.cell_end : part.element_end);
+    if (from < to) longest[p] *= *std::max_element(factor.begin() + from, factor.begin() + to);
+  }
+  return longest;
+}
+
+}  // namespace
+
+StepBound::StepBound(const Problem& problem, const std::vector<Pass>& passes, const KernelEffects& plan)
+    : problem_(problem),
+      passes_(passes),
+      plan_(plan),
+      cells_(cell_frequencies(problem)),
+      stiffening_(cells_.size(), 1),
+      connections_(cells_.size(), 0),
+      damping_(longest_damping(problem.body, plan.damping)) {}
+
+bool StepBound::damps_explicitly() const {
+  double bare = std::numeric_limits<double>::infinity(), damped = bare;
+  for (std::size_t p = 0; p < cells_.size(); ++p) {
+    bare = std::min(bare, stable_step(cells_[p], 0));
+    damped = std::min(damped, stable_step(cells_[p], damping_[p]));
+  }
+  return damped >= 0.5 * bare;
+}
+
+void StepBound::look(const State& state, const PaperModel* paper, const std::vector<double>& mass) {
+  stiffening_ = stiffening(problem_, state.displacement, plan_);
+  if (paper) connections_ = paper->frequencies(state, mass);
+  added_ = 0;
+  for (const Pass& pass : passes_)
+    if (pass.added_frequency) added_ += pass.added_frequency(state, mass);
+}
+
+double StepBound::longest(bool implicit_damping) const {
+  double longest = std::numeric_limits<double>::infinity();
+  for (std::size_t p = 0; p < cells_.size(); ++p) {
+    // a part has cells or connections
+    const double own = cells_[p] * stiffening_[p] + connections_[p];
+    const double damping = implicit_damping && connections_[p] == 0 ? 0 : damping_[p];
+    // what effects add is not damped: total dt^2 / 4 + tau own dt / 2 <= 1
+    const double total = own + added_;
+    longest = std::min(longest, stable_step(total, total > 0 ? damping * (own / total) : 0));
+  }
+  return longest;
+}
+
+}  // namespace flexel::simulate

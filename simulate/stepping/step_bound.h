@@ -1,0 +1,34 @@
+// The longest stable step of a whole run: cells, connections and the stiffness that effects add
+// (simulate/models/stability.h), in the state that was last looked at.
+#pragma once
+#include <vector>
+
+#include "simulate/effects/effect.h"
+#include "simulate/models/paper_model.h"
+
+namespace flexel::simulate {
+
+class StepBound {
+ public:
+  // Keeps references to all.
+  StepBound(const Problem& problem, const std::vector<Pass>& passes, const KernelEffects& plan);
+
+  // Whether explicit damping of the cells leaves at least half of the undamped step.
+  [[nodiscard]] bool damps_explicitly() const;
+
+  // Looks at how stiff everything is now. `paper`: the centre-placed parts, or none.
+  void look(const State& state, const PaperModel* paper, const std::vector<double>& mass);
+
+  // s; `implicit_damping`: that of the cells does not count. 0 or less: a cell is folded.
+  [[nodiscard]] double longest(bool implicit_damping) const;
+
+ private:
+  const Problem& problem_;
+  const std::vector<Pass>& passes_;
+  const KernelEffects& plan_;
+  std::vector<double> cells_, stiffening_, connections_;  // (parts) 1/s^2 at rest, its growth; 1/s^2
+  std::vector<double> damping_;                           // (parts) s, the longest time of a cell
+  double added_ = 0;                                      // 1/s^2
+};
+
+}  // namespace flexel::simulate

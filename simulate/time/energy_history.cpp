@@ -1,0 +1,292 @@
+// Sums over the body at samples; powers at every step.
+#include "simulate/time/energy_history.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <iterator>
+#include <utility>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "simulate/stepping/failure_messages.h"
+
+namespace flexel::simulate {
+namespace {
+
+constexpr std::size_t kFirstJudged =
+    20;                            // row; at the start energies are small and steps meet what moves at once
+constexpr double kMostLost = 0.5;  // of the largest energy, that the books may lack
+constexpr double kLeastStrain = 1e-6;  // of all matter, whose energy is too little to be judged
+
+struct Momenta {
+  double kinetic = 0;
+  Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
+  Momenta& operator+=(const Momenta& other) {
+    kinetic += other.kinetic;
+    linear += other.linear;
+    angular += other.angular;
+    return *this;
+  }
+};
+
+const char* called(Account::Kind kind) {
+  switch (kind) {
+    case Account::Kind::work:
+      return "work";
+    case Account::Kind::dissipation:
+      return "dissipated";
+    case Account::Kind::storage:
+      break;
+  }
+  return "stored";
+}
+
+Account::Kind kind_of(Book book) {
+  return book == Book::stored        ? Account::Kind::storage
+         : book == Book::dissipation ? Account::Kind::dissipation
+                                     : Account::Kind::work;
+}
+
+}  // namespace
+
+std::size_t Ledger::account(const std::string& name, Account::Kind kind) {
+  for (std::size_t a = 0; a < accounts.size(); ++a)
+    if (accounts[a].name == name) return a;
+  accounts.push_back({name, kind, 0});
+  return accounts.size() - 1;
+}
+
+std::string Ledger::csv() const {
+  std::string text = "time [s],kinetic [J],elastic [J],potential [J],work [J],dissipated [J],residual [J]";
+  auto out = std::back_inserter(text);
+  for (const Account& account : accounts)
+    fmt::format_to(out, ",{} {} [J]", account.name, called(account.kind));
+  for (const char* name : {"momentum", "angular momentum"})
+    for (const char axis : {'x', 'y', 'z'})
+      fmt::format_to(out, ",{} {} [{}]", name, axis, std::string(name) == "momentum" ? "kg m/s" : "kg m2/s");
+  for (const std::string& probe : probes)
+    for (const char axis : {'x', 'y', 'z'}) fmt::format_to(out, ",{} {} [m]", probe, axis);
+  for (const std::string& column : columns) fmt::format_to(out, ",{}", column);
+  text += '\n';
+  for (const BookRow& row : rows) {
+    const Energies& e = row.energies;
+    fmt::format_to(out, "{:.17g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.3g}", row.time, e.kinetic, e.elastic,
+                   e.potential, e.work, e.dissipated, e.residual);
+    for (std::size_t a = 0; a < accounts.size(); ++a)
+      fmt::format_to(out, ",{:.9g}", a < row.accounts.size() ? row.accounts[a] : 0.0);
+    for (const Vec3& vector : {row.momentum, row.angular})
+      for (const double value : vector) fmt::format_to(out, ",{:.12g}", value);
+    for (const double value : row.probes) fmt::format_to(out, ",{:.12g}", value);
+    for (const double value : row.values) fmt::format_to(out, ",{:.9g}", value);
+    text += '\n';
+  }
+  return text;
+}
+
+std::vector<std::pair<std::string, double>> Ledger::sums() const {
+  const Energies& last = rows.back().energies;
+  return {{"kinetic", last.kinetic},
+          {"elastic", last.elastic},
+          {"potential", last.potential},
+          {"work", last.work},
+          {"dissipated", last.dissipated},
+          {"worst_residual", worst_residual},
+          {"worst_contact_error", worst_unstored},
+          {"largest_term", largest_term}};
+}
+
+EnergyHistory::EnergyHistory(const Problem& problem, const std::vector<Pass>& passes,
+                             const std::vector<ProbePoints>& probes, const std::vector<double>& mass,
+                             const PaperModel* paper, const KernelEffects& plan, Ledger ledger)
+    : problem_(problem),
+      passes_(passes),
+      probes_(probes),
+      mass_(mass),
+      paper_(paper),
+      cells_(problem, no_stencil_),
+      forces_(passes.size()),
+      remembers_(plan.remembers()),
+      ledger_(std::move(ledger)) {
+  own_.assign(passes.size(), 0);
+  stored_.assign(passes.size(), 0);
+  for (const Part& part : problem.body.parts)
+    for (std::uint32_t e = part.element_begin; e < part.element_end; ++e) {
+      const Material& material =
+          problem.materials[static_cast<std::size_t>(&part - problem.body.parts.data())];
+      least_ += kLeastStrain * kLeastStrain * material.young * mass[e] / material.density;
+    }
+  for (std::size_t p = 0; p < passes.size(); ++p) {
+    if (!passes[p].add_forces || passes[p].book == Book::potential) continue;
+    forces_[p].assign(problem.body.element_count(), Vec3::Zero());
+    own_[p] = ledger_.account(passes[p].name, kind_of(passes[p].book));
+  }
+  supports_ = ledger_.account("supports", Account::Kind::work);
+  damping_ = ledger_.account("damping", Account::Kind::dissipation);
+  if (!plan.plasticity.empty()) plasticity_ = ledger_.account("plasticity", Account::Kind::dissipation);
+  if (!plan.fracture.empty()) fracture_ = ledger_.account("fracture", Account::Kind::dissipation);
+  ledger_.probes.clear();
+  for (const ProbePoints& probe : probes) ledger_.probes.push_back(probe.name);
+  ledger_.columns.clear();
+  for (const Pass& pass : passes)
+    ledger_.columns.insert(ledger_.columns.end(), pass.history_columns.begin(), pass.history_columns.end());
+}
+
+void EnergyHistory::before(const State& state, bool sample, double folding) {
+  for (std::size_t p = 0; p < passes_.size(); ++p) {
+    if (!passes_[p].injected_energy) continue;
+    const double more = passes_[p].injected_energy(state);
+    if (more == 0) continue;
+    ledger_.accounts[own_[p]].energy -= more;
+    ledger_.accounts[ledger_.account(passes_[p].injected_by, Account::Kind::work)].energy += more;
+  }
+  velocity_ = state.velocity;
+  sample_ = sample;
+  time_ = *state.time;
+  if (!sample) return;
+  sampled_.displacement = state.displacement;
+  sampled_.time = state.time;
+  // with plasticity, fracture or rest shapes the step tells that of the cells
+  elastic_ = (remembers_ ? folding : cells_.energy(state)) + (paper_ ? paper_->energy(state) : 0);
+  potential_ = 0;
+  for (std::size_t p = 0; p < passes_.size(); ++p) {
+    if (!passes_[p].energy) continue;
+    if (passes_[p].book == Book::potential) potential_ += passes_[p].energy(state);
+    if (passes_[p].book == Book::stored) stored_[p] = passes_[p].energy(state);
+  }
+}
+
+void EnergyHistory::after(const State& state, const StepOutcome& outcome, const std::vector<Vec3>& damping,
+                          const std::vector<Vec3>& supports, double previous_step, double step,
+                          bool half_kick) {
+  // A half kick from v(0) makes v(1/2); the same forces for as long before it would have made v(0) from
+  // v(-1/2) = 2 v(0) - v(1/2), and with that one the kinetic energy changes by the work of whole kicks.
+  if (half_kick)
+    parallel_for_each(velocity_.size(),
+                      [&](std::size_t e) { velocity_[e] = 2 * velocity_[e] - state.velocity[e]; });
+  const auto add_powers = [&](const std::vector<Vec3>& velocity, double time) {
+    const auto enter = [&](std::size_t account, const std::vector<Vec3>& forces) {
+      ledger_.accounts[account].energy += time * parallel_sum<double>(forces.size(), [&](std::size_t e) {
+                                            return forces[e].dot(velocity[e]);
+                                          });
+    };
+    for (std::size_t p = 0; p < passes_.size(); ++p)
+      if (!forces_[p].empty()) enter(own_[p], forces_[p]);
+    enter(supports_, supports);
+    enter(damping_, damping);
+    enter(damping_, connection_damping_);
+  };
+  // before an event the half step to it was entered
+  if (!ledger_.changed) add_powers(velocity_, 0.5 * previous_step);
+  const std::vector<Account> kept = closing_ ? ledger_.accounts : std::vector<Account>();
+  if (plasticity_) ledger_.accounts[*plasticity_].energy -= outcome.plastic_work;
+  if (fracture_) ledger_.accounts[*fracture_].energy -= outcome.released;
+  if (outcome.elastic) elastic_ += *outcome.elastic;
+  if (sample_) add_row(state, supports);
+  if (closing_)
+    ledger_.accounts = kept;
+  else
+    add_powers(state.velocity, 0.5 * step);
+}
+
+void EnergyHistory::add_row_of(const State& state, const std::vector<Vec3>& supports) {
+  before(state, true);
+  if (remembers_) elastic_ += cells_.energy(state);  // no step tells it
+  add_row(state, supports);
+}
+
+void EnergyHistory::enter(const std::vector<Vec3>& moved, const std::vector<Vec3>& damping,
+                          const std::vector<Vec3>& supports, double numerical) {
+  const auto add = [&](std::size_t account, const std::vector<Vec3>& forces) {
+    ledger_.accounts[account].energy +=
+        parallel_sum<double>(forces.size(), [&](std::size_t e) { return forces[e].dot(moved[e]); });
+  };
+  for (std::size_t p = 0; p < passes_.size(); ++p)
+    if (!forces_[p].empty()) add(own_[p], forces_[p]);
+  add(supports_, supports);
+  add(damping_, damping);
+  ledger_.accounts[ledger_.account("numerical", Account::Kind::dissipation)].energy -= numerical;
+}
+
+// What an event changed of what is stored, it gave or took: the sum of what stores lack stays what it was.
+void EnergyHistory::book_stored_by_event() {
+  double lacking = ledger_.unstored_now - ledger_.unstored;
+  std::optional<std::size_t> store;
+  for (std::size_t p = 0; p < passes_.size(); ++p) {
+    if (passes_[p].book != Book::stored || forces_[p].empty()) continue;
+    store = own_[p];
+    lacking += ledger_.accounts[own_[p]].energy + stored_[p];
+  }
+  if (store) ledger_.accounts[*store].energy -= lacking;
+}
+
+void EnergyHistory::add_row(const State& state, const std::vector<Vec3>& supports) {
+  const Momenta sum = parallel_sum<Momenta>(mass_.size(), [&](std::size_t e) {
+    const Vec3 mean = 0.5 * (velocity_[e] + state.velocity[e]);
+    const Vec3 at = problem_.body.rest[e] + sampled_.displacement[e];
+    return Momenta{0.5 * mass_[e] * velocity_[e].dot(state.velocity[e]), mass_[e] * mean,
+                   mass_[e] * at.cross(mean)};
+  });
+  BookRow row;
+  row.time = time_;
+  row.momentum = sum.linear;
+  row.angular = sum.angular;
+  Energies& now = row.energies;
+  now = {sum.kinetic, elastic_, potential_, 0, 0, 0};
+  if (ledger_.changed && !ledger_.rows.empty()) book_stored_by_event();
+  double unstored = 0;
+  for (std::size_t p = 0; p < passes_.size(); ++p) {
+    if (passes_[p].book != Book::stored || forces_[p].empty()) continue;
+    if (!ledger_.start) ledger_.accounts[own_[p]].energy -= stored_[p];  // that it begins with
+    if (stored_[p] == 0 && ledger_.accounts[own_[p]].energy != 0) {
+      const double left = std::exchange(ledger_.accounts[own_[p]].energy, 0);
+      ledger_.accounts[ledger_.account("numerical", Account::Kind::dissipation)].energy += left;
+      ledger_.unstored -= left;
+    }
+    unstored -= ledger_.accounts[own_[p]].energy + stored_[p];
+  }
+  ledger_.unstored_now = ledger_.unstored + unstored;
+  ledger_.worst_unstored = std::max(ledger_.worst_unstored, std::abs(ledger_.unstored_now));
+  double book = now.kinetic + now.elastic + now.potential;
+  for (const Account& account : ledger_.accounts) book -= account.energy;
+  if (ledger_.changed && !ledger_.rows.empty())
+    ledger_.accounts[ledger_.account("events", Account::Kind::work)].energy +=
+        book - *ledger_.start - ledger_.rows.back().energies.residual;
+  ledger_.changed = false;
+  for (const Account& account : ledger_.accounts) {
+    const bool gives = account.kind == Account::Kind::work;
+    double& term = gives                                        ? now.work
+                   : account.kind == Account::Kind::dissipation ? now.dissipated
+                                                                : now.potential;
+    term += gives ? account.energy : -account.energy;
+    row.accounts.push_back(gives ? account.energy : 0.0 - account.energy);
+  }
+  book = now.kinetic + now.elastic + now.potential + now.dissipated - now.work;
+  if (!ledger_.start) ledger_.start = book;
+  now.residual = book - *ledger_.start;
+  ledger_.worst_residual = std::max(ledger_.worst_residual, std::abs(now.residual));
+  for (const double term : {now.kinetic, now.elastic, now.potential, now.work, now.dissipated})
+    ledger_.largest_term = std::max(ledger_.largest_term, std::abs(term));
+  for (const ProbePoints& probe : probes_)
+    for (const double value : measure(probe, sampled_).displacement) row.probes.push_back(value);
+  std::vector<Vec3> unbalanced(problem_.body.element_count(), Vec3::Zero());
+  for (std::size_t e = 0; e < supports.size(); ++e) unbalanced[e] = -supports[e];
+  for (const Pass& pass : passes_)
+    if (pass.history_values)
+      for (const double value : pass.history_values(sampled_, unbalanced)) row.values.push_back(value);
+  ledger_.rows.push_back(std::move(row));
+}
+
+void EnergyHistory::refuse_broken_books(const State& state) const {
+  if (ledger_.rows.size() < kFirstJudged || !(ledger_.largest_term > least_)) return;
+  const double lost =
+      std::max(std::abs(ledger_.rows.back().energies.residual), std::abs(ledger_.unstored_now));
+  if (lost < kMostLost * ledger_.largest_term) return;
+  throw DivergedError(fmt::format(
+      "{:.3g} J of at most {:.3g} J in the books of energy have come from nowhere or gone there, the "
+      "fastest element rests near {}: give a shorter [run] step, load it more slowly or damp it "
+      "([damping])",
+      lost, ledger_.largest_term, fastest_near(problem_.body, state)));
+}
+
+}  // namespace flexel::simulate

@@ -1,0 +1,64 @@
+// Between an act and what is around it: what it is made from, what it leaves in the body, its plan in words.
+#include "simulate/time/time_segment.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
+namespace flexel::simulate {
+
+Problem timed_problem(const Body& body, const Scene& scene, const SegmentStart& beginning) {
+  return {body,
+          materials_of_parts(scene, body),
+          {},
+          models_of_parts(scene, body),
+          hooke_of_parts(scene, body),
+          {},
+          scene.run.time,
+          beginning.settled,
+          beginning.bonding_parts,
+          RigidParts::rigidity(scene.get<RigidParts>(), body)};
+}
+
+void TimeSegment::store(const State& state) {
+  body_.position.resize(body_.element_count());
+  Column velocity;
+  velocity.components = 3;
+  velocity.values.reserve(3 * body_.element_count());
+  for (std::size_t e = 0; e < body_.element_count(); ++e) {
+    body_.position[e] = body_.rest[e] + state.displacement[e];
+    velocity.values.insert(velocity.values.end(), state.velocity[e].begin(), state.velocity[e].end());
+  }
+  body_.element_columns["velocity"] = std::move(velocity);
+  if (stepper_->mark_broken(body_.broken)) derive_connections(body_);
+  stepper_->write_memory(body_.cell_count(), body_.cell_columns);
+}
+
+void TimeSegment::unload() {
+  std::vector<Vec3>().swap(body_.position);
+  body_.element_columns.erase("velocity");
+#ifdef __GLIBC__
+  malloc_trim(0);  // likewise what was freed since the body was read
+#endif
+}
+
+void TimeSegment::explain(const Clock& clock) const {
+  const double left = clock.until - *state_.time;
+  progress_.say(fmt::format(
+      "plan: cells (the parts' models), {} {}steps of {:.4g} s, {}",
+      static_cast<std::uint64_t>(std::llround(left / clock.step)), is_implicit() ? "implicit " : "",
+      clock.step,
+      is_implicit() ? std::string("Newton's method") : fmt::format("kernel {}", stepper().isa())));
+  if (solves())
+    progress_.say(
+        "plan: every step solves for the damping, which taken explicitly would cut it by more than 2");
+  for (const Pass& pass : passes_) progress_.say(fmt::format("plan: {} ({})", pass.name, pass.why));
+  for (const Event& event : scene_.events)
+    progress_.say(fmt::format("plan: at {:.4g} s {} ({})", event.at, event.name, event.origin));
+}
+
+}  // namespace flexel::simulate

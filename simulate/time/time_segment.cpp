@@ -1,0 +1,395 @@
+// Per step: forces of the effects that change, the kernel, held elements, and where asked the books.
+#include "simulate/time/time_segment.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "base/stop.h"
+#include "simulate/events/fuse.h"
+#include "simulate/models/rest_shape.h"
+#include "simulate/probes/report.h"
+#include "simulate/stepping/failure_messages.h"
+
+namespace flexel::simulate {
+namespace {
+
+constexpr double kShareOfBound = 0.9;  // of the bound: it may fall between two checks
+constexpr double kStepsAhead = 100;    // steps from one of them to the next
+constexpr int kImplicitSteps = 200;    // in a run, unless the scene says otherwise
+constexpr int kFailures = 30;          // of Newton's method within an implicit step
+constexpr std::uint64_t kRenew = 10;   // implicit steps that one tangent may serve
+constexpr double kRunaway = 1e4;       // of the body's diagonal: a displacement that no scene means
+
+bool has_cells_of_model_cells(const Problem& problem) {
+  const auto is_springs = [](Model model) { return model == Model::springs; };
+  return problem.body.cell_count() > 0 &&
+         !(problem.models.size() == problem.body.parts.size() &&
+           std::all_of(problem.models.begin(), problem.models.end(), is_springs));
+}
+
+}  // namespace
+
+TimeSegment::TimeSegment(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress,
+                         const SegmentStart& beginning, State state)
+    : body_(body),
+      scene_(scene),
+      progress_(progress),
+      problem_(timed_problem(body, scene, beginning)),
+      probes_(place_probes(scene, problem_)),
+      passes_(Effects::passes(scene.effects, problem_)),
+      state_(std::move(state)) {
+  const bool fresh = beginning.fresh;
+  if (!beginning.fused.empty()) passes_.push_back(make_pass(FusedPoints(body, beginning.fused)));
+  if (fresh) report_materials(problem_, progress_);
+  name_materials(body_, problem_.materials);
+  plan_.damping.assign(body.parts.size(), 0);
+  for (Pass& pass : passes_) {
+    if (pass.compose) pass.compose(plan_);
+    if (pass.start && fresh) pass.start(state_);
+    if (pass.begin) pass.begin(state_);
+    if (pass.constrain) pass.constrain(constraints_);
+    for (const auto& [name, transfer_state] : beginning.transferred_states)
+      if (pass.restore_from && name == pass.name) pass.restore_from(transfer_state);
+  }
+  plan_.rest_shapes = RestShapes(body).any();
+  plan_.broken_springs = body.cell_columns.contains("broken_springs");
+  refuse_held_rigid();
+  bound_.emplace(problem_, passes_, plan_);
+  // Explicit damping may cut the step by 2; beyond that every step solves for it.
+  const bool implicit = scene.run.method == TimeMethod::implicit_euler;
+  const bool by_steps =
+      implicit || scene.run.method == TimeMethod::explicit_euler || bound_->damps_explicitly();
+  stepper_.emplace(problem_, plan_, (!options.history.empty() && !implicit) || !by_steps, options.isa);
+  stepper_->read_memory(body.cell_columns);
+  held_.emplace(constraints_, body_, state_, fresh);
+  if (!by_steps) implicit_.emplace(*stepper_, *held_);
+  make_forces();
+  if (implicit)
+    make_implicit();
+  else if (has_cells_of_model_cells(problem_))
+    guard_.emplace(problem_);
+}
+
+void TimeSegment::spare_mass() {
+  const bool asked = paper_ || implicit_ || euler_ || !constraints_.mask.empty() ||
+                     std::any_of(passes_.begin(), passes_.end(),
+                                 [](const Pass& pass) { return pass.added_frequency || pass.finish_step; });
+  if (!asked) stepper_->drop_mass();
+}
+
+void TimeSegment::refuse_held_rigid() const {
+  if (constraints_.mask.empty()) return;
+  for (std::size_t p = 0; p < problem_.rigidity.size(); ++p)
+    for (std::uint32_t e = body_.parts[p].element_begin; e < body_.parts[p].element_end; ++e)
+      if (problem_.rigidity[p] != Rigidity::none && constraints_.mask[e])
+        throw InputError(scene_.name,
+                         fmt::format("part \"{}\" is rigid and held by a [[fix]] or [[move]]: lead "
+                                     "it with a [[manipulator]], which without a path stays",
+                                     body_.parts[p].name));
+}
+
+void TimeSegment::make_implicit() {
+  const auto refuse = [&](const std::string& what) {
+    throw InputError(scene_.name,
+                     fmt::format("[run] method = \"implicit\" does not take {}: leave \"method\" out", what));
+  };
+  if (!plan_.plasticity.empty()) refuse("[plasticity]");
+  if (!plan_.fracture.empty()) refuse("[fracture]");
+  if (paper_damped_) refuse("[damping] of model \"paper\"");
+  for (const Pass& pass : passes_)
+    if (pass.finish_step || pass.needs_step_recheck || (pass.add_forces && !pass.energy && !pass.resistance))
+      refuse(fmt::format("{} ({})", pass.name, pass.why));
+  euler_.emplace(problem_, passes_, plan_, stepper_->mass(), scene_.run.tolerance);
+}
+
+void TimeSegment::make_forces() {
+  for (const Pass& pass : passes_) {
+    if (!pass.add_forces) continue;
+    if (steady_.empty()) steady_.assign(body_.element_count(), Vec3::Zero());
+    if (pass.constant) pass.add_forces(state_, steady_);
+    varies_ = varies_ || !pass.constant;
+  }
+  for (std::size_t p = 0; p < body_.parts.size(); ++p) {
+    if (body_.parts[p].placement != Placement::centre) continue;
+    if (!paper_) paper_.emplace(problem_);
+    paper_damped_ = paper_damped_ || plan_.damping[p] > 0;
+    varies_ = true;
+  }
+  if (varies_ && steady_.empty()) steady_.assign(body_.element_count(), Vec3::Zero());
+}
+
+std::unique_ptr<EnergyHistory> TimeSegment::make_history(Ledger ledger) const {
+  auto history = std::make_unique<EnergyHistory>(problem_, passes_, probes_, stepper_->mass(),
+                                                 paper_ ? &*paper_ : nullptr, plan_, std::move(ledger));
+  for (std::size_t p = 0; p < passes_.size(); ++p)
+    if (passes_[p].constant && !history->forces_of(p).empty())
+      passes_[p].add_forces(state_, history->forces_of(p));
+  return history;
+}
+
+void TimeSegment::look() {
+  stepper_->mark_broken(body_.broken);
+  bound_->look(state_, paper_ ? &*paper_ : nullptr, stepper_->mass());
+  if (guard_)
+    guard_->look(state_, kStepsAhead * std::min(bound_->longest(implicit_.has_value()), *scene_.run.time));
+}
+
+void TimeSegment::choose_step(Clock& clock) {
+  look();
+  const double longest = bound_->longest(implicit_.has_value());
+  if (!(longest > 0)) throw DivergedError(where_it_folds(problem_, state_));
+  double step = kShareOfBound * longest;
+  if (euler_) {
+    step = scene_.run.step.value_or(*scene_.run.time / kImplicitSteps);
+  } else if (scene_.run.step) {
+    if (clock.steps == 0 && *scene_.run.step > longest)
+      throw InputError(scene_.name,
+                       fmt::format("[run] step = {:.4g} s is above {:.4g} s, the longest stable one",
+                                   *scene_.run.step, longest));
+    step = std::min(clock.steps == 0 ? longest : step, *scene_.run.step);
+  }
+  clock.epoch = *state_.time;
+  clock.in_epoch = 0;
+  const double left = clock.until - clock.epoch;
+  // without stiffness there is no bound: a thousand steps draw the path
+  if (!std::isfinite(step)) step = *scene_.run.time / 1000;
+  if (!(step > 1e-12 * *scene_.run.time))
+    throw DivergedError(
+        fmt::format("the stable step has fallen to {:.3g} s: {}", step, where_it_folds(problem_, state_)));
+  clock.step = left / std::max(1.0, std::ceil(left / step - 1e-9));
+}
+
+void TimeSegment::refuse_unsound() {
+  double farthest = 0;
+  std::size_t where = 0;
+  for (std::size_t e = 0; e < state_.displacement.size(); ++e) {
+    const Vec3& u = state_.displacement[e];
+    const double far = u.allFinite() ? u.norm() : std::numeric_limits<double>::infinity();
+    if (!(far > farthest)) continue;
+    farthest = far;
+    where = e;
+  }
+  if (!(farthest < kRunaway * (1 + body_extent(body_))))
+    throw DivergedError(runs_away_at(body_.rest[where], scene_.run.method));
+  look();
+  if (!(bound_->longest(implicit_.has_value()) > 0)) throw DivergedError(where_it_folds(problem_, state_));
+}
+
+void TimeSegment::adapt_step(Clock& clock) {
+  if (euler_) return;
+  const double longest = bound_->longest(implicit_.has_value());
+  if (clock.step > 0.97 * longest || (!scene_.run.step && clock.step < 0.6 * kShareOfBound * longest))
+    choose_step(clock);
+}
+
+bool TimeSegment::needs_step_recheck() const {
+  if (guard_ && guard_->needs_step_recheck()) return true;
+  return std::any_of(passes_.begin(), passes_.end(), [&](const Pass& pass) {
+    return pass.needs_step_recheck && pass.needs_step_recheck(state_);
+  });
+}
+
+// Calls add(outer_); where the books want to know, `own` (elements) becomes what it added. So the sum, and
+// with it the motion, has the same bits with books and without.
+template <class Add>
+void TimeSegment::add_apart(std::vector<Vec3>* own, const Add& add) {
+  if (own) *own = outer_;
+  add(outer_);
+  if (own) parallel_for_each(own->size(), [&](std::size_t e) { (*own)[e] = outer_[e] - (*own)[e]; });
+}
+
+// Forces of the passes at the present state; with a history also one by one, those that are constant but
+// once.
+void TimeSegment::sum_forces(EnergyHistory* history) {
+  const bool guarded = guard_ && guard_->watches();
+  if (!varies_ && !guarded) return;
+  outer_ = steady_;
+  if (outer_.empty()) outer_.assign(body_.element_count(), Vec3::Zero());
+  for (std::size_t p = 0; p < passes_.size(); ++p) {
+    Pass& pass = passes_[p];
+    if (!pass.add_forces || pass.constant) continue;
+    const PassTimer timer(pass.seconds);
+    add_apart(history && !history->forces_of(p).empty() ? &history->forces_of(p) : nullptr,
+              [&](std::vector<Vec3>& sum) { pass.add_forces(state_, sum); });
+  }
+  if (paper_) add_connection_forces(history);
+  if (!guarded) return;
+  const PassTimer timer(kernel_seconds_);
+  guard_->add_forces(state_, outer_);
+}
+
+const std::vector<Vec3>& TimeSegment::outer() const {
+  return varies_ || (guard_ && guard_->watches()) ? outer_ : steady_;
+}
+
+void TimeSegment::add_connection_forces(EnergyHistory* history) {
+  const PassTimer timer(paper_seconds_);
+  if (const PaperModel::SmallestVolume least = paper_->smallest_volume(state_); !(least.value > 0))
+    throw DivergedError(folds_at("an element", body_.rest[least.element]));
+  paper_->add_forces(state_, outer_);
+  if (!paper_damped_) return;
+  add_apart(history ? &history->connection_damping() : nullptr,
+            [&](std::vector<Vec3>& sum) { paper_->add_damping(state_, plan_.damping, sum); });
+}
+
+void TimeSegment::step_implicitly(Clock& clock, EnergyHistory* history, bool row) {
+  const PassTimer timer(kernel_seconds_);
+  if (history && row) history->add_row_of(state_, euler_->supports());
+  if (renews(clock)) euler_->forget();
+  const double end = clock.epoch + static_cast<double>(clock.in_epoch + 1) * clock.step;
+  int failures = 0;
+  while (*state_.time < end) {
+    const ImplicitStep told = euler_->advance(state_, end, clock.step, hear_);
+    newton_iterations_ += told.newton_iterations;
+    cg_iterations_ += told.cg_iterations;
+    failures += told.failures;
+    if (told.step == 0 || failures > kFailures)
+      throw DivergedError(fmt::format(
+          "Newton's method ends nowhere, with steps of {:.3g} s and {}: {}{}; load it more slowly "
+          "or give a shorter [run] step",
+          clock.step, told.step == 0 ? "down to 1/1024 of it" : fmt::format("{} shorter ones", failures),
+          told.trouble, squeezed_most(problem_, state_)));
+    held_->settle(state_, euler_->supports());
+    if (!history) continue;
+    for (std::size_t p = 0; p < passes_.size(); ++p)
+      if (std::vector<Vec3>& own = history->forces_of(p); !own.empty()) {
+        std::fill(own.begin(), own.end(), Vec3::Zero());
+        euler_->add_forces(p, state_, own);
+      }
+    history->enter(euler_->moved(), euler_->damping_force(), euler_->supports(),
+                   euler_->numerical_dissipation(state_));
+  }
+  ++clock.in_epoch;
+  ++clock.steps;
+  clock.previous = clock.step;
+}
+
+bool TimeSegment::renews(const Clock& clock) const {
+  return !euler_ || clock.steps % kRenew == 0;
+}
+
+TimeSegment::Memory TimeSegment::memory() const {
+  Memory memory;
+  memory.cells = stepper_->memory();
+  if (implicit_) memory.damping_change = implicit_->change();
+  if (euler_) {
+    memory.reach = euler_->reach();
+    memory.supports = euler_->supports();
+  }
+  for (const Pass& pass : passes_)
+    memory.passes.push_back(pass.memory ? pass.memory() : std::vector<double>());
+  return memory;
+}
+
+std::vector<std::pair<std::string, std::vector<double>>> TimeSegment::transferred_states() const {
+  std::vector<std::pair<std::string, std::vector<double>>> kept;
+  for (const Pass& pass : passes_)
+    if (pass.transfer_state) kept.emplace_back(pass.name, pass.transfer_state());
+  return kept;
+}
+
+void TimeSegment::restore(const Memory& memory) {
+  const Stepper::Memory own = stepper_->memory();
+  const std::size_t change = memory.damping_change.size();
+  if (memory.cells.fill.size() != own.fill.size() || memory.cells.plastic.size() != own.plastic.size() ||
+      memory.cells.springs.size() != own.springs.size() ||
+      memory.cells.spring_flow.size() != own.spring_flow.size() ||
+      (change != 0 && (!implicit_ || change != body_.element_count())) ||
+      (!memory.supports.empty() && (!euler_ || memory.supports.size() != body_.element_count())))
+    throw InputError("the checkpoint's memory is not that of its scene and body: it is damaged");
+  stepper_->restore(memory.cells);
+  stepper_->mark_broken(body_.broken);
+  for (std::size_t p = 0; p < passes_.size() && p < memory.passes.size(); ++p)
+    if (passes_[p].restore) passes_[p].restore(memory.passes[p]);
+  if (implicit_) implicit_->set_change(memory.damping_change);
+  if (!euler_) return;
+  euler_->set_reach(memory.reach);
+  euler_->set_supports(memory.supports);
+}
+
+void TimeSegment::step(Clock& clock, EnergyHistory* history, bool row) {
+  if (euler_) return step_implicitly(clock, history, row);
+  if (history) history->before(state_, row, row && guard_ ? guard_->energy(state_) : 0);
+  const bool first = clock.steps == 0;
+  const double before = first ? (scene_.run.method == TimeMethod::verlet ? 0 : clock.step) : clock.previous;
+  const step::Advance advance{0.5 * (before + clock.step), clock.step,
+                              scene_.run.method == TimeMethod::explicit_euler};
+  state_.kick = advance.kick;
+  sum_forces(history);
+  StepOutcome outcome;
+  const double end = clock.epoch + static_cast<double>(clock.in_epoch + 1) * clock.step;
+  {
+    const PassTimer timer(kernel_seconds_);
+    const std::vector<Vec3>& forces = outer();
+    outcome = implicit_ ? implicit_->advance(state_, forces, advance, end)
+                        : stepper_->advance(state_, forces, advance);
+    if (outcome.broken > 0 && guard_ && guard_->watches() && stepper_->mark_broken(body_.broken))
+      outcome.released += guard_->drop_broken(state_);
+  }
+  if (outcome.broken > 0) stepper_->mark_broken(body_.broken);
+  ++clock.in_epoch;
+  ++clock.steps;
+  state_.time = end;
+  held_->impose(state_, stepper_->mass(), advance);
+  for (const Pass& pass : passes_)
+    if (pass.finish_step) pass.finish_step(state_, {stepper_->mass(), advance.kick, advance.drift});
+  if (history) {
+    std::vector<Vec3> supports(body_.element_count(), Vec3::Zero());
+    held_->add_forces(supports);
+    for (const Pass& pass : passes_)
+      if (pass.add_support_forces) pass.add_support_forces(supports);
+    history->after(state_, outcome, stepper_->damping_force(), supports, first ? 0 : clock.previous,
+                   clock.step, before == 0);
+  }
+  clock.previous = clock.step;
+  if (!(outcome.smallest_jacobian > 0)) throw DivergedError(where_it_folds(problem_, state_));
+}
+
+void TimeSegment::slow(double factor) {
+  const StopWaits whole;
+  parallel_for_each(state_.velocity.size(), [&](std::size_t e) { state_.velocity[e] *= factor; });
+  for (const Pass& pass : passes_)
+    if (pass.begin) pass.begin(state_);
+}
+
+bool TimeSegment::kicks() const {
+  return !euler_ && !implicit_ && scene_.run.method != TimeMethod::explicit_euler &&
+         std::none_of(passes_.begin(), passes_.end(),
+                      [](const Pass& pass) { return bool(pass.finish_step); });
+}
+
+void TimeSegment::kick(double time) {
+  const StopWaits whole;  // half a kick is no state
+  const Stepper::Memory memory = stepper_->memory();
+  const std::vector<Vec3> before = state_.velocity;
+  state_.kick = std::abs(time);
+  sum_forces(nullptr);
+  (void)stepper_->advance(state_, outer(), {time, 0, false});
+  held_->copy(before, state_.velocity);
+  stepper_->restore(memory);
+}
+
+void TimeSegment::close_books(const Clock& clock, EnergyHistory& history) {
+  if (euler_) return history.add_row_of(state_, euler_->supports());
+  const StopWaits whole;  // the step beyond is taken back
+  State last = state_;
+  const Memory before = memory();
+  const std::vector<std::uint8_t> broken = body_.broken;
+  Clock beyond = clock;
+  history.close();
+  step(beyond, &history, true);
+  state_ = std::move(last);
+  body_.broken = broken;
+  restore(before);
+}
+
+bool TimeSegment::damps() const {
+  return std::any_of(plan_.damping.begin(), plan_.damping.end(), [](double tau) { return tau > 0; });
+}
+
+}  // namespace flexel::simulate

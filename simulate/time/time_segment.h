@@ -1,0 +1,159 @@
+// A stretch of a timed run in which nothing changes but the state: what is made of a body and a scene to step
+// it (effects, kernel, held elements, the bound on the step). A run is one act, or several where something
+// else changes between them; the clock and the books go from one act to the next.
+#pragma once
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "simulate/events/event.h"
+#include "simulate/implicit/implicit_damping.h"
+#include "simulate/implicit/implicit_euler.h"
+#include "simulate/result/options.h"
+#include "simulate/result/result.h"
+#include "simulate/scene/scene.h"
+#include "simulate/stepping/explicit_barrier.h"
+#include "simulate/stepping/prescribed_motion.h"
+#include "simulate/stepping/step_bound.h"
+#include "simulate/stepping/stepper.h"
+#include "simulate/time/energy_history.h"
+
+namespace flexel::simulate {
+
+// How far a run has come; State::time is the time itself.
+struct Clock {
+  double until = 0;               // s, when the act ends
+  double step = 0, previous = 0;  // s: the present length of a step, that of the last step taken
+  double epoch = 0;               // s, time of step 0 of the present length
+  std::uint64_t in_epoch = 0;     // steps of the present length
+  std::uint64_t steps = 0;        // of the run
+};
+
+// What an act begins with, beside the body and the state.
+struct SegmentStart {
+  // The run begins: effects that change the state at its start do, and held elements are put on their paths.
+  bool fresh = true;
+  std::vector<Vec3> settled = {};        // Problem::settled
+  std::vector<FusedPoint> fused = {};    // by events so far
+  std::size_t bonding_parts = SIZE_MAX;  // Problem::bonding_parts
+  // What passes hand over, by their names, across an event.
+  std::vector<std::pair<std::string, std::vector<double>>> transferred_states = {};
+};
+
+// The problem of a timed run with the body as it is now.
+[[nodiscard]] Problem timed_problem(const Body& body, const Scene& scene, const SegmentStart& beginning);
+
+class TimeSegment {
+ public:
+  // Refers to the others while it lives. Throws InputError.
+  TimeSegment(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress,
+              const SegmentStart& beginning, State state);
+  TimeSegment(const TimeSegment&) = delete;
+  TimeSegment& operator=(const TimeSegment&) = delete;
+
+  // Chooses the length of the steps from here to clock.until. Throws DivergedError: it has fallen to nothing;
+  // InputError: at the first step, where the scene's step is above the stable one.
+  void choose_step(Clock& clock);
+  // Looks at the present state. Throws DivergedError: it is folded, not finite or far beyond what any scene
+  // means.
+  void refuse_unsound();
+  // Chooses anew where the length does not suit what was last looked at.
+  void adapt_step(Clock& clock);
+  // Whether an effect cannot wait for the next look.
+  [[nodiscard]] bool needs_step_recheck() const;
+  // One step. With `history` its books, and a row of them where `row`. Throws DivergedError.
+  void step(Clock& clock, EnergyHistory* history, bool row);
+  // What the next steps depend on besides state() and the clock; only where renews() says so.
+  struct Memory {
+    Stepper::Memory cells;
+    std::vector<Vec3> damping_change;         // m/s, of ImplicitDamping
+    double reach = 0;                         // s, of ImplicitEuler
+    std::vector<Vec3> supports;               // N, of its last step
+    std::vector<std::vector<double>> passes;  // what each remembers
+  };
+  [[nodiscard]] Memory memory() const;
+  // Throws InputError("", ...): it is that of another act.
+  void restore(const Memory& memory);
+  // Whether the step to come depends on nothing else. Always, but implicit steps keep their tangent for a
+  // while.
+  [[nodiscard]] bool renews(const Clock& clock) const;
+  // Implicit steps tell `hear` of every iteration; it may throw.
+  void set_hear(std::function<void(const std::string&)> hear) { hear_ = std::move(hear); }
+
+  // Multiplies all velocities, but of what follows a path.
+  void slow(double factor);
+  // Loads and reactions, as of the last step.
+  void tell_forces(SimulateResult& result) const;
+  // Whether kick() can: velocities are those of half steps, and nothing but forces changes them.
+  [[nodiscard]] bool kicks() const;
+  // The velocities change by the forces of the present state for so many seconds, before or after it.
+  void kick(double time);
+
+  // The books of the present state need the forces there, hence a step that is thrown away.
+  void close_books(const Clock& clock, EnergyHistory& history);
+
+  // Says what the steps to clock.until do, and the events of the run.
+  void explain(const Clock& clock) const;
+  [[nodiscard]] std::vector<std::pair<std::string, std::vector<double>>> transferred_states() const;
+
+  // Moves the body to `state`: positions, velocities, what broke, what the cells remember.
+  void store(const State& state);
+  // Frees the masses (Stepper::drop_mass) where no effect asks for them; neither may the caller then.
+  void spare_mass();
+  // Frees what the next store() makes anew: positions and velocities of the body.
+  void unload();
+  // Adds the time of everything that acted, and the iterations, to `result`; once. `explained`: the time of
+  // the effects in the hot loop apart from that of the model, which takes some steps more to tell.
+  void add_effort(SimulateResult& result, bool explained);
+  // What can be measured now, with the stresses where they are asked for. `unbalanced` forces are those of
+  // the last step.
+  void report(const Clock& clock, bool stress, SimulateResult& result);
+
+  [[nodiscard]] const State& state() const { return state_; }
+  [[nodiscard]] const std::vector<Pass>& passes() const { return passes_; }
+  [[nodiscard]] const Stepper& stepper() const { return *stepper_; }
+  // A step solves for the velocity at its end: it may take seconds.
+  [[nodiscard]] bool solves() const { return implicit_.has_value(); }
+  [[nodiscard]] bool damps() const;  // internally
+  [[nodiscard]] bool is_implicit() const { return euler_.has_value(); }
+  [[nodiscard]] std::unique_ptr<EnergyHistory> make_history(Ledger ledger) const;
+
+ private:
+  void make_forces();
+  void make_implicit();
+  void refuse_held_rigid() const;
+  void step_implicitly(Clock& clock, EnergyHistory* history, bool row);
+  void look();
+  void tell_loop_apart();
+  template <class Add>
+  void add_apart(std::vector<Vec3>* own, const Add& add);
+  void sum_forces(EnergyHistory* history);
+  // Forces of the passes at the present state; none: empty.
+  [[nodiscard]] const std::vector<Vec3>& outer() const;
+  void add_connection_forces(EnergyHistory* history);
+
+  Body& body_;
+  const Scene& scene_;
+  Progress& progress_;
+  Problem problem_;
+  std::vector<ProbePoints> probes_;
+  std::vector<Pass> passes_;
+  KernelEffects plan_;
+  Constraints constraints_;
+  State state_;
+  std::optional<PaperModel> paper_;  // of the centre-placed parts
+  bool paper_damped_ = false;
+  std::optional<Stepper> stepper_;
+  std::optional<PrescribedMotion> held_;
+  std::optional<ImplicitDamping> implicit_;
+  std::optional<ImplicitEuler> euler_;
+  std::function<void(const std::string&)> hear_ = [](const std::string&) {};
+  std::optional<StepBound> bound_;
+  std::optional<ExplicitBarrier> guard_;  // of explicit steps of model `cells`
+  std::vector<Vec3> steady_, outer_;      // (elements) N, of the passes that are constant; of all
+  bool varies_ = false;
+  double kernel_seconds_ = 0, paper_seconds_ = 0;
+  int newton_iterations_ = 0, cg_iterations_ = 0;
+};
+
+}  // namespace flexel::simulate

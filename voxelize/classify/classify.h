@@ -1,0 +1,16 @@
+// Closed surface -> voxels: fill fractions and pieces, exact to rounding.
+#pragma once
+#include "voxelize/classify/voxels.h"
+#include "voxelize/mesh/part_mesh.h"
+
+namespace flexel::voxelize {
+
+struct ClassifyOptions {
+  bool with_centres = false;  // set kContainsCentre
+};
+
+// `mesh` is balanced, oriented and placed on the lattice. Voxels whose corners lie in several shells, or in
+// which shells intersect, get their fill from lines (overlap.h) and are one piece.
+[[nodiscard]] Voxels classify_closed(const PartMesh& mesh, const ClassifyOptions& options);
+
+}  // namespace flexel::voxelize

@@ -1,0 +1,35 @@
+// How a part is to be voxelised.
+#pragma once
+#include <optional>
+#include <string>
+
+#include "formats/lattice/body.h"
+
+namespace flexel::voxelize {
+
+enum class Align { snap, box, none };
+// What is done to surfaces that are not closed before inside is told from outside; docs/healing.md.
+enum class Heal { none, automatic, wrap };
+struct HealChoice {
+  Heal mode = Heal::automatic;
+  std::optional<double> alpha =
+      std::nullopt;  // m, wrap: the widest opening that it spans; default a hundredth of the diagonal
+};
+// From "none", "auto", "wrap", "wrap:5 mm"; throws InputError naming --heal.
+[[nodiscard]] HealChoice heal_choice(const std::string& word);
+
+// From "corner", "centre"; throws InputError naming --placement.
+[[nodiscard]] Placement placement_choice(const std::string& word);
+
+struct VoxelizeOptions {
+  std::optional<double> size;  // spacing h [m]
+  std::optional<std::size_t>
+      count;  // or about this many cells (elements for centre placement) over all parts; default 20,000
+  Placement placement = Placement::corner;
+  Align align = Align::snap;
+  HealChoice heal;
+  std::string material;              // of every part; "" leaves it to the scene
+  std::optional<double> max_memory;  // bytes; default 80 % of what is free
+};
+
+}  // namespace flexel::voxelize
