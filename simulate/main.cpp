@@ -3,6 +3,7 @@
 
 #include "base/error.h"
 #include "base/files/files.h"
+#include "base/files/output_file.h"
 #include "base/files/outputs.h"
 #include "base/program/arguments.h"
 #include "base/program/program.h"

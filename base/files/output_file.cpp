@@ -2,6 +2,8 @@
 // that its name never shows half a result; links are followed first, so that what they point to is replaced,
 // not the link. Devices and FIFOs are written through. Temporary files are also listed in a fixed table that
 // the signal handlers may walk.
+#include "base/files/output_file.h"
+
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
@@ -17,7 +19,6 @@
 
 #include "base/error.h"
 #include "base/files/files.h"
-#include "base/files/outputs.h"
 #include "base/stop.h"
 
 namespace flexel {

@@ -1,6 +1,8 @@
 // Consistent nodal forces, and the means that are asked for. On a lattice they are those of a run of ours. On
 // tetrahedra the load is spread over points of the six-node triangles (seven a triangle, exact to the fifth
 // degree: Radon 1948) and from each to the six nodes by their shape functions.
+#include "flexel/export/nodal_forces.h"
+
 #include <Eigen/Geometry>
 #include <cmath>
 

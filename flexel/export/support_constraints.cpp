@@ -2,6 +2,8 @@
 // the face lies on a plane of it; where the face cuts through cells it crosses the lattice's edges, and on
 // each edge along the axis nearest to the face's normal the linear displacement between its two nodes is held
 // at the crossing: an equation between the two.
+#include "flexel/export/support_constraints.h"
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>

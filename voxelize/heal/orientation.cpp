@@ -1,6 +1,8 @@
 // Within a shell, orientation spreads from triangle to triangle across edges that two triangles share, and
 // the shell keeps the way round that most of its area had. Between shells: one that lies in no other shell
 // must enclose positive volume; when all such shells are inside out, the file is, and every shell turns.
+#include "voxelize/heal/orientation.h"
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>

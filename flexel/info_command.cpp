@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/files/output_file.h"
 #include "base/human.h"
 #include "base/program/arguments.h"
 #include "base/program/progress.h"
@@ -20,6 +21,7 @@
 #include "formats/part/topology.h"
 #include "voxelize/heal/heal.h"
 #include "voxelize/thickness.h"
+#include "voxelize/measure_part.h"
 #include "voxelize/voxelize.h"
 
 namespace flexel::commands {

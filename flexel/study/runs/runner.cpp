@@ -1,6 +1,6 @@
 // The three programs in order; then their summaries and the lines of their logs ("flexel-map: write: 0.012
 // s") become figures.
-#include "flexel/study/runner.h"
+#include "flexel/study/runs/runner.h"
 
 #include <fmt/format.h>
 
@@ -13,8 +13,9 @@
 
 #include "base/error.h"
 #include "base/files/files.h"
-#include "flexel/study/history_csv.h"
-#include "flexel/study/scene_edit.h"
+#include "base/files/output_file.h"
+#include "flexel/study/runs/history_csv.h"
+#include "flexel/study/runs/scene_edit.h"
 #include "formats/lattice/body_file.h"
 #include "simulate/estimate/coarsen.h"
 

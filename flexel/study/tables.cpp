@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/units.h"
+#include "flexel/study/tables.h"
 #include "flexel/study/study.h"
 
 namespace flexel::study {

@@ -1,6 +1,6 @@
 // Reading is by hand: the file is ours, numbers and commas below one line of names. The lag is found by a
 // scan and then by a parabola through the best three shifts.
-#include "flexel/study/history_csv.h"
+#include "flexel/study/runs/history_csv.h"
 
 #include <algorithm>
 #include <cmath>

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "base/units.h"
+#include "flexel/study/page.h"
 #include "flexel/study/page_template.h"
 #include "flexel/study/study.h"
 

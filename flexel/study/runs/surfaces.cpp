@@ -1,5 +1,7 @@
 // Mapped surfaces against the finest one. All are the part's own mesh, moved: vertex i is the same material
 // point in each.
+#include "flexel/study/runs/surfaces.h"
+
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
@@ -7,8 +9,7 @@
 #include <cmath>
 
 #include "base/error.h"
-#include "flexel/study/hausdorff.h"
-#include "flexel/study/study.h"
+#include "flexel/study/runs/hausdorff.h"
 #include "formats/exchange/import.h"
 #include "formats/exchange/surface_file.h"
 

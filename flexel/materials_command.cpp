@@ -1,6 +1,7 @@
 // flexel materials: the library of materials.
 #include "base/error.h"
 #include "base/files/files.h"
+#include "base/files/output_file.h"
 #include "base/program/arguments.h"
 #include "flexel/commands.h"
 #include "flexel/measure/materials_table.h"

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/files/files.h"
+#include "base/files/output_file.h"
 #include "base/files/outputs.h"
 #include "base/human.h"
 #include "base/parallel.h"

@@ -11,6 +11,9 @@
 
 #include "base/error.h"
 #include "base/files/files.h"
+#include "base/files/output_file.h"
+#include "flexel/study/conclude.h"
+#include "flexel/study/plots.h"
 #include "flexel/study/study.h"
 
 namespace flexel::study {
@@ -116,6 +119,25 @@ std::array<std::string, std::size(kSlots)> placed_labels(const std::vector<Point
   return data;
 }
 
+// The data and the plot command of one curve.
+void add_curve(std::size_t c, const std::string& name, std::vector<const Summed*> sorted, std::string& data,
+               std::string& plots) {
+  data += fmt::format("$curve{} << EOD\n", c);
+  std::sort(sorted.begin(), sorted.end(),
+            [](const Summed* a, const Summed* b) { return a->point.seconds < b->point.seconds; });
+  for (const Summed* each : sorted)
+    data += fmt::format("{:.9g} {:.9g}\n", each->point.seconds, shown_error(each->point));
+  data += "EOD\n";
+  const bool against = name == "CalculiX";
+  const bool joined = against || name == "size" || name.rfind("model", 0) == 0;
+  plots += fmt::format(
+      "$curve{} with {} lw 1.6 pt {} ps {} lc rgb '{}' title {}, ", c, joined ? "linespoints" : "points",
+      against  ? kAgainstMarker
+      : c == 0 ? 7
+               : static_cast<int>(c) + 4,
+      against ? 1.1 : 0.7, against ? kAgainstColour : kColours[c % std::size(kColours)], in_quotes(name));
+}
+
 std::string error_script(const Study& study, const std::string& out) {
   std::vector<std::pair<std::string, std::vector<const Summed*>>> curves;
   std::vector<Point> points;
@@ -152,24 +174,8 @@ std::string error_script(const Study& study, const std::string& out) {
   for (const std::size_t i : front)
     if (std::find(labelled.begin(), labelled.end(), i) == labelled.end()) labelled.push_back(i);
   if (!front.empty()) plots += "$front with linespoints lw 7 lc rgb '#55e0c000' pt 6 ps 2 title 'frontier', ";
-  for (std::size_t c = 0; c < curves.size(); ++c) {
-    data += fmt::format("$curve{} << EOD\n", c);
-    std::vector<const Summed*> sorted = curves[c].second;
-    std::sort(sorted.begin(), sorted.end(),
-              [](const Summed* a, const Summed* b) { return a->point.seconds < b->point.seconds; });
-    for (const Summed* each : sorted)
-      data += fmt::format("{:.9g} {:.9g}\n", each->point.seconds, shown_error(each->point));
-    data += "EOD\n";
-    const bool against = curves[c].first == "CalculiX";
-    const bool joined = against || curves[c].first == "size" || curves[c].first.rfind("model", 0) == 0;
-    plots += fmt::format("$curve{} with {} lw 1.6 pt {} ps {} lc rgb '{}' title {}, ", c,
-                         joined ? "linespoints" : "points",
-                         against  ? kAgainstMarker
-                         : c == 0 ? 7
-                                  : static_cast<int>(c) + 4,
-                         against ? 1.1 : 0.7, against ? kAgainstColour : kColours[c % std::size(kColours)],
-                         in_quotes(curves[c].first));
-  }
+  for (std::size_t c = 0; c < curves.size(); ++c)
+    add_curve(c, curves[c].first, curves[c].second, data, plots);
   const auto labels = placed_labels(points, labelled);
   for (std::size_t s = 0; s < labels.size(); ++s) {
     if (labels[s].empty()) continue;

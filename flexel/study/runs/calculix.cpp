@@ -1,6 +1,6 @@
 // What CalculiX found is read from its .frd (displacements of every node, block "DISP": lines of " -1", the
 // node in 10 characters and three values in 12 each) and its .dat (total forces of the supports).
-#include "flexel/study/calculix.h"
+#include "flexel/study/runs/calculix.h"
 
 #include <fmt/format.h>
 

@@ -5,7 +5,7 @@
 //   - the middle's distance and the piece's radius (distance changes no faster than the point moves).
 // The distances of corners and middles are what it is at least. The piece that could be farthest is looked at
 // first and cut in two where its bounds are not close enough. Closest points come from CGAL's tree of boxes.
-#include "flexel/study/hausdorff.h"
+#include "flexel/study/runs/hausdorff.h"
 
 #include <CGAL/AABB_traits.h>
 #include <CGAL/AABB_tree.h>

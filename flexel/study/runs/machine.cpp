@@ -9,7 +9,7 @@
 
 #include "base/error.h"
 #include "base/version.h"
-#include "flexel/study/study.h"
+#include "flexel/study/runs/machine.h"
 
 namespace flexel::study {
 

@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "base/files/files.h"
+#include "base/files/output_file.h"
 #include "base/nearest_word.h"
 #include "base/program/arguments.h"
 #include "base/program/termination.h"

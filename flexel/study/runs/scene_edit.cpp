@@ -1,6 +1,6 @@
 // The scene is parsed, changed as a tree and written again; flexel-simulate reads and checks the result.
 #define TOML_EXCEPTIONS 1
-#include "flexel/study/scene_edit.h"
+#include "flexel/study/runs/scene_edit.h"
 
 #include <fmt/format.h>
 #include <toml++/toml.h>
