@@ -1,5 +1,4 @@
-// The last colon ends WHERE, so that WHERE may be a table of the scene's language; what follows is numbers
-// and one unit.
+// WHERE ends at the last colon, so that it may be an inline table of a scene; numbers and one unit follow.
 #include "flexel/actions.h"
 
 #include <fmt/format.h>

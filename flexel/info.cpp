@@ -1,4 +1,4 @@
-// flexel info: what a part is and what a scene can name in it.
+// flexel info: size, volume and faces of a part, and the names that a scene can use.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -81,7 +81,7 @@ struct Unit {
   std::string name = "mm";
 };
 
-// The unit to speak in: the file's own, by the shortest name that it has.
+// The unit of the output: the file's own, by its shortest name.
 Unit unit_of(const SurfaceSource& source) {
   for (const char* name : {"mm", "cm", "m", "um", "in", "ft", "km"})
     if (std::abs(length_unit(name) - source.unit) <= 1e-12 * source.unit) return {source.unit, name};

@@ -1,4 +1,4 @@
-// The job's own part of a command line, checked before any stage runs.
+// The options of a job, checked before any stage runs.
 #include "flexel/job.h"
 
 #include <fmt/format.h>

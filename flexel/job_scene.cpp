@@ -1,4 +1,4 @@
-// What happens to the parts, from a scene file and from options on top of it.
+// The scene of a job: a scene file, and options added to it.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,4 +1,5 @@
-// A surface that stays whole is mapped as it is; one that is cut takes the place of the body's own meanwhile.
+// A whole surface is mapped as it is; a surface that was cut along cracks replaces the body's own while it is
+// mapped.
 #include "mapping/map_part.h"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Options are declared, checked and obeyed here, so that the two programs cannot drift apart.
+// The options of a mapping are declared, checked and applied here, for flexel-map and `flexel deform` alike.
 #include "mapping/options.h"
 
 #include <fmt/format.h>

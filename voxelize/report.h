@@ -1,4 +1,4 @@
-// What was found of a part, for people and programs.
+// The report on voxelised parts, as text and as JSON.
 #pragma once
 #include <string>
 

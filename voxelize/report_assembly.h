@@ -1,4 +1,4 @@
-// What is said of assemblies: a line a finding, not a line a part.
+// The report on assemblies: one line for each kind of finding instead of one for each part.
 #pragma once
 #include "base/program/progress.h"
 #include "voxelize/types/options.h"

@@ -47,7 +47,7 @@ struct TiedFaces {                                  // two parts that touch
 
 struct AnalysisProbe {
   std::string name;
-  std::vector<std::pair<std::uint32_t, double>> weights;  // of the nodes in what is asked for; sum 1
+  std::vector<std::pair<std::uint32_t, double>> weights;  // of the nodes in the mean; sum 1
   double distance = 0;                                    // m, of a tetrahedron's node from the point
 };
 
@@ -60,7 +60,7 @@ struct Analysis {
   std::vector<TiedFaces> ties;
   std::vector<AnalysisProbe> probes;
   bool large_deflection = false;
-  std::string why_deflection;  // how that was told
+  std::string why_deflection;  // the reason for it
   int load_steps = 1;
   std::vector<std::string> warnings;  // what is not, or not exactly, as in the scene
 };
@@ -99,9 +99,9 @@ using HeldValues = std::map<std::pair<std::uint32_t, std::uint8_t>, double>;
 // CAD faces of different parts that lie on one another, within `tolerance` [m], facing each other.
 [[nodiscard]] std::vector<TiedFaces> touching_faces(const AnalysisMesh& mesh, double tolerance);
 
-// Whether leaving large rotations out would change the largest displacement of the part by over a percent:
-// from a coarse lattice of ours under the scene's loads and under a thousandth of them. In `why` how that was
-// told, or why it could not be.
+// Whether a geometrically linear analysis would change the largest displacement by over a percent: from a
+// coarse lattice under the scene's loads and under a thousandth of them. `why`: the reason, or why it is not
+// known.
 [[nodiscard]] bool large_deflection(const Surface& surface, simulate::Scene scene, int threads,
                                     std::string& why);
 

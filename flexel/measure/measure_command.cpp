@@ -1,4 +1,4 @@
-// flexel measure: what the lattice makes of a material.
+// flexel measure: the effective elastic constants of a lattice beside those of its material.
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>

@@ -1,4 +1,4 @@
-// A picture of surfaces and bodies: what `flexel picture` does but for its arguments and files.
+// Draws surfaces and bodies: `flexel picture` without its arguments and files.
 #pragma once
 #include <optional>
 #include <string>

@@ -1,5 +1,5 @@
-// Other programs, run as child processes: stopped at a deadline, interrupted with us, and measured by the
-// kernel.
+// Runs other programs as child processes: with a deadline, interrupted together with this process, time and
+// memory measured by the kernel.
 #pragma once
 #include <chrono>
 #include <filesystem>

@@ -1,5 +1,5 @@
-// What users would pick instead: the same part and scene meshed by gmsh and run by CalculiX, through `flexel
-// export --calculix --mesh tet`. For `flexel study --against calculix`.
+// `flexel study --against calculix`: the same part and scene meshed by gmsh and solved by CalculiX, through
+// `flexel export --calculix --mesh tet`.
 #pragma once
 #include <string>
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace flexel::study {
 
-// What a first, coarse export tells.
+// The result of a first, coarse export.
 struct CalculixLook {
   std::string refused;            // why CalculiX cannot run this scene here; "": it can
   std::string versions;           // "CalculiX 2.20, gmsh 4.8.4"

@@ -1,5 +1,5 @@
-// Reading is by hand: the file is ours, numbers and commas below one line of names. The lag is found by a
-// scan and then by a parabola through the best three shifts.
+// The file is Flexel's own: one line of names, then numbers and commas. The lag is found by a scan of shifts,
+// then by a parabola through the best three.
 #include "flexel/study/history_csv.h"
 
 #include <algorithm>

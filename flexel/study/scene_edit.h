@@ -1,5 +1,4 @@
-// Scenes with something changed, as text that flexel-simulate reads: another model, solver or step, or one
-// effect left out.
+// Variants of a scene as TOML for flexel-simulate: another model, solver or step, or one effect left out.
 #pragma once
 #include <string>
 #include <vector>

@@ -1,4 +1,4 @@
-// A whole study: its runs, and what they add up to.
+// A study: its runs and the conclusions from them.
 #pragma once
 #include <filesystem>
 #include <map>
@@ -72,7 +72,7 @@ struct Study {
 
 // The first row of each size of a sweep that went well, the coarsest first.
 [[nodiscard]] std::vector<const Row*> sizes_of(const Study& study, const std::string& sweep);
-// What they found, of the rows that have the quantity.
+// Their values, of the rows that have the quantity.
 [[nodiscard]] std::vector<SizeValue> values_of(const std::vector<const Row*>& rows,
                                                const std::string& quantity);
 
@@ -86,13 +86,12 @@ void conclude(Study& study, const std::vector<Reference>& given);
                                    const std::vector<Quantity>& quantities);
 // All of it, as JSON in SI units.
 [[nodiscard]] std::string study_json(const Study& study);
-// What was told of each run before it began, beside what it took: a table for a terminal.
+// The prediction for each run beside its cost: a table for a terminal.
 [[nodiscard]] std::string prediction_table(const Study& study);
 
-// Distances of the mapped surface `path` from `finest` (both .ply of the same part): of the same points of
-// matter the root of the mean square over the area; and the Hausdorff distance of the two surfaces
-// (study/hausdorff.h), for which there is time until `deadline`. Throws InputError where they do not
-// correspond.
+// Distances of the mapped surface `path` from `finest` (both .ply of the same part): the root mean square,
+// over the area, of the distance between the same material points, and the Hausdorff distance
+// (study/hausdorff.h), computed until `deadline`. Throws InputError where the surfaces do not correspond.
 struct SurfaceDistance {
   double rms = 0, hausdorff = 0;  // m
 };

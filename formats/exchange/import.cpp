@@ -1,5 +1,5 @@
-// Tells the format by the first bytes, then by the extension, has its reader make the surface, and finishes
-// it: names, source, and our own checks, whatever the reader promised.
+// Recognises the format by the first bytes, then by the extension; calls its reader; then sets names and
+// source and checks the surface.
 #include "formats/exchange/import.h"
 
 #include <fmt/format.h>

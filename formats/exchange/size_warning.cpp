@@ -1,4 +1,4 @@
-// Sizes of parts against what people make, and the unit that would bring them there.
+// Compares a part's size with usual sizes, and finds the unit that would make it usual.
 #include "formats/exchange/size_warning.h"
 
 #include <fmt/format.h>

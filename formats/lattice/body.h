@@ -69,9 +69,9 @@ struct Body {
   Columns cell_columns;
 
   // Cells under the surface: polygon p bounds the matter of cells surface_cells[surface_cell_offsets[p] ...
-  // surface_cell_offsets[p + 1]), ascending. It tells apart two pieces of one voxel, and where the matter
-  // just under a polygon was too little for a cell it names the neighbouring cell that it hangs on. Empty for
-  // centre placement.
+  // surface_cell_offsets[p + 1]), ascending. This distinguishes two pieces of one voxel. Where the matter
+  // under a polygon was too little for a cell, the neighbouring cell that it is attached to stands in. Empty
+  // for centre placement.
   std::vector<std::uint32_t> surface_cell_offsets;  // (polygons + 1)
   std::vector<std::uint32_t> surface_cells;         // indices of cells
 

@@ -1,4 +1,5 @@
-// A foreign surface knows no cells: seats (mapping/anchors/vertex_anchor.h) then come from the nearest elements.
+// The polygons of another surface name no cells, so its vertices are anchored at their nearest elements
+// (mapping/anchors/vertex_anchor.h).
 #include "mapping/anchors/other_surfaces.h"
 
 #include <fmt/format.h>

@@ -1,12 +1,11 @@
-// Nearly every vertex lies inside the voxel of a cell that its first polygon bounds: that is found first,
-// without a table of the polygons around each vertex. The rest (on the face between two voxels, or of matter
-// too thin for a cell of its own, so that it hangs on a neighbour) looks through the cells of all polygons
-// around it for the nearest, so that the order of the polygons does not matter; what finds no cell at all
-// takes the nearest element of its part.
+// Nearly every vertex lies inside the voxel of a cell that its first polygon bounds. Those are found first,
+// without a table of the polygons around each vertex. Other vertices (on the face between two voxels, or of
+// matter too thin for a cell of its own) take the nearest of the cells of all polygons around them, so that
+// the order of polygons does not matter; without any such cell, the nearest element of their part.
 //
-// Vertices at one position in one part (an OBJ has them along texture seams) have one representative, which
-// alone is seated. Inside a voxel with one cell all of them find that cell, whoever is asked: representatives
-// are looked for only at the positions of the others.
+// Of the vertices at one position in one part (an OBJ has them along texture seams) one representative is
+// located. Inside a voxel with one cell all of them find that cell, so representatives are needed only
+// elsewhere.
 #include "mapping/anchors/vertex_anchor.h"
 
 #include <algorithm>
@@ -178,7 +177,7 @@ class Seating {
   }
 
  private:
-  // What the polygons around a vertex say of its seat.
+  // What is known of a vertex's anchor from the polygons around it.
   enum Settled : std::uint8_t {
     kOpen,
     kAmongPieces,  // a cell that its first polygon bounds holds it
@@ -238,8 +237,7 @@ class Seating {
     });
   }
 
-  // A representative that is unused, or of another part, cannot speak for a vertex; the vertex then speaks
-  // for itself.
+  // A vertex whose representative is unused, or of another part, represents itself.
   void find_representatives() {
     std::vector<std::uint32_t> doubtful;
     for (std::uint32_t v = 0; v < settled_.size(); ++v)
@@ -336,7 +334,7 @@ class Seating {
 
   const Body& body_;
   std::vector<std::uint32_t> first_polygon_;         // (vertices) kNone: unused
-  std::vector<std::uint32_t> representative_;        // (vertices) whose seat each shares; empty: its own
+  std::vector<std::uint32_t> representative_;        // (vertices) whose anchor each shares; empty: its own
   std::vector<Vec3> middle_;                         // (parts x 3) lattice coordinates
   std::vector<std::unique_ptr<ElementGrid>> grids_;  // (parts)
   Buckets<std::uint32_t> cells_of_;                  // (elements) cells around each, where grids are needed

@@ -1,4 +1,4 @@
-// A counting sort of the vertices by cell or element, then the reach of each group that has any.
+// A counting sort of the vertices by cell or element, then the connected neighbourhood of each group.
 #include "mapping/anchors/vertex_batches.h"
 
 #include "base/bucket.h"

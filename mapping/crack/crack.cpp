@@ -1,6 +1,5 @@
-// Part by part: boxes, cut, walls, pieces. What rounding can spoil (a point on a plane, two points at one
-// place) shows as an odd count or an open edge; the part is then cut again with its boxes shifted a little
-// further.
+// For each part: boxes, cut, walls, pieces. Degenerate positions (a point on a plane, two coincident points)
+// show as an odd count or an open edge; the part is then cut again with its boxes shifted a little further.
 #include "mapping/crack/crack.h"
 
 #include <fmt/format.h>

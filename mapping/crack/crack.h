@@ -45,7 +45,7 @@ constexpr double kDrawnApart = 1e-3;
 // closed or crosses itself.
 [[nodiscard]] CrackedSurface part_surface(const Body& body, const Components& fragments,
                                           const PartedPairs& parted, const CrackOptions& options);
-// The same with seats of the body's vertices that are known, and shifts that some of them have already.
+// The same with known anchors of the body's vertices, and shifts that some of them already have.
 [[nodiscard]] CrackedSurface part_surface(const Body& body, const Components& fragments,
                                           const PartedPairs& parted, const CrackOptions& options,
                                           VertexAnchors seats,

@@ -1,4 +1,4 @@
-// The walls of a crack: what of each square between boxes of two fragments lies inside the part.
+// The walls of a crack: the portion inside the part of each square between boxes of two fragments.
 #pragma once
 #include "mapping/crack/crack_split.h"
 

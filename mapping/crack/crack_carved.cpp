@@ -1,6 +1,6 @@
-// Cells fill voxels, so matter is parted between voxels, not between elements: the cutting sees a body whose
-// elements are the voxels, those that are left and those that went, which are a fragment of their own. An
-// element of that body and the octant of it that a vertex is in are a cell and its corner.
+// Carving removes whole voxels, so the cut runs between voxels, not between elements. The cutting code is
+// given a body whose elements are the voxels, with the carved ones as a fragment. An element of that body and
+// an octant of it stand for a cell and its corner.
 #include "mapping/crack/crack_carved.h"
 
 #include <algorithm>

@@ -1,5 +1,4 @@
-// Leaves the debris out: its polygons, the faces and parts that are its own, and the vertices that only it
-// used.
+// Removes the debris: its polygons, and the faces, parts and vertices that only it uses.
 #include "base/error.h"
 #include "mapping/crack/crack_pieces.h"
 

@@ -1,6 +1,6 @@
-// Boxes that hold elements of several fragments, such as two leaves a third of a spacing apart of which one
-// broke off. All their squares were cut, so each bit of surface and each wall lies in one box: those that
-// share an edge in it bound the same matter. The cells under the surface's bits name the element.
+// Boxes with elements of several fragments, such as two leaves a third of a spacing apart of which one broke
+// off. All their squares were cut, so each facet and each wall lies in one box; those that share an edge
+// inside it bound the same matter. The cells under the facets give the element.
 #include <algorithm>
 #include <map>
 

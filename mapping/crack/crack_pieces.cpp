@@ -1,8 +1,7 @@
-// A vertex of the body's surface stays what it is: it lies in one box, so in one piece. A point on a cut is a
-// vertex in each piece that it bounds. There a piece may touch itself, or have a crack that ends inside it:
-// the polygons around the point are grouped by the edges that they share, as far as they bound the same
-// matter there, and each group gets a vertex of its own. At the end of a crack both its sides are in one
-// group.
+// A vertex of the body's surface lies in one box, so in one piece, and stays one vertex. A point on a cut
+// becomes a vertex of each piece that it bounds. Where a piece touches itself there, or has a crack that ends
+// inside it, the polygons around the point are grouped by the edges that they share, as far as they bound the
+// same matter, and each group gets a vertex. At the end of a crack both sides are in one group.
 #include "mapping/crack/crack_pieces.h"
 
 #include <fmt/format.h>
@@ -116,7 +115,7 @@ std::uint32_t PieceBuilder::add_vertex(const CrackMesh& mesh, std::uint32_t node
   return static_cast<std::uint32_t>(surface.vertices.size() - 1);
 }
 
-// A vertex of the body's surface goes with its own seat, unless that is in another fragment or beyond a
+// A vertex of the body's surface keeps its anchor, unless that is in another fragment or beyond a
 // crack: then with the owner of its box.
 void PieceBuilder::place_vertex(const CrackMesh& mesh, const CrackPolygon& polygon, std::uint32_t vertex) {
   if (seen_[vertex] != kNoBox) return;

@@ -35,7 +35,7 @@ void drop_debris(CrackedSurface& cracked);
 
 class PieceBuilder {
  public:
-  // `seats`, `shifts`: of the vertices of the body's surface.
+  // `seats` (anchors), `shifts`: of the vertices of the body's surface.
   PieceBuilder(const Body& body, const Components& fragments, const CrackOptions& options,
                VertexAnchors seats, std::vector<CrackedSurface::Shift> shifts);
   // A part that did not break.

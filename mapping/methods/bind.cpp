@@ -1,7 +1,6 @@
-// VertexAnchors are turned into frames, one for each distinct seat: a byte a cell (and a byte an element) records
-// which of its eight octants are taken, and a running count numbers them. Then each vertex gets its
-// coordinates in the rest base of its frame, which is all that the paper's transformation (section 6.1.2)
-// needs later.
+// Each distinct anchor gets a frame: a byte for each cell (and element) records which of its eight octants
+// are used, and a prefix sum numbers them. Then each vertex gets its coordinates in the rest base of its
+// frame, which is all that the paper's transformation (section 6.1.2) needs later.
 #include "mapping/methods/bind.h"
 
 #include <Eigen/LU>

@@ -1,4 +1,4 @@
-// What is known of each vertex, as columns of the surface that is written.
+// Attributes of the mapped vertices, as columns of the surface.
 #pragma once
 #include "formats/lattice/body.h"
 #include "mapping/types/result.h"

@@ -1,6 +1,6 @@
-// Points along the edges of a triangle, and inside it, are mapped and compared with the plane of the mapped
-// corners: what slides within the plane does not change the shape. An edge of a box belongs to triangles in
-// two planes, so that it counts whichever way it bows.
+// Points along the edges of a triangle, and inside it, are mapped and their distance from the plane of the
+// mapped corners is taken; sliding within the plane does not change the shape. A sharp edge belongs to
+// triangles in two planes, so bending in either direction is seen.
 #include "mapping/report/chord.h"
 
 #include <Eigen/Geometry>

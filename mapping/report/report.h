@@ -1,4 +1,4 @@
-// How far a mapping can be trusted, for people and programs.
+// The validity report of a mapping, as text and as JSON.
 #pragma once
 #include <string>
 #include <vector>

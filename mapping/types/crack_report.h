@@ -1,4 +1,4 @@
-// What a fracture made of the parts.
+// The pieces that a fracture broke the parts into.
 #pragma once
 #include <cstdint>
 #include <string>

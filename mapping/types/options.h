@@ -1,4 +1,4 @@
-// How a deformation is to be mapped.
+// Options of a mapping.
 #pragma once
 #include <cstdint>
 #include <string>

@@ -1,4 +1,4 @@
-// Where the vertices went, and how far that can be trusted.
+// Results of a mapping: displacements of the vertices, and checks of their validity.
 #pragma once
 #include <array>
 #include <cstdint>

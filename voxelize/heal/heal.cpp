@@ -1,5 +1,5 @@
-// Each repair is kept only where it makes the surface more closed. What is still open then is left to
-// judge.h.
+// A repair is kept only if it reduces the open edges. What stays open is classified by samples
+// (voxelize/classify/inside_consensus.h).
 #include "voxelize/heal/heal.h"
 
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-// How a part is to be voxelised.
+// Options of voxelization.
 #pragma once
 #include <optional>
 #include <string>

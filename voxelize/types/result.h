@@ -1,4 +1,4 @@
-// What was found of a part.
+// The result of voxelizing a part, besides the body.
 #pragma once
 #include <array>
 #include <optional>

@@ -1,4 +1,4 @@
-// The point of a drawable that a ray met, with what shading needs to know of it.
+// The point of a drawable that a ray hit, with the data for shading.
 #pragma once
 #include "flexel/picture/render/drawable.h"
 

@@ -144,7 +144,7 @@ std::string error_script(const Study& study, const std::string& out) {
   for (const std::size_t i : front)
     data += fmt::format("{:.9g} {:.9g}\n", points[i].seconds, shown_error(points[i]));
   data += "EOD\n";
-  // The others are told by their colour: where all are written none can be read.
+  // The other points are identified by colour: labels on all would overlap.
   std::vector<std::size_t> labelled;
   for (std::size_t i = 0; i < points.size(); ++i)
     if (points[i].error && (points[i].sweep == "resolution" || points[i].sweep == "calculix"))
