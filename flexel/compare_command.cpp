@@ -292,7 +292,7 @@ int compare_command(int argc, char** argv) {
   CLI::App app{"Which of several parts is stiffer under one scene: mass, displacement, stiffness, stress.",
                "flexel compare"};
   declare_job(app, arguments.job);
-  app.add_flag("--json", arguments.json, "As JSON, in SI units (docs/compare.md)");
+  app.add_flag("--json", arguments.json, "As JSON, in SI units (docs/guide/compare.md)");
   app.add_option("--threads", arguments.threads, "Threads; 0 is every core")->check(CLI::NonNegativeNumber);
   app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
   if (!parse_arguments(app, argc, argv)) return kExitDone;

@@ -100,7 +100,7 @@ void map_pieces(Body& body, const Components& fragments, const MapOptions& optio
   for (std::size_t p = 0; p < volumes.size(); ++p) cracked.pieces[p].volume_after = volumes[p];
 }
 
-// What [[event]] carve took away leaves its surface behind (docs/events.md).
+// What [[event]] carve took away leaves its surface behind (docs/reference/events.md).
 void warn_of_carved(const Body& body, Progress& progress) {
   if (body.notes.count(kCarvedNote) > 0)
     progress.warn(

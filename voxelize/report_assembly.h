@@ -7,7 +7,7 @@
 namespace flexel::voxelize {
 
 // Totals over the parts, and of what is wrong how many parts have it and the worst of them. All that is known
-// of each part is in the summary (docs/voxelize.md).
+// of each part is in the summary (docs/reference/voxelize.md).
 void report_together(const VoxelizeResult& result, Progress& progress);
 
 // Parts that overlap, and parts that miss each other.

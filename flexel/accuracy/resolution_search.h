@@ -1,4 +1,4 @@
-// The size of the lattice where the command line gives none (docs/deform.md, "How exact, how long"): by
+// The size of the lattice where the command line gives none (docs/guide/deform.md, "How exact, how long"): by
 // default an error of 5 % within about 20 s; `flexel deform --accuracy 2%` and `--within 10s` ask for others.
 //
 // The compared quantities: the displacement of each probe along its direction in the last run; where no probe
@@ -80,7 +80,7 @@ struct AccuracyReport {
   [[nodiscard]] bool met() const;
   // One sentence for people.
   [[nodiscard]] std::string sentence() const;
-  [[nodiscard]] std::string json() const;  // docs/summary.md, "accuracy"
+  [[nodiscard]] std::string json() const;  // docs/reference/summary.md, "accuracy"
 };
 
 // Makes runs until the goal is met, or the next would take too long or need too much memory, or four finer

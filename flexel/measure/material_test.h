@@ -1,4 +1,4 @@
-// The effective elastic constants of a lattice: virtual material tests (`flexel measure`, docs/accuracy.md).
+// The effective elastic constants of a lattice: virtual material tests (`flexel measure`, docs/measurements/accuracy.md).
 //
 // Inside: the elasticity tensor of an unbounded lattice, from its energy under affine strains, and from it
 // Young's modulus, Poisson's ratio and the shear modulus by direction.

@@ -146,7 +146,7 @@ int measure_command(int argc, char** argv) {
   CLI::App app{
       "Draws, bends and twists bars of lattice and prints the E, nu and G that they have, beside those of "
       "the "
-      "material (docs/accuracy.md).",
+      "material (docs/measurements/accuracy.md).",
       "flexel measure"};
   app.add_option("--model", arguments.model, "cells, springs or paper")
       ->type_name("NAME")

@@ -17,7 +17,7 @@ struct CalculixLook {
   std::vector<std::string> warnings;  // what is not exactly as in the scene
 };
 
-// Whether the programs are there and the scene has a translation (docs/export.md). Throws Interrupted.
+// Whether the programs are there and the scene has a translation (docs/guide/export.md). Throws Interrupted.
 [[nodiscard]] CalculixLook look_at_calculix(const Case& study, const RunOptions& options);
 
 // Exports, and runs ccx, at tetrahedra (C3D10) with edges up to `size` [m], on `threads`. The result's

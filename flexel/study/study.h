@@ -79,7 +79,7 @@ struct Study {
 // References from the rows (`given` go first), errors of the rows, the summed points and the sentences.
 void conclude(Study& study, const std::vector<Reference>& given);
 
-// study.csv (docs/study.md gives its columns): one line of names, one line a row. `quantities` are the names
+// study.csv (docs/guide/study.md gives its columns): one line of names, one line a row. `quantities` are the names
 // of the last columns.
 [[nodiscard]] std::string csv_header(const std::vector<Quantity>& quantities);
 [[nodiscard]] std::string csv_line(std::size_t number, const Row& row,

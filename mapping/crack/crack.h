@@ -1,5 +1,5 @@
 // Mapping across a fracture: the surface is parted along the boundary between the Voronoi cells of the
-// fragments' elements, so that each piece goes with its own elements only (docs/cracks.md).
+// fragments' elements, so that each piece goes with its own elements only (docs/reference/cracks.md).
 #pragma once
 #include <optional>
 

@@ -40,7 +40,7 @@ struct CrackReport {
 
 // For people; none where nothing broke in two.
 [[nodiscard]] std::vector<std::string> crack_lines(const CrackReport& report);
-// Every key and unit is in docs/cracks.md.
+// Every key and unit is in docs/reference/cracks.md.
 [[nodiscard]] std::string crack_json(const CrackReport& report);
 
 }  // namespace flexel::mapping

@@ -5,7 +5,7 @@
 
 namespace flexel::mapping {
 
-// How the elements around a vertex carry it (docs/mapping.md compares them).
+// How the elements around a vertex carry it (docs/theory/mapping-methods.md compares them).
 enum class MapMethod {
   gram_schmidt,  // the paper's: the orthonormal base of four elements
   affine,        // the edges of the same four elements

@@ -8,7 +8,7 @@
 namespace flexel::voxelize {
 
 enum class Align { snap, box, none };
-// What is done to surfaces that are not closed before inside is told from outside; docs/healing.md.
+// What is done to surfaces that are not closed before inside is told from outside; docs/reference/healing.md.
 enum class Heal { none, automatic, wrap };
 struct HealChoice {
   Heal mode = Heal::automatic;
