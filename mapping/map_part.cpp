@@ -82,7 +82,7 @@ void map_pieces(Body& body, const Components& fragments, const MapOptions& optio
       at_rest.push_back(vertices[vertex]);
       vertices[vertex] += by;
     }
-    mapped.result = map_surface(body, options, cracked.seats, progress);
+    mapped.result = map_surface(body, options, cracked.anchors, progress);
     for (std::size_t s = 0; s < cracked.shifts.size(); ++s) {
       vertices[cracked.shifts[s].vertex] = at_rest[s];
       mapped.result.displacement[cracked.shifts[s].vertex] += cracked.shifts[s].by;
@@ -131,7 +131,7 @@ CrackedSurface part_carved(Body& body, const Broken& broken, const CrackOptions&
   std::vector<std::uint32_t> no_offsets, no_cells;  // the cells under the polygons are those of others
   const Loan surface(body.surface, closed.surface);
   const Loan offsets(body.surface_cell_offsets, no_offsets), cells(body.surface_cells, no_cells);
-  return part_surface(body, broken.fragments, broken.parted, options, std::move(closed.seats),
+  return part_surface(body, broken.fragments, broken.parted, options, std::move(closed.anchors),
                       std::move(closed.shifts));
 }
 

@@ -16,14 +16,14 @@ struct VertexAnchor {
 constexpr double kHigher = 1e300;  // beyond every lattice
 
 struct VertexAnchors {
-  std::vector<VertexAnchor> seat;        // (vertices)
+  std::vector<VertexAnchor> anchor;      // (vertices)
   std::vector<std::uint8_t> referenced;  // (vertices) 1: some polygon uses it
 };
 
 // At `element` of `part`, for a vertex at `point` (m). Half-way between two octants the side of `middle`
 // (lattice coordinates) is taken, by default the higher one.
-[[nodiscard]] VertexAnchor seat_at_element(const Body& body, std::uint32_t part, std::uint32_t element,
-                                           const Vec3& point, const Vec3& middle = Vec3::Constant(kHigher));
+[[nodiscard]] VertexAnchor anchor_at_element(const Body& body, std::uint32_t part, std::uint32_t element,
+                                             const Vec3& point, const Vec3& middle = Vec3::Constant(kHigher));
 
 // Throws InputError: no surface, a part without elements.
 [[nodiscard]] VertexAnchors locate_vertices(const Body& body);

@@ -35,7 +35,7 @@ struct Groups {
 // Elements farther than `radius` spacings from the cell have no weight at its vertices and are left out;
 // those of an element group all stay.
 [[nodiscard]] Groups group_vertices(const Body& body, const Adjacency& connections,
-                                    const std::vector<VertexAnchor>& seats, int steps, double radius);
+                                    const std::vector<VertexAnchor>& anchors, int steps, double radius);
 
 // Where `point` lies as seen from the group, in spacings: a cell's corners are at 0 and 1.
 [[nodiscard]] inline Vec3 within(const Body& body, const Group& group, const Vec3& point) {

@@ -146,9 +146,9 @@ CrackedSurface part_surface(const Body& body, const Components& fragments, const
 }
 
 CrackedSurface part_surface(const Body& body, const Components& fragments, const PartedPairs& parted,
-                            const CrackOptions& options, VertexAnchors seats,
+                            const CrackOptions& options, VertexAnchors anchors,
                             std::vector<CrackedSurface::Shift> shifts) {
-  PieceBuilder builder(body, fragments, options, std::move(seats), std::move(shifts));
+  PieceBuilder builder(body, fragments, options, std::move(anchors), std::move(shifts));
   const Triangles triangles = triangulate(body.surface);
   const std::vector<std::uint32_t> welded = weld(body.surface.vertices);
   const Cutting cutting{body, fragments, parted, options, welded};

@@ -33,7 +33,7 @@ struct Binding {
 // Throws InputError: the body carries no surface, a part has no elements.
 [[nodiscard]] Binding bind(const Body& body, MapMethod method, std::size_t states = 1);
 // The same with known anchors: those of a surface that was cut along cracks (mapping/crack/crack.h).
-[[nodiscard]] Binding bind(const Body& body, MapMethod method, VertexAnchors seats, std::size_t states = 1);
+[[nodiscard]] Binding bind(const Body& body, MapMethod method, VertexAnchors anchors, std::size_t states = 1);
 
 // Maps the state `position` (elements x 3, m) onto the vertices: (vertices x 3) m.
 [[nodiscard]] std::vector<Vec3> apply(const Binding& binding, const Body& body,

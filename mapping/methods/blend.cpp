@@ -100,10 +100,10 @@ Vec3 follow_nearest(const Body& body, const Blend& blend, const Group& group,
 
 }  // namespace
 
-Blend make_blend(const Body& body, const Adjacency& connections, const std::vector<VertexAnchor>& seats,
+Blend make_blend(const Body& body, const Adjacency& connections, const std::vector<VertexAnchor>& anchors,
                  bool keep_weights) {
   Blend blend;
-  blend.groups = group_vertices(body, connections, seats, kBlendSteps, kBlendRadius);
+  blend.groups = group_vertices(body, connections, anchors, kBlendSteps, kBlendRadius);
   blend.moving = find_moving_elements(body, connections, blend.groups.elements);
   if (!keep_weights) return blend;
   blend.weights.resize(blend.groups.blocks.size());

@@ -21,7 +21,7 @@ struct Blend {
 
 // `keep_weights`: about 150 bytes a vertex, which pays when several states are mapped.
 [[nodiscard]] Blend make_blend(const Body& body, const Adjacency& connections,
-                               const std::vector<VertexAnchor>& seats, bool keep_weights);
+                               const std::vector<VertexAnchor>& anchors, bool keep_weights);
 
 // (vertices x 3) m. The displacement of vertex x is
 //   u(x) = sum_e w_e (d_e + G_e (x - X_e)) / sum_e w_e

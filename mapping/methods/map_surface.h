@@ -12,7 +12,7 @@ namespace flexel::mapping {
 [[nodiscard]] MapResult map_surface(const Body& body, const MapOptions& options, Progress& progress);
 // The same with known anchors (mapping/crack/crack.h).
 struct VertexAnchors;
-[[nodiscard]] MapResult map_surface(const Body& body, const MapOptions& options, const VertexAnchors& seats,
+[[nodiscard]] MapResult map_surface(const Body& body, const MapOptions& options, const VertexAnchors& anchors,
                                     Progress& progress);
 
 }  // namespace flexel::mapping
