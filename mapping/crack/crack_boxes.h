@@ -95,8 +95,8 @@ class CrackBoxes {
   std::vector<std::uint32_t> owner_;     // (boxes)
   std::vector<std::uint32_t> fragment_;  // (boxes)
   std::vector<Square> squares_;          // by axis, plane
-  std::array<std::vector<std::uint64_t>, 3>
-      square_keys_;  // by axis: plane, then the next two axes; ascending
+  // By axis: plane, then the next two axes; ascending
+  std::array<std::vector<std::uint64_t>, 3> square_keys_;
 };
 
 }  // namespace flexel::mapping
