@@ -33,7 +33,7 @@ std::size_t spanning_triangles(const Body& body, const MapResult& result, const 
   return count;
 }
 
-// What hangs together, and what does not.
+// The fragments, and the pairs that a crack parted.
 struct Broken {
   Adjacency connections;
   Components fragments;

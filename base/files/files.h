@@ -13,7 +13,7 @@ namespace flexel {
 
 using Bytes = std::vector<std::byte>;
 
-// The program of ours before this one in a pipe has failed with `code`, and said why (base/files/pipe_code.h).
+// The Flexel program before this one in a pipe failed with `code` and printed why (base/files/pipe_code.h).
 class ProgramBeforeFailed : public std::runtime_error {
  public:
   explicit ProgramBeforeFailed(int code) : std::runtime_error("the program before it failed"), code_(code) {}
@@ -51,7 +51,7 @@ class OutputFile {
   void write_through(const char* data, std::size_t size);
   Bytes* memory_ = nullptr;
   std::string path_;       // as given
-  std::string target_;     // what it stands for once links are followed
+  std::string target_;     // the path with symbolic links resolved
   std::string temporary_;  // "" for stdout, devices and FIFOs, and once committed
   int descriptor_ = -1;
   bool committed_ = false;
@@ -65,7 +65,7 @@ void refuse_unwritable(const std::string& path, bool binary = true);
 // A whole text to `path`, as OutputFile does.
 void write_text(const std::string& text, const std::string& path, bool alone = false);
 
-// What `path` stands for once links are followed; it need not exist. Throws InputError: a ring of links.
+// `path` with symbolic links resolved; it need not exist. Throws InputError: a cycle of links.
 [[nodiscard]] std::string follow_links(const std::string& path);
 
 // Whether `path` names stdout: "-", "/dev/stdout".

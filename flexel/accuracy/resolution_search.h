@@ -78,7 +78,7 @@ struct AccuracyReport {
   // What to ask for next, with the time that it is expected to take: "--accuracy 2% takes about 40 s".
   std::string advice;
   [[nodiscard]] bool met() const;
-  // One sentence for people.
+  // One sentence for the user.
   [[nodiscard]] std::string sentence() const;
   [[nodiscard]] std::string json() const;  // docs/reference/summary.md, "accuracy"
 };

@@ -195,7 +195,7 @@ class Writer {
           line("{},{},{}", held.node + 1, held.axis + 1, held.axis + 1);
   }
 
-  // What moves lead: within the step.
+  // Prescribed displacements: within the step.
   void moves() {
     std::string led;
     std::size_t next = 0;

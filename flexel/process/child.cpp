@@ -72,7 +72,7 @@ bool has_ended(pid_t child) {
          info.si_pid == child;
 }
 
-// As the kernel wants them: a null pointer at the end.
+// For execve(): a null pointer at the end.
 std::vector<char*> pointers(const std::vector<std::string>& texts) {
   std::vector<char*> result;
   for (const std::string& each : texts) result.push_back(const_cast<char*>(each.c_str()));

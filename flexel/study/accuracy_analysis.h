@@ -81,7 +81,7 @@ struct Point {
 // half its width. As extrapolate() has it, about its own value.
 [[nodiscard]] double half_range(const std::vector<SizeValue>& values);
 
-// One quantity as another program has it beside ours.
+// One quantity by another program beside Flexel's value.
 struct Agreement {
   Reference ours, theirs;  // theirs extrapolated from its own sizes
   double finest = 0;       // what its finest run found

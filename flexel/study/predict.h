@@ -43,7 +43,7 @@ struct Prediction {
 };
 
 // Kinds of runs whose costs follow laws of their own: CalculiX's direct solver, cells being tetrahedra; and
-// `flexel deform`, which has all stages in one process, its memory being that of program 0, and knows them as
+// `flexel deform`, which has all stages in one process, its memory being that of program 0, and names them
 // "voxelize", "solve" (with what assembles), "error bars" and "map".
 inline constexpr const char* kCalculix = "calculix";
 inline constexpr const char* kOneProcess = "one process";

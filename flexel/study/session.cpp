@@ -176,7 +176,7 @@ bool Session::run_cheapest(Sweep& sweep) {
         if (open[i].sweep == ladder) best = i;
   const Trial& trial = open[best];
   const Prediction& prediction = predicted[best];
-  // Fewer cells than the size's cube are a chance to be looked at, once the lattice is made.
+  // The lattice may have fewer cells than the size's cube suggests: then the run is considered again.
   const std::string why = why_not(trial, prediction.scaled(1 / kFewerCells));
   if (why.empty())
     run_one(sweep, trial, prediction);

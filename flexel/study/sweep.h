@@ -32,7 +32,7 @@ struct LeftOut {
   std::string why;
 };
 
-// To three digits, as people write sizes.
+// Rounded to three digits.
 [[nodiscard]] double rounded(double size);
 
 // How many tetrahedra of an edge gmsh puts into a cube of that edge, about, on bulky parts.

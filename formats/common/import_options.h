@@ -21,7 +21,7 @@ struct ImportOptions {
   std::optional<double> largest_edge;
   // s of processor time that OpenCASCADE may take over a file; not given: a minute and 10 s a megabyte
   std::optional<double> occt_seconds;
-  // Told, a line each, what a reader passed over and the user should know.
+  // Called with a line for each thing that a reader ignored and the user should know.
   std::function<void(const std::string&)> warn;
 };
 

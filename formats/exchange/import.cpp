@@ -148,12 +148,12 @@ bool looks_like_iges(std::string_view text) {
          text.substr(0, kLine).find('\n') == std::string_view::npos;
 }
 
-// JSON that speaks of an asset somewhere near its beginning.
+// JSON with "asset" near its beginning.
 bool looks_like_gltf(std::string_view text) {
   return begins_with_word(text, "{") && text.find("\"asset\"") != std::string_view::npos;
 }
 
-// The format that an extension or --input-format stands for, "" for none.
+// The format of an extension or of --input-format, "" for none.
 std::string format_named(const std::string& name) {
   if (name == "stp" || name == "p21") return "step";
   if (name == "igs") return "iges";

@@ -31,7 +31,7 @@ std::string name_of(double unit) {
   return fmt::format("{:g} m", unit);
 }
 
-// CAD files are read in mm whatever they carry, and cannot be told another unit.
+// These formats carry their unit; --unit cannot change it.
 bool carries_unit(const SurfaceSource& source) {
   return source.format == "step" || source.format == "iges" || source.format == "glb" ||
          source.format == "3mf";

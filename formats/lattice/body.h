@@ -50,7 +50,7 @@ struct Body {
 
   // Elements (n)
   std::vector<Index3> lattice_index;  // (n x 3) in the part's lattice; may be negative
-  // (n) tells elements of one part at one lattice index apart; 0 nearly everywhere
+  // (n) distinguishes elements of one part at one lattice index; 0 nearly everywhere
   std::vector<std::uint16_t> piece;
   std::vector<Vec3> rest;      // (n x 3) m, world frame
   std::vector<Vec3> position;  // (n x 3) m, world frame

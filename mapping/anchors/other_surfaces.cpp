@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t kSamples = 500;  // vertices of a part that say where it lies
 
-// (parts of the surface) the body's part that each goes with.
+// (parts of the surface) the part of the body that carries each.
 std::vector<std::uint32_t> partners(const Body& body, const Surface& surface) {
   std::vector<std::uint32_t> partner(surface.parts.size(), 0);
   if (body.parts.size() == 1) return partner;

@@ -42,7 +42,7 @@ class Mixed {
       if (caps[c].fragment == kMixed) add(mesh, {boxes.find(caps[c].box), kNoBox, c}, caps[c].corners);
   }
 
-  // For each item the first of those that it hangs together with.
+  // For each item the first of those that it is connected with.
   [[nodiscard]] std::vector<std::uint32_t> components() {
     const auto key = [](const Side& side) { return std::array{side.box, side.low, side.high}; };
     std::sort(sides_.begin(), sides_.end(), [&](const Side& a, const Side& b) {

@@ -45,7 +45,7 @@ struct Binding {
                                               const std::vector<Vec3>& position,
                                               const std::vector<Vec3>& displacement);
 
-// apply() and judge(), and what the binding knows of each vertex.
+// apply() and judge(), and the data of each vertex in the binding.
 [[nodiscard]] MapResult map_state(const Binding& binding, const Body& body);
 // What `options` ask for beyond that: vertices far outside, checks by name. Throws InputError: --far refuse.
 void complete(const Body& body, const MapOptions& options, MapResult& result);

@@ -12,7 +12,7 @@ struct BlockWeights {
   std::vector<float> weight;           // relative to each other; a vertex's last may be 0 (kBlendStep)
 };
 
-// What `blended` knows at rest.
+// The data of `blended` at rest.
 struct Blend {
   Groups groups;
   MovingElements moving;

@@ -133,7 +133,7 @@ void collect_in_radius(const float* weight, std::size_t count, ElementsInRadius&
   if (by_sixteen) return list_heard_by_sixteen(weight, count, heard);
 #endif
   std::size_t used = 0;
-  for (std::size_t e = 0; e < count; ++e) {  // every one is written, and overwritten where it is not heard
+  for (std::size_t e = 0; e < count; ++e) {  // every one is written; those of weight 0 are overwritten
     heard.element[used] = static_cast<std::uint16_t>(e);
     heard.weight[used] = weight[e];
     used += weight[e] > 0;

@@ -17,7 +17,7 @@ namespace {
 
 using Triangle = std::array<std::uint32_t, 3>;
 
-constexpr double kLongEdge = 2;        // spacings: shorter edges are not looked at
+constexpr double kLongEdge = 2;        // spacings: shorter edges are not sampled
 constexpr double kMostOnEdge = 16;     // pairs of pieces, each of two spacings or more
 constexpr double kMostInside = 3;      // thirds of a triangle's sides, each in as many pieces
 constexpr double kNoise = 1e-9;        // of the part's diagonal: rounding

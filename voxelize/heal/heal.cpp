@@ -169,7 +169,7 @@ std::string why_undecided(const HealedPart& part) {
   return faults;
 }
 
-// What to do about parts that are open, tried for as long as nobody gets impatient.
+// Advice for open parts; a wrap is tried for 10 s in all.
 std::string cure(const std::vector<UndecidedPart>& parts) {
   constexpr std::chrono::seconds kPatience(10);
   const auto begin = std::chrono::steady_clock::now();

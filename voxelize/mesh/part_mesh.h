@@ -48,7 +48,7 @@ void number_edges(PartMesh& mesh);
 // enclose positive volume. A shell inside another one may be inside out: it bounds a void.
 void repair_orientation(PartMesh& mesh);
 
-// Regions of triangles that hang together across edges with two triangles, and which triangles to turn so
+// Regions of triangles connected across edges with two triangles, and which triangles to turn so
 // that all of a region face the same side of it: the side that most of its area faces.
 struct FacingRegions {
   std::vector<std::uint8_t> turn;     // (triangles) 1: turn it over

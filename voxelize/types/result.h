@@ -27,7 +27,7 @@ struct Healing {
   std::size_t left_open = 0;                  // open edges afterwards
   bool wrapped = false;
   double wrap_alpha = 0;                                    // m, the widest opening spanned
-  enum class By { surface, vote, flood } by = By::surface;  // what told inside from outside
+  enum class By { surface, vote, flood } by = By::surface;  // the classifier that was used
 };
 
 // What was found for one part.

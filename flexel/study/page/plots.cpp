@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Okabe and Ito (2008), told apart by the colour-blind, on light and on dark.
+// Okabe and Ito (2008): distinguishable for the colour-blind, on light and on dark.
 constexpr const char* kColours[] = {"#0b84c8", "#e08a00", "#009e73", "#d55e00",
                                     "#b8659a", "#56a9dd", "#8a8a8a", "#a0922c"};
 
@@ -36,7 +36,7 @@ std::string head(const std::string& name, int width, int height) {
       width, height, name);
 }
 
-// Nobody of ours has it.
+// No Flexel run has this colour.
 constexpr const char* kAgainstColour = "#8a5cd0";
 constexpr int kAgainstMarker = 13;  // a filled diamond
 
