@@ -1,4 +1,4 @@
-// flexel info: size, volume and faces of a part, and the names that a scene can use.
+// flexel info: what a part is and what a scene can name in it.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -81,7 +81,7 @@ struct Unit {
   std::string name = "mm";
 };
 
-// The unit of the output: the file's own, by its shortest name.
+// The unit to speak in: the file's own, by the shortest name that it has.
 Unit unit_of(const SurfaceSource& source) {
   for (const char* name : {"mm", "cm", "m", "um", "in", "ft", "km"})
     if (std::abs(length_unit(name) - source.unit) <= 1e-12 * source.unit) return {source.unit, name};
@@ -269,7 +269,7 @@ int info_command(int argc, char** argv) {
   app.add_option("part", files, "STEP, IGES, BREP, STL, OBJ, PLY, OFF, glTF or 3MF files; -: stdin")
       ->required()
       ->type_name("PART");
-  app.add_flag("--json", json, "As JSON, in SI units (docs/guide/info.md)");
+  app.add_flag("--json", json, "As JSON, in SI units (docs/info.md)");
   app.add_option("--unit", unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
   app.add_option("--edge", edge, "Split the mesh to this longest edge (default: not split)")
       ->type_name("LENGTH");

@@ -1,5 +1,5 @@
-// Recognises the format by the first bytes, then by the extension; calls its reader; then sets names and
-// source and checks the surface.
+// Tells the format by the first bytes, then by the extension, has its reader make the surface, and finishes
+// it: names, source, and our own checks, whatever the reader promised.
 #include "formats/exchange/import.h"
 
 #include <fmt/format.h>
@@ -148,12 +148,12 @@ bool looks_like_iges(std::string_view text) {
          text.substr(0, kLine).find('\n') == std::string_view::npos;
 }
 
-// JSON with "asset" near its beginning.
+// JSON that speaks of an asset somewhere near its beginning.
 bool looks_like_gltf(std::string_view text) {
   return begins_with_word(text, "{") && text.find("\"asset\"") != std::string_view::npos;
 }
 
-// The format of an extension or of --input-format, "" for none.
+// The format that an extension or --input-format stands for, "" for none.
 std::string format_named(const std::string& name) {
   if (name == "stp" || name == "p21") return "step";
   if (name == "igs") return "iges";

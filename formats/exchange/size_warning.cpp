@@ -1,4 +1,4 @@
-// Compares a part's size with usual sizes, and finds the unit that would make it usual.
+// Sizes of parts against what people make, and the unit that would bring them there.
 #include "formats/exchange/size_warning.h"
 
 #include <fmt/format.h>
@@ -31,7 +31,7 @@ std::string name_of(double unit) {
   return fmt::format("{:g} m", unit);
 }
 
-// These formats carry their unit; --unit cannot change it.
+// CAD files are read in mm whatever they carry, and cannot be told another unit.
 bool carries_unit(const SurfaceSource& source) {
   return source.format == "step" || source.format == "iges" || source.format == "glb" ||
          source.format == "3mf";

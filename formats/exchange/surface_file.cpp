@@ -1,5 +1,5 @@
-// Chooses the writer and checks what all writers need. Text is formatted in parallel, in chunks of polygons,
-// and written in order.
+// Picks the writer and checks what all writers need. Text is made in chunks of polygons in parallel and put
+// out in order.
 #include "formats/exchange/surface_file.h"
 #include "formats/exchange/part_files.h"
 

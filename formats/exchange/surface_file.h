@@ -10,8 +10,7 @@ namespace flexel {
 enum class SurfaceFormat { stl_binary, stl_ascii, obj, ply, ply_ascii, off, glb };
 
 // The format for `format` ("stl", "obj", "ply", "off", "glb") or, when that is empty, for the extension of
-// `path`; InputError when neither is given (a pipe needs --format) or the format is unknown (with the
-// nearest).
+// `path`; InputError when neither tells (a pipe needs --format) or the format is unknown (with the nearest).
 [[nodiscard]] SurfaceFormat surface_format(const std::string& format, const std::string& path, bool ascii);
 
 // Writes `surface` with vertex i moved by displacement[i] (vertices x 3, m). Every coordinate is written in
