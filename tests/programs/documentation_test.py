@@ -84,5 +84,12 @@ def test_docs():
         expect(result.code == 0, f"the commands of {page.relative_to(SOURCE)} as they stand: {result}")
 
 
+def test_the_index_has_every_page():
+    docs = SOURCE / "docs"
+    index = (docs / "README.md").read_text(encoding="utf-8")
+    missing = [name for page in sorted(docs.rglob("*.md")) if f"({(name := str(page.relative_to(docs)))})" not in index and name != "README.md"]
+    expect(not missing, f"docs/README.md has no link to {missing}")
+
+
 if __name__ == "__main__":
     main(globals())
