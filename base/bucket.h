@@ -1,4 +1,4 @@
-// Large arrays made by all threads: counting sort, and room that is touched in parallel.
+// Large arrays filled by all threads: counting sort, and first touch of fresh memory in parallel.
 #pragma once
 #if __has_include(<sys/mman.h>)
 #include <sys/mman.h>

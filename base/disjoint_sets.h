@@ -1,5 +1,4 @@
-// Union-find whose root is always the lowest member, so that numbering sets in order of first member is one
-// sweep.
+// Union-find. The root of a set is its lowest member, so one sweep numbers the sets in order of first member.
 #pragma once
 #include <cstdint>
 #include <numeric>

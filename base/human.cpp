@@ -66,9 +66,9 @@ std::string with_bar(double value, double bar, std::span<const Scale> ascending)
   const int decimals = std::clamp(wanted, 0, std::max(finest, 0));
   const double last = std::pow(10, -decimals);
   // What is cut to fewer digits is not made narrower by that
-  const double told = wanted > decimals ? std::ceil(width / last - 1e-9) * last : width;
-  const std::string bar_text =
-      width >= last ? fmt::format("{:.{}f}", told, decimals) : fmt::format("under {:.{}f}", last, decimals);
+  const double rounded = wanted > decimals ? std::ceil(width / last - 1e-9) * last : width;
+  const std::string bar_text = width >= last ? fmt::format("{:.{}f}", rounded, decimals)
+                                             : fmt::format("under {:.{}f}", last, decimals);
   return fmt::format("{:.{}f} {} +- {} {}", shown, decimals, unit.name, bar_text, unit.name);
 }
 

@@ -1,5 +1,5 @@
-// Figures as people write them: no exponents, a unit that fits, no more digits than are known.
-// base/units.h has lengths, forces and the like without a bar.
+// Numbers formatted for people: no exponents, a suitable unit, only significant digits. base/units.h formats
+// quantities without an error bar.
 #pragma once
 #include <cstddef>
 #include <string>
@@ -22,13 +22,13 @@ namespace flexel {
 // "1 voxel", "2,048 voxels".
 [[nodiscard]] std::string counted(std::size_t count, const std::string& noun);
 
-// "54.1 um +- 1.6 um": the bar [m] has two significant digits, the length as many decimals as its bar, four
-// significant digits at most. A bar below the last of them is "under" one of it.
+// "54.1 um +- 1.6 um": the bar [m] has two significant digits, the length as many decimals as its bar and at
+// most four significant digits. A bar smaller than one unit of the last digit is written "under" that unit.
 [[nodiscard]] std::string length_with_bar(double metres, double bar);
 [[nodiscard]] std::string pressure_with_bar(double pascals, double bar);
 [[nodiscard]] std::string energy_with_bar(double joules, double bar);
 
-// "0 to 5.7 mm", of a quantity [m] that is known that badly.
+// "0 to 5.7 mm": a range [m], for values whose error bar is over half of them.
 [[nodiscard]] std::string length_range(double low, double high);
 
 }  // namespace flexel

@@ -1,11 +1,11 @@
-// Which instruction set the kernels that are compiled several times run with.
+// Run-time choice of the instruction set, for kernels that are compiled once for each.
 #pragma once
 
 namespace flexel {
 
 enum class InstructionSet { portable, avx2, avx512 };
 
-// Whether this machine has it.
+// Whether this machine supports it.
 [[nodiscard]] inline bool runs(InstructionSet set) {
 #if defined(__x86_64__)
   if (set == InstructionSet::avx512)
@@ -16,8 +16,8 @@ enum class InstructionSet { portable, avx2, avx512 };
   return set == InstructionSet::portable;
 }
 
-// Calls the best one's function; the others are not so much as asked for, since what fills in a table may be
-// compiled for its instruction set too.
+// The table of the best instruction set that this machine supports. The other functions are not called: they
+// may themselves contain instructions that it lacks.
 template <class Table>
 [[nodiscard]] const Table& best_table(const Table& (*portable)(), const Table& (*avx2)(),
                                       const Table& (*avx512)()) {

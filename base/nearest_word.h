@@ -1,4 +1,4 @@
-// "Did you mean": the word of a list that is nearest to a mistyped one.
+// "Did you mean": the word of a list with the least edit distance from a mistyped one.
 #pragma once
 #include <string>
 #include <vector>

@@ -1,5 +1,5 @@
-// Which numbers may be read. Squares of such numbers, and their sums over a body, stay finite, and nothing
-// that is made lies outside.
+// The range of numbers that are accepted as input. Squares of such numbers, and their sums over a body, stay
+// finite; no real part needs more.
 #pragma once
 #include <cmath>
 

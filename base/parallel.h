@@ -1,6 +1,6 @@
-// All use of oneTBB is here. Every function gives the same bits for any number of threads: work is cut into
-// chunks whose size depends on n only, and reductions add the chunks' sums in order. Before every chunk is
-// asked whether the work is to stop (base/stop.h): any of them may throw Interrupted and TimeoutError.
+// All use of oneTBB is here. Every function gives the same bits for any number of threads: the chunk size
+// depends on n only, and reductions add the chunks' sums in order. Every chunk begins with check_stop()
+// (base/stop.h), so each function may throw Interrupted and TimeoutError.
 #pragma once
 #include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/global_control.h>

@@ -1,1 +1,1 @@
-// Where the headers that most files include are compiled, once for all.
+// Compiles the precompiled header.

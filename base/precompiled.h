@@ -1,4 +1,5 @@
-// Headers that most files include. Files still include what they use: this only spares the compiler's time.
+// The precompiled header: what most files include. It only saves compile time; files still include what they
+// use.
 #pragma once
 #include <fmt/format.h>
 #include <oneapi/tbb/blocked_range.h>

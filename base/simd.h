@@ -1,8 +1,9 @@
-// Eight doubles or sixteen floats at a time by the compiler's vector extension: one instruction on AVX-512, two on
-// AVX2, four on plain x86-64 or NEON, the same bits on all (contraction is off). Loops that are compiled for several
-// instruction sets are either files that are compiled several times (FLEXEL_ISA, simulate/CMakeLists.txt), whose
-// table of functions best_table() (base/instruction_set.h) chooses, or functions marked FLEXEL_CLONES, which the
-// loader chooses. Everything here is internal to a file: no copy of one instruction set may stand in for another's.
+// Eight doubles or sixteen floats at a time by the compiler's vector extension: one instruction on AVX-512,
+// two on AVX2, four on plain x86-64 or NEON, the same bits on all (contraction is off). Loops that are
+// compiled for several instruction sets are either files that are compiled several times (FLEXEL_ISA,
+// simulate/CMakeLists.txt), whose table of functions best_table() (base/instruction_set.h) chooses, or
+// functions marked FLEXEL_CLONES, which the loader chooses. Everything here is internal to a file: no copy of
+// one instruction set may stand in for another's.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -53,7 +54,7 @@ FLEXEL_INLINE Lanes square_root(const Lanes& x) {
   return root;
 }
 
-// Lane l is the one of a, b (0 to 7, 8 to 15) that `from` names for it; Clang knows no such built-in for
+// Lane l is lane from[l] of a, b (0 to 7, 8 to 15); Clang has no such built-in for
 // vectors of indices.
 FLEXEL_INLINE Lanes shuffle(const Lanes& a, const Lanes& b, const LaneBits& from) {
 #if defined(__clang__)

@@ -1,5 +1,5 @@
-// One flag for signals and one time for the nearest limit: what every loop reads. The limits themselves form
-// a stack that is walked only when one of them is over.
+// Every loop reads one flag (signals) and one time (the nearest limit). The limits form a stack, which is
+// walked only when one of them has passed.
 #include "base/stop.h"
 
 #include <fmt/format.h>

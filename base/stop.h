@@ -1,13 +1,13 @@
 // Stopping work from outside: Ctrl-C and time limits, in one place for the whole process.
 //
-// Every loop that may take more than some milliseconds calls check_stop(). The loops of base/parallel.h do
-// so once a chunk: what is built on them needs nothing more. A serial loop calls it once an item, or once in
-// a few where an item takes under 100 ns.
+// Every loop that may take more than some milliseconds calls check_stop(). The loops of base/parallel.h do so
+// once a chunk: what is built on them needs nothing more. A serial loop calls it once an item, or once in a
+// few where an item takes under 100 ns.
 //
 //     const StopAfter limit(seconds, "--timeout");   // the work below ends with TimeoutError
 //     solve();
 //
-// Time limits nest. One who goes on when an attempt took too long asks whose limit it was:
+// Time limits nest. Code that goes on after an attempt took too long checks whose limit it was:
 //
 //     const StopAfter limit(budget, "--within");
 //     try {
@@ -17,9 +17,9 @@
 //       give_up_this_attempt();                      // after the scope of `limit` work is possible again
 //     }
 //
-// What a stop leaves (a checkpoint, the last good state) is written under a StopWaits. Calls of libraries
-// that cannot be asked to stop are made under a StopEndsProcess (base/program/termination.h). The limits belong to
-// the process: make them on the thread that owns the run, not on a worker.
+// A checkpoint, or the last sound state, is written under a StopWaits. Calls into libraries that cannot be
+// interrupted are made under a StopEndsProcess (base/program/termination.h). Limits belong to the process:
+// set them on the thread that owns the run, not on a worker.
 #pragma once
 #include <atomic>
 #include <cstdint>

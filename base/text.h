@@ -1,4 +1,4 @@
-// Small things that readers and messages do with text.
+// Small functions on text, for readers and messages.
 #pragma once
 #include <algorithm>
 #include <string>

@@ -1,5 +1,4 @@
-// The last colon ends WHERE, so that WHERE may be a table of the scene's language; what follows is numbers
-// and one unit.
+// WHERE ends at the last colon, so that it may be an inline table of a scene; numbers and one unit follow.
 #include "flexel/actions.h"
 
 #include <fmt/format.h>
@@ -54,7 +53,7 @@ bool has_unit(Dimension dimension, const std::string& unit) {
   return std::find(units.begin(), units.end(), unit) != units.end();
 }
 
-// The option that takes such a unit, where people mean that one.
+// The option that takes this unit, which the user likely means.
 std::string other_option(Dimension dimension, const std::string& unit) {
   if (dimension == Dimension::force && has_unit(Dimension::torque, unit)) return "; --torque takes torques";
   if (dimension == Dimension::force && has_unit(Dimension::length, unit)) return "; --move takes lengths";

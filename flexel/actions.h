@@ -1,4 +1,4 @@
-// What --push, --move, --torque and the others ask for, as people write it on a command line.
+// Parses the arguments of --push, --move, --torque and the like.
 #pragma once
 #include <optional>
 #include <string>

@@ -1,4 +1,4 @@
-// The body travels in the picture's subject, so that it is not held twice.
+// The body is moved into the picture's subject, so that memory holds it once.
 #include "flexel/bent_picture.h"
 #include "flexel/picture/canvas/png_file.h"
 

@@ -1,4 +1,4 @@
-// Replaces this process by the stage program that lies beside it.
+// Replaces this process (exec) by the stage program in the same folder.
 #include <unistd.h>
 
 #include <cerrno>

@@ -1,9 +1,9 @@
 // flexel compare: which of several parts is stiffer under one scene. Every part gets the same number of cells
-// (or the same spacing), so that their errors are alike, and each its error bars: where those overlap the
-// order is not sure.
+// (or the same spacing), so that the errors are similar, and its own error bars; where two bars overlap the
+// order is not certain.
 //
-// Stiffness is the resultant of all loads (or of what the moves take) over the largest displacement. Its bar
-// is that of the displacement, or, where a move drives the part, of the elastic energy.
+// Stiffness is the resultant of all loads (or of the reactions at the moves) over the largest displacement.
+// Its bar is that of the displacement or, where a [[move]] drives the part, of the elastic energy.
 #include <fmt/format.h>
 
 #include <chrono>
@@ -293,7 +293,7 @@ int compare_command(int argc, char** argv) {
   CLI::App app{"Which of several parts is stiffer under one scene: mass, displacement, stiffness, stress.",
                "flexel compare"};
   declare_job(app, arguments.job);
-  app.add_flag("--json", arguments.json, "As JSON, in SI units (docs/compare.md)");
+  app.add_flag("--json", arguments.json, "As JSON, in SI units (docs/guide/compare.md)");
   app.add_option("--threads", arguments.threads, "Threads; 0 is every core")->check(CLI::NonNegativeNumber);
   app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
   if (!parse_arguments(app, argc, argv)) return kExitDone;

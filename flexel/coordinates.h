@@ -1,4 +1,4 @@
-// A vector as reports write it.
+// Formats a vector for reports.
 #pragma once
 #include <array>
 

@@ -68,7 +68,8 @@ void declare_output(CLI::App& app, DeformArguments& arguments) {
       ->allow_extra_args(false);
   app.add_option("--body", arguments.body, "Write the deformed body (.vtu) too")->type_name("FILE");
   declare_map_options(app, arguments.map);
-  app.add_option("--summary", arguments.summary, "Write the summary of all stages (JSON; docs/deform.md)")
+  app.add_option("--summary", arguments.summary,
+                 "Write the summary of all stages (JSON; docs/guide/deform.md)")
       ->type_name("FILE");
   app.add_option("--threads", arguments.threads, "Threads; 0 is every core")->check(CLI::NonNegativeNumber);
   app.add_option("--timeout", arguments.timeout,
@@ -81,7 +82,7 @@ void declare_output(CLI::App& app, DeformArguments& arguments) {
   app.add_option("--within", arguments.within,
                  "Choose the finest size whose run ends within this time, all in all (\"10s\")")
       ->type_name("TIME");
-  app.add_flag("!--no-estimate", arguments.estimate, "Leave out the error bars (docs/error-bars.md)");
+  app.add_flag("!--no-estimate", arguments.estimate, "Leave out the error bars (docs/theory/error-bars.md)");
   app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
   app.add_flag("--verbose", arguments.verbose, "Say all that each stage found");
 }

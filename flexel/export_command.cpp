@@ -38,7 +38,7 @@ struct ExportArguments {
 
 void declare(CLI::App& app, ExportArguments& arguments) {
   declare_job(app, arguments.job);
-  app.add_flag("--calculix", arguments.calculix, "For CalculiX (ccx), as an .inp file (docs/export.md)")
+  app.add_flag("--calculix", arguments.calculix, "For CalculiX (ccx), as an .inp file (docs/guide/export.md)")
       ->required();
   app.add_option("-o,--output", arguments.output, "The file; -: stdout")->type_name("FILE")->required();
   app.add_option("--mesh", arguments.mesh,
@@ -51,7 +51,7 @@ void declare(CLI::App& app, ExportArguments& arguments) {
   app.add_option("--nlgeom", arguments.nlgeom, "Large deflections: on, off, or as a coarse run tells")
       ->type_name("auto|on|off")
       ->capture_default_str();
-  app.add_option("--summary", arguments.summary, "Write what was written as JSON (docs/export.md)")
+  app.add_option("--summary", arguments.summary, "Write what was written as JSON (docs/guide/export.md)")
       ->type_name("FILE");
   app.add_option("--threads", arguments.threads, "Threads; 0 is every core")->check(CLI::NonNegativeNumber);
   app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");

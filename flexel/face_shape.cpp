@@ -1,11 +1,10 @@
-// Area vectors of the polygons give everything: the longest sum is that of a flat face; the direction that no
-// normal has a part in (smallest eigenvalue of the area-weighted normals' second moment) is the axis of a
-// round one. Its circle is then fitted to the corners in the plane across the axis by linear least squares
+// From the area vectors of the polygons: a face is flat if the length of their sum is its area. The axis of a
+// round face is the direction to which all normals are orthogonal (smallest eigenvalue of their area-weighted
+// second moment). Its circle is fitted to the corners, projected along the axis, by linear least squares
 // (Kasa 1976).
 //
-// How far round its cylinder a face goes is counted in steps of half a degree that its polygons cover. A hole
-// is a hollow whose faces, one or several of one cylinder side by side, go all the way round; a fillet does
-// not.
+// The angle that a face covers of its cylinder is counted in steps of half a degree. A hole is concave and
+// its faces, one or several of one cylinder side by side, cover the full circle; those of a fillet do not.
 #include "flexel/face_shape.h"
 
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-// What a face of a surface looks like, for people who write a scene.
+// The shape of a face (flat, round, curved), for people who write a scene.
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -29,7 +29,7 @@ struct FaceShape {
 // axis within a degree and its corners lie within 1 % of a radius from it.
 [[nodiscard]] std::vector<FaceShape> face_shapes(const Surface& surface);
 
-// The same of any polygons, as one face; `closed` tells of these alone.
+// The same of any polygons, as one face; `closed` refers to these alone.
 [[nodiscard]] FaceShape face_shape(const Surface& surface, const std::vector<std::uint32_t>& polygons);
 
 // "flat, normal +z", "round, hole of diameter 8 mm along x", "round, fillet of radius 2 mm (90 degrees) along

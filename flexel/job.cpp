@@ -1,4 +1,4 @@
-// The job's own part of a command line, checked before any stage runs.
+// The options of a job, checked before any stage runs.
 #include "flexel/job.h"
 
 #include <fmt/format.h>
@@ -17,7 +17,7 @@ void declare_job(CLI::App& app, JobArguments& arguments) {
   declare_scene(app, arguments);
   app.add_option("--size", arguments.size, "Spacing of the lattice (\"2 mm\")")->type_name("LENGTH");
   app.add_option("--count", arguments.count, "Or: about this many cells")->type_name("N");
-  app.add_option("--heal", arguments.heal, "Broken surfaces: auto, wrap or none (docs/healing.md)")
+  app.add_option("--heal", arguments.heal, "Broken surfaces: auto, wrap or none (docs/reference/healing.md)")
       ->type_name("HOW")
       ->capture_default_str();
   app.add_option("--unit", arguments.unit, "Unit of files that carry none (default mm)")->type_name("UNIT");

@@ -1,5 +1,5 @@
-// Parts and what happens to them, as the commands that take both spell it (`flexel deform`, `flexel export`,
-// `flexel compare`; what happens: `flexel study` too).
+// Options for parts and for their loads and supports, shared by `flexel deform`, `flexel export` and `flexel
+// compare` (loads and supports: `flexel study` too).
 #pragma once
 #include <optional>
 #include <string>

@@ -1,4 +1,4 @@
-// What happens to the parts, from a scene file and from options on top of it.
+// The scene of a job: a scene file, and options added to it.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -79,7 +79,7 @@ void declare_scene(CLI::App& app, JobArguments& arguments) {
                        const char* type) {
     app.add_option(name, values, what)->type_name(type)->allow_extra_args(false);
   };
-  app.add_option("--scene", arguments.scene, "Scene file (TOML; docs/scene.md)")->type_name("FILE");
+  app.add_option("--scene", arguments.scene, "Scene file (TOML; docs/reference/scene.md)")->type_name("FILE");
   add("--fix", arguments.fixes, "Hold this surface: \"xmin\", \"part/3\" (`flexel info` lists faces)",
       "WHERE");
   add("--push", arguments.pushes,
@@ -97,7 +97,7 @@ void declare_scene(CLI::App& app, JobArguments& arguments) {
   add("--probe", arguments.probes,
       "Say how far a point or a surface moves: \"tip: 80 5 3 mm\", \"tip: part/3\"", "NAME:POINT");
   add("--material", arguments.materials,
-      "What the parts are made of: steel, PLA, ... (docs/scene.md); of one part: \"knob=PLA\"",
+      "What the parts are made of: steel, PLA, ... (docs/reference/scene.md); of one part: \"knob=PLA\"",
       "[PART=]NAME");
   add("--infill", arguments.infills, "Printed with this infill: 20%; of one part: \"knob=20%\" (an estimate)",
       "[PART=]SHARE");

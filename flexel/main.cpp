@@ -1,4 +1,4 @@
-// flexel, the front door: `flexel COMMAND ...`.
+// The program flexel: `flexel COMMAND ...`.
 #include <fmt/format.h>
 
 #include <string>

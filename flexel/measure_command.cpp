@@ -1,4 +1,4 @@
-// flexel measure: what the lattice makes of a material.
+// flexel measure: the effective elastic constants of a lattice beside those of its material.
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
@@ -147,7 +147,7 @@ int measure_command(int argc, char** argv) {
   CLI::App app{
       "Draws, bends and twists bars of lattice and prints the E, nu and G that they have, beside those of "
       "the "
-      "material (docs/accuracy.md).",
+      "material (docs/measurements/accuracy.md).",
       "flexel measure"};
   app.add_option("--model", arguments.model, "cells, springs or paper")
       ->type_name("NAME")

@@ -1,4 +1,4 @@
-// Numbers with all their digits: what is read is what was written.
+// Numbers are written with all digits, so that reading gives the same bits.
 #include "flexel/scene_text.h"
 
 #include <fmt/format.h>

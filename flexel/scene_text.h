@@ -1,4 +1,4 @@
-// A scene as the text that flexel-simulate reads.
+// Writes a scene as the TOML that flexel-simulate reads.
 #pragma once
 #include <string>
 

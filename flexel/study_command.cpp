@@ -1,4 +1,4 @@
-// flexel study: what accuracy costs in time, for a part and a scene (docs/study.md).
+// flexel study: what accuracy costs in time, for a part and a scene (docs/guide/study.md).
 #include <fmt/format.h>
 #include <sys/utsname.h>
 #include <unistd.h>
@@ -59,7 +59,8 @@ void declare(CLI::App& app, StudyArguments& a) {
                  "calculix: run CalculiX (ccx) on the same scene too, on meshes by gmsh, and draw it beside")
       ->type_name("PROGRAM");
   app.add_option("--unit", a.job.unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
-  app.add_option("--heal", a.heal, "Broken surfaces: auto, wrap or none (docs/healing.md)")->type_name("HOW");
+  app.add_option("--heal", a.heal, "Broken surfaces: auto, wrap or none (docs/reference/healing.md)")
+      ->type_name("HOW");
   app.add_option("--edge", a.job.edge, "Split the mesh to this longest edge")->type_name("LENGTH");
   app.add_flag("--quiet", a.quiet, "Say only warnings and errors");
 }
@@ -200,7 +201,7 @@ int study_command(int argc, char** argv) {
   StudyArguments arguments;
   CLI::App app{
       "Runs a part and a scene at many sizes and with many choices, and writes what each costs and how exact "
-      "it is: study.csv, study.json and the page study.html (docs/study.md).",
+      "it is: study.csv, study.json and the page study.html (docs/guide/study.md).",
       "flexel study"};
   declare(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;

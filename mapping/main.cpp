@@ -287,8 +287,7 @@ void map_series(const Arguments& arguments, Plan& plan, Progress& progress) {
       next.surface = std::move(body.surface);
       next.surface_cell_offsets = std::move(body.surface_cell_offsets);
       next.surface_cells = std::move(body.surface_cells);
-      if (next.cell_elements !=
-          body.cell_elements) {  // cells are numbered anew: seats come from the elements
+      if (next.cell_elements != body.cell_elements) {  // cells are renumbered: anchors come from the elements
         next.surface_cell_offsets.clear();
         next.surface_cells.clear();
       }

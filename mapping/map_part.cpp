@@ -1,4 +1,5 @@
-// A surface that stays whole is mapped as it is; one that is cut takes the place of the body's own meanwhile.
+// A whole surface is mapped as it is; a surface that was cut along cracks replaces the body's own while it is
+// mapped.
 #include "mapping/map_part.h"
 
 #include <algorithm>
@@ -32,7 +33,7 @@ std::size_t spanning_triangles(const Body& body, const MapResult& result, const 
   return count;
 }
 
-// What hangs together, and what does not.
+// The fragments, and the pairs that a crack parted.
 struct Broken {
   Adjacency connections;
   Components fragments;
@@ -81,7 +82,7 @@ void map_pieces(Body& body, const Components& fragments, const MapOptions& optio
       at_rest.push_back(vertices[vertex]);
       vertices[vertex] += by;
     }
-    mapped.result = map_surface(body, options, cracked.seats, progress);
+    mapped.result = map_surface(body, options, cracked.anchors, progress);
     for (std::size_t s = 0; s < cracked.shifts.size(); ++s) {
       vertices[cracked.shifts[s].vertex] = at_rest[s];
       mapped.result.displacement[cracked.shifts[s].vertex] += cracked.shifts[s].by;
@@ -99,7 +100,7 @@ void map_pieces(Body& body, const Components& fragments, const MapOptions& optio
   for (std::size_t p = 0; p < volumes.size(); ++p) cracked.pieces[p].volume_after = volumes[p];
 }
 
-// What [[event]] carve took away leaves its surface behind (docs/events.md).
+// What [[event]] carve took away leaves its surface behind (docs/reference/events.md).
 void warn_of_carved(const Body& body, Progress& progress) {
   if (body.notes.count(kCarvedNote) > 0)
     progress.warn(
@@ -130,7 +131,7 @@ CrackedSurface part_carved(Body& body, const Broken& broken, const CrackOptions&
   std::vector<std::uint32_t> no_offsets, no_cells;  // the cells under the polygons are those of others
   const Loan surface(body.surface, closed.surface);
   const Loan offsets(body.surface_cell_offsets, no_offsets), cells(body.surface_cells, no_cells);
-  return part_surface(body, broken.fragments, broken.parted, options, std::move(closed.seats),
+  return part_surface(body, broken.fragments, broken.parted, options, std::move(closed.anchors),
                       std::move(closed.shifts));
 }
 

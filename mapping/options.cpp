@@ -1,4 +1,4 @@
-// Options are declared, checked and obeyed here, so that the two programs cannot drift apart.
+// The options of a mapping are declared, checked and applied here, for flexel-map and `flexel deform` alike.
 #include "mapping/options.h"
 
 #include <fmt/format.h>
@@ -44,9 +44,9 @@ void declare_map_options(CLI::App& app, MapArguments& arguments) {
   app.add_option("--check", arguments.checks,
                  "Also check the mapped surface: voronoi, self-intersection, or both with a comma")
       ->type_name("NAMES");
-  app.add_option(
-         "--crack", arguments.crack,
-         "Where the part broke: keep the surface as it is, open it, or cap the pieces (docs/cracks.md)")
+  app.add_option("--crack", arguments.crack,
+                 "Where the part broke: keep the surface as it is, open it, or cap the pieces "
+                 "(docs/reference/cracks.md)")
       ->type_name("HOW")
       ->capture_default_str();
   app.add_option("--debris", arguments.debris, "Pieces of a single element: keep or drop")

@@ -1,4 +1,4 @@
-// The command line's words for a mapping, the same in flexel-map and in flexel deform.
+// Command-line options of a mapping, shared by flexel-map and `flexel deform`.
 #pragma once
 #include "base/error.h"
 #include "base/program/arguments.h"

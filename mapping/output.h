@@ -1,4 +1,4 @@
-// Writes the mapped surface, with what the user wants beside it.
+// Writes the mapped surface, on request with attributes.
 #pragma once
 #include <optional>
 #include <string>

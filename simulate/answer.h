@@ -1,4 +1,4 @@
-// The answer of a run as its user needs it: at most six lines (docs/deform.md, "What is said").
+// The answer of a run as its user needs it: at most six lines (docs/guide/deform.md, "What is said").
 #pragma once
 #include <optional>
 #include <string>

@@ -8,7 +8,7 @@
 
 namespace flexel::simulate {
 
-// The result as JSON (docs/summary.md gives every key and unit).
+// The result as JSON (docs/reference/summary.md gives every key and unit).
 [[nodiscard]] std::string summary_json(const SimulateResult& result, const Body& body);
 
 // The result in lines for people.

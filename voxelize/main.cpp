@@ -62,7 +62,8 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_flag("--quiet", arguments.quiet, "say warnings only");
   app.add_flag("--force", arguments.force, "let results replace files that are read");
   app.add_option("--vdb", arguments.vdb, "also write fill and distance as OpenVDB grids to this file");
-  app.add_option("--summary", arguments.summary, "also write what was found as JSON (docs/voxelize.md)");
+  app.add_option("--summary", arguments.summary,
+                 "also write what was found as JSON (docs/reference/voxelize.md)");
   app.add_option("-o,--output", arguments.output, "body file (.vtu); - or none: standard output");
 }
 

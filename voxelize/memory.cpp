@@ -1,4 +1,4 @@
-// Estimates by volume and area alone: what is inside, and what a surface cuts (memory.h gives the formula).
+// Estimates from volume and surface area (memory.h has the formula).
 #include "voxelize/memory.h"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// What the lattice and its simulation will need, before either is made.
+// Estimates of cells and memory before a lattice is made.
 #pragma once
 #include "formats/lattice/body.h"
 

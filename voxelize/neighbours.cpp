@@ -1,5 +1,5 @@
-// Lines along each axis, on a grid over the box that both parts reach into: each part's matter is a list of
-// intervals on a line, and two intervals overlap, meet or leave a gap.
+// Lines along each axis, on a grid over the intersection of the two parts' boxes. Along a line the matter of
+// a part is a list of intervals; two intervals overlap, touch or leave a gap.
 #include "voxelize/neighbours.h"
 
 #include <fmt/format.h>

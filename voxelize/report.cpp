@@ -1,4 +1,4 @@
-// What is said about each part after it was voxelised.
+// The report on each part: text.
 #include <fmt/format.h>
 #include <cmath>
 

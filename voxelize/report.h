@@ -1,4 +1,4 @@
-// What was found of a part, for people and programs.
+// The report on voxelised parts, as text and as JSON.
 #pragma once
 #include <string>
 
@@ -9,7 +9,7 @@ namespace flexel::voxelize {
 
 // Says what was found, a few lines a part.
 void report(const VoxelizeResult& result, Progress& progress);
-// The same as JSON, in SI units (docs/voxelize.md).
+// The same as JSON, in SI units (docs/reference/voxelize.md).
 [[nodiscard]] std::string summary_json(const VoxelizeResult& result);
 
 }  // namespace flexel::voxelize

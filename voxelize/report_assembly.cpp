@@ -1,4 +1,4 @@
-// Sums and the worst part.
+// Per finding, the sum over the parts and the worst part.
 #include "voxelize/report_assembly.h"
 
 #include <fmt/format.h>

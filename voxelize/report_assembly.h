@@ -1,4 +1,4 @@
-// What is said of assemblies: a line a finding, not a line a part.
+// The report on assemblies: one line for each kind of finding instead of one for each part.
 #pragma once
 #include "base/program/progress.h"
 #include "voxelize/types/options.h"
@@ -7,7 +7,7 @@
 namespace flexel::voxelize {
 
 // Totals over the parts, and of what is wrong how many parts have it and the worst of them. All that is known
-// of each part is in the summary (docs/voxelize.md).
+// of each part is in the summary (docs/reference/voxelize.md).
 void report_together(const VoxelizeResult& result, Progress& progress);
 
 // Parts that overlap, and parts that miss each other.

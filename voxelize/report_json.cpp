@@ -1,4 +1,4 @@
-// What was found in every part, for programs to read.
+// The report as JSON.
 #include <nlohmann/json.hpp>
 
 #include "voxelize/report.h"

@@ -1,4 +1,4 @@
-// How thick a part is under each vertex of its surface.
+// Wall thickness at each vertex of a part's surface.
 #pragma once
 #include <vector>
 
@@ -6,11 +6,11 @@
 
 namespace flexel::voxelize {
 
-// Wall thickness [m] at every vertex (vertices): the least of the ways, along the inward normals of the
-// triangles at the vertex, to where matter ends; exact for the triangles as they are. A way counts where it
-// ends on a facet that opposes it within 30 degrees; where none does (a cone's tip), the least of all ways.
-// Rays start a twentieth inside the triangle, so that the sides of an edge do not count. Surfaces are healed
-// as `--heal auto` does; NaN where a vertex is in no triangle or every way misses.
+// Wall thickness [m] at every vertex (vertices): the shortest ray, along the inward normals of the triangles
+// at the vertex, to where it leaves the matter; exact for the mesh. Rays that end on a facet opposing them
+// within 30 degrees go first; where there is none (a cone's tip), the shortest of all counts. Rays start a
+// twentieth inside their triangle, to miss the faces at its edges. Surfaces are healed as by `--heal auto`;
+// NaN where a vertex is in no triangle or every ray misses.
 [[nodiscard]] std::vector<double> vertex_thickness(const Surface& surface);
 
 }  // namespace flexel::voxelize

@@ -1,4 +1,4 @@
-// Walls along straight lines through the part: from where a line enters to where it leaves again.
+// Along lines through the part: distances from entry to exit.
 #include "voxelize/walls.h"
 
 #include <Eigen/Geometry>

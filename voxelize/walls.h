@@ -1,4 +1,4 @@
-// How thick the walls of a part are, where lines through it tell.
+// Wall thickness of a part, sampled along lines through it.
 #pragma once
 #include "voxelize/mesh/part_mesh.h"
 

@@ -1,5 +1,5 @@
-// Reading whole files and pipes, names of files, zlib and the content hash. A buffer is grown a megabyte at a
-// time and read into at once, so that its zeroing stays in the cache.
+// Reading whole files and pipes, file names, zlib, content hash. A buffer grows by a megabyte at a time and
+// is read into at once, while the zeroed memory is still in the cache.
 #include "base/files/files.h"
 
 #include <fcntl.h>

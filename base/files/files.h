@@ -13,7 +13,7 @@ namespace flexel {
 
 using Bytes = std::vector<std::byte>;
 
-// The program of ours before this one in a pipe has failed with `code`, and said why (base/files/pipe_code.h).
+// The Flexel program before this one in a pipe failed with `code` and printed why (base/files/pipe_code.h).
 class ProgramBeforeFailed : public std::runtime_error {
  public:
   explicit ProgramBeforeFailed(int code) : std::runtime_error("the program before it failed"), code_(code) {}

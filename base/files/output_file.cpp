@@ -1,9 +1,7 @@
-// OutputFile. A regular file is written beside its target under a hidden name and renamed by commit(), so
-// that its name never shows half a result; links are followed first, so that what they point to is replaced,
-// not the link. Devices and FIFOs are written through. Temporary files are also listed in a fixed table that
-// the signal handlers may walk.
+// OutputFile. A regular file is written beside its target under a hidden name and renamed by commit().
+// Symbolic links are resolved first, so the file is replaced and not the link. Devices and FIFOs are written
+// directly. A fixed table lists the temporary files, for the signal handlers.
 #include "base/files/output_file.h"
-
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>

@@ -1,5 +1,5 @@
-// Two names are one file when the system says so (device and number), or, where one does not exist yet, when
-// their folders are one and the names in them are.
+// Two names mean the same file when device and inode agree or, where one does not exist yet, when folder and
+// name agree.
 #include "base/files/outputs.h"
 
 #include <fmt/format.h>

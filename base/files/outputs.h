@@ -1,4 +1,5 @@
-// The files that a command writes, checked against each other and its inputs before its work begins.
+// The files that a command writes: checked against each other and its inputs before it starts, and renamed to
+// their final names together when it ends.
 #pragma once
 #include <string>
 #include <vector>

@@ -1,5 +1,5 @@
-// Capacities are powers of two from a page to a megabyte; those that pipes have by themselves (64 KiB), that
-// OutputFile asks for (1 MiB) and that remain to a user of very many pipes (8 KiB) stand for nothing.
+// Capacities are powers of two from a page to a megabyte. Three of them encode nothing: the default (64 KiB),
+// the one that OutputFile sets (1 MiB), and the one left to a user of very many pipes (8 KiB).
 #include "base/files/pipe_code.h"
 
 #include <fcntl.h>

@@ -1,4 +1,4 @@
-// A folder for the files of other programs that we run.
+// A temporary folder for the files of child processes.
 #pragma once
 #include <filesystem>
 

@@ -1,4 +1,4 @@
-// Both are called some times a part or an element, never in a loop over time.
+// Called a few times per part or element, never in a time step.
 #include "base/math/small_matrices.h"
 
 #include <Eigen/Eigenvalues>

@@ -1,7 +1,7 @@
-// Which positions are exactly equal. Positions are spread by the top bits of a hash over buckets that depend
-// on their number only; in each bucket one thread finds the first of equal hashes with an open-addressing
-// table. Whether the positions are equal too is seen afterwards in one pass along memory; where two differ in
-// spite of equal hashes, all are sorted instead.
+// Welding of exactly equal positions. The top bits of a hash distribute the positions over buckets, whose
+// number depends on the count only; in each bucket one thread finds the first of equal hashes with an
+// open-addressing table. One pass then compares the positions themselves; on a hash collision all are sorted
+// instead.
 #pragma once
 #include <algorithm>
 #include <array>

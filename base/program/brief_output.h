@@ -1,4 +1,4 @@
-// What a run says is cut to what a user needs.
+// Shortens the output of a run to what a user needs (without --verbose).
 #pragma once
 #include <string>
 #include <vector>

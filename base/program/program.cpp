@@ -1,4 +1,4 @@
-// run_program() is the only place where exceptions become words and exit codes.
+// run_program() is the only place where exceptions become messages and exit codes.
 #include "base/program/program.h"
 
 #include <fcntl.h>

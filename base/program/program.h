@@ -1,4 +1,4 @@
-// The edge of a program: one line of error and an exit code out.
+// The entry point of every program: turns exceptions into one line on stderr and an exit code.
 #pragma once
 #include <functional>
 #include <string>

@@ -1,5 +1,5 @@
-// The handlers only set a flag (the first SIGINT, and where it waits SIGTERM or SIGHUP) or remove the temporary
-// outputs and end the process.
+// The handlers either set a flag (the first SIGINT; under TerminationWaits also SIGTERM and SIGHUP) or remove
+// the temporary outputs and end the process.
 #include "base/program/signals.h"
 
 #include <unistd.h>
@@ -126,7 +126,7 @@ class StopEndsProcess::Watch {
     std::unique_lock lock(mutex_);
     const std::chrono::nanoseconds left(limit - stop_detail::now());
     if (changed_.wait_for(lock, left, [this] { return done_; })) return;
-    if (termination_waits > 0) return;  // the work hears the limit itself
+    if (termination_waits > 0) return;  // check_stop() in the work throws TimeoutError
     write_words({program_name.data(), ": error: stopped by --timeout\n"});
     remove_temporary_outputs();
     tell_code_through_pipe(STDOUT_FILENO, kExitTimeout);

@@ -1,4 +1,4 @@
-// stdio keeps errors until they are asked for.
+// stdio keeps an error until ferror() reads it.
 #include "base/program/standard_output.h"
 
 #include <fmt/format.h>

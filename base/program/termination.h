@@ -1,13 +1,14 @@
-// What SIGTERM and SIGHUP do, and SIGINT where nobody can hear it. By themselves SIGTERM and SIGHUP end a
-// program at once, temporary outputs removed (base/program/program.h); work that leaves something behind when it
-// is stopped has them wait.
+// Scopes that change how a process is stopped. By default SIGTERM and SIGHUP remove the temporary outputs and
+// end the program at once (base/program/program.h), and SIGINT and time limits stop it at the next
+// check_stop().
 #pragma once
 #include <memory>
 
 namespace flexel {
 
-// While one lives, SIGTERM and SIGHUP ask to stop as SIGINT does (base/stop.h): a second signal ends the
-// program at once. The exit code of a program that then stops is 128 + the signal's number.
+// In this scope SIGTERM and SIGHUP stop the work as SIGINT does (base/stop.h), so that it can write a
+// checkpoint or its last state; a second signal ends the program at once. The exit code is 128 + the signal's
+// number.
 class TerminationWaits {
  public:
   TerminationWaits();
@@ -16,10 +17,10 @@ class TerminationWaits {
   TerminationWaits& operator=(const TerminationWaits&) = delete;
 };
 
-// While one lives, and no TerminationWaits, Ctrl-C and the time limits of the command that were set before it
-// end the process at once, with the line and the exit code that check_stop() would have led to; temporary
-// files are removed. For commands that leave nothing when they are stopped, and for calls of libraries that
-// cannot be asked to stop. A limit of an attempt is heard only after the call.
+// In this scope, unless there is a TerminationWaits too, Ctrl-C and the command's time limits that were set
+// before it end the process at once, with the message and exit code of check_stop(); temporary files are
+// removed. For commands that leave nothing when they are stopped, and for calls into libraries that cannot be
+// interrupted. The limit of an attempt takes effect only after the call.
 class StopEndsProcess {
  public:
   StopEndsProcess();

@@ -1,4 +1,4 @@
-// Prints the errors of the central-spring models for the paper's cantilever as a table (docs/accuracy.md).
+// Prints the errors of the central-spring models for the paper's cantilever as a table (docs/measurements/accuracy.md).
 #include <fmt/format.h>
 
 #include <functional>

@@ -1,5 +1,5 @@
 // Whether error bars hold: cases whose answer is known, each with its error, its bar, and what the bar cost.
-// Ends with 1 when fewer than nine of ten hold. docs/error-bars.md quotes it.
+// Ends with 1 when fewer than nine of ten hold. docs/measurements/verification.md quotes it.
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""What Flexel's answers are off by, measured and written as docs/verification.md with its figures.
+"""What Flexel's answers are off by, measured and written as docs/measurements/verification.md with its figures.
 
     PATH=build/release/bin:$PATH bench/accuracy/verification.py [--quick] [--keep FOLDER] [--leave-out CASE] [-o FILE]
 
@@ -119,7 +119,7 @@ def solve(folder, part, size, scene):
 
 def cantilever(folder, n):
     """The paper's beam (section 5), 2 x 0.75 x 0.5 m, n cells through the 0.5 m: displacement, bar, cells, reference. The reference is
-    Timoshenko's beam times 0.98522, its ratio to C3D20R runs of CalculiX, extrapolated (docs/accuracy.md)."""
+    Timoshenko's beam times 0.98522, its ratio to C3D20R runs of CalculiX, extrapolated (docs/measurements/accuracy.md)."""
     box(folder / "beam.obj", (2000, 750, 500))
     young, nu, force, width, height, length = 12.1e5, 0.25, 1e-3, 0.75, 0.5, 2.0
     inertia, shear, factor = width * height**3 / 12, young / 2 / (1 + nu), 10 * (1 + nu) / (12 + 11 * nu)
@@ -195,11 +195,11 @@ def main():
     arguments.add_argument("--leave-out", default=[], action="append", metavar="CASE", help="of the STEP parts or beside CalculiX; the page says so")
     arguments.add_argument("--keep", type=pathlib.Path, metavar="FOLDER", help="write each case there when it is done; go on from what is there")
     arguments.add_argument("--parts", default=ROOT / "../shared/parts", type=pathlib.Path)
-    arguments.add_argument("-o", "--output", default=ROOT / "docs/verification.md", type=pathlib.Path)
+    arguments.add_argument("-o", "--output", default=ROOT / "docs/measurements/verification.md", type=pathlib.Path)
     options = arguments.parse_args()
     sections = ["# Verification\n\nWritten by `bench/accuracy/verification.py`" + (" --quick" if options.quick else "") +
                 f", {command('flexel', '--version').strip()}. Errors are against the named reference; above 0 is too soft. What error\n"
-                "bars are is in [error-bars.md](error-bars.md), what the models are in [accuracy.md](accuracy.md).\n"]
+                "bars are is in [error-bars.md](../theory/error-bars.md), what the models are in [accuracy.md](accuracy.md).\n"]
     try:
         kept = Kept(options.keep)
         text, good = kept("materials", materials)
@@ -218,7 +218,7 @@ def main():
         sections.append(f"In {inside} of these {count} runs the true error lies within the bar.\n")
         if not options.quick:
             tables = [("Models", "Tip of the same cantilever by model, elements on its faces ([accuracy.md](accuracy.md)).", ["accuracy_table"]),
-                      ("Error bars", "Cases whose answer is known ([error-bars.md](error-bars.md)).", ["error_bars"]),
+                      ("Error bars", "Cases whose answer is known ([error-bars.md](../theory/error-bars.md)).", ["error_bars"]),
                       ("STEP parts", "Every closed STEP part with an error bar, nothing set by hand; processor seconds.",
                        [HERE / "step_parts.py", "--parts", options.parts, "--cells", "30000,300000"], [options.parts],
                        lambda: command(HERE / "step_parts.py", "--list").split()),

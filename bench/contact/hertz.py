@@ -1,4 +1,4 @@
-"""Force against indentation of an elastic ball, as Hertz has it: prints the table of docs/contact.md.
+"""Force against indentation of an elastic ball, as Hertz has it: prints the table of docs/theory/contact-mechanics.md.
 
     python3 bench/contact/hertz.py build/release/bin [cells of the radius [radius of the contact, in cells]]
 

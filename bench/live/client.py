@@ -1,4 +1,4 @@
-"""A client of live runs (docs/live.md): starts one, leads its tools, takes its frames apart."""
+"""A client of live runs (docs/guide/live.md): starts one, leads its tools, takes its frames apart."""
 
 import array
 import json

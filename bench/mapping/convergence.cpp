@@ -1,5 +1,5 @@
 // Prints how well each method of mapping follows known motions of all elements, as the Markdown table of
-// docs/mapping.md: root mean square error of the vertices by spacing, its order of convergence, the normal
+// docs/measurements/mapping-accuracy.md: root mean square error of the vertices by spacing, its order of convergence, the normal
 // jump between neighbouring triangles; then what each method costs there. Rows in brackets are no methods of
 // the product: they are what `blended` would give with other frames.
 //

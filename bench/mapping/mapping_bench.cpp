@@ -1,5 +1,5 @@
 // Binding and mapping a surface of 1 M vertices on a lattice of about 100,000 elements: a ring of
-// diameter 2.6 m, h = 28.5 mm. The counter per_vertex is what docs/mapping.md quotes; the argument is the
+// diameter 2.6 m, h = 28.5 mm. The counter per_vertex is what docs/measurements/performance.md quotes; the argument is the
 // number of threads.
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>

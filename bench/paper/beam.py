@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """The experiment of Jansson and Vergeest's section 5 (their figures 6 and 7): a beam of 2 x 0.7 x 0.5 m, E = 12.1e5 Pa, 580 kg/m3, held
-at one end, across which the other is loaded; load against displacement at two resolutions. Writes docs/paper-experiment.md's table and,
+at one end, across which the other is loaded; load against displacement at two resolutions. Writes docs/measurements/paper-experiment.md's table and,
 where gnuplot is installed, its graph; the two lattices as `flexel picture` shows them.
 
     PATH=build/release/bin:$PATH bench/paper/beam.py
@@ -117,7 +117,7 @@ def main():
             SOURCE / "docs/pictures/paper-beams.png")
         os.chdir("/")
     print(tables)
-    page = SOURCE / "docs/paper-experiment.md"
+    page = SOURCE / "docs/measurements/paper-experiment.md"
     before, _, rest = page.read_text(encoding="utf-8").partition("<!-- beam.py -->\n")
     _, _, after = rest.partition("<!-- end -->\n")
     page.write_text(f"{before}<!-- beam.py -->\n{tables}\n<!-- end -->\n{after}", encoding="utf-8")

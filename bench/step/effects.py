@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Prints what each effect adds to a step, an element: instructions (callgrind: exact), nanoseconds (processor time of one thread,
 medians of five) and bytes of memory (the process's peak), over a scene that names none; then the hot loop's variants and what they
-cost to build. Writes it into docs/effects.md.
+cost to build. Writes it into docs/measurements/effects.md.
 
     PATH=build/release/bin:$PATH bench/step/effects.py
 """
@@ -73,7 +73,7 @@ def kernels(program):
     build = program.resolve().parent.parent
     lines = ["| hot loop | variants a model | object file | compiled in |", "|---|---|---|---|"]
     for isa in ("portable", "avx2", "avx512"):
-        target = f"simulate/CMakeFiles/flexel_kernel_{isa}.dir/time/kernel.cpp.o"
+        target = f"simulate/CMakeFiles/flexel_kernel_{isa}.dir/kernels/kernel.cpp.o"
         if not (build / target).exists():
             continue
         command = subprocess.run(["ninja", "-C", build, "-t", "commands", "-s", target], check=True, stdout=subprocess.PIPE).stdout.decode()
@@ -98,7 +98,7 @@ def main():
         tables = "\n".join([*costs(), "", *kernels(pathlib.Path(program))])
         os.chdir("/")
     print(tables)
-    page = SOURCE / "docs/effects.md"
+    page = SOURCE / "docs/measurements/effects.md"
     before, _, rest = page.read_text(encoding="utf-8").partition("<!-- effects.py -->\n")
     _, _, after = rest.partition("<!-- end -->\n")
     page.write_text(f"{before}<!-- effects.py -->\n{tables}\n<!-- end -->\n{after}", encoding="utf-8")

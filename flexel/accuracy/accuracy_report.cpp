@@ -1,4 +1,4 @@
-// What the search for a size tells people and programs.
+// The report of the resolution search, as text and JSON.
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>

@@ -1,5 +1,5 @@
-// Sizes are preferred numbers, so that predictions that differ a little choose the same one, and `--size`
-// with what is printed gives the same run. What people and programs are told is in accuracy_report.cpp.
+// Sizes are preferred numbers: slightly different predictions choose the same size, and `--size` with the
+// printed value repeats the run. accuracy_report.cpp writes the report.
 #include "flexel/accuracy/resolution_search.h"
 
 #include <fmt/format.h>
@@ -124,22 +124,22 @@ class Search {
   // Given up where the lattice has more cells than the time or the memory that is left allow, and where it
   // takes longer in spite of that.
   Outcome run(double size) {
-    study::Prediction told;
+    study::Prediction predicted;
     const StopAfter limit(std::max(patience_left(), kLeastPatience), "--within");
     try {
       SolvedRun solved = solve_(size, [&](std::size_t cells) {
         counted_ = {size, static_cast<double>(cells)};
-        told = prediction(size);
-        return affordable(told);
+        predicted = prediction(size);
+        return affordable(predicted);
       });
       if (solved.given_up) {
-        say_unaffordable(told);
+        say_unaffordable(predicted);
         return Outcome::given_up;
       }
       report_.stopped.clear();
       keep(std::move(solved));
-      report_.runs.back().predicted_seconds = told.seconds;
-      report_.runs.back().predicted_memory = told.bytes;
+      report_.runs.back().predicted_seconds = predicted.seconds;
+      report_.runs.back().predicted_memory = predicted.bytes;
       return Outcome::done;
     } catch (const DivergedError&) {
       report_.stopped = fmt::format("the run at {} diverged", size_text(size));
@@ -210,8 +210,8 @@ class Search {
     return kMemoryShare * (voxelize::available_memory() + peak_memory());
   }
   [[nodiscard]] bool affordable(double size) const { return affordable(prediction(size)); }
-  [[nodiscard]] bool affordable(const study::Prediction& told) const {
-    return told.seconds <= kTimeMargin * seconds_left() && told.bytes <= memory_limit();
+  [[nodiscard]] bool affordable(const study::Prediction& predicted) const {
+    return predicted.seconds <= kTimeMargin * seconds_left() && predicted.bytes <= memory_limit();
   }
 
   // The finest size between two that is affordable; nothing where the coarser one is not.
@@ -247,12 +247,12 @@ class Search {
     // Not a little above it: three cells become one and a half on the coarser lattice of an error bar.
     return std::min(wanted, last.wall / kCellsThroughWalls / kBelow);
   }
-  void say_unaffordable(const study::Prediction& told) {
+  void say_unaffordable(const study::Prediction& predicted) {
     report_.stopped =
-        told.bytes > memory_limit()
-            ? fmt::format("the next run would need {} of memory", human_bytes(told.bytes))
+        predicted.bytes > memory_limit()
+            ? fmt::format("the next run would need {} of memory", human_bytes(predicted.bytes))
             : fmt::format("the next run would take about {}, of {} that are left",
-                          human_seconds(told.seconds), human_seconds(std::max(0.0, seconds_left())));
+                          human_seconds(predicted.seconds), human_seconds(std::max(0.0, seconds_left())));
   }
 
   // What would make the result surer, as far as the machine can.
@@ -260,11 +260,12 @@ class Search {
     if (!judged_) return "";
     const double goal = goal_.error && !met() ? *goal_.error : finer_goal(judged_->error);
     const double step = std::pow(judged_->error / (kAim * goal), 1 / judged_->order);
-    const study::Prediction told = prediction(runs_.back().size / std::max(step, kLeastStep));
+    const study::Prediction predicted = prediction(runs_.back().size / std::max(step, kLeastStep));
     const bool asked = goal_.error && !goal_.by_default && !met();
-    if (asked && !goal_.within && given_up_ == 0 && affordable(told)) return "";  // time was not the reason
-    const double seconds = told.seconds + (asked ? seconds_since(goal_.began) : 0.2 * told.seconds);
-    if (told.bytes > memory_limit() || seconds > kPatience) return "";
+    if (asked && !goal_.within && given_up_ == 0 && affordable(predicted))
+      return "";  // time was not the reason
+    const double seconds = predicted.seconds + (asked ? seconds_since(goal_.began) : 0.2 * predicted.seconds);
+    if (predicted.bytes > memory_limit() || seconds > kPatience) return "";
     return fmt::format("--accuracy {}{} takes about {}", fmt::format("{:.6g}%", 100 * goal),
                        seconds > kTimeMargin * kUsualLimit ? " --within 10min" : "", human_seconds(seconds));
   }

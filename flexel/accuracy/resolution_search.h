@@ -1,16 +1,16 @@
-// The size of the lattice where the command line gives none (docs/deform.md, "How exact, how long"): by
+// The size of the lattice where the command line gives none (docs/guide/deform.md, "How exact, how long"): by
 // default an error of 5 % within about 20 s; `flexel deform --accuracy 2%` and `--within 10s` ask for others.
 //
-// What is asked of every run: the displacements of the scene's probes, along what they are in the last run;
-// where none moves, that of the vertex that moves most; and, where a move drives the part, the elastic
-// energy. A run alone has the error that its own error bars tell (simulate/estimate/error_bars.h). Beside a coarser
-// run i - 1, at the ratio r of their spacings, the error of run i is
+// The compared quantities: the displacement of each probe along its direction in the last run; where no probe
+// moves, that of the vertex that moves most; and, where a [[move]] drives the part, the elastic energy. The
+// error of a single run is that of its error bars (simulate/estimate/error_bars.h). Beside a coarser run i -
+// 1, at the ratio r of the spacings, the error of run i is
 //     three runs that approach a limit:           their grid convergence index (simulate/result/estimate.h)
 //     order p <= 2.1 of the run's own error bars: 1.25 |f_i - f_(i-1)| / (r^p - 1), p between 1 and 2
 //     else:                                       3 |f_i - f_(i-1)| / (r - 1)
-// (safety factors of Roache, J. Fluids Eng. 116, 1994), and never less than the run's own error bar. Which
-// of the quantities is worst counts. Runs whose cells are wider than walls that hold over a fifth of the
-// matter are compared with nothing, as simulate/estimate/error_bars.cpp does.
+// (safety factors of Roache, J. Fluids Eng. 116, 1994), and never less than the run's own error bar. The
+// worst quantity counts. Runs whose cells are wider than walls that hold over a fifth of the matter are not
+// compared, as in simulate/estimate/error_bars.cpp.
 #pragma once
 #include <chrono>
 #include <functional>

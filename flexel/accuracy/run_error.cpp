@@ -1,4 +1,4 @@
-// Safety factors of Roache (1994); the largest of what two ways tell.
+// Safety factors of Roache (1994); of two estimates the larger.
 #include "flexel/accuracy/run_error.h"
 
 #include <algorithm>
@@ -24,9 +24,9 @@ double ratio_after(const std::vector<SolvedRun>& runs, std::size_t i) {
   return spacing_of(runs[i]) / spacing_of(runs[i + 1]);
 }
 
-// Of one quantity; `coarser` is that of the run before the coarse one, where there is one. A bar of the run
-// itself speaks of its own lattice made coarser, the runs of lattices laid anew: neither is believed to be
-// nearer than the other says.
+// The error of one quantity; `coarser`: of the run before the coarse one, null where there is none. There are
+// two estimates: the run's error bar, from its own lattice coarsened, and the comparison of runs, whose
+// lattices are aligned anew. The larger counts.
 Judged judge(const Quantity& fine, const Quantity& coarse, const Quantity* coarser,
              const std::array<double, 2>& ratio) {
   const double step = std::abs(fine.value - coarse.value);
@@ -151,7 +151,7 @@ void widen_bars(std::vector<SolvedRun>& runs, const Quantities& quantities) {
       each.bar.half_width = std::max(each.bar.half_width, width);
       known = true;
     }
-    if (known) continue;  // else its own lattices told nothing
+    if (known) continue;  // else its error bars gave nothing
     simulate::ErrorBar bar;
     bar.of = quantity.kind;
     bar.probe = quantity.probe;

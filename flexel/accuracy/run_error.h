@@ -1,4 +1,4 @@
-// The error of a run beside coarser ones (accuracy.h has the formulas).
+// The error of a run, estimated from coarser runs (resolution_search.h has the formulas).
 #pragma once
 #include <optional>
 #include <string>
@@ -18,13 +18,13 @@ struct Quantity {
   std::size_t probe = 0;
 };
 
-// What is asked of every run.
+// The quantities that runs are compared by.
 class Quantities {
  public:
   explicit Quantities(bool driven) : driven_(driven) {}
 
-  // The probes; where none moves, of every run the displacement at the vertex that moves most in the last
-  // one, along that.
+  // The probes' displacements; where no probe moves, the displacement of the vertex that moves most in
+  // `last`, along its direction there.
   [[nodiscard]] std::vector<Quantity> of(const SolvedRun& run, const SolvedRun& last) const;
 
  private:
@@ -44,8 +44,8 @@ struct Judged {
 [[nodiscard]] bool resolves_walls(const SolvedRun& run);
 
 // The error of the last of the runs, the worst of its quantities: from its own error bars, and from the one
-// or two runs before it where they are coarser and resolve the walls. Nothing where neither tells. `runs` is
-// not empty.
+// or two runs before it where they are coarser and resolve the walls. Nothing where there are neither. `runs`
+// is not empty.
 [[nodiscard]] std::optional<Judged> judge(const std::vector<SolvedRun>& runs, const Quantities& quantities);
 
 // Widens the error bars of the last run to what judge() says of each quantity, so that no two figures of one

@@ -47,7 +47,7 @@ struct TiedFaces {                                  // two parts that touch
 
 struct AnalysisProbe {
   std::string name;
-  std::vector<std::pair<std::uint32_t, double>> weights;  // of the nodes in what is asked for; sum 1
+  std::vector<std::pair<std::uint32_t, double>> weights;  // of the nodes in the mean; sum 1
   double distance = 0;                                    // m, of a tetrahedron's node from the point
 };
 
@@ -60,7 +60,7 @@ struct Analysis {
   std::vector<TiedFaces> ties;
   std::vector<AnalysisProbe> probes;
   bool large_deflection = false;
-  std::string why_deflection;  // how that was told
+  std::string why_deflection;  // the reason for it
   int load_steps = 1;
   std::vector<std::string> warnings;  // what is not, or not exactly, as in the scene
 };

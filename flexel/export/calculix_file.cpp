@@ -1,5 +1,5 @@
-// Written in the order in which CalculiX wants it: nodes, elements, sets, materials, constraints, one step.
-// Lines stay within its 16 entries, numbers within its 20 characters, names within its 80.
+// Written in the order that CalculiX requires: nodes, elements, sets, materials, constraints, one step. Its
+// limits: 16 entries a line, 20 characters a number, 80 a name.
 #include "flexel/export/calculix_file.h"
 
 #include <fmt/format.h>
@@ -195,7 +195,7 @@ class Writer {
           line("{},{},{}", held.node + 1, held.axis + 1, held.axis + 1);
   }
 
-  // What moves lead: within the step.
+  // Prescribed displacements: within the step.
   void moves() {
     std::string led;
     std::size_t next = 0;

@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kWhole = 1 - 1e-9;
 constexpr int kClasses = 20;
-constexpr double kSideFacing = 0.1;  // cosine between a side and the surface that it stands for
+constexpr double kSideFacing = 0.1;  // least cosine between a side and the surface it represents
 // Corner a = i + 2 j + 4 k of a cell by its place in C3D8.
 constexpr std::array<std::uint8_t, 8> kOrder = {0, 1, 3, 2, 4, 5, 7, 6};
 

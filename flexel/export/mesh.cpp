@@ -1,4 +1,4 @@
-// What is measured on a mesh. Quadratic tetrahedra are integrated at the four points that C3D10 uses.
+// Volumes and areas of a mesh. Quadratic tetrahedra are integrated at the four points of C3D10.
 #include "flexel/export/mesh.h"
 
 #include <Eigen/Geometry>

@@ -1,5 +1,5 @@
-// A mesh for another program's analysis: our lattice's cells as hexahedra, or second-order tetrahedra made by
-// gmsh. Selections resolve on its `body` as they do in a run (simulate/input/selection.h).
+// A mesh for analysis by another program: the lattice's cells as hexahedra, or second-order tetrahedra made
+// by gmsh. Selections are resolved on its `body` as in a run (simulate/input/selection.h).
 #pragma once
 #include <array>
 #include <string>

@@ -1,9 +1,8 @@
-// Fixes and moves on a mesh. Tetrahedra have nodes on the CAD face, which are held. A lattice has them where
-// the face lies on a plane of it; where the face cuts through cells it crosses the lattice's edges, and on
-// each edge along the axis nearest to the face's normal the linear displacement between its two nodes is held
-// at the crossing: an equation between the two.
+// Fixes and moves on a mesh. Tetrahedra have nodes on the CAD face, which are held. So does a lattice where
+// the face lies in a lattice plane. Where the face cuts through cells, it crosses lattice edges: on each edge
+// along the axis nearest to the face's normal, an equation between the edge's two nodes prescribes the
+// interpolated displacement at the crossing.
 #include "flexel/export/support_constraints.h"
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,7 @@
 // CAD files are meshed from their own geometry, all in one run of gmsh; a mesh is written part by part as
-// STL, which gmsh cuts into faces and parametrises. Which CAD face a surface of gmsh is, is told by place:
-// most of its triangles' middles are nearest to that face's polygons, with the normal the same way.
+// STL, which gmsh cuts into faces and parametrises. A surface of gmsh is identified with the CAD face whose
+// polygons, with normals on the same side, are nearest to most of its triangles' centres.
 #include "flexel/export/tet_mesh.h"
-
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
@@ -21,8 +20,8 @@
 namespace flexel::mesh_export {
 namespace {
 
-constexpr double kRegionAngle = 30;   // degrees, as regions of meshes are told (formats/part/surface.h)
-constexpr std::size_t kSamples = 25;  // triangles of a surface that are asked which face they are on
+constexpr double kRegionAngle = 30;   // degrees, as for the faces of meshes (formats/part/surface.h)
+constexpr std::size_t kSamples = 25;  // triangles of a surface that decide which face it is
 constexpr double kTetFacing = 0.3;    // cosine
 constexpr double kBoxTolerance = 0.02;
 

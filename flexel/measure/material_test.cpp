@@ -155,7 +155,7 @@ class Beam {
   [[nodiscard]] const Vec3& low() const { return low_; }
   [[nodiscard]] const Vec3& high() const { return high_; }
 
-  // Energy [J] with both ends led by a motion and its opposite on `axes`, and `others` tied.
+  // Energy [J] with a displacement and its opposite prescribed at the two ends on `axes`, and `others` tied.
   double energy(const std::array<bool, 3>& axes, const simulate::Motion& motion,
                 const std::vector<simulate::Tie>& others) {
     simulate::Scene scene;
@@ -184,7 +184,7 @@ class Beam {
     return simulate::simulate(body_, scene, options, progress).elastic_energy;
   }
 
-  // The two sides across y, led along x by `way` and its opposite, and an element that holds z.
+  // The two sides across y, moved along x by `way` and its opposite, and an element that holds z.
   [[nodiscard]] std::vector<simulate::Tie> frame_sides(double way) const {
     std::vector<simulate::Tie> ties{tie(ball(low_, 0.25 * h_), {false, false, true})};
     for (const double side : {-1.0, 1.0}) {

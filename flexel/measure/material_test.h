@@ -1,19 +1,20 @@
-// What a lattice makes of a material: virtual tests of the models (`flexel measure`, docs/accuracy.md).
+// The effective elastic constants of a lattice: virtual material tests (`flexel measure`, docs/measurements/accuracy.md).
 //
-// Inside: the elasticity tensor of an unbounded lattice, from its energy under affine strains, and Young's
-// modulus, Poisson's ratio and the shear modulus that it has along and across a direction.
+// Inside: the elasticity tensor of an unbounded lattice, from its energy under affine strains, and from it
+// Young's modulus, Poisson's ratio and the shear modulus by direction.
 //
-// Bars: n x n x 4n cells (centre placement: elements) along the lattice, led so that the exact solution of a
-// homogeneous bar fits: drawn (u_x given at the ends), sheared in a frame (ends and two sides led along
-// themselves: u_x = gamma y / 2, u_y = gamma x / 2), bent (u_x = kappa x y), twisted (ends turned, free to
-// warp: Saint-Venant). The moduli follow from the energy over that of the homogeneous bar, Poisson's ratio
-// from the contraction of the drawn one. Strains that are even across a cell are the lattice's material at
-// any n; those of bending and twisting vary inside a cell, and what that adds falls with n^2 (limit_of).
-// Of `cells` the hourglass connections have one stiffness c = 8/3 mu h for all. It is that of bending at
-// nu = 0, where a cell's q = kappa h^2 / 4 costs c q^2 / 2 = E kappa^2 h^5 / 24, as its matter does. A cell
-// twisted by theta per length has two such q, theta h^2 / 4, and costs mu theta^2 h^5 / 6 where its matter
-// costs half: over the whole section (1/6) / 0.1406 / n^2 = 1.19 / n^2 too much. Measured is 2.0 / n^2 in
-// all; the rest is the warping within cells.
+// Bars: n x n x 4n cells (centre placement: elements) along the lattice, with boundary displacements of the
+// exact solution of a homogeneous bar: drawn (u_x given at the ends), sheared in a frame (ends and two sides:
+// u_x = gamma y / 2, u_y = gamma x / 2), bent (u_x = kappa x y), twisted (ends turned, free to warp:
+// Saint-Venant). The moduli are the energy over that of the homogeneous bar, Poisson's ratio is the
+// contraction of the drawn one. Where the strain is constant over a cell the result is the material at any n.
+// Under bending and twisting it varies inside a cell, and the error falls as 1 / n^2 (limit_of).
+//
+// The hourglass connections of `cells` have one stiffness, c = 8/3 mu h, which is right for bending at nu =
+// 0: there q = kappa h^2 / 4 has the energy c q^2 / 2 = E kappa^2 h^5 / 24, that of the matter. A cell
+// twisted by theta per length has two such q = theta h^2 / 4 and the energy mu theta^2 h^5 / 6, twice that of
+// its matter: over the section (1/6) / 0.1406 / n^2 = 1.19 / n^2 too stiff. Measured is 2.0 / n^2; the rest
+// is warping within cells.
 #pragma once
 #include <vector>
 

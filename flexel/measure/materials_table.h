@@ -4,7 +4,7 @@
 
 namespace flexel::commands {
 
-// The library as lines for people, as a table in Markdown (docs/materials.md holds it), and as JSON (SI).
+// The library as lines for people, as a table in Markdown (docs/reference/materials.md holds it), and as JSON (SI).
 [[nodiscard]] std::string materials_text();
 [[nodiscard]] std::string materials_markdown();
 [[nodiscard]] std::string materials_json();

@@ -1,7 +1,7 @@
-// Rays on a coarse grid tell which face is seen where. The place of a text is the point of its face that is
-// farthest from all else, by the two-pass chessboard distance transform (Rosenfeld and Pfaltz 1966): a text
-// is about twice as wide as it is tall, so the grid's steps are too. Large faces come first; a text that has
-// no room is tried smaller, and left out below 10 pixels.
+// Rays on a coarse grid find the visible face at each grid point. A label goes to the point of its face
+// farthest from everything else, by the two-pass chessboard distance transform (Rosenfeld and Pfaltz 1966);
+// the grid's steps are twice as wide as tall, like a label. Large faces come first; a label that does not fit
+// is made smaller, and left out below 10 pixels.
 #include "flexel/picture/face_labels.h"
 
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-// The numbers of faces, written on them.
+// Labels with the numbers of the faces.
 #pragma once
 #include <string>
 #include <vector>

@@ -1,4 +1,4 @@
-// Where things go in the picture.
+// The layout of a picture: panels, legend, axes, scale bar.
 #pragma once
 #include <vector>
 

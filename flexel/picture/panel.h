@@ -1,4 +1,4 @@
-// What one panel of a picture shows.
+// The contents of one panel of a picture.
 #pragma once
 #include <memory>
 #include <optional>

@@ -1,4 +1,4 @@
-// What a picture is coloured by: the user's choice, checked against what every file has.
+// The attribute that colours a picture: the user's choice, checked against every file.
 #include <fmt/format.h>
 
 #include <algorithm>

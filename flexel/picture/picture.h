@@ -1,4 +1,4 @@
-// A picture of surfaces and bodies: what `flexel picture` does but for its arguments and files.
+// Draws surfaces and bodies: `flexel picture` without its arguments and files.
 #pragma once
 #include <optional>
 #include <string>
@@ -27,8 +27,8 @@ struct PictureOptions {
   enum class Show { surface, cells, elements } show = Show::surface;  // cells and elements: bodies only
   // "none"; or an attribute; else displacement for bodies that are deformed, and none
   std::optional<std::string> colour;
-  std::optional<std::pair<std::string, std::string>>
-      range;                               // as written: numbers with units; else that of the values
+  // As written: numbers with units. Default: the range of the values
+  std::optional<std::pair<std::string, std::string>> range;
   std::optional<double> exaggeration = 1;  // of the displacement; nothing: as chosen for it to be seen
   bool outline_at_rest = true;
   bool faces = false;  // the numbers of the faces on them, from four sides where no view is given

@@ -1,5 +1,5 @@
-// The child is in a process group of its own, so that Ctrl-C reaches it through us alone and
-// ends it once; it dies with us, whatever ends us.
+// The child has its own process group, so that Ctrl-C reaches it only through this process, and is killed
+// when this process ends (PR_SET_PDEATHSIG).
 #include "flexel/process/child.h"
 
 #include <fcntl.h>
@@ -37,7 +37,7 @@ double seconds(const timeval& time) {
                          int nothing, pid_t parent) {
   setpgid(0, 0);
   prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (getppid() != parent) _exit(127);  // it ended before we asked to end with it
+  if (getppid() != parent) _exit(127);  // the parent ended before prctl() took effect
   dup2(nothing, STDIN_FILENO);
   dup2(log, STDOUT_FILENO);
   dup2(log, STDERR_FILENO);
@@ -72,7 +72,7 @@ bool has_ended(pid_t child) {
          info.si_pid == child;
 }
 
-// As the kernel wants them: a null pointer at the end.
+// For execve(): a null pointer at the end.
 std::vector<char*> pointers(const std::vector<std::string>& texts) {
   std::vector<char*> result;
   for (const std::string& each : texts) result.push_back(const_cast<char*>(each.c_str()));
@@ -113,18 +113,18 @@ ChildRun run_child(const std::vector<std::string>& argv, const ChildOptions& opt
   // by its number: the header of glibc 2.36 declares pidfd_open for C alone
   const Descriptor handle(static_cast<int>(syscall(SYS_pidfd_open, child, 0)));
   ChildRun result;
-  bool told = false;  // it was asked to end
+  bool signalled = false;  // SIGINT was sent
   Deadline until = options.deadline;
   pollfd watched = {handle.number, POLLIN, 0};
   while (poll(&watched, 1, patience(until)) <= 0 && !has_ended(child)) {
     const bool late = Clock::now() >= until;
-    if (told && late) {
+    if (signalled && late) {
       kill(child, SIGKILL);
       until = kNever;
-    } else if (!told && (late || (options.heed_interrupts && interrupted()))) {
+    } else if (!signalled && (late || (options.heed_interrupts && interrupted()))) {
       result.out_of_time = late;
       kill(child, SIGINT);
-      told = true;
+      signalled = true;
       until = Clock::now() + kGrace;
     }
   }

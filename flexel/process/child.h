@@ -1,5 +1,5 @@
-// Other programs, run as child processes: stopped at a deadline, interrupted with us, and measured by the
-// kernel.
+// Runs other programs as child processes: with a deadline, interrupted together with this process, time and
+// memory measured by the kernel.
 #pragma once
 #include <chrono>
 #include <filesystem>
@@ -22,8 +22,8 @@ inline constexpr Deadline kNever = Deadline::max();
 
 struct ChildOptions {
   std::filesystem::path log;             // stdout and stderr go there
-  std::filesystem::path folder;          // the working folder; "": ours
-  std::vector<std::string> environment;  // "NAME=VALUE", beside ours
+  std::filesystem::path folder;          // the working folder; "": that of this process
+  std::vector<std::string> environment;  // "NAME=VALUE", added to this process's
   Deadline deadline = kNever;
   bool heed_interrupts = true;  // false: an interrupt that has come already does not count
 };
@@ -33,10 +33,10 @@ struct ChildOptions {
 // lives on for two seconds gets SIGKILL. Throws InputError: it cannot be started, the log cannot be written.
 [[nodiscard]] ChildRun run_child(const std::vector<std::string>& argv, const ChildOptions& options);
 
-// The path of a program of ours: `name` ("flexel-simulate") beside this one. Throws InputError.
+// The path of a Flexel program: `name` ("flexel-simulate") in this one's folder. Throws InputError.
 [[nodiscard]] std::string own_program(const std::string& name);
 
-// The path of somebody else's, from PATH; "" where it is not there.
+// The path of any other program, from PATH; "" where it is not there.
 [[nodiscard]] std::string find_program(const std::string& name);
 
 }  // namespace flexel

@@ -19,7 +19,7 @@ constexpr double kUsualTarget = 0.01;
 constexpr double kMostBelievedOrder = 3;  // cells close in with order 2: more is chance
 constexpr double kMostUncertain = 0.25;   // of the value: a reference that is known worse is none
 
-// Of three sizes. `believed`: false where they close in faster than cells can.
+// Of three sizes. `believed`: false where they converge faster than the models' order allows.
 simulate::Bar bar_of(const std::vector<SizeValue>& values, std::size_t finest, bool& believed) {
   simulate::Sequence sequence;
   for (std::size_t i = 0; i < 3; ++i) sequence.value.at(i) = values[finest - i].value;

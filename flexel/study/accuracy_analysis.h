@@ -1,5 +1,5 @@
-// From runs to figures that a user can act on: the reference and its uncertainty, errors, the frontier of
-// error against time, what accuracy costs, and the sentences that say so. No files, no processes.
+// The analysis of a study's runs: reference values and their uncertainty, errors, the Pareto frontier of
+// error against time, the cost of accuracy, and the sentences of the report. No files, no processes.
 #pragma once
 #include <optional>
 #include <string>
@@ -29,13 +29,13 @@ struct SizeValue {
 };
 inline constexpr double kThinMatter = 0.2;  // as the error bars have it
 
-// Of the finest three that are resolved, by Richardson's extrapolation with the observed order, or 2 where
-// that is more; the uncertainty is the grid convergence index (simulate/result/estimate.h gives sources and
-// exceptions), at least half the difference of the extrapolation from what the next coarser three give, where
-// there are four. Orders above 3 are none: values that close in so fast agree by chance, and the finest is
-// taken within three times the larger difference. With fewer than three resolved sizes, or an uncertainty
-// above a quarter of the value, there is `doubt`: the finest of all within three times the largest
-// difference; of one itself, within its whole size.
+// The reference value of a quantity, by Richardson extrapolation from the finest three resolved sizes, with
+// the observed order, at most 2. Its uncertainty is the grid convergence index (simulate/result/estimate.h
+// gives sources and exceptions) and, with four sizes, at least half the difference from the extrapolation of
+// the next coarser three. An observed order above 3 is chance: the reference is then the finest value, within
+// three times the larger difference. With fewer than three resolved sizes, or an uncertainty above a quarter
+// of the value, there is `doubt`: the finest value within three times the largest difference; a single one
+// within its own size.
 [[nodiscard]] Reference extrapolate(const std::string& name, const std::string& unit,
                                     const std::vector<SizeValue>& values);
 
@@ -81,7 +81,7 @@ struct Point {
 // half its width. As extrapolate() has it, about its own value.
 [[nodiscard]] double half_range(const std::vector<SizeValue>& values);
 
-// One quantity as another program has it beside ours.
+// One quantity by another program beside Flexel's value.
 struct Agreement {
   Reference ours, theirs;  // theirs extrapolated from its own sizes
   double finest = 0;       // what its finest run found

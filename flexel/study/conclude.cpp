@@ -1,4 +1,4 @@
-// What the rows of a study add up to.
+// Conclusions from the rows of a study: references, errors, sums, sentences.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -268,7 +268,7 @@ std::string page(const Study& study, const std::map<std::string, std::string>& p
       {"PLOT_SIZE", plot(plots, "size")},
       {"SIZE_WORDS",
        "What each size found. Its bar is the range in which the limit lies by the sizes up to it "
-       "(docs/study.md); "
+       "(docs/guide/study.md); "
        "the band is the reference. Hollow: a fifth of the matter or more lies in walls of fewer than two "
        "cells, "
        "and the size has no part in the reference."},

@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Okabe and Ito (2008), told apart by the colour-blind, on light and on dark.
+// Okabe and Ito (2008): distinguishable for the colour-blind, on light and on dark.
 constexpr const char* kColours[] = {"#0b84c8", "#e08a00", "#009e73", "#d55e00",
                                     "#b8659a", "#56a9dd", "#8a8a8a", "#a0922c"};
 
@@ -39,7 +39,7 @@ std::string head(const std::string& name, int width, int height) {
       width, height, name);
 }
 
-// Nobody of ours has it.
+// No Flexel run has this colour.
 constexpr const char* kAgainstColour = "#8a5cd0";
 constexpr int kAgainstMarker = 13;  // a filled diamond
 
@@ -166,7 +166,7 @@ std::string error_script(const Study& study, const std::string& out) {
   for (const std::size_t i : front)
     data += fmt::format("{:.9g} {:.9g}\n", points[i].seconds, shown_error(points[i]));
   data += "EOD\n";
-  // The others are told by their colour: where all are written none can be read.
+  // The other points are identified by colour: labels on all would overlap.
   std::vector<std::size_t> labelled;
   for (std::size_t i = 0; i < points.size(); ++i)
     if (points[i].error && (points[i].sweep == "resolution" || points[i].sweep == "calculix"))

@@ -26,7 +26,7 @@ PowerLaw prior_of(const std::string& stage, bool timed) {
   return {0.01, 2e-6, 1};  // write
 }
 
-// Of the L-bracket of docs/accuracy.md, 1,664 to 12,428 tetrahedra.
+// Of the L-bracket of docs/measurements/accuracy.md, 1,664 to 12,428 tetrahedra.
 PowerLaw calculix_prior(const std::string& stage) {
   if (stage == "voxelize") return {0.6, 6e-5, 1};
   if (stage == "solve") return {0.1, 5.5e-6, 1.45};

@@ -1,9 +1,8 @@
-// How long the next run will take and how much memory it will need, from the runs that are done.
+// Predicts time and memory of the next run from earlier runs.
 //
-// Each stage is taken as seconds = c + a x^p with x the cells, of the stages that step in time the cells
-// times the steps; each program's memory as bytes = c + a n. c, a and p come from the runs by least squares
-// of the relative error, the larger runs weighing more, drawn weakly towards a prior: constants measured
-// once, or what another kind of run showed.
+// Model: each stage takes seconds = c + a x^p, x the cells (of stages that step in time, cells times steps);
+// each program takes bytes = c + a n. c, a and p are fitted by least squares of the relative error, with more
+// weight on larger runs and a weak prior: constants measured once, or the fit of another kind of run.
 #pragma once
 #include <array>
 #include <map>
@@ -44,14 +43,14 @@ struct Prediction {
 };
 
 // Kinds of runs whose costs follow laws of their own: CalculiX's direct solver, cells being tetrahedra; and
-// `flexel deform`, which has all stages in one process, its memory being that of program 0, and knows them as
+// `flexel deform`, which has all stages in one process, its memory being that of program 0, and names them
 // "voxelize", "solve" (with what assembles), "error bars" and "map".
 inline constexpr const char* kCalculix = "calculix";
 inline constexpr const char* kOneProcess = "one process";
 
 class Predictor {
  public:
-  // A run that went well. `kind` tells apart runs that cost differently at the same size: the model, the
+  // A run that succeeded. `kind` separates runs of different cost at the same size: the model, the
   // integrator, the threads; "" is the ordinary one, which is the prior of all others but of kCalculix and
   // kOneProcess.
   void add(const std::string& kind, const RunSize& size, const RunResult& run);

@@ -1,5 +1,5 @@
-// The loop: predict what is open, run the cheapest that fits, write its row; then repeat what is not known to
-// 5 %; then sum up.
+// The loop: predict the open configurations, run the cheapest that fits the budget, write its row; then
+// repeat those whose time is not known to 5 %; then conclude.
 #include "flexel/study/session.h"
 #include "flexel/study/tables.h"
 
@@ -176,34 +176,35 @@ bool Session::run_cheapest(Sweep& sweep) {
       for (std::size_t i = 0; i < open.size(); ++i)
         if (open[i].sweep == ladder) best = i;
   const Trial& trial = open[best];
-  const Prediction& told = predicted[best];
-  // Fewer cells than the size's cube are a chance to be looked at, once the lattice is made.
-  const std::string why = why_not(trial, told.scaled(1 / kFewerCells));
+  const Prediction& prediction = predicted[best];
+  // The lattice may have fewer cells than the size's cube suggests: then the run is considered again.
+  const std::string why = why_not(trial, prediction.scaled(1 / kFewerCells));
   if (why.empty())
-    run_one(sweep, trial, told);
+    run_one(sweep, trial, prediction);
   else
-    leave_out(sweep, trial, told, why);
+    leave_out(sweep, trial, prediction, why);
   return true;
 }
 
-// What speaks against a first run; "" where nothing does.
-std::string Session::why_not(const Trial& trial, const Prediction& told) const {
+// Why a configuration is not run; "" where it may run.
+std::string Session::why_not(const Trial& trial, const Prediction& prediction) const {
   const bool size = trial.sweep == "resolution" || trial.sweep == "calculix";
   // Something is better than nothing: the first of all may take what there is.
   const double time_left =
       study_.rows.empty() ? left() : (size ? kLadderShare : kFirstShare) * wanted_.budget - spent();
-  if (told.seconds > time_left)
+  if (prediction.seconds > time_left)
     return fmt::format("time: {} were left for {}", human_seconds(std::max(0.0, time_left)),
                        size ? "another size" : "first runs");
-  if (!size && told.seconds > kSideShare * wanted_.budget)
+  if (!size && prediction.seconds > kSideShare * wanted_.budget)
     return "time: beside the sizes no run may take more than a tenth of the budget";
-  if (told.bytes > kMemoryShare * voxelize::available_memory())
+  if (prediction.bytes > kMemoryShare * voxelize::available_memory())
     return fmt::format("memory: {} are free", human_bytes(voxelize::available_memory()));
   return "";
 }
 
-void Session::leave_out(Sweep& sweep, const Trial& trial, const Prediction& told, const std::string& why) {
-  study_.left_out.push_back({trial, told, why});
+void Session::leave_out(Sweep& sweep, const Trial& trial, const Prediction& prediction,
+                        const std::string& why) {
+  study_.left_out.push_back({trial, prediction, why});
   sweep.leave_out(trial);
 }
 
@@ -221,7 +222,7 @@ void Session::repeat_all(Sweep& sweep) {
         entry.second.push_back(row.found.wall);
       }
     const Row* next = nullptr;
-    double shortest = left() / 1.2;  // a margin: a repeat that is cut off tells nothing
+    double shortest = left() / 1.2;  // a margin: a repeat that is stopped is wasted
     for (const auto& [label, entry] : seen) {
       const Median wall = median(entry.second);
       if (failed.count(label) > 0 || wall.relative_error <= kKnown || entry.second.size() >= kMostRepeats ||

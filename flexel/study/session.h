@@ -1,4 +1,4 @@
-// One study from its first look at the part to its page.
+// One study, from the first coarse run to the page.
 #pragma once
 #include <chrono>
 #include <filesystem>
@@ -37,10 +37,10 @@ class Session {
   [[nodiscard]] std::ptrdiff_t sizes_done(const std::string& sweep) const;
   bool run_cheapest(Sweep& sweep);
   void repeat_all(Sweep& sweep);
-  [[nodiscard]] std::string why_not(const Trial& trial, const Prediction& told) const;
+  [[nodiscard]] std::string why_not(const Trial& trial, const Prediction& prediction) const;
   void run_one(Sweep& sweep, const Trial& trial, Prediction predicted);
   [[nodiscard]] RunResult run_trial(const Trial& trial, bool first, const RunOptions& asked) const;
-  void leave_out(Sweep& sweep, const Trial& trial, const Prediction& told, const std::string& why);
+  void leave_out(Sweep& sweep, const Trial& trial, const Prediction& prediction, const std::string& why);
   void note_against();
   void note_interrupt();
   void append(const Row& row);

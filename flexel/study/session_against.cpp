@@ -1,4 +1,4 @@
-// What a session does for --against calculix: the look before the runs, and what is said after them.
+// --against calculix in a session: the check before the runs, and the comparison after them.
 #include <fmt/format.h>
 
 #include <cmath>

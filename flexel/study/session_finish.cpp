@@ -1,5 +1,5 @@
-// After the runs: surfaces against the finest, pictures of their errors, and the page, in the time that is
-// left.
+// After the runs, in the remaining time: distances from the finest surface, pictures of the errors, and the
+// page.
 #include <fmt/format.h>
 
 #include <algorithm>

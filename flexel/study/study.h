@@ -1,4 +1,4 @@
-// A whole study: its runs, and what they add up to.
+// A study: its runs and the conclusions from them.
 #pragma once
 #include <filesystem>
 #include <map>

@@ -237,9 +237,10 @@ RunSize Sweep::size_of(const Trial& wanted) const {
 Prediction Sweep::predict(const Trial& wanted, std::optional<std::size_t> counted) const {
   RunSize size = size_of(wanted);
   if (counted) size.cells = static_cast<double>(*counted);
-  Prediction told = predictor_.predict(wanted.kind(), size);
-  if (wanted.sweep == "threads" && !predictor_.knows(wanted.kind())) told.seconds *= thread_factor(wanted);
-  return told;
+  Prediction prediction = predictor_.predict(wanted.kind(), size);
+  if (wanted.sweep == "threads" && !predictor_.knows(wanted.kind()))
+    prediction.seconds *= thread_factor(wanted);
+  return prediction;
 }
 
 // Amdahl, 1967: of the work of a run on all n cores, s + p, s is done by one thread and takes s + p / n.

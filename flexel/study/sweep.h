@@ -1,8 +1,6 @@
-// Which configurations a study runs, and in which order: the sizes first, as fine as time and memory allow;
-// then the other choices, the cheapest next.
-//
-// One ladder of sizes carries the study. Its wider choices are run beside it at one size, of which people
-// ask: one that resolves the walls, has kFewestOfUse cells or more and takes a small share of the budget.
+// The configurations of a study and their order: first a ladder of sizes, as fine as time and memory allow,
+// then the other choices, cheapest first. Those run at one size, which resolves the walls, has kFewestOfUse
+// cells or more and takes a small share of the budget.
 #pragma once
 #include <map>
 #include <optional>
@@ -34,7 +32,7 @@ struct LeftOut {
   std::string why;
 };
 
-// To three digits, as people write sizes.
+// Rounded to three digits.
 [[nodiscard]] double rounded(double size);
 
 // How many tetrahedra of an edge gmsh puts into a cube of that edge, about, on bulky parts.

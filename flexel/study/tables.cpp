@@ -1,4 +1,4 @@
-// study.csv, study.json and the table of predictions. docs/study.md gives every column.
+// study.csv, study.json and the table of predictions. docs/guide/study.md gives every column.
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>

@@ -1,6 +1,6 @@
 // IGES through OpenCASCADE. Most files hold no solids but the trimmed surfaces of one; those are sewn along
 // their edges first, at the smallest of a few tolerances that leaves no edge free, and the closed shells
-// stand for solids. Names are those of the entities.
+// are taken as solids. Names are those of the entities.
 #include <fmt/format.h>
 #include <sys/mman.h>
 #include <unistd.h>

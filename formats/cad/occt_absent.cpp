@@ -1,4 +1,4 @@
-// In place of the readers through OpenCASCADE, in a build or a program without it.
+// Stands in for the OpenCASCADE readers in a build without it: every call is refused.
 #include <fmt/format.h>
 
 #include "base/error.h"

@@ -1,4 +1,4 @@
-// STEP is text between two fixed lines; a file that was cut off lacks the second.
+// STEP is text between two fixed lines; a truncated file lacks the second.
 #include "formats/cad/occt_help.h"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// What the readers of OpenCASCADE's formats need that has nothing to do with OpenCASCADE.
+// Helpers of the STEP, IGES and BREP readers that do not use OpenCASCADE.
 #pragma once
 #include <istream>
 #include <streambuf>

@@ -51,7 +51,7 @@ std::vector<TopoDS_Shape> shapes_of(const TopoDS_Shape& shape, TopAbs_ShapeEnum 
   return found;
 }
 
-// The solids; where there are none, closed shells stand for solids.
+// The solids; where there are none, the closed shells.
 std::vector<TopoDS_Shape> solids_of(const TopoDS_Shape& shape, const ImportInput& input) {
   if (shape.IsNull()) throw InputError(input.where, "holds no shape");
   std::vector<TopoDS_Shape> solids = shapes_of(shape, TopAbs_SOLID);

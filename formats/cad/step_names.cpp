@@ -1,5 +1,5 @@
-// A solid's name is that of the smallest product it is in, where it is alone there; else its own. Both are
-// found from the entities that OpenCASCADE made shapes of.
+// A solid that is the only one of its product has the product's name, any other its own. Both are read from
+// the STEP entities that OpenCASCADE translated into shapes.
 #include <Quantity_Color.hxx>
 #include <STEPConstruct_Styles.hxx>
 #include <STEPControl_Reader.hxx>

@@ -20,7 +20,7 @@ class StepNames {
   explicit StepNames(const STEPControl_Reader& reader);
   // The name of a face or solid itself, or "".
   [[nodiscard]] std::string own(const TopoDS_Shape& shape) const;
-  // A product with one solid gives it its name; the solids of one product are told apart by their own names.
+  // A product with one solid gives it its name; several solids of one product have their own names.
   [[nodiscard]] std::string solid(const TopoDS_Shape& solid) const;
   // The colour of a face or solid itself, in sRGB as the file has it.
   [[nodiscard]] std::optional<ShapeColor> color(const TopoDS_Shape& shape) const;

@@ -1,4 +1,4 @@
-// STEP through OpenCASCADE, which only this file, step_names.cpp and the other readers of its formats see.
+// STEP through OpenCASCADE.
 #include <fmt/format.h>
 
 #include <BRepCheck_Analyzer.hxx>
@@ -67,10 +67,9 @@ void check_references(const Handle(Interface_InterfaceModel) & model, const Impo
   for (Standard_Integer i = 1; i <= check->NbWarnings(); ++i) examine(check->CWarning(i));
 }
 
-// OpenCASCADE loads what it can and later follows the references that are missing, so a file with such is
-// refused, and so is one whose solids or representations did not load. Returns what did not load of the
-// geometry below them, "" for nothing. Damage elsewhere in the file (drawings, tolerances, colours) does no
-// harm.
+// OpenCASCADE loads what it can and later follows missing references. So a file with missing references is
+// refused, and one whose solids or representations did not load. Returns what did not load of their geometry,
+// "" for nothing. Damage elsewhere in the file (drawings, tolerances, colours) is ignored.
 std::string check_loaded(const STEPControl_Reader& reader, const ImportInput& input) {
   const Handle(Interface_InterfaceModel) model = reader.WS()->Model();
   check_references(model, input);

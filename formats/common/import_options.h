@@ -1,4 +1,4 @@
-// What a user may say of a part's file.
+// Options of reading a part's file.
 #pragma once
 #include <functional>
 #include <optional>
@@ -15,14 +15,13 @@ struct ImportOptions {
   // between neighbouring normals. No deflection given: a thousandth of the part's diagonal.
   std::optional<double> deflection;
   double angular_deflection = 0.35;
-  // The mesh is split until no edge is longer than this [m], so that flat faces can bend too; more than 2
-  // million triangles are an error. Not given: meshes (STL, OBJ, ...) are the user's and stay as they are,
-  // STEP's tessellation is split to a 64th of the diagonal of all solids together, or to what 2 million
-  // triangles for the file allow.
+  // The mesh is split until no edge is longer than this [m], so that flat faces can bend; more than 2 million
+  // triangles are an error. Default: meshes (STL, OBJ, ...) stay as they are; the tessellation of CAD files
+  // is split to a 64th of the diagonal of all solids together, or as far as 2 million triangles a file allow.
   std::optional<double> largest_edge;
   // s of processor time that OpenCASCADE may take over a file; not given: a minute and 10 s a megabyte
   std::optional<double> occt_seconds;
-  // Told, a line each, what a reader passed over and the user should know.
+  // Called with a line for each thing that a reader ignored and the user should know.
   std::function<void(const std::string&)> warn;
 };
 

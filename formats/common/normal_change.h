@@ -1,4 +1,4 @@
-// How normals that a file gives turn with the surface. Inside flexel_formats only.
+// Rotates the normals that a file gives with the deformed surface. Inside flexel_formats only.
 #pragma once
 #include <Eigen/Geometry>
 #include <optional>

@@ -1,4 +1,4 @@
-// Faces of meshes without groups, names, units: what several readers need.
+// Helpers of several readers: faces of meshes without groups, names, units.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -9,10 +9,10 @@
 
 namespace flexel {
 
-// Reads one file ("-": stdin). The format is told by its bytes, then by its extension. Solids become parts;
-// CAD faces, groups or dihedral regions become faces; the result has passed check(). Throws InputError:
-// unreadable, empty, truncated, unknown format, not finite, STEP without OpenCASCADE (the message says how to
-// get it), a `unit` given for a file that carries another.
+// Reads one file ("-": stdin). The format is recognised by its bytes, then by its extension. Solids become
+// parts; CAD faces, groups or dihedral regions become faces; the result has passed check(). Throws
+// InputError: unreadable, empty, truncated, unknown format, not finite, STEP without OpenCASCADE (the message
+// says how to get it), a `unit` given for a file that carries another.
 [[nodiscard]] Surface import_surface(const std::string& path, const ImportOptions& options = {});
 
 // A line for each file of a format that is otherwise written again as it came, whose triangles were split

@@ -1,5 +1,5 @@
-// One file a part: each part of a surface is taken out with the vertices that its polygons use, in their
-// order, and written like a surface of its own.
+// One file a part: each part is extracted with the vertices that its polygons use, in their order, and
+// written as a surface.
 #include <fmt/format.h>
 
 #include <algorithm>

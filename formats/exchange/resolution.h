@@ -1,12 +1,12 @@
-// How far apart the numbers are that a file can say a part's coordinates with.
+// The floating-point spacing of a part's coordinates in its file.
 #pragma once
 #include "formats/part/surface.h"
 
 namespace flexel {
 
-// m: distance between neighbouring single-precision numbers at the part's coordinate that is farthest from
-// zero, where its file holds those (binary STL, binary PLY with float coordinates); 0 for other files, which
-// hold double precision or text, and for a part without polygons.
+// m: the distance between neighbouring single-precision numbers at the part's largest coordinate, for files
+// that store single precision (binary STL, binary PLY with float coordinates); 0 for files of double
+// precision or text, and for a part without polygons.
 [[nodiscard]] double coordinate_resolution(const Surface& surface, std::size_t part);
 
 }  // namespace flexel

@@ -1,4 +1,4 @@
-// Parts of a size that hardly any part has: their file's unit was likely another.
+// Warns of parts of an unusual size, whose file likely has another unit.
 #pragma once
 #include <string>
 #include <vector>

@@ -151,7 +151,7 @@ class Walk {
   }
 
  private:
-  // The roots of the scene that is shown; without scenes, the nodes that are nobody's children.
+  // The roots of the scene that is shown; without scenes, the nodes without a parent.
   [[nodiscard]] std::vector<std::size_t> roots() const {
     const GltfJson& json = gltf_.json;
     if (json.contains("scenes") && json["scenes"].is_array() && !json["scenes"].empty()) {

@@ -50,7 +50,7 @@ struct Body {
 
   // Elements (n)
   std::vector<Index3> lattice_index;  // (n x 3) in the part's lattice; may be negative
-  // (n) tells elements of one part at one lattice index apart; 0 nearly everywhere
+  // (n) distinguishes elements of one part at one lattice index; 0 nearly everywhere
   std::vector<std::uint16_t> piece;
   std::vector<Vec3> rest;      // (n x 3) m, world frame
   std::vector<Vec3> position;  // (n x 3) m, world frame
@@ -69,9 +69,9 @@ struct Body {
   Columns cell_columns;
 
   // Cells under the surface: polygon p bounds the matter of cells surface_cells[surface_cell_offsets[p] ...
-  // surface_cell_offsets[p + 1]), ascending. It tells apart two pieces of one voxel, and where the matter
-  // just under a polygon was too little for a cell it names the neighbouring cell that it hangs on. Empty for
-  // centre placement.
+  // surface_cell_offsets[p + 1]), ascending. This distinguishes two pieces of one voxel. Where the matter
+  // under a polygon was too little for a cell, the neighbouring cell that it is attached to stands in. Empty
+  // for centre placement.
   std::vector<std::uint32_t> surface_cell_offsets;  // (polygons + 1)
   std::vector<std::uint32_t> surface_cells;         // indices of cells
 

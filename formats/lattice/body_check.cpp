@@ -1,5 +1,5 @@
-// check(Body): everything that a stage relies on without looking again. One pass over each array, in
-// parallel; the message names the field and the first entry that is wrong, numbered from 0 as in the arrays.
+// check(Body): every invariant that the stages rely on. One parallel pass over each array; the message names
+// the field and the first wrong entry, numbered from 0.
 #include <fmt/format.h>
 
 #include <Eigen/LU>

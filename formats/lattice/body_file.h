@@ -1,4 +1,4 @@
-// Body files: .vtu, appended raw data. docs/body-file.md describes every field.
+// Body files: .vtu, appended raw data. docs/reference/body-file.md describes every field.
 #pragma once
 #include <string>
 

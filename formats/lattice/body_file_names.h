@@ -1,4 +1,4 @@
-// Names of the arrays of a body file, for its writer and its reader; docs/body-file.md explains them.
+// Names of the arrays of a body file, for its writer and its reader; docs/reference/body-file.md explains them.
 #pragma once
 #include <array>
 #include <string>

@@ -1,6 +1,5 @@
-// The part of a body that is not arrays of numbers, as JSON text (field data "flexel_metadata" of a body
-// file). Numbers are written so that they read back to the bit; texts that are not UTF-8 are kept as lists of
-// bytes.
+// The data of a body other than arrays of numbers, as JSON text (field data "flexel_metadata" of a body
+// file). Numbers are written with all digits; texts that are not UTF-8 are written as lists of bytes.
 #pragma once
 #include <string>
 #include <vector>

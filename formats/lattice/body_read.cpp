@@ -1,6 +1,5 @@
-// .vtu -> Body. The version is looked at first, then the metadata, then the arrays; check() has the last
-// word, so that a body that was read can be relied on. Displacement, part, material, offsets and types repeat
-// what other fields say and are not read back (their sizes are checked with all others).
+// .vtu -> Body: first the version, then the metadata, then the arrays, and at the end check(). Displacement,
+// part, material, offsets and types repeat other fields and are not read back (only their sizes are checked).
 #include <fmt/format.h>
 
 #include <string_view>

@@ -1,6 +1,6 @@
 // Body -> .vtu. Arrays that lie in memory as they are written go out from there; the others (hexahedra in
 // VTK's corner order, displacement, part and material of each cell) are made a chunk at a time.
-// docs/body-file.md gives every array.
+// docs/reference/body-file.md gives every array.
 #include <algorithm>
 #include <limits>
 #include <stdexcept>

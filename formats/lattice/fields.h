@@ -1,5 +1,5 @@
-// Figures of a deformed body that every stage and picture gives alike: each is of the part's matter, never of
-// an element that only carries matter beside it.
+// Largest displacement, stress and the like of a deformed body, defined once for all stages. Each is taken
+// over points of the part's matter, not over elements, some of which lie outside the part.
 #pragma once
 #include <optional>
 #include <vector>

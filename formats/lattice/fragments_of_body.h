@@ -1,4 +1,4 @@
-// What a body has fallen into: elements that connections join, directly or through others.
+// The fragments of a body: its connected components.
 #pragma once
 #include <cstdint>
 #include <vector>

@@ -100,7 +100,8 @@ SurfaceLocator::SurfaceLocator(const Body& body, std::size_t polygon) : body_(bo
   if (!cells_.empty()) lattice_ = &part_of_cell(body, cells_.front()).lattice;
 }
 
-// Mostly the point lies in one of the first voxels looked at, or on its face; and the next point in the same.
+// Usually the point lies in one of the first voxels tried, or on its face, and the next point in the same
+// voxel.
 std::uint32_t SurfaceLocator::nearest_cell(const Vec3& at) {
   const Voxel home = at.array().floor().matrix().cast<std::int64_t>();
   std::array<int, 3> first{};  // 0, or -1 on a face

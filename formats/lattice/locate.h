@@ -39,8 +39,8 @@ class SurfaceLocator {
   const Body& body_;
   std::span<const std::uint32_t> cells_;  // that the polygon bounds, ascending
   const Lattice* lattice_ = nullptr;
-  std::optional<std::uint32_t>
-      last_;  // found in voxel `last_home_` or beside its faces that the point lay on
+  // Found in voxel `last_home_`, or beside those of its faces that the point lay on
+  std::optional<std::uint32_t> last_;
   Eigen::Matrix<std::int64_t, 3, 1> last_home_;
   std::array<int, 3> last_first_{};
 };

@@ -1,5 +1,5 @@
-// Parsing the head of a .vtu with pugixml. Numbers are read whole and bounded; whether offsets and sizes fit
-// the data is seen to by vtu::File.
+// Parses the XML head of a .vtu with pugixml. Numbers are range-checked; vtu::File checks offsets and sizes
+// against the data.
 #include "formats/lattice/vtu_head.h"
 
 #include <fmt/format.h>

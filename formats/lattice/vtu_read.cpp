@@ -1,6 +1,6 @@
-// Reading .vtu. The XML head, up to the "_" that begins the appended data, is parsed on its own; then every
-// array's header is followed once and its place, size and number of tuples are made sure of. Nothing is
-// allocated for a size that the bytes present cannot hold.
+// Reading .vtu. The XML head, up to the "_" that begins the appended data, is parsed first; then offset, size
+// and number of tuples of every array are checked. Nothing is allocated for a size that exceeds the bytes
+// present.
 #include <fmt/format.h>
 
 #include <algorithm>

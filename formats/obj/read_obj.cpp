@@ -1,5 +1,5 @@
 // OBJ, read by hand because the same lines must come out again: every vertex in the file's order, used or
-// not, in double precision, polygons as they are (docs/surfaces.md says what a library does instead). One
+// not, in double precision, polygons as they are (docs/reference/surfaces.md says what a library does instead). One
 // file is one part; its faces are its groups, or dihedral regions where all its polygons are in one group.
 #include <fmt/format.h>
 

@@ -1,7 +1,7 @@
-// Words are told apart by blanks; a comment goes from # to the end of its line. A face's colour is what
-// follows its corners on the line (Geomview's rule). Where the file has one line per vertex and face, which
-// all programs write, what follows a vertex on its line belongs to it; else a vertex has the words that its
-// keyword promises.
+// Blanks separate words; a comment goes from # to the end of its line. A face's colour is what follows its
+// corners on the line (Geomview's rule). Where the file has one line per vertex and face, as all programs
+// write it, the rest of a vertex's line belongs to it; else a vertex has the number of words that the keyword
+// states.
 #include "formats/off/off_text.h"
 
 #include <fmt/format.h>

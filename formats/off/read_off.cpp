@@ -1,4 +1,4 @@
-// OFF, read by hand because the same lines must come out again, in double precision (docs/surfaces.md). One
+// OFF, read by hand because the same lines must come out again, in double precision (docs/reference/surfaces.md). One
 // file is one part; its faces are dihedral regions. Colours are whole numbers up to 255, or, where any has a
 // point, 0 to 1 (Geomview).
 #include "formats/off/off_text.h"

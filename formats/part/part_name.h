@@ -1,4 +1,4 @@
-// Names of parts that say nothing.
+// Recognises meaningless part names, such as "COMPOUND" or "mesh_0".
 #pragma once
 #include <string>
 

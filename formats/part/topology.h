@@ -1,4 +1,4 @@
-// How the triangles of a surface hang together: welding, closed or open, oriented or not, shells, volume.
+// Topology of a triangle mesh: welding, closed or open, orientation, shells, enclosed volume.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -40,8 +40,8 @@ struct Topology {
                                    const std::vector<std::array<std::uint32_t, 3>>& corners);
 
 // Numbers regions of triangles bounded by edges whose dihedral angle exceeds `degrees` (or that are open or
-// non-manifold). A triangle too low to have a direction (a millionth of the diagonal) is judged by the one
-// across its longest edge; a degenerate one goes with the triangle before it (at the front: the first after).
+// non-manifold). A sliver (lower than a millionth of the diagonal) takes the region of its neighbour across
+// the longest edge; a degenerate triangle that of the triangle before it (at the front: the first after).
 // Returns (triangles) region ids from 0 in order of first triangle.
 [[nodiscard]] std::vector<std::uint32_t> dihedral_regions(
     const std::vector<Vec3>& vertices, const std::vector<std::array<std::uint32_t, 3>>& corners,

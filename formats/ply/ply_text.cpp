@@ -1,6 +1,6 @@
 // The header is lines of text, ended by LF or CRLF, in every encoding. Numbers of ASCII files are words, read
-// with std::from_chars (exact, no locale); which line they are on does not matter. Before anything is read,
-// the counts of the header are held against the bytes that are there, so that none is believed.
+// with std::from_chars (exact, no locale); line breaks between them do not matter. The header's counts are
+// checked against the number of bytes before anything is read.
 #include "formats/ply/ply_text.h"
 
 #include <fmt/format.h>

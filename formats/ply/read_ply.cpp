@@ -1,5 +1,5 @@
 // PLY, read by hand because the same header, order and properties must come out again, and in double
-// precision where the file has it (docs/surfaces.md). One file is one part; its faces are dihedral regions.
+// precision where the file has it (docs/reference/surfaces.md). One file is one part; its faces are dihedral regions.
 // Colours and every other single number of a vertex or a face become columns; lists other than the polygons
 // stay in the source's bytes only.
 #include "formats/ply/ply_text.h"

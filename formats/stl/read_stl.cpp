@@ -1,4 +1,4 @@
-// STL, binary and ASCII, read by hand: see docs/surfaces.md for why not by a library. Binary: 80 bytes of
+// STL, binary and ASCII, read by hand: see docs/reference/surfaces.md for why not by a library. Binary: 80 bytes of
 // header, a count, 50 bytes a triangle (normal, three corners, all single precision; two bytes unused).
 // ASCII: words, in any case, in double precision. Normals are not read: the corners' order says the same.
 // Corners of a solid at exactly equal positions become one vertex, in order of first use.

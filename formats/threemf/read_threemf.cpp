@@ -1,6 +1,6 @@
 // 3MF (3MF Consortium, "3D Manufacturing Format, Core Specification", 1.3): XML in a ZIP archive. Read with
 // libzip and pugixml; lib3mf, the format's own library, keeps coordinates in single precision
-// (docs/surfaces.md). Every mesh that the build shows is a part, an object shown twice two parts. Read of the
+// (docs/reference/surfaces.md). Every mesh that the build shows is a part, an object shown twice two parts. Read of the
 // extensions: colour groups (materials), and meshes in other files of the archive (production). An object
 // that uses another extension which its file requires, and one whose matter is not triangles, is refused. A
 // row vector times a 4 x 3 matrix transforms a point.

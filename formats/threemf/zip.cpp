@@ -1,4 +1,4 @@
-// ZIP archives through libzip, which only this file sees. Sizes are checked before they are believed.
+// ZIP archives through libzip, which only this file includes. Sizes are checked before memory is allocated.
 #include "formats/threemf/zip.h"
 
 #include <fmt/format.h>

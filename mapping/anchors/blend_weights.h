@@ -1,5 +1,5 @@
-// The weights that blend what the elements around a point say, on the lattice: distances are counted in
-// spacings along the lattice's axes, so that they do not depend on the unit or on where the part lies.
+// Weights of the elements around a point. Distances are in spacings along the lattice's axes, so the weights
+// do not depend on the unit or on the part's position.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -8,11 +8,11 @@
 
 namespace flexel::mapping {
 
-// How far from the point an element is still heard, in spacings: by `blended` and by `smooth`.
+// Support radius of the weights, in spacings, of `blended` and of `smooth`.
 constexpr double kBlendRadius = 2.0;
 constexpr double kSmoothRadius = 3.2;
-// Connections within which those elements lie in a whole lattice, from every corner of the point's cell. What
-// is farther along connections lies across a gap.
+// In a whole lattice, the elements within that radius are at most this many connections from every corner of
+// the point's cell. Those farther along connections lie across a gap.
 constexpr int kBlendSteps = 2;
 constexpr int kSmoothSteps = 3;
 
@@ -26,9 +26,9 @@ template <class Scalar>
   return square * square * (Scalar(4) * r + Scalar(1));
 }
 
-// How much each anchor counts for a point at `within` (a cell's corners 0 and 1 along each axis): products of
-// 6 t^5 - 15 t^4 + 10 t^3, so that an element that only some corners reach (across the root of a slit) comes
-// in with two continuous derivatives. They sum to 1.
+// The weights of the cell's corners at a point `within` it (0 to 1 along each axis): products of 6 t^5 - 15
+// t^4 + 10 t^3; they sum to 1. They make the influence of an element that only some corners are connected
+// with (past the end of a slit) twice continuously differentiable.
 [[nodiscard]] inline double smooth_step(double t) {
   const double c = t < 0 ? 0 : t > 1 ? 1 : t;
   return c * c * c * (c * (6 * c - 15) + 10);

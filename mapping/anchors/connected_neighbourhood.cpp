@@ -1,5 +1,5 @@
-// Breadth first, from all anchors at once: a byte an element tells which anchors reach it, and a step hands
-// on what the step before has brought.
+// Breadth-first search from all anchors at once: one byte an element holds a bit for each anchor that reached
+// it, and each step propagates the bits that the step before added.
 #include "mapping/anchors/connected_neighbourhood.h"
 
 #include <algorithm>

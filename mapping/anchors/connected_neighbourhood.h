@@ -1,6 +1,5 @@
-// Which elements a vertex may use: those that a short way along connections joins to where it sits.
-// Everything that looks farther than one frame (blended, smooth, the evaluator) asks here, so that nothing
-// reaches across a broken or absent connection or to another part.
+// The elements that may carry a vertex: those within a few connections of its anchor. `blended`, `smooth` and
+// SpaceMap use only these, so no influence crosses a broken or absent connection, or goes to another part.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -16,7 +15,7 @@ struct Reach {
   std::vector<std::uint8_t> from;       // (elements) bit a: from anchor a
 };
 
-// Finds reaches; keeps its room between calls. One for each thread.
+// Finds them; keeps its memory between calls. One for each thread.
 class ReachFinder {
  public:
   // `connections` must outlive this.

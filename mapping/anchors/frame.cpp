@@ -117,7 +117,7 @@ FrameMotion frame_motion(const Frame& frame, const std::vector<Vec3>& rest, cons
   if (frame.kind == FrameKind::rigid) return motion;
   const Mat3 rest_edge = edges(frame, rest), edge = edges(frame, position);
   motion.flags = flags_of(frame.kind, rest_edge, edge);
-  // A collapsed base has no axes to speak of: the vertex then follows the origin.
+  // A collapsed base has no axes: the vertex then follows the origin.
   if (motion.flags & kFrameDegenerate) return motion;
   motion.change =
       base_of(frame.kind, rest_edge, edge, method) - base_of(frame.kind, rest_edge, rest_edge, method);

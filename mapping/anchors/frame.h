@@ -1,4 +1,4 @@
-// Frames: the elements that hold a vertex, and the base that they span.
+// Frames: the elements that carry a vertex, and the base that they span.
 #pragma once
 #include "formats/lattice/body.h"
 #include "mapping/types/result.h"

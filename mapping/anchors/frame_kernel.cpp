@@ -1,4 +1,5 @@
-// Edges are gathered into lanes, a lane a frame; what is left of the last eight takes the last frame again.
+// Edges are gathered into SIMD lanes, one lane a frame; the last eight are filled up with copies of the last
+// frame.
 #include "mapping/anchors/frame_kernel.h"
 
 #include <algorithm>

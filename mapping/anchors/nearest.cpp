@@ -1,8 +1,8 @@
-// Buckets of one spacing (more where the part fills little of its box, so that there are never many more
-// buckets than elements), filled by a counting sort. A query looks into the bucket under the point, clamped
-// into the grid, then into shells of buckets around it, and stops when no bucket farther out can hold
-// anything nearer: for a point outside the box, |q - x|^2 >= |q - p|^2 + |p - x|^2 for every x of the box and
-// p the point of the box nearest to q, so the part of the distance outside counts too.
+// A uniform grid with buckets of one spacing (larger where the part fills little of its box, so that there
+// are not many more buckets than elements), filled by a counting sort. A query searches the bucket of the
+// point, clamped into the grid, then shells of buckets around it, until no bucket farther out can hold a
+// nearer element. For a query q outside the box, with p the nearest point of the box, |q - x|^2 >= |q - p|^2
+// + |p - x|^2 for every x of the box gives the bound.
 #include "mapping/anchors/nearest.h"
 
 #include <algorithm>

@@ -1,4 +1,5 @@
-// A foreign surface knows no cells: seats (mapping/anchors/vertex_anchor.h) then come from the nearest elements.
+// The polygons of another surface name no cells, so its vertices are anchored at their nearest elements
+// (mapping/anchors/vertex_anchor.h).
 #include "mapping/anchors/other_surfaces.h"
 
 #include <fmt/format.h>
@@ -18,7 +19,7 @@ namespace {
 
 constexpr std::size_t kSamples = 500;  // vertices of a part that say where it lies
 
-// (parts of the surface) the body's part that each goes with.
+// (parts of the surface) the part of the body that carries each.
 std::vector<std::uint32_t> partners(const Body& body, const Surface& surface) {
   std::vector<std::uint32_t> partner(surface.parts.size(), 0);
   if (body.parts.size() == 1) return partner;

@@ -1,4 +1,4 @@
-// Mapping what did not come with the body: any other surface in the part's frame, and points.
+// Mapping surfaces and points that did not come with the body (--onto, --points).
 #pragma once
 #include <string>
 #include <vector>
@@ -7,10 +7,9 @@
 
 namespace flexel::mapping {
 
-// Puts the vertices and polygons of `surface` in the place of the body's own. Each of its parts goes with the
-// body's part of the same name or, where there is none, the one whose elements are nearest to its vertices on
-// the whole. The surface itself stays as it is, for writing. Throws InputError: a part of the body without
-// elements.
+// Replaces the body's surface by `surface`. Each of its parts goes with the body's part of the same name or,
+// where there is none, with the one whose elements are nearest to its vertices in the mean. `surface` itself
+// stays, for writing. Throws InputError: a part of the body without elements.
 void map_onto(Body& body, const Surface& surface);
 
 // A table of points, as text: x, y, z by the names in a header line, else the first three columns.

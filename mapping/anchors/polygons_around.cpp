@@ -1,4 +1,4 @@
-// Each goes through all polygons or vertices once; tables are for what was asked for alone.
+// Each function passes once over all polygons or vertices; tables hold only the requested ones.
 #include "mapping/anchors/polygons_around.h"
 
 #include <algorithm>

@@ -1,5 +1,4 @@
-// Which polygons are around a vertex, and which vertices may share a position: for those few whose seat needs
-// it.
+// The polygons around a vertex, and vertices at one position: for the few vertices whose anchor needs them.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -16,13 +15,13 @@ inline constexpr std::size_t kPolygonsAtATime = 1 << 12;  // of a thread
 
 // Polygons around some of the vertices.
 struct Around {
-  std::vector<std::uint32_t> slot;      // (vertices) kNone: not asked for
+  std::vector<std::uint32_t> slot;      // (vertices) kNone: not requested
   std::vector<std::uint32_t> offsets;   // (slots + 1)
   std::vector<std::uint32_t> polygons;  // ascending within a slot
 };
 
-// The polygons around each vertex of `wanted`, and around those that it speaks for: `representative` (empty:
-// every vertex is its own).
+// The polygons around each vertex of `wanted` and around all vertices that it represents: `representative`
+// (empty: every vertex is its own).
 [[nodiscard]] Around polygons_around(const Surface& surface, const std::vector<std::uint32_t>& representative,
                                      const std::vector<std::uint32_t>& wanted);
 

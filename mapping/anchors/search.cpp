@@ -1,7 +1,7 @@
-// Rings of connected elements are added until three of them, with the origin, span space. "Span" is tested
-// first and cheaply: the nearest element, the one most across it, the one most out of their plane. Then the
-// closest good ones are taken in order of distance to the middle of the octant that the vertex lies in: in a
-// whole lattice that gives the three axis neighbours on the vertex's side.
+// Rings of connected elements are added until three of them span space with the origin. A cheap test comes
+// first: the nearest element, the one most across it, the one most out of their plane. Then well-conditioned
+// elements are taken in order of distance to the middle of the vertex's octant, which in a whole lattice
+// gives the three axis neighbours on the vertex's side.
 #include "mapping/anchors/search.h"
 
 #include <Eigen/Geometry>
@@ -18,7 +18,7 @@ struct Candidate {
   Vec3 edge;  // from the origin
 };
 
-// A pair must leave room for a third to reach kWellConditioned.
+// A pair with a smaller sine cannot reach kWellConditioned with any third edge.
 constexpr double kWellApart = 0.3;
 
 bool spans_space(const std::vector<Candidate>& candidates) {

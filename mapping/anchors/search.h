@@ -6,8 +6,8 @@
 
 namespace flexel::mapping {
 
-// How far from the origin a frame reaches, in connections. Farther elements say less of what happens at the
-// vertex than a plane or a line through near ones.
+// The largest distance of a frame's elements from its origin, in connections. A plane or a line through near
+// elements describes the motion at the vertex better than farther ones.
 constexpr int kRings = 3;
 
 // The frame with origin `origin` for a vertex in `octant` of it (bit 0, 1, 2: on the high side along the

@@ -1,12 +1,11 @@
-// Nearly every vertex lies inside the voxel of a cell that its first polygon bounds: that is found first,
-// without a table of the polygons around each vertex. The rest (on the face between two voxels, or of matter
-// too thin for a cell of its own, so that it hangs on a neighbour) looks through the cells of all polygons
-// around it for the nearest, so that the order of the polygons does not matter; what finds no cell at all
-// takes the nearest element of its part.
+// Nearly every vertex lies inside the voxel of a cell that its first polygon bounds. Those are found first,
+// without a table of the polygons around each vertex. Other vertices (on the face between two voxels, or of
+// matter too thin for a cell of its own) take the nearest of the cells of all polygons around them, so that
+// the order of polygons does not matter; without any such cell, the nearest element of their part.
 //
-// Vertices at one position in one part (an OBJ has them along texture seams) have one representative, which
-// alone is seated. Inside a voxel with one cell all of them find that cell, whoever is asked: representatives
-// are looked for only at the positions of the others.
+// Of the vertices at one position in one part (an OBJ has them along texture seams) one representative is
+// located. Inside a voxel with one cell all of them find that cell, so representatives are needed only
+// elsewhere.
 #include "mapping/anchors/vertex_anchor.h"
 
 #include <algorithm>
@@ -52,14 +51,14 @@ std::vector<Voxel> voxels_of_cells(const Body& body) {
 struct Home {
   double squared_distance = kUnreached;  // m^2, 0 inside
   bool on_face = false;                  // inside, but another voxel may hold the point as well
-  VertexAnchor seat;
+  VertexAnchor anchor;
   [[nodiscard]] bool certain() const { return squared_distance == 0 && !on_face; }
 };
 
 // Parts are modelled in round numbers and lattices snapped to them: vertices lie on the faces of voxels and
 // half-way between elements. What is closer than this to such a place, in spacings, counts as on it, so that
 // rounding (another unit, a turned part) decides nothing.
-constexpr double kSeatTie = 1e-9;
+constexpr double kAnchorTie = 1e-9;
 
 // (parts x 3) The middle of each part's elements, in lattice coordinates. Where nothing else decides, what is
 // nearer to it is taken: so the mirrored or turned part decides alike. Only on a part's own plane of symmetry
@@ -83,7 +82,7 @@ std::vector<Vec3> middles(const Body& body) {
 // Whether a point at `at`, `offset` above the place half-way between two elements (spacings), goes with the
 // higher one.
 bool goes_up(double offset, double at, double middle) {
-  if (std::abs(offset) < kSeatTie) return middle >= at - kSeatTie;
+  if (std::abs(offset) < kAnchorTie) return middle >= at - kAnchorTie;
   return offset > 0;
 }
 
@@ -101,7 +100,7 @@ bool is_preferred(const Body& body, std::uint32_t cell, std::uint32_t other, con
     return (Vec3(index[0], index[1], index[2]) + Vec3::Constant(0.5) - middle).squaredNorm();
   };
   const double mine = squared_distance(cell), its = squared_distance(other);
-  return mine < its - kSeatTie || (mine <= its + kSeatTie && cell < other);
+  return mine < its - kAnchorTie || (mine <= its + kAnchorTie && cell < other);
 }
 
 // Compares `cell` with the nearest so far; `u` is a point in lattice coordinates.
@@ -110,12 +109,12 @@ void consider(const Body& body, std::uint32_t cell, const Vec3& u, const Vec3& s
   const Index3& index = body.lattice_index[body.cell_elements[cell][0]];
   const Vec3 within = u - Vec3(index[0], index[1], index[2]);
   const Vec3 clamped = within.cwiseMax(Vec3::Zero()).cwiseMin(Vec3::Ones());
-  const bool inside = (within - clamped).cwiseAbs().maxCoeff() < kSeatTie;
+  const bool inside = (within - clamped).cwiseAbs().maxCoeff() < kAnchorTie;
   const double squared_distance = inside ? 0 : (within - clamped).cwiseProduct(spacing).squaredNorm();
-  const bool nearer = squared_distance < (1 - kSeatTie) * home.squared_distance;
-  if (!nearer && squared_distance > (1 + kSeatTie) * home.squared_distance) return;
-  if (!nearer && !is_preferred(body, cell, home.seat.owner, middle)) return;
-  const bool on_face = inside && within.cwiseMin(Vec3::Ones() - within).minCoeff() < kSeatTie;
+  const bool nearer = squared_distance < (1 - kAnchorTie) * home.squared_distance;
+  if (!nearer && squared_distance > (1 + kAnchorTie) * home.squared_distance) return;
+  if (!nearer && !is_preferred(body, cell, home.anchor.owner, middle)) return;
+  const bool on_face = inside && within.cwiseMin(Vec3::Ones() - within).minCoeff() < kAnchorTie;
   home = {squared_distance, on_face, {cell, true, corner_of(within, u, middle)}};
 }
 
@@ -140,45 +139,45 @@ void look_under(const Body& body, std::size_t p, const Vec3& point, const std::v
 
 // Of the cells around `element`, the nearest element to `point`: the one that the point is in, or nearest to;
 // where there is none, the element itself.
-VertexAnchor seat_near_element(const Body& body, const Buckets<std::uint32_t>& cells_of, std::uint32_t part,
-                               std::uint32_t element, const Vec3& point, const Vec3& middle) {
+VertexAnchor anchor_near_element(const Body& body, const Buckets<std::uint32_t>& cells_of, std::uint32_t part,
+                                 std::uint32_t element, const Vec3& point, const Vec3& middle) {
   const Lattice& lattice = body.parts[part].lattice;
   if (body.parts[part].placement == Placement::corner && !cells_of.begin.empty()) {
     Home home;
     const Vec3 u = lattice.to_lattice(point);
     for (std::uint32_t i = cells_of.begin[element]; i < cells_of.begin[element + 1]; ++i)
       consider(body, cells_of.values[i], u, lattice.spacing, middle, home);
-    if (home.squared_distance < kUnreached) return home.seat;
+    if (home.squared_distance < kUnreached) return home.anchor;
   }
-  return seat_at_element(body, part, element, point, middle);
+  return anchor_at_element(body, part, element, point, middle);
 }
 
-class Seating {
+class AnchorFinder {
  public:
-  explicit Seating(const Body& body) : body_(body), middle_(middles(body)), grids_(body.parts.size()) {
+  explicit AnchorFinder(const Body& body) : body_(body), middle_(middles(body)), grids_(body.parts.size()) {
     const std::size_t n = body.surface.vertices.size();
-    resize_touched(seats_.seat, n);
-    resize_touched(seats_.referenced, n);
+    resize_touched(anchors_.anchor, n);
+    resize_touched(anchors_.referenced, n);
     resize_touched(settled_, n);
   }
 
   VertexAnchors take() {
-    if (!body_.surface_cell_offsets.empty()) seat_inside_voxels();
+    if (!body_.surface_cell_offsets.empty()) anchor_inside_voxels();
     if (std::count(settled_.begin(), settled_.end(), kAlone) != std::ssize(settled_)) {
       first_polygon_ = first_polygons(body_.surface);
-      seat_under_first_polygon();
+      anchor_under_first_polygon();
       find_representatives();
-      seat_remaining();
+      anchor_remaining();
     }
-    parallel_for_each(seats_.seat.size(), [&](std::size_t v) {
-      seats_.referenced[v] = settled_[v] != kUnused;
-      if (!representative_.empty()) seats_.seat[v] = seats_.seat[representative_[v]];
+    parallel_for_each(anchors_.anchor.size(), [&](std::size_t v) {
+      anchors_.referenced[v] = settled_[v] != kUnused;
+      if (!representative_.empty()) anchors_.anchor[v] = anchors_.anchor[representative_[v]];
     });
-    return std::move(seats_);
+    return std::move(anchors_);
   }
 
  private:
-  // What the polygons around a vertex say of its seat.
+  // What is known of a vertex's anchor from the polygons around it.
   enum Settled : std::uint8_t {
     kOpen,
     kAmongPieces,  // a cell that its first polygon bounds holds it
@@ -189,23 +188,23 @@ class Seating {
   // Of the vertices that lie inside a voxel with one cell, clear of its faces: any polygon around them that
   // bounds the cell will do, so polygons are gone through as they come, and threads that meet at a vertex
   // write the same.
-  void seat_inside_voxels() {
+  void anchor_inside_voxels() {
     const std::vector<Voxel> voxels = voxels_of_cells(body_);
     parallel_chunks(body_.surface.polygon_count(), kPolygonsAtATime, [&](std::size_t begin, std::size_t end) {
       for (std::size_t p = begin; p < end; ++p)
         for (const std::uint32_t v : body_.surface.polygon(p)) {
           const std::atomic_ref<Settled> settled(settled_[v]);
           if (settled.load(std::memory_order_relaxed) == kAlone) continue;
-          const std::optional<VertexAnchor> seat = seat_inside(voxels, p, body_.surface.vertices[v]);
-          if (!seat) continue;
-          std::atomic_ref<VertexAnchor>(seats_.seat[v]).store(*seat, std::memory_order_relaxed);
+          const std::optional<VertexAnchor> anchor = anchor_inside(voxels, p, body_.surface.vertices[v]);
+          if (!anchor) continue;
+          std::atomic_ref<VertexAnchor>(anchors_.anchor[v]).store(*anchor, std::memory_order_relaxed);
           settled.store(kAlone, std::memory_order_relaxed);
         }
     });
   }
 
-  [[nodiscard]] std::optional<VertexAnchor> seat_inside(const std::vector<Voxel>& voxels, std::size_t p,
-                                                        const Vec3& point) const {
+  [[nodiscard]] std::optional<VertexAnchor> anchor_inside(const std::vector<Voxel>& voxels, std::size_t p,
+                                                          const Vec3& point) const {
     const std::uint32_t begin = body_.surface_cell_offsets[p], end = body_.surface_cell_offsets[p + 1];
     if (end - begin > kManyCells) return std::nullopt;
     const std::uint32_t part = body_.surface.polygon_part(p);
@@ -213,7 +212,7 @@ class Seating {
     for (std::uint32_t s = begin; s < end; ++s) {
       const Voxel& voxel = voxels[body_.surface_cells[s]];
       const Vec3 within = u - Vec3(voxel.index[0], voxel.index[1], voxel.index[2]);
-      if (within.cwiseMin(Vec3::Ones() - within).minCoeff() < kSeatTie) continue;
+      if (within.cwiseMin(Vec3::Ones() - within).minCoeff() < kAnchorTie) continue;
       if (voxel.shared) return std::nullopt;
       return VertexAnchor{body_.surface_cells[s], true, corner_of(within, u, middle_[part])};
     }
@@ -225,21 +224,20 @@ class Seating {
     return home;
   }
 
-  void seat_under_first_polygon() {
-    parallel_for_each(seats_.seat.size(), [&](std::size_t v) {
+  void anchor_under_first_polygon() {
+    parallel_for_each(anchors_.anchor.size(), [&](std::size_t v) {
       if (settled_[v] == kAlone) return;
       if (first_polygon_[v] == kNone) {
         settled_[v] = kUnused;
         return;
       }
       const Home home = look(static_cast<std::uint32_t>(v), first_polygon_[v], {});
-      seats_.seat[v] = home.seat;
+      anchors_.anchor[v] = home.anchor;
       if (home.certain()) settled_[v] = kAmongPieces;
     });
   }
 
-  // A representative that is unused, or of another part, cannot speak for a vertex; the vertex then speaks
-  // for itself.
+  // A vertex whose representative is unused, or of another part, represents itself.
   void find_representatives() {
     std::vector<std::uint32_t> doubtful;
     for (std::uint32_t v = 0; v < settled_.size(); ++v)
@@ -262,9 +260,9 @@ class Seating {
     });
   }
 
-  void seat_remaining() {
+  void anchor_remaining() {
     std::vector<std::uint32_t> remaining;
-    for (std::uint32_t v = 0; v < seats_.seat.size(); ++v)
+    for (std::uint32_t v = 0; v < anchors_.anchor.size(); ++v)
       if (settled_[v] == kUnused || (settled_[v] == kOpen && representative_[v] == v)) remaining.push_back(v);
     if (remaining.empty()) return;
     const Around around =
@@ -275,7 +273,7 @@ class Seating {
         [&](std::size_t i) {
           const std::uint32_t v = remaining[i];
           const Home home = nearest_under(v, around);
-          seats_.seat[v] = home.squared_distance < kUnreached ? home.seat : seat_nearest(v);
+          anchors_.anchor[v] = home.squared_distance < kUnreached ? home.anchor : anchor_nearest(v);
         },
         256);
   }
@@ -316,11 +314,11 @@ class Seating {
       find_cells_of_elements();
   }
 
-  [[nodiscard]] VertexAnchor seat_nearest(std::uint32_t v) const {
+  [[nodiscard]] VertexAnchor anchor_nearest(std::uint32_t v) const {
     const Vec3& point = body_.surface.vertices[v];
     if (first_polygon_[v] != kNone) {
       const std::uint32_t part = part_of(v);
-      return seat_near_element(body_, cells_of_, part, grids_[part]->nearest(point), point, middle_[part]);
+      return anchor_near_element(body_, cells_of_, part, grids_[part]->nearest(point), point, middle_[part]);
     }
     std::uint32_t best_part = 0, best = kNone;
     for (std::uint32_t part = 0; part < grids_.size(); ++part) {
@@ -331,23 +329,23 @@ class Seating {
       best = element;
       best_part = part;
     }
-    return seat_near_element(body_, cells_of_, best_part, best, point, middle_[best_part]);
+    return anchor_near_element(body_, cells_of_, best_part, best, point, middle_[best_part]);
   }
 
   const Body& body_;
   std::vector<std::uint32_t> first_polygon_;         // (vertices) kNone: unused
-  std::vector<std::uint32_t> representative_;        // (vertices) whose seat each shares; empty: its own
+  std::vector<std::uint32_t> representative_;        // (vertices) whose anchor each shares; empty: its own
   std::vector<Vec3> middle_;                         // (parts x 3) lattice coordinates
   std::vector<std::unique_ptr<ElementGrid>> grids_;  // (parts)
   Buckets<std::uint32_t> cells_of_;                  // (elements) cells around each, where grids are needed
   std::vector<Settled> settled_;                     // (vertices)
-  VertexAnchors seats_;
+  VertexAnchors anchors_;
 };
 
 }  // namespace
 
-VertexAnchor seat_at_element(const Body& body, std::uint32_t part, std::uint32_t element, const Vec3& point,
-                             const Vec3& middle) {
+VertexAnchor anchor_at_element(const Body& body, std::uint32_t part, std::uint32_t element, const Vec3& point,
+                               const Vec3& middle) {
   const Lattice& lattice = body.parts[part].lattice;
   const Vec3 offset =
       (lattice.axes.transpose() * (point - body.rest[element])).cwiseQuotient(lattice.spacing);
@@ -365,7 +363,7 @@ VertexAnchors locate_vertices(const Body& body) {
   for (const Part& part : body.parts)
     if (part.element_begin == part.element_end)
       throw InputError("part \"" + part.name + "\" has no elements: voxelize it with a smaller --size");
-  return Seating(body).take();
+  return AnchorFinder(body).take();
 }
 
 }  // namespace flexel::mapping

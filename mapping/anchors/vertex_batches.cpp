@@ -1,4 +1,4 @@
-// A counting sort of the vertices by cell or element, then the reach of each group that has any.
+// A counting sort of the vertices by cell or element, then the connected neighbourhood of each group.
 #include "mapping/anchors/vertex_batches.h"
 
 #include "base/bucket.h"
@@ -8,9 +8,10 @@ namespace flexel::mapping {
 namespace {
 
 // Cells are numbered before elements.
-std::size_t owner_number(const Body& body, const VertexAnchor& seat) {
-  if (seat.in_cell && !body.broken[seat.owner]) return seat.owner;
-  return body.cell_count() + (seat.in_cell ? body.cell_elements[seat.owner][seat.octant] : seat.owner);
+std::size_t owner_number(const Body& body, const VertexAnchor& anchor) {
+  if (anchor.in_cell && !body.broken[anchor.owner]) return anchor.owner;
+  return body.cell_count() +
+         (anchor.in_cell ? body.cell_elements[anchor.owner][anchor.octant] : anchor.owner);
 }
 
 std::vector<Group> nonempty_groups(const Body& body, const std::vector<std::uint32_t>& begin) {
@@ -85,12 +86,12 @@ void find_reaches(const Body& body, const Adjacency& connections, int steps, dou
 
 }  // namespace
 
-Groups group_vertices(const Body& body, const Adjacency& connections, const std::vector<VertexAnchor>& seats,
-                      int steps, double radius) {
+Groups group_vertices(const Body& body, const Adjacency& connections,
+                      const std::vector<VertexAnchor>& anchors, int steps, double radius) {
   Buckets<std::uint32_t> buckets =
       sort_into_buckets<std::uint32_t>(body.cell_count() + body.element_count(), [&](const auto& use) {
-        for (std::size_t v = 0; v < seats.size(); ++v)
-          use(owner_number(body, seats[v]), static_cast<std::uint32_t>(v));
+        for (std::size_t v = 0; v < anchors.size(); ++v)
+          use(owner_number(body, anchors[v]), static_cast<std::uint32_t>(v));
       });
   Groups groups;
   groups.vertices = std::move(buckets.values);

@@ -1,5 +1,5 @@
-// The vertices by where they sit, each group with the elements that it may use: what `blended` and `smooth`
-// go through block by block, so that an element's data is fetched once for all vertices around it.
+// The vertices grouped by anchor cell, each group with the elements that may carry it. `blended` and `smooth`
+// work through them block by block, so that an element's data is fetched once for all vertices around it.
 #pragma once
 #include "mapping/anchors/connected_neighbourhood.h"
 #include "mapping/anchors/vertex_anchor.h"
@@ -27,15 +27,15 @@ struct Groups {
   std::vector<std::uint32_t> vertices;  // by group, ascending within one
   std::vector<Group> groups;
   std::vector<Block> blocks;
-  std::vector<std::uint32_t>
-      elements;  // by group: what its vertices may use (mapping/anchors/connected_neighbourhood.h)
+  // By group: the elements that may carry its vertices (mapping/anchors/connected_neighbourhood.h)
+  std::vector<std::uint32_t> elements;
   std::vector<std::uint8_t> from;  // (elements) the corners of the cell that reach it; 1 for element groups
 };
 
-// Elements farther than `radius` spacings from the cell are left out, since no vertex in it hears them; those
-// of an element group all stay.
+// Elements farther than `radius` spacings from the cell have no weight at its vertices and are left out;
+// those of an element group all stay.
 [[nodiscard]] Groups group_vertices(const Body& body, const Adjacency& connections,
-                                    const std::vector<VertexAnchor>& seats, int steps, double radius);
+                                    const std::vector<VertexAnchor>& anchors, int steps, double radius);
 
 // Where `point` lies as seen from the group, in spacings: a cell's corners are at 0 and 1.
 [[nodiscard]] inline Vec3 within(const Body& body, const Group& group, const Vec3& point) {
@@ -50,7 +50,7 @@ struct Groups {
   return Vec3(index[0], index[1], index[2]) - Vec3(group.home[0], group.home[1], group.home[2]);
 }
 
-// How much anchor by anchor counts for a point at `within` of the group.
+// The weight of each anchor for a point at `within` of the group (blend_weights.h).
 [[nodiscard]] std::array<double, 8> shares(const Group& group, const Vec3& within);
 
 }  // namespace flexel::mapping

@@ -1,4 +1,4 @@
-// Checks that are asked for by name (--check), with CGAL.
+// The checks of --check, by CGAL.
 #pragma once
 #include "formats/lattice/body.h"
 #include "mapping/types/result.h"

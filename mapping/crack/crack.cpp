@@ -1,6 +1,5 @@
-// Part by part: boxes, cut, walls, pieces. What rounding can spoil (a point on a plane, two points at one
-// place) shows as an odd count or an open edge; the part is then cut again with its boxes shifted a little
-// further.
+// For each part: boxes, cut, walls, pieces. Degenerate positions (a point on a plane, two coincident points)
+// show as an odd count or an open edge; the part is then cut again with its boxes shifted a little further.
 #include "mapping/crack/crack.h"
 
 #include <fmt/format.h>
@@ -147,9 +146,9 @@ CrackedSurface part_surface(const Body& body, const Components& fragments, const
 }
 
 CrackedSurface part_surface(const Body& body, const Components& fragments, const PartedPairs& parted,
-                            const CrackOptions& options, VertexAnchors seats,
+                            const CrackOptions& options, VertexAnchors anchors,
                             std::vector<CrackedSurface::Shift> shifts) {
-  PieceBuilder builder(body, fragments, options, std::move(seats), std::move(shifts));
+  PieceBuilder builder(body, fragments, options, std::move(anchors), std::move(shifts));
   const Triangles triangles = triangulate(body.surface);
   const std::vector<std::uint32_t> welded = weld(body.surface.vertices);
   const Cutting cutting{body, fragments, parted, options, welded};

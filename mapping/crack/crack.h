@@ -1,5 +1,5 @@
 // Mapping across a fracture: the surface is parted along the boundary between the Voronoi cells of the
-// fragments' elements, so that each piece goes with its own elements only (docs/cracks.md).
+// fragments' elements, so that each piece goes with its own elements only (docs/reference/cracks.md).
 #pragma once
 #include <optional>
 
@@ -28,7 +28,7 @@ struct CrackedSurface {
   Surface surface;
   std::vector<std::uint32_t> part_piece;  // (parts of the surface) index into pieces
   std::vector<CrackPiece> pieces;
-  VertexAnchors seats;  // (vertices) each with its own fragment
+  VertexAnchors anchors;  // (vertices) each with its own fragment
   // Where a piece touches itself along an edge or in a point only, its vertices there are one for each side
   // and come out drawn apart by kDrawnApart spacings, or less where triangles are small; at rest they are
   // where they belong.
@@ -45,10 +45,10 @@ constexpr double kDrawnApart = 1e-3;
 // closed or crosses itself.
 [[nodiscard]] CrackedSurface part_surface(const Body& body, const Components& fragments,
                                           const PartedPairs& parted, const CrackOptions& options);
-// The same with seats of the body's vertices that are known, and shifts that some of them have already.
+// The same with known anchors of the body's vertices, and shifts that some of them already have.
 [[nodiscard]] CrackedSurface part_surface(const Body& body, const Components& fragments,
                                           const PartedPairs& parted, const CrackOptions& options,
-                                          VertexAnchors seats,
+                                          VertexAnchors anchors,
                                           std::vector<CrackedSurface::Shift> shifts = {});
 
 // Volumes [m^3] of the pieces that are in the surface, its vertices at `vertices`; 0 of those left out.

@@ -59,7 +59,7 @@ class CrackBoxes {
   enum class Face { whole, fragments, inside, mixed };
   [[nodiscard]] Face face(int axis, const Index3& low) const;
   // The four boxes around a lattice line (along `along`, planes `p`, `q` of the other two axes, ascending; at
-  // box `at` along it), as numbers that are equal where matter hangs together around the line: by
+  // box `at` along it), as numbers that are equal where matter is connected around the line: by
   // [high along the first axis + 2 high along the second]. A box without matter has one of its own. Nothing
   // where one of them is mixed.
   using Sectors = std::array<std::uint8_t, 4>;
@@ -95,8 +95,8 @@ class CrackBoxes {
   std::vector<std::uint32_t> owner_;     // (boxes)
   std::vector<std::uint32_t> fragment_;  // (boxes)
   std::vector<Square> squares_;          // by axis, plane
-  std::array<std::vector<std::uint64_t>, 3>
-      square_keys_;  // by axis: plane, then the next two axes; ascending
+  // By axis: plane, then the next two axes; ascending
+  std::array<std::vector<std::uint64_t>, 3> square_keys_;
 };
 
 }  // namespace flexel::mapping

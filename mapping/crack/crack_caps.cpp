@@ -1,6 +1,6 @@
-// A square's part inside is bounded by the surface's cuts along it and by the stretches of its sides that are
-// inside, which a count of the crossings along the whole line tells. Both come from neighbours that share
-// them, so that walls, like the surface, meet in the same points.
+// The part of a square inside the part is bounded by the surface's cut lines and by those stretches of its
+// sides that are inside, which the parity of crossings along the whole lattice line decides. Neighbours share
+// both, so walls meet each other and the surface in the same points.
 #include "mapping/crack/crack_caps.h"
 
 #include <Eigen/Geometry>

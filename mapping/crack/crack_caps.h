@@ -1,4 +1,4 @@
-// The walls of a crack: what of each square between boxes of two fragments lies inside the part.
+// The walls of a crack: the portion inside the part of each square between boxes of two fragments.
 #pragma once
 #include "mapping/crack/crack_split.h"
 
@@ -47,7 +47,7 @@ class CrackEdges {
   std::unordered_map<std::uint64_t, std::uint32_t> corner_;  // nodes on three planes
 };
 
-// Gives bits and caps in mixed boxes their fragments: what hangs together in a box is of one, and the cells
+// Gives bits and caps in mixed boxes their fragments: what is connected in a box is of one, and the cells
 // under its surface say which. `polygon_of`: (triangles of the mesh).
 void resolve_mixed(const Body& body, const std::vector<std::uint32_t>& polygon_of,
                    const Components& fragments, CrackMesh& mesh, std::vector<CrackCap>& caps);

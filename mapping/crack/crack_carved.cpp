@@ -1,6 +1,6 @@
-// Cells fill voxels, so matter is parted between voxels, not between elements: the cutting sees a body whose
-// elements are the voxels, those that are left and those that went, which are a fragment of their own. An
-// element of that body and the octant of it that a vertex is in are a cell and its corner.
+// Carving removes whole voxels, so the cut runs between voxels, not between elements. The cutting code is
+// given a body whose elements are the voxels, with the carved ones as a fragment. An element of that body and
+// an octant of it stand for a cell and its corner.
 #include "mapping/crack/crack_carved.h"
 
 #include <algorithm>
@@ -126,14 +126,14 @@ CrackedSurface close_carved(const Body& body, const Components& fragments, Crack
   // The part's own vertices sit where they always do, others in the cell whose voxel they bound.
   const VertexAnchors own = locate_vertices(body);
   const std::vector<std::uint32_t> part_of = element_parts(voxels.body);
-  for (std::size_t v = 0; v < cracked.seats.seat.size(); ++v) {
-    VertexAnchor& seat = cracked.seats.seat[v];
-    const std::uint32_t element = seat.owner;
-    if (v < own.seat.size())
-      seat = own.seat[v];
+  for (std::size_t v = 0; v < cracked.anchors.anchor.size(); ++v) {
+    VertexAnchor& anchor = cracked.anchors.anchor[v];
+    const std::uint32_t element = anchor.owner;
+    if (v < own.anchor.size())
+      anchor = own.anchor[v];
     else if (voxels.origin[element] != kNoBox)  // else it goes
-      seat = {voxels.origin[element], body.parts[part_of[element]].placement == Placement::corner,
-              seat.octant};
+      anchor = {voxels.origin[element], body.parts[part_of[element]].placement == Placement::corner,
+                anchor.octant};
   }
   for (CrackPiece& piece : cracked.pieces) piece.debris = voxels.carved[piece.fragment] != 0;
   drop_debris(cracked);

@@ -1,5 +1,5 @@
-// What [[event]] carve took away (docs/events.md), as a piece of the part that is left out: the surface is
-// parted along the voxels that went, so that the part comes out closed.
+// What [[event]] carve took away (docs/reference/events.md), as a piece of the part that is left out: the
+// surface is parted along the voxels that went, so that the part comes out closed.
 #pragma once
 #include "mapping/crack/crack.h"
 
@@ -11,7 +11,7 @@ namespace flexel::mapping {
 [[nodiscard]] Components whole_parts(const Body& body);
 
 // The surface without what lay over carved matter, with walls (`cap`, as part_surface(); faces "crack") where
-// it was. A part that hangs together keeps its name; one that fell apart comes as pieces. `fragments`: of the
+// it was. A connected part keeps its name; one that fell apart comes as pieces. `fragments`: of the
 // body. Throws as part_surface(), and InputError: a note that is no list of voxels.
 [[nodiscard]] CrackedSurface close_carved(const Body& body, const Components& fragments, CrackMode mode);
 

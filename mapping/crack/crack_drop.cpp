@@ -1,5 +1,4 @@
-// Leaves the debris out: its polygons, the faces and parts that are its own, and the vertices that only it
-// used.
+// Removes the debris: its polygons, and the faces, parts and vertices that only it uses.
 #include "base/error.h"
 #include "mapping/crack/crack_pieces.h"
 
@@ -54,7 +53,7 @@ Renumbering keep_parts(CrackedSurface& cracked, Surface& kept) {
 std::vector<std::uint32_t> keep_vertices(const CrackedSurface& cracked, Renumbering& to) {
   const Surface& surface = cracked.surface;
   std::vector<std::uint8_t> stays(surface.vertices.size());
-  for (std::size_t v = 0; v < stays.size(); ++v) stays[v] = cracked.seats.referenced[v] == 0;
+  for (std::size_t v = 0; v < stays.size(); ++v) stays[v] = cracked.anchors.referenced[v] == 0;
   for (std::size_t p = 0; p < surface.polygon_count(); ++p)
     if (to.face[surface.polygon_face[p]] != kNoBox)
       for (const std::uint32_t v : surface.polygon(p)) stays[v] = 1;
@@ -86,11 +85,11 @@ void drop_debris(CrackedSurface& cracked) {
     kept.polygon_offsets.push_back(static_cast<std::uint32_t>(kept.polygon_vertices.size()));
     kept.polygon_face.push_back(to.face[surface.polygon_face[p]]);
   }
-  VertexAnchors seats;
+  VertexAnchors anchors;
   for (const std::uint32_t v : vertices) {
     kept.vertices.push_back(surface.vertices[v]);
-    seats.seat.push_back(cracked.seats.seat[v]);
-    seats.referenced.push_back(cracked.seats.referenced[v]);
+    anchors.anchor.push_back(cracked.anchors.anchor[v]);
+    anchors.referenced.push_back(cracked.anchors.referenced[v]);
   }
   kept.vertex_columns = rows_of(surface.vertex_columns, vertices);
   kept.polygon_columns = rows_of(surface.polygon_columns, polygons);
@@ -99,7 +98,7 @@ void drop_debris(CrackedSurface& cracked) {
   for (const CrackedSurface::Shift& shift : cracked.shifts)
     if (to.vertex[shift.vertex] != kNoBox) shifts.push_back({to.vertex[shift.vertex], shift.by});
   cracked.surface = std::move(kept);
-  cracked.seats = std::move(seats);
+  cracked.anchors = std::move(anchors);
   cracked.shifts = std::move(shifts);
 }
 

@@ -1,4 +1,4 @@
-// Cut triangles as triangles, whole polygons as they were; and whether the result is closed.
+// Collects cut triangles and whole polygons, and checks whether the result is closed.
 #include <Eigen/Geometry>
 #include <algorithm>
 

@@ -1,6 +1,6 @@
-// Boxes that hold elements of several fragments, such as two leaves a third of a spacing apart of which one
-// broke off. All their squares were cut, so each bit of surface and each wall lies in one box: those that
-// share an edge in it bound the same matter. The cells under the surface's bits name the element.
+// Boxes with elements of several fragments, such as two leaves a third of a spacing apart of which one broke
+// off. All their squares were cut, so each facet and each wall lies in one box; those that share an edge
+// inside it bound the same matter. The cells under the facets give the element.
 #include <algorithm>
 #include <map>
 
@@ -42,7 +42,7 @@ class Mixed {
       if (caps[c].fragment == kMixed) add(mesh, {boxes.find(caps[c].box), kNoBox, c}, caps[c].corners);
   }
 
-  // For each item the first of those that it hangs together with.
+  // For each item the first of those that it is connected with.
   [[nodiscard]] std::vector<std::uint32_t> components() {
     const auto key = [](const Side& side) { return std::array{side.box, side.low, side.high}; };
     std::sort(sides_.begin(), sides_.end(), [&](const Side& a, const Side& b) {

@@ -1,5 +1,5 @@
-// Elements that stood side by side and that a fracture parted, although they may still hang together
-// elsewhere: the faces of cracks that end inside a part.
+// Pairs of adjacent elements that a fracture disconnected, although they may still be connected elsewhere:
+// the faces of cracks that end inside a part.
 #pragma once
 #include <cstdint>
 #include <vector>

@@ -1,8 +1,7 @@
-// A vertex of the body's surface stays what it is: it lies in one box, so in one piece. A point on a cut is a
-// vertex in each piece that it bounds. There a piece may touch itself, or have a crack that ends inside it:
-// the polygons around the point are grouped by the edges that they share, as far as they bound the same
-// matter there, and each group gets a vertex of its own. At the end of a crack both its sides are in one
-// group.
+// A vertex of the body's surface lies in one box, so in one piece, and stays one vertex. A point on a cut
+// becomes a vertex of each piece that it bounds. Where a piece touches itself there, or has a crack that ends
+// inside it, the polygons around the point are grouped by the edges that they share, as far as they bound the
+// same matter, and each group gets a vertex. At the end of a crack both sides are in one group.
 #include "mapping/crack/crack_pieces.h"
 
 #include <fmt/format.h>
@@ -17,7 +16,7 @@
 namespace flexel::mapping {
 
 PieceBuilder::PieceBuilder(const Body& body, const Components& fragments, const CrackOptions& options,
-                           VertexAnchors seats, std::vector<CrackedSurface::Shift> shifts)
+                           VertexAnchors anchors, std::vector<CrackedSurface::Shift> shifts)
     : body_(body), fragments_(fragments), options_(options) {
   Surface& surface = result_.surface;
   surface.vertices = body.surface.vertices;
@@ -25,9 +24,9 @@ PieceBuilder::PieceBuilder(const Body& body, const Components& fragments, const 
   surface.sources = body.surface.sources;
   // The file's bytes have other polygons.
   for (SurfaceSource& source : surface.sources) source.bytes.clear();
-  result_.seats = std::move(seats);
+  result_.anchors = std::move(anchors);
   result_.shifts = std::move(shifts);
-  std::fill(result_.seats.referenced.begin(), result_.seats.referenced.end(), std::uint8_t{0});
+  std::fill(result_.anchors.referenced.begin(), result_.anchors.referenced.end(), std::uint8_t{0});
   seen_.assign(surface.vertices.size(), kNoBox);
   part_of_.assign(fragments.list.size(), kNoBox);
   for (std::uint32_t f = 0; f < fragments.list.size(); ++f) {
@@ -66,7 +65,7 @@ void PieceBuilder::add_polygon(std::uint32_t fragment, std::uint32_t source,
   surface.polygon_vertices.insert(surface.polygon_vertices.end(), corners.begin(), corners.end());
   surface.polygon_offsets.push_back(static_cast<std::uint32_t>(surface.polygon_vertices.size()));
   source_polygon_.push_back(source);
-  for (const std::uint32_t v : corners) result_.seats.referenced[v] = 1;
+  for (const std::uint32_t v : corners) result_.anchors.referenced[v] = 1;
 }
 
 void PieceBuilder::add_whole(std::uint32_t part) {
@@ -110,24 +109,25 @@ std::uint32_t PieceBuilder::add_vertex(const CrackMesh& mesh, std::uint32_t node
   Surface& surface = result_.surface;
   surface.vertices.push_back(from.world);
   source_vertex_.push_back({from.from, from.weight});
-  result_.seats.seat.push_back(
-      seat_at_element(body_, fragments_.list[fragments_.of[element]].part, element, from.world));
-  result_.seats.referenced.push_back(0);
+  result_.anchors.anchor.push_back(
+      anchor_at_element(body_, fragments_.list[fragments_.of[element]].part, element, from.world));
+  result_.anchors.referenced.push_back(0);
   return static_cast<std::uint32_t>(surface.vertices.size() - 1);
 }
 
-// A vertex of the body's surface goes with its own seat, unless that is in another fragment or beyond a
+// A vertex of the body's surface keeps its anchor, unless that is in another fragment or beyond a
 // crack: then with the owner of its box.
 void PieceBuilder::place_vertex(const CrackMesh& mesh, const CrackPolygon& polygon, std::uint32_t vertex) {
   if (seen_[vertex] != kNoBox) return;
   seen_[vertex] = polygon.fragment;
-  const VertexAnchor& seat = result_.seats.seat[vertex];
-  const std::uint32_t origin = seat.in_cell ? body_.cell_elements[seat.owner][seat.octant] : seat.owner;
+  const VertexAnchor& anchor = result_.anchors.anchor[vertex];
+  const std::uint32_t origin =
+      anchor.in_cell ? body_.cell_elements[anchor.owner][anchor.octant] : anchor.owner;
   const std::uint32_t element = holder(mesh, polygon, vertex).element;
   if (fragments_.of[origin] == polygon.fragment && !mesh.boxes().parted(origin, element)) return;
   if (element != kNoBox)
-    result_.seats.seat[vertex] = seat_at_element(body_, fragments_.list[polygon.fragment].part, element,
-                                                 body_.surface.vertices[vertex]);
+    result_.anchors.anchor[vertex] = anchor_at_element(body_, fragments_.list[polygon.fragment].part, element,
+                                                       body_.surface.vertices[vertex]);
 }
 
 namespace {

@@ -35,9 +35,9 @@ void drop_debris(CrackedSurface& cracked);
 
 class PieceBuilder {
  public:
-  // `seats`, `shifts`: of the vertices of the body's surface.
+  // `anchors`, `shifts`: of the vertices of the body's surface.
   PieceBuilder(const Body& body, const Components& fragments, const CrackOptions& options,
-               VertexAnchors seats, std::vector<CrackedSurface::Shift> shifts);
+               VertexAnchors anchors, std::vector<CrackedSurface::Shift> shifts);
   // A part that did not break.
   void add_whole(std::uint32_t part);
   void add_pieces(const CrackMesh& mesh, const CrackPolygons& polygons);

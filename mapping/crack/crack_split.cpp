@@ -1,6 +1,6 @@
-// Each triangle is halved at a plane that has a square of the crack in its range, and the halves again, until
-// none is left; a triangle away from the crack is not touched. A half may get points on an edge whose other
-// side is not cut: insert_points() gives them to the other side too.
+// Each triangle is split recursively at the planes that have a square of the crack within its extent;
+// triangles away from the crack stay. A split may put points on an edge whose other triangle is not cut:
+// insert_points() adds them there too.
 #include "mapping/crack/crack_split.h"
 
 #include <Eigen/Geometry>

@@ -1,7 +1,7 @@
 // gram-schmidt and affine: each distinct frame is rebuilt once from the deformed elements; a vertex then
-// moves by a translation and a 3x3 product. Whatever the method, the vertex's frame tells whether the place
-// it sits in has kept its sense. The check of its Voronoi cell compares the distance to the origin with those
-// to the elements connected with it: O(1), and enough unless the body folds onto itself.
+// moves by a translation and a 3x3 product. With every method, the handedness of the vertex's deformed frame
+// shows an inversion. The Voronoi check compares the distance to the origin with those to the elements
+// connected with it: O(1), and sufficient unless the body folds onto itself.
 #include <cmath>
 
 #include "base/bucket.h"

@@ -1,7 +1,6 @@
-// VertexAnchors are turned into frames, one for each distinct seat: a byte a cell (and a byte an element) records
-// which of its eight octants are taken, and a running count numbers them. Then each vertex gets its
-// coordinates in the rest base of its frame, which is all that the paper's transformation (section 6.1.2)
-// needs later.
+// Each distinct anchor gets a frame: a byte for each cell (and element) records which of its eight octants
+// are used, and a prefix sum numbers them. Then each vertex gets its coordinates in the rest base of its
+// frame, which is all that the paper's transformation (section 6.1.2) needs later.
 #include "mapping/methods/bind.h"
 
 #include <Eigen/LU>
@@ -62,10 +61,10 @@ class OctantNumbers {
   std::vector<std::uint32_t> first_;
 };
 
-void make_frames(const Body& body, const std::vector<VertexAnchor>& seats, Binding& binding) {
+void make_frames(const Body& body, const std::vector<VertexAnchor>& anchors, Binding& binding) {
   OctantNumbers in_cells(body.cell_count()), at_elements(body.element_count());
-  parallel_for_each(seats.size(), [&](std::size_t v) {
-    (seats[v].in_cell ? in_cells : at_elements).take(seats[v].owner, seats[v].octant);
+  parallel_for_each(anchors.size(), [&](std::size_t v) {
+    (anchors[v].in_cell ? in_cells : at_elements).take(anchors[v].owner, anchors[v].octant);
   });
   resize_touched(binding.frames, at_elements.number(in_cells.number(0)));
   const std::vector<std::uint32_t> cell_part = cell_parts(body), element_part = element_parts(body);
@@ -81,9 +80,9 @@ void make_frames(const Body& body, const std::vector<VertexAnchor>& seats, Bindi
     binding.frames[number] =
         find_frame(body, binding.connections, body.parts[element_part[element]], element, octant);
   });
-  resize_touched(binding.frame, seats.size());
-  parallel_for_each(seats.size(), [&](std::size_t v) {
-    binding.frame[v] = (seats[v].in_cell ? in_cells : at_elements).of(seats[v].owner, seats[v].octant);
+  resize_touched(binding.frame, anchors.size());
+  parallel_for_each(anchors.size(), [&](std::size_t v) {
+    binding.frame[v] = (anchors[v].in_cell ? in_cells : at_elements).of(anchors[v].owner, anchors[v].octant);
   });
 }
 
@@ -144,17 +143,17 @@ Binding bind(const Body& body, MapMethod method, std::size_t states) {
   return bind(body, method, locate_vertices(body), states);
 }
 
-Binding bind(const Body& body, MapMethod method, VertexAnchors seats, std::size_t states) {
+Binding bind(const Body& body, MapMethod method, VertexAnchors anchors, std::size_t states) {
   Binding binding;
   binding.method = method;
   binding.connections = element_adjacency(body);
-  binding.referenced = std::move(seats.referenced);
-  make_frames(body, seats.seat, binding);
+  binding.referenced = std::move(anchors.referenced);
+  make_frames(body, anchors.anchor, binding);
   take_coordinates(body, binding);
   if (method == MapMethod::blended)
-    binding.blend = make_blend(body, binding.connections, seats.seat, states > 1);
+    binding.blend = make_blend(body, binding.connections, anchors.anchor, states > 1);
   if (method == MapMethod::smooth)
-    binding.groups = group_vertices(body, binding.connections, seats.seat, kSmoothSteps, kSmoothRadius);
+    binding.groups = group_vertices(body, binding.connections, anchors.anchor, kSmoothSteps, kSmoothRadius);
   return binding;
 }
 

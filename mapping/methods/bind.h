@@ -32,8 +32,8 @@ struct Binding {
 //
 // Throws InputError: the body carries no surface, a part has no elements.
 [[nodiscard]] Binding bind(const Body& body, MapMethod method, std::size_t states = 1);
-// The same with seats that are known: those of a surface that is parted along cracks (mapping/crack/crack.h).
-[[nodiscard]] Binding bind(const Body& body, MapMethod method, VertexAnchors seats, std::size_t states = 1);
+// The same with known anchors: those of a surface that was cut along cracks (mapping/crack/crack.h).
+[[nodiscard]] Binding bind(const Body& body, MapMethod method, VertexAnchors anchors, std::size_t states = 1);
 
 // Maps the state `position` (elements x 3, m) onto the vertices: (vertices x 3) m.
 [[nodiscard]] std::vector<Vec3> apply(const Binding& binding, const Body& body,
@@ -45,7 +45,7 @@ struct Binding {
                                               const std::vector<Vec3>& position,
                                               const std::vector<Vec3>& displacement);
 
-// apply() and judge(), and what the binding knows of each vertex.
+// apply() and judge(), and the data of each vertex in the binding.
 [[nodiscard]] MapResult map_state(const Binding& binding, const Body& body);
 // What `options` ask for beyond that: vertices far outside, checks by name. Throws InputError: --far refuse.
 void complete(const Body& body, const MapOptions& options, MapResult& result);

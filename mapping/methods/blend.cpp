@@ -1,8 +1,7 @@
-// A block of vertices shares its elements: their motions are gathered once, twelve numbers each, and a vertex
-// then needs one sum of twelve numbers over the elements it hears, and one of their weights. The first
-// element's motion is evaluated as it is, and only how the others depart from it is summed
-// (mapping/methods/blend_kernel.h): what all elements agree on comes out exactly, although weights are single
-// precision.
+// The vertices of a block share their elements, whose motions (twelve numbers each) are gathered once; a
+// vertex then needs one weighted sum of them and the sum of weights. Only differences from the first
+// element's motion are summed (mapping/methods/blend_kernel.h), so a motion that all elements share is exact
+// although weights are single precision.
 #include "mapping/methods/blend.h"
 
 #include <algorithm>
@@ -20,10 +19,10 @@ using namespace simd;
 
 constexpr std::size_t kBlocksAtATime = 8;
 
-// Elements that a group reaches, as arrays that are gone through sixteen at a time.
+// The elements that may carry a group's vertices, as arrays for loops of sixteen at a time.
 struct Around {
   std::size_t count = 0;
-  std::vector<float> x, y, z;  // in spacings, from the group's home; padded by what is out of reach
+  std::vector<float> x, y, z;  // in spacings, from the group's home; padded by points outside the radius
   std::vector<float> weight;
   std::vector<std::uint8_t> from;
 
@@ -42,7 +41,7 @@ struct Around {
   }
 };
 
-// Elements that not every corner reaches count as far as the corners that do.
+// An element that only some corners are connected with counts by the weights of those corners.
 void apply_shares(const std::array<double, 8>& share, const std::vector<std::uint8_t>& from,
                   ElementsInRadius heard) {
   constexpr std::uint8_t kAll = 0xff;
@@ -87,8 +86,7 @@ void weigh_block(const Body& body, const Groups& groups, const Groups::Block& bl
   }
 }
 
-// Too far away to hear any element: the motion of the anchor nearest to the vertex, which the blend runs
-// into.
+// For a vertex outside the radius of all elements: the motion of the nearest anchor, the limit of the blend.
 Vec3 follow_nearest(const Body& body, const Blend& blend, const Group& group,
                     const std::vector<ElementMotion>& motions, const Vec3& vertex) {
   const std::uint32_t* anchor = blend.groups.elements.data() + group.reach_begin;
@@ -102,10 +100,10 @@ Vec3 follow_nearest(const Body& body, const Blend& blend, const Group& group,
 
 }  // namespace
 
-Blend make_blend(const Body& body, const Adjacency& connections, const std::vector<VertexAnchor>& seats,
+Blend make_blend(const Body& body, const Adjacency& connections, const std::vector<VertexAnchor>& anchors,
                  bool keep_weights) {
   Blend blend;
-  blend.groups = group_vertices(body, connections, seats, kBlendSteps, kBlendRadius);
+  blend.groups = group_vertices(body, connections, anchors, kBlendSteps, kBlendRadius);
   blend.moving = find_moving_elements(body, connections, blend.groups.elements);
   if (!keep_weights) return blend;
   blend.weights.resize(blend.groups.blocks.size());

@@ -8,11 +8,11 @@ namespace flexel::mapping {
 // Weights of the elements that a block of vertices uses, packed vertex after vertex.
 struct BlockWeights {
   std::vector<std::uint32_t> begin;    // (vertices of the block + 1)
-  std::vector<std::uint16_t> element;  // within the reach of the group
+  std::vector<std::uint16_t> element;  // number within the group's elements
   std::vector<float> weight;           // relative to each other; a vertex's last may be 0 (kBlendStep)
 };
 
-// What `blended` knows at rest.
+// The data of `blended` at rest.
 struct Blend {
   Groups groups;
   MovingElements moving;
@@ -21,13 +21,13 @@ struct Blend {
 
 // `keep_weights`: about 150 bytes a vertex, which pays when several states are mapped.
 [[nodiscard]] Blend make_blend(const Body& body, const Adjacency& connections,
-                               const std::vector<VertexAnchor>& seats, bool keep_weights);
+                               const std::vector<VertexAnchor>& anchors, bool keep_weights);
 
 // (vertices x 3) m. The displacement of vertex x is
 //   u(x) = sum_e w_e (d_e + G_e (x - X_e)) / sum_e w_e
-// over the elements e that its group reaches, with their motions d_e, G_e, rest positions X_e, and
-// w_e = wendland(|x - X_e| / R) times the share of the anchors that reach e. A vertex that hears no element
-// follows its origin's frame, which the blend runs into. `motions`: of blend.moving.elements.
+// over the elements e of its group, with their motions d_e, G_e, rest positions X_e, and w_e = wendland(|x -
+// X_e| / R) times the weight of the anchors that are connected with e. A vertex without an element in the
+// radius follows its nearest anchor, the limit of the blend. `motions`: of blend.moving.elements.
 [[nodiscard]] std::vector<Vec3> apply(const Blend& blend, const Body& body,
                                       const std::vector<ElementMotion>& motions);
 

@@ -1,5 +1,4 @@
-// Three numbers of a vector, or column of a matrix, are the first three lanes of four; what the fourth holds
-// is overwritten or never looked at.
+// A vector, or a column of a matrix, is the first three of four lanes; the fourth is overwritten or unused.
 #include "mapping/methods/blend_kernel.h"
 
 #ifdef __x86_64__
@@ -14,7 +13,7 @@ namespace {
 
 using namespace simd;
 
-// The columns of a motion, which has no room behind its last.
+// The columns of a motion. The last is loaded one number earlier, since nothing may be read past it.
 struct MotionColumns {
   FourDoubles displacement{}, gradient[3]{};
 };
@@ -29,7 +28,7 @@ FLEXEL_INLINE void read(const ElementMotion& motion, MotionColumns& columns) {
   columns.gradient[2] = FourDoubles{last[1], last[2], last[3], 0};
 }
 
-// Three numbers and what is to be behind them.
+// Three numbers, then `behind`.
 FLEXEL_INLINE void write(const FourDoubles& from, double behind, double* to) {
   const FourDoubles padded{from[0], from[1], from[2], behind};
   __builtin_memcpy(to, &padded, sizeof padded);
@@ -134,7 +133,7 @@ void collect_in_radius(const float* weight, std::size_t count, ElementsInRadius&
   if (by_sixteen) return list_heard_by_sixteen(weight, count, heard);
 #endif
   std::size_t used = 0;
-  for (std::size_t e = 0; e < count; ++e) {  // every one is written, and overwritten where it is not heard
+  for (std::size_t e = 0; e < count; ++e) {  // every one is written; those of weight 0 are overwritten
     heard.element[used] = static_cast<std::uint16_t>(e);
     heard.weight[used] = weight[e];
     used += weight[e] > 0;

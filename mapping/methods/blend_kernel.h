@@ -1,4 +1,4 @@
-// The arithmetic of `blended`, many numbers at a time.
+// The arithmetic of `blended`, by SIMD.
 #pragma once
 #include <cstdint>
 
@@ -6,9 +6,8 @@
 
 namespace flexel::mapping {
 
-// How far the motion of an element departs from that of its group's first element, seen from that element:
-// displacement, 1 (whose sum is that of the weights), then the gradient by columns, each with a zero behind
-// it.
+// The difference of an element's motion from that of its group's first element, about that element:
+// displacement, then 1 (which sums up the weights), then the gradient by columns, a zero after each.
 struct alignas(64) BlendRow {
   double value[16];
 };
@@ -17,11 +16,11 @@ struct alignas(64) BlendRow {
 void make_blend_rows(const std::uint32_t* elements, std::size_t count, const Vec3* rest,
                      const std::uint32_t* slot_of, const ElementMotion* motions, BlendRow* rows);
 
-// A vertex hears this many elements, or a multiple: with weight 0 what is missing.
+// The list of elements of a vertex is padded to a multiple of this, with weight 0.
 constexpr std::size_t kBlendStep = 4;
 
-// The vertices of a block, and the elements that each hears: those that `element` lists from begin[i] to
-// begin[i + 1].
+// The vertices of a block. Vertex i is carried by the elements element[begin[i]] to element[begin[i + 1] -
+// 1].
 struct BlendedVertices {
   const std::uint32_t* vertex;  // (count)
   std::size_t count, listed;    // `listed`: how many `vertex` goes on to list, which will be next
@@ -42,20 +41,20 @@ void blend(const BlendedVertices& vertices, const BlendRow* rows, const ElementM
 void weigh_elements(const float* x, const float* y, const float* z, std::size_t count, const float* point,
                     float* weight);
 
-// What one vertex hears: elements by their number in the group.
+// The elements within the radius of one vertex, by their number in the group.
 struct ElementsInRadius {
   std::uint16_t* element;
   float* weight;
   std::size_t count;
 };
 
-// Lists the elements whose weight (count, a multiple of 16) is not 0, behind which there must be room for
-// sixteen more.
+// Appends the elements whose weight (count, a multiple of 16) is not 0. `heard` must have space for sixteen
+// more than it will hold.
 void collect_in_radius(const float* weight, std::size_t count, ElementsInRadius& heard);
 
 // The least-squares gradients of `count` elements: element[i]'s from the displacements (x, y, z, 0; m) of
-// what it is connected with. `inverse_moments`, `motion`: (count); see mapping/methods/element_motion.h. Elements
-// with a frame (frame[i] other than kNoSlot) are left out.
+// what it is connected with. `inverse_moments`, `motion`: (count); see mapping/methods/element_motion.h.
+// Elements with a frame (frame[i] other than kNoSlot) are left out.
 void fit_gradients(const std::uint32_t* element, const std::uint32_t* frame, std::size_t count,
                    const Adjacency& connections, const Vec3* rest, const double* displacement,
                    const Mat3* inverse_moments, ElementMotion* motion);

@@ -1,4 +1,5 @@
-// How the matter around an element moves, to first order: what `blended` blends.
+// The motion of the matter around an element, to first order: displacement and its gradient, which `blended`
+// blends.
 #pragma once
 #include "mapping/anchors/frame.h"
 
@@ -10,10 +11,10 @@ struct ElementMotion {
   Mat3 gradient = Mat3::Zero();      // F - I
 };
 
-// Elements whose motion is wanted, and how each is to be found. By least squares over the elements that it is
-// connected with, weighted by 1 / distance^2; where those do not span space (normalised determinant of their
-// moments below that of a quadruple that is taken), by the affine frame of the paper's quadruple, which
-// widens, or falls back to a plane, a line or a rigid frame.
+// The elements whose motion is computed, and how. The gradient is a least-squares fit over the connected
+// elements, weighted by 1 / distance^2. Where those do not span space (normalised determinant of their
+// moments below kWellConditioned), the affine frame of the paper's quadruple is used, with its wider search
+// and its planes, lines and rigid frames.
 struct MovingElements {
   std::vector<std::uint32_t> elements;  // ascending
   std::vector<std::uint32_t> slot_of;   // (elements of the body) index into `elements`; kNoSlot

@@ -121,10 +121,10 @@ MapResult map_surface(const Body& body, const MapOptions& options, Progress& pro
   return map_surface(body, options, locate_vertices(body), progress);
 }
 
-MapResult map_surface(const Body& body, const MapOptions& options, const VertexAnchors& seats,
+MapResult map_surface(const Body& body, const MapOptions& options, const VertexAnchors& anchors,
                       Progress& progress) {
   progress.update(0, "binding vertices");
-  MapResult result = map_state(bind(body, options.method, seats), body);
+  MapResult result = map_state(bind(body, options.method, anchors), body);
   progress.update(0.8, "checking");
   complete(body, options, result);
   progress.update(1);

@@ -55,7 +55,7 @@ struct Octet {
     }
   }
 
-  // Those of `all` that one of the points may hear.
+  // Those of `all` within the radius of the points' bounding box.
   void choose(const std::vector<SmoothNeighbour>& all, std::vector<SmoothNeighbour>& heard) const {
     heard.clear();
     for (const SmoothNeighbour& neighbour : all)
@@ -104,8 +104,7 @@ std::vector<Vec3> apply_smooth(const Groups& groups, const Body& body, const std
       const Groups::Block& block = groups.blocks[b];
       const Group& group = groups.groups[block.group];
       const Vec3& centre = body.rest[groups.elements[group.reach_begin]];
-      // The elements of a cell's frames are all heard by its vertices: what did not move is left exactly at
-      // rest.
+      // All vertices of a cell use the elements of its frames, so what did not move stays exactly at rest.
       const FrameField reference =
           group.in_cell ? fields[frame_of[groups.vertices[block.begin]]] : FrameField{};
       gather(body, groups, group, position, reference, neighbours);

@@ -6,12 +6,11 @@
 
 namespace flexel::mapping {
 
-// (vertices x 3) m. At each vertex the quadratic polynomial that fits the displacements of the elements its
-// group reaches, with weights wendland(|x - X_e| / R), is evaluated at the vertex. What is fitted is what the
-// affine motion of the vertex's own quadruple leaves over: that motion is exact for rigid and affine maps, so
-// the fit cannot spoil them, and keeps its meaning where the elements do not determine a polynomial. A ridge
-// of 1e-6 of the constant term's weight holds the quadratic terms (1e-9 the linear ones), without which the
-// fit blows up where elements are few.
+// (vertices x 3) m. At each vertex, a quadratic polynomial is fitted to the displacements of the elements of
+// its group, with weights wendland(|x - X_e| / R), and evaluated there. The fit is of the residual of the
+// affine motion of the vertex's quadruple: rigid and affine maps are exact, and where the elements do not
+// determine a polynomial that motion remains. Tikhonov regularisation, 1e-6 of the constant term's weight on
+// the quadratic terms and 1e-9 on the linear ones, keeps the fit bounded where elements are few.
 //
 // `frames`, `frame_of`: as bound (mapping/methods/bind.h). `groups`: of kSmoothSteps and kSmoothRadius.
 [[nodiscard]] std::vector<Vec3> apply_smooth(const Groups& groups, const Body& body,

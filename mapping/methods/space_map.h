@@ -1,6 +1,5 @@
-// The deformation as a map of space: phi(x) with its first derivatives at any point in or near the part, as
-// `blended` takes vertices there. Twice continuously differentiable, for fitting curves and surfaces to
-// (STEP).
+// The `blended` deformation as a map of space: phi(x) and its gradient at any point in or near the part.
+// Twice continuously differentiable, as fitting curves and surfaces (STEP) needs.
 #pragma once
 #include <memory>
 #include <optional>
@@ -29,8 +28,8 @@ class SpaceMap {
   class Probe {
    public:
     explicit Probe(const SpaceMap& map) : map_(map), finder_(map.connections_) {}
-    // `x` (m, world frame, at rest) of part `part`. `polygon`: of the surface, near which x lies; it tells
-    // which piece is meant where two walls are nearer to each other than a spacing.
+    // `x` (m, world frame, at rest) of part `part`. `polygon`: of the surface, near x; it selects the wall
+    // where two walls are nearer to each other than a spacing.
     [[nodiscard]] Value at(const Vec3& x, std::uint32_t part, std::optional<std::size_t> polygon = {});
 
    private:

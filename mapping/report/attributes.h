@@ -1,4 +1,4 @@
-// What is known of each vertex, as columns of the surface that is written.
+// Attributes of the mapped vertices, as columns of the surface.
 #pragma once
 #include "formats/lattice/body.h"
 #include "mapping/types/result.h"
@@ -6,7 +6,7 @@
 namespace flexel::mapping {
 
 // (vertices) displacement (3 components, m), stretch, frame_kind, distance_outside (spacings), rest_residual
-// (m), inverted, degenerate, voronoi_cell_left and, where it was checked, voronoi_changed (docs/mapping.md).
+// (m), inverted, degenerate, voronoi_cell_left and, where it was checked, voronoi_changed (docs/reference/mapping.md).
 // `surface`: what was mapped, at rest.
 [[nodiscard]] Columns vertex_attributes(const Surface& surface, const Body& body, const MapResult& result);
 

@@ -1,6 +1,6 @@
-// Points along the edges of a triangle, and inside it, are mapped and compared with the plane of the mapped
-// corners: what slides within the plane does not change the shape. An edge of a box belongs to triangles in
-// two planes, so that it counts whichever way it bows.
+// Points along the edges of a triangle, and inside it, are mapped and their distance from the plane of the
+// mapped corners is taken; sliding within the plane does not change the shape. A sharp edge belongs to
+// triangles in two planes, so bending in either direction is seen.
 #include "mapping/report/chord.h"
 
 #include <Eigen/Geometry>
@@ -17,7 +17,7 @@ namespace {
 
 using Triangle = std::array<std::uint32_t, 3>;
 
-constexpr double kLongEdge = 2;        // spacings: shorter edges are not looked at
+constexpr double kLongEdge = 2;        // spacings: shorter edges are not sampled
 constexpr double kMostOnEdge = 16;     // pairs of pieces, each of two spacings or more
 constexpr double kMostInside = 3;      // thirds of a triangle's sides, each in as many pieces
 constexpr double kNoise = 1e-9;        // of the part's diagonal: rounding

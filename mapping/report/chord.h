@@ -1,4 +1,4 @@
-// How far the deformation lies from the flat triangles that show it.
+// Chord error: the distance of the mapped surface from its flat triangles.
 #pragma once
 #include "formats/lattice/body.h"
 #include "mapping/types/result.h"

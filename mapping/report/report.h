@@ -1,4 +1,4 @@
-// How far a mapping can be trusted, for people and programs.
+// The validity report of a mapping, as text and as JSON.
 #pragma once
 #include <string>
 #include <vector>
@@ -14,7 +14,7 @@ namespace flexel::mapping {
 // For people: first a sentence that says whether the mapping can be used and why, then the figures worth a
 // look.
 [[nodiscard]] std::vector<std::string> report_lines(const MapReport& report);
-// Every key and unit is in docs/mapping.md.
+// Every key and unit is in docs/reference/mapping.md.
 [[nodiscard]] std::string report_json(const MapReport& report, const MapOptions& options);
 // The same as a table of two columns, for reading.
 [[nodiscard]] std::string report_table(const MapReport& report, const MapOptions& options);

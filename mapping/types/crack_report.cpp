@@ -1,4 +1,4 @@
-// Words and JSON for the pieces. Debris may be thousands of pieces: people get its sum.
+// Text and JSON for the pieces. The text sums up debris, which may be thousands of pieces.
 #include "mapping/types/crack_report.h"
 
 #include <fmt/format.h>
@@ -16,7 +16,7 @@ namespace {
 
 const std::vector<std::string> kModes = {"keep", "open", "cap"};  // by CrackMode
 
-constexpr std::size_t kNamed = 4;  // pieces that people are told of one by one
+constexpr std::size_t kNamed = 4;  // pieces with a line each in the text
 
 std::string piece_line(const CrackReport& report) {
   std::vector<const CrackPiece*> pieces;

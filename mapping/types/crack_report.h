@@ -1,4 +1,4 @@
-// What a fracture made of the parts.
+// The pieces that a fracture broke the parts into.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -38,9 +38,9 @@ struct CrackReport {
   [[nodiscard]] double dropped_volume() const;  // m^3 at rest; cap only
 };
 
-// For people; none where nothing broke in two.
+// Text lines; none where nothing broke in two.
 [[nodiscard]] std::vector<std::string> crack_lines(const CrackReport& report);
-// Every key and unit is in docs/cracks.md.
+// Every key and unit is in docs/reference/cracks.md.
 [[nodiscard]] std::string crack_json(const CrackReport& report);
 
 }  // namespace flexel::mapping

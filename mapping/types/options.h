@@ -1,11 +1,11 @@
-// How a deformation is to be mapped.
+// Options of a mapping.
 #pragma once
 #include <cstdint>
 #include <string>
 
 namespace flexel::mapping {
 
-// How the elements around a vertex carry it (docs/mapping.md compares them).
+// How the elements around a vertex carry it (docs/theory/mapping-methods.md compares them).
 enum class MapMethod {
   gram_schmidt,  // the paper's: the orthonormal base of four elements
   affine,        // the edges of the same four elements

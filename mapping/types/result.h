@@ -1,4 +1,4 @@
-// Where the vertices went, and how far that can be trusted.
+// Results of a mapping: displacements of the vertices, and checks of their validity.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -58,7 +58,7 @@ struct ChordError {
   double largest = 0;                // m
   Vec3 at = Vec3::Zero();            // m, where that point is at rest
   double longest_edge = 0;           // m, at rest, of the triangle that it is on
-  double largest_displacement = 0;   // m, of vertices and of the points that were looked at
+  double largest_displacement = 0;   // m, of vertices and of the sampled points
   std::size_t coarse_triangles = 0;  // that miss more than kCoarseShare of it (mapping/report/chord.h)
   [[nodiscard]] double share() const { return largest_displacement > 0 ? largest / largest_displacement : 0; }
 };

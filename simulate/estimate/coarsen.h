@@ -1,4 +1,4 @@
-// The same matter on a coarser lattice: what error bars compare a result with (docs/error-bars.md).
+// The same matter on a coarser lattice: what error bars compare a result with (docs/theory/error-bars.md).
 //
 // Each part's lattice becomes about twice as coarse along each axis. A cell of the finer lattice gives its
 // matter to the coarse voxels that it overlaps; the fill is what they got. What is not connected through the

@@ -1,4 +1,4 @@
-// add: a body from a file joins the scene, where and as fast as the file says. docs/events.md
+// add: a body from a file joins the scene, where and as fast as the file says. docs/reference/events.md
 #pragma once
 #include "simulate/events/event.h"
 

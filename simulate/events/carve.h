@@ -1,5 +1,5 @@
 // carve: matter inside a region is taken away, cells and the elements that no other cell holds.
-// docs/events.md
+// docs/reference/events.md
 #pragma once
 #include "simulate/events/event.h"
 

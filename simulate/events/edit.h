@@ -1,6 +1,6 @@
 // edit: what cells and elements are made of changes, by factors on stiffness (and with it damping, strength
 // and yield stress), on the time of the damping and on mass, and by a traction more or less that their
-// surface sticks with. Velocities stay. docs/events.md
+// surface sticks with. Velocities stay. docs/reference/events.md
 #pragma once
 #include "simulate/events/event.h"
 

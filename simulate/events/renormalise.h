@@ -1,5 +1,5 @@
 // renormalise: the present shape becomes the rest shape, and stress ends (Jansson and Vergeest, section 4.1).
-// The lattice stays; simulate/models/rest_shape.h has what is remembered instead. docs/events.md
+// The lattice stays; simulate/models/rest_shape.h has what is remembered instead. docs/reference/events.md
 #pragma once
 #include "simulate/events/event.h"
 

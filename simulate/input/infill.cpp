@@ -77,7 +77,7 @@ std::string infill_line(const std::string& part, const Material& material) {
                                 : ", no solid walls (--shell \"1 mm\", or shell in the scene, counts them)";
   return fmt::format(
       "\"{}\" is {} with {:.3g} % infill{}: as one even material of {} and {:.0f} kg/m3, an "
-      "estimate, rather too soft (docs/materials.md)",
+      "estimate, rather too soft (docs/reference/materials.md)",
       part, material.name, 100 * material.infill, walls, human_pressure(material.young), material.density);
 }
 

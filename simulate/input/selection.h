@@ -1,4 +1,4 @@
-// Selections: which part of a body a fix, load, move or probe acts on (docs/scene.md, "Selections").
+// Selections: which part of a body a fix, load, move or probe acts on (docs/reference/scene.md, "Selections").
 #pragma once
 #include <cstdint>
 #include <string>

@@ -7,7 +7,7 @@
 // is kept by shrinking s. The trace of b follows from det b = J^2 (plastic flow keeps the volume): Newton on
 // the cubic det(s/mu + x I) = J^2. Then P = tau F^-T.
 //
-// A cell whose rest shape is another than the voxel's (docs/events.md) has Fp with Jp = det Fp other than 1:
+// A cell whose rest shape is another than the voxel's (docs/reference/events.md) has Fp with Jp = det Fp other than 1:
 // J is then over Jp, in everything but F^-T, and energies and stresses are per volume of the rest shape, Jp
 // to one of the voxel.
 //

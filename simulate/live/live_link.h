@@ -1,4 +1,4 @@
-// A run's link to the world outside: poses in, frames out, and real time kept (docs/live.md).
+// A run's link to the world outside: poses in, frames out, and real time kept (docs/guide/live.md).
 //
 // Frames leave at a steady rate by the clock on the wall. Between two of them the run steps on until it has
 // reached the time of the next, and waits for it, or hurries: a run that is behind by more than half of the

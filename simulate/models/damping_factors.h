@@ -1,5 +1,5 @@
 // What edits made of the damping time of cells, and of elements at centre placement: factors, kept in the
-// columns "damping_change" less 1 (docs/events.md).
+// columns "damping_change" less 1 (docs/reference/events.md).
 #pragma once
 #include <vector>
 

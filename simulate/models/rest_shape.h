@@ -1,5 +1,5 @@
 // Rest shapes: a cell or connection that is free of stress at another shape than the lattice's, because it
-// flowed (docs/fracture-plasticity.md) or because its shape was renormalised (docs/events.md; Jansson and
+// flowed (docs/reference/fracture-plasticity.md) or because its shape was renormalised (docs/reference/events.md; Jansson and
 // Vergeest, section 4.1). The body remembers in columns, all 0 where the rest shape is the lattice's:
 //     plastic_flow       (cells x 6) Cp^-1 - I, Cp = Fp^T Fp: xx, yy, zz, xy, yz, zx in the lattice's axes
 //     rest_volume        (cells) Jp - 1, Jp = det Fp

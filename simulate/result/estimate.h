@@ -1,5 +1,5 @@
 // Error bars: how far a result at equilibrium may be off because its cells are not small
-// (docs/error-bars.md).
+// (docs/theory/error-bars.md).
 //
 // The same scene is solved on the body coarsened once and twice (simulate/estimate/coarsen.h). Where the three values
 // of a quantity approach a limit, Richardson's extrapolation with the observed order gives the limit, and the

@@ -12,7 +12,7 @@ struct SimulateOptions {
   int threads = 0;                // 0: every core
   std::string failed_output;      // where the last good state goes when the run fails; "" for nowhere
   std::optional<double> timeout;  // s, after which the run stops
-  // Timed runs: where the books go (CSV), and the frames (.pvd); "" for nowhere. docs/motion.md
+  // Timed runs: where the books go (CSV), and the frames (.pvd); "" for nowhere. docs/reference/motion.md
   std::string history, series;
   bool compress = false;  // the frames
   // Timed runs: where checkpoints go ("" for nowhere), how many seconds of work lie between two, what the
@@ -23,7 +23,7 @@ struct SimulateOptions {
   std::string output;
   std::shared_ptr<const Checkpoint> resume;
   // Timed runs: where frames go at `live_rate` a second in real time, every `live_state`-th with the
-  // positions (0: none); "" for nowhere. docs/live.md
+  // positions (0: none); "" for nowhere. docs/guide/live.md
   std::string live;
   double live_rate = 100;
   int live_state = 1;

@@ -1,4 +1,4 @@
-// A line that leads a tool: the format of poses that come in while a run goes on (docs/live.md).
+// A line that leads a tool: the format of poses that come in while a run goes on (docs/guide/live.md).
 #pragma once
 #include <optional>
 #include <string>

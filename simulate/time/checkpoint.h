@@ -1,5 +1,5 @@
 // Where a timed run stood, to the bit: what is written now and then so that a run that was stopped goes on as
-// if it had not been (docs/motion.md).
+// if it had not been (docs/reference/motion.md).
 //
 // The file: eight bytes "flexelCP", the version, the sizes of the two parts that follow and the content hash
 // of each [u64, little endian]; the values of Checkpoint one after another, numbers as they lie in memory,

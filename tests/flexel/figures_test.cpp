@@ -150,7 +150,7 @@ TEST(FiguresOfStress, UniformTensionIsUniform) {
     const double along = (askew().transpose() * body.rest[e]).x() / kLength;
     if (std::abs(along - 0.5) > 0.25) continue;  // from the ends, where cells are pulled through cut faces
     EXPECT_NEAR(column[e], 1e6, 0.2e6)
-        << along;  // cells that the surface cuts are that good (docs/stress.md)
+        << along;  // cells that the surface cuts are that good (docs/theory/stress.md)
     sum += column[e];
     ++judged;
   }

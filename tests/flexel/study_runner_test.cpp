@@ -98,7 +98,7 @@ TEST_F(StudyRuns, ModelsAreChosen) {
   EXPECT_EQ(paper.size(), 16u * 4 * 4);
   wanted_.model = "";
   const study::RunResult cells = run_configuration(case_, wanted_, options_);
-  // docs/accuracy.md, 4 cells through: springs too stiff by some percent, the paper's model by half.
+  // docs/measurements/accuracy.md, 4 cells through: springs too stiff by some percent, the paper's model by half.
   EXPECT_LT(springs.find("tip")->value, 0.98 * cells.find("tip")->value);
   EXPECT_LT(paper.find("tip")->value, 0.8 * springs.find("tip")->value);
 }

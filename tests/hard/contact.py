@@ -80,7 +80,7 @@ def plates_at_rest(trial, name, cells, count, seconds, shift=0.0):
     trial.figure(f"{name}: drift {significant(drift)} h, jitter {significant(jitter)} h, books {significant(ratio)}")
     require(drift < 1e-3 and jitter < 1e-3, f"drift {significant(drift)} h, jitter {significant(jitter)} h")
     # The stack is shorter by its own weight: m g over area and modulus, summed over the plates below; and pressure begins to grow softly where the
-    # surfaces meet (docs/contact.md), over a hundredth of a cell at each.
+    # surfaces meet (docs/reference/contact.md), over a hundredth of a cell at each.
     weight = 1000 * 9.81 * h / 1e6 * h * sum(count - n - 0.5 for n in range(count))
     top = -path[count - 1, 2, -1]
     require(0.5 * weight < top < 3 * weight + 0.01 * h * count, f"the top plate sank by {significant(top)} m; {significant(weight)} m by the plates' compression alone")

@@ -1,4 +1,4 @@
-"""What a run found, kept in a folder, and docs/hard-cases.md made of it."""
+"""What a run found, kept in a folder, and docs/measurements/hard-cases.md made of it."""
 
 import json
 import pathlib
@@ -102,7 +102,7 @@ def write_document(cases, folder, docs):
         shown = None
         if path.with_suffix(".png").exists():
             shutil.copy(path.with_suffix(".png"), pictures / f"{case.key}.png")
-            shown = f"pictures/hard/{case.key}.png"
+            shown = f"../pictures/hard/{case.key}.png"
         lines.append(_row(case, kept, shown))
         if case is [c for c in cases if c.family == family][-1]:
             lines.append("")
@@ -110,7 +110,7 @@ def write_document(cases, folder, docs):
         lines[0] += f"\nNot run to the end for this page, and not in the table: {', '.join(missing)}.\n"
     lines[0] += f"\n{counts['ok']} cases hold, {counts['KNOWN'] + counts['FAILS']} do not yet.\n"
     text = "\n".join(lines).rstrip() + "\n\n" + (pathlib.Path(__file__).parent / "defects.md").read_text(encoding="utf-8")
-    (docs / "hard-cases.md").write_text(text, encoding="utf-8")
+    (docs / "measurements/hard-cases.md").write_text(text, encoding="utf-8")
     if missing:
         print(f"run.py: these have not been run yet and are not in the table: {', '.join(missing)}", file=sys.stderr)
     return 1 if missing else 0

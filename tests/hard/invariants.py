@@ -149,7 +149,7 @@ def ends_well(outcome, timed=True):
 
 def integrators(trial, world, time, step, label="", energy=1e-3, free=None, units=1e-8, mirror=1e-6, explicit=True):
     """world(view, run): the setup with the text of [run]. Every integrator: symplectic, verlet and implicit must get through with all that
-    battery asks for; explicit Euler, which gains energy by itself (docs/motion.md), must get through or stop as it should. The quick half
+    battery asks for; explicit Euler, which gains energy by itself (docs/reference/motion.md), must get through or stop as it should. The quick half
     has the first and the last of them. step: of the implicit one. Gives the outcomes by method."""
     outcomes = {}
     for method in ("symplectic", "implicit") if trial.quick else ("symplectic", "verlet", "explicit", "implicit"):
@@ -167,7 +167,7 @@ def integrators(trial, world, time, step, label="", energy=1e-3, free=None, unit
                 if free is not None:
                     momentum(outcomes[method], free)
             else:
-                # implicit Euler takes angular momentum from what turns, at the rate omega dt (docs/motion.md)
+                # implicit Euler takes angular momentum from what turns, at the rate omega dt (docs/reference/motion.md)
                 outcomes[method] = battery(trial, lambda view: world(view, run), energy=energy, free=None if method == "implicit" else free,
                                            units=units if units is None or method != "implicit" else max(units, 1e-6), mirror=mirror)
     return outcomes

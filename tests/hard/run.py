@@ -4,7 +4,7 @@
     tests/hard/run.py [--quick] [--keep FOLDER] [CASE...]   CASE: a family, or family.case
     tests/hard/run.py --list [--quick]                      their names
     tests/hard/run.py --known                               what is known not to hold yet
-    tests/hard/run.py --write-docs                          docs/hard-cases.md and its pictures, from what the last whole runs left
+    tests/hard/run.py --write-docs                          docs/measurements/hard-cases.md and its pictures, from what the last whole runs left
 
 What a run of a case in full found, and its picture, goes to build/hard.
 """
@@ -45,7 +45,7 @@ def main():
     parser.add_argument("--list", action="store_true")
     parser.add_argument("--known", action="store_true")
     parser.add_argument("--keep", help="leave every run's files in this folder")
-    parser.add_argument("--write-docs", action="store_true", help="write docs/hard-cases.md from the last runs")
+    parser.add_argument("--write-docs", action="store_true", help="write docs/measurements/hard-cases.md from the last runs")
     options = parser.parse_args()
     cases = chosen(options.case, options.quick)
     if options.list:

@@ -64,7 +64,7 @@ def at_the_bound(trial):
 
 
 @case("stiffness that appears mid-run",
-      holds="cells made 100 times stiffer at half time, a block that meets a floor at half time, both at once: the step follows, books within 1 % (3 % where a floor is met: docs/contact.md), the same in other units",
+      holds="cells made 100 times stiffer at half time, a block that meets a floor at half time, both at once: the step follows, books within 1 % (3 % where a floor is met: docs/reference/contact.md), the same in other units",
       breaks="a step chosen once; a bound that is looked at every hundred steps only")
 def appearing(trial):
     h = 1e-2
@@ -79,7 +79,7 @@ def appearing(trial):
         return Setup({"bar": grid_box((6, 3, 3), h)}, scene + run, h)
 
     for name, edit, floor in (("edit", True, False), ("floor", False, True), ("both", True, True)):
-        # implicit steps refuse contact (docs/contact.md)
+        # implicit steps refuse contact (docs/reference/contact.md)
         outcomes = integrators(trial, lambda view, run: world(view, run, edit, floor), "30 ms", None if floor else "0.2 ms", f"{name}, ", energy=3e-2 if floor else 1e-2,
                                units=1e-6, mirror=1e-5, free=None)
         if "symplectic" in outcomes:

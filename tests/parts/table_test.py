@@ -1,4 +1,4 @@
-"""The command that writes docs/parts.md: every real part ends in a lattice or is refused with one line."""
+"""The command that writes docs/measurements/parts.md: every real part ends in a lattice or is refused with one line."""
 
 import pathlib
 import sys

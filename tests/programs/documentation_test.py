@@ -75,13 +75,20 @@ def test_gripped():
 
 
 def test_docs():
-    pages = [page for page in sorted((SOURCE / "docs").glob("*.md")) if blocks(page)]
+    pages = [page for page in sorted((SOURCE / "docs").rglob("*.md")) if blocks(page)]
     expect(pages, "no page of docs/ has a command that can be run")
     furnish()
     for page in pages:
         write("page.sh", "set -eu -o pipefail\n" + "\n".join(blocks(page)))
         result = shell("bash page.sh", timeout=100)
-        expect(result.code == 0, f"the commands of docs/{page.name} as they stand: {result}")
+        expect(result.code == 0, f"the commands of {page.relative_to(SOURCE)} as they stand: {result}")
+
+
+def test_the_index_has_every_page():
+    docs = SOURCE / "docs"
+    index = (docs / "README.md").read_text(encoding="utf-8")
+    missing = [name for page in sorted(docs.rglob("*.md")) if f"({(name := str(page.relative_to(docs)))})" not in index and name != "README.md"]
+    expect(not missing, f"docs/README.md has no link to {missing}")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Runs that a hand leads and a viewer watches: poses from stdin, frames in real time, whoever leaves when (docs/live.md)."""
+"""Runs that a hand leads and a viewer watches: poses from stdin, frames in real time, whoever leaves when (docs/guide/live.md)."""
 
 import json
 import os

@@ -8,8 +8,8 @@ from harness import SOURCE, expect, expect_error, main, run
 def test_the_page_holds_the_table():
     found = run("flexel", "materials", "--markdown")
     expect(found.code == 0, found)
-    page = (SOURCE / "docs" / "materials.md").read_text(encoding="utf-8")
-    expect(found.out.decode() in page, "docs/materials.md is not what `flexel materials --markdown` prints")
+    page = (SOURCE / "docs/reference/materials.md").read_text(encoding="utf-8")
+    expect(found.out.decode() in page, "docs/reference/materials.md is not what `flexel materials --markdown` prints")
 
 
 def test_json_and_text_hold_the_same():

@@ -89,7 +89,7 @@ def test_hooke_constants_and_threads():
     same = simulate(SCENE.format('hooke = "paper"'), "--threads", "1")["probes"][0]["displacement"][2]
     soft = simulate(SCENE.format('model = "paper"\nhooke = "ganovelli"'))["probes"][0]["displacement"][2]
     expect(paper == same, "the default, with any number of threads")
-    # E l is about 2.4 times as stiff at eight elements (docs/accuracy.md: -64.5 against -15.6 percent).
+    # E l is about 2.4 times as stiff at eight elements (docs/measurements/accuracy.md: -64.5 against -15.6 percent).
     expect(2.0 < soft / paper < 2.8, f"ganovelli {soft}, paper {paper}")
 
 

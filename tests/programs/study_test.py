@@ -76,7 +76,7 @@ def people_seconds(seconds):
 
 
 def recomputed(rows):
-    """The sentences, by their definition in docs/study.md."""
+    """The sentences, by their definition in docs/guide/study.md."""
     known = [p for p in points(rows) if p["sweep"] != "effect" and p["error"] is not None]
     bound = lambda p: p["error"] + p["uncertainty"]
     parts = {}

@@ -23,7 +23,7 @@ def arrays_in(data):
 
 
 STEPS = [(1, 0, 0), (-1, 1, 0), (0, 1, 0), (1, 1, 0), (-1, -1, 1), (0, -1, 1), (1, -1, 1), (-1, 0, 1), (0, 0, 1), (1, 0, 1), (-1, 1, 1),
-         (0, 1, 1), (1, 1, 1)]  # of the bits of `connections` (docs/body-file.md)
+         (0, 1, 1), (1, 1, 1)]  # of the bits of `connections` (docs/reference/body-file.md)
 
 
 def tear(rest, torn, side, move, only=None):

@@ -1,4 +1,4 @@
-"""The quick part of bench/accuracy/verification.py, which writes docs/verification.md."""
+"""The quick part of bench/accuracy/verification.py, which writes docs/measurements/verification.md."""
 
 import os
 import re

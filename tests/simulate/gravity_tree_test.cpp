@@ -66,7 +66,7 @@ double seconds_of(const auto& work) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
 }
 
-// Prints the table of docs/effects-gravity-drag.md.
+// Prints the table of docs/measurements/gravity-tree.md.
 TEST(GravityTree, ErrorAgainstTheSumOverPairs) {
   std::printf("points           opening  rms field  largest    energy     momentum   tree [s]  pairs [s]\n");
   for (const bool of_body : {true, false}) {

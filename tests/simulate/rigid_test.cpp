@@ -91,7 +91,7 @@ TEST(Rigid, CollidesWithASoftBlockAndKeepsTheMomenta) {
   throw_part(scene, "hard", Vec3(0.1, 0, -0.5));
   const TimedCase made = testing::run_timed(std::move(body), scene);
   expect_momenta_kept(made.history, 1e-8);
-  // light bodies, two and three cells thick (docs/contact.md, the books)
+  // light bodies, two and three cells thick (docs/reference/contact.md, the books)
   EXPECT_LT(testing::book(made.result, "worst_residual"), 0.05 * testing::book(made.result, "largest_term"));
   // the soft one has taken up some of it
   const Column& velocity = made.body.element_columns.at("velocity");

@@ -1,5 +1,5 @@
-// Lines along the three axes run through all samples; their crossings are found once, and each sample asks
-// three lines.
+// The crossings of axis-parallel lines through all samples are computed once; each sample looks up three
+// lines.
 #include "voxelize/classify/axis_parity.h"
 
 #include <algorithm>

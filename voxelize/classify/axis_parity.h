@@ -1,4 +1,4 @@
-// Surface that is not closed -> voxels, by sampling.
+// Surface that is not closed -> voxels, by the parity of crossings along the three axes at samples.
 #pragma once
 #include <memory>
 
@@ -8,9 +8,9 @@
 
 namespace flexel::voxelize {
 
-// Along each axis a sample is inside when a line meets the surface an odd
-// number of times before it; an axis whose line meets the surface an odd number of times in all abstains, and
-// two axes that agree win. `mesh` is placed on the lattice.
+// Along each axis a sample is inside when its line crosses the surface an odd number of times before it. An
+// axis whose line has an odd number of crossings in all abstains; the majority of the axes decides. `mesh` is
+// placed on the lattice.
 class AxisVote {
  public:
   AxisVote(const PartMesh& mesh, const Range& range);

@@ -1,7 +1,7 @@
-// Slabs of voxels are independent: each clips the triangles that reach into it, sorts the records by voxel
-// and sweeps every row along x. The sweep carries the winding number at the lattice points of the row, which
-// each record may change; between voxels that the surface passes through, all are full or all empty. See
-// clip.cpp for the fill, pieces.cpp for the pieces.
+// Slabs of voxels are independent: each clips the triangles that intersect it, sorts the records by voxel and
+// sweeps every row along x. The sweep updates the winding number at the row's lattice points from the
+// records; voxels between two that the surface cuts are all full or all empty. clip.cpp computes the fill,
+// pieces.cpp the pieces.
 #include "voxelize/classify/classify.h"
 
 #include <algorithm>

@@ -28,8 +28,8 @@ struct Record {
   std::int32_t i = 0, j = 0;
   std::uint32_t triangle = 0;
   std::uint16_t sides = 0;  // bits of Side: where the clipped polygon is bounded
-  std::uint16_t windings =
-      0;  // change of winding number along seven edges of the voxel, two bits each; see winding_change
+  // Change of winding number along seven edges of the voxel, two bits each; see winding_change
+  std::uint16_t windings = 0;
 };
 
 // The edges of a voxel that form a tree from its lowest corner (i, j, k) to the other seven.

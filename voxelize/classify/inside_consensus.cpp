@@ -1,10 +1,9 @@
-// The vote is taken if the winding numbers confirm it, else the flood if they confirm that, else the vote if
-// the flood confirms it (orientation is unusable then). Where the lattice is so coarse that its samples pass
-// over what the surface bounds, and nobody agrees, they are asked once more on a finer one: what a surface
-// encloses does not depend on the cells that somebody wants. Fill counts samples by their distance to the
-// surface:
-// a sample is a small cube of which a plane at distance d from its centre leaves 1/2 - d on average over
-// directions.
+// The axis parity is used if the winding numbers confirm it, else the flood if they confirm that, else the
+// axis parity if the flood confirms it (the orientation is then unusable). Where no two agree, because the
+// samples of a coarse lattice miss thin matter, the three are compared once more on a finer lattice: what a
+// surface encloses does not depend on the cells that were asked for. The fill counts samples by their
+// distance to the surface: of a sample, a small cube, a plane at distance d from its centre leaves 1/2 - d,
+// averaged over directions.
 #include "voxelize/classify/inside_consensus.h"
 
 #include <algorithm>
@@ -22,7 +21,7 @@ namespace flexel::voxelize {
 namespace {
 
 constexpr std::size_t kJudged = 100000;       // samples judged by all three
-constexpr std::size_t kJudgedVoxels = 15000;  // of a lattice that is fine enough to judge by
+constexpr std::size_t kJudgedVoxels = 15000;  // of a lattice fine enough for the comparison
 constexpr int kFinest = 9;                    // times as fine
 
 struct Counts {

@@ -1,4 +1,4 @@
-// Inside and outside of a surface that could not be closed: three ways to tell, and how far they agree.
+// Inside and outside of a surface that could not be closed: three classifiers, and how far they agree.
 #pragma once
 #include <string>
 
@@ -7,13 +7,13 @@
 
 namespace flexel::voxelize {
 
-// How far three independent classifiers agree, from samples spread over the lattice. V votes of lines along
-// the axes (parity; blind to orientation), D OpenVDB's flood from outside (blind to orientation and to
-// cavities), W winding numbers above 1/2 (need orientation, blind to gaps).
+// How far three independent classifiers agree, at samples spread over the lattice. Vote: parity along the
+// axes (ignores orientation). Flood: OpenVDB's flood from outside (ignores orientation and cavities).
+// Winding: generalised winding number above 1/2 (needs orientation, tolerates gaps).
 struct Agreement {
   double vote = 0, flood = 0, winding = 0;  // volumes, in voxels
-  // Shares of the least of the two volumes: samples judged differently, but for those within 3/4 sample of a
-  // triangle
+  // Samples on which two classifiers differ, but for those within 3/4 sample of a triangle, as a share of the
+  // smaller volume
   double vote_flood = 0, vote_winding = 0, flood_winding = 0;
   double unsure = 0;  // share of the volume where the winding number is over 0.3 from a whole one, 1.5
                       // samples or more from any triangle
@@ -21,17 +21,17 @@ struct Agreement {
 
 struct Sampled {
   Voxels voxels;
-  Agreement agreement;  // on the lattice, or on the finer one that was asked where nobody agreed
+  Agreement agreement;  // on the lattice, or on the finer one where no two agreed on it
   enum class By { vote, flood, nobody } by = By::nobody;  // nobody: no two agree, voxels are empty
 };
 
-// Two agree when their volumes differ by at most kVolumesDiffer and their samples by at most kSamplesDiffer;
-// the winding numbers count as a judge only where they are whole nearly everywhere (`unsure` at most
+// Two classifiers agree when their volumes differ by at most kVolumesDiffer and their samples by at most
+// kSamplesDiffer. Winding numbers count only where they are nearly whole numbers (`unsure` at most
 // kMostUnsure).
 constexpr double kVolumesDiffer = .01, kSamplesDiffer = .02, kMostUnsure = .03;
 
-// `mesh` is placed on the lattice; its orientation is what it is. `unanimous`: all three have to agree (where
-// a large hole is known: what lies behind it is missed by all that look along straight lines).
+// `mesh` is placed on the lattice; its orientation may be wrong. `unanimous`: all three have to agree (needed
+// beside a large hole, where classifiers that follow straight lines err together).
 [[nodiscard]] Sampled classify_sampled(const PartMesh& mesh, bool unanimous);
 
 }  // namespace flexel::voxelize

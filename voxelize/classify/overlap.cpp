@@ -1,6 +1,5 @@
-// Along a line the matter is where the running sum of crossings is above 0. Inside a voxel a line along z
-// starts on its low face, where the winding number comes from the lowest corner: along y on that face, then
-// along x, then up.
+// Along a line, matter is where the running sum of crossings is above 0. Inside a voxel a line along z starts
+// on the low face; the winding number there follows from that at the lowest corner, along x and then y.
 #include "voxelize/classify/overlap.h"
 
 #include <algorithm>

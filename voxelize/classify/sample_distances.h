@@ -1,4 +1,4 @@
-// What OpenVDB does for healing; heal_vdb.cpp alone sees it.
+// Distances of samples from a surface, by OpenVDB; only sample_distances.cpp includes it.
 #pragma once
 #include <memory>
 #include <string>

@@ -1,5 +1,5 @@
-// The matter of one part, voxel by voxel: what the surface is cut into before elements and cells are made of
-// it.
+// The matter of one part, voxel by voxel: the result of classification, from which elements and cells are
+// made.
 #pragma once
 #include <cstdint>
 #include <span>

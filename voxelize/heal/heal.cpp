@@ -1,5 +1,5 @@
-// Each repair is kept only where it makes the surface more closed. What is still open then is left to
-// judge.h.
+// A repair is kept only if it reduces the open edges. What stays open is classified by samples
+// (voxelize/classify/inside_consensus.h).
 #include "voxelize/heal/heal.h"
 
 #include <fmt/format.h>
@@ -170,7 +170,7 @@ std::string why_undecided(const HealedPart& part) {
   return faults;
 }
 
-// What to do about parts that are open, tried for as long as nobody gets impatient.
+// Advice for open parts; a wrap is tried for 10 s in all.
 std::string cure(const std::vector<UndecidedPart>& parts) {
   constexpr std::chrono::seconds kPatience(10);
   const auto begin = std::chrono::steady_clock::now();

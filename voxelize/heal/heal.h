@@ -1,5 +1,5 @@
-// Healing: what is done to a part's surface so that inside can be told from outside. Of the surface that the
-// user gets back only the polygons' orientation changes (outward.h).
+// Healing: repairs of a part's surface that make inside and outside well defined. They apply to a copy; in
+// the surface that the user gets back only the orientation of polygons changes (outward.h).
 #pragma once
 #include "base/error.h"
 #include "voxelize/heal/heal_holes.h"

@@ -1,4 +1,4 @@
-// What CGAL does for healing; heal_cgal.cpp alone sees it.
+// Hole filling and alpha wrapping by CGAL; only heal_cgal.cpp includes it.
 #pragma once
 #include <memory>
 #include <optional>

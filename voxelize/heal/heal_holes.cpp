@@ -1,5 +1,5 @@
-// Loops are walked along edges with one triangle; where the walk meets itself the loop behind it is cut off,
-// so that holes which touch in a vertex come apart.
+// Loops are followed along edges with one triangle. Where the path meets itself a loop is split off, so holes
+// that share a vertex are separate.
 #include "voxelize/heal/heal_holes.h"
 
 #include <Eigen/Geometry>

@@ -23,10 +23,10 @@ struct Hole {
 // area, or several that are under kLargestHole together, and all holes of a shell stay under kAllHoles: a
 // plate whose round hole lost its wall would be plugged, with an error of twice that share of its volume.
 constexpr double kLargestTriangle = .15, kLargestHole = .02, kAllHoles = .2;
-// Several triangles that do not lie in a plane, and along some share of the rim do not go on smoothly (within
-// 45 degrees) where the surface ends, close a hole whose shape is not known: the matter that is missing may
-// reach as far beyond them as the hole is wide. That share x area x width is added up, and such holes are
-// filled while it is at most kUncertain of the volume.
+// The uncertainty of filling a hole. Where the filling is not planar and, along some share of the rim, does
+// not continue the surface smoothly (within 45 degrees), the missing matter may extend beyond it by the width
+// of the hole: an uncertain volume of share x area x width. Holes are filled while the sum of these is at
+// most kUncertain of the part's volume.
 constexpr double kUncertain = .02;
 
 struct FilledHoles {

@@ -1,6 +1,6 @@
-// Vertices are joined through a hash of cells as wide as the tolerance. Fins are found patch by patch: cut at
-// every edge that has not two triangles, the surface falls into patches; leaving a patch out changes the
-// number of triangles at each edge of its rim by one, so the patch is a fin when all its rim is odd before.
+// Vertices are welded through a spatial hash with cells as wide as the tolerance. Fins: cut at all edges
+// without exactly two triangles, the surface falls into patches. Removing a patch lowers the number of
+// triangles at each edge of its rim by one, so a patch is a fin if all these numbers are odd.
 #include "voxelize/heal/heal_mesh.h"
 
 #include <Eigen/Geometry>

@@ -1,4 +1,4 @@
-// Repairs of a part's triangles that need no other library: what is left out, what is joined.
+// Repairs of a part's triangles: removal of duplicates and fins, welding.
 #pragma once
 #include <cstdint>
 #include <vector>

@@ -1,8 +1,7 @@
-// Within a shell, orientation spreads from triangle to triangle across edges that two triangles share, and
-// the shell keeps the way round that most of its area had. Between shells: one that lies in no other shell
-// must enclose positive volume; when all such shells are inside out, the file is, and every shell turns.
+// Within a shell, orientation is propagated across edges that two triangles share; the shell keeps the
+// orientation of most of its area. An outermost shell must enclose a positive volume. If all outermost shells
+// are inside out, the whole file is, and every shell is turned.
 #include "voxelize/heal/orientation.h"
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>

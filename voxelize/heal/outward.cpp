@@ -1,7 +1,7 @@
-// Where healing closed the surface, its triangles face outward and each polygon follows its own. Where the
-// surface stayed open, regions of triangles that agree with each other are turned as rays tell: from a
-// triangle, matter lies on the side on which a ray meets the surface an odd number of times. Around a wrapped
-// part the outside is the side on which the wrap is nearer.
+// Where healing closed the surface, each polygon takes the orientation of its healed triangles. Where the
+// surface stayed open, regions of consistent orientation are turned by ray casting: matter lies on the side
+// of a triangle on which a ray crosses the surface an odd number of times. For a wrapped part, the outside is
+// the side on which the wrap is nearer.
 #include "voxelize/heal/outward.h"
 
 #include <Eigen/Geometry>

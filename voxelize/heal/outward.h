@@ -6,11 +6,11 @@
 
 namespace flexel::voxelize {
 
-// Turns polygons of `surface` so that they face out of the matter: what selections, loads, contact and
-// reports take for outward is then what the lattice was made by. Vertices, and the number and order of
-// polygons, stay; a turned polygon keeps its first corner. parts[p] is surface part p, healed, its mesh in
-// world coordinates; `flipped_facets` of a part whose surface stayed open, or was wrapped, is set. A polygon
-// that healing left out and that repeats no other stays as it was.
+// Turns polygons of `surface` to face out of the matter, so that selections, loads, contact and reports use
+// the orientation that the lattice was made with. Vertices, and number and order of polygons, stay; a turned
+// polygon keeps its first corner. parts[p] is surface part p, healed, its mesh in world coordinates. Sets
+// `flipped_facets` of parts whose surface stayed open or was wrapped. A polygon that healing removed, unless
+// as a duplicate, stays as it was.
 void face_outward(std::vector<HealedPart>& parts, Surface& surface);
 
 }  // namespace flexel::voxelize

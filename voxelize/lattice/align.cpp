@@ -1,7 +1,7 @@
-// The axes come from align_axes.cpp. Along each axis the flat faces orthogonal to it are planes with an area.
-// Between the outermost planes of some size lie n cells: of the n that keep the spacing within 15 % of the
-// one asked for, the one that puts most area on lattice planes is taken, with a slight preference for the
-// spacing asked for.
+// The axes come from align_axes.cpp. Along each axis, the flat faces orthogonal to it are planes with an
+// area, and n cells lie between the outermost large planes. Of the n whose spacing is within 15 % of the
+// requested one, the n that puts most area on lattice planes is chosen, with a slight preference for the
+// requested spacing.
 #include "voxelize/lattice/align.h"
 
 #include <Eigen/Geometry>

@@ -1,5 +1,5 @@
-// Directions of flat faces: triangles' normals, opposite ones alike, are gathered in small cells of the unit
-// sphere's surrounding cube and weighted by area; the largest gatherings grow to all cells within 0.1 degree.
+// Directions of flat faces: a histogram of triangle normals up to sign, weighted by area, over small cells of
+// the cube around the unit sphere; the largest bins are extended to all cells within 0.1 degree.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
-// Kept pieces become cells in their own order, which is that of the body (k, j, i, piece). With elements at
-// the voxels' centres, two of them are connected when their pieces share a lattice point's group, that is
-// when they hang together inside the block of 2, 4 or 8 voxels that they span. A polygon whose matter was
-// dropped hangs on the neighbouring cell with most fill that it meets.
+// Kept pieces become cells in the order of the body (k, j, i, piece). At centre placement two elements are
+// connected when their pieces share a group at a lattice point, that is, when they are joined inside the
+// block of 2, 4 or 8 voxels that they span. A polygon whose matter was dropped is attached to the adjoining
+// neighbour cell of largest fill.
 #include "voxelize/lattice/assemble.h"
 
 #include <algorithm>

@@ -1,8 +1,8 @@
-// Every plane of lattice points is swept on its own, row by row along x, with a cursor in each of the four
-// rows of voxels around the row of points. A point inside the matter, each voxel around it in one piece, has
-// one element: the common case. At any other point the pieces around it (those of up to eight voxels) are
-// joined where they meet, and every group with a kept piece gets an element. Numbers are local to the plane
-// until all planes are done.
+// Every plane of lattice points is swept by itself, row by row along x, with a cursor in each of the four
+// adjacent rows of voxels. In the common case, a point inside matter with one piece in each voxel around it,
+// there is one element. Otherwise the pieces around the point (of up to eight voxels) are joined where they
+// meet, and each group with a kept piece gets an element. Numbers are local to the plane until all planes are
+// done.
 #include "voxelize/lattice/elements.h"
 
 #include <algorithm>

@@ -12,11 +12,11 @@ namespace flexel::voxelize {
 // Pieces with less fill are dropped: they become no cells, but matter still connects through them.
 constexpr double kDroppedFill = 1. / 64;
 
-// An element for every group of pieces around a lattice point that hang together through the faces incident
+// An element for every group of pieces around a lattice point that are connected through the faces incident
 // to that point, at least one of them kept.
 struct LatticeElements {
   std::vector<Index3> index;          // (elements x 3) sorted by (k, j, i, number)
-  std::vector<std::uint16_t> number;  // (elements) tells those of one lattice point apart, from 0
+  std::vector<std::uint16_t> number;  // (elements) distinguishes those of one lattice point, from 0
   std::vector<std::array<std::uint32_t, 8>> of_piece;  // (pieces x 8) element at each corner of the voxel;
                                                        // kNoElement where a dropped piece touches no kept one
 };

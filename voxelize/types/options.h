@@ -1,4 +1,4 @@
-// How a part is to be voxelised.
+// Options of voxelization.
 #pragma once
 #include <optional>
 #include <string>
@@ -8,12 +8,12 @@
 namespace flexel::voxelize {
 
 enum class Align { snap, box, none };
-// What is done to surfaces that are not closed before inside is told from outside; docs/healing.md.
+// What is done to surfaces that are not closed before inside is told from outside; docs/reference/healing.md.
 enum class Heal { none, automatic, wrap };
 struct HealChoice {
   Heal mode = Heal::automatic;
-  std::optional<double> alpha =
-      std::nullopt;  // m, wrap: the widest opening that it spans; default a hundredth of the diagonal
+  // m, wrap: the widest opening that it spans; default a hundredth of the diagonal
+  std::optional<double> alpha = std::nullopt;
 };
 // From "none", "auto", "wrap", "wrap:5 mm"; throws InputError naming --heal.
 [[nodiscard]] HealChoice heal_choice(const std::string& word);
@@ -23,8 +23,8 @@ struct HealChoice {
 
 struct VoxelizeOptions {
   std::optional<double> size;  // spacing h [m]
-  std::optional<std::size_t>
-      count;  // or about this many cells (elements for centre placement) over all parts; default 20,000
+  // Or about this many cells (elements for centre placement) over all parts; default 20,000
+  std::optional<std::size_t> count;
   Placement placement = Placement::corner;
   Align align = Align::snap;
   HealChoice heal;

@@ -1,4 +1,4 @@
-// What was found of a part.
+// The result of voxelizing a part, besides the body.
 #pragma once
 #include <array>
 #include <optional>
@@ -27,7 +27,7 @@ struct Healing {
   std::size_t left_open = 0;                  // open edges afterwards
   bool wrapped = false;
   double wrap_alpha = 0;                                    // m, the widest opening spanned
-  enum class By { surface, vote, flood } by = By::surface;  // what told inside from outside
+  enum class By { surface, vote, flood } by = By::surface;  // the classifier that was used
 };
 
 // What was found for one part.
@@ -38,13 +38,11 @@ struct VoxelizedPart {
   double lattice_volume = 0;  // m^3, sum of fill x cell volume of the cells kept
   double dropped_volume = 0;  // m^3 in cells under fill 1/64
   std::size_t cells = 0, elements = 0, dropped_cells = 0;
-  std::size_t split_voxels = 0;  // voxels that hold more than one piece
-  std::size_t overlapping_voxels =
-      0;  // voxels in which shells interpenetrate; their fill comes from 64 x 64 lines
-  std::size_t undecided_voxels = 0;  // voxels whose pieces could not be told apart
+  std::size_t split_voxels = 0;        // voxels that hold more than one piece
+  std::size_t overlapping_voxels = 0;  // in which shells interpenetrate; fill from 64 x 64 lines
+  std::size_t undecided_voxels = 0;    // voxels whose pieces could not be told apart
   Healing healing;
-  std::size_t disagreements =
-      0;  // voxels where the votes of the three axes differ (surfaces that are not closed)
+  std::size_t disagreements = 0;  // voxels where the parities of the three axes differ (open surfaces)
   Vec3 spacing = Vec3::Zero();
   std::optional<ThinWall> thinnest;  // thinnest wall found
   double fifth_wall = 1e300;         // m: a fifth of the matter lies in thinner walls

@@ -1,4 +1,4 @@
-// Pixels: colour spaces, and lines by the distance of a pixel's centre from them.
+// Colour spaces, and anti-aliased lines by the distance of a pixel's centre.
 #include "flexel/picture/canvas/image.h"
 
 #include <algorithm>

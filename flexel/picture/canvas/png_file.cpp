@@ -1,5 +1,5 @@
-// libpng: 8-bit RGB, the sRGB chunk, rows filtered adaptively. libpng's errors are ours: sizes are checked
-// before.
+// libpng: 8-bit RGB, the sRGB chunk, rows filtered adaptively. An error of libpng is a bug here: sizes are
+// checked before.
 #include <png.h>
 
 #include <algorithm>

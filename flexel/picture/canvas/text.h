@@ -1,4 +1,4 @@
-// Words in the picture. All use of FreeType is in text.cpp; the font (DejaVu Sans) is part of the program.
+// Text in a picture. All use of FreeType is in text.cpp; the font (DejaVu Sans) is part of the program.
 #pragma once
 #include <string>
 

@@ -1,4 +1,4 @@
-// What is written into the picture beside the part.
+// The annotations of a picture: legend, axes, scale bar.
 #pragma once
 #include <string>
 #include <vector>
@@ -18,7 +18,7 @@ struct Legend {
   DisplayUnit unit;
 };
 
-// `size` is that of the text, in pixels to the em; `box` is the room there is.
+// `size`: of the text, in pixels per em; `box`: the space for it.
 void draw_legend(Image& image, const Viewport& box, float size, const Legend& legend);
 // Width that the legend takes, pixels.
 [[nodiscard]] int legend_width(float size, const Legend& legend);

@@ -1,4 +1,4 @@
-// Each candidate is looked at with a few thousand rays.
+// Each candidate is judged by a few thousand rays.
 #include "flexel/picture/render/best_view.h"
 
 #include <Eigen/Geometry>

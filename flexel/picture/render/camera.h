@@ -1,4 +1,4 @@
-// Where the picture is taken from. Orthographic: lengths can be read off anywhere by the scale bar.
+// The camera. Orthographic, so that the scale bar holds everywhere.
 #pragma once
 #include <optional>
 #include <span>

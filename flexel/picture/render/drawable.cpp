@@ -35,7 +35,7 @@ bool is_crease(const Vec3& a, const Vec3& b, bool turned, double noise) {
   return (turned ? -a.dot(b) : a.dot(b)) < std::cos(kCrease) * lengths;
 }
 
-// On coarse round shapes single edges pass the angle of a crease. Creases that hang together stay where one
+// On coarse round shapes single edges pass the angle of a crease. Connected creases stay where one
 // of them is sharp, or an end of the surface, or all of them together are long.
 void drop_stray_creases(const Surface& surface, const MeshTopology& mesh, const std::vector<Vec3>& area,
                         std::vector<std::array<EdgeKind, 3>>& edges) {

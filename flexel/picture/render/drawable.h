@@ -46,7 +46,7 @@ struct Drawable {
   }
 };
 
-// The triangles of a mesh and what hangs together in it, found once for the shape at rest.
+// The triangles of a mesh and their connectivity, found once for the shape at rest.
 struct MeshTopology {
   Triangles triangles;
   std::vector<std::uint32_t> welded;

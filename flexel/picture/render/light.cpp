@@ -1,5 +1,5 @@
-// Every pixel of a 4 x 4 block takes its own sixteenth of one set of directions (the R2 sequence of M.
-// Roberts, 2018), so that a block together has sampled the sky evenly; pixels with the same sixteenth are
+// Interleaved sampling: each pixel of a 4 x 4 block takes a sixteenth of one set of directions (the R2
+// sequence of M. Roberts, 2018), so that a block samples the sky evenly. Pixels with the same sixteenth are
 // traced together, which keeps the rays of a packet nearly parallel.
 #include "flexel/picture/render/light.h"
 

@@ -1,5 +1,5 @@
-// Lines are geometry, not pixels: each edge is cut into pieces of a pixel and a half, each piece asks by a
-// ray whether the camera sees it, and runs of visible pieces are drawn as one line with smooth sides.
+// Each edge is cut into pieces of a pixel and a half, a ray tests whether the camera sees each piece, and
+// runs of visible pieces are drawn as one anti-aliased line.
 #include "flexel/picture/render/lines.h"
 
 #include <Eigen/Geometry>
@@ -62,7 +62,7 @@ std::vector<Edge> candidates(const Drawable& drawn, const Camera& camera) {
   return all;
 }
 
-// The pieces of one edge with the rays that judge them.
+// The pieces of one edge with the rays that test their visibility.
 struct Pieces {
   int count = 0;
   std::vector<Ray> rays, beside;

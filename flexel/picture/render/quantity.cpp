@@ -84,7 +84,7 @@ DisplayUnit display_unit(std::optional<Dimension> dimension, double largest) {
     return {chosen->factor, chosen->name};
   }
   if (!(std::abs(largest) > 0) || (std::abs(largest) >= 1e-2 && std::abs(largest) < 1e5)) return {1, ""};
-  // No unit that we know: powers of a thousand.
+  // An unknown unit: powers of a thousand.
   const int power = 3 * static_cast<int>(std::floor(std::log10(std::abs(largest)) / 3));
   return {std::pow(10.0, power), fmt::format("1e{}", power)};
 }

@@ -1,4 +1,4 @@
-// What a value is and how it is written: units that fit, round numbers.
+// The quantity of an attribute and how it is formatted: suitable units, round numbers.
 #pragma once
 #include <optional>
 #include <string>

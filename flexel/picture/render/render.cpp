@@ -1,5 +1,5 @@
-// One ray through the middle of each pixel; the light that gets there (light.h); the colour. Then pixels that
-// differ from a neighbour are drawn again with sixteen rays, which take their light from the pixels around.
+// One ray through the centre of each pixel, the light there (light.h), the colour. Then pixels that differ
+// from a neighbour are supersampled with sixteen rays, which interpolate the light of the pixels around.
 #include "flexel/picture/render/render.h"
 
 #include <algorithm>
@@ -116,7 +116,7 @@ Colour shade(const Scene& scene, const Surfel& at, const Light& light) {
   const float diffuse = (sky + camera) * (0.12f + 0.88f * light.sky) + 0.62f * cosine * light.lamp;
   const float gloss = squared_again(std::max(0.0f, at.normal.dot(scene.half)), 5) * light.lamp;
   const bool coloured = scene.options.by_value || scene.options.thickness;
-  // Values are read off colours: light tells less there.
+  // Colours encode values: weaker shading keeps them readable.
   return own_colour(scene, at) * (coloured ? 0.3f + 0.7f * diffuse : diffuse) +
          Colour::Constant(coloured ? 0.012f + 0.03f * gloss : 0.07f * gloss);
 }

@@ -1,5 +1,5 @@
-// Embree 3 behind a narrow door: one geometry a scene, rays in packets of sixteen (Embree splits them where
-// the processor has narrower registers). Robust traversal, so that no ray slips between two triangles.
+// Embree 3: one geometry a scene, rays in packets of sixteen (Embree splits them where registers are
+// narrower). Robust traversal, so that no ray passes between two triangles.
 #include "flexel/picture/render/tracer.h"
 
 #include <embree3/rtcore.h>

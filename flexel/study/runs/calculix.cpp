@@ -1,5 +1,5 @@
-// What CalculiX found is read from its .frd (displacements of every node, block "DISP": lines of " -1", the
-// node in 10 characters and three values in 12 each) and its .dat (total forces of the supports).
+// Results of CalculiX are read from its .frd (block "DISP", displacements of every node: lines of " -1", the
+// node in 10 characters and three values of 12 each) and its .dat (total forces of the supports).
 #include "flexel/study/runs/calculix.h"
 
 #include <fmt/format.h>
@@ -77,7 +77,7 @@ std::string ccx_error(const fs::path& log) {
   return found.substr(0, 200);
 }
 
-void take_results(const Json& told, const fs::path& job, RunResult& result) {
+void take_results(const Json& summary, const fs::path& job, RunResult& result) {
   const std::map<long, Vec3> moved = displacements(job.string() + ".frd");
   const bool numbers =
       std::all_of(moved.begin(), moved.end(), [](const auto& m) { return m.second.allFinite(); });
@@ -85,7 +85,7 @@ void take_results(const Json& told, const fs::path& job, RunResult& result) {
     result.failure = "ccx wrote no displacements that can be used";
     return;
   }
-  for (const Json& probe : told["probes"]) {
+  for (const Json& probe : summary["probes"]) {
     Vec3 mean = Vec3::Zero();
     for (std::size_t i = 0; i < probe["nodes"].size(); ++i)
       if (const auto at = moved.find(probe["nodes"][i].get<long>()); at != moved.end())
@@ -96,7 +96,7 @@ void take_results(const Json& told, const fs::path& job, RunResult& result) {
   for (const auto& [node, each] : moved) largest = std::max(largest, each.norm());
   result.quantities.push_back({"largest displacement", "m", largest});
   const std::map<std::string, Vec3> forces = total_forces(job.string() + ".dat");
-  for (const Json& support : told["supports"])
+  for (const Json& support : summary["supports"])
     if (const auto at = forces.find(support["set"]); at != forces.end())
       result.quantities.push_back({"reaction " + support["name"].get<std::string>(), "N", at->second.norm()});
 }
@@ -149,10 +149,10 @@ CalculixLook look_at_calculix(const Case& study, const RunOptions& options) {
     return look;
   }
   std::ifstream in(job.string() + ".json");
-  const Json told = Json::parse(in);
-  look.large_deflection = told["nlgeom"];
-  look.why_deflection = told["why_nlgeom"];
-  look.warnings = told["warnings"].get<std::vector<std::string>>();
+  const Json summary = Json::parse(in);
+  look.large_deflection = summary["nlgeom"];
+  look.why_deflection = summary["why_nlgeom"];
+  look.warnings = summary["warnings"].get<std::vector<std::string>>();
   return look;
 }
 
@@ -188,9 +188,9 @@ RunResult run_calculix(const Case& study, double size, bool large_deflection, in
                                      large_deflection ? "on" : "off", "--threads", std::to_string(threads)})))
     return result;
   std::ifstream in(job.string() + ".json");
-  const Json told = Json::parse(in);
-  result.cells = told["elements"];
-  result.elements = told["nodes"];
+  const Json summary = Json::parse(in);
+  result.cells = summary["elements"];
+  result.elements = summary["nodes"];
   result.spacing = size;
   result.given_up = options.goes_on && !options.goes_on(result.cells);
   if (result.given_up) return result;
@@ -199,7 +199,7 @@ RunResult run_calculix(const Case& study, double size, bool large_deflection, in
   if (ccx.empty())
     result.failure = "the program ccx is not installed";
   else if (run("solve", {ccx, job.string()}))
-    take_results(told, job, result);
+    take_results(summary, job, result);
   return result;
 }
 

@@ -1,5 +1,5 @@
-// What users would pick instead: the same part and scene meshed by gmsh and run by CalculiX, through `flexel
-// export --calculix --mesh tet`. For `flexel study --against calculix`.
+// `flexel study --against calculix`: the same part and scene meshed by gmsh and solved by CalculiX, through
+// `flexel export --calculix --mesh tet`.
 #pragma once
 #include <string>
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace flexel::study {
 
-// What a first, coarse export tells.
+// The result of a first, coarse export.
 struct CalculixLook {
   std::string refused;            // why CalculiX cannot run this scene here; "": it can
   std::string versions;           // "CalculiX 2.20, gmsh 4.8.4"
@@ -17,7 +17,7 @@ struct CalculixLook {
   std::vector<std::string> warnings;  // what is not exactly as in the scene
 };
 
-// Whether the programs are there and the scene has a translation (docs/export.md). Throws Interrupted.
+// Whether the programs are there and the scene has a translation (docs/guide/export.md). Throws Interrupted.
 [[nodiscard]] CalculixLook look_at_calculix(const Case& study, const RunOptions& options);
 
 // Exports, and runs ccx, at tetrahedra (C3D10) with edges up to `size` [m], on `threads`. The result's

@@ -1,10 +1,10 @@
-// One side after the other. A piece of a triangle of the one surface is no farther from the other surface
-// than
-//   - the farthest of its corners from the same point of the same triangle there (distance is convex),
-//   - the farthest of its corners from any one triangle there (the same),
-//   - the middle's distance and the piece's radius (distance changes no faster than the point moves).
-// The distances of corners and middles are what it is at least. The piece that could be farthest is looked at
-// first and cut in two where its bounds are not close enough. Closest points come from CGAL's tree of boxes.
+// One direction after the other. Upper bounds of the distance of a piece of a triangle from the other
+// surface:
+//   - the largest distance of its corners from the same points of the same triangle there (distance is convex),
+//   - the largest distance of its corners from any single triangle there (likewise),
+//   - the distance of its centre plus its radius (distance is 1-Lipschitz).
+// Lower bounds: the distances of corners and centres. The piece with the largest upper bound comes first and
+// is split where its bounds are too far apart. Closest points by CGAL's AABB tree.
 #include "flexel/study/runs/hausdorff.h"
 
 #include <CGAL/AABB_traits.h>

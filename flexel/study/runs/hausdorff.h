@@ -1,4 +1,4 @@
-// How far apart two surfaces are, every point of their triangles counted.
+// The Hausdorff distance of two surfaces, over all points of their triangles.
 #pragma once
 #include <array>
 #include <chrono>
@@ -12,10 +12,10 @@ namespace flexel::study {
 
 // The Hausdorff distance of two surfaces that share their triangles and differ in their vertices:
 //     max( max over p on A of d(p, B), max over q on B of d(q, A) ).
-// Never less than the true one and at most kHausdorffMargin above it, but for surfaces that would need more
-// than 100,000 pieces a side, or more time than until `deadline`, which are told the bound that those gave.
-// Branch and bound over pieces of triangles (Tang, Lee, Kim 2009, "Interactive Hausdorff distance computation
-// for general polygonal models", ACM Trans. Graph. 28). a, b: (vertices) m; triangles: indices into both. 0
+// Never less than the true value, and at most kHausdorffMargin above it unless more than 100,000 pieces a
+// side, or more time than until `deadline`, were needed; the result is then the upper bound reached. Branch
+// and bound over pieces of triangles (Tang, Lee, Kim 2009, "Interactive Hausdorff distance computation for
+// general polygonal models", ACM Trans. Graph. 28). a, b: (vertices) m; triangles: indices into both. 0
 // without triangles.
 inline constexpr double kHausdorffMargin = 0.05;
 [[nodiscard]] double hausdorff_distance(

@@ -1,5 +1,5 @@
-// Reading is by hand: the file is ours, numbers and commas below one line of names. The lag is found by a
-// scan and then by a parabola through the best three shifts.
+// The file is Flexel's own: one line of names, then numbers and commas. The lag is found by a scan of shifts,
+// then by a parabola through the best three.
 #include "flexel/study/runs/history_csv.h"
 
 #include <algorithm>
@@ -78,7 +78,7 @@ std::optional<double> lag(const std::vector<double>& time, const std::vector<dou
   if (!(*most > *least)) return std::nullopt;
   const double end = std::min(time.back(), reference_time.back());
   const double reach = end / 4, step = reach / kShifts;
-  // Only what both know at every shift: the middle half of the run.
+  // Only times that both motions have at every shift: the middle half of the run.
   const auto difference = [&](int shift) {
     double sum = 0;
     for (int i = 0; i <= 2 * kShifts; ++i) {

@@ -1,4 +1,4 @@
-// The books of a timed run (flexel-simulate --history), read back, and how far one motion lags another.
+// Reads the energy history of a timed run (flexel-simulate --history); the time lag between two motions.
 #pragma once
 #include <optional>
 #include <string>

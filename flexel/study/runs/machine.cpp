@@ -1,4 +1,4 @@
-// What the times of a study were measured on.
+// Describes the machine that a study's times were measured on.
 #include <fmt/format.h>
 #include <sys/utsname.h>
 #include <unistd.h>

@@ -1,5 +1,5 @@
-// The three programs in order; then their summaries and the lines of their logs ("flexel-map: write: 0.012
-// s") become figures.
+// Runs the three programs in order, then reads their summaries and the stage times in their logs
+// ("flexel-map: write: 0.012 s").
 #include "flexel/study/runs/runner.h"
 
 #include <fmt/format.h>
@@ -93,9 +93,9 @@ class Run {
     result_.memory = std::max(result_.memory, child.memory);
     result_.program_memory.at(programs_++) = child.memory;
     log_ = read_log(file("log"));
-    double told = 0;
-    for (const auto& [stage, seconds] : log_.stages) told += seconds;
-    add("start", child.wall - told);
+    double in_stages = 0;
+    for (const auto& [stage, seconds] : log_.stages) in_stages += seconds;
+    add("start", child.wall - in_stages);
     if (child.exit_code == 0) return true;
     result_.exit_code = child.exit_code;
     result_.out_of_time = child.out_of_time;

@@ -1,6 +1,6 @@
-// Runs one configuration of a part and a scene the way a user does: flexel-voxelize, flexel-simulate and
-// flexel-map, one after the other, as child processes. What each took (wall and processor time, peak memory)
-// comes from the kernel (wait4), what it found from the summaries that it wrote.
+// Runs one configuration of a part and a scene: flexel-voxelize, flexel-simulate and flexel-map, one after
+// the other, as child processes. Wall time, processor time and peak memory come from the kernel (wait4),
+// results from the programs' summaries.
 #pragma once
 #include <array>
 #include <filesystem>
@@ -84,7 +84,7 @@ struct RunResult {
   std::size_t steps = 0;               // timed runs
   double step = 0;                     // s
   double simulate_seconds = 0;         // s, without reading and writing
-  std::optional<double> energy_drift;  // timed runs: worst residual of the books over their largest term
+  std::optional<double> energy_drift;  // timed runs: residual of the energy balance over its largest term
 
   [[nodiscard]] bool ok() const { return failure.empty() && !given_up; }
   [[nodiscard]] const Quantity* find(const std::string& name) const;
@@ -97,7 +97,7 @@ struct RunResult {
 struct RunOptions {
   std::filesystem::path folder;   // for temporary files; those are gone when the run has ended
   std::filesystem::path surface;  // where the mapped surface is kept (.ply); "": nowhere
-  std::filesystem::path history;  // timed runs: where the books are kept (.csv); "": nowhere
+  std::filesystem::path history;  // timed runs: file of the energy history (.csv); "": none
   Deadline deadline = kNever;
   // Asked when the lattice is made (of CalculiX the mesh): whether so many cells are to be solved (elements
   // where there are none, tetrahedra). The run ends there otherwise, `given_up`. Empty: they are.

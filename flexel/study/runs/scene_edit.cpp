@@ -31,7 +31,7 @@ std::string text_at(const toml::table& table, const char* key) {
   return table[key].value_or(std::string());
 }
 
-// "load 2 (bracket/2)": what tells one of several apart.
+// "load 2 (bracket/2)": identifies one of several.
 std::string entry_name(const std::string& key, const toml::array& entries, std::size_t index) {
   if (entries.size() == 1) return key;
   std::string name = fmt::format("{} {}", key, index + 1);

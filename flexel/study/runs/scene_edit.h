@@ -1,5 +1,4 @@
-// Scenes with something changed, as text that flexel-simulate reads: another model, solver or step, or one
-// effect left out.
+// Variants of a scene as TOML for flexel-simulate: another model, solver or step, or one effect left out.
 #pragma once
 #include <string>
 #include <vector>
@@ -29,7 +28,7 @@ struct SceneFacts {
 // What the scene is about. `name` is its file's name for messages. Throws InputError.
 [[nodiscard]] SceneFacts scene_facts(const std::string& text, const std::string& name);
 
-// The scene as `configuration` wants it. Files that it names stay those that are meant: paths that are
+// The scene changed as `configuration` says. Files that it names stay those that are meant: paths that are
 // relative become relative to `folder`, the scene's own. `parts` are the names of the body's parts. Throws
 // InputError: no such effect.
 [[nodiscard]] std::string edited_scene(const std::string& text, const std::string& name,

@@ -1,7 +1,6 @@
-// Mapped surfaces against the finest one. All are the part's own mesh, moved: vertex i is the same material
-// point in each.
+// Distances of mapped surfaces from the finest one. All are the part's mesh, deformed: vertex i is the same
+// material point in each.
 #include "flexel/study/runs/surfaces.h"
-
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
