@@ -271,7 +271,7 @@ int info_command(int argc, char** argv) {
   app.add_option("part", files, "STEP, IGES, BREP, STL, OBJ, PLY, OFF, glTF or 3MF files; -: stdin")
       ->required()
       ->type_name("PART");
-  app.add_flag("--json", json, "As JSON, in SI units (docs/info.md)");
+  app.add_flag("--json", json, "As JSON, in SI units (docs/guide/info.md)");
   app.add_option("--unit", unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
   app.add_option("--edge", edge, "Split the mesh to this longest edge (default: not split)")
       ->type_name("LENGTH");

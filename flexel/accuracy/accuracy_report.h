@@ -42,7 +42,7 @@ struct AccuracyReport {
   [[nodiscard]] bool met() const;
   // One sentence for people.
   [[nodiscard]] std::string sentence() const;
-  [[nodiscard]] std::string json() const;  // docs/summary.md, "accuracy"
+  [[nodiscard]] std::string json() const;  // docs/reference/summary.md, "accuracy"
 };
 
 }  // namespace flexel::commands

@@ -7,7 +7,7 @@
 
 namespace flexel::study {
 
-// study.csv (docs/study.md gives its columns): one line of names, one line a row. `quantities` are the names
+// study.csv (docs/guide/study.md gives its columns): one line of names, one line a row. `quantities` are the names
 // of the last columns.
 [[nodiscard]] std::string csv_header(const std::vector<Quantity>& quantities);
 [[nodiscard]] std::string csv_line(std::size_t number, const Row& row,
