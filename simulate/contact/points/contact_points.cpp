@@ -1,11 +1,12 @@
 // Patches: surface_points() sorted by cell and half cell, gathered greedily by their normals.
-#include "simulate/contact/contact_points.h"
+#include "simulate/contact/points/contact_points.h"
 
 #include <algorithm>
 #include <cmath>
 #include <tuple>
 
-#include "simulate/contact/broad_phase.h"
+#include "simulate/contact/points/broad_phase.h"
+#include "simulate/contact/points/edge_points.h"
 #include "simulate/matter/surface_points.h"
 
 namespace flexel::simulate {

@@ -28,12 +28,16 @@ struct ContactPoint {
   double facing_fully = 0.87;  //   and counts fully from this one on
 };
 
-// Of all `parts` that are set (parts). Order: by part, faces before edges.
+// A contact point as one side of a pair, in a state.
+struct ContactSide {
+  Vec3 position = Vec3::Zero();  // m
+  Vec3 normal = Vec3::Zero();    // unit; of a ball 0
+  double own_plane = 0;          // 1: a face, whose plane gives the direction of contact; else 0
+  double radius = 0;             // m, of a ball; else 0
+};
+
+// Points of the `parts` (parts) that are 1, by part, faces before edges before balls.
 [[nodiscard]] std::vector<ContactPoint> contact_points(const Problem& problem,
                                                        const std::vector<std::uint8_t>& parts);
-
-// Those of sharp edges of corner-placed parts (contact_edges.cpp).
-[[nodiscard]] std::vector<ContactPoint> edge_points(const Problem& problem,
-                                                    const std::vector<std::uint8_t>& parts);
 
 }  // namespace flexel::simulate

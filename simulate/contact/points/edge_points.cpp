@@ -1,13 +1,11 @@
-// Sharp convex edges: a face's patches begin a quarter of a cell from its rim, so a body that stands on an
-// edge or a corner needs points there. They have no plane of their own (contact is along the normal of what
-// they touch), only a cone of directions in which they are the body's outermost matter.
+// Corners first, then points along the edges; one that another is too near to is left out.
+#include "simulate/contact/points/edge_points.h"
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <tuple>
-
-#include "simulate/contact/contact_points.h"
 
 namespace flexel::simulate {
 namespace {
@@ -134,7 +132,7 @@ class Sampler {
     points_.push_back(made);
   }
 
-  // Remembers where points are, in cubes of a spacing.
+  // Whether another point is near; else the place is entered, in cubes of a spacing.
   bool crowded(std::uint32_t part, const Vec3& position, double width) {
     std::array<std::int64_t, 4> cube{part, 0, 0, 0};
     for (int axis = 0; axis < 3; ++axis)

@@ -1,5 +1,5 @@
 // A radix sort by the keys of the cubes, least digits first, which keeps the order of equal ones.
-#include "simulate/contact/broad_phase.h"
+#include "simulate/contact/points/broad_phase.h"
 
 #include <bit>
 #include <cmath>
