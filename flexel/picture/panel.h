@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "flexel/picture/attribute.h"
-#include "flexel/picture/picture.h"
+#include "flexel/picture/picture_options.h"
 #include "flexel/picture/render/best_view.h"
 #include "flexel/picture/render/drawable.h"
 #include "flexel/picture/render/render.h"

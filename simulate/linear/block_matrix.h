@@ -1,6 +1,7 @@
 // Sparse symmetric matrix of 3x3 blocks, compressed rows: the tangent stiffness over the elements.
 #pragma once
 #include <cstdint>
+#include <stdexcept>
 #include <vector>
 
 #include "base/math/vec.h"
@@ -16,8 +17,10 @@ struct BlockMatrix {
   [[nodiscard]] std::size_t rows() const { return row_offsets.empty() ? 0 : row_offsets.size() - 1; }
 };
 
-// y = A x, rows in parallel; the same bits for any thread count. x and y: (rows x 3).
-void multiply(const BlockMatrix& matrix, const std::vector<Vec3>& x, std::vector<Vec3>& y);
+// What position_of() throws where there is no block: our own fault, unless it is asked for (Mechanics).
+struct MissingBlock : std::logic_error {
+  using std::logic_error::logic_error;
+};
 
 // Position in `columns` of the block of `row` and `column`, which must be there, and of the diagonal one.
 [[nodiscard]] std::size_t position_of(const BlockMatrix& matrix, std::size_t row, std::uint32_t column);

@@ -3,17 +3,11 @@
 #pragma once
 #include <cstdint>
 #include <span>
-#include <stdexcept>
 #include <vector>
 
 #include "simulate/linear/block_matrix.h"
 
 namespace flexel::simulate {
-
-// What position_of() throws where there is no block: our own fault, unless it is asked for (Mechanics).
-struct MissingBlock : std::logic_error {
-  using std::logic_error::logic_error;
-};
 
 class LinearOperator {
  public:
@@ -34,7 +28,9 @@ class LinearOperator {
   [[nodiscard]] virtual std::vector<Block> diagonal() const = 0;
 };
 
+// y = A x, rows in parallel; the same bits for any thread count. x and y: (rows x 3).
 void multiply(const LinearOperator& matrix, const std::vector<Vec3>& x, std::vector<Vec3>& y);
+void multiply(const BlockMatrix& matrix, const std::vector<Vec3>& x, std::vector<Vec3>& y);
 
 // A matrix that is stored elsewhere.
 class StoredMatrix final : public LinearOperator {

@@ -1,9 +1,10 @@
 // Variants of a scene as TOML for flexel-simulate: another model, solver or step, or one effect left out.
 #pragma once
+#include <filesystem>
 #include <string>
 #include <vector>
 
-#include "flexel/study/runs/runner.h"
+#include "flexel/study/runs/configuration.h"
 
 namespace flexel::study {
 

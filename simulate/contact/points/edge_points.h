@@ -2,7 +2,10 @@
 // that stands on an edge or a corner needs points there. They have no plane of their own (contact is along the
 // normal of the other side), only a cone of directions in which they are the outermost matter of the body.
 #pragma once
-#include "simulate/contact/points/contact_points.h"
+#include <cstdint>
+#include <vector>
+
+#include "simulate/contact/points/contact_point.h"
 
 namespace flexel::simulate {
 
