@@ -15,6 +15,7 @@
 #include "flexel/commands.h"
 #include "flexel/coordinates.h"
 #include "flexel/face_shape.h"
+#include "formats/common/file_formats.h"
 #include "formats/exchange/import.h"
 #include "formats/exchange/size_warning.h"
 #include "formats/exchange/surface_file.h"
@@ -258,7 +259,7 @@ void write_thickness(Surface surface, const std::string& path) {
   for (SurfaceSource& source : surface.sources)
     source.bytes = {};  // a new file, not the source's with other numbers
   const std::vector<Vec3> still(surface.vertices.size(), Vec3::Zero());
-  write_surface(surface, still, SurfaceFormat::ply, unit, path);
+  write_surface(surface, still, surface_format("ply"), unit, path);
 }
 
 }  // namespace
@@ -268,10 +269,8 @@ int info_command(int argc, char** argv) {
   std::string unit, edge, thickness;
   bool json = false;
   CLI::App app{"What a part is, and what a scene can name in it.", "flexel info"};
-  app.add_option("part", files, "STEP, IGES, BREP, STL, OBJ, PLY, OFF, glTF or 3MF files; -: stdin")
-      ->required()
-      ->type_name("PART");
-  app.add_flag("--json", json, "As JSON, in SI units (docs/guide/info.md)");
+  app.add_option("part", files, read_titles() + " files; -: stdin")->required()->type_name("PART");
+  app.add_flag("--json", json, "As JSON, in SI units (docs/info.md)");
   app.add_option("--unit", unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
   app.add_option("--edge", edge, "Split the mesh to this longest edge (default: not split)")
       ->type_name("LENGTH");

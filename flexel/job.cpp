@@ -7,13 +7,12 @@
 
 #include "base/error.h"
 #include "base/units.h"
+#include "formats/common/file_formats.h"
 #include "formats/exchange/size_warning.h"
 
 namespace flexel::commands {
 void declare_job(CLI::App& app, JobArguments& arguments) {
-  app.add_option("part", arguments.parts, "STEP, IGES, BREP, STL, OBJ, PLY, OFF, glTF or 3MF files; -: stdin")
-      ->required()
-      ->type_name("PART");
+  app.add_option("part", arguments.parts, read_titles() + " files; -: stdin")->required()->type_name("PART");
   declare_scene(app, arguments);
   app.add_option("--size", arguments.size, "Spacing of the lattice (\"2 mm\")")->type_name("LENGTH");
   app.add_option("--count", arguments.count, "Or: about this many cells")->type_name("N");

@@ -10,6 +10,7 @@
 #include "base/program/program.h"
 #include "base/version.h"
 #include "flexel/commands.h"
+#include "formats/common/file_formats.h"
 
 namespace flexel::commands {
 namespace {
@@ -18,7 +19,7 @@ constexpr const char* kHelp =
     "flexel deforms CAD parts.\n"
     "\n"
     "  flexel deform PART... --fix WHERE --push \"WHERE: 0 0 -50 N\" --material NAME -o OUT\n"
-    "                        the part, deformed as its material would be (STL, OBJ, PLY, OFF, GLB; .vtu for "
+    "                        the part, deformed as its material would be ({}; .vtu for "
     "the body,\n"
     "                        .png for a picture)\n"
     "  flexel compare PART PART... --scene FILE\n"
@@ -40,6 +41,10 @@ constexpr const char* kHelp =
     "\n"
     "`flexel COMMAND --help` lists the options of a command; `flexel --version` prints the version.\n";
 
+std::string help_text() {
+  return fmt::format(kHelp, written_titles([](const FileFormat&) { return true; }, "or"));
+}
+
 void print(const std::string& text) {
   OutputFile out("-", false);
   out.write(text);
@@ -60,7 +65,7 @@ bool is_stage(const std::string& command) {
 
 int help(int argc, char** argv) {
   if (argc < 2) {
-    print(kHelp);
+    print(help_text());
     return kExitDone;
   }
   std::string option = "--help";

@@ -22,6 +22,7 @@
 #include "flexel/scene_text.h"
 #include "flexel/study/runs/scene_edit.h"
 #include "flexel/study/session.h"
+#include "formats/common/file_formats.h"
 #include "simulate/scene/scene.h"
 #include "simulate/simulate.h"
 #include "voxelize/measure_part.h"
@@ -40,9 +41,7 @@ struct StudyArguments {
 };
 
 void declare(CLI::App& app, StudyArguments& a) {
-  app.add_option("part", a.job.parts, "STEP, IGES, BREP, STL, OBJ, PLY, OFF, glTF or 3MF files")
-      ->required()
-      ->type_name("PART");
+  app.add_option("part", a.job.parts, read_titles() + " files")->required()->type_name("PART");
   declare_scene(app, a.job);
   app.add_option("-o,--output", a.output, "Folder for study.csv, study.json and study.html")
       ->required()

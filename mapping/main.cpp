@@ -12,6 +12,7 @@
 #include "base/program/termination.h"
 #include "base/stop.h"
 #include "base/units.h"
+#include "formats/common/file_formats.h"
 #include "formats/exchange/import.h"
 #include "formats/exchange/part_files.h"
 #include "formats/lattice/body_file.h"
@@ -49,7 +50,7 @@ void declare(CLI::App& app, Arguments& arguments) {
                  "Body file (.vtu) or series (.pvd); without one, or with -, a body from stdin")
       ->type_name("BODY");
   app.add_option("--onto", arguments.onto,
-                 "Deform this mesh (STL, OBJ, PLY, OFF, glTF, 3MF) instead of the body's own")
+                 fmt::format("Deform this mesh ({}) instead of the body's own", read_titles(false)))
       ->type_name("FILE");
   app.add_option("--edge", arguments.edge, "Of --onto: split that mesh to this longest edge")
       ->type_name("LENGTH");
@@ -101,8 +102,7 @@ void check_pieces(const Arguments& arguments, const Plan& plan, bool own_surface
     throw InputError("--pieces are of one state: give one frame, or leave it out for a file a frame");
   if (!arguments.map.pieces.empty() && arguments.map.scale != 1)
     throw InputError("--pieces are written as they are: leave out --scale");
-  if (plan.unit > 0 && plan.crack.pieces_format == SurfaceFormat::glb)
-    throw InputError("GLB has a unit of its own: leave out --unit");
+  if (!arguments.map.pieces.empty()) check_unit(plan.crack.pieces_format, plan.unit);
 }
 
 void check_binding(const Arguments& arguments, const Plan& plan) {
@@ -164,8 +164,8 @@ Plan make_plan(Arguments& arguments) {
 Surface read_onto(const std::string& path, const Body& body, std::optional<double> edge) {
   ImportOptions options;
   options.largest_edge = edge;
-  const std::string ending = extension(path);
-  if (ending == "stl" || ending == "obj" || ending == "ply" || ending == "off")
+  const FileFormat* format = format_named(extension(path));
+  if (format != nullptr && !format->carries_unit && !format->is_cad)
     options.unit = default_unit(body.surface);
   return import_surface(path, options);
 }

@@ -2,6 +2,7 @@
 #include "mapping/options.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <filesystem>
 
@@ -9,6 +10,7 @@
 #include "base/files/files.h"
 #include "base/files/output_file.h"
 #include "base/nearest_word.h"
+#include "formats/common/file_formats.h"
 #include "formats/exchange/part_files.h"
 #include "mapping/report/report.h"
 
@@ -58,11 +60,18 @@ void declare_map_options(CLI::App& app, MapArguments& arguments) {
   app.add_option("--scale", arguments.scale, "Write displacements this many times as large")
       ->type_name("FACTOR");
   app.add_option("--format", arguments.format,
-                 "stl, obj, ply, off, glb or vtu, for stdout and pieces; else told by the extension")
+                 fmt::format("{} or vtu, for stdout and pieces; else told by the extension",
+                             fmt::join(written_formats(), ", ")))
       ->type_name("NAME");
-  app.add_flag("--ascii", arguments.ascii, "Write an ASCII STL or PLY");
-  app.add_flag("--attributes", arguments.attributes,
-               "PLY: write what is known of each vertex too (.vtu always has it)");
+  app.add_flag(
+      "--ascii", arguments.ascii,
+      fmt::format(
+          "Write an ASCII {}",
+          written_titles([](const FileFormat& each) { return each.encoding == FileEncoding::both; }, "or")));
+  app.add_flag(
+      "--attributes", arguments.attributes,
+      fmt::format("{}: write what is known of each vertex too (.vtu always has it)",
+                  written_titles([](const FileFormat& each) { return each.holds_attributes; }, "or")));
   app.add_option("--report", arguments.report, "Write the mapping's validity report (JSON)")
       ->type_name("FILE");
   app.add_flag("--table", arguments.table, "Print the mapping's whole report as a table");

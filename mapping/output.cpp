@@ -4,44 +4,27 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <cstring>
 
 #include "base/error.h"
+#include "formats/common/file_formats.h"
 #include "mapping/report/attributes.h"
 
 namespace flexel::mapping {
 namespace {
 
-// Puts `line` before the first line of a text file, or after its `skip` first lines.
-void insert_line(Bytes& bytes, const std::string& line, int skip) {
-  auto at = bytes.begin();
-  for (; skip > 0; --skip) {
-    at = std::find(at, bytes.end(), std::byte{'\n'});
-    if (at == bytes.end()) return;
-    ++at;
-  }
-  const auto* text = reinterpret_cast<const std::byte*>(line.data());
-  bytes.insert(at, text, text + line.size());
-}
-
-// Says in the file that displacements are not true to scale: the header of an STL, the solids' names of an
-// ASCII one, a comment in what is written again from an OBJ, PLY or OFF file.
+// Says in the file that displacements are not true to scale, where its format has a place for it.
 void note_scale(Surface& surface, const MapOutput& output) {
-  constexpr std::size_t kHeader = 80;
-  const std::string note = fmt::format("Flexel: displacements times {:g}", output.scale);
-  if (output.format == SurfaceFormat::stl_ascii)
-    for (SurfacePart& part : surface.parts) part.name += fmt::format(" ({})", note);
-  for (SurfaceSource& source : surface.sources) {
-    source.stl_header.assign(kHeader, std::byte{0});
-    std::memcpy(source.stl_header.data(), note.data(), std::min(note.size(), kHeader));
-    if (source.bytes.empty()) continue;
-    if (source.format == "obj") insert_line(source.bytes, "# " + note + "\n", 0);
-    if (source.format == "off") insert_line(source.bytes, "# " + note + "\n", 1);
-    if (source.format.starts_with("ply")) insert_line(source.bytes, "comment " + note + "\n", 2);
-  }
+  if (output.format->file->add_note != nullptr)
+    output.format->file->add_note(surface, output.format->ascii,
+                                  fmt::format("Flexel: displacements times {:g}", output.scale));
 }
 
 }  // namespace
+
+void check_unit(SurfaceFormat format, double unit) {
+  if (unit > 0 && format.file->carries_unit)
+    throw InputError(fmt::format("{} has a unit of its own: leave out --unit", capitals(*format.file)));
+}
 
 MapOutput map_output(const std::string& format, const std::string& path, bool ascii, double unit,
                      double scale, bool attributes) {
@@ -53,10 +36,11 @@ MapOutput map_output(const std::string& format, const std::string& path, bool as
   if (!std::isfinite(scale)) throw InputError("--scale: a number is needed");
   if (format == "vtu" || (format.empty() && extension(path) == "vtu")) return output;
   output.format = surface_format(format, path, ascii);
-  if (unit > 0 && output.format == SurfaceFormat::glb)
-    throw InputError("GLB has a unit of its own: leave out --unit");
-  if (attributes && output.format != SurfaceFormat::ply && output.format != SurfaceFormat::ply_ascii)
-    throw InputError("--attributes: only PLY and .vtu hold attributes of vertices: write one of them");
+  check_unit(*output.format, unit);
+  if (attributes && !output.format->file->holds_attributes)
+    throw InputError(
+        fmt::format("--attributes: only {} and .vtu hold attributes of vertices: write one of them",
+                    written_titles([](const FileFormat& each) { return each.holds_attributes; }, "and")));
   return output;
 }
 

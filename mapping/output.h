@@ -22,6 +22,9 @@ struct MapOutput {
 [[nodiscard]] MapOutput map_output(const std::string& format, const std::string& path, bool ascii,
                                    double unit, double scale, bool attributes);
 
+// Throws InputError: a unit was given and the format has its own. `unit`: 0 where none was given.
+void check_unit(SurfaceFormat format, double unit);
+
 // `surface`: as it is to be written, the vertices that were mapped, in the same order.
 void write_mapped(const Surface& surface, const Body& body, const MapResult& result, const MapOutput& output);
 

@@ -1,4 +1,7 @@
 // flexel-voxelize: parts in, body out.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <optional>
 #include <vector>
 
@@ -13,6 +16,7 @@
 #include "base/program/progress.h"
 #include "base/program/termination.h"
 #include "base/units.h"
+#include "formats/common/file_formats.h"
 #include "formats/exchange/import.h"
 #include "formats/exchange/size_warning.h"
 #include "formats/lattice/body_file.h"
@@ -35,8 +39,7 @@ struct Arguments {
 };
 
 void declare(CLI::App& app, Arguments& arguments) {
-  app.add_option("PART", arguments.parts,
-                 "STEP, IGES, BREP, STL, OBJ, PLY, OFF, glTF or 3MF files; - or none: stdin");
+  app.add_option("PART", arguments.parts, read_titles() + " files; - or none: stdin");
   app.add_option("--size", arguments.size, "spacing of the lattice, for example \"2 mm\"");
   app.add_option("--count", arguments.count, "or: about this many cells over all parts (default 20000)");
   app.add_option("--placement", arguments.placement, "elements at the voxels' corner (default) or centre");
@@ -55,8 +58,8 @@ void declare(CLI::App& app, Arguments& arguments) {
       "--edge", arguments.edge,
       "split the mesh to this longest edge (default: STEP a 64th of the file's diagonal, meshes not)");
   app.add_option("--input-format,--format", arguments.format,
-                 "format of the input (step, iges, brep, stl, obj, ply, off, glb, 3mf) instead of what "
-                 "its bytes tell");
+                 fmt::format("format of the input ({}) instead of what its bytes tell",
+                             fmt::join(read_formats(), ", ")));
   app.add_option("--threads", arguments.threads, "threads; 0 (default): every core");
   app.add_flag("--compress", arguments.compress, "compress the arrays of the body file");
   app.add_flag("--quiet", arguments.quiet, "say warnings only");

@@ -111,15 +111,15 @@ BENCHMARK(read_million)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK_CAPTURE(assimp_million, read, 0)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(assimp_million, joined, aiProcess_JoinIdenticalVertices)->Unit(benchmark::kMillisecond);
 BENCHMARK(topology_million)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(write_million, stl_binary, SurfaceFormat::stl_binary)
+BENCHMARK_CAPTURE(write_million, stl_binary, surface_format("stl"))
     ->Arg(2)
     ->Unit(benchmark::kMillisecond)
     ->UseRealTime();
-BENCHMARK_CAPTURE(write_million, stl_ascii, SurfaceFormat::stl_ascii)
+BENCHMARK_CAPTURE(write_million, stl_ascii, surface_format("stl", "", true))
     ->Arg(2)
     ->Unit(benchmark::kMillisecond)
     ->UseRealTime();
-BENCHMARK_CAPTURE(write_million, obj, SurfaceFormat::obj)
+BENCHMARK_CAPTURE(write_million, obj, surface_format("obj"))
     ->Arg(2)
     ->Unit(benchmark::kMillisecond)
     ->UseRealTime();

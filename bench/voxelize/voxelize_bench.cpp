@@ -58,7 +58,7 @@ struct TemporaryFiles {
              ("flexel-bench-" + std::to_string(getpid()));
     std::filesystem::create_directory(folder);
     write_surface(million(), std::vector<Vec3>(million().vertices.size(), Vec3::Zero()),
-                  SurfaceFormat::stl_binary, 1e-3, part());
+                  surface_format("stl"), 1e-3, part());
   }
   ~TemporaryFiles() { std::filesystem::remove_all(folder); }
   [[nodiscard]] std::string part() const { return (folder / "knot.stl").string(); }

@@ -15,6 +15,7 @@
 #include "base/math/distance.h"
 #include "flexel/export/gmsh.h"
 #include "flexel/export/mesh.h"
+#include "formats/common/file_formats.h"
 #include "formats/exchange/surface_file.h"
 
 namespace flexel::mesh_export {
@@ -24,10 +25,6 @@ constexpr double kRegionAngle = 30;   // degrees, as for the faces of meshes (fo
 constexpr std::size_t kSamples = 25;  // triangles of a surface that decide which face it is
 constexpr double kTetFacing = 0.3;    // cosine
 constexpr double kBoxTolerance = 0.02;
-
-bool is_cad(const SurfaceSource& source) {
-  return source.format == "step" || source.format == "iges" || source.format == "brep";
-}
 
 std::string settings(const TetrahedraOptions& options, double unit) {
   return fmt::format(
@@ -87,7 +84,7 @@ GmshMesh mesh_all(const std::vector<std::string>& paths, const Surface& surface,
       const std::string name = "part." + source.format;
       std::filesystem::create_symlink(std::filesystem::absolute(paths[s]), folder.path() / name);
       // gmsh reads STEP and IGES in millimetres, BREP as it is
-      const double unit = source.format == "brep" ? source.unit : 1e-3;
+      const double unit = carries_unit(source) ? 1e-3 : source.unit;
       append(all,
              mesh_with_gmsh(folder.path().string(),
                             fmt::format("SetFactory(\"OpenCASCADE\");\nMerge \"{}\";\n{}", name,
@@ -100,8 +97,8 @@ GmshMesh mesh_all(const std::vector<std::string>& paths, const Surface& surface,
       if (surface.part_source[part] != s) continue;
       const TemporaryFolder folder;
       const Surface one = part_surface(surface, part);
-      write_surface(one, std::vector<Vec3>(one.vertices.size(), Vec3::Zero()), SurfaceFormat::stl_binary,
-                    1e-3, (folder.path() / "part.stl").string());
+      write_surface(one, std::vector<Vec3>(one.vertices.size(), Vec3::Zero()), surface_format("stl"), 1e-3,
+                    (folder.path() / "part.stl").string());
       append(
           all,
           mesh_with_gmsh(folder.path().string(),

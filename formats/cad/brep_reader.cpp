@@ -10,8 +10,8 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "formats/cad/cad_readers.h"
 #include "formats/cad/occt.h"
-#include "formats/common/readers.h"
 
 namespace flexel {
 namespace {

@@ -26,8 +26,8 @@
 #include <new>
 
 #include "base/error.h"
+#include "formats/cad/cad_readers.h"
 #include "formats/cad/occt.h"
-#include "formats/common/readers.h"
 
 namespace flexel {
 namespace {

@@ -2,7 +2,7 @@
 #include <fmt/format.h>
 
 #include "base/error.h"
-#include "formats/common/readers.h"
+#include "formats/cad/cad_readers.h"
 
 namespace flexel {
 namespace {

@@ -24,10 +24,10 @@
 #include <XSControl_WorkSession.hxx>
 
 #include "base/error.h"
+#include "formats/cad/cad_readers.h"
 #include "formats/cad/occt.h"
 #include "formats/cad/occt_help.h"
 #include "formats/cad/step_names.h"
-#include "formats/common/readers.h"
 
 namespace flexel {
 namespace {

@@ -13,6 +13,19 @@
 
 namespace flexel {
 
+std::string_view beginning(const ImportInput& input) {
+  constexpr std::size_t kLooked = 4096;
+  return {reinterpret_cast<const char*>(input.bytes.data()), std::min(kLooked, input.bytes.size())};
+}
+
+bool begins_with_word(std::string_view text, std::string_view word) {
+  std::size_t at = 0;
+  while (at < text.size() && std::isspace(static_cast<unsigned char>(text[at])) != 0) ++at;
+  return text.size() - at >= word.size() &&
+         std::equal(word.begin(), word.end(), text.begin() + static_cast<std::ptrdiff_t>(at),
+                    [](char w, char t) { return w == std::tolower(static_cast<unsigned char>(t)); });
+}
+
 void assign_dihedral_faces(Surface& surface, const std::vector<std::uint32_t>& polygon_part,
                            const std::vector<std::uint32_t>& welded) {
   constexpr std::uint32_t kNoFace = 0xffffffffu;

@@ -2,9 +2,11 @@
 #pragma once
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/files/files.h"
+#include "formats/common/file_format.h"
 #include "formats/common/import_options.h"
 #include "formats/part/surface.h"
 
@@ -19,17 +21,31 @@ struct ImportInput {
   std::string stem;    // fallback for part names: the file's name without its extension, "part" for "-"
 };
 
-// Each returns the surface with vertices in metres and `sources` filled but for file and hash; part names may
-// still be empty or repeated. All throw InputError(input.where, ...).
-[[nodiscard]] Surface read_stl(ImportInput& input, const ImportOptions& options);
-[[nodiscard]] Surface read_obj(ImportInput& input, const ImportOptions& options);
-[[nodiscard]] Surface read_ply(ImportInput& input, const ImportOptions& options);
-[[nodiscard]] Surface read_off(ImportInput& input, const ImportOptions& options);
-[[nodiscard]] Surface read_gltf(ImportInput& input, const ImportOptions& options);
-[[nodiscard]] Surface read_3mf(ImportInput& input, const ImportOptions& options);
-[[nodiscard]] Surface read_step(ImportInput& input, const ImportOptions& options);
-[[nodiscard]] Surface read_iges(ImportInput& input, const ImportOptions& options);
-[[nodiscard]] Surface read_brep(ImportInput& input, const ImportOptions& options);
+// The first bytes, as text.
+[[nodiscard]] std::string_view beginning(const ImportInput& input);
+
+// How far a file's bytes speak for a format. `weak` counts for less than the file's extension.
+enum class Evidence { none, weak, text, size, magic };
+
+// How a format is read: the second half of its row (formats/common/file_format.h).
+struct FileReader {
+  const FileFormat* format = nullptr;
+  Evidence (*sniff)(const ImportInput& input) = nullptr;  // of a file whose encoding is not known yet
+  // Returns the surface with vertices in metres and `sources` filled but for file and hash; part names may
+  // still be empty or repeated. Throws InputError(input.where, ...).
+  Surface (*read)(ImportInput& input, const ImportOptions& options) = nullptr;
+  // Whether the file is text, so that no byte of it is 0; none: nobody looks.
+  bool (*is_text)(const ImportInput& input) = nullptr;
+  // It leaves the bytes alone and uses few threads: the file's hash is made meanwhile.
+  bool hashed_while_read = false;
+};
+
+// Defined where each format is read.
+extern const FileReader kStepReader, kIgesReader, kBrepReader, kStlReader, kObjReader, kPlyReader, kOffReader,
+    kGltfReader, k3mfReader;
+
+// Whether the text begins, after blanks, with a word (given in lower case) in whatever case.
+[[nodiscard]] bool begins_with_word(std::string_view text, std::string_view word);
 
 // Edges with a dihedral angle over this bound the faces of a mesh that has no groups.
 constexpr double kFaceAngle = 30;  // degrees

@@ -56,6 +56,10 @@ class Rewriter {
 // than the rounding of the unit.
 void append_position(std::string& text, const DeformedSurface& deformed, std::size_t v);
 
+// Puts `line` after the `skip` first lines of the text of every source of `format` (a FileFormat's name) whose
+// bytes are there.
+void add_source_line(Surface& surface, std::string_view format, const std::string& line, int skip);
+
 void write_stl_binary(const DeformedSurface& deformed, OutputFile& out);
 void write_stl_ascii(const DeformedSurface& deformed, OutputFile& out);
 // The lines of the OBJ file that the surface came from, with v and vn rewritten.

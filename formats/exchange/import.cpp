@@ -6,26 +6,25 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cctype>
+#include <array>
 #include <filesystem>
+#include <utility>
 
 #include "base/error.h"
 #include "base/nearest_word.h"
 #include "base/parallel.h"
+#include "formats/common/file_formats.h"
 #include "formats/common/readers.h"
 #include "formats/lattice/body_file.h"
-#include "formats/off/off_text.h"
 #include "formats/part/part_name.h"
 #include "formats/part/subdivide.h"
 
 namespace flexel {
 namespace {
 
-const std::vector<std::string>& known_formats() {
-  static const std::vector<std::string> names{"step", "iges", "brep", "stl", "obj",
-                                              "ply",  "off",  "glb",  "3mf"};
-  return names;
-}
+constexpr std::array<const FileReader*, 9> kReaders = {&kStepReader, &kIgesReader, &kBrepReader,
+                                                       &kStlReader,  &kObjReader,  &kPlyReader,
+                                                       &kOffReader,  &kGltfReader, &k3mfReader};
 
 ImportInput load(const std::string& path) {
   ImportInput input;
@@ -38,16 +37,12 @@ ImportInput load(const std::string& path) {
   return input;
 }
 
-std::string_view beginning(const ImportInput& input, std::size_t size) {
-  return {reinterpret_cast<const char*>(input.bytes.data()), std::min(size, input.bytes.size())};
-}
-
-// A binary STL of n triangles is 84 + 50 n bytes long.
-bool sized_like_binary_stl(const ImportInput& input) {
-  if (input.bytes.size() < 84) return false;
-  std::uint32_t count = 0;
-  std::copy_n(input.bytes.data() + 80, 4, reinterpret_cast<std::byte*>(&count));
-  return input.bytes.size() == 84 + std::size_t{50} * count;
+// The reader whose format the bytes speak for most, and how much; of equal ones the first.
+std::pair<const FileReader*, Evidence> strongest(const ImportInput& input) {
+  std::pair<const FileReader*, Evidence> best{nullptr, Evidence::none};
+  for (const FileReader* reader : kReaders)
+    if (const Evidence evidence = reader->sniff(input); evidence > best.second) best = {reader, evidence};
+  return best;
 }
 
 // The encoding of text whose characters are two or four bytes wide, by which of their bytes are 0 and which
@@ -80,10 +75,16 @@ std::string wide_encoding(const ImportInput& input) {
   return "";
 }
 
+// A binary file of a format without a mark of its own, which its size tells.
+bool told_by_size(const ImportInput& input) {
+  return std::any_of(kReaders.begin(), kReaders.end(),
+                     [&](const FileReader* reader) { return reader->sniff(input) == Evidence::size; });
+}
+
 // Takes off the mark of UTF-8 at the front, which says nothing, and refuses wider characters.
 void check_encoding(ImportInput& input) {
   constexpr std::array kMark = {std::byte{0xef}, std::byte{0xbb}, std::byte{0xbf}};
-  if (sized_like_binary_stl(input)) return;
+  if (told_by_size(input)) return;
   if (const std::string encoding = wide_encoding(input); !encoding.empty())
     throw InputError(input.where,
                      fmt::format("is text in {}, which is not read: save it as UTF-8 (iconv -f {} "
@@ -94,11 +95,8 @@ void check_encoding(ImportInput& input) {
 }
 
 // No text holds a NUL, but some writers pad its end with them.
-void check_text(const ImportInput& input, const std::string& format) {
-  const bool text =
-      format == "obj" || format == "off" || format == "step" || format == "iges" ||
-      (format == "ply" && beginning(input, 4096).find("format ascii") != std::string_view::npos);
-  if (!text) return;
+void check_text(const ImportInput& input, const FileReader& reader) {
+  if (reader.is_text == nullptr || !reader.is_text(input)) return;
   const auto begin = input.bytes.begin();
   const auto nul = std::find(begin, input.bytes.end(), std::byte{0});
   if (std::all_of(nul, input.bytes.end(), [](std::byte byte) { return byte == std::byte{0}; })) return;
@@ -108,114 +106,37 @@ void check_text(const ImportInput& input, const std::string& format) {
       "export it anew, in UTF-8");
 }
 
-bool begins_with_word(std::string_view text, std::string_view word) {
-  std::size_t at = 0;
-  while (at < text.size() && std::isspace(static_cast<unsigned char>(text[at])) != 0) ++at;
-  return text.size() - at >= word.size() &&
-         std::equal(word.begin(), word.end(), text.begin() + static_cast<std::ptrdiff_t>(at),
-                    [](char w, char t) { return w == std::tolower(static_cast<unsigned char>(t)); });
+// By the name of its format or an extension; nullptr: none.
+const FileReader* reader_named(const std::string& name) {
+  const FileFormat* format = format_named(name);
+  for (const FileReader* reader : kReaders)
+    if (reader->format == format) return reader;
+  return nullptr;
 }
 
-// The first line that is neither empty nor a comment begins with a word of OBJ.
-bool looks_like_obj(std::string_view text) {
-  while (!text.empty()) {
-    const std::size_t end = std::min(text.find('\n'), text.size());
-    std::string_view line = text.substr(0, end);
-    text.remove_prefix(std::min(end + 1, text.size()));
-    while (!line.empty() && std::isspace(static_cast<unsigned char>(line.front())) != 0)
-      line.remove_prefix(1);
-    if (line.empty() || line.front() == '#') continue;
-    const std::string_view word = line.substr(0, line.find_first_of(" \t\r"));
-    constexpr std::array<std::string_view, 10> kWords{"v", "vn", "vt", "vp",     "f",
-                                                      "g", "o",  "s",  "mtllib", "usemtl"};
-    return std::find(kWords.begin(), kWords.end(), word) != kWords.end();
-  }
-  return false;
-}
-
-bool looks_like_brep(std::string_view text) {
-  constexpr std::string_view kBinary = "Open CASCADE Topology V";
-  return begins_with_word(text, "dbrep_drawableshape") || begins_with_word(text, "cascade topology v") ||
-         text.substr(0, kBinary.size() + 1).find(kBinary) != std::string_view::npos;
-}
-
-// The first line is 80 characters long: text, an S in column 73, and the number 1.
-bool looks_like_iges(std::string_view text) {
-  constexpr std::size_t kLetter = 72, kLine = 80;
-  if (text.size() < kLine || text[kLetter] != 'S') return false;
-  const std::string_view number = text.substr(kLetter + 1, kLine - kLetter - 1);
-  return number.find_first_not_of(" 0") == number.size() - 1 && number.back() == '1' &&
-         text.substr(0, kLine).find('\n') == std::string_view::npos;
-}
-
-// JSON that speaks of an asset somewhere near its beginning.
-bool looks_like_gltf(std::string_view text) {
-  return begins_with_word(text, "{") && text.find("\"asset\"") != std::string_view::npos;
-}
-
-// The format that an extension or --input-format stands for, "" for none.
-std::string format_named(const std::string& name) {
-  if (name == "stp" || name == "p21") return "step";
-  if (name == "igs") return "iges";
-  if (name == "brp") return "brep";
-  if (name == "gltf") return "glb";
-  const auto& known = known_formats();
-  return std::find(known.begin(), known.end(), name) == known.end() ? "" : name;
-}
-
-Surface read(const std::string& format, ImportInput& input, const ImportOptions& options) {
-  if (format == "step") return read_step(input, options);
-  if (format == "iges") return read_iges(input, options);
-  if (format == "brep") return read_brep(input, options);
-  if (format == "stl") return read_stl(input, options);
-  if (format == "obj") return read_obj(input, options);
-  if (format == "ply") return read_ply(input, options);
-  if (format == "off") return read_off(input, options);
-  if (format == "glb") return read_gltf(input, options);
-  return read_3mf(input, options);
-}
-
-// Tessellated on import, and split there (formats/cad/occt_mesh.cpp).
-bool is_cad(const std::string& format) {
-  return format == "step" || format == "iges" || format == "brep";
-}
-
-std::string sniff(const ImportInput& input, const std::string& path) {
-  const std::string_view text = beginning(input, 4096);
-  if (begins_with_word(text, "iso-10303-21")) return "step";
-  if (text.starts_with("glTF")) return "glb";
-  if (text.starts_with("PK\x03\x04")) return "3mf";
-  if (text.starts_with("ply\n") || text.starts_with("ply\r")) return "ply";
-  if (sized_like_binary_stl(input)) return "stl";
+const FileReader& sniff(const ImportInput& input, const std::string& path) {
+  const auto [found, evidence] = strongest(input);
+  if (evidence > Evidence::weak) return *found;
   if (looks_like_body(input.bytes))
     throw InputError(
         input.where,
         "is a body (a lattice), not a part: give it to flexel-simulate or flexel-map, or give a part "
         "(STEP, STL, OBJ, ...) here");
-  if (begins_with_word(text, "solid")) return "stl";
-  if (looks_like_off(text)) return "off";
-  if (looks_like_brep(text)) return "brep";
-  if (looks_like_iges(text)) return "iges";
-  const std::string suffix = format_named(path == "-" ? "" : extension(path));
-  if (!suffix.empty()) return suffix;
-  if (looks_like_obj(text)) return "obj";
-  if (looks_like_gltf(text)) return "glb";
+  if (const FileReader* named = reader_named(path == "-" ? "" : extension(path))) return *named;
+  if (found != nullptr) return *found;
   throw InputError(input.where,
                    path == "-"
                        ? fmt::format("its bytes do not tell its format: say it with --input-format ({})",
-                                     fmt::join(known_formats(), ", "))
-                       : "is in no format that can be read: a part comes as STEP, IGES, BREP, STL, OBJ, PLY, "
-                         "OFF, glTF or 3MF");
+                                     fmt::join(read_formats(), ", "))
+                       : fmt::format("is in no format that can be read: a part comes as {}", read_titles()));
 }
 
-std::string format_of(const ImportInput& input, const ImportOptions& options, const std::string& path) {
+const FileReader& reader_of(const ImportInput& input, const ImportOptions& options, const std::string& path) {
   if (!options.format) return sniff(input, path);
-  const std::string format = format_named(*options.format);
-  if (format.empty())
-    throw InputError(fmt::format("unknown input format \"{}\": {}{}", *options.format,
-                                 fmt::join(known_formats(), ", "),
-                                 did_you_mean(*options.format, known_formats())));
-  return format;
+  if (const FileReader* named = reader_named(*options.format)) return *named;
+  throw InputError(fmt::format("unknown input format \"{}\": {}{}", *options.format,
+                               fmt::join(read_formats(), ", "),
+                               did_you_mean(*options.format, read_formats())));
 }
 
 struct HashedSurface {
@@ -223,17 +144,15 @@ struct HashedSurface {
   std::uint64_t hash = 0;
 };
 
-// STL is hashed while it is read, for neither makes full use of the threads; the other readers are larger
-// than the hash, and one takes the bytes for itself.
-HashedSurface read_and_hash(ImportInput& input, const std::string& format, const ImportOptions& options) {
+HashedSurface read_and_hash(ImportInput& input, const FileReader& reader, const ImportOptions& options) {
   HashedSurface result;
-  if (format == "stl") {
-    parallel_both([&] { result.surface = read_stl(input, options); },
+  if (reader.hashed_while_read) {
+    parallel_both([&] { result.surface = reader.read(input, options); },
                   [&] { result.hash = content_hash(input.bytes); });
     return result;
   }
   result.hash = content_hash(input.bytes);
-  result.surface = read(format, input, options);
+  result.surface = reader.read(input, options);
   return result;
 }
 
@@ -242,13 +161,14 @@ HashedSurface read_and_hash(ImportInput& input, const std::string& format, const
 Surface import_surface(const std::string& path, const ImportOptions& options) {
   ImportInput input = load(path);
   check_encoding(input);
-  const std::string format = format_of(input, options, path);
-  check_text(input, format);
-  HashedSurface read = read_and_hash(input, format, options);
+  const FileReader& reader = reader_of(input, options, path);
+  check_text(input, reader);
+  HashedSurface read = read_and_hash(input, reader, options);
   Surface& surface = read.surface;
   surface.sources.at(0).file = input.file;
   surface.sources.at(0).hash = read.hash;
-  if (options.largest_edge && !is_cad(format)) subdivide_mesh(surface, *options.largest_edge, input.where);
+  if (options.largest_edge && !reader.format->is_cad)  // CAD is split where it is tessellated
+    subdivide_mesh(surface, *options.largest_edge, input.where);
   surface.part_source.assign(surface.parts.size(), 0);
   for (SurfacePart& part : surface.parts)
     if (says_nothing(part.name)) part.name.clear();
@@ -263,9 +183,7 @@ Surface import_surface(const std::string& path, const ImportOptions& options) {
 std::vector<std::string> refinement_notes(const Surface& surface) {
   std::vector<std::string> lines;
   for (const SurfaceSource& source : surface.sources) {
-    const bool rewritten = source.format == "obj" || source.format == "off" || source.format == "glb" ||
-                           source.format.starts_with("ply");
-    if (rewritten && source.bytes.empty())
+    if (is_rewritten(source) && source.bytes.empty())
       lines.push_back(fmt::format(
           "{}: its triangles were split, so the part comes out as a new file: vertices keep their "
           "order and new ones follow; groups, names and colours stay, textures, materials and "

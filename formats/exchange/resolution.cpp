@@ -5,20 +5,14 @@
 #include <cmath>
 #include <limits>
 
-#include "formats/ply/ply_text.h"
+#include "formats/common/file_formats.h"
 
 namespace flexel {
 namespace {
 
 bool is_single_precision(const SurfaceSource& source) {
-  if (source.format == "stl-binary") return true;
-  if (source.format != "ply-binary" || source.bytes.empty()) return false;
-  const PlyHeader header = parse_ply_header(source.bytes, source.file);
-  const auto vertex = std::find_if(header.elements.begin(), header.elements.end(),
-                                   [](const PlyElement& element) { return element.name == "vertex"; });
-  if (vertex == header.elements.end()) return false;
-  const std::size_t x = vertex_layout(*vertex).position[0];
-  return x != kNoProperty && vertex->properties[x].type == PlyType::float32;
+  const FileFormat* format = format_of(source);
+  return format != nullptr && format->in_single_precision != nullptr && format->in_single_precision(source);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/units.h"
+#include "formats/common/file_formats.h"
 
 namespace flexel {
 namespace {
@@ -29,12 +30,6 @@ std::string name_of(double unit) {
   for (const auto& [name, metres] : kUnits)
     if (std::abs(metres - unit) <= 1e-12 * unit) return name;
   return fmt::format("{:g} m", unit);
-}
-
-// CAD files are read in mm whatever they carry, and cannot be told another unit.
-bool carries_unit(const SurfaceSource& source) {
-  return source.format == "step" || source.format == "iges" || source.format == "glb" ||
-         source.format == "3mf";
 }
 
 }  // namespace

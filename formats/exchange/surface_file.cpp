@@ -1,35 +1,19 @@
-// Picks the writer and checks what all writers need. Text is made in chunks of polygons in parallel and put
-// out in order.
+// Picks the writer and checks what all writers need.
 #include "formats/exchange/surface_file.h"
-#include "formats/exchange/part_files.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <Eigen/Geometry>
-#include <bit>
-#include <charconv>
-#include <cmath>
-#include <cstring>
-#include <iterator>
-#include <limits>
-#include <memory>
 #include <stdexcept>
 
 #include "base/error.h"
 #include "base/files/output_file.h"
 #include "base/nearest_word.h"
-#include "base/parallel.h"
-#include "base/version.h"
-#include "formats/common/surface_writers.h"
+#include "formats/common/file_formats.h"
+#include "formats/exchange/part_files.h"
 
 namespace flexel {
 namespace {
-
-static_assert(std::endian::native == std::endian::little,
-              "STL is little-endian; writing it here copies bytes");
-
-constexpr std::size_t kHeaderSize = 80, kPreambleSize = 84, kRecordSize = 50;
 
 void check_finite(const DeformedSurface& deformed, const std::string& path) {
   for (std::size_t v = 0; v < deformed.displacement.size(); ++v)
@@ -38,146 +22,37 @@ void check_finite(const DeformedSurface& deformed, const std::string& path) {
                        fmt::format("cannot write the part: vertex {} is not finite once deformed", v + 1));
 }
 
-// Coordinates in single precision, or the first vertex that does not fit.
-std::vector<std::array<float, 3>> single_precision(const DeformedSurface& deformed) {
-  std::vector<std::array<float, 3>> positions(deformed.displacement.size());
-  parallel_for_each(positions.size(), [&](std::size_t v) {
-    const Vec3 at = deformed.at(v);
-    for (std::size_t i = 0; i < 3; ++i)
-      positions[v][i] = static_cast<float>(at[static_cast<Eigen::Index>(i)]);
-  });
-  for (std::size_t v = 0; v < positions.size(); ++v)
-    for (const float value : positions[v])
-      if (!std::isfinite(value))
-        throw InputError(fmt::format(
-            "vertex {} does not fit the single precision of binary STL: write in a larger unit, or "
-            "as ASCII (--ascii)",
-            v + 1));
-  return positions;
-}
-
-Vec3 unit_normal(const DeformedSurface& deformed, const std::array<std::uint32_t, 3>& triangle) {
-  const Vec3 a = deformed.at(triangle[0]);
-  const Vec3 area = (deformed.at(triangle[1]) - a).cross(deformed.at(triangle[2]) - a);
-  const double length = area.norm();
-  return length > 0 && std::isfinite(length) ? Vec3(area / length) : Vec3(Vec3::Zero());
-}
-
-std::string stl_header(const Surface& surface) {
-  std::string header;
-  if (surface.sources.size() == 1 && surface.sources[0].stl_header.size() == kHeaderSize)
-    header.assign(reinterpret_cast<const char*>(surface.sources[0].stl_header.data()), kHeaderSize);
-  else
-    header = fmt::format("Flexel {}", version());
-  header.resize(kHeaderSize, '\0');
-  return header;
-}
-
-// Polygons by part, in order.
-std::vector<std::vector<std::uint32_t>> triangles_by_part(const Surface& surface,
-                                                          const Triangles& triangles) {
-  std::vector<std::vector<std::uint32_t>> result(surface.parts.size());
-  for (std::size_t t = 0; t < triangles.corners.size(); ++t)
-    result[surface.polygon_part(triangles.polygon[t])].push_back(static_cast<std::uint32_t>(t));
-  return result;
-}
-
-// Decimal of 15 digits that, read in `unit`, gives exactly `metres`; "" where there is none.
-std::string rest_text(double metres, double unit) {
-  std::string text = fmt::format("{:.15g}", metres / unit);
-  double back = 0;
-  std::from_chars(text.data(), text.data() + text.size(), back);
-  if (back * unit != metres) text.clear();
-  return text;
+// Whether the file that the surface came from can be written again: it is one of this format, its bytes are
+// there, and it is not a binary one that shall become text.
+bool is_source_format(const Surface& surface, SurfaceFormat format) {
+  if (format.file->rewrite == nullptr || surface.sources.size() != 1) return false;
+  const SurfaceSource& source = surface.sources[0];
+  return is_format(source, *format.file) && !source.bytes.empty() &&
+         !(format.ascii && source.format.ends_with("-binary"));
 }
 
 }  // namespace
 
-void append_position(std::string& text, const DeformedSurface& deformed, std::size_t v) {
-  const Vec3 at = deformed.at(v);
-  for (Eigen::Index i = 0; i < 3; ++i) {
-    text += ' ';
-    const std::string rest =
-        deformed.displacement[v][i] == 0 ? rest_text(deformed.surface.vertices[v][i], deformed.unit) : "";
-    if (rest.empty())
-      fmt::format_to(std::back_inserter(text), "{}", at[i]);
-    else
-      text += rest;
-  }
-}
-
-void write_stl_binary(const DeformedSurface& deformed, OutputFile& out) {
-  const Triangles triangles = triangulate(deformed.surface);
-  const auto positions = single_precision(deformed);
-  const std::size_t count = triangles.corners.size(), size = kPreambleSize + count * kRecordSize;
-  if (count > std::numeric_limits<std::uint32_t>::max()) throw InputError("too many triangles for STL");
-  const auto bytes = std::make_unique_for_overwrite<char[]>(size);
-  std::memcpy(bytes.get(), stl_header(deformed.surface).data(), kHeaderSize);
-  const auto count32 = static_cast<std::uint32_t>(count);
-  std::memcpy(bytes.get() + kHeaderSize, &count32, sizeof count32);
-  parallel_for_each(count, [&](std::size_t t) {
-    char* record = bytes.get() + kPreambleSize + t * kRecordSize;
-    const Eigen::Vector3f normal = unit_normal(deformed, triangles.corners[t]).cast<float>();
-    std::memcpy(record, normal.data(), 12);
-    for (std::size_t i = 0; i < 3; ++i)
-      std::memcpy(record + 12 + 12 * i, positions[triangles.corners[t][i]].data(), 12);
-    record[48] = record[49] = 0;
-  });
-  out.write(bytes.get(), size);
-}
-
-void write_stl_ascii(const DeformedSurface& deformed, OutputFile& out) {
-  constexpr std::size_t kGrain = 4096;
-  const Triangles triangles = triangulate(deformed.surface);
-  const auto by_part = triangles_by_part(deformed.surface, triangles);
-  for (std::size_t part = 0; part < by_part.size(); ++part) {
-    const auto& members = by_part[part];
-    std::vector<std::string> chunks(members.size() / kGrain + 1);
-    parallel_chunks(members.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-      std::string& text = chunks[begin / kGrain];
-      for (std::size_t m = begin; m < end; ++m) {
-        const auto& corners = triangles.corners[members[m]];
-        const Vec3 normal = unit_normal(deformed, corners);
-        fmt::format_to(std::back_inserter(text), " facet normal {:.6g} {:.6g} {:.6g}\n  outer loop\n",
-                       normal.x(), normal.y(), normal.z());
-        for (const std::uint32_t v : corners) {
-          text += "   vertex";
-          append_position(text, deformed, v);
-          text += '\n';
-        }
-        text += "  endloop\n endfacet\n";
-      }
-    });
-    const std::string& name = deformed.surface.parts[part].name;
-    out.write(fmt::format("solid {}\n", name));
-    for (const std::string& text : chunks) out.write(text);
-    out.write(fmt::format("endsolid {}\n", name));
-  }
-}
-
 SurfaceFormat surface_format(const std::string& format, const std::string& path, bool ascii) {
-  static const std::vector<std::string> kKnown = {"stl", "obj", "ply", "off", "glb"};
+  const std::vector<std::string> known = written_formats();
   const std::string asked = format.empty() ? extension(path) : format;
-  if (asked == "stl") return ascii ? SurfaceFormat::stl_ascii : SurfaceFormat::stl_binary;
-  if (asked == "ply") return ascii ? SurfaceFormat::ply_ascii : SurfaceFormat::ply;
-  if (asked == "glb") {
-    if (ascii) throw InputError("--ascii is for STL and PLY only: GLB is binary");
-    return SurfaceFormat::glb;
-  }
-  if (asked == "obj" || asked == "off") {
-    if (ascii)
-      throw InputError(fmt::format("--ascii is for STL and PLY only: {} is text as it is",
-                                   asked == "obj" ? "OBJ" : "OFF"));
-    return asked == "obj" ? SurfaceFormat::obj : SurfaceFormat::off;
+  if (std::find(known.begin(), known.end(), asked) != known.end()) {
+    const FileFormat& file = *format_named(asked);
+    if (ascii && file.encoding != FileEncoding::both)
+      throw InputError(fmt::format(
+          "--ascii is for {} only: {} is {}",
+          written_titles([](const FileFormat& each) { return each.encoding == FileEncoding::both; }, "and"),
+          capitals(file), file.encoding == FileEncoding::binary ? "binary" : "text as it is"));
+    return {&file, ascii};
   }
   if (!format.empty())
-    throw InputError(fmt::format("unknown output format \"{}\": {}{}", format, fmt::join(kKnown, ", "),
-                                 did_you_mean(format, kKnown)));
+    throw InputError(fmt::format("unknown output format \"{}\": {}{}", format, fmt::join(known, ", "),
+                                 did_you_mean(format, known)));
   if (path == "-" || path.empty())
-    throw InputError(fmt::format("a pipe needs --format ({})", fmt::join(kKnown, ", ")));
+    throw InputError(fmt::format("a pipe needs --format ({})", fmt::join(known, ", ")));
   if (asked.empty()) throw InputError(path, "the name has no extension that tells the format: give --format");
   throw InputError(path, fmt::format("parts cannot be written as \"{}\": use .{}{}", asked,
-                                     fmt::join(kKnown, ", ."), did_you_mean(asked, kKnown)));
+                                     fmt::join(known, ", ."), did_you_mean(asked, known)));
 }
 
 void write_surface(const Surface& surface, const std::vector<Vec3>& displacement, SurfaceFormat format,
@@ -187,37 +62,11 @@ void write_surface(const Surface& surface, const std::vector<Vec3>& displacement
   if (names_parts(path)) return write_parts(surface, displacement, format, unit, path);
   const DeformedSurface deformed{surface, displacement, unit};
   check_finite(deformed, path);
-  const bool binary =
-      format == SurfaceFormat::stl_binary || format == SurfaceFormat::ply || format == SurfaceFormat::glb;
-  OutputFile out(path, binary);
-  const auto from = [&](std::string_view source) {
-    return surface.sources.size() == 1 && surface.sources[0].format == source &&
-           !surface.sources[0].bytes.empty();
-  };
-  switch (format) {
-    case SurfaceFormat::stl_binary:
-      write_stl_binary(deformed, out);
-      break;
-    case SurfaceFormat::stl_ascii:
-      write_stl_ascii(deformed, out);
-      break;
-    case SurfaceFormat::obj:
-      from("obj") ? rewrite_obj(deformed, out) : write_new_obj(deformed, out);
-      break;
-    case SurfaceFormat::ply:
-      from("ply-binary") || from("ply-ascii") ? rewrite_ply(deformed, out)
-                                              : write_new_ply(deformed, false, out);
-      break;
-    case SurfaceFormat::ply_ascii:
-      from("ply-ascii") ? rewrite_ply(deformed, out) : write_new_ply(deformed, true, out);
-      break;
-    case SurfaceFormat::off:
-      from("off") ? rewrite_off(deformed, out) : write_new_off(deformed, out);
-      break;
-    case SurfaceFormat::glb:
-      from("glb") ? rewrite_glb(deformed, out) : write_new_glb(deformed, out);
-      break;
-  }
+  OutputFile out(path, format.file->encoding != FileEncoding::text && !format.ascii);
+  if (is_source_format(surface, format))
+    format.file->rewrite(deformed, out);
+  else
+    format.file->write_new(deformed, format.ascii, out);
   out.commit();
 }
 

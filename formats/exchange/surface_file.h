@@ -7,11 +7,19 @@
 
 namespace flexel {
 
-enum class SurfaceFormat { stl_binary, stl_ascii, obj, ply, ply_ascii, off, glb };
+struct FileFormat;  // formats/common/file_format.h
+
+// A format to write, as text where it has both encodings and `ascii` is set.
+struct SurfaceFormat {
+  const FileFormat* file = nullptr;
+  bool ascii = false;
+  bool operator==(const SurfaceFormat&) const = default;
+};
 
 // The format for `format` ("stl", "obj", "ply", "off", "glb") or, when that is empty, for the extension of
 // `path`; InputError when neither tells (a pipe needs --format) or the format is unknown (with the nearest).
-[[nodiscard]] SurfaceFormat surface_format(const std::string& format, const std::string& path, bool ascii);
+[[nodiscard]] SurfaceFormat surface_format(const std::string& format, const std::string& path = "",
+                                           bool ascii = false);
 
 // Writes `surface` with vertex i moved by displacement[i] (vertices x 3, m). Every coordinate is written in
 // `unit` metres; pass default_unit(surface) for the unit the file came in (mm for CAD formats). STL: the

@@ -359,7 +359,16 @@ class GltfReader {
   bool colored_ = false;
 };
 
-}  // namespace
+// JSON that speaks of an asset somewhere near its beginning.
+bool looks_like_gltf(std::string_view text) {
+  return begins_with_word(text, "{") && text.find("\"asset\"") != std::string_view::npos;
+}
+
+Evidence sniff_gltf(const ImportInput& input) {
+  const std::string_view text = beginning(input);
+  if (text.starts_with("glTF")) return Evidence::magic;
+  return looks_like_gltf(text) ? Evidence::weak : Evidence::none;
+}
 
 Surface read_gltf(ImportInput& input, const ImportOptions& options) {
   if (options.unit) throw InputError(input.where, "a glTF file carries its own unit: leave out --unit");
@@ -372,5 +381,9 @@ Surface read_gltf(ImportInput& input, const ImportOptions& options) {
     throw InputError(input.where, fmt::format("is damaged: {}", clean_name(error.what())));
   }
 }
+
+}  // namespace
+
+constinit const FileReader kGltfReader{.format = &kGltfFormat, .sniff = sniff_gltf, .read = read_gltf};
 
 }  // namespace flexel

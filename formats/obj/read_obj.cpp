@@ -73,7 +73,26 @@ void add_line(ObjScan& scan, const ObjLine& line, const ImportInput& input) {
   }
 }
 
-}  // namespace
+// The first line that is neither empty nor a comment begins with a word of OBJ.
+bool looks_like_obj(std::string_view text) {
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    std::string_view line = text.substr(0, end);
+    text.remove_prefix(std::min(end + 1, text.size()));
+    while (!line.empty() && std::isspace(static_cast<unsigned char>(line.front())) != 0)
+      line.remove_prefix(1);
+    if (line.empty() || line.front() == '#') continue;
+    const std::string_view word = line.substr(0, line.find_first_of(" \t\r"));
+    constexpr std::array<std::string_view, 10> kWords{"v", "vn", "vt", "vp",     "f",
+                                                      "g", "o",  "s",  "mtllib", "usemtl"};
+    return std::find(kWords.begin(), kWords.end(), word) != kWords.end();
+  }
+  return false;
+}
+
+Evidence sniff_obj(const ImportInput& input) {
+  return looks_like_obj(beginning(input)) ? Evidence::weak : Evidence::none;
+}
 
 Surface read_obj(ImportInput& input, const ImportOptions& options) {
   ObjScan scan;
@@ -95,5 +114,12 @@ Surface read_obj(ImportInput& input, const ImportOptions& options) {
   surface.sources[0].bytes = std::move(input.bytes);
   return surface;
 }
+
+}  // namespace
+
+constinit const FileReader kObjReader{
+    .format = &kObjFormat, .sniff = sniff_obj, .read = read_obj, .is_text = [](const ImportInput&) {
+      return true;
+    }};
 
 }  // namespace flexel

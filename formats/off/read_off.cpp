@@ -35,7 +35,9 @@ std::optional<Column> color_column(const std::vector<OffColor>& colors, const st
   return column;
 }
 
-}  // namespace
+Evidence sniff_off(const ImportInput& input) {
+  return looks_like_off(beginning(input)) ? Evidence::text : Evidence::none;
+}
 
 Surface read_off(ImportInput& input, const ImportOptions& options) {
   OffFile file =
@@ -59,5 +61,12 @@ Surface read_off(ImportInput& input, const ImportOptions& options) {
   complete_single_part(surface, input);
   return surface;
 }
+
+}  // namespace
+
+constinit const FileReader kOffReader{
+    .format = &kOffFormat, .sniff = sniff_off, .read = read_off, .is_text = [](const ImportInput&) {
+      return true;
+    }};
 
 }  // namespace flexel

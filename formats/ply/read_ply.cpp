@@ -188,7 +188,14 @@ Surface read_elements(const PlyHeader& header, const ImportInput& input) {
                                            : "holds no faces: nothing to work on");
 }
 
-}  // namespace
+Evidence sniff_ply(const ImportInput& input) {
+  const std::string_view text = beginning(input);
+  return text.starts_with("ply\n") || text.starts_with("ply\r") ? Evidence::magic : Evidence::none;
+}
+
+bool is_ascii_ply(const ImportInput& input) {
+  return beginning(input).find("format ascii") != std::string_view::npos;
+}
 
 Surface read_ply(ImportInput& input, const ImportOptions& options) {
   const PlyHeader header = parse_ply_header(input.bytes, input.where);
@@ -200,5 +207,10 @@ Surface read_ply(ImportInput& input, const ImportOptions& options) {
   complete_single_part(surface, input);
   return surface;
 }
+
+}  // namespace
+
+constinit const FileReader kPlyReader{
+    .format = &kPlyFormat, .sniff = sniff_ply, .read = read_ply, .is_text = is_ascii_ply};
 
 }  // namespace flexel

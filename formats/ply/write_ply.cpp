@@ -10,6 +10,7 @@
 #include "base/files/output_file.h"
 #include "base/parallel.h"
 #include "base/version.h"
+#include "formats/common/file_formats.h"
 #include "formats/common/normal_change.h"
 #include "formats/common/surface_writers.h"
 #include "formats/ply/ply_text.h"
@@ -164,8 +165,7 @@ std::string header_lines(const std::vector<NewProperty>& properties) {
 struct Numbered {
   explicit Numbered(const Surface& surface) : parts(surface.parts.size() > 1) {
     for (const SurfaceFace& face : surface.faces) faces = faces || !face.name.empty();
-    for (const SurfaceSource& source : surface.sources)
-      faces = faces || source.format == "step" || source.format == "iges" || source.format == "brep";
+    for (const SurfaceSource& source : surface.sources) faces = faces || is_cad(source);
   }
   bool parts, faces = false;
 };

@@ -345,10 +345,26 @@ bool is_ascii(const ImportInput& input) {
   return std::none_of(text.begin(), text.end(), binary);
 }
 
-}  // namespace
+// A binary STL of n triangles is 84 + 50 n bytes long.
+bool sized_like_binary(const ImportInput& input) {
+  if (input.bytes.size() < kPreambleSize) return false;
+  std::uint32_t count = 0;
+  std::memcpy(&count, input.bytes.data() + kHeaderSize, sizeof count);
+  return input.bytes.size() == kPreambleSize + kRecordSize * count;
+}
+
+Evidence sniff_stl(const ImportInput& input) {
+  if (sized_like_binary(input)) return Evidence::size;
+  return begins_with_word(beginning(input), "solid") ? Evidence::text : Evidence::none;
+}
 
 Surface read_stl(ImportInput& input, const ImportOptions& options) {
   return is_ascii(input) ? read_ascii(input, options) : read_binary(input, options);
 }
+
+}  // namespace
+
+constinit const FileReader kStlReader{
+    .format = &kStlFormat, .sniff = sniff_stl, .read = read_stl, .hashed_while_read = true};
 
 }  // namespace flexel

@@ -353,11 +353,17 @@ class ThreeMfReader {
   std::size_t instances_ = 0;
 };
 
-}  // namespace
+Evidence sniff_3mf(const ImportInput& input) {
+  return beginning(input).starts_with("PK\x03\x04") ? Evidence::magic : Evidence::none;
+}
 
 Surface read_3mf(ImportInput& input, const ImportOptions& options) {
   if (options.unit) throw InputError(input.where, "a 3MF file carries its own unit: leave out --unit");
   return ThreeMfReader(input).read();
 }
+
+}  // namespace
+
+constinit const FileReader k3mfReader{.format = &k3mfFormat, .sniff = sniff_3mf, .read = read_3mf};
 
 }  // namespace flexel

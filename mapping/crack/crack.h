@@ -15,9 +15,9 @@ namespace flexel::mapping {
 // What --crack, --debris and --pieces ask for.
 struct CrackOptions {
   CrackMode mode = CrackMode::keep;
-  bool drop_debris = false;  // leave out pieces of a single element in parts that broke
-  std::string pieces;        // where a file for each piece goes, as write_parts() wants it; "" nowhere
-  SurfaceFormat pieces_format = SurfaceFormat::stl_binary;
+  bool drop_debris = false;     // leave out pieces of a single element in parts that broke
+  std::string pieces;           // where a file for each piece goes, as write_parts() wants it; "" nowhere
+  SurfaceFormat pieces_format;  // where there are such files
 };
 
 // The parted surface.

@@ -54,7 +54,7 @@ inline std::vector<Vec3> nothing(const Surface& surface) {
 }
 
 inline std::string part_path(const std::string& name) {
-  return std::string(FLEXEL_PARTS_DIR) + "/" + name;
+  return (std::filesystem::path(FLEXEL_PARTS_DIR) / name).string();
 }
 #define SKIP_WITHOUT_PARTS() \
   if (!std::filesystem::exists(FLEXEL_PARTS_DIR)) GTEST_SKIP() << "no parts folder: " << FLEXEL_PARTS_DIR

@@ -56,7 +56,7 @@ TEST(ImportOracle, AssimpReadsTheGlbThatWeWrite) {
   append(surface, import_surface(scratch.write("two.off", box)));
   std::vector<Vec3> displacement(8, Vec3::Zero());
   displacement.resize(16, Vec3(0, 0, 0.02));
-  write_surface(surface, displacement, SurfaceFormat::glb, 1, scratch.path("new.glb"));
+  write_surface(surface, displacement, surface_format("glb"), 1, scratch.path("new.glb"));
   const std::vector<Vec3> seen = corners_by_assimp(scratch.path("new.glb"));
   const Triangles triangles = triangulate(surface);
   ASSERT_EQ(seen.size(), 3 * triangles.corners.size());

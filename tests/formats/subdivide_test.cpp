@@ -155,7 +155,8 @@ TEST(SubdivideImport, WhatWasSplitIsANewFile) {
   ASSERT_EQ(refinement_notes(fine).size(), 1u);
   EXPECT_THAT(refinement_notes(fine)[0], ::testing::HasSubstr("plate.obj: its triangles were split"));
   const std::string out = scratch.path("out.obj");
-  write_surface(fine, std::vector<Vec3>(fine.vertices.size(), Vec3::Zero()), SurfaceFormat::obj, 1e-3, out);
+  write_surface(fine, std::vector<Vec3>(fine.vertices.size(), Vec3::Zero()), surface_format("obj"), 1e-3,
+                out);
   const Surface again = import_surface(out);
   EXPECT_EQ(again.polygon_count(), fine.polygon_count());
   EXPECT_EQ(again.faces.size(), 6u);

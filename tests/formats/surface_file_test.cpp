@@ -60,7 +60,7 @@ TEST(SurfaceFile, BinaryStlThatDidNotMoveHasTheSameBytesButForNormals) {
     ImportOptions options;
     options.unit = unit;
     const Surface surface = import_surface(scratch.write("a.stl", original), options);
-    std::string bytes = written(surface, nothing(surface), SurfaceFormat::stl_binary, scratch);
+    std::string bytes = written(surface, nothing(surface), surface_format("stl"), scratch);
     ASSERT_EQ(bytes.size(), original.size());
     for (std::size_t t = 0; t < facets.size(); ++t) {
       Eigen::Vector3f normal;
@@ -76,9 +76,9 @@ TEST(SurfaceFile, StlHeaderIsTheirsOrOursButOursNeverBeginsWithSolid) {
   const Scratch scratch;
   const Facets box = box_facets({0, 0, 0}, {1, 1, 1});
   const Surface solid = import_surface(scratch.write("a.stl", binary_stl(box, "solid theirs")));
-  EXPECT_THAT(written(solid, nothing(solid), SurfaceFormat::stl_binary, scratch), StartsWith("solid theirs"));
+  EXPECT_THAT(written(solid, nothing(solid), surface_format("stl"), scratch), StartsWith("solid theirs"));
   const Surface obj = import_surface(scratch.write("solid.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"));
-  EXPECT_THAT(written(obj, nothing(obj), SurfaceFormat::stl_binary, scratch), StartsWith("Flexel"));
+  EXPECT_THAT(written(obj, nothing(obj), surface_format("stl"), scratch), StartsWith("Flexel"));
 }
 
 TEST(SurfaceFile, EveryFormatBringsBackTheMovedPartInOrder) {
@@ -88,14 +88,14 @@ TEST(SurfaceFile, EveryFormatBringsBackTheMovedPartInOrder) {
   const std::vector<Vec3> motion = random_motion(surface);
   Surface moved = surface;
   for (std::size_t v = 0; v < motion.size(); ++v) moved.vertices[v] += motion[v];
-  for (const auto& [format, name, tolerance] : {std::tuple{SurfaceFormat::stl_binary, "b.stl", 1e-8},
-                                                {SurfaceFormat::stl_ascii, "b.stl", 1e-17},
-                                                {SurfaceFormat::obj, "b.obj", 1e-17}}) {
+  for (const auto& [format, name, tolerance] : {std::tuple{surface_format("stl"), "b.stl", 1e-8},
+                                                {surface_format("stl", "", true), "b.stl", 1e-17},
+                                                {surface_format("obj"), "b.obj", 1e-17}}) {
     write_surface(surface, motion, format, 1e-3, scratch.path(name));
     EXPECT_LE(largest_difference(soup(import_surface(scratch.path(name))), soup(moved)), tolerance);
   }
   const double inch = 0.0254;
-  write_surface(surface, motion, SurfaceFormat::obj, inch, scratch.path("inch.obj"));
+  write_surface(surface, motion, surface_format("obj"), inch, scratch.path("inch.obj"));
   ImportOptions inches;
   inches.unit = inch;
   EXPECT_LE(largest_difference(soup(import_surface(scratch.path("inch.obj"), inches)), soup(moved)), 1e-17);
@@ -110,13 +110,13 @@ TEST(SurfaceFile, AsciiStlKeepsSolidsNamesAndTheFilesOwnDigits) {
       "0 0\n"
       "   vertex 6 0 0\n   vertex 5.123456 1 0\n  endloop\n endfacet\nendsolid right wing\n";
   const Surface surface = import_surface(scratch.write("a.stl", text));
-  const std::string again = written(surface, nothing(surface), SurfaceFormat::stl_ascii, scratch);
+  const std::string again = written(surface, nothing(surface), surface_format("stl", "", true), scratch);
   for (const char* line :
        {"solid left\n", "vertex 0.1 0.2 0.3\n", "vertex 1.7 0 -12.34\n", "vertex 1e-05 1 0\n",
         "endsolid left\nsolid right wing\n", "vertex 5.123456 1 0\n", "endsolid right wing\n"})
     EXPECT_THAT(again, HasSubstr(line));
-  EXPECT_EQ(written(import_surface(scratch.write("b.stl", again)), nothing(surface), SurfaceFormat::stl_ascii,
-                    scratch),
+  EXPECT_EQ(written(import_surface(scratch.write("b.stl", again)), nothing(surface),
+                    surface_format("stl", "", true), scratch),
             again);
 }
 
@@ -129,7 +129,7 @@ const char* const kAwkwardObj =
 TEST(SurfaceFile, AnObjThatDidNotMoveIsTheSameByteForByte) {
   const Scratch scratch;
   const Surface surface = import_surface(scratch.write("a.obj", kAwkwardObj));
-  EXPECT_EQ(written(surface, nothing(surface), SurfaceFormat::obj, scratch), kAwkwardObj);
+  EXPECT_EQ(written(surface, nothing(surface), surface_format("obj"), scratch), kAwkwardObj);
 }
 
 TEST(SurfaceFile, OnlyCoordinatesThatMovedAreRewrittenInAnObj) {
@@ -140,7 +140,7 @@ TEST(SurfaceFile, OnlyCoordinatesThatMovedAreRewrittenInAnObj) {
   std::string expected = kAwkwardObj;
   const std::string before = "v 1.0e0\t0 \\\r\n 0 1.0\r\n", after = "v 1.0e0\t0.5 \\\r\n 0 1.0\r\n";
   expected.replace(expected.find(before), before.size(), after);
-  EXPECT_EQ(written(surface, motion, SurfaceFormat::obj, scratch), expected);
+  EXPECT_EQ(written(surface, motion, surface_format("obj"), scratch), expected);
 }
 
 TEST(SurfaceFile, NormalsOfAnObjTurnWithTheirPolygonsAndKeepTheirLength) {
@@ -149,20 +149,20 @@ TEST(SurfaceFile, NormalsOfAnObjTurnWithTheirPolygonsAndKeepTheirLength) {
   const Eigen::AngleAxisd quarter(std::acos(-1.0) / 2, Vec3::UnitX());
   std::vector<Vec3> motion;
   for (const Vec3& v : surface.vertices) motion.push_back(quarter * v - v);
-  const std::string text = written(surface, motion, SurfaceFormat::obj, scratch);
+  const std::string text = written(surface, motion, surface_format("obj"), scratch);
   const std::size_t at = text.find("vn ");
   double x = 0, y = 0, z = 0;
   ASSERT_EQ(std::sscanf(text.c_str() + at, "vn %lf %lf %lf", &x, &y, &z), 3);
   EXPECT_NEAR((Vec3(x, y, z) - Vec3(0, -1, 0)).norm(), 0, 1e-8);
   EXPECT_THAT(text, HasSubstr("vn 1 0 0\r\n"));  // used by no polygon
   const std::vector<Vec3> shift(surface.vertices.size(), Vec3(1e-3, 2e-3, 0.3e-3));
-  EXPECT_THAT(written(surface, shift, SurfaceFormat::obj, scratch), HasSubstr("vn 0.000 0 1.0\r\n"));
+  EXPECT_THAT(written(surface, shift, surface_format("obj"), scratch), HasSubstr("vn 0.000 0 1.0\r\n"));
 }
 
 TEST(SurfaceFile, ObjInAnotherUnitScalesEveryVertex) {
   const Scratch scratch;
   const Surface surface = import_surface(scratch.write("a.obj", "v 1 2 3\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"));
-  EXPECT_THAT(written(surface, nothing(surface), SurfaceFormat::obj, scratch, 1.0),
+  EXPECT_THAT(written(surface, nothing(surface), surface_format("obj"), scratch, 1.0),
               HasSubstr("v 0.001 0.002 0.003\n"));
 }
 
@@ -176,10 +176,10 @@ TEST(SurfaceFile, FormatsAreChosenByNameOrExtension) {
     }
     return "";
   };
-  EXPECT_EQ(surface_format("", "a.STL", false), SurfaceFormat::stl_binary);
-  EXPECT_EQ(surface_format("", "a.stl", true), SurfaceFormat::stl_ascii);
-  EXPECT_EQ(surface_format("obj", "-", false), SurfaceFormat::obj);
-  EXPECT_EQ(surface_format("stl", "a.obj", false), SurfaceFormat::stl_binary);
+  EXPECT_EQ(surface_format("", "a.STL", false), surface_format("stl"));
+  EXPECT_EQ(surface_format("", "a.stl", true), surface_format("stl", "", true));
+  EXPECT_EQ(surface_format("obj", "-", false), surface_format("obj"));
+  EXPECT_EQ(surface_format("stl", "a.obj", false), surface_format("stl"));
   EXPECT_THAT(error("", "-"), HasSubstr("a pipe needs --format"));
   EXPECT_THAT(error("", "name"), HasSubstr("--format"));
   EXPECT_THAT(error("", "a.step"), HasSubstr("cannot be written as \"step\""));
@@ -192,10 +192,11 @@ TEST(SurfaceFile, WhatDoesNotFitIsRefusedAndNothingIsLeft) {
   const Surface surface = import_surface(scratch.write("a.obj", "v 1 2 3\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"));
   std::vector<Vec3> motion = nothing(surface);
   motion[1].x() = 1e37;
-  EXPECT_THROW(write_surface(surface, motion, SurfaceFormat::stl_binary, 1e-3, scratch.path("out.stl")),
+  EXPECT_THROW(write_surface(surface, motion, surface_format("stl"), 1e-3, scratch.path("out.stl")),
                InputError);
   motion[1].x() = std::nan("");
-  EXPECT_THROW(write_surface(surface, motion, SurfaceFormat::obj, 1e-3, scratch.path("out.obj")), InputError);
+  EXPECT_THROW(write_surface(surface, motion, surface_format("obj"), 1e-3, scratch.path("out.obj")),
+               InputError);
   EXPECT_FALSE(std::filesystem::exists(scratch.path("out.stl")));
   EXPECT_FALSE(std::filesystem::exists(scratch.path("out.obj")));
 }
@@ -206,12 +207,12 @@ TEST(SurfaceFile, PartsComeBackFromEveryFormat) {
   for (const char* name :
        {"rabbit.obj", "quadknot.obj", "spot_quadrangulated.obj", "openscad-nonmanifold-crash.obj"}) {
     const Surface surface = import_surface(part_path(name));
-    EXPECT_EQ(written(surface, nothing(surface), SurfaceFormat::obj, scratch), read_file(part_path(name)))
+    EXPECT_EQ(written(surface, nothing(surface), surface_format("obj"), scratch), read_file(part_path(name)))
         << name;
   }
   for (const char* name : {"conrod.stl", "ADIS16480.STL", "multibody.stl", "rabbit.obj"}) {
     const Surface surface = import_surface(part_path(name));
-    write_surface(surface, nothing(surface), SurfaceFormat::stl_ascii, 1e-3, scratch.path("a.stl"));
+    write_surface(surface, nothing(surface), surface_format("stl", "", true), 1e-3, scratch.path("a.stl"));
     EXPECT_EQ(largest_difference(soup(import_surface(scratch.path("a.stl"))), soup(surface)), 0) << name;
   }
 }

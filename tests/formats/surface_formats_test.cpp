@@ -51,10 +51,10 @@ constexpr const char* kPly =
 TEST(WritePly, FromPlyEverythingButPositionsAndNormalsStays) {
   const Scratch scratch;
   const Surface surface = import_surface(scratch.write("a.ply", kPly));
-  EXPECT_EQ(written_as(surface, nothing(surface), SurfaceFormat::ply, scratch, "b.ply"), kPly);
+  EXPECT_EQ(written_as(surface, nothing(surface), surface_format("ply"), scratch, "b.ply"), kPly);
   std::vector<Vec3> motion = nothing(surface);
   motion[1] = Vec3(0, 0.25e-3, 0);
-  const std::string text = written_as(surface, motion, SurfaceFormat::ply, scratch, "c.ply");
+  const std::string text = written_as(surface, motion, surface_format("ply"), scratch, "c.ply");
   EXPECT_THAT(text, StartsWith(std::string(kPly).substr(0, std::string(kPly).find("end_header"))));
   EXPECT_THAT(text, HasSubstr("\r\n 0 1.50 0.25 0 7 9 "));
   EXPECT_THAT(text, HasSubstr("\r\n255 0 0 0.000 7 9 "));
@@ -67,7 +67,7 @@ TEST(WritePly, NormalsTurnWithTheSurface) {
   const Surface surface = import_surface(scratch.write("a.ply", kPly));
   std::vector<Vec3> motion;
   for (const Vec3& v : surface.vertices) motion.push_back(Vec3(-v.y(), v.x(), v.z()) - v);
-  const std::string text = written_as(surface, motion, SurfaceFormat::ply, scratch, "b.ply");
+  const std::string text = written_as(surface, motion, surface_format("ply"), scratch, "b.ply");
   // The second vertex's normal, x, is now y.
   const std::string line = text.substr(text.find("\r\n 0 ") + 2);
   double red, x, y, z, green, blue, nx, ny, nz;
@@ -102,8 +102,8 @@ TEST(WritePly, BinaryKeepsTypesAndByteOrder) {
       for (const std::int32_t v : t) add(v);
     }
     const Surface surface = import_surface(scratch.write("a.ply", data));
-    EXPECT_EQ(written_as(surface, nothing(surface), SurfaceFormat::ply, scratch, "b.ply"), data);
-    const std::string moved = written_as(surface, bend(surface), SurfaceFormat::ply, scratch, "c.ply");
+    EXPECT_EQ(written_as(surface, nothing(surface), surface_format("ply"), scratch, "b.ply"), data);
+    const std::string moved = written_as(surface, bend(surface), surface_format("ply"), scratch, "c.ply");
     EXPECT_EQ(moved.size(), data.size());
     const Surface after = import_surface(scratch.path("c.ply"));
     expect_moved(surface, bend(surface), after, 1e-10);
@@ -126,7 +126,7 @@ Surface two_parts(const Scratch& scratch) {
 TEST(WritePly, ANewFileHasColoursNumbersPartsAndFaces) {
   const Scratch scratch;
   const Surface surface = two_parts(scratch);
-  for (const SurfaceFormat format : {SurfaceFormat::ply, SurfaceFormat::ply_ascii}) {
+  for (const SurfaceFormat format : {surface_format("ply"), surface_format("ply", "", true)}) {
     const std::string text = written_as(surface, bend(surface), format, scratch, "n.ply");
     EXPECT_THAT(text, HasSubstr("comment part 1 is two\n"));
     const Surface again = import_surface(scratch.path("n.ply"));
@@ -146,20 +146,21 @@ TEST(WriteOff, FromOffEverythingButPositionsAndNormalsStays) {
       "NOFF # a tetrahedron\n4 4\n0 0 0.0 0 0 1\n1.00 0 0 1 0 0\n0 1 0 0 1 0\n0 0 1 0 0 1\n\n3 0 2 1 7\n"
       "3 0 1 3 0.5 0.5 0.5 # grey\n3 1 2 3\n3 2 0 3";
   const Surface surface = import_surface(scratch.write("a.off", text));
-  EXPECT_EQ(written_as(surface, nothing(surface), SurfaceFormat::off, scratch, "b.off"), text);
+  EXPECT_EQ(written_as(surface, nothing(surface), surface_format("off"), scratch, "b.off"), text);
   std::vector<Vec3> shift(4, Vec3(0, 0, 1e-3));
-  const std::string moved = written_as(surface, shift, SurfaceFormat::off, scratch, "c.off");
+  const std::string moved = written_as(surface, shift, surface_format("off"), scratch, "c.off");
   EXPECT_EQ(moved,
             "NOFF # a tetrahedron\n4 4\n0 0 1 0 0 1\n1.00 0 1 1 0 0\n0 1 1 0 1 0\n0 0 2 0 0 1\n\n3 0 2 1 7\n"
             "3 0 1 3 0.5 0.5 0.5 # grey\n3 1 2 3\n3 2 0 3");
-  static_cast<void>(written_as(surface, bend(surface), SurfaceFormat::off, scratch, "d.off"));
+  static_cast<void>(written_as(surface, bend(surface), surface_format("off"), scratch, "d.off"));
   expect_moved(surface, bend(surface), import_surface(scratch.path("d.off")), 1e-18);
 }
 
 TEST(WriteOff, ANewFileHasColours) {
   const Scratch scratch;
   const Surface surface = two_parts(scratch);
-  EXPECT_THAT(written_as(surface, bend(surface), SurfaceFormat::off, scratch, "n.off"), StartsWith("COFF\n"));
+  EXPECT_THAT(written_as(surface, bend(surface), surface_format("off"), scratch, "n.off"),
+              StartsWith("COFF\n"));
   const Surface again = import_surface(scratch.path("n.off"));
   expect_moved(surface, bend(surface), again, 1e-18);
   EXPECT_EQ(again.vertex_columns.at("color").values, surface.vertex_columns.at("color").values);
@@ -169,7 +170,7 @@ TEST(WriteOff, ANewFileHasColours) {
 TEST(WriteGlb, ANewFileHasPartsColoursAndNumbers) {
   const Scratch scratch;
   Surface surface = two_parts(scratch);
-  static_cast<void>(written_as(surface, bend(surface), SurfaceFormat::glb, scratch, "n.glb"));
+  static_cast<void>(written_as(surface, bend(surface), surface_format("glb"), scratch, "n.glb"));
   const Surface again = import_surface(scratch.path("n.glb"));
   ASSERT_EQ(again.parts.size(), 2u);
   EXPECT_EQ(again.parts[1].name, "two");
@@ -206,8 +207,8 @@ std::string instanced() {
 TEST(WriteGlb, FromGlbInstancesGetMeshesOfTheirOwn) {
   const Scratch scratch;
   const Surface surface = import_surface(scratch.write("a.glb", instanced()));
-  EXPECT_EQ(written_as(surface, nothing(surface), SurfaceFormat::glb, scratch, "b.glb"), instanced());
-  const std::string text = written_as(surface, bend(surface), SurfaceFormat::glb, scratch, "c.glb");
+  EXPECT_EQ(written_as(surface, nothing(surface), surface_format("glb"), scratch, "b.glb"), instanced());
+  const std::string text = written_as(surface, bend(surface), surface_format("glb"), scratch, "c.glb");
   EXPECT_THAT(text, HasSubstr("\"generator\":\"hand\""));
   EXPECT_THAT(text, HasSubstr("\"translation\":[4,0,0]"));
   const Surface after = import_surface(scratch.path("c.glb"));
@@ -216,7 +217,7 @@ TEST(WriteGlb, FromGlbInstancesGetMeshesOfTheirOwn) {
   // Only the second instance moves: the first keeps the mesh that it had.
   std::vector<Vec3> second = nothing(surface);
   for (std::size_t v = 4; v < 8; ++v) second[v] = Vec3(0, 0, 0.5);
-  const std::string partly = written_as(surface, second, SurfaceFormat::glb, scratch, "d.glb");
+  const std::string partly = written_as(surface, second, surface_format("glb"), scratch, "d.glb");
   EXPECT_THAT(partly, HasSubstr(R"({"mesh":0,"name":"a"})"));
   expect_moved(surface, second, import_surface(scratch.path("d.glb")), 1e-6);
 }
@@ -227,7 +228,7 @@ TEST(WriteGlb, AMeshOfOneNodeIsOverwrittenInPlace) {
   one.replace(one.find("{\"mesh\":0,\"name\":\"a\"}"), 21, std::string("{}") + std::string(19, ' '));
   const Surface surface = import_surface(scratch.write("a.glb", one));
   ASSERT_EQ(surface.parts.size(), 1u);
-  const std::string moved = written_as(surface, bend(surface), SurfaceFormat::glb, scratch, "b.glb");
+  const std::string moved = written_as(surface, bend(surface), surface_format("glb"), scratch, "b.glb");
   EXPECT_EQ(moved.size() - moved.find("BIN"), one.size() - one.find("BIN"));
   expect_moved(surface, bend(surface), import_surface(scratch.path("b.glb")), 2e-5);
 }
@@ -235,9 +236,9 @@ TEST(WriteGlb, AMeshOfOneNodeIsOverwrittenInPlace) {
 TEST(WriteSurface, RealFilesComeOutAsTheyWentIn) {
   SKIP_WITHOUT_PARTS();
   const Scratch scratch;
-  for (const auto& [file, format] : {std::pair{"cycloidal.ply", SurfaceFormat::ply},
-                                     {"ballA.off", SurfaceFormat::off},
-                                     {"pins.glb", SurfaceFormat::glb}}) {
+  for (const auto& [file, format] : {std::pair{"cycloidal.ply", surface_format("ply")},
+                                     {"ballA.off", surface_format("off")},
+                                     {"pins.glb", surface_format("glb")}}) {
     const Surface surface = import_surface(part_path(file));
     EXPECT_EQ(written_as(surface, nothing(surface), format, scratch, file), read_file(part_path(file)))
         << file;
@@ -253,7 +254,7 @@ TEST(WriteSurface, OneFileAPart) {
   const Scratch scratch;
   Surface surface = two_parts(scratch);
   surface.parts[1].name = "left/arm";
-  write_surface(surface, bend(surface), SurfaceFormat::ply, 1e-3, scratch.path("out_{part}.ply"));
+  write_surface(surface, bend(surface), surface_format("ply"), 1e-3, scratch.path("out_{part}.ply"));
   const Surface one = import_surface(scratch.path("out_one.ply")),
                 two = import_surface(scratch.path("out_left_arm.ply"));
   EXPECT_EQ(one.vertices.size(), 4u);
@@ -271,7 +272,7 @@ TEST(WriteSurface, NamesThatDifferByASlashGetFilesOfTheirOwn) {
     Surface surface = two_parts(scratch);
     surface.parts[slash_first ? 0 : 1].name = "left/arm";
     surface.parts[slash_first ? 1 : 0].name = "left_arm";
-    write_surface(surface, nothing(surface), SurfaceFormat::ply, 1e-3, scratch.path("out_{part}.ply"));
+    write_surface(surface, nothing(surface), surface_format("ply"), 1e-3, scratch.path("out_{part}.ply"));
     const auto first_of = [&](const std::string& file, std::size_t part) {
       const Surface own = import_surface(scratch.path(file));
       EXPECT_EQ(own.vertex_columns.at("heat").values.front(),
@@ -284,10 +285,10 @@ TEST(WriteSurface, NamesThatDifferByASlashGetFilesOfTheirOwn) {
 }
 
 TEST(SurfaceFormat, NewFormatsAreTold) {
-  EXPECT_EQ(surface_format("", "a.ply", false), SurfaceFormat::ply);
-  EXPECT_EQ(surface_format("ply", "-", true), SurfaceFormat::ply_ascii);
-  EXPECT_EQ(surface_format("", "a.OFF", false), SurfaceFormat::off);
-  EXPECT_EQ(surface_format("glb", "-", false), SurfaceFormat::glb);
+  EXPECT_EQ(surface_format("", "a.ply", false), surface_format("ply"));
+  EXPECT_EQ(surface_format("ply", "-", true), surface_format("ply", "", true));
+  EXPECT_EQ(surface_format("", "a.OFF", false), surface_format("off"));
+  EXPECT_EQ(surface_format("glb", "-", false), surface_format("glb"));
   EXPECT_THROW(static_cast<void>(surface_format("glb", "-", true)), InputError);
   EXPECT_THROW(static_cast<void>(surface_format("", "a.gltf", false)), InputError);
 }

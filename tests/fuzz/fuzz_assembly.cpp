@@ -67,7 +67,7 @@ void read_mutant(const std::string& path) {
   if (bytes[0] == std::byte{'g'} || bytes[0] == std::byte{'{'}) {
     const Surface surface = import_surface(path, options);
     check(surface, path);
-    fuzz::write_moved(surface, SurfaceFormat::glb, path + ".out");
+    fuzz::write_moved(surface, surface_format("glb"), path + ".out");
     return;
   }
   const std::string archive = path + ".3mf";

@@ -55,7 +55,7 @@ int main(int argc, char** argv) {
     options.format = !bytes.empty() && bytes[0] == std::byte{'p'} ? "ply" : "off";
     const Surface surface = import_surface(path, options);
     check(surface, path);
-    fuzz::write_moved(surface, *options.format == "ply" ? SurfaceFormat::ply : SurfaceFormat::off,
+    fuzz::write_moved(surface, *options.format == "ply" ? surface_format("ply") : surface_format("off"),
                       path + ".out");
   });
 }

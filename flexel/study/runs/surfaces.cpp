@@ -65,7 +65,7 @@ void write_error_surface(const std::string& path, const std::string& finest, dou
   surface.sources.front().bytes.clear();  // a new file, not the old one with other positions
   surface.sources.front().format = "obj";
   const std::vector<Vec3> still(surface.vertices.size(), Vec3::Zero());
-  write_surface(surface, still, SurfaceFormat::ply, 1e-3, out);
+  write_surface(surface, still, surface_format("ply"), 1e-3, out);
 }
 
 }  // namespace flexel::study

@@ -1,0 +1,52 @@
+// Text of coordinates and lines in a source's text: what several writers need.
+#include "formats/common/surface_writers.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <iterator>
+
+namespace flexel {
+namespace {
+
+// Decimal of 15 digits that, read in `unit`, gives exactly `metres`; "" where there is none.
+std::string rest_text(double metres, double unit) {
+  std::string text = fmt::format("{:.15g}", metres / unit);
+  double back = 0;
+  std::from_chars(text.data(), text.data() + text.size(), back);
+  if (back * unit != metres) text.clear();
+  return text;
+}
+
+}  // namespace
+
+void append_position(std::string& text, const DeformedSurface& deformed, std::size_t v) {
+  const Vec3 at = deformed.at(v);
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    text += ' ';
+    const std::string rest =
+        deformed.displacement[v][i] == 0 ? rest_text(deformed.surface.vertices[v][i], deformed.unit) : "";
+    if (rest.empty())
+      fmt::format_to(std::back_inserter(text), "{}", at[i]);
+    else
+      text += rest;
+  }
+}
+
+void add_source_line(Surface& surface, std::string_view format, const std::string& line, int skip) {
+  const std::string text = line + "\n";
+  for (SurfaceSource& source : surface.sources) {
+    if (source.format.substr(0, source.format.find('-')) != format) continue;
+    auto at = source.bytes.begin();
+    for (int i = 0; i < skip && at != source.bytes.end(); ++i) {
+      at = std::find(at, source.bytes.end(), std::byte{'\n'});
+      if (at != source.bytes.end()) ++at;
+    }
+    if (at == source.bytes.end()) continue;  // no such line
+    const auto* bytes = reinterpret_cast<const std::byte*>(text.data());
+    source.bytes.insert(at, bytes, bytes + text.size());
+  }
+}
+
+}  // namespace flexel
