@@ -270,7 +270,7 @@ int info_command(int argc, char** argv) {
   bool json = false;
   CLI::App app{"What a part is, and what a scene can name in it.", "flexel info"};
   app.add_option("part", files, read_titles() + " files; -: stdin")->required()->type_name("PART");
-  app.add_flag("--json", json, "As JSON, in SI units (docs/info.md)");
+  app.add_flag("--json", json, "As JSON, in SI units (docs/guide/info.md)");
   app.add_option("--unit", unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
   app.add_option("--edge", edge, "Split the mesh to this longest edge (default: not split)")
       ->type_name("LENGTH");

@@ -28,7 +28,7 @@
 #include "simulate/linear/block_jacobi.h"
 #include "simulate/linear/conjugate_gradients.h"
 #include "simulate/linear/multigrid.h"
-"simulate/linear/vector_products.h"
+#include "simulate/linear/vector_products.h"
 
     namespace flexel::simulate {
   namespace {
