@@ -1,9 +1,11 @@
 // The body is moved into the picture's subject, so that memory holds it once.
 #include "flexel/bent_picture.h"
+#include "flexel/picture/canvas/png_file.h"
 
 #include <fmt/format.h>
 
 #include "base/files/files.h"
+#include "base/files/output_file.h"
 #include "flexel/picture/picture.h"
 
 namespace flexel::commands {

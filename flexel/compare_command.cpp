@@ -13,6 +13,7 @@
 
 #include "base/error.h"
 #include "base/files/files.h"
+#include "base/files/output_file.h"
 #include "base/human.h"
 #include "base/parallel.h"
 #include "base/program/termination.h"

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/files/files.h"
+#include "base/files/output_file.h"
 #include "base/files/outputs.h"
 #include "base/nearest_word.h"
 #include "base/parallel.h"
@@ -14,6 +15,9 @@
 #include "flexel/commands.h"
 #include "flexel/coordinates.h"
 #include "flexel/export/calculix_file.h"
+#include "flexel/export/hex_mesh.h"
+#include "flexel/export/tet_mesh.h"
+#include "flexel/export/translate.h"
 #include "flexel/job.h"
 #include "simulate/matter/fragments.h"
 #include "voxelize/report.h"
@@ -101,10 +105,41 @@ std::vector<std::string> head(const ExportArguments& arguments, const mesh_expor
 
 using Json = nlohmann::ordered_json;
 
+Json faces_json(const mesh_export::AnalysisMesh& mesh, const mesh_export::CalculixNames& names) {
+  const std::vector<double> areas = side_areas(mesh);
+  const std::vector<std::uint32_t> numbers = face_numbers(mesh.body.surface);
+  Json faces = Json::array();
+  for (std::size_t f = 0; f < mesh.sides.size(); ++f)
+    faces.push_back({{"selection", fmt::format("{}/{}", mesh.body.parts[mesh.body.surface.faces[f].part].name,
+                                               numbers[f])},
+                     {"nodes", "N_" + names.faces[f]},
+                     {"surface", "S_" + names.faces[f]},
+                     {"sides", mesh.sides[f].size()},
+                     {"area", areas[f]}});
+  return faces;
+}
+
+Json probes_json(const mesh_export::Analysis& analysis, const mesh_export::CalculixNames& names) {
+  Json probes = Json::array();
+  for (std::size_t i = 0; i < analysis.probes.size(); ++i) {
+    Json probe = {{"name", analysis.probes[i].name},
+                  {"set", "N_" + names.probes[i]},
+                  {"distance", analysis.probes[i].distance},
+                  {"nodes", Json::array()},
+                  {"weights", Json::array()}};
+    for (const auto& [node, weight] : analysis.probes[i].weights) {
+      probe["nodes"].push_back(node + 1);
+      probe["weights"].push_back(weight);
+    }
+    probes.push_back(probe);
+  }
+  return probes;
+}
+
 std::string summary(const mesh_export::Analysis& analysis, const ExportArguments& arguments) {
   const mesh_export::AnalysisMesh& mesh = analysis.mesh;
   const mesh_export::CalculixNames names = calculix_names(analysis);
-  const std::vector<double> volumes = section_volumes(mesh), areas = side_areas(mesh);
+  const std::vector<double> volumes = section_volumes(mesh);
   const std::vector<std::uint8_t> used = used_nodes(mesh);
   Json json;
   json["program"] = "flexel export";
@@ -125,16 +160,7 @@ std::string summary(const mesh_export::Analysis& analysis, const ExportArguments
                                 {"volume", volumes[s]}});
   }
   json["mass"] = mass;
-  json["faces"] = Json::array();
-  const std::vector<std::uint32_t> numbers = face_numbers(mesh.body.surface);
-  for (std::size_t f = 0; f < mesh.sides.size(); ++f)
-    json["faces"].push_back(
-        {{"selection",
-          fmt::format("{}/{}", mesh.body.parts[mesh.body.surface.faces[f].part].name, numbers[f])},
-         {"nodes", "N_" + names.faces[f]},
-         {"surface", "S_" + names.faces[f]},
-         {"sides", mesh.sides[f].size()},
-         {"area", areas[f]}});
+  json["faces"] = faces_json(mesh, names);
   json["supports"] = Json::array();
   for (std::size_t i = 0; i < analysis.supports.size(); ++i)
     json["supports"].push_back({{"name", analysis.supports[i].name},
@@ -151,19 +177,7 @@ std::string summary(const mesh_export::Analysis& analysis, const ExportArguments
   json["ties"] = Json::array();
   for (const mesh_export::TiedFaces& tie : analysis.ties)
     json["ties"].push_back({mesh.body.parts[tie.part[0]].name, mesh.body.parts[tie.part[1]].name});
-  json["probes"] = Json::array();
-  for (std::size_t i = 0; i < analysis.probes.size(); ++i) {
-    Json probe = {{"name", analysis.probes[i].name},
-                  {"set", "N_" + names.probes[i]},
-                  {"distance", analysis.probes[i].distance},
-                  {"nodes", Json::array()},
-                  {"weights", Json::array()}};
-    for (const auto& [node, weight] : analysis.probes[i].weights) {
-      probe["nodes"].push_back(node + 1);
-      probe["weights"].push_back(weight);
-    }
-    json["probes"].push_back(probe);
-  }
+  json["probes"] = probes_json(analysis, names);
   json["nlgeom"] = analysis.large_deflection;
   json["why_nlgeom"] = analysis.why_deflection;
   json["notes"] = mesh.notes;

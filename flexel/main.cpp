@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "base/files/files.h"
+#include "base/files/output_file.h"
 #include "base/nearest_word.h"
 #include "base/program/program.h"
 #include "base/version.h"

@@ -7,12 +7,14 @@
 #include <memory>
 
 #include "base/error.h"
+#include "base/files/output_file.h"
 #include "base/files/outputs.h"
 #include "base/parallel.h"
 #include "base/program/arguments.h"
 #include "base/program/termination.h"
 #include "base/units.h"
 #include "flexel/commands.h"
+#include "flexel/picture/canvas/png_file.h"
 #include "flexel/picture/picture.h"
 #include "formats/exchange/import.h"
 #include "formats/lattice/body_file.h"

@@ -11,6 +11,7 @@
 
 #include "base/error.h"
 #include "base/files/files.h"
+#include "base/files/output_file.h"
 #include "base/nearest_word.h"
 #include "base/program/arguments.h"
 #include "base/program/progress.h"
@@ -19,10 +20,11 @@
 #include "flexel/commands.h"
 #include "flexel/job.h"
 #include "flexel/scene_text.h"
-#include "flexel/study/scene_edit.h"
+#include "flexel/study/runs/scene_edit.h"
 #include "flexel/study/session.h"
 #include "simulate/scene/scene.h"
 #include "simulate/simulate.h"
+#include "voxelize/measure_part.h"
 #include "voxelize/voxelize.h"
 
 namespace flexel::commands {

@@ -4,6 +4,7 @@
 
 #include "base/error.h"
 #include "base/files/files.h"
+#include "base/files/output_file.h"
 #include "base/files/outputs.h"
 #include "base/parallel.h"
 #include "base/program/arguments.h"

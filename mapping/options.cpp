@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/files/files.h"
+#include "base/files/output_file.h"
 #include "base/nearest_word.h"
 #include "formats/exchange/part_files.h"
 #include "mapping/report/report.h"

@@ -3,6 +3,7 @@
 
 #include "base/error.h"
 #include "base/files/files.h"
+#include "base/files/output_file.h"
 #include "base/files/outputs.h"
 #include "base/program/arguments.h"
 #include "base/program/program.h"
@@ -42,14 +43,14 @@ std::string is_rate(const std::string& text) {
 }
 
 void declare(CLI::App& app, Arguments& arguments) {
-  app.add_option("scene", arguments.scene, "Scene file (TOML; docs/scene.md gives every key)");
+  app.add_option("scene", arguments.scene, "Scene file (TOML; docs/reference/scene.md gives every key)");
   app.add_option("body", arguments.bodies,
                  "Body files; none or \"-\": stdin. Several are simulated together");
   app.add_option("-o,--output", arguments.output,
                  "Deformed body (.vtu; in timed runs also .pvd, a series of frames); \"-\": stdout");
   app.add_option("--checkpoint", arguments.options.checkpoint,
                  "Timed runs: write now and then, and when the run is stopped, all that it needs to go on to "
-                 "this file (docs/motion.md)");
+                 "this file (docs/reference/motion.md)");
   app.add_option("--checkpoint-every", arguments.checkpoint_every,
                  "Work between two of them (\"60 s\"); \"10 min\" by itself")
       ->type_name("TIME");
@@ -59,7 +60,7 @@ void declare(CLI::App& app, Arguments& arguments) {
       "run, and need not be given");
   app.add_option("--threads", arguments.options.threads, "Threads; 0: every core")
       ->check(CLI::NonNegativeNumber);
-  app.add_option("--summary", arguments.summary, "Write the summary as JSON to this file (docs/summary.md)");
+  app.add_option("--summary", arguments.summary, "Write the summary as JSON to this file (docs/reference/summary.md)");
   app.add_flag("--explain", arguments.options.explain,
                "Say which effects run and why, and the share of time of each");
   app.add_option("--timeout", arguments.timeout,
@@ -68,11 +69,11 @@ void declare(CLI::App& app, Arguments& arguments) {
       ->type_name("TIME");
   app.add_option(
       "--history", arguments.options.history,
-      "Timed runs: write energies, momenta and probes over time to this CSV file (docs/motion.md)");
+      "Timed runs: write energies, momenta and probes over time to this CSV file (docs/reference/motion.md)");
   app.add_option(
          "--live", arguments.live,
          "Timed runs: keep real time, and write frames of positions and of what tools feel to stdout, "
-         "or where readers attach: tcp:PORT on this machine, unix:PATH (docs/live.md)")
+         "or where readers attach: tcp:PORT on this machine, unix:PATH (docs/guide/live.md)")
       ->expected(0, 1)
       ->type_name("[WHERE]");
   app.add_option("--live-rate", arguments.options.live_rate, "Frames a second")
@@ -84,9 +85,9 @@ void declare(CLI::App& app, Arguments& arguments) {
       ->capture_default_str();
   app.add_option("--isa", arguments.options.isa,
                  "Timed runs: instruction set of the kernel (portable, avx2, avx512); the best by itself");
-  app.add_flag("!--no-stress", arguments.options.stress, "Leave out the stresses (docs/stress.md)");
+  app.add_flag("!--no-stress", arguments.options.stress, "Leave out the stresses (docs/theory/stress.md)");
   app.add_flag("!--no-estimate", arguments.options.estimate,
-               "Leave out the error bars, and the two coarser runs that they come from (docs/error-bars.md)");
+               "Leave out the error bars, and the two coarser runs that they come from (docs/theory/error-bars.md)");
   app.add_flag("--quiet", arguments.quiet, "Say nothing but warnings and errors");
   app.add_flag("--verbose", arguments.verbose, "Say all that was found");
   app.add_flag("--compress", arguments.compress, "Compress the arrays of the body file");

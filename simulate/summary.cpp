@@ -177,6 +177,64 @@ std::string live_line(const LiveSummary& live) {
       live.behind, 1e3 * rms_jitter(live), 1e3 * live.worst_jitter, live.readers, human_count(live.dropped));
 }
 
+Json run_json(const SimulateResult& result) {
+  Json json;
+  if (result.timed) {
+    json["timed"] = {{"time", result.timed->time},
+                     {"steps", result.timed->steps},
+                     {"step", result.timed->step},
+                     {"isa", result.timed->isa}};
+    for (const auto& [name, joules] : result.timed->books) json["timed"]["books"][name] = joules;
+    if (result.timed->live) json["timed"]["live"] = live_json(*result.timed->live);
+  } else if (result.settled) {
+    json["settled"] = {{"steps", result.settled->steps},
+                       {"relative_residual", result.settled->residual},
+                       {"kinetic_energy", result.settled->kinetic},
+                       {"tolerance", result.settled->tolerance}};
+  } else {
+    json["load_steps"] = result.load_steps;
+    json["newton_iterations"] = result.newton_iterations;
+    json["cg_iterations"] = result.cg_iterations;
+    json["relative_residual"] = result.relative_residual;
+  }
+  return json;
+}
+
+Json loads_json(const std::vector<AppliedLoad>& loads) {
+  Json json = Json::array();
+  for (const AppliedLoad& load : loads) {
+    json.push_back({{"name", load.name}, {"force", vector(load.force)}, {"moment", vector(load.moment)}});
+    if (load.displacement) json.back()["displacement"] = vector(*load.displacement);
+    if (load.rotation) json.back()["rotation"] = vector(*load.rotation);
+  }
+  return json;
+}
+
+// How the run went, the last line.
+std::string run_line(const SimulateResult& result) {
+  const std::string corner = result.smallest_corner_jacobian
+                                 ? fmt::format(" (at a corner {:.4g})", *result.smallest_corner_jacobian)
+                                 : "";
+  if (result.timed)
+    return fmt::format(
+        "{} steps of {:.4g} s to {:.6g} s in {:.2f} s (kernel {}), elastic energy {:.4g} J, smallest J "
+        "{:.4g}{}",
+        result.timed->steps, result.timed->step, result.timed->time, result.seconds, result.timed->isa,
+        result.elastic_energy, result.smallest_jacobian, corner);
+  if (result.settled)
+    return fmt::format(
+        "at rest after {} steps in {:.2f} s: residual {:.1e}, kinetic energy {:.2g} J; elastic "
+        "energy {:.4g} J, smallest J {:.4g}{}",
+        human_count(result.settled->steps), result.seconds, result.settled->residual, result.settled->kinetic,
+        result.elastic_energy, result.smallest_jacobian, corner);
+  return fmt::format(
+      "elastic energy {:.4g} J{}, smallest J {:.4g}{}, {} load step(s), {} Newton and {} CG iterations, "
+      "residual {:.1e}, {:.2f} s",
+      result.elastic_energy, bar_of(result, ErrorBar::Of::elastic_energy), result.smallest_jacobian, corner,
+      result.load_steps, result.newton_iterations, result.cg_iterations, result.relative_residual,
+      result.seconds);
+}
+
 }  // namespace
 
 std::string summary_json(const SimulateResult& result, const Body& body) {
@@ -198,13 +256,7 @@ std::string summary_json(const SimulateResult& result, const Body& body) {
   for (const ProbeResult& probe : result.probes)
     json["probes"].push_back(
         {{"name", probe.name}, {"at", vector(probe.where)}, {"displacement", vector(probe.displacement)}});
-  json["loads"] = Json::array();
-  for (const AppliedLoad& load : result.loads) {
-    json["loads"].push_back(
-        {{"name", load.name}, {"force", vector(load.force)}, {"moment", vector(load.moment)}});
-    if (load.displacement) json["loads"].back()["displacement"] = vector(*load.displacement);
-    if (load.rotation) json["loads"].back()["rotation"] = vector(*load.rotation);
-  }
+  json["loads"] = loads_json(result.loads);
   json["reactions"] = Json::array();
   for (const Reaction& reaction : result.reactions)
     json["reactions"].push_back(
@@ -229,24 +281,7 @@ std::string summary_json(const SimulateResult& result, const Body& body) {
     if (!result.stress->beside.empty()) json["largest_von_mises_beside"] = result.stress->beside;
     if (result.stress->yield_share) json["largest_von_mises_yield_share"] = *result.stress->yield_share;
   }
-  if (result.timed) {
-    json["timed"] = {{"time", result.timed->time},
-                     {"steps", result.timed->steps},
-                     {"step", result.timed->step},
-                     {"isa", result.timed->isa}};
-    for (const auto& [name, joules] : result.timed->books) json["timed"]["books"][name] = joules;
-    if (result.timed->live) json["timed"]["live"] = live_json(*result.timed->live);
-  } else if (result.settled) {
-    json["settled"] = {{"steps", result.settled->steps},
-                       {"relative_residual", result.settled->residual},
-                       {"kinetic_energy", result.settled->kinetic},
-                       {"tolerance", result.settled->tolerance}};
-  } else {
-    json["load_steps"] = result.load_steps;
-    json["newton_iterations"] = result.newton_iterations;
-    json["cg_iterations"] = result.cg_iterations;
-    json["relative_residual"] = result.relative_residual;
-  }
+  json.update(run_json(result));
   json["seconds"] = result.seconds;
   json["time"] = Json::array();
   for (const PassShare& pass : result.passes)
@@ -280,41 +315,16 @@ std::vector<std::string> summary_lines(const SimulateResult& result) {
     lines.push_back(
         fmt::format("reaction of \"{}\": {}", reaction.name, resultant(reaction.force, reaction.moment)));
   add_bonds(result.bonds, lines);
-  const std::string corner = result.smallest_corner_jacobian
-                                 ? fmt::format(" (at a corner {:.4g})", *result.smallest_corner_jacobian)
-                                 : "";
+  lines.push_back(run_line(result));
   if (result.timed) {
-    lines.push_back(
-        fmt::format("{} steps of {:.4g} s to {:.6g} s in {:.2f} s "
-                    "(kernel {}), elastic energy {:.4g} J, "
-                    "smallest J {:.4g}{}",
-                    result.timed->steps, result.timed->step, result.timed->time, result.seconds,
-                    result.timed->isa, result.elastic_energy, result.smallest_jacobian, corner));
     std::string books;
     for (const auto& [name, joules] : result.timed->books)
       books += fmt::format("{}{} {:.4g} J", books.empty() ? "" : ", ", name, joules);
     if (!books.empty()) lines.push_back("books: " + books);
     if (result.timed->live) lines.push_back(live_line(*result.timed->live));
-    return lines;
-  }
-  if (result.settled) {
-    lines.push_back(
-        fmt::format("at rest after {} steps in {:.2f} s: residual {:.1e}, kinetic energy {:.2g} J; elastic "
-                    "energy {:.4g} J, smallest J {:.4g}{}",
-                    human_count(result.settled->steps), result.seconds, result.settled->residual,
-                    result.settled->kinetic, result.elastic_energy, result.smallest_jacobian, corner));
-    return lines;
-  }
-  lines.push_back(
-      fmt::format("elastic energy {:.4g} J{}, smallest J {:.4g}{}, {} load step(s), {} "
-                  "Newton and {} CG "
-                  "iterations, residual "
-                  "{:.1e}, {:.2f} s",
-                  result.elastic_energy, bar_of(result, ErrorBar::Of::elastic_energy),
-                  result.smallest_jacobian, corner, result.load_steps, result.newton_iterations,
-                  result.cg_iterations, result.relative_residual, result.seconds));
-  if (!result.error_bars.bars.empty() || !result.error_bars.note.empty())
+  } else if (!result.settled && (!result.error_bars.bars.empty() || !result.error_bars.note.empty())) {
     lines.push_back(error_bars_line(result.error_bars));
+  }
   return lines;
 }
 

@@ -10,7 +10,6 @@
 #include "voxelize/heal/heal.h"
 #include "voxelize/heal/outward.h"
 #include "voxelize/mesh/line_crossings.h"
-#include "voxelize/voxelize.h"
 
 namespace flexel::voxelize {
 namespace {
@@ -67,27 +66,6 @@ std::size_t thinnest_sample(const std::vector<WallSample>& samples) {
       std::min_element(samples.begin(), samples.end(),
                        [](const WallSample& a, const WallSample& b) { return a.thickness < b.thickness; });
   return static_cast<std::size_t>(least - samples.begin());
-}
-
-std::vector<MeasuredPart> heal_and_measure(Surface& surface, int rays) {
-  std::vector<HealedPart> healed;
-  for (PartMesh& mesh : exact_part_meshes(surface)) healed.push_back(heal(std::move(mesh), {}, ""));
-  face_outward(healed, surface);
-  std::vector<MeasuredPart> result(healed.size());
-  for (std::size_t p = 0; p < healed.size(); ++p) {
-    const PartMesh& mesh = healed[p].mesh;
-    result[p].healing = healed[p].done;
-    if (mesh.corners.empty() || !mesh.balanced()) continue;
-    result[p].volume = enclosed_volume(mesh);
-    constexpr double kLinesDiffer = .01;  // lines alone may be off by that around thin walls
-    const double joined = mesh.shell_count > 1 ? union_volume(mesh) : *result[p].volume;
-    if (std::abs(joined - *result[p].volume) > kLinesDiffer * joined) result[p].volume = joined;
-    const std::vector<WallSample> samples = wall_samples(mesh, rays);
-    if (samples.empty()) continue;
-    const WallSample& least = samples[thinnest_sample(samples)];
-    result[p].thinnest = ThinWall{least.thickness, least.where, static_cast<std::uint32_t>(p)};
-  }
-  return result;
 }
 
 }  // namespace flexel::voxelize

@@ -27,45 +27,7 @@ class ProgramBeforeFailed : public std::runtime_error {
 // stdin: "the program before it in the pipe failed or wrote nothing"). Throws ProgramBeforeFailed.
 [[nodiscard]] Bytes read_all(const std::string& path);
 
-// Where a result goes. Data is appended in pieces; nothing appears under the target's name until commit().
-// "-" writes to stdout: refused (InputError) when stdout is a terminal and `binary`. All errors of the disk
-// (full, read-only, no such folder) are InputError naming the path and the reason; a closed pipe is
-// ReaderClosedPipe. A writer destroyed without commit() removes its temporary file.
-class OutputFile {
- public:
-  explicit OutputFile(const std::string& path, bool binary = true);
-  // Into `memory`, which must outlive it.
-  explicit OutputFile(Bytes& memory) : memory_(&memory) {}
-  ~OutputFile();
-  OutputFile(const OutputFile&) = delete;
-  OutputFile& operator=(const OutputFile&) = delete;
-  void write(const void* data, std::size_t size);
-  void write(const std::string& text) { write(text.data(), text.size()); }
-  // Where an OutputsTogether (base/files/outputs.h) waits for the file, it appears with the others; `alone`:
-  // now.
-  void commit(bool alone = false);
-
- private:
-  void open_file();
-  void flush_buffer();
-  void write_through(const char* data, std::size_t size);
-  Bytes* memory_ = nullptr;
-  std::string path_;       // as given
-  std::string target_;     // the path with symbolic links resolved
-  std::string temporary_;  // "" for stdout, devices and FIFOs, and once committed
-  int descriptor_ = -1;
-  bool committed_ = false;
-  std::vector<char> buffer_;
-};
-
-// Throws now what OutputFile would throw of `path` when it is made: the end of a long run is late to learn of
-// a folder that is not there. Devices and FIFOs are not opened; "": no output.
-void refuse_unwritable(const std::string& path, bool binary = true);
-
-// A whole text to `path`, as OutputFile does.
-void write_text(const std::string& text, const std::string& path, bool alone = false);
-
-// `path` with symbolic links resolved; it need not exist. Throws InputError: a cycle of links.
+// What `path` stands for once links are followed; it need not exist. Throws InputError: a ring of links.
 [[nodiscard]] std::string follow_links(const std::string& path);
 
 // Whether `path` names stdout: "-", "/dev/stdout".

@@ -1,6 +1,7 @@
 // OutputFile. A regular file is written beside its target under a hidden name and renamed by commit().
 // Symbolic links are resolved first, so the file is replaced and not the link. Devices and FIFOs are written
 // directly. A fixed table lists the temporary files, for the signal handlers.
+#include "base/files/output_file.h"
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
@@ -16,7 +17,6 @@
 
 #include "base/error.h"
 #include "base/files/files.h"
-#include "base/files/outputs.h"
 #include "base/stop.h"
 
 namespace flexel {

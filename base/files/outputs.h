@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "base/files/output_file.h"
+
 namespace flexel {
 
 struct OutputName {
@@ -15,27 +17,5 @@ struct OutputName {
 // and, without `force`, one that is an input. Devices may be given twice.
 void check_outputs(const std::vector<OutputName>& outputs, const std::vector<std::string>& inputs,
                    bool force);
-
-// While one lives, OutputFiles to `paths` are written, but appear under their names only by appear(): a disk
-// that is full at the second leaves the first as it was. Not to be nested.
-class OutputsTogether {
- public:
-  explicit OutputsTogether(std::vector<std::string> paths);
-  ~OutputsTogether();
-  OutputsTogether(const OutputsTogether&) = delete;
-  OutputsTogether& operator=(const OutputsTogether&) = delete;
-  // Throws InputError: a file cannot be renamed.
-  void appear();
-
- private:
-  friend class OutputFile;
-  struct Waiting {
-    std::string path, temporary, target;
-  };
-  static bool takes(const std::string& path, const std::string& temporary, const std::string& target);
-  static OutputsTogether* present_;
-  std::vector<std::string> paths_;
-  std::vector<Waiting> waiting_;
-};
 
 }  // namespace flexel

@@ -16,7 +16,7 @@
 
 #include "base/files/files.h"
 #include "flexel/study/predict.h"
-#include "flexel/study/runner.h"
+#include "flexel/study/runs/runner.h"
 
 namespace {
 

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <numbers>
 
+#include "base/files/output_file.h"
 #include "base/parallel.h"
 #include "formats/exchange/import.h"
 #include "formats/exchange/surface_file.h"

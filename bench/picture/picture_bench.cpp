@@ -8,6 +8,7 @@
 
 #include "base/parallel.h"
 #include "bench/knot.h"
+#include "flexel/picture/canvas/png_file.h"
 #include "flexel/picture/picture.h"
 #include "flexel/picture/render/lines.h"
 #include "flexel/picture/render/render.h"

@@ -15,6 +15,7 @@
 #include "formats/exchange/surface_file.h"
 #include "formats/lattice/body_file.h"
 #include "voxelize/classify/classify.h"
+#include "voxelize/heal/orientation.h"
 #include "voxelize/lattice/align.h"
 #include "voxelize/lattice/elements.h"
 #include "voxelize/voxelize.h"

@@ -5,7 +5,7 @@
 
 #include "base/human.h"
 #include "base/units.h"
-#include "flexel/accuracy/resolution_search.h"
+#include "flexel/accuracy/accuracy_report.h"
 
 namespace flexel::commands {
 namespace {

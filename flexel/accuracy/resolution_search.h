@@ -20,6 +20,8 @@
 #include <vector>
 
 #include "base/program/progress.h"
+#include "flexel/accuracy/accuracy_report.h"
+#include "flexel/accuracy/solved_run.h"
 #include "mapping/types/result.h"
 #include "simulate/result/result.h"
 #include "voxelize/types/options.h"
@@ -27,61 +29,11 @@
 
 namespace flexel::commands {
 
-// One run at one size, its body deformed.
-struct SolvedRun {
-  double size = 0;  // m, asked for
-  voxelize::VoxelizeResult voxels;
-  simulate::SimulateResult simulated;
-  std::vector<Vec3> mapped;  // (vertices) m
-  double voxelize_seconds = 0, map_seconds = 0;
-  double processor_seconds = 0;       // of all of it and all threads; 0: not known
-  double wall = 1e300;                // m: a fifth of the matter lies in thinner walls
-  std::vector<std::string> warnings;  // said while it ran, held back
-  bool given_up = false;
-};
-
 // Asked of a run when its lattice is made: whether so many cells are to be solved.
 using GoesOn = std::function<bool(std::size_t cells)>;
 // Runs the stages at `size`; nothing: makes a lattice of a usual count of cells and no more. Where `goes_on`
 // says no, nor is anything solved: the run is `given_up`.
 using SolveAt = std::function<SolvedRun(std::optional<double> size, const GoesOn& goes_on)>;
-
-struct AccuracyGoal {
-  std::optional<double> error;   // share, of --accuracy
-  std::optional<double> within;  // s, of --within: from `began` to the end
-  // Nobody asked: sizes are chosen by the time that the machine would take if nobody else used it, so that
-  // the same command chooses the same one when it is busy.
-  bool by_default = false;
-  std::chrono::steady_clock::time_point began;
-  bool driven = false;  // by moves: the elastic energy counts
-};
-
-struct TriedRun {
-  double size = 0;  // m
-  std::size_t cells = 0;
-  double seconds = 0;
-  double memory = 0;                                          // bytes, of the process until its end
-  std::optional<double> predicted_seconds, predicted_memory;  // before it; nothing for the first
-  std::optional<double> error;                                // share
-  std::string of;    // the quantity that is worst: "probe tip", "largest displacement"
-  double order = 1;  // by which the error falls with the spacing
-  std::vector<std::pair<std::string, double>> found;  // quantities by name: m, of energies J
-  std::string failure;                                // why there is nothing at this size
-};
-
-struct AccuracyReport {
-  AccuracyGoal goal;
-  std::vector<TriedRun> runs;  // in the order they were made; the last is the one that counts
-  std::string stopped;         // why no finer run was made, where the goal is not met
-  std::string method;          // of mapping
-  double seconds = 0;          // of all runs, until the result was written
-  // What to ask for next, with the time that it is expected to take: "--accuracy 2% takes about 40 s".
-  std::string advice;
-  [[nodiscard]] bool met() const;
-  // One sentence for the user.
-  [[nodiscard]] std::string sentence() const;
-  [[nodiscard]] std::string json() const;  // docs/reference/summary.md, "accuracy"
-};
 
 // Makes runs until the goal is met, or the next would take too long or need too much memory, or four finer
 // ones did not help. Returns the last good one. Throws what the first sizes threw where none can be solved.

@@ -4,7 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "flexel/accuracy/resolution_search.h"
+#include "flexel/accuracy/accuracy_report.h"
+#include "flexel/accuracy/solved_run.h"
 #include "simulate/result/estimate.h"
 
 namespace flexel::commands {

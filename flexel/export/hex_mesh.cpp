@@ -1,5 +1,7 @@
 // Every sound cell is a hexahedron. Its sides that no other cell shares are the mesh's skin; each belongs to
 // the CAD face whose polygons bound the cell with the most area facing its way.
+#include "flexel/export/hex_mesh.h"
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>

@@ -52,23 +52,6 @@ constexpr std::array<std::array<std::uint8_t, 4>, 6> kHexahedronSides = {
 constexpr std::array<std::array<std::uint8_t, 6>, 4> kTetrahedronSides = {
     {{0, 2, 1, 6, 5, 4}, {0, 1, 3, 4, 8, 7}, {1, 2, 3, 5, 9, 8}, {2, 0, 3, 6, 7, 9}}};
 
-// The sound cells of the problem's body. A cell whose fill is below 1 goes to one of 20 classes of 0.05 a
-// part, whose stiffness and density are those of the material times the mean fill: the mass is the part's
-// own.
-[[nodiscard]] AnalysisMesh hexahedra(const simulate::Problem& problem);
-
-struct TetrahedraOptions {
-  double size = 0;  // m, largest edge
-  int threads = 0;  // 0: as gmsh chooses
-};
-
-// Meshes the files with gmsh: STEP, IGES and BREP from their own geometry, meshes after being cut into faces
-// at 30 degrees and parametrised. `surface` is what the files were imported as; the mesh's faces take their
-// names from those nearest to them. Throws InputError: gmsh is not installed, cannot mesh the part, or was
-// given stdin.
-[[nodiscard]] AnalysisMesh tetrahedra(const std::vector<std::string>& paths, const Surface& surface,
-                                      const TetrahedraOptions& options);
-
 // Nodes that elements use (nodes): 1.
 [[nodiscard]] std::vector<std::uint8_t> used_nodes(const AnalysisMesh& mesh);
 // m^3 of matter (fill included) in each section, and of each CAD face of it the area [m^2] of its sides.

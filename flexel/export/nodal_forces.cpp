@@ -1,6 +1,7 @@
 // Consistent nodal forces, and probes as weighted means of nodes. On a lattice they are those of a Flexel
 // run. On tetrahedra the load is integrated over the six-node triangles (seven points, exact to the fifth
 // degree: Radon 1948) and distributed to the six nodes by their shape functions.
+#include "flexel/export/nodal_forces.h"
 #include <Eigen/Geometry>
 #include <cmath>
 

@@ -2,6 +2,7 @@
 // the face lies in a lattice plane. Where the face cuts through cells, it crosses lattice edges: on each edge
 // along the axis nearest to the face's normal, an equation between the edge's two nodes prescribes the
 // interpolated displacement at the crossing.
+#include "flexel/export/support_constraints.h"
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,7 @@
 // CAD files are meshed from their own geometry, all in one run of gmsh; a mesh is written part by part as
 // STL, which gmsh cuts into faces and parametrises. A surface of gmsh is identified with the CAD face whose
 // polygons, with normals on the same side, are nearest to most of its triangles' centres.
+#include "flexel/export/tet_mesh.h"
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
@@ -195,10 +196,10 @@ std::map<int, std::uint32_t> name_surfaces(const Surface& surface, const GmshMes
   return face_of;
 }
 
-// The body that selections resolve on, nodes by part; fills the mesh's elements in the same order.
-void make_body(const Surface& surface, const GmshMesh& from, AnalysisMesh& mesh) {
-  const std::vector<SkinSide> skin = find_skin(from);
-  const std::map<int, std::uint32_t> face_of = name_surfaces(surface, from, skin);
+// The part of each of gmsh's volumes: that of most of its sides.
+std::map<int, std::uint32_t> parts_of_volumes(const Surface& surface, const GmshMesh& from,
+                                              const std::vector<SkinSide>& skin,
+                                              const std::map<int, std::uint32_t>& face_of) {
   std::map<int, std::map<std::uint32_t, std::size_t>> votes;  // volume -> part
   for (std::size_t t = 0; t < skin.size(); ++t)
     if (skin[t].at.element != 0xffffffffu)
@@ -209,6 +210,14 @@ void make_body(const Surface& surface, const GmshMesh& from, AnalysisMesh& mesh)
     part_of[volume] = std::max_element(count.begin(), count.end(), [](const auto& a, const auto& b) {
                         return a.second < b.second;
                       })->first;
+  return part_of;
+}
+
+// The body that selections resolve on, nodes by part; fills the mesh's elements in the same order.
+void make_body(const Surface& surface, const GmshMesh& from, AnalysisMesh& mesh) {
+  const std::vector<SkinSide> skin = find_skin(from);
+  const std::map<int, std::uint32_t> face_of = name_surfaces(surface, from, skin);
+  const std::map<int, std::uint32_t> part_of = parts_of_volumes(surface, from, skin, face_of);
   Body& body = mesh.body;
   std::vector<std::uint32_t> number(from.nodes.size(), 0xffffffffu), element(from.tetrahedra.size());
   for (std::uint32_t p = 0; p < surface.parts.size(); ++p) {

@@ -1,5 +1,7 @@
 // Brute force over the polygons of faces whose boxes overlap: done once, and faces of different parts rarely
 // do.
+#include "flexel/export/touching_faces.h"
+
 #include <Eigen/Geometry>
 #include <algorithm>
 

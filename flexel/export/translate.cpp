@@ -1,4 +1,6 @@
 // Each item of the scene becomes one of the analysis; what has no counterpart is refused by name.
+#include "flexel/export/translate.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -8,6 +10,9 @@
 #include "base/human.h"
 #include "base/units.h"
 #include "flexel/export/analysis.h"
+#include "flexel/export/nodal_forces.h"
+#include "flexel/export/support_constraints.h"
+#include "flexel/export/touching_faces.h"
 #include "simulate/result/options.h"
 #include "simulate/simulate.h"
 #include "voxelize/voxelize.h"

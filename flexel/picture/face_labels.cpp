@@ -106,12 +106,12 @@ std::vector<std::string> face_texts(const Surface& surface) {
   return texts;
 }
 
-void label_faces(Image& image, const Viewport& viewport, const Camera& camera, const Panel& panel,
-                 const std::vector<std::string>& texts, float size, bool beside,
-                 std::vector<std::uint8_t>& shown) {
-  const FaceMap map = look(viewport, camera, panel);
+namespace {
+
+// For each face the place that is farthest from all others.
+std::vector<Widest> widest_places(const FaceMap& map, std::size_t faces) {
   const std::vector<int> distance = distances(map);
-  std::vector<Widest> widest(texts.size());
+  std::vector<Widest> widest(faces);
   for (int row = 0; row < map.rows; ++row)
     for (int column = 0; column < map.columns; ++column) {
       const std::uint32_t face = map.face[map.index(column, row)];
@@ -121,6 +121,16 @@ void label_faces(Image& image, const Viewport& viewport, const Camera& camera, c
       if (const int here = distance[map.index(column, row)]; here > place.distance)
         place = {place.points, here, column, row};
     }
+  return widest;
+}
+
+}  // namespace
+
+void label_faces(Image& image, const Viewport& viewport, const Camera& camera, const Panel& panel,
+                 const std::vector<std::string>& texts, float size, bool beside,
+                 std::vector<std::uint8_t>& shown) {
+  const FaceMap map = look(viewport, camera, panel);
+  const std::vector<Widest> widest = widest_places(map, texts.size());
   std::vector<std::uint32_t> order(texts.size());
   std::iota(order.begin(), order.end(), 0u);
   std::stable_sort(order.begin(), order.end(),

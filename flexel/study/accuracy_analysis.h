@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "flexel/study/runner.h"
+#include "flexel/study/runs/runner.h"
 
 namespace flexel::study {
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include "flexel/study/conclude.h"
 #include "flexel/study/study.h"
 
 namespace flexel::study {

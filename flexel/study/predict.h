@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "flexel/study/runner.h"
+#include "flexel/study/runs/runner.h"
 
 namespace flexel::study {
 

@@ -1,6 +1,7 @@
 // The loop: predict the open configurations, run the cheapest that fits the budget, write its row; then
 // repeat those whose time is not known to 5 %; then conclude.
 #include "flexel/study/session.h"
+#include "flexel/study/tables.h"
 
 #include <fmt/format.h>
 
@@ -13,7 +14,7 @@
 #include "base/error.h"
 #include "base/files/files.h"
 #include "base/units.h"
-#include "flexel/study/calculix.h"
+#include "flexel/study/runs/calculix.h"
 #include "voxelize/memory.h"
 
 namespace flexel::study {

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "flexel/study/calculix.h"
+#include "flexel/study/runs/calculix.h"
 #include "flexel/study/session.h"
 
 namespace flexel::study {

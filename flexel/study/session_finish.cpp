@@ -7,9 +7,15 @@
 
 #include "base/error.h"
 #include "base/files/files.h"
+#include "base/files/output_file.h"
 #include "base/units.h"
-#include "flexel/study/history_csv.h"
+#include "flexel/study/conclude.h"
+#include "flexel/study/runs/history_csv.h"
+#include "flexel/study/page.h"
+#include "flexel/study/plots.h"
+#include "flexel/study/tables.h"
 #include "flexel/study/session.h"
+#include "flexel/study/runs/surfaces.h"
 
 namespace flexel::study {
 namespace {

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "flexel/study/predict.h"
-#include "flexel/study/runner.h"
-#include "flexel/study/scene_edit.h"
+#include "flexel/study/runs/runner.h"
+#include "flexel/study/runs/scene_edit.h"
 
 namespace flexel::study {
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/files/files.h"
+#include "base/files/output_file.h"
 #include "formats/part/surface.h"
 
 namespace flexel {

@@ -17,6 +17,7 @@
 #include <stdexcept>
 
 #include "base/error.h"
+#include "base/files/output_file.h"
 #include "base/nearest_word.h"
 #include "base/parallel.h"
 #include "base/version.h"

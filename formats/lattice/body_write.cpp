@@ -5,6 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "base/files/output_file.h"
 #include "formats/lattice/body_file.h"
 #include "formats/lattice/body_file_names.h"
 #include "formats/lattice/body_metadata.h"

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/files/files.h"
+#include "base/files/output_file.h"
 #include "base/math/vec.h"
 
 namespace flexel::vtu {

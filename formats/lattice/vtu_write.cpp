@@ -10,6 +10,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "base/files/output_file.h"
 #include "base/parallel.h"
 #include "formats/lattice/vtu.h"
 

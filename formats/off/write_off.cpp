@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "base/error.h"
+#include "base/files/output_file.h"
 #include "base/parallel.h"
 #include "base/version.h"
 #include "formats/common/normal_change.h"

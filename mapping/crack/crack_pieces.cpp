@@ -199,11 +199,8 @@ int side_of_wall(const CrackMesh& mesh, std::uint32_t node, std::uint32_t previo
   return !bounds ? 0 : is_above(polygon, axis, on) ? 1 : -1;
 }
 
-}  // namespace
-
-// `around`: all corners at one node in one fragment.
-void PieceBuilder::place_fans(const CrackMesh& mesh, std::span<const Corner> around,
-                              std::vector<std::uint32_t>& vertex) {
+// Corners at one node that hang together by edges, as sets.
+DisjointSets fans_around(const CrackMesh& mesh, std::span<const Corner> around) {
   DisjointSets fans(around.size());
   std::vector<std::pair<std::uint32_t, std::uint32_t>> spokes;  // the edge's other end, corner
   for (std::uint32_t k = 0; k < around.size(); ++k) {
@@ -224,6 +221,15 @@ void PieceBuilder::place_fans(const CrackMesh& mesh, std::span<const Corner> aro
           fans.unite(spokes[a].second, spokes[b].second);
       }
   }
+  return fans;
+}
+
+}  // namespace
+
+// `around`: all corners at one node in one fragment.
+void PieceBuilder::place_fans(const CrackMesh& mesh, std::span<const Corner> around,
+                              std::vector<std::uint32_t>& vertex) {
+  DisjointSets fans = fans_around(mesh, around);
   // Away from the walls, once for each side of a plane.
   std::vector<Vec3> towards(around.size()), above(around.size(), Vec3::Zero()), below = above;
   for (std::uint32_t k = 0; k < around.size(); ++k)

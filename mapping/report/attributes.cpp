@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <cmath>
 
+#include "base/files/output_file.h"
 #include "base/parallel.h"
 #include "formats/lattice/vtu.h"
 #include "mapping/anchors/frame.h"

@@ -50,6 +50,7 @@
 
 #include "base/error.h"
 #include "base/files/files.h"
+#include "base/files/output_file.h"
 #include "base/program/arguments.h"
 #include "base/program/program.h"
 

@@ -3,7 +3,7 @@
 // Points x_i, x_j with outward unit normals n_i, n_j as they are now, d = x_j - x_i, c = -n_i . n_j. Contact
 // acts along n = b / |b|, b = a_i n_i - a_j n_j (a: 1 for a face, 0 for an edge or a ball; two balls: along
 // d).
-//     gap       g = d . n - R_i - R_j + a             (R the radius of a ball, a what is allowed for)
+//     gap       g = d . n - R_i - R_j + p             (R the radius of a ball, p the allowed penetration)
 //     offset    t = d - (d . n) n
 //     energy    U = kappa A_i A_j K(t) w(c) psi(-g)
 // K is a kernel of unit area, so that the double sum over the patches A of two faces in contact is kappa
@@ -17,7 +17,7 @@
 // linear, and hard where the sphere under the surface would be squeezed by half:
 //     p = delta^2 / (2 delta_0) below delta_0, delta - delta_0 / 2 above it;  + delta^3 / delta_h^2
 #pragma once
-#include "base/math/vec.h"
+#include "simulate/contact/points/contact_points.h"
 
 namespace flexel::simulate {
 
@@ -41,26 +41,18 @@ struct NormalLaw {
   }
 };
 
-// One side of a pair as it is now.
-struct ContactSide {
-  Vec3 position = Vec3::Zero();  // m
-  Vec3 normal = Vec3::Zero();    // unit; of a ball 0
-  double own_plane = 0;          // a
-  double radius = 0;             // m, R
-};
-
 struct PairConstants {
   double stiffness = 0;  // kappa A_i A_j [N m], or kappa A [N/m] where the kernel is 1
   double width = 0;      // rho [m]; 0: the kernel is 1
   double facing_from = 0, facing_fully = 0;
-  double limit = 0;    // m, deeper than this it is no contact
-  double allowed = 0;  // m, how deep they may be in each other before they press
+  double limit = 0;    // m, penetration beyond which the pair is no contact
+  double allowed = 0;  // m, p: penetration without pressure (initial-penetration release)
   NormalLaw law;
 };
 
 struct PairState {
-  bool near = false;     // within the kernel, facing; else nothing below holds
-  bool deep = false;     // near, but deeper than the limit: nothing below but the gap holds
+  bool near = false;     // within the kernel and facing; else the rest is not set
+  bool deep = false;     // near, but deeper than the limit: of the rest only the gap holds
   double gap = 0;        // m
   double weight = 0;     // kappa A_i A_j K w [N/m]
   double energy = 0;     // J

@@ -1,4 +1,4 @@
-// What a scene says of contact, resolved to the parts of a body.
+// The contact settings of a scene, resolved to the parts of a body.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace flexel::simulate {
 struct ContactPlane {
   Vec3 point = Vec3::Zero();            // m
   Vec3 normal = Vec3::UnitZ();          // unit, out of it
-  std::optional<double> friction = {};  // its own constant; none: that of what touches it
+  std::optional<double> friction = {};  // its own coefficient; none: that of the part that touches it
   std::optional<double> stick = {};     // Pa, likewise
   std::string name = {}, origin = {};
 };
@@ -22,14 +22,14 @@ struct ContactPlane {
 struct ContactSettings {
   std::vector<std::uint8_t> parts = {};  // (parts) 1: can touch
   bool self = true;                      // also itself
-  double stiffness = 1;                  // factor on that of the contacts
+  double stiffness = 1;                  // factor on the stiffness of contacts
   double friction = 0;                   // mu, of materials that give none
-  std::vector<double> stick =
-      {};              // (parts) Pa, or empty: the traction that pulls off what has touched; infinity: glue
-  double damping = 0;  // s, tau
-  double parting = 0;  // s, in which what begins inside something else is let out; 0: it is refused
+  // (parts) Pa, or empty: traction that separates points that have touched; infinity: glue
+  std::vector<double> stick = {};
+  double damping = 0;       // s, tau
+  double release_time = 0;  // s, in which initial penetrations are released; 0: they are refused
   std::vector<ContactPlane> planes = {};
-  // Pairs of parts, lower number first, that are bonded: they do not touch where they are near at rest.
+  // Pairs of bonded parts, lower number first: they do not touch where they are near at rest.
   std::vector<std::array<std::uint32_t, 2>> bonded = {};
 };
 

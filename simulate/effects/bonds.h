@@ -1,4 +1,4 @@
-// Bonds: parts that touch are held together where they do (docs/scene.md, "Parts that touch").
+// Bonds: parts that touch are held together where they do (docs/reference/scene.md, "Parts that touch").
 //
 // At quadrature points q of the finer part's surface the same rest point is carried by matter of either part:
 // a cell with trilinear weights, or an element with its neighbours (simulate/matter/interpolation_weights.h); the energy is 1/2

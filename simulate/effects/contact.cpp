@@ -183,7 +183,7 @@ std::optional<Contact> Contact::make(const Parameters& parameters, const Problem
   settings.stiffness = parameters.stiffness;
   settings.friction = parameters.friction;
   settings.damping = parameters.damping;
-  settings.parting = parameters.parting;
+  settings.release_time = parameters.parting;
   for (const std::array<std::string, 2>& each : parameters.bonded) {
     std::array<std::uint32_t, 2> parts{};
     for (std::uint32_t p = 0; p < problem.body.parts.size(); ++p)
@@ -241,19 +241,19 @@ void Contact::restore_from(const std::vector<double>& transfer_state) const {
 // Of the free rigid parts; what leads a manipulator tells its own.
 std::vector<std::string> Contact::history_columns() const {
   std::vector<std::string> columns;
-  for (const Contacts::Felt& felt : contacts_->felt())
+  for (const RigidLoad& load : contacts_->rigid_loads())
     for (const char* what : {"force", "torque"})
       for (const char axis : {'x', 'y', 'z'})
-        columns.push_back(fmt::format("{} contact {} {} [{}]", names_[felt.part], what, axis,
+        columns.push_back(fmt::format("{} contact {} {} [{}]", names_[load.part], what, axis,
                                       std::string(what) == "force" ? "N" : "N m"));
   return columns;
 }
 
 std::vector<double> Contact::history_values(const State& state, const std::vector<Vec3>&) const {
   std::vector<double> values;
-  for (const Contacts::Felt& felt : contacts_->felt_about_centres(state)) {
-    values.insert(values.end(), felt.force.begin(), felt.force.end());
-    values.insert(values.end(), felt.torque.begin(), felt.torque.end());
+  for (const RigidLoad& load : contacts_->rigid_loads_about_centres(state)) {
+    values.insert(values.end(), load.force.begin(), load.force.end());
+    values.insert(values.end(), load.torque.begin(), load.torque.end());
   }
   return values;
 }
@@ -263,16 +263,16 @@ double Contact::injected_energy(const State& state) const {
 }
 
 std::optional<ContactLosses> Contact::companion() const {
-  if (!contacts_->loses()) return std::nullopt;
+  if (!contacts_->dissipate()) return std::nullopt;
   return ContactLosses(contacts_);
 }
 
 void ContactLosses::add_forces(const State& state, std::vector<Vec3>& forces) const {
-  contacts_->add_losses(state, forces);
+  contacts_->add_dissipative_forces(state, forces);
 }
 
 void ContactLosses::finish_step(State& state, const StepDone& done) const {
-  contacts_->remember(state, done.drift);
+  contacts_->finish_step(state, done.drift);
 }
 
 }  // namespace flexel::simulate

@@ -1,4 +1,4 @@
-// Contact: parts that touch push each other apart, slide and stick (docs/contact.md). simulate/contact has
+// Contact: parts that touch push each other apart, slide and stick (docs/reference/contact.md). simulate/contact has
 // the mechanics; here are the keys and the hooks. Forces along the normals have a potential; friction and
 // damping and what sticks are an effect of their own that shares the contacts.
 #pragma once

@@ -1,7 +1,7 @@
 // Fracture: cells that are pulled beyond their strength, or flow beyond their elongation, resist no more;
 // their matter stays in the scene and moves on (Jansson and Vergeest, section 3.2: a connection ends where
 // its length passes a threshold, equation 2). Lives in the kernel (simulate/kernels/kernel_plastic.h);
-// docs/fracture-plasticity.md.
+// docs/reference/fracture-plasticity.md.
 #pragma once
 #include "simulate/effects/effect.h"
 

@@ -1,6 +1,6 @@
 // Plasticity: parts whose material has a yield stress keep part of their deformation. J2 flow with isotropic,
 // linear hardening (Simo and Hughes 1998, box 9.1), cell by cell. Lives in the kernel
-// (simulate/kernels/kernel_plastic.h); docs/fracture-plasticity.md.
+// (simulate/kernels/kernel_plastic.h); docs/reference/fracture-plasticity.md.
 #pragma once
 #include "simulate/effects/effect.h"
 

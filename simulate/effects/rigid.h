@@ -1,4 +1,4 @@
-// Rigid parts and manipulators (docs/contact.md): `rigid = true` of [parts.NAME], a part with six degrees of
+// Rigid parts and manipulators (docs/reference/contact.md): `rigid = true` of [parts.NAME], a part with six degrees of
 // freedom; [[manipulator]], a rigid part on a path. Their cells do not resist and cost nothing; they touch
 // what [contact] lets them.
 #pragma once

@@ -5,7 +5,8 @@
 #include <string>
 
 #include "simulate/equilibrium/mechanics.h"
-#include "simulate/linear/solve.h"
+#include "simulate/linear/free_motions.h"
+#include "simulate/linear/preconditioner.h"
 
 namespace flexel::simulate {
 

@@ -1,5 +1,5 @@
 // fuse: matter that touches becomes one. Parts are held together point by point where they are nearer than a
-// distance; broken cells that are nearly whole again resist again. docs/events.md
+// distance; broken cells that are nearly whole again resist again. docs/reference/events.md
 #pragma once
 #include "simulate/effects/effect.h"
 #include "simulate/events/event.h"

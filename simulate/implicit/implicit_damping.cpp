@@ -53,7 +53,7 @@ StepOutcome ImplicitDamping::advance(State& state, const std::vector<Vec3>& oute
   image_.resize(n);
   parallel_for_each(n, [&](std::size_t e) { right_[e] = mass[e] * (state.velocity[e] - before_[e]); });
 
-  // PrescribedMotion components are known: what their change pulls along goes to the right-hand side of the others.
+  // Prescribed components are known: what their change pulls along goes to the right-hand side of the others.
   if (change_.size() != n) change_.assign(n, Vec3::Zero());
   direction_ = before_;
   held_.impose_velocity(state, advance.drift, direction_);
@@ -70,6 +70,24 @@ StepOutcome ImplicitDamping::advance(State& state, const std::vector<Vec3>& oute
   parallel_for_each(n,
                     [&](std::size_t e) { residual_[e] = right_[e] + dt * first[e] - mass[e] * image_[e]; });
   held_.clear(residual_);
+  solve_for_change(dt);
+  // What the forces make of the held components as if they were free: the damping at v+ in place of that at
+  // v-. The former stays with the stepper, for the books.
+  const std::vector<Vec3>& then = damping(before_);
+  parallel_for_each(n, [&](std::size_t e) {
+    image_[e] = state.velocity[e] - dt * inverse[e] * then[e];
+    state.velocity[e] = before_[e] + change_[e];
+  });
+  const std::vector<Vec3>& now = damping(state.velocity);
+  parallel_for_each(n, [&](std::size_t e) { image_[e] += dt * inverse[e] * now[e]; });
+  held_.copy(image_, state.velocity);
+  parallel_for_each(n, [&](std::size_t e) { state.displacement[e] += advance.drift * state.velocity[e]; });
+  return outcome;
+}
+
+void ImplicitDamping::solve_for_change(double dt) {
+  const std::vector<double>&mass = stepper_.mass(), &inverse = stepper_.inverse_mass();
+  const std::size_t n = change_.size();
   const double enough = kDampingTolerance * kDampingTolerance * weighted_dot(right_, right_, inverse);
   double norm = weighted_dot(residual_, residual_, inverse);
   parallel_for_each(n, [&](std::size_t e) { direction_[e] = inverse[e] * residual_[e]; });
@@ -91,18 +109,6 @@ StepOutcome ImplicitDamping::advance(State& state, const std::vector<Vec3>& oute
         n, [&](std::size_t e) { direction_[e] = inverse[e] * residual_[e] + share * direction_[e]; });
     norm = next;
   }
-  // What the forces make of the held components as if they were free: the damping at v+ in place of that at
-  // v-. The former stays with the stepper, for the books.
-  const std::vector<Vec3>& then = damping(before_);
-  parallel_for_each(n, [&](std::size_t e) {
-    image_[e] = state.velocity[e] - dt * inverse[e] * then[e];
-    state.velocity[e] = before_[e] + change_[e];
-  });
-  const std::vector<Vec3>& now = damping(state.velocity);
-  parallel_for_each(n, [&](std::size_t e) { image_[e] += dt * inverse[e] * now[e]; });
-  held_.copy(image_, state.velocity);
-  parallel_for_each(n, [&](std::size_t e) { state.displacement[e] += advance.drift * state.velocity[e]; });
-  return outcome;
 }
 
 }  // namespace flexel::simulate

@@ -39,6 +39,9 @@ class ImplicitDamping {
  private:
   // D v [N] (elements) at the displacements of probe_.
   const std::vector<Vec3>& damping(const std::vector<Vec3>& velocity);
+  // Conjugate gradients for change_, from residual_ = right_ - (M - dt D) change_, with the inverse masses as
+  // preconditioner.
+  void solve_for_change(double dt);
 
   Stepper& stepper_;
   const PrescribedMotion& held_;

@@ -26,7 +26,7 @@ struct Material {
   double walls = 0;   // share of the part's volume
 };
 
-// The library, in order of docs/materials.md. At room temperature; figures that are not known for certain are
+// The library, in order of docs/reference/materials.md. At room temperature; figures that are not known for certain are
 // left out. A scene's own go before them.
 [[nodiscard]] const std::vector<Material>& material_library();
 

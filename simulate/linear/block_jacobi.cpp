@@ -1,8 +1,9 @@
 // Block Jacobi: every unknown element is corrected by the inverse of its own 3x3 block. Cheap to set up, but
 // the iterations grow with the number of cells along the part.
+#include "simulate/linear/block_jacobi.h"
 #include "base/parallel.h"
 #include "simulate/linear/block_inverse.h"
-#include "simulate/linear/solve.h"
+#include "simulate/linear/preconditioner.h"
 
 namespace flexel::simulate {
 namespace {

@@ -8,7 +8,8 @@
 #include <limits>
 
 #include "base/parallel.h"
-#include "simulate/linear/solve.h"
+#include "simulate/linear/conjugate_gradients.h"
+#include "simulate/linear/preconditioner.h"
 #include "simulate/linear/vector_products.h"
 
 namespace flexel::simulate {

@@ -12,7 +12,8 @@
 #include "base/disjoint_sets.h"
 #include "base/parallel.h"
 #include "simulate/linear/aggregate.h"
-#include "simulate/linear/solve.h"
+#include "simulate/linear/free_motions.h"
+#include "simulate/linear/preconditioner.h"
 
 namespace flexel::simulate {
 namespace {

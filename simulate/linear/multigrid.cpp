@@ -14,8 +14,9 @@
 
 #include "simulate/linear/direct.h"
 #include "simulate/linear/level.h"
+#include "simulate/linear/multigrid.h"
+#include "simulate/linear/preconditioner.h"
 #include "simulate/linear/rigid_transfer.h"
-#include "simulate/linear/solve.h"
 
 namespace flexel::simulate {
 namespace {

@@ -64,7 +64,7 @@ struct SettleSummary {  // of equilibrium with contact (simulate/time/dynamic_re
   double tolerance = 0;  // of both; that of the kinetic energy relative to its largest
 };
 
-struct LiveSummary {        // of a run with poses from stdin or --live (docs/live.md)
+struct LiveSummary {        // of a run with poses from stdin or --live (docs/guide/live.md)
   std::uint64_t poses = 0;  // that came in
   bool poses_ended = false;
   double rate = 0;  // 1/s, of frames; 0: none were written, and real time was not kept

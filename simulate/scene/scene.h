@@ -1,4 +1,4 @@
-// Scene: what happens to a body. Read from TOML (docs/scene.md gives every key and unit) or filled by a
+// Scene: what happens to a body. Read from TOML (docs/reference/scene.md gives every key and unit) or filled by a
 // program:
 //     Scene scene;
 //     scene.material = "steel";

@@ -1,4 +1,4 @@
-// PrescribedMotion components: f = m a of the free advance, R = m (a of the path) - f.
+// Prescribed components: f = m a of the free advance, R = m (a of the path) - f.
 #include "simulate/stepping/prescribed_motion.h"
 
 #include "base/parallel.h"

@@ -1,4 +1,4 @@
-// The books of a timed run, a row per sample: energies, momenta, probes (docs/motion.md gives every column).
+// The books of a timed run, a row per sample: energies, momenta, probes (docs/reference/motion.md gives every column).
 //
 // At the time of step n, with the velocities of the half steps before and after it, the kinetic energy is 1/2
 // sum m v(n-1/2) . v(n+1/2). It changes from step to step by exactly the mean of the forces at both ends

@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "base/files/files.h"
+#include "base/files/output_file.h"
 #include "formats/lattice/body_file.h"
 
 namespace flexel::simulate {

@@ -11,6 +11,7 @@
 
 #include "base/error.h"
 #include "base/files/files.h"
+#include "base/files/output_file.h"
 #include "base/program/termination.h"
 #include "base/stop.h"
 #include "formats/lattice/body_file.h"

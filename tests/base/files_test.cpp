@@ -15,6 +15,7 @@
 #include <thread>
 
 #include "base/error.h"
+#include "base/files/output_file.h"
 
 namespace flexel {
 namespace {

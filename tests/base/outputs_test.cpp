@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/files/files.h"
+#include "base/files/output_file.h"
 #include "base/files/pipe_code.h"
 #include "tests/formats/import_help.h"
 

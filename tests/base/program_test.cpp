@@ -16,6 +16,7 @@
 #include <thread>
 
 #include "base/files/files.h"
+#include "base/files/output_file.h"
 #include "base/program/progress.h"
 #include "base/program/termination.h"
 

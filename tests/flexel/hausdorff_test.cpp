@@ -1,5 +1,5 @@
 // The distance of two surfaces, against shapes whose distance is known and against points strewn densely.
-#include "flexel/study/hausdorff.h"
+#include "flexel/study/runs/hausdorff.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Whole runs. The programs lie beside this one; where they are not built the runs are skipped.
-#include "flexel/study/runner.h"
+#include "flexel/study/runs/runner.h"
 
 #include <gtest/gtest.h>
 

@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "flexel/study/history_csv.h"
-#include "flexel/study/scene_edit.h"
+#include "flexel/study/runs/history_csv.h"
+#include "flexel/study/runs/scene_edit.h"
 #include "simulate/scene/scene.h"
 
 namespace flexel::study {

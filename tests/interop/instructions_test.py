@@ -40,7 +40,7 @@ def bare():
 def of_effects(counted):
     """What was counted in effects, in the damped variants of the hot loop, or in what serves effects."""
     names = "|".join([*effects(), "Held", "History"])
-    return {f: n for f, n in counted.items() if re.search(rf"flexel::({names})::|make_pass|Damping\)[12]|Composition\{{[^}}]", f)}
+    return {f: n for f, n in counted.items() if re.search(rf"flexel::simulate::({names})::|make_pass|Damping\)[12]|Composition\{{[^}}]", f)}
 
 
 def test_a_bare_step_runs_nothing_of_any_effect():
@@ -56,7 +56,7 @@ def test_naming_an_effect_adds_its_own_instructions():
     damped = of_a_step(lambda steps: simulate_command(steps, EFFECTS["`[damping]`"]))
     expect(sum(of_effects(damped).values()) > 100 * CELLS**3, "damping leaves no trace: the test sees nothing")
     pushed = of_a_step(lambda steps: simulate_command(steps, EFFECTS["`[[load]]` with a course"]))
-    expect(any("flexel::Loads::add_forces" in f for f in of_effects(pushed)), "a load leaves no trace: the test sees nothing")
+    expect(any("flexel::simulate::Loads::add_forces" in f for f in of_effects(pushed)), "a load leaves no trace: the test sees nothing")
     expect(sum(pushed.values()) > sum(before.values()), "a load that varies costs nothing")
 
 
@@ -64,9 +64,9 @@ def test_a_program_without_effects_steps_with_the_same_instructions():
     prepare()
     if not (BIN / "bare_step").exists():
         raise Skip("built without FLEXEL_BENCH: no bare_step")
-    linked = [name for name in effects() if f"flexel::{name}::" in symbols("bare_step")]
+    linked = [name for name in effects() if f"flexel::simulate::{name}::" in symbols("bare_step")]
     expect(not linked, f"bare_step has effects in it: {linked}")
-    missing = [name for name in effects() if f"flexel::{name}::" not in symbols("flexel-simulate")]
+    missing = [name for name in effects() if f"flexel::simulate::{name}::" not in symbols("flexel-simulate")]
     expect(not missing, f"flexel-simulate lacks effects: {missing}")
     with_all = kernel_only(bare())
     without = kernel_only(of_a_step(lambda steps: [str(BIN / "bare_step"), "block.vtu", str(steps)]))
@@ -77,7 +77,7 @@ def test_a_program_without_effects_steps_with_the_same_instructions():
 def test_the_hot_loop_has_few_variants():
     listed = symbols("flexel-simulate")
     for model in ("CellsModel", "SpringsModel", "ConnectionsModel"):
-        found = set(re.findall(rf"run<flexel::step::\(anonymous namespace\)::{model}, ([^\n]*?)>\(", listed))
+        found = set(re.findall(rf"run<flexel::simulate::step::\(anonymous namespace\)::{model}, ([^\n]*?)>\(", listed))
         print(model, len(found))
         expect(1 <= len(found) <= MOST_VARIANTS, f"{model} has {len(found)} variants: {found}")
 

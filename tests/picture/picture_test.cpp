@@ -1,5 +1,6 @@
 // The whole picture: views, ranges, exaggeration, labels, what is refused.
 #include "flexel/picture/picture.h"
+#include "flexel/picture/canvas/png_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -11,7 +11,11 @@
 #include <tuple>
 #include <vector>
 
-#include "simulate/linear/solve.h"
+#include "simulate/linear/block_jacobi.h"
+#include "simulate/linear/conjugate_gradients.h"
+#include "simulate/linear/free_motions.h"
+#include "simulate/linear/multigrid.h"
+#include "simulate/linear/preconditioner.h"
 
 namespace flexel::simulate::test {
 

@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/files/files.h"
+#include "base/files/output_file.h"
 
 namespace flexel::voxelize {
 namespace {

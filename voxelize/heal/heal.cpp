@@ -13,6 +13,7 @@
 #include "base/units.h"
 #include "voxelize/heal/heal_cgal.h"
 #include "voxelize/heal/heal_mesh.h"
+#include "voxelize/heal/orientation.h"
 
 namespace flexel::voxelize {
 namespace {

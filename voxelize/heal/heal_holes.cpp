@@ -12,6 +12,7 @@
 #include "formats/part/topology.h"
 #include "voxelize/heal/heal_cgal.h"
 #include "voxelize/heal/heal_mesh.h"
+#include "voxelize/heal/orientation.h"
 
 namespace flexel::voxelize {
 namespace {
@@ -158,6 +159,37 @@ double volume_with(PartMesh mesh, const std::vector<Corners>& closing) {
   return std::abs(enclosed_volume(mesh));
 }
 
+// A hole before it is decided on, in the mesh's vertices.
+Hole hole_at(const Loop& loop) {
+  Hole hole{.loop = loop.vertices};
+  Box box;
+  for (const Vec3& point : loop.points) {
+    box.add(point);
+    hole.centre += point / static_cast<double>(loop.points.size());
+  }
+  hole.width = box.diagonal();
+  return hole;
+}
+
+// Closes the holes that are filled, but those of which more is unknown than the part's volume leaves room for.
+// `closings` (holes) their triangles, `reaches` (holes) m^3, what may be missing beyond them.
+void close_holes(const std::vector<std::vector<Corners>>& closings, const std::vector<double>& reaches,
+                 const std::vector<Corners>& all, PartMesh& mesh, FilledHoles& result) {
+  const bool any_uncertain = std::any_of(reaches.begin(), reaches.end(), [](double r) { return r > 0; });
+  double left = any_uncertain ? kUncertain * volume_with(mesh, all) : 0;
+  for (std::size_t n = 0; n < closings.size(); ++n) {
+    Hole& hole = result.holes[n];
+    hole.uncertain = hole.filled && reaches[n] > left;
+    hole.filled = hole.filled && !hole.uncertain;
+    if (!hole.filled) continue;
+    left -= reaches[n];
+    result.triangles += closings[n].size();
+    mesh.corners.insert(mesh.corners.end(), closings[n].begin(), closings[n].end());
+    mesh.polygon.resize(mesh.corners.size(), kNoPolygon);
+  }
+  if (result.triangles > 0) number_edges(mesh);
+}
+
 }  // namespace
 
 FilledHoles fill_holes(PartMesh& mesh) {
@@ -177,13 +209,7 @@ FilledHoles fill_holes(PartMesh& mesh) {
   for (const auto& edges : walker.walk()) {
     check_stop();
     const Loop loop = loop_of(mesh, walker, edges);
-    Hole hole{.loop = loop.vertices};
-    Box box;
-    for (const Vec3& point : loop.points) {
-      box.add(point);
-      hole.centre += point / static_cast<double>(loop.points.size());
-    }
-    hole.width = box.diagonal();
+    Hole hole = hole_at(loop);
     in_loops += edges.size();
     std::vector<Corners> closing = closing_triangles(loop);
     const double unknown = unknown_share(loop, closing);
@@ -209,20 +235,8 @@ FilledHoles fill_holes(PartMesh& mesh) {
     closings.push_back(std::move(closing));
     result.holes.push_back(std::move(hole));
   }
-  const bool any_uncertain = std::any_of(reaches.begin(), reaches.end(), [](double r) { return r > 0; });
-  double left = any_uncertain ? kUncertain * volume_with(mesh, all) : 0;
-  for (std::size_t n = 0; n < closings.size(); ++n) {
-    Hole& hole = result.holes[n];
-    hole.uncertain = hole.filled && reaches[n] > left;
-    hole.filled = hole.filled && !hole.uncertain;
-    if (!hole.filled) continue;
-    left -= reaches[n];
-    result.triangles += closings[n].size();
-    mesh.corners.insert(mesh.corners.end(), closings[n].begin(), closings[n].end());
-    mesh.polygon.resize(mesh.corners.size(), kNoPolygon);
-  }
   result.stray_edges = walker.edge_count() - in_loops;
-  if (result.triangles > 0) number_edges(mesh);
+  close_holes(closings, reaches, all, mesh, result);
   return result;
 }
 

@@ -1,6 +1,7 @@
 // Within a shell, orientation is propagated across edges that two triangles share; the shell keeps the
 // orientation of most of its area. An outermost shell must enclose a positive volume. If all outermost shells
 // are inside out, the whole file is, and every shell is turned.
+#include "voxelize/heal/orientation.h"
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>

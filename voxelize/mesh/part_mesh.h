@@ -43,12 +43,7 @@ struct PartMesh {
 // Numbers edges and shells and counts open and unbalanced edges. Needs `world` and `corners`.
 void number_edges(PartMesh& mesh);
 
-// Turns triangles over so that winding numbers are positive inside: triangles of a shell agree with their
-// neighbours (each shell keeps the orientation that most of its area has), and shells that are outermost
-// enclose positive volume. A shell inside another one may be inside out: it bounds a void.
-void repair_orientation(PartMesh& mesh);
-
-// Regions of triangles connected across edges with two triangles, and which triangles to turn so
+// Regions of triangles that hang together across edges with two triangles, and which triangles to turn so
 // that all of a region face the same side of it: the side that most of its area faces.
 struct FacingRegions {
   std::vector<std::uint8_t> turn;     // (triangles) 1: turn it over

@@ -60,7 +60,4 @@ class LineLayer {
   std::vector<float> cover_;  // (height x width)
 };
 
-// PNG, 8 bits a channel, with the programs' name in it. All use of libpng is in png_file.cpp.
-[[nodiscard]] Bytes encode_png(const Image& image);
-
 }  // namespace flexel::picture

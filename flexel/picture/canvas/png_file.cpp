@@ -6,7 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "flexel/picture/canvas/image.h"
+#include "flexel/picture/canvas/png_file.h"
 
 namespace flexel::picture {
 namespace {

@@ -1,0 +1,370 @@
+// flexel deform: every stage in one process, on one body in memory. All that can be wrong with the arguments
+// is found before the first stage runs, and nothing is written before the last has ended.
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "base/files/files.h"
+#include "base/files/output_file.h"
+#include "base/files/outputs.h"
+#include "base/human.h"
+#include "base/parallel.h"
+#include "base/program/brief_output.h"
+#include "base/program/termination.h"
+#include "base/stop.h"
+#include "base/units.h"
+#include "flexel/accuracy/resolution_search.h"
+#include "flexel/bent_picture.h"
+#include "flexel/commands.h"
+#include "flexel/job.h"
+#include "formats/exchange/part_files.h"
+#include "formats/lattice/body_file.h"
+#include "mapping/options.h"
+#include "mapping/output.h"
+#include "mapping/report/report.h"
+#include "simulate/answer.h"
+#include "simulate/input/infill.h"
+#include "simulate/result/options.h"
+#include "simulate/scene/strength.h"
+#include "simulate/simulate.h"
+#include "simulate/summary.h"
+#include "simulate/time/dynamic_relaxation.h"
+#include "voxelize/report.h"
+#include "voxelize/voxelize.h"
+
+namespace flexel::commands {
+namespace {
+
+// Of the first run when a size is chosen: enough for most error bars, or for one that takes a tenth of a
+// second.
+constexpr std::size_t kFirstCells = 20000, kFewCells = 2000;
+constexpr double kShort = 5;                              // s
+constexpr double kUsualError = 0.05, kUsualSeconds = 20;  // aimed at where nothing is asked for
+
+struct DeformArguments {
+  JobArguments job;
+  std::vector<std::string> outputs;
+  std::string summary, body, timeout, accuracy, within;
+  mapping::MapArguments map;
+  int threads = 0;
+  bool quiet = false, verbose = false, estimate = true;
+};
+
+void declare_input(CLI::App& app, JobArguments& arguments) {
+  declare_job(app, arguments);
+  app.add_option("--placement", arguments.placement,
+                 "Elements at the voxels' corner or centre (model \"paper\")")
+      ->type_name("WHERE")
+      ->capture_default_str();
+}
+
+void declare_output(CLI::App& app, DeformArguments& arguments) {
+  app.add_option(
+         "-o,--output", arguments.outputs,
+         "The deformed part (.stl, .obj ...), body (.vtu) or a picture of it (.png); again for more; -: "
+         "stdout")
+      ->type_name("FILE")
+      ->required()
+      ->allow_extra_args(false);
+  app.add_option("--body", arguments.body, "Write the deformed body (.vtu) too")->type_name("FILE");
+  declare_map_options(app, arguments.map);
+  app.add_option("--summary", arguments.summary,
+                 "Write the summary of all stages (JSON; docs/guide/deform.md)")
+      ->type_name("FILE");
+  app.add_option("--threads", arguments.threads, "Threads; 0 is every core")->check(CLI::NonNegativeNumber);
+  app.add_option("--timeout", arguments.timeout,
+                 "Stop after this time (\"90 s\"): exit 5, of a simulation the last good state in "
+                 "OUTPUT.failed.vtu")
+      ->type_name("TIME");
+  app.add_option("--accuracy", arguments.accuracy,
+                 "Choose size and mapping from cheap runs so that the error is at most this (\"2%\")")
+      ->type_name("SHARE");
+  app.add_option("--within", arguments.within,
+                 "Choose the finest size whose run ends within this time, all in all (\"10s\")")
+      ->type_name("TIME");
+  app.add_flag("!--no-estimate", arguments.estimate, "Leave out the error bars (docs/theory/error-bars.md)");
+  app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
+  app.add_flag("--verbose", arguments.verbose, "Say all that each stage found");
+}
+
+// What the arguments ask for, checked.
+struct Plan {
+  Job job;
+  std::optional<double> timeout;     // s
+  std::optional<AccuracyGoal> goal;  // of --accuracy and --within
+  mapping::MapOptions map;
+  mapping::CrackOptions crack;
+  struct Output {
+    std::string path;
+    std::optional<mapping::MapOutput> surface;  // nothing: the body, or its picture
+    [[nodiscard]] bool is_picture() const { return extension(path) == "png"; }
+  };
+  std::vector<Output> outputs;
+};
+
+// Where the last good state goes when the simulation diverges: beside the first file that is written.
+std::string failed_name(const Plan& plan) {
+  for (const Plan::Output& output : plan.outputs) {
+    if (output.path == "-") continue;
+    const std::string ending = "." + extension(output.path);
+    return output.path.substr(0, output.path.size() - ending.size()) + ".failed.vtu";
+  }
+  return "";
+}
+
+void plan_outputs(const DeformArguments& arguments, Plan& plan) {
+  for (const std::string& path : arguments.outputs)
+    if (extension(path) == "vtu" || extension(path) == "png")
+      plan.outputs.push_back({path, std::nullopt});
+    else
+      plan.outputs.push_back(
+          {path, mapping::map_output(path == "-" ? arguments.map.format : "", path, arguments.map.ascii, 0,
+                                     arguments.map.scale, arguments.map.attributes)});
+  if (!arguments.body.empty()) plan.outputs.push_back({arguments.body, std::nullopt});
+  std::vector<OutputName> names;
+  for (const Plan::Output& output : plan.outputs) names.push_back({output.path});
+  for (const std::string& path : {arguments.map.report, arguments.summary, failed_name(plan)})
+    names.push_back({path});
+  std::vector<std::string> inputs = arguments.job.parts;
+  inputs.push_back(arguments.job.scene);
+  check_outputs(names, inputs, arguments.job.force);
+}
+
+// Nothing is asked for: a size is chosen where error bars can judge it.
+void plan_usual_goal(const DeformArguments& arguments, Plan& plan) {
+  const simulate::Scene& scene = plan.job.scene;
+  if (plan.job.voxelize.size || plan.job.voxelize.count || !arguments.estimate ||
+      plan.job.voxelize.placement != Placement::corner || scene.run.time || settles(scene) ||
+      !arguments.timeout.empty())
+    return;
+  plan.goal.emplace();
+  plan.goal->by_default = true;
+  plan.goal->began = std::chrono::steady_clock::now();
+  plan.goal->error = kUsualError;
+  plan.goal->within = kUsualSeconds;
+}
+
+void plan_goal(const DeformArguments& arguments, Plan& plan) {
+  if (arguments.accuracy.empty() && arguments.within.empty()) return plan_usual_goal(arguments, plan);
+  const std::string option = arguments.accuracy.empty() ? "--within" : "--accuracy";
+  if (plan.job.voxelize.size || plan.job.voxelize.count)
+    throw InputError(option + " chooses the size: leave --size and --count out");
+  if (plan.job.voxelize.placement != Placement::corner)
+    throw InputError(option + " needs error bars, which --placement centre does not have");
+  if (plan.job.scene.run.time)
+    throw InputError(plan.job.scene.name,
+                     option + " is for runs to equilibrium, and this scene is a timed run");
+  if (!arguments.estimate) throw InputError(option + " needs the error bars: leave --no-estimate out");
+  plan.goal.emplace();
+  plan.goal->began = std::chrono::steady_clock::now();
+  if (!arguments.accuracy.empty()) {
+    plan.goal->error = parse_quantity(arguments.accuracy, Dimension::share);
+    if (!(*plan.goal->error > 0 && *plan.goal->error < 1))
+      throw InputError("--accuracy: must lie above 0 % and below 100 %");
+  }
+  if (!arguments.within.empty()) plan.goal->within = simulate::parse_timeout(arguments.within, "--within");
+}
+
+Plan make_plan(const DeformArguments& arguments) {
+  Plan plan;
+  if (!arguments.timeout.empty()) plan.timeout = simulate::parse_timeout(arguments.timeout);
+  plan.map = map_options(arguments.map);
+  plan.crack = crack_options(arguments.map);
+  plan_outputs(arguments, plan);
+  plan.job = plan_job(arguments.job);
+  plan_goal(arguments, plan);
+  return plan;
+}
+
+void write_outputs(const Plan& plan, Body& body, const mapping::MappedPart& mapped, Progress& progress) {
+  progress.stage("write");
+  if (!plan.crack.pieces.empty())
+    write_parts(mapped.surface(body), mapped.result.displacement, plan.crack.pieces_format,
+                default_unit(body.surface), plan.crack.pieces);
+  for (const Plan::Output& output : plan.outputs)
+    if (output.surface)
+      write_mapped(mapped.surface(body), body, mapped.result, *output.surface);
+    else if (output.is_picture())
+      write_bent_picture(body, output.path, progress);
+    else
+      write_body(body, output.path);
+}
+
+simulate::SimulateOptions simulate_options(const DeformArguments& arguments, const Plan& plan) {
+  simulate::SimulateOptions options;
+  options.threads = arguments.threads;
+  options.failed_output = failed_name(plan);
+  options.estimate = arguments.estimate;
+  return options;
+}
+
+// The size that --accuracy or --within asks for, and the run at it. The mapping is `smooth` where that moves
+// a vertex by more than a quarter of the error asked for beside what --method says.
+SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surface& surface,
+                        AccuracyReport& accuracy, Progress& progress) {
+  Progress quiet("flexel", Progress::Mode::quiet);
+  HeldWarnings warnings;  // of runs that are only tried
+  for (const simulate::Tie& tie : plan.job.scene.get<simulate::Ties>().ties) plan.goal->driven |= tie.is_move;
+  plan.goal->driven |= !plan.job.moves.empty() || !plan.job.twists.empty();
+  mapping::MapOptions mapping;
+  mapping.method = plan.map.method;
+  const auto solve = [&](std::optional<double> size, const GoesOn& goes_on) {
+    SolvedRun run;
+    progress.update(0, size ? "--size " + size_text(*size) : "");
+    (void)warnings.take();
+    run.size = size.value_or(0);
+    voxelize::VoxelizeOptions options = plan.job.voxelize;
+    options.size = size;
+    if (!size) options.count = plan.goal->within.value_or(kShort) < kShort ? kFewCells : kFirstCells;
+    const double processor = processor_seconds();
+    auto began = std::chrono::steady_clock::now();
+    run.voxels = voxelize::voxelize(surface, options, quiet);
+    run.voxelize_seconds = seconds_since(began);
+    if (!size) return run;  // only its spacing is wanted
+    if (!goes_on(run.voxels.body.cell_count())) {
+      run.given_up = true;
+      return run;
+    }
+    Job job = plan.job;  // anew for each body: an action that throws leaves none out
+    add_actions(job, run.voxels.body);
+    run.simulated = simulate::simulate(run.voxels.body, job.scene, simulate_options(arguments, plan), quiet);
+    began = std::chrono::steady_clock::now();
+    run.mapped = map_part(run.voxels.body, mapping, {}, quiet).result.displacement;
+    run.map_seconds = seconds_since(began);
+    run.processor_seconds = processor_seconds() - processor;
+    run.wall = wall_thickness(run.voxels);
+    run.warnings = warnings.take();
+    return run;
+  };
+  SolvedRun run = choose_resolution(*plan.goal, solve, accuracy, progress);
+  (void)warnings.take();
+  if (plan.goal->error && plan.map.method == mapping::MapMethod::blended) {
+    mapping.method = mapping::MapMethod::smooth;
+    const mapping::MapResult smooth = map_part(run.voxels.body, mapping, {}, quiet).result;
+    if (mapping_difference(run.mapped, smooth.displacement) > 0.25 * *plan.goal->error)
+      plan.map.method = mapping::MapMethod::smooth;
+  }
+  accuracy.method = name_of(plan.map.method);
+  return run;
+}
+
+Surface read_part_files(const DeformArguments& arguments, const Plan& plan, Progress& progress) {
+  const StopEndsProcess at_once;
+  return read_parts(arguments.job.parts, plan.job.import, progress);
+}
+
+// Lattice and simulation; of --accuracy and --within what they chose.
+SolvedRun solve(const DeformArguments& arguments, Plan& plan, std::optional<AccuracyReport>& accuracy,
+                Progress& progress) {
+  progress.stage("import");
+  Surface surface = read_part_files(arguments, plan, progress);
+  check_parts(plan.job, surface);
+  if (plan.goal) {
+    progress.stage("choose the size");
+    return solve_to_goal(arguments, plan, surface, accuracy.emplace(), progress);
+  }
+  SolvedRun run;
+  {
+    const StopEndsProcess at_once;
+    run.voxels = voxelize::voxelize(std::move(surface), plan.job.voxelize, progress);
+  }
+  voxelize::report(run.voxels, progress);
+  add_actions(plan.job, run.voxels.body);
+  run.simulated =
+      simulate::simulate(run.voxels.body, plan.job.scene, simulate_options(arguments, plan), progress);
+  return run;
+}
+
+// What to do next, of this run.
+std::string next_step(const std::optional<AccuracyReport>& accuracy) {
+  if (!accuracy) return "";
+  std::string chosen_for;
+  if (accuracy->goal.error) chosen_for += human_share(*accuracy->goal.error);
+  if (accuracy->goal.within)
+    chosen_for +=
+        fmt::format("{}within {}", chosen_for.empty() ? "" : " ", human_seconds(*accuracy->goal.within));
+  const std::string method =
+      accuracy->method == name_of(mapping::MapMethod::blended) ? "" : " --method " + accuracy->method;
+  const std::string repeat = fmt::format("--size {}{} repeats this run, chosen for {}",
+                                         size_text(accuracy->runs.back().size), method, chosen_for);
+  return accuracy->advice.empty() ? repeat : accuracy->advice + "; " + repeat;
+}
+
+int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress) {
+  std::optional<StopAfter> limit;
+  if (plan.timeout) limit.emplace(*plan.timeout, "--timeout", LimitOf::command);
+  std::optional<AccuracyReport> accuracy;
+  SolvedRun run;
+  {
+    const BriefOutput brief(!arguments.verbose);
+    run = solve(arguments, plan, accuracy, progress);
+  }
+  Body& body = run.voxels.body;
+  for (const std::string& line : run.warnings) progress.warn(line);
+  mapping::MappedPart mapped;
+  const StopEndsProcess at_once;
+  {
+    const BriefOutput brief(!arguments.verbose);
+    if (accuracy) report(run.voxels, progress);
+    for (const std::string& line : summary_lines(run.simulated)) progress.say(line);
+    progress.stage("map");
+    mapped = map_part(body, plan.map, plan.crack, progress);
+    progress.finish();
+    say_report(mapped.report, arguments.map, plan.map, progress);
+  }
+  const mapping::MapReport& found = mapped.report;
+  std::vector<std::string> paths{arguments.map.report, arguments.summary};
+  for (const Plan::Output& output : plan.outputs) paths.push_back(output.path);
+  OutputsTogether outputs(std::move(paths));
+  try {
+    write_report(found, arguments.map, plan.map, arguments.map.report);
+  } catch (const InvalidMappingError&) {
+    outputs.appear();
+    throw;
+  }
+  {
+    const BriefOutput brief(!arguments.verbose);
+    write_outputs(plan, body, mapped, progress);
+    if (accuracy) {
+      accuracy->seconds = seconds_since(plan.goal->began);
+      accuracy->met() || accuracy->goal.by_default ? progress.say(accuracy->sentence())
+                                                   : progress.warn(accuracy->sentence());
+    }
+    progress.finish();
+  }
+  if (!arguments.summary.empty()) {
+    nlohmann::ordered_json summary;
+    summary["voxelize"] = nlohmann::ordered_json::parse(voxelize::summary_json(run.voxels));
+    summary["simulate"] = nlohmann::ordered_json::parse(simulate::summary_json(run.simulated, body));
+    summary["map"] = nlohmann::ordered_json::parse(mapping::report_json(found, plan.map));
+    if (accuracy) summary["accuracy"] = nlohmann::ordered_json::parse(accuracy->json());
+    write_text(summary.dump(2) + "\n", arguments.summary);
+  }
+  outputs.appear();
+  const std::vector<simulate::Material> materials = known_materials(plan.job.scene, body);
+  if (accuracy || !arguments.verbose)  // else simulate() has said it
+    for (std::size_t p = 0; p < materials.size(); ++p)
+      if (const std::string line = infill_line(body.parts[p].name, materials[p]); !line.empty())
+        progress.say(line);
+  for (const std::string& line : answer_lines(run.simulated, body, materials, next_step(accuracy), "--size"))
+    progress.say(line);
+  return kExitDone;
+}
+
+}  // namespace
+
+int deform_command(int argc, char** argv) {
+  DeformArguments arguments;
+  CLI::App app{"Deforms a part as its material would be: import, lattice, simulation and mapping in one run.",
+               "flexel deform"};
+  declare_input(app, arguments.job);
+  declare_output(app, arguments);
+  if (!parse_arguments(app, argc, argv)) return kExitDone;
+  const StopEndsProcess nothing_is_left;  // runs in time leave something, and see to it themselves
+  Plan plan = make_plan(arguments);
+  const ThreadLimit limit(arguments.threads);
+  Progress progress("flexel", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
+  return run_stages(arguments, plan, progress);
+}
+
+}  // namespace flexel::commands

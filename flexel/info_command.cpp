@@ -1,0 +1,306 @@
+// flexel info: what a part is and what a scene can name in it.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "base/error.h"
+#include "base/files/output_file.h"
+#include "base/human.h"
+#include "base/program/arguments.h"
+#include "base/program/progress.h"
+#include "base/program/termination.h"
+#include "base/units.h"
+#include "flexel/commands.h"
+#include "flexel/coordinates.h"
+#include "flexel/face_shape.h"
+#include "formats/exchange/import.h"
+#include "formats/exchange/size_warning.h"
+#include "formats/exchange/surface_file.h"
+#include "formats/part/topology.h"
+#include "voxelize/heal/heal.h"
+#include "voxelize/thickness.h"
+#include "voxelize/measure_part.h"
+#include "voxelize/voxelize.h"
+
+namespace flexel::commands {
+namespace {
+
+struct PartInfo {
+  std::string name;
+  std::size_t vertices = 0, polygons = 0, triangles = 0;
+  Box box;
+  double area = 0;    // m^2
+  Topology topology;  // as in the file
+  voxelize::MeasuredPart healed;
+  std::vector<std::uint32_t> faces;  // indices into Surface::faces
+  [[nodiscard]] bool closed() const { return topology.closed(); }
+};
+
+// A surface whose polygons face outward, and what is known of it.
+struct Known {
+  std::vector<FaceShape> shapes;       // (faces)
+  std::vector<std::uint32_t> numbers;  // (faces) within their part
+  std::vector<PartInfo> parts;
+};
+
+Known look_at(Surface& surface) {
+  Known known;
+  std::vector<PartInfo>& parts = known.parts;
+  parts.resize(surface.parts.size());
+  const Triangles triangles = triangulate(surface);
+  const std::vector<std::uint32_t> welded = weld(surface.vertices);
+  std::vector<std::vector<std::array<std::uint32_t, 3>>> corners(parts.size());
+  for (std::size_t t = 0; t < triangles.corners.size(); ++t)
+    corners[surface.polygon_part(triangles.polygon[t])].push_back(triangles.corners[t]);
+  for (std::size_t p = 0; p < surface.polygon_count(); ++p) ++parts[surface.polygon_part(p)].polygons;
+  std::vector<std::uint32_t> used_by(surface.vertices.size(), 0xffffffffu);
+  for (std::uint32_t p = 0; p < parts.size(); ++p) {
+    PartInfo& part = parts[p];
+    part.name = surface.parts[p].name;
+    part.triangles = corners[p].size();
+    for (const auto& triangle : corners[p])
+      for (const std::uint32_t v : triangle) {
+        part.box.add(surface.vertices[v]);
+        part.vertices += std::exchange(used_by[v], p) != p;
+      }
+    part.topology = topology(corners[p], welded);
+  }
+  std::vector<voxelize::MeasuredPart> healed = voxelize::heal_and_measure(surface);
+  for (std::size_t p = 0; p < parts.size(); ++p) parts[p].healed = std::move(healed[p]);
+  known.shapes = face_shapes(surface);
+  known.numbers = face_numbers(surface);
+  for (std::uint32_t f = 0; f < surface.faces.size(); ++f) {
+    parts[surface.faces[f].part].faces.push_back(f);
+    parts[surface.faces[f].part].area += known.shapes[f].area;
+  }
+  return known;
+}
+
+struct Unit {
+  double metres = 1e-3;
+  std::string name = "mm";
+};
+
+// The unit to speak in: the file's own, by the shortest name that it has.
+Unit unit_of(const SurfaceSource& source) {
+  for (const char* name : {"mm", "cm", "m", "um", "in", "ft", "km"})
+    if (std::abs(length_unit(name) - source.unit) <= 1e-12 * source.unit) return {source.unit, name};
+  return {};
+}
+
+std::string place(const Vec3& at, const Unit& unit) {
+  const auto tidy = [&](double x) { return std::abs(x) < 1e-9 * unit.metres ? 0.0 : x / unit.metres; };
+  return fmt::format("({}, {}, {})", human_number(tidy(at.x()), 4), human_number(tidy(at.y()), 4),
+                     human_number(tidy(at.z()), 4));
+}
+
+std::string closedness(const PartInfo& part) {
+  std::string text;
+  const auto add = [&](std::size_t count, const std::string& what) {
+    if (count > 0) text += fmt::format(", {} {}", human_count(count), what);
+  };
+  text = part.closed() ? "closed" : "NOT closed";
+  add(part.topology.shell_count, part.topology.shell_count == 1 ? "shell" : "shells");
+  add(part.topology.open_edges, "open edges");
+  add(part.topology.non_manifold_edges, "non-manifold edges");
+  add(part.topology.misoriented_edges, "edges whose triangles face opposite ways");
+  add(part.topology.degenerate_triangles, "degenerate triangles");
+  return text;
+}
+
+std::string part_text(const PartInfo& part, const Unit& unit) {
+  const Vec3 size = part.box.size() / unit.metres;
+  std::string text =
+      fmt::format("part \"{}\"\n  size       {} x {} x {} {}, from {} to {}\n", part.name,
+                  human_number(size.x(), 6), human_number(size.y(), 6), human_number(size.z(), 6), unit.name,
+                  place(part.box.min, unit), place(part.box.max, unit));
+  text += fmt::format("  mesh       {} vertices, {} polygons; {}\n", human_count(part.vertices),
+                      human_count(part.polygons), closedness(part));
+  text += fmt::format("  area       {} {}^2\n", human_number(part.area / (unit.metres * unit.metres), 6),
+                      unit.name);
+  const voxelize::MeasuredPart& healed = part.healed;
+  if (healed.volume)
+    text += fmt::format("  volume     {} {}^3\n", human_number(*healed.volume / std::pow(unit.metres, 3), 6),
+                        unit.name);
+  else
+    text += "  volume     none: the surface is not closed\n";
+  for (const std::string& line : healing_lines(healed.healing)) text += "  healed     " + line + "\n";
+  if (healed.thinnest)
+    text += fmt::format("  thinnest   wall {} {} at {}\n",
+                        human_number(healed.thinnest->thickness / unit.metres, 4), unit.name,
+                        place(healed.thinnest->where, unit));
+  return text;
+}
+
+// How a scene selects a face by its number: "part/2", or "part/#2" where the file calls another face "2".
+std::string selection_of(std::uint32_t face, const std::vector<std::uint32_t>& numbers,
+                         const Surface& surface, const std::string& part) {
+  const std::string number = std::to_string(numbers[face]);
+  bool taken = false;
+  for (std::uint32_t f = 0; f < surface.faces.size(); ++f)
+    taken |=
+        f != face && surface.faces[f].part == surface.faces[face].part && surface.faces[f].name == number;
+  return fmt::format("{}/{}{}", part, taken ? "#" : "", number);
+}
+
+std::string faces_text(const PartInfo& part, const Surface& surface, const std::vector<FaceShape>& shapes,
+                       const std::vector<std::uint32_t>& numbers, const Unit& unit) {
+  const auto selection = [&](std::uint32_t f) { return selection_of(f, numbers, surface, part.name); };
+  std::size_t width = 4;
+  for (const std::uint32_t f : part.faces) width = std::max(width, selection(f).size());
+  std::string text = fmt::format("  {:<{}} {:>12}  {:<28} {}\n", "face", width, "area " + unit.name + "^2",
+                                 "centre " + unit.name, "what");
+  for (const std::uint32_t f : part.faces) {
+    std::string what = describe(shapes[f], unit.metres, unit.name);
+    if (!surface.faces[f].name.empty()) what += fmt::format(", called \"{}\"", surface.faces[f].name);
+    text += fmt::format("  {:<{}} {:>12.5g}  {:<28} {}\n", selection(f), width,
+                        shapes[f].area / (unit.metres * unit.metres), place(shapes[f].centroid, unit), what);
+  }
+  return text;
+}
+
+std::string source_text(const SurfaceSource& source, const Unit& unit) {
+  return fmt::format("{}: {}, unit {}{}\n", source.file, source.format, unit.name,
+                     source.unit_given ? "" : " (assumed: the file carries none; --unit)");
+}
+
+std::string info_text(const Surface& surface, const Known& known) {
+  const auto& [shapes, numbers, parts] = known;
+  std::string text;
+  for (std::uint32_t s = 0; s < surface.sources.size(); ++s) {
+    const Unit unit = unit_of(surface.sources[s]);
+    text += source_text(surface.sources[s], unit);
+    for (std::size_t p = 0; p < parts.size(); ++p)
+      if (surface.part_source[p] == s)
+        text += part_text(parts[p], unit) + faces_text(parts[p], surface, shapes, numbers, unit);
+  }
+  text +=
+      "A scene or an option can name a part, a face, a group, or a side: xmin, xmax, ymin, ymax, zmin, "
+      "zmax. Where a name means two things, \"part/#2\" is face number 2 and \"part/=2\" what the file calls "
+      "\"2\".\n";
+  return text;
+}
+
+using Json = nlohmann::ordered_json;
+
+Json face_json(const SurfaceFace& face, std::uint32_t number, const std::string& selection,
+               const FaceShape& shape) {
+  Json json = {{"number", number},   {"selection", selection},
+               {"name", face.name},  {"polygons", shape.polygons},
+               {"area", shape.area}, {"centroid", coordinates(shape.centroid)}};
+  constexpr const char* kKinds[] = {"flat", "round", "curved"};
+  json["kind"] = kKinds[static_cast<int>(shape.kind)];
+  if (shape.kind == FaceShape::Kind::flat) json["normal"] = coordinates(shape.normal);
+  if (shape.kind == FaceShape::Kind::round) {
+    json["axis"] = coordinates(shape.axis);
+    json["axis_point"] = coordinates(shape.axis_point);
+    json["radius"] = shape.radius;
+    json["angle"] = shape.angle;
+    json["hole"] = shape.is_hole();
+  }
+  return json;
+}
+
+Json part_json(const PartInfo& part) {
+  Json json = {{"name", part.name},
+               {"vertices", part.vertices},
+               {"polygons", part.polygons},
+               {"triangles", part.triangles},
+               {"min", coordinates(part.box.min)},
+               {"max", coordinates(part.box.max)},
+               {"area", part.area},
+               {"volume", part.healed.volume ? Json(*part.healed.volume) : Json()},
+               {"closed", part.closed()},
+               {"shells", part.topology.shell_count},
+               {"open_edges", part.topology.open_edges},
+               {"non_manifold_edges", part.topology.non_manifold_edges},
+               {"misoriented_edges", part.topology.misoriented_edges},
+               {"degenerate_triangles", part.topology.degenerate_triangles}};
+  const std::optional<voxelize::ThinWall>& thinnest = part.healed.thinnest;
+  json["thinnest_wall"] =
+      thinnest ? Json{{"thickness", thinnest->thickness}, {"where", coordinates(thinnest->where)}} : Json();
+  return json;
+}
+
+std::string info_json(const Surface& surface, const Known& known) {
+  const auto& [shapes, numbers, parts] = known;
+  Json files = Json::array();
+  for (std::uint32_t s = 0; s < surface.sources.size(); ++s) {
+    const SurfaceSource& source = surface.sources[s];
+    Json file = {{"file", source.file},
+                 {"format", source.format},
+                 {"unit", source.unit},
+                 {"unit_given", source.unit_given}};
+    file["parts"] = Json::array();
+    for (std::size_t p = 0; p < parts.size(); ++p) {
+      if (surface.part_source[p] != s) continue;
+      Json part = part_json(parts[p]);
+      part["faces"] = Json::array();
+      for (const std::uint32_t f : parts[p].faces)
+        part["faces"].push_back(face_json(surface.faces[f], numbers[f],
+                                          selection_of(f, numbers, surface, parts[p].name), shapes[f]));
+      file["parts"].push_back(part);
+    }
+    files.push_back(file);
+  }
+  return Json{{"files", files}}.dump(2) + "\n";
+}
+
+// The surface as a new PLY with the wall thickness at every vertex, in the unit of the coordinates; 0 where
+// there is none.
+void write_thickness(Surface surface, const std::string& path) {
+  const double unit = default_unit(surface);
+  std::vector<double> thickness = voxelize::vertex_thickness(surface);
+  for (double& value : thickness) value = std::isfinite(value) ? value / unit : 0;
+  surface.vertex_columns["thickness"] = {1, std::move(thickness)};
+  for (SurfaceSource& source : surface.sources)
+    source.bytes = {};  // a new file, not the source's with other numbers
+  const std::vector<Vec3> still(surface.vertices.size(), Vec3::Zero());
+  write_surface(surface, still, SurfaceFormat::ply, unit, path);
+}
+
+}  // namespace
+
+int info_command(int argc, char** argv) {
+  std::vector<std::string> files;
+  std::string unit, edge, thickness;
+  bool json = false;
+  CLI::App app{"What a part is, and what a scene can name in it.", "flexel info"};
+  app.add_option("part", files, "STEP, IGES, BREP, STL, OBJ, PLY, OFF, glTF or 3MF files; -: stdin")
+      ->required()
+      ->type_name("PART");
+  app.add_flag("--json", json, "As JSON, in SI units (docs/guide/info.md)");
+  app.add_option("--unit", unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
+  app.add_option("--edge", edge, "Split the mesh to this longest edge (default: not split)")
+      ->type_name("LENGTH");
+  app.add_option("--thickness", thickness,
+                 "Also write the surface as PLY with the wall thickness at its vertices")
+      ->type_name("FILE.ply");
+  if (!parse_arguments(app, argc, argv)) return kExitDone;
+  const StopEndsProcess nothing_is_left;
+  if (!thickness.empty() && extension(thickness) != "ply")
+    throw InputError("--thickness: the file must end in .ply");
+  ImportOptions options;
+  // Corners on chords would make the circles that are fitted to round faces too small.
+  options.largest_edge = std::numeric_limits<double>::infinity();
+  if (!unit.empty()) options.unit = length_unit(unit);
+  if (!edge.empty()) {
+    options.largest_edge = parse_quantity(edge, Dimension::length);
+    if (!(*options.largest_edge > 0)) throw InputError("--edge: must be above zero");
+  }
+  Progress progress("flexel", Progress::Mode::quiet);
+  options.warn = [&](const std::string& line) { progress.warn(line); };
+  Surface surface = import_surface(files.front(), options);
+  for (std::size_t f = 1; f < files.size(); ++f) append(surface, import_surface(files[f], options));
+  for (const std::string& line : size_warnings(surface)) progress.warn(line);
+  const Known known = look_at(surface);
+  if (!thickness.empty()) write_thickness(surface, thickness);
+  OutputFile out("-", false);
+  out.write(json ? info_json(surface, known) : info_text(surface, known));
+  out.commit();
+  return kExitDone;
+}
+
+}  // namespace flexel::commands

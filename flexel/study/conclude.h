@@ -1,0 +1,19 @@
+// What the runs of a study say together.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "flexel/study/study.h"
+
+namespace flexel::study {
+
+// The first row of each size of a sweep that went well, the coarsest first.
+[[nodiscard]] std::vector<const Row*> sizes_of(const Study& study, const std::string& sweep);
+// What they found, of the rows that have the quantity.
+[[nodiscard]] std::vector<SizeValue> values_of(const std::vector<const Row*>& rows,
+                                               const std::string& quantity);
+
+// References from the rows (`given` go first), errors of the rows, the summed points and the sentences.
+void conclude(Study& study, const std::vector<Reference>& given);
+
+}  // namespace flexel::study

@@ -1,0 +1,180 @@
+// Velocities at the place where the points of a pair meet, and the forces there.
+#include "simulate/contact/contact_friction.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace flexel::simulate {
+namespace {
+
+constexpr double kTangential = 0.8;  // stiffness along the surface, of that along the normal
+
+Vec3 at_most(const Vec3& value, double most) {
+  const double norm = value.norm();
+  return norm > most ? Vec3(value * (most / norm)) : value;
+}
+
+}  // namespace
+
+ContactFriction::ContactFriction(double damping, const ContactSurface& surface, const PairList& list,
+                                 const PairStates& states, PairMemory& memory)
+    : damping_(damping), surface_(surface), list_(list), states_(states), memory_(memory) {}
+
+// From each point. A ball meets at its centre, which alone can carry a force; a shapeless point likewise.
+std::array<Vec3, 2> ContactFriction::meeting_place(const ContactPair& pair) const {
+  if (pair.of_plane()) return {Vec3::Zero(), Vec3::Zero()};
+  const PointState &i = states_.points()[pair.i], &j = states_.points()[pair.j];
+  const Vec3 d = j.side.position - i.side.position;
+  const bool centred_i = i.side.radius > 0 || i.shapeless;
+  const bool centred_j = j.side.radius > 0 || j.shapeless;
+  const double share = centred_i == centred_j ? 0.5 : centred_i ? 0 : 1;
+  return {share * d, (share - 1) * d};
+}
+
+// finish_step() asks for the motions that loads() of the next step asks for again.
+void ContactFriction::find_motions(const State& state) {
+  const std::vector<std::uint32_t>& elements = list_.elements();
+  bool same = evaluation_ == states_.evaluations() && velocities_.size() == elements.size();
+  for (std::size_t e = 0; same && e < velocities_.size(); ++e)
+    same = velocities_[e] == state.velocity[elements[e]];
+  if (same) return;
+  evaluation_ = states_.evaluations();
+  velocities_.resize(elements.size());
+  for (std::size_t e = 0; e < velocities_.size(); ++e) velocities_[e] = state.velocity[elements[e]];
+  motions_.assign(list_.points().size(), Motion{});
+  parallel_for_each(
+      motions_.size(),
+      [&](std::size_t n) {
+        const ContactPoint& point = list_.point(static_cast<std::uint32_t>(n));
+        Motion& motion = motions_[n];
+        for (std::uint32_t a = 0; a < point.at.count; ++a)
+          motion.velocity += point.at.weights[a] * state.velocity[point.at.elements[a]];
+        if (point.at.count != 8) return;
+        for (std::size_t a = 0; a < 8; ++a)
+          motion.gradient +=
+              state.velocity[point.at.elements[a]] * surface_.gradients(point.part)[a].transpose();
+        motion.gradient *= states_.points()[n].inverse;
+      },
+      512);
+}
+
+// m/s, of j against i where they meet.
+Vec3 ContactFriction::relative_velocity(const ContactPair& pair) const {
+  const std::array<Vec3, 2> place = meeting_place(pair);
+  const auto at = [&](std::uint32_t point, const Vec3& away) {
+    return Vec3(motions_[point].velocity + motions_[point].gradient * away);
+  };
+  const Vec3 of_i = at(pair.i, place[0]);
+  return pair.of_plane() ? Vec3(-of_i) : Vec3(at(pair.j, place[1]) - of_i);
+}
+
+// m, of the adhesive spring; 0 without one.
+double ContactFriction::extension(std::size_t pair) const {
+  return memory_[pair].sticks() ? std::max(states_[pair].gap - memory_[pair].adhesion, 0.0) : 0;
+}
+
+// N/m, of a pair that is pressed together or sticks: from the first touch on at least that of the linear
+// range, so that a body that rests under little pressure does not sway.
+double ContactFriction::secant_stiffness(std::size_t pair) const {
+  const PairState& now = states_[pair];
+  return std::max(now.pressure > 0 ? now.pressure / -now.gap : 0, now.weight);
+}
+
+// N, along the surface, at which a pair slides: mu N and the traction of adhesion, less as it is extended.
+double ContactFriction::largest_tangential(std::size_t pair) const {
+  const PairProperties& properties = list_.pairs()[pair].properties;
+  const double most = properties.friction * states_[pair].pressure;
+  if (!memory_[pair].sticks()) return most;
+  const double share = extension(pair) / properties.pull_off;
+  return most + states_[pair].weight * properties.pull_off * std::sqrt(std::max(1 - share * share, 0.0));
+}
+
+// N, on j.
+Vec3 ContactFriction::force(std::size_t pair) const {
+  const PairState& now = states_[pair];
+  const bool sticks = now.near && memory_[pair].sticks();
+  if (!(now.pressure > 0) && !sticks) return Vec3::Zero();
+  const ContactPair& of = list_.pairs()[pair];
+  const double stiffness = secant_stiffness(pair);
+  // share of the dashpot: as the contact's stiffness, less where the law begins softly
+  const double share = sticks ? 1 : std::min(-now.gap / of.properties.constants.law.soft, 1.0);
+  const Vec3 velocity = damping_ > 0 ? relative_velocity(of) : Vec3(Vec3::Zero());
+  const double separating = velocity.dot(now.normal);
+  double along = -damping_ * now.stiffness * share * separating - stiffness * extension(pair);
+  if (!sticks) along = std::max(along, -now.pressure);
+  const Vec3 sliding = velocity - separating * now.normal;
+  const Vec3 held = memory_[pair].slip + damping_ * sliding;
+  return along * now.normal - at_most(kTangential * stiffness * held, largest_tangential(pair));
+}
+
+std::vector<PointLoad> ContactFriction::loads(const State& state) {
+  const std::vector<std::uint32_t>& active = states_.active();
+  if (active.empty()) return {};
+  if (damping_ > 0) find_motions(state);
+  std::vector<Vec3> forces(active.size(), Vec3::Zero());
+  parallel_for_each(
+      active.size(), [&](std::size_t c) { forces[c] = force(active[c]); }, 512);
+  std::vector<PointLoad> loads(list_.points().size());
+  for (std::size_t c = 0; c < active.size(); ++c) {
+    if (forces[c] == Vec3::Zero()) continue;
+    const ContactPair& pair = list_.pairs()[active[c]];
+    const std::array<Vec3, 2> place = meeting_place(pair);
+    loads[pair.i].force -= forces[c];
+    loads[pair.i].couple -= forces[c] * place[0].transpose();
+    if (pair.of_plane()) continue;
+    loads[pair.j].force += forces[c];
+    loads[pair.j].couple += forces[c] * place[1].transpose();
+  }
+  return loads;
+}
+
+void ContactFriction::finish_step(const State& state, double drift, bool active) {
+  const bool fresh = std::exchange(fresh_, false);
+  if (list_.pairs().empty() || !active) return;
+  forget_separated();
+  find_motions(state);
+  parallel_for_each(
+      states_.active().size(), [&](std::size_t c) { update_record(states_.active()[c], drift, fresh); }, 512);
+  last_active_ = states_.active();
+  last_builds_ = list_.builds();
+}
+
+void ContactFriction::update_record(std::size_t pair, double drift, bool fresh) {
+  const PairState& now = states_[pair];
+  const ContactPair& of = list_.pairs()[pair];
+  PairRecord& record = memory_[pair];
+  // in the first step points that are nearly together touch
+  const bool touches = now.gap < (fresh ? of.properties.constants.law.soft : 0);
+  if (!(of.properties.pull_off > 0))
+    record.release_adhesion();
+  else if (!record.sticks() && touches)
+    record.adhesion = std::max(now.gap, 0.0);
+  const bool rubs = now.pressure > 0 && of.properties.friction > 0;
+  Vec3 slip = Vec3::Zero();
+  if (rubs || record.sticks()) {
+    slip = record.slip + drift * relative_velocity(of);
+    slip -= slip.dot(now.normal) * now.normal;
+  }
+  if (!(now.pressure > 0) && std::hypot(extension(pair), kTangential * slip.norm()) > of.properties.pull_off)
+    record.release_adhesion();
+  record.slip = rubs || record.sticks()
+                    ? at_most(slip, largest_tangential(pair) / (kTangential * secant_stiffness(pair)))
+                    : Vec3(Vec3::Zero());
+}
+
+// Pairs that are not near any more begin anew when they come back.
+void ContactFriction::forget_separated() {
+  const auto forget = [&](std::uint32_t p) {
+    if (states_.is_active(p)) return;
+    memory_[p].release_adhesion();
+    memory_[p].slip = Vec3::Zero();
+  };
+  if (last_builds_ == list_.builds()) {
+    for (const std::uint32_t p : last_active_) forget(p);
+  } else {
+    for (std::uint32_t p = 0; p < list_.pairs().size(); ++p) forget(p);
+  }
+}
+
+}  // namespace flexel::simulate

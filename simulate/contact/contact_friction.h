@@ -1,0 +1,67 @@
+// Friction, damping and adhesion of contacts.
+//
+// They act on both sides at one place, half way between the points, and along one line: momentum and angular
+// momentum are kept.
+//
+// Friction (Jansson and Vergeest, equations 4 and 20, with sticking added): a spring along the surface holds
+// the points where they first touched, with 0.8 of the stiffness of the contact (Mindlin 1949: 0.8 at Poisson's
+// ratio 1/3); where its force would exceed mu N they slide and it stays at mu N. Damping: a dashpot of tau
+// times the contact's stiffness, along the normal and, while the pair sticks, along the surface. Without
+// adhesion it never pulls.
+//
+// Adhesion (Jansson and Vergeest, section 3.2: a connection made when elements meet, destroyed when they are t
+// apart): points that have touched are joined by a spring, as stiff as the contact, that pulls until its
+// extension is t, where the traction is `stick`; along the surface it holds that traction beside mu N, and
+// slides beyond.
+#pragma once
+#include "simulate/contact/contact_loads.h"
+
+namespace flexel::simulate {
+
+class ContactFriction {
+ public:
+  // All but `damping` [s] outlive this; slip and adhesion are kept in `memory`.
+  ContactFriction(double damping, const ContactSurface& surface, const PairList& list,
+                  const PairStates& states, PairMemory& memory);
+
+  // The loads (PairList::points()) in `state`, for which the pairs have been evaluated; empty: none.
+  [[nodiscard]] std::vector<PointLoad> loads(const State& state);
+  // Slip and adhesion after a step of `drift` s that led to `state`, likewise evaluated. `active`: whether
+  // anything dissipates at all.
+  void finish_step(const State& state, double drift, bool active);
+
+  // For checkpoints: whether no step has been finished.
+  [[nodiscard]] bool fresh() const { return fresh_; }
+  void set_fresh(bool fresh) { fresh_ = fresh; }
+
+ private:
+  struct Motion {  // of a point: its velocity [m/s] and that of the matter around it, dv/dx [1/s]
+    Vec3 velocity = Vec3::Zero();
+    Mat3 gradient = Mat3::Zero();
+  };
+  void find_motions(const State& state);
+  void forget_separated();
+  void update_record(std::size_t pair, double drift, bool fresh);
+  [[nodiscard]] Vec3 force(std::size_t pair) const;
+  [[nodiscard]] std::array<Vec3, 2> meeting_place(const ContactPair& pair) const;
+  [[nodiscard]] Vec3 relative_velocity(const ContactPair& pair) const;
+  [[nodiscard]] double extension(std::size_t pair) const;
+  [[nodiscard]] double secant_stiffness(std::size_t pair) const;
+  [[nodiscard]] double largest_tangential(std::size_t pair) const;
+
+  double damping_;
+  const ContactSurface& surface_;
+  const PairList& list_;
+  const PairStates& states_;
+  PairMemory& memory_;
+  // Motions of the points, of which evaluation of the pairs and velocities of PairList::elements().
+  std::vector<Motion> motions_;
+  std::vector<Vec3> velocities_;
+  std::uint64_t evaluation_ = 0;
+  // Active pairs of the last finish_step(), in the list of this number.
+  std::vector<std::uint32_t> last_active_;
+  std::uint64_t last_builds_ = 0;
+  bool fresh_ = true;
+};
+
+}  // namespace flexel::simulate

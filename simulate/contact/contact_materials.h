@@ -1,0 +1,39 @@
+// Stiffness, friction and adhesion of a pair of contact points, from the settings and materials of their parts.
+#pragma once
+#include "simulate/contact/pair_law.h"
+#include "simulate/contact/points/contact_surface.h"
+#include "simulate/contact/settings.h"
+
+namespace flexel::simulate {
+
+struct PairProperties {
+  double friction = 0;  // mu
+  PairConstants constants;
+  double pull_off = 0;  // m, extension at which adhesion ends; 0: the pair does not stick
+};
+
+class ContactMaterials {
+ public:
+  // `settings` and `surface` outlive this.
+  ContactMaterials(const ContactSettings& settings, const Problem& problem, const ContactSurface& surface);
+
+  [[nodiscard]] PairProperties between(std::uint32_t i, std::uint32_t j) const;
+  [[nodiscard]] PairProperties against_plane(std::uint32_t point, const ContactPlane& plane) const;
+  // Whether any pair may have friction, damping or adhesion.
+  [[nodiscard]] bool dissipate() const;
+
+ private:
+  [[nodiscard]] double foundation(std::uint32_t i, std::uint32_t j) const;
+  [[nodiscard]] double stick(std::uint32_t point) const;
+  [[nodiscard]] double pull_off(std::uint32_t i, double stick, double foundation) const;
+  [[nodiscard]] PairConstants constants(std::uint32_t i, std::uint32_t j) const;
+  [[nodiscard]] PairConstants plane_constants(std::uint32_t i) const;
+
+  const ContactSettings& settings_;
+  const ContactSurface& surface_;
+  std::vector<double> foundation_;  // (parts) kappa, Pa/m
+  std::vector<double> friction_;    // (parts) mu
+  std::vector<double> stick_;       // (parts) Pa; infinity: glue
+};
+
+}  // namespace flexel::simulate

@@ -1,0 +1,46 @@
+// Bound of the time step by the contacts.
+//
+// Stiffness: the largest eigenvalue of M^-1 sum k b b^T over the pairs, b the derivative of the gap by the
+// elements, is at most the largest row sum of absolute values, sum k |b_a| sum_c |b_c| / m_a (Gershgorin).
+// Active pairs that do not touch yet count as if they did. Motion: points pass each other by at most an eighth
+// of the smallest spacing a step: the energy error of an impact, whose moment falls between steps, grows with
+// the square of that.
+#pragma once
+#include "simulate/contact/pair_states.h"
+
+namespace flexel::simulate {
+
+class ContactStepBound {
+ public:
+  // All outlive this; pairs are evaluated for the states that are passed.
+  ContactStepBound(const ContactSettings& settings, const ContactSurface& surface, const PairList& list,
+                   const PairStates& states);
+
+  // 1/s^2, added by the contacts to the square of the largest frequency, or what bounds the motion of a step.
+  [[nodiscard]] double frequency(const State& state);
+  // Whether the motion of a step is too large; the pairs need not be evaluated.
+  [[nodiscard]] bool moves_too_far(const State& state) const;
+  // Whether the contacts are stiffer than frequency() last said.
+  [[nodiscard]] bool is_exceeded();
+
+  // For checkpoints: 1/s^2, what the last frequency() said of the stiffness, and whether the present list was
+  // checked against it.
+  [[nodiscard]] double bound() const { return bound_; }
+  [[nodiscard]] bool checked() const { return checked_builds_ == list_.builds(); }
+  void restore(double bound, bool checked);
+
+ private:
+  [[nodiscard]] double stiffness_bound() const;
+  void add_row(std::uint32_t number, const Vec3& lever, double stiffness, std::vector<double>& elements,
+               std::vector<double>& parts) const;
+  [[nodiscard]] double speed(const State& state) const;
+
+  const ContactSettings& settings_;
+  const ContactSurface& surface_;
+  const PairList& list_;
+  const PairStates& states_;
+  double bound_ = 0;
+  std::uint64_t checked_builds_ = 0;
+};
+
+}  // namespace flexel::simulate

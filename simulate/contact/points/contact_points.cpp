@@ -1,0 +1,161 @@
+// Patches: surface_points() sorted by cell and half cell, gathered greedily by their normals.
+#include "simulate/contact/points/contact_points.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "simulate/contact/points/broad_phase.h"
+#include "simulate/contact/points/edge_points.h"
+#include "simulate/matter/surface_points.h"
+
+namespace flexel::simulate {
+namespace {
+
+constexpr double kSamePatch = 0.94;   // cosine of 20 degrees
+constexpr double kLeastPatch = 1e-5;  // of h^2; slivers carry nothing worth their time
+
+struct Piece {  // of surface, in its half cell
+  const SurfacePoint* point = nullptr;
+  Index3 half{};
+  [[nodiscard]] auto key() const { return std::tie(point->at.elements, half); }
+};
+
+ContactPoint patch_of(const std::vector<const SurfacePoint*>& members, std::uint32_t part, double width) {
+  ContactPoint made;
+  made.part = part;
+  made.at.elements = members.front()->at.elements;
+  made.at.count = members.front()->at.count;
+  made.width = width;
+  made.depth = 0.5 * width;
+  Vec3 turned = Vec3::Zero();
+  for (const SurfacePoint* each : members) {
+    const double area = each->area_vector.norm();
+    made.area += area;
+    turned += each->area_vector;
+    made.rest += area * each->position;
+    for (std::size_t a = 0; a < 8; ++a) made.at.weights[a] += area * each->at.weights[a];
+  }
+  made.rest /= made.area;
+  for (double& weight : made.at.weights) weight /= made.area;
+  made.normal = turned.normalized();
+  return made;
+}
+
+// The patches of the pieces [begin, end), all in one half cell.
+void gather(std::vector<Piece>::const_iterator begin, std::vector<Piece>::const_iterator end,
+            std::uint32_t part, double width, std::vector<ContactPoint>& points) {
+  std::vector<std::pair<Vec3, std::vector<const SurfacePoint*>>> patches;
+  for (auto piece = begin; piece != end; ++piece) {
+    const Vec3 normal = piece->point->area_vector.normalized();
+    const auto found = std::find_if(patches.begin(), patches.end(),
+                                    [&](const auto& patch) { return patch.first.dot(normal) > kSamePatch; });
+    if (found == patches.end())
+      patches.push_back({normal, {piece->point}});
+    else
+      found->second.push_back(piece->point);
+  }
+  for (const auto& [normal, members] : patches) {
+    ContactPoint made = patch_of(members, part, width);
+    if (made.area > kLeastPatch * width * width) points.push_back(made);
+  }
+}
+
+void add_faces(const Problem& problem, std::uint32_t part, const std::vector<SurfacePoint>& surface,
+               std::vector<ContactPoint>& points) {
+  const Lattice& lattice = problem.body.parts[part].lattice;
+  std::vector<Piece> pieces;
+  for (const SurfacePoint& point : surface) {
+    if (!(point.area_vector.squaredNorm() > 0)) continue;
+    const Vec3 at = lattice.to_lattice(point.position);
+    Index3 half;
+    for (int axis = 0; axis < 3; ++axis)
+      half[static_cast<std::size_t>(axis)] = static_cast<std::int32_t>(std::floor(2 * at[axis]));
+    pieces.push_back({&point, half});
+  }
+  std::stable_sort(pieces.begin(), pieces.end(),
+                   [](const Piece& a, const Piece& b) { return a.key() < b.key(); });
+  for (auto begin = pieces.cbegin(); begin != pieces.cend();) {
+    const auto end =
+        std::find_if(begin, pieces.cend(), [&](const Piece& piece) { return piece.key() != begin->key(); });
+    gather(begin, end, part, lattice.spacing.mean(), points);
+    begin = end;
+  }
+}
+
+// Elements at centres that carry surface: a ball that reaches to the nearest of it.
+void add_balls(const Problem& problem, std::uint32_t part, const std::vector<SurfacePoint>& surface,
+               std::vector<ContactPoint>& points) {
+  const double width = problem.body.parts[part].lattice.spacing.mean();
+  std::vector<std::pair<std::uint32_t, double>> reach;  // element, distance of a piece of surface
+  for (const SurfacePoint& point : surface)
+    reach.emplace_back(point.at.elements[0],
+                       (point.position - problem.body.rest[point.at.elements[0]]).norm());
+  std::sort(reach.begin(), reach.end());
+  for (std::size_t i = 0; i < reach.size(); ++i) {
+    if (i > 0 && reach[i].first == reach[i - 1].first) continue;
+    ContactPoint made;
+    made.shape = ContactShape::ball;
+    made.part = part;
+    made.at = {{reach[i].first}, {1}, 1};
+    made.rest = problem.body.rest[reach[i].first];
+    made.area = width * width;
+    made.radius = std::min(width, reach[i].second);
+    made.depth = made.radius;
+    made.width = width;
+    points.push_back(made);
+  }
+}
+
+// Half the wall, where that is less than half a spacing: the distance to the surface that looks the other
+// way.
+void measure_walls(std::vector<ContactPoint>& points) {
+  double reach = 0;
+  std::vector<Vec3> at;
+  for (const ContactPoint& point : points) {
+    at.push_back(point.rest);
+    reach = std::max(reach, 1.2 * point.width);
+  }
+  if (points.empty()) return;
+  const Neighbours near = neighbours_within(at, reach, [&](std::uint32_t i, std::uint32_t j) {
+    return points[i].part == points[j].part && points[i].normal.dot(points[j].normal) < -0.5;
+  });
+  const auto look = [&](ContactPoint& from, const ContactPoint& to) {
+    const Vec3 way = to.rest - from.rest;
+    const double wall = -way.dot(from.normal);
+    if (wall > 0 && (way + wall * from.normal).norm() < 0.5 * from.width)
+      from.depth = std::min(from.depth, 0.5 * wall);
+  };
+  for (std::uint32_t i = 0; i < points.size(); ++i)
+    for (const std::uint32_t j : near.of(i)) {
+      look(points[i], points[j]);
+      look(points[j], points[i]);
+    }
+}
+
+}  // namespace
+
+std::vector<ContactPoint> contact_points(const Problem& problem, const std::vector<std::uint8_t>& parts) {
+  const Body& body = problem.body;
+  std::vector<std::vector<std::uint32_t>> polygons(body.parts.size());
+  for (std::uint32_t p = 0; p < body.surface.polygon_count(); ++p)
+    polygons[body.surface.polygon_part(p)].push_back(p);
+  std::vector<ContactPoint> points, balls;
+  for (std::uint32_t part = 0; part < body.parts.size(); ++part) {
+    if (!parts[part]) continue;
+    const std::vector<SurfacePoint> surface = surface_points(problem, polygons[part]);
+    if (body.parts[part].placement == Placement::corner)
+      add_faces(problem, part, surface, points);
+    else
+      add_balls(problem, part, surface, balls);
+  }
+  measure_walls(points);
+  const std::vector<ContactPoint> edges = edge_points(problem, parts);
+  points.insert(points.end(), edges.begin(), edges.end());
+  points.insert(points.end(), balls.begin(), balls.end());
+  std::stable_sort(points.begin(), points.end(),
+                   [](const ContactPoint& a, const ContactPoint& b) { return a.part < b.part; });
+  return points;
+}
+
+}  // namespace flexel::simulate

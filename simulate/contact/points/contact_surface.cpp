@@ -1,0 +1,106 @@
+// Position by the weights of the carrying elements, normal by the cell's mean deformation gradient.
+#include "simulate/contact/points/contact_surface.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+
+#include "base/parallel.h"
+#include "simulate/kernels/chunk_layout.h"
+#include "simulate/models/cell_model.h"
+#include "simulate/rigid/rigid_body.h"
+
+namespace flexel::simulate {
+namespace {
+
+constexpr std::uint32_t kNoCarrier = 0xffffffff;
+constexpr double kLeastVolume = 0.05;  // of a cell at rest, below which it gives no normal
+constexpr double kLeastWeight = 1e-3;  // of a point on an element, that limits its area
+constexpr double kMostStretch = 25;    // sum of squares of its stretches, above which it gives none
+
+}  // namespace
+
+ContactSurface::ContactSurface(const Problem& problem, const std::vector<std::uint8_t>& parts)
+    : body_(problem.body), points_(contact_points(problem, parts)), mass_(lumped_masses(problem)) {
+  for (std::size_t p = 0; p < body_.parts.size(); ++p) {
+    std::array<Vec3, 8> gradients = cell_kind(body_.parts[p].lattice, problem.materials[p]).gradient;
+    for (Vec3& each : gradients) each /= 4;
+    gradients_.push_back(gradients);
+  }
+  rigid_.resize(body_.parts.size());
+  for (std::uint32_t p = 0; p < problem.rigidity.size(); ++p) {
+    if (problem.rigidity[p] == Rigidity::none) continue;
+    const RigidBody rigid = rigid_body(body_, p, mass_);
+    const Eigen::SelfAdjointEigenSolver<Mat3> eigen(rigid.inverse_inertia, Eigen::EigenvaluesOnly);
+    rigid_[p] = RigidPart{problem.rigidity[p] == Rigidity::free, rigid.centre, 1 / rigid.mass,
+                          eigen.eigenvalues()[2]};
+  }
+  // Where an edge runs through a sliver of a cell, its elements are light: the area of a point there is at
+  // most what a face's point on that mass would have.
+  for (ContactPoint& point : points_)
+    for (std::uint32_t a = 0; a < point.at.count && point.shape == ContactShape::edge; ++a)
+      if (std::abs(point.at.weights[a]) > kLeastWeight)
+        point.area = std::min(point.area, 0.5 * mass_[point.at.elements[a]] /
+                                              (problem.materials[point.part].density * point.width *
+                                               std::abs(point.at.weights[a])));
+  std::vector<std::uint8_t> carries(body_.element_count(), 0);
+  for (const ContactPoint& point : points_) {
+    for (std::uint32_t a = 0; a < point.at.count; ++a) carries[point.at.elements[a]] = 1;
+    widest_ = std::max(widest_, point.width);
+    narrowest_ = std::min(narrowest_, point.width);
+  }
+  for (std::uint32_t e = 0; e < carries.size(); ++e)
+    if (carries[e]) elements_.push_back(e);
+  find_cells();
+}
+
+void ContactSurface::find_cells() {
+  std::vector<std::uint32_t> order;
+  for (std::uint32_t i = 0; i < points_.size(); ++i)
+    if (points_[i].at.count == 8) order.push_back(i);
+  const auto less = [](const auto& a, const auto& b) { return a < b; };
+  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return less(points_[a].at.elements, points_[b].at.elements);
+  });
+  cell_.assign(points_.size(), kNoCarrier);
+  for (std::uint32_t c = 0; c < body_.cell_count() && !order.empty(); ++c) {
+    const std::array<std::uint32_t, 8>& corners = body_.cell_elements[c];
+    auto at = std::lower_bound(order.begin(), order.end(), corners, [&](std::uint32_t i, const auto& key) {
+      return points_[i].at.elements < key;
+    });
+    if (at != order.end() && points_[*at].at.elements == corners) cells_.push_back(c);
+    for (; at != order.end() && points_[*at].at.elements == corners; ++at) cell_[*at] = c;
+  }
+}
+
+std::size_t ContactSurface::broken_cells() const {
+  return parallel_sum<std::size_t>(cells_.size(),
+                                   [&](std::size_t c) { return body_.broken[cells_[c]] != 0; });
+}
+
+PointState ContactSurface::at(std::uint32_t point, const State& state) const {
+  const ContactPoint& from = points_[point];
+  PointState made;
+  made.side.position = from.rest;
+  for (std::uint32_t a = 0; a < from.at.count; ++a)
+    made.side.position += from.at.weights[a] * state.displacement[from.at.elements[a]];
+  made.side.own_plane = from.shape == ContactShape::face ? 1 : 0;
+  made.side.radius = from.radius;
+  if (from.shape == ContactShape::ball) return made;
+  Mat3 f = Mat3::Identity();
+  if (from.at.count == 8)
+    for (std::size_t a = 0; a < 8; ++a)
+      f += state.displacement[from.at.elements[a]] * gradients_[from.part][a].transpose();
+  // The remains of a broken cell may have any shape and direction: whole faces and planes touch its points as
+  // they touch those of edges, from all sides.
+  const bool broken = cell_[point] != kNoCarrier && body_.broken[cell_[point]] != 0;
+  if (broken || !(f.determinant() > kLeastVolume && f.squaredNorm() < kMostStretch)) {
+    made.shapeless = true;
+    made.side.own_plane = 0;
+    return made;
+  }
+  made.inverse = f.inverse();
+  made.side.normal = (made.inverse.transpose() * from.normal).normalized();
+  return made;
+}
+
+}  // namespace flexel::simulate

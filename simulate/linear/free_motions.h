@@ -1,0 +1,22 @@
+// Rigid motions that supports leave free.
+#pragma once
+#include <vector>
+
+#include "simulate/linear/preconditioner.h"
+
+namespace flexel::simulate {
+
+// Rigid motions that A leaves free: eigenvectors of A restricted to the six rigid motions of each connected
+// group of unknowns, with an eigenvalue under `threshold` times that of a stiff one. For the message that
+// names the part and the motion.
+struct FreeMotion {
+  std::uint32_t part = 0;
+  Vec3 translation = Vec3::Zero();  // unit direction, or zero
+  Vec3 rotation = Vec3::Zero();     // unit axis, or zero
+};
+[[nodiscard]] std::vector<FreeMotion> free_motions(const LinearOperator& matrix, const NodeGeometry& geometry,
+                                                   double threshold = 1e-9);
+[[nodiscard]] std::vector<FreeMotion> free_motions(const BlockMatrix& matrix, const NodeGeometry& geometry,
+                                                   double threshold = 1e-9);
+
+}  // namespace flexel::simulate
