@@ -1,4 +1,4 @@
-// Where results go.
+// Output files, written whole or not at all.
 #pragma once
 #include <cstddef>
 #include <string>
@@ -32,7 +32,7 @@ class OutputFile {
   void write_through(const char* data, std::size_t size);
   Bytes* memory_ = nullptr;
   std::string path_;       // as given
-  std::string target_;     // what it stands for once links are followed
+  std::string target_;     // the path with symbolic links resolved
   std::string temporary_;  // "" for stdout, devices and FIFOs, and once committed
   int descriptor_ = -1;
   bool committed_ = false;

@@ -1,4 +1,4 @@
-// Whether a study's predictions of time and memory hold (docs/guide/study.md): the same part and scene at sizes
+// Whether a study's predictions of time and memory hold (docs/measurements/performance.md): the same part and scene at sizes
 // with 2.5 times the cells each, each one predicted from those before it, once its lattice is made and its
 // cells are counted, and then run.
 //

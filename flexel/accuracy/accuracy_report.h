@@ -1,4 +1,4 @@
-// How accurate a result was asked to be, and what was tried for it.
+// The requested accuracy, the runs that were tried, and the report on them.
 #pragma once
 #include <chrono>
 #include <optional>

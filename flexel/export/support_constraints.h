@@ -9,7 +9,7 @@
 
 namespace flexel::mesh_export {
 
-// What is held already: (node, axis) -> value [m]; not a number where an equation gives it.
+// Components that are already held: (node, axis) -> value [m]; not a number where an equation gives it.
 using HeldValues = std::map<std::pair<std::uint32_t, std::uint8_t>, double>;
 
 // A fix or a move as held nodes, and equations where the surface cuts through hexahedra. Degrees of freedom

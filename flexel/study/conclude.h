@@ -1,4 +1,4 @@
-// What the runs of a study say together.
+// Conclusions from the runs of a study.
 #pragma once
 #include <string>
 #include <vector>
@@ -9,7 +9,7 @@ namespace flexel::study {
 
 // The first row of each size of a sweep that went well, the coarsest first.
 [[nodiscard]] std::vector<const Row*> sizes_of(const Study& study, const std::string& sweep);
-// What they found, of the rows that have the quantity.
+// Their values, of the rows that have the quantity.
 [[nodiscard]] std::vector<SizeValue> values_of(const std::vector<const Row*>& rows,
                                                const std::string& quantity);
 

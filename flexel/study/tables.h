@@ -14,7 +14,7 @@ namespace flexel::study {
                                    const std::vector<Quantity>& quantities);
 // All of it, as JSON in SI units.
 [[nodiscard]] std::string study_json(const Study& study);
-// What was told of each run before it began, beside what it took: a table for a terminal.
+// The prediction for each run beside its cost: a table for a terminal.
 [[nodiscard]] std::string prediction_table(const Study& study);
 
 }  // namespace flexel::study

@@ -1,4 +1,4 @@
-// Implicit Euler for stiff bodies: steps that no stability bound limits (docs/reference/motion.md).
+// Implicit Euler for stiff bodies: steps that no stability bound limits (docs/theory/time-integration.md).
 //
 // With M the lumped masses, C the damping at u-, E the energy of the models and of every pass at the end of
 // the step, and x~ = u- + dt v-, a step is the least of the incremental potential

@@ -1,4 +1,4 @@
-// Triangles that agree on what is outside.
+// Consistent outward orientation of triangles.
 #pragma once
 #include "voxelize/mesh/part_mesh.h"
 

@@ -6,10 +6,9 @@
 
 namespace flexel::study {
 
-// Distances of the mapped surface `path` from `finest` (both .ply of the same part): of the same points of
-// matter the root of the mean square over the area; and the Hausdorff distance of the two surfaces
-// (study/hausdorff.h), for which there is time until `deadline`. Throws InputError where they do not
-// correspond.
+// Distances of the mapped surface `path` from `finest` (both .ply of the same part): the root mean square, over
+// the area, of the distance between the same material points, and the Hausdorff distance (hausdorff.h), computed
+// until `deadline`. Throws InputError where the surfaces do not correspond.
 struct SurfaceDistance {
   double rms = 0, hausdorff = 0;  // m
 };
