@@ -17,7 +17,7 @@
 #include "flexel/bent_picture.h"
 #include "flexel/commands.h"
 #include "flexel/job.h"
-#include "formats/exchange/part_files.h"
+#include "formats/exchange/surface_file.h"
 #include "formats/lattice/body_file.h"
 #include "mapping/options.h"
 #include "mapping/output.h"

@@ -14,7 +14,7 @@
 #include "base/units.h"
 #include "formats/common/file_formats.h"
 #include "formats/exchange/import.h"
-#include "formats/exchange/part_files.h"
+#include "formats/exchange/surface_file.h"
 #include "formats/lattice/body_file.h"
 #include "mapping/anchors/other_surfaces.h"
 #include "mapping/map_part.h"

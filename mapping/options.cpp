@@ -11,7 +11,7 @@
 #include "base/files/output_file.h"
 #include "base/nearest_word.h"
 #include "formats/common/file_formats.h"
-#include "formats/exchange/part_files.h"
+#include "formats/exchange/surface_file.h"
 #include "mapping/report/report.h"
 
 namespace flexel::mapping {

@@ -73,7 +73,7 @@ def kernels(program):
     build = program.resolve().parent.parent
     lines = ["| hot loop | variants a model | object file | compiled in |", "|---|---|---|---|"]
     for isa in ("portable", "avx2", "avx512"):
-        target = f"simulate/CMakeFiles/flexel_kernel_{isa}.dir/kernels/kernel.cpp.o"
+        target = f"simulate/CMakeFiles/flexel_kernel_{isa}.dir/kernels/kernel_table.cpp.o"
         if not (build / target).exists():
             continue
         command = subprocess.run(["ninja", "-C", build, "-t", "commands", "-s", target], check=True, stdout=subprocess.PIPE).stdout.decode()

@@ -10,7 +10,6 @@
 #include "base/files/output_file.h"
 #include "base/nearest_word.h"
 #include "formats/common/file_formats.h"
-#include "formats/exchange/part_files.h"
 
 namespace flexel {
 namespace {

@@ -1,7 +1,7 @@
 // Puts the cut triangles and walls of all parts together to one surface whose parts are the pieces.
 #pragma once
-#include "mapping/crack/crack.h"
 #include "mapping/crack/crack_caps.h"
+#include "mapping/crack/cracked_surface.h"
 
 namespace flexel::mapping {
 

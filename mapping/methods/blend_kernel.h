@@ -2,7 +2,8 @@
 #pragma once
 #include <cstdint>
 
-#include "mapping/methods/element_motion.h"
+#include "formats/lattice/body.h"
+#include "mapping/types/element_motion.h"
 
 namespace flexel::mapping {
 

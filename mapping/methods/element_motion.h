@@ -1,15 +1,13 @@
 // The motion of the matter around an element, to first order: displacement and its gradient, which `blended`
 // blends.
 #pragma once
+#include <cstdint>
+#include <vector>
+
 #include "mapping/anchors/frame.h"
+#include "mapping/types/element_motion.h"
 
 namespace flexel::mapping {
-
-// The displacement around an element: u(x) = displacement + gradient (x - rest position of the element).
-struct ElementMotion {
-  Vec3 displacement = Vec3::Zero();  // m
-  Mat3 gradient = Mat3::Zero();      // F - I
-};
 
 // The elements whose motion is computed, and how. The gradient is a least-squares fit over the connected
 // elements, weighted by 1 / distance^2. Where those do not span space (normalised determinant of their
@@ -22,7 +20,6 @@ struct MovingElements {
   std::vector<std::uint32_t> frame;     // (elements) index into frames; kNoSlot: least squares
   std::vector<Frame> frames;
 };
-constexpr std::uint32_t kNoSlot = 0xffffffffu;
 
 // `wanted` may hold an element more than once.
 [[nodiscard]] MovingElements find_moving_elements(const Body& body, const Adjacency& connections,

@@ -1,7 +1,7 @@
 // Internal damping: every connection and every cell resists the rate of its strain as a dashpot of tau times
 // its stiffness does (Jansson and Vergeest, equations 3 and 18, b = tau k). On relative velocities only: free
 // motion and momentum are untouched. A swing of angular frequency omega decays with the ratio zeta = tau
-// omega / 2. Lives in the kernel (simulate/kernels/kernel.cpp).
+// omega / 2. Lives in the kernel (simulate/kernels/kernel_table.cpp).
 #pragma once
 #include "simulate/effects/effect.h"
 

@@ -7,7 +7,7 @@ namespace flexel::simulate {
 
 // Sets every value of `matrix` [N s/m], which has the pattern that `stencil` belongs to: C of cells and
 // springs displaced by `displacement` [m] (elements), the same as that of the kernel of explicit steps
-// (simulate/kernels/kernel.cpp). `damping`: the time tau of each part [s].
+// (simulate/kernels/kernel_table.cpp). `damping`: the time tau of each part [s].
 void set_damping(const Problem& problem, const Stencil& stencil, const std::vector<double>& damping,
                  const std::vector<Vec3>& displacement, BlockMatrix& matrix);
 

@@ -1,7 +1,7 @@
 // The hot loop of timed runs, as plain data: what one chunk of cells needs, what it gives back, and a table
-// of the compiled variants. simulate/kernels/chunk_layout.h builds the chunks, simulate/kernels/kernel.cpp is the loop.
+// of the compiled variants. simulate/kernels/chunk_layout.h builds the chunks, simulate/kernels/kernel_table.cpp is the loop.
 //
-// kernel.cpp is compiled once per instruction set. Its code and everything that it includes must therefore
+// kernel_table.cpp is compiled once per instruction set. Its code and everything that it includes must therefore
 // stay out of the other translation units' way: no templates or inline functions of the standard library or
 // of Eigen, whose copies the linker would be free to take from the wrong one. Hence raw pointers and arrays
 // here.

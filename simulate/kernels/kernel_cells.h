@@ -1,5 +1,5 @@
-// Model `cells`, elastic and damped, eight cells at a time; kernel.cpp has the formulas. Included by
-// kernel.cpp alone.
+// Model `cells`, elastic and damped, eight cells at a time; kernel_table.cpp has the formulas. Included by
+// kernel_table.cpp alone.
 #pragma once
 #include "simulate/kernels/kernel_state.h"
 

@@ -1,6 +1,6 @@
 // Model `springs` where nothing flows or breaks: every connection once, eight side by side, its stiffness the
-// sum of what the cells around it add (simulate/kernels/connection_runs.h); kernel.cpp has the formulas. A cell
-// by itself would compute 28 springs, an edge of the lattice four times. Included by kernel.cpp alone.
+// sum of what the cells around it add (simulate/kernels/connection_runs.h); kernel_table.cpp has the formulas. A cell
+// by itself would compute 28 springs, an edge of the lattice four times. Included by kernel_table.cpp alone.
 //
 // What a connection does to its second element is added up in columns of its own (kReaction), so that neither
 // sum reads what was just written to an address beside its own: such a load waits until the store is done.

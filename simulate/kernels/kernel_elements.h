@@ -1,6 +1,6 @@
 // Elements of a chunk: their state into columns in the lattice frame, and what the forces make of it. Along a
 // row of the lattice the body has them one after the other, eight vectors in 24 doubles. Included by
-// kernel.cpp alone.
+// kernel_table.cpp alone.
 #pragma once
 #include "simulate/kernels/kernel_state.h"
 

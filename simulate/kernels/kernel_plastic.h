@@ -1,4 +1,4 @@
-// Plastic flow and fracture of model `cells`, eight cells at a time. Included by kernel.cpp alone.
+// Plastic flow and fracture of model `cells`, eight cells at a time. Included by kernel_table.cpp alone.
 //
 // J2 flow with the split F = Fe Fp (Simo and Hughes 1998, section 9.3 and box 9.1). What a cell remembers is
 // Cp^-1 and the equivalent plastic strain a. With b = F Cp^-1 F^T, the energy of the cell is W of b in place

@@ -1,5 +1,5 @@
 // One chunk of a product with the tangent stiffness: gather the displacements of its elements, sum the forces
-// of its cells eight at a time, hand them over. The formulas are those of simulate/kernels/kernel.cpp made
+// of its cells eight at a time, hand them over. The formulas are those of simulate/kernels/kernel_table.cpp made
 // linear: H from the transform of the corners, dP of it, the transform backwards.
 #include "simulate/kernels/kernel_product.h"
 

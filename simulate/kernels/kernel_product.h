@@ -1,6 +1,6 @@
 // Products of the cells' tangent stiffness with displacements, as plain data: simulate/equilibrium/cell_stiffness.h cuts
 // the body into the chunks of timed runs (simulate/kernels/chunk_layout.h) and prepares their tangents,
-// simulate/kernels/kernel_product.cpp is the loop, compiled once per instruction set as kernel.cpp is.
+// simulate/kernels/kernel_product.cpp is the loop, compiled once per instruction set as kernel_table.cpp is.
 #pragma once
 #include "simulate/kernels/kernel.h"
 

@@ -1,5 +1,5 @@
-// Model `springs` where they flow or break, eight cells at a time; kernel.cpp has the formulas. Included by
-// kernel.cpp alone.
+// Model `springs` where they flow or break, eight cells at a time; kernel_table.cpp has the formulas. Included by
+// kernel_table.cpp alone.
 //
 // Fracture: a spring ends where its length passes t = l (1 + `elongation`) (Jansson and Vergeest, equation
 // 2). Each cell that holds a share of it sees the same length and decides the same. A cell whose springs
@@ -156,7 +156,7 @@ struct SpringsModel {
       if constexpr (has.fracture) {
         const LaneMask gone = (broken >> spring & 1) != 0;
         if constexpr (damping == Damping::book) {
-          // As cells do (kernel.cpp): the energy of half a step ago.
+          // As cells do (kernel_table.cpp): the energy of half a step ago.
           const Lanes released = 0.5 * stiffness * stretch * stretch - 0.5 * advance.kick * pull * along;
           sums.released += (gone & ((before >> spring & 1) == 0) & (fill > 0)) ? released : Lanes{};
         }

@@ -1,5 +1,5 @@
 // What both models' loops share: the columns of a chunk's elements, and reading and adding at the corners of
-// a block. Included by kernel.cpp alone.
+// a block. Included by kernel_table.cpp alone.
 #pragma once
 #include "base/simd.h"
 #include "simulate/kernels/kernel.h"

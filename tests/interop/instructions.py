@@ -69,5 +69,5 @@ def of_a_step(command_for, steps=200):
 
 
 def kernel_only(functions):
-    """Those of the hot loop, simulate/kernels/kernel.cpp."""
+    """Those of the hot loop, simulate/kernels/kernel_table.cpp."""
     return {f: n for f, n in functions.items() if re.match(r"(void |double |flexel::simulate::step::ChunkOutcome )?flexel::simulate::step::", f)}

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <set>
 
-#include "formats/exchange/part_files.h"
+#include "formats/exchange/surface_file.h"
 
 namespace flexel {
 namespace {
