@@ -42,21 +42,41 @@ void ContactFriction::find_motions(const State& state) {
   evaluation_ = states_.evaluations();
   velocities_.resize(elements.size());
   for (std::size_t e = 0; e < velocities_.size(); ++e) velocities_[e] = state.velocity[elements[e]];
-  motions_.assign(list_.points().size(), Motion{});
+  const std::vector<std::uint32_t> points = loaded_points();
+  motions_.resize(list_.points().size());
   parallel_for_each(
-      motions_.size(),
+      points.size(),
       [&](std::size_t n) {
-        const ContactPoint& point = list_.point(static_cast<std::uint32_t>(n));
-        Motion& motion = motions_[n];
+        const std::uint32_t number = points[n];
+        const ContactPoint& point = list_.point(number);
+        Motion motion;
         for (std::uint32_t a = 0; a < point.at.count; ++a)
           motion.velocity += point.at.weights[a] * state.velocity[point.at.elements[a]];
-        if (point.at.count != 8) return;
-        for (std::size_t a = 0; a < 8; ++a)
-          motion.gradient +=
-              state.velocity[point.at.elements[a]] * surface_.gradients(point.part)[a].transpose();
-        motion.gradient *= states_.points()[n].inverse;
+        if (point.at.count == 8) {
+          for (std::size_t a = 0; a < 8; ++a)
+            motion.gradient +=
+                state.velocity[point.at.elements[a]] * surface_.gradients(point.part)[a].transpose();
+          motion.gradient *= states_.points()[number].inverse;
+        }
+        motions_[number] = motion;
       },
       512);
+}
+
+// Numbers in PairList::points() of those in pairs under pressure or that can stick: only their motions are
+// asked for.
+std::vector<std::uint32_t> ContactFriction::loaded_points() const {
+  std::vector<std::uint8_t> loaded(list_.points().size(), 0);
+  for (const std::uint32_t p : states_.active()) {
+    const ContactPair& pair = list_.pairs()[p];
+    if (!(states_[p].pressure > 0) && !(pair.properties.pull_off > 0)) continue;
+    loaded[pair.i] = 1;
+    if (!pair.of_plane()) loaded[pair.j] = 1;
+  }
+  std::vector<std::uint32_t> points;
+  for (std::uint32_t n = 0; n < loaded.size(); ++n)
+    if (loaded[n]) points.push_back(n);
+  return points;
 }
 
 // m/s, of j against i where they meet.
@@ -144,6 +164,11 @@ void ContactFriction::update_record(std::size_t pair, double drift, bool fresh) 
   const PairState& now = states_[pair];
   const ContactPair& of = list_.pairs()[pair];
   PairRecord& record = memory_[pair];
+  if (!(now.pressure > 0) && !(of.properties.pull_off > 0)) {
+    record.release_adhesion();
+    record.slip = Vec3::Zero();
+    return;
+  }
   // in the first step points that are nearly together touch
   const bool touches = now.gap < (fresh ? of.properties.constants.law.soft : 0);
   if (!(of.properties.pull_off > 0))

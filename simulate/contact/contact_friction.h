@@ -40,6 +40,7 @@ class ContactFriction {
     Mat3 gradient = Mat3::Zero();
   };
   void find_motions(const State& state);
+  [[nodiscard]] std::vector<std::uint32_t> loaded_points() const;
   void forget_separated();
   void update_record(std::size_t pair, double drift, bool fresh);
   [[nodiscard]] Vec3 force(std::size_t pair) const;

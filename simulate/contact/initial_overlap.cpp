@@ -17,13 +17,13 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr double kBorne = 0.05;      // spacings, of penetration that contact bears
-constexpr double kSearched = 4;      // spacings, of penetration that is searched for
-constexpr double kReleased = 0.9;    // of the depth at which two surfaces do not act on each other any more
-constexpr double kFacing = 0.5;      // cosine from which surfaces face each other
-constexpr double kBeside = 1;        // spacings along a surface, within which a point across is beside it
-constexpr double kNearEnough = 1.5;  // spacings, from a point in a cut cell to one that faces it
-constexpr double kSquashed = 0.05;   // of its volume at rest, below which a cell is left out
+constexpr double kBorne = 0.05;        // spacings, of penetration that contact bears
+constexpr double kSearched = 4;        // spacings, of penetration that is searched for
+constexpr double kReleased = 0.9;      // of the depth at which two surfaces do not act on each other any more
+constexpr double kFacingCosine = 0.5;  // cosine from which surfaces face each other
+constexpr double kBeside = 1;          // spacings along a surface, within which a point across is beside it
+constexpr double kNearEnough = 1.5;    // spacings, from a point in a cut cell to one that faces it
+constexpr double kSquashed = 0.05;     // of its volume at rest, below which a cell is left out
 
 struct Depth {
   double depth = 0, most = 0;    // m: penetration, and the largest that can be released; 0: none
@@ -180,8 +180,8 @@ Depth OverlapCheck::deepest(const std::array<std::uint32_t, 2>& parts, const Box
   two.near = neighbours_within(two.at, kSearched * widest, [&](std::uint32_t a, std::uint32_t b) {
     if (a >= first || b < first) return false;
     const double cosine = opposite(two.points[a], two.points[b]);
-    if (cosine < -kFacing) return false;
-    const bool close = cosine > kFacing && (two.at[b] - two.at[a]).norm() < kNearEnough * widest;
+    if (cosine < -kFacingCosine) return false;
+    const bool close = cosine > kFacingCosine && (two.at[b] - two.at[a]).norm() < kNearEnough * widest;
     return two.inside[a] || two.inside[b] || close;
   });
   const std::vector<Depth> all = depths(two);
@@ -210,7 +210,7 @@ std::vector<Depth> OverlapCheck::depths(const TwoParts& two) const {
   for_each_way([&](std::uint32_t a, std::uint32_t b) {
     const std::uint32_t i = two.points[a], j = two.points[b];
     const double apart = (two.at[b] - two.at[a]).norm();
-    if (!(opposite(i, j) > kFacing && apart < distance[a])) return;
+    if (!(opposite(i, j) > kFacingCosine && apart < distance[a])) return;
     const double depth = penetration(now_[i].side, now_[j].side);
     if (!(depth > 0)) return;
     distance[a] = apart;
@@ -218,7 +218,7 @@ std::vector<Depth> OverlapCheck::depths(const TwoParts& two) const {
   });
   std::vector<Depth> least = facing;
   for_each_way([&](std::uint32_t a, std::uint32_t b) {
-    if (!two.inside[a] || opposite(two.points[a], two.points[b]) > kFacing) return;
+    if (!two.inside[a] || opposite(two.points[a], two.points[b]) > kFacingCosine) return;
     const ContactSide& on = now_[two.points[b]].side;
     const double depth = (on.position - two.at[a]).dot(on.normal);
     const Vec3 along = two.at[a] - on.position + depth * on.normal;

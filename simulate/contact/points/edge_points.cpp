@@ -10,9 +10,9 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr double kSharp = 0.866;   // cosine of 30 degrees between the normals of the faces
-constexpr double kSpacing = 0.5;   // of the points along an edge, in spacings
-constexpr double kCrowded = 0.35;  // nearer than this to another one, in spacings, a point is left out
+constexpr double kSharpEdge = 0.866;  // cosine of 30 degrees between the normals of the faces
+constexpr double kSpacing = 0.5;      // of the points along an edge, in spacings
+constexpr double kCrowded = 0.35;     // nearer than this to another one, in spacings, a point is left out
 
 struct Edge {
   std::array<std::uint32_t, 2> ends{};  // welded vertices
@@ -65,7 +65,7 @@ std::vector<Edge> sharp_edges(const Surface& surface, const std::vector<std::uin
     edge.polygon = triangles.polygon[one.triangle];
     const Vec3 across = surface.vertices[two.apex] - surface.vertices[edge.ends[0]];
     const bool convex = across.dot(edge.normals[0]) < 0;
-    if (convex && edge.normals[0].dot(edge.normals[1]) < kSharp) edges.push_back(edge);
+    if (convex && edge.normals[0].dot(edge.normals[1]) < kSharpEdge) edges.push_back(edge);
   }
   return edges;
 }
