@@ -100,7 +100,8 @@ inline void add_surface(Body& body, std::mt19937_64& random) {
     for (const Vec3& corner : {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)})
       surface.vertices.push_back(part.lattice.to_world(corner));
     surface.faces.push_back({"", p});
-    surface.faces.push_back({"top </AppendedData> \"\xC3\xA9\" & \n", p});
+    surface.faces.emplace_back().name = "top </AppendedData> \"\xC3\xA9\" & \n";
+    surface.faces.back().part = p;
     for (const std::array<std::uint32_t, 3>& t :
          {std::array<std::uint32_t, 3>{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}}) {
       for (const std::uint32_t v : t) surface.polygon_vertices.push_back(base + v);
