@@ -21,6 +21,7 @@
 #include "flexel/scene_text.h"
 #include "flexel/study/scene_edit.h"
 #include "flexel/study/session.h"
+#include "simulate/effects/gravity.h"
 #include "simulate/scene/scene.h"
 #include "simulate/simulate.h"
 #include "voxelize/voxelize.h"

@@ -167,7 +167,7 @@ LinearResult Solver::iterate(const std::vector<Vec3>& rhs, double forcing) {
   double share = 1;  // of the right-hand side, that `left` is
   direction_.assign(rhs.size(), Vec3::Zero());
   for (;;) {
-    const PassTimer timer(outcome_.linear_seconds);
+    const ScopeTimer timer(outcome_.linear_seconds);
     if (!kept_.factored) factor();
     const bool stale = kept_.stale, bounded = full() && kept_.projected;
     const int most = bounded  ? std::min(kMaxCgOfFullStep, 4 * kept_.usual_iterations + kMoreCgOfProjected)
