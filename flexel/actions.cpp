@@ -231,7 +231,7 @@ void add_push(simulate::Scene& scene, const Action& action, const Body& body) {
 
 void add_move(simulate::Scene& scene, const Action& action, const Body& body) {
   const simulate::Selection where = simulate::parse_where(action.where, "--move");
-  scene.get<simulate::Ties>().ties.push_back(simulate::make_move(
+  scene.get<simulate::Supports>().ties.push_back(simulate::make_move(
       where, action.vector ? *action.vector : Vec3(*action.along * inward_normal(where, body))));
 }
 
@@ -250,7 +250,7 @@ void add_twist(simulate::Scene& scene, const Action& action, const Body& body) {
   tie.motion.angle = action.along ? *action.along : action.vector->norm();
   tie.motion.axis = axis.direction;
   tie.motion.through = axis.through;
-  scene.get<simulate::Ties>().ties.push_back(std::move(tie));
+  scene.get<simulate::Supports>().ties.push_back(std::move(tie));
 }
 
 void add_bearing(simulate::Scene& scene, const Action& action) {

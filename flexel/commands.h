@@ -10,6 +10,7 @@ int info_command(int argc, char** argv);
 int picture_command(int argc, char** argv);
 int materials_command(int argc, char** argv);
 int measure_command(int argc, char** argv);
+int scene_keys_command(int argc, char** argv);
 int study_command(int argc, char** argv);
 
 // Becomes the stage program flexel-NAME that lies beside this one. Returns only by throwing InputError: it is

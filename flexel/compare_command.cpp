@@ -67,14 +67,14 @@ double resultant(const simulate::SimulateResult& result, const simulate::Scene& 
   for (const simulate::AppliedLoad& load : result.loads) sum += load.force;
   driven = false;
   bool turned = false;
-  for (const simulate::Tie& tie : scene.get<simulate::Ties>().ties) {
+  for (const simulate::Tie& tie : scene.get<simulate::Supports>().ties) {
     driven = driven || tie.is_move;
     turned = turned || (tie.is_move && tie.motion.angle != 0);
   }
   if (turned) return 0;  // a couple over an angle is no force over a displacement
   if (!driven) return sum.norm();
   sum.setZero();
-  for (const simulate::Tie& tie : scene.get<simulate::Ties>().ties)
+  for (const simulate::Tie& tie : scene.get<simulate::Supports>().ties)
     for (const simulate::Reaction& reaction : result.reactions)
       if (tie.is_move && reaction.name == tie.name) sum += reaction.force;
   return sum.norm();

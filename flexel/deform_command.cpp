@@ -204,7 +204,8 @@ SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surf
                         AccuracyReport& accuracy, Progress& progress) {
   Progress quiet("flexel", Progress::Mode::quiet);
   HeldWarnings warnings;  // of runs that are only tried
-  for (const simulate::Tie& tie : plan.job.scene.get<simulate::Ties>().ties) plan.goal->driven |= tie.is_move;
+  for (const simulate::Tie& tie : plan.job.scene.get<simulate::Supports>().ties)
+    plan.goal->driven |= tie.is_move;
   plan.goal->driven |= !plan.job.moves.empty() || !plan.job.twists.empty();
   mapping::MapOptions mapping;
   mapping.method = plan.map.method;

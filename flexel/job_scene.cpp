@@ -7,6 +7,7 @@
 #include "base/nearest_word.h"
 #include "base/units.h"
 #include "flexel/job.h"
+#include "simulate/effects/gravity.h"
 #include "simulate/input/material_names.h"
 
 namespace flexel::commands {
@@ -123,7 +124,8 @@ void add_options(const JobArguments& arguments, Job& job) {
   plan_materials(arguments, job.scene);
   plan_infill(arguments, job.scene);
   for (const std::string& where : arguments.fixes)
-    job.scene.get<simulate::Ties>().ties.push_back(simulate::make_fix(simulate::parse_where(where, "--fix")));
+    job.scene.get<simulate::Supports>().ties.push_back(
+        simulate::make_fix(simulate::parse_where(where, "--fix")));
   for (const std::string& text : arguments.pushes) job.pushes.push_back(parse_push(text));
   for (const std::string& text : arguments.moves) job.moves.push_back(parse_move(text));
   for (const std::string& text : arguments.torques) job.torques.push_back(parse_torque(text));

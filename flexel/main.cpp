@@ -31,6 +31,7 @@ constexpr const char* kHelp =
     "  flexel picture FILE... -o OUT.png\n"
     "                        a picture of parts and bodies, deformed and coloured, without a display\n"
     "  flexel materials      the materials that --material and scenes know, with their sources\n"
+    "  flexel scene-keys     the keys of scenes: where each may stand, what it takes, its default\n"
     "  flexel measure --model NAME --size LENGTH\n"
     "                        what the lattice makes of a material: E, nu and G by direction and resolution\n"
     "  flexel study PART... --scene FILE -o FOLDER\n"
@@ -56,9 +57,9 @@ bool is_stage(const std::string& command) {
 }
 
 [[noreturn]] void unknown_command(const std::string& command) {
-  const std::vector<std::string> commands = {"deform",   "compare",   "export",  "info",
-                                             "picture",  "materials", "measure", "study",
-                                             "voxelize", "simulate",  "map",     "help"};
+  const std::vector<std::string> commands = {"deform",    "compare",    "export",  "info",  "picture",
+                                             "materials", "scene-keys", "measure", "study", "voxelize",
+                                             "simulate",  "map",        "help"};
   throw InputError(fmt::format("unknown command \"{}\"; the commands are {}{}", command,
                                fmt::join(commands, ", "), did_you_mean(command, commands)));
 }
@@ -75,6 +76,7 @@ int help(int argc, char** argv) {
   if (command == "compare") return compare_command(2, arguments);
   if (command == "export") return export_command(2, arguments);
   if (command == "materials") return materials_command(2, arguments);
+  if (command == "scene-keys") return scene_keys_command(2, arguments);
   if (command == "measure") return measure_command(2, arguments);
   if (command == "study") return study_command(2, arguments);
   if (command == "info") return info_command(2, arguments);
@@ -86,9 +88,9 @@ int help(int argc, char** argv) {
 int run(int argc, char** argv) {
   if (argc < 2)
     throw InputError(
-        "a command is missing: deform, compare, export, info, picture, materials, measure, study, voxelize, "
-        "simulate "
-        "or map (`flexel help`)");
+        "a command is missing: deform, compare, export, info, picture, materials, scene-keys, measure, "
+        "study, "
+        "voxelize, simulate or map (`flexel help`)");
   const std::string command = argv[1];
   if (command == "--version") {
     print(fmt::format("flexel {}\n", version()));
@@ -98,6 +100,7 @@ int run(int argc, char** argv) {
   if (command == "deform") return deform_command(argc - 1, argv + 1);
   if (command == "compare") return compare_command(argc - 1, argv + 1);
   if (command == "materials") return materials_command(argc - 1, argv + 1);
+  if (command == "scene-keys") return scene_keys_command(argc - 1, argv + 1);
   if (command == "measure") return measure_command(argc - 1, argv + 1);
   if (command == "export") return export_command(argc - 1, argv + 1);
   if (command == "study") return study_command(argc - 1, argv + 1);

@@ -1,5 +1,6 @@
 // Numbers are written with all digits, so that reading gives the same bits.
 #include "flexel/scene_text.h"
+#include "simulate/effects/gravity.h"
 
 #include <fmt/format.h>
 
@@ -95,7 +96,7 @@ SceneText scene_text(const simulate::Scene& scene) {
     if (!part.material.empty()) text.tables += fmt::format("material = {}\n", quoted(part.material));
     text.tables += infill_text(part.infill);
   }
-  for (const simulate::Tie& tie : scene.get<simulate::Ties>().ties) text.tables += tie_text(tie);
+  for (const simulate::Tie& tie : scene.get<simulate::Supports>().ties) text.tables += tie_text(tie);
   for (const simulate::Load& load : scene.get<simulate::Loads>().loads) text.tables += load_text(load);
   for (const simulate::Probe& probe : scene.probes)
     text.tables +=

@@ -23,6 +23,7 @@
 #include "flexel/study/runs/scene_edit.h"
 #include "flexel/study/session.h"
 #include "formats/common/file_formats.h"
+#include "simulate/effects/gravity.h"
 #include "simulate/scene/scene.h"
 #include "simulate/simulate.h"
 #include "voxelize/measure_part.h"

@@ -11,6 +11,7 @@
 #include "formats/lattice/body_file.h"
 #include "formats/lattice/merge.h"
 #include "simulate/answer.h"
+#include "simulate/effects/rigid.h"
 #include "simulate/models/stress.h"
 #include "simulate/result/options.h"
 #include "simulate/result/result.h"

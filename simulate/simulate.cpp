@@ -81,9 +81,10 @@ void report_unsupported(std::size_t elements, SimulateResult& result, Progress& 
       human_count(elements)));
 }
 
-void explain_before(const std::vector<Pass>& passes, Progress& progress) {
+void explain_before(const std::vector<ActiveEffect>& effects, Progress& progress) {
   progress.say("plan: the parts' models, equilibrium by Newton's method");
-  for (const Pass& pass : passes) progress.say(fmt::format("plan: {} ({})", pass.name, pass.why));
+  for (const ActiveEffect& effect : effects)
+    progress.say(fmt::format("plan: {} ({})", effect.name, effect.why));
 }
 
 double mass_of(const Problem& problem) {
@@ -103,20 +104,14 @@ double mass_of(const Problem& problem) {
   return mass;
 }
 
-bool anything_acts(const Scene& scene) {
-  bool acts = scene.get<Gravity>().acceleration.has_value() || !scene.get<Loads>().loads.empty();
-  for (const Tie& tie : scene.get<Ties>().ties) acts = acts || tie.is_move || tie.link;
-  return acts;
-}
-
 // An effect that acts in time has no meaning at equilibrium.
-void refuse_timed(const std::vector<Pass>& passes, const std::string& scene) {
-  for (const Pass& pass : passes)
-    if (pass.needs_time)
+void refuse_timed(const std::vector<ActiveEffect>& effects, const std::string& scene) {
+  for (const ActiveEffect& effect : effects)
+    if (effect.acts != ActsIn::all)
       throw InputError(scene,
                        fmt::format("{} ({}) acts in timed runs only: give [run] time = \"1 s\", or leave "
                                    "it out",
-                                   pass.name, pass.why));
+                                   effect.name, effect.why));
 }
 
 // Outputs that only a timed run has.
@@ -233,15 +228,15 @@ SimulateResult Run::operator()() {
   report_materials(problem_, progress_);
   name_materials(body_, problem_.materials);
   const std::vector<ProbePoints> probes = place_probes(scene_, problem_);
-  std::vector<Pass> passes = Effects::passes(scene_.effects, problem_);
-  refuse_timed(passes, scene_.name);
+  std::vector<ActiveEffect> effects = active_effects(scene_.effects, problem_);
+  refuse_timed(effects, scene_.name);
   refuse_timed(options_, scene_.name);
-  if (!anything_acts(scene_))
+  if (std::none_of(effects.begin(), effects.end(), [](const ActiveEffect& each) { return each->drives(); }))
     progress_.warn("the scene has no [[load]], [[move]] or [gravity]: nothing will move");
-  if (options_.explain) explain_before(passes, progress_);
+  if (options_.explain) explain_before(effects, progress_);
   report_strays(fragments_, result, progress_);
   report_unsupported(unsupported_, result, progress_);
-  Mechanics mechanics(problem_, std::move(passes));
+  Mechanics mechanics(problem_, std::move(effects));
   state_.displacement = where_to_begin(body_);
   const EquilibriumResult solved = solve(mechanics);
   const StopWaits answered;  // what is found is told: the rest takes moments
@@ -280,7 +275,7 @@ SimulateResult Run::operator()() {
   result.relative_residual = solved.relative_residual;
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
   if (options_.explain) {
-    std::vector<PassShare> shares = result.passes;
+    std::vector<EffectShare> shares = result.shares;
     shares.push_back({"linear solver", "", solved.linear_seconds});
     explain_times(shares, result.seconds, progress_);
   }

@@ -284,8 +284,8 @@ std::string summary_json(const SimulateResult& result, const Body& body) {
   json.update(run_json(result));
   json["seconds"] = result.seconds;
   json["time"] = Json::array();
-  for (const PassShare& pass : result.passes)
-    json["time"].push_back({{"name", pass.name}, {"why", pass.why}, {"seconds", pass.seconds}});
+  for (const EffectShare& effect : result.shares)
+    json["time"].push_back({{"name", effect.name}, {"why", effect.why}, {"seconds", effect.seconds}});
   return json.dump(2) + "\n";
 }
 

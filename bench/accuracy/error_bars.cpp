@@ -68,7 +68,7 @@ Found wide_beam(int n) {
   simulate::Scene scene;
   scene.materials["gum"] = {"gum", simulate::testing::kStudyYoung, 0.3, 580, "test"};
   scene.material = "gum";
-  scene.get<simulate::Ties>().ties.push_back(simulate::make_fix(simulate::select_by_name("xmin")));
+  scene.get<simulate::Supports>().ties.push_back(simulate::make_fix(simulate::select_by_name("xmin")));
   return solve(body, loaded_end(scene, simulate::select_by_name("box/x1"), Vec3(0, 1e-3, 0)),
                1.65964e-4 * 1e-3);
 }
@@ -82,7 +82,7 @@ Found drawn_bar(int n) {
   for (const auto& [side, axis] : {std::pair{"xmin", 0}, {"ymin", 1}, {"zmin", 2}}) {
     simulate::Tie tie = simulate::make_fix(simulate::select_by_name(side));
     tie.axes = {axis == 0, axis == 1, axis == 2};
-    scene.get<simulate::Ties>().ties.push_back(tie);
+    scene.get<simulate::Supports>().ties.push_back(tie);
   }
   // The mean over the end also draws in by nu F / E on either side of y = z = 0.
   const double drawn = 4 * 10 / 1e6, drawn_in = 0.3 * 10 / 1e6 / 2;
@@ -135,7 +135,7 @@ Found turned_beam(int n) {
   simulate::Scene scene;
   scene.materials["gum"] = {"gum", simulate::testing::kStudyYoung, 0.25, 580, "test"};
   scene.material = "gum";
-  scene.get<simulate::Ties>().ties.push_back(simulate::make_fix(simulate::select_by_name("part/f0")));
+  scene.get<simulate::Supports>().ties.push_back(simulate::make_fix(simulate::select_by_name("part/f0")));
   return solve(body, loaded_end(scene, simulate::select_by_name("part/f1"), turn * Vec3(0, 0, 1e-3)),
                simulate::testing::study_reference(0.5) * 1e-3);
 }
@@ -176,7 +176,7 @@ Found ring(double spacing) {
        {std::pair{"part/along", 1}, {"part/across", 0}, {"part/low", 2}, {"part/high", 2}}) {
     simulate::Tie tie = simulate::make_fix(simulate::select_by_name(face));
     tie.axes = {axis == 0, axis == 1, axis == 2};
-    scene.get<simulate::Ties>().ties.push_back(tie);
+    scene.get<simulate::Supports>().ties.push_back(tie);
   }
   scene.get<simulate::Loads>().loads.push_back(
       simulate::make_pressure(simulate::select_by_name("part/inner"), kPressure));

@@ -13,6 +13,8 @@
 #include "flexel/export/nodal_forces.h"
 #include "flexel/export/support_constraints.h"
 #include "flexel/export/touching_faces.h"
+#include "simulate/effects/bonds.h"
+#include "simulate/effects/gravity.h"
 #include "simulate/result/options.h"
 #include "simulate/simulate.h"
 #include "voxelize/voxelize.h"
@@ -79,7 +81,7 @@ void scale_actions(simulate::Scene& scene, double factor) {
     if (load.torque) *load.torque *= factor;
     if (load.pressure) *load.pressure *= factor;
   }
-  for (simulate::Tie& tie : scene.get<simulate::Ties>().ties) {
+  for (simulate::Tie& tie : scene.get<simulate::Supports>().ties) {
     tie.motion.translation *= factor;
     tie.motion.angle *= factor;
     if (tie.link) {
@@ -100,21 +102,21 @@ void refuse_untranslatable(const simulate::Scene& scene, const simulate::Problem
         "what needs it out, or use --scene with another file");
   if (!scene.events.empty())
     throw InputError(scene.name, "[[event]] has no translation: only equilibrium is exported");
-  for (const simulate::Tie& tie : scene.get<simulate::Ties>().ties)
+  for (const simulate::Tie& tie : scene.get<simulate::Supports>().ties)
     if (tie.link)
       throw InputError(tie.origin, fmt::format("load \"{}\": a rigid link has no translation; export it with "
                                                "link = \"averaging\"",
                                                tie.name));
-  simulate::Effects::Parameters others = scene.effects;
-  std::get<simulate::Gravity::Parameters>(others).acceleration.reset();
-  std::get<simulate::Loads::Parameters>(others) = {};
-  std::get<simulate::Ties::Parameters>(others) = {};
-  std::get<simulate::Bonds::Parameters>(others).bond = false;
-  for (const simulate::Pass& pass : simulate::Effects::passes(others, problem))
+  simulate::EffectParameters others = scene.effects;
+  others.get<simulate::Gravity>().acceleration.reset();
+  others.get<simulate::Loads>() = {};
+  others.get<simulate::Supports>() = {};
+  others.get<simulate::Bonds>().bond = false;
+  for (const simulate::ActiveEffect& effect : simulate::active_effects(others, problem))
     throw InputError(scene.name,
                      fmt::format("{} ({}) has no translation: gravity, loads, fixes, moves and bonded parts "
                                  "are exported; leave it out",
-                                 pass.name, pass.why));
+                                 effect.name, effect.why));
 }
 
 std::vector<std::string> drop_models(simulate::Scene& scene) {
@@ -136,7 +138,7 @@ Analysis translate(AnalysisMesh mesh, const simulate::Scene& scene, const simula
   analysis.materials = problem.materials;
   HeldValues taken;
   std::size_t shared = 0;
-  for (const simulate::Tie& tie : scene.get<simulate::Ties>().ties)
+  for (const simulate::Tie& tie : scene.get<simulate::Supports>().ties)
     analysis.supports.push_back(hold(tie, analysis.mesh, problem, taken, shared));
   if (shared > 0)
     analysis.warnings.push_back(fmt::format(
@@ -162,7 +164,7 @@ bool large_deflection(const Surface& surface, simulate::Scene scene, int threads
   simulate::SimulateOptions options;
   options.threads = threads;
   options.stress = options.estimate = false;
-  for (const simulate::Tie& tie : scene.get<simulate::Ties>().ties)
+  for (const simulate::Tie& tie : scene.get<simulate::Supports>().ties)
     if (std::abs(tie.motion.angle) > kSmallAngle) {
       why = fmt::format("\"{}\" is turned by {:.3g} degrees", tie.name, tie.motion.angle * 180 / M_PI);
       return true;

@@ -172,10 +172,10 @@ class Beam {
       way.through = middle_ + Vec3(end * length_ / 2, 0, 0);
       way.translation *= end;
       way.angle *= end;
-      scene.get<simulate::Ties>().ties.push_back(
+      scene.get<simulate::Supports>().ties.push_back(
           tie(beyond(way.through - Vec3(0.25 * end * h_, 0, 0), Vec3(end, 0, 0)), axes, way));
     }
-    for (const simulate::Tie& each : others) scene.get<simulate::Ties>().ties.push_back(each);
+    for (const simulate::Tie& each : others) scene.get<simulate::Supports>().ties.push_back(each);
     scene.run.tolerance = 1e-10;
     simulate::SimulateOptions options;
     options.stress = options.estimate = false;

@@ -1,4 +1,4 @@
-// What the effects that live inside the hot kernel ask of a timed run. Filled by their `compose` hooks,
+// What the effects that live inside the hot kernel ask of a timed run. Filled by configure_kernel() of each,
 // before the stepper is made.
 #pragma once
 #include <cmath>
@@ -29,6 +29,11 @@ struct KernelEffects {
   [[nodiscard]] bool remembers() const {
     return !plasticity.empty() || !fracture.empty() || rest_shapes || broken_springs;
   }
+};
+
+// The shares of the hot loop's time that its effects take; the rest is the model.
+struct KernelShares {
+  double damping = 0, plasticity = 0, fracture = 0;
 };
 
 }  // namespace flexel::simulate

@@ -208,7 +208,7 @@ Bonds::Displacements Bonds::displacements(const BondedElements& bond, const Stat
   return u;
 }
 
-double Bonds::energy(const State& state) const {
+double Bonds::energy(const State& state) {
   double energy = 0;
   for (const BondedElements& bond : bonds_) {
     const Displacements u = displacements(bond, state);
@@ -217,14 +217,14 @@ double Bonds::energy(const State& state) const {
   return energy;
 }
 
-void Bonds::add_forces(const State& state, std::vector<Vec3>& forces) const {
+void Bonds::add_forces(const State& state, std::vector<Vec3>& forces) {
   for (const BondedElements& bond : bonds_) {
     const Displacements force = bond.stiffness * displacements(bond, state);
     for (Eigen::Index a = 0; a < force.rows(); ++a) forces[bond.element(a)] -= force.row(a).transpose();
   }
 }
 
-void Bonds::add_stiffness(const State&, BlockMatrix& matrix) const {
+void Bonds::add_stiffness(const State&, BlockMatrix& matrix) {
   for (const BondedElements& bond : bonds_)
     for (Eigen::Index a = 0; a < bond.stiffness.rows(); ++a)
       for (Eigen::Index b = 0; b < bond.stiffness.cols(); ++b)
@@ -241,7 +241,7 @@ std::vector<CoupledElements> Bonds::couples() const {
   return groups;
 }
 
-void Bonds::report(const State&, const std::vector<Vec3>&, SimulateResult& result) const {
+void Bonds::report(const State&, const std::vector<Vec3>&, SimulateResult& result) {
   result.bonds = parts_;
 }
 

@@ -17,7 +17,7 @@
 
 namespace flexel::simulate {
 
-class Bonds {
+class Bonds : public Effect {
  public:
   struct Named {  // [[bond]]
     std::array<std::string, 2> parts;
@@ -33,14 +33,18 @@ class Bonds {
 
   static void parse(TableReader& scene, Parameters& parameters);
   [[nodiscard]] static std::optional<Bonds> make(const Parameters& parameters, const Problem& problem);
-  [[nodiscard]] std::string why() const;
+  [[nodiscard]] std::string why() const override;
 
-  [[nodiscard]] double added_frequency(const std::vector<double>&) const { return frequency_; }
-  [[nodiscard]] double energy(const State& state) const;
-  void add_forces(const State& state, std::vector<Vec3>& forces) const;
-  void add_stiffness(const State& state, BlockMatrix& matrix) const;
-  [[nodiscard]] std::vector<CoupledElements> couples() const;
-  void report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) const;
+  [[nodiscard]] EnergyAccount account() const override { return EnergyAccount::work; }
+  [[nodiscard]] double added_frequency(const State&, const std::vector<double>&) override {
+    return frequency_;
+  }
+  [[nodiscard]] double energy(const State& state) override;
+  void add_forces(const State& state, std::vector<Vec3>& forces) override;
+  [[nodiscard]] bool adds_stiffness() const override { return true; }
+  void add_stiffness(const State& state, BlockMatrix& matrix) override;
+  [[nodiscard]] std::vector<CoupledElements> couples() const override;
+  void report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) override;
 
  private:
   struct BondedElements {

@@ -205,20 +205,20 @@ std::string Contact::why() const {
   return fmt::format("[contact], {} points", contacts_->points().size());
 }
 
-double Contact::energy(const State& state) const {
+double Contact::energy(const State& state) {
   return contacts_->energy(state);
 }
 
-void Contact::add_forces(const State& state, std::vector<Vec3>& forces) const {
+void Contact::add_forces(const State& state, std::vector<Vec3>& forces) {
   contacts_->add_forces(state, forces);
 }
 
-double Contact::added_frequency(const State& state, const std::vector<double>&) const {
+double Contact::added_frequency(const State& state, const std::vector<double>&) {
   if (state.time) contacts_->refuse_overlap(state);
   return contacts_->frequency(state);
 }
 
-bool Contact::needs_step_recheck(const State& state) const {
+bool Contact::needs_step_recheck(const State& state) {
   return contacts_->needs_step_recheck(state);
 }
 
@@ -226,7 +226,7 @@ std::vector<double> Contact::memory() const {
   return contacts_->memory();
 }
 
-void Contact::restore(const std::vector<double>& memory) const {
+void Contact::restore(const std::vector<double>& memory) {
   contacts_->restore(memory);
 }
 
@@ -234,7 +234,7 @@ std::vector<double> Contact::transfer_state() const {
   return contacts_->transfer_state();
 }
 
-void Contact::restore_from(const std::vector<double>& transfer_state) const {
+void Contact::restore_from(const std::vector<double>& transfer_state) {
   contacts_->restore_from(transfer_state);
 }
 
@@ -249,7 +249,7 @@ std::vector<std::string> Contact::history_columns() const {
   return columns;
 }
 
-std::vector<double> Contact::history_values(const State& state, const std::vector<Vec3>&) const {
+std::vector<double> Contact::history_values(const State& state, const std::vector<Vec3>&) {
   std::vector<double> values;
   for (const RigidLoad& load : contacts_->rigid_loads_about_centres(state)) {
     values.insert(values.end(), load.force.begin(), load.force.end());
@@ -258,20 +258,20 @@ std::vector<double> Contact::history_values(const State& state, const std::vecto
   return values;
 }
 
-double Contact::injected_energy(const State& state) const {
+double Contact::injected_energy(const State& state) {
   return contacts_->injected_energy(state);
 }
 
-std::optional<ContactLosses> Contact::companion() const {
+std::optional<ContactLosses> Contact::losses() const {
   if (!contacts_->dissipate()) return std::nullopt;
   return ContactLosses(contacts_);
 }
 
-void ContactLosses::add_forces(const State& state, std::vector<Vec3>& forces) const {
+void ContactLosses::add_forces(const State& state, std::vector<Vec3>& forces) {
   contacts_->add_dissipative_forces(state, forces);
 }
 
-void ContactLosses::finish_step(State& state, const StepDone& done) const {
+void ContactLosses::finish_step(State& state, const StepDone& done) {
   contacts_->finish_step(state, done.drift);
 }
 

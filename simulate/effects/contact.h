@@ -12,22 +12,23 @@ namespace flexel::simulate {
 class Contacts;  // simulate/contact/contacts.h
 
 // Friction, damping and sticking of the contacts of a run.
-class ContactLosses {
+class ContactLosses : public Effect {
  public:
   static constexpr const char* name = "contact friction";
-  static constexpr bool needs_time = true;
-  static constexpr Book book = Book::dissipation;
 
   explicit ContactLosses(std::shared_ptr<Contacts> contacts) : contacts_(std::move(contacts)) {}
-  [[nodiscard]] std::string why() const { return "friction, damping and sticking of [contact]"; }
-  void add_forces(const State& state, std::vector<Vec3>& forces) const;
-  void finish_step(State& state, const StepDone& done) const;
+  [[nodiscard]] std::string why() const override { return "friction, damping and sticking of [contact]"; }
+  [[nodiscard]] EnergyAccount account() const override { return EnergyAccount::dissipation; }
+  [[nodiscard]] bool finishes_steps() const override { return true; }
+  [[nodiscard]] bool takes_implicit_steps() const override { return false; }
+  void add_forces(const State& state, std::vector<Vec3>& forces) override;
+  void finish_step(State& state, const StepDone& done) override;
 
  private:
   std::shared_ptr<Contacts> contacts_;
 };
 
-class Contact {
+class Contact : public Effect {
  public:
   struct Parameters {
     bool on = false;
@@ -45,26 +46,27 @@ class Contact {
     std::string origin;
   };
   static constexpr const char* name = "contact";
-  static constexpr bool needs_time = true;
-  static constexpr Book book = Book::stored;
 
   static void parse(TableReader& scene, Parameters& parameters);
   [[nodiscard]] static std::optional<Contact> make(const Parameters& parameters, const Problem& problem);
-  [[nodiscard]] std::string why() const;
+  [[nodiscard]] std::string why() const override;
 
-  [[nodiscard]] double energy(const State& state) const;
-  void add_forces(const State& state, std::vector<Vec3>& forces) const;
-  [[nodiscard]] double added_frequency(const State& state, const std::vector<double>& mass) const;
-  [[nodiscard]] bool needs_step_recheck(const State& state) const;
-  [[nodiscard]] std::vector<double> memory() const;
-  void restore(const std::vector<double>& memory) const;
-  [[nodiscard]] std::vector<double> transfer_state() const;
-  void restore_from(const std::vector<double>& transfer_state) const;
-  [[nodiscard]] std::vector<std::string> history_columns() const;
-  [[nodiscard]] std::vector<double> history_values(const State& state, const std::vector<Vec3>&) const;
-  static constexpr const char* injected_by = "overlap";
-  [[nodiscard]] double injected_energy(const State& state) const;
-  [[nodiscard]] std::optional<ContactLosses> companion() const;
+  [[nodiscard]] EnergyAccount account() const override { return EnergyAccount::stored; }
+  [[nodiscard]] bool takes_implicit_steps() const override { return false; }
+  [[nodiscard]] double energy(const State& state) override;
+  void add_forces(const State& state, std::vector<Vec3>& forces) override;
+  [[nodiscard]] double added_frequency(const State& state, const std::vector<double>& mass) override;
+  [[nodiscard]] bool needs_step_recheck(const State& state) override;
+  [[nodiscard]] std::vector<double> memory() const override;
+  void restore(const std::vector<double>& memory) override;
+  [[nodiscard]] std::vector<double> transfer_state() const override;
+  void restore_from(const std::vector<double>& transfer_state) override;
+  [[nodiscard]] std::vector<std::string> history_columns() const override;
+  [[nodiscard]] std::vector<double> history_values(const State& state, const std::vector<Vec3>&) override;
+  [[nodiscard]] const char* injected_by() const override { return "overlap"; }
+  [[nodiscard]] double injected_energy(const State& state) override;
+  // Nothing where nothing is lost.
+  [[nodiscard]] std::optional<ContactLosses> losses() const;
 
  private:
   std::shared_ptr<Contacts> contacts_;

@@ -37,7 +37,7 @@ std::string Damping::why() const {
   return fmt::format("{} [damping]", entries_);
 }
 
-void Damping::compose(KernelEffects& plan) const {
+void Damping::configure_kernel(KernelEffects& plan) const {
   plan.damping = time_;
 }
 

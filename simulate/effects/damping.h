@@ -7,7 +7,7 @@
 
 namespace flexel::simulate {
 
-class Damping {
+class Damping : public Effect {
  public:
   struct Entry {
     double time = 0;                  // s, tau
@@ -18,12 +18,12 @@ class Damping {
     std::vector<Entry> entries;  // a later one goes before an earlier one
   };
   static constexpr const char* name = "damping";
-  static constexpr bool needs_time = true;
 
   static void parse(TableReader& scene, Parameters& parameters);
   [[nodiscard]] static std::optional<Damping> make(const Parameters& parameters, const Problem& problem);
-  [[nodiscard]] std::string why() const;
-  void compose(KernelEffects& plan) const;
+  [[nodiscard]] std::string why() const override;
+  void configure_kernel(KernelEffects& plan) const override;
+  [[nodiscard]] double kernel_share(const KernelShares& shares) const override { return shares.damping; }
 
  private:
   std::vector<double> time_;  // (parts) s

@@ -154,7 +154,7 @@ Vec3 Drag::force(const Face& face, const State& state) const {
   return -(resistance * at.outward) * at.area;
 }
 
-double Drag::resistance(const State& state) const {
+double Drag::resistance(const State& state) {
   return parallel_sum<double>(faces_.size(),
                               [&](std::size_t f) {
                                 const Front at = front(faces_[f], state);
@@ -167,7 +167,7 @@ double Drag::resistance(const State& state) const {
 
 // Each piece's matrix g w w^T n n^T is at most its row sums on the diagonal, and the same for what moves as
 // one; balls: rho A (|v| I + v v^T / |v|) is at most twice rho A |v| I.
-void Drag::add_resistance(const State& state, double scale, BlockMatrix& matrix) const {
+void Drag::add_resistance(const State& state, double scale, BlockMatrix& matrix) {
   for (const Face& face : faces_) {
     const Front at = front(face, state);
     if (at.outward == 0) continue;
@@ -183,7 +183,7 @@ void Drag::add_resistance(const State& state, double scale, BlockMatrix& matrix)
         2 * scale * density_ * ball.area * state.velocity[ball.element].norm();
 }
 
-void Drag::add_forces(const State& state, std::vector<Vec3>& forces) const {
+void Drag::add_forces(const State& state, std::vector<Vec3>& forces) {
   std::vector<Vec3> found(faces_.size());
   parallel_for_each(faces_.size(), [&](std::size_t f) { found[f] = force(faces_[f], state); });
   for (std::size_t f = 0; f < faces_.size(); ++f)

@@ -22,22 +22,22 @@
 
 namespace flexel::simulate {
 
-class Drag {
+class Drag : public Effect {
  public:
   struct Parameters {
     std::optional<double> density;  // kg/m^3, of the medium
     double coefficient = 1;         // C
   };
   static constexpr const char* name = "drag";
-  static constexpr bool needs_time = true;
-  static constexpr Book book = Book::dissipation;
 
   static void parse(TableReader& scene, Parameters& parameters);
   [[nodiscard]] static std::optional<Drag> make(const Parameters& parameters, const Problem& problem);
-  [[nodiscard]] std::string why() const;
-  void add_forces(const State& state, std::vector<Vec3>& forces) const;
-  [[nodiscard]] double resistance(const State& state) const;
-  void add_resistance(const State& state, double scale, BlockMatrix& matrix) const;
+  [[nodiscard]] std::string why() const override;
+  [[nodiscard]] EnergyAccount account() const override { return EnergyAccount::dissipation; }
+  [[nodiscard]] bool resists() const override { return true; }
+  void add_forces(const State& state, std::vector<Vec3>& forces) override;
+  [[nodiscard]] double resistance(const State& state) override;
+  void add_resistance(const State& state, double scale, BlockMatrix& matrix) override;
 
  private:
   // The surface of one polygon in one cell.

@@ -70,13 +70,16 @@ std::string Fracture::why() const {
   return fmt::format("[fracture], {} part(s) that can break", parts);
 }
 
-void Fracture::compose(KernelEffects& plan) const {
+void Fracture::configure_kernel(KernelEffects& plan) const {
+  plan.fracture = limits_;
+}
+
+void Fracture::check_kernel(const KernelEffects& plan) const {
   for (std::size_t p = 0; p < limits_.size(); ++p)
     if (needs_flow_[p] && (plan.plasticity.empty() || !std::isfinite(plan.plasticity[p].yield)))
       throw InputError(origin_,
                        "\"elongation\" is the plastic strain at which a cell breaks: add [plasticity] and a "
                        "yield stress, or give \"strength\"");
-  plan.fracture = limits_;
 }
 
 }  // namespace flexel::simulate

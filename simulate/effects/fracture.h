@@ -7,7 +7,7 @@
 
 namespace flexel::simulate {
 
-class Fracture {
+class Fracture : public Effect {
  public:
   struct Entry {
     std::optional<double> strength;    // Pa; nothing: the material's
@@ -19,15 +19,16 @@ class Fracture {
     std::vector<Entry> entries;  // a later one goes before an earlier one
   };
   static constexpr const char* name = "fracture";
-  static constexpr bool needs_time = true;
 
   static void parse(TableReader& scene, Parameters& parameters);
   // Throws InputError: an unknown part, a part that is named but has neither limit or whose model cannot
   // break, no part that can.
   [[nodiscard]] static std::optional<Fracture> make(const Parameters& parameters, const Problem& problem);
-  [[nodiscard]] std::string why() const;
-  // After that of plasticity, without which a limit of elongation is refused in model `cells`.
-  void compose(KernelEffects& plan) const;
+  [[nodiscard]] std::string why() const override;
+  void configure_kernel(KernelEffects& plan) const override;
+  // In model `cells` a limit of elongation needs plasticity.
+  void check_kernel(const KernelEffects& plan) const override;
+  [[nodiscard]] double kernel_share(const KernelShares& shares) const override { return shares.fracture; }
 
  private:
   std::vector<FractureLimits> limits_;  // (parts)

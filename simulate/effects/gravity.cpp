@@ -110,7 +110,7 @@ Pull Gravity::pull(const State& state, std::size_t element) const {
   return sum;
 }
 
-double Gravity::energy(const State& state) const {
+double Gravity::energy(const State& state) {
   double energy = -state.share * parallel_sum<double>(mass_.size(), [&](std::size_t e) {
     return mass_[e] * acceleration_.dot(state.displacement[e]);
   });
@@ -125,7 +125,7 @@ double Gravity::energy(const State& state) const {
   return energy;
 }
 
-void Gravity::add_forces(const State& state, std::vector<Vec3>& forces) const {
+void Gravity::add_forces(const State& state, std::vector<Vec3>& forces) {
   if (acceleration_ != Vec3::Zero())
     parallel_for_each(mass_.size(),
                       [&](std::size_t e) { forces[e] += (state.share * mass_[e]) * acceleration_; });
@@ -141,7 +141,7 @@ void Gravity::add_forces(const State& state, std::vector<Vec3>& forces) const {
 
 // The stiffness of an attraction is at most G m M / r^3 (across), and between two elements that of their
 // distance at most twice that of the one by itself (Gershgorin).
-double Gravity::added_frequency(const State& state, const std::vector<double>&) const {
+double Gravity::added_frequency(const State& state, const std::vector<double>&) {
   if (!needs_time()) return 0;
   double largest = 0;
   if (!sources_.empty())
@@ -157,7 +157,7 @@ double Gravity::added_frequency(const State& state, const std::vector<double>&) 
   return kResolve * kResolve * constant_ * largest;
 }
 
-void Gravity::report(const State& state, const std::vector<Vec3>&, SimulateResult& result) const {
+void Gravity::report(const State& state, const std::vector<Vec3>&, SimulateResult& result) {
   AppliedLoad total{"gravity", Vec3::Zero(), Vec3::Zero()};
   const double mass = parallel_sum<double>(mass_.size(), [&](std::size_t e) { return mass_[e]; });
   Vec3 first_moment = first_moment_;

@@ -11,7 +11,7 @@
 
 namespace flexel::simulate {
 
-class Gravity {
+class Gravity : public Effect {
  public:
   struct Source {
     Vec3 at = Vec3::Zero();  // m, world frame; it does not move
@@ -25,19 +25,20 @@ class Gravity {
     double constant = kNewton;  // m^3/kg/s^2, G
   };
   static constexpr const char* name = "gravity";
-  static constexpr Book book = Book::potential;
 
   static void parse(TableReader& scene, Parameters& parameters);
   [[nodiscard]] static std::optional<Gravity> make(const Parameters& parameters, const Problem& problem);
-  [[nodiscard]] std::string why() const;
+  [[nodiscard]] std::string why() const override;
 
-  [[nodiscard]] bool needs_time() const { return mutual_ || !sources_.empty(); }
-  [[nodiscard]] bool constant() const { return !needs_time(); }
-  [[nodiscard]] double energy(const State& state) const;
-  void add_forces(const State& state, std::vector<Vec3>& forces) const;
+  [[nodiscard]] EnergyAccount account() const override { return EnergyAccount::potential; }
+  [[nodiscard]] bool drives() const override { return true; }
+  [[nodiscard]] bool needs_time() const override { return mutual_ || !sources_.empty(); }
+  [[nodiscard]] bool constant() const override { return !needs_time(); }
+  [[nodiscard]] double energy(const State& state) override;
+  void add_forces(const State& state, std::vector<Vec3>& forces) override;
   // So that a step turns no orbit by more than 2 / 60 rad: 60^2 times what attraction adds.
-  [[nodiscard]] double added_frequency(const State& state, const std::vector<double>& mass) const;
-  void report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) const;
+  [[nodiscard]] double added_frequency(const State& state, const std::vector<double>& mass) override;
+  void report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) override;
 
  private:
   // The elements with mass, where they are now.

@@ -56,7 +56,7 @@ std::string InitialVelocity::why() const {
   return fmt::format("{} [[velocity]]", count_);
 }
 
-void InitialVelocity::start(State& state) const {
+void InitialVelocity::add_initial_state(State& state) {
   for (std::size_t e = 0; e < velocity_.size(); ++e) state.velocity[e] += velocity_[e];
 }
 

@@ -13,19 +13,18 @@ struct StartingVelocity {
   std::string origin;
 };
 
-class InitialVelocity {
+class InitialVelocity : public Effect {
  public:
   struct Parameters {
     std::vector<StartingVelocity> velocities;  // added where they overlap
   };
   static constexpr const char* name = "initial velocity";
-  static constexpr bool needs_time = true;
 
   static void parse(TableReader& scene, Parameters& parameters);
   [[nodiscard]] static std::optional<InitialVelocity> make(const Parameters& parameters,
                                                            const Problem& problem);
-  [[nodiscard]] std::string why() const;
-  void start(State& state) const;
+  [[nodiscard]] std::string why() const override;
+  void add_initial_state(State& state) override;
 
  private:
   std::vector<Vec3> velocity_;  // (elements) m/s

@@ -150,7 +150,7 @@ std::optional<Vec3> turn_of_couple(const ElementForces& forces, const Body& body
 void Loads::parse(TableReader& scene, Parameters& parameters) {
   for (const SceneValue* table : scene.tables("load")) {
     TableReader reader(*table, scene.file(), "[[load]]");
-    if (reader.text("link") == "rigid") continue;  // of Ties
+    if (reader.text("link") == "rigid") continue;  // of Supports
     parameters.loads.push_back(parse_load(reader));
   }
 }
@@ -186,7 +186,7 @@ bool Loads::constant() const {
                      [](const Spread& load) { return load.course.time.empty(); });
 }
 
-double Loads::energy(const State& state) const {
+double Loads::energy(const State& state) {
   double energy = 0;
   for (const Spread& load : loads_) {
     double work = 0;
@@ -196,14 +196,14 @@ double Loads::energy(const State& state) const {
   return energy;
 }
 
-void Loads::add_forces(const State& state, std::vector<Vec3>& forces) const {
+void Loads::add_forces(const State& state, std::vector<Vec3>& forces) {
   for (const Spread& load : loads_) {
     const double factor = load.course.at(state);
     for (const ElementForce& at : load.forces) forces[at.element] += factor * at.force;
   }
 }
 
-void Loads::report(const State& state, const std::vector<Vec3>&, SimulateResult& result) const {
+void Loads::report(const State& state, const std::vector<Vec3>&, SimulateResult& result) {
   for (const Spread& load : loads_) {
     const double factor = load.course.at(state);
     AppliedLoad total{load.name, Vec3::Zero(), Vec3::Zero()};

@@ -22,7 +22,7 @@ struct Load {
   bool bearing = false;             // `force` is that of a pin on a cylindrical face
 };
 
-class Loads {
+class Loads : public Effect {
  public:
   struct Parameters {
     std::vector<Load> loads;
@@ -31,12 +31,14 @@ class Loads {
 
   static void parse(TableReader& scene, Parameters& parameters);
   [[nodiscard]] static std::optional<Loads> make(const Parameters& parameters, const Problem& problem);
-  [[nodiscard]] std::string why() const;
+  [[nodiscard]] std::string why() const override;
 
-  [[nodiscard]] bool constant() const;
-  [[nodiscard]] double energy(const State& state) const;
-  void add_forces(const State& state, std::vector<Vec3>& forces) const;
-  void report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) const;
+  [[nodiscard]] EnergyAccount account() const override { return EnergyAccount::work; }
+  [[nodiscard]] bool drives() const override { return true; }
+  [[nodiscard]] bool constant() const override;
+  [[nodiscard]] double energy(const State& state) override;
+  void add_forces(const State& state, std::vector<Vec3>& forces) override;
+  void report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) override;
 
  private:
   struct ElementForce {

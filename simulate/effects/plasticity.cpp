@@ -56,7 +56,7 @@ std::string Plasticity::why() const {
   return fmt::format("[plasticity], {} part(s) with a yield stress", parts);
 }
 
-void Plasticity::compose(KernelEffects& plan) const {
+void Plasticity::configure_kernel(KernelEffects& plan) const {
   plan.plasticity = flow_;
 }
 

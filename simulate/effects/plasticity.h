@@ -6,7 +6,7 @@
 
 namespace flexel::simulate {
 
-class Plasticity {
+class Plasticity : public Effect {
  public:
   struct Entry {
     std::optional<double> yield, hardening;  // Pa; nothing: the material's
@@ -17,14 +17,14 @@ class Plasticity {
     std::vector<Entry> entries;  // a later one goes before an earlier one
   };
   static constexpr const char* name = "plasticity";
-  static constexpr bool needs_time = true;
 
   static void parse(TableReader& scene, Parameters& parameters);
   // Throws InputError: an unknown part, a part that is named but has no yield stress or whose model cannot
   // flow, no part that can.
   [[nodiscard]] static std::optional<Plasticity> make(const Parameters& parameters, const Problem& problem);
-  [[nodiscard]] std::string why() const;
-  void compose(KernelEffects& plan) const;
+  [[nodiscard]] std::string why() const override;
+  void configure_kernel(KernelEffects& plan) const override;
+  [[nodiscard]] double kernel_share(const KernelShares& shares) const override { return shares.plasticity; }
 
  private:
   std::vector<PlasticFlow> flow_;  // (parts)

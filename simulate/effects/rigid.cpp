@@ -67,7 +67,6 @@ std::optional<RigidParts> RigidParts::make(const Parameters& parameters, const P
   RigidParts made;
   made.body_ = &problem.body;
   made.mass_ = lumped_masses(problem);
-  made.moving_ = std::make_shared<std::vector<Moving>>();
   // at equilibrium, which refuses the effect, nothing is rigid
   for (std::uint32_t p = 0; p < problem.rigidity.size(); ++p) {
     if (problem.rigidity[p] == Rigidity::none) continue;
@@ -77,22 +76,22 @@ std::optional<RigidParts> RigidParts::make(const Parameters& parameters, const P
       if (each.part == problem.body.parts[p].name) moving.led = each;
     moving.velocity.resize(moving.body.arms.size());
     moving.support.resize(moving.body.arms.size(), Vec3::Zero());
-    made.moving_->push_back(std::move(moving));
+    made.moving_.push_back(std::move(moving));
   }
   return made;
 }
 
 std::string RigidParts::why() const {
-  const auto led = std::count_if(moving_->begin(), moving_->end(), [](const Moving& m) { return m.led; });
-  return fmt::format("{} rigid part(s), {} [[manipulator]]", moving_->size(), led);
+  const auto led = std::count_if(moving_.begin(), moving_.end(), [](const Moving& m) { return m.led; });
+  return fmt::format("{} rigid part(s), {} [[manipulator]]", moving_.size(), led);
 }
 
 Pose RigidParts::Moving::pose_at(double time) const {
   return (led->live ? led->live->path : led->path).at(time, body.centre);
 }
 
-void RigidParts::start(State& state) const {
-  for (Moving& moving : *moving_) {
+void RigidParts::start(State& state) {
+  for (Moving& moving : moving_) {
     RigidBody& body = moving.body;
     take_up(body, *body_, mass_, state.displacement, state.velocity);
     if (moving.led) {
@@ -104,16 +103,16 @@ void RigidParts::start(State& state) const {
   }
 }
 
-void RigidParts::begin(const State& state) const {
-  for (Moving& moving : *moving_) {
+void RigidParts::begin(const State& state) {
+  for (Moving& moving : moving_) {
     take_up(moving.body, *body_, mass_, state.displacement, state.velocity);
     std::copy(state.velocity.begin() + moving.body.begin, state.velocity.begin() + moving.body.end,
               moving.velocity.begin());
   }
 }
 
-void RigidParts::finish_step(State& state, const StepDone& done) const {
-  for (Moving& moving : *moving_) {
+void RigidParts::finish_step(State& state, const StepDone& done) {
+  for (Moving& moving : moving_) {
     RigidBody& body = moving.body;
     Vec3 impulse = Vec3::Zero(), turning = Vec3::Zero();
     for (std::uint32_t e = body.begin; e < body.end; ++e) {
@@ -155,8 +154,8 @@ void RigidParts::finish_step(State& state, const StepDone& done) const {
   }
 }
 
-void RigidParts::add_support_forces(std::vector<Vec3>& forces) const {
-  for (const Moving& moving : *moving_)
+void RigidParts::add_support_forces(std::vector<Vec3>& forces) {
+  for (const Moving& moving : moving_)
     for (std::uint32_t e = moving.body.begin; e < moving.body.end; ++e)
       forces[e] += moving.support[e - moving.body.begin];
 }
@@ -167,7 +166,7 @@ std::vector<double> RigidParts::memory() const {
   const auto add = [&](const auto& values) {
     memory.insert(memory.end(), values.data(), values.data() + values.size());
   };
-  for (const Moving& moving : *moving_) {
+  for (const Moving& moving : moving_) {
     add(moving.body.pose.translation);
     add(moving.body.pose.rotation);
     add(moving.body.momentum);
@@ -177,16 +176,16 @@ std::vector<double> RigidParts::memory() const {
   return memory;
 }
 
-void RigidParts::restore(const std::vector<double>& memory) const {
+void RigidParts::restore(const std::vector<double>& memory) {
   const double* from = memory.data();
   const auto take = [&](auto& values) {
     std::copy(from, from + values.size(), values.data());
     from += values.size();
   };
   std::size_t wanted = 0;
-  for (const Moving& moving : *moving_) wanted += 18 + 3 * moving.velocity.size();
+  for (const Moving& moving : moving_) wanted += 18 + 3 * moving.velocity.size();
   if (memory.size() != wanted) throw InputError("the checkpoint's rigid parts are not those of its scene");
-  for (Moving& moving : *moving_) {
+  for (Moving& moving : moving_) {
     take(moving.body.pose.translation);
     take(moving.body.pose.rotation);
     take(moving.body.momentum);
@@ -195,8 +194,8 @@ void RigidParts::restore(const std::vector<double>& memory) const {
   }
 }
 
-void RigidParts::report(const State&, const std::vector<Vec3>&, SimulateResult& result) const {
-  for (const Moving& moving : *moving_) {
+void RigidParts::report(const State&, const std::vector<Vec3>&, SimulateResult& result) {
+  for (const Moving& moving : moving_) {
     if (!moving.led) continue;
     const Pose& pose = moving.body.pose;
     const Vec3& centre = moving.body.centre;
@@ -208,7 +207,7 @@ void RigidParts::report(const State&, const std::vector<Vec3>&, SimulateResult& 
 
 std::vector<std::string> RigidParts::history_columns() const {
   std::vector<std::string> columns;
-  for (const Moving& moving : *moving_) {
+  for (const Moving& moving : moving_) {
     if (!moving.led) continue;
     for (const char* what : {"force", "torque"})
       for (const char axis : {'x', 'y', 'z'})
@@ -218,9 +217,9 @@ std::vector<std::string> RigidParts::history_columns() const {
   return columns;
 }
 
-std::vector<double> RigidParts::history_values(const State&, const std::vector<Vec3>&) const {
+std::vector<double> RigidParts::history_values(const State&, const std::vector<Vec3>&) {
   std::vector<double> values;
-  for (const Moving& moving : *moving_) {
+  for (const Moving& moving : moving_) {
     if (!moving.led) continue;
     values.insert(values.end(), moving.force.begin(), moving.force.end());
     values.insert(values.end(), moving.torque.begin(), moving.torque.end());

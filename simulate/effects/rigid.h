@@ -16,14 +16,13 @@ struct Manipulator {
   std::shared_ptr<LiveTool> live = nullptr;  // `path = "stdin"`, or in a run that tells what it feels
 };
 
-class RigidParts {
+class RigidParts : public Effect {
  public:
   struct Parameters {
     std::vector<std::string> parts;  // `rigid = true`
     std::vector<Manipulator> manipulators;
   };
   static constexpr const char* name = "rigid";
-  static constexpr bool needs_time = true;
 
   static void parse(TableReader& scene, Parameters& parameters);
   // Of each part: what the scene makes of it. Throws InputError: a name that the body does not have, two
@@ -31,21 +30,24 @@ class RigidParts {
   [[nodiscard]] static std::vector<Rigidity> rigidity(const Parameters& parameters, const Body& body);
 
   [[nodiscard]] static std::optional<RigidParts> make(const Parameters& parameters, const Problem& problem);
-  [[nodiscard]] std::string why() const;
+  [[nodiscard]] std::string why() const override;
 
-  void start(State& state) const;
-  void begin(const State& state) const;
-  void finish_step(State& state, const StepDone& done) const;
+  [[nodiscard]] bool finishes_steps() const override { return true; }
+  [[nodiscard]] bool takes_implicit_steps() const override { return false; }
+  [[nodiscard]] bool needs_mass() const override { return true; }
+  void start(State& state) override;
+  void begin(const State& state) override;
+  void finish_step(State& state, const StepDone& done) override;
   // N (elements): what keeps a manipulator on its path, in the last step.
-  void add_support_forces(std::vector<Vec3>& forces) const;
-  [[nodiscard]] std::vector<double> memory() const;
-  void restore(const std::vector<double>& memory) const;
-  void report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) const;
+  void add_support_forces(std::vector<Vec3>& forces) override;
+  [[nodiscard]] std::vector<double> memory() const override;
+  void restore(const std::vector<double>& memory) override;
+  void report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) override;
   // Reactions in the last step: force and torque on the manipulator, by what leads it, about `about` as it is
   // now.
-  [[nodiscard]] std::vector<std::string> history_columns() const;
+  [[nodiscard]] std::vector<std::string> history_columns() const override;
   [[nodiscard]] std::vector<double> history_values(const State& state,
-                                                   const std::vector<Vec3>& unbalanced) const;
+                                                   const std::vector<Vec3>& unbalanced) override;
 
  private:
   struct Moving {
@@ -56,8 +58,7 @@ class RigidParts {
     std::vector<Vec3> support;                         // (its elements) N, of the last step; of those led
     Vec3 force = Vec3::Zero(), torque = Vec3::Zero();  // N, N m, of what leads it
   };
-  // What moves is the parts; effects themselves stay as they are made.
-  std::shared_ptr<std::vector<Moving>> moving_;
+  std::vector<Moving> moving_;
   const Body* body_ = nullptr;
   std::vector<double> mass_;  // (elements) kg
 };

@@ -1,4 +1,4 @@
-// Ties: penalty matrices per tied cell or element, and elements that are followed exactly. Tied ones are few
+// Supports: penalty matrices per tied cell or element, and elements that are followed exactly. Tied ones are few
 // (a layer under a surface), so their sums run on one thread in a fixed order.
 #include "simulate/effects/supports.h"
 
@@ -56,9 +56,9 @@ bool lies_on_face(const InterpolationWeights& at) {
 
 }  // namespace
 
-std::optional<Ties> Ties::make(const Parameters& parameters, const Problem& problem) {
+std::optional<Supports> Supports::make(const Parameters& parameters, const Problem& problem) {
   if (parameters.ties.empty()) return std::nullopt;
-  Ties made;
+  Supports made;
   made.body_ = &problem.body;
   made.start_ = problem.settled;
   made.ties_ = parameters.ties;
@@ -78,7 +78,7 @@ std::optional<Ties> Ties::make(const Parameters& parameters, const Problem& prob
 }
 
 // Adds to the elements that a tie is followed by. A link leaves those to the others that they hold already.
-void Ties::hold(std::uint32_t tie, const std::vector<std::uint32_t>& elements) {
+void Supports::hold(std::uint32_t tie, const std::vector<std::uint32_t>& elements) {
   std::vector<std::uint32_t>& held = held_elements_[tie];
   held.insert(held.end(), elements.begin(), elements.end());
   std::sort(held.begin(), held.end());
@@ -91,7 +91,7 @@ void Ties::hold(std::uint32_t tie, const std::vector<std::uint32_t>& elements) {
 }
 
 // The middle and the extent of what the link holds, from its points of the surface or its elements' matter.
-void Ties::make_link(Tie& tie, const Selected& selected, const Problem& problem) const {
+void Supports::make_link(Tie& tie, const Selected& selected, const Problem& problem) const {
   if (problem.duration)
     throw InputError(tie.origin,
                      fmt::format("load \"{}\": a rigid link needs equilibrium without contact; in time make "
@@ -131,8 +131,8 @@ void Ties::make_link(Tie& tie, const Selected& selected, const Problem& problem)
   tie.motion.link = link;
 }
 
-void Ties::add_surface_tie(std::uint32_t tie, const std::vector<std::uint32_t>& polygons,
-                           const Problem& problem) {
+void Supports::add_surface_tie(std::uint32_t tie, const std::vector<std::uint32_t>& polygons,
+                               const Problem& problem) {
   const std::vector<SurfacePoint> points = surface_points(problem, polygons);
   if (!(total_area(points) > 0))
     throw InputError(ties_[tie].origin,
@@ -162,7 +162,7 @@ void Ties::add_surface_tie(std::uint32_t tie, const std::vector<std::uint32_t>& 
 
 // Lowers the matrices from `first` on so that at no element their rows together are stiffer than omega^2 of
 // its part times its mass.
-void Ties::soften(std::size_t first, const Problem& problem) {
+void Supports::soften(std::size_t first, const Problem& problem) {
   const std::vector<double> omega2 = cell_frequencies(problem);
   const std::vector<double> mass = lumped_masses(problem);
   const std::vector<std::uint32_t> part = element_parts(problem.body);
@@ -180,21 +180,27 @@ void Ties::soften(std::size_t first, const Problem& problem) {
   }
 }
 
-double Ties::added_frequency(const std::vector<double>& mass) const {
+double Supports::added_frequency(const State&, const std::vector<double>& mass) {
+  if (added_frequency_) return *added_frequency_;
   std::map<std::uint32_t, double> row_sum;
   for (const TiedElements& tied : tied_)
     for (std::size_t a = 0; a < tied.count; ++a)
       row_sum[tied.elements[a]] += tied.stiffness.row(static_cast<Eigen::Index>(a)).cwiseAbs().sum();
   double largest = 0;
   for (const auto& [e, sum] : row_sum) largest = std::max(largest, sum / mass[e]);
+  added_frequency_ = largest;
   return largest;
 }
 
-double Ties::factor(const Tie& tie, const State& state) const {
+double Supports::factor(const Tie& tie, const State& state) const {
   return tie.is_move ? tie.course.at(state) : state.share;
 }
 
-std::string Ties::why() const {
+bool Supports::drives() const {
+  return std::any_of(ties_.begin(), ties_.end(), [](const Tie& tie) { return tie.is_move || tie.link; });
+}
+
+std::string Supports::why() const {
   const auto moves = std::count_if(ties_.begin(), ties_.end(), [](const Tie& tie) { return tie.is_move; });
   const auto links =
       std::count_if(ties_.begin(), ties_.end(), [](const Tie& tie) { return tie.link.has_value(); });
@@ -204,7 +210,7 @@ std::string Ties::why() const {
 }
 
 // u_a - d(X_a) on the tied axes, 0 on the others. (count x 3) m
-Ties::Displacements Ties::violation(const TiedElements& tied, const State& state) const {
+Supports::Displacements Supports::violation(const TiedElements& tied, const State& state) const {
   const Tie& tie = ties_[tied.tie];
   Displacements result(tied.count, 3);
   for (std::size_t a = 0; a < tied.count; ++a) {
@@ -219,7 +225,7 @@ Ties::Displacements Ties::violation(const TiedElements& tied, const State& state
   return result;
 }
 
-double Ties::energy(const State& state) const {
+double Supports::energy(const State& state) {
   double energy = 0;
   for (const TiedElements& tied : tied_) {
     const Displacements off = violation(tied, state);
@@ -228,7 +234,7 @@ double Ties::energy(const State& state) const {
   return energy;
 }
 
-void Ties::add_forces(const State& state, std::vector<Vec3>& forces) const {
+void Supports::add_forces(const State& state, std::vector<Vec3>& forces) {
   for (const TiedElements& tied : tied_) {
     const Displacements force = tied.stiffness * violation(tied, state);
     for (std::size_t a = 0; a < tied.count; ++a)
@@ -236,7 +242,7 @@ void Ties::add_forces(const State& state, std::vector<Vec3>& forces) const {
   }
 }
 
-void Ties::add_stiffness(const State&, BlockMatrix& matrix) const {
+void Supports::add_stiffness(const State&, BlockMatrix& matrix) {
   for (const TiedElements& tied : tied_)
     for (std::size_t a = 0; a < tied.count; ++a)
       for (std::size_t b = 0; b < tied.count; ++b) {
@@ -247,7 +253,7 @@ void Ties::add_stiffness(const State&, BlockMatrix& matrix) const {
       }
 }
 
-void Ties::constrain(Constraints& constraints) const {
+void Supports::constrain(Constraints& constraints) {
   constraints.start = start_;
   if (constraints.mask.empty()) {  // a timed run, where nothing else holds elements
     constraints.mask.assign(body_->element_count(), 0);
@@ -266,7 +272,7 @@ void Ties::constrain(Constraints& constraints) const {
   }
 }
 
-std::vector<Reaction> Ties::reactions(const State& state, const std::vector<Vec3>& unbalanced) const {
+std::vector<Reaction> Supports::reactions(const State& state, const std::vector<Vec3>& unbalanced) const {
   std::vector<Reaction> reaction;
   for (const Tie& tie : ties_) reaction.push_back({tie.name, Vec3::Zero(), Vec3::Zero()});
   const auto add = [&](std::size_t tie, const Vec3& force, std::uint32_t e) {
@@ -292,7 +298,7 @@ std::vector<Reaction> Ties::reactions(const State& state, const std::vector<Vec3
   return reaction;
 }
 
-void Ties::report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) const {
+void Supports::report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) {
   const std::vector<Reaction> reaction = reactions(state, unbalanced);
   for (std::size_t t = 0; t < ties_.size(); ++t) {
     if (!ties_[t].link) {
@@ -308,7 +314,7 @@ void Ties::report(const State& state, const std::vector<Vec3>& unbalanced, Simul
   }
 }
 
-std::vector<std::string> Ties::history_columns() const {
+std::vector<std::string> Supports::history_columns() const {
   std::vector<std::string> columns;
   for (const Tie& tie : ties_)
     for (const auto& [what, unit] : {std::pair{"force", "N"}, {"moment", "N m"}})
@@ -317,7 +323,7 @@ std::vector<std::string> Ties::history_columns() const {
   return columns;
 }
 
-std::vector<double> Ties::history_values(const State& state, const std::vector<Vec3>& unbalanced) const {
+std::vector<double> Supports::history_values(const State& state, const std::vector<Vec3>& unbalanced) {
   std::vector<double> values;
   for (const Reaction& reaction : reactions(state, unbalanced))
     for (const Vec3& each : {reaction.force, reaction.moment})

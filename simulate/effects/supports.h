@@ -40,7 +40,7 @@ struct Tie {
   std::optional<LinkLoad> link = {};  // a rigid link: its motion is found, all axes are led
 };
 
-class Ties {
+class Supports : public Effect {
  public:
   struct Parameters {
     std::vector<Tie> ties;
@@ -49,20 +49,24 @@ class Ties {
   static constexpr double kPenalty = 300;  // stiffness per area, in E / h
 
   static void parse(TableReader& scene, Parameters& parameters);
-  [[nodiscard]] static std::optional<Ties> make(const Parameters& parameters, const Problem& problem);
-  [[nodiscard]] std::string why() const;
+  [[nodiscard]] static std::optional<Supports> make(const Parameters& parameters, const Problem& problem);
+  [[nodiscard]] std::string why() const override;
 
-  [[nodiscard]] double added_frequency(const std::vector<double>& mass) const;
-  [[nodiscard]] double energy(const State& state) const;
-  void add_forces(const State& state, std::vector<Vec3>& forces) const;
-  void add_stiffness(const State& state, BlockMatrix& matrix) const;
-  void constrain(Constraints& constraints) const;
+  [[nodiscard]] EnergyAccount account() const override { return EnergyAccount::work; }
+  [[nodiscard]] bool drives() const override;
+  [[nodiscard]] bool needs_mass() const override { return true; }
+  [[nodiscard]] double added_frequency(const State&, const std::vector<double>& mass) override;
+  [[nodiscard]] double energy(const State& state) override;
+  void add_forces(const State& state, std::vector<Vec3>& forces) override;
+  [[nodiscard]] bool adds_stiffness() const override { return true; }
+  void add_stiffness(const State& state, BlockMatrix& matrix) override;
+  void constrain(Constraints& constraints) override;
   // Reactions: penalty forces, and minus the unbalanced forces on eliminated elements.
-  void report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) const;
+  void report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) override;
   // The same in timed runs, of each row of the books.
-  [[nodiscard]] std::vector<std::string> history_columns() const;
+  [[nodiscard]] std::vector<std::string> history_columns() const override;
   [[nodiscard]] std::vector<double> history_values(const State& state,
-                                                   const std::vector<Vec3>& unbalanced) const;
+                                                   const std::vector<Vec3>& unbalanced) override;
 
  private:
   [[nodiscard]] std::vector<Reaction> reactions(const State& state,
@@ -87,6 +91,7 @@ class Ties {
   std::vector<Tie> ties_;
   std::vector<TiedElements> tied_;                         // by tie, then elements
   std::vector<std::vector<std::uint32_t>> held_elements_;  // (ties) eliminated elements
+  std::optional<double> added_frequency_;                  // 1/s^2, once it was asked for
 };
 
 }  // namespace flexel::simulate

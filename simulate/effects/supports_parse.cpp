@@ -77,7 +77,7 @@ Tie parse_link(TableReader& reader) {
 
 }  // namespace
 
-void Ties::parse(TableReader& scene, Parameters& parameters) {
+void Supports::parse(TableReader& scene, Parameters& parameters) {
   for (const SceneValue* table : scene.tables("fix")) {
     TableReader reader(*table, scene.file(), "[[fix]]");
     Tie tie;

@@ -8,7 +8,7 @@
 
 #include "base/instruction_set.h"
 #include "base/parallel.h"
-#include "simulate/equilibrium/pass_matrix.h"
+#include "simulate/equilibrium/effect_matrix.h"
 #include "simulate/kernels/scratch.h"
 #include "simulate/models/corner_barrier.h"
 #include "simulate/models/prepared_cell.h"
@@ -62,7 +62,7 @@ bool CellStiffness::fits(const Problem& problem, const PaperModel& paper) {
 }
 
 CellStiffness::CellStiffness(const Problem& problem, const StiffnessPattern& pattern,
-                             const std::vector<Pass>& passes)
+                             const std::vector<ActiveEffect>& effects)
     : body_(problem.body),
       pattern_(pattern),
       layout_(layout_of(problem)),
@@ -71,7 +71,7 @@ CellStiffness::CellStiffness(const Problem& problem, const StiffnessPattern& pat
       part_(cell_parts(problem.body)),
       share_(stiffness_shares(problem.body)),
       place_(problem.body.cell_count()),
-      added_(matrix_of_passes(problem.body, pattern.matrix, passes)),
+      added_(matrix_of_effects(problem.body, pattern.matrix, effects)),
       shared_force_(3 * layout_.shared.size()) {
   for (std::size_t block = 0; block < layout_.block_cells.size(); ++block)
     for (std::size_t lane = 0; lane < kLanes; ++lane)

@@ -21,11 +21,12 @@ class CellStiffness final : public LinearOperator {
   [[nodiscard]] static bool fits(const Problem& problem, const PaperModel& paper);
 
   // Keeps references to the problem's body and to `pattern`, whose matrix needs no values.
-  CellStiffness(const Problem& problem, const StiffnessPattern& pattern, const std::vector<Pass>& passes);
+  CellStiffness(const Problem& problem, const StiffnessPattern& pattern,
+                const std::vector<ActiveEffect>& effects);
 
   // Takes up the cells' tangents at `state`, nothing added and nothing eliminated.
   void linearise(const State& state, const TangentOptions& tangent);
-  // What passes add: rows and columns of the elements that they pull at, and of their neighbours. Zero after
+  // What effects add: rows and columns of the elements that they pull at, and of their neighbours. Zero after
   // linearise().
   [[nodiscard]] BlockMatrix& added() {
     adding_.reset();

@@ -1,5 +1,4 @@
-// Sums the models and the passes. A pass without a hook is skipped; an effect that the scene does not name
-// has no pass.
+// Sums the models and the effects.
 #include "simulate/equilibrium/mechanics.h"
 
 #include <fmt/format.h>
@@ -41,19 +40,18 @@ Constraints initial_constraints(const Problem& problem, const Stencil& stencil, 
 
 }  // namespace
 
-Mechanics::Mechanics(const Problem& problem, std::vector<Pass> passes, StiffnessStorage storage)
+Mechanics::Mechanics(const Problem& problem, std::vector<ActiveEffect> effects, StiffnessStorage storage)
     : body_(problem.body),
       paper_(problem),
       stored_(storage == StiffnessStorage::stored ||
               (storage == StiffnessStorage::automatic &&
                (body_.element_count() <= kStoredElements || !CellStiffness::fits(problem, paper_)))),
       pattern_(
-          stiffness_pattern(problem.body, active_cells(problem), paper_.rows(), coupled(passes), stored_)),
+          stiffness_pattern(problem.body, active_cells(problem), paper_.rows(), coupled(effects), stored_)),
       cells_(problem, pattern_.stencil),
-      passes_(std::move(passes)),
+      effects_(std::move(effects)),
       constraints_(initial_constraints(problem, pattern_.stencil, paper_)) {
-  for (const Pass& pass : passes_)
-    if (pass.constrain) pass.constrain(constraints_);
+  for (const ActiveEffect& effect : effects_) effect->constrain(constraints_);
   if (!stored_) make_tangent(problem);
   if (stored_) {
     stored_tangent_ = std::make_unique<StoredMatrix>(pattern_.matrix);
@@ -61,13 +59,12 @@ Mechanics::Mechanics(const Problem& problem, std::vector<Pass> passes, Stiffness
   }
 }
 
-// Where a pass adds to elements that it does not pull at, the matrix is stored after all.
+// Where an effect adds to elements that it does not pull at, the matrix is stored after all.
 void Mechanics::make_tangent(const Problem& problem) {
-  tangent_ = &made_.emplace(problem, pattern_, passes_);
+  tangent_ = &made_.emplace(problem, pattern_, effects_);
   const State rest{std::vector<Vec3>(body_.element_count(), Vec3::Zero()), 1};
   try {
-    for (const Pass& pass : passes_)
-      if (pass.add_stiffness) pass.add_stiffness(rest, made_->added());
+    for (const ActiveEffect& effect : effects_) effect->add_stiffness(rest, made_->added());
   } catch (const MissingBlock&) {
     made_.reset();
     stored_ = true;
@@ -75,36 +72,33 @@ void Mechanics::make_tangent(const Problem& problem) {
   }
 }
 
-std::vector<CoupledElements> Mechanics::coupled(const std::vector<Pass>& passes) {
+std::vector<CoupledElements> Mechanics::coupled(const std::vector<ActiveEffect>& effects) {
   std::vector<CoupledElements> groups;
-  for (const Pass& pass : passes) groups.insert(groups.end(), pass.couples.begin(), pass.couples.end());
+  for (const ActiveEffect& effect : effects)
+    groups.insert(groups.end(), effect.couples.begin(), effect.couples.end());
   return groups;
 }
 
 double Mechanics::energy(const State& state) {
   double energy = 0;
   {
-    const PassTimer timer(cell_seconds_);
+    const ScopeTimer timer(cell_seconds_);
     energy = cells_.energy(state);
   }
   {
-    const PassTimer timer(paper_seconds_);
+    const ScopeTimer timer(paper_seconds_);
     energy += paper_.energy(state);
   }
-  for (Pass& pass : passes_)
-    if (pass.energy) {
-      const PassTimer timer(pass.seconds);
-      energy += pass.energy(state);
-    }
+  for (const ActiveEffect& effect : effects_) energy += effect->energy(state);
   return energy;
 }
 
 void Mechanics::add_elastic_forces(const State& state, std::vector<Vec3>& forces) {
   {
-    const PassTimer timer(cell_seconds_);
+    const ScopeTimer timer(cell_seconds_);
     cells_.add_forces(state, forces);
   }
-  const PassTimer timer(paper_seconds_);
+  const ScopeTimer timer(paper_seconds_);
   paper_.add_forces(state, forces);
 }
 
@@ -112,11 +106,8 @@ Forces Mechanics::forces(const State& state) {
   Forces result;
   std::vector<Vec3> inner(body_.element_count(), Vec3::Zero());
   result.total.assign(body_.element_count(), Vec3::Zero());
-  for (Pass& pass : passes_)
-    if (pass.add_forces) {
-      const PassTimer timer(pass.seconds);
-      pass.add_forces(state, pass.couples.empty() ? result.total : inner);
-    }
+  for (const ActiveEffect& effect : effects_)
+    effect->add_forces(state, effect.couples.empty() ? result.total : inner);
   add_elastic_forces(state, inner);
   const double outer = squared_norm(result.total);
   const double held = parallel_sum<double>(inner.size(), [&](std::size_t e) {
@@ -134,21 +125,17 @@ Forces Mechanics::forces(const State& state) {
 
 void Mechanics::assemble(const State& state, const TangentOptions& tangent) {
   {
-    const PassTimer timer(cell_seconds_);
+    const ScopeTimer timer(cell_seconds_);
     if (made_)
       made_->linearise(state, tangent);
     else
       cells_.set_stiffness(state, tangent, pattern_.matrix);
   }
   if (!made_) {
-    const PassTimer timer(paper_seconds_);
+    const ScopeTimer timer(paper_seconds_);
     paper_.add_stiffness(state, tangent.project, pattern_.matrix);
   }
-  for (Pass& pass : passes_)
-    if (pass.add_stiffness) {
-      const PassTimer timer(pass.seconds);
-      pass.add_stiffness(state, added_stiffness());
-    }
+  for (const ActiveEffect& effect : effects_) effect->add_stiffness(state, added_stiffness());
 }
 
 void Mechanics::eliminate_prescribed() {
@@ -178,8 +165,8 @@ std::vector<std::uint8_t> Mechanics::tied_elements() {
   BlockMatrix& matrix = added_stiffness();
   std::fill(matrix.values.begin(), matrix.values.end(), Block::Zero());
   const State rest{std::vector<Vec3>(body_.element_count(), Vec3::Zero()), 1};
-  for (const Pass& pass : passes_)
-    if (pass.add_stiffness && pass.couples.empty()) pass.add_stiffness(rest, matrix);
+  for (const ActiveEffect& effect : effects_)
+    if (effect.couples.empty()) effect->add_stiffness(rest, matrix);
   for (std::uint32_t e = 0; e < tied.size(); ++e) {
     if (constraints_.mask[e] != 0) tied[e] = constraints_.mask[e] == 7 ? 2 : 1;
     for (std::size_t entry = matrix.row_offsets[e]; entry < matrix.row_offsets[e + 1]; ++entry)
@@ -191,13 +178,13 @@ std::vector<std::uint8_t> Mechanics::tied_elements() {
 
 void Mechanics::report(const State& state, SimulateResult& result) {
   const Forces unbalanced = forces(state);
-  for (const Pass& pass : passes_)
-    if (pass.report) pass.report(state, unbalanced.total, result);
+  for (const ActiveEffect& effect : effects_) effect->report(state, unbalanced.total, result);
   if (body_.cell_count() > 0)
-    result.passes.push_back({"cells", "model of corner-placed parts", cell_seconds_});
+    result.shares.push_back({"cells", "model of corner-placed parts", cell_seconds_});
   if (!paper_.rows().entries.empty())
-    result.passes.push_back({"connections", "model of centre-placed parts", paper_seconds_});
-  for (const Pass& pass : passes_) result.passes.push_back({pass.name, pass.why, pass.seconds});
+    result.shares.push_back({"connections", "model of centre-placed parts", paper_seconds_});
+  for (const ActiveEffect& effect : effects_)
+    result.shares.push_back({effect.name, effect.why, effect.seconds});
 }
 
 }  // namespace flexel::simulate

@@ -1,4 +1,4 @@
-// Everything that acts on a body in a run: the models of its parts and the passes of its effects, summed up.
+// Everything that acts on a body in a run: the models of its parts and its effects, summed up.
 #pragma once
 #include <cassert>
 #include <optional>
@@ -12,7 +12,7 @@ namespace flexel::simulate {
 
 // Forces on the elements [N].
 struct Forces {
-  std::vector<Vec3> total;  // (elements) of the models and of every pass
+  std::vector<Vec3> total;  // (elements) of the models and of every effect
   double scale = 0;  // 2-norm of what acts from outside: loads, ties, and matter on prescribed components
 };
 
@@ -30,7 +30,7 @@ enum class StiffnessStorage { automatic, stored, made };
 class Mechanics {
  public:
   // `problem`'s body must outlive it. `made`: CellStiffness must fit.
-  Mechanics(const Problem& problem, std::vector<Pass> passes,
+  Mechanics(const Problem& problem, std::vector<ActiveEffect> effects,
             StiffnessStorage storage = StiffnessStorage::automatic);
   Mechanics(const Mechanics&) = delete;
   Mechanics& operator=(const Mechanics&) = delete;
@@ -47,7 +47,7 @@ class Mechanics {
     assert(stored_);
     return pattern_.matrix;
   }
-  [[nodiscard]] const std::vector<Pass>& passes() const { return passes_; }
+  [[nodiscard]] const std::vector<ActiveEffect>& effects() const { return effects_; }
 
   // Total energy [J]; infinity where a cell or an element has J <= 0.
   [[nodiscard]] double energy(const State& state);
@@ -62,16 +62,16 @@ class Mechanics {
   void assemble(const State& state, const TangentOptions& tangent = {});
   void eliminate_prescribed();
   // Groups of elements that effects couple (bonds).
-  [[nodiscard]] std::vector<CoupledElements> coupled_elements() const { return coupled(passes_); }
+  [[nodiscard]] std::vector<CoupledElements> coupled_elements() const { return coupled(effects_); }
   // (elements) 1 where a tie holds or leads an element along some directions, 2 along all, else 0.
   [[nodiscard]] std::vector<std::uint8_t> tied_elements();
 
   void report(const State& state, SimulateResult& result);
 
  private:
-  static std::vector<CoupledElements> coupled(const std::vector<Pass>& passes);
+  static std::vector<CoupledElements> coupled(const std::vector<ActiveEffect>& effects);
   void make_tangent(const Problem& problem);
-  // Where passes add their stiffness.
+  // Where effects add their stiffness.
   [[nodiscard]] BlockMatrix& added_stiffness() { return made_ ? made_->added() : pattern_.matrix; }
 
   const Body& body_;
@@ -79,7 +79,7 @@ class Mechanics {
   bool stored_;
   StiffnessPattern pattern_;
   Cells cells_;
-  std::vector<Pass> passes_;
+  std::vector<ActiveEffect> effects_;
   std::optional<CellStiffness> made_;  // nothing where the matrix of the pattern has values
   std::unique_ptr<LinearOperator> stored_tangent_;
   const LinearOperator* tangent_ = nullptr;

@@ -165,7 +165,7 @@ void Balance::correct(Eigen::MatrixXd& slope) const {
 // db/dq [N/m], the free elements following. A tangent with negative curvature is taken with the cells' moduli
 // projected to their positive part.
 Eigen::MatrixXd Balance::slope() {
-  const PassTimer timer(outcome_.linear_seconds);
+  const ScopeTimer timer(outcome_.linear_seconds);
   Eigen::MatrixXd slope = Eigen::MatrixXd::Zero(unknowns(), unknowns());
   for (const bool project : {false, true}) {
     mechanics_.assemble(state_, {project, nullptr});

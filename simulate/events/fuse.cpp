@@ -223,13 +223,13 @@ Vec3 FusedPoints::gap(const FusedPoint& point, const State& state) const {
   return sum;
 }
 
-double FusedPoints::energy(const State& state) const {
+double FusedPoints::energy(const State& state) {
   double energy = 0;
   for (const FusedPoint& point : points_) energy += 0.5 * point.stiffness * gap(point, state).squaredNorm();
   return energy;
 }
 
-void FusedPoints::add_forces(const State& state, std::vector<Vec3>& forces) const {
+void FusedPoints::add_forces(const State& state, std::vector<Vec3>& forces) {
   for (const FusedPoint& point : points_) {
     const Vec3 pull = -point.stiffness * gap(point, state);
     for (std::size_t i = 0; i < point.elements.size(); ++i)
@@ -238,7 +238,8 @@ void FusedPoints::add_forces(const State& state, std::vector<Vec3>& forces) cons
 }
 
 // Gershgorin on the rows of k w w^T.
-double FusedPoints::added_frequency(const std::vector<double>& mass) const {
+double FusedPoints::added_frequency(const State&, const std::vector<double>& mass) {
+  if (added_frequency_) return *added_frequency_;
   std::map<std::uint32_t, double> row;
   for (const FusedPoint& point : points_) {
     double all = 0;
@@ -248,6 +249,7 @@ double FusedPoints::added_frequency(const std::vector<double>& mass) const {
   }
   double largest = 0;
   for (const auto& [e, sum] : row) largest = std::max(largest, sum / mass[e]);
+  added_frequency_ = largest;
   return largest;
 }
 

@@ -22,22 +22,24 @@ class Fuse {
 // The points that were fused so far, as an effect. With the present positions x and weights w of a point, the
 // energy is 1/2 k |sum_i w_i x_i|^2: no force at the moment of fusing, none by any rigid motion of all, and
 // neither momentum nor angular momentum, for the weights sum to 0.
-class FusedPoints {
+class FusedPoints : public Effect {
  public:
   static constexpr const char* name = "fused";
-  static constexpr Book book = Book::potential;
 
   FusedPoints(const Body& body, std::vector<FusedPoint> points) : body_(&body), points_(std::move(points)) {}
-  [[nodiscard]] std::string why() const;
-  [[nodiscard]] double energy(const State& state) const;
-  void add_forces(const State& state, std::vector<Vec3>& forces) const;
-  [[nodiscard]] double added_frequency(const std::vector<double>& mass) const;
+  [[nodiscard]] std::string why() const override;
+  [[nodiscard]] EnergyAccount account() const override { return EnergyAccount::potential; }
+  [[nodiscard]] bool needs_mass() const override { return true; }
+  [[nodiscard]] double energy(const State& state) override;
+  void add_forces(const State& state, std::vector<Vec3>& forces) override;
+  [[nodiscard]] double added_frequency(const State&, const std::vector<double>& mass) override;
 
  private:
   [[nodiscard]] Vec3 gap(const FusedPoint& point, const State& state) const;
 
   const Body* body_;
   std::vector<FusedPoint> points_;
+  std::optional<double> added_frequency_;  // 1/s^2, once it was asked for
 };
 
 }  // namespace flexel::simulate

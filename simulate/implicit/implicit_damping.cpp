@@ -45,7 +45,7 @@ StepOutcome ImplicitDamping::advance(State& state, const std::vector<Vec3>& oute
   before_ = state.velocity;
   probe_.displacement = state.displacement;
   const StepOutcome outcome = stepper_.advance(state, outer, {dt, 0, false});  // v- + dt / m (f + D v-)
-  const PassTimer timer(seconds_);
+  const ScopeTimer timer(seconds_);
   state.time = time;
   right_.resize(n);
   residual_.resize(n);

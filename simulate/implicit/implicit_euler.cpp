@@ -1,5 +1,5 @@
-// Inertia and damping are two more passes of the mechanics whose equilibrium Newton's method finds; effects
-// that resist velocity act as a pass whose velocity is that of the step. The tangent is kept from step to
+// Inertia and damping are two more effects of the mechanics whose equilibrium Newton's method finds; effects
+// that resist velocity act with that of the step. The tangent is kept from step to
 // step while it serves.
 #include "simulate/implicit/implicit_euler.h"
 
@@ -18,71 +18,117 @@ constexpr int kFullIterations = 12;
 
 }  // namespace
 
-ImplicitEuler::ImplicitEuler(const Problem& problem, const std::vector<Pass>& passes,
+ImplicitEuler::ImplicitEuler(const Problem& problem, const std::vector<ActiveEffect>& effects,
                              const KernelEffects& plan, const std::vector<double>& mass, double tolerance)
     : problem_(problem),
       mass_(mass),
       tau_(plan.damping),
       tolerance_(tolerance),
-      outer_passes_(passes.size()),
+      outer_effects_(effects.size()),
       reach_(std::numeric_limits<double>::infinity()),
-      mechanics_(problem, all_passes(passes), StiffnessStorage::stored) {
+      mechanics_(problem, all_effects(effects), StiffnessStorage::stored) {
   if (damped_) damping_matrix_ = mechanics_.stiffness();
 }
 
-std::vector<Pass> ImplicitEuler::all_passes(const std::vector<Pass>& passes) {
-  std::vector<Pass> all;
-  for (const Pass& pass : passes) all.push_back(pass.add_resistance ? resisting(pass) : pass);
-  for (Pass& pass : all) pass.seconds = 0;
-  for (const double tau : tau_) damped_ = damped_ || tau > 0;
-  all.push_back(inertia());
-  if (damped_) all.push_back(damping());
-  return all;
-}
+// An effect of the run as the mechanics of a step sees it: one that resists velocity has that of the step.
+class ImplicitEuler::EffectOfStep : public Effect {
+ public:
+  static constexpr const char* name = "";
+  EffectOfStep(const ImplicitEuler& euler, Effect& effect) : euler_(&euler), effect_(&effect) {}
+  [[nodiscard]] std::string why() const override { return effect_->why(); }
+  [[nodiscard]] bool adds_stiffness() const override {
+    return effect_->adds_stiffness() || effect_->resists();
+  }
+  [[nodiscard]] std::vector<CoupledElements> couples() const override { return effect_->couples(); }
+  void constrain(Constraints& constraints) override { effect_->constrain(constraints); }
+  [[nodiscard]] double energy(const State& state) override {
+    return effect_->resists() ? euler_->step_ * effect_->resistance(euler_->along_the_way(state))
+                              : effect_->energy(state);
+  }
+  void add_forces(const State& state, std::vector<Vec3>& forces) override {
+    effect_->resists() ? effect_->add_forces(euler_->along_the_way(state), forces)
+                       : effect_->add_forces(state, forces);
+  }
+  void add_stiffness(const State& state, BlockMatrix& matrix) override {
+    effect_->resists() ? effect_->add_resistance(euler_->along_the_way(state), 1 / euler_->step_, matrix)
+                       : effect_->add_stiffness(state, matrix);
+  }
 
-Pass ImplicitEuler::inertia() {
-  Pass pass;
-  pass.energy = [this](const State& state) {
-    return 0.5 / (step_ * step_) * parallel_sum<double>(mass_.size(), [&](std::size_t e) {
-             return mass_[e] * (state.displacement[e] - target_[e]).squaredNorm();
+ private:
+  const ImplicitEuler* euler_;
+  Effect* effect_;
+};
+
+class ImplicitEuler::Inertia : public Effect {
+ public:
+  static constexpr const char* name = "inertia";
+  explicit Inertia(const ImplicitEuler& euler) : euler_(&euler) {}
+  [[nodiscard]] std::string why() const override { return "implicit steps"; }
+  [[nodiscard]] bool adds_stiffness() const override { return true; }
+  [[nodiscard]] double energy(const State& state) override {
+    const double step = euler_->step_;
+    return 0.5 / (step * step) * parallel_sum<double>(euler_->mass_.size(), [&](std::size_t e) {
+             return euler_->mass_[e] * (state.displacement[e] - euler_->target_[e]).squaredNorm();
            });
-  };
-  pass.add_forces = [this](const State& state, std::vector<Vec3>& forces) {
-    parallel_for_each(mass_.size(), [&](std::size_t e) {
-      forces[e] -= mass_[e] / (step_ * step_) * (state.displacement[e] - target_[e]);
+  }
+  void add_forces(const State& state, std::vector<Vec3>& forces) override {
+    const double step = euler_->step_;
+    parallel_for_each(euler_->mass_.size(), [&](std::size_t e) {
+      forces[e] -= euler_->mass_[e] / (step * step) * (state.displacement[e] - euler_->target_[e]);
     });
-  };
-  pass.add_stiffness = [this](const State&, BlockMatrix& matrix) {
-    parallel_for_each(mass_.size(), [&](std::size_t e) {
-      matrix.values[diagonal_position(matrix, e)].diagonal().array() += mass_[e] / (step_ * step_);
+  }
+  void add_stiffness(const State&, BlockMatrix& matrix) override {
+    const double step = euler_->step_;
+    parallel_for_each(euler_->mass_.size(), [&](std::size_t e) {
+      matrix.values[diagonal_position(matrix, e)].diagonal().array() += euler_->mass_[e] / (step * step);
     });
-  };
-  return pass;
-}
+  }
 
-Pass ImplicitEuler::damping() {
-  const auto pulled = [this](const State& state) {
-    std::vector<Vec3> moved(mass_.size()), forces(mass_.size());
-    parallel_for_each(mass_.size(), [&](std::size_t e) {
-      moved[e] = (state.displacement[e] - before_.displacement[e]) / step_;
-    });
-    multiply(damping_matrix_, moved, forces);
-    return std::pair{std::move(moved), std::move(forces)};
-  };
-  Pass pass;
-  pass.energy = [this, pulled](const State& state) {
+ private:
+  const ImplicitEuler* euler_;
+};
+
+class ImplicitEuler::StepDamping : public Effect {
+ public:
+  static constexpr const char* name = "damping";
+  explicit StepDamping(const ImplicitEuler& euler) : euler_(&euler) {}
+  [[nodiscard]] std::string why() const override { return "implicit steps"; }
+  [[nodiscard]] bool adds_stiffness() const override { return true; }
+  [[nodiscard]] double energy(const State& state) override {
     const auto [moved, forces] = pulled(state);
-    return 0.5 * step_ * dot(moved, forces);
-  };
-  pass.add_forces = [pulled](const State& state, std::vector<Vec3>& sum) {
+    return 0.5 * euler_->step_ * dot(moved, forces);
+  }
+  void add_forces(const State& state, std::vector<Vec3>& sum) override {
     const std::vector<Vec3> forces = pulled(state).second;
     parallel_for_each(sum.size(), [&](std::size_t e) { sum[e] -= forces[e]; });
-  };
-  pass.add_stiffness = [this](const State&, BlockMatrix& matrix) {
-    parallel_for_each(matrix.values.size(),
-                      [&](std::size_t i) { matrix.values[i] += damping_matrix_.values[i] / step_; });
-  };
-  return pass;
+  }
+  void add_stiffness(const State&, BlockMatrix& matrix) override {
+    parallel_for_each(matrix.values.size(), [&](std::size_t i) {
+      matrix.values[i] += euler_->damping_matrix_.values[i] / euler_->step_;
+    });
+  }
+
+ private:
+  // m/s, the velocity of the step; N, what damping takes for it
+  [[nodiscard]] std::pair<std::vector<Vec3>, std::vector<Vec3>> pulled(const State& state) const {
+    const std::size_t n = euler_->mass_.size();
+    std::vector<Vec3> moved(n), forces(n);
+    parallel_for_each(n, [&](std::size_t e) {
+      moved[e] = (state.displacement[e] - euler_->before_.displacement[e]) / euler_->step_;
+    });
+    multiply(euler_->damping_matrix_, moved, forces);
+    return {std::move(moved), std::move(forces)};
+  }
+  const ImplicitEuler* euler_;
+};
+
+std::vector<ActiveEffect> ImplicitEuler::all_effects(const std::vector<ActiveEffect>& effects) {
+  std::vector<ActiveEffect> all;
+  for (const ActiveEffect& effect : effects) all.push_back(activate(EffectOfStep(*this, effect.untimed())));
+  for (const double tau : tau_) damped_ = damped_ || tau > 0;
+  all.push_back(activate(Inertia(*this)));
+  if (damped_) all.push_back(activate(StepDamping(*this)));
+  return all;
 }
 
 // The shape at the start of the step and the velocity that leads to `trial`.
@@ -96,25 +142,12 @@ State ImplicitEuler::along_the_way(const State& trial) const {
   return state;
 }
 
-Pass ImplicitEuler::resisting(const Pass& pass) {
-  Pass made = pass;
-  made.energy = [this, pass](const State& state) { return step_ * pass.resistance(along_the_way(state)); };
-  made.add_forces = [this, pass](const State& state, std::vector<Vec3>& forces) {
-    pass.add_forces(along_the_way(state), forces);
-  };
-  made.add_stiffness = [this, pass](const State& state, BlockMatrix& matrix) {
-    pass.add_resistance(along_the_way(state), 1 / step_, matrix);
-  };
-  return made;
-}
-
-// What forces the residual is measured against where everything moves freely: those of the passes as the step
-// begins.
+// What forces the residual is measured against where everything moves freely: those of the effects as the
+// step begins.
 double ImplicitEuler::force_scale(const State& trial) const {
   std::vector<Vec3> forces(mass_.size(), Vec3::Zero());
-  for (std::size_t p = 0; p < outer_passes_; ++p)
-    if (mechanics_.passes()[p].add_forces && mechanics_.passes()[p].couples.empty())
-      mechanics_.passes()[p].add_forces(trial, forces);
+  for (std::size_t p = 0; p < outer_effects_; ++p)
+    if (mechanics_.effects()[p].couples.empty()) mechanics_.effects()[p]->add_forces(trial, forces);
   return std::sqrt(dot(forces, forces));
 }
 
@@ -207,12 +240,17 @@ double ImplicitEuler::numerical_dissipation(const State& state) {
   return moved + mechanics_.elastic_energy(before_) - mechanics_.elastic_energy(state);
 }
 
-void ImplicitEuler::add_forces(std::size_t pass, const State& state, std::vector<Vec3>& forces) const {
-  if (mechanics_.passes()[pass].add_forces) mechanics_.passes()[pass].add_forces(state, forces);
+void ImplicitEuler::add_forces(std::size_t effect, const State& state, std::vector<Vec3>& forces) const {
+  mechanics_.effects()[effect]->add_forces(state, forces);
 }
 
-void ImplicitEuler::add_seconds(std::vector<Pass>& passes) const {
-  for (std::size_t p = 0; p < passes.size(); ++p) passes[p].seconds += mechanics_.passes()[p].seconds;
+double ImplicitEuler::add_seconds(const std::vector<ActiveEffect>& effects) const {
+  double sum = 0;
+  for (std::size_t p = 0; p < effects.size(); ++p) {
+    effects[p].seconds += mechanics_.effects()[p].seconds;
+    sum += mechanics_.effects()[p].seconds;
+  }
+  return sum;
 }
 
 }  // namespace flexel::simulate

@@ -1,6 +1,6 @@
 // Implicit Euler for stiff bodies: steps that no stability bound limits (docs/theory/time-integration.md).
 //
-// With M the lumped masses, C the damping at u-, E the energy of the models and of every pass at the end of
+// With M the lumped masses, C the damping at u-, E the energy of the models and of every effect at the end of
 // the step, and x~ = u- + dt v-, a step is the least of the incremental potential
 //     1/2 |u - x~|^2_M / dt^2 + 1/2 |u - u-|^2_C / dt + E(u),      v = (u - u-) / dt
 // (Kane, Marsden, Ortiz, West 2000, section 3; Martin, Thomaszewski, Grinspun, Gross 2011, section 3.3),
@@ -27,7 +27,7 @@ class ImplicitEuler {
  public:
   // Refers to `problem`, `plan` and `mass` [kg] (elements) while it lives. `tolerance`: of Newton's residual,
   // relative to the forces.
-  ImplicitEuler(const Problem& problem, const std::vector<Pass>& passes, const KernelEffects& plan,
+  ImplicitEuler(const Problem& problem, const std::vector<ActiveEffect>& effects, const KernelEffects& plan,
                 const std::vector<double>& mass, double tolerance);
   ImplicitEuler(const ImplicitEuler&) = delete;
   ImplicitEuler& operator=(const ImplicitEuler&) = delete;
@@ -53,16 +53,16 @@ class ImplicitEuler {
   // J, what the method itself took: 1/2 |v - v-|^2_M, and what the elastic energy fell short of its work
   // E- - E + grad E(u) . (u - u-). `state`: after the advance.
   [[nodiscard]] double numerical_dissipation(const State& state);
-  // Adds the forces of pass p of the constructor's [N] as the advance took them. `state`: after it.
-  void add_forces(std::size_t pass, const State& state, std::vector<Vec3>& forces) const;
-  // Adds the time that each pass took to `passes`, those of the constructor.
-  void add_seconds(std::vector<Pass>& passes) const;
+  // Adds the forces of effect p of the constructor's [N] as the advance took them. `state`: after it.
+  void add_forces(std::size_t effect, const State& state, std::vector<Vec3>& forces) const;
+  // Adds the time that each effect took within advance() to `effects`, those of the constructor; the sum.
+  double add_seconds(const std::vector<ActiveEffect>& effects) const;
 
  private:
-  [[nodiscard]] std::vector<Pass> all_passes(const std::vector<Pass>& passes);
-  [[nodiscard]] Pass inertia();
-  [[nodiscard]] Pass damping();
-  [[nodiscard]] Pass resisting(const Pass& pass);
+  class EffectOfStep;
+  class Inertia;
+  class StepDamping;
+  [[nodiscard]] std::vector<ActiveEffect> all_effects(const std::vector<ActiveEffect>& effects);
   bool attempt(State& state, double step, double end, const std::function<void(const std::string&)>& progress,
                ImplicitStep& told);
   bool solve(State& trial, NewtonSteps steps, const std::function<void(const std::string&)>& progress,
@@ -75,7 +75,7 @@ class ImplicitEuler {
   const std::vector<double>& tau_;  // (parts) s
   double tolerance_;
   bool damped_ = false;
-  std::size_t outer_passes_;
+  std::size_t outer_effects_;
   double step_ = 0, reach_;     // s
   State before_;                // at the start of the step
   std::vector<Vec3> target_;    // x~, displacements without forces [m]

@@ -100,7 +100,7 @@ struct ChunkView {
 struct StateView {
   double* displacement;        // m
   double* velocity;            // m/s
-  const double* outer;         // N, forces of the passes; null: none
+  const double* outer;         // N, forces of the effects; null: none
   const double* inverse_mass;  // (n) 1/kg; 0: does not move by force
   double* damping_force;       // N, out: that of the damping alone on the owned elements, with `book`
 };

@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "simulate/effects/rigid.h"
 
 namespace flexel::simulate {
 namespace {

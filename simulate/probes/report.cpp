@@ -117,9 +117,9 @@ void measure_stress(const Problem& problem, const State& state, Body& body, Simu
   write_stress_columns(computed, body);
 }
 
-void add_shares(const std::vector<PassShare>& shares, std::vector<PassShare>& all) {
+void add_shares(const std::vector<EffectShare>& shares, std::vector<EffectShare>& all) {
   std::vector<bool> free(all.size(), true);  // two of one name are two
-  for (const PassShare& share : shares) {
+  for (const EffectShare& share : shares) {
     std::size_t i = 0;
     while (i < free.size() && !(free[i] && all[i].name == share.name)) ++i;
     if (i == free.size()) {
@@ -132,13 +132,13 @@ void add_shares(const std::vector<PassShare>& shares, std::vector<PassShare>& al
   }
 }
 
-void explain_times(const std::vector<PassShare>& shares, double seconds, Progress& progress) {
+void explain_times(const std::vector<EffectShare>& shares, double seconds, Progress& progress) {
   double rest = seconds;
   const auto line = [&](const std::string& name, double taken) {
     progress.say(
         fmt::format("time: {:<14} {:8.3f} s {:5.1f} %", name, taken, 100 * taken / std::max(seconds, 1e-9)));
   };
-  for (const PassShare& share : shares) {
+  for (const EffectShare& share : shares) {
     line(share.name, share.seconds);
     rest -= share.seconds;
   }

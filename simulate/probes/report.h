@@ -30,10 +30,10 @@ void refuse_not_finite(const SimulateResult& result, const std::string& scene);
 
 // Adds the times that effects took in one stretch of a run to those of the stretches before: an effect that
 // was there already goes on.
-void add_shares(const std::vector<PassShare>& shares, std::vector<PassShare>& all);
+void add_shares(const std::vector<EffectShare>& shares, std::vector<EffectShare>& all);
 
 // What --explain says after a run of so many seconds: the time of each share, and what is in none of them.
-void explain_times(const std::vector<PassShare>& shares, double seconds, Progress& progress);
+void explain_times(const std::vector<EffectShare>& shares, double seconds, Progress& progress);
 
 // Diagonal of the box around the elements at rest [m].
 [[nodiscard]] double body_extent(const Body& body);

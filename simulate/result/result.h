@@ -44,7 +44,7 @@ struct BondedParts {  // two parts that touch
   double area = 0;  // m^2, over which they do
 };
 
-struct PassShare {  // an effect that ran, why, and how long it took
+struct EffectShare {  // an effect that ran, why, and how long it took
   std::string name, why;
   double seconds = 0;
 };
@@ -92,7 +92,7 @@ struct SimulateResult {
   std::vector<BondedParts> bonds;
   Vec3 imbalance = Vec3::Zero();         // N, sum of loads and reactions; 0 but for the tolerance
   Vec3 moment_imbalance = Vec3::Zero();  // N m, likewise
-  std::vector<PassShare> passes;
+  std::vector<EffectShare> shares;
   std::size_t stray_cells = 0;      // in loose crumbs that were carried along, not simulated
   double largest_displacement = 0;  // m, of the matter (formats/lattice/fields.h)
   Vec3 largest_displacement_at = Vec3::Zero();

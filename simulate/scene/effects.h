@@ -1,48 +1,54 @@
-// The list of effects. A new one is added here and nowhere else.
+// The effects that a scene can name. A new one is a row of effects.cpp, and nothing else knows its name.
 #pragma once
-#include <tuple>
+#include <any>
+#include <map>
+#include <typeindex>
+#include <vector>
 
-#include "simulate/effects/bonds.h"
-#include "simulate/effects/contact.h"
-#include "simulate/effects/damping.h"
-#include "simulate/effects/drag.h"
-#include "simulate/effects/fracture.h"
-#include "simulate/effects/gravity.h"
-#include "simulate/effects/initial_velocity.h"
-#include "simulate/effects/loads.h"
-#include "simulate/effects/plasticity.h"
-#include "simulate/effects/rigid.h"
-#include "simulate/effects/supports.h"
+#include "simulate/effects/effect.h"
+#include "simulate/scene/scene_keys.h"
 
 namespace flexel::simulate {
 
-template <class... E>
-struct EffectList {
-  using Parameters = std::tuple<typename E::Parameters...>;
-
-  static void parse(TableReader& scene, Parameters& parameters) {
-    (E::parse(scene, std::get<typename E::Parameters>(parameters)), ...);
+// What a scene says of each effect E: its E::Parameters, or their defaults where it says nothing.
+class EffectParameters {
+ public:
+  template <class E>
+  [[nodiscard]] typename E::Parameters& get() {
+    std::any& held = held_[typeid(E)];
+    if (!held.has_value()) held = typename E::Parameters{};
+    return std::any_cast<typename E::Parameters&>(held);
+  }
+  template <class E>
+  [[nodiscard]] const typename E::Parameters& get() const {
+    static const typename E::Parameters none{};
+    const auto found = held_.find(typeid(E));
+    return found == held_.end() ? none : std::any_cast<const typename E::Parameters&>(found->second);
   }
 
-  // The passes of the effects that the scene calls for, in the order of the list.
-  [[nodiscard]] static std::vector<Pass> passes(const Parameters& parameters, const Problem& problem) {
-    std::vector<Pass> result;
-    const auto add = [&](auto made) {
-      if (!made) return;
-      if constexpr (requires { made->companion(); }) {
-        auto companion = made->companion();
-        result.push_back(make_pass(std::move(*made)));
-        if (companion) result.push_back(make_pass(std::move(*companion)));
-      } else {
-        result.push_back(make_pass(std::move(*made)));
-      }
-    };
-    (add(E::make(std::get<typename E::Parameters>(parameters), problem)), ...);
-    return result;
-  }
+ private:
+  std::map<std::type_index, std::any> held_;
 };
 
-using Effects = EffectList<Gravity, Loads, Ties, Bonds, Damping, InitialVelocity, Plasticity, Fracture, Drag,
-                           RigidParts, Contact>;
+struct EffectRow {
+  const char* name;
+  const char* help;  // one line
+  ActsIn acts;
+  const char* models;  // of the parts that it acts on
+  // Tables whose removal from a scene leaves this effect out, and a problem that can still be solved.
+  std::vector<std::string> can_leave_out;
+  std::vector<SceneKey> keys;
+  void (*parse)(TableReader& scene, EffectParameters& parameters);
+  void (*make)(const EffectParameters& parameters, const Problem& problem, std::vector<ActiveEffect>& to);
+};
+
+[[nodiscard]] const std::vector<EffectRow>& effect_rows();
+
+// Throws InputError.
+void parse_effects(TableReader& scene, EffectParameters& parameters);
+
+// The effects that the scene calls for, each with the time that making it took. Throws InputError.
+[[nodiscard]] std::vector<ActiveEffect> active_effects(const EffectParameters& parameters,
+                                                       const Problem& problem);
 
 }  // namespace flexel::simulate

@@ -183,6 +183,7 @@ void parse_events(TableReader& root, Scene& scene) {
 Scene parse_scene(const std::string& text, const std::string& name) {
   const SceneValue tree = read_toml(text, name);
   TableReader root(tree, name, "the scene");
+  refuse_unknown_keys(tree, name);
   Scene scene;
   scene.name = name;
   scene.text = text;
@@ -196,7 +197,7 @@ Scene parse_scene(const std::string& text, const std::string& name) {
   }
   scene.run = parse_run(root);
   parse_events(root, scene);
-  Effects::parse(root, scene.effects);
+  parse_effects(root, scene.effects);
   root.finish();
   return scene;
 }

@@ -2,7 +2,7 @@
 // program:
 //     Scene scene;
 //     scene.material = "steel";
-//     scene.get<Ties>().ties.push_back(make_fix(parse_where("xmin", "--fix")));
+//     scene.get<Supports>().ties.push_back(make_fix(parse_where("xmin", "--fix")));
 //     scene.get<Loads>().loads.push_back(make_push(parse_where("part/3", "--push"), {0, 0, -100}));
 #pragma once
 #include <map>
@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "simulate/effects/loads.h"
+#include "simulate/effects/supports.h"
 #include "simulate/events/event.h"
 #include "simulate/input/infill.h"
 #include "simulate/input/materials.h"
@@ -66,15 +68,15 @@ struct Scene {
   RunSettings run;
   std::vector<Event> events;              // ascending in time
   std::vector<std::string> coming_parts;  // that events will add; set when the run begins
-  Effects::Parameters effects;
+  EffectParameters effects;
 
   template <class E>
   [[nodiscard]] typename E::Parameters& get() {
-    return std::get<typename E::Parameters>(effects);
+    return effects.get<E>();
   }
   template <class E>
   [[nodiscard]] const typename E::Parameters& get() const {
-    return std::get<typename E::Parameters>(effects);
+    return effects.get<E>();
   }
 };
 

@@ -32,7 +32,7 @@ void refuse_course(const TimeCurve& course, const std::string& origin, const std
 void refuse_courses(const Scene& scene) {
   for (const Load& load : scene.get<Loads>().loads)
     refuse_course(load.course, load.origin, fmt::format("load \"{}\"", load.name));
-  for (const Tie& tie : scene.get<Ties>().ties)
+  for (const Tie& tie : scene.get<Supports>().ties)
     refuse_course(tie.course, tie.origin, fmt::format("{} \"{}\"", tie.link ? "load" : "move", tie.name));
 }
 
@@ -164,7 +164,7 @@ void check_side(const Load& load, const Body& body, Progress& progress) {
 void check_actions(const Scene& scene, const Body& body, Progress& progress) {
   warn_of_unused_materials(scene, body, progress);
   if (!scene.run.time) refuse_courses(scene);
-  const std::vector<Tie>& ties = scene.get<Ties>().ties;
+  const std::vector<Tie>& ties = scene.get<Supports>().ties;
   if (std::any_of(ties.begin(), ties.end(), [](const Tie& tie) { return tie.is_move; })) {
     const HeldMasks fixes = held_masks(ties, false, body);
     for (const Tie& tie : ties)

@@ -28,9 +28,10 @@ std::vector<double> longest_damping(const Body& body, const std::vector<double>&
 
 }  // namespace
 
-StepBound::StepBound(const Problem& problem, const std::vector<Pass>& passes, const KernelEffects& plan)
+StepBound::StepBound(const Problem& problem, const std::vector<ActiveEffect>& effects,
+                     const KernelEffects& plan)
     : problem_(problem),
-      passes_(passes),
+      effects_(effects),
       plan_(plan),
       cells_(cell_frequencies(problem)),
       stiffening_(cells_.size(), 1),
@@ -50,8 +51,7 @@ void StepBound::look(const State& state, const PaperModel* paper, const std::vec
   stiffening_ = stiffening(problem_, state.displacement, plan_);
   if (paper) connections_ = paper->frequencies(state, mass);
   added_ = 0;
-  for (const Pass& pass : passes_)
-    if (pass.added_frequency) added_ += pass.added_frequency(state, mass);
+  for (const ActiveEffect& effect : effects_) added_ += effect->added_frequency(state, mass);
 }
 
 double StepBound::longest(bool implicit_damping) const {

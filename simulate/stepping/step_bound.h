@@ -11,7 +11,7 @@ namespace flexel::simulate {
 class StepBound {
  public:
   // Keeps references to all.
-  StepBound(const Problem& problem, const std::vector<Pass>& passes, const KernelEffects& plan);
+  StepBound(const Problem& problem, const std::vector<ActiveEffect>& effects, const KernelEffects& plan);
 
   // Whether explicit damping of the cells leaves at least half of the undamped step.
   [[nodiscard]] bool damps_explicitly() const;
@@ -24,7 +24,7 @@ class StepBound {
 
  private:
   const Problem& problem_;
-  const std::vector<Pass>& passes_;
+  const std::vector<ActiveEffect>& effects_;
   const KernelEffects& plan_;
   std::vector<double> cells_, stiffening_, connections_;  // (parts) 1/s^2 at rest, its growth; 1/s^2
   std::vector<double> damping_;                           // (parts) s, the longest time of a cell

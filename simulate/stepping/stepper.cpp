@@ -154,7 +154,7 @@ std::optional<double> Stepper::elastic_energy(const State& state) {
   return outcome.elastic;
 }
 
-Stepper::Shares Stepper::time_shares(const State& state) {
+KernelShares Stepper::time_shares(const State& state) {
   const Memory kept = memory();
   const std::vector<step::ChunkKernel> kernels = kernel_;
   State copy = state;

@@ -51,10 +51,7 @@ class Stepper {
   // What each effect in the hot loop takes of its time, 0 to 1: the loop of the step from `state` with it,
   // and without it and those after it, the quickest of a few. Effects of model `springs` that its loop over
   // connections lacks count as the model's own.
-  struct Shares {
-    double damping = 0, plasticity = 0, fracture = 0;
-  };
-  [[nodiscard]] Shares time_shares(const State& state);
+  [[nodiscard]] KernelShares time_shares(const State& state);
 
   // (elements) kg; a step needs its inverse only, so where nothing else asks for it it can go.
   [[nodiscard]] const std::vector<double>& mass() const { return mass_; }

@@ -157,7 +157,7 @@ void visit(Archive& archive, Checkpoint& c) {
   visit(archive, c.settled);
   visit(archive, c.fused);
   visit(archive, c.bonding_parts);
-  visit(archive, c.memory.passes);
+  visit(archive, c.memory.effects);
   visit(archive, c.ledger.accounts);
   visit(archive, c.ledger.rows);
   visit(archive, c.ledger.probes);

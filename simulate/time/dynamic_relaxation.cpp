@@ -8,6 +8,8 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "simulate/effects/contact.h"
+#include "simulate/effects/rigid.h"
 #include "simulate/probes/report.h"
 #include "simulate/stepping/failure_messages.h"
 
@@ -40,7 +42,7 @@ Settling::Settling(Scene& scene, const Body& body) {
   ramp_ = kRamp * sound;
   const TimeCurve grows{{0, ramp_}, {0, 1}};
   for (Load& load : scene.get<Loads>().loads) load.course = grows;
-  for (Tie& tie : scene.get<Ties>().ties)
+  for (Tie& tie : scene.get<Supports>().ties)
     if (tie.is_move) tie.course = grows;
   double whole = 0;  // s, until the last tool is there
   for (Manipulator& each : scene.get<RigidParts>().manipulators) {
@@ -101,13 +103,12 @@ void Settling::look(const std::function<void(SimulateResult&)>& tell) {
   done_ = summary_.residual <= summary_.tolerance && kinetic_ <= summary_.tolerance * largest_;
 }
 
-void Settling::refuse(const std::vector<Pass>& passes, const std::string& scene) {
-  for (const Pass& pass : passes)
-    if (pass.needs_time && pass.name != Contact::name && pass.name != ContactLosses::name &&
-        pass.name != RigidParts::name && pass.name != Damping::name)
+void Settling::refuse(const std::vector<ActiveEffect>& effects, const std::string& scene) {
+  for (const ActiveEffect& effect : effects)
+    if (effect.acts == ActsIn::time)
       throw InputError(scene, fmt::format("{} ({}) acts in timed runs only: give [run] time = \"1 s\", or "
                                           "leave it out",
-                                          pass.name, pass.why));
+                                          effect.name, effect.why));
 }
 
 void Settling::report(SimulateResult& result) const {

@@ -28,7 +28,7 @@ class Settling {
   Settling(Scene& scene, const Body& body);
 
   // Throws InputError: an effect that means nothing at rest.
-  static void refuse(const std::vector<Pass>& passes, const std::string& scene);
+  static void refuse(const std::vector<ActiveEffect>& effects, const std::string& scene);
   // Before a step: the velocities that it begins with.
   void before(const State& state);
   // After it: what all velocities are to be multiplied by. `tell` gives loads and reactions.

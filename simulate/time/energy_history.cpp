@@ -42,10 +42,10 @@ const char* called(Account::Kind kind) {
   return "stored";
 }
 
-Account::Kind kind_of(Book book) {
-  return book == Book::stored        ? Account::Kind::storage
-         : book == Book::dissipation ? Account::Kind::dissipation
-                                     : Account::Kind::work;
+Account::Kind kind_of(EnergyAccount account) {
+  return account == EnergyAccount::stored        ? Account::Kind::storage
+         : account == EnergyAccount::dissipation ? Account::Kind::dissipation
+                                                 : Account::Kind::work;
 }
 
 }  // namespace
@@ -96,30 +96,31 @@ std::vector<std::pair<std::string, double>> Ledger::sums() const {
           {"largest_term", largest_term}};
 }
 
-EnergyHistory::EnergyHistory(const Problem& problem, const std::vector<Pass>& passes,
+EnergyHistory::EnergyHistory(const Problem& problem, const std::vector<ActiveEffect>& effects,
                              const std::vector<ProbePoints>& probes, const std::vector<double>& mass,
                              const PaperModel* paper, const KernelEffects& plan, Ledger ledger)
     : problem_(problem),
-      passes_(passes),
+      effects_(effects),
       probes_(probes),
       mass_(mass),
       paper_(paper),
       cells_(problem, no_stencil_),
-      forces_(passes.size()),
+      forces_(effects.size()),
       remembers_(plan.remembers()),
       ledger_(std::move(ledger)) {
-  own_.assign(passes.size(), 0);
-  stored_.assign(passes.size(), 0);
+  own_.assign(effects.size(), 0);
+  stored_.assign(effects.size(), 0);
   for (const Part& part : problem.body.parts)
     for (std::uint32_t e = part.element_begin; e < part.element_end; ++e) {
       const Material& material =
           problem.materials[static_cast<std::size_t>(&part - problem.body.parts.data())];
       least_ += kLeastStrain * kLeastStrain * material.young * mass[e] / material.density;
     }
-  for (std::size_t p = 0; p < passes.size(); ++p) {
-    if (!passes[p].add_forces || passes[p].book == Book::potential) continue;
+  for (std::size_t p = 0; p < effects.size(); ++p) {
+    const EnergyAccount account = effects[p]->account();
+    if (account == EnergyAccount::none || account == EnergyAccount::potential) continue;
     forces_[p].assign(problem.body.element_count(), Vec3::Zero());
-    own_[p] = ledger_.account(passes[p].name, kind_of(passes[p].book));
+    own_[p] = ledger_.account(effects[p].name, kind_of(account));
   }
   supports_ = ledger_.account("supports", Account::Kind::work);
   damping_ = ledger_.account("damping", Account::Kind::dissipation);
@@ -128,17 +129,16 @@ EnergyHistory::EnergyHistory(const Problem& problem, const std::vector<Pass>& pa
   ledger_.probes.clear();
   for (const ProbePoints& probe : probes) ledger_.probes.push_back(probe.name);
   ledger_.columns.clear();
-  for (const Pass& pass : passes)
-    ledger_.columns.insert(ledger_.columns.end(), pass.history_columns.begin(), pass.history_columns.end());
+  for (const ActiveEffect& effect : effects)
+    for (std::string& column : effect->history_columns()) ledger_.columns.push_back(std::move(column));
 }
 
 void EnergyHistory::before(const State& state, bool sample, double folding) {
-  for (std::size_t p = 0; p < passes_.size(); ++p) {
-    if (!passes_[p].injected_energy) continue;
-    const double more = passes_[p].injected_energy(state);
+  for (std::size_t p = 0; p < effects_.size(); ++p) {
+    const double more = effects_[p]->injected_energy(state);
     if (more == 0) continue;
     ledger_.accounts[own_[p]].energy -= more;
-    ledger_.accounts[ledger_.account(passes_[p].injected_by, Account::Kind::work)].energy += more;
+    ledger_.accounts[ledger_.account(effects_[p]->injected_by(), Account::Kind::work)].energy += more;
   }
   velocity_ = state.velocity;
   sample_ = sample;
@@ -149,10 +149,10 @@ void EnergyHistory::before(const State& state, bool sample, double folding) {
   // with plasticity, fracture or rest shapes the step tells that of the cells
   elastic_ = (remembers_ ? folding : cells_.energy(state)) + (paper_ ? paper_->energy(state) : 0);
   potential_ = 0;
-  for (std::size_t p = 0; p < passes_.size(); ++p) {
-    if (!passes_[p].energy) continue;
-    if (passes_[p].book == Book::potential) potential_ += passes_[p].energy(state);
-    if (passes_[p].book == Book::stored) stored_[p] = passes_[p].energy(state);
+  for (std::size_t p = 0; p < effects_.size(); ++p) {
+    const EnergyAccount account = effects_[p]->account();
+    if (account == EnergyAccount::potential) potential_ += effects_[p]->energy(state);
+    if (account == EnergyAccount::stored) stored_[p] = effects_[p]->energy(state);
   }
 }
 
@@ -170,7 +170,7 @@ void EnergyHistory::after(const State& state, const StepOutcome& outcome, const 
                                             return forces[e].dot(velocity[e]);
                                           });
     };
-    for (std::size_t p = 0; p < passes_.size(); ++p)
+    for (std::size_t p = 0; p < effects_.size(); ++p)
       if (!forces_[p].empty()) enter(own_[p], forces_[p]);
     enter(supports_, supports);
     enter(damping_, damping);
@@ -201,7 +201,7 @@ void EnergyHistory::enter(const std::vector<Vec3>& moved, const std::vector<Vec3
     ledger_.accounts[account].energy +=
         parallel_sum<double>(forces.size(), [&](std::size_t e) { return forces[e].dot(moved[e]); });
   };
-  for (std::size_t p = 0; p < passes_.size(); ++p)
+  for (std::size_t p = 0; p < effects_.size(); ++p)
     if (!forces_[p].empty()) add(own_[p], forces_[p]);
   add(supports_, supports);
   add(damping_, damping);
@@ -212,8 +212,8 @@ void EnergyHistory::enter(const std::vector<Vec3>& moved, const std::vector<Vec3
 void EnergyHistory::book_stored_by_event() {
   double lacking = ledger_.unstored_now - ledger_.unstored;
   std::optional<std::size_t> store;
-  for (std::size_t p = 0; p < passes_.size(); ++p) {
-    if (passes_[p].book != Book::stored || forces_[p].empty()) continue;
+  for (std::size_t p = 0; p < effects_.size(); ++p) {
+    if (effects_[p]->account() != EnergyAccount::stored || forces_[p].empty()) continue;
     store = own_[p];
     lacking += ledger_.accounts[own_[p]].energy + stored_[p];
   }
@@ -235,8 +235,8 @@ void EnergyHistory::add_row(const State& state, const std::vector<Vec3>& support
   now = {sum.kinetic, elastic_, potential_, 0, 0, 0};
   if (ledger_.changed && !ledger_.rows.empty()) book_stored_by_event();
   double unstored = 0;
-  for (std::size_t p = 0; p < passes_.size(); ++p) {
-    if (passes_[p].book != Book::stored || forces_[p].empty()) continue;
+  for (std::size_t p = 0; p < effects_.size(); ++p) {
+    if (effects_[p]->account() != EnergyAccount::stored || forces_[p].empty()) continue;
     if (!ledger_.start) ledger_.accounts[own_[p]].energy -= stored_[p];  // that it begins with
     if (stored_[p] == 0 && ledger_.accounts[own_[p]].energy != 0) {
       const double left = std::exchange(ledger_.accounts[own_[p]].energy, 0);
@@ -271,9 +271,8 @@ void EnergyHistory::add_row(const State& state, const std::vector<Vec3>& support
     for (const double value : measure(probe, sampled_).displacement) row.probes.push_back(value);
   std::vector<Vec3> unbalanced(problem_.body.element_count(), Vec3::Zero());
   for (std::size_t e = 0; e < supports.size(); ++e) unbalanced[e] = -supports[e];
-  for (const Pass& pass : passes_)
-    if (pass.history_values)
-      for (const double value : pass.history_values(sampled_, unbalanced)) row.values.push_back(value);
+  for (const ActiveEffect& effect : effects_)
+    for (const double value : effect->history_values(sampled_, unbalanced)) row.values.push_back(value);
   ledger_.rows.push_back(std::move(row));
 }
 

@@ -69,15 +69,15 @@ class EnergyHistory {
  public:
   // Refers to all but the ledger, which it goes on with, while it lives. `paper`: of the centre-placed parts;
   // null: there are none.
-  EnergyHistory(const Problem& problem, const std::vector<Pass>& passes,
+  EnergyHistory(const Problem& problem, const std::vector<ActiveEffect>& effects,
                 const std::vector<ProbePoints>& probes, const std::vector<double>& mass,
                 const PaperModel* paper, const KernelEffects& plan, Ledger ledger = {});
 
   // Before a step: keeps the velocities and, where `sample`, the energies of the state. `folding`: of the
   // barriers of cells [J], which those that the step itself tells the energy of do not know.
   void before(const State& state, bool sample, double folding = 0);
-  // The forces of pass p [N] (elements) at the state before the step.
-  [[nodiscard]] std::vector<Vec3>& forces_of(std::size_t pass) { return forces_[pass]; }
+  // The forces of effect p [N] (elements) at the state before the step.
+  [[nodiscard]] std::vector<Vec3>& forces_of(std::size_t effect) { return forces_[effect]; }
   // Likewise of the damping of connections.
   [[nodiscard]] std::vector<Vec3>& connection_damping() { return connection_damping_; }
   // After it: what the stepper says of its energies, the forces of damping and supports [N] (elements; or
@@ -107,19 +107,19 @@ class EnergyHistory {
   void add_row(const State& state, const std::vector<Vec3>& supports);
 
   const Problem& problem_;
-  const std::vector<Pass>& passes_;
+  const std::vector<ActiveEffect>& effects_;
   const std::vector<ProbePoints>& probes_;
   const std::vector<double>& mass_;
   const PaperModel* paper_;
   Stencil no_stencil_;
   Cells cells_;
-  std::vector<std::vector<Vec3>> forces_;  // (passes x elements)
+  std::vector<std::vector<Vec3>> forces_;  // (effects x elements)
   bool remembers_;
   std::vector<Vec3> connection_damping_;  // (elements) or empty
   std::vector<Vec3> velocity_;            // before the step
   Ledger ledger_;
-  std::vector<std::size_t> own_;  // (passes) places in the ledger
-  std::vector<double> stored_;    // (passes) J, in those that store, at the sample
+  std::vector<std::size_t> own_;  // (effects) places in the ledger
+  std::vector<double> stored_;    // (effects) J, in those that store, at the sample
   double least_ = 0;              // J, less is not judged
   std::size_t supports_ = 0, damping_ = 0;
   std::optional<std::size_t> plasticity_, fracture_;

@@ -34,6 +34,29 @@ bool has_cells_of_model_cells(const Problem& problem) {
 
 }  // namespace
 
+// Adds the time of its scope to that of the model, but for what the effects took of it.
+class TimeSegment::ModelTimer {
+ public:
+  explicit ModelTimer(TimeSegment& segment) : segment_(segment), others_(segment.effect_seconds()) {}
+  ~ModelTimer() {
+    const std::chrono::duration<double> all = std::chrono::steady_clock::now() - began_;
+    segment_.kernel_seconds_ += all.count() - (segment_.effect_seconds() - others_);
+  }
+  ModelTimer(const ModelTimer&) = delete;
+  ModelTimer& operator=(const ModelTimer&) = delete;
+
+ private:
+  TimeSegment& segment_;
+  double others_;
+  std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
+};
+
+double TimeSegment::effect_seconds() const {
+  double sum = 0;
+  for (const ActiveEffect& effect : effects_) sum += effect.seconds;
+  return sum;
+}
+
 TimeSegment::TimeSegment(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress,
                          const SegmentStart& beginning, State state)
     : body_(body),
@@ -41,25 +64,16 @@ TimeSegment::TimeSegment(Body& body, const Scene& scene, const SimulateOptions& 
       progress_(progress),
       problem_(timed_problem(body, scene, beginning)),
       probes_(place_probes(scene, problem_)),
-      passes_(Effects::passes(scene.effects, problem_)),
+      effects_(active_effects(scene.effects, problem_)),
       state_(std::move(state)) {
   const bool fresh = beginning.fresh;
-  if (!beginning.fused.empty()) passes_.push_back(make_pass(FusedPoints(body, beginning.fused)));
+  if (!beginning.fused.empty()) effects_.push_back(activate(FusedPoints(body, beginning.fused)));
   if (fresh) report_materials(problem_, progress_);
   name_materials(body_, problem_.materials);
-  plan_.damping.assign(body.parts.size(), 0);
-  for (Pass& pass : passes_) {
-    if (pass.compose) pass.compose(plan_);
-    if (pass.start && fresh) pass.start(state_);
-    if (pass.begin) pass.begin(state_);
-    if (pass.constrain) pass.constrain(constraints_);
-    for (const auto& [name, transfer_state] : beginning.transferred_states)
-      if (pass.restore_from && name == pass.name) pass.restore_from(transfer_state);
-  }
-  plan_.rest_shapes = RestShapes(body).any();
-  plan_.broken_springs = body.cell_columns.contains("broken_springs");
+  configure_kernel();
+  begin_effects(beginning);
   refuse_held_rigid();
-  bound_.emplace(problem_, passes_, plan_);
+  bound_.emplace(problem_, effects_, plan_);
   // Explicit damping may cut the step by 2; beyond that every step solves for it.
   const bool implicit = scene.run.method == TimeMethod::implicit_euler;
   const bool by_steps =
@@ -75,10 +89,32 @@ TimeSegment::TimeSegment(Body& body, const Scene& scene, const SimulateOptions& 
     guard_.emplace(problem_);
 }
 
+// The effects are asked in any order, and then whether what all have asked suffices.
+void TimeSegment::configure_kernel() {
+  plan_.damping.assign(body_.parts.size(), 0);
+  plan_.rest_shapes = RestShapes(body_).any();
+  plan_.broken_springs = body_.cell_columns.contains("broken_springs");
+  for (const ActiveEffect& effect : effects_) effect->configure_kernel(plan_);
+  for (const ActiveEffect& effect : effects_) effect->check_kernel(plan_);
+}
+
+void TimeSegment::begin_effects(const SegmentStart& beginning) {
+  if (beginning.fresh)
+    for (const ActiveEffect& effect : effects_) effect->add_initial_state(state_);
+  if (beginning.fresh)
+    for (const ActiveEffect& effect : effects_) effect->start(state_);
+  for (const ActiveEffect& effect : effects_) {
+    effect->begin(state_);
+    effect->constrain(constraints_);
+    for (const auto& [name, transferred] : beginning.transferred_states)
+      if (name == effect.name) effect->restore_from(transferred);
+  }
+}
+
 void TimeSegment::spare_mass() {
   const bool asked = paper_ || implicit_ || euler_ || !constraints_.mask.empty() ||
-                     std::any_of(passes_.begin(), passes_.end(),
-                                 [](const Pass& pass) { return pass.added_frequency || pass.finish_step; });
+                     std::any_of(effects_.begin(), effects_.end(),
+                                 [](const ActiveEffect& effect) { return effect->needs_mass(); });
   if (!asked) stepper_->drop_mass();
 }
 
@@ -101,18 +137,17 @@ void TimeSegment::make_implicit() {
   if (!plan_.plasticity.empty()) refuse("[plasticity]");
   if (!plan_.fracture.empty()) refuse("[fracture]");
   if (paper_damped_) refuse("[damping] of model \"paper\"");
-  for (const Pass& pass : passes_)
-    if (pass.finish_step || pass.needs_step_recheck || (pass.add_forces && !pass.energy && !pass.resistance))
-      refuse(fmt::format("{} ({})", pass.name, pass.why));
-  euler_.emplace(problem_, passes_, plan_, stepper_->mass(), scene_.run.tolerance);
+  for (const ActiveEffect& effect : effects_)
+    if (!effect->takes_implicit_steps()) refuse(fmt::format("{} ({})", effect.name, effect.why));
+  euler_.emplace(problem_, effects_, plan_, stepper_->mass(), scene_.run.tolerance);
 }
 
 void TimeSegment::make_forces() {
-  for (const Pass& pass : passes_) {
-    if (!pass.add_forces) continue;
+  for (const ActiveEffect& effect : effects_) {
+    if (effect->account() == EnergyAccount::none) continue;
     if (steady_.empty()) steady_.assign(body_.element_count(), Vec3::Zero());
-    if (pass.constant) pass.add_forces(state_, steady_);
-    varies_ = varies_ || !pass.constant;
+    if (effect->constant()) effect->add_forces(state_, steady_);
+    varies_ = varies_ || !effect->constant();
   }
   for (std::size_t p = 0; p < body_.parts.size(); ++p) {
     if (body_.parts[p].placement != Placement::centre) continue;
@@ -124,15 +159,16 @@ void TimeSegment::make_forces() {
 }
 
 std::unique_ptr<EnergyHistory> TimeSegment::make_history(Ledger ledger) const {
-  auto history = std::make_unique<EnergyHistory>(problem_, passes_, probes_, stepper_->mass(),
+  auto history = std::make_unique<EnergyHistory>(problem_, effects_, probes_, stepper_->mass(),
                                                  paper_ ? &*paper_ : nullptr, plan_, std::move(ledger));
-  for (std::size_t p = 0; p < passes_.size(); ++p)
-    if (passes_[p].constant && !history->forces_of(p).empty())
-      passes_[p].add_forces(state_, history->forces_of(p));
+  for (std::size_t p = 0; p < effects_.size(); ++p)
+    if (effects_[p]->constant() && !history->forces_of(p).empty())
+      effects_[p]->add_forces(state_, history->forces_of(p));
   return history;
 }
 
 void TimeSegment::look() {
+  const ModelTimer timer(*this);
   stepper_->mark_broken(body_.broken);
   bound_->look(state_, paper_ ? &*paper_ : nullptr, stepper_->mass());
   if (guard_)
@@ -189,9 +225,8 @@ void TimeSegment::adapt_step(Clock& clock) {
 
 bool TimeSegment::needs_step_recheck() const {
   if (guard_ && guard_->needs_step_recheck()) return true;
-  return std::any_of(passes_.begin(), passes_.end(), [&](const Pass& pass) {
-    return pass.needs_step_recheck && pass.needs_step_recheck(state_);
-  });
+  return std::any_of(effects_.begin(), effects_.end(),
+                     [&](const ActiveEffect& effect) { return effect->needs_step_recheck(state_); });
 }
 
 // Calls add(outer_); where the books want to know, `own` (elements) becomes what it added. So the sum, and
@@ -203,23 +238,22 @@ void TimeSegment::add_apart(std::vector<Vec3>* own, const Add& add) {
   if (own) parallel_for_each(own->size(), [&](std::size_t e) { (*own)[e] = outer_[e] - (*own)[e]; });
 }
 
-// Forces of the passes at the present state; with a history also one by one, those that are constant but
+// Forces of the effects at the present state; with a history also one by one, those that are constant but
 // once.
 void TimeSegment::sum_forces(EnergyHistory* history) {
   const bool guarded = guard_ && guard_->watches();
   if (!varies_ && !guarded) return;
   outer_ = steady_;
   if (outer_.empty()) outer_.assign(body_.element_count(), Vec3::Zero());
-  for (std::size_t p = 0; p < passes_.size(); ++p) {
-    Pass& pass = passes_[p];
-    if (!pass.add_forces || pass.constant) continue;
-    const PassTimer timer(pass.seconds);
+  for (std::size_t p = 0; p < effects_.size(); ++p) {
+    const ActiveEffect& effect = effects_[p];
+    if (effect.untimed().account() == EnergyAccount::none || effect.untimed().constant()) continue;
     add_apart(history && !history->forces_of(p).empty() ? &history->forces_of(p) : nullptr,
-              [&](std::vector<Vec3>& sum) { pass.add_forces(state_, sum); });
+              [&](std::vector<Vec3>& sum) { effect->add_forces(state_, sum); });
   }
   if (paper_) add_connection_forces(history);
   if (!guarded) return;
-  const PassTimer timer(kernel_seconds_);
+  const ScopeTimer timer(kernel_seconds_);
   guard_->add_forces(state_, outer_);
 }
 
@@ -228,7 +262,7 @@ const std::vector<Vec3>& TimeSegment::outer() const {
 }
 
 void TimeSegment::add_connection_forces(EnergyHistory* history) {
-  const PassTimer timer(paper_seconds_);
+  const ScopeTimer timer(paper_seconds_);
   if (const PaperModel::SmallestVolume least = paper_->smallest_volume(state_); !(least.value > 0))
     throw DivergedError(folds_at("an element", body_.rest[least.element]));
   paper_->add_forces(state_, outer_);
@@ -238,7 +272,7 @@ void TimeSegment::add_connection_forces(EnergyHistory* history) {
 }
 
 void TimeSegment::step_implicitly(Clock& clock, EnergyHistory* history, bool row) {
-  const PassTimer timer(kernel_seconds_);
+  const ModelTimer timer(*this);
   if (history && row) history->add_row_of(state_, euler_->supports());
   if (renews(clock)) euler_->forget();
   const double end = clock.epoch + static_cast<double>(clock.in_epoch + 1) * clock.step;
@@ -256,7 +290,7 @@ void TimeSegment::step_implicitly(Clock& clock, EnergyHistory* history, bool row
           told.trouble, squeezed_most(problem_, state_)));
     held_->settle(state_, euler_->supports());
     if (!history) continue;
-    for (std::size_t p = 0; p < passes_.size(); ++p)
+    for (std::size_t p = 0; p < effects_.size(); ++p)
       if (std::vector<Vec3>& own = history->forces_of(p); !own.empty()) {
         std::fill(own.begin(), own.end(), Vec3::Zero());
         euler_->add_forces(p, state_, own);
@@ -281,15 +315,13 @@ TimeSegment::Memory TimeSegment::memory() const {
     memory.reach = euler_->reach();
     memory.supports = euler_->supports();
   }
-  for (const Pass& pass : passes_)
-    memory.passes.push_back(pass.memory ? pass.memory() : std::vector<double>());
+  for (const ActiveEffect& effect : effects_) memory.effects.push_back(effect->memory());
   return memory;
 }
 
 std::vector<std::pair<std::string, std::vector<double>>> TimeSegment::transferred_states() const {
   std::vector<std::pair<std::string, std::vector<double>>> kept;
-  for (const Pass& pass : passes_)
-    if (pass.transfer_state) kept.emplace_back(pass.name, pass.transfer_state());
+  for (const ActiveEffect& effect : effects_) kept.emplace_back(effect.name, effect->transfer_state());
   return kept;
 }
 
@@ -304,8 +336,8 @@ void TimeSegment::restore(const Memory& memory) {
     throw InputError("the checkpoint's memory is not that of its scene and body: it is damaged");
   stepper_->restore(memory.cells);
   stepper_->mark_broken(body_.broken);
-  for (std::size_t p = 0; p < passes_.size() && p < memory.passes.size(); ++p)
-    if (passes_[p].restore) passes_[p].restore(memory.passes[p]);
+  for (std::size_t p = 0; p < effects_.size() && p < memory.effects.size(); ++p)
+    effects_[p]->restore(memory.effects[p]);
   if (implicit_) implicit_->set_change(memory.damping_change);
   if (!euler_) return;
   euler_->set_reach(memory.reach);
@@ -324,7 +356,7 @@ void TimeSegment::step(Clock& clock, EnergyHistory* history, bool row) {
   StepOutcome outcome;
   const double end = clock.epoch + static_cast<double>(clock.in_epoch + 1) * clock.step;
   {
-    const PassTimer timer(kernel_seconds_);
+    const ScopeTimer timer(kernel_seconds_);
     const std::vector<Vec3>& forces = outer();
     outcome = implicit_ ? implicit_->advance(state_, forces, advance, end)
                         : stepper_->advance(state_, forces, advance);
@@ -336,13 +368,12 @@ void TimeSegment::step(Clock& clock, EnergyHistory* history, bool row) {
   ++clock.steps;
   state_.time = end;
   held_->impose(state_, stepper_->mass(), advance);
-  for (const Pass& pass : passes_)
-    if (pass.finish_step) pass.finish_step(state_, {stepper_->mass(), advance.kick, advance.drift});
+  for (const ActiveEffect& effect : effects_)
+    effect->finish_step(state_, {stepper_->mass(), advance.kick, advance.drift});
   if (history) {
     std::vector<Vec3> supports(body_.element_count(), Vec3::Zero());
     held_->add_forces(supports);
-    for (const Pass& pass : passes_)
-      if (pass.add_support_forces) pass.add_support_forces(supports);
+    for (const ActiveEffect& effect : effects_) effect->add_support_forces(supports);
     history->after(state_, outcome, stepper_->damping_force(), supports, first ? 0 : clock.previous,
                    clock.step, before == 0);
   }
@@ -353,14 +384,13 @@ void TimeSegment::step(Clock& clock, EnergyHistory* history, bool row) {
 void TimeSegment::slow(double factor) {
   const StopWaits whole;
   parallel_for_each(state_.velocity.size(), [&](std::size_t e) { state_.velocity[e] *= factor; });
-  for (const Pass& pass : passes_)
-    if (pass.begin) pass.begin(state_);
+  for (const ActiveEffect& effect : effects_) effect->begin(state_);
 }
 
 bool TimeSegment::kicks() const {
   return !euler_ && !implicit_ && scene_.run.method != TimeMethod::explicit_euler &&
-         std::none_of(passes_.begin(), passes_.end(),
-                      [](const Pass& pass) { return bool(pass.finish_step); });
+         std::none_of(effects_.begin(), effects_.end(),
+                      [](const ActiveEffect& effect) { return effect->finishes_steps(); });
 }
 
 void TimeSegment::kick(double time) {

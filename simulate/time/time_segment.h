@@ -36,7 +36,7 @@ struct SegmentStart {
   std::vector<Vec3> settled = {};        // Problem::settled
   std::vector<FusedPoint> fused = {};    // by events so far
   std::size_t bonding_parts = SIZE_MAX;  // Problem::bonding_parts
-  // What passes hand over, by their names, across an event.
+  // What effects hand over, by their names, across an event.
   std::vector<std::pair<std::string, std::vector<double>>> transferred_states = {};
 };
 
@@ -66,10 +66,10 @@ class TimeSegment {
   // What the next steps depend on besides state() and the clock; only where renews() says so.
   struct Memory {
     Stepper::Memory cells;
-    std::vector<Vec3> damping_change;         // m/s, of ImplicitDamping
-    double reach = 0;                         // s, of ImplicitEuler
-    std::vector<Vec3> supports;               // N, of its last step
-    std::vector<std::vector<double>> passes;  // what each remembers
+    std::vector<Vec3> damping_change;          // m/s, of ImplicitDamping
+    double reach = 0;                          // s, of ImplicitEuler
+    std::vector<Vec3> supports;                // N, of its last step
+    std::vector<std::vector<double>> effects;  // what each remembers
   };
   [[nodiscard]] Memory memory() const;
   // Throws InputError("", ...): it is that of another act.
@@ -110,7 +110,7 @@ class TimeSegment {
   void report(const Clock& clock, bool stress, SimulateResult& result);
 
   [[nodiscard]] const State& state() const { return state_; }
-  [[nodiscard]] const std::vector<Pass>& passes() const { return passes_; }
+  [[nodiscard]] const std::vector<ActiveEffect>& effects() const { return effects_; }
   [[nodiscard]] const Stepper& stepper() const { return *stepper_; }
   // A step solves for the velocity at its end: it may take seconds.
   [[nodiscard]] bool solves() const { return implicit_.has_value(); }
@@ -119,6 +119,10 @@ class TimeSegment {
   [[nodiscard]] std::unique_ptr<EnergyHistory> make_history(Ledger ledger) const;
 
  private:
+  class ModelTimer;
+  void configure_kernel();
+  void begin_effects(const SegmentStart& beginning);
+  [[nodiscard]] double effect_seconds() const;
   void make_forces();
   void make_implicit();
   void refuse_held_rigid() const;
@@ -128,7 +132,7 @@ class TimeSegment {
   template <class Add>
   void add_apart(std::vector<Vec3>* own, const Add& add);
   void sum_forces(EnergyHistory* history);
-  // Forces of the passes at the present state; none: empty.
+  // Forces of the effects at the present state; none: empty.
   [[nodiscard]] const std::vector<Vec3>& outer() const;
   void add_connection_forces(EnergyHistory* history);
 
@@ -137,7 +141,7 @@ class TimeSegment {
   Progress& progress_;
   Problem problem_;
   std::vector<ProbePoints> probes_;
-  std::vector<Pass> passes_;
+  std::vector<ActiveEffect> effects_;
   KernelEffects plan_;
   Constraints constraints_;
   State state_;
@@ -150,7 +154,7 @@ class TimeSegment {
   std::function<void(const std::string&)> hear_ = [](const std::string&) {};
   std::optional<StepBound> bound_;
   std::optional<ExplicitBarrier> guard_;  // of explicit steps of model `cells`
-  std::vector<Vec3> steady_, outer_;      // (elements) N, of the passes that are constant; of all
+  std::vector<Vec3> steady_, outer_;      // (elements) N, of the effects that are constant; of all
   bool varies_ = false;
   double kernel_seconds_ = 0, paper_seconds_ = 0;
   int newton_iterations_ = 0, cg_iterations_ = 0;

@@ -1,4 +1,5 @@
 // Between an act and what is around it: what it is made from, what it leaves in the body, its plan in words.
+#include "simulate/effects/rigid.h"
 #include "simulate/time/time_segment.h"
 
 #include <fmt/format.h>
@@ -56,7 +57,8 @@ void TimeSegment::explain(const Clock& clock) const {
   if (solves())
     progress_.say(
         "plan: every step solves for the damping, which taken explicitly would cut it by more than 2");
-  for (const Pass& pass : passes_) progress_.say(fmt::format("plan: {} ({})", pass.name, pass.why));
+  for (const ActiveEffect& effect : effects_)
+    progress_.say(fmt::format("plan: {} ({})", effect.name, effect.why));
   for (const Event& event : scene_.events)
     progress_.say(fmt::format("plan: at {:.4g} s {} ({})", event.at, event.name, event.origin));
 }

@@ -3,9 +3,6 @@
 
 #include <algorithm>
 
-#include "simulate/effects/damping.h"
-#include "simulate/effects/fracture.h"
-#include "simulate/effects/plasticity.h"
 #include "simulate/probes/report.h"
 #include "simulate/time/time_segment.h"
 
@@ -15,8 +12,7 @@ void TimeSegment::tell_forces(SimulateResult& result) const {
   std::vector<Vec3> unbalanced(body_.element_count(), Vec3::Zero());
   held_->add_forces(unbalanced);
   for (Vec3& force : unbalanced) force = -force;
-  for (const Pass& pass : passes_)
-    if (pass.report) pass.report(state_, unbalanced, result);
+  for (const ActiveEffect& effect : effects_) effect->report(state_, unbalanced, result);
 }
 
 void TimeSegment::report(const Clock& clock, bool stress, SimulateResult& result) {
@@ -39,36 +35,34 @@ void TimeSegment::report(const Clock& clock, bool stress, SimulateResult& result
   for (const std::string& warning : warnings_of(result)) progress_.warn(scene_.name + ": " + warning);
 }
 
-// Of the time of the hot loop, to each pass in it the share that it has of a step from the present state.
+// Of the time of the hot loop, to each effect in it the share that it has of a step from the present state.
 void TimeSegment::tell_loop_apart() {
   if (euler_ || !(kernel_seconds_ > 0)) return;
-  const auto give = [&](const char* name, double seconds) {
-    for (Pass& pass : passes_)
-      if (pass.name == name) {
-        pass.seconds += seconds;
-        kernel_seconds_ -= seconds;
-      }
-  };
-  if (implicit_) give(Damping::name, implicit_->seconds());
-  const Stepper::Shares shares = stepper_->time_shares(state_);
-  const double loop = kernel_seconds_;
-  if (!implicit_) give(Damping::name, loop * shares.damping);
-  give(Plasticity::name, loop * shares.plasticity);
-  give(Fracture::name, loop * shares.fracture);
+  KernelShares shares = stepper_->time_shares(state_);
+  double loop = kernel_seconds_;
+  if (implicit_) {  // damping is solved for beside the loop
+    loop -= implicit_->seconds();
+    shares.damping = implicit_->seconds() / loop;
+  }
+  for (const ActiveEffect& effect : effects_) {
+    const double seconds = loop * effect->kernel_share(shares);
+    effect.seconds += seconds;
+    kernel_seconds_ -= seconds;
+  }
 }
 
 void TimeSegment::add_effort(SimulateResult& result, bool explained) {
   if (explained) tell_loop_apart();
   result.newton_iterations += newton_iterations_;
   result.cg_iterations += cg_iterations_;
-  if (euler_) euler_->add_seconds(passes_);
-  std::vector<PassShare> shares{{"cells",
-                                 euler_ ? "model of every part, Newton's method and its linear solver"
-                                        : fmt::format("model of every part, kernel {}", stepper_->isa()),
-                                 kernel_seconds_}};
+  if (euler_) kernel_seconds_ -= euler_->add_seconds(effects_);
+  std::vector<EffectShare> shares{{"cells",
+                                   euler_ ? "model of every part, Newton's method and its linear solver"
+                                          : fmt::format("model of every part, kernel {}", stepper_->isa()),
+                                   kernel_seconds_}};
   if (paper_) shares.push_back({"connections", "model of centre-placed parts", paper_seconds_});
-  for (const Pass& pass : passes_) shares.push_back({pass.name, pass.why, pass.seconds});
-  add_shares(shares, result.passes);
+  for (const ActiveEffect& effect : effects_) shares.push_back({effect.name, effect.why, effect.seconds});
+  add_shares(shares, result.shares);
 }
 
 }  // namespace flexel::simulate

@@ -15,6 +15,7 @@
 #include "base/program/termination.h"
 #include "base/stop.h"
 #include "formats/lattice/body_file.h"
+#include "simulate/effects/contact.h"
 #include "simulate/live/live_link.h"
 #include "simulate/models/damping_factors.h"
 #include "simulate/models/rest_shape.h"
@@ -119,7 +120,7 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
   if (!options.history.empty())
     history_ = segment_->make_history(options.resume ? options.resume->ledger : Ledger{});
   segment_->set_hear([this](const std::string& note) { listen(note); });
-  if (settling_) Settling::refuse(segment_->passes(), scene_.name);
+  if (settling_) Settling::refuse(segment_->effects(), scene_.name);
 }
 
 void TimedRun::resume(const Checkpoint& from) {
@@ -257,7 +258,7 @@ SimulateResult TimedRun::report() {
   if (!start_.fused.empty())
     progress_.say(fmt::format("{} fused points hold in this run only: a later one has to fuse again",
                               start_.fused.size()));
-  if (options_.explain) explain_times(result.passes, result.seconds, progress_);
+  if (options_.explain) explain_times(result.shares, result.seconds, progress_);
   return result;
 }
 

@@ -82,7 +82,7 @@ TEST(Actions, TheInwardNormalIsAgainstTheAreaVector) {
   ASSERT_EQ(loads.size(), 2u);
   EXPECT_LT((*loads[0].force - Vec3(0, 0, -50)).norm(), 1e-12);
   EXPECT_EQ(*loads[1].pressure, 3);
-  EXPECT_EQ(scene.get<simulate::Ties>().ties.size(), 1u);
+  EXPECT_EQ(scene.get<simulate::Supports>().ties.size(), 1u);
 }
 
 // A slanted top: its polygon looks 45 degrees away from z, but "zmax" is a side, whose push is along z.
@@ -96,7 +96,7 @@ TEST(Actions, APushOnASideGoesAlongItsAxis) {
   const std::vector<simulate::Load>& loads = scene.get<simulate::Loads>().loads;
   EXPECT_EQ(*loads[0].force, Vec3(0, 0, -50));
   EXPECT_LT((*loads[1].force - 50 * Vec3(1, 0, -1).normalized()).norm(), 1e-12);
-  EXPECT_EQ(scene.get<simulate::Ties>().ties[0].motion.translation, Vec3(0, 0, -2e-3));
+  EXPECT_EQ(scene.get<simulate::Supports>().ties[0].motion.translation, Vec3(0, 0, -2e-3));
 }
 
 TEST(Actions, TorquesAndTwistsTurnAboutTheOutwardNormal) {
@@ -110,7 +110,7 @@ TEST(Actions, TorquesAndTwistsTurnAboutTheOutwardNormal) {
   const std::vector<simulate::Load>& loads = scene.get<simulate::Loads>().loads;
   EXPECT_LT((*loads[0].torque - Vec3(0, 0, 5)).norm(), 1e-12);
   EXPECT_LT((*loads[1].torque - Vec3(1, 2, 3)).norm(), 1e-12);
-  const std::vector<simulate::Tie>& ties = scene.get<simulate::Ties>().ties;
+  const std::vector<simulate::Tie>& ties = scene.get<simulate::Supports>().ties;
   EXPECT_TRUE(ties[0].is_move && ties[1].is_move);
   EXPECT_LT((ties[0].motion.axis - Vec3::UnitZ()).norm(), 1e-12);
   EXPECT_LT((ties[0].motion.through - Vec3(0.5, 0.5, 1)).norm(), 1e-12);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "flexel/actions.h"
+#include "simulate/effects/gravity.h"
 
 namespace flexel::commands {
 namespace {
@@ -13,15 +14,15 @@ TEST(SceneText, IsReadAsTheSame) {
   scene.material = "PLA";
   scene.infill = {0.2, 1.0 / 3000};
   scene.parts["a \"b\""].material = "steel";
-  scene.get<simulate::Ties>().ties.push_back(simulate::make_fix(simulate::parse_where(
+  scene.get<simulate::Supports>().ties.push_back(simulate::make_fix(simulate::parse_where(
       "{ sphere = { centre = [\"1 mm\", \"0 mm\", \"0 mm\"], radius = \"5 mm\" } }", "--fix")));
-  scene.get<simulate::Ties>().ties.push_back(
+  scene.get<simulate::Supports>().ties.push_back(
       simulate::make_move(simulate::parse_where("[\"xmin\", \"part/3\"]", "--move"), Vec3(1e-3, 0, 1.0 / 3)));
   simulate::Tie twist = simulate::make_move(simulate::parse_where("xmax", "--twist"), Vec3::Zero());
   twist.motion.axis = Vec3(1, 2, 2) / 3;
   twist.motion.through = Vec3(0.1, 0.2, 0.3);
   twist.motion.angle = 0.1;
-  scene.get<simulate::Ties>().ties.push_back(twist);
+  scene.get<simulate::Supports>().ties.push_back(twist);
   add_bearing(scene, parse_bearing("part/3: 0 0 -200 N"));
   scene.get<simulate::Loads>().loads.push_back(
       simulate::make_pressure(simulate::parse_where("zmax", "--push"), 2e6));
@@ -38,7 +39,7 @@ TEST(SceneText, IsReadAsTheSame) {
   EXPECT_EQ(*again.infill.share, 0.2);
   EXPECT_EQ(*again.infill.shell, 1.0 / 3000);
   EXPECT_EQ(again.parts.at("a \"b\"").material, "steel");
-  const auto &ties = again.get<simulate::Ties>().ties, &wanted = scene.get<simulate::Ties>().ties;
+  const auto &ties = again.get<simulate::Supports>().ties, &wanted = scene.get<simulate::Supports>().ties;
   ASSERT_EQ(ties.size(), wanted.size());
   EXPECT_EQ(ties[0].where.radius, 5e-3);
   EXPECT_EQ(ties[1].motion.translation, wanted[1].motion.translation);

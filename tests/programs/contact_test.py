@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import sys
 
 from harness import BIN, SOURCE, binary_stl, box_triangles, expect, expect_error, expect_ok, main, run, scene, write
@@ -53,6 +54,15 @@ def test_a_glued_tool_lifts_the_part():
     two_blocks()
     expect(abs(lifted("")) < 1e-5, "without glue the part stays")
     expect(abs(lifted("glue = true") - 2e-3) < 2e-4, "with glue it comes along")
+
+
+def test_explain_tells_the_whole_time_of_contact():
+    two_blocks()
+    scene("lift.toml", LIFT.replace("GLUE", "glue = true"))
+    lines = expect_ok(run("flexel-simulate", "lift.toml", "body.vtu", "-o", "lifted.vtu", "--explain", "--threads", "1")).err
+    shares = {name.strip(): float(share) for name, share in re.findall(r"time: (.+?) +[0-9.]+ s +([0-9.]+) %", lines)}
+    expect(abs(sum(shares.values()) - 100) < 1, f"the shares do not add up to the run: {shares}")
+    expect(shares["contact"] + shares["contact friction"] > 60, f"contact takes most of this run: {shares}")
 
 
 def test_refusals():

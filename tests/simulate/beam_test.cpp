@@ -28,7 +28,7 @@ Scene cantilever(double poisson, const Vec3& force) {
   Scene scene;
   scene.materials["gum"] = {"gum", 12.1e5, poisson, 580, "test"};
   scene.material = "gum";
-  scene.get<Ties>().ties.push_back(make_fix(select_by_name("xmin")));
+  scene.get<Supports>().ties.push_back(make_fix(select_by_name("xmin")));
   scene.get<Loads>().loads.push_back(make_push(select_by_name("box/x1"), force));
   Probe tip;
   tip.name = "tip";
@@ -116,7 +116,7 @@ TEST(Beam, PlateBendsFarPastItsThicknessInFewIterations) {
   options.spacing = Vec3(0.01, 0.01, 0.004);
   Body body = box_body(options);
   Scene scene = cantilever(0.3, Vec3(0, 0, -0.1));
-  scene.get<Ties>().ties.push_back(make_fix(select_by_name("box/y0")));
+  scene.get<Supports>().ties.push_back(make_fix(select_by_name("box/y0")));
   const SimulateResult result = simulate_quietly(body, scene);
   EXPECT_GT(result.largest_displacement, 10 * 0.004);
   EXPECT_EQ(result.load_steps, 1);

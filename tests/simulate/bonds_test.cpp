@@ -6,6 +6,9 @@
 
 #include "base/error.h"
 #include "formats/lattice/merge.h"
+#include "simulate/effects/bonds.h"
+#include "simulate/effects/contact.h"
+#include "simulate/effects/gravity.h"
 #include "simulate/matter/interface_points.h"
 #include "simulate/result/result.h"
 #include "simulate/scene/scene.h"
@@ -44,7 +47,7 @@ Scene pull(const Vec3& force) {
   Scene scene;
   scene.materials["gum"] = {"gum", 12.1e5, 0.3, 580, "test"};
   scene.material = "gum";
-  scene.get<Ties>().ties.push_back(make_fix(select_by_name("xmin")));
+  scene.get<Supports>().ties.push_back(make_fix(select_by_name("xmin")));
   scene.get<Loads>().loads.push_back(make_push(select_by_name("xmax"), force));
   Probe tip;
   tip.where = select_by_name("xmax");
@@ -162,11 +165,11 @@ TEST(Bonds, RotationOfBondedPartsIsFree) {
   Body body = bonded_bar(false, 3);
   Scene scene = pull(Vec3::Zero());
   scene.get<Loads>().loads.clear();
-  scene.get<Ties>().ties.clear();
+  scene.get<Supports>().ties.clear();
   Tie tie = make_move(select_by_name("near/xmin"), Vec3::Zero());
   tie.motion.axis = Vec3(1, 2, 3).normalized();
   tie.motion.angle = 1;
-  scene.get<Ties>().ties.push_back(tie);
+  scene.get<Supports>().ties.push_back(tie);
   const SimulateResult result = simulate_quietly(body, scene);
   for (std::size_t e = 0; e < body.element_count(); ++e)
     EXPECT_LT((body.position[e] - body.rest[e] - tie.motion.displacement(body.rest[e], 1)).norm(), 1e-6);

@@ -47,13 +47,13 @@ Scene held_scene() {
   Scene scene;
   scene.materials["gum"] = {"gum", kGumYoung, 0.3, 580, "test"};
   scene.material = "gum";
-  scene.get<Ties>().ties.push_back(make_fix(select_by_name("near/x0")));
+  scene.get<Supports>().ties.push_back(make_fix(select_by_name("near/x0")));
   Selection ball;
   ball.kind = Selection::Kind::sphere;
   ball.radius = 0.3;
   Tie slide = make_fix(ball);
   slide.axes = {true, false, true};
-  scene.get<Ties>().ties.push_back(slide);
+  scene.get<Supports>().ties.push_back(slide);
   return scene;
 }
 
@@ -77,8 +77,8 @@ class CellStiffnessOf : public ::testing::TestWithParam<TangentCase> {
       : body_(two_boxes()),
         scene_(held_scene()),
         problem_{body_, materials_of_parts(scene_, body_), {}, {}, {}, {}},
-        stored_(problem_, Effects::passes(scene_.effects, problem_), StiffnessStorage::stored),
-        made_(problem_, Effects::passes(scene_.effects, problem_), StiffnessStorage::made) {
+        stored_(problem_, active_effects(scene_.effects, problem_), StiffnessStorage::stored),
+        made_(problem_, active_effects(scene_.effects, problem_), StiffnessStorage::made) {
     State state{random_vectors(body_.element_count(), GetParam().size), 1};
     for (std::size_t e = 0; e < body_.element_count(); ++e)
       state.displacement[e] -= GetParam().squeeze * body_.rest[e];

@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "formats/lattice/merge.h"
+#include "simulate/effects/gravity.h"
 #include "simulate/matter/interface_points.h"
 #include "simulate/matter/interpolation_weights.h"
 #include "tests/simulate/scene_case.h"
@@ -32,7 +33,7 @@ CentreOptions bar_of_voxels(std::array<int, 3> voxels = {8, 3, 3}) {
 }
 
 void fix(Scene& scene, const std::string& where) {
-  scene.get<Ties>().ties.push_back(make_fix(select_by_name(where)));
+  scene.get<Supports>().ties.push_back(make_fix(select_by_name(where)));
 }
 
 TEST(Centre, NearestElementIsThatOfASearchOverAll) {
@@ -124,7 +125,7 @@ TEST(Centre, TurnedAsAWholeItKeepsItsShape) {
   turn.motion.through = Vec3(0.2, 0.3, 0);
   turn.motion.angle = 0.7;
   const Motion motion = turn.motion;
-  scene.get<Ties>().ties.push_back(turn);
+  scene.get<Supports>().ties.push_back(turn);
   Probe corner;
   corner.at = Vec3(0.8, 0.3, 0.3);
   Probe end;
@@ -170,7 +171,7 @@ TEST(Centre, ATipOfOneElementTurnsWithTheRest) {
   turn.motion.axis = Vec3::UnitZ();
   turn.motion.angle = 0.5;
   const Motion motion = turn.motion;
-  scene.get<Ties>().ties.push_back(turn);
+  scene.get<Supports>().ties.push_back(turn);
   const SimulateResult result = simulate_quietly(body, scene);
   EXPECT_EQ(result.stray_cells, 1u);
   for (std::size_t e = 0; e < body.element_count(); ++e)
@@ -186,7 +187,7 @@ TEST(Centre, RefusesWhatNothingHolds) {
   parted.inside = [](int i, int, int) { return i != 4; };
   EXPECT_THAT(refusal(centre_body(parted), scene), HasSubstr("the one of 27 elements near"));
   EXPECT_THAT(refusal(centre_body(bar_of_voxels({6, 5, 1})), scene), HasSubstr("lie in one plane"));
-  scene.get<Ties>().ties[0].axes = {true, false, true};
+  scene.get<Supports>().ties[0].axes = {true, false, true};
   EXPECT_THAT(refusal(centre_body(bar_of_voxels()), scene),
               HasSubstr("\"bar\" is free to translate along y"));
 }
@@ -259,7 +260,7 @@ TEST(Centre, BondsDoNotResistRotation) {
     turn.motion.axis = Vec3(1, 1, 0).normalized();
     turn.motion.angle = 1.0;
     const Motion motion = turn.motion;
-    scene.get<Ties>().ties.push_back(turn);
+    scene.get<Supports>().ties.push_back(turn);
     const SimulateResult result = simulate_quietly(body, scene);
     for (std::size_t e = 0; e < body.element_count(); ++e)
       EXPECT_LT((body.position[e] - body.rest[e] - motion.displacement(body.rest[e], 1)).norm(), 1e-5);

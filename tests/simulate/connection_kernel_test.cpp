@@ -239,7 +239,7 @@ TEST(ConnectionKernel, FoldedCellEndsTheStableStep) {
   const Body body = box_body({{2, 2, 2}, Vec3::Constant(0.01)});
   const Problem problem = springs_setting(body);
   State state = shaken(body, 0, 11);
-  const std::vector<Pass> none;
+  const std::vector<ActiveEffect> none;
   KernelEffects plan{{0}};
   StepBound bound(problem, none, plan);
   bound.look(state, nullptr, {});

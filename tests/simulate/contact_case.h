@@ -6,6 +6,9 @@
 
 #include "formats/lattice/merge.h"
 #include "simulate/contact/contacts.h"
+#include "simulate/effects/bonds.h"
+#include "simulate/effects/contact.h"
+#include "simulate/effects/initial_velocity.h"
 #include "simulate/scene/scene.h"
 #include "tests/simulate/box_body.h"
 #include "tests/simulate/timed_case.h"

@@ -4,6 +4,10 @@
 
 #include <cmath>
 
+#include "simulate/effects/contact.h"
+#include "simulate/effects/damping.h"
+#include "simulate/effects/gravity.h"
+#include "simulate/effects/initial_velocity.h"
 #include "simulate/input/scene_selection.h"
 #include "simulate/kernels/chunk_layout.h"
 #include "simulate/result/options.h"
@@ -120,7 +124,7 @@ TEST(Contact, ABlockAt300MetresASecondDoesNotPassAWallOfTwoCells) {
   Tie held;
   held.where = parse_where("[\"wall/x0\", \"wall/x1\"]", "test");
   held.name = "rim";
-  scene.get<Ties>().ties.push_back(held);
+  scene.get<Supports>().ties.push_back(held);
   throw_part(scene, "shot", Vec3(0, 0, -300));
   const TimedCase made = testing::run_timed(std::move(body), scene);
   EXPECT_GT(mean_velocity(made.body, 1).z(), 0);
@@ -190,7 +194,7 @@ SlideOnSlope slide(double angle, double friction, double time, double turned, do
   Body body = block("block", {3, 3, 2}, Vec3::Zero(), axes);
   if (on_part) {
     append(body, block("ramp", {9, 5, 1}, tilt * Vec3(-0.02, -0.012, -kSide), tilt));
-    scene.get<Ties>().ties.push_back(make_fix(select_by_name("ramp")));
+    scene.get<Supports>().ties.push_back(make_fix(select_by_name("ramp")));
   } else {
     scene.get<Contact>().planes.push_back(plane_at(0, tilt.col(2)));
   }

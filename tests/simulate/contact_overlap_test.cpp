@@ -8,6 +8,8 @@
 
 #include "base/error.h"
 #include "formats/lattice/body_file.h"
+#include "simulate/effects/contact.h"
+#include "simulate/effects/damping.h"
 #include "simulate/input/scene_selection.h"
 #include "tests/simulate/contact_case.h"
 
@@ -189,8 +191,8 @@ Scene held_while_let_out(const std::string& events) {
   Scene scene = scene_of(0.03);
   scene.get<Contact>().parting = 0.02;
   scene.get<Damping>().entries.push_back({1e-4, std::nullopt, ""});
-  scene.get<Ties>().ties.push_back(make_fix(select_by_name("a/z0")));
-  scene.get<Ties>().ties.push_back(make_fix(select_by_name("b/z1")));
+  scene.get<Supports>().ties.push_back(make_fix(select_by_name("a/z0")));
+  scene.get<Supports>().ties.push_back(make_fix(select_by_name("b/z1")));
   scene.events = parse_scene(events + "[run]\ntime = \"30 ms\"\n", "test").events;
   return scene;
 }

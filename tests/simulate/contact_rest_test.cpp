@@ -5,6 +5,10 @@
 #include <cmath>
 #include <map>
 
+#include "simulate/effects/contact.h"
+#include "simulate/effects/damping.h"
+#include "simulate/effects/gravity.h"
+#include "simulate/effects/rigid.h"
 #include "simulate/input/scene_selection.h"
 #include "tests/simulate/centre_body.h"
 #include "tests/simulate/contact_case.h"

@@ -9,6 +9,11 @@
 #include <random>
 
 #include "base/error.h"
+#include "simulate/effects/bonds.h"
+#include "simulate/effects/contact.h"
+#include "simulate/effects/damping.h"
+#include "simulate/effects/gravity.h"
+#include "simulate/effects/rigid.h"
 #include "simulate/input/scene_selection.h"
 #include "simulate/kernels/chunk_layout.h"
 #include "tests/simulate/contact_case.h"

@@ -8,6 +8,9 @@
 
 #include "base/error.h"
 #include "formats/lattice/merge.h"
+#include "simulate/effects/damping.h"
+#include "simulate/effects/drag.h"
+#include "simulate/effects/gravity.h"
 #include "simulate/result/options.h"
 #include "simulate/scene/scene.h"
 #include "simulate/simulate.h"
@@ -98,7 +101,7 @@ Vec3 force_on(const Body& body, const Vec3& velocity, const Mat3& turn = Mat3::I
   Problem problem{body, std::vector<Material>(body.parts.size(), {"gum", 1e6, 0.25, kCubeDensity, ""}),
                   std::vector<std::uint8_t>(body.cell_count(), 0)};
   problem.duration = 1;
-  const Drag drag = *Drag::make({kMedium, kCoefficient}, problem);
+  Drag drag = *Drag::make({kMedium, kCoefficient}, problem);
   State state;
   for (const Vec3& x : body.rest) {
     state.displacement.push_back(turn * x - x);

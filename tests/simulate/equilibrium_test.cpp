@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "formats/lattice/merge.h"
+#include "simulate/effects/gravity.h"
 #include "simulate/result/result.h"
 #include "simulate/scene/scene.h"
 #include "tests/simulate/box_body.h"
@@ -51,7 +52,7 @@ TEST(Equilibrium, UniformStretchIsExact) {
   for (const auto& [where, axis] : {std::pair{"x0", 0}, std::pair{"y0", 1}, std::pair{"z0", 2}}) {
     Tie tie = make_fix(face(where));
     tie.axes = {axis == 0, axis == 1, axis == 2};
-    scene.get<Ties>().ties.push_back(tie);
+    scene.get<Supports>().ties.push_back(tie);
   }
   scene.get<Loads>().loads.push_back(make_pressure(face("x1"), pressure));
   Probe probe;
@@ -85,12 +86,12 @@ TEST(Equilibrium, RigidRotationByMovesIsExact) {
       for (const char* where : {"x0", "x1"}) {
         Tie tie = make_move(face(where), Vec3::Zero());
         tie.motion = motion;
-        scene.get<Ties>().ties.push_back(tie);
+        scene.get<Supports>().ties.push_back(tie);
       }
     } else {
       Tie tie = make_move(select_by_name("box"), Vec3::Zero());
       tie.motion = motion;
-      scene.get<Ties>().ties.push_back(tie);
+      scene.get<Supports>().ties.push_back(tie);
     }
     const SimulateResult result = simulate_quietly(body, scene);
     for (std::size_t e = 0; e < body.element_count(); ++e)
@@ -103,7 +104,7 @@ TEST(Equilibrium, RigidRotationByMovesIsExact) {
 TEST(Equilibrium, GravityIsCarriedByTheFix) {
   Body body = box_body(uneven_box());
   Scene scene = steel_scene();
-  scene.get<Ties>().ties.push_back(make_fix(face("z0")));
+  scene.get<Supports>().ties.push_back(make_fix(face("z0")));
   scene.get<Gravity>().acceleration = Vec3(0, 0, -9.81);
   const SimulateResult result = simulate_quietly(body, scene);
   const double mass = 7850 * 60 * 0.002 * 0.0023 * 0.0019;
@@ -115,12 +116,12 @@ TEST(Equilibrium, LargeMoveOfSelectedElementsIsFollowedExactly) {
   Body body = box_body({.cells = {6, 4, 4}, .spacing = Vec3(0.01, 0.01, 0.01)});
   Scene scene;
   scene.material = "rubber";
-  scene.get<Ties>().ties.push_back(make_fix(face("x0")));
+  scene.get<Supports>().ties.push_back(make_fix(face("x0")));
   Selection end;
   end.kind = Selection::Kind::half_space;
   end.point = Vec3(0.0599, 0, 0);
   end.normal = Vec3::UnitX();
-  scene.get<Ties>().ties.push_back(make_move(end, Vec3(0.03, 0.02, 0)));
+  scene.get<Supports>().ties.push_back(make_move(end, Vec3(0.03, 0.02, 0)));
   const SimulateResult result = simulate_quietly(body, scene);
   for (std::size_t e = 0; e < body.element_count(); ++e)
     if (body.lattice_index[e][0] == 6) {
@@ -137,7 +138,7 @@ TEST(Equilibrium, FreeMotionsAreNamed) {
   Scene sliding = nothing;
   Tie tie = make_fix(face("x0"));
   tie.axes = {true, false, false};
-  sliding.get<Ties>().ties.push_back(tie);
+  sliding.get<Supports>().ties.push_back(tie);
   const std::string message = refusal(box_body(), sliding);
   EXPECT_THAT(message, HasSubstr("part \"box\" is free"));
   EXPECT_THAT(message, HasSubstr("translate along"));
@@ -152,7 +153,7 @@ TEST(Equilibrium, DustIsRefused) {
   low.kind = Selection::Kind::half_space;
   low.point = Vec3(1e-6, 0, 0);
   low.normal = -Vec3::UnitX();
-  scene.get<Ties>().ties.push_back(make_fix(low));
+  scene.get<Supports>().ties.push_back(make_fix(low));
   scene.get<Gravity>().acceleration = Vec3(0, 0, -9.81);
   EXPECT_THAT(refusal(dust, scene), HasSubstr("every cell of the body is broken"));
 }
@@ -165,10 +166,10 @@ TEST(Equilibrium, SecondBodyNeedsItsOwnFix) {
   check(body, "merged");
   EXPECT_EQ(body.parts[1].name, "box-2");
   Scene scene = steel_scene();
-  scene.get<Ties>().ties.push_back(make_fix(select_by_name("box/x0")));
+  scene.get<Supports>().ties.push_back(make_fix(select_by_name("box/x0")));
   scene.get<Loads>().loads.push_back(make_push(select_by_name("box/x1"), Vec3(1, 0, 0)));
   EXPECT_THAT(refusal(body, scene), HasSubstr("part \"box-2\""));
-  scene.get<Ties>().ties.push_back(make_fix(select_by_name("box-2")));
+  scene.get<Supports>().ties.push_back(make_fix(select_by_name("box-2")));
   EXPECT_EQ(refusal(body, scene), "accepted");
 }
 
@@ -186,7 +187,7 @@ TEST(Equilibrium, CrumbsAreCarriedAndLargePiecesRefused) {
   start.kind = Selection::Kind::half_space;
   start.point = Vec3(0.0005, 0, 0);
   start.normal = -Vec3::UnitX();
-  scene.get<Ties>().ties.push_back(make_fix(start));
+  scene.get<Supports>().ties.push_back(make_fix(start));
   scene.get<Gravity>().acceleration = Vec3(0, 0, -9.81);
   const SimulateResult result = simulate_quietly(body, scene);
   EXPECT_EQ(result.stray_cells, 1u);
@@ -211,9 +212,9 @@ TEST(Equilibrium, MirroredCellDiverges) {
   end.kind = Selection::Kind::half_space;
   end.point = Vec3(0.5, 0, 0);
   end.normal = -Vec3::UnitX();
-  scene.get<Ties>().ties.push_back(make_fix(end));
+  scene.get<Supports>().ties.push_back(make_fix(end));
   end.normal = Vec3::UnitX();
-  scene.get<Ties>().ties.push_back(make_move(end, Vec3(-2, 0, 0)));
+  scene.get<Supports>().ties.push_back(make_move(end, Vec3(-2, 0, 0)));
   try {
     (void)simulate_quietly(body, scene);
     FAIL() << "a mirrored cell has no equilibrium";

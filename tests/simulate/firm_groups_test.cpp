@@ -66,7 +66,7 @@ TEST(FirmGroups, BrokenCellsHoldNothing) {
 TEST(FirmGroups, APlateOnAHingeIsRefused) {
   Body body = cells({8, 8, 2}, [](int i, int, int k) { return k == 0 ? i < 4 : i >= 4; });
   Scene scene = testing::gum_scene();
-  scene.get<Ties>().ties.push_back(make_fix(select_by_name("x0")));
+  scene.get<Supports>().ties.push_back(make_fix(select_by_name("x0")));
   EXPECT_THAT(testing::refusal(body, scene),
               AllOf(HasSubstr("in 2 pieces that are not firmly connected"), HasSubstr("the one of 32 cells"),
                     HasSubstr("by edges and corners of cells alone"), HasSubstr("a smaller spacing")));

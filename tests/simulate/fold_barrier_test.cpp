@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 #include <random>
 
+#include "simulate/effects/damping.h"
 #include "simulate/stepping/explicit_barrier.h"
 #include "tests/simulate/stepped.h"
 #include "tests/simulate/timed_case.h"
@@ -173,10 +174,10 @@ TEST(FoldBarrier, CrushedCellsKeepTheirCornersAndTheBooks) {
   scene.materials["gum"] = kCauchyGum;
   scene.material = "gum";
   scene.run.time = 0.06;
-  scene.get<Ties>().ties.push_back(make_fix(select_by_name("z0")));
+  scene.get<Supports>().ties.push_back(make_fix(select_by_name("z0")));
   Tie press = make_move(select_by_name("z1"), Vec3(0.0004, 0.0002, -0.018));
   press.course = {{0, 0.03, 0.06}, {0, 1, 0}};
-  scene.get<Ties>().ties.push_back(press);
+  scene.get<Supports>().ties.push_back(press);
   scene.get<Damping>().entries.push_back({5e-4, {}, ""});
   const testing::TimedCase made = testing::run_timed(testing::box_of({2, 2, 2}, kFoldSpacing), scene);
   testing::expect_books_close(made.result);

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "base/error.h"
+#include "simulate/effects/gravity.h"
 #include "simulate/result/options.h"
 #include "simulate/scene/scene.h"
 #include "simulate/simulate.h"
@@ -207,7 +208,7 @@ TEST(MutualGravity, LargeBlocksFallByTheTree) {
   scene.get<Gravity>().mutual = true;
   const TimedCase made = run_timed(testing::box_body(options), scene);
   ASSERT_GT(made.body.element_count(), 2000u);
-  EXPECT_THAT(made.result.passes[1].why, HasSubstr("by a tree"));
+  EXPECT_THAT(made.result.shares[1].why, HasSubstr("by a tree"));
   // 1 t each, centres 2 m apart: they draw each other with 1 N per kg or so
   const std::vector<double>& kinetic = made.history.column("kinetic");
   EXPECT_GT(kinetic.back(), 50);

@@ -8,6 +8,11 @@
 #include <numbers>
 
 #include "base/error.h"
+#include "simulate/effects/damping.h"
+#include "simulate/effects/drag.h"
+#include "simulate/effects/gravity.h"
+#include "simulate/effects/initial_velocity.h"
+#include "simulate/effects/plasticity.h"
 #include "simulate/implicit/damping_matrix.h"
 #include "simulate/time/energy_history.h"
 #include "tests/simulate/stepped.h"
@@ -86,7 +91,7 @@ Decay decay(int steps, double zeta) {
   const double omega = std::sqrt(1e6 * 0.01 / (0.5 * 1000 * 1e-6)), time = 1.3 / omega * 2 * pi;
   Scene scene = implicit_scene(material, time, time / steps);
   scene.run.tolerance = 1e-11;
-  scene.get<Ties>().ties.push_back(make_fix(select_by_name("x0")));
+  scene.get<Supports>().ties.push_back(make_fix(select_by_name("x0")));
   if (zeta > 0) scene.get<Damping>().entries.push_back({2 * zeta / omega, {}, ""});
   const double start = 1e-9;
   for (Vec3& at : body.position)
@@ -184,17 +189,17 @@ TEST(ImplicitEuler, StiffBodyComesToRestInEquilibrium) {
   held.normal = -options.axes.col(0);
   led.point = body.rest.back() - 1e-6 * options.axes.col(0);
   led.normal = options.axes.col(0);
-  scene.get<Ties>().ties.push_back(make_fix(held));
+  scene.get<Supports>().ties.push_back(make_fix(held));
   Tie push = make_move(led, Vec3(0, 1e-4, 0));
   push.course = {{0, 2e4 * bound}, {0, 1}};
   push.axes = {false, true, false};
-  scene.get<Ties>().ties.push_back(push);
+  scene.get<Supports>().ties.push_back(push);
   scene.get<Loads>().loads.push_back(make_push(select_by_name("z1"), Vec3(0, 0, -300)));
   const TimedCase made = testing::run_timed(body, scene);
   testing::expect_books_close(made.result);
   scene.run.time.reset();
   scene.run.step.reset();
-  for (Tie& tie : scene.get<Ties>().ties) tie.course = {};
+  for (Tie& tie : scene.get<Supports>().ties) tie.course = {};
   Body rest = body;
   Progress progress("test", Progress::Mode::quiet);
   const SimulateResult still = simulate(rest, scene, {}, progress);
@@ -228,16 +233,16 @@ TEST(ImplicitEuler, DragIsTakenAtTheEndOfTheStep) {
 // Newton's iterations of all stretches of a run are told, and what acts in several of them is told once.
 TEST(ImplicitEuler, EffortIsThatOfAllActs) {
   Scene scene = implicit_scene(kCauchyGum, 0.04, 0.002);
-  scene.get<Ties>().ties.push_back(make_fix(select_by_name("x0")));
+  scene.get<Supports>().ties.push_back(make_fix(select_by_name("x0")));
   scene.get<Gravity>().acceleration = Vec3(0, 0, -9.81);
   const TimedCase whole = testing::run_timed(small_box(), scene);
   Event nothing{0.02, "nothing", "", {}, [](EventContext&) { return std::string(); }};
   scene.events.push_back(nothing);
   const TimedCase parted = testing::run_timed(small_box(), scene);
   EXPECT_GT(parted.result.newton_iterations, 0.8 * whole.result.newton_iterations);
-  ASSERT_EQ(parted.result.passes.size(), whole.result.passes.size());
-  for (std::size_t p = 0; p < whole.result.passes.size(); ++p)
-    EXPECT_EQ(parted.result.passes[p].name, whole.result.passes[p].name);
+  ASSERT_EQ(parted.result.shares.size(), whole.result.shares.size());
+  for (std::size_t p = 0; p < whole.result.shares.size(); ++p)
+    EXPECT_EQ(parted.result.shares[p].name, whole.result.shares[p].name);
 }
 
 TEST(ImplicitEuler, SameBitsForAnyNumberOfThreads) {
@@ -246,7 +251,7 @@ TEST(ImplicitEuler, SameBitsForAnyNumberOfThreads) {
   options.spacing = Vec3::Constant(0.01);
   const auto positions = [&](int threads) {
     Scene scene = implicit_scene(kCauchyGum, 0.02, 0.005);
-    scene.get<Ties>().ties.push_back(make_fix(select_by_name("x0")));
+    scene.get<Supports>().ties.push_back(make_fix(select_by_name("x0")));
     scene.get<Gravity>().acceleration = Vec3(0, 0, -9.81);
     scene.get<Damping>().entries.push_back({1e-3, {}, ""});
     SimulateOptions run;
@@ -288,9 +293,9 @@ TEST(ImplicitEuler, MatterThrownThroughItselfEndsTheRun) {
 
 TEST(ImplicitEuler, TellsWhereItEnds) {
   Scene scene = implicit_scene(kCauchyGum, 0.01, 1e-3);
-  scene.get<Ties>().ties.push_back(make_fix(select_by_name("x0")));
+  scene.get<Supports>().ties.push_back(make_fix(select_by_name("x0")));
   Tie squeeze = make_move(select_by_name("x1"), Vec3(-0.05, 0, 0));
-  scene.get<Ties>().ties.push_back(squeeze);
+  scene.get<Supports>().ties.push_back(squeeze);
   BoxOptions options;
   options.cells = {1, 1, 1};
   options.spacing = Vec3::Constant(0.01);

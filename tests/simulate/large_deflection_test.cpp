@@ -40,7 +40,7 @@ Body column(const Slender& bar) {
 // PrescribedMotion at x = 0, `force` on the free end, whose mean displacement is probed.
 Scene held(const Vec3& force) {
   Scene scene = gum_scene(0);
-  scene.get<Ties>().ties.push_back(make_fix(select_by_name("xmin")));
+  scene.get<Supports>().ties.push_back(make_fix(select_by_name("xmin")));
   scene.get<Loads>().loads.push_back(make_push(select_by_name("xmax"), force));
   Probe probe;
   probe.where = select_by_name("xmax");
@@ -83,7 +83,7 @@ TEST(LargeDeflection, ColumnAfterBuckling) {
   middle.max = Vec3(1 + 1e-6, 1, bar.side() / 2 + 1e-6);
   Tie aside = make_move(middle, Vec3(0, 0, 0.593));
   aside.axes = {false, false, true};
-  scene.get<Ties>().ties.push_back(aside);
+  scene.get<Supports>().ties.push_back(aside);
   const SimulateResult result = find_equilibrium(body, scene);
   EXPECT_NEAR(result.reactions[1].force.z() / bar.euler(), 0, 0.02);
   EXPECT_NEAR(-result.probes[0].displacement.x(), 0.259, 0.005);
@@ -119,18 +119,18 @@ Snap crown_led_by(double down) {
     selection.normal = Vec3(side, 0, 0);
     return selection;
   };
-  scene.get<Ties>().ties.push_back(make_fix(beyond(0.001, -1)));
-  scene.get<Ties>().ties.push_back(make_fix(beyond(0.599, 1)));
+  scene.get<Supports>().ties.push_back(make_fix(beyond(0.001, -1)));
+  scene.get<Supports>().ties.push_back(make_fix(beyond(0.599, 1)));
   Selection crown;
   crown.kind = Selection::Kind::box;
   crown.min = Vec3(0.299, -1, -1);
   crown.max = Vec3(0.301, 1, 1);
   Tie lead = make_move(crown, Vec3(0, 0, -down));
   lead.axes = {true, false, true};
-  scene.get<Ties>().ties.push_back(lead);
+  scene.get<Supports>().ties.push_back(lead);
   Tie plane = make_fix(select_by_name("box"));  // one cell wide, it would leave its plane first
   plane.axes = {false, true, false};
-  scene.get<Ties>().ties.push_back(plane);
+  scene.get<Supports>().ties.push_back(plane);
   scene.run.load_steps = 4;
   const SimulateResult result = find_equilibrium(body, scene);
   return {-result.reactions[2].force.z(), result.elastic_energy};
@@ -177,11 +177,11 @@ TEST(LargeDeflection, AWholeTurnIsFollowedBeyondBuckling) {
     Body body = testing::box_body({.cells = {1, 1, 6}, .spacing = Vec3::Constant(0.01)});
     Scene scene = gum_scene(0);
     scene.materials["gum"].poisson = 0.25;
-    scene.get<Ties>().ties.push_back(make_fix(select_by_name("zmin")));
+    scene.get<Supports>().ties.push_back(make_fix(select_by_name("zmin")));
     Tie turn = make_move(select_by_name("zmax"), Vec3::Zero());
     turn.motion.through = Vec3(0.005, 0.005, 0);
     turn.motion.angle = angle;
-    scene.get<Ties>().ties.push_back(turn);
+    scene.get<Supports>().ties.push_back(turn);
     scene.run.load_steps = load_steps;
     const SimulateResult result = find_equilibrium(body, scene);
     Vec3 middle = Vec3::Zero();

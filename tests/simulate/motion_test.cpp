@@ -7,6 +7,10 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "simulate/effects/damping.h"
+#include "simulate/effects/gravity.h"
+#include "simulate/effects/initial_velocity.h"
+#include "simulate/effects/plasticity.h"
 #include "simulate/models/stability.h"
 #include "simulate/result/result.h"
 #include "simulate/scene/scene.h"
@@ -94,7 +98,7 @@ Swing swing_of_bar(Model model, double tau) {
   const double omega = wave_speed * pi / 2 / length;
   Scene scene = scene_made_of(material, 2.3 * 2 * pi / omega);
   scene.parts["box"].model = model == Model::springs ? "springs" : "cells";
-  scene.get<Ties>().ties.push_back(make_fix(select_by_name("x0")));
+  scene.get<Supports>().ties.push_back(make_fix(select_by_name("x0")));
   if (tau > 0) scene.get<Damping>().entries.push_back({tau, {}, ""});
   Probe end;
   end.name = "end";
@@ -157,7 +161,7 @@ TEST(Motion, LongDampingAgreesWithShortSteps) {
     Scene scene = scene_made_of(material, 2e-3);
     scene.run.method = method;
     scene.run.step = step;
-    scene.get<Ties>().ties.push_back(make_fix(select_by_name("x0")));
+    scene.get<Supports>().ties.push_back(make_fix(select_by_name("x0")));
     Load pull = make_push(select_by_name("x1"), Vec3(300, 0, 0));
     pull.course = {{0, 8e-4, 1.6e-3}, {0, 1, 0}};
     scene.get<Loads>().loads.push_back(pull);
@@ -224,7 +228,7 @@ TEST(Motion, BeamSwingsAtItsFrequency) {
     options.spacing = Vec3(2.0 / options.cells[0], 0.7 / options.cells[1], 0.5 / options.cells[2]);
     Body body = box_body(options);
     Scene scene = scene_made_of(kStudyGum, 3.2 / each.frequency);
-    scene.get<Ties>().ties.push_back(make_fix(select_by_name("x0")));
+    scene.get<Supports>().ties.push_back(make_fix(select_by_name("x0")));
     Probe tip;
     tip.name = "tip";
     tip.where = select_by_name("x1");
@@ -333,7 +337,7 @@ TEST(Motion, RunawayTellsWhereAndWhy) {
 TEST(Motion, EffectsOfTimeAreRefusedAtEquilibrium) {
   Scene scene = scene_made_of(kStudyGum, 1);
   scene.run.time.reset();
-  scene.get<Ties>().ties.push_back(make_fix(select_by_name("x0")));
+  scene.get<Supports>().ties.push_back(make_fix(select_by_name("x0")));
   scene.get<Damping>().entries.push_back({1e-5, {}, ""});
   Body body = small_box();
   Progress progress("test", Progress::Mode::quiet);
@@ -342,10 +346,10 @@ TEST(Motion, EffectsOfTimeAreRefusedAtEquilibrium) {
 
 TEST(Motion, MovesTakeTheirCourseAndSupportsDoTheWork) {
   Scene scene = scene_made_of(kStudyGum, 0.1);
-  scene.get<Ties>().ties.push_back(make_fix(select_by_name("x0")));
+  scene.get<Supports>().ties.push_back(make_fix(select_by_name("x0")));
   Tie pull = make_move(select_by_name("x1"), Vec3(0.003, 0, 0));
   pull.course = {{0, 0.05, 0.1}, {0, 1, 1}};
-  scene.get<Ties>().ties.push_back(pull);
+  scene.get<Supports>().ties.push_back(pull);
   scene.get<Damping>().entries.push_back({2e-4, {}, ""});
   const TimedCase made = testing::run_timed(small_box(), scene);
   EXPECT_NEAR(made.body.position.back().x() - made.body.rest.back().x(), 0.003, 1e-12);
@@ -382,7 +386,7 @@ TEST(Motion, BooksOfVerletClose) {
     scene.run.method = TimeMethod::verlet;
     scene.get<InitialVelocity>() = thrown(Vec3(0, 0, 1), Vec3(0, 0, 30), Vec3(0.015, 0.01, 0.01));
     scene.get<Gravity>().acceleration = Vec3(0, 0, -9.81);
-    scene.get<Ties>().ties.push_back(make_fix(select_by_name("x0")));
+    scene.get<Supports>().ties.push_back(make_fix(select_by_name("x0")));
     if (tau > 0) scene.get<Damping>().entries.push_back({tau, {}, ""});
     expect_books_close(testing::run_timed(small_box(), scene).result);
   }

@@ -10,6 +10,7 @@
 #include <random>
 
 #include "base/error.h"
+#include "simulate/effects/gravity.h"
 #include "tests/simulate/derivatives.h"
 #include "tests/simulate/study_beam.h"
 

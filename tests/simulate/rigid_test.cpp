@@ -9,6 +9,11 @@
 
 #include "base/error.h"
 #include "formats/lattice/merge.h"
+#include "simulate/effects/bonds.h"
+#include "simulate/effects/contact.h"
+#include "simulate/effects/damping.h"
+#include "simulate/effects/gravity.h"
+#include "simulate/effects/rigid.h"
 #include "simulate/kernels/chunk_layout.h"
 #include "simulate/result/result.h"
 #include "simulate/rigid/path.h"
@@ -229,7 +234,7 @@ displacement = [["0 mm", "0 mm", "0 mm"], ["0 mm", "0 mm", "-5 mm"]]
   EXPECT_THROW((void)parse_scene("[[manipulator]]\npart = \"a\"\ntime = [\"0 s\"]\n", "s.toml"), InputError);
   Scene held = rigid_scene(0.1);
   held.get<RigidParts>().parts = {"box"};
-  held.get<Ties>().ties.push_back(make_fix(select_by_name("box")));
+  held.get<Supports>().ties.push_back(make_fix(select_by_name("box")));
   EXPECT_THROW((void)testing::run_timed(block("box", {2, 2, 2}), held), InputError);
   Scene unknown = rigid_scene(0.1);
   unknown.get<RigidParts>().parts = {"bix"};

@@ -263,7 +263,7 @@ TEST(Torques, ThatTurnWhatTheyActOnAreTold) {
   for (const double angle : {0.05, 1.0}) {  // rad
     Body body = box_body({.cells = {slender * thick, thick, thick}, .spacing = Vec3::Constant(side / thick)});
     Scene scene = testing::gum_scene(0);
-    scene.get<Ties>().ties.push_back(make_fix(select_by_name("xmin")));
+    scene.get<Supports>().ties.push_back(make_fix(select_by_name("xmin")));
     Load load = make_push(select_by_name("xmax"), Vec3::Zero());
     load.force.reset();
     load.torque = Vec3(0, -angle * bending, 0);

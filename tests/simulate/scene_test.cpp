@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "simulate/effects/gravity.h"
 #include "tests/simulate/box_body.h"
 
 namespace flexel::simulate {
@@ -59,7 +60,7 @@ TEST(Scene, ReadsEveryKeyInSi) {
   const Scene scene = parse_scene(kWhole, "s.toml");
   EXPECT_EQ(scene.materials.at("gum").young, 1.2e6);
   EXPECT_EQ(scene.materials.at("gum").poisson, 0.49);
-  const auto& ties = scene.get<Ties>().ties;
+  const auto& ties = scene.get<Supports>().ties;
   ASSERT_EQ(ties.size(), 3u);
   EXPECT_EQ(ties[0].axes, (std::array<bool, 3>{true, false, true}));
   EXPECT_EQ(ties[0].where.members[1].radius, 0.002);

@@ -5,6 +5,9 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "simulate/effects/contact.h"
+#include "simulate/effects/gravity.h"
+#include "simulate/effects/rigid.h"
 #include "tests/simulate/contact_case.h"
 
 namespace flexel::simulate {
@@ -47,7 +50,7 @@ TEST(Settling, TwoStackedBlocksAreSpringsInSeries) {
   Scene scene = still(0);
   scene.materials["stiff"] = {"stiff", 2e6, 0, 1000, "test"};
   scene.parts["upper"].material = "stiff";
-  scene.get<Ties>().ties.push_back(make_fix(select_by_name("lower/z0")));
+  scene.get<Supports>().ties.push_back(make_fix(select_by_name("lower/z0")));
   const double area = 16 * kSide * kSide, force = 0.01 * 1e6 * area;
   scene.get<Loads>().loads.push_back(make_push(select_by_name("upper/z1"), Vec3(0, 0, -force)));
   scene.get<Contact>().self = false;
@@ -132,7 +135,7 @@ TEST(Settling, WhatBeginsInsideSomethingElseIsLetOutFirst) {
     scene.run.tolerance_given = true;
     scene.get<Contact>().parting = parting;
     scene.get<Contact>().friction = 0.5;
-    scene.get<Ties>().ties.push_back(make_fix(select_by_name("lower/z0")));
+    scene.get<Supports>().ties.push_back(make_fix(select_by_name("lower/z0")));
     scene.get<Loads>().loads.push_back(make_push(select_by_name("upper/z1"), Vec3(0, 0, -2)));
     Probe top;
     top.name = "top";

@@ -129,7 +129,7 @@ TEST(Stress, BendingAtEightCells) {
   const double h = 0.01 / n, length = 4 * n * h, side = n * h;
   Body body = box_body({.cells = {4 * n, n, n}, .spacing = Vec3::Constant(h)});
   Scene scene = metal_scene(0.3);
-  scene.get<Ties>().ties.push_back(make_fix(select_by_name("xmin")));
+  scene.get<Supports>().ties.push_back(make_fix(select_by_name("xmin")));
   scene.get<Loads>().loads.push_back(make_push(select_by_name("xmax"), Vec3(0, 0, 10)));
   const SimulateResult result = solve_stresses(body, scene);
   const double inertia = std::pow(side, 4) / 12;
@@ -171,10 +171,10 @@ TEST(Stress, TorsionAtEightCells) {
   const double h = 0.01 / n, side = n * h;
   Body body = box_body({.cells = {3 * n, n, n}, .spacing = Vec3::Constant(h)});
   Scene scene = metal_scene(0.3);
-  scene.get<Ties>().ties.push_back(make_fix(select_by_name("xmin")));
+  scene.get<Supports>().ties.push_back(make_fix(select_by_name("xmin")));
   Tie turn = make_move(select_by_name("xmax"), Vec3::Zero());
   turn.motion = {Vec3::Zero(), Vec3::UnitX(), Vec3(0, side / 2, side / 2), 1e-4};
-  scene.get<Ties>().ties.push_back(turn);
+  scene.get<Supports>().ties.push_back(turn);
   (void)solve_stresses(body, scene);
   // The twist per length in the middle, from two elements on the axis' height at one side.
   const auto angle_at = [&](int i) {
@@ -217,7 +217,7 @@ TEST(Stress, HoopStressBesideAHole) {
   for (const auto& [side, axis] : {std::pair{"xmin", 0}, {"ymin", 1}, {"zmin", 2}}) {
     Tie tie = make_fix(select_by_name(side));
     tie.axes = {axis == 0, axis == 1, axis == 2};
-    scene.get<Ties>().ties.push_back(tie);
+    scene.get<Supports>().ties.push_back(tie);
   }
   scene.get<Loads>().loads.push_back(make_pressure(select_by_name("xmax"), -stress));
   (void)solve_stresses(body, scene);
@@ -247,7 +247,7 @@ TEST(Stress, HoopStressBesideAHole) {
 TEST(Stress, OfADrawnBarHasANarrowErrorBar) {
   Body body = box_body({.cells = {16, 8, 8}, .spacing = Vec3::Constant(0.001)});
   Scene scene = metal_scene(0);
-  scene.get<Ties>().ties.push_back(make_fix(select_by_name("xmin")));
+  scene.get<Supports>().ties.push_back(make_fix(select_by_name("xmin")));
   scene.get<Loads>().loads.push_back(make_pressure(select_by_name("xmax"), -1e6));
   const SimulateResult result = testing::simulate_quietly(body, scene);
   ASSERT_TRUE(result.error_bars.von_mises.has_value()) << result.error_bars.note;

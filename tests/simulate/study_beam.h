@@ -65,7 +65,7 @@ inline Scene held_beam(const std::string& model, const std::string& hooke = "") 
   scene.material = "gum";
   scene.parts["box"].model = model;
   scene.parts["box"].hooke = hooke;
-  scene.get<Ties>().ties.push_back(make_fix(half_space(Vec3(1e-6, 0, 0), -Vec3::UnitX())));
+  scene.get<Supports>().ties.push_back(make_fix(half_space(Vec3(1e-6, 0, 0), -Vec3::UnitX())));
   return scene;
 }
 

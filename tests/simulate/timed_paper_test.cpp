@@ -7,6 +7,8 @@
 #include <random>
 
 #include "base/error.h"
+#include "simulate/effects/damping.h"
+#include "simulate/effects/gravity.h"
 #include "simulate/equilibrium/mechanics.h"
 #include "simulate/kernels/chunk_layout.h"
 #include "tests/simulate/study_beam.h"
@@ -213,7 +215,8 @@ TEST(TimedPaper, SameBitsForAnyNumberOfThreads) {
   options.spacing = kTimedSpacing;
   Body one = centre_body(options), two = one;
   Scene scene = timed_scene(5e-3, 1e-4);
-  scene.get<Ties>().ties.push_back(make_fix(testing::half_space(Vec3(kTimedSpacing, 0, 0), -Vec3::UnitX())));
+  scene.get<Supports>().ties.push_back(
+      make_fix(testing::half_space(Vec3(kTimedSpacing, 0, 0), -Vec3::UnitX())));
   scene.get<Gravity>().acceleration = Vec3(0, 0, -98.1);
   (void)run_with_books(one, scene, 1);
   (void)run_with_books(two, scene, 2);

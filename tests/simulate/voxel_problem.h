@@ -133,7 +133,7 @@ inline VoxelProblem assemble(std::vector<Voxel> voxels, double spacing = 1, doub
   return problem;
 }
 
-// Ties the low face along `axis` of every voxel that `where` chooses to the ground: 300 E / h per unit area,
+// Supports the low face along `axis` of every voxel that `where` chooses to the ground: 300 E / h per unit area,
 // 2 x 2 Gauss points.
 inline void clamp_low_faces(VoxelProblem& problem, int axis, const std::function<bool(const Voxel&)>& where) {
   for (std::size_t c = 0; c < problem.voxels.size(); ++c) {

@@ -9,14 +9,20 @@
 
 #include "base/error.h"
 #include "base/units.h"
+#include "simulate/scene/effects.h"
 
 namespace flexel::study {
 namespace {
 
-// What acts and can be left out, by its key. Supports ([[fix]]) are not among it: without them there is
-// another problem, not a cheaper one.
-constexpr const char* kEffectKeys[] = {"gravity",  "drag", "contact", "damping",  "plasticity",
-                                       "fracture", "load", "move",    "velocity", "event"};
+// What acts and can be left out, by its key: what the effects say of themselves, and events. Supports ([[fix]])
+// are not among it: without them there is another problem, not a cheaper one.
+std::vector<std::string> effect_keys() {
+  std::vector<std::string> keys;
+  for (const simulate::EffectRow& row : simulate::effect_rows())
+    keys.insert(keys.end(), row.can_leave_out.begin(), row.can_leave_out.end());
+  keys.push_back("event");
+  return keys;
+}
 
 toml::table parse(const std::string& text, const std::string& name) {
   try {
@@ -45,7 +51,7 @@ std::string entry_name(const std::string& key, const toml::array& entries, std::
 
 std::vector<SceneEffect> effects_of(const toml::table& scene) {
   std::vector<SceneEffect> effects;
-  for (const char* key : kEffectKeys) {
+  for (const std::string& key : effect_keys()) {
     const toml::node* node = scene.get(key);
     if (node == nullptr) continue;
     if (const toml::array* entries = node->as_array()) {

@@ -1,6 +1,6 @@
-// A pass does not say where it pulls: all elements are moved, each its own way, and those with forces on them
+// An effect does not say where it pulls: all elements are moved, each its own way, and those with forces on them
 // are the ones.
-#include "simulate/equilibrium/pass_matrix.h"
+#include "simulate/equilibrium/effect_matrix.h"
 
 #include <algorithm>
 
@@ -9,18 +9,18 @@
 namespace flexel::simulate {
 namespace {
 
-// Elements that the passes pull at when all are moved, each its own way, and their neighbours: a tie of a
+// Elements that the effects pull at when all are moved, each its own way, and their neighbours: a tie of a
 // cell may leave some of its corners alone.
 std::vector<std::uint8_t> touched_elements(const Body& body, const BlockMatrix& pattern,
-                                           const std::vector<Pass>& passes) {
+                                           const std::vector<ActiveEffect>& effects) {
   const std::size_t n = body.element_count();
   State state{std::vector<Vec3>(n), 1};
   for (std::size_t e = 0; e < n; ++e)
     for (std::size_t axis = 0; axis < 3; ++axis)
       state.displacement[e][static_cast<Eigen::Index>(axis)] = scattered(3 * e + axis);
   std::vector<Vec3> forces(n, Vec3::Zero());
-  for (const Pass& pass : passes)
-    if (pass.add_stiffness && pass.add_forces) pass.add_forces(state, forces);
+  for (const ActiveEffect& effect : effects)
+    if (effect->adds_stiffness()) effect->add_forces(state, forces);
   std::vector<std::uint8_t> touched(n, 0);
   for (std::size_t e = 0; e < n; ++e)
     if (forces[e] != Vec3::Zero())
@@ -31,12 +31,13 @@ std::vector<std::uint8_t> touched_elements(const Body& body, const BlockMatrix& 
 
 }  // namespace
 
-BlockMatrix matrix_of_passes(const Body& body, const BlockMatrix& pattern, const std::vector<Pass>& passes) {
+BlockMatrix matrix_of_effects(const Body& body, const BlockMatrix& pattern,
+                              const std::vector<ActiveEffect>& effects) {
   BlockMatrix matrix;
   matrix.row_offsets.assign(body.element_count() + 1, 0);
-  const auto adds = [](const Pass& pass) { return static_cast<bool>(pass.add_stiffness); };
-  if (std::none_of(passes.begin(), passes.end(), adds)) return matrix;
-  const std::vector<std::uint8_t> touched = touched_elements(body, pattern, passes);
+  const auto adds = [](const ActiveEffect& effect) { return effect->adds_stiffness(); };
+  if (std::none_of(effects.begin(), effects.end(), adds)) return matrix;
+  const std::vector<std::uint8_t> touched = touched_elements(body, pattern, effects);
   for (std::size_t e = 0; e < touched.size(); ++e) {
     if (touched[e])
       for (std::uint64_t q = pattern.row_offsets[e]; q < pattern.row_offsets[e + 1]; ++q)

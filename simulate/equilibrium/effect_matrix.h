@@ -6,9 +6,9 @@
 
 namespace flexel::simulate {
 
-// A matrix of zeros with the rows and columns of `pattern` that passes add to: those of the elements that
+// A matrix of zeros with the rows and columns of `pattern` that effects add to: those of the elements that
 // they pull at, and of their neighbours.
-[[nodiscard]] BlockMatrix matrix_of_passes(const Body& body, const BlockMatrix& pattern,
-                                           const std::vector<Pass>& passes);
+[[nodiscard]] BlockMatrix matrix_of_effects(const Body& body, const BlockMatrix& pattern,
+                                            const std::vector<ActiveEffect>& effects);
 
 }  // namespace flexel::simulate

@@ -1,0 +1,163 @@
+// The general keys of a scene, those of all effects, and what is told of them.
+#include "simulate/scene/scene_keys.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "base/error.h"
+#include "base/nearest_word.h"
+#include "simulate/scene/effects.h"
+
+namespace flexel::simulate {
+namespace {
+
+using K = KeyKind;
+using D = Dimension;
+
+SceneKeyGroup material_keys() {
+  const std::string m = "[materials.NAME]", p = "[parts.NAME]";
+  return {"materials and parts",
+          "what each part is made of and how it resists",
+          "",
+          "",
+          {{"", "material", K::text, {}, "the body's", "of every part"},
+           {"", "infill", K::quantity, D::share, "solid", "of a print, with the material beside it"},
+           {"", "shell", K::quantity, D::length, "0", "solid walls around an infill"},
+           {m, "young", K::quantity, D::pressure, "required", "Young's modulus"},
+           {m, "poisson", K::number, {}, "required", "Poisson's ratio, above -1 and below 0.5"},
+           {m, "density", K::quantity, D::density, "required", "of solid matter"},
+           {m, "source", K::text, {}, "the scene's file", "where the figures come from"},
+           {m, "yield", K::quantity, D::pressure, "none", "stress at which it flows"},
+           {m, "hardening", K::quantity, D::pressure, "0", "stress per plastic strain"},
+           {m, "strength", K::quantity, D::pressure, "none", "stress at which it breaks"},
+           {m, "layer_strength", K::quantity, D::pressure, "none", "likewise across the layers of a print"},
+           {m, "elongation", K::number, {}, "none", "plastic strain at which it breaks"},
+           {m, "friction", K::number, {}, "that of [contact]", "coefficient"},
+           {p, "material", K::text, {}, "the scene's", "of this part"},
+           {p, "model", K::text, {}, "by placement", "\"cells\", \"springs\" or \"paper\""},
+           {p, "hooke", K::text, {}, "\"paper\"", "or \"ganovelli\": constants of model paper"},
+           {p, "infill", K::quantity, D::share, "the scene's", "with the material beside it"},
+           {p, "shell", K::quantity, D::length, "0", "solid walls around an infill"}}};
+}
+
+SceneKeyGroup run_keys() {
+  const std::string r = "[run]", p = "[[probe]]";
+  return {"run and probes",
+          "what is computed and what is told of it",
+          "",
+          "",
+          {{r, "until", K::text, {}, "\"equilibrium\"", "unless there is a time"},
+           {r, "time", K::quantity, D::time, "", "of a timed run"},
+           {r, "step", K::quantity, D::time, "the stable one", "of a timed run"},
+           {r, "method", K::text, {}, "\"symplectic\"", "or \"verlet\", \"explicit\", \"implicit\""},
+           {r, "frames", K::whole_number, {}, "50", "of a .pvd series"},
+           {r, "history_every", K::quantity, D::time, "time / 1000", "between rows of --history"},
+           {r, "tolerance", K::number, {}, "1e-8; 1e-5 with contact", "forces left over, relative"},
+           {r, "load_steps", K::whole_number, {}, "1", "in which the load grows"},
+           {r, "newton_iterations", K::whole_number, {}, "100", "after which the run gives up"},
+           {r, "renormalise", K::flag, {}, "false", "the shape at the end becomes the rest shape"},
+           {p, "name", K::text, {}, "probe N", "for the summary"},
+           {p, "at", K::vector, D::length, "", "a material point; or where"},
+           {p, "where", K::selection, {}, "", "whose mean displacement is told"}}};
+}
+
+SceneKeyGroup event_keys() {
+  const std::string e = "[[event]]";
+  return {"events",
+          "changes of the body at a time of a timed run",
+          "timed runs",
+          "",
+          {{e, "at", K::quantity, D::time, "required", "when"},
+           {e, "do", K::text, {}, "required", "renormalise, edit, carve, fuse or add"},
+           {e, "where", K::selection, {}, "everything", "of renormalise, edit, carve and fuse"},
+           {e, "positions", K::text, {}, "\"now\"", "or \"rest\": the places that where means"},
+           {e, "stiffness", K::number, {}, "1", "of edit: a factor"},
+           {e, "damping", K::number, {}, "1", "of edit: a factor"},
+           {e, "density", K::number, {}, "1", "of edit: a factor"},
+           {e, "stick", K::quantity, D::pressure, "0", "of edit: a traction more"},
+           {e, "within", K::quantity, D::length, "required", "of fuse: over which distance"},
+           {e, "body", K::text, {}, "required", "of add: a body's file"},
+           {e, "velocity", K::vector, D::velocity, "0", "of add: what it comes with"}}};
+}
+
+const char* name_of(ActsIn acts) {
+  switch (acts) {
+    case ActsIn::all:
+      return "equilibrium, timed runs";
+    case ActsIn::relaxation_and_time:
+      return "equilibrium with contact, timed runs";
+    case ActsIn::time:
+      break;
+  }
+  return "timed runs";
+}
+
+[[noreturn]] void refuse(const SceneMember& member, const std::string& title, const std::string& file,
+                         const std::vector<std::string>& known) {
+  std::string hint = did_you_mean(member.key, known);
+  if (hint.empty()) hint = fmt::format("; known keys: {}", fmt::join(known, ", "));
+  throw InputError(member.value.line > 0 ? fmt::format("{}:{}", file, member.value.line) : file,
+                   fmt::format("unknown key \"{}\" in {}{}", member.key, title, hint));
+}
+
+void add(std::vector<std::string>& names, const std::string& name) {
+  if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+}
+
+// Keys by their tables, and of the top of the scene those and the names of tables.
+std::vector<std::string> known_in(const std::string& table) {
+  std::vector<std::string> known;
+  for (const SceneKeyGroup& group : scene_key_groups())
+    for (const SceneKey& key : group.keys) {
+      if (key.table == table) add(known, key.key);
+      if (!table.empty() || key.table.empty() || key.table[0] != '[') continue;
+      const std::size_t begin = key.table.find_first_not_of('[');
+      add(known, key.table.substr(begin, key.table.find_first_of(".]") - begin));
+    }
+  return known;
+}
+
+void check_table(const SceneValue& table, const std::string& title, const std::string& file,
+                 const std::vector<std::string>& known) {
+  if (known.empty() || table.kind != SceneValue::Kind::table) return;
+  for (const SceneMember& member : table.members)
+    if (std::find(known.begin(), known.end(), member.key) == known.end()) refuse(member, title, file, known);
+}
+
+}  // namespace
+
+std::vector<SceneKeyGroup> scene_key_groups() {
+  std::vector<SceneKeyGroup> groups{material_keys(), run_keys()};
+  for (const EffectRow& row : effect_rows())
+    groups.push_back({row.name, row.help, name_of(row.acts), row.models, row.keys});
+  groups.push_back(event_keys());
+  return groups;
+}
+
+std::string value_of(const SceneKey& key) {
+  static constexpr const char* kNames[] = {"text",   "number",    "whole number", "true or false", "quantity",
+                                           "vector", "direction", "selection",    "list",          "table"};
+  const std::string name = kNames[static_cast<std::size_t>(key.kind)];
+  if (!key.unit) return name;
+  const std::string what = dimension_name(*key.unit);
+  return key.kind == K::quantity ? what : fmt::format("{} of {}", name, what);
+}
+
+void refuse_unknown_keys(const SceneValue& scene, const std::string& file) {
+  check_table(scene, "the scene", file, known_in(""));
+  for (const auto& [key, value] : scene.members) {
+    const std::string one = fmt::format("[{}]", key), several = fmt::format("[{}]", one);
+    const std::vector<std::string> of_one = known_in(one), of_several = known_in(several);
+    const bool array = of_one.empty();
+    const std::vector<std::string>& known = array ? of_several : of_one;
+    check_table(value, array ? several : one, file, known);
+    for (const SceneValue& item : value.items) check_table(item, array ? several : one, file, known);
+    const std::vector<std::string> of_named = known_in(fmt::format("[{}.NAME]", key));
+    if (of_named.empty()) continue;
+    for (const auto& [name, member] : value.members)
+      check_table(member, fmt::format("[{}.{}]", key, name), file, of_named);
+  }
+}
+
+}  // namespace flexel::simulate
