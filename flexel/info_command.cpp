@@ -21,8 +21,8 @@
 #include "formats/exchange/surface_file.h"
 #include "formats/part/topology.h"
 #include "voxelize/heal/heal.h"
-#include "voxelize/thickness.h"
 #include "voxelize/measure_part.h"
+#include "voxelize/thickness.h"
 #include "voxelize/voxelize.h"
 
 namespace flexel::commands {

@@ -61,7 +61,8 @@ void declare(CLI::App& app, Arguments& arguments) {
       "run, and need not be given");
   app.add_option("--threads", arguments.options.threads, "Threads; 0: every core")
       ->check(CLI::NonNegativeNumber);
-  app.add_option("--summary", arguments.summary, "Write the summary as JSON to this file (docs/reference/summary.md)");
+  app.add_option("--summary", arguments.summary,
+                 "Write the summary as JSON to this file (docs/reference/summary.md)");
   app.add_flag("--explain", arguments.options.explain,
                "Say which effects run and why, and the share of time of each");
   app.add_option("--timeout", arguments.timeout,
@@ -87,8 +88,9 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_option("--isa", arguments.options.isa,
                  "Timed runs: instruction set of the kernel (portable, avx2, avx512); the best by itself");
   app.add_flag("!--no-stress", arguments.options.stress, "Leave out the stresses (docs/theory/stress.md)");
-  app.add_flag("!--no-estimate", arguments.options.estimate,
-               "Leave out the error bars, and the two coarser runs that they come from (docs/theory/error-bars.md)");
+  app.add_flag(
+      "!--no-estimate", arguments.options.estimate,
+      "Leave out the error bars, and the two coarser runs that they come from (docs/theory/error-bars.md)");
   app.add_flag("--quiet", arguments.quiet, "Say nothing but warnings and errors");
   app.add_flag("--verbose", arguments.verbose, "Say all that was found");
   app.add_flag("--compress", arguments.compress, "Compress the arrays of the body file");

@@ -10,12 +10,12 @@
 #include "base/files/output_file.h"
 #include "base/units.h"
 #include "flexel/study/conclude.h"
-#include "flexel/study/runs/history_csv.h"
 #include "flexel/study/page.h"
 #include "flexel/study/plots.h"
-#include "flexel/study/tables.h"
-#include "flexel/study/session.h"
+#include "flexel/study/runs/history_csv.h"
 #include "flexel/study/runs/surfaces.h"
+#include "flexel/study/session.h"
+#include "flexel/study/tables.h"
 
 namespace flexel::study {
 namespace {

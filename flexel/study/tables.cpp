@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 
 #include "base/units.h"
-#include "flexel/study/tables.h"
 #include "flexel/study/study.h"
+#include "flexel/study/tables.h"
 
 namespace flexel::study {
 namespace {

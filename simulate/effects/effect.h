@@ -1,4 +1,4 @@
-// What an effect is, and how a run holds those that its scene calls for (docs/effects.md).
+// What an effect is, and how a run holds those that its scene calls for (docs/measurements/effects.md).
 //
 // An effect is a class E derived from Effect, in one header (with its .cpp) in simulate/effects, and one row
 // of simulate/scene/effects.cpp. Beside what it overrides it has

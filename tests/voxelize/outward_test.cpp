@@ -1,6 +1,6 @@
 // The polygons of the body's surface face out of the matter, whatever way they faced in the file.
-#include "voxelize/measure_part.h"
 #include "voxelize/heal/outward.h"
+#include "voxelize/measure_part.h"
 
 #include <gtest/gtest.h>
 

@@ -11,9 +11,9 @@
 #include "formats/exchange/import.h"
 #include "formats/lattice/locate.h"
 #include "tests/voxelize/shapes.h"
-#include "voxelize/measure_part.h"
 #include "voxelize/classify/axis_parity.h"
 #include "voxelize/lattice/align.h"
+#include "voxelize/measure_part.h"
 #include "voxelize/mesh/part_mesh.h"
 
 namespace flexel::voxelize {
