@@ -12,7 +12,7 @@
 #include "formats/lattice/merge.h"
 #include "simulate/answer.h"
 #include "simulate/effects/rigid.h"
-#include "simulate/models/stress.h"
+#include "simulate/matter/stress.h"
 #include "simulate/result/options.h"
 #include "simulate/result/result.h"
 #include "simulate/scene/scene.h"

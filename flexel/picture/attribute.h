@@ -28,7 +28,7 @@ struct Attribute {
 [[nodiscard]] Attribute strain(const Body& body);
 
 // The largest "displacement", "strain" or "von_mises" of the part's matter, as the summary of a run gives it
-// (formats/lattice/fields.h, simulate/models/stress.h); nothing for other names.
+// (formats/lattice/fields.h, simulate/matter/stress.h); nothing for other names.
 [[nodiscard]] std::optional<double> largest_in_matter(const Body& body, const std::string& name);
 
 // Values of cells at the elements: the mean over the element's cells, weighted by fill; and of elements in

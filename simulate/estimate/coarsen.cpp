@@ -14,7 +14,7 @@
 #include "base/disjoint_sets.h"
 #include "base/error.h"
 #include "simulate/estimate/coarse_grid.h"
-#include "simulate/models/stress.h"
+#include "simulate/matter/stress.h"
 
 namespace flexel::simulate {
 namespace {

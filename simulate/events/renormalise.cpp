@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include "simulate/models/rest_shape.h"
+#include "simulate/models/set_rest_shape.h"
 
 namespace flexel::simulate {
 

@@ -20,6 +20,8 @@
 
 namespace flexel::simulate {
 
+inline constexpr int kEntry[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}};
+
 // What the cells of a body remember. Refers to the body's columns while it lives.
 class RestShapes {
  public:
@@ -38,16 +40,6 @@ class RestShapes {
                *broken_ = nullptr, *connections_ = nullptr;
   bool any_ = false;
 };
-
-// Makes the present shape, `displacement` (elements x 3, m), the rest shape of the cells with cells[c] != 0
-// and of the connections between elements with elements[e] != 0 (centre placement). Cells that are broken
-// stay as they are. Hardening (plastic_strain, spring_strain) does too. Throws DivergedError: a cell or an
-// element is turned inside out there.
-void renormalise(Body& body, const Problem& problem, const std::vector<Vec3>& displacement,
-                 const std::vector<std::uint8_t>& cells, const std::vector<std::uint8_t>& elements);
-
-// Likewise of everything that is simulated.
-void renormalise_all(Body& body, const Problem& problem, const std::vector<Vec3>& displacement);
 
 // (elements) m, column "settled"; empty: none.
 [[nodiscard]] std::vector<Vec3> settled_displacement(const Body& body);

@@ -11,8 +11,8 @@
 #include "base/units.h"
 #include "formats/lattice/fields.h"
 #include "simulate/input/infill.h"
+#include "simulate/matter/stress.h"
 #include "simulate/models/connections.h"
-#include "simulate/models/stress.h"
 
 namespace flexel::simulate {
 

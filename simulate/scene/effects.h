@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "simulate/effects/effect.h"
-#include "simulate/scene/scene_keys.h"
+#include "simulate/scene/scene_key.h"
 
 namespace flexel::simulate {
 

@@ -1,27 +1,13 @@
 // The keys of a scene: what a reference page, the completion and "did you mean" are made from. Those of an
 // effect stand in its row (simulate/scene/effects.cpp), the general ones in scene_keys.cpp.
 #pragma once
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "base/units.h"
 #include "simulate/input/scene_table.h"
+#include "simulate/scene/scene_key.h"
 
 namespace flexel::simulate {
-
-enum class KeyKind { text, number, whole_number, flag, quantity, vector, direction, selection, list, table };
-
-struct SceneKey {
-  // Where it may stand: "" (top of the scene), "[gravity]", "[[load]]", "[parts.NAME]"; "source of [gravity]"
-  // for a table that is written in one line.
-  std::string table;
-  std::string key;
-  KeyKind kind = KeyKind::text;
-  std::optional<Dimension> unit;  // of quantities, vectors and lists of them
-  std::string standard;           // default; "required"; "": nothing
-  std::string help;               // one line
-};
 
 // A row of the reference: an effect, or a general table.
 struct SceneKeyGroup {

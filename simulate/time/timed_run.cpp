@@ -19,6 +19,7 @@
 #include "simulate/live/live_link.h"
 #include "simulate/models/damping_factors.h"
 #include "simulate/models/rest_shape.h"
+#include "simulate/models/set_rest_shape.h"
 #include "simulate/probes/report.h"
 #include "simulate/time/checkpoint.h"
 #include "simulate/time/dynamic_relaxation.h"

@@ -1,6 +1,6 @@
 // Rest shapes: free of force where they were taken, forces and stiffness as derivatives of the energy, the
 // hot loop against the cells of equilibrium, and parts that were renormalised against parts made that way.
-#include "simulate/models/rest_shape.h"
+#include "simulate/models/set_rest_shape.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // Stresses against uniform fields, beam theory, Saint-Venant's torsion and Kirsch's plate.
-#include "simulate/models/stress.h"
+#include "simulate/matter/stress.h"
 
 #include <gtest/gtest.h>
 

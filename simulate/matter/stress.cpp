@@ -1,5 +1,5 @@
 // Cells first, then elements; both in parallel, each written by one thread in a fixed order.
-#include "simulate/models/stress.h"
+#include "simulate/matter/stress.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
