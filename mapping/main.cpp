@@ -19,6 +19,7 @@
 #include "mapping/anchors/other_surfaces.h"
 #include "mapping/map_part.h"
 #include "mapping/methods/binding_file.h"
+#include "mapping/methods/map_surface.h"
 #include "mapping/options.h"
 #include "mapping/output.h"
 #include "mapping/report/report.h"

@@ -12,6 +12,7 @@
 #include <cstring>
 
 #include "mapping/anchors/search.h"
+#include "mapping/methods/apply.h"
 #include "mapping/methods/bind.h"
 #include "motions.h"
 

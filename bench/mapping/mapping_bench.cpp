@@ -13,7 +13,9 @@
 #include "base/parallel.h"
 #include "formats/part/topology.h"
 #include "mapping/anchors/nearest.h"
+#include "mapping/methods/apply.h"
 #include "mapping/methods/bind.h"
+#include "mapping/methods/map_surface.h"
 
 namespace flexel::mapping {
 namespace {

@@ -2,11 +2,12 @@
 // moves by a translation and a 3x3 product. With every method, the handedness of the vertex's deformed frame
 // shows an inversion. The Voronoi check compares the distance to the origin with those to the elements
 // connected with it: O(1), and sufficient unless the body folds onto itself.
+#include "mapping/methods/apply.h"
+
 #include <cmath>
 
 #include "base/bucket.h"
 #include "mapping/anchors/frame_kernel.h"
-#include "mapping/methods/bind.h"
 #include "mapping/methods/smooth.h"
 
 namespace flexel::mapping {

@@ -35,19 +35,4 @@ struct Binding {
 // The same with known anchors: those of a surface that was cut along cracks (mapping/crack/crack.h).
 [[nodiscard]] Binding bind(const Body& body, MapMethod method, VertexAnchors anchors, std::size_t states = 1);
 
-// Maps the state `position` (elements x 3, m) onto the vertices: (vertices x 3) m.
-[[nodiscard]] std::vector<Vec3> apply(const Binding& binding, const Body& body,
-                                      const std::vector<Vec3>& position);
-
-// (vertices) bits of MapFlag: what became of the quadruple that holds each vertex, and of the vertex. 0 for
-// vertices that no polygon uses, unless they are not finite.
-[[nodiscard]] std::vector<std::uint8_t> judge(const Binding& binding, const Body& body,
-                                              const std::vector<Vec3>& position,
-                                              const std::vector<Vec3>& displacement);
-
-// apply() and judge(), and the data of each vertex in the binding.
-[[nodiscard]] MapResult map_state(const Binding& binding, const Body& body);
-// What `options` ask for beyond that: vertices far outside, checks by name. Throws InputError: --far refuse.
-void complete(const Body& body, const MapOptions& options, MapResult& result);
-
 }  // namespace flexel::mapping

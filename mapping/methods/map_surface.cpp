@@ -12,6 +12,7 @@
 #include "base/nearest_word.h"
 #include "base/stop.h"
 #include "mapping/checks/cgal_checks.h"
+#include "mapping/methods/apply.h"
 #include "mapping/methods/bind.h"
 
 namespace flexel::mapping {

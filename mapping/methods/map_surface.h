@@ -2,6 +2,7 @@
 #pragma once
 #include "base/program/progress.h"
 #include "formats/lattice/body.h"
+#include "mapping/methods/bind.h"
 #include "mapping/types/options.h"
 #include "mapping/types/result.h"
 
@@ -14,5 +15,10 @@ namespace flexel::mapping {
 struct VertexAnchors;
 [[nodiscard]] MapResult map_surface(const Body& body, const MapOptions& options, const VertexAnchors& anchors,
                                     Progress& progress);
+
+// apply() and judge(), and the data of each vertex in the binding.
+[[nodiscard]] MapResult map_state(const Binding& binding, const Body& body);
+// What `options` ask for beyond that: vertices far outside, checks by name. Throws InputError: --far refuse.
+void complete(const Body& body, const MapOptions& options, MapResult& result);
 
 }  // namespace flexel::mapping

@@ -16,6 +16,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "simulate/linear/conjugate_gradients.h"
 
 namespace flexel::simulate {
 namespace {

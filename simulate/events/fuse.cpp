@@ -12,6 +12,7 @@
 #include "base/error.h"
 #include "base/units.h"
 #include "simulate/models/cells.h"
+#include "simulate/models/set_rest_shape.h"
 
 namespace flexel::simulate {
 namespace {

@@ -87,147 +87,149 @@ Material with_damping(Material material, double damping) {
   return material;
 }
 
+// Made before main(): a table, by kind.
+const Material kLibrary[] = {
+    with_damping(
+        with_friction(
+            library_entry("steel", 210e9, 0.30, 7850, {235e6, 360e6, 0.26},
+                          "S235JR. EN 1993-1-1, 3.2.6, read at eurocodeapplied.com, strengths EN 10025-2 "
+                          "(3 to 16 mm) at ilongma.com, friction EN 1090-2, table 18, class D, at "
+                          "scribd.com; not read: damping EN 1991-1-4, F.2 (welded stack, 0.012 / 2 pi; "
+                          "help.scia.net has the prestandard's 0.015)"),
+            0.2),
+        0.0019),
+    with_friction(library_entry("steel S355", 210e9, 0.30, 7850, {355e6, 470e6, 0.22},
+                                "S355JR. As steel; strengths EN 10025-2 (3 to 16 mm), read at "
+                                "balingsteel.com, friction EN 1090-2, table 18, class D, at scribd.com"),
+                  0.2),
+    library_entry(
+        "steel 42CrMo4", 210e9, 0.30, 7850, {900e6, 1100e6, 0.10},
+        "Quenched and tempered, to 16 mm. Strengths EN 10083, read in Saarstahl's data sheet; elastic "
+        "figures as steel"),
+    library_entry("spring steel", 206e9, 0.264, 7850, {},
+                  "EN 10270-1 (E 206, G 81.5 GPa, hence poisson), read at mollificiomodenese.it"),
+    library_entry(
+        "stainless", 200e9, 0.30, 7900, {210e6, 520e6, 0.45},
+        "1.4301, plate. E, poisson (from G 77 GPa) read at makeitfrom.com, least strengths, elongation "
+        "(hot rolled) at wixsteel.com, density at agst.de"),
+    library_entry("stainless 316", 200e9, 0.30, 8000, {220e6, 520e6, 0.40},
+                  "1.4401. E read at woite-edelstahl.com, density and least strengths at metalsupplies.com "
+                  "(there 193 GPa); poisson as 1.4301"),
+    library_entry("cast iron", 110e9, 0.26, 7200, {0, 250e6, 0},
+                  "EN-GJL-250. EN 1561 (E 103 to 118 GPa), read at sn-castiron.nl"),
+    library_entry("ductile iron", 169e9, 0.28, 7100, {250e6, 400e6, 0.15},
+                  "EN-GJS-400-15. EN 1563, read at iron-foundry.com, poisson at sn-castiron.nl"),
+    library_entry(
+        "aluminium 6061", 68.9e9, 0.33, 2700, {241e6, 262e6, 0.10},
+        "T6, extruded, from 6.4 mm. Strengths ASTM B221 (35, 38 ksi), read at h2abc.com; the others "
+        "Aluminum Association, typical, at glemco.com (there strengths of 276 and 310 MPa, 12 %)"),
+    library_entry("aluminium 6082", 70e9, 0.33, 2700, {250e6, 290e6, 0.08},
+                  "T6. EN 755-2 (extruded, to 5 mm), read at top-factories.com, poisson (6000 series) at "
+                  "mfgrobots.com"),
+    library_entry("aluminium 5083", 71e9, 0.33, 2660, {125e6, 275e6, 0.11},
+                  "O/H111. Strengths EN 485-2 (to 50 mm), read at euralliage.com; E, density (Aluminum "
+                  "Association, typical), poisson (estimated) at ratnamsteels.com"),
+    library_entry("aluminium 2024", 73.1e9, 0.33, 2780, {345e6, 483e6, 0.18},
+                  "T3, typical. E (10600 ksi) read at substech.com, density and strength at matweb.com, "
+                  "yield and elongation at princeton.edu, poisson (T361) at makeitfrom.com"),
+    library_entry(
+        "aluminium 7075", 71.7e9, 0.33, 2810, {503e6, 572e6, 0.11},
+        "T6, typical. E (10400 ksi), density, strengths read at substech.com, poisson at wikipedia.org"),
+    library_entry(
+        "titanium", 113.8e9, 0.33, 4430, {827e6, 896e6, 0.10},
+        "Ti-6Al-4V annealed. E (16500 ksi), poisson, density read at asm.matweb.com, least strengths "
+        "(120, 130 ksi) at nickel-systems.com"),
+    library_entry("magnesium", 45e9, 0.35, 1770, {}, "AZ31B, read at alloysintl.com"),
+    library_entry(
+        "nickel alloy 718", 200e9, 0.29, 8220, {1034e6, 1276e6, 0.12},
+        "Aged. E (29.0e3 ksi), poisson read in Special Metals SMC-045, density at hightempmetals.com; "
+        "not read: strengths AMS 5663"),
+    library_entry("brass", 97e9, 0.31, 8490, {}, "C36000, read at ezlok.com"),
+    library_entry(
+        "copper", 117e9, 0.34, 8910, {},
+        "C11000. E (17.0e3 ksi), density read in Hussey Copper's data sheet, poisson at shlionmetal.com"),
+    library_entry("bronze", 110e9, 0.34, 8860, {},
+                  "C51000. E, density read in Olin Brass's data sheet, poisson at makeitfrom.com"),
+    library_entry("tungsten", 411e9, 0.28, 19300, {},
+                  "Pure. CRC Handbook and Cardarelli 2018, read at matmake.com"),
+    library_entry("PLA", 3.25e9, 0.36, 1240, {45e6, 48e6, 0.025, 26e6},
+                  "Printed. E (data sheets' example) read at filamentspecs.com, poisson, density in "
+                  "FreeCAD's library, strengths, elongation in Stratasys's data sheet (ASTM D638; E 3.04 "
+                  "GPa, 2.54 across layers) at pro3dcomposites.com (additive.tools has 50 to 65 MPa, 35 to "
+                  "45 across layers)"),
+    library_entry("PETG", 1.94e9, 0.38, 1270, {0, 44e6, 0, 25e6},
+                  "Printed. E (data sheets' example) read at filamentspecs.com, density in UltiMaker's "
+                  "fdm_materials (github.com), strengths (least of 44 to 56 and 25 to 38 MPa) at "
+                  "additive.tools; not read: poisson"),
+    library_entry("ABS", 2.0e9, 0.37, 1040, {0, 33e6, 0.046},
+                  "Printed. E, density SUSTAABS data sheet (ISO 527; molded it yields at 38 MPa), read at "
+                  "studylib.net, poisson in FreeCAD's library (0.394 at "
+                  "themechanicalengineeringhandbook.com), strength Stratasys ABS-M30 (ISO 527, by "
+                  "Loughborough University; 36 MPa by ASTM D638) at pdfslide.net, elongation (UltiMaker) "
+                  "at github.com"),
+    library_entry("ASA", 2.0e9, 0.37, 1070, {0, 35e6, 0},
+                  "Molded. E, density, strength (least of 2.0 to 2.5 GPa and 35 to 50 MPa), read at "
+                  "renato.design (Polymaker's, printed, has 43.8 MPa at github.com); poisson taken as "
+                  "ABS"),
+    library_entry(
+        "PA12", 1.65e9, 0.408, 930, {0, 48e6, 0.18},
+        "Laser sintered, EOS PA 2200. Strength, elongation read at layerx3d.in, density at additive.tools, "
+        "poisson (Duraform PA, dense) at nowpublishers.com (Rapid Prototyping J. 14/5); not read: E "
+        "(renato.design has 1.7 to 1.9 GPa)"),
+    library_entry("PA12 MJF", 1.8e9, 0.43, 1010, {0, 48e6, 0.12, 48e6},
+                  "Multi Jet Fusion, HP 3D High Reusability PA 12. HP's data sheet (ASTM D638, least of XY "
+                  "and Z), read at scribd.com"),
+    library_entry("durable resin", 1.26e9, 0.40, 1150, {0, 31.8e6, 0.49},
+                  "Stereolithography, Formlabs Durable, cured. Formlabs's data sheet (ASTM D638), read at "
+                  "manualmachine.com, density (of cured resins) at renato.design; poisson taken as 0.40"),
+    library_entry("polycarbonate", 2.4e9, 0.37, 1200, {65e6, 0, 0},
+                  "Makrolon 2405. Covestro's data sheet (ISO 527), read at scribd.com, poisson at "
+                  "themechanicalengineeringhandbook.com"),
+    library_entry("POM", 3.1e9, 0.37, 1420, {70e6, 0, 0},
+                  "Delrin 500P. DuPont's figures (ISO 527), read at a dealer's (zjxxg.cn), poisson "
+                  "(MatWeb's) in FreeCAD's library"),
+    library_entry("PMMA", 2.86e9, 0.38, 1190, {0, 75e6, 0.045},
+                  "Cast; read at designerdata.nl, poisson (MatWeb's) in FreeCAD's library"),
+    library_entry("PEEK", 4.2e9, 0.40, 1310, {116e6, 116e6, 0.15},
+                  "TECAPEEK natural. Ensinger's data sheet (ISO 527), quoted, read at github.com "
+                  "(TempestOS-Core); not read: poisson"),
+    library_entry(
+        "rubber", 1.2e6, 0.49, 930, {},
+        "Natural, soft. E chosen in the range 1 to 5 MPa, read at polymers.netzsch.com (matweb.com has G "
+        "0.5 MPa), density at thermopedia.com; nearly incompressible, poisson taken as 0.49"),
+    library_entry(
+        "silicone", 2.5e6, 0.48, 1170, {},
+        "Gent 1958's relation at 50 Shore A, computed (Ruess's, read at josephborrello.com, gives 3.4 "
+        "MPa); density (Silastic 55U) read at archive.org; nearly incompressible, poisson taken as 0.48"),
+    library_entry(
+        "TPU", 19.3e6, 0.45, 1180, {},
+        "80 Shore A. BASF Elastollan C78A data sheet (E 2800 psi), read at scribd.com; poisson taken as "
+        "0.45"),
+    library_entry("TPU 86A", 60e6, 0.45, 1200, {0, 7e6, 0, 5e6},
+                  "86 Shore A, laser sintered. E, strengths (ISO 527) read at shapeways.com, density "
+                  "(printed TPU) at additive.tools; breaks at 250 %, 90 % across layers; poisson taken as "
+                  "0.45"),
+    with_damping(
+        with_friction(
+            library_entry(
+                "concrete", 33e9, 0.20, 2400, {0, 2.9e6, 0},
+                "C30/37. EN 1992-1-1, table 3.1 (strength: mean axial tension), read at "
+                "buildinghow.com, poisson 3.1.3 in BHoM's datasets (github.com), density (C25) "
+                "in FreeCAD's library; not read: friction EN 1992-1-1, 6.2.5 (smooth; hindawi.com has "
+                "0.64), damping EN 1991-1-4, F.2 (building, 0.10 / 2 pi; help.scia.net has the "
+                "prestandard's 0.08)"),
+            0.6),
+        0.016),
+    library_entry("glass", 70e9, 0.20, 2500, {0, 45e6, 0},
+                  "Soda lime, annealed. EN 572 (strength: in bending), read at vasglass.gr"),
+    library_entry("borosilicate glass", 63e9, 0.20, 2230, {}, "ISO 3585, SCHOTT Duran, read at matmatch.com"),
+    library_entry("alumina", 370e9, 0.22, 3900, {}, "99.5 %, read at vertebr.ae"),
+};
+
 }  // namespace
 
 const std::vector<Material>& material_library() {
-  static const std::vector<Material> library = {
-      with_damping(
-          with_friction(
-              library_entry("steel", 210e9, 0.30, 7850, {235e6, 360e6, 0.26},
-                            "S235JR. EN 1993-1-1, 3.2.6, read at eurocodeapplied.com, strengths EN 10025-2 "
-                            "(3 to 16 mm) at ilongma.com, friction EN 1090-2, table 18, class D, at "
-                            "scribd.com; not read: damping EN 1991-1-4, F.2 (welded stack, 0.012 / 2 pi; "
-                            "help.scia.net has the prestandard's 0.015)"),
-              0.2),
-          0.0019),
-      with_friction(library_entry("steel S355", 210e9, 0.30, 7850, {355e6, 470e6, 0.22},
-                                  "S355JR. As steel; strengths EN 10025-2 (3 to 16 mm), read at "
-                                  "balingsteel.com, friction EN 1090-2, table 18, class D, at scribd.com"),
-                    0.2),
-      library_entry(
-          "steel 42CrMo4", 210e9, 0.30, 7850, {900e6, 1100e6, 0.10},
-          "Quenched and tempered, to 16 mm. Strengths EN 10083, read in Saarstahl's data sheet; elastic "
-          "figures as steel"),
-      library_entry("spring steel", 206e9, 0.264, 7850, {},
-                    "EN 10270-1 (E 206, G 81.5 GPa, hence poisson), read at mollificiomodenese.it"),
-      library_entry(
-          "stainless", 200e9, 0.30, 7900, {210e6, 520e6, 0.45},
-          "1.4301, plate. E, poisson (from G 77 GPa) read at makeitfrom.com, least strengths, elongation "
-          "(hot rolled) at wixsteel.com, density at agst.de"),
-      library_entry("stainless 316", 200e9, 0.30, 8000, {220e6, 520e6, 0.40},
-                    "1.4401. E read at woite-edelstahl.com, density and least strengths at metalsupplies.com "
-                    "(there 193 GPa); poisson as 1.4301"),
-      library_entry("cast iron", 110e9, 0.26, 7200, {0, 250e6, 0},
-                    "EN-GJL-250. EN 1561 (E 103 to 118 GPa), read at sn-castiron.nl"),
-      library_entry("ductile iron", 169e9, 0.28, 7100, {250e6, 400e6, 0.15},
-                    "EN-GJS-400-15. EN 1563, read at iron-foundry.com, poisson at sn-castiron.nl"),
-      library_entry(
-          "aluminium 6061", 68.9e9, 0.33, 2700, {241e6, 262e6, 0.10},
-          "T6, extruded, from 6.4 mm. Strengths ASTM B221 (35, 38 ksi), read at h2abc.com; the others "
-          "Aluminum Association, typical, at glemco.com (there strengths of 276 and 310 MPa, 12 %)"),
-      library_entry("aluminium 6082", 70e9, 0.33, 2700, {250e6, 290e6, 0.08},
-                    "T6. EN 755-2 (extruded, to 5 mm), read at top-factories.com, poisson (6000 series) at "
-                    "mfgrobots.com"),
-      library_entry("aluminium 5083", 71e9, 0.33, 2660, {125e6, 275e6, 0.11},
-                    "O/H111. Strengths EN 485-2 (to 50 mm), read at euralliage.com; E, density (Aluminum "
-                    "Association, typical), poisson (estimated) at ratnamsteels.com"),
-      library_entry("aluminium 2024", 73.1e9, 0.33, 2780, {345e6, 483e6, 0.18},
-                    "T3, typical. E (10600 ksi) read at substech.com, density and strength at matweb.com, "
-                    "yield and elongation at princeton.edu, poisson (T361) at makeitfrom.com"),
-      library_entry(
-          "aluminium 7075", 71.7e9, 0.33, 2810, {503e6, 572e6, 0.11},
-          "T6, typical. E (10400 ksi), density, strengths read at substech.com, poisson at wikipedia.org"),
-      library_entry(
-          "titanium", 113.8e9, 0.33, 4430, {827e6, 896e6, 0.10},
-          "Ti-6Al-4V annealed. E (16500 ksi), poisson, density read at asm.matweb.com, least strengths "
-          "(120, 130 ksi) at nickel-systems.com"),
-      library_entry("magnesium", 45e9, 0.35, 1770, {}, "AZ31B, read at alloysintl.com"),
-      library_entry(
-          "nickel alloy 718", 200e9, 0.29, 8220, {1034e6, 1276e6, 0.12},
-          "Aged. E (29.0e3 ksi), poisson read in Special Metals SMC-045, density at hightempmetals.com; "
-          "not read: strengths AMS 5663"),
-      library_entry("brass", 97e9, 0.31, 8490, {}, "C36000, read at ezlok.com"),
-      library_entry(
-          "copper", 117e9, 0.34, 8910, {},
-          "C11000. E (17.0e3 ksi), density read in Hussey Copper's data sheet, poisson at shlionmetal.com"),
-      library_entry("bronze", 110e9, 0.34, 8860, {},
-                    "C51000. E, density read in Olin Brass's data sheet, poisson at makeitfrom.com"),
-      library_entry("tungsten", 411e9, 0.28, 19300, {},
-                    "Pure. CRC Handbook and Cardarelli 2018, read at matmake.com"),
-      library_entry("PLA", 3.25e9, 0.36, 1240, {45e6, 48e6, 0.025, 26e6},
-                    "Printed. E (data sheets' example) read at filamentspecs.com, poisson, density in "
-                    "FreeCAD's library, strengths, elongation in Stratasys's data sheet (ASTM D638; E 3.04 "
-                    "GPa, 2.54 across layers) at pro3dcomposites.com (additive.tools has 50 to 65 MPa, 35 to "
-                    "45 across layers)"),
-      library_entry("PETG", 1.94e9, 0.38, 1270, {0, 44e6, 0, 25e6},
-                    "Printed. E (data sheets' example) read at filamentspecs.com, density in UltiMaker's "
-                    "fdm_materials (github.com), strengths (least of 44 to 56 and 25 to 38 MPa) at "
-                    "additive.tools; not read: poisson"),
-      library_entry("ABS", 2.0e9, 0.37, 1040, {0, 33e6, 0.046},
-                    "Printed. E, density SUSTAABS data sheet (ISO 527; molded it yields at 38 MPa), read at "
-                    "studylib.net, poisson in FreeCAD's library (0.394 at "
-                    "themechanicalengineeringhandbook.com), strength Stratasys ABS-M30 (ISO 527, by "
-                    "Loughborough University; 36 MPa by ASTM D638) at pdfslide.net, elongation (UltiMaker) "
-                    "at github.com"),
-      library_entry("ASA", 2.0e9, 0.37, 1070, {0, 35e6, 0},
-                    "Molded. E, density, strength (least of 2.0 to 2.5 GPa and 35 to 50 MPa), read at "
-                    "renato.design (Polymaker's, printed, has 43.8 MPa at github.com); poisson taken as "
-                    "ABS"),
-      library_entry(
-          "PA12", 1.65e9, 0.408, 930, {0, 48e6, 0.18},
-          "Laser sintered, EOS PA 2200. Strength, elongation read at layerx3d.in, density at additive.tools, "
-          "poisson (Duraform PA, dense) at nowpublishers.com (Rapid Prototyping J. 14/5); not read: E "
-          "(renato.design has 1.7 to 1.9 GPa)"),
-      library_entry("PA12 MJF", 1.8e9, 0.43, 1010, {0, 48e6, 0.12, 48e6},
-                    "Multi Jet Fusion, HP 3D High Reusability PA 12. HP's data sheet (ASTM D638, least of XY "
-                    "and Z), read at scribd.com"),
-      library_entry("durable resin", 1.26e9, 0.40, 1150, {0, 31.8e6, 0.49},
-                    "Stereolithography, Formlabs Durable, cured. Formlabs's data sheet (ASTM D638), read at "
-                    "manualmachine.com, density (of cured resins) at renato.design; poisson taken as 0.40"),
-      library_entry("polycarbonate", 2.4e9, 0.37, 1200, {65e6, 0, 0},
-                    "Makrolon 2405. Covestro's data sheet (ISO 527), read at scribd.com, poisson at "
-                    "themechanicalengineeringhandbook.com"),
-      library_entry("POM", 3.1e9, 0.37, 1420, {70e6, 0, 0},
-                    "Delrin 500P. DuPont's figures (ISO 527), read at a dealer's (zjxxg.cn), poisson "
-                    "(MatWeb's) in FreeCAD's library"),
-      library_entry("PMMA", 2.86e9, 0.38, 1190, {0, 75e6, 0.045},
-                    "Cast; read at designerdata.nl, poisson (MatWeb's) in FreeCAD's library"),
-      library_entry("PEEK", 4.2e9, 0.40, 1310, {116e6, 116e6, 0.15},
-                    "TECAPEEK natural. Ensinger's data sheet (ISO 527), quoted, read at github.com "
-                    "(TempestOS-Core); not read: poisson"),
-      library_entry(
-          "rubber", 1.2e6, 0.49, 930, {},
-          "Natural, soft. E chosen in the range 1 to 5 MPa, read at polymers.netzsch.com (matweb.com has G "
-          "0.5 MPa), density at thermopedia.com; nearly incompressible, poisson taken as 0.49"),
-      library_entry(
-          "silicone", 2.5e6, 0.48, 1170, {},
-          "Gent 1958's relation at 50 Shore A, computed (Ruess's, read at josephborrello.com, gives 3.4 "
-          "MPa); density (Silastic 55U) read at archive.org; nearly incompressible, poisson taken as 0.48"),
-      library_entry(
-          "TPU", 19.3e6, 0.45, 1180, {},
-          "80 Shore A. BASF Elastollan C78A data sheet (E 2800 psi), read at scribd.com; poisson taken as "
-          "0.45"),
-      library_entry("TPU 86A", 60e6, 0.45, 1200, {0, 7e6, 0, 5e6},
-                    "86 Shore A, laser sintered. E, strengths (ISO 527) read at shapeways.com, density "
-                    "(printed TPU) at additive.tools; breaks at 250 %, 90 % across layers; poisson taken as "
-                    "0.45"),
-      with_damping(
-          with_friction(
-              library_entry(
-                  "concrete", 33e9, 0.20, 2400, {0, 2.9e6, 0},
-                  "C30/37. EN 1992-1-1, table 3.1 (strength: mean axial tension), read at "
-                  "buildinghow.com, poisson 3.1.3 in BHoM's datasets (github.com), density (C25) "
-                  "in FreeCAD's library; not read: friction EN 1992-1-1, 6.2.5 (smooth; hindawi.com has "
-                  "0.64), damping EN 1991-1-4, F.2 (building, 0.10 / 2 pi; help.scia.net has the "
-                  "prestandard's 0.08)"),
-              0.6),
-          0.016),
-      library_entry("glass", 70e9, 0.20, 2500, {0, 45e6, 0},
-                    "Soda lime, annealed. EN 572 (strength: in bending), read at vasglass.gr"),
-      library_entry("borosilicate glass", 63e9, 0.20, 2230, {},
-                    "ISO 3585, SCHOTT Duran, read at matmatch.com"),
-      library_entry("alumina", 370e9, 0.22, 3900, {}, "99.5 %, read at vertebr.ae"),
-  };
+  static const std::vector<Material> library(std::begin(kLibrary), std::end(kLibrary));
   return library;
 }
 

@@ -10,6 +10,7 @@
 #include "base/files/files.h"
 #include "base/files/output_file.h"
 #include "bodies.h"
+#include "mapping/methods/map_surface.h"
 #include "motions.h"
 
 namespace flexel::mapping {

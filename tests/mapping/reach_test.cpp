@@ -7,6 +7,7 @@
 #include <random>
 
 #include "mapping/anchors/blend_weights.h"
+#include "mapping/methods/apply.h"
 #include "mapping/methods/bind.h"
 #include "motions.h"
 

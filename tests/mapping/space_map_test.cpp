@@ -7,6 +7,7 @@
 #include <random>
 
 #include "base/error.h"
+#include "mapping/methods/apply.h"
 #include "mapping/methods/bind.h"
 #include "motions.h"
 

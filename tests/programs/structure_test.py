@@ -97,7 +97,7 @@ def test_files_do_not_include_each_other():
 def test_source_files_have_a_header():
     """Going to the header of a file works: it has the same name, or the file's begins with it (stepper_memory.cpp, stepper.h)."""
     # What a reader or a writer of one format gives is declared for all of them together.
-    shared = re.compile(r"formats/\w+/(read_\w+|write_\w+|\w+_reader|occt_mesh|occt_absent)\.cpp$|/main\.cpp$|/\w+_command\.cpp$")
+    shared = re.compile(r"formats/\w+/(read_\w+|write_\w+|\w+_reader|\w+_format|occt_mesh|occt_absent)\.cpp$|/main\.cpp$|/\w+_command\.cpp$")
     wrong = []
     for path in (path for folder in CODE for path in code_files(folder, ".cpp")):
         stems = [header.stem for header in path.parent.glob("*.h")]
