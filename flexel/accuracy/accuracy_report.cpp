@@ -67,4 +67,8 @@ std::string AccuracyReport::json() const {
   return json.dump();
 }
 
+std::string size_text(double metres) {
+  return fmt::format("{:.6g}mm", 1e3 * metres);
+}
+
 }  // namespace flexel::commands

@@ -45,4 +45,7 @@ struct AccuracyReport {
   [[nodiscard]] std::string json() const;  // docs/reference/summary.md, "accuracy"
 };
 
+// In words that --size takes: "1.25mm".
+[[nodiscard]] std::string size_text(double metres);
+
 }  // namespace flexel::commands

@@ -320,10 +320,6 @@ double processor_seconds() {
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
-std::string size_text(double metres) {
-  return fmt::format("{:.6g}mm", 1e3 * metres);
-}
-
 double preferred_number(double value, int to_a_decade, Rounded rounded) {
   // ISO 3: the rounded ones are no exact powers
   constexpr double kTwenty[] = {1,    1.12, 1.25, 1.4, 1.6, 1.8, 2,   2.24, 2.5, 2.8,

@@ -45,9 +45,6 @@ using SolveAt = std::function<SolvedRun(std::optional<double> size, const GoesOn
 
 [[nodiscard]] double seconds_since(std::chrono::steady_clock::time_point began);
 
-// In words that --size takes: "1.25mm".
-[[nodiscard]] std::string size_text(double metres);
-
 // The preferred number (ISO 3: 10 or 20 to a decade) that is nearest, or the next one above.
 enum class Rounded { nearest, up };
 [[nodiscard]] double preferred_number(double value, int to_a_decade, Rounded rounded);

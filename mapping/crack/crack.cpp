@@ -10,7 +10,6 @@
 #include "base/error.h"
 #include "base/stop.h"
 #include "formats/part/topology.h"
-#include "mapping/crack/crack_carved.h"
 #include "mapping/crack/crack_pieces.h"
 
 namespace flexel::mapping {

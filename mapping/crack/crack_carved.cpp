@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "mapping/crack/crack.h"
 #include "mapping/crack/crack_pieces.h"
 
 namespace flexel::mapping {

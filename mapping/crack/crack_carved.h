@@ -1,6 +1,7 @@
 // What [[event]] carve took away (docs/reference/events.md), as a piece of the part that is left out: the
 // surface is parted along the voxels that went, so that the part comes out closed.
 #pragma once
+#include "formats/lattice/fragments_of_body.h"
 #include "mapping/crack/cracked_surface.h"
 
 namespace flexel::mapping {

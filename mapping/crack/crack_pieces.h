@@ -1,5 +1,6 @@
 // Puts the cut triangles and walls of all parts together to one surface whose parts are the pieces.
 #pragma once
+#include "formats/lattice/fragments_of_body.h"
 #include "mapping/crack/crack_caps.h"
 #include "mapping/crack/cracked_surface.h"
 

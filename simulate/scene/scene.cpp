@@ -12,6 +12,7 @@
 #include "simulate/input/infill.h"
 #include "simulate/input/material_names.h"
 #include "simulate/scene/events.h"
+#include "simulate/scene/scene_keys.h"
 
 namespace flexel::simulate {
 namespace {
