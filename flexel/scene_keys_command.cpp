@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "base/files/files.h"
+#include "base/files/output_file.h"
 #include "base/program/arguments.h"
 #include "flexel/commands.h"
 #include "simulate/scene/scene_keys.h"

@@ -3,6 +3,7 @@
 #include <memory>
 #include <optional>
 
+#include "base/program/progress.h"
 #include "flexel/picture/attribute.h"
 #include "flexel/picture/picture_options.h"
 #include "flexel/picture/render/best_view.h"

@@ -199,8 +199,9 @@ int side_of_wall(const CrackMesh& mesh, std::uint32_t node, std::uint32_t previo
   return !bounds ? 0 : is_above(polygon, axis, on) ? 1 : -1;
 }
 
-// Corners at one node that hang together by edges, as sets.
-DisjointSets fans_around(const CrackMesh& mesh, std::span<const Corner> around) {
+}  // namespace
+
+DisjointSets PieceBuilder::fans_around(const CrackMesh& mesh, std::span<const Corner> around) {
   DisjointSets fans(around.size());
   std::vector<std::pair<std::uint32_t, std::uint32_t>> spokes;  // the edge's other end, corner
   for (std::uint32_t k = 0; k < around.size(); ++k) {
@@ -223,8 +224,6 @@ DisjointSets fans_around(const CrackMesh& mesh, std::span<const Corner> around) 
   }
   return fans;
 }
-
-}  // namespace
 
 // `around`: all corners at one node in one fragment.
 void PieceBuilder::place_fans(const CrackMesh& mesh, std::span<const Corner> around,

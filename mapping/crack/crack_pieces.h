@@ -1,5 +1,6 @@
 // Puts the cut triangles and walls of all parts together to one surface whose parts are the pieces.
 #pragma once
+#include "base/disjoint_sets.h"
 #include "formats/lattice/fragments_of_body.h"
 #include "mapping/crack/crack_caps.h"
 #include "mapping/crack/cracked_surface.h"
@@ -60,6 +61,8 @@ class PieceBuilder {
   [[nodiscard]] Holder holder(const CrackMesh& mesh, const CrackPolygon& polygon, std::uint32_t node) const;
   [[nodiscard]] std::uint32_t add_vertex(const CrackMesh& mesh, std::uint32_t node, std::uint32_t element);
   void place_vertex(const CrackMesh& mesh, const CrackPolygon& polygon, std::uint32_t vertex);
+  // Corners at one node that hang together by edges, as sets.
+  [[nodiscard]] static DisjointSets fans_around(const CrackMesh& mesh, std::span<const Corner> around);
   void place_fans(const CrackMesh& mesh, std::span<const Corner> around, std::vector<std::uint32_t>& vertex);
   void add_polygon(std::uint32_t fragment, std::uint32_t source, std::span<const std::uint32_t> corners);
   [[nodiscard]] std::uint32_t face(std::uint32_t fragment, std::uint32_t source);

@@ -17,6 +17,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "simulate/linear/conjugate_gradients.h"
+#include "simulate/linear/multigrid.h"
 
 namespace flexel::simulate {
 namespace {

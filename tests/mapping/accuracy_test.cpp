@@ -5,6 +5,7 @@
 
 #include "base/parallel.h"
 #include "bodies.h"
+#include "mapping/methods/apply.h"
 #include "mapping/methods/bind.h"
 #include "mapping/report/report.h"
 #include "motions.h"
