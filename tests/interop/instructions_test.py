@@ -14,10 +14,9 @@ MOST_VARIANTS = 16  # of the hot loop, a model
 
 def effects():
     """The classes in the list of effects."""
-    text = (SOURCE / "simulate/scene/effects.h").read_text(encoding="utf-8")
-    found = re.search(r"using Effects = EffectList<([^>]*)>", text).group(1)
-    names = re.findall(r"\w+", found)
-    expect(len(names) >= 6, f"no list of effects in simulate/scene/effects.h: {names}")
+    text = (SOURCE / "simulate/scene/effects.cpp").read_text(encoding="utf-8")
+    names = re.findall(r"^ +row<(\w+)>\(", text, re.M)
+    expect(len(names) >= 6, f"no list of effects in simulate/scene/effects.cpp: {names}")
     return names
 
 
@@ -39,8 +38,8 @@ def bare():
 
 def of_effects(counted):
     """What was counted in effects, in the damped variants of the hot loop, or in what serves effects."""
-    names = "|".join([*effects(), "Held", "History"])
-    return {f: n for f, n in counted.items() if re.search(rf"flexel::simulate::({names})::|make_pass|Damping\)[12]|Composition\{{[^}}]", f)}
+    names = "|".join([*effects(), "PrescribedMotion", "EnergyHistory"])
+    return {f: n for f, n in counted.items() if re.search(rf"flexel::simulate::({names})::|ActiveEffect::|Damping\)[12]|Composition\{{[^}}]", f)}
 
 
 def test_a_bare_step_runs_nothing_of_any_effect():
