@@ -6,7 +6,7 @@ from harness import SOURCE, expect, expect_error, main, run
 def test_the_page_holds_the_tables():
     found = run("flexel", "scene-keys", "--markdown")
     expect(found.code == 0, found)
-    page = (SOURCE / "docs" / "scene-keys.md").read_text(encoding="utf-8")
+    page = (SOURCE / "docs/reference/scene-keys.md").read_text(encoding="utf-8")
     expect(found.out.decode() in page, "docs/reference/scene-keys.md is not what `flexel scene-keys --markdown` prints")
 
 
