@@ -169,7 +169,7 @@ void parse_events(TableReader& root, Scene& scene) {
     TableReader reader(*table, root.file(), "[[event]]");
     Event event = Events::parse(reader);
     if (!scene.run.time)
-      reader.fail("events apply in timed runs only: give [run] time = \"1 s\", or leave them out");
+      reader.fail("events happen in timed runs only: give [run] time = \"1 s\", or leave them out");
     if (!(event.at >= 0 && event.at <= *scene.run.time))
       reader.fail(
           fmt::format("\"at\" = {:.6g} s is not within the run, 0 s to {:.6g} s", event.at, *scene.run.time));

@@ -303,7 +303,7 @@ std::string TimedRun::stop() {
   return saved;
 }
 
-// Events up to `end` apply now, and another act begins.
+// Events up to `end` happen now, and another act begins.
 void TimedRun::apply(std::size_t end) {
   const StopWaits whole;  // between two acts there is no state to save
   Ledger ledger;
