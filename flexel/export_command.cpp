@@ -45,7 +45,7 @@ void declare(CLI::App& app, ExportArguments& arguments) {
                  "hex: the lattice's cells; tet: second-order tetrahedra, by the program gmsh")
       ->type_name("KIND")
       ->capture_default_str();
-  app.add_option("--element", arguments.element, "Of mesh_export::hexahedra: C3D8I or C3D8")
+  app.add_option("--element", arguments.element, "Of hexahedra: C3D8I or C3D8")
       ->type_name("NAME")
       ->capture_default_str();
   app.add_option("--nlgeom", arguments.nlgeom, "Large deflections: on, off, or as a coarse run tells")

@@ -1,7 +1,7 @@
 // A rigid link: selected matter that moves as one rigid body, driven by a force and a couple at a point
 // (RBE2).
 //
-// The matter is tied (effects/ties.h) to a rigid motion whose six numbers nobody gives: a displacement of the
+// The matter is tied (effects/supports.h) to a rigid motion whose six numbers nobody gives: a displacement of the
 // matter's middle and a rotation about it. The solver looks for those under which the ties pull with the
 // force and the couple (simulate/equilibrium/rigid_link_equilibrium.h).
 #pragma once

@@ -1,5 +1,5 @@
 // A scene file as a tree of plain values with their lines, and the reader that every part of a scene is
-// parsed with. Nothing here sees toml++: scene_toml.cpp turns its tables into this tree.
+// parsed with. Nothing here sees toml++: scene_table_toml.cpp turns its tables into this tree.
 #pragma once
 #include <optional>
 #include <string>

@@ -193,6 +193,15 @@ def test_none_takes_it_as_it_is():
     expect(not part["closed"] and part["healing"]["inside_by"] == "vote" and part["healing"]["holes"] == 0, f"{part}")
 
 
+def test_facets_without_area_are_refused():
+    lines = [[(0, 0, 0), (1, 0, 0), (2, 0, 0)], [(0, 0, 0), (2, 0, 0), (3, 0, 0)]]
+    write("lines.stl", binary_stl(lines))
+    for options in (["--size", "0.2 mm"], ["--size", "0.2 mm", "--heal", "wrap"], ["--count", "100"]):
+        found = run("flexel-voxelize", "lines.stl", *options, "-o", "lines.vtu")
+        expect(found.code == 2, f"{options}: {found.code} {found.err}")
+        expect("flexel-voxelize: error: " in found.err, found.err)
+
+
 def test_lost_features_are_named():
     for depth, words in ((2.0, "features lost: walls thinner than one cell (33 % of the places measured), the thinnest 2 mm at ("),
                          (4.0, "walls thinner than two cells, the thinnest 4 mm at (")):

@@ -179,7 +179,7 @@ TEST(Loads, ReactionsBalanceForcesAndMoments) {
 }
 
 // A small torque twists a square bar by T L / (G J), J = 0.1406 a^4 (Saint-Venant); eight cells are 3 % too
-// stiff (measure_test.cpp).
+// stiff (material_test_test.cpp).
 TEST(Loads, TorqueTwistsABar) {
   constexpr int n = 8;
   Body body = testing::box_body({.cells = {4 * n, n, n}, .spacing = Vec3::Constant(0.01 / n)});

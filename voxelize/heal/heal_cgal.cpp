@@ -8,6 +8,7 @@
 #include <CGAL/Polygon_mesh_processing/triangulate_hole.h>
 #include <CGAL/Surface_mesh.h>
 #include <CGAL/alpha_wrap_3.h>
+#include <algorithm>
 
 #include "base/stop.h"
 
@@ -49,10 +50,16 @@ struct HearsStops : CGAL::Alpha_wraps_3::internal::Wrapping_default_visitor {
 }  // namespace
 
 PartMesh alpha_wrap(const PartMesh& mesh, double alpha, double offset) {
+  const std::vector<Point> points = points_of(mesh.world);
+  // CGAL leaves out triangles whose corners lie on a line, and crashes where none is left.
+  if (std::all_of(mesh.corners.begin(), mesh.corners.end(), [&](const Corners& c) {
+        return CGAL::collinear(points[c[0]], points[c[1]], points[c[2]]);
+      }))
+    return {};
   CGAL::Surface_mesh<Point> wrap;
   HearsStops visitor;
-  CGAL::alpha_wrap_3(points_of(mesh.world), mesh.corners, alpha, offset, wrap,
-                     CGAL::parameters::default_values(), CGAL::parameters::visitor(visitor));
+  CGAL::alpha_wrap_3(points, mesh.corners, alpha, offset, wrap, CGAL::parameters::default_values(),
+                     CGAL::parameters::visitor(visitor));
   PartMesh result;
   for (const auto v : wrap.vertices()) {
     const Point& p = wrap.point(v);
@@ -100,7 +107,7 @@ std::optional<RayCaster::Hit> RayCaster::first(const Vec3& from, const Vec3& uni
     return tree_->numbers[static_cast<std::size_t>(id - tree_->triangles.cbegin())];
   };
   const auto met = tree_->tree.first_intersection(ray, [&](const auto& id) { return number(id) == own; });
-  if (!met) return std::nullopt;
+  if (!met || number(met->second) == own) return std::nullopt;  // a tree of one triangle skips none
   const Point* point = boost::get<Point>(&met->first);
   if (point == nullptr) return std::nullopt;  // along the triangle
   return Hit{std::sqrt(CGAL::squared_distance(origin, *point)), number(met->second)};
