@@ -13,7 +13,7 @@ namespace flexel::voxelize {
 [[nodiscard]] std::vector<Corners> close_loop(const std::vector<Vec3>& loop, const std::vector<Vec3>& across);
 
 // A closed surface around the triangles, from outside, through no opening narrower than `alpha` [m], `offset`
-// [m] off them (Portaneri et al., "Alpha wrapping with an offset", 2022). Its triangles have no polygon; it has none
+// [m] off them (Portaneri et al., "Alpha wrapping with an offset", 2022). Its triangles have no polygon. None
 // where every triangle of the mesh is a line.
 [[nodiscard]] PartMesh alpha_wrap(const PartMesh& mesh, double alpha, double offset);
 
