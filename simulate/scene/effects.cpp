@@ -1,4 +1,4 @@
-// The list of effects. A new one is added here and nowhere else.
+// The rows of all effects.
 #include "simulate/scene/effects.h"
 
 #include "simulate/effects/bonds.h"

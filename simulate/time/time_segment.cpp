@@ -34,19 +34,21 @@ bool has_cells_of_model_cells(const Problem& problem) {
 
 }  // namespace
 
-// Adds the time of its scope to that of the model, but for what the effects took of it.
+// Adds the time of its scope to `seconds`, but for what the effects took of it.
 class TimeSegment::ModelTimer {
  public:
-  explicit ModelTimer(TimeSegment& segment) : segment_(segment), others_(segment.effect_seconds()) {}
+  ModelTimer(const TimeSegment& segment, double& seconds)
+      : segment_(segment), seconds_(seconds), others_(segment.effect_seconds()) {}
   ~ModelTimer() {
     const std::chrono::duration<double> all = std::chrono::steady_clock::now() - began_;
-    segment_.kernel_seconds_ += all.count() - (segment_.effect_seconds() - others_);
+    seconds_ += all.count() - (segment_.effect_seconds() - others_);
   }
   ModelTimer(const ModelTimer&) = delete;
   ModelTimer& operator=(const ModelTimer&) = delete;
 
  private:
-  TimeSegment& segment_;
+  const TimeSegment& segment_;
+  double& seconds_;
   double others_;
   std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
 };
@@ -168,7 +170,7 @@ std::unique_ptr<EnergyHistory> TimeSegment::make_history(Ledger ledger) const {
 }
 
 void TimeSegment::look() {
-  const ModelTimer timer(*this);
+  const ModelTimer timer(*this, check_seconds_);
   stepper_->mark_broken(body_.broken);
   bound_->look(state_, paper_ ? &*paper_ : nullptr, stepper_->mass());
   if (guard_)
@@ -272,7 +274,7 @@ void TimeSegment::add_connection_forces(EnergyHistory* history) {
 }
 
 void TimeSegment::step_implicitly(Clock& clock, EnergyHistory* history, bool row) {
-  const ModelTimer timer(*this);
+  const ModelTimer timer(*this, kernel_seconds_);
   if (history && row) history->add_row_of(state_, euler_->supports());
   if (renews(clock)) euler_->forget();
   const double end = clock.epoch + static_cast<double>(clock.in_epoch + 1) * clock.step;

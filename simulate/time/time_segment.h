@@ -156,7 +156,7 @@ class TimeSegment {
   std::optional<ExplicitBarrier> guard_;  // of explicit steps of model `cells`
   std::vector<Vec3> steady_, outer_;      // (elements) N, of the effects that are constant; of all
   bool varies_ = false;
-  double kernel_seconds_ = 0, paper_seconds_ = 0;
+  double kernel_seconds_ = 0, check_seconds_ = 0, paper_seconds_ = 0;  // steps; bounds on them
   int newton_iterations_ = 0, cg_iterations_ = 0;
 };
 

@@ -59,7 +59,7 @@ void TimeSegment::add_effort(SimulateResult& result, bool explained) {
   std::vector<EffectShare> shares{{"cells",
                                    euler_ ? "model of every part, Newton's method and its linear solver"
                                           : fmt::format("model of every part, kernel {}", stepper_->isa()),
-                                   kernel_seconds_}};
+                                   kernel_seconds_ + check_seconds_}};
   if (paper_) shares.push_back({"connections", "model of centre-placed parts", paper_seconds_});
   for (const ActiveEffect& effect : effects_) shares.push_back({effect.name, effect.why, effect.seconds});
   add_shares(shares, result.shares);
