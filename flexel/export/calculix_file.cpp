@@ -160,10 +160,37 @@ class Writer {
       comment(section.fill == 1 ? fmt::format("{}, {}", material.name, material.source)
                                 : fmt::format("{} times {:.6g}, the mean fill of {} elements", material.name,
                                               section.fill, section.elements));
-      line("*MATERIAL, NAME=MAT_{}\n*ELASTIC\n{:.10g},{:.10g}\n*DENSITY\n{:.10g}", section_name(s),
-           kStress * section.fill * material.young, material.poisson,
-           kDensity * section.fill * material.density);
-      line("*SOLID SECTION, ELSET=M_{0}, MATERIAL=MAT_{0}", section_name(s));
+      line("*MATERIAL, NAME=MAT_{}", section_name(s));
+      law(material, kStress * section.fill);
+      line("*DENSITY\n{:.10g}", kDensity * section.fill * material.density);
+      const bool turned = material.law == simulate::LawName::orthotropic;
+      if (turned) {
+        const Mat3& a = material.axes;
+        line("*ORIENTATION, NAME=OR_{}, SYSTEM=RECTANGULAR\n{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g}",
+             section_name(s), a(0, 0), a(1, 0), a(2, 0), a(0, 1), a(1, 1), a(2, 1));
+      }
+      line("*SOLID SECTION, ELSET=M_{0}, MATERIAL=MAT_{0}{1}", section_name(s),
+           turned ? ", ORIENTATION=OR_" + section_name(s) : "");
+    }
+  }
+
+  // The elastic constants, moduli times `unit`.
+  void law(const simulate::Material& m, double unit) {
+    const Vec3 e = unit * m.youngs, &nu = m.poissons, g = unit * m.shears;
+    switch (m.law) {
+      case simulate::LawName::neo_hooke:
+        line("*ELASTIC\n{:.10g},{:.10g}", unit * m.young, m.poisson);
+        return;
+      case simulate::LawName::mooney_rivlin:  // D1 = 2 / K
+        line("*HYPERELASTIC, MOONEY-RIVLIN\n{:.10g},{:.10g},{:.10g}", unit * m.c10, unit * m.c01,
+             2 / (unit * m.bulk));
+        return;
+      case simulate::LawName::orthotropic:
+        line(
+            "*ELASTIC, TYPE=ENGINEERING CONSTANTS\n{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},"
+            "{:.10g}\n{:.10g}",
+            e[0], e[1], e[2], nu[0], nu[1], nu[2], g[0], g[1], g[2]);
+        return;
     }
   }
 

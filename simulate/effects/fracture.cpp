@@ -46,6 +46,12 @@ std::optional<Fracture> Fracture::make(const Parameters& parameters, const Probl
                                      "\"40 MPa\" here or in [materials.NAME]",
                                      *entry.part, material.name));
       if (!can_break) continue;
+      if ((strength > 0 || elongation > 0) && material.law != LawName::neo_hooke)
+        throw InputError(
+            entry.origin,
+            fmt::format("part \"{}\" cannot break: fracture is for law \"neo-hooke\", and {} has \"{}\"; "
+                        "leave its \"strength\" and \"elongation\" out, or name another part",
+                        problem.body.parts[p].name, material.name, law_name(material.law)));
       made.limits_[p] = {};
       made.needs_flow_[p] = false;
       if (model_of(problem, p) == Model::springs) {  // t = l (1 + elongation)

@@ -41,6 +41,12 @@ std::optional<Plasticity> Plasticity::make(const Parameters& parameters, const P
         throw InputError(entry.origin, fmt::format("part \"{}\": {} has no yield stress: write yield = \"250 "
                                                    "MPa\" here or in [materials.NAME]",
                                                    *entry.part, material.name));
+      if (yield > 0 && material.law != LawName::neo_hooke)
+        throw InputError(
+            entry.origin,
+            fmt::format("part \"{}\" cannot flow: plasticity is for law \"neo-hooke\", and {} has \"{}\"; "
+                        "leave its \"yield\" out, or name another part",
+                        problem.body.parts[p].name, material.name, law_name(material.law)));
       if (can_flow && yield > 0) made.flow_[p] = {yield, entry.hardening.value_or(material.hardening)};
     }
   for (const PlasticFlow& flow : made.flow_)

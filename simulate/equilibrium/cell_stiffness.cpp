@@ -78,11 +78,13 @@ CellStiffness::CellStiffness(const Problem& problem, const StiffnessPattern& pat
       if (const std::uint32_t cell = layout_.block_cells[block][lane]; cell != StepLayout::kNoCell)
         place_[cell] = static_cast<std::uint32_t>(block * kLanes + lane);
   for (std::size_t p = 0; p < body_.parts.size(); ++p) {
-    Lattice straight = body_.parts[p].lattice;
-    PartKind made{{}, cell_kind(straight, problem.materials[p]), straight.axes, {}};
-    for (std::size_t ab = 0; ab < 64; ++ab) made.at_rest[ab] = tangent_block(made.turned, {}, ab / 8, ab % 8);
-    straight.axes = Mat3::Identity();
-    made.kind = cell_kind(straight, problem.materials[p]);
+    const Lattice& lattice = body_.parts[p].lattice;
+    PartKind made{cell_kind_in_lattice(lattice, problem.materials[p]),
+                  cell_kind(lattice, problem.materials[p]),
+                  lattice.axes,
+                  {}};
+    made.at_rest = blocks_at_rest(made.turned);
+    by_moduli_ = by_moduli_ || made.kind.law.name != LawName::neo_hooke;
     kinds_.push_back(made);
   }
 }
@@ -97,14 +99,15 @@ void CellStiffness::prepare_lane(std::uint32_t cell, const State& state, const T
     u[a] = axes.transpose() * state.displacement[body_.cell_elements[cell][a]];
   Mat3 stress;
   if (tangent.stress) stress = axes.transpose() * (*tangent.stress)[cell] * axes;
-  const PreparedCell prepared = prepare_cell(part.kind, displacement_gradient(part.kind, u), tangent.project,
-                                             tangent.stress ? &stress : nullptr);
-  if (prepared.projected) {
+  const Mat3 gradient = displacement_gradient(part.kind, u);
+  const Mat3* given = tangent.stress ? &stress : nullptr;
+  if (form_ == TangentForm::moduli) {
+    const Mat9 moduli = prepare_moduli(part.kind, gradient, tangent.project, given);
     for (std::size_t c = 0; c < 81; ++c)
-      to[kLanes * c] =
-          (*prepared.projected)(static_cast<Eigen::Index>(c / 9), static_cast<Eigen::Index>(c % 9));
+      to[kLanes * c] = moduli(static_cast<Eigen::Index>(c / 9), static_cast<Eigen::Index>(c % 9));
     return;
   }
+  const PreparedCell prepared = prepare_cell(part.kind, gradient, tangent.project, given);
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) {
       to[kLanes * static_cast<std::size_t>(3 * i + j)] = prepared.tangent.inverse_transpose(i, j);
@@ -148,9 +151,9 @@ void CellStiffness::linearise(const State& state, const TangentOptions& tangent)
   held_.clear();
   const bool rest = std::all_of(state.displacement.begin(), state.displacement.end(),
                                 [](const Vec3& u) { return u == Vec3::Zero(); });
-  form_ = rest && !tangent.stress              ? TangentForm::at_rest
-          : tangent.project && !tangent.stress ? TangentForm::moduli
-                                               : TangentForm::deformed;
+  form_ = rest && !tangent.stress                              ? TangentForm::at_rest
+          : by_moduli_ || (tangent.project && !tangent.stress) ? TangentForm::moduli
+                                                               : TangentForm::deformed;
   const std::size_t width = kLanes * step::kTangentColumns[static_cast<std::size_t>(form_)];
   tangents_.assign(width * layout_.blocks.size(), 0);
   if (form_ == TangentForm::at_rest) {

@@ -90,6 +90,7 @@ class CellStiffness final : public LinearOperator {
   std::vector<std::uint32_t> part_;   // (cells)
   std::vector<double> share_;         // (cells) of the stiffness of a whole cell of its material
   std::vector<std::uint32_t> place_;  // (cells) block x kLanes + lane
+  bool by_moduli_ = false;            // a part has another law than neo-Hooke's
   step::TangentForm form_ = step::TangentForm::at_rest;
   std::vector<double> tangents_;  // by block: columns of kLanes
   std::vector<Folding> folding_;  // ascending

@@ -1,7 +1,8 @@
 // With F = I + H of a cell and A = sym(F^T dF/dt), its dissipation tau V (lambda tr^2 A + 2 mu A:A) has the
 // blocks
 //     C_ab = tau V / 16 { lambda (F g_a)(F g_b)^T + mu (g_a . g_b) F F^T + mu (F g_b)(F g_a)^T },
-// g the gradients gamma of simulate/models/cell_model.h. The hourglass displacements q_m resist their rate as seen
+// g the gradients gamma of simulate/models/cell_model.h; of an orthotropic material the moduli C at rest in place
+// of lambda and mu, F C(g_a, g_b) F^T. The hourglass displacements q_m resist their rate as seen
 // by an observer that turns with the cell, q' = dq/dt - w x q = sum_b B_mb v_b with the spin w = 1/2 sum_b
 // F^-T g_b / 4 x v_b; they add tau c_m B_ma^T B_mb. A spring from a to b along the unit vector d adds tau k d
 // d^T. Each row is gathered by one thread from its cells in ascending order.
@@ -32,7 +33,17 @@ std::array<Mat3, 8> damping_row(const CellKind& kind, const CellVectors& u, std:
   const Mat3 turned = f.inverse().transpose(), metric = f * f.transpose();
   const Vec3 at = f * kind.gradient[a];
   std::array<Mat3, 8> row;
+  const bool orthotropic = kind.law.name == LawName::orthotropic;
+  const Mat9 moduli = orthotropic ? elasticity(kind, Mat3(Mat3::Zero())) : Mat9(Mat9::Zero());
   for (std::size_t b = 0; b < 8; ++b) {
+    if (orthotropic) {
+      Mat3 own;
+      for (int i = 0; i < 3; ++i)
+        for (int k = 0; k < 3; ++k)
+          own(i, k) = kind.gradient[a].dot(moduli.block<3, 3>(3 * i, 3 * k) * kind.gradient[b]);
+      row[b] = kind.volume / 16 * (f * own * f.transpose());
+      continue;
+    }
     const Vec3 other = f * kind.gradient[b];
     row[b] = kind.volume / 16 *
              (kind.lambda * at * other.transpose() +

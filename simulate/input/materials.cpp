@@ -257,4 +257,40 @@ double shear_modulus(const Material& material) {
   return material.young / (2 * (1 + material.poisson));
 }
 
+Mat6 compliance(const Material& material) {
+  Mat6 c = Mat6::Zero();
+  const Vec3 &e = material.youngs, &nu = material.poissons, &g = material.shears;
+  for (int i = 0; i < 3; ++i) c(i, i) = 1 / e[i];
+  c(0, 1) = c(1, 0) = -nu[0] / e[0];
+  c(0, 2) = c(2, 0) = -nu[1] / e[0];
+  c(1, 2) = c(2, 1) = -nu[2] / e[1];
+  c.diagonal().tail<3>() << 1 / g[0], 1 / g[2], 1 / g[1];  // xy, yz, zx
+  return c;
+}
+
+Law law_of(const Material& material, const Mat3& frame) {
+  switch (material.law) {
+    case LawName::neo_hooke:
+      return neo_hooke_law(shear_modulus(material), lame_lambda(material));
+    case LawName::mooney_rivlin:
+      return mooney_rivlin_law(material.c10, material.c01, material.bulk);
+    case LawName::orthotropic:
+      return orthotropic_law(compliance(material), frame.transpose() * material.axes);
+  }
+  return {};
+}
+
+void set_isotropic_constants(Material& material) {
+  if (material.law == LawName::neo_hooke) return;
+  const Law law = law_of(material);
+  material.young = law.mu * (3 * law.lambda + 2 * law.mu) / (law.lambda + law.mu);
+  material.poisson = law.lambda / (2 * (law.lambda + law.mu));
+}
+
+const char* law_name(LawName law) {
+  return law == LawName::mooney_rivlin ? "mooney-rivlin"
+         : law == LawName::orthotropic ? "orthotropic"
+                                       : "neo-hooke";
+}
+
 }  // namespace flexel::simulate

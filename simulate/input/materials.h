@@ -1,8 +1,11 @@
-// Materials: isotropic elastic constants and density, from a library of named ones or from the scene.
+// Materials: elastic constants and density, from a library of named ones or from the scene.
 #pragma once
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "base/math/vec.h"
+#include "simulate/laws/elasticity.h"
 
 namespace flexel::simulate {
 
@@ -24,6 +27,13 @@ struct Material {
   // Of a print that is not solid (simulate/input/infill.h): the figures above are those of the print as a whole
   double infill = 1;  // share of the volume inside the walls
   double walls = 0;   // share of the part's volume
+  // The elastic law (docs/theory/laws.md). Of others than neo-Hooke's `young` and `poisson` are those of the isotropic
+  // material next to it at small strain, which penalties and bounds take.
+  LawName law = LawName::neo_hooke;
+  double c10 = 0, c01 = 0, bulk = 0;  // Pa, of Mooney and Rivlin
+  // Orthotropic, in the axes of the material: E_1, E_2, E_3 [Pa]; nu_12, nu_13, nu_23; G_12, G_13, G_23 [Pa]
+  Vec3 youngs = Vec3::Zero(), poissons = Vec3::Zero(), shears = Vec3::Zero();
+  Mat3 axes = Mat3::Identity();  // of the material in the part, columns, world frame
 };
 
 // The library, in order of docs/reference/materials.md. At room temperature; figures that are not known for certain are
@@ -37,5 +47,17 @@ struct Material {
 // Lame's first parameter and the shear modulus [Pa].
 [[nodiscard]] double lame_lambda(const Material& material);
 [[nodiscard]] double shear_modulus(const Material& material);
+
+// The material's law for deformation gradients in the frame whose axes are the columns of `frame`.
+[[nodiscard]] Law law_of(const Material& material, const Mat3& frame = Mat3::Identity());
+
+// Of an orthotropic material, in its axes [1/Pa]: xx, yy, zz, xy, yz, zx, shears as angles.
+[[nodiscard]] Mat6 compliance(const Material& material);
+
+// Sets `young` and `poisson` from the constants of the law, where it is not neo-Hooke's.
+void set_isotropic_constants(Material& material);
+
+// What a scene calls a law.
+[[nodiscard]] const char* law_name(LawName law);
 
 }  // namespace flexel::simulate

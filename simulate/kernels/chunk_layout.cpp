@@ -23,8 +23,9 @@ constexpr Index3 kTile{32, 8, 8};
 constexpr Index3 kConnectionTile{64, 8, 16};
 
 step::CellConstants constants_of(const Part& part, const Material& material, double damping) {
-  const CellKind kind = cell_kind(part.lattice, material);
+  const CellKind kind = cell_kind_in_lattice(part.lattice, material);
   step::CellConstants c{};
+  c.law = kind.law;
   for (std::size_t j = 0; j < 3; ++j) c.spacing[j] = part.lattice.spacing[static_cast<Eigen::Index>(j)];
   c.volume = kind.volume;
   c.mu = kind.mu;

@@ -9,6 +9,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "simulate/laws/law.h"
+
 namespace flexel::simulate::step {
 
 constexpr std::size_t kLanes = 8;  // cells that are computed side by side, on every instruction set
@@ -53,6 +55,7 @@ struct CellConstants {
                                   // (springs: yield, hardening, elongation are strains of a spring)
   double axes[9];                 // column-major rotation from the lattice to the world frame
   bool aligned;                   // axes is the identity
+  Law law;                        // lattice frame
 };
 
 // What the cells of a block remember of their plastic flow and of the shape that is their rest; model

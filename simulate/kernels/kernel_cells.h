@@ -1,7 +1,8 @@
 // Model `cells`, elastic and damped, eight cells at a time; kernel_table.cpp has the formulas. Included by
 // kernel_table.cpp alone.
 #pragma once
-#include "simulate/kernels/kernel_state.h"
+#include "simulate/kernels/kernel_law.h"
+#include "simulate/laws/neo_hooke.h"
 
 namespace flexel::simulate::step {
 namespace {
@@ -38,67 +39,20 @@ FLEXEL_INLINE void transform_back(const Modes& t, int c, Corners& f) {
   }
 }
 
-struct Matrix {
-  Lanes at[3][3];
-};
-
-FLEXEL_INLINE Matrix cofactor(const Matrix& m) {
-  Matrix c;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) {
-      const int i1 = (i + 1) % 3, i2 = (i + 2) % 3, j1 = (j + 1) % 3, j2 = (j + 2) % 3;
-      c.at[i][j] = m.at[i1][j1] * m.at[i2][j2] - m.at[i1][j2] * m.at[i2][j1];
-    }
-  return c;
-}
-
-struct Gradient {
-  Matrix h, cofactor, less_one;  // H; cof F; cof F - I without cancellation
-  Lanes jacobian, inverse;       // J, 1 / J
-  Lanes trace, change;           // tr H; J - 1
-};
-
 FLEXEL_INLINE Gradient gradient_of(const Modes modes[3], const CellConstants& k, const Lanes& fill,
                                    Sums& sums) {
-  Gradient g;
+  Matrix h;
   for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) g.h.at[i][j] = modes[i].d[j] * (0.25 / k.spacing[j]);
-  const Matrix& h = g.h;
-  const Matrix second = cofactor(h);
-  g.trace = h.at[0][0] + h.at[1][1] + h.at[2][2];
-  const Lanes sum_of_minors = second.at[0][0] + second.at[1][1] + second.at[2][2];
-  const Lanes determinant =
-      h.at[0][0] * second.at[0][0] + h.at[0][1] * second.at[0][1] + h.at[0][2] * second.at[0][2];
-  g.change = g.trace + sum_of_minors + determinant;
-  const Lanes jacobian = 1 + g.change;
-  const Lanes counted = fill > 0 ? jacobian : Lanes{} + __builtin_huge_val();
-  // A jacobian that is not a number fails both comparisons and must win.
-  sums.smallest_jacobian = counted >= sums.smallest_jacobian ? sums.smallest_jacobian : counted;
-  // A cell that resists nothing may be folded: its numbers are not used, but they must stay finite.
-  g.change = fill > 0 ? g.change : Lanes{};
-  g.jacobian = 1 + g.change;
-  g.inverse = 1 / g.jacobian;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      g.less_one.at[i][j] = second.at[i][j] - h.at[j][i] + (i == j ? g.trace : Lanes{});
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) g.cofactor.at[i][j] = g.less_one.at[i][j] + (i == j ? 1.0 : 0.0);
-  return g;
-}
-
-// First Piola-Kirchhoff stress [Pa].
-FLEXEL_INLINE Matrix elastic_stress(const Gradient& g, const Lanes& log_volume, const CellConstants& k) {
-  const Lanes pressure = k.lambda * log_volume * g.inverse;
-  const Lanes shear = k.mu * g.inverse;
-  Matrix p;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) {
-      // J (F - F^-T), F^-T = cof F / J
-      const Lanes difference =
-          g.jacobian * g.h.at[i][j] - g.less_one.at[i][j] + (i == j ? g.change : Lanes{});
-      p.at[i][j] = shear * difference + pressure * g.cofactor.at[i][j];
-    }
-  return p;
+    for (int j = 0; j < 3; ++j) h.at[i][j] = modes[i].d[j] * (0.25 / k.spacing[j]);
+  return laws::kinematics(
+      h, [&](const Lanes& change) __attribute__((always_inline))->Lanes {
+        const Lanes jacobian = 1 + change;
+        const Lanes counted = fill > 0 ? jacobian : Lanes{} + __builtin_huge_val();
+        // A jacobian that is not a number fails both comparisons and must win.
+        sums.smallest_jacobian = counted >= sums.smallest_jacobian ? sums.smallest_jacobian : counted;
+        // A cell that resists nothing may be folded: its numbers are not used, but they must stay finite.
+        return fill > 0 ? change : Lanes{};
+      });
 }
 
 // Adds the viscous stress [Pa] to `stress`; sets `spin_free`, the forces of the hourglass modes [N].
@@ -121,6 +75,13 @@ FLEXEL_INLINE void add_damping(const Gradient& g, const Modes u[3], const Modes 
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
       s.at[i][j] = (k.damping * k.mu) * strain_rate.at[i][j] + (i == j ? pressure : Lanes{});
+  if (k.law.name == LawName::orthotropic) {
+    Matrix half, made;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) half.at[i][j] = (0.5 * k.damping) * strain_rate.at[i][j];
+    stress_at_rest_of_law(k.law, half, made);
+    s = made;
+  }
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
       stress.at[i][j] +=

@@ -14,6 +14,13 @@ namespace flexel::simulate::step {
 namespace {
 
 FLEXEL_INLINE Matrix stress_at_rest(const Matrix& h, const CellConstants& k) {
+  if (k.law.name == LawName::orthotropic) {
+    Matrix strain, made;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) strain.at[i][j] = 0.5 * (h.at[i][j] + h.at[j][i]);
+    stress_at_rest_of_law(k.law, strain, made);
+    return made;
+  }
   const Lanes pressure = k.lambda * (h.at[0][0] + h.at[1][1] + h.at[2][2]);
   Matrix p;
   for (int i = 0; i < 3; ++i)

@@ -6,9 +6,7 @@
 // sum_a s_ma u_a of an 8-point Walsh-Hadamard transform,
 //     H_.j = D_j / (4 h_j),  q_m = Q_m / 8,
 //     f_a = -fill { V/4 sum_j P_.j s_aj / h_j + 1/8 sum_m c_m s_ma q_m }:  the same transform backwards.
-// P = mu (F - F^-T) + lambda ln J F^-T without cancellation, with F = I + H and cof F = I + tr(H) I - H^T +
-// cof H:
-//     J (F - F^-T) = (J - 1 - tr H) I + J H + H^T - cof H.
+// P is that of the part's law (simulate/laws).
 //
 // Damping with time tau is the power of the rate of strain: S_v = tau (lambda tr A I + 2 mu A), A = sym(F^T
 // dF/dt), P_v = F S_v, and for the hourglass modes of their rate as seen by an observer that turns with the
@@ -51,19 +49,30 @@ struct CellsModel {
     Matrix stress;
     Lanes mode_force[4][3];
     [[maybe_unused]] Elastic now;
-    if constexpr (has.plasticity) {
+    const bool neo_hooke = k.law.name == LawName::neo_hooke;
+    bool elastic = true;
+    if constexpr (has.plasticity) elastic = !neo_hooke;  // other laws do not flow
+    if (elastic) {
+      if (neo_hooke) {
+        const Lanes log_volume = log1p(g.change);
+        stress = laws::neo_hooke_stress(g, log_volume, k.mu, k.lambda);
+        if constexpr (has.fracture) now = elastic_state(g, u, g.change, log_volume, k);
+      } else {
+        const Gradient at = g;
+        Matrix made;
+        stress_of_law(k.law, at, made);
+        stress = made;
+        if constexpr (has.fracture || has.plasticity) now = elastic_state(g, u, g.change, Lanes{}, k);
+      }
+      for (int m = 0; m < 4; ++m)
+        for (int i = 0; i < 3; ++i) mode_force[m][i] = (0.125 * k.hourglass[m]) * u[i].q[m];
+    } else if constexpr (has.plasticity) {
       PlasticBlock& memory = chunk.plastic[number];
       matter = fill * (1 + load(memory.volume));
       now = plastic_state(g, u, k, matter, memory, sums);
       stress = plastic_stress(g, now, k, memory);
       for (int m = 0; m < 4; ++m)
         for (int i = 0; i < 3; ++i) mode_force[m][i] = k.hourglass[m] * now.hourglass[m][i];
-    } else {
-      const Lanes log_volume = log1p(g.change);
-      stress = elastic_stress(g, log_volume, k);
-      for (int m = 0; m < 4; ++m)
-        for (int i = 0; i < 3; ++i) mode_force[m][i] = (0.125 * k.hourglass[m]) * u[i].q[m];
-      if constexpr (has.fracture) now = elastic_state(g, u, g.change, log_volume, k);
     }
     if constexpr (has.damping != Damping::none) {
       read_corners(chunk, block, scratch.column + kVelocity, corners);
@@ -84,7 +93,14 @@ struct CellsModel {
       }
     }
     if constexpr (has.damping == Damping::book && (has.fracture || has.plasticity)) {
-      const Lanes energy = matter * elastic_energy(now, k);
+      Lanes whole = elastic_energy(now, k);
+      if (!neo_hooke) {
+        const Matrix h = g.h;
+        Lanes density;
+        energy_of_law(k.law, h, density);
+        whole = k.volume * density + 0.5 * now.hourglass_square;
+      }
+      const Lanes energy = matter * whole;
       sums.elastic += matter > 0 ? energy : Lanes{};
     }
     if constexpr (has.damping != Damping::none) {

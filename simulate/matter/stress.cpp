@@ -39,12 +39,9 @@ Mat3 matrix(const SymmetricStress& s) {
   return m;
 }
 
-// sigma = (mu (b - I) + lambda ln J I) / J, b = F F^T from the cell's own rest shape.
+// From the cell's own rest shape.
 Mat3 cauchy(const CellKind& kind, const CellVectors& u) {
-  const Mat3 h = displacement_gradient(kind, u);
-  const double change = volume_change(h);
-  const Mat3 strain = h + h.transpose() + h * h.transpose();
-  return (kind.mu * strain + kind.lambda * std::log1p(change) * Mat3::Identity()) / (1 + change);
+  return cauchy_stress(kind.law, displacement_gradient(kind, u));
 }
 
 Mat3 virial(const SpringKind& kind, const CellVectors& u, double volume) {

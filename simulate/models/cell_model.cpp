@@ -1,6 +1,4 @@
-// One cell. Everything is written in H = F - I, so that strains of 1e-12 still have ten digits: J - 1 is the
-// sum of the invariants of H, ln J is log1p, and the energy is a sum of terms of second order (tr H cancels
-// against J - 1 analytically).
+// One cell. Everything is written in H = F - I, so that strains of 1e-12 still have ten digits.
 #include "simulate/models/cell_model.h"
 
 #include <Eigen/Dense>
@@ -9,20 +7,6 @@
 
 namespace flexel::simulate {
 namespace {
-
-// Sum of the principal minors of H, its second invariant.
-double second_invariant(const Mat3& h) {
-  return h(0, 0) * h(1, 1) - h(0, 1) * h(1, 0) + h(1, 1) * h(2, 2) - h(1, 2) * h(2, 1) + h(2, 2) * h(0, 0) -
-         h(2, 0) * h(0, 2);
-}
-
-// x - ln(1 + x), without cancellation near 0: the series to x^7 below 1e-2, where its error is under 1e-15 of
-// the sum.
-double less_logarithm(double x) {
-  if (std::abs(x) > 1e-2) return x - std::log1p(x);
-  return x * x *
-         (1.0 / 2 - x * (1.0 / 3 - x * (1.0 / 4 - x * (1.0 / 5 - x * (1.0 / 6 - x * (1.0 / 7 - x / 8))))));
-}
 
 std::array<Vec3, 4> hourglass_displacements(const CellKind& kind, const CellVectors& u) {
   std::array<Vec3, 4> q;
@@ -47,29 +31,62 @@ void set_diagonal(CellKind& kind) {
                                  hourglass_coefficient(kind, a, b);
 }
 
-}  // namespace
+// c_m of a material with other moduli along each axis of the lattice: Young's without contraction, and the
+// shear moduli, both from the compliance along those axes.
+std::array<double, 4> hourglass_of(const Law& law, const Vec3& curvature, double volume) {
+  const Mat6 s = moduli_at_rest(law).inverse();
+  Vec3 bend, twist_xyz, slide;  // E_j / (1 + nu), mean shear beside axis j; G of xy, yz, zx
+  for (int k = 0; k < 3; ++k) slide[k] = 1 / s(3 + k, 3 + k);
+  for (int j = 0; j < 3; ++j) {
+    const double contraction = 0.5 * (s(j, (j + 1) % 3) + s(j, (j + 2) % 3));
+    bend[j] = 1 / std::max(s(j, j) - contraction, 0.5 * s(j, j));
+    twist_xyz[j] = 0.5 * (slide[j] + slide[(j + 2) % 3]);
+  }
+  // mode along axes j and k, its third axis l: bending moves along j and k, twisting along l
+  const auto pair = [&](int j, int k, double beside_j, double beside_k) {
+    return 4.0 / 9 * volume * ((bend[j] + beside_j) * curvature[j] + (bend[k] + beside_k) * curvature[k]);
+  };
+  const double xy = slide[0], yz = slide[1], zx = slide[2];
+  return {pair(0, 1, zx, yz), pair(1, 2, xy, zx), pair(2, 0, yz, xy),
+          8.0 / 27 * volume * (bend + twist_xyz).dot(curvature)};
+}
 
-CellKind cell_kind(const Lattice& lattice, const Material& material) {
+CellKind kind_of(const Lattice& lattice, const Mat3& axes, const Law& law, const Law& in_lattice) {
   CellKind kind;
   const Vec3& h = lattice.spacing;
-  kind.mu = shear_modulus(material);
-  kind.lambda = lame_lambda(material);
+  kind.law = law;
+  kind.mu = law.mu;
+  kind.lambda = law.lambda;
   kind.volume = h.prod();
   for (int a = 0; a < 8; ++a) {
     const Vec3 sign((a & 1) ? 1 : -1, (a & 2) ? 1 : -1, (a & 4) ? 1 : -1);
-    kind.gradient[static_cast<std::size_t>(a)] = lattice.axes * sign.cwiseQuotient(h);
+    kind.gradient[static_cast<std::size_t>(a)] = axes * sign.cwiseQuotient(h);
   }
   const Vec3 curvature = h.cwiseProduct(h).cwiseInverse();
   const double scale = kind.mu * kind.volume;
   kind.hourglass = {4.0 / 3 * scale * (curvature.x() + curvature.y()),
                     4.0 / 3 * scale * (curvature.y() + curvature.z()),
                     4.0 / 3 * scale * (curvature.z() + curvature.x()), 8.0 / 9 * scale * curvature.sum()};
+  if (law.name == LawName::orthotropic) kind.hourglass = hourglass_of(in_lattice, curvature, kind.volume);
   for (int mode = 0; mode < 4; ++mode)
     for (int corner = 0; corner < 8; ++corner)
       kind.mode[static_cast<std::size_t>(mode)][static_cast<std::size_t>(corner)] =
           hourglass_sign(mode, corner) / 8;
   set_diagonal(kind);
   return kind;
+}
+
+}  // namespace
+
+CellKind cell_kind(const Lattice& lattice, const Material& material) {
+  const Law law = law_of(material);
+  return kind_of(lattice, lattice.axes, law,
+                 law.name == LawName::orthotropic ? law_of(material, lattice.axes) : law);
+}
+
+CellKind cell_kind_in_lattice(const Lattice& lattice, const Material& material) {
+  const Law law = law_of(material, lattice.axes);
+  return kind_of(lattice, Mat3::Identity(), law, law);
 }
 
 CellKind with_rest_shape(const CellKind& kind, const Mat3& change, double volume,
@@ -106,23 +123,12 @@ Mat3 corner_gradient(const CellKind& kind, const CellVectors& u, std::uint32_t c
   return h;
 }
 
-double volume_change(const Mat3& h) {
-  return h.trace() + second_invariant(h) + h.determinant();
-}
-
 double energy_density(const CellKind& kind, const Mat3& h) {
-  const double change = volume_change(h);
-  const double log_volume = std::log1p(change);
-  // tr F^T F - 3 - 2 ln J = H:H + 2 tr H - 2 ln J and tr H = change - invariants.
-  const double shape = h.squaredNorm() + 2 * (less_logarithm(change) - second_invariant(h) - h.determinant());
-  return 0.5 * kind.mu * shape + 0.5 * kind.lambda * log_volume * log_volume;
+  return energy_density(kind.law, h);
 }
 
 Mat3 stress(const CellKind& kind, const Mat3& h) {
-  const CellTangent tangent = cell_tangent(h);
-  // F - F^-T = (F F^T - I) F^-T.
-  const Mat3 strain = h + h.transpose() + h * h.transpose();
-  return (kind.mu * strain + kind.lambda * tangent.log_volume * Mat3::Identity()) * tangent.inverse_transpose;
+  return first_stress(kind.law, h);
 }
 
 Mat3 second_stress(const CellKind& kind, const Mat3& h) {
@@ -130,13 +136,17 @@ Mat3 second_stress(const CellKind& kind, const Mat3& h) {
 }
 
 Mat3 predicted_stress(const CellKind& kind, const Mat3& h, const Mat3& change) {
-  const CellTangent tangent = cell_tangent(h);
-  const Mat3 product = (Mat3::Identity() + h).transpose() * change;
-  const Mat3 strain = 0.5 * (product + product.transpose());
-  const Mat3 metric = tangent.inverse_transpose.transpose() * tangent.inverse_transpose;  // C^-1
-  const Mat3 turned = metric * strain;
-  return second_stress(kind, h) + kind.lambda * turned.trace() * metric +
-         2 * (kind.mu - kind.lambda * tangent.log_volume) * turned * metric;
+  const Mat3 second = second_stress(kind, h);
+  if (kind.law.name == LawName::neo_hooke) return neo_hooke::predicted_stress(kind.law, h, second, change);
+  // P = F S: F dS = dP - dF S.
+  const Mat9 moduli = elasticity(kind, h);
+  Mat3 first;
+  for (int row = 0; row < 9; ++row) {
+    first(row / 3, row % 3) = 0;
+    for (int column = 0; column < 9; ++column)
+      first(row / 3, row % 3) += moduli(row, column) * change(column / 3, column % 3);
+  }
+  return second + (Mat3::Identity() + h).inverse() * (first - change * second);
 }
 
 double cell_energy(const CellKind& kind, const CellVectors& u) {
@@ -161,7 +171,7 @@ CellVectors cell_forces(const CellKind& kind, const CellVectors& u) {
 }
 
 CellTangent cell_tangent(const Mat3& h) {
-  return {(Mat3::Identity() + h).inverse().transpose(), std::log1p(volume_change(h))};
+  return neo_hooke::tangent(h);
 }
 
 Block tangent_block(const CellKind& kind, const CellTangent& tangent, std::size_t a, std::size_t b) {
@@ -174,23 +184,34 @@ Block tangent_block(const CellKind& kind, const CellTangent& tangent, std::size_
   return block;
 }
 
+Mat9 elasticity(const CellKind& kind, const Mat3& gradient) {
+  return elasticity(kind.law, gradient);
+}
+
 Mat9 elasticity(const CellKind& kind, const CellTangent& tangent) {
-  const Mat3& g = tangent.inverse_transpose;
-  const double geometric = kind.mu - kind.lambda * tangent.log_volume;
-  Mat9 result;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      for (int k = 0; k < 3; ++k)
-        for (int l = 0; l < 3; ++l)
-          result(3 * i + j, 3 * k + l) = (i == k && j == l ? kind.mu : 0) + geometric * g(i, l) * g(k, j) +
-                                         kind.lambda * g(i, j) * g(k, l);
-  return result;
+  return neo_hooke::elasticity(kind.law, tangent);
+}
+
+Mat9 positive_part(const Mat9& moduli) {
+  const Eigen::SelfAdjointEigenSolver<Mat9> solver(moduli);
+  return solver.eigenvectors() * solver.eigenvalues().cwiseMax(0).asDiagonal() *
+         solver.eigenvectors().transpose();
 }
 
 Mat9 projected_elasticity(const CellKind& kind, const CellTangent& tangent) {
-  const Eigen::SelfAdjointEigenSolver<Mat9> solver(elasticity(kind, tangent));
-  return solver.eigenvectors() * solver.eigenvalues().cwiseMax(0).asDiagonal() *
-         solver.eigenvectors().transpose();
+  return positive_part(elasticity(kind, tangent));
+}
+
+std::array<Block, 64> blocks_at_rest(const CellKind& kind) {
+  std::array<Block, 64> blocks;
+  if (kind.law.name == LawName::neo_hooke) {
+    const CellTangent rest = {};
+    for (std::size_t ab = 0; ab < 64; ++ab) blocks[ab] = tangent_block(kind, rest, ab / 8, ab % 8);
+    return blocks;
+  }
+  const Mat9 moduli = elasticity(kind, Mat3(Mat3::Zero()));
+  for (std::size_t ab = 0; ab < 64; ++ab) blocks[ab] = projected_block(kind, moduli, ab / 8, ab % 8);
+  return blocks;
 }
 
 Block projected_block(const CellKind& kind, const Mat9& moduli, std::size_t a, std::size_t b) {

@@ -18,9 +18,9 @@ void add_cell_row(const CellKind& kind, const PreparedCell& cell, double fill, s
                   const std::array<std::uint16_t, 64>& slot, Block* row) {
   if (cell.folding)
     for (std::size_t b = 0; b < 8; ++b) row[slot[8 * a + b]] += fill * (*cell.folding)[8 * a + b];
-  if (cell.projected) {
+  if (cell.moduli) {
     for (std::size_t b = 0; b < 8; ++b)
-      row[slot[8 * a + b]] += fill * projected_block(kind, *cell.projected, a, b);
+      row[slot[8 * a + b]] += fill * projected_block(kind, *cell.moduli, a, b);
     return;
   }
   const double scale = fill * kind.volume / 16;

@@ -19,11 +19,10 @@ using CellMatrix = Eigen::Matrix<double, 24, 24>;
 
 CellMatrix cells_stiffness(const CellKind& kind) {
   CellMatrix k;
-  const CellTangent rest = cell_tangent(Mat3::Zero());
+  const std::array<Block, 64> blocks = blocks_at_rest(kind);
   for (std::size_t a = 0; a < 8; ++a)
     for (std::size_t b = 0; b < 8; ++b)
-      k.block<3, 3>(3 * static_cast<Eigen::Index>(a), 3 * static_cast<Eigen::Index>(b)) =
-          tangent_block(kind, rest, a, b);
+      k.block<3, 3>(3 * static_cast<Eigen::Index>(a), 3 * static_cast<Eigen::Index>(b)) = blocks[8 * a + b];
   return k;
 }
 
@@ -49,29 +48,25 @@ bool is_springs(const Problem& problem, std::size_t part) {
   return problem.models.size() > part && problem.models[part] == Model::springs;
 }
 
-// d2W/dF2 of the neo-Hookean energy has, with s the singular values of F, entries of at most mu + (mu +
-// lambda (1 - ln J)) / s_min^2; at rest 2 mu + lambda.
-// With plastic flow mu is that of b = F Cp^-1 F^T: at most 1 / s_min^2 where the flow follows F. With a rest
-// shape mu is times the largest eigenvalue of Cp^-1, ln J less ln Jp, and all times Jp.
-double cell_stiffening(const CellKind& kind, const CellVectors& u, bool plastic,
+// With plastic flow, of neo-Hooke alone, its stretch counts too (simulate/laws/neo_hooke_scalar.h). Other laws
+// bound by the largest modulus, exact for cubes: a cell's largest eigenvalue is that modulus times the gradients'
+// squares, which spacings differ in.
+double cell_stiffening(const CellKind& kind, const Vec3& spacing, const CellVectors& u, bool plastic,
                        const std::optional<CellKind>& shaped) {
   const Mat3 gradient = displacement_gradient(kind, u);
-  const double jacobian = 1 + volume_change(gradient);
-  if (!(jacobian > 0)) return std::numeric_limits<double>::infinity();
-  const Mat3 f = Mat3::Identity() + gradient;
-  Eigen::SelfAdjointEigenSolver<Mat3> eigen;
-  eigen.computeDirect(f.transpose() * f, Eigen::EigenvaluesOnly);
-  const double least = std::max(eigen.eigenvalues()[0], 1e-12);
-  const double volume = shaped ? shaped->volume / kind.volume : 1;
-  const double log_volume = std::log(jacobian / volume);
-  const double coupling = kind.mu + kind.lambda * (1 - log_volume);
-  double own = plastic ? kind.mu / std::min(least, 1.0) : kind.mu;
+  if (kind.law.name != LawName::neo_hooke) {
+    const double ratio = spacing.maxCoeff() / spacing.minCoeff();
+    return ratio * ratio * stiffening(kind.law, gradient);
+  }
+  neo_hooke::Flow flow{plastic};
   if (shaped) {
     const Mat3 root = Mat3::Identity() + shaped->offset;
+    Eigen::SelfAdjointEigenSolver<Mat3> eigen;
     eigen.computeDirect(root * root, Eigen::EigenvaluesOnly);
-    own = std::max(own, kind.mu * eigen.eigenvalues()[2]);
+    flow.metric = eigen.eigenvalues()[2];
+    flow.volume = shaped->volume / kind.volume;
   }
-  return volume * (own + std::max(coupling, 0.0) / least) / (2 * kind.mu + kind.lambda);
+  return neo_hooke::stiffening(kind.law, gradient, flow);
 }
 
 // k (1 + extension) at most; compression turns the cross stiffness k (1 - l/d) negative, which slows.
@@ -152,12 +147,12 @@ std::vector<double> stiffening(const Problem& problem, const std::vector<Vec3>& 
         return Greatest{factor * springs_stiffening(
                                      shapes.any() ? shapes.of(springs, cell).value_or(springs) : springs, u)};
       if (!shapes.any()) {
-        double stiffer = cell_stiffening(cells, u, plastic, std::nullopt);
+        double stiffer = cell_stiffening(cells, part.lattice.spacing, u, plastic, std::nullopt);
         stiffer += fold_stiffening(cells, fold_thresholds(cells, std::nullopt), u);
         return Greatest{factor * stiffer};
       }
       const std::optional<CellKind> shaped = shapes.of(cells, part, cell);
-      return Greatest{factor * (cell_stiffening(cells, u, plastic, shaped) +
+      return Greatest{factor * (cell_stiffening(cells, part.lattice.spacing, u, plastic, shaped) +
                                 fold_stiffening(cells, fold_thresholds(cells, shaped), u))};
     });
     result.push_back(std::max(1.0, greatest.value));

@@ -12,6 +12,7 @@
 #include "simulate/input/infill.h"
 #include "simulate/input/material_names.h"
 #include "simulate/scene/events.h"
+#include "simulate/scene/material_laws.h"
 #include "simulate/scene/scene_keys.h"
 
 namespace flexel::simulate {
@@ -24,9 +25,7 @@ double required_quantity(TableReader& reader, const char* key, Dimension dimensi
 Material parse_material(TableReader& reader, const std::string& name) {
   Material material;
   material.name = name;
-  material.young = required_quantity(reader, "young", Dimension::pressure, "\"210 GPa\"");
-  (void)reader.require("poisson", "0.3");
-  material.poisson = *reader.number("poisson");
+  parse_law(reader, material);
   material.density = required_quantity(reader, "density", Dimension::density, "\"7850 kg/m3\"");
   material.source = reader.text("source").value_or(reader.file());
   const auto optional_limit = [&](const char* key) {
@@ -81,6 +80,7 @@ void parse_parts(TableReader& root, Scene& scene) {
     settings.model = reader.text("model").value_or("");
     settings.hooke = reader.text("hooke").value_or("");
     settings.infill = parse_infill(reader);
+    settings.axes = parse_axes(reader);
     (void)reader.find("rigid");  // simulate/effects/rigid.h
     reader.finish();
     scene.parts[name] = settings;

@@ -28,6 +28,7 @@ struct PartSettings {
   std::string hooke;     // of model paper: "paper" ("" too) or "ganovelli"
   Infill infill = {};    // of its own `material`, else of the scene's
   std::string origin;
+  std::optional<Mat3> axes = {};  // of an orthotropic material, columns, world frame; nothing: the world's
 };
 
 // A material point whose displacement is reported; `at` (rest, world frame, m) or the mean over a selection.

@@ -7,6 +7,7 @@
 #include "base/nearest_word.h"
 #include "base/units.h"
 #include "simulate/input/material_names.h"
+#include "simulate/scene/material_laws.h"
 #include "simulate/scene/scene.h"
 #include "simulate/scene/scene_checks.h"
 
@@ -133,8 +134,10 @@ std::vector<Material> materials_of_parts(const Scene& scene, const Body& body) {
         settings.infill.share || !settings.material.empty() ? settings.infill : scene.infill;
     infill_used = infill_used || settings.material.empty();
     Material material = material_named(scene, name, settings.origin);
+    const auto index = static_cast<std::size_t>(&part - body.parts.data());
+    refuse_law(scene, settings, body, index, material);
+    if (settings.axes) material.axes = *settings.axes;
     if (infill.share) {
-      const auto index = static_cast<std::size_t>(&part - body.parts.data());
       const double walls =
           infill.shell ? wall_share(*infill.shell, part, body.surface, index, settings.origin) : 0;
       material = with_infill(std::move(material), *infill.share, walls);

@@ -16,7 +16,7 @@ base base/math base/files base/program
 formats/part formats/common formats/stl formats/obj formats/ply formats/off formats/gltf formats/threemf formats/cad
 formats/lattice formats/exchange
 voxelize/types voxelize/mesh voxelize/classify voxelize/heal voxelize/lattice voxelize
-simulate/input simulate/result simulate/linear simulate/state simulate/rigid simulate/conditions simulate/models
+simulate/laws simulate/input simulate/result simulate/linear simulate/state simulate/rigid simulate/conditions simulate/models
 simulate/kernels simulate/matter simulate/gravitation simulate/contact/points simulate/contact simulate/effects simulate/events simulate/scene
 simulate/equilibrium simulate/estimate simulate/probes simulate/live simulate/stepping simulate/implicit simulate/time simulate
 mapping/types mapping/anchors mapping/checks mapping/methods mapping/crack mapping/report mapping

@@ -12,6 +12,7 @@
 #include "simulate/scene/effects.h"
 #include "simulate/scene/scene.h"
 #include "tests/simulate/box_body.h"
+#include "tests/simulate/law_materials.h"
 #include "tests/simulate/numbered_body.h"
 #include "tests/simulate/scene_case.h"
 
@@ -43,9 +44,11 @@ Body two_boxes() {
   return body;
 }
 
-Scene held_scene() {
+Scene held_scene(LawName law = LawName::neo_hooke) {
   Scene scene;
   scene.materials["gum"] = {"gum", kGumYoung, 0.3, 580, "test"};
+  if (law == LawName::mooney_rivlin) scene.materials["gum"] = testing::mooney_rivlin_material();
+  if (law == LawName::orthotropic) scene.materials["gum"] = testing::orthotropic_material();
   scene.material = "gum";
   scene.get<Supports>().ties.push_back(make_fix(select_by_name("near/x0")));
   Selection ball;
@@ -69,13 +72,14 @@ std::vector<Vec3> random_vectors(std::size_t count, double size) {
 struct TangentCase {
   double size, squeeze;  // m, 1
   bool project, stressed;
+  LawName law = LawName::neo_hooke;
 };
 
 class CellStiffnessOf : public ::testing::TestWithParam<TangentCase> {
  protected:
   CellStiffnessOf()
       : body_(two_boxes()),
-        scene_(held_scene()),
+        scene_(held_scene(GetParam().law)),
         problem_{body_, materials_of_parts(scene_, body_), {}, {}, {}, {}},
         stored_(problem_, active_effects(scene_.effects, problem_), StiffnessStorage::stored),
         made_(problem_, active_effects(scene_.effects, problem_), StiffnessStorage::made) {
@@ -126,6 +130,17 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(TangentCase{0, 0, false, false}, kSqueezed, TangentCase{0.02, 0.2, true, false},
                       TangentCase{0.02, 0.2, false, true}, TangentCase{0.02, 0.2, true, true}, kFolding,
                       TangentCase{0.035, 0, true, false}, TangentCase{0.035, 0, true, true}));
+
+std::vector<TangentCase> of_other_laws() {
+  std::vector<TangentCase> cases;
+  for (const LawName law : {LawName::mooney_rivlin, LawName::orthotropic})
+    for (const bool project : {false, true})
+      for (const bool stressed : {false, true})
+        for (const double squeeze : {0.0, 0.1})
+          cases.push_back({squeeze > 0 ? 0.02 : 0, squeeze, project, stressed, law});
+  return cases;
+}
+INSTANTIATE_TEST_SUITE_P(Laws, CellStiffnessOf, ::testing::ValuesIn(of_other_laws()));
 
 TEST_P(CellStiffnessOf, IsTheStoredOne) {
   if (GetParam().size == kFolding.size) {

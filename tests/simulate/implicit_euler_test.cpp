@@ -15,6 +15,7 @@
 #include "simulate/effects/plasticity.h"
 #include "simulate/implicit/damping_matrix.h"
 #include "simulate/time/energy_history.h"
+#include "tests/simulate/law_materials.h"
 #include "tests/simulate/stepped.h"
 #include "tests/simulate/timed_case.h"
 
@@ -30,7 +31,10 @@ using testing::TimedCase;
 
 // Sheared, squeezed, turned cells of partial fill on a turned lattice: C v is what the kernel brakes with.
 TEST(DampingMatrix, IsTheKernelsDamping) {
-  for (const Model model : {Model::cells, Model::springs}) {
+  for (const auto& [model, material] : {std::pair{Model::cells, Material{"gum", 1e6, 0.25, 1000, "test"}},
+                                        {Model::springs, Material{"gum", 1e6, 0.25, 1000, "test"}},
+                                        {Model::cells, testing::mooney_rivlin_material()},
+                                        {Model::cells, testing::orthotropic_material()}}) {
     BoxOptions options;
     options.cells = {3, 2, 2};
     options.spacing = model == Model::springs ? Vec3(0.01, 0.01, 0.01) : Vec3(0.01, 0.012, 0.009);
@@ -40,7 +44,7 @@ TEST(DampingMatrix, IsTheKernelsDamping) {
     body.cell_columns["damping_change"] = {1, std::vector<double>(body.cell_count(), 0)};  // as edits do
     for (std::size_t c = 0; c < body.cell_count(); c += 3)
       body.cell_columns["damping_change"].values[c] = 1.5;
-    const Problem problem = testing::problem_of(body, {"gum", 1e6, 0.25, 1000, "test"}, model);
+    const Problem problem = testing::problem_of(body, material, model);
     const KernelEffects plan{{3e-4}};
     Stepper stepper(problem, plan, true, "");
     State state = testing::at_rest(body);

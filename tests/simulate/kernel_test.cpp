@@ -9,6 +9,7 @@
 
 #include "simulate/implicit/implicit_damping.h"
 #include "simulate/models/cells.h"
+#include "tests/simulate/law_materials.h"
 #include "tests/simulate/numbered_body.h"
 #include "tests/simulate/stepped.h"
 
@@ -37,14 +38,23 @@ Body rough_body(const std::array<int, 3>& cells, const Vec3& spacing) {
   return box_body(options);
 }
 
+struct KernelCase {
+  const char* name;
+  Model model;
+  Material material;
+};
+
+Problem kernel_setting(const Body& body, const KernelCase& of) {
+  return testing::problem_of(body, of.material, of.model);
+}
 Problem kernel_setting(const Body& body, Model model) {
   return testing::problem_of(body, kKernelGum, model);
 }
 
 std::vector<Vec3> cell_by_cell(const Problem& problem, const State& state) {
   const Body& body = problem.body;
-  const CellKind cells = cell_kind(body.parts[0].lattice, kKernelGum);
-  const SpringKind springs = spring_kind(body.parts[0].lattice, kKernelGum);
+  const CellKind cells = cell_kind(body.parts[0].lattice, problem.materials[0]);
+  const SpringKind springs = spring_kind(body.parts[0].lattice, problem.materials[0]);
   std::vector<Vec3> result(body.element_count(), Vec3::Zero());
   for (std::size_t c = 0; c < body.cell_count(); ++c) {
     CellVectors u;
@@ -56,7 +66,7 @@ std::vector<Vec3> cell_by_cell(const Problem& problem, const State& state) {
   return result;
 }
 
-class KernelOf : public ::testing::TestWithParam<Model> {};
+class KernelOf : public ::testing::TestWithParam<KernelCase> {};
 
 TEST_P(KernelOf, AgreesWithTheModelsCellByCell) {
   const Body body = rough_body({37, 19, 11}, Vec3::Constant(0.01));
@@ -160,10 +170,14 @@ TEST_P(KernelOf, DampingOfEditedCells) {
   EXPECT_GT(largest_difference(found, forces_in_step(problem, state, 0)), 1e-3 * largest(expected));
 }
 
-std::string name_of(const ::testing::TestParamInfo<Model>& info) {
-  return info.param == Model::cells ? "cells" : "springs";
-}
-INSTANTIATE_TEST_SUITE_P(Models, KernelOf, ::testing::Values(Model::cells, Model::springs), name_of);
+INSTANTIATE_TEST_SUITE_P(Models, KernelOf,
+                         ::testing::Values(KernelCase{"cells", Model::cells, kKernelGum},
+                                           KernelCase{"springs", Model::springs, kKernelGum},
+                                           KernelCase{"mooney_rivlin", Model::cells,
+                                                      testing::mooney_rivlin_material()},
+                                           KernelCase{"orthotropic", Model::cells,
+                                                      testing::orthotropic_material()}),
+                         [](const ::testing::TestParamInfo<KernelCase>& info) { return info.param.name; });
 
 TEST(Kernel, FoldedCellIsTold) {
   const Body body = box_body({{2, 2, 2}, Vec3::Constant(0.01)});

@@ -1,0 +1,34 @@
+// The seam of the elastic laws: what every user of a material asks of its law, one cell at a time, in
+// H = F - I. Timed runs have the same laws eight cells at a time (simulate/kernels/kernel_law.h).
+#pragma once
+#include "base/math/vec.h"
+#include "simulate/laws/law.h"
+
+namespace flexel::simulate {
+
+using Mat9 = Eigen::Matrix<double, 9, 9>;  // row and column 3 i + j for component ij
+using Mat6 = Eigen::Matrix<double, 6, 6>;  // xx, yy, zz, xy, yz, zx, shears as angles
+
+// J - 1 = det(I + H) - 1, without cancellation for small H.
+[[nodiscard]] double volume_change(const Mat3& gradient);
+
+// W [J/m^3], P = dW/dF (first Piola-Kirchhoff) and Cauchy's stress [Pa], dP/dF [Pa]. Need J > 0.
+[[nodiscard]] double energy_density(const Law& law, const Mat3& gradient);
+[[nodiscard]] Mat3 first_stress(const Law& law, const Mat3& gradient);
+[[nodiscard]] Mat3 cauchy_stress(const Law& law, const Mat3& gradient);
+[[nodiscard]] Mat9 elasticity(const Law& law, const Mat3& gradient);
+
+// A bound on the speed of waves: the largest eigenvalue of dP/dF over that at rest. Neo-Hooke: see
+// neo_hooke::stiffening. Infinity for J <= 0.
+[[nodiscard]] double stiffening(const Law& law, const Mat3& gradient);
+
+// dS/dE at rest (C of small strains), of any law.
+[[nodiscard]] Mat6 moduli_at_rest(const Law& law);
+
+[[nodiscard]] Law neo_hooke_law(double mu, double lambda);
+// C10 + C01 > 0, bulk > 0.
+[[nodiscard]] Law mooney_rivlin_law(double c10, double c01, double bulk);
+// `compliance` in the material's axes [1/Pa], positive definite; `axes`: from those to the frame of F.
+[[nodiscard]] Law orthotropic_law(const Mat6& compliance, const Mat3& axes);
+
+}  // namespace flexel::simulate

@@ -1,0 +1,187 @@
+// Whole runs of the elastic laws against closed forms: at equilibrium, in time, and what is refused.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <numbers>
+
+#include "simulate/laws/elasticity.h"
+#include "tests/simulate/law_materials.h"
+#include "tests/simulate/stepped.h"
+#include "tests/simulate/timed_case.h"
+
+namespace flexel::simulate {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr const char* kGrain = R"(
+material = "grain"
+[materials.grain]
+law = "orthotropic"
+young = ["2 MPa", "0.4 MPa", "0.2 MPa"]
+poisson = [0.37, 0.42, 0.47]
+shear = ["0.3 MPa", "0.28 MPa", "0.1 MPa"]
+density = "500 kg/m3"
+)";
+constexpr const char* kElastomer = R"(
+material = "elastomer"
+[materials.elastomer]
+law = "mooney-rivlin"
+c10 = "0.15 MPa"
+c01 = "0.05 MPa"
+bulk = "1.6 MPa"
+density = "1000 kg/m3"
+)";
+
+// x0 stays in its plane, the corner at the origin where it is, and the bar does not turn about its length: an
+// even stress along x meets all of it.
+constexpr const char* kDrawn = R"(
+[[fix]]
+where = "x0"
+axes = "x"
+[[fix]]
+where = { sphere = { centre = [0, 0, 0], radius = "1 mm" } }
+[[fix]]
+where = { sphere = { centre = [0, "20 mm", 0], radius = "1 mm" } }
+axes = "z"
+[[probe]]
+name = "end"
+where = "x1"
+)";
+
+// 40 x 20 x 20 mm.
+Body bar() {
+  return testing::box_body({.cells = {4, 2, 2}, .spacing = Vec3::Constant(0.01)});
+}
+
+constexpr double kArea = 4e-4;  // m^2
+constexpr double kLength = 0.04;
+
+SimulateResult at_equilibrium(Body& body, const std::string& scene) {
+  Progress progress("test", Progress::Mode::quiet);
+  return simulate(body, parse_scene(scene, "s.toml"), {}, progress);
+}
+
+std::string drawn_by(double force) {
+  return fmt::format("[[load]]\nwhere = \"x1\"\nforce = [\"{} N\", 0, 0]\n", force);
+}
+
+// Drawn askew to its fibres a bar shears too (Lekhnitskii 1963): strain = compliance times stress, all over.
+TEST(LawRuns, OrthotropicBarDrawnAskew) {
+  const double angle = std::numbers::pi / 6;
+  const std::string axes =
+      fmt::format("[parts.box]\naxes = [[{0}, {1}, 0], [{2}, {0}, 0]]\n", std::cos(angle), std::sin(angle),
+                  -std::sin(angle));
+  Body body = bar();
+  const double force = 0.04;  // 100 Pa
+  const SimulateResult result = at_equilibrium(body, kGrain + axes + kDrawn + drawn_by(force));
+  Material material = testing::orthotropic_material();
+  material.axes = Eigen::AngleAxisd(angle, Vec3::UnitZ()).toRotationMatrix();
+  const Mat6 compliance = moduli_at_rest(law_of(material)).inverse();
+  const Vec3 moved = result.probes[0].displacement;
+  const double strain = force / kArea * compliance(0, 0);
+  EXPECT_NEAR(moved.x() / (strain * kLength), 1, 1e-3);  // the law is not linear: strains of 1e-4
+  const double across = force / kArea * (compliance(3, 0) * kLength + compliance(1, 0) * 0.01);
+  EXPECT_NEAR(moved.y() / across, 1, 1e-3);
+  EXPECT_GT(std::abs(compliance(3, 0)), compliance(0, 0) / 4) << "it shears";
+  ASSERT_TRUE(result.stress);
+  EXPECT_NEAR(result.stress->value / (force / kArea), 1, 1e-3);
+}
+
+// Drawn along x to a stretch, free across.
+struct Drawn {
+  double stress = 0, energy = 0;  // nominal, Pa; J/m^3
+};
+
+Drawn drawn_to(const Law& law, double stretch) {
+  double low = 0.5, high = 1.5;
+  Mat3 h = Mat3::Zero();
+  for (int i = 0; i < 200; ++i) {
+    const double across = 0.5 * (low + high);
+    h.diagonal() = Vec3(stretch - 1, across - 1, across - 1);
+    (first_stress(law, h)(1, 1) > 0 ? high : low) = across;
+  }
+  return {first_stress(law, h)(0, 0), energy_density(law, h)};
+}
+
+TEST(LawRuns, MooneyRivlinBarDrawnAndPressed) {
+  const Law law = law_of(testing::mooney_rivlin_material());
+  for (const double stretch : {0.7, 1.5, 2.0}) {
+    Body body = bar();
+    const Drawn drawn = drawn_to(law, stretch);
+    const SimulateResult result =
+        at_equilibrium(body, std::string(kElastomer) + kDrawn + drawn_by(kArea * drawn.stress));
+    EXPECT_NEAR(1 + result.probes[0].displacement.x() / kLength, stretch, 1e-6);
+    EXPECT_NEAR(result.elastic_energy / (drawn.energy * kArea * kLength), 1, 1e-5);
+  }
+}
+
+// What swings with damping comes to rest where equilibrium is, far from small strains.
+TEST(LawRuns, InTimeEndsAtEquilibrium) {
+  for (const std::string& material : {std::string(kElastomer), std::string(kGrain)}) {
+    const std::string held =
+        "[[fix]]\nwhere = \"x0\"\n[[load]]\nwhere = \"x1\"\nforce = [\"20 N\", 0, \"-6 N\"]\n[[probe]]\nname = "
+        "\"end\"\nwhere = \"x1\"\n";
+    Body body = bar();
+    const Vec3 still = at_equilibrium(body, material + held).probes[0].displacement;
+    EXPECT_GT(still.norm(), 0.1 * kLength);
+    for (const std::string method : {"symplectic", "implicit"}) {
+      const std::string timed = fmt::format("[run]\ntime = \"0.15 s\"\nmethod = \"{}\"\n{}[damping]\ntime = \"3 ms\"\n",
+                                            method, method == "implicit" ? "step = \"0.5 ms\"\n" : "");
+      const testing::TimedCase made = testing::run_timed(bar(), parse_scene(material + held + timed, "s.toml"));
+      EXPECT_LT((made.result.probes[0].displacement - still).norm(), 1e-3 * still.norm()) << material << method;
+      testing::expect_books_close(made.result);
+    }
+  }
+}
+
+// A free bar that is thrown and wrung keeps its momenta and, undamped, its energy.
+TEST(LawRuns, FreeMotionKeepsMomentaAndEnergy) {
+  for (const std::string& material : {std::string(kElastomer), std::string(kGrain)}) {
+    const std::string scene =
+        material +
+        "[[velocity]]\nwhere = \"x1\"\nvelocity = [\"2 m/s\", \"3 m/s\", 0]\nspin = [\"200 rad/s\", 0, 0]\n"
+        "[run]\ntime = \"20 ms\"\n";
+    const testing::TimedCase made = testing::run_timed(bar(), parse_scene(scene, "s.toml"));
+    testing::expect_momenta_kept(made.history, 1e-9);
+    testing::expect_books_close(made.result);
+    const std::vector<double> kinetic = made.history.column("kinetic");
+    EXPECT_LT(*std::min_element(kinetic.begin(), kinetic.end()), 0.8 * kinetic[0]) << "it swings";
+  }
+}
+
+TEST(LawRuns, WhatIsNoMaterialIsRefused) {
+  const auto with = [](std::string text, const std::string& from, const std::string& to) {
+    const std::size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    return text.replace(at, from.size(), to);
+  };
+  EXPECT_THAT(testing::refusal(with(kGrain, "orthotropic", "ortotropic")),
+              HasSubstr("no law \"ortotropic\"; did you mean \"orthotropic\"?"));
+  EXPECT_THAT(testing::refusal(with(kGrain, "0.37", "2.5")), HasSubstr("no stable material"));
+  EXPECT_THAT(testing::refusal(with(kGrain, "\"0.28 MPa\"", "\"0 MPa\"")), HasSubstr("\"shear\" needs to be above 0"));
+  EXPECT_THAT(testing::refusal(with(kElastomer, "c01 = \"0.05 MPa\"\n", "")), HasSubstr("c01"));
+  EXPECT_THAT(testing::refusal(with(kElastomer, "1.6 MPa", "0 MPa")), HasSubstr("\"bulk\" needs to be above 0"));
+  EXPECT_THAT(testing::refusal(with(kElastomer, "c10 =", "young = \"1 MPa\"\nc10 =")), HasSubstr("young"));
+}
+
+TEST(LawRuns, WhatALawCannotDoIsRefusedByName) {
+  const std::string grain = kGrain, run = "[[fix]]\nwhere = \"x0\"\n";
+  EXPECT_THAT(testing::refusal(grain + "[parts.box]\nmodel = \"springs\"\n" + run),
+              HasSubstr("needs model \"cells\", not \"springs\""));
+  EXPECT_THAT(testing::refusal("infill = \"20 %\"\n" + grain + run), HasSubstr("takes no infill"));
+  EXPECT_THAT(testing::refusal(grain + "[run]\nrenormalise = true\n" + run), HasSubstr("cannot be renormalised"));
+  EXPECT_THAT(testing::refusal(grain + "[plasticity]\nyield = \"1 MPa\"\n[run]\ntime = \"1 ms\"\n" + run),
+              HasSubstr("plasticity is for law \"neo-hooke\""));
+  EXPECT_THAT(testing::refusal(grain + "[fracture]\nstrength = \"1 MPa\"\n[run]\ntime = \"1 ms\"\n" + run),
+              HasSubstr("fracture is for law \"neo-hooke\""));
+  EXPECT_THAT(testing::refusal(std::string(kElastomer) + "[parts.box]\naxes = [[1, 0, 0], [0, 1, 0]]\n" + run),
+              HasSubstr("\"axes\" belong to a material with law = \"orthotropic\""));
+  EXPECT_THAT(testing::refusal(grain + "[parts.box]\naxes = [[1, 0, 0], [1, 1, 0]]\n" + run),
+              HasSubstr("right angle"));
+}
+
+}  // namespace
+}  // namespace flexel::simulate

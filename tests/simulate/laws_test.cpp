@@ -1,0 +1,131 @@
+// The elastic laws: every derivative against differences, objectivity, small strains, and what each is called for.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <Eigen/Geometry>
+#include <random>
+
+#include "simulate/input/materials.h"
+#include "simulate/laws/elasticity.h"
+#include "simulate/models/cell_model.h"
+#include "tests/simulate/law_materials.h"
+
+namespace flexel::simulate {
+namespace {
+
+using testing::mooney_rivlin_material;
+using testing::orthotropic_material;
+
+std::vector<Law> laws_to_test() {
+  return {neo_hooke_law(0.8e6, 2e6), law_of(mooney_rivlin_material()), law_of(orthotropic_material())};
+}
+
+Mat3 random_gradient(std::mt19937& engine, double size) {
+  std::uniform_real_distribution<double> uniform(-size, size);
+  return Mat3::NullaryExpr([&] { return uniform(engine); });
+}
+
+TEST(Laws, StressIsTheEnergysDerivativeAndTheTangentTheStresss) {
+  std::mt19937 engine(3);
+  for (const Law& law : laws_to_test())
+    for (int round = 0; round < 20; ++round) {
+      const Mat3 h = random_gradient(engine, 0.2);
+      const Mat3 p = first_stress(law, h);
+      const Mat9 tangent = elasticity(law, h);
+      for (int k = 0; k < 9; ++k) {
+        constexpr double step = 1e-6;
+        Mat3 up = h, down = h;
+        up(k / 3, k % 3) += step;
+        down(k / 3, k % 3) -= step;
+        const double slope = (energy_density(law, up) - energy_density(law, down)) / (2 * step);
+        EXPECT_NEAR(p(k / 3, k % 3), slope, 1e-6 * p.norm()) << law_name(law.name);
+        const Mat3 change = (first_stress(law, up) - first_stress(law, down)) / (2 * step);
+        for (int row = 0; row < 9; ++row)
+          EXPECT_NEAR(tangent(row, k), change(row / 3, row % 3), 1e-7 * tangent.norm()) << law_name(law.name);
+      }
+    }
+}
+
+TEST(Laws, RotationChangesNothing) {
+  std::mt19937 engine(5);
+  const Mat3 turn = Eigen::AngleAxisd(1.9, Vec3(2, -1, 1).normalized()).toRotationMatrix();
+  for (const Law& law : laws_to_test()) {
+    const Mat3 h = random_gradient(engine, 0.2), turned = turn * (Mat3::Identity() + h) - Mat3::Identity();
+    EXPECT_NEAR(energy_density(law, turned) / energy_density(law, h), 1, 1e-12);
+    EXPECT_LT((first_stress(law, turned) - turn * first_stress(law, h)).norm(),
+              1e-12 * first_stress(law, h).norm());
+    EXPECT_NEAR(stiffening(law, turned), stiffening(law, h), 1e-10);
+    EXPECT_NEAR(stiffening(law, Mat3::Zero()), 1, 1e-12);
+  }
+}
+
+TEST(Laws, SmallStrainsKeepTheirDigits) {
+  std::mt19937 engine(7);
+  for (const Law& law : laws_to_test()) {
+    const Mat3 h = random_gradient(engine, 1);
+    const double coarse = energy_density(law, 1e-8 * h) / 1e-16,
+                 fine = energy_density(law, 1e-12 * h) / 1e-24;
+    EXPECT_NEAR(fine / coarse, 1, 1e-6) << law_name(law.name);
+    EXPECT_LT((first_stress(law, 1e-12 * h) / 1e-12 - first_stress(law, 1e-8 * h) / 1e-8).norm(),
+              1e-6 * first_stress(law, 1e-8 * h).norm() / 1e-8);
+  }
+}
+
+// With C01 = 0, and with isotropic constants, the moduli at rest are those of neo-Hooke.
+TEST(Laws, IsotropicLimits) {
+  const double mu = 0.8e6, lambda = 2e6, bulk = lambda + 2.0 / 3 * mu;
+  const Law neo = neo_hooke_law(mu, lambda);
+  Material even;
+  even.law = LawName::orthotropic;
+  even.young = mu * (3 * lambda + 2 * mu) / (lambda + mu);
+  even.poisson = lambda / (2 * (lambda + mu));
+  even.youngs.setConstant(even.young);
+  even.poissons.setConstant(even.poisson);
+  even.shears.setConstant(mu);
+  even.axes = orthotropic_material().axes;
+  const Mat9 expected = elasticity(neo, Mat3::Zero());
+  for (const Law& law : {mooney_rivlin_law(mu / 2, 0, bulk), law_of(even)}) {
+    EXPECT_LT((elasticity(law, Mat3::Zero()) - expected).norm(), 1e-10 * expected.norm());
+    EXPECT_NEAR(law.mu / mu, 1, 1e-12);
+    EXPECT_NEAR(law.lambda / lambda, 1, 1e-12);
+  }
+  Material plain{"even", even.young, even.poisson, 1000, ""};
+  Lattice lattice;
+  lattice.spacing = Vec3(0.1, 0.115, 0.093);
+  for (std::size_t m = 0; m < 4; ++m)
+    EXPECT_NEAR(cell_kind(lattice, even).hourglass[m] / cell_kind(lattice, plain).hourglass[m], 1, 1e-10);
+}
+
+// Young's moduli along the material's axes, and turned by 30 degrees in the plane (Lekhnitskii 1963):
+// 1/E = c^4/E1 + (1/G12 - 2 nu12/E1) c^2 s^2 + s^4/E2.
+TEST(Laws, TurnedComplianceIsLekhnitskiis) {
+  Material material = orthotropic_material();
+  const double angle = std::numbers::pi / 6, c = std::cos(angle), s = std::sin(angle);
+  material.axes = Eigen::AngleAxisd(angle, Vec3::UnitZ()).toRotationMatrix();
+  const Mat6 turned = moduli_at_rest(law_of(material)).inverse();
+  const double expected =
+      std::pow(c, 4) / material.youngs[0] + std::pow(s, 4) / material.youngs[1] +
+      (1 / material.shears[0] - 2 * material.poissons[0] / material.youngs[0]) * c * c * s * s;
+  EXPECT_NEAR(turned(0, 0) / expected, 1, 1e-12);
+  EXPECT_NEAR(moduli_at_rest(law_of(material, material.axes)).inverse()(0, 0) * material.youngs[0], 1, 1e-12);
+}
+
+// Incompressible in the limit: sigma = 2 (l^2 - 1/l) (C10 + C01 / l) (Rivlin 1948).
+TEST(Laws, MooneyRivlinUnderUniaxialStress) {
+  const Law law = mooney_rivlin_law(0.3e6, 0.1e6, 1e11);
+  for (const double stretch : {0.6, 1.3, 2.0, 3.0}) {
+    // across: the stretch at which the stress across is 0, by bisection
+    double low = 0.9 / std::sqrt(stretch), high = 1.1 / std::sqrt(stretch);
+    const auto at = [&](double across) {
+      Mat3 h = Mat3::Zero();
+      h.diagonal() = Vec3(stretch - 1, across - 1, across - 1);
+      return cauchy_stress(law, h);
+    };
+    for (int i = 0; i < 200; ++i) (at(0.5 * (low + high))(1, 1) > 0 ? high : low) = 0.5 * (low + high);
+    const double expected = 2 * (stretch * stretch - 1 / stretch) * (0.3e6 + 0.1e6 / stretch);
+    EXPECT_NEAR(at(0.5 * (low + high))(0, 0) / expected, 1, 1e-4) << stretch;
+  }
+}
+
+}  // namespace
+}  // namespace flexel::simulate
