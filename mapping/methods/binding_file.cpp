@@ -67,8 +67,9 @@ std::uint64_t surface_hash(const Body& body) {
 
 template <class Value>
 void append(Bytes& bytes, const std::vector<Value>& values) {
-  const auto raw = std::as_bytes(std::span(values));
-  bytes.insert(bytes.end(), raw.begin(), raw.end());
+  const std::size_t at = bytes.size();
+  bytes.resize(at + values.size() * sizeof(Value));
+  std::memcpy(bytes.data() + at, values.data(), values.size() * sizeof(Value));
 }
 
 // Takes arrays from the front of what is left.
