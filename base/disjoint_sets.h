@@ -24,6 +24,13 @@ class DisjointSets {
     if (a < b) parent_[b] = a;
     if (b < a) parent_[a] = b;
   }
+  // (members) The number of each one's set; sets are numbered in order of their lowest member.
+  [[nodiscard]] std::vector<std::uint32_t> numbered() {
+    std::vector<std::uint32_t> number(parent_.size());
+    std::uint32_t count = 0;
+    for (std::uint32_t i = 0; i < number.size(); ++i) number[i] = root(i) == i ? count++ : number[root(i)];
+    return number;
+  }
 
  private:
   std::vector<std::uint32_t> parent_;

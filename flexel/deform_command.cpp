@@ -239,11 +239,11 @@ SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surf
   };
   SolvedRun run = choose_resolution(*plan.goal, solve, accuracy, progress);
   (void)warnings.take();
-  if (plan.goal->error && plan.map.method == mapping::MapMethod::blended) {
-    mapping.method = mapping::MapMethod::smooth;
+  if (plan.goal->error && plan.map.method == &mapping::kBlended) {
+    mapping.method = &mapping::kSmooth;
     const mapping::MapResult smooth = map_part(run.voxels.body, mapping, {}, quiet).result;
     if (mapping_difference(run.mapped, smooth.displacement) > 0.25 * *plan.goal->error)
-      plan.map.method = mapping::MapMethod::smooth;
+      plan.map.method = &mapping::kSmooth;
   }
   accuracy.method = name_of(plan.map.method);
   return run;
@@ -285,7 +285,7 @@ std::string next_step(const std::optional<AccuracyReport>& accuracy) {
     chosen_for +=
         fmt::format("{}within {}", chosen_for.empty() ? "" : " ", human_seconds(*accuracy->goal.within));
   const std::string method =
-      accuracy->method == name_of(mapping::MapMethod::blended) ? "" : " --method " + accuracy->method;
+      accuracy->method == name_of(&mapping::kBlended) ? "" : " --method " + accuracy->method;
   const std::string repeat = fmt::format("--size {}{} repeats this run, chosen for {}",
                                          size_text(accuracy->runs.back().size), method, chosen_for);
   return accuracy->advice.empty() ? repeat : accuracy->advice + "; " + repeat;

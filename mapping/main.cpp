@@ -65,8 +65,9 @@ void declare(CLI::App& app, Arguments& arguments) {
       ->check(is_distance)
       ->capture_default_str();
   declare_map_options(app, arguments.map);
-  app.add_option("--save-binding", arguments.save_binding,
-                 "affine, gram-schmidt: write what ties the vertices to the elements, for --binding")
+  app.add_option(
+         "--save-binding", arguments.save_binding,
+         fmt::format("{}: write what ties the vertices to the elements, for --binding", saved_method_names()))
       ->type_name("FILE");
   app.add_option("--binding", arguments.binding,
                  "Take the binding of this file, made for the same lattice and surface, and its method")
@@ -113,11 +114,9 @@ void check_binding(const Arguments& arguments, const Plan& plan) {
         "--binding and --save-binding exclude each other: a saved binding need not be saved again");
   if (plan.crack.mode != CrackMode::keep)
     throw InputError("--binding and --save-binding are for a surface that stays whole: leave out --crack");
-  if (arguments.binding.empty() && plan.options.method != MapMethod::affine &&
-      plan.options.method != MapMethod::gram_schmidt)
-    throw InputError(
-        fmt::format("--save-binding: {} has no binding to keep: add --method affine or gram-schmidt",
-                    name_of(plan.options.method)));
+  if (arguments.binding.empty() && plan.options.method->file_number < 0)
+    throw InputError(fmt::format("--save-binding: {} has no binding to keep: add --method {}",
+                                 name_of(plan.options.method), saved_method_names()));
 }
 
 Plan make_plan(Arguments& arguments) {

@@ -12,6 +12,7 @@
 #include "base/nearest_word.h"
 #include "formats/common/file_formats.h"
 #include "formats/exchange/surface_file.h"
+#include "mapping/methods/method.h"
 #include "mapping/report/report.h"
 
 namespace flexel::mapping {
@@ -40,9 +41,9 @@ std::string pattern_of(const std::string& pieces, const std::string& format) {
 
 void declare_map_options(CLI::App& app, MapArguments& arguments) {
   app.add_option("--method", arguments.method,
-                 "How elements carry the vertices: blended, smooth, affine or gram-schmidt (the paper's)")
+                 fmt::format("How elements carry the vertices: {}", method_help()))
       ->type_name("NAME")
-      ->default_str("blended");
+      ->default_str(name_of(MapOptions().method));
   app.add_option("--check", arguments.checks,
                  "Also check the mapped surface: voronoi, self-intersection, or both with a comma")
       ->type_name("NAMES");

@@ -14,6 +14,7 @@
 #include "mapping/anchors/search.h"
 #include "mapping/methods/apply.h"
 #include "mapping/methods/bind.h"
+#include "mapping/methods/blend.h"
 #include "motions.h"
 
 namespace flexel::mapping {
@@ -26,15 +27,15 @@ struct Motion {
 
 // The motions of the quadruple of each element, in place of the least squares fit.
 std::vector<mapping::ElementMotion> quadruple_motions(const Body& body, const mapping::Binding& binding,
-                                                      mapping::MapMethod method) {
-  const mapping::MovingElements& moving = binding.blend.moving;
+                                                      bool orthonormal) {
+  const mapping::MovingElements& moving = blend_of(binding).moving;
   std::vector<mapping::ElementMotion> motions(moving.elements.size());
   for (std::size_t i = 0; i < motions.size(); ++i) {
     const std::uint32_t e = moving.elements[i];
     const mapping::Frame frame = find_frame(body, binding.connections, body.parts[0], e, 7);
     motions[i].displacement = body.position[e] - body.rest[e];
-    motions[i].gradient = frame_motion(frame, body.rest, body.position, method).change *
-                          rest_base(frame, body.rest, method).inverse();
+    motions[i].gradient = frame_motion(frame, body.rest, body.position, orthonormal).change *
+                          rest_base(frame, body.rest, orthonormal).inverse();
   }
   return motions;
 }
@@ -48,19 +49,19 @@ template <mapping::MapMethod method>
 std::vector<Vec3> mapped(const Body& body) {
   return apply(bind(body, method), body, body.position);
 }
-template <mapping::MapMethod frames>
+template <bool orthonormal>
 std::vector<Vec3> blended_with(const Body& body) {
-  const mapping::Binding binding = bind(body, mapping::MapMethod::blended);
-  return apply(binding.blend, body, quadruple_motions(body, binding, frames));
+  const mapping::Binding binding = bind(body, &mapping::kBlended);
+  return apply(blend_of(binding), body, quadruple_motions(body, binding, orthonormal));
 }
 
 constexpr std::array<Row, 6> kRows = {{
-    {"`gram-schmidt`", mapped<mapping::MapMethod::gram_schmidt>},
-    {"`affine`", mapped<mapping::MapMethod::affine>},
-    {"`blended`", mapped<mapping::MapMethod::blended>},
-    {"(blended, Gram-Schmidt frames)", blended_with<mapping::MapMethod::gram_schmidt>},
-    {"(blended, affine frames)", blended_with<mapping::MapMethod::affine>},
-    {"`smooth`", mapped<mapping::MapMethod::smooth>},
+    {"`gram-schmidt`", mapped<&mapping::kGramSchmidt>},
+    {"`affine`", mapped<&mapping::kAffine>},
+    {"`blended`", mapped<&mapping::kBlended>},
+    {"(blended, Gram-Schmidt frames)", blended_with<true>},
+    {"(blended, affine frames)", blended_with<false>},
+    {"`smooth`", mapped<&mapping::kSmooth>},
 }};
 
 void print_table(const char* title, std::vector<Body>& bodies, const std::vector<int>& across,
@@ -113,10 +114,10 @@ void print_costs(const std::vector<Body>& bodies, const std::vector<int>& across
   fmt::print("\n|---|");
   for (std::size_t i = 0; i < 2 * across.size(); ++i) fmt::print("---|");
   fmt::print("\n");
-  for (const auto& [name, method] : {std::pair{"gram-schmidt", mapping::MapMethod::gram_schmidt},
-                                     {"affine", mapping::MapMethod::affine},
-                                     {"blended", mapping::MapMethod::blended},
-                                     {"smooth", mapping::MapMethod::smooth}}) {
+  for (const auto& [name, method] : {std::pair{"gram-schmidt", &mapping::kGramSchmidt},
+                                     {"affine", &mapping::kAffine},
+                                     {"blended", &mapping::kBlended},
+                                     {"smooth", &mapping::kSmooth}}) {
     fmt::print("| `{}` |", name);
     // as bench_mapping does: with weights kept for states to come
     for (const Body& body : bodies) fmt::print(" {:.0f} |", cost(body, [&] { (void)bind(body, method, 2); }));

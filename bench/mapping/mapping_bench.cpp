@@ -15,6 +15,7 @@
 #include "mapping/anchors/nearest.h"
 #include "mapping/methods/apply.h"
 #include "mapping/methods/bind.h"
+#include "mapping/methods/frame_methods.h"
 #include "mapping/methods/map_surface.h"
 
 namespace flexel::mapping {
@@ -219,11 +220,12 @@ void welding(benchmark::State& state) {
 void traffic(benchmark::State& state) {
   const Body& body = ring(Placement::corner);
   const ThreadLimit limit(static_cast<int>(state.range(0)));
-  const mapping::Binding binding = bind(body, mapping::MapMethod::affine);
+  const mapping::Binding binding = bind(body, &mapping::kAffine);
+  const auto& coordinates = dynamic_cast<const mapping::FrameCoordinates&>(*binding.kept).coordinates;
   std::vector<Vec3> out(body.surface.vertices.size());
   for (auto _ : state) {
     parallel_for_each(
-        out.size(), [&](std::size_t v) { out[v] = binding.coordinates[v] * binding.frame[v]; }, 8192);
+        out.size(), [&](std::size_t v) { out[v] = coordinates[v] * binding.frame[v]; }, 8192);
     benchmark::DoNotOptimize(out.data());
   }
   count(state, body);
@@ -248,7 +250,7 @@ void nearest(benchmark::State& state) {
 void judging(benchmark::State& state) {
   const Body& body = ring(Placement::corner);
   const ThreadLimit limit(static_cast<int>(state.range(0)));
-  const mapping::Binding binding = bind(body, mapping::MapMethod::affine);
+  const mapping::Binding binding = bind(body, &mapping::kAffine);
   const std::vector<Vec3> displacement = apply(binding, body, body.position);
   for (auto _ : state) benchmark::DoNotOptimize(judge(binding, body, body.position, displacement).data());
   count(state, body);
@@ -263,18 +265,18 @@ void register_all() {
           ->UseRealTime();
   };
   constexpr auto corner = Placement::corner, centre = Placement::centre;
-  add("bind/corner/gram-schmidt", bind_surface<corner, mapping::MapMethod::gram_schmidt>);
-  add("bind/corner/affine", bind_surface<corner, mapping::MapMethod::affine>);
-  add("bind/corner/blended", bind_surface<corner, mapping::MapMethod::blended>);
-  add("bind/corner/smooth", bind_surface<corner, mapping::MapMethod::smooth>);
-  add("bind/centre/gram-schmidt", bind_surface<centre, mapping::MapMethod::gram_schmidt>);
-  add("bind/centre/blended", bind_surface<centre, mapping::MapMethod::blended>);
-  add("apply/corner/gram-schmidt", apply_state<corner, mapping::MapMethod::gram_schmidt>);
-  add("apply/corner/affine", apply_state<corner, mapping::MapMethod::affine>);
-  add("apply/corner/blended", apply_state<corner, mapping::MapMethod::blended>);
-  add("apply/corner/smooth", apply_state<corner, mapping::MapMethod::smooth>);
-  add("apply/centre/gram-schmidt", apply_state<centre, mapping::MapMethod::gram_schmidt>);
-  add("apply/centre/blended", apply_state<centre, mapping::MapMethod::blended>);
+  add("bind/corner/gram-schmidt", bind_surface<corner, &mapping::kGramSchmidt>);
+  add("bind/corner/affine", bind_surface<corner, &mapping::kAffine>);
+  add("bind/corner/blended", bind_surface<corner, &mapping::kBlended>);
+  add("bind/corner/smooth", bind_surface<corner, &mapping::kSmooth>);
+  add("bind/centre/gram-schmidt", bind_surface<centre, &mapping::kGramSchmidt>);
+  add("bind/centre/blended", bind_surface<centre, &mapping::kBlended>);
+  add("apply/corner/gram-schmidt", apply_state<corner, &mapping::kGramSchmidt>);
+  add("apply/corner/affine", apply_state<corner, &mapping::kAffine>);
+  add("apply/corner/blended", apply_state<corner, &mapping::kBlended>);
+  add("apply/corner/smooth", apply_state<corner, &mapping::kSmooth>);
+  add("apply/centre/gram-schmidt", apply_state<centre, &mapping::kGramSchmidt>);
+  add("apply/centre/blended", apply_state<centre, &mapping::kBlended>);
   add("judge", judging);
   add("part/connections", connections);
   add("part/welding", welding);

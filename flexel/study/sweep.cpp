@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ranges>
 
 #include "base/units.h"
 #include "flexel/study/accuracy_analysis.h"
+#include "mapping/methods/method.h"
 
 namespace flexel::study {
 namespace {
@@ -148,7 +150,8 @@ std::optional<std::size_t> Sweep::middle() const {
 // What changes the time or the last digits only.
 void Sweep::add_switches(std::vector<Trial>& trials, std::size_t r) const {
   const Rung& rung = rungs_[r];
-  for (const char* method : {"gram-schmidt", "affine", "smooth", "blended"}) {
+  for (const mapping::MapMethod row : mapping::map_methods() | std::views::reverse) {  // the default last
+    const std::string method = name_of(row);
     if (method == first_.method) continue;
     Configuration each = first_;
     each.method = method;

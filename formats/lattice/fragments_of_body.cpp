@@ -3,15 +3,19 @@
 
 #include <algorithm>
 
-#include "base/disjoint_sets.h"
-
 namespace flexel {
 
-Components find_components(const Body& body, const Adjacency& connections) {
-  const auto n = static_cast<std::uint32_t>(body.element_count());
+DisjointSets connected_elements(const Adjacency& connections) {
+  const auto n = static_cast<std::uint32_t>(connections.offsets.size() - 1);
   DisjointSets sets(n);
   for (std::uint32_t e = 0; e < n; ++e)
     for (const std::uint32_t other : connections.of(e)) sets.unite(e, other);
+  return sets;
+}
+
+Components find_components(const Body& body, const Adjacency& connections) {
+  const auto n = static_cast<std::uint32_t>(body.element_count());
+  DisjointSets sets = connected_elements(connections);
   Components fragments;
   std::vector<std::uint32_t> size(n, 0), number(n, 0);
   for (std::uint32_t e = 0; e < n; ++e) ++size[sets.root(e)];

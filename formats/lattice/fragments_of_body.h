@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/disjoint_sets.h"
 #include "formats/lattice/body.h"
 
 namespace flexel {
@@ -23,6 +24,9 @@ struct Components {
   }
   [[nodiscard]] bool in_pieces(std::uint32_t part) const { return offset[part + 1] - offset[part] > 1; }
 };
+
+// Sets of elements that `connections` join, directly or through others.
+[[nodiscard]] DisjointSets connected_elements(const Adjacency& connections);
 
 // Connected components of `connections`, which element_adjacency(body) gives.
 [[nodiscard]] Components find_components(const Body& body, const Adjacency& connections);

@@ -32,9 +32,9 @@ Mat3 gram_schmidt(const Mat3& edge) {
 }
 
 // The plane's edges (or their orthonormal axes) and its unit normal.
-Mat3 plane_base(const Mat3& edge, MapMethod method) {
+Mat3 plane_base(const Mat3& edge, bool orthonormal) {
   Mat3 base = edge;
-  if (method == MapMethod::gram_schmidt) {
+  if (orthonormal) {
     base.col(0) = edge.col(0).normalized();
     base.col(1) = (edge.col(1) - edge.col(1).dot(base.col(0)) * base.col(0)).normalized();
   }
@@ -57,26 +57,26 @@ Mat3 smallest_rotation(const Vec3& from, const Vec3& to) {
 }
 
 // `rest` is the edge at rest, `edge` the edge now.
-Mat3 line_base(const Vec3& rest, const Vec3& edge, MapMethod method) {
+Mat3 line_base(const Vec3& rest, const Vec3& edge, bool orthonormal) {
   const Vec3 along = rest.normalized();
   const Mat3 rotation = smallest_rotation(along, edge.normalized());
   const Vec3 across = along.unitOrthogonal();
   Mat3 base;
-  base.col(0) = method == MapMethod::gram_schmidt ? edge.normalized() : edge;
+  base.col(0) = orthonormal ? edge.normalized() : edge;
   base.col(1) = rotation * across;
   base.col(2) = rotation * along.cross(across);
   return base;
 }
 
 // The base now, of a frame whose edges were `rest_edge` at rest.
-Mat3 base_of(FrameKind kind, const Mat3& rest_edge, const Mat3& edge, MapMethod method) {
+Mat3 base_of(FrameKind kind, const Mat3& rest_edge, const Mat3& edge, bool orthonormal) {
   switch (kind) {
     case FrameKind::full:
-      return method == MapMethod::gram_schmidt ? gram_schmidt(edge) : edge;
+      return orthonormal ? gram_schmidt(edge) : edge;
     case FrameKind::plane:
-      return plane_base(edge, method);
+      return plane_base(edge, orthonormal);
     case FrameKind::line:
-      return line_base(rest_edge.col(0), edge.col(0), method);
+      return line_base(rest_edge.col(0), edge.col(0), orthonormal);
     case FrameKind::rigid:
       break;
   }
@@ -105,13 +105,13 @@ double sine(const Vec3& a, const Vec3& b) {
   return lengths > 0 ? a.cross(b).norm() / lengths : 0;
 }
 
-Mat3 rest_base(const Frame& frame, const std::vector<Vec3>& rest, MapMethod method) {
+Mat3 rest_base(const Frame& frame, const std::vector<Vec3>& rest, bool orthonormal) {
   const Mat3 edge = edges(frame, rest);
-  return base_of(frame.kind, edge, edge, method);
+  return base_of(frame.kind, edge, edge, orthonormal);
 }
 
 FrameMotion frame_motion(const Frame& frame, const std::vector<Vec3>& rest, const std::vector<Vec3>& position,
-                         MapMethod method) {
+                         bool orthonormal) {
   FrameMotion motion;
   motion.translation = position[frame.elements[0]] - rest[frame.elements[0]];
   if (frame.kind == FrameKind::rigid) return motion;
@@ -119,8 +119,8 @@ FrameMotion frame_motion(const Frame& frame, const std::vector<Vec3>& rest, cons
   motion.flags = flags_of(frame.kind, rest_edge, edge);
   // A collapsed base has no axes: the vertex then follows the origin.
   if (motion.flags & kFrameDegenerate) return motion;
-  motion.change =
-      base_of(frame.kind, rest_edge, edge, method) - base_of(frame.kind, rest_edge, rest_edge, method);
+  motion.change = base_of(frame.kind, rest_edge, edge, orthonormal) -
+                  base_of(frame.kind, rest_edge, rest_edge, orthonormal);
   return motion;
 }
 
@@ -128,8 +128,8 @@ std::vector<Mat3> deformation_gradients(const std::vector<Frame>& frames, const 
                                         const std::vector<Vec3>& position) {
   std::vector<Mat3> gradients(frames.size());
   parallel_for_each(frames.size(), [&](std::size_t f) {
-    const FrameMotion motion = frame_motion(frames[f], rest, position, MapMethod::affine);
-    gradients[f] = Mat3::Identity() + motion.change * rest_base(frames[f], rest, MapMethod::affine).inverse();
+    const FrameMotion motion = frame_motion(frames[f], rest, position, false);
+    gradients[f] = Mat3::Identity() + motion.change * rest_base(frames[f], rest, false).inverse();
   });
   return gradients;
 }

@@ -17,11 +17,11 @@ constexpr double kDegenerate = 1e-6;
 [[nodiscard]] double sine(const Vec3& a, const Vec3& b);
 
 // The base of a frame, columns in m (affine edges) or unit length (orthonormal axes), world frame.
-// gram_schmidt: the paper's orthonormal base (section 6.1.2); all other methods: the edges themselves.
+// `orthonormal`: the paper's base (section 6.1.2); else the edges themselves.
 // Kinds with fewer than four elements complete it: a plane by its unit normal, a line by the two axes that
 // the smallest rotation from its direction at rest carries along (the axes at rest are arbitrary but fixed);
 // a rigid frame has the world's axes, whatever its elements do.
-[[nodiscard]] Mat3 rest_base(const Frame& frame, const std::vector<Vec3>& rest, MapMethod method);
+[[nodiscard]] Mat3 rest_base(const Frame& frame, const std::vector<Vec3>& rest, bool orthonormal);
 
 // How a frame has moved. A vertex with coordinates c in the rest base moves by translation + change * c:
 // exactly zero where its elements did not move.
@@ -30,9 +30,9 @@ struct FrameMotion {
   Mat3 change = Mat3::Zero();       // deformed base - rest base
   std::uint8_t flags = 0;           // kFrameInverted, kFrameDegenerate
 };
-// As far as `flags` go, the same in every method.
+// `flags` are the same for both bases.
 [[nodiscard]] FrameMotion frame_motion(const Frame& frame, const std::vector<Vec3>& rest,
-                                       const std::vector<Vec3>& position, MapMethod method);
+                                       const std::vector<Vec3>& position, bool orthonormal);
 
 // (frames) The deformation gradient of each, by its edges: the identity where nothing moved.
 [[nodiscard]] std::vector<Mat3> deformation_gradients(const std::vector<Frame>& frames,

@@ -92,11 +92,11 @@ std::vector<Mat3> rest_bases(const Body& body, const Binding& binding) {
   std::vector<Mat3> base;
   resize_touched(base, binding.frames.size());
   parallel_chunks(base.size(), kFramesAtATime, [&](std::size_t begin, std::size_t end) {
-    span_bases(&binding.frames[begin], end - begin, body.rest.data(),
-               binding.method == MapMethod::gram_schmidt, &base[begin]);
+    span_bases(&binding.frames[begin], end - begin, body.rest.data(), binding.method->orthonormal,
+               &base[begin]);
     for (std::size_t f = begin; f < end; ++f)
       if (binding.frames[f].kind != FrameKind::full)
-        base[f] = rest_base(binding.frames[f], body.rest, binding.method);
+        base[f] = rest_base(binding.frames[f], body.rest, binding.method->orthonormal);
   });
   return base;
 }
@@ -118,19 +118,20 @@ RestFrames rest_frames(const Body& body, const Binding& binding) {
   return rest;
 }
 
-void take_coordinates(const Body& body, Binding& binding) {
+// The residual and the distance of all vertices; and, for methods that keep them, coordinates and bases.
+void take_coordinates(const Body& body, Binding& binding, MethodInput& input) {
   constexpr std::size_t kVerticesAtATime = 8192;
   RestFrames rest = rest_frames(body, binding);
   const std::size_t n = binding.frame.size();
-  const bool keep = binding.method == MapMethod::affine || binding.method == MapMethod::gram_schmidt;
-  if (keep) resize_touched(binding.coordinates, n);
+  const bool keep = binding.method->keeps_coordinates;
+  if (keep) resize_touched(input.coordinates, n);
   std::vector<Extremes> found(n / kVerticesAtATime + 1);
   parallel_chunks(n, kVerticesAtATime, [&](std::size_t begin, std::size_t end) {
     found[begin / kVerticesAtATime] =
         coordinates_in(rest, &binding.frame[begin], &body.surface.vertices[begin], &binding.referenced[begin],
-                       end - begin, keep ? &binding.coordinates[begin] : nullptr);
+                       end - begin, keep ? &input.coordinates[begin] : nullptr);
   });
-  if (keep) binding.rest_base = std::move(rest.base);
+  if (keep) input.rest_base = std::move(rest.base);
   Extremes largest;
   for (const Extremes& chunk : found) largest.include(chunk);
   binding.rest_residual = std::sqrt(largest.squared_residual);
@@ -149,11 +150,9 @@ Binding bind(const Body& body, MapMethod method, VertexAnchors anchors, std::siz
   binding.connections = element_adjacency(body);
   binding.referenced = std::move(anchors.referenced);
   make_frames(body, anchors.anchor, binding);
-  take_coordinates(body, binding);
-  if (method == MapMethod::blended)
-    binding.blend = make_blend(body, binding.connections, anchors.anchor, states > 1);
-  if (method == MapMethod::smooth)
-    binding.groups = group_vertices(body, binding.connections, anchors.anchor, kSmoothSteps, kSmoothRadius);
+  MethodInput input{body, binding.connections, anchors.anchor, states, {}, {}};
+  take_coordinates(body, binding, input);
+  binding.kept = method->bind(input);
   return binding;
 }
 

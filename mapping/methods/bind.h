@@ -2,27 +2,24 @@
 // state.
 #pragma once
 #include "mapping/anchors/vertex_anchor.h"
-#include "mapping/methods/blend.h"
+#include "mapping/methods/method.h"
+#include "mapping/types/result.h"
 
 namespace flexel::mapping {
 
 struct Binding {
-  MapMethod method = MapMethod::blended;
-  std::vector<Frame> frames;         // distinct
-  std::vector<std::uint32_t> frame;  // (vertices) index into frames
-  // gram_schmidt, affine: (vertices x 3) in the rest base of the frame, m or edges
-  std::vector<Vec3> coordinates;
-  std::vector<Mat3> rest_base;           // gram_schmidt, affine: (frames)
-  Blend blend;                           // blended
-  Groups groups;                         // smooth
-  std::vector<std::uint8_t> referenced;  // (vertices) 1: some polygon uses it
-  Adjacency connections;                 // of the elements, as they are now
-  double rest_residual = 0;              // m, largest distance of a vertex rebuilt at rest from itself
-  double distance_outside = 0;           // in spacings; see MapResult
+  MapMethod method = &kBlended;
+  std::vector<Frame> frames;                  // distinct
+  std::vector<std::uint32_t> frame;           // (vertices) index into frames
+  std::shared_ptr<const MethodBinding> kept;  // what the method keeps
+  std::vector<std::uint8_t> referenced;       // (vertices) 1: some polygon uses it
+  Adjacency connections;                      // of the elements, as they are now
+  double rest_residual = 0;                   // m, largest distance of a vertex rebuilt at rest from itself
+  double distance_outside = 0;                // in spacings; see MapResult
 };
 
 // Binds the surface that travels in `body`. `states`: how many will be mapped; where there are several,
-// weights are kept (Blend).
+// methods may keep more (MethodInput).
 //
 // Corner placement: the origin is the nearest corner of the cell under the vertex, which the polygons around
 // the vertex name (Body::surface_cells): two leaves nearer to each other than a spacing keep to their own

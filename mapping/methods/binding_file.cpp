@@ -68,8 +68,9 @@ std::uint64_t surface_hash(const Body& body) {
 
 template <class Value>
 void append(Bytes& bytes, const std::vector<Value>& values) {
-  const auto raw = std::as_bytes(std::span(values));
-  bytes.insert(bytes.end(), raw.begin(), raw.end());
+  const std::size_t at = bytes.size();
+  bytes.resize(at + values.size() * sizeof(Value));
+  std::memcpy(bytes.data() + at, values.data(), values.size() * sizeof(Value));
 }
 
 // Takes arrays from the front of what is left.
@@ -83,20 +84,32 @@ class Reader {
     left_ = left_.subspan(count * sizeof(Value));
     return values;
   }
+  // The next `count` bytes.
+  [[nodiscard]] std::span<const std::byte> take_bytes(std::size_t count) {
+    const std::span<const std::byte> taken = left_.first(count);
+    left_ = left_.subspan(count);
+    return taken;
+  }
 
  private:
   std::span<const std::byte> left_;
 };
 
 constexpr const char* kDamaged = "is damaged: save the binding again";
-constexpr std::size_t kFrameBytes = sizeof(PackedFrame) + sizeof(Mat3);
-constexpr std::size_t kVertexBytes = sizeof(std::uint32_t) + sizeof(Vec3) + sizeof(std::uint8_t);
+
+// The method of that number in the file; nullptr: none.
+MapMethod saved_method(std::uint32_t number) {
+  for (const MapMethod method : map_methods())
+    if (method->file_number >= 0 && static_cast<std::uint32_t>(method->file_number) == number) return method;
+  return nullptr;
+}
 
 // True when the file is as long as its header says, without overflow.
-bool is_complete(const Header& header, std::size_t size) {
-  if (header.frames > size / kFrameBytes || header.vertices > size / kVertexBytes) return false;
-  return size == sizeof(Header) + header.frames * kFrameBytes + header.vertices * kVertexBytes +
-                     sizeof(std::uint64_t);
+bool is_complete(const Header& header, MapMethod method, std::size_t size) {
+  const std::size_t frame = sizeof(PackedFrame) + method->bytes_a_frame;
+  const std::size_t vertex = sizeof(std::uint32_t) + sizeof(std::uint8_t) + method->bytes_a_vertex;
+  if (header.frames > size / frame || header.vertices > size / vertex) return false;
+  return size == sizeof(Header) + header.frames * frame + header.vertices * vertex + sizeof(std::uint64_t);
 }
 
 // The hash keeps what was damaged out; this, what was made by hand.
@@ -118,12 +131,11 @@ Header check_header(const Bytes& bytes, const std::string& path) {
     throw InputError(path,
                      fmt::format("is a binding of version {}, this program reads version {}: save it again",
                                  header.version, expected.version));
+  const MapMethod method = saved_method(header.method);
+  if (method == nullptr || !is_complete(header, method, bytes.size())) throw InputError(path, kDamaged);
   std::uint64_t hash = 0;
-  if (is_complete(header, bytes.size()))
-    std::memcpy(&hash, bytes.data() + bytes.size() - sizeof hash, sizeof hash);
-  if (!is_complete(header, bytes.size()) ||
-      hash != content_hash(std::span<const std::byte>(bytes).first(bytes.size() - sizeof hash)) ||
-      header.method > static_cast<std::uint32_t>(MapMethod::affine))
+  std::memcpy(&hash, bytes.data() + bytes.size() - sizeof hash, sizeof hash);
+  if (hash != content_hash(std::span<const std::byte>(bytes).first(bytes.size() - sizeof hash)))
     throw InputError(path, kDamaged);
   return header;
 }
@@ -131,12 +143,11 @@ Header check_header(const Bytes& bytes, const std::string& path) {
 }  // namespace
 
 void write_binding(const Binding& binding, const Body& body, const std::string& path) {
-  if (binding.method != MapMethod::gram_schmidt && binding.method != MapMethod::affine)
-    throw InputError(
-        fmt::format("--save-binding: \"{}\" is not kept in a file: take --method affine or gram-schmidt",
-                    name_of(binding.method)));
+  if (binding.method->file_number < 0)
+    throw InputError(fmt::format("--save-binding: \"{}\" is not kept in a file: take --method {}",
+                                 name_of(binding.method), saved_method_names()));
   Header header;
-  header.method = static_cast<std::uint32_t>(binding.method);
+  header.method = static_cast<std::uint32_t>(binding.method->file_number);
   header.lattice = lattice_hash(body);
   header.surface = surface_hash(body);
   header.frames = binding.frames.size();
@@ -150,8 +161,7 @@ void write_binding(const Binding& binding, const Body& body, const std::string& 
   Bytes bytes(sizeof header);
   std::memcpy(bytes.data(), &header, sizeof header);
   append(bytes, frames);
-  append(bytes, binding.rest_base);
-  append(bytes, binding.coordinates);
+  binding.method->save(*binding.kept, bytes);
   append(bytes, binding.frame);
   append(bytes, binding.referenced);
   append(bytes, std::vector<std::uint64_t>{content_hash(bytes)});
@@ -169,12 +179,13 @@ Binding read_binding(const std::string& path, const Body& body) {
     throw InputError(path, "was made for another surface than is mapped here: save it again with this one");
   Reader reader(std::span<const std::byte>(bytes).subspan(sizeof header));
   Binding binding;
-  binding.method = static_cast<MapMethod>(header.method);
+  binding.method = saved_method(header.method);
   for (const PackedFrame& frame : reader.take<PackedFrame>(header.frames))
     binding.frames.push_back(
         {frame.elements, static_cast<FrameKind>(frame.kind), static_cast<std::uint8_t>(frame.rings)});
-  binding.rest_base = reader.take<Mat3>(header.frames);
-  binding.coordinates = reader.take<Vec3>(header.vertices);
+  binding.kept = binding.method->load(reader.take_bytes(header.frames * binding.method->bytes_a_frame +
+                                                        header.vertices * binding.method->bytes_a_vertex),
+                                      header.frames, header.vertices);
   binding.frame = reader.take<std::uint32_t>(header.vertices);
   binding.referenced = reader.take<std::uint8_t>(header.vertices);
   if (!is_in_range(binding, body)) throw InputError(path, kDamaged);

@@ -6,7 +6,7 @@
 
 namespace flexel::mapping {
 
-// Writes a binding of `gram-schmidt` or `affine` (others keep too much to be worth a file). Throws
+// Writes a binding of a method with a file_number (others keep too much to be worth a file). Throws
 // InputError: another method, the disk.
 void write_binding(const Binding& binding, const Body& body, const std::string& path);
 

@@ -10,6 +10,7 @@
 #include "base/bucket.h"
 #include "base/simd.h"
 #include "mapping/anchors/blend_weights.h"
+#include "mapping/methods/bind.h"
 #include "mapping/methods/blend_kernel.h"
 
 namespace flexel::mapping {
@@ -162,5 +163,26 @@ std::vector<Vec3> apply(const Blend& blend, const Body& body, const std::vector<
   });
   return displacement;
 }
+
+std::vector<Vec3> BlendBinding::apply(const Binding& binding, const Body& body,
+                                      const std::vector<Vec3>& position) const {
+  return mapping::apply(blend, body, element_motions(blend.moving, body, binding.connections, position));
+}
+
+const Blend& blend_of(const Binding& binding) {
+  return dynamic_cast<const BlendBinding&>(*binding.kept).blend;
+}
+
+namespace {
+
+std::shared_ptr<const MethodBinding> bind_blended(MethodInput& input) {
+  auto kept = std::make_shared<BlendBinding>();
+  kept->blend = make_blend(input.body, input.connections, input.anchors, input.states > 1);
+  return kept;
+}
+
+}  // namespace
+
+constinit const MappingMethod kBlended{.name = "blended", .bind = bind_blended};
 
 }  // namespace flexel::mapping

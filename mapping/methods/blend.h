@@ -2,6 +2,7 @@
 #pragma once
 #include "mapping/anchors/vertex_batches.h"
 #include "mapping/methods/element_motion.h"
+#include "mapping/methods/method.h"
 
 namespace flexel::mapping {
 
@@ -30,5 +31,13 @@ struct Blend {
 // radius follows its nearest anchor, the limit of the blend. `motions`: of blend.moving.elements.
 [[nodiscard]] std::vector<Vec3> apply(const Blend& blend, const Body& body,
                                       const std::vector<ElementMotion>& motions);
+
+struct BlendBinding final : MethodBinding {
+  Blend blend;
+  [[nodiscard]] std::vector<Vec3> apply(const Binding& binding, const Body& body,
+                                        const std::vector<Vec3>& position) const override;
+};
+// What a binding of `blended` keeps.
+[[nodiscard]] const Blend& blend_of(const Binding& binding);
 
 }  // namespace flexel::mapping

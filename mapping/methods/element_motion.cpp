@@ -34,8 +34,8 @@ bool spans_space(const Mat3& moments) {
 }
 
 Mat3 frame_gradient(const Body& body, const Frame& frame, const std::vector<Vec3>& position) {
-  const FrameMotion motion = frame_motion(frame, body.rest, position, MapMethod::affine);
-  return motion.change * rest_base(frame, body.rest, MapMethod::affine).inverse();
+  const FrameMotion motion = frame_motion(frame, body.rest, position, false);
+  return motion.change * rest_base(frame, body.rest, false).inverse();
 }
 
 }  // namespace

@@ -19,8 +19,6 @@ namespace flexel::mapping {
 
 namespace {
 
-const std::vector<std::string> kMethods = {"gram-schmidt", "affine", "blended", "smooth"};  // by MapMethod
-
 // The rotation nearest to a deformation gradient (its polar factor); the identity where it has none.
 Mat3 rotation_of(const Mat3& gradient) {
   if (!gradient.allFinite()) return Mat3::Identity();
@@ -87,17 +85,6 @@ void add_checks(MapOptions& options, const std::string& names) {
       throw InputError(
           fmt::format("--check \"{}\": {}{}", name, fmt::join(kChecks, ", "), did_you_mean(name, kChecks)));
   }
-}
-
-MapMethod map_method(const std::string& name) {
-  const auto found = std::find(kMethods.begin(), kMethods.end(), name);
-  if (found != kMethods.end()) return static_cast<MapMethod>(found - kMethods.begin());
-  throw InputError(fmt::format("unknown method \"{}\": --method is {}{}", name, fmt::join(kMethods, ", "),
-                               did_you_mean(name, kMethods)));
-}
-
-std::string name_of(MapMethod method) {
-  return kMethods[static_cast<std::size_t>(method)];
 }
 
 MapResult map_state(const Binding& binding, const Body& body) {

@@ -8,6 +8,8 @@
 
 #include "base/parallel.h"
 #include "mapping/anchors/blend_weights.h"
+#include "mapping/anchors/frame.h"
+#include "mapping/methods/bind.h"
 #include "mapping/methods/smooth_fit.h"
 
 namespace flexel::mapping {
@@ -82,19 +84,19 @@ std::vector<FrameField> frame_fields(const Body& body, const std::vector<Frame>&
                                      const std::vector<Vec3>& position) {
   std::vector<FrameField> fields(frames.size());
   parallel_for_each(frames.size(), [&](std::size_t f) {
-    const FrameMotion motion = frame_motion(frames[f], body.rest, position, MapMethod::smooth);
+    const FrameMotion motion = frame_motion(frames[f], body.rest, position, false);
     fields[f] = {motion.translation, body.rest[frames[f].elements[0]],
-                 motion.change * rest_base(frames[f], body.rest, MapMethod::smooth).inverse()};
+                 motion.change * rest_base(frames[f], body.rest, false).inverse()};
   });
   return fields;
 }
 
 }  // namespace
 
-std::vector<Vec3> apply_smooth(const Groups& groups, const Body& body, const std::vector<Frame>& frames,
-                               const std::vector<std::uint32_t>& frame_of,
-                               const std::vector<Vec3>& position) {
-  const std::vector<FrameField> fields = frame_fields(body, frames, position);
+std::vector<Vec3> SmoothBinding::apply(const Binding& binding, const Body& body,
+                                       const std::vector<Vec3>& position) const {
+  const std::vector<std::uint32_t>& frame_of = binding.frame;
+  const std::vector<FrameField> fields = frame_fields(body, binding.frames, position);
   std::vector<Vec3> displacement(groups.vertices.size());
   parallel_chunks(groups.blocks.size(), kBlocksAtATime, [&](std::size_t begin, std::size_t end) {
     std::vector<SmoothNeighbour> neighbours, heard;
@@ -122,5 +124,17 @@ std::vector<Vec3> apply_smooth(const Groups& groups, const Body& body, const std
   });
   return displacement;
 }
+
+namespace {
+
+std::shared_ptr<const MethodBinding> bind_smooth(MethodInput& input) {
+  auto kept = std::make_shared<SmoothBinding>();
+  kept->groups = group_vertices(input.body, input.connections, input.anchors, kSmoothSteps, kSmoothRadius);
+  return kept;
+}
+
+}  // namespace
+
+constinit const MappingMethod kSmooth{.name = "smooth", .bind = bind_smooth};
 
 }  // namespace flexel::mapping

@@ -44,7 +44,7 @@ Columns vertex_attributes(const Surface& surface, const Body& body, const MapRes
       n, [&](std::size_t v) { return distance_outside(body, result.frame_of(v), surface.vertices[v]); });
   columns["rest_residual"] = column(n, [&](std::size_t v) {
     const Frame& frame = result.frame_of(v);
-    const Mat3 base = rest_base(frame, body.rest, MapMethod::affine);
+    const Mat3 base = rest_base(frame, body.rest, false);
     const Vec3 away = surface.vertices[v] - body.rest[frame.elements[0]];
     return (base * (base.inverse() * away) - away).norm();
   });

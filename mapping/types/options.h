@@ -5,13 +5,13 @@
 
 namespace flexel::mapping {
 
-// How the elements around a vertex carry it (docs/theory/mapping-methods.md compares them).
-enum class MapMethod {
-  gram_schmidt,  // the paper's: the orthonormal base of four elements
-  affine,        // the edges of the same four elements
-  blended,       // the frames of all elements around, blended with two continuous derivatives
-  smooth,        // moving least squares, quadratic
-};
+// How the elements around a vertex carry it (mapping/methods/method.h; docs/theory/mapping-methods.md compares them).
+struct MappingMethod;
+using MapMethod = const MappingMethod*;
+extern const MappingMethod kGramSchmidt,  // the paper's: the orthonormal base of four elements
+    kAffine,                              // the edges of the same four elements
+    kBlended,  // the frames of all elements around, blended with two continuous derivatives
+    kSmooth;   // moving least squares, quadratic
 
 // What holds a vertex. Later kinds are what is left when no four close elements span space.
 enum class FrameKind : std::uint8_t { full, plane, line, rigid };
@@ -30,7 +30,7 @@ enum class FarVertices {
 [[nodiscard]] FarVertices far_vertices(const std::string& name);
 
 struct MapOptions {
-  MapMethod method = MapMethod::blended;
+  MapMethod method = &kBlended;
   FarVertices far = FarVertices::follow;
   double far_distance = 3;          // in spacings, beyond half a voxel's diagonal from the nearest element
   bool check_voronoi = false;       // compares the Voronoi neighbours of every origin

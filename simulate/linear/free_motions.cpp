@@ -33,15 +33,11 @@ std::vector<Rows> connected_groups(const LinearOperator& matrix) {
   for (std::uint32_t i = 0; i < matrix.rows(); ++i)
     for (std::uint64_t q = offsets[i]; q < offsets[i + 1]; ++q)
       if (columns[q] < i && strength[q] > 0) sets.unite(i, columns[q]);
+  const std::vector<std::uint32_t> number = sets.numbered();
   std::vector<Rows> groups;
-  std::vector<std::uint32_t> number(matrix.rows(), kNoAggregate);  // of the group, by root
   for (std::uint32_t i = 0; i < matrix.rows(); ++i) {
-    std::uint32_t& group = number[sets.root(i)];
-    if (group == kNoAggregate) {
-      group = static_cast<std::uint32_t>(groups.size());
-      groups.emplace_back();
-    }
-    groups[group].push_back(i);
+    if (number[i] == groups.size()) groups.emplace_back();
+    groups[number[i]].push_back(i);
   }
   return groups;
 }

@@ -1,14 +1,15 @@
 // Fragments are the firm groups of cells (simulate/matter/firm_groups.h), or what hangs together by the connections
-// of centre-placed parts, by union-find; the smaller index is the root, so the numbering is repeatable.
+// of centre-placed parts.
 #include "simulate/matter/fragments.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <numeric>
 
+#include "base/disjoint_sets.h"
 #include "base/error.h"
 #include "base/units.h"
+#include "formats/lattice/fragments_of_body.h"
 #include "simulate/matter/firm_groups.h"
 #include "simulate/matter/interpolation_weights.h"
 #include "simulate/models/cell_model.h"
@@ -18,36 +19,9 @@ namespace {
 
 constexpr double kStrayShare = 1e-3;
 
-std::uint32_t root_of(std::vector<std::uint32_t>& parent, std::uint32_t e) {
-  while (parent[e] != e) {
-    parent[e] = parent[parent[e]];
-    e = parent[e];
-  }
-  return e;
-}
-
-void join(std::vector<std::uint32_t>& parent, std::uint32_t a, std::uint32_t b) {
-  const std::uint32_t x = root_of(parent, a), y = root_of(parent, b);
-  parent[std::max(x, y)] = std::min(x, y);
-}
-
 bool any_centre(const Body& body) {
   return std::any_of(body.parts.begin(), body.parts.end(),
                      [](const Part& part) { return part.placement == Placement::centre; });
-}
-
-std::vector<std::uint32_t> connected_elements(const Body& body) {
-  std::vector<std::uint32_t> parent(body.element_count());
-  std::iota(parent.begin(), parent.end(), 0u);
-  if (any_centre(body)) {
-    const Adjacency adjacency = element_adjacency(body);
-    for (const Part& part : body.parts) {
-      if (part.placement == Placement::corner) continue;
-      for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
-        for (const std::uint32_t other : adjacency.of(e)) join(parent, e, other);
-    }
-  }
-  return parent;
 }
 
 Vec3 rest_centre(const Body& body, std::uint32_t cell) {
@@ -74,15 +48,14 @@ std::string near(const Vec3& at) {
 // What is bonded with something that is held is held too.
 void hold_bonded(const Fragments& fragments, const std::vector<CoupledElements>& coupled,
                  std::vector<std::uint8_t>& held) {
-  std::vector<std::uint32_t> parent(held.size());
-  std::iota(parent.begin(), parent.end(), 0u);
+  DisjointSets sets(held.size());
   for (const CoupledElements& group : coupled)
     for (const std::uint32_t e : group)
-      join(parent, fragments.of_element[group.front()], fragments.of_element[e]);
+      sets.unite(fragments.of_element[group.front()], fragments.of_element[e]);
   std::vector<std::uint8_t> group(held.size(), 0);
   for (std::uint32_t f = 0; f < held.size(); ++f)
-    if (held[f]) group[root_of(parent, f)] = 1;
-  for (std::uint32_t f = 0; f < held.size(); ++f) held[f] = group[root_of(parent, f)];
+    if (held[f]) group[sets.root(f)] = 1;
+  for (std::uint32_t f = 0; f < held.size(); ++f) held[f] = group[sets.root(f)];
 }
 
 // The cell of simulated matter whose centre is nearest to `point`, in `part`.
@@ -157,7 +130,7 @@ void number_elements(const Body& body, Fragments& found) {
 
 Fragments find_fragments(const Body& body) {
   Fragments found;
-  std::vector<std::uint32_t> parent = connected_elements(body);
+  DisjointSets sets = any_centre(body) ? connected_elements(element_adjacency(body)) : DisjointSets();
   std::vector<std::uint32_t> number(body.element_count(), kNoFragment);
   found.of_cell = firm_groups(body);
   found.of_element.assign(body.element_count(), kNoFragment);
@@ -173,7 +146,7 @@ Fragments find_fragments(const Body& body) {
     const Part& placed = body.parts[p];
     if (placed.placement == Placement::corner) continue;
     for (std::uint32_t e = placed.element_begin; e < placed.element_end; ++e) {
-      std::uint32_t& which = number[root_of(parent, e)];
+      std::uint32_t& which = number[sets.root(e)];
       if (which == kNoFragment) {
         which = static_cast<std::uint32_t>(found.list.size());
         found.list.push_back({p});

@@ -7,6 +7,7 @@
 #include "bodies.h"
 #include "mapping/methods/apply.h"
 #include "mapping/methods/bind.h"
+#include "mapping/methods/blend.h"
 #include "mapping/report/report.h"
 #include "motions.h"
 
@@ -85,7 +86,7 @@ TEST_P(Order, ErrorsAreThoseOfTheStudy) {
 
 TEST_P(Order, EveryVertexOfTheBarHasFourElements) {
   const Body body = round_bar(8, GetParam());
-  const MapReport found = report(body, map_quietly(body, MapMethod::affine));
+  const MapReport found = report(body, map_quietly(body, &kAffine));
   EXPECT_EQ(found.kinds[0], found.vertices);
   if (GetParam() == Placement::corner) {
     EXPECT_EQ(found.widened, 0u);
@@ -139,15 +140,13 @@ TEST(Exactness, FollowsRigidAndAffineMotionsNearAndFar) {
         const Vec3 move(0.3, -7, 12);
         const auto rigid = [&](const Vec3& x) -> Vec3 { return turn * (x - shift) + move; };
         test::deform(body, rigid);
-        EXPECT_LT(largest_error(body, map_quietly(body, MapMethod::gram_schmidt).displacement, rigid),
-                  1e-9 * diagonal);
-        EXPECT_LT(largest_error(body, map_quietly(body, MapMethod::affine).displacement, rigid),
-                  1e-9 * diagonal);
+        EXPECT_LT(largest_error(body, map_quietly(body, &kGramSchmidt).displacement, rigid), 1e-9 * diagonal);
+        EXPECT_LT(largest_error(body, map_quietly(body, &kAffine).displacement, rigid), 1e-9 * diagonal);
         Mat3 shear;
         shear << 1.7, 0.4, -0.2, 0.1, 0.6, 0.3, 0, -0.5, 1.2;
         const auto affine = [&](const Vec3& x) -> Vec3 { return turn * (shear * (x - shift)) + move; };
         test::deform(body, affine);
-        for (const MapMethod method : {MapMethod::affine, MapMethod::blended, MapMethod::smooth})
+        for (const MapMethod method : {&kAffine, &kBlended, &kSmooth})
           EXPECT_LT(largest_error(body, map_quietly(body, method).displacement, affine), 1e-9 * diagonal);
       }
     }
@@ -171,7 +170,7 @@ TEST(Exactness, DoesNotDependOnTheWorldsAxes) {
     double largest = 0;
     for (std::size_t v = 0; v < here.displacement.size(); ++v)
       largest = std::max(largest, (turn * here.displacement[v] - there.displacement[v]).norm());
-    EXPECT_LT(largest, method == MapMethod::smooth ? 1e-11 : 1e-12);  // its fit has 10 unknowns
+    EXPECT_LT(largest, method == &kSmooth ? 1e-11 : 1e-12);  // its fit has 10 unknowns
   }
 }
 
@@ -195,9 +194,9 @@ TEST(Exactness, KeptWeightsGiveTheSameBitsAsThoseFoundAgain) {
   for (const Placement placement : {Placement::corner, Placement::centre}) {
     Body body = round_bar(8, placement);
     test::deform(body, bend);
-    const Binding once = bind(body, MapMethod::blended, 1), often = bind(body, MapMethod::blended, 2);
-    EXPECT_TRUE(once.blend.weights.empty());
-    EXPECT_FALSE(often.blend.weights.empty());
+    const Binding once = bind(body, &kBlended, 1), often = bind(body, &kBlended, 2);
+    EXPECT_TRUE(blend_of(once).weights.empty());
+    EXPECT_FALSE(blend_of(often).weights.empty());
     EXPECT_EQ(apply(once, body, body.position), apply(often, body, body.position));
   }
 }

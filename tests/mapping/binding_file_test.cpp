@@ -47,7 +47,7 @@ class BindingFile : public testing::Test {
 TEST_F(BindingFile, GivesTheSameBits) {
   for (const Placement placement : {Placement::corner, Placement::centre}) {
     Body body = test::round_bar(6, placement);
-    for (const MapMethod method : {MapMethod::gram_schmidt, MapMethod::affine}) {
+    for (const MapMethod method : {&kGramSchmidt, &kAffine}) {
       const Binding binding = bind(body, method);
       write_binding(binding, body, path_);
       const Binding read = read_binding(path_, body);
@@ -67,7 +67,7 @@ TEST_F(BindingFile, GivesTheSameBits) {
 
 TEST_F(BindingFile, IsRefusedWhenDamaged) {
   const Body body = test::block(3, 2, 2, 0.1, Placement::corner, 2);
-  write_binding(bind(body, MapMethod::affine), body, path_);
+  write_binding(bind(body, &kAffine), body, path_);
   const Bytes whole = read_all(path_);
   for (std::size_t size = 1; size < whole.size(); size += 97) {
     write(std::span(whole).first(size));
@@ -91,7 +91,7 @@ TEST_F(BindingFile, IsRefusedWhenDamaged) {
 
 TEST_F(BindingFile, IsRefusedForAnotherLatticeOrSurface) {
   const Body body = test::block(3, 2, 2, 0.1, Placement::corner, 2);
-  write_binding(bind(body, MapMethod::affine), body, path_);
+  write_binding(bind(body, &kAffine), body, path_);
   Body other = body;
   other.position[0].x() += 1;  // another state of the same body
   EXPECT_NO_THROW((void)read_binding(path_, other));
@@ -110,7 +110,7 @@ TEST_F(BindingFile, IsRefusedForAnotherLatticeOrSurface) {
 
 TEST_F(BindingFile, IsForTwoMethods) {
   const Body body = test::block(2, 2, 2, 0.1, Placement::corner, 2);
-  for (const MapMethod method : {MapMethod::blended, MapMethod::smooth})
+  for (const MapMethod method : {&kBlended, &kSmooth})
     EXPECT_THROW(write_binding(bind(body, method), body, path_), InputError);
   EXPECT_FALSE(std::filesystem::exists(path_));
 }

@@ -64,8 +64,8 @@ TEST(Quality, TrianglesTurnedOverAreCounted) {
   // A frame of gram-schmidt does not stretch: squeezed to a tenth, sharp folds appear.
   Body body = test::block(6, 6, 6, 0.1, Placement::corner, 40);
   test::deform(body, [](const Vec3& x) -> Vec3 { return {0.05 * x.x(), x.y(), x.z()}; });
-  EXPECT_GT(mapped(body, {MapMethod::gram_schmidt}).quality.flipped, 0u);
-  EXPECT_EQ(mapped(body, {MapMethod::blended}).quality.flipped, 0u);
+  EXPECT_GT(mapped(body, {&kGramSchmidt}).quality.flipped, 0u);
+  EXPECT_EQ(mapped(body, {&kBlended}).quality.flipped, 0u);
 }
 
 // Two blocks of one part, bound by nothing: one is pushed through the other.

@@ -97,7 +97,7 @@ TEST(ChordOfAPlate, SeesWhatNoVertexDoes) {
     const double x = p.x() / 2.4, y = p.y() / 2.4;
     return p + Vec3(0, 0, 0.3 * 16 * x * (1 - x) * y * (1 - y));
   });
-  const MapReport found = report(body, map_quietly(body, MapMethod::blended));
+  const MapReport found = report(body, map_quietly(body, &kBlended));
   EXPECT_LT(found.largest_displacement, 0.02);
   EXPECT_NEAR(found.chord->largest, 0.3, 0.02);
   EXPECT_NEAR(found.chord->share(), 1, 0.05);
@@ -112,7 +112,7 @@ TEST(ChordOfABrokenBar, LeavesOutWhatTheFractureTore) {
   test::deform(body, [](const Vec3& p) -> Vec3 {
     return p.x() < kLength / 2 + kChordSpacing / 2 ? p : Vec3(p + Vec3(1, 0, 0.5));
   });
-  const MapReport found = report(body, map_quietly(body, MapMethod::blended));
+  const MapReport found = report(body, map_quietly(body, &kBlended));
   EXPECT_EQ(found.chord->coarse_triangles, 0u);
   EXPECT_LT(found.chord->largest, 1e-12);
 }
@@ -120,7 +120,7 @@ TEST(ChordOfABrokenBar, LeavesOutWhatTheFractureTore) {
 TEST(ChordOfACutSurface, IsNotMeasured) {
   Body body = bar();
   test::deform(body, along_circle);
-  const MapReport found = report(body, map_quietly(body, MapMethod::blended), true);
+  const MapReport found = report(body, map_quietly(body, &kBlended), true);
   EXPECT_FALSE(found.chord);
   EXPECT_TRUE(nlohmann::json::parse(report_json(found, {}))["chord_error"].is_null());
 }

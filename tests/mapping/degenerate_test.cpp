@@ -165,8 +165,8 @@ TEST(Degenerate, TheMirroredPartIsMappedToTheMirrorImage) {
         // On the part's own plane of symmetry one frame lies on one side of it: in corner placement the first
         // axis of Gram-Schmidt points there, in centre placement the origin lies there.
         const bool symmetric = std::abs(body.surface.vertices[v].x() - 0.3) < 1e-9;
-        const bool one_frame = method == MapMethod::gram_schmidt ||
-                               (method == MapMethod::affine && placement == Placement::centre);
+        const bool one_frame =
+            method == &kGramSchmidt || (method == &kAffine && placement == Placement::centre);
         if (symmetric && one_frame) continue;
         largest = std::max(largest, (one.displacement[v] - mirrored(other.displacement[v])).norm());
       }

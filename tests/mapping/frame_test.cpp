@@ -285,7 +285,7 @@ TEST(Seams, APolygonThatNamesTheWrongCellHoldsItsVerticesLikeThoseAtTheirPositio
       if (!is_wrong(other / 4) && vertices[other] == vertices[v]) return true;
     return false;
   };
-  const MapResult right = map_quietly(body, MapMethod::affine), held = map_quietly(wrong, MapMethod::affine);
+  const MapResult right = map_quietly(body, &kAffine), held = map_quietly(wrong, &kAffine);
   std::size_t in_doubt = 0;
   for (std::size_t v = 0; v < vertices.size(); ++v) {
     if (!has_double(v)) continue;

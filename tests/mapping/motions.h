@@ -9,8 +9,7 @@
 
 namespace flexel::mapping::test {
 
-constexpr std::array<MapMethod, 4> kEveryMethod = {MapMethod::gram_schmidt, MapMethod::affine,
-                                                   MapMethod::blended, MapMethod::smooth};
+constexpr std::array<MapMethod, 4> kEveryMethod = {&kGramSchmidt, &kAffine, &kBlended, &kSmooth};
 // For the names of tests: "gram_schmidt".
 inline std::string test_name(MapMethod method) {
   std::string name = name_of(method);
@@ -25,7 +24,7 @@ inline Progress& silent() {
 inline MapResult map_quietly(const Body& body, const MapOptions& options) {
   return map_surface(body, options, silent());
 }
-inline MapResult map_quietly(const Body& body, MapMethod method = MapMethod::affine) {
+inline MapResult map_quietly(const Body& body, MapMethod method = &kAffine) {
   return map_quietly(body, MapOptions{method});
 }
 

@@ -74,7 +74,7 @@ TEST(Voronoi, RigidAndUniformMotionLeaveNoCellAndShearDoes) {
   Body body = test::block(6, 6, 6, 0.1, Placement::centre, 12);
   const auto left = [&](const test::Field& field) {
     test::deform(body, field);
-    return report(body, map_quietly(body, MapMethod::affine)).voronoi_cell_left;
+    return report(body, map_quietly(body, &kAffine)).voronoi_cell_left;
   };
   const Mat3 turn = test::rotation(1.2, Vec3(1, 2, -1));
   EXPECT_EQ(left([&](const Vec3& x) -> Vec3 { return turn * x; }), 0u);
@@ -90,7 +90,7 @@ TEST(Voronoi, AgreesWithALookAtEveryElement) {
   test::deform(body, [](const Vec3& x) -> Vec3 {
     return {x.x() + 0.6 * x.y() - 0.3 * x.z(), x.y() * 0.9, x.z() + 0.1 * x.x()};
   });
-  const MapResult result = map_quietly(body, MapMethod::affine);
+  const MapResult result = map_quietly(body, &kAffine);
   std::size_t flagged = 0;
   for (std::size_t v = 0; v < result.flags.size(); ++v) {
     const Vec3& rest = body.surface.vertices[v];
@@ -120,7 +120,7 @@ TEST(Voronoi, TiesAtRestAndSmallStrainsLeaveNoCell) {
       test::deform(body, [&](const Vec3& x) -> Vec3 {
         return {x.x() + by * x.y(), x.y() - by * x.z(), x.z()};
       });
-      return report(body, map_quietly(body, MapMethod::affine));
+      return report(body, map_quietly(body, &kAffine));
     };
     for (const double by : {4e-4, 4e-3}) EXPECT_EQ(sheared(by).voronoi_cell_left, 0u) << by;
     const auto said = [](const MapReport& found) {
@@ -139,12 +139,12 @@ TEST(Voronoi, TiesAtRestAndSmallStrainsLeaveNoCell) {
 TEST(Report, HoldsVolumeAndDisplacement) {
   Body body = test::block(4, 4, 4, 0.1, Placement::corner);
   test::deform(body, [](const Vec3& x) -> Vec3 { return {2 * x.x(), 3 * x.y(), x.z()}; });
-  const MapReport found = report(body, map_quietly(body, MapMethod::affine));
+  const MapReport found = report(body, map_quietly(body, &kAffine));
   const double side = 0.4 - 0.003;
   EXPECT_NEAR(found.quality.volume_before, side * side * side, 1e-12);
   EXPECT_NEAR(found.quality.volume_after, 6 * side * side * side, 1e-12);
   EXPECT_NEAR(found.largest_displacement, std::hypot(0.3983, 2 * 0.3983), 1e-12);
-  const auto json = nlohmann::json::parse(report_json(found, {MapMethod::affine}));
+  const auto json = nlohmann::json::parse(report_json(found, {&kAffine}));
   EXPECT_EQ(json["method"], "affine");
   EXPECT_TRUE(json["valid"]);
   EXPECT_EQ(json["frames"]["full"], found.vertices);

@@ -96,7 +96,7 @@ TEST(SpaceMap, TakesVerticesWhereBlendedDoes) {
   for (const Placement placement : {Placement::corner, Placement::centre}) {
     Body body = test::round_bar(8, placement);
     test::deform(body, test::twist);
-    const std::vector<Vec3> displacement = apply(bind(body, MapMethod::blended), body, body.position);
+    const std::vector<Vec3> displacement = apply(bind(body, &kBlended), body, body.position);
     const SpaceMap map(body);
     SpaceMap::Probe probe(map);
     for (std::size_t p = 0; p < body.surface.polygon_count(); ++p) {
