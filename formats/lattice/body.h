@@ -75,6 +75,11 @@ struct Body {
   std::vector<std::uint32_t> surface_cell_offsets;  // (polygons + 1)
   std::vector<std::uint32_t> surface_cells;         // indices of cells
 
+  // Exact moments of the matter of cells that the surface cuts (formats/lattice/cell_moments.h), for model
+  // `quadratic`; both are empty unless they were asked for.
+  std::vector<std::uint32_t> moment_cells;  // (c) indices of cells, ascending
+  std::vector<double> moments;              // (c x kMoments), in units of the voxel's volume
+
   Surface surface;                           // the part's own mesh, at rest; surface.parts[p] is parts[p]
   std::map<std::string, std::string> notes;  // free text that travels along: "history", "isa", ...
 

@@ -71,9 +71,8 @@ std::string drawn_by(double force) {
 // Drawn askew to its fibres a bar shears too (Lekhnitskii 1963): strain = compliance times stress, all over.
 TEST(LawRuns, OrthotropicBarDrawnAskew) {
   const double angle = std::numbers::pi / 6;
-  const std::string axes =
-      fmt::format("[parts.box]\naxes = [[{0}, {1}, 0], [{2}, {0}, 0]]\n", std::cos(angle), std::sin(angle),
-                  -std::sin(angle));
+  const std::string axes = fmt::format("[parts.box]\naxes = [[{0}, {1}, 0], [{2}, {0}, 0]]\n",
+                                       std::cos(angle), std::sin(angle), -std::sin(angle));
   Body body = bar();
   const double force = 0.04;  // 100 Pa
   const SimulateResult result = at_equilibrium(body, kGrain + axes + kDrawn + drawn_by(force));
@@ -122,16 +121,20 @@ TEST(LawRuns, MooneyRivlinBarDrawnAndPressed) {
 TEST(LawRuns, InTimeEndsAtEquilibrium) {
   for (const std::string& material : {std::string(kElastomer), std::string(kGrain)}) {
     const std::string held =
-        "[[fix]]\nwhere = \"x0\"\n[[load]]\nwhere = \"x1\"\nforce = [\"20 N\", 0, \"-6 N\"]\n[[probe]]\nname = "
+        "[[fix]]\nwhere = \"x0\"\n[[load]]\nwhere = \"x1\"\nforce = [\"20 N\", 0, \"-6 N\"]\n[[probe]]\nname "
+        "= "
         "\"end\"\nwhere = \"x1\"\n";
     Body body = bar();
     const Vec3 still = at_equilibrium(body, material + held).probes[0].displacement;
     EXPECT_GT(still.norm(), 0.1 * kLength);
     for (const std::string method : {"symplectic", "implicit"}) {
-      const std::string timed = fmt::format("[run]\ntime = \"0.15 s\"\nmethod = \"{}\"\n{}[damping]\ntime = \"3 ms\"\n",
-                                            method, method == "implicit" ? "step = \"0.5 ms\"\n" : "");
-      const testing::TimedCase made = testing::run_timed(bar(), parse_scene(material + held + timed, "s.toml"));
-      EXPECT_LT((made.result.probes[0].displacement - still).norm(), 1e-3 * still.norm()) << material << method;
+      const std::string timed =
+          fmt::format("[run]\ntime = \"0.15 s\"\nmethod = \"{}\"\n{}[damping]\ntime = \"3 ms\"\n", method,
+                      method == "implicit" ? "step = \"0.5 ms\"\n" : "");
+      const testing::TimedCase made =
+          testing::run_timed(bar(), parse_scene(material + held + timed, "s.toml"));
+      EXPECT_LT((made.result.probes[0].displacement - still).norm(), 1e-3 * still.norm())
+          << material << method;
       testing::expect_books_close(made.result);
     }
   }
@@ -161,9 +164,11 @@ TEST(LawRuns, WhatIsNoMaterialIsRefused) {
   EXPECT_THAT(testing::refusal(with(kGrain, "orthotropic", "ortotropic")),
               HasSubstr("no law \"ortotropic\"; did you mean \"orthotropic\"?"));
   EXPECT_THAT(testing::refusal(with(kGrain, "0.37", "2.5")), HasSubstr("no stable material"));
-  EXPECT_THAT(testing::refusal(with(kGrain, "\"0.28 MPa\"", "\"0 MPa\"")), HasSubstr("\"shear\" needs to be above 0"));
+  EXPECT_THAT(testing::refusal(with(kGrain, "\"0.28 MPa\"", "\"0 MPa\"")),
+              HasSubstr("\"shear\" needs to be above 0"));
   EXPECT_THAT(testing::refusal(with(kElastomer, "c01 = \"0.05 MPa\"\n", "")), HasSubstr("c01"));
-  EXPECT_THAT(testing::refusal(with(kElastomer, "1.6 MPa", "0 MPa")), HasSubstr("\"bulk\" needs to be above 0"));
+  EXPECT_THAT(testing::refusal(with(kElastomer, "1.6 MPa", "0 MPa")),
+              HasSubstr("\"bulk\" needs to be above 0"));
   EXPECT_THAT(testing::refusal(with(kElastomer, "c10 =", "young = \"1 MPa\"\nc10 =")), HasSubstr("young"));
 }
 
@@ -172,13 +177,15 @@ TEST(LawRuns, WhatALawCannotDoIsRefusedByName) {
   EXPECT_THAT(testing::refusal(grain + "[parts.box]\nmodel = \"springs\"\n" + run),
               HasSubstr("needs model \"cells\", not \"springs\""));
   EXPECT_THAT(testing::refusal("infill = \"20 %\"\n" + grain + run), HasSubstr("takes no infill"));
-  EXPECT_THAT(testing::refusal(grain + "[run]\nrenormalise = true\n" + run), HasSubstr("cannot be renormalised"));
+  EXPECT_THAT(testing::refusal(grain + "[run]\nrenormalise = true\n" + run),
+              HasSubstr("cannot be renormalised"));
   EXPECT_THAT(testing::refusal(grain + "[plasticity]\nyield = \"1 MPa\"\n[run]\ntime = \"1 ms\"\n" + run),
               HasSubstr("plasticity is for law \"neo-hooke\""));
   EXPECT_THAT(testing::refusal(grain + "[fracture]\nstrength = \"1 MPa\"\n[run]\ntime = \"1 ms\"\n" + run),
               HasSubstr("fracture is for law \"neo-hooke\""));
-  EXPECT_THAT(testing::refusal(std::string(kElastomer) + "[parts.box]\naxes = [[1, 0, 0], [0, 1, 0]]\n" + run),
-              HasSubstr("\"axes\" belong to a material with law = \"orthotropic\""));
+  EXPECT_THAT(
+      testing::refusal(std::string(kElastomer) + "[parts.box]\naxes = [[1, 0, 0], [0, 1, 0]]\n" + run),
+      HasSubstr("\"axes\" belong to a material with law = \"orthotropic\""));
   EXPECT_THAT(testing::refusal(grain + "[parts.box]\naxes = [[1, 0, 0], [1, 1, 0]]\n" + run),
               HasSubstr("right angle"));
 }
