@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/nearest_word.h"
 #include "base/stop.h"
+#include "mapping/anchors/frame.h"
 #include "mapping/checks/cgal_checks.h"
 #include "mapping/methods/apply.h"
 #include "mapping/methods/bind.h"
