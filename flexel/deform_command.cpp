@@ -230,6 +230,8 @@ SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surf
     add_actions(job, run.voxels.body);
     run.simulated = simulate::simulate(run.voxels.body, job.scene, simulate_options(arguments, plan), quiet);
     began = std::chrono::steady_clock::now();
+    use_field(run.voxels.body, arguments.map, plan.map);
+    mapping.method = plan.map.method;
     run.mapped = map_part(run.voxels.body, mapping, {}, quiet).result.displacement;
     run.map_seconds = seconds_since(began);
     run.processor_seconds = processor_seconds() - processor;
@@ -309,6 +311,7 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
     if (accuracy) report(run.voxels, progress);
     for (const std::string& line : summary_lines(run.simulated)) progress.say(line);
     progress.stage("map");
+    use_field(body, arguments.map, plan.map);
     mapped = map_part(body, plan.map, plan.crack, progress);
     progress.finish();
     say_report(mapped.report, arguments.map, plan.map, progress);

@@ -17,7 +17,7 @@ namespace flexel::commands {
 
 struct JobArguments {
   std::vector<std::string> parts, fixes, pushes, moves, torques, twists, bearings, probes, materials, infills;
-  std::string scene, gravity, shell, size, heal = "auto", placement = "corner", unit, edge;
+  std::string scene, model, gravity, shell, size, heal = "auto", placement = "corner", unit, edge;
   std::optional<std::size_t> count;
   bool force = false;  // results may replace files that are read
 };

@@ -100,6 +100,9 @@ void declare_scene(CLI::App& app, JobArguments& arguments) {
   add("--material", arguments.materials,
       "What the parts are made of: steel, PLA, ... (docs/reference/scene.md); of one part: \"knob=PLA\"",
       "[PART=]NAME");
+  app.add_option("--model", arguments.model,
+                 "How the parts resist: cells, quadratic (linear; exact on thin and slanted walls), springs or paper")
+      ->type_name("NAME");
   add("--infill", arguments.infills, "Printed with this infill: 20%; of one part: \"knob=20%\" (an estimate)",
       "[PART=]SHARE");
   app.add_option("--shell", arguments.shell, "With --infill: thickness of the solid walls (\"1 mm\")")
@@ -122,6 +125,7 @@ void refuse_idle(const JobArguments& arguments) {
 
 void add_options(const JobArguments& arguments, Job& job) {
   plan_materials(arguments, job.scene);
+  if (!arguments.model.empty()) job.scene.model = arguments.model;
   plan_infill(arguments, job.scene);
   for (const std::string& where : arguments.fixes)
     job.scene.get<simulate::Supports>().ties.push_back(

@@ -256,6 +256,7 @@ void map_one(const Arguments& arguments, Plan& plan, Progress& progress) {
   progress.stage("read");
   Body body = read_body(arguments.body);
   run.take_surface(body);
+  use_field(body, arguments.map, plan.options);
   progress.stage("map");
   const std::optional<Binding> known = own_binding(arguments, body, plan.options);
   const MappedPart mapped = map_part(body, plan.options, plan.crack, progress, known ? &*known : nullptr);
@@ -280,6 +281,7 @@ void map_series(const Arguments& arguments, Plan& plan, Progress& progress) {
     Body next = read_body(files[f]);
     if (f == 0) {
       run.take_surface(next);
+      use_field(next, arguments.map, plan.options);
       binding = own_binding(arguments, next, plan.options);
     } else {
       if (next.parts.size() != body.parts.size())

@@ -12,6 +12,7 @@
 #include "base/nearest_word.h"
 #include "formats/common/file_formats.h"
 #include "formats/exchange/surface_file.h"
+#include "formats/lattice/quadratic_field.h"
 #include "mapping/methods/method.h"
 #include "mapping/report/report.h"
 
@@ -85,6 +86,10 @@ MapOptions map_options(const MapArguments& arguments) {
   if (!arguments.method.empty()) options.method = map_method(arguments.method);
   if (!arguments.checks.empty()) add_checks(options, arguments.checks);
   return options;
+}
+
+void use_field(const Body& body, const MapArguments& arguments, MapOptions& options) {
+  if (arguments.method.empty() && QuadraticField::is_in(body)) options.method = &kShapeFunctions;
 }
 
 CrackOptions crack_options(const MapArguments& arguments) {

@@ -16,6 +16,9 @@ struct MapArguments {
 // Adds their options to the program; --format too, as it also names that of the pieces.
 void declare_map_options(CLI::App& app, MapArguments& arguments);
 
+// A body that model `quadratic` deformed is mapped by its own field unless --method is given.
+void use_field(const Body& body, const MapArguments& arguments, MapOptions& options);
+
 // What they ask for. Throws InputError: an unknown word, options that exclude each other.
 [[nodiscard]] MapOptions map_options(const MapArguments& arguments);
 [[nodiscard]] CrackOptions crack_options(const MapArguments& arguments);

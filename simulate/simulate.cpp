@@ -14,6 +14,7 @@
 #include "base/stop.h"
 #include "base/units.h"
 #include "formats/lattice/body_file.h"
+#include "formats/lattice/quadratic_field.h"
 #include "simulate/equilibrium/equilibrium.h"
 #include "simulate/estimate/coarsen.h"
 #include "simulate/estimate/error_bars.h"
@@ -25,6 +26,7 @@
 #include "simulate/models/set_rest_shape.h"
 #include "simulate/probes/probes.h"
 #include "simulate/probes/report.h"
+#include "simulate/quadratic/quadratic_run.h"
 #include "simulate/scene/scene.h"
 #include "simulate/scene/scene_checks.h"
 #include "simulate/time/dynamic_relaxation.h"
@@ -299,6 +301,19 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
   std::optional<StopAfter> time_limit;
   if (options.timeout) time_limit.emplace(*options.timeout, "--timeout", LimitOf::command);
   check_actions(scene, body, progress);
+  if (is_quadratic(scene, body)) {
+    refuse_timed(options, scene.name);
+    SimulateResult result = run_quadratic(body, scene, options, progress);
+    if (options.estimate)
+      result.error_bars =
+          estimate_errors(body, scene, options, result, [](auto& coarse, auto& same, auto& how) {
+            Progress silent("", Progress::Mode::silent);
+            return run_quadratic(coarse, same, how, silent);
+          });
+    progress.finish();
+    return result;
+  }
+  body.cell_columns.erase(kQuadraticColumn);
   if (scene.run.time) {
     SimulateResult result = run_in_time(body, scene, options, progress);
     progress.finish();

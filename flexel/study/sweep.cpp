@@ -152,7 +152,7 @@ void Sweep::add_switches(std::vector<Trial>& trials, std::size_t r) const {
   const Rung& rung = rungs_[r];
   for (const mapping::MapMethod row : mapping::map_methods() | std::views::reverse) {  // the default last
     const std::string method = name_of(row);
-    if (method == first_.method) continue;
+    if (method == first_.method || row == &mapping::kShapeFunctions) continue;
     Configuration each = first_;
     each.method = method;
     trials.push_back(trial("mapping", method, rung.size, each));

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "base/parallel.h"
+#include "formats/lattice/quadratic_field.h"
 
 namespace flexel {
 namespace {
@@ -77,10 +78,16 @@ std::vector<std::uint32_t> polygons_around_vertices(const Body& body) {
 LargestDisplacement largest_displacement(const Body& body, const std::vector<Vec3>& displacement) {
   std::vector<std::uint8_t> inside = elements_in_matter(body);
   const std::vector<std::uint32_t> around = polygons_around_vertices(body);
+  std::optional<QuadraticField> field;
+  if (QuadraticField::is_in(body)) field.emplace(body, displacement);
   FirstLargest largest = parallel_sum<FirstLargest>(around.size(), [&](std::size_t v) {
     if (around[v] == kNoPolygonAround) return FirstLargest{};
-    const auto at = locate_on_surface(body, around[v], body.surface.vertices[v]);
-    return at ? moved(interpolate(*at, body, displacement), body.surface.vertices[v]) : FirstLargest{};
+    const Vec3& vertex = body.surface.vertices[v];
+    const auto at = locate_on_surface(body, around[v], vertex);
+    if (!at) return FirstLargest{};
+    if (!field) return moved(interpolate(*at, body, displacement), vertex);
+    const Part& part = body.parts[body.surface.polygon_part(around[v])];
+    return moved(field->displacement(at->cell, cell_coordinates(body, part, at->cell, vertex)), vertex);
   });
   if (largest.squared < 0 && std::find(inside.begin(), inside.end(), 1) == inside.end())
     std::fill(inside.begin(), inside.end(), std::uint8_t{1});

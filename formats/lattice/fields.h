@@ -24,7 +24,7 @@ struct LargestDisplacement {
 };
 
 // The largest displacement of the part's matter: of the elements that lie in it and of the vertices of its
-// surface, each moved by the cell that carries it (trilinear weights). `displacement`: (elements x 3) m. Of
+// surface, each moved by the cell that carries it (trilinear weights, or the field of model `quadratic`). `displacement`: (elements x 3) m. Of
 // equal ones the first. A body without a surface and without a whole cell: of all elements.
 [[nodiscard]] LargestDisplacement largest_displacement(const Body& body,
                                                        const std::vector<Vec3>& displacement);

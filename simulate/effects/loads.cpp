@@ -53,24 +53,6 @@ void spread(const InterpolationWeights& at, const Vec3& force, std::vector<Vec3>
   for (std::uint32_t a = 0; a < at.count; ++a) sum[at.elements[a]] += at.weights[a] * force;
 }
 
-// Forces at the points, by the kind of the load.
-std::vector<Vec3> forces_at(const Load& load, const std::vector<LoadedPoint>& points) {
-  if (load.bearing) {
-    if (auto forces = bearing(points, *load.force)) return *forces;
-    throw InputError(load.origin,
-                     fmt::format("load \"{}\": the face does not look against the bearing load all around "
-                                 "it; select the cylindrical face, and give a force across its axis",
-                                 load.name));
-  }
-  if (auto forces = averaging_link(points, load.force.value_or(Vec3::Zero()),
-                                   load.torque.value_or(Vec3::Zero()), load.at))
-    return *forces;
-  throw InputError(
-      load.origin,
-      fmt::format("load \"{}\": its points lie on a line and take no moment about it; select a larger area",
-                  load.name));
-}
-
 void add_surface_load(const Load& load, const std::vector<std::uint32_t>& polygons, const Problem& problem,
                       std::vector<Vec3>& sum) {
   const std::vector<SurfacePoint> points = gathered_surface_points(problem, polygons);
@@ -87,7 +69,7 @@ void add_surface_load(const Load& load, const std::vector<std::uint32_t>& polygo
   loaded.reserve(points.size());
   for (const SurfacePoint& point : points)
     loaded.push_back({point.position, point.area_vector.norm(), point.area_vector.normalized()});
-  const std::vector<Vec3> forces = forces_at(load, loaded);
+  const std::vector<Vec3> forces = load_forces(load, loaded);
   for (std::size_t q = 0; q < points.size(); ++q) spread(points[q].at, forces[q], sum);
 }
 
@@ -109,7 +91,7 @@ void add_volume_load(const Load& load, const std::vector<std::uint32_t>& element
   if (!(total > 0))
     throw InputError(load.origin,
                      fmt::format("load \"{}\": the selected elements hold no matter", load.name));
-  const std::vector<Vec3> forces = forces_at(load, loaded);
+  const std::vector<Vec3> forces = load_forces(load, loaded);
   for (std::size_t q = 0; q < elements.size(); ++q) sum[elements[q]] += forces[q];
 }
 
@@ -146,6 +128,23 @@ std::optional<Vec3> turn_of_couple(const ElementForces& forces, const Body& body
 }
 
 }  // namespace
+
+std::vector<Vec3> load_forces(const Load& load, const std::vector<LoadedPoint>& points) {
+  if (load.bearing) {
+    if (auto forces = bearing(points, *load.force)) return *forces;
+    throw InputError(load.origin,
+                     fmt::format("load \"{}\": the face does not look against the bearing load all around "
+                                 "it; select the cylindrical face, and give a force across its axis",
+                                 load.name));
+  }
+  if (auto forces = averaging_link(points, load.force.value_or(Vec3::Zero()),
+                                   load.torque.value_or(Vec3::Zero()), load.at))
+    return *forces;
+  throw InputError(
+      load.origin,
+      fmt::format("load \"{}\": its points lie on a line and take no moment about it; select a larger area",
+                  load.name));
+}
 
 void Loads::parse(TableReader& scene, Parameters& parameters) {
   for (const SceneValue* table : scene.tables("load")) {

@@ -22,6 +22,11 @@ struct Load {
   bool bearing = false;             // `force` is that of a pin on a cylindrical face
 };
 
+// Forces [N] of a load at points of the surface or of elements that stand for all of it, by its kind. Throws
+// InputError: a bearing load on a face that does not look against it, a moment about points on a line.
+struct LoadedPoint;
+[[nodiscard]] std::vector<Vec3> load_forces(const Load& load, const std::vector<LoadedPoint>& points);
+
 class Loads : public Effect {
  public:
   struct Parameters {

@@ -61,6 +61,7 @@ ProbePoints place_point(const Probe& probe, const Problem& problem) {
   ProbePoints points{probe.name, *probe.at, {}};
   if (body.parts[found.part].placement == Placement::corner) {
     add(cell_carrier(body, cell_point(body, found.cell, *probe.at)), points.weights);
+    points.cell = found.cell;
   } else {
     // Within a spacing of a voxel there is an element within two.
     const auto element = nearest_element(problem, found.part, *probe.at, Vec3::Zero());

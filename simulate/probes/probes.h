@@ -1,5 +1,6 @@
 // Probes: the displacement of material points.
 #pragma once
+#include <optional>
 #include <vector>
 
 #include "simulate/result/result.h"
@@ -14,6 +15,7 @@ struct ProbePoints {
   std::string name;
   Vec3 where = Vec3::Zero();                              // m, rest: the point, or the mean of the selection
   std::vector<std::pair<std::uint32_t, double>> weights;  // element, weight
+  std::optional<std::uint32_t> cell = {};                 // of a point that a cell carries
 };
 
 // Throws InputError: a point further than one spacing from all matter, a selection that selects nothing.

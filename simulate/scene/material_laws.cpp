@@ -118,7 +118,7 @@ std::optional<Mat3> parse_axes(TableReader& reader) {
 }
 
 void refuse_law(const Scene& scene, const PartSettings& settings, const Body& body, std::size_t p,
-                const Material& material) {
+                const Material& material, const std::string& model) {
   const Part& part = body.parts[p];
   if (settings.axes && material.law != LawName::orthotropic)
     throw InputError(
@@ -133,8 +133,8 @@ void refuse_law(const Scene& scene, const PartSettings& settings, const Body& bo
   };
   if (part.placement == Placement::centre)
     refuse("needs model \"cells\", not \"paper\": voxelize with --placement corner");
-  if (!settings.model.empty() && settings.model != "cells")
-    refuse(fmt::format("needs model \"cells\", not \"{}\": write model = \"cells\"", settings.model));
+  if (model != "cells" && model != "quadratic")
+    refuse(fmt::format("needs model \"cells\", not \"{}\": write model = \"cells\"", model));
   if (settings.infill.share || (settings.material.empty() && scene.infill.share))
     refuse("takes no infill: give the constants of the print as it is, with its infill");
   const bool event = std::any_of(scene.events.begin(), scene.events.end(),

@@ -14,6 +14,6 @@ void parse_law(TableReader& reader, Material& material);
 // Throws InputError, one line: a law but neo-Hooke's with another model than cells, an infill, a rest shape of
 // its own, or axes for a law that has none. `settings` of part `p`, `material` without the part's axes.
 void refuse_law(const Scene& scene, const PartSettings& settings, const Body& body, std::size_t p,
-                const Material& material);
+                const Material& material, const std::string& model);
 
 }  // namespace flexel::simulate

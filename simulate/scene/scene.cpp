@@ -189,6 +189,7 @@ Scene parse_scene(const std::string& text, const std::string& name) {
   scene.name = name;
   scene.text = text;
   scene.material = root.text("material").value_or("");
+  scene.model = root.text("model").value_or("");
   scene.infill = parse_infill(root);
   parse_materials(root, scene);
   parse_parts(root, scene);

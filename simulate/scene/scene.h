@@ -62,6 +62,7 @@ struct Scene {
   std::string name = "scene";                 // for messages
   std::string text;                           // that it was parsed from; "" where a program filled it
   std::string material;                       // default of every part; "" : the body's own
+  std::string model;                          // likewise; "" : by placement
   Infill infill = {};                         // of `material`; nothing: solid
   std::map<std::string, Material> materials;  // the scene's own; they go before the library
   std::map<std::string, PartSettings> parts;

@@ -34,7 +34,10 @@ const std::string& name_of_material(const Scene& scene, const Part& part) {
   return scene.material.empty() ? part.material : scene.material;
 }
 
-const char* default_model(const Part& part) {
+// What the part, the scene or the placement says.
+std::string model_of_part(const Scene& scene, const PartSettings& settings, const Part& part) {
+  if (!settings.model.empty()) return settings.model;
+  if (!scene.model.empty()) return scene.model;
   return part.placement == Placement::corner ? "cells" : "paper";
 }
 
@@ -64,13 +67,13 @@ void refuse_placement(const PartSettings& settings, const std::string& model, co
                     model, part.name));
 }
 
-void refuse_model(const PartSettings& settings, const Part& part) {
-  const std::string model = settings.model.empty() ? default_model(part) : settings.model;
-  if (model != "cells" && model != "springs" && model != "paper")
-    throw InputError(settings.origin, fmt::format("no model \"{}\"{}", model,
-                                                  did_you_mean(model, {"cells", "springs", "paper"})));
+void refuse_model(const Scene& scene, const PartSettings& settings, const Part& part) {
+  const std::vector<std::string> known = {"cells", "quadratic", "springs", "paper"};
+  const std::string model = model_of_part(scene, settings, part);
+  if (std::find(known.begin(), known.end(), model) == known.end())
+    throw InputError(settings.origin, fmt::format("no model \"{}\"{}", model, did_you_mean(model, known)));
   refuse_placement(settings, model, part);
-  if (model != "cells") refuse_uneven(settings, model, part);
+  if (model == "springs" || model == "paper") refuse_uneven(settings, model, part);
   if (settings.hooke.empty()) return;
   if (model != "paper")
     throw InputError(
@@ -88,10 +91,12 @@ std::vector<Model> models_of_parts(const Scene& scene, const Body& body) {
   std::vector<Model> models;
   for (const Part& part : body.parts) {
     const auto found = scene.parts.find(part.name);
-    const std::string model = found != scene.parts.end() && !found->second.model.empty()
-                                  ? found->second.model
-                                  : default_model(part);
-    models.push_back(model == "springs" ? Model::springs : model == "paper" ? Model::paper : Model::cells);
+    const std::string model =
+        model_of_part(scene, found == scene.parts.end() ? PartSettings{} : found->second, part);
+    models.push_back(model == "springs"     ? Model::springs
+                     : model == "paper"     ? Model::paper
+                     : model == "quadratic" ? Model::quadratic
+                                            : Model::cells);
   }
   return models;
 }
@@ -122,7 +127,7 @@ std::vector<Material> materials_of_parts(const Scene& scene, const Body& body) {
     PartSettings settings;
     settings.origin = scene.name;
     if (const auto found = scene.parts.find(part.name); found != scene.parts.end()) settings = found->second;
-    refuse_model(settings, part);
+    refuse_model(scene, settings, part);
     const std::string& name = name_of_material(scene, part);
     if (name.empty())
       throw InputError(
@@ -135,7 +140,7 @@ std::vector<Material> materials_of_parts(const Scene& scene, const Body& body) {
     infill_used = infill_used || settings.material.empty();
     Material material = material_named(scene, name, settings.origin);
     const auto index = static_cast<std::size_t>(&part - body.parts.data());
-    refuse_law(scene, settings, body, index, material);
+    refuse_law(scene, settings, body, index, material, model_of_part(scene, settings, part));
     if (settings.axes) material.axes = *settings.axes;
     if (infill.share) {
       const double walls =

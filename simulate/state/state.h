@@ -18,8 +18,8 @@ struct State {
   double kick = 0;                  // s, for which the forces at this time act on the velocities
 };
 
-// How a part resists: cells and springs at corner placement, paper at centre placement.
-enum class Model { cells, springs, paper };
+// How a part resists: cells, springs and quadratic at corner placement, paper at centre placement.
+enum class Model { cells, springs, paper, quadratic };
 
 // Where the Hooke constants of model `paper` come from: equation (22) or (21) of the paper.
 enum class HookeConstant { paper, ganovelli };

@@ -18,7 +18,7 @@ formats/lattice formats/exchange
 voxelize/types voxelize/mesh voxelize/classify voxelize/heal voxelize/lattice voxelize
 simulate/laws simulate/input simulate/result simulate/linear simulate/state simulate/rigid simulate/conditions simulate/models
 simulate/kernels simulate/matter simulate/gravitation simulate/contact/points simulate/contact simulate/effects simulate/events simulate/scene
-simulate/equilibrium simulate/estimate simulate/probes simulate/live simulate/stepping simulate/implicit simulate/time simulate
+simulate/equilibrium simulate/estimate simulate/probes simulate/quadratic simulate/live simulate/stepping simulate/implicit simulate/time simulate
 mapping/types mapping/anchors mapping/checks mapping/methods mapping/crack mapping/report mapping
 flexel/process flexel/picture/canvas flexel/picture/render flexel/picture flexel/study/runs flexel/study flexel/export
 flexel/measure flexel/accuracy flexel

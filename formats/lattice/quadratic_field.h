@@ -1,0 +1,53 @@
+// The displacement field of model `quadratic`: 27 nodes a cell, which travel in a body as a column of its cells.
+//
+// Node n = i + 3 j + 9 k of a cell lies at (i, j, k) / 2 of its own coordinates [0, 1]^3. Those with i, j and k
+// even are the cell's elements; the other 19 have their displacement [m, world frame] in the column
+// "quadratic_displacement" (57 components), in ascending order of n, the same values in every cell that shares
+// them.
+#pragma once
+#include <array>
+#include <cstdint>
+
+#include "formats/lattice/body.h"
+
+namespace flexel {
+
+constexpr std::size_t kQuadraticNodes = 27;
+constexpr const char* kQuadraticColumn = "quadratic_displacement";
+
+// The triquadratic shape functions at `at` (cell coordinates), and their gradients there (by cell coordinates).
+struct QuadraticShape {
+  std::array<double, kQuadraticNodes> value{};
+  std::array<Vec3, kQuadraticNodes> gradient{};
+};
+[[nodiscard]] QuadraticShape quadratic_shape(const Vec3& at);
+
+// The element of a cell (0 to 7) that node n is; 8 for the nodes between.
+[[nodiscard]] constexpr std::size_t corner_of_node(std::size_t n) {
+  const std::size_t i = n % 3, j = n / 3 % 3, k = n / 9;
+  return i == 1 || j == 1 || k == 1 ? 8 : i / 2 + j + 2 * k;
+}
+
+// Coordinates of a rest point (m, world frame) in a cell: [0, 1]^3 inside.
+[[nodiscard]] Vec3 cell_coordinates(const Body& body, const Part& part, std::uint32_t cell, const Vec3& point);
+
+// Reads the field of a body that has it. Keeps references.
+class QuadraticField {
+ public:
+  // Nothing of a body without the column (or with one of a wrong size).
+  [[nodiscard]] static bool is_in(const Body& body);
+  // `displacement`: (elements x 3) m.
+  QuadraticField(const Body& body, const std::vector<Vec3>& displacement);
+
+  [[nodiscard]] std::array<Vec3, kQuadraticNodes> nodes(std::uint32_t cell) const;  // m
+  // Displacement [m] and its gradient (world frame) at cell coordinates `at`.
+  [[nodiscard]] Vec3 displacement(std::uint32_t cell, const Vec3& at) const;
+  [[nodiscard]] Mat3 gradient(const Lattice& lattice, std::uint32_t cell, const Vec3& at) const;
+
+ private:
+  const Body& body_;
+  const std::vector<Vec3>& displacement_;
+  const std::vector<double>& between_;
+};
+
+}  // namespace flexel

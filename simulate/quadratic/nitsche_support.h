@@ -1,0 +1,46 @@
+// Supports of model `quadratic`: Nitsche's method (1971) on faces; nodes that a box or a sphere selects are
+// eliminated.
+//
+// Where a face is held or led to d along the axes of the projector P, with the outward traction t(u) = sigma n of
+// the field,
+//     a(u, v) = int sigma : eps(v) - int [t(u) . P v + t(v) . P (u - d)] + int beta (u - d) . P v,
+// which the exact solution satisfies (unlike a penalty). beta = kNitsche (lambda + 2 mu) / h: half of that is not
+// enough at Poisson's ratio .3 (measured; docs/theory/quadratic.md).
+#pragma once
+#include <string>
+
+#include "simulate/effects/supports.h"
+#include "simulate/quadratic/cell_integrals.h"
+#include "simulate/quadratic/face_points.h"
+
+namespace flexel::simulate {
+
+constexpr double kNitsche = 150;
+
+// What one [[fix]] or [[move]] holds.
+struct NitscheSupport {
+  const Tie* tie = nullptr;
+  std::vector<FacePoint> points;     // on faces
+  std::vector<std::uint32_t> nodes;  // held as they are
+};
+
+// Of one point: the traction that node n's displacement makes, (i, k): component i by component k [Pa/m]; and the
+// stiffness of the penalty [Pa/m].
+struct NitschePoint {
+  QuadraticShape shape;  // gradients in the world frame
+  std::array<Mat3, kQuadraticNodes> traction{};
+  Mat3 projector = Mat3::Zero();
+  double area = 0, penalty = 0;  // m^2, Pa/m
+  Vec3 led = Vec3::Zero();       // m, d
+};
+[[nodiscard]] NitschePoint nitsche_point(const FacePoint& point, const Tie& tie, const Lattice& lattice,
+                                         const Mat9& moduli, double penalty);
+
+// Adds its part to the cell's matrix; and what `led` asks for, to forces (27 x 3) [N].
+void add_to(const NitschePoint& point, CellMatrix& matrix);
+void add_led(const NitschePoint& point, std::array<Vec3, kQuadraticNodes>& forces);
+
+// N, of the support on the body: P (t(u) - beta (u - d)) times the area.
+[[nodiscard]] Vec3 reaction(const NitschePoint& point, const std::array<Vec3, kQuadraticNodes>& u);
+
+}  // namespace flexel::simulate

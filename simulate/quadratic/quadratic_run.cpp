@@ -1,0 +1,166 @@
+#include "simulate/quadratic/quadratic_run.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numbers>
+
+#include "base/error.h"
+#include "base/human.h"
+#include "base/stop.h"
+#include "simulate/matter/fragments.h"
+#include "simulate/matter/interpolation_weights.h"
+#include "simulate/models/cells.h"
+#include "simulate/models/stiffness.h"
+#include "simulate/probes/probes.h"
+#include "simulate/probes/report.h"
+#include "simulate/quadratic/quadratic_solve.h"
+
+namespace flexel::simulate {
+namespace {
+
+// A linear answer is off by about the square of the angle that matter turns by.
+constexpr double kNoticeable = 0.05, kTooLarge = 0.25;  // rad
+
+void refuse_what_is_missing(const Scene& scene, const Body& body, const std::vector<ActiveEffect>& effects) {
+  const std::string needs = "model \"quadratic\" finds linear equilibria: ";
+  if (scene.run.time) throw InputError(scene.name, needs + "it has no [run] time; use model \"cells\"");
+  if (scene.run.renormalise) throw InputError(scene.name, needs + "it has no renormalise; use model \"cells\"");
+  for (const ActiveEffect& effect : effects)
+    if (effect.name != Supports::name && effect.name != Loads::name && effect.name != "gravity")
+      throw InputError(scene.name, fmt::format("{}it has no {} ({}); use model \"cells\"", needs, effect.name, effect.why));
+  for (const Tie& tie : scene.get<Supports>().ties)
+    if (tie.link)
+      throw InputError(tie.origin, fmt::format("{}it has no rigid links (\"{}\"); use link = \"averaging\"", needs, tie.name));
+  for (const Part& part : body.parts)
+    if (part.placement == Placement::centre)
+      throw InputError(scene.name, fmt::format("model \"quadratic\" needs elements at the corners of the voxels: "
+                                               "voxelize part \"{}\" with --placement corner",
+                                               part.name));
+}
+
+void judge_rotation(double rotation, Progress& progress) {
+  const double degrees = 180 / std::numbers::pi * rotation;
+  if (rotation > kTooLarge)
+    throw DivergedError(fmt::format("matter turns by {} degrees, and model \"quadratic\" is linear: that answer "
+                                    "would be worth nothing; use model \"cells\"",
+                                    human_number(degrees, 2)));
+  if (rotation > kNoticeable)
+    progress.warn(fmt::format("matter turns by {} degrees, and model \"quadratic\" is linear: about {} of the answer "
+                              "is left out; use model \"cells\"",
+                              human_number(degrees, 2), human_share(rotation * rotation)));
+}
+
+ProbeResult measure_probe(const Probe& probe, const ProbePoints& placed, const QuadraticSystem& system,
+                          const Body& body, const State& state) {
+  const QuadraticField field(body, state.displacement);
+  const std::vector<std::uint32_t> part = cell_parts(body);
+  if (placed.cell)
+    return {placed.name, placed.where,
+            field.displacement(*placed.cell,
+                               cell_coordinates(body, body.parts[part[*placed.cell]], *placed.cell, placed.where))};
+  const Selected selected = resolve(*probe.where, body);
+  const std::vector<FacePoint> points =
+      selected.polygons.empty() ? std::vector<FacePoint>{} : face_points(system.problem(), system.nodes(), selected.polygons);
+  if (points.empty()) return measure(placed, state);
+  ProbeResult result{placed.name, Vec3::Zero(), Vec3::Zero()};
+  double area = 0;
+  for (const FacePoint& point : points) {
+    const double share = point.area_vector.norm();
+    area += share;
+    result.where += share * point.position;
+    result.displacement += share * field.displacement(system.nodes().cells[point.cell], point.at);
+  }
+  result.where /= area;
+  result.displacement /= area;
+  return result;
+}
+
+void measure_field_stress(const QuadraticSystem& system, const QuadraticSolution& solution, const State& state,
+                          Body& body, SimulateResult& result) {
+  const Stresses found = field_stresses(system, solution, state);
+  const std::optional<LargestStress> largest = largest_stress(body, found);
+  if (!largest) return;
+  const double yield = system.problem().materials[largest->part].yield;
+  result.stress = StressSummary{largest->value, largest->at, body.parts[largest->part].name, {}};
+  if (yield > 0) result.stress->yield_share = largest->value / yield;
+  write_stress_columns(found, body);
+}
+
+void sum_up(SimulateResult& result) {
+  for (const AppliedLoad& load : result.loads) {
+    result.imbalance += load.force;
+    result.moment_imbalance += load.moment;
+  }
+  for (const Reaction& reaction : result.reactions) {
+    result.imbalance += reaction.force;
+    result.moment_imbalance += reaction.moment;
+  }
+}
+
+double mass_of(const QuadraticSystem& system) {
+  double mass = 0;
+  const Body& body = system.problem().body;
+  const std::vector<std::uint32_t> part = cell_parts(body);
+  for (std::size_t c = 0; c < body.cell_count(); ++c)
+    mass += body.broken[c] ? 0 : body.fill[c] * system.problem().materials[part[c]].density *
+                                     body.parts[part[c]].lattice.spacing.prod();
+  return mass;
+}
+
+}  // namespace
+
+bool is_quadratic(const Scene& scene, const Body& body) {
+  const std::vector<Model> models = models_of_parts(scene, body);
+  const auto other = std::find_if(models.begin(), models.end(), [](Model each) { return each != Model::quadratic; });
+  if (other == models.end()) return true;
+  if (std::find(models.begin(), models.end(), Model::quadratic) == models.end()) return false;
+  throw InputError(scene.name, fmt::format("model \"quadratic\" is for all parts or none: write [parts.\"{}\"] "
+                                           "model = \"quadratic\" too",
+                                           body.parts[static_cast<std::size_t>(other - models.begin())].name));
+}
+
+SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress) {
+  const auto began = std::chrono::steady_clock::now();
+  const Fragments fragments = find_fragments(body);
+  const Problem problem{body, materials_of_parts(scene, body), stray_cells(fragments), models_of_parts(scene, body), {}, {}, {}, {}};
+  SimulateResult result;
+  report_materials(problem, progress);
+  const std::vector<ProbePoints> probes = place_probes(scene, problem);
+  const std::vector<ActiveEffect> effects = active_effects(scene.effects, problem);
+  refuse_what_is_missing(scene, body, effects);
+  const QuadraticSystem system(problem, scene);
+  refuse_loose_fragments(fragments, body, system.tied_elements(), {}, scene.name);
+  const QuadraticSolution solution = solve(system, scene.run, scene.name, [&](int iteration, double residual) {
+    check_stop();
+    progress.update(0.1 + 0.8 * std::min(1.0, std::log(residual) / std::log(scene.run.tolerance)),
+                    fmt::format("iteration {}", iteration));
+  });
+  const StopWaits answered;
+  judge_rotation(largest_rotation(system, solution), progress);
+  name_materials(body, problem.materials);
+  State state;
+  write_field(system, solution, body, state);
+  report(system, solution, result);
+  sum_up(result);
+  if (options.stress) measure_field_stress(system, solution, state, body, result);
+  for (std::size_t p = 0; p < probes.size(); ++p)
+    result.probes.push_back(measure_probe(scene.probes[p], probes[p], system, body, state));
+  const StiffnessPattern pattern =
+      stiffness_pattern(body, active_cells(problem), connection_rows({}, body.element_count()), {}, false);
+  carry_strays(fragments, problem, pattern.stencil, state);
+  for (std::size_t e = 0; e < body.element_count(); ++e) body.position[e] = body.rest[e] + state.displacement[e];
+  measure_displacement(body, state, result);
+  result.mass = mass_of(system);
+  refuse_not_finite(result, scene.name);
+  result.load_steps = 1;
+  result.newton_iterations = 1;
+  result.cg_iterations = solution.iterations;
+  result.relative_residual = solution.relative_residual;
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  return result;
+}
+
+}  // namespace flexel::simulate

@@ -1,0 +1,20 @@
+// Model `quadratic`: linear equilibrium with 27-node cells whose stiffness is integrated over the part's matter
+// exactly (docs/theory/quadratic.md).
+#pragma once
+#include "base/program/progress.h"
+#include "simulate/result/options.h"
+#include "simulate/result/result.h"
+#include "simulate/scene/scene.h"
+
+namespace flexel::simulate {
+
+// Whether the scene asks for it. Throws InputError where it does for some parts only.
+[[nodiscard]] bool is_quadratic(const Scene& scene, const Body& body);
+
+// Moves the body to equilibrium; its column "quadratic_displacement" has the field between the elements. Throws
+// InputError naming what the model does not have; DivergedError where displacements are too large for a linear
+// answer, or the solver does not converge.
+[[nodiscard]] SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptions& options,
+                                           Progress& progress);
+
+}  // namespace flexel::simulate

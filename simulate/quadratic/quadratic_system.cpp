@@ -1,0 +1,230 @@
+#include "simulate/quadratic/quadratic_system.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "simulate/effects/gravity.h"
+#include "simulate/matter/interpolation_weights.h"
+#include "simulate/matter/load_distribution.h"
+#include "simulate/models/cells.h"
+
+namespace flexel::simulate {
+namespace {
+
+constexpr std::uint32_t kWhole = std::numeric_limits<std::uint32_t>::max();
+constexpr double kOutside = 1e-6;  // stiffness of what is not matter, of the material's: slivers stay regular
+constexpr double kFull = 1 - 1e-9;
+constexpr std::size_t kCellsAtATime = 16;
+
+Moments body_moments(const Body& body, std::size_t place) {
+  return Eigen::Map<const Moments>(&body.moments[place * kMoments]);
+}
+
+}  // namespace
+
+QuadraticSystem::QuadraticSystem(const Problem& problem, const Scene& scene)
+    : problem_(problem), scene_(scene), nodes_(quadratic_nodes(problem.body, active_cells(problem))) {
+  const Body& body = problem.body;
+  const std::vector<std::uint32_t> part = cell_parts(body);
+  for (const std::uint32_t c : nodes_.cells) {
+    part_.push_back(part[c]);
+    const auto found = std::lower_bound(body.moment_cells.begin(), body.moment_cells.end(), c);
+    moments_at_.push_back(found != body.moment_cells.end() && *found == c
+                              ? static_cast<std::uint32_t>(found - body.moment_cells.begin())
+                              : kWhole);
+  }
+  require_moments();
+  for (std::size_t p = 0; p < body.parts.size(); ++p) {
+    moduli_.push_back(elasticity(law_of(problem.materials[p]), Mat3::Zero()));
+    integrals_.emplace_back(body.parts[p].lattice, moduli_.back());
+  }
+  place_supports(scene.get<Supports>().ties);
+  place_loads(scene.get<Loads>().loads);
+  if (const auto& acceleration = scene.get<Gravity>().acceleration) add_gravity(*acceleration);
+}
+
+void QuadraticSystem::require_moments() const {
+  const Body& body = problem_.body;
+  for (std::size_t i = 0; i < nodes_.cells.size(); ++i)
+    if (moments_at_[i] == kWhole && body.fill[nodes_.cells[i]] < kFull)
+      throw InputError(scene_.name,
+                       fmt::format("model \"quadratic\" needs the exact moments of cells that the surface of part "
+                                   "\"{}\" cuts, which this body does not have: voxelize with --moments",
+                                   body.parts[part_[i]].name));
+}
+
+void QuadraticSystem::place_supports(const std::vector<Tie>& ties) {
+  for (const Tie& tie : ties) {
+    const Selected selected = resolve(tie.where, problem_.body);
+    NitscheSupport support{&tie, {}, {}};
+    if (!selected.polygons.empty()) {
+      support.points = face_points(problem_, nodes_, selected.polygons);
+      if (support.points.empty())
+        throw InputError(tie.origin, fmt::format("\"{}\": no matter lies under the selected surface; use a "
+                                                 "smaller spacing",
+                                                 tie.name));
+    }
+    std::vector<std::uint8_t> chosen(problem_.body.element_count(), 0);
+    for (const std::uint32_t e : selected.elements) chosen[e] = 1;
+    // a node between elements is held where all of them are
+    std::vector<std::uint8_t> free(nodes_.size(), 0);
+    for (std::size_t c = 0; !selected.elements.empty() && c < nodes_.cells.size(); ++c)
+      for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
+        const std::array<std::size_t, 3> at{n % 3, n / 3 % 3, n / 9};
+        for (std::size_t a = 0; a < 8; ++a)
+          if ((at[0] == 1 || at[0] / 2 == (a & 1)) && (at[1] == 1 || at[1] / 2 == (a >> 1 & 1)) &&
+              (at[2] == 1 || at[2] / 2 == a >> 2) && !chosen[problem_.body.cell_elements[nodes_.cells[c]][a]])
+            free[nodes_.of_cell[c][n]] = 1;
+      }
+    for (std::uint32_t n = 0; !selected.elements.empty() && n < nodes_.size(); ++n)
+      if (!free[n]) support.nodes.push_back(n);
+    supports_.push_back(std::move(support));
+  }
+}
+
+void QuadraticSystem::place_loads(const std::vector<Load>& loads) {
+  for (const Load& load : loads) {
+    const Selected selected = resolve(load.where, problem_.body);
+    NodalLoad made{load.name, std::vector<Vec3>(nodes_.size(), Vec3::Zero())};
+    if (!selected.elements.empty() || selected.polygons.empty())
+      throw InputError(load.origin,
+                       fmt::format("load \"{}\": model \"quadratic\" takes loads on faces, groups and sides; {} "
+                                   "selects elements",
+                                   load.name, describe(load.where)));
+    const std::vector<FacePoint> points = face_points(problem_, nodes_, selected.polygons);
+    if (points.empty())
+      throw InputError(load.origin, fmt::format("load \"{}\": no matter lies under the selected surface; use a "
+                                                "smaller spacing",
+                                                load.name));
+    std::vector<Vec3> forces;
+    std::vector<LoadedPoint> loaded;
+    for (const FacePoint& point : points) {
+      if (load.pressure)
+        forces.push_back(-*load.pressure * point.area_vector);
+      else
+        loaded.push_back({point.position, point.area_vector.norm(), point.area_vector.normalized()});
+    }
+    if (!load.pressure) forces = load_forces(load, loaded);
+    for (std::size_t q = 0; q < points.size(); ++q) {
+      const QuadraticShape shape = quadratic_shape(points[q].at);
+      for (std::size_t n = 0; n < kQuadraticNodes; ++n)
+        made.forces[nodes_.of_cell[points[q].cell][n]] += shape.value[n] * forces[q];
+    }
+    loads_.push_back(std::move(made));
+  }
+}
+
+void QuadraticSystem::add_gravity(const Vec3& acceleration) {
+  NodalLoad made{"gravity", std::vector<Vec3>(nodes_.size(), Vec3::Zero())};
+  for (std::size_t c = 0; c < nodes_.cells.size(); ++c) {
+    const auto volumes = integrals_[part_[c]].volumes(moments(c));
+    for (std::size_t n = 0; n < kQuadraticNodes; ++n)
+      made.forces[nodes_.of_cell[c][n]] += problem_.materials[part_[c]].density * volumes[n] * acceleration;
+  }
+  loads_.push_back(std::move(made));
+}
+
+Moments QuadraticSystem::moments(std::size_t cell) const {
+  return moments_at_[cell] == kWhole ? whole_cell_moments() : body_moments(problem_.body, moments_at_[cell]);
+}
+
+CellMatrix QuadraticSystem::elastic_stiffness(std::size_t cell) const {
+  const Moments own = moments(cell), whole = whole_cell_moments();
+  return integrals_[part_[cell]].stiffness(own + kOutside * (whole - own));
+}
+
+NitschePoint QuadraticSystem::point(const NitscheSupport& support, const FacePoint& point, double safety) const {
+  const std::uint32_t part = part_[point.cell];
+  const Lattice& lattice = problem_.body.parts[part].lattice;
+  const Law law = law_of(problem_.materials[part]);
+  // lambda + 2 mu; of an orthotropic material the largest of dP/dF
+  const double stiffest = law.name == LawName::orthotropic ? law.stiffest : law.lambda + 2 * law.mu;
+  return nitsche_point(point, *support.tie, lattice, moduli_[part],
+                       safety * kNitsche * stiffest / lattice.spacing.minCoeff());
+}
+
+std::vector<std::uint8_t> QuadraticSystem::held() const {
+  std::vector<std::uint8_t> held(nodes_.size(), 0);
+  for (const NitscheSupport& support : supports_)
+    for (const std::uint32_t n : support.nodes)
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        if (support.tie->axes[axis]) held[n] = static_cast<std::uint8_t>(held[n] | 1u << axis);
+  return held;
+}
+
+QuadraticOperator QuadraticSystem::stiffness(double safety) const {
+  QuadraticOperator made(nodes_, held());
+  std::vector<std::vector<const NitscheSupport*>> supports_at(nodes_.cells.size());
+  std::vector<std::vector<const FacePoint*>> points_at(nodes_.cells.size());
+  for (const NitscheSupport& support : supports_)
+    for (const FacePoint& point : support.points) {
+      supports_at[point.cell].push_back(&support);
+      points_at[point.cell].push_back(&point);
+    }
+  std::vector<std::uint32_t> own;
+  for (std::uint32_t c = 0; c < nodes_.cells.size(); ++c)
+    if (moments_at_[c] != kWhole || !points_at[c].empty()) own.push_back(c);
+  std::vector<std::uint32_t> shared;
+  for (const CellIntegrals& integrals : integrals_) shared.push_back(made.add_shared(integrals.stiffness(whole_cell_moments())));
+  for (std::size_t c = 0; c < nodes_.cells.size(); ++c) made.share(c, shared[part_[c]]);
+  made.reserve_own(own);
+  parallel_for_each(
+      own.size(),
+      [&](std::size_t i) {
+        const std::uint32_t c = own[i];
+        CellMatrix matrix = elastic_stiffness(c);
+        for (std::size_t p = 0; p < points_at[c].size(); ++p)
+          add_to(point(*supports_at[c][p], *points_at[c][p], safety), matrix);
+        made.set_own(c, matrix);
+      },
+      kCellsAtATime);
+  return made;
+}
+
+std::vector<Vec3> QuadraticSystem::right_side(double safety) const {
+  std::vector<Vec3> sum(nodes_.size(), Vec3::Zero());
+  for (const NodalLoad& load : loads_)
+    for (std::size_t n = 0; n < sum.size(); ++n) sum[n] += load.forces[n];
+  for (const NitscheSupport& support : supports_) {
+    if (!support.tie->is_move) continue;
+    for (const FacePoint& at : support.points) {
+      std::array<Vec3, kQuadraticNodes> forces;
+      forces.fill(Vec3::Zero());
+      add_led(point(support, at, safety), forces);
+      for (std::size_t n = 0; n < kQuadraticNodes; ++n) sum[nodes_.of_cell[at.cell][n]] += forces[n];
+    }
+  }
+  return sum;
+}
+
+std::vector<Vec3> QuadraticSystem::prescribed() const {
+  std::vector<Vec3> value(nodes_.size(), Vec3::Zero());
+  for (const NitscheSupport& support : supports_)
+    for (const std::uint32_t n : support.nodes) {
+      const Vec3 led = support.tie->motion.displacement(nodes_.rest[n], 1);
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        if (support.tie->axes[axis]) value[n][static_cast<Eigen::Index>(axis)] = led[static_cast<Eigen::Index>(axis)];
+    }
+  return value;
+}
+
+std::vector<std::uint8_t> QuadraticSystem::tied_elements() const {
+  std::vector<std::uint8_t> tied(problem_.body.element_count(), 0);
+  const auto mark = [&](std::uint32_t node, const Tie& tie) {
+    if (node >= nodes_.elements.size()) return;
+    std::uint8_t& mark = tied[nodes_.elements[node]];
+    mark = std::max<std::uint8_t>(mark, tie.axes[0] && tie.axes[1] && tie.axes[2] ? 2 : 1);
+  };
+  for (const NitscheSupport& support : supports_) {
+    for (const FacePoint& point : support.points)
+      for (const std::uint32_t node : nodes_.of_cell[point.cell]) mark(node, *support.tie);
+    for (const std::uint32_t node : support.nodes) mark(node, *support.tie);
+  }
+  return tied;
+}
+
+}  // namespace flexel::simulate

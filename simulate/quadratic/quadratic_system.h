@@ -1,0 +1,61 @@
+// A scene's linear equilibrium in model `quadratic`: cells, supports and loads, put together.
+#pragma once
+#include "simulate/quadratic/nitsche_support.h"
+#include "simulate/quadratic/quadratic_multigrid.h"
+#include "simulate/scene/scene.h"
+
+namespace flexel::simulate {
+
+// A [[load]] or [gravity], on the nodes.
+struct NodalLoad {
+  std::string name;
+  std::vector<Vec3> forces;  // (nodes x 3) N
+};
+
+class QuadraticSystem {
+ public:
+  // Throws InputError: cells that the surface cuts without moments, a support or load under which no matter lies.
+  // Keeps references.
+  QuadraticSystem(const Problem& problem, const Scene& scene);
+  QuadraticSystem(const QuadraticSystem&) = delete;
+  QuadraticSystem& operator=(const QuadraticSystem&) = delete;
+
+  // The stiffness with supports, whose penalty is `safety` times the usual one.
+  [[nodiscard]] QuadraticOperator stiffness(double safety) const;
+  // (nodes x 3) N: loads and what led faces ask for.
+  [[nodiscard]] std::vector<Vec3> right_side(double safety) const;
+  // (nodes x 3) m, in prescribed components; 0 elsewhere.
+  [[nodiscard]] std::vector<Vec3> prescribed() const;
+
+  [[nodiscard]] const Problem& problem() const { return problem_; }
+  [[nodiscard]] const QuadraticNodes& nodes() const { return nodes_; }
+  [[nodiscard]] const std::vector<NitscheSupport>& supports() const { return supports_; }
+  [[nodiscard]] const std::vector<NodalLoad>& loads() const { return loads_; }
+  [[nodiscard]] const Mat9& moduli(std::uint32_t part) const { return moduli_[part]; }
+  [[nodiscard]] std::uint32_t part_of(std::size_t cell) const { return part_[cell]; }
+  // Of the cell of that index in nodes().cells.
+  [[nodiscard]] Moments moments(std::size_t cell) const;
+  [[nodiscard]] CellMatrix elastic_stiffness(std::size_t cell) const;
+  [[nodiscard]] NitschePoint point(const NitscheSupport& support, const FacePoint& point, double safety) const;
+  // (elements) 2 where a support holds all axes, 1 where it holds some, else 0.
+  [[nodiscard]] std::vector<std::uint8_t> tied_elements() const;
+
+ private:
+  void require_moments() const;
+  void place_supports(const std::vector<Tie>& ties);
+  void place_loads(const std::vector<Load>& loads);
+  void add_gravity(const Vec3& acceleration);
+  [[nodiscard]] std::vector<std::uint8_t> held() const;
+
+  const Problem& problem_;
+  const Scene& scene_;
+  QuadraticNodes nodes_;
+  std::vector<std::uint32_t> part_;         // (cells)
+  std::vector<std::uint32_t> moments_at_;   // (cells) place in the body's moments; kWhole
+  std::vector<Mat9> moduli_;                // (parts) Pa, world frame
+  std::vector<CellIntegrals> integrals_;    // (parts)
+  std::vector<NitscheSupport> supports_;
+  std::vector<NodalLoad> loads_;
+};
+
+}  // namespace flexel::simulate
