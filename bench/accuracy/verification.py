@@ -5,7 +5,7 @@
 
 Always: the lattice tested as a material (`flexel measure`), the paper's cantilever against its reference and a thick tube against Lame's
 solution, each at several spacings with its error bar. Without --quick also the tables of accuracy_table and error_bars (a
-build with FLEXEL_BENCH=ON), of bench/accuracy/step_parts.py and of bench/accuracy/calculix.py (ccx and gmsh). A section whose programs or
+build with FLEXEL_BENCH=ON), of bench/accuracy/laws.py, step_parts.py and calculix.py (ccx and gmsh). A section whose programs or
 parts are not there says so. With --keep every case is written to FOLDER as soon as it is done, and a later run takes it from there: a run
 of half an hour can be stopped and goes on. Figures are SVG by gnuplot, in a folder beside FILE named after it. Exit code 1 when a true error lies outside
 its bar in more than one case of ten, or a material is off by more than 1 %.
@@ -219,6 +219,8 @@ def main():
         if not options.quick:
             tables = [("Models", "Tip of the same cantilever by model, elements on its faces ([accuracy.md](accuracy.md)).", ["accuracy_table"]),
                       ("Error bars", "Cases whose answer is known ([error-bars.md](../theory/error-bars.md)).", ["error_bars"]),
+                      ("Elastic laws", "A bar of 100 x 20 x 20 mm, held at one end and pushed at the other, beside second-order tetrahedra of 3 mm by CalculiX\n"
+                       "([laws.md](../theory/laws.md)); \"in time\": the same scene with damping until it is at rest.", [HERE / "laws.py"], ["ccx", "gmsh"]),
                       ("STEP parts", "Every closed STEP part with an error bar, nothing set by hand; processor seconds.",
                        [HERE / "step_parts.py", "--parts", options.parts, "--cells", "30000,300000"], [options.parts],
                        lambda: command(HERE / "step_parts.py", "--list").split()),

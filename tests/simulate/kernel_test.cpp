@@ -170,13 +170,16 @@ TEST_P(KernelOf, DampingOfEditedCells) {
   EXPECT_GT(largest_difference(found, forces_in_step(problem, state, 0)), 1e-3 * largest(expected));
 }
 
+std::string name_of(const ::testing::TestParamInfo<KernelCase>& tested) {
+  return tested.param.name;
+}
 INSTANTIATE_TEST_SUITE_P(
     Models, KernelOf,
     ::testing::Values(KernelCase{"cells", Model::cells, kKernelGum},
                       KernelCase{"springs", Model::springs, kKernelGum},
                       KernelCase{"mooney_rivlin", Model::cells, testing::mooney_rivlin_material()},
                       KernelCase{"orthotropic", Model::cells, testing::orthotropic_material()}),
-    [](const ::testing::TestParamInfo<KernelCase>& info) { return info.param.name; });
+    name_of);
 
 TEST(Kernel, FoldedCellIsTold) {
   const Body body = box_body({{2, 2, 2}, Vec3::Constant(0.01)});
