@@ -35,7 +35,7 @@ struct Arguments {
                     deflection, edge, format, vdb, summary, output = "-";
   std::optional<long long> count;
   int threads = 0;
-  bool compress = false, quiet = false, force = false;
+  bool moments = false, compress = false, quiet = false, force = false;
 };
 
 void declare(CLI::App& app, Arguments& arguments) {
@@ -50,6 +50,8 @@ void declare(CLI::App& app, Arguments& arguments) {
                  "broken surfaces: auto (default) repairs small damage and refuses what cannot be told, wrap "
                  "(wrap:LENGTH) wraps them, none takes them as they are");
   app.add_option("--material", arguments.material, "name of the parts' material; else the scene gives it");
+  app.add_flag("--moments", arguments.moments,
+               "write the exact moments of cut cells too, for model quadratic");
   app.add_option("--max-memory", arguments.max_memory,
                  "refuse what needs more to simulate, for example 4GB (default 80 % of what is free)");
   app.add_option("--deflection", arguments.deflection,
@@ -115,6 +117,7 @@ VoxelizeOptions voxelize_options(const Arguments& arguments) {
   options.align = aligns[choose("--align", arguments.align, {"snap", "box", "none"})];
   options.heal = heal_choice(arguments.heal);
   options.material = arguments.material;
+  options.moments = arguments.moments;
   if (!arguments.max_memory.empty()) options.max_memory = parse_bytes(arguments.max_memory);
   return options;
 }

@@ -21,6 +21,7 @@
 #include "voxelize/heal/outward.h"
 #include "voxelize/lattice/align.h"
 #include "voxelize/lattice/assemble.h"
+#include "voxelize/lattice/assemble_moments.h"
 #include "voxelize/memory.h"
 #include "voxelize/mesh/part_mesh.h"
 #include "voxelize/neighbours.h"
@@ -165,7 +166,8 @@ std::vector<HealedPart> heal_parts(Surface& surface, const HealChoice& how) {
 // Inside and outside of a part whose mesh lies on the lattice; nothing where they cannot be told apart.
 std::optional<Voxels> classify(HealedPart& part, const Lattice& lattice, const VoxelizeOptions& options) {
   if (part.mesh.balanced()) {
-    Voxels voxels = classify_closed(part.mesh, {.with_centres = options.placement == Placement::centre});
+    Voxels voxels = classify_closed(
+        part.mesh, {.with_centres = options.placement == Placement::centre, .with_moments = options.moments});
     if (!part.original.corners.empty()) {
       place_on_lattice(part.original, lattice);
       trace_missing(part.original, voxels);
@@ -198,6 +200,7 @@ std::optional<VoxelizedPart> voxelize_part(HealedPart& healed, double spacing, c
   const std::optional<Voxels> voxels = classify(healed, part.lattice, options);
   if (!voxels) return std::nullopt;
   const AssembledPart assembled = assemble_part(*voxels, part, body, polygon_cells);
+  if (options.moments) append_moments(*voxels, body);
   if (assembled.elements == 0 && enclosed_volume(mesh) < 0)
     throw InputError(fmt::format("part \"{}\" is inside out; --heal auto turns it", name));
   if (assembled.elements == 0)
@@ -314,6 +317,8 @@ Placement placement_choice(const std::string& word) {
 }
 
 VoxelizeResult voxelize(Surface surface, const VoxelizeOptions& options, Progress& progress) {
+  if (options.moments && options.placement == Placement::centre)
+    throw InputError("--moments: centre placement has no cells; use --placement corner");
   progress.stage("heal");
   std::vector<HealedPart> meshes = heal_parts(surface, options.heal);
   check_meshes(meshes, surface);

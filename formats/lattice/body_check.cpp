@@ -6,11 +6,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <tuple>
 
 #include "base/error.h"
 #include "base/parallel.h"
 #include "formats/lattice/body.h"
+#include "formats/lattice/cell_moments.h"
 
 namespace flexel {
 namespace {
@@ -34,6 +36,7 @@ class Checker {
     numbers();
     order();
     cells();
+    moments();
     columns("element_columns", body_.element_columns, body_.element_count());
     columns("cell_columns", body_.cell_columns, body_.cell_count());
     surface();
@@ -167,6 +170,23 @@ class Checker {
         return false;
     }
     return true;
+  }
+
+  void moments() const {
+    const std::vector<std::uint32_t>& cells = body_.moment_cells;
+    const std::vector<double>& values = body_.moments;
+    size("moments", values.size(), kMoments * cells.size(), "moments of moment_cells");
+    all(0, cells.size(), "moment_cells", "is not a cell after the one before it",
+        [&](std::size_t c) { return cells[c] < body_.cell_count() && (c == 0 || cells[c - 1] < cells[c]); });
+    all(0, values.size(), "moments", "is not finite",
+        [&](std::size_t k) { return std::isfinite(values[k]); });
+    constexpr double kTolerance = 1e-6;
+    all(0, cells.size(), "moments of moment_cells", "do not add up to the fill of its cell",
+        [&](std::size_t c) {
+          const auto begin = values.begin() + static_cast<std::ptrdiff_t>(kMoments * c);
+          const double sum = std::accumulate(begin, begin + kMoments, 0.0);
+          return std::abs(sum - body_.fill[cells[c]]) <= kTolerance;
+        });
   }
 
   void columns(const char* field, const std::map<std::string, Column>& columns, std::size_t count) const {

@@ -17,6 +17,8 @@ constexpr const char* surface_polygon_face = "surface_polygon_face";
 constexpr const char* surface_face_part = "surface_face_part";
 constexpr const char* surface_cell_offsets = "surface_cell_offsets";
 constexpr const char* surface_cells = "surface_cells";
+constexpr const char* moment_cells = "moment_cells";
+constexpr const char* moments = "moments";
 // Before the name of each attribute of the surface.
 constexpr const char* surface_vertex_columns = "surface_vertex_columns.";
 constexpr const char* surface_polygon_columns = "surface_polygon_columns.";

@@ -9,6 +9,7 @@
 #include "formats/lattice/body_file.h"
 #include "formats/lattice/body_file_names.h"
 #include "formats/lattice/body_metadata.h"
+#include "formats/lattice/cell_moments.h"
 #include "formats/lattice/vtu.h"
 
 namespace flexel {
@@ -148,6 +149,14 @@ void read_cells(const vtu::File& file, Body& body) {
   read_columns(file, Section::cell_data, cells, body.cell_columns);
 }
 
+// Bodies that were made without have neither.
+void read_moments(const vtu::File& file, Body& body) {
+  if (!file.has(Section::field, names::moment_cells) && !file.has(Section::field, names::moments)) return;
+  body.moment_cells = file.read<std::uint32_t>(Section::field, names::moment_cells);
+  for (const CellMoments& each : file.read<CellMoments>(Section::field, names::moments))
+    body.moments.insert(body.moments.end(), each.begin(), each.end());
+}
+
 }  // namespace
 
 Body read_body(const std::string& path) {
@@ -164,6 +173,7 @@ Body read_body(Bytes bytes, const std::string& where) {
   Body body = std::move(metadata.body);
   read_elements(file, body);
   read_cells(file, body);
+  read_moments(file, body);
   if (metadata.with_surface) read_surface(file, metadata, body);
   check(body, where);
   return body;

@@ -9,6 +9,7 @@
 #include "formats/lattice/body_file.h"
 #include "formats/lattice/body_file_names.h"
 #include "formats/lattice/body_metadata.h"
+#include "formats/lattice/cell_moments.h"
 #include "formats/lattice/vtu.h"
 
 namespace flexel {
@@ -174,13 +175,21 @@ void add_cells(const Body& body, const Workspace& work, std::vector<vtu::Array>&
   add_columns(Section::cell_data, body.cell_columns, m, vertices, arrays);
 }
 
+void add_moments(const Body& body, std::vector<vtu::Array>& arrays) {
+  if (body.moment_cells.empty()) return;
+  arrays.push_back(array_of(Section::field, names::moment_cells, body.moment_cells));
+  arrays.push_back(array_of(Section::field, names::moments, body.moments));
+  arrays.back().components = kMoments;
+  arrays.back().tuples = body.moment_cells.size();
+}
+
 // A body whose arrays do not fit together is a mistake of the program that made it.
 void require_sizes(const Body& body) {
   const std::size_t n = body.element_count(), m = body.cell_count();
   const bool agree = body.lattice_index.size() == n && body.piece.size() == n && body.position.size() == n &&
                      body.connections.size() == n && body.fill.size() == m && body.broken.size() == m &&
-                     !body.parts.empty() && body.parts.back().element_end == n &&
-                     body.parts.back().cell_end == m;
+                     body.moments.size() == kMoments * body.moment_cells.size() && !body.parts.empty() &&
+                     body.parts.back().element_end == n && body.parts.back().cell_end == m;
   if (!agree) throw std::logic_error("write_body: the sizes of the body's arrays do not agree");
 }
 
@@ -192,6 +201,7 @@ void write_to(OutputFile& output, const Body& body, const BodyFileOptions& optio
   arrays.push_back(array_of(Section::field, names::version, work.version));
   arrays.push_back(array_of(Section::field, names::metadata, work.metadata));
   if (with_surface) add_surface(body, work, arrays);
+  if (options.embed_surface) add_moments(body, arrays);
   add_elements(body, work, arrays);
   add_cells(body, work, arrays);
   vtu::write(output, body.element_count(), body.cell_count() + work.vertex_elements.size(), arrays,

@@ -13,6 +13,10 @@ namespace flexel {
 
 constexpr std::size_t kMomentPoints = 5;  // along an axis
 constexpr std::size_t kMoments = kMomentPoints * kMomentPoints * kMomentPoints;
+using CellMoments = std::array<double, kMoments>;
+
+// Cells with this fill or more are whole but for rounding and need no moments of their own.
+constexpr double kWholeFill = 1 - 1e-9;
 
 // Gauss's points and weights on [0, 1].
 constexpr std::array<double, kMomentPoints> kGaussPoints = {
@@ -35,8 +39,8 @@ constexpr std::array<double, kMomentPoints> kGaussWeights = {
 }
 
 // Those of a whole cell.
-[[nodiscard]] constexpr std::array<double, kMoments> whole_moments() {
-  std::array<double, kMoments> moments{};
+[[nodiscard]] constexpr CellMoments whole_moments() {
+  CellMoments moments{};
   for (std::size_t k = 0; k < kMoments; ++k)
     moments[k] = kGaussWeights[k % 5] * kGaussWeights[k / 5 % 5] * kGaussWeights[k / 25];
   return moments;

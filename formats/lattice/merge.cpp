@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "base/error.h"
+#include "formats/lattice/body_moments.h"
 
 namespace flexel {
 namespace {
@@ -53,6 +54,7 @@ void append(Body& body, Body other) {
     part.cell_end += cells;
     body.parts.push_back(part);
   }
+  append_moments(body, other);
   append_all(body.lattice_index, other.lattice_index);
   append_all(body.piece, other.piece);
   append_all(body.rest, other.rest);

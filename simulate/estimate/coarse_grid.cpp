@@ -61,15 +61,26 @@ FlatFaces flat_faces(const Body& body, const Part& part, const FacePairs& pairs,
   return result;
 }
 
+double area_on(const CoarseGrid& grid, const FlatFaces& faces) {
+  double on = 0;
+  for (std::size_t i = 0; i < faces.area.size(); ++i)
+    if (holds(grid, faces.begin + static_cast<double>(i))) on += faces.area[i];
+  return on;
+}
+
+CoarseGrid doubled_grid(const FlatFaces& faces) {
+  const CoarseGrid even{static_cast<double>(faces.begin), kDoubled},
+      odd{static_cast<double>(faces.begin - 1), kDoubled};
+  return area_on(odd, faces) > area_on(even, faces) ? odd : even;
+}
+
 CoarseGrid choose_grid(const FlatFaces& faces, double wanted, const std::string& part) {
   const auto planes = static_cast<std::int32_t>(faces.area.size());
   if (planes < 3) throw InputError(fmt::format("part \"{}\" is one cell thick", part));
   const double total = std::accumulate(faces.area.begin(), faces.area.end(), 0.0);
   const auto score = [&](const CoarseGrid& grid) {
-    double on = 0;
-    for (std::int32_t i = 0; i < planes; ++i)
-      if (holds(grid, faces.begin + i)) on += faces.area[static_cast<std::size_t>(i)];
-    return (total > 0 ? on / total : 0) - kGain * std::abs(std::log(grid.pitch / wanted)) / std::log(1.5);
+    return (total > 0 ? area_on(grid, faces) / total : 0) -
+           kGain * std::abs(std::log(grid.pitch / wanted)) / std::log(1.5);
   };
   std::vector<std::int32_t> heavy(static_cast<std::size_t>(planes));
   std::iota(heavy.begin(), heavy.end(), 0);
@@ -139,7 +150,8 @@ std::array<CoarseGrid, 3> choose_grids(const Body& body, const Part& part, const
   std::size_t thinnest = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     faces[axis] = flat_faces(body, part, pairs, axis);
-    grids[axis] = choose_grid(faces[axis], kDoubled, part.name);
+    grids[axis] =
+        body.moment_cells.empty() ? choose_grid(faces[axis], kDoubled, part.name) : doubled_grid(faces[axis]);
     if (faces[axis].area.size() < faces[thinnest].area.size()) thinnest = axis;
   }
   // Cells of another shape have another error: where the part is thin and must stay finer, all axes do.

@@ -26,7 +26,9 @@ struct GridCut {
 
 // By axis, moved so that the first coarse plane at or below all cells has index 0. The pitch is 2 unless
 // another from 1.5 to 3 puts more flat faces of the part on planes; where the axis along which the part is
-// thinnest takes less, the others come near to that. Throws InputError: a part one cell thick.
+// thinnest takes less, the others come near to that. Throws InputError: a part one cell thick. A body with moments
+// gets a pitch of 2 from a plane of its own everywhere: no cell is cut, for what of its moments lies on either side
+// of a cut is not known.
 [[nodiscard]] std::array<CoarseGrid, 3> choose_grids(const Body& body, const Part& part,
                                                      const FacePairs& pairs);
 

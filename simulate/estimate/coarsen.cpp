@@ -13,7 +13,10 @@
 
 #include "base/disjoint_sets.h"
 #include "base/error.h"
+#include "formats/lattice/body_moments.h"
+#include "formats/lattice/cell_moments.h"
 #include "simulate/estimate/coarse_grid.h"
+#include "simulate/estimate/coarse_moments.h"
 #include "simulate/matter/stress.h"
 
 namespace flexel::simulate {
@@ -35,8 +38,10 @@ class PartCoarsening {
     for (std::size_t axis = 0; axis < 3; ++axis) join_boxes(axis, pairs[axis], true);
   }
 
-  // Appends the part to `coarse`; coarse cells of a fine one: cells_of().
+  // Appends the part to `coarse`, without moments; coarse cells of a fine one: cells_of().
   void append_to(Body& coarse);
+  // Afterwards. The fine body has moments for every cell that is cut.
+  void append_moments(Body& coarse) const;
   void cells_of(std::uint32_t cell, std::vector<std::uint32_t>& out) const {
     const std::uint32_t local = cell - part_.cell_begin;
     for (std::uint32_t box = offset_[local]; box < offset_[local + 1]; ++box)
@@ -216,6 +221,40 @@ void PartCoarsening::append_to(Body& coarse) {
   coarse.parts.push_back(part);
 }
 
+void PartCoarsening::append_moments(Body& coarse) const {
+  constexpr CellMoments kWhole = whole_moments();
+  std::vector<std::size_t> begin(voxel_.size(), 0);  // of the cell's moments
+  for (std::uint32_t c = 0; c < voxel_.size(); ++c) {
+    if (fill_[c] >= kWholeFill) continue;
+    begin[c] = kMoments * coarse.moment_cells.size();
+    coarse.moment_cells.push_back(first_cell_ + c);
+  }
+  coarse.moments.resize(kMoments * coarse.moment_cells.size(), 0);
+  auto cut_cell = std::lower_bound(fine_.moment_cells.begin(), fine_.moment_cells.end(), part_.cell_begin);
+  for (std::uint32_t c = 0; c + 1 < offset_.size(); ++c) {
+    const std::uint32_t cell = part_.cell_begin + c;
+    const bool whole = cut_cell == fine_.moment_cells.end() || *cut_cell != cell;
+    const double* moments =
+        whole ? kWhole.data()
+              : &fine_.moments[kMoments * static_cast<std::size_t>(cut_cell - fine_.moment_cells.begin())];
+    if (!whole) ++cut_cell;
+    if (fine_.broken[cell]) continue;
+    const std::array<GridCut, 3> at = cuts(c);
+    const Index3& index = fine_.lattice_index[fine_.cell_elements[cell][0]];
+    for_each_place(at, [&](const std::array<std::uint32_t, 3>& place) {
+      const std::uint32_t number = cell_of_box_[box(c, at, place)];
+      if (fill_[number] >= kWholeFill) return;
+      std::array<double, 3> low{}, size{};
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const CoarseGrid& grid = grids_[axis];
+        if (place[axis] == 0) low[axis] = (index[axis] - grid.begin) / grid.pitch - at[axis].voxel;
+        size[axis] = at[axis].share[place[axis]] / grid.pitch;
+      }
+      add_box(moments, low, size, &coarse.moments[begin[number]]);
+    });
+  }
+}
+
 void refuse(const Body& body) {
   for (const Columns* columns : {&body.cell_columns, &body.element_columns})
     for (const auto& [name, column] : *columns)
@@ -245,11 +284,13 @@ Surface without_bytes(const Surface& surface) {
 Coarsening coarsening(const Body& body) {
   refuse(body);
   const FacePairs pairs = face_pairs(body);
+  const bool with_moments = has_all_moments(body);
   Coarsening result{{}, {0}, {}};
   Body& coarse = result.body;
   for (std::size_t p = 0; p < body.parts.size(); ++p) {
     PartCoarsening part(body, p, pairs);
     part.append_to(coarse);
+    if (with_moments) part.append_moments(coarse);
     for (std::uint32_t c = body.parts[p].cell_begin; c < body.parts[p].cell_end; ++c) {
       part.cells_of(c, result.cells);
       result.offsets.push_back(static_cast<std::uint32_t>(result.cells.size()));

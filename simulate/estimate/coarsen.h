@@ -7,14 +7,15 @@
 //
 // The spacing is exactly doubled unless another one between 1.5 and 3 times puts more of the flat faces of
 // the part, which lie on planes of the fine lattice, on planes of the coarse one: a wall of three cells
-// becomes one of two, not one of one and a half.
+// becomes one of two, not one of one and a half. With moments it is exactly doubled, and the coarse cells that are
+// not whole get moments in turn, exact as theirs.
 #pragma once
 #include "formats/lattice/body.h"
 
 namespace flexel::simulate {
 
 // At rest, without columns and without the source bytes of the surface. Throws InputError with the reason
-// where the body cannot be coarsened: centre placement, a part one cell thick, columns of an earlier run.
+// where the body cannot be coarsened: centre placement, a part one cell thick (without moments), columns of an earlier run.
 [[nodiscard]] Body coarsened(const Body& body);
 
 // Likewise, with the coarse cells that each fine one overlaps.

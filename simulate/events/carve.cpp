@@ -8,6 +8,7 @@
 #include <algorithm>
 
 #include "base/error.h"
+#include "formats/lattice/body_moments.h"
 #include "simulate/models/connections.h"
 
 namespace flexel::simulate {
@@ -153,6 +154,7 @@ std::string Carve::apply(EventContext& context) const {
   keep_rows(body.cell_elements, cells);
   for (auto& corners : body.cell_elements)
     for (std::uint32_t& e : corners) e = element[e];
+  renumber_moments(body, cell, kGone);
   keep_rows(body.fill, cells);
   keep_rows(body.broken, cells);
   keep_rows(body.cell_columns, cells);

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "formats/lattice/body.h"
+#include "formats/lattice/cell_moments.h"
 
 namespace flexel::test {
 
@@ -120,6 +121,20 @@ inline void add_surface(Body& body, std::mt19937_64& random) {
   surface.sources = {obj, stl};
 }
 
+// Moments of about half of the cells, of every kind that adds up to the fill.
+inline void add_moments(Body& body, std::mt19937_64& random) {
+  for (std::uint32_t c = 0; c < body.cell_count(); ++c) {
+    if (uniform(random, 0, 1) < 0.5) continue;
+    body.moment_cells.push_back(c);
+    double rest = body.fill[c];
+    for (std::size_t k = 0; k + 1 < kMoments; ++k) {
+      body.moments.push_back(uniform(random, -1, 1));
+      rest -= body.moments.back();
+    }
+    body.moments.push_back(rest);
+  }
+}
+
 // Two corner-placed parts, one centre-placed, a surface, columns and notes; numbers of every kind.
 inline Body random_body(std::uint64_t seed) {
   std::mt19937_64 random(seed);
@@ -157,6 +172,7 @@ inline Body random_body(std::uint64_t seed) {
     quality.values.push_back(uniform(random, -1e300, 1));
   body.surface.polygon_columns[kColorColumn] = color;
   body.surface.vertex_columns = {{"quality", quality}, {"offsets", quality}};
+  add_moments(body, random);
   return body;
 }
 

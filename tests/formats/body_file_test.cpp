@@ -133,6 +133,8 @@ void expect_same(const Body& a, const Body& b) {
   expect_same_columns(a.cell_columns, b.cell_columns);
   expect_same_bits(a.surface_cell_offsets, b.surface_cell_offsets, "surface_cell_offsets");
   expect_same_bits(a.surface_cells, b.surface_cells, "surface_cells");
+  expect_same_bits(a.moment_cells, b.moment_cells, "moment_cells");
+  expect_same_bits(a.moments, b.moments, "moments");
   EXPECT_EQ(a.notes, b.notes);
   expect_same_surface(a.surface, b.surface);
 }
@@ -159,13 +161,15 @@ TEST_F(BodyFile, CompressedIsSmallerWhereThereIsSomethingToSqueeze) {
   EXPECT_LT(written(body, {true, true}).size(), written(body, {false, true}).size());
 }
 
-TEST_F(BodyFile, AFrameOfASeriesLeavesTheSurfaceOut) {
+TEST_F(BodyFile, AFrameOfASeriesLeavesTheSurfaceAndTheMomentsOut) {
   const Body body = test::random_body(4);
   write_body(body, path("frame.vtu"), {false, false});
   Body bare = body;
   bare.surface = {};
   bare.surface_cells.clear();
   bare.surface_cell_offsets.clear();
+  bare.moment_cells.clear();
+  bare.moments.clear();
   expect_same(bare, read_body(path("frame.vtu")));
 }
 
@@ -255,6 +259,24 @@ TEST_F(BodyFile, WrongSizesNameTheField) {
   EXPECT_NE(
       failure(replaced(text, "\"placement\":\"corner", "\"placement\":\"corker")).find("parts[0].placement"),
       std::string::npos);
+}
+
+TEST_F(BodyFile, OneArrayOfTheMomentsNeedsTheOther) {
+  const std::string text = written(test::random_body(6));
+  EXPECT_NE(failure(replaced(text, "Name=\"moments\"", "Name=\"momenta\"")).find("\"moments\" is missing"),
+            std::string::npos);
+  EXPECT_NE(failure(replaced(text, "Name=\"moment_cells\"", "Name=\"moment_calls\""))
+                .find("\"moment_cells\" is missing"),
+            std::string::npos);
+}
+
+TEST_F(BodyFile, ABodyWithoutMomentsHasNoArraysOfThem) {
+  Body body = test::random_body(6);
+  body.moment_cells.clear();
+  body.moments.clear();
+  const std::string text = written(body);
+  EXPECT_EQ(text.find("moment"), std::string::npos);
+  expect_same(body, read_body(path("good.vtu")));
 }
 
 TEST_F(BodyFile, AnotherVersionSaysWhichIsRead) {

@@ -4,6 +4,9 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "formats/lattice/body_moments.h"
+#include "formats/lattice/cell_moments.h"
+#include "formats/lattice/merge.h"
 #include "tests/formats/bodies.h"
 
 namespace flexel {
@@ -166,6 +169,12 @@ TEST(BodyCheck, EachFieldThatIsWrongIsNamed) {
       {"surface_cells", [=](Body& b) { b.surface_cells[0] = none; }},
       {"surface_cells", [](Body& b) { b.surface_cells[1] = b.surface_cells[0]; }},
       {"surface_cells", [](Body& b) { b.surface_cell_offsets.clear(); }},
+      {"moments has", [](Body& b) { b.moments.pop_back(); }},
+      {"moments has", [](Body& b) { b.moment_cells.clear(); }},
+      {"moment_cells[1]", [](Body& b) { b.moment_cells[1] = b.moment_cells[0]; }},
+      {"moment_cells[1]", [=](Body& b) { b.moment_cells[1] = none; }},
+      {"moments[7] is not finite", [](Body& b) { b.moments[7] = std::nan(""); }},
+      {"moments of moment_cells[2] do not add up", [](Body& b) { b.moments[2 * kMoments] += 1e-5; }},
       {"parts[1].name", [](Body& b) { b.parts[1].name = "other"; }},
   };
   for (const Case& c : cases) {
@@ -173,6 +182,69 @@ TEST(BodyCheck, EachFieldThatIsWrongIsNamed) {
     c.damage(body);
     EXPECT_THAT(check_failure(body), HasSubstr(c.field));
   }
+}
+
+// A cell without moments is whole, or the body has not all of them.
+void complete_moments(Body& body) {
+  for (std::uint32_t c = 0; c < body.cell_count(); ++c)
+    if (!std::binary_search(body.moment_cells.begin(), body.moment_cells.end(), c)) body.fill[c] = 1;
+}
+
+TEST(BodyMoments, OfMergedBodiesFollowTheirCells) {
+  Body first = test::random_body(2), second = test::random_body(3);
+  EXPECT_FALSE(has_all_moments(first));
+  complete_moments(first);
+  complete_moments(second);
+  EXPECT_TRUE(has_all_moments(first));
+  Body both = first;
+  append(both, second);
+  check(both, "both");
+  EXPECT_TRUE(has_all_moments(both));
+  ASSERT_EQ(both.moment_cells.size(), first.moment_cells.size() + second.moment_cells.size());
+  EXPECT_EQ(both.moment_cells.back(), first.cell_count() + second.moment_cells.back());
+  EXPECT_EQ(both.moments.back(), second.moments.back());
+  for (const bool of_first : {true, false}) {  // one of them was made without
+    Body one = first, other = second;
+    (of_first ? one : other).moment_cells.clear();
+    (of_first ? one : other).moments.clear();
+    for (double& fill : (of_first ? one : other).fill) fill = std::min(fill, 0.5);
+    append(one, other);
+    check(one, "one");
+    EXPECT_TRUE(one.moment_cells.empty());
+    EXPECT_TRUE(one.moments.empty());
+  }
+}
+
+TEST(BodyMoments, StayWithCellsThatAreRenumbered) {
+  Body body = test::random_body(5);
+  const Body before = body;
+  constexpr std::uint32_t kGone = 0xffffffffu;
+  std::vector<std::uint32_t> number;
+  std::uint32_t next = 0;
+  for (std::uint32_t c = 0; c < body.cell_count(); ++c) number.push_back(c % 3 == 1 ? kGone : next++);
+  renumber_moments(body, number, kGone);
+  std::size_t kept = 0;
+  for (std::size_t n = 0; n < before.moment_cells.size(); ++n) {
+    if (number[before.moment_cells[n]] == kGone) continue;
+    ASSERT_LT(kept, body.moment_cells.size());
+    EXPECT_EQ(body.moment_cells[kept], number[before.moment_cells[n]]);
+    EXPECT_TRUE(std::equal(before.moments.begin() + kMoments * n, before.moments.begin() + kMoments * (n + 1),
+                           body.moments.begin() + kMoments * kept));
+    ++kept;
+  }
+  EXPECT_EQ(kept, body.moment_cells.size());
+  EXPECT_EQ(body.moments.size(), kMoments * kept);
+}
+
+TEST(CellMoments, OfAWholeCellIntegratePolynomials) {
+  const CellMoments whole = whole_moments();
+  for (int a = 0; a <= 4; ++a)
+    for (int b = 0; b <= 4; ++b) {
+      double sum = 0;
+      for (std::size_t k = 0; k < kMoments; ++k)
+        sum += whole[k] * std::pow(kGaussPoints[k % 5], a) * std::pow(kGaussPoints[k / 25], b);
+      EXPECT_NEAR(sum, 1. / (a + 1) / (b + 1), 1e-15);
+    }
 }
 
 }  // namespace

@@ -3,11 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numeric>
+#include <random>
 #include <set>
 #include <tuple>
 
 #include "base/error.h"
+#include "formats/lattice/cell_moments.h"
 #include "tests/simulate/box_body.h"
 
 namespace flexel::simulate {
@@ -146,6 +149,117 @@ TEST(Coarsen, RefusesWithAReason) {
   Body body = box_body({.cells = {4, 4, 4}});
   body.cell_columns["plastic_flow"] = {6, std::vector<double>(6 * body.cell_count())};
   EXPECT_THROW((void)coarsened(body), InputError);
+}
+
+// The integral of x^a y^b z^c over the matter, from the moments: its own or those of a whole cell.
+double integral(const Body& body, int a, int b, int c) {
+  const CellMoments whole = whole_moments();
+  const Lattice& lattice = body.parts[0].lattice;
+  double sum = 0;
+  std::size_t next = 0;
+  for (std::uint32_t cell = 0; cell < body.cell_count(); ++cell) {
+    const double* moments = whole.data();
+    if (next < body.moment_cells.size() && body.moment_cells[next] == cell)
+      moments = &body.moments[kMoments * next++];
+    const Index3& low = body.lattice_index[body.cell_elements[cell][0]];
+    for (std::size_t k = 0; k < kMoments; ++k) {
+      const Vec3 at = lattice.to_world(Vec3(low[0] + kGaussPoints[k % 5], low[1] + kGaussPoints[k / 5 % 5],
+                                            low[2] + kGaussPoints[k / 25]));
+      sum +=
+          lattice.spacing.prod() * moments[k] * std::pow(at[0], a) * std::pow(at[1], b) * std::pow(at[2], c);
+    }
+  }
+  return sum;
+}
+
+void expect_same_integrals(const Body& fine, const Body& coarse) {
+  for (int a = 0; a <= 4; ++a)
+    for (int b = 0; b <= 4; ++b)
+      for (int c = 0; c <= 4; ++c) {
+        const double exact = integral(fine, a, b, c);
+        EXPECT_NEAR(integral(coarse, a, b, c), exact, 1e-12 * std::abs(exact)) << a << b << c;
+      }
+  std::size_t next = 0;
+  for (std::uint32_t cell = 0; cell < coarse.cell_count(); ++cell) {
+    if (next < coarse.moment_cells.size() && coarse.moment_cells[next] == cell) {
+      const auto begin = coarse.moments.begin() + static_cast<std::ptrdiff_t>(kMoments * next++);
+      EXPECT_NEAR(std::accumulate(begin, begin + kMoments, 0.0), coarse.fill[cell], 1e-12);
+    } else {
+      EXPECT_GE(coarse.fill[cell], kWholeFill);
+    }
+  }
+  EXPECT_EQ(next, coarse.moment_cells.size());
+  EXPECT_EQ(coarse.moments.size(), kMoments * next);
+}
+
+TEST(CoarseMoments, IntegrateThePolynomialsThatTheFineOnesDo) {
+  std::mt19937_64 random(4);
+  std::uniform_real_distribution<double> uniform(0.5, 1);
+  for (const bool all_cut : {true, false}) {
+    testing::BoxOptions options{.cells = {5, 4, 1}, .spacing = Vec3(1, 2, 3), .origin = Vec3(1, 1, 1)};
+    options.fill = [&](int i, int j, int) { return i == 3 && j == 1 ? 0 : all_cut || i == 4 ? 0.5 : 1; };
+    Body fine = box_body(options);
+    for (std::uint32_t c = 0; c < fine.cell_count(); ++c) {
+      if (fine.fill[c] == 1) continue;
+      fine.moment_cells.push_back(c);
+      double sum = 0;
+      for (const double moment : whole_moments()) {
+        fine.moments.push_back(moment * uniform(random));
+        sum += fine.moments.back();
+      }
+      fine.fill[c] = sum;
+    }
+    const Body coarse = coarsened(fine);
+    expect_sound(coarse);
+    EXPECT_EQ(coarse.cell_count(), 3u * 2);
+    EXPECT_LT((coarse.parts[0].lattice.spacing - Vec3(2, 4, 6)).norm(), 1e-12) << "no cell is cut";
+    expect_same_integrals(fine, coarse);
+  }
+}
+
+TEST(CoarseMoments, OfALayerAreThoseOfTheLayer) {
+  testing::BoxOptions options{.cells = {8, 4, 5}};
+  options.fill = [](int, int, int k) { return k == 4 ? 0.3 : 1; };
+  Body fine = box_body(options);
+  const auto layer = [](double height) {
+    CellMoments moments{};
+    for (std::size_t g = 0; g < kMomentPoints; ++g) {
+      const auto z = lagrange_at(height * kGaussPoints[g]);
+      for (std::size_t k = 0; k < kMoments; ++k)
+        moments[k] += kGaussWeights[k % 5] * kGaussWeights[k / 5 % 5] * height * kGaussWeights[g] * z[k / 25];
+    }
+    return moments;
+  };
+  for (std::uint32_t c = 0; c < fine.cell_count(); ++c) {
+    if (fine.fill[c] == 1) continue;
+    fine.moment_cells.push_back(c);
+    for (const double moment : layer(0.3)) fine.moments.push_back(moment);
+  }
+  const Body coarse = coarsened(fine);
+  ASSERT_EQ(coarse.cell_count(), 4u * 2 * 3);
+  ASSERT_EQ(coarse.moment_cells.size(), 4u * 2);
+  const CellMoments wanted = layer(0.15);
+  for (std::size_t n = 0; n < coarse.moment_cells.size(); ++n) {
+    EXPECT_EQ(coarse.moment_cells[n], 16 + n);
+    for (std::size_t k = 0; k < kMoments; ++k)
+      EXPECT_NEAR(coarse.moments[kMoments * n + k], wanted[k], 1e-15);
+  }
+}
+
+TEST(CoarseMoments, OfWholeCellsThatCoarsePlanesCut) {
+  testing::BoxOptions options{.cells = {7, 6, 9}};
+  options.fill = [](int i, int j, int k) { return (i + j + k) % 4 == 0 ? 0.0 : 1; };
+  const Body fine = box_body(options), coarse = coarsened(fine);
+  EXPECT_FALSE(coarse.moment_cells.empty());
+  expect_same_integrals(fine, coarse);
+}
+
+TEST(CoarseMoments, AreNotThereWhereTheFineOnesAreNot) {
+  testing::BoxOptions options{.cells = {6, 6, 6}};
+  options.fill = [](int, int, int k) { return k == 5 ? 0.5 : 1; };
+  const Body coarse = coarsened(box_body(options));
+  EXPECT_TRUE(coarse.moment_cells.empty());
+  EXPECT_TRUE(coarse.moments.empty());
 }
 
 TEST(Coarsen, ThinWallsAreCounted) {

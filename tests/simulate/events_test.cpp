@@ -3,6 +3,7 @@
 
 #include "base/error.h"
 #include "formats/lattice/body_file.h"
+#include "formats/lattice/cell_moments.h"
 #include "tests/simulate/box_body.h"
 #include "tests/simulate/stepped.h"
 #include "tests/simulate/timed_case.h"
@@ -184,17 +185,21 @@ TEST(Events, EditOfMassKeepsVelocities) {
 }
 
 TEST(Events, CarvedHalfLeavesHalf) {
+  Body bar = lively_bar();
+  bar.moment_cells = {0, static_cast<std::uint32_t>(bar.cell_count() - 1)};
+  for (int cell = 0; cell < 2; ++cell)
+    for (const double moment : whole_moments()) bar.moments.push_back(moment);
   const TimedCase made = run_timed(
-      lively_bar(),
-      gum_scene_with(
-          "[run]\ntime = \"20 ms\"\nstep = \"50 us\"\n" +
-          event("10 ms",
-                "do = \"carve\"\npositions = \"rest\"\nwhere = { half_space = { point = [\"40 mm\", "
-                "0, 0], normal = [1, 0, 0] } }")));
+      bar, gum_scene_with(
+               "[run]\ntime = \"20 ms\"\nstep = \"50 us\"\n" +
+               event("10 ms",
+                     "do = \"carve\"\npositions = \"rest\"\nwhere = { half_space = { point = [\"40 mm\", "
+                     "0, 0], normal = [1, 0, 0] } }")));
   EXPECT_NEAR(made.result.mass, 0.016, 1e-12);
   EXPECT_EQ(made.body.cell_count(), 16u);
   EXPECT_EQ(made.body.element_count(), 45u);
   EXPECT_NO_THROW(check(made.body, "carved"));
+  EXPECT_EQ(made.body.moment_cells, std::vector<std::uint32_t>{0});
   expect_books_close(made.result);
   const auto [before, after] = at_event(made.history);
   const double kinetic = made.history.column("kinetic")[before];

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "base/parallel.h"
+#include "voxelize/classify/moments.h"
 #include "voxelize/classify/overlap.h"
 #include "voxelize/classify/pieces.h"
 
@@ -180,6 +181,7 @@ class SlabBuilder {
     // A shell that passes through itself may give one of several pieces less than nothing, or too much.
     for (std::uint32_t p = 0; p < found.count; ++p)
       slab.pieces[first + p].fill = std::clamp(slab.pieces[first + p].fill, 0., 1.);
+    if (options_.with_moments) moments_.find(voxel, found, first, slab);
     slab.split_voxels += found.count > 1;
     slab.undecided_voxels += found.undecided && !found.overlapping;
     slab.overlapping_voxels += found.overlapping;
@@ -213,6 +215,7 @@ class SlabBuilder {
   const PartMesh& mesh_;
   const ClassifyOptions& options_;
   PieceFinder finder_;
+  MomentFinder moments_;
   std::vector<Record> unsorted_, records_;
   std::vector<std::uint32_t> next_;
 };

@@ -7,10 +7,11 @@ namespace flexel::voxelize {
 
 struct ClassifyOptions {
   bool with_centres = false;  // set kContainsCentre
+  bool with_moments = false;  // set Slab::moments
 };
 
 // `mesh` is balanced, oriented and placed on the lattice. Voxels whose corners lie in several shells, or in
-// which shells intersect, get their fill from lines (overlap.h) and are one piece.
+// which shells intersect, get their fill from lines (overlap.h) and are one piece; they have no moments then.
 [[nodiscard]] Voxels classify_closed(const PartMesh& mesh, const ClassifyOptions& options);
 
 }  // namespace flexel::voxelize

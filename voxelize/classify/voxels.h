@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/math/vec.h"
+#include "formats/lattice/cell_moments.h"
 
 namespace flexel::voxelize {
 
@@ -45,6 +46,8 @@ struct Slab {
   std::vector<SplitTrace> split_traces;  // by (piece, triangle)
   std::vector<std::uint64_t> samples;    // (pieces) the 4x4x4 samples of the piece, bit x + 4 y + 16 z; only
       // where the surface is not closed and the pieces were made by sampling
+  std::vector<std::uint32_t> moment_pieces;  // within the slab, ascending: those that have moments
+  std::vector<CellMoments> moments;          // (moment_pieces) exact; only on request
   std::size_t split_voxels = 0, undecided_voxels = 0, overlapping_voxels = 0, disagreements = 0;
   [[nodiscard]] int rows() const { return row_begin.empty() ? 0 : static_cast<int>(row_begin.size()) - 1; }
   [[nodiscard]] std::span<const Piece> row(int j) const {

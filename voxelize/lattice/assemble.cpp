@@ -53,9 +53,6 @@ KeptPieces number_kept(const Voxels& voxels, bool (*keep)(const Piece&), std::ui
   return kept;
 }
 
-bool has_cell(const Piece& piece) {
-  return piece.fill >= kDroppedFill;
-}
 bool has_centre(const Piece& piece) {
   return piece.flags & kContainsCentre;
 }

@@ -27,6 +27,7 @@ struct VoxelizeOptions {
   std::optional<std::size_t> count;
   Placement placement = Placement::corner;
   Align align = Align::snap;
+  bool moments = false;  // also the exact moments of cut cells (Body::moments); corner placement
   HealChoice heal;
   std::string material;              // of every part; "" leaves it to the scene
   std::optional<double> max_memory;  // bytes; default 80 % of what is free

@@ -1,0 +1,35 @@
+// One pass over the pieces in the order of the cells: what takes time was done slab by slab.
+#include "voxelize/lattice/assemble_moments.h"
+
+#include "voxelize/lattice/elements.h"
+
+namespace flexel::voxelize {
+namespace {
+
+void append(const CellMoments& moments, double scale, std::uint32_t cell, Body& body) {
+  body.moment_cells.push_back(cell);
+  for (const double moment : moments) body.moments.push_back(scale * moment);
+}
+
+}  // namespace
+
+void append_moments(const Voxels& voxels, Body& body) {
+  constexpr CellMoments kWhole = whole_moments();
+  std::uint32_t cell = body.parts.back().cell_begin;
+  for (const Slab& slab : voxels.slabs) {
+    std::size_t next = 0;
+    for (std::uint32_t p = 0; p < slab.pieces.size(); ++p) {
+      const bool exact = next < slab.moment_pieces.size() && slab.moment_pieces[next] == p;
+      if (has_cell(slab.pieces[p])) {
+        if (exact)
+          append(slab.moments[next], 1, cell, body);
+        else if (slab.pieces[p].fill < kWholeFill)
+          append(kWhole, slab.pieces[p].fill, cell, body);
+        ++cell;
+      }
+      next += exact;
+    }
+  }
+}
+
+}  // namespace flexel::voxelize
