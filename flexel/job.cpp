@@ -9,6 +9,7 @@
 #include "base/units.h"
 #include "formats/common/file_formats.h"
 #include "formats/exchange/size_warning.h"
+#include "simulate/quadratic/quadratic_run.h"
 
 namespace flexel::commands {
 void declare_job(CLI::App& app, JobArguments& arguments) {
@@ -46,6 +47,7 @@ Job plan_job(const JobArguments& arguments) {
   job.voxelize.heal = voxelize::heal_choice(arguments.heal);
   job.voxelize.placement = voxelize::placement_choice(arguments.placement);
   plan_scene(arguments, job);
+  job.voxelize.moments = simulate::asks_for_quadratic(job.scene);
   return job;
 }
 

@@ -112,6 +112,12 @@ double mass_of(const QuadraticSystem& system) {
 
 }  // namespace
 
+bool asks_for_quadratic(const Scene& scene) {
+  return scene.model == "quadratic" || std::any_of(scene.parts.begin(), scene.parts.end(), [](const auto& part) {
+           return part.second.model == "quadratic";
+         });
+}
+
 bool is_quadratic(const Scene& scene, const Body& body) {
   const std::vector<Model> models = models_of_parts(scene, body);
   const auto other = std::find_if(models.begin(), models.end(), [](Model each) { return each != Model::quadratic; });

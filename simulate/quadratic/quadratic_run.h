@@ -8,7 +8,10 @@
 
 namespace flexel::simulate {
 
-// Whether the scene asks for it. Throws InputError where it does for some parts only.
+// Whether it is the model of any part, or of all.
+[[nodiscard]] bool asks_for_quadratic(const Scene& scene);
+
+// Whether the scene asks for it on this body. Throws InputError where it does for some parts only.
 [[nodiscard]] bool is_quadratic(const Scene& scene, const Body& body);
 
 // Moves the body to equilibrium; its column "quadratic_displacement" has the field between the elements. Throws

@@ -1,0 +1,218 @@
+// Model `quadratic`: what it has to reproduce exactly, closed forms, books, and what it refuses.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <random>
+
+#include "formats/lattice/cell_moments.h"
+#include "formats/lattice/quadratic_field.h"
+#include "simulate/laws/elasticity.h"
+#include "tests/simulate/law_materials.h"
+#include "tests/simulate/stepped.h"
+
+namespace flexel::simulate {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr double kYoung = 1e6;  // Pa
+
+std::string material(double poisson) {
+  return fmt::format("material = \"gum\"\nmodel = \"quadratic\"\n[materials.gum]\nyoung = \"1 MPa\"\npoisson = {}\n"
+                     "density = \"1000 kg/m3\"\n",
+                     poisson);
+}
+
+constexpr const char* kDrawn = R"(
+[[fix]]
+where = "x0"
+axes = "x"
+[[fix]]
+where = { sphere = { centre = [0, 0, 0], radius = "1 mm" } }
+[[fix]]
+where = { sphere = { centre = [0, "20 mm", 0], radius = "1 mm" } }
+axes = "z"
+[[probe]]
+name = "end"
+where = "x1"
+)";
+
+std::string pull(const Vec3& force) {
+  return fmt::format("[[load]]\nwhere = \"x1\"\nforce = [\"{} N\", \"{} N\", \"{} N\"]\n", force.x(), force.y(),
+                     force.z());
+}
+
+SimulateResult run(Body& body, const std::string& scene, bool estimate = false, int threads = 0) {
+  Progress progress("test", Progress::Mode::quiet);
+  SimulateOptions options;
+  options.estimate = estimate;
+  options.threads = threads;
+  return simulate(body, parse_scene(scene, "s.toml"), options, progress);
+}
+
+// 40 x 20 x 20 mm; or its upper layer of cells filled up to `share` only, moments and surface with it.
+Body bar(double share = 1) {
+  Body body = testing::box_body({.cells = {4, 2, 2}, .spacing = Vec3::Constant(0.01)});
+  if (share == 1) return body;
+  for (Vec3& vertex : body.surface.vertices)
+    if (vertex.z() > 0.015) vertex.z() = 0.01 * (1 + share);
+  // integrals of the Lagrange polynomials up to the cut, by Gauss's rule on [0, share]
+  std::array<double, kMomentPoints> below{};
+  for (std::size_t g = 0; g < kMomentPoints; ++g) {
+    const auto value = lagrange_at(share * kGaussPoints[g]);
+    for (std::size_t l = 0; l < kMomentPoints; ++l) below[l] += share * kGaussWeights[g] * value[l];
+  }
+  for (std::uint32_t c = 0; c < body.cell_count(); ++c) {
+    if (body.lattice_index[body.cell_elements[c][0]][2] == 0) continue;
+    body.fill[c] = share;
+    body.moment_cells.push_back(c);
+    for (std::size_t k = 0; k < kMoments; ++k)
+      body.moments.push_back(kGaussWeights[k % 5] * kGaussWeights[k / 5 % 5] * below[k / 25]);
+  }
+  return body;
+}
+
+TEST(QuadraticShape, ReproducesQuadraticFieldsAndTheirGradients) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> any(-0.3, 1.3);
+  const auto field = [](const Vec3& p) { return 1 + p.x() - 2 * p.y() * p.z() + 3 * p.x() * p.x() * p.z() * p.z(); };
+  for (int round = 0; round < 20; ++round) {
+    const Vec3 at(any(random), any(random), any(random));
+    const QuadraticShape shape = quadratic_shape(at);
+    double value = 0;
+    Vec3 gradient = Vec3::Zero();
+    for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
+      const double node = field(0.5 * Vec3(static_cast<double>(n % 3), static_cast<double>(n / 3 % 3), static_cast<double>(n / 9)));
+      value += node * shape.value[n];
+      gradient += node * shape.gradient[n];
+    }
+    EXPECT_NEAR(value, field(at), 1e-12);
+    constexpr double step = 1e-6;
+    for (int axis = 0; axis < 3; ++axis) {
+      const Vec3 away = step * Vec3::Unit(axis);
+      EXPECT_NEAR(gradient[axis], (field(at + away) - field(at - away)) / (2 * step), 1e-7);
+    }
+  }
+}
+
+// An even stress is exact, in cells that the surface cuts too, however little matter they hold.
+TEST(Quadratic, PatchTest) {
+  for (const double share : {1.0, 0.6, 0.1, 0.02}) {
+    Body body = bar(share);
+    const double area = 0.02 * 0.01 * (1 + share), force = 2e-4;
+    const SimulateResult result = run(body, material(0.3) + kDrawn + pull({force, 0, 0}));
+    const double strain = force / area / kYoung;
+    EXPECT_NEAR(result.probes[0].displacement.x() / (strain * 0.04), 1, 2e-6) << share;
+    EXPECT_NEAR(result.elastic_energy / (0.5 * force * strain * 0.04), 1, 2e-6) << share;
+    ASSERT_TRUE(result.stress);
+    EXPECT_NEAR(result.stress->value / (force / area), 1, 1e-4) << share;
+    EXPECT_NEAR(result.reactions[0].force.x() / force, -1, 1e-7);
+    EXPECT_LT(result.moment_imbalance.norm(), 1e-6 * force * 0.02);
+  }
+}
+
+// Stretched by its own weight a bar has a quadratic displacement, which the model holds: rho g L^2 / (2 E).
+TEST(Quadratic, HangingBarIsExact) {
+  for (const double share : {1.0, 0.4}) {
+    Body body = bar(share);
+    const SimulateResult result =
+        run(body, material(0) + "[[fix]]\nwhere = \"x0\"\n[gravity]\nacceleration = [\"10 m/s2\", 0, 0]\n"
+                                "[[probe]]\nname = \"end\"\nwhere = \"x1\"\n");
+    EXPECT_NEAR(result.probes[0].displacement.x() / (1000 * 10 * 0.04 * 0.04 / (2 * kYoung)), 1, 1e-5) << share;
+    EXPECT_NEAR(result.mass, 1000 * 0.04 * 0.02 * 0.01 * (1 + share), 1e-9);
+  }
+}
+
+// 2 x .5 x .5, E = 1, nu = .3: 528.2 +- .2 (CalculiX C3D20R, n = 4, 6, 9, extrapolated).
+TEST(Quadratic, CantileverOfOneAndTwoCells) {
+  for (const auto& [cells, off] : {std::pair{1, 0.03}, {2, 0.01}}) {
+    Body body = testing::box_body({.cells = {4 * cells, cells, cells}, .spacing = Vec3::Constant(0.5 / cells)});
+    const std::string scene = material(0.3) + "[[fix]]\nwhere = \"x0\"\n[[probe]]\nname = \"end\"\nwhere = \"x1\"\n";
+    const double force = 1e-3;
+    const SimulateResult result = run(body, scene + pull({0, 0, force}));
+    EXPECT_NEAR(result.probes[0].displacement.z() * kYoung / force / 528.2, 1, off) << cells;
+    EXPECT_NEAR(result.elastic_energy / (0.5 * force * result.probes[0].displacement.z()), 1, 0.02);
+    EXPECT_LT(result.imbalance.norm(), 1e-7 * force);
+    EXPECT_LT(result.moment_imbalance.norm(), 1e-7 * force * 2);
+    EXPECT_TRUE(QuadraticField::is_in(body));
+  }
+}
+
+TEST(Quadratic, AMoveLeadsItsFace) {
+  Body body = bar(0.5);
+  const SimulateResult result = run(
+      body, material(0.3) + "[[fix]]\nwhere = \"x0\"\n[[move]]\nwhere = \"x1\"\ndisplacement = [\"0.1 mm\", 0, \"-0.05 mm\"]\n"
+                            "[[probe]]\nname = \"end\"\nwhere = \"x1\"\n");
+  EXPECT_LT((result.probes[0].displacement - Vec3(1e-4, 0, -5e-5)).norm(), 2e-6);
+  EXPECT_LT((result.reactions[0].force + result.reactions[1].force).norm(), 1e-6 * result.reactions[0].force.norm());
+  EXPECT_GT(result.reactions[1].force.x(), 0);
+}
+
+TEST(Quadratic, OrthotropicBarDrawnAskew) {
+  const double c = std::sqrt(0.75), s = 0.5;
+  const std::string grain = fmt::format(R"(
+material = "grain"
+model = "quadratic"
+[materials.grain]
+law = "orthotropic"
+young = ["2 MPa", "0.4 MPa", "0.2 MPa"]
+poisson = [0.37, 0.42, 0.47]
+shear = ["0.3 MPa", "0.28 MPa", "0.1 MPa"]
+density = "500 kg/m3"
+[parts.box]
+axes = [[{0}, {1}, 0], [-{1}, {0}, 0]]
+)",
+                                        c, s);
+  Body body = bar(0.3);
+  const double force = 1e-3, area = 0.02 * 0.013;
+  const SimulateResult result = run(body, grain + kDrawn + pull({force, 0, 0}));
+  Material material = testing::orthotropic_material();
+  material.axes << c, -s, 0, s, c, 0, 0, 0, 1;
+  const Mat6 compliance = moduli_at_rest(law_of(material)).inverse();
+  EXPECT_NEAR(result.probes[0].displacement.x() / (force / area * compliance(0, 0) * 0.04), 1, 1e-5);
+  EXPECT_NEAR(result.probes[0].displacement.y() / (force / area * (compliance(3, 0) * 0.04 + compliance(1, 0) * 0.01)), 1, 1e-5);
+}
+
+TEST(Quadratic, SameBitsForAnyNumberOfThreads) {
+  const std::string scene = material(0.45) + "[[fix]]\nwhere = \"x0\"\n" + pull({0, 0, 1e-3});
+  Body one = bar(0.4), many = bar(0.4);
+  (void)run(one, scene, true, 1);
+  (void)run(many, scene, true, 7);
+  EXPECT_EQ(one.position, many.position);
+  EXPECT_EQ(one.cell_columns.at(kQuadraticColumn).values, many.cell_columns.at(kQuadraticColumn).values);
+}
+
+std::string refusal(Body body, const std::string& scene) {
+  try {
+    (void)run(body, scene);
+  } catch (const InputError& error) {
+    return error.what();
+  } catch (const DivergedError& error) {
+    return std::string("diverged: ") + error.what();
+  }
+  return "accepted";
+}
+
+TEST(Quadratic, WhatItDoesNotHaveIsRefusedByName) {
+  const std::string held = material(0.3) + "[[fix]]\nwhere = \"x0\"\n" + pull({0, 0, 1e-3});
+  EXPECT_EQ(refusal(bar(), held), "accepted");
+  EXPECT_THAT(refusal(bar(), held + "[run]\ntime = \"1 ms\"\n"), HasSubstr("it has no [run] time"));
+  EXPECT_THAT(refusal(bar(), held + "[contact]\n"), HasSubstr("it has no contact"));
+  EXPECT_THAT(refusal(bar(), held + "[[load]]\nwhere = \"x1\"\ntorque = [\"1e-5 N m\", 0, 0]\nlink = \"rigid\"\n"),
+              HasSubstr("it has no rigid links"));
+  EXPECT_THAT(refusal(bar(), material(0.3) + pull({1, 0, 0})), HasSubstr("add a [[fix]]"));
+  EXPECT_THAT(refusal(bar(), material(0.3) + "[[fix]]\nwhere = \"x0\"\naxes = \"x\"\n" + pull({1e-3, 0, 0})), HasSubstr("is free to"));
+  Body cut = bar(0.5);
+  cut.moment_cells.clear();
+  cut.moments.clear();
+  EXPECT_THAT(refusal(cut, held), HasSubstr("voxelize with --moments"));
+  EXPECT_THAT(refusal(bar(), material(0.3) + "[[fix]]\nwhere = \"x0\"\n" + pull({0, 0, 10})),
+              HasSubstr("model \"quadratic\" is linear"));
+  EXPECT_THAT(refusal(bar(), "material = \"steel\"\nmodel = \"quadratc\"\n[[fix]]\nwhere = \"x0\"\n"),
+              HasSubstr("did you mean \"quadratic\"?"));
+}
+
+}  // namespace
+}  // namespace flexel::simulate
