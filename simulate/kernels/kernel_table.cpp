@@ -53,17 +53,7 @@ struct CellsModel {
     bool elastic = true;
     if constexpr (has.plasticity) elastic = !neo_hooke;  // other laws do not flow
     if (elastic) {
-      if (neo_hooke) {
-        const Lanes log_volume = log1p(g.change);
-        stress = laws::neo_hooke_stress(g, log_volume, k.mu, k.lambda);
-        if constexpr (has.fracture) now = elastic_state(g, u, g.change, log_volume, k);
-      } else {
-        const Gradient at = g;
-        Matrix made;
-        stress_of_law(k.law, at, made);
-        stress = made;
-        if constexpr (has.fracture || has.plasticity) now = elastic_state(g, u, g.change, Lanes{}, k);
-      }
+      stress = elastic_stress<has>(g, u, k, now);
       for (int m = 0; m < 4; ++m)
         for (int i = 0; i < 3; ++i) mode_force[m][i] = (0.125 * k.hourglass[m]) * u[i].q[m];
     } else if constexpr (has.plasticity) {
@@ -93,14 +83,7 @@ struct CellsModel {
       }
     }
     if constexpr (has.damping == Damping::book && (has.fracture || has.plasticity)) {
-      Lanes whole = elastic_energy(now, k);
-      if (!neo_hooke) {
-        const Matrix h = g.h;
-        Lanes density;
-        energy_of_law(k.law, h, density);
-        whole = k.volume * density + 0.5 * now.hourglass_square;
-      }
-      const Lanes energy = matter * whole;
+      const Lanes energy = matter * (neo_hooke ? elastic_energy(now, k) : energy_by_law(g, now, k));
       sums.elastic += matter > 0 ? energy : Lanes{};
     }
     if constexpr (has.damping != Damping::none) {
@@ -121,6 +104,30 @@ struct CellsModel {
   }
 
  private:
+  // First Piola-Kirchhoff stress [Pa]; `now` is set where fracture or the books need it.
+  template <Composition has>
+  FLEXEL_INLINE static Matrix elastic_stress(const Gradient& g, const Modes u[3], const CellConstants& k,
+                                             [[maybe_unused]] Elastic& now) {
+    if (k.law.name == LawName::neo_hooke) {
+      const Lanes log_volume = log1p(g.change);
+      if constexpr (has.fracture) now = elastic_state(g, u, g.change, log_volume, k);
+      return laws::neo_hooke_stress(g, log_volume, k.mu, k.lambda);
+    }
+    const Gradient at = g;
+    Matrix made;
+    stress_of_law(k.law, at, made);
+    if constexpr (has.fracture || has.plasticity) now = elastic_state(g, u, g.change, Lanes{}, k);
+    return made;
+  }
+
+  // Of a whole cell of another law than neo-Hooke's [J].
+  FLEXEL_INLINE static Lanes energy_by_law(const Gradient& g, const Elastic& now, const CellConstants& k) {
+    const Matrix h = g.h;
+    Lanes density;
+    energy_of_law(k.law, h, density);
+    return k.volume * density + 0.5 * now.hourglass_square;
+  }
+
   // Of cells that break with the force f [J]: their energy half a step ago, U + dt/2 f . v, which is what the
   // books of the leapfrog lose when a force of this step is taken away.
   FLEXEL_INLINE static Lanes released_energy(const Matrix& stress, const Lanes mode_force[4][3],

@@ -2,15 +2,10 @@
 // H = F - I. Timed runs have the same laws eight cells at a time (simulate/kernels/kernel_law.h).
 #pragma once
 #include "base/math/vec.h"
+#include "simulate/laws/deformation.h"
 #include "simulate/laws/law.h"
 
 namespace flexel::simulate {
-
-using Mat9 = Eigen::Matrix<double, 9, 9>;  // row and column 3 i + j for component ij
-using Mat6 = Eigen::Matrix<double, 6, 6>;  // xx, yy, zz, xy, yz, zx, shears as angles
-
-// J - 1 = det(I + H) - 1, without cancellation for small H.
-[[nodiscard]] double volume_change(const Mat3& gradient);
 
 // W [J/m^3], P = dW/dF (first Piola-Kirchhoff) and Cauchy's stress [Pa], dP/dF [Pa]. Need J > 0.
 [[nodiscard]] double energy_density(const Law& law, const Mat3& gradient);

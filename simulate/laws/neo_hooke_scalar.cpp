@@ -9,12 +9,6 @@
 namespace flexel::simulate {
 namespace {
 
-// Sum of the principal minors of H, its second invariant.
-double second_invariant(const Mat3& h) {
-  return h(0, 0) * h(1, 1) - h(0, 1) * h(1, 0) + h(1, 1) * h(2, 2) - h(1, 2) * h(2, 1) + h(2, 2) * h(0, 0) -
-         h(2, 0) * h(0, 2);
-}
-
 // x - ln(1 + x), without cancellation near 0: the series to x^7 below 1e-2, where its error is under 1e-15 of
 // the sum.
 double less_logarithm(double x) {
@@ -24,10 +18,6 @@ double less_logarithm(double x) {
 }
 
 }  // namespace
-
-double volume_change(const Mat3& h) {
-  return h.trace() + second_invariant(h) + h.determinant();
-}
 
 namespace neo_hooke {
 

@@ -1,8 +1,8 @@
 // Neo-Hooke (simulate/laws/neo_hooke.h) for one cell, in H = F - I, so that strains of 1e-12 still have ten
 // digits.
 #pragma once
-#include "base/math/vec.h"
-#include "simulate/laws/elasticity.h"
+#include "simulate/laws/deformation.h"
+#include "simulate/laws/law.h"
 
 namespace flexel::simulate::neo_hooke {
 
