@@ -203,8 +203,9 @@ CellMoments MomentSum::total(int winding) const {
 
 void MomentFinder::find(const VoxelRecords& voxel, const VoxelPieces& found, std::uint32_t first,
                         Slab& slab) {
-  const auto is_cut = [&](std::uint32_t p) {
-    return slab.pieces[first + p].fill > 0 && slab.pieces[first + p].fill < kWholeFill;
+  const auto is_cut = [&](std::uint32_t p) {  // faces on lattice planes leave nothing, or all
+    const double fill = slab.pieces[first + p].fill;
+    return fill > 1 - kWholeFill && fill < kWholeFill;
   };
   bool any = false;
   for (std::uint32_t p = 0; p < found.count; ++p) any |= is_cut(p);
