@@ -40,9 +40,7 @@ bool QuadraticField::is_in(const Body& body) {
 }
 
 QuadraticField::QuadraticField(const Body& body, const std::vector<Vec3>& displacement)
-    : body_(body),
-      displacement_(displacement),
-      between_(body.cell_columns.at(kQuadraticColumn).values) {}
+    : body_(body), displacement_(displacement), between_(body.cell_columns.at(kQuadraticColumn).values) {}
 
 std::array<Vec3, kQuadraticNodes> QuadraticField::nodes(std::uint32_t cell) const {
   std::array<Vec3, kQuadraticNodes> u;

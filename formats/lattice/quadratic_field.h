@@ -29,7 +29,8 @@ struct QuadraticShape {
 }
 
 // Coordinates of a rest point (m, world frame) in a cell: [0, 1]^3 inside.
-[[nodiscard]] Vec3 cell_coordinates(const Body& body, const Part& part, std::uint32_t cell, const Vec3& point);
+[[nodiscard]] Vec3 cell_coordinates(const Body& body, const Part& part, std::uint32_t cell,
+                                    const Vec3& point);
 
 // Reads the field of a body that has it. Keeps references.
 class QuadraticField {

@@ -12,7 +12,8 @@
 namespace flexel::mapping {
 namespace {
 
-constexpr std::array<MapMethod, 5> kMethods = {&kBlended, &kSmooth, &kAffine, &kGramSchmidt, &kShapeFunctions};
+constexpr std::array<MapMethod, 5> kMethods = {&kBlended, &kSmooth, &kAffine, &kGramSchmidt,
+                                               &kShapeFunctions};
 
 // "a, b or c".
 std::string any_of_these(const std::vector<std::string>& words) {

@@ -10,8 +10,8 @@ struct MappingMethod;
 using MapMethod = const MappingMethod*;
 extern const MappingMethod kGramSchmidt,  // the paper's: the orthonormal base of four elements
     kAffine,                              // the edges of the same four elements
-    kBlended,  // the frames of all elements around, blended with two continuous derivatives
-    kSmooth,   // moving least squares, quadratic
+    kBlended,         // the frames of all elements around, blended with two continuous derivatives
+    kSmooth,          // moving least squares, quadratic
     kShapeFunctions;  // the field of model `quadratic`, which is mapped so unless another method is given
 
 // What holds a vertex. Later kinds are what is left when no four close elements span space.

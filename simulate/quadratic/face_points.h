@@ -7,9 +7,9 @@
 namespace flexel::simulate {
 
 struct FacePoint {
-  std::uint32_t cell = 0;           // index into QuadraticNodes::cells
-  Vec3 at = Vec3::Zero();           // cell coordinates; beyond [0, 1] where the voxel's own matter was dropped
-  Vec3 position = Vec3::Zero();     // m, rest, world frame
+  std::uint32_t cell = 0;        // index into QuadraticNodes::cells
+  Vec3 at = Vec3::Zero();        // cell coordinates; beyond [0, 1] where the voxel's own matter was dropped
+  Vec3 position = Vec3::Zero();  // m, rest, world frame
   Vec3 area_vector = Vec3::Zero();  // m^2, outward
 };
 

@@ -25,15 +25,17 @@ void add_to(const NitschePoint& point, CellMatrix& matrix) {
     for (std::size_t b = 0; b < kQuadraticNodes; ++b) {
       const double na = point.shape.value[a], nb = point.shape.value[b];
       matrix.block<3, 3>(static_cast<Eigen::Index>(3 * a), static_cast<Eigen::Index>(3 * b)) +=
-          point.area * (point.penalty * na * nb * point.projector - na * (point.projector * point.traction[b]) -
-                        nb * (point.traction[a].transpose() * point.projector));
+          point.area *
+          (point.penalty * na * nb * point.projector - na * (point.projector * point.traction[b]) -
+           nb * (point.traction[a].transpose() * point.projector));
     }
 }
 
 void add_led(const NitschePoint& point, std::array<Vec3, kQuadraticNodes>& forces) {
   const Vec3 led = point.projector * point.led;
   for (std::size_t a = 0; a < kQuadraticNodes; ++a)
-    forces[a] += point.area * (point.penalty * point.shape.value[a] * led - point.traction[a].transpose() * led);
+    forces[a] +=
+        point.area * (point.penalty * point.shape.value[a] * led - point.traction[a].transpose() * led);
 }
 
 Vec3 reaction(const NitschePoint& point, const std::array<Vec3, kQuadraticNodes>& u) {

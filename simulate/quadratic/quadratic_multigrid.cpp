@@ -16,11 +16,11 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr int kSteps = 2;          // of Chebyshev's iteration, before and after
-constexpr double kRange = 8;       // largest over smallest eigenvalue that it damps
-constexpr double kMargin = 1.1;    // over the estimate of the largest
+constexpr int kSteps = 2;        // of Chebyshev's iteration, before and after
+constexpr double kRange = 8;     // largest over smallest eigenvalue that it damps
+constexpr double kMargin = 1.1;  // over the estimate of the largest
 constexpr int kPowerSteps = 15;
-constexpr double kRaised = 1e-6;   // of a block's scaled diagonal: it is kept in single precision
+constexpr double kRaised = 1e-6;  // of a block's scaled diagonal: it is kept in single precision
 constexpr std::size_t kBlocksAtATime = 16;
 using Vector = std::vector<Vec3>;
 
@@ -41,7 +41,8 @@ Eigen::Matrix<double, kQuadraticNodes, 8> trilinear_weights() {
   for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
     const std::vector<std::size_t> corners = corners_of(n);
     for (const std::size_t a : corners)
-      weights(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(a)) = 1 / static_cast<double>(corners.size());
+      weights(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(a)) =
+          1 / static_cast<double>(corners.size());
   }
   return weights;
 }
@@ -179,7 +180,8 @@ void QuadraticMultigrid::factorise(std::size_t block, std::uint32_t cell) {
         sum.col(i).setZero();
         sum(i, i) = 1;
       }
-  const Eigen::Matrix<double, kCellUnknowns, 1> scale = sum.diagonal().cwiseAbs().cwiseMax(1e-300).cwiseSqrt();
+  const Eigen::Matrix<double, kCellUnknowns, 1> scale =
+      sum.diagonal().cwiseAbs().cwiseMax(1e-300).cwiseSqrt();
   const auto inverse = scale.cwiseInverse().asDiagonal();
   CellMatrix scaled = inverse * sum * inverse;
   scaled.diagonal().array() += kRaised;
@@ -224,7 +226,8 @@ void QuadraticMultigrid::smooth_once(const Vector& residual, Vector& correction)
     }
     Vec3 sum = Vec3::Zero();
     for (const auto& [block, node] : blocks_at_[n])
-      sum += Eigen::Map<const Eigen::Vector3f>(&block_values_[block * kCellUnknowns + 3 * node]).cast<double>();
+      sum +=
+          Eigen::Map<const Eigen::Vector3f>(&block_values_[block * kCellUnknowns + 3 * node]).cast<double>();
     correction[n] = weight_[n] * sum;
   });
   matrix_.clear_held(correction);
@@ -279,10 +282,13 @@ void QuadraticMultigrid::add_coarse_correction(const Vector& b, Vector& x) const
   matrix_.clear_held(residual);
   const std::size_t elements = matrix_.nodes().elements.size();
   Vector restricted(elements), correction;
-  const auto count = [&](std::size_t n) { return static_cast<double>(from_offsets_[n + 1] - from_offsets_[n]); };
+  const auto count = [&](std::size_t n) {
+    return static_cast<double>(from_offsets_[n + 1] - from_offsets_[n]);
+  };
   parallel_for_each(elements, [&](std::size_t e) {
     Vec3 sum = Vec3::Zero();
-    for (std::uint32_t i = to_offsets_[e]; i < to_offsets_[e + 1]; ++i) sum += residual[to_[i]] / count(to_[i]);
+    for (std::uint32_t i = to_offsets_[e]; i < to_offsets_[e + 1]; ++i)
+      sum += residual[to_[i]] / count(to_[i]);
     restricted[e] = sum;
   });
   for (std::size_t e = 0; e < elements; ++e)

@@ -50,8 +50,8 @@ class QuadraticMultigrid final : public Preconditioner {
   std::vector<float> factors_;              // (blocks x kPackedSize) Cholesky's, scaled by the diagonal
   std::vector<double> weight_;              // (nodes) 1 / sqrt(multiplicity); 0: not in any block
   std::vector<std::vector<std::pair<std::uint32_t, std::uint32_t>>> blocks_at_;  // (nodes) block, node of it
-  std::vector<Block> inverse_;              // (nodes) of the diagonal block, where weight_ is 0
-  double largest_ = 1;                      // eigenvalue of M^-1 A
+  std::vector<Block> inverse_;               // (nodes) of the diagonal block, where weight_ is 0
+  double largest_ = 1;                       // eigenvalue of M^-1 A
   mutable std::vector<float> block_values_;  // (blocks x 81)
 };
 

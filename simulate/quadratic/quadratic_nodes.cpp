@@ -30,7 +30,8 @@ std::vector<std::size_t> corners_around(std::size_t n) {
   const std::array<std::size_t, 3> at{n % 3, n / 3 % 3, n / 9};
   for (std::size_t a = 0; a < 8; ++a) {
     bool around = true;
-    for (std::size_t axis = 0; axis < 3; ++axis) around = around && (at[axis] == 1 || at[axis] / 2 == (a >> axis & 1));
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      around = around && (at[axis] == 1 || at[axis] / 2 == (a >> axis & 1));
     if (around) corners.push_back(a);
   }
   return corners;
@@ -74,7 +75,8 @@ void number_between(const Body& body, QuadraticNodes& nodes) {
     return Vec3(sum / static_cast<double>(around[node].size()));
   };
   for (std::size_t p = 0; p < places.size(); ++p) {
-    if (p == 0 || places[p].key != places[p - 1].key) nodes.rest.push_back(middle(places[p].cell, places[p].node));
+    if (p == 0 || places[p].key != places[p - 1].key)
+      nodes.rest.push_back(middle(places[p].cell, places[p].node));
     nodes.of_cell[places[p].cell][places[p].node] = static_cast<std::uint32_t>(nodes.rest.size() - 1);
   }
   constexpr std::uint32_t kCentre = 13;

@@ -18,7 +18,9 @@ class QuadraticOperator final : public LinearOperator {
 
   // The number of a matrix that several cells share.
   std::uint32_t add_shared(const CellMatrix& matrix);
-  void share(std::size_t cell, std::uint32_t shared) { which_[cell] = -1 - static_cast<std::int32_t>(shared); }
+  void share(std::size_t cell, std::uint32_t shared) {
+    which_[cell] = -1 - static_cast<std::int32_t>(shared);
+  }
   void set_own(std::size_t cell, const CellMatrix& matrix);
   // Room for own matrices, before they are set from several threads.
   void reserve_own(const std::vector<std::uint32_t>& cells);

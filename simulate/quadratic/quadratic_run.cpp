@@ -27,30 +27,36 @@ constexpr double kNoticeable = 0.05, kTooLarge = 0.25;  // rad
 void refuse_what_is_missing(const Scene& scene, const Body& body, const std::vector<ActiveEffect>& effects) {
   const std::string needs = "model \"quadratic\" finds linear equilibria: ";
   if (scene.run.time) throw InputError(scene.name, needs + "it has no [run] time; use model \"cells\"");
-  if (scene.run.renormalise) throw InputError(scene.name, needs + "it has no renormalise; use model \"cells\"");
+  if (scene.run.renormalise)
+    throw InputError(scene.name, needs + "it has no renormalise; use model \"cells\"");
   for (const ActiveEffect& effect : effects)
     if (effect.name != Supports::name && effect.name != Loads::name && effect.name != "gravity")
-      throw InputError(scene.name, fmt::format("{}it has no {} ({}); use model \"cells\"", needs, effect.name, effect.why));
+      throw InputError(scene.name, fmt::format("{}it has no {} ({}); use model \"cells\"", needs, effect.name,
+                                               effect.why));
   for (const Tie& tie : scene.get<Supports>().ties)
     if (tie.link)
-      throw InputError(tie.origin, fmt::format("{}it has no rigid links (\"{}\"); use link = \"averaging\"", needs, tie.name));
+      throw InputError(tie.origin, fmt::format("{}it has no rigid links (\"{}\"); use link = \"averaging\"",
+                                               needs, tie.name));
   for (const Part& part : body.parts)
     if (part.placement == Placement::centre)
-      throw InputError(scene.name, fmt::format("model \"quadratic\" needs elements at the corners of the voxels: "
-                                               "voxelize part \"{}\" with --placement corner",
-                                               part.name));
+      throw InputError(scene.name,
+                       fmt::format("model \"quadratic\" needs elements at the corners of the voxels: "
+                                   "voxelize part \"{}\" with --placement corner",
+                                   part.name));
 }
 
 void judge_rotation(double rotation, Progress& progress) {
   const double degrees = 180 / std::numbers::pi * rotation;
   if (rotation > kTooLarge)
-    throw DivergedError(fmt::format("matter turns by {} degrees, and model \"quadratic\" is linear: that answer "
-                                    "would be worth nothing; use model \"cells\"",
-                                    human_number(degrees, 2)));
+    throw DivergedError(
+        fmt::format("matter turns by {} degrees, and model \"quadratic\" is linear: that answer "
+                    "would be worth nothing; use model \"cells\"",
+                    human_number(degrees, 2)));
   if (rotation > kNoticeable)
-    progress.warn(fmt::format("matter turns by {} degrees, and model \"quadratic\" is linear: about {} of the answer "
-                              "is left out; use model \"cells\"",
-                              human_number(degrees, 2), human_share(rotation * rotation)));
+    progress.warn(
+        fmt::format("matter turns by {} degrees, and model \"quadratic\" is linear: about {} of the answer "
+                    "is left out; use model \"cells\"",
+                    human_number(degrees, 2), human_share(rotation * rotation)));
 }
 
 ProbeResult measure_probe(const Probe& probe, const ProbePoints& placed, const QuadraticSystem& system,
@@ -59,11 +65,12 @@ ProbeResult measure_probe(const Probe& probe, const ProbePoints& placed, const Q
   const std::vector<std::uint32_t> part = cell_parts(body);
   if (placed.cell)
     return {placed.name, placed.where,
-            field.displacement(*placed.cell,
-                               cell_coordinates(body, body.parts[part[*placed.cell]], *placed.cell, placed.where))};
+            field.displacement(*placed.cell, cell_coordinates(body, body.parts[part[*placed.cell]],
+                                                              *placed.cell, placed.where))};
   const Selected selected = resolve(*probe.where, body);
   const std::vector<FacePoint> points =
-      selected.polygons.empty() ? std::vector<FacePoint>{} : face_points(system.problem(), system.nodes(), selected.polygons);
+      selected.polygons.empty() ? std::vector<FacePoint>{}
+                                : face_points(system.problem(), system.nodes(), selected.polygons);
   if (points.empty()) return measure(placed, state);
   ProbeResult result{placed.name, Vec3::Zero(), Vec3::Zero()};
   double area = 0;
@@ -78,8 +85,8 @@ ProbeResult measure_probe(const Probe& probe, const ProbePoints& placed, const Q
   return result;
 }
 
-void measure_field_stress(const QuadraticSystem& system, const QuadraticSolution& solution, const State& state,
-                          Body& body, SimulateResult& result) {
+void measure_field_stress(const QuadraticSystem& system, const QuadraticSolution& solution,
+                          const State& state, Body& body, SimulateResult& result) {
   const Stresses found = field_stresses(system, solution, state);
   const std::optional<LargestStress> largest = largest_stress(body, found);
   if (!largest) return;
@@ -105,33 +112,39 @@ double mass_of(const QuadraticSystem& system) {
   const Body& body = system.problem().body;
   const std::vector<std::uint32_t> part = cell_parts(body);
   for (std::size_t c = 0; c < body.cell_count(); ++c)
-    mass += body.broken[c] ? 0 : body.fill[c] * system.problem().materials[part[c]].density *
-                                     body.parts[part[c]].lattice.spacing.prod();
+    mass += body.broken[c] ? 0
+                           : body.fill[c] * system.problem().materials[part[c]].density *
+                                 body.parts[part[c]].lattice.spacing.prod();
   return mass;
 }
 
 }  // namespace
 
 bool asks_for_quadratic(const Scene& scene) {
-  return scene.model == "quadratic" || std::any_of(scene.parts.begin(), scene.parts.end(), [](const auto& part) {
-           return part.second.model == "quadratic";
-         });
+  return scene.model == "quadratic" ||
+         std::any_of(scene.parts.begin(), scene.parts.end(),
+                     [](const auto& part) { return part.second.model == "quadratic"; });
 }
 
 bool is_quadratic(const Scene& scene, const Body& body) {
   const std::vector<Model> models = models_of_parts(scene, body);
-  const auto other = std::find_if(models.begin(), models.end(), [](Model each) { return each != Model::quadratic; });
+  const auto other =
+      std::find_if(models.begin(), models.end(), [](Model each) { return each != Model::quadratic; });
   if (other == models.end()) return true;
   if (std::find(models.begin(), models.end(), Model::quadratic) == models.end()) return false;
-  throw InputError(scene.name, fmt::format("model \"quadratic\" is for all parts or none: write [parts.\"{}\"] "
-                                           "model = \"quadratic\" too",
-                                           body.parts[static_cast<std::size_t>(other - models.begin())].name));
+  throw InputError(scene.name,
+                   fmt::format("model \"quadratic\" is for all parts or none: write [parts.\"{}\"] "
+                               "model = \"quadratic\" too",
+                               body.parts[static_cast<std::size_t>(other - models.begin())].name));
 }
 
-SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress) {
+SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptions& options,
+                             Progress& progress) {
   const auto began = std::chrono::steady_clock::now();
   const Fragments fragments = find_fragments(body);
-  const Problem problem{body, materials_of_parts(scene, body), stray_cells(fragments), models_of_parts(scene, body), {}, {}, {}, {}};
+  const Problem problem{
+      body, materials_of_parts(scene, body), stray_cells(fragments), models_of_parts(scene, body), {}, {}, {},
+      {}};
   SimulateResult result;
   report_materials(problem, progress);
   const std::vector<ProbePoints> probes = place_probes(scene, problem);
@@ -139,11 +152,12 @@ SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptio
   refuse_what_is_missing(scene, body, effects);
   const QuadraticSystem system(problem, scene);
   refuse_loose_fragments(fragments, body, system.tied_elements(), {}, scene.name);
-  const QuadraticSolution solution = solve(system, scene.run, scene.name, [&](int iteration, double residual) {
-    check_stop();
-    progress.update(0.1 + 0.8 * std::min(1.0, std::log(residual) / std::log(scene.run.tolerance)),
-                    fmt::format("iteration {}", iteration));
-  });
+  const QuadraticSolution solution =
+      solve(system, scene.run, scene.name, [&](int iteration, double residual) {
+        check_stop();
+        progress.update(0.1 + 0.8 * std::min(1.0, std::log(residual) / std::log(scene.run.tolerance)),
+                        fmt::format("iteration {}", iteration));
+      });
   const StopWaits answered;
   judge_rotation(largest_rotation(system, solution), progress);
   name_materials(body, problem.materials);
@@ -157,7 +171,8 @@ SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptio
   const StiffnessPattern pattern =
       stiffness_pattern(body, active_cells(problem), connection_rows({}, body.element_count()), {}, false);
   carry_strays(fragments, problem, pattern.stencil, state);
-  for (std::size_t e = 0; e < body.element_count(); ++e) body.position[e] = body.rest[e] + state.displacement[e];
+  for (std::size_t e = 0; e < body.element_count(); ++e)
+    body.position[e] = body.rest[e] + state.displacement[e];
   measure_displacement(body, state, result);
   result.mass = mass_of(system);
   refuse_not_finite(result, scene.name);

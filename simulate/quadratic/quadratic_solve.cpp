@@ -25,7 +25,8 @@ constexpr std::size_t kCellsAtATime = 64;
 std::array<Vec3, kQuadraticNodes> values_at(const QuadraticSystem& system, const QuadraticSolution& solution,
                                             std::size_t cell) {
   std::array<Vec3, kQuadraticNodes> u;
-  for (std::size_t n = 0; n < kQuadraticNodes; ++n) u[n] = solution.displacement[system.nodes().of_cell[cell][n]];
+  for (std::size_t n = 0; n < kQuadraticNodes; ++n)
+    u[n] = solution.displacement[system.nodes().of_cell[cell][n]];
   return u;
 }
 
@@ -39,13 +40,12 @@ void refuse_free(const QuadraticMultigrid& multigrid, const Body& body, const st
   const std::vector<FreeMotion> free = free_motions(multigrid.coarse(), multigrid.geometry());
   if (free.empty()) return;
   const FreeMotion& motion = free.front();
-  throw InputError(scene, fmt::format("part \"{}\" is free to {}: add a [[fix]] that stops it",
-                                      body.parts[motion.part].name,
-                                      motion.rotation == Vec3::Zero()
-                                          ? "translate along " + axis_name(motion.translation)
-                                          : "rotate about " + axis_name(motion.rotation)));
+  throw InputError(
+      scene,
+      fmt::format("part \"{}\" is free to {}: add a [[fix]] that stops it", body.parts[motion.part].name,
+                  motion.rotation == Vec3::Zero() ? "translate along " + axis_name(motion.translation)
+                                                  : "rotate about " + axis_name(motion.rotation)));
 }
-
 
 SymmetricStress stress_at(const Mat9& moduli, const Mat3& gradient) {
   Eigen::Matrix<double, 9, 1> h;
@@ -77,8 +77,9 @@ QuadraticSolution solve(const QuadraticSystem& system, const RunSettings& settin
     stiffness.forces(start[0].data(), led[0].data());
     parallel_for_each(n, [&](std::size_t i) { b[i] -= led[i]; });
     stiffness.clear_held(b);
-    const LinearResult result = conjugate_gradients(
-        stiffness, b, change, multigrid, std::max(settings.tolerance, kLeastTolerance), kMostIterations, progress);
+    const LinearResult result =
+        conjugate_gradients(stiffness, b, change, multigrid, std::max(settings.tolerance, kLeastTolerance),
+                            kMostIterations, progress);
     found.iterations += result.iterations;
     found.relative_residual = result.relative_residual;
     if (result.indefinite || !(result.converged || result.relative_residual < kGoodEnough)) continue;
@@ -89,12 +90,14 @@ QuadraticSolution solve(const QuadraticSystem& system, const RunSettings& settin
     parallel_for_each(n, [&](std::size_t i) { found.unbalanced[i] = wanted[i] - found.unbalanced[i]; });
     return found;
   }
-  throw DivergedError(fmt::format("model \"quadratic\" did not converge: residual {:.2g} after {} iterations; use "
-                                  "another --size, or model \"cells\"",
-                                  found.relative_residual, found.iterations));
+  throw DivergedError(
+      fmt::format("model \"quadratic\" did not converge: residual {:.2g} after {} iterations; use "
+                  "another --size, or model \"cells\"",
+                  found.relative_residual, found.iterations));
 }
 
-Mat3 gradient_at(const QuadraticSystem& system, const QuadraticSolution& solution, std::size_t cell, const Vec3& at) {
+Mat3 gradient_at(const QuadraticSystem& system, const QuadraticSolution& solution, std::size_t cell,
+                 const Vec3& at) {
   const QuadraticShape shape = world_shape(system.problem().body.parts[system.part_of(cell)].lattice, at);
   const auto u = values_at(system, solution, cell);
   Mat3 sum = Mat3::Zero();
@@ -120,7 +123,8 @@ void write_field(const QuadraticSystem& system, const QuadraticSolution& solutio
   body.cell_columns[kQuadraticColumn] = std::move(column);
 }
 
-Stresses field_stresses(const QuadraticSystem& system, const QuadraticSolution& solution, const State& state) {
+Stresses field_stresses(const QuadraticSystem& system, const QuadraticSolution& solution,
+                        const State& state) {
   const Body& body = system.problem().body;
   const QuadraticNodes& nodes = system.nodes();
   Stresses found = stresses(system.problem(), state);  // for the points that elements stand for
@@ -151,7 +155,8 @@ Stresses field_stresses(const QuadraticSystem& system, const QuadraticSolution& 
             count = 0;
             sum.setZero();
           }
-          sum += stress_at(system.moduli(system.part_of(around.cell)), gradient_at(system, solution, around.cell, at));
+          sum += stress_at(system.moduli(system.part_of(around.cell)),
+                           gradient_at(system, solution, around.cell, at));
           ++count;
         }
         if (count > 0) found.element[e] = sum / count;
@@ -165,7 +170,8 @@ void report(const QuadraticSystem& system, const QuadraticSolution& solution, Si
   for (const NitscheSupport& support : system.supports()) {
     Reaction reaction{support.tie->name, Vec3::Zero(), Vec3::Zero()};
     for (const FacePoint& at : support.points)
-      add_at(flexel::simulate::reaction(system.point(support, at, solution.safety), values_at(system, solution, at.cell)),
+      add_at(flexel::simulate::reaction(system.point(support, at, solution.safety),
+                                        values_at(system, solution, at.cell)),
              at.position, reaction.force, reaction.moment);
     for (const std::uint32_t n : support.nodes) {
       Vec3 held = Vec3::Zero();
@@ -178,7 +184,8 @@ void report(const QuadraticSystem& system, const QuadraticSolution& solution, Si
   }
   for (const NodalLoad& load : system.loads()) {
     AppliedLoad total{load.name, Vec3::Zero(), Vec3::Zero()};
-    for (std::size_t n = 0; n < nodes.size(); ++n) add_at(load.forces[n], nodes.rest[n], total.force, total.moment);
+    for (std::size_t n = 0; n < nodes.size(); ++n)
+      add_at(load.forces[n], nodes.rest[n], total.force, total.moment);
     result.loads.push_back(total);
   }
   result.elastic_energy = parallel_sum<double>(
@@ -187,14 +194,15 @@ void report(const QuadraticSystem& system, const QuadraticSolution& solution, Si
         Eigen::Matrix<double, kCellUnknowns, 1> u;
         const auto values = values_at(system, solution, c);
         for (std::size_t n = 0; n < kQuadraticNodes; ++n)
-          u.segment<3>(static_cast<Eigen::Index>(3 * n)) = values[n] - values[0];  // a translation costs nothing
+          u.segment<3>(static_cast<Eigen::Index>(3 * n)) =
+              values[n] - values[0];  // a translation costs nothing
         return 0.5 * u.dot(system.elastic_stiffness(c) * u);
       },
       kCellsAtATime);
   for (std::size_t c = 0; c < nodes.cells.size(); ++c)
-    result.smallest_jacobian = std::min(
-        result.smallest_jacobian,
-        (Mat3::Identity() + gradient_at(system, solution, c, middle_of(system, c))).determinant());
+    result.smallest_jacobian =
+        std::min(result.smallest_jacobian,
+                 (Mat3::Identity() + gradient_at(system, solution, c, middle_of(system, c))).determinant());
 }
 
 double largest_rotation(const QuadraticSystem& system, const QuadraticSolution& solution) {

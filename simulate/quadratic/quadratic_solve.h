@@ -10,8 +10,8 @@ namespace flexel::simulate {
 
 struct QuadraticSolution {
   std::vector<Vec3> displacement;  // (nodes x 3) m
-  std::vector<Vec3> unbalanced;    // (nodes x 3) N: on prescribed components what holds them, else the residual
-  double safety = 1;               // of the supports' penalty (QuadraticSystem::stiffness)
+  std::vector<Vec3> unbalanced;  // (nodes x 3) N: on prescribed components what holds them, else the residual
+  double safety = 1;             // of the supports' penalty (QuadraticSystem::stiffness)
   int iterations = 0;
   double relative_residual = 0;
 };
@@ -20,11 +20,12 @@ struct QuadraticSolution {
 // raised fourfold, three times at most. Throws DivergedError; InputError(scene, ...) naming a rigid motion that is free.
 // `progress` is told each iteration and its relative residual.
 [[nodiscard]] QuadraticSolution solve(const QuadraticSystem& system, const RunSettings& settings,
-                                      const std::string& scene, const std::function<void(int, double)>& progress);
+                                      const std::string& scene,
+                                      const std::function<void(int, double)>& progress);
 
 // The displacement gradient (world frame) of a cell at cell coordinates.
-[[nodiscard]] Mat3 gradient_at(const QuadraticSystem& system, const QuadraticSolution& solution, std::size_t cell,
-                               const Vec3& at);
+[[nodiscard]] Mat3 gradient_at(const QuadraticSystem& system, const QuadraticSolution& solution,
+                               std::size_t cell, const Vec3& at);
 
 // The column that travels in the body (formats/lattice/quadratic_field.h), and the displacement of the elements.
 void write_field(const QuadraticSystem& system, const QuadraticSolution& solution, Body& body, State& state);

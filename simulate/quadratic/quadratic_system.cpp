@@ -51,10 +51,11 @@ void QuadraticSystem::require_moments() const {
   const Body& body = problem_.body;
   for (std::size_t i = 0; i < nodes_.cells.size(); ++i)
     if (moments_at_[i] == kWhole && body.fill[nodes_.cells[i]] < kFull)
-      throw InputError(scene_.name,
-                       fmt::format("model \"quadratic\" needs the exact moments of cells that the surface of part "
-                                   "\"{}\" cuts, which this body does not have: voxelize with --moments",
-                                   body.parts[part_[i]].name));
+      throw InputError(
+          scene_.name,
+          fmt::format("model \"quadratic\" needs the exact moments of cells that the surface of part "
+                      "\"{}\" cuts, which this body does not have: voxelize with --moments",
+                      body.parts[part_[i]].name));
 }
 
 void QuadraticSystem::place_supports(const std::vector<Tie>& ties) {
@@ -91,15 +92,17 @@ void QuadraticSystem::place_loads(const std::vector<Load>& loads) {
     const Selected selected = resolve(load.where, problem_.body);
     NodalLoad made{load.name, std::vector<Vec3>(nodes_.size(), Vec3::Zero())};
     if (!selected.elements.empty() || selected.polygons.empty())
-      throw InputError(load.origin,
-                       fmt::format("load \"{}\": model \"quadratic\" takes loads on faces, groups and sides; {} "
-                                   "selects elements",
-                                   load.name, describe(load.where)));
+      throw InputError(
+          load.origin,
+          fmt::format("load \"{}\": model \"quadratic\" takes loads on faces, groups and sides; {} "
+                      "selects elements",
+                      load.name, describe(load.where)));
     const std::vector<FacePoint> points = face_points(problem_, nodes_, selected.polygons);
     if (points.empty())
-      throw InputError(load.origin, fmt::format("load \"{}\": no matter lies under the selected surface; use a "
-                                                "smaller spacing",
-                                                load.name));
+      throw InputError(load.origin,
+                       fmt::format("load \"{}\": no matter lies under the selected surface; use a "
+                                   "smaller spacing",
+                                   load.name));
     std::vector<Vec3> forces;
     std::vector<LoadedPoint> loaded;
     for (const FacePoint& point : points) {
@@ -137,7 +140,8 @@ CellMatrix QuadraticSystem::elastic_stiffness(std::size_t cell) const {
   return integrals_[part_[cell]].stiffness(own + kOutside * (whole - own));
 }
 
-NitschePoint QuadraticSystem::point(const NitscheSupport& support, const FacePoint& point, double safety) const {
+NitschePoint QuadraticSystem::point(const NitscheSupport& support, const FacePoint& point,
+                                    double safety) const {
   const std::uint32_t part = part_[point.cell];
   const Lattice& lattice = problem_.body.parts[part].lattice;
   const Law law = law_of(problem_.materials[part]);
@@ -169,7 +173,8 @@ QuadraticOperator QuadraticSystem::stiffness(double safety) const {
   for (std::uint32_t c = 0; c < nodes_.cells.size(); ++c)
     if (moments_at_[c] != kWhole || !points_at[c].empty()) own.push_back(c);
   std::vector<std::uint32_t> shared;
-  for (const CellIntegrals& integrals : integrals_) shared.push_back(made.add_shared(integrals.stiffness(whole_cell_moments())));
+  for (const CellIntegrals& integrals : integrals_)
+    shared.push_back(made.add_shared(integrals.stiffness(whole_cell_moments())));
   for (std::size_t c = 0; c < nodes_.cells.size(); ++c) made.share(c, shared[part_[c]]);
   made.reserve_own(own);
   parallel_for_each(
@@ -207,7 +212,8 @@ std::vector<Vec3> QuadraticSystem::prescribed() const {
     for (const std::uint32_t n : support.nodes) {
       const Vec3 led = support.tie->motion.displacement(nodes_.rest[n], 1);
       for (std::size_t axis = 0; axis < 3; ++axis)
-        if (support.tie->axes[axis]) value[n][static_cast<Eigen::Index>(axis)] = led[static_cast<Eigen::Index>(axis)];
+        if (support.tie->axes[axis])
+          value[n][static_cast<Eigen::Index>(axis)] = led[static_cast<Eigen::Index>(axis)];
     }
   return value;
 }
@@ -216,8 +222,8 @@ std::vector<std::uint8_t> QuadraticSystem::tied_elements() const {
   std::vector<std::uint8_t> tied(problem_.body.element_count(), 0);
   const auto mark = [&](std::uint32_t node, const Tie& tie) {
     if (node >= nodes_.elements.size()) return;
-    std::uint8_t& mark = tied[nodes_.elements[node]];
-    mark = std::max<std::uint8_t>(mark, tie.axes[0] && tie.axes[1] && tie.axes[2] ? 2 : 1);
+    std::uint8_t& known = tied[nodes_.elements[node]];
+    known = std::max<std::uint8_t>(known, tie.axes[0] && tie.axes[1] && tie.axes[2] ? 2 : 1);
   };
   for (const NitscheSupport& support : supports_) {
     for (const FacePoint& point : support.points)

@@ -36,7 +36,8 @@ class QuadraticSystem {
   // Of the cell of that index in nodes().cells.
   [[nodiscard]] Moments moments(std::size_t cell) const;
   [[nodiscard]] CellMatrix elastic_stiffness(std::size_t cell) const;
-  [[nodiscard]] NitschePoint point(const NitscheSupport& support, const FacePoint& point, double safety) const;
+  [[nodiscard]] NitschePoint point(const NitscheSupport& support, const FacePoint& point,
+                                   double safety) const;
   // (elements) 2 where a support holds all axes, 1 where it holds some, else 0.
   [[nodiscard]] std::vector<std::uint8_t> tied_elements() const;
 
@@ -50,10 +51,10 @@ class QuadraticSystem {
   const Problem& problem_;
   const Scene& scene_;
   QuadraticNodes nodes_;
-  std::vector<std::uint32_t> part_;         // (cells)
-  std::vector<std::uint32_t> moments_at_;   // (cells) place in the body's moments; kWhole
-  std::vector<Mat9> moduli_;                // (parts) Pa, world frame
-  std::vector<CellIntegrals> integrals_;    // (parts)
+  std::vector<std::uint32_t> part_;        // (cells)
+  std::vector<std::uint32_t> moments_at_;  // (cells) place in the body's moments; kWhole
+  std::vector<Mat9> moduli_;               // (parts) Pa, world frame
+  std::vector<CellIntegrals> integrals_;   // (parts)
   std::vector<NitscheSupport> supports_;
   std::vector<NodalLoad> loads_;
 };

@@ -20,9 +20,10 @@ using ::testing::HasSubstr;
 constexpr double kYoung = 1e6;  // Pa
 
 std::string material(double poisson) {
-  return fmt::format("material = \"gum\"\nmodel = \"quadratic\"\n[materials.gum]\nyoung = \"1 MPa\"\npoisson = {}\n"
-                     "density = \"1000 kg/m3\"\n",
-                     poisson);
+  return fmt::format(
+      "material = \"gum\"\nmodel = \"quadratic\"\n[materials.gum]\nyoung = \"1 MPa\"\npoisson = {}\n"
+      "density = \"1000 kg/m3\"\n",
+      poisson);
 }
 
 constexpr const char* kDrawn = R"(
@@ -40,8 +41,8 @@ where = "x1"
 )";
 
 std::string pull(const Vec3& force) {
-  return fmt::format("[[load]]\nwhere = \"x1\"\nforce = [\"{} N\", \"{} N\", \"{} N\"]\n", force.x(), force.y(),
-                     force.z());
+  return fmt::format("[[load]]\nwhere = \"x1\"\nforce = [\"{} N\", \"{} N\", \"{} N\"]\n", force.x(),
+                     force.y(), force.z());
 }
 
 SimulateResult run(Body& body, const std::string& scene, bool estimate = false, int threads = 0) {
@@ -77,14 +78,17 @@ Body bar(double share = 1) {
 TEST(QuadraticShape, ReproducesQuadraticFieldsAndTheirGradients) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> any(-0.3, 1.3);
-  const auto field = [](const Vec3& p) { return 1 + p.x() - 2 * p.y() * p.z() + 3 * p.x() * p.x() * p.z() * p.z(); };
+  const auto field = [](const Vec3& p) {
+    return 1 + p.x() - 2 * p.y() * p.z() + 3 * p.x() * p.x() * p.z() * p.z();
+  };
   for (int round = 0; round < 20; ++round) {
     const Vec3 at(any(random), any(random), any(random));
     const QuadraticShape shape = quadratic_shape(at);
     double value = 0;
     Vec3 gradient = Vec3::Zero();
     for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
-      const double node = field(0.5 * Vec3(static_cast<double>(n % 3), static_cast<double>(n / 3 % 3), static_cast<double>(n / 9)));
+      const double node = field(
+          0.5 * Vec3(static_cast<double>(n % 3), static_cast<double>(n / 3 % 3), static_cast<double>(n / 9)));
       value += node * shape.value[n];
       gradient += node * shape.gradient[n];
     }
@@ -118,9 +122,11 @@ TEST(Quadratic, HangingBarIsExact) {
   for (const double share : {1.0, 0.4}) {
     Body body = bar(share);
     const SimulateResult result =
-        run(body, material(0) + "[[fix]]\nwhere = \"x0\"\n[gravity]\nacceleration = [\"10 m/s2\", 0, 0]\n"
-                                "[[probe]]\nname = \"end\"\nwhere = \"x1\"\n");
-    EXPECT_NEAR(result.probes[0].displacement.x() / (1000 * 10 * 0.04 * 0.04 / (2 * kYoung)), 1, 1e-5) << share;
+        run(body, material(0) +
+                      "[[fix]]\nwhere = \"x0\"\n[gravity]\nacceleration = [\"10 m/s2\", 0, 0]\n"
+                      "[[probe]]\nname = \"end\"\nwhere = \"x1\"\n");
+    EXPECT_NEAR(result.probes[0].displacement.x() / (1000 * 10 * 0.04 * 0.04 / (2 * kYoung)), 1, 1e-5)
+        << share;
     EXPECT_NEAR(result.mass, 1000 * 0.04 * 0.02 * 0.01 * (1 + share), 1e-9);
   }
 }
@@ -128,8 +134,10 @@ TEST(Quadratic, HangingBarIsExact) {
 // 2 x .5 x .5, E = 1, nu = .3: 528.2 +- .2 (CalculiX C3D20R, n = 4, 6, 9, extrapolated).
 TEST(Quadratic, CantileverOfOneAndTwoCells) {
   for (const auto& [cells, off] : {std::pair{1, 0.03}, {2, 0.01}}) {
-    Body body = testing::box_body({.cells = {4 * cells, cells, cells}, .spacing = Vec3::Constant(0.5 / cells)});
-    const std::string scene = material(0.3) + "[[fix]]\nwhere = \"x0\"\n[[probe]]\nname = \"end\"\nwhere = \"x1\"\n";
+    Body body =
+        testing::box_body({.cells = {4 * cells, cells, cells}, .spacing = Vec3::Constant(0.5 / cells)});
+    const std::string scene =
+        material(0.3) + "[[fix]]\nwhere = \"x0\"\n[[probe]]\nname = \"end\"\nwhere = \"x1\"\n";
     const double force = 1e-3;
     const SimulateResult result = run(body, scene + pull({0, 0, force}));
     EXPECT_NEAR(result.probes[0].displacement.z() * kYoung / force / 528.2, 1, off) << cells;
@@ -143,10 +151,13 @@ TEST(Quadratic, CantileverOfOneAndTwoCells) {
 TEST(Quadratic, AMoveLeadsItsFace) {
   Body body = bar(0.5);
   const SimulateResult result = run(
-      body, material(0.3) + "[[fix]]\nwhere = \"x0\"\n[[move]]\nwhere = \"x1\"\ndisplacement = [\"0.1 mm\", 0, \"-0.05 mm\"]\n"
-                            "[[probe]]\nname = \"end\"\nwhere = \"x1\"\n");
+      body,
+      material(0.3) +
+          "[[fix]]\nwhere = \"x0\"\n[[move]]\nwhere = \"x1\"\ndisplacement = [\"0.1 mm\", 0, \"-0.05 mm\"]\n"
+          "[[probe]]\nname = \"end\"\nwhere = \"x1\"\n");
   EXPECT_LT((result.probes[0].displacement - Vec3(1e-4, 0, -5e-5)).norm(), 2e-6);
-  EXPECT_LT((result.reactions[0].force + result.reactions[1].force).norm(), 1e-6 * result.reactions[0].force.norm());
+  EXPECT_LT((result.reactions[0].force + result.reactions[1].force).norm(),
+            1e-6 * result.reactions[0].force.norm());
   EXPECT_GT(result.reactions[1].force.x(), 0);
 }
 
@@ -172,7 +183,9 @@ axes = [[{0}, {1}, 0], [-{1}, {0}, 0]]
   material.axes << c, -s, 0, s, c, 0, 0, 0, 1;
   const Mat6 compliance = moduli_at_rest(law_of(material)).inverse();
   EXPECT_NEAR(result.probes[0].displacement.x() / (force / area * compliance(0, 0) * 0.04), 1, 1e-5);
-  EXPECT_NEAR(result.probes[0].displacement.y() / (force / area * (compliance(3, 0) * 0.04 + compliance(1, 0) * 0.01)), 1, 1e-5);
+  EXPECT_NEAR(result.probes[0].displacement.y() /
+                  (force / area * (compliance(3, 0) * 0.04 + compliance(1, 0) * 0.01)),
+              1, 1e-5);
 }
 
 TEST(Quadratic, SameBitsForAnyNumberOfThreads) {
@@ -200,10 +213,12 @@ TEST(Quadratic, WhatItDoesNotHaveIsRefusedByName) {
   EXPECT_EQ(refusal(bar(), held), "accepted");
   EXPECT_THAT(refusal(bar(), held + "[run]\ntime = \"1 ms\"\n"), HasSubstr("it has no [run] time"));
   EXPECT_THAT(refusal(bar(), held + "[contact]\n"), HasSubstr("it has no contact"));
-  EXPECT_THAT(refusal(bar(), held + "[[load]]\nwhere = \"x1\"\ntorque = [\"1e-5 N m\", 0, 0]\nlink = \"rigid\"\n"),
-              HasSubstr("it has no rigid links"));
+  EXPECT_THAT(
+      refusal(bar(), held + "[[load]]\nwhere = \"x1\"\ntorque = [\"1e-5 N m\", 0, 0]\nlink = \"rigid\"\n"),
+      HasSubstr("it has no rigid links"));
   EXPECT_THAT(refusal(bar(), material(0.3) + pull({1, 0, 0})), HasSubstr("add a [[fix]]"));
-  EXPECT_THAT(refusal(bar(), material(0.3) + "[[fix]]\nwhere = \"x0\"\naxes = \"x\"\n" + pull({1e-3, 0, 0})), HasSubstr("is free to"));
+  EXPECT_THAT(refusal(bar(), material(0.3) + "[[fix]]\nwhere = \"x0\"\naxes = \"x\"\n" + pull({1e-3, 0, 0})),
+              HasSubstr("is free to"));
   Body cut = bar(0.5);
   cut.moment_cells.clear();
   cut.moments.clear();

@@ -1,0 +1,152 @@
+#!/usr/bin/python3
+"""Model `quadratic` on slanted and thin walls, beside model `cells` and CalculiX: writes docs/measurements/quadratic.md.
+
+    PATH=build/release/bin:$PATH bench/accuracy/quadratic.py [--parts ../shared/parts] [-o FILE]
+
+Bars and strips are turned by 33 degrees about (1, 2, 3) in the lattice (`--align none`), held at one end and pushed across at the other;
+what is compared is the mean displacement of the end along the push. References: the beam, CalculiX's C3D20R at n = 4, 6 and 9, extrapolated
+(528.2 at Poisson's ratio .3, 519.1 at .45 for 2 x .5 x .5 and E = 1); strips, C3D20R of 32 x 8 x 2 run here (ccx); STEP parts, model
+`quadratic`'s own finest run and CalculiX's second-order tetrahedra (`flexel export --calculix --mesh tet`). Seconds: the whole process of flexel-simulate, one thread.
+"""
+
+import argparse
+import json
+import math
+import os
+import pathlib
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+
+def call(*words, cwd=None, accept=(0,)):
+    """(stdout, wall s, MB)"""
+    before = time.monotonic()
+    done = subprocess.run([str(word) for word in words], capture_output=True, text=True, cwd=cwd, env={**os.environ, "OMP_NUM_THREADS": "1"})
+    if done.returncode not in accept:
+        raise RuntimeError(f"{' '.join(map(str, words))}: {(done.stderr.strip().splitlines() or ['no message'])[-1]}")
+    return done.stdout, time.monotonic() - before, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+
+
+def turn(degrees, axis=(1, 2, 3)):
+    length, angle = math.hypot(*axis), math.radians(degrees)
+    x, y, z = (each / length for each in axis)
+    c, s = math.cos(angle), math.sin(angle)
+    return [[c + x * x * (1 - c), x * y * (1 - c) - z * s, x * z * (1 - c) + y * s],
+            [y * x * (1 - c) + z * s, c + y * y * (1 - c), y * z * (1 - c) - x * s],
+            [z * x * (1 - c) - y * s, z * y * (1 - c) + x * s, c + z * z * (1 - c)]]
+
+
+def turned(rotation, point):
+    return [sum(a * b for a, b in zip(row, point)) for row in rotation]
+
+
+def bar(path, sizes, degrees):
+    rotation = turn(degrees)
+    corners = [(a, b, c) for c in (0, sizes[2]) for b in (0, sizes[1]) for a in (0, sizes[0])]
+    lines = ["v {:.15g} {:.15g} {:.15g}".format(*turned(rotation, corner)) for corner in corners]
+    for group, faces in {"held": [(0, 4, 6, 2)], "end": [(1, 3, 7, 5)], "side": [(0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6)]}.items():
+        lines += [f"g {group}"] + ["f " + " ".join(str(i + 1) for i in face) for face in faces]
+    path.write_text("\n".join(lines) + "\n")
+    return rotation
+
+
+def scene(model, poisson, direction, force):
+    vector = ", ".join(f'"{force * each:.12g} N"' for each in direction)
+    return (f'material = "gum"\nmodel = "{model}"\n[materials.gum]\nyoung = "1 MPa"\npoisson = {poisson}\ndensity = "1000 kg/m3"\n'
+            f'[[fix]]\nwhere = "held"\n[[load]]\nwhere = "end"\nforce = [{vector}]\n[[probe]]\nname = "end"\nwhere = "end"\n')
+
+
+def solve(folder, part, size, text, direction, estimate=False):
+    """(displacement along the push m, bar m, cells, unknowns, iterations, s)"""
+    (folder / "scene.toml").write_text(text)
+    call("flexel-voxelize", part, "--size", f"{size} mm", "--align", "none", "--moments", "--threads", "1", "--quiet", "-o", folder / "body.vtu")
+    _, seconds, _ = call("flexel-simulate", folder / "scene.toml", folder / "body.vtu", "--threads", "1", "--quiet", "--no-stress",
+                         *([] if estimate else ["--no-estimate"]), "--summary", folder / "s.json", "-o", folder / "out.vtu")
+    found = json.loads((folder / "s.json").read_text())
+    bars = [each["bar"] for each in found.get("error_bars", {}).get("bars", []) if each["of"] == "probe end"]
+    return (sum(a * b for a, b in zip(found["probes"][0]["displacement"], direction)), bars[0] if bars else None, found["cells"],
+            found["cg_iterations"], seconds)
+
+
+def reference_strip(folder, sizes, counts, poisson):
+    """u = F . u / F of a box held at x = 0 under an even traction along z at its end, E = 1: CalculiX's C3D20R."""
+    (length, width, thick), (nx, ny, nz) = sizes, counts
+    number, points = {}, []
+
+    def node(i, j, k):
+        if (i, j, k) not in number:
+            number[i, j, k] = len(number) + 1
+            points.append((length * i / 2 / nx, width * j / 2 / ny, thick * k / 2 / nz))
+        return number[i, j, k]
+
+    order = [(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2), (1, 0, 0), (2, 1, 0), (1, 2, 0), (0, 1, 0),
+             (1, 0, 2), (2, 1, 2), (1, 2, 2), (0, 1, 2), (0, 0, 1), (2, 0, 1), (2, 2, 1), (0, 2, 1)]
+    elements = [[node(2 * i + a, 2 * j + b, 2 * k + c) for a, b, c in order] for k in range(nz) for j in range(ny) for i in range(nx)]
+    force = {}
+    for j in range(ny):
+        for k in range(nz):
+            for b, c, share in ((0, 0, -1 / 12), (2, 0, -1 / 12), (0, 2, -1 / 12), (2, 2, -1 / 12), (1, 0, 1 / 3), (0, 1, 1 / 3), (2, 1, 1 / 3), (1, 2, 1 / 3)):
+                at = node(2 * nx, 2 * j + b, 2 * k + c)
+                force[at] = force.get(at, 0) + share / ny / nz
+    text = "*NODE,NSET=ALL\n" + "".join(f"{i + 1},{x:.12g},{y:.12g},{z:.12g}\n" for i, (x, y, z) in enumerate(points))
+    text += "*ELEMENT,TYPE=C3D20R,ELSET=ALL\n" + "".join(f"{e + 1}," + ",".join(map(str, n[:12])) + ",\n" + ",".join(map(str, n[12:])) + "\n" for e, n in enumerate(elements))
+    text += "*NSET,NSET=H\n" + "".join(f"{v},\n" for key, v in number.items() if key[0] == 0) + "*NSET,NSET=L\n" + "".join(f"{i},\n" for i in force)
+    text += f"*MATERIAL,NAME=M\n*ELASTIC\n1,{poisson}\n*SOLID SECTION,ELSET=ALL,MATERIAL=M\n*STEP\n*STATIC\n*BOUNDARY\nH,1,3\n*CLOAD\n"
+    text += "".join(f"{i},3,{f:.12g}\n" for i, f in force.items()) + "*NODE PRINT,NSET=L\nU\n*END STEP\n"
+    (folder / "strip.inp").write_text(text)
+    call("ccx", "strip", cwd=folder)
+    rows = [line.split() for line in (folder / "strip.dat").read_text().splitlines()]
+    return sum(force[int(row[0])] * float(row[3]) for row in rows if len(row) == 4 and row[0].isdigit())
+
+
+def beams(folder):
+    text = ("## A turned beam\n\n2 x .5 x .5, turned by 33 degrees, n cells through its thickness. Error of the end's displacement in %; unknowns of `quadratic`\n"
+            "in brackets are cells; iterations and seconds of `quadratic`.\n\n| nu | n | `cells` | `quadratic` | bar | cells | iterations | s |\n|---|---|---|---|---|---|---|---|\n")
+    for poisson, reference in ((0.3, 528.2), (0.45, 519.1)):
+        for n in (1, 2, 3, 4, 6):
+            rotation = bar(folder / "beam.obj", (200, 50, 50), 33)
+            direction, force = turned(rotation, (0, 0, 1)), 1e-4
+            true = reference * force / (1e6 * 0.1)
+            old = solve(folder, folder / "beam.obj", 50 / n, scene("cells", poisson, direction, force), direction)
+            new = solve(folder, folder / "beam.obj", 50 / n, scene("quadratic", poisson, direction, force), direction, estimate=n > 1)
+            barred = f"{100 * new[1] / true:.2f}" if new[1] else ""
+            text += f"| {poisson} | {n} | {100 * (old[0] / true - 1):+.1f} | {100 * (new[0] / true - 1):+.2f} | {barred} | {new[2]:,} | {new[3]} | {new[4]:.2f} |\n"
+    return text
+
+
+def strips(folder):
+    text = ("\n## Turned strips\n\n16 x 4 x t in cells of 1, turned by 33 degrees, Poisson's ratio .3: walls of a quarter of a cell to two cells. Error in %.\n\n"
+            "| t / h | `cells` | `quadratic` | cells | iterations | s |\n|---|---|---|---|---|---|\n")
+    for thick in (0.25, 0.5, 1, 2):
+        reference = reference_strip(folder, (16, 4, thick), (32, 8, 2), 0.3)
+        rotation = bar(folder / "strip.obj", (160, 40, 10 * thick), 33)
+        direction = turned(rotation, (0, 0, 1))
+        force = 1e-6 * thick**3
+        true = reference * force / (1e6 * 0.01)
+        old = solve(folder, folder / "strip.obj", 10, scene("cells", 0.3, direction, force), direction)
+        new = solve(folder, folder / "strip.obj", 10, scene("quadratic", 0.3, direction, force), direction)
+        text += f"| {thick} | {100 * (old[0] / true - 1):+.1f} | {100 * (new[0] / true - 1):+.2f} | {new[2]:,} | {new[3]} | {new[4]:.2f} |\n"
+    return text
+
+
+def main():
+    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    arguments.add_argument("-o", "--output", default=ROOT / "docs/measurements/quadratic.md", type=pathlib.Path)
+    options = arguments.parse_args()
+    with tempfile.TemporaryDirectory() as place:
+        folder = pathlib.Path(place)
+        text = ("# Model `quadratic`, measured\n\nWritten by `bench/accuracy/quadratic.py`, which says what is run and what the references are; the model is in\n"
+                "[quadratic.md](../theory/quadratic.md). Above 0 is too soft. One thread.\n\n" + beams(folder) + strips(folder))
+    part = options.output.with_name(options.output.name + ".part")
+    part.write_text(text, encoding="utf-8")
+    part.replace(options.output)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
