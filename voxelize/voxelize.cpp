@@ -278,6 +278,12 @@ class CountSearch {
   double least_error_ = std::numeric_limits<double>::infinity(), best_ = 0;
 };
 
+// For the search of a spacing: moments take longer than all else.
+VoxelizeOptions without_moments(VoxelizeOptions options) {
+  options.moments = false;
+  return options;
+}
+
 VoxelizeResult correct_count(VoxelizeResult result, double spacing, std::vector<HealedPart>& meshes,
                              const std::vector<PartExtent>& extents, const VoxelizeOptions& options,
                              Progress& progress) {
@@ -285,24 +291,25 @@ VoxelizeResult correct_count(VoxelizeResult result, double spacing, std::vector<
   CountSearch search(extents, static_cast<double>(options.count.value_or(kDefaultCount)), options.placement);
   search.add(spacing, total_cells(result, options.placement));
   Surface surface;
-  const auto build_at = [&](double next) {
+  const auto build_at = [&](double next, const VoxelizeOptions& how) {
     spacing = next;
     check_spacing(spacing, meshes, surface);
-    result = build(surface, meshes, spacing, options, progress);
+    result = build(surface, meshes, spacing, how, progress);
   };
+  const VoxelizeOptions quick = without_moments(options);
   for (int n = 0; n < kCorrections && !search.close(); ++n) {
     std::swap(surface, result.body.surface);
     try {
-      build_at(search.next());
+      build_at(search.next(), quick);
     } catch (const InputError&) {  // as small a count cannot be met: the best before stays
       spacing = 0;
       break;
     }
     search.add(spacing, total_cells(result, options.placement));
   }
-  if (spacing != search.best()) {
+  if (spacing != search.best() || options.moments) {
     if (surface.parts.empty()) std::swap(surface, result.body.surface);
-    build_at(search.best());
+    build_at(search.best(), options);
   }
   return result;
 }
@@ -330,7 +337,8 @@ VoxelizeResult voxelize(Surface surface, const VoxelizeOptions& options, Progres
   double estimate = 0;
   for (const PartExtent& extent : extents) estimate += estimate_cells(extent, spacing, options.placement);
   check_memory(estimate, limit, extents, options.placement);
-  VoxelizeResult result = build(surface, meshes, spacing, options, progress);
+  VoxelizeResult result =
+      build(surface, meshes, spacing, options.size ? options : without_moments(options), progress);
   if (!options.size) result = correct_count(std::move(result), spacing, meshes, extents, options, progress);
   const double cells = total_cells(result, options.placement);
   check_memory(cells, limit, extents, options.placement);

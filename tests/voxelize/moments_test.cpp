@@ -401,6 +401,21 @@ TEST(Moments, AreSpreadEvenlyWhereTheMatterIsNotKnownExactly) {
   EXPECT_EQ(open_even, open_cells);
 }
 
+TEST(Moments, AreThereWhenACountIsAskedFor) {
+  Progress progress("test", Progress::Mode::quiet);
+  VoxelizeOptions options;
+  options.align = Align::none;
+  options.moments = true;
+  for (const std::size_t count : {300u, 3000u}) {
+    options.count = count;
+    const Body body = voxelize(surface(icosphere(3, 1)), options, progress).body;
+    check(body, "test");
+    const auto [cut_cells, even] = count_cut(body);
+    EXPECT_GT(cut_cells, 100u);
+    EXPECT_EQ(even, 0u);
+  }
+}
+
 TEST(Moments, AreRefusedWhereThereAreNoCells) {
   Progress progress("test", Progress::Mode::quiet);
   VoxelizeOptions options;
