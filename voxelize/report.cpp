@@ -26,7 +26,7 @@ void say_volume(const VoxelizedPart& part, const std::string& name, Placement pl
                            part.overlapping_voxels > 0 ? " (union of its shells)" : "",
                            human_share(std::abs(lattice / part.surface_volume - 1))));
   if (placement == Placement::corner && part.dropped_cells > 0)
-    progress.say(fmt::format("{}: {} under 1/64 of a cell dropped, {} together ({} of the volume)", name,
+    progress.say(fmt::format("{}: {} too small for a cell dropped, {} together ({} of the volume)", name,
                              counted(part.dropped_cells, "sliver"), human_volume(part.dropped_volume),
                              human_share(part.dropped_volume / part.surface_volume)));
 }

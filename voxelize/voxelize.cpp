@@ -168,6 +168,7 @@ std::optional<Voxels> classify(HealedPart& part, const Lattice& lattice, const V
   if (part.mesh.balanced()) {
     Voxels voxels = classify_closed(
         part.mesh, {.with_centres = options.placement == Placement::centre, .with_moments = options.moments});
+    if (options.moments) voxels.dropped_fill = kDroppedFillWithMoments;
     if (!part.original.corners.empty()) {
       place_on_lattice(part.original, lattice);
       trace_missing(part.original, voxels);

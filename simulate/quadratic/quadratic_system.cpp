@@ -39,7 +39,10 @@ QuadraticSystem::QuadraticSystem(const Problem& problem, const Scene& scene)
   }
   require_moments();
   for (std::size_t p = 0; p < body.parts.size(); ++p) {
-    moduli_.push_back(elasticity(law_of(problem.materials[p]), Mat3::Zero()));
+    const Law law = law_of(problem.materials[p]);
+    moduli_.push_back(elasticity(law, Mat3::Zero()));
+    // of an orthotropic material the largest eigenvalue of dP/dF
+    stiffest_.push_back(law.name == LawName::orthotropic ? law.stiffest : law.lambda + 2 * law.mu);
     integrals_.emplace_back(body.parts[p].lattice, moduli_.back());
   }
   place_supports(scene.get<Supports>().ties);
@@ -144,11 +147,8 @@ NitschePoint QuadraticSystem::point(const NitscheSupport& support, const FacePoi
                                     double safety) const {
   const std::uint32_t part = part_[point.cell];
   const Lattice& lattice = problem_.body.parts[part].lattice;
-  const Law law = law_of(problem_.materials[part]);
-  // lambda + 2 mu; of an orthotropic material the largest of dP/dF
-  const double stiffest = law.name == LawName::orthotropic ? law.stiffest : law.lambda + 2 * law.mu;
   return nitsche_point(point, *support.tie, lattice, moduli_[part],
-                       safety * kNitsche * stiffest / lattice.spacing.minCoeff());
+                       safety * kNitsche * stiffest_[part] / lattice.spacing.minCoeff());
 }
 
 std::vector<std::uint8_t> QuadraticSystem::held() const {

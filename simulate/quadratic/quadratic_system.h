@@ -54,6 +54,7 @@ class QuadraticSystem {
   std::vector<std::uint32_t> part_;        // (cells)
   std::vector<std::uint32_t> moments_at_;  // (cells) place in the body's moments; kWhole
   std::vector<Mat9> moduli_;               // (parts) Pa, world frame
+  std::vector<double> stiffest_;           // (parts) Pa, lambda + 2 mu
   std::vector<CellIntegrals> integrals_;   // (parts)
   std::vector<NitscheSupport> supports_;
   std::vector<NodalLoad> loads_;

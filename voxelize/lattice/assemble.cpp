@@ -25,7 +25,8 @@ struct KeptPieces {
   std::size_t count = 0;
 };
 
-KeptPieces number_kept(const Voxels& voxels, bool (*keep)(const Piece&), std::uint32_t first) {
+template <class Keep>
+KeptPieces number_kept(const Voxels& voxels, const Keep& keep, std::uint32_t first) {
   const std::size_t slabs = voxels.slabs.size();
   std::vector<std::uint32_t> next(slabs);
   parallel_for_each(
@@ -57,7 +58,8 @@ bool has_centre(const Piece& piece) {
   return piece.flags & kContainsCentre;
 }
 
-AssembledPart count_slab(const Slab& slab, bool (*keep)(const Piece&)) {
+template <class Keep>
+AssembledPart count_slab(const Slab& slab, const Keep& keep) {
   AssembledPart result;
   for (const Piece& piece : slab.pieces) {
     if (keep(piece))
@@ -69,7 +71,8 @@ AssembledPart count_slab(const Slab& slab, bool (*keep)(const Piece&)) {
   return result;
 }
 
-AssembledPart count_volumes(const Voxels& voxels, bool (*keep)(const Piece&)) {
+template <class Keep>
+AssembledPart count_volumes(const Voxels& voxels, const Keep& keep) {
   std::vector<AssembledPart> of_slab(voxels.slabs.size());
   parallel_for_each(
       of_slab.size(), [&](std::size_t s) { of_slab[s] = count_slab(voxels.slabs[s], keep); }, 2);
@@ -222,8 +225,9 @@ AssembledPart assemble_corners(const Voxels& voxels, const Part& part, Body& bod
                                PolygonCells& polygon_cells) {
   const auto first_element = static_cast<std::uint32_t>(body.element_count());
   const auto first_cell = static_cast<std::uint32_t>(body.cell_count());
-  AssembledPart result = count_volumes(voxels, has_cell);
-  const KeptPieces kept = number_kept(voxels, has_cell, first_cell);
+  const auto keep = [&](const Piece& piece) { return has_cell(voxels, piece); };
+  AssembledPart result = count_volumes(voxels, keep);
+  const KeptPieces kept = number_kept(voxels, keep, first_cell);
   result.cells = kept.count;
   LatticeElements elements = make_elements(voxels, kept.number, first_cell, kept.count);
   result.elements = elements.index.size();

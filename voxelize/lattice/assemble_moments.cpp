@@ -20,7 +20,7 @@ void append_moments(const Voxels& voxels, Body& body) {
     std::size_t next = 0;
     for (std::uint32_t p = 0; p < slab.pieces.size(); ++p) {
       const bool exact = next < slab.moment_pieces.size() && slab.moment_pieces[next] == p;
-      if (has_cell(slab.pieces[p])) {
+      if (has_cell(voxels, slab.pieces[p])) {
         if (exact)
           append(slab.moments[next], 1, cell, body);
         else if (slab.pieces[p].fill < kWholeFill)

@@ -139,7 +139,7 @@ class PlaneSweep {
 
   void add_point(int i, int j) {
     if (inside() && std::any_of(neighbours_.begin(), neighbours_.end(),
-                                [](const Neighbour& n) { return piece_of(n).fill >= kDroppedFill; })) {
+                                [this](const Neighbour& n) { return has_cell(voxels_, piece_of(n)); })) {
       const std::uint32_t element = add_element(i, j, 0);
       for (const Neighbour& n : neighbours_) set(n, element);
       return;
@@ -170,7 +170,7 @@ class PlaneSweep {
     const auto count = static_cast<std::uint32_t>(neighbours_.size());
     kept_.assign(count, false);
     for (std::uint32_t n = 0; n < count; ++n)
-      if (piece_of(neighbours_[n]).fill >= kDroppedFill) kept_[sets_.root(n)] = true;
+      if (has_cell(voxels_, piece_of(neighbours_[n]))) kept_[sets_.root(n)] = true;
     element_.assign(count, kNoElement);
     std::uint16_t number = 0;
     for (std::uint32_t n = 0; n < count; ++n) {

@@ -10,9 +10,8 @@
 namespace flexel::voxelize {
 
 // Pieces with less fill are dropped: they become no cells, but matter still connects through them.
-constexpr double kDroppedFill = 1. / 64;
-[[nodiscard]] inline bool has_cell(const Piece& piece) {
-  return piece.fill >= kDroppedFill;
+[[nodiscard]] inline bool has_cell(const Voxels& voxels, const Piece& piece) {
+  return piece.fill >= voxels.dropped_fill;
 }
 
 // An element for every group of pieces around a lattice point that are connected through the faces incident
