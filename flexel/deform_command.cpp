@@ -14,11 +14,13 @@
 #include "base/stop.h"
 #include "base/units.h"
 #include "flexel/accuracy/resolution_search.h"
+#include "flexel/accuracy/run_error.h"
 #include "flexel/bent_picture.h"
 #include "flexel/commands.h"
 #include "flexel/job.h"
 #include "formats/exchange/surface_file.h"
 #include "formats/lattice/body_file.h"
+#include "formats/lattice/quadratic_field.h"
 #include "mapping/options.h"
 #include "mapping/output.h"
 #include "mapping/report/report.h"
@@ -278,9 +280,21 @@ SolvedRun solve(const DeformArguments& arguments, Plan& plan, std::optional<Accu
   return run;
 }
 
+// A wide bar, and walls that the cells of model `cells` are too coarse for.
+bool has_thin_walls(const SolvedRun& run) {
+  constexpr double kWide = 0.1, kFewCells = 3;
+  double worst = 0;
+  for (const simulate::ErrorBar& each : run.simulated.error_bars.bars)
+    if (each.of != simulate::ErrorBar::Of::elastic_energy && std::abs(each.value) > 0)
+      worst = std::max(worst, each.bar.half_width / std::abs(each.value));
+  return worst > kWide && wall_thickness(run.voxels) < kFewCells * spacing_of(run);
+}
+
 // What to do next, of this run.
-std::string next_step(const std::optional<AccuracyReport>& accuracy) {
+std::string next_step(const SolvedRun& run, const std::optional<AccuracyReport>& accuracy) {
   if (!accuracy) return "";
+  if (!QuadraticField::is_in(run.voxels.body) && !run.simulated.timed && !run.simulated.settled && has_thin_walls(run))
+    return "--model quadratic is made for walls as thin as these (small deflections)";
   std::string chosen_for;
   if (accuracy->goal.error) chosen_for += human_share(*accuracy->goal.error);
   if (accuracy->goal.within)
@@ -350,7 +364,7 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
     for (std::size_t p = 0; p < materials.size(); ++p)
       if (const std::string line = infill_line(body.parts[p].name, materials[p]); !line.empty())
         progress.say(line);
-  for (const std::string& line : answer_lines(run.simulated, body, materials, next_step(accuracy), "--size"))
+  for (const std::string& line : answer_lines(run.simulated, body, materials, next_step(run, accuracy), "--size"))
     progress.say(line);
   return kExitDone;
 }

@@ -5,8 +5,8 @@
 
 Bars and strips are turned by 33 degrees about (1, 2, 3) in the lattice (`--align none`), held at one end and pushed across at the other;
 what is compared is the mean displacement of the end along the push. References: the beam, CalculiX's C3D20R at n = 4, 6 and 9, extrapolated
-(528.2 at Poisson's ratio .3, 519.1 at .45 for 2 x .5 x .5 and E = 1); strips, C3D20R of 32 x 8 x 2 run here (ccx); STEP parts, model
-`quadratic`'s own finest run and CalculiX's second-order tetrahedra (`flexel export --calculix --mesh tet`). Seconds: the whole process of flexel-simulate, one thread.
+(528.2 at Poisson's ratio .3, 519.1 at .45 for 2 x .5 x .5 and E = 1); strips, C3D20R of 32 x 8 x 2 run here (ccx); STEP parts stand
+beside CalculiX's second-order tetrahedra (`flexel export --calculix --mesh tet`) of a 30th and a 60th of the diagonal. Seconds: the whole process of flexel-simulate, one thread.
 """
 
 import argparse
@@ -19,6 +19,8 @@ import subprocess
 import sys
 import tempfile
 import time
+
+from step_parts import PARTS, scene_of
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
@@ -105,8 +107,8 @@ def reference_strip(folder, sizes, counts, poisson):
 
 
 def beams(folder):
-    text = ("## A turned beam\n\n2 x .5 x .5, turned by 33 degrees, n cells through its thickness. Error of the end's displacement in %; unknowns of `quadratic`\n"
-            "in brackets are cells; iterations and seconds of `quadratic`.\n\n| nu | n | `cells` | `quadratic` | bar | cells | iterations | s |\n|---|---|---|---|---|---|---|---|\n")
+    text = ("## A turned beam\n\n2 x .5 x .5, turned by 33 degrees, n cells through its thickness. Error of the end's displacement in %; error bar,\n"
+            "cells, iterations and seconds of `quadratic`.\n\n| nu | n | `cells` | `quadratic` | bar | cells | iterations | s |\n|---|---|---|---|---|---|---|---|\n")
     for poisson, reference in ((0.3, 528.2), (0.45, 519.1)):
         for n in (1, 2, 3, 4, 6):
             rotation = bar(folder / "beam.obj", (200, 50, 50), 33)
@@ -134,14 +136,63 @@ def strips(folder):
     return text
 
 
+def calculix(folder, part, text, edge):
+    """(displacement of the probe along the push m, elements, s of meshing, s of solving): second-order tetrahedra."""
+    (folder / "scene.toml").write_text(text)
+    _, meshing, _ = call("flexel", "export", part, "--scene", folder / "scene.toml", "--calculix", "--mesh", "tet", "--size", f"{edge} mm", "--nlgeom", "off",
+                         "--quiet", "--summary", folder / "export.json", "--force", "-o", folder / "job.inp")
+    _, solving, _ = call("timeout", "400", "ccx", "job", cwd=folder)
+    export = json.loads((folder / "export.json").read_text())
+    probe = export["probes"][0]
+    weight, moved = dict(zip(probe["nodes"], probe["weights"])), {}
+    for line in (folder / "job.dat").read_text().splitlines():
+        row = line.split()
+        if len(row) == 4 and row[0].isdigit():
+            moved[int(row[0])] = [float(value) for value in row[1:]]
+    return [1e-3 * sum(weight[n] * moved[n][axis] for n in weight) for axis in range(3)], export["elements"], meshing, solving
+
+
+def step_parts(folder, parts):
+    text = ("\n## STEP parts\n\nHeld at the flat face at one end of the longest side, drawn by 10 N along (1, 1, 1) at the other; aluminium. How far that face moves, in um; the\n"
+            "error bar in brackets, where there is one; seconds of solving on one thread (CalculiX: and of meshing).\n\n"
+            "| part | `cells`, 30,000 | `quadratic`, 1,000 | 4,000 | 16,000 | CalculiX C3D10 | C3D10, finer |\n|---|---|---|---|---|---|---|\n")
+    for name in PARTS:
+        part = parts / name
+        if not part.exists():
+            text += f"| {name} | left out: not there | | | | | |\n"
+            continue
+        plain = scene_of(part)
+        drawn = plain.split("[[load]]\nwhere = ")[1].splitlines()[0]
+        row = []
+        for model, count in (("cells", 30000), ("quadratic", 1000), ("quadratic", 4000), ("quadratic", 16000)):
+            (folder / "scene.toml").write_text(f'model = "{model}"\n{plain}[[probe]]\nname = "end"\nwhere = {drawn}\n')
+            call("flexel-voxelize", part, "--count", count, "--threads", "1", "--quiet", *(["--moments"] if model == "quadratic" else []), "-o", folder / "body.vtu")
+            _, seconds, _ = call("flexel-simulate", folder / "scene.toml", folder / "body.vtu", "--threads", "1", "--quiet", "--no-stress", "--no-estimate",
+                                 "--summary", folder / "s.json", "-o", folder / "out.vtu")
+            moved = json.loads((folder / "s.json").read_text())["probes"][0]["displacement"]
+            row.append(f"{1e6 * math.hypot(*moved):.4g} ({seconds:.1f} s)")
+        solid = json.loads(call("flexel", "info", part, "--json")[0])["files"][0]["parts"][0]
+        diagonal = 1e3 * math.dist(solid["min"], solid["max"])
+        for share in (30, 60):
+            try:
+                moved, elements, meshing, solving = calculix(folder, part, f"{plain}[[probe]]\nname = \"end\"\nwhere = {drawn}\n", diagonal / share)
+                row.append(f"{1e6 * math.hypot(*moved):.4g} ({elements:,} elements, {meshing:.0f} + {solving:.0f} s)")
+            except RuntimeError as error:
+                row.append(f"none: {str(error)[-60:]}")
+        text += f"| {name} | {' | '.join(row)} |\n"
+        print(text.splitlines()[-1], file=sys.stderr, flush=True)
+    return text
+
+
 def main():
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("-o", "--output", default=ROOT / "docs/measurements/quadratic.md", type=pathlib.Path)
+    arguments.add_argument("--parts", default=ROOT / "../shared/parts", type=pathlib.Path)
     options = arguments.parse_args()
     with tempfile.TemporaryDirectory() as place:
         folder = pathlib.Path(place)
         text = ("# Model `quadratic`, measured\n\nWritten by `bench/accuracy/quadratic.py`, which says what is run and what the references are; the model is in\n"
-                "[quadratic.md](../theory/quadratic.md). Above 0 is too soft. One thread.\n\n" + beams(folder) + strips(folder))
+                "[quadratic.md](../theory/quadratic.md). Above 0 is too soft. One thread.\n\n" + beams(folder) + strips(folder) + step_parts(folder, options.parts))
     part = options.output.with_name(options.output.name + ".part")
     part.write_text(text, encoding="utf-8")
     part.replace(options.output)

@@ -17,6 +17,11 @@ struct FacePoint {
 [[nodiscard]] std::vector<FacePoint> face_points(const Problem& problem, const QuadraticNodes& nodes,
                                                  const std::vector<std::uint32_t>& polygons);
 
+// The points, those in cells with little matter taken over by the next cell inwards (its polynomials reach a little
+// further): there the traction of a field that hardly any matter resists would need any penalty to hold it.
+[[nodiscard]] std::vector<FacePoint> in_firm_cells(const Body& body, const QuadraticNodes& nodes,
+                                                   std::vector<FacePoint> points);
+
 // Shape functions at `at` of a cell, with gradients in the world frame [1/m].
 [[nodiscard]] QuadraticShape world_shape(const Lattice& lattice, const Vec3& at);
 

@@ -66,7 +66,7 @@ void QuadraticSystem::place_supports(const std::vector<Tie>& ties) {
     const Selected selected = resolve(tie.where, problem_.body);
     NitscheSupport support{&tie, {}, {}};
     if (!selected.polygons.empty()) {
-      support.points = face_points(problem_, nodes_, selected.polygons);
+      support.points = in_firm_cells(problem_.body, nodes_, face_points(problem_, nodes_, selected.polygons));
       if (support.points.empty())
         throw InputError(tie.origin, fmt::format("\"{}\": no matter lies under the selected surface; use a "
                                                  "smaller spacing",
