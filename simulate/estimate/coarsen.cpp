@@ -15,6 +15,7 @@
 #include "base/error.h"
 #include "formats/lattice/body_moments.h"
 #include "formats/lattice/cell_moments.h"
+#include "formats/lattice/quadratic_field.h"
 #include "simulate/estimate/coarse_grid.h"
 #include "simulate/estimate/coarse_moments.h"
 #include "simulate/matter/stress.h"
@@ -258,7 +259,7 @@ void PartCoarsening::append_moments(Body& coarse) const {
 void refuse(const Body& body) {
   for (const Columns* columns : {&body.cell_columns, &body.element_columns})
     for (const auto& [name, column] : *columns)
-      if (!is_stress_column(name) && name != "velocity")
+      if (!is_stress_column(name) && name != "velocity" && name != kQuadraticColumn)
         throw InputError(fmt::format("the body remembers an earlier run (\"{}\")", name));
   for (const Part& part : body.parts) {
     if (part.placement == Placement::centre)

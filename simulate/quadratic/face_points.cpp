@@ -1,11 +1,10 @@
 #include "simulate/quadratic/face_points.h"
 
 #include <algorithm>
-#include <memory>
+#include <cmath>
 #include <optional>
 
 #include "formats/lattice/locate.h"
-#include "simulate/matter/surface_points.h"
 
 namespace flexel::simulate {
 namespace {
@@ -20,6 +19,77 @@ std::optional<std::uint32_t> beyond(const QuadraticNodes& nodes, std::uint32_t c
   for (const QuadraticNodes::Incidence& at : nodes.at(nodes.of_cell[cell][kFaceNodes[face]]))
     if (at.cell != cell) return at.cell;
   return std::nullopt;
+}
+
+using Outline = std::vector<Vec3>;  // of a convex polygon, lattice coordinates
+
+// Calls visit(piece) for the part of a polygon in each voxel, axis by axis.
+template <class Visit>
+void for_each_voxel(const Outline& outline, int axis, const Visit& visit) {
+  if (axis == 3) return visit(outline);
+  double low = outline[0][axis], high = low;
+  for (const Vec3& corner : outline) {
+    low = std::min(low, corner[axis]);
+    high = std::max(high, corner[axis]);
+  }
+  const double first = std::floor(low), last = std::max(first, std::ceil(high) - 1);
+  for (double plane = first; plane <= last; ++plane) {
+    Outline piece = outline;
+    for (const double side : {1.0, -1.0}) {  // above the lower plane, below the upper one
+      const double at = side > 0 ? plane : plane + 1;
+      Outline kept;
+      for (std::size_t v = 0; v < piece.size(); ++v) {
+        const Vec3 &a = piece[v], &b = piece[(v + 1) % piece.size()];
+        const double da = side * (a[axis] - at), db = side * (b[axis] - at);
+        if (da >= 0) kept.push_back(a);
+        if ((da > 0 && db < 0) || (da < 0 && db > 0)) kept.push_back(a + (b - a) * (da / (da - db)));
+      }
+      piece = std::move(kept);
+    }
+    if (piece.size() >= 3) for_each_voxel(piece, axis + 1, visit);
+  }
+}
+
+Vec3 middle_of(const Outline& outline) {
+  Vec3 sum = Vec3::Zero();
+  for (const Vec3& corner : outline) sum += corner;
+  return sum / static_cast<double>(outline.size());
+}
+
+// Gauss's points on [0, 1]: four, exact to degree 7; two for pieces that are small beside a voxel.
+struct Rule {
+  std::vector<double> at, weight;
+};
+const Rule& rule_for(const Outline& piece) {
+  constexpr double kSmall = 0.1;  // spacings
+  static const Rule two{{0.21132486540518712, 0.78867513459481288}, {0.5, 0.5}};
+  static const Rule four{
+      {0.06943184420297371, 0.33000947820757187, 0.66999052179242813, 0.93056815579702629},
+      {0.17392742256872693, 0.32607257743127307, 0.32607257743127307, 0.17392742256872693}};
+  double largest = 0;
+  for (const Vec3& corner : piece) largest = std::max(largest, (corner - piece[0]).cwiseAbs().maxCoeff());
+  return largest < kSmall ? two : four;
+}
+
+// A piece's points: of each triangle of its fan those of a square, collapsed to it.
+void add_points(const Body& body, const Part& part, std::uint32_t cell, std::uint32_t body_cell,
+                const Outline& piece, std::vector<FacePoint>& points) {
+  const Rule& rule = rule_for(piece);
+  for (std::size_t v = 1; v + 1 < piece.size(); ++v) {
+    const Vec3 a = part.lattice.to_world(piece[0]), b = part.lattice.to_world(piece[v]),
+               c = part.lattice.to_world(piece[v + 1]);
+    const Vec3 area = 0.5 * (b - a).cross(c - a);
+    if (!(area.norm() > 0)) continue;
+    for (std::size_t r = 0; r < rule.at.size(); ++r)
+      for (std::size_t q = 0; q < rule.at.size(); ++q) {
+        FacePoint point;
+        point.cell = cell;
+        point.position = a + rule.at[r] * ((b - a) + rule.at[q] * (c - b));
+        point.area_vector = 2 * rule.weight[r] * rule.at[r] * rule.weight[q] * area;
+        point.at = cell_coordinates(body, part, body_cell, point.position);
+        points.push_back(point);
+      }
+  }
 }
 
 }  // namespace
@@ -46,22 +116,29 @@ std::vector<FacePoint> in_firm_cells(const Body& body, const QuadraticNodes& nod
 std::vector<FacePoint> face_points(const Problem& problem, const QuadraticNodes& nodes,
                                    const std::vector<std::uint32_t>& polygons) {
   const Body& body = problem.body;
+  const Triangles triangles = triangulate(body.surface);
+  std::vector<std::uint8_t> chosen(body.surface.polygon_count(), 0);
+  for (const std::uint32_t p : polygons) chosen[p] = 1;
   std::vector<FacePoint> points;
-  std::unique_ptr<SurfaceLocator> locate;
+  std::optional<SurfaceLocator> locate;
   std::uint32_t polygon = 0;
-  for (const SurfacePoint& point : surface_points(problem, polygons)) {
-    if (!locate || point.polygon != polygon) {
-      polygon = point.polygon;
-      locate = std::make_unique<SurfaceLocator>(body, polygon);
+  for (std::size_t t = 0; t < triangles.polygon.size(); ++t) {
+    if (!chosen[triangles.polygon[t]]) continue;
+    if (!locate || triangles.polygon[t] != polygon) {
+      polygon = triangles.polygon[t];
+      locate.emplace(body, polygon);
     }
-    const std::optional<CellPoint> found = (*locate)(point.position);
-    if (!found) continue;
-    const auto cell = std::lower_bound(nodes.cells.begin(), nodes.cells.end(), found->cell);
-    if (cell == nodes.cells.end() || *cell != found->cell) continue;  // it resists nothing
     const Part& part = body.parts[body.surface.polygon_part(polygon)];
-    points.push_back({static_cast<std::uint32_t>(cell - nodes.cells.begin()),
-                      cell_coordinates(body, part, found->cell, point.position), point.position,
-                      point.area_vector});
+    Outline corners;
+    for (const std::uint32_t v : triangles.corners[t])
+      corners.push_back(part.lattice.to_lattice(body.surface.vertices[v]));
+    for_each_voxel(corners, 0, [&](const Outline& piece) {
+      const std::optional<CellPoint> found = (*locate)(part.lattice.to_world(middle_of(piece)));
+      if (!found) return;
+      const auto cell = std::lower_bound(nodes.cells.begin(), nodes.cells.end(), found->cell);
+      if (cell == nodes.cells.end() || *cell != found->cell) return;  // it resists nothing
+      add_points(body, part, static_cast<std::uint32_t>(cell - nodes.cells.begin()), *cell, piece, points);
+    });
   }
   return points;
 }

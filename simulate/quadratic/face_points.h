@@ -13,7 +13,7 @@ struct FacePoint {
   Vec3 area_vector = Vec3::Zero();  // m^2, outward
 };
 
-// Of the selected polygons (simulate/matter/surface_points.h); none where no cell that resists lies under.
+// Of the selected polygons: each is cut by the voxels, and each piece gets Gauss points; none where no cell that resists lies under.
 [[nodiscard]] std::vector<FacePoint> face_points(const Problem& problem, const QuadraticNodes& nodes,
                                                  const std::vector<std::uint32_t>& polygons);
 

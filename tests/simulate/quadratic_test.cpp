@@ -111,8 +111,8 @@ TEST(Quadratic, PatchTest) {
     EXPECT_NEAR(result.probes[0].displacement.x() / (strain * 0.04), 1, 2e-6) << share;
     EXPECT_NEAR(result.elastic_energy / (0.5 * force * strain * 0.04), 1, 2e-6) << share;
     ASSERT_TRUE(result.stress);
-    EXPECT_NEAR(result.stress->value / (force / area), 1, 1e-4) << share;
-    EXPECT_NEAR(result.reactions[0].force.x() / force, -1, 1e-7);
+    EXPECT_NEAR(result.stress->value / (force / area), 1, 1e-3) << share;  // 1e-6 beside a fill of .02
+    EXPECT_LT(result.imbalance.norm(), 1e-7 * force);
     EXPECT_LT(result.moment_imbalance.norm(), 1e-6 * force * 0.02);
   }
 }
