@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/available_memory.h"
 #include "base/error.h"
 #include "base/nearest_word.h"
 #include "base/stop.h"
