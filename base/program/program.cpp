@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/files/files.h"
 #include "base/files/pipe_code.h"
+#include "base/printable.h"
 #include "base/program/signals.h"
 #include "base/program/standard_output.h"
 #include "base/text.h"
@@ -30,7 +31,7 @@ void hold_standard_descriptors() {
 }
 
 int report(const std::string& name, const std::string& what, int code) {
-  const std::string line = name + ": error: " + one_line(what) + "\n";
+  const std::string line = name + ": error: " + printable(one_line(what)) + "\n";
   std::fwrite(line.data(), 1, line.size(), stderr);
   return code;
 }
