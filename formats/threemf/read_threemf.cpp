@@ -13,10 +13,12 @@
 #include <iterator>
 #include <map>
 #include <pugixml.hpp>
+#include <set>
 #include <sstream>
 #include <utility>
 
 #include "base/error.h"
+#include "base/stop.h"
 #include "formats/common/readers.h"
 #include "formats/part/topology.h"
 #include "formats/threemf/zip.h"
@@ -29,7 +31,7 @@ using Rgba = std::array<double, 4>;
 using Id = std::pair<std::string, std::string>;  // the model file in the archive, and the id in it
 
 constexpr int kDeepest = 64;
-constexpr std::size_t kMostInstances = 1'000'000;
+constexpr std::size_t kMostInstances = 1'000'000, kMostRepeated = 20'000'000;
 
 // "m:color" is "color": prefixes differ from writer to writer.
 std::string_view local(std::string_view name) {
@@ -84,14 +86,22 @@ std::map<std::string, std::string> unread_extensions(const pugi::xml_node& model
   return unread;
 }
 
-// Whether the node, one of its attributes, or anything below it has the prefix.
+// Whether the node, one of its attributes, or anything below it has the prefix. Elements may lie in one
+// another without end, so nothing recurses.
 bool uses(const pugi::xml_node& node, const std::string& prefix) {
   const auto has = [&](std::string_view name) { return name.starts_with(prefix + ":"); };
-  if (has(node.name())) return true;
-  for (const pugi::xml_attribute& found : node.attributes())
-    if (has(found.name())) return true;
-  return std::any_of(node.begin(), node.end(),
-                     [&](const pugi::xml_node& below) { return uses(below, prefix); });
+  const auto has_itself = [&](const pugi::xml_node& one) {
+    return has(one.name()) || std::any_of(one.attributes_begin(), one.attributes_end(),
+                                          [&](const auto& found) { return has(found.name()); });
+  };
+  std::vector<pugi::xml_node> pending = {node};
+  while (!pending.empty()) {
+    const pugi::xml_node one = pending.back();
+    pending.pop_back();
+    if (has_itself(one)) return true;
+    for (const pugi::xml_node& below : one.children()) pending.push_back(below);
+  }
+  return false;
 }
 
 class ThreeMfReader {
@@ -149,7 +159,7 @@ class ThreeMfReader {
   }
 
   // The model that the archive's relationships name.
-  [[nodiscard]] std::string root_model() const {
+  [[nodiscard]] std::string root_model() {
     if (const auto bytes = archive_.read("_rels/.rels")) {
       pugi::xml_document document;
       document.load_buffer(bytes->data(), bytes->size());
@@ -245,12 +255,27 @@ class ThreeMfReader {
     const std::string own = clean_name(attribute(object, "name"));
     const std::string& name = own.empty() ? fallback : own;
     check_readable(model, object, name.empty() ? id.second : name);
-    if (const pugi::xml_node mesh = child(object, "mesh")) add_mesh(model, object, mesh, transform, name);
+    check_stop();
+    if (const pugi::xml_node mesh = child(object, "mesh")) {
+      const std::size_t before = surface_.polygon_count();
+      add_mesh(model, object, mesh, transform, name);
+      count_repeats(id, surface_.polygon_count() - before);
+    }
     for_each_child(child(object, "components"), "component", [&](const pugi::xml_node& component) {
       const std::string_view path = attribute(component, "path");
       add_object({path.empty() ? id.first : normal_path(path), std::string(attribute(component, "objectid"))},
                  times(transform, transform_of(component)), name, depth + 1);
     });
+  }
+
+  // A few lines of components that show components can be more triangles than memory holds.
+  void count_repeats(const Id& id, std::size_t triangles) {
+    if (!shown_.insert(id).second) repeated_ += triangles;
+    if (repeated_ > kMostRepeated)
+      fail(
+          fmt::format("shows the same objects again and again, with more than {} million triangles in all: "
+                      "it is damaged, or made to fill the memory",
+                      kMostRepeated / 1'000'000));
   }
 
   // An object is its triangles, or its components, and nothing else that has matter.
@@ -351,6 +376,8 @@ class ThreeMfReader {
   Column color_{4, {}};
   bool colored_ = false;
   std::size_t instances_ = 0;
+  std::set<Id> shown_;        // objects with triangles that are in the surface
+  std::size_t repeated_ = 0;  // triangles of objects that were in it already
 };
 
 Evidence sniff_3mf(const ImportInput& input) {
