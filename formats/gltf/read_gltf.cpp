@@ -67,15 +67,16 @@ std::string buffer_path(const std::string& uri, const ImportInput& input) {
   const auto inside = [&](const fs::path& folder) {
     const fs::path from = fs::canonical(folder.empty() ? "." : folder, error);
     if (error) return false;
-    const fs::path way = fs::canonical(path, error).lexically_relative(from);
+    const fs::path way = fs::weakly_canonical(path, error).lexically_relative(from);
     return !error && !way.empty() && *way.begin() != "..";
   };
   const auto refuse = [&](const char* why) {
     throw InputError(input.where, fmt::format("has its numbers in \"{}\", {}", shown(uri), why));
   };
-  if (!fs::exists(path, error)) refuse("which is not there: put that file where it looks for it, or give a GLB");
   if (!inside(input.folder) && !inside(fs::canonical(input.where, error).parent_path()))
     refuse("outside of its folder, from where nothing is read: put that file beside it, or give a GLB");
+  if (!fs::exists(path, error))
+    refuse("which is not there: put that file where it looks for it, or give a GLB");
   if (!fs::is_regular_file(path, error)) refuse("which is no file: give a GLB");
   return path.string();
 }

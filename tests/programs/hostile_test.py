@@ -7,9 +7,9 @@ import struct
 import subprocess
 import time
 import zipfile
-import zlib
 
-from harness import BIN, SCENE, body, box, expect, expect_error, expect_ok, expect_only, main, need_step, run, scene, shell, write
+from harness import (BIN, SCENE, body, box, box_triangles, expect, expect_error, expect_ok, expect_only, main, need_step, run, scene, shell,
+                     write)
 
 ESCAPE, C1, TURN = "\x1b[31m", "\u009b", "\u202e"
 
@@ -118,6 +118,23 @@ def test_keys_of_a_scene_with_parts_without_end():
     # Dots in strings, numbers and comments are none of a key's.
     scene("dots.toml", SCENE.replace('"tip"', f'"{"." * 100}"') + f"# {'a.' * 100}\n")
     expect_ok(run("flexel-simulate", "dots.toml", "body.vtu", "-o", "o.vtu", "--quiet"))
+
+
+def test_a_damaged_accessor_that_nothing_shows_costs_no_result():
+    data = b"".join(struct.pack("<9f", *(x for corner in triangle for x in corner)) for triangle in box_triangles())
+    count = len(data) // 12
+    views = [{"buffer": 0, "byteLength": len(data)}]
+    accessor = {"bufferView": 0, "componentType": 5126, "count": count, "type": "VEC3"}
+    text = json.dumps({"asset": {"version": "2.0"}, "buffers": [{"byteLength": len(data)}], "bufferViews": views,
+                       "accessors": [accessor, dict(accessor, count=10 ** 9)],
+                       "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}], "extras": {"units": "mm"}}], "nodes": [{"mesh": 0}]}).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(data), 0x004E4942) + data
+    write("b.glb", struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks)
+    expect_ok(run("flexel", "deform", "b.glb", "--material", "steel", "--fix", "zmin", "--push", "zmax: 0 0 -1 N", "--count", "200", "-o", "o.stl",
+                  "-o", "o.glb"))
+    expect_only("b.glb", "o.stl", "o.glb")
+    expect_ok(run("flexel", "info", "o.glb"))
 
 
 # --- 3MF
@@ -236,7 +253,7 @@ def test_buffers_of_gltf_come_from_beside_it_alone():
         write("in/a.gltf", gltf(uri))
         result = run("flexel", "info", "in/a.gltf")
         expect("has its numbers" not in result.err, f"{uri}: {result}")
-    for uri in ("../out.bin", "%2e%2e/out.bin", "below/../../out.bin", f"{here}/out.bin", "link.bin", "/etc/passwd", "/dev/zero", "zero.bin"):
+    for uri in ("../out.bin", "%2e%2e/out.bin", "below/../../out.bin", f"{here}/out.bin", "link.bin", "/etc/passwd", "/dev/zero", "zero.bin", "../missing.bin"):
         write("in/a.gltf", gltf(uri))
         refused("flexel", "info", "in/a.gltf", seconds=5, fragments=["in/a.gltf", uri, "outside of its folder"])
     write("in/a.gltf", gltf("fifo.bin"))
