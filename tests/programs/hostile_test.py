@@ -269,6 +269,16 @@ def test_buffers_of_gltf_come_from_beside_it_alone():
     expect("has its numbers" not in result.err, str(result))
 
 
+def test_frames_and_bodies_that_are_devices():
+    body("b.vtu")
+    os.mkfifo("fifo")
+    for name in ("fifo", "/dev/zero"):
+        write("run.pvd", f'<?xml version="1.0"?><VTKFile type="Collection"><Collection><DataSet timestep="0" file="{name}"/></Collection></VTKFile>')
+        refused("flexel-map", "run.pvd", "-o", "o.stl", seconds=5, fragments=["run.pvd", name, "a device or a pipe"])
+        scene("s.toml", SCENE + f'[run]\ntime = "1 ms"\n[[event]]\nat = "0.5 ms"\ndo = "add"\nbody = "{name}"\n')
+        refused("flexel-simulate", "s.toml", "b.vtu", "-o", "o.vtu", seconds=5, fragments=["s.toml", name, "a device or a pipe"])
+
+
 def test_a_checkpoint_touches_no_other_file():
     body("b.vtu")
     write("notes.body", "precious")
