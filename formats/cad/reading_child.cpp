@@ -50,7 +50,7 @@ MemoryInUse memory_in_use(const std::string& process) {
 // --- in the child
 
 // Never more than this process may have already.
-void lower_limit(__rlimit_resource resource, double value) {
+void lower_limit(decltype(RLIMIT_DATA) resource, double value) {
   rlimit limit{};
   if (getrlimit(resource, &limit) != 0 || !(value < 1e18)) return;
   const auto wanted = static_cast<rlim_t>(value);
