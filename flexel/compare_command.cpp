@@ -16,6 +16,7 @@
 #include "base/files/output_file.h"
 #include "base/human.h"
 #include "base/parallel.h"
+#include "base/printable.h"
 #include "base/program/termination.h"
 #include "base/units.h"
 #include "flexel/commands.h"
@@ -294,7 +295,7 @@ int compare_command(int argc, char** argv) {
                "flexel compare"};
   declare_job(app, arguments.job);
   app.add_flag("--json", arguments.json, "As JSON, in SI units (docs/guide/compare.md)");
-  app.add_option("--threads", arguments.threads, "Threads; 0 is every core")->check(CLI::NonNegativeNumber);
+  add_threads_option(app, arguments.threads);
   app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   if (arguments.job.parts.size() < 2) throw InputError("two parts at least are compared: name another file");
@@ -315,9 +316,9 @@ int compare_command(int argc, char** argv) {
     all.push_back(run_named(arguments, file, name, inner));
   }
   progress.finish();
-  std::string text = arguments.json ? comparison_json(all) : table_of(all);
+  std::string text = arguments.json ? comparison_json(all) : printable_lines(table_of(all));
   if (!arguments.json)
-    for (const std::string& line : verdict(all)) text += line + "\n";
+    for (const std::string& line : verdict(all)) text += printable(line) + "\n";
   OutputFile out("-", false);
   out.write(text);
   out.commit();

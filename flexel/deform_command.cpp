@@ -73,7 +73,7 @@ void declare_output(CLI::App& app, DeformArguments& arguments) {
   app.add_option("--summary", arguments.summary,
                  "Write the summary of all stages (JSON; docs/guide/deform.md)")
       ->type_name("FILE");
-  app.add_option("--threads", arguments.threads, "Threads; 0 is every core")->check(CLI::NonNegativeNumber);
+  add_threads_option(app, arguments.threads);
   app.add_option("--timeout", arguments.timeout,
                  "Stop after this time (\"90 s\"): exit 5, of a simulation the last good state in "
                  "OUTPUT.failed.vtu")

@@ -53,7 +53,7 @@ void declare(CLI::App& app, ExportArguments& arguments) {
       ->capture_default_str();
   app.add_option("--summary", arguments.summary, "Write what was written as JSON (docs/guide/export.md)")
       ->type_name("FILE");
-  app.add_option("--threads", arguments.threads, "Threads; 0 is every core")->check(CLI::NonNegativeNumber);
+  add_threads_option(app, arguments.threads);
   app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
 }
 

@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "base/files/output_file.h"
 #include "base/human.h"
+#include "base/printable.h"
 #include "base/program/arguments.h"
 #include "base/program/progress.h"
 #include "base/program/termination.h"
@@ -297,7 +298,7 @@ int info_command(int argc, char** argv) {
   const Known known = look_at(surface);
   if (!thickness.empty()) write_thickness(surface, thickness);
   OutputFile out("-", false);
-  out.write(json ? info_json(surface, known) : info_text(surface, known));
+  out.write(json ? info_json(surface, known) : printable_lines(info_text(surface, known)));
   out.commit();
   return kExitDone;
 }

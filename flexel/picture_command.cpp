@@ -64,7 +64,7 @@ void declare(CLI::App& app, PictureArguments& a) {
   app.add_option("--unit", a.unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
   app.add_option("--input-format", a.input_format, "Format of the files, where their bytes do not tell")
       ->type_name("NAME");
-  app.add_option("--threads", a.threads, "Threads; 0 is every core")->check(CLI::NonNegativeNumber);
+  add_threads_option(app, a.threads);
   app.add_flag("--quiet", a.quiet, "Say only warnings and errors");
   app.add_flag("--force", a.force, "Let the picture replace a file that is read");
 }

@@ -12,6 +12,7 @@
 #include "base/error.h"
 #include "base/files/files.h"
 #include "base/files/output_file.h"
+#include "base/json_depth.h"
 #include "base/nearest_word.h"
 #include "base/program/arguments.h"
 #include "base/program/progress.h"
@@ -90,9 +91,9 @@ void add_references(const std::string& text, const study::SceneFacts& facts,
     return;
   }
   const Bytes bytes = read_all(text);
+  const std::string_view content(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   const auto json =
-      nlohmann::json::parse(reinterpret_cast<const char*>(bytes.data()),
-                            reinterpret_cast<const char*>(bytes.data()) + bytes.size(), nullptr, false);
+      json_depth(content) > kDeepestJson ? nlohmann::json() : nlohmann::json::parse(content, nullptr, false);
   if (!json.is_object() || !json.contains("probes") || !json.contains("largest_displacement") ||
       !json.contains("elastic_energy"))
     throw InputError(text, "this is no summary of flexel-simulate (--summary); or write NAME=VALUE");

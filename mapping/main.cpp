@@ -74,7 +74,7 @@ void declare(CLI::App& app, Arguments& arguments) {
       ->type_name("FILE");
   app.add_option("--unit", arguments.unit, "Unit of the coordinates written; else that of the input")
       ->type_name("UNIT");
-  app.add_option("--threads", arguments.threads, "Threads; 0 is every core")->check(CLI::NonNegativeNumber);
+  add_threads_option(app, arguments.threads);
   app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
   app.add_flag("--force", arguments.force, "Let results replace files that are read");
   app.add_option("-o,--output", arguments.output,

@@ -10,6 +10,7 @@
 #include "base/files/files.h"
 #include "base/files/output_file.h"
 #include "base/nearest_word.h"
+#include "base/printable.h"
 #include "formats/common/file_formats.h"
 #include "formats/exchange/surface_file.h"
 #include "formats/lattice/quadratic_field.h"
@@ -118,7 +119,7 @@ void say_report(const MapReport& found, const MapArguments& arguments, const Map
       progress.warn(lines[i]);
     else
       progress.say(lines[i]);
-  if (arguments.table) fmt::print(stderr, "{}", report_table(found, options));
+  if (arguments.table) fmt::print(stderr, "{}", printable_lines(report_table(found, options)));
 }
 
 void write_report(const MapReport& found, const MapArguments& arguments, const MapOptions& options,

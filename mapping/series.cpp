@@ -7,6 +7,7 @@
 #include <pugixml.hpp>
 
 #include "base/error.h"
+#include "base/files/named_file.h"
 
 namespace flexel::mapping {
 
@@ -23,6 +24,7 @@ std::vector<std::string> series_files(const std::string& pvd) {
     const std::string file = set.attribute("file").value();
     if (file.empty()) throw InputError(pvd, fmt::format("frame {} names no file", files.size() + 1));
     files.push_back((folder / file).string());
+    refuse_device(files.back(), pvd);
   }
   if (files.empty()) throw InputError(pvd, "the series lists no frame");
   return files;

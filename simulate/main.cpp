@@ -59,8 +59,7 @@ void declare(CLI::App& app, Arguments& arguments) {
       "--resume", arguments.resume,
       "Go on from this checkpoint to the same bits; scene, body, -o and --history are those of the "
       "run, and need not be given");
-  app.add_option("--threads", arguments.options.threads, "Threads; 0: every core")
-      ->check(CLI::NonNegativeNumber);
+  add_threads_option(app, arguments.options.threads);
   app.add_option("--summary", arguments.summary,
                  "Write the summary as JSON to this file (docs/reference/summary.md)");
   app.add_flag("--explain", arguments.options.explain,

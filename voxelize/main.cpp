@@ -62,7 +62,7 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_option("--input-format,--format", arguments.format,
                  fmt::format("format of the input ({}) instead of what its bytes tell",
                              fmt::join(read_formats(), ", ")));
-  app.add_option("--threads", arguments.threads, "threads; 0 (default): every core");
+  add_threads_option(app, arguments.threads);
   app.add_flag("--compress", arguments.compress, "compress the arrays of the body file");
   app.add_flag("--quiet", arguments.quiet, "say warnings only");
   app.add_flag("--force", arguments.force, "let results replace files that are read");
@@ -110,7 +110,6 @@ VoxelizeOptions voxelize_options(const Arguments& arguments) {
     if (!(*options.size > 0)) throw InputError("--size: must be above zero");
   }
   if (arguments.count && *arguments.count <= 0) throw InputError("--count: must be above zero");
-  if (arguments.threads < 0) throw InputError("--threads: must not be below zero");
   if (arguments.count) options.count = static_cast<std::size_t>(*arguments.count);
   options.placement = placement_choice(arguments.placement);
   constexpr Align aligns[] = {Align::snap, Align::box, Align::none};
@@ -152,32 +151,31 @@ int run(int argc, char** argv) {
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   const StopEndsProcess nothing_is_left;
   const VoxelizeOptions options = voxelize_options(arguments);
-  ImportOptions import = import_options(arguments);
+  ImportOptions how = import_options(arguments);
   if (!arguments.vdb.empty() && options.placement != Placement::corner)
     throw InputError("--vdb: centre placement has no cells; use --placement corner");
   check_outputs({{arguments.output, true}, {arguments.vdb, true}, {arguments.summary}}, arguments.parts,
                 arguments.force);
   const ThreadLimit threads(arguments.threads);
   Progress progress(kName, arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
-  import.warn = [&](const std::string& line) { progress.warn(line);
-};
-progress.stage("import");
-Surface surface = import_all(arguments, import);
-for (const std::string& line : size_warnings(surface)) progress.warn(line);
-for (const std::string& line : refinement_notes(surface)) progress.say(line);
-const VoxelizeResult result = voxelize(std::move(surface), options, progress);
-report(result, progress);
-progress.stage("write");
-OutputsTogether outputs({arguments.output, arguments.vdb, arguments.summary});
-if (!arguments.vdb.empty()) write_vdb(result.body, arguments.vdb);
-if (!arguments.summary.empty()) write_text(summary_json(result), arguments.summary);
-write_body(result.body, arguments.output, {.compress = arguments.compress});
-outputs.appear();
-progress.finish();
-return kExitDone;
-}  // namespace
+  how.warn = [&](const std::string& line) { progress.warn(line); };
+  progress.stage("import");
+  Surface surface = import_all(arguments, how);
+  for (const std::string& line : size_warnings(surface)) progress.warn(line);
+  for (const std::string& line : refinement_notes(surface)) progress.say(line);
+  const VoxelizeResult result = voxelize(std::move(surface), options, progress);
+  report(result, progress);
+  progress.stage("write");
+  OutputsTogether outputs({arguments.output, arguments.vdb, arguments.summary});
+  if (!arguments.vdb.empty()) write_vdb(result.body, arguments.vdb);
+  if (!arguments.summary.empty()) write_text(summary_json(result), arguments.summary);
+  write_body(result.body, arguments.output, {.compress = arguments.compress});
+  outputs.appear();
+  progress.finish();
+  return kExitDone;
+}
 
-}  // namespace flexel::voxelize
+}  // namespace
 }  // namespace flexel::voxelize
 
 int main(int argc, char** argv) {

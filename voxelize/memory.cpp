@@ -3,9 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <limits>
-#include <string>
 
 namespace flexel::voxelize {
 
@@ -43,17 +40,6 @@ double simulation_memory(double cells, Placement placement) {
 
 double cells_within(double bytes, Placement placement) {
   return std::max(1., (bytes - kProgram) / bytes_each(placement));
-}
-
-double available_memory() {
-  std::ifstream file("/proc/meminfo");
-  std::string name, unit;
-  double kibibytes = 0;
-  while (file >> name >> kibibytes) {
-    if (name == "MemAvailable:") return kibibytes * 1024;
-    std::getline(file, unit);
-  }
-  return std::numeric_limits<double>::infinity();
 }
 
 }  // namespace flexel::voxelize

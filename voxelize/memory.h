@@ -30,7 +30,4 @@ struct PartExtent {
 // The cells (centre placement: elements) that simulate can hold in so many bytes, at least 1.
 [[nodiscard]] double cells_within(double bytes, Placement placement);
 
-// Bytes that can be used without swapping (MemAvailable); infinite where the system does not say.
-[[nodiscard]] double available_memory();
-
 }  // namespace flexel::voxelize

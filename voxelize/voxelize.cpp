@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/available_memory.h"
 #include "base/error.h"
 #include "base/nearest_word.h"
 #include "base/stop.h"
@@ -155,10 +156,13 @@ void measure(const std::vector<HealedPart>& meshes, VoxelizeResult& result) {
 }
 
 // The parts, healed; the polygons of `surface` face as they do then.
-std::vector<HealedPart> heal_parts(Surface& surface, const HealChoice& how) {
+std::vector<HealedPart> heal_parts(Surface& surface, const HealChoice& how, double memory) {
   std::vector<HealedPart> healed;
-  for (PartMesh& mesh : exact_part_meshes(surface))
-    healed.push_back(heal(std::move(mesh), how, surface.parts[healed.size()].name));
+  for (PartMesh& mesh : exact_part_meshes(surface)) {
+    const std::string& name = surface.parts[healed.size()].name;
+    refuse_fine_wrap(mesh, how, memory, name);
+    healed.push_back(heal(std::move(mesh), how, name));
+  }
   face_outward(healed, surface);
   return healed;
 }
@@ -328,11 +332,11 @@ VoxelizeResult voxelize(Surface surface, const VoxelizeOptions& options, Progres
   if (options.moments && options.placement == Placement::centre)
     throw InputError("--moments: centre placement has no cells; use --placement corner");
   progress.stage("heal");
-  std::vector<HealedPart> meshes = heal_parts(surface, options.heal);
+  const double limit = options.max_memory.value_or(.8 * available_memory());
+  std::vector<HealedPart> meshes = heal_parts(surface, options.heal, limit);
   check_meshes(meshes, surface);
   progress.stage("voxelize");
   const std::vector<PartExtent> extents = extents_of(meshes);
-  const double limit = options.max_memory.value_or(.8 * available_memory());
   const double spacing = choose_spacing(options, extents);
   check_spacing(spacing, meshes, surface);
   double estimate = 0;

@@ -33,6 +33,16 @@ void collect_options(const CLI::App& app, std::vector<std::string>& names) {
       fmt::format("unknown option \"{}\"{}", word, hint.empty() ? "; --help lists the options" : hint));
 }
 
+// CLI11 takes the next argument for the value of "--unit=".
+void refuse_empty_values(int argc, char** argv) {
+  for (int a = 1; a < argc && std::string_view(argv[a]) != "--"; ++a) {
+    const std::string_view word = argv[a];
+    if (word.starts_with("--") && word.ends_with('=') && word.find('=') == word.size() - 1)
+      throw InputError(fmt::format("{}: its value is empty; --help shows what is accepted",
+                                   word.substr(0, word.size() - 1)));
+  }
+}
+
 }  // namespace
 
 bool parse_arguments(CLI::App& app, int argc, char** argv) {
@@ -40,6 +50,7 @@ bool parse_arguments(CLI::App& app, int argc, char** argv) {
     const std::string name = app.get_name().empty() ? stem(argv[0]) : app.get_name();
     app.set_version_flag("--version", name + " " + version(), "Print the version and exit");
   }
+  refuse_empty_values(argc, argv);
   try {
     app.parse(argc, argv);
     return true;
@@ -55,6 +66,17 @@ bool parse_arguments(CLI::App& app, int argc, char** argv) {
     throw InputError(fmt::format("{}; --help shows what is accepted", one_line(error.what())));
   }
   return false;
+}
+
+void add_threads_option(CLI::App& app, int& threads) {
+  // Each takes memory of its own, used or not.
+  static constexpr int kMost = 1024;
+  app.add_option("--threads", threads, "Threads; 0 is every core")->check([](const std::string& text) {
+    int number = 0;
+    return CLI::detail::lexical_cast(text, number) && number >= 0 && number <= kMost
+               ? std::string()
+               : fmt::format("\"{}\" is no whole number from 0 to {}", text, kMost);
+  });
 }
 
 }  // namespace flexel

@@ -9,4 +9,7 @@ namespace flexel {
 // on, false when it is done (help or version was printed).
 [[nodiscard]] bool parse_arguments(CLI::App& app, int argc, char** argv);
 
+// --threads: how many the work may use; 0 is every core.
+void add_threads_option(CLI::App& app, int& threads);
+
 }  // namespace flexel

@@ -7,10 +7,13 @@
 
 #include <cstdio>
 #include <new>
+#include <string_view>
+#include <system_error>
 
 #include "base/error.h"
 #include "base/files/files.h"
 #include "base/files/pipe_code.h"
+#include "base/printable.h"
 #include "base/program/signals.h"
 #include "base/program/standard_output.h"
 #include "base/text.h"
@@ -30,9 +33,16 @@ void hold_standard_descriptors() {
 }
 
 int report(const std::string& name, const std::string& what, int code) {
-  const std::string line = name + ": error: " + one_line(what) + "\n";
+  const std::string line = name + ": error: " + printable(one_line(what)) + "\n";
   std::fwrite(line.data(), 1, line.size(), stderr);
   return code;
+}
+
+// std::thread says it by a code, oneTBB by a text.
+bool wants_a_thread(const std::exception& error) {
+  const auto* system = dynamic_cast<const std::system_error*>(&error);
+  return (system != nullptr && system->code() == std::errc::resource_unavailable_try_again) ||
+         std::string_view(error.what()).starts_with("pthread_create");
 }
 
 // The body's exit code, or that of what it throws.
@@ -61,6 +71,12 @@ int code_of(const std::string& name, const std::function<int()>& body) {
     return report(name, "not enough memory: a larger spacing (--size) or fewer elements (--count) needs less",
                   kExitInput);
   } catch (const std::exception& error) {
+    if (wants_a_thread(error))
+      return report(
+          name,
+          "no thread can be started: the limits of this shell leave no room (ulimit -u, ulimit -v); "
+          "raise them, or give --threads 1",
+          kExitInput);
     return report(name, fmt::format("internal error, please report it with the input: {}", error.what()),
                   kExitOurFault);
   } catch (...) {

@@ -14,6 +14,7 @@
 #include <string_view>
 #include <utility>
 
+#include "base/printable.h"
 #include "base/program/brief_output.h"
 
 namespace flexel {
@@ -64,7 +65,7 @@ HeldWarnings::~HeldWarnings() {
   holds_warnings = false;
   if (std::uncaught_exceptions() > exceptions_)
     for (const std::string& line : held_warnings)
-      print_error(fmt::format("{}: warning: {}\n", held_program, line));
+      print_error(fmt::format("{}: warning: {}\n", held_program, printable(line)));
   held_warnings.clear();
 }
 
@@ -99,7 +100,7 @@ void Progress::update(double share, const std::string& note) {
   const auto filled = static_cast<std::size_t>(std::lround(done * kBarWidth));
   std::string line = fmt::format("{}: {} [{}{}] {:3.0f} %", program_, stage_, std::string(filled, '#'),
                                  std::string(kBarWidth - filled, '.'), std::floor(100 * done));
-  if (!note.empty()) line += "  " + note;
+  if (!note.empty()) line += "  " + printable(note);
   const std::size_t columns = terminal_columns();
   if (line.size() >= columns) line.resize(columns - 1);  // a wrapped line could not be rewritten
   print_error("\r" + line + "\033[K");
@@ -109,7 +110,7 @@ void Progress::update(double share, const std::string& note) {
 void Progress::say(const std::string& line) {
   if (mode_ == Mode::quiet || mode_ == Mode::silent || brief_output) return;
   clear_bar();
-  print_error(fmt::format("{}: {}\n", program_, line));
+  print_error(fmt::format("{}: {}\n", program_, printable(line)));
 }
 
 void Progress::warn(const std::string& line) {
@@ -121,7 +122,7 @@ void Progress::warn(const std::string& line) {
     return;
   }
   clear_bar();
-  print_error(fmt::format("{}: warning: {}\n", program_, line));
+  print_error(fmt::format("{}: warning: {}\n", program_, printable(line)));
 }
 
 void Progress::finish() {

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <exception>
 
+#include "base/available_memory.h"
 #include "base/error.h"
 #include "base/human.h"
 #include "base/parallel.h"
@@ -206,9 +207,7 @@ class Search {
     return (goal_.by_default ? 3 : 1) * goal_.within.value_or(kUsualLimit) - seconds_since(goal_.began);
   }
   // What the runs that are kept hold already is part of the prediction.
-  [[nodiscard]] double memory_limit() const {
-    return kMemoryShare * (voxelize::available_memory() + peak_memory());
-  }
+  [[nodiscard]] double memory_limit() const { return kMemoryShare * (available_memory() + peak_memory()); }
   [[nodiscard]] bool affordable(double size) const { return affordable(prediction(size)); }
   [[nodiscard]] bool affordable(const study::Prediction& predicted) const {
     return predicted.seconds <= kTimeMargin * seconds_left() && predicted.bytes <= memory_limit();

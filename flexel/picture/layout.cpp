@@ -1,8 +1,12 @@
 // Panels in a grid, and the scale that fits all of them.
 #include "flexel/picture/layout.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+
+#include "base/error.h"
 
 namespace flexel::picture {
 namespace {
@@ -63,6 +67,10 @@ Layout lay_out(std::size_t panels, const PictureOptions& options, const Legend* 
   const Grid grid = best_grid(panels, right - margin, bottom - margin);
   const float across = (right - margin) / static_cast<float>(grid.columns),
               down = (bottom - margin) / static_cast<float>(grid.rows);
+  constexpr float kLeast = 8;  // pixels of a panel
+  if (panels > 1 && (across - layout.text < kLeast || down - label - layout.text < kLeast))
+    throw InputError(fmt::format("--size {}x{} leaves no room for {} panels: give a larger one",
+                                 options.width, options.height, panels));
   for (std::size_t p = 0; p < panels; ++p) {
     const auto column = static_cast<float>(static_cast<int>(p) % grid.columns),
                row = static_cast<float>(static_cast<int>(p) / grid.columns);

@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "base/available_memory.h"
 #include "base/error.h"
 #include "base/files/files.h"
 #include "base/units.h"
@@ -197,8 +198,8 @@ std::string Session::why_not(const Trial& trial, const Prediction& prediction) c
                        size ? "another size" : "first runs");
   if (!size && prediction.seconds > kSideShare * wanted_.budget)
     return "time: beside the sizes no run may take more than a tenth of the budget";
-  if (prediction.bytes > kMemoryShare * voxelize::available_memory())
-    return fmt::format("memory: {} are free", human_bytes(voxelize::available_memory()));
+  if (prediction.bytes > kMemoryShare * available_memory())
+    return fmt::format("memory: {} are free", human_bytes(available_memory()));
   return "";
 }
 

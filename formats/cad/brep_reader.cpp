@@ -49,36 +49,34 @@ void check_tables(std::string_view text, const ImportInput& input) {
     throw InputError(input.where, "is cut off: it does not end with the number of its shape");
 }
 
-Surface read_shape(ImportInput& input, const ImportOptions& options) {
+CadMesh read_shape(ImportInput& input, const ImportOptions& options, double unit) {
   const std::string_view text(reinterpret_cast<const char*>(input.bytes.data()), input.bytes.size());
   std::istringstream stream{std::string(text)};  // OpenCASCADE also seeks
   // It reads on past the end without looking, some of it forever; so the stream throws there.
   stream.exceptions(std::ios::failbit | std::ios::badbit);
   TopoDS_Shape shape;
-  if (is_binary(text)) {
-    BinTools::Read(shape, stream);
-  } else {
-    check_tables(text, input);
-    BRepTools::Read(shape, stream, BRep_Builder());
+  try {
+    if (is_binary(text)) {
+      BinTools::Read(shape, stream);
+    } else {
+      check_tables(text, input);
+      BRepTools::Read(shape, stream, BRep_Builder());
+    }
+  } catch (const std::ios_base::failure&) {
+    throw InputError(input.where, "is cut off or damaged: numbers are missing in it");
   }
   if (shape.IsNull()) throw InputError(input.where, "is damaged: OpenCASCADE finds no shape in it");
   const auto nothing = [](const TopoDS_Shape&) { return std::string(); };
-  SurfaceSource source = unitless_source("brep", options);
-  Surface surface =
-      mesh_of(shape, source.unit, {nothing, nothing, [](const TopoDS_Shape&) { return std::nullopt; }},
-              options, input);
-  surface.sources.push_back(std::move(source));
-  return surface;
+  return mesh_of(shape, unit, {nothing, nothing, [](const TopoDS_Shape&) { return std::nullopt; }}, options,
+                 input);
 }
 
 }  // namespace
 
 Surface read_brep(ImportInput& input, const ImportOptions& options) {
-  try {
-    return read_with_occt(input, options, [&] { return read_shape(input, options); });
-  } catch (const std::ios_base::failure&) {
-    throw InputError(input.where, "is cut off or damaged: numbers are missing in it");
-  }
+  const SurfaceSource source = unitless_source("brep", options);
+  return read_with_occt(input, options, source,
+                        [&](const ImportOptions& heard) { return read_shape(input, heard, source.unit); });
 }
 
 }  // namespace flexel

@@ -32,6 +32,8 @@
 namespace flexel {
 namespace {
 
+constexpr double kMillimetre = 1e-3;
+
 // OpenCASCADE reads IGES from files only: this one is in memory and has a name while it is open, so that
 // nothing is left of it, however the program ends.
 class MemoryFile {
@@ -112,8 +114,7 @@ TopoDS_Shape sewn(const TopoDS_Shape& shape, Names& names) {
   return result;
 }
 
-Surface read_entities(const std::string& path, const ImportOptions& options, const ImportInput& input) {
-  constexpr double kMillimetre = 1e-3;
+CadMesh read_entities(const std::string& path, const ImportOptions& options, const ImportInput& input) {
   Message::DefaultMessenger()->ChangePrinters().Clear();  // stdout belongs to the result
   IGESControl_Controller::Init();
   Interface_Static::SetCVal("xstep.cascade.unit", "MM");
@@ -134,10 +135,8 @@ Surface read_entities(const std::string& path, const ImportOptions& options, con
     const auto found = names.find(item.TShape().get());
     return found == names.end() ? std::string() : found->second;
   };
-  Surface surface = mesh_of(shape, kMillimetre,
-                            {name, name, [](const TopoDS_Shape&) { return std::nullopt; }}, options, input);
-  surface.sources.push_back(source_in_unit("iges", kMillimetre));
-  return surface;
+  return mesh_of(shape, kMillimetre, {name, name, [](const TopoDS_Shape&) { return std::nullopt; }}, options,
+                 input);
 }
 
 }  // namespace
@@ -146,7 +145,8 @@ Surface read_iges(ImportInput& input, const ImportOptions& options) {
   if (options.unit) throw InputError(input.where, "an IGES file carries its own unit: leave out --unit");
   check_complete(input);
   const MemoryFile file(input.bytes);
-  return read_with_occt(input, options, [&] { return read_entities(file.path(), options, input); });
+  return read_with_occt(input, options, source_in_unit("iges", kMillimetre),
+                        [&](const ImportOptions& heard) { return read_entities(file.path(), heard, input); });
 }
 
 }  // namespace flexel

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "formats/cad/cad_reading.h"
 #include "formats/common/readers.h"
 
 class TopoDS_Shape;
@@ -21,17 +22,19 @@ struct ShapeLabels {
   std::function<std::optional<ShapeColor>(const TopoDS_Shape& solid_or_face)> color;
 };
 
-// The solids of `shape`, tessellated: parts, faces, vertices in metres, colours; no sources. `unit`: metres
-// per unit of the shape. Throws InputError: no solid, a deflection or an edge that is not positive.
-[[nodiscard]] Surface mesh_of(const TopoDS_Shape& shape, double unit, const ShapeLabels& labels,
+// The solids of `shape`, tessellated. `unit`: metres per unit of the shape. Throws InputError: no solid, a
+// deflection that is not positive.
+[[nodiscard]] CadMesh mesh_of(const TopoDS_Shape& shape, double unit, const ShapeLabels& labels,
                               const ImportOptions& options, const ImportInput& input);
 
 // The message for what OpenCASCADE found wrong with a file.
 [[nodiscard]] std::string damage_message(const std::string& what);
 
-// Runs `read`, which uses OpenCASCADE on the file; its exceptions, crashes and endless loops become
-// InputError.
+// Runs `read`, which uses OpenCASCADE on the file, in a process of its own (reading_child.h), and finishes the
+// mesh. It gets options whose warnings come through. Exceptions, crashes, endless loops and a hunger for
+// memory become InputError.
 [[nodiscard]] Surface read_with_occt(const ImportInput& input, const ImportOptions& options,
-                                     const std::function<Surface()>& read);
+                                     SurfaceSource source,
+                                     const std::function<CadMesh(const ImportOptions&)>& read);
 
 }  // namespace flexel

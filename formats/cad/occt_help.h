@@ -3,6 +3,7 @@
 #include <istream>
 #include <streambuf>
 
+#include "formats/cad/cad_reading.h"
 #include "formats/common/readers.h"
 
 namespace flexel {
@@ -19,7 +20,9 @@ class MemoryStream : private std::streambuf, public std::istream {
 // Throws InputError when the bytes are no STEP file, or when its end is missing.
 void check_step_complete(const ImportInput& input);
 
-// Turns the polygons from `first_polygon` on outward, all together, where they enclose a negative volume.
-void orient_outward(Surface& surface, std::size_t first_polygon);
+// The surface of what OpenCASCADE gave, once it has been checked: solids that are inside out are turned, edges
+// split, colours those of the polygons. Throws InputError: damaged, an edge that is not positive.
+[[nodiscard]] Surface finished(CadMesh mesh, SurfaceSource source, const ImportOptions& options,
+                               const std::string& where);
 
 }  // namespace flexel

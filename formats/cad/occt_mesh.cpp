@@ -11,9 +11,12 @@
 #include <Bnd_Box.hxx>
 #include <Eigen/Geometry>
 #include <IMeshTools_Parameters.hxx>
+#include <OSD_Parallel.hxx>
+#include <OSD_ThreadPool.hxx>
 #include <Poly_PolygonOnTriangulation.hxx>
 #include <Poly_Triangulation.hxx>
 #include <Standard_Failure.hxx>
+#include <Standard_OutOfMemory.hxx>
 #include <TopExp.hxx>
 #include <TopExp_Explorer.hxx>
 #include <TopTools_IndexedMapOfShape.hxx>
@@ -23,19 +26,24 @@
 #include <TopoDS_Vertex.hxx>
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
+#include <cstdlib>
+#include <exception>
+#include <new>
+#include <thread>
 #include <utility>
 
+#include "base/available_memory.h"
 #include "base/disjoint_sets.h"
 #include "base/error.h"
 #include "base/math/area_vector.h"
-#include "base/program/termination.h"
-#include "formats/cad/crash_guard.h"
+#include "base/parallel.h"
+#include "base/units.h"
 #include "formats/cad/occt.h"
 #include "formats/cad/occt_help.h"
+#include "formats/cad/reading_child.h"
 #include "formats/common/readers.h"
-#include "formats/part/subdivide.h"
-#include "formats/part/topology.h"
 
 namespace flexel {
 namespace {
@@ -201,7 +209,7 @@ void add_face(Surface& surface, const SolidMesh& mesh, std::size_t f, double uni
 void add_solid(Surface& surface, const TopoDS_Shape& solid, double unit, const ShapeLabels& labels,
                std::vector<std::optional<ShapeColor>>& colors) {
   const SolidMesh mesh = collect(solid);
-  const std::size_t faces = mesh.triangulations.size(), first_polygon = surface.polygon_count();
+  const std::size_t faces = mesh.triangulations.size();
   NodeMerger merger(mesh);
   for (std::size_t f = 0; f < faces; ++f) merger.add_face(f);
   const auto part = static_cast<std::uint32_t>(surface.parts.size());
@@ -215,76 +223,127 @@ void add_solid(Surface& surface, const TopoDS_Shape& solid, double unit, const S
     colors.push_back(color ? color : solid_color);
     add_face(surface, mesh, f, unit, merger, vertex_of);
   }
-  orient_outward(surface, first_polygon);
 }
 
-// Default for the largest edge: a share of the diagonal of all solids together. A lattice has cells of one
-// size for all of them, so the bolts of a machine need no finer mesh than its frame to bend as their cells
-// do.
-constexpr double kDefaultEdges = 64;
-
-// Without a limit of the user's the edges become as short as kMostTriangles allow.
-void refine(Surface& surface, const ImportOptions& options, const ImportInput& input) {
-  if (options.largest_edge) return subdivide(surface, 0, *options.largest_edge, input.where);
-  const double largest = bounding_box(surface.vertices).diagonal() / kDefaultEdges;
-  if (largest > 0) static_cast<void>(subdivide(surface, 0, largest, kMostTriangles));
+// White for a face that has none; empty where none has.
+std::vector<double> numbers_of(const std::vector<std::optional<ShapeColor>>& colors) {
+  std::vector<double> numbers;
+  if (std::none_of(colors.begin(), colors.end(), [](const auto& color) { return color.has_value(); }))
+    return numbers;
+  for (const auto& color : colors)
+    for (const double value : color.value_or(ShapeColor{1, 1, 1})) numbers.push_back(value);
+  return numbers;
 }
 
-// The colours of the faces as those of their polygons; white where there is none.
-void add_colors(Surface& surface, const std::vector<std::optional<ShapeColor>>& colors) {
-  if (std::none_of(colors.begin(), colors.end(), [](const auto& color) { return color.has_value(); })) return;
-  Column column{3, {}};
-  column.values.reserve(3 * surface.polygon_count());
-  for (const std::uint32_t face : surface.polygon_face) {
-    const ShapeColor color = colors[face].value_or(ShapeColor{1, 1, 1});
-    column.values.insert(column.values.end(), color.begin(), color.end());
+// OpenCASCADE may run out of memory where nothing can catch it: in a destructor, or in a thread of its own.
+void end_on_terminate() {
+  try {
+    if (std::current_exception()) std::rethrow_exception(std::current_exception());
+  } catch (const std::bad_alloc&) {
+    end_child_without_memory();
+  } catch (const Standard_OutOfMemory&) {
+    end_child_without_memory();
+  } catch (...) {
   }
-  surface.polygon_columns[kColorColumn] = std::move(column);
+  std::abort();
+}
+
+// How many threads can be started, `wanted` at most: OpenCASCADE waits for ever for one that could not.
+std::size_t threads_that_start(std::size_t wanted) {
+  std::vector<std::thread> started;
+  std::atomic<bool> all_there = false;
+  try {
+    while (started.size() + 1 < wanted) started.emplace_back([&] { all_there.wait(false); });
+  } catch (const std::exception&) {
+  }
+  all_there = true;
+  all_there.notify_all();
+  for (std::thread& each : started) each.join();
+  return started.size() + 1;
+}
+
+// What the child says. oneTBB is the parent's: OpenCASCADE has threads of its own.
+CadReading reading_of(const std::function<CadMesh(const ImportOptions&)>& read, ImportOptions options,
+                      std::size_t threads) {
+  std::set_terminate(end_on_terminate);
+  CadReading reading;
+  options.warn = [&](const std::string& line) { reading.warnings.push_back(line); };
+  OSD_Parallel::SetUseOcctThreads(Standard_True);
+  OSD_ThreadPool::DefaultPool(static_cast<int>(threads_that_start(threads)));
+  try {
+    reading.mesh = read(options);
+  } catch (const InputError& error) {
+    reading.refused = true;
+    reading.where = error.where();
+    reading.why = error.what();
+  } catch (const Standard_OutOfMemory&) {
+    end_child_without_memory();
+  } catch (const Standard_Failure& failure) {
+    reading.refused = true;
+    reading.why = damage_message(failure.GetMessageString() ? failure.GetMessageString() : "no reason");
+  }
+  return reading;
+}
+
+// Some damaged files send OpenCASCADE into loops without an end, or have it ask for all memory there is. Sound
+// ones take it about a second a megabyte, and 250 bytes a triangle.
+ChildLimits limits_of(const ImportInput& input, const ImportOptions& options) {
+  const auto bytes = static_cast<double>(input.bytes.size());
+  ChildLimits limits;
+  limits.processor = options.occt_seconds.value_or(60 + 1e-5 * bytes);
+  limits.wall = 3 * limits.processor;  // another program may have the processor
+  limits.memory = options.occt_memory.value_or(std::min(.8 * available_memory(), 2e9 + 500 * bytes));
+  return limits;
 }
 
 }  // namespace
 
-Surface mesh_of(const TopoDS_Shape& shape, double unit, const ShapeLabels& labels,
+CadMesh mesh_of(const TopoDS_Shape& shape, double unit, const ShapeLabels& labels,
                 const ImportOptions& options, const ImportInput& input) {
   const std::vector<TopoDS_Shape> solids = solids_of(shape, input);
-  Surface surface;
-  surface.polygon_offsets.push_back(0);
+  CadMesh mesh;
+  mesh.surface.polygon_offsets.push_back(0);
   std::vector<std::optional<ShapeColor>> colors;  // (faces)
   for (const TopoDS_Shape& solid : solids) {
     tessellate(solid, unit, options, input);
-    add_solid(surface, solid, unit, labels, colors);
+    add_solid(mesh.surface, solid, unit, labels, colors);
   }
-  refine(surface, options, input);
-  add_colors(surface, colors);
-  return surface;
+  mesh.face_colors = numbers_of(colors);
+  return mesh;
 }
 
 std::string damage_message(const std::string& what) {
   return fmt::format("is damaged: OpenCASCADE says \"{}\"", clean_name(what));
 }
 
-Surface read_with_occt(const ImportInput& input, const ImportOptions& options,
-                       const std::function<Surface()>& read) {
-  // Some damaged files send OpenCASCADE into loops without an end. Sound ones take it about a second a
-  // megabyte.
-  const double limit = options.occt_seconds.value_or(60 + 1e-5 * static_cast<double>(input.bytes.size()));
-  const StopEndsProcess at_once;
-  try {
-    Surface surface;
-    guarded([&] { surface = read(); }, limit);
-    return surface;
-  } catch (const LibraryCrashed&) {
-    throw InputError(input.where, "is damaged: OpenCASCADE cannot read it");
-  } catch (const LibraryHung&) {
-    throw InputError(
-        input.where,
-        fmt::format("is damaged, or too much for OpenCASCADE: it had not read it after {:.3g} s of "
-                    "processor time; export it anew, or as STL",
-                    limit));
-  } catch (const Standard_Failure& failure) {
-    throw InputError(input.where,
-                     damage_message(failure.GetMessageString() ? failure.GetMessageString() : "no reason"));
+Surface read_with_occt(const ImportInput& input, const ImportOptions& options, SurfaceSource source,
+                       const std::function<CadMesh(const ImportOptions&)>& read) {
+  const ChildLimits limits = limits_of(input, options);
+  const std::size_t threads = thread_count();
+  const ChildOutput output = run_in_child([&] { return pack(reading_of(read, options, threads)); }, limits);
+  switch (output.end) {
+    case ChildEnd::finished:
+      break;
+    case ChildEnd::crashed:
+      throw InputError(input.where, "is damaged: OpenCASCADE cannot read it");
+    case ChildEnd::out_of_time:
+      throw InputError(
+          input.where,
+          fmt::format("is damaged, or too much for OpenCASCADE: it had not read it after {:.3g} s of "
+                      "processor time; export it anew, or as STL",
+                      limits.processor));
+    case ChildEnd::out_of_memory:
+      throw InputError(
+          input.where,
+          fmt::format("is damaged, or too much for OpenCASCADE: it wants more memory than it gets ({} at "
+                      "most); export it anew, or as STL",
+                      human_bytes(limits.memory)));
   }
+  CadReading reading = unpack_reading(output.bytes, input.where);
+  if (options.warn)
+    for (const std::string& line : reading.warnings) options.warn(line);
+  if (reading.refused) throw InputError(reading.where.empty() ? input.where : reading.where, reading.why);
+  return finished(std::move(reading.mesh), std::move(source), options, input.where);
 }
 
 }  // namespace flexel

@@ -32,6 +32,8 @@
 namespace flexel {
 namespace {
 
+constexpr double kMillimetre = 1e-3;
+
 bool is_geometry(const Handle(Standard_Transient) & entity) {
   const bool representation = entity->IsKind(STANDARD_TYPE(StepRepr_Representation)) &&
                               !std::string_view(entity->DynamicType()->Name()).starts_with("StepVisual_");
@@ -158,19 +160,16 @@ void tell_tessellated(const ImportInput& input, bool all, const ImportOptions& o
                                       input.file, kind, kAdvice));
 }
 
-Surface read_solids(ImportInput& input, const ImportOptions& options) {
-  constexpr double kMillimetre = 1e-3;
+CadMesh read_solids(ImportInput& input, const ImportOptions& options) {
   STEPControl_Reader reader;
   const TopoDS_Shape shape = transfer(reader, input, options);
   tell_tessellated(input, shape.IsNull(), options);
   const StepNames names(reader);
-  Surface surface = mesh_of(shape, kMillimetre,
-                            {[&](const TopoDS_Shape& solid) { return names.solid(solid); },
-                             [&](const TopoDS_Shape& face) { return names.own(face); },
-                             [&](const TopoDS_Shape& item) { return names.color(item); }},
-                            options, input);
-  surface.sources.push_back(source_in_unit("step", kMillimetre));
-  return surface;
+  return mesh_of(shape, kMillimetre,
+                 {[&](const TopoDS_Shape& solid) { return names.solid(solid); },
+                  [&](const TopoDS_Shape& face) { return names.own(face); },
+                  [&](const TopoDS_Shape& item) { return names.color(item); }},
+                 options, input);
 }
 
 }  // namespace
@@ -178,7 +177,8 @@ Surface read_solids(ImportInput& input, const ImportOptions& options) {
 Surface read_step(ImportInput& input, const ImportOptions& options) {
   if (options.unit) throw InputError(input.where, "a STEP file carries its own unit: leave out --unit");
   check_step_complete(input);
-  return read_with_occt(input, options, [&] { return read_solids(input, options); });
+  return read_with_occt(input, options, source_in_unit("step", kMillimetre),
+                        [&](const ImportOptions& heard) { return read_solids(input, heard); });
 }
 
 }  // namespace flexel

@@ -19,8 +19,9 @@ struct ImportOptions {
   // triangles are an error. Default: meshes (STL, OBJ, ...) stay as they are; the tessellation of CAD files
   // is split to a 64th of the diagonal of all solids together, or as far as 2 million triangles a file allow.
   std::optional<double> largest_edge;
-  // s of processor time that OpenCASCADE may take over a file; not given: a minute and 10 s a megabyte
-  std::optional<double> occt_seconds;
+  // s of processor time that OpenCASCADE may take over a file, and bytes of memory; not given: a minute and
+  // 10 s a megabyte, and 2 GB and 500 bytes a byte, or 80 % of what is free
+  std::optional<double> occt_seconds, occt_memory;
   // Called with a line for each thing that a reader ignored and the user should know.
   std::function<void(const std::string&)> warn;
 };

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/math/weld.h"
+#include "base/printable.h"
 #include "formats/common/readers.h"
 #include "formats/part/topology.h"
 
@@ -75,35 +76,11 @@ void check_indices(const Surface& surface, const ImportInput& input) {
                                                 std::uint64_t{vertex} + 1, surface.vertices.size()));
 }
 
-namespace {
-
-// Length of the UTF-8 sequence at the front of `text`, or 0 where there is none (RFC 3629).
-std::size_t utf8_length(std::string_view text) {
-  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
-  const unsigned char lead = byte(0);
-  const std::size_t length = lead < 0x80   ? 1
-                             : lead < 0xc2 ? 0
-                             : lead < 0xe0 ? 2
-                             : lead < 0xf0 ? 3
-                             : lead < 0xf5 ? 4
-                                           : 0;
-  if (length > text.size()) return 0;
-  for (std::size_t i = 1; i < length; ++i)
-    if ((byte(i) & 0xc0) != 0x80) return 0;
-  if (length == 3 && ((lead == 0xe0 && byte(1) < 0xa0) || (lead == 0xed && byte(1) > 0x9f))) return 0;
-  if (length == 4 && ((lead == 0xf0 && byte(1) < 0x90) || (lead == 0xf4 && byte(1) > 0x8f))) return 0;
-  return length;
-}
-
-}  // namespace
-
 std::string clean_name(std::string_view text) {
   std::string name;
   while (!text.empty()) {
     const std::size_t length = utf8_length(text);
-    const bool plain =
-        length > 1 || (length == 1 && static_cast<unsigned char>(text[0]) >= 0x20 && text[0] != 0x7f);
-    if (plain)
+    if (length > 0 && !acts_on_terminal(text.substr(0, length)))
       name.append(text.substr(0, length));
     else
       name.push_back(std::isspace(static_cast<unsigned char>(text[0])) != 0 ? ' ' : '?');

@@ -66,8 +66,8 @@ void assign_group_faces(Surface& surface, const std::vector<std::uint32_t>& poly
 // Throws InputError where a polygon names a vertex that is not there.
 void check_indices(const Surface& surface, const ImportInput& input);
 
-// Text of a file fit for messages and for JSON: bytes that are no UTF-8 and control characters become '?',
-// blanks at the ends go.
+// Text of a file fit for messages and for JSON: bytes that are no UTF-8 and what acts on a terminal
+// (base/printable.h) become '?', blanks at the ends go.
 [[nodiscard]] std::string clean_name(std::string_view text);
 
 // The source record of a format that carries no unit: --unit, else mm.

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <set>
 
+#include "base/printable.h"
 #include "formats/exchange/surface_file.h"
 
 namespace flexel {
@@ -78,14 +79,29 @@ std::string path_of(std::string path, const std::string& name) {
   return path;
 }
 
+// A part's name as one of a file: no folder in it, and nothing that acts on a terminal (a body's names are
+// whatever its file says).
+std::string fit_for_file(std::string_view name) {
+  std::string fit;
+  while (!name.empty()) {
+    const std::size_t length = utf8_length(name);
+    const std::string_view character = name.substr(0, std::max<std::size_t>(length, 1));
+    if (length == 0 || character == "/" || acts_on_terminal(character))
+      fit += '_';
+    else
+      fit += character;
+    name.remove_prefix(character.size());
+  }
+  return fit;
+}
+
 // Names fit for files, no two alike: a part whose own name fits has it, others get "-2", "-3" ... where
 // theirs is taken.
 std::vector<std::string> file_names(const std::vector<SurfacePart>& parts) {
   std::vector<std::string> names(parts.size());
   std::set<std::string> taken;
   for (std::size_t p = 0; p < parts.size(); ++p) {
-    names[p] = parts[p].name;
-    std::replace(names[p].begin(), names[p].end(), '/', '_');
+    names[p] = fit_for_file(parts[p].name);
     if (names[p] == parts[p].name) taken.insert(names[p]);
   }
   for (std::size_t p = 0; p < parts.size(); ++p) {

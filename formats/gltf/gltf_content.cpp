@@ -12,6 +12,7 @@
 #include <cstring>
 
 #include "base/error.h"
+#include "base/json_depth.h"
 
 namespace flexel {
 namespace {
@@ -234,6 +235,8 @@ bool looks_like_glb(std::span<const std::byte> bytes) {
 }
 
 GltfJson parse_gltf_json(std::string_view text, const std::string& where) {
+  if (json_depth(text) > kDeepestJson)
+    damaged(where, fmt::format("its JSON is nested more than {} deep", kDeepestJson));
   GltfJson json = GltfJson::parse(text, nullptr, false);
   if (!json.is_object()) damaged(where, "its JSON does not parse");
   const auto asset = json.find("asset");

@@ -14,6 +14,7 @@
 #include <optional>
 
 #include "base/error.h"
+#include "base/text.h"
 #include "base/units.h"
 #include "formats/common/readers.h"
 #include "formats/part/topology.h"
@@ -57,6 +58,29 @@ std::string decode_percent(std::string_view uri) {
   return text;
 }
 
+// A file may come from anybody, and what it names must not be told to whoever gets the result: only what lies
+// beside it or below, links followed, and no device or FIFO, which may have no end.
+std::string buffer_path(const std::string& uri, const ImportInput& input) {
+  namespace fs = std::filesystem;
+  const fs::path path = fs::path(input.folder) / decode_percent(uri);
+  std::error_code error;
+  const auto inside = [&](const fs::path& folder) {
+    const fs::path from = fs::canonical(folder.empty() ? "." : folder, error);
+    if (error) return false;
+    const fs::path way = fs::weakly_canonical(path, error).lexically_relative(from);
+    return !error && !way.empty() && *way.begin() != "..";
+  };
+  const auto refuse = [&](const char* why) {
+    throw InputError(input.where, fmt::format("has its numbers in \"{}\", {}", shown(uri), why));
+  };
+  if (!inside(input.folder) && !inside(fs::canonical(input.where, error).parent_path()))
+    refuse("outside of its folder, from where nothing is read: put that file beside it, or give a GLB");
+  if (!fs::exists(path, error))
+    refuse("which is not there: put that file where it looks for it, or give a GLB");
+  if (!fs::is_regular_file(path, error)) refuse("which is no file: give a GLB");
+  return path.string();
+}
+
 Bytes load_uri(const std::string& uri, const ImportInput& input) {
   if (uri.starts_with("data:")) {
     const std::size_t comma = uri.find(";base64,");
@@ -70,7 +94,7 @@ Bytes load_uri(const std::string& uri, const ImportInput& input) {
                                  clean_name(uri)));
   if (uri.find("://") != std::string::npos)
     throw InputError(input.where, "has its numbers on a network, from where nothing is read");
-  return read_all((std::filesystem::path(input.folder) / decode_percent(uri)).string());
+  return read_all(buffer_path(uri, input));
 }
 
 // All buffers as the one of a GLB.

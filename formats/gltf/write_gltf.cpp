@@ -202,7 +202,8 @@ class GltfRewrite {
     return false;
   }
 
-  [[nodiscard]] bool overlapped(std::size_t accessor) const {
+  // Whether another accessor reads these bytes; one that is damaged, which nothing shown uses, may.
+  [[nodiscard]] bool overlapped(std::size_t accessor) const try {
     const GltfAccessor own = gltf_accessor(gltf_, accessor, source_.file);
     const std::size_t own_end = own.begin + own.count * own.stride;
     for (std::size_t other = 0; other < gltf_.json["accessors"].size(); ++other) {
@@ -217,6 +218,8 @@ class GltfRewrite {
       if (!apart && !interleaved) return true;
     }
     return false;
+  } catch (const InputError&) {
+    return true;
   }
 
   const DeformedSurface& deformed_;

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/json_depth.h"
 #include "base/version.h"
 
 namespace flexel {
@@ -227,6 +228,9 @@ std::string metadata_to_json(const Body& body, bool with_surface, const std::vec
 }
 
 Metadata metadata_from_json(const std::string& text, const std::string& where) {
+  if (json_depth(text) > kDeepestJson)
+    throw InputError(where,
+                     fmt::format("damaged: flexel_metadata is nested more than {} deep", kDeepestJson));
   const Json json = Json::parse(text, nullptr, false);
   if (json.is_discarded()) throw InputError(where, "damaged: flexel_metadata is not JSON");
   const Cursor root(json, "", where);

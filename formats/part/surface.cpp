@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 
 #include <cmath>
+#include <map>
 #include <set>
 #include <utility>
 
@@ -192,15 +193,16 @@ std::vector<std::uint32_t> face_numbers(const Surface& surface) {
 
 void make_part_names_unique(Surface& surface, const std::string& fallback) {
   std::set<std::string> all, used;
+  std::map<std::string, std::size_t> next;  // number to try, of a name that is taken
   for (SurfacePart& part : surface.parts) {
     if (part.name.empty()) part.name = fallback;
     all.insert(part.name);
   }
   for (SurfacePart& part : surface.parts) {
     const std::string name = part.name;
-    for (std::size_t number = 2; used.contains(part.name) || (part.name != name && all.contains(part.name));
-         ++number)
-      part.name = fmt::format("{}-{}", name, number);
+    std::size_t& number = next.try_emplace(name, 2).first->second;
+    while (used.contains(part.name) || (part.name != name && all.contains(part.name)))
+      part.name = fmt::format("{}-{}", name, number++);
     used.insert(part.name);
   }
 }

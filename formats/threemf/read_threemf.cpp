@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/stop.h"
 #include "formats/common/readers.h"
 #include "formats/part/topology.h"
 #include "formats/threemf/zip.h"
@@ -30,6 +31,7 @@ using Id = std::pair<std::string, std::string>;  // the model file in the archiv
 
 constexpr int kDeepest = 64;
 constexpr std::size_t kMostInstances = 1'000'000;
+constexpr double kMostRepeated = 20e6;  // triangles that repeat others
 
 // "m:color" is "color": prefixes differ from writer to writer.
 std::string_view local(std::string_view name) {
@@ -84,14 +86,22 @@ std::map<std::string, std::string> unread_extensions(const pugi::xml_node& model
   return unread;
 }
 
-// Whether the node, one of its attributes, or anything below it has the prefix.
+// Whether the node, one of its attributes, or anything below it has the prefix. Elements may lie in one
+// another without end, so nothing recurses.
 bool uses(const pugi::xml_node& node, const std::string& prefix) {
   const auto has = [&](std::string_view name) { return name.starts_with(prefix + ":"); };
-  if (has(node.name())) return true;
-  for (const pugi::xml_attribute& found : node.attributes())
-    if (has(found.name())) return true;
-  return std::any_of(node.begin(), node.end(),
-                     [&](const pugi::xml_node& below) { return uses(below, prefix); });
+  const auto has_itself = [&](const pugi::xml_node& one) {
+    return has(one.name()) || std::any_of(one.attributes_begin(), one.attributes_end(),
+                                          [&](const auto& found) { return has(found.name()); });
+  };
+  std::vector<pugi::xml_node> pending = {node};
+  while (!pending.empty()) {
+    const pugi::xml_node one = pending.back();
+    pending.pop_back();
+    if (has_itself(one)) return true;
+    for (const pugi::xml_node& below : one.children()) pending.push_back(below);
+  }
+  return false;
 }
 
 class ThreeMfReader {
@@ -104,10 +114,12 @@ class ThreeMfReader {
     const pugi::xml_node model = models_.at(root).node;
     surface_.polygon_offsets.push_back(0);
     const double unit = unit_of(model);
+    double triangles = 0;
+    for_each_child(child(model, "build"), "item",
+                   [&](const pugi::xml_node& item) { triangles += unfolded(named_by(item, root), 0); });
+    check_unfolded(triangles);
     for_each_child(child(model, "build"), "item", [&](const pugi::xml_node& item) {
-      const std::string_view path = attribute(item, "path");
-      add_object({path.empty() ? root : normal_path(path), std::string(attribute(item, "objectid"))},
-                 transform_of(item), clean_name(attribute(item, "partnumber")), 0);
+      add_object(named_by(item, root), transform_of(item), clean_name(attribute(item, "partnumber")), 0);
     });
     if (surface_.polygon_count() == 0) fail("builds no triangles: nothing to work on");
     for (Vec3& vertex : surface_.vertices) vertex *= unit;
@@ -149,7 +161,7 @@ class ThreeMfReader {
   }
 
   // The model that the archive's relationships name.
-  [[nodiscard]] std::string root_model() const {
+  [[nodiscard]] std::string root_model() {
     if (const auto bytes = archive_.read("_rels/.rels")) {
       pugi::xml_document document;
       document.load_buffer(bytes->data(), bytes->size());
@@ -234,6 +246,12 @@ class ThreeMfReader {
     return product;
   }
 
+  // The object that an item or a component of the model `file` shows.
+  static Id named_by(const pugi::xml_node& node, const std::string& file) {
+    const std::string_view path = attribute(node, "path");
+    return {path.empty() ? file : normal_path(path), std::string(attribute(node, "objectid"))};
+  }
+
   void add_object(const Id& id, const Transform& transform, const std::string& fallback, int depth) {
     if (depth > kDeepest || ++instances_ > kMostInstances)
       fail("is damaged: its components contain one another, or are more than a million");
@@ -245,12 +263,37 @@ class ThreeMfReader {
     const std::string own = clean_name(attribute(object, "name"));
     const std::string& name = own.empty() ? fallback : own;
     check_readable(model, object, name.empty() ? id.second : name);
+    check_stop();
     if (const pugi::xml_node mesh = child(object, "mesh")) add_mesh(model, object, mesh, transform, name);
     for_each_child(child(object, "components"), "component", [&](const pugi::xml_node& component) {
-      const std::string_view path = attribute(component, "path");
-      add_object({path.empty() ? id.first : normal_path(path), std::string(attribute(component, "objectid"))},
-                 times(transform, transform_of(component)), name, depth + 1);
+      add_object(named_by(component, id.first), times(transform, transform_of(component)), name, depth + 1);
     });
+  }
+
+  // Triangles of an object with all that its components show; each object is counted once.
+  double unfolded(const Id& id, int depth) {
+    const auto [known, added] = unfolded_.try_emplace(id, 0);  // 0 too for one that shows itself
+    if (!added) return known->second;
+    const Model& model = load(id.first);
+    const auto found = model.objects.find(id.second);
+    if (found == model.objects.end() || depth > kDeepest) return 0;  // add_object() says so
+    const auto triangles = child(child(found->second, "mesh"), "triangles").children();
+    const auto own = static_cast<double>(std::distance(triangles.begin(), triangles.end()));
+    double sum = own;
+    for_each_child(child(found->second, "components"), "component", [&](const pugi::xml_node& component) {
+      sum += unfolded(named_by(component, id.first), depth + 1);
+    });
+    different_ += own;
+    return known->second = sum;
+  }
+
+  // A few lines of components that show components can be more triangles than memory holds.
+  void check_unfolded(double triangles) const {
+    if (triangles - different_ > kMostRepeated)
+      fail(
+          fmt::format("shows the same objects again and again, with {:.3g} million triangles in all: it is "
+                      "damaged, or made to fill the memory",
+                      1e-6 * triangles));
   }
 
   // An object is its triangles, or its components, and nothing else that has matter.
@@ -351,6 +394,8 @@ class ThreeMfReader {
   Column color_{4, {}};
   bool colored_ = false;
   std::size_t instances_ = 0;
+  std::map<Id, double> unfolded_;  // triangles
+  double different_ = 0;           // triangles of the objects in unfolded_, each counted once
 };
 
 Evidence sniff_3mf(const ImportInput& input) {

@@ -4,17 +4,23 @@
 #include <fmt/format.h>
 #include <zip.h>
 
+#include <algorithm>
+
+#include "base/available_memory.h"
 #include "base/error.h"
+#include "base/units.h"
 
 namespace flexel {
 namespace {
 
-// Deflate packs no better than 1032 to 1.
-constexpr std::uint64_t kBestRatio = 1032;
+// Deflate packs no better than 1032 to 1, and no model, XML of numbers, better than some 20 to 1.
+constexpr std::uint64_t kBestRatio = 1032, kSoundRatio = 100, kAlwaysSound = 256'000'000;
+constexpr double kBytesToRead = 6;  // of memory a byte of XML
 
 }  // namespace
 
-ZipArchive::ZipArchive(std::span<const std::byte> bytes, std::string where) : where_(std::move(where)) {
+ZipArchive::ZipArchive(std::span<const std::byte> bytes, std::string where)
+    : where_(std::move(where)), packed_(bytes.size()) {
   zip_error_t error;
   zip_error_init(&error);
   zip_source_t* source = zip_source_buffer_create(bytes.data(), bytes.size(), 0, &error);
@@ -39,7 +45,7 @@ std::vector<std::string> ZipArchive::names() const {
   return result;
 }
 
-std::optional<Bytes> ZipArchive::read(const std::string& name) const {
+std::optional<Bytes> ZipArchive::read(const std::string& name) {
   const zip_int64_t index = zip_name_locate(archive_, name.c_str(), ZIP_FL_NOCASE);
   if (index < 0) return std::nullopt;
   zip_stat_t about;
@@ -50,7 +56,19 @@ std::optional<Bytes> ZipArchive::read(const std::string& name) const {
   if (zip_stat_index(archive_, static_cast<zip_uint64_t>(index), 0, &about) != 0 ||
       (about.valid & ZIP_STAT_SIZE) == 0 || (about.valid & ZIP_STAT_COMP_SIZE) == 0)
     throw damaged("its size is not known");
-  if (about.size / kBestRatio > about.comp_size) throw damaged("its sizes do not agree");
+  if (about.comp_size > packed_ || about.size / kBestRatio > about.comp_size)
+    throw damaged("its sizes do not agree");
+  unpacked_ += about.size;
+  if (unpacked_ > std::max(kAlwaysSound, kSoundRatio * packed_))
+    throw InputError(where_,
+                     fmt::format("unpacks to {}, more than {} times its size: it is damaged, or made to "
+                                 "fill the memory",
+                                 human_bytes(static_cast<double>(unpacked_)), kSoundRatio));
+  if (kBytesToRead * static_cast<double>(unpacked_) > .8 * available_memory())
+    throw InputError(where_,
+                     fmt::format("needs {} of memory to read, more than is free: export its parts one by "
+                                 "one",
+                                 human_bytes(kBytesToRead * static_cast<double>(unpacked_))));
   zip_file_t* file = zip_fopen_index(archive_, static_cast<zip_uint64_t>(index), 0);
   if (file == nullptr) throw damaged(zip_strerror(archive_));
   Bytes bytes(about.size);

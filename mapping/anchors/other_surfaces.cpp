@@ -112,7 +112,8 @@ void map_onto(Body& body, const Surface& surface) {
 
 PointTable read_points(const std::string& path, double unit) {
   const Bytes bytes = read_all(path);
-  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);  // the mark of UTF-8, as Excel writes it
   const std::string name = path == "-" ? "stdin" : path;
   PointTable table;
   table.column = {0, 1, 2};

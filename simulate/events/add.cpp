@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "base/error.h"
+#include "base/files/named_file.h"
 #include "formats/lattice/body_file.h"
 #include "formats/lattice/merge.h"
 #include "simulate/models/rest_shape.h"
@@ -36,6 +37,7 @@ Add Add::parse(TableReader& reader) {
 }
 
 std::vector<std::string> Add::prepare() {
+  refuse_device(path_, origin_);
   try {
     body_ = read_body(path_);
   } catch (const InputError& error) {

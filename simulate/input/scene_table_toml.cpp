@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/number_range.h"
+#include "simulate/input/key_depth.h"
 #include "simulate/input/scene_table.h"
 
 namespace flexel::simulate {
@@ -68,6 +69,7 @@ void refuse_wild_numbers(const SceneValue& value, const std::string& key, const 
 }  // namespace
 
 SceneValue read_toml(const std::string& text, const std::string& name) {
+  refuse_long_keys(text, name);
   try {
     SceneValue root = convert(toml::parse(text, name));
     root.line = 1;

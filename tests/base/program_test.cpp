@@ -13,6 +13,7 @@
 #include <csignal>
 #include <filesystem>
 #include <new>
+#include <system_error>
 #include <thread>
 
 #include "base/files/files.h"
@@ -89,6 +90,13 @@ TEST(Program, MemoryIsTheUsersAndTheRestIsOurs) {
   const Outcome memory = run(throwing(std::bad_alloc()));
   EXPECT_EQ(memory.code, 2);
   EXPECT_THAT(memory.err, HasSubstr("not enough memory"));
+  const std::error_code few = std::make_error_code(std::errc::resource_unavailable_try_again);
+  for (const auto& body :
+       {throwing(std::system_error(few)), throwing(std::runtime_error("pthread_create has failed"))}) {
+    const Outcome threads = run(body);
+    EXPECT_EQ(threads.code, 2);
+    EXPECT_THAT(threads.err, HasSubstr("no thread can be started"));
+  }
   const Outcome ours = run(throwing(std::logic_error("index 7")));
   EXPECT_EQ(ours.code, 1);
   EXPECT_THAT(ours.err, HasSubstr("internal error"));

@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "base/error.h"
+#include "formats/lattice/body_metadata.h"
 #include "tests/formats/bodies.h"
 #include "tests/formats/import_help.h"
 
@@ -310,6 +311,16 @@ TEST_F(BodyFile, NumbersThatAreNotFiniteAreRefused) {
   } catch (const InputError& error) {
     EXPECT_EQ(std::string(error.what()), "damaged body: position[3] is not finite");
     EXPECT_EQ(error.where(), path("nan.vtu"));
+  }
+}
+
+TEST_F(BodyFile, MetadataThatNestsWithoutEndIsRefused) {
+  try {
+    (void)metadata_from_json(std::string(100000, '['), "deep.vtu");
+    FAIL() << "it was read";
+  } catch (const InputError& error) {
+    EXPECT_EQ(error.where(), "deep.vtu");
+    EXPECT_EQ(std::string(error.what()), "damaged: flexel_metadata is nested more than 500 deep");
   }
 }
 

@@ -76,6 +76,18 @@ TEST(ImportBrep, DamageIsNamed) {
   EXPECT_THAT(import_error(scratch.write("c.brep", counts)), HasSubstr("wrong length"));
 }
 
+TEST(ImportBrep, TimeAndMemoryHaveLimits) {
+  const Scratch scratch;
+  write_ball_brep(scratch.path("a.brep"));
+  ImportOptions little_memory, little_time;
+  little_memory.deflection = 1e-9;
+  little_memory.occt_memory = 2e7;
+  EXPECT_THAT(import_error(scratch.path("a.brep"), little_memory),
+              HasSubstr("wants more memory than it gets"));
+  little_time.occt_seconds = 1e-6;
+  EXPECT_THAT(import_error(scratch.path("a.brep"), little_time), HasSubstr("s of processor time"));
+}
+
 #endif
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <BRepAlgoAPI_Cut.hxx>
 #include <BRepPrimAPI_MakeBox.hxx>
+#include <BRepPrimAPI_MakeSphere.hxx>
 #include <BRepTools.hxx>
 #include <BinTools.hxx>
 #include <IGESControl_Controller.hxx>
@@ -43,6 +44,10 @@ void write_bracket_brep(const std::string& path, bool binary) {
     BinTools::Write(solid_bracket(), path.c_str());
   else
     BRepTools::Write(solid_bracket(), path.c_str());
+}
+
+void write_ball_brep(const std::string& path) {
+  BRepTools::Write(BRepPrimAPI_MakeSphere(10).Shape(), path.c_str());
 }
 
 void write_bracket_step(const std::string& path, const char* unit) {

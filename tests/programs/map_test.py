@@ -63,6 +63,11 @@ def test_points_come_out_as_the_table_they_were_in():
     expect(piped.out.decode().count(",") == 2, f"{piped.out}")
 
 
+def test_points_from_a_spreadsheet_begin_with_a_mark():
+    write("p.csv", "\ufeffx,y,z\n40,5,5\n")
+    expect_ok(run("flexel-map", bent(), "--points", "p.csv", "-o", "out.csv"))
+
+
 def test_wrong_points_name_their_line():
     bent()
     for text, fragment in [("x,y,z\n1,2\n", "bad.csv:2"), ("1,2,three\n", "bad.csv:1"), ("a,b\n1,2\n", "bad.csv:1"),

@@ -22,6 +22,9 @@ struct HealedPart {
 // InputError where that goes through an opening and keeps no volume.
 [[nodiscard]] HealedPart heal(PartMesh mesh, const HealChoice& how, const std::string& name);
 
+// Throws InputError where a wrap of the width in `how` would take more than `memory` [bytes].
+void refuse_fine_wrap(const PartMesh& mesh, const HealChoice& how, double memory, const std::string& name);
+
 // Whether a hole that is too large to fill is left in a shell of a tenth of the area or more.
 [[nodiscard]] bool has_large_hole(const HealedPart& part);
 

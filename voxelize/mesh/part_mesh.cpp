@@ -90,11 +90,11 @@ void number_shells(PartMesh& mesh) {
 }
 
 // Compacts the vertices that triangles [of one part] use, in order of index, and drops triangles with a
-// repeated corner.
+// repeated corner. `number` (vertices of the surface) is kNoTriangle throughout, before and after: a surface of
+// many parts is not gone through once for each.
 PartMesh build_mesh(const Surface& surface, const Triangles& triangles, std::span<const std::uint32_t> chosen,
-                    const std::vector<std::uint32_t>& welded) {
+                    const std::vector<std::uint32_t>& welded, std::vector<std::uint32_t>& number) {
   PartMesh mesh;
-  std::vector<std::uint32_t> number(surface.vertices.size(), kNoTriangle);
   mesh.corners.reserve(chosen.size());
   mesh.polygon.reserve(chosen.size());
   for (const std::uint32_t t : chosen) {
@@ -114,6 +114,8 @@ PartMesh build_mesh(const Surface& surface, const Triangles& triangles, std::spa
     mesh.corners.push_back(c);
     mesh.polygon.push_back(triangles.polygon[t]);
   }
+  for (const std::uint32_t t : chosen)
+    for (const std::uint32_t v : triangles.corners[t]) number[welded[v]] = kNoTriangle;
   number_edges(mesh);
   return mesh;
 }
@@ -150,13 +152,13 @@ std::vector<std::uint32_t> used_vertices(const Triangles& triangles, std::span<c
 // Float noise in a file's coordinates opens cracks far below any lattice spacing: close them where that makes
 // the part whole.
 PartMesh close_cracks(const Surface& surface, const Triangles& triangles,
-                      std::span<const std::uint32_t> chosen, std::vector<std::uint32_t> welded,
-                      PartMesh open) {
+                      std::span<const std::uint32_t> chosen, std::vector<std::uint32_t> welded, PartMesh open,
+                      std::vector<std::uint32_t>& number) {
   constexpr double kRelativeTolerance = 1e-7;  // of the diagonal
   const double tolerance = kRelativeTolerance * bounding_box(open.world).diagonal();
   const auto near = weld_near(surface.vertices, used_vertices(triangles, chosen, welded), tolerance);
   for (std::uint32_t& v : welded) v = near[v];
-  PartMesh mesh = build_mesh(surface, triangles, chosen, welded);
+  PartMesh mesh = build_mesh(surface, triangles, chosen, welded, number);
   if (mesh.open_edges > 0 || mesh.corners.empty()) return open;
   mesh.cracks_closed = true;
   return mesh;
@@ -169,10 +171,12 @@ std::vector<PartMesh> make_meshes(const Surface& surface, bool closing) {
   for (std::uint32_t t = 0; t < triangles.corners.size(); ++t)
     of_part[surface.polygon_part(triangles.polygon[t])].push_back(t);
   std::vector<PartMesh> meshes;
+  std::vector<std::uint32_t> number(surface.vertices.size(), kNoTriangle);
   for (const auto& chosen : of_part) {
-    PartMesh mesh = build_mesh(surface, triangles, chosen, welded);
+    check_stop();
+    PartMesh mesh = build_mesh(surface, triangles, chosen, welded, number);
     if (closing && mesh.open_edges > 0)
-      mesh = close_cracks(surface, triangles, chosen, welded, std::move(mesh));
+      mesh = close_cracks(surface, triangles, chosen, welded, std::move(mesh), number);
     meshes.push_back(std::move(mesh));
   }
   return meshes;

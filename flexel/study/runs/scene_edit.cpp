@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/units.h"
+#include "simulate/input/key_depth.h"
 #include "simulate/scene/effects.h"
 
 namespace flexel::study {
@@ -25,6 +26,7 @@ std::vector<std::string> effect_keys() {
 }
 
 toml::table parse(const std::string& text, const std::string& name) {
+  simulate::refuse_long_keys(text, name);
   try {
     return toml::parse(text, name);
   } catch (const toml::parse_error& error) {
