@@ -277,6 +277,7 @@ SolvedRun solve(const DeformArguments& arguments, Plan& plan, std::optional<Accu
   add_actions(plan.job, run.voxels.body);
   run.simulated =
       simulate::simulate(run.voxels.body, plan.job.scene, simulate_options(arguments, plan), progress);
+  use_field(run.voxels.body, arguments.map, plan.map);
   return run;
 }
 
@@ -293,15 +294,17 @@ bool has_thin_walls(const SolvedRun& run) {
 // What to do next, of this run.
 std::string next_step(const SolvedRun& run, const std::optional<AccuracyReport>& accuracy) {
   if (!accuracy) return "";
-  if (!QuadraticField::is_in(run.voxels.body) && !run.simulated.timed && !run.simulated.settled && has_thin_walls(run))
+  if (!QuadraticField::is_in(run.voxels.body) && !run.simulated.timed && !run.simulated.settled &&
+      has_thin_walls(run))
     return "--model quadratic is made for walls as thin as these (small deflections)";
   std::string chosen_for;
   if (accuracy->goal.error) chosen_for += human_share(*accuracy->goal.error);
   if (accuracy->goal.within)
     chosen_for +=
         fmt::format("{}within {}", chosen_for.empty() ? "" : " ", human_seconds(*accuracy->goal.within));
-  const std::string method =
-      accuracy->method == name_of(&mapping::kBlended) ? "" : " --method " + accuracy->method;
+  const bool usual = accuracy->method == name_of(&mapping::kBlended) ||
+                     accuracy->method == name_of(&mapping::kShapeFunctions);
+  const std::string method = usual ? "" : " --method " + accuracy->method;
   const std::string repeat = fmt::format("--size {}{} repeats this run, chosen for {}",
                                          size_text(accuracy->runs.back().size), method, chosen_for);
   return accuracy->advice.empty() ? repeat : accuracy->advice + "; " + repeat;
@@ -325,7 +328,6 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
     if (accuracy) report(run.voxels, progress);
     for (const std::string& line : summary_lines(run.simulated)) progress.say(line);
     progress.stage("map");
-    use_field(body, arguments.map, plan.map);
     mapped = map_part(body, plan.map, plan.crack, progress);
     progress.finish();
     say_report(mapped.report, arguments.map, plan.map, progress);
@@ -364,7 +366,8 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
     for (std::size_t p = 0; p < materials.size(); ++p)
       if (const std::string line = infill_line(body.parts[p].name, materials[p]); !line.empty())
         progress.say(line);
-  for (const std::string& line : answer_lines(run.simulated, body, materials, next_step(run, accuracy), "--size"))
+  for (const std::string& line :
+       answer_lines(run.simulated, body, materials, next_step(run, accuracy), "--size"))
     progress.say(line);
   return kExitDone;
 }

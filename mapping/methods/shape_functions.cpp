@@ -1,17 +1,12 @@
 // `shape-functions`: the field of model `quadratic` itself, at each vertex; no frame comes between.
+#include "mapping/methods/shape_functions.h"
+
 #include "base/error.h"
 #include "base/parallel.h"
 #include "formats/lattice/quadratic_field.h"
 #include "mapping/methods/bind.h"
 
 namespace flexel::mapping {
-namespace {
-
-struct VertexCells final : MethodBinding {
-  std::vector<std::uint32_t> cell;  // (vertices) that carries each
-  [[nodiscard]] std::vector<Vec3> apply(const Binding& binding, const Body& body,
-                                        const std::vector<Vec3>& position) const override;
-};
 
 std::vector<Vec3> VertexCells::apply(const Binding&, const Body& body,
                                      const std::vector<Vec3>& position) const {
@@ -29,6 +24,8 @@ std::vector<Vec3> VertexCells::apply(const Binding&, const Body& body,
   });
   return displacement;
 }
+
+namespace {
 
 // The cell that a vertex is anchored in; for one at an element, that on its side.
 std::shared_ptr<const MethodBinding> bind_cells(MethodInput& input) {

@@ -1,3 +1,4 @@
+// The terms of Nitsche's method at one point, with dP/dF of the material at rest.
 #include "simulate/quadratic/nitsche_support.h"
 
 namespace flexel::simulate {

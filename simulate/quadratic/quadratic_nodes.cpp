@@ -1,9 +1,8 @@
 // An edge or a face is known by its elements: the keys of all cells are sorted, and equal ones are one node.
 #include "simulate/quadratic/quadratic_nodes.h"
 
-#include <oneapi/tbb/parallel_sort.h>
-
 #include <algorithm>
+#include <functional>
 #include <limits>
 
 #include "base/parallel.h"
@@ -68,7 +67,7 @@ void number_between(const Body& body, QuadraticNodes& nodes) {
       std::sort(place.key.begin(), place.key.end());
       places.push_back(place);
     }
-  tbb::parallel_sort(places.begin(), places.end());
+  parallel_sort(places.begin(), places.end(), std::less<>());
   const auto middle = [&](std::uint32_t cell, std::uint32_t node) {
     Vec3 sum = Vec3::Zero();
     for (const std::size_t a : around[node]) sum += body.rest[body.cell_elements[nodes.cells[cell]][a]];

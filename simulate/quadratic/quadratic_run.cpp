@@ -1,3 +1,4 @@
+// The run: what the model does not have is refused first; then one linear solution, and what is reported of it.
 #include "simulate/quadratic/quadratic_run.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// Conjugate gradients on the change from what supports prescribe; then figures of the field, cell by cell.
 #include "simulate/quadratic/quadratic_solve.h"
 
 #include <fmt/format.h>

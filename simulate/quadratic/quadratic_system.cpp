@@ -1,3 +1,5 @@
+// Cells that the surface cuts, and those under supports, get a matrix of their own; all other cells of a part share
+// one.
 #include "simulate/quadratic/quadratic_system.h"
 
 #include <fmt/format.h>

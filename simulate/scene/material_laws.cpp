@@ -1,4 +1,4 @@
-// Keys and refusals of the elastic laws (docs/theory/laws.md).
+// Keys of the elastic laws (docs/theory/laws.md).
 #include "simulate/scene/material_laws.h"
 
 #include <fmt/format.h>
@@ -8,7 +8,6 @@
 
 #include "base/error.h"
 #include "base/nearest_word.h"
-#include "simulate/models/rest_shape.h"
 
 namespace flexel::simulate {
 namespace {
@@ -115,38 +114,6 @@ std::optional<Mat3> parse_axes(TableReader& reader) {
   axes.col(2) = given[0].cross(given[1]).normalized();
   axes.col(1) = axes.col(2).cross(axes.col(0));
   return axes;
-}
-
-void refuse_law(const Scene& scene, const PartSettings& settings, const Body& body, std::size_t p,
-                const Material& material, const std::string& model) {
-  const Part& part = body.parts[p];
-  if (settings.axes && material.law != LawName::orthotropic)
-    throw InputError(
-        settings.origin,
-        fmt::format("\"axes\" belong to a material with law = \"orthotropic\"; {} of part \"{}\" is "
-                    "{}: leave them out",
-                    material.name, part.name, law_name(material.law)));
-  if (material.law == LawName::neo_hooke) return;
-  const auto refuse = [&](const std::string& what) {
-    throw InputError(settings.origin, fmt::format("part \"{}\": law \"{}\" of {} {}", part.name,
-                                                  law_name(material.law), material.name, what));
-  };
-  if (part.placement == Placement::centre)
-    refuse("needs model \"cells\", not \"paper\": voxelize with --placement corner");
-  if (model != "cells" && model != "quadratic")
-    refuse(fmt::format("needs model \"cells\", not \"{}\": write model = \"cells\"", model));
-  if (settings.infill.share || (settings.material.empty() && scene.infill.share))
-    refuse("takes no infill: give the constants of the print as it is, with its infill");
-  const bool event = std::any_of(scene.events.begin(), scene.events.end(),
-                                 [](const Event& each) { return each.name == "renormalise"; });
-  if (scene.run.renormalise || event)
-    refuse("cannot be renormalised: leave \"renormalise\" out or take a neo-Hookean material");
-  const RestShapes shapes(body);
-  if (!shapes.any()) return;
-  const CellKind kind = cell_kind(part.lattice, material);
-  for (std::uint32_t c = part.cell_begin; c < part.cell_end; ++c)
-    if (shapes.of(kind, part, c))
-      refuse("takes no rest shape of its own, which an earlier run left: begin with the body as voxelized");
 }
 
 }  // namespace flexel::simulate
