@@ -310,6 +310,16 @@ std::string next_step(const SolvedRun& run, const std::optional<AccuracyReport>&
   return accuracy->advice.empty() ? repeat : accuracy->advice + "; " + repeat;
 }
 
+void write_summary(const SolvedRun& run, const mapping::MapReport& mapped, const Plan& plan,
+                   const std::optional<AccuracyReport>& accuracy, const std::string& path) {
+  nlohmann::ordered_json summary;
+  summary["voxelize"] = nlohmann::ordered_json::parse(voxelize::summary_json(run.voxels));
+  summary["simulate"] = nlohmann::ordered_json::parse(simulate::summary_json(run.simulated, run.voxels.body));
+  summary["map"] = nlohmann::ordered_json::parse(mapping::report_json(mapped, plan.map));
+  if (accuracy) summary["accuracy"] = nlohmann::ordered_json::parse(accuracy->json());
+  write_text(summary.dump(2) + "\n", path);
+}
+
 int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress) {
   std::optional<StopAfter> limit;
   if (plan.timeout) limit.emplace(*plan.timeout, "--timeout", LimitOf::command);
@@ -352,14 +362,7 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
     }
     progress.finish();
   }
-  if (!arguments.summary.empty()) {
-    nlohmann::ordered_json summary;
-    summary["voxelize"] = nlohmann::ordered_json::parse(voxelize::summary_json(run.voxels));
-    summary["simulate"] = nlohmann::ordered_json::parse(simulate::summary_json(run.simulated, body));
-    summary["map"] = nlohmann::ordered_json::parse(mapping::report_json(found, plan.map));
-    if (accuracy) summary["accuracy"] = nlohmann::ordered_json::parse(accuracy->json());
-    write_text(summary.dump(2) + "\n", arguments.summary);
-  }
+  if (!arguments.summary.empty()) write_summary(run, found, plan, accuracy, arguments.summary);
   outputs.appear();
   const std::vector<simulate::Material> materials = known_materials(plan.job.scene, body);
   if (accuracy || !arguments.verbose)  // else simulate() has said it
