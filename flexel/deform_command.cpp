@@ -283,12 +283,12 @@ SolvedRun solve(const DeformArguments& arguments, Plan& plan, std::optional<Accu
 
 // A wide bar, and walls that the cells of model `cells` are too coarse for.
 bool has_thin_walls(const SolvedRun& run) {
-  constexpr double kWide = 0.1, kFewCells = 3;
+  constexpr double kWide = 0.1, kThin = 3;  // share, cells
   double worst = 0;
   for (const simulate::ErrorBar& each : run.simulated.error_bars.bars)
     if (each.of != simulate::ErrorBar::Of::elastic_energy && std::abs(each.value) > 0)
       worst = std::max(worst, each.bar.half_width / std::abs(each.value));
-  return worst > kWide && wall_thickness(run.voxels) < kFewCells * spacing_of(run);
+  return worst > kWide && wall_thickness(run.voxels) < kThin * spacing_of(run);
 }
 
 // What to do next, of this run.
