@@ -121,6 +121,10 @@ void refuse_untranslatable(const simulate::Scene& scene, const simulate::Problem
 
 std::vector<std::string> drop_models(simulate::Scene& scene) {
   std::vector<std::string> lines;
+  if (!scene.model.empty() && scene.model != "cells")
+    lines.push_back(
+        fmt::format("model \"{}\" is exported as ordinary elastic matter of the same material", scene.model));
+  scene.model.clear();
   for (auto& [name, settings] : scene.parts) {
     if (!settings.model.empty() && settings.model != "cells")
       lines.push_back(

@@ -3,7 +3,7 @@
 #include <array>
 #include <string>
 
-#include "formats/lattice/vtu.h"
+#include "formats/vtu/vtu.h"
 #include "formats/part/column.h"
 
 namespace flexel::names {

@@ -10,7 +10,7 @@
 #include "formats/lattice/body_file_names.h"
 #include "formats/lattice/body_metadata.h"
 #include "formats/lattice/cell_moments.h"
-#include "formats/lattice/vtu.h"
+#include "formats/vtu/vtu.h"
 
 namespace flexel {
 namespace {

@@ -40,7 +40,7 @@ struct MappingMethod {
   bool keeps_coordinates = false;  // it carries vertices by their coordinates in the bases
   std::shared_ptr<const MethodBinding> (*bind)(MethodInput& input) = nullptr;
 
-  // For the binding file (mapping/methods/binding_file.h): the method's number in it, which never changes; below 0:
+  // For the binding file (mapping/binding_file.h): the method's number in it, which never changes; below 0:
   // what it keeps is too much to be worth a file, and the rest is empty.
   int file_number = -1;
   std::size_t bytes_a_frame = 0, bytes_a_vertex = 0;  // of what save() appends

@@ -6,7 +6,7 @@
 
 #include "base/files/output_file.h"
 #include "base/parallel.h"
-#include "formats/lattice/vtu.h"
+#include "formats/vtu/vtu.h"
 #include "mapping/anchors/frame.h"
 #include "mapping/report/quality.h"
 

@@ -1,5 +1,5 @@
 // A binding comes out of its file as it went in, and nothing else does.
-#include "mapping/methods/binding_file.h"
+#include "mapping/binding_file.h"
 
 #include <gtest/gtest.h>
 

@@ -14,7 +14,7 @@ CODE = ["base", "formats", "voxelize", "simulate", "mapping", "flexel"]
 ORDER = """
 base base/math base/files base/program
 formats/part formats/common formats/stl formats/obj formats/ply formats/off formats/gltf formats/threemf formats/cad
-formats/lattice formats/exchange
+formats/vtu formats/lattice formats/exchange
 voxelize/types voxelize/mesh voxelize/classify voxelize/heal voxelize/lattice voxelize
 simulate/laws simulate/input simulate/result simulate/linear simulate/state simulate/rigid simulate/conditions simulate/models
 simulate/kernels simulate/matter simulate/gravitation simulate/contact/points simulate/contact simulate/effects simulate/events simulate/scene

@@ -362,7 +362,11 @@ TEST(Moments, OfTheBodyBelongToItsCutCells) {
   EXPECT_EQ(even, 0u);
   const Body without = run(mesh, .13).body;
   EXPECT_TRUE(without.moments.empty() && without.moment_cells.empty());
-  EXPECT_EQ(without.fill, body.fill);
+  std::vector<double> firm;  // slivers stay with moments alone
+  std::copy_if(body.fill.begin(), body.fill.end(), std::back_inserter(firm),
+               [](double fill) { return fill >= kDroppedFill; });
+  EXPECT_EQ(without.fill, firm);
+  EXPECT_LT(firm.size(), body.fill.size());
   const ThreadLimit one(1);
   const Body again = with_moments(mesh, .13).body;
   EXPECT_EQ(again.moment_cells, body.moment_cells);

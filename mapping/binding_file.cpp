@@ -1,7 +1,7 @@
 // A header of numbers, the arrays as they are in memory, and at the end a hash of all before it, so that
 // damage shows as such. Two more hashes say what was bound: the lattice (rest shape, cells, what is broken)
 // and the surface. Adjacency is found again: it is most of the size and little of the time.
-#include "mapping/methods/binding_file.h"
+#include "mapping/binding_file.h"
 
 #include <fmt/format.h>
 

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "formats/lattice/vtu.h"
+#include "formats/vtu/vtu.h"
 
 namespace flexel::vtu {
 

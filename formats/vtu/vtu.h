@@ -93,7 +93,7 @@ template <class Entry, class Make>
 void write(OutputFile& output, std::size_t points, std::size_t cells, const std::vector<Array>& arrays,
            bool compress);
 
-struct HeadArray;  // formats/lattice/vtu_head.h
+struct HeadArray;  // formats/vtu/vtu_head.h
 
 // A file that was read, its arrays still packed. Every offset and size is checked when it is opened, so that
 // none is trusted later. Throws InputError: truncated, not a .vtu with appended raw data, sizes that do not

@@ -1,6 +1,6 @@
 // Parses the XML head of a .vtu with pugixml. Numbers are range-checked; vtu::File checks offsets and sizes
 // against the data.
-#include "formats/lattice/vtu_head.h"
+#include "formats/vtu/vtu_head.h"
 
 #include <fmt/format.h>
 

@@ -9,8 +9,8 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "formats/lattice/vtu.h"
-#include "formats/lattice/vtu_head.h"
+#include "formats/vtu/vtu.h"
+#include "formats/vtu/vtu_head.h"
 
 namespace flexel::vtu {
 namespace {

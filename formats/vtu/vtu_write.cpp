@@ -12,7 +12,7 @@
 
 #include "base/files/output_file.h"
 #include "base/parallel.h"
-#include "formats/lattice/vtu.h"
+#include "formats/vtu/vtu.h"
 
 namespace flexel::vtu {
 namespace {
