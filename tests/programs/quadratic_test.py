@@ -135,7 +135,7 @@ def test_the_mapped_surface_is_the_field():
 def test_deform_takes_the_model():
     part, _ = bar("beam.obj", (200, 50, 50), 33)
     write("s.toml", MATERIAL.format(poisson=0.3) + HELD.format(0, 0, 1e-4))
-    expect_ok(run("flexel", "deform", part, "--scene", "s.toml", "--size", "50 mm", "-o", "bent.stl", "--summary", "s.json"))
+    expect_ok(run("flexel", "deform", part, "--scene", "s.toml", "--size", "25 mm", "-o", "bent.stl", "--summary", "s.json"))
     found = json.loads(pathlib.Path("s.json").read_text())
     expect(found["map"]["method"] == "shape-functions", found["map"])
     bars = found["simulate"]["error_bars"]
