@@ -89,6 +89,7 @@ std::string load_text(const simulate::Load& load) {
 
 SceneText scene_text(const simulate::Scene& scene) {
   SceneText text;
+  if (!scene.model.empty()) text.keys += fmt::format("model = {}\n", quoted(scene.model));
   if (!scene.material.empty()) text.keys += fmt::format("material = {}\n", quoted(scene.material));
   text.keys += infill_text(scene.infill);
   for (const auto& [name, part] : scene.parts) {

@@ -25,6 +25,7 @@
 #include "flexel/study/session.h"
 #include "formats/common/file_formats.h"
 #include "simulate/effects/gravity.h"
+#include "simulate/quadratic/quadratic_run.h"
 #include "simulate/scene/scene.h"
 #include "simulate/simulate.h"
 #include "voxelize/measure_part.h"
@@ -151,6 +152,10 @@ void make_folder(const std::string& output) {
 void read_scenes(const StudyArguments& a, study::Case& study_case) {
   const simulate::Scene file = a.job.scene.empty() ? simulate::Scene{} : simulate::read_scene(a.job.scene);
   if (a.job.scene.empty()) refuse_idle(a.job);
+  if (a.job.model == "quadratic" || simulate::asks_for_quadratic(file))
+    throw InputError(
+        "flexel study does not run model \"quadratic\": compare sizes with flexel deform --model quadratic "
+        "--size, whose error bars say what a finer one would change");
   study_case.scene = a.job.scene;
   study_case.scene_text = whole_scene(a.job, file);
   if (study_case.scene_text == file.text) return;

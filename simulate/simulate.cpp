@@ -59,22 +59,6 @@ std::vector<Vec3> where_to_begin(const Body& body) {
   return displacement;
 }
 
-void report_strays(const Fragments& fragments, SimulateResult& result, Progress& progress) {
-  double volume = 0;
-  std::size_t crumbs = 0;
-  for (const Fragment& fragment : fragments.list)
-    if (fragment.stray) {
-      ++crumbs;
-      result.stray_cells += fragment.size;
-      volume += fragment.volume;
-    }
-  if (crumbs > 0)
-    progress.warn(fmt::format(
-        "{} loose crumb(s) of {} voxels in all ({}) hang on nothing; they are carried along with the matter "
-        "nearest to them",
-        crumbs, human_count(result.stray_cells), human_volume(volume)));
-}
-
 void report_unsupported(std::size_t elements, SimulateResult& result, Progress& progress) {
   if (elements == 0) return;
   result.stray_cells += elements;

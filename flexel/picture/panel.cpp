@@ -12,6 +12,7 @@
 #include "flexel/picture/lattice_drawable.h"
 #include "flexel/picture/render/quantity.h"
 #include "flexel/picture/render/thickness.h"
+#include "formats/lattice/quadratic_field.h"
 #include "mapping/methods/map_surface.h"
 
 namespace flexel::picture {
@@ -106,7 +107,9 @@ void set_surface_values(const Surface& surface, const MeshTopology& mesh, const 
 void draw_body_surface(const Body& body, const PictureOptions& options, const ColourBy& by,
                        Progress& progress, Panel& panel) {
   const Surface& surface = body.surface;
-  const mapping::MapResult mapped = map_surface(body, mapping::MapOptions{}, progress);
+  mapping::MapOptions how;
+  if (QuadraticField::is_in(body)) how.method = &mapping::kShapeFunctions;
+  const mapping::MapResult mapped = map_surface(body, how, progress);
   for (const Vec3& u : mapped.displacement)
     if (!u.allFinite())
       throw InputError(panel.subject->where,

@@ -40,6 +40,22 @@ void report_materials(const Problem& problem, Progress& progress) {
   }
 }
 
+void report_strays(const Fragments& fragments, SimulateResult& result, Progress& progress) {
+  double volume = 0;
+  std::size_t crumbs = 0;
+  for (const Fragment& fragment : fragments.list)
+    if (fragment.stray) {
+      ++crumbs;
+      result.stray_cells += fragment.size;
+      volume += fragment.volume;
+    }
+  if (crumbs > 0)
+    progress.warn(fmt::format(
+        "{} loose crumb(s) of {} voxels in all ({}) hang on nothing; they are carried along with the matter "
+        "nearest to them",
+        crumbs, human_count(result.stray_cells), human_volume(volume)));
+}
+
 void measure_displacement(const Body& body, const State& state, SimulateResult& result) {
   const LargestDisplacement largest = largest_displacement(body, state.displacement);
   result.largest_displacement = largest.value();

@@ -1,6 +1,7 @@
 // What every run measures and says, at equilibrium or in time.
 #pragma once
 #include "base/program/progress.h"
+#include "simulate/matter/fragments.h"
 #include "simulate/models/cells.h"
 #include "simulate/result/result.h"
 
@@ -10,6 +11,9 @@ void name_materials(Body& body, const std::vector<Material>& materials);
 
 // What an infill leaves of a part's material, and what models `springs` and `paper` cannot follow of one.
 void report_materials(const Problem& problem, Progress& progress);
+
+// Counts the cells of loose crumbs in the result, and warns of them.
+void report_strays(const Fragments& fragments, SimulateResult& result, Progress& progress);
 
 // Largest displacement of the part's matter. `body` is at the state already.
 void measure_displacement(const Body& body, const State& state, SimulateResult& result);

@@ -34,10 +34,22 @@ void refuse_what_is_missing(const Scene& scene, const Body& body, const std::vec
     if (effect.name != Supports::name && effect.name != Loads::name && effect.name != "gravity")
       throw InputError(scene.name, fmt::format("{}it has no {} ({}); use model \"cells\"", needs, effect.name,
                                                effect.why));
-  for (const Tie& tie : scene.get<Supports>().ties)
+  for (const Columns* columns : {&body.cell_columns, &body.element_columns})
+    for (const auto& [name, column] : *columns)
+      if (!is_stress_column(name) && name != "velocity" && name != kQuadraticColumn)
+        throw InputError(scene.name,
+                         fmt::format("{}it does not know what an earlier run left in the body (\"{}\"); use "
+                                     "model \"cells\"",
+                                     needs, name));
+  for (const Tie& tie : scene.get<Supports>().ties) {
+    if (std::abs(tie.motion.angle) > kTooLarge)
+      throw InputError(tie.origin,
+                       fmt::format("{}\"{}\" turns by {} degrees; use model \"cells\"", needs, tie.name,
+                                   human_number(180 / std::numbers::pi * std::abs(tie.motion.angle), 3)));
     if (tie.link)
       throw InputError(tie.origin, fmt::format("{}it has no rigid links (\"{}\"); use link = \"averaging\"",
                                                needs, tie.name));
+  }
   for (const Part& part : body.parts)
     if (part.placement == Placement::centre)
       throw InputError(scene.name,
@@ -151,6 +163,9 @@ SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptio
   const std::vector<ProbePoints> probes = place_probes(scene, problem);
   const std::vector<ActiveEffect> effects = active_effects(scene.effects, problem);
   refuse_what_is_missing(scene, body, effects);
+  if (std::none_of(effects.begin(), effects.end(), [](const ActiveEffect& each) { return each->drives(); }))
+    progress.warn("the scene has no [[load]], [[move]] or [gravity]: nothing will move");
+  report_strays(fragments, result, progress);
   const QuadraticSystem system(problem, scene);
   refuse_loose_fragments(fragments, body, system.tied_elements(), {}, scene.name);
   const QuadraticSolution solution =
@@ -172,6 +187,7 @@ SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptio
   const StiffnessPattern pattern =
       stiffness_pattern(body, active_cells(problem), connection_rows({}, body.element_count()), {}, false);
   carry_strays(fragments, problem, pattern.stencil, state);
+  carry_field(system.nodes(), state, body);
   for (std::size_t e = 0; e < body.element_count(); ++e)
     body.position[e] = body.rest[e] + state.displacement[e];
   measure_displacement(body, state, result);

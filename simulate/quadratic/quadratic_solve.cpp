@@ -83,6 +83,7 @@ QuadraticSolution solve(const QuadraticSystem& system, const RunSettings& settin
                             kMostIterations, progress);
     found.iterations += result.iterations;
     found.relative_residual = result.relative_residual;
+    if (result.iterations == kMostIterations) break;
     if (result.indefinite || !(result.converged || result.relative_residual < kGoodEnough)) continue;
     found.displacement = start;
     parallel_for_each(n, [&](std::size_t i) { found.displacement[i] += change[i]; });
@@ -122,6 +123,27 @@ void write_field(const QuadraticSystem& system, const QuadraticSolution& solutio
     }
   }
   body.cell_columns[kQuadraticColumn] = std::move(column);
+}
+
+void carry_field(const QuadraticNodes& nodes, const State& state, Body& body) {
+  constexpr std::size_t kBetween = 57;
+  std::vector<double>& values = body.cell_columns.at(kQuadraticColumn).values;
+  for (std::uint32_t c = 0; c < body.cell_count(); ++c) {
+    if (std::binary_search(nodes.cells.begin(), nodes.cells.end(), c)) continue;
+    double* to = &values[kBetween * c];
+    for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
+      if (corner_of_node(n) < 8) continue;
+      const std::array<std::size_t, 3> at{n % 3, n / 3 % 3, n / 9};
+      Vec3 sum = Vec3::Zero();
+      for (std::size_t a = 0; a < 8; ++a) {
+        double weight = 1;
+        for (std::size_t axis = 0; axis < 3; ++axis)
+          weight *= at[axis] == 1 ? 0.5 : at[axis] / 2 == (a >> axis & 1) ? 1 : 0;
+        sum += weight * state.displacement[body.cell_elements[c][a]];
+      }
+      to = std::copy(sum.begin(), sum.end(), to);
+    }
+  }
 }
 
 Stresses field_stresses(const QuadraticSystem& system, const QuadraticSolution& solution,
@@ -168,6 +190,7 @@ Stresses field_stresses(const QuadraticSystem& system, const QuadraticSolution& 
 
 void report(const QuadraticSystem& system, const QuadraticSolution& solution, SimulateResult& result) {
   const QuadraticNodes& nodes = system.nodes();
+  std::vector<std::uint8_t> counted(nodes.size(), 0);  // a node of two supports counts for the first
   for (const NitscheSupport& support : system.supports()) {
     Reaction reaction{support.tie->name, Vec3::Zero(), Vec3::Zero()};
     for (const FacePoint& at : support.points)
@@ -177,8 +200,10 @@ void report(const QuadraticSystem& system, const QuadraticSolution& solution, Si
     for (const std::uint32_t n : support.nodes) {
       Vec3 held = Vec3::Zero();
       for (std::size_t axis = 0; axis < 3; ++axis)
-        if (support.tie->axes[axis])
+        if (support.tie->axes[axis] && !(counted[n] >> axis & 1)) {
+          counted[n] = static_cast<std::uint8_t>(counted[n] | 1u << axis);
           held[static_cast<Eigen::Index>(axis)] = -solution.unbalanced[n][static_cast<Eigen::Index>(axis)];
+        }
       add_at(held, nodes.rest[n], reaction.force, reaction.moment);
     }
     result.reactions.push_back(reaction);

@@ -30,6 +30,9 @@ struct QuadraticSolution {
 // The column that travels in the body (formats/lattice/quadratic_field.h), and the displacement of the elements.
 void write_field(const QuadraticSystem& system, const QuadraticSolution& solution, Body& body, State& state);
 
+// In cells that resist nothing (loose crumbs, broken ones), once their elements are carried along: trilinear.
+void carry_field(const QuadraticNodes& nodes, const State& state, Body& body);
+
 // Stresses as `stresses()` defines them, from the field itself: of a cell in the middle of its matter; of an element
 // there, or at the nearest point of the surface, the mean over the cells that hold the point.
 [[nodiscard]] Stresses field_stresses(const QuadraticSystem& system, const QuadraticSolution& solution,

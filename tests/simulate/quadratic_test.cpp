@@ -197,6 +197,19 @@ TEST(Quadratic, SameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(one.cell_columns.at(kQuadraticColumn).values, many.cell_columns.at(kQuadraticColumn).values);
 }
 
+// Two supports on the same nodes: each node's force is told once.
+TEST(Quadratic, SupportsOfTheSameNodesShareTheirForce) {
+  const std::string at_end =
+      "[[fix]]\nwhere = { box = { min = [\"-1 mm\", \"-1 mm\", \"-1 mm\"], max = [\"1 mm\", \"21 mm\", \"21 "
+      "mm\"] } }\n";
+  Body body = bar();
+  const double force = 1e-3;
+  const SimulateResult result = run(body, material(0.3) + at_end + at_end + pull({force, 0, 0}));
+  EXPECT_LT(result.imbalance.norm(), 1e-7 * force);
+  EXPECT_NEAR(result.reactions[0].force.x() / force, -1, 1e-6);
+  EXPECT_LT(result.reactions[1].force.norm(), 1e-9 * force);
+}
+
 std::string refusal(Body body, const std::string& scene) {
   try {
     (void)run(body, scene);
@@ -219,6 +232,15 @@ TEST(Quadratic, WhatItDoesNotHaveIsRefusedByName) {
   EXPECT_THAT(refusal(bar(), material(0.3) + pull({1, 0, 0})), HasSubstr("add a [[fix]]"));
   EXPECT_THAT(refusal(bar(), material(0.3) + "[[fix]]\nwhere = \"x0\"\naxes = \"x\"\n" + pull({1e-3, 0, 0})),
               HasSubstr("is free to"));
+  EXPECT_THAT(
+      refusal(bar(),
+              held + "[[move]]\nwhere = \"x1\"\nrotation = { axis = [1, 0, 0], through = [0, 0, 0], angle "
+                     "= \"360 deg\" }\n"),
+      HasSubstr("turns by 360 degrees"));
+  Body edited = bar();
+  edited.cell_columns["stiffness_change"] = {1, std::vector<double>(edited.cell_count(), 1)};
+  EXPECT_THAT(refusal(edited, held),
+              HasSubstr("what an earlier run left in the body (\"stiffness_change\")"));
   Body cut = bar(0.5);
   cut.moment_cells.clear();
   cut.moments.clear();

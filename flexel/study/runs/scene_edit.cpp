@@ -112,6 +112,7 @@ SceneFacts scene_facts(const std::string& text, const std::string& name) {
   if (const toml::array* probes = scene["probe"].as_array())
     for (const toml::node& each : *probes)
       if (const toml::table* probe = each.as_table()) facts.probes.push_back(text_at(*probe, "name"));
+  facts.model = text_at(scene, "model");
   if (const toml::table* parts = scene["parts"].as_table())
     for (const auto& [part, settings] : *parts)
       if (settings.is_table())
