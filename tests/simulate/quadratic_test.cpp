@@ -225,7 +225,8 @@ TEST(Quadratic, WhatItDoesNotHaveIsRefusedByName) {
   const std::string held = material(0.3) + "[[fix]]\nwhere = \"x0\"\n" + pull({0, 0, 1e-3});
   EXPECT_EQ(refusal(bar(), held), "accepted");
   EXPECT_THAT(refusal(bar(), held + "[run]\ntime = \"1 ms\"\n"), HasSubstr("it has no [run] time"));
-  EXPECT_THAT(refusal(bar(), held + "[contact]\n"), HasSubstr("it has no contact"));
+  EXPECT_THAT(refusal(bar(), material(0.3) + "[[fix]]\nwhere = \"x0\"\n" + "[contact]\n"),
+              HasSubstr("it has no contact"));
   EXPECT_THAT(
       refusal(bar(), held + "[[load]]\nwhere = \"x1\"\ntorque = [\"1e-5 N m\", 0, 0]\nlink = \"rigid\"\n"),
       HasSubstr("it has no rigid links"));
