@@ -288,9 +288,15 @@ void set_isotropic_constants(Material& material) {
 }
 
 const char* law_name(LawName law) {
-  return law == LawName::mooney_rivlin ? "mooney-rivlin"
-         : law == LawName::orthotropic ? "orthotropic"
-                                       : "neo-hooke";
+  switch (law) {
+    case LawName::neo_hooke:
+      return "neo-hooke";
+    case LawName::mooney_rivlin:
+      return "mooney-rivlin";
+    case LawName::orthotropic:
+      return "orthotropic";
+  }
+  return "";
 }
 
 }  // namespace flexel::simulate

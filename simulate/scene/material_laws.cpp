@@ -45,6 +45,11 @@ void parse_mooney_rivlin(TableReader& reader, Material& material) {
   if (!(material.c10 >= 0 && material.c01 >= 0 && material.c10 + material.c01 > 0))
     reader.fail("\"c10\" and \"c01\" need to be 0 or more, and one of them above 0");
   if (!(material.bulk > 0)) reader.fail("\"bulk\" needs to be above 0");
+  constexpr double kStiffest = 1e4;  // times mu: beyond, volume locks and the solver fails
+  if (material.bulk > kStiffest * 2 * (material.c10 + material.c01))
+    reader.fail(
+        "\"bulk\" is more than 20000 times c10 + c01: take a smaller one; a thousand times is "
+        "incompressible");
 }
 
 void parse_orthotropic(TableReader& reader, Material& material) {
@@ -60,7 +65,8 @@ void parse_orthotropic(TableReader& reader, Material& material) {
                                  1 - even(1, 2) * even(1, 2), even.determinant()});
   if (!(minor > 1e-9))
     reader.fail(
-        "\"young\" and \"poisson\" are of no stable material: nu_ij needs to be below sqrt(E_i / E_j), and 1 "
+        "\"young\" and \"poisson\" are of no stable material: the size of nu_ij needs to be below sqrt(E_i / "
+        "E_j), and 1 "
         "- "
         "nu12^2 E2/E1 - nu13^2 E3/E1 - nu23^2 E3/E2 - 2 nu12 nu13 nu23 E3/E1 above 0; nu_ij is the "
         "contraction "

@@ -30,7 +30,8 @@ std::optional<StrengthSummary> nearest_to_strength(const Body& body, const std::
     const Material& material = materials[p];
     if (part.element_begin == part.element_end) continue;
     const double limit = material.yield > 0 ? material.yield : material.strength;
-    if (!(limit > 0)) {
+    // along and across the grain strengths differ many times over: one number says nothing of the nearest
+    if (!(limit > 0) || material.law == LawName::orthotropic) {
       if (std::find(unknown.begin(), unknown.end(), material.name) == unknown.end())
         unknown.push_back(material.name);
       continue;
