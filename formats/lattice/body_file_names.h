@@ -3,8 +3,8 @@
 #include <array>
 #include <string>
 
-#include "formats/vtu/vtu.h"
 #include "formats/part/column.h"
+#include "formats/vtu/vtu.h"
 
 namespace flexel::names {
 
