@@ -78,6 +78,16 @@ void say_lost_matter(const VoxelizedPart& part, const std::string& name, Progres
                   name, human_share(part.dropped_volume / part.surface_volume)));
 }
 
+void say_spread_moments(const VoxelizeResult& result, Progress& progress) {
+  std::size_t spread = 0;
+  for (const VoxelizedPart& part : result.parts) spread += part.spread_cells;
+  if (spread > 0)
+    progress.warn(
+        fmt::format("model quadratic takes the matter of {} as spread evenly: a shell passes "
+                    "through itself there",
+                    counted(spread, "cut cell")));
+}
+
 void report_each(const VoxelizeResult& result, Progress& progress) {
   for (std::size_t p = 0; p < result.parts.size(); ++p) {
     const VoxelizedPart& part = result.parts[p];
@@ -107,6 +117,7 @@ void report(const VoxelizeResult& result, Progress& progress) {
       progress.say(
           fmt::format("{} has no unit: {} assumed (--unit)", source.file, human_length(source.unit)));
   result.parts.size() <= kFew ? report_each(result, progress) : report_together(result, progress);
+  say_spread_moments(result, progress);
   report_pairs(result, progress);
   progress.say(fmt::format("simulating this needs about {}", human_bytes(result.simulation_memory)));
 }

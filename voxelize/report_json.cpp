@@ -50,6 +50,7 @@ std::string summary_json(const VoxelizeResult& result) {
                      {"thin_walls", part.thin_walls},
                      {"lost_walls", part.lost_walls},
                      {"wall_samples", part.wall_samples},
+                     {"spread_cells", part.spread_cells},
                      {"healing", json_of(part.healing)}});
   }
   Json overlaps = Json::array(), gaps = Json::array();

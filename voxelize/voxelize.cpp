@@ -168,7 +168,8 @@ std::vector<HealedPart> heal_parts(Surface& surface, const HealChoice& how, doub
 }
 
 // Inside and outside of a part whose mesh lies on the lattice; nothing where they cannot be told apart.
-std::optional<Voxels> classify(HealedPart& part, const Lattice& lattice, const VoxelizeOptions& options) {
+std::optional<Voxels> classify(HealedPart& part, const Lattice& lattice, const VoxelizeOptions& options,
+                               const std::string& name) {
   if (part.mesh.balanced()) {
     Voxels voxels = classify_closed(
         part.mesh, {.with_centres = options.placement == Placement::centre, .with_moments = options.moments});
@@ -179,6 +180,11 @@ std::optional<Voxels> classify(HealedPart& part, const Lattice& lattice, const V
     }
     return voxels;
   }
+  if (options.moments)
+    throw InputError(
+        fmt::format("part \"{}\": its surface is not closed, and exact moments (model quadratic) "
+                    "need it to be; {}use model cells",
+                    name, options.heal.mode == Heal::wrap ? "" : "use --heal wrap, or "));
   if (options.heal.mode == Heal::none) {
     Voxels voxels = classify_open(part.mesh);
     part.done.by = Healing::By::vote;
@@ -202,16 +208,18 @@ std::optional<VoxelizedPart> voxelize_part(HealedPart& healed, double spacing, c
   part.placement = options.placement;
   part.lattice = align_lattice(mesh, spacing, options.align, centre);
   place_on_lattice(mesh, part.lattice);
-  const std::optional<Voxels> voxels = classify(healed, part.lattice, options);
+  const std::optional<Voxels> voxels = classify(healed, part.lattice, options, name);
   if (!voxels) return std::nullopt;
   const AssembledPart assembled = assemble_part(*voxels, part, body, polygon_cells);
-  if (options.moments) append_moments(*voxels, body);
+  const std::size_t spread = options.moments ? append_moments(*voxels, body) : 0;
   if (assembled.elements == 0 && enclosed_volume(mesh) < 0)
     throw InputError(fmt::format("part \"{}\" is inside out; --heal auto turns it", name));
   if (assembled.elements == 0)
     throw InputError(fmt::format("nothing of part \"{}\" is left at size {}; choose a smaller size", name,
                                  human_length(spacing)));
-  return describe(healed, *voxels, assembled, part);
+  VoxelizedPart described = describe(healed, *voxels, assembled, part);
+  described.spread_cells = spread;
+  return described;
 }
 
 // All parts at one spacing.

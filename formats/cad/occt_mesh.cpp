@@ -286,13 +286,15 @@ CadReading reading_of(const std::function<CadMesh(const ImportOptions&)>& read, 
 }
 
 // Some damaged files send OpenCASCADE into loops without an end, or have it ask for all memory there is. Sound
-// ones take it about a second a megabyte, and 250 bytes a triangle.
+// ones take it about a second a megabyte, and 250 bytes a triangle, of which a given deflection may ask for any number.
 ChildLimits limits_of(const ImportInput& input, const ImportOptions& options) {
   const auto bytes = static_cast<double>(input.bytes.size());
+  const double share = .8 * available_memory(), seconds = (options.deflection ? 600 : 60) + 1e-5 * bytes;
   ChildLimits limits;
-  limits.processor = options.occt_seconds.value_or(60 + 1e-5 * bytes);
-  limits.wall = 3 * limits.processor;  // another program may have the processor
-  limits.memory = options.occt_memory.value_or(std::min(.8 * available_memory(), 2e9 + 500 * bytes));
+  limits.processor = options.occt_seconds.value_or(seconds * static_cast<double>(thread_count()));
+  limits.wall = 3 * options.occt_seconds.value_or(seconds);  // another program may have the processor
+  limits.memory =
+      options.occt_memory.value_or(options.deflection ? share : std::min(share, 2e9 + 500 * bytes));
   return limits;
 }
 
@@ -320,6 +322,7 @@ Surface read_with_occt(const ImportInput& input, const ImportOptions& options, S
                        const std::function<CadMesh(const ImportOptions&)>& read) {
   const ChildLimits limits = limits_of(input, options);
   const std::size_t threads = thread_count();
+  const char* instead = options.deflection ? "a larger --deflection takes less" : "export it anew, or as STL";
   const ChildOutput output = run_in_child([&] { return pack(reading_of(read, options, threads)); }, limits);
   switch (output.end) {
     case ChildEnd::finished:
@@ -330,14 +333,14 @@ Surface read_with_occt(const ImportInput& input, const ImportOptions& options, S
       throw InputError(
           input.where,
           fmt::format("is damaged, or too much for OpenCASCADE: it had not read it after {:.3g} s of "
-                      "processor time; export it anew, or as STL",
-                      limits.processor));
+                      "processor time; {}",
+                      limits.processor, instead));
     case ChildEnd::out_of_memory:
       throw InputError(
           input.where,
           fmt::format("is damaged, or too much for OpenCASCADE: it wants more memory than it gets ({} at "
-                      "most); export it anew, or as STL",
-                      human_bytes(limits.memory)));
+                      "most); {}",
+                      human_bytes(limits.memory), instead));
   }
   CadReading reading = unpack_reading(output.bytes, input.where);
   if (options.warn)

@@ -18,11 +18,6 @@ bool has_all_moments(const Body& body) {
 }
 
 void append_moments(Body& body, const Body& other) {
-  if (!has_all_moments(body) || !has_all_moments(other)) {
-    body.moment_cells.clear();
-    body.moments.clear();
-    return;
-  }
   const auto cells = static_cast<std::uint32_t>(body.cell_count());
   for (const std::uint32_t cell : other.moment_cells) body.moment_cells.push_back(cells + cell);
   body.moments.insert(body.moments.end(), other.moments.begin(), other.moments.end());

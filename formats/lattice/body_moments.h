@@ -7,8 +7,7 @@ namespace flexel {
 // Whether every cell of less than the whole fill has moments: they were asked for, or it needs none.
 [[nodiscard]] bool has_all_moments(const Body& body);
 
-// Appends those of `other`, whose cells will be appended to those of `body`. Where one of the two has not all of
-// its own, none are left: some are of no use.
+// Appends those of `other`, whose cells will be appended to those of `body`.
 void append_moments(Body& body, const Body& other);
 
 // Keeps those of the cells that `number` gives another number than `gone`, under that number; ascending.

@@ -8,12 +8,12 @@
 #include <limits>
 
 #include "base/parallel.h"
+#include "formats/lattice/cell_moments.h"
 #include "formats/lattice/quadratic_field.h"
 
 namespace flexel {
 namespace {
 
-constexpr double kWholeCell = 1 - 1e-9;  // fill
 constexpr double kNoStrain = std::numeric_limits<double>::quiet_NaN();
 
 struct FirstLargest {
@@ -56,7 +56,7 @@ Mat3 gradient_of_connections(const Body& body, const Adjacency& adjacency, std::
 std::vector<std::uint8_t> elements_in_matter(const Body& body) {
   std::vector<std::uint8_t> inside(body.element_count(), 0);
   for (std::size_t c = 0; c < body.cell_count(); ++c)
-    if (body.fill[c] >= kWholeCell)
+    if (body.fill[c] >= kWholeFill)
       for (const std::uint32_t e : body.cell_elements[c]) inside[e] = 1;
   for (const Part& part : body.parts)
     if (part.placement == Placement::centre)

@@ -4,8 +4,6 @@
 namespace flexel {
 namespace {
 
-constexpr std::size_t kBetween = 19;
-
 struct Along {
   std::array<double, 3> value{}, slope{};
 };
@@ -35,8 +33,9 @@ Vec3 cell_coordinates(const Body& body, const Part& part, std::uint32_t cell, co
 
 bool QuadraticField::is_in(const Body& body) {
   const auto found = body.cell_columns.find(kQuadraticColumn);
-  return found != body.cell_columns.end() && found->second.components == 3 * static_cast<int>(kBetween) &&
-         found->second.values.size() == 3 * kBetween * body.cell_count();
+  return found != body.cell_columns.end() &&
+         found->second.components == 3 * static_cast<int>(kBetweenNodes) &&
+         found->second.values.size() == 3 * kBetweenNodes * body.cell_count();
 }
 
 QuadraticField::QuadraticField(const Body& body, const std::vector<Vec3>& displacement)
@@ -44,7 +43,7 @@ QuadraticField::QuadraticField(const Body& body, const std::vector<Vec3>& displa
 
 std::array<Vec3, kQuadraticNodes> QuadraticField::nodes(std::uint32_t cell) const {
   std::array<Vec3, kQuadraticNodes> u;
-  const double* next = &between_[3 * kBetween * cell];
+  const double* next = &between_[3 * kBetweenNodes * cell];
   for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
     if (const std::size_t corner = corner_of_node(n); corner < 8) {
       u[n] = displacement_[body_.cell_elements[cell][corner]];
@@ -61,15 +60,6 @@ Vec3 QuadraticField::displacement(std::uint32_t cell, const Vec3& at) const {
   const auto u = nodes(cell);
   Vec3 sum = Vec3::Zero();
   for (std::size_t n = 0; n < kQuadraticNodes; ++n) sum += shape.value[n] * u[n];
-  return sum;
-}
-
-Mat3 QuadraticField::gradient(const Lattice& lattice, std::uint32_t cell, const Vec3& at) const {
-  const QuadraticShape shape = quadratic_shape(at);
-  const auto u = nodes(cell);
-  Mat3 sum = Mat3::Zero();
-  for (std::size_t n = 0; n < kQuadraticNodes; ++n)
-    sum += u[n] * (lattice.axes * shape.gradient[n].cwiseQuotient(lattice.spacing)).transpose();
   return sum;
 }
 

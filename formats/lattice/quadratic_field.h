@@ -13,6 +13,7 @@
 namespace flexel {
 
 constexpr std::size_t kQuadraticNodes = 27;
+constexpr std::size_t kBetweenNodes = 19;  // those that are no elements
 constexpr const char* kQuadraticColumn = "quadratic_displacement";
 
 // The triquadratic shape functions at `at` (cell coordinates), and their gradients there (by cell coordinates).
@@ -26,6 +27,17 @@ struct QuadraticShape {
 [[nodiscard]] constexpr std::size_t corner_of_node(std::size_t n) {
   const std::size_t i = n % 3, j = n / 3 % 3, k = n / 9;
   return i == 1 || j == 1 || k == 1 ? 8 : i / 2 + j + 2 * k;
+}
+[[nodiscard]] constexpr std::size_t node_of_corner(std::size_t corner) {
+  return 2 * (corner & 1) + 6 * (corner >> 1 & 1) + 18 * (corner >> 2);
+}
+
+// Of trilinear interpolation from the cell's elements: the weight of element `corner` at node n.
+[[nodiscard]] constexpr double trilinear_weight(std::size_t n, std::size_t corner) {
+  double weight = 1;
+  for (std::size_t axis = 0, at = n; axis < 3; ++axis, at /= 3)
+    weight *= at % 3 == 1 ? 0.5 : at % 3 / 2 == (corner >> axis & 1) ? 1 : 0;
+  return weight;
 }
 
 // Coordinates of a rest point (m, world frame) in a cell: [0, 1]^3 inside.
@@ -41,9 +53,8 @@ class QuadraticField {
   QuadraticField(const Body& body, const std::vector<Vec3>& displacement);
 
   [[nodiscard]] std::array<Vec3, kQuadraticNodes> nodes(std::uint32_t cell) const;  // m
-  // Displacement [m] and its gradient (world frame) at cell coordinates `at`.
+  // Displacement [m] at cell coordinates `at`.
   [[nodiscard]] Vec3 displacement(std::uint32_t cell, const Vec3& at) const;
-  [[nodiscard]] Mat3 gradient(const Lattice& lattice, std::uint32_t cell, const Vec3& at) const;
 
  private:
   const Body& body_;

@@ -13,6 +13,7 @@
 #include <iterator>
 #include <map>
 #include <pugixml.hpp>
+#include <set>
 #include <sstream>
 #include <utility>
 
@@ -108,12 +109,12 @@ class ThreeMfReader {
  public:
   explicit ThreeMfReader(const ImportInput& input) : input_(input), archive_(input.bytes, input.where) {}
 
-  Surface read() {
+  // Tells `warn` what is a part that may not be meant as one.
+  Surface read(const std::function<void(const std::string&)>& warn) {
     const std::string root = root_model();
     load(root);
     const pugi::xml_node model = models_.at(root).node;
     surface_.polygon_offsets.push_back(0);
-    const double unit = unit_of(model);
     double triangles = 0;
     for_each_child(child(model, "build"), "item",
                    [&](const pugi::xml_node& item) { triangles += unfolded(named_by(item, root), 0); });
@@ -122,10 +123,14 @@ class ThreeMfReader {
       add_object(named_by(item, root), transform_of(item), clean_name(attribute(item, "partnumber")), 0);
     });
     if (surface_.polygon_count() == 0) fail("builds no triangles: nothing to work on");
-    for (Vec3& vertex : surface_.vertices) vertex *= unit;
+    for (Vec3& vertex : surface_.vertices) vertex *= unit_;
+    if (warn && !supports_.empty())
+      warn(fmt::format("\"{}\"{} is support material for the print, and a part like any other here",
+                       *supports_.begin(),
+                       supports_.size() > 1 ? fmt::format(" (one of {})", supports_.size()) : ""));
     if (colored_) surface_.polygon_columns[kColorColumn] = std::move(color_);
     assign_dihedral_faces(surface_, polygon_part_, welded_);
-    surface_.sources.push_back(source_in_unit("3mf", unit));
+    surface_.sources.push_back(source_in_unit("3mf", unit_));
     return std::move(surface_);
   }
 
@@ -187,6 +192,11 @@ class ThreeMfReader {
     if (!parsed) fail(fmt::format("is damaged: its XML does not parse ({})", parsed.description()));
     model.node = child(model.document, "model");
     model.unread = unread_extensions(model.node);
+    if (const double unit = unit_of(model.node); unit_ == 0)
+      unit_ = unit;
+    else if (unit != unit_ && !attribute(model.node, "unit").empty())
+      fail(fmt::format("\"{}\" in it has another unit than the model that shows it: write it in one unit",
+                       clean_name(path)));
     const pugi::xml_node resources = child(model.node, "resources");
     for (const pugi::xml_node& resource : resources.children()) {
       const std::string id(attribute(resource, "id"));
@@ -263,6 +273,8 @@ class ThreeMfReader {
     const std::string own = clean_name(attribute(object, "name"));
     const std::string& name = own.empty() ? fallback : own;
     check_readable(model, object, name.empty() ? id.second : name);
+    if (const std::string_view type = attribute(object, "type"); type == "support" || type == "solidsupport")
+      supports_.insert(name.empty() ? clean_name(id.second) : name);
     check_stop();
     if (const pugi::xml_node mesh = child(object, "mesh")) add_mesh(model, object, mesh, transform, name);
     for_each_child(child(object, "components"), "component", [&](const pugi::xml_node& component) {
@@ -393,6 +405,8 @@ class ThreeMfReader {
   std::vector<std::uint32_t> polygon_part_, welded_;
   Column color_{4, {}};
   bool colored_ = false;
+  double unit_ = 0;                 // m; 0: no model was read yet
+  std::set<std::string> supports_;  // names of objects that hold the print up
   std::size_t instances_ = 0;
   std::map<Id, double> unfolded_;  // triangles
   double different_ = 0;           // triangles of the objects in unfolded_, each counted once
@@ -404,7 +418,7 @@ Evidence sniff_3mf(const ImportInput& input) {
 
 Surface read_3mf(ImportInput& input, const ImportOptions& options) {
   if (options.unit) throw InputError(input.where, "a 3MF file carries its own unit: leave out --unit");
-  return ThreeMfReader(input).read();
+  return ThreeMfReader(input).read(options.warn);
 }
 
 }  // namespace

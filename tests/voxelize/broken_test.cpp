@@ -59,6 +59,52 @@ TEST(Broken, AlignedInterpenetratingBoxesAreExact) {
   EXPECT_EQ(result.parts[0].dropped_cells, 0u);
 }
 
+// Of every cell, with faces on lattice planes and between them: all are multiples of 1/64 of a cell, which lines resolve.
+TEST(Broken, CellsOfInterpenetratingBoxesHaveTheFillOfTheirUnion) {
+  std::mt19937 random(14);
+  const auto eighths = [&](int least, int most) {
+    std::uniform_int_distribution<int> range(least, most);
+    Vec3 made;
+    for (double& each : made) each = range(random) / 8.;
+    return made;
+  };
+  const auto common = [](const Vec3& low, const Vec3& high, const Vec3& cell) {
+    return (high.cwiseMin(cell + Vec3::Ones()) - low.cwiseMax(cell)).cwiseMax(0).prod();
+  };
+  int seen = 0;
+  for (int trial = 0; trial < 60; ++trial) {
+    const Vec3 a = eighths(0, 8), b = eighths(4, 16);
+    const Vec3 to_a = a + eighths(6, 24), to_b = b + eighths(6, 24);
+    const VoxelizeResult result = run(merged(box(a, to_a), box(b, to_b)), 1);
+    const Body& body = result.body;
+    for (std::uint32_t c = 0; c < body.cell_count(); ++c) {
+      const Vec3& cell = body.rest[body.cell_elements[c][0]];
+      const double both = common(a.cwiseMax(b), to_a.cwiseMin(to_b), cell);
+      if (both == 0) continue;  // two pieces perhaps
+      ++seen;
+      EXPECT_NEAR(body.fill[c], common(a, to_a, cell) + common(b, to_b, cell) - both, 1e-9)
+          << trial << " " << cell.transpose();
+    }
+  }
+  EXPECT_GT(seen, 100);
+}
+
+// Walls that pass through corners of the lattice, at 45 degrees.
+TEST(Broken, AShellWithinAnotherChangesNothing) {
+  const auto prism = [](double half, double low, double high) {
+    Mesh mesh = box({-1, -1, low}, {1, 1, high});
+    for (Vec3& v : mesh.vertices) v = Vec3(half * (v.x() + v.y()) / 2, half * (v.y() - v.x()) / 2, v.z());
+    return mesh;
+  };
+  const Body alone = run(prism(3, 0, 2.5), 1).body;
+  for (const double inner : {1., 1.5, 2.}) {
+    const Body nested = run(merged(prism(3, 0, 2.5), prism(inner, .25, 2)), 1).body;
+    ASSERT_EQ(nested.cell_count(), alone.cell_count());
+    for (std::uint32_t c = 0; c < alone.cell_count(); ++c)
+      EXPECT_NEAR(nested.fill[c], alone.fill[c], .01) << inner;
+  }
+}
+
 TEST(Broken, TouchingBoxesHangTogether) {
   std::mt19937 random(17);
   for (int trial = 0; trial < 10; ++trial) {

@@ -389,20 +389,40 @@ TEST(Moments, OfSeveralPartsFollowEachOther) {
   EXPECT_EQ(count_cut(body)[1], 0u);
 }
 
-TEST(Moments, AreSpreadEvenlyWhereTheMatterIsNotKnownExactly) {
-  // Two balls that interpenetrate: only where they do.
-  const Mesh balls = merged(icosphere(2, 1), icosphere(2, 1, {.7, .1, .2}));
-  const VoxelizeResult result = with_moments(balls, .2);
-  const auto [cut_cells, even] = count_cut(result.body);
-  EXPECT_GT(even, 0u);
-  EXPECT_LE(even, result.parts[0].overlapping_voxels);
-  EXPECT_GT(cut_cells, 2 * even);
-  // A surface that stays open: everywhere.
+// Two boxes that overlap, with faces on lattice planes and between them.
+TEST(Moments, WhereShellsOverlapAreThoseOfTheUnion) {
+  const std::array<Vec3, 2> a{Vec3(0, 0, 0), Vec3(3, 2.5, .75)}, b{Vec3(1.5, .25, .125), Vec3(4, 2, 2)};
+  const Polynomial f = [](const Vec3& at) {
+    return 1 + at.x() * at.x() * at.y() - 2 * std::pow(at.z(), 4) + std::pow(at.x() * at.y(), 3) * at.z();
+  };
+  const auto over = [&](const Vec3& low, const Vec3& high) {
+    const Mesh mesh = box(low, high);
+    return integral(mesh.vertices, mesh.triangles, f);
+  };
+  const double exact = over(a[0], a[1]) + over(b[0], b[1]) - over(b[0].cwiseMax(a[0]), b[1].cwiseMin(a[1]));
+  const VoxelizeResult result = with_moments(merged(box(a[0], a[1]), box(b[0], b[1])), 1);
+  EXPECT_GT(result.parts[0].overlapping_voxels, 0u);
+  EXPECT_EQ(result.parts[0].spread_cells, 0u);
+  const Body& body = result.body;
+  const CellMoments whole = whole_moments();
+  double sum = 0;
+  std::size_t next = 0;
+  for (std::uint32_t c = 0; c < body.cell_count(); ++c) {
+    const bool cut = next < body.moment_cells.size() && body.moment_cells[next] == c;
+    const Vec3& low = body.rest[body.cell_elements[c][0]];
+    for (std::size_t k = 0; k < kMoments; ++k)
+      sum += (cut ? body.moments[kMoments * next + k] : whole[k]) *
+             f(low + Vec3(kGaussPoints[k % 5], kGaussPoints[k / 5 % 5], kGaussPoints[k / 25]));
+    next += cut;
+  }
+  EXPECT_NEAR(sum / exact, 1, 1e-9);
+  EXPECT_EQ(count_cut(with_moments(merged(icosphere(2, 1), icosphere(2, 1, {.7, .1, .2})), .2).body)[1], 0u);
+}
+
+TEST(Moments, OfASurfaceThatIsNotClosedAreRefused) {
   Mesh open = icosphere(2, 1);
   open.triangles.resize(open.triangles.size() - 3);
-  const auto [open_cells, open_even] = count_cut(with_moments(open, .2, Heal::none).body);
-  EXPECT_GT(open_cells, 100u);
-  EXPECT_EQ(open_even, open_cells);
+  EXPECT_THROW((void)with_moments(open, .2, Heal::none), InputError);
 }
 
 TEST(Moments, AreThereWhenACountIsAskedFor) {

@@ -5,6 +5,7 @@
 #include "voxelize/classify/classify.h"
 
 #include <algorithm>
+#include <optional>
 #include <stdexcept>
 
 #include "base/parallel.h"
@@ -168,20 +169,30 @@ class SlabBuilder {
       Piece piece{.i = voxel.i, .flags = static_cast<std::uint8_t>(found.count > 1 ? kOneOfSeveral : 0)};
       for (int a = 0; a < 8; ++a)
         piece.corners = static_cast<std::uint8_t>(piece.corners | (found.of_corner[a] == p) << a);
-      if (found.of_corner[0] == p) piece.fill = voxel.winding[0];
+      if (found.of_corner[0] == p || (found.count == 1 && voxel.winding[0] < 0))
+        piece.fill = voxel.winding[0];
       if (found.of_centre == p) piece.flags |= kContainsCentre;
       slab.pieces.push_back(piece);
     }
     add_records(voxel, found, first, slab);
+    std::optional<LineFill> by_lines;
     if (found.count == 1 && (found.overlapping || found.undecided || impossible(slab.pieces[first].fill))) {
-      const LineFill by_lines = fill_by_lines(voxel);
-      found.overlapping = by_lines.overlap;
-      if (by_lines.overlap || impossible(slab.pieces[first].fill)) slab.pieces[first].fill = by_lines.fill;
+      by_lines = fill_by_lines(voxel);
+      found.overlapping = by_lines->overlap;
+      if (by_lines->overlap || impossible(slab.pieces[first].fill))
+        slab.pieces[first].fill = by_lines->fill;
+      else
+        by_lines.reset();
     }
     // A shell that passes through itself may give one of several pieces less than nothing, or too much.
     for (std::uint32_t p = 0; p < found.count; ++p)
       slab.pieces[first + p].fill = std::clamp(slab.pieces[first + p].fill, 0., 1.);
-    if (options_.with_moments) moments_.find(voxel, found, first, slab);
+    if (options_.with_moments) {
+      if (by_lines)
+        append_moments(by_lines->moments, first, slab);
+      else
+        moments_.find(voxel, found, first, slab);
+    }
     slab.split_voxels += found.count > 1;
     slab.undecided_voxels += found.undecided && !found.overlapping;
     slab.overlapping_voxels += found.overlapping;

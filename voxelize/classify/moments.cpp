@@ -163,7 +163,17 @@ Polygon polygon_of(const VoxelRecords& voxel, const Record& record) {
                        voxel.k);
 }
 
+bool is_cut(const Piece& piece) {
+  return piece.fill > 1 - kWholeFill && piece.fill < kWholeFill;
+}
+
 }  // namespace
+
+std::array<double, kMomentPoints> lagrange_tails(double x) {
+  std::array<double, kN> value;
+  tails(x, value.data());
+  return value;
+}
 
 void MomentSum::add(const Polygon& polygon, const Index3& voxel) {
   std::array<Point, Polygon::kCapacity> corner;
@@ -201,27 +211,27 @@ CellMoments MomentSum::total(int winding) const {
   return moments;
 }
 
+void append_moments(const CellMoments& moments, std::uint32_t piece, Slab& slab) {
+  if (!is_cut(slab.pieces[piece])) return;
+  slab.moment_pieces.push_back(piece);
+  slab.moments.push_back(moments);
+}
+
 void MomentFinder::find(const VoxelRecords& voxel, const VoxelPieces& found, std::uint32_t first,
                         Slab& slab) {
-  const auto is_cut = [&](std::uint32_t p) {  // faces on lattice planes leave nothing, or all
-    const double fill = slab.pieces[first + p].fill;
-    return fill > 1 - kWholeFill && fill < kWholeFill;
-  };
   bool any = false;
-  for (std::uint32_t p = 0; p < found.count; ++p) any |= is_cut(p);
+  for (std::uint32_t p = 0; p < found.count; ++p) any |= is_cut(slab.pieces[first + p]);
   if (!any) return;
   sums_.assign(found.count, {});
   for (std::size_t r = 0; r < voxel.records.size(); ++r)
-    if (const std::uint32_t p = found.count > 1 ? found.of_record[r] : 0; is_cut(p))
+    if (const std::uint32_t p = found.count > 1 ? found.of_record[r] : 0; is_cut(slab.pieces[first + p]))
       sums_[p].add(polygon_of(voxel, voxel.records[r]), {voxel.i, voxel.j, voxel.k});
   for (std::uint32_t p = 0; p < found.count; ++p) {
-    if (!is_cut(p)) continue;
+    if (!is_cut(slab.pieces[first + p])) continue;
     const CellMoments moments = sums_[p].total(found.of_corner[0] == p ? voxel.winding[0] : 0);
     constexpr double kSame = 1e-9;
     const double sum = std::accumulate(moments.begin(), moments.end(), 0.);
-    if (!(std::abs(sum - slab.pieces[first + p].fill) < kSame)) continue;
-    slab.moment_pieces.push_back(first + p);
-    slab.moments.push_back(moments);
+    if (std::abs(sum - slab.pieces[first + p].fill) < kSame) append_moments(moments, first + p, slab);
   }
 }
 

@@ -9,6 +9,9 @@
 
 namespace flexel::voxelize {
 
+// The integrals of L_0 .. L_4 from x to 1.
+[[nodiscard]] std::array<double, kMomentPoints> lagrange_tails(double x);
+
 // Sums up what the clipped polygons around one piece say of its moments; see moments.cpp.
 class MomentSum {
  public:
@@ -23,11 +26,14 @@ class MomentSum {
   std::array<double, kMomentPoints> edge_{};                  // crossing terms, without w_j w_l
 };
 
+// Appends those of a piece, if the surface cuts it: faces on lattice planes leave nothing, or all.
+void append_moments(const CellMoments& moments, std::uint32_t piece, Slab& slab);
+
 // Finds the moments of pieces; keeps its memory from voxel to voxel.
 class MomentFinder {
  public:
   // Appends to the slab the moments of those of the voxel's pieces, from `first` on, that the surface cuts. A
-  // piece gets none where they do not add up to its fill: shells overlap there, and the fill was found otherwise.
+  // piece gets none where they do not add up to its fill: a shell passes through itself there.
   void find(const VoxelRecords& voxel, const VoxelPieces& found, std::uint32_t first, Slab& slab);
 
  private:

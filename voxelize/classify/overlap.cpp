@@ -1,11 +1,12 @@
-// Along a line, matter is where the running sum of crossings is above 0. Inside a voxel a line along z starts
-// on the low face; the winding number there follows from that at the lowest corner, along x and then y.
+// Along a line, matter is where the running sum of crossings is above 0. Inside a voxel the winding
+// number of a line along z follows from that at an inner point, along x and then y.
 #include "voxelize/classify/overlap.h"
 
 #include <algorithm>
 #include <numeric>
 
 #include "base/stop.h"
+#include "voxelize/classify/moments.h"
 #include "voxelize/mesh/line_crossings.h"
 
 namespace flexel::voxelize {
@@ -14,10 +15,11 @@ namespace {
 constexpr int kLines = 64;                   // across a voxel
 constexpr double kTouchingCrossings = 1e-6;  // in cells
 
-// Sum of the changes of `line` at coordinates in [low, high).
-int change_between(std::span<const LineCrossing> crossings, double low, double high) {
+// Change of the winding number on the way from one coordinate of a line to another.
+int change_between(std::span<const LineCrossing> crossings, double from, double to) {
+  if (to < from) return -change_between(crossings, to, from);
   return std::accumulate(crossings.begin(), crossings.end(), 0, [&](int sum, const LineCrossing& crossing) {
-    return sum + (crossing.at >= low && crossing.at < high ? crossing.change : 0);
+    return sum + (crossing.at >= from && crossing.at < to ? crossing.change : 0);
   });
 }
 
@@ -29,21 +31,36 @@ std::vector<std::size_t> line_begins(const std::vector<LineCrossing>& crossings,
   return begin;
 }
 
-// Length with winding > 0 in [low, high], starting from `winding` at low.
-LineFill length_inside(std::span<const LineCrossing> crossings, double low, double high, int winding) {
-  LineFill length;
+// Calls matter(from, to) for every stretch of [low, high] with winding > 0, starting from `winding` at low. True where
+// another number than 0 and 1 was met.
+template <class Matter>
+bool walk(std::span<const LineCrossing> crossings, double low, double high, int winding,
+          const Matter& matter) {
+  bool overlap = false;
   double from = low;
   for (const LineCrossing& crossing : crossings) {
     if (crossing.at < low || crossing.at >= high) continue;
-    if (winding > 0) length.fill += crossing.at - from;
+    if (winding > 0) matter(from, crossing.at);
     // Surfaces that touch may be met in either order: a winding number over no length is no overlap.
-    if (winding != 0 && winding != 1 && crossing.at - from > kTouchingCrossings) length.overlap = true;
+    if (winding != 0 && winding != 1 && crossing.at - from > kTouchingCrossings) overlap = true;
     winding += crossing.change;
     from = crossing.at;
   }
-  if (winding > 0) length.fill += high - from;
-  if (winding != 0 && winding != 1) length.overlap = true;
-  return length;
+  if (winding > 0) matter(from, high);
+  return overlap || (winding != 0 && winding != 1);
+}
+
+using Weights = std::array<double, kMomentPoints>;
+
+// The integrals of the Lagrange polynomials over the strip of line n.
+std::array<Weights, kLines> strip_weights() {
+  std::array<Weights, kLines> strips{};
+  for (int n = 0; n < kLines; ++n) {
+    const Weights low = lagrange_tails(static_cast<double>(n) / kLines),
+                  high = lagrange_tails(static_cast<double>(n + 1) / kLines);
+    for (std::size_t i = 0; i < kMomentPoints; ++i) strips[n][i] = low[i] - high[i];
+  }
+  return strips;
 }
 
 }  // namespace
@@ -53,26 +70,40 @@ LineFill fill_by_lines(const VoxelRecords& voxel) {
   for (const Record& record : voxel.records) triangles.push_back(record.triangle);
   const PartMesh& mesh = *voxel.mesh;
   constexpr double kStep = 1. / kLines;
-  const double x = voxel.i + kStep / 2, y = voxel.j + kStep / 2, z = voxel.k;
-  // Axis 1: (u, v) = (z, x). Axis 0: (u, v) = (y, z). Axis 2: (u, v) = (x, y).
-  const auto edge =
-      cross_lines(mesh, mesh.vertices, {1, z, static_cast<double>(voxel.i), 1, 1, 1, 1}, triangles);
-  const auto face = cross_lines(mesh, mesh.vertices, {0, y, z, kStep, 1, kLines, 1}, triangles);
-  const auto inside = cross_lines(mesh, mesh.vertices, {2, x, y, kStep, kStep, kLines, kLines}, triangles);
-  const auto face_begin = line_begins(face, kLines), inside_begin = line_begins(inside, kLines * kLines);
+  const Vec3 first = Vec3(voxel.i, voxel.j, voxel.k) + Vec3::Constant(kStep / 2);  // of the lines
+  const Vec3 begin = first + Vec3(.3719, .6131, .4327);  // irregular: no ties with symmetric surfaces
+  // Axis 0: (u, v) = (y, z). Axis 1: (u, v) = (z, x). Axis 2: (u, v) = (x, y).
+  const auto along_x = cross_lines(mesh, mesh.vertices, {0, begin.y(), begin.z(), 1, 1, 1, 1}, triangles);
+  const auto along_y =
+      cross_lines(mesh, mesh.vertices, {1, begin.z(), first.x(), 1, kStep, 1, kLines}, triangles);
+  const auto inside =
+      cross_lines(mesh, mesh.vertices, {2, first.x(), first.y(), kStep, kStep, kLines, kLines}, triangles);
+  const auto y_begin = line_begins(along_y, kLines), inside_begin = line_begins(inside, kLines * kLines);
+  const int start = winding_at(voxel, begin);
+  static const std::array<Weights, kLines> strips = strip_weights();
   LineFill sum;
   for (int b = 0; b < kLines; ++b) {
-    const int row = voxel.winding[0] + change_between(edge, voxel.j, y + b * kStep);
-    const std::span<const LineCrossing> along_x{face.data() + face_begin[b], face.data() + face_begin[b + 1]};
+    std::array<Weights, kMomentPoints> plane{};  // along z, x: of the row of lines
     for (int a = 0; a < kLines; ++a) {
-      const int start = row + change_between(along_x, voxel.i, x + a * kStep);
-      const std::size_t line = static_cast<std::size_t>(a + kLines * b);
-      const LineFill length =
-          length_inside({inside.data() + inside_begin[line], inside.data() + inside_begin[line + 1]}, voxel.k,
-                        voxel.k + 1, start);
-      sum.fill += length.fill / (kLines * kLines);
-      sum.overlap |= length.overlap;
+      const std::span<const LineCrossing> row{along_y.data() + y_begin[a], along_y.data() + y_begin[a + 1]};
+      const std::size_t n = static_cast<std::size_t>(a + kLines * b);
+      const std::span<const LineCrossing> line{inside.data() + inside_begin[n],
+                                               inside.data() + inside_begin[n + 1]};
+      const int low = start + change_between(along_x, begin.x(), first.x() + a * kStep) +
+                      change_between(row, begin.y(), first.y() + b * kStep) -
+                      change_between(line, voxel.k, begin.z());
+      const bool overlap = walk(line, voxel.k, voxel.k + 1, low, [&](double from, double to) {
+        sum.fill += (to - from) / (kLines * kLines);
+        const Weights low_tail = lagrange_tails(from - voxel.k), high_tail = lagrange_tails(to - voxel.k);
+        for (std::size_t l = 0; l < kMomentPoints; ++l)
+          for (std::size_t i = 0; i < kMomentPoints; ++i)
+            plane[l][i] += strips[a][i] * (low_tail[l] - high_tail[l]);
+      });
+      sum.overlap |= overlap;
     }
+    for (std::size_t k = 0; k < kMoments; ++k)
+      sum.moments[k] += strips[b][k / kMomentPoints % kMomentPoints] *
+                        plane[k / (kMomentPoints * kMomentPoints)][k % kMomentPoints];
   }
   return sum;
 }

@@ -17,6 +17,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/math/distance.h"
+
 namespace flexel::voxelize {
 namespace {
 
@@ -334,16 +336,37 @@ void number_by_record(const std::vector<std::uint32_t>& fragment, std::uint32_t 
   pieces.of_centre = of(bounds[8]);
 }
 
+// The corner that the surface passes farthest from, of the first that are clear of it: which side a corner on the surface
+// is on depends on the way there.
+int clear_corner(const VoxelRecords& voxel) {
+  constexpr double kClear = 1e-4;  // cells
+  int best = 0;
+  double farthest = -1;
+  for (int a = 0; a < 8 && farthest < kClear; ++a) {
+    double distance = 1;
+    for (const Record& record : voxel.records) {
+      const TrianglePoints p = points_of(*voxel.mesh, record.triangle);
+      distance = std::min(distance, distance_to_triangle(corner_point(voxel, a), *p[0], *p[1], *p[2]));
+    }
+    if (distance > farthest) {
+      farthest = distance;
+      best = a;
+    }
+  }
+  return best;
+}
+
 }  // namespace
 
 // The way from the corner to the point bends at an irregular place: a straight one from the corner to the
 // voxel's centre would run through a box's own corner, where the signs of the edges tie.
 int winding_at(const VoxelRecords& voxel, const Vec3& point) {
   const Vec3 bend = Vec3(voxel.i, voxel.j, voxel.k) + Vec3(kCentres[0][0], kCentres[0][1], kCentres[0][2]);
-  int winding = voxel.winding[0];
+  const int corner = clear_corner(voxel);
+  int winding = voxel.winding[corner];
   for (const Record& record : voxel.records) {
     double at = 0;
-    winding += cross_triangle(corner_point(voxel, 0), bend, *voxel.mesh, record.triangle, at);
+    winding += cross_triangle(corner_point(voxel, corner), bend, *voxel.mesh, record.triangle, at);
     winding += cross_triangle(bend, point, *voxel.mesh, record.triangle, at);
   }
   return winding;

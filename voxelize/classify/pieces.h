@@ -37,7 +37,7 @@ struct PieceFinder {
   VoxelPieces find(const VoxelRecords& voxel, bool with_centre);
 };
 
-// Winding number at `point` in the voxel, from that at its lowest corner.
+// Winding number at `point` in the voxel, from that at a corner.
 [[nodiscard]] int winding_at(const VoxelRecords& voxel, const Vec3& point);
 
 }  // namespace flexel::voxelize

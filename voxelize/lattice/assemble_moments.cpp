@@ -13,9 +13,10 @@ void append(const CellMoments& moments, double scale, std::uint32_t cell, Body& 
 
 }  // namespace
 
-void append_moments(const Voxels& voxels, Body& body) {
+std::size_t append_moments(const Voxels& voxels, Body& body) {
   constexpr CellMoments kWhole = whole_moments();
   std::uint32_t cell = body.parts.back().cell_begin;
+  std::size_t spread = 0;
   for (const Slab& slab : voxels.slabs) {
     std::size_t next = 0;
     for (std::uint32_t p = 0; p < slab.pieces.size(); ++p) {
@@ -23,13 +24,16 @@ void append_moments(const Voxels& voxels, Body& body) {
       if (has_cell(voxels, slab.pieces[p])) {
         if (exact)
           append(slab.moments[next], 1, cell, body);
-        else if (slab.pieces[p].fill < kWholeFill)
+        else if (slab.pieces[p].fill < kWholeFill) {
           append(kWhole, slab.pieces[p].fill, cell, body);
+          ++spread;
+        }
         ++cell;
       }
       next += exact;
     }
   }
+  return spread;
 }
 
 }  // namespace flexel::voxelize

@@ -6,8 +6,8 @@
 namespace flexel::voxelize {
 
 // Appends those of the cells of the body's last part, which assemble_part made of `voxels`. Cells with less than
-// the whole fill but without exact moments (shells overlap there, or the surface is not closed) get those of
-// matter spread evenly: the fill times those of a whole cell.
-void append_moments(const Voxels& voxels, Body& body);
+// the whole fill but without exact moments (a shell passes through itself there) get those of
+// matter spread evenly: the fill times those of a whole cell; their number is returned.
+std::size_t append_moments(const Voxels& voxels, Body& body);
 
 }  // namespace flexel::voxelize

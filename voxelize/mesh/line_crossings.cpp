@@ -1,6 +1,7 @@
 // Scan conversion: every row of lines (constant v) cuts two edges of a triangle, interpolated from the lower
 // to the upper vertex so that both triangles of an edge find the same u; lines between the two cross the
-// triangle. A coordinate on a line counts as above it (see clip.cpp).
+// triangle. A coordinate on a line counts as above it along u and v alike (see clip.cpp): the line runs a hair
+// below its place, as the corners of voxels lie there.
 #include "voxelize/mesh/line_crossings.h"
 
 #include <algorithm>
@@ -11,7 +12,7 @@
 namespace flexel::voxelize {
 namespace {
 
-// First grid line at or above a coordinate: lines below `n` are under it.
+// How many grid lines lie below a coordinate.
 int lines_below(double coordinate, double begin, double step, int count) {
   double n = std::ceil((coordinate - begin) / step);
   if (!(n > 0)) return 0;
@@ -20,6 +21,12 @@ int lines_below(double coordinate, double begin, double step, int count) {
   while (n > 0 && begin + (n - 1) * step >= coordinate) --n;
   while (n < count && begin + n * step < coordinate) ++n;
   return static_cast<int>(n);
+}
+
+// How many grid lines lie below a coordinate or on it.
+int lines_up_to(double coordinate, double begin, double step, int count) {
+  const int n = lines_below(coordinate, begin, step, count);
+  return n < count && begin + n * step == coordinate ? n + 1 : n;
 }
 
 // Whether surely no grid line lies between the coordinates: a quick look that may say no where it is true.
@@ -56,8 +63,8 @@ void cross_row(const Triangle2& t, double v, int b, const LineGrid& grid, std::u
   if (n < 2) return;
   // Counter-clockwise seen from +axis (normal along +axis: leaving): the upward edge is on the high side.
   const int high = ends[0] < ends[1] ? 1 : 0;
-  const int begin = lines_below(ends[1 - high], grid.u_begin, grid.u_step, grid.u_count);
-  const int end = lines_below(ends[high], grid.u_begin, grid.u_step, grid.u_count);
+  const int begin = lines_up_to(ends[1 - high], grid.u_begin, grid.u_step, grid.u_count);
+  const int end = lines_up_to(ends[high], grid.u_begin, grid.u_step, grid.u_count);
   if (begin >= end) return;
   const double du1 = t.u[1] - t.u[0], dv1 = t.v[1] - t.v[0], du2 = t.u[2] - t.u[0], dv2 = t.v[2] - t.v[0];
   const double twice_area = du1 * dv2 - du2 * dv1;

@@ -41,6 +41,7 @@ struct VoxelizedPart {
   std::size_t split_voxels = 0;        // voxels that hold more than one piece
   std::size_t overlapping_voxels = 0;  // in which shells interpenetrate; fill from 64 x 64 lines
   std::size_t undecided_voxels = 0;    // voxels whose pieces could not be told apart
+  std::size_t spread_cells = 0;        // cut cells whose moments are those of matter spread evenly
   Healing healing;
   std::size_t disagreements = 0;  // voxels where the parities of the three axes differ (open surfaces)
   Vec3 spacing = Vec3::Zero();
