@@ -40,6 +40,8 @@ namespace {
 // Of the first run when a size is chosen: enough for most error bars, or for one that takes a tenth of a
 // second.
 constexpr std::size_t kFirstCells = 20000, kFewCells = 2000;
+constexpr std::size_t kFirstQuadraticCells = 2500, kFewQuadraticCells = 500;
+constexpr double kThinWalls = 3;                          // cells: model `quadratic` is for thinner ones
 constexpr double kShort = 5;                              // s
 constexpr double kUsualError = 0.05, kUsualSeconds = 20;  // aimed at where nothing is asked for
 
@@ -200,56 +202,138 @@ simulate::SimulateOptions simulate_options(const DeformArguments& arguments, con
   return options;
 }
 
-// The size that --accuracy or --within asks for, and the run at it. The mapping is `smooth` where that moves
-// a vertex by more than a quarter of the error asked for beside what --method says.
-SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surface& surface,
-                        AccuracyReport& accuracy, Progress& progress) {
-  Progress quiet("flexel", Progress::Mode::quiet);
-  HeldWarnings warnings;  // of runs that are only tried
-  for (const simulate::Tie& tie : plan.job.scene.get<simulate::Supports>().ties)
-    plan.goal->driven |= tie.is_move;
-  plan.goal->driven |= !plan.job.moves.empty() || !plan.job.twists.empty();
-  mapping::MapOptions mapping;
-  mapping.method = plan.map.method;
-  const auto solve = [&](std::optional<double> size, const GoesOn& goes_on) {
+bool walls_are_thin(const voxelize::VoxelizeResult& voxels) {
+  return wall_thickness(voxels) < kThinWalls * voxels.parts.front().spacing.minCoeff();
+}
+
+// Which model the runs at several sizes have. Where nobody says it, thin walls get `quadratic`, unless that does not take
+// the scene.
+class ModelChoice {
+ public:
+  explicit ModelChoice(Job& job)
+      : job_(job),
+        free_(job.scene.model.empty() &&
+              std::none_of(job.scene.parts.begin(), job.scene.parts.end(),
+                           [](const auto& part) { return !part.second.model.empty(); })) {}
+
+  void choose(const voxelize::VoxelizeResult& usual) {
+    if (free_ && !chosen_ && walls_are_thin(usual)) set(true);
+  }
+  // False where the model was not chosen here.
+  bool take_back() {
+    if (!chosen_) return false;
+    set(false);
+    free_ = false;
+    return true;
+  }
+  [[nodiscard]] bool quadratic() const { return job_.voxelize.moments; }
+  [[nodiscard]] bool chosen() const { return chosen_; }
+
+ private:
+  void set(bool chosen) {
+    chosen_ = job_.voxelize.moments = chosen;
+    job_.scene.model = chosen ? "quadratic" : "";
+  }
+
+  Job& job_;
+  bool free_;
+  bool chosen_ = false;
+};
+
+// The runs at several sizes; warnings of runs that are only tried are held back.
+class GoalRuns {
+ public:
+  GoalRuns(const DeformArguments& arguments, Plan& plan, const Surface& surface, Progress& progress)
+      : arguments_(arguments), plan_(plan), surface_(surface), progress_(progress), model_(plan.job) {}
+
+  SolvedRun operator()(std::optional<double> size, const GoesOn& goes_on) {
+    try {
+      SolvedRun run = solve(size, goes_on);
+      if (!size) model_.choose(run.voxels);
+      return size || !model_.chosen() ? std::move(run) : solve(size, goes_on);
+    } catch (const InputError&) {
+      if (!model_.take_back()) throw;
+    } catch (const DivergedError&) {
+      if (!model_.take_back()) throw;
+    }
+    return solve(size, goes_on);
+  }
+
+  [[nodiscard]] mapping::MapResult map(SolvedRun& run, mapping::MapMethod method) {
+    mapping::MapOptions options;
+    options.method = method;
+    return map_part(run.voxels.body, options, {}, quiet_).result;
+  }
+  [[nodiscard]] bool chose_quadratic() const { return model_.chosen(); }
+  void drop_warnings() { (void)warnings_.take(); }
+
+ private:
+  [[nodiscard]] std::size_t usual_count() const {
+    const bool few = plan_.goal->within.value_or(kShort) < kShort;
+    if (model_.quadratic()) return few ? kFewQuadraticCells : kFirstQuadraticCells;
+    return few ? kFewCells : kFirstCells;
+  }
+
+  SolvedRun solve(std::optional<double> size, const GoesOn& goes_on) {
     SolvedRun run;
-    progress.update(0, size ? "--size " + size_text(*size) : "");
-    (void)warnings.take();
+    progress_.update(0, size ? "--size " + size_text(*size) : "");
+    drop_warnings();
     run.size = size.value_or(0);
-    voxelize::VoxelizeOptions options = plan.job.voxelize;
+    voxelize::VoxelizeOptions options = plan_.job.voxelize;
     options.size = size;
-    if (!size) options.count = plan.goal->within.value_or(kShort) < kShort ? kFewCells : kFirstCells;
+    if (!size) options.count = usual_count();
     const double processor = processor_seconds();
     auto began = std::chrono::steady_clock::now();
-    run.voxels = voxelize::voxelize(surface, options, quiet);
+    run.voxels = voxelize::voxelize(surface_, options, quiet_);
     run.voxelize_seconds = seconds_since(began);
     if (!size) return run;  // only its spacing is wanted
     if (!goes_on(run.voxels.body.cell_count())) {
       run.given_up = true;
       return run;
     }
-    Job job = plan.job;  // anew for each body: an action that throws leaves none out
+    Job job = plan_.job;  // anew for each body: an action that throws leaves none out
     add_actions(job, run.voxels.body);
-    run.simulated = simulate::simulate(run.voxels.body, job.scene, simulate_options(arguments, plan), quiet);
+    run.simulated =
+        simulate::simulate(run.voxels.body, job.scene, simulate_options(arguments_, plan_), quiet_);
     began = std::chrono::steady_clock::now();
-    use_field(run.voxels.body, arguments.map, plan.map);
-    mapping.method = plan.map.method;
-    run.mapped = map_part(run.voxels.body, mapping, {}, quiet).result.displacement;
+    use_field(run.voxels.body, arguments_.map, plan_.map);
+    run.mapped = map(run, plan_.map.method).displacement;
     run.map_seconds = seconds_since(began);
     run.processor_seconds = processor_seconds() - processor;
-    run.wall = wall_thickness(run.voxels);
-    run.warnings = warnings.take();
+    if (!model_.quadratic()) run.wall = wall_thickness(run.voxels);
+    run.warnings = warnings_.take();
     return run;
-  };
-  SolvedRun run = choose_resolution(*plan.goal, solve, accuracy, progress);
-  (void)warnings.take();
-  if (plan.goal->error && plan.map.method == &mapping::kBlended) {
-    mapping.method = &mapping::kSmooth;
-    const mapping::MapResult smooth = map_part(run.voxels.body, mapping, {}, quiet).result;
-    if (mapping_difference(run.mapped, smooth.displacement) > 0.25 * *plan.goal->error)
-      plan.map.method = &mapping::kSmooth;
   }
+
+  const DeformArguments& arguments_;
+  Plan& plan_;
+  const Surface& surface_;
+  Progress& progress_;
+  Progress quiet_{"flexel", Progress::Mode::quiet};
+  HeldWarnings warnings_;
+  ModelChoice model_;
+};
+
+// The size that --accuracy or --within asks for, and the run at it. The mapping is `smooth` where that moves
+// a vertex by more than a quarter of the error asked for beside what --method says.
+SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surface& surface,
+                        AccuracyReport& accuracy, Progress& progress) {
+  for (const simulate::Tie& tie : plan.job.scene.get<simulate::Supports>().ties)
+    plan.goal->driven |= tie.is_move;
+  plan.goal->driven |= !plan.job.moves.empty() || !plan.job.twists.empty();
+  GoalRuns runs(arguments, plan, surface, progress);
+  SolvedRun run = choose_resolution(*plan.goal, std::ref(runs), accuracy, progress);
+  runs.drop_warnings();
+  if (plan.goal->error && plan.map.method == &mapping::kBlended &&
+      mapping_difference(run.mapped, runs.map(run, &mapping::kSmooth).displacement) >
+          0.25 * *plan.goal->error)
+    plan.map.method = &mapping::kSmooth;
   accuracy.method = name_of(plan.map.method);
+  if (runs.chose_quadratic())
+    progress.say(
+        fmt::format("model quadratic: a fifth of the matter lies in walls thinner than {} of the usual cells "
+                    "(--model cells is the other)",
+                    kThinWalls));
   return run;
 }
 
@@ -283,20 +367,27 @@ SolvedRun solve(const DeformArguments& arguments, Plan& plan, std::optional<Accu
 
 // A wide bar, and walls that the cells of model `cells` are too coarse for.
 bool has_thin_walls(const SolvedRun& run) {
-  constexpr double kWide = 0.1, kThin = 3;  // share, cells
+  constexpr double kWide = 0.1;  // share
   double worst = 0;
   for (const simulate::ErrorBar& each : run.simulated.error_bars.bars)
     if (each.of != simulate::ErrorBar::Of::elastic_energy && std::abs(each.value) > 0)
       worst = std::max(worst, each.bar.half_width / std::abs(each.value));
-  return worst > kWide && wall_thickness(run.voxels) < kThin * spacing_of(run);
+  return worst > kWide && walls_are_thin(run.voxels);
+}
+
+// Model `quadratic` takes the scene: equilibrium of parts that do not touch, without rigid links.
+bool suits_quadratic(const SolvedRun& run) {
+  const simulate::SimulateResult& found = run.simulated;
+  return !QuadraticField::is_in(run.voxels.body) && !found.timed && !found.settled && found.bonds.empty() &&
+         std::none_of(found.loads.begin(), found.loads.end(),
+                      [](const simulate::AppliedLoad& load) { return load.displacement.has_value(); });
 }
 
 // What to do next, of this run.
 std::string next_step(const SolvedRun& run, const std::optional<AccuracyReport>& accuracy) {
   if (!accuracy) return "";
-  if (!QuadraticField::is_in(run.voxels.body) && !run.simulated.timed && !run.simulated.settled &&
-      has_thin_walls(run))
-    return "--model quadratic is made for walls as thin as these (small deflections)";
+  if (suits_quadratic(run) && has_thin_walls(run))
+    return "--model quadratic is made for walls as thin as these";
   std::string chosen_for;
   if (accuracy->goal.error) chosen_for += human_share(*accuracy->goal.error);
   if (accuracy->goal.within)
@@ -305,8 +396,10 @@ std::string next_step(const SolvedRun& run, const std::optional<AccuracyReport>&
   const bool usual = accuracy->method == name_of(&mapping::kBlended) ||
                      accuracy->method == name_of(&mapping::kShapeFunctions);
   const std::string method = usual ? "" : " --method " + accuracy->method;
-  const std::string repeat = fmt::format("--size {}{} repeats this run, chosen for {}",
-                                         size_text(accuracy->runs.back().size), method, chosen_for);
+  const bool quadratic = QuadraticField::is_in(run.voxels.body);
+  const std::string repeat =
+      fmt::format("--size {}{}{} repeats this run, chosen for {}", size_text(accuracy->runs.back().size),
+                  quadratic ? " --model quadratic" : "", method, chosen_for);
   return accuracy->advice.empty() ? repeat : accuracy->advice + "; " + repeat;
 }
 

@@ -100,9 +100,9 @@ void declare_scene(CLI::App& app, JobArguments& arguments) {
   add("--material", arguments.materials,
       "What the parts are made of: steel, PLA, ... (docs/reference/scene.md); of one part: \"knob=PLA\"",
       "[PART=]NAME");
-  app.add_option(
-         "--model", arguments.model,
-         "How the parts resist: cells, quadratic (linear; exact on thin and slanted walls), springs or paper")
+  app.add_option("--model", arguments.model,
+                 "How the parts resist: cells, quadratic (small strains; exact on thin and slanted walls), "
+                 "springs or paper")
       ->type_name("NAME");
   add("--infill", arguments.infills, "Printed with this infill: 20%; of one part: \"knob=20%\" (an estimate)",
       "[PART=]SHARE");

@@ -13,7 +13,6 @@
 #include "base/printable.h"
 #include "formats/common/file_formats.h"
 #include "formats/exchange/surface_file.h"
-#include "formats/lattice/quadratic_field.h"
 #include "mapping/methods/method.h"
 #include "mapping/report/report.h"
 
@@ -90,7 +89,7 @@ MapOptions map_options(const MapArguments& arguments) {
 }
 
 void use_field(const Body& body, const MapArguments& arguments, MapOptions& options) {
-  if (arguments.method.empty() && QuadraticField::is_in(body)) options.method = &kShapeFunctions;
+  if (arguments.method.empty()) options.method = default_method(body);
 }
 
 CrackOptions crack_options(const MapArguments& arguments) {

@@ -37,7 +37,6 @@ namespace {
 
 // Of a start from a coarser lattice
 constexpr std::size_t kLeastCellsToCoarsen = 4000;
-constexpr double kBesideCells = 5;      // coarse cells put the peak of a support or an edge that far from it
 constexpr double kMostThinWalls = 0.2;  // share of the matter, in walls thinner than a coarse cell
 constexpr double kStartTolerance = 1e-5;
 
@@ -66,39 +65,6 @@ void report_unsupported(std::size_t elements, SimulateResult& result, Progress& 
       "{} element(s) at tips or edges have connections in one plane only, which resist nothing across it; "
       "they are carried along with the matter nearest to them",
       human_count(elements)));
-}
-
-void explain_before(const std::vector<ActiveEffect>& effects, Progress& progress) {
-  progress.say("plan: the parts' models, equilibrium by Newton's method");
-  for (const ActiveEffect& effect : effects)
-    progress.say(fmt::format("plan: {} ({})", effect.name, effect.why));
-}
-
-double mass_of(const Problem& problem) {
-  const std::vector<std::uint32_t> part = cell_parts(problem.body);
-  const std::vector<double> share = mass_shares(problem.body), factor = mass_factors(problem.body);
-  double mass = parallel_sum<double>(problem.body.cell_count(), [&](std::size_t c) {
-    return share[c] * problem.materials[part[c]].density * problem.body.parts[part[c]].lattice.spacing.prod();
-  });
-  for (std::size_t p = 0; p < problem.body.parts.size(); ++p) {
-    const Part& each = problem.body.parts[p];
-    if (each.placement != Placement::centre) continue;
-    const double whole = problem.materials[p].density * each.lattice.spacing.prod();
-    mass += factor.empty() ? (each.element_end - each.element_begin) * whole
-                           : whole * std::accumulate(factor.begin() + each.element_begin,
-                                                     factor.begin() + each.element_end, 0.0);
-  }
-  return mass;
-}
-
-// An effect that acts in time has no meaning at equilibrium.
-void refuse_timed(const std::vector<ActiveEffect>& effects, const std::string& scene) {
-  for (const ActiveEffect& effect : effects)
-    if (effect.acts != ActsIn::all)
-      throw InputError(scene,
-                       fmt::format("{} ({}) acts in timed runs only: give [run] time = \"1 s\", or leave "
-                                   "it out",
-                                   effect.name, effect.why));
 }
 
 // Outputs that only a timed run has.
@@ -216,11 +182,9 @@ SimulateResult Run::operator()() {
   name_materials(body_, problem_.materials);
   const std::vector<ProbePoints> probes = place_probes(scene_, problem_);
   std::vector<ActiveEffect> effects = active_effects(scene_.effects, problem_);
-  refuse_timed(effects, scene_.name);
+  refuse_timed(effects, ActsIn::all, scene_.name);
   refuse_timed(options_, scene_.name);
-  if (std::none_of(effects.begin(), effects.end(), [](const ActiveEffect& each) { return each->drives(); }))
-    progress_.warn("the scene has no [[load]], [[move]] or [gravity]: nothing will move");
-  if (options_.explain) explain_before(effects, progress_);
+  report_effects(effects, "the parts' models, equilibrium by Newton's method", options_.explain, progress_);
   report_strays(fragments_, result, progress_);
   report_unsupported(unsupported_, result, progress_);
   Mechanics mechanics(problem_, std::move(effects));
@@ -234,24 +198,12 @@ SimulateResult Run::operator()() {
   result.smallest_jacobian = mechanics.most_compressed(state_).value;
   measure_corners(mechanics.cells(), body_, state_, result, progress_);
   if (options_.stress) measure_stress(problem_, state_, body_, result);
-  if (options_.estimate && result.stress) {
-    const auto part = std::find_if(body_.parts.begin(), body_.parts.end(),
-                                   [&](const Part& each) { return each.name == result.stress->part; });
-    const double reach = kBesideCells * part->lattice.spacing.maxCoeff();
-    result.stress->beside = singular_beside(body_, tied_, result.stress->at, reach);
-  }
+  if (options_.estimate) mark_singular(body_, tied_, result);
   carry_strays(fragments_, problem_, mechanics.stencil(), state_);
   move_body(body_, state_);
   if (scene_.run.renormalise) renormalise_all(body_, problem_, state_.displacement);
   for (const ProbePoints& probe : probes) result.probes.push_back(measure(probe, state_));
-  for (const AppliedLoad& load : result.loads) {
-    result.imbalance += load.force;
-    result.moment_imbalance += load.moment;
-  }
-  for (const Reaction& reaction : result.reactions) {
-    result.imbalance += reaction.force;
-    result.moment_imbalance += reaction.moment;
-  }
+  sum_up_imbalance(result);
   measure_displacement(body_, state_, result);
   result.mass = mass_of(problem_);
   refuse_not_finite(result, scene_.name);

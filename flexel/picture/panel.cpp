@@ -12,8 +12,8 @@
 #include "flexel/picture/lattice_drawable.h"
 #include "flexel/picture/render/quantity.h"
 #include "flexel/picture/render/thickness.h"
-#include "formats/lattice/quadratic_field.h"
 #include "mapping/methods/map_surface.h"
+#include "mapping/methods/method.h"
 
 namespace flexel::picture {
 namespace {
@@ -108,7 +108,7 @@ void draw_body_surface(const Body& body, const PictureOptions& options, const Co
                        Progress& progress, Panel& panel) {
   const Surface& surface = body.surface;
   mapping::MapOptions how;
-  if (QuadraticField::is_in(body)) how.method = &mapping::kShapeFunctions;
+  how.method = mapping::default_method(body);
   const mapping::MapResult mapped = map_surface(body, how, progress);
   for (const Vec3& u : mapped.displacement)
     if (!u.allFinite())

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/nearest_word.h"
+#include "formats/lattice/quadratic_field.h"
 
 namespace flexel::mapping {
 namespace {
@@ -27,6 +28,10 @@ std::string any_of_these(const std::vector<std::string>& words) {
 
 std::span<const MapMethod> map_methods() {
   return kMethods;
+}
+
+MapMethod default_method(const Body& body) {
+  return QuadraticField::is_in(body) ? &kShapeFunctions : &kBlended;
 }
 
 std::string method_help() {

@@ -49,8 +49,10 @@ struct MappingMethod {
                                                std::size_t vertices) = nullptr;
 };
 
-// All methods, the default first.
+// All methods.
 [[nodiscard]] std::span<const MapMethod> map_methods();
+// For a body with the field of model `quadratic` that field; else `blended`.
+[[nodiscard]] MapMethod default_method(const Body& body);
 // For help texts: "blended, smooth, affine or gram-schmidt (the paper's)".
 [[nodiscard]] std::string method_help();
 // The names of those that a binding file can hold: "affine or gram-schmidt".

@@ -33,7 +33,7 @@ namespace flexel::simulate {
 enum class EnergyAccount { none, potential, stored, work, dissipation };
 
 // Where an effect acts: everywhere; in timed runs and in the dynamic relaxation that looks for equilibrium
-// with contact; in timed runs alone.
+// with contact; in timed runs alone. Each is more than the one before.
 enum class ActsIn { all, relaxation_and_time, time };
 
 // The step that led to a state.

@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
@@ -95,38 +94,6 @@ void add_volume_load(const Load& load, const std::vector<std::uint32_t>& element
   for (std::size_t q = 0; q < elements.size(); ++q) sum[elements[q]] += forces[q];
 }
 
-constexpr double kCouple = 1e-3;  // of forces times arms: less moment about their middle is rounding
-
-// The rotation vector [rad] of what a couple acts on: of the rigid motion nearest to the elements' own, each
-// with the weight of its force (Kabsch 1976). Nothing for forces that have no moment about their own middle.
-template <class ElementForces>
-std::optional<Vec3> turn_of_couple(const ElementForces& forces, const Body& body, const State& state) {
-  double whole = 0, arms = 0;
-  Vec3 middle = Vec3::Zero(), moved = Vec3::Zero(), moment = Vec3::Zero();
-  for (const auto& at : forces) {
-    const double weight = at.force.norm();
-    whole += weight;
-    middle += weight * body.rest[at.element];
-    moved += weight * state.displacement[at.element];
-  }
-  middle /= whole;
-  moved /= whole;
-  Mat3 product = Mat3::Zero();
-  for (const auto& at : forces) {
-    const Vec3 arm = body.rest[at.element] - middle;
-    product += at.force.norm() * (arm + state.displacement[at.element] - moved) * arm.transpose();
-    moment += arm.cross(at.force);
-    arms += arm.norm() * at.force.norm();
-  }
-  if (!(moment.norm() > kCouple * arms)) return std::nullopt;
-  const Eigen::JacobiSVD<Mat3> svd(product, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  if (!(svd.singularValues()[1] > 1e-9 * svd.singularValues()[0])) return std::nullopt;  // a line
-  Mat3 sense = Mat3::Identity();
-  sense(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
-  const Eigen::AngleAxisd turn(Mat3(svd.matrixU() * sense * svd.matrixV().transpose()));
-  return Vec3(turn.angle() * turn.axis());
-}
-
 }  // namespace
 
 std::vector<Vec3> load_forces(const Load& load, const std::vector<LoadedPoint>& points) {
@@ -209,7 +176,11 @@ void Loads::report(const State& state, const std::vector<Vec3>&, SimulateResult&
     for (const ElementForce& at : load.forces)
       add_at(factor * at.force, body_->rest[at.element] + state.displacement[at.element], total.force,
              total.moment);
-    if (load.couple) total.rotation = turn_of_couple(load.forces, *body_, state);
+    if (load.couple)
+      total.rotation = turn_of_couple(load.forces.size(), [&](std::size_t i) {
+        const ElementForce& at = load.forces[i];
+        return LoadedMotion{at.force, body_->rest[at.element], state.displacement[at.element]};
+      });
     result.loads.push_back(total);
   }
 }

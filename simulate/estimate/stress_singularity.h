@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "formats/lattice/body.h"
+#include "simulate/result/result.h"
 
 namespace flexel::simulate {
 
@@ -12,5 +13,9 @@ namespace flexel::simulate {
 // all directions (2), or "a re-entrant edge" of the surface, turning by more than 30 degrees. "" for neither.
 [[nodiscard]] std::string singular_beside(const Body& body, const std::vector<std::uint8_t>& tied,
                                           const Vec3& at, double reach);
+
+// Says it of the largest stress of `result`, if there is one: within 5 spacings, for coarse cells put the peak of a
+// support or an edge that far from it.
+void mark_singular(const Body& body, const std::vector<std::uint8_t>& tied, SimulateResult& result);
 
 }  // namespace flexel::simulate

@@ -1,6 +1,9 @@
 // Both are sums over the points in their order.
 #include "simulate/matter/load_distribution.h"
 
+#include <Eigen/Geometry>
+#include <Eigen/SVD>
+
 #include <Eigen/Eigenvalues>
 
 namespace flexel::simulate {
@@ -66,6 +69,36 @@ std::optional<std::vector<Vec3>> bearing(const std::vector<LoadedPoint>& points,
   for (std::size_t q = 0; q < points.size(); ++q)
     forces[q] = scale * forces[q] + points[q].weight / total * left;
   return forces;
+}
+
+std::optional<Vec3> turn_of_couple(std::size_t count, const std::function<LoadedMotion(std::size_t)>& at) {
+  constexpr double kCouple = 1e-3;  // of forces times arms: less moment about their middle is rounding
+  double whole = 0, arms = 0;
+  Vec3 middle = Vec3::Zero(), moved = Vec3::Zero(), moment = Vec3::Zero();
+  for (std::size_t i = 0; i < count; ++i) {
+    const LoadedMotion each = at(i);
+    const double weight = each.force.norm();
+    whole += weight;
+    middle += weight * each.rest;
+    moved += weight * each.displacement;
+  }
+  middle /= whole;
+  moved /= whole;
+  Mat3 product = Mat3::Zero();
+  for (std::size_t i = 0; i < count; ++i) {
+    const LoadedMotion each = at(i);
+    const Vec3 arm = each.rest - middle;
+    product += each.force.norm() * (arm + each.displacement - moved) * arm.transpose();
+    moment += arm.cross(each.force);
+    arms += arm.norm() * each.force.norm();
+  }
+  if (!(moment.norm() > kCouple * arms)) return std::nullopt;
+  const Eigen::JacobiSVD<Mat3> svd(product, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  if (!(svd.singularValues()[1] > 1e-9 * svd.singularValues()[0])) return std::nullopt;  // a line
+  Mat3 sense = Mat3::Identity();
+  sense(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
+  const Eigen::AngleAxisd turn(Mat3(svd.matrixU() * sense * svd.matrixV().transpose()));
+  return Vec3(turn.angle() * turn.axis());
 }
 
 }  // namespace flexel::simulate

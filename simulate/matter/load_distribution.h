@@ -1,5 +1,6 @@
 // How a force, a moment or a bearing load is spread over points of a surface (or over elements).
 #pragma once
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -28,5 +29,14 @@ struct LoadedPoint {
 // not look against it.
 [[nodiscard]] std::optional<std::vector<Vec3>> bearing(const std::vector<LoadedPoint>& points,
                                                        const Vec3& force);
+
+struct LoadedMotion {
+  Vec3 force, rest, displacement;  // N, m, m
+};
+
+// The rotation vector [rad] of what `count` forces act on: of the rigid motion nearest to that of their places, each
+// with the weight of its force (Kabsch 1976). Nothing for forces that have no moment about their own middle.
+[[nodiscard]] std::optional<Vec3> turn_of_couple(std::size_t count,
+                                                 const std::function<LoadedMotion(std::size_t)>& at);
 
 }  // namespace flexel::simulate

@@ -9,6 +9,7 @@
 
 #include "base/math/distance.h"
 #include "base/parallel.h"
+#include "formats/lattice/cell_moments.h"
 #include "formats/lattice/fields.h"
 #include "simulate/models/cells.h"
 #include "simulate/models/central_spring.h"
@@ -20,7 +21,6 @@ namespace {
 constexpr const char* kMises = "von_mises";
 constexpr const char* kPrincipal = "principal_stress";
 constexpr const char* kOfCell = "cell_";  // before a name: in the middle of each cell
-constexpr double kFull = 1 - 1e-9;
 // Of the patch's weight, on the squared gradient per spacing: where the cells lie in one layer the field is
 // constant across it.
 constexpr double kRidge = 1e-3;
@@ -160,7 +160,7 @@ class Recovery {
     const std::span<const std::uint32_t> near = around_.of(e);
     if (near.empty()) return SymmetricStress::Zero();
     const bool full = near.size() == 8 && std::all_of(near.begin(), near.end(), [&](std::uint32_t c) {
-                        return body_.fill[c] >= kFull;
+                        return body_.fill[c] >= kWholeFill;
                       });
     if (!full) return fitted(e, beside, patch(near));
     SymmetricStress sum = SymmetricStress::Zero();

@@ -6,13 +6,15 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "base/error.h"
+#include "base/parallel.h"
 #include "base/units.h"
 #include "formats/lattice/fields.h"
 #include "simulate/input/infill.h"
-#include "simulate/matter/stress.h"
 #include "simulate/models/connections.h"
+#include "simulate/models/rest_shape.h"
 
 namespace flexel::simulate {
 
@@ -38,6 +40,16 @@ void report_materials(const Problem& problem, Progress& progress) {
           "sizes",
           part, material.name, axial_stiffness(problem.hooke[p])));
   }
+}
+
+void report_effects(const std::vector<ActiveEffect>& effects, const std::string& run, bool explain,
+                    Progress& progress) {
+  if (std::none_of(effects.begin(), effects.end(), [](const ActiveEffect& each) { return each->drives(); }))
+    progress.warn("the scene has no [[load]], [[move]] or [gravity]: nothing will move");
+  if (!explain) return;
+  progress.say("plan: " + run);
+  for (const ActiveEffect& effect : effects)
+    progress.say(fmt::format("plan: {} ({})", effect.name, effect.why));
 }
 
 void report_strays(const Fragments& fragments, SimulateResult& result, Progress& progress) {
@@ -123,14 +135,44 @@ void measure_corners(const Cells& cells, const Body& body, const State& state, S
 }
 
 void measure_stress(const Problem& problem, const State& state, Body& body, SimulateResult& result) {
-  if (body.cell_count() == 0) return;
-  const Stresses computed = stresses(problem, state);
-  const std::optional<LargestStress> largest = largest_stress(body, computed);
+  if (body.cell_count() > 0) report_stress(problem, stresses(problem, state), body, result);
+}
+
+void report_stress(const Problem& problem, const Stresses& stresses, Body& body, SimulateResult& result) {
+  const std::optional<LargestStress> largest = largest_stress(body, stresses);
   if (!largest) return;
   const double yield = problem.materials[largest->part].yield;
   result.stress = StressSummary{largest->value, largest->at, body.parts[largest->part].name, {}};
   if (yield > 0) result.stress->yield_share = largest->value / yield;
-  write_stress_columns(computed, body);
+  write_stress_columns(stresses, body);
+}
+
+void sum_up_imbalance(SimulateResult& result) {
+  for (const AppliedLoad& load : result.loads) {
+    result.imbalance += load.force;
+    result.moment_imbalance += load.moment;
+  }
+  for (const Reaction& reaction : result.reactions) {
+    result.imbalance += reaction.force;
+    result.moment_imbalance += reaction.moment;
+  }
+}
+
+double mass_of(const Problem& problem) {
+  const std::vector<std::uint32_t> part = cell_parts(problem.body);
+  const std::vector<double> share = mass_shares(problem.body), factor = mass_factors(problem.body);
+  double mass = parallel_sum<double>(problem.body.cell_count(), [&](std::size_t c) {
+    return share[c] * problem.materials[part[c]].density * problem.body.parts[part[c]].lattice.spacing.prod();
+  });
+  for (std::size_t p = 0; p < problem.body.parts.size(); ++p) {
+    const Part& each = problem.body.parts[p];
+    if (each.placement != Placement::centre) continue;
+    const double whole = problem.materials[p].density * each.lattice.spacing.prod();
+    mass += factor.empty() ? (each.element_end - each.element_begin) * whole
+                           : whole * std::accumulate(factor.begin() + each.element_begin,
+                                                     factor.begin() + each.element_end, 0.0);
+  }
+  return mass;
 }
 
 void add_shares(const std::vector<EffectShare>& shares, std::vector<EffectShare>& all) {

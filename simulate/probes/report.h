@@ -1,7 +1,9 @@
 // What every run measures and says, at equilibrium or in time.
 #pragma once
 #include "base/program/progress.h"
+#include "simulate/effects/effect.h"
 #include "simulate/matter/fragments.h"
+#include "simulate/matter/stress.h"
 #include "simulate/models/cells.h"
 #include "simulate/result/result.h"
 
@@ -11,6 +13,10 @@ void name_materials(Body& body, const std::vector<Material>& materials);
 
 // What an infill leaves of a part's material, and what models `springs` and `paper` cannot follow of one.
 void report_materials(const Problem& problem, Progress& progress);
+
+// Says what acts where --explain asks for it, beginning with what the run does; and that nothing moves, where nothing drives.
+void report_effects(const std::vector<ActiveEffect>& effects, const std::string& run, bool explain,
+                    Progress& progress);
 
 // Counts the cells of loose crumbs in the result, and warns of them.
 void report_strays(const Fragments& fragments, SimulateResult& result, Progress& progress);
@@ -24,6 +30,13 @@ void measure_corners(const Cells& cells, const Body& body, const State& state, S
 
 // The stresses of the final state: columns of the body, and the largest. Model `paper` has none.
 void measure_stress(const Problem& problem, const State& state, Body& body, SimulateResult& result);
+// Those that are known already.
+void report_stress(const Problem& problem, const Stresses& stresses, Body& body, SimulateResult& result);
+
+// What is left of loads and reactions, summed.
+void sum_up_imbalance(SimulateResult& result);
+
+[[nodiscard]] double mass_of(const Problem& problem);  // kg, of the unbroken matter
 
 // What makes figures of a result worth less than they look, for people: torques that turn what they act on by
 // more than 10 degrees.

@@ -14,7 +14,7 @@ using CellMatrix = Eigen::Matrix<double, kCellUnknowns, kCellUnknowns>;
 using Moments = Eigen::Matrix<double, static_cast<int>(kMoments), 1>;
 
 // With A = dP/dF at rest, the stiffness of a cell is K_ab(i, k) = sum_jl A(3 i + j, 3 k + l) times the integral of
-// d_j N_a d_l N_b. The integrals are linear in the moments: one matrix product for many cells.
+// d_j N_a d_l N_b. The integrals are linear in the moments.
 class CellIntegrals {
  public:
   // Of the cells of a part: `moduli` is A in the world frame [Pa].

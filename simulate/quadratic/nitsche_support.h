@@ -33,14 +33,23 @@ struct NitschePoint {
   double area = 0, penalty = 0;  // m^2, Pa/m
   Vec3 led = Vec3::Zero();       // m, d
 };
-[[nodiscard]] NitschePoint nitsche_point(const FacePoint& point, const Tie& tie, const Lattice& lattice,
-                                         const Mat9& moduli, double penalty);
+// `share`: of the tie's motion that is done.
+[[nodiscard]] NitschePoint nitsche_point(const FacePoint& point, const Tie& tie, double share,
+                                         const Lattice& lattice, const Mat9& moduli, double penalty);
 
-// Adds its part to the cell's matrix; and what `led` asks for, to forces (27 x 3) [N].
-void add_to(const NitschePoint& point, CellMatrix& matrix);
+// Adds its part to the cell's matrix, in the frame of a cell that is turned by `rotation`; and what `led` asks for, to
+// forces (27 x 3) [N].
+void add_to(const NitschePoint& point, const Mat3& rotation, CellMatrix& matrix);
 void add_led(const NitschePoint& point, std::array<Vec3, kQuadraticNodes>& forces);
 
-// N, of the support on the body: P (t(u) - beta (u - d)) times the area.
-[[nodiscard]] Vec3 reaction(const NitschePoint& point, const std::array<Vec3, kQuadraticNodes>& u);
+// N, of the support on the body: P (t - beta (u - d)) times the area. t is the traction of `local`, the displacement of the
+// cell's nodes without its rotation (in its frame; without a rotation u itself).
+[[nodiscard]] Vec3 reaction(const NitschePoint& point, const std::array<Vec3, kQuadraticNodes>& u,
+                            const std::array<Vec3, kQuadraticNodes>& local, const Mat3& rotation);
+// (27 x 3) N: the forces that it adds to the cell's own.
+[[nodiscard]] std::array<Vec3, kQuadraticNodes> support_forces(const NitschePoint& point,
+                                                               const std::array<Vec3, kQuadraticNodes>& u,
+                                                               const std::array<Vec3, kQuadraticNodes>& local,
+                                                               const Mat3& rotation);
 
 }  // namespace flexel::simulate

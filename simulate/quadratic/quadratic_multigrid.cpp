@@ -24,41 +24,13 @@ constexpr double kRaised = 1e-6;  // of a block's scaled diagonal: it is kept in
 constexpr std::size_t kBlocksAtATime = 16;
 using Vector = std::vector<Vec3>;
 
-// Even weights of a cell's corners at node n.
-std::vector<std::size_t> corners_of(std::size_t n) {
-  std::vector<std::size_t> corners;
-  const std::array<std::size_t, 3> at{n % 3, n / 3 % 3, n / 9};
-  for (std::size_t a = 0; a < 8; ++a)
-    if ((at[0] == 1 || at[0] / 2 == (a & 1)) && (at[1] == 1 || at[1] / 2 == (a >> 1 & 1)) &&
-        (at[2] == 1 || at[2] / 2 == a >> 2))
-      corners.push_back(a);
-  return corners;
-}
-
-// The 27 x 8 weights of trilinear interpolation from the corners.
-Eigen::Matrix<double, kQuadraticNodes, 8> trilinear_weights() {
-  Eigen::Matrix<double, kQuadraticNodes, 8> weights = Eigen::Matrix<double, kQuadraticNodes, 8>::Zero();
-  for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
-    const std::vector<std::size_t> corners = corners_of(n);
-    for (const std::size_t a : corners)
-      weights(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(a)) =
-          1 / static_cast<double>(corners.size());
-  }
-  return weights;
-}
-
-std::array<std::size_t, 8> corner_nodes() {
-  std::array<std::size_t, 8> nodes{};
-  for (std::size_t n = 0; n < kQuadraticNodes; ++n)
-    if (const std::size_t corner = corner_of_node(n); corner < 8) nodes[corner] = n;
-  return nodes;
-}
-
 }  // namespace
 
-QuadraticMultigrid::QuadraticMultigrid(const QuadraticOperator& matrix, const Body& body) : matrix_(matrix) {
+QuadraticMultigrid::QuadraticMultigrid(const QuadraticOperator& matrix, const Body& body,
+                                       const std::vector<Vec3>& displacement)
+    : matrix_(matrix) {
   make_transfer();
-  make_coarse(body);
+  make_coarse(body, displacement);
   hierarchy_ = aggregation_multigrid(coarse_, geometry_);
   make_blocks();
   estimate_largest();
@@ -66,11 +38,11 @@ QuadraticMultigrid::QuadraticMultigrid(const QuadraticOperator& matrix, const Bo
 
 void QuadraticMultigrid::make_transfer() {
   const QuadraticNodes& nodes = matrix_.nodes();
-  const std::array<std::size_t, 8> corner = corner_nodes();
   from_offsets_.assign(1, 0);
   for (std::size_t n = 0; n < nodes.size(); ++n) {
     const QuadraticNodes::Incidence& at = nodes.at(n).front();
-    for (const std::size_t a : corners_of(at.node)) from_.push_back(nodes.of_cell[at.cell][corner[a]]);
+    for (std::size_t a = 0; a < 8; ++a)
+      if (trilinear_weight(at.node, a) > 0) from_.push_back(nodes.of_cell[at.cell][node_of_corner(a)]);
     from_offsets_.push_back(static_cast<std::uint32_t>(from_.size()));
   }
   to_offsets_.assign(nodes.elements.size() + 1, 0);
@@ -83,9 +55,10 @@ void QuadraticMultigrid::make_transfer() {
 }
 
 // P^T K P over the elements that are nodes.
-void QuadraticMultigrid::make_coarse(const Body& body) {
+void QuadraticMultigrid::make_coarse(const Body& body, const std::vector<Vec3>& displacement) {
   const QuadraticNodes& nodes = matrix_.nodes();
-  const std::array<std::size_t, 8> corner = corner_nodes();
+  std::array<std::size_t, 8> corner{};
+  for (std::size_t a = 0; a < 8; ++a) corner[a] = node_of_corner(a);
   std::vector<std::vector<std::uint32_t>> rows(nodes.elements.size());
   for (const auto& cell : nodes.of_cell)
     for (const std::size_t a : corner)
@@ -98,10 +71,11 @@ void QuadraticMultigrid::make_coarse(const Body& body) {
     coarse_.row_offsets.push_back(coarse_.columns.size());
   }
   coarse_.values.assign(coarse_.columns.size(), Block::Zero());
-  const auto weights = trilinear_weights();
   Eigen::Matrix<double, kCellUnknowns, 24> embed = Eigen::Matrix<double, kCellUnknowns, 24>::Zero();
-  for (int n = 0; n < static_cast<int>(kQuadraticNodes); ++n)
-    for (int a = 0; a < 8; ++a) embed.block<3, 3>(3 * n, 3 * a) = weights(n, a) * Mat3::Identity();
+  for (std::size_t n = 0; n < kQuadraticNodes; ++n)
+    for (std::size_t a = 0; a < 8; ++a)
+      embed.block<3, 3>(static_cast<Eigen::Index>(3 * n), static_cast<Eigen::Index>(3 * a)) =
+          trilinear_weight(n, a) * Mat3::Identity();
   std::vector<Eigen::Matrix<double, 24, 24>> of_cell(nodes.cells.size());
   parallel_for_each(
       nodes.cells.size(),
@@ -116,8 +90,9 @@ void QuadraticMultigrid::make_coarse(const Body& body) {
   held.mask.assign(matrix_.held().begin(), matrix_.held().begin() + static_cast<std::ptrdiff_t>(rows.size()));
   eliminate(held, coarse_);
   const std::vector<std::uint32_t> part = element_parts(body);
-  for (const std::uint32_t e : nodes.elements) {
-    geometry_.position.push_back(body.rest[e]);
+  for (std::size_t n = 0; n < nodes.elements.size(); ++n) {
+    const std::uint32_t e = nodes.elements[n];
+    geometry_.position.push_back(displacement.empty() ? body.rest[e] : Vec3(body.rest[e] + displacement[n]));
     geometry_.index.push_back(body.lattice_index[e]);
     geometry_.part.push_back(part[e]);
   }

@@ -16,8 +16,9 @@ namespace flexel::simulate {
 
 class QuadraticMultigrid final : public Preconditioner {
  public:
-  // Keeps references to both.
-  QuadraticMultigrid(const QuadraticOperator& matrix, const Body& body);
+  // Keeps references to the first two. `displacement`: (nodes x 3) m, where the matrix is the tangent; none: at rest.
+  QuadraticMultigrid(const QuadraticOperator& matrix, const Body& body,
+                     const std::vector<Vec3>& displacement = {});
   QuadraticMultigrid(const QuadraticMultigrid&) = delete;
   QuadraticMultigrid& operator=(const QuadraticMultigrid&) = delete;
 
@@ -30,7 +31,7 @@ class QuadraticMultigrid final : public Preconditioner {
 
  private:
   void make_transfer();
-  void make_coarse(const Body& body);
+  void make_coarse(const Body& body, const std::vector<Vec3>& displacement);
   void make_blocks();
   void factorise(std::size_t block, std::uint32_t cell);
   void estimate_largest();

@@ -26,13 +26,8 @@ struct Place {
 // Corners of a cell around node n: one, two, four or eight.
 std::vector<std::size_t> corners_around(std::size_t n) {
   std::vector<std::size_t> corners;
-  const std::array<std::size_t, 3> at{n % 3, n / 3 % 3, n / 9};
-  for (std::size_t a = 0; a < 8; ++a) {
-    bool around = true;
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      around = around && (at[axis] == 1 || at[axis] / 2 == (a >> axis & 1));
-    if (around) corners.push_back(a);
-  }
+  for (std::size_t a = 0; a < 8; ++a)
+    if (trilinear_weight(n, a) > 0) corners.push_back(a);
   return corners;
 }
 

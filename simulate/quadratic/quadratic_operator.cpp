@@ -21,6 +21,13 @@ void multiply_packed(const double* packed, const CellValues& x, double* y) {
   }
 }
 
+void turn_values(const Mat3& rotation, double* values) {
+  for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
+    Eigen::Map<Vec3> value(values + 3 * n);
+    value = (rotation * value).eval();
+  }
+}
+
 }  // namespace
 
 QuadraticOperator::QuadraticOperator(const QuadraticNodes& nodes, std::vector<std::uint8_t> held)
@@ -46,13 +53,33 @@ void QuadraticOperator::set_own(std::size_t cell, const CellMatrix& matrix) {
     for (int j = 0; j <= i; ++j) *to++ = matrix(i, j);
 }
 
-CellMatrix QuadraticOperator::matrix(std::size_t cell) const {
+CellMatrix QuadraticOperator::set_matrix(std::size_t cell) const {
   if (which_[cell] < 0) return shared_[static_cast<std::size_t>(-1 - which_[cell])];
   CellMatrix full;
   const double* from = &own_[static_cast<std::size_t>(which_[cell]) * kPackedSize];
   for (int i = 0; i < kCellUnknowns; ++i)
     for (int j = 0; j <= i; ++j) full(i, j) = full(j, i) = *from++;
   return full;
+}
+
+CellMatrix QuadraticOperator::matrix(std::size_t cell) const {
+  CellMatrix full = set_matrix(cell);
+  if (turns_.empty()) return full;
+  const CellTurn& turn = turns_[cell];
+  full.noalias() += turn.a * turn.gamma.transpose();
+  full.noalias() += turn.gamma * turn.a.transpose();
+  for (Eigen::Index a = 0; a < kCellUnknowns; a += 3)
+    for (Eigen::Index b = 0; b < kCellUnknowns; b += 3)
+      full.block<3, 3>(a, b) = (turn.rotation * full.block<3, 3>(a, b) * turn.rotation.transpose()).eval();
+  return full;
+}
+
+void QuadraticOperator::multiply_set(std::size_t cell, const Eigen::Matrix<double, kCellUnknowns, 4>& x,
+                                     Eigen::Matrix<double, kCellUnknowns, 4>& product) const {
+  if (which_[cell] < 0)
+    product.noalias() = shared_[static_cast<std::size_t>(-1 - which_[cell])] * x;
+  else
+    product.noalias() = set_matrix(cell) * x;
 }
 
 void QuadraticOperator::clear_held(std::vector<Vec3>& values) const {
@@ -70,10 +97,17 @@ void QuadraticOperator::forces(const double* x, double* y) const {
           for (std::size_t axis = 0; axis < 3; ++axis)
             own[static_cast<Eigen::Index>(3 * n + axis)] = x[3 * nodes_.of_cell[c][n] + axis];
         double* to = &cell_force_[c * kCellUnknowns];
+        if (!turns_.empty()) turn_values(turns_[c].rotation.transpose(), own.data());
         if (which_[c] < 0)
           Eigen::Map<CellValues>(to).noalias() = shared_[static_cast<std::size_t>(-1 - which_[c])] * own;
         else
           multiply_packed(&own_[static_cast<std::size_t>(which_[c]) * kPackedSize], own, to);
+        if (turns_.empty()) return;
+        const CellTurn& turn = turns_[c];
+        Eigen::Map<CellValues> sum(to);
+        sum.noalias() += turn.a * (turn.gamma.transpose() * own).eval();
+        sum.noalias() += turn.gamma * (turn.a.transpose() * own).eval();
+        turn_values(turn.rotation, to);
       },
       kCellsAtATime);
   parallel_for_each(

@@ -6,27 +6,28 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <numbers>
 
 #include "base/error.h"
 #include "base/human.h"
 #include "base/stop.h"
+#include "simulate/estimate/stress_singularity.h"
 #include "simulate/matter/fragments.h"
 #include "simulate/matter/interpolation_weights.h"
 #include "simulate/models/cells.h"
 #include "simulate/models/stiffness.h"
 #include "simulate/probes/probes.h"
 #include "simulate/probes/report.h"
+#include "simulate/quadratic/quadratic_newton.h"
 #include "simulate/quadratic/quadratic_solve.h"
 
 namespace flexel::simulate {
 namespace {
 
-// A linear answer is off by about the square of the angle that matter turns by.
-constexpr double kNoticeable = 0.05, kTooLarge = 0.25;  // rad
+// Stress is taken as proportional to strain: an answer is off by about the strain.
+constexpr double kNoticeable = 0.03, kTooLarge = 0.25;
 
 void refuse_what_is_missing(const Scene& scene, const Body& body, const std::vector<ActiveEffect>& effects) {
-  const std::string needs = "model \"quadratic\" finds linear equilibria: ";
+  const std::string needs = "model \"quadratic\" finds equilibria at small strain: ";
   if (scene.run.time) throw InputError(scene.name, needs + "it has no [run] time; use model \"cells\"");
   if (scene.run.renormalise)
     throw InputError(scene.name, needs + "it has no renormalise; use model \"cells\"");
@@ -34,6 +35,7 @@ void refuse_what_is_missing(const Scene& scene, const Body& body, const std::vec
     if (effect.name != Supports::name && effect.name != Loads::name && effect.name != "gravity")
       throw InputError(scene.name, fmt::format("{}it has no {} ({}); use model \"cells\"", needs, effect.name,
                                                effect.why));
+  refuse_timed(effects, ActsIn::all, scene.name);
   for (const Columns* columns : {&body.cell_columns, &body.element_columns})
     for (const auto& [name, column] : *columns)
       if (!is_stress_column(name) && name != "velocity" && name != kQuadraticColumn)
@@ -41,15 +43,10 @@ void refuse_what_is_missing(const Scene& scene, const Body& body, const std::vec
                          fmt::format("{}it does not know what an earlier run left in the body (\"{}\"); use "
                                      "model \"cells\"",
                                      needs, name));
-  for (const Tie& tie : scene.get<Supports>().ties) {
-    if (std::abs(tie.motion.angle) > kTooLarge)
-      throw InputError(tie.origin,
-                       fmt::format("{}\"{}\" turns by {} degrees; use model \"cells\"", needs, tie.name,
-                                   human_number(180 / std::numbers::pi * std::abs(tie.motion.angle), 3)));
+  for (const Tie& tie : scene.get<Supports>().ties)
     if (tie.link)
       throw InputError(tie.origin, fmt::format("{}it has no rigid links (\"{}\"); use link = \"averaging\"",
                                                needs, tie.name));
-  }
   for (const Part& part : body.parts)
     if (part.placement == Placement::centre)
       throw InputError(scene.name,
@@ -58,18 +55,18 @@ void refuse_what_is_missing(const Scene& scene, const Body& body, const std::vec
                                    part.name));
 }
 
-void judge_rotation(double rotation, Progress& progress) {
-  const double degrees = 180 / std::numbers::pi * rotation;
-  if (rotation > kTooLarge)
+void judge_strain(double strain, Progress& progress) {
+  constexpr const char* kAssumed = "model \"quadratic\" takes stress as proportional to strain";
+  if (strain > kTooLarge)
     throw DivergedError(
-        fmt::format("matter turns by {} degrees, and model \"quadratic\" is linear: that answer "
-                    "would be worth nothing; use model \"cells\"",
-                    human_number(degrees, 2)));
-  if (rotation > kNoticeable)
+        fmt::format("matter is strained by {}, and {}: that answer would be worth nothing; use "
+                    "model \"cells\"",
+                    human_share(strain), kAssumed));
+  if (strain > kNoticeable)
     progress.warn(
-        fmt::format("matter turns by {} degrees, and model \"quadratic\" is linear: about {} of the answer "
-                    "is left out; use model \"cells\"",
-                    human_number(degrees, 2), human_share(rotation * rotation)));
+        fmt::format("matter is strained by {}, and {}: about so much of the answer is left out; use "
+                    "model \"cells\"",
+                    human_share(strain), kAssumed));
 }
 
 ProbeResult measure_probe(const Probe& probe, const ProbePoints& placed, const QuadraticSystem& system,
@@ -98,37 +95,23 @@ ProbeResult measure_probe(const Probe& probe, const ProbePoints& placed, const Q
   return result;
 }
 
-void measure_field_stress(const QuadraticSystem& system, const QuadraticSolution& solution,
-                          const State& state, Body& body, SimulateResult& result) {
-  const Stresses found = field_stresses(system, solution, state);
-  const std::optional<LargestStress> largest = largest_stress(body, found);
-  if (!largest) return;
-  const double yield = system.problem().materials[largest->part].yield;
-  result.stress = StressSummary{largest->value, largest->at, body.parts[largest->part].name, {}};
-  if (yield > 0) result.stress->yield_share = largest->value / yield;
-  write_stress_columns(found, body);
-}
-
-void sum_up(SimulateResult& result) {
-  for (const AppliedLoad& load : result.loads) {
-    result.imbalance += load.force;
-    result.moment_imbalance += load.moment;
-  }
-  for (const Reaction& reaction : result.reactions) {
-    result.imbalance += reaction.force;
-    result.moment_imbalance += reaction.moment;
-  }
-}
-
-double mass_of(const QuadraticSystem& system) {
-  double mass = 0;
-  const Body& body = system.problem().body;
-  const std::vector<std::uint32_t> part = cell_parts(body);
-  for (std::size_t c = 0; c < body.cell_count(); ++c)
-    mass += body.broken[c] ? 0
-                           : body.fill[c] * system.problem().materials[part[c]].density *
-                                 body.parts[part[c]].lattice.spacing.prod();
-  return mass;
+// The linear solution, and what large deflections make of it. Adds to `seconds`.
+QuadraticSolution equilibrium(const QuadraticSystem& system, const Scene& scene, double& seconds,
+                              Progress& progress) {
+  const ScopeTimer timer(seconds);
+  QuadraticSolution solution = solve(system, scene.run, scene.name, [&](int iteration, double residual) {
+    check_stop();
+    progress.update(0.05 + 0.4 * std::min(1.0, std::log(residual) / std::log(scene.run.tolerance)),
+                    fmt::format("iteration {}", iteration));
+  });
+  solve_large(
+      system, scene.run, scene.name,
+      [&](double share, double residual) {
+        check_stop();
+        progress.update(0.45 + 0.5 * share, fmt::format("residual {:.1e}", residual));
+      },
+      solution);
+  return solution;
 }
 
 }  // namespace
@@ -163,41 +146,48 @@ SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptio
   const std::vector<ProbePoints> probes = place_probes(scene, problem);
   const std::vector<ActiveEffect> effects = active_effects(scene.effects, problem);
   refuse_what_is_missing(scene, body, effects);
-  if (std::none_of(effects.begin(), effects.end(), [](const ActiveEffect& each) { return each->drives(); }))
-    progress.warn("the scene has no [[load]], [[move]] or [gravity]: nothing will move");
+  report_effects(effects,
+                 "cells with quadratic shape functions, which turn with their matter where that matters",
+                 options.explain, progress);
   report_strays(fragments, result, progress);
   const QuadraticSystem system(problem, scene);
+  for (const std::string& warning : system.warnings()) progress.warn(warning);
   refuse_loose_fragments(fragments, body, system.tied_elements(), {}, scene.name);
-  const QuadraticSolution solution =
-      solve(system, scene.run, scene.name, [&](int iteration, double residual) {
-        check_stop();
-        progress.update(0.1 + 0.8 * std::min(1.0, std::log(residual) / std::log(scene.run.tolerance)),
-                        fmt::format("iteration {}", iteration));
-      });
+  double solving = 0;
+  const QuadraticSolution solution = equilibrium(system, scene, solving, progress);
   const StopWaits answered;
-  judge_rotation(largest_rotation(system, solution), progress);
+  judge_strain(typical_strain(system, solution), progress);
   name_materials(body, problem.materials);
   State state;
-  write_field(system, solution, body, state);
+  state.displacement = element_displacement(system, solution);
   report(system, solution, result);
-  sum_up(result);
-  if (options.stress) measure_field_stress(system, solution, state, body, result);
-  for (std::size_t p = 0; p < probes.size(); ++p)
-    result.probes.push_back(measure_probe(scene.probes[p], probes[p], system, body, state));
+  sum_up_imbalance(result);
+  for (const std::string& warning : warnings_of(result)) progress.warn(scene.name + ": " + warning);
+  if (options.stress) report_stress(problem, field_stresses(system, solution, state), body, result);
+  if (options.estimate) mark_singular(body, system.tied_elements(), result);
   const StiffnessPattern pattern =
       stiffness_pattern(body, active_cells(problem), connection_rows({}, body.element_count()), {}, false);
   carry_strays(fragments, problem, pattern.stencil, state);
-  carry_field(system.nodes(), state, body);
+  write_field(system.nodes(), solution, state, body);
+  for (std::size_t p = 0; p < probes.size(); ++p)
+    result.probes.push_back(measure_probe(scene.probes[p], probes[p], system, body, state));
   for (std::size_t e = 0; e < body.element_count(); ++e)
     body.position[e] = body.rest[e] + state.displacement[e];
   measure_displacement(body, state, result);
-  result.mass = mass_of(system);
+  result.mass = mass_of(problem);
   refuse_not_finite(result, scene.name);
-  result.load_steps = 1;
-  result.newton_iterations = 1;
+  result.load_steps = std::max(solution.load_steps, 1);
+  result.newton_iterations = solution.newton_iterations + 1;
   result.cg_iterations = solution.iterations;
   result.relative_residual = solution.relative_residual;
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  for (const ActiveEffect& effect : effects)
+    result.shares.push_back({effect.name, effect.why, effect.seconds});
+  if (options.explain) {
+    std::vector<EffectShare> shares = result.shares;
+    shares.push_back({"linear solver", "", solving});
+    explain_times(shares, result.seconds, progress);
+  }
   return result;
 }
 

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -11,6 +12,7 @@
 #include "base/parallel.h"
 #include "simulate/linear/conjugate_gradients.h"
 #include "simulate/linear/free_motions.h"
+#include "simulate/matter/load_distribution.h"
 
 namespace flexel::simulate {
 namespace {
@@ -58,9 +60,32 @@ SymmetricStress stress_at(const Mat9& moduli, const Mat3& gradient) {
   return stress;
 }
 
-// The middle of a cell's matter; of the voxel where there is none to speak of.
-Vec3 middle_of(const QuadraticSystem& system, std::size_t cell) {
-  return CellIntegrals::middle(system.moments(cell)).cwiseMax(0).cwiseMin(1);
+const Mat3& turn_of_cell(const QuadraticSolution& solution, std::size_t cell) {
+  static const Mat3 none = Mat3::Zero();
+  return solution.turn.empty() ? none : solution.turn[cell];
+}
+
+// R^T F - 1: the displacement gradient without the cell's rotation.
+Mat3 local_gradient(const QuadraticSystem& system, const QuadraticSolution& solution, std::size_t cell,
+                    const Vec3& at) {
+  const Mat3 gradient = gradient_at(system, solution.displacement, cell, at);
+  const Mat3& turn = turn_of_cell(solution, cell);
+  return gradient + turn.transpose() + turn.transpose() * gradient;
+}
+
+// Of a cell, turned with it.
+SymmetricStress stress_of(const QuadraticSystem& system, const QuadraticSolution& solution, std::size_t cell,
+                          const Vec3& at) {
+  const SymmetricStress own =
+      stress_at(system.moduli(system.part_of(cell)), local_gradient(system, solution, cell, at));
+  if (solution.turn.empty()) return own;
+  Mat3 sigma;
+  sigma << own[0], own[3], own[5], own[3], own[1], own[4], own[5], own[4], own[2];
+  const Mat3 rotation = Mat3::Identity() + solution.turn[cell];
+  const Mat3 turned = rotation * sigma * rotation.transpose();
+  SymmetricStress stress;
+  stress << turned(0, 0), turned(1, 1), turned(2, 2), turned(0, 1), turned(1, 2), turned(0, 2);
+  return stress;
 }
 
 }  // namespace
@@ -70,8 +95,9 @@ QuadraticSolution solve(const QuadraticSystem& system, const RunSettings& settin
   QuadraticSolution found;
   const std::size_t n = system.nodes().size();
   for (int attempt = 0; attempt < kSafeties; ++attempt, found.safety *= kMoreSafety) {
-    const QuadraticOperator stiffness = system.stiffness(found.safety);
-    const QuadraticMultigrid multigrid(stiffness, system.problem().body);
+    found.tangent = std::make_unique<QuadraticTangent>(system.stiffness(found.safety));
+    const QuadraticOperator& stiffness = found.tangent->stiffness;
+    const QuadraticMultigrid& multigrid = found.tangent->multigrid.emplace(stiffness, system.problem().body);
     if (attempt == 0) refuse_free(multigrid, system.problem().body, scene);
     const std::vector<Vec3> wanted = system.right_side(found.safety);
     std::vector<Vec3> b = wanted, led(n), start = system.prescribed(), change;
@@ -98,52 +124,59 @@ QuadraticSolution solve(const QuadraticSystem& system, const RunSettings& settin
                   found.relative_residual, found.iterations));
 }
 
-Mat3 gradient_at(const QuadraticSystem& system, const QuadraticSolution& solution, std::size_t cell,
+Mat3 gradient_at(const QuadraticSystem& system, const std::vector<Vec3>& displacement, std::size_t cell,
                  const Vec3& at) {
-  const QuadraticShape shape = world_shape(system.problem().body.parts[system.part_of(cell)].lattice, at);
-  const auto u = values_at(system, solution, cell);
+  const QuadraticShape shape = world_shape(system.lattice(cell), at);
   Mat3 sum = Mat3::Zero();
-  for (std::size_t n = 0; n < kQuadraticNodes; ++n) sum += u[n] * shape.gradient[n].transpose();
+  for (std::size_t n = 0; n < kQuadraticNodes; ++n)
+    sum += displacement[system.nodes().of_cell[cell][n]] * shape.gradient[n].transpose();
   return sum;
 }
 
-void write_field(const QuadraticSystem& system, const QuadraticSolution& solution, Body& body, State& state) {
-  const QuadraticNodes& nodes = system.nodes();
-  state.displacement.assign(body.element_count(), Vec3::Zero());
-  for (std::size_t i = 0; i < nodes.elements.size(); ++i)
-    state.displacement[nodes.elements[i]] = solution.displacement[i];
-  constexpr int kBetween = 57;
-  Column column{kBetween, std::vector<double>(kBetween * body.cell_count(), 0)};
-  for (std::size_t c = 0; c < nodes.cells.size(); ++c) {
-    double* to = &column.values[static_cast<std::size_t>(kBetween) * nodes.cells[c]];
+Vec3 spin_of(const Mat3& h) {
+  return 0.5 * Vec3(h(2, 1) - h(1, 2), h(0, 2) - h(2, 0), h(1, 0) - h(0, 1));
+}
+
+std::array<Vec3, kQuadraticNodes> local_displacement(const QuadraticNodes& nodes, std::size_t cell,
+                                                     const std::vector<Vec3>& displacement,
+                                                     const Mat3& turn) {
+  const auto& of_cell = nodes.of_cell[cell];
+  std::array<Vec3, kQuadraticNodes> local;
+  for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
+    const Vec3 rest = nodes.rest[of_cell[n]] - nodes.rest[of_cell[0]];
+    const Vec3 moved = displacement[of_cell[n]] - displacement[of_cell[0]];
+    local[n] = moved + turn.transpose() * (rest + moved);
+  }
+  return local;
+}
+
+std::vector<Vec3> element_displacement(const QuadraticSystem& system, const QuadraticSolution& solution) {
+  std::vector<Vec3> displacement(system.problem().body.element_count(), Vec3::Zero());
+  for (std::size_t i = 0; i < system.nodes().elements.size(); ++i)
+    displacement[system.nodes().elements[i]] = solution.displacement[i];
+  return displacement;
+}
+
+void write_field(const QuadraticNodes& nodes, const QuadraticSolution& solution, const State& state,
+                 Body& body) {
+  constexpr std::size_t kValues = 3 * kBetweenNodes;
+  Column column{static_cast<int>(kValues), std::vector<double>(kValues * body.cell_count(), 0)};
+  auto solved = nodes.cells.begin();
+  for (std::uint32_t c = 0; c < body.cell_count(); ++c) {
+    while (solved != nodes.cells.end() && *solved < c) ++solved;
+    const bool resists = solved != nodes.cells.end() && *solved == c;
+    const auto index = static_cast<std::size_t>(solved - nodes.cells.begin());
+    double* to = &column.values[kValues * c];
     for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
       if (corner_of_node(n) < 8) continue;
-      const Vec3& u = solution.displacement[nodes.of_cell[c][n]];
+      Vec3 u = Vec3::Zero();
+      for (std::size_t a = 0; a < 8 && !resists; ++a)
+        u += trilinear_weight(n, a) * state.displacement[body.cell_elements[c][a]];
+      if (resists) u = solution.displacement[nodes.of_cell[index][n]];
       to = std::copy(u.begin(), u.end(), to);
     }
   }
   body.cell_columns[kQuadraticColumn] = std::move(column);
-}
-
-void carry_field(const QuadraticNodes& nodes, const State& state, Body& body) {
-  constexpr std::size_t kBetween = 57;
-  std::vector<double>& values = body.cell_columns.at(kQuadraticColumn).values;
-  for (std::uint32_t c = 0; c < body.cell_count(); ++c) {
-    if (std::binary_search(nodes.cells.begin(), nodes.cells.end(), c)) continue;
-    double* to = &values[kBetween * c];
-    for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
-      if (corner_of_node(n) < 8) continue;
-      const std::array<std::size_t, 3> at{n % 3, n / 3 % 3, n / 9};
-      Vec3 sum = Vec3::Zero();
-      for (std::size_t a = 0; a < 8; ++a) {
-        double weight = 1;
-        for (std::size_t axis = 0; axis < 3; ++axis)
-          weight *= at[axis] == 1 ? 0.5 : at[axis] / 2 == (a >> axis & 1) ? 1 : 0;
-        sum += weight * state.displacement[body.cell_elements[c][a]];
-      }
-      to = std::copy(sum.begin(), sum.end(), to);
-    }
-  }
 }
 
 Stresses field_stresses(const QuadraticSystem& system, const QuadraticSolution& solution,
@@ -153,10 +186,7 @@ Stresses field_stresses(const QuadraticSystem& system, const QuadraticSolution& 
   Stresses found = stresses(system.problem(), state);  // for the points that elements stand for
   parallel_for_each(
       nodes.cells.size(),
-      [&](std::size_t c) {
-        found.cell[nodes.cells[c]] = stress_at(system.moduli(system.part_of(c)),
-                                               gradient_at(system, solution, c, middle_of(system, c)));
-      },
+      [&](std::size_t c) { found.cell[nodes.cells[c]] = stress_of(system, solution, c, system.middle(c)); },
       kCellsAtATime);
   parallel_for_each(
       nodes.elements.size(),
@@ -178,8 +208,7 @@ Stresses field_stresses(const QuadraticSystem& system, const QuadraticSolution& 
             count = 0;
             sum.setZero();
           }
-          sum += stress_at(system.moduli(system.part_of(around.cell)),
-                           gradient_at(system, solution, around.cell, at));
+          sum += stress_of(system, solution, around.cell, at);
           ++count;
         }
         if (count > 0) found.element[e] = sum / count;
@@ -190,13 +219,24 @@ Stresses field_stresses(const QuadraticSystem& system, const QuadraticSolution& 
 
 void report(const QuadraticSystem& system, const QuadraticSolution& solution, SimulateResult& result) {
   const QuadraticNodes& nodes = system.nodes();
+  const bool large = !solution.turn.empty();  // a linear solution has its moments about the places at rest
+  const auto place = [&](std::size_t n) {
+    return large ? Vec3(nodes.rest[n] + solution.displacement[n]) : nodes.rest[n];
+  };
   std::vector<std::uint8_t> counted(nodes.size(), 0);  // a node of two supports counts for the first
   for (const NitscheSupport& support : system.supports()) {
     Reaction reaction{support.tie->name, Vec3::Zero(), Vec3::Zero()};
-    for (const FacePoint& at : support.points)
-      add_at(flexel::simulate::reaction(system.point(support, at, solution.safety),
-                                        values_at(system, solution, at.cell)),
-             at.position, reaction.force, reaction.moment);
+    for (const FacePoint& at : support.points) {
+      const NitschePoint point = system.point({&support, &at}, solution.safety);
+      const Mat3& turn = turn_of_cell(solution, at.cell);
+      const auto u = values_at(system, solution, at.cell);
+      Vec3 moved = Vec3::Zero();
+      for (std::size_t n = 0; n < kQuadraticNodes && large; ++n) moved += point.shape.value[n] * u[n];
+      add_at(flexel::simulate::reaction(point, u,
+                                        local_displacement(nodes, at.cell, solution.displacement, turn),
+                                        Mat3::Identity() + turn),
+             at.position + moved, reaction.force, reaction.moment);
+    }
     for (const std::uint32_t n : support.nodes) {
       Vec3 held = Vec3::Zero();
       for (std::size_t axis = 0; axis < 3; ++axis)
@@ -204,40 +244,58 @@ void report(const QuadraticSystem& system, const QuadraticSolution& solution, Si
           counted[n] = static_cast<std::uint8_t>(counted[n] | 1u << axis);
           held[static_cast<Eigen::Index>(axis)] = -solution.unbalanced[n][static_cast<Eigen::Index>(axis)];
         }
-      add_at(held, nodes.rest[n], reaction.force, reaction.moment);
+      add_at(held, place(n), reaction.force, reaction.moment);
     }
     result.reactions.push_back(reaction);
   }
   for (const NodalLoad& load : system.loads()) {
     AppliedLoad total{load.name, Vec3::Zero(), Vec3::Zero()};
     for (std::size_t n = 0; n < nodes.size(); ++n)
-      add_at(load.forces[n], nodes.rest[n], total.force, total.moment);
+      add_at(load.forces[n], place(n), total.force, total.moment);
+    if (load.couple)
+      total.rotation = turn_of_couple(nodes.size(), [&](std::size_t n) {
+        return LoadedMotion{load.forces[n], nodes.rest[n], solution.displacement[n]};
+      });
     result.loads.push_back(total);
   }
   result.elastic_energy = parallel_sum<double>(
       nodes.cells.size(),
       [&](std::size_t c) {
+        const auto local = local_displacement(nodes, c, solution.displacement, turn_of_cell(solution, c));
         Eigen::Matrix<double, kCellUnknowns, 1> u;
-        const auto values = values_at(system, solution, c);
         for (std::size_t n = 0; n < kQuadraticNodes; ++n)
-          u.segment<3>(static_cast<Eigen::Index>(3 * n)) =
-              values[n] - values[0];  // a translation costs nothing
+          u.segment<3>(static_cast<Eigen::Index>(3 * n)) = local[n];
         return 0.5 * u.dot(system.elastic_stiffness(c) * u);
       },
       kCellsAtATime);
   for (std::size_t c = 0; c < nodes.cells.size(); ++c)
-    result.smallest_jacobian =
-        std::min(result.smallest_jacobian,
-                 (Mat3::Identity() + gradient_at(system, solution, c, middle_of(system, c))).determinant());
+    result.smallest_jacobian = std::min(
+        result.smallest_jacobian,
+        (Mat3::Identity() + gradient_at(system, solution.displacement, c, system.middle(c))).determinant());
 }
 
-double largest_rotation(const QuadraticSystem& system, const QuadraticSolution& solution) {
-  double largest = 0;
-  for (std::size_t c = 0; c < system.nodes().cells.size(); ++c) {
-    const Mat3 h = gradient_at(system, solution, c, middle_of(system, c));
-    largest = std::max(largest, 0.5 * Vec3(h(2, 1) - h(1, 2), h(0, 2) - h(2, 0), h(1, 0) - h(0, 1)).norm());
-  }
-  return largest;
+double typical_strain(const QuadraticSystem& system, const QuadraticSolution& solution) {
+  struct Sums {
+    double cube = 0, square = 0;
+    Sums& operator+=(const Sums& other) {
+      cube += other.cube;
+      square += other.square;
+      return *this;
+    }
+  };
+  const QuadraticNodes& nodes = system.nodes();
+  const Sums sums = parallel_sum<Sums>(nodes.cells.size(), [&](std::size_t c) {
+    const Mat3 h = local_gradient(system, solution, c, system.middle(c));
+    const Mat3 strain = 0.5 * (h + h.transpose());
+    const double most = Eigen::SelfAdjointEigenSolver<Mat3>(strain, Eigen::EigenvaluesOnly)
+                            .eigenvalues()
+                            .cwiseAbs()
+                            .maxCoeff();
+    const double volume =
+        system.problem().body.fill[nodes.cells[c]] * system.lattice(c).spacing.prod() * strain.squaredNorm();
+    return Sums{volume * most, volume};
+  });
+  return sums.square > 0 ? sums.cube / sums.square : 0;
 }
 
 }  // namespace flexel::simulate

@@ -1,6 +1,8 @@
 // Solves a system of model `quadratic`, and measures the answer.
 #pragma once
 #include <functional>
+#include <memory>
+#include <optional>
 
 #include "simulate/matter/stress.h"
 #include "simulate/quadratic/quadratic_system.h"
@@ -8,30 +10,50 @@
 
 namespace flexel::simulate {
 
+// A stiffness and its preconditioner, which keeps a reference to it.
+struct QuadraticTangent {
+  QuadraticOperator stiffness;
+  std::optional<QuadraticMultigrid> multigrid = std::nullopt;
+};
+
 struct QuadraticSolution {
   std::vector<Vec3> displacement;  // (nodes x 3) m
   std::vector<Vec3> unbalanced;  // (nodes x 3) N: on prescribed components what holds them, else the residual
+  std::vector<Mat3> turn;        // (cells) R - 1 where large deflections turned them; none: a linear solution
   double safety = 1;             // of the supports' penalty (QuadraticSystem::stiffness)
-  int iterations = 0;
+  int load_steps = 0, newton_iterations = 0;
+  int iterations = 0;  // of conjugate gradients, in all
   double relative_residual = 0;
+  std::unique_ptr<QuadraticTangent> tangent = nullptr;  // that it was found with
 };
 
-// By conjugate gradients. Supports whose penalty is too weak for a sliver show as an indefinite stiffness: it is
+// The linear solution, by conjugate gradients. Supports whose penalty is too weak for a sliver show as an indefinite stiffness: it is
 // raised fourfold, three times at most. Throws DivergedError; InputError(scene, ...) naming a rigid motion that is free.
 // `progress` is told each iteration and its relative residual.
 [[nodiscard]] QuadraticSolution solve(const QuadraticSystem& system, const RunSettings& settings,
                                       const std::string& scene,
                                       const std::function<void(int, double)>& progress);
 
-// The displacement gradient (world frame) of a cell at cell coordinates.
-[[nodiscard]] Mat3 gradient_at(const QuadraticSystem& system, const QuadraticSolution& solution,
+// The gradient (world frame) of a displacement (nodes x 3) in a cell at cell coordinates.
+[[nodiscard]] Mat3 gradient_at(const QuadraticSystem& system, const std::vector<Vec3>& displacement,
                                std::size_t cell, const Vec3& at);
+// The rotation vector of a small displacement gradient.
+[[nodiscard]] Vec3 spin_of(const Mat3& gradient);
+// (27 x 3) m: the displacement of a cell's nodes beside its first one, once the cell's rotation R is taken out of it;
+// `turn` is R - 1.
+[[nodiscard]] std::array<Vec3, kQuadraticNodes> local_displacement(const QuadraticNodes& nodes,
+                                                                   std::size_t cell,
+                                                                   const std::vector<Vec3>& displacement,
+                                                                   const Mat3& turn);
 
-// The column that travels in the body (formats/lattice/quadratic_field.h), and the displacement of the elements.
-void write_field(const QuadraticSystem& system, const QuadraticSolution& solution, Body& body, State& state);
+// (elements x 3) m, 0 where no cell resists.
+[[nodiscard]] std::vector<Vec3> element_displacement(const QuadraticSystem& system,
+                                                     const QuadraticSolution& solution);
 
-// In cells that resist nothing (loose crumbs, broken ones), once their elements are carried along: trilinear.
-void carry_field(const QuadraticNodes& nodes, const State& state, Body& body);
+// The column that travels in the body (formats/lattice/quadratic_field.h). In cells that resist nothing (loose crumbs,
+// broken ones) the field is trilinear between the elements of `state`, which are carried along.
+void write_field(const QuadraticNodes& nodes, const QuadraticSolution& solution, const State& state,
+                 Body& body);
 
 // Stresses as `stresses()` defines them, from the field itself: of a cell in the middle of its matter; of an element
 // there, or at the nearest point of the surface, the mean over the cells that hold the point.
@@ -41,7 +63,7 @@ void carry_field(const QuadraticNodes& nodes, const State& state, Body& body);
 // Reactions, loads, elastic energy, smallest J (middle of cells) into `result`.
 void report(const QuadraticSystem& system, const QuadraticSolution& solution, SimulateResult& result);
 
-// rad: how far the matter turns, at most (middle of cells).
-[[nodiscard]] double largest_rotation(const QuadraticSystem& system, const QuadraticSolution& solution);
+// The strain (largest principal value, without the rotation) where the energy is: its mean, weighted by energy.
+[[nodiscard]] double typical_strain(const QuadraticSystem& system, const QuadraticSolution& solution);
 
 }  // namespace flexel::simulate

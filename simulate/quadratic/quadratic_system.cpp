@@ -8,7 +8,10 @@
 #include <limits>
 
 #include "base/error.h"
+#include "base/human.h"
+#include "base/math/area_vector.h"
 #include "base/parallel.h"
+#include "formats/lattice/cell_moments.h"
 #include "simulate/effects/gravity.h"
 #include "simulate/matter/interpolation_weights.h"
 #include "simulate/matter/load_distribution.h"
@@ -19,7 +22,6 @@ namespace {
 
 constexpr std::uint32_t kWhole = std::numeric_limits<std::uint32_t>::max();
 constexpr double kOutside = 1e-6;  // stiffness of what is not matter, of the material's: slivers stay regular
-constexpr double kFull = 1 - 1e-9;
 constexpr std::size_t kCellsAtATime = 16;
 
 Moments body_moments(const Body& body, std::size_t place) {
@@ -55,7 +57,7 @@ QuadraticSystem::QuadraticSystem(const Problem& problem, const Scene& scene)
 void QuadraticSystem::require_moments() const {
   const Body& body = problem_.body;
   for (std::size_t i = 0; i < nodes_.cells.size(); ++i)
-    if (moments_at_[i] == kWhole && body.fill[nodes_.cells[i]] < kFull)
+    if (moments_at_[i] == kWhole && body.fill[nodes_.cells[i]] < kWholeFill)
       throw InputError(
           scene_.name,
           fmt::format("model \"quadratic\" needs the exact moments of cells that the surface of part "
@@ -79,23 +81,24 @@ void QuadraticSystem::place_supports(const std::vector<Tie>& ties) {
     // a node between elements is held where all of them are
     std::vector<std::uint8_t> free(nodes_.size(), 0);
     for (std::size_t c = 0; !selected.elements.empty() && c < nodes_.cells.size(); ++c)
-      for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
-        const std::array<std::size_t, 3> at{n % 3, n / 3 % 3, n / 9};
+      for (std::size_t n = 0; n < kQuadraticNodes; ++n)
         for (std::size_t a = 0; a < 8; ++a)
-          if ((at[0] == 1 || at[0] / 2 == (a & 1)) && (at[1] == 1 || at[1] / 2 == (a >> 1 & 1)) &&
-              (at[2] == 1 || at[2] / 2 == a >> 2) && !chosen[problem_.body.cell_elements[nodes_.cells[c]][a]])
+          if (trilinear_weight(n, a) > 0 && !chosen[problem_.body.cell_elements[nodes_.cells[c]][a]])
             free[nodes_.of_cell[c][n]] = 1;
-      }
     for (std::uint32_t n = 0; !selected.elements.empty() && n < nodes_.size(); ++n)
       if (!free[n]) support.nodes.push_back(n);
     supports_.push_back(std::move(support));
   }
+  support_points_.resize(nodes_.cells.size());
+  for (const NitscheSupport& support : supports_)
+    for (const FacePoint& point : support.points) support_points_[point.cell].push_back({&support, &point});
 }
 
 void QuadraticSystem::place_loads(const std::vector<Load>& loads) {
   for (const Load& load : loads) {
     const Selected selected = resolve(load.where, problem_.body);
-    NodalLoad made{load.name, std::vector<Vec3>(nodes_.size(), Vec3::Zero())};
+    NodalLoad made{load.name, std::vector<Vec3>(nodes_.size(), Vec3::Zero()),
+                   load.torque.has_value() || load.at.has_value()};
     if (!selected.elements.empty() || selected.polygons.empty())
       throw InputError(
           load.origin,
@@ -108,6 +111,7 @@ void QuadraticSystem::place_loads(const std::vector<Load>& loads) {
                        fmt::format("load \"{}\": no matter lies under the selected surface; use a "
                                    "smaller spacing",
                                    load.name));
+    check_area(load, selected.polygons, points);
     std::vector<Vec3> forces;
     std::vector<LoadedPoint> loaded;
     for (const FacePoint& point : points) {
@@ -124,6 +128,20 @@ void QuadraticSystem::place_loads(const std::vector<Load>& loads) {
     }
     loads_.push_back(std::move(made));
   }
+}
+
+void QuadraticSystem::check_area(const Load& load, const std::vector<std::uint32_t>& polygons,
+                                 const std::vector<FacePoint>& points) {
+  constexpr double kLost = 0.01;
+  double whole = 0, found = 0;
+  for (const std::uint32_t p : polygons)
+    whole += area_vector(problem_.body.surface.vertices, problem_.body.surface.polygon(p)).norm();
+  for (const FacePoint& point : points) found += point.area_vector.norm();
+  if (found < (1 - kLost) * whole)
+    warnings_.push_back(
+        fmt::format("load \"{}\": {} of its surface lies on matter that the lattice leaves out; "
+                    "use a smaller spacing",
+                    load.name, human_share(1 - found / whole)));
 }
 
 void QuadraticSystem::add_gravity(const Vec3& acceleration) {
@@ -145,11 +163,20 @@ CellMatrix QuadraticSystem::elastic_stiffness(std::size_t cell) const {
   return integrals_[part_[cell]].stiffness(own + kOutside * (whole - own));
 }
 
-NitschePoint QuadraticSystem::point(const NitscheSupport& support, const FacePoint& point,
-                                    double safety) const {
-  const std::uint32_t part = part_[point.cell];
+Vec3 QuadraticSystem::middle(std::size_t cell) const {
+  return CellIntegrals::middle(moments(cell)).cwiseMax(0).cwiseMin(1);
+}
+
+CellMatrix QuadraticSystem::supported_stiffness(std::size_t cell, double safety, const Mat3& rotation) const {
+  CellMatrix matrix = elastic_stiffness(cell);
+  for (const SupportPoint& at : support_points_[cell]) add_to(point(at, safety), rotation, matrix);
+  return matrix;
+}
+
+NitschePoint QuadraticSystem::point(const SupportPoint& at, double safety, double share) const {
+  const std::uint32_t part = part_[at.point->cell];
   const Lattice& lattice = problem_.body.parts[part].lattice;
-  return nitsche_point(point, *support.tie, lattice, moduli_[part],
+  return nitsche_point(*at.point, *at.support->tie, share, lattice, moduli_[part],
                        safety * kNitsche * stiffest_[part] / lattice.spacing.minCoeff());
 }
 
@@ -164,16 +191,9 @@ std::vector<std::uint8_t> QuadraticSystem::held() const {
 
 QuadraticOperator QuadraticSystem::stiffness(double safety) const {
   QuadraticOperator made(nodes_, held());
-  std::vector<std::vector<const NitscheSupport*>> supports_at(nodes_.cells.size());
-  std::vector<std::vector<const FacePoint*>> points_at(nodes_.cells.size());
-  for (const NitscheSupport& support : supports_)
-    for (const FacePoint& point : support.points) {
-      supports_at[point.cell].push_back(&support);
-      points_at[point.cell].push_back(&point);
-    }
   std::vector<std::uint32_t> own;
   for (std::uint32_t c = 0; c < nodes_.cells.size(); ++c)
-    if (moments_at_[c] != kWhole || !points_at[c].empty()) own.push_back(c);
+    if (moments_at_[c] != kWhole || !support_points_[c].empty()) own.push_back(c);
   std::vector<std::uint32_t> shared;
   for (const CellIntegrals& integrals : integrals_)
     shared.push_back(made.add_shared(integrals.stiffness(whole_cell_moments())));
@@ -181,13 +201,7 @@ QuadraticOperator QuadraticSystem::stiffness(double safety) const {
   made.reserve_own(own);
   parallel_for_each(
       own.size(),
-      [&](std::size_t i) {
-        const std::uint32_t c = own[i];
-        CellMatrix matrix = elastic_stiffness(c);
-        for (std::size_t p = 0; p < points_at[c].size(); ++p)
-          add_to(point(*supports_at[c][p], *points_at[c][p], safety), matrix);
-        made.set_own(c, matrix);
-      },
+      [&](std::size_t i) { made.set_own(own[i], supported_stiffness(own[i], safety, Mat3::Identity())); },
       kCellsAtATime);
   return made;
 }
@@ -201,18 +215,18 @@ std::vector<Vec3> QuadraticSystem::right_side(double safety) const {
     for (const FacePoint& at : support.points) {
       std::array<Vec3, kQuadraticNodes> forces;
       forces.fill(Vec3::Zero());
-      add_led(point(support, at, safety), forces);
+      add_led(point({&support, &at}, safety), forces);
       for (std::size_t n = 0; n < kQuadraticNodes; ++n) sum[nodes_.of_cell[at.cell][n]] += forces[n];
     }
   }
   return sum;
 }
 
-std::vector<Vec3> QuadraticSystem::prescribed() const {
+std::vector<Vec3> QuadraticSystem::prescribed(double share) const {
   std::vector<Vec3> value(nodes_.size(), Vec3::Zero());
   for (const NitscheSupport& support : supports_)
     for (const std::uint32_t n : support.nodes) {
-      const Vec3 led = support.tie->motion.displacement(nodes_.rest[n], 1);
+      const Vec3 led = support.tie->motion.displacement(nodes_.rest[n], share);
       for (std::size_t axis = 0; axis < 3; ++axis)
         if (support.tie->axes[axis])
           value[n][static_cast<Eigen::Index>(axis)] = led[static_cast<Eigen::Index>(axis)];

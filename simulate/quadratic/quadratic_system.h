@@ -10,6 +10,13 @@ namespace flexel::simulate {
 struct NodalLoad {
   std::string name;
   std::vector<Vec3> forces;  // (nodes x 3) N
+  bool couple = false;       // it was given a torque, or a point where its force acts
+};
+
+// A point of a support, of the cell that it lies in.
+struct SupportPoint {
+  const NitscheSupport* support = nullptr;
+  const FacePoint* point = nullptr;
 };
 
 class QuadraticSystem {
@@ -24,8 +31,8 @@ class QuadraticSystem {
   [[nodiscard]] QuadraticOperator stiffness(double safety) const;
   // (nodes x 3) N: loads and what led faces ask for.
   [[nodiscard]] std::vector<Vec3> right_side(double safety) const;
-  // (nodes x 3) m, in prescribed components; 0 elsewhere.
-  [[nodiscard]] std::vector<Vec3> prescribed() const;
+  // (nodes x 3) m, in prescribed components at this share of the moves; 0 elsewhere.
+  [[nodiscard]] std::vector<Vec3> prescribed(double share = 1) const;
 
   [[nodiscard]] const Problem& problem() const { return problem_; }
   [[nodiscard]] const QuadraticNodes& nodes() const { return nodes_; }
@@ -36,8 +43,19 @@ class QuadraticSystem {
   // Of the cell of that index in nodes().cells.
   [[nodiscard]] Moments moments(std::size_t cell) const;
   [[nodiscard]] CellMatrix elastic_stiffness(std::size_t cell) const;
-  [[nodiscard]] NitschePoint point(const NitscheSupport& support, const FacePoint& point,
-                                   double safety) const;
+  [[nodiscard]] const Lattice& lattice(std::size_t cell) const {
+    return problem_.body.parts[part_[cell]].lattice;
+  }
+  // The middle of a cell's matter (cell coordinates); of the voxel where there is none to speak of.
+  [[nodiscard]] Vec3 middle(std::size_t cell) const;
+  [[nodiscard]] const std::vector<SupportPoint>& support_points(std::size_t cell) const {
+    return support_points_[cell];
+  }
+  // elastic_stiffness() with its supports, in the frame of a cell that is turned.
+  [[nodiscard]] CellMatrix supported_stiffness(std::size_t cell, double safety, const Mat3& rotation) const;
+  [[nodiscard]] NitschePoint point(const SupportPoint& at, double safety, double share = 1) const;
+  // What of the loaded surface bears on no matter, for people.
+  [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
   // (elements) 2 where a support holds all axes, 1 where it holds some, else 0.
   [[nodiscard]] std::vector<std::uint8_t> tied_elements() const;
 
@@ -45,6 +63,8 @@ class QuadraticSystem {
   void require_moments() const;
   void place_supports(const std::vector<Tie>& ties);
   void place_loads(const std::vector<Load>& loads);
+  void check_area(const Load& load, const std::vector<std::uint32_t>& polygons,
+                  const std::vector<FacePoint>& points);
   void add_gravity(const Vec3& acceleration);
   [[nodiscard]] std::vector<std::uint8_t> held() const;
 
@@ -57,7 +77,9 @@ class QuadraticSystem {
   std::vector<double> stiffest_;           // (parts) Pa, lambda + 2 mu
   std::vector<CellIntegrals> integrals_;   // (parts)
   std::vector<NitscheSupport> supports_;
+  std::vector<std::vector<SupportPoint>> support_points_;  // (cells)
   std::vector<NodalLoad> loads_;
+  std::vector<std::string> warnings_;
 };
 
 }  // namespace flexel::simulate

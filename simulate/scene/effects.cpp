@@ -1,6 +1,9 @@
 // The rows of all effects.
 #include "simulate/scene/effects.h"
 
+#include <fmt/format.h>
+
+#include "base/error.h"
 #include "simulate/effects/bonds.h"
 #include "simulate/effects/contact.h"
 #include "simulate/effects/damping.h"
@@ -205,6 +208,14 @@ std::vector<ActiveEffect> active_effects(const EffectParameters& parameters, con
       if (effects[i].acts == ActsIn::all) effects[i].acts = row.acts;
   }
   return effects;
+}
+
+void refuse_timed(const std::vector<ActiveEffect>& effects, ActsIn run, const std::string& scene) {
+  for (const ActiveEffect& effect : effects)
+    if (effect.acts > run)
+      throw InputError(scene, fmt::format("{} ({}) acts in timed runs only: give [run] time = \"1 s\", or "
+                                          "leave it out",
+                                          effect.name, effect.why));
 }
 
 }  // namespace flexel::simulate

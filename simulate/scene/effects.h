@@ -51,4 +51,8 @@ void parse_effects(TableReader& scene, EffectParameters& parameters);
 [[nodiscard]] std::vector<ActiveEffect> active_effects(const EffectParameters& parameters,
                                                        const Problem& problem);
 
+// Throws InputError(scene, ...) naming an effect that has no meaning in this kind of run: `run` is ActsIn::all at
+// equilibrium, ActsIn::relaxation_and_time where dynamic relaxation looks for it.
+void refuse_timed(const std::vector<ActiveEffect>& effects, ActsIn run, const std::string& scene);
+
 }  // namespace flexel::simulate

@@ -103,25 +103,10 @@ void Settling::look(const std::function<void(SimulateResult&)>& tell) {
   done_ = summary_.residual <= summary_.tolerance && kinetic_ <= summary_.tolerance * largest_;
 }
 
-void Settling::refuse(const std::vector<ActiveEffect>& effects, const std::string& scene) {
-  for (const ActiveEffect& effect : effects)
-    if (effect.acts == ActsIn::time)
-      throw InputError(scene, fmt::format("{} ({}) acts in timed runs only: give [run] time = \"1 s\", or "
-                                          "leave it out",
-                                          effect.name, effect.why));
-}
-
 void Settling::report(SimulateResult& result) const {
   result.settled = summary_;
   result.timed.reset();
-  for (const AppliedLoad& load : result.loads) {
-    result.imbalance += load.force;
-    result.moment_imbalance += load.moment;
-  }
-  for (const Reaction& reaction : result.reactions) {
-    result.imbalance += reaction.force;
-    result.moment_imbalance += reaction.moment;
-  }
+  sum_up_imbalance(result);
 }
 
 std::string Settling::failure(const Body& body, const State& state) const {

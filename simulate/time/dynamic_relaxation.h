@@ -27,8 +27,6 @@ class Settling {
   // not take.
   Settling(Scene& scene, const Body& body);
 
-  // Throws InputError: an effect that means nothing at rest.
-  static void refuse(const std::vector<ActiveEffect>& effects, const std::string& scene);
   // Before a step: the velocities that it begins with.
   void before(const State& state);
   // After it: what all velocities are to be multiplied by. `tell` gives loads and reactions.

@@ -121,7 +121,7 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
   if (!options.history.empty())
     history_ = segment_->make_history(options.resume ? options.resume->ledger : Ledger{});
   segment_->set_hear([this](const std::string& note) { listen(note); });
-  if (settling_) Settling::refuse(segment_->effects(), scene_.name);
+  if (settling_) refuse_timed(segment_->effects(), ActsIn::relaxation_and_time, scene_.name);
 }
 
 void TimedRun::resume(const Checkpoint& from) {

@@ -153,9 +153,78 @@ def test_a_body_without_moments_is_refused():
 
 def test_too_large_a_load_is_refused():
     part, _ = bar("beam.obj", (200, 50, 50), 33)
-    write("s.toml", MATERIAL.format(poisson=0.3) + HELD.format(0, 0, 50))
+    write("s.toml", MATERIAL.format(poisson=0.3) + HELD.format(2000, 0, 50))
     expect_ok(run("flexel-voxelize", part, "--size", "50 mm", "--align", "none", "--moments", "-o", "body.vtu"))
-    expect_error(run("flexel-simulate", "s.toml", "body.vtu", "-o", "bent.vtu"), "flexel-simulate", "is linear", "model \"cells\"", code=3)
+    expect_error(run("flexel-simulate", "s.toml", "body.vtu", "-o", "bent.vtu"), "flexel-simulate", "model \"cells\"", code=3)
+
+
+def test_a_clamped_plate_stretches_as_it_bends():
+    """200 x 200 x 5, E 1 GPa, nu .3, 20 kPa: the linear answer is 3.54 mm, model cells 3.113 with cells of 2.5 (5.6 % soft there)."""
+    lines = [f"v {a} {b} {c}" for c in (0, 5) for b in (0, 200) for a in (0, 200)]
+    for group, quads in {"rim": [(1, 5, 7, 3), (2, 4, 8, 6), (1, 2, 6, 5), (3, 7, 8, 4)], "bottom": [(1, 3, 4, 2)], "top": [(5, 6, 8, 7)]}.items():
+        lines += [f"g {group}"] + ["f " + " ".join(map(str, quad)) for quad in quads]
+    write("plate.obj", "\n".join(lines) + "\n")
+    scene = MATERIAL.format(poisson=0.3).replace("1 MPa", "1 GPa") + """[[fix]]
+where = "rim"
+[[load]]
+where = "top"
+pressure = "{} kPa"
+[[probe]]
+name = "middle"
+at = ["100 mm", "100 mm", "2.5 mm"]
+"""
+    small, large = (deflection("plate.obj", "20 mm", scene.format(load), "--no-estimate")[0] for load in (0.02, 20))
+    linear, bent = (each["probes"][0]["displacement"][2] for each in (small, large))
+    expect(abs(1000 * linear / -3.54e-3 - 1) < 0.03, linear)
+    expect(abs(bent / -3.0e-3 - 1) < 0.03, bent)
+
+
+def test_attraction_by_masses_is_refused():
+    part, _ = bar("beam.obj", (200, 50, 50), 33)
+    write("s.toml", MATERIAL.format(poisson=0.3) + HELD.format(0, 0, 1e-4) + "[gravity]\nmutual = true\n")
+    expect_ok(run("flexel-voxelize", part, "--size", "50 mm", "--align", "none", "--moments", "-o", "body.vtu"))
+    expect_error(run("flexel-simulate", "s.toml", "body.vtu", "-o", "bent.vtu"), "flexel-simulate", "gravity", "acts in timed runs only")
+
+
+def test_explain_tells_what_acts_and_how_long_it_took():
+    part, _ = bar("beam.obj", (200, 50, 50), 33)
+    scene = MATERIAL.format(poisson=0.3) + HELD.format(0, 0, 1e-4)
+    summary, done = deflection(part, "50 mm", scene, "--no-estimate", "--explain")
+    for words in ("plan: loads (1 [[load]])", "plan: ties", "time: linear solver"):
+        expect(words in done.err, done.err)
+
+
+def test_a_bar_without_loads_is_told_of():
+    part, _ = bar("beam.obj", (200, 50, 50), 33)
+    _, done = deflection(part, "50 mm", MATERIAL.format(poisson=0.3) + "[[fix]]\nwhere = \"held\"\n", "--no-estimate")
+    expect("nothing will move" in done.err, done.err)
+
+
+def test_stress_beside_a_support_has_no_bar():
+    part, _ = bar("beam.obj", (200, 50, 50), 33)
+    summary, _ = deflection(part, "25 mm", MATERIAL.format(poisson=0.3) + HELD.format(0, 0, 1e-4))
+    expect(summary["largest_von_mises_beside"] == "a support", summary)
+
+
+def test_overlapping_shells_are_as_stiff_as_their_union():
+    """A strip of 16 x 4 x 1 cells, and the same of two shells that overlap; flush with the lattice and askew."""
+    boxes = lambda *ranges: "".join(
+        f"v {a} {b} {c}\n" for (x, y, z) in ranges for c in z for b in y for a in x)
+    faces = lambda n: "".join(f"f {' '.join(str(8 * n + i) for i in quad)}\n" for quad in ((1, 2, 6, 5), (3, 7, 8, 4), (1, 3, 4, 2), (5, 6, 8, 7), (1, 5, 7, 3), (2, 4, 8, 6)))
+    scene = MATERIAL.format(poisson=0.3) + """[[fix]]
+where = { box = { min = ["-1 mm", "-1 mm", "-1 mm"], max = ["10 mm", "41 mm", "9 mm"] } }
+[gravity]
+acceleration = ["0 m/s2", "0 m/s2", "-0.01 m/s2"]
+[[probe]]
+name = "end"
+at = ["155 mm", "20 mm", "4 mm"]
+"""
+    found = []
+    for name, solids in (("one.obj", [((0, 160), (0, 40), (0, 7.5))]), ("two.obj", [((0, 100), (0, 40), (0, 7.5)), ((60, 160), (0, 40), (0, 7.5))]),
+                         ("nested.obj", [((0, 160), (0, 40), (0, 7.5)), ((20, 140), (5, 35), (1.25, 6.25))])):
+        write(name, boxes(*solids) + "".join(faces(n) for n in range(len(solids))))
+        found.append(deflection(name, "10 mm", scene, "--no-estimate")[0]["probes"][0]["displacement"][2])
+    expect(max(found) - min(found) < 1e-3 * abs(found[0]), found)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,49 @@
+// Large deflections of model `quadratic`: cells that turn with their matter (corotational formulation; Nour-Omid and
+// Rankin, Comput. Methods Appl. Mech. Engrg. 93, 1991; Felippa and Haugen, CMAME 194, 2005).
+//
+// R is the rotation of F = I + grad u in the middle of a cell's matter (polar decomposition F = R U). With u^ what is left of
+// the displacement once R is taken out, u^_a = R^T (x_a - x_0) - (X_a - X_0), the cell's energy is 1/2 u^ . K u^, K its exact
+// linear stiffness. The forces are its derivatives,
+//     f = R P^T K u^,  P = I + Y G,
+// where G (3 x 81) gives the spin of R from the displacement and Y_a w = y_a x w with y_a = R^T (x_a - x_0). Strains have to
+// stay small, rotations need not.
+#pragma once
+#include "simulate/quadratic/quadratic_system.h"
+
+namespace flexel::simulate {
+
+class Corotation {
+ public:
+  // Keeps references. `stiffness`: QuadraticSystem::stiffness(safety), whose cells are turned by turn().
+  Corotation(const QuadraticSystem& system, QuadraticOperator& stiffness, double safety);
+  Corotation(const Corotation&) = delete;
+  Corotation& operator=(const Corotation&) = delete;
+
+  // (nodes x 3) N: what is left of loads and forces of cells and supports at `share` of all loads and moves. Finds the
+  // rotations; false where a cell is inside out.
+  [[nodiscard]] bool residual(const std::vector<Vec3>& displacement, double share, std::vector<Vec3>& left);
+  // N, sum of the squares of the cells' forces at the last displacement, under the root: what a residual is small beside.
+  [[nodiscard]] double scale() const { return scale_; }
+  // Makes `stiffness` the tangent at the last displacement. Without `stressed` the part of the stresses (geometric
+  // stiffness), which may make it indefinite, is left out.
+  void set_tangent(bool stressed);
+
+  // (cells) R - 1 of the last displacement.
+  [[nodiscard]] const std::vector<Mat3>& turns() const { return from_rest_; }
+
+ private:
+  bool evaluate(std::size_t cell, const std::vector<Vec3>& displacement);
+  void add_supports(std::size_t cell, const std::vector<Vec3>& displacement, double share);
+
+  const QuadraticSystem& system_;
+  QuadraticOperator& stiffness_;
+  double safety_;
+  double scale_ = 0, largest_ = 0;
+  std::vector<Mat3> from_rest_;  // (cells) R - 1
+  std::vector<CellTurn>
+      turn_;  // (cells) without the part of the stresses, which is stress_, to be added to `a`
+  std::vector<Eigen::Matrix<double, kCellUnknowns, 3>> stress_;
+  std::vector<double> force_;  // (cells x 81) N
+};
+
+}  // namespace flexel::simulate

@@ -1,0 +1,161 @@
+// The tangent lacks only terms of the order of the strains, so iterations converge nearly quadratically.
+#include "simulate/quadratic/quadratic_newton.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "base/human.h"
+#include "base/parallel.h"
+#include "simulate/linear/conjugate_gradients.h"
+#include "simulate/linear/vector_products.h"
+#include "simulate/quadratic/corotation.h"
+
+namespace flexel::simulate {
+namespace {
+
+constexpr double kFirstTurn = 0.5;       // rad, that the first load step aims at
+constexpr double kMostTurn = 0.7;        // rad, of an iteration
+constexpr double kLeastStep = 1. / 256;  // of the load
+constexpr int kMostIterations = 20;      // of a load step
+constexpr int kFewIterations = 6;        // after which the next step is longer
+constexpr double kMostStale = 0.1;       // rad
+constexpr int kMostLinear = 400;
+constexpr double kLeastTolerance = 1e-8, kGoodEnough = 1e-6;
+constexpr double kLoosest = 1e-3, kTightest = 1e-6;  // residuals of linear solutions
+
+class LargeDeflection {
+ public:
+  LargeDeflection(const QuadraticSystem& system, const RunSettings& settings,
+                  const std::function<void(double, double)>& progress, QuadraticSolution& solution)
+      : system_(system),
+        tolerance_(std::max(settings.tolerance, kLeastTolerance)),
+        progress_(progress),
+        solution_(solution),
+        tangent_(*solution.tangent),
+        corotation_(system, tangent_.stiffness, solution.safety) {}
+
+  void run(const RunSettings& settings, const std::string& scene) {
+    const std::vector<Vec3> linear = solution_.displacement, unbalanced = solution_.unbalanced;
+    std::vector<Vec3> before(linear.size(), Vec3::Zero()), now = before;
+    double done = 0, last = 0;
+    double step = std::min(1., kFirstTurn / std::max(largest_turn(linear), 1e-300));
+    step = std::min(step, 1. / std::max(settings.load_steps, 1));
+    while (done < 1) {
+      const double share = done + step > 1 - 1e-9 ? 1 : done + step;
+      std::vector<Vec3> guess(now.size());
+      const double ahead = last > 0 ? (share - done) / last : 0;
+      parallel_for_each(guess.size(), [&](std::size_t n) {
+        guess[n] = done > 0 ? Vec3(now[n] + ahead * (now[n] - before[n])) : Vec3(share * linear[n]);
+      });
+      std::vector<Vec3> moved(guess.size());
+      parallel_for_each(guess.size(), [&](std::size_t n) { moved[n] = guess[n] - now[n]; });
+      stale_ += largest_turn(moved);
+      const int iterations = reach(share, guess);
+      if (iterations > kMostIterations) {
+        step = (share - done) / 2;
+        if (step < kLeastStep)
+          throw DivergedError(
+              fmt::format("{}: model \"quadratic\" finds no equilibrium beyond {} of the load; use "
+                          "model \"cells\", which follows buckling and large strains",
+                          scene, human_share(done)));
+        continue;
+      }
+      ++solution_.load_steps;
+      before = now;
+      now = guess;
+      last = share - done;
+      done = share;
+      if (iterations <= kFewIterations) step *= 2;
+    }
+    if (solution_.newton_iterations == 0) {  // the linear answer is one
+      solution_.unbalanced = unbalanced;
+      return;
+    }
+    solution_.displacement = now;
+    solution_.turn = corotation_.turns();
+  }
+
+ private:
+  // rad: how far a displacement turns any cell, to first order.
+  double largest_turn(const std::vector<Vec3>& displacement) const {
+    double largest = 0;
+    for (std::size_t c = 0; c < system_.nodes().cells.size(); ++c)
+      largest = std::max(largest, spin_of(gradient_at(system_, displacement, c, system_.middle(c))).norm());
+    return largest;
+  }
+
+  // Equilibrium at a share of the load, from `u`. How many iterations it took; more than kMostIterations: there was none.
+  int reach(double share, std::vector<Vec3>& u) {
+    const std::vector<Vec3> led = system_.prescribed(share);
+    const std::vector<std::uint8_t>& held = tangent_.stiffness.held();
+    for (std::size_t n = 0; n < u.size(); ++n)
+      for (int axis = 0; axis < 3; ++axis)
+        if (held[n] >> axis & 1) u[n][axis] = led[n][axis];
+    double before = HUGE_VAL;
+    for (int iteration = 0; iteration <= kMostIterations; ++iteration) {
+      if (!corotation_.residual(u, share, solution_.unbalanced)) return kMostIterations + 1;
+      std::vector<Vec3> left = solution_.unbalanced;
+      tangent_.stiffness.clear_held(left);
+      const double residual = std::sqrt(dot(left, left)) / std::max(corotation_.scale(), 1e-300);
+      if (!std::isfinite(residual)) return kMostIterations + 1;
+      progress_(share, residual);
+      solution_.relative_residual = residual;
+      // as small as it was asked for, or as rounding lets it be
+      if (residual <= tolerance_ || (residual <= kGoodEnough && residual > 0.5 * before)) return iteration;
+      before = residual;
+      std::vector<Vec3> change;
+      if (!solve(u, left, residual, change)) return kMostIterations + 1;
+      const double turn = largest_turn(change);
+      stale_ += turn;
+      const double part = turn > kMostTurn ? kMostTurn / turn : 1;
+      parallel_for_each(u.size(), [&](std::size_t n) { u[n] += part * change[n]; });
+      ++solution_.newton_iterations;
+    }
+    return kMostIterations + 1;
+  }
+
+  // A preconditioner lasts for a while; a tangent that is not positive loses the part of the stresses.
+  bool solve(const std::vector<Vec3>& u, const std::vector<Vec3>& left, double residual,
+             std::vector<Vec3>& change) {
+    corotation_.set_tangent(true);
+    if (stale_ < kMostStale && attempt(left, residual, change)) return true;
+    for (const bool stressed : {true, false}) {
+      corotation_.set_tangent(stressed);
+      tangent_.multigrid.emplace(tangent_.stiffness, system_.problem().body, u);
+      stale_ = 0;
+      if (attempt(left, residual, change)) return true;
+    }
+    return false;
+  }
+
+  bool attempt(const std::vector<Vec3>& left, double residual, std::vector<Vec3>& change) {
+    const LinearResult result = conjugate_gradients(tangent_.stiffness, left, change, *tangent_.multigrid,
+                                                    std::clamp(residual, kTightest, kLoosest), kMostLinear);
+    solution_.iterations += result.iterations;
+    return !result.indefinite && result.iterations < kMostLinear;
+  }
+
+  const QuadraticSystem& system_;
+  double tolerance_;
+  const std::function<void(double, double)>& progress_;
+  QuadraticSolution& solution_;
+  QuadraticTangent& tangent_;
+  double stale_ = 0;  // rad: how far cells may have turned since the preconditioner was made
+  Corotation corotation_;
+};
+
+}  // namespace
+
+void solve_large(const QuadraticSystem& system, const RunSettings& settings, const std::string& scene,
+                 const std::function<void(double, double)>& progress, QuadraticSolution& solution) {
+  constexpr double kTiny = 1e-9;  // rad
+  double turn = 0;
+  for (std::size_t c = 0; c < system.nodes().cells.size(); ++c)
+    turn = std::max(turn, spin_of(gradient_at(system, solution.displacement, c, system.middle(c))).norm());
+  if (turn > kTiny) LargeDeflection(system, settings, progress, solution).run(settings, scene);
+}
+
+}  // namespace flexel::simulate
