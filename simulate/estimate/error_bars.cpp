@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/stop.h"
 #include "formats/lattice/fields.h"
+#include "formats/lattice/quadratic_field.h"
 #include "simulate/estimate/coarsen.h"
 
 namespace flexel::simulate {
@@ -37,6 +38,14 @@ Answers answers(const SimulateResult& result) {
   return found;
 }
 
+// The share of the matter in walls that thin, where it is too much for bars. The cells of model
+// `quadratic` hold walls of any thickness.
+std::optional<double> thin_walls(const Body& body, double cells, bool quadratic) {
+  if (quadratic) return std::nullopt;
+  const double share = share_of_thin_walls(body, cells);
+  return share > kThinShare ? std::optional(share) : std::nullopt;
+}
+
 // Ratio of the spacings of two lattices of the same matter.
 double ratio_of(const Body& fine, const Body& coarse) {
   double volumes = 0, weights = 0;
@@ -54,7 +63,7 @@ class CoarseRuns {
  public:
   CoarseRuns(const Body& body, const Scene& scene, const SimulateOptions& options,
              const SimulateResult& result, const SolveCoarse& solve)
-      : options_(options), solve_(solve), scene_(scene) {
+      : options_(options), solve_(solve), scene_(scene), quadratic_(QuadraticField::is_in(body)) {
     const StopWaits answered;
     const LargestDisplacement most = largest_displacement(body);
     Probe probe;
@@ -75,7 +84,7 @@ class CoarseRuns {
   bool add(const Body& finer, Body& coarse, std::string& reason) {
     try {
       coarse = coarsened(finer);
-      if (found_.size() > 1 && share_of_thin_walls(coarse, 1) > kThinShare)
+      if (found_.size() > 1 && thin_walls(coarse, 1, quadratic_))
         throw InputError("walls are thinner than its cells");
       ratio_.push_back(ratio_of(finer, coarse));
       found_.push_back(answers(solve_(coarse, scene_, options_)));
@@ -118,6 +127,7 @@ class CoarseRuns {
   Scene scene_;
   std::vector<Answers> found_;
   std::vector<double> ratio_;
+  bool quadratic_;
 };
 
 std::string first_sentence(const std::string& text) {
@@ -142,12 +152,12 @@ ErrorBars estimate_errors(const Body& body, const Scene& scene, const SimulateOp
   bool wide = false;
   if (runs.add(half, quarter, reason)) {
     errors.cells.push_back(quarter.cell_count());
-    if (const double thin = share_of_thin_walls(body, kThinWall); thin > kThinShare) {
+    if (const std::optional<double> thin = thin_walls(body, kThinWall, QuadraticField::is_in(body))) {
       wide = true;
       errors.note = fmt::format(
           "{:.0f} % of the matter lies in walls under 2 cells: the bars are three times the "
           "largest difference; use a smaller spacing",
-          100 * thin);
+          100 * *thin);
     }
   } else {
     wide = true;

@@ -76,7 +76,7 @@ bool Corotation::evaluate(std::size_t cell, const std::vector<Vec3>& displacemen
     turn.gamma.middleRows<3>(at(n)) = -cross_matrix(shape.gradient[n]) * spin;
   }
   Eigen::Matrix<double, kCellUnknowns, 4> product;
-  if (system_.support_points(cell).empty())
+  if (system_.cell_supports(cell).empty())
     stiffness_.multiply_set(cell, columns, product);
   else
     product.noalias() = system_.elastic_stiffness(cell) * columns;
@@ -103,18 +103,25 @@ bool Corotation::evaluate(std::size_t cell, const std::vector<Vec3>& displacemen
 }
 
 void Corotation::add_supports(std::size_t cell, const std::vector<Vec3>& displacement, double share) {
+  if (system_.cell_supports(cell).empty()) return;
   const auto& of_cell = system_.nodes().of_cell[cell];
   const std::array<Vec3, kQuadraticNodes> local =
       local_displacement(system_.nodes(), cell, displacement, from_rest_[cell]);
   std::array<Vec3, kQuadraticNodes> u;
   for (std::size_t n = 0; n < kQuadraticNodes; ++n) u[n] = displacement[of_cell[n]];
-  for (const SupportPoint& held : system_.support_points(cell)) {
-    const NitschePoint point = system_.point(held, safety_, share);
-    const std::array<Vec3, kQuadraticNodes> forces = support_forces(point, u, local, turn_[cell].rotation);
-    for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
-      Eigen::Map<Vec3> sum(&force_[cell * kCellUnknowns + 3 * n]);
-      sum += forces[n];
-    }
+  const Mat3& rotation = turn_[cell].rotation;
+  std::array<Vec3, kQuadraticNodes> forces, led;
+  forces.fill(Vec3::Zero());
+  led.fill(Vec3::Zero());
+  for (const SupportIntegrals& held : system_.cell_supports(cell)) {
+    held.add_forces(system_.penalty(cell, safety_), u, local, rotation, forces);
+    if (!held.support->tie->is_move) continue;
+    for (const FacePoint* point : held.points)
+      add_led(system_.point(*held.support, *point, safety_, share), rotation, led);
+  }
+  for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
+    Eigen::Map<Vec3> sum(&force_[cell * kCellUnknowns + 3 * n]);
+    sum += forces[n] - led[n];
   }
 }
 
@@ -152,7 +159,7 @@ void Corotation::set_tangent(bool stressed) {
   parallel_for_each(
       turn_.size(),
       [&](std::size_t c) {
-        if (!system_.support_points(c).empty())
+        if (!system_.cell_supports(c).empty())
           stiffness_.set_own(c, system_.supported_stiffness(c, safety_, turn_[c].rotation));
       },
       kCellsAtATime);

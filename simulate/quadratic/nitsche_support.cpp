@@ -1,7 +1,16 @@
 // The terms of Nitsche's method at one point, with dP/dF of the material at rest.
 #include "simulate/quadratic/nitsche_support.h"
 
+#include <algorithm>
+
 namespace flexel::simulate {
+namespace {
+
+Mat3 projector_of(const Tie& tie) {
+  return Vec3(tie.axes[0], tie.axes[1], tie.axes[2]).asDiagonal();
+}
+
+}  // namespace
 
 NitschePoint nitsche_point(const FacePoint& point, const Tie& tie, double share, const Lattice& lattice,
                            const Mat9& moduli, double penalty) {
@@ -9,8 +18,7 @@ NitschePoint nitsche_point(const FacePoint& point, const Tie& tie, double share,
   made.shape = world_shape(lattice, point.at);
   made.area = point.area_vector.norm();
   made.penalty = penalty;
-  for (std::size_t axis = 0; axis < 3; ++axis)
-    if (tie.axes[axis]) made.projector(static_cast<Eigen::Index>(axis), static_cast<Eigen::Index>(axis)) = 1;
+  made.projector = projector_of(tie);
   made.led = tie.motion.displacement(point.position, share);
   const Vec3 normal = point.area_vector / made.area;
   Eigen::Matrix<double, 3, 9> normal_moduli;  // (i, 3 k + l): sum_j n_j A(3 i + j, 3 k + l)
@@ -21,22 +29,11 @@ NitschePoint nitsche_point(const FacePoint& point, const Tie& tie, double share,
   return made;
 }
 
-void add_to(const NitschePoint& point, const Mat3& rotation, CellMatrix& matrix) {
-  const Mat3 projector = rotation.transpose() * point.projector * rotation;
+void add_led(const NitschePoint& point, const Mat3& rotation, std::array<Vec3, kQuadraticNodes>& forces) {
+  const Vec3 led = point.projector * point.led, local = rotation.transpose() * led;
   for (std::size_t a = 0; a < kQuadraticNodes; ++a)
-    for (std::size_t b = 0; b < kQuadraticNodes; ++b) {
-      const double na = point.shape.value[a], nb = point.shape.value[b];
-      matrix.block<3, 3>(static_cast<Eigen::Index>(3 * a), static_cast<Eigen::Index>(3 * b)) +=
-          point.area * (point.penalty * na * nb * projector - na * (projector * point.traction[b]) -
-                        nb * (point.traction[a].transpose() * projector));
-    }
-}
-
-void add_led(const NitschePoint& point, std::array<Vec3, kQuadraticNodes>& forces) {
-  const Vec3 led = point.projector * point.led;
-  for (std::size_t a = 0; a < kQuadraticNodes; ++a)
-    forces[a] +=
-        point.area * (point.penalty * point.shape.value[a] * led - point.traction[a].transpose() * led);
+    forces[a] += point.area * (point.penalty * point.shape.value[a] * led -
+                               rotation * (point.traction[a].transpose() * local));
 }
 
 Vec3 reaction(const NitschePoint& point, const std::array<Vec3, kQuadraticNodes>& u,
@@ -49,19 +46,69 @@ Vec3 reaction(const NitschePoint& point, const std::array<Vec3, kQuadraticNodes>
   return point.area * (point.projector * (rotation * traction - point.penalty * (moved - point.led)));
 }
 
-std::array<Vec3, kQuadraticNodes> support_forces(const NitschePoint& point,
-                                                 const std::array<Vec3, kQuadraticNodes>& u,
-                                                 const std::array<Vec3, kQuadraticNodes>& local,
-                                                 const Mat3& rotation) {
-  const Vec3 held = reaction(point, u, local, rotation);
-  Vec3 moved = -point.led;
-  for (std::size_t n = 0; n < kQuadraticNodes; ++n) moved += point.shape.value[n] * u[n];
-  const Vec3 slip = rotation.transpose() * (point.projector * moved);
-  std::array<Vec3, kQuadraticNodes> forces;
-  for (std::size_t n = 0; n < kQuadraticNodes; ++n)
-    forces[n] =
-        -point.shape.value[n] * held - point.area * (rotation * (point.traction[n].transpose() * slip));
-  return forces;
+// Many points at a time: most of the work is the product of shape functions and tractions.
+void SupportIntegrals::find(const Lattice& lattice, const Mat9& moduli) {
+  constexpr std::size_t kAtATime = 32;
+  constexpr auto kNodes = static_cast<Eigen::Index>(kQuadraticNodes);
+  mass.setZero();
+  traction.setZero();
+  Eigen::Matrix<double, kQuadraticNodes, Eigen::Dynamic> value(kNodes, kAtATime), weighted = value;
+  Eigen::Matrix<double, 9 * kQuadraticNodes, Eigen::Dynamic> tractions(9 * kNodes, kAtATime);
+  for (std::size_t first = 0; first < points.size(); first += kAtATime) {
+    const auto count = static_cast<Eigen::Index>(std::min(kAtATime, points.size() - first));
+    for (Eigen::Index p = 0; p < count; ++p) {
+      const NitschePoint point =
+          nitsche_point(*points[first + static_cast<std::size_t>(p)], *support->tie, 0, lattice, moduli, 0);
+      for (Eigen::Index n = 0; n < kNodes; ++n) {
+        value(n, p) = point.shape.value[static_cast<std::size_t>(n)];
+        weighted(n, p) = point.area * value(n, p);
+        const Mat3& t = point.traction[static_cast<std::size_t>(n)];
+        for (int i = 0; i < 3; ++i)
+          for (int k = 0; k < 3; ++k) tractions(9 * n + 3 * i + k, p) = t(i, k);
+      }
+    }
+    mass.noalias() += weighted.leftCols(count) * value.leftCols(count).transpose();
+    traction.noalias() += weighted.leftCols(count) * tractions.leftCols(count).transpose();
+  }
+}
+
+Mat3 SupportIntegrals::traction_block(std::size_t a, std::size_t b) const {
+  Mat3 block;
+  for (int i = 0; i < 3; ++i)
+    for (int k = 0; k < 3; ++k)
+      block(i, k) = traction(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(9 * b) + 3 * i + k);
+  return block;
+}
+
+void SupportIntegrals::add_to(double penalty, const Mat3& rotation, CellMatrix& matrix) const {
+  const Mat3 projector = rotation.transpose() * projector_of(*support->tie) * rotation;
+  for (std::size_t a = 0; a < kQuadraticNodes; ++a)
+    for (std::size_t b = 0; b < kQuadraticNodes; ++b) {
+      const auto i = static_cast<Eigen::Index>(a), j = static_cast<Eigen::Index>(b);
+      matrix.block<3, 3>(3 * i, 3 * j) += penalty * mass(i, j) * projector -
+                                          projector * traction_block(a, b) -
+                                          traction_block(b, a).transpose() * projector;
+    }
+}
+
+void SupportIntegrals::add_forces(double penalty, const std::array<Vec3, kQuadraticNodes>& u,
+                                  const std::array<Vec3, kQuadraticNodes>& local, const Mat3& rotation,
+                                  std::array<Vec3, kQuadraticNodes>& forces) const {
+  const Mat3 projector = projector_of(*support->tie);
+  std::array<Vec3, kQuadraticNodes> held, turned;  // P u in the world's frame and in the cell's
+  for (std::size_t b = 0; b < kQuadraticNodes; ++b) {
+    held[b] = projector * u[b];
+    turned[b] = rotation.transpose() * held[b];
+  }
+  for (std::size_t a = 0; a < kQuadraticNodes; ++a) {
+    Vec3 penalised = Vec3::Zero(), pulled = Vec3::Zero(), adjoint = Vec3::Zero();
+    for (std::size_t b = 0; b < kQuadraticNodes; ++b) {
+      penalised += mass(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) * held[b];
+      pulled += traction_block(a, b) * local[b];
+      adjoint += traction_block(b, a).transpose() * turned[b];
+    }
+    forces[a] += penalty * penalised - projector * (rotation * pulled) - rotation * adjoint;
+  }
 }
 
 }  // namespace flexel::simulate

@@ -37,19 +37,30 @@ struct NitschePoint {
 [[nodiscard]] NitschePoint nitsche_point(const FacePoint& point, const Tie& tie, double share,
                                          const Lattice& lattice, const Mat9& moduli, double penalty);
 
-// Adds its part to the cell's matrix, in the frame of a cell that is turned by `rotation`; and what `led` asks for, to
-// forces (27 x 3) [N].
-void add_to(const NitschePoint& point, const Mat3& rotation, CellMatrix& matrix);
-void add_led(const NitschePoint& point, std::array<Vec3, kQuadraticNodes>& forces);
+// Adds what `led` asks for to forces (27 x 3) [N], of a cell that is turned by `rotation`.
+void add_led(const NitschePoint& point, const Mat3& rotation, std::array<Vec3, kQuadraticNodes>& forces);
 
 // N, of the support on the body: P (t - beta (u - d)) times the area. t is the traction of `local`, the displacement of the
 // cell's nodes without its rotation (in its frame; without a rotation u itself).
 [[nodiscard]] Vec3 reaction(const NitschePoint& point, const std::array<Vec3, kQuadraticNodes>& u,
                             const std::array<Vec3, kQuadraticNodes>& local, const Mat3& rotation);
-// (27 x 3) N: the forces that it adds to the cell's own.
-[[nodiscard]] std::array<Vec3, kQuadraticNodes> support_forces(const NitschePoint& point,
-                                                               const std::array<Vec3, kQuadraticNodes>& u,
-                                                               const std::array<Vec3, kQuadraticNodes>& local,
-                                                               const Mat3& rotation);
+// Of one support in one cell: int N_a N_b dA [m^2], and int N_a t_b dA [N/m], (i, k) at (a, 9 b + 3 i + k).
+struct SupportIntegrals {
+  const NitscheSupport* support = nullptr;
+  std::vector<const FacePoint*> points;
+  Eigen::Matrix<double, kQuadraticNodes, kQuadraticNodes> mass;
+  Eigen::Matrix<double, kQuadraticNodes, 9 * kQuadraticNodes> traction;
+
+  void find(const Lattice& lattice, const Mat9& moduli);
+  // Adds its part to the cell's matrix, in the frame of a cell that is turned by `rotation`. `penalty`: beta [Pa/m].
+  void add_to(double penalty, const Mat3& rotation, CellMatrix& matrix) const;
+  // Adds its forces on the nodes, but for what a move asks for, to (27 x 3) [N]; u and `local` as for reaction().
+  void add_forces(double penalty, const std::array<Vec3, kQuadraticNodes>& u,
+                  const std::array<Vec3, kQuadraticNodes>& local, const Mat3& rotation,
+                  std::array<Vec3, kQuadraticNodes>& forces) const;
+
+ private:
+  [[nodiscard]] Mat3 traction_block(std::size_t a, std::size_t b) const;
+};
 
 }  // namespace flexel::simulate

@@ -38,7 +38,7 @@ class LargeDeflection {
         corotation_(system, tangent_.stiffness, solution.safety) {}
 
   void run(const RunSettings& settings, const std::string& scene) {
-    const std::vector<Vec3> linear = solution_.displacement, unbalanced = solution_.unbalanced;
+    const std::vector<Vec3> linear = solution_.displacement;
     std::vector<Vec3> before(linear.size(), Vec3::Zero()), now = before;
     double done = 0, last = 0;
     double step = std::min(1., kFirstTurn / std::max(largest_turn(linear), 1e-300));
@@ -70,15 +70,30 @@ class LargeDeflection {
       done = share;
       if (iterations <= kFewIterations) step *= 2;
     }
-    if (solution_.newton_iterations == 0) {  // the linear answer is one
-      solution_.unbalanced = unbalanced;
-      return;
-    }
     solution_.displacement = now;
     solution_.turn = corotation_.turns();
   }
 
+  // Whether cells that turn answer noticeably otherwise: by one correction of the linear solution.
+  bool matters() {
+    constexpr double kNoticeable = 1e-4, kRoughly = 1e-2;
+    const std::vector<Vec3>& u = solution_.displacement;
+    std::vector<Vec3> left, change;
+    if (!corotation_.residual(u, 1, left)) return true;
+    tangent_.stiffness.clear_held(left);
+    const LinearResult result =
+        conjugate_gradients(tangent_.stiffness, left, change, *tangent_.multigrid, kRoughly, kMostLinear);
+    solution_.iterations += result.iterations;
+    return !(largest(change) <= kNoticeable * largest(u));
+  }
+
  private:
+  static double largest(const std::vector<Vec3>& values) {
+    double most = 0;
+    for (const Vec3& value : values) most = std::max(most, value.norm());
+    return most;
+  }
+
   // rad: how far a displacement turns any cell, to first order.
   double largest_turn(const std::vector<Vec3>& displacement) const {
     double largest = 0;
@@ -151,11 +166,16 @@ class LargeDeflection {
 
 void solve_large(const QuadraticSystem& system, const RunSettings& settings, const std::string& scene,
                  const std::function<void(double, double)>& progress, QuadraticSolution& solution) {
-  constexpr double kTiny = 1e-9;  // rad
-  double turn = 0;
-  for (std::size_t c = 0; c < system.nodes().cells.size(); ++c)
+  // What large deflections change is of the order of the rotation times the slenderness.
+  constexpr double kTiny = 3e-4;
+  double turn = 0, finest = HUGE_VAL;
+  for (std::size_t c = 0; c < system.nodes().cells.size(); ++c) {
     turn = std::max(turn, spin_of(gradient_at(system, solution.displacement, c, system.middle(c))).norm());
-  if (turn > kTiny) LargeDeflection(system, settings, progress, solution).run(settings, scene);
+    finest = std::min(finest, system.lattice(c).spacing.minCoeff());
+  }
+  if (turn * bounding_box(system.nodes().rest).diagonal() < kTiny * finest) return;
+  LargeDeflection large(system, settings, progress, solution);
+  if (large.matters()) large.run(settings, scene);
 }
 
 }  // namespace flexel::simulate

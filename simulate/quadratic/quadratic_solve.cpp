@@ -227,7 +227,7 @@ void report(const QuadraticSystem& system, const QuadraticSolution& solution, Si
   for (const NitscheSupport& support : system.supports()) {
     Reaction reaction{support.tie->name, Vec3::Zero(), Vec3::Zero()};
     for (const FacePoint& at : support.points) {
-      const NitschePoint point = system.point({&support, &at}, solution.safety);
+      const NitschePoint point = system.point(support, at, solution.safety);
       const Mat3& turn = turn_of_cell(solution, at.cell);
       const auto u = values_at(system, solution, at.cell);
       Vec3 moved = Vec3::Zero();
@@ -262,10 +262,14 @@ void report(const QuadraticSystem& system, const QuadraticSolution& solution, Si
       nodes.cells.size(),
       [&](std::size_t c) {
         const auto local = local_displacement(nodes, c, solution.displacement, turn_of_cell(solution, c));
-        Eigen::Matrix<double, kCellUnknowns, 1> u;
+        Eigen::Matrix<double, kCellUnknowns, 4> u = Eigen::Matrix<double, kCellUnknowns, 4>::Zero(), force;
         for (std::size_t n = 0; n < kQuadraticNodes; ++n)
-          u.segment<3>(static_cast<Eigen::Index>(3 * n)) = local[n];
-        return 0.5 * u.dot(system.elastic_stiffness(c) * u);
+          u.block<3, 1>(static_cast<Eigen::Index>(3 * n), 0) = local[n];
+        if (system.cell_supports(c).empty())
+          solution.tangent->stiffness.multiply_set(c, u, force);
+        else
+          force.noalias() = system.elastic_stiffness(c) * u;
+        return 0.5 * u.col(0).dot(force.col(0));
       },
       kCellsAtATime);
   for (std::size_t c = 0; c < nodes.cells.size(); ++c)

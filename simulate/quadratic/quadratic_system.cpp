@@ -89,9 +89,23 @@ void QuadraticSystem::place_supports(const std::vector<Tie>& ties) {
       if (!free[n]) support.nodes.push_back(n);
     supports_.push_back(std::move(support));
   }
-  support_points_.resize(nodes_.cells.size());
+  integrate_supports();
+}
+
+void QuadraticSystem::integrate_supports() {
+  cell_supports_.resize(nodes_.cells.size());
   for (const NitscheSupport& support : supports_)
-    for (const FacePoint& point : support.points) support_points_[point.cell].push_back({&support, &point});
+    for (const FacePoint& point : support.points) {
+      std::vector<SupportIntegrals>& there = cell_supports_[point.cell];
+      if (there.empty() || there.back().support != &support) there.emplace_back().support = &support;
+      there.back().points.push_back(&point);
+    }
+  parallel_for_each(
+      nodes_.cells.size(),
+      [&](std::size_t c) {
+        for (SupportIntegrals& each : cell_supports_[c]) each.find(lattice(c), moduli_[part_[c]]);
+      },
+      kCellsAtATime);
 }
 
 void QuadraticSystem::place_loads(const std::vector<Load>& loads) {
@@ -169,15 +183,19 @@ Vec3 QuadraticSystem::middle(std::size_t cell) const {
 
 CellMatrix QuadraticSystem::supported_stiffness(std::size_t cell, double safety, const Mat3& rotation) const {
   CellMatrix matrix = elastic_stiffness(cell);
-  for (const SupportPoint& at : support_points_[cell]) add_to(point(at, safety), rotation, matrix);
+  for (const SupportIntegrals& each : cell_supports_[cell])
+    each.add_to(penalty(cell, safety), rotation, matrix);
   return matrix;
 }
 
-NitschePoint QuadraticSystem::point(const SupportPoint& at, double safety, double share) const {
-  const std::uint32_t part = part_[at.point->cell];
-  const Lattice& lattice = problem_.body.parts[part].lattice;
-  return nitsche_point(*at.point, *at.support->tie, share, lattice, moduli_[part],
-                       safety * kNitsche * stiffest_[part] / lattice.spacing.minCoeff());
+double QuadraticSystem::penalty(std::size_t cell, double safety) const {
+  return safety * kNitsche * stiffest_[part_[cell]] / lattice(cell).spacing.minCoeff();
+}
+
+NitschePoint QuadraticSystem::point(const NitscheSupport& support, const FacePoint& at, double safety,
+                                    double share) const {
+  return nitsche_point(at, *support.tie, share, lattice(at.cell), moduli_[part_[at.cell]],
+                       penalty(at.cell, safety));
 }
 
 std::vector<std::uint8_t> QuadraticSystem::held() const {
@@ -193,7 +211,7 @@ QuadraticOperator QuadraticSystem::stiffness(double safety) const {
   QuadraticOperator made(nodes_, held());
   std::vector<std::uint32_t> own;
   for (std::uint32_t c = 0; c < nodes_.cells.size(); ++c)
-    if (moments_at_[c] != kWhole || !support_points_[c].empty()) own.push_back(c);
+    if (moments_at_[c] != kWhole || !cell_supports_[c].empty()) own.push_back(c);
   std::vector<std::uint32_t> shared;
   for (const CellIntegrals& integrals : integrals_)
     shared.push_back(made.add_shared(integrals.stiffness(whole_cell_moments())));
@@ -215,7 +233,7 @@ std::vector<Vec3> QuadraticSystem::right_side(double safety) const {
     for (const FacePoint& at : support.points) {
       std::array<Vec3, kQuadraticNodes> forces;
       forces.fill(Vec3::Zero());
-      add_led(point({&support, &at}, safety), forces);
+      add_led(point(support, at, safety), Mat3::Identity(), forces);
       for (std::size_t n = 0; n < kQuadraticNodes; ++n) sum[nodes_.of_cell[at.cell][n]] += forces[n];
     }
   }

@@ -13,12 +13,6 @@ struct NodalLoad {
   bool couple = false;       // it was given a torque, or a point where its force acts
 };
 
-// A point of a support, of the cell that it lies in.
-struct SupportPoint {
-  const NitscheSupport* support = nullptr;
-  const FacePoint* point = nullptr;
-};
-
 class QuadraticSystem {
  public:
   // Throws InputError: cells that the surface cuts without moments, a support or load under which no matter lies.
@@ -48,12 +42,15 @@ class QuadraticSystem {
   }
   // The middle of a cell's matter (cell coordinates); of the voxel where there is none to speak of.
   [[nodiscard]] Vec3 middle(std::size_t cell) const;
-  [[nodiscard]] const std::vector<SupportPoint>& support_points(std::size_t cell) const {
-    return support_points_[cell];
+  // What supports hold of a cell by its faces.
+  [[nodiscard]] const std::vector<SupportIntegrals>& cell_supports(std::size_t cell) const {
+    return cell_supports_[cell];
   }
   // elastic_stiffness() with its supports, in the frame of a cell that is turned.
   [[nodiscard]] CellMatrix supported_stiffness(std::size_t cell, double safety, const Mat3& rotation) const;
-  [[nodiscard]] NitschePoint point(const SupportPoint& at, double safety, double share = 1) const;
+  [[nodiscard]] double penalty(std::size_t cell, double safety) const;  // Pa/m, beta
+  [[nodiscard]] NitschePoint point(const NitscheSupport& support, const FacePoint& at, double safety,
+                                   double share = 1) const;
   // What of the loaded surface bears on no matter, for people.
   [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
   // (elements) 2 where a support holds all axes, 1 where it holds some, else 0.
@@ -62,6 +59,7 @@ class QuadraticSystem {
  private:
   void require_moments() const;
   void place_supports(const std::vector<Tie>& ties);
+  void integrate_supports();
   void place_loads(const std::vector<Load>& loads);
   void check_area(const Load& load, const std::vector<std::uint32_t>& polygons,
                   const std::vector<FacePoint>& points);
@@ -77,7 +75,7 @@ class QuadraticSystem {
   std::vector<double> stiffest_;           // (parts) Pa, lambda + 2 mu
   std::vector<CellIntegrals> integrals_;   // (parts)
   std::vector<NitscheSupport> supports_;
-  std::vector<std::vector<SupportPoint>> support_points_;  // (cells)
+  std::vector<std::vector<SupportIntegrals>> cell_supports_;  // (cells)
   std::vector<NodalLoad> loads_;
   std::vector<std::string> warnings_;
 };
