@@ -17,6 +17,7 @@
 #include <span>
 
 #include "base/math/area_vector.h"
+#include "base/math/decompositions.h"
 
 namespace flexel::commands {
 namespace {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/math/decompositions.h"
 #include "base/parallel.h"
 #include "formats/part/topology.h"
 

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "base/math/decompositions.h"
+
 namespace flexel::simulate {
 namespace {
 

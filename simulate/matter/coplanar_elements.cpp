@@ -2,8 +2,7 @@
 // it.
 #include "simulate/matter/coplanar_elements.h"
 
-#include <Eigen/Eigenvalues>
-
+#include "base/math/decompositions.h"
 #include "simulate/models/connections.h"
 
 namespace flexel::simulate {

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "base/math/decompositions.h"
+
 namespace flexel::simulate {
 namespace {
 
