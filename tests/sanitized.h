@@ -3,7 +3,7 @@
 #pragma once
 #include <cstdio>
 
-namespace flexel::testing {
+namespace flexel {
 
 #ifdef __SANITIZE_ADDRESS__
 constexpr bool kSanitized = true;
@@ -18,4 +18,4 @@ T less_if_sanitized(T whole, T less, const char* what) {
   return kSanitized ? less : whole;
 }
 
-}  // namespace flexel::testing
+}  // namespace flexel

@@ -219,7 +219,7 @@ TEST(ContactFriction, ABlockRestsBelowTheAngleOfFriction) {
 
 TEST(ContactFriction, ABlockSlidesAboveTheAngleOfFriction) {
   const std::vector<double> plane =
-      testing::less_if_sanitized<std::vector<double>>({0.0, 0.4, 0.9}, {0.4}, "one orientation of three");
+      less_if_sanitized<std::vector<double>>({0.0, 0.4, 0.9}, {0.4}, "one orientation of three");
   for (const bool on_part : {false, true})
     for (const double turned : on_part ? std::vector{0.4} : plane) {
       const double angle = 0.5, mu = 0.3, time = 0.1;

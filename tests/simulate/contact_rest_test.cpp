@@ -51,7 +51,7 @@ std::vector<double> way_down(const TimedCase& made, const Vec3& down) {
 
 TEST(ContactFriction, ABlockRestsForTenSeconds) {
   for (const double turned :
-       testing::less_if_sanitized<std::vector<double>>({0.0, 0.4, 0.9}, {0.4}, "one orientation of three")) {
+       less_if_sanitized<std::vector<double>>({0.0, 0.4, 0.9}, {0.4}, "one orientation of three")) {
     Slope made = slope(10, turned, {2, 2, 1});
     made.scene.get<RigidParts>().parts = {"block"};
     made.scene.get<Contact>().stiffness = 0.005;  // of 3 E/h: longer steps
