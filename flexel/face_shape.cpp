@@ -17,7 +17,6 @@
 #include <span>
 
 #include "base/math/area_vector.h"
-#include "base/math/decompositions.h"
 
 namespace flexel::commands {
 namespace {

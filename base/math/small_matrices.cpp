@@ -1,7 +1,7 @@
 // Called a few times per part or element, never in a time step.
 #include "base/math/small_matrices.h"
 
-#include "base/math/decompositions.h"
+#include <Eigen/Eigenvalues>
 
 namespace flexel {
 

@@ -1,12 +1,12 @@
 // Largest values are found in parallel by chunks that keep the first of equal ones.
 #include "formats/lattice/fields.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "base/math/decompositions.h"
 #include "base/parallel.h"
 #include "formats/lattice/quadratic_field.h"
 

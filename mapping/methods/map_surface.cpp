@@ -5,10 +5,10 @@
 #include <fmt/ranges.h>
 
 #include <Eigen/LU>
+#include <Eigen/SVD>
 #include <algorithm>
 
 #include "base/error.h"
-#include "base/math/decompositions.h"
 #include "base/nearest_word.h"
 #include "base/stop.h"
 #include "mapping/anchors/frame.h"

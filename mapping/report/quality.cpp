@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/math/decompositions.h"
 #include "base/parallel.h"
 #include "formats/part/topology.h"
 

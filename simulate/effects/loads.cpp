@@ -7,11 +7,11 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
+#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
 #include "base/error.h"
-#include "base/math/decompositions.h"
 #include "simulate/input/scene_selection.h"
 #include "simulate/matter/load_distribution.h"
 #include "simulate/matter/surface_points.h"

@@ -13,13 +13,13 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "base/error.h"
 #include "base/human.h"
-#include "base/math/decompositions.h"
 #include "base/stop.h"
 #include "base/units.h"
 #include "simulate/equilibrium/rigid_link_equilibrium.h"

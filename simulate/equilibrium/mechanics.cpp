@@ -3,10 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
+
 #include <cmath>
 #include <limits>
 
-#include "base/math/decompositions.h"
 #include "base/parallel.h"
 
 namespace flexel::simulate {

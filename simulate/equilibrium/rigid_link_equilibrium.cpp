@@ -11,10 +11,10 @@
 #include <fmt/format.h>
 
 #include <Eigen/LU>
+#include <Eigen/SVD>
 #include <algorithm>
 
 #include "base/error.h"
-#include "base/math/decompositions.h"
 #include "base/parallel.h"
 #include "simulate/linear/conjugate_gradients.h"
 #include "simulate/linear/multigrid.h"

@@ -4,7 +4,6 @@
 #include <Eigen/Dense>
 #include <limits>
 
-#include "base/math/decompositions.h"
 #include "simulate/laws/mooney_rivlin.h"
 #include "simulate/laws/neo_hooke_scalar.h"
 #include "simulate/laws/orthotropic.h"

@@ -6,8 +6,6 @@
 #include <cmath>
 #include <limits>
 
-#include "base/math/decompositions.h"
-
 namespace flexel::simulate {
 namespace {
 

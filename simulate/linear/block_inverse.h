@@ -2,9 +2,8 @@
 #pragma once
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <Eigen/Eigenvalues>
 #include <cmath>
-
-#include "base/math/decompositions.h"
 
 namespace flexel::simulate {
 

@@ -3,12 +3,13 @@
 // energy is next to nothing beside the stiffness of a single element are free. Their space is then told in
 // plain words: pure translations first, then rotations, each turned as near to the coordinate axes as the
 // space allows.
+#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
+#include <Eigen/SVD>
 #include <algorithm>
 #include <array>
 
 #include "base/disjoint_sets.h"
-#include "base/math/decompositions.h"
 #include "base/parallel.h"
 #include "simulate/linear/aggregate.h"
 #include "simulate/linear/free_motions.h"

@@ -2,7 +2,8 @@
 // it.
 #include "simulate/matter/coplanar_elements.h"
 
-#include "base/math/decompositions.h"
+#include <Eigen/Eigenvalues>
+
 #include "simulate/models/connections.h"
 
 namespace flexel::simulate {

@@ -6,13 +6,13 @@
 // space of the sum of |d|^2 over every two groups at every shared element, d the difference of theirs.
 #include "simulate/matter/firm_groups.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <map>
 #include <optional>
 
 #include "base/disjoint_sets.h"
-#include "base/math/decompositions.h"
 
 namespace flexel::simulate {
 namespace {

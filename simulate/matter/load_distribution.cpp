@@ -1,7 +1,7 @@
 // Both are sums over the points in their order.
 #include "simulate/matter/load_distribution.h"
 
-#include "base/math/decompositions.h"
+#include <Eigen/Eigenvalues>
 
 namespace flexel::simulate {
 namespace {

@@ -2,11 +2,11 @@
 #include "simulate/matter/stress.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <span>
 
-#include "base/math/decompositions.h"
 #include "base/math/distance.h"
 #include "base/parallel.h"
 #include "formats/lattice/fields.h"

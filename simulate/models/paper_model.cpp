@@ -3,11 +3,11 @@
 // its ends; both give the same numbers with opposite signs, so that momentum is kept exactly.
 #include "simulate/models/paper_model.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <limits>
 
-#include "base/math/decompositions.h"
 #include "base/math/greatest.h"
 #include "base/parallel.h"
 #include "simulate/models/central_spring.h"

@@ -2,13 +2,13 @@
 // besides is the geometric part, by the stresses.
 #include "simulate/models/prepared_cell.h"
 
-#include "base/math/decompositions.h"
+#include <Eigen/Eigenvalues>
 
 namespace flexel::simulate {
 namespace {
 
 Mat3 positive_part(const Mat3& symmetric) {
-  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(Mat3(0.5 * (symmetric + symmetric.transpose())));
+  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(0.5 * (symmetric + symmetric.transpose()));
   return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() *
          eigen.eigenvectors().transpose();
 }

@@ -9,7 +9,6 @@
 #include <cmath>
 
 #include "base/error.h"
-#include "base/math/decompositions.h"
 #include "base/parallel.h"
 #include "base/units.h"
 

@@ -2,9 +2,9 @@
 #include "simulate/rigid/rigid_body.h"
 
 #include <Eigen/Geometry>
+#include <Eigen/SVD>
 #include <cmath>
 
-#include "base/math/decompositions.h"
 #include "base/math/small_matrices.h"
 
 namespace flexel::simulate {
