@@ -15,41 +15,22 @@
 namespace flexel::voxelize {
 namespace {
 
-// Triangles as OpenVDB asks for them, in the index space of a grid. One class for every mesh: what OpenVDB
-// makes of it takes half a minute to compile.
-struct IndexTriangles {
-  std::vector<openvdb::Vec3d> points;
-  std::vector<Corners> corners;
-  [[nodiscard]] std::size_t polygonCount() const { return corners.size(); }
-  [[nodiscard]] std::size_t pointCount() const { return points.size(); }
+// A mesh as OpenVDB asks for it, in its index space.
+class MeshAdapter {
+ public:
+  MeshAdapter(const PartMesh& mesh, const Range& range) : mesh_(&mesh), range_(range) {}
+  [[nodiscard]] std::size_t polygonCount() const { return mesh_->corners.size(); }
+  [[nodiscard]] std::size_t pointCount() const { return mesh_->vertices.size(); }
   [[nodiscard]] std::size_t vertexCount(std::size_t) const { return 3; }
   void getIndexSpacePoint(std::size_t n, std::size_t v, openvdb::Vec3d& at) const {
-    at = points[corners[n][v]];
+    const Vec3& vertex = mesh_->vertices[mesh_->corners[n][v]];
+    for (int a = 0; a < 3; ++a) at[a] = (vertex[a] - range_.begin[a]) * kSamples - .5;
   }
+
+ private:
+  const PartMesh* mesh_;
+  Range range_;
 };
-
-IndexTriangles triangles_of(const PartMesh& mesh, const Range& range) {
-  IndexTriangles made{{}, mesh.corners};
-  for (const Vec3& vertex : mesh.vertices) {
-    openvdb::Vec3d& at = made.points.emplace_back();
-    for (int a = 0; a < 3; ++a) at[a] = (vertex[a] - range.begin[a]) * kSamples - .5;
-  }
-  return made;
-}
-
-// A part's, in the index space of its distance grid.
-IndexTriangles triangles_of(const Surface& surface, std::uint32_t part, const Lattice& lattice,
-                            double voxel) {
-  IndexTriangles made;
-  for (const Vec3& vertex : surface.vertices) {
-    const Vec3 local = lattice.axes.transpose() * (vertex - lattice.origin) / voxel;
-    made.points.emplace_back(local[0] - .5, local[1] - .5, local[2] - .5);
-  }
-  const Triangles all = triangulate(surface);
-  for (std::size_t t = 0; t < all.corners.size(); ++t)
-    if (surface.polygon_part(all.polygon[t]) == part) made.corners.push_back(all.corners[t]);
-  return made;
-}
 
 // Index (i, j, k) to the centre of that voxel; OpenVDB's vectors are rows.
 openvdb::math::Transform::Ptr transform_of(const Lattice& lattice, const Vec3& spacing) {
@@ -75,6 +56,31 @@ openvdb::FloatGrid::Ptr fill_grid(const Body& body, const Part& part) {
   return grid;
 }
 
+// A part's triangles in the index space of its distance grid.
+class SurfaceAdapter {
+ public:
+  SurfaceAdapter(const Surface& surface, std::uint32_t part, const Lattice& lattice, double voxel)
+      : surface_(&surface), lattice_(&lattice), voxel_(voxel) {
+    const Triangles all = triangulate(surface);
+    for (std::size_t t = 0; t < all.corners.size(); ++t)
+      if (surface.polygon_part(all.polygon[t]) == part) corners_.push_back(all.corners[t]);
+  }
+  [[nodiscard]] std::size_t polygonCount() const { return corners_.size(); }
+  [[nodiscard]] std::size_t pointCount() const { return surface_->vertices.size(); }
+  [[nodiscard]] std::size_t vertexCount(std::size_t) const { return 3; }
+  void getIndexSpacePoint(std::size_t n, std::size_t v, openvdb::Vec3d& at) const {
+    const Vec3 local =
+        lattice_->axes.transpose() * (surface_->vertices[corners_[n][v]] - lattice_->origin) / voxel_;
+    for (int a = 0; a < 3; ++a) at[a] = local[a] - .5;
+  }
+
+ private:
+  const Surface* surface_;
+  const Lattice* lattice_;
+  double voxel_;
+  std::vector<Corners> corners_;
+};
+
 openvdb::FloatGrid::Ptr distance_grid(const Body& body, std::uint32_t number,
                                       const openvdb::FloatGrid& fill) {
   constexpr float kBandVoxels = 3;
@@ -83,7 +89,7 @@ openvdb::FloatGrid::Ptr distance_grid(const Body& body, std::uint32_t number,
   const double voxel = spacing.minCoeff();
   const auto transform = transform_of(part.lattice, Vec3::Constant(voxel));
   auto grid = openvdb::tools::meshToVolume<openvdb::FloatGrid>(
-      triangles_of(body.surface, number, part.lattice, voxel), *transform, kBandVoxels, kBandVoxels,
+      SurfaceAdapter(body.surface, number, part.lattice, voxel), *transform, kBandVoxels, kBandVoxels,
       openvdb::tools::UNSIGNED_DISTANCE_FIELD);
   const auto reader = fill.getConstUnsafeAccessor();
   for (auto value = grid->beginValueOn(); value; ++value) {
@@ -107,7 +113,7 @@ SampleDistances::SampleDistances(const PartMesh& mesh, const Range& range) : gri
   openvdb::initialize();
   const auto transform = openvdb::math::Transform::createLinearTransform(1);
   grid_->grid =
-      openvdb::tools::meshToVolume<openvdb::FloatGrid>(triangles_of(mesh, range), *transform, kBand, kBand);
+      openvdb::tools::meshToVolume<openvdb::FloatGrid>(MeshAdapter(mesh, range), *transform, kBand, kBand);
 }
 SampleDistances::~SampleDistances() = default;
 
