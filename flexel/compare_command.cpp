@@ -291,8 +291,8 @@ std::string comparison_json(const std::vector<Finding>& all) {
 
 int compare_command(int argc, char** argv) {
   CompareArguments arguments;
-  CLI::App app{"Which of several parts is stiffer under one scene: mass, displacement, stiffness, stress.",
-               "flexel compare"};
+  CommandLine app{"Which of several parts is stiffer under one scene: mass, displacement, stiffness, stress.",
+                  "flexel compare"};
   declare_job(app, arguments.job);
   app.add_flag("--json", arguments.json, "As JSON, in SI units (docs/guide/compare.md)");
   add_threads_option(app, arguments.threads);

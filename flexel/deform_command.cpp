@@ -54,38 +54,38 @@ struct DeformArguments {
   bool quiet = false, verbose = false, estimate = true;
 };
 
-void declare_input(CLI::App& app, JobArguments& arguments) {
+void declare_input(CommandLine& app, JobArguments& arguments) {
   declare_job(app, arguments);
   app.add_option("--placement", arguments.placement,
                  "Elements at the voxels' corner or centre (model \"paper\")")
-      ->type_name("WHERE")
-      ->capture_default_str();
+      .type_name("WHERE")
+      .show_default();
 }
 
-void declare_output(CLI::App& app, DeformArguments& arguments) {
+void declare_output(CommandLine& app, DeformArguments& arguments) {
   app.add_option(
          "-o,--output", arguments.outputs,
          "The deformed part (.stl, .obj ...), body (.vtu) or a picture of it (.png); again for more; -: "
          "stdout")
-      ->type_name("FILE")
-      ->required()
-      ->allow_extra_args(false);
-  app.add_option("--body", arguments.body, "Write the deformed body (.vtu) too")->type_name("FILE");
+      .type_name("FILE")
+      .required()
+      .one_value_each();
+  app.add_option("--body", arguments.body, "Write the deformed body (.vtu) too").type_name("FILE");
   declare_map_options(app, arguments.map);
   app.add_option("--summary", arguments.summary,
                  "Write the summary of all stages (JSON; docs/guide/deform.md)")
-      ->type_name("FILE");
+      .type_name("FILE");
   add_threads_option(app, arguments.threads);
   app.add_option("--timeout", arguments.timeout,
                  "Stop after this time (\"90 s\"): exit 5, of a simulation the last good state in "
                  "OUTPUT.failed.vtu")
-      ->type_name("TIME");
+      .type_name("TIME");
   app.add_option("--accuracy", arguments.accuracy,
                  "Choose size and mapping from cheap runs so that the error is at most this (\"2%\")")
-      ->type_name("SHARE");
+      .type_name("SHARE");
   app.add_option("--within", arguments.within,
                  "Choose the finest size whose run ends within this time, all in all (\"10s\")")
-      ->type_name("TIME");
+      .type_name("TIME");
   app.add_flag("!--no-estimate", arguments.estimate, "Leave out the error bars (docs/theory/error-bars.md)");
   app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
   app.add_flag("--verbose", arguments.verbose, "Say all that each stage found");
@@ -472,8 +472,9 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
 
 int deform_command(int argc, char** argv) {
   DeformArguments arguments;
-  CLI::App app{"Deforms a part as its material would be: import, lattice, simulation and mapping in one run.",
-               "flexel deform"};
+  CommandLine app{
+      "Deforms a part as its material would be: import, lattice, simulation and mapping in one run.",
+      "flexel deform"};
   declare_input(app, arguments.job);
   declare_output(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;

@@ -36,23 +36,23 @@ struct ExportArguments {
   int threads = 0;
 };
 
-void declare(CLI::App& app, ExportArguments& arguments) {
+void declare(CommandLine& app, ExportArguments& arguments) {
   declare_job(app, arguments.job);
   app.add_flag("--calculix", arguments.calculix, "For CalculiX (ccx), as an .inp file (docs/guide/export.md)")
-      ->required();
-  app.add_option("-o,--output", arguments.output, "The file; -: stdout")->type_name("FILE")->required();
+      .required();
+  app.add_option("-o,--output", arguments.output, "The file; -: stdout").type_name("FILE").required();
   app.add_option("--mesh", arguments.mesh,
                  "hex: the lattice's cells; tet: second-order tetrahedra, by the program gmsh")
-      ->type_name("KIND")
-      ->capture_default_str();
+      .type_name("KIND")
+      .show_default();
   app.add_option("--element", arguments.element, "Of hexahedra: C3D8I or C3D8")
-      ->type_name("NAME")
-      ->capture_default_str();
+      .type_name("NAME")
+      .show_default();
   app.add_option("--nlgeom", arguments.nlgeom, "Large deflections: on, off, or as a coarse run tells")
-      ->type_name("auto|on|off")
-      ->capture_default_str();
+      .type_name("auto|on|off")
+      .show_default();
   app.add_option("--summary", arguments.summary, "Write what was written as JSON (docs/guide/export.md)")
-      ->type_name("FILE");
+      .type_name("FILE");
   add_threads_option(app, arguments.threads);
   app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
 }
@@ -246,8 +246,8 @@ mesh_export::Analysis analyse(const ExportArguments& arguments, Job& job, const 
 
 int export_command(int argc, char** argv) {
   ExportArguments arguments;
-  CLI::App app{"Writes the part and its scene as the input of another program, for detailed analysis.",
-               "flexel export"};
+  CommandLine app{"Writes the part and its scene as the input of another program, for detailed analysis.",
+                  "flexel export"};
   declare(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   const StopEndsProcess nothing_is_left;

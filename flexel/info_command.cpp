@@ -269,15 +269,15 @@ int info_command(int argc, char** argv) {
   std::vector<std::string> files;
   std::string unit, edge, thickness;
   bool json = false;
-  CLI::App app{"What a part is, and what a scene can name in it.", "flexel info"};
-  app.add_option("part", files, read_titles() + " files; -: stdin")->required()->type_name("PART");
+  CommandLine app{"What a part is, and what a scene can name in it.", "flexel info"};
+  app.add_option("part", files, read_titles() + " files; -: stdin").required().type_name("PART");
   app.add_flag("--json", json, "As JSON, in SI units (docs/guide/info.md)");
-  app.add_option("--unit", unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
+  app.add_option("--unit", unit, "Unit of files that carry none (default mm)").type_name("UNIT");
   app.add_option("--edge", edge, "Split the mesh to this longest edge (default: not split)")
-      ->type_name("LENGTH");
+      .type_name("LENGTH");
   app.add_option("--thickness", thickness,
                  "Also write the surface as PLY with the wall thickness at its vertices")
-      ->type_name("FILE.ply");
+      .type_name("FILE.ply");
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   const StopEndsProcess nothing_is_left;
   if (!thickness.empty() && extension(thickness) != "ply")

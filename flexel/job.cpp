@@ -12,19 +12,19 @@
 #include "simulate/quadratic/quadratic_run.h"
 
 namespace flexel::commands {
-void declare_job(CLI::App& app, JobArguments& arguments) {
-  app.add_option("part", arguments.parts, read_titles() + " files; -: stdin")->required()->type_name("PART");
+void declare_job(CommandLine& app, JobArguments& arguments) {
+  app.add_option("part", arguments.parts, read_titles() + " files; -: stdin").required().type_name("PART");
   declare_scene(app, arguments);
-  app.add_option("--size", arguments.size, "Spacing of the lattice (\"2 mm\")")->type_name("LENGTH");
-  app.add_option("--count", arguments.count, "Or: about this many cells")->type_name("N");
+  app.add_option("--size", arguments.size, "Spacing of the lattice (\"2 mm\")").type_name("LENGTH");
+  app.add_option("--count", arguments.count, "Or: about this many cells").type_name("N");
   app.add_option("--heal", arguments.heal, "Broken surfaces: auto, wrap or none (docs/reference/healing.md)")
-      ->type_name("HOW")
-      ->capture_default_str();
-  app.add_option("--unit", arguments.unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
+      .type_name("HOW")
+      .show_default();
+  app.add_option("--unit", arguments.unit, "Unit of files that carry none (default mm)").type_name("UNIT");
   app.add_option(
          "--edge", arguments.edge,
          "Split the mesh to this longest edge (default: STEP a 64th of the file's diagonal, meshes not)")
-      ->type_name("LENGTH");
+      .type_name("LENGTH");
   app.add_flag("--force", arguments.force, "Let results replace files that are read");
 }
 

@@ -23,10 +23,10 @@ struct JobArguments {
 };
 
 // Adds the options of what happens: --scene to --shell.
-void declare_scene(CLI::App& app, JobArguments& arguments);
+void declare_scene(CommandLine& app, JobArguments& arguments);
 
 // Adds all of their options to the program, but for --placement, which not every command has.
-void declare_job(CLI::App& app, JobArguments& arguments);
+void declare_job(CommandLine& app, JobArguments& arguments);
 
 // What they ask for, checked.
 struct Job {

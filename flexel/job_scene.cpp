@@ -75,12 +75,12 @@ void plan_infill(const JobArguments& arguments, simulate::Scene& scene) {
 
 }  // namespace
 
-void declare_scene(CLI::App& app, JobArguments& arguments) {
+void declare_scene(CommandLine& app, JobArguments& arguments) {
   const auto add = [&](const char* name, std::vector<std::string>& values, const char* what,
                        const char* type) {
-    app.add_option(name, values, what)->type_name(type)->allow_extra_args(false);
+    app.add_option(name, values, what).type_name(type).one_value_each();
   };
-  app.add_option("--scene", arguments.scene, "Scene file (TOML; docs/reference/scene.md)")->type_name("FILE");
+  app.add_option("--scene", arguments.scene, "Scene file (TOML; docs/reference/scene.md)").type_name("FILE");
   add("--fix", arguments.fixes, "Hold this surface: \"xmin\", \"part/3\" (`flexel info` lists faces)",
       "WHERE");
   add("--push", arguments.pushes,
@@ -94,7 +94,7 @@ void declare_scene(CLI::App& app, JobArguments& arguments) {
   add("--bearing", arguments.bearings, "Press on a hole as a pin does: \"part/3: 0 0 -200 N\"",
       "WHERE:FORCE");
   app.add_option("--gravity", arguments.gravity, "Weight: \"1 g\" (along -z), \"0 -9.81 0 m/s^2\"")
-      ->type_name("ACCELERATION");
+      .type_name("ACCELERATION");
   add("--probe", arguments.probes,
       "Say how far a point or a surface moves: \"tip: 80 5 3 mm\", \"tip: part/3\"", "NAME:POINT");
   add("--material", arguments.materials,
@@ -103,11 +103,11 @@ void declare_scene(CLI::App& app, JobArguments& arguments) {
   app.add_option("--model", arguments.model,
                  "How the parts resist: cells, quadratic (small strains; exact on thin and slanted walls), "
                  "springs or paper")
-      ->type_name("NAME");
+      .type_name("NAME");
   add("--infill", arguments.infills, "Printed with this infill: 20%; of one part: \"knob=20%\" (an estimate)",
       "[PART=]SHARE");
   app.add_option("--shell", arguments.shell, "With --infill: thickness of the solid walls (\"1 mm\")")
-      ->type_name("LENGTH");
+      .type_name("LENGTH");
 }
 
 void refuse_idle(const JobArguments& arguments) {

@@ -10,10 +10,10 @@ namespace flexel::commands {
 
 int materials_command(int argc, char** argv) {
   bool json = false, markdown = false;
-  CLI::App app{"Lists the materials that scenes and --material know, each figure with its source.",
-               "flexel materials"};
-  auto* as_json = app.add_flag("--json", json, "As JSON, in SI units");
-  app.add_flag("--markdown", markdown, "As a table in Markdown")->excludes(as_json);
+  CommandLine app{"Lists the materials that scenes and --material know, each figure with its source.",
+                  "flexel materials"};
+  const Option as_json = app.add_flag("--json", json, "As JSON, in SI units");
+  app.add_flag("--markdown", markdown, "As a table in Markdown").excludes(as_json);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   OutputFile out("-", false);
   out.write(json ? materials_json() : markdown ? materials_markdown() : materials_text());

@@ -144,25 +144,23 @@ std::string json_of(const MeasureArguments& arguments, const Measured& found) {
 
 int measure_command(int argc, char** argv) {
   MeasureArguments arguments;
-  CLI::App app{
+  CommandLine app{
       "Draws, bends and twists bars of lattice and prints the E, nu and G that they have, beside those of "
       "the "
       "material (docs/measurements/accuracy.md).",
       "flexel measure"};
-  app.add_option("--model", arguments.model, "cells, springs or paper")
-      ->type_name("NAME")
-      ->capture_default_str();
+  app.add_option("--model", arguments.model, "cells, springs or paper").type_name("NAME").show_default();
   app.add_option("--size", arguments.size, "Spacing of the lattice (\"2 mm\")")
-      ->type_name("LENGTH")
-      ->required();
+      .type_name("LENGTH")
+      .required();
   app.add_option("--material", arguments.material, "From the library (`flexel materials`)")
-      ->type_name("NAME")
-      ->capture_default_str();
+      .type_name("NAME")
+      .show_default();
   app.add_option("--poisson", arguments.poisson, "Poisson's ratio in place of the material's")
-      ->type_name("NU");
+      .type_name("NU");
   app.add_option("--hooke", arguments.hooke, "Model paper: paper or ganovelli")
-      ->type_name("NAME")
-      ->capture_default_str();
+      .type_name("NAME")
+      .show_default();
   app.add_flag("--json", arguments.json, "As JSON, in SI units");
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   const StopEndsProcess nothing_is_left;

@@ -33,37 +33,37 @@ struct PictureArguments {
   int threads = 0;
 };
 
-void declare(CLI::App& app, PictureArguments& a) {
+void declare(CommandLine& app, PictureArguments& a) {
   app.add_option("file", a.files, "Parts (STEP, STL, OBJ ...) and bodies (.vtu); -: stdin")
-      ->required()
-      ->type_name("FILE");
-  app.add_option("-o,--output", a.output, "The picture (.png); -: stdout")->required()->type_name("FILE");
+      .required()
+      .type_name("FILE");
+  app.add_option("-o,--output", a.output, "The picture (.png); -: stdout").required().type_name("FILE");
   app.add_option("--color,--colour", a.colour,
                  "displacement, strain, fill, thickness, any attribute, or none")
-      ->type_name("NAME");
+      .type_name("NAME");
   app.add_option("--range", a.range, "Values at the ends of the colour map, such as \"0:5 mm\"")
-      ->type_name("LOW:HIGH");
+      .type_name("LOW:HIGH");
   app.add_option("--scale", a.scale,
                  "Draw displacements this many times as large; auto: so that they are seen")
-      ->type_name("FACTOR")
-      ->capture_default_str();
+      .type_name("FACTOR")
+      .show_default();
   app.add_option("--view", a.view,
                  "auto, iso, front, back, left, right, top, bottom, or AZIMUTH,ELEVATION in degrees")
-      ->type_name("VIEW")
-      ->capture_default_str();
+      .type_name("VIEW")
+      .show_default();
   app.add_option("--up", a.up, "The axis that points up: x, y (glTF, many OBJ files) or z")
-      ->check(CLI::IsMember({"x", "y", "z"}))
-      ->type_name("AXIS")
-      ->capture_default_str();
-  app.add_option("--size", a.size, "Pixels")->type_name("WIDTHxHEIGHT")->capture_default_str();
+      .one_of({"x", "y", "z"})
+      .type_name("AXIS")
+      .show_default();
+  app.add_option("--size", a.size, "Pixels").type_name("WIDTHxHEIGHT").show_default();
   app.add_flag("--cells", a.cells, "Draw the cells of a body instead of its surface");
   app.add_flag("--elements", a.elements, "Draw the elements of a body instead of its surface");
   app.add_flag("--faces", a.faces,
                "Write the numbers of the faces on them (part/3), from four sides without --view");
   app.add_flag("--no-outline", a.no_outline, "Leave out the shape at rest");
-  app.add_option("--unit", a.unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
+  app.add_option("--unit", a.unit, "Unit of files that carry none (default mm)").type_name("UNIT");
   app.add_option("--input-format", a.input_format, "Format of the files, where their bytes do not tell")
-      ->type_name("NAME");
+      .type_name("NAME");
   add_threads_option(app, a.threads);
   app.add_flag("--quiet", a.quiet, "Say only warnings and errors");
   app.add_flag("--force", a.force, "Let the picture replace a file that is read");
@@ -184,7 +184,7 @@ void check_output(const std::string& output) {
 
 int picture_command(int argc, char** argv) {
   PictureArguments arguments;
-  CLI::App app{"A picture (PNG) of parts and bodies, made without a display.", "flexel picture"};
+  CommandLine app{"A picture (PNG) of parts and bodies, made without a display.", "flexel picture"};
   declare(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   const StopEndsProcess nothing_is_left;

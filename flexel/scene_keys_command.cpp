@@ -63,10 +63,10 @@ std::string as_words() {
 
 int scene_keys_command(int argc, char** argv) {
   bool markdown = false, words = false;
-  CLI::App app{"Lists the keys of a scene: where each may stand, what it takes, its default.",
-               "flexel scene-keys"};
-  auto* as_page = app.add_flag("--markdown", markdown, "As tables in Markdown");
-  app.add_flag("--words", words, "Tables and keys alone, a line each, for completion")->excludes(as_page);
+  CommandLine app{"Lists the keys of a scene: where each may stand, what it takes, its default.",
+                  "flexel scene-keys"};
+  const Option as_page = app.add_flag("--markdown", markdown, "As tables in Markdown");
+  app.add_flag("--words", words, "Tables and keys alone, a line each, for completion").excludes(as_page);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   OutputFile out("-", false);
   out.write(words ? as_words() : markdown ? as_markdown() : as_text());

@@ -43,27 +43,27 @@ struct StudyArguments {
   bool quiet = false;
 };
 
-void declare(CLI::App& app, StudyArguments& a) {
-  app.add_option("part", a.job.parts, read_titles() + " files")->required()->type_name("PART");
+void declare(CommandLine& app, StudyArguments& a) {
+  app.add_option("part", a.job.parts, read_titles() + " files").required().type_name("PART");
   declare_scene(app, a.job);
   app.add_option("-o,--output", a.output, "Folder for study.csv, study.json and study.html")
-      ->required()
-      ->type_name("FOLDER");
+      .required()
+      .type_name("FOLDER");
   app.add_option("--budget", a.budget, "What all runs together may take (\"5 min\")")
-      ->type_name("TIME")
-      ->capture_default_str();
+      .type_name("TIME")
+      .show_default();
   app.add_option("--reference", a.references,
                  "The true value of a probe or of \"largest displacement\" (\"tip=5.21 mm\"), or the summary "
                  "(JSON) of another run of flexel-simulate; without it the finest runs are extrapolated")
-      ->type_name("NAME=VALUE|FILE")
-      ->allow_extra_args(false);
+      .type_name("NAME=VALUE|FILE")
+      .one_value_each();
   app.add_option("--against", a.against,
                  "calculix: run CalculiX (ccx) on the same scene too, on meshes by gmsh, and draw it beside")
-      ->type_name("PROGRAM");
-  app.add_option("--unit", a.job.unit, "Unit of files that carry none (default mm)")->type_name("UNIT");
+      .type_name("PROGRAM");
+  app.add_option("--unit", a.job.unit, "Unit of files that carry none (default mm)").type_name("UNIT");
   app.add_option("--heal", a.heal, "Broken surfaces: auto, wrap or none (docs/reference/healing.md)")
-      ->type_name("HOW");
-  app.add_option("--edge", a.job.edge, "Split the mesh to this longest edge")->type_name("LENGTH");
+      .type_name("HOW");
+  app.add_option("--edge", a.job.edge, "Split the mesh to this longest edge").type_name("LENGTH");
   app.add_flag("--quiet", a.quiet, "Say only warnings and errors");
 }
 
@@ -205,7 +205,7 @@ study::Assignment assignment(const StudyArguments& a) {
 
 int study_command(int argc, char** argv) {
   StudyArguments arguments;
-  CLI::App app{
+  CommandLine app{
       "Runs a part and a scene at many sizes and with many choices, and writes what each costs and how exact "
       "it is: study.csv, study.json and the page study.html (docs/guide/study.md).",
       "flexel study"};

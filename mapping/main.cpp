@@ -41,39 +41,39 @@ struct Arguments {
 // CLI11's checks let "nan" pass.
 std::string is_distance(const std::string& text) {
   double distance = 0;
-  return CLI::detail::lexical_cast(text, distance) && distance >= 0 && std::isfinite(distance)
+  return is_number(text, distance) && distance >= 0 && std::isfinite(distance)
              ? ""
              : fmt::format("\"{}\" is no number from 0 on", text);
 }
 
-void declare(CLI::App& app, Arguments& arguments) {
+void declare(CommandLine& app, Arguments& arguments) {
   app.add_option("body", arguments.body,
                  "Body file (.vtu) or series (.pvd); without one, or with -, a body from stdin")
-      ->type_name("BODY");
+      .type_name("BODY");
   app.add_option("--onto", arguments.onto,
                  fmt::format("Deform this mesh ({}) instead of the body's own", read_titles(false)))
-      ->type_name("FILE");
+      .type_name("FILE");
   app.add_option("--edge", arguments.edge, "Of --onto: split that mesh to this longest edge")
-      ->type_name("LENGTH");
+      .type_name("LENGTH");
   app.add_option("--points", arguments.points, "Deform the points of this table (CSV) instead; CSV comes out")
-      ->type_name("FILE");
+      .type_name("FILE");
   app.add_option("--far", arguments.far,
                  "Vertices far outside the lattice: follow (extrapolated), rigid or refuse (default with "
                  "--onto and --points)")
-      ->type_name("HOW");
+      .type_name("HOW");
   app.add_option("--far-distance", arguments.far_distance, "How far that is, in spacings")
-      ->check(is_distance)
-      ->capture_default_str();
+      .check(is_distance)
+      .show_default();
   declare_map_options(app, arguments.map);
   app.add_option(
          "--save-binding", arguments.save_binding,
          fmt::format("{}: write what ties the vertices to the elements, for --binding", saved_method_names()))
-      ->type_name("FILE");
+      .type_name("FILE");
   app.add_option("--binding", arguments.binding,
                  "Take the binding of this file, made for the same lattice and surface, and its method")
-      ->type_name("FILE");
+      .type_name("FILE");
   app.add_option("--unit", arguments.unit, "Unit of the coordinates written; else that of the input")
-      ->type_name("UNIT");
+      .type_name("UNIT");
   add_threads_option(app, arguments.threads);
   app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
   app.add_flag("--force", arguments.force, "Let results replace files that are read");
@@ -81,7 +81,7 @@ void declare(CLI::App& app, Arguments& arguments) {
                  "Where the surface goes; -: stdout, also without it unless --pieces is given. A series: "
                  "bent.stl gives "
                  "bent_00000.stl ..., or {frame} in the name")
-      ->type_name("FILE");
+      .type_name("FILE");
 }
 
 // What the arguments ask for, checked.
@@ -310,7 +310,7 @@ void map_series(const Arguments& arguments, Plan& plan, Progress& progress) {
 
 int run(int argc, char** argv) {
   Arguments arguments;
-  CLI::App app{"Maps the deformation of a body onto the surface that it was made from.", kProgram};
+  CommandLine app{"Maps the deformation of a body onto the surface that it was made from.", kProgram};
   declare(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   const StopEndsProcess nothing_is_left;

@@ -40,31 +40,31 @@ std::string pattern_of(const std::string& pieces, const std::string& format) {
 
 }  // namespace
 
-void declare_map_options(CLI::App& app, MapArguments& arguments) {
+void declare_map_options(CommandLine& app, MapArguments& arguments) {
   app.add_option("--method", arguments.method,
                  fmt::format("How elements carry the vertices: {}", method_help()))
-      ->type_name("NAME")
-      ->default_str(name_of(MapOptions().method));
+      .type_name("NAME")
+      .default_text(name_of(MapOptions().method));
   app.add_option("--check", arguments.checks,
                  "Also check the mapped surface: voronoi, self-intersection, or both with a comma")
-      ->type_name("NAMES");
+      .type_name("NAMES");
   app.add_option("--crack", arguments.crack,
                  "Where the part broke: keep the surface as it is, open it, or cap the pieces "
                  "(docs/reference/cracks.md)")
-      ->type_name("HOW")
-      ->capture_default_str();
+      .type_name("HOW")
+      .show_default();
   app.add_option("--debris", arguments.debris, "Pieces of a single element: keep or drop")
-      ->type_name("HOW")
-      ->capture_default_str();
+      .type_name("HOW")
+      .show_default();
   app.add_option("--pieces", arguments.pieces,
                  "Write each piece to a file of its own too: a folder, or \"out/{piece}.stl\"")
-      ->type_name("PATH");
+      .type_name("PATH");
   app.add_option("--scale", arguments.scale, "Write displacements this many times as large")
-      ->type_name("FACTOR");
+      .type_name("FACTOR");
   app.add_option("--format", arguments.format,
                  fmt::format("{} or vtu, for stdout and pieces; else told by the extension",
                              fmt::join(written_formats(), ", ")))
-      ->type_name("NAME");
+      .type_name("NAME");
   app.add_flag(
       "--ascii", arguments.ascii,
       fmt::format(
@@ -75,7 +75,7 @@ void declare_map_options(CLI::App& app, MapArguments& arguments) {
       fmt::format("{}: write what is known of each vertex too (.vtu always has it)",
                   written_titles([](const FileFormat& each) { return each.holds_attributes; }, "or")));
   app.add_option("--report", arguments.report, "Write the mapping's validity report (JSON)")
-      ->type_name("FILE");
+      .type_name("FILE");
   app.add_flag("--table", arguments.table, "Print the mapping's whole report as a table");
   app.add_flag("--strict", arguments.strict,
                "Exit 4 and write no surface when a frame is inverted or degenerate, or a check fails");

@@ -14,7 +14,7 @@ struct MapArguments {
 };
 
 // Adds their options to the program; --format too, as it also names that of the pieces.
-void declare_map_options(CLI::App& app, MapArguments& arguments);
+void declare_map_options(CommandLine& app, MapArguments& arguments);
 
 // A body that model `quadratic` deformed is mapped by its own field unless --method is given.
 void use_field(const Body& body, const MapArguments& arguments, MapOptions& options);

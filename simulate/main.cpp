@@ -38,12 +38,12 @@ struct Arguments {
 // CLI11's ranges let "nan" pass.
 std::string is_rate(const std::string& text) {
   double rate = 0;
-  return CLI::detail::lexical_cast(text, rate) && rate >= 1e-3 && rate <= 1e5
+  return is_number(text, rate) && rate >= 1e-3 && rate <= 1e5
              ? ""
              : fmt::format("\"{}\" is no number from 0.001 to 100000", text);
 }
 
-void declare(CLI::App& app, Arguments& arguments) {
+void declare(CommandLine& app, Arguments& arguments) {
   app.add_option("scene", arguments.scene, "Scene file (TOML; docs/reference/scene.md gives every key)");
   app.add_option("body", arguments.bodies,
                  "Body files; none or \"-\": stdin. Several are simulated together");
@@ -54,7 +54,7 @@ void declare(CLI::App& app, Arguments& arguments) {
                  "this file (docs/reference/motion.md)");
   app.add_option("--checkpoint-every", arguments.checkpoint_every,
                  "Work between two of them (\"60 s\"); \"10 min\" by itself")
-      ->type_name("TIME");
+      .type_name("TIME");
   app.add_option(
       "--resume", arguments.resume,
       "Go on from this checkpoint to the same bits; scene, body, -o and --history are those of the "
@@ -67,7 +67,7 @@ void declare(CLI::App& app, Arguments& arguments) {
   app.add_option("--timeout", arguments.timeout,
                  "Stop after this time (\"90 s\", \"5 min\"): exit 5, the last good state in "
                  "OUTPUT.failed.vtu")
-      ->type_name("TIME");
+      .type_name("TIME");
   app.add_option(
       "--history", arguments.options.history,
       "Timed runs: write energies, momenta and probes over time to this CSV file (docs/reference/motion.md)");
@@ -75,15 +75,13 @@ void declare(CLI::App& app, Arguments& arguments) {
          "--live", arguments.live,
          "Timed runs: keep real time, and write frames of positions and of what tools feel to stdout, "
          "or where readers attach: tcp:PORT on this machine, unix:PATH (docs/guide/live.md)")
-      ->expected(0, 1)
-      ->type_name("[WHERE]");
-  app.add_option("--live-rate", arguments.options.live_rate, "Frames a second")
-      ->check(is_rate)
-      ->capture_default_str();
+      .value_may_be_left_out()
+      .type_name("[WHERE]");
+  app.add_option("--live-rate", arguments.options.live_rate, "Frames a second").check(is_rate).show_default();
   app.add_option("--live-state", arguments.options.live_state,
                  "Every so many frames hold the positions; 0: none does")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
+      .not_negative()
+      .show_default();
   app.add_option("--isa", arguments.options.isa,
                  "Timed runs: instruction set of the kernel (portable, avx2, avx512); the best by itself");
   app.add_flag("!--no-stress", arguments.options.stress, "Leave out the stresses (docs/theory/stress.md)");
@@ -188,7 +186,8 @@ Input read_input(Arguments& arguments) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app("Deforms a body as a scene says: loads, fixes and moves, to equilibrium.", "flexel-simulate");
+  CommandLine app("Deforms a body as a scene says: loads, fixes and moves, to equilibrium.",
+                  "flexel-simulate");
   Arguments arguments;
   declare(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
@@ -201,7 +200,7 @@ int run(int argc, char** argv) {
       throw InputError("--checkpoint-every needs --checkpoint FILE");
     options.checkpoint_every = parse_timeout(arguments.checkpoint_every, "--checkpoint-every");
   }
-  if (app.count("--live") > 0) {
+  if (app.has("--live")) {
     options.live = arguments.live.empty() || arguments.live.front().empty() ? "-" : arguments.live.front();
     if (options.live == "-" && (arguments.output.empty() || arguments.output == "-"))
       throw InputError(

@@ -38,7 +38,7 @@ struct Arguments {
   bool moments = false, compress = false, quiet = false, force = false;
 };
 
-void declare(CLI::App& app, Arguments& arguments) {
+void declare(CommandLine& app, Arguments& arguments) {
   app.add_option("PART", arguments.parts, read_titles() + " files; - or none: stdin");
   app.add_option("--size", arguments.size, "spacing of the lattice, for example \"2 mm\"");
   app.add_option("--count", arguments.count, "or: about this many cells over all parts (default 20000)");
@@ -145,7 +145,7 @@ Surface import_all(const Arguments& arguments, const ImportOptions& options) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app("Turns parts into lattices of elements.", kName);
+  CommandLine app("Turns parts into lattices of elements.", kName);
   Arguments arguments;
   declare(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;

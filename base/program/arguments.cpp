@@ -3,6 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
+#include <optional>
+
 #include "base/error.h"
 #include "base/files/files.h"
 #include "base/nearest_word.h"
@@ -45,7 +48,56 @@ void refuse_empty_values(int argc, char** argv) {
 
 }  // namespace
 
-bool parse_arguments(CLI::App& app, int argc, char** argv) {
+Option Option::type_name(const std::string& name) const {
+  return Option(option_->type_name(name));
+}
+Option Option::required() const {
+  return Option(option_->required());
+}
+Option Option::excludes(const Option& other) const {
+  return Option(option_->excludes(other.option_));
+}
+Option Option::default_text(const std::string& text) const {
+  return Option(option_->default_str(text));
+}
+Option Option::show_default() const {
+  return Option(option_->capture_default_str());
+}
+Option Option::one_value_each() const {
+  return Option(option_->allow_extra_args(false));
+}
+Option Option::value_may_be_left_out() const {
+  return Option(option_->expected(0, 1));
+}
+Option Option::not_negative() const {
+  return Option(option_->check(CLI::NonNegativeNumber));
+}
+Option Option::one_of(const std::vector<std::string>& words) const {
+  return Option(option_->check(CLI::IsMember(words)));
+}
+Option Option::check(const std::function<std::string(const std::string&)>& wrong) const {
+  return Option(option_->check(wrong));
+}
+
+CommandLine::CommandLine(const std::string& what, const std::string& name)
+    : app_(std::make_unique<CLI::App>(what, name)) {}
+CommandLine::~CommandLine() = default;
+
+template <class T>
+Option CommandLine::add_option(const std::string& names, T& to, const std::string& what) {
+  return Option(app_->add_option(names, to, what));
+}
+
+Option CommandLine::add_flag(const std::string& names, bool& to, const std::string& what) {
+  return Option(app_->add_flag(names, to, what));
+}
+
+bool CommandLine::has(const std::string& name) const {
+  return app_->count(name) > 0;
+}
+
+bool parse_arguments(CommandLine& line, int argc, char** argv) {
+  CLI::App& app = *line.app_;
   if (app.get_option_no_throw("--version") == nullptr) {
     const std::string name = app.get_name().empty() ? stem(argv[0]) : app.get_name();
     app.set_version_flag("--version", name + " " + version(), "Print the version and exit");
@@ -68,15 +120,28 @@ bool parse_arguments(CLI::App& app, int argc, char** argv) {
   return false;
 }
 
-void add_threads_option(CLI::App& app, int& threads) {
+bool is_number(const std::string& text, double& number) {
+  return CLI::detail::lexical_cast(text, number);
+}
+
+void add_threads_option(CommandLine& app, int& threads) {
   // Each takes memory of its own, used or not.
   static constexpr int kMost = 1024;
-  app.add_option("--threads", threads, "Threads; 0 is every core")->check([](const std::string& text) {
+  app.add_option("--threads", threads, "Threads; 0 is every core").check([](const std::string& text) {
     int number = 0;
     return CLI::detail::lexical_cast(text, number) && number >= 0 && number <= kMost
                ? std::string()
                : fmt::format("\"{}\" is no whole number from 0 to {}", text, kMost);
   });
 }
+
+template Option CommandLine::add_option(const std::string&, std::string&, const std::string&);
+template Option CommandLine::add_option(const std::string&, std::vector<std::string>&, const std::string&);
+template Option CommandLine::add_option(const std::string&, std::optional<std::string>&, const std::string&);
+template Option CommandLine::add_option(const std::string&, int&, const std::string&);
+template Option CommandLine::add_option(const std::string&, double&, const std::string&);
+template Option CommandLine::add_option(const std::string&, std::optional<double>&, const std::string&);
+template Option CommandLine::add_option(const std::string&, std::optional<long long>&, const std::string&);
+template Option CommandLine::add_option(const std::string&, std::optional<std::size_t>&, const std::string&);
 
 }  // namespace flexel

@@ -8,6 +8,8 @@
 #include <cctype>
 #include <set>
 
+#include "base/files/append_text.h"
+
 namespace flexel::mesh_export {
 namespace {
 
@@ -53,7 +55,7 @@ class Writer {
  private:
   template <class... T>
   void line(fmt::format_string<T...> format, T&&... values) {
-    fmt::format_to(std::back_inserter(text_), format, std::forward<T>(values)...);
+    append_text(text_, format, std::forward<T>(values)...);
     text_ += '\n';
   }
   // A comment; texts of others must not end it.
@@ -63,8 +65,8 @@ class Writer {
   }
   void list(const std::vector<std::uint32_t>& numbers) {
     for (std::size_t i = 0; i < numbers.size(); ++i) {
-      fmt::format_to(std::back_inserter(text_), "{}{}", numbers[i] + 1,
-                     i % kPerLine == kPerLine - 1 || i + 1 == numbers.size() ? "\n" : ",");
+      append_text(text_, "{}{}", numbers[i] + 1,
+                  i % kPerLine == kPerLine - 1 || i + 1 == numbers.size() ? "\n" : ",");
     }
   }
 
@@ -108,9 +110,9 @@ class Writer {
       line("*ELEMENT, TYPE={}, ELSET=M_{}", type, section_name(s));
       for (std::size_t e = 0; e < mesh_.element_count(); ++e) {
         if (mesh_.section[e] != s) continue;
-        fmt::format_to(std::back_inserter(text_), "{}", e + 1);
+        append_text(text_, "{}", e + 1);
         for (std::uint32_t n = 0; n < mesh_.nodes_per_element; ++n)
-          fmt::format_to(std::back_inserter(text_), ",{}", mesh_.element(e)[n] + 1);
+          append_text(text_, ",{}", mesh_.element(e)[n] + 1);
         text_ += '\n';
       }
     }

@@ -7,6 +7,8 @@
 #include <charconv>
 #include <iterator>
 
+#include "base/files/append_text.h"
+
 namespace flexel {
 namespace {
 
@@ -28,7 +30,7 @@ void append_position(std::string& text, const DeformedSurface& deformed, std::si
     const std::string rest =
         deformed.displacement[v][i] == 0 ? rest_text(deformed.surface.vertices[v][i], deformed.unit) : "";
     if (rest.empty())
-      fmt::format_to(std::back_inserter(text), "{}", at[i]);
+      append_text(text, "{}", at[i]);
     else
       text += rest;
   }

@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "base/error.h"
+#include "base/files/append_text.h"
 #include "base/files/output_file.h"
 #include "base/parallel.h"
 #include "base/version.h"
@@ -146,13 +147,11 @@ void write_new_obj(const DeformedSurface& deformed, OutputFile& out) {
   for (std::size_t p = 0; p < surface.polygon_count(); ++p) {
     const std::uint32_t face = surface.polygon_face[p], part = surface.faces[face].part;
     const std::string name = obj_name(surface.parts[part].name);
-    if (p == 0 || part != surface.polygon_part(p - 1))
-      fmt::format_to(std::back_inserter(text), "o {}\n", name);
+    if (p == 0 || part != surface.polygon_part(p - 1)) append_text(text, "o {}\n", name);
     if (p == 0 || face != surface.polygon_face[p - 1])
-      fmt::format_to(std::back_inserter(text), "g {}\n", written_group(surface, face, numbers[face]));
+      append_text(text, "g {}\n", written_group(surface, face, numbers[face]));
     text += 'f';
-    for (const std::uint32_t vertex : surface.polygon(p))
-      fmt::format_to(std::back_inserter(text), " {}", std::uint64_t{vertex} + 1);
+    for (const std::uint32_t vertex : surface.polygon(p)) append_text(text, " {}", std::uint64_t{vertex} + 1);
     text += '\n';
   }
   out.write(text);

@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "base/error.h"
+#include "base/files/append_text.h"
 #include "base/files/output_file.h"
 #include "base/parallel.h"
 #include "base/version.h"
@@ -92,7 +93,7 @@ void write_new_off(const DeformedSurface& deformed, OutputFile& out) {
   write_lines(surface.polygon_count(), out, [&](std::string& text, std::size_t p) {
     const auto polygon = surface.polygon(p);
     text += std::to_string(polygon.size());
-    for (const std::uint32_t v : polygon) fmt::format_to(std::back_inserter(text), " {}", v);
+    for (const std::uint32_t v : polygon) append_text(text, " {}", v);
     if (polygon_color != nullptr) text += color_text(*polygon_color, p);
   });
 }

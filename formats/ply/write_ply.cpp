@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "base/error.h"
+#include "base/files/append_text.h"
 #include "base/files/output_file.h"
 #include "base/parallel.h"
 #include "base/version.h"
@@ -198,7 +199,7 @@ class Numbers {
     if (!ascii_)
       text_ += ply_bytes(value, type, PlyEncoding::little_endian);
     else
-      fmt::format_to(std::back_inserter(text_), "{} ", value);
+      append_text(text_, "{} ", value);
   }
   void add_position(const DeformedSurface& deformed, std::size_t v) {
     if (!ascii_) {

@@ -11,6 +11,7 @@
 #include <memory>
 
 #include "base/error.h"
+#include "base/files/append_text.h"
 #include "base/parallel.h"
 #include "base/version.h"
 #include "formats/common/surface_writers.h"
@@ -101,8 +102,8 @@ void write_stl_ascii(const DeformedSurface& deformed, OutputFile& out) {
       for (std::size_t m = begin; m < end; ++m) {
         const auto& corners = triangles.corners[members[m]];
         const Vec3 normal = unit_normal(deformed, corners);
-        fmt::format_to(std::back_inserter(text), " facet normal {:.6g} {:.6g} {:.6g}\n  outer loop\n",
-                       normal.x(), normal.y(), normal.z());
+        append_text(text, " facet normal {:.6g} {:.6g} {:.6g}\n  outer loop\n", normal.x(), normal.y(),
+                    normal.z());
         for (const std::uint32_t v : corners) {
           text += "   vertex";
           append_position(text, deformed, v);

@@ -196,9 +196,9 @@ std::string text_for(const std::string& path) {
 }
 
 int make_bracket(int argc, char** argv) {
-  CLI::App app{"Writes the sample bracket as STEP, IGES or BREP"};
+  flexel::CommandLine app{"Writes the sample bracket as STEP, IGES or BREP"};
   std::string path;
-  app.add_option("FILE", path, "where to write it (\"-\": stdout)")->required();
+  app.add_option("FILE", path, "where to write it (\"-\": stdout)").required();
   if (!flexel::parse_arguments(app, argc, argv)) return flexel::kExitDone;
   flexel::OutputFile out(path, false);
   out.write(text_for(path));

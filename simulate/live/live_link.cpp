@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/files/append_text.h"
 #include "simulate/effects/rigid.h"
 
 namespace flexel::simulate {
@@ -24,8 +25,7 @@ constexpr double kLongestWait = 0.05;  // s, after which an interrupt is looked 
 static_assert(std::endian::native == std::endian::little, "frames are little-endian");
 
 void add_numbers(std::string& line, const Vec3& a, const Vec3& b) {
-  fmt::format_to(std::back_inserter(line), "[{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}]", a.x(), a.y(), a.z(),
-                 b.x(), b.y(), b.z());
+  append_text(line, "[{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}]", a.x(), a.y(), a.z(), b.x(), b.y(), b.z());
 }
 
 }  // namespace
@@ -168,8 +168,7 @@ void LiveLink::write_frame(const State& state, bool late) {
   }
   const bool whole = options_.live_state > 0 && number % static_cast<std::uint64_t>(options_.live_state) == 0;
   const std::size_t count = whole ? 3 * state.displacement.size() : 0;
-  fmt::format_to(std::back_inserter(frame), "],\"place\":[{}],\"bytes\":{}}}\n", places,
-                 count * sizeof(float));
+  append_text(frame, "],\"place\":[{}],\"bytes\":{}}}\n", places, count * sizeof(float));
   const std::size_t begin = frame.size();
   frame.resize(begin + count * sizeof(float));
   for (std::size_t e = 0; 3 * e < count; ++e) {

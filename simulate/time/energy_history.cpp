@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/files/append_text.h"
 #include "base/parallel.h"
 #include "simulate/stepping/failure_messages.h"
 
@@ -59,26 +60,24 @@ std::size_t Ledger::account(const std::string& name, Account::Kind kind) {
 
 std::string Ledger::csv() const {
   std::string text = "time [s],kinetic [J],elastic [J],potential [J],work [J],dissipated [J],residual [J]";
-  auto out = std::back_inserter(text);
-  for (const Account& account : accounts)
-    fmt::format_to(out, ",{} {} [J]", account.name, called(account.kind));
+  for (const Account& account : accounts) append_text(text, ",{} {} [J]", account.name, called(account.kind));
   for (const char* name : {"momentum", "angular momentum"})
     for (const char axis : {'x', 'y', 'z'})
-      fmt::format_to(out, ",{} {} [{}]", name, axis, std::string(name) == "momentum" ? "kg m/s" : "kg m2/s");
+      append_text(text, ",{} {} [{}]", name, axis, std::string(name) == "momentum" ? "kg m/s" : "kg m2/s");
   for (const std::string& probe : probes)
-    for (const char axis : {'x', 'y', 'z'}) fmt::format_to(out, ",{} {} [m]", probe, axis);
-  for (const std::string& column : columns) fmt::format_to(out, ",{}", column);
+    for (const char axis : {'x', 'y', 'z'}) append_text(text, ",{} {} [m]", probe, axis);
+  for (const std::string& column : columns) append_text(text, ",{}", column);
   text += '\n';
   for (const BookRow& row : rows) {
     const Energies& e = row.energies;
-    fmt::format_to(out, "{:.17g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.3g}", row.time, e.kinetic, e.elastic,
-                   e.potential, e.work, e.dissipated, e.residual);
+    append_text(text, "{:.17g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.3g}", row.time, e.kinetic, e.elastic,
+                e.potential, e.work, e.dissipated, e.residual);
     for (std::size_t a = 0; a < accounts.size(); ++a)
-      fmt::format_to(out, ",{:.9g}", a < row.accounts.size() ? row.accounts[a] : 0.0);
+      append_text(text, ",{:.9g}", a < row.accounts.size() ? row.accounts[a] : 0.0);
     for (const Vec3& vector : {row.momentum, row.angular})
-      for (const double value : vector) fmt::format_to(out, ",{:.12g}", value);
-    for (const double value : row.probes) fmt::format_to(out, ",{:.12g}", value);
-    for (const double value : row.values) fmt::format_to(out, ",{:.9g}", value);
+      for (const double value : vector) append_text(text, ",{:.12g}", value);
+    for (const double value : row.probes) append_text(text, ",{:.12g}", value);
+    for (const double value : row.values) append_text(text, ",{:.9g}", value);
     text += '\n';
   }
   return text;

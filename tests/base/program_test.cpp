@@ -264,7 +264,7 @@ TEST(Program, AnEmptyStdinBlamesTheProgramBefore) {
 
 // Parses `words` and gives the message of the InputError, "go on" or "done".
 std::string parse(std::vector<std::string> words) {
-  CLI::App app("Tests the parser", "flexel-test");
+  CommandLine app("Tests the parser", "flexel-test");
   std::string size, file;
   int count = 0;
   app.add_option("--size", size);

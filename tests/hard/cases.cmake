@@ -9,7 +9,7 @@ set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${scripts})
 string(REPLACE "\n" ";" cases "${cases}")
 foreach(case ${cases})
   add_test(NAME hard.${case} COMMAND ${FLEXEL_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/hard/run.py --quick ${case})
-  set_tests_properties(hard.${case} PROPERTIES TIMEOUT 300 ENVIRONMENT "FLEXEL_BIN=${CMAKE_RUNTIME_OUTPUT_DIRECTORY}")
+  set_tests_properties(hard.${case} PROPERTIES TIMEOUT 300 COST 150 ENVIRONMENT "FLEXEL_BIN=${CMAKE_RUNTIME_OUTPUT_DIRECTORY}")
 endforeach()
 
 # Bullet's side of some cases, where Debian's libbullet-dev is there

@@ -1,6 +1,8 @@
 #include "motions.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
 #include <numbers>
 
 #include "formats/part/topology.h"
@@ -62,12 +64,19 @@ Body knot(int across, Placement placement) {
     curve.push_back(knot_centre(2 * std::numbers::pi * i / kSamples));
     box.add(curve.back());
   }
+  double step = (curve.back() - curve.front()).norm();  // the longest from a sample to the next
+  for (int i = 1; i < kSamples; ++i) step = std::max(step, (curve[i] - curve[i - 1]).norm());
   const Vec3 room = Vec3::Constant(kRadius);
   Body body =
       body_in_box(across, placement, box.min - room, box.max + room, [&](const Vec3& p, double margin) {
         const double reach = kRadius + margin;
-        return std::any_of(curve.begin(), curve.end(),
-                           [&](const Vec3& c) { return (p - c).squaredNorm() <= reach * reach; });
+        // The samples that are too near to one out of reach to be within it are passed over.
+        for (std::size_t i = 0; i < curve.size();) {
+          const double squared = (p - curve[i]).squaredNorm();
+          if (squared <= reach * reach) return true;
+          i += std::max<std::size_t>(1, static_cast<std::size_t>(0.99 * (std::sqrt(squared) - reach) / step));
+        }
+        return false;
       });
   std::vector<Vec3> vertices;
   std::vector<std::vector<std::uint32_t>> quads;

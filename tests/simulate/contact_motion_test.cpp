@@ -11,6 +11,7 @@
 #include "simulate/input/scene_selection.h"
 #include "simulate/kernels/chunk_layout.h"
 #include "simulate/result/options.h"
+#include "tests/sanitized.h"
 #include "tests/simulate/contact_case.h"
 
 namespace flexel::simulate {
@@ -217,8 +218,10 @@ TEST(ContactFriction, ABlockRestsBelowTheAngleOfFriction) {
 }
 
 TEST(ContactFriction, ABlockSlidesAboveTheAngleOfFriction) {
+  const std::vector<double> plane =
+      less_if_sanitized<std::vector<double>>({0.0, 0.4, 0.9}, {0.4}, "one orientation of three");
   for (const bool on_part : {false, true})
-    for (const double turned : on_part ? std::vector{0.4} : std::vector{0.0, 0.4, 0.9}) {
+    for (const double turned : on_part ? std::vector{0.4} : plane) {
       const double angle = 0.5, mu = 0.3, time = 0.1;
       const SlideOnSlope slope = slide(angle, mu, time, turned, 0, on_part);
       const double expected = 9.81 * (std::sin(angle) - mu * std::cos(angle));
