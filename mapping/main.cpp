@@ -131,7 +131,7 @@ Plan make_plan(Arguments& arguments) {
   plan.crack = crack_options(arguments.map);
   check_pieces(arguments, plan, !foreign);
   check_binding(arguments, plan);
-  if (arguments.output.empty() && arguments.map.pieces.empty()) arguments.output = "-";
+  if (arguments.output.empty() && arguments.map.pieces.empty()) arguments.output = std::string("-");
   if (!arguments.onto.empty() && !arguments.points.empty())
     throw InputError("--onto and --points exclude each other: give one of them");
   if (!arguments.edge.empty()) {

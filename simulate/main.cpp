@@ -208,7 +208,7 @@ int run(int argc, char** argv) {
   }
   progress.stage("read");
   auto [scene, body] = read_input(arguments);
-  if (arguments.output.empty()) arguments.output = "-";
+  if (arguments.output.empty()) arguments.output = std::string("-");
   options.failed_output = failed_name(arguments.output);
   check_files(arguments);
   options.output = arguments.output;
