@@ -40,7 +40,7 @@ namespace {
 // Of the first run when a size is chosen: enough for most error bars, or for one that takes a tenth of a
 // second.
 constexpr std::size_t kFirstCells = 20000, kFewCells = 2000;
-constexpr std::size_t kFirstQuadraticCells = 2500, kFewQuadraticCells = 500;
+constexpr std::size_t kFirstQuadraticCells = 1000, kFewQuadraticCells = 300;
 constexpr double kThinWalls = 3;                          // cells: model `quadratic` is for thinner ones
 constexpr double kShort = 5;                              // s
 constexpr double kUsualError = 0.05, kUsualSeconds = 20;  // aimed at where nothing is asked for
@@ -217,11 +217,15 @@ class ModelChoice {
                            [](const auto& part) { return !part.second.model.empty(); })) {}
 
   void choose(const voxelize::VoxelizeResult& usual) {
-    if (free_ && !chosen_ && walls_are_thin(usual)) set(true);
+    constexpr double kTooThin = 0.3;  // cells: nor do a tenth of the cells resolve such walls
+    if (free_ && !chosen_ && walls_are_thin(usual) &&
+        wall_thickness(usual) > kTooThin * usual.parts.front().spacing.minCoeff())
+      set(true);
   }
-  // False where the model was not chosen here.
+  void keep() { free_ = false; }
+  // False where the model was not chosen here, or has answered already.
   bool take_back() {
-    if (!chosen_) return false;
+    if (!chosen_ || !free_) return false;
     set(false);
     free_ = false;
     return true;
@@ -249,14 +253,19 @@ class GoalRuns {
   SolvedRun operator()(std::optional<double> size, const GoesOn& goes_on) {
     try {
       SolvedRun run = solve(size, goes_on);
-      if (!size) model_.choose(run.voxels);
-      return size || !model_.chosen() ? std::move(run) : solve(size, goes_on);
+      if (size) {
+        model_.keep();
+        return run;
+      }
+      usual_size_ = preferred_number(spacing_of(run), 20, Rounded::nearest);
+      model_.choose(run.voxels);
+      return model_.chosen() ? solve(size, goes_on) : std::move(run);
     } catch (const InputError&) {
       if (!model_.take_back()) throw;
     } catch (const DivergedError&) {
       if (!model_.take_back()) throw;
     }
-    return solve(size, goes_on);
+    return solve(usual_size_, goes_on);
   }
 
   [[nodiscard]] mapping::MapResult map(SolvedRun& run, mapping::MapMethod method) {
@@ -312,6 +321,7 @@ class GoalRuns {
   Progress quiet_{"flexel", Progress::Mode::quiet};
   HeldWarnings warnings_;
   ModelChoice model_;
+  double usual_size_ = 0;  // m, of a lattice for model `cells`
 };
 
 // The size that --accuracy or --within asks for, and the run at it. The mapping is `smooth` where that moves

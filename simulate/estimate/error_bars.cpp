@@ -166,7 +166,14 @@ ErrorBars estimate_errors(const Body& body, const Scene& scene, const SimulateOp
         "only difference",
         first_sentence(reason));
   }
-  const auto bar = [&](const Sequence& values) { return wide ? wide_bar(values) : richardson(values); };
+  const auto bar = [&](const Sequence& values) {
+    Bar found = wide ? wide_bar(values) : richardson(values);
+    // Its order is 2 and more inside the matter and 1 at clamped edges and notches, which count last.
+    if (QuadraticField::is_in(body))
+      found.half_width =
+          std::max(found.half_width, std::abs(values.value[0] - values.value[1]) / (values.ratio[0] - 1));
+    return found;
+  };
   for (std::size_t p = 0; p <= result.probes.size(); ++p) {
     const Sequence values = runs.moved(p);
     const bool probe = p < result.probes.size();

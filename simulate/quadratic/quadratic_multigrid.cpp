@@ -139,14 +139,15 @@ void QuadraticMultigrid::factorise(std::size_t block, std::uint32_t cell) {
   around.erase(std::unique(around.begin(), around.end()), around.end());
   CellMatrix sum = CellMatrix::Zero();
   for (const std::uint32_t other : around) {
-    const CellMatrix matrix = matrix_.matrix(other);
-    std::vector<std::pair<Eigen::Index, Eigen::Index>> shared;  // node here, node there
+    std::vector<std::pair<Eigen::Index, std::size_t>> shared;  // row here, node there
     for (std::size_t n = 0; n < kQuadraticNodes; ++n)
       if (const auto found = std::find(own.begin(), own.end(), nodes.of_cell[other][n]); found != own.end())
-        shared.emplace_back(3 * (found - own.begin()), static_cast<Eigen::Index>(3 * n));
+        shared.emplace_back(3 * (found - own.begin()), n);
     for (const auto& [a, there_a] : shared)
-      for (const auto& [b, there_b] : shared) sum.block<3, 3>(a, b) += matrix.block<3, 3>(there_a, there_b);
+      for (const auto& [b, there_b] : shared)
+        if (b <= a) sum.block<3, 3>(a, b) += matrix_.block(other, there_a, there_b);
   }
+  sum.triangularView<Eigen::StrictlyUpper>() = sum.transpose();
   for (std::size_t n = 0; n < kQuadraticNodes; ++n)
     for (std::size_t axis = 0; axis < 3; ++axis)
       if (matrix_.held()[own[n]] >> axis & 1) {

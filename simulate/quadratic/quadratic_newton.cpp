@@ -16,7 +16,8 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr double kFirstTurn = 0.5;       // rad, that the first load step aims at
+constexpr double kFirstTurn = 1.0;       // rad, that the first load step aims at
+constexpr double kOutOfProportion = 3;   // times the size of the part
 constexpr double kMostTurn = 0.7;        // rad, of an iteration
 constexpr double kLeastStep = 1. / 256;  // of the load
 constexpr int kMostIterations = 20;      // of a load step
@@ -24,7 +25,7 @@ constexpr int kFewIterations = 6;        // after which the next step is longer
 constexpr double kMostStale = 0.1;       // rad
 constexpr int kMostLinear = 400;
 constexpr double kLeastTolerance = 1e-8, kGoodEnough = 1e-6;
-constexpr double kLoosest = 1e-3, kTightest = 1e-6;  // residuals of linear solutions
+constexpr double kLoosest = 1e-2, kTightest = 1e-6;  // residuals of linear solutions
 
 class LargeDeflection {
  public:
@@ -35,11 +36,16 @@ class LargeDeflection {
         progress_(progress),
         solution_(solution),
         tangent_(*solution.tangent),
-        corotation_(system, tangent_.stiffness, solution.safety) {}
+        corotation_(system, tangent_.stiffness, solution.safety),
+        reach_(largest(solution.displacement)),
+        extent_(std::max(bounding_box(system.nodes().rest).diagonal(), largest_led(system))) {}
 
   void run(const RunSettings& settings, const std::string& scene) {
     const std::vector<Vec3> linear = solution_.displacement;
     std::vector<Vec3> before(linear.size(), Vec3::Zero()), now = before;
+    const bool overloaded = reach_ > extent_;
+    if (reach_ > kOutOfProportion * extent_ && settings.load_steps == 1) fail(scene, 0);
+    const int most = settings.newton_iterations.value_or(overloaded ? 40 : 100);
     double done = 0, last = 0;
     double step = std::min(1., kFirstTurn / std::max(largest_turn(linear), 1e-300));
     step = std::min(step, 1. / std::max(settings.load_steps, 1));
@@ -56,11 +62,7 @@ class LargeDeflection {
       const int iterations = reach(share, guess);
       if (iterations > kMostIterations) {
         step = (share - done) / 2;
-        if (step < kLeastStep)
-          throw DivergedError(
-              fmt::format("{}: model \"quadratic\" finds no equilibrium beyond {} of the load; use "
-                          "model \"cells\", which follows buckling and large strains",
-                          scene, human_share(done)));
+        if (step < kLeastStep || solution_.newton_iterations > most) fail(scene, done);
         continue;
       }
       ++solution_.load_steps;
@@ -88,6 +90,27 @@ class LargeDeflection {
   }
 
  private:
+  [[noreturn]] void fail(const std::string& scene, double done) const {
+    const std::string why =
+        reach_ > extent_
+            ? fmt::format(
+                  "at its first stiffness the load would move the part by {}, {} times its size: check "
+                  "the unit of the part and the load",
+                  human_length(reach_), human_number(reach_ / extent_, 2))
+            : "use model \"cells\", which follows buckling and large strains";
+    throw DivergedError(fmt::format("{}: model \"quadratic\" finds no equilibrium beyond {} of the load; {}",
+                                    scene, human_share(done), why));
+  }
+
+  // m: how far moves lead the matter.
+  static double largest_led(const QuadraticSystem& system) {
+    double most = 0;
+    for (const NitscheSupport& support : system.supports())
+      for (const FacePoint& point : support.points)
+        most = std::max(most, support.tie->motion.displacement(point.position, 1).norm());
+    return std::max(most, largest(system.prescribed()));
+  }
+
   static double largest(const std::vector<Vec3>& values) {
     double most = 0;
     for (const Vec3& value : values) most = std::max(most, value.norm());
@@ -158,8 +181,9 @@ class LargeDeflection {
   const std::function<void(double, double)>& progress_;
   QuadraticSolution& solution_;
   QuadraticTangent& tangent_;
-  double stale_ = 0;  // rad: how far cells may have turned since the preconditioner was made
   Corotation corotation_;
+  double reach_ = 0, extent_ = 0;  // m: of the linear answer; of the part, or of what leads it
+  double stale_ = 0;               // rad: how far cells may have turned since the preconditioner was made
 };
 
 }  // namespace

@@ -2,6 +2,8 @@
 // bits for any number of threads.
 #include "simulate/quadratic/quadratic_operator.h"
 
+#include <algorithm>
+
 #include "base/parallel.h"
 
 namespace flexel::simulate {
@@ -72,6 +74,26 @@ CellMatrix QuadraticOperator::matrix(std::size_t cell) const {
     for (Eigen::Index b = 0; b < kCellUnknowns; b += 3)
       full.block<3, 3>(a, b) = (turn.rotation * full.block<3, 3>(a, b) * turn.rotation.transpose()).eval();
   return full;
+}
+
+Mat3 QuadraticOperator::block(std::size_t cell, std::size_t a, std::size_t b) const {
+  const auto row = static_cast<Eigen::Index>(3 * a), column = static_cast<Eigen::Index>(3 * b);
+  Mat3 found;
+  if (which_[cell] < 0) {
+    found = shared_[static_cast<std::size_t>(-1 - which_[cell])].block<3, 3>(row, column);
+  } else {
+    const double* packed = &own_[static_cast<std::size_t>(which_[cell]) * kPackedSize];
+    for (Eigen::Index i = 0; i < 3; ++i)
+      for (Eigen::Index j = 0; j < 3; ++j) {
+        const Eigen::Index most = std::max(row + i, column + j), least = std::min(row + i, column + j);
+        found(i, j) = packed[most * (most + 1) / 2 + least];
+      }
+  }
+  if (turns_.empty()) return found;
+  const CellTurn& turn = turns_[cell];
+  found += turn.a.middleRows<3>(row) * turn.gamma.middleRows<3>(column).transpose() +
+           turn.gamma.middleRows<3>(row) * turn.a.middleRows<3>(column).transpose();
+  return turn.rotation * found * turn.rotation.transpose();
 }
 
 void QuadraticOperator::multiply_set(std::size_t cell, const Eigen::Matrix<double, kCellUnknowns, 4>& x,

@@ -37,6 +37,8 @@ class QuadraticOperator final : public LinearOperator {
 
   [[nodiscard]] bool has_own(std::size_t cell) const { return which_[cell] >= 0; }
   [[nodiscard]] CellMatrix matrix(std::size_t cell) const;
+  // Of two of the cell's nodes.
+  [[nodiscard]] Mat3 block(std::size_t cell, std::size_t a, std::size_t b) const;
   // K x of a cell, not turned.
   void multiply_set(std::size_t cell, const Eigen::Matrix<double, kCellUnknowns, 4>& x,
                     Eigen::Matrix<double, kCellUnknowns, 4>& product) const;
