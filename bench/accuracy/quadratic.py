@@ -4,7 +4,7 @@
     PATH=build/release/bin:$PATH bench/accuracy/quadratic.py [--parts ../shared/parts] [-o FILE]
 
 Bars and strips are turned by 33 degrees about (1, 2, 3) in the lattice (`--align none`), held at one end and pushed across at the other;
-what is compared is the mean displacement of the end along the push. References: the beam, CalculiX's C3D20R at n = 4, 6 and 9, extrapolated
+what is compared is the mean displacement of the end along the push; slender bars stand beside the elastica. References: the beam, CalculiX's C3D20R at n = 4, 6 and 9, extrapolated
 (528.2 at Poisson's ratio .3, 519.1 at .45 for 2 x .5 x .5 and E = 1); strips, C3D20R of 32 x 8 x 2 run here (ccx); STEP parts stand
 beside CalculiX's second-order tetrahedra (`flexel export --calculix --mesh tet`) of a 40th of the diagonal. Seconds: the whole process of flexel-simulate, one thread.
 """
@@ -136,6 +136,42 @@ def strips(folder):
     return text
 
 
+def elastica(load, steps=4000):
+    """(x, z) of the tip of an inextensible cantilever of length 1, load = F L^2 / (E I) across: theta'' = -load cos(theta), by shooting."""
+    def shoot(slope):
+        theta = x = z = 0.0
+        for _ in range(steps):
+            middle = theta + slope / 2 / steps
+            x, z = x + math.cos(middle) / steps, z + math.sin(middle) / steps
+            theta, slope = theta + (slope - load * math.cos(theta) / 2 / steps) / steps, slope - load * math.cos(middle) / steps
+        return slope, x, z
+
+    low, high = 0.0, 2 * load + 2
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (low, middle) if shoot(middle)[0] > 0 else (middle, high)
+    return shoot(low)[1:]
+
+
+def cantilevers(folder):
+    text = ("\n## Large deflections\n\nA cantilever of 40 x 1 x 1 cells of 1, Poisson's ratio 0, under a force across that keeps its direction, beside the elastica: where its tip is, off by\n"
+            "so much of the length in %. F L^2 / (E I) of 1, 4 and 10.\n\n| lattice | load | tip, of the length | `cells` | `quadratic` | Newton | iterations | s |\n|---|---|---|---|---|---|---|---|\n")
+    for words, degrees in (("along the bar", 0), ("turned by 33 degrees", 33)):
+        rotation = bar(folder / "slender.obj", (400, 10, 10), degrees)
+        across, along = turned(rotation, (0, 0, 1)), turned(rotation, (1, 0, 0))
+        for load in (1, 4, 10):
+            force, (x, z) = load * (1e6 * 0.01**4 / 12) / 0.4**2, elastica(load)
+            row = []
+            for model in ("cells", "quadratic"):
+                seconds = solve(folder, folder / "slender.obj", 10, scene(model, 0, across, force), across)[4]
+                found = json.loads((folder / "s.json").read_text())
+                moved = found["probes"][0]["displacement"]
+                tip = [1 + sum(a * b for a, b in zip(moved, along)) / 0.4, sum(a * b for a, b in zip(moved, across)) / 0.4]
+                row.append(f"{100 * math.dist(tip, (x, z)):.2f}")
+            text += f"| {words} | {load} | ({x:.4f}, {z:.4f}) | {' | '.join(row)} | {found['newton_iterations']} | {found['cg_iterations']} | {seconds:.2f} |\n"
+    return text
+
+
 def calculix(folder, part, text, edge):
     """(displacement of the probe along the push m, elements, s of meshing, s of solving): second-order tetrahedra."""
     (folder / "scene.toml").write_text(text)
@@ -194,7 +230,7 @@ def main():
     with tempfile.TemporaryDirectory() as place:
         folder = pathlib.Path(place)
         text = ("# Model `quadratic`, measured\n\nWritten by `bench/accuracy/quadratic.py`, which says what is run and what the references are; the model is in\n"
-                "[quadratic.md](../theory/quadratic.md). Above 0 is too soft. One thread.\n\n" + beams(folder) + strips(folder) + step_parts(folder, options.parts))
+                "[quadratic.md](../theory/quadratic.md). Above 0 is too soft. One thread.\n\n" + beams(folder) + strips(folder) + cantilevers(folder) + step_parts(folder, options.parts))
     part = options.output.with_name(options.output.name + ".part")
     part.write_text(text, encoding="utf-8")
     part.replace(options.output)

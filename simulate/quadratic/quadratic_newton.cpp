@@ -17,7 +17,7 @@ namespace flexel::simulate {
 namespace {
 
 constexpr double kFirstTurn = 1.0;       // rad, that the first load step aims at
-constexpr double kOutOfProportion = 3;   // times the size of the part
+constexpr double kOutOfProportion = 5;   // times the size of the part
 constexpr double kMostTurn = 0.7;        // rad, of an iteration
 constexpr double kLeastStep = 1. / 256;  // of the load
 constexpr int kMostIterations = 20;      // of a load step
