@@ -16,7 +16,7 @@ namespace {
 constexpr double kGuess = 0.5;     // a bar over this share of the value: hardly more than its size is known
 constexpr std::size_t kNamed = 2;  // probes, supports: so many are named, the others counted
 
-const ErrorBar* bar_of(const SimulateResult& result, ErrorBar::Of of, std::size_t probe = 0) {
+const ErrorBar* find_bar(const SimulateResult& result, ErrorBar::Of of, std::size_t probe = 0) {
   for (const ErrorBar& each : result.error_bars.bars)
     if (each.of == of && each.probe == probe) return &each;
   return nullptr;
@@ -29,7 +29,7 @@ std::optional<double> share_of(const ErrorBar* bar) {
 }
 
 // "(80, 20, 6) mm", in one unit; components that are only rounding beside the largest are 0.
-std::string place(const Vec3& at) {
+std::string place_in_one_unit(const Vec3& at) {
   const double largest = at.cwiseAbs().maxCoeff();
   const bool metres = largest >= 10, microns = largest > 0 && largest < 1e-4;
   const double unit = metres ? 1 : microns ? 1e-6 : 1e-3;
@@ -88,15 +88,16 @@ std::string how_far(const SimulateResult& result) {
   const std::string when =
       result.timed ? fmt::format(" at the end, {}", human_seconds(result.timed->time)) : "";
   return fmt::format("{}, at {}{}",
-                     moved(result.largest_displacement, bar_of(result, ErrorBar::Of::largest_displacement)),
-                     place(result.largest_displacement_at), when);
+                     moved(result.largest_displacement, find_bar(result, ErrorBar::Of::largest_displacement)),
+                     place_in_one_unit(result.largest_displacement_at), when);
 }
 
 std::string probes(const SimulateResult& result) {
   std::string text;
   for (std::size_t p = 0; p < std::min(kNamed, result.probes.size()); ++p)
-    text += fmt::format("{}\"{}\" {}", text.empty() ? "" : "; ", result.probes[p].name,
-                        moved(result.probes[p].displacement.norm(), bar_of(result, ErrorBar::Of::probe, p)));
+    text +=
+        fmt::format("{}\"{}\" {}", text.empty() ? "" : "; ", result.probes[p].name,
+                    moved(result.probes[p].displacement.norm(), find_bar(result, ErrorBar::Of::probe, p)));
   return text + more(result.probes.size());
 }
 
@@ -138,10 +139,10 @@ std::string how_sure(const SimulateResult& result, const Body& body) {
 }
 
 const std::string& material_of(const Body& body, const std::string& part) {
-  static const std::string kNone;
+  static const std::string kNoMaterial;
   for (const Part& each : body.parts)
     if (each.name == part) return each.material;
-  return kNone;
+  return kNoMaterial;
 }
 
 // Whether the largest stress has a value that smaller cells would confirm.
@@ -169,19 +170,21 @@ std::string strength(const SimulateResult& result, const Body& body, const std::
   const std::optional<StrengthSummary> found = nearest_to_strength(body, materials, unknown);
   if (!found)
     return fmt::format("unknown of {}: its stress is {} at {}{}", material_of(body, result.stress->part),
-                       peak_stress(result, result.stress->value), place(result.stress->at), unsure(result));
+                       peak_stress(result, result.stress->value), place_in_one_unit(result.stress->at),
+                       unsure(result));
   if (!(found->share > 0)) return "nothing is stressed";
   const std::string layers = found->layer_share ? fmt::format(" ({} across printed layers)",
                                                               human_number(1 / *found->layer_share, 2))
                                                 : "";
-  std::string text = fmt::format(
-      "{}safety factor {}{}: {} of {} at which {} {}, at {}{}",
-      found->share > 1                     ? "TOO WEAK, "
-      : found->layer_share.value_or(0) > 1 ? "TOO WEAK across its layers, "
-                                           : "",
-      human_number(1 / found->share, 2), layers, peak_stress(result, found->stress),
-      human_pressure(found->limit), found->material, found->yields ? "yields" : "breaks",
-      place(found->stress == result.stress->value ? result.stress->at : found->at), unsure(result));
+  std::string text =
+      fmt::format("{}safety factor {}{}: {} of {} at which {} {}, at {}{}",
+                  found->share > 1                     ? "TOO WEAK, "
+                  : found->layer_share.value_or(0) > 1 ? "TOO WEAK across its layers, "
+                                                       : "",
+                  human_number(1 / found->share, 2), layers, peak_stress(result, found->stress),
+                  human_pressure(found->limit), found->material, found->yields ? "yields" : "breaks",
+                  place_in_one_unit(found->stress == result.stress->value ? result.stress->at : found->at),
+                  unsure(result));
   if (!unknown.empty()) text += fmt::format("; unknown of {}", fmt::join(unknown, ", "));
   return text;
 }

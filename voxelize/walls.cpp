@@ -16,7 +16,7 @@ namespace {
 
 void add_samples(const PartMesh& mesh, const LineGrid& grid, double negligible,
                  std::vector<WallSample>& samples) {
-  constexpr double kOpposed = -.985;  // cosine of 170 degrees
+  constexpr double kOpposite = -.985;  // cosine of 170 degrees
   const int u = (grid.axis + 1) % 3, v = (grid.axis + 2) % 3;
   const std::vector<LineCrossing> crossings = cross_lines(mesh, mesh.world, grid);
   int winding = 0;
@@ -25,7 +25,7 @@ void add_samples(const PartMesh& mesh, const LineGrid& grid, double negligible,
     winding += enter.change;
     if (winding != 1 || enter.change != 1 || leave.change != -1 || enter.line != leave.line) continue;
     const Vec3 normal = unit_normal(mesh, enter.triangle);
-    if (normal.dot(unit_normal(mesh, leave.triangle)) > kOpposed) continue;
+    if (normal.dot(unit_normal(mesh, leave.triangle)) > kOpposite) continue;
     const double thickness = (leave.at - enter.at) * -normal[grid.axis];
     if (!(thickness > negligible)) continue;
     WallSample sample{thickness, (leave.at - enter.at) * grid.u_step * grid.v_step, Vec3::Zero()};

@@ -32,8 +32,6 @@
 namespace flexel {
 namespace {
 
-constexpr double kMillimetre = 1e-3;
-
 // OpenCASCADE reads IGES from files only: this one is in memory and has a name while it is open, so that
 // nothing is left of it, however the program ends.
 class MemoryFile {

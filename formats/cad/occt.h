@@ -22,6 +22,9 @@ struct ShapeLabels {
   std::function<std::optional<ShapeColor>(const TopoDS_Shape& solid_or_face)> color;
 };
 
+// What OpenCASCADE's readers of STEP and IGES make of every unit [m].
+inline constexpr double kMillimetre = 1e-3;
+
 // The solids of `shape`, tessellated. `unit`: metres per unit of the shape. Throws InputError: no solid, a
 // deflection that is not positive.
 [[nodiscard]] CadMesh mesh_of(const TopoDS_Shape& shape, double unit, const ShapeLabels& labels,

@@ -32,8 +32,6 @@
 namespace flexel {
 namespace {
 
-constexpr double kMillimetre = 1e-3;
-
 bool is_geometry(const Handle(Standard_Transient) & entity) {
   const bool representation = entity->IsKind(STANDARD_TYPE(StepRepr_Representation)) &&
                               !std::string_view(entity->DynamicType()->Name()).starts_with("StepVisual_");

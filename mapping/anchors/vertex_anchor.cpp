@@ -27,14 +27,14 @@ namespace {
 constexpr double kUnreached = std::numeric_limits<double>::infinity();
 
 // Where a cell lies, and whether another piece has a cell there too.
-struct Voxel {
+struct CellVoxel {
   Index3 index{};
   bool shared = false;
 };
 
 // (cells)
-std::vector<Voxel> voxels_of_cells(const Body& body) {
-  std::vector<Voxel> voxels(body.cell_count());
+std::vector<CellVoxel> voxels_of_cells(const Body& body) {
+  std::vector<CellVoxel> voxels(body.cell_count());
   const auto index = [&](std::size_t c) { return body.lattice_index[body.cell_elements[c][0]]; };
   for (const Part& part : body.parts)
     parallel_for_each(part.cell_end - part.cell_begin, [&](std::size_t i) {
@@ -189,7 +189,7 @@ class AnchorFinder {
   // bounds the cell will do, so polygons are gone through as they come, and threads that meet at a vertex
   // write the same.
   void anchor_inside_voxels() {
-    const std::vector<Voxel> voxels = voxels_of_cells(body_);
+    const std::vector<CellVoxel> voxels = voxels_of_cells(body_);
     parallel_chunks(body_.surface.polygon_count(), kPolygonsAtATime, [&](std::size_t begin, std::size_t end) {
       for (std::size_t p = begin; p < end; ++p)
         for (const std::uint32_t v : body_.surface.polygon(p)) {
@@ -203,14 +203,14 @@ class AnchorFinder {
     });
   }
 
-  [[nodiscard]] std::optional<VertexAnchor> anchor_inside(const std::vector<Voxel>& voxels, std::size_t p,
+  [[nodiscard]] std::optional<VertexAnchor> anchor_inside(const std::vector<CellVoxel>& voxels, std::size_t p,
                                                           const Vec3& point) const {
     const std::uint32_t begin = body_.surface_cell_offsets[p], end = body_.surface_cell_offsets[p + 1];
     if (end - begin > kManyCells) return std::nullopt;
     const std::uint32_t part = body_.surface.polygon_part(p);
     const Vec3 u = body_.parts[part].lattice.to_lattice(point);
     for (std::uint32_t s = begin; s < end; ++s) {
-      const Voxel& voxel = voxels[body_.surface_cells[s]];
+      const CellVoxel& voxel = voxels[body_.surface_cells[s]];
       const Vec3 within = u - Vec3(voxel.index[0], voxel.index[1], voxel.index[2]);
       if (within.cwiseMin(Vec3::Ones() - within).minCoeff() < kAnchorTie) continue;
       if (voxel.shared) return std::nullopt;

@@ -7,7 +7,7 @@
 namespace flexel::simulate {
 namespace {
 
-std::array<bool, 3> parse_axes(TableReader& reader) {
+std::array<bool, 3> parse_held_axes(TableReader& reader) {
   const std::optional<std::string> text = reader.text("axes");
   if (!text) return {true, true, true};
   std::array<bool, 3> axes{false, false, false};
@@ -84,7 +84,7 @@ void Supports::parse(TableReader& scene, Parameters& parameters) {
     tie.origin = reader.place();
     tie.where = require_where(reader);
     tie.name = reader.text("name").value_or(describe(tie.where));
-    tie.axes = parse_axes(reader);
+    tie.axes = parse_held_axes(reader);
     reader.finish();
     parameters.ties.push_back(tie);
   }

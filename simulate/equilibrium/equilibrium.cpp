@@ -48,17 +48,6 @@ constexpr double kOverload = 3;    // diagonals: a first linear answer beyond th
 // turns is at 6; a foil that membrane forces hold may be further, and can be asked for by load steps.
 constexpr double kOutOfProportion = 30;
 
-std::string axis_name(const Vec3& direction) {
-  for (int axis = 0; axis < 3; ++axis)
-    if (std::abs(direction[axis]) > 0.999) return std::string(1, static_cast<char>('x' + axis));
-  return fmt::format("({:.2f}, {:.2f}, {:.2f})", direction.x(), direction.y(), direction.z());
-}
-
-std::string motion_name(const FreeMotion& motion) {
-  if (motion.rotation == Vec3::Zero()) return "translate along " + axis_name(motion.translation);
-  return "rotate about " + axis_name(motion.rotation);
-}
-
 std::string point_name(const Vec3& at) {
   return fmt::format("({}, {}, {})", human_length(at.x()), human_length(at.y()), human_length(at.z()));
 }

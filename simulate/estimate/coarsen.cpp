@@ -137,12 +137,12 @@ void PartCoarsening::join_boxes(std::size_t axis, const std::vector<std::array<s
 
 // Coarse cells by (k, j, i), then by their first box.
 void PartCoarsening::number_cells() {
-  struct Found {
+  struct FoundVoxel {
     Index3 voxel;
     std::uint32_t root = 0;
     double fill = 0;
   };
-  std::vector<Found> found;
+  std::vector<FoundVoxel> found;
   std::vector<std::uint32_t> place_of_root(offset_.back(), kNone);
   const double ratio = grids_[0].pitch * grids_[1].pitch * grids_[2].pitch;
   for (std::uint32_t c = 0; c + 1 < offset_.size(); ++c) {
@@ -223,7 +223,7 @@ void PartCoarsening::append_to(Body& coarse) {
 }
 
 void PartCoarsening::append_moments(Body& coarse) const {
-  constexpr CellMoments kWhole = whole_moments();
+  constexpr CellMoments kWholeMoments = whole_moments();
   std::vector<std::size_t> begin(voxel_.size(), 0);  // of the cell's moments
   for (std::uint32_t c = 0; c < voxel_.size(); ++c) {
     if (fill_[c] >= kWholeFill) continue;
@@ -236,7 +236,7 @@ void PartCoarsening::append_moments(Body& coarse) const {
     const std::uint32_t cell = part_.cell_begin + c;
     const bool whole = cut_cell == fine_.moment_cells.end() || *cut_cell != cell;
     const double* moments =
-        whole ? kWhole.data()
+        whole ? kWholeMoments.data()
               : &fine_.moments[kMoments * static_cast<std::size_t>(cut_cell - fine_.moment_cells.begin())];
     if (!whole) ++cut_cell;
     if (fine_.broken[cell]) continue;

@@ -17,13 +17,14 @@ using step::kLanes;
 // Elements whose connections of all directions are computed one after the other: their state and forces stay
 // in the innermost cache.
 constexpr std::size_t kGroup = 128;
-constexpr std::int32_t kNone = -1;
+constexpr std::int32_t kNoElement = -1;
 constexpr std::uint8_t kAllLanes = 0xff;
 
 // A connection from an element: numbers of the chunk, + kLanes.
 struct Link {
-  std::int32_t b = kNone;
-  std::array<std::int32_t, 4> cell{kNone, kNone, kNone, kNone};  // lowest corners of the cells around it
+  std::int32_t b = kNoElement;
+  std::array<std::int32_t, 4> cell{kNoElement, kNoElement, kNoElement,
+                                   kNoElement};  // lowest corners of the cells around it
 };
 
 // One of a cell's 28 pairs of corners.
@@ -105,8 +106,8 @@ void RunBuilder::add(const Pair& pair, const std::array<std::uint16_t, 8>& corne
   const auto number = [&](std::size_t corner) { return static_cast<std::int32_t>(kLanes + corners[corner]); };
   const std::size_t from = corners[pair.from];
   const auto accepts = [&](Link& link) {
-    if (link.b == kNone) link.b = number(pair.to);
-    if (link.b != number(pair.to) || link.cell[pair.slot] != kNone) return false;
+    if (link.b == kNoElement) link.b = number(pair.to);
+    if (link.b != number(pair.to) || link.cell[pair.slot] != kNoElement) return false;
     link.cell[pair.slot] = number(0);
     return true;
   };
@@ -121,9 +122,9 @@ void RunBuilder::add(const Pair& pair, const std::array<std::uint16_t, 8>& corne
 bool RunBuilder::holds(const Shape& shape, std::int32_t a, const Link& link) const {
   if (link.b != a + shape.b) return false;
   for (std::size_t s = 0; s < 4; ++s) {
-    const std::int32_t at = shape.cell[s] == kNoOffset ? kNone : a + shape.cell[s];
+    const std::int32_t at = shape.cell[s] == kNoOffset ? kNoElement : a + shape.cell[s];
     if (link.cell[s] == at) continue;
-    if (link.cell[s] != kNone || result_.fill[static_cast<std::size_t>(at)] != 0) return false;
+    if (link.cell[s] != kNoElement || result_.fill[static_cast<std::size_t>(at)] != 0) return false;
   }
   return true;
 }
@@ -142,8 +143,8 @@ bool RunBuilder::continues(const Shape& shape, const Link* links, std::int32_t a
   for (std::int32_t l = 0; l < static_cast<std::int32_t>(kLanes); ++l) {
     for (const std::int32_t offset : shape.cell)
       if (offset != kNoOffset && (a + l + offset < 0 || a + l + offset >= size)) return false;
-    if (links[l].b == kNone ? !is_empty(shape, a + l) : !holds(shape, a + l, links[l])) return false;
-    any = any || links[l].b != kNone;
+    if (links[l].b == kNoElement ? !is_empty(shape, a + l) : !holds(shape, a + l, links[l])) return false;
+    any = any || links[l].b != kNoElement;
   }
   return any;
 }
@@ -152,12 +153,13 @@ RunBuilder::Taken RunBuilder::take(const Link* links, std::int32_t a) const {
   Shape shape;
   unsigned taken = 0;
   for (unsigned l = 0; l < kLanes; ++l) {
-    if (links[l].b == kNone) continue;
+    if (links[l].b == kNoElement) continue;
     const auto own = a + static_cast<std::int32_t>(l);
     Shape wider = shape;
     if (taken == 0) wider.b = links[l].b - own;
     for (std::size_t s = 0; s < 4; ++s)
-      if (links[l].cell[s] != kNone && wider.cell[s] == kNoOffset) wider.cell[s] = links[l].cell[s] - own;
+      if (links[l].cell[s] != kNoElement && wider.cell[s] == kNoOffset)
+        wider.cell[s] = links[l].cell[s] - own;
     bool fits = true;
     for (unsigned m = 0; m <= l; ++m)
       if ((taken >> m & 1) || m == l) fits = fits && holds(wider, a + static_cast<std::int32_t>(m), links[m]);
@@ -187,7 +189,7 @@ void RunBuilder::add_runs(std::size_t direction, std::size_t first, std::size_t 
   Link* links = links_[direction].data();
   const auto number = [](std::size_t element) { return static_cast<std::int32_t>(kLanes + element); };
   for (std::size_t e = first; e < last;) {
-    if (links[e].b == kNone) {
+    if (links[e].b == kNoElement) {
       ++e;
       continue;
     }

@@ -3,6 +3,8 @@
 // energy is next to nothing beside the stiffness of a single element are free. Their space is then told in
 // plain words: pure translations first, then rotations, each turned as near to the coordinate axes as the
 // space allows.
+#include <fmt/format.h>
+
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <Eigen/SVD>
@@ -18,8 +20,8 @@
 namespace flexel::simulate {
 namespace {
 
-using Motion = Eigen::Matrix<double, 6, 1>;   // translation, rotation x reach
-using Motions = Eigen::Matrix<double, 3, 6>;  // displacement of one element per unit of each
+using Movement = Eigen::Matrix<double, 6, 1>;   // translation, rotation x reach
+using Movements = Eigen::Matrix<double, 3, 6>;  // displacement of one element per unit of each
 using Rows = std::vector<std::uint32_t>;
 
 constexpr double kCoupled = 1e-12;
@@ -45,9 +47,9 @@ std::vector<Rows> connected_groups(const LinearOperator& matrix) {
 struct Frame {
   Vec3 centre = Vec3::Zero();
   double reach = 1;
-  [[nodiscard]] Motions at(const Vec3& position) const {
+  [[nodiscard]] Movements at(const Vec3& position) const {
     const Vec3 r = (position - centre) / reach;
-    Motions motions;
+    Movements motions;
     motions << 1, 0, 0, 0, r[2], -r[1], 0, 1, 0, -r[2], 0, r[0], 0, 0, 1, r[1], -r[0], 0;
     return motions;
   }
@@ -75,7 +77,7 @@ struct Restriction {
 };
 
 struct Work {
-  Motion of = Motion::Zero();
+  Movement of = Movement::Zero();
   void operator+=(const Work& other) { of += other.of; }
 };
 
@@ -105,7 +107,7 @@ std::vector<Restriction> restrict_to_rigid(const LinearOperator& matrix, const s
     const double share = 1 / static_cast<double>(groups[g].size());
     result[g] += parallel_sum<Restriction>(groups[g].size(), [&](std::size_t r) {
       const std::uint32_t i = groups[g][r];
-      const Motions own = frames[g].at(position[i]);
+      const Movements own = frames[g].at(position[i]);
       Restriction term;
       term.size = share * own.transpose() * own;
       term.stiffness = share * diagonal[i].trace() / 3;
@@ -167,6 +169,12 @@ void tell(const Eigen::MatrixXd& space, std::uint32_t part, std::vector<FreeMoti
     motions.push_back({part, Vec3::Zero(), axis});
 }
 
+std::string axis_name(const Vec3& direction) {
+  for (int axis = 0; axis < 3; ++axis)
+    if (std::abs(direction[axis]) > 0.999) return std::string(1, static_cast<char>('x' + axis));
+  return fmt::format("({:.2f}, {:.2f}, {:.2f})", direction.x(), direction.y(), direction.z());
+}
+
 }  // namespace
 
 std::vector<FreeMotion> free_motions(const LinearOperator& matrix, const NodeGeometry& geometry,
@@ -186,6 +194,11 @@ std::vector<FreeMotion> free_motions(const LinearOperator& matrix, const NodeGeo
 std::vector<FreeMotion> free_motions(const BlockMatrix& matrix, const NodeGeometry& geometry,
                                      double threshold) {
   return free_motions(StoredMatrix(matrix), geometry, threshold);
+}
+
+std::string motion_name(const FreeMotion& motion) {
+  if (motion.rotation == Vec3::Zero()) return "translate along " + axis_name(motion.translation);
+  return "rotate about " + axis_name(motion.rotation);
 }
 
 }  // namespace flexel::simulate

@@ -1,5 +1,6 @@
 // Rigid motions that supports leave free.
 #pragma once
+#include <string>
 #include <vector>
 
 #include "simulate/linear/preconditioner.h"
@@ -18,5 +19,8 @@ struct FreeMotion {
                                                    double threshold = 1e-9);
 [[nodiscard]] std::vector<FreeMotion> free_motions(const BlockMatrix& matrix, const NodeGeometry& geometry,
                                                    double threshold = 1e-9);
+
+// "translate along x", "rotate about (0.71, 0.71, 0.00)".
+[[nodiscard]] std::string motion_name(const FreeMotion& motion);
 
 }  // namespace flexel::simulate

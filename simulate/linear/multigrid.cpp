@@ -56,13 +56,13 @@ Grouping grouping(const LevelNodes& fine, const Aggregates& aggregates) {
 // would get no coarse motion either.
 // `sum`: of the blocks of its row, `own`: the diagonal one.
 Mat3 free_directions(const Mat3& sum, const Mat3& own) {
-  constexpr double kHeld = .5;
+  constexpr double kHeldShare = .5;
   if (sum.norm() < .1 * own.norm()) return Mat3::Identity();
   const Eigen::SelfAdjointEigenSolver<Mat3> eigen(.5 * (sum + sum.transpose()));
   Mat3 projector = Mat3::Identity();
   for (int c = 0; c < 3; ++c) {
     const Vec3 direction = eigen.eigenvectors().col(c);
-    if (eigen.eigenvalues()[c] > kHeld * direction.dot(own * direction))
+    if (eigen.eigenvalues()[c] > kHeldShare * direction.dot(own * direction))
       projector -= direction * direction.transpose();
   }
   return projector;

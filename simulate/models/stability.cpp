@@ -15,10 +15,10 @@
 namespace flexel::simulate {
 namespace {
 
-using CellMatrix = Eigen::Matrix<double, 24, 24>;
+using CornersMatrix = Eigen::Matrix<double, 24, 24>;
 
-CellMatrix cells_stiffness(const CellKind& kind) {
-  CellMatrix k;
+CornersMatrix cells_stiffness(const CellKind& kind) {
+  CornersMatrix k;
   const std::array<Block, 64> blocks = blocks_at_rest(kind);
   for (std::size_t a = 0; a < 8; ++a)
     for (std::size_t b = 0; b < 8; ++b)
@@ -26,8 +26,8 @@ CellMatrix cells_stiffness(const CellKind& kind) {
   return k;
 }
 
-CellMatrix springs_stiffness(const SpringKind& kind) {
-  CellMatrix k = CellMatrix::Zero();
+CornersMatrix springs_stiffness(const SpringKind& kind) {
+  CornersMatrix k = CornersMatrix::Zero();
   const CellVectors rest = [] {
     CellVectors u;
     u.fill(Vec3::Zero());
@@ -91,10 +91,10 @@ std::vector<double> cell_frequencies(const Problem& problem) {
       result.push_back(0);
       continue;
     }
-    const CellMatrix k = is_springs(problem, p)
-                             ? springs_stiffness(spring_kind(part.lattice, problem.materials[p]))
-                             : cells_stiffness(cell_kind(part.lattice, problem.materials[p]));
-    const Eigen::SelfAdjointEigenSolver<CellMatrix> eigen(k, Eigen::EigenvaluesOnly);
+    const CornersMatrix k = is_springs(problem, p)
+                                ? springs_stiffness(spring_kind(part.lattice, problem.materials[p]))
+                                : cells_stiffness(cell_kind(part.lattice, problem.materials[p]));
+    const Eigen::SelfAdjointEigenSolver<CornersMatrix> eigen(k, Eigen::EigenvaluesOnly);
     const double corner_mass = problem.materials[p].density * part.lattice.spacing.prod() / 8;
     result.push_back(eigen.eigenvalues()[23] / corner_mass);
   }

@@ -11,7 +11,7 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr std::size_t kCellsAtATime = 16;
+constexpr std::size_t kTurnedCellsAtATime = 16;
 constexpr double kNothing = 1e-6;  // of the largest forces so far: smaller ones are what rounding leaves
 using CellValues = Eigen::Matrix<double, kCellUnknowns, 1>;
 using CellColumns = Eigen::Matrix<double, kCellUnknowns, 3>;
@@ -136,7 +136,7 @@ bool Corotation::residual(const std::vector<Vec3>& displacement, double share, s
         square[c] = Eigen::Map<const CellValues>(&force_[c * kCellUnknowns]).squaredNorm();
         if (!folded[c]) add_supports(c, displacement, share);
       },
-      kCellsAtATime);
+      kTurnedCellsAtATime);
   if (std::any_of(folded.begin(), folded.end(), [](std::uint8_t each) { return each != 0; })) return false;
   const double now = std::sqrt(parallel_sum<double>(square.size(), [&](std::size_t c) { return square[c]; }));
   largest_ = std::max(largest_, now);
@@ -162,7 +162,7 @@ void Corotation::set_tangent(bool stressed) {
         if (!system_.cell_supports(c).empty())
           stiffness_.set_own(c, system_.supported_stiffness(c, safety_, turn_[c].rotation));
       },
-      kCellsAtATime);
+      kTurnedCellsAtATime);
 }
 
 }  // namespace flexel::simulate

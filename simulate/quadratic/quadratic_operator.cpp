@@ -9,7 +9,7 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr std::size_t kCellsAtATime = 32, kNodesAtATime = 512;
+constexpr std::size_t kProductCellsAtATime = 32, kNodesAtATime = 512;
 using CellValues = Eigen::Matrix<double, kCellUnknowns, 1>;
 
 void multiply_packed(const double* packed, const CellValues& x, double* y) {
@@ -131,7 +131,7 @@ void QuadraticOperator::forces(const double* x, double* y) const {
         sum.noalias() += turn.gamma * (turn.a.transpose() * own).eval();
         turn_values(turn.rotation, to);
       },
-      kCellsAtATime);
+      kProductCellsAtATime);
   parallel_for_each(
       nodes_.size(),
       [&](std::size_t n) {

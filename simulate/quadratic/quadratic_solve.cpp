@@ -19,11 +19,11 @@ namespace {
 
 constexpr double kMoreSafety = 4;
 constexpr int kSafeties = 4;
-constexpr int kMostIterations = 1000;
-constexpr double kLeastTolerance = 1e-10;
-constexpr double kGoodEnough = 1e-6;  // of the loads, where rounding allows no less
-constexpr double kBesideCell = 1e-3;  // of a cell: a point so far outside still counts as in it
-constexpr std::size_t kCellsAtATime = 64;
+constexpr int kMostLinearIterations = 1000;
+constexpr double kLeastLinearTolerance = 1e-10;
+constexpr double kLinearGoodEnough = 1e-6;  // of the loads, where rounding allows no less
+constexpr double kBesideCell = 1e-3;        // of a cell: a point so far outside still counts as in it
+constexpr std::size_t kAnswerCellsAtATime = 64;
 
 std::array<Vec3, kQuadraticNodes> values_at(const QuadraticSystem& system, const QuadraticSolution& solution,
                                             std::size_t cell) {
@@ -33,21 +33,11 @@ std::array<Vec3, kQuadraticNodes> values_at(const QuadraticSystem& system, const
   return u;
 }
 
-std::string axis_name(const Vec3& direction) {
-  for (int axis = 0; axis < 3; ++axis)
-    if (std::abs(direction[axis]) > 0.999) return std::string(1, static_cast<char>('x' + axis));
-  return fmt::format("({:.2f}, {:.2f}, {:.2f})", direction.x(), direction.y(), direction.z());
-}
-
 void refuse_free(const QuadraticMultigrid& multigrid, const Body& body, const std::string& scene) {
   const std::vector<FreeMotion> free = free_motions(multigrid.coarse(), multigrid.geometry());
   if (free.empty()) return;
-  const FreeMotion& motion = free.front();
-  throw InputError(
-      scene,
-      fmt::format("part \"{}\" is free to {}: add a [[fix]] that stops it", body.parts[motion.part].name,
-                  motion.rotation == Vec3::Zero() ? "translate along " + axis_name(motion.translation)
-                                                  : "rotate about " + axis_name(motion.rotation)));
+  throw InputError(scene, fmt::format("part \"{}\" is free to {}: add a [[fix]] that stops it",
+                                      body.parts[free.front().part].name, motion_name(free.front())));
 }
 
 SymmetricStress stress_at(const Mat9& moduli, const Mat3& gradient) {
@@ -104,13 +94,13 @@ QuadraticSolution solve(const QuadraticSystem& system, const RunSettings& settin
     stiffness.forces(start[0].data(), led[0].data());
     parallel_for_each(n, [&](std::size_t i) { b[i] -= led[i]; });
     stiffness.clear_held(b);
-    const LinearResult result =
-        conjugate_gradients(stiffness, b, change, multigrid, std::max(settings.tolerance, kLeastTolerance),
-                            kMostIterations, progress);
+    const LinearResult result = conjugate_gradients(stiffness, b, change, multigrid,
+                                                    std::max(settings.tolerance, kLeastLinearTolerance),
+                                                    kMostLinearIterations, progress);
     found.iterations += result.iterations;
     found.relative_residual = result.relative_residual;
-    if (result.iterations == kMostIterations) break;
-    if (result.indefinite || !(result.converged || result.relative_residual < kGoodEnough)) continue;
+    if (result.iterations == kMostLinearIterations) break;
+    if (result.indefinite || !(result.converged || result.relative_residual < kLinearGoodEnough)) continue;
     found.displacement = start;
     parallel_for_each(n, [&](std::size_t i) { found.displacement[i] += change[i]; });
     found.unbalanced.resize(n);
@@ -187,7 +177,7 @@ Stresses field_stresses(const QuadraticSystem& system, const QuadraticSolution& 
   parallel_for_each(
       nodes.cells.size(),
       [&](std::size_t c) { found.cell[nodes.cells[c]] = stress_of(system, solution, c, system.middle(c)); },
-      kCellsAtATime);
+      kAnswerCellsAtATime);
   parallel_for_each(
       nodes.elements.size(),
       [&](std::size_t i) {
@@ -213,7 +203,7 @@ Stresses field_stresses(const QuadraticSystem& system, const QuadraticSolution& 
         }
         if (count > 0) found.element[e] = sum / count;
       },
-      kCellsAtATime);
+      kAnswerCellsAtATime);
   return found;
 }
 
@@ -271,7 +261,7 @@ void report(const QuadraticSystem& system, const QuadraticSolution& solution, Si
           force.noalias() = system.elastic_stiffness(c) * u;
         return 0.5 * u.col(0).dot(force.col(0));
       },
-      kCellsAtATime);
+      kAnswerCellsAtATime);
   for (std::size_t c = 0; c < nodes.cells.size(); ++c)
     result.smallest_jacobian = std::min(
         result.smallest_jacobian,

@@ -22,7 +22,7 @@ namespace {
 
 constexpr std::uint32_t kWhole = std::numeric_limits<std::uint32_t>::max();
 constexpr double kOutside = 1e-6;  // stiffness of what is not matter, of the material's: slivers stay regular
-constexpr std::size_t kCellsAtATime = 16;
+constexpr std::size_t kIntegratedCellsAtATime = 16;
 
 Moments body_moments(const Body& body, std::size_t place) {
   return Eigen::Map<const Moments>(&body.moments[place * kMoments]);
@@ -105,7 +105,7 @@ void QuadraticSystem::integrate_supports() {
       [&](std::size_t c) {
         for (SupportIntegrals& each : cell_supports_[c]) each.find(lattice(c), moduli_[part_[c]]);
       },
-      kCellsAtATime);
+      kIntegratedCellsAtATime);
 }
 
 void QuadraticSystem::place_loads(const std::vector<Load>& loads) {
@@ -220,7 +220,7 @@ QuadraticOperator QuadraticSystem::stiffness(double safety) const {
   parallel_for_each(
       own.size(),
       [&](std::size_t i) { made.set_own(own[i], supported_stiffness(own[i], safety, Mat3::Identity())); },
-      kCellsAtATime);
+      kIntegratedCellsAtATime);
   return made;
 }
 

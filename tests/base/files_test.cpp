@@ -43,7 +43,7 @@ std::string text_of(const std::string& path) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-void write_text(const std::string& path, const std::string& text) {
+void write_whole_text(const std::string& path, const std::string& text) {
   OutputFile output(path);
   output.write(text);
   output.commit();
@@ -82,7 +82,7 @@ TEST_F(Files, WhatIsWrittenInPiecesIsReadWhole) {
 }
 
 TEST_F(Files, WithoutCommitNothingIsLeftAndTheOldFileStays) {
-  write_text(path("a"), "old");
+  write_whole_text(path("a"), "old");
   {
     OutputFile output(path("a"));
     output.write("new");
@@ -93,27 +93,27 @@ TEST_F(Files, WithoutCommitNothingIsLeftAndTheOldFileStays) {
 
 TEST_F(Files, LinksAreFollowedNotReplaced) {
   fs::create_directories(path("real"));
-  write_text(path("real/target"), "old");
+  write_whole_text(path("real/target"), "old");
   fs::create_symlink("real/target", path("link"));
   fs::create_symlink("link", path("link2"));
   fs::create_symlink("real/not-yet", path("dangling"));
-  write_text(path("link2"), "new");
-  write_text(path("dangling"), "made");
+  write_whole_text(path("link2"), "new");
+  write_whole_text(path("dangling"), "made");
   EXPECT_TRUE(fs::is_symlink(path("link2")));
   EXPECT_TRUE(fs::is_symlink(path("link")));
   EXPECT_EQ(text_of(path("real/target")), "new");
   EXPECT_EQ(text_of(path("real/not-yet")), "made");
   fs::create_symlink("round", path("round"));
-  EXPECT_NE(failure([&] { write_text(path("round"), "x"); }), "");
+  EXPECT_NE(failure([&] { write_whole_text(path("round"), "x"); }), "");
 }
 
 TEST_F(Files, DevicesAndFifosAreWrittenThrough) {
-  write_text("/dev/null", "x");
+  write_whole_text("/dev/null", "x");
   EXPECT_TRUE(fs::is_character_file("/dev/null"));
   ASSERT_EQ(mkfifo(path("fifo").c_str(), 0600), 0);
   std::string seen;
   std::thread reader([&] { seen = text_of(path("fifo")); });
-  write_text(path("fifo"), "through");
+  write_whole_text(path("fifo"), "through");
   reader.join();
   EXPECT_EQ(seen, "through");
   EXPECT_TRUE(fs::is_fifo(path("fifo")));
@@ -121,9 +121,10 @@ TEST_F(Files, DevicesAndFifosAreWrittenThrough) {
 
 TEST_F(Files, AFullDiskIsSaidAndLeavesNothing) {
   if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
-  const std::string message = failure([] { write_text("/dev/full", std::string(3 << 20, 'x')); });
+  const std::string message = failure([] { write_whole_text("/dev/full", std::string(3 << 20, 'x')); });
   EXPECT_THAT(message, HasSubstr("/dev/full: cannot write: No space left on device"));
-  EXPECT_NE(failure([] { write_text("/dev/full", "x"); }), "") << "an error that only the last flush sees";
+  EXPECT_NE(failure([] { write_whole_text("/dev/full", "x"); }), "")
+      << "an error that only the last flush sees";
 }
 
 TEST_F(Files, AFileThatOutgrowsTheLimitIsRemoved) {
@@ -133,7 +134,7 @@ TEST_F(Files, AFileThatOutgrowsTheLimitIsRemoved) {
     std::signal(SIGXFSZ, SIG_IGN);
     const rlimit limit = {1 << 20, 1 << 20};
     setrlimit(RLIMIT_FSIZE, &limit);
-    const std::string message = failure([&] { write_text(path("big"), std::string(3 << 20, 'x')); });
+    const std::string message = failure([&] { write_whole_text(path("big"), std::string(3 << 20, 'x')); });
     _exit(message.find("File too large") != std::string::npos ? 0 : 1);
   }
   int status = -1;
@@ -152,7 +153,7 @@ TEST_F(Files, AReaderThatLeftIsNoError) {
     dup2(ends[1], STDOUT_FILENO);
     close(ends[1]);
     try {
-      write_text("-", std::string(1 << 20, 'x'));
+      write_whole_text("-", std::string(1 << 20, 'x'));
     } catch (const ReaderClosedPipe&) {
       _exit(0);
     }
@@ -166,11 +167,11 @@ TEST_F(Files, AReaderThatLeftIsNoError) {
 
 TEST_F(Files, PermissionsAreThoseOfANormalFile) {
   const mode_t before = umask(027);
-  write_text(path("a"), "x");
+  write_whole_text(path("a"), "x");
   umask(before);
   EXPECT_EQ(fs::status(path("a")).permissions(), static_cast<fs::perms>(0640));
   fs::permissions(path("a"), static_cast<fs::perms>(0755));
-  write_text(path("a"), "y");
+  write_whole_text(path("a"), "y");
   EXPECT_EQ(fs::status(path("a")).permissions(), static_cast<fs::perms>(0755)) << "overwriting keeps them";
 }
 
@@ -180,7 +181,7 @@ TEST_F(Files, WhatCannotBeReadOrWrittenIsNamed) {
   EXPECT_EQ(reading(path("none")), path("none") + ": cannot read: No such file or directory");
   EXPECT_EQ(reading(path("empty")), path("empty") + ": is empty");
   EXPECT_THAT(reading(folder_.string()), HasSubstr("is a folder"));
-  const auto writing = [&](const std::string& p) { return failure([&] { write_text(p, "x"); }); };
+  const auto writing = [&](const std::string& p) { return failure([&] { write_whole_text(p, "x"); }); };
   EXPECT_THAT(writing(folder_.string()), HasSubstr("is a folder"));
   EXPECT_EQ(writing(path("no/where")), path("no/where") + ": cannot write: No such file or directory");
   EXPECT_NE(writing(""), "");
@@ -189,7 +190,7 @@ TEST_F(Files, WhatCannotBeReadOrWrittenIsNamed) {
 
 TEST_F(Files, LongNamesFit) {
   const std::string name(250, 'n');
-  write_text(path(name), "x");
+  write_whole_text(path(name), "x");
   EXPECT_EQ(text_of(path(name)), "x");
 }
 

@@ -11,7 +11,7 @@ using ::testing::HasSubstr;
 
 const std::string kObj = "v 0 0 0\nv 20 0 0\nv 0 10 0\nv 0 0 10\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
 const std::string kOff = "OFF\n4 4 0\n0 0 0\n20 0 0\n0 10 0\n0 0 10\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n";
-const std::string kPly =
+const std::string kPlyText =
     "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
     "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n20 0 0\n0 10 0\n3 0 1 2\n";
 const std::string kStl =
@@ -31,7 +31,7 @@ std::string widened(const std::string& text, std::size_t width, bool big_endian)
 TEST(Encoding, TheMarkOfUtf8SaysNothing) {
   const Scratch scratch;
   for (const auto& [name, text] :
-       {std::pair{"a.obj", kObj}, {"a.off", kOff}, {"a.ply", kPly}, {"a.stl", kStl}}) {
+       {std::pair{"a.obj", kObj}, {"a.off", kOff}, {"a.ply", kPlyText}, {"a.stl", kStl}}) {
     const Surface plain = import_surface(scratch.write(name, text));
     const Surface marked = import_surface(scratch.write(name, "\xef\xbb\xbf" + text));
     EXPECT_EQ(marked.vertices, plain.vertices) << name;
@@ -43,7 +43,7 @@ TEST(Encoding, WideCharactersAreRefusedByTheirName) {
   const Scratch scratch;
   const std::string little = "\xff\xfe", big = "\xfe\xff";
   for (const auto& [name, text] :
-       {std::pair{"a.obj", kObj}, {"a.off", kOff}, {"a.ply", kPly}, {"a.stl", kStl}}) {
+       {std::pair{"a.obj", kObj}, {"a.off", kOff}, {"a.ply", kPlyText}, {"a.stl", kStl}}) {
     const auto error = [&, file = std::string(name)](const std::string& bytes) {
       return import_error(scratch.write(file, bytes));
     };
@@ -63,7 +63,7 @@ TEST(Encoding, ANulInsideTextIsAnErrorWithItsLine) {
               HasSubstr("a.obj:2|holds a byte that is 0"));
   EXPECT_THAT(import_error(scratch.write("a.off", replaced(kOff, "20 0", "2" + nul + "0 0"))),
               HasSubstr("a.off:4|holds a byte that is 0"));
-  EXPECT_THAT(import_error(scratch.write("a.ply", replaced(kPly, "20 0", "2" + nul + "0 0"))),
+  EXPECT_THAT(import_error(scratch.write("a.ply", replaced(kPlyText, "20 0", "2" + nul + "0 0"))),
               HasSubstr("a.ply:11|holds a byte that is 0"));
   EXPECT_NE(import_error(scratch.write("a.stl", replaced(kStl, "20 0", "2" + nul + "0 0"))), "");
   // Padding at the end is none of the text.

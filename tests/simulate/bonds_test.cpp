@@ -43,7 +43,7 @@ Body bonded_bar(bool whole, int n = 4, double gap = 0) {
   return body;
 }
 
-Scene pull(const Vec3& force) {
+Scene pulled_scene(const Vec3& force) {
   Scene scene;
   scene.materials["gum"] = {"gum", 12.1e5, 0.3, 580, "test"};
   scene.material = "gum";
@@ -60,7 +60,7 @@ Vec3 tip_of(Body body, const Scene& scene) {
 }
 
 Vec3 pulled_tip(Body body, const Vec3& force) {
-  return tip_of(std::move(body), pull(force));
+  return tip_of(std::move(body), pulled_scene(force));
 }
 
 TEST(Bonds, CutBarIsTheWholeBar) {
@@ -82,7 +82,7 @@ TEST(Bonds, LargeDeflectionOfACutBar) {
 // Let go under its weight, the cut bar swings as far as the whole one.
 TEST(Bonds, ACutBarSwingsAsTheWholeBar) {
   const auto swing = [](const Body& body) {
-    Scene scene = pull(Vec3::Zero());
+    Scene scene = pulled_scene(Vec3::Zero());
     scene.get<Loads>().loads.clear();
     scene.get<Gravity>().acceleration = Vec3(0, 0, -0.5);
     scene.run.time = 0.2;
@@ -105,7 +105,7 @@ TEST(Bonds, ACutBarSwingsAsTheWholeBar) {
 TEST(Bonds, NamedBondsHold) {
   const Vec3 force(0, 0, 1e-3);
   const Vec3 whole = pulled_tip(bonded_bar(true), force);
-  Scene scene = pull(force);
+  Scene scene = pulled_scene(force);
   scene.get<Bonds>().bond = false;
   scene.get<Bonds>().named = {{{"far", "near"}, 0.06, "s.toml:3"}};
   for (const double gap : {0.0, 0.05}) {
@@ -121,7 +121,7 @@ TEST(Bonds, NamedBondsHold) {
 }
 
 TEST(Bonds, PartsOfDifferentModelsAreBonded) {
-  Scene scene = pull(Vec3(1e-3, 0, 0));
+  Scene scene = pulled_scene(Vec3(1e-3, 0, 0));
   scene.materials["gum"].poisson = 0.25;
   const auto pulled = [&](const std::string& model) {
     Scene own = parse_scene("[parts.far]\nmodel = \"" + model + "\"\n", "s.toml");
@@ -134,7 +134,7 @@ TEST(Bonds, PartsOfDifferentModelsAreBonded) {
 
 // In a timed run with contact the bonded faces do not press each other as well.
 TEST(Bonds, NamedBondsBesideContact) {
-  Scene scene = pull(Vec3::Zero());
+  Scene scene = pulled_scene(Vec3::Zero());
   scene.get<Loads>().loads.clear();
   scene.get<Gravity>().acceleration = Vec3(0, 0, -0.5);
   scene.run.time = 0.2;
@@ -151,7 +151,7 @@ TEST(Bonds, NamedBondsBesideContact) {
 
 TEST(Bonds, SaysWhoIsBondedOverWhatArea) {
   Body body = bonded_bar(false, 5);
-  const SimulateResult result = simulate_quietly(body, pull(Vec3(0, 0, 1)));
+  const SimulateResult result = simulate_quietly(body, pulled_scene(Vec3(0, 0, 1)));
   ASSERT_EQ(result.bonds.size(), 1u);
   EXPECT_EQ(result.bonds[0].parts, (std::array<std::string, 2>{"near", "far"}));
   EXPECT_NEAR(result.bonds[0].area, 0.25, 1e-12);
@@ -163,7 +163,7 @@ TEST(Bonds, SaysWhoIsBondedOverWhatArea) {
 // A rotation of everything costs nothing, whatever the lattices: the bond does not see it.
 TEST(Bonds, RotationOfBondedPartsIsFree) {
   Body body = bonded_bar(false, 3);
-  Scene scene = pull(Vec3::Zero());
+  Scene scene = pulled_scene(Vec3::Zero());
   scene.get<Loads>().loads.clear();
   scene.get<Supports>().ties.clear();
   Tie tie = make_move(select_by_name("near/xmin"), Vec3::Zero());
@@ -181,12 +181,12 @@ TEST(Bonds, OnlyPartsThatTouchAreBonded) {
   EXPECT_FALSE(
       touching_points({bonded_bar(false, 4, 0.0005), {}, {}}).empty());  // under a hundredth of the spacing
   EXPECT_TRUE(touching_points({bonded_bar(false, 4, 0.002), {}, {}}).empty());
-  EXPECT_THAT(refusal(bonded_bar(false, 4, 0.002), pull(Vec3(0, 0, 1))),
+  EXPECT_THAT(refusal(bonded_bar(false, 4, 0.002), pulled_scene(Vec3(0, 0, 1))),
               HasSubstr("nothing holds part \"far\""));
 }
 
 TEST(Bonds, CanBeLeftOut) {
-  Scene scene = pull(Vec3(0, 0, 1));
+  Scene scene = pulled_scene(Vec3(0, 0, 1));
   scene.get<Bonds>().bond = false;
   EXPECT_THAT(refusal(bonded_bar(false), scene), HasSubstr("nothing holds part \"far\""));
   EXPECT_FALSE(parse_scene("bond = false\n", "s.toml").get<Bonds>().bond);

@@ -37,7 +37,7 @@ density = "1000 kg/m3"
 
 // The elements at x = 0 stay in their plane, exactly, the corner at the origin where it is, and the bar does not turn about its length: an
 // even stress along x meets all of it.
-constexpr const char* kDrawn = R"(
+constexpr const char* kDrawnBar = R"(
 [[fix]]
 where = { box = { min = ["-1 mm", "-1 mm", "-1 mm"], max = ["1 mm", "21 mm", "21 mm"] } }
 axes = "x"
@@ -52,7 +52,7 @@ where = "x1"
 )";
 
 // 40 x 20 x 20 mm.
-Body bar() {
+Body long_bar() {
   return testing::box_body({.cells = {4, 2, 2}, .spacing = Vec3::Constant(0.01)});
 }
 
@@ -73,9 +73,9 @@ TEST(LawRuns, OrthotropicBarDrawnAskew) {
   const double angle = std::numbers::pi / 6;
   const std::string axes = fmt::format("[parts.box]\naxes = [[{0}, {1}, 0], [{2}, {0}, 0]]\n",
                                        std::cos(angle), std::sin(angle), -std::sin(angle));
-  Body body = bar();
+  Body body = long_bar();
   const double force = 0.004;  // 10 Pa
-  const SimulateResult result = at_equilibrium(body, kGrain + axes + kDrawn + drawn_by(force));
+  const SimulateResult result = at_equilibrium(body, kGrain + axes + kDrawnBar + drawn_by(force));
   Material material = testing::orthotropic_material();
   material.axes = Eigen::AngleAxisd(angle, Vec3::UnitZ()).toRotationMatrix();
   const Mat6 compliance = moduli_at_rest(law_of(material)).inverse();
@@ -108,10 +108,10 @@ Drawn drawn_to(const Law& law, double stretch) {
 TEST(LawRuns, MooneyRivlinBarDrawn) {
   const Law law = law_of(testing::mooney_rivlin_material());
   for (const double stretch : {1.1, 1.5, 2.0}) {
-    Body body = bar();
+    Body body = long_bar();
     const Drawn drawn = drawn_to(law, stretch);
     const SimulateResult result =
-        at_equilibrium(body, std::string(kElastomer) + kDrawn + drawn_by(kArea * drawn.stress));
+        at_equilibrium(body, std::string(kElastomer) + kDrawnBar + drawn_by(kArea * drawn.stress));
     EXPECT_NEAR(1 + result.probes[0].displacement.x() / kLength, stretch, 1e-6);
     EXPECT_NEAR(result.elastic_energy / (drawn.energy * kArea * kLength), 1, 1e-5);
   }
@@ -130,7 +130,7 @@ force = ["20 N", 0, "-6 N"]
 name = "end"
 where = "x1"
 )";
-    Body body = bar();
+    Body body = long_bar();
     const Vec3 still = at_equilibrium(body, material + held).probes[0].displacement;
     EXPECT_GT(still.norm(), 0.1 * kLength);
     for (const std::string method : {"symplectic", "implicit"}) {
@@ -138,7 +138,7 @@ where = "x1"
           fmt::format("[run]\ntime = \"0.15 s\"\nmethod = \"{}\"\n{}[damping]\ntime = \"3 ms\"\n", method,
                       method == "implicit" ? "step = \"0.5 ms\"\n" : "");
       const testing::TimedCase made =
-          testing::run_timed(bar(), parse_scene(material + held + timed, "s.toml"));
+          testing::run_timed(long_bar(), parse_scene(material + held + timed, "s.toml"));
       EXPECT_LT((made.result.probes[0].displacement - still).norm(), 1e-3 * still.norm())
           << material << method;
       testing::expect_books_close(made.result);
@@ -155,7 +155,7 @@ TEST(LawRuns, FreeMotionKeepsMomentaAndEnergy) {
         "= [\"2 m/s\", \"3 m/s\", 0]\nspin = { axis = [1, 0, 0], "
         "through = [0, \"10 mm\", \"10 mm\"], angle_per_second = \"200 rad\" }\n"
         "[run]\ntime = \"20 ms\"\nstep = \"10 us\"\nmethod = \"verlet\"\n";
-    const testing::TimedCase made = testing::run_timed(bar(), parse_scene(scene, "s.toml"));
+    const testing::TimedCase made = testing::run_timed(long_bar(), parse_scene(scene, "s.toml"));
     testing::expect_momenta_kept(made.history, 1e-9);
     testing::expect_books_close(made.result);
     const std::vector<double> kinetic = made.history.column("kinetic");

@@ -47,7 +47,7 @@ tolerance = 1e-9
 load_steps = 4
 )";
 
-std::pair<std::string, std::string> parse_refusal(const std::string& text) {
+std::pair<std::string, std::string> parse_refusal_at(const std::string& text) {
   try {
     (void)parse_scene(text, "s.toml");
   } catch (const InputError& error) {
@@ -119,7 +119,7 @@ TEST(Scene, RefusesWithLineAndReason) {
       {"gravity = 3\n", "s.toml:1", "table"},
   };
   for (const Wrong& wrong : cases) {
-    const auto [where, what] = parse_refusal(wrong.text);
+    const auto [where, what] = parse_refusal_at(wrong.text);
     EXPECT_EQ(where, wrong.where) << wrong.text << what;
     EXPECT_THAT(what, HasSubstr(wrong.says)) << wrong.text;
   }

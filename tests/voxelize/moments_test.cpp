@@ -113,7 +113,7 @@ double sum_of(const CellMoments& moments) {
   return std::accumulate(moments.begin(), moments.end(), 0.);
 }
 
-PartMesh placed(const Mesh& mesh, double h, const Vec3& origin = Vec3::Zero()) {
+PartMesh placed_at(const Mesh& mesh, double h, const Vec3& origin = Vec3::Zero()) {
   PartMesh part = part_meshes(surface(mesh))[0];
   Lattice lattice;
   lattice.spacing = Vec3::Constant(h);
@@ -193,7 +193,7 @@ TEST(Moments, OfABoxAtAnyAngleAreThoseOfTheCutCube) {
     const Mat3 turn = trial == 0 ? turned_by_33_degrees() : random_rotation(random);
     const Vec3 size(3.1, 2.2, 1.4 + .1 * trial);
     std::size_t cut_cells = 0;
-    for (const PieceMoments& piece : pieces_of(placed(transformed(box(Vec3::Zero(), size), turn), 1))) {
+    for (const PieceMoments& piece : pieces_of(placed_at(transformed(box(Vec3::Zero(), size), turn), 1))) {
       if (!piece.cut) continue;
       ++cut_cells;
       Faces faces = unit_cube(low_of(piece.voxel));
@@ -211,7 +211,7 @@ TEST(Moments, OfABoxAtAnyAngleAreThoseOfTheCutCube) {
 TEST(Moments, IntegratePolynomialsOverATurnedBox) {
   const Mesh mesh = transformed(box({0, 0, 0}, {2, .5, .5}), turned_by_33_degrees());
   for (const double h : {.5, .25, .11}) {
-    const PartMesh part = placed(mesh, h);
+    const PartMesh part = placed_at(mesh, h);
     const std::vector<PieceMoments> pieces = pieces_of(part);
     for (const Polynomial& f : polynomials(2 / h)) {
       const double exact = integral(part.vertices, part.corners, f);
@@ -223,7 +223,7 @@ TEST(Moments, IntegratePolynomialsOverATurnedBox) {
 
 TEST(Moments, IntegratePolynomialsOverABallAndATorus) {
   for (const Mesh& mesh : {icosphere(3, 1, {.3, -.2, .1}), torus(1, .3, 31, 17)}) {
-    const PartMesh part = placed(mesh, .21);
+    const PartMesh part = placed_at(mesh, .21);
     const std::vector<PieceMoments> pieces = pieces_of(part);
     const double volume = integral(part.vertices, part.corners, [](const Vec3&) { return 1.; });
     for (const Polynomial& f : polynomials(1.5 / .21))
@@ -238,9 +238,10 @@ TEST(Moments, OfThePiecesOfAVoxelAreThoseOfEachLeaf) {
   const Mesh b = transformed(box({0, 0, 1.1 * h}, {1, .6, 1.9 * h}), turn);
   std::map<Index3, std::vector<CellMoments>> alone;
   for (const Mesh& mesh : {a, b})
-    for (const PieceMoments& piece : pieces_of(placed(mesh, h))) alone[piece.voxel].push_back(piece.moments);
+    for (const PieceMoments& piece : pieces_of(placed_at(mesh, h)))
+      alone[piece.voxel].push_back(piece.moments);
   std::map<Index3, std::vector<CellMoments>> together;
-  for (const PieceMoments& piece : pieces_of(placed(merged(a, b), h)))
+  for (const PieceMoments& piece : pieces_of(placed_at(merged(a, b), h)))
     together[piece.voxel].push_back(piece.moments);
   std::size_t split = 0;
   ASSERT_EQ(alone.size(), together.size());
@@ -258,10 +259,11 @@ TEST(Moments, OfThePiecesOfAVoxelAreThoseOfEachLeaf) {
 }
 
 TEST(Moments, OfABoxOnLatticePlanesAreNoneAndProducts) {
-  for (const PieceMoments& piece : pieces_of(placed(box({1, 2, 3}, {4, 4, 5}), 1))) EXPECT_FALSE(piece.cut);
+  for (const PieceMoments& piece : pieces_of(placed_at(box({1, 2, 3}, {4, 4, 5}), 1)))
+    EXPECT_FALSE(piece.cut);
   // The upper layer is half full, a quarter in the last row.
   std::size_t cut_cells = 0;
-  for (const PieceMoments& piece : pieces_of(placed(box({0, 0, 0}, {3, 2.5, 1.5}), 1))) {
+  for (const PieceMoments& piece : pieces_of(placed_at(box({0, 0, 0}, {3, 2.5, 1.5}), 1))) {
     if (!piece.cut) {
       EXPECT_LT(piece.fill * (1 - piece.fill), 1e-12);
       continue;
@@ -288,8 +290,8 @@ TEST(Moments, OfABoxOnLatticePlanesAreNoneAndProducts) {
 TEST(Moments, MoveWithThePartByWholeCells) {
   Mesh mesh = transformed(fork(.1, .0375, .25, .5), turned(.5, .4, .3));
   for (Vec3& v : mesh.vertices) v = (v * 1048576).array().round() / 1048576;  // so that shifts are exact
-  const auto here = pieces_of(placed(mesh, .125));
-  const auto there = pieces_of(placed(transformed(mesh, Mat3::Identity(), {.375, -.625, .875}), .125));
+  const auto here = pieces_of(placed_at(mesh, .125));
+  const auto there = pieces_of(placed_at(transformed(mesh, Mat3::Identity(), {.375, -.625, .875}), .125));
   ASSERT_EQ(here.size(), there.size());
   for (std::size_t p = 0; p < here.size(); ++p) {
     EXPECT_EQ(there[p].voxel, (Index3{here[p].voxel[0] + 3, here[p].voxel[1] - 5, here[p].voxel[2] + 7}));
@@ -303,7 +305,7 @@ TEST(Moments, OfSliversIntegrateSquaresToPositiveNumbers) {
   std::size_t slivers = 0;
   for (const double thickness : {.003, .02, .1, .7}) {
     const Mesh plate = transformed(box({0, 0, 0}, {5, 4, thickness}), turned_by_33_degrees());
-    for (const PieceMoments& piece : pieces_of(placed(plate, 1))) {
+    for (const PieceMoments& piece : pieces_of(placed_at(plate, 1))) {
       if (piece.fill < 1e-5) continue;
       slivers += piece.fill < .02;
       for (int trial = 0; trial < 20; ++trial) {

@@ -34,11 +34,11 @@ struct Ray {
 
 // From the centroid to the front, a little off the normal: across symmetric parts that would meet edges.
 Ray ray_from(const PartMesh& mesh, std::uint32_t t) {
-  constexpr double kAside = .01, kAcross = .007;
+  constexpr double kTilt = .01, kTiltAcross = .007;
   const Corners& c = mesh.corners[t];
   const Vec3 normal = unit_normal(mesh, t), along = (mesh.world[c[1]] - mesh.world[c[0]]).normalized();
   return {(mesh.world[c[0]] + mesh.world[c[1]] + mesh.world[c[2]]) / 3,
-          (normal + kAside * along + kAcross * normal.cross(along)).normalized()};
+          (normal + kTilt * along + kTiltAcross * normal.cross(along)).normalized()};
 }
 
 bool odd_crossings(const RayCaster& rays, Vec3 from, const Vec3& direction, std::uint32_t own) {

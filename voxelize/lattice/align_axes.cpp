@@ -38,7 +38,7 @@ Vec3 same_way(const Vec3& normal) {
   return normal[largest] < 0 ? Vec3(-normal) : normal;
 }
 
-Vec3 area_vector(const PartMesh& mesh, const Corners& c) {
+Vec3 triangle_area_vector(const PartMesh& mesh, const Corners& c) {
   const Vec3& a = mesh.world[c[0]];
   return same_way((mesh.world[c[1]] - a).cross(mesh.world[c[2]] - a) / 2);
 }
@@ -74,7 +74,7 @@ std::vector<bool> heavy_squares(const PartMesh& mesh, double least_area) {
   std::array<std::vector<double>, kChunks> area;
   for (auto& of_chunk : area) of_chunk.assign(3 * kSquares * kSquares, 0);
   for_each_triangle(mesh, [&](std::size_t chunk, const Corners& c) {
-    if (const Vec3 vector = area_vector(mesh, c); vector.squaredNorm() > 0)
+    if (const Vec3 vector = triangle_area_vector(mesh, c); vector.squaredNorm() > 0)
       area[chunk][coarse_square(vector)] += vector.norm();
   });
   std::vector<bool> heavy;
@@ -93,7 +93,7 @@ std::vector<Direction> gather(const PartMesh& mesh, double least_area) {
   if (std::find(heavy.begin(), heavy.end(), true) == heavy.end()) return {};
   std::array<std::map<Cell, Vec3>, kChunks> of_chunk;
   for_each_triangle(mesh, [&](std::size_t chunk, const Corners& c) {
-    const Vec3 vector = area_vector(mesh, c);
+    const Vec3 vector = triangle_area_vector(mesh, c);
     if (vector.squaredNorm() > 0 && heavy[coarse_square(vector)])
       of_chunk[chunk].try_emplace(cell_of(vector.normalized()), Vec3::Zero()).first->second += vector;
   });

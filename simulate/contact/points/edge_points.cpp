@@ -30,13 +30,13 @@ std::vector<std::uint32_t> weld(const std::vector<Vec3>& vertices) {
 }
 
 std::vector<Edge> sharp_edges(const Surface& surface, const std::vector<std::uint8_t>& wanted) {
-  struct Side {
+  struct EdgeSide {
     std::uint32_t triangle = 0, apex = 0;
   };
   const Triangles triangles = triangulate(surface);
   const std::vector<std::uint32_t> welded = weld(surface.vertices);
-  using Key = std::tuple<std::uint32_t, std::uint32_t, std::uint32_t>;  // part, ends
-  std::vector<std::pair<Key, Side>> sides;
+  using EdgeKey = std::tuple<std::uint32_t, std::uint32_t, std::uint32_t>;  // part, ends
+  std::vector<std::pair<EdgeKey, EdgeSide>> sides;
   for (std::uint32_t t = 0; t < triangles.corners.size(); ++t) {
     const std::uint32_t part = surface.polygon_part(triangles.polygon[t]);
     if (!wanted[part]) continue;
@@ -58,7 +58,7 @@ std::vector<Edge> sharp_edges(const Surface& surface, const std::vector<std::uin
   for (std::size_t i = 0; i + 1 < sides.size(); ++i) {
     if (sides[i].first != sides[i + 1].first) continue;
     if (i + 2 < sides.size() && sides[i + 2].first == sides[i].first) continue;  // not two faces
-    const Side &one = sides[i].second, &two = sides[i + 1].second;
+    const EdgeSide &one = sides[i].second, &two = sides[i + 1].second;
     Edge edge;
     edge.ends = {std::get<1>(sides[i].first), std::get<2>(sides[i].first)};
     edge.normals = {normal(one.triangle), normal(two.triangle)};
