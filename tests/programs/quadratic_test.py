@@ -155,7 +155,7 @@ def test_too_large_a_load_is_refused():
     part, _ = bar("beam.obj", (200, 50, 50), 33)
     write("s.toml", MATERIAL.format(poisson=0.3) + HELD.format(2000, 0, 50))
     expect_ok(run("flexel-voxelize", part, "--size", "50 mm", "--align", "none", "--moments", "-o", "body.vtu"))
-    expect_error(run("flexel-simulate", "s.toml", "body.vtu", "-o", "bent.vtu"), "flexel-simulate", "model \"cells\"", code=3)
+    expect_error(run("flexel-simulate", "s.toml", "body.vtu", "-o", "bent.vtu"), "flexel-simulate", "times its size: check the unit", code=3)
 
 
 def test_a_clamped_plate_stretches_as_it_bends():
