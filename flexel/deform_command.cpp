@@ -223,13 +223,17 @@ class ModelChoice {
       set(true);
   }
   void keep() { free_ = false; }
+  [[nodiscard]] bool may_take_back() const { return chosen_ && free_; }
   // False where the model was not chosen here, or has answered already.
-  bool take_back() {
-    if (!chosen_ || !free_) return false;
+  bool take_back(const std::string& why) {
+    if (!may_take_back()) return false;
     set(false);
     free_ = false;
+    why_not_ = why;
     return true;
   }
+  // Why the model that was chosen is not the one that answered; "" if it is.
+  [[nodiscard]] const std::string& why_not() const { return why_not_; }
   [[nodiscard]] bool quadratic() const { return job_.voxelize.moments; }
   [[nodiscard]] bool chosen() const { return chosen_; }
 
@@ -242,6 +246,7 @@ class ModelChoice {
   Job& job_;
   bool free_;
   bool chosen_ = false;
+  std::string why_not_;
 };
 
 // The runs at several sizes; warnings of runs that are only tried are held back.
@@ -251,6 +256,8 @@ class GoalRuns {
       : arguments_(arguments), plan_(plan), surface_(surface), progress_(progress), model_(plan.job) {}
 
   SolvedRun operator()(std::optional<double> size, const GoesOn& goes_on) {
+    std::optional<StopAfter> limit;
+    if (size && model_.may_take_back()) limit.emplace(patience(), "--within");
     try {
       SolvedRun run = solve(size, goes_on);
       if (size) {
@@ -260,11 +267,14 @@ class GoalRuns {
       usual_size_ = preferred_number(spacing_of(run), 20, Rounded::nearest);
       model_.choose(run.voxels);
       return model_.chosen() ? solve(size, goes_on) : std::move(run);
-    } catch (const InputError&) {
-      if (!model_.take_back()) throw;
-    } catch (const DivergedError&) {
-      if (!model_.take_back()) throw;
+    } catch (const InputError& error) {
+      if (!model_.take_back(error.what())) throw;
+    } catch (const DivergedError& error) {
+      if (!model_.take_back(error.what())) throw;
+    } catch (const TimeoutError&) {
+      if (!limit || !limit->passed() || !model_.take_back("it takes too long")) throw;
     }
+    limit.reset();
     return solve(usual_size_, goes_on);
   }
 
@@ -273,10 +283,15 @@ class GoalRuns {
     options.method = method;
     return map_part(run.voxels.body, options, {}, quiet_).result;
   }
-  [[nodiscard]] bool chose_quadratic() const { return model_.chosen(); }
+  [[nodiscard]] const ModelChoice& model() const { return model_; }
   void drop_warnings() { (void)warnings_.take(); }
 
  private:
+  // s, for the first answer of a model that nobody asked for.
+  [[nodiscard]] double patience() const {
+    constexpr double kShare = 0.3, kUsual = 30;
+    return (plan_.goal->by_default ? 3 : 1) * kShare * plan_.goal->within.value_or(kUsual);  // it may be busy
+  }
   [[nodiscard]] std::size_t usual_count() const {
     const bool few = plan_.goal->within.value_or(kShort) < kShort;
     if (model_.quadratic()) return few ? kFewQuadraticCells : kFirstQuadraticCells;
@@ -339,7 +354,10 @@ SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surf
           0.25 * *plan.goal->error)
     plan.map.method = &mapping::kSmooth;
   accuracy.method = name_of(plan.map.method);
-  if (runs.chose_quadratic())
+  if (!runs.model().why_not().empty())
+    progress.say(fmt::format("model quadratic, for thin walls, found no answer ({}): model cells is used",
+                             runs.model().why_not()));
+  if (runs.model().chosen())
     progress.say(
         fmt::format("model quadratic: a fifth of the matter lies in walls thinner than {} of the usual cells "
                     "(--model cells is the other)",

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "base/error.h"
 #include "base/human.h"
@@ -38,23 +39,30 @@ class LargeDeflection {
         tangent_(*solution.tangent),
         corotation_(system, tangent_.stiffness, solution.safety),
         reach_(largest(solution.displacement)),
-        extent_(std::max(bounding_box(system.nodes().rest).diagonal(), largest_led(system))) {}
+        extent_(std::max(bounding_box(system.nodes().rest).diagonal(), largest_led(system))),
+        angle_(largest_angle(system)) {}
 
   void run(const RunSettings& settings, const std::string& scene) {
     const std::vector<Vec3> linear = solution_.displacement;
     std::vector<Vec3> before(linear.size(), Vec3::Zero()), now = before;
     const bool overloaded = reach_ > extent_;
-    if (reach_ > kOutOfProportion * extent_ && settings.load_steps == 1) fail(scene, 0);
+    if (reach_ > kOutOfProportion * extent_ && settings.load_steps == 1)
+      throw DivergedError(
+          fmt::format("{}: {}; or, if that is meant, write [run] load_steps = 4", scene, overload()));
     const int most = settings.newton_iterations.value_or(overloaded ? 40 : 100);
     double done = 0, last = 0;
-    double step = std::min(1., kFirstTurn / std::max(largest_turn(linear), 1e-300));
-    step = std::min(step, 1. / std::max(settings.load_steps, 1));
+    // the linear answer to a move that turns follows the chord of its end, which says nothing of the way there
+    const bool turned = angle_ > kFirstTurn;
+    const double longest = std::min(1. / std::max(settings.load_steps, 1), turned ? kFirstTurn / angle_ : 1.);
+    double step = std::min(longest, kFirstTurn / std::max(largest_turn(linear), 1e-300));
     while (done < 1) {
       const double share = done + step > 1 - 1e-9 ? 1 : done + step;
       std::vector<Vec3> guess(now.size());
       const double ahead = last > 0 ? (share - done) / last : 0;
       parallel_for_each(guess.size(), [&](std::size_t n) {
-        guess[n] = done > 0 ? Vec3(now[n] + ahead * (now[n] - before[n])) : Vec3(share * linear[n]);
+        guess[n] = done > 0 ? Vec3(now[n] + ahead * (now[n] - before[n]))
+                   : turned ? Vec3(Vec3::Zero())
+                            : Vec3(share * linear[n]);
       });
       std::vector<Vec3> moved(guess.size());
       parallel_for_each(guess.size(), [&](std::size_t n) { moved[n] = guess[n] - now[n]; });
@@ -62,7 +70,8 @@ class LargeDeflection {
       const int iterations = reach(share, guess);
       if (iterations > kMostIterations) {
         step = (share - done) / 2;
-        if (step < kLeastStep || solution_.newton_iterations > most) fail(scene, done);
+        if (step < kLeastStep * longest || solution_.newton_iterations > most + 10 * solution_.load_steps)
+          fail(scene, done);
         continue;
       }
       ++solution_.load_steps;
@@ -70,7 +79,7 @@ class LargeDeflection {
       now = guess;
       last = share - done;
       done = share;
-      if (iterations <= kFewIterations) step *= 2;
+      if (iterations <= kFewIterations) step = std::min(2 * step, longest);
     }
     solution_.displacement = now;
     solution_.turn = corotation_.turns();
@@ -78,6 +87,7 @@ class LargeDeflection {
 
   // Whether cells that turn answer noticeably otherwise: by one correction of the linear solution.
   bool matters() {
+    if (angle_ > kFirstTurn) return true;
     constexpr double kNoticeable = 1e-4, kRoughly = 1e-2;
     const std::vector<Vec3>& u = solution_.displacement;
     std::vector<Vec3> left, change;
@@ -89,15 +99,41 @@ class LargeDeflection {
     return !(largest(change) <= kNoticeable * largest(u));
   }
 
+  // Whether the last state is a stable equilibrium: its tangent is positive. A load that is as symmetric as the part never
+  // meets the way in which that buckles, so the right side is irregular.
+  bool stable(const std::vector<Vec3>& u) {
+    std::vector<Vec3> irregular(u.size()), change;
+    std::mt19937 random(1);
+    for (Vec3& each : irregular)
+      for (double& value : each) value = static_cast<double>(random()) / 4294967295.0 - 0.5;
+    tangent_.stiffness.clear_held(irregular);
+    corotation_.set_tangent(true);
+    tangent_.multigrid.emplace(tangent_.stiffness, system_.problem().body, u);
+    const LinearResult result = conjugate_gradients(tangent_.stiffness, irregular, change,
+                                                    *tangent_.multigrid, kLoosest, kMostLinear);
+    solution_.iterations += result.iterations;
+    return !result.indefinite;
+  }
+
  private:
+  [[nodiscard]] std::string overload() const {
+    return fmt::format(
+        "at its first stiffness the load would move the part by {}, {} times its size: check the "
+        "unit of the part and the load",
+        human_length(reach_), human_number(reach_ / extent_, 2));
+  }
+
+  // rad: how far moves turn what they lead.
+  static double largest_angle(const QuadraticSystem& system) {
+    double most = 0;
+    for (const NitscheSupport& support : system.supports())
+      most = std::max(most, std::abs(support.tie->motion.angle));
+    return most;
+  }
+
   [[noreturn]] void fail(const std::string& scene, double done) const {
     const std::string why =
-        reach_ > extent_
-            ? fmt::format(
-                  "at its first stiffness the load would move the part by {}, {} times its size: check "
-                  "the unit of the part and the load",
-                  human_length(reach_), human_number(reach_ / extent_, 2))
-            : "use model \"cells\", which follows buckling and large strains";
+        reach_ > extent_ ? overload() : "use model \"cells\", which follows buckling and large strains";
     throw DivergedError(fmt::format("{}: model \"quadratic\" finds no equilibrium beyond {} of the load; {}",
                                     scene, human_share(done), why));
   }
@@ -183,6 +219,7 @@ class LargeDeflection {
   QuadraticTangent& tangent_;
   Corotation corotation_;
   double reach_ = 0, extent_ = 0;  // m: of the linear answer; of the part, or of what leads it
+  double angle_ = 0;               // rad, of moves
   double stale_ = 0;               // rad: how far cells may have turned since the preconditioner was made
 };
 
@@ -192,14 +229,24 @@ void solve_large(const QuadraticSystem& system, const RunSettings& settings, con
                  const std::function<void(double, double)>& progress, QuadraticSolution& solution) {
   // What large deflections change is of the order of the rotation times the slenderness.
   constexpr double kTiny = 3e-4;
-  double turn = 0, finest = HUGE_VAL;
+  constexpr double kFarFromBuckling = 0.02;  // of the strain times the slenderness squared
+  double turn = 0, strain = 0, finest = HUGE_VAL;
   for (std::size_t c = 0; c < system.nodes().cells.size(); ++c) {
-    turn = std::max(turn, spin_of(gradient_at(system, solution.displacement, c, system.middle(c))).norm());
+    const Mat3 gradient = gradient_at(system, solution.displacement, c, system.middle(c));
+    turn = std::max(turn, spin_of(gradient).norm());
+    strain = std::max(strain, 0.5 * (gradient + gradient.transpose()).norm());
     finest = std::min(finest, system.lattice(c).spacing.minCoeff());
   }
-  if (turn * bounding_box(system.nodes().rest).diagonal() < kTiny * finest) return;
+  for (const NitscheSupport& support : system.supports())  // a whole turn leaves no displacement
+    turn = std::max(turn, std::abs(support.tie->motion.angle));
+  const double slenderness = bounding_box(system.nodes().rest).diagonal() / finest;
+  const bool straight = turn * slenderness < kTiny,
+             far = strain * slenderness * slenderness < kFarFromBuckling;
+  if (straight && far) return;
   LargeDeflection large(system, settings, progress, solution);
-  if (large.matters()) large.run(settings, scene);
+  const bool matters = large.matters();
+  if (matters) large.run(settings, scene);
+  if (!far) solution.stable = large.stable(solution.displacement);
 }
 
 }  // namespace flexel::simulate

@@ -157,6 +157,10 @@ SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptio
   const QuadraticSolution solution = equilibrium(system, scene, solving, progress);
   const StopWaits answered;
   judge_strain(typical_strain(system, solution), progress);
+  if (!solution.stable)
+    progress.warn(
+        "this equilibrium is not stable: the part buckles under less than this load, somewhere at least, and "
+        "what is told is as if it did not; model \"cells\" follows buckling");
   name_materials(body, problem.materials);
   State state;
   state.displacement = element_displacement(system, solution);

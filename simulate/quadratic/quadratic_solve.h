@@ -20,7 +20,8 @@ struct QuadraticSolution {
   std::vector<Vec3> displacement;  // (nodes x 3) m
   std::vector<Vec3> unbalanced;  // (nodes x 3) N: on prescribed components what holds them, else the residual
   std::vector<Mat3> turn;        // (cells) R - 1 where large deflections turned them; none: a linear solution
-  double safety = 1;             // of the supports' penalty (QuadraticSystem::stiffness)
+  bool stable = true;  // as far as was looked: where loads are far too small to buckle it nobody does
+  double safety = 1;   // of the supports' penalty (QuadraticSystem::stiffness)
   int load_steps = 0, newton_iterations = 0;
   int iterations = 0;  // of conjugate gradients, in all
   double relative_residual = 0;
