@@ -227,5 +227,29 @@ at = ["155 mm", "20 mm", "4 mm"]
     expect(max(found) - min(found) < 1e-3 * abs(found[0]), found)
 
 
+SLENDER = MATERIAL.format(poisson=0.3) + "[[fix]]\nwhere = \"held\"\n"
+END = "[[probe]]\nname = \"end\"\nwhere = \"end\"\n"
+
+
+def test_a_turn_of_more_than_half_a_revolution_is_what_it_says():
+    """200 x 10 x 10, G J = .1406 a^4 E / 2.6: 2 % stiffer at its clamps, and a little for the stretch of its edges."""
+    part, _ = bar("bar.obj", (200, 10, 10))
+    for degrees in (200, 360):
+        turn = "[[move]]\nwhere = \"end\"\nrotation = {{ axis = [1, 0, 0], through = [0, \"5 mm\", \"5 mm\"], angle = \"{} deg\" }}\n".format(degrees)
+        summary, _ = deflection(part, "5 mm", SLENDER + turn, "--no-estimate")
+        torque = 0.1406e-8 * 1e6 / 2.6 * math.radians(degrees) / 0.2
+        moment = summary["reactions"][1]["moment"][0]
+        expect(0.98 < moment / torque < 1.15, f"{degrees}: {moment}, {torque}")
+
+
+def test_a_strut_above_its_buckling_load_is_told():
+    """200 x 10 x 10, E 1 MPa: Euler's load is pi^2 E I / (4 L^2) = .0514 N."""
+    part, _ = bar("bar.obj", (200, 10, 10))
+    for force, stable in ((0.03, True), (0.1, False)):
+        push = "[[load]]\nwhere = \"end\"\nforce = [\"-{} N\", 0, 0]\n".format(force)
+        _, done = deflection(part, "10 mm", SLENDER + push + END, "--no-estimate")
+        expect(("is not stable" in done.err) != stable, f"{force} N: {done.err}")
+
+
 if __name__ == "__main__":
     main(globals())
