@@ -2,6 +2,7 @@
 else as STL."""
 
 import struct
+import zipfile
 
 from harness import bracket, box, expect, expect_error, expect_ok, expect_only, main, run, scene, write
 from meshes import glb_box, indexed_box, off_box, ply_box, read_glb, read_off, read_ply, threemf_box
@@ -80,6 +81,37 @@ def test_3mf():
     at = data.index(b"end_header\n") + 11
     expect_bent(indexed_box()[0], list(struct.iter_unpack("<3d", data[at:at + 8 * 24])))
     expect_error(run("flexel-map", "body.vtu", "-o", "bent.3mf"), "flexel-map", "3mf")
+
+
+def write_3mf(name, models):
+    """An archive of model files: {path: text}; the first is the root."""
+    with zipfile.ZipFile(name, "w") as archive:
+        archive.writestr("_rels/.rels", '<Relationships><Relationship Target="/{}" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>'.format(next(iter(models))))
+        for path, text in models.items():
+            archive.writestr(path, text)
+
+
+CUBE = ("<mesh><vertices>" + "".join(f'<vertex x="{x}" y="{y}" z="{z}"/>' for z in (0, 10) for y in (0, 10) for x in (0, 10)) + "</vertices><triangles>" +
+        "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in ((0, 2, 3), (0, 3, 1), (4, 5, 7), (4, 7, 6), (0, 1, 5), (0, 5, 4), (2, 6, 7), (2, 7, 3), (0, 4, 6), (0, 6, 2), (1, 3, 7), (1, 7, 5))) +
+        "</triangles></mesh>")
+MODEL = '<model unit="{}"><resources>{}</resources><build>{}</build></model>'
+
+
+def test_3mf_models_of_two_units_are_refused():
+    for unit, fine in (("millimeter", True), ("inch", False)):
+        write_3mf("units.3mf", {"3D/root.model": MODEL.format("millimeter", "", '<item objectid="1" path="/3D/a.model"/>'),
+                                "3D/a.model": MODEL.format(unit, f'<object id="1">{CUBE}</object>', "")})
+        if fine:
+            expect_ok(run("flexel", "info", "units.3mf"))
+        else:
+            expect_error(run("flexel", "info", "units.3mf"), "flexel", "3D/a.model", "another unit")
+
+
+def test_3mf_supports_are_told():
+    objects = f'<object id="1" name="part">{CUBE}</object><object id="2" name="tree" type="support">{CUBE}</object>'
+    write_3mf("support.3mf", {"3D/m.model": MODEL.format("millimeter", objects, '<item objectid="1"/><item objectid="2" transform="1 0 0 0 1 0 0 0 1 20 0 0"/>')})
+    done = expect_ok(run("flexel-voxelize", "support.3mf", "--size", "2 mm", "-o", "s.vtu"))
+    expect("\"tree\" is support material" in done.err, done.err)
 
 
 def bent_bracket(file):
