@@ -14,7 +14,6 @@ namespace {
 constexpr std::size_t kTurnedCellsAtATime = 16;
 constexpr double kNothing = 1e-6;  // of the largest forces so far: smaller ones are what rounding leaves
 using CellValues = Eigen::Matrix<double, kCellUnknowns, 1>;
-using CellColumns = Eigen::Matrix<double, kCellUnknowns, 3>;
 
 Mat3 cross_matrix(const Vec3& v) {
   Mat3 m;
@@ -26,7 +25,8 @@ Eigen::Index at(std::size_t node) {
   return static_cast<Eigen::Index>(3 * node);
 }
 
-// R - 1 of F = R U, from F - 1 and to its relative precision; nothing where F turns matter inside out. Newton's iteration R <- (R + R^-T) / 2 (Higham 1986), written for what is left beside 1.
+// R - 1 of F = R U, from F - 1 and to its relative precision; nothing where F turns matter inside out.
+// Newton's iteration R <- (R + R^-T) / 2 (Higham 1986), written for what is left beside 1.
 std::optional<Mat3> polar_turn(const Mat3& gradient) {
   constexpr int kMost = 60;
   Mat3 turn = gradient;

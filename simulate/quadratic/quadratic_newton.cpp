@@ -28,6 +28,14 @@ constexpr int kMostLinear = 400;
 constexpr double kLeastTolerance = 1e-8, kGoodEnough = 1e-6;
 constexpr double kLoosest = 1e-2, kTightest = 1e-6;  // residuals of linear solutions
 
+// rad: how far moves turn what they lead.
+double largest_angle(const QuadraticSystem& system) {
+  double most = 0;
+  for (const NitscheSupport& support : system.supports())
+    most = std::max(most, std::abs(support.tie->motion.angle));
+  return most;
+}
+
 class LargeDeflection {
  public:
   LargeDeflection(const QuadraticSystem& system, const RunSettings& settings,
@@ -121,14 +129,6 @@ class LargeDeflection {
         "at its first stiffness the load would move the part by {}, {} times its size: check the "
         "unit of the part and the load",
         human_length(reach_), human_number(reach_ / extent_, 2));
-  }
-
-  // rad: how far moves turn what they lead.
-  static double largest_angle(const QuadraticSystem& system) {
-    double most = 0;
-    for (const NitscheSupport& support : system.supports())
-      most = std::max(most, std::abs(support.tie->motion.angle));
-    return most;
   }
 
   [[noreturn]] void fail(const std::string& scene, double done) const {
@@ -230,15 +230,13 @@ void solve_large(const QuadraticSystem& system, const RunSettings& settings, con
   // What large deflections change is of the order of the rotation times the slenderness.
   constexpr double kTiny = 3e-4;
   constexpr double kFarFromBuckling = 0.02;  // of the strain times the slenderness squared
-  double turn = 0, strain = 0, finest = HUGE_VAL;
+  double turn = largest_angle(system), strain = 0, finest = HUGE_VAL;  // a whole turn leaves no displacement
   for (std::size_t c = 0; c < system.nodes().cells.size(); ++c) {
     const Mat3 gradient = gradient_at(system, solution.displacement, c, system.middle(c));
     turn = std::max(turn, spin_of(gradient).norm());
     strain = std::max(strain, 0.5 * (gradient + gradient.transpose()).norm());
     finest = std::min(finest, system.lattice(c).spacing.minCoeff());
   }
-  for (const NitscheSupport& support : system.supports())  // a whole turn leaves no displacement
-    turn = std::max(turn, std::abs(support.tie->motion.angle));
   const double slenderness = bounding_box(system.nodes().rest).diagonal() / finest;
   const bool straight = turn * slenderness < kTiny,
              far = strain * slenderness * slenderness < kFarFromBuckling;
