@@ -1,74 +1,58 @@
-// The products of gradients at the 125 points are made once: 378 pairs of nodes, nine each.
 #include "simulate/quadratic/cell_integrals.h"
+
+#include <algorithm>
 
 namespace flexel::simulate {
 namespace {
-
-constexpr int kPairs = static_cast<int>(kQuadraticNodes * (kQuadraticNodes + 1) / 2);
-using Products = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic>;  // (9 x pairs) x moments
 
 Vec3 gauss_point(std::size_t k) {
   return {kGaussPoints[k % kMomentPoints], kGaussPoints[k / kMomentPoints % kMomentPoints],
           kGaussPoints[k / (kMomentPoints * kMomentPoints)]};
 }
 
-// d_j N_a d_l N_b (cell coordinates) at each point; pair by pair, a <= b.
-Products gradient_products() {
-  Products products(9 * kPairs, static_cast<Eigen::Index>(kMoments));
-  for (std::size_t k = 0; k < kMoments; ++k) {
-    const QuadraticShape shape = quadratic_shape(gauss_point(k));
-    Eigen::Index row = 0;
-    for (std::size_t a = 0; a < kQuadraticNodes; ++a)
-      for (std::size_t b = a; b < kQuadraticNodes; ++b)
-        for (int j = 0; j < 3; ++j)
-          for (int l = 0; l < 3; ++l)
-            products(row++, static_cast<Eigen::Index>(k)) = shape.gradient[a][j] * shape.gradient[b][l];
-  }
-  return products;
-}
+}  // namespace
 
-const Products& products() {
-  static const Products made = gradient_products();
+quadratic_kernel::Elasticity<double> cell_elasticity(const Lattice& lattice, const Mat9& moduli) {
+  constexpr int row[6] = {0, 1, 2, 0, 1, 2}, column[6] = {0, 1, 2, 1, 2, 0};
+  quadratic_kernel::Elasticity<double> made{};
+  const double volume = lattice.spacing.prod();
+  for (int axis = 0; axis < 3; ++axis) made.scale[axis] = 2 / lattice.spacing[axis];
+  double largest = 0;
+  for (int b = 0; b < 6; ++b) {
+    Mat3 strain = Mat3::Zero();  // a unit of it
+    strain(row[b], column[b]) += 0.5;
+    strain(column[b], row[b]) += 0.5;
+    const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> world =
+        lattice.axes * strain * lattice.axes.transpose();
+    const Eigen::Matrix<double, 9, 1> stress = moduli * Eigen::Map<const Eigen::Matrix<double, 9, 1>>(world.data());
+    const Mat3 own = lattice.axes.transpose() *
+                     Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(stress.data()) * lattice.axes;
+    for (int a = 0; a < 6; ++a) {
+      made.moduli[6 * a + b] = volume * own(row[a], column[a]);
+      largest = std::max(largest, std::abs(made.moduli[6 * a + b]));
+    }
+  }
+  const double lambda = made.moduli[1], mu = made.moduli[21];
+  made.isotropic = true;
+  for (int a = 0; a < 6; ++a)
+    for (int b = 0; b < 6; ++b) {
+      const double wanted = a < 3 && b < 3 ? lambda + (a == b ? 2 * mu : 0) : a == b ? mu : 0;
+      if (std::abs(made.moduli[6 * a + b] - wanted) > 1e-14 * largest) made.isotropic = false;
+    }
   return made;
 }
 
-}  // namespace
-
-CellIntegrals::CellIntegrals(const Lattice& lattice, const Mat9& moduli)
-    : lattice_(lattice), moduli_(moduli), volume_(lattice.spacing.prod()) {}
-
-CellMatrix CellIntegrals::stiffness(const Moments& moments) const {
-  const Eigen::VectorXd integrals = products() * moments;
-  // G(j, l) in the world frame: to_world G^ to_world^T, G^ that in cell coordinates
-  const Mat3 to_world = lattice_.axes * lattice_.spacing.cwiseInverse().asDiagonal();
-  CellMatrix k;
-  Eigen::Index pair = 0;
-  for (int a = 0; a < static_cast<int>(kQuadraticNodes); ++a)
-    for (int b = a; b < static_cast<int>(kQuadraticNodes); ++b, ++pair) {
-      const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> own(&integrals[9 * pair]);
-      const Mat3 g = volume_ * (to_world * own * to_world.transpose());
-      Mat3 block;
-      for (int i = 0; i < 3; ++i)
-        for (int c = 0; c < 3; ++c) block(i, c) = moduli_.block<3, 3>(3 * i, 3 * c).cwiseProduct(g).sum();
-      k.block<3, 3>(3 * a, 3 * b) = block;
-      if (a != b) k.block<3, 3>(3 * b, 3 * a) = block.transpose();
-    }
-  for (int a = 0; a < kCellUnknowns; a += 3)  // rounding alone makes the diagonal blocks uneven
-    k.block<3, 3>(a, a) = (0.5 * (k.block<3, 3>(a, a) + k.block<3, 3>(a, a).transpose())).eval();
-  return k;
-}
-
-std::array<double, kQuadraticNodes> CellIntegrals::volumes(const Moments& moments) const {
+std::array<double, kQuadraticNodes> shape_integrals(double voxel, const Moments& moments) {
   std::array<double, kQuadraticNodes> sum{};
   for (std::size_t k = 0; k < kMoments; ++k) {
     const QuadraticShape shape = quadratic_shape(gauss_point(k));
     for (std::size_t n = 0; n < kQuadraticNodes; ++n)
-      sum[n] += volume_ * moments[static_cast<Eigen::Index>(k)] * shape.value[n];
+      sum[n] += voxel * moments[static_cast<Eigen::Index>(k)] * shape.value[n];
   }
   return sum;
 }
 
-Vec3 CellIntegrals::middle(const Moments& moments) {
+Vec3 middle_of(const Moments& moments) {
   Vec3 sum = Vec3::Zero();
   for (std::size_t k = 0; k < kMoments; ++k) sum += moments[static_cast<Eigen::Index>(k)] * gauss_point(k);
   return sum / moments.sum();

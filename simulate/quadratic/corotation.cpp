@@ -67,7 +67,7 @@ bool Corotation::evaluate(std::size_t cell, const std::vector<Vec3>& displacemen
   const Mat3 stretch = r.transpose() * (Mat3::Identity() + gradient);
   const Mat3 spin = (stretch.trace() * Mat3::Identity() - 0.5 * (stretch + stretch.transpose())).inverse();
   // u^ and Y side by side: one product with K
-  Eigen::Matrix<double, kCellUnknowns, 4> columns;
+  CellColumns columns = CellColumns::Zero(), product;
   const std::array<Vec3, kQuadraticNodes> local =
       local_displacement(nodes, cell, displacement, from_rest_[cell]);
   for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
@@ -75,14 +75,10 @@ bool Corotation::evaluate(std::size_t cell, const std::vector<Vec3>& displacemen
     columns.block<3, 3>(at(n), 1) = cross_matrix(nodes.rest[of_cell[n]] - nodes.rest[of_cell[0]] + local[n]);
     turn.gamma.middleRows<3>(at(n)) = -cross_matrix(shape.gradient[n]) * spin;
   }
-  Eigen::Matrix<double, kCellUnknowns, 4> product;
-  if (system_.cell_supports(cell).empty())
-    stiffness_.multiply_set(cell, columns, product);
-  else
-    product.noalias() = system_.elastic_stiffness(cell) * columns;
+  stiffness_.cells().elastic_forces(cell, columns, product);
   const CellValues force = product.col(0);
-  const auto spins = columns.rightCols<3>();
-  Mat3 turned = spins.transpose() * product.rightCols<3>(), stressed = Mat3::Zero();
+  const auto spins = columns.middleCols<3>(1);
+  Mat3 turned = spins.transpose() * product.middleCols<3>(1), stressed = Mat3::Zero();
   Vec3 moment = Vec3::Zero();  // Y^T f
   for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
     const Vec3 f = force.segment<3>(at(n));
@@ -92,7 +88,7 @@ bool Corotation::evaluate(std::size_t cell, const std::vector<Vec3>& displacemen
     stress_[cell].middleRows<3>(at(n)) = -cross_matrix(f);
   }
   stressed = (0.5 * (stressed + stressed.transpose())).eval();
-  turn.a = product.rightCols<3>() + 0.5 * turn.gamma * turned;
+  turn.a = product.middleCols<3>(1) + 0.5 * turn.gamma * turned;
   stress_[cell] += 0.5 * turn.gamma * stressed;
   const CellValues whole = force + turn.gamma * moment;
   for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
@@ -155,12 +151,12 @@ void Corotation::set_tangent(bool stressed) {
   std::vector<CellTurn> turns = turn_;
   if (stressed)
     for (std::size_t c = 0; c < turns.size(); ++c) turns[c].a += stress_[c];
-  stiffness_.turn(std::move(turns));
+  stiffness_.cells().turn(turns);
   parallel_for_each(
       turn_.size(),
       [&](std::size_t c) {
         if (!system_.cell_supports(c).empty())
-          stiffness_.set_own(c, system_.supported_stiffness(c, safety_, turn_[c].rotation));
+          stiffness_.cells().set_support(c, system_.support_stiffness(c, safety_, turn_[c].rotation));
       },
       kTurnedCellsAtATime);
 }

@@ -20,19 +20,62 @@ constexpr int kSteps = 2;        // of Chebyshev's iteration, before and after
 constexpr double kRange = 8;     // largest over smallest eigenvalue that it damps
 constexpr double kMargin = 1.1;  // over the estimate of the largest
 constexpr int kPowerSteps = 15;
-constexpr double kRaised = 1e-6;  // of a block's scaled diagonal: it is kept in single precision
+constexpr double kRaised = 1e-6;  // of a block's scaled diagonal: what it is made from is in single precision
 constexpr std::size_t kBlocksAtATime = 16;
+constexpr std::size_t kPackedSize = static_cast<std::size_t>(kCellUnknowns) * (kCellUnknowns + 1) / 2;
 using Vector = std::vector<Vec3>;
+using CornerMatrix = Eigen::Matrix<double, 24, 24>;
 
 }  // namespace
 
+// Of all cells, while the rest is made from it.
+struct QuadraticMultigrid::CellStiffness {
+  std::vector<CornerMatrix> corners;  // of the trilinear field
+  std::vector<float> packed;          // (cells x kPackedSize) lower triangle, row by row
+
+  explicit CellStiffness(const CellProducts<double>& cells, std::size_t count)
+      : corners(count), packed(count * kPackedSize) {
+    Eigen::Matrix<double, kCellUnknowns, 24> embed = Eigen::Matrix<double, kCellUnknowns, 24>::Zero();
+    for (std::size_t n = 0; n < kQuadraticNodes; ++n)
+      for (std::size_t a = 0; a < 8; ++a)
+        embed.block<3, 3>(static_cast<Eigen::Index>(3 * n), static_cast<Eigen::Index>(3 * a)) =
+            trilinear_weight(n, a) * Mat3::Identity();
+    parallel_for_each(
+        count,
+        [&](std::size_t c) {
+          const CellMatrix matrix = cells.matrix(c);
+          corners[c].noalias() = embed.transpose() * (matrix * embed);
+          float* to = &packed[c * kPackedSize];
+          for (int i = 0; i < kCellUnknowns; ++i)
+            for (int j = 0; j <= i; ++j) *to++ = static_cast<float>(matrix(i, j));
+        },
+        kBlocksAtATime);
+  }
+
+  // Of two of a cell's nodes.
+  [[nodiscard]] Mat3 block(std::size_t cell, std::size_t a, std::size_t b) const {
+    const float* from = &packed[cell * kPackedSize];
+    Mat3 found;
+    for (std::size_t i = 0; i < 3; ++i)
+      for (std::size_t j = 0; j < 3; ++j) {
+        const std::size_t most = std::max(3 * a + i, 3 * b + j), least = std::min(3 * a + i, 3 * b + j);
+        found(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
+            static_cast<double>(from[most * (most + 1) / 2 + least]);
+      }
+    return found;
+  }
+};
+
 QuadraticMultigrid::QuadraticMultigrid(const QuadraticOperator& matrix, const Body& body,
                                        const std::vector<Vec3>& displacement)
-    : matrix_(matrix) {
+    : matrix_(matrix), cells_(matrix.cells()) {
   make_transfer();
-  make_coarse(body, displacement);
+  {
+    const CellStiffness cells(matrix.cells(), matrix.nodes().cells.size());
+    make_coarse(body, displacement, cells);
+    make_blocks(cells);
+  }
   hierarchy_ = aggregation_multigrid(coarse_, geometry_);
-  make_blocks();
   estimate_largest();
 }
 
@@ -55,7 +98,8 @@ void QuadraticMultigrid::make_transfer() {
 }
 
 // P^T K P over the elements that are nodes.
-void QuadraticMultigrid::make_coarse(const Body& body, const std::vector<Vec3>& displacement) {
+void QuadraticMultigrid::make_coarse(const Body& body, const std::vector<Vec3>& displacement,
+                                     const CellStiffness& cells) {
   const QuadraticNodes& nodes = matrix_.nodes();
   std::array<std::size_t, 8> corner{};
   for (std::size_t a = 0; a < 8; ++a) corner[a] = node_of_corner(a);
@@ -71,21 +115,11 @@ void QuadraticMultigrid::make_coarse(const Body& body, const std::vector<Vec3>& 
     coarse_.row_offsets.push_back(coarse_.columns.size());
   }
   coarse_.values.assign(coarse_.columns.size(), Block::Zero());
-  Eigen::Matrix<double, kCellUnknowns, 24> embed = Eigen::Matrix<double, kCellUnknowns, 24>::Zero();
-  for (std::size_t n = 0; n < kQuadraticNodes; ++n)
-    for (std::size_t a = 0; a < 8; ++a)
-      embed.block<3, 3>(static_cast<Eigen::Index>(3 * n), static_cast<Eigen::Index>(3 * a)) =
-          trilinear_weight(n, a) * Mat3::Identity();
-  std::vector<Eigen::Matrix<double, 24, 24>> of_cell(nodes.cells.size());
-  parallel_for_each(
-      nodes.cells.size(),
-      [&](std::size_t c) { of_cell[c].noalias() = embed.transpose() * (matrix_.matrix(c) * embed); },
-      kBlocksAtATime);
   for (std::size_t c = 0; c < nodes.cells.size(); ++c)
     for (std::size_t a = 0; a < 8; ++a)
       for (std::size_t b = 0; b < 8; ++b)
         coarse_.values[position_of(coarse_, nodes.of_cell[c][corner[a]], nodes.of_cell[c][corner[b]])] +=
-            of_cell[c].block<3, 3>(static_cast<Eigen::Index>(3 * a), static_cast<Eigen::Index>(3 * b));
+            cells.corners[c].block<3, 3>(static_cast<Eigen::Index>(3 * a), static_cast<Eigen::Index>(3 * b));
   Constraints held;
   held.mask.assign(matrix_.held().begin(), matrix_.held().begin() + static_cast<std::ptrdiff_t>(rows.size()));
   eliminate(held, coarse_);
@@ -98,38 +132,40 @@ void QuadraticMultigrid::make_coarse(const Body& body, const std::vector<Vec3>& 
   }
 }
 
-void QuadraticMultigrid::make_blocks() {
+void QuadraticMultigrid::make_blocks(const CellStiffness& cells) {
   const QuadraticNodes& nodes = matrix_.nodes();
   for (std::uint32_t c = 0; c < nodes.cells.size(); ++c)
-    if (matrix_.has_own(c)) block_cells_.push_back(c);
+    if (!cells_.is_whole(c) || cells_.is_supported(c)) block_cells_.push_back(c);
   blocks_at_.resize(nodes.size());
   for (std::uint32_t b = 0; b < block_cells_.size(); ++b)
     for (std::uint32_t n = 0; n < kQuadraticNodes; ++n)
       blocks_at_[nodes.of_cell[block_cells_[b]][n]].emplace_back(b, n);
   weight_.assign(nodes.size(), 0);
   inverse_.assign(nodes.size(), Block::Zero());
-  std::vector<Block> diagonal = matrix_.diagonal();
   for (std::size_t n = 0; n < nodes.size(); ++n) {
     if (!blocks_at_[n].empty()) {
       weight_[n] = 1 / std::sqrt(static_cast<double>(blocks_at_[n].size()));
       continue;
     }
+    Block diagonal = Block::Zero();
+    for (const QuadraticNodes::Incidence& at : nodes.at(n)) diagonal += cells.block(at.cell, at.node, at.node);
     for (int axis = 0; axis < 3; ++axis)
       if (matrix_.held()[n] >> axis & 1) {
-        diagonal[n].row(axis).setZero();
-        diagonal[n].col(axis).setZero();
-        diagonal[n](axis, axis) = 1;
+        diagonal.row(axis).setZero();
+        diagonal.col(axis).setZero();
+        diagonal(axis, axis) = 1;
       }
-    inverse_[n] = diagonal[n].inverse();
+    inverse_[n] = diagonal.inverse();
   }
-  factors_.assign(block_cells_.size() * kPackedSize, 0);
-  block_values_.assign(block_cells_.size() * kCellUnknowns, 0);
+  inverse_factors_.assign(block_cells_.size() * quadratic_kernel::kTriangleSize, 0);
+  block_values_.assign(block_cells_.size() * quadratic_kernel::kPaddedUnknowns, 0);
   parallel_for_each(
-      block_cells_.size(), [&](std::size_t b) { factorise(b, block_cells_[b]); }, kBlocksAtATime);
+      block_cells_.size(), [&](std::size_t b) { factorise(b, block_cells_[b], cells); }, kBlocksAtATime);
 }
 
-// Cholesky's factor of the assembled stiffness of a cell's nodes.
-void QuadraticMultigrid::factorise(std::size_t block, std::uint32_t cell) {
+// The inverse of Cholesky's factor of the assembled stiffness of a cell's nodes: with T = L^-1, T^T T is its inverse, and
+// positive however T is rounded.
+void QuadraticMultigrid::factorise(std::size_t block, std::uint32_t cell, const CellStiffness& cells) {
   const QuadraticNodes& nodes = matrix_.nodes();
   const auto& own = nodes.of_cell[cell];
   std::vector<std::uint32_t> around;
@@ -145,7 +181,7 @@ void QuadraticMultigrid::factorise(std::size_t block, std::uint32_t cell) {
         shared.emplace_back(3 * (found - own.begin()), n);
     for (const auto& [a, there_a] : shared)
       for (const auto& [b, there_b] : shared)
-        if (b <= a) sum.block<3, 3>(a, b) += matrix_.block(other, there_a, there_b);
+        if (b <= a) sum.block<3, 3>(a, b) += cells.block(other, there_a, there_b);
   }
   sum.triangularView<Eigen::StrictlyUpper>() = sum.transpose();
   for (std::size_t n = 0; n < kQuadraticNodes; ++n)
@@ -166,32 +202,37 @@ void QuadraticMultigrid::factorise(std::size_t block, std::uint32_t cell) {
     scaled.diagonal().array() += more;
     factor.compute(scaled);
   }
-  const CellMatrix lower = scale.asDiagonal() * CellMatrix(factor.matrixL());
-  float* to = &factors_[block * kPackedSize];
-  for (int i = 0; i < kCellUnknowns; ++i)
-    for (int j = 0; j <= i; ++j) *to++ = static_cast<float>(lower(i, j));
+  CellMatrix lower = CellMatrix::Identity();
+  factor.matrixL().solveInPlace(lower);
+  float* to = &inverse_factors_[block * quadratic_kernel::kTriangleSize];
+  for (std::size_t group = 0; group < quadratic_kernel::kGroups; ++group)
+    for (std::size_t r = 0; r < quadratic_kernel::kRows; ++r, to += quadratic_kernel::group_columns(group)) {
+      const auto row = static_cast<Eigen::Index>(quadratic_kernel::kRows * group + r);
+      if (row >= kCellUnknowns) break;
+      for (Eigen::Index j = 0; j <= row; ++j) to[j] = static_cast<float>(lower(row, j) / scale[j]);
+    }
+}
+
+void QuadraticMultigrid::multiply_roughly(const Vector& x, Vector& y) const {
+  y.resize(x.size());
+  cells_.forces(x[0].data(), y[0].data());
+  matrix_.clear_held(y);
 }
 
 void QuadraticMultigrid::smooth_once(const Vector& residual, Vector& correction) const {
   const QuadraticNodes& nodes = matrix_.nodes();
-  using Values = Eigen::Matrix<float, kCellUnknowns, 1>;
+  using quadratic_kernel::kPaddedUnknowns;
   parallel_for_each(
       block_cells_.size(),
       [&](std::size_t b) {
-        Eigen::Map<Values> x(&block_values_[b * kCellUnknowns]);
+        alignas(64) float wanted[kPaddedUnknowns] = {};
         const auto& own = nodes.of_cell[block_cells_[b]];
         for (std::size_t n = 0; n < kQuadraticNodes; ++n)
-          x.segment<3>(static_cast<Eigen::Index>(3 * n)) = (weight_[own[n]] * residual[own[n]]).cast<float>();
-        const float* row = &factors_[b * kPackedSize];
-        for (int i = 0; i < kCellUnknowns; ++i) {
-          x[i] = (x[i] - Eigen::Map<const Eigen::VectorXf>(row, i).dot(x.head(i))) / row[i];
-          row += i + 1;
-        }
-        for (int i = kCellUnknowns - 1; i >= 0; --i) {
-          row -= i + 1;
-          x[i] /= row[i];
-          x.head(i) -= x[i] * Eigen::Map<const Eigen::VectorXf>(row, i);
-        }
+          for (std::size_t axis = 0; axis < 3; ++axis)
+            wanted[3 * n + axis] = static_cast<float>(
+                weight_[own[n]] * residual[own[n]][static_cast<Eigen::Index>(axis)]);
+        quadratic_kernel::best().square(&inverse_factors_[b * quadratic_kernel::kTriangleSize], wanted,
+                         &block_values_[b * kPaddedUnknowns]);
       },
       kBlocksAtATime);
   correction.resize(residual.size());
@@ -203,7 +244,7 @@ void QuadraticMultigrid::smooth_once(const Vector& residual, Vector& correction)
     Vec3 sum = Vec3::Zero();
     for (const auto& [block, node] : blocks_at_[n])
       sum +=
-          Eigen::Map<const Eigen::Vector3f>(&block_values_[block * kCellUnknowns + 3 * node]).cast<double>();
+          Eigen::Map<const Eigen::Vector3f>(&block_values_[block * kPaddedUnknowns + 3 * node]).cast<double>();
     correction[n] = weight_[n] * sum;
   });
   matrix_.clear_held(correction);
@@ -219,7 +260,7 @@ void QuadraticMultigrid::estimate_largest() {
     const double norm = std::sqrt(dot(x, x));
     if (!(norm > 0)) return;
     parallel_for_each(x.size(), [&](std::size_t n) { x[n] /= norm; });
-    multiply(matrix_, x, image);
+    multiply_roughly(x, image);
     smooth_once(image, x);
     largest_ = std::sqrt(dot(x, x));
   }
@@ -232,7 +273,7 @@ void QuadraticMultigrid::chebyshev(const Vector& b, Vector& x, bool from_zero) c
   double rho = half / middle;
   Vector residual = b, image, smoothed;
   if (!from_zero) {
-    multiply(matrix_, x, image);
+    multiply_roughly(x, image);
     parallel_for_each(b.size(), [&](std::size_t n) { residual[n] -= image[n]; });
   }
   smooth_once(residual, smoothed);
@@ -241,7 +282,7 @@ void QuadraticMultigrid::chebyshev(const Vector& b, Vector& x, bool from_zero) c
   for (int i = 0;; ++i) {
     parallel_for_each(x.size(), [&](std::size_t n) { x[n] += step[n]; });
     if (i + 1 == kSteps) return;
-    multiply(matrix_, step, image);
+    multiply_roughly(step, image);
     parallel_for_each(x.size(), [&](std::size_t n) { residual[n] -= image[n]; });
     smooth_once(residual, smoothed);
     const double next = 1 / (2 * middle / half - rho);
@@ -253,7 +294,7 @@ void QuadraticMultigrid::chebyshev(const Vector& b, Vector& x, bool from_zero) c
 
 void QuadraticMultigrid::add_coarse_correction(const Vector& b, Vector& x) const {
   Vector residual;
-  multiply(matrix_, x, residual);
+  multiply_roughly(x, residual);
   parallel_for_each(b.size(), [&](std::size_t n) { residual[n] = b[n] - residual[n]; });
   matrix_.clear_held(residual);
   const std::size_t elements = matrix_.nodes().elements.size();

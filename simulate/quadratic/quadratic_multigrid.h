@@ -1,10 +1,10 @@
 // The preconditioner of model `quadratic`: p-multigrid.
 //
-// Chebyshev(2) before and after, smoothed by additive Schwarz: one block a cell with a matrix of its own (all 27
-// nodes of the assembled stiffness), weighted by 1 / sqrt(multiplicity) on both sides, and 3 x 3 blocks of all other
-// nodes. Between them the trilinear field on the same lattice: its Galerkin operator P^T K P, made cell by cell, and
+// Chebyshev(2) before and after, smoothed by additive Schwarz: one block a cell that the surface cuts or a support holds
+// (all 27 nodes of the assembled stiffness), weighted by 1 / sqrt(multiplicity) on both sides, and 3 x 3 blocks of all
+// other nodes. Between them the trilinear field on the same lattice: its Galerkin operator P^T K P, made cell by cell, and
 // the hierarchy of simulate/linear/multigrid.h. Without the blocks of the cut cells conjugate gradients need some
-// thirty times the iterations (measured).
+// thirty times the iterations (measured). Products and blocks are in single precision.
 #pragma once
 #include <memory>
 
@@ -30,17 +30,21 @@ class QuadraticMultigrid final : public Preconditioner {
   [[nodiscard]] const NodeGeometry& geometry() const { return geometry_; }
 
  private:
+  struct CellStiffness;
   void make_transfer();
-  void make_coarse(const Body& body, const std::vector<Vec3>& displacement);
-  void make_blocks();
-  void factorise(std::size_t block, std::uint32_t cell);
+  void make_coarse(const Body& body, const std::vector<Vec3>& displacement, const CellStiffness& cells);
+  void make_blocks(const CellStiffness& cells);
+  void factorise(std::size_t block, std::uint32_t cell, const CellStiffness& cells);
   void estimate_largest();
+  // y = K x, 0 in prescribed components
+  void multiply_roughly(const std::vector<Vec3>& x, std::vector<Vec3>& y) const;
   // correction = M^-1 residual, M the Schwarz smoother
   void smooth_once(const std::vector<Vec3>& residual, std::vector<Vec3>& correction) const;
   void chebyshev(const std::vector<Vec3>& b, std::vector<Vec3>& x, bool from_zero) const;
   void add_coarse_correction(const std::vector<Vec3>& b, std::vector<Vec3>& x) const;
 
   const QuadraticOperator& matrix_;
+  CellProducts<float> cells_;
   // (nodes) the elements that a node lies between, with even weights
   std::vector<std::uint32_t> from_offsets_, from_;
   std::vector<std::uint32_t> to_offsets_, to_;  // transposed: nodes of each element
@@ -48,12 +52,12 @@ class QuadraticMultigrid final : public Preconditioner {
   NodeGeometry geometry_;
   std::unique_ptr<Preconditioner> hierarchy_;
   std::vector<std::uint32_t> block_cells_;  // cells that have a block
-  std::vector<float> factors_;              // (blocks x kPackedSize) Cholesky's, scaled by the diagonal
+  std::vector<float> inverse_factors_;      // (blocks x kTriangleSize) inverse of Cholesky's factor
   std::vector<double> weight_;              // (nodes) 1 / sqrt(multiplicity); 0: not in any block
   std::vector<std::vector<std::pair<std::uint32_t, std::uint32_t>>> blocks_at_;  // (nodes) block, node of it
   std::vector<Block> inverse_;               // (nodes) of the diagonal block, where weight_ is 0
   double largest_ = 1;                       // eigenvalue of M^-1 A
-  mutable std::vector<float> block_values_;  // (blocks x 81)
+  mutable std::vector<float> block_values_;  // (blocks x kPaddedUnknowns)
 };
 
 }  // namespace flexel::simulate

@@ -252,13 +252,10 @@ void report(const QuadraticSystem& system, const QuadraticSolution& solution, Si
       nodes.cells.size(),
       [&](std::size_t c) {
         const auto local = local_displacement(nodes, c, solution.displacement, turn_of_cell(solution, c));
-        Eigen::Matrix<double, kCellUnknowns, 4> u = Eigen::Matrix<double, kCellUnknowns, 4>::Zero(), force;
+        CellColumns u = CellColumns::Zero(), force;
         for (std::size_t n = 0; n < kQuadraticNodes; ++n)
           u.block<3, 1>(static_cast<Eigen::Index>(3 * n), 0) = local[n];
-        if (system.cell_supports(c).empty())
-          solution.tangent->stiffness.multiply_set(c, u, force);
-        else
-          force.noalias() = system.elastic_stiffness(c) * u;
+        solution.tangent->stiffness.cells().elastic_forces(c, u, force);
         return 0.5 * u.col(0).dot(force.col(0));
       },
       kAnswerCellsAtATime);

@@ -47,7 +47,6 @@ QuadraticSystem::QuadraticSystem(const Problem& problem, const Scene& scene)
     moduli_.push_back(elasticity(law, Mat3::Zero()));
     // of an orthotropic material the largest eigenvalue of dP/dF
     stiffest_.push_back(law.name == LawName::orthotropic ? law.stiffest : law.lambda + 2 * law.mu);
-    integrals_.emplace_back(body.parts[p].lattice, moduli_.back());
   }
   place_supports(scene.get<Supports>().ties);
   place_loads(scene.get<Loads>().loads);
@@ -161,7 +160,7 @@ void QuadraticSystem::check_area(const Load& load, const std::vector<std::uint32
 void QuadraticSystem::add_gravity(const Vec3& acceleration) {
   NodalLoad made{"gravity", std::vector<Vec3>(nodes_.size(), Vec3::Zero())};
   for (std::size_t c = 0; c < nodes_.cells.size(); ++c) {
-    const auto volumes = integrals_[part_[c]].volumes(moments(c));
+    const auto volumes = shape_integrals(lattice(c).spacing.prod(), moments(c));
     for (std::size_t n = 0; n < kQuadraticNodes; ++n)
       made.forces[nodes_.of_cell[c][n]] += problem_.materials[part_[c]].density * volumes[n] * acceleration;
   }
@@ -172,17 +171,12 @@ Moments QuadraticSystem::moments(std::size_t cell) const {
   return moments_at_[cell] == kWhole ? whole_cell_moments() : body_moments(problem_.body, moments_at_[cell]);
 }
 
-CellMatrix QuadraticSystem::elastic_stiffness(std::size_t cell) const {
-  const Moments own = moments(cell), whole = whole_cell_moments();
-  return integrals_[part_[cell]].stiffness(own + kOutside * (whole - own));
-}
-
 Vec3 QuadraticSystem::middle(std::size_t cell) const {
-  return CellIntegrals::middle(moments(cell)).cwiseMax(0).cwiseMin(1);
+  return middle_of(moments(cell)).cwiseMax(0).cwiseMin(1);
 }
 
-CellMatrix QuadraticSystem::supported_stiffness(std::size_t cell, double safety, const Mat3& rotation) const {
-  CellMatrix matrix = elastic_stiffness(cell);
+CellMatrix QuadraticSystem::support_stiffness(std::size_t cell, double safety, const Mat3& rotation) const {
+  CellMatrix matrix = CellMatrix::Zero();
   for (const SupportIntegrals& each : cell_supports_[cell])
     each.add_to(penalty(cell, safety), rotation, matrix);
   return matrix;
@@ -208,20 +202,28 @@ std::vector<std::uint8_t> QuadraticSystem::held() const {
 }
 
 QuadraticOperator QuadraticSystem::stiffness(double safety) const {
-  QuadraticOperator made(nodes_, held());
-  std::vector<std::uint32_t> own;
+  std::vector<CellProducts<double>::PartCells> parts;
+  for (std::size_t p = 0; p < moduli_.size(); ++p) {
+    const Lattice& lattice = problem_.body.parts[p].lattice;
+    parts.push_back({cell_elasticity(lattice, moduli_[p]), lattice.axes});
+  }
+  const Moments whole = whole_cell_moments();
+  CellProducts<double> cells(nodes_, parts, part_, [&](std::size_t c) -> std::optional<Moments> {
+    if (moments_at_[c] == kWhole) return std::nullopt;
+    const Moments own = moments(c);
+    return Moments(own + kOutside * (whole - own));
+  });
+  std::vector<std::uint32_t> supported;
   for (std::uint32_t c = 0; c < nodes_.cells.size(); ++c)
-    if (moments_at_[c] != kWhole || !cell_supports_[c].empty()) own.push_back(c);
-  std::vector<std::uint32_t> shared;
-  for (const CellIntegrals& integrals : integrals_)
-    shared.push_back(made.add_shared(integrals.stiffness(whole_cell_moments())));
-  for (std::size_t c = 0; c < nodes_.cells.size(); ++c) made.share(c, shared[part_[c]]);
-  made.reserve_own(own);
+    if (!cell_supports_[c].empty()) supported.push_back(c);
+  cells.reserve_supports(supported);
   parallel_for_each(
-      own.size(),
-      [&](std::size_t i) { made.set_own(own[i], supported_stiffness(own[i], safety, Mat3::Identity())); },
+      supported.size(),
+      [&](std::size_t i) {
+        cells.set_support(supported[i], support_stiffness(supported[i], safety, Mat3::Identity()));
+      },
       kIntegratedCellsAtATime);
-  return made;
+  return {nodes_, std::move(cells), held()};
 }
 
 std::vector<Vec3> QuadraticSystem::right_side(double safety) const {

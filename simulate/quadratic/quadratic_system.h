@@ -36,7 +36,6 @@ class QuadraticSystem {
   [[nodiscard]] std::uint32_t part_of(std::size_t cell) const { return part_[cell]; }
   // Of the cell of that index in nodes().cells.
   [[nodiscard]] Moments moments(std::size_t cell) const;
-  [[nodiscard]] CellMatrix elastic_stiffness(std::size_t cell) const;
   [[nodiscard]] const Lattice& lattice(std::size_t cell) const {
     return problem_.body.parts[part_[cell]].lattice;
   }
@@ -46,8 +45,8 @@ class QuadraticSystem {
   [[nodiscard]] const std::vector<SupportIntegrals>& cell_supports(std::size_t cell) const {
     return cell_supports_[cell];
   }
-  // elastic_stiffness() with its supports, in the frame of a cell that is turned.
-  [[nodiscard]] CellMatrix supported_stiffness(std::size_t cell, double safety, const Mat3& rotation) const;
+  // What its supports add to a cell's stiffness, in the frame of a cell that is turned.
+  [[nodiscard]] CellMatrix support_stiffness(std::size_t cell, double safety, const Mat3& rotation) const;
   [[nodiscard]] double penalty(std::size_t cell, double safety) const;  // Pa/m, beta
   [[nodiscard]] NitschePoint point(const NitscheSupport& support, const FacePoint& at, double safety,
                                    double share = 1) const;
@@ -73,7 +72,6 @@ class QuadraticSystem {
   std::vector<std::uint32_t> moments_at_;  // (cells) place in the body's moments; kWhole
   std::vector<Mat9> moduli_;               // (parts) Pa, world frame
   std::vector<double> stiffest_;           // (parts) Pa, lambda + 2 mu
-  std::vector<CellIntegrals> integrals_;   // (parts)
   std::vector<NitscheSupport> supports_;
   std::vector<std::vector<SupportIntegrals>> cell_supports_;  // (cells)
   std::vector<NodalLoad> loads_;

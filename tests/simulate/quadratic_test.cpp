@@ -212,10 +212,11 @@ struct Turned {
     double sum = 0;
     for (std::size_t c = 0; c < system.nodes().cells.size(); ++c) {
       const auto local = local_displacement(system.nodes(), c, u, cells.turns()[c]);
-      Eigen::Matrix<double, kCellUnknowns, 1> values;
+      CellColumns values = CellColumns::Zero(), forces;
       for (std::size_t n = 0; n < kQuadraticNodes; ++n)
-        values.segment<3>(static_cast<Eigen::Index>(3 * n)) = local[n];
-      sum += 0.5 * values.dot(system.elastic_stiffness(c) * values);
+        values.block<3, 1>(static_cast<Eigen::Index>(3 * n), 0) = local[n];
+      stiffness.cells().elastic_forces(c, values, forces);
+      sum += 0.5 * values.col(0).dot(forces.col(0));
     }
     return sum;
   }

@@ -1,0 +1,310 @@
+// A product is made cell by cell, then gathered node by node in the order of the cells, so that it has the same
+// bits for any number of threads. Displacements are taken beside those of a cell's first node, for a translation needs no
+// force and floats have no digits to spare for it.
+#include "simulate/quadratic/cell_products.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "base/parallel.h"
+
+namespace flexel::simulate {
+namespace {
+
+constexpr std::size_t kEightsAtATime = 4, kNodesAtATime = 512;
+constexpr std::size_t kWidth = quadratic_kernel::kWidth, kPoints = 3;
+constexpr std::size_t kWholeMoments = kPoints * kPoints * kPoints;
+constexpr std::size_t kTurnNumbers = static_cast<std::size_t>(kCellUnknowns) * 3;
+constexpr std::size_t kPackedSize = static_cast<std::size_t>(kCellUnknowns) * (kCellUnknowns + 1) / 2;
+using CellValues = Eigen::Matrix<double, kCellUnknowns, 1>;
+
+void multiply(bool whole, const quadratic_kernel::EightCells<double>& cells,
+              const quadratic_kernel::Elasticity<double>& part, double* values) {
+  quadratic_kernel::best().product[whole ? 0 : 1](cells, part, values);
+}
+void multiply(bool whole, const quadratic_kernel::EightCells<float>& cells,
+              const quadratic_kernel::Elasticity<float>& part, float* values) {
+  quadratic_kernel::best().product_of_floats[whole ? 0 : 1](cells, part, values);
+}
+
+template <class To, class From>
+quadratic_kernel::Elasticity<To> in_precision(const quadratic_kernel::Elasticity<From>& from) {
+  quadratic_kernel::Elasticity<To> to{};
+  std::transform(std::begin(from.scale), std::end(from.scale), to.scale, [](From x) { return static_cast<To>(x); });
+  std::transform(std::begin(from.moduli), std::end(from.moduli), to.moduli,
+                 [](From x) { return static_cast<To>(x); });
+  to.isotropic = from.isotropic;
+  return to;
+}
+
+template <class To, class From>
+std::vector<To> in_precision(const std::vector<From>& from) {
+  std::vector<To> to(from.size());
+  std::transform(from.begin(), from.end(), to.begin(), [](From x) { return static_cast<To>(x); });
+  return to;
+}
+
+template <class Number>
+void put_rotation(const Mat3& rotation, std::size_t lane, Number* to) {
+  for (Eigen::Index i = 0; i < 3; ++i)
+    for (Eigen::Index j = 0; j < 3; ++j)
+      to[kWidth * static_cast<std::size_t>(3 * i + j) + lane] = static_cast<Number>(rotation(i, j));
+}
+
+}  // namespace
+
+template <class Number>
+CellProducts<Number>::CellProducts(const QuadraticNodes& nodes, const std::vector<PartCells>& parts,
+                                   const std::vector<std::uint32_t>& part,
+                                   const std::function<std::optional<Moments>(std::size_t)>& moments)
+    : nodes_(&nodes), place_(nodes.cells.size()), cell_force_(nodes.cells.size() * kCellUnknowns) {
+  for (const PartCells& each : parts) {
+    parts_.push_back({in_precision<Number>(each.elasticity), each.axes, each.axes == Mat3::Identity()});
+    first_rotation_.resize(first_rotation_.size() + 9 * kWidth);
+    for (std::size_t lane = 0; lane < kWidth; ++lane)
+      put_rotation(each.axes.transpose(), lane,
+                   first_rotation_.data() + first_rotation_.size() - 9 * kWidth);
+  }
+  constexpr double weights[kPoints] = {5. / 18, 8. / 18, 5. / 18};  // Gauss's on [0, 1]
+  for (std::size_t k = 0; k < kWholeMoments; ++k)
+    moments_.insert(moments_.end(), kWidth,
+                    static_cast<Number>(weights[k % 3] * weights[k / 3 % 3] * weights[k / 9]));
+  std::vector<std::vector<std::uint32_t>> lists(2 * parts.size());  // of a part: cut cells, whole ones
+  for (std::uint32_t c = 0; c < nodes.cells.size(); ++c)
+    lists[2 * part[c] + (moments(c) ? 0 : 1)].push_back(c);
+  for (std::size_t list = 0; list < lists.size(); ++list)
+    for (std::size_t first = 0; first < lists[list].size(); first += kWidth) {
+      Eight& eight = eights_.emplace_back();
+      eight.part = static_cast<std::uint32_t>(list / 2);
+      eight.whole = list % 2 == 1;
+      eight.count = static_cast<std::uint32_t>(std::min(kWidth, lists[list].size() - first));
+      eight.moments = eight.whole ? 0 : moments_.size();
+      if (!eight.whole) moments_.resize(moments_.size() + kMoments * kWidth);
+      for (std::size_t lane = 0; lane < eight.count; ++lane) {
+        const std::uint32_t c = eight.cell[lane] = lists[list][first + lane];
+        place_[c] = static_cast<std::uint32_t>(kWidth * (eights_.size() - 1) + lane);
+        if (eight.whole) continue;
+        const Moments own = *moments(c);
+        for (std::size_t k = 0; k < kMoments; ++k)
+          moments_[eight.moments + kWidth * k + lane] = static_cast<Number>(own[static_cast<Eigen::Index>(k)]);
+      }
+    }
+}
+
+template <class Number>
+template <class Other>
+CellProducts<Number>::CellProducts(const CellProducts<Other>& other)
+    : nodes_(other.nodes_),
+      place_(other.place_),
+      moments_(in_precision<Number>(other.moments_)),
+      first_rotation_(in_precision<Number>(other.first_rotation_)),
+      rotation_(in_precision<Number>(other.rotation_)),
+      a_(in_precision<Number>(other.a_)),
+      gamma_(in_precision<Number>(other.gamma_)),
+      turned_(other.turned_),
+      support_at_(other.support_at_),
+      support_(other.support_),
+      cell_force_(other.cell_force_.size()) {
+  for (const auto& each : other.parts_)
+    parts_.push_back({in_precision<Number>(each.elasticity), each.axes, each.along_world});
+  for (const auto& each : other.eights_)
+    eights_.push_back({each.cell, each.count, each.part, each.whole, each.moments});
+}
+
+template <class Number>
+void CellProducts<Number>::reserve_supports(const std::vector<std::uint32_t>& cells) {
+  support_at_.assign(place_.size(), -1);
+  for (std::size_t i = 0; i < cells.size(); ++i) support_at_[cells[i]] = static_cast<std::int32_t>(i);
+  support_.assign(cells.size() * kPackedSize, 0);
+}
+
+template <class Number>
+void CellProducts<Number>::set_support(std::size_t cell, const CellMatrix& matrix) {
+  double* to = &support_[static_cast<std::size_t>(support_at_[cell]) * kPackedSize];
+  for (int i = 0; i < kCellUnknowns; ++i)
+    for (int j = 0; j <= i; ++j) *to++ = matrix(i, j);
+}
+
+template <class Number>
+void CellProducts<Number>::turn(const std::vector<CellTurn>& turns) {
+  rotation_.assign(eights_.size() * 9 * kWidth, 0);
+  a_.assign(eights_.size() * kTurnNumbers * kWidth, 0);
+  gamma_ = a_;
+  turned_.resize(turns.size());
+  parallel_for_each(
+      eights_.size(),
+      [&](std::size_t e) {
+        const Eight& eight = eights_[e];
+        const Mat3& axes = parts_[eight.part].axes;
+        for (std::size_t lane = 0; lane < eight.count; ++lane) {
+          const CellTurn& turn = turns[eight.cell[lane]];
+          turned_[eight.cell[lane]] = turn.rotation;
+          put_rotation((turn.rotation * axes).transpose(), lane, &rotation_[e * 9 * kWidth]);
+          for (Eigen::Index n = 0; n < kCellUnknowns; n += 3) {
+            const Mat3 a = axes.transpose() * turn.a.template middleRows<3>(n),
+                       gamma = axes.transpose() * turn.gamma.template middleRows<3>(n);
+            for (Eigen::Index i = 0; i < 3; ++i)
+              for (Eigen::Index k = 0; k < 3; ++k) {
+                const std::size_t to =
+                    kWidth * (e * kTurnNumbers + static_cast<std::size_t>(3 * (n + i) + k)) + lane;
+                a_[to] = static_cast<Number>(a(i, k));
+                gamma_[to] = static_cast<Number>(gamma(i, k));
+              }
+          }
+        }
+      },
+      kEightsAtATime);
+}
+
+template <class Number>
+void CellProducts<Number>::apply(std::size_t e, Number* values) const {
+  const Eight& eight = eights_[e];
+  const Part& part = parts_[eight.part];
+  quadratic_kernel::EightCells<Number> cells{&moments_[eight.moments], nullptr, nullptr, nullptr};
+  if (!rotation_.empty()) {
+    cells.rotation = &rotation_[e * 9 * kWidth];
+    cells.a = &a_[e * kTurnNumbers * kWidth];
+    cells.gamma = &gamma_[e * kTurnNumbers * kWidth];
+  } else if (!part.along_world) {
+    cells.rotation = &first_rotation_[eight.part * 9 * kWidth];
+  }
+  multiply(eight.whole, cells, part.elasticity, values);
+}
+
+// Adds R S R^T x to the forces of a cell.
+template <class Number>
+void CellProducts<Number>::add_support(std::size_t cell, const double* x, Number* forces) const {
+  CellValues own, sum = CellValues::Zero();
+  for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
+    const Eigen::Map<const Vec3> at(x + 3 * nodes_->of_cell[cell][n]);
+    own.segment<3>(static_cast<Eigen::Index>(3 * n)) =
+        turned_.empty() ? Vec3(at) : Vec3(turned_[cell].transpose() * at);
+  }
+  const double* packed = &support_[static_cast<std::size_t>(support_at_[cell]) * kPackedSize];
+  for (int i = 0; i < kCellUnknowns; ++i) {
+    const Eigen::Map<const Eigen::VectorXd> row(packed, i);
+    sum[i] += row.dot(own.head(i)) + packed[i] * own[i];
+    sum.head(i) += own[i] * row;
+    packed += i + 1;
+  }
+  for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
+    const Vec3 at = sum.segment<3>(static_cast<Eigen::Index>(3 * n));
+    const Vec3 force = turned_.empty() ? at : Vec3(turned_[cell] * at);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      forces[3 * n + axis] += static_cast<Number>(force[static_cast<Eigen::Index>(axis)]);
+  }
+}
+
+template <class Number>
+void CellProducts<Number>::forces(const double* x, double* y) const {
+  parallel_for_each(
+      eights_.size(),
+      [&](std::size_t e) {
+        const Eight& eight = eights_[e];
+        alignas(64) Number values[kCellUnknowns * kWidth];
+        std::fill(std::begin(values), std::end(values), Number{0});
+        for (std::size_t lane = 0; lane < eight.count; ++lane) {
+          const auto& of_cell = nodes_->of_cell[eight.cell[lane]];
+          const double* first = x + 3 * std::size_t{of_cell[0]};
+          for (std::size_t n = 0; n < kQuadraticNodes; ++n)
+            for (std::size_t axis = 0; axis < 3; ++axis)
+              values[kWidth * (3 * n + axis) + lane] =
+                  static_cast<Number>(x[3 * std::size_t{of_cell[n]} + axis] - first[axis]);
+        }
+        apply(e, values);
+        for (std::size_t lane = 0; lane < eight.count; ++lane) {
+          Number* to = &cell_force_[eight.cell[lane] * kCellUnknowns];
+          for (std::size_t i = 0; i < kCellUnknowns; ++i) to[i] = values[kWidth * i + lane];
+          if (is_supported(eight.cell[lane])) add_support(eight.cell[lane], x, to);
+        }
+      },
+      kEightsAtATime);
+  parallel_for_each(
+      nodes_->size(),
+      [&](std::size_t n) {
+        double sum[3] = {0, 0, 0};
+        for (const QuadraticNodes::Incidence& at : nodes_->at(n))
+          for (std::size_t axis = 0; axis < 3; ++axis)
+            sum[axis] += static_cast<double>(cell_force_[at.cell * kCellUnknowns + 3 * at.node + axis]);
+        for (std::size_t axis = 0; axis < 3; ++axis) y[3 * n + axis] = sum[axis];
+      },
+      kNodesAtATime);
+}
+
+template <class Number>
+void CellProducts<Number>::multiply_one(std::size_t cell, bool turned, const CellColumns& x,
+                                        CellColumns& product) const {
+  const std::size_t e = place_[cell] / kWidth, lane = place_[cell] % kWidth;
+  const Eight& eight = eights_[e];
+  const Part& part = parts_[eight.part];
+  const auto everywhere = [&](const Number* from, std::size_t count) {
+    std::vector<Number> to(count * kWidth);
+    for (std::size_t i = 0; i < count; ++i)
+      std::fill_n(to.begin() + static_cast<std::ptrdiff_t>(kWidth * i), kWidth, from[kWidth * i + lane]);
+    return to;
+  };
+  const std::vector<Number> moments =
+      everywhere(&moments_[eight.moments], eight.whole ? kWholeMoments : kMoments);
+  std::vector<Number> rotation, a, gamma;
+  quadratic_kernel::EightCells<Number> cells{moments.data(), nullptr, nullptr, nullptr};
+  if (turned && !rotation_.empty()) {
+    rotation = everywhere(&rotation_[e * 9 * kWidth], 9);
+    a = everywhere(&a_[e * kTurnNumbers * kWidth], kTurnNumbers);
+    gamma = everywhere(&gamma_[e * kTurnNumbers * kWidth], kTurnNumbers);
+    cells = {moments.data(), rotation.data(), a.data(), gamma.data()};
+  } else if (!part.along_world) {
+    cells.rotation = &first_rotation_[eight.part * 9 * kWidth];
+  }
+  alignas(64) Number values[kCellUnknowns * kWidth];
+  for (Eigen::Index i = 0; i < kCellUnknowns; ++i)
+    for (Eigen::Index c = 0; c < 8; ++c) values[8 * i + c] = static_cast<Number>(x(i, c));
+  multiply(eight.whole, cells, part.elasticity, values);
+  for (Eigen::Index i = 0; i < kCellUnknowns; ++i)
+    for (Eigen::Index c = 0; c < 8; ++c) product(i, c) = static_cast<double>(values[8 * i + c]);
+}
+
+template <class Number>
+void CellProducts<Number>::elastic_forces(std::size_t cell, const CellColumns& x, CellColumns& product) const {
+  multiply_one(cell, false, x, product);
+}
+
+template <class Number>
+CellMatrix CellProducts<Number>::matrix(std::size_t cell) const {
+  CellMatrix made;
+  CellColumns unit, column;
+  for (Eigen::Index first = 0; first < kCellUnknowns; first += 8) {
+    const Eigen::Index count = std::min<Eigen::Index>(8, kCellUnknowns - first);
+    unit.setZero();
+    for (Eigen::Index c = 0; c < count; ++c) unit(first + c, c) = 1;
+    multiply_one(cell, true, unit, column);
+    made.middleCols(first, count) = column.leftCols(count);
+  }
+  made = (0.5 * (made + made.transpose())).eval();  // rounding alone makes it uneven
+  if (!is_supported(cell)) return made;
+  const double* from = &support_[static_cast<std::size_t>(support_at_[cell]) * kPackedSize];
+  CellMatrix support;
+  for (int i = 0; i < kCellUnknowns; ++i)
+    for (int j = 0; j <= i; ++j) support(i, j) = support(j, i) = *from++;
+  if (!turned_.empty())
+    for (Eigen::Index a = 0; a < kCellUnknowns; a += 3)
+      for (Eigen::Index b = 0; b < kCellUnknowns; b += 3)
+        support.block<3, 3>(a, b) =
+            (turned_[cell] * support.block<3, 3>(a, b) * turned_[cell].transpose()).eval();
+  return made + support;
+}
+
+template <class Number>
+double CellProducts<Number>::fill(std::size_t cell) const {
+  const Eight& eight = eights_[place_[cell] / kWidth];
+  if (eight.whole) return 1;
+  double sum = 0;
+  for (std::size_t k = 0; k < kMoments; ++k)
+    sum += static_cast<double>(moments_[eight.moments + kWidth * k + place_[cell] % kWidth]);
+  return sum;
+}
+
+template class CellProducts<double>;
+template class CellProducts<float>;
+template CellProducts<float>::CellProducts(const CellProducts<double>&);
+
+}  // namespace flexel::simulate

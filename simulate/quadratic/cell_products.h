@@ -1,0 +1,94 @@
+// Products with the stiffness of the cells of model `quadratic`, made from their moments; no matrix is kept but those of
+// supports. Eight cells of a part at a time, by the kernels of kernel_quadratic.h.
+#pragma once
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "simulate/quadratic/cell_integrals.h"
+#include "simulate/quadratic/quadratic_nodes.h"
+
+namespace flexel::simulate {
+
+// What large deflections make of a cell's matrix K: R (K + a gamma^T + gamma a^T) R^T, node by node
+// (simulate/quadratic/corotation.h).
+struct CellTurn {
+  Mat3 rotation = Mat3::Identity();
+  Eigen::Matrix<double, kCellUnknowns, 3> a = Eigen::Matrix<double, kCellUnknowns, 3>::Zero(), gamma = a;
+};
+
+// K x of up to eight columns.
+using CellColumns = Eigen::Matrix<double, kCellUnknowns, 8>;
+
+// `Number`: what is summed within a cell; double, or float for a preconditioner.
+template <class Number>
+class CellProducts {
+ public:
+  struct PartCells {
+    quadratic_kernel::Elasticity<double> elasticity;
+    Mat3 axes;  // of the lattice, in the world frame
+  };
+  // Keeps a reference to `nodes`. `part`: (cells). `moments` of a cell; none where it is whole.
+  CellProducts(const QuadraticNodes& nodes, const std::vector<PartCells>& parts,
+               const std::vector<std::uint32_t>& part,
+               const std::function<std::optional<Moments>(std::size_t)>& moments);
+  // The same in another precision.
+  template <class Other>
+  explicit CellProducts(const CellProducts<Other>& other);
+
+  // Room for the matrices of these cells' supports, before they are set from several threads.
+  void reserve_supports(const std::vector<std::uint32_t>& cells);
+  // What supports add to K, symmetric.
+  void set_support(std::size_t cell, const CellMatrix& matrix);
+  // (cells) From now on every cell is turned.
+  void turn(const std::vector<CellTurn>& turns);
+
+  // y (nodes x 3) N = K x, x (nodes x 3) m; in parallel, the same bits for any thread count.
+  void forces(const double* x, double* y) const;
+  // K x of a cell without its supports and before it was turned.
+  void elastic_forces(std::size_t cell, const CellColumns& x, CellColumns& product) const;
+  // Of a cell, as forces() takes it.
+  [[nodiscard]] CellMatrix matrix(std::size_t cell) const;
+
+  [[nodiscard]] bool is_whole(std::size_t cell) const { return eights_[place_[cell] / 8].whole; }
+  [[nodiscard]] bool is_supported(std::size_t cell) const {
+    return !support_at_.empty() && support_at_[cell] >= 0;
+  }
+  // Share of the voxel.
+  [[nodiscard]] double fill(std::size_t cell) const;
+
+ private:
+  template <class>
+  friend class CellProducts;
+
+  struct Eight {
+    std::array<std::uint32_t, 8> cell{};
+    std::uint32_t count = 0, part = 0;
+    bool whole = false;
+    std::size_t moments = 0;  // where they begin
+  };
+  struct Part {
+    quadratic_kernel::Elasticity<Number> elasticity;
+    Mat3 axes;
+    bool along_world;  // the axes are the world's
+  };
+  void apply(std::size_t eight, Number* values) const;
+  void add_support(std::size_t cell, const double* x, Number* forces) const;
+  // All lanes are one cell. `turned`: as it is now, else as at first.
+  void multiply_one(std::size_t cell, bool turned, const CellColumns& x, CellColumns& product) const;
+
+  const QuadraticNodes* nodes_;
+  std::vector<Part> parts_;
+  std::vector<Eight> eights_;
+  std::vector<std::uint32_t> place_;     // (cells) 8 eight + lane
+  std::vector<Number> moments_;          // 27 x 8 of whole cells, then 125 x 8 of each eight that is not
+  std::vector<Number> first_rotation_;   // (parts x 9 x 8) from the world's axes to the lattice's
+  std::vector<Number> rotation_;         // (eights x 9 x 8); none: not turned
+  std::vector<Number> a_, gamma_;        // (eights x 243 x 8)
+  std::vector<Mat3> turned_;             // (cells) R; none: not turned
+  std::vector<std::int32_t> support_at_;   // (cells) or -1; none: no supports
+  std::vector<double> support_;            // (supported cells x 81 x 82 / 2) lower triangle, row by row
+  mutable std::vector<Number> cell_force_;  // (cells x 81)
+};
+
+}  // namespace flexel::simulate
