@@ -1,3 +1,4 @@
+// Moment k is the weight of Gauss's point k; a cell_elasticity() is the strain-stress relation in the lattice's axes.
 #include "simulate/quadratic/cell_integrals.h"
 
 #include <algorithm>
@@ -24,9 +25,11 @@ quadratic_kernel::Elasticity<double> cell_elasticity(const Lattice& lattice, con
     strain(column[b], row[b]) += 0.5;
     const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> world =
         lattice.axes * strain * lattice.axes.transpose();
-    const Eigen::Matrix<double, 9, 1> stress = moduli * Eigen::Map<const Eigen::Matrix<double, 9, 1>>(world.data());
+    const Eigen::Matrix<double, 9, 1> stress =
+        moduli * Eigen::Map<const Eigen::Matrix<double, 9, 1>>(world.data());
     const Mat3 own = lattice.axes.transpose() *
-                     Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(stress.data()) * lattice.axes;
+                     Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(stress.data()) *
+                     lattice.axes;
     for (int a = 0; a < 6; ++a) {
       made.moduli[6 * a + b] = volume * own(row[a], column[a]);
       largest = std::max(largest, std::abs(made.moduli[6 * a + b]));

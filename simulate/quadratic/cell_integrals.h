@@ -16,7 +16,8 @@ using CellMatrix = Eigen::Matrix<double, kCellUnknowns, kCellUnknowns>;
 using Moments = Eigen::Matrix<double, static_cast<int>(kMoments), 1>;
 
 // Of the cells of a part: `moduli` is A = dP/dF at rest in the world frame [Pa].
-[[nodiscard]] quadratic_kernel::Elasticity<double> cell_elasticity(const Lattice& lattice, const Mat9& moduli);
+[[nodiscard]] quadratic_kernel::Elasticity<double> cell_elasticity(const Lattice& lattice,
+                                                                   const Mat9& moduli);
 
 // Integrals of the shape functions over a cell of that volume [m^3].
 [[nodiscard]] std::array<double, kQuadraticNodes> shape_integrals(double voxel, const Moments& moments);

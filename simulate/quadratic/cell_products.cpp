@@ -30,7 +30,8 @@ void multiply(bool whole, const quadratic_kernel::EightCells<float>& cells,
 template <class To, class From>
 quadratic_kernel::Elasticity<To> in_precision(const quadratic_kernel::Elasticity<From>& from) {
   quadratic_kernel::Elasticity<To> to{};
-  std::transform(std::begin(from.scale), std::end(from.scale), to.scale, [](From x) { return static_cast<To>(x); });
+  std::transform(std::begin(from.scale), std::end(from.scale), to.scale,
+                 [](From x) { return static_cast<To>(x); });
   std::transform(std::begin(from.moduli), std::end(from.moduli), to.moduli,
                  [](From x) { return static_cast<To>(x); });
   to.isotropic = from.isotropic;
@@ -62,8 +63,7 @@ CellProducts<Number>::CellProducts(const QuadraticNodes& nodes, const std::vecto
     parts_.push_back({in_precision<Number>(each.elasticity), each.axes, each.axes == Mat3::Identity()});
     first_rotation_.resize(first_rotation_.size() + 9 * kWidth);
     for (std::size_t lane = 0; lane < kWidth; ++lane)
-      put_rotation(each.axes.transpose(), lane,
-                   first_rotation_.data() + first_rotation_.size() - 9 * kWidth);
+      put_rotation(each.axes.transpose(), lane, first_rotation_.data() + first_rotation_.size() - 9 * kWidth);
   }
   constexpr double weights[kPoints] = {5. / 18, 8. / 18, 5. / 18};  // Gauss's on [0, 1]
   for (std::size_t k = 0; k < kWholeMoments; ++k)
@@ -86,7 +86,8 @@ CellProducts<Number>::CellProducts(const QuadraticNodes& nodes, const std::vecto
         if (eight.whole) continue;
         const Moments own = *moments(c);
         for (std::size_t k = 0; k < kMoments; ++k)
-          moments_[eight.moments + kWidth * k + lane] = static_cast<Number>(own[static_cast<Eigen::Index>(k)]);
+          moments_[eight.moments + kWidth * k + lane] =
+              static_cast<Number>(own[static_cast<Eigen::Index>(k)]);
       }
     }
 }
@@ -264,7 +265,8 @@ void CellProducts<Number>::multiply_one(std::size_t cell, bool turned, const Cel
 }
 
 template <class Number>
-void CellProducts<Number>::elastic_forces(std::size_t cell, const CellColumns& x, CellColumns& product) const {
+void CellProducts<Number>::elastic_forces(std::size_t cell, const CellColumns& x,
+                                          CellColumns& product) const {
   multiply_one(cell, false, x, product);
 }
 

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "base/parallel.h"
+#include "simulate/linear/vector_products.h"
 #include "simulate/quadratic/quadratic_solve.h"
 
 namespace flexel::simulate {
@@ -49,7 +50,10 @@ Corotation::Corotation(const QuadraticSystem& system, QuadraticOperator& stiffne
       from_rest_(system.nodes().cells.size(), Mat3::Zero()),
       turn_(system.nodes().cells.size()),
       stress_(system.nodes().cells.size()),
-      force_(system.nodes().cells.size() * kCellUnknowns) {}
+      force_(system.nodes().cells.size() * kCellUnknowns) {
+  for (std::uint32_t c = 0; c < system.nodes().cells.size(); ++c)
+    if (!system.cell_supports(c).empty()) supported_.push_back(c);
+}
 
 bool Corotation::evaluate(std::size_t cell, const std::vector<Vec3>& displacement) {
   const QuadraticNodes& nodes = system_.nodes();
@@ -98,52 +102,55 @@ bool Corotation::evaluate(std::size_t cell, const std::vector<Vec3>& displacemen
   return true;
 }
 
-void Corotation::add_supports(std::size_t cell, const std::vector<Vec3>& displacement, double share) {
-  if (system_.cell_supports(cell).empty()) return;
+std::array<Vec3, kQuadraticNodes> Corotation::support_forces(std::size_t cell,
+                                                             const std::vector<Vec3>& displacement,
+                                                             double share) const {
   const auto& of_cell = system_.nodes().of_cell[cell];
   const std::array<Vec3, kQuadraticNodes> local =
       local_displacement(system_.nodes(), cell, displacement, from_rest_[cell]);
   std::array<Vec3, kQuadraticNodes> u;
   for (std::size_t n = 0; n < kQuadraticNodes; ++n) u[n] = displacement[of_cell[n]];
   const Mat3& rotation = turn_[cell].rotation;
-  std::array<Vec3, kQuadraticNodes> forces, led;
-  forces.fill(Vec3::Zero());
+  std::array<Vec3, kQuadraticNodes> taken, led;
+  taken.fill(Vec3::Zero());
   led.fill(Vec3::Zero());
   for (const SupportIntegrals& held : system_.cell_supports(cell)) {
-    held.add_forces(system_.penalty(cell, safety_), u, local, rotation, forces);
+    held.add_forces(system_.penalty(cell, safety_), u, local, rotation, taken);
     if (!held.support->tie->is_move) continue;
     for (const FacePoint* point : held.points)
       add_led(system_.point(*held.support, *point, safety_, share), rotation, led);
   }
-  for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
-    Eigen::Map<Vec3> sum(&force_[cell * kCellUnknowns + 3 * n]);
-    sum += forces[n] - led[n];
-  }
+  for (std::size_t n = 0; n < kQuadraticNodes; ++n) led[n] -= taken[n];
+  return led;
 }
 
 bool Corotation::residual(const std::vector<Vec3>& displacement, double share, std::vector<Vec3>& left) {
   const QuadraticNodes& nodes = system_.nodes();
   std::vector<std::uint8_t> folded(nodes.cells.size(), 0);
-  std::vector<double> square(nodes.cells.size(), 0);
   parallel_for_each(
-      nodes.cells.size(),
-      [&](std::size_t c) {
-        folded[c] = !evaluate(c, displacement);
-        square[c] = Eigen::Map<const CellValues>(&force_[c * kCellUnknowns]).squaredNorm();
-        if (!folded[c]) add_supports(c, displacement, share);
-      },
+      nodes.cells.size(), [&](std::size_t c) { folded[c] = !evaluate(c, displacement); },
       kTurnedCellsAtATime);
   if (std::any_of(folded.begin(), folded.end(), [](std::uint8_t each) { return each != 0; })) return false;
-  const double now = std::sqrt(parallel_sum<double>(square.size(), [&](std::size_t c) { return square[c]; }));
-  largest_ = std::max(largest_, now);
-  scale_ = std::max(now, kNothing * largest_);
+  std::vector<std::array<Vec3, kQuadraticNodes>> held(supported_.size());
+  parallel_for_each(
+      supported_.size(), [&](std::size_t i) { held[i] = support_forces(supported_[i], displacement, share); },
+      kTurnedCellsAtATime);
   left.assign(nodes.size(), Vec3::Zero());
   for (const NodalLoad& load : system_.loads())
     for (std::size_t n = 0; n < nodes.size(); ++n) left[n] += share * load.forces[n];
+  for (std::size_t i = 0; i < supported_.size(); ++i)
+    for (std::size_t n = 0; n < kQuadraticNodes; ++n) left[nodes.of_cell[supported_[i]][n]] += held[i][n];
+  double outer = dot(left, left);
   parallel_for_each(nodes.size(), [&](std::size_t n) {
     for (const QuadraticNodes::Incidence& incidence : nodes.at(n))
       left[n] -= Eigen::Map<const Vec3>(&force_[incidence.cell * kCellUnknowns + 3 * incidence.node]);
   });
+  for (std::size_t n = 0; n < nodes.size(); ++n)
+    for (int axis = 0; axis < 3; ++axis)
+      if (stiffness_.held()[n] >> axis & 1) outer += left[n][axis] * left[n][axis];
+  largest_ = std::max(largest_, std::sqrt(parallel_sum<double>(
+                                    force_.size(), [&](std::size_t i) { return force_[i] * force_[i]; })));
+  scale_ = std::max(std::sqrt(outer), kNothing * largest_);
   return true;
 }
 
@@ -153,10 +160,10 @@ void Corotation::set_tangent(bool stressed) {
     for (std::size_t c = 0; c < turns.size(); ++c) turns[c].a += stress_[c];
   stiffness_.cells().turn(turns);
   parallel_for_each(
-      turn_.size(),
-      [&](std::size_t c) {
-        if (!system_.cell_supports(c).empty())
-          stiffness_.cells().set_support(c, system_.support_stiffness(c, safety_, turn_[c].rotation));
+      supported_.size(),
+      [&](std::size_t i) {
+        const std::uint32_t c = supported_[i];
+        stiffness_.cells().set_support(c, system_.support_stiffness(c, safety_, turn_[c].rotation));
       },
       kTurnedCellsAtATime);
 }

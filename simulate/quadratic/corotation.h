@@ -22,7 +22,8 @@ class Corotation {
   // (nodes x 3) N: what is left of loads and forces of cells and supports at `share` of all loads and moves. Finds the
   // rotations; false where a cell is inside out.
   [[nodiscard]] bool residual(const std::vector<Vec3>& displacement, double share, std::vector<Vec3>& left);
-  // N, sum of the squares of the cells' forces at the last displacement, under the root: what a residual is small beside.
+  // N, the norm of loads and of what holds the part at the last displacement: what a residual is small beside. At least a
+  // millionth of that of the cells' forces, which rounding leaves where nothing acts.
   [[nodiscard]] double scale() const { return scale_; }
   // Makes `stiffness` the tangent at the last displacement. Without `stressed` the part of the stresses (geometric
   // stiffness), which may make it indefinite, is left out.
@@ -33,17 +34,21 @@ class Corotation {
 
  private:
   bool evaluate(std::size_t cell, const std::vector<Vec3>& displacement);
-  void add_supports(std::size_t cell, const std::vector<Vec3>& displacement, double share);
+  // (27 x 3) N: what its supports and their moves do to the nodes of a cell.
+  [[nodiscard]] std::array<Vec3, kQuadraticNodes> support_forces(std::size_t cell,
+                                                                 const std::vector<Vec3>& displacement,
+                                                                 double share) const;
 
   const QuadraticSystem& system_;
   QuadraticOperator& stiffness_;
   double safety_;
-  double scale_ = 0, largest_ = 0;
-  std::vector<Mat3> from_rest_;  // (cells) R - 1
+  double scale_ = 0, largest_ = 0;  // N; the largest norm of the cells' forces so far
+  std::vector<Mat3> from_rest_;     // (cells) R - 1
   std::vector<CellTurn>
       turn_;  // (cells) without the part of the stresses, which is stress_, to be added to `a`
   std::vector<Eigen::Matrix<double, kCellUnknowns, 3>> stress_;
-  std::vector<double> force_;  // (cells x 81) N
+  std::vector<double> force_;             // (cells x 81) N, elastic
+  std::vector<std::uint32_t> supported_;  // cells that supports hold
 };
 
 }  // namespace flexel::simulate

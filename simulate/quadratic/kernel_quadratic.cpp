@@ -126,8 +126,8 @@ FLEXEL_INLINE void add_point(const Elasticity<Number>& part, const V (&u)[3][3][
     by[i][1] = value(u[i][1], t);
     by[i][2] = slope(u[i][2], t);
   }
-  const V strain[6] = {by[0][0],           by[1][1],           by[2][2],
-                       by[0][1] + by[1][0], by[1][2] + by[2][1], by[2][0] + by[0][2]};
+  const V strain[6] = {by[0][0],           by[1][1], by[2][2], by[0][1] + by[1][0], by[1][2] + by[2][1],
+                       by[2][0] + by[0][2]};
   to_stress<isotropic>(part, strain, stress);
   for (V& each : stress) each *= weight;
   constexpr int of[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}};
@@ -224,7 +224,8 @@ FLEXEL_INLINE void add_turning(const EightCells<Number>& cells, const V (&u)[3][
 }
 
 template <std::size_t kPoints, class Number>
-FLEXEL_INLINE void some_products(const EightCells<Number>& cells, const Elasticity<Number>& part, Number* values) {
+FLEXEL_INLINE void some_products(const EightCells<Number>& cells, const Elasticity<Number>& part,
+                                 Number* values) {
   using V = typename VectorOf<Number>::Type;
   V field[3][27], moved[3][27];
   for (std::size_t n = 0; n < 27; ++n)
@@ -249,44 +250,79 @@ void product(const EightCells<Number>& cells, const Elasticity<Number>& part, Nu
   for (std::size_t lane = 0; lane < kWidth; lane += kLanes<Number>) {
     const auto from = [&](const Number* first) { return first == nullptr ? nullptr : first + lane; };
     some_products<kPoints>(
-        EightCells<Number>{cells.moments + lane, from(cells.rotation), from(cells.a), from(cells.gamma)}, part,
-        values + lane);
+        EightCells<Number>{cells.moments + lane, from(cells.rotation), from(cells.a), from(cells.gamma)},
+        part, values + lane);
   }
 }
 
+using FourFloats = float __attribute__((vector_size(16)));
+
+// Of eight numbers each, in the same order for any length of the vectors.
+template <class V, std::size_t kParts>
+FLEXEL_INLINE FourFloats sums_of(const V (&rows)[kRows][kParts]) {
+  FourFloats half[kRows];
+  for (std::size_t r = 0; r < kRows; ++r)
+    if constexpr (kParts == 1)
+      half[r] = __builtin_shufflevector(rows[r][0], rows[r][0], 0, 1, 2, 3) +
+                __builtin_shufflevector(rows[r][0], rows[r][0], 4, 5, 6, 7);
+    else
+      half[r] = rows[r][0] + rows[r][1];
+  const FourFloats low01 = __builtin_shufflevector(half[0], half[1], 0, 4, 1, 5),
+                   high01 = __builtin_shufflevector(half[0], half[1], 2, 6, 3, 7),
+                   low23 = __builtin_shufflevector(half[2], half[3], 0, 4, 1, 5),
+                   high23 = __builtin_shufflevector(half[2], half[3], 2, 6, 3, 7);
+  return (__builtin_shufflevector(low01, low23, 0, 1, 4, 5) +
+          __builtin_shufflevector(low01, low23, 2, 3, 6, 7)) +
+         (__builtin_shufflevector(high01, high23, 0, 1, 4, 5) +
+          __builtin_shufflevector(high01, high23, 2, 3, 6, 7));
+}
+
 // Four rows at a time: their products with x, then y += the rows times those; the matrix is read from memory once.
-void square(const float* triangle, const float* x, float* y) {
+void square(const Triangle& triangle, float* x, float* y) {
   using V = VectorOf<float>::Type;
+  using Short = std::int16_t __attribute__((vector_size(sizeof(std::int16_t) * kLanes<float>)));
   constexpr std::size_t kStep = kLanes<float>;
-  for (std::size_t i = 0; i < kPaddedUnknowns; ++i) y[i] = 0;
+  using Int = std::int32_t __attribute__((vector_size(sizeof(V))));
+  const auto numbers = [](const std::int16_t* from) {
+    return __builtin_convertvector(__builtin_convertvector(simd::load_as<Short>(from), Int), V);
+  };
+  for (std::size_t i = 0; i < kPaddedUnknowns; ++i) {
+    x[i] *= triangle.scale[i];
+    y[i] = 0;
+  }
+  const std::int16_t* steps = triangle.steps;
   for (std::size_t group = 0; group < kGroups; ++group) {
     const std::size_t columns = group_columns(group);
-    V sum[kRows][kWidth / kStep] = {};
+    V sum[kRows][kWidth / kStep] = {}, rows[kPaddedUnknowns / kStep][kRows];
+#pragma GCC unroll 1
     for (std::size_t j = 0; j < columns; j += kWidth)
       for (std::size_t part = 0; part < kWidth / kStep; ++part) {
-        const V at = simd::load_as<V>(x + j + kStep * part);
-        for (std::size_t r = 0; r < kRows; ++r)
-          sum[r][part] += simd::load_as<V>(triangle + r * columns + j + kStep * part) * at;
+        const std::size_t first = j + kStep * part;
+        const V at = simd::load_as<V>(x + first);
+        for (std::size_t r = 0; r < kRows; ++r) {
+          const V number = numbers(steps + r * columns + first);
+          rows[first / kStep][r] = number;
+          sum[r][part] += number * at;
+        }
       }
-    float whole[kRows];
-    for (std::size_t r = 0; r < kRows; ++r) {
-      float lane[kWidth];
-      __builtin_memcpy(lane, sum[r], sizeof lane);
-      whole[r] = ((lane[0] + lane[1]) + (lane[2] + lane[3])) + ((lane[4] + lane[5]) + (lane[6] + lane[7]));
-    }
+    const FourFloats step = simd::load_as<FourFloats>(triangle.step + kRows * group);
+    const FourFloats whole = step * step * sums_of(sum);
+#pragma GCC unroll 1
     for (std::size_t j = 0; j < columns; j += kStep) {
       V to = simd::load_as<V>(y + j);
-      for (std::size_t r = 0; r < kRows; ++r) to += whole[r] * simd::load_as<V>(triangle + r * columns + j);
+      for (std::size_t r = 0; r < kRows; ++r) to += whole[r] * rows[j / kStep][r];
       __builtin_memcpy(y + j, &to, sizeof to);
     }
-    triangle += kRows * columns;
+    steps += kRows * columns;
   }
+  for (std::size_t i = 0; i < kPaddedUnknowns; ++i) y[i] *= triangle.scale[i];
 }
 
 }  // namespace
 
 const Table& FLEXEL_ISA() {
-  static const Table table{{&product<3, double>, &product<5, double>}, {&product<3, float>, &product<5, float>}, &square};
+  static const Table table{
+      {&product<3, double>, &product<5, double>}, {&product<3, float>, &product<5, float>}, &square};
   return table;
 }
 

@@ -2,6 +2,7 @@
 // (the reasons are in simulate/kernels/kernel.h). Cells go eight side by side: number i of cell l is at 8 i + l.
 #pragma once
 #include <cstddef>
+#include <cstdint>
 
 #include "base/instruction_set.h"
 
@@ -21,8 +22,8 @@ struct Elasticity {
 
 template <class Number>
 struct EightCells {
-  const Number* moments;     // (points x 8) weights of Gauss's points (formats/lattice/cell_moments.h)
-  const Number* rotation;    // (9 x 8) row by row, from the world to the cells' axes; none: the same
+  const Number* moments;    // (points x 8) weights of Gauss's points (formats/lattice/cell_moments.h)
+  const Number* rotation;   // (9 x 8) row by row, from the world to the cells' axes; none: the same
   const Number *a, *gamma;  // (243 x 8) of CellTurn, in the cells' axes, 3 unknown + column; or none
 };
 
@@ -31,8 +32,9 @@ template <class Number>
 using Product = void (*)(const EightCells<Number>& cells, const Elasticity<Number>& part, Number* values);
 
 // The lower triangle of a matrix, four rows at a time, each as long as the last of them, rounded up to eight: zeros behind
-// the diagonal.
+// the diagonal. A row is kept in steps of a 32,767th of its largest number.
 constexpr std::size_t kRows = 4, kGroups = (kUnknowns + kRows - 1) / kRows, kPaddedUnknowns = 88;
+constexpr int kMostSteps = 32767;
 constexpr std::size_t group_columns(std::size_t group) {
   return (kRows * (group + 1) + kWidth - 1) / kWidth * kWidth;
 }
@@ -41,14 +43,18 @@ constexpr std::size_t triangle_size() {
   for (std::size_t g = 0; g < kGroups; ++g) size += kRows * group_columns(g);
   return size;
 }
-constexpr std::size_t kTriangleSize = triangle_size();
+struct Triangle {
+  float step[kRows * kGroups];
+  float scale[kPaddedUnknowns];  // of x and y
+  std::int16_t steps[triangle_size()];
+};
 
 struct Table {
   // By the number of Gauss's points along an axis: 3 (whole cells), 5.
   Product<double> product[2];
   Product<float> product_of_floats[2];
-  // y = T^T T x, T such a triangle; x and y have kPaddedUnknowns numbers.
-  void (*square)(const float* triangle, const float* x, float* y);
+  // y = D T^T T D x, D the scale; x and y have kPaddedUnknowns numbers, x is lost.
+  void (*square)(const Triangle& triangle, float* x, float* y);
 };
 
 [[nodiscard]] const Table& portable();

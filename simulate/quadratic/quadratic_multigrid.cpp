@@ -16,9 +16,10 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr int kSteps = 2;        // of Chebyshev's iteration, before and after
-constexpr double kRange = 8;     // largest over smallest eigenvalue that it damps
-constexpr double kMargin = 1.1;  // over the estimate of the largest
+constexpr int kSteps = 2;            // of Chebyshev's iteration, before and after
+constexpr double kRange = 16;        // largest over smallest eigenvalue that it damps
+constexpr double kFullEnough = 0.7;  // cells filled so far are as good without a block (measured)
+constexpr double kMargin = 1.1;      // over the estimate of the largest
 constexpr int kPowerSteps = 15;
 constexpr double kRaised = 1e-6;  // of a block's scaled diagonal: what it is made from is in single precision
 constexpr std::size_t kBlocksAtATime = 16;
@@ -134,21 +135,24 @@ void QuadraticMultigrid::make_coarse(const Body& body, const std::vector<Vec3>& 
 
 void QuadraticMultigrid::make_blocks(const CellStiffness& cells) {
   const QuadraticNodes& nodes = matrix_.nodes();
-  for (std::uint32_t c = 0; c < nodes.cells.size(); ++c)
-    if (!cells_.is_whole(c) || cells_.is_supported(c)) block_cells_.push_back(c);
-  blocks_at_.resize(nodes.size());
-  for (std::uint32_t b = 0; b < block_cells_.size(); ++b)
-    for (std::uint32_t n = 0; n < kQuadraticNodes; ++n)
-      blocks_at_[nodes.of_cell[block_cells_[b]][n]].emplace_back(b, n);
+  block_of_.assign(nodes.cells.size(), -1);
+  for (std::uint32_t c = 0; c < nodes.cells.size(); ++c) {
+    if (cells_.fill(c) >= kFullEnough && !cells_.is_supported(c)) continue;
+    block_of_[c] = static_cast<std::int32_t>(block_cells_.size());
+    block_cells_.push_back(c);
+  }
   weight_.assign(nodes.size(), 0);
   inverse_.assign(nodes.size(), Block::Zero());
   for (std::size_t n = 0; n < nodes.size(); ++n) {
-    if (!blocks_at_[n].empty()) {
-      weight_[n] = 1 / std::sqrt(static_cast<double>(blocks_at_[n].size()));
+    const auto count = std::count_if(nodes.at(n).begin(), nodes.at(n).end(),
+                                     [&](const auto& at) { return block_of_[at.cell] >= 0; });
+    if (count > 0) {
+      weight_[n] = 1 / std::sqrt(static_cast<double>(count));
       continue;
     }
     Block diagonal = Block::Zero();
-    for (const QuadraticNodes::Incidence& at : nodes.at(n)) diagonal += cells.block(at.cell, at.node, at.node);
+    for (const QuadraticNodes::Incidence& at : nodes.at(n))
+      diagonal += cells.block(at.cell, at.node, at.node);
     for (int axis = 0; axis < 3; ++axis)
       if (matrix_.held()[n] >> axis & 1) {
         diagonal.row(axis).setZero();
@@ -157,7 +161,7 @@ void QuadraticMultigrid::make_blocks(const CellStiffness& cells) {
       }
     inverse_[n] = diagonal.inverse();
   }
-  inverse_factors_.assign(block_cells_.size() * quadratic_kernel::kTriangleSize, 0);
+  inverse_factors_.assign(block_cells_.size(), {});
   block_values_.assign(block_cells_.size() * quadratic_kernel::kPaddedUnknowns, 0);
   parallel_for_each(
       block_cells_.size(), [&](std::size_t b) { factorise(b, block_cells_[b], cells); }, kBlocksAtATime);
@@ -204,13 +208,17 @@ void QuadraticMultigrid::factorise(std::size_t block, std::uint32_t cell, const 
   }
   CellMatrix lower = CellMatrix::Identity();
   factor.matrixL().solveInPlace(lower);
-  float* to = &inverse_factors_[block * quadratic_kernel::kTriangleSize];
-  for (std::size_t group = 0; group < quadratic_kernel::kGroups; ++group)
-    for (std::size_t r = 0; r < quadratic_kernel::kRows; ++r, to += quadratic_kernel::group_columns(group)) {
-      const auto row = static_cast<Eigen::Index>(quadratic_kernel::kRows * group + r);
-      if (row >= kCellUnknowns) break;
-      for (Eigen::Index j = 0; j <= row; ++j) to[j] = static_cast<float>(lower(row, j) / scale[j]);
-    }
+  quadratic_kernel::Triangle& to = inverse_factors_[block];
+  for (int i = 0; i < kCellUnknowns; ++i) to.scale[i] = static_cast<float>(1 / scale[i]);
+  std::int16_t* steps = to.steps;
+  for (std::size_t r = 0; r < static_cast<std::size_t>(kCellUnknowns); ++r) {
+    const auto row = lower.row(static_cast<Eigen::Index>(r));
+    const double step = row.cwiseAbs().maxCoeff() / quadratic_kernel::kMostSteps;
+    to.step[r] = static_cast<float>(step);
+    for (std::size_t j = 0; j <= r; ++j)
+      steps[j] = static_cast<std::int16_t>(std::lround(row[static_cast<Eigen::Index>(j)] / step));
+    steps += quadratic_kernel::group_columns(r / quadratic_kernel::kRows);
+  }
 }
 
 void QuadraticMultigrid::multiply_roughly(const Vector& x, Vector& y) const {
@@ -229,22 +237,23 @@ void QuadraticMultigrid::smooth_once(const Vector& residual, Vector& correction)
         const auto& own = nodes.of_cell[block_cells_[b]];
         for (std::size_t n = 0; n < kQuadraticNodes; ++n)
           for (std::size_t axis = 0; axis < 3; ++axis)
-            wanted[3 * n + axis] = static_cast<float>(
-                weight_[own[n]] * residual[own[n]][static_cast<Eigen::Index>(axis)]);
-        quadratic_kernel::best().square(&inverse_factors_[b * quadratic_kernel::kTriangleSize], wanted,
-                         &block_values_[b * kPaddedUnknowns]);
+            wanted[3 * n + axis] =
+                static_cast<float>(weight_[own[n]] * residual[own[n]][static_cast<Eigen::Index>(axis)]);
+        quadratic_kernel::best().square(inverse_factors_[b], wanted, &block_values_[b * kPaddedUnknowns]);
       },
       kBlocksAtATime);
   correction.resize(residual.size());
   parallel_for_each(nodes.size(), [&](std::size_t n) {
-    if (blocks_at_[n].empty()) {
+    if (weight_[n] == 0) {
       correction[n] = inverse_[n] * residual[n];
       return;
     }
     Vec3 sum = Vec3::Zero();
-    for (const auto& [block, node] : blocks_at_[n])
-      sum +=
-          Eigen::Map<const Eigen::Vector3f>(&block_values_[block * kPaddedUnknowns + 3 * node]).cast<double>();
+    for (const QuadraticNodes::Incidence& at : nodes.at(n))
+      if (const std::int32_t block = block_of_[at.cell]; block >= 0)
+        sum += Eigen::Map<const Eigen::Vector3f>(
+                   &block_values_[static_cast<std::size_t>(block) * kPaddedUnknowns + 3 * at.node])
+                   .cast<double>();
     correction[n] = weight_[n] * sum;
   });
   matrix_.clear_held(correction);

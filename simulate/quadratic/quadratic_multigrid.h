@@ -51,10 +51,10 @@ class QuadraticMultigrid final : public Preconditioner {
   BlockMatrix coarse_;
   NodeGeometry geometry_;
   std::unique_ptr<Preconditioner> hierarchy_;
-  std::vector<std::uint32_t> block_cells_;  // cells that have a block
-  std::vector<float> inverse_factors_;      // (blocks x kTriangleSize) inverse of Cholesky's factor
-  std::vector<double> weight_;              // (nodes) 1 / sqrt(multiplicity); 0: not in any block
-  std::vector<std::vector<std::pair<std::uint32_t, std::uint32_t>>> blocks_at_;  // (nodes) block, node of it
+  std::vector<std::uint32_t> block_cells_;                   // cells that have a block
+  std::vector<quadratic_kernel::Triangle> inverse_factors_;  // (blocks) inverse of Cholesky's factor
+  std::vector<std::int32_t> block_of_;                       // (cells) or -1
+  std::vector<double> weight_;               // (nodes) 1 / sqrt(multiplicity); 0: not in any block
   std::vector<Block> inverse_;               // (nodes) of the diagonal block, where weight_ is 0
   double largest_ = 1;                       // eigenvalue of M^-1 A
   mutable std::vector<float> block_values_;  // (blocks x kPaddedUnknowns)

@@ -26,7 +26,7 @@ constexpr int kFewIterations = 6;        // after which the next step is longer
 constexpr double kMostStale = 0.1;       // rad
 constexpr int kMostLinear = 400;
 constexpr double kLeastTolerance = 1e-8, kGoodEnough = 1e-6;
-constexpr double kLoosest = 1e-2, kTightest = 1e-6;  // residuals of linear solutions
+constexpr double kLoosest = 1e-2;  // residual of a linear solution
 
 // rad: how far moves turn what they lead.
 double largest_angle(const QuadraticSystem& system) {
@@ -96,7 +96,7 @@ class LargeDeflection {
   // Whether cells that turn answer noticeably otherwise: by one correction of the linear solution.
   bool matters() {
     if (angle_ > kFirstTurn) return true;
-    constexpr double kNoticeable = 1e-4, kRoughly = 1e-2;
+    constexpr double kNoticeable = 5e-5, kRoughly = 0.1;
     const std::vector<Vec3>& u = solution_.displacement;
     std::vector<Vec3> left, change;
     if (!corotation_.residual(u, 1, left)) return true;
@@ -205,9 +205,14 @@ class LargeDeflection {
     return false;
   }
 
+  // The next residual is of the order of the square of this one, and need be no less than what was asked for.
+  [[nodiscard]] double forcing(double residual) const {
+    return std::min(kLoosest, std::max(residual, 0.3 * tolerance_ / residual));
+  }
+
   bool attempt(const std::vector<Vec3>& left, double residual, std::vector<Vec3>& change) {
     const LinearResult result = conjugate_gradients(tangent_.stiffness, left, change, *tangent_.multigrid,
-                                                    std::clamp(residual, kTightest, kLoosest), kMostLinear);
+                                                    forcing(residual), kMostLinear);
     solution_.iterations += result.iterations;
     return !result.indefinite && result.iterations < kMostLinear;
   }
@@ -225,7 +230,8 @@ class LargeDeflection {
 
 }  // namespace
 
-void solve_large(const QuadraticSystem& system, const RunSettings& settings, const std::string& scene,
+bool solve_large(const QuadraticSystem& system, const RunSettings& settings, const std::string& scene,
+                 const std::function<void(int, double)>& linear,
                  const std::function<void(double, double)>& progress, QuadraticSolution& solution) {
   // What large deflections change is of the order of the rotation times the slenderness.
   constexpr double kTiny = 3e-4;
@@ -240,11 +246,14 @@ void solve_large(const QuadraticSystem& system, const RunSettings& settings, con
   const double slenderness = bounding_box(system.nodes().rest).diagonal() / finest;
   const bool straight = turn * slenderness < kTiny,
              far = strain * slenderness * slenderness < kFarFromBuckling;
-  if (straight && far) return;
+  if (straight && far) return correct(system, settings.tolerance, solution, linear);
   LargeDeflection large(system, settings, progress, solution);
-  const bool matters = large.matters();
-  if (matters) large.run(settings, scene);
+  if (large.matters())
+    large.run(settings, scene);
+  else if (!correct(system, settings.tolerance, solution, linear))
+    return false;
   if (!far) solution.stable = large.stable(solution.displacement);
+  return true;
 }
 
 }  // namespace flexel::simulate

@@ -7,9 +7,12 @@
 
 namespace flexel::simulate {
 
-// Takes the linear solution to equilibrium under the whole load. Throws DivergedError naming the share of the load that was
-// reached. `progress` is told the share and the residual, relative to the cells' forces, before each iteration.
-void solve_large(const QuadraticSystem& system, const RunSettings& settings, const std::string& scene,
-                 const std::function<void(double, double)>& progress, QuadraticSolution& solution);
+// Takes a linear solution, which may be rough, to equilibrium under the whole load. False where the linear stiffness shows as
+// indefinite (solve()). Throws DivergedError naming the share of the load that was reached. `linear` is told as in solve(),
+// `progress` the share and the residual, relative to loads and reactions, before each iteration of Newton's.
+[[nodiscard]] bool solve_large(const QuadraticSystem& system, const RunSettings& settings,
+                               const std::string& scene, const std::function<void(int, double)>& linear,
+                               const std::function<void(double, double)>& progress,
+                               QuadraticSolution& solution);
 
 }  // namespace flexel::simulate

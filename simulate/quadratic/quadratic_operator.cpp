@@ -1,3 +1,4 @@
+// Prescribed components are left out of the cells' products and put back as rows of the identity.
 #include "simulate/quadratic/quadratic_operator.h"
 
 namespace flexel::simulate {

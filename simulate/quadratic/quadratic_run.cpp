@@ -98,19 +98,23 @@ ProbeResult measure_probe(const Probe& probe, const ProbePoints& placed, const Q
 // The linear solution, and what large deflections make of it. Adds to `seconds`.
 QuadraticSolution equilibrium(const QuadraticSystem& system, const Scene& scene, double& seconds,
                               Progress& progress) {
+  constexpr double kRough = 1e-3;  // of a linear solution that large deflections may change
   const ScopeTimer timer(seconds);
-  QuadraticSolution solution = solve(system, scene.run, scene.name, [&](int iteration, double residual) {
+  const auto linear = [&](int iteration, double residual) {
     check_stop();
     progress.update(0.05 + 0.4 * std::min(1.0, std::log(residual) / std::log(scene.run.tolerance)),
                     fmt::format("iteration {}", iteration));
-  });
-  solve_large(
-      system, scene.run, scene.name,
-      [&](double share, double residual) {
-        check_stop();
-        progress.update(0.45 + 0.5 * share, fmt::format("residual {:.1e}", residual));
-      },
-      solution);
+  };
+  QuadraticSolution solution = solve(system, std::max(kRough, scene.run.tolerance), 1, scene.name, linear);
+  const auto large = [&](double share, double residual) {
+    check_stop();
+    progress.update(0.45 + 0.5 * share, fmt::format("residual {:.1e}", residual));
+  };
+  if (solve_large(system, scene.run, scene.name, linear, large, solution)) return solution;
+  solution = solve(system, scene.run.tolerance, solution.safety * kMoreSafety, scene.name, linear);
+  if (!solve_large(system, scene.run, scene.name, linear, large, solution))
+    throw DivergedError(scene.name +
+                        ": model \"quadratic\" did not converge; use another --size, or model \"cells\"");
   return solution;
 }
 

@@ -12,12 +12,12 @@
 #include "base/parallel.h"
 #include "simulate/linear/conjugate_gradients.h"
 #include "simulate/linear/free_motions.h"
+#include "simulate/linear/vector_products.h"
 #include "simulate/matter/load_distribution.h"
 
 namespace flexel::simulate {
 namespace {
 
-constexpr double kMoreSafety = 4;
 constexpr int kSafeties = 4;
 constexpr int kMostLinearIterations = 1000;
 constexpr double kLeastLinearTolerance = 1e-10;
@@ -80,38 +80,58 @@ SymmetricStress stress_of(const QuadraticSystem& system, const QuadraticSolution
 
 }  // namespace
 
-QuadraticSolution solve(const QuadraticSystem& system, const RunSettings& settings, const std::string& scene,
-                        const std::function<void(int, double)>& progress) {
+QuadraticSolution solve(const QuadraticSystem& system, double tolerance, double safety,
+                        const std::string& scene, const std::function<void(int, double)>& progress) {
   QuadraticSolution found;
+  found.safety = safety;
   const std::size_t n = system.nodes().size();
   for (int attempt = 0; attempt < kSafeties; ++attempt, found.safety *= kMoreSafety) {
     found.tangent = std::make_unique<QuadraticTangent>(system.stiffness(found.safety));
     const QuadraticOperator& stiffness = found.tangent->stiffness;
     const QuadraticMultigrid& multigrid = found.tangent->multigrid.emplace(stiffness, system.problem().body);
     if (attempt == 0) refuse_free(multigrid, system.problem().body, scene);
-    const std::vector<Vec3> wanted = system.right_side(found.safety);
-    std::vector<Vec3> b = wanted, led(n), start = system.prescribed(), change;
-    stiffness.forces(start[0].data(), led[0].data());
-    parallel_for_each(n, [&](std::size_t i) { b[i] -= led[i]; });
-    stiffness.clear_held(b);
-    const LinearResult result = conjugate_gradients(stiffness, b, change, multigrid,
-                                                    std::max(settings.tolerance, kLeastLinearTolerance),
-                                                    kMostLinearIterations, progress);
-    found.iterations += result.iterations;
-    found.relative_residual = result.relative_residual;
-    if (result.iterations == kMostLinearIterations) break;
-    if (result.indefinite || !(result.converged || result.relative_residual < kLinearGoodEnough)) continue;
-    found.displacement = start;
-    parallel_for_each(n, [&](std::size_t i) { found.displacement[i] += change[i]; });
+    found.displacement = system.prescribed();
     found.unbalanced.resize(n);
-    stiffness.forces(found.displacement[0].data(), found.unbalanced[0].data());
-    parallel_for_each(n, [&](std::size_t i) { found.unbalanced[i] = wanted[i] - found.unbalanced[i]; });
-    return found;
+    if (correct(system, tolerance, found, progress)) return found;
+    if (found.iterations >= kMostLinearIterations) break;
   }
   throw DivergedError(
       fmt::format("model \"quadratic\" did not converge: residual {:.2g} after {} iterations; use "
                   "another --size, or model \"cells\"",
                   found.relative_residual, found.iterations));
+}
+
+bool correct(const QuadraticSystem& system, double tolerance, QuadraticSolution& solution,
+             const std::function<void(int, double)>& progress) {
+  const QuadraticOperator& stiffness = solution.tangent->stiffness;
+  const std::size_t n = system.nodes().size();
+  const std::vector<Vec3> wanted = system.right_side(solution.safety);
+  const auto find_unbalanced = [&](const std::vector<Vec3>& displacement) {
+    std::vector<Vec3> left(n);
+    stiffness.forces(displacement[0].data(), left[0].data());
+    parallel_for_each(n, [&](std::size_t i) { left[i] = wanted[i] - left[i]; });
+    return left;
+  };
+  std::vector<Vec3> start = find_unbalanced(system.prescribed()),
+                    left = find_unbalanced(solution.displacement);
+  stiffness.clear_held(start);
+  stiffness.clear_held(left);
+  const double scale = std::sqrt(dot(start, start)), now = std::sqrt(dot(left, left));
+  const double asked = std::max(tolerance, kLeastLinearTolerance);
+  if (now <= asked * scale && scale > 0) return true;
+  const double ahead = scale > 0 ? now / scale : 1;
+  std::vector<Vec3> change;
+  const LinearResult result = conjugate_gradients(
+      stiffness, left, change, *solution.tangent->multigrid, asked / ahead, kMostLinearIterations,
+      [&](int iteration, double residual) { progress(solution.iterations + iteration, residual * ahead); });
+  solution.iterations += result.iterations;
+  solution.relative_residual = result.relative_residual * ahead;
+  if (result.iterations == kMostLinearIterations || result.indefinite ||
+      !(result.converged || solution.relative_residual < kLinearGoodEnough))
+    return false;
+  parallel_for_each(n, [&](std::size_t i) { solution.displacement[i] += change[i]; });
+  solution.unbalanced = find_unbalanced(solution.displacement);
+  return true;
 }
 
 Mat3 gradient_at(const QuadraticSystem& system, const std::vector<Vec3>& displacement, std::size_t cell,

@@ -28,12 +28,18 @@ struct QuadraticSolution {
   std::unique_ptr<QuadraticTangent> tangent = nullptr;  // that it was found with
 };
 
-// The linear solution, by conjugate gradients. Supports whose penalty is too weak for a sliver show as an indefinite stiffness: it is
-// raised fourfold, three times at most. Throws DivergedError; InputError(scene, ...) naming a rigid motion that is free.
+constexpr double kMoreSafety = 4;
+
+// The linear solution, by conjugate gradients, with a residual of at most `tolerance` beside what loads and moves ask for.
+// Supports whose penalty is too weak for a sliver show as an indefinite stiffness: from `safety` on it is raised by kMoreSafety,
+// three times at most. Throws DivergedError; InputError(scene, ...) naming a rigid motion that is free.
 // `progress` is told each iteration and its relative residual.
-[[nodiscard]] QuadraticSolution solve(const QuadraticSystem& system, const RunSettings& settings,
+[[nodiscard]] QuadraticSolution solve(const QuadraticSystem& system, double tolerance, double safety,
                                       const std::string& scene,
                                       const std::function<void(int, double)>& progress);
+// Goes on from a linear solution to another tolerance; false where the stiffness shows as indefinite.
+[[nodiscard]] bool correct(const QuadraticSystem& system, double tolerance, QuadraticSolution& solution,
+                           const std::function<void(int, double)>& progress);
 
 // The gradient (world frame) of a displacement (nodes x 3) in a cell at cell coordinates.
 [[nodiscard]] Mat3 gradient_at(const QuadraticSystem& system, const std::vector<Vec3>& displacement,
