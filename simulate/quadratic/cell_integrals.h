@@ -6,8 +6,8 @@
 
 #include "formats/lattice/cell_moments.h"
 #include "formats/lattice/quadratic_field.h"
+#include "simulate/kernels/kernel_quadratic.h"
 #include "simulate/laws/elasticity.h"
-#include "simulate/quadratic/kernel_quadratic.h"
 
 namespace flexel::simulate {
 

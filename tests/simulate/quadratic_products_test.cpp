@@ -94,9 +94,9 @@ struct Lump {
       turn.a.setRandom();
       turn.gamma.setRandom();
       for (auto* each : {&turn.a, &turn.gamma})  // a translation neither turns a cell nor strains it
-        for (int axis = 0; axis < 3; ++axis) {
-          const Eigen::RowVector3d mean = (*each)(Eigen::seqN(axis, 27, 3), Eigen::all).colwise().mean();
-          (*each)(Eigen::seqN(axis, 27, 3), Eigen::all).rowwise() -= mean;
+        for (int column = 0; column < 3; ++column) {
+          Eigen::Map<Eigen::Matrix<double, 3, 27>> nodes_of(each->col(column).data());
+          nodes_of.colwise() -= Vec3(nodes_of.rowwise().mean());
         }
       const CellMatrix half = CellMatrix::Random();
       supports.push_back(half + half.transpose());

@@ -1,7 +1,7 @@
 // K u of eight cells: the field's gradient at Gauss's points, the stress there, and the same way back. Along each axis the
 // field is m + h t + c t^2 with t from -1 to 1, and a sum over the points goes axis by axis (sum factorization; Orszag,
 // J. Comput. Phys. 37, 1980). A cell's own matrix would be 26 kB to read, its moments are 1 kB.
-#include "simulate/quadratic/kernel_quadratic.h"
+#include "simulate/kernels/kernel_quadratic.h"
 
 #include "base/simd.h"
 
