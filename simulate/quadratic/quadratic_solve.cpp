@@ -189,39 +189,86 @@ void write_field(const QuadraticNodes& nodes, const QuadraticSolution& solution,
   body.cell_columns[kQuadraticColumn] = std::move(column);
 }
 
+namespace {
+
+// Stress at a point (rest, world frame) of matter that these cells hold or touch: the mean over those that the point lies
+// in, else of those that it lies the least outside of. A field that a sliver of matter alone carries says nothing of the
+// stress, so cells with a tenth of the fullest one's matter or less only count where there are no others.
+std::optional<SymmetricStress> stress_near(const QuadraticSystem& system, const QuadraticSolution& solution,
+                                           const Vec3& point,
+                                           std::span<const QuadraticNodes::Incidence> cells) {
+  constexpr double kSliver = 0.1;
+  const Body& body = system.problem().body;
+  const std::vector<std::uint32_t>& of_body = system.nodes().cells;
+  double fullest = 0, least = HUGE_VAL;
+  for (const auto& around : cells) fullest = std::max(fullest, body.fill[of_body[around.cell]]);
+  int count = 0;
+  SymmetricStress sum = SymmetricStress::Zero();
+  for (const auto& around : cells) {
+    if (body.fill[of_body[around.cell]] <= kSliver * fullest) continue;
+    const Part& part = body.parts[system.part_of(around.cell)];
+    const Vec3 at = cell_coordinates(body, part, of_body[around.cell], point);
+    const double beyond = std::max(-at.minCoeff(), at.maxCoeff() - 1),
+                 outside = beyond <= kBesideCell ? 0 : beyond;
+    if (outside > least) continue;
+    if (outside < least) {
+      least = outside;
+      count = 0;
+      sum.setZero();
+    }
+    sum += stress_of(system, solution, around.cell, at);
+    ++count;
+  }
+  if (count == 0) return std::nullopt;
+  return SymmetricStress(sum / count);
+}
+
+// The same where these cells hold too little matter to say: with the cells around them.
+std::optional<SymmetricStress> stress_around(const QuadraticSystem& system, const QuadraticSolution& solution,
+                                             const Vec3& point,
+                                             std::span<const QuadraticNodes::Incidence> cells) {
+  constexpr double kEnough = 0.1;  // of a voxel
+  const QuadraticNodes& nodes = system.nodes();
+  std::vector<QuadraticNodes::Incidence> around(cells.begin(), cells.end());
+  if (std::none_of(cells.begin(), cells.end(), [&](const auto& each) {
+        return system.problem().body.fill[nodes.cells[each.cell]] > kEnough;
+      }))
+    for (const QuadraticNodes::Incidence& each : cells)
+      for (const std::uint32_t node : nodes.of_cell[each.cell])
+        around.insert(around.end(), nodes.at(node).begin(), nodes.at(node).end());
+  std::sort(around.begin(), around.end(), [](const auto& a, const auto& b) { return a.cell < b.cell; });
+  around.erase(std::unique(around.begin(), around.end(),
+                           [](const auto& a, const auto& b) { return a.cell == b.cell; }),
+               around.end());
+  return stress_near(system, solution, point, around);
+}
+
+// Of the middle of a cell's matter.
+SymmetricStress cell_stress(const QuadraticSystem& system, const QuadraticSolution& solution,
+                            std::size_t cell) {
+  const Body& body = system.problem().body;
+  const Index3& low = body.lattice_index[body.cell_elements[system.nodes().cells[cell]][0]];
+  const Vec3 middle = Vec3(low[0], low[1], low[2]) + system.middle(cell);
+  const QuadraticNodes::Incidence own{static_cast<std::uint32_t>(cell), 0};
+  return stress_around(system, solution, system.lattice(cell).to_world(middle), {&own, 1}).value();
+}
+
+}  // namespace
+
 Stresses field_stresses(const QuadraticSystem& system, const QuadraticSolution& solution,
                         const State& state) {
-  const Body& body = system.problem().body;
   const QuadraticNodes& nodes = system.nodes();
   Stresses found = stresses(system.problem(), state);  // for the points that elements stand for
   parallel_for_each(
       nodes.cells.size(),
-      [&](std::size_t c) { found.cell[nodes.cells[c]] = stress_of(system, solution, c, system.middle(c)); },
+      [&](std::size_t c) { found.cell[nodes.cells[c]] = cell_stress(system, solution, c); },
       kAnswerCellsAtATime);
   parallel_for_each(
       nodes.elements.size(),
       [&](std::size_t i) {
         const std::uint32_t e = nodes.elements[i];
-        // the cells that hold the point; where none does, the one that it is the least outside of
-        double least = 1e300;
-        int count = 0;
-        SymmetricStress sum = SymmetricStress::Zero();
-        for (const QuadraticNodes::Incidence& around : nodes.at(i)) {
-          const Part& part = body.parts[system.part_of(around.cell)];
-          const Vec3 at = cell_coordinates(body, part, nodes.cells[around.cell], found.element_at[e]);
-          const double outside = std::max({0.0, -at.minCoeff(), at.maxCoeff() - 1}) <= kBesideCell
-                                     ? 0
-                                     : std::max(-at.minCoeff(), at.maxCoeff() - 1);
-          if (outside > least) continue;
-          if (outside < least) {
-            least = outside;
-            count = 0;
-            sum.setZero();
-          }
-          sum += stress_of(system, solution, around.cell, at);
-          ++count;
-        }
-        if (count > 0) found.element[e] = sum / count;
+        if (const auto stress = stress_around(system, solution, found.element_at[e], nodes.at(i)))
+          found.element[e] = *stress;
       },
       kAnswerCellsAtATime);
   return found;
