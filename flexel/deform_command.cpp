@@ -258,6 +258,7 @@ class GoalRuns {
   SolvedRun operator()(std::optional<double> size, const GoesOn& goes_on) {
     std::optional<StopAfter> limit;
     if (size && model_.may_take_back()) limit.emplace(patience(), "--within");
+    std::optional<SolvedRun> usual;
     try {
       SolvedRun run = solve(size, goes_on);
       if (size) {
@@ -266,7 +267,8 @@ class GoalRuns {
       }
       usual_size_ = preferred_number(spacing_of(run), 20, Rounded::nearest);
       model_.choose(run.voxels);
-      return model_.chosen() ? solve(size, goes_on) : std::move(run);
+      usual = std::move(run);
+      if (model_.chosen()) return solve(size, goes_on);
     } catch (const InputError& error) {
       if (!model_.take_back(error.what())) throw;
     } catch (const DivergedError& error) {
@@ -275,7 +277,7 @@ class GoalRuns {
       if (!limit || !limit->passed() || !model_.take_back("it takes too long")) throw;
     }
     limit.reset();
-    return solve(usual_size_, goes_on);
+    return usual ? *std::move(usual) : solve(usual_size_, goes_on);
   }
 
   [[nodiscard]] mapping::MapResult map(SolvedRun& run, mapping::MapMethod method) {

@@ -2,7 +2,7 @@
 
 import json
 
-from harness import binary_stl, box_triangles, expect, expect_error, expect_ok, main, run, scene, write
+from harness import ascii_stl, binary_stl, box_triangles, expect, expect_error, expect_ok, main, run, scene, write
 
 
 def beam():
@@ -34,6 +34,16 @@ def test_accuracy_is_the_run_of_its_size():
     fine, _ = deform([*options, "--size", f"{0.75 * told['size']} m", "--no-estimate"], "fine.stl")
     true = abs(moved / fine["simulate"]["largest_displacement"] - 1)
     expect(true < 0.05, f"{true} from a finer run")
+
+
+def test_a_part_that_the_model_for_thin_walls_refuses():
+    """A plate beside a part that is not closed, which has no moments: the other model answers."""
+    plate = box_triangles((120, 40, 2))
+    raised = [[(x, y, z + 30) for x, y, z in triangle] for triangle in box_triangles((120, 40, 8))]
+    write("two.stl", ascii_stl(plate, "plate") + ascii_stl(raised[:-1], "open"))
+    options = ["two.stl", "--heal", "none", "--material", "steel", "--fix", "xmin", "--push", "xmax: 0 0 -1 N"]
+    summary, said = deform([*options, "--within", "2s"])
+    expect("--model quadratic" not in said and summary["simulate"]["largest_displacement"] > 0, said)
 
 
 def test_within():
