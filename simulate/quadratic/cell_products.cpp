@@ -18,12 +18,12 @@ constexpr std::size_t kTurnNumbers = static_cast<std::size_t>(kCellUnknowns) * 3
 constexpr std::size_t kPackedSize = static_cast<std::size_t>(kCellUnknowns) * (kCellUnknowns + 1) / 2;
 using CellValues = Eigen::Matrix<double, kCellUnknowns, 1>;
 
-void multiply(bool whole, const quadratic_kernel::EightCells<double>& cells,
-              const quadratic_kernel::Elasticity<double>& part, double* values) {
+void run_kernel(bool whole, const quadratic_kernel::EightCells<double>& cells,
+                const quadratic_kernel::Elasticity<double>& part, double* values) {
   quadratic_kernel::best().product[whole ? 0 : 1](cells, part, values);
 }
-void multiply(bool whole, const quadratic_kernel::EightCells<float>& cells,
-              const quadratic_kernel::Elasticity<float>& part, float* values) {
+void run_kernel(bool whole, const quadratic_kernel::EightCells<float>& cells,
+                const quadratic_kernel::Elasticity<float>& part, float* values) {
   quadratic_kernel::best().product_of_floats[whole ? 0 : 1](cells, part, values);
 }
 
@@ -127,7 +127,8 @@ void CellProducts<Number>::set_support(std::size_t cell, const CellMatrix& matri
 }
 
 template <class Number>
-void CellProducts<Number>::turn(const std::vector<CellTurn>& turns) {
+void CellProducts<Number>::turn(const std::vector<CellTurn>& turns,
+                                const std::vector<CellTurn::Columns>& more) {
   rotation_.assign(eights_.size() * 9 * kWidth, 0);
   a_.assign(eights_.size() * kTurnNumbers * kWidth, 0);
   gamma_ = a_;
@@ -142,7 +143,9 @@ void CellProducts<Number>::turn(const std::vector<CellTurn>& turns) {
           turned_[eight.cell[lane]] = turn.rotation;
           put_rotation((turn.rotation * axes).transpose(), lane, &rotation_[e * 9 * kWidth]);
           for (Eigen::Index n = 0; n < kCellUnknowns; n += 3) {
-            const Mat3 a = axes.transpose() * turn.a.template middleRows<3>(n),
+            Mat3 added = turn.a.template middleRows<3>(n);
+            if (!more.empty()) added += more[eight.cell[lane]].template middleRows<3>(n);
+            const Mat3 a = axes.transpose() * added,
                        gamma = axes.transpose() * turn.gamma.template middleRows<3>(n);
             for (Eigen::Index i = 0; i < 3; ++i)
               for (Eigen::Index k = 0; k < 3; ++k) {
@@ -169,7 +172,7 @@ void CellProducts<Number>::apply(std::size_t e, Number* values) const {
   } else if (!part.along_world) {
     cells.rotation = &first_rotation_[eight.part * 9 * kWidth];
   }
-  multiply(eight.whole, cells, part.elasticity, values);
+  run_kernel(eight.whole, cells, part.elasticity, values);
 }
 
 // Adds R S R^T x to the forces of a cell.
@@ -259,7 +262,7 @@ void CellProducts<Number>::multiply_one(std::size_t cell, bool turned, const Cel
   alignas(64) Number values[kCellUnknowns * kWidth];
   for (Eigen::Index i = 0; i < kCellUnknowns; ++i)
     for (Eigen::Index c = 0; c < 8; ++c) values[8 * i + c] = static_cast<Number>(x(i, c));
-  multiply(eight.whole, cells, part.elasticity, values);
+  run_kernel(eight.whole, cells, part.elasticity, values);
   for (Eigen::Index i = 0; i < kCellUnknowns; ++i)
     for (Eigen::Index c = 0; c < 8; ++c) product(i, c) = static_cast<double>(values[8 * i + c]);
 }
@@ -268,6 +271,27 @@ template <class Number>
 void CellProducts<Number>::elastic_forces(std::size_t cell, const CellColumns& x,
                                           CellColumns& product) const {
   multiply_one(cell, false, x, product);
+}
+
+template <class Number>
+CellMatrix CellProducts<Number>::support(std::size_t cell) const {
+  const double* from = &support_[static_cast<std::size_t>(support_at_[cell]) * kPackedSize];
+  CellMatrix made;
+  for (int i = 0; i < kCellUnknowns; ++i)
+    for (int j = 0; j <= i; ++j) made(i, j) = made(j, i) = *from++;
+  if (!turned_.empty())
+    for (Eigen::Index a = 0; a < kCellUnknowns; a += 3)
+      for (Eigen::Index b = 0; b < kCellUnknowns; b += 3)
+        made.block<3, 3>(a, b) = (turned_[cell] * made.block<3, 3>(a, b) * turned_[cell].transpose()).eval();
+  return made;
+}
+
+template <class Number>
+CellColumns CellProducts<Number>::multiply(std::size_t cell, const CellColumns& x) const {
+  CellColumns product;
+  multiply_one(cell, true, x, product);
+  if (is_supported(cell)) product += support(cell) * x;
+  return product;
 }
 
 template <class Number>
@@ -282,17 +306,19 @@ CellMatrix CellProducts<Number>::matrix(std::size_t cell) const {
     made.middleCols(first, count) = column.leftCols(count);
   }
   made = (0.5 * (made + made.transpose())).eval();  // rounding alone makes it uneven
-  if (!is_supported(cell)) return made;
-  const double* from = &support_[static_cast<std::size_t>(support_at_[cell]) * kPackedSize];
-  CellMatrix support;
-  for (int i = 0; i < kCellUnknowns; ++i)
-    for (int j = 0; j <= i; ++j) support(i, j) = support(j, i) = *from++;
-  if (!turned_.empty())
-    for (Eigen::Index a = 0; a < kCellUnknowns; a += 3)
-      for (Eigen::Index b = 0; b < kCellUnknowns; b += 3)
-        support.block<3, 3>(a, b) =
-            (turned_[cell] * support.block<3, 3>(a, b) * turned_[cell].transpose()).eval();
-  return made + support;
+  if (is_supported(cell)) made += support(cell);
+  return made;
+}
+
+template <class Number>
+std::size_t CellProducts<Number>::twin(std::size_t cell) const {
+  const Eight& own = eights_[place_[cell] / kWidth];
+  if (!own.whole || is_supported(cell) || !rotation_.empty()) return cell;
+  const auto first = std::find_if(eights_.begin(), eights_.end(),
+                                  [&](const Eight& each) { return each.whole && each.part == own.part; });
+  const auto same = std::find_if(first->cell.begin(), first->cell.begin() + first->count,
+                                 [&](std::uint32_t each) { return !is_supported(each); });
+  return same == first->cell.begin() + first->count ? cell : *same;
 }
 
 template <class Number>

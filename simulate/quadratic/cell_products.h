@@ -13,8 +13,9 @@ namespace flexel::simulate {
 // What large deflections make of a cell's matrix K: R (K + a gamma^T + gamma a^T) R^T, node by node
 // (simulate/quadratic/corotation.h).
 struct CellTurn {
+  using Columns = Eigen::Matrix<double, kCellUnknowns, 3>;
   Mat3 rotation = Mat3::Identity();
-  Eigen::Matrix<double, kCellUnknowns, 3> a = Eigen::Matrix<double, kCellUnknowns, 3>::Zero(), gamma = a;
+  Columns a = Columns::Zero(), gamma = Columns::Zero();
 };
 
 // K x of up to eight columns.
@@ -40,8 +41,8 @@ class CellProducts {
   void reserve_supports(const std::vector<std::uint32_t>& cells);
   // What supports add to K, symmetric.
   void set_support(std::size_t cell, const CellMatrix& matrix);
-  // (cells) From now on every cell is turned.
-  void turn(const std::vector<CellTurn>& turns);
+  // (cells) From now on every cell is turned; what `more` has is added to `a` (none: nothing).
+  void turn(const std::vector<CellTurn>& turns, const std::vector<CellTurn::Columns>& more = {});
 
   // y (nodes x 3) N = K x, x (nodes x 3) m; in parallel, the same bits for any thread count.
   void forces(const double* x, double* y) const;
@@ -49,6 +50,10 @@ class CellProducts {
   void elastic_forces(std::size_t cell, const CellColumns& x, CellColumns& product) const;
   // Of a cell, as forces() takes it.
   [[nodiscard]] CellMatrix matrix(std::size_t cell) const;
+  // A cell that has the same matrix, the same one for all of those.
+  [[nodiscard]] std::size_t twin(std::size_t cell) const;
+  // matrix(cell) x
+  [[nodiscard]] CellColumns multiply(std::size_t cell, const CellColumns& x) const;
 
   [[nodiscard]] bool is_whole(std::size_t cell) const { return eights_[place_[cell] / 8].whole; }
   [[nodiscard]] bool is_supported(std::size_t cell) const {
@@ -76,6 +81,7 @@ class CellProducts {
   void add_support(std::size_t cell, const double* x, Number* forces) const;
   // All lanes are one cell. `turned`: as it is now, else as at first.
   void multiply_one(std::size_t cell, bool turned, const CellColumns& x, CellColumns& product) const;
+  [[nodiscard]] CellMatrix support(std::size_t cell) const;  // R S R^T
 
   const QuadraticNodes* nodes_;
   std::vector<Part> parts_;

@@ -155,10 +155,10 @@ bool Corotation::residual(const std::vector<Vec3>& displacement, double share, s
 }
 
 void Corotation::set_tangent(bool stressed) {
-  std::vector<CellTurn> turns = turn_;
   if (stressed)
-    for (std::size_t c = 0; c < turns.size(); ++c) turns[c].a += stress_[c];
-  stiffness_.cells().turn(turns);
+    stiffness_.cells().turn(turn_, stress_);
+  else
+    stiffness_.cells().turn(turn_);
   parallel_for_each(
       supported_.size(),
       [&](std::size_t i) {

@@ -46,7 +46,7 @@ class Corotation {
   std::vector<Mat3> from_rest_;     // (cells) R - 1
   std::vector<CellTurn>
       turn_;  // (cells) without the part of the stresses, which is stress_, to be added to `a`
-  std::vector<Eigen::Matrix<double, kCellUnknowns, 3>> stress_;
+  std::vector<CellTurn::Columns> stress_;
   std::vector<double> force_;             // (cells x 81) N, elastic
   std::vector<std::uint32_t> supported_;  // cells that supports hold
 };

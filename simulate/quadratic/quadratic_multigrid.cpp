@@ -31,31 +31,59 @@ using CornerMatrix = Eigen::Matrix<double, 24, 24>;
 
 // Of all cells, while the rest is made from it.
 struct QuadraticMultigrid::CellStiffness {
-  std::vector<CornerMatrix> corners;  // of the trilinear field
-  std::vector<float> packed;          // (cells x kPackedSize) lower triangle, row by row
+  std::vector<CornerMatrix> corners;  // (cells) of the trilinear field
+  std::vector<std::size_t> place;     // (cells) in `packed`: cells that have the same matrix share it
+  std::vector<float> packed;          // (x kPackedSize) lower triangle, row by row
 
-  explicit CellStiffness(const CellProducts<double>& cells, std::size_t count)
-      : corners(count), packed(count * kPackedSize) {
-    Eigen::Matrix<double, kCellUnknowns, 24> embed = Eigen::Matrix<double, kCellUnknowns, 24>::Zero();
-    for (std::size_t n = 0; n < kQuadraticNodes; ++n)
-      for (std::size_t a = 0; a < 8; ++a)
-        embed.block<3, 3>(static_cast<Eigen::Index>(3 * n), static_cast<Eigen::Index>(3 * a)) =
-            trilinear_weight(n, a) * Mat3::Identity();
+  CellStiffness(const CellProducts<double>& cells, std::size_t count) : corners(count), place(count) {
+    std::vector<std::uint32_t> others;  // cells whose matrix is no other's
+    for (std::uint32_t c = 0; c < count; ++c)
+      if (cells.twin(c) == c) {
+        place[c] = others.size();
+        others.push_back(c);
+      }
+    packed.resize(others.size() * kPackedSize);
     parallel_for_each(
-        count,
-        [&](std::size_t c) {
-          const CellMatrix matrix = cells.matrix(c);
-          corners[c].noalias() = embed.transpose() * (matrix * embed);
-          float* to = &packed[c * kPackedSize];
-          for (int i = 0; i < kCellUnknowns; ++i)
-            for (int j = 0; j <= i; ++j) *to++ = static_cast<float>(matrix(i, j));
+        others.size(),
+        [&](std::size_t i) {
+          corners[others[i]] = corner_matrix(cells, others[i]);
+          const CellMatrix matrix = cells.matrix(others[i]);
+          float* to = &packed[i * kPackedSize];
+          for (int row = 0; row < kCellUnknowns; ++row)
+            for (int j = 0; j <= row; ++j) *to++ = static_cast<float>(matrix(row, j));
         },
         kBlocksAtATime);
+    for (std::size_t c = 0; c < count; ++c)
+      if (const std::size_t same = cells.twin(c); same != c) {
+        place[c] = place[same];
+        corners[c] = corners[same];
+      }
+  }
+
+  // P^T K P
+  static CornerMatrix corner_matrix(const CellProducts<double>& cells, std::size_t cell) {
+    CornerMatrix made = CornerMatrix::Zero();
+    CellColumns embedded;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      embedded.setZero();
+      for (std::size_t n = 0; n < kQuadraticNodes; ++n)
+        for (std::size_t a = 0; a < 8; ++a)
+          embedded(static_cast<Eigen::Index>(3 * n + axis), static_cast<Eigen::Index>(a)) =
+              trilinear_weight(n, a);
+      const CellColumns forces = cells.multiply(cell, embedded);
+      for (std::size_t n = 0; n < kQuadraticNodes; ++n)
+        for (std::size_t a = 0; a < 8; ++a)
+          if (const double weight = trilinear_weight(n, a); weight > 0)
+            for (std::size_t b = 0; b < 8; ++b)
+              made.block<3, 1>(static_cast<Eigen::Index>(3 * a), static_cast<Eigen::Index>(3 * b + axis)) +=
+                  weight * forces.block<3, 1>(static_cast<Eigen::Index>(3 * n), static_cast<Eigen::Index>(b));
+    }
+    return 0.5 * (made + made.transpose());
   }
 
   // Of two of a cell's nodes.
   [[nodiscard]] Mat3 block(std::size_t cell, std::size_t a, std::size_t b) const {
-    const float* from = &packed[cell * kPackedSize];
+    const float* from = &packed[place[cell] * kPackedSize];
     Mat3 found;
     for (std::size_t i = 0; i < 3; ++i)
       for (std::size_t j = 0; j < 3; ++j) {

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/human.h"
+#include "base/math/greatest.h"
 #include "base/parallel.h"
 #include "simulate/linear/conjugate_gradients.h"
 #include "simulate/linear/vector_products.h"
@@ -72,9 +73,6 @@ class LargeDeflection {
                    : turned ? Vec3(Vec3::Zero())
                             : Vec3(share * linear[n]);
       });
-      std::vector<Vec3> moved(guess.size());
-      parallel_for_each(guess.size(), [&](std::size_t n) { moved[n] = guess[n] - now[n]; });
-      stale_ += largest_turn(moved);
       const int iterations = reach(share, guess);
       if (iterations > kMostIterations) {
         step = (share - done) / 2;
@@ -116,7 +114,7 @@ class LargeDeflection {
       for (double& value : each) value = static_cast<double>(random()) / 4294967295.0 - 0.5;
     tangent_.stiffness.clear_held(irregular);
     corotation_.set_tangent(true);
-    tangent_.multigrid.emplace(tangent_.stiffness, system_.problem().body, u);
+    if (stale(u)) make_preconditioner(u);
     const LinearResult result = conjugate_gradients(tangent_.stiffness, irregular, change,
                                                     *tangent_.multigrid, kLoosest, kMostLinear);
     solution_.iterations += result.iterations;
@@ -155,10 +153,12 @@ class LargeDeflection {
 
   // rad: how far a displacement turns any cell, to first order.
   double largest_turn(const std::vector<Vec3>& displacement) const {
-    double largest = 0;
-    for (std::size_t c = 0; c < system_.nodes().cells.size(); ++c)
-      largest = std::max(largest, spin_of(gradient_at(system_, displacement, c, system_.middle(c))).norm());
-    return largest;
+    return parallel_sum<Greatest>(
+               system_.nodes().cells.size(),
+               [&](std::size_t c) {
+                 return Greatest{spin_of(gradient_at(system_, displacement, c, system_.middle(c))).norm()};
+               })
+        .value;
   }
 
   // Equilibrium at a share of the load, from `u`. How many iterations it took; more than kMostIterations: there was none.
@@ -183,7 +183,6 @@ class LargeDeflection {
       std::vector<Vec3> change;
       if (!solve(u, left, residual, change)) return kMostIterations + 1;
       const double turn = largest_turn(change);
-      stale_ += turn;
       const double part = turn > kMostTurn ? kMostTurn / turn : 1;
       parallel_for_each(u.size(), [&](std::size_t n) { u[n] += part * change[n]; });
       ++solution_.newton_iterations;
@@ -191,15 +190,27 @@ class LargeDeflection {
     return kMostIterations + 1;
   }
 
+  // Cells have turned too far since the preconditioner was made.
+  [[nodiscard]] bool stale(const std::vector<Vec3>& u) const {
+    if (made_at_.empty()) return largest_turn(u) > kMostStale;
+    std::vector<Vec3> since(u.size());
+    parallel_for_each(u.size(), [&](std::size_t n) { since[n] = u[n] - made_at_[n]; });
+    return largest_turn(since) > kMostStale;
+  }
+  void make_preconditioner(const std::vector<Vec3>& u) {
+    tangent_.multigrid.reset();  // before there is another
+    tangent_.multigrid.emplace(tangent_.stiffness, system_.problem().body, u);
+    made_at_ = u;
+  }
+
   // A preconditioner lasts for a while; a tangent that is not positive loses the part of the stresses.
   bool solve(const std::vector<Vec3>& u, const std::vector<Vec3>& left, double residual,
              std::vector<Vec3>& change) {
     corotation_.set_tangent(true);
-    if (stale_ < kMostStale && attempt(left, residual, change)) return true;
+    if (!stale(u) && attempt(left, residual, change)) return true;
     for (const bool stressed : {true, false}) {
       corotation_.set_tangent(stressed);
-      tangent_.multigrid.emplace(tangent_.stiffness, system_.problem().body, u);
-      stale_ = 0;
+      make_preconditioner(u);
       if (attempt(left, residual, change)) return true;
     }
     return false;
@@ -225,7 +236,7 @@ class LargeDeflection {
   Corotation corotation_;
   double reach_ = 0, extent_ = 0;  // m: of the linear answer; of the part, or of what leads it
   double angle_ = 0;               // rad, of moves
-  double stale_ = 0;               // rad: how far cells may have turned since the preconditioner was made
+  std::vector<Vec3> made_at_;      // (nodes x 3) m, where the preconditioner was made; none: at rest
 };
 
 }  // namespace
