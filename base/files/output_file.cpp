@@ -111,6 +111,7 @@ void remove_temporary_outputs() {
 }
 
 OutputFile::OutputFile(const std::string& path, bool binary) : path_(path), target_(path) {
+  buffer_.reserve(kBufferSize);  // before there is a file that would be left behind
   if (path.empty()) throw InputError("the name of the output is empty");
   if (means_stdout(path)) {
     if (binary && isatty(STDOUT_FILENO) != 0)
@@ -121,7 +122,6 @@ OutputFile::OutputFile(const std::string& path, bool binary) : path_(path), targ
   } else {
     open_file();
   }
-  buffer_.reserve(kBufferSize);
 }
 
 void OutputFile::open_file() {
@@ -135,10 +135,11 @@ void OutputFile::open_file() {
   if (exists && ::access(path_.c_str(), W_OK) != 0) refuse(path_, errno);
   target_ = follow_links(path_);
   refuse_long_name(target_, path_);
-  const std::string name = temporary_beside(target_);
+  std::string name = temporary_beside(target_);
   descriptor_ = open_or_refuse(name, O_WRONLY | O_CREAT | O_TRUNC, 0666, path_);  // narrowed by the umask
-  temporary_ = name;
+  temporary_ = std::move(name);
   remember_temporary(temporary_);
+  replaces_ = exists;
   if (exists) (void)::fchmod(descriptor_, status.st_mode & 07777);  // overwriting keeps the permissions
 }
 
@@ -189,6 +190,8 @@ void OutputFile::commit(bool alone) {
   flush_buffer();
   committed_ = true;
   if (descriptor_ == STDOUT_FILENO || memory_ != nullptr) return;
+  // Were the power lost after the renaming, the old result would be gone and the new one not yet on the disk.
+  if (replaces_ && ::fsync(descriptor_) != 0 && errno != EINVAL && errno != ENOTSUP) refuse(path_, errno);
   const int closed =
       ::close(std::exchange(descriptor_, -1));  // some disks report only here that they are full
   if (closed != 0 && errno != EINTR) refuse(path_, errno);

@@ -35,7 +35,7 @@ class OutputFile {
   std::string target_;     // the path with symbolic links resolved
   std::string temporary_;  // "" for stdout, devices and FIFOs, and once committed
   int descriptor_ = -1;
-  bool committed_ = false;
+  bool committed_ = false, replaces_ = false;
   std::vector<char> buffer_;
 };
 

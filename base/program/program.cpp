@@ -68,8 +68,7 @@ int code_of(const std::string& name, const std::function<int()>& body) {
   } catch (const ProgramBeforeFailed& failed) {
     return failed.code();
   } catch (const std::bad_alloc&) {
-    return report(name, "not enough memory: a larger spacing (--size) or fewer elements (--count) needs less",
-                  kExitInput);
+    return report(name, kNoMemory, kExitInput);
   } catch (const std::exception& error) {
     if (wants_a_thread(error))
       return report(

@@ -2,14 +2,19 @@
 // the temporary outputs and end the process.
 #include "base/program/signals.h"
 
+#include <cxxabi.h>
 #include <unistd.h>
 
 #include <array>
 #include <condition_variable>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
+#include <exception>
 #include <mutex>
+#include <new>
 #include <thread>
+#include <typeinfo>
 
 #include "base/error.h"
 #include "base/files/files.h"
@@ -76,10 +81,24 @@ void handle(int signal, void (*handler)(int)) {
   sigaction(signal, &action, nullptr);
 }
 
+// Where an exception meets another, or leaves a destructor, nobody can catch it: libraries do that where memory ends.
+[[noreturn]] void on_terminate() {
+  const std::type_info* type = abi::__cxa_current_exception_type();
+  const bool memory = type != nullptr && *type == typeid(std::bad_alloc);
+  remove_temporary_outputs();
+  write_words({program_name.data(), ": error: ",
+               memory ? kNoMemory : "internal error of an unknown kind, please report it with the input",
+               "\n"});
+  if (!memory) std::abort();
+  tell_code_through_pipe(STDOUT_FILENO, kExitInput);
+  _exit(kExitInput);
+}
+
 }  // namespace
 
 void install_signal_handlers(const std::string& name) {
   name.copy(program_name.data(), program_name.size() - 1);
+  std::set_terminate(on_terminate);
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);  // a limit on the size of files then surfaces as EFBIG
   struct sigaction crash = {};

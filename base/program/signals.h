@@ -4,8 +4,12 @@
 
 namespace flexel {
 
+constexpr const char* kNoMemory =
+    "not enough memory: a larger spacing (--size) or fewer elements (--count) needs less";
+
 // Installs the handlers of a program called `name`. SIGPIPE is ignored (a closed pipe surfaces as
-// ReaderClosedPipe); SIGINT makes check_stop() throw (base/stop.h), a second one ends the process at once.
+// ReaderClosedPipe); SIGINT makes check_stop() throw (base/stop.h), a second one ends the process at once. What
+// nobody can catch (std::terminate) ends in a line too.
 void install_signal_handlers(const std::string& name);
 
 // "interrupted" or "terminated", of the signal that check_stop() saw, and the exit code that a shell gives

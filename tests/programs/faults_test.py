@@ -1,0 +1,153 @@
+"""Calls of the C library that fail, one after another (tests/faults/fail_call.cpp): a command ends with success and its whole
+result, or with one line, and then what was there before is there still."""
+
+import json
+import os
+import pathlib
+import shutil
+
+from harness import BIN, SCENE, Skip, body, box, bracket, expect, expect_ok, main, need_step, run, scene, write
+
+KINDS = ("write", "fsync", "rename", "open", "close", "malloc")
+MOST = 12  # of each kind; the others lie evenly between
+OLD = b"what was there before\n"
+
+
+def library():
+    path = BIN / "libfail_call.so"
+    if not path.exists():
+        raise Skip("fail_call.cpp was not built")
+    return str(path)
+
+
+def counted(command, **options):
+    """How often each kind of call is made by any one process of the command."""
+    environment = dict(os.environ, LD_PRELOAD=library(), FLEXEL_FAULT_COUNTS="counts.txt")
+    expect_ok(run(*command, env=environment, **options))
+    most = {kind: 0 for kind in KINDS}
+    for line in pathlib.Path("counts.txt").read_text().splitlines():
+        kind, count = line.split()
+        most[kind] = max(most[kind], int(count))
+    os.remove("counts.txt")
+    return most
+
+
+def whole(name, data, reference):
+    if name.endswith(".json"):  # holds times
+        try:
+            return isinstance(json.loads(data), (dict, list))
+        except ValueError:
+            return False
+    return data == reference
+
+
+def sweep(command, outputs, least=1):
+    """Each fault alone, over old results."""
+    program = command[0]
+    inputs = {path.name: path.read_bytes() for path in pathlib.Path(".").iterdir()}
+    for name in outputs:
+        write(name, OLD)
+    counts = counted(command)
+    reference = {name: pathlib.Path(name).read_bytes() for name in outputs}
+    expect(counts["fsync"] >= len(outputs) and counts["rename"] >= len(outputs), f"results are replaced without fsync and rename: {counts}")
+    said = expect_ok(run(*command)).out
+    tried = failed = 0
+    for kind in KINDS:
+        count = counts[kind]
+        numbers = range(1, count + 1) if count <= MOST else sorted({1 + round(i * (count - 1) / (MOST - 1)) for i in range(MOST)})
+        for number in numbers:
+            shutil.rmtree("again", ignore_errors=True)
+            os.mkdir("again")
+            for name, data in inputs.items():
+                pathlib.Path("again", name).write_bytes(data)
+            for name in outputs:
+                pathlib.Path("again", name).write_bytes(OLD)
+            environment = dict(os.environ, LD_PRELOAD=library(), FLEXEL_FAULT=f"{kind}:{number}")
+            done = run(*command, env=environment, cwd="again")
+            what = f"{' '.join(map(str, command))} with {kind} {number} of {count} failing: {done}"
+            found = {path.name: path.read_bytes() for path in pathlib.Path("again").iterdir()}
+            expect(set(found) == set(inputs) | set(outputs), f"files {sorted(found)}; {what}")
+            tried += 1
+            if done.code == 0:
+                expect(all(whole(name, found[name], reference[name]) for name in outputs), f"success, but not its result; {what}")
+                expect(outputs or done.out == said, f"success, but not all was said; {what}")
+                continue
+            failed += 1
+            errors = [line for line in done.err.splitlines() if f"{program}: error: " in line]
+            expect(0 < done.code < 6 and len(errors) == 1, f"one line and an exit code wanted; {what}")
+            expect("internal error" not in done.err, what)
+            for name in outputs:
+                expect(found[name] == OLD or whole(name, found[name], reference[name]), f"{name} is neither old nor new; {what}")
+    shutil.rmtree("again", ignore_errors=True)
+    expect(failed >= least and tried > failed, f"{failed} of {tried} faults were noticed")
+
+
+def test_voxelize():
+    box()
+    sweep(("flexel-voxelize", "box.stl", "--size", "5 mm", "--moments", "-o", "body.vtu", "--summary", "s.json"), ("body.vtu", "s.json"))
+
+
+def test_voxelize_step_in_a_child():
+    need_step()
+    bracket()
+    sweep(("flexel-voxelize", "bracket.step", "--size", "5 mm", "-o", "body.vtu"), ("body.vtu",))
+
+
+def test_simulate():
+    body()
+    scene()
+    sweep(("flexel-simulate", "scene.toml", "body.vtu", "-o", "bent.vtu", "--summary", "s.json"), ("bent.vtu", "s.json"))
+
+
+def test_simulate_quadratic():
+    body("body.vtu", "--moments")
+    scene("scene.toml", 'model = "quadratic"\n' + SCENE)
+    sweep(("flexel-simulate", "scene.toml", "body.vtu", "-o", "bent.vtu"), ("bent.vtu",))
+
+
+def test_simulate_in_time():
+    body()
+    scene("scene.toml", SCENE + '[run]\ntime = "20 us"\n')
+    sweep(("flexel-simulate", "scene.toml", "body.vtu", "-o", "bent.vtu", "--history", "h.csv"), ("bent.vtu", "h.csv"))
+
+
+def bent():
+    body()
+    scene()
+    expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "bent.vtu", "--no-estimate"))
+
+
+def test_map():
+    bent()
+    sweep(("flexel-map", "bent.vtu", "-o", "bent.stl", "--report", "r.json"), ("bent.stl", "r.json"))
+
+
+def test_map_to_a_body_of_polygons():
+    bent()
+    sweep(("flexel-map", "bent.vtu", "-o", "bent.glb"), ("bent.glb",))
+
+
+def test_deform():
+    box()
+    scene()
+    sweep(("flexel", "deform", "box.stl", "--scene", "scene.toml", "--size", "5 mm", "-o", "out.stl", "--summary", "s.json"), ("out.stl", "s.json"))
+
+
+def test_picture():
+    bent()
+    sweep(("flexel", "picture", "bent.vtu", "-o", "p.png"), ("p.png",))
+
+
+def test_export():
+    box()
+    scene()
+    sweep(("flexel", "export", "box.stl", "--scene", "scene.toml", "--size", "5 mm", "--calculix", "-o", "out.inp"), ("out.inp",))
+
+
+def test_info_on_stdout():
+    box()
+    sweep(("flexel", "info", "box.stl", "--json"), ())
+
+
+if __name__ == "__main__":
+    main(globals())
