@@ -4,6 +4,7 @@
 #include "simulate/quadratic/cell_products.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include "base/parallel.h"
@@ -28,21 +29,35 @@ void run_kernel(bool whole, const quadratic_kernel::EightCells<float>& cells,
 }
 
 template <class To, class From>
-quadratic_kernel::Elasticity<To> in_precision(const quadratic_kernel::Elasticity<From>& from) {
+quadratic_kernel::Elasticity<To> in_precision(const quadratic_kernel::Elasticity<From>& from,
+                                              double unit = 1) {
   quadratic_kernel::Elasticity<To> to{};
   std::transform(std::begin(from.scale), std::end(from.scale), to.scale,
                  [](From x) { return static_cast<To>(x); });
   std::transform(std::begin(from.moduli), std::end(from.moduli), to.moduli,
-                 [](From x) { return static_cast<To>(x); });
+                 [unit](From x) { return static_cast<To>(x / unit); });
   to.isotropic = from.isotropic;
   return to;
 }
 
 template <class To, class From>
-std::vector<To> in_precision(const std::vector<From>& from) {
+std::vector<To> in_precision(const std::vector<From>& from, double unit = 1) {
   std::vector<To> to(from.size());
-  std::transform(from.begin(), from.end(), to.begin(), [](From x) { return static_cast<To>(x); });
+  std::transform(from.begin(), from.end(), to.begin(), [unit](From x) { return static_cast<To>(x / unit); });
   return to;
+}
+
+// A power of two near the stiffest node of a part's cells [N/m].
+template <class Parts>
+double stiffness_unit(const Parts& parts) {
+  double most = 0;
+  for (const auto& each : parts)
+    for (int i = 0; i < 6; ++i)
+      for (int axis = 0; axis < 3; ++axis)
+        most = std::max(most, static_cast<double>(each.elasticity.moduli[7 * i]) *
+                                  static_cast<double>(each.elasticity.scale[axis]) *
+                                  static_cast<double>(each.elasticity.scale[axis]));
+  return most > 0 ? std::exp2(std::floor(std::log2(most))) : 1;
 }
 
 template <class Number>
@@ -96,18 +111,19 @@ template <class Number>
 template <class Other>
 CellProducts<Number>::CellProducts(const CellProducts<Other>& other)
     : nodes_(other.nodes_),
+      unit_(stiffness_unit(other.parts_)),
       place_(other.place_),
       moments_(in_precision<Number>(other.moments_)),
       first_rotation_(in_precision<Number>(other.first_rotation_)),
       rotation_(in_precision<Number>(other.rotation_)),
-      a_(in_precision<Number>(other.a_)),
+      a_(in_precision<Number>(other.a_, unit_)),
       gamma_(in_precision<Number>(other.gamma_)),
       turned_(other.turned_),
       support_at_(other.support_at_),
       support_(other.support_),
       cell_force_(other.cell_force_.size()) {
   for (const auto& each : other.parts_)
-    parts_.push_back({in_precision<Number>(each.elasticity), each.axes, each.along_world});
+    parts_.push_back({in_precision<Number>(each.elasticity, unit_), each.axes, each.along_world});
   for (const auto& each : other.eights_)
     eights_.push_back({each.cell, each.count, each.part, each.whole, each.moments});
 }
@@ -195,7 +211,7 @@ void CellProducts<Number>::add_support(std::size_t cell, const double* x, Number
     const Vec3 at = sum.segment<3>(static_cast<Eigen::Index>(3 * n));
     const Vec3 force = turned_.empty() ? at : Vec3(turned_[cell] * at);
     for (std::size_t axis = 0; axis < 3; ++axis)
-      forces[3 * n + axis] += static_cast<Number>(force[static_cast<Eigen::Index>(axis)]);
+      forces[3 * n + axis] += static_cast<Number>(force[static_cast<Eigen::Index>(axis)] / unit_);
   }
 }
 
@@ -230,7 +246,7 @@ void CellProducts<Number>::forces(const double* x, double* y) const {
         for (const QuadraticNodes::Incidence& at : nodes_->at(n))
           for (std::size_t axis = 0; axis < 3; ++axis)
             sum[axis] += static_cast<double>(cell_force_[at.cell * kCellUnknowns + 3 * at.node + axis]);
-        for (std::size_t axis = 0; axis < 3; ++axis) y[3 * n + axis] = sum[axis];
+        for (std::size_t axis = 0; axis < 3; ++axis) y[3 * n + axis] = unit_ * sum[axis];
       },
       kNodesAtATime);
 }
@@ -311,14 +327,19 @@ CellMatrix CellProducts<Number>::matrix(std::size_t cell) const {
 }
 
 template <class Number>
-std::size_t CellProducts<Number>::twin(std::size_t cell) const {
-  const Eight& own = eights_[place_[cell] / kWidth];
-  if (!own.whole || is_supported(cell) || !rotation_.empty()) return cell;
-  const auto first = std::find_if(eights_.begin(), eights_.end(),
-                                  [&](const Eight& each) { return each.whole && each.part == own.part; });
-  const auto same = std::find_if(first->cell.begin(), first->cell.begin() + first->count,
-                                 [&](std::uint32_t each) { return !is_supported(each); });
-  return same == first->cell.begin() + first->count ? cell : *same;
+std::vector<std::uint32_t> CellProducts<Number>::twins() const {
+  std::vector<std::uint32_t> same(place_.size());
+  std::iota(same.begin(), same.end(), 0U);
+  if (!rotation_.empty()) return same;
+  std::vector<std::int64_t> first(parts_.size(), -1);
+  for (const Eight& eight : eights_)
+    for (std::size_t lane = 0; eight.whole && lane < eight.count; ++lane) {
+      const std::uint32_t cell = eight.cell[lane];
+      if (is_supported(cell)) continue;
+      if (first[eight.part] < 0) first[eight.part] = cell;
+      same[cell] = static_cast<std::uint32_t>(first[eight.part]);
+    }
+  return same;
 }
 
 template <class Number>

@@ -50,8 +50,8 @@ class CellProducts {
   void elastic_forces(std::size_t cell, const CellColumns& x, CellColumns& product) const;
   // Of a cell, as forces() takes it.
   [[nodiscard]] CellMatrix matrix(std::size_t cell) const;
-  // A cell that has the same matrix, the same one for all of those.
-  [[nodiscard]] std::size_t twin(std::size_t cell) const;
+  // (cells) a cell that has the same matrix, the same one for all of those.
+  [[nodiscard]] std::vector<std::uint32_t> twins() const;
   // matrix(cell) x
   [[nodiscard]] CellColumns multiply(std::size_t cell, const CellColumns& x) const;
 
@@ -86,14 +86,15 @@ class CellProducts {
   const QuadraticNodes* nodes_;
   std::vector<Part> parts_;
   std::vector<Eight> eights_;
-  std::vector<std::uint32_t> place_;        // (cells) 8 eight + lane
-  std::vector<Number> moments_;             // 27 x 8 of whole cells, then 125 x 8 of each eight that is not
-  std::vector<Number> first_rotation_;      // (parts x 9 x 8) from the world's axes to the lattice's
-  std::vector<Number> rotation_;            // (eights x 9 x 8); none: not turned
-  std::vector<Number> a_, gamma_;           // (eights x 243 x 8)
-  std::vector<Mat3> turned_;                // (cells) R; none: not turned
-  std::vector<std::int32_t> support_at_;    // (cells) or -1; none: no supports
-  std::vector<double> support_;             // (supported cells x 81 x 82 / 2) lower triangle, row by row
+  double unit_ = 1;                       // of the stiffness as it is kept [N/m]: floats have a narrow range
+  std::vector<std::uint32_t> place_;      // (cells) 8 eight + lane
+  std::vector<Number> moments_;           // 27 x 8 of whole cells, then 125 x 8 of each eight that is not
+  std::vector<Number> first_rotation_;    // (parts x 9 x 8) from the world's axes to the lattice's
+  std::vector<Number> rotation_;          // (eights x 9 x 8); none: not turned
+  std::vector<Number> a_, gamma_;         // (eights x 243 x 8)
+  std::vector<Mat3> turned_;              // (cells) R; none: not turned
+  std::vector<std::int32_t> support_at_;  // (cells) or -1; none: no supports
+  std::vector<double> support_;           // (supported cells x 81 x 82 / 2) lower triangle, row by row
   mutable std::vector<Number> cell_force_;  // (cells x 81)
 };
 

@@ -3,6 +3,7 @@
 
 #include <Eigen/LU>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "base/parallel.h"
@@ -13,7 +14,7 @@ namespace flexel::simulate {
 namespace {
 
 constexpr std::size_t kTurnedCellsAtATime = 16;
-constexpr double kNothing = 1e-6;  // of the largest forces so far: smaller ones are what rounding leaves
+constexpr double kRounded = 1e-8;  // the residual that is called so where rounding alone leaves one
 using CellValues = Eigen::Matrix<double, kCellUnknowns, 1>;
 
 Mat3 cross_matrix(const Vec3& v) {
@@ -53,6 +54,8 @@ Corotation::Corotation(const QuadraticSystem& system, QuadraticOperator& stiffne
       force_(system.nodes().cells.size() * kCellUnknowns) {
   for (std::uint32_t c = 0; c < system.nodes().cells.size(); ++c)
     if (!system.cell_supports(c).empty()) supported_.push_back(c);
+  for (std::size_t c = 0; c < system.nodes().cells.size(); ++c)
+    stiffest_ = std::max(stiffest_, system.stiffest(c) * system.lattice(c).spacing.maxCoeff());
 }
 
 bool Corotation::evaluate(std::size_t cell, const std::vector<Vec3>& displacement) {
@@ -148,9 +151,11 @@ bool Corotation::residual(const std::vector<Vec3>& displacement, double share, s
   for (std::size_t n = 0; n < nodes.size(); ++n)
     for (int axis = 0; axis < 3; ++axis)
       if (stiffness_.held()[n] >> axis & 1) outer += left[n][axis] * left[n][axis];
-  largest_ = std::max(largest_, std::sqrt(parallel_sum<double>(
-                                    force_.size(), [&](std::size_t i) { return force_[i] * force_[i]; })));
-  scale_ = std::max(std::sqrt(outer), kNothing * largest_);
+  double reach = 0;
+  for (const Vec3& each : displacement) reach = std::max(reach, each.squaredNorm());
+  const double rounding = 2 * std::numeric_limits<double>::epsilon() *
+                          std::sqrt(3 * static_cast<double>(nodes.size()) * reach) * stiffest_;
+  scale_ = std::max(std::sqrt(outer), rounding / kRounded);
   return true;
 }
 

@@ -22,8 +22,8 @@ class Corotation {
   // (nodes x 3) N: what is left of loads and forces of cells and supports at `share` of all loads and moves. Finds the
   // rotations; false where a cell is inside out.
   [[nodiscard]] bool residual(const std::vector<Vec3>& displacement, double share, std::vector<Vec3>& left);
-  // N, the norm of loads and of what holds the part at the last displacement: what a residual is small beside. At least a
-  // millionth of that of the cells' forces, which rounding leaves where nothing acts.
+  // N, the norm of loads and of what holds the part at the last displacement: what a residual is small beside. Where nothing acts,
+  // 1e8 times what rounding leaves of the displacement.
   [[nodiscard]] double scale() const { return scale_; }
   // Makes `stiffness` the tangent at the last displacement. Without `stressed` the part of the stresses (geometric
   // stiffness), which may make it indefinite, is left out.
@@ -42,8 +42,9 @@ class Corotation {
   const QuadraticSystem& system_;
   QuadraticOperator& stiffness_;
   double safety_;
-  double scale_ = 0, largest_ = 0;  // N; the largest norm of the cells' forces so far
-  std::vector<Mat3> from_rest_;     // (cells) R - 1
+  double scale_ = 0;             // N
+  double stiffest_ = 0;          // N/m, of a cell
+  std::vector<Mat3> from_rest_;  // (cells) R - 1
   std::vector<CellTurn>
       turn_;  // (cells) without the part of the stresses, which is stress_, to be added to `a`
   std::vector<CellTurn::Columns> stress_;

@@ -37,8 +37,9 @@ struct QuadraticMultigrid::CellStiffness {
 
   CellStiffness(const CellProducts<double>& cells, std::size_t count) : corners(count), place(count) {
     std::vector<std::uint32_t> others;  // cells whose matrix is no other's
+    const std::vector<std::uint32_t> twins = cells.twins();
     for (std::uint32_t c = 0; c < count; ++c)
-      if (cells.twin(c) == c) {
+      if (twins[c] == c) {
         place[c] = others.size();
         others.push_back(c);
       }
@@ -54,7 +55,7 @@ struct QuadraticMultigrid::CellStiffness {
         },
         kBlocksAtATime);
     for (std::size_t c = 0; c < count; ++c)
-      if (const std::size_t same = cells.twin(c); same != c) {
+      if (const std::uint32_t same = twins[c]; same != c) {
         place[c] = place[same];
         corners[c] = corners[same];
       }
@@ -235,7 +236,7 @@ void QuadraticMultigrid::factorise(std::size_t block, std::uint32_t cell, const 
     factor.compute(scaled);
   }
   CellMatrix lower = CellMatrix::Identity();
-  factor.matrixL().solveInPlace(lower);
+  if (factor.info() == Eigen::Success) factor.matrixL().solveInPlace(lower);  // else by the diagonal alone
   quadratic_kernel::Triangle& to = inverse_factors_[block];
   for (int i = 0; i < kCellUnknowns; ++i) to.scale[i] = static_cast<float>(1 / scale[i]);
   std::int16_t* steps = to.steps;

@@ -1,7 +1,7 @@
 // The preconditioner of model `quadratic`: p-multigrid.
 //
-// Chebyshev(2) before and after, smoothed by additive Schwarz: one block a cell that the surface cuts or a support holds
-// (all 27 nodes of the assembled stiffness), weighted by 1 / sqrt(multiplicity) on both sides, and 3 x 3 blocks of all
+// Chebyshev(2) before and after, smoothed by additive Schwarz: one block (all 27 nodes of the assembled stiffness) a cell
+// that is filled less than 70 % or that a support holds, weighted by 1 / sqrt(multiplicity) on both sides, and 3 x 3 blocks of all
 // other nodes. Between them the trilinear field on the same lattice: its Galerkin operator P^T K P, made cell by cell, and
 // the hierarchy of simulate/linear/multigrid.h. Without the blocks of the cut cells conjugate gradients need some
 // thirty times the iterations (measured). Products and blocks are in single precision.

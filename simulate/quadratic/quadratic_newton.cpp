@@ -18,14 +18,14 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr double kFirstTurn = 1.0;       // rad, that the first load step aims at
-constexpr double kOutOfProportion = 5;   // times the size of the part
-constexpr double kMostTurn = 0.7;        // rad, of an iteration
-constexpr double kLeastStep = 1. / 256;  // of the load
-constexpr int kMostIterations = 20;      // of a load step
-constexpr int kFewIterations = 6;        // after which the next step is longer
-constexpr double kMostStale = 0.1;       // rad
-constexpr int kMostLinear = 400;
+constexpr double kFirstTurn = 1.0;                         // rad, that the first load step aims at
+constexpr double kOutOfProportion = 5;                     // times the size of the part
+constexpr double kMostTurn = 0.7;                          // rad, of an iteration
+constexpr double kLeastStep = 1. / 256;                    // of the load
+constexpr int kMostIterations = 20;                        // of a load step
+constexpr int kFewIterations = 6;                          // after which the next step is longer
+constexpr double kMostStale = 0.1;                         // rad
+constexpr int kMostLinear = 400, kMostLinearInAll = 5000;  // the second: where no load step succeeds
 constexpr double kLeastTolerance = 1e-8, kGoodEnough = 1e-6;
 constexpr double kLoosest = 1e-2;  // residual of a linear solution
 
@@ -76,8 +76,11 @@ class LargeDeflection {
       const int iterations = reach(share, guess);
       if (iterations > kMostIterations) {
         step = (share - done) / 2;
-        if (step < kLeastStep * longest || solution_.newton_iterations > most + 10 * solution_.load_steps)
+        if (step < kLeastStep * longest || solution_.iterations > kMostLinearInAll ||
+            solution_.newton_iterations > most + 10 * solution_.load_steps) {
+          if (weak_support_) return;
           fail(scene, done);
+        }
         continue;
       }
       ++solution_.load_steps;
@@ -85,6 +88,7 @@ class LargeDeflection {
       now = guess;
       last = share - done;
       done = share;
+      weak_support_ = false;
       if (iterations <= kFewIterations) step = std::min(2 * step, longest);
     }
     solution_.displacement = now;
@@ -102,24 +106,35 @@ class LargeDeflection {
     const LinearResult result =
         conjugate_gradients(tangent_.stiffness, left, change, *tangent_.multigrid, kRoughly, kMostLinear);
     solution_.iterations += result.iterations;
+    weak_support_ = result.indefinite;
     return !(largest(change) <= kNoticeable * largest(u));
   }
 
   // Whether the last state is a stable equilibrium: its tangent is positive. A load that is as symmetric as the part never
   // meets the way in which that buckles, so the right side is irregular.
-  bool stable(const std::vector<Vec3>& u) {
+  // Nothing where conjugate gradients do not tell.
+  std::optional<bool> stable(const std::vector<Vec3>& u) {
     std::vector<Vec3> irregular(u.size()), change;
+    if (!corotation_.residual(u, 1, change)) return std::nullopt;
     std::mt19937 random(1);
     for (Vec3& each : irregular)
       for (double& value : each) value = static_cast<double>(random()) / 4294967295.0 - 0.5;
     tangent_.stiffness.clear_held(irregular);
     corotation_.set_tangent(true);
-    if (stale(u)) make_preconditioner(u);
-    const LinearResult result = conjugate_gradients(tangent_.stiffness, irregular, change,
-                                                    *tangent_.multigrid, kLoosest, kMostLinear);
-    solution_.iterations += result.iterations;
-    return !result.indefinite;
+    bool anew = stale(u);
+    for (int attempt = 0; attempt < 2; ++attempt, anew = true) {
+      if (anew) make_preconditioner(u);
+      const LinearResult result = conjugate_gradients(tangent_.stiffness, irregular, change,
+                                                      *tangent_.multigrid, kLoosest, kMostLinear);
+      solution_.iterations += result.iterations;
+      if (result.indefinite) return false;
+      if (result.converged) return true;
+      if (anew) break;
+    }
+    return std::nullopt;
   }
+  // The stiffness is not positive, and stresses are not the reason.
+  [[nodiscard]] bool weak_support() const { return weak_support_; }
 
  private:
   [[nodiscard]] std::string overload() const {
@@ -213,6 +228,7 @@ class LargeDeflection {
       make_preconditioner(u);
       if (attempt(left, residual, change)) return true;
     }
+    weak_support_ |= indefinite_;
     return false;
   }
 
@@ -225,7 +241,8 @@ class LargeDeflection {
     const LinearResult result = conjugate_gradients(tangent_.stiffness, left, change, *tangent_.multigrid,
                                                     forcing(residual), kMostLinear);
     solution_.iterations += result.iterations;
-    return !result.indefinite && result.iterations < kMostLinear;
+    indefinite_ = result.indefinite;
+    return result.converged;
   }
 
   const QuadraticSystem& system_;
@@ -236,7 +253,9 @@ class LargeDeflection {
   Corotation corotation_;
   double reach_ = 0, extent_ = 0;  // m: of the linear answer; of the part, or of what leads it
   double angle_ = 0;               // rad, of moves
-  std::vector<Vec3> made_at_;      // (nodes x 3) m, where the preconditioner was made; none: at rest
+  bool indefinite_ = false;        // the last tangent
+  bool weak_support_ = false;
+  std::vector<Vec3> made_at_;  // (nodes x 3) m, where the preconditioner was made; none: at rest
 };
 
 }  // namespace
@@ -259,10 +278,12 @@ bool solve_large(const QuadraticSystem& system, const RunSettings& settings, con
              far = strain * slenderness * slenderness < kFarFromBuckling;
   if (straight && far) return correct(system, settings.tolerance, solution, linear);
   LargeDeflection large(system, settings, progress, solution);
-  if (large.matters())
-    large.run(settings, scene);
-  else if (!correct(system, settings.tolerance, solution, linear))
-    return false;
+  if (!large.matters()) {
+    if (large.weak_support() || !correct(system, settings.tolerance, solution, linear)) return false;
+  } else {
+    if (!large.weak_support()) large.run(settings, scene);
+    if (large.weak_support()) return false;
+  }
   if (!far) solution.stable = large.stable(solution.displacement);
   return true;
 }

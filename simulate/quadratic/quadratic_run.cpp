@@ -69,6 +69,18 @@ void judge_strain(double strain, Progress& progress) {
                     human_share(strain), kAssumed));
 }
 
+// Walls of a few hundredths of a cell are held by what keeps cells of slivers regular.
+void judge_outside(double share, Progress& progress) {
+  constexpr double kTold = 0.01, kRefused = 0.1;
+  const std::string what = fmt::format(
+      "{} of the elastic energy lies where there is no matter: the walls are too thin for these cells, and "
+      "the "
+      "answer is too stiff by about as much; use a smaller --size",
+      human_share(share));
+  if (share > kRefused) throw DivergedError("model \"quadratic\": " + what);
+  if (share > kTold) progress.warn(what);
+}
+
 ProbeResult measure_probe(const Probe& probe, const ProbePoints& placed, const QuadraticSystem& system,
                           const Body& body, const State& state) {
   const QuadraticField field(body, state.displacement);
@@ -114,7 +126,7 @@ QuadraticSolution equilibrium(const QuadraticSystem& system, const Scene& scene,
   solution = solve(system, scene.run.tolerance, solution.safety * kMoreSafety, scene.name, linear);
   if (!solve_large(system, scene.run, scene.name, linear, large, solution))
     throw DivergedError(scene.name +
-                        ": model \"quadratic\" did not converge; use another --size, or model \"cells\"");
+                        ": model \"quadratic\" did not converge; use a smaller --size, or model \"cells\"");
   return solution;
 }
 
@@ -163,12 +175,17 @@ SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptio
   judge_strain(typical_strain(system, solution), progress);
   if (!solution.stable)
     progress.warn(
+        "whether this equilibrium is stable was not found out: the part may buckle; model \"cells\" follows "
+        "that");
+  else if (!*solution.stable)
+    progress.warn(
         "this equilibrium is not stable: the part buckles under less than this load, somewhere at least, and "
         "what is told is as if it did not; model \"cells\" follows buckling");
   name_materials(body, problem.materials);
   State state;
   state.displacement = element_displacement(system, solution);
   report(system, solution, result);
+  judge_outside(energy_outside(system, solution, result.elastic_energy), progress);
   sum_up_imbalance(result);
   for (const std::string& warning : warnings_of(result)) progress.warn(scene.name + ": " + warning);
   if (options.stress) report_stress(problem, field_stresses(system, solution, state), body, result);

@@ -96,8 +96,8 @@ QuadraticSolution solve(const QuadraticSystem& system, double tolerance, double 
     if (found.iterations >= kMostLinearIterations) break;
   }
   throw DivergedError(
-      fmt::format("model \"quadratic\" did not converge: residual {:.2g} after {} iterations; use "
-                  "another --size, or model \"cells\"",
+      fmt::format("model \"quadratic\" did not converge: residual {:.2g} after {} iterations; use a smaller "
+                  "--size, or model \"cells\"",
                   found.relative_residual, found.iterations));
 }
 
@@ -205,7 +205,7 @@ std::optional<SymmetricStress> stress_near(const QuadraticSystem& system, const 
   int count = 0;
   SymmetricStress sum = SymmetricStress::Zero();
   for (const auto& around : cells) {
-    if (body.fill[of_body[around.cell]] <= kSliver * fullest) continue;
+    if (body.fill[of_body[around.cell]] < kSliver * fullest) continue;
     const Part& part = body.parts[system.part_of(around.cell)];
     const Vec3 at = cell_coordinates(body, part, of_body[around.cell], point);
     const double beyond = std::max(-at.minCoeff(), at.maxCoeff() - 1),
@@ -274,6 +274,32 @@ Stresses field_stresses(const QuadraticSystem& system, const QuadraticSolution& 
   return found;
 }
 
+namespace {
+
+// J, of the cells once their rotation is taken out.
+double energy_of(const CellProducts<double>& cells, const QuadraticNodes& nodes,
+                 const QuadraticSolution& solution) {
+  return parallel_sum<double>(
+      nodes.cells.size(),
+      [&](std::size_t c) {
+        const auto local = local_displacement(nodes, c, solution.displacement, turn_of_cell(solution, c));
+        CellColumns u = CellColumns::Zero(), force;
+        for (std::size_t n = 0; n < kQuadraticNodes; ++n)
+          u.block<3, 1>(static_cast<Eigen::Index>(3 * n), 0) = local[n];
+        cells.elastic_forces(c, u, force);
+        return 0.5 * u.col(0).dot(force.col(0));
+      },
+      kAnswerCellsAtATime);
+}
+
+}  // namespace
+
+double energy_outside(const QuadraticSystem& system, const QuadraticSolution& solution,
+                      double elastic_energy) {
+  const double outside = energy_of(system.outside(), system.nodes(), solution);
+  return elastic_energy > 0 ? outside / elastic_energy : 0;
+}
+
 void report(const QuadraticSystem& system, const QuadraticSolution& solution, SimulateResult& result) {
   const QuadraticNodes& nodes = system.nodes();
   const bool large = !solution.turn.empty();  // a linear solution has its moments about the places at rest
@@ -315,17 +341,7 @@ void report(const QuadraticSystem& system, const QuadraticSolution& solution, Si
       });
     result.loads.push_back(total);
   }
-  result.elastic_energy = parallel_sum<double>(
-      nodes.cells.size(),
-      [&](std::size_t c) {
-        const auto local = local_displacement(nodes, c, solution.displacement, turn_of_cell(solution, c));
-        CellColumns u = CellColumns::Zero(), force;
-        for (std::size_t n = 0; n < kQuadraticNodes; ++n)
-          u.block<3, 1>(static_cast<Eigen::Index>(3 * n), 0) = local[n];
-        solution.tangent->stiffness.cells().elastic_forces(c, u, force);
-        return 0.5 * u.col(0).dot(force.col(0));
-      },
-      kAnswerCellsAtATime);
+  result.elastic_energy = energy_of(solution.tangent->stiffness.cells(), nodes, solution);
   for (std::size_t c = 0; c < nodes.cells.size(); ++c)
     result.smallest_jacobian = std::min(
         result.smallest_jacobian,

@@ -20,8 +20,9 @@ struct QuadraticSolution {
   std::vector<Vec3> displacement;  // (nodes x 3) m
   std::vector<Vec3> unbalanced;  // (nodes x 3) N: on prescribed components what holds them, else the residual
   std::vector<Mat3> turn;        // (cells) R - 1 where large deflections turned them; none: a linear solution
-  bool stable = true;  // as far as was looked: where loads are far too small to buckle it nobody does
-  double safety = 1;   // of the supports' penalty (QuadraticSystem::stiffness)
+  // As far as was looked: where loads are far too small to buckle it nobody does. Nothing: it was not found out.
+  std::optional<bool> stable = true;
+  double safety = 1;  // of the supports' penalty (QuadraticSystem::stiffness)
   int load_steps = 0, newton_iterations = 0;
   int iterations = 0;  // of conjugate gradients, in all
   double relative_residual = 0;
@@ -32,7 +33,7 @@ constexpr double kMoreSafety = 4;
 
 // The linear solution, by conjugate gradients, with a residual of at most `tolerance` beside what loads and moves ask for.
 // Supports whose penalty is too weak for a sliver show as an indefinite stiffness: from `safety` on it is raised by kMoreSafety,
-// three times at most. Throws DivergedError; InputError(scene, ...) naming a rigid motion that is free.
+// at most three times in a call. Throws DivergedError; InputError(scene, ...) naming a rigid motion that is free.
 // `progress` is told each iteration and its relative residual.
 [[nodiscard]] QuadraticSolution solve(const QuadraticSystem& system, double tolerance, double safety,
                                       const std::string& scene,
@@ -69,6 +70,10 @@ void write_field(const QuadraticNodes& nodes, const QuadraticSolution& solution,
 
 // Reactions, loads, elastic energy, smallest J (middle of cells) into `result`.
 void report(const QuadraticSystem& system, const QuadraticSolution& solution, SimulateResult& result);
+
+// The share of the elastic energy that is in what is no matter (QuadraticSystem::outside()).
+[[nodiscard]] double energy_outside(const QuadraticSystem& system, const QuadraticSolution& solution,
+                                    double elastic_energy);
 
 // The strain (largest principal value, without the rotation) where the energy is: its mean, weighted by energy.
 [[nodiscard]] double typical_strain(const QuadraticSystem& system, const QuadraticSolution& solution);

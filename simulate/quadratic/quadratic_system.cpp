@@ -1,5 +1,4 @@
-// Cells that the surface cuts, and those under supports, get a matrix of their own; all other cells of a part share
-// one.
+// Cells by their moments; only what supports add to a cell is a matrix.
 #include "simulate/quadratic/quadratic_system.h"
 
 #include <fmt/format.h>
@@ -201,14 +200,24 @@ std::vector<std::uint8_t> QuadraticSystem::held() const {
   return held;
 }
 
-QuadraticOperator QuadraticSystem::stiffness(double safety) const {
+CellProducts<double> QuadraticSystem::cells(
+    const std::function<std::optional<Moments>(std::size_t)>& moments) const {
   std::vector<CellProducts<double>::PartCells> parts;
   for (std::size_t p = 0; p < moduli_.size(); ++p) {
     const Lattice& lattice = problem_.body.parts[p].lattice;
     parts.push_back({cell_elasticity(lattice, moduli_[p]), lattice.axes});
   }
+  return {nodes_, parts, part_, moments};
+}
+
+CellProducts<double> QuadraticSystem::outside() const {
   const Moments whole = whole_cell_moments();
-  CellProducts<double> cells(nodes_, parts, part_, [&](std::size_t c) -> std::optional<Moments> {
+  return cells([&](std::size_t c) { return Moments(kOutside * (whole - moments(c))); });
+}
+
+QuadraticOperator QuadraticSystem::stiffness(double safety) const {
+  const Moments whole = whole_cell_moments();
+  CellProducts<double> cells = this->cells([&](std::size_t c) -> std::optional<Moments> {
     if (moments_at_[c] == kWhole) return std::nullopt;
     const Moments own = moments(c);
     return Moments(own + kOutside * (whole - own));

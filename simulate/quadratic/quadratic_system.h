@@ -23,6 +23,8 @@ class QuadraticSystem {
 
   // The stiffness with supports, whose penalty is `safety` times the usual one.
   [[nodiscard]] QuadraticOperator stiffness(double safety) const;
+  // What the stiffness has of cells where there is no matter, so that slivers stay regular.
+  [[nodiscard]] CellProducts<double> outside() const;
   // (nodes x 3) N: loads and what led faces ask for.
   [[nodiscard]] std::vector<Vec3> right_side(double safety) const;
   // (nodes x 3) m, in prescribed components at this share of the moves; 0 elsewhere.
@@ -34,6 +36,7 @@ class QuadraticSystem {
   [[nodiscard]] const std::vector<NodalLoad>& loads() const { return loads_; }
   [[nodiscard]] const Mat9& moduli(std::uint32_t part) const { return moduli_[part]; }
   [[nodiscard]] std::uint32_t part_of(std::size_t cell) const { return part_[cell]; }
+  [[nodiscard]] double stiffest(std::size_t cell) const { return stiffest_[part_[cell]]; }  // Pa
   // Of the cell of that index in nodes().cells.
   [[nodiscard]] Moments moments(std::size_t cell) const;
   [[nodiscard]] const Lattice& lattice(std::size_t cell) const {
@@ -56,6 +59,8 @@ class QuadraticSystem {
   [[nodiscard]] std::vector<std::uint8_t> tied_elements() const;
 
  private:
+  [[nodiscard]] CellProducts<double> cells(
+      const std::function<std::optional<Moments>(std::size_t)>& moments) const;
   void require_moments() const;
   void place_supports(const std::vector<Tie>& ties);
   void integrate_supports();
