@@ -27,19 +27,20 @@ double spacing_for_cells(const std::vector<PartExtent>& extents, double cells, P
 }
 
 namespace {
-constexpr double kProgram = 35e6;                            // bytes
-constexpr double kPerCell = 4500, kPerCentreElement = 4200;  // bytes
-double bytes_each(Placement placement) {
+constexpr double kProgram = 35e6;                                                      // bytes
+constexpr double kPerCell = 4500, kPerCentreElement = 4200, kPerQuadraticCell = 36e3;  // bytes
+double bytes_each(Placement placement, bool moments) {
+  if (moments) return kPerQuadraticCell;
   return placement == Placement::corner ? kPerCell : kPerCentreElement;
 }
 }  // namespace
 
-double simulation_memory(double cells, Placement placement) {
-  return kProgram + cells * bytes_each(placement);
+double simulation_memory(double cells, Placement placement, bool moments) {
+  return kProgram + cells * bytes_each(placement, moments);
 }
 
-double cells_within(double bytes, Placement placement) {
-  return std::max(1., (bytes - kProgram) / bytes_each(placement));
+double cells_within(double bytes, Placement placement, bool moments) {
+  return std::max(1., (bytes - kProgram) / bytes_each(placement, moments));
 }
 
 }  // namespace flexel::voxelize

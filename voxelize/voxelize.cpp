@@ -82,10 +82,12 @@ void check_spacing(double spacing, const std::vector<HealedPart>& meshes, const 
   }
 }
 
-void check_memory(double cells, double limit, const std::vector<PartExtent>& extents, Placement placement) {
-  const double needed = simulation_memory(cells, placement);
+void check_memory(double cells, const VoxelizeOptions& options, double limit,
+                  const std::vector<PartExtent>& extents) {
+  const double needed = simulation_memory(cells, options.placement, options.moments);
   if (needed <= limit) return;
-  const double fitting = spacing_for_cells(extents, cells_within(limit, placement), placement);
+  const double fitting =
+      spacing_for_cells(extents, cells_within(limit, options.placement, options.moments), options.placement);
   throw InputError(
       fmt::format("about {} cells need {} to simulate, more than the limit of {}; --size {} would fit, or "
                   "raise --max-memory",
@@ -349,18 +351,18 @@ VoxelizeResult voxelize(Surface surface, const VoxelizeOptions& options, Progres
   check_spacing(spacing, meshes, surface);
   double estimate = 0;
   for (const PartExtent& extent : extents) estimate += estimate_cells(extent, spacing, options.placement);
-  check_memory(estimate, limit, extents, options.placement);
+  check_memory(estimate, options, limit, extents);
   VoxelizeResult result =
       build(surface, meshes, spacing, options.size ? options : without_moments(options), progress);
   if (!options.size) result = correct_count(std::move(result), spacing, meshes, extents, options, progress);
   const double cells = total_cells(result, options.placement);
-  check_memory(cells, limit, extents, options.placement);
+  check_memory(cells, options, limit, extents);
   measure(meshes, result);
   std::vector<double> cell;
   for (const VoxelizedPart& part : result.parts) cell.push_back(part.spacing.maxCoeff());
   result.pairs = noteworthy_pairs(meshes, cell);
   refuse_duplicates(result.pairs, result.body.surface);
-  result.simulation_memory = simulation_memory(cells, options.placement);
+  result.simulation_memory = simulation_memory(cells, options.placement, options.moments);
   progress.finish();
   return result;
 }

@@ -146,7 +146,9 @@ class LargeDeflection {
 
   [[noreturn]] void fail(const std::string& scene, double done) const {
     const std::string why =
-        reach_ > extent_ ? overload() : "use model \"cells\", which follows buckling and large strains";
+        reach_ > extent_
+            ? overload()
+            : "use a smaller --size where walls are thin; model \"cells\" follows buckling and large strains";
     throw DivergedError(fmt::format("{}: model \"quadratic\" finds no equilibrium beyond {} of the load; {}",
                                     scene, human_share(done), why));
   }

@@ -73,12 +73,26 @@ void judge_strain(double strain, Progress& progress) {
 void judge_outside(double share, Progress& progress) {
   constexpr double kTold = 0.01, kRefused = 0.1;
   const std::string what = fmt::format(
-      "{} of the elastic energy lies where there is no matter: the walls are too thin for these cells, and "
-      "the "
-      "answer is too stiff by about as much; use a smaller --size",
+      "{} of the elastic energy lies where there is no matter: the walls are too thin for these cells, "
+      "and the answer is too stiff by about as much; use a smaller --size",
       human_share(share));
   if (share > kRefused) throw DivergedError("model \"quadratic\": " + what);
   if (share > kTold) progress.warn(what);
+}
+
+// What the model leaves out, and what speaks against the answer.
+void judge(const QuadraticSystem& system, const QuadraticSolution& solution, double elastic_energy,
+           Progress& progress) {
+  judge_strain(typical_strain(system, solution), progress);
+  judge_outside(energy_outside(system, solution, elastic_energy), progress);
+  if (!solution.stable)
+    progress.warn(
+        "whether this equilibrium is stable was not found out: the part may buckle, which model \"cells\" "
+        "follows");
+  else if (!*solution.stable)
+    progress.warn(
+        "this equilibrium is not stable: the part buckles under less than this load, somewhere at least, and "
+        "what is told is as if it did not; model \"cells\" follows buckling");
 }
 
 ProbeResult measure_probe(const Probe& probe, const ProbePoints& placed, const QuadraticSystem& system,
@@ -172,20 +186,11 @@ SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptio
   double solving = 0;
   const QuadraticSolution solution = equilibrium(system, scene, solving, progress);
   const StopWaits answered;
-  judge_strain(typical_strain(system, solution), progress);
-  if (!solution.stable)
-    progress.warn(
-        "whether this equilibrium is stable was not found out: the part may buckle; model \"cells\" follows "
-        "that");
-  else if (!*solution.stable)
-    progress.warn(
-        "this equilibrium is not stable: the part buckles under less than this load, somewhere at least, and "
-        "what is told is as if it did not; model \"cells\" follows buckling");
   name_materials(body, problem.materials);
   State state;
   state.displacement = element_displacement(system, solution);
   report(system, solution, result);
-  judge_outside(energy_outside(system, solution, result.elastic_energy), progress);
+  judge(system, solution, result.elastic_energy, progress);
   sum_up_imbalance(result);
   for (const std::string& warning : warnings_of(result)) progress.warn(scene.name + ": " + warning);
   if (options.stress) report_stress(problem, field_stresses(system, solution, state), body, result);

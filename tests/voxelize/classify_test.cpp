@@ -137,8 +137,16 @@ TEST(Classify, MemoryBeyondTheLimitIsRefusedWithASizeThatFits) {
     EXPECT_THAT(error.what(), testing::HasSubstr("--max-memory"));
   }
   const PartExtent extent{4.19, 12.57};
-  options.size = 1.05 * spacing_for_cells({extent}, cells_within(1e9, Placement::corner), Placement::corner);
-  EXPECT_LE(voxelize(surface(icosphere(2, 1)), options, progress).simulation_memory, 1e9);
+  for (const bool moments : {false, true}) {
+    options.moments = moments;
+    options.max_memory = moments ? 3e8 : 1e9;
+    options.size =
+        1.05 * spacing_for_cells({extent}, cells_within(*options.max_memory, Placement::corner, moments),
+                                 Placement::corner);
+    EXPECT_LE(voxelize(surface(icosphere(2, 1)), options, progress).simulation_memory, *options.max_memory);
+    options.size = 0.8 * *options.size;
+    EXPECT_THROW(static_cast<void>(voxelize(surface(icosphere(2, 1)), options, progress)), InputError);
+  }
 }
 
 }  // namespace
