@@ -55,7 +55,6 @@ class CellProducts {
   // matrix(cell) x
   [[nodiscard]] CellColumns multiply(std::size_t cell, const CellColumns& x) const;
 
-  [[nodiscard]] bool is_whole(std::size_t cell) const { return eights_[place_[cell] / 8].whole; }
   [[nodiscard]] bool is_supported(std::size_t cell) const {
     return !support_at_.empty() && support_at_[cell] >= 0;
   }
