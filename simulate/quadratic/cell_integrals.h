@@ -12,6 +12,8 @@
 namespace flexel::simulate {
 
 constexpr int kCellUnknowns = 81;  // 3 n + axis
+// Numbers of the lower triangle of a cell's matrix.
+constexpr std::size_t kPackedSize = static_cast<std::size_t>(kCellUnknowns) * (kCellUnknowns + 1) / 2;
 using CellMatrix = Eigen::Matrix<double, kCellUnknowns, kCellUnknowns>;
 using Moments = Eigen::Matrix<double, static_cast<int>(kMoments), 1>;
 

@@ -16,7 +16,6 @@ constexpr std::size_t kEightsAtATime = 4, kNodesAtATime = 512;
 constexpr std::size_t kWidth = quadratic_kernel::kWidth, kPoints = 3;
 constexpr std::size_t kWholeMoments = kPoints * kPoints * kPoints;
 constexpr std::size_t kTurnNumbers = static_cast<std::size_t>(kCellUnknowns) * 3;
-constexpr std::size_t kPackedSize = static_cast<std::size_t>(kCellUnknowns) * (kCellUnknowns + 1) / 2;
 using CellValues = Eigen::Matrix<double, kCellUnknowns, 1>;
 
 void run_kernel(bool whole, const quadratic_kernel::EightCells<double>& cells,

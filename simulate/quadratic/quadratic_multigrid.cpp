@@ -23,7 +23,6 @@ constexpr double kMargin = 1.1;      // over the estimate of the largest
 constexpr int kPowerSteps = 15;
 constexpr double kRaised = 1e-6;  // of a block's scaled diagonal: what it is made from is in single precision
 constexpr std::size_t kBlocksAtATime = 16;
-constexpr std::size_t kPackedSize = static_cast<std::size_t>(kCellUnknowns) * (kCellUnknowns + 1) / 2;
 using Vector = std::vector<Vec3>;
 using CornerMatrix = Eigen::Matrix<double, 24, 24>;
 
