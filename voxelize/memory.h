@@ -26,7 +26,7 @@ struct PartExtent {
 // solid block and a thin plate of 20,000 to 130,000 cells. Centre placement: 4.2 kB an element, which has as
 // many neighbours; measured peaks lie at 0.90 to 0.95 of it, on a solid block of 32,000 to 500,000 elements.
 // With `moments`, for model `quadratic`: 36 kB a cell (moments, turned cells, Schwarz blocks, and every cell's matrix in
-// single precision while the blocks are made); measured peaks lie at 0.76 to 1.18 of it, 4,000 to 34,000 cells.
+// single precision while the blocks are made); measured peaks lie at 0.79 to 1.18 of it, 4,000 to 34,000 cells.
 [[nodiscard]] double simulation_memory(double cells, Placement placement, bool moments);
 
 // The cells (centre placement: elements) that simulate can hold in so many bytes, at least 1.

@@ -111,8 +111,8 @@ class LargeDeflection {
   }
 
   // Whether the last state is a stable equilibrium: its tangent is positive. A load that is as symmetric as the part never
-  // meets the way in which that buckles, so the right side is irregular.
-  // Nothing where conjugate gradients do not tell.
+  // meets the way in which that buckles, so the right side is irregular. Nothing where
+  // conjugate gradients do not tell.
   std::optional<bool> stable(const std::vector<Vec3>& u) {
     std::vector<Vec3> irregular(u.size()), change;
     if (!corotation_.residual(u, 1, change)) return std::nullopt;
