@@ -140,15 +140,6 @@ ChildRun run_child(const std::vector<std::string>& argv, const ChildOptions& opt
   return result;
 }
 
-std::string own_program(const std::string& name) {
-  std::error_code error;
-  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
-  const std::filesystem::path program = self.parent_path() / name;
-  if (error || access(program.c_str(), X_OK) != 0)
-    throw InputError("cannot run " + program.string() + "; the stage programs are installed beside flexel");
-  return program.string();
-}
-
 std::string find_program(const std::string& name) {
   const char* paths = std::getenv("PATH");
   std::istringstream in(paths != nullptr ? paths : "/usr/bin:/bin");

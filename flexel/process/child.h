@@ -33,9 +33,6 @@ struct ChildOptions {
 // lives on for two seconds gets SIGKILL. Throws InputError: it cannot be started, the log cannot be written.
 [[nodiscard]] ChildRun run_child(const std::vector<std::string>& argv, const ChildOptions& options);
 
-// The path of a Flexel program: `name` ("flexel-simulate") in this one's folder. Throws InputError.
-[[nodiscard]] std::string own_program(const std::string& name);
-
 // The path of any other program, from PATH; "" where it is not there.
 [[nodiscard]] std::string find_program(const std::string& name);
 

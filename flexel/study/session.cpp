@@ -14,6 +14,7 @@
 #include "base/available_memory.h"
 #include "base/error.h"
 #include "base/files/files.h"
+#include "base/program/own_program.h"
 #include "base/units.h"
 #include "flexel/study/runs/calculix.h"
 #include "voxelize/memory.h"

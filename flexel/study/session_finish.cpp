@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "base/files/files.h"
 #include "base/files/output_file.h"
+#include "base/program/own_program.h"
 #include "base/units.h"
 #include "flexel/study/conclude.h"
 #include "flexel/study/page.h"

@@ -1,5 +1,14 @@
-// What CAD files look like. Without OpenCASCADE they are known all the same, to be refused by name.
-#include "formats/cad/cad_readers.h"
+// What CAD files look like, and how flexel-cad is asked to read them. Without OpenCASCADE they are known all the same,
+// to be refused by name.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "base/available_memory.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "formats/cad/cad_surface.h"
+#include "formats/common/readers.h"
 
 namespace flexel {
 namespace {
@@ -27,6 +36,47 @@ bool is_always_text(const ImportInput&) {
   return true;
 }
 
+// Some damaged files send OpenCASCADE into loops without an end, or have it ask for all memory there is. Sound
+// ones take it about a second a megabyte, and 250 bytes a triangle, of which a given deflection may ask for any number.
+ChildLimits limits_of(const ImportInput& input, const ImportOptions& options) {
+  const auto bytes = static_cast<double>(input.bytes.size());
+  const double share = .8 * available_memory(), seconds = (options.deflection ? 600 : 60) + 1e-5 * bytes;
+  ChildLimits limits;
+  limits.processor = options.occt_seconds.value_or(seconds * static_cast<double>(thread_count()));
+  limits.wall = 3 * options.occt_seconds.value_or(seconds);  // another program may have the processor
+  limits.memory =
+      options.occt_memory.value_or(options.deflection ? share : std::min(share, 2e9 + 500 * bytes));
+  return limits;
+}
+
+// The file travels along: a deformed part is written in its place.
+Surface read_cad(ImportInput& input, const ImportOptions& options, SurfaceSource source) {
+  const ChildLimits limits = limits_of(input, options);
+  CadReadJob job;
+  job.format = source.format;
+  job.bytes = std::move(input.bytes);
+  job.where = input.where;
+  job.file = input.file;
+  job.unit = source.unit;
+  job.deflection = options.deflection;
+  job.angular_deflection = options.angular_deflection;
+  job.threads = thread_count();
+  const char* instead = options.deflection ? "a larger --deflection takes less" : "export it anew, or as STL";
+  CadMesh mesh = run_job(job, limits, instead, options.warn);
+  source.bytes = std::move(job.bytes);
+  return cad_surface(std::move(mesh), std::move(source), options, input.where);
+}
+
+// What OpenCASCADE's readers of STEP and IGES make of every unit [m].
+constexpr double kMillimetre = 1e-3;
+
+Surface read_with_unit(ImportInput& input, const ImportOptions& options, const char* format,
+                       const char* title) {
+  if (options.unit)
+    throw InputError(input.where, fmt::format("{} file carries its own unit: leave out --unit", title));
+  return read_cad(input, options, source_in_unit(format, kMillimetre));
+}
+
 }  // namespace
 
 constinit const FileReader kStepReader{
@@ -35,16 +85,21 @@ constinit const FileReader kStepReader{
         [](const ImportInput& input) {
           return begins_with_word(beginning(input), "iso-10303-21") ? Evidence::magic : Evidence::none;
         },
-    .read = read_step,
+    .read = [](ImportInput& input,
+               const ImportOptions& options) { return read_with_unit(input, options, "step", "a STEP"); },
     .is_text = is_always_text};
 constinit const FileReader kIgesReader{
     .format = &kIgesFormat,
     .sniff = [](const ImportInput& input) { return text_if(looks_like_iges(beginning(input))); },
-    .read = read_iges,
+    .read = [](ImportInput& input,
+               const ImportOptions& options) { return read_with_unit(input, options, "iges", "an IGES"); },
     .is_text = is_always_text};
 constinit const FileReader kBrepReader{
     .format = &kBrepFormat,
     .sniff = [](const ImportInput& input) { return text_if(looks_like_brep(beginning(input))); },
-    .read = read_brep};
+    .read =
+        [](ImportInput& input, const ImportOptions& options) {
+          return read_cad(input, options, unitless_source("brep", options));
+        }};
 
 }  // namespace flexel

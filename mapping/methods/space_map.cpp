@@ -93,6 +93,12 @@ SpaceMap::Value SpaceMap::Probe::at(const Vec3& x, std::uint32_t part, std::opti
   return blend(x);
 }
 
+std::optional<std::uint32_t> SpaceMap::Probe::cell_at(const Vec3& x, std::uint32_t part,
+                                                      std::optional<std::size_t> polygon) const {
+  const Group group = map_.group_at(x, part, polygon);
+  return group.in_cell ? std::optional(group.owner) : std::nullopt;
+}
+
 void SpaceMap::Probe::gather(const Group& group) {
   if (gathered_ && group.owner == group_.owner && group.in_cell == group_.in_cell) return;
   const Reach& reach =
@@ -133,7 +139,7 @@ SpaceMap::Value SpaceMap::Probe::blend(const Vec3& x) const {
   const Vec3 u = sum / total;
   const Mat3 to_spacings = lattice.spacing.cwiseInverse().asDiagonal() * lattice.axes.transpose();
   return {x + u, Mat3::Identity() + (inner + (outer - u * total_gradient.transpose()) * to_spacings) / total,
-          true};
+          true, total};
 }
 
 SpaceMap::Value SpaceMap::Probe::nearest(const Vec3& x) const {

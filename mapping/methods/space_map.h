@@ -21,6 +21,7 @@ class SpaceMap {
     Vec3 position = Vec3::Zero();      // phi(x), m
     Mat3 gradient = Mat3::Identity();  // d phi / d x; a determinant of 0 or less: space is folded there
     bool heard = true;  // false: farther than kBlendRadius from every element, carried by the nearest frame
+    double weight = 0;  // of all elements together: falls to 0 where none is near
   };
 
   // Evaluates points; keeps what it gathered for the cell of the last one. One for each thread. It must not
@@ -31,6 +32,10 @@ class SpaceMap {
     // `x` (m, world frame, at rest) of part `part`. `polygon`: of the surface, near x; it selects the wall
     // where two walls are nearer to each other than a spacing.
     [[nodiscard]] Value at(const Vec3& x, std::uint32_t part, std::optional<std::size_t> polygon = {});
+
+    // The cell that x lies in, or that is nearest to it; nothing where no whole cell is there.
+    [[nodiscard]] std::optional<std::uint32_t> cell_at(const Vec3& x, std::uint32_t part,
+                                                       std::optional<std::size_t> polygon = {}) const;
 
    private:
     void gather(const Group& group);
@@ -43,6 +48,14 @@ class SpaceMap {
     std::vector<std::uint32_t> elements_;
     std::vector<std::uint8_t> from_;
   };
+
+  // (elements) The motion around each.
+  [[nodiscard]] const std::vector<ElementMotion>& motions() const { return motions_; }
+  // The cells that have the element.
+  [[nodiscard]] std::span<const std::uint32_t> cells_of(std::uint32_t element) const {
+    return {cells_of_.values.data() + cells_of_.begin[element],
+            cells_of_.begin[element + 1] - cells_of_.begin[element]};
+  }
 
  private:
   [[nodiscard]] Group group_at(const Vec3& x, std::uint32_t part, std::optional<std::size_t> polygon) const;

@@ -5,19 +5,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <cstring>
-#include <type_traits>
 
 #include "base/error.h"
 #include "base/files/files.h"
 #include "base/files/output_file.h"
+#include "base/files/packing.h"
 #include "formats/lattice/body_file.h"
 
 namespace flexel::simulate {
 namespace {
-
-static_assert(std::endian::native == std::endian::little);
 
 constexpr char kMagic[8] = {'f', 'l', 'e', 'x', 'e', 'l', 'C', 'P'};
 constexpr std::uint64_t kVersion = 4;
@@ -31,112 +28,36 @@ std::span<const std::byte> bytes_of(const void* data, std::size_t size) {
   return {static_cast<const std::byte*>(data), size};
 }
 
-class Packer {
- public:
-  void raw(void* data, std::size_t size) {
-    const auto* from = static_cast<const std::byte*>(data);
-    bytes.insert(bytes.end(), from, from + size);
-  }
-  [[nodiscard]] std::size_t length(std::size_t count, std::size_t) {
-    std::uint64_t number = count;
-    raw(&number, sizeof number);
-    return count;
-  }
-  Bytes bytes;
-};
+}  // namespace
 
-class Unpacker {
- public:
-  Unpacker(std::span<const std::byte> bytes, std::string where) : left_(bytes), where_(std::move(where)) {}
-  void raw(void* data, std::size_t size) {
-    if (size > left_.size()) fail();
-    if (size > 0) std::memcpy(data, left_.data(), size);
-    left_ = left_.subspan(size);
-  }
-  [[nodiscard]] std::size_t length(std::size_t, std::size_t least_size) {
-    std::uint64_t number = 0;
-    raw(&number, sizeof number);
-    if (number > left_.size() / least_size) fail();
-    return number;
-  }
-  void finish() const {
-    if (!left_.empty()) fail();
-  }
-
- private:
-  [[noreturn]] void fail() const { throw InputError(where_, "damaged: its values do not fit together"); }
-  std::span<const std::byte> left_;
-  std::string where_;
-};
-
-template <class Archive, class Value>
-void visit(Archive& archive, Value& value);
-
-template <class Archive, class Value>
-void visit(Archive& archive, std::vector<Value>& values) {
-  // of a string or a row at least its length
-  values.resize(archive.length(values.size(), std::is_trivially_copyable_v<Value> ? sizeof(Value) : 8));
-  if constexpr (std::is_trivially_copyable_v<Value>)
-    archive.raw(values.data(), values.size() * sizeof(Value));
-  else
-    for (Value& value : values) visit(archive, value);
-}
-
+// Outside the unnamed namespace, where argument-dependent lookup finds them.
 template <class Archive>
-void visit(Archive& archive, std::vector<Vec3>& values) {
-  static_assert(sizeof(Vec3) == 3 * sizeof(double));
-  values.resize(archive.length(values.size(), sizeof(Vec3)));
-  archive.raw(values.data(), values.size() * sizeof(Vec3));
-}
-
-template <class Archive>
-void visit(Archive& archive, std::string& text) {
-  text.resize(archive.length(text.size(), 1));
-  archive.raw(text.data(), text.size());
-}
-
-template <class Archive>
-void visit(Archive& archive, std::optional<double>& value) {
-  double number = value.value_or(0);
-  std::uint8_t there = value.has_value();
-  archive.raw(&there, 1);
-  archive.raw(&number, sizeof number);
-  value = there ? std::optional(number) : std::nullopt;
-}
-
-template <class Archive>
-void visit(Archive& archive, Account& account) {
+static void visit(Archive& archive, Account& account) {
   visit(archive, account.name);
   visit(archive, account.kind);
   visit(archive, account.energy);
 }
 
 template <class Archive>
-void visit(Archive& archive, FusedPoint& point) {
+static void visit(Archive& archive, FusedPoint& point) {
   visit(archive, point.elements);
   visit(archive, point.weights);
   visit(archive, point.stiffness);
 }
 
 template <class Archive>
-void visit(Archive& archive, BookRow& row) {
+static void visit(Archive& archive, BookRow& row) {
   visit(archive, row.time);
   visit(archive, row.energies);
   visit(archive, row.accounts);
-  archive.raw(row.momentum.data(), sizeof(Vec3));
-  archive.raw(row.angular.data(), sizeof(Vec3));
+  visit(archive, row.momentum);
+  visit(archive, row.angular);
   visit(archive, row.probes);
   visit(archive, row.values);
 }
 
-template <class Archive, class Value>
-void visit(Archive& archive, Value& value) {
-  static_assert(std::is_trivially_copyable_v<Value>);
-  archive.raw(&value, sizeof value);
-}
-
 template <class Archive>
-void visit(Archive& archive, Checkpoint& c) {
+static void visit(Archive& archive, Checkpoint& c) {
   for (std::string* text : {&c.scene_name, &c.scene, &c.output, &c.history}) visit(archive, *text);
   visit(archive, c.compress);
   visit(archive, c.input);
@@ -174,8 +95,6 @@ void visit(Archive& archive, Checkpoint& c) {
   visit(archive, c.frames);
 }
 
-}  // namespace
-
 void write_checkpoint(const Checkpoint& checkpoint, const Bytes& body, const std::string& path) {
   Packer packer;
   visit(packer, const_cast<Checkpoint&>(checkpoint));
@@ -207,7 +126,7 @@ Resumed read_checkpoint(const std::string& path) {
   if (content_hash(values) != head.values_hash || content_hash(body) != head.body_hash)
     throw InputError(where, "is damaged: copy it again, or resume from another checkpoint");
   Resumed resumed;
-  Unpacker unpacker(values, where);
+  Unpacker unpacker(values, where, "damaged: its values do not fit together");
   visit(unpacker, resumed.checkpoint);
   unpacker.finish();
   resumed.body = read_body(Bytes(body.begin(), body.end()), where);

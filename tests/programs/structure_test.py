@@ -8,7 +8,7 @@ import sys
 
 from harness import BIN, SOURCE, Skip, expect, main, need
 
-CODE = ["base", "formats", "voxelize", "simulate", "mapping", "flexel"]
+CODE = ["base", "formats", "voxelize", "simulate", "mapping", "cad", "flexel"]
 
 # Every folder of the code, each after those that it may include: docs/development.md says what they hold.
 ORDER = """
@@ -19,7 +19,8 @@ voxelize/types voxelize/mesh voxelize/classify voxelize/heal voxelize/lattice vo
 simulate/laws simulate/input simulate/result simulate/linear simulate/state simulate/rigid simulate/conditions simulate/models
 simulate/kernels simulate/matter simulate/gravitation simulate/contact/points simulate/contact simulate/effects simulate/events simulate/scene
 simulate/equilibrium simulate/estimate simulate/probes simulate/quadratic simulate/live simulate/stepping simulate/implicit simulate/time simulate
-mapping/types mapping/anchors mapping/checks mapping/methods mapping/crack mapping/report mapping
+mapping/types mapping/anchors mapping/checks mapping/methods mapping/space mapping/crack mapping/report mapping
+cad/read cad/deform cad
 flexel/process flexel/picture/canvas flexel/picture/render flexel/picture flexel/study/runs flexel/study flexel/export
 flexel/measure flexel/accuracy flexel
 """.split()
@@ -97,7 +98,7 @@ def test_files_do_not_include_each_other():
 def test_source_files_have_a_header():
     """Going to the header of a file works: it has the same name, or the file's begins with it (stepper_memory.cpp, stepper.h)."""
     # What a reader or a writer of one format gives is declared for all of them together.
-    shared = re.compile(r"formats/\w+/(read_\w+|write_\w+|\w+_reader|\w+_format|occt_mesh|occt_absent)\.cpp$|/main\.cpp$|/\w+_command\.cpp$")
+    shared = re.compile(r"formats/\w+/(read_\w+|write_\w+|\w+_format)\.cpp$|cad/read/(\w+_reader|occt_mesh)\.cpp$|/main\.cpp$|/\w+_command\.cpp$")
     wrong = []
     for path in (path for folder in CODE for path in code_files(folder, ".cpp")):
         stems = [header.stem for header in path.parent.glob("*.h")]
@@ -214,6 +215,9 @@ def test_light_programs_link_no_heavy_library():
         linked = subprocess.run(["ldd", BIN / program], check=True, stdout=subprocess.PIPE).stdout.decode()
         expect("libstdc++" in linked, f"ldd says nothing of {program}: {linked}")
         expect(not LIBRARIES.search(linked), f"{program} links {LIBRARIES.findall(linked)}")
+    for program in ["flexel", "flexel-voxelize"]:  # OpenCASCADE is loaded by flexel-cad alone, where a CAD file comes
+        linked = subprocess.run(["ldd", BIN / program], check=True, stdout=subprocess.PIPE).stdout.decode()
+        expect("libTK" not in linked, f"{program} links OpenCASCADE")
 
 
 def test_no_path_of_one_machine():

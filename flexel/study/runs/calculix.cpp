@@ -14,6 +14,7 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "base/program/own_program.h"
 
 namespace flexel::study {
 namespace {

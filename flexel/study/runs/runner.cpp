@@ -14,6 +14,7 @@
 #include "base/error.h"
 #include "base/files/files.h"
 #include "base/files/output_file.h"
+#include "base/program/own_program.h"
 #include "flexel/study/runs/history_csv.h"
 #include "flexel/study/runs/scene_edit.h"
 #include "formats/lattice/body_file.h"

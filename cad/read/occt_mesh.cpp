@@ -11,12 +11,8 @@
 #include <Bnd_Box.hxx>
 #include <Eigen/Geometry>
 #include <IMeshTools_Parameters.hxx>
-#include <OSD_Parallel.hxx>
-#include <OSD_ThreadPool.hxx>
 #include <Poly_PolygonOnTriangulation.hxx>
 #include <Poly_Triangulation.hxx>
-#include <Standard_Failure.hxx>
-#include <Standard_OutOfMemory.hxx>
 #include <TopExp.hxx>
 #include <TopExp_Explorer.hxx>
 #include <TopTools_IndexedMapOfShape.hxx>
@@ -26,26 +22,15 @@
 #include <TopoDS_Vertex.hxx>
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
-#include <cstdlib>
-#include <exception>
-#include <new>
-#include <thread>
 #include <utility>
 
-#include "base/available_memory.h"
 #include "base/disjoint_sets.h"
 #include "base/error.h"
 #include "base/math/area_vector.h"
-#include "base/parallel.h"
-#include "base/units.h"
-#include "formats/cad/occt.h"
-#include "formats/cad/occt_help.h"
-#include "formats/cad/reading_child.h"
-#include "formats/common/readers.h"
+#include "cad/read/occt.h"
 
-namespace flexel {
+namespace flexel::cad {
 namespace {
 
 constexpr std::uint32_t kNone = 0xffffffffu;
@@ -59,38 +44,20 @@ std::vector<TopoDS_Shape> shapes_of(const TopoDS_Shape& shape, TopAbs_ShapeEnum 
   return found;
 }
 
-// The solids; where there are none, the closed shells.
-std::vector<TopoDS_Shape> solids_of(const TopoDS_Shape& shape, const ImportInput& input) {
-  if (shape.IsNull()) throw InputError(input.where, "holds no shape");
-  std::vector<TopoDS_Shape> solids = shapes_of(shape, TopAbs_SOLID);
-  if (!solids.empty()) return solids;
-  std::vector<TopoDS_Shape> shells = shapes_of(shape, TopAbs_SHELL);
-  const std::size_t faces = shapes_of(shape, TopAbs_FACE).size();
-  for (const TopoDS_Shape& shell : shells)
-    if (BRep_Tool::IsClosed(shell)) solids.push_back(shell);
-  if (solids.empty())
-    throw InputError(
-        input.where,
-        fmt::format("holds no solid, only {} open shells and {} faces: export the part as a solid",
-                    shells.size(), faces));
-  return solids;
-}
-
 // --- tessellation
 
-void tessellate(const TopoDS_Shape& solid, double unit, const ImportOptions& options,
-                const ImportInput& input) {
+void tessellate(const TopoDS_Shape& solid, double unit, const CadReadJob& job) {
   constexpr double kDefaultShare = 1e-3;  // of the diagonal
   Bnd_Box box;
   BRepBndLib::Add(solid, box, Standard_False);
-  if (box.IsVoid()) throw InputError(input.where, "holds a solid without extent");
+  if (box.IsVoid()) throw InputError(job.where, "holds a solid without extent");
   IMeshTools_Parameters parameters;
   parameters.Deflection =
-      options.deflection ? *options.deflection / unit : kDefaultShare * std::sqrt(box.SquareExtent());
-  parameters.Angle = options.angular_deflection;
+      job.deflection ? *job.deflection / unit : kDefaultShare * std::sqrt(box.SquareExtent());
+  parameters.Angle = job.angular_deflection;
   parameters.InParallel = Standard_True;
   if (!(parameters.Deflection > 0) || !(parameters.Angle > 0))
-    throw InputError(input.where, "the deflection of the tessellation must be positive");
+    throw InputError(job.where, "the deflection of the tessellation must be positive");
   BRepMesh_IncrementalMesh mesher(solid, parameters);
 }
 
@@ -235,118 +202,33 @@ std::vector<double> numbers_of(const std::vector<std::optional<ShapeColor>>& col
   return numbers;
 }
 
-// OpenCASCADE may run out of memory where nothing can catch it: in a destructor, or in a thread of its own.
-void end_on_terminate() {
-  try {
-    if (std::current_exception()) std::rethrow_exception(std::current_exception());
-  } catch (const std::bad_alloc&) {
-    end_child_without_memory();
-  } catch (const Standard_OutOfMemory&) {
-    end_child_without_memory();
-  } catch (...) {
-  }
-  std::abort();
-}
-
-// How many threads can be started, `wanted` at most: OpenCASCADE waits for ever for one that could not.
-std::size_t threads_that_start(std::size_t wanted) {
-  std::vector<std::thread> started;
-  std::atomic<bool> all_there = false;
-  try {
-    while (started.size() + 1 < wanted) started.emplace_back([&] { all_there.wait(false); });
-  } catch (const std::exception&) {
-  }
-  all_there = true;
-  all_there.notify_all();
-  for (std::thread& each : started) each.join();
-  return started.size() + 1;
-}
-
-// What the child says. oneTBB is the parent's: OpenCASCADE has threads of its own.
-CadReading reading_of(const std::function<CadMesh(const ImportOptions&)>& read, ImportOptions options,
-                      std::size_t threads) {
-  std::set_terminate(end_on_terminate);
-  CadReading reading;
-  options.warn = [&](const std::string& line) { reading.warnings.push_back(line); };
-  OSD_Parallel::SetUseOcctThreads(Standard_True);
-  OSD_ThreadPool::DefaultPool(static_cast<int>(threads_that_start(threads)));
-  try {
-    reading.mesh = read(options);
-  } catch (const InputError& error) {
-    reading.refused = true;
-    reading.where = error.where();
-    reading.why = error.what();
-  } catch (const Standard_OutOfMemory&) {
-    end_child_without_memory();
-  } catch (const Standard_Failure& failure) {
-    reading.refused = true;
-    reading.why = damage_message(failure.GetMessageString() ? failure.GetMessageString() : "no reason");
-  }
-  return reading;
-}
-
-// Some damaged files send OpenCASCADE into loops without an end, or have it ask for all memory there is. Sound
-// ones take it about a second a megabyte, and 250 bytes a triangle, of which a given deflection may ask for any number.
-ChildLimits limits_of(const ImportInput& input, const ImportOptions& options) {
-  const auto bytes = static_cast<double>(input.bytes.size());
-  const double share = .8 * available_memory(), seconds = (options.deflection ? 600 : 60) + 1e-5 * bytes;
-  ChildLimits limits;
-  limits.processor = options.occt_seconds.value_or(seconds * static_cast<double>(thread_count()));
-  limits.wall = 3 * options.occt_seconds.value_or(seconds);  // another program may have the processor
-  limits.memory =
-      options.occt_memory.value_or(options.deflection ? share : std::min(share, 2e9 + 500 * bytes));
-  return limits;
-}
-
 }  // namespace
 
-CadMesh mesh_of(const TopoDS_Shape& shape, double unit, const ShapeLabels& labels,
-                const ImportOptions& options, const ImportInput& input) {
-  const std::vector<TopoDS_Shape> solids = solids_of(shape, input);
+std::vector<TopoDS_Shape> solids_of(const TopoDS_Shape& shape, const std::string& where) {
+  if (shape.IsNull()) throw InputError(where, "holds no shape");
+  std::vector<TopoDS_Shape> solids = shapes_of(shape, TopAbs_SOLID);
+  if (!solids.empty()) return solids;
+  std::vector<TopoDS_Shape> shells = shapes_of(shape, TopAbs_SHELL);
+  const std::size_t faces = shapes_of(shape, TopAbs_FACE).size();
+  for (const TopoDS_Shape& shell : shells)
+    if (BRep_Tool::IsClosed(shell)) solids.push_back(shell);
+  if (solids.empty())
+    throw InputError(
+        where, fmt::format("holds no solid, only {} open shells and {} faces: export the part as a solid",
+                           shells.size(), faces));
+  return solids;
+}
+
+CadMesh mesh_of(const CadShape& shape, const CadReadJob& job) {
   CadMesh mesh;
   mesh.surface.polygon_offsets.push_back(0);
   std::vector<std::optional<ShapeColor>> colors;  // (faces)
-  for (const TopoDS_Shape& solid : solids) {
-    tessellate(solid, unit, options, input);
-    add_solid(mesh.surface, solid, unit, labels, colors);
+  for (const TopoDS_Shape& solid : solids_of(*shape.shape, job.where)) {
+    tessellate(solid, shape.unit, job);
+    add_solid(mesh.surface, solid, shape.unit, shape.labels, colors);
   }
   mesh.face_colors = numbers_of(colors);
   return mesh;
 }
 
-std::string damage_message(const std::string& what) {
-  return fmt::format("is damaged: OpenCASCADE says \"{}\"", clean_name(what));
-}
-
-Surface read_with_occt(const ImportInput& input, const ImportOptions& options, SurfaceSource source,
-                       const std::function<CadMesh(const ImportOptions&)>& read) {
-  const ChildLimits limits = limits_of(input, options);
-  const std::size_t threads = thread_count();
-  const char* instead = options.deflection ? "a larger --deflection takes less" : "export it anew, or as STL";
-  const ChildOutput output = run_in_child([&] { return pack(reading_of(read, options, threads)); }, limits);
-  switch (output.end) {
-    case ChildEnd::finished:
-      break;
-    case ChildEnd::crashed:
-      throw InputError(input.where, "is damaged: OpenCASCADE cannot read it");
-    case ChildEnd::out_of_time:
-      throw InputError(
-          input.where,
-          fmt::format("is damaged, or too much for OpenCASCADE: it had not read it after {:.3g} s of "
-                      "processor time; {}",
-                      limits.processor, instead));
-    case ChildEnd::out_of_memory:
-      throw InputError(
-          input.where,
-          fmt::format("is damaged, or too much for OpenCASCADE: it wants more memory than it gets ({} at "
-                      "most); {}",
-                      human_bytes(limits.memory), instead));
-  }
-  CadReading reading = unpack_reading(output.bytes, input.where);
-  if (options.warn)
-    for (const std::string& line : reading.warnings) options.warn(line);
-  if (reading.refused) throw InputError(reading.where.empty() ? input.where : reading.where, reading.why);
-  return finished(std::move(reading.mesh), std::move(source), options, input.where);
-}
-
-}  // namespace flexel
+}  // namespace flexel::cad

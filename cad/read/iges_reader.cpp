@@ -26,10 +26,10 @@
 #include <new>
 
 #include "base/error.h"
-#include "formats/cad/cad_readers.h"
-#include "formats/cad/occt.h"
+#include "cad/read/occt.h"
+#include "formats/common/readers.h"
 
-namespace flexel {
+namespace flexel::cad {
 namespace {
 
 // OpenCASCADE reads IGES from files only: this one is in memory and has a name while it is open, so that
@@ -57,17 +57,17 @@ class MemoryFile {
 };
 
 // The last line has a T in column 73; the first is one of the start section.
-void check_complete(const ImportInput& input) {
+void check_complete(const CadReadJob& job) {
   constexpr std::size_t kLetter = 72;
-  std::string_view text(reinterpret_cast<const char*>(input.bytes.data()), input.bytes.size());
+  std::string_view text(reinterpret_cast<const char*>(job.bytes.data()), job.bytes.size());
   if (text.size() <= kLetter || text[kLetter] != 'S')
-    throw InputError(input.where, "is no IGES file: its first line does not have an S in column 73");
+    throw InputError(job.where, "is no IGES file: its first line does not have an S in column 73");
   while (!text.empty() &&
          (text.back() == '\n' || text.back() == '\r' || text.back() == ' ' || text.back() == '\0'))
     text.remove_suffix(1);
   const std::size_t line = text.rfind('\n') + 1;
   if (text.size() - line <= kLetter || text[line + kLetter] != 'T')
-    throw InputError(input.where, "is cut off: an IGES file ends with a line that has a T in column 73");
+    throw InputError(job.where, "is cut off: an IGES file ends with a line that has a T in column 73");
 }
 
 using Names = std::map<const void*, std::string>;  // by the TShape
@@ -112,39 +112,38 @@ TopoDS_Shape sewn(const TopoDS_Shape& shape, Names& names) {
   return result;
 }
 
-CadMesh read_entities(const std::string& path, const ImportOptions& options, const ImportInput& input) {
+CadShape read_entities(const std::string& path, const CadReadJob& job) {
   Message::DefaultMessenger()->ChangePrinters().Clear();  // stdout belongs to the result
   IGESControl_Controller::Init();
   Interface_Static::SetCVal("xstep.cascade.unit", "MM");
   IGESControl_Reader reader;
   reader.SetReadVisible(Standard_False);
   if (reader.ReadFile(path.c_str()) != IFSelect_RetDone)
-    throw InputError(input.where, "is damaged: OpenCASCADE cannot make sense of it as IGES");
+    throw InputError(job.where, "is damaged: OpenCASCADE cannot make sense of it as IGES");
   reader.TransferRoots();
   TopoDS_Shape shape = reader.OneShape();
-  if (shape.IsNull()) throw InputError(input.where, "holds no shape");
+  if (shape.IsNull()) throw InputError(job.where, "holds no shape");
   Names names = names_in(reader);
   if (count(shape, TopAbs_SOLID) == 0) {
     if (count(shape, TopAbs_FACE) == 0)
-      throw InputError(input.where, "holds curves or points but no faces: export the part as a solid");
+      throw InputError(job.where, "holds curves or points but no faces: export the part as a solid");
     shape = sewn(shape, names);
   }
-  const auto name = [&](const TopoDS_Shape& item) {
+  const auto name = [names](const TopoDS_Shape& item) {
     const auto found = names.find(item.TShape().get());
     return found == names.end() ? std::string() : found->second;
   };
-  return mesh_of(shape, kMillimetre, {name, name, [](const TopoDS_Shape&) { return std::nullopt; }}, options,
-                 input);
+  return {std::make_shared<TopoDS_Shape>(shape), kMillimetre, {name, name, [](const TopoDS_Shape&) {
+                                                                 return std::nullopt;
+                                                               }}};
 }
 
 }  // namespace
 
-Surface read_iges(ImportInput& input, const ImportOptions& options) {
-  if (options.unit) throw InputError(input.where, "an IGES file carries its own unit: leave out --unit");
-  check_complete(input);
-  const MemoryFile file(input.bytes);
-  return read_with_occt(input, options, source_in_unit("iges", kMillimetre),
-                        [&](const ImportOptions& heard) { return read_entities(file.path(), heard, input); });
+CadShape read_iges(const CadReadJob& job) {
+  check_complete(job);
+  const MemoryFile file(job.bytes);
+  return read_entities(file.path(), job);
 }
 
-}  // namespace flexel
+}  // namespace flexel::cad

@@ -22,10 +22,10 @@
 #include <cmath>
 #include <vector>
 
-#include "formats/cad/step_names.h"
+#include "cad/read/step_names.h"
 #include "formats/common/readers.h"
 
-namespace flexel {
+namespace flexel::cad {
 namespace {
 
 std::string name_of(const Handle(TCollection_HAsciiString) & text) {
@@ -109,4 +109,4 @@ std::string StepNames::solid(const TopoDS_Shape& solid) const {
   return (solids > 1 && !own_name.empty()) || name.empty() ? own_name : name;
 }
 
-}  // namespace flexel
+}  // namespace flexel::cad

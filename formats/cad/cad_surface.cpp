@@ -1,6 +1,5 @@
-// STEP is text between two fixed lines; a truncated file lacks the second. What follows the tessellation is
-// done in the process that asked for it.
-#include "formats/cad/occt_help.h"
+// Flat faces come with corners on their rims only: they get some to bend by.
+#include "formats/cad/cad_surface.h"
 
 #include <algorithm>
 
@@ -47,15 +46,8 @@ void add_colors(Surface& surface, const std::vector<double>& face_colors) {
 
 }  // namespace
 
-void check_step_complete(const ImportInput& input) {
-  const std::string_view text(reinterpret_cast<const char*>(input.bytes.data()), input.bytes.size());
-  if (text.rfind("END-ISO-10303-21") == std::string_view::npos)
-    throw InputError(input.where, text.find("ISO-10303-21") == std::string_view::npos
-                                      ? "is no STEP file: it does not begin with ISO-10303-21"
-                                      : "is cut off: a STEP file ends with END-ISO-10303-21");
-}
-
-Surface finished(CadMesh mesh, SurfaceSource source, const ImportOptions& options, const std::string& where) {
+Surface cad_surface(CadMesh mesh, SurfaceSource source, const ImportOptions& options,
+                    const std::string& where) {
   Surface surface = std::move(mesh.surface);
   surface.sources.assign(1, std::move(source));
   surface.part_source.assign(surface.parts.size(), 0);

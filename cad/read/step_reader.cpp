@@ -24,12 +24,11 @@
 #include <XSControl_WorkSession.hxx>
 
 #include "base/error.h"
-#include "formats/cad/cad_readers.h"
-#include "formats/cad/occt.h"
-#include "formats/cad/occt_help.h"
-#include "formats/cad/step_names.h"
+#include "cad/read/memory_stream.h"
+#include "cad/read/occt.h"
+#include "cad/read/step_names.h"
 
-namespace flexel {
+namespace flexel::cad {
 namespace {
 
 bool is_geometry(const Handle(Standard_Transient) & entity) {
@@ -55,13 +54,13 @@ std::string label_in(std::string_view message) {
 
 // A reference from a solid or a unit to something that is not in the file. OpenCASCADE keeps these apart, as
 // messages on the whole.
-void check_references(const Handle(Interface_InterfaceModel) & model, const ImportInput& input) {
+void check_references(const Handle(Interface_InterfaceModel) & model, const CadReadJob& job) {
   const Handle(Interface_Check) check = model->GlobalCheck();
   const auto examine = [&](Standard_CString message) {
     const std::string label = label_in(message);
     const Standard_Integer number = label.empty() ? 0 : model->NextNumberForLabel(label.c_str());
     if (number > 0 && (is_geometry(model->Value(number)) || is_unit(model->Value(number))))
-      throw InputError(input.where, damage_message(message));
+      throw InputError(job.where, damage_message(message));
   };
   for (Standard_Integer i = 1; i <= check->NbFails(); ++i) examine(check->CFail(i));
   for (Standard_Integer i = 1; i <= check->NbWarnings(); ++i) examine(check->CWarning(i));
@@ -70,9 +69,9 @@ void check_references(const Handle(Interface_InterfaceModel) & model, const Impo
 // OpenCASCADE loads what it can and later follows missing references. So a file with missing references is
 // refused, and one whose solids or representations did not load. Returns what did not load of their geometry,
 // "" for nothing. Damage elsewhere in the file (drawings, tolerances, colours) is ignored.
-std::string check_loaded(const STEPControl_Reader& reader, const ImportInput& input) {
+std::string check_loaded(const STEPControl_Reader& reader, const CadReadJob& job) {
   const Handle(Interface_InterfaceModel) model = reader.WS()->Model();
-  check_references(model, input);
+  check_references(model, job);
   std::string damage;
   const Interface_CheckIterator checks = reader.WS()->ModelCheckList(Standard_False);
   for (checks.Start(); checks.More(); checks.Next()) {
@@ -83,7 +82,7 @@ std::string check_loaded(const STEPControl_Reader& reader, const ImportInput& in
         fmt::format("{}: {}", model->StringLabel(entity)->ToCString(), checks.Value()->CFail(1));
     if (!entity->IsKind(STANDARD_TYPE(StepGeom_GeometricRepresentationItem)) ||
         entity->IsKind(STANDARD_TYPE(StepShape_SolidModel)))
-      throw InputError(input.where, damage_message(found));
+      throw InputError(job.where, damage_message(found));
     if (damage.empty()) damage = found;
   }
   return damage;
@@ -114,34 +113,34 @@ SolidCount count_solids(const STEPControl_Reader& reader) {
   return count;
 }
 
-TopoDS_Shape transfer(STEPControl_Reader& reader, ImportInput& input, const ImportOptions& options) {
+TopoDS_Shape transfer(STEPControl_Reader& reader, const CadReadJob& job, const Warn& warn) {
   // OpenCASCADE reports on stdout, which belongs to the result.
   Message::DefaultMessenger()->ChangePrinters().Clear();
   Interface_Static::SetCVal("xstep.cascade.unit", "MM");
-  MemoryStream stream(input.bytes);
-  if (reader.ReadStream(input.file.c_str(), stream) != IFSelect_RetDone)
-    throw InputError(input.where, "is damaged: OpenCASCADE cannot make sense of it as STEP");
-  const std::string damage = check_loaded(reader, input);
+  MemoryStream stream(job.bytes);
+  if (reader.ReadStream(job.file.c_str(), stream) != IFSelect_RetDone)
+    throw InputError(job.where, "is damaged: OpenCASCADE cannot make sense of it as STEP");
+  const std::string damage = check_loaded(reader, job);
   reader.TransferRoots();
   const TopoDS_Shape shape = reader.OneShape();
   const SolidCount solids = count_solids(reader);
   if (!damage.empty() && (shape.IsNull() || solids.sound == 0 || solids.unsound + solids.missing > 0 ||
                           !BRepCheck_Analyzer(shape).IsValid()))
-    throw InputError(input.where, damage_message(damage));
-  if (!damage.empty() && options.warn)
-    options.warn(
+    throw InputError(job.where, damage_message(damage));
+  if (!damage.empty() && warn)
+    warn(
         fmt::format("{} {}; its solids are closed and valid all the same: compare their volume with "
                     "that in the CAD program",
-                    input.file, damage_message(damage)));
-  if (solids.sound > 0 && solids.missing > 0 && options.warn)
-    options.warn(fmt::format("{}: solids that belong to no product are left out: {}, beside {} that are read",
-                             input.file, solids.missing, solids.sound));
+                    job.file, damage_message(damage)));
+  if (solids.sound > 0 && solids.missing > 0 && warn)
+    warn(fmt::format("{}: solids that belong to no product are left out: {}, beside {} that are read",
+                     job.file, solids.missing, solids.sound));
   return shape;
 }
 
 // OpenCASCADE passes over the triangles of AP242 without a word (release 7.7 reads them).
-void tell_tessellated(const ImportInput& input, bool all, const ImportOptions& options) {
-  const std::string_view text(reinterpret_cast<const char*>(input.bytes.data()), input.bytes.size());
+void tell_tessellated(const CadReadJob& job, bool all, const Warn& warn) {
+  const std::string_view text(reinterpret_cast<const char*>(job.bytes.data()), job.bytes.size());
   const auto holds = [&](const char* kind) { return text.find(kind) != std::string_view::npos; };
   constexpr const char* kAdvice =
       "OpenCASCADE " OCC_VERSION_COMPLETE
@@ -150,33 +149,36 @@ void tell_tessellated(const ImportInput& input, bool all, const ImportOptions& o
     for (const char* kind :
          {"TESSELLATED_SOLID", "TESSELLATED_SHELL", "TRIANGULATED_FACE", "TRIANGULATED_SURFACE_SET"})
       if (holds(kind))
-        throw InputError(input.where,
+        throw InputError(job.where,
                          fmt::format("holds tessellated geometry only ({}), which {}", kind, kAdvice));
   for (const char* kind : {"TESSELLATED_SOLID", "TESSELLATED_SHELL"})
-    if (holds(kind) && options.warn)
-      return options.warn(fmt::format("{}: holds tessellated geometry too ({}), which {}; it is left out",
-                                      input.file, kind, kAdvice));
+    if (holds(kind) && warn)
+      return warn(fmt::format("{}: holds tessellated geometry too ({}), which {}; it is left out", job.file,
+                              kind, kAdvice));
 }
 
-CadMesh read_solids(ImportInput& input, const ImportOptions& options) {
-  STEPControl_Reader reader;
-  const TopoDS_Shape shape = transfer(reader, input, options);
-  tell_tessellated(input, shape.IsNull(), options);
-  const StepNames names(reader);
-  return mesh_of(shape, kMillimetre,
-                 {[&](const TopoDS_Shape& solid) { return names.solid(solid); },
-                  [&](const TopoDS_Shape& face) { return names.own(face); },
-                  [&](const TopoDS_Shape& item) { return names.color(item); }},
-                 options, input);
+void check_complete(const CadReadJob& job) {
+  const std::string_view text(reinterpret_cast<const char*>(job.bytes.data()), job.bytes.size());
+  if (text.rfind("END-ISO-10303-21") == std::string_view::npos)
+    throw InputError(job.where, text.find("ISO-10303-21") == std::string_view::npos
+                                    ? "is no STEP file: it does not begin with ISO-10303-21"
+                                    : "is cut off: a STEP file ends with END-ISO-10303-21");
 }
 
 }  // namespace
 
-Surface read_step(ImportInput& input, const ImportOptions& options) {
-  if (options.unit) throw InputError(input.where, "a STEP file carries its own unit: leave out --unit");
-  check_step_complete(input);
-  return read_with_occt(input, options, source_in_unit("step", kMillimetre),
-                        [&](const ImportOptions& heard) { return read_solids(input, heard); });
+CadShape read_step(const CadReadJob& job, const Warn& warn) {
+  check_complete(job);
+  STEPControl_Reader reader;
+  CadShape result;
+  result.shape = std::make_shared<TopoDS_Shape>(transfer(reader, job, warn));
+  result.unit = kMillimetre;
+  tell_tessellated(job, result.shape->IsNull(), warn);
+  const auto names = std::make_shared<StepNames>(reader);
+  result.labels = {[names](const TopoDS_Shape& solid) { return names->solid(solid); },
+                   [names](const TopoDS_Shape& face) { return names->own(face); },
+                   [names](const TopoDS_Shape& item) { return names->color(item); }};
+  return result;
 }
 
-}  // namespace flexel
+}  // namespace flexel::cad

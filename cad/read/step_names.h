@@ -1,18 +1,17 @@
-// Names and colours of solids and faces in a STEP file. Inside flexel_import; OpenCASCADE's types are only
-// declared.
+// Names and colours of solids and faces in a STEP file. OpenCASCADE's types are only declared.
 #pragma once
 #include <map>
 #include <optional>
 #include <string>
 #include <utility>
 
-#include "formats/cad/occt.h"
+#include "cad/read/occt.h"
 
 class STEPControl_Reader;
 class StepBasic_ProductDefinition;
 class TopoDS_Shape;
 
-namespace flexel {
+namespace flexel::cad {
 
 class StepNames {
  public:
@@ -36,4 +35,4 @@ class StepNames {
   std::map<const void*, std::pair<std::size_t, std::string>> product_;
 };
 
-}  // namespace flexel
+}  // namespace flexel::cad

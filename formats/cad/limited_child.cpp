@@ -1,13 +1,10 @@
-// The child is a fork, not a second program: it costs a few ms where loading the libraries anew takes tens,
-// and every program and test that reads parts has it without a word in its main(). Other threads of this
-// process do not exist in the child, so nothing may be used there that one of them could have held locked:
-// glibc sees to malloc and stdio, OpenCASCADE is called nowhere else, and oneTBB (base/parallel.h) is left
-// alone. What comes back is read through a pipe, whose end tells that the child has ended, however it did.
-#include "formats/cad/reading_child.h"
+// What comes back is read through a pipe, whose end tells that the child has ended, however it did.
+#include "formats/cad/limited_child.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/time.h>
@@ -30,8 +27,6 @@
 
 namespace flexel {
 namespace {
-
-enum ChildCode : int { kFinished = 0, kFailed = 1, kNoMemory = 2 };  // exit codes
 
 struct MemoryInUse {
   double resident = 0;  // bytes
@@ -87,30 +82,19 @@ void be_silent() {
     if (nothing >= 0) dup2(nothing, each);
 }
 
-bool write_all(int to, const Bytes& bytes) {
-  std::size_t done = 0;
-  while (done < bytes.size()) {
-    const ssize_t written = write(to, bytes.data() + done, bytes.size() - done);
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) return false;
-    done += static_cast<std::size_t>(written);
-  }
-  return true;
-}
-
-[[noreturn]] void be_child(const std::function<Bytes()>& work, const ChildLimits& limits, int out,
+[[noreturn]] void be_child(const std::function<int(int out)>& body, const ChildLimits& limits, int out,
                            pid_t parent, const sigset_t& unblocked) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (getppid() != parent) _exit(kFailed);  // it ended before prctl() took effect
+  if (getppid() != parent) _exit(kChildFailed);  // it ended before prctl() took effect
   reset_signals();
   be_silent();
   set_limits(limits);
   pthread_sigmask(SIG_SETMASK, &unblocked, nullptr);
-  int code = kFailed;
+  int code = kChildFailed;
   try {
-    if (write_all(out, work())) code = kFinished;
+    code = body(out);
   } catch (const std::bad_alloc&) {
-    code = kNoMemory;
+    code = kChildWithoutMemory;
   } catch (...) {
   }
   _exit(code);  // no destructors: what they would end is the parent's
@@ -120,7 +104,7 @@ bool write_all(int to, const Bytes& bytes) {
 
 class Child {
  public:
-  Child(const std::function<Bytes()>& work, const ChildLimits& limits) {
+  Child(const std::function<int(int out)>& body, const ChildLimits& limits) {
     int ends[2];
     if (pipe2(ends, O_CLOEXEC) != 0) fail();
     // A signal that came between fork and reset_signals() would find the parent's handlers in the child.
@@ -129,7 +113,7 @@ class Child {
     pthread_sigmask(SIG_SETMASK, &all, &before);
     const pid_t parent = getpid();
     number_ = fork();
-    if (number_ == 0) be_child(work, limits, ends[1], parent, before);
+    if (number_ == 0) be_child(body, limits, ends[1], parent, before);
     const int error = errno;
     pthread_sigmask(SIG_SETMASK, &before, nullptr);
     close(ends[1]);
@@ -154,8 +138,8 @@ class Child {
     return count > 0;
   }
 
-  // Bytes that it has in memory beyond what this process had.
-  [[nodiscard]] double memory() const { return memory_in_use(std::to_string(number_)).resident - before_; }
+  // Bytes that it has in memory.
+  [[nodiscard]] double memory() const { return memory_in_use(std::to_string(number_)).resident; }
 
   // How it ended; a child that runs on is killed.
   int end() {
@@ -171,35 +155,54 @@ class Child {
  private:
   [[noreturn]] static void fail() {
     throw InputError(
-        fmt::format("no process can be started to read the part in ({}): the limits of this "
+        fmt::format("no process can be started for OpenCASCADE ({}): the limits of this "
                     "shell (ulimit) leave no room",
                     std::strerror(errno)));
   }
-  double before_ = memory_in_use("self").resident;
   pid_t number_ = -1;
   int in_ = -1, status_ = 0;
 };
 
 ChildEnd end_of(int status) {
-  if (WIFEXITED(status) && WEXITSTATUS(status) == kFinished) return ChildEnd::finished;
+  if (WIFEXITED(status) && WEXITSTATUS(status) == kChildFinished) return ChildEnd::finished;
   if (WIFEXITED(status))
-    return WEXITSTATUS(status) == kNoMemory ? ChildEnd::out_of_memory : ChildEnd::crashed;
+    return WEXITSTATUS(status) == kChildWithoutMemory ? ChildEnd::out_of_memory : ChildEnd::crashed;
   if (WTERMSIG(status) == SIGPROF || WTERMSIG(status) == SIGXCPU) return ChildEnd::out_of_time;
   // nobody kills it but the system, where memory is short
   return WTERMSIG(status) == SIGKILL ? ChildEnd::out_of_memory : ChildEnd::crashed;
 }
 
+// A file in memory that holds `bytes`, to be read from its beginning.
+class MemoryInput {
+ public:
+  explicit MemoryInput(const Bytes& bytes) : descriptor_(memfd_create("input", MFD_CLOEXEC)) {
+    std::size_t done = 0;
+    while (descriptor_ >= 0 && done < bytes.size()) {
+      const ssize_t written = write(descriptor_, bytes.data() + done, bytes.size() - done);
+      if (written < 0 && errno == EINTR) continue;
+      if (written <= 0) break;
+      done += static_cast<std::size_t>(written);
+    }
+    if (done == bytes.size() && descriptor_ >= 0 && lseek(descriptor_, 0, SEEK_SET) == 0) return;
+    if (descriptor_ >= 0) close(descriptor_);
+    throw std::bad_alloc();
+  }
+  ~MemoryInput() { close(descriptor_); }
+  MemoryInput(const MemoryInput&) = delete;
+  MemoryInput& operator=(const MemoryInput&) = delete;
+  [[nodiscard]] int descriptor() const { return descriptor_; }
+
+ private:
+  int descriptor_ = -1;
+};
+
 }  // namespace
 
-void end_child_without_memory() noexcept {
-  _exit(kNoMemory);
-}
-
-ChildOutput run_in_child(const std::function<Bytes()>& work, const ChildLimits& limits) {
+ChildOutput run_in_child(const std::function<int(int out)>& body, const ChildLimits& limits) {
   using Clock = std::chrono::steady_clock;
   constexpr int kGlance = 50;  // ms
   check_stop();
-  Child child(work, limits);
+  Child child(body, limits);
   ChildOutput output;
   double waited = 0;  // s
   Clock::time_point last = Clock::now();
@@ -215,6 +218,17 @@ ChildOutput run_in_child(const std::function<Bytes()>& work, const ChildLimits& 
   output.end = end_of(child.end());
   if (output.end != ChildEnd::finished) output.bytes.clear();
   return output;
+}
+
+ChildOutput run_limited(const std::string& program, const Bytes& input, const ChildLimits& limits) {
+  const MemoryInput file(input);
+  return run_in_child(
+      [&](int out) -> int {
+        if (dup2(file.descriptor(), STDIN_FILENO) < 0 || dup2(out, STDOUT_FILENO) < 0) return kChildFailed;
+        execl(program.c_str(), program.c_str(), nullptr);
+        return kChildFailed;
+      },
+      limits);
 }
 
 }  // namespace flexel

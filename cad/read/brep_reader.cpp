@@ -10,10 +10,9 @@
 #include <sstream>
 
 #include "base/error.h"
-#include "formats/cad/cad_readers.h"
-#include "formats/cad/occt.h"
+#include "cad/read/occt.h"
 
-namespace flexel {
+namespace flexel::cad {
 namespace {
 
 bool is_binary(std::string_view text) {
@@ -23,9 +22,9 @@ bool is_binary(std::string_view text) {
 
 // OpenCASCADE believes the counts and reads on past the end of a file, so a table that is missing, or longer
 // than the file could hold, is refused here.
-void check_tables(std::string_view text, const ImportInput& input) {
+void check_tables(std::string_view text, const CadReadJob& job) {
   if (text.find("CASCADE Topology V") == std::string_view::npos)
-    throw InputError(input.where, "is no BREP file: it names no version of its topology");
+    throw InputError(job.where, "is no BREP file: it names no version of its topology");
   std::size_t at = 0;
   for (const std::string_view table :
        {"Locations ", "Curve2ds ", "Curves ", "Polygon3D ", "PolygonOnTriangulations ", "Surfaces ",
@@ -33,24 +32,26 @@ void check_tables(std::string_view text, const ImportInput& input) {
     const std::string line = fmt::format("\n{}", table);
     at = text.find(line, at);
     if (at == std::string_view::npos)
-      throw InputError(input.where, fmt::format("is cut off or damaged: it has no table \"{}\"",
-                                                table.substr(0, table.size() - 1)));
+      throw InputError(job.where, fmt::format("is cut off or damaged: it has no table \"{}\"",
+                                              table.substr(0, table.size() - 1)));
     at += line.size();
     std::size_t count = 0;
     const auto [end, error] = std::from_chars(text.data() + at, text.data() + text.size(), count);
     if (error != std::errc{} || count > text.size() - at)
-      throw InputError(input.where, fmt::format("is cut off or damaged: its table \"{}\" has a wrong length",
-                                                table.substr(0, table.size() - 1)));
+      throw InputError(job.where, fmt::format("is cut off or damaged: its table \"{}\" has a wrong length",
+                                              table.substr(0, table.size() - 1)));
   }
   // After the last shape ("*") comes the number of the one that the file is about.
   const std::size_t star = text.rfind('*');
   if (star == std::string_view::npos || star < at ||
       text.find_first_of("0123456789", star) == std::string_view::npos)
-    throw InputError(input.where, "is cut off: it does not end with the number of its shape");
+    throw InputError(job.where, "is cut off: it does not end with the number of its shape");
 }
 
-CadMesh read_shape(ImportInput& input, const ImportOptions& options, double unit) {
-  const std::string_view text(reinterpret_cast<const char*>(input.bytes.data()), input.bytes.size());
+}  // namespace
+
+CadShape read_brep(const CadReadJob& job) {
+  const std::string_view text(reinterpret_cast<const char*>(job.bytes.data()), job.bytes.size());
   std::istringstream stream{std::string(text)};  // OpenCASCADE also seeks
   // It reads on past the end without looking, some of it forever; so the stream throws there.
   stream.exceptions(std::ios::failbit | std::ios::badbit);
@@ -59,24 +60,17 @@ CadMesh read_shape(ImportInput& input, const ImportOptions& options, double unit
     if (is_binary(text)) {
       BinTools::Read(shape, stream);
     } else {
-      check_tables(text, input);
+      check_tables(text, job);
       BRepTools::Read(shape, stream, BRep_Builder());
     }
   } catch (const std::ios_base::failure&) {
-    throw InputError(input.where, "is cut off or damaged: numbers are missing in it");
+    throw InputError(job.where, "is cut off or damaged: numbers are missing in it");
   }
-  if (shape.IsNull()) throw InputError(input.where, "is damaged: OpenCASCADE finds no shape in it");
+  if (shape.IsNull()) throw InputError(job.where, "is damaged: OpenCASCADE finds no shape in it");
   const auto nothing = [](const TopoDS_Shape&) { return std::string(); };
-  return mesh_of(shape, unit, {nothing, nothing, [](const TopoDS_Shape&) { return std::nullopt; }}, options,
-                 input);
+  return {std::make_shared<TopoDS_Shape>(shape), job.unit, {nothing, nothing, [](const TopoDS_Shape&) {
+                                                              return std::nullopt;
+                                                            }}};
 }
 
-}  // namespace
-
-Surface read_brep(ImportInput& input, const ImportOptions& options) {
-  const SurfaceSource source = unitless_source("brep", options);
-  return read_with_occt(input, options, source,
-                        [&](const ImportOptions& heard) { return read_shape(input, heard, source.unit); });
-}
-
-}  // namespace flexel
+}  // namespace flexel::cad

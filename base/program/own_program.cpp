@@ -1,0 +1,21 @@
+// /proc/self/exe: PATH and argv[0] may lead elsewhere.
+#include "base/program/own_program.h"
+
+#include <unistd.h>
+
+#include <filesystem>
+
+#include "base/error.h"
+
+namespace flexel {
+
+std::string own_program(const std::string& name) {
+  std::error_code error;
+  const std::filesystem::path folder = std::filesystem::read_symlink("/proc/self/exe", error).parent_path();
+  for (const std::filesystem::path& path : {folder / name, folder.parent_path() / "libexec/flexel" / name})
+    if (!error && access(path.c_str(), X_OK) == 0) return path.string();
+  throw InputError("cannot run " + (folder / name).string() +
+                   "; the programs of Flexel are installed together: install it again");
+}
+
+}  // namespace flexel

@@ -1,0 +1,11 @@
+// Where the programs of this installation are.
+#pragma once
+#include <string>
+
+namespace flexel {
+
+// The path of a Flexel program: `name` ("flexel-simulate") in the folder of this one, or in its libexec/flexel.
+// Throws InputError: it is not there.
+[[nodiscard]] std::string own_program(const std::string& name);
+
+}  // namespace flexel

@@ -1,0 +1,118 @@
+// flexel-cad: what the other programs need of OpenCASCADE, a job on stdin and its answer on stdout
+// (formats/cad/cad_job.h). They start it where a CAD file comes, and limit its time and memory.
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <OSD_Parallel.hxx>
+#include <OSD_ThreadPool.hxx>
+#include <Standard_Failure.hxx>
+#include <Standard_OutOfMemory.hxx>
+#include <atomic>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <new>
+#include <thread>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "cad/read/occt.h"
+#include "formats/cad/cad_job.h"
+
+namespace flexel::cad {
+namespace {
+
+[[noreturn]] void end_without_memory() {
+  _exit(kChildWithoutMemory);
+}
+
+// OpenCASCADE may run out of memory where nothing can catch it: in a destructor, or in a thread of its own.
+void end_on_terminate() {
+  try {
+    if (std::current_exception()) std::rethrow_exception(std::current_exception());
+  } catch (const std::bad_alloc&) {
+    end_without_memory();
+  } catch (const Standard_OutOfMemory&) {
+    end_without_memory();
+  } catch (...) {
+  }
+  std::abort();
+}
+
+// How many threads can be started, `wanted` at most: OpenCASCADE waits for ever for one that could not.
+std::size_t threads_that_start(std::size_t wanted) {
+  std::vector<std::thread> started;
+  std::atomic<bool> all_there = false;
+  try {
+    while (started.size() + 1 < wanted) started.emplace_back([&] { all_there.wait(false); });
+  } catch (const std::exception&) {
+  }
+  all_there = true;
+  all_there.notify_all();
+  for (std::thread& each : started) each.join();
+  return started.size() + 1;
+}
+
+// OpenCASCADE writes on stdout, which is the answer's: that goes to another descriptor, which is returned.
+int take_stdout() {
+  const int out = dup(STDOUT_FILENO), nothing = open("/dev/null", O_WRONLY | O_CLOEXEC);
+  if (nothing >= 0) dup2(nothing, STDOUT_FILENO);
+  return out;
+}
+
+template <class Result, class Work>
+Bytes answer(std::size_t threads, const Work& work) {
+  OSD_Parallel::SetUseOcctThreads(Standard_True);
+  OSD_ThreadPool::DefaultPool(static_cast<int>(threads_that_start(threads)));
+  CadAnswer<Result> found;
+  try {
+    found.result = work([&](const std::string& line) { found.warnings.push_back(line); });
+  } catch (const InputError& error) {
+    found.refused = true;
+    found.where = error.where();
+    found.why = error.what();
+  } catch (const Standard_OutOfMemory&) {
+    end_without_memory();
+  } catch (const Standard_Failure& failure) {
+    found.refused = true;
+    found.why = damage_message(failure.GetMessageString() ? failure.GetMessageString() : "no reason");
+  }
+  return pack(found);
+}
+
+Bytes do_job(const CadJob& job) {
+  return answer<CadMesh>(job.read->threads,
+                         [&](const Warn& warn) { return mesh_of(read_shape(*job.read, warn), *job.read); });
+}
+
+bool write_whole(int to, const Bytes& bytes) {
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    const ssize_t written = write(to, bytes.data() + done, bytes.size() - done);
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) return false;
+    done += static_cast<std::size_t>(written);
+  }
+  return true;
+}
+
+int run() {
+  std::set_terminate(end_on_terminate);
+  const int out = take_stdout();
+  try {
+    return write_whole(out, do_job(unpack_job(read_all("-")))) ? kChildFinished : kChildFailed;
+  } catch (const std::bad_alloc&) {
+    return kChildWithoutMemory;
+  } catch (const InputError& error) {
+    std::fprintf(stderr, "flexel-cad: error: %s\n", error.what());
+    return kChildFailed;
+  }
+}
+
+}  // namespace
+}  // namespace flexel::cad
+
+int main() {
+  _exit(flexel::cad::run());  // what the libraries would tidy up is gone with the process
+}
