@@ -17,6 +17,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "cad/deform/write_job.h"
 #include "cad/read/occt.h"
 #include "formats/cad/cad_job.h"
 
@@ -82,6 +83,10 @@ Bytes answer(std::size_t threads, const Work& work) {
 }
 
 Bytes do_job(const CadJob& job) {
+  if (job.write) {
+    const ThreadLimit limit(static_cast<int>(job.write->threads));
+    return answer<CadWritten>(job.write->threads, [&](const Warn&) { return write_deformed(*job.write); });
+  }
   return answer<CadMesh>(job.read->threads,
                          [&](const Warn& warn) { return mesh_of(read_shape(*job.read, warn), *job.read); });
 }

@@ -21,6 +21,7 @@
 #include "formats/exchange/surface_file.h"
 #include "formats/lattice/body_file.h"
 #include "formats/lattice/quadratic_field.h"
+#include "mapping/cad_output.h"
 #include "mapping/options.h"
 #include "mapping/output.h"
 #include "mapping/report/report.h"
@@ -124,6 +125,10 @@ void plan_outputs(const DeformArguments& arguments, Plan& plan) {
       plan.outputs.push_back(
           {path, mapping::map_output(path == "-" ? arguments.map.format : "", path, arguments.map.ascii, 0,
                                      arguments.map.scale, arguments.map.attributes)});
+  check_cad_output(arguments.map, plan.crack,
+                   std::any_of(plan.outputs.begin(), plan.outputs.end(), [](const Plan::Output& output) {
+                     return output.surface && is_cad(*output.surface);
+                   }));
   if (!arguments.body.empty()) plan.outputs.push_back({arguments.body, std::nullopt});
   std::vector<OutputName> names;
   for (const Plan::Output& output : plan.outputs) names.push_back({output.path});
@@ -180,14 +185,17 @@ Plan make_plan(const DeformArguments& arguments) {
   return plan;
 }
 
-void write_outputs(const Plan& plan, Body& body, const mapping::MappedPart& mapped, Progress& progress) {
+void write_outputs(const DeformArguments& arguments, const Plan& plan, Body& body,
+                   const mapping::MappedPart& mapped, Progress& progress) {
   progress.stage("write");
   if (!plan.crack.pieces.empty())
     write_parts(mapped.surface(body), mapped.result.displacement, plan.crack.pieces_format,
                 default_unit(body.surface), plan.crack.pieces);
   for (const Plan::Output& output : plan.outputs)
     if (output.surface)
-      write_mapped(mapped.surface(body), body, mapped.result, *output.surface);
+      is_cad(*output.surface)
+          ? write_cad(body, mapped.report, arguments.map, plan.map, *output.surface, progress)
+          : write_mapped(mapped.surface(body), body, mapped.result, *output.surface);
     else if (output.is_picture())
       write_bent_picture(body, output.path, progress);
     else
@@ -477,7 +485,7 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
   }
   {
     const BriefOutput brief(!arguments.verbose);
-    write_outputs(plan, body, mapped, progress);
+    write_outputs(arguments, plan, body, mapped, progress);
     if (accuracy) {
       accuracy->seconds = seconds_since(plan.goal->began);
       accuracy->met() || accuracy->goal.by_default ? progress.say(accuracy->sentence())

@@ -18,6 +18,7 @@
 #include "formats/lattice/body_file.h"
 #include "mapping/anchors/other_surfaces.h"
 #include "mapping/binding_file.h"
+#include "mapping/cad_output.h"
 #include "mapping/map_part.h"
 #include "mapping/methods/map_surface.h"
 #include "mapping/options.h"
@@ -152,6 +153,10 @@ Plan make_plan(Arguments& arguments) {
   else if (!arguments.points.empty() &&
            (arguments.map.attributes || arguments.map.ascii || !arguments.map.format.empty()))
     throw InputError("--points: a table comes out; --format, --ascii and --attributes are for surfaces");
+  const bool cad = plan.output && is_cad(*plan.output);
+  check_cad_output(arguments.map, plan.crack, cad);
+  if (cad && foreign)
+    throw InputError("--onto: a mesh has no faces that a CAD file could hold: write STL, OBJ, ...");
   const std::vector<std::string> inputs = {arguments.body, arguments.onto, arguments.points,
                                            arguments.binding};
   std::vector<OutputName> outputs = {{arguments.save_binding, true}};
@@ -217,7 +222,10 @@ class Run {
     if (plan_.output) {
       MapOutput output = *plan_.output;
       output.path = path;
-      write_mapped(foreign_ ? *foreign_ : surface, body, result, output);
+      if (is_cad(output))
+        write_cad(body, found, arguments_.map, plan_.options, output, progress_);
+      else
+        write_mapped(foreign_ ? *foreign_ : surface, body, result, output);
     }
     outputs.appear();
     progress_.finish();

@@ -63,8 +63,14 @@ void declare_map_options(CommandLine& app, MapArguments& arguments) {
       .type_name("FACTOR");
   app.add_option("--format", arguments.format,
                  fmt::format("{} or vtu, for stdout and pieces; else told by the extension",
-                             fmt::join(written_formats(), ", ")))
+                             fmt::join(written_formats(true), ", ")))
       .type_name("NAME");
+  app.add_option(
+         "--tolerance", arguments.tolerance,
+         "STEP, IGES, BREP: how far their faces may be from the deformation: a share of the part's diagonal "
+         "or a length")
+      .type_name("SHARE|LENGTH")
+      .default_text("1e-4");
   app.add_flag(
       "--ascii", arguments.ascii,
       fmt::format(

@@ -8,7 +8,7 @@ namespace flexel::mapping {
 
 struct MapArguments {
   std::string method;  // "": blended
-  std::string checks, crack = "keep", debris = "keep", pieces, report, format;
+  std::string checks, crack = "keep", debris = "keep", pieces, report, format, tolerance;
   double scale = 1;
   bool attributes = false, table = false, ascii = false, strict = false;
 };

@@ -35,7 +35,7 @@ MapOutput map_output(const std::string& format, const std::string& path, bool as
   output.attributes = attributes;
   if (!std::isfinite(scale)) throw InputError("--scale: a number is needed");
   if (format == "vtu" || (format.empty() && extension(path) == "vtu")) return output;
-  output.format = surface_format(format, path, ascii);
+  output.format = surface_format(format, path, ascii, true);
   check_unit(*output.format, unit);
   if (attributes && !output.format->file->holds_attributes)
     throw InputError(

@@ -27,6 +27,7 @@
 #include "cad/read/memory_stream.h"
 #include "cad/read/occt.h"
 #include "cad/read/step_names.h"
+#include "cad/read/step_reader.h"
 
 namespace flexel::cad {
 namespace {
@@ -113,7 +114,19 @@ SolidCount count_solids(const STEPControl_Reader& reader) {
   return count;
 }
 
-TopoDS_Shape transfer(STEPControl_Reader& reader, const CadReadJob& job, const Warn& warn) {
+void check_complete(const CadReadJob& job) {
+  const std::string_view text(reinterpret_cast<const char*>(job.bytes.data()), job.bytes.size());
+  if (text.rfind("END-ISO-10303-21") == std::string_view::npos)
+    throw InputError(job.where, text.find("ISO-10303-21") == std::string_view::npos
+                                    ? "is no STEP file: it does not begin with ISO-10303-21"
+                                    : "is cut off: a STEP file ends with END-ISO-10303-21");
+}
+
+}  // namespace
+
+TopoDS_Shape transfer_step(STEPControl_Reader& reader, const CadReadJob& job, const Warn& warn,
+                           const std::function<void()>& transfer_roots) {
+  check_complete(job);
   // OpenCASCADE reports on stdout, which belongs to the result.
   Message::DefaultMessenger()->ChangePrinters().Clear();
   Interface_Static::SetCVal("xstep.cascade.unit", "MM");
@@ -121,7 +134,7 @@ TopoDS_Shape transfer(STEPControl_Reader& reader, const CadReadJob& job, const W
   if (reader.ReadStream(job.file.c_str(), stream) != IFSelect_RetDone)
     throw InputError(job.where, "is damaged: OpenCASCADE cannot make sense of it as STEP");
   const std::string damage = check_loaded(reader, job);
-  reader.TransferRoots();
+  transfer_roots();
   const TopoDS_Shape shape = reader.OneShape();
   const SolidCount solids = count_solids(reader);
   if (!damage.empty() && (shape.IsNull() || solids.sound == 0 || solids.unsound + solids.missing > 0 ||
@@ -137,6 +150,8 @@ TopoDS_Shape transfer(STEPControl_Reader& reader, const CadReadJob& job, const W
                      job.file, solids.missing, solids.sound));
   return shape;
 }
+
+namespace {
 
 // OpenCASCADE passes over the triangles of AP242 without a word (release 7.7 reads them).
 void tell_tessellated(const CadReadJob& job, bool all, const Warn& warn) {
@@ -157,21 +172,13 @@ void tell_tessellated(const CadReadJob& job, bool all, const Warn& warn) {
                               kind, kAdvice));
 }
 
-void check_complete(const CadReadJob& job) {
-  const std::string_view text(reinterpret_cast<const char*>(job.bytes.data()), job.bytes.size());
-  if (text.rfind("END-ISO-10303-21") == std::string_view::npos)
-    throw InputError(job.where, text.find("ISO-10303-21") == std::string_view::npos
-                                    ? "is no STEP file: it does not begin with ISO-10303-21"
-                                    : "is cut off: a STEP file ends with END-ISO-10303-21");
-}
-
 }  // namespace
 
 CadShape read_step(const CadReadJob& job, const Warn& warn) {
-  check_complete(job);
   STEPControl_Reader reader;
   CadShape result;
-  result.shape = std::make_shared<TopoDS_Shape>(transfer(reader, job, warn));
+  result.shape =
+      std::make_shared<TopoDS_Shape>(transfer_step(reader, job, warn, [&] { reader.TransferRoots(); }));
   result.unit = kMillimetre;
   tell_tessellated(job, result.shape->IsNull(), warn);
   const auto names = std::make_shared<StepNames>(reader);

@@ -1,4 +1,4 @@
-// STEP, IGES and OpenCASCADE's own BREP: read only, tessellated.
+// STEP, IGES and OpenCASCADE's own BREP. No mesh is written as one: the part's own CAD file is, deformed.
 #include <array>
 
 #include "formats/common/file_format.h"

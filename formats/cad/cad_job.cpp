@@ -77,6 +77,7 @@ static void visit(Archive& archive, CadWritten& written) {
   visit(archive, written.invalid);
   visit(archive, written.invalid_before);
   visit(archive, written.volume);
+  visit(archive, written.volume_before);
 }
 
 template <class Archive, class Result>

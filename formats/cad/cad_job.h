@@ -37,7 +37,7 @@ struct CadWriteJob {
   std::string format;    // to write
   std::string method;    // of the mapping
   double scale = 1;      // of the displacements
-  double tolerance = 0;  // share of the diagonal that surfaces may miss the deformation by
+  double tolerance = 0;  // m, that surfaces may miss the deformation by
   std::uint64_t threads = 1;
 };
 
@@ -58,7 +58,7 @@ struct CadWritten {
   std::vector<std::string> folded;  // faces on which the deformation turns space inside out
   // Solids that OpenCASCADE's check finds invalid, and those of them that were so in the source
   std::vector<std::string> invalid, invalid_before;
-  double volume = 0;  // m^3, of all solids together
+  double volume = 0, volume_before = 0;  // m^3, of all solids together
 };
 
 // Either answer, or why there is none.

@@ -20,7 +20,7 @@ struct FileFormat {
   std::span<const std::string_view> extensions{};  // others that mean it too: "stp"
   FileEncoding encoding = FileEncoding::text;
   bool carries_unit = false;      // the file says the unit of its coordinates; else --unit does
-  bool is_cad = false;            // exact surfaces: tessellated where it is read, never written
+  bool is_cad = false;            // exact surfaces: tessellated where it is read, written by flexel-cad
   bool holds_attributes = false;  // numbers of any name at vertices
 
   // The three that follow: none where the format is only read.

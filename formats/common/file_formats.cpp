@@ -65,10 +65,10 @@ std::vector<std::string> read_formats() {
   return names;
 }
 
-std::vector<std::string> written_formats() {
+std::vector<std::string> written_formats(bool cad) {
   std::vector<std::string> names;
   for (const FileFormat* format : kFormats)
-    if (format->write_new != nullptr) names.emplace_back(format->name);
+    if (format->write_new != nullptr || (cad && format->is_cad)) names.emplace_back(format->name);
   return names;
 }
 

@@ -20,9 +20,10 @@ namespace flexel {
 // Whether the part comes out as its source's file with other positions, as long as its mesh is the source's.
 [[nodiscard]] bool is_rewritten(const SurfaceSource& source);
 
-// The names of all that are read ("step", "iges" ...), and of those that are written.
+// The names of all that are read ("step", "iges" ...), and of those that a mesh can be written as; with `cad` those
+// too that the part's own CAD file can be written as.
 [[nodiscard]] std::vector<std::string> read_formats();
-[[nodiscard]] std::vector<std::string> written_formats();
+[[nodiscard]] std::vector<std::string> written_formats(bool cad = false);
 // For help texts: "STEP, IGES, ..., glTF or 3MF"; with `cad` false those that hold meshes.
 [[nodiscard]] std::string read_titles(bool cad = true);
 // A format's name in capitals, as messages about what is written have it: "GLB".

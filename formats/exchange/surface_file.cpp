@@ -32,11 +32,12 @@ bool is_source_format(const Surface& surface, SurfaceFormat format) {
 
 }  // namespace
 
-SurfaceFormat surface_format(const std::string& format, const std::string& path, bool ascii) {
-  const std::vector<std::string> known = written_formats();
+SurfaceFormat surface_format(const std::string& format, const std::string& path, bool ascii, bool cad) {
+  const std::vector<std::string> known = written_formats(cad);
   const std::string asked = format.empty() ? extension(path) : format;
-  if (std::find(known.begin(), known.end(), asked) != known.end()) {
-    const FileFormat& file = *format_named(asked);
+  if (const FileFormat* named = format_named(asked);
+      named != nullptr && std::find(known.begin(), known.end(), named->name) != known.end()) {
+    const FileFormat& file = *named;
     if (ascii && file.encoding != FileEncoding::both)
       throw InputError(fmt::format(
           "--ascii is for {} only: {} is {}",

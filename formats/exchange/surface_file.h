@@ -17,9 +17,10 @@ struct SurfaceFormat {
 };
 
 // The format for `format` ("stl", "obj", "ply", "off", "glb") or, when that is empty, for the extension of
-// `path`; InputError when neither tells (a pipe needs --format) or the format is unknown (with the nearest).
+// `path`; InputError when neither tells (a pipe needs --format) or the format is unknown (with the nearest). CAD formats
+// with `cad` only.
 [[nodiscard]] SurfaceFormat surface_format(const std::string& format, const std::string& path = "",
-                                           bool ascii = false);
+                                           bool ascii = false, bool cad = false);
 
 // Writes `surface` with vertex i moved by displacement[i] (vertices x 3, m). Every coordinate is written in
 // `unit` metres; pass default_unit(surface) for the unit the file came in (mm for CAD formats). STL: the

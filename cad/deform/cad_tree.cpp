@@ -1,0 +1,255 @@
+// STEP keeps its tree in OpenCASCADE's document (XCAF); IGES and BREP files are one node.
+#include "cad/deform/cad_tree.h"
+
+#include <APIHeaderSection_MakeHeader.hxx>
+#include <HeaderSection_FileName.hxx>
+#include <HeaderSection_FileSchema.hxx>
+#include <Interface_Static.hxx>
+#include <STEPCAFControl_Reader.hxx>
+#include <StepData_StepModel.hxx>
+#include <TColStd_HSequenceOfExtendedString.hxx>
+#include <TColStd_SequenceOfAsciiString.hxx>
+#include <TCollection_HAsciiString.hxx>
+#include <TDF_LabelSequence.hxx>
+#include <TDataStd_Name.hxx>
+#include <TDocStd_Document.hxx>
+#include <TopExp_Explorer.hxx>
+#include <TopTools_MapOfShape.hxx>
+#include <XCAFApp_Application.hxx>
+#include <XCAFDoc_ColorTool.hxx>
+#include <XCAFDoc_DocumentTool.hxx>
+#include <XCAFDoc_LayerTool.hxx>
+#include <XCAFDoc_ShapeTool.hxx>
+#include <XSControl_WorkSession.hxx>
+#include <algorithm>
+#include <map>
+
+#include "base/error.h"
+#include "cad/read/step_reader.h"
+
+namespace flexel::cad {
+namespace {
+
+constexpr std::array<XCAFDoc_ColorType, 3> kColorTypes = {XCAFDoc_ColorGen, XCAFDoc_ColorSurf,
+                                                          XCAFDoc_ColorCurv};
+
+TCollection_ExtendedString name_of(const TDF_Label& label) {
+  Handle(TDataStd_Name) name;
+  return label.FindAttribute(TDataStd_Name::GetID(), name) ? name->Get() : TCollection_ExtendedString();
+}
+
+// Reads the labels of a document.
+class DocumentReader {
+ public:
+  explicit DocumentReader(const Handle(TDocStd_Document) & document)
+      : shapes_(XCAFDoc_DocumentTool::ShapeTool(document->Main())),
+        colors_(XCAFDoc_DocumentTool::ColorTool(document->Main())),
+        layers_(XCAFDoc_DocumentTool::LayerTool(document->Main())) {}
+
+  [[nodiscard]] std::vector<CadNode> roots() const {
+    TDF_LabelSequence free;
+    shapes_->GetFreeShapes(free);
+    std::vector<CadNode> nodes;
+    for (Standard_Integer i = 1; i <= free.Length(); ++i) nodes.push_back(node(free(i)));
+    return nodes;
+  }
+
+ private:
+  [[nodiscard]] ShapeStyle style(const TDF_Label& label) const {
+    ShapeStyle found;
+    for (std::size_t type = 0; type < kColorTypes.size(); ++type)
+      if (Quantity_ColorRGBA color; colors_->GetColor(label, kColorTypes[type], color))
+        found.colors[type] = color;
+    Handle(TColStd_HSequenceOfExtendedString) names;
+    if (layers_->GetLayers(label, names) && !names.IsNull())
+      for (Standard_Integer i = 1; i <= names->Length(); ++i) found.layers.push_back(names->Value(i));
+    return found;
+  }
+
+  // Of a product, or of its use in an assembly.
+  [[nodiscard]] CadNode node(const TDF_Label& label) const {
+    CadNode found;
+    TDF_Label product = label;
+    if (XCAFDoc_ShapeTool::IsReference(label)) {
+      found.location = XCAFDoc_ShapeTool::GetLocation(label);
+      found.instance_name = name_of(label);
+      found.instance_style = style(label);
+      XCAFDoc_ShapeTool::GetReferredShape(label, product);
+    }
+    found.name = name_of(product);
+    found.style = style(product);
+    if (XCAFDoc_ShapeTool::IsAssembly(product)) {
+      TDF_LabelSequence components;
+      XCAFDoc_ShapeTool::GetComponents(product, components);
+      for (Standard_Integer i = 1; i <= components.Length(); ++i)
+        found.children.push_back(node(components(i)));
+      return found;
+    }
+    found.shape = XCAFDoc_ShapeTool::GetShape(product);
+    TDF_LabelSequence parts;
+    XCAFDoc_ShapeTool::GetSubShapes(product, parts);
+    for (Standard_Integer i = 1; i <= parts.Length(); ++i)
+      found.styled.push_back({XCAFDoc_ShapeTool::GetShape(parts(i)), name_of(parts(i)), style(parts(i))});
+    return found;
+  }
+
+  Handle(XCAFDoc_ShapeTool) shapes_;
+  Handle(XCAFDoc_ColorTool) colors_;
+  Handle(XCAFDoc_LayerTool) layers_;
+};
+
+// What writing calls the unit of a file's lengths; "MM" for one that it has no name for.
+std::string length_unit(STEPControl_Reader& reader) {
+  static const std::map<std::string, std::string> kNames = {
+      {"metre", "M"},       {"meter", "M"},       {"millimetre", "MM"}, {"millimeter", "MM"},
+      {"centimetre", "CM"}, {"centimeter", "CM"}, {"inch", "INCH"},     {"foot", "FT"},
+      {"micrometre", "UM"}, {"kilometre", "KM"}};
+  TColStd_SequenceOfAsciiString lengths, angles, solid_angles;
+  reader.FileUnits(lengths, angles, solid_angles);
+  if (lengths.IsEmpty()) return "MM";
+  std::string name = lengths.First().ToCString();
+  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
+  const auto found = kNames.find(name);
+  return found == kNames.end() ? "MM" : found->second;
+}
+
+std::string text_of(const Handle(TCollection_HAsciiString) & text) {
+  return text.IsNull() ? "" : text->ToCString();
+}
+
+// Several solids of one shape at different places cannot be deformed apart: they become children of their own.
+void part_repeated(CadNode& node) {
+  TopTools_MapOfShape seen;
+  bool repeated = false;
+  std::vector<TopoDS_Shape> solids;
+  for (TopExp_Explorer each(node.shape, TopAbs_SOLID); each.More(); each.Next()) {
+    solids.push_back(each.Current());
+    repeated = !seen.Add(each.Current().Located(TopLoc_Location())) || repeated;
+  }
+  if (!repeated) return;
+  for (const TopoDS_Shape& solid : solids) {
+    CadNode child;
+    child.location = solid.Location();
+    child.shape = solid.Located(TopLoc_Location());
+    child.name = node.name;
+    child.style = node.style;
+    for (const StyledShape& styled : node.styled)
+      if (styled.shape.TShape() == solid.TShape())
+        child.styled.push_back({child.shape, styled.name, styled.style});
+    node.children.push_back(std::move(child));
+  }
+  node.shape.Nullify();
+  node.styled.clear();
+}
+
+void part_repeated(std::vector<CadNode>& nodes) {
+  for (CadNode& node : nodes)
+    if (node.children.empty())
+      part_repeated(node);
+    else
+      part_repeated(node.children);
+}
+
+// Which solids of the file the nodes hold: those of the same shape, nearest in place, each once.
+class SolidFinder {
+ public:
+  explicit SolidFinder(const std::vector<TopoDS_Shape>& solids)
+      : solids_(solids), taken_(solids.size(), false) {}
+
+  void find(std::vector<CadNode>& nodes, const TopLoc_Location& above) {
+    for (CadNode& node : nodes) {
+      const TopLoc_Location here = above * node.location;
+      find(node.children, here);
+      if (node.shape.IsNull()) continue;
+      const TopAbs_ShapeEnum kind =
+          TopExp_Explorer(node.shape, TopAbs_SOLID).More() ? TopAbs_SOLID : TopAbs_SHELL;
+      for (TopExp_Explorer each(node.shape.Moved(here), kind); each.More(); each.Next())
+        if (const std::size_t solid = take(each.Current()); solid < solids_.size())
+          node.solids.push_back(solid);
+    }
+  }
+  [[nodiscard]] bool all() const {
+    return std::all_of(taken_.begin(), taken_.end(), [](bool taken) { return taken; });
+  }
+
+ private:
+  std::size_t take(const TopoDS_Shape& wanted) {
+    std::size_t best = solids_.size();
+    double least = 1e300;
+    const gp_Trsf there = wanted.Location().Transformation();
+    for (std::size_t i = 0; i < solids_.size(); ++i) {
+      if (taken_[i] || solids_[i].TShape() != wanted.TShape()) continue;
+      const gp_Trsf here = solids_[i].Location().Transformation();
+      double distance = (here.TranslationPart() - there.TranslationPart()).Modulus();
+      for (int row = 1; row <= 3; ++row)
+        for (int column = 1; column <= 3; ++column)
+          distance += std::abs(here.Value(row, column) - there.Value(row, column));
+      if (distance >= least) continue;
+      least = distance;
+      best = i;
+    }
+    if (best < solids_.size()) taken_[best] = true;
+    return best;
+  }
+  const std::vector<TopoDS_Shape>& solids_;
+  std::vector<bool> taken_;
+};
+
+void read_header(STEPControl_Reader& reader, CadTree& tree) {
+  const APIHeaderSection_MakeHeader header(Handle(StepData_StepModel)::DownCast(reader.WS()->Model()));
+  tree.time = text_of(header.TimeStamp());
+  const Handle(HeaderSection_FileSchema) schema = header.FsValue();
+  if (!schema.IsNull() && !schema->SchemaIdentifiers().IsNull() && schema->NbSchemaIdentifiers() > 0)
+    tree.schema = text_of(schema->SchemaIdentifiersValue(1));
+}
+
+TopoDS_Shape read_step_tree(const CadReadJob& job, CadTree& tree) {
+  STEPCAFControl_Reader reader;
+  Interface_Static::SetIVal("read.stepcaf.subshapes.name", 1);  // known once there is a reader
+  reader.SetColorMode(Standard_True);
+  reader.SetNameMode(Standard_True);
+  reader.SetLayerMode(Standard_True);
+  Handle(TDocStd_Document) document;
+  XCAFApp_Application::GetApplication()->NewDocument("BinXCAF", document);
+  const auto transfer = [&] {
+    if (!reader.Transfer(document)) throw InputError(job.where, "holds no shape");
+  };
+  const TopoDS_Shape shape = transfer_step(reader.ChangeReader(), job, {}, transfer);
+  tree.unit = kMillimetre;
+  tree.roots = DocumentReader(document).roots();
+  tree.length_unit = length_unit(reader.ChangeReader());
+  read_header(reader.ChangeReader(), tree);
+  return shape;
+}
+
+TopoDS_Shape read_single(const CadReadJob& job, CadTree& tree) {
+  const CadShape read = read_shape(job, {});
+  CadNode node;
+  node.shape = *read.shape;
+  for (TopExp_Explorer each(node.shape, TopAbs_SOLID); each.More(); each.Next())
+    if (const std::string name = read.labels.solid_name(each.Current()); !name.empty())
+      node.styled.push_back({each.Current(), TCollection_ExtendedString(name.c_str(), Standard_True), {}});
+  for (TopExp_Explorer each(node.shape, TopAbs_FACE); each.More(); each.Next())
+    if (const std::string name = read.labels.face_name(each.Current()); !name.empty())
+      node.styled.push_back({each.Current(), TCollection_ExtendedString(name.c_str(), Standard_True), {}});
+  tree.unit = read.unit;
+  tree.roots.push_back(std::move(node));
+  return *read.shape;
+}
+
+}  // namespace
+
+CadTree read_tree(const CadReadJob& job) {
+  CadTree tree;
+  const TopoDS_Shape shape = job.format == "step" ? read_step_tree(job, tree) : read_single(job, tree);
+  part_repeated(tree.roots);
+  const std::vector<TopoDS_Shape> solids = solids_of(shape, job.where);
+  tree.solids = solids.size();
+  SolidFinder finder(solids);
+  finder.find(tree.roots, TopLoc_Location());
+  if (!finder.all())
+    throw InputError(job.where, "its assemblies do not hold all its solids: write a mesh instead");
+  return tree;
+}
+
+}  // namespace flexel::cad

@@ -1,0 +1,320 @@
+// A surface whose points all moved with one rigid motion, to a tenth of the tolerance, is moved by it and stays what it
+// is. All others become B-splines.
+#include "cad/deform/deformed_geometry.h"
+
+#include <BRep_Tool.hxx>
+#include <Geom2d_Curve.hxx>
+#include <GeomAdaptor_Curve.hxx>
+#include <GeomAdaptor_Surface.hxx>
+#include <Geom_BSplineSurface.hxx>
+#include <Geom_TrimmedCurve.hxx>
+#include <Standard_Failure.hxx>
+#include <TColStd_Array1OfReal.hxx>
+#include <TopExp.hxx>
+#include <TopExp_Explorer.hxx>
+#include <TopTools_ListIteratorOfListOfShape.hxx>
+#include <TopoDS.hxx>
+#include <TopoDS_Edge.hxx>
+#include <TopoDS_Vertex.hxx>
+#include <algorithm>
+#include <cmath>
+
+#include "base/parallel.h"
+#include "cad/deform/fit.h"
+#include "cad/deform/rigid_motion.h"
+
+namespace flexel::cad {
+namespace {
+
+constexpr double kRigidShare = 0.1;   // of the tolerance
+constexpr double kCurveShare = 0.25;  // of the tolerance, for curves
+constexpr double kLeastTolerance = 1e-7;
+constexpr double kAngle = 1.05;     // rad: no span of a turned surface is longer
+constexpr double kLongestSpan = 3;  // lattice spacings
+constexpr std::size_t kMostFirstSpans = 64;
+
+// The intervals on which an adaptor is continuous of each order, as breaks.
+template <class Count, class Intervals>
+std::vector<Break> breaks_of(const Count& count, const Intervals& intervals) {
+  // Intervals of C(k + 1) end where only C(k) is sure.
+  constexpr std::pair<GeomAbs_Shape, int> kOrders[] = {
+      {GeomAbs_CN, 3}, {GeomAbs_C3, 2}, {GeomAbs_C2, 1}, {GeomAbs_C1, 0}};
+  std::vector<Break> breaks;
+  for (const auto& [order, continuity] : kOrders) {
+    try {
+      const Standard_Integer n = count(order);
+      if (n <= 1) continue;
+      TColStd_Array1OfReal ends(1, n + 1);
+      intervals(ends, order);
+      for (Standard_Integer i = 2; i <= n; ++i) breaks.push_back({ends(i), continuity});
+    } catch (const Standard_Failure&) {  // some surfaces do not know
+    }
+  }
+  return breaks;
+}
+
+std::size_t least_spans(double length, double angle, double spacing) {
+  const double by_length = spacing > 0 ? length / (kLongestSpan * spacing) : 0, by_angle = angle / kAngle;
+  return static_cast<std::size_t>(
+      std::clamp(std::ceil(std::max(by_length, by_angle)), 2.0, static_cast<double>(kMostFirstSpans)));
+}
+
+bool turns_in_u(GeomAbs_SurfaceType type) {
+  return type == GeomAbs_Cylinder || type == GeomAbs_Cone || type == GeomAbs_Sphere ||
+         type == GeomAbs_Torus || type == GeomAbs_SurfaceOfRevolution;
+}
+bool turns_in_v(GeomAbs_SurfaceType type) {
+  return type == GeomAbs_Sphere || type == GeomAbs_Torus;
+}
+
+// Length of a line of parameters through the middle.
+double length_of(const Handle(Geom_Surface) & surface, const FaceDomain& d, bool along_u) {
+  constexpr int kPieces = 16;
+  const auto at = [&](int i) {
+    const double share = static_cast<double>(i) / kPieces;
+    const double u = along_u ? d.u_begin + share * (d.u_end - d.u_begin) : 0.5 * (d.u_begin + d.u_end);
+    const double v = along_u ? 0.5 * (d.v_begin + d.v_end) : d.v_begin + share * (d.v_end - d.v_begin);
+    return surface->Value(u, v);
+  };
+  double length = 0;
+  for (int i = 0; i < kPieces; ++i) length += at(i).Distance(at(i + 1));
+  return length;
+}
+
+struct Moved {
+  std::vector<gp_XYZ> from, to;
+  void add(const gp_Pnt& point, const PointMap& map) {
+    from.push_back(point.XYZ());
+    to.push_back(map(point.XYZ()));
+  }
+};
+
+TopoDS_Face forward(const TopoDS_Shape& face) {
+  return TopoDS::Face(face.Oriented(TopAbs_FORWARD));
+}
+
+}  // namespace
+
+struct DeformedGeometry::OnFace {
+  Handle(Geom2d_Curve) curve;
+  double begin = 0, end = 0;  // of its parameter
+  GeomAdaptor_Surface surface;
+  [[nodiscard]] gp_XYZ at(double share) const {
+    const gp_Pnt2d uv = curve->Value(begin + share * (end - begin));
+    return surface.Value(uv.X(), uv.Y()).XYZ();
+  }
+};
+
+DeformedGeometry::DeformedGeometry(const TopoDS_Shape& shape, const ShapeMap& map, const FitOptions& options)
+    : map_(map), options_(options) {
+  TopExp::MapShapes(shape, TopAbs_FACE, faces_);
+  TopExp::MapShapes(shape, TopAbs_EDGE, edges_);
+  TopExp::MapShapes(shape, TopAbs_VERTEX, vertices_);
+  TopExp::MapShapesAndAncestors(shape, TopAbs_EDGE, TopAbs_FACE, faces_of_edge_);
+  TopExp::MapShapesAndAncestors(shape, TopAbs_VERTEX, TopAbs_FACE, faces_of_vertex_);
+  face_.resize(faces_.Extent());
+  edge_.resize(edges_.Extent());
+  vertex_.resize(vertices_.Extent());
+  parallel_for_each(
+      face_.size(), [&](std::size_t i) { fit_face(i); }, 1);
+  parallel_for_each(
+      edge_.size(), [&](std::size_t i) { fit_edge(i); }, 4);
+  for (std::size_t i = 0; i < vertex_.size(); ++i) move_vertex(i);
+  widen_tolerances();
+}
+
+void DeformedGeometry::fit_face(std::size_t i) {
+  constexpr int kLook = 25;  // points in each direction, to see a rigid motion
+  DeformedFace& result = face_[i];
+  const TopoDS_Face face = forward(faces_(static_cast<Standard_Integer>(i) + 1));
+  const Handle(Geom_Surface) surface = BRep_Tool::Surface(face);
+  if (surface.IsNull()) return;
+  const PointMap map = map_.of_face(i);
+  result.domain = face_domain(face);
+  const FaceDomain& d = result.domain;
+  Moved moved;
+  for (int p = 0; p <= kLook; ++p)
+    for (int q = 0; q <= kLook; ++q)
+      moved.add(surface->Value(d.u_begin + (d.u_end - d.u_begin) * p / kLook,
+                               d.v_begin + (d.v_end - d.v_begin) * q / kLook),
+                map);
+  if (const RigidMotion rigid = rigid_motion(moved.from, moved.to, kLeastTolerance);
+      rigid.error <= kRigidShare * options_.tolerance) {
+    result.surface =
+        rigid.none ? surface : Handle(Geom_Surface)::DownCast(surface->Transformed(rigid.motion));
+    result.error = rigid.error;
+    result.kept = result.reached = true;
+    return;
+  }
+  const GeomAdaptor_Surface adaptor(surface, d.u_begin, d.u_end, d.v_begin, d.v_end);
+  const GeomAbs_SurfaceType type = adaptor.GetType();
+  const Knots u = make_knots(
+      d.u_begin, d.u_end,
+      breaks_of([&](GeomAbs_Shape order) { return adaptor.NbUIntervals(order); },
+                [&](TColStd_Array1OfReal& ends, GeomAbs_Shape order) { adaptor.UIntervals(ends, order); }),
+      least_spans(length_of(surface, d, true), turns_in_u(type) ? d.u_end - d.u_begin : 0, options_.spacing));
+  const Knots v = make_knots(
+      d.v_begin, d.v_end,
+      breaks_of([&](GeomAbs_Shape order) { return adaptor.NbVIntervals(order); },
+                [&](TColStd_Array1OfReal& ends, GeomAbs_Shape order) { adaptor.VIntervals(ends, order); }),
+      least_spans(length_of(surface, d, false), turns_in_v(type) ? d.v_end - d.v_begin : 0,
+                  options_.spacing));
+  const FaceMask mask(face, d);
+  SurfaceMap fitted;
+  fitted.point = [&](double at_u, double at_v) { return map(adaptor.Value(at_u, at_v).XYZ()); };
+  fitted.counts = [&](double at_u, double at_v, double du, double dv) {
+    return mask.has_near(at_u, at_v, du, dv);
+  };
+  fitted.u_closed = d.u_closed;
+  fitted.v_closed = d.v_closed;
+  const SurfaceFit fit = fit_surface(fitted, u, v, options_.tolerance);
+  result.surface = fit.surface;
+  result.error = fit.error;
+  result.reached = fit.reached;
+}
+
+// A seam lies on its face twice.
+std::vector<DeformedGeometry::OnFace> DeformedGeometry::on_faces(const TopoDS_Shape& shape) const {
+  const TopoDS_Edge edge = TopoDS::Edge(shape.Oriented(TopAbs_FORWARD));
+  std::vector<OnFace> found;
+  if (!faces_of_edge_.Contains(edge)) return found;
+  TopTools_IndexedMapOfShape seen;
+  for (TopTools_ListIteratorOfListOfShape each(faces_of_edge_.FindFromKey(edge)); each.More(); each.Next()) {
+    const TopoDS_Face face = forward(each.Value());
+    if (seen.Contains(face)) continue;
+    seen.Add(face);
+    const DeformedFace* moved = find_face(face);
+    if (moved == nullptr || moved->surface.IsNull()) continue;
+    for (const TopAbs_Orientation orientation : {TopAbs_FORWARD, TopAbs_REVERSED}) {
+      const TopoDS_Edge oriented = TopoDS::Edge(edge.Oriented(orientation));
+      if (orientation == TopAbs_REVERSED && !BRep_Tool::IsClosed(oriented, face)) break;
+      OnFace on;
+      on.curve = BRep_Tool::CurveOnSurface(oriented, face, on.begin, on.end);
+      if (on.curve.IsNull()) continue;
+      on.surface.Load(moved->surface);
+      found.push_back(on);
+    }
+  }
+  return found;
+}
+
+void DeformedGeometry::fit_edge(std::size_t i) {
+  constexpr int kLook = 60;
+  DeformedEdge& result = edge_[i];
+  const TopoDS_Edge edge =
+      TopoDS::Edge(edges_(static_cast<Standard_Integer>(i) + 1).Oriented(TopAbs_FORWARD));
+  BRep_Tool::Range(edge, result.begin, result.end);
+  if (BRep_Tool::Degenerated(edge)) return;
+  double begin = 0, end = 0;
+  Handle(Geom_Curve) curve = BRep_Tool::Curve(edge, begin, end);
+  if (curve.IsNull()) return;
+  result.begin = begin;
+  result.end = end;
+  const std::vector<OnFace> faces = on_faces(edge);
+  const PointMap map = faces_of_edge_.Contains(edge) && !faces_of_edge_.FindFromKey(edge).IsEmpty()
+                           ? map_.of_face(faces_.FindIndex(faces_of_edge_.FindFromKey(edge).First()) - 1)
+                           : map_.elsewhere();
+  Moved moved;
+  for (int p = 0; p <= kLook; ++p) moved.add(curve->Value(begin + (end - begin) * p / kLook), map);
+  if (const RigidMotion rigid = rigid_motion(moved.from, moved.to, kLeastTolerance);
+      rigid.error <= kRigidShare * options_.tolerance) {
+    if (!rigid.none) curve = Handle(Geom_Curve)::DownCast(curve->Transformed(rigid.motion));
+    if (const auto trimmed = Handle(Geom_TrimmedCurve)::DownCast(curve); !trimmed.IsNull())
+      curve = trimmed->BasisCurve();
+    result.curve = curve;
+    result.kept = true;
+    return;
+  }
+  const GeomAdaptor_Curve adaptor(curve, begin, end);
+  double length = 0;
+  for (int p = 0; p < kLook; ++p) length += (moved.from[p + 1] - moved.from[p]).Modulus();
+  const bool turns = adaptor.GetType() == GeomAbs_Circle || adaptor.GetType() == GeomAbs_Ellipse;
+  const Knots knots = make_knots(
+      begin, end,
+      breaks_of([&](GeomAbs_Shape order) { return adaptor.NbIntervals(order); },
+                [&](TColStd_Array1OfReal& ends, GeomAbs_Shape order) { adaptor.Intervals(ends, order); }),
+      least_spans(length, turns ? end - begin : 0, options_.spacing));
+  const auto mean = [&](double t) {
+    if (faces.empty()) return map(curve->Value(t).XYZ());
+    gp_XYZ sum(0, 0, 0);
+    for (const OnFace& face : faces) sum += face.at((t - begin) / (end - begin));
+    return sum / static_cast<double>(faces.size());
+  };
+  const bool closed = moved.from.front().IsEqual(moved.from.back(), kLeastTolerance);
+  result.curve = fit_curve(mean, knots, closed, kCurveShare * options_.tolerance).curve;
+}
+
+void DeformedGeometry::move_vertex(std::size_t i) {
+  const TopoDS_Vertex vertex = TopoDS::Vertex(vertices_(static_cast<Standard_Integer>(i) + 1));
+  const bool on_face = faces_of_vertex_.Contains(vertex) && !faces_of_vertex_.FindFromKey(vertex).IsEmpty();
+  const PointMap map = on_face
+                           ? map_.of_face(faces_.FindIndex(faces_of_vertex_.FindFromKey(vertex).First()) - 1)
+                           : map_.elsewhere();
+  vertex_[i].point = gp_Pnt(map(BRep_Tool::Pnt(vertex).XYZ()));
+}
+
+// An edge's covers the gaps to the surfaces that meet in it, a vertex's those of its edges. Looked at in every span of
+// knots, where the gaps have their maxima.
+void DeformedGeometry::widen_tolerances() {
+  constexpr double kMargin = 1.1;
+  constexpr int kLeastPoints = 64, kPointsASpan = 8;
+  for (std::size_t i = 0; i < edge_.size(); ++i) {
+    DeformedEdge& edge = edge_[i];
+    const TopoDS_Shape shape = edges_(static_cast<Standard_Integer>(i) + 1).Oriented(TopAbs_FORWARD);
+    TopoDS_Vertex ends[2];
+    TopExp::Vertices(TopoDS::Edge(shape), ends[0], ends[1]);
+    const auto widen = [&](int end, double distance) {
+      if (ends[end].IsNull()) return;
+      DeformedVertex& vertex = vertex_[vertices_.FindIndex(ends[end]) - 1];
+      vertex.tolerance = std::max(vertex.tolerance, kMargin * distance + 1e-9);
+    };
+    for (const OnFace& face : on_faces(shape)) {
+      int points = kLeastPoints;
+      if (const auto spline = Handle(Geom_BSplineSurface)::DownCast(face.surface.Surface()); !spline.IsNull())
+        points = std::max(points, kPointsASpan * std::max(spline->NbUKnots(), spline->NbVKnots()));
+      for (int p = 0; p <= points; ++p) {
+        const double share = static_cast<double>(p) / points;
+        const gp_Pnt on(face.at(share));
+        if (edge.curve.IsNull()) {  // all of it is at its vertex
+          if (!ends[0].IsNull()) {
+            const double distance = on.Distance(vertex_[vertices_.FindIndex(ends[0]) - 1].point);
+            widen(0, distance);
+            edge.tolerance = std::max(edge.tolerance, kMargin * distance);
+          }
+          continue;
+        }
+        const gp_Pnt along = edge.curve->Value(edge.begin + share * (edge.end - edge.begin));
+        edge.tolerance = std::max(edge.tolerance, kMargin * along.Distance(on) + 1e-9);
+        if (p != 0 && p != points) continue;
+        const int end = p == 0 ? 0 : 1;
+        if (ends[end].IsNull()) continue;
+        const gp_Pnt& point = vertex_[vertices_.FindIndex(ends[end]) - 1].point;
+        widen(end, std::max(along.Distance(point), on.Distance(point)));
+      }
+    }
+  }
+  for (std::size_t i = 0; i < edge_.size(); ++i) {
+    TopoDS_Vertex ends[2];
+    TopExp::Vertices(TopoDS::Edge(edges_(static_cast<Standard_Integer>(i) + 1)), ends[0], ends[1]);
+    for (const TopoDS_Vertex& end : ends) {
+      if (end.IsNull()) continue;
+      DeformedVertex& vertex = vertex_[vertices_.FindIndex(end) - 1];
+      vertex.tolerance = std::max(vertex.tolerance, edge_[i].tolerance);
+    }
+  }
+}
+
+const DeformedFace* DeformedGeometry::find_face(const TopoDS_Shape& face) const {
+  const Standard_Integer i = faces_.FindIndex(face);
+  return i == 0 ? nullptr : &face_[i - 1];
+}
+const DeformedEdge* DeformedGeometry::find_edge(const TopoDS_Shape& edge) const {
+  const Standard_Integer i = edges_.FindIndex(edge);
+  return i == 0 ? nullptr : &edge_[i - 1];
+}
+const DeformedVertex* DeformedGeometry::find_vertex(const TopoDS_Shape& vertex) const {
+  const Standard_Integer i = vertices_.FindIndex(vertex);
+  return i == 0 ? nullptr : &vertex_[i - 1];
+}
+
+}  // namespace flexel::cad

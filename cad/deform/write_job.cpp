@@ -1,0 +1,310 @@
+// The faces of a CAD file and those of the body's surface are in one order: both come from solids_of().
+#include "cad/deform/write_job.h"
+
+#include <fmt/format.h>
+
+#include <BRepCheck_Analyzer.hxx>
+#include <BRepGProp.hxx>
+#include <BRepTopAdaptor_FClass2d.hxx>
+#include <BRep_Tool.hxx>
+#include <GProp_GProps.hxx>
+#include <Geom_Surface.hxx>
+#include <TopExp.hxx>
+#include <TopExp_Explorer.hxx>
+#include <TopoDS.hxx>
+#include <TopoDS_Face.hxx>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "cad/deform/cad_tree.h"
+#include "cad/deform/deform_shape.h"
+#include "cad/deform/deformed_geometry.h"
+#include "cad/deform/face_polygons.h"
+#include "cad/deform/write_tree.h"
+#include "formats/lattice/body_file.h"
+#include "formats/part/surface.h"
+#include "mapping/space/space_field.h"
+#include "mapping/types/options.h"
+
+namespace flexel::cad {
+namespace {
+
+constexpr std::uint32_t kNoFace = 0xffffffffu;
+
+// What one job works on.
+struct Work {
+  Body body;
+  mapping::SpaceField field;
+  FacePolygons polygons;
+  std::vector<std::uint32_t> first_face;  // (parts) of Surface::faces
+  double tolerance = 0;                   // m
+  CadWritten written;
+
+  Work(Body deformed, const CadWriteJob& job)
+      : body(std::move(deformed)),
+        field(body, mapping::map_method(job.method), job.scale),
+        polygons(body),
+        first_face(body.parts.size(), kNoFace) {
+    for (std::uint32_t f = 0; f < body.surface.faces.size(); ++f) {
+      std::uint32_t& first = first_face[body.surface.faces[f].part];
+      if (first == kNoFace) first = f;
+    }
+    tolerance = job.tolerance;
+    written.tolerance = tolerance;
+  }
+};
+
+// Where a face of a shape is in the body.
+struct FacePlace {
+  std::uint32_t part = 0, face = kNoFace;
+};
+
+// The deformation in the coordinates of one node's shape.
+class NodeMap {
+ public:
+  NodeMap(const Work& work, const gp_Trsf& to_world, double unit, std::vector<FacePlace> places)
+      : work_(work),
+        to_world_(to_world),
+        from_world_(to_world.Inverted()),
+        unit_(unit),
+        places_(std::move(places)) {}
+  [[nodiscard]] PointMap of_face(std::size_t face) const { return of(places_[face]); }
+  [[nodiscard]] PointMap elsewhere() const {
+    return of({places_.empty() ? 0 : places_.front().part, kNoFace});
+  }
+  [[nodiscard]] const FacePlace& place(std::size_t face) const { return places_[face]; }
+
+ private:
+  [[nodiscard]] PointMap of(const FacePlace& place) const {
+    return [this, place,
+            probe = std::make_shared<mapping::SpaceField::Probe>(work_.field)](const gp_XYZ& point) {
+      gp_XYZ world = point;
+      to_world_.Transforms(world);
+      const Vec3 x(world.X() * unit_, world.Y() * unit_, world.Z() * unit_);
+      const Vec3 moved = probe->at(x, place.part, work_.polygons.nearest(place.face, x)) / unit_;
+      gp_XYZ back(moved.x(), moved.y(), moved.z());
+      from_world_.Transforms(back);
+      return back;
+    };
+  }
+  const Work& work_;
+  gp_Trsf to_world_, from_world_;
+  double unit_;
+  std::vector<FacePlace> places_;
+};
+
+TopAbs_ShapeEnum kind_of_solids(const TopoDS_Shape& shape) {
+  return TopExp_Explorer(shape, TopAbs_SOLID).More() ? TopAbs_SOLID : TopAbs_SHELL;
+}
+
+// (faces of the shape) Where each is in the body; those of no solid follow the node's first part.
+std::vector<FacePlace> places_of(const Work& work, const CadNode& node,
+                                 const std::vector<std::uint32_t>& part_of_solid, const std::string& where) {
+  TopTools_IndexedMapOfShape faces;
+  TopExp::MapShapes(node.shape, TopAbs_FACE, faces);
+  const std::uint32_t first = node.solids.empty() ? 0 : part_of_solid[node.solids.front()];
+  std::vector<FacePlace> places(faces.Extent(), FacePlace{first, kNoFace});
+  std::size_t n = 0;
+  for (TopExp_Explorer each(node.shape, kind_of_solids(node.shape)); each.More() && n < node.solids.size();
+       each.Next(), ++n) {
+    const std::uint32_t part = part_of_solid[node.solids[n]];
+    TopTools_IndexedMapOfShape own;
+    TopExp::MapShapes(each.Current(), TopAbs_FACE, own);
+    const auto in_body = static_cast<Standard_Integer>(
+        std::count_if(work.body.surface.faces.begin(), work.body.surface.faces.end(),
+                      [&](const SurfaceFace& face) { return face.part == part; }));
+    if (own.Extent() != in_body)
+      throw InputError(
+          where, fmt::format("has {} faces where part \"{}\" of the body has {}: the body was made from "
+                             "another file",
+                             own.Extent(), work.body.parts[part].name, in_body));
+    for (Standard_Integer f = 1; f <= own.Extent(); ++f)
+      places[faces.FindIndex(own(f)) - 1] = {part, work.first_face[part] + static_cast<std::uint32_t>(f) - 1};
+  }
+  return places;
+}
+
+std::string face_name(const Work& work, const FacePlace& place) {
+  const std::string& part = work.body.parts[place.part].name;
+  return place.face == kNoFace ? part
+                               : fmt::format("{}/{}", part, place.face - work.first_face[place.part] + 1);
+}
+
+struct FaceCheck {
+  double deviation = 0;  // m
+  bool folded = false;
+};
+
+// Distance from the deformation, at points inside the face that the fit did not use; and whether the deformation
+// turns space inside out there.
+FaceCheck check_face(const DeformedGeometry& geometry, std::size_t i, const NodeMap& node, double unit,
+                     double spacing) {
+  constexpr int kPoints = 13;
+  FaceCheck found;
+  const DeformedFace& moved = geometry.face(i);
+  const TopoDS_Face face =
+      TopoDS::Face(geometry.faces()(static_cast<Standard_Integer>(i) + 1).Oriented(TopAbs_FORWARD));
+  const Handle(Geom_Surface) before = BRep_Tool::Surface(face);
+  const PointMap map = node.of_face(i);
+  BRepTopAdaptor_FClass2d trimmed(face, 1e-6);
+  const FaceDomain& d = moved.domain;
+  const double step = 1e-3 * spacing;
+  const auto difference = [&](const gp_XYZ& x, const gp_XYZ& by) { return map(x + by) - map(x - by); };
+  for (int a = 0; a < kPoints; ++a)
+    for (int b = 0; b < kPoints; ++b) {
+      // irrational shares, so that no line of knots or nodes has them
+      const double u = d.u_begin + (d.u_end - d.u_begin) * std::fmod(0.3819660113 + 0.6180339887 * a, 1.0);
+      const double v =
+          d.v_begin + (d.v_end - d.v_begin) * std::fmod(0.4142135624 * (b + 1) + 0.0711 * a, 1.0);
+      if (trimmed.Perform(gp_Pnt2d(u, v)) != TopAbs_IN) continue;
+      const gp_XYZ x = before->Value(u, v).XYZ();
+      found.deviation =
+          std::max(found.deviation, unit * (moved.surface->Value(u, v).XYZ() - map(x)).Modulus());
+      if ((a + b) % 4 != 0) continue;
+      const gp_XYZ dx = difference(x, gp_XYZ(step, 0, 0)), dy = difference(x, gp_XYZ(0, step, 0)),
+                   dz = difference(x, gp_XYZ(0, 0, step));
+      found.folded = found.folded || !(dx.DotCross(dy, dz) > 0);
+    }
+  return found;
+}
+
+double volume_of(const TopoDS_Shape& shape) {
+  GProp_GProps properties;
+  BRepGProp::VolumeProperties(shape, properties);
+  return std::abs(properties.Mass());
+}
+
+// Faces without a surface, misses, folds.
+void judge_faces(Work& work, const DeformedGeometry& geometry, const NodeMap& map, double unit,
+                 double spacing) {
+  const auto count = static_cast<std::size_t>(geometry.faces().Extent());
+  std::vector<FaceCheck> checks(count);
+  for (std::size_t i = 0; i < count; ++i)
+    if (geometry.face(i).surface.IsNull())
+      throw InputError(fmt::format("face {} cannot be deformed: no surface goes through its points",
+                                   face_name(work, map.place(i))));
+  parallel_for_each(
+      count, [&](std::size_t i) { checks[i] = check_face(geometry, i, map, unit, spacing); }, 1);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::string name = face_name(work, map.place(i));
+    const double deviation = std::max(checks[i].deviation, unit * geometry.face(i).error);
+    ++work.written.faces;
+    work.written.kept += geometry.face(i).kept;
+    if (deviation > work.written.deviation) {
+      work.written.deviation = deviation;
+      work.written.deviation_face = name;
+    }
+    if (deviation > work.tolerance) work.written.missed.push_back({name, deviation});
+    if (checks[i].folded) work.written.folded.push_back(name);
+  }
+}
+
+// Solids before and after are in one order.
+void judge_solids(Work& work, const CadNode& node, const TopoDS_Shape& after,
+                  const std::vector<std::uint32_t>& part_of_solid, double unit) {
+  TopExp_Explorer old_solid(node.shape, kind_of_solids(node.shape)), new_solid(after, kind_of_solids(after));
+  for (std::size_t n = 0; n < node.solids.size() && old_solid.More(); ++n, old_solid.Next()) {
+    const std::string& name = work.body.parts[part_of_solid[node.solids[n]]].name;
+    ++work.written.solids;
+    if (!new_solid.More()) {
+      work.written.invalid.push_back(name);
+      continue;
+    }
+    if (!BRepCheck_Analyzer(new_solid.Current()).IsValid()) {
+      work.written.invalid.push_back(name);
+      if (!BRepCheck_Analyzer(old_solid.Current()).IsValid()) work.written.invalid_before.push_back(name);
+    }
+    work.written.volume += unit * unit * unit * volume_of(new_solid.Current());
+    work.written.volume_before += unit * unit * unit * volume_of(old_solid.Current());
+    new_solid.Next();
+  }
+}
+
+void deform_node(Work& work, CadNode& node, const TopLoc_Location& here, double unit,
+                 const std::vector<std::uint32_t>& part_of_solid, const std::string& where) {
+  const NodeMap map(work, here.Transformation(), unit, places_of(work, node, part_of_solid, where));
+  const std::uint32_t part = node.solids.empty() ? 0 : part_of_solid[node.solids.front()];
+  FitOptions options;
+  options.tolerance = 0.5 * work.tolerance / unit;
+  options.spacing = work.body.parts[part].lattice.spacing.minCoeff() / unit;
+  const ShapeMap shape_map{[&](std::size_t face) { return map.of_face(face); },
+                           [&] { return map.elsewhere(); }};
+  const DeformedGeometry geometry(node.shape, shape_map, options);
+  judge_faces(work, geometry, map, unit, options.spacing);
+  DeformedShape deformed = deform_shape(node.shape, geometry);
+  judge_solids(work, node, deformed.shape, part_of_solid, unit);
+  for (StyledShape& styled : node.styled) styled.shape = deformed.image(styled.shape);
+  std::erase_if(node.styled, [](const StyledShape& styled) { return styled.shape.IsNull(); });
+  node.shape = deformed.shape;
+}
+
+void deform_nodes(Work& work, std::vector<CadNode>& nodes, const TopLoc_Location& above, double unit,
+                  const std::vector<std::uint32_t>& part_of_solid, const std::string& where) {
+  for (CadNode& node : nodes) {
+    const TopLoc_Location here = above * node.location;
+    if (node.shape.IsNull())
+      deform_nodes(work, node.children, here, unit, part_of_solid, where);
+    else
+      deform_node(work, node, here, unit, part_of_solid, where);
+  }
+}
+
+CadTree deformed_source(Work& work, std::uint32_t index) {
+  const SurfaceSource& source = work.body.surface.sources[index];
+  if (source.bytes.empty() || (source.format != "step" && source.format != "iges" && source.format != "brep"))
+    throw InputError(source.file,
+                     fmt::format("has no CAD faces to be deformed (it is {}): write a mesh (STL, OBJ, "
+                                 "...), or start from a CAD file",
+                                 source.format));
+  CadReadJob job;
+  job.format = source.format;
+  job.bytes = source.bytes;
+  job.where = job.file = source.file;
+  job.unit = source.unit;
+  CadTree tree = read_tree(job);
+  std::vector<std::uint32_t> part_of_solid;
+  for (std::uint32_t part = 0; part < work.body.parts.size(); ++part)
+    if (work.body.surface.part_source[part] == index) part_of_solid.push_back(part);
+  if (part_of_solid.size() != tree.solids)
+    throw InputError(source.file,
+                     fmt::format("holds {} solids where the body has {} parts of it: write a mesh instead",
+                                 tree.solids, part_of_solid.size()));
+  deform_nodes(work, tree.roots, TopLoc_Location(), tree.unit, part_of_solid, source.file);
+  return tree;
+}
+
+// What was written has to be what was meant: as many solids, valid ones.
+void read_again(CadWritten& written, const std::string& format, double unit) {
+  CadReadJob job;
+  job.format = format;
+  job.bytes = written.file;
+  job.where = job.file = "the file written";
+  job.unit = unit;
+  const CadShape back = read_shape(job, {});
+  const std::vector<TopoDS_Shape> solids = solids_of(*back.shape, job.where);
+  if (solids.size() != written.solids)
+    throw InputError(
+        fmt::format("the {} file, read again, holds {} solids instead of {}: write another format", format,
+                    solids.size(), written.solids));
+  for (const TopoDS_Shape& solid : solids)
+    if (!BRepCheck_Analyzer(solid).IsValid() && written.invalid.empty())
+      written.invalid.emplace_back("a solid, read again");
+}
+
+}  // namespace
+
+CadWritten write_deformed(const CadWriteJob& job) {
+  Work work(read_body(job.body, "the body"), job);
+  std::vector<CadTree> trees;
+  for (std::uint32_t s = 0; s < work.body.surface.sources.size(); ++s)
+    trees.push_back(deformed_source(work, s));
+  if (trees.empty()) throw InputError("the body carries no surface: its part is not known");
+  work.written.file = write_tree(trees, job.format);
+  read_again(work.written, job.format, trees.front().unit);
+  return std::move(work.written);
+}
+
+}  // namespace flexel::cad

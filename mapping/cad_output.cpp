@@ -1,0 +1,149 @@
+// flexel-cad does the work (cad/deform); here its answer is put into words.
+#include "mapping/cad_output.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/available_memory.h"
+#include "base/error.h"
+#include "base/files/output_file.h"
+#include "base/human.h"
+#include "base/parallel.h"
+#include "base/units.h"
+#include "formats/cad/cad_job.h"
+#include "formats/common/file_formats.h"
+#include "formats/lattice/body_file.h"
+
+namespace flexel::mapping {
+namespace {
+
+constexpr double kTolerance = 1e-4;    // of the diagonal, where none is given
+constexpr double kVolumeShare = 1e-3;  // by which the volumes of the faces and of the triangles may go apart
+
+// m; a share of the diagonal of all parts together, or a length.
+double tolerance_of(const std::string& text, const Body& body) {
+  double share = kTolerance;
+  if (!text.empty() && !is_number(text, share)) return parse_quantity(text, Dimension::length);
+  return share * bounding_box(body.surface.vertices).diagonal();
+}
+
+void check_tolerance(const std::string& text) {
+  if (text.empty()) return;
+  double value = 0;
+  const bool share = is_number(text, value);
+  if (!share) value = parse_quantity(text, Dimension::length);
+  if (!(value > 0) || !std::isfinite(value) || (share && value >= 1))
+    throw InputError(fmt::format(
+        "--tolerance: \"{}\" is neither a share of the diagonal (1e-4) nor a length (10um)", text));
+}
+
+// "a, b, c and 12 others".
+std::string some_of(const std::vector<std::string>& names) {
+  constexpr std::size_t kShown = 3;
+  if (names.size() <= kShown) return fmt::format("{}", fmt::join(names, ", "));
+  return fmt::format("{} and {} others", fmt::join(names.begin(), names.begin() + kShown, ", "),
+                     names.size() - kShown);
+}
+
+// What is wrong with it, a line each.
+std::vector<std::string> faults(const CadWritten& written, const MapReport& found) {
+  std::vector<std::string> lines;
+  if (!written.folded.empty())
+    lines.push_back(fmt::format("the deformation turns space inside out at {}: their faces are folded",
+                                some_of(written.folded)));
+  if (!written.missed.empty()) {
+    std::vector<std::string> names;
+    for (const CadFace& face : written.missed)
+      names.push_back(fmt::format("{} ({})", face.name, human_length(face.deviation)));
+    lines.push_back(fmt::format(
+        "{} not within the tolerance of {}: {}; a larger --tolerance, or a finer --size, may do",
+        names.size() == 1 ? "a face is" : "faces are", human_length(written.tolerance), some_of(names)));
+  }
+  std::vector<std::string> newly;
+  for (const std::string& name : written.invalid)
+    if (std::find(written.invalid_before.begin(), written.invalid_before.end(), name) ==
+        written.invalid_before.end())
+      newly.push_back(name);
+  if (!newly.empty())
+    lines.push_back(
+        fmt::format("OpenCASCADE's check finds {} not valid: look at it in your CAD program, or write a "
+                    "mesh (STL, OBJ, ...)",
+                    some_of(newly)));
+  if (!written.invalid_before.empty())
+    lines.push_back(fmt::format("OpenCASCADE's check finds {} not valid, as it was in the file read",
+                                some_of(written.invalid_before)));
+  const SurfaceQuality& mesh = found.quality;
+  const double faces = written.volume / written.volume_before,
+               triangles = mesh.volume_after / mesh.volume_before;
+  if (std::isfinite(triangles) && found.valid() && std::abs(faces - triangles) > kVolumeShare)
+    lines.push_back(
+        fmt::format("the volume of the faces changed by {:.2f} %, that of the mapped triangles by {:.2f} %",
+                    100 * (faces - 1), 100 * (triangles - 1)));
+  return lines;
+}
+
+ChildLimits limits_of(const Body& body) {
+  double bytes = 0;
+  for (const SurfaceSource& source : body.surface.sources) bytes += static_cast<double>(source.bytes.size());
+  const double seconds = 600 + 1e-3 * bytes;
+  ChildLimits limits;
+  limits.processor = seconds * static_cast<double>(thread_count());
+  limits.wall = 3 * seconds;
+  limits.memory = .8 * available_memory();
+  return limits;
+}
+
+}  // namespace
+
+void check_cad_output(const MapArguments& arguments, const CrackOptions& crack, bool any_cad) {
+  check_tolerance(arguments.tolerance);
+  if (!any_cad) {
+    if (!arguments.tolerance.empty())
+      throw InputError("--tolerance is for STEP, IGES and BREP: meshes have the vertices of the part itself");
+    return;
+  }
+  if (crack.mode != CrackMode::keep)
+    throw InputError("--crack: STEP, IGES and BREP keep the faces of the part: write a mesh (STL, OBJ, ...)");
+  if (arguments.attributes)
+    throw InputError("--attributes: STEP, IGES and BREP have no vertices: write .vtu or PLY");
+}
+
+void write_cad(const Body& body, const MapReport& found, const MapArguments& arguments,
+               const MapOptions& options, const MapOutput& output, Progress& progress) {
+  const std::string title(output.format->file->title);
+  for (const SurfaceSource& source : body.surface.sources)
+    if (!is_cad(source) || source.bytes.empty())
+      throw InputError(source.file,
+                       fmt::format("has no CAD faces that {} could hold: write a mesh (STL, OBJ, ...), or "
+                                   "start from a STEP, IGES or BREP file",
+                                   title));
+  if (found.crack.spanning_triangles > 0)
+    throw InputError(fmt::format(
+        "the part broke, and {} keeps its faces whole: write a mesh, with --crack open or cap", title));
+  CadWriteJob job;
+  job.body = body_bytes(body);
+  job.format = output.format->file->name;
+  job.method = name_of(options.method);
+  job.scale = output.scale;
+  job.tolerance = tolerance_of(arguments.tolerance, body);
+  job.threads = thread_count();
+  const std::string where = body.surface.sources.empty() ? "the body" : body.surface.sources.front().file;
+  const CadWritten written =
+      run_job(job, limits_of(body), where, [&](const std::string& line) { progress.warn(line); });
+  const std::vector<std::string> wrong = faults(written, found);
+  if (arguments.strict && !wrong.empty()) throw InvalidMappingError(wrong.front());
+  for (const std::string& line : wrong) progress.warn(line);
+  OutputFile file(output.path);
+  file.write(written.file.data(), written.file.size());
+  file.commit();
+  progress.say(fmt::format("{}: {} of {}, {} as before, the others within {} of the deformation{}; {}", title,
+                           counted(written.solids, "solid"), counted(written.faces, "face"), written.kept,
+                           human_length(written.deviation),
+                           written.deviation_face.empty() ? "" : " (" + written.deviation_face + ")",
+                           written.invalid.empty() ? "valid, also when read again" : "not valid"));
+}
+
+}  // namespace flexel::mapping
