@@ -20,14 +20,21 @@
 namespace flexel::mapping {
 namespace {
 
-constexpr double kTolerance = 1e-4;    // of the diagonal, where none is given
+constexpr double kTolerance = 1e-4;       // of the diagonal, where none is given
+constexpr double kLeastTolerance = 1e-7;  // of the diagonal: below it OpenCASCADE takes points for one
 constexpr double kVolumeShare = 1e-3;  // by which the volumes of the faces and of the triangles may go apart
 
 // m; a share of the diagonal of all parts together, or a length.
 double tolerance_of(const std::string& text, const Body& body) {
+  const double diagonal = bounding_box(body.surface.vertices).diagonal();
   double share = kTolerance;
-  if (!text.empty() && !is_number(text, share)) return parse_quantity(text, Dimension::length);
-  return share * bounding_box(body.surface.vertices).diagonal();
+  if (!text.empty() && !is_number(text, share)) share = parse_quantity(text, Dimension::length) / diagonal;
+  if (share < kLeastTolerance)
+    throw InputError(
+        fmt::format("--tolerance: faces cannot be told apart below {:g} of the part's diagonal, {}: give "
+                    "more",
+                    kLeastTolerance, human_length(kLeastTolerance * diagonal)));
+  return share * diagonal;
 }
 
 void check_tolerance(const std::string& text) {
@@ -129,6 +136,7 @@ void write_cad(const Body& body, const MapReport& found, const MapArguments& arg
   job.method = name_of(options.method);
   job.scale = output.scale;
   job.tolerance = tolerance_of(arguments.tolerance, body);
+  job.volume = found.quality.volume_after / found.quality.volume_before;
   job.threads = thread_count();
   const std::string where = body.surface.sources.empty() ? "the body" : body.surface.sources.front().file;
   const CadWritten written =

@@ -33,6 +33,8 @@ namespace flexel::cad {
 namespace {
 
 constexpr std::uint32_t kNoFace = 0xffffffffu;
+constexpr double kFitShare =
+    0.75;  // of the tolerance: between the points that a fit looks at its error is larger
 
 // What one job works on.
 struct Work {
@@ -41,6 +43,7 @@ struct Work {
   FacePolygons polygons;
   std::vector<std::uint32_t> first_face;  // (parts) of Surface::faces
   double tolerance = 0;                   // m
+  double expected_volume = 1;             // of the mapped triangles, beside that at rest
   CadWritten written;
 
   Work(Body deformed, const CadWriteJob& job)
@@ -53,6 +56,7 @@ struct Work {
       if (first == kNoFace) first = f;
     }
     tolerance = job.tolerance;
+    expected_volume = job.volume;
     written.tolerance = tolerance;
   }
 };
@@ -171,10 +175,24 @@ FaceCheck check_face(const DeformedGeometry& geometry, std::size_t i, const Node
   return found;
 }
 
-double volume_of(const TopoDS_Shape& shape) {
+// OpenCASCADE's quick rule is good to some 1e-4 on most faces; with a tolerance it takes several times as long.
+double volume_of(const TopoDS_Shape& shape, bool exactly) {
+  constexpr double kExact = 1e-4;
   GProp_GProps properties;
-  BRepGProp::VolumeProperties(shape, properties);
+  exactly ? static_cast<void>(BRepGProp::VolumeProperties(shape, properties, kExact))
+          : BRepGProp::VolumeProperties(shape, properties);
   return std::abs(properties.Mass());
+}
+
+struct Volumes {
+  double before = 0, after = 0;
+};
+Volumes volumes_of(const TopoDS_Shape& before, const TopoDS_Shape& after, double expected) {
+  constexpr double kClose = 5e-4;
+  Volumes volumes{volume_of(before, false), volume_of(after, false)};
+  if (std::abs(volumes.after / volumes.before - expected) > kClose)
+    volumes = {volume_of(before, true), volume_of(after, true)};
+  return volumes;
 }
 
 // Faces without a surface, misses, folds.
@@ -217,8 +235,9 @@ void judge_solids(Work& work, const CadNode& node, const TopoDS_Shape& after,
       work.written.invalid.push_back(name);
       if (!BRepCheck_Analyzer(old_solid.Current()).IsValid()) work.written.invalid_before.push_back(name);
     }
-    work.written.volume += unit * unit * unit * volume_of(new_solid.Current());
-    work.written.volume_before += unit * unit * unit * volume_of(old_solid.Current());
+    const Volumes volumes = volumes_of(old_solid.Current(), new_solid.Current(), work.expected_volume);
+    work.written.volume += unit * unit * unit * volumes.after;
+    work.written.volume_before += unit * unit * unit * volumes.before;
     new_solid.Next();
   }
 }
@@ -228,7 +247,7 @@ void deform_node(Work& work, CadNode& node, const TopLoc_Location& here, double 
   const NodeMap map(work, here.Transformation(), unit, places_of(work, node, part_of_solid, where));
   const std::uint32_t part = node.solids.empty() ? 0 : part_of_solid[node.solids.front()];
   FitOptions options;
-  options.tolerance = 0.5 * work.tolerance / unit;
+  options.tolerance = kFitShare * work.tolerance / unit;
   options.spacing = work.body.parts[part].lattice.spacing.minCoeff() / unit;
   const ShapeMap shape_map{[&](std::size_t face) { return map.of_face(face); },
                            [&] { return map.elsewhere(); }};
@@ -289,9 +308,16 @@ void read_again(CadWritten& written, const std::string& format, double unit) {
     throw InputError(
         fmt::format("the {} file, read again, holds {} solids instead of {}: write another format", format,
                     solids.size(), written.solids));
-  for (const TopoDS_Shape& solid : solids)
+  double volume = 0;  // m^3
+  for (const TopoDS_Shape& solid : solids) {
+    volume += back.unit * back.unit * back.unit * volume_of(solid, false);
     if (!BRepCheck_Analyzer(solid).IsValid() && written.invalid.empty())
       written.invalid.emplace_back("a solid, read again");
+  }
+  if (std::abs(volume - written.volume) > 5e-3 * written.volume)
+    throw InputError(
+        fmt::format("the {} file, read again, encloses {:.6g} m^3 instead of {:.6g}: write another format",
+                    format, volume, written.volume));
 }
 
 }  // namespace

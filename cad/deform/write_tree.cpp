@@ -17,6 +17,7 @@
 #include <Interface_Static.hxx>
 #include <Message.hxx>
 #include <Message_Messenger.hxx>
+#include <STEPCAFControl_Controller.hxx>
 #include <STEPCAFControl_Writer.hxx>
 #include <Standard_Failure.hxx>
 #include <StepData_StepModel.hxx>
@@ -88,11 +89,16 @@ class DocumentWriter {
       label = shapes_->NewShape();
       for (const CadNode& child : node.children) {
         const TDF_Label component = shapes_->AddComponent(label, add(child), child.location);
-        dress(component, child.instance_name, child.instance_style);
+        dress(component, child.instance_name.IsEmpty() ? name_of(child) : child.instance_name,
+              child.instance_style);
       }
     }
-    dress(label, node.name, node.style);
+    dress(label, name_of(node), node.style);
     return label;
+  }
+  // OpenCASCADE's writer of IGES follows the names of all products and uses without looking whether there are any.
+  static TCollection_ExtendedString name_of(const CadNode& node) {
+    return node.name.IsEmpty() ? TCollection_ExtendedString("part") : node.name;
   }
   void dress(const TDF_Label& label, const TCollection_ExtendedString& name, const ShapeStyle& style) {
     constexpr std::array<XCAFDoc_ColorType, 3> kTypes = {XCAFDoc_ColorGen, XCAFDoc_ColorSurf,
@@ -116,10 +122,12 @@ const char* schema_name(const std::string& schema) {
 }
 
 Bytes write_step(const CadTree& style, const Handle(TDocStd_Document) & document) {
-  STEPCAFControl_Writer writer;
-  Interface_Static::SetCVal("write.step.schema", schema_name(style.schema));  // known once there is a writer
+  STEPCAFControl_Controller::Init();  // knows the settings that follow
+  Interface_Static::SetCVal("xstep.cascade.unit", "MM");
+  Interface_Static::SetCVal("write.step.schema", schema_name(style.schema));
   Interface_Static::SetCVal("write.step.unit", style.length_unit.empty() ? "MM" : style.length_unit.c_str());
   Interface_Static::SetIVal("write.stepcaf.subshapes.name", 1);
+  STEPCAFControl_Writer writer;
   writer.SetColorMode(Standard_True);
   writer.SetNameMode(Standard_True);
   writer.SetLayerMode(Standard_True);

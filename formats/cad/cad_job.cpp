@@ -31,6 +31,7 @@ static void visit(Archive& archive, CadWriteJob& job) {
   visit(archive, job.method);
   visit(archive, job.scale);
   visit(archive, job.tolerance);
+  visit(archive, job.volume);
   visit(archive, job.threads);
 }
 

@@ -38,6 +38,7 @@ struct CadWriteJob {
   std::string method;    // of the mapping
   double scale = 1;      // of the displacements
   double tolerance = 0;  // m, that surfaces may miss the deformation by
+  double volume = 1;     // of the mapped triangles, beside that at rest; nan: not known
   std::uint64_t threads = 1;
 };
 

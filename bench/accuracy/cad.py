@@ -1,0 +1,165 @@
+#!/usr/bin/python3
+"""STEP in, the same STEP out: bends parts by 20 % of their size and has gmsh mesh what is written. Writes docs/measurements/cad.md.
+
+    PATH=build/release/bin:$PATH bench/accuracy/cad.py [--parts ../shared/parts] [--held-out FOLDER] [-o FILE] [NAME ...]
+
+Each part is cut into some 6,000 cells, held over 6 % of its longest side at one end, and moved across by 20 % of that side at the other.
+`flexel-map -o bent.step` writes its faces; gmsh meshes the part and the result with tetrahedra of one size. Volumes: by how much that of gmsh's mesh changed, and
+that of the mapped triangles (`flexel-map --report`). Seconds: flexel-map, reading and mapping included, two threads. With names only
+these parts run, and nothing is written.
+"""
+
+import argparse
+import json
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import time
+
+import meshio
+import numpy
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+CELLS = 6000
+END, BEND = .06, .2  # shares of the longest side
+GMSH_SECONDS = 120
+
+
+def run(*words, cwd, seconds=600):
+    """(exit code, stderr, wall s); 124 after `seconds`."""
+    before = time.monotonic()
+    try:
+        done = subprocess.run([str(word) for word in words], capture_output=True, text=True, cwd=cwd, timeout=seconds)
+    except subprocess.TimeoutExpired:
+        return 124, "out of time", seconds
+    return done.returncode, done.stderr, time.monotonic() - before
+
+
+def box_of(part, cwd):
+    text = subprocess.run(["flexel", "info", str(part)], capture_output=True, text=True, cwd=cwd, check=True).stdout
+    number = r"([-+\d.e]+)"
+    corners = re.findall(rf"from \({number}, {number}, {number}\) to \({number}, {number}, {number}\)", text)
+    low = [min(float(each[i]) for each in corners) for i in range(3)]
+    return low, [max(float(each[i + 3]) for each in corners) for i in range(3)]
+
+
+def scene_of(low, high):
+    size = [b - a for a, b in zip(low, high)]
+    long, short = size.index(max(size)), size.index(min(size))
+    diagonal = sum(each * each for each in size) ** .5
+
+    def box(begin, end):
+        at = lambda shares: ", ".join(f'"{value:.9g} mm"' for value in shares)
+        lower = [low[i] - diagonal if i != long or begin == 0 else low[i] + begin * size[i] for i in range(3)]
+        upper = [high[i] + diagonal if i != long or end == 1 else low[i] + end * size[i] for i in range(3)]
+        return f"{{ box = {{ min = [{at(lower)}], max = [{at(upper)}] }} }}"
+
+    move = ", ".join(f'"{BEND * size[long] if i == short else 0:.9g} mm"' for i in range(3))
+    return (f'material = "rubber"\n[[fix]]\nwhere = {box(0, END)}\n'
+            f"[[move]]\nwhere = {box(1 - END, 1)}\ndisplacement = [{move}]\n"), max(size), diagonal
+
+
+def tet_volume(step, size, cwd):
+    """Volume of gmsh's tetrahedra, mm^3; None and why where there are none."""
+    geo, mesh = cwd / "mesh.geo", cwd / "mesh.msh"
+    geo.write_text(f'SetFactory("OpenCASCADE"); Merge "{step}"; Mesh.MeshSizeMax = {size}; Mesh.MeshSizeFromCurvature = 12;\n')
+    mesh.unlink(missing_ok=True)
+    code, said, _ = run("gmsh", "-3", geo, "-o", mesh, "-format", "msh2", "-v", "1", cwd=cwd, seconds=GMSH_SECONDS)
+    if code != 0:
+        return None, "out of time" if code == 124 else (said.strip().splitlines() or ["fails"])[0]
+    read = meshio.read(mesh)
+    tets = [block.data for block in read.cells if block.type == "tetra"]
+    if not tets:
+        return None, "no tetrahedra"
+    p = read.points[numpy.concatenate(tets)]
+    return abs(numpy.einsum("ij,ij->i", numpy.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), p[:, 3] - p[:, 0])).sum() / 6, ""
+
+
+def measure(part, cwd):
+    """A row: what happened to one part."""
+    row = {"part": part.name}
+    scene, longest, diagonal = scene_of(*box_of(part, cwd))
+    (cwd / "scene.toml").write_text(scene)
+    code, said, _ = run("flexel-voxelize", part, "--count", CELLS, "-o", "rest.vtu", "--quiet", cwd=cwd)
+    if code == 0:
+        code, said, _ = run("flexel-simulate", "scene.toml", "rest.vtu", "-o", "bent.vtu", "--no-estimate", cwd=cwd)
+    if code != 0:
+        return {**row, "why": said.strip().splitlines()[-1]}
+    (cwd / "bent.step").unlink(missing_ok=True)
+    code, said, row["seconds"] = run("flexel-map", "bent.vtu", "-o", "bent.step", "--report", "report.json", "--threads", 2, cwd=cwd)
+    if code != 0:
+        return {**row, "why": said.strip().splitlines()[-1]}
+    row["warnings"] = [line.split("warning: ")[1] for line in said.splitlines() if "warning: " in line]
+    told = re.search(r"STEP: (\d+) solids? of (\d+) faces?, (\d+) as before, the others within (\S+ \S+) of the deformation.*; (.*)", said)
+    row["solids"], row["faces"], row["kept"] = (int(told[i]) for i in (1, 2, 3))
+    row["deviation"], row["valid"], row["tolerance"] = told[4], told[5].startswith("valid"), 1e-4 * diagonal
+    row["size"] = (cwd / "bent.step").stat().st_size / part.stat().st_size
+    quality = json.loads((cwd / "report.json").read_text())
+    row["triangles"] = quality["volume_after"] / quality["volume_before"] - 1
+    before, why_before = tet_volume(part, longest / 15, cwd)
+    after, why_after = tet_volume(cwd / "bent.step", longest / 15, cwd)
+    row["gmsh_before"], row["gmsh"] = why_before or "yes", why_after or "yes"
+    if before and after:
+        row["tets"] = after / before - 1
+    return row
+
+
+def line_of(row):
+    if "why" in row:
+        return f"| {row['part']} | | | | | | | | | {row['why']} |"
+    percent = lambda name: f"{100 * row[name]:+.2f} %" if name in row else ""
+    return (f"| {row['part']} | {row['solids']} | {row['faces']} ({row['kept']}) | {row['deviation']} | {1e3 * row['tolerance']:.3g} um | "
+            f"{'yes' if row['valid'] else 'no'} | {row['gmsh']}{'' if row['gmsh_before'] == 'yes' else ' (the part itself: ' + row['gmsh_before'] + ')'} | "
+            f"{percent('tets')} / {percent('triangles')} | {row['seconds']:.1f} s, x {row['size']:.1f} | {'; '.join(row['warnings'])} |")
+
+
+def page(rows, groups):
+    done = [row for row in rows if "why" not in row]
+    valid = sum(row["valid"] for row in done)
+    meshed = sum(row["gmsh"] == "yes" for row in done)
+    meshable = sum(row["gmsh_before"] == "yes" for row in done)
+    seconds = sorted(row["seconds"] for row in done)
+    apart = sorted(abs(row["tets"] - row["triangles"]) for row in done if "tets" in row)
+    lines = ["# STEP in, the same STEP out", "", "Written by `bench/accuracy/cad.py`: do not edit.", "",
+             " ".join(__doc__.split("\n\n", 2)[2].split()), "",
+             f"{len(done)} of {len(rows)} parts were bent. OpenCASCADE's check finds {valid} valid, written and read again; gmsh meshes {meshed} of them, and {meshable} "
+             f"of the parts as they were. The volumes of gmsh's meshes and of the mapped triangles changed by the same to {100 * apart[len(apart) // 2]:.3f} % (median; "
+             f"largest {100 * apart[-1]:.2f} %). Median {seconds[len(seconds) // 2]:.1f} s, longest {seconds[-1]:.1f} s.", ""]
+    for title, group in groups:
+        lines += [f"## {title}", "", "| part | solids | faces (kept as they were) | farthest from the deformation | tolerance | valid | gmsh meshes it | "
+                  "volume: gmsh / triangles | time, file size | warnings |", "|---|---|---|---|---|---|---|---|---|---|", *map(line_of, group), ""]
+    return "\n".join(lines)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--parts", type=pathlib.Path, default=ROOT / "../shared/parts")
+    parser.add_argument("--held-out", type=pathlib.Path, help="parts that nothing was tuned to")
+    parser.add_argument("-o", "--output", type=pathlib.Path, default=ROOT / "docs/measurements/cad.md")
+    parser.add_argument("names", nargs="*")
+    arguments = parser.parse_args()
+    groups = []
+    for title, folder in (("Parts of ../shared/parts", arguments.parts), ("Held-out parts", arguments.held_out)):
+        if folder is None or not folder.is_dir():
+            continue
+        found = sorted(path.resolve() for path in folder.iterdir() if path.suffix.lower() in (".step", ".stp"))
+        rows = []
+        for part in found:
+            if arguments.names and part.name not in arguments.names:
+                continue
+            with tempfile.TemporaryDirectory() as scratch:
+                try:
+                    rows.append(measure(part, pathlib.Path(scratch)))
+                except subprocess.CalledProcessError as error:
+                    rows.append({"part": part.name, "why": error.stderr.strip().splitlines()[-1]})
+            print(line_of(rows[-1]), file=sys.stderr, flush=True)
+        groups.append((title, rows))
+    if arguments.names:
+        return
+    arguments.output.write_text(page([row for _, rows in groups for row in rows], groups))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,144 @@
+// Solids deformed by maps that are known: valid, as many faces, where the map says, and of the volume that it says.
+#include "cad/deform/deform_shape.h"
+
+#include <gtest/gtest.h>
+
+#include <BRepAlgoAPI_Cut.hxx>
+#include <BRepCheck_Analyzer.hxx>
+#include <BRepGProp.hxx>
+#include <BRepMesh_IncrementalMesh.hxx>
+#include <BRepPrimAPI_MakeBox.hxx>
+#include <BRepPrimAPI_MakeCone.hxx>
+#include <BRepPrimAPI_MakeCylinder.hxx>
+#include <BRepPrimAPI_MakeSphere.hxx>
+#include <BRepPrimAPI_MakeTorus.hxx>
+#include <BRep_Tool.hxx>
+#include <GProp_GProps.hxx>
+#include <Geom_CylindricalSurface.hxx>
+#include <Geom_Plane.hxx>
+#include <Poly_Triangulation.hxx>
+#include <TopExp.hxx>
+#include <TopExp_Explorer.hxx>
+#include <TopoDS.hxx>
+#include <TopoDS_Face.hxx>
+#include <cmath>
+
+namespace flexel::cad {
+namespace {
+
+double volume(const TopoDS_Shape& shape) {
+  GProp_GProps properties;
+  BRepGProp::VolumeProperties(shape, properties, 1e-7);
+  return properties.Mass();
+}
+
+// About the z axis, by an angle that grows along it: keeps the volume.
+gp_XYZ twist(const gp_XYZ& p) {
+  const double c = std::cos(0.03 * p.Z()), s = std::sin(0.03 * p.Z());
+  return {c * p.X() - s * p.Y(), s * p.X() + c * p.Y(), p.Z()};
+}
+gp_XYZ shear(const gp_XYZ& p) {
+  return {p.X() + 0.004 * p.Z() * p.Z(), p.Y() + 3 * std::sin(0.05 * p.X()), p.Z()};
+}
+
+ShapeMap same_everywhere(const PointMap& map) {
+  return {[map](std::size_t) { return map; }, [map] { return map; }};
+}
+
+struct Sample {
+  const char* name;
+  TopoDS_Shape shape;
+};
+
+std::vector<Sample> samples() {
+  const TopoDS_Shape box = BRepPrimAPI_MakeBox(60, 20, 12).Shape();
+  const TopoDS_Shape drilled =
+      BRepAlgoAPI_Cut(box, BRepPrimAPI_MakeCylinder(gp_Ax2(gp_Pnt(30, 10, -1), gp::DZ()), 5, 20).Shape())
+          .Shape();
+  return {{"box", box},
+          {"drilled box", drilled},
+          {"cylinder", BRepPrimAPI_MakeCylinder(8, 50).Shape()},
+          {"sphere", BRepPrimAPI_MakeSphere(20).Shape()},     // poles
+          {"cone", BRepPrimAPI_MakeCone(15, 0, 40).Shape()},  // an apex
+          {"torus", BRepPrimAPI_MakeTorus(30, 8).Shape()}};   // two seams
+}
+
+constexpr double kTolerance = 5e-4;
+
+TEST(DeformShape, SolidsStayValidAndKeepTheirVolume) {
+  for (const auto& [name, shape] : samples())
+    for (const PointMap& map : {PointMap(twist), PointMap(shear)}) {
+      const DeformedGeometry geometry(shape, same_everywhere(map), {kTolerance, 5});
+      const DeformedShape deformed = deform_shape(shape, geometry);
+      EXPECT_TRUE(BRepCheck_Analyzer(deformed.shape).IsValid()) << name;
+      EXPECT_NEAR(volume(deformed.shape) / volume(shape), 1, 3e-5) << name;
+      TopTools_IndexedMapOfShape before, after;
+      TopExp::MapShapes(shape, TopAbs_FACE, before);
+      TopExp::MapShapes(deformed.shape, TopAbs_FACE, after);
+      ASSERT_EQ(before.Extent(), after.Extent()) << name;
+      for (Standard_Integer f = 1; f <= before.Extent(); ++f) {
+        EXPECT_TRUE(geometry.face(f - 1).reached) << name << ' ' << f;
+        EXPECT_TRUE(deformed.image(before(f)).IsSame(after(f))) << name << ' ' << f;
+      }
+    }
+}
+
+// At points of our own in every face; the parameters stay.
+TEST(DeformShape, FacesAreWhereTheMapSays) {
+  for (const auto& [name, shape] : samples()) {
+    const DeformedGeometry geometry(shape, same_everywhere(twist), {kTolerance, 5});
+    for (Standard_Integer f = 1; f <= geometry.faces().Extent(); ++f) {
+      const Handle(Geom_Surface) before = BRep_Tool::Surface(TopoDS::Face(geometry.faces()(f)));
+      const DeformedFace& face = geometry.face(f - 1);
+      const FaceDomain& d = face.domain;
+      for (double a = 0.0153; a < 1; a += 0.071)
+        for (double b = 0.0327; b < 1; b += 0.083) {
+          const double u = d.u_begin + a * (d.u_end - d.u_begin), v = d.v_begin + b * (d.v_end - d.v_begin);
+          EXPECT_LT((face.surface->Value(u, v).XYZ() - twist(before->Value(u, v).XYZ())).Modulus(),
+                    1.2 * kTolerance)
+              << name << ' ' << f;
+        }
+    }
+  }
+}
+
+TEST(DeformShape, ARigidMotionKeepsPlanesAndCylinders) {
+  gp_Trsf turn;
+  turn.SetRotation(gp_Ax1(gp_Pnt(3, 2, 1), gp_Dir(1, 2, 3)), 0.8);
+  const auto rigid = [turn](const gp_XYZ& p) {
+    gp_XYZ moved = p;
+    turn.Transforms(moved);
+    return moved;
+  };
+  const TopoDS_Shape drilled = samples()[1].shape;
+  const DeformedGeometry geometry(drilled, same_everywhere(rigid), {kTolerance, 5});
+  std::size_t planes = 0, cylinders = 0;
+  for (Standard_Integer f = 0; f < geometry.faces().Extent(); ++f) {
+    EXPECT_TRUE(geometry.face(f).kept);
+    planes += geometry.face(f).surface->IsKind(STANDARD_TYPE(Geom_Plane));
+    cylinders += geometry.face(f).surface->IsKind(STANDARD_TYPE(Geom_CylindricalSurface));
+  }
+  EXPECT_EQ(planes, 6u);
+  EXPECT_EQ(cylinders, 1u);
+  const DeformedShape moved = deform_shape(drilled, geometry);
+  EXPECT_TRUE(BRepCheck_Analyzer(moved.shape).IsValid());
+  EXPECT_NEAR(volume(moved.shape) / volume(drilled), 1, 1e-9);
+}
+
+// OpenCASCADE meshes each face with the points of its edges: a face that it cannot mesh is left out without a word.
+TEST(DeformShape, EveryFaceCanBeMeshed) {
+  for (const auto& [name, shape] : samples()) {
+    const DeformedGeometry geometry(shape, same_everywhere(twist), {kTolerance, 5});
+    const TopoDS_Shape deformed = deform_shape(shape, geometry).shape;
+    const BRepMesh_IncrementalMesh mesh(deformed, 0.05);
+    for (TopExp_Explorer each(deformed, TopAbs_FACE); each.More(); each.Next()) {
+      TopLoc_Location location;
+      const auto triangles = BRep_Tool::Triangulation(TopoDS::Face(each.Current()), location);
+      ASSERT_FALSE(triangles.IsNull()) << name;
+      EXPECT_GT(triangles->NbTriangles(), 1) << name;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace flexel::cad

@@ -1,0 +1,223 @@
+"""STEP, IGES and BREP out: the part's own faces, deformed, read by other tools; and what is refused."""
+
+import json
+import math
+import os
+import pathlib
+import re
+import shutil
+
+from harness import (BIN, PARTS, Skip, body, bracket, expect, expect_error, expect_ok, expect_only, main, need, need_step, run, scene, shell, write)
+
+BEND = """material = "pla"
+[[fix]]
+where = "bracket/1"
+[[load]]
+where = "bracket/2"
+force = ["0 N", "0 N", "-1000 N"]
+"""
+
+
+def bent(name="bent.vtu", size="3mm", text=BEND, part=None):
+    """The bracket, its seat bent by some 30 mm, as a body."""
+    part = part or bracket()
+    scene(text=text)
+    expect_ok(run("flexel-voxelize", part, "--size", size, "-o", "rest.vtu", "--quiet"))
+    expect_ok(run("flexel-simulate", "scene.toml", "rest.vtu", "-o", name, "--no-estimate", "--quiet"))
+    return name
+
+
+def faces(part):
+    """(number, area in mm^2, name) of each face that `flexel info` shows."""
+    text = expect_ok(run("flexel", "info", part)).out.decode()
+    found = re.findall(r"^  \S+/(\d+) +([\d.]+)  \(.*?\) +(.*)$", text, re.M)
+    return [(int(number), float(area), (re.search(r'called "(.*)"', what) or [None, ""])[1]) for number, area, what in found]
+
+
+def volume(part):
+    return float(re.search(r"volume +([\d,.]+) mm", expect_ok(run("flexel", "info", part)).out.decode())[1].replace(",", ""))
+
+
+def vertices(step):
+    """Corners of the solid: the points of its VERTEX_POINTs, mm."""
+    text = pathlib.Path(step).read_text().replace("\n", "")
+    points = {number: tuple(map(float, at.split(","))) for number, at in re.findall(r"#(\d+) *= *CARTESIAN_POINT\('[^']*', *\(([^()]*)\)\)", text) if at.count(",") == 2}
+    return [points[number] for number in re.findall(r"VERTEX_POINT\('[^']*', *#(\d+)\)", text)]
+
+
+def test_the_same_faces_come_back_bent():
+    bent()
+    said = expect_ok(run("flexel-map", "bent.vtu", "-o", "bent.step", "--report", "report.json")).err
+    expect(re.search(r"STEP: 1 solid of 11 faces, \d+ as before, the others within .* of the deformation", said), said)
+    expect("valid, also when read again" in said, said)
+    before, after = faces("bracket.step"), faces("bent.step")
+    expect([each[0::2] for each in before] == [each[0::2] for each in after], f"numbers and names: {before} {after}")
+    report = json.loads(pathlib.Path("report.json").read_text())
+    changed = volume("bent.step") / volume("bracket.step")
+    expect(abs(changed - report["volume_after"] / report["volume_before"]) < 1e-3, f"volume: {changed} {report}")
+    expect(pathlib.Path("bent.step").read_text().count("AUTOMOTIVE_DESIGN") == pathlib.Path("bracket.step").read_text().count("AUTOMOTIVE_DESIGN"), "schema")
+
+
+def test_corners_are_where_points_go():
+    """flexel-map --points moves the corners without any CAD library."""
+    bent()
+    expect_ok(run("flexel-map", "bent.vtu", "-o", "bent.step", "--quiet"))
+    at_rest, moved = vertices("bracket.step"), vertices("bent.step")
+    write("corners.csv", "x,y,z\n" + "".join(f"{x!r},{y!r},{z!r}\n" for x, y, z in at_rest))
+    expect_ok(run("flexel-map", "bent.vtu", "--points", "corners.csv", "-o", "moved.csv", "--quiet"))
+    lines = pathlib.Path("moved.csv").read_text().splitlines()[1:]
+    wanted = [tuple(map(float, line.split(",")[:3])) for line in lines]
+    expect(len(wanted) == len(moved) and len(moved) >= 18, f"{len(wanted)} corners and {len(moved)}")
+    tolerance = 1e-4 * math.dist((0, 0, 0), (80, 40, 60))
+    for corner in wanted:
+        expect(min(math.dist(corner, each) for each in moved) < tolerance, f"no corner near {corner}")
+    expect(max(math.dist(a, b) for a, b in zip(at_rest, wanted)) > 10, "hardly anything moved")
+
+
+def test_gmsh_meshes_it():
+    need("gmsh")
+    import meshio
+    import numpy
+    bent()
+    expect_ok(run("flexel-map", "bent.vtu", "-o", "bent.step", "--report", "report.json", "--quiet"))
+    volumes = []
+    for name in ("bracket", "bent"):
+        write("mesh.geo", f'SetFactory("OpenCASCADE"); Merge "{name}.step"; Mesh.MeshSizeMax = 4; Mesh.MeshSizeFromCurvature = 30;\n')
+        expect_ok(run("gmsh", "-3", "mesh.geo", "-o", "mesh.msh", "-format", "msh2", "-v", "1"))
+        read = meshio.read("mesh.msh")
+        p = read.points[numpy.concatenate([block.data for block in read.cells if block.type == "tetra"])]
+        volumes.append(abs(numpy.einsum("ij,ij->i", numpy.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), p[:, 3] - p[:, 0])).sum() / 6)
+    report = json.loads(pathlib.Path("report.json").read_text())
+    expect(abs(volumes[1] / volumes[0] - report["volume_after"] / report["volume_before"]) < 1e-3, f"{volumes} {report['volume_after']}")
+
+
+def test_iges_and_brep_hold_the_same():
+    bent()
+    expect_ok(run("flexel-map", "bent.vtu", "-o", "bent.step", "--quiet"))
+    wanted = volume("bent.step")
+    for name in ("bent.igs", "bent.brep"):
+        expect_ok(run("flexel-map", "bent.vtu", "-o", name, "--quiet"))
+        expect(abs(volume(name) / wanted - 1) < 1e-4, f"{name}: {volume(name)} {wanted}")
+        expect(len(faces(name)) == 11, f"{name}: {faces(name)}")
+    expect([each[2] for each in faces("bent.igs")] == [each[2] for each in faces("bracket.step")], "names of faces in IGES")
+    for name in ("bent.igs", "bent.brep"):  # and they are sources in their turn
+        bent(part=name, text='material = "pla"\n[[fix]]\nwhere = "zmax"\n[[move]]\nwhere = "zmin"\ndisplacement = ["3 mm", "0 mm", "0 mm"]\n', name="again.vtu")
+        expect_ok(run("flexel-map", "again.vtu", "-o", "again." + name.rsplit(".")[1], "--quiet"))
+
+
+def test_a_pipe_carries_the_file():
+    bracket()
+    scene(text=BEND)
+    expect_ok(shell("flexel-voxelize bracket.step --size 4mm --quiet | flexel-simulate scene.toml --no-estimate --quiet | flexel-map --format step --quiet > bent.step"))
+    expect(len(faces("bent.step")) == 11, "faces")
+    expect_ok(shell("flexel deform bracket.step --fix bracket/1 --push 'bracket/2: 0 0 -1000 N' --material pla --size 4mm -o one.step -o one.stl --quiet"))
+    expect(len(faces("one.step")) == 11, "faces")
+
+
+def test_the_bytes_do_not_depend_on_threads_or_time():
+    bent()
+    for threads in (1, 2):
+        expect_ok(run("flexel-map", "bent.vtu", "-o", f"bent{threads}.step", "--threads", threads, "--quiet"))
+    expect(pathlib.Path("bent1.step").read_bytes() == pathlib.Path("bent2.step").read_bytes(), "bytes at 1 and 2 threads")
+
+
+def test_what_moves_as_one_stays_a_plane():
+    turned = 'material = "pla"\n[[move]]\nwhere = { box = { min = ["-1 m", "-1 m", "-1 m"], max = ["1 m", "1 m", "1 m"] } }\nrotation = { axis = [1, 2, 3], through = ["0 mm", "0 mm", "0 mm"], angle = "70 deg" }\n'
+    bent(text=turned)
+    said = expect_ok(run("flexel-map", "bent.vtu", "-o", "bent.step")).err
+    expect("11 faces, 11 as before" in said, said)
+    text = pathlib.Path("bent.step").read_text()
+    expect(text.count("CYLINDRICAL_SURFACE") == 3 and text.count(" PLANE") >= 8 and "B_SPLINE_SURFACE" not in text, "surfaces")
+
+
+def test_a_tolerance_is_kept_or_told():
+    bent()
+    size = {}
+    for tolerance in ("1e-3", "20um", "1e-6"):
+        said = expect_ok(run("flexel-map", "bent.vtu", "-o", "bent.step", "--tolerance", tolerance)).err
+        expect("warning" not in said, said)
+        size[tolerance] = os.path.getsize("bent.step")
+    expect(size["1e-3"] < size["1e-6"], f"sizes {size}")
+    expect_error(run("flexel-map", "bent.vtu", "-o", "bent.step", "--tolerance", "1e-9"), "flexel-map", "--tolerance", "diagonal")
+
+
+def test_a_folded_part_is_told_and_not_written_with_strict():
+    bent()
+    said = expect_ok(run("flexel-map", "bent.vtu", "-o", "folded.step", "--scale", "-40")).err
+    expect("turns space inside out at bracket/" in said, said)
+    refused = run("flexel-map", "bent.vtu", "-o", "bent.step", "--scale", "-40", "--strict")
+    expect_error(refused, "flexel-map", code=4)
+    expect(not pathlib.Path("bent.step").exists(), "a file in spite of --strict")
+
+
+def test_the_field_of_quadratic_cells():
+    bracket()
+    scene(text=BEND.replace('material', 'model = "quadratic"\nmaterial', 1).replace("-1000", "-100"))
+    expect_ok(run("flexel-voxelize", "bracket.step", "--size", "6mm", "--moments", "-o", "rest.vtu", "--quiet"))
+    expect_ok(run("flexel-simulate", "scene.toml", "rest.vtu", "-o", "bent.vtu", "--no-estimate", "--quiet"))
+    said = expect_ok(run("flexel-map", "bent.vtu", "-o", "bent.step")).err
+    expect("valid, also when read again" in said and "warning" not in said, said)
+    expect([each[2] for each in faces("bent.step")] == [each[2] for each in faces("bracket.step")], "names")
+
+
+def test_assemblies_keep_their_parts_and_colours():
+    need_step()
+    part = PARTS / "as1-oc-214.stp"
+    if not part.exists():
+        raise Skip("no real parts here")
+    text = 'material = "steel"\n[[fix]]\nwhere = "plate/zmin"\n[[move]]\nwhere = "rod/xmax"\ndisplacement = ["0 mm", "8 mm", "0 mm"]\n'
+    scene(text=text)
+    expect_ok(run("flexel-voxelize", part, "--count", "6000", "-o", "rest.vtu", "--quiet"))
+    expect_ok(run("flexel-simulate", "scene.toml", "rest.vtu", "-o", "bent.vtu", "--no-estimate", "--quiet"))
+    said = expect_ok(run("flexel-map", "bent.vtu", "-o", "bent.step")).err
+    expect("18 solids of 160 faces" in said and "valid, also" in said, said)
+    names = lambda step: re.findall(r'^part "(.*)"', expect_ok(run("flexel", "info", step)).out.decode(), re.M)
+    expect(names("bent.step") == names(part) and len(names(part)) == 18, f"parts: {names('bent.step')}")
+    before, after = part.read_text(errors="replace"), pathlib.Path("bent.step").read_text(errors="replace")
+    colours = lambda step: {tuple(round(float(each), 4) for each in rgb) for rgb in re.findall(r"COLOUR_RGB\('[^']*', *([\d.E+-]+), *([\d.E+-]+), *([\d.E+-]+)\)", step.replace("\n", ""))}
+    expect(colours(before) <= colours(after), f"colours {colours(before)} {colours(after)}")
+    for product in ("rod-assembly", "l-bracket-assembly", "nut-bolt-assembly"):
+        expect(f"'{product}'" in after, f"the assembly {product} is lost")
+
+
+def test_a_part_without_cad_faces_is_refused():
+    body()
+    for name in ("box.step", "box.igs", "box.brep"):
+        expect_error(run("flexel-map", "body.vtu", "-o", name), "flexel-map", "has no CAD faces", "write a mesh")
+    expect_only("body.vtu")
+
+
+def test_options_that_are_for_meshes_are_refused():
+    need_step()
+    bent()
+    map_step = ("flexel-map", "bent.vtu", "-o", "x.step")
+    expect_error(run(*map_step, "--crack", "cap"), "flexel-map", "--crack", "write a mesh")
+    expect_error(run(*map_step, "--attributes"), "flexel-map", "--attributes")
+    expect_error(run(*map_step, "--ascii"), "flexel-map", "--ascii")
+    expect_error(run(*map_step, "--unit", "inch"), "flexel-map", "--unit")
+    expect_error(run(*map_step, "--method", "gram-schmidt"), "flexel-map", "gram-schmidt", "blended")
+    expect_error(run(*map_step, "--onto", "bracket.step"), "flexel-map", "--onto")
+    for tolerance in ("0", "-1", "nan", "2", "3 kg", "soon"):
+        expect_error(run(*map_step, f"--tolerance={tolerance}"), "flexel-map")
+    expect_error(run("flexel-map", "bent.vtu", "-o", "x.stl", "--tolerance", "1e-4"), "flexel-map", "--tolerance")
+    expect(not list(pathlib.Path().glob("x.*")), "something was written")
+
+
+def test_a_missing_worker_is_one_line():
+    """flexel-cad is the one program that loads OpenCASCADE."""
+    bent()
+    os.mkdir("bin")
+    shutil.copy(BIN / "flexel-map", "bin/flexel-map")
+    shutil.copy(BIN / "flexel-voxelize", "bin/flexel-voxelize")
+    expect_error(run("./bin/flexel-map", "bent.vtu", "-o", "x.step"), "flexel-map", "flexel-cad", "install")
+    expect_error(run("./bin/flexel-voxelize", "bracket.step", "--size", "3mm", "-o", "x.vtu"), "flexel-voxelize", "flexel-cad")
+    expect_ok(run("./bin/flexel-map", "bent.vtu", "-o", "x.stl", "--quiet"))
+    os.mkdir("libexec"), os.mkdir("libexec/flexel")
+    os.symlink(BIN / "flexel-cad", "libexec/flexel/flexel-cad")
+    expect_ok(run("./bin/flexel-map", "bent.vtu", "-o", "x.step", "--quiet"))
+    alone = run("flexel-cad", stdin=b"no job")
+    expect(alone.code == 1 and "run by the other programs" in alone.err, str(alone))
+
+
+if __name__ == "__main__":
+    main(globals())
