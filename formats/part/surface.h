@@ -35,9 +35,9 @@ struct SurfaceSource {
   std::uint64_t hash = 0;   // content_hash of the file
   Bytes bytes;  // the file itself, for formats that are written again from it (OBJ, PLY, OFF, glTF,
                 // as one GLB); else empty
-  // Where the surface's vertices are not in the order of those in `bytes`: for each of the file's, the surface's.
-  std::vector<std::uint32_t> order;
   std::vector<std::byte> stl_header;  // the 80 bytes of a binary STL's header; else empty
+  // Where the surface's vertices are not in the order of those in `bytes`: for each of the file's, the surface's.
+  std::vector<std::uint32_t> order{};
 };
 
 struct Surface {
