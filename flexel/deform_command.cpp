@@ -489,6 +489,7 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
     progress.finish();
     say_report(mapped.report, arguments.map, plan.map, progress);
   }
+  if (!mapped.split_line.empty()) progress.say(mapped.split_line);
   const mapping::MapReport& found = mapped.report;
   std::vector<std::string> paths{arguments.map.report, arguments.summary};
   for (const Plan::Output& output : plan.outputs) paths.push_back(output.path);

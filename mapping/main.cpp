@@ -226,15 +226,16 @@ class Run {
   // Splits what is mapped and what is written, of all states alike.
   void split(Body& body, const Refinement& refinement) {
     if (!refinement.changes()) return;
-    const Surface& comes_out = foreign_ ? *foreign_ : body.surface;
-    std::optional<Surface> surface = split_surface(comes_out, refinement, plan_.refine, formats(), progress_);
-    if (!surface) return;
+    SplitSurface split =
+        split_surface(foreign_ ? *foreign_ : body.surface, refinement, plan_.refine, formats());
+    progress_.say(split.line);
+    if (!split.surface) return;
     split_from_ = triangle_count(body.surface);
     if (foreign_) {
       take_refined(body, refined(body.surface, refinement), refinement);
-      foreign_ = std::move(surface);
+      foreign_ = std::move(split.surface);
     } else {
-      take_refined(body, *std::move(surface), refinement);
+      take_refined(body, *std::move(split.surface), refinement);
     }
   }
 
@@ -315,6 +316,7 @@ void map_one(const Arguments& arguments, Plan& plan, Progress& progress) {
     MappedPart mapped =
         map_refined(body, plan.options, plan.crack, plan.refine, run.written(), run.formats(), progress);
     const Surface& surface = mapped.surface(body);
+    if (!mapped.split_line.empty()) progress.say(mapped.split_line);
     if (run.foreign() && mapped.refined) run.write_instead(*mapped.refined);
     return run.finish(surface, body, mapped.result, mapped.report, arguments.output);
   }

@@ -75,47 +75,50 @@ std::size_t triangle_count(const Surface& surface) {
   return surface.polygon_vertices.size() - 2 * surface.polygon_count();
 }
 
-std::optional<Surface> split_surface(const Surface& surface, const Refinement& refinement,
-                                     const RefineOptions& options, std::span<const SurfaceFormat> formats,
-                                     Progress& progress) {
-  std::optional<Surface> split;
+SplitSurface split_surface(const Surface& surface, const Refinement& refinement, const RefineOptions& options,
+                           std::span<const SurfaceFormat> formats) {
+  SplitSurface split;
   try {
-    split = refined_with_file(surface, refinement, formats);
+    split.surface = refined_with_file(surface, refinement, formats);
   } catch (const InputError& error) {
     if (options.asked) throw;
-    progress.say(
-        fmt::format("the triangles are too large for this deformation and were not split: {}", error.what()));
+    split.line = fmt::format("the triangles are too large for this deformation and were not split: {}: {}",
+                             error.where(), error.what());
     return split;
   }
-  const std::string counts = fmt::format("{} triangles became {}", human_count(triangle_count(surface)),
-                                         human_count(triangle_count(*split)));
-  if (options.mode == RefineOptions::Mode::to_edge)
-    progress.say(fmt::format("{}, with edges of at most {}", counts, human_length(options.edge)));
-  else
-    progress.say(fmt::format(
-        "{}: they were split where they stay flat and the part bends (--keep-vertices leaves them whole)",
-        counts));
+  split.line = fmt::format("{} triangles became {}", human_count(triangle_count(surface)),
+                           human_count(triangle_count(*split.surface)));
+  split.line +=
+      options.mode == RefineOptions::Mode::to_edge
+          ? fmt::format(", with edges of at most {}", human_length(options.edge))
+          : ": they were split where they stay flat and the part bends (--keep-vertices leaves them whole)";
   return split;
 }
 
 MappedPart map_refined(Body& body, const MapOptions& options, const CrackOptions& crack,
                        const RefineOptions& refine, const Surface* written,
                        std::span<const SurfaceFormat> formats, Progress& progress) {
-  const Surface& comes_out = written != nullptr ? *written : body.surface;
-  if (refine.mode == RefineOptions::Mode::to_edge) {
-    const Refinement refinement = refine_to_edge(body.surface, refine.edge);
-    if (!refinement.changes()) return map_part(body, options, crack, progress);
-    return map_split(body, options, crack, refinement,
-                     *split_surface(comes_out, refinement, refine, formats, progress), progress);
+  using Mode = RefineOptions::Mode;
+  std::optional<MappedPart> whole;
+  std::optional<Refinement> refinement;
+  if (refine.mode == Mode::to_edge) {
+    refinement = refine_to_edge(body.surface, refine.edge);
+  } else {
+    whole = map_part(body, options, crack, progress);
+    if (refine.mode == Mode::automatic && !whole->cracked)
+      refinement = refinement_of_state(body, whole->result, whole->report.chord, progress);
   }
-  MappedPart mapped = map_part(body, options, crack, progress);
-  if (refine.mode == RefineOptions::Mode::off || mapped.cracked) return mapped;
-  const std::optional<Refinement> refinement =
-      refinement_of_state(body, mapped.result, mapped.report.chord, progress);
-  if (!refinement) return mapped;
-  std::optional<Surface> split = split_surface(comes_out, *refinement, refine, formats, progress);
-  if (!split) return mapped;
-  return map_split(body, options, crack, *refinement, std::move(*split), progress);
+  if (!refinement || !refinement->changes())
+    return whole ? *std::move(whole) : map_part(body, options, crack, progress);
+  SplitSurface split =
+      split_surface(written != nullptr ? *written : body.surface, *refinement, refine, formats);
+  if (!split.surface) {
+    whole->split_line = std::move(split.line);
+    return *std::move(whole);
+  }
+  MappedPart mapped = map_split(body, options, crack, *refinement, *std::move(split.surface), progress);
+  mapped.split_line = std::move(split.line);
+  return mapped;
 }
 
 std::optional<Refinement> refinement_of_series(const Body& first, const std::vector<std::string>& files,

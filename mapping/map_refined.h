@@ -21,12 +21,16 @@ struct RefineOptions {
 
 [[nodiscard]] std::size_t triangle_count(const Surface& surface);
 
-// The surface with its polygons split, ready for `formats`, and a line that says so. Where its file cannot be split alike
-// (refined_with_file()): that error where the user asked for it, else a line that says why, and nothing.
-[[nodiscard]] std::optional<Surface> split_surface(const Surface& surface, const Refinement& refinement,
-                                                   const RefineOptions& options,
-                                                   std::span<const SurfaceFormat> formats,
-                                                   Progress& progress);
+// A surface with its polygons split, ready to be written; nothing where that cannot be done. And a line for the user.
+struct SplitSurface {
+  std::optional<Surface> surface;
+  std::string line;
+};
+// Where the surface is to be written as its file, which cannot be split alike (refined_with_file()): that error where the
+// user asked for it, else none and a line that says why.
+[[nodiscard]] SplitSurface split_surface(const Surface& surface, const Refinement& refinement,
+                                         const RefineOptions& options,
+                                         std::span<const SurfaceFormat> formats);
 
 // map_part(), and again on a surface that was split, as `refine` says; the body gets its own back. A surface that
 // was cut along cracks is split by `to_edge` only. `written`: what is written in place of the body's surface (--onto).

@@ -109,7 +109,8 @@ class GltfRefinement {
     if (primitive.contains("targets")) return "morph targets";
     if (!primitive.contains("indices") && primitive.value("mode", 4) < 4)
       return "lines or points without indices";
-    for (const auto& [name, value] : primitive.value("extensions", GltfJson::object()).items())
+    const GltfJson extensions = primitive.value("extensions", GltfJson::object());
+    for (const auto& [name, value] : extensions.items())
       if (name != "KHR_materials_variants") return fmt::format("the extension {}", name);
     for (const auto& [name, value] : primitive["attributes"].items())
       if (name.starts_with("JOINTS_") || name.starts_with("WEIGHTS_")) return "the weights of a skeleton";
