@@ -65,7 +65,9 @@ class WhereCoarse {
     std::vector<std::uint32_t> found;
     SpaceMap::Probe probe(map_);
     for (std::size_t i = 0; i < numbers.size(); ++i)
-      if (missed[i].largest > most_[flat[i].part] && is_near(probe, flat[i])) found.push_back(numbers[i]);
+      if ((missed[i].largest > most_[flat[i].part] || missed[i].facing < kRefinedFacing) &&
+          is_near(probe, flat[i]))
+        found.push_back(numbers[i]);
     return found;
   }
 

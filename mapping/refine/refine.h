@@ -11,6 +11,9 @@ namespace flexel::mapping {
 // (sufficient_edge()), nor this share of a spacing. The second is for thin walls that move by many times their thickness:
 // both their sides stay where the wall is.
 constexpr double kRefinedShare = 0.0025, kRefinedSpacings = 0.25;
+// And until none is turned by more than 15 degrees against the matter at its middle: across a needle of a triangle even a
+// small distance from the plane is much.
+constexpr double kRefinedFacing = 0.966;  // cosine
 
 struct RefinedWhereCoarse {
   Refinement refinement;

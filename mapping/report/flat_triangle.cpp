@@ -37,6 +37,13 @@ MissedPoint FlatTriangles::operator()(const FlatTriangle& triangle) {
   const Vec3 area = (moved[1] - moved[0]).cross(moved[2] - moved[0]);
   if (!(area.norm() > 0) || !area.allFinite()) return found;
   const Vec3 normal = area.normalized();
+  const Vec3 middle = (rest[0] + rest[1] + rest[2]) / 3;
+  // An area vector goes with the inverse transpose of the gradient F, times its determinant.
+  const Mat3& f = probe_.at(middle, triangle.part, triangle.polygon).gradient;
+  Mat3 cofactors;
+  cofactors << f.col(1).cross(f.col(2)), f.col(2).cross(f.col(0)), f.col(0).cross(f.col(1));
+  const Vec3 turned = cofactors * (rest[1] - rest[0]).cross(rest[2] - rest[0]);
+  if (turned.norm() > 0) found.facing = normal.dot(turned.normalized());
   const auto look = [&](double u, double v) {
     const Vec3 x = rest[0] + u * (rest[1] - rest[0]) + v * (rest[2] - rest[0]);
     const SpaceMap::Value value = probe_.at(x, triangle.part, triangle.polygon);

@@ -20,6 +20,8 @@ struct MissedPoint {
   double largest = 0;       // m, from the plane of the mapped corners
   Vec3 at = Vec3::Zero();   // m, at rest
   double displacement = 0;  // m, the largest of a point that was looked at
+  double facing =
+      1;  // cosine between the normal of the mapped corners and that of the deformation at its middle
 };
 
 // Looks at one triangle after the other. One for each thread.
