@@ -129,6 +129,9 @@ class ObjRefinement {
     };
     PieceCorners<ObjCorner, decltype(halve)> pieces(refinement_, halve);
     for (ObjCorner& corner : corners) {
+      // What names a line that is not there must not come to name a new one.
+      if (corner.normal >= static_cast<std::int64_t>(old_normals_)) corner.normal = kNoIndex;
+      if (corner.texture >= static_cast<std::int64_t>(old_textures_)) corner.texture = kNoIndex;
       corner.normal = normal_at(corner.vertex, corner.normal, corner.normal);
       pieces.add(static_cast<std::uint32_t>(corner.vertex), corner);
     }

@@ -213,6 +213,34 @@ TEST(Refinement, KeepsTheSidesOfASheetApart) {
   EXPECT_NEAR(volume(*fine.refined, fine.result.displacement) / (2 * 0.2 * 0.04), 1, 0.05);
 }
 
+// A rod as CAD exports it: needles from end to end. Bent, their pieces must not turn over.
+TEST(Refinement, KeepsNeedlesOnTheirSide) {
+  const double length = 2, radius = 0.12;
+  Lattice lattice;
+  lattice.origin = Vec3(0, -0.16, -0.16);
+  lattice.spacing = Vec3::Constant(0.04);
+  Body body = test::make_body(
+      lattice, {0, 0, 0}, {50, 8, 8},
+      [&](const Vec3& p) { return p.x() < length && std::hypot(p.y(), p.z()) < radius + 0.02; },
+      Placement::corner);
+  test::add_tube_surface(body, length, radius, 1, 100);
+  body.surface_cell_offsets.clear();  // they have cells near their corners only
+  body.surface_cells.clear();
+  test::deform(body, [](const Vec3& p) -> Vec3 {
+    const double bow = 4, r = bow - p.z();
+    return {r * std::sin(p.x() / bow), p.y(), bow - r * std::cos(p.x() / bow)};
+  });
+  const MappedPart whole = map_it(body, {Mode::off}), fine = map_it(body, {});
+  EXPECT_GT(whole.report.chord->coarse_triangles, 0u);
+  ASSERT_TRUE(fine.refined);
+  EXPECT_TRUE(fine.report.valid());
+  const SurfaceQuality& quality = fine.report.quality;
+  EXPECT_LT(1000 * (quality.flipped + quality.folded), quality.triangles)
+      << quality.flipped << " turned over, " << quality.folded << " folded";
+  const double exact = volume(body.surface, std::vector<Vec3>(body.surface.vertices.size(), Vec3::Zero()));
+  EXPECT_NEAR(volume(*fine.refined, fine.result.displacement) / exact, 1, 0.01);  // six cells across it
+}
+
 TEST(Refinement, GivesPiecesTheCellsOfTheirPolygonThatAreNear) {
   Body body = test::block(40, 4, 4, 0.1, Placement::corner, 1);
   body.surface_cell_offsets.assign(1, 0);
