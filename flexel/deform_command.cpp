@@ -18,6 +18,7 @@
 #include "flexel/bent_picture.h"
 #include "flexel/commands.h"
 #include "flexel/job.h"
+#include "formats/common/file_format.h"
 #include "formats/exchange/surface_file.h"
 #include "formats/lattice/body_file.h"
 #include "formats/lattice/quadratic_field.h"
@@ -99,6 +100,7 @@ struct Plan {
   std::optional<AccuracyGoal> goal;  // of --accuracy and --within
   mapping::MapOptions map;
   mapping::CrackOptions crack;
+  mapping::RefineOptions refine;
   struct Output {
     std::string path;
     std::optional<mapping::MapOutput> surface;  // nothing: the body, or its picture
@@ -174,12 +176,33 @@ void plan_goal(const DeformArguments& arguments, Plan& plan) {
   if (!arguments.within.empty()) plan.goal->within = simulate::parse_timeout(arguments.within, "--within");
 }
 
-Plan make_plan(const DeformArguments& arguments) {
+// The formats that the surface is written in.
+std::vector<SurfaceFormat> written_formats_of(const Plan& plan) {
+  std::vector<SurfaceFormat> formats;
+  for (const Plan::Output& output : plan.outputs)
+    if (output.surface && output.surface->format) formats.push_back(*output.surface->format);
+  if (!plan.crack.pieces.empty()) formats.push_back(plan.crack.pieces_format);
+  return formats;
+}
+
+// Only what is written as a mesh is split.
+void plan_refinement(Plan& plan) {
+  const std::vector<SurfaceFormat> formats = written_formats_of(plan);
+  const bool meshes = std::any_of(formats.begin(), formats.end(),
+                                  [](const SurfaceFormat& each) { return !each.file->is_cad; });
+  if (meshes || plan.refine.mode == mapping::RefineOptions::Mode::off) return;
+  if (plan.refine.asked) throw InputError("--refine is for meshes: write one with -o, such as bent.stl");
+  plan.refine.mode = mapping::RefineOptions::Mode::off;
+}
+
+Plan make_plan(const DeformArguments& arguments, const CommandLine& app) {
   Plan plan;
   if (!arguments.timeout.empty()) plan.timeout = simulate::parse_timeout(arguments.timeout);
   plan.map = map_options(arguments.map);
   plan.crack = crack_options(arguments.map);
   plan_outputs(arguments, plan);
+  plan.refine = refine_options(arguments.map, app, plan.crack);
+  plan_refinement(plan);
   plan.job = plan_job(arguments.job);
   plan_goal(arguments, plan);
   return plan;
@@ -469,10 +492,12 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
     if (accuracy) report(run.voxels, progress);
     for (const std::string& line : summary_lines(run.simulated)) progress.say(line);
     progress.stage("map");
-    mapped = map_part(body, plan.map, plan.crack, progress);
+    mapped =
+        map_refined(body, plan.map, plan.crack, plan.refine, nullptr, written_formats_of(plan), progress);
     progress.finish();
     say_report(mapped.report, arguments.map, plan.map, progress);
   }
+  if (!mapped.split_line.empty()) progress.say(mapped.split_line);
   const mapping::MapReport& found = mapped.report;
   std::vector<std::string> paths{arguments.map.report, arguments.summary};
   for (const Plan::Output& output : plan.outputs) paths.push_back(output.path);
@@ -517,7 +542,7 @@ int deform_command(int argc, char** argv) {
   declare_output(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   const StopEndsProcess nothing_is_left;  // runs in time leave something, and see to it themselves
-  Plan plan = make_plan(arguments);
+  Plan plan = make_plan(arguments, app);
   const ThreadLimit limit(arguments.threads);
   Progress progress("flexel", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
   return run_stages(arguments, plan, progress);

@@ -19,10 +19,11 @@
 #include "mapping/anchors/other_surfaces.h"
 #include "mapping/binding_file.h"
 #include "mapping/cad_output.h"
-#include "mapping/map_part.h"
+#include "mapping/map_refined.h"
 #include "mapping/methods/map_surface.h"
 #include "mapping/options.h"
 #include "mapping/output.h"
+#include "mapping/refine/refine.h"
 #include "mapping/report/report.h"
 #include "mapping/series.h"
 
@@ -89,6 +90,7 @@ void declare(CommandLine& app, Arguments& arguments) {
 struct Plan {
   MapOptions options;
   CrackOptions crack;
+  RefineOptions refine;
   std::optional<MapOutput> output;  // nothing: points, or only the pieces are wanted
   double unit = 0;                  // of the numbers written, m; 0: that of the surface
   std::optional<double> edge;       // m, longest of the mesh of --onto
@@ -120,7 +122,27 @@ void check_binding(const Arguments& arguments, const Plan& plan) {
                                  name_of(plan.options.method), saved_method_names()));
 }
 
-Plan make_plan(Arguments& arguments) {
+// Where triangles cannot be split as the state asks for it, they stay as they are unless the user asked.
+void plan_refinement(const Arguments& arguments, const CommandLine& app, Plan& plan) {
+  plan.refine = refine_options(arguments.map, app, plan.crack);
+  const bool splits = plan.refine.asked && plan.refine.mode != RefineOptions::Mode::off;
+  if (splits && !arguments.points.empty())
+    throw InputError("--refine: the points of a table have no triangles to split: leave it out");
+  if (splits && plan.output && is_cad(*plan.output))
+    throw InputError("--refine is for meshes: leave it out where exact surfaces are written");
+  const bool bound = !arguments.binding.empty() || !arguments.save_binding.empty();
+  if (bound && plan.refine.mode == RefineOptions::Mode::automatic) {
+    if (splits)
+      throw InputError(
+          "--refine auto depends on the state, and a binding does not: with --binding and --save-binding "
+          "give it a length");
+    plan.refine.mode = RefineOptions::Mode::off;
+  }
+  if (!arguments.points.empty() || !plan.output || is_cad(*plan.output))
+    plan.refine.mode = RefineOptions::Mode::off;
+}
+
+Plan make_plan(Arguments& arguments, const CommandLine& app) {
   Plan plan;
   plan.options = map_options(arguments.map);
   const bool foreign = !arguments.onto.empty() || !arguments.points.empty();
@@ -157,6 +179,7 @@ Plan make_plan(Arguments& arguments) {
   check_cad_output(arguments.map, plan.crack, cad);
   if (cad && foreign)
     throw InputError("--onto: a mesh has no faces that a CAD file could hold: write STL, OBJ, ...");
+  plan_refinement(arguments, app, plan);
   const std::vector<std::string> inputs = {arguments.body, arguments.onto, arguments.points,
                                            arguments.binding};
   std::vector<OutputName> outputs = {{arguments.save_binding, true}};
@@ -195,11 +218,38 @@ class Run {
     }
   }
 
+  [[nodiscard]] const Surface* written() const { return foreign_ ? &*foreign_ : nullptr; }
+  [[nodiscard]] std::vector<SurfaceFormat> formats() const {
+    std::vector<SurfaceFormat> formats;
+    if (plan_.output && plan_.output->format) formats.push_back(*plan_.output->format);
+    if (!plan_.crack.pieces.empty()) formats.push_back(plan_.crack.pieces_format);
+    return formats;
+  }
+  // From now on this is written in place of the body's surface.
+  void write_instead(Surface surface) { foreign_ = std::move(surface); }
+
+  // Splits what is mapped and what is written, of all states alike.
+  void split(Body& body, const Refinement& refinement) {
+    if (!refinement.changes()) return;
+    SplitSurface split =
+        split_surface(foreign_ ? *foreign_ : body.surface, refinement, plan_.refine, formats());
+    progress_.say(split.line);
+    if (!split.surface) return;
+    split_from_ = triangle_count(body.surface);
+    if (foreign_) {
+      take_refined(body, refined(body.surface, refinement), refinement);
+      foreign_ = std::move(split.surface);
+    } else {
+      take_refined(body, *std::move(split.surface), refinement);
+    }
+  }
+
   [[nodiscard]] bool foreign() const { return foreign_ || table_; }
 
   // Says what was found, and writes.
-  void finish(const Surface& surface, const Body& body, const MapResult& result, const MapReport& found,
+  void finish(const Surface& surface, const Body& body, const MapResult& result, MapReport found,
               const std::string& path) {
+    if (split_from_) found.split_from = split_from_;
     progress_.finish();
     if (!table_) say_report(found, arguments_.map, plan_.options, progress_);
     std::string report = arguments_.map.report;
@@ -238,6 +288,7 @@ class Run {
   Progress& progress_;
   std::optional<Surface> foreign_;
   std::optional<PointTable> table_;
+  std::optional<std::size_t> split_from_;  // triangles
   double unit_ = 0;
   std::size_t frame_ = 0;
 };
@@ -266,9 +317,29 @@ void map_one(const Arguments& arguments, Plan& plan, Progress& progress) {
   run.take_surface(body);
   use_field(body, arguments.map, plan.options);
   progress.stage("map");
+  if (plan.refine.mode == RefineOptions::Mode::to_edge)
+    run.split(body, refine_to_edge(body.surface, plan.refine.edge));
   const std::optional<Binding> known = own_binding(arguments, body, plan.options);
+  if (plan.refine.mode == RefineOptions::Mode::automatic) {
+    MappedPart mapped =
+        map_refined(body, plan.options, plan.crack, plan.refine, run.written(), run.formats(), progress);
+    const Surface& surface = mapped.surface(body);
+    if (!mapped.split_line.empty()) progress.say(mapped.split_line);
+    if (run.foreign() && mapped.refined) run.write_instead(*mapped.refined);
+    return run.finish(surface, body, mapped.result, mapped.report, arguments.output);
+  }
   const MappedPart mapped = map_part(body, plan.options, plan.crack, progress, known ? &*known : nullptr);
   run.finish(mapped.surface(body), body, mapped.result, mapped.report, arguments.output);
+}
+
+// Before the first frame is mapped: all have the same triangles.
+void split_for_series(const std::vector<std::string>& files, Body& first, const Plan& plan, Run& run,
+                      Progress& progress) {
+  using Mode = RefineOptions::Mode;
+  if (plan.refine.mode == Mode::to_edge) run.split(first, refine_to_edge(first.surface, plan.refine.edge));
+  if (plan.refine.mode != Mode::automatic || plan.crack.mode != CrackMode::keep) return;
+  if (const auto needed = refinement_of_series(first, files, plan.options, progress))
+    run.split(first, *needed);
 }
 
 // Frames share one binding until the lattice changes (something was cut off) or breaks; only the first frame
@@ -290,17 +361,10 @@ void map_series(const Arguments& arguments, Plan& plan, Progress& progress) {
     if (f == 0) {
       run.take_surface(next);
       use_field(next, arguments.map, plan.options);
+      split_for_series(files, next, plan, run, progress);
       binding = own_binding(arguments, next, plan.options);
     } else {
-      if (next.parts.size() != body.parts.size())
-        throw InputError(files[f], "has other parts than the first frame: map it with its own surface");
-      next.surface = std::move(body.surface);
-      next.surface_cell_offsets = std::move(body.surface_cell_offsets);
-      next.surface_cells = std::move(body.surface_cells);
-      if (next.cell_elements != body.cell_elements) {  // cells are renumbered: anchors come from the elements
-        next.surface_cell_offsets.clear();
-        next.surface_cells.clear();
-      }
+      take_surface(next, body, files[f]);
       if (!same_lattice(next, body)) binding.reset();
     }
     body = std::move(next);
@@ -322,7 +386,7 @@ int run(int argc, char** argv) {
   declare(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   const StopEndsProcess nothing_is_left;
-  Plan plan = make_plan(arguments);
+  Plan plan = make_plan(arguments, app);
   const ThreadLimit limit(arguments.threads);
   Progress progress(kProgram, arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
   plan.series ? map_series(arguments, plan, progress) : map_one(arguments, plan, progress);

@@ -15,8 +15,10 @@ struct MappedPart {
   MapResult result;
   MapReport report;
   std::optional<CrackedSurface> cracked;  // `open` and `cap`, where a part is in fragments or cracked
+  std::optional<Surface> refined;         // in place of the body's, whose triangles were split for it
+  std::string split_line;                 // says so, or why it was not
   [[nodiscard]] const Surface& surface(const Body& body) const {
-    return cracked ? cracked->surface : body.surface;
+    return cracked ? cracked->surface : refined ? *refined : body.surface;
   }
 };
 

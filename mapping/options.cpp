@@ -11,6 +11,7 @@
 #include "base/files/output_file.h"
 #include "base/nearest_word.h"
 #include "base/printable.h"
+#include "base/units.h"
 #include "formats/common/file_formats.h"
 #include "formats/exchange/surface_file.h"
 #include "mapping/methods/method.h"
@@ -59,6 +60,14 @@ void declare_map_options(CommandLine& app, MapArguments& arguments) {
   app.add_option("--pieces", arguments.pieces,
                  "Write each piece to a file of its own too: a folder, or \"out/{piece}.stl\"")
       .type_name("PATH");
+  app.add_option(
+         "--refine", arguments.refine,
+         "Split triangles that are too large to show the deformation: auto, off, or all to this longest "
+         "edge (\"2 mm\")")
+      .type_name("HOW")
+      .show_default();
+  app.add_flag("--keep-vertices", arguments.keep_vertices,
+               "The file's own vertices, whatever they show: --refine off");
   app.add_option("--scale", arguments.scale, "Write displacements this many times as large")
       .type_name("FACTOR");
   app.add_option("--format", arguments.format,
@@ -113,6 +122,33 @@ CrackOptions crack_options(const MapArguments& arguments) {
     throw InputError("--pieces needs --crack open or cap: else there are no pieces");
   options.pieces = pattern_of(arguments.pieces, arguments.format);
   options.pieces_format = surface_format("", options.pieces, arguments.ascii);
+  return options;
+}
+
+RefineOptions refine_options(const MapArguments& arguments, const CommandLine& app,
+                             const CrackOptions& crack) {
+  using Mode = RefineOptions::Mode;
+  RefineOptions options;
+  options.asked = app.has("--refine");
+  const std::string& word = arguments.refine;
+  if (word == "off")
+    options.mode = Mode::off;
+  else if (word != "auto") {
+    options.mode = Mode::to_edge;
+    if (word.find_first_of("0123456789") == std::string::npos)
+      throw InputError(
+          fmt::format("unknown word \"{}\": --refine is auto, off or a length such as \"2 mm\"{}", word,
+                      did_you_mean(word, {"auto", "off"})));
+    options.edge = parse_quantity(word, Dimension::length);
+    if (!(options.edge > 0)) throw InputError("--refine: the length must be above zero");
+  }
+  if (arguments.keep_vertices && options.asked && options.mode != Mode::off)
+    throw InputError("--keep-vertices is --refine off: give one of the two");
+  if (arguments.keep_vertices) options.mode = Mode::off;
+  if (crack.mode == CrackMode::keep || options.mode != Mode::automatic) return options;
+  if (options.asked)
+    throw InputError(
+        "--refine auto is for surfaces that stay whole: with --crack open or cap give it a length");
   return options;
 }
 

@@ -2,7 +2,7 @@
 #pragma once
 #include "base/error.h"
 #include "base/program/arguments.h"
-#include "mapping/map_part.h"
+#include "mapping/map_refined.h"
 
 namespace flexel::mapping {
 
@@ -10,6 +10,8 @@ struct MapArguments {
   std::string method;  // "": blended
   std::string checks, crack = "keep", debris = "keep", pieces, report, format, tolerance;
   double scale = 1;
+  std::string refine = "auto";
+  bool keep_vertices = false;
   bool attributes = false, table = false, ascii = false, strict = false;
 };
 
@@ -22,6 +24,9 @@ void use_field(const Body& body, const MapArguments& arguments, MapOptions& opti
 // What they ask for. Throws InputError: an unknown word, options that exclude each other.
 [[nodiscard]] MapOptions map_options(const MapArguments& arguments);
 [[nodiscard]] CrackOptions crack_options(const MapArguments& arguments);
+// `app`: says whether --refine was given;
+[[nodiscard]] RefineOptions refine_options(const MapArguments& arguments, const CommandLine& app,
+                                           const CrackOptions& crack);
 
 // Says the report's lines, the first as a warning where the mapping cannot be used; and its table.
 void say_report(const MapReport& found, const MapArguments& arguments, const MapOptions& options,

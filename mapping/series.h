@@ -19,4 +19,8 @@ namespace flexel::mapping {
 // broken.
 [[nodiscard]] bool same_lattice(const Body& a, const Body& b);
 
+// Gives the body of a frame the surface of the one before it, and the cells under it where they are the same. Throws
+// InputError(file, ...): it has other parts.
+void take_surface(Body& next, Body& before, const std::string& file);
+
 }  // namespace flexel::mapping

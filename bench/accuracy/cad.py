@@ -24,7 +24,7 @@ import numpy
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 CELLS = 6000
 END, BEND = .06, .2  # shares of the longest side
-GMSH_SECONDS = 120
+GMSH_SECONDS = 60
 
 
 def run(*words, cwd, seconds=600):
@@ -98,8 +98,8 @@ def measure(part, cwd):
     row["size"] = (cwd / "bent.step").stat().st_size / part.stat().st_size
     quality = json.loads((cwd / "report.json").read_text())
     row["triangles"] = quality["volume_after"] / quality["volume_before"] - 1
-    before, why_before = tet_volume(part, longest / 15, cwd)
-    after, why_after = tet_volume(cwd / "bent.step", longest / 15, cwd)
+    before, why_before = tet_volume(part, longest / 12, cwd)
+    after, why_after = tet_volume(cwd / "bent.step", longest / 12, cwd)
     row["gmsh_before"], row["gmsh"] = why_before or "yes", why_after or "yes"
     if before and after:
         row["tets"] = after / before - 1

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/files/files.h"
+#include "formats/common/refine_files.h"
 #include "formats/common/surface_writers.h"
 
 namespace flexel {
@@ -23,12 +24,14 @@ struct FileFormat {
   bool is_cad = false;            // exact surfaces: tessellated where it is read, written by flexel-cad
   bool holds_attributes = false;  // numbers of any name at vertices
 
-  // The three that follow: none where the format is only read.
+  // The four that follow: none where the format is only read.
   // A new file of the surface.
   void (*write_new)(const DeformedSurface& deformed, bool ascii, OutputFile& out) = nullptr;
   // The file that the surface came from (its source's `bytes`), with other positions and normals; none where
   // `write_new` says all.
   void (*rewrite)(const DeformedSurface& deformed, OutputFile& out) = nullptr;
+  // Splits the polygons in the source's bytes; returns what they hold that cannot be split (formats/common/refine_files.h).
+  std::string (*refine)(SurfaceSource& source, const Refinement& refinement) = nullptr;
   // Puts a note for people where the file written from this surface shows it; none where there is no place.
   void (*add_note)(Surface& surface, bool ascii, const std::string& note) = nullptr;
 

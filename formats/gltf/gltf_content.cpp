@@ -369,6 +369,84 @@ bool has_triangles(const GltfJson& primitive, const std::string& where) {
   return mode >= kTriangles && mode <= kFan;
 }
 
+namespace {
+
+std::vector<std::uint32_t> unrolled(const std::vector<std::uint32_t>& listed, bool strip) {
+  std::vector<std::uint32_t> corners;
+  for (std::size_t i = 0; i + 2 < listed.size(); ++i) {
+    const std::size_t odd = i % 2;
+    for (const std::size_t corner : strip ? std::array<std::size_t, 3>{i, i + 1 + odd, i + 2 - odd}
+                                          : std::array<std::size_t, 3>{i + 1, i + 2, 0})
+      corners.push_back(listed[corner]);
+  }
+  return corners;
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> gltf_corners(const Gltf& gltf, const GltfJson& primitive,
+                                        const std::string& where) {
+  std::vector<std::uint32_t> listed;
+  if (primitive.contains("indices")) {
+    const GltfAccessor at = gltf_accessor(gltf, gltf_index(primitive, "indices", where), where);
+    if (at.components != 1 || at.type == kGltfFloat) damaged(where, "indices are no list of whole numbers");
+    for (const double value : gltf_numbers(gltf, at)) {
+      if (!(value >= 0)) damaged(where, "an index is negative");
+      listed.push_back(static_cast<std::uint32_t>(value));
+    }
+  } else {
+    const std::size_t accessor = gltf_index(primitive["attributes"], "POSITION", where);
+    listed.resize(gltf_accessor(gltf, accessor, where).count);
+    for (std::size_t i = 0; i < listed.size(); ++i) listed[i] = static_cast<std::uint32_t>(i);
+  }
+  const std::size_t mode = gltf_index(primitive, "mode", 4, where);
+  if (mode != 4) return unrolled(listed, mode == 5);
+  if (listed.size() % 3 != 0) damaged(where, "a list of triangles does not end with a whole one");
+  return listed;
+}
+
+std::size_t append_gltf_accessor(Gltf& gltf, const void* data, std::size_t count, std::size_t components,
+                                 std::uint32_t type, int target) {
+  constexpr std::array<const char*, 4> kTypes = {"SCALAR", "VEC2", "VEC3", "VEC4"};
+  const std::size_t size = 4 * components * count;
+  gltf.binary.resize((gltf.binary.size() + 3) / 4 * 4);
+  const std::size_t begin = gltf.binary.size();
+  gltf.binary.resize(begin + size);
+  if (size > 0) std::memcpy(gltf.binary.data() + begin, data, size);
+  GltfJson& views = gltf.json["bufferViews"];
+  views.push_back({{"buffer", 0}, {"byteOffset", begin}, {"byteLength", size}, {"target", target}});
+  GltfJson& accessors = gltf.json["accessors"];
+  accessors.push_back({{"bufferView", views.size() - 1},
+                       {"componentType", type},
+                       {"count", count},
+                       {"type", kTypes.at(components - 1)}});
+  gltf.json["buffers"][0]["byteLength"] = gltf.binary.size();
+  return accessors.size() - 1;
+}
+
+void set_gltf_bounds(GltfJson& accessor, const GltfFloats& positions) {
+  Eigen::Vector3f low = Eigen::Vector3f::Constant(std::numeric_limits<float>::max()), high = -low;
+  for (const auto& p : positions) {
+    const Eigen::Vector3f at(p[0], p[1], p[2]);
+    low = low.cwiseMin(at);
+    high = high.cwiseMax(at);
+  }
+  accessor["min"] = {low.x(), low.y(), low.z()};
+  accessor["max"] = {high.x(), high.y(), high.z()};
+}
+
+std::size_t own_gltf_mesh(Gltf& gltf, const GltfInstance& instance, const std::string& where) {
+  GltfJson& nodes = gltf.json["nodes"];
+  std::size_t shown = 0;
+  for (const GltfJson& node : nodes)
+    shown += node.contains("mesh") && gltf_index(node, "mesh", where) == instance.mesh;
+  if (shown < 2) return instance.mesh;
+  GltfJson& meshes = gltf.json["meshes"];
+  meshes.push_back(GltfJson(meshes[instance.mesh]));
+  nodes[instance.node]["mesh"] = meshes.size() - 1;
+  return meshes.size() - 1;
+}
+
 double linear_to_srgb(double linear) {
   return linear <= 0.0031308 ? 12.92 * linear : std::min(1.0, 1.055 * std::pow(linear, 1 / 2.4) - 0.055);
 }

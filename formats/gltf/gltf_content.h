@@ -1,7 +1,8 @@
 // glTF 2.0 (Khronos, 2021) as one GLB: its JSON and its one binary buffer. For reading a file and for writing
-// it again with other positions. Only the reader of glTF files and the writer of surfaces use this.
+// it again with other positions or split triangles. Only formats/gltf uses this.
 #pragma once
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -15,7 +16,8 @@ namespace flexel {
 
 using GltfJson = nlohmann::ordered_json;
 
-constexpr std::uint32_t kGltfFloat = 5126;
+constexpr std::uint32_t kGltfFloat = 5126, kGltfWhole = 5125;
+constexpr int kGltfArrayBuffer = 34962, kGltfElementBuffer = 34963;
 
 struct Gltf {
   GltfJson json;
@@ -65,6 +67,20 @@ struct GltfInstance {
 
 // True when a primitive is made of triangles (also strips and fans).
 [[nodiscard]] bool has_triangles(const GltfJson& primitive, const std::string& where);
+
+// Of a primitive with triangles: three indices each, strips and fans unrolled.
+[[nodiscard]] std::vector<std::uint32_t> gltf_corners(const Gltf& gltf, const GltfJson& primitive,
+                                                      const std::string& where);
+
+// Appends numbers of four bytes as an accessor with its own view, and returns its number.
+std::size_t append_gltf_accessor(Gltf& gltf, const void* data, std::size_t count, std::size_t components,
+                                 std::uint32_t type, int target);
+// Three numbers of single precision for each vertex.
+using GltfFloats = std::vector<std::array<float, 3>>;
+void set_gltf_bounds(GltfJson& accessor, const GltfFloats& positions);
+
+// The mesh of the instance, for it alone: a copy where other nodes show it too.
+std::size_t own_gltf_mesh(Gltf& gltf, const GltfInstance& instance, const std::string& where);
 
 // Colours: glTF has linear intensities, the columns of a surface those of screens (sRGB, IEC 61966-2-1).
 [[nodiscard]] double linear_to_srgb(double linear);

@@ -17,6 +17,7 @@ constinit const FileFormat kGltfFormat{
     .encoding = FileEncoding::binary,
     .carries_unit = true,
     .write_new = [](const DeformedSurface& deformed, bool, OutputFile& out) { write_new_glb(deformed, out); },
-    .rewrite = rewrite_glb};
+    .rewrite = rewrite_glb,
+    .refine = refine_glb};
 
 }  // namespace flexel

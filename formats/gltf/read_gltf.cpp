@@ -298,7 +298,7 @@ class GltfReader {
   }
 
   void add_primitive(const GltfJson& primitive, std::size_t begin, bool mirrored) {
-    const std::vector<std::uint32_t> corners = corners_of(primitive);
+    const std::vector<std::uint32_t> corners = gltf_corners(gltf_, primitive, input_.where);
     const std::size_t count =
         gltf_accessor(gltf_, gltf_index(primitive["attributes"], "POSITION", input_.where), input_.where)
             .count;
@@ -316,40 +316,6 @@ class GltfReader {
     }
     if (surface_.polygon_vertices.size() > 0xffffffffu) fail("holds too many triangles");
     add_material(primitive, corners.size() / 3);
-  }
-
-  // Three indices a triangle.
-  std::vector<std::uint32_t> corners_of(const GltfJson& primitive) {
-    std::vector<std::uint32_t> listed;
-    if (primitive.contains("indices")) {
-      const GltfAccessor at =
-          gltf_accessor(gltf_, gltf_index(primitive, "indices", input_.where), input_.where);
-      if (at.components != 1 || at.type == kGltfFloat)
-        fail("is damaged: indices are no list of whole numbers");
-      for (const double value : gltf_numbers(gltf_, at)) {
-        if (!(value >= 0)) fail("is damaged: an index is negative");
-        listed.push_back(static_cast<std::uint32_t>(value));
-      }
-    } else {
-      const std::size_t accessor = gltf_index(primitive["attributes"], "POSITION", input_.where);
-      listed.resize(gltf_accessor(gltf_, accessor, input_.where).count);
-      for (std::size_t i = 0; i < listed.size(); ++i) listed[i] = static_cast<std::uint32_t>(i);
-    }
-    const std::size_t mode = gltf_index(primitive, "mode", 4, input_.where);
-    if (mode != 4) return unrolled(listed, mode == 5);
-    if (listed.size() % 3 != 0) fail("is damaged: a list of triangles does not end with a whole one");
-    return listed;
-  }
-
-  static std::vector<std::uint32_t> unrolled(const std::vector<std::uint32_t>& listed, bool strip) {
-    std::vector<std::uint32_t> corners;
-    for (std::size_t i = 0; i + 2 < listed.size(); ++i) {
-      const std::size_t odd = i % 2;
-      for (const std::size_t corner : strip ? std::array<std::size_t, 3>{i, i + 1 + odd, i + 2 - odd}
-                                            : std::array<std::size_t, 3>{i + 1, i + 2, 0})
-        corners.push_back(listed[corner]);
-    }
-    return corners;
   }
 
   // The material's name for the group and its colour for the triangles.

@@ -23,47 +23,11 @@
 namespace flexel {
 namespace {
 
-constexpr int kArrayBuffer = 34962, kElementBuffer = 34963;
-
-// Three numbers of single precision for each vertex.
-using Floats = std::vector<std::array<float, 3>>;
-
 float single(double value) {
   const auto number = static_cast<float>(value);
   if (!std::isfinite(number))
     throw InputError("the part does not fit the single precision of GLB: write in another format");
   return number;
-}
-
-// Appends an accessor with its own view, and returns its number.
-std::size_t append_accessor(Gltf& gltf, const void* data, std::size_t count, std::size_t components,
-                            std::uint32_t type, int target) {
-  constexpr std::array<const char*, 4> kTypes = {"SCALAR", "VEC2", "VEC3", "VEC4"};
-  const std::size_t size = 4 * components * count;
-  gltf.binary.resize((gltf.binary.size() + 3) / 4 * 4);
-  const std::size_t begin = gltf.binary.size();
-  gltf.binary.resize(begin + size);
-  if (size > 0) std::memcpy(gltf.binary.data() + begin, data, size);
-  GltfJson& views = gltf.json["bufferViews"];
-  views.push_back({{"buffer", 0}, {"byteOffset", begin}, {"byteLength", size}, {"target", target}});
-  GltfJson& accessors = gltf.json["accessors"];
-  accessors.push_back({{"bufferView", views.size() - 1},
-                       {"componentType", type},
-                       {"count", count},
-                       {"type", kTypes.at(components - 1)}});
-  gltf.json["buffers"][0]["byteLength"] = gltf.binary.size();
-  return accessors.size() - 1;
-}
-
-void set_bounds(GltfJson& accessor, const Floats& positions) {
-  Eigen::Vector3f low = Eigen::Vector3f::Constant(std::numeric_limits<float>::max()), high = -low;
-  for (const auto& p : positions) {
-    const Eigen::Vector3f at(p[0], p[1], p[2]);
-    low = low.cwiseMin(at);
-    high = high.cwiseMax(at);
-  }
-  accessor["min"] = {low.x(), low.y(), low.z()};
-  accessor["max"] = {high.x(), high.y(), high.z()};
 }
 
 // The rewriting of one source.
@@ -72,11 +36,12 @@ class GltfRewrite {
   explicit GltfRewrite(const DeformedSurface& deformed)
       : deformed_(deformed),
         source_(deformed.surface.sources[0]),
+        displacement_(in_file_order(deformed.displacement)),
         gltf_(parse_glb(source_.bytes, source_.file)),
         instances_(gltf_instances(gltf_, source_.file)) {}
 
   Bytes run() {
-    changes_ = vertex_normal_changes(deformed_);
+    changes_ = in_file_order(vertex_normal_changes(deformed_));
     std::size_t vertex = 0;
     for (const GltfInstance& instance : instances_) {
       std::vector<std::size_t> begins;
@@ -84,14 +49,14 @@ class GltfRewrite {
         begins.push_back(vertex);
         vertex += gltf_accessor(gltf_, accessor, source_.file).count;
       }
-      if (vertex > deformed_.displacement.size()) break;
-      const auto from = deformed_.displacement.begin();
+      if (vertex > displacement_.size()) break;
+      const auto from = displacement_.begin();
       const bool moved = std::any_of(from + static_cast<std::ptrdiff_t>(begins.front()),
                                      from + static_cast<std::ptrdiff_t>(vertex),
                                      [](const Vec3& d) { return d != Vec3::Zero(); });
       if (moved) rewrite(instance, begins);
     }
-    if (vertex != deformed_.displacement.size())
+    if (vertex != displacement_.size())
       throw InputError(source_.file, "the embedded GLB has another number of vertices than the surface");
     return changed_ ? make_glb(gltf_) : source_.bytes;
   }
@@ -99,12 +64,12 @@ class GltfRewrite {
  private:
   void rewrite(const GltfInstance& instance, const std::vector<std::size_t>& begins) {
     changed_ = true;
-    const std::size_t mesh = own_mesh(instance);
+    const std::size_t mesh = own_gltf_mesh(gltf_, instance, source_.file);
     for (std::size_t i = 0; i < begins.size(); ++i) {
       const std::size_t old = instance.positions[i];
-      const Floats positions = new_positions(instance, old, begins[i]);
+      const GltfFloats positions = new_positions(instance, old, begins[i]);
       const std::size_t accessor = put(old, positions);
-      set_bounds(gltf_.json["accessors"][accessor], positions);
+      set_gltf_bounds(gltf_.json["accessors"][accessor], positions);
       std::map<std::size_t, std::size_t> normals;  // old accessor to new
       for (GltfJson& primitive : gltf_.json["meshes"][mesh]["primitives"]) {
         if (!primitive.contains("attributes") || !primitive["attributes"].contains("POSITION") ||
@@ -120,34 +85,31 @@ class GltfRewrite {
     }
   }
 
-  // The mesh of the instance, for it alone.
-  std::size_t own_mesh(const GltfInstance& instance) {
-    GltfJson& nodes = gltf_.json["nodes"];
-    std::size_t shown = 0;
-    for (const GltfJson& node : nodes)
-      shown += node.contains("mesh") && gltf_index(node, "mesh", source_.file) == instance.mesh;
-    if (shown < 2) return instance.mesh;
-    GltfJson& meshes = gltf_.json["meshes"];
-    meshes.push_back(GltfJson(meshes[instance.mesh]));
-    nodes[instance.node]["mesh"] = meshes.size() - 1;
-    return meshes.size() - 1;
+  // What the surface's vertices have, as the file's come.
+  template <class Value>
+  [[nodiscard]] std::vector<Value> in_file_order(const std::vector<Value>& values) const {
+    if (source_.order.empty()) return values;
+    std::vector<Value> result;
+    result.reserve(values.size());
+    for (const std::uint32_t v : source_.order) result.push_back(values.at(v));
+    return result;
   }
 
   // In the mesh's own frame; a vertex that did not move keeps its numbers.
-  Floats new_positions(const GltfInstance& instance, std::size_t accessor, std::size_t begin) const {
+  GltfFloats new_positions(const GltfInstance& instance, std::size_t accessor, std::size_t begin) const {
     const GltfAccessor at = gltf_accessor(gltf_, accessor, source_.file);
     const std::vector<double> old = gltf_numbers(gltf_, at);
     const Eigen::Matrix3d back = instance.transform.topLeftCorner<3, 3>().inverse();
-    Floats positions(at.count);
+    GltfFloats positions(at.count);
     for (std::size_t v = 0; v < at.count; ++v) {
-      const Vec3 moved = back * deformed_.displacement[begin + v] / source_.unit;
+      const Vec3 moved = back * displacement_[begin + v] / source_.unit;
       for (std::size_t i = 0; i < 3; ++i)
         positions[v][i] = single(old[3 * v + i] + moved[static_cast<Eigen::Index>(i)]);
     }
     return positions;
   }
 
-  Floats new_normals(const GltfInstance& instance, std::size_t accessor, std::size_t begin) const {
+  GltfFloats new_normals(const GltfInstance& instance, std::size_t accessor, std::size_t begin) const {
     const GltfAccessor at = gltf_accessor(gltf_, accessor, source_.file);
     const std::vector<double> old = gltf_numbers(gltf_, at);
     if (at.components != 3 || begin + at.count > changes_.size())
@@ -155,7 +117,7 @@ class GltfRewrite {
     // Normals go to the world by the inverse transpose, and back by the transpose.
     const Eigen::Matrix3d transpose = instance.transform.topLeftCorner<3, 3>().transpose();
     const Eigen::Matrix3d out = transpose.inverse();
-    Floats normals(at.count);
+    GltfFloats normals(at.count);
     for (std::size_t v = 0; v < at.count; ++v) {
       Vec3 normal(old[3 * v], old[3 * v + 1], old[3 * v + 2]);
       if (const auto rotation = turn(changes_[begin + v]); rotation && normal.allFinite())
@@ -168,7 +130,7 @@ class GltfRewrite {
 
   // Writes the numbers over those of `accessor` where no other use of them is left, else appends them;
   // returns the accessor that then has them.
-  std::size_t put(std::size_t accessor, const Floats& numbers) {
+  std::size_t put(std::size_t accessor, const GltfFloats& numbers) {
     const GltfAccessor at = gltf_accessor(gltf_, accessor, source_.file);
     if (at.type == kGltfFloat && !shared(accessor)) {
       for (std::size_t i = 0; i < numbers.size(); ++i)
@@ -176,7 +138,7 @@ class GltfRewrite {
       return accessor;
     }
     const std::size_t added =
-        append_accessor(gltf_, numbers.data(), numbers.size(), 3, kGltfFloat, kArrayBuffer);
+        append_gltf_accessor(gltf_, numbers.data(), numbers.size(), 3, kGltfFloat, kGltfArrayBuffer);
     return added;
   }
 
@@ -224,6 +186,7 @@ class GltfRewrite {
 
   const DeformedSurface& deformed_;
   const SurfaceSource& source_;
+  std::vector<Vec3> displacement_;  // (vertices of the file x 3) m
   Gltf gltf_;
   std::vector<GltfInstance> instances_;
   std::vector<NormalChange> changes_;
@@ -279,9 +242,9 @@ class GltfMaker {
     }
     GltfJson primitives = GltfJson::array();
     for (const auto& [group, corners] : groups) {
-      GltfJson primitive = {
-          {"attributes", attributes},
-          {"indices", append_accessor(gltf_, corners.data(), corners.size(), 1, 5125, kElementBuffer)}};
+      GltfJson primitive = {{"attributes", attributes},
+                            {"indices", append_gltf_accessor(gltf_, corners.data(), corners.size(), 1,
+                                                             kGltfWhole, kGltfElementBuffer)}};
       if (const std::string name = face_name(group); !name.empty() || !group.second.empty())
         primitive["material"] = material(name, group.second);
       primitives.push_back(std::move(primitive));
@@ -316,15 +279,15 @@ class GltfMaker {
     }
     std::sort(used.begin(), used.end());
     used.erase(std::unique(used.begin(), used.end()), used.end());
-    Floats positions(used.size());
+    GltfFloats positions(used.size());
     for (std::size_t v = 0; v < used.size(); ++v) {
       local_[used[v]] = static_cast<std::uint32_t>(v);
       const Vec3 at = deformed_.surface.vertices[used[v]] + deformed_.displacement[used[v]];  // m
       for (std::size_t i = 0; i < 3; ++i) positions[v][i] = single(at[static_cast<Eigen::Index>(i)]);
     }
     const std::size_t accessor =
-        append_accessor(gltf_, positions.data(), positions.size(), 3, kGltfFloat, kArrayBuffer);
-    set_bounds(gltf_.json["accessors"][accessor], positions);
+        append_gltf_accessor(gltf_, positions.data(), positions.size(), 3, kGltfFloat, kGltfArrayBuffer);
+    set_gltf_bounds(gltf_.json["accessors"][accessor], positions);
     GltfJson attributes = {{"POSITION", accessor}};
     for (const auto& [name, column] : deformed_.surface.vertex_columns)
       if (column.components <= 4)
@@ -349,7 +312,7 @@ class GltfMaker {
         const double value = column.values[v * components + c];
         values.push_back(single(color && c < 3 ? srgb_to_linear(value) : value));
       }
-    return append_accessor(gltf_, values.data(), used.size(), components, kGltfFloat, kArrayBuffer);
+    return append_gltf_accessor(gltf_, values.data(), used.size(), components, kGltfFloat, kGltfArrayBuffer);
   }
 
   std::size_t material(const std::string& name, const std::vector<double>& color) {

@@ -8,6 +8,7 @@ constinit const FileFormat kObjFormat{
     .title = "OBJ",
     .write_new = [](const DeformedSurface& deformed, bool, OutputFile& out) { write_new_obj(deformed, out); },
     .rewrite = rewrite_obj,
+    .refine = refine_obj,
     .add_note = [](Surface& surface, bool,
                    const std::string& note) { add_source_line(surface, kObjFormat.name, "# " + note, 0); }};
 

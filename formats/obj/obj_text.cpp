@@ -33,6 +33,7 @@ std::size_t continuation(std::string_view text) {
 ObjKeyword keyword_of(std::string_view word) {
   if (word == "v") return ObjKeyword::vertex;
   if (word == "vn") return ObjKeyword::normal;
+  if (word == "vt") return ObjKeyword::texture;
   if (word == "f" || word == "fo") return ObjKeyword::face;
   if (word == "g") return ObjKeyword::group;
   if (word == "o") return ObjKeyword::object;
@@ -107,6 +108,18 @@ Vec3 parse_triple(const ObjLine& line, const std::string& where) {
   return triple;
 }
 
+std::vector<double> numbers_of(const ObjLine& line) {
+  std::vector<double> numbers;
+  std::string_view rest = line.text;
+  for (std::string_view word = next_word(rest); !word.empty(); word = next_word(rest)) {
+    if (word.front() == '+') word.remove_prefix(1);
+    double value = 0;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (error == std::errc{} && end == word.data() + word.size()) numbers.push_back(value);
+  }
+  return numbers;
+}
+
 void parse_face(const ObjLine& line, const ObjCounts& counts, const std::string& where,
                 std::vector<ObjCorner>& corners) {
   corners.clear();
@@ -114,7 +127,10 @@ void parse_face(const ObjLine& line, const ObjCounts& counts, const std::string&
   for (std::string_view word = next_word(rest); !word.empty(); word = next_word(rest)) {
     const std::size_t slash = word.find('/');
     const std::size_t second = slash == std::string_view::npos ? slash : word.find('/', slash + 1);
-    ObjCorner corner{resolve(word.substr(0, slash), counts.vertices, line, where), kNoIndex};
+    ObjCorner corner{resolve(word.substr(0, slash), counts.vertices, line, where), kNoIndex, kNoIndex};
+    if (counts.textures >= 0 && slash != std::string_view::npos)
+      if (const std::string_view digits = word.substr(slash + 1, second - slash - 1); !digits.empty())
+        corner.texture = resolve(digits, counts.textures, line, where);
     if (second != std::string_view::npos && second + 1 < word.size())
       corner.normal = resolve(word.substr(second + 1), counts.normals, line, where);
     corners.push_back(corner);

@@ -13,7 +13,7 @@
 namespace flexel {
 
 // A line that says something to us. Lines continued with a backslash are one.
-enum class ObjKeyword { vertex, normal, face, group, object, other };
+enum class ObjKeyword { vertex, normal, texture, face, group, object, other };
 
 struct ObjLine {
   ObjKeyword keyword = ObjKeyword::other;
@@ -27,6 +27,8 @@ class ObjLines {
   explicit ObjLines(std::string_view text) : text_(text) {}
   // False at the end of the file.
   bool next(ObjLine& line);
+  // Where the next line begins: its place in the text.
+  [[nodiscard]] std::size_t at() const { return at_; }
 
  private:
   std::string_view text_;
@@ -43,15 +45,19 @@ class ObjLines {
 
 constexpr std::int64_t kNoIndex = -1;
 
-// One corner of a face: from 0; normal kNoIndex where there is none.
+// One corner of a face: from 0; normal and texture kNoIndex where there is none.
 struct ObjCorner {
-  std::int64_t vertex = 0, normal = kNoIndex;
+  std::int64_t vertex = 0, normal = kNoIndex, texture = kNoIndex;
 };
 
-// How many v and vn lines came before, which is what negative indices count back from.
+// How many v, vn and vt lines came before, which is what negative indices count back from. Texture coordinates are
+// looked at only where they are counted.
 struct ObjCounts {
-  std::int64_t vertices = 0, normals = 0;
+  std::int64_t vertices = 0, normals = 0, textures = kNoIndex;
 };
+
+// All numbers of a line, in order; words that are none are left out.
+[[nodiscard]] std::vector<double> numbers_of(const ObjLine& line);
 
 // The corners of an f line, into `corners`. Indices above the counts so far are kept: some files list
 // vertices after faces; the caller checks them at the end. Throws InputError (`where`:line): malformed, zero,

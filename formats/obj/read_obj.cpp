@@ -68,6 +68,7 @@ void add_line(ObjScan& scan, const ObjLine& line, const ImportInput& input) {
       scan.object = group_name(line.text);
       scan.group.clear();
       break;
+    case ObjKeyword::texture:
     case ObjKeyword::other:
       break;
   }

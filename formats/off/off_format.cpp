@@ -8,6 +8,7 @@ constinit const FileFormat kOffFormat{
     .title = "OFF",
     .write_new = [](const DeformedSurface& deformed, bool, OutputFile& out) { write_new_off(deformed, out); },
     .rewrite = rewrite_off,
+    .refine = refine_off,
     .add_note = [](Surface& surface, bool,
                    const std::string& note) { add_source_line(surface, kOffFormat.name, "# " + note, 1); }};
 

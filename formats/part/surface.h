@@ -36,6 +36,8 @@ struct SurfaceSource {
   Bytes bytes;  // the file itself, for formats that are written again from it (OBJ, PLY, OFF, glTF,
                 // as one GLB); else empty
   std::vector<std::byte> stl_header;  // the 80 bytes of a binary STL's header; else empty
+  // Where the surface's vertices are not in the order of those in `bytes`: for each of the file's, the surface's.
+  std::vector<std::uint32_t> order{};
 };
 
 struct Surface {

@@ -26,6 +26,7 @@ constinit const FileFormat kPlyFormat{.name = "ply",
                                       .holds_attributes = true,
                                       .write_new = write_new_ply,
                                       .rewrite = rewrite_ply,
+                                      .refine = refine_ply,
                                       .add_note =
                                           [](Surface& surface, bool, const std::string& note) {
                                             add_source_line(surface, kPlyFormat.name, "comment " + note, 2);

@@ -1,12 +1,29 @@
 // Chord error: the distance of the mapped surface from its flat triangles.
 #pragma once
 #include "formats/lattice/body.h"
+#include "mapping/report/flat_triangle.h"
 #include "mapping/types/result.h"
 
 namespace flexel::mapping {
 
 // Triangles that miss more than this share of the largest displacement are too coarse.
 constexpr double kCoarseShare = 0.05;
+
+// A triangle with an edge of over two spacings.
+struct LongTriangle {
+  std::uint32_t number = 0;  // among those of triangulate(body.surface)
+  double longest = 0;        // m
+  FlatTriangle flat;
+};
+// All but those that are stretched across a fracture (CrackReport::spanning_triangles has them).
+[[nodiscard]] std::vector<LongTriangle> long_triangles(const Body& body, const MapResult& result);
+
+// Whether there are any; quick.
+[[nodiscard]] bool has_long_triangles(const Body& body);
+
+// What each of them misses.
+[[nodiscard]] std::vector<MissedPoint> look_at(const std::vector<FlatTriangle>& triangles, const Body& body,
+                                               const SpaceMap& map);
 
 // Looks at points of every triangle with an edge of over two spacings, which is what a lattice can bend; of
 // shorter ones nothing is counted. Points are carried as `blended` carries vertices, whatever the method.

@@ -48,7 +48,7 @@ std::string as_option(double metres) {
 std::string coarseness(const ChordError& chord) {
   return fmt::format(
       "its triangles, up to {} long, stay flat where the part bends and miss it by up to {} ({} of the "
-      "largest displacement) at ({}, {}, {}); read the mesh with --edge {} to split them",
+      "largest displacement) at ({}, {}, {}); --refine {} splits them",
       human_length(chord.longest_edge), human_length(chord.largest), human_share(chord.share()),
       human_length(chord.at.x()), human_length(chord.at.y()), human_length(chord.at.z()),
       as_option(sufficient_edge(chord)));
@@ -233,6 +233,7 @@ Json report_object(const MapReport& report, const MapOptions& options) {
   json["largest_vertex_displacement"] = report.largest_displacement;
   json["largest_stretch"] = report.largest_strain;
   json["triangles"] = quality.triangles;
+  json["split_from"] = optional_count(report.split_from);
   json["smallest_angle_before"] = quality.smallest_angle_before;
   json["smallest_angle_after"] = quality.smallest_angle_after;
   json["largest_normal_jump_added"] = quality.largest_normal_jump_added;

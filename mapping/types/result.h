@@ -77,7 +77,8 @@ struct MapReport {
   double largest_displacement = 0;                                     // m
   double largest_strain = 0;                                           // |principal stretch - 1| at a vertex
   SurfaceQuality quality;
-  std::optional<ChordError> chord;  // nothing of a surface that was cut along cracks
+  std::optional<ChordError> chord;        // nothing of a surface that was cut along cracks
+  std::optional<std::size_t> split_from;  // triangles, before they were split to show the deformation
   double lattice_volume_before = 0, lattice_volume_after = 0;  // m^3 of matter in whole cells; 0: no cells
   CrackReport crack;
   // The places of the vertices can be trusted.

@@ -70,7 +70,7 @@ def test_abaqus():
 def test_stl_is_read_with_its_triangles_in_order():
     box()
     path = deformed()
-    expect_ok(run("flexel-map", path, "-o", "bent.stl"))
+    expect_ok(run("flexel-map", path, "--keep-vertices", "-o", "bent.stl"))
     ours = stl_triangles("bent.stl")
     mesh = meshio.read("bent.stl")
     expect(len(ours) == 12 and np.array_equal(mesh.points[mesh.cells_dict["triangle"]], ours.astype(np.float32)), "triangles differ")
@@ -101,13 +101,27 @@ def test_obj_is_read_with_its_vertices_in_order():
     scene()
     expect_ok(run("flexel-voxelize", "part.obj", "--size", "5 mm", "-o", "rest.vtu"))
     expect_ok(run("flexel-simulate", "scene.toml", "rest.vtu", "-o", "body.vtu"))
-    expect_ok(run("flexel-map", "body.vtu", "-o", "bent.obj"))
+    expect_ok(run("flexel-map", "body.vtu", "--keep-vertices", "-o", "bent.obj"))
     before, faces = obj_parts("part.obj")
     vertices, new_faces = obj_parts("bent.obj")
     expect(faces == new_faces and len(before) == len(vertices), "faces or vertices were added, lost or reordered")
     expect(np.abs(vertices - before)[:, 2].max() > 0, "the load left no trace in the OBJ")
     mesh = meshio.read("bent.obj")
     expect(np.allclose(mesh.points, vertices, rtol=1e-6), "meshio reads other points")
+
+
+def test_split_surfaces_are_read():
+    write("part.obj", QUADS)
+    scene()
+    expect_ok(run("flexel-voxelize", "part.obj", "--size", "5 mm", "-o", "rest.vtu"))
+    for ending in ("obj", "ply", "off", "stl"):
+        expect_ok(run("flexel-map", "rest.vtu", "-o", f"whole.{ending}"))
+        expect_ok(run("flexel-voxelize", f"whole.{ending}", "--size", "5 mm", "-o", "own.vtu"))
+        expect_ok(run("flexel-map", "own.vtu", "--refine", "3 mm", "-o", f"split.{ending}"))
+        mesh = meshio.read(f"split.{ending}")
+        at = mesh.points[mesh.cells_dict["triangle"]].astype(float)
+        volume = np.einsum("ti,ti->t", at[:, 0], np.cross(at[:, 1], at[:, 2])).sum() / 6
+        expect(len(at) > 500 and abs(volume / 4000 - 1) < 1e-5, f"{ending}: {len(at)} triangles, {volume} mm^3")
 
 
 def test_new_ply_and_off_are_read():

@@ -51,7 +51,7 @@ TEST_P(Chord, IsTheSagittaOfABentBar) {
   EXPECT_FALSE(found.valid());
   const std::string verdict = report_lines(found).front();
   EXPECT_NE(verdict.find("cannot be used as it is: its triangles, up to 4.0"), std::string::npos) << verdict;
-  EXPECT_NE(verdict.find("with --edge"), std::string::npos) << verdict;
+  EXPECT_NE(verdict.find("--refine "), std::string::npos) << verdict;
   const auto json = nlohmann::json::parse(report_json(found, {GetParam()}));
   EXPECT_FALSE(json["valid"]);
   EXPECT_EQ(json["failures"]["coarse_triangles"], found.chord->coarse_triangles);

@@ -17,15 +17,16 @@ def pipeline(name, *arguments):
 
 
 def bent(before, after):
-    """Same triangles in the same order; the held end stays, the other goes down."""
+    """No triangle less (they are split where the part bends); the held end stays, the other goes down."""
     import numpy as np
     from files import any_stl_triangles
-    old, new = any_stl_triangles(before), any_stl_triangles(after)
-    expect(old.shape == new.shape and np.isfinite(new).all(), f"{old.shape} became {new.shape}")
-    moved = (new - old)[..., 2]
-    left, right = old[..., 0] < old[..., 0].min() + 1e-3, old[..., 0] > old[..., 0].max() - 1e-3
-    expect(abs(moved[left]).max() < 0.02 * abs(moved[right]).max(), f"the held end moved by {abs(moved[left]).max()} mm")
-    expect(moved[right].max() < -0.01, f"the loaded end moved by {moved[right].max()} mm")
+    old, new = any_stl_triangles(before).reshape(-1, 3), any_stl_triangles(after).reshape(-1, 3)
+    expect(len(new) >= len(old) and np.isfinite(new).all(), f"{len(old)} corners became {len(new)}")
+    ends = old[:, 0].min(), old[:, 0].max()
+    lowest = lambda points, end: points[abs(points[:, 0] - end) < 0.005 * (ends[1] - ends[0]), 2].min()
+    held, loaded = (lowest(new, end) - lowest(old, end) for end in ends)
+    expect(abs(held) < 0.02 * abs(loaded), f"the held end moved by {held} mm")
+    expect(loaded < -0.01, f"the loaded end moved by {loaded} mm")
 
 
 def test_openscad():
@@ -54,7 +55,7 @@ def test_meshio():
     meshio.write_points_cells("part.ply", points, [("triangle", index.reshape(-1, 3))])
     pipeline("meshio.sh", "part.ply", "out")
     bent("out/part.stl", "out/bent.stl")
-    expect(len(meshio.read("out/bent.ply").cells_dict["triangle"]) == len(triangles), "triangles were lost on the way")
+    expect(len(meshio.read("out/bent.ply").cells_dict["triangle"]) >= len(triangles), "triangles were lost on the way")
     hexahedra = meshio.read("out/body.inp").cells_dict["hexahedron"]
     expect(1000 < len(hexahedra) < 4000, f"{len(hexahedra)} hexahedra in the .inp")
 

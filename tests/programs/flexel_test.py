@@ -17,8 +17,8 @@ def vertices_of(stl):
 
 
 def test_deform_writes_every_output():
-    result = expect_ok(run("flexel", "deform", box(), *CASE, "-o", "bent.stl", "-o", "bent.obj", "-o", "bent.vtu", "--report",
-                           "report.json", "--summary", "summary.json"))
+    result = expect_ok(run("flexel", "deform", box(), *CASE, "--keep-vertices", "-o", "bent.stl", "-o", "bent.obj", "-o", "bent.vtu",
+                           "--report", "report.json", "--summary", "summary.json"))
     expect_only("box.stl", "bent.stl", "bent.obj", "bent.vtu", "report.json", "summary.json")
     expect(result.out == b"", "everything that is said goes to stderr")
     before, after = vertices_of("box.stl"), vertices_of("bent.stl")
@@ -36,19 +36,21 @@ def test_large_flat_triangles_are_told_and_the_advice_mends_them():
     """Twelve triangles around a box that bends: nothing between its ends shows it."""
     box()
     bend = ["--material", "PLA", "--fix", "xmin", "--push", "zmax: 0 0 -20 N", "--count", "4000"]
-    coarse = expect_ok(run("flexel", "deform", "box.stl", *bend, "-o", "bent.stl", "--report", "report.json"))
+    kept = [*bend, "--keep-vertices"]
+    coarse = expect_ok(run("flexel", "deform", "box.stl", *kept, "-o", "bent.stl", "--report", "report.json"))
     found = json.load(open("report.json"))
     expect(not found["valid"] and found["failures"]["coarse_triangles"] > 3, f"{found}")
     # Under an even load w the middle of a cantilever moves by 17/48 of its end, and the chord is at a half.
     expect(0.10 < found["chord_error"]["share"] < 0.2, f"{found['chord_error']}")
-    advice = re.search(r"warning: the mapped surface cannot be used as it is: its triangles, up to 41.2 mm long, .* read the mesh with "
-                       r"(--edge) (\S+) to split them", coarse.err)
+    advice = re.search(r"warning: the mapped surface cannot be used as it is: its triangles, up to 41.2 mm long, .* (--refine) (\S+) splits them",
+                       coarse.err)
     expect(advice, coarse.err)
-    expect_error(run("flexel", "deform", "box.stl", *bend, "-o", "strict.stl", "--strict"), "flexel", "--edge", code=4)
+    expect_error(run("flexel", "deform", "box.stl", *kept, "-o", "strict.stl", "--strict"), "flexel", "--refine", code=4)
     expect(not os.path.exists("strict.stl"), "nothing is written")
-    fine = expect_ok(run("flexel", "deform", "box.stl", *bend, *advice.groups(), "-o", "fine.stl", "--strict", "--report", "report.json"))
-    found = json.load(open("report.json"))
-    expect(found["valid"] and found["chord_error"]["share"] < 0.02 and "cannot be used" not in fine.err, f"{found} {fine.err}")
+    for split in (advice.groups(), ("--edge", advice[2])):
+        fine = expect_ok(run("flexel", "deform", "box.stl", *bend, *split, "-o", "fine.stl", "--strict", "--report", "report.json"))
+        found = json.load(open("report.json"))
+        expect(found["valid"] and found["chord_error"]["share"] < 0.02 and "cannot be used" not in fine.err, f"{found} {fine.err}")
 
 
 def test_edge_splits_meshes_of_every_format():

@@ -43,7 +43,7 @@ def test_another_mesh_follows_the_same_deformation():
 
 
 def test_another_mesh_is_split_too():
-    coarse = expect_ok(run("flexel-map", bent(), "-o", "own.obj"))
+    coarse = expect_ok(run("flexel-map", bent(), "--keep-vertices", "-o", "own.obj"))
     expect("stay flat where the part bends" in coarse.err, coarse.err)
     expect_ok(run("flexel-map", "body.vtu", "--quiet", "-o", "box.obj"))
     fine = expect_ok(run("flexel-map", "bent.vtu", "--onto", "box.obj", "--edge", "4 mm", "-o", "fine.obj", "--strict"))
@@ -100,11 +100,12 @@ def test_a_scale_is_said_in_the_file():
 def test_a_series_gives_a_file_for_each_frame():
     bent()
     expect_ok(run("flexel-map", "body.vtu", "-o", "rest.stl"))
-    expect_ok(run("flexel-map", "bent.vtu", "-o", "alone.stl"))
+    whole = "--keep-vertices"
+    expect_ok(run("flexel-map", "bent.vtu", whole, "-o", "alone.stl"))
     frames = "".join(f'<DataSet timestep="{i}" part="0" file="{name}"/>' for i, name in enumerate(["body.vtu", "bent.vtu"]))
     write("run.pvd", f'<?xml version="1.0"?><VTKFile type="Collection" version="0.1"><Collection>{frames}</Collection></VTKFile>')
-    expect_ok(run("flexel-map", "run.pvd", "-o", "frame.stl"))
-    expect_ok(run("flexel-map", "run.pvd", "-o", "n{frame}.stl", "--report", "r.json"))
+    expect_ok(run("flexel-map", "run.pvd", whole, "-o", "frame.stl"))
+    expect_ok(run("flexel-map", "run.pvd", whole, "-o", "n{frame}.stl", "--report", "r.json"))
     for name in ["frame_00001.stl", "n00001.stl"]:
         expect(open(name, "rb").read() == open("alone.stl", "rb").read(), f"{name} is what the frame alone gives")
     expect(open("frame_00000.stl", "rb").read() == open("rest.stl", "rb").read(), "the first frame is at rest")
@@ -120,7 +121,7 @@ def test_a_saved_binding_gives_the_same_bytes():
     bent()
     for extra in [[], ["--onto", "strip.obj"]]:
         for method in ["affine", "gram-schmidt"]:
-            plain = ["flexel-map", "bent.vtu", *extra]
+            plain = ["flexel-map", "bent.vtu", "--keep-vertices", *extra]
             expect_ok(run(*plain, "--method", method, "-o", "plain.obj"))
             expect_ok(run(*plain, "--method", method, "--save-binding", "part.binding", "-o", "saving.obj"))
             expect_ok(run(*plain, "--binding", "part.binding", "--report", "report.json", "-o", "bound.obj"))
@@ -173,7 +174,7 @@ def test_a_vtu_surface_is_read_by_meshio():
         import meshio
     except ImportError:
         return
-    expect_ok(run("flexel-map", bent(), "-o", "a.vtu"))
+    expect_ok(run("flexel-map", bent(), "--keep-vertices", "-o", "a.vtu"))
     mesh = meshio.read("a.vtu")
     expect(len(mesh.points) == 8 and mesh.point_data["displacement"].shape == (8, 3), f"{mesh}")
 

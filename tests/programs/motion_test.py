@@ -87,7 +87,7 @@ def test_pipe_carries_the_last_state():
     body()
     scene(text=SWING)
     state = expect_ok(run("flexel-simulate", "scene.toml", "body.vtu")).out
-    mapped = expect_ok(run("flexel-map", "--format", "stl", stdin=state)).out
+    mapped = expect_ok(run("flexel-map", "--format", "stl", "--keep-vertices", stdin=state)).out
     expect(len(mapped) == 84 + 50 * 12, "the box should come out")
 
 

@@ -19,7 +19,7 @@ voxelize/types voxelize/mesh voxelize/classify voxelize/heal voxelize/lattice vo
 simulate/laws simulate/input simulate/result simulate/linear simulate/state simulate/rigid simulate/conditions simulate/models
 simulate/kernels simulate/matter simulate/gravitation simulate/contact/points simulate/contact simulate/effects simulate/events simulate/scene
 simulate/equilibrium simulate/estimate simulate/probes simulate/quadratic simulate/live simulate/stepping simulate/implicit simulate/time simulate
-mapping/types mapping/anchors mapping/checks mapping/methods mapping/space mapping/crack mapping/report mapping
+mapping/types mapping/anchors mapping/checks mapping/methods mapping/space mapping/crack mapping/report mapping/refine mapping
 cad/read cad/deform cad
 flexel/process flexel/picture/canvas flexel/picture/render flexel/picture flexel/study/runs flexel/study flexel/export
 flexel/measure flexel/accuracy flexel
@@ -98,7 +98,7 @@ def test_files_do_not_include_each_other():
 def test_source_files_have_a_header():
     """Going to the header of a file works: it has the same name, or the file's begins with it (stepper_memory.cpp, stepper.h)."""
     # What a reader or a writer of one format gives is declared for all of them together.
-    shared = re.compile(r"formats/\w+/(read_\w+|write_\w+|\w+_format)\.cpp$|cad/read/(\w+_reader|occt_mesh)\.cpp$|/main\.cpp$|/\w+_command\.cpp$")
+    shared = re.compile(r"formats/\w+/(read_\w+|write_\w+|refine_\w+|\w+_format)\.cpp$|cad/read/(\w+_reader|occt_mesh)\.cpp$|/main\.cpp$|/\w+_command\.cpp$")
     wrong = []
     for path in (path for folder in CODE for path in code_files(folder, ".cpp")):
         stems = [header.stem for header in path.parent.glob("*.h")]
@@ -182,7 +182,8 @@ def test_heavy_libraries_stay_in_source_files():
     expect(not wrong, f"headers that show a heavy library: {wrong}")
     users = [str(path.relative_to(SOURCE)) for folder in CODE for path in code_files(folder)
              if '#include "formats/gltf/gltf_content.h"' in path.read_text(encoding="utf-8")]
-    expect(users == ["formats/gltf/gltf_content.cpp", "formats/gltf/read_gltf.cpp", "formats/gltf/write_gltf.cpp"],
+    expect(users == ["formats/gltf/gltf_content.cpp", "formats/gltf/read_gltf.cpp", "formats/gltf/refine_gltf.cpp",
+                     "formats/gltf/write_gltf.cpp"],
            f"formats/gltf/gltf_content.h is for glTF alone: {users}")
 
 

@@ -1,0 +1,152 @@
+// The surface is mapped as it is; where that is coarse it is split and mapped again. The states of a series are gone
+// through in their order, each with the surface as the states before it split it.
+#include "mapping/map_refined.h"
+
+#include <fmt/format.h>
+
+#include "base/error.h"
+#include "base/human.h"
+#include "base/stop.h"
+#include "base/units.h"
+#include "formats/exchange/refined_file.h"
+#include "formats/lattice/body_file.h"
+#include "formats/part/subdivide.h"
+#include "mapping/methods/map_surface.h"
+#include "mapping/refine/refine.h"
+#include "mapping/report/chord.h"
+#include "mapping/series.h"
+
+namespace flexel::mapping {
+namespace {
+
+// The body's own surface and the cells under it, which come back at the end.
+class OwnSurface {
+ public:
+  explicit OwnSurface(Body& body)
+      : body_(body),
+        surface_(body.surface),
+        offsets_(body.surface_cell_offsets),
+        cells_(body.surface_cells) {}
+  OwnSurface(const OwnSurface&) = delete;
+  OwnSurface& operator=(const OwnSurface&) = delete;
+  ~OwnSurface() {
+    std::swap(body_.surface, surface_);
+    std::swap(body_.surface_cell_offsets, offsets_);
+    std::swap(body_.surface_cells, cells_);
+  }
+
+ private:
+  Body& body_;
+  Surface surface_;
+  std::vector<std::uint32_t> offsets_, cells_;
+};
+
+void warn_of_budget(Progress& progress) {
+  progress.warn(
+      fmt::format("the surface was split into {} triangles, the most that are made, and some still stay flat "
+                  "where the part bends",
+                  human_count(kMostTriangles)));
+}
+
+// What the state of a whole surface asks for.
+std::optional<Refinement> refinement_of_state(const Body& body, const MapResult& result,
+                                              const std::optional<ChordError>& chord, Progress& progress) {
+  if (!chord || chord->coarse_triangles == 0) return std::nullopt;
+  RefinedWhereCoarse found = refine_where_coarse(body, result, chord->largest_displacement);
+  if (!found.refinement.changes()) return std::nullopt;
+  if (!found.ended) warn_of_budget(progress);
+  return std::move(found.refinement);
+}
+
+MappedPart map_split(Body& body, const MapOptions& options, const CrackOptions& crack,
+                     const Refinement& refinement, Surface written, Progress& progress) {
+  const std::size_t before = triangle_count(body.surface);
+  const OwnSurface own(body);
+  take_refined(body, refined(body.surface, refinement), refinement);
+  MappedPart mapped = map_part(body, options, crack, progress);
+  mapped.report.split_from = before;
+  mapped.refined = std::move(written);
+  return mapped;
+}
+
+}  // namespace
+
+std::size_t triangle_count(const Surface& surface) {
+  return surface.polygon_vertices.size() - 2 * surface.polygon_count();
+}
+
+SplitSurface split_surface(const Surface& surface, const Refinement& refinement, const RefineOptions& options,
+                           std::span<const SurfaceFormat> formats) {
+  SplitSurface split;
+  try {
+    split.surface = refined_with_file(surface, refinement, formats);
+  } catch (const InputError& error) {
+    if (options.asked) throw;
+    split.line = fmt::format("the triangles are too large for this deformation and were not split: {}: {}",
+                             error.where(), error.what());
+    return split;
+  }
+  split.line = fmt::format("{} triangles became {}", human_count(triangle_count(surface)),
+                           human_count(triangle_count(*split.surface)));
+  split.line +=
+      options.mode == RefineOptions::Mode::to_edge
+          ? fmt::format(", with edges of at most {}", human_length(options.edge))
+          : ": they were split where they stay flat and the part bends (--keep-vertices leaves them whole)";
+  return split;
+}
+
+MappedPart map_refined(Body& body, const MapOptions& options, const CrackOptions& crack,
+                       const RefineOptions& refine, const Surface* written,
+                       std::span<const SurfaceFormat> formats, Progress& progress) {
+  using Mode = RefineOptions::Mode;
+  std::optional<MappedPart> whole;
+  std::optional<Refinement> refinement;
+  if (refine.mode == Mode::to_edge) {
+    refinement = refine_to_edge(body.surface, refine.edge);
+  } else {
+    whole = map_part(body, options, crack, progress);
+    if (refine.mode == Mode::automatic && !whole->cracked)
+      refinement = refinement_of_state(body, whole->result, whole->report.chord, progress);
+  }
+  if (!refinement || !refinement->changes())
+    return whole ? *std::move(whole) : map_part(body, options, crack, progress);
+  SplitSurface split =
+      split_surface(written != nullptr ? *written : body.surface, *refinement, refine, formats);
+  if (!split.surface) {
+    whole->split_line = std::move(split.line);
+    return *std::move(whole);
+  }
+  MappedPart mapped = map_split(body, options, crack, *refinement, *std::move(split.surface), progress);
+  mapped.split_line = std::move(split.line);
+  return mapped;
+}
+
+std::optional<Refinement> refinement_of_series(const Body& first, const std::vector<std::string>& files,
+                                               const MapOptions& options, Progress& progress) {
+  if (!has_long_triangles(first)) return std::nullopt;
+  MapOptions quick;
+  quick.method = options.method;
+  std::optional<Refinement> all;
+  Body body;
+  for (const std::string& file : files) {
+    check_stop();
+    progress.update(0, "looking for coarse triangles in " + file);
+    Body next = read_body(file);
+    if (body.parts.empty()) {
+      next.surface = refined(first.surface, unsplit(first.surface));
+      next.surface_cell_offsets = first.surface_cell_offsets;
+      next.surface_cells = first.surface_cells;
+    } else {
+      take_surface(next, body, file);
+    }
+    body = std::move(next);
+    const MapResult result = map_surface(body, quick, progress);
+    const auto found = refinement_of_state(body, result, chord_error(body, result), progress);
+    if (!found) continue;
+    take_refined(body, refined(body.surface, *found), *found);
+    all = all ? composed(*all, *found) : *found;
+  }
+  return all;
+}
+
+}  // namespace flexel::mapping

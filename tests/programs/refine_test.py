@@ -1,0 +1,409 @@
+"""Triangles too large for the deformation are split (flexel-map --refine), with all that their files hold."""
+
+import json
+import os
+import struct
+
+from harness import box_triangles, expect, expect_error, expect_ok, main, run, write
+
+SIZE = (100.0, 10.0, 6.0)
+# Corners of each side, counter-clockwise from outside, and texture coordinates of its own: linear on each side.
+CORNERS = [(x, y, z) for z in (0.0, SIZE[2]) for y in (0.0, SIZE[1]) for x in (0.0, SIZE[0])]
+SIDES = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+NORMALS = [(0, 0, -1), (0, 0, 1), (0, -1, 0), (0, 1, 0), (-1, 0, 0), (1, 0, 0)]
+BEND = ["--material", "PLA", "--fix", "xmin", "--push", "xmax: 0 0 -110 N", "--size", "2 mm", "--no-estimate", "--quiet"]
+
+
+def uv(side, p):
+    """Where a side's picture has this point."""
+    return (0.1 * side + 0.003 * p[0] + 0.001 * p[2], 0.02 * p[1] + 0.004 * p[2] - 0.05 * side)
+
+
+def tint(p):
+    return [p[0] / SIZE[0], p[1] / SIZE[1], p[2] / SIZE[2]]
+
+
+def obj_bar(name="bar.obj", negative=False):
+    lines = ["# by hand", "mtllib bar.mtl", "o bar"]
+    lines += ["v " + " ".join(f"{c}" for c in (*p, *tint(p))) for p in CORNERS]
+    lines += ["vt {} {}".format(*uv(s, CORNERS[c])) for s, side in enumerate(SIDES) for c in side]
+    lines += ["vn {} {} {}".format(*n) for n in NORMALS]
+    for s, side in enumerate(SIDES):
+        lines += [f"g side{s}", f"usemtl paint{s % 2}", "s off"]
+        if negative:
+            lines.append("f " + " ".join(f"{c - 8}/{4 * s + k - 24}/{s - 6}" for k, c in enumerate(side)))
+        else:
+            lines.append("f " + " ".join(f"{c + 1}/{4 * s + k + 1}/{s + 1}" for k, c in enumerate(side)))
+    return write(name, "\n".join(lines) + "\n")
+
+
+def glb_bar(name="bar.glb"):
+    """Every side with corners of its own, normals, texture coordinates and colours; two materials."""
+    floats, indices = [], []
+    for s, side in enumerate(SIDES):
+        for c in side:
+            floats.append((*[x / 1000 for x in CORNERS[c]], *NORMALS[s], *uv(s, CORNERS[c]), *tint(CORNERS[c])))
+        indices.append([4 * s + i for i in (0, 1, 2, 0, 2, 3)])
+    vertices = b"".join(struct.pack("<11f", *row) for row in floats)
+    first, second = sum(indices[:3], []), sum(indices[3:], [])
+    listed = struct.pack("<36H", *first, *second)
+    accessors = [{"bufferView": 0, "byteOffset": at, "componentType": 5126, "count": 24, "type": kind}
+                 for at, kind in ((0, "VEC3"), (12, "VEC3"), (24, "VEC2"), (32, "VEC3"))]
+    accessors[0].update(min=[0, 0, 0], max=[x / 1000 for x in SIZE])
+    accessors += [{"bufferView": 1, "byteOffset": 36 * n, "componentType": 5123, "count": 18, "type": "SCALAR"} for n in (0, 1)]
+    attributes = {"POSITION": 0, "NORMAL": 1, "TEXCOORD_0": 2, "COLOR_0": 3}
+    head = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0, "name": "bar"}],
+            "meshes": [{"primitives": [{"attributes": attributes, "indices": 4 + n, "material": n} for n in (0, 1)]}],
+            "materials": [{"name": "low"}, {"name": "high"}], "accessors": accessors,
+            "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": len(vertices), "byteStride": 44},
+                            {"buffer": 0, "byteOffset": len(vertices), "byteLength": 72}],
+            "buffers": [{"byteLength": len(vertices) + 72}]}
+    return write(name, glb(head, vertices + listed))
+
+
+def glb(head, binary):
+    text = json.dumps(head).encode()
+    text += b" " * (-len(text) % 4)
+    binary += b"\0" * (-len(binary) % 4)
+    return (struct.pack("<3I", 0x46546C67, 2, 28 + len(text) + len(binary)) + struct.pack("<2I", len(text), 0x4E4F534A) + text
+            + struct.pack("<2I", len(binary), 0x004E4942) + binary)
+
+
+def read_glb(name):
+    data = open(name, "rb").read()
+    size = struct.unpack_from("<I", data, 12)[0]
+    return json.loads(data[20:20 + size]), data[28 + size:]
+
+
+def accessor(head, binary, number):
+    it = head["accessors"][number]
+    view = head["bufferViews"][it["bufferView"]]
+    n = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}[it["type"]]
+    code = {5126: "f", 5123: "H", 5125: "I"}[it["componentType"]]
+    stride = view.get("byteStride", n * struct.calcsize(code))
+    at = view.get("byteOffset", 0) + it.get("byteOffset", 0)
+    return [struct.unpack_from(f"<{n}{code}", binary, at + i * stride) for i in range(it["count"])]
+
+
+def ply_bar(name="bar.ply", encoding="ascii", index="int"):
+    """Colours at the vertices, texture coordinates of each corner of a face, a number of each face."""
+    head = f"ply\nformat {encoding} 1.0\ncomment by hand\nelement vertex 8\n"
+    head += "".join(f"property double {c}\n" for c in "xyz") + "".join(f"property uchar {c}\n" for c in ("red", "green", "blue"))
+    head += f"element face 6\nproperty list uchar {index} vertex_indices\nproperty list uchar float texcoord\nproperty int side\n"
+    head += "element edge 1\nproperty int vertex1\nproperty int vertex2\nend_header\n"
+    rows = [(*p, *[round(255 * c) for c in tint(p)]) for p in CORNERS]
+    faces = [(side, [x for c in side for x in uv(s, CORNERS[c])], s) for s, side in enumerate(SIDES)]
+    if encoding == "ascii":
+        lines = [" ".join(map(str, row)) for row in rows]
+        lines += [" ".join(map(str, (4, *side, 8, *t, s))) for side, t, s in faces] + ["0 1"]
+        return write(name, head + "\n".join(lines) + "\n")
+    order = "<" if "little" in encoding else ">"
+    data = b"".join(struct.pack(order + "3d3B", *row) for row in rows)
+    code = {"int": "i", "uchar": "B"}[index]
+    data += b"".join(struct.pack(order + "B4" + code + "B8fi", 4, *side, 8, *t, s) for side, t, s in faces)
+    return write(name, head.encode() + data + struct.pack(order + "2i", 0, 1))
+
+
+def read_ply(name):
+    """Vertices with colours; faces with their corners' texture coordinates and the number of their side."""
+    data = open(name, "rb").read()
+    at = data.index(b"end_header\n") + 11
+    head = data[:at].decode().split()
+    counts = [int(head[n + 2]) for n, word in enumerate(head) if word == "element"]
+    if "ascii" in head:
+        words = iter(data[at:].split())
+        take = lambda code: [(int if c in "iB" else float)(next(words)) for c in code]
+    else:
+        order = "<" if "binary_little_endian" in head else ">"
+
+        def take(code):
+            nonlocal at
+            found = struct.unpack_from(order + code, data, at)
+            at += struct.calcsize("=" + code)
+            return list(found)
+    vertices = [take("dddBBB") for _ in range(counts[0])]
+    faces = []
+    for _ in range(counts[1]):
+        corners = take("i" * take("B")[0])
+        faces.append((corners, take("f" * take("B")[0]), take("i")[0]))
+    return vertices, faces, [take("ii") for _ in range(counts[2])]
+
+
+def off_bar(name="bar.off"):
+    lines = ["COFF", "# by hand", "8 6 12"]
+    lines += [" ".join(f"{c}" for c in p) + " " + " ".join(f"{round(255 * c)}" for c in tint(p)) + " 255" for p in CORNERS]
+    lines += ["4 " + " ".join(map(str, side)) + f" {40 * s} 0 0" for s, side in enumerate(SIDES)]
+    return write(name, "\n".join(lines) + "\n")
+
+
+def stl_bar(name="bar.stl"):
+    lines = ["solid bar"]
+    for triangle in box_triangles(SIZE):
+        lines += ["facet normal 0 0 0", "outer loop"] + ["vertex {} {} {}".format(*p) for p in triangle] + ["endloop", "endfacet"]
+    return write(name, "\n".join(lines + ["endsolid bar"]) + "\n")
+
+
+BARS = {"stl": stl_bar, "obj": obj_bar, "ply": ply_bar, "off": off_bar, "glb": glb_bar}
+
+
+def near(a, b, tolerance=1e-5):
+    return len(a) == len(b) and all(abs(x - y) <= tolerance for x, y in zip(a, b))
+
+
+def info(name):
+    return json.loads(expect_ok(run("flexel", "info", name, "--json")).out)["files"][0]["parts"][0]
+
+
+def rest(name):
+    return expect_ok(run("flexel-voxelize", name, "--size", "2 mm", "--quiet", "-o", "rest.vtu")) and "rest.vtu"
+
+
+def bent(name, body="bent.vtu"):
+    """The bar's end moves by half of its length."""
+    expect_ok(run("flexel", "deform", name, *BEND, "-o", body))
+    return body
+
+
+def split(name, out, how="7 mm"):
+    """The bar at rest, split: what is linear on its sides must stay so."""
+    found = expect_ok(run("flexel-map", rest(name), "--refine", how, "-o", out))
+    expect("triangles became" in found.err, found.err)
+    part = info(out)
+    expect(part["closed"] and abs(part["volume"] / 6e-6 - 1) < 1e-6 and part["triangles"] > 600, f"{part}")
+
+
+def read_obj(name):
+    lines, kinds = open(name).read().splitlines(), {"v": [], "vt": [], "vn": []}
+    faces, group, paint = [], None, None
+    for words in (line.split() for line in lines if line):
+        if words[0] in kinds:
+            kinds[words[0]].append([float(x) for x in words[1:]])
+        elif words[0] == "g":
+            group = words[1]
+        elif words[0] == "usemtl":
+            paint = words[1]
+        elif words[0] == "f":
+            faces.append((group, paint, [[int(x) - 1 for x in word.split("/")] for word in words[1:]]))
+    return lines, kinds, faces
+
+
+def test_obj_keeps_texture_coordinates_groups_materials_and_colours():
+    for negative in (False, True):
+        obj_bar(negative=negative)
+        split("bar.obj", "out.obj")
+        lines, kinds, faces = read_obj("out.obj")
+        expect(lines[:3] == ["# by hand", "mtllib bar.mtl", "o bar"] and lines.count("s off") == 6, f"{lines[:9]}")
+        for group, paint, corners in faces:
+            side = int(group[4:])
+            expect(paint == f"paint{side % 2}" and len(corners) == 3, f"{group} {paint}")
+            for v, t, n in corners:
+                p = kinds["v"][v]
+                expect(near(kinds["vt"][t], uv(side, p)), f"{kinds['vt'][t]} at {p} of side {side}")
+                expect(near(kinds["vn"][n], NORMALS[side]), "a flat side at rest")
+                expect(near(p[3:], tint(p)), f"{p}")
+        expect(len({t for _, _, corners in faces for _, t, _ in corners}) > len(kinds["v"]), "seams have two of them")
+        expect([line for line in lines if line.startswith("v ")][:8] ==
+               [line for line in open("bar.obj").read().splitlines() if line.startswith("v ")], "the file's own come first")
+
+
+def test_obj_normals_turn_with_the_bent_side():
+    obj_bar()
+    expect_ok(run("flexel-map", bent("bar.obj"), "-o", "out.obj", "--strict"))
+    _, kinds, faces = read_obj("out.obj")
+    top = [(kinds["v"][v], kinds["vn"][n]) for group, _, corners in faces if group == "side1" for v, _, n in corners]
+    low, high = min(top), max(top)
+    expect(low[1][2] > 0.99 and 0.5 < high[1][0] < 0.85, f"upright where it is held, over 30 degrees at the end: {low} {high}")
+
+
+def test_glb_keeps_texture_coordinates_normals_colours_and_materials():
+    glb_bar()
+    split("bar.glb", "out.glb")
+    head, binary = read_glb("out.glb")
+    expect([m["name"] for m in head["materials"]] == ["low", "high"] and len(head["meshes"]) == 1, f"{head}")
+    for primitive in head["meshes"][0]["primitives"]:
+        columns = {name: accessor(head, binary, number) for name, number in primitive["attributes"].items()}
+        listed = [i for i, in accessor(head, binary, primitive["indices"])]
+        expect(len(listed) > 300 and max(listed) < len(columns["POSITION"]), f"{len(listed)}")
+        for triangle in zip(listed[::3], listed[1::3], listed[2::3]):
+            side = NORMALS.index(tuple(round(x) for x in columns["NORMAL"][triangle[0]]))
+            expect((side < 3) == (primitive["material"] == 0), "the material of its side")
+            for v in triangle:
+                p = [1000 * x for x in columns["POSITION"][v]]
+                expect(near(columns["NORMAL"][v], NORMALS[side]), f"{columns['NORMAL'][v]}")
+                expect(near(columns["TEXCOORD_0"][v], uv(side, p)), f"{columns['TEXCOORD_0'][v]} at {p} of side {side}")
+                expect(near(columns["COLOR_0"][v], tint(p)), f"{columns['COLOR_0'][v]} at {p}")
+
+
+def test_glb_shown_by_two_nodes_is_split_for_each():
+    glb_bar()
+    head, binary = read_glb("bar.glb")
+    head["nodes"] = [{"mesh": 0, "name": "left"}, {"mesh": 0, "name": "right", "translation": [0, 0.1, 0], "scale": [1, -1, 1]}]
+    head["scenes"][0]["nodes"] = [0, 1]
+    write("two.glb", glb(head, binary))
+    expect_ok(run("flexel-map", rest("two.glb"), "--refine", "7 mm", "-o", "out.glb"))
+    parts = json.loads(expect_ok(run("flexel", "info", "out.glb", "--json")).out)["files"][0]["parts"]
+    expect([p["name"] for p in parts] == ["left", "right"], f"{parts}")
+    expect(all(p["closed"] and abs(p["volume"] / 6e-6 - 1) < 1e-6 and p["triangles"] > 600 for p in parts), f"{parts}")
+    expect_ok(run("flexel", "deform", "two.glb", *BEND, "-o", "bent.vtu"))
+    bent_parts = expect_ok(run("flexel-map", "bent.vtu", "-o", "out.glb", "--strict")) and \
+        json.loads(expect_ok(run("flexel", "info", "out.glb", "--json")).out)["files"][0]["parts"]
+    expect(all(p["closed"] and abs(p["volume"] / 6e-6 - 1) < 0.01 for p in bent_parts), f"{bent_parts}")
+
+
+def test_ply_keeps_colours_lists_and_numbers():
+    for encoding in ("ascii", "binary_little_endian", "binary_big_endian"):
+        ply_bar(encoding=encoding)
+        split("bar.ply", "out.ply")
+        vertices, faces, edges = read_ply("out.ply")
+        expect(b"comment by hand" in open("out.ply", "rb").read() and edges == [[0, 1]], f"{edges}")
+        for v in vertices:
+            expect(near(v[3:], [255 * c for c in tint(v)], 3), f"{v}")
+        for corners, texture, side in faces:
+            for n, v in enumerate(corners):
+                expect(near(texture[2 * n:2 * n + 2], uv(side, vertices[v])), f"{texture} {vertices[v]} {side}")
+    ply_bar(encoding="binary_little_endian", index="uchar")
+    expect_error(run("flexel-map", rest("bar.ply"), "--refine", "3 mm", "-o", "out.ply"), "flexel-map", "bar.ply", "8 bits",
+                 "--keep-vertices")
+
+
+def test_off_keeps_colours():
+    off_bar()
+    split("bar.off", "out.off")
+    words = [line.split() for line in open("out.off").read().splitlines() if not line.startswith("#")]
+    expect(words[0] == ["COFF"], f"{words[:2]}")
+    vertices = [[float(x) for x in row] for row in words[2:2 + int(words[1][0])]]
+    faces = words[2 + int(words[1][0]):]
+    expect(len(faces) == int(words[1][1]) and faces, "as many as it says")
+    for v in vertices:
+        expect(near(v[3:], [255 * c for c in tint(v)] + [255], 3), f"{v}")
+    for row in faces:
+        side = int(row[4]) // 40
+        for v in row[1:4]:
+            axis = max(range(3), key=lambda a: abs(NORMALS[side][a]))
+            expect(abs(vertices[int(v)][axis] - (SIZE[axis] if sum(NORMALS[side]) > 0 else 0)) < 1e-9, f"{row} lies on side {side}")
+
+
+def test_a_bent_bar_keeps_its_volume_in_every_format():
+    """52 mm of 100: twelve triangles stay straight and lose a tenth of it."""
+    for ending, bar in BARS.items():
+        bar()
+        body = bent(f"bar.{ending}")
+        kept = run("flexel-map", body, "--keep-vertices", "-o", f"kept.{ending}")
+        expect("stay flat where the part bends" in kept.err and "--refine" in expect_ok(kept).err, kept.err)
+        found = expect_ok(run("flexel-map", body, "-o", f"fine.{ending}", "--strict", "--report", "report.json"))
+        expect("12 triangles became" in found.err and "--keep-vertices" in found.err, found.err)
+        report = json.load(open("report.json"))
+        expect(report["valid"] and report["split_from"] == 12 and report["failures"]["coarse_triangles"] == 0, f"{report}")
+        coarse, fine = info(f"kept.{ending}"), info(f"fine.{ending}")
+        expect(coarse["volume"] < 5.5e-6 and coarse["triangles"] == 12, f"{coarse}")
+        expect(fine["closed"] and abs(fine["volume"] / 6e-6 - 1) < 0.01 and fine["triangles"] > 100, f"{fine}")
+
+
+def test_nothing_coarse_changes_nothing():
+    for ending, bar in BARS.items():
+        bar()
+        expect_ok(run("flexel", "deform", f"bar.{ending}", *BEND[:5], "xmax: 500 0 0 N", *BEND[6:], "-o", "body.vtu"))
+        expect_ok(run("flexel-map", "body.vtu", "-o", f"auto.{ending}"))
+        expect_ok(run("flexel-map", "body.vtu", "--refine", "off", "-o", f"off.{ending}"))
+        expect(open(f"auto.{ending}", "rb").read() == open(f"off.{ending}", "rb").read(), ending)
+        expect(info(f"auto.{ending}")["triangles"] == 12, ending)
+
+
+def test_threads_give_the_same_file():
+    obj_bar()
+    bent("bar.obj")
+    for n in (1, 3):
+        expect_ok(run("flexel-map", "bent.vtu", "--threads", n, "-o", f"out{n}.obj"))
+    expect(open("out1.obj").read() == open("out3.obj").read(), "the same bytes")
+
+
+def test_what_cannot_be_split_stays_and_is_named():
+    glb_bar()
+    head, binary = read_glb("bar.glb")
+    head["meshes"][0]["primitives"][0]["targets"] = [{"POSITION": 0}]
+    write("morph.glb", glb(head, binary))
+    body = bent("morph.glb")
+    found = expect_ok(run("flexel-map", body, "-o", "out.glb"))
+    expect("were not split: morph.glb" in found.err and "morph targets" in found.err and "stay flat" in found.err, found.err)
+    expect(info("out.glb")["triangles"] == 12, "as it was")
+    expect_error(run("flexel-map", body, "--strict", "-o", "strict.glb"), "flexel-map", "--refine", code=4)
+    expect_error(run("flexel-map", body, "--refine", "auto", "-o", "x.glb"), "flexel-map", "morph.glb", "morph targets", "--edge")
+    # Another format does not hold them anyway.
+    expect_ok(run("flexel-map", body, "--strict", "-o", "out.stl"))
+    expect(not os.path.exists("strict.glb") and not os.path.exists("x.glb"), "nothing is written")
+
+
+def test_series_have_the_same_triangles_in_every_frame():
+    obj_bar()
+    rest("bar.obj")
+    bent("bar.obj")
+    write("run.pvd", '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1"><Collection>\n'
+          '<DataSet timestep="0" file="rest.vtu"/>\n<DataSet timestep="1" file="bent.vtu"/>\n</Collection></VTKFile>\n')
+    found = expect_ok(run("flexel-map", "run.pvd", "-o", "out.obj", "--report", "report.json", "--strict"))
+    expect(found.err.count("triangles became") == 1, found.err)
+    faces = [[line for line in open(f"out_0000{n}.obj") if line[0] in "fg"] for n in (0, 1)]
+    expect(faces[0] == faces[1] and len(faces[0]) > 100, "the same triangles")
+    expect(abs(info("out_00000.obj")["volume"] / 6e-6 - 1) < 1e-6 and abs(info("out_00001.obj")["volume"] / 6e-6 - 1) < 0.01, "of both")
+    expect_ok(run("flexel-map", "run.pvd", "-o", "kept.obj", "--keep-vertices"))
+    expect(open("kept_00000.obj").read() == open("bar.obj").read(), "the file itself")
+    expect_ok(run("flexel-map", "run.pvd", "-o", "even.obj", "--refine", "9 mm"))
+    expect(info("even_00000.obj")["triangles"] == info("even_00001.obj")["triangles"] > 300, "to an edge too")
+
+
+def test_other_meshes_are_split_as_well():
+    obj_bar()
+    bent("bar.obj")
+    found = expect_ok(run("flexel-map", "bent.vtu", "--onto", "bar.obj", "-o", "out.obj", "--strict"))
+    expect("triangles became" in found.err, found.err)
+    _, kinds, faces = read_obj("out.obj")
+    expect(len(kinds["vt"]) > 100 and {paint for _, paint, _ in faces} == {"paint0", "paint1"}, "with what their file holds")
+    expect(abs(info("out.obj")["volume"] / 6e-6 - 1) < 0.01, "and its volume")
+
+
+def test_combinations():
+    stl_bar()
+    body = bent("bar.stl")
+    expect_error(run("flexel-map", body, "--refine", "much", "-o", "x.stl"), "flexel-map", "auto, off")
+    expect_error(run("flexel-map", body, "--refine", "0 mm", "-o", "x.stl"), "flexel-map", "above zero")
+    expect_error(run("flexel-map", body, "--refine", "5", "-o", "x.stl"), "flexel-map", "unit")
+    expect_error(run("flexel-map", body, "--refine", "1 um", "-o", "x.stl"), "flexel-map", "--refine", "larger")
+    expect_error(run("flexel-map", body, "--refine", "auto", "--keep-vertices", "-o", "x.stl"), "flexel-map", "--keep-vertices")
+    expect_error(run("flexel-map", body, "--refine", "auto", "--crack", "cap", "-o", "x.stl"), "flexel-map", "--crack", "length")
+    expect_error(run("flexel-map", body, "--refine", "auto", "--method", "affine", "--save-binding", "b", "-o", "x.stl"), "flexel-map",
+                 "--save-binding", "length")
+    write("p.csv", "x,y,z\n40,5,5\n")
+    expect_error(run("flexel-map", body, "--refine", "auto", "--points", "p.csv", "-o", "x.csv"), "flexel-map", "--refine", "--points"[2:])
+    expect(not any(name.startswith("x.") for name in os.listdir(".")), "nothing is written")
+    # A binding holds for the surface as it was split, and the file's own stays whole without a length.
+    bound = ["--method", "affine", "--refine", "6 mm"]
+    expect_ok(run("flexel-map", body, *bound, "--save-binding", "part.binding", "-o", "a.stl"))
+    expect_ok(run("flexel-map", body, "--refine", "6 mm", "--binding", "part.binding", "-o", "b.stl"))
+    expect(open("a.stl", "rb").read() == open("b.stl", "rb").read() and info("a.stl")["triangles"] > 300, "the same")
+    whole = expect_ok(run("flexel-map", body, "--method", "affine", "--save-binding", "whole.binding", "-o", "c.stl"))
+    expect("stay flat" in whole.err and "became" not in whole.err and info("c.stl")["triangles"] == 12, whole.err)
+    # What did not break is whole, whatever was said of cracks.
+    capped = expect_ok(run("flexel-map", body, "--crack", "cap", "-o", "d.stl", "--strict"))
+    expect("12 triangles became" in capped.err, capped.err)
+    expect_ok(run("flexel-map", body, "--attributes", "-o", "e.ply", "--strict"))
+    expect_ok(run("flexel-map", body, "--scale", "0.5", "-o", "f.obj", "--strict"))
+    expect_ok(run("flexel-map", body, "-o", "g.vtu", "--strict"))
+    expect(info("e.ply")["triangles"] == info("f.obj")["triangles"] == info("d.stl")["triangles"], "the same triangles in all")
+
+
+def test_deform_splits_the_surface_and_keeps_that_of_the_body():
+    obj_bar()
+    found = expect_ok(run("flexel", "deform", "bar.obj", *BEND[:-1], "-o", "out.obj", "-o", "out.stl", "--body", "body.vtu", "--strict"))
+    expect("12 triangles became" in found.err, found.err)
+    expect(info("out.obj")["triangles"] == info("out.stl")["triangles"] > 100, "both")
+    expect(len(read_obj("out.obj")[1]["vt"]) > 100, "with its texture coordinates")
+    expect_ok(run("flexel-map", "body.vtu", "--keep-vertices", "--quiet", "-o", "own.obj"))
+    expect(info("own.obj")["triangles"] == 12, "the body has the file's own surface")
+    expect_ok(run("flexel", "deform", "bar.obj", *BEND, "--keep-vertices", "-o", "kept.obj"))
+    expect(open("kept.obj").read() == open("own.obj").read(), "as flexel-map writes it")
+    expect_error(run("flexel", "deform", "bar.obj", *BEND, "--refine", "auto", "-o", "x.vtu"), "flexel", "--refine", "mesh")
+    expect_ok(run("flexel", "deform", "bar.obj", *BEND, "--refine", "5 mm", "-o", "even.obj"))
+    expect(info("even.obj")["triangles"] > 1000, "to an edge")
+
+
+if __name__ == "__main__":
+    main(globals())
