@@ -24,7 +24,7 @@ import numpy
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 CELLS = 6000
 END, BEND = .06, .2  # shares of the longest side
-GMSH_SECONDS = 60
+GMSH_SECONDS = 40
 
 
 def run(*words, cwd, seconds=600):
@@ -64,7 +64,7 @@ def scene_of(low, high):
 def tet_volume(step, size, cwd):
     """Volume of gmsh's tetrahedra, mm^3; None and why where there are none."""
     geo, mesh = cwd / "mesh.geo", cwd / "mesh.msh"
-    geo.write_text(f'SetFactory("OpenCASCADE"); Merge "{step}"; Mesh.MeshSizeMax = {size}; Mesh.MeshSizeFromCurvature = 12;\n')
+    geo.write_text(f'SetFactory("OpenCASCADE"); Merge "{step}"; Mesh.MeshSizeMax = {size}; Mesh.MeshSizeFromCurvature = 6; Mesh.Algorithm3D = 10;\n')
     mesh.unlink(missing_ok=True)
     code, said, _ = run("gmsh", "-3", geo, "-o", mesh, "-format", "msh2", "-v", "1", cwd=cwd, seconds=GMSH_SECONDS)
     if code != 0:
@@ -98,8 +98,8 @@ def measure(part, cwd):
     row["size"] = (cwd / "bent.step").stat().st_size / part.stat().st_size
     quality = json.loads((cwd / "report.json").read_text())
     row["triangles"] = quality["volume_after"] / quality["volume_before"] - 1
-    before, why_before = tet_volume(part, longest / 12, cwd)
-    after, why_after = tet_volume(cwd / "bent.step", longest / 12, cwd)
+    before, why_before = tet_volume(part, longest / 10, cwd)
+    after, why_after = tet_volume(cwd / "bent.step", longest / 10, cwd)
     row["gmsh_before"], row["gmsh"] = why_before or "yes", why_after or "yes"
     if before and after:
         row["tets"] = after / before - 1
