@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "base/error.h"
+#include "base/program/own_program.h"
 #include "formats/exchange/surface_file.h"
 
 namespace flexel::study {
