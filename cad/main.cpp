@@ -85,7 +85,8 @@ Bytes answer(std::size_t threads, const Work& work) {
 Bytes do_job(const CadJob& job) {
   if (job.write) {
     const ThreadLimit limit(static_cast<int>(job.write->threads));
-    return answer<CadWritten>(job.write->threads, [&](const Warn&) { return write_deformed(*job.write); });
+    return answer<CadWritten>(job.write->threads,
+                              [&](const Warn& warn) { return write_deformed(*job.write, warn); });
   }
   return answer<CadMesh>(job.read->threads,
                          [&](const Warn& warn) { return mesh_of(read_shape(*job.read, warn), *job.read); });
@@ -111,7 +112,7 @@ int run() {
     return kChildWithoutMemory;
   } catch (const InputError& error) {
     std::fprintf(stderr, "flexel-cad: error: %s\n", error.what());
-    return kChildFailed;
+    return kChildNotStarted;
   }
 }
 

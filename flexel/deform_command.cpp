@@ -214,11 +214,14 @@ void write_outputs(const DeformArguments& arguments, const Plan& plan, Body& bod
   if (!plan.crack.pieces.empty())
     write_parts(mapped.surface(body), mapped.result.displacement, plan.crack.pieces_format,
                 default_unit(body.surface), plan.crack.pieces);
+  const auto cad = [](const Plan::Output& output) { return output.surface && is_cad(*output.surface); };
+  for (const Plan::Output& output : plan.outputs)  // first, for --strict may end the run here
+    if (cad(output)) write_cad(body, mapped.report, arguments.map, plan.map, *output.surface, progress);
   for (const Plan::Output& output : plan.outputs)
-    if (output.surface)
-      is_cad(*output.surface)
-          ? write_cad(body, mapped.report, arguments.map, plan.map, *output.surface, progress)
-          : write_mapped(mapped.surface(body), body, mapped.result, *output.surface);
+    if (cad(output))
+      continue;
+    else if (output.surface)
+      write_mapped(mapped.surface(body), body, mapped.result, *output.surface);
     else if (output.is_picture())
       write_bent_picture(body, output.path, progress);
     else
@@ -502,15 +505,15 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
   std::vector<std::string> paths{arguments.map.report, arguments.summary};
   for (const Plan::Output& output : plan.outputs) paths.push_back(output.path);
   OutputsTogether outputs(std::move(paths));
-  try {
-    write_report(found, arguments.map, plan.map, arguments.map.report);
-  } catch (const InvalidMappingError&) {
-    outputs.appear();
-    throw;
-  }
   {
     const BriefOutput brief(!arguments.verbose);
-    write_outputs(arguments, plan, body, mapped, progress);
+    try {
+      write_report(found, arguments.map, plan.map, arguments.map.report);
+      write_outputs(arguments, plan, body, mapped, progress);
+    } catch (const InvalidMappingError&) {
+      outputs.appear();
+      throw;
+    }
     if (accuracy) {
       accuracy->seconds = seconds_since(plan.goal->began);
       accuracy->met() || accuracy->goal.by_default ? progress.say(accuracy->sentence())

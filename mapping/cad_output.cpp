@@ -22,6 +22,7 @@ namespace {
 
 constexpr double kTolerance = 1e-4;       // of the diagonal, where none is given
 constexpr double kLeastTolerance = 1e-7;  // of the diagonal: below it OpenCASCADE takes points for one
+constexpr double kWideGap = 3;            // tolerances
 constexpr double kVolumeShare = 1e-3;  // by which the volumes of the faces and of the triangles may go apart
 
 // m; a share of the diagonal of all parts together, or a length.
@@ -29,6 +30,8 @@ double tolerance_of(const std::string& text, const Body& body) {
   const double diagonal = bounding_box(body.surface.vertices).diagonal();
   double share = kTolerance;
   if (!text.empty() && !is_number(text, share)) share = parse_quantity(text, Dimension::length) / diagonal;
+  if (share >= 1)
+    throw InputError("--tolerance: must be below the part's diagonal, " + human_length(diagonal));
   if (share < kLeastTolerance)
     throw InputError(
         fmt::format("--tolerance: faces cannot be told apart below {:g} of the part's diagonal, {}: give "
@@ -56,7 +59,7 @@ std::string some_of(const std::vector<std::string>& names) {
 }
 
 // What is wrong with it, a line each.
-std::vector<std::string> faults(const CadWritten& written, const MapReport& found) {
+std::vector<std::string> faults(const CadWritten& written, const MapReport& found, double scale) {
   std::vector<std::string> lines;
   if (!written.folded.empty())
     lines.push_back(fmt::format("the deformation turns space inside out at {}: their faces are folded",
@@ -69,6 +72,10 @@ std::vector<std::string> faults(const CadWritten& written, const MapReport& foun
         "{} not within the tolerance of {}: {}; a larger --tolerance, or a finer --size, may do",
         names.size() == 1 ? "a face is" : "faces are", human_length(written.tolerance), some_of(names)));
   }
+  if (written.gap > kWideGap * written.tolerance)
+    lines.push_back(
+        fmt::format("edges are up to {} from the faces that meet in them: a finer --size may close them",
+                    human_length(written.gap)));
   std::vector<std::string> newly;
   for (const std::string& name : written.invalid)
     if (std::find(written.invalid_before.begin(), written.invalid_before.end(), name) ==
@@ -85,7 +92,7 @@ std::vector<std::string> faults(const CadWritten& written, const MapReport& foun
   const SurfaceQuality& mesh = found.quality;
   const double faces = written.volume / written.volume_before,
                triangles = mesh.volume_after / mesh.volume_before;
-  if (std::isfinite(triangles) && found.valid() && std::abs(faces - triangles) > kVolumeShare)
+  if (scale == 1 && std::isfinite(triangles) && found.valid() && std::abs(faces - triangles) > kVolumeShare)
     lines.push_back(
         fmt::format("the volume of the faces changed by {:.2f} %, that of the mapped triangles by {:.2f} %",
                     100 * (faces - 1), 100 * (triangles - 1)));
@@ -136,12 +143,12 @@ void write_cad(const Body& body, const MapReport& found, const MapArguments& arg
   job.method = name_of(options.method);
   job.scale = output.scale;
   job.tolerance = tolerance_of(arguments.tolerance, body);
-  job.volume = found.quality.volume_after / found.quality.volume_before;
+  if (output.scale == 1) job.volume = found.quality.volume_after / found.quality.volume_before;
   job.threads = thread_count();
   const std::string where = body.surface.sources.empty() ? "the body" : body.surface.sources.front().file;
   const CadWritten written =
       run_job(job, limits_of(body), where, [&](const std::string& line) { progress.warn(line); });
-  const std::vector<std::string> wrong = faults(written, found);
+  const std::vector<std::string> wrong = faults(written, found, output.scale);
   if (arguments.strict && !wrong.empty()) throw InvalidMappingError(wrong.front());
   for (const std::string& line : wrong) progress.warn(line);
   OutputFile file(output.path);

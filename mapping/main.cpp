@@ -179,6 +179,9 @@ Plan make_plan(Arguments& arguments, const CommandLine& app) {
   check_cad_output(arguments.map, plan.crack, cad);
   if (cad && foreign)
     throw InputError("--onto: a mesh has no faces that a CAD file could hold: write STL, OBJ, ...");
+  if (cad && (!arguments.far.empty() || !arguments.binding.empty()))
+    throw InputError(
+        "--far and --binding are for vertices, which STEP, IGES and BREP do not have: leave them out");
   plan_refinement(arguments, app, plan);
   const std::vector<std::string> inputs = {arguments.body, arguments.onto, arguments.points,
                                            arguments.binding};
@@ -273,7 +276,7 @@ class Run {
       MapOutput output = *plan_.output;
       output.path = path;
       if (is_cad(output))
-        write_cad(body, found, arguments_.map, plan_.options, output, progress_);
+        write_part(body, found, output, outputs);
       else
         write_mapped(foreign_ ? *foreign_ : surface, body, result, output);
     }
@@ -283,6 +286,16 @@ class Run {
   }
 
  private:
+  // What is not as it should be, with --strict, leaves the report.
+  void write_part(const Body& body, const MapReport& found, const MapOutput& output,
+                  OutputsTogether& outputs) {
+    try {
+      write_cad(body, found, arguments_.map, plan_.options, output, progress_);
+    } catch (const InvalidMappingError&) {
+      outputs.appear();
+      throw;
+    }
+  }
   const Arguments& arguments_;
   const Plan& plan_;
   Progress& progress_;

@@ -36,6 +36,9 @@ MapOutput map_output(const std::string& format, const std::string& path, bool as
   if (!std::isfinite(scale)) throw InputError("--scale: a number is needed");
   if (format == "vtu" || (format.empty() && extension(path) == "vtu")) return output;
   output.format = surface_format(format, path, ascii, true);
+  if (unit > 0 && output.format->file->is_cad)
+    throw InputError(
+        fmt::format("{} keeps the unit of the part: leave out --unit", output.format->file->title));
   check_unit(*output.format, unit);
   if (attributes && !output.format->file->holds_attributes)
     throw InputError(

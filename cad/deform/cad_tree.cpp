@@ -2,6 +2,8 @@
 #include "cad/deform/cad_tree.h"
 
 #include <APIHeaderSection_MakeHeader.hxx>
+#include <BRepBuilderAPI_Transform.hxx>
+#include <BRep_Builder.hxx>
 #include <HeaderSection_FileName.hxx>
 #include <HeaderSection_FileSchema.hxx>
 #include <Interface_Static.hxx>
@@ -13,8 +15,11 @@
 #include <TDF_LabelSequence.hxx>
 #include <TDataStd_Name.hxx>
 #include <TDocStd_Document.hxx>
+#include <TopExp.hxx>
 #include <TopExp_Explorer.hxx>
+#include <TopTools_IndexedMapOfShape.hxx>
 #include <TopTools_MapOfShape.hxx>
+#include <TopoDS_Compound.hxx>
 #include <XCAFApp_Application.hxx>
 #include <XCAFDoc_ColorTool.hxx>
 #include <XCAFDoc_DocumentTool.hxx>
@@ -22,6 +27,7 @@
 #include <XCAFDoc_ShapeTool.hxx>
 #include <XSControl_WorkSession.hxx>
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "base/error.h"
@@ -117,6 +123,21 @@ std::string text_of(const Handle(TCollection_HAsciiString) & text) {
   return text.IsNull() ? "" : text->ToCString();
 }
 
+// What of a shape is in no solid: loose faces, edges in no face. Null: nothing.
+TopoDS_Shape loose_of(const TopoDS_Shape& shape) {
+  TopoDS_Compound loose;
+  BRep_Builder builder;
+  builder.MakeCompound(loose);
+  bool any = false;
+  for (const auto& [kind, avoid] :
+       {std::pair(TopAbs_FACE, TopAbs_SOLID), std::pair(TopAbs_EDGE, TopAbs_FACE)})
+    for (TopExp_Explorer each(shape, kind, avoid); each.More(); each.Next()) {
+      builder.Add(loose, each.Current());
+      any = true;
+    }
+  return any ? TopoDS_Shape(loose) : TopoDS_Shape();
+}
+
 // Several solids of one shape at different places cannot be deformed apart: they become children of their own.
 void part_repeated(CadNode& node) {
   TopTools_MapOfShape seen;
@@ -133,9 +154,18 @@ void part_repeated(CadNode& node) {
     child.shape = solid.Located(TopLoc_Location());
     child.name = node.name;
     child.style = node.style;
+    TopTools_IndexedMapOfShape parts;
+    TopExp::MapShapes(child.shape, parts);
     for (const StyledShape& styled : node.styled)
-      if (styled.shape.TShape() == solid.TShape())
-        child.styled.push_back({child.shape, styled.name, styled.style});
+      for (Standard_Integer i = 1; i <= parts.Extent(); ++i)
+        if (parts(i).TShape() == styled.shape.TShape())
+          child.styled.push_back({parts(i), styled.name, styled.style});
+    node.children.push_back(std::move(child));
+  }
+  if (const TopoDS_Shape loose = loose_of(node.shape); !loose.IsNull()) {
+    CadNode child;
+    child.shape = loose;
+    child.name = node.name;
     node.children.push_back(std::move(child));
   }
   node.shape.Nullify();
@@ -174,7 +204,7 @@ class SolidFinder {
 
  private:
   std::size_t take(const TopoDS_Shape& wanted) {
-    std::size_t best = solids_.size();
+    std::size_t best = kNoSolid;
     double least = 1e300;
     const gp_Trsf there = wanted.Location().Transformation();
     for (std::size_t i = 0; i < solids_.size(); ++i) {
@@ -188,7 +218,7 @@ class SolidFinder {
       least = distance;
       best = i;
     }
-    if (best < solids_.size()) taken_[best] = true;
+    if (best != kNoSolid) taken_[best] = true;
     return best;
   }
   const std::vector<TopoDS_Shape>& solids_;
@@ -222,8 +252,23 @@ TopoDS_Shape read_step_tree(const CadReadJob& job, CadTree& tree) {
   return shape;
 }
 
-TopoDS_Shape read_single(const CadReadJob& job, CadTree& tree) {
-  const CadShape read = read_shape(job, {});
+// OpenCASCADE moves what lies in a scaled place as if it had its own size.
+void check_scales(const TopoDS_Shape& shape, const std::string& where) {
+  for (TopExp_Explorer each(shape, TopAbs_FACE); each.More(); each.Next())
+    if (std::abs(std::abs(each.Current().Location().Transformation().ScaleFactor()) - 1) > 1e-12)
+      throw InputError(
+          where, "has shapes in scaled places, which cannot be written again: write a mesh (STL, OBJ, ...)");
+}
+
+TopoDS_Shape read_single(const CadReadJob& job, bool in_mm, CadTree& tree) {
+  CadShape read = read_shape(job, {});
+  check_scales(*read.shape, job.where);
+  if (in_mm && read.unit != kMillimetre) {
+    gp_Trsf scale;
+    scale.SetScale(gp_Pnt(0, 0, 0), read.unit / kMillimetre);
+    *read.shape = BRepBuilderAPI_Transform(*read.shape, scale, Standard_True).Shape();
+    read.unit = kMillimetre;
+  }
   CadNode node;
   node.shape = *read.shape;
   for (TopExp_Explorer each(node.shape, TopAbs_SOLID); each.More(); each.Next())
@@ -239,9 +284,9 @@ TopoDS_Shape read_single(const CadReadJob& job, CadTree& tree) {
 
 }  // namespace
 
-CadTree read_tree(const CadReadJob& job) {
+CadTree read_tree(const CadReadJob& job, bool in_mm) {
   CadTree tree;
-  const TopoDS_Shape shape = job.format == "step" ? read_step_tree(job, tree) : read_single(job, tree);
+  const TopoDS_Shape shape = job.format == "step" ? read_step_tree(job, tree) : read_single(job, in_mm, tree);
   part_repeated(tree.roots);
   const std::vector<TopoDS_Shape> solids = solids_of(shape, job.where);
   tree.solids = solids.size();

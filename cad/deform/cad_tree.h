@@ -26,6 +26,8 @@ struct StyledShape {
   ShapeStyle style;
 };
 
+constexpr std::size_t kNoSolid = static_cast<std::size_t>(-1);
+
 struct CadNode {
   TCollection_ExtendedString name, instance_name;  // of the product, and of its use in the assembly above
   TopLoc_Location location;                        // in the assembly above
@@ -46,7 +48,7 @@ struct CadTree {
 };
 
 // Products that are used several times come once for each use, for each is deformed in its own way. Throws as
-// read_shape().
-[[nodiscard]] CadTree read_tree(const CadReadJob& job);
+// read_shape(). `in_mm`: shapes of a file in another unit become millimetres.
+[[nodiscard]] CadTree read_tree(const CadReadJob& job, bool in_mm);
 
 }  // namespace flexel::cad

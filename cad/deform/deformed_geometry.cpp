@@ -19,6 +19,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/error.h"
 #include "base/parallel.h"
 #include "cad/deform/fit.h"
 #include "cad/deform/rigid_motion.h"
@@ -31,7 +32,8 @@ constexpr double kCurveShare = 0.25;  // of the tolerance, for curves
 constexpr double kLeastTolerance = 1e-7;
 constexpr double kAngle = 1.05;     // rad: no span of a turned surface is longer
 constexpr double kLongestSpan = 3;  // lattice spacings
-constexpr std::size_t kMostFirstSpans = 64;
+constexpr std::size_t kMostFirstSpans = 200;
+constexpr double kLooks = 2;  // a lattice spacing: what moves a single cell is seen
 
 // The intervals on which an adaptor is continuous of each order, as breaks.
 template <class Count, class Intervals>
@@ -67,18 +69,16 @@ bool turns_in_v(GeomAbs_SurfaceType type) {
   return type == GeomAbs_Sphere || type == GeomAbs_Torus;
 }
 
-// Length of a line of parameters through the middle.
-double length_of(const Handle(Geom_Surface) & surface, const FaceDomain& d, bool along_u) {
-  constexpr int kPieces = 16;
-  const auto at = [&](int i) {
-    const double share = static_cast<double>(i) / kPieces;
-    const double u = along_u ? d.u_begin + share * (d.u_end - d.u_begin) : 0.5 * (d.u_begin + d.u_end);
-    const double v = along_u ? 0.5 * (d.v_begin + d.v_end) : d.v_begin + share * (d.v_end - d.v_begin);
-    return surface->Value(u, v);
-  };
-  double length = 0;
-  for (int i = 0; i < kPieces; ++i) length += at(i).Distance(at(i + 1));
-  return length;
+// Points to look at along u and v: kLooks a spacing, fewer where they would be very many.
+std::pair<int, int> looks_at(const DeformedFace& face, double spacing) {
+  constexpr double kLeast = 25, kMost = 100'000;  // in a direction; in all
+  double u = std::max(kLeast, kLooks * face.u_length / spacing),
+         v = std::max(kLeast, kLooks * face.v_length / spacing);
+  if (const double many = u * v / kMost; many > 1) {
+    u = std::max(kLeast, u / std::sqrt(many));
+    v = std::max(kLeast, std::min(v, kMost / u));
+  }
+  return {static_cast<int>(std::min(u, kMost / kLeast)), static_cast<int>(std::min(v, kMost / kLeast))};
 }
 
 struct Moved {
@@ -124,7 +124,6 @@ DeformedGeometry::DeformedGeometry(const TopoDS_Shape& shape, const ShapeMap& ma
 }
 
 void DeformedGeometry::fit_face(std::size_t i) {
-  constexpr int kLook = 25;  // points in each direction, to see a rigid motion
   DeformedFace& result = face_[i];
   const TopoDS_Face face = forward(faces_(static_cast<Standard_Integer>(i) + 1));
   const Handle(Geom_Surface) surface = BRep_Tool::Surface(face);
@@ -132,11 +131,14 @@ void DeformedGeometry::fit_face(std::size_t i) {
   const PointMap map = map_.of_face(i);
   result.domain = face_domain(face);
   const FaceDomain& d = result.domain;
+  result.u_length = length_of(surface, d, true);
+  result.v_length = length_of(surface, d, false);
+  const auto [u_looks, v_looks] = looks_at(result, options_.spacing);
   Moved moved;
-  for (int p = 0; p <= kLook; ++p)
-    for (int q = 0; q <= kLook; ++q)
-      moved.add(surface->Value(d.u_begin + (d.u_end - d.u_begin) * p / kLook,
-                               d.v_begin + (d.v_end - d.v_begin) * q / kLook),
+  for (int p = 0; p <= u_looks; ++p)
+    for (int q = 0; q <= v_looks; ++q)
+      moved.add(surface->Value(d.u_begin + (d.u_end - d.u_begin) * p / u_looks,
+                               d.v_begin + (d.v_end - d.v_begin) * q / v_looks),
                 map);
   if (const RigidMotion rigid = rigid_motion(moved.from, moved.to, kLeastTolerance);
       rigid.error <= kRigidShare * options_.tolerance) {
@@ -152,13 +154,12 @@ void DeformedGeometry::fit_face(std::size_t i) {
       d.u_begin, d.u_end,
       breaks_of([&](GeomAbs_Shape order) { return adaptor.NbUIntervals(order); },
                 [&](TColStd_Array1OfReal& ends, GeomAbs_Shape order) { adaptor.UIntervals(ends, order); }),
-      least_spans(length_of(surface, d, true), turns_in_u(type) ? d.u_end - d.u_begin : 0, options_.spacing));
+      least_spans(result.u_length, turns_in_u(type) ? d.u_end - d.u_begin : 0, options_.spacing));
   const Knots v = make_knots(
       d.v_begin, d.v_end,
       breaks_of([&](GeomAbs_Shape order) { return adaptor.NbVIntervals(order); },
                 [&](TColStd_Array1OfReal& ends, GeomAbs_Shape order) { adaptor.VIntervals(ends, order); }),
-      least_spans(length_of(surface, d, false), turns_in_v(type) ? d.v_end - d.v_begin : 0,
-                  options_.spacing));
+      least_spans(result.v_length, turns_in_v(type) ? d.v_end - d.v_begin : 0, options_.spacing));
   const FaceMask mask(face, d);
   SurfaceMap fitted;
   fitted.point = [&](double at_u, double at_v) { return map(adaptor.Value(at_u, at_v).XYZ()); };
@@ -199,7 +200,6 @@ std::vector<DeformedGeometry::OnFace> DeformedGeometry::on_faces(const TopoDS_Sh
 }
 
 void DeformedGeometry::fit_edge(std::size_t i) {
-  constexpr int kLook = 60;
   DeformedEdge& result = edge_[i];
   const TopoDS_Edge edge =
       TopoDS::Edge(edges_(static_cast<Standard_Integer>(i) + 1).Oriented(TopAbs_FORWARD));
@@ -214,8 +214,10 @@ void DeformedGeometry::fit_edge(std::size_t i) {
   const PointMap map = faces_of_edge_.Contains(edge) && !faces_of_edge_.FindFromKey(edge).IsEmpty()
                            ? map_.of_face(faces_.FindIndex(faces_of_edge_.FindFromKey(edge).First()) - 1)
                            : map_.elsewhere();
+  const int looks =
+      static_cast<int>(std::clamp(kLooks * length_of(curve, begin, end) / options_.spacing, 60.0, 10'000.0));
   Moved moved;
-  for (int p = 0; p <= kLook; ++p) moved.add(curve->Value(begin + (end - begin) * p / kLook), map);
+  for (int p = 0; p <= looks; ++p) moved.add(curve->Value(begin + (end - begin) * p / looks), map);
   if (const RigidMotion rigid = rigid_motion(moved.from, moved.to, kLeastTolerance);
       rigid.error <= kRigidShare * options_.tolerance) {
     if (!rigid.none) curve = Handle(Geom_Curve)::DownCast(curve->Transformed(rigid.motion));
@@ -226,14 +228,12 @@ void DeformedGeometry::fit_edge(std::size_t i) {
     return;
   }
   const GeomAdaptor_Curve adaptor(curve, begin, end);
-  double length = 0;
-  for (int p = 0; p < kLook; ++p) length += (moved.from[p + 1] - moved.from[p]).Modulus();
   const bool turns = adaptor.GetType() == GeomAbs_Circle || adaptor.GetType() == GeomAbs_Ellipse;
   const Knots knots = make_knots(
       begin, end,
       breaks_of([&](GeomAbs_Shape order) { return adaptor.NbIntervals(order); },
                 [&](TColStd_Array1OfReal& ends, GeomAbs_Shape order) { adaptor.Intervals(ends, order); }),
-      least_spans(length, turns ? end - begin : 0, options_.spacing));
+      least_spans(length_of(curve, begin, end), turns ? end - begin : 0, options_.spacing));
   const auto mean = [&](double t) {
     if (faces.empty()) return map(curve->Value(t).XYZ());
     gp_XYZ sum(0, 0, 0);
@@ -242,6 +242,7 @@ void DeformedGeometry::fit_edge(std::size_t i) {
   };
   const bool closed = moved.from.front().IsEqual(moved.from.back(), kLeastTolerance);
   result.curve = fit_curve(mean, knots, closed, kCurveShare * options_.tolerance).curve;
+  if (result.curve.IsNull()) throw InputError("an edge cannot be deformed: no curve goes through its points");
 }
 
 void DeformedGeometry::move_vertex(std::size_t i) {
@@ -302,6 +303,12 @@ void DeformedGeometry::widen_tolerances() {
       vertex.tolerance = std::max(vertex.tolerance, edge_[i].tolerance);
     }
   }
+}
+
+double DeformedGeometry::widest_gap() const {
+  double widest = 0;
+  for (const DeformedEdge& edge : edge_) widest = std::max(widest, edge.tolerance);
+  return widest;
 }
 
 const DeformedFace* DeformedGeometry::find_face(const TopoDS_Shape& face) const {

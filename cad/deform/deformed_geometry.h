@@ -30,6 +30,7 @@ struct FitOptions {
 struct DeformedFace {
   Handle(Geom_Surface) surface;  // null: there is none
   FaceDomain domain;
+  double u_length = 0, v_length = 0;  // through the middle of the domain
   double error = 0;
   bool kept = false;     // moved as a rigid body: a plane stays a plane
   bool reached = false;  // within the tolerance
@@ -55,6 +56,8 @@ class DeformedGeometry {
 
   [[nodiscard]] const TopTools_IndexedMapOfShape& faces() const { return faces_; }
   [[nodiscard]] const DeformedFace& face(std::size_t i) const { return face_[i]; }
+  // The largest distance of an edge from the surfaces that meet in it.
+  [[nodiscard]] double widest_gap() const;
   // nullptr: the shape does not have it
   [[nodiscard]] const DeformedFace* find_face(const TopoDS_Shape& face) const;
   [[nodiscard]] const DeformedEdge* find_edge(const TopoDS_Shape& edge) const;

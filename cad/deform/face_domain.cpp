@@ -57,6 +57,28 @@ FaceDomain face_domain(const TopoDS_Face& face) {
   return domain;
 }
 
+double length_of(const Handle(Geom_Surface) & surface, const FaceDomain& d, bool along_u) {
+  constexpr int kPieces = 32;
+  const auto at = [&](int i) {
+    const double share = static_cast<double>(i) / kPieces;
+    const double u = along_u ? d.u_begin + share * (d.u_end - d.u_begin) : 0.5 * (d.u_begin + d.u_end);
+    const double v = along_u ? 0.5 * (d.v_begin + d.v_end) : d.v_begin + share * (d.v_end - d.v_begin);
+    return surface->Value(u, v);
+  };
+  double length = 0;
+  for (int i = 0; i < kPieces; ++i) length += at(i).Distance(at(i + 1));
+  return length;
+}
+
+double length_of(const Handle(Geom_Curve) & curve, double begin, double end) {
+  constexpr int kPieces = 64;
+  double length = 0;
+  for (int i = 0; i < kPieces; ++i)
+    length += curve->Value(begin + (end - begin) * i / kPieces)
+                  .Distance(curve->Value(begin + (end - begin) * (i + 1) / kPieces));
+  return length;
+}
+
 namespace {
 
 constexpr std::size_t kRaster = 96;  // cells in each direction

@@ -1,6 +1,8 @@
 // The rectangle of parameters that a face needs of its surface, and what of it lies in the face.
 #pragma once
 #include <BRepTopAdaptor_FClass2d.hxx>
+#include <Geom_Curve.hxx>
+#include <Geom_Surface.hxx>
 #include <TopoDS_Face.hxx>
 #include <cstdint>
 #include <vector>
@@ -14,6 +16,10 @@ struct FaceDomain {
 
 // What the face's edges bound, a little more where that is the surface's own bound.
 [[nodiscard]] FaceDomain face_domain(const TopoDS_Face& face);
+
+// Of the line of parameters through the middle of the domain, and of a curve.
+[[nodiscard]] double length_of(const Handle(Geom_Surface) & surface, const FaceDomain& domain, bool along_u);
+[[nodiscard]] double length_of(const Handle(Geom_Curve) & curve, double begin, double end);
 
 // Which parameters lie in the face: where errors of a fit count. What its edges pass by is looked up exactly, the rest in
 // a raster.

@@ -140,8 +140,8 @@ bool refine(const SurfaceMap& map, Knots& u, Knots& v, double tolerance, Surface
   const ErrorGauge gauge(map, fit.surface, u, v);
   const SpanErrors lines = gauge.on_lines();
   fit.error = lines.largest();
-  if (u.greville().size() * v.greville().size() > kMostPoles) return false;
-  if (fit.error > kShare * tolerance) {
+  const bool full = u.greville().size() * v.greville().size() > kMostPoles;
+  if (fit.error > kShare * tolerance && !full) {
     const bool u_split = split_spans(u, lines.u, kShare * tolerance, kMostSurfaceSpans);
     const bool v_split = split_spans(v, lines.v, kShare * tolerance, kMostSurfaceSpans);
     return u_split || v_split;
@@ -149,7 +149,7 @@ bool refine(const SurfaceMap& map, Knots& u, Knots& v, double tolerance, Surface
   const SpanErrors between = gauge.between();
   fit.error = std::max(fit.error, between.largest());
   fit.reached = fit.error <= tolerance;
-  if (fit.reached) return false;
+  if (fit.reached || full) return false;
   const bool u_first =
       *std::max_element(lines.u.begin(), lines.u.end()) >= *std::max_element(lines.v.begin(), lines.v.end());
   return u_first ? split_spans(u, between.u, tolerance, kMostSurfaceSpans)

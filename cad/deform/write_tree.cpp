@@ -1,5 +1,6 @@
 // Through a document (XCAF), whose writers take names, colours and layers along. The time in the header is that of the
-// source: a run writes the same bytes today and tomorrow.
+// source, or none: a run writes the same bytes today and tomorrow (IGES apart, where OpenCASCADE puts names in the order of
+// their addresses).
 #include "cad/deform/write_tree.h"
 
 #include <sys/mman.h>
@@ -71,7 +72,16 @@ class DocumentWriter {
     layers_ = XCAFDoc_DocumentTool::LayerTool(document_->Main());
   }
   void add(const std::vector<CadNode>& roots) {
-    for (const CadNode& root : roots) add(root);
+    for (const CadNode& root : roots) {
+      if (root.location.IsIdentity()) {
+        add(root);
+        continue;
+      }
+      CadNode holder;  // a root has no place of its own
+      holder.name = root.name;
+      holder.children.push_back(root);
+      add(holder);
+    }
     shapes_->UpdateAssemblies();
   }
   [[nodiscard]] const Handle(TDocStd_Document) & document() const { return document_; }
@@ -135,7 +145,8 @@ Bytes write_step(const CadTree& style, const Handle(TDocStd_Document) & document
     throw Standard_Failure("the shapes cannot be written as STEP");
   APIHeaderSection_MakeHeader header(
       Handle(StepData_StepModel)::DownCast(writer.ChangeWriter().WS()->Model()));
-  if (!style.time.empty()) header.SetTimeStamp(new TCollection_HAsciiString(style.time.c_str()));
+  header.SetTimeStamp(
+      new TCollection_HAsciiString(style.time.empty() ? "1970-01-01T00:00:00" : style.time.c_str()));
   header.SetOriginatingSystem(new TCollection_HAsciiString("Flexel"));
   const MemoryOutput file;
   if (writer.Write(file.path().c_str()) != IFSelect_RetDone)
@@ -153,6 +164,11 @@ Bytes write_iges(const Handle(TDocStd_Document) & document) {
   if (!writer.Transfer(document)) throw Standard_Failure("the shapes cannot be written as IGES");
   std::ostringstream out;
   writer.ComputeModel();
+  IGESData_GlobalSection global = writer.Model()->GlobalSection();
+  const Handle(TCollection_HAsciiString) date = new TCollection_HAsciiString("19700101.000000");
+  global.SetDate(date);
+  global.SetLastChangeDate(date);
+  writer.Model()->SetGlobalSection(global);
   if (!writer.Write(out)) throw Standard_Failure("the IGES file cannot be written");
   return bytes_of(out.str());
 }

@@ -77,6 +77,7 @@ static void visit(Archive& archive, CadWritten& written) {
   visit(archive, written.folded);
   visit(archive, written.invalid);
   visit(archive, written.invalid_before);
+  visit(archive, written.gap);
   visit(archive, written.volume);
   visit(archive, written.volume_before);
 }
@@ -138,10 +139,16 @@ Bytes run(const Bytes& job, const ChildLimits& limits, const std::string& where,
                    "is a CAD file, and this build has no OpenCASCADE: configure with -DFLEXEL_STEP=ON (needs "
                    "OpenCASCADE 7.6.3), or export the part as STL");
 #endif
-  ChildOutput output = run_limited(own_program("flexel-cad"), job, limits);
+  const std::string program = own_program("flexel-cad");
+  ChildOutput output = run_limited(program, job, limits);
   switch (output.end) {
     case ChildEnd::finished:
       break;
+    case ChildEnd::not_started:
+      throw InputError(
+          fmt::format("{} does not start, or is of another version: install Flexel and OpenCASCADE 7.6.3 "
+                      "again",
+                      program));
     case ChildEnd::crashed:
       throw InputError(where, fmt::format("{}: OpenCASCADE cannot {}", words.why, words.verb));
     case ChildEnd::out_of_time:

@@ -3,6 +3,7 @@
 // harms nobody else.
 #pragma once
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -38,7 +39,8 @@ struct CadWriteJob {
   std::string method;    // of the mapping
   double scale = 1;      // of the displacements
   double tolerance = 0;  // m, that surfaces may miss the deformation by
-  double volume = 1;     // of the mapped triangles, beside that at rest; nan: not known
+  // of the mapped triangles, beside that at rest; nan: not known
+  double volume = std::numeric_limits<double>::quiet_NaN();
   std::uint64_t threads = 1;
 };
 
@@ -59,6 +61,7 @@ struct CadWritten {
   std::vector<std::string> folded;  // faces on which the deformation turns space inside out
   // Solids that OpenCASCADE's check finds invalid, and those of them that were so in the source
   std::vector<std::string> invalid, invalid_before;
+  double gap = 0;                        // m, largest distance of an edge from the faces that meet in it
   double volume = 0, volume_before = 0;  // m^3, of all solids together
 };
 

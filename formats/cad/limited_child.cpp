@@ -165,6 +165,7 @@ class Child {
 
 ChildEnd end_of(int status) {
   if (WIFEXITED(status) && WEXITSTATUS(status) == kChildFinished) return ChildEnd::finished;
+  if (WIFEXITED(status) && WEXITSTATUS(status) == kChildNotStarted) return ChildEnd::not_started;
   if (WIFEXITED(status))
     return WEXITSTATUS(status) == kChildWithoutMemory ? ChildEnd::out_of_memory : ChildEnd::crashed;
   if (WTERMSIG(status) == SIGPROF || WTERMSIG(status) == SIGXCPU) return ChildEnd::out_of_time;
@@ -226,7 +227,7 @@ ChildOutput run_limited(const std::string& program, const Bytes& input, const Ch
       [&](int out) -> int {
         if (dup2(file.descriptor(), STDIN_FILENO) < 0 || dup2(out, STDOUT_FILENO) < 0) return kChildFailed;
         execl(program.c_str(), program.c_str(), nullptr);
-        return kChildFailed;
+        return kChildNotStarted;
       },
       limits);
 }

@@ -14,10 +14,16 @@ struct ChildLimits {
   double memory = 2e9;    // bytes that the child may have in memory
 };
 
-enum class ChildEnd { finished, crashed, out_of_time, out_of_memory };
+enum class ChildEnd { finished, crashed, out_of_time, out_of_memory, not_started };
 
 // What the child exits with.
-enum ChildCode : int { kChildFinished = 0, kChildFailed = 1, kChildWithoutMemory = 2 };
+// The last is what a program exits with whose libraries are not found.
+enum ChildCode : int {
+  kChildFinished = 0,
+  kChildFailed = 1,
+  kChildWithoutMemory = 2,
+  kChildNotStarted = 127
+};
 
 struct ChildOutput {
   ChildEnd end = ChildEnd::crashed;

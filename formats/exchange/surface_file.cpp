@@ -35,8 +35,10 @@ bool is_source_format(const Surface& surface, SurfaceFormat format) {
 SurfaceFormat surface_format(const std::string& format, const std::string& path, bool ascii, bool cad) {
   const std::vector<std::string> known = written_formats(cad);
   const std::string asked = format.empty() ? extension(path) : format;
-  if (const FileFormat* named = format_named(asked);
-      named != nullptr && std::find(known.begin(), known.end(), named->name) != known.end()) {
+  const FileFormat* named = format_named(asked);
+  // CAD formats by any of their extensions; ".gltf" is text, which is not written
+  const bool known_name = std::find(known.begin(), known.end(), asked) != known.end();
+  if (named != nullptr && (known_name || (cad && named->is_cad))) {
     const FileFormat& file = *named;
     if (ascii && file.encoding != FileEncoding::both)
       throw InputError(fmt::format(

@@ -6,6 +6,7 @@ import os
 import pathlib
 import re
 import shutil
+import time
 
 from harness import (BIN, PARTS, Skip, body, bracket, expect, expect_error, expect_ok, expect_only, main, need, need_step, run, scene, shell, write)
 
@@ -150,6 +151,67 @@ def test_a_folded_part_is_told_and_not_written_with_strict():
     expect(not pathlib.Path("bent.step").exists(), "a file in spite of --strict")
 
 
+def test_a_dent_smaller_than_the_face_is_in_the_file():
+    """A spot of two cells on the seat, 66 cells long: it is no plane any more."""
+    bracket("plain.step")
+    scene(text="""material = "rubber"
+[[fix]]
+where = "bracket/7"
+[[move]]
+where = { box = { min = ["46 mm", "19 mm", "5.5 mm"], max = ["48 mm", "21 mm", "6.5 mm"] } }
+displacement = ["0 mm", "0 mm", "-0.4 mm"]
+""")
+    expect_ok(run("flexel-voxelize", "plain.step", "--size", "1mm", "-o", "rest.vtu", "--quiet"))
+    expect_ok(run("flexel-simulate", "scene.toml", "rest.vtu", "-o", "dent.vtu", "--no-estimate", "--quiet"))
+    said = expect_ok(run("flexel-map", "dent.vtu", "-o", "dent.step", "--strict")).err
+    kept = int(re.search(r"of 11 faces, (\d+) as before", said)[1])
+    expect(kept < 10, said)
+    expect_ok(run("flexel-voxelize", "dent.step", "--size", "3mm", "--deflection", "0.01mm", "-o", "again.vtu", "--quiet"))
+    import meshio
+    at = meshio.read("again.vtu").field_data["surface_vertices"].reshape(-1, 3)
+    near = at[(abs(at[:, 0] - .047) < .004) & (abs(at[:, 1] - .02) < .004) & (at[:, 2] > .004)]
+    expect(near[:, 2].min() < .006 - .0003, f"the dent is {1e3 * (.006 - near[:, 2].min())} mm deep")
+
+
+def test_a_scale_is_no_fault():
+    bent()
+    said = expect_ok(run("flexel-map", "bent.vtu", "-o", "bent.step", "--scale", "0.5", "--strict")).err
+    expect("volume of the faces" not in said, said)
+
+
+def test_strict_leaves_the_report():
+    bent()
+    refused = run("flexel-map", "bent.vtu", "-o", "bent.step", "--scale", "-40", "--strict", "--report", "report.json")
+    expect_error(refused, "flexel-map", code=4)
+    expect(pathlib.Path("report.json").exists() and not pathlib.Path("bent.step").exists(), "the report, and no part")
+
+
+def test_bytes_are_the_same_a_second_later():
+    """Not those of IGES, whose names OpenCASCADE writes in the order of their addresses."""
+    bent()
+    for turn in (1, 2):
+        for kind in ("brep", "step"):
+            expect_ok(run("flexel-map", "bent.vtu", "-o", f"bent{turn}.{kind}", "--quiet"))
+        time.sleep(1.1)
+    for kind in ("brep", "step"):
+        expect(pathlib.Path(f"bent1.{kind}").read_bytes() == pathlib.Path(f"bent2.{kind}").read_bytes(), f"bytes of {kind}")
+
+
+def test_brep_in_other_units():
+    bent()
+    expect_ok(run("flexel-map", "bent.vtu", "-o", "bent.brep", "--quiet"))
+    moved = 'material = "pla"\n[[fix]]\nwhere = "zmax"\n[[move]]\nwhere = "zmin"\ndisplacement = ["3 cm", "0 mm", "0 mm"]\n'
+    scene(text=moved)
+    expect_ok(run("flexel-voxelize", "bent.brep", "--unit", "cm", "--count", "3000", "-o", "rest.vtu", "--quiet"))
+    expect_ok(run("flexel-simulate", "scene.toml", "rest.vtu", "-o", "big.vtu", "--no-estimate", "--quiet"))
+    for name in ("big.step", "big.iges"):
+        expect_ok(run("flexel-map", "big.vtu", "-o", name, "--quiet"))
+        expect(abs(volume(name) / volume("bent.brep") / 1000 - 1) < 5e-3, f"{name}: {volume(name)}")
+    expect_ok(run("flexel-map", "big.vtu", "-o", "big.brep", "--quiet"))
+    expect(abs(volume("big.brep") / volume("bent.brep") - 1) < 5e-3, "BREP keeps its numbers")
+    expect_error(run("flexel-map", "big.vtu", "-o", "x.brep", "--unit", "inch"), "flexel-map", "--unit")
+
+
 def test_the_field_of_quadratic_cells():
     bracket()
     scene(text=BEND.replace('material', 'model = "quadratic"\nmaterial', 1).replace("-1000", "-100"))
@@ -215,8 +277,12 @@ def test_a_missing_worker_is_one_line():
     os.mkdir("libexec"), os.mkdir("libexec/flexel")
     os.symlink(BIN / "flexel-cad", "libexec/flexel/flexel-cad")
     expect_ok(run("./bin/flexel-map", "bent.vtu", "-o", "x.step", "--quiet"))
+    os.remove("libexec/flexel/flexel-cad")
+    write("libexec/flexel/flexel-cad", "#!/bin/sh\nexit 127\n")
+    os.chmod("libexec/flexel/flexel-cad", 0o755)
+    expect_error(run("./bin/flexel-voxelize", "bracket.step", "--size", "3mm", "-o", "x.vtu"), "flexel-voxelize", "does not start", "install")
     alone = run("flexel-cad", stdin=b"no job")
-    expect(alone.code == 1 and "run by the other programs" in alone.err, str(alone))
+    expect(alone.code == 127 and "run by the other programs" in alone.err, str(alone))
 
 
 if __name__ == "__main__":

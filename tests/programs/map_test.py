@@ -3,7 +3,7 @@
 import json
 import os
 
-from harness import body, expect, expect_error, expect_ok, main, need, run, scene, write
+from harness import body, bracket, expect, expect_error, expect_ok, main, need, run, scene, write
 
 MOVE = """material = "steel"
 [[fix]]
@@ -179,9 +179,12 @@ def test_a_vtu_surface_is_read_by_meshio():
     expect(len(mesh.points) == 8 and mesh.point_data["displacement"].shape == (8, 3), f"{mesh}")
 
 
-def test_a_step_file_is_refused_with_what_to_do():
+def test_a_step_file_can_be_mapped_onto():
     write("a.step", "ISO-10303-21;\nHEADER;\n")
-    expect_error(run("flexel-map", bent(), "--onto", "a.step", "-o", "x.stl"), "flexel-map", "a.step", "STL")
+    expect_error(run("flexel-map", bent(), "--onto", "a.step", "-o", "x.stl"), "flexel-map", "a.step")
+    bracket()
+    expect_ok(run("flexel-voxelize", "bracket.step", "--size", "4mm", "-o", "rest.vtu", "--quiet"))
+    expect_ok(run("flexel-map", "rest.vtu", "--onto", "bracket.step", "-o", "x.stl"))
 
 
 if __name__ == "__main__":
