@@ -194,8 +194,7 @@ class SolidFinder {
       const TopAbs_ShapeEnum kind =
           TopExp_Explorer(node.shape, TopAbs_SOLID).More() ? TopAbs_SOLID : TopAbs_SHELL;
       for (TopExp_Explorer each(node.shape.Moved(here), kind); each.More(); each.Next())
-        if (const std::size_t solid = take(each.Current()); solid < solids_.size())
-          node.solids.push_back(solid);
+        node.solids.push_back(take(each.Current()));
     }
   }
   [[nodiscard]] bool all() const {
