@@ -53,7 +53,7 @@ void declare(CommandLine& app, Arguments& arguments) {
                  "Body file (.vtu) or series (.pvd); without one, or with -, a body from stdin")
       .type_name("BODY");
   app.add_option("--onto", arguments.onto,
-                 fmt::format("Deform this mesh ({}) instead of the body's own", read_titles(false)))
+                 fmt::format("Deform this mesh ({}) instead of the body's own", read_titles()))
       .type_name("FILE");
   app.add_option("--edge", arguments.edge, "Of --onto: split that mesh to this longest edge")
       .type_name("LENGTH");
