@@ -10,10 +10,10 @@
 namespace flexel {
 namespace {
 
-using Words = std::vector<std::string_view>;
+using OffWords = std::vector<std::string_view>;
 
-Words words_of(std::string_view line) {
-  Words words;
+OffWords words_of(std::string_view line) {
+  OffWords words;
   line = line.substr(0, line.find('#'));
   constexpr std::string_view kBlank = " \t\r\n\v\f";
   for (std::size_t at = line.find_first_not_of(kBlank); at != std::string_view::npos;) {
@@ -39,13 +39,13 @@ class OffRefinement {
     has_normals_ = !file.normals.empty();
     std::size_t number = 0;  // of the lines with words after the two of the head
     bool in_head = true;
-    Words head;
+    OffWords head;
     while (done_ < text_.size()) {
       const std::size_t end = text_.find('\n', done_);
       const std::string_view line =
           text_.substr(done_, end == std::string_view::npos ? end : end + 1 - done_);
       done_ += line.size();
-      const Words words = words_of(line);
+      const OffWords words = words_of(line);
       if (words.empty()) {
         out_ += line;
       } else if (in_head && head.empty() && words.size() == 1) {
@@ -70,7 +70,7 @@ class OffRefinement {
  private:
   static constexpr const char* kByLines = "vertices or faces that do not have a line each";
 
-  std::string add(std::string_view line, const Words& words, std::size_t number) {
+  std::string add(std::string_view line, const OffWords& words, std::size_t number) {
     if (number < refinement_.vertices) {
       if (words.size() < 3) return kByLines;
       vertices_.push_back({});
@@ -104,7 +104,7 @@ class OffRefinement {
   }
 
   // Whether the colour is in whole numbers, 0 to 255.
-  [[nodiscard]] bool is_whole(const Words& words) const {
+  [[nodiscard]] bool is_whole(const OffWords& words) const {
     for (std::size_t i = first_of_color(); i < end_of_color(words.size()); ++i)
       if (words[i].find_first_of(".eE") != std::string_view::npos) return false;
     return true;
