@@ -6,6 +6,7 @@
 
 #include "base/parallel.h"
 #include "formats/lattice/fragments_of_body.h"
+#include "formats/part/near_weld.h"
 #include "mapping/methods/space_map.h"
 
 namespace flexel::mapping {
@@ -57,6 +58,7 @@ std::vector<LongTriangle> long_triangles(const Body& body, const MapResult& resu
   std::optional<Components> fragments;
   if (may_be_broken(body)) fragments = find_components(body, element_adjacency(body));
   const Triangles triangles = triangulate(surface);
+  const std::vector<std::uint8_t> unshared = unshared_edges(surface, triangles);
   for (std::uint32_t t = 0; t < triangles.corners.size(); ++t) {
     const auto& corners = triangles.corners[t];
     const std::uint32_t polygon = triangles.polygon[t], part = surface.polygon_part(polygon);
@@ -64,7 +66,8 @@ std::vector<LongTriangle> long_triangles(const Body& body, const MapResult& resu
     if (!(longest > least[part])) continue;
     if (fragments && spans_fracture(*fragments, result, corners)) continue;
     const auto& at = surface.vertices;
-    found.push_back({t, longest, {{at[corners[0]], at[corners[1]], at[corners[2]]}, part, polygon}});
+    found.push_back(
+        {t, longest, {{at[corners[0]], at[corners[1]], at[corners[2]]}, part, polygon, unshared[t]}});
   }
   return found;
 }

@@ -1,6 +1,7 @@
 """Triangles too large for the deformation are split (flexel-map --refine), with all that their files hold."""
 
 import json
+import math
 import os
 import struct
 
@@ -358,6 +359,54 @@ def test_other_meshes_are_split_as_well():
     _, kinds, faces = read_obj("out.obj")
     expect(len(kinds["vt"]) > 100 and {paint for _, paint, _ in faces} == {"paint0", "paint1"}, "with what their file holds")
     expect(abs(info("out.obj")["volume"] / 6e-6 - 1) < 0.01, "and its volume")
+
+
+def longest_hole(name):
+    """Of the STL's edges that one triangle has, corners within 0.1 mm being one: the length of the longest."""
+    data, count = open(name, "rb").read(), {}
+    for n in range(struct.unpack_from("<I", data, 80)[0]):
+        at = [tuple(round(c, 1) for c in struct.unpack_from("<3f", data, 96 + 50 * n + 12 * k)) for k in range(3)]
+        for k in range(3):
+            edge = tuple(sorted((at[k], at[(k + 1) % 3])))
+            count[edge] = count.get(edge, 0) + 1
+    return max((math.dist(*edge) for edge, users in count.items() if users == 1), default=0)
+
+
+def noisy_stl():
+    """Every second triangle off by what single precision makes of a coordinate."""
+    lines = ["solid bar"]
+    for n, triangle in enumerate(box_triangles(SIZE)):
+        corners = ["vertex {:.7f} {:.7f} {:.7f}".format(*(c + 2e-6 * (n % 2) for c in p)) for p in triangle]
+        lines += ["facet normal 0 0 0", "outer loop", *corners, "endloop", "endfacet"]
+    return write("noisy.stl", "\n".join(lines + ["endsolid bar"]) + "\n")
+
+
+def noisy_obj():
+    """The upper side has corners of its own, not quite at those of the others."""
+    lines = [f"v {x} {y} {z}" for x, y, z in CORNERS] + [f"v {x + 1e-6} {y} {z}" for x, y, z in CORNERS[4:]]
+    lines += ["f " + " ".join(str(c + (5 if s == 1 else 1)) for c in side) for s, side in enumerate(SIDES)]
+    return write("noisy.obj", "\n".join(lines) + "\n")
+
+
+def t_junction_obj():
+    """A side has a corner more, in the middle of an edge of the upper one."""
+    sides = [list(side) for side in SIDES]
+    sides[2].insert(3, 8)
+    lines = [f"v {x} {y} {z}" for x, y, z in [*CORNERS, (30, 0, 6)]]
+    return write("junction.obj", "\n".join(lines + ["f " + " ".join(str(c + 1) for c in side) for side in sides]) + "\n")
+
+
+def test_seams_that_do_not_fit_exactly_stay_closed():
+    for make, longest in ((noisy_stl, 0), (noisy_obj, 0), (t_junction_obj, 20)):
+        name = make()
+        body = bent(name)
+        expect_ok(run("flexel-map", body, "--strict", "-o", "out.stl", "--report", "out.json", "--force"))
+        report = json.load(open("out.json"))
+        expect(abs(report["volume_after"] / report["volume_before"] - 1) < 0.005, f"{name}: {report['volume_after']}")
+        expect(longest_hole("out.stl") <= longest, f"{name}: a hole of {longest_hole('out.stl')} mm")
+        expect_ok(run("flexel-voxelize", "out.stl", "--size", "2 mm", "-o", "again.vtu", "--force"))
+        # Whole, such a part is no better than one that fits.
+        expect_error(run("flexel-map", body, "--strict", "--keep-vertices", "-o", "x.stl"), "flexel-map", "stay flat", code=4)
 
 
 def test_combinations():
