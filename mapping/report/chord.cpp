@@ -29,18 +29,18 @@ bool spans_fracture(const Components& fragments, const MapResult& result,
 }
 
 // (parts) m
-std::vector<double> long_edges(const Body& body) {
+std::vector<double> long_edges(const Body& body, double spacings = kLongEdge) {
   std::vector<double> least;
-  for (const Part& part : body.parts) least.push_back(kLongEdge * part.lattice.spacing.minCoeff());
+  for (const Part& part : body.parts) least.push_back(spacings * part.lattice.spacing.minCoeff());
   return least;
 }
 
 }  // namespace
 
 // The diagonal of a polygon is at most half its perimeter: most meshes need no triangulation.
-bool has_long_triangles(const Body& body) {
+bool has_long_triangles(const Body& body, double spacings) {
   const Surface& surface = body.surface;
-  const std::vector<double> least = long_edges(body);
+  const std::vector<double> least = long_edges(body, spacings);
   for (std::size_t p = 0; p < surface.polygon_count(); ++p) {
     const auto corners = surface.polygon(p);
     const double longest = longest_edge(surface.vertices, corners) * static_cast<double>(corners.size()) /
