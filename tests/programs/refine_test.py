@@ -503,7 +503,7 @@ def test_pieces_alone_and_cut_surfaces():
 
 
 def bow(p):
-    """Both halves bend, and move apart."""
+    """Bent about the middle, and away from the other half."""
     moved = p.copy()
     moved[:, 2] -= 4 * (p[:, 0] - 0.05) ** 2
     moved[:, 0] += 0.01
