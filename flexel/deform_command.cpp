@@ -185,12 +185,15 @@ std::vector<SurfaceFormat> written_formats_of(const Plan& plan) {
   return formats;
 }
 
+bool writes_mesh(const Plan& plan) {
+  const std::vector<SurfaceFormat> formats = written_formats_of(plan);
+  return std::any_of(formats.begin(), formats.end(),
+                     [](const SurfaceFormat& each) { return !each.file->is_cad; });
+}
+
 // Only what is written as a mesh is split.
 void plan_refinement(Plan& plan) {
-  const std::vector<SurfaceFormat> formats = written_formats_of(plan);
-  const bool meshes = std::any_of(formats.begin(), formats.end(),
-                                  [](const SurfaceFormat& each) { return !each.file->is_cad; });
-  if (meshes || plan.refine.mode == mapping::RefineOptions::Mode::off) return;
+  if (writes_mesh(plan) || plan.refine.mode == mapping::RefineOptions::Mode::off) return;
   if (plan.refine.asked) throw InputError("--refine is for meshes: write one with -o, such as bent.stl");
   plan.refine.mode = mapping::RefineOptions::Mode::off;
 }
@@ -498,6 +501,7 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
     mapped =
         map_refined(body, plan.map, plan.crack, plan.refine, nullptr, written_formats_of(plan), progress);
     progress.finish();
+    if (!writes_mesh(plan)) mapped.report.chord.reset();  // nobody gets the triangles
     say_report(mapped.report, arguments.map, plan.map, progress);
   }
   if (!mapped.split_line.empty()) progress.say(mapped.split_line);

@@ -138,8 +138,8 @@ void plan_refinement(const Arguments& arguments, const CommandLine& app, Plan& p
           "give it a length");
     plan.refine.mode = RefineOptions::Mode::off;
   }
-  if (!arguments.points.empty() || !plan.output || is_cad(*plan.output))
-    plan.refine.mode = RefineOptions::Mode::off;
+  const bool mesh = plan.output ? !is_cad(*plan.output) : !plan.crack.pieces.empty();
+  if (!arguments.points.empty() || !mesh) plan.refine.mode = RefineOptions::Mode::off;
 }
 
 Plan make_plan(Arguments& arguments, const CommandLine& app) {
@@ -205,7 +205,9 @@ Surface read_onto(const std::string& path, const Body& body, std::optional<doubl
 class Run {
  public:
   Run(const Arguments& arguments, const Plan& plan, Progress& progress)
-      : arguments_(arguments), plan_(plan), progress_(progress) {}
+      : arguments_(arguments), plan_(plan), progress_(progress) {
+    if (!arguments.binding.empty()) advice_ = SplitAdvice::new_binding;
+  }
 
   // Takes what is to be mapped, in place of the body's own surface where the arguments say so.
   void take_surface(Body& body) {
@@ -237,7 +239,10 @@ class Run {
     SplitSurface split =
         split_surface(foreign_ ? *foreign_ : body.surface, refinement, plan_.refine, formats());
     progress_.say(split.line);
-    if (!split.surface) return;
+    if (!split.surface) {
+      advice_ = SplitAdvice::none;
+      return;
+    }
     split_from_ = triangle_count(body.surface);
     if (foreign_) {
       take_refined(body, refined(body.surface, refinement), refinement);
@@ -253,6 +258,8 @@ class Run {
   void finish(const Surface& surface, const Body& body, const MapResult& result, MapReport found,
               const std::string& path) {
     if (split_from_) found.split_from = split_from_;
+    if (plan_.output && is_cad(*plan_.output)) found.chord.reset();  // its faces are no triangles
+    if (found.split_advice == SplitAdvice::length) found.split_advice = advice_;
     progress_.finish();
     if (!table_) say_report(found, arguments_.map, plan_.options, progress_);
     std::string report = arguments_.map.report;
@@ -302,6 +309,7 @@ class Run {
   std::optional<Surface> foreign_;
   std::optional<PointTable> table_;
   std::optional<std::size_t> split_from_;  // triangles
+  SplitAdvice advice_ = SplitAdvice::length;
   double unit_ = 0;
   std::size_t frame_ = 0;
 };
@@ -350,9 +358,11 @@ void split_for_series(const std::vector<std::string>& files, Body& first, const 
                       Progress& progress) {
   using Mode = RefineOptions::Mode;
   if (plan.refine.mode == Mode::to_edge) run.split(first, refine_to_edge(first.surface, plan.refine.edge));
-  if (plan.refine.mode != Mode::automatic || plan.crack.mode != CrackMode::keep) return;
-  if (const auto needed = refinement_of_series(first, files, plan.options, progress))
-    run.split(first, *needed);
+  if (plan.refine.mode != Mode::automatic) return;
+  const RefinedSeries found =
+      refinement_of_series(first, files, plan.options, plan.crack.mode != CrackMode::keep, progress);
+  if (!found.line.empty()) progress.say(found.line);
+  if (found.refinement) run.split(first, *found.refinement);
 }
 
 // Frames share one binding until the lattice changes (something was cut off) or breaks; only the first frame

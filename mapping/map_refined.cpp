@@ -10,6 +10,7 @@
 #include "base/units.h"
 #include "formats/exchange/refined_file.h"
 #include "formats/lattice/body_file.h"
+#include "formats/lattice/fragments_of_body.h"
 #include "formats/part/subdivide.h"
 #include "mapping/methods/map_surface.h"
 #include "mapping/refine/refine.h"
@@ -40,6 +41,21 @@ class OwnSurface {
   Surface surface_;
   std::vector<std::uint32_t> offsets_, cells_;
 };
+
+constexpr const char* kNotSplitCut =
+    "the surface is cut along cracks and was not split: where its triangles are too large to show the "
+    "deformation, "
+    "--refine LENGTH splits them before the cut";
+
+// Whether triangles of a body that broke miss too much, or are so long that they reach over what moves apart.
+bool is_coarse(const Body& body, const MapOptions& options, Progress& progress) {
+  constexpr double kFarAcross = 10;  // spacings
+  if (!has_long_triangles(body)) return false;
+  if (has_long_triangles(body, kFarAcross)) return true;
+  MapOptions quick;
+  quick.method = options.method;
+  return chord_error(body, map_surface(body, quick, progress)).coarse_triangles > 0;
+}
 
 void warn_of_budget(Progress& progress) {
   progress.warn(
@@ -84,6 +100,8 @@ SplitSurface split_surface(const Surface& surface, const Refinement& refinement,
     if (options.asked) throw;
     split.line = fmt::format("the triangles are too large for this deformation and were not split: {}: {}",
                              error.where(), error.what());
+    if (formats.size() > 1)
+      split.line += "; nor were they for the other files, which have the same triangles";
     return split;
   }
   split.line = fmt::format("{} triangles became {}", human_count(triangle_count(surface)),
@@ -107,13 +125,17 @@ MappedPart map_refined(Body& body, const MapOptions& options, const CrackOptions
     whole = map_part(body, options, crack, progress);
     if (refine.mode == Mode::automatic && !whole->cracked)
       refinement = refinement_of_state(body, whole->result, whole->report.chord, progress);
+    else if (refine.mode == Mode::automatic && is_coarse(body, options, progress))
+      whole->split_line = kNotSplitCut;
   }
   if (!refinement || !refinement->changes())
     return whole ? *std::move(whole) : map_part(body, options, crack, progress);
   SplitSurface split =
       split_surface(written != nullptr ? *written : body.surface, *refinement, refine, formats);
   if (!split.surface) {
+    if (!whole) whole = map_part(body, options, crack, progress);
     whole->split_line = std::move(split.line);
+    whole->report.split_advice = SplitAdvice::none;
     return *std::move(whole);
   }
   MappedPart mapped = map_split(body, options, crack, *refinement, *std::move(split.surface), progress);
@@ -121,12 +143,12 @@ MappedPart map_refined(Body& body, const MapOptions& options, const CrackOptions
   return mapped;
 }
 
-std::optional<Refinement> refinement_of_series(const Body& first, const std::vector<std::string>& files,
-                                               const MapOptions& options, Progress& progress) {
-  if (!has_long_triangles(first)) return std::nullopt;
+RefinedSeries refinement_of_series(const Body& first, const std::vector<std::string>& files,
+                                   const MapOptions& options, bool cut, Progress& progress) {
+  if (!has_long_triangles(first)) return {};
   MapOptions quick;
   quick.method = options.method;
-  std::optional<Refinement> all;
+  RefinedSeries found;
   Body body;
   for (const std::string& file : files) {
     check_stop();
@@ -140,13 +162,15 @@ std::optional<Refinement> refinement_of_series(const Body& first, const std::vec
       take_surface(next, body, file);
     }
     body = std::move(next);
+    if (cut && (may_be_broken(body) || body.notes.count(kCarvedNote) > 0))
+      return {std::nullopt, kNotSplitCut};
     const MapResult result = map_surface(body, quick, progress);
-    const auto found = refinement_of_state(body, result, chord_error(body, result), progress);
-    if (!found) continue;
-    take_refined(body, refined(body.surface, *found), *found);
-    all = all ? composed(*all, *found) : *found;
+    const auto more = refinement_of_state(body, result, chord_error(body, result), progress);
+    if (!more) continue;
+    take_refined(body, refined(body.surface, *more), *more);
+    found.refinement = found.refinement ? composed(*found.refinement, *more) : *more;
   }
-  return all;
+  return found;
 }
 
 }  // namespace flexel::mapping

@@ -39,10 +39,14 @@ struct SplitSurface {
                                      const RefineOptions& refine, const Surface* written,
                                      std::span<const SurfaceFormat> formats, Progress& progress);
 
-// What all states of a series need together: `automatic`, of the surface and the parts of `first`. The frames are read for it, where
-// the surface has triangles that could be coarse.
-[[nodiscard]] std::optional<Refinement> refinement_of_series(const Body& first,
-                                                             const std::vector<std::string>& files,
-                                                             const MapOptions& options, Progress& progress);
+// What all states of a series need together, and where nothing is split for them, why.
+struct RefinedSeries {
+  std::optional<Refinement> refinement;
+  std::string line;
+};
+// `automatic`, of the surface and the parts of `first`. The frames are read for it, where the surface has triangles that
+// could be coarse. `cut`: along cracks, so that the series is split only where no frame has any.
+[[nodiscard]] RefinedSeries refinement_of_series(const Body& first, const std::vector<std::string>& files,
+                                                 const MapOptions& options, bool cut, Progress& progress);
 
 }  // namespace flexel::mapping

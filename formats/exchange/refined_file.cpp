@@ -21,13 +21,18 @@ Surface refined_with_file(const Surface& surface, const Refinement& refinement,
   SurfaceSource& source = result.sources[0];
   source.bytes = surface.sources[0].bytes;
   source.order = surface.sources[0].order;
-  if (const std::string held = own->refine(source, refinement); !held.empty())
-    throw InputError(
-        source.file,
-        fmt::format("holds {}, which cannot be split with its triangles: --keep-vertices leaves them "
-                    "as they are; read with --edge LENGTH the part comes out as a new file without it",
-                    held));
-  return result;
+  std::string why;
+  try {
+    const std::string held = own->refine(source, refinement);
+    if (held.empty()) return result;
+    why = fmt::format("holds {}, which cannot be split with its triangles", held);
+  } catch (const InputError& error) {
+    why = error.what();
+  }
+  throw InputError(source.file,
+                   why +
+                       ": --keep-vertices leaves them as they are; read with --edge LENGTH the part "
+                       "comes out as a new file without it");
 }
 
 }  // namespace flexel

@@ -149,6 +149,8 @@ class GltfRefinement {
     const GltfAccessor at = gltf_accessor(gltf_, old, where_);
     if (at.count != range.count)
       throw InputError(where_, fmt::format("is damaged: {} does not fit the positions", name));
+    if (name.starts_with("_") && at.type != kGltfFloat && !at.normalized)
+      return longer_labels(old, at, range);
     std::vector<double> numbers = gltf_numbers(gltf_, at);
     const std::size_t n = at.components;
     const bool direction = (name == "NORMAL" || name == "TANGENT") && n >= 3;
@@ -171,6 +173,36 @@ class GltfRefinement {
     for (std::size_t i = 0; i < floats.size(); ++i) positions[i / 3][i % 3] = floats[i];
     set_gltf_bounds(gltf_.json["accessors"][added], positions);
     return added;
+  }
+
+  // Whole numbers of the file's own are labels: new vertices take those of one end, in the same type.
+  std::size_t longer_labels(std::size_t old, const GltfAccessor& at, const Range& range) {
+    constexpr std::uint32_t kShort = 5122, kUnsignedShort = 5123;
+    const std::size_t each = at.type < kShort ? 1 : at.type <= kUnsignedShort ? 2 : 4;
+    const std::size_t row = each * at.components, stride = (row + 3) / 4 * 4;
+    std::vector<std::byte> rows(stride * (range.count + range.added.size()));
+    for (std::size_t v = 0; v < range.count; ++v)
+      std::copy_n(gltf_.binary.data() + at.begin + v * at.stride, row, rows.data() + v * stride);
+    for (std::size_t i = 0; i < range.added.size(); ++i)
+      std::copy_n(rows.data() + local_[refinement_.ends_of(range.added[i])[0]] * stride, row,
+                  rows.data() + (range.count + i) * stride);
+    gltf_.binary.resize((gltf_.binary.size() + 3) / 4 * 4);
+    const std::size_t begin = gltf_.binary.size();
+    gltf_.binary.resize(begin + rows.size());
+    std::copy(rows.begin(), rows.end(), gltf_.binary.begin() + static_cast<std::ptrdiff_t>(begin));
+    GltfJson& views = gltf_.json["bufferViews"];
+    views.push_back({{"buffer", 0},
+                     {"byteOffset", begin},
+                     {"byteLength", rows.size()},
+                     {"byteStride", stride},
+                     {"target", kGltfArrayBuffer}});
+    GltfJson accessor = gltf_.json["accessors"][old];
+    accessor.erase("byteOffset");
+    accessor["bufferView"] = views.size() - 1;
+    accessor["count"] = range.count + range.added.size();
+    gltf_.json["accessors"].push_back(std::move(accessor));
+    gltf_.json["buffers"][0]["byteLength"] = gltf_.binary.size();
+    return gltf_.json["accessors"].size() - 1;
   }
 
   const std::string& where_;

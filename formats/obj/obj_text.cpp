@@ -115,7 +115,10 @@ std::vector<double> numbers_of(const ObjLine& line) {
     if (word.front() == '+') word.remove_prefix(1);
     double value = 0;
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (error == std::errc{} && end == word.data() + word.size()) numbers.push_back(value);
+    if (end != word.data() + word.size()) continue;
+    // Below what a double holds; those after it must keep their places.
+    if (error == std::errc::result_out_of_range) value = 0;
+    numbers.push_back(value);
   }
   return numbers;
 }

@@ -119,8 +119,9 @@ class ObjRefinement {
   std::string text_of(std::uint32_t polygon, std::vector<ObjCorner>& corners, const ObjLine& line) {
     const std::uint32_t first = first_piece_[polygon], last = first_piece_[polygon + 1];
     std::string text;
+    const bool dangles = drop_dangling(corners);
     if (last - first == 1) {
-      if (line.text.find('-') == std::string_view::npos) return "";
+      if (line.text.find('-') == std::string_view::npos && !dangles) return "";
       add_face(text, corners);  // what it counts back from is not what it was
       return text;
     }
@@ -129,9 +130,6 @@ class ObjRefinement {
     };
     PieceCorners<ObjCorner, decltype(halve)> pieces(refinement_, halve);
     for (ObjCorner& corner : corners) {
-      // What names a line that is not there must not come to name a new one.
-      if (corner.normal >= static_cast<std::int64_t>(old_normals_)) corner.normal = kNoIndex;
-      if (corner.texture >= static_cast<std::int64_t>(old_textures_)) corner.texture = kNoIndex;
       corner.normal = normal_at(corner.vertex, corner.normal, corner.normal);
       pieces.add(static_cast<std::uint32_t>(corner.vertex), corner);
     }
@@ -142,6 +140,21 @@ class ObjRefinement {
       add_face(text, own);
     }
     return text;
+  }
+
+  // What names a line that is not there must not come to name a new one. Whether there was any.
+  bool drop_dangling(std::vector<ObjCorner>& corners) const {
+    bool found = false;
+    const auto drop = [&](std::int64_t& index, std::size_t count) {
+      if (index < static_cast<std::int64_t>(count)) return;
+      index = kNoIndex;
+      found = true;
+    };
+    for (ObjCorner& corner : corners) {
+      drop(corner.normal, old_normals_);
+      drop(corner.texture, old_textures_);
+    }
+    return found;
   }
 
   static void add_face(std::string& text, const std::vector<ObjCorner>& corners) {

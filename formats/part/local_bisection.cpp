@@ -9,6 +9,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "formats/part/near_weld.h"
 #include "formats/part/topology.h"
 
 namespace flexel {
@@ -17,8 +18,8 @@ LocalBisection::LocalBisection(const Surface& surface)
     : vertices_before_(static_cast<std::uint32_t>(surface.vertices.size())),
       vertices_(surface.vertices),
       is_split_(surface.polygon_count(), 0) {
-  weld_vertices(surface);
   Triangles triangles = triangulate(surface);
+  welded_ = weld_parts(surface, triangles);
   triangles_ = std::move(triangles.corners);
   polygon_ = std::move(triangles.polygon);
   users_.reserve(triangles_.size() * 3 / 2);
@@ -29,17 +30,6 @@ LocalBisection::LocalBisection(const Surface& surface)
       users_[key(each.a, each.b)].push_back(t);
     }
   }
-}
-
-void LocalBisection::weld_vertices(const Surface& surface) {
-  welded_ = weld(surface.vertices);
-  if (surface.parts.size() < 2) return;
-  std::vector<std::uint32_t> part(surface.vertices.size(), 0);
-  for (std::size_t p = 0; p < surface.polygon_count(); ++p)
-    for (const std::uint32_t v : surface.polygon(p)) part[v] = surface.polygon_part(p);
-  std::unordered_map<std::uint64_t, std::uint32_t> first;
-  for (std::uint32_t v = 0; v < welded_.size(); ++v)
-    welded_[v] = first.emplace(std::uint64_t{welded_[v]} << 32 | part[v], v).first->second;
 }
 
 LocalBisection::Edge LocalBisection::edge(std::uint32_t triangle, std::size_t corner) const {
@@ -63,6 +53,16 @@ bool LocalBisection::has_area(std::uint32_t triangle) const {
   const Corners& at = triangles_[triangle];
   return welded_[at[0]] != welded_[at[1]] && welded_[at[1]] != welded_[at[2]] &&
          welded_[at[2]] != welded_[at[0]];
+}
+
+std::uint8_t LocalBisection::unshared(std::uint32_t triangle) const {
+  std::uint8_t edges = 0;
+  if (!has_area(triangle)) return edges;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Edge each = edge(triangle, i);
+    if (users_.at(key(each.a, each.b)).size() != 2) edges |= static_cast<std::uint8_t>(1u << i);
+  }
+  return edges;
 }
 
 bool LocalBisection::bisect(std::uint32_t triangle) {

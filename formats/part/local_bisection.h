@@ -9,9 +9,9 @@
 
 namespace flexel {
 
-// Longest-edge bisection where it is asked for. Triangles whose corners lie at exactly the same positions (seams of texture
-// coordinates and normals) are neighbours too, within a part: each side of the seam gets a vertex of its own at
-// the same midpoint.
+// Longest-edge bisection where it is asked for. Triangles whose corners lie at the same positions (seams of texture
+// coordinates and normals; weld_parts() says what is the same) are neighbours too, within a part: each side of the seam
+// gets a vertex of its own at its midpoint.
 class LocalBisection {
  public:
   // Keeps a copy of what it needs of the surface; polygons count as their triangles (triangulate()).
@@ -23,6 +23,8 @@ class LocalBisection {
   [[nodiscard]] std::uint32_t polygon(std::uint32_t triangle) const { return polygon_[triangle]; }
   [[nodiscard]] const Vec3& vertex(std::uint32_t v) const { return vertices_[v]; }  // m
   [[nodiscard]] double longest_edge(std::uint32_t triangle) const;                  // m
+  // Bit i: the edge from corner i to the next is not shared by two triangles.
+  [[nodiscard]] std::uint8_t unshared(std::uint32_t triangle) const;
 
   // Bisects the triangle at the middle of its longest edge, with all that have this edge, and before these, where they
   // have longer ones, them at those. False where its corners are not at three positions: it takes part in nothing.
@@ -49,14 +51,13 @@ class LocalBisection {
   [[nodiscard]] Edge edge(std::uint32_t triangle, std::size_t corner) const;
   [[nodiscard]] Edge longest(std::uint32_t triangle) const;
   [[nodiscard]] bool has_area(std::uint32_t triangle) const;
-  void weld_vertices(const Surface& surface);
   std::uint32_t middle(std::uint32_t a, std::uint32_t b, std::uint32_t& first);
   void split_edge(const Edge& edge);
   void split(std::uint32_t triangle, const Edge& edge, std::uint32_t& first);
 
   std::uint32_t vertices_before_;
   std::vector<Vec3> vertices_;                      // m
-  std::vector<std::uint32_t> welded_;               // (vertices) the first of its part at its position
+  std::vector<std::uint32_t> welded_;               // (vertices) weld_parts(), and so on for new ones
   std::vector<std::array<std::uint32_t, 2>> ends_;  // (new vertices)
   std::vector<Corners> triangles_;
   std::vector<std::uint32_t> polygon_;                                   // (triangles) it is a piece of

@@ -26,18 +26,6 @@ std::string_view text_of(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-std::vector<std::string_view> words_of(std::string_view line) {
-  std::vector<std::string_view> words;
-  std::size_t at = 0;
-  while (true) {
-    while (at < line.size() && blank(line[at])) ++at;
-    const std::size_t begin = at;
-    while (at < line.size() && !blank(line[at])) ++at;
-    if (at == begin) return words;
-    words.push_back(line.substr(begin, at - begin));
-  }
-}
-
 std::optional<PlyType> type_named(std::string_view name) {
   constexpr std::pair<std::string_view, PlyType> kNames[] = {
       {"char", PlyType::int8},      {"int8", PlyType::int8},       {"uchar", PlyType::uint8},
@@ -214,6 +202,18 @@ auto with_type(PlyType type, const Work& work) {
 }
 
 }  // namespace
+
+std::vector<std::string_view> words_of(std::string_view line) {
+  std::vector<std::string_view> words;
+  std::size_t at = 0;
+  while (true) {
+    while (at < line.size() && blank(line[at])) ++at;
+    const std::size_t begin = at;
+    while (at < line.size() && !blank(line[at])) ++at;
+    if (at == begin) return words;
+    words.push_back(line.substr(begin, at - begin));
+  }
+}
 
 std::size_t size_of(PlyType type) {
   return with_type(type, []<class T>() { return sizeof(T); });

@@ -39,6 +39,9 @@ struct PlyHeader {
   std::size_t size = 0;  // bytes, with its last newline
 };
 
+// The words of a line of the header.
+[[nodiscard]] std::vector<std::string_view> words_of(std::string_view line);
+
 // Throws InputError: no PLY file, cut off, a line that makes no sense, more elements than the file has room
 // for.
 [[nodiscard]] PlyHeader parse_ply_header(std::span<const std::byte> bytes, const std::string& where);

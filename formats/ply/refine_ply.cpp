@@ -19,6 +19,8 @@ bool is_corners(const PlyProperty& property) {
   return property.list && (property.name == "vertex_indices" || property.name == "vertex_index");
 }
 
+constexpr std::string_view kColorWords[] = {"red", "green", "blue", "alpha"};
+
 double largest_of(PlyType type) {
   const auto bits = static_cast<int>(8 * size_of(type));
   const bool is_signed = type == PlyType::int8 || type == PlyType::int16 || type == PlyType::int32;
@@ -46,7 +48,7 @@ class PlyRefinement {
       else if (element.name == "face" && !std::exchange(faces, true))
         held = split_faces(element);
       else
-        for (std::uint64_t i = 0; i < element.count; ++i) static_cast<void>(next_entry(element, i));
+        held = pass_over(element);
       if (!held.empty()) return held;
     }
     copy_to(text_.size());
@@ -72,15 +74,27 @@ class PlyRefinement {
       const std::string_view line = text_.substr(at, end - at);
       const std::string_view ending = line.ends_with("\r\n") ? "\r\n" : "\n";
       at = end;
-      if (line.starts_with("element vertex ") && !std::exchange(vertices, true))
+      const std::vector<std::string_view> words = words_of(line);
+      const std::string_view element = words.size() > 1 && words[0] == "element" ? words[1] : "";
+      if (element == "vertex" && !std::exchange(vertices, true))
         text += fmt::format("element vertex {}{}", refinement_.vertices + refinement_.ends.size(), ending);
-      else if (line.starts_with("element face ") && !std::exchange(faces, true))
+      else if (element == "face" && !std::exchange(faces, true))
         text += fmt::format("element face {}{}", refinement_.polygon_count(), ending);
       else
         text += line;
     }
     if (!vertices || !faces) throw InputError(source_.file, "the embedded PLY has another header");
     return text;
+  }
+
+  // Faces get other numbers; what names them by number would name others.
+  std::string pass_over(const PlyElement& element) {
+    for (const PlyProperty& property : element.properties)
+      for (const char* word : {"face", "tri"})
+        if (element.count > 0 && !is_float(property.type) && property.name.find(word) != std::string::npos)
+          return fmt::format("numbers of faces (\"{}\" of its element \"{}\")", property.name, element.name);
+    for (std::uint64_t i = 0; i < element.count; ++i) static_cast<void>(next_entry(element, i));
+    return "";
   }
 
   // Its place is [begin_, values_.end()).
@@ -135,16 +149,30 @@ class PlyRefinement {
     if (ascii()) out_ += '\n';
     const PlyVertexLayout layout = vertex_layout(element);
     for (const auto& [a, b] : refinement_.ends) {
-      entries.push_back(between(layout, entries[a], entries[b]));
+      entries.push_back(between(element, layout, entries[a], entries[b]));
       add_entry(element, entries.back());
     }
     if (ascii()) out_.pop_back();  // the line's end is in the text that follows
     return "";
   }
 
-  static Entry between(const PlyVertexLayout& layout, const Entry& a, const Entry& b) {
+  // Whole numbers that are no places and no colours name something: there is nothing between two labels.
+  static bool is_label(const PlyElement& element, const PlyVertexLayout& layout, std::size_t i) {
+    const PlyProperty& property = element.properties[i];
+    const auto has = [&](const auto& numbers) {
+      return std::find(numbers.begin(), numbers.end(), i) != numbers.end();
+    };
+    return !is_float(property.type) && !has(layout.position) &&
+           !(layout.has_normal() && has(layout.normal)) &&
+           std::none_of(std::begin(kColorWords), std::end(kColorWords),
+                        [&](std::string_view word) { return property.name.find(word) != std::string::npos; });
+  }
+
+  static Entry between(const PlyElement& element, const PlyVertexLayout& layout, const Entry& a,
+                       const Entry& b) {
     Entry result = a;
-    for (std::size_t i = 0; i < result.size(); ++i) result[i][0] = 0.5 * (a[i][0] + b[i][0]);
+    for (std::size_t i = 0; i < result.size(); ++i)
+      if (!is_label(element, layout, i)) result[i][0] = 0.5 * (a[i][0] + b[i][0]);
     if (!layout.has_normal()) return result;
     const auto normal = [&](const Entry& entry) {
       return Vec3(entry[layout.normal[0]][0], entry[layout.normal[1]][0], entry[layout.normal[2]][0]);

@@ -59,7 +59,8 @@ class WhereCoarse {
       const auto& [a, b, c] = bisection_.corners(t);
       flat.push_back({{bisection_.vertex(a), bisection_.vertex(b), bisection_.vertex(c)},
                       part(t),
-                      bisection_.polygon(t)});
+                      bisection_.polygon(t),
+                      bisection_.unshared(t)});
     }
     const std::vector<MissedPoint> missed = look_at(flat, body_, map_);
     std::vector<std::uint32_t> found;

@@ -6,6 +6,7 @@
 
 #include "base/parallel.h"
 #include "formats/lattice/fragments_of_body.h"
+#include "formats/part/near_weld.h"
 #include "mapping/methods/space_map.h"
 
 namespace flexel::mapping {
@@ -28,18 +29,18 @@ bool spans_fracture(const Components& fragments, const MapResult& result,
 }
 
 // (parts) m
-std::vector<double> long_edges(const Body& body) {
+std::vector<double> long_edges(const Body& body, double spacings = kLongEdge) {
   std::vector<double> least;
-  for (const Part& part : body.parts) least.push_back(kLongEdge * part.lattice.spacing.minCoeff());
+  for (const Part& part : body.parts) least.push_back(spacings * part.lattice.spacing.minCoeff());
   return least;
 }
 
 }  // namespace
 
 // The diagonal of a polygon is at most half its perimeter: most meshes need no triangulation.
-bool has_long_triangles(const Body& body) {
+bool has_long_triangles(const Body& body, double spacings) {
   const Surface& surface = body.surface;
-  const std::vector<double> least = long_edges(body);
+  const std::vector<double> least = long_edges(body, spacings);
   for (std::size_t p = 0; p < surface.polygon_count(); ++p) {
     const auto corners = surface.polygon(p);
     const double longest = longest_edge(surface.vertices, corners) * static_cast<double>(corners.size()) /
@@ -57,6 +58,7 @@ std::vector<LongTriangle> long_triangles(const Body& body, const MapResult& resu
   std::optional<Components> fragments;
   if (may_be_broken(body)) fragments = find_components(body, element_adjacency(body));
   const Triangles triangles = triangulate(surface);
+  const std::vector<std::uint8_t> unshared = unshared_edges(surface, triangles);
   for (std::uint32_t t = 0; t < triangles.corners.size(); ++t) {
     const auto& corners = triangles.corners[t];
     const std::uint32_t polygon = triangles.polygon[t], part = surface.polygon_part(polygon);
@@ -64,7 +66,8 @@ std::vector<LongTriangle> long_triangles(const Body& body, const MapResult& resu
     if (!(longest > least[part])) continue;
     if (fragments && spans_fracture(*fragments, result, corners)) continue;
     const auto& at = surface.vertices;
-    found.push_back({t, longest, {{at[corners[0]], at[corners[1]], at[corners[2]]}, part, polygon}});
+    found.push_back(
+        {t, longest, {{at[corners[0]], at[corners[1]], at[corners[2]]}, part, polygon, unshared[t]}});
   }
   return found;
 }

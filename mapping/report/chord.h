@@ -18,8 +18,8 @@ struct LongTriangle {
 // All but those that are stretched across a fracture (CrackReport::spanning_triangles has them).
 [[nodiscard]] std::vector<LongTriangle> long_triangles(const Body& body, const MapResult& result);
 
-// Whether there are any; quick.
-[[nodiscard]] bool has_long_triangles(const Body& body);
+// Whether there may be any, or any with an edge of so many spacings; quick.
+[[nodiscard]] bool has_long_triangles(const Body& body, double spacings = kLongEdge);
 
 // What each of them misses.
 [[nodiscard]] std::vector<MissedPoint> look_at(const std::vector<FlatTriangle>& triangles, const Body& body,

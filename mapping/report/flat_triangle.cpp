@@ -1,6 +1,7 @@
 // Points along the edges of a triangle, and inside it, are mapped and their distance from the plane of the
 // mapped corners is taken; sliding within the plane does not change the shape. A sharp edge belongs to
-// triangles in two planes, so bending in either direction is seen.
+// triangles in two planes, so bending in either direction is seen. What lies across an unshared edge may be split where
+// this triangle is not, and has other corners there: whatever such an edge misses is a gap.
 #include "mapping/report/flat_triangle.h"
 
 #include <Eigen/Geometry>
@@ -20,6 +21,11 @@ int pieces_of_edge(double spacings) {
 // Divisible by three, so that the centroid is.
 int pieces_inside(double spacings) {
   return 3 * static_cast<int>(std::clamp(std::ceil(spacings / (3 * kLongEdge)), 1.0, kMostInside));
+}
+
+double distance_from_line(const Vec3& p, const Vec3& from, const Vec3& to) {
+  const Vec3 along = (to - from).normalized();
+  return (p - from).cross(along).norm();
 }
 
 }  // namespace
@@ -44,12 +50,13 @@ MissedPoint FlatTriangles::operator()(const FlatTriangle& triangle) {
   cofactors << f.col(1).cross(f.col(2)), f.col(2).cross(f.col(0)), f.col(0).cross(f.col(1));
   const Vec3 turned = cofactors * (rest[1] - rest[0]).cross(rest[2] - rest[0]);
   if (turned.norm() > 0) found.facing = normal.dot(turned.normalized());
-  const auto look = [&](double u, double v) {
+  const auto look = [&](double u, double v, const Vec3* from = nullptr, const Vec3* to = nullptr) {
     const Vec3 x = rest[0] + u * (rest[1] - rest[0]) + v * (rest[2] - rest[0]);
     const SpaceMap::Value value = probe_.at(x, triangle.part, triangle.polygon);
     if (!value.heard || !value.position.allFinite()) return;
     found.displacement = std::max(found.displacement, (value.position - x).norm());
-    const double distance = std::abs(normal.dot(value.position - moved[0]));
+    const double distance = from != nullptr ? distance_from_line(value.position, *from, *to)
+                                            : std::abs(normal.dot(value.position - moved[0]));
     if (distance <= found.largest) return;
     found.largest = distance;
     found.at = x;
@@ -60,9 +67,11 @@ MissedPoint FlatTriangles::operator()(const FlatTriangle& triangle) {
     const double length = (rest.at((i + 1) % 3) - rest.at(i)).norm() / spacing;
     if (!(length > kLongEdge)) continue;
     const int n = pieces_of_edge(length);
+    const bool alone = triangle.unshared >> i & 1;
+    const Vec3 *begin = alone ? &moved.at(i) : nullptr, *end = alone ? &moved.at((i + 1) % 3) : nullptr;
     for (int k = 1; k < n; ++k) {
       const double s = static_cast<double>(k) / n;
-      look(from[0] + s * (to[0] - from[0]), from[1] + s * (to[1] - from[1]));
+      look(from[0] + s * (to[0] - from[0]), from[1] + s * (to[1] - from[1]), begin, end);
     }
   }
   const double height = (rest[1] - rest[0]).cross(rest[2] - rest[0]).norm() / longest;

@@ -14,10 +14,11 @@ constexpr double kChordNoise = 1e-9;  // of the part's diagonal: rounding
 struct FlatTriangle {
   std::array<Vec3, 3> corners;  // m, at rest
   std::uint32_t part = 0, polygon = 0;
+  std::uint8_t unshared = 0;  // bit i: no one triangle lies across the edge from corner i to the next
 };
 
 struct MissedPoint {
-  double largest = 0;       // m, from the plane of the mapped corners
+  double largest = 0;       // m, from the plane of the mapped corners; on unshared edges from the edge
   Vec3 at = Vec3::Zero();   // m, at rest
   double displacement = 0;  // m, the largest of a point that was looked at
   double facing =

@@ -45,18 +45,21 @@ std::string as_option(double metres) {
 }
 
 // What the triangles do not show, and with which edges they would.
-std::string coarseness(const ChordError& chord) {
-  return fmt::format(
+std::string coarseness(const ChordError& chord, SplitAdvice advice) {
+  std::string line = fmt::format(
       "its triangles, up to {} long, stay flat where the part bends and miss it by up to {} ({} of the "
-      "largest displacement) at ({}, {}, {}); --refine {} splits them",
+      "largest displacement) at ({}, {}, {})",
       human_length(chord.longest_edge), human_length(chord.largest), human_share(chord.share()),
-      human_length(chord.at.x()), human_length(chord.at.y()), human_length(chord.at.z()),
-      as_option(sufficient_edge(chord)));
+      human_length(chord.at.x()), human_length(chord.at.y()), human_length(chord.at.z()));
+  if (advice == SplitAdvice::none) return line;
+  line += fmt::format("; --refine {} splits them", as_option(sufficient_edge(chord)));
+  if (advice == SplitAdvice::new_binding) line += " with a binding that --save-binding makes anew for it";
+  return line;
 }
 
 // Why a mapping that fails must not be used.
 std::string failure(const MapReport& report) {
-  if (report.placed()) return coarseness(*report.chord);
+  if (report.placed()) return coarseness(*report.chord, report.split_advice);
   std::vector<std::string> causes;
   if (report.inverted > 0)
     causes.push_back(share(report.inverted, report.vertices) +
@@ -182,7 +185,7 @@ std::vector<std::string> report_lines(const MapReport& report) {
         fmt::format("the farthest vertex lies {:.2g} spacings outside the lattice: its place is extrapolated",
                     report.distance_outside));
   if (!report.placed() && report.chord && report.chord->coarse_triangles > 0)
-    lines.push_back(coarseness(*report.chord));
+    lines.push_back(coarseness(*report.chord, report.split_advice));
   add_triangle_lines(report, lines);
   lines.push_back(volume_line(report));
   for (const std::string& line : crack_lines(report.crack)) lines.push_back(line);

@@ -63,6 +63,13 @@ struct ChordError {
   [[nodiscard]] double share() const { return largest_displacement > 0 ? largest / largest_displacement : 0; }
 };
 
+// What would split triangles that are too coarse.
+enum class SplitAdvice {
+  length,       // --refine with a length
+  new_binding,  // that too, and a binding for the surface that is split
+  none,         // nothing: the file cannot be split
+};
+
 struct MapReport {
   std::size_t vertices = 0;
   std::size_t unreferenced = 0;  // of them, used by no polygon; they carry no flags
@@ -79,6 +86,7 @@ struct MapReport {
   SurfaceQuality quality;
   std::optional<ChordError> chord;        // nothing of a surface that was cut along cracks
   std::optional<std::size_t> split_from;  // triangles, before they were split to show the deformation
+  SplitAdvice split_advice = SplitAdvice::length;
   double lattice_volume_before = 0, lattice_volume_after = 0;  // m^3 of matter in whole cells; 0: no cells
   CrackReport crack;
   // The places of the vertices can be trusted.

@@ -5,6 +5,8 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "formats/exchange/surface_file.h"
+#include "formats/part/near_weld.h"
 #include "formats/part/topology.h"
 #include "mapping/map_refined.h"
 #include "mapping/report/chord.h"
@@ -177,6 +179,53 @@ TEST(Refinement, KeepsSeamsClosed) {
   const std::vector<std::uint32_t> first = weld(fine.refined->vertices);
   for (std::size_t v = 0; v < first.size(); ++v)
     EXPECT_EQ(fine.result.displacement[v], fine.result.displacement[first[v]]);
+}
+
+// A needle of a closed mesh, narrower than seams come apart, lies between neighbours that fit it exactly.
+TEST(Refinement, KeepsWhatFitsApart) {
+  Body body = bar();
+  Surface& surface = body.surface;
+  const Triangles before = triangulate(surface);
+  const std::uint32_t a = before.corners[0][0], b = before.corners[0][1], c = before.corners[0][2];
+  const Vec3 beside = surface.vertices[a] + 1e-9 * (surface.vertices[b] - surface.vertices[a]);
+  Triangles triangles = before;
+  surface.vertices.push_back(beside);
+  const auto extra = static_cast<std::uint32_t>(surface.vertices.size() - 1);
+  triangles.corners[0] = {extra, b, c};
+  triangles.corners.push_back({a, extra, c});
+  triangles.polygon.push_back(triangles.polygon[0]);
+  for (auto& corners : triangles.corners)  // and on the other side of a b
+    for (std::size_t i = 0; i < 3; ++i)
+      if (corners.at(i) == b && corners.at((i + 1) % 3) == a) {
+        const std::uint32_t apex = corners.at((i + 2) % 3);
+        corners = {b, extra, apex};
+        triangles.corners.push_back({extra, a, apex});
+        triangles.polygon.push_back(triangles.polygon[0]);
+        break;
+      }
+  ASSERT_EQ(triangles.corners.size(), before.corners.size() + 2);
+  const std::vector<std::uint32_t> welded = weld_parts(surface, triangles);
+  EXPECT_NE(welded[extra], welded[a]);
+  for (const std::uint8_t edges : unshared_edges(surface, triangles)) EXPECT_EQ(edges, 0);
+  triangles.corners.pop_back();
+  EXPECT_EQ(weld_parts(surface, triangles)[extra], a) << "beside a gap they are one";
+}
+
+TEST(RefinementToAnEdge, LeavesAFileThatCannotBeSplitWhole) {
+  Body body = bar();
+  body.surface.sources.resize(1);
+  SurfaceSource& source = body.surface.sources[0];
+  source.file = "bar.obj";
+  source.format = "obj";
+  source.bytes.assign(1, std::byte{'#'});
+  const std::vector<SurfaceFormat> formats = {surface_format("obj", "out.obj", false)};
+  RefineOptions refine;
+  refine.mode = Mode::to_edge;
+  refine.edge = 1;
+  const MappedPart whole = map_refined(body, MapOptions{&kBlended}, {}, refine, nullptr, formats, silent());
+  EXPECT_FALSE(whole.refined);
+  EXPECT_NE(whole.split_line.find("were not split: bar.obj"), std::string::npos) << whole.split_line;
+  EXPECT_EQ(whole.report.split_advice, SplitAdvice::none);
 }
 
 TEST(Refinement, IsTheSameForAnyNumberOfThreads) {

@@ -1,10 +1,12 @@
 """Triangles too large for the deformation are split (flexel-map --refine), with all that their files hold."""
 
 import json
+import math
 import os
 import struct
 
 from harness import box_triangles, expect, expect_error, expect_ok, main, run, write
+from torn import tear
 
 SIZE = (100.0, 10.0, 6.0)
 # Corners of each side, counter-clockwise from outside, and texture coordinates of its own: linear on each side.
@@ -143,6 +145,8 @@ def stl_bar(name="bar.stl"):
     return write(name, "\n".join(lines + ["endsolid bar"]) + "\n")
 
 
+SERIES = ('<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1"><Collection>\n'
+          '<DataSet timestep="0" file="{}"/>\n<DataSet timestep="1" file="{}"/>\n</Collection></VTKFile>\n')
 BARS = {"stl": stl_bar, "obj": obj_bar, "ply": ply_bar, "off": off_bar, "glb": glb_bar}
 
 
@@ -326,7 +330,8 @@ def test_what_cannot_be_split_stays_and_is_named():
     found = expect_ok(run("flexel-map", body, "-o", "out.glb"))
     expect("were not split: morph.glb" in found.err and "morph targets" in found.err and "stay flat" in found.err, found.err)
     expect(info("out.glb")["triangles"] == 12, "as it was")
-    expect_error(run("flexel-map", body, "--strict", "-o", "strict.glb"), "flexel-map", "--refine", code=4)
+    expect("--refine" not in found.err, f"what would be refused is not advised: {found.err}")
+    expect_error(run("flexel-map", body, "--strict", "-o", "strict.glb"), "flexel-map", "stay flat", code=4)
     expect_error(run("flexel-map", body, "--refine", "auto", "-o", "x.glb"), "flexel-map", "morph.glb", "morph targets", "--edge")
     # Another format does not hold them anyway.
     expect_ok(run("flexel-map", body, "--strict", "-o", "out.stl"))
@@ -337,8 +342,7 @@ def test_series_have_the_same_triangles_in_every_frame():
     obj_bar()
     rest("bar.obj")
     bent("bar.obj")
-    write("run.pvd", '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1"><Collection>\n'
-          '<DataSet timestep="0" file="rest.vtu"/>\n<DataSet timestep="1" file="bent.vtu"/>\n</Collection></VTKFile>\n')
+    write("run.pvd", SERIES.format("rest.vtu", "bent.vtu"))
     found = expect_ok(run("flexel-map", "run.pvd", "-o", "out.obj", "--report", "report.json", "--strict"))
     expect(found.err.count("triangles became") == 1, found.err)
     faces = [[line for line in open(f"out_0000{n}.obj") if line[0] in "fg"] for n in (0, 1)]
@@ -358,6 +362,170 @@ def test_other_meshes_are_split_as_well():
     _, kinds, faces = read_obj("out.obj")
     expect(len(kinds["vt"]) > 100 and {paint for _, paint, _ in faces} == {"paint0", "paint1"}, "with what their file holds")
     expect(abs(info("out.obj")["volume"] / 6e-6 - 1) < 0.01, "and its volume")
+
+
+def longest_hole(name):
+    """Of the STL's edges that one triangle has, corners within 0.1 mm being one: the length of the longest."""
+    data, count = open(name, "rb").read(), {}
+    for n in range(struct.unpack_from("<I", data, 80)[0]):
+        at = [tuple(round(c, 1) for c in struct.unpack_from("<3f", data, 96 + 50 * n + 12 * k)) for k in range(3)]
+        for k in range(3):
+            edge = tuple(sorted((at[k], at[(k + 1) % 3])))
+            count[edge] = count.get(edge, 0) + 1
+    return max((math.dist(*edge) for edge, users in count.items() if users == 1), default=0)
+
+
+def noisy_stl():
+    """Every second triangle off by what single precision makes of a coordinate."""
+    lines = ["solid bar"]
+    for n, triangle in enumerate(box_triangles(SIZE)):
+        corners = ["vertex {:.7f} {:.7f} {:.7f}".format(*(c + 2e-6 * (n % 2) for c in p)) for p in triangle]
+        lines += ["facet normal 0 0 0", "outer loop", *corners, "endloop", "endfacet"]
+    return write("noisy.stl", "\n".join(lines + ["endsolid bar"]) + "\n")
+
+
+def noisy_obj():
+    """The upper side has corners of its own, not quite at those of the others."""
+    lines = [f"v {x} {y} {z}" for x, y, z in CORNERS] + [f"v {x + 1e-6} {y} {z}" for x, y, z in CORNERS[4:]]
+    lines += ["f " + " ".join(str(c + (5 if s == 1 else 1)) for c in side) for s, side in enumerate(SIDES)]
+    return write("noisy.obj", "\n".join(lines) + "\n")
+
+
+def t_junction_obj():
+    """A side has a corner more, in the middle of an edge of the upper one."""
+    sides = [list(side) for side in SIDES]
+    sides[2].insert(3, 8)
+    lines = [f"v {x} {y} {z}" for x, y, z in [*CORNERS, (30, 0, 6)]]
+    return write("junction.obj", "\n".join(lines + ["f " + " ".join(str(c + 1) for c in side) for side in sides]) + "\n")
+
+
+def test_seams_that_do_not_fit_exactly_stay_closed():
+    for make, longest in ((noisy_stl, 0), (noisy_obj, 0), (t_junction_obj, 20)):
+        name = make()
+        body = bent(name)
+        expect_ok(run("flexel-map", body, "--strict", "-o", "out.stl", "--report", "out.json", "--force"))
+        report = json.load(open("out.json"))
+        expect(abs(report["volume_after"] / report["volume_before"] - 1) < 0.005, f"{name}: {report['volume_after']}")
+        expect(longest_hole("out.stl") <= longest, f"{name}: a hole of {longest_hole('out.stl')} mm")
+        expect_ok(run("flexel-voxelize", "out.stl", "--size", "2 mm", "-o", "again.vtu", "--force"))
+        # Whole, such a part is no better than one that fits.
+        expect_error(run("flexel-map", body, "--strict", "--keep-vertices", "-o", "x.stl"), "flexel-map", "stay flat", code=4)
+
+
+def test_ply_with_other_blanks_labels_and_faces_by_number():
+    ply_bar()
+    text = open("bar.ply").read().replace("element vertex 8", "element  vertex\t8").replace("uchar blue\n", "uchar blue\nproperty int label\n")
+    lines = text.split("\n")
+    first = lines.index("end_header") + 1
+    for v in range(8):
+        lines[first + v] += f" {10 * (v % 2)}"
+    write("label.ply", "\n".join(lines))
+    body = bent("label.ply")
+    expect_ok(run("flexel-map", body, "-o", "label_out.ply", "--strict"))
+    out = open("label_out.ply").read().split("\n")
+    first = out.index("end_header") + 1
+    count = int(next(line for line in out if line.startswith("element vertex")).split()[2])
+    labels = [line.split()[6] for line in out[first:first + count]]
+    expect(count > 50 and set(labels) == {"0", "10"}, f"{set(labels)}")
+    reds = {line.split()[3] for line in out[first:first + count]}
+    expect(len(reds) > 2, "colours lie between")
+    text = open("bar.ply").read().replace("element edge 1\nproperty int vertex1\nproperty int vertex2", "element seam 1\nproperty int face\nproperty int to")
+    write("seam.ply", text)
+    body = bent("seam.ply", "seam.vtu")
+    whole = expect_ok(run("flexel-map", body, "-o", "seam_out.ply"))
+    expect("were not split: seam.ply: holds numbers of faces" in whole.err and '"face"' in whole.err, whole.err)
+    expect(info("seam_out.ply")["triangles"] == 12, "as it was")
+    expect_error(run("flexel-map", body, "-o", "x.ply", "--refine", "5 mm"), "flexel-map", "numbers of faces", "--keep-vertices", "--edge")
+
+
+def test_glb_labels_stay_labels():
+    glb_bar()
+    head, binary = read_glb("bar.glb")
+    head["bufferViews"].append({"buffer": 0, "byteOffset": len(binary), "byteLength": 48})
+    binary += struct.pack("<24H", *[100 * (i // 4) + 3 for i in range(24)])
+    head["accessors"].append({"bufferView": 2, "componentType": 5123, "count": 24, "type": "SCALAR"})
+    head["buffers"][0]["byteLength"] = len(binary)
+    for primitive in head["meshes"][0]["primitives"]:
+        primitive["attributes"]["_BATCHID"] = len(head["accessors"]) - 1
+    # Within a side, too, there are two of them.
+    binary = binary[:-2] + struct.pack("<H", 900)
+    write("batch.glb", glb(head, binary))
+    expect_ok(run("flexel-map", bent("batch.glb"), "-o", "out.glb", "--strict"))
+    head, binary = read_glb("out.glb")
+    number = head["meshes"][0]["primitives"][0]["attributes"]["_BATCHID"]
+    expect(head["accessors"][number]["componentType"] == 5123 and head["accessors"][number]["count"] > 50, f"{head['accessors'][number]}")
+    found = {x for x, in accessor(head, binary, number)}
+    expect(found == {3, 103, 203, 303, 403, 503, 900}, f"{found}")
+
+
+def test_obj_numbers_keep_their_places():
+    obj_bar()
+    text = open("bar.obj").read()
+    tiny = text.replace("v 0.0 0.0 0.0 0.0", "v 0.0 0.0 0.0 1e-400")
+    expect(tiny != text, "a colour that no double holds")
+    write("tiny.obj", tiny)
+    expect_ok(run("flexel-map", bent("tiny.obj"), "-o", "tiny_out.obj", "--strict"))
+    new = [line.split() for line in open("tiny_out.obj") if line.startswith("v ")]
+    expect(len(new) > 50 and all(len(words) == 7 for words in new), f"{[w for w in new if len(w) != 7][:3]}")
+    # A small box besides, of polygons that are not split, with texture coordinates that the file does not have.
+    knob = [(50 + x, 4 + y, 5.5 + z) for z in (0, 1) for y in (0, 1) for x in (0, 1)]
+    lines = ["o knob"] + ["v {} {} {}".format(*p) for p in knob] + ["f " + " ".join(f"{c + 9}/99" for c in side) for side in SIDES]
+    write("knob.obj", text + "\n".join(lines) + "\n")
+    expect_ok(run("flexel-voxelize", "knob.obj", "--size", "2 mm", "-o", "knob.vtu"))
+    expect_ok(run("flexel-map", "knob.vtu", "--refine", "7 mm", "-o", "knob_out.obj"))
+    out = open("knob_out.obj").read()
+    expect(out.count("\nvt ") >= 99 and "/99" not in out.split("o knob")[1], "they name nothing new")
+
+
+def test_pieces_alone_and_cut_surfaces():
+    stl_bar()
+    body = bent("bar.stl")
+    expect_ok(run("flexel-map", body, "--crack", "cap", "--pieces", "even_{piece}.stl", "--refine", "5 mm"))
+    expect_ok(run("flexel-map", body, "--crack", "cap", "--pieces", "auto_{piece}.stl"))
+    expect(info("even_bar.stl")["triangles"] > 1000, "to an edge")
+    expect(info("auto_bar.stl")["triangles"] > 100, "and where it bends")
+    # A series that did not break is split, whatever was said of cracks.
+    rest("bar.stl")
+    write("run.pvd", SERIES.format("rest.vtu", "bent.vtu"))
+    found = expect_ok(run("flexel-map", "run.pvd", "-o", "out.stl", "--crack", "cap", "--strict"))
+    expect(found.err.count("triangles became") == 1, found.err)
+    expect(info("out_00000.stl")["triangles"] == info("out_00001.stl")["triangles"] > 100, "all frames alike")
+    obj_bar()
+    rest("bar.obj")
+    tear("rest.vtu", "torn.vtu", lambda p: p[:, 0] > 0.05, bow)
+    for files in (["torn.vtu"], ["torn.vtu", "--pieces", "t_{piece}.obj"]):
+        torn = expect_ok(run("flexel-map", *files, "--crack", "cap", "-o", "torn.obj", "--force"))
+        expect("was not split" in torn.err and "--refine LENGTH" in torn.err, torn.err)
+    write("torn.pvd", SERIES.format("rest.vtu", "torn.vtu"))
+    torn = expect_ok(run("flexel-map", "torn.pvd", "--crack", "open", "-o", "t.obj"))
+    expect(torn.err.count("--refine LENGTH") == 1 and "became" not in torn.err, torn.err)
+    expect_ok(run("flexel-map", "torn.vtu", "--crack", "cap", "--refine", "6 mm", "-o", "fine.obj"))
+
+
+def bow(p):
+    """Bent about the middle, and away from the other half."""
+    moved = p.copy()
+    moved[:, 2] -= 4 * (p[:, 0] - 0.05) ** 2
+    moved[:, 0] += 0.01
+    return moved
+
+
+def test_only_advice_that_works_is_given():
+    stl_bar()
+    # Nobody gets the triangles of a body, so they do not count.
+    found = expect_ok(run("flexel", "deform", "bar.stl", *BEND[:-1], "-o", "body.vtu", "--strict"))
+    expect("--refine" not in found.err and "stay flat" not in found.err, found.err)
+    whole = ["--method", "affine", "--keep-vertices"]
+    saved = expect_ok(run("flexel-map", "body.vtu", *whole, "--save-binding", "p.binding", "-o", "a.stl"))
+    expect("--refine" in saved.err and "--save-binding" not in saved.err, saved.err)
+    bound = expect_ok(run("flexel-map", "body.vtu", "--binding", "p.binding", "-o", "b.stl"))
+    expect("--refine" in bound.err and "--save-binding" in bound.err, bound.err)
+    # One format's limit is that of all, and the line says so.
+    obj_bar()
+    write("lines.obj", open("bar.obj").read() + "l -1 -2\n")
+    both = expect_ok(run("flexel", "deform", "lines.obj", *BEND[:-1], "-o", "m.stl", "-o", "m.obj"))
+    expect("the other files" in both.err and "--refine" not in both.err, both.err)
+    expect(info("m.stl")["triangles"] == info("m.obj")["triangles"] == 12, "the same triangles")
 
 
 def test_combinations():
