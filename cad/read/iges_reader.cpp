@@ -57,7 +57,7 @@ class MemoryFile {
 };
 
 // The last line has a T in column 73; the first is one of the start section.
-void check_complete(const CadReadJob& job) {
+void check_iges_complete(const CadReadJob& job) {
   constexpr std::size_t kLetter = 72;
   std::string_view text(reinterpret_cast<const char*>(job.bytes.data()), job.bytes.size());
   if (text.size() <= kLetter || text[kLetter] != 'S')
@@ -141,7 +141,7 @@ CadShape read_entities(const std::string& path, const CadReadJob& job) {
 }  // namespace
 
 CadShape read_iges(const CadReadJob& job) {
-  check_complete(job);
+  check_iges_complete(job);
   const MemoryFile file(job.bytes);
   return read_entities(file.path(), job);
 }

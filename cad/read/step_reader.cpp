@@ -114,7 +114,7 @@ SolidCount count_solids(const STEPControl_Reader& reader) {
   return count;
 }
 
-void check_complete(const CadReadJob& job) {
+void check_step_complete(const CadReadJob& job) {
   const std::string_view text(reinterpret_cast<const char*>(job.bytes.data()), job.bytes.size());
   if (text.rfind("END-ISO-10303-21") == std::string_view::npos)
     throw InputError(job.where, text.find("ISO-10303-21") == std::string_view::npos
@@ -126,7 +126,7 @@ void check_complete(const CadReadJob& job) {
 
 TopoDS_Shape transfer_step(STEPControl_Reader& reader, const CadReadJob& job, const Warn& warn,
                            const std::function<void()>& transfer_roots) {
-  check_complete(job);
+  check_step_complete(job);
   // OpenCASCADE reports on stdout, which belongs to the result.
   Message::DefaultMessenger()->ChangePrinters().Clear();
   Interface_Static::SetCVal("xstep.cascade.unit", "MM");
