@@ -14,7 +14,7 @@
 namespace flexel::cad {
 namespace {
 
-double volume(const TopoDS_Shape& shape) {
+double solid_volume(const TopoDS_Shape& shape) {
   GProp_GProps properties;
   BRepGProp::VolumeProperties(shape, properties);
   return properties.Mass();
@@ -66,7 +66,7 @@ TEST(WriteTree, UnitsAndSchemasComeBack) {
       EXPECT_EQ(back.schema.substr(0, 5), std::string(schema).substr(0, 5));
       EXPECT_EQ(back.time, "2001-02-03T04:05:06");
       ASSERT_EQ(back.solids, 2u);
-      EXPECT_NEAR(volume(back.roots.at(0).children.at(0).shape), 6000, 1e-6)
+      EXPECT_NEAR(solid_volume(back.roots.at(0).children.at(0).shape), 6000, 1e-6)
           << unit;  // mm^3, whatever the unit
       EXPECT_NEAR(back.roots[0].children.at(1).location.Transformation().TranslationPart().X(), 100, 1e-9)
           << unit;

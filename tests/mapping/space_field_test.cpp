@@ -14,9 +14,9 @@
 namespace flexel::mapping {
 namespace {
 
-constexpr double kSpacing = 0.2;
+constexpr double kFieldSpacing = 0.2;
 
-Vec3 wave(const Vec3& p) {
+Vec3 bent_by_wave(const Vec3& p) {
   return {p.x() + 0.1 * std::sin(3 * p.y()), p.y() + 0.2 * std::cos(2 * p.x()) * p.z(),
           p.z() * (1 + 0.2 * std::sin(p.x()))};
 }
@@ -24,26 +24,26 @@ Vec3 wave(const Vec3& p) {
 // An angle of two bars: between them is space that no element is near.
 Body angle_body() {
   Lattice lattice;
-  lattice.spacing = Vec3::Constant(kSpacing);
+  lattice.spacing = Vec3::Constant(kFieldSpacing);
   Body body = test::make_body(
       lattice, {0, 0, 0}, {16, 16, 2},
       [&](const Vec3& p) { return lattice.to_lattice(p).x() < 2 || lattice.to_lattice(p).y() < 2; },
       Placement::corner);
-  test::deform(body, wave);
+  test::deform(body, bent_by_wave);
   return body;
 }
 
-// The nodes between the elements follow wave() too.
+// The nodes between the elements follow bent_by_wave() too.
 void add_quadratic(Body& body) {
   Column column{3 * static_cast<int>(kBetweenNodes), {}};
   for (std::uint32_t c = 0; c < body.cell_count(); ++c) {
     const Vec3 low = body.rest[body.cell_elements[c][0]];
     for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
       if (corner_of_node(n) < 8) continue;
-      const Vec3 at = low + kSpacing / 2 *
+      const Vec3 at = low + kFieldSpacing / 2 *
                                 Vec3(static_cast<double>(n % 3), static_cast<double>(n / 3 % 3),
                                      static_cast<double>(n / 9));
-      const Vec3 u = wave(at) - at;
+      const Vec3 u = bent_by_wave(at) - at;
       column.values.insert(column.values.end(), {u.x(), u.y(), u.z()});
     }
   }
@@ -54,7 +54,7 @@ void add_quadratic(Body& body) {
 double roughness(const SpaceField& field, const Vec3& from, const Vec3& to, int points) {
   SpaceField::Probe probe(field);
   const Vec3 step = (to - from) / points;
-  const double h = 0.02 * kSpacing;
+  const double h = 0.02 * kFieldSpacing;
   const Vec3 along = h * step.normalized();
   Vec3 before = Vec3::Zero();
   double largest = 0;
@@ -74,7 +74,7 @@ TEST(SpaceField, FollowsTheMapNearTheElements) {
   SpaceField::Probe probe(field), twice_probe(twice);
   SpaceMap::Probe direct(map);
   for (const Vec3& x : body.rest) {
-    const Vec3 inside = x + Vec3(0.3, 0.2, 0.4) * kSpacing;
+    const Vec3 inside = x + Vec3(0.3, 0.2, 0.4) * kFieldSpacing;
     EXPECT_LT((probe.at(inside, 0) - direct.at(inside, 0).position).norm(), 1e-14);
     EXPECT_LT((twice_probe.at(inside, 0) - (2 * probe.at(inside, 0) - inside)).norm(), 1e-14);
   }
@@ -89,11 +89,11 @@ TEST(SpaceField, FollowsThePolynomialsOfTheCells) {
   for (std::size_t e = 0; e < displacement.size(); ++e) displacement[e] = body.position[e] - body.rest[e];
   const QuadraticField cells(body, displacement);
   for (std::uint32_t c = 0; c < body.cell_count(); ++c) {
-    const Vec3 middle = body.rest[body.cell_elements[c][0]] + Vec3::Constant(kSpacing / 2);
+    const Vec3 middle = body.rest[body.cell_elements[c][0]] + Vec3::Constant(kFieldSpacing / 2);
     // what is left of the neighbours' weights in the middle is nothing
     EXPECT_LT((probe.at(middle, 0) - middle - cells.displacement(c, Vec3::Constant(0.5))).norm(), 1e-15);
-    const Vec3 face = middle + Vec3(kSpacing / 2, 0, 0);
-    EXPECT_LT((probe.at(face, 0) - wave(face)).norm(), 1e-3 * kSpacing);
+    const Vec3 face = middle + Vec3(kFieldSpacing / 2, 0, 0);
+    EXPECT_LT((probe.at(face, 0) - bent_by_wave(face)).norm(), 1e-3 * kFieldSpacing);
   }
 }
 
