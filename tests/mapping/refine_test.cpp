@@ -272,7 +272,12 @@ TEST(Refinement, KeepsNeedlesOnTheirSide) {
       lattice, {0, 0, 0}, {50, 8, 8},
       [&](const Vec3& p) { return p.x() < length && std::hypot(p.y(), p.z()) < radius + 0.02; },
       Placement::corner);
-  test::add_tube_surface(body, length, radius, 1, 100);
+#ifdef __SANITIZE_ADDRESS__  // minutes otherwise
+  constexpr int kAround = 24;
+#else
+  constexpr int kAround = 100;
+#endif
+  test::add_tube_surface(body, length, radius, 1, kAround);
   body.surface_cell_offsets.clear();  // they have cells near their corners only
   body.surface_cells.clear();
   test::deform(body, [](const Vec3& p) -> Vec3 {
