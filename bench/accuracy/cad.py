@@ -108,6 +108,7 @@ def measure(part, cwd):
 
 def line_of(row):
     if "why" in row:
+        row["why"] = re.sub(r"\S*/", "", row["why"])  # no folders
         return f"| {row['part']} | | | | | | | | | {row['why']} |"
     percent = lambda name: f"{100 * row[name]:+.2f} %" if name in row else ""
     return (f"| {row['part']} | {row['solids']} | {row['faces']} ({row['kept']}) | {row['deviation']} | {1e3 * row['tolerance']:.3g} um | "
