@@ -16,6 +16,7 @@
 #include <thread>
 
 #include "base/error.h"
+#include "base/files/memory_file.h"
 #include "base/parallel.h"
 #include "cad/deform/write_job.h"
 #include "cad/read/occt.h"
@@ -90,17 +91,6 @@ Bytes do_job(const CadJob& job) {
   }
   return answer<CadMesh>(job.read->threads,
                          [&](const Warn& warn) { return mesh_of(read_shape(*job.read, warn), *job.read); });
-}
-
-bool write_whole(int to, const Bytes& bytes) {
-  std::size_t done = 0;
-  while (done < bytes.size()) {
-    const ssize_t written = write(to, bytes.data() + done, bytes.size() - done);
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) return false;
-    done += static_cast<std::size_t>(written);
-  }
-  return true;
 }
 
 int run() {

@@ -25,11 +25,28 @@ constexpr double kLeastTolerance = 1e-7;  // of the diagonal: below it OpenCASCA
 constexpr double kWideGap = 3;            // tolerances
 constexpr double kVolumeShare = 1e-3;  // by which the volumes of the faces and of the triangles may go apart
 
-// m; a share of the diagonal of all parts together, or a length.
+// --tolerance: a share of the diagonal of all parts together, or a length [m].
+struct Tolerance {
+  double value = kTolerance;
+  bool is_share = true;
+};
+
+Tolerance parse_tolerance(const std::string& text) {
+  Tolerance found;
+  if (text.empty()) return found;
+  found.is_share = is_number(text, found.value);
+  if (!found.is_share) found.value = parse_quantity(text, Dimension::length);
+  if (!(found.value > 0) || !std::isfinite(found.value) || (found.is_share && found.value >= 1))
+    throw InputError(fmt::format(
+        "--tolerance: \"{}\" is neither a share of the diagonal (1e-4) nor a length (10um)", text));
+  return found;
+}
+
+// m
 double tolerance_of(const std::string& text, const Body& body) {
+  const Tolerance asked = parse_tolerance(text);
   const double diagonal = bounding_box(body.surface.vertices).diagonal();
-  double share = kTolerance;
-  if (!text.empty() && !is_number(text, share)) share = parse_quantity(text, Dimension::length) / diagonal;
+  const double share = asked.is_share ? asked.value : asked.value / diagonal;
   if (share >= 1)
     throw InputError("--tolerance: must be below the part's diagonal, " + human_length(diagonal));
   if (share < kLeastTolerance)
@@ -38,16 +55,6 @@ double tolerance_of(const std::string& text, const Body& body) {
                     "more",
                     kLeastTolerance, human_length(kLeastTolerance * diagonal)));
   return share * diagonal;
-}
-
-void check_tolerance(const std::string& text) {
-  if (text.empty()) return;
-  double value = 0;
-  const bool share = is_number(text, value);
-  if (!share) value = parse_quantity(text, Dimension::length);
-  if (!(value > 0) || !std::isfinite(value) || (share && value >= 1))
-    throw InputError(fmt::format(
-        "--tolerance: \"{}\" is neither a share of the diagonal (1e-4) nor a length (10um)", text));
 }
 
 // "a, b, c and 12 others".
@@ -113,7 +120,7 @@ ChildLimits limits_of(const Body& body) {
 }  // namespace
 
 void check_cad_output(const MapArguments& arguments, const CrackOptions& crack, bool any_cad) {
-  check_tolerance(arguments.tolerance);
+  static_cast<void>(parse_tolerance(arguments.tolerance));
   if (!any_cad) {
     if (!arguments.tolerance.empty())
       throw InputError("--tolerance is for STEP, IGES and BREP: meshes have the vertices of the part itself");

@@ -36,9 +36,6 @@
 namespace flexel::cad {
 namespace {
 
-constexpr std::array<XCAFDoc_ColorType, 3> kColorTypes = {XCAFDoc_ColorGen, XCAFDoc_ColorSurf,
-                                                          XCAFDoc_ColorCurv};
-
 TCollection_ExtendedString name_of(const TDF_Label& label) {
   Handle(TDataStd_Name) name;
   return label.FindAttribute(TDataStd_Name::GetID(), name) ? name->Get() : TCollection_ExtendedString();
@@ -191,9 +188,7 @@ class SolidFinder {
       const TopLoc_Location here = above * node.location;
       find(node.children, here);
       if (node.shape.IsNull()) continue;
-      const TopAbs_ShapeEnum kind =
-          TopExp_Explorer(node.shape, TopAbs_SOLID).More() ? TopAbs_SOLID : TopAbs_SHELL;
-      for (TopExp_Explorer each(node.shape.Moved(here), kind); each.More(); each.Next())
+      for (TopExp_Explorer each(node.shape.Moved(here), kind_of_solids(node.shape)); each.More(); each.Next())
         node.solids.push_back(take(each.Current()));
     }
   }
@@ -282,6 +277,10 @@ TopoDS_Shape read_single(const CadReadJob& job, bool in_mm, CadTree& tree) {
 }
 
 }  // namespace
+
+TopAbs_ShapeEnum kind_of_solids(const TopoDS_Shape& shape) {
+  return TopExp_Explorer(shape, TopAbs_SOLID).More() ? TopAbs_SOLID : TopAbs_SHELL;
+}
 
 CadTree read_tree(const CadReadJob& job, bool in_mm) {
   CadTree tree;

@@ -2,8 +2,10 @@
 #pragma once
 #include <Quantity_ColorRGBA.hxx>
 #include <TCollection_ExtendedString.hxx>
+#include <TopAbs_ShapeEnum.hxx>
 #include <TopLoc_Location.hxx>
 #include <TopoDS_Shape.hxx>
+#include <XCAFDoc_ColorType.hxx>
 #include <array>
 #include <optional>
 #include <string>
@@ -13,9 +15,11 @@
 
 namespace flexel::cad {
 
-// Colours of what, surfaces and curves (XCAFDoc_ColorType), and layers.
+inline constexpr std::array<XCAFDoc_ColorType, 3> kColorTypes = {XCAFDoc_ColorGen, XCAFDoc_ColorSurf,
+                                                                 XCAFDoc_ColorCurv};
+
 struct ShapeStyle {
-  std::array<std::optional<Quantity_ColorRGBA>, 3> colors;
+  std::array<std::optional<Quantity_ColorRGBA>, kColorTypes.size()> colors;
   std::vector<TCollection_ExtendedString> layers;
 };
 
@@ -25,6 +29,9 @@ struct StyledShape {
   TCollection_ExtendedString name;
   ShapeStyle style;
 };
+
+// What counts as solids of a shape: shells where it has none.
+[[nodiscard]] TopAbs_ShapeEnum kind_of_solids(const TopoDS_Shape& shape);
 
 constexpr std::size_t kNoSolid = static_cast<std::size_t>(-1);
 

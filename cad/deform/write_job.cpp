@@ -16,7 +16,6 @@
 #include <TopoDS_Vertex.hxx>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "base/error.h"
 #include "base/human.h"
@@ -35,8 +34,8 @@ namespace flexel::cad {
 namespace {
 
 constexpr std::uint32_t kNoFace = 0xffffffffu;
-constexpr double kFitShare =
-    0.75;  // of the tolerance: between the points that a fit looks at its error is larger
+// Of the tolerance: between the points that a fit looks at its error is larger.
+constexpr double kFitShare = 0.75;
 
 // What one job works on.
 struct Work {
@@ -107,10 +106,6 @@ class NodeMap {
   std::vector<FacePlace> places_;
   std::uint32_t loose_part_ = 0;
 };
-
-TopAbs_ShapeEnum kind_of_solids(const TopoDS_Shape& shape) {
-  return TopExp_Explorer(shape, TopAbs_SOLID).More() ? TopAbs_SOLID : TopAbs_SHELL;
-}
 
 // The part that has the element nearest to a point (m, at rest).
 std::uint32_t nearest_part(const Work& work, const Vec3& x) {

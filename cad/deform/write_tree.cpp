@@ -3,10 +3,6 @@
 // their addresses).
 #include "cad/deform/write_tree.h"
 
-#include <sys/mman.h>
-#include <unistd.h>
-
-#include <fmt/format.h>
 #include <APIHeaderSection_MakeHeader.hxx>
 #include <BRepTools.hxx>
 #include <BRep_Builder.hxx>
@@ -32,29 +28,12 @@
 #include <XCAFDoc_LayerTool.hxx>
 #include <XCAFDoc_ShapeTool.hxx>
 #include <XSControl_WorkSession.hxx>
-#include <new>
 #include <sstream>
 
-#include "base/error.h"
+#include "base/files/memory_file.h"
 
 namespace flexel::cad {
 namespace {
-
-// A file in memory, for writers that know names of files only.
-class MemoryOutput {
- public:
-  MemoryOutput() : descriptor_(memfd_create("output", MFD_CLOEXEC)) {
-    if (descriptor_ < 0) throw std::bad_alloc();
-  }
-  ~MemoryOutput() { close(descriptor_); }
-  MemoryOutput(const MemoryOutput&) = delete;
-  MemoryOutput& operator=(const MemoryOutput&) = delete;
-  [[nodiscard]] std::string path() const { return fmt::format("/proc/self/fd/{}", descriptor_); }
-  [[nodiscard]] Bytes bytes() const { return read_all(path()); }
-
- private:
-  int descriptor_;
-};
 
 Bytes bytes_of(const std::string& text) {
   const auto* begin = reinterpret_cast<const std::byte*>(text.data());
@@ -111,11 +90,9 @@ class DocumentWriter {
     return node.name.IsEmpty() ? TCollection_ExtendedString("part") : node.name;
   }
   void dress(const TDF_Label& label, const TCollection_ExtendedString& name, const ShapeStyle& style) {
-    constexpr std::array<XCAFDoc_ColorType, 3> kTypes = {XCAFDoc_ColorGen, XCAFDoc_ColorSurf,
-                                                         XCAFDoc_ColorCurv};
     if (!name.IsEmpty()) TDataStd_Name::Set(label, name);
-    for (std::size_t type = 0; type < kTypes.size(); ++type)
-      if (style.colors[type]) colors_->SetColor(label, *style.colors[type], kTypes[type]);
+    for (std::size_t type = 0; type < kColorTypes.size(); ++type)
+      if (style.colors[type]) colors_->SetColor(label, *style.colors[type], kColorTypes[type]);
     for (const TCollection_ExtendedString& layer : style.layers) layers_->SetLayer(label, layer);
   }
   Handle(TDocStd_Document) document_;
@@ -148,7 +125,7 @@ Bytes write_step(const CadTree& style, const Handle(TDocStd_Document) & document
   header.SetTimeStamp(
       new TCollection_HAsciiString(style.time.empty() ? "1970-01-01T00:00:00" : style.time.c_str()));
   header.SetOriginatingSystem(new TCollection_HAsciiString("Flexel"));
-  const MemoryOutput file;
+  const MemoryFile file;  // it knows names of files only
   if (writer.Write(file.path().c_str()) != IFSelect_RetDone)
     throw Standard_Failure("the STEP file cannot be written");
   return file.bytes();

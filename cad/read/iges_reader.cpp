@@ -2,8 +2,6 @@
 // their edges first, at the smallest of a few tolerances that leaves no edge free, and the closed shells
 // are taken as solids. Names are those of the entities.
 #include <fmt/format.h>
-#include <sys/mman.h>
-#include <unistd.h>
 
 #include <BRepBndLib.hxx>
 #include <BRepBuilderAPI_Sewing.hxx>
@@ -23,38 +21,14 @@
 #include <XSControl_WorkSession.hxx>
 #include <cmath>
 #include <map>
-#include <new>
 
 #include "base/error.h"
+#include "base/files/memory_file.h"
 #include "cad/read/occt.h"
 #include "formats/common/readers.h"
 
 namespace flexel::cad {
 namespace {
-
-// OpenCASCADE reads IGES from files only: this one is in memory and has a name while it is open, so that
-// nothing is left of it, however the program ends.
-class MemoryFile {
- public:
-  explicit MemoryFile(const Bytes& bytes) : descriptor_(::memfd_create("iges", MFD_CLOEXEC)) {
-    std::size_t done = 0;
-    while (descriptor_ >= 0 && done < bytes.size()) {
-      const ssize_t written = ::write(descriptor_, bytes.data() + done, bytes.size() - done);
-      if (written <= 0) break;
-      done += static_cast<std::size_t>(written);
-    }
-    if (done == bytes.size()) return;
-    ::close(descriptor_);
-    throw std::bad_alloc();
-  }
-  ~MemoryFile() { ::close(descriptor_); }
-  MemoryFile(const MemoryFile&) = delete;
-  MemoryFile& operator=(const MemoryFile&) = delete;
-  [[nodiscard]] std::string path() const { return fmt::format("/proc/self/fd/{}", descriptor_); }
-
- private:
-  int descriptor_ = -1;
-};
 
 // The last line has a T in column 73; the first is one of the start section.
 void check_iges_complete(const CadReadJob& job) {
@@ -142,7 +116,7 @@ CadShape read_entities(const std::string& path, const CadReadJob& job) {
 
 CadShape read_iges(const CadReadJob& job) {
   check_iges_complete(job);
-  const MemoryFile file(job.bytes);
+  const MemoryFile file(job.bytes);  // OpenCASCADE reads IGES from files only
   return read_entities(file.path(), job);
 }
 

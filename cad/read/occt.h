@@ -30,9 +30,6 @@ struct CadShape {
   ShapeLabels labels;
 };
 
-// What OpenCASCADE's readers of STEP and IGES make of every unit [m].
-inline constexpr double kMillimetre = 1e-3;
-
 // Throw InputError: damaged, no solid.
 [[nodiscard]] CadShape read_step(const CadReadJob& job, const Warn& warn);
 [[nodiscard]] CadShape read_iges(const CadReadJob& job);

@@ -14,12 +14,15 @@
 
 namespace flexel {
 
+// What OpenCASCADE's readers of STEP and IGES make of every unit [m].
+inline constexpr double kMillimetre = 1e-3;
+
 // Read a CAD file.
 struct CadReadJob {
   std::string format;  // name of its FileFormat
   Bytes bytes;
   std::string where, file;           // as those of ImportInput
-  double unit = 1e-3;                // metres per unit of a format that carries none
+  double unit = kMillimetre;         // metres per unit of a format that carries none
   std::optional<double> deflection;  // as those of ImportOptions
   double angular_deflection = 0;
   std::uint64_t threads = 1;

@@ -67,9 +67,6 @@ Surface read_cad(ImportInput& input, const ImportOptions& options, SurfaceSource
   return cad_surface(std::move(mesh), std::move(source), options, input.where);
 }
 
-// What OpenCASCADE's readers of STEP and IGES make of every unit [m].
-constexpr double kMillimetre = 1e-3;
-
 Surface read_with_unit(ImportInput& input, const ImportOptions& options, const char* format,
                        const char* title) {
   if (options.unit)

@@ -4,7 +4,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
-#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/time.h>
@@ -23,6 +22,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "base/files/memory_file.h"
 #include "base/stop.h"
 
 namespace flexel {
@@ -173,30 +173,6 @@ ChildEnd end_of(int status) {
   return WTERMSIG(status) == SIGKILL ? ChildEnd::out_of_memory : ChildEnd::crashed;
 }
 
-// A file in memory that holds `bytes`, to be read from its beginning.
-class MemoryInput {
- public:
-  explicit MemoryInput(const Bytes& bytes) : descriptor_(memfd_create("input", MFD_CLOEXEC)) {
-    std::size_t done = 0;
-    while (descriptor_ >= 0 && done < bytes.size()) {
-      const ssize_t written = write(descriptor_, bytes.data() + done, bytes.size() - done);
-      if (written < 0 && errno == EINTR) continue;
-      if (written <= 0) break;
-      done += static_cast<std::size_t>(written);
-    }
-    if (done == bytes.size() && descriptor_ >= 0 && lseek(descriptor_, 0, SEEK_SET) == 0) return;
-    if (descriptor_ >= 0) close(descriptor_);
-    throw std::bad_alloc();
-  }
-  ~MemoryInput() { close(descriptor_); }
-  MemoryInput(const MemoryInput&) = delete;
-  MemoryInput& operator=(const MemoryInput&) = delete;
-  [[nodiscard]] int descriptor() const { return descriptor_; }
-
- private:
-  int descriptor_ = -1;
-};
-
 }  // namespace
 
 ChildOutput run_in_child(const std::function<int(int out)>& body, const ChildLimits& limits) {
@@ -222,7 +198,7 @@ ChildOutput run_in_child(const std::function<int(int out)>& body, const ChildLim
 }
 
 ChildOutput run_limited(const std::string& program, const Bytes& input, const ChildLimits& limits) {
-  const MemoryInput file(input);
+  const MemoryFile file(input);
   return run_in_child(
       [&](int out) -> int {
         if (dup2(file.descriptor(), STDIN_FILENO) < 0 || dup2(out, STDOUT_FILENO) < 0) return kChildFailed;
