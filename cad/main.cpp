@@ -1,6 +1,5 @@
 // flexel-cad: what the other programs need of OpenCASCADE, a job on stdin and its answer on stdout
 // (formats/cad/cad_job.h). They start it where a CAD file comes, and limit its time and memory.
-#include <fcntl.h>
 #include <unistd.h>
 
 #include <OSD_Parallel.hxx>
@@ -8,15 +7,12 @@
 #include <Standard_Failure.hxx>
 #include <Standard_OutOfMemory.hxx>
 #include <atomic>
-#include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <exception>
 #include <new>
 #include <thread>
 
 #include "base/error.h"
-#include "base/files/memory_file.h"
 #include "base/parallel.h"
 #include "cad/deform/write_job.h"
 #include "cad/read/occt.h"
@@ -56,18 +52,11 @@ std::size_t threads_that_start(std::size_t wanted) {
   return started.size() + 1;
 }
 
-// OpenCASCADE writes on stdout, which is the answer's: that goes to another descriptor, which is returned.
-int take_stdout() {
-  const int out = dup(STDOUT_FILENO), nothing = open("/dev/null", O_WRONLY | O_CLOEXEC);
-  if (nothing >= 0) dup2(nothing, STDOUT_FILENO);
-  return out;
-}
-
 template <class Result, class Work>
 Bytes answer(std::size_t threads, const Work& work) {
   OSD_Parallel::SetUseOcctThreads(Standard_True);
   OSD_ThreadPool::DefaultPool(static_cast<int>(threads_that_start(threads)));
-  CadAnswer<Result> found;
+  JobAnswer<Result> found;
   try {
     found.result = work([&](const std::string& line) { found.warnings.push_back(line); });
   } catch (const InputError& error) {
@@ -93,22 +82,12 @@ Bytes do_job(const CadJob& job) {
                          [&](const Warn& warn) { return mesh_of(read_shape(*job.read, warn), *job.read); });
 }
 
-int run() {
-  std::set_terminate(end_on_terminate);
-  const int out = take_stdout();
-  try {
-    return write_whole(out, do_job(unpack_job(read_all("-")))) ? kChildFinished : kChildFailed;
-  } catch (const std::bad_alloc&) {
-    return kChildWithoutMemory;
-  } catch (const InputError& error) {
-    std::fprintf(stderr, "flexel-cad: error: %s\n", error.what());
-    return kChildNotStarted;
-  }
-}
-
 }  // namespace
 }  // namespace flexel::cad
 
 int main() {
-  _exit(flexel::cad::run());  // what the libraries would tidy up is gone with the process
+  std::set_terminate(flexel::cad::end_on_terminate);
+  // What the libraries would tidy up is gone with the process.
+  _exit(flexel::serve_job(
+      "flexel-cad", [](const flexel::Bytes& job) { return flexel::cad::do_job(flexel::unpack_job(job)); }));
 }

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/cad/limited_child.h"
+#include "formats/common/child_job.h"
 #include "formats/part/surface.h"
 
 namespace flexel {
@@ -68,19 +68,10 @@ struct CadWritten {
   double volume = 0, volume_before = 0;  // m^3, of all solids together
 };
 
-// Either answer, or why there is none.
-template <class Result>
-struct CadAnswer {
-  std::vector<std::string> warnings;
-  bool refused = false;
-  std::string where, why;  // of an InputError, where it is refused
-  Result result;           // else
-};
-
 [[nodiscard]] Bytes pack(const CadReadJob& job);
 [[nodiscard]] Bytes pack(const CadWriteJob& job);
-[[nodiscard]] Bytes pack(const CadAnswer<CadMesh>& answer);
-[[nodiscard]] Bytes pack(const CadAnswer<CadWritten>& answer);
+[[nodiscard]] Bytes pack(const JobAnswer<CadMesh>& answer);
+[[nodiscard]] Bytes pack(const JobAnswer<CadWritten>& answer);
 
 // What a job asks for: one of the two. Throws InputError: these bytes are not from pack().
 struct CadJob {
@@ -90,8 +81,8 @@ struct CadJob {
 [[nodiscard]] CadJob unpack_job(std::span<const std::byte> bytes);
 
 // Throw InputError(where, ...): the same, of an answer.
-[[nodiscard]] CadAnswer<CadMesh> unpack_mesh(std::span<const std::byte> bytes, const std::string& where);
-[[nodiscard]] CadAnswer<CadWritten> unpack_written(std::span<const std::byte> bytes,
+[[nodiscard]] JobAnswer<CadMesh> unpack_mesh(std::span<const std::byte> bytes, const std::string& where);
+[[nodiscard]] JobAnswer<CadWritten> unpack_written(std::span<const std::byte> bytes,
                                                    const std::string& where);
 
 // Has flexel-cad do it. Throws InputError(where, ...): it crashes, takes more than the limits, or answers what does not

@@ -23,6 +23,7 @@ struct FileFormat {
   bool carries_unit = false;      // the file says the unit of its coordinates; else --unit does
   bool is_cad = false;            // exact surfaces: tessellated where it is read, written by flexel-cad
   bool holds_attributes = false;  // numbers of any name at vertices
+  bool by_assimp = false;         // read through assimp (formats/assimp)
 
   // The four that follow: none where the format is only read.
   // A new file of the surface.
@@ -48,6 +49,9 @@ struct FileFormat {
 
 // The rows; each is defined in its format's folder.
 extern const FileFormat kStepFormat, kIgesFormat, kBrepFormat, kStlFormat, kObjFormat, kPlyFormat, kOffFormat,
-    kGltfFormat, k3mfFormat;
+    kGltfFormat, k3mfFormat, kVdbFormat;
+// Those that are read through assimp (formats/assimp).
+inline constexpr std::size_t kAssimpFormats = 28;
+[[nodiscard]] std::span<const FileFormat, kAssimpFormats> assimp_formats();
 
 }  // namespace flexel

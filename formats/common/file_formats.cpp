@@ -4,15 +4,21 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 
 namespace flexel {
 namespace {
 
-constexpr std::array<const FileFormat*, 9> kFormats = {&kStepFormat, &kIgesFormat, &kBrepFormat,
-                                                       &kStlFormat,  &kObjFormat,  &kPlyFormat,
-                                                       &kOffFormat,  &kGltfFormat, &k3mfFormat};
+// Our own first, then those of assimp.
+const std::vector<const FileFormat*>& all_formats() {
+  static const std::vector<const FileFormat*> kAll = [] {
+    std::vector<const FileFormat*> all = {&kStepFormat, &kIgesFormat, &kBrepFormat, &kStlFormat, &kObjFormat,
+                                          &kPlyFormat,  &kOffFormat,  &kGltfFormat, &k3mfFormat, &kVdbFormat};
+    for (const FileFormat& format : assimp_formats()) all.push_back(&format);
+    return all;
+  }();
+  return kAll;
+}
 
 // "a, b or c".
 std::string listed(const std::vector<std::string>& words, std::string_view last) {
@@ -27,11 +33,11 @@ std::string listed(const std::vector<std::string>& words, std::string_view last)
 }  // namespace
 
 std::span<const FileFormat* const> file_formats() {
-  return kFormats;
+  return all_formats();
 }
 
 const FileFormat* format_named(std::string_view name) {
-  for (const FileFormat* format : kFormats)
+  for (const FileFormat* format : all_formats())
     if (format->name == name ||
         std::find(format->extensions.begin(), format->extensions.end(), name) != format->extensions.end())
       return format;
@@ -39,7 +45,7 @@ const FileFormat* format_named(std::string_view name) {
 }
 
 const FileFormat* format_of(const SurfaceSource& source) {
-  for (const FileFormat* format : kFormats)
+  for (const FileFormat* format : all_formats())
     if (is_format(source, *format)) return format;
   return nullptr;
 }
@@ -61,21 +67,24 @@ bool is_rewritten(const SurfaceSource& source) {
 
 std::vector<std::string> read_formats() {
   std::vector<std::string> names;
-  for (const FileFormat* format : kFormats) names.emplace_back(format->name);
+  for (const FileFormat* format : all_formats()) names.emplace_back(format->name);
   return names;
 }
 
 std::vector<std::string> written_formats(bool cad) {
   std::vector<std::string> names;
-  for (const FileFormat* format : kFormats)
+  for (const FileFormat* format : all_formats())
     if (format->write_new != nullptr || (cad && format->is_cad)) names.emplace_back(format->name);
   return names;
 }
 
 std::string read_titles(bool cad) {
   std::vector<std::string> titles;
-  for (const FileFormat* format : kFormats)
-    if (cad || !format->is_cad) titles.emplace_back(format->title);
+  for (const FileFormat* format : all_formats())
+    if ((cad || !format->is_cad) && !format->by_assimp) titles.emplace_back(format->title);
+  constexpr std::size_t kNamed = 6;  // those that parts come in
+  for (const FileFormat& format : assimp_formats().first(kNamed)) titles.emplace_back(format.title);
+  titles.emplace_back("another that assimp reads");
   return listed(titles, "or");
 }
 
@@ -87,7 +96,7 @@ std::string capitals(const FileFormat& format) {
 
 std::string written_titles(bool (*holds)(const FileFormat&), std::string_view last) {
   std::vector<std::string> titles;
-  for (const FileFormat* format : kFormats)
+  for (const FileFormat* format : all_formats())
     if (format->write_new != nullptr && holds(*format)) titles.push_back(capitals(*format));
   return listed(titles, last);
 }

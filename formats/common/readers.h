@@ -1,6 +1,7 @@
 // What the readers of single formats share. Inside flexel_import only.
 #pragma once
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -42,7 +43,9 @@ struct FileReader {
 
 // Defined where each format is read.
 extern const FileReader kStepReader, kIgesReader, kBrepReader, kStlReader, kObjReader, kPlyReader, kOffReader,
-    kGltfReader, k3mfReader;
+    kGltfReader, k3mfReader, kVdbReader;
+// Those of formats/assimp, in the order of their rows.
+[[nodiscard]] std::span<const FileReader> assimp_readers();
 
 // Whether the text begins, after blanks, with a word (given in lower case) in whatever case.
 [[nodiscard]] bool begins_with_word(std::string_view text, std::string_view word);

@@ -15,6 +15,7 @@
 #include "base/parallel.h"
 #include "formats/common/file_formats.h"
 #include "formats/common/readers.h"
+#include "formats/exchange/unread_formats.h"
 #include "formats/lattice/body_file.h"
 #include "formats/part/part_name.h"
 #include "formats/part/subdivide.h"
@@ -22,9 +23,16 @@
 namespace flexel {
 namespace {
 
-constexpr std::array<const FileReader*, 9> kReaders = {&kStepReader, &kIgesReader, &kBrepReader,
-                                                       &kStlReader,  &kObjReader,  &kPlyReader,
-                                                       &kOffReader,  &kGltfReader, &k3mfReader};
+// Our own first, then those of assimp.
+const std::vector<const FileReader*>& all_readers() {
+  static const std::vector<const FileReader*> kAll = [] {
+    std::vector<const FileReader*> all = {&kStepReader, &kIgesReader, &kBrepReader, &kStlReader, &kObjReader,
+                                          &kPlyReader,  &kOffReader,  &kGltfReader, &k3mfReader, &kVdbReader};
+    for (const FileReader& reader : assimp_readers()) all.push_back(&reader);
+    return all;
+  }();
+  return kAll;
+}
 
 ImportInput load(const std::string& path) {
   ImportInput input;
@@ -40,7 +48,7 @@ ImportInput load(const std::string& path) {
 // The reader whose format the bytes speak for most, and how much; of equal ones the first.
 std::pair<const FileReader*, Evidence> strongest(const ImportInput& input) {
   std::pair<const FileReader*, Evidence> best{nullptr, Evidence::none};
-  for (const FileReader* reader : kReaders)
+  for (const FileReader* reader : all_readers())
     if (const Evidence evidence = reader->sniff(input); evidence > best.second) best = {reader, evidence};
   return best;
 }
@@ -77,7 +85,7 @@ std::string wide_encoding(const ImportInput& input) {
 
 // A binary file of a format without a mark of its own, which its size tells.
 bool told_by_size(const ImportInput& input) {
-  return std::any_of(kReaders.begin(), kReaders.end(),
+  return std::any_of(all_readers().begin(), all_readers().end(),
                      [&](const FileReader* reader) { return reader->sniff(input) == Evidence::size; });
 }
 
@@ -109,7 +117,7 @@ void check_text(const ImportInput& input, const FileReader& reader) {
 // By the name of its format or an extension; nullptr: none.
 const FileReader* reader_named(const std::string& name) {
   const FileFormat* format = format_named(name);
-  for (const FileReader* reader : kReaders)
+  for (const FileReader* reader : all_readers())
     if (reader->format == format) return reader;
   return nullptr;
 }
@@ -161,6 +169,10 @@ HashedSurface read_and_hash(ImportInput& input, const FileReader& reader, const 
 Surface import_surface(const std::string& path, const ImportOptions& options) {
   ImportInput input = load(path);
   check_encoding(input);
+  if (const std::string why =
+          options.format ? "" : unread_format(path == "-" ? "" : extension(path), beginning(input));
+      !why.empty())
+    throw InputError(input.where, why);
   const FileReader& reader = reader_of(input, options, path);
   check_text(input, reader);
   HashedSurface read = read_and_hash(input, reader, options);

@@ -1,5 +1,5 @@
 // The process in which OpenCASCADE runs, and what it hands back.
-#include "formats/cad/limited_child.h"
+#include "base/program/limited_child.h"
 
 #include <gmock/gmock.h>
 #include <sys/wait.h>
@@ -100,8 +100,8 @@ TEST(LimitedChild, ALimitOfTheRunEndsIt) {
   expect_no_child();
 }
 
-CadAnswer<CadMesh> some_answer() {
-  CadAnswer<CadMesh> answer;
+JobAnswer<CadMesh> some_answer() {
+  JobAnswer<CadMesh> answer;
   answer.warnings = {"one", "two"};
   Surface& surface = answer.result.surface;
   surface.vertices = {Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0)};
@@ -115,7 +115,7 @@ CadAnswer<CadMesh> some_answer() {
 }
 
 TEST(CadJob, AnAnswerComesBackAsItWas) {
-  const CadAnswer<CadMesh> answer = some_answer(), back = unpack_mesh(pack(answer), "a.step");
+  const JobAnswer<CadMesh> answer = some_answer(), back = unpack_mesh(pack(answer), "a.step");
   const Surface &surface = answer.result.surface, &read = back.result.surface;
   EXPECT_EQ(back.warnings, answer.warnings);
   EXPECT_FALSE(back.refused);
@@ -126,11 +126,11 @@ TEST(CadJob, AnAnswerComesBackAsItWas) {
   EXPECT_EQ(read.faces.at(0).name, "face");
   EXPECT_EQ(read.parts.at(0).name, "part");
   EXPECT_EQ(back.result.face_colors, answer.result.face_colors);
-  CadAnswer<CadMesh> no;
+  JobAnswer<CadMesh> no;
   no.refused = true;
   no.where = "a.step";
   no.why = "is damaged";
-  const CadAnswer<CadMesh> refused = unpack_mesh(pack(no), "a.step");
+  const JobAnswer<CadMesh> refused = unpack_mesh(pack(no), "a.step");
   EXPECT_TRUE(refused.refused);
   EXPECT_EQ(refused.where + refused.why, "a.stepis damaged");
 }

@@ -8,13 +8,14 @@ import sys
 
 from harness import BIN, SOURCE, Skip, expect, main, need
 
-CODE = ["base", "formats", "voxelize", "simulate", "mapping", "cad", "flexel"]
+CODE = ["base", "formats", "meshes", "voxelize", "simulate", "mapping", "cad", "flexel"]
 
 # Every folder of the code, each after those that it may include: docs/development.md says what they hold.
 ORDER = """
 base base/math base/files base/program
-formats/part formats/common formats/stl formats/obj formats/ply formats/off formats/gltf formats/threemf formats/cad
+formats/part formats/common formats/stl formats/obj formats/ply formats/off formats/gltf formats/threemf formats/cad formats/vdb formats/assimp
 formats/vtu formats/lattice formats/exchange
+meshes
 voxelize/types voxelize/mesh voxelize/classify voxelize/heal voxelize/lattice voxelize
 simulate/laws simulate/input simulate/result simulate/linear simulate/state simulate/rigid simulate/conditions simulate/models
 simulate/kernels simulate/matter simulate/gravitation simulate/contact/points simulate/contact simulate/effects simulate/events simulate/scene

@@ -4,6 +4,7 @@
 #include <openvdb/io/Stream.h>
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/MeshToVolume.h>
+#include <openvdb/tools/SignedFloodFill.h>
 
 #include <cmath>
 #include <sstream>
@@ -11,6 +12,7 @@
 #include "base/error.h"
 #include "base/files/files.h"
 #include "base/files/output_file.h"
+#include "formats/common/length_metadata.h"
 
 namespace flexel::voxelize {
 namespace {
@@ -53,6 +55,7 @@ openvdb::FloatGrid::Ptr fill_grid(const Body& body, const Part& part) {
   grid->setTransform(transform_of(part.lattice, part.lattice.spacing));
   grid->setGridClass(openvdb::GRID_FOG_VOLUME);
   grid->setName("fill_" + part.name);
+  grid->insertMeta(kLengthMetadata, openvdb::StringMetadata("m"));
   return grid;
 }
 
@@ -98,8 +101,10 @@ openvdb::FloatGrid::Ptr distance_grid(const Body& body, std::uint32_t number,
     for (int a = 0; a < 3; ++a) cell[a] = static_cast<int>(std::floor((at[a] + .5) * voxel / spacing[a]));
     if (reader.getValue(cell) >= .5f) value.setValue(-value.getValue());
   }
+  openvdb::tools::signedFloodFill(grid->tree());  // beyond the band: deep inside is negative too
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
   grid->setName("distance_" + part.name);
+  grid->insertMeta(kLengthMetadata, openvdb::StringMetadata("m"));
   return grid;
 }
 

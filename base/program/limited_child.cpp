@@ -1,5 +1,5 @@
 // What comes back is read through a pipe, whose end tells that the child has ended, however it did.
-#include "formats/cad/limited_child.h"
+#include "base/program/limited_child.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -54,7 +54,7 @@ void lower_limit(decltype(RLIMIT_DATA) resource, double value) {
 }
 
 void set_limits(const ChildLimits& limits) {
-  // The parent watches the memory in use. OpenCASCADE goes on without a face for which there was none, so that
+  // The parent watches the memory in use. OpenCASCADE, for one, goes on without a face for which there was none, so that
   // no allocation is to fail but one of a size that is absurd, or one that the parent sees too late.
 #ifndef __SANITIZE_ADDRESS__  // its shadow is more than any limit
   if (const double used = memory_in_use("self").writable; used > 0)
@@ -155,8 +155,8 @@ class Child {
  private:
   [[noreturn]] static void fail() {
     throw InputError(
-        fmt::format("no process can be started for OpenCASCADE ({}): the limits of this "
-                    "shell (ulimit) leave no room",
+        fmt::format("no process can be started to read or write a file ({}): the "
+                    "limits of this shell (ulimit) leave no room",
                     std::strerror(errno)));
   }
   pid_t number_ = -1;

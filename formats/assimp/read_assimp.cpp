@@ -1,0 +1,34 @@
+// How the formats of assimp are told, and read: by flexel-meshes.
+#include <utility>
+
+#include "formats/assimp/assimp_formats.h"
+#include "formats/common/mesh_job.h"
+#include "formats/common/readers.h"
+
+namespace flexel {
+namespace {
+
+template <std::size_t kFormat>
+Evidence sniff_assimp(const ImportInput& input) {
+  return has_mark(beginning(input), kFormat) ? Evidence::magic : Evidence::none;
+}
+
+template <std::size_t kFormat>
+Surface read_assimp(ImportInput& input, const ImportOptions& options) {
+  return read_foreign(input, options, assimp_formats()[kFormat], "assimp");
+}
+
+template <std::size_t... kFormat>
+std::array<FileReader, sizeof...(kFormat)> readers_of(std::index_sequence<kFormat...>) {
+  return {FileReader{
+      .format = &assimp_formats()[kFormat], .sniff = sniff_assimp<kFormat>, .read = read_assimp<kFormat>}...};
+}
+
+}  // namespace
+
+std::span<const FileReader> assimp_readers() {
+  static const auto kReaders = readers_of(std::make_index_sequence<kAssimpFormats>());
+  return kReaders;
+}
+
+}  // namespace flexel

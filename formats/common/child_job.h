@@ -1,0 +1,120 @@
+// Work that another program of ours does, because it needs a large library that may crash, loop or take all memory over
+// a damaged file: a job on that program's stdin, its answer on stdout, with limits. Both are one build, so values go as
+// they are in memory; what is read is not believed all the same.
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/files/packing.h"
+#include "base/program/limited_child.h"
+#include "formats/part/surface.h"
+
+namespace flexel {
+
+struct ForeignProgram {
+  const char* name;     // "flexel-cad"
+  const char* library;  // for messages: "OpenCASCADE"
+  const char* install;  // what to install where it does not start: "OpenCASCADE 7.6.3"
+};
+
+// An answer, or why there is none.
+template <class Result>
+struct JobAnswer {
+  std::vector<std::string> warnings;
+  bool refused = false;
+  std::string where, why;  // of an InputError, where it is refused
+  Result result;           // else
+};
+
+template <class Archive, class Result>
+void visit(Archive& archive, JobAnswer<Result>& answer) {
+  visit(archive, answer.warnings);
+  visit(archive, answer.refused);
+  visit(archive, answer.where);
+  visit(archive, answer.why);
+  visit(archive, answer.result);
+}
+
+template <class Archive>
+void visit(Archive& archive, SurfacePart& part) {
+  visit(archive, part.name);
+}
+
+template <class Archive>
+void visit(Archive& archive, SurfaceFace& face) {
+  visit(archive, face.name);
+  visit(archive, face.part);
+}
+
+// Vertices, polygons, faces and parts: no columns, no sources.
+template <class Archive>
+void visit_mesh(Archive& archive, Surface& surface) {
+  visit(archive, surface.vertices);
+  visit(archive, surface.polygon_offsets);
+  visit(archive, surface.polygon_vertices);
+  visit(archive, surface.polygon_face);
+  visit(archive, surface.faces);
+  visit(archive, surface.parts);
+}
+
+constexpr std::uint64_t kJobEnd = 0x666c6578656c3031;
+
+// A job or an answer of some kind (any number) as bytes.
+template <class Value>
+[[nodiscard]] Bytes packed(std::uint64_t kind, const Value& value) {
+  Packer packer;
+  visit(packer, kind);
+  visit(packer, const_cast<Value&>(value));
+  std::uint64_t end = kJobEnd;
+  visit(packer, end);
+  return std::move(packer.bytes);
+}
+
+// The kind of what packed() made, read first.
+[[nodiscard]] inline std::uint64_t kind_of(Unpacker& unpacker) {
+  std::uint64_t kind = 0;
+  visit(unpacker, kind);
+  return kind;
+}
+
+// Its value, after the kind.
+template <class Value>
+void finish(Unpacker& unpacker, Value& value) {
+  visit(unpacker, value);
+  std::uint64_t end = 0;
+  visit(unpacker, end);
+  if (end != kJobEnd) unpacker.fail();
+  unpacker.finish();
+}
+
+// What to say where a job fails.
+struct JobWords {
+  const char* verb;      // "read it"
+  const char* why;       // what a crash says: "is damaged"
+  const char* too_much;  // what a limit says: "is damaged, or too much"
+  std::string instead;   // what to do where the limits are passed
+};
+
+// The bytes of the answer. Throws InputError: the program is not there or does not start; InputError(where, ...): it
+// crashes, or takes more than the limits.
+[[nodiscard]] Bytes run_job(const ForeignProgram& program, const Bytes& job, const ChildLimits& limits,
+                            const std::string& where, const JobWords& words);
+
+// Passes on what the answer says: calls `warn`, throws its InputError.
+template <class Result>
+[[nodiscard]] Result result_of(JobAnswer<Result> answer, const std::string& where,
+                               const std::function<void(const std::string&)>& warn) {
+  if (warn)
+    for (const std::string& line : answer.warnings) warn(line);
+  if (answer.refused) throw InputError(answer.where.empty() ? where : answer.where, answer.why);
+  return std::move(answer.result);
+}
+
+// In the other program: reads the job, writes what `work` makes of it, and returns the exit status (ChildCode). Stdout is
+// the answer's alone: what a library prints there is dropped.
+[[nodiscard]] int serve_job(const char* program, const std::function<Bytes(const Bytes& job)>& work);
+
+}  // namespace flexel
