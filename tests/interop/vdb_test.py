@@ -27,7 +27,7 @@ def test_level_sets_come_in_as_parts():
     volume = float(re.search(r"volume\s+([\d.]+) m\^3", text)[1])
     expect(abs(volume / 4e-6 - 1) < 0.02, f"4e-6 m^3 wanted: {volume}")
     expect_error(run("flexel", "info", "box.vdb", "--unit", "mm"), "flexel", "carries its own unit")
-    expect_ok(run("flexel", "deform", "box.vdb", "--size", "2 mm", "--material", "PLA", "--fix", "xmin", "--push", "xmax", "0 0 -5 N", "-o", "bent.stl"))
+    expect_ok(run("flexel", "deform", "box.vdb", "--size", "2 mm", "--material", "PLA", "--fix", "xmin", "--push", "xmax: 0 0 -5 N", "-o", "bent.stl"))
 
 
 def test_centre_placement_has_no_cells():
