@@ -168,20 +168,41 @@ std::string source_text(const SurfaceSource& source, const Unit& unit) {
                      source.unit_given ? "" : " (assumed: the file carries none; --unit)");
 }
 
+// The assemblies of one source with their parts, indented; "" where it has none.
+std::string tree_text(const Surface& surface, std::uint32_t source) {
+  std::string text;
+  std::vector<std::string> open;  // the assemblies around the last part
+  bool any = false;
+  for (std::size_t p = 0; p < surface.parts.size(); ++p) {
+    if (surface.part_source[p] != source) continue;
+    any = any || !surface.parts[p].assembly.empty();
+    const std::vector<std::string> around = split(surface.parts[p].assembly, '/');
+    const auto differs = std::mismatch(open.begin(), open.end(), around.begin(), around.end());
+    for (auto name = differs.second; name != around.end(); ++name)
+      text += fmt::format("  {:{}}{}/\n", "", 2 * (name - around.begin()), *name);
+    text += fmt::format("  {:{}}{}\n", "", 2 * around.size(), surface.parts[p].name);
+    open = around;
+  }
+  return any ? "parts in their assemblies\n" + text : "";
+}
+
 std::string info_text(const Surface& surface, const Known& known) {
   const auto& [shapes, numbers, parts] = known;
   std::string text;
   for (std::uint32_t s = 0; s < surface.sources.size(); ++s) {
     const Unit unit = unit_of(surface.sources[s]);
-    text += source_text(surface.sources[s], unit);
+    text += source_text(surface.sources[s], unit) + tree_text(surface, s);
     for (std::size_t p = 0; p < parts.size(); ++p)
       if (surface.part_source[p] == s)
         text += part_text(parts[p], unit) + faces_text(parts[p], surface, shapes, numbers, unit);
   }
-  text +=
-      "A scene or an option can name a part, a face, a group, or a side: xmin, xmax, ymin, ymax, zmin, "
+  const bool assemblies = std::any_of(surface.parts.begin(), surface.parts.end(),
+                                      [](const SurfacePart& part) { return !part.assembly.empty(); });
+  text += fmt::format(
+      "A scene or an option can name a part, {}a face, a group, or a side: xmin, xmax, ymin, ymax, zmin, "
       "zmax. Where a name means two things, \"part/#2\" is face number 2 and \"part/=2\" what the file calls "
-      "\"2\".\n";
+      "\"2\".\n",
+      assemblies ? "an assembly (all its parts), " : "");
   return text;
 }
 
@@ -239,6 +260,7 @@ std::string info_json(const Surface& surface, const Known& known) {
     for (std::size_t p = 0; p < parts.size(); ++p) {
       if (surface.part_source[p] != s) continue;
       Json part = part_json(parts[p]);
+      if (!surface.parts[p].assembly.empty()) part["assembly"] = surface.parts[p].assembly;
       part["faces"] = Json::array();
       for (const std::uint32_t f : parts[p].faces)
         part["faces"].push_back(face_json(surface.faces[f], numbers[f],

@@ -68,9 +68,9 @@ CadShape read_brep(const CadReadJob& job) {
   }
   if (shape.IsNull()) throw InputError(job.where, "is damaged: OpenCASCADE finds no shape in it");
   const auto nothing = [](const TopoDS_Shape&) { return std::string(); };
-  return {std::make_shared<TopoDS_Shape>(shape), job.unit, {nothing, nothing, [](const TopoDS_Shape&) {
-                                                              return std::nullopt;
-                                                            }}};
+  return {std::make_shared<TopoDS_Shape>(shape),
+          job.unit,
+          {nothing, nothing, nothing, [](const TopoDS_Shape&) { return std::nullopt; }}};
 }
 
 }  // namespace flexel::cad

@@ -107,9 +107,9 @@ CadShape read_entities(const std::string& path, const CadReadJob& job) {
     const auto found = names.find(item.TShape().get());
     return found == names.end() ? std::string() : found->second;
   };
-  return {std::make_shared<TopoDS_Shape>(shape), kMillimetre, {name, name, [](const TopoDS_Shape&) {
-                                                                 return std::nullopt;
-                                                               }}};
+  return {std::make_shared<TopoDS_Shape>(shape), kMillimetre,
+          {name, name, [](const TopoDS_Shape&) { return std::string(); },
+           [](const TopoDS_Shape&) { return std::nullopt; }}};
 }
 
 }  // namespace

@@ -20,6 +20,7 @@ using Warn = std::function<void(const std::string&)>;
 struct ShapeLabels {
   std::function<std::string(const TopoDS_Shape& solid)> solid_name;
   std::function<std::string(const TopoDS_Shape& face)> face_name;
+  std::function<std::string(const TopoDS_Shape& compound)> assembly_name;  // of a product's shape, or ""
   std::function<std::optional<ShapeColor>(const TopoDS_Shape& solid_or_face)> color;
 };
 

@@ -28,6 +28,7 @@
 #include "base/disjoint_sets.h"
 #include "base/error.h"
 #include "base/math/area_vector.h"
+#include "cad/read/assembly_paths.h"
 #include "cad/read/occt.h"
 
 namespace flexel::cad {
@@ -222,10 +223,13 @@ std::vector<TopoDS_Shape> solids_of(const TopoDS_Shape& shape, const std::string
 CadMesh mesh_of(const CadShape& shape, const CadReadJob& job) {
   CadMesh mesh;
   mesh.surface.polygon_offsets.push_back(0);
+  const std::vector<std::string> assemblies = assembly_paths(shape);
   std::vector<std::optional<ShapeColor>> colors;  // (faces)
   for (const TopoDS_Shape& solid : solids_of(*shape.shape, job.where)) {
     tessellate(solid, shape.unit, job);
+    const std::size_t part = mesh.surface.parts.size();
     add_solid(mesh.surface, solid, shape.unit, shape.labels, colors);
+    if (part < assemblies.size()) mesh.surface.parts[part].assembly = assemblies[part];
   }
   mesh.face_colors = numbers_of(colors);
   return mesh;

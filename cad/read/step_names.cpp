@@ -41,6 +41,7 @@ void StepNames::add_product(const StepBasic_ProductDefinition& definition, const
   if (definition.Formation().IsNull() || definition.Formation()->OfProduct().IsNull()) return;
   std::string name = name_of(definition.Formation()->OfProduct()->Name());
   if (name.empty()) name = name_of(definition.Formation()->OfProduct()->Id());
+  assembly_.emplace(shape.TShape().get(), name);
   std::vector<const void*> solids;
   for (TopExp_Explorer explorer(shape, TopAbs_SOLID); explorer.More(); explorer.Next())
     solids.push_back(explorer.Current().TShape().get());
@@ -99,6 +100,11 @@ std::optional<ShapeColor> StepNames::color(const TopoDS_Shape& shape) const {
 std::string StepNames::own(const TopoDS_Shape& shape) const {
   const auto found = own_.find(shape.TShape().get());
   return found == own_.end() ? "" : found->second;
+}
+
+std::string StepNames::assembly(const TopoDS_Shape& compound) const {
+  const auto found = assembly_.find(compound.TShape().get());
+  return found == assembly_.end() ? "" : found->second;
 }
 
 std::string StepNames::solid(const TopoDS_Shape& solid) const {

@@ -21,6 +21,8 @@ class StepNames {
   [[nodiscard]] std::string own(const TopoDS_Shape& shape) const;
   // A product with one solid gives it its name; several solids of one product have their own names.
   [[nodiscard]] std::string solid(const TopoDS_Shape& solid) const;
+  // The name of the product whose shape this is, or "".
+  [[nodiscard]] std::string assembly(const TopoDS_Shape& compound) const;
   // The colour of a face or solid itself, in sRGB as the file has it.
   [[nodiscard]] std::optional<ShapeColor> color(const TopoDS_Shape& shape) const;
 
@@ -31,6 +33,7 @@ class StepNames {
   // By the TShape that a shape's instances share.
   std::map<const void*, std::string> own_;
   std::map<const void*, ShapeColor> color_;
+  std::map<const void*, std::string> assembly_;
   // Of the smallest product that holds a solid, and how many solids that product holds.
   std::map<const void*, std::pair<std::size_t, std::string>> product_;
 };

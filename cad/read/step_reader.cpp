@@ -184,6 +184,7 @@ CadShape read_step(const CadReadJob& job, const Warn& warn) {
   const auto names = std::make_shared<StepNames>(reader);
   result.labels = {[names](const TopoDS_Shape& solid) { return names->solid(solid); },
                    [names](const TopoDS_Shape& face) { return names->own(face); },
+                   [names](const TopoDS_Shape& compound) { return names->assembly(compound); },
                    [names](const TopoDS_Shape& item) { return names->color(item); }};
   return result;
 }

@@ -41,6 +41,7 @@ void visit(Archive& archive, JobAnswer<Result>& answer) {
 template <class Archive>
 void visit(Archive& archive, SurfacePart& part) {
   visit(archive, part.name);
+  visit(archive, part.assembly);
 }
 
 template <class Archive>

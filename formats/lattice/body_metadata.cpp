@@ -63,8 +63,11 @@ Json source_to_json(const SurfaceSource& source, const PackedSource& packed) {
 
 Json surface_to_json(const Surface& surface, const std::vector<PackedSource>& sources) {
   Json parts = Json::array(), names = Json::array(), source_list = Json::array();
-  for (std::size_t p = 0; p < surface.parts.size(); ++p)
+  for (std::size_t p = 0; p < surface.parts.size(); ++p) {
     parts.push_back({{"name", text_to_json(surface.parts[p].name)}});
+    if (!surface.parts[p].assembly.empty())
+      parts.back()["assembly"] = text_to_json(surface.parts[p].assembly);
+  }
   for (std::size_t f = 0; f < surface.faces.size(); ++f)
     if (!surface.faces[f].name.empty()) names.push_back({f, text_to_json(surface.faces[f].name)});
   for (std::size_t s = 0; s < surface.sources.size(); ++s)
@@ -92,6 +95,7 @@ class Cursor {
     if (found == value_.end()) Cursor(value_, path, where_).fail("is missing");
     return {*found, path, where_};
   }
+  [[nodiscard]] bool has(const char* key) const { return value_.is_object() && value_.contains(key); }
   [[nodiscard]] Cursor at(std::size_t i) const {
     return {value_.at(i), fmt::format("{}[{}]", path_, i), where_};
   }
@@ -185,7 +189,10 @@ SurfaceSource source_from_json(const Cursor& json, PackedSource& packed) {
 void surface_from_json(const Cursor& json, Metadata& metadata) {
   Surface& surface = metadata.body.surface;
   const Cursor parts = json["parts"], part_source = json["part_source"], sources = json["sources"];
-  for (std::size_t p = 0; p < parts.size(); ++p) surface.parts.push_back({parts.at(p)["name"].text()});
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    const Cursor part = parts.at(p);
+    surface.parts.push_back({part["name"].text(), part.has("assembly") ? part["assembly"].text() : ""});
+  }
   for (std::size_t s = 0; s < sources.size(); ++s) {
     metadata.sources.emplace_back();
     surface.sources.push_back(source_from_json(sources.at(s), metadata.sources.back()));

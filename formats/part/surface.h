@@ -23,6 +23,8 @@ struct SurfaceFace {
 struct SurfacePart {
   // unique within the surface; the file's own name, else the file's stem ("-2" ... appended)
   std::string name;
+  // The assemblies of the file that hold it, from the outermost: "gearbox/shaft-2"; "": none.
+  std::string assembly{};
 };
 
 // Where the surface came from, and what is needed to write the same file again.

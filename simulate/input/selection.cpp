@@ -1,4 +1,5 @@
-// Finds polygons by name and elements by region. What Flexel itself calls faces ("part/2", sides: "xmin",
+// Finds polygons by name and elements by region. Where no part has a name, the assemblies of the file are asked: "gearbox",
+// "gearbox/shaft-2", or any run of such names, each for all parts in it. What Flexel itself calls faces ("part/2", sides: "xmin",
 // "part/xmin") and what the file calls them ("part/flange", "flange") is looked up in both; a name that means
 // one thing there and another here is refused, and "#" or "=" before its last word says which.
 //
@@ -38,12 +39,18 @@ std::optional<Side> side_of(const std::string& name) {
   return std::nullopt;
 }
 
-// Polygons of the parts for which `part` is empty or equal, at the extreme of those parts.
-std::vector<std::uint32_t> polygons_of_side(const Surface& surface, Side side,
-                                            std::optional<std::uint32_t> part) {
+// The parts that are meant, ascending; nothing: all.
+using Parts = std::optional<std::vector<std::uint32_t>>;
+
+bool among(const Parts& parts, std::uint32_t part) {
+  return !parts || std::binary_search(parts->begin(), parts->end(), part);
+}
+
+// Polygons of `parts` at the extreme of these together.
+std::vector<std::uint32_t> polygons_of_side(const Surface& surface, Side side, const Parts& parts) {
   double low = 1e300, high = -1e300;
   const auto height = [&](std::uint32_t vertex) { return side.sign * surface.vertices[vertex][side.axis]; };
-  const auto wanted = [&](std::size_t p) { return !part || surface.polygon_part(p) == *part; };
+  const auto wanted = [&](std::size_t p) { return among(parts, surface.polygon_part(p)); };
   for (std::size_t p = 0; p < surface.polygon_count(); ++p) {
     if (!wanted(p)) continue;
     for (const std::uint32_t vertex : surface.polygon(p)) {
@@ -90,6 +97,26 @@ std::optional<std::uint32_t> part_named(const Body& body, const std::string& nam
   return std::nullopt;
 }
 
+// The parts in the assembly of that name or path, or the one part at the end of the path; none where there is none.
+std::vector<std::uint32_t> parts_at(const Body& body, const std::string& path) {
+  std::vector<std::uint32_t> found;
+  const std::string wanted = "/" + path + "/";
+  for (std::uint32_t p = 0; p < body.surface.parts.size(); ++p) {
+    const SurfacePart& part = body.surface.parts[p];
+    const std::string whole = fmt::format("/{}/{}/", part.assembly, part.name);
+    const std::size_t at = whole.find(wanted);
+    if (!path.empty() && !part.assembly.empty() && at < 1 + part.assembly.size()) found.push_back(p);
+  }
+  return found;
+}
+
+// That of the name, else those at the path; nothing where there is none.
+Parts parts_called(const Body& body, const std::string& name) {
+  if (const auto part = part_named(body, name)) return std::vector{*part};
+  std::vector<std::uint32_t> parts = parts_at(body, name);
+  return parts.empty() ? Parts() : parts;
+}
+
 std::optional<std::uint32_t> number_in(const std::string& text) {
   std::uint32_t number = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
@@ -111,38 +138,37 @@ Word parse_word(const std::string& text) {
 }
 
 // Polygons that the file calls so, of all parts or one.
-std::vector<std::uint32_t> polygons_of_file(const Surface& surface, const Word& word,
-                                            std::optional<std::uint32_t> part) {
+std::vector<std::uint32_t> polygons_of_file(const Surface& surface, const Word& word, const Parts& parts) {
   std::vector<std::uint32_t> faces;
   if (word.by == Word::By::flexel || word.text.empty()) return faces;  // a face without a name has no name
   for (std::uint32_t f = 0; f < surface.faces.size(); ++f)
-    if ((!part || surface.faces[f].part == *part) && surface.faces[f].name == word.text) faces.push_back(f);
+    if (among(parts, surface.faces[f].part) && surface.faces[f].name == word.text) faces.push_back(f);
   return polygons_of_faces(surface, faces);
 }
 
 // Polygons that Flexel calls so: a side of all parts or of one, a face of one part by its number.
-std::vector<std::uint32_t> polygons_of_flexel(const Surface& surface, const Word& word,
-                                              std::optional<std::uint32_t> part) {
+std::vector<std::uint32_t> polygons_of_flexel(const Surface& surface, const Word& word, const Parts& parts) {
   if (word.by == Word::By::file) return {};
-  if (const auto side = side_of(word.text)) return polygons_of_side(surface, *side, part);
-  const std::optional<std::uint32_t> number = part ? number_in(word.text) : std::nullopt;
+  if (const auto side = side_of(word.text)) return polygons_of_side(surface, *side, parts);
+  const bool one = parts && parts->size() == 1;
+  const std::optional<std::uint32_t> number = one ? number_in(word.text) : std::nullopt;
   if (!number) return {};
   const std::vector<std::uint32_t> numbers = face_numbers(surface);
   std::vector<std::uint32_t> faces;
   for (std::uint32_t f = 0; f < surface.faces.size(); ++f)
-    if (surface.faces[f].part == *part && numbers[f] == *number) faces.push_back(f);
+    if (surface.faces[f].part == parts->front() && numbers[f] == *number) faces.push_back(f);
   return polygons_of_faces(surface, faces);
 }
 
 // The polygons of the word, which must not mean two things. `before`: "part/", or nothing.
 std::vector<std::uint32_t> polygons_called(const Selection& selection, const Surface& surface,
                                            const std::string& before, const std::string& text,
-                                           std::optional<std::uint32_t> part) {
+                                           const Parts& parts) {
   const Word word = parse_word(text);
-  std::vector<std::uint32_t> own = polygons_of_flexel(surface, word, part);
-  std::vector<std::uint32_t> named = polygons_of_file(surface, word, part);
+  std::vector<std::uint32_t> own = polygons_of_flexel(surface, word, parts);
+  std::vector<std::uint32_t> named = polygons_of_file(surface, word, parts);
   if (word.by != Word::By::either && named.empty())  // the file's name may begin so
-    named = polygons_of_file(surface, {Word::By::file, text}, part);
+    named = polygons_of_file(surface, {Word::By::file, text}, parts);
   if (!own.empty() && !named.empty() && own != named)
     throw InputError(
         selection.origin,
@@ -159,6 +185,8 @@ std::vector<std::string> every_name(const Body& body) {
   std::vector<std::string> names;
   for (const char* side : {"xmin", "xmax", "ymin", "ymax", "zmin", "zmax"}) names.emplace_back(side);
   for (const Part& part : body.parts) names.push_back(part.name);
+  for (const SurfacePart& part : body.surface.parts)
+    if (!part.assembly.empty()) names.push_back(part.assembly);
   for (const SurfaceFace& face : body.surface.faces)
     if (!face.name.empty()) {
       names.push_back(face.name);
@@ -171,12 +199,18 @@ std::vector<std::string> every_name(const Body& body) {
   const std::string& name = selection.name;
   const std::size_t slash = name.rfind('/');
   if (slash != std::string::npos) {
-    if (const auto part = part_named(body, name.substr(0, slash))) {
+    if (const Parts parts = parts_called(body, name.substr(0, slash))) {
+      const std::uint32_t part = parts->front();
       const auto count = std::count_if(body.surface.faces.begin(), body.surface.faces.end(),
-                                       [&](const SurfaceFace& face) { return face.part == *part; });
-      if (number_in(parse_word(name.substr(slash + 1)).text))
+                                       [&](const SurfaceFace& face) { return face.part == part; });
+      const bool number = number_in(parse_word(name.substr(slash + 1)).text).has_value();
+      if (number && parts->size() > 1)
+        throw InputError(selection.origin,
+                         fmt::format("no face \"{}\"; \"{}\" is {} parts: name one of them, as {}/1", name,
+                                     name.substr(0, slash), parts->size(), body.parts[part].name));
+      if (number)
         throw InputError(selection.origin, fmt::format("no face \"{}\"; part \"{}\" has faces 1 to {}", name,
-                                                       body.parts[*part].name, count));
+                                                       body.parts[part].name, count));
     } else {
       std::vector<std::string> parts;
       for (const Part& each : body.parts) parts.push_back(each.name);
@@ -202,6 +236,16 @@ std::vector<std::uint32_t> range(std::uint32_t begin, std::uint32_t end) {
   return all;
 }
 
+// The elements of all parts at a path.
+std::vector<std::uint32_t> elements_at(const Body& body, const std::string& path) {
+  std::vector<std::uint32_t> elements;
+  for (const std::uint32_t p : parts_at(body, path))
+    for (std::uint32_t e = body.parts[p].element_begin; e < body.parts[p].element_end; ++e)
+      elements.push_back(e);
+  std::sort(elements.begin(), elements.end());
+  return elements;
+}
+
 Selected resolve_name(const Selection& selection, const Body& body) {
   const std::string& name = selection.name;
   const Word whole = parse_word(name);
@@ -218,24 +262,27 @@ Selected resolve_name(const Selection& selection, const Body& body) {
   std::vector<std::uint32_t> found = polygons_called(selection, body.surface, "", name, std::nullopt);
   // The part's own name may hold a slash: try every one.
   for (std::size_t slash = name.find('/'); slash != std::string::npos; slash = name.find('/', slash + 1)) {
-    part = part_named(body, name.substr(0, slash));
-    if (!part) continue;
+    const Parts parts = parts_called(body, name.substr(0, slash));
+    if (!parts) continue;
     if (slash + 1 == name.size())
       throw InputError(
           selection.origin,
           fmt::format("\"{0}\" names no face: write \"{0}1\" for a face, \"{0}xmin\" for a side, "
                       "\"{1}\" for the whole part",
-                      name, body.parts[*part].name));
-    const std::vector<std::uint32_t> of_part =
-        polygons_called(selection, body.surface, name.substr(0, slash + 1), name.substr(slash + 1), part);
-    if (!found.empty() && !of_part.empty() && found != of_part)
+                      name, name.substr(0, slash)));
+    const std::vector<std::uint32_t> of_parts =
+        polygons_called(selection, body.surface, name.substr(0, slash + 1), name.substr(slash + 1), parts);
+    if (!found.empty() && !of_parts.empty() && found != of_parts)
       throw InputError(
           selection.origin,
           fmt::format("\"{}\" means two things: names with a slash can be split in two ways here; "
                       "rename a part or a group of the file",
                       name));
-    if (!of_part.empty()) found = of_part;
+    if (!of_parts.empty()) found = of_parts;
   }
+  if (found.empty())
+    if (std::vector<std::uint32_t> elements = elements_at(body, name); !elements.empty())
+      return {{}, elements};
   if (found.empty()) unknown_name(selection, body);
   return {found, {}};
 }
@@ -294,8 +341,7 @@ std::optional<Vec3> side_axis(const Selection& selection, const Body& body) {
   if (selection.kind != Selection::Kind::name || part_named(body, selection.name)) return std::nullopt;
   const std::size_t slash = selection.name.rfind('/');
   const std::string before = slash == std::string::npos ? "" : selection.name.substr(0, slash);
-  const std::optional<std::uint32_t> part = part_named(body, before);
-  if (slash != std::string::npos && !part) return std::nullopt;
+  if (slash != std::string::npos && !parts_called(body, before)) return std::nullopt;
   const Word word = parse_word(selection.name.substr(slash == std::string::npos ? 0 : slash + 1));
   const std::optional<Side> side = side_of(word.text);
   if (!side || word.by == Word::By::file) return std::nullopt;
