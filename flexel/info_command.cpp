@@ -168,6 +168,16 @@ std::string source_text(const SurfaceSource& source, const Unit& unit) {
                      source.unit_given ? "" : " (assumed: the file carries none; --unit)");
 }
 
+std::vector<std::string> components(const std::string& path) {
+  std::vector<std::string> names;
+  for (std::size_t begin = 0; begin < path.size();) {
+    const std::size_t end = std::min(path.find('/', begin), path.size());
+    names.push_back(path.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return names;
+}
+
 // The assemblies of one source with their parts, indented; "" where it has none.
 std::string tree_text(const Surface& surface, std::uint32_t source) {
   std::string text;
@@ -176,7 +186,7 @@ std::string tree_text(const Surface& surface, std::uint32_t source) {
   for (std::size_t p = 0; p < surface.parts.size(); ++p) {
     if (surface.part_source[p] != source) continue;
     any = any || !surface.parts[p].assembly.empty();
-    const std::vector<std::string> around = split(surface.parts[p].assembly, '/');
+    const std::vector<std::string> around = components(surface.parts[p].assembly);
     const auto differs = std::mismatch(open.begin(), open.end(), around.begin(), around.end());
     for (auto name = differs.second; name != around.end(); ++name)
       text += fmt::format("  {:{}}{}/\n", "", 2 * (name - around.begin()), *name);

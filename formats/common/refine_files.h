@@ -14,6 +14,7 @@ namespace flexel {
 [[nodiscard]] std::string refine_ply(SurfaceSource& source, const Refinement& refinement);
 [[nodiscard]] std::string refine_off(SurfaceSource& source, const Refinement& refinement);
 [[nodiscard]] std::string refine_glb(SurfaceSource& source, const Refinement& refinement);
+[[nodiscard]] std::string refine_3mf(SurfaceSource& source, const Refinement& refinement);
 
 // Half-way between two normals: as long as their mean; the first where they are opposite.
 [[nodiscard]] inline Vec3 mean_normal(const Vec3& a, const Vec3& b) {

@@ -23,16 +23,19 @@ std::string rest_text(double metres, double unit) {
 
 }  // namespace
 
+void append_coordinate(std::string& text, const DeformedSurface& deformed, std::size_t v, Eigen::Index i) {
+  const double rest = deformed.surface.vertices[v][i], displacement = deformed.displacement[v][i];
+  const std::string own = displacement == 0 ? rest_text(rest, deformed.unit) : "";
+  if (own.empty())
+    append_text(text, "{}", (rest + displacement) / deformed.unit);
+  else
+    text += own;
+}
+
 void append_position(std::string& text, const DeformedSurface& deformed, std::size_t v) {
-  const Vec3 at = deformed.at(v);
   for (Eigen::Index i = 0; i < 3; ++i) {
     text += ' ';
-    const std::string rest =
-        deformed.displacement[v][i] == 0 ? rest_text(deformed.surface.vertices[v][i], deformed.unit) : "";
-    if (rest.empty())
-      append_text(text, "{}", at[i]);
-    else
-      text += rest;
+    append_coordinate(text, deformed, v, i);
   }
 }
 

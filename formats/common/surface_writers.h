@@ -51,9 +51,10 @@ class Rewriter {
   std::size_t done_ = 0;
 };
 
-// Appends the three coordinates of vertex v, a blank before each. Decimals that read back to the same double;
-// where the vertex did not move and 15 digits give back its position, those: the file's own digits rather
-// than the rounding of the unit.
+// Appends coordinate i of vertex v: the decimal that reads back to the same double; where the vertex did not move and
+// 15 digits give back its position, those: the file's own digits rather than the rounding of the unit.
+void append_coordinate(std::string& text, const DeformedSurface& deformed, std::size_t v, Eigen::Index i);
+// All three, a blank before each.
 void append_position(std::string& text, const DeformedSurface& deformed, std::size_t v);
 
 // Puts `line` after the `skip` first lines of the text of every source of `format` (a FileFormat's name) whose
@@ -74,5 +75,8 @@ void write_new_off(const DeformedSurface& deformed, OutputFile& out);
 // The GLB file that the surface came from, with positions and normals rewritten.
 void rewrite_glb(const DeformedSurface& deformed, OutputFile& out);
 void write_new_glb(const DeformedSurface& deformed, OutputFile& out);
+// The 3MF file that the surface came from, with other coordinates, in its own unit.
+void rewrite_3mf(const DeformedSurface& deformed, OutputFile& out);
+void write_new_3mf(const DeformedSurface& deformed, OutputFile& out);
 
 }  // namespace flexel

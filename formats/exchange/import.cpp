@@ -198,8 +198,8 @@ std::vector<std::string> refinement_notes(const Surface& surface) {
     if (is_rewritten(source) && source.bytes.empty())
       lines.push_back(fmt::format(
           "{}: its triangles were split, so the part comes out as a new file: vertices keep their "
-          "order and new ones follow; groups, names and colours stay, textures, materials and "
-          "normals do not",
+          "order and new ones follow; groups, names and colours stay, textures, materials, "
+          "metadata and normals do not",
           source.file));
   }
   return lines;

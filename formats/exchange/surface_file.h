@@ -16,7 +16,7 @@ struct SurfaceFormat {
   bool operator==(const SurfaceFormat&) const = default;
 };
 
-// The format for `format` ("stl", "obj", "ply", "off", "glb") or, when that is empty, for the extension of
+// The format for `format` ("stl", "obj", "ply", "off", "glb", "3mf") or, when that is empty, for the extension of
 // `path`; InputError when neither tells (a pipe needs --format) or the format is unknown (with the nearest). CAD formats
 // with `cad` only.
 [[nodiscard]] SurfaceFormat surface_format(const std::string& format, const std::string& path = "",
@@ -26,9 +26,9 @@ struct SurfaceFormat {
 // `unit` metres; pass default_unit(surface) for the unit the file came in (mm for CAD formats). STL: the
 // triangles in the input's order, normals recomputed, the header and the solids' names kept; polygons are
 // triangulated. OBJ from OBJ: the same lines with only v and vn rewritten; a vertex that did not move keeps
-// its text. Else a new OBJ with a group per face. PLY, OFF and GLB likewise: from a file of the same format
+// its text. Else a new OBJ with a group per face. PLY, OFF, GLB and 3MF likewise: from a file of the same format
 // (PLY: the same encoding, or `ply`) that file with other positions and normals, else a new one with the
-// surface's colours, attributes and names. GLB is always in its source's unit, a new one in metres. Throws
+// surface's colours, attributes and names. GLB and 3MF are always in their source's unit, a new GLB in metres. Throws
 // InputError for the disk, and when a coordinate does not fit the single precision of the format.
 void write_surface(const Surface& surface, const std::vector<Vec3>& displacement, SurfaceFormat format,
                    double unit, const std::string& path);

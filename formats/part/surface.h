@@ -35,8 +35,8 @@ struct SurfaceSource {
   double unit = 1e-3;       // metres per unit of the file's coordinates
   bool unit_given = false;  // the file itself or the user said so (else the default, mm, was assumed)
   std::uint64_t hash = 0;   // content_hash of the file
-  Bytes bytes;  // the file itself, for formats that are written again from it (OBJ, PLY, OFF, glTF,
-                // as one GLB); else empty
+  Bytes bytes;  // the file itself, for formats that are written again from it (OBJ, PLY, OFF, glTF
+                // as one GLB, 3MF); else empty
   std::vector<std::byte> stl_header;  // the 80 bytes of a binary STL's header; else empty
   // Where the surface's vertices are not in the order of those in `bytes`: for each of the file's, the surface's.
   std::vector<std::uint32_t> order{};

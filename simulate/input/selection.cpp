@@ -212,10 +212,10 @@ std::vector<std::string> every_name(const Body& body) {
         throw InputError(selection.origin, fmt::format("no face \"{}\"; part \"{}\" has faces 1 to {}", name,
                                                        body.parts[part].name, count));
     } else {
-      std::vector<std::string> parts;
-      for (const Part& each : body.parts) parts.push_back(each.name);
+      std::vector<std::string> all;
+      for (const Part& each : body.parts) all.push_back(each.name);
       throw InputError(selection.origin, fmt::format("no part \"{}\" for \"{}\"; the body has {}",
-                                                     name.substr(0, slash), name, fmt::join(parts, ", ")));
+                                                     name.substr(0, slash), name, fmt::join(all, ", ")));
     }
   }
   std::string hint = did_you_mean(name, every_name(body));

@@ -47,7 +47,7 @@ TEST(ImportOracle, AssimpSeesTheSameCornersInTheSameOrder) {
   }
 }
 
-TEST(ImportOracle, AssimpReadsTheGlbThatWeWrite) {
+TEST(ImportOracle, AssimpReadsTheGlbAndThe3mfThatWeWrite) {
   const Scratch scratch;
   const std::string box =
       "OFF\n8 6 0\n0 0 0\n40 0 0\n40 10 0\n0 10 0\n0 0 5\n40 0 5\n40 10 5\n0 10 5\n4 0 3 2 1\n4 4 5 6 7\n"
@@ -56,13 +56,16 @@ TEST(ImportOracle, AssimpReadsTheGlbThatWeWrite) {
   append(surface, import_surface(scratch.write("two.off", box)));
   std::vector<Vec3> displacement(8, Vec3::Zero());
   displacement.resize(16, Vec3(0, 0, 0.02));
-  write_surface(surface, displacement, surface_format("glb"), 1, scratch.path("new.glb"));
-  const std::vector<Vec3> seen = corners_by_assimp(scratch.path("new.glb"));
   const Triangles triangles = triangulate(surface);
-  ASSERT_EQ(seen.size(), 3 * triangles.corners.size());
-  for (std::size_t c = 0; c < seen.size(); ++c) {
-    const std::uint32_t v = triangles.corners[c / 3][c % 3];
-    EXPECT_LE((surface.vertices[v] + displacement[v] - seen[c]).norm(), 1e-8) << c;
+  for (const char* ending : {"glb", "3mf"}) {
+    const std::string path = scratch.path(std::string("new.") + ending);
+    write_surface(surface, displacement, surface_format(ending), 1, path);
+    const std::vector<Vec3> seen = corners_by_assimp(path);
+    ASSERT_EQ(seen.size(), 3 * triangles.corners.size()) << ending;
+    for (std::size_t c = 0; c < seen.size(); ++c) {
+      const std::uint32_t v = triangles.corners[c / 3][c % 3];
+      EXPECT_LE((surface.vertices[v] + displacement[v] - seen[c]).norm(), 1e-8) << ending << " " << c;
+    }
   }
 }
 

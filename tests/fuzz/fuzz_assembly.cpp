@@ -1,4 +1,4 @@
-// Mutated glTF (text, GLB) and 3MF files; glTF is also written again, moved. What is neither GLB nor JSON is
+// Mutated glTF (text, GLB) and 3MF files, also written again, moved. What is neither GLB nor JSON is
 // the model of a 3MF file, which is put into an archive here: mutated archives end at their checksums.
 #include <filesystem>
 
@@ -77,7 +77,9 @@ void read_mutant(const std::string& path) {
   std::ofstream(archive, std::ios::binary) << data;
   options.format = "3mf";
   try {
-    check(import_surface(archive, options), archive);
+    const Surface surface = import_surface(archive, options);
+    check(surface, archive);
+    fuzz::write_moved(surface, surface_format("3mf"), archive + ".out");
   } catch (const InputError&) {
     std::filesystem::remove(archive);
     throw;

@@ -117,7 +117,7 @@ def test_a_notch_opens_up_to_its_tip():
 
 def test_pieces_in_every_format():
     torn_bar(2.0)
-    for name in ("torn.obj", "torn.ply", "torn.off", "torn.glb"):
+    for name in ("torn.obj", "torn.ply", "torn.off", "torn.glb", "torn.3mf"):
         expect_ok(run("flexel-map", "torn.vtu", "--crack", "cap", "--debris", "drop", "-o", name))
     expect_ok(run("flexel-map", "torn.vtu", "--crack", "cap", "--debris", "drop", "--ascii", "-o", "torn.stl"))
     expect(re.findall(r"(?m)^o (\S+)", open("torn.obj").read()) == ["box-1", "box-2"], "objects of the OBJ")

@@ -127,6 +127,11 @@ def test_map_to_a_body_of_polygons():
     sweep(("flexel-map", "bent.vtu", "-o", "bent.glb"), ("bent.glb",))
 
 
+def test_map_to_an_archive():
+    bent()
+    sweep(("flexel-map", "bent.vtu", "-o", "bent.3mf"), ("bent.3mf",))
+
+
 def test_deform():
     box()
     scene()

@@ -56,9 +56,9 @@ def test_large_flat_triangles_are_told_and_the_advice_mends_them():
 def test_edge_splits_meshes_of_every_format():
     box()
     expect_ok(run("flexel-voxelize", "box.stl", "--size", "5 mm", "-o", "rest.vtu", "--quiet"))
-    for ending in ("obj", "ply", "off", "glb"):
+    for ending in ("obj", "ply", "off", "glb", "3mf"):
         expect_ok(run("flexel-map", "rest.vtu", "--quiet", "-o", f"box.{ending}"))
-    for ending in ("stl", "obj", "ply", "off", "glb"):
+    for ending in ("stl", "obj", "ply", "off", "glb", "3mf"):
         read = expect_ok(run("flexel-voxelize", f"box.{ending}", "--edge", "6 mm", "--size", "5 mm", "-o", "split.vtu"))
         expect(("its triangles were split" in read.err) == (ending != "stl"), read.err)
         expect_ok(run("flexel-map", "split.vtu", "--quiet", "-o", f"split.{ending}"))

@@ -1,11 +1,13 @@
 """Every format through the whole chain: the part that comes out is the one that went in, bent, in its own format where that is written,
 else as STL."""
 
+import io
+import os
 import struct
 import zipfile
 
-from harness import bracket, box, expect, expect_error, expect_ok, expect_only, main, run, scene, write
-from meshes import glb_box, indexed_box, off_box, ply_box, read_glb, read_off, read_ply, threemf_box
+from harness import PARTS, Skip, bracket, box, expect, expect_error, expect_ok, expect_only, main, need, run, scene, write
+from meshes import CORE, glb_box, indexed_box, off_box, ply_box, read_3mf, read_glb, read_off, read_ply, threemf_box
 
 BEND = """material = "PLA"
 [[fix]]
@@ -80,7 +82,136 @@ def test_3mf():
     data = open("bent.ply", "rb").read()
     at = data.index(b"end_header\n") + 11
     expect_bent(indexed_box()[0], list(struct.iter_unpack("<3d", data[at:at + 8 * 24])))
-    expect_error(run("flexel-map", "body.vtu", "-o", "bent.3mf"), "flexel-map", "3mf")
+    through_the_chain("box.3mf", "bent.3mf")
+    expect(open("box.3mf", "rb").read() == open("rest.3mf", "rb").read(), "a part that did not move is the same file")
+    ((name, before, triangles),), _ = read_3mf("box.3mf")
+    ((same_name, after, same_triangles),), _ = read_3mf("bent.3mf")
+    expect((name, triangles) == (same_name, same_triangles), "not the same part, moved")
+    expect_bent(before, after)
+    expect(zipfile.ZipFile("bent.3mf").read("Metadata/thumbnail.png") == b"\x89PNG", "other files of the archive stay")
+    expect_ok(run("flexel-map", "body.vtu", "--keep-vertices", "-o", "again.3mf"))
+    expect(open("again.3mf", "rb").read() == open("bent.3mf", "rb").read(), "the same bytes")
+    expect_error(run("flexel-map", "body.vtu", "-o", "x.3mf", "--unit", "in"), "flexel-map", "3MF has a unit of its own", "--unit")
+    expect_error(run("flexel-map", "body.vtu", "--format", "3mf", "--ascii", "-o", "x"), "flexel-map", "3MF is binary")
+    expect_only("again.3mf", "bend.toml", "bent.3mf", "bent.ply", "body.vtu", "box.3mf", "rest.3mf", "rest.ply", "rest.vtu")
+
+
+def test_3mf_through_pipes_and_one_file_a_part():
+    vertices, triangles = indexed_box()
+    upper = [(x, y, z + 30) for x, y, z in vertices]
+    write("other.off", "\n".join(["OFF", "8 12 0"] + ["{} {} {}".format(*v) for v in upper] + ["3 {} {} {}".format(*t) for t in triangles]) + "\n")
+    expect_ok(run("flexel-voxelize", threemf_box(), "other.off", "--size", "5 mm", "-o", "two.vtu"))
+    piped = expect_ok(run("flexel-map", "two.vtu", "--format", "3mf"))
+    write("two.3mf", piped.out)
+    shown, _ = read_3mf("two.3mf")
+    expect([name for name, _, _ in shown] == ["bar", "other"] and all(len(t) == 12 for _, _, t in shown), f"{shown}")
+    expect_ok(run("flexel-map", "two.vtu", "-o", "out_{part}.3mf"))
+    for part, corners in (("bar", vertices), ("other", upper)):
+        (found,), _ = read_3mf(f"out_{part}.3mf")
+        expect(found == (part, corners, triangles), f"{found}")
+
+
+def test_a_new_3mf():
+    """In the unit that the numbers were in; colours as a group."""
+    scene("bend.toml", BEND)
+    for unit, word, length in (("mm", "millimeter", 40.0), ("in", "inch", 40 * 25.4), ("km", "millimeter", 4e7)):
+        expect_ok(run("flexel-voxelize", box(), "--unit", unit, "--count", "500", "-o", "rest.vtu"))
+        expect_ok(run("flexel-map", "rest.vtu", "-o", "new.3mf"))
+        ((name, vertices, triangles),), model = read_3mf("new.3mf")
+        expect((name, model.get("unit"), len(triangles)) == ("box", word, 12), f"{name} {model.attrib}")
+        expect(abs(max(v[0] for v in vertices) / length - 1) < 1e-12, f"{vertices}")
+        expect(sorted(float(v.get("x")) for v in model.iter(CORE + "vertex"))[0] == 0, "as text")
+    lines = open(off_box()).read().splitlines()
+    write("red.off", "\n".join(lines[:11] + [line + " 255 0 51" for line in lines[11:]]) + "\n")
+    expect_ok(run("flexel", "deform", "red.off", "--material", "PLA", "--fix", "xmin", "--push", "xmax: 0 0 -50 N", "--size", "2.5 mm", "--no-estimate",
+                  "--keep-vertices", "-o", "red.3mf", "-o", "same.3mf"))
+    ((_, after, _),), model = read_3mf("red.3mf")
+    expect_bent(indexed_box()[0], after)
+    colors = [node.get("color") for node in model.iter() if node.tag.endswith("}color")]
+    expect(colors == ["#FF0033"], f"{colors}")
+    expect(open("red.3mf", "rb").read() == open("same.3mf", "rb").read(), "the same bytes")
+
+
+def test_a_new_3mf_of_a_step_file():
+    through_the_chain(bracket(), "bent.3mf", size="3 mm")
+    (before,), model = read_3mf("rest.3mf")
+    (after,), _ = read_3mf("bent.3mf")
+    expect(model.get("unit") == "millimeter" and before[2] == after[2] and len(after[2]) > 100, f"{model.attrib}")
+    expect(max(p[2] - q[2] for p, q in zip(before[1], after[1])) > 0.1, "it bends")
+
+
+def mesh_volume(vertices, triangles):
+    return volume([vertices[a] + vertices[b] + vertices[c] for a, b, c in triangles])
+
+
+def test_openscad_reads_the_3mf_that_we_write():
+    need("openscad")
+    for part in (threemf_box(), box()):
+        through_the_chain(part, "bent.3mf")
+        ((_, vertices, triangles),), _ = read_3mf("bent.3mf")
+        write("in.scad", 'import("bent.3mf");\n')
+        done = run("openscad", "-o", "out.stl", "in.scad", timeout=100, env=dict(os.environ, HOME=os.getcwd()))
+        expect(done.code == 0, f"{done}")
+        corners = [tuple(map(float, line.split()[1:])) for line in open("out.stl") if line.split()[0] == "vertex"]
+        seen = [corners[n] + corners[n + 1] + corners[n + 2] for n in range(0, len(corners), 3)]
+        expect(len(seen) == 12 and abs(volume(seen) / mesh_volume(vertices, triangles) - 1) < 1e-4, f"{part}: {volume(seen)} mm^3")
+
+
+class Pipe(io.RawIOBase):
+    """What cannot go back: a ZIP archive then has its sizes after the data."""
+
+    def __init__(self):
+        self.data = b""
+
+    def writable(self):
+        return True
+
+    def write(self, data):
+        self.data += bytes(data)
+        return len(data)
+
+
+def test_3mf_archives_of_other_writers():
+    """Streamed, with sizes of 64 bits and a comment; XML in UTF-16."""
+    with zipfile.ZipFile(threemf_box()) as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    model = files["3D/3dmodel.model"].decode()
+    wide = model.replace('<?xml version="1.0"?>', '<?xml version="1.0" encoding="utf-16"?>').replace('"bar"', '"b\u00e4r &amp; &quot;x&quot;"')
+    for name, text in (("bar", model.encode()), ("b\u00e4r & \"x\"", wide.replace("><", ">\r\n<").encode("utf-16"))):
+        pipe = Pipe()
+        with zipfile.ZipFile(pipe, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.comment = b"PK\x05\x06 begins the end"
+            for file, data in dict(files, **{"3D/3dmodel.model": text}).items():
+                with archive.open(file, "w", force_zip64=True) as out:
+                    out.write(data)
+        write("streamed.3mf", pipe.data)
+        through_the_chain("streamed.3mf", "bent.3mf")
+        expect(open("rest.3mf", "rb").read() == pipe.data, "a part that did not move is the same file")
+        ((found, after, _),), _ = read_3mf("bent.3mf")
+        expect(found == name, found)
+        expect_bent(indexed_box()[0], after)
+
+
+def test_real_3mf_files_keep_all_they_have():
+    """One in inches with base materials; an assembly of 17 model files (production extension) with pictures and UUIDs."""
+    for file, parts, options in (("featuretype.3MF", 1, ["--count", "2000"]), ("cube_gears_prod_req.3mf", 17, ["--count", "5000"])):
+        if not (PARTS / file).exists():
+            raise Skip(f"{file} is not there")
+        expect_ok(run("flexel-voxelize", PARTS / file, *options, "-o", "rest.vtu"))
+        expect_ok(run("flexel-map", "rest.vtu", "-o", "rest.3mf"))
+        expect(open("rest.3mf", "rb").read() == (PARTS / file).read_bytes(), f"{file}: a part that did not move is the same file")
+        lift = run("flexel", "deform", PARTS / file, *options, "--material", "PLA", "--fix", "zmin", "--push", "zmax: 0 0 5 N", "--no-estimate",
+                   "--keep-vertices", "-o", "bent.3mf")
+        expect_ok(lift)
+        before, old = read_3mf(PARTS / file)
+        after, new = read_3mf("bent.3mf")
+        expect([(n, len(v), t) for n, v, t in before] == [(n, len(v), t) for n, v, t in after] and len(after) == parts, file)
+        expect(old.attrib == new.attrib and [m.text for m in old.iter(CORE + "metadata")] == [m.text for m in new.iter(CORE + "metadata")], file)
+        expect([v for _, v, _ in before] != [v for _, v, _ in after], "it moved")
+        with zipfile.ZipFile(PARTS / file) as one, zipfile.ZipFile("bent.3mf") as two:
+            expect(one.namelist() == two.namelist(), "the same files in the same order")
+            for name in one.namelist():
+                expect(name.endswith(".model") or one.read(name) == two.read(name), name)
 
 
 def write_3mf(name, models):

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import struct
 import subprocess
@@ -188,6 +189,22 @@ def test_elements_of_a_3mf_file_that_nest_without_end():
     write_3mf("deep.3mf", MODEL.format(' xmlns:x="http://x/3dmanufacturing/x/1" requiredextensions="x"', f'<object id="1">{MESH}{deep}</object>', 1))
     result = run("flexel-voxelize", "deep.3mf", "--count", "100", "-o", "o.vtu")
     expect(result.code in (0, 2), str(result))
+    done = run("flexel", "deform", "deep.3mf", "--material", "steel", "--fix", "zmin", "--push", "zmax: 0 0 -1 N", "--count", "200", "-o", "out.3mf")
+    expect(done.code in (0, 2), str(done))
+    write_3mf("inside.3mf", MODEL.format("", f'<object id="1">{MESH}</object>'.replace('v3="1"/>', f'v3="1">{deep}</triangle>'), 1))
+    done = run("flexel", "deform", "inside.3mf", "--material", "steel", "--fix", "zmin", "--push", "zmax: 0 0 -1 N", "--count", "200", "--refine", "1 mm",
+               "-o", "out.3mf")
+    expect(done.code == 2 and "elements inside triangles" in done.err, str(done))
+
+
+def test_a_3mf_file_with_more_copies_than_it_seems():
+    """A thousand uses of an object become a thousand objects: in time, and none of them twice."""
+    uses = "".join(f'<component objectid="1" transform="1 0 0 0 1 0 0 0 1 {20 * n} 0 0"/>' for n in range(1000))
+    write_3mf("many.3mf", MODEL.format("", f'<object id="1">{MESH}</object><object id="2"><components>{uses}</components></object>', 2))
+    expect_ok(run("flexel", "deform", "many.3mf", "--material", "steel", "--fix", "zmin", "--push", "zmax: 0 0 -1 N", "--count", "3000", "--no-estimate",
+                  "--keep-vertices", "-o", "out.3mf"))
+    text = zipfile.ZipFile("out.3mf").read("3D/m.model").decode()
+    expect(text.count("<mesh>") == 1000 and len(set(re.findall(r'objectid="(\d+)"', text))) == 1001, f"{text.count('<mesh>')} meshes")
 
 
 # --- options

@@ -3,6 +3,7 @@
 import io
 import json
 import struct
+import xml.etree.ElementTree as xml
 import zipfile
 
 from harness import box_triangles, write
@@ -63,6 +64,11 @@ def glb_box(name="box.glb"):
                  struct.pack("<I", len(binary)) + b"BIN\0" + binary)
 
 
+CONTENT_TYPES = ('<?xml version="1.0"?><Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types"><Default Extension="rels" '
+                 'ContentType="application/vnd.openxmlformats-package.relationships+xml"/><Default Extension="model" '
+                 'ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/><Default Extension="png" ContentType="image/png"/></Types>')
+
+
 def threemf_box(name="box.3mf"):
     vertices, triangles = indexed_box()
     model = ('<?xml version="1.0"?><model unit="millimeter" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>'
@@ -73,9 +79,83 @@ def threemf_box(name="box.3mf"):
                 'Target="/3D/3dmodel.model" Id="r" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>')
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("[Content_Types].xml", CONTENT_TYPES)
         archive.writestr("_rels/.rels", relation)
         archive.writestr("3D/3dmodel.model", model)
+        archive.writestr("Metadata/thumbnail.png", b"\x89PNG")
     return write(name, file.getvalue())
+
+
+CORE = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
+PRODUCTION = "{http://schemas.microsoft.com/3dmanufacturing/production/2015/06}"
+PACKAGE = "{http://schemas.openxmlformats.org/package/2006/"
+MODEL_TYPE = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
+UNITS_OF_3MF = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}
+
+
+def read_3mf(name):
+    """(name, vertices in mm in the build's frame, triangles) of every mesh that the build shows, and the root of the model, after checking
+    the package and each reference against the specification (core 1.3, production 1.1)."""
+    archive = zipfile.ZipFile(name)
+    assert archive.testzip() is None and len(set(n.lower() for n in archive.namelist())) == len(archive.namelist()), "a damaged archive"
+    types = xml.fromstring(archive.read("[Content_Types].xml"))
+    assert {e.get("Extension") for e in types.iter(PACKAGE + "content-types}Default")} >= {"rels", "model"}, "content types"
+    relations = [r for r in xml.fromstring(archive.read("_rels/.rels")) if r.get("Type") == MODEL_TYPE]
+    assert len(relations) == 1 and relations[0].tag == PACKAGE + "relationships}Relationship", "one model"
+    start = relations[0].get("Target").lstrip("/")
+    models = {n: xml.fromstring(archive.read(n)) for n in archive.namelist() if n.endswith(".model")}
+    objects, uuids = {}, set()
+    for file, model in models.items():
+        assert model.tag == CORE + "model" and model.get("unit", "millimeter") == models[start].get("unit", "millimeter"), f"{file}: {model.attrib}"
+        for node in model.iter():
+            uuid = node.get(PRODUCTION + "UUID")
+            assert uuid is None or uuid not in uuids, f"{uuid} twice"
+            uuids.add(uuid)
+        groups = {}
+        for resource in model.find(CORE + "resources"):
+            number = resource.get("id")
+            assert (file, number) not in objects and number not in groups and 0 < int(number) < 2 ** 31, f"id {number}"
+            if resource.tag == CORE + "object":
+                objects[file, number] = check_object(resource, file, objects, groups)
+            else:
+                groups[number] = len(resource)
+    shown = []
+    for item in models[start].find(CORE + "build"):
+        unfold_3mf(item, start, [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, 0)], objects, UNITS_OF_3MF[models[start].get("unit", "millimeter")], shown)
+    return shown, models[start]
+
+
+def check_object(node, file, objects, groups):
+    """Corners and properties that are there, and components that come before."""
+    pid = node.get("pid")
+    assert pid is None or int(node.get("pindex")) < groups[pid], f"{node.attrib}"
+    for component in node.iter(CORE + "component"):
+        assert (component.get(PRODUCTION + "path", file).lstrip("/"), component.get("objectid")) in objects or component.get(PRODUCTION + "path"), \
+            f"{component.attrib} comes later"
+    vertices = list(node.iter(CORE + "vertex"))
+    for triangle in node.iter(CORE + "triangle"):
+        corners = [int(triangle.get(key)) for key in ("v1", "v2", "v3")]
+        assert max(corners) < len(vertices) and len(set(corners)) == 3, f"{corners}"
+        properties = [triangle.get(key) for key in ("p1", "p2", "p3")]
+        assert (properties[1] is None) == (properties[2] is None), f"{properties}"
+        for value in filter(None, properties):
+            assert int(value) < groups[triangle.get("pid", pid)], f"{triangle.attrib}"
+    return node
+
+
+def unfold_3mf(shown_by, file, outer, objects, unit, shown):
+    numbers = [float(x) for x in shown_by.get("transform", "1 0 0 0 1 0 0 0 1 0 0 0").split()]
+    rows = [numbers[3 * r:3 * r + 3] for r in range(4)]
+    apply = lambda p, m: tuple(sum(p[r] * m[r][c] for r in range(3)) + m[3][c] for c in range(3))
+    turn = lambda p, m: tuple(sum(p[r] * m[r][c] for r in range(3)) for c in range(3))
+    whole = [turn(row, outer) for row in rows[:3]] + [apply(rows[3], outer)]
+    file = shown_by.get(PRODUCTION + "path", file).lstrip("/")
+    node = objects[file, shown_by.get("objectid")]
+    vertices = [tuple(1000 * unit * x for x in apply([float(v.get(axis)) for axis in "xyz"], whole)) for v in node.iter(CORE + "vertex")]
+    if vertices:
+        shown.append((node.get("name"), vertices, [[int(t.get(key)) for key in ("v1", "v2", "v3")] for t in node.iter(CORE + "triangle")]))
+    for component in node.iter(CORE + "component"):
+        unfold_3mf(component, file, whole, objects, unit, shown)
 
 
 # Sizes by componentType and by type (glTF 2.0, 3.6.2.2), and struct's letters.

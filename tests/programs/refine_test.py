@@ -4,8 +4,10 @@ import json
 import math
 import os
 import struct
+import zipfile
 
 from harness import box_triangles, expect, expect_error, expect_ok, main, run, write
+from meshes import CONTENT_TYPES, CORE, read_3mf
 from torn import tear
 
 SIZE = (100.0, 10.0, 6.0)
@@ -145,9 +147,39 @@ def stl_bar(name="bar.stl"):
     return write(name, "\n".join(lines + ["endsolid bar"]) + "\n")
 
 
+def threemf_bar(name="bar.3mf", extra=""):
+    """Every side's texture coordinates, or the colours of its corners; two meshes of one file would share the groups."""
+    coords = "".join('<m:tex2coord u="{}" v="{}"/>'.format(*uv(s, CORNERS[c])) for s, side in enumerate(SIDES) for c in side)
+    colors = "".join('<m:color color="#' + "".join(f"{round(255 * x):02X}" for x in tint(p)) + '"/>' for p in CORNERS)
+    triangles = ""
+    for s, side in enumerate(SIDES):
+        for corners in ((0, 1, 2), (0, 2, 3)):
+            v = [side[i] for i in corners]
+            p = v if s % 2 else [4 * s + i for i in corners]
+            triangles += '<triangle v1="{}" v2="{}" v3="{}" pid="{}" p1="{}" p2="{}" p3="{}"{}/>\n'.format(*v, 4 if s % 2 else 3, *p, extra)
+    model = ('<model unit="millimeter" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02" '
+             'xmlns:m="http://schemas.microsoft.com/3dmanufacturing/material/2015/02"><metadata name="Title">by hand</metadata><resources>'
+             '<m:texture2d id="2" path="/3D/t.png" contenttype="image/png"/>'
+             f'<m:texture2dgroup id="3" texid="2">{coords}</m:texture2dgroup><m:colorgroup id="4">{colors}</m:colorgroup>'
+             '<object id="7" name="bar" pid="4" pindex="0"><mesh><vertices>' + "".join('<vertex x="{}" y="{}" z="{}"/>'.format(*p) for p in CORNERS) +
+             f'</vertices><triangles>{triangles}</triangles></mesh></object></resources><build>%s</build></model>')
+    return lambda items: threemf(name, model % items)
+
+
+def threemf(name, model):
+    with zipfile.ZipFile(name, "w") as archive:
+        archive.writestr("[Content_Types].xml", CONTENT_TYPES)
+        archive.writestr("_rels/.rels", '<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships"><Relationship Id="r" '
+                         'Target="/3D/m.model" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>')
+        archive.writestr("3D/m.model", model)
+        archive.writestr("3D/t.png", b"\x89PNG")
+    return name
+
+
 SERIES = ('<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1"><Collection>\n'
           '<DataSet timestep="0" file="{}"/>\n<DataSet timestep="1" file="{}"/>\n</Collection></VTKFile>\n')
-BARS = {"stl": stl_bar, "obj": obj_bar, "ply": ply_bar, "off": off_bar, "glb": glb_bar}
+BARS = {"stl": stl_bar, "obj": obj_bar, "ply": ply_bar, "off": off_bar, "glb": glb_bar,
+        "3mf": lambda: threemf_bar()('<item objectid="7"/>')}
 
 
 def near(a, b, tolerance=1e-5):
@@ -285,6 +317,47 @@ def test_off_keeps_colours():
         for v in row[1:4]:
             axis = max(range(3), key=lambda a: abs(NORMALS[side][a]))
             expect(abs(vertices[int(v)][axis] - (SIZE[axis] if sum(NORMALS[side]) > 0 else 0)) < 1e-9, f"{row} lies on side {side}")
+
+
+def test_3mf_keeps_texture_coordinates_colours_and_uses():
+    """Shown as it is, and a mirrored one: each use has triangles and corners of its own, and they share the groups."""
+    threemf_bar()('<item objectid="7" partnumber="a"/><item objectid="7" partnumber="b" transform="1 0 0 0 -1 0 0 0 1 0 -20 0"/>')
+    expect_ok(run("flexel-map", rest("bar.3mf"), "--refine", "7 mm", "-o", "out.3mf"))
+    shown, model = read_3mf("out.3mf")
+    expect([n for n, _, _ in shown] == ["bar", "bar"] and all(len(t) > 600 for _, _, t in shown), f"{[len(t) for _, _, t in shown]}")
+    parts = json.loads(expect_ok(run("flexel", "info", "out.3mf", "--json")).out)["files"][0]["parts"]
+    expect(all(p["closed"] and abs(p["volume"] / 6e-6 - 1) < 1e-6 for p in parts), f"{parts}")
+    expect([m.text for m in model.iter(CORE + "metadata")] == ["by hand"], "the file's own metadata")
+    groups = {node.get("id"): list(node) for node in model.find(CORE + "resources")}
+    colors = [[int(node.get("color")[i:i + 2], 16) for i in (1, 3, 5)] for node in groups["4"]]
+    coordinates = [(float(node.get("u")), float(node.get("v"))) for node in groups["3"]]
+    seen = set()
+    for node in model.iter(CORE + "object"):
+        vertices = [tuple(float(v.get(a)) for a in "xyz") for v in node.iter(CORE + "vertex")]
+        expect(vertices[:8] == CORNERS, "the file's own come first")
+        for t in node.iter(CORE + "triangle"):
+            corners = [vertices[int(t.get(key))] for key in ("v1", "v2", "v3")]
+            (side,) = [s for s, n in enumerate(NORMALS) if all(abs(sum(a * b for a, b in zip(n, p)) - max(0, sum(a * b for a, b in zip(n, SIZE)))) < 1e-9
+                                                               for p in corners)]
+            seen.add(side)
+            for p, key in zip(corners, ("p1", "p2", "p3")):
+                if side % 2:
+                    expect(t.get("pid") == "4" and near(colors[int(t.get(key))], [255 * c for c in tint(p)], 1.01), f"{p} {t.attrib}")
+                else:
+                    expect(t.get("pid") == "3" and near(coordinates[int(t.get(key))], uv(side, p)), f"{p} {t.attrib}")
+    expect(seen == set(range(6)), f"{seen}")
+    expect_ok(run("flexel", "deform", "bar.3mf", *BEND, "-o", "bent.vtu"))
+    expect_ok(run("flexel-map", "bent.vtu", "-o", "bent.3mf", "--strict"))
+    parts = json.loads(expect_ok(run("flexel", "info", "bent.3mf", "--json")).out)["files"][0]["parts"]
+    expect(all(p["closed"] and abs(p["volume"] / 6e-6 - 1) < 0.01 for p in parts), f"{parts}")
+
+
+def test_3mf_triangles_with_paint_stay_whole():
+    threemf_bar(extra=' paint_color="4"')('<item objectid="7"/>')
+    found = expect_ok(run("flexel-map", bent("bar.3mf"), "-o", "out.3mf"))
+    expect('were not split: bar.3mf: holds triangles with "paint_color"' in found.err, found.err)
+    expect(info("out.3mf")["triangles"] == 12, "as it was")
+    expect_error(run("flexel-map", "bent.vtu", "--refine", "7 mm", "-o", "x.3mf"), "flexel-map", "paint_color", "--keep-vertices")
 
 
 def test_a_bent_bar_keeps_its_volume_in_every_format():
