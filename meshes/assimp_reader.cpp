@@ -12,7 +12,6 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <array>
 #include <assimp/DefaultLogger.hpp>
 #include <assimp/IOSystem.hpp>
 #include <assimp/Importer.hpp>
@@ -22,9 +21,8 @@
 #include <utility>
 
 #include "base/error.h"
-#include "base/math/weld.h"
-#include "meshes/amf_document.h"
-#include "meshes/dxf_entities.h"
+#include "meshes/dxf_document.h"
+#include "meshes/mesh_builder.h"
 #include "meshes/written_unit.h"
 #include "meshes/x3d_document.h"
 
@@ -56,17 +54,9 @@ Eigen::Matrix4d matrix_of(const aiMatrix4x4& m) {
   return matrix;
 }
 
-// Undoes what assimp does to the whole scene: (x, y, z) was made (x, z, -y), Collada's unit a (single-precision) factor.
-Eigen::Matrix4d own_axes(const std::string& format, double unit) {
-  Eigen::Matrix4d back = Eigen::Matrix4d::Identity();
-  if (format == "3ds" || format == "ase" || format == "dxf") back.block<2, 2>(1, 1) << 0, -1, 1, 0;
-  if (format == "dae") back.topLeftCorner<3, 3>() /= static_cast<float>(unit);
-  return back;
-}
-
 // By which assimp tells formats apart.
-std::string file_name(const std::string& format) {
-  return "part." + format;
+std::string file_name(const MeshReadJob& job) {
+  return "part." + job.extension;
 }
 
 // FBX: centimetres a unit.
@@ -81,20 +71,35 @@ double fbx_unit(const aiScene& scene) {
   return 1e-2 * std::stod(fmt::format("{}", centimetres));
 }
 
+// Formats in which the transform of the topmost node is assimp's own: it turns y up, and applies units and scales that the
+// other programs pass over (3DS) or that are ours to apply (Collada).
+bool has_made_up_root(const std::string& format) {
+  return format == "3ds" || format == "ase" || format == "dxf" || format == "dae";
+}
+
+// What a reader before assimp found out of the file.
+struct FileFacts {
+  Bytes bytes;  // for assimp, where it gets others than the file's
+  double unit = 0;
+  std::vector<std::string> left_out;
+  std::optional<std::size_t> shapes;  // how many it shows
+};
+
 class AssimpReader {
  public:
-  AssimpReader(const aiScene& scene, const MeshReadJob& job, double unit) : scene_(scene), job_(job) {
-    mesh_.unit = unit;
-    mesh_.polygon_offsets.push_back(0);
-  }
+  AssimpReader(const aiScene& scene, const MeshReadJob& job) : scene_(scene), job_(job), mesh_(job.where) {}
 
   // What the scene shows, in the order of its nodes.
-  void show_scene() {
-    std::vector<Shown> pending = {{scene_.mRootNode, own_axes(job_.format, mesh_.unit), ""}};
+  void show() {
+    const bool made_up = has_made_up_root(job_.format);
+    std::vector<Shown> pending = {{scene_.mRootNode, Eigen::Matrix4d::Identity(), ""}};
     while (!pending.empty()) {
       const auto [node, above, name_above] = pending.back();
       pending.pop_back();
-      const Eigen::Matrix4d transform = above * matrix_of(node->mTransformation);
+      check_inheritance(*node, above);
+      const bool own = node != scene_.mRootNode || !made_up;
+      const Eigen::Matrix4d transform =
+          own ? Eigen::Matrix4d(above * matrix_of(node->mTransformation)) : above;
       const std::string name = name_of(*node, name_above);
       if (node->mNumMeshes > 0) add_part(*node, transform, name);
       for (unsigned i = node->mNumChildren; i > 0; --i)
@@ -102,35 +107,20 @@ class AssimpReader {
     }
   }
 
-  // What an AMF file shows; assimp calls an object's node by its id.
-  void show(const AmfDocument& amf) {
-    for (const AmfDocument::Use& use : amf.uses) {
-      const aiNode* node = scene_.mRootNode->FindNode(use.object.c_str());
-      if (node == nullptr) continue;  // an object without triangles
-      const auto name = amf.names.find(use.object);
-      add_part(*node, use.transform, name == amf.names.end() ? "" : name->second);
-    }
-  }
-
-  ForeignMesh mesh() {
-    if (mesh_.polygon_vertices.empty()) throw InputError(job_.where, "shows no polygons: nothing to work on");
-    if (colored_) mesh_.polygon_colors = std::move(colors_);
-    return std::move(mesh_);
-  }
+  [[nodiscard]] ForeignMesh finish(double unit) { return mesh_.finish(unit); }
 
   // How many meshes of polygons were shown.
   [[nodiscard]] std::size_t shown() const { return shown_; }
 
   // What is left out of the file, for one line; empty: nothing.
-  [[nodiscard]] std::vector<std::string> left_out(std::size_t lines_before) const {
-    const std::size_t lines = lines_ + lines_before;
+  [[nodiscard]] std::vector<std::string> left_out() const {
     std::vector<std::string> all;
     if (textures_) all.emplace_back("textures");
     if (colors_within_) all.emplace_back("changes of colour within a polygon");
     if (bones_) all.emplace_back("skeletons");
     if (morphs_) all.emplace_back("morph targets");
     if (scene_.mNumAnimations > 0) all.emplace_back("animations");
-    if (lines > 0) all.push_back(fmt::format("{} points and lines", lines));
+    if (lines_ > 0) all.push_back(fmt::format("{} points and lines", lines_));
     return all;
   }
 
@@ -142,34 +132,45 @@ class AssimpReader {
     std::string name;
   };
 
-  void add_part(const aiNode& node, const Eigen::Matrix4d& transform, const std::string& name) {
-    if (++uses_ > kMostUses) throw InputError(job_.where, "shows more than a million meshes: it is damaged");
-    const std::size_t polygons = mesh_.polygon_part.size();
-    corners_.clear();
-    for (unsigned i = 0; i < node.mNumMeshes; ++i)
-      if (node.mMeshes[i] < scene_.mNumMeshes) add_mesh(*scene_.mMeshes[node.mMeshes[i]], transform);
-    if (mesh_.polygon_part.size() == polygons) return;
-    weld_corners();
-    mesh_.part_names.push_back(name);
+  // FBX can keep a node from being scaled as the one above it is; assimp scales it.
+  void check_inheritance(const aiNode& node, const Eigen::Matrix4d& above) const {
+    std::int32_t kind = 1;
+    constexpr int kWithoutScale = 2;
+    if (node.mMetaData == nullptr || !node.mMetaData->Get("InheritType", kind) || kind != kWithoutScale)
+      return;
+    const Eigen::Matrix3d stretch = above.topLeftCorner<3, 3>();
+    if (!(stretch.transpose() * stretch).isIdentity(1e-4))
+      throw InputError(job_.where,
+                       fmt::format("\"{}\" is not scaled as what it belongs to, which assimp does not read "
+                                   "right: apply the scales before exporting, or export STL",
+                                   clean_name(node.mName.C_Str())));
   }
 
   // The node's, its mesh's, or that of the nearest node above with one; none that assimp makes up ("<DXF_ROOT>").
   [[nodiscard]] std::string name_of(const aiNode& node, const std::string& above) const {
     std::string own = node.mName.C_Str();
-    if (own.starts_with('<') || own == file_name(job_.format)) own.clear();
+    if (own.starts_with('<') || own.starts_with("$Collada") || own == file_name(job_)) own.clear();
     if (own.empty() && node.mNumMeshes > 0 && node.mMeshes[0] < scene_.mNumMeshes)
       own = scene_.mMeshes[node.mMeshes[0]]->mName.C_Str();
     return own.empty() ? above : own;
   }
 
+  void add_part(const aiNode& node, const Eigen::Matrix4d& transform, const std::string& name) {
+    if (++uses_ > kMostUses) throw InputError(job_.where, "shows more than a million meshes: it is damaged");
+    for (unsigned i = 0; i < node.mNumMeshes; ++i)
+      if (node.mMeshes[i] < scene_.mNumMeshes) add_mesh(*scene_.mMeshes[node.mMeshes[i]], transform);
+    mesh_.end_part(name);
+  }
+
   void add_mesh(const aiMesh& mesh, const Eigen::Matrix4d& transform) {
     const bool mirrored = transform.topLeftCorner<3, 3>().determinant() < 0;
-    const auto group = static_cast<std::uint32_t>(mesh_.group_names.size());
     const aiMaterial* material =
         mesh.mMaterialIndex < scene_.mNumMaterials ? scene_.mMaterials[mesh.mMaterialIndex] : nullptr;
     textures_ = textures_ || mesh.HasTextureCoords(0);
     bones_ = bones_ || mesh.HasBones();
     morphs_ = morphs_ || mesh.mNumAnimMeshes > 0;
+    mesh_.begin_group(material == nullptr ? "" : material->GetName().C_Str());
+    bool any = false;
     for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
       const aiFace& face = mesh.mFaces[f];
       if (face.mNumIndices < 3) {
@@ -178,18 +179,10 @@ class AssimpReader {
       }
       for (unsigned c = 0; c < face.mNumIndices; ++c)
         add_corner(mesh, face.mIndices[mirrored ? face.mNumIndices - 1 - c : c], transform);
-      mesh_.polygon_offsets.push_back(checked(mesh_.polygon_vertices.size() + corners_.size()));
-      mesh_.polygon_part.push_back(static_cast<std::uint32_t>(mesh_.part_names.size()));
-      mesh_.polygon_group.push_back(group);
-      add_color(mesh, face, material);
+      mesh_.end_polygon(color_of(mesh, face, material));
+      any = true;
     }
-    shown_ += mesh_.polygon_group.empty() || mesh_.polygon_group.back() != group ? 0 : 1;
-    mesh_.group_names.emplace_back(material == nullptr ? "" : material->GetName().C_Str());
-  }
-
-  [[nodiscard]] std::uint32_t checked(std::size_t count) const {
-    if (count > 0xffffffffu) throw InputError(job_.where, "holds too many polygons");
-    return static_cast<std::uint32_t>(count);
+    shown_ += any ? 1 : 0;
   }
 
   void add_corner(const aiMesh& mesh, unsigned vertex, const Eigen::Matrix4d& transform) {
@@ -198,33 +191,25 @@ class AssimpReader {
                        fmt::format("is damaged: a polygon names vertex {} (from 0), but there are only {}",
                                    vertex, mesh.mNumVertices));
     const aiVector3D& at = mesh.mVertices[vertex];
-    const Vec3 world =
-        transform.topLeftCorner<3, 3>() * Vec3(at.x, at.y, at.z) + transform.topRightCorner<3, 1>();
-    if (!world.allFinite())
-      throw InputError(
-          job_.where,
-          fmt::format("vertex {} of a mesh has a coordinate that is not a finite number", vertex + 1));
-    corners_.push_back(world);
+    mesh_.add_corner(transform.topLeftCorner<3, 3>() * Vec3(at.x, at.y, at.z) +
+                     transform.topRightCorner<3, 1>());
   }
 
   // That of the corners, their mean, or the material's.
-  void add_color(const aiMesh& mesh, const aiFace& face, const aiMaterial* material) {
-    aiColor4D color(1, 1, 1, 1);
+  std::optional<Rgba> color_of(const aiMesh& mesh, const aiFace& face, const aiMaterial* material) {
+    aiColor4D color(0, 0, 0, 0);
     if (mesh.HasVertexColors(0) && !is_blank(mesh)) {
       const aiColor4D first = mesh.mColors[0][face.mIndices[0]];
-      color = aiColor4D(0, 0, 0, 0);
       for (unsigned c = 0; c < face.mNumIndices; ++c) {
         color += mesh.mColors[0][face.mIndices[c]];
         colors_within_ = colors_within_ || mesh.mColors[0][face.mIndices[c]] != first;
       }
       color = color * (1 / static_cast<float>(face.mNumIndices));
-      colored_ = true;
-    } else if (material != nullptr && material->GetName() != aiString(AI_DEFAULT_MATERIAL_NAME) &&
-               material->Get(AI_MATKEY_COLOR_DIFFUSE, color) == aiReturn_SUCCESS) {
-      colored_ = true;
+    } else if (material == nullptr || material->GetName() == aiString(AI_DEFAULT_MATERIAL_NAME) ||
+               material->Get(AI_MATKEY_COLOR_DIFFUSE, color) != aiReturn_SUCCESS) {
+      return std::nullopt;
     }
-    for (const float value : {color.r, color.g, color.b, color.a})
-      colors_.push_back(std::isfinite(value) ? std::clamp(static_cast<double>(value), 0.0, 1.0) : 1);
+    return Rgba{color.r, color.g, color.b, color.a};
   }
 
   // assimp makes colours for formats whose file has none: all zero, the opacity too.
@@ -233,31 +218,14 @@ class AssimpReader {
                        [](const aiColor4D& color) { return color == aiColor4D(0, 0, 0, 0); });
   }
 
-  // Corners at equal positions become one vertex, in the order of first use: most formats have a vertex for each corner.
-  void weld_corners() {
-    const std::vector<std::uint32_t> first = first_equal(corners_.size(), [&](std::size_t i) {
-      return position_key(corners_[i].x(), corners_[i].y(), corners_[i].z());
-    });
-    std::vector<std::uint32_t> number(corners_.size());
-    for (std::size_t i = 0; i < corners_.size(); ++i) {
-      if (first[i] == i) {
-        number[i] = checked(mesh_.vertices.size());
-        mesh_.vertices.push_back(corners_[i]);
-      }
-      mesh_.polygon_vertices.push_back(number[first[i]]);
-    }
-  }
-
   const aiScene& scene_;
   const MeshReadJob& job_;
-  ForeignMesh mesh_;
-  std::vector<Vec3> corners_;  // of the part that is added
-  std::vector<double> colors_;
+  MeshBuilder mesh_;
   std::size_t uses_ = 0, shown_ = 0, lines_ = 0;
-  bool colored_ = false, colors_within_ = false, textures_ = false, bones_ = false, morphs_ = false;
+  bool colors_within_ = false, textures_ = false, bones_ = false, morphs_ = false;
 };
 
-// What assimp says while it reads that may mean a shape is missing; nothing else of its log.
+// What assimp says while it reads, but for what is of looks and movements: it may mean that a shape is missing.
 class Doubts : public Assimp::LogStream {
  public:
   Doubts() {
@@ -277,12 +245,10 @@ class Doubts : public Assimp::LogStream {
     const auto speaks_of = [&](auto... words) {
       return (... || (text.find(words) != std::string_view::npos));
     };
-    const bool of_shapes = speaks_of("skip", "ignor", "unsupported", "not supported", "not implemented",
-                                     "invalid", "unexpected");
-    const bool of_looks =
-        speaks_of("BlendDNA", "texture", "material", "anim", "track", "light", "camera", "Lamp", "UV", "uv",
-                  "normal", "tangent", "color", "chunk", "shader", "version");
-    if (of_shapes && !of_looks && count_++ == 0) first_ = clean_name(text.substr(0, 160));
+    const bool of_looks = speaks_of("BlendDNA", "texture", "Texture", "material", "anim", "track", "light",
+                                    "camera", "Lamp", "UV", "uv", "normal", "tangent", "color", "chunk",
+                                    "shader", "version", "add reason", "EOF");
+    if (!of_looks && count_++ == 0) first_ = clean_name(text.substr(0, 160));
   }
   // "" where nothing was said.
   [[nodiscard]] std::string told() const {
@@ -302,37 +268,62 @@ std::string reason(std::string text) {
   return text.empty() ? "no reason" : text;
 }
 
+// What assimp cannot be trusted with, mended or refused.
+FileFacts facts_of(const MeshReadJob& job, const Warn& warn) {
+  FileFacts facts;
+  const std::string_view text(reinterpret_cast<const char*>(job.bytes.data()), job.bytes.size());
+  facts.unit = written_unit(job.format, text, job.where);
+  if (job.format == "x3d") {
+    X3dDocument document = x3d_document(job.bytes, job.where);
+    facts.bytes = std::move(document.bytes);
+    facts.unit = document.unit;
+    facts.shapes = document.shapes;
+    facts.left_out = std::move(document.left_out);
+  } else if (job.format == "dxf") {
+    DxfDocument document = dxf_document(text, job.where);
+    facts.bytes = std::move(document.bytes);
+    facts.unit = document.unit;
+    for (const auto& [kind, count] : document.others)
+      facts.left_out.push_back(fmt::format("{} {}", count, clean_name(kind)));
+  } else if (job.format == "dae") {
+    for (const char* element : {"<trifans", "<lookat", "<skew"})
+      if (text.find(element) != std::string_view::npos)
+        throw InputError(
+            job.where,
+            fmt::format("holds {}>, which assimp does not read right: export it anew with triangles "
+                        "and matrices, or as STL",
+                        element));
+  } else if (job.format == "blend") {
+    warn("Blender's modifiers are read in part only: apply them before saving, or export STL");
+  }
+  return facts;
+}
+
 }  // namespace
 
 ForeignMesh read_with_assimp(const MeshReadJob& job, const Warn& warn) {
-  const bool x3d = job.format == "x3d", amf = job.format == "amf";
-  const X3dDocument x3d_file = x3d ? x3d_document(job.bytes, job.where) : X3dDocument();
-  const AmfDocument amf_file = amf ? amf_document(job.bytes, job.where) : AmfDocument();
-  const std::string_view text(reinterpret_cast<const char*>(job.bytes.data()), job.bytes.size());
-  const std::size_t dxf_lines = job.format == "dxf" ? check_dxf_entities(text, job.where) : 0;
+  FileFacts facts = facts_of(job, warn);
   Doubts doubts;  // lives longer than the importer, which speaks at its end
   Assimp::Importer importer;
-  const std::string name = file_name(job.format);
-  importer.SetIOHandler(new OneFile(name, x3d ? x3d_file.bytes : amf ? amf_file.bytes : job.bytes));
+  importer.SetIOHandler(new OneFile(file_name(job), facts.bytes.empty() ? job.bytes : facts.bytes));
   importer.SetPropertyInteger(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, 1);
-  const aiScene* scene = importer.ReadFile(name, 0);
+  const aiScene* scene = importer.ReadFile(file_name(job), 0);
   if (scene == nullptr || scene->mRootNode == nullptr)
     throw InputError(
         job.where,
-        fmt::format("assimp cannot read it ({}): it is damaged, or of a version that assimp does not "
+        fmt::format("assimp cannot read it ({}): it is damaged, or of a version or kind that assimp does not "
                     "know; export it anew, or as STL",
                     reason(importer.GetErrorString())));
-  AssimpReader reader(*scene, job, job.format == "fbx" ? fbx_unit(*scene) : written_unit(job.format, text));
-  if (amf)
-    reader.show(amf_file);
-  else
-    reader.show_scene();
-  ForeignMesh mesh = reader.mesh();
-  if (x3d && reader.shown() != x3d_file.shapes)
+  AssimpReader reader(*scene, job);
+  reader.show();
+  if (facts.shapes && reader.shown() != *facts.shapes)
     throw InputError(job.where,
                      fmt::format("assimp finds {} of its {} shapes: export it as another format, or as STL",
-                                 reader.shown(), x3d_file.shapes));
-  if (const std::vector<std::string> lost = reader.left_out(x3d_file.lines + dxf_lines); !lost.empty())
+                                 reader.shown(), *facts.shapes));
+  ForeignMesh mesh = reader.finish(job.format == "fbx" ? fbx_unit(*scene) : facts.unit);
+  std::vector<std::string> lost = reader.left_out();
+  lost.insert(lost.end(), facts.left_out.begin(), facts.left_out.end());
+  if (!lost.empty())
     warn(fmt::format("left out, for only shapes and colours are read: {}", fmt::join(lost, ", ")));
   if (const std::string doubt = doubts.told(); !doubt.empty()) warn(doubt);
   return mesh;

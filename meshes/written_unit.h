@@ -1,11 +1,12 @@
-// Units that a file says and assimp passes over.
+// Units that assimp passes over, or rounds to single precision.
 #pragma once
+#include <string>
 #include <string_view>
 
 namespace flexel::meshes {
 
-// Metres per unit of the coordinates in the text of a Collada (.dae), AMF, X3D or DXF file, or what the format prescribes
-// where the text says nothing; 0: neither does.
-[[nodiscard]] double written_unit(std::string_view format, std::string_view text);
+// Metres per unit of the coordinates in the text of a Collada file (.dae), or what the format prescribes; 0: nothing does.
+// Throws InputError(where, ...): the unit of a Collada file is no length.
+[[nodiscard]] double written_unit(std::string_view format, std::string_view text, const std::string& where);
 
 }  // namespace flexel::meshes

@@ -9,9 +9,8 @@ namespace {
 
 using Extension = std::array<std::string_view, 1>;
 constexpr std::array<std::string_view, 2> kAcExtensions = {"ac3d", "acc"};
-constexpr Extension kAseExtensions = {"ask"}, kNffExtensions = {"enff"}, kIrrmeshExtensions = {"irr"},
-                    kQ3oExtensions = {"q3s"}, kLwoExtensions = {"lxo"}, kXglExtensions = {"zgl"},
-                    k3dsExtensions = {"prj"};
+constexpr Extension kAseExtensions = {"ask"}, kNffExtensions = {"enff"}, kQ3oExtensions = {"q3s"},
+                    kLwoExtensions = {"lxo"}, kXglExtensions = {"zgl"};
 
 // The unit is the file's own, or one that the format prescribes.
 constexpr FileFormat with_unit(std::string_view name, std::string_view title,
@@ -31,21 +30,15 @@ constexpr FileFormat without_unit(std::string_view name, std::string_view title,
   return format;
 }
 
-// The bytes at the front of a file.
-struct Mark {
-  std::string_view bytes;
-  bool anywhere = false;  // among the first: XML
-};
-
 struct Row {
   FileFormat format;
-  Mark mark;
+  FormatMark mark;
 };
 
 constexpr std::array<Row, kAssimpFormats> kRows = {{
     Row{with_unit("fbx", "FBX"), {"Kaydara FBX Binary"}},
     Row{with_unit("dae", "Collada"), {"<COLLADA", true}},
-    Row{without_unit("3ds", "3DS", k3dsExtensions), {}},
+    Row{without_unit("3ds", "3DS"), {}},
     Row{with_unit("amf", "AMF"), {"<amf", true}},
     Row{with_unit("x3d", "X3D"), {"<X3D", true}},
     Row{without_unit("dxf", "DXF"), {}},
@@ -62,7 +55,7 @@ constexpr std::array<Row, kAssimpFormats> kRows = {{
     Row{without_unit("ndo", "Nendo"), {"nendo"}},
     Row{without_unit("q3o", "Quick3D", kQ3oExtensions), {"quick3D"}},
     Row{without_unit("sib", "Silo"), {}},
-    Row{without_unit("irrmesh", "Irrlicht", kIrrmeshExtensions), {}},
+    Row{without_unit("irrmesh", "Irrlicht"), {}},
     Row{without_unit("b3d", "Blitz3D"), {"BB3D"}},
     Row{without_unit("iqm", "IQM"), {"INTERQUAKEMODEL"}},
     Row{without_unit("pmx", "PMX"), {"PMX "}},
@@ -87,11 +80,8 @@ std::span<const FileFormat, kAssimpFormats> assimp_formats() {
   return kFormats;
 }
 
-bool has_mark(std::string_view beginning, std::size_t format) {
-  const Mark& mark = kRows[format].mark;
-  if (mark.bytes.empty()) return false;
-  return mark.anywhere ? beginning.find(mark.bytes) != std::string_view::npos
-                       : beginning.substr(0, mark.bytes.size()) == mark.bytes;
+FormatMark assimp_mark(std::size_t format) {
+  return kRows[format].mark;
 }
 
 }  // namespace flexel

@@ -7,7 +7,13 @@
 
 namespace flexel {
 
-// Whether the first bytes of a file are those of assimp_formats()[format]; false where it has no mark of its own.
-[[nodiscard]] bool has_mark(std::string_view beginning, std::size_t format);
+// The bytes that tell a format.
+struct FormatMark {
+  std::string_view bytes;  // at the front of the file; "": nothing tells it but the extension
+  bool in_xml = false;     // or, where XML stands there, among the first
+};
+
+// Of assimp_formats()[format].
+[[nodiscard]] FormatMark assimp_mark(std::size_t format);
 
 }  // namespace flexel

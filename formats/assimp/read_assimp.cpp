@@ -4,9 +4,18 @@
 #include "formats/assimp/assimp_formats.h"
 #include "formats/common/mesh_job.h"
 #include "formats/common/readers.h"
+#include "formats/threemf/zip.h"
 
 namespace flexel {
 namespace {
+
+bool has_mark(std::string_view text, std::size_t format) {
+  if (assimp_formats()[format].name == "amf" && first_zip_entry(text).ends_with(".amf")) return true;
+  const FormatMark mark = assimp_mark(format);
+  if (mark.bytes.empty()) return false;
+  if (!mark.in_xml) return text.starts_with(mark.bytes);
+  return begins_with_word(text, "<") && text.find(mark.bytes) != std::string_view::npos;
+}
 
 template <std::size_t kFormat>
 Evidence sniff_assimp(const ImportInput& input) {

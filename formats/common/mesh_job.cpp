@@ -32,6 +32,7 @@ ChildLimits mesh_limits(const ImportInput& input) {
 template <class Archive>
 static void visit(Archive& archive, MeshReadJob& job) {
   visit(archive, job.format);
+  visit(archive, job.extension);
   visit(archive, job.bytes);
   visit(archive, job.where);
 }
@@ -92,7 +93,10 @@ JobAnswer<ForeignMesh> unpack_foreign_mesh(std::span<const std::byte> bytes, con
 
 Surface read_foreign(ImportInput& input, const ImportOptions& options, const FileFormat& format,
                      const char* library) {
-  MeshReadJob job{std::string(format.name), std::move(input.bytes), input.where};
+  const std::string name(format.name), given = extension(input.file);
+  const bool known =
+      std::find(format.extensions.begin(), format.extensions.end(), given) != format.extensions.end();
+  MeshReadJob job{name, known ? given : name, std::move(input.bytes), input.where};
   const JobWords words{"read it", "is damaged", "is damaged, or too much", "export it anew, or as STL"};
   const Bytes answer =
       run_job({"flexel-meshes", library, library}, pack(job), mesh_limits(input), input.where, words);
@@ -102,7 +106,6 @@ Surface read_foreign(ImportInput& input, const ImportOptions& options, const Fil
     throw InputError(input.where,
                      fmt::format("the {} file carries its own unit: leave out --unit", format.title));
   Surface surface;
-  const std::string name(format.name);
   surface.sources.push_back(mesh.unit > 0 ? source_in_unit(name.c_str(), mesh.unit)
                                           : unitless_source(name.c_str(), options));
   for (Vec3& vertex : mesh.vertices) {

@@ -12,7 +12,8 @@
 namespace flexel {
 
 struct MeshReadJob {
-  std::string format;  // name of its FileFormat
+  std::string format;     // name of its FileFormat
+  std::string extension;  // the file's, where the format has several
   Bytes bytes;
   std::string where;  // as that of ImportInput
 };

@@ -122,9 +122,15 @@ const FileReader* reader_named(const std::string& name) {
   return nullptr;
 }
 
+void refuse_unread(const ImportInput& input, const std::string& why) {
+  if (!why.empty()) throw InputError(input.where, why);
+}
+
 const FileReader& sniff(const ImportInput& input, const std::string& path) {
+  refuse_unread(input, unread_bytes(beginning(input)));
   const auto [found, evidence] = strongest(input);
   if (evidence > Evidence::weak) return *found;
+  if (path != "-") refuse_unread(input, unread_extension(extension(path)));
   if (looks_like_body(input.bytes))
     throw InputError(
         input.where,
@@ -169,10 +175,6 @@ HashedSurface read_and_hash(ImportInput& input, const FileReader& reader, const 
 Surface import_surface(const std::string& path, const ImportOptions& options) {
   ImportInput input = load(path);
   check_encoding(input);
-  if (const std::string why =
-          options.format ? "" : unread_format(path == "-" ? "" : extension(path), beginning(input));
-      !why.empty())
-    throw InputError(input.where, why);
   const FileReader& reader = reader_of(input, options, path);
   check_text(input, reader);
   HashedSurface read = read_and_hash(input, reader, options);

@@ -58,13 +58,16 @@ bool is_jt(std::string_view beginning) {
 
 }  // namespace
 
-std::string unread_format(std::string_view extension, std::string_view beginning) {
-  if (is_ifc(beginning)) extension = "ifc";
-  if (is_jt(beginning)) extension = "jt";
+std::string unread_extension(std::string_view extension) {
   for (const UnreadFormat& format : kUnread)
     if (format.extension == extension)
       return fmt::format("is {}, which is not read: {}", format.title, format.way);
   return "";
+}
+
+std::string unread_bytes(std::string_view beginning) {
+  if (is_ifc(beginning)) return unread_extension("ifc");
+  return is_jt(beginning) ? unread_extension("jt") : "";
 }
 
 }  // namespace flexel

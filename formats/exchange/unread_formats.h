@@ -5,8 +5,9 @@
 
 namespace flexel {
 
-// What to say of a file with this extension (lower case, "" for none) and these first bytes: "is a JT file ...: ...";
-// "" where it is none of them.
-[[nodiscard]] std::string unread_format(std::string_view extension, std::string_view beginning);
+// What to say of a file with this extension (lower case): "is a JT file ...: ..."; "" where it is none of them.
+[[nodiscard]] std::string unread_extension(std::string_view extension);
+// The same by its first bytes.
+[[nodiscard]] std::string unread_bytes(std::string_view beginning);
 
 }  // namespace flexel

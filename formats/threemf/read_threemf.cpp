@@ -163,7 +163,9 @@ class ThreeMfReader {
 };
 
 Evidence sniff_3mf(const ImportInput& input) {
-  return beginning(input).starts_with("PK\x03\x04") ? Evidence::magic : Evidence::none;
+  const std::string_view text = beginning(input);
+  return text.starts_with("PK\x03\x04") && !first_zip_entry(text).ends_with(".amf") ? Evidence::magic
+                                                                                    : Evidence::none;
 }
 
 Surface read_3mf(ImportInput& input, const ImportOptions& options) {

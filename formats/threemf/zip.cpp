@@ -121,6 +121,13 @@ void append_name(Bytes& to, const std::string& name) {
 
 }  // namespace
 
+std::string_view first_zip_entry(std::string_view beginning) {
+  constexpr std::size_t kNameLength = 26;
+  if (beginning.size() < kLocalSize || !beginning.starts_with("PK\x03\x04")) return {};
+  const auto byte = [&](std::size_t at) { return static_cast<unsigned char>(beginning[at]); };
+  return beginning.substr(kLocalSize, byte(kNameLength) + 256u * byte(kNameLength + 1));
+}
+
 ZipArchive::ZipArchive(std::span<const std::byte> bytes, std::string where)
     : bytes_(bytes), where_(std::move(where)) {
   read_directory();

@@ -21,6 +21,9 @@ struct ZipEntry {
   std::uint64_t header = 0;            // where its local header begins
 };
 
+// The name of the file that an archive begins with, by its first bytes; "" where they are none of an archive.
+[[nodiscard]] std::string_view first_zip_entry(std::string_view beginning);
+
 class ZipArchive {
  public:
   // The bytes must outlive this. Throws InputError: no ZIP archive, damaged, cut off.
