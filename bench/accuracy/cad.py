@@ -6,7 +6,8 @@
 Each part is cut into some 6,000 cells, held over 6 % of its longest side at one end, and moved across by 20 % of that side at the other.
 `flexel-map -o bent.step` writes its faces; gmsh meshes the part and the result with tetrahedra of one size. Volumes: by how much that of gmsh's mesh changed, and
 that of the mapped triangles (`flexel-map --report`). Seconds: flexel-map, reading and mapping included, two threads. With names only
-these parts run, which the page says.
+these parts run, which the page says. The held-out parts of the page as it stands: all STEP files under 1.5 MB in three public repositories on GitHub, TheRobotStudio/SO-ARM100,
+tpaviot/pythonocc-demos and Kofferkulli/full-size-models, but for those in ../shared/parts; chosen before the first run.
 """
 
 import argparse

@@ -11,6 +11,8 @@
 #include <TopoDS_Shape.hxx>
 #include <string_view>
 
+#include "cad/read/assembly_paths.h"
+
 namespace flexel::cad {
 namespace {
 
@@ -95,6 +97,21 @@ TEST(WriteTree, OtherFormatsHoldTheSolidsInPlace) {
     const CadTree back = read_tree(job_of(write_tree({assembly("MM", "")}, format), format), true);
     EXPECT_EQ(back.solids, 2u) << format;
   }
+}
+
+TEST(AssemblyPaths, ASecondUseOfANameHasANumber) {
+  CadTree tree = assembly("MM", "");
+  CadNode outer;
+  outer.name = "machine/1";
+  outer.children = {tree.roots[0], tree.roots[0], tree.roots[0].children[0]};
+  tree.roots = {outer};
+  const CadReadJob job = job_of(write_tree({tree}, "step"), "step");
+  const std::vector<std::string> paths = assembly_paths(read_shape(job, nullptr));
+  EXPECT_EQ(paths, (std::vector<std::string>{"machine_1/pair", "machine_1/pair", "machine_1/pair-2",
+                                             "machine_1/pair-2", "machine_1"}));
+  const CadMesh mesh = mesh_of(read_shape(job, nullptr), job);
+  ASSERT_EQ(mesh.surface.parts.size(), paths.size());
+  for (std::size_t p = 0; p < paths.size(); ++p) EXPECT_EQ(mesh.surface.parts[p].assembly, paths[p]);
 }
 
 }  // namespace

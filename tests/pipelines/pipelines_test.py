@@ -4,7 +4,7 @@ import os
 import re
 import sys
 
-from harness import BIN, SOURCE, box_triangles, expect, expect_ok, main, need, run
+from harness import BIN, SOURCE, box_triangles, expect, expect_ok, main, need, need_step, run
 
 sys.path.insert(0, str(SOURCE / "tests/interop"))
 PIPELINES = SOURCE / "samples/pipelines"
@@ -45,6 +45,23 @@ def test_gmsh():
     import meshio
     tetrahedra = meshio.read("out/bent.msh").cells_dict.get("tetra", [])
     expect(len(tetrahedra) > 100, f"gmsh filled the bent plate with {len(tetrahedra)} tetrahedra")
+
+
+def test_step():
+    need("gmsh")
+    need_step()
+    pipeline("step.sh", "out")
+    import meshio
+    import numpy as np
+
+    def volume(name):
+        mesh = meshio.read(name)
+        at = mesh.points[mesh.cells_dict["tetra"]]
+        return np.abs(np.linalg.det(at[:, 1:] - at[:, :1])).sum() / 6
+    before, after = volume("out/bracket.msh"), volume("out/bent.msh")
+    expect(abs(after / before - 1) < 0.03, f"gmsh's tetrahedra of the bracket hold {before} mm^3, of the bent one {after}")
+    faces = lambda name: len(re.findall("ADVANCED_FACE", open(name, encoding="utf-8").read()))
+    expect(faces("out/bracket.step") == faces("out/bent.step") == 11, "the bent part has the bracket's 11 faces")
 
 
 def test_meshio():

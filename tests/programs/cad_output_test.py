@@ -235,6 +235,9 @@ def test_assemblies_keep_their_parts_and_colours():
     expect("18 solids of 160 faces" in said and "valid, also" in said, said)
     names = lambda step: re.findall(r'^part "(.*)"', expect_ok(run("flexel", "info", step)).out.decode(), re.M)
     expect(names("bent.step") == names(part) and len(names(part)) == 18, f"parts: {names('bent.step')}")
+    tree = lambda step: expect_ok(run("flexel", "info", step)).out.decode().split("parts in their assemblies\n")[1].split("\npart ")[0]
+    expect("  as1/\n    rod-assembly/\n      nut\n      nut-2\n      rod\n    l-bracket-assembly/\n      nut-bolt-assembly/" in tree(part), tree(part))
+    expect(tree("bent.step") == tree(part), f"the tree: {tree('bent.step')}")
     before, after = part.read_text(errors="replace"), pathlib.Path("bent.step").read_text(errors="replace")
     colours = lambda step: {tuple(round(float(each), 4) for each in rgb) for rgb in re.findall(r"COLOUR_RGB\('[^']*', *([\d.E+-]+), *([\d.E+-]+), *([\d.E+-]+)\)", step.replace("\n", ""))}
     expect(colours(before) <= colours(after), f"colours {colours(before)} {colours(after)}")

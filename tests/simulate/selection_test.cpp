@@ -1,0 +1,79 @@
+// Parts that are selected by the assemblies which hold them.
+#include "simulate/input/selection.h"
+
+#include <gmock/gmock.h>
+
+#include "base/error.h"
+#include "formats/lattice/merge.h"
+#include "tests/simulate/box_body.h"
+
+namespace flexel::simulate::testing {
+namespace {
+
+using ::testing::HasSubstr;
+
+// Three boxes side by side: two in assemblies, one in none.
+Body machine() {
+  const char* names[] = {"bolt", "bolt-2", "plate"};
+  const char* assemblies[] = {"machine/joint", "machine/joint-2", ""};
+  Body all;
+  for (int b = 0; b < 3; ++b) {
+    Body box = box_body({.cells = {2, 1, 1},
+                         .spacing = Vec3::Constant(0.01),
+                         .origin = Vec3(0.1 * b, 0, 0),
+                         .name = names[b]});
+    box.surface.parts[0].assembly = assemblies[b];
+    if (b == 0)
+      all = std::move(box);
+    else
+      append(all, std::move(box));
+  }
+  return all;
+}
+
+std::size_t elements(const Body& body, const char* name) {
+  return resolve(select_by_name(name), body).elements.size();
+}
+
+TEST(Selection, AnAssemblyIsAllItsParts) {
+  const Body body = machine();
+  const std::size_t one = elements(body, "bolt");
+  EXPECT_EQ(one, 12u);
+  EXPECT_EQ(elements(body, "machine"), 2 * one);
+  EXPECT_EQ(elements(body, "machine/joint"), one);
+  EXPECT_EQ(elements(body, "joint-2"), one);
+  EXPECT_EQ(elements(body, "machine/joint-2/bolt-2"), one);
+  EXPECT_EQ(elements(body, "joint/bolt"), one);
+}
+
+TEST(Selection, AWordAfterAPathIsAFaceOrASide) {
+  const Body body = machine();
+  EXPECT_EQ(resolve(select_by_name("machine/xmax"), body).polygons,
+            resolve(select_by_name("bolt-2/xmax"), body).polygons);
+  EXPECT_EQ(resolve(select_by_name("joint-2/1"), body).polygons,
+            resolve(select_by_name("bolt-2/1"), body).polygons);
+  EXPECT_EQ(resolve(select_by_name("joint/bolt/x1"), body).polygons,
+            resolve(select_by_name("bolt/x1"), body).polygons);
+  EXPECT_TRUE(side_axis(select_by_name("machine/zmin"), body).has_value());
+}
+
+std::string why(const Body& body, const char* name) {
+  try {
+    static_cast<void>(resolve(select_by_name(name), body));
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Selection, WhatAnAssemblyDoesNotHaveIsToldWithWhatItHas) {
+  const Body body = machine();
+  EXPECT_THAT(why(body, "machine/1"), HasSubstr("\"machine\" is 2 parts: name one of them, as bolt/1"));
+  EXPECT_THAT(why(body, "joint/9"), HasSubstr("part \"bolt\" has faces 1 to 6"));
+  EXPECT_THAT(why(body, "machin"), HasSubstr("did you mean \"machine\""));
+  EXPECT_NE(why(body, "chine/joint"), "");
+  EXPECT_NE(why(body, "joint/plate"), "");
+}
+
+}  // namespace
+}  // namespace flexel::simulate::testing
