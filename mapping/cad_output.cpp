@@ -161,10 +161,14 @@ void write_cad(const Body& body, const MapReport& found, const MapArguments& arg
   OutputFile file(output.path);
   file.write(written.file.data(), written.file.size());
   file.commit();
-  progress.say(fmt::format("{}: {} of {}, {} as before, the others within {} of the deformation{}; {}", title,
-                           counted(written.solids, "solid"), counted(written.faces, "face"), written.kept,
-                           human_length(written.deviation),
-                           written.deviation_face.empty() ? "" : " (" + written.deviation_face + ")",
+  const std::string others =
+      written.kept == written.faces
+          ? "all as before, moved"
+          : fmt::format("{} as before, the others within {} of the deformation{}", written.kept,
+                        human_length(written.deviation),
+                        written.deviation_face.empty() ? "" : " (" + written.deviation_face + ")");
+  progress.say(fmt::format("{}: {} of {}, {}; {}", title, counted(written.solids, "solid"),
+                           counted(written.faces, "face"), others,
                            written.invalid.empty() ? "valid, also when read again" : "not valid"));
 }
 

@@ -1,4 +1,4 @@
-// flexel-meshes: reads meshes with libraries that may crash, loop or take all memory over a damaged file. A job on stdin,
+// flexel-meshes: reads meshes, and writes OpenVDB files, with libraries that take long to load, and may crash, loop or take all memory over a damaged file. A job on stdin,
 // its answer on stdout (formats/common/mesh_job.h); the other programs start it, and limit its time and memory.
 #include <unistd.h>
 
@@ -6,9 +6,11 @@
 
 #include "base/error.h"
 #include "formats/common/mesh_job.h"
+#include "formats/lattice/body_file.h"
 #include "meshes/amf_reader.h"
 #include "meshes/assimp_reader.h"
 #include "meshes/vdb_reader.h"
+#include "meshes/vdb_writer.h"
 
 namespace flexel::meshes {
 namespace {
@@ -19,18 +21,25 @@ ForeignMesh read(const MeshReadJob& job, const Warn& warn) {
   return read_with_assimp(job, warn);
 }
 
-Bytes do_job(const Bytes& bytes) {
-  const MeshReadJob job = unpack_mesh_job(bytes);
-  JobAnswer<ForeignMesh> answer;
-  const Warn warn = [&](const std::string& line) { answer.warnings.push_back(line); };
+template <class Result, class Work>
+Bytes answer(const Work& work) {
+  JobAnswer<Result> found;
   try {
-    answer.result = read(job, warn);
+    found.result = work([&](const std::string& line) { found.warnings.push_back(line); });
   } catch (const InputError& error) {
-    answer.refused = true;
-    answer.where = error.where();
-    answer.why = error.what();
+    found.refused = true;
+    found.where = error.where();
+    found.why = error.what();
   }
-  return pack(answer);
+  return pack(found);
+}
+
+Bytes do_job(const Bytes& bytes) {
+  const MeshJob job = unpack_mesh_job(bytes);
+  if (job.write)
+    return answer<VdbFile>(
+        [&](const Warn&) { return VdbFile{vdb_of(read_body(job.write->body, "the body"))}; });
+  return answer<ForeignMesh>([&](const Warn& warn) { return read(*job.read, warn); });
 }
 
 }  // namespace

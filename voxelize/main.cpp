@@ -19,8 +19,8 @@
 #include "formats/common/file_formats.h"
 #include "formats/exchange/import.h"
 #include "formats/exchange/size_warning.h"
+#include "formats/exchange/vdb_file.h"
 #include "formats/lattice/body_file.h"
-#include "voxelize/classify/sample_distances.h"
 #include "voxelize/report.h"
 #include "voxelize/voxelize.h"
 

@@ -46,8 +46,14 @@ void say_repairs(const VoxelizedPart& part, const std::string& name, Progress& p
                               counted(part.undecided_voxels, "voxel")));
 }
 
-void say_walls(const VoxelizedPart& part, const std::string& name, Progress& progress) {
+void say_walls(const VoxelizedPart& part, const std::string& name, bool with_moments, Progress& progress) {
   if (!part.thinnest || part.thin_walls == 0) return;
+  if (with_moments) {
+    if (part.lost_walls > 0)
+      progress.say(fmt::format("{}: walls thinner than one cell, the thinnest {}: {}", name,
+                               human_length(part.thinnest->thickness), kForQuadratic));
+    return;
+  }
   const Vec3& at = part.thinnest->where;
   const std::string place =
       fmt::format("({}, {}, {})", human_length(at.x()), human_length(at.y()), human_length(at.z()));
@@ -103,7 +109,7 @@ void report_each(const VoxelizeResult& result, Progress& progress) {
       progress.say(fmt::format("{}: {} with several pieces, kept apart", lattice.name,
                                counted(part.split_voxels, "voxel")));
     say_repairs(part, lattice.name, progress);
-    say_walls(part, lattice.name, progress);
+    say_walls(part, lattice.name, !result.body.moments.empty(), progress);
     if (lattice.placement == Placement::corner) say_lost_matter(part, lattice.name, progress);
   }
 }

@@ -112,12 +112,16 @@ void say_losses(const VoxelizeResult& result, Progress& progress) {
   const Has thin = [&](const VoxelizedPart& part) {
     return part.thinnest && part.thin_walls > 0 && !lost(part);
   };
-  if (const std::string which = parts_with(result, lost); !which.empty())
+  const bool with_moments = !result.body.moments.empty();
+  if (const std::string which = parts_with(result, lost); !which.empty() && with_moments)
+    progress.say(fmt::format("walls thinner than one cell in {}, the thinnest {}: {}", which, thinnest(lost),
+                             kForQuadratic));
+  else if (!which.empty())
     progress.warn(
         fmt::format("features lost: walls thinner than one cell in {}, the thinnest {}; the lattice "
                     "holds their matter, not their shape",
                     which, thinnest(lost)));
-  if (const std::string which = parts_with(result, thin); !which.empty())
+  if (const std::string which = parts_with(result, thin); !which.empty() && !with_moments)
     progress.warn(
         fmt::format("walls thinner than two cells in {}, the thinnest {}; a smaller size resolves them",
                     which, thinnest(thin)));

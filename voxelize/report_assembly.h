@@ -6,6 +6,9 @@
 
 namespace flexel::voxelize {
 
+// What walls thinner than a cell mean to a body with moments.
+inline constexpr const char* kForQuadratic = "model quadratic carries them, model cells does not";
+
 // Totals over the parts, and of what is wrong how many parts have it and the worst of them. All that is known
 // of each part is in the summary (docs/reference/voxelize.md).
 void report_together(const VoxelizeResult& result, Progress& progress);

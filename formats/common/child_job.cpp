@@ -36,15 +36,15 @@ Bytes run_job(const ForeignProgram& program, const Bytes& job, const ChildLimits
       throw InputError(fmt::format("{} does not start, or is of another version: install Flexel and {} again",
                                    path, program.install));
     case ChildEnd::crashed:
-      throw InputError(where, fmt::format("{}: {} cannot {}", words.why, program.library, words.verb));
+      throw InputError(where, fmt::format("{}: {} cannot {}", words.why, program.foreign, words.verb));
     case ChildEnd::out_of_time:
       throw InputError(
           where, fmt::format("{} for {}: it did not {} within {:.3g} s of processor time; {}", words.too_much,
-                             program.library, words.verb, limits.processor, words.instead));
+                             program.foreign, words.verb, limits.processor, words.instead));
     case ChildEnd::out_of_memory:
       throw InputError(
           where, fmt::format("{} for {}: it wants more memory than it gets ({} at most); {}", words.too_much,
-                             program.library, human_bytes(limits.memory), words.instead));
+                             program.foreign, human_bytes(limits.memory), words.instead));
   }
   return std::move(output.bytes);
 }

@@ -16,7 +16,7 @@ namespace flexel {
 
 struct ForeignProgram {
   const char* name;     // "flexel-cad"
-  const char* library;  // for messages: "OpenCASCADE"
+  const char* foreign;  // for messages: "OpenCASCADE"
   const char* install;  // what to install where it does not start: "OpenCASCADE 7.6.3"
 };
 

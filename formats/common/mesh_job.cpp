@@ -13,7 +13,7 @@
 namespace flexel {
 namespace {
 
-constexpr std::uint64_t kMeshKind = 0x666c65786d657301;
+constexpr std::uint64_t kMeshKind = 0x666c65786d657301, kVdbKind = 0x666c65786d657302;
 constexpr const char* kUnsound = "is damaged: what its reader gives does not fit together";
 
 // Sound files take a few seconds and 30 bytes of memory a byte; text of polygons with little space the most.
@@ -38,6 +38,16 @@ static void visit(Archive& archive, MeshReadJob& job) {
 }
 
 template <class Archive>
+static void visit(Archive& archive, VdbWriteJob& job) {
+  visit(archive, job.body);
+}
+
+template <class Archive>
+static void visit(Archive& archive, VdbFile& file) {
+  visit(archive, file.bytes);
+}
+
+template <class Archive>
 static void visit(Archive& archive, ForeignMesh& mesh) {
   visit(archive, mesh.unit);
   visit(archive, mesh.vertices);
@@ -58,12 +68,33 @@ Bytes pack(const JobAnswer<ForeignMesh>& answer) {
   return packed(kMeshKind, answer);
 }
 
-MeshReadJob unpack_mesh_job(std::span<const std::byte> bytes) {
+Bytes pack(const VdbWriteJob& job) {
+  return packed(kVdbKind, job);
+}
+
+Bytes pack(const JobAnswer<VdbFile>& answer) {
+  return packed(kVdbKind, answer);
+}
+
+MeshJob unpack_mesh_job(std::span<const std::byte> bytes) {
   Unpacker unpacker(bytes, "stdin", "is no job: flexel-meshes is run by the other programs only");
-  if (kind_of(unpacker) != kMeshKind) unpacker.fail();
-  MeshReadJob job;
-  finish(unpacker, job);
+  const std::uint64_t kind = kind_of(unpacker);
+  MeshJob job;
+  if (kind == kMeshKind)
+    finish(unpacker, job.read.emplace());
+  else if (kind == kVdbKind)
+    finish(unpacker, job.write.emplace());
+  else
+    unpacker.fail();
   return job;
+}
+
+JobAnswer<VdbFile> unpack_vdb(std::span<const std::byte> bytes, const std::string& where) {
+  Unpacker unpacker(bytes, where, "flexel-meshes answers what does not fit together");
+  if (kind_of(unpacker) != kVdbKind) unpacker.fail();
+  JobAnswer<VdbFile> answer;
+  finish(unpacker, answer);
+  return answer;
 }
 
 JobAnswer<ForeignMesh> unpack_foreign_mesh(std::span<const std::byte> bytes, const std::string& where) {

@@ -2,6 +2,7 @@
 // and OpenVDB for level sets. Inside flexel_import and that program only.
 #pragma once
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,20 @@ struct MeshReadJob {
   std::string where;  // as that of ImportInput
 };
 
+// Write what a body file holds as an OpenVDB file.
+struct VdbWriteJob {
+  Bytes body;
+};
+struct VdbFile {
+  Bytes bytes;
+};
+
+// What a job asks for: one of the two.
+struct MeshJob {
+  std::optional<MeshReadJob> read;
+  std::optional<VdbWriteJob> write;
+};
+
 // Polygons of all parts, one part after the other; no vertex belongs to two parts.
 struct ForeignMesh {
   double unit = 0;             // metres per unit of the vertices; 0: the file does not say
@@ -29,9 +44,12 @@ struct ForeignMesh {
 };
 
 [[nodiscard]] Bytes pack(const MeshReadJob& job);
+[[nodiscard]] Bytes pack(const VdbWriteJob& job);
 [[nodiscard]] Bytes pack(const JobAnswer<ForeignMesh>& answer);
+[[nodiscard]] Bytes pack(const JobAnswer<VdbFile>& answer);
 // Throw InputError(where, ...): these bytes are not from pack(), or do not fit together.
-[[nodiscard]] MeshReadJob unpack_mesh_job(std::span<const std::byte> bytes);
+[[nodiscard]] MeshJob unpack_mesh_job(std::span<const std::byte> bytes);
+[[nodiscard]] JobAnswer<VdbFile> unpack_vdb(std::span<const std::byte> bytes, const std::string& where);
 [[nodiscard]] JobAnswer<ForeignMesh> unpack_foreign_mesh(std::span<const std::byte> bytes,
                                                          const std::string& where);
 

@@ -186,7 +186,11 @@ std::vector<std::string> every_name(const Body& body) {
   for (const char* side : {"xmin", "xmax", "ymin", "ymax", "zmin", "zmax"}) names.emplace_back(side);
   for (const Part& part : body.parts) names.push_back(part.name);
   for (const SurfacePart& part : body.surface.parts)
-    if (!part.assembly.empty()) names.push_back(part.assembly);
+    for (std::size_t end = 0; !part.assembly.empty(); ++end) {
+      end = part.assembly.find('/', end);
+      names.push_back(part.assembly.substr(0, end));
+      if (end == std::string::npos) break;
+    }
   for (const SurfaceFace& face : body.surface.faces)
     if (!face.name.empty()) {
       names.push_back(face.name);

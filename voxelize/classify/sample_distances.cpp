@@ -1,153 +1,67 @@
-// OpenVDB voxels are samples: index (x, y, z) is the centre of a sample.
+// OpenVDB lies in a module of its own, which is loaded here.
 #include "voxelize/classify/sample_distances.h"
 
-#include <openvdb/io/Stream.h>
-#include <openvdb/openvdb.h>
-#include <openvdb/tools/MeshToVolume.h>
-#include <openvdb/tools/SignedFloodFill.h>
+#include <dlfcn.h>
+#include <fmt/format.h>
 
-#include <cmath>
-#include <sstream>
+#include <new>
 
 #include "base/error.h"
-#include "base/files/files.h"
-#include "base/files/output_file.h"
-#include "formats/common/length_metadata.h"
+#include "base/program/own_program.h"
+#include "voxelize/distances/distance_module.h"
 
 namespace flexel::voxelize {
 namespace {
 
-// A mesh as OpenVDB asks for it, in its index space.
-class MeshAdapter {
- public:
-  MeshAdapter(const PartMesh& mesh, const Range& range) : mesh_(&mesh), range_(range) {}
-  [[nodiscard]] std::size_t polygonCount() const { return mesh_->corners.size(); }
-  [[nodiscard]] std::size_t pointCount() const { return mesh_->vertices.size(); }
-  [[nodiscard]] std::size_t vertexCount(std::size_t) const { return 3; }
-  void getIndexSpacePoint(std::size_t n, std::size_t v, openvdb::Vec3d& at) const {
-    const Vec3& vertex = mesh_->vertices[mesh_->corners[n][v]];
-    for (int a = 0; a < 3; ++a) at[a] = (vertex[a] - range_.begin[a]) * kSamples - .5;
-  }
+#define FLEXEL_TEXT_OF(name) #name
+#define FLEXEL_NAME_OF(name) FLEXEL_TEXT_OF(name)
 
- private:
-  const PartMesh* mesh_;
-  Range range_;
-};
-
-// Index (i, j, k) to the centre of that voxel; OpenVDB's vectors are rows.
-openvdb::math::Transform::Ptr transform_of(const Lattice& lattice, const Vec3& spacing) {
-  openvdb::Mat4R matrix = openvdb::Mat4R::identity();
-  const Vec3 centre = lattice.origin + lattice.axes * (.5 * spacing);
-  for (int a = 0; a < 3; ++a)
-    for (int b = 0; b < 3; ++b) matrix[a][b] = lattice.axes(b, a) * spacing[a];
-  for (int b = 0; b < 3; ++b) matrix[3][b] = centre[b];
-  return openvdb::math::Transform::createLinearTransform(matrix);
-}
-
-openvdb::FloatGrid::Ptr fill_grid(const Body& body, const Part& part) {
-  auto grid = openvdb::FloatGrid::create(0);
-  auto writer = grid->getAccessor();
-  for (std::uint32_t c = part.cell_begin; c < part.cell_end; ++c) {
-    const Index3& at = body.lattice_index[body.cell_elements[c][0]];
-    const openvdb::Coord ijk(at[0], at[1], at[2]);
-    writer.setValue(ijk, writer.getValue(ijk) + static_cast<float>(body.fill[c]));
-  }
-  grid->setTransform(transform_of(part.lattice, part.lattice.spacing));
-  grid->setGridClass(openvdb::GRID_FOG_VOLUME);
-  grid->setName("fill_" + part.name);
-  grid->insertMeta(kLengthMetadata, openvdb::StringMetadata("m"));
-  return grid;
-}
-
-// A part's triangles in the index space of its distance grid.
-class SurfaceAdapter {
- public:
-  SurfaceAdapter(const Surface& surface, std::uint32_t part, const Lattice& lattice, double voxel)
-      : surface_(&surface), lattice_(&lattice), voxel_(voxel) {
-    const Triangles all = triangulate(surface);
-    for (std::size_t t = 0; t < all.corners.size(); ++t)
-      if (surface.polygon_part(all.polygon[t]) == part) corners_.push_back(all.corners[t]);
-  }
-  [[nodiscard]] std::size_t polygonCount() const { return corners_.size(); }
-  [[nodiscard]] std::size_t pointCount() const { return surface_->vertices.size(); }
-  [[nodiscard]] std::size_t vertexCount(std::size_t) const { return 3; }
-  void getIndexSpacePoint(std::size_t n, std::size_t v, openvdb::Vec3d& at) const {
-    const Vec3 local =
-        lattice_->axes.transpose() * (surface_->vertices[corners_[n][v]] - lattice_->origin) / voxel_;
-    for (int a = 0; a < 3; ++a) at[a] = local[a] - .5;
-  }
-
- private:
-  const Surface* surface_;
-  const Lattice* lattice_;
-  double voxel_;
-  std::vector<Corners> corners_;
-};
-
-openvdb::FloatGrid::Ptr distance_grid(const Body& body, std::uint32_t number,
-                                      const openvdb::FloatGrid& fill) {
-  constexpr float kBandVoxels = 3;
-  const Part& part = body.parts[number];
-  const Vec3& spacing = part.lattice.spacing;
-  const double voxel = spacing.minCoeff();
-  const auto transform = transform_of(part.lattice, Vec3::Constant(voxel));
-  auto grid = openvdb::tools::meshToVolume<openvdb::FloatGrid>(
-      SurfaceAdapter(body.surface, number, part.lattice, voxel), *transform, kBandVoxels, kBandVoxels,
-      openvdb::tools::UNSIGNED_DISTANCE_FIELD);
-  const auto reader = fill.getConstUnsafeAccessor();
-  for (auto value = grid->beginValueOn(); value; ++value) {
-    const openvdb::Coord at = value.getCoord();
-    openvdb::Coord cell;
-    for (int a = 0; a < 3; ++a) cell[a] = static_cast<int>(std::floor((at[a] + .5) * voxel / spacing[a]));
-    if (reader.getValue(cell) >= .5f) value.setValue(-value.getValue());
-  }
-  openvdb::tools::signedFloodFill(grid->tree());  // beyond the band: deep inside is negative too
-  grid->setGridClass(openvdb::GRID_LEVEL_SET);
-  grid->setName("distance_" + part.name);
-  grid->insertMeta(kLengthMetadata, openvdb::StringMetadata("m"));
-  return grid;
+// Loaded once, and never let go.
+const FlexelDistanceModule& module() {
+  static const FlexelDistanceModule& kModule = []() -> const FlexelDistanceModule& {
+    const std::string path = own_program("flexel-distances.so");
+    void* library = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
+    void* function = library == nullptr ? nullptr : dlsym(library, FLEXEL_NAME_OF(FLEXEL_DISTANCE_MODULE));
+    if (function == nullptr)
+      throw InputError(fmt::format("{} cannot be loaded: install Flexel and OpenVDB again", path));
+    return *reinterpret_cast<FlexelDistanceModuleFunction*>(function)();
+  }();
+  return kModule;
 }
 
 }  // namespace
 
 struct SampleDistances::Grid {
-  openvdb::FloatGrid::Ptr grid;
+  explicit Grid(void* made) : distances(made) {
+    if (distances == nullptr) throw std::bad_alloc();
+  }
+  ~Grid() { module().destroy(distances); }
+  Grid(const Grid&) = delete;
+  Grid& operator=(const Grid&) = delete;
+  void* distances;
 };
 
-SampleDistances::SampleDistances(const PartMesh& mesh, const Range& range) : grid_(std::make_unique<Grid>()) {
-  openvdb::initialize();
-  const auto transform = openvdb::math::Transform::createLinearTransform(1);
-  grid_->grid =
-      openvdb::tools::meshToVolume<openvdb::FloatGrid>(MeshAdapter(mesh, range), *transform, kBand, kBand);
+SampleDistances::SampleDistances(const PartMesh& mesh, const Range& range) {
+  std::vector<double> points;
+  points.reserve(3 * mesh.vertices.size());
+  for (const Vec3& vertex : mesh.vertices)
+    for (int a = 0; a < 3; ++a) points.push_back((vertex[a] - range.begin[a]) * kSamples - .5);
+  std::vector<std::uint32_t> corners;
+  corners.reserve(3 * mesh.corners.size());
+  for (const auto& triangle : mesh.corners) corners.insert(corners.end(), triangle.begin(), triangle.end());
+  grid_ = std::make_unique<Grid>(
+      module().create(points.data(), mesh.vertices.size(), corners.data(), mesh.corners.size(), kBand));
 }
 SampleDistances::~SampleDistances() = default;
 
 float SampleDistances::at(int x, int y, int z) const {
-  return grid_->grid->tree().getValue({x, y, z});
+  float distance = 0;
+  module().read(grid_->distances, x, y, z, 1, &distance);
+  return distance;
 }
 
 void SampleDistances::voxel(int i, int j, int k, std::array<float, 64>& out) const {
-  const auto reader = grid_->grid->getConstUnsafeAccessor();
-  for (int bit = 0; bit < 64; ++bit)
-    out[static_cast<std::size_t>(bit)] =
-        reader.getValue({kSamples * i + (bit & 3), kSamples * j + (bit >> 2 & 3), kSamples * k + (bit >> 4)});
-}
-
-void write_vdb(const Body& body, const std::string& path) {
-  openvdb::initialize();
-  openvdb::GridPtrVec grids;
-  for (std::uint32_t p = 0; p < body.parts.size(); ++p) {
-    if (body.parts[p].placement != Placement::corner)
-      throw InputError("--vdb: centre placement has no cells; use --placement corner");
-    const auto fill = fill_grid(body, body.parts[p]);
-    grids.push_back(fill);
-    grids.push_back(distance_grid(body, p, *fill));
-  }
-  std::ostringstream bytes;
-  openvdb::io::Stream(bytes).write(grids);
-  OutputFile out(path);
-  out.write(bytes.str());
-  out.commit();
+  module().read(grid_->distances, kSamples * i, kSamples * j, kSamples * k, kSamples, out.data());
 }
 
 }  // namespace flexel::voxelize

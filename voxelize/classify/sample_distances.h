@@ -1,9 +1,8 @@
-// Distances of samples from a surface, by OpenVDB; only sample_distances.cpp includes it.
+// Distances of samples from a surface, by OpenVDB.
 #pragma once
+#include <array>
 #include <memory>
-#include <string>
 
-#include "formats/lattice/body.h"
 #include "voxelize/classify/samples.h"
 
 namespace flexel::voxelize {
@@ -13,7 +12,7 @@ namespace flexel::voxelize {
 // gaps of one or two samples close.
 class SampleDistances {
  public:
-  // `mesh` is placed on the lattice.
+  // `mesh` is placed on the lattice. Throws InputError: the module with OpenVDB is not there.
   SampleDistances(const PartMesh& mesh, const Range& range);
   ~SampleDistances();
   static constexpr float kBand = 3;  // samples: distances beyond are cut off here
@@ -26,12 +25,5 @@ class SampleDistances {
   struct Grid;
   std::unique_ptr<Grid> grid_;
 };
-
-// Writes OpenVDB grids of a body with cells, two for each part: "fill_NAME", the fill of the voxels (index
-// (i, j, k) is the voxel's centre, with the lattice's transform; pieces of one voxel add up), and
-// "distance_NAME", a level set of the part's surface [m, negative inside] to three voxels from it, on cubic
-// voxels of the lattice's least spacing with its axes and origin (the lattice's own transform where it is
-// cubic). Inside is where the fill is a half or more. Throws InputError for a body without cells.
-void write_vdb(const Body& body, const std::string& path);
 
 }  // namespace flexel::voxelize
