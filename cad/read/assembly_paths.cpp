@@ -21,6 +21,12 @@ bool is_part(const TopoDS_Shape& compound, const std::string& name, const ShapeL
   return !solids.More();
 }
 
+// A slash divides the names of a path.
+std::string as_component(std::string name) {
+  std::replace(name.begin(), name.end(), '/', '_');
+  return name;
+}
+
 void walk(const TopoDS_Shape& shape, const std::string& path, const ShapeLabels& labels, int depth,
           std::vector<std::string>& paths) {
   if (shape.ShapeType() == TopAbs_SOLID) return paths.push_back(path);
@@ -34,7 +40,7 @@ void walk(const TopoDS_Shape& shape, const std::string& path, const ShapeLabels&
     std::string name = below.ShapeType() < TopAbs_SOLID ? labels.assembly_name(below) : "";
     std::string inner = path;
     if (!name.empty() && !is_part(below, name, labels)) {
-      std::replace(name.begin(), name.end(), '/', '_');
+      name = as_component(name);
       if (const int use = ++uses[name]; use > 1) name += fmt::format("-{}", use);
       inner += (path.empty() ? "" : "/") + name;
     }
@@ -47,9 +53,10 @@ void walk(const TopoDS_Shape& shape, const std::string& path, const ShapeLabels&
 std::vector<std::string> assembly_paths(const CadShape& shape) {
   std::vector<std::string> paths;
   if (shape.shape->IsNull()) return paths;
-  const std::string root =
-      shape.shape->ShapeType() < TopAbs_SOLID ? shape.labels.assembly_name(*shape.shape) : "";
-  walk(*shape.shape, is_part(*shape.shape, root, shape.labels) ? "" : root, shape.labels, 0, paths);
+  const bool compound = shape.shape->ShapeType() < TopAbs_SOLID;
+  const std::string root = compound ? shape.labels.assembly_name(*shape.shape) : "";
+  walk(*shape.shape, is_part(*shape.shape, root, shape.labels) ? "" : as_component(root), shape.labels, 0,
+       paths);
   return paths;
 }
 
