@@ -143,6 +143,15 @@ MappedPart map_refined(Body& body, const MapOptions& options, const CrackOptions
   return mapped;
 }
 
+std::optional<Body> split_where_coarse(const Body& body, const MapResult& result, Progress& progress) {
+  if (!has_long_triangles(body)) return std::nullopt;
+  const auto refinement = refinement_of_state(body, result, chord_error(body, result), progress);
+  if (!refinement) return std::nullopt;
+  Body split = body;
+  take_refined(split, refined(body.surface, *refinement), *refinement);
+  return split;
+}
+
 RefinedSeries refinement_of_series(const Body& first, const std::vector<std::string>& files,
                                    const MapOptions& options, bool cut, Progress& progress) {
   if (!has_long_triangles(first)) return {};

@@ -39,6 +39,11 @@ struct SplitSurface {
                                      const RefineOptions& refine, const Surface* written,
                                      std::span<const SurfaceFormat> formats, Progress& progress);
 
+// A copy of the body whose polygons are split where those of its surface, mapped as `result`, are too large to show the
+// deformation; nothing where none is.
+[[nodiscard]] std::optional<Body> split_where_coarse(const Body& body, const MapResult& result,
+                                                     Progress& progress);
+
 // What all states of a series need together, and where nothing is split for them, why.
 struct RefinedSeries {
   std::optional<Refinement> refinement;

@@ -12,6 +12,7 @@
 #include "flexel/picture/lattice_drawable.h"
 #include "flexel/picture/render/quantity.h"
 #include "flexel/picture/render/thickness.h"
+#include "mapping/map_refined.h"
 #include "mapping/methods/map_surface.h"
 #include "mapping/methods/method.h"
 
@@ -104,12 +105,9 @@ void set_surface_values(const Surface& surface, const MeshTopology& mesh, const 
                per_triangle(attribute->values, mesh.triangles.polygon));
 }
 
-void draw_body_surface(const Body& body, const PictureOptions& options, const ColourBy& by,
-                       Progress& progress, Panel& panel) {
+void draw_mapped(const Body& body, const mapping::MapResult& mapped, const PictureOptions& options,
+                 const ColourBy& by, Panel& panel) {
   const Surface& surface = body.surface;
-  mapping::MapOptions how;
-  how.method = mapping::default_method(body);
-  const mapping::MapResult mapped = map_surface(body, how, progress);
   for (const Vec3& u : mapped.displacement)
     if (!u.allFinite())
       throw InputError(panel.subject->where,
@@ -133,6 +131,17 @@ void draw_body_surface(const Body& body, const PictureOptions& options, const Co
   std::vector<std::uint32_t> nearest(mapped.frame.size());
   for (std::size_t v = 0; v < nearest.size(); ++v) nearest[v] = mapped.frame_of(v).elements[0];
   set_values(panel.drawn, Drawable::ValuesAt::vertices, at_vertices(body, *attribute, nearest));
+}
+
+// Split where its triangles would hide the bend, as the part is when it is written.
+void draw_body_surface(const Body& body, const PictureOptions& options, const ColourBy& by,
+                       Progress& progress, Panel& panel) {
+  mapping::MapOptions how;
+  how.method = mapping::default_method(body);
+  const mapping::MapResult mapped = map_surface(body, how, progress);
+  if (const std::optional<Body> split = split_where_coarse(body, mapped, progress))
+    return draw_mapped(*split, map_surface(*split, how, progress), options, by, panel);
+  draw_mapped(body, mapped, options, by, panel);
 }
 
 void draw_lattice(const Body& body, const PictureOptions& options, const ColourBy& by, Panel& panel) {

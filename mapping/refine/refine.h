@@ -6,7 +6,7 @@
 
 namespace flexel::mapping {
 
-// Once a triangle is coarse (kCoarseShare), the surface is split until no triangle with an edge of over two spacings
+// Once a triangle is coarse (chord.h), the surface is split until no triangle with an edge of over two spacings
 // misses more than this share of the largest displacement, which is what the edge that the report names leaves too
 // (sufficient_edge()), nor this share of a spacing. The second is for thin walls that move by many times their thickness:
 // both their sides stay where the wall is.

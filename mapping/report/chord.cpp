@@ -103,8 +103,12 @@ ChordError chord_error(const Body& body, const MapResult& result) {
     error.at = found[t].at;
     error.longest_edge = triangles[t].longest;
   }
-  const double least = std::max(kCoarseShare * error.largest_displacement, kChordNoise * box.size().norm());
-  for (const MissedPoint& each : found) error.coarse_triangles += each.largest > least;
+  const double noise = kChordNoise * box.size().norm();
+  for (std::size_t t = 0; t < found.size(); ++t) {
+    const double spacing = body.parts[flat[t].part].lattice.spacing.minCoeff();
+    const double most = std::min(kCoarseShare * error.largest_displacement, kCoarseSpacings * spacing);
+    error.coarse_triangles += found[t].largest > std::max(most, noise);
+  }
   return error;
 }
 

@@ -6,8 +6,9 @@
 
 namespace flexel::mapping {
 
-// Triangles that miss more than this share of the largest displacement are too coarse.
-constexpr double kCoarseShare = 0.05;
+// Triangles that miss more than this share of the largest displacement are too coarse: a bar whose end moves without turning
+// misses 4.9 % where its sides are flat. So are those that miss more than this share of a spacing, however far the part moves.
+constexpr double kCoarseShare = 0.03, kCoarseSpacings = 0.25;
 
 // A triangle with an edge of over two spacings.
 struct LongTriangle {

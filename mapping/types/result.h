@@ -59,7 +59,7 @@ struct ChordError {
   Vec3 at = Vec3::Zero();            // m, where that point is at rest
   double longest_edge = 0;           // m, at rest, of the triangle that it is on
   double largest_displacement = 0;   // m, of vertices and of the sampled points
-  std::size_t coarse_triangles = 0;  // that miss more than kCoarseShare of it (mapping/report/chord.h)
+  std::size_t coarse_triangles = 0;  // that miss too much (mapping/report/chord.h)
   [[nodiscard]] double share() const { return largest_displacement > 0 ? largest / largest_displacement : 0; }
 };
 

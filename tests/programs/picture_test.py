@@ -7,6 +7,15 @@ import zlib
 from harness import body, bracket, box, expect, expect_error, expect_ok, expect_only, main, run, scene, shell, write
 
 
+BEND = """material = "PLA"
+[[fix]]
+where = "xmin"
+[[move]]
+where = "xmax"
+displacement = ["0 mm", "0 mm", "-12 mm"]
+"""
+
+
 def read_png(data):
     """Width, height and rows of RGB bytes, by nothing but struct and zlib; every chunk's checksum is checked."""
     expect(data[:8] == b"\x89PNG\r\n\x1a\n", "the signature of a PNG")
@@ -74,6 +83,21 @@ def test_picture_of_a_body_is_coloured():
 
 def read_png_of(*arguments):
     return read_png(expect_ok(run("flexel", "picture", *arguments, "-o", "-", "--quiet")).out)
+
+
+def test_a_coarse_surface_bends_in_the_picture():
+    """Twelve triangles, drawn as they are written: split where the bar bends. Whole, they would show it straight."""
+    box()
+    scene("bend.toml", BEND)
+    expect_ok(run("flexel-voxelize", "box.stl", "--size", "2.5 mm", "-o", "rest.vtu", "--quiet"))
+    expect_ok(run("flexel-simulate", "bend.toml", "rest.vtu", "-o", "bent.vtu", "--no-estimate", "--quiet"))
+    expect_ok(run("flexel-map", "bent.vtu", "-o", "split.stl", "--quiet"))
+    expect_ok(run("flexel-map", "bent.vtu", "-o", "whole.stl", "--keep-vertices", "--quiet"))
+    view = ("--size", "320x200", "--view", "0,0", "--color", "none", "--no-outline", "--scale", "1")
+    dark = lambda name: [[sum(row[3 * i:3 * i + 3]) < 700 for i in range(320)] for row in read_png_of(name, *view)[2]]
+    body, split, whole = dark("bent.vtu"), dark("split.stl"), dark("whole.stl")
+    apart = lambda a, b: sum(x != y for row, other in zip(a, b) for x, y in zip(row, other))
+    expect(apart(body, split) < 0.1 * apart(body, whole), f"{apart(body, split)} pixels differ from the split part, {apart(body, whole)} from the whole one")
 
 
 def test_every_kind_of_picture():
