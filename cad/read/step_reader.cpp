@@ -44,6 +44,16 @@ bool is_unit(const Handle(Standard_Transient) & entity) {
   return std::string_view(entity->DynamicType()->Name()).find("Unit") != std::string_view::npos;
 }
 
+// The first failure that matters; "" for none. Creo leaves out the dimensions of degrees (NAMED_UNIT(*)), which nobody
+// needs to convert them.
+std::string failure_of(const Interface_Check& check, bool unit) {
+  for (Standard_Integer i = 1; i <= check.NbFails(); ++i) {
+    const std::string_view text = check.CFail(i);
+    if (!unit || text.find("(dimensions)") == std::string_view::npos) return std::string(text);
+  }
+  return "";
+}
+
 // "#176" of "Unresolved Reference, Ent.Id.#176 Param.n0 4 (Id.#225)", or "".
 std::string label_in(std::string_view message) {
   constexpr std::string_view kBefore = "Ent.Id.";
@@ -79,8 +89,9 @@ std::string check_loaded(const STEPControl_Reader& reader, const CadReadJob& job
     if (!checks.Value()->HasFailed() || checks.Number() < 1) continue;
     const Handle(Standard_Transient) entity = model->Value(checks.Number());
     if (!is_geometry(entity) && !is_unit(entity)) continue;
-    const std::string found =
-        fmt::format("{}: {}", model->StringLabel(entity)->ToCString(), checks.Value()->CFail(1));
+    const std::string failure = failure_of(*checks.Value(), is_unit(entity));
+    if (failure.empty()) continue;
+    const std::string found = fmt::format("{}: {}", model->StringLabel(entity)->ToCString(), failure);
     if (!entity->IsKind(STANDARD_TYPE(StepGeom_GeometricRepresentationItem)) ||
         entity->IsKind(STANDARD_TYPE(StepShape_SolidModel)))
       throw InputError(job.where, damage_message(found));

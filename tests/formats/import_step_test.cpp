@@ -123,6 +123,17 @@ TEST(ImportStep, SameForAnyThreadCountAndSilentOnStdout) {
   EXPECT_EQ(first.polygon_face, second.polygon_face);
 }
 
+// As Creo writes its degrees; every file of it was refused as damaged.
+TEST(ImportStep, UnitsWithoutDimensionsAreRead) {
+  SKIP_WITHOUT_PARTS();
+  const Scratch scratch;
+  const std::string text = read_file(part_path("red_cube_blue_cylinder.step"));
+  const Surface sound = import_surface(part_path("red_cube_blue_cylinder.step"));
+  const Surface read =
+      import_surface(scratch.write("a.step", replaced(text, "NAMED_UNIT( #68 )", "NAMED_UNIT( * )")));
+  EXPECT_EQ(read.vertices, sound.vertices);
+}
+
 TEST(ImportStep, AClosedShellStandsForASolid) {
   SKIP_WITHOUT_PARTS();
   const Scratch scratch;

@@ -6,7 +6,7 @@ import os
 import struct
 import zipfile
 
-from harness import box_triangles, expect, expect_error, expect_ok, main, run, write
+from harness import box, box_triangles, expect, expect_error, expect_ok, main, run, write
 from meshes import CONTENT_TYPES, CORE, read_3mf
 from torn import tear
 
