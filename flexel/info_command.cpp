@@ -212,7 +212,7 @@ std::string info_text(const Surface& surface, const Known& known) {
       "A scene or an option can name a part, {}a face, a group, or a side: xmin, xmax, ymin, ymax, zmin, "
       "zmax. Where a name means two things, \"part/#2\" is face number 2 and \"part/=2\" what the file calls "
       "\"2\".\n",
-      assemblies ? "an assembly (all its parts), " : "");
+      assemblies ? "an assembly (in selections: all its parts), " : "");
   return text;
 }
 

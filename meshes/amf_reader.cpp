@@ -65,20 +65,22 @@ class AmfReader {
     }
     for (const pugi::xml_node& material : amf.children("material"))
       materials_[material.attribute("id").value()] = color_of(material);
-  }
-
-  // Constellations that no other shows, and objects that none does, in the order of the file.
+  }  // Constellations that no other shows, and objects that none does, in the order of the file.
   ForeignMesh read() {
+    for (const auto& [id, object] : objects_)
+      if (constellations_.count(id) > 0)
+        fail(fmt::format("an object and a constellation have the id \"{}\"", short_text(id)));
     for (const pugi::xml_node& node : amf_.children()) {
       const bool used = used_.count(node.attribute("id").value()) > 0;
       if (!used && std::string_view(node.name()) == "object") add_object(node, Eigen::Affine3d::Identity());
       if (!used && std::string_view(node.name()) == "constellation")
         show(node, Eigen::Affine3d::Identity(), 0);
     }
+    if (shown_.size() < constellations_.size()) fail("its constellations contain one another");
     return mesh_.finish(unit_of(amf_, where_));
   }
 
-  bool curved = false, vertex_colors = false;  // there were such
+  bool curved = false, vertex_colors = false, hidden = false, support = false;  // there were such
 
  private:
   using Nodes = std::map<std::string, pugi::xml_node>;
@@ -101,16 +103,39 @@ class AmfReader {
     const auto value = [&](const char* name) { return number_in(instance, name, 0, where_); };
     const auto turn = [&](const char* name, const Vec3& axis) {
       return Eigen::AngleAxisd(value(name) * std::numbers::pi / 180, axis);
-    };
+    };  // What slicers write beside the standard, applied first: scale, then mirror.
+    const auto size = [&](const char* name) { return number_in(instance, name, 1, where_); };
+    const auto sign = [&](const char* name) { return value(name) != 0 ? -1.0 : 1.0; };
+    const Vec3 scale =
+        size("scale") * Vec3(size("scalex") * sign("mirrorx"), size("scaley") * sign("mirrory"),
+                             size("scalez") * sign("mirrorz"));
     return Eigen::Translation3d(value("deltax"), value("deltay"), value("deltaz")) *
-           turn("rz", Vec3::UnitZ()) * turn("ry", Vec3::UnitY()) * turn("rx", Vec3::UnitX());
+           turn("rz", Vec3::UnitZ()) * turn("ry", Vec3::UnitY()) * turn("rx", Vec3::UnitX()) *
+           Eigen::Scaling(scale);
   }
 
+  void check_instance(const pugi::xml_node& instance) const {
+    constexpr std::string_view kKnown[] = {"deltax",  "deltay",  "deltaz",  "rx",       "ry",
+                                           "rz",      "scale",   "scalex",  "scaley",   "scalez",
+                                           "mirrorx", "mirrory", "mirrorz", "printable"};
+    for (const pugi::xml_node& each : instance.children())
+      if (each.type() == pugi::node_element &&
+          std::find(std::begin(kKnown), std::end(kKnown), std::string_view(each.name())) == std::end(kKnown))
+        throw InputError(
+            where_, fmt::format("an instance has <{}>, which is not known here: export it without, or as STL",
+                                short_text(each.name())));
+  }
   void show(const pugi::xml_node& constellation, const Eigen::Affine3d& above, int depth) {
+    shown_.insert(constellation.attribute("id").value());
     for (const pugi::xml_node& instance : constellation.children("instance")) {
       if (depth > kDeepest || ++uses_ > kMostUses)
         fail("its constellations contain one another, or show more than 100,000 objects");
       const std::string id = instance.attribute("objectid").value();
+      check_instance(instance);
+      if (number_in(instance, "printable", 1, where_) == 0) {
+        hidden = true;
+        continue;
+      }
       const Eigen::Affine3d transform = above * transform_of(instance);
       if (const auto found = constellations_.find(id); found != constellations_.end())
         show(found->second, transform, depth + 1);
@@ -140,18 +165,20 @@ class AmfReader {
       }
       curved = curved || mesh.child("vertices").child("edge");
       for (const pugi::xml_node& volume : mesh.children("volume"))
-        add_volume(volume, vertices, color, name_of(object));
+        add_volume(volume, transform, vertices, color, name_of(object));
     }
   }
-
-  void add_volume(const pugi::xml_node& volume, const std::vector<Vec3>& vertices, std::optional<Rgba> color,
+  void add_volume(const pugi::xml_node& volume, const Eigen::Affine3d& transform,
+                  const std::vector<Vec3>& vertices, std::optional<Rgba> color,
                   const std::string& object_name) {
     const auto material = materials_.find(volume.attribute("materialid").value());
     if (material != materials_.end() && material->second) color = material->second;
     if (const auto own = color_of(volume)) color = own;
     mesh_.begin_group("");
+    support = support || std::string_view(volume.attribute("type").value()) == "support";
+    const bool mirrored = transform.linear().determinant() < 0;
     for (const pugi::xml_node& triangle : volume.children("triangle")) {
-      for (const char* corner : {"v1", "v2", "v3"}) {
+      for (const char* corner : {"v1", mirrored ? "v3" : "v2", mirrored ? "v2" : "v3"}) {
         const double index = number_in(triangle, corner, -1, where_);
         if (!(index >= 0) || index >= static_cast<double>(vertices.size()) || index != std::floor(index))
           fail(fmt::format("a triangle names vertex {} (from 0), but there are only {}", index,
@@ -168,7 +195,7 @@ class AmfReader {
   const pugi::xml_node& amf_;
   const std::string& where_;
   Nodes objects_, constellations_;
-  std::set<std::string> used_;
+  std::set<std::string> used_, shown_;
   std::map<std::string, std::optional<Rgba>> materials_;
   std::size_t uses_ = 0;
   MeshBuilder mesh_;
@@ -181,7 +208,7 @@ Bytes text_of(const MeshReadJob& job) {
   if (!bytes.starts_with(kZip)) return job.bytes;
   ZipArchive archive(job.bytes, job.where);
   for (std::size_t e = 0; e < archive.entries().size(); ++e)
-    if (archive.entries()[e].name.ends_with(".amf")) return archive.read(e);
+    if (is_amf_name(archive.entries()[e].name)) return archive.read(e);
   throw InputError(job.where, "is a ZIP archive without an AMF file");
 }
 
@@ -197,6 +224,8 @@ ForeignMesh read_amf(const MeshReadJob& job, const Warn& warn) {
   AmfReader reader(amf, job.where);
   ForeignMesh mesh = reader.read();
   if (reader.curved) warn("its curved triangles (edges and normals) are read as flat ones");
+  if (reader.hidden) warn("instances that are not to be printed are left out");
+  if (reader.support) warn("it holds support material for the print, which is a part like any other here");
   if (reader.vertex_colors)
     warn("left out, for only shapes and colours of triangles are read: colours of vertices");
   return mesh;

@@ -286,7 +286,7 @@ FileFacts facts_of(const MeshReadJob& job, const Warn& warn) {
     for (const auto& [kind, count] : document.others)
       facts.left_out.push_back(fmt::format("{} {}", count, clean_name(kind)));
   } else if (job.format == "dae") {
-    for (const char* element : {"<trifans", "<lookat", "<skew"})
+    for (const char* element : {"<trifans", "<lookat", "<skew", "<convex_mesh", "<brep"})
       if (text.find(element) != std::string_view::npos)
         throw InputError(
             job.where,

@@ -85,6 +85,11 @@ class DxfScanner {
       check_entity();
       ++document_.others[std::string(entity_.substr(0, 40))];
     }
+    if (code == "67" && whole(value) != 0 && (entity_ == "3DFACE" || entity_ == "POLYLINE")) {
+      // On the sheet, not in the model: an entity that nobody knows.
+      document_.bytes[static_cast<std::size_t>(entity_.data() - text_.data())] = std::byte{'~'};
+      ++document_.others["on a sheet (paper space)"];
+    }
     if (code == "70" && entity_ == "POLYLINE" && (whole(value) & kPolygonMesh) != 0)
       refuse(where_, "polygon meshes (POLYLINE with flag 16)",
              "explode them into faces before exporting, or export STL");

@@ -49,6 +49,12 @@ class Expander {
     for (pugi::xml_node node = parent.first_child(); node;) {
       if (++nodes_ > kMostNodes) fail("its nodes are used again and again, more than two million in all");
       const pugi::xml_node next = node.next_sibling();
+      if (!node.attribute("visible").as_bool(true)) {  // X3D 4
+        left_out.insert("hidden nodes");
+        parent.remove_child(node);
+        node = next;
+        continue;
+      }
       refuse(node);
       const std::string use = node.attribute("USE").value(), name = node.attribute("DEF").value();
       const pugi::xml_node shown = use.empty() ? node : copy_of(use, node);
@@ -73,6 +79,10 @@ class Expander {
       throw InputError(
           where_,
           "shows another file (Inline), which is not opened: put that into this one, or give it alone");
+    if (is_one_of(node, std::array<std::string_view, 2>{"Cylinder", "Cone"}))
+      throw InputError(
+          where_, fmt::format("holds a {}, which assimp does not close: export it as triangles, or as STL",
+                              node.name()));
     if (is_one_of(node, std::array<std::string_view, 3>{"ProtoInstance", "Collision", "Billboard"}))
       throw InputError(
           where_,

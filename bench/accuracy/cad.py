@@ -1,12 +1,12 @@
 #!/usr/bin/python3
 """STEP in, the same STEP out: bends parts by 20 % of their size and has gmsh mesh what is written. Writes docs/measurements/cad.md.
 
-    PATH=build/release/bin:$PATH bench/accuracy/cad.py [--parts ../shared/parts] [--held-out FOLDER] [-o FILE] [NAME ...]
+    PATH=build/release/bin:$PATH bench/accuracy/cad.py [--parts ../shared/parts] [--held-out FOLDER] [-o FILE] [--again] [NAME ...]
 
 Each part is cut into some 6,000 cells, held over 6 % of its longest side at one end, and moved across by 20 % of that side at the other.
 `flexel-map -o bent.step` writes its faces; gmsh meshes the part and the result with tetrahedra of one size. Volumes: by how much that of gmsh's mesh changed, and
 that of the mapped triangles (`flexel-map --report`). Seconds: flexel-map, reading and mapping included, two threads. With names only
-these parts run, which the page says. The held-out parts of the page as it stands: all STEP files under 1.5 MB in three public repositories on GitHub, TheRobotStudio/SO-ARM100,
+these parts run, which the page says; with --again the page keeps its rows of the others. The held-out parts of the page as it stands: all STEP files under 1.5 MB in three public repositories on GitHub, TheRobotStudio/SO-ARM100,
 tpaviot/pythonocc-demos and Kofferkulli/full-size-models, but for those in ../shared/parts; chosen before the first run.
 """
 
@@ -109,6 +109,8 @@ def measure(part, cwd):
 
 
 def line_of(row):
+    if "line" in row:
+        return row["line"]
     if "why" in row:
         row["why"] = re.sub(r"\S*/", "", row["why"])  # no folders
         return f"| {row['part']} | | | | | | | | | {row['why']} |"
@@ -116,6 +118,22 @@ def line_of(row):
     return (f"| {row['part']} | {row['solids']} | {row['faces']} ({row['kept']}) | {row['deviation']} | {1e3 * row['tolerance']:.3g} um | "
             f"{'yes' if row['valid'] else 'no'} | {row['gmsh']}{'' if row['gmsh_before'] == 'yes' else ' (the part itself: ' + row['gmsh_before'] + ')'} | "
             f"{percent('tets')} / {percent('triangles')} | {row['seconds']:.1f} s, x {row['size']:.1f} | {'; '.join(row['warnings'])} |")
+
+
+def row_of(line):
+    """The row that line_of() wrote, as far as page() needs it; its line stays as it is."""
+    cells = [cell.strip() for cell in line.strip().strip("|").split(" | ")]
+    row = {"part": cells[0], "line": line}
+    if len(cells) < 10 or not cells[1]:
+        return {**row, "why": cells[-1]}
+    row["valid"], row["gmsh"] = cells[5] == "yes", cells[6].split(" (the part")[0]
+    row["gmsh_before"] = "no" if "(the part itself" in cells[6] else "yes"
+    row["seconds"] = float(cells[8].split(" s")[0])
+    shares = [each.strip() for each in cells[7].split("/")]
+    row["triangles"] = float(shares[1].rstrip(" %")) / 100
+    if shares[0]:
+        row["tets"] = float(shares[0].rstrip(" %")) / 100
+    return row
 
 
 def page(rows, groups):
@@ -141,8 +159,13 @@ def main():
     parser.add_argument("--parts", type=pathlib.Path, default=ROOT / "../shared/parts")
     parser.add_argument("--held-out", type=pathlib.Path, help="parts that nothing was tuned to")
     parser.add_argument("-o", "--output", type=pathlib.Path, default=ROOT / "docs/measurements/cad.md")
+    parser.add_argument("--again", action="store_true", help="keep the rows of parts that are not named")
     parser.add_argument("names", nargs="*")
     arguments = parser.parse_args()
+    kept = {}
+    if arguments.again:
+        lines = [line for line in arguments.output.read_text().splitlines() if line.startswith("| ") and not line.startswith("| part ")]
+        kept = {row["part"]: row for row in map(row_of, lines)}
     groups = []
     for title, folder in (("Parts of ../shared/parts", arguments.parts), ("Held-out parts", arguments.held_out)):
         if folder is None or not folder.is_dir():
@@ -151,6 +174,8 @@ def main():
         rows = []
         for part in found:
             if arguments.names and part.name not in arguments.names:
+                if part.name in kept:
+                    rows.append(kept[part.name])
                 continue
             with tempfile.TemporaryDirectory() as scratch:
                 try:
@@ -159,7 +184,7 @@ def main():
                     rows.append({"part": part.name, "why": error.stderr.strip().splitlines()[-1]})
             print(line_of(rows[-1]), file=sys.stderr, flush=True)
         groups.append((title, rows))
-    if arguments.names:
+    if arguments.names and not arguments.again:
         groups = [(f"{title}, some of them", rows) for title, rows in groups]
     arguments.output.write_text(page([row for _, rows in groups for row in rows], groups))
 

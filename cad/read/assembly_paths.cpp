@@ -7,7 +7,7 @@
 #include <TopoDS_Iterator.hxx>
 #include <TopoDS_Shape.hxx>
 #include <algorithm>
-#include <map>
+#include <set>
 
 namespace flexel::cad {
 namespace {
@@ -27,6 +27,10 @@ std::string as_component(std::string name) {
   return name;
 }
 
+std::string assembly_of(const TopoDS_Shape& shape, const ShapeLabels& labels) {
+  return shape.ShapeType() < TopAbs_SOLID ? labels.assembly_name(shape) : "";
+}
+
 void walk(const TopoDS_Shape& shape, const std::string& path, const ShapeLabels& labels, int depth,
           std::vector<std::string>& paths) {
   if (shape.ShapeType() == TopAbs_SOLID) return paths.push_back(path);
@@ -34,14 +38,17 @@ void walk(const TopoDS_Shape& shape, const std::string& path, const ShapeLabels&
     for (TopExp_Explorer solids(shape, TopAbs_SOLID); solids.More(); solids.Next()) paths.push_back(path);
     return;
   }
-  std::map<std::string, int> uses;
+  std::set<std::string> names, taken;
+  for (TopoDS_Iterator member(shape); member.More(); member.Next())
+    names.insert(as_component(assembly_of(member.Value(), labels)));
   for (TopoDS_Iterator member(shape); member.More(); member.Next()) {
     const TopoDS_Shape& below = member.Value();
-    std::string name = below.ShapeType() < TopAbs_SOLID ? labels.assembly_name(below) : "";
+    const std::string own = assembly_of(below, labels);
     std::string inner = path;
-    if (!name.empty() && !is_part(below, name, labels)) {
-      name = as_component(name);
-      if (const int use = ++uses[name]; use > 1) name += fmt::format("-{}", use);
+    if (!own.empty() && !is_part(below, own, labels)) {
+      std::string name = as_component(own);
+      for (int use = 2; (use > 2 && names.count(name) > 0) || !taken.insert(name).second; ++use)
+        name = fmt::format("{}-{}", as_component(own), use);
       inner += (path.empty() ? "" : "/") + name;
     }
     walk(below, inner, labels, depth + 1, paths);

@@ -10,7 +10,7 @@ namespace flexel {
 namespace {
 
 bool has_mark(std::string_view text, std::size_t format) {
-  if (assimp_formats()[format].name == "amf" && first_zip_entry(text).ends_with(".amf")) return true;
+  if (assimp_formats()[format].name == "amf" && is_amf_name(first_zip_entry(text))) return true;
   const FormatMark mark = assimp_mark(format);
   if (mark.bytes.empty()) return false;
   if (!mark.in_xml) return text.starts_with(mark.bytes);

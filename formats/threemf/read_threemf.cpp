@@ -164,8 +164,8 @@ class ThreeMfReader {
 
 Evidence sniff_3mf(const ImportInput& input) {
   const std::string_view text = beginning(input);
-  return text.starts_with("PK\x03\x04") && !first_zip_entry(text).ends_with(".amf") ? Evidence::magic
-                                                                                    : Evidence::none;
+  return text.starts_with("PK\x03\x04") && !is_amf_name(first_zip_entry(text)) ? Evidence::magic
+                                                                               : Evidence::none;
 }
 
 Surface read_3mf(ImportInput& input, const ImportOptions& options) {

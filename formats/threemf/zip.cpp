@@ -121,6 +121,10 @@ void append_name(Bytes& to, const std::string& name) {
 
 }  // namespace
 
+bool is_amf_name(std::string_view name) {
+  return lower(std::string(name)).ends_with(".amf");
+}
+
 std::string_view first_zip_entry(std::string_view beginning) {
   constexpr std::size_t kNameLength = 26;
   if (beginning.size() < kLocalSize || !beginning.starts_with("PK\x03\x04")) return {};

@@ -24,6 +24,9 @@ struct ZipEntry {
 // The name of the file that an archive begins with, by its first bytes; "" where they are none of an archive.
 [[nodiscard]] std::string_view first_zip_entry(std::string_view beginning);
 
+// Whether a file in an archive is AMF, by its name.
+[[nodiscard]] bool is_amf_name(std::string_view name);
+
 class ZipArchive {
  public:
   // The bytes must outlive this. Throws InputError: no ZIP archive, damaged, cut off.

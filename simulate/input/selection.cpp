@@ -256,6 +256,12 @@ Selected resolve_name(const Selection& selection, const Body& body) {
   std::optional<std::uint32_t> part = part_named(body, name);
   if (!part && whole.by == Word::By::file) part = part_named(body, whole.text);
   if (part) {
+    if (whole.by == Word::By::either && !parts_at(body, name).empty())
+      throw InputError(
+          selection.origin,
+          fmt::format("\"{0}\" means two things: a part and an assembly; write \"={0}\" for the part, "
+                      "the parts one by one for the assembly",
+                      name));
     if (side_of(name))
       throw InputError(selection.origin,
                        fmt::format("\"{0}\" means two things: a part and a side; write \"={0}\" "
@@ -284,9 +290,14 @@ Selected resolve_name(const Selection& selection, const Body& body) {
                       name));
     if (!of_parts.empty()) found = of_parts;
   }
-  if (found.empty())
-    if (std::vector<std::uint32_t> elements = elements_at(body, name); !elements.empty())
-      return {{}, elements};
+  const std::vector<std::uint32_t> elements = elements_at(body, name);
+  if (!found.empty() && !elements.empty())
+    throw InputError(
+        selection.origin,
+        fmt::format("\"{}\" means two things: an assembly or part, and a side, face or group; \"#\" or \"=\" "
+                    "before its last word takes the second, the parts one by one make the first",
+                    name));
+  if (!elements.empty()) return {{}, elements};
   if (found.empty()) unknown_name(selection, body);
   return {found, {}};
 }

@@ -116,5 +116,19 @@ TEST(AssemblyPaths, ASecondUseOfANameHasANumber) {
   for (std::size_t p = 0; p < paths.size(); ++p) EXPECT_EQ(mesh.surface.parts[p].assembly, paths[p]);
 }
 
+TEST(AssemblyPaths, ANumberIsNoSiblingsName) {
+  const CadTree tree = assembly("MM", "");
+  CadNode outer, named = tree.roots[0];
+  outer.name = "machine";
+  named.name = "pair-2";
+  outer.children = {tree.roots[0], tree.roots[0], named};
+  CadTree whole = tree;
+  whole.roots = {outer};
+  const std::vector<std::string> paths =
+      assembly_paths(read_shape(job_of(write_tree({whole}, "step"), "step"), nullptr));
+  EXPECT_EQ(paths, (std::vector<std::string>{"machine/pair", "machine/pair", "machine/pair-3",
+                                             "machine/pair-3", "machine/pair-2", "machine/pair-2"}));
+}
+
 }  // namespace
 }  // namespace flexel::cad

@@ -278,6 +278,28 @@ TEST(ImportAssimp, X3dIsReadOnAfterAGroupThatIsUsedAgainOrEmpty) {
   EXPECT_THAT(import_error(scratch.write("c.x3d", x3d("", 1, groups))), HasSubstr("more than two million"));
 }
 
+TEST(ImportAmf, InstancesAreScaledMirroredAndHidden) {
+  const Scratch scratch;
+  const Surface scaled = import_surface(scratch.write(
+      "a.amf", replaced(amf(), "<rz>90</rz>", "<scale>2</scale><scalex>3</scalex><mirrory>1</mirrory>")));
+  Surface wanted = wedge_surface(false);
+  for (Vec3& at : wanted.vertices) at = 1e-3 * Vec3(100, 20, 30) + Vec3(6 * at.x(), -2 * at.y(), 2 * at.z());
+  for (std::size_t c = 0; c < wanted.polygon_vertices.size(); c += 3)
+    std::swap(wanted.polygon_vertices[c + 1], wanted.polygon_vertices[c + 2]);
+  EXPECT_EQ(triangles_of(scaled, 1), triangles_of(wanted, 0));
+  std::vector<std::string> lines;
+  ImportOptions options;
+  options.warn = [&](const std::string& line) { lines.push_back(line); };
+  EXPECT_EQ(import_surface(scratch.write("b.amf", replaced(amf(), "<rz>90</rz>", "<printable>0</printable>")),
+                           options)
+                .parts.size(),
+            1u);
+  ASSERT_EQ(lines.size(), 1u);
+  EXPECT_THAT(lines[0], HasSubstr("not to be printed"));
+  EXPECT_THAT(import_error(scratch.write("c.amf", replaced(amf(), "<rz>90</rz>", "<shear>1</shear>"))),
+              HasSubstr("<shear>"));
+}
+
 TEST(ImportAmf, EveryVolumeIsAPart) {
   const Scratch scratch;
   std::string twice = replaced(
@@ -334,6 +356,9 @@ TEST(ImportAssimp, X3dSwitchesUnitsAndColours) {
   EXPECT_EQ(parts(R"(<Switch whichChoice="1"><Group/>)" + shape + "</Switch>"), 2u);
   EXPECT_EQ(parts("<Switch>" + shape + "</Switch>"), 1u);
   EXPECT_EQ(parts("<LOD>" + shape + shape + "</LOD>"), 2u);
+  EXPECT_EQ(parts(R"(<Group visible="false">)" + shape + "</Group>"), 1u);
+  EXPECT_THAT(import_error(scratch.write("e.x3d", x3d("", 1, "<Shape><Cone/></Shape>"))),
+              HasSubstr("holds a Cone"));
   EXPECT_THAT(
       import_error(scratch.write(
           "b.x3d",
@@ -362,6 +387,10 @@ TEST(ImportAssimp, DxfFacesWithInvisibleEdgesAreReadAndACutFileIsNot) {
   const Surface surface = import_surface(scratch.write("a.dxf", mesh));
   EXPECT_EQ(triangles_of(surface, 0), triangles_of(wedge_surface(false), 0));
   EXPECT_THAT(import_error(scratch.write("b.dxf", replaced(mesh, "0\nEOF\n", ""))), HasSubstr("is cut off"));
+  const std::string sheet = dxf_face("sheet", {Vec3(0, 0, 0), Vec3(900, 0, 0), Vec3(0, 900, 0)}) + "67\n1\n";
+  EXPECT_EQ(import_surface(scratch.write("d.dxf", replaced(mesh, "0\nPOLYLINE\n", sheet + "0\nPOLYLINE\n")))
+                .polygon_count(),
+            8u);
   EXPECT_THAT(import_error(scratch.write("c.dxf", dxf(99))), HasSubstr("unit number 99"));
 }
 

@@ -35,6 +35,15 @@ std::size_t elements(const Body& body, const char* name) {
   return resolve(select_by_name(name), body).elements.size();
 }
 
+std::string why(const Body& body, const char* name) {
+  try {
+    static_cast<void>(resolve(select_by_name(name), body));
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
 TEST(Selection, AnAssemblyIsAllItsParts) {
   const Body body = machine();
   const std::size_t one = elements(body, "bolt");
@@ -57,13 +66,17 @@ TEST(Selection, AWordAfterAPathIsAFaceOrASide) {
   EXPECT_TRUE(side_axis(select_by_name("machine/zmin"), body).has_value());
 }
 
-std::string why(const Body& body, const char* name) {
-  try {
-    static_cast<void>(resolve(select_by_name(name), body));
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+TEST(Selection, ANameOfTwoThingsIsRefused) {
+  Body body = machine();
+  body.surface.parts[2].assembly = "bolt";  // an assembly called as a part is
+  EXPECT_THAT(why(body, "bolt"), HasSubstr("a part and an assembly; write \"=bolt\""));
+  EXPECT_EQ(elements(body, "=bolt"), 12u);
+  body.surface.faces[0].name = "joint";  // a face called as an assembly is
+  EXPECT_THAT(why(body, "joint"), HasSubstr("an assembly or part, and a side, face or group"));
+  EXPECT_THAT(why(body, "machine/joint"), HasSubstr("means two things"));
+  EXPECT_EQ(resolve(select_by_name("=joint"), body).polygons.size(), 1u);
+  body.surface.parts[2].assembly = "xmin";
+  EXPECT_THAT(why(body, "xmin"), HasSubstr("means two things"));
 }
 
 TEST(Selection, WhatAnAssemblyDoesNotHaveIsToldWithWhatItHas) {
