@@ -21,8 +21,8 @@
 namespace flexel::meshes {
 namespace {
 
-constexpr std::size_t kMostUses = 100'000;
-constexpr int kDeepest = 64;
+constexpr std::size_t kMostInstances = 100'000;
+constexpr int kDeepestConstellation = 64;
 
 std::string short_text(std::string_view text) {
   return clean_name(text.substr(0, 60));
@@ -43,7 +43,7 @@ double number_in(const pugi::xml_node& parent, const char* name, double otherwis
 }
 
 // "feet" and "microns" are what programs write too; mm where nothing is said.
-double unit_of(const pugi::xml_node& amf, const std::string& where) {
+double amf_unit(const pugi::xml_node& amf, const std::string& where) {
   constexpr std::pair<std::string_view, double> kUnits[] = {
       {"", 1e-3},       {"millimeter", 1e-3}, {"inch", 0.0254}, {"feet", 0.3048},
       {"foot", 0.3048}, {"meter", 1},         {"micron", 1e-6}, {"micrometer", 1e-6}};
@@ -77,7 +77,7 @@ class AmfReader {
         show(node, Eigen::Affine3d::Identity(), 0);
     }
     if (shown_.size() < constellations_.size()) fail("its constellations contain one another");
-    return mesh_.finish(unit_of(amf_, where_));
+    return mesh_.finish(amf_unit(amf_, where_));
   }
 
   bool curved = false, vertex_colors = false, hidden = false, support = false;  // there were such
@@ -128,7 +128,7 @@ class AmfReader {
   void show(const pugi::xml_node& constellation, const Eigen::Affine3d& above, int depth) {
     shown_.insert(constellation.attribute("id").value());
     for (const pugi::xml_node& instance : constellation.children("instance")) {
-      if (depth > kDeepest || ++uses_ > kMostUses)
+      if (depth > kDeepestConstellation || ++uses_ > kMostInstances)
         fail("its constellations contain one another, or show more than 100,000 objects");
       const std::string id = instance.attribute("objectid").value();
       check_instance(instance);

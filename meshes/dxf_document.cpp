@@ -29,7 +29,7 @@ int whole(std::string_view text) {
 }
 
 // Of $INSUNITS; 0: not said.
-double unit_of(int code, const std::string& where) {
+double dxf_unit(int code, const std::string& where) {
   constexpr double kInch = 0.0254, kFoot = 0.3048;
   constexpr std::pair<int, double> kUnits[] = {
       {0, 0},          {1, kInch},  {2, kFoot}, {3, 5280 * kFoot},  {4, 1e-3},
@@ -59,7 +59,7 @@ class DxfScanner {
       if (code == "0" && value == "ENDSEC") section_ = "";
       if (code == "2" && entity_ == "SECTION") section_ = value;
       if (section_ == "HEADER" && variable_ == "$INSUNITS" && code == "70")
-        document_.unit = unit_of(whole(value), where_);
+        document_.unit = dxf_unit(whole(value), where_);
       if (section_ == "ENTITIES") look_at(code, value);
     }
     if (!ended) throw InputError(where_, "is cut off: DXF ends with EOF, and this does not");

@@ -18,7 +18,7 @@ namespace flexel::meshes {
 namespace {
 
 constexpr std::size_t kMostNodes = 2'000'000;
-constexpr int kDeepest = 200;
+constexpr int kDeepestNode = 200;
 
 template <std::size_t kCount>
 bool is_one_of(const pugi::xml_node& node, const std::array<std::string_view, kCount>& names) {
@@ -45,7 +45,7 @@ class Expander {
 
   // Works on the children of a node, in the order of the file.
   void expand(pugi::xml_node parent, int depth) {
-    if (depth > kDeepest) fail("its nodes lie in one another more than 200 deep");
+    if (depth > kDeepestNode) fail("its nodes lie in one another more than 200 deep");
     for (pugi::xml_node node = parent.first_child(); node;) {
       if (++nodes_ > kMostNodes) fail("its nodes are used again and again, more than two million in all");
       const pugi::xml_node next = node.next_sibling();
@@ -137,7 +137,7 @@ class Expander {
 };
 
 // <unit category="length" conversionFactor="0.001"/>; metres where nothing is said.
-double unit_of(const pugi::xml_node& head, const std::string& where) {
+double x3d_unit(const pugi::xml_node& head, const std::string& where) {
   double metres = 1;
   for (const pugi::xml_node& unit : head.children("unit")) {
     const std::string_view category = unit.attribute("category").value();
@@ -162,7 +162,7 @@ X3dDocument x3d_document(const Bytes& bytes, const std::string& where) {
     throw InputError(where, fmt::format("is damaged: its XML does not parse ({})", parsed.description()));
   const pugi::xml_node x3d = document.child("X3D");
   X3dDocument result;
-  result.unit = unit_of(x3d.child("head"), where);
+  result.unit = x3d_unit(x3d.child("head"), where);
   Expander expander(where);
   expander.expand(x3d.child("Scene"), 0);
   result.shapes = expander.shapes;
