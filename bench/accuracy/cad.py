@@ -93,9 +93,9 @@ def measure(part, cwd):
     if code != 0:
         return {**row, "why": said.strip().splitlines()[-1]}
     row["warnings"] = [line.split("warning: ")[1] for line in said.splitlines() if "warning: " in line]
-    told = re.search(r"STEP: (\d+) solids? of (\d+) faces?, (?:all|(\d+)) as before(?:, moved|, the others within (\S+ \S+) of the deformation.*); (.*)", said)
-    row["solids"], row["faces"] = int(told[1]), int(told[2])
-    row["kept"], row["deviation"] = int(told[3] or told[2]), told[4] or "none"
+    told = re.search(r"STEP: ([\d,]+) solids? of ([\d,]+) faces?, (?:all|([\d,]+)) as before(?:, moved|, the others within (\S+ \S+) of the deformation.*); (.*)", said)
+    row["solids"], row["faces"], row["kept"] = (int(each.replace(",", "")) for each in (told[1], told[2], told[3] or told[2]))
+    row["deviation"] = told[4] or "none"
     row["valid"], row["tolerance"] = told[5].startswith("valid"), 1e-4 * diagonal
     row["size"] = (cwd / "bent.step").stat().st_size / part.stat().st_size
     quality = json.loads((cwd / "report.json").read_text())
