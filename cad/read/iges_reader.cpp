@@ -107,7 +107,8 @@ CadShape read_entities(const std::string& path, const CadReadJob& job) {
     const auto found = names.find(item.TShape().get());
     return found == names.end() ? std::string() : found->second;
   };
-  return {std::make_shared<TopoDS_Shape>(shape), kMillimetre,
+  return {std::make_shared<TopoDS_Shape>(shape),
+          kMillimetre,
           {name, name, [](const TopoDS_Shape&) { return std::string(); },
            [](const TopoDS_Shape&) { return std::nullopt; }}};
 }
