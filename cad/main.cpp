@@ -56,20 +56,15 @@ template <class Result, class Work>
 Bytes answer(std::size_t threads, const Work& work) {
   OSD_Parallel::SetUseOcctThreads(Standard_True);
   OSD_ThreadPool::DefaultPool(static_cast<int>(threads_that_start(threads)));
-  JobAnswer<Result> found;
-  try {
-    found.result = work([&](const std::string& line) { found.warnings.push_back(line); });
-  } catch (const InputError& error) {
-    found.refused = true;
-    found.where = error.where();
-    found.why = error.what();
-  } catch (const Standard_OutOfMemory&) {
-    end_without_memory();
-  } catch (const Standard_Failure& failure) {
-    found.refused = true;
-    found.why = damage_message(failure.GetMessageString() ? failure.GetMessageString() : "no reason");
-  }
-  return pack(found);
+  return pack(answer_of<Result>([&](const Warn& warn) -> Result {
+    try {
+      return work(warn);
+    } catch (const Standard_OutOfMemory&) {
+      end_without_memory();
+    } catch (const Standard_Failure& failure) {
+      throw InputError(damage_message(failure.GetMessageString() ? failure.GetMessageString() : "no reason"));
+    }
+  }));
 }
 
 Bytes do_job(const CadJob& job) {

@@ -65,7 +65,9 @@ class AmfReader {
     }
     for (const pugi::xml_node& material : amf.children("material"))
       materials_[material.attribute("id").value()] = color_of(material);
-  }  // Constellations that no other shows, and objects that none does, in the order of the file.
+  }
+
+  // Constellations that no other shows, and objects that none does, in the order of the file.
   ForeignMesh read() {
     for (const auto& [id, object] : objects_)
       if (constellations_.count(id) > 0)
@@ -103,7 +105,8 @@ class AmfReader {
     const auto value = [&](const char* name) { return number_in(instance, name, 0, where_); };
     const auto turn = [&](const char* name, const Vec3& axis) {
       return Eigen::AngleAxisd(value(name) * std::numbers::pi / 180, axis);
-    };  // What slicers write beside the standard, applied first: scale, then mirror.
+    };
+    // What slicers write beside the standard, applied first: scale, then mirror.
     const auto size = [&](const char* name) { return number_in(instance, name, 1, where_); };
     const auto sign = [&](const char* name) { return value(name) != 0 ? -1.0 : 1.0; };
     const Vec3 scale =
@@ -125,6 +128,7 @@ class AmfReader {
             where_, fmt::format("an instance has <{}>, which is not known here: export it without, or as STL",
                                 short_text(each.name())));
   }
+
   void show(const pugi::xml_node& constellation, const Eigen::Affine3d& above, int depth) {
     shown_.insert(constellation.attribute("id").value());
     for (const pugi::xml_node& instance : constellation.children("instance")) {
@@ -168,6 +172,7 @@ class AmfReader {
         add_volume(volume, transform, vertices, color, name_of(object));
     }
   }
+
   void add_volume(const pugi::xml_node& volume, const Eigen::Affine3d& transform,
                   const std::vector<Vec3>& vertices, std::optional<Rgba> color,
                   const std::string& object_name) {

@@ -1,13 +1,8 @@
 // AMF (ISO/ASTM 52915), plain or in a ZIP archive.
 #pragma once
-#include <functional>
-#include <string>
-
 #include "formats/common/mesh_job.h"
 
 namespace flexel::meshes {
-
-using Warn = std::function<void(const std::string&)>;
 
 // Every volume of every object that a constellation shows, or that none does, is a part. Not by assimp, whose release 5.2
 // drops all volumes of an object but the first, and takes the turns of an instance for displacements. Curved edges are

@@ -170,6 +170,7 @@ class AssimpReader {
     bones_ = bones_ || mesh.HasBones();
     morphs_ = morphs_ || mesh.mNumAnimMeshes > 0;
     mesh_.begin_group(material == nullptr ? "" : material->GetName().C_Str());
+    const bool own_colors = mesh.HasVertexColors(0) && !is_blank(mesh);
     bool any = false;
     for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
       const aiFace& face = mesh.mFaces[f];
@@ -179,7 +180,7 @@ class AssimpReader {
       }
       for (unsigned c = 0; c < face.mNumIndices; ++c)
         add_corner(mesh, face.mIndices[mirrored ? face.mNumIndices - 1 - c : c], transform);
-      mesh_.end_polygon(color_of(mesh, face, material));
+      mesh_.end_polygon(own_colors ? color_of(mesh, face) : color_of(material));
       any = true;
     }
     shown_ += any ? 1 : 0;
@@ -195,20 +196,23 @@ class AssimpReader {
                      transform.topRightCorner<3, 1>());
   }
 
-  // That of the corners, their mean, or the material's.
-  std::optional<Rgba> color_of(const aiMesh& mesh, const aiFace& face, const aiMaterial* material) {
+  // The mean of the corners'.
+  Rgba color_of(const aiMesh& mesh, const aiFace& face) {
     aiColor4D color(0, 0, 0, 0);
-    if (mesh.HasVertexColors(0) && !is_blank(mesh)) {
-      const aiColor4D first = mesh.mColors[0][face.mIndices[0]];
-      for (unsigned c = 0; c < face.mNumIndices; ++c) {
-        color += mesh.mColors[0][face.mIndices[c]];
-        colors_within_ = colors_within_ || mesh.mColors[0][face.mIndices[c]] != first;
-      }
-      color = color * (1 / static_cast<float>(face.mNumIndices));
-    } else if (material == nullptr || material->GetName() == aiString(AI_DEFAULT_MATERIAL_NAME) ||
-               material->Get(AI_MATKEY_COLOR_DIFFUSE, color) != aiReturn_SUCCESS) {
-      return std::nullopt;
+    const aiColor4D first = mesh.mColors[0][face.mIndices[0]];
+    for (unsigned c = 0; c < face.mNumIndices; ++c) {
+      color += mesh.mColors[0][face.mIndices[c]];
+      colors_within_ = colors_within_ || mesh.mColors[0][face.mIndices[c]] != first;
     }
+    color = color * (1 / static_cast<float>(face.mNumIndices));
+    return Rgba{color.r, color.g, color.b, color.a};
+  }
+
+  static std::optional<Rgba> color_of(const aiMaterial* material) {
+    aiColor4D color(0, 0, 0, 0);
+    if (material == nullptr || material->GetName() == aiString(AI_DEFAULT_MATERIAL_NAME) ||
+        material->Get(AI_MATKEY_COLOR_DIFFUSE, color) != aiReturn_SUCCESS)
+      return std::nullopt;
     return Rgba{color.r, color.g, color.b, color.a};
   }
 

@@ -1,13 +1,8 @@
 // Meshes of the formats that the Open Asset Import Library (assimp) reads.
 #pragma once
-#include <functional>
-#include <string>
-
 #include "formats/common/mesh_job.h"
 
 namespace flexel::meshes {
-
-using Warn = std::function<void(const std::string&)>;
 
 // Every use of a mesh in the scene is a part, in the file's own axes, in the pose of its mesh; equal positions of a part are
 // one vertex. What is left out is told in one line. Throws InputError: assimp cannot read it; it shows no polygons.

@@ -1,10 +1,8 @@
-// flexel-meshes: reads meshes, and writes OpenVDB files, with libraries that take long to load, and may crash, loop or take all memory over a damaged file. A job on stdin,
-// its answer on stdout (formats/common/mesh_job.h); the other programs start it, and limit its time and memory.
+// flexel-meshes: reads meshes, and writes OpenVDB files, with libraries that take long to load, and may crash, loop or take
+// all memory over a damaged file. A job on stdin, its answer on stdout (formats/common/mesh_job.h); the other programs
+// start it, and limit its time and memory.
 #include <unistd.h>
 
-#include <exception>
-
-#include "base/error.h"
 #include "formats/common/mesh_job.h"
 #include "formats/lattice/body_file.h"
 #include "meshes/amf_reader.h"
@@ -21,31 +19,18 @@ ForeignMesh read(const MeshReadJob& job, const Warn& warn) {
   return read_with_assimp(job, warn);
 }
 
-template <class Result, class Work>
-Bytes answer(const Work& work) {
-  JobAnswer<Result> found;
-  try {
-    found.result = work([&](const std::string& line) { found.warnings.push_back(line); });
-  } catch (const InputError& error) {
-    found.refused = true;
-    found.where = error.where();
-    found.why = error.what();
-  }
-  return pack(found);
-}
-
 Bytes do_job(const Bytes& bytes) {
   const MeshJob job = unpack_mesh_job(bytes);
   if (job.write)
-    return answer<VdbFile>(
-        [&](const Warn&) { return VdbFile{vdb_of(read_body(job.write->body, "the body"))}; });
-  return answer<ForeignMesh>([&](const Warn& warn) { return read(*job.read, warn); });
+    return pack(answer_of<VdbFile>(
+        [&](const Warn&) { return VdbFile{vdb_of(read_body(job.write->body, "the body"))}; }));
+  return pack(answer_of<ForeignMesh>([&](const Warn& warn) { return read(*job.read, warn); }));
 }
 
 }  // namespace
 }  // namespace flexel::meshes
 
 int main() {
-  _exit(flexel::serve_job(
-      "flexel-meshes", flexel::meshes::do_job));  // what the libraries would tidy up is gone with the process
+  // What the libraries would tidy up is gone with the process.
+  _exit(flexel::serve_job("flexel-meshes", flexel::meshes::do_job));
 }

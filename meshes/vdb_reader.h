@@ -1,13 +1,8 @@
 // Level sets of OpenVDB files (.vdb).
 #pragma once
-#include <functional>
-#include <string>
-
 #include "formats/common/mesh_job.h"
 
 namespace flexel::meshes {
-
-using Warn = std::function<void(const std::string&)>;
 
 // Every level set of the file is a part: the surface where the distance is 0, as quadrilaterals of about a voxel (OpenVDB's
 // volumeToMesh: dual contouring), in the coordinates of the grid's transform. Grids of other classes are left out, which is

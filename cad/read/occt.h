@@ -14,8 +14,6 @@ class TopoDS_Shape;
 namespace flexel::cad {
 
 using ShapeColor = std::array<double, 3>;  // red, green, blue in [0, 1], as the file has them
-using Warn = std::function<void(const std::string&)>;
-
 // What a file says of its solids and faces. Owns what it needs.
 struct ShapeLabels {
   std::function<std::string(const TopoDS_Shape& solid)> solid_name;

@@ -14,6 +14,8 @@
 
 namespace flexel {
 
+using Warn = std::function<void(const std::string&)>;
+
 struct ForeignProgram {
   const char* name;     // "flexel-cad"
   const char* foreign;  // for messages: "OpenCASCADE"
@@ -106,15 +108,28 @@ struct JobWords {
 
 // Passes on what the answer says: calls `warn`, throws its InputError.
 template <class Result>
-[[nodiscard]] Result result_of(JobAnswer<Result> answer, const std::string& where,
-                               const std::function<void(const std::string&)>& warn) {
+[[nodiscard]] Result result_of(JobAnswer<Result> answer, const std::string& where, const Warn& warn) {
   if (warn)
     for (const std::string& line : answer.warnings) warn(line);
   if (answer.refused) throw InputError(answer.where.empty() ? where : answer.where, answer.why);
   return std::move(answer.result);
 }
 
-// In the other program: reads the job, writes what `work` makes of it, and returns the exit status (ChildCode). Stdout is
+// In the other program: what `work` makes of the job with somewhere to warn, or its InputError.
+template <class Result, class Work>
+[[nodiscard]] JobAnswer<Result> answer_of(const Work& work) {
+  JobAnswer<Result> answer;
+  try {
+    answer.result = work([&](const std::string& line) { answer.warnings.push_back(line); });
+  } catch (const InputError& error) {
+    answer.refused = true;
+    answer.where = error.where();
+    answer.why = error.what();
+  }
+  return answer;
+}
+
+// There too: reads the job, writes what `work` makes of it, and returns the exit status (ChildCode). Stdout is
 // the answer's alone: what a library prints there is dropped.
 [[nodiscard]] int serve_job(const char* program, const std::function<Bytes(const Bytes& job)>& work);
 
