@@ -98,7 +98,7 @@ double ContactFriction::extension(std::size_t pair) const {
 // range, so that a body that rests under little pressure does not sway.
 double ContactFriction::secant_stiffness(std::size_t pair) const {
   const PairState& now = states_[pair];
-  return std::max(now.pressure > 0 ? now.pressure / -now.gap : 0, now.weight);
+  return std::max(now.share < 1 ? 0 : now.pressure / -now.gap, now.weight);
 }
 
 // N, along the surface, at which a pair slides: mu N and the traction of adhesion, less as it is extended.
@@ -117,8 +117,8 @@ Vec3 ContactFriction::force(std::size_t pair) const {
   if (!(now.pressure > 0) && !sticks) return Vec3::Zero();
   const ContactPair& of = list_.pairs()[pair];
   const double stiffness = secant_stiffness(pair);
-  // share of the dashpot: as the contact's stiffness, less where the law begins softly
-  const double share = sticks ? 1 : std::min(-now.gap / of.properties.constants.law.soft, 1.0);
+  // the dashpot is as the contact's stiffness, less where the law begins softly
+  const double share = sticks ? 1 : now.share;
   const Vec3 velocity = damping_ > 0 ? relative_velocity(of) : Vec3(Vec3::Zero());
   const double separating = velocity.dot(now.normal);
   double along = -damping_ * now.stiffness * share * separating - stiffness * extension(pair);

@@ -8,6 +8,7 @@ namespace flexel::simulate {
 namespace {
 
 constexpr double kHardeningAhead = 1.3;              // growth of hardening until the next check
+constexpr double kRigidSafety = 4;  // of rigid parts, whose whole impact is one oscillation
 constexpr double kTravel = 0.12, kMostTravel = 0.2;  // spacings a step: asked for, and allowed
 
 // omega^2 that bounds the step like a dashpot of tau beside a stiffness of omega^2 (time/stability.h).
@@ -57,7 +58,7 @@ double ContactStepBound::stiffness_bound() const {
     if (!pair.of_plane()) add_row(pair.j, lever, stiffness, elements, parts);
   }
   double largest = 0;
-  for (const double part : parts) largest = std::max(largest, part);
+  for (const double part : parts) largest = std::max(largest, kRigidSafety * part);
   for (const std::uint32_t e : surface_.elements())
     largest = std::max(largest, elements[e] / surface_.mass(e));
   return damped(largest, settings_.damping);

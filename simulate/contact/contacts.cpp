@@ -58,6 +58,11 @@ void Contacts::add_dissipative_forces(const State& state, std::vector<Vec3>& for
 
 void Contacts::finish_step(const State& state, double drift) {
   update(state);
+  states_.finish_step(state, drift);
+}
+
+void Contacts::finish_losses(const State& state, double drift) {
+  update(state);
   friction_.finish_step(state, drift, dissipate());
 }
 

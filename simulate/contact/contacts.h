@@ -26,8 +26,9 @@ class Contacts {
   void add_forces(const State& state, std::vector<Vec3>& forces);
   // Of friction, damping and adhesion.
   void add_dissipative_forces(const State& state, std::vector<Vec3>& forces);
-  // After a step of `drift` s that led to `state`: slip and adhesion.
+  // After a step of `drift` s that led to `state`: how softly contact begins; slip and adhesion.
   void finish_step(const State& state, double drift);
+  void finish_losses(const State& state, double drift);
   // J, that the release of initial penetrations has put in since this was asked last.
   [[nodiscard]] double injected_energy(const State& state);
 

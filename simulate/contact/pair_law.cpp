@@ -56,7 +56,8 @@ PairState pair_state(const ContactSide& i, const ContactSide& j, const PairConst
   now.weight = pair.stiffness * k.value * facing.value;
   const NormalLaw::Value law = pair.law.at(-now.gap);
   now.stiffness = now.weight * law.stiffness;
-  if (!(now.gap < 0)) return now;
+  if (!(law.pressure > 0)) return now;
+  now.share = pair.law.share(-now.gap);
   now.energy = now.weight * law.energy;
   now.pressure = now.weight * law.pressure;
   const double spread = -2 * pair.stiffness * k.slope * facing.value * law.energy;  // N/m, of t

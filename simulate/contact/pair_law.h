@@ -13,31 +13,49 @@
 // other meet. U depends on the elements through x and n; its whole derivative is taken, the normals' too, and
 // so forces and moments on the two sides balance to rounding.
 //
-// psi' = p: soft over the first hundredth of a cell (an impact then begins smoothly from step to step),
-// linear, and hard where the sphere under the surface would be squeezed by half:
-//     p = delta^2 / (2 delta_0) below delta_0, delta - delta_0 / 2 above it;  + delta^3 / delta_h^2
+// psi' = p: soft over the first hundredth of a cell, linear, and hard where the sphere under the surface would
+// be squeezed by half, delta = s - g with
+//     p = delta^2 / (2 delta_0) below delta_0, delta - delta_0 / 2 above it;  + max(-g, 0)^3 / delta_h^2
+// delta_0 is a hundredth of a cell, or the way of two steps at the speed of an impact (PairRecord::soft): steps
+// that jump over the soft part would give energy or take it, by as much as (omega dt)^2 / 6 of that of the
+// impact. s is half of what delta_0 exceeds that hundredth by: what follows the soft part stays where it was,
+// and so does the mean force of an impact.
 #pragma once
+#include <algorithm>
+
 #include "simulate/contact/points/contact_points.h"
 
 namespace flexel::simulate {
 
 struct NormalLaw {
   double soft = 0, hard = 0;  // m, delta_0 and delta_h
+  double ahead = 0;           // m, s: pressure begins before the surfaces touch
   struct Value {
     double energy = 0, pressure = 0, stiffness = 0;  // psi [m^2], p [m], p' (the largest up to here)
   };
+  // `depth` [m]: -g.
   [[nodiscard]] Value at(double depth) const {
-    if (!(depth > 0)) return {0, 0, 1};
-    const double hardening = depth * depth / (hard * hard);
-    Value value{0.25 * hardening * depth * depth, hardening * depth, 1 + 3 * hardening};
-    if (depth < soft) {
-      value.energy += depth * depth * depth / (6 * soft);
-      value.pressure += depth * depth / (2 * soft);
+    Value value{0, 0, 1};
+    if (depth > 0) {
+      const double hardening = depth * depth / (hard * hard);
+      value = {0.25 * hardening * depth * depth, hardening * depth, 1 + 3 * hardening};
+    }
+    const double delta = depth + ahead;
+    if (!(delta > 0)) return value;
+    if (delta < soft) {
+      value.energy += delta * delta * delta / (6 * soft);
+      value.pressure += delta * delta / (2 * soft);
     } else {
-      value.energy += 0.5 * depth * (depth - soft) + soft * soft / 6;
-      value.pressure += depth - 0.5 * soft;
+      value.energy += 0.5 * delta * (delta - soft) + soft * soft / 6;
+      value.pressure += delta - 0.5 * soft;
     }
     return value;
+  }
+  // Of the linear range's slope, that of the soft part.
+  [[nodiscard]] double share(double depth) const { return std::clamp((depth + ahead) / soft, 0.0, 1.0); }
+  // With a soft part of `wider` [m], at least its own.
+  [[nodiscard]] NormalLaw softened(double wider) const {
+    return wider > soft ? NormalLaw{wider, hard, 0.5 * (wider - soft)} : *this;
   }
 };
 
@@ -58,6 +76,7 @@ struct PairState {
   double energy = 0;     // J
   double pressure = 0;   // N, magnitude of the force along the normal
   double stiffness = 0;  // N/m
+  double share = 0;      // of the soft part: its slope in that of the linear range
   Vec3 normal = Vec3::Zero();
   Vec3 offset = Vec3::Zero();                               // t
   Vec3 force = Vec3::Zero();                                // N, on j; minus it on i

@@ -31,7 +31,8 @@ bool PairList::update(const State& state) {
   return true;
 }
 
-// Half the diagonal of the box of the moves since the list was made bounds them but for a common one.
+// Half the diagonal of the box of the moves since the list was made bounds them but for a common one. The next
+// step's are among them: the length of a step is chosen before it leads to an impact.
 bool PairList::is_due(const State& state) const {
   struct Moves : Box {
     Moves& operator+=(const Box& other) {
@@ -43,7 +44,9 @@ bool PairList::is_due(const State& state) const {
   const std::vector<std::uint32_t>& elements = surface_.elements();
   Moves moves = parallel_sum<Moves>(elements.size(), [&](std::size_t e) {
     Moves one;
-    one.add(state.displacement[elements[e]] - built_at_[e]);
+    const Vec3 move = state.displacement[elements[e]] - built_at_[e];
+    one.add(move);
+    if (state.kick > 0) one.add(move + state.kick * state.velocity[elements[e]]);
     return one;
   });
   if (!settings_.planes.empty()) moves.add(Vec3::Zero());

@@ -8,7 +8,7 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr std::size_t kPerPoint = 7, kPerRecord = 6;
+constexpr std::size_t kPerPoint = 7, kPerRecord = 7;
 
 using PointName = std::array<double, kPerPoint>;
 
@@ -27,11 +27,12 @@ void append(const PairRecord& record, std::vector<double>& values) {
   values.push_back(record.adhesion);
   values.push_back(static_cast<double>(record.phase));
   values.push_back(record.penetration);
+  values.push_back(record.soft);
 }
 
 PairRecord record_of(std::uint64_t key, const double* values) {
   return {key, Vec3(values[0], values[1], values[2]), values[3],
-          static_cast<PairPhase>(static_cast<int>(values[4])), values[5]};
+          static_cast<PairPhase>(static_cast<int>(values[4])), values[5], values[6]};
 }
 
 }  // namespace

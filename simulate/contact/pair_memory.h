@@ -1,4 +1,5 @@
-// State that pairs carry from step to step: stick-slip, adhesion, phase and initial penetration. Beside the
+// State that pairs carry from step to step: stick-slip, adhesion, phase, initial penetration, and how softly
+// they began to press. Beside the
 // displacements for which the list of pairs was made it is all of contact that the present state of the body
 // does not determine.
 #pragma once
@@ -20,6 +21,7 @@ struct PairRecord {
   double adhesion = kFree;   // m, the gap at which adhesion pulls nothing; kFree: it does not stick
   PairPhase phase = PairPhase::separated;
   double penetration = 0;  // m, initial: a share of it is allowed while it is released
+  double soft = 0;         // m, of the soft part of the contact law, where that is wider than at rest
 
   [[nodiscard]] bool sticks() const { return adhesion != kFree; }
   void release_adhesion() { adhesion = kFree; }
@@ -34,7 +36,7 @@ class PairMemory {
   void follow(const std::vector<ContactPair>& pairs);
 
   // For checkpoints: kValues a pair.
-  static constexpr std::size_t kValues = 8;
+  static constexpr std::size_t kValues = 9;
   [[nodiscard]] std::size_t size() const { return records_.size(); }
   void save(std::vector<double>& values) const;
   void restore(std::span<const double> values);

@@ -2,9 +2,15 @@
 // others (OverlapRelease::admit).
 #include "simulate/contact/pair_states.h"
 
+#include <algorithm>
+
 namespace flexel::simulate {
 namespace {
 
+constexpr double kSoftSteps = 2;      // in which an impact goes through the soft part of the contact law
+constexpr double kFarthestSoft = 0.4;  // spacings, at most, of that part: two steps of contact_step_bound.cpp
+constexpr double kHardening = 0.001;  // a step, of what rests: the share of its extra softness that goes
+constexpr double kHardened = 1.01;    // of the least softness, at which that is over
 constexpr double kShapelessEntry = 0.05;  // spacings; most penetration with which shapeless points approach
 
 }  // namespace
@@ -60,9 +66,10 @@ std::vector<std::uint8_t> PairStates::evaluate_pairs() {
           if (is_active_[p]) states_[p] = {};
           is_active_[p] = 0;
           record.phase = PairPhase::separated;
+          record.soft = 0;
           return;
         }
-        const PairState now = evaluate(pairs[p], release_.allowed(pairs[p], record));
+        const PairState now = evaluate(pairs[p], release_.allowed(pairs[p], record), record.soft);
         const bool enters = now.near && !now.deep && now.gap < 0 && record.phase == PairPhase::separated;
         if (enters && record.penetration == 0 && release_.is_releasing(pairs[p]))
           entering[p] = 1;
@@ -79,12 +86,12 @@ void PairStates::admit(const std::vector<std::uint8_t>& entering) {
   for (std::uint32_t p = 0; p < entering.size(); ++p)
     if (entering[p]) {
       pairs.push_back(p);
-      depths.push_back(-evaluate(list_.pairs()[p], 0).gap);
+      depths.push_back(-evaluate(list_.pairs()[p], 0, 0).gap);
     }
   if (pairs.empty()) return;
   release_.admit(pairs, depths, memory_);
   for (const std::uint32_t p : pairs)
-    set(p, evaluate(list_.pairs()[p], release_.allowed(list_.pairs()[p], memory_[p])));
+    set(p, evaluate(list_.pairs()[p], release_.allowed(list_.pairs()[p], memory_[p]), memory_[p].soft));
 }
 
 // In the first state; after an event, of the parts that have joined.
@@ -98,7 +105,7 @@ void PairStates::find_initial_penetrations(const State& state) {
         const ContactPair& pair = list_.pairs()[p];
         const std::uint32_t i = list_.point(pair.i).part;
         if (std::max(i, pair.of_plane() ? i : list_.point(pair.j).part) < known) return;
-        const PairState now = evaluate(pair, 0);
+        const PairState now = evaluate(pair, 0, 0);
         if (now.near && !now.deep) memory_[p].penetration = std::max(-now.gap, 0.0);
       },
       512);
@@ -110,6 +117,7 @@ void PairStates::set(std::size_t pair, PairState now) {
     states_[pair] = now;
   else if (is_active_[pair])
     states_[pair] = {};
+  if (!now.near) memory_[pair].soft = 0;
   is_active_[pair] = now.near;
 }
 
@@ -138,13 +146,51 @@ ContactSide PairStates::other_side(const ContactPair& pair) const {
   return {from - (from - plane.point).dot(plane.normal) * plane.normal, plane.normal, 1, 0};
 }
 
-PairState PairStates::evaluate(const ContactPair& pair, double allowed) const {
+PairState PairStates::evaluate(const ContactPair& pair, double allowed, double soft) const {
   ContactSide from = points_[pair.i].side;
   if (pair.of_plane()) from.own_plane = 0;  // the plane's normal is the exact one
-  if (!(allowed > 0)) return pair_state(from, other_side(pair), pair.properties.constants);
+  if (!(allowed > 0) && !(soft > 0)) return pair_state(from, other_side(pair), pair.properties.constants);
   PairConstants constants = pair.properties.constants;
   constants.allowed = allowed;
+  constants.law = constants.law.softened(soft);
   return pair_state(from, other_side(pair), constants);
+}
+
+// m/s, at which the points of a pair come together along `normal`.
+double PairStates::approach(const ContactPair& pair, const Vec3& normal, const State& state) const {
+  const auto velocity = [&](std::uint32_t number) {
+    const InterpolationWeights& at = list_.point(number).at;
+    Vec3 sum = Vec3::Zero();
+    for (std::uint32_t a = 0; a < at.count; ++a) sum += at.weights[a] * state.velocity[at.elements[a]];
+    return sum;
+  };
+  Vec3 of_j = Vec3::Zero();
+  if (!pair.of_plane()) of_j = velocity(pair.j);
+  return (velocity(pair.i) - of_j).dot(normal);
+}
+
+// A pair that is not pressed gets a soft part of what it can go in kSoftSteps; one that is keeps its own, for
+// the energy it has stored is of that, and hardens slowly as it rests.
+void PairStates::finish_step(const State& state, double drift) {
+  parallel_for_each(
+      active_.size(),
+      [&](std::size_t n) {
+        const std::uint32_t p = active_[n];
+        const PairState& now = states_[p];
+        double& soft = memory_[p].soft;
+        const ContactPair& pair = list_.pairs()[p];
+        const double least = pair.properties.constants.law.soft;
+        if (now.pressure > 0) {
+          if (soft > 0) soft -= kHardening * (soft - least);
+          if (soft < kHardened * least) soft = 0;
+          return;
+        }
+        soft = 0;
+        if (now.gap > kFarthestSoft * list_.point(pair.i).width) return;
+        const double way = kSoftSteps * drift * approach(pair, now.normal, state);
+        if (way > least) soft = std::min(way, kFarthestSoft * list_.point(pair.i).width);
+      },
+      512);
 }
 
 // Whether the kernel is 0 for certain: |t|^2 = d^2 - (d . b)^2 / b^2, in the terms of pair_law.h, is beyond

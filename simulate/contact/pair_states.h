@@ -16,6 +16,9 @@ class PairStates {
   // ask for the same state several times.
   void update(const State& state);
 
+  // After a step of `drift` s that led to `state`, which is evaluated: how softly pairs begin to press.
+  void finish_step(const State& state, double drift);
+
   [[nodiscard]] std::uint64_t evaluations() const { return evaluations_; }
   [[nodiscard]] const std::vector<PointState>& points() const { return points_; }  // (PairList::points())
   [[nodiscard]] const std::vector<PairState>& states() const { return states_; }   // (pairs)
@@ -28,7 +31,9 @@ class PairStates {
   [[nodiscard]] bool evaluated(const State& state);
   [[nodiscard]] bool out_of_reach(const ContactPair& pair) const;
   [[nodiscard]] ContactSide other_side(const ContactPair& pair) const;
-  [[nodiscard]] PairState evaluate(const ContactPair& pair, double allowed) const;
+  // `allowed` [m]: penetration without pressure; `soft` [m]: of PairRecord.
+  [[nodiscard]] PairState evaluate(const ContactPair& pair, double allowed, double soft) const;
+  [[nodiscard]] double approach(const ContactPair& pair, const Vec3& normal, const State& state) const;
   void find_initial_penetrations(const State& state);
   [[nodiscard]] std::vector<std::uint8_t> evaluate_pairs();
   void admit(const std::vector<std::uint8_t>& entering);

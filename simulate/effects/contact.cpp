@@ -271,8 +271,12 @@ void ContactLosses::add_forces(const State& state, std::vector<Vec3>& forces) {
   contacts_->add_dissipative_forces(state, forces);
 }
 
-void ContactLosses::finish_step(State& state, const StepDone& done) {
+void Contact::finish_step(State& state, const StepDone& done) {
   contacts_->finish_step(state, done.drift);
+}
+
+void ContactLosses::finish_step(State& state, const StepDone& done) {
+  contacts_->finish_losses(state, done.drift);
 }
 
 }  // namespace flexel::simulate

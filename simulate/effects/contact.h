@@ -57,6 +57,8 @@ class Contact : public Effect {
   void add_forces(const State& state, std::vector<Vec3>& forces) override;
   [[nodiscard]] double added_frequency(const State& state, const std::vector<double>& mass) override;
   [[nodiscard]] bool needs_step_recheck(const State& state) override;
+  // Needs no finishes_steps(): what it remembers does not mind that the last velocities are of a whole step.
+  void finish_step(State& state, const StepDone& done) override;
   [[nodiscard]] std::vector<double> memory() const override;
   void restore(const std::vector<double>& memory) override;
   [[nodiscard]] std::vector<double> transfer_state() const override;

@@ -116,14 +116,14 @@ TEST(ContactStick, ForcesBalanceWithTheirMoments) {
   settings.damping = 1e-4;
   Contacts contacts(settings, problem);
   State state = starting_at_rest(body);
-  contacts.finish_step(state, 0);
+  contacts.finish_losses(state, 0);
   std::mt19937 random(5);
   std::uniform_real_distribution<double> shake(-2e-5, 2e-5);
   for (Vec3& u : state.displacement) u = Vec3(shake(random), shake(random), shake(random));
   for (Vec3& v : state.velocity) v = 1e3 * Vec3(shake(random), shake(random), shake(random));
   for (std::uint32_t e = body.parts[1].element_begin; e < body.element_count(); ++e)
     state.displacement[e] += Vec3(1e-4, 2e-4, 3e-4);
-  contacts.finish_step(state, 1e-4);
+  contacts.finish_losses(state, 1e-4);
   std::vector<Vec3> forces(body.element_count(), Vec3::Zero());
   contacts.add_dissipative_forces(state, forces);
   Vec3 sum = Vec3::Zero(), moment = Vec3::Zero(), on_b = Vec3::Zero();

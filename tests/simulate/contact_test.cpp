@@ -105,7 +105,7 @@ TEST(Contact, ForcesAndLossesBalanceWithTheirMoments) {
   for (const bool losses : {false, true}) {
     std::vector<Vec3> forces(made.body.element_count(), Vec3::Zero());
     if (losses)
-      contacts.finish_step(made.state, 1e-5), contacts.add_dissipative_forces(made.state, forces);
+      contacts.finish_losses(made.state, 1e-5), contacts.add_dissipative_forces(made.state, forces);
     else
       contacts.add_forces(made.state, forces);
     Vec3 sum = Vec3::Zero(), moment = Vec3::Zero();
