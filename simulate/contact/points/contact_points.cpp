@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <tuple>
 
+#include "base/math/distance.h"
 #include "simulate/contact/points/broad_phase.h"
 #include "simulate/contact/points/edge_points.h"
 #include "simulate/matter/surface_points.h"
@@ -12,7 +14,8 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr double kSamePatch = 0.94;   // cosine of 20 degrees
+constexpr double kSamePatch = 0.94;  // cosine of 20 degrees
+constexpr double kBallReach = 1.4;   // spacings, from an element to points of the surface that may be nearest
 constexpr double kLeastPatch = 1e-5;  // of h^2; slivers carry nothing worth their time
 
 struct Piece {  // of surface, in its half cell
@@ -83,24 +86,50 @@ void add_faces(const Problem& problem, std::uint32_t part, const std::vector<Sur
   }
 }
 
-// Elements at centres that carry surface: a ball that reaches to the nearest of it.
-void add_balls(const Problem& problem, std::uint32_t part, const std::vector<SurfacePoint>& surface,
-               std::vector<ContactPoint>& points) {
+double distance_to_polygon(const Surface& surface, const Triangles& triangles, std::uint32_t polygon,
+                           const Vec3& from) {
+  const auto [first, last] = std::equal_range(triangles.polygon.begin(), triangles.polygon.end(), polygon);
+  double nearest = std::numeric_limits<double>::infinity();
+  for (auto t = first; t != last; ++t) {
+    const auto& corners = triangles.corners[static_cast<std::size_t>(t - triangles.polygon.begin())];
+    nearest =
+        std::min(nearest, distance_to_triangle(from, surface.vertices[corners[0]],
+                                               surface.vertices[corners[1]], surface.vertices[corners[2]]));
+  }
+  return nearest;
+}
+
+// Elements at centres that carry surface: a ball that reaches to the surface. Balls of two parts, or of a part
+// and a plane, whose surfaces touch do not overlap then.
+void add_balls(const Problem& problem, const Triangles& triangles, std::uint32_t part,
+               const std::vector<SurfacePoint>& surface, std::vector<ContactPoint>& points) {
   const double width = problem.body.parts[part].lattice.spacing.mean();
-  std::vector<std::pair<std::uint32_t, double>> reach;  // element, distance of a piece of surface
-  for (const SurfacePoint& point : surface)
-    reach.emplace_back(point.at.elements[0],
-                       (point.position - problem.body.rest[point.at.elements[0]]).norm());
-  std::sort(reach.begin(), reach.end());
-  for (std::size_t i = 0; i < reach.size(); ++i) {
-    if (i > 0 && reach[i].first == reach[i - 1].first) continue;
+  std::vector<std::uint32_t> outer;
+  for (const SurfacePoint& point : surface) outer.push_back(point.at.elements[0]);
+  std::sort(outer.begin(), outer.end());
+  outer.erase(std::unique(outer.begin(), outer.end()), outer.end());
+  std::vector<Vec3> at;
+  for (const std::uint32_t element : outer) at.push_back(problem.body.rest[element]);
+  for (const SurfacePoint& point : surface) at.push_back(point.position);
+  // the nearest surface is of a polygon that has a point within kLongestEdge of it (surface_points.cpp)
+  const Neighbours near = neighbours_within(at, kBallReach * width, [&](std::uint32_t i, std::uint32_t j) {
+    return i < outer.size() && j >= outer.size();
+  });
+  for (std::uint32_t i = 0; i < outer.size(); ++i) {
+    std::vector<std::uint32_t> polygons;
+    for (const std::uint32_t j : near.of(i)) polygons.push_back(surface[j - outer.size()].polygon);
+    std::sort(polygons.begin(), polygons.end());
+    polygons.erase(std::unique(polygons.begin(), polygons.end()), polygons.end());
     ContactPoint made;
     made.shape = ContactShape::ball;
     made.part = part;
-    made.at = {{reach[i].first}, {1}, 1};
-    made.rest = problem.body.rest[reach[i].first];
+    made.at = {{outer[i]}, {1}, 1};
+    made.rest = at[i];
     made.area = width * width;
-    made.radius = std::min(width, reach[i].second);
+    made.radius = width;
+    for (const std::uint32_t polygon : polygons)
+      made.radius =
+          std::min(made.radius, distance_to_polygon(problem.body.surface, triangles, polygon, made.rest));
     made.depth = made.radius;
     made.width = width;
     points.push_back(made);
@@ -140,6 +169,7 @@ std::vector<ContactPoint> contact_points(const Problem& problem, const std::vect
   std::vector<std::vector<std::uint32_t>> polygons(body.parts.size());
   for (std::uint32_t p = 0; p < body.surface.polygon_count(); ++p)
     polygons[body.surface.polygon_part(p)].push_back(p);
+  const Triangles triangles = triangulate(body.surface);
   std::vector<ContactPoint> points, balls;
   for (std::uint32_t part = 0; part < body.parts.size(); ++part) {
     if (!parts[part]) continue;
@@ -147,7 +177,7 @@ std::vector<ContactPoint> contact_points(const Problem& problem, const std::vect
     if (body.parts[part].placement == Placement::corner)
       add_faces(problem, part, surface, points);
     else
-      add_balls(problem, part, surface, balls);
+      add_balls(problem, triangles, part, surface, balls);
   }
   measure_walls(points);
   const std::vector<ContactPoint> edges = edge_points(problem, parts);
