@@ -8,7 +8,7 @@ namespace flexel::simulate {
 namespace {
 
 constexpr double kHardeningAhead = 1.3;              // growth of hardening until the next check
-constexpr double kRigidSafety = 4;  // of rigid parts, whose whole impact is one oscillation
+constexpr double kRigidSafety = 4;                   // of rigid parts, whose whole impact is one oscillation
 constexpr double kTravel = 0.12, kMostTravel = 0.2;  // spacings a step: asked for, and allowed
 
 // omega^2 that bounds the step like a dashpot of tau beside a stiffness of omega^2 (time/stability.h).

@@ -31,8 +31,9 @@ void append(const PairRecord& record, std::vector<double>& values) {
 }
 
 PairRecord record_of(std::uint64_t key, const double* values) {
-  return {key, Vec3(values[0], values[1], values[2]), values[3],
-          static_cast<PairPhase>(static_cast<int>(values[4])), values[5], values[6]};
+  return {key,       Vec3(values[0], values[1], values[2]),
+          values[3], static_cast<PairPhase>(static_cast<int>(values[4])),
+          values[5], values[6]};
 }
 
 }  // namespace

@@ -7,10 +7,10 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr double kSoftSteps = 2;      // in which an impact goes through the soft part of the contact law
+constexpr double kSoftSteps = 2;       // in which an impact goes through the soft part of the contact law
 constexpr double kFarthestSoft = 0.4;  // spacings, at most, of that part: two steps of contact_step_bound.cpp
-constexpr double kHardening = 0.001;  // a step, of what rests: the share of its extra softness that goes
-constexpr double kHardened = 1.01;    // of the least softness, at which that is over
+constexpr double kHardening = 0.001;   // a step, of what rests: the share of its extra softness that goes
+constexpr double kHardened = 1.01;     // of the least softness, at which that is over
 constexpr double kShapelessEntry = 0.05;  // spacings; most penetration with which shapeless points approach
 
 }  // namespace

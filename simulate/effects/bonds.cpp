@@ -11,8 +11,8 @@
 #include "base/error.h"
 #include "base/nearest_word.h"
 #include "simulate/effects/contact.h"
-#include "simulate/kernels/chunk_layout.h"
 #include "simulate/matter/interface_points.h"
+#include "simulate/models/masses.h"
 #include "simulate/models/stability.h"
 
 namespace flexel::simulate {

@@ -11,9 +11,9 @@
 #include <numbers>
 
 #include "base/parallel.h"
-#include "simulate/kernels/chunk_layout.h"
 #include "simulate/matter/interface_points.h"
 #include "simulate/matter/surface_points.h"
+#include "simulate/models/masses.h"
 
 namespace flexel::simulate {
 namespace {

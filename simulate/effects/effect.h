@@ -22,6 +22,7 @@
 #include "simulate/input/scene_table.h"
 #include "simulate/models/stiffness.h"
 #include "simulate/result/result.h"
+#include "simulate/rigid/rigid_body.h"
 #include "simulate/state/state.h"
 
 namespace flexel::simulate {
@@ -101,6 +102,9 @@ class Effect {
   // Asked before every step: whether its length has to be chosen anew now.
   [[nodiscard]] virtual bool needs_step_recheck(const State&) { return false; }
   virtual void finish_step(State&, const StepDone&) {}
+  // Of free rigid parts at the beginning of the last step, between the velocities before and after it;
+  // `half_kick`: those before it were of that very time.
+  [[nodiscard]] virtual std::vector<RigidMomenta> rigid_momenta(bool /*half_kick*/) const { return {}; }
   // N, of supports in the last step.
   virtual void add_support_forces(std::vector<Vec3>& /*forces*/) {}
   // The share of the hot loop's time that it takes.

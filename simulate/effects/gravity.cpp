@@ -6,8 +6,8 @@
 #include "base/math/greatest.h"
 #include "base/parallel.h"
 #include "simulate/gravitation/gravity_tree.h"
-#include "simulate/kernels/chunk_layout.h"
 #include "simulate/matter/interpolation_weights.h"
+#include "simulate/models/masses.h"
 
 namespace flexel::simulate {
 namespace {

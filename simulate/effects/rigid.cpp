@@ -8,7 +8,7 @@
 
 #include "base/error.h"
 #include "base/nearest_word.h"
-#include "simulate/kernels/chunk_layout.h"
+#include "simulate/models/masses.h"
 
 namespace flexel::simulate {
 namespace {
@@ -67,11 +67,12 @@ std::optional<RigidParts> RigidParts::make(const Parameters& parameters, const P
   RigidParts made;
   made.body_ = &problem.body;
   made.mass_ = lumped_masses(problem);
+  const std::vector<MassMoments> moments = rigid_moments(problem);
   // at equilibrium, which refuses the effect, nothing is rigid
   for (std::uint32_t p = 0; p < problem.rigidity.size(); ++p) {
     if (problem.rigidity[p] == Rigidity::none) continue;
     Moving moving;
-    moving.body = rigid_body(problem.body, p, made.mass_);
+    moving.body = rigid_body(problem.body, p, moments[p]);
     for (const Manipulator& each : parameters.manipulators)
       if (each.part == problem.body.parts[p].name) moving.led = each;
     moving.velocity.resize(moving.body.arms.size());
@@ -114,6 +115,7 @@ void RigidParts::begin(const State& state) {
 void RigidParts::finish_step(State& state, const StepDone& done) {
   for (Moving& moving : moving_) {
     RigidBody& body = moving.body;
+    moving.before = {body.pose, body.momentum, body.spin};
     Vec3 impulse = Vec3::Zero(), turning = Vec3::Zero();
     for (std::uint32_t e = body.begin; e < body.end; ++e) {
       const Vec3 took = done.mass[e] * (state.velocity[e] - moving.velocity[e - body.begin]);
@@ -152,6 +154,18 @@ void RigidParts::finish_step(State& state, const StepDone& done) {
       moving.velocity[e - body.begin] = state.velocity[e];
     }
   }
+}
+
+std::vector<RigidMomenta> RigidParts::rigid_momenta(bool half_kick) const {
+  std::vector<RigidMomenta> result;
+  for (const Moving& moving : moving_) {
+    if (moving.led) continue;
+    const auto& [pose, momentum, spin] = moving.before;
+    result.push_back(half_kick ? momenta_at(moving.body, pose, 2 * momentum - moving.body.momentum,
+                                            2 * spin - moving.body.spin)
+                               : momenta_at(moving.body, pose, momentum, spin));
+  }
+  return result;
 }
 
 void RigidParts::add_support_forces(std::vector<Vec3>& forces) {

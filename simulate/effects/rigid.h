@@ -38,6 +38,7 @@ class RigidParts : public Effect {
   void start(State& state) override;
   void begin(const State& state) override;
   void finish_step(State& state, const StepDone& done) override;
+  [[nodiscard]] std::vector<RigidMomenta> rigid_momenta(bool half_kick) const override;
   // N (elements): what keeps a manipulator on its path, in the last step.
   void add_support_forces(std::vector<Vec3>& forces) override;
   [[nodiscard]] std::vector<double> memory() const override;
@@ -50,8 +51,13 @@ class RigidParts : public Effect {
                                                    const std::vector<Vec3>& unbalanced) override;
 
  private:
+  struct Before {  // the last step
+    Pose pose;
+    Vec3 momentum = Vec3::Zero(), spin = Vec3::Zero();
+  };
   struct Moving {
     RigidBody body;
+    Before before;
     std::optional<Manipulator> led;
     [[nodiscard]] Pose pose_at(double time) const;
     std::vector<Vec3> velocity;                        // (its elements) m/s, that the step began with

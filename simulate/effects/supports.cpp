@@ -9,9 +9,9 @@
 #include <map>
 
 #include "base/error.h"
-#include "simulate/kernels/chunk_layout.h"
 #include "simulate/matter/load_distribution.h"
 #include "simulate/matter/surface_points.h"
+#include "simulate/models/masses.h"
 #include "simulate/models/stability.h"
 
 namespace flexel::simulate {

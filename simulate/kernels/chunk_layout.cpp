@@ -335,20 +335,4 @@ StepLayout step_layout(const Problem& problem, const KernelEffects& plan) {
   return layout;
 }
 
-std::vector<double> lumped_masses(const Problem& problem) {
-  const Body& body = problem.body;
-  std::vector<double> mass(body.element_count(), 0);
-  const std::vector<double> share = mass_shares(body), factor = mass_factors(body);
-  for (std::size_t p = 0; p < body.parts.size(); ++p) {
-    const Part& part = body.parts[p];
-    const double whole = problem.materials[p].density * part.lattice.spacing.prod();
-    if (part.placement == Placement::centre)
-      for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
-        mass[e] = factor.empty() ? whole : factor[e] * whole;
-    for (std::uint32_t c = part.cell_begin; c < part.cell_end; ++c)
-      for (const std::uint32_t e : body.cell_elements[c]) mass[e] += share[c] * whole / 8;
-  }
-  return mass;
-}
-
 }  // namespace flexel::simulate

@@ -59,8 +59,4 @@ struct StepLayout {
 // Of the cells that resist (simulate/models/cells.h).
 [[nodiscard]] StepLayout step_layout(const Problem& problem, const KernelEffects& plan);
 
-// Inertia of each element [kg], broken cells included: an eighth of rho f V of each of its cells, or rho h^3
-// in centre placement.
-[[nodiscard]] std::vector<double> lumped_masses(const Problem& problem);
-
 }  // namespace flexel::simulate

@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
+#include <algorithm>
 #include <cmath>
 
 #include "base/math/small_matrices.h"
@@ -10,8 +11,31 @@
 namespace flexel::simulate {
 namespace {
 
+constexpr double kLargestTurn = 0.5;  // rad, in one go
+constexpr double kRounding = 1e-16;   // share of the angular momentum
+constexpr int kMostRounds = 60;
+
 Vec3 angular_velocity(const RigidBody& rigid, const Mat3& rotation) {
   return rotation * rigid.inverse_inertia * rotation.transpose() * rigid.spin;
+}
+
+Mat3 inertia_of(const Mat3& second) {
+  return second.trace() * Mat3::Identity() - second;
+}
+
+// dt w of the header [rad], in the frame of the part. The iteration contracts by half the turn.
+Vec3 turn_in(const RigidBody& rigid, const Mat3& rotation, double step) {
+  const Vec3 spin = rotation.transpose() * rigid.spin;
+  Vec3 middle = spin, velocity = rigid.inverse_inertia * spin;
+  for (int i = 0; i < kMostRounds; ++i) {
+    const double half = 0.5 * step * velocity.norm();
+    const Vec3 next = spin + 0.5 * step * (half > 0 ? std::tan(half) / half : 1) * middle.cross(velocity);
+    const double change = (next - middle).norm();
+    middle = next;
+    velocity = rigid.inverse_inertia * middle;
+    if (!(change > kRounding * spin.norm())) break;
+  }
+  return step * velocity;
 }
 
 }  // namespace
@@ -34,23 +58,15 @@ Vec3 turn_of(const Mat3& rotation) {
   return turn.angle() * turn.axis();
 }
 
-RigidBody rigid_body(const Body& body, std::uint32_t part, const std::vector<double>& mass) {
+RigidBody rigid_body(const Body& body, std::uint32_t part, const MassMoments& matter) {
   RigidBody made;
   made.part = part;
   made.begin = body.parts[part].element_begin;
   made.end = body.parts[part].element_end;
-  for (std::uint32_t e = made.begin; e < made.end; ++e) {
-    made.mass += mass[e];
-    made.centre += mass[e] * body.rest[e];
-  }
-  made.centre /= made.mass;
-  made.inertia = Mat3::Zero();
-  for (std::uint32_t e = made.begin; e < made.end; ++e) {
-    const Vec3 arm = body.rest[e] - made.centre;
-    made.arms.push_back(arm);
-    made.inertia += mass[e] * (arm.squaredNorm() * Mat3::Identity() - arm * arm.transpose());
-  }
-  // About an axis that all elements lie on nothing turns.
+  made.mass = matter.mass;
+  made.centre = matter.centre;
+  made.inertia = inertia_of(matter.second);
+  for (std::uint32_t e = made.begin; e < made.end; ++e) made.arms.push_back(body.rest[e] - made.centre);
   made.inverse_inertia = inverse_on_range(made.inertia).first;
   return made;
 }
@@ -58,33 +74,57 @@ RigidBody rigid_body(const Body& body, std::uint32_t part, const std::vector<dou
 // The rotation that fits best: Kabsch 1976.
 void take_up(RigidBody& rigid, const Body& body, const std::vector<double>& mass,
              const std::vector<Vec3>& displacement, const std::vector<Vec3>& velocity) {
-  Vec3 centre = Vec3::Zero();
-  rigid.momentum = rigid.spin = Vec3::Zero();
+  double whole = 0;
+  Vec3 at = Vec3::Zero(), at_rest = Vec3::Zero(), speed = Vec3::Zero();
   for (std::uint32_t e = rigid.begin; e < rigid.end; ++e) {
-    centre += mass[e] / rigid.mass * (body.rest[e] + displacement[e]);
-    rigid.momentum += mass[e] * velocity[e];
+    whole += mass[e];
+    at += mass[e] * (body.rest[e] + displacement[e]);
+    at_rest += mass[e] * rigid.arms[e - rigid.begin];
+    speed += mass[e] * velocity[e];
   }
-  Mat3 moment = Mat3::Zero();
+  at /= whole, at_rest /= whole, speed /= whole;
+  Mat3 moment = Mat3::Zero(), second = Mat3::Zero();
+  Vec3 spin = Vec3::Zero();
   bool turned = false;
   for (std::uint32_t e = rigid.begin; e < rigid.end; ++e) {
-    const Vec3 now = body.rest[e] + displacement[e] - centre;
-    moment += mass[e] * now * rigid.arms[e - rigid.begin].transpose();
+    const Vec3 now = body.rest[e] + displacement[e] - at;
+    moment += mass[e] * now * (rigid.arms[e - rigid.begin] - at_rest).transpose();
+    second += mass[e] * now * now.transpose();
     turned = turned || displacement[e] != displacement[rigid.begin];
-    rigid.spin += mass[e] * now.cross(velocity[e]);
+    spin += mass[e] * now.cross(velocity[e] - speed);
   }
-  rigid.pose = {centre - rigid.centre, Mat3::Identity()};
-  if (!turned) return;
-  const Eigen::JacobiSVD<Mat3> svd(moment, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Mat3 signs = Mat3::Identity();
-  if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0) signs(2, 2) = -1;
-  rigid.pose.rotation = svd.matrixU() * signs * svd.matrixV().transpose();
+  Mat3 rotation = Mat3::Identity();
+  if (turned) {
+    const Eigen::JacobiSVD<Mat3> svd(moment, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    Mat3 signs = Mat3::Identity();
+    if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0) signs(2, 2) = -1;
+    rotation = svd.matrixU() * signs * svd.matrixV().transpose();
+  }
+  const Vec3 centre = at - rotation * at_rest;
+  rigid.pose = {centre - rigid.centre, rotation};
+  // about an axis that all elements lie on nothing is known to turn
+  const Vec3 turning = inverse_on_range(inertia_of(second)).first * spin;
+  rigid.momentum = rigid.mass * (speed - turning.cross(rotation * at_rest));
+  rigid.spin = rotation * rigid.inertia * rotation.transpose() * turning;
 }
 
 Pose drifted(const RigidBody& rigid, double step) {
-  const Mat3 middle =
-      turned_by(0.5 * step * angular_velocity(rigid, rigid.pose.rotation)) * rigid.pose.rotation;
-  return {rigid.pose.translation + step / rigid.mass * rigid.momentum,
-          turned_by(step * angular_velocity(rigid, middle)) * rigid.pose.rotation};
+  Pose next{rigid.pose.translation + step / rigid.mass * rigid.momentum, rigid.pose.rotation};
+  const double fastest = rigid.inverse_inertia.norm() * rigid.spin.norm();  // rad/s
+  const double pieces = std::ceil(std::max(step * fastest / kLargestTurn, 1.0));
+  for (double piece = 0; piece < pieces; ++piece)
+    next.rotation = next.rotation * turned_by(turn_in(rigid, next.rotation, step / pieces));
+  return next;
+}
+
+RigidMomenta momenta_at(const RigidBody& rigid, const Pose& at, const Vec3& momentum_before,
+                        const Vec3& spin_before) {
+  const Vec3 momentum = 0.5 * (momentum_before + rigid.momentum);
+  const Vec3 centre = rigid.centre + at.translation;
+  return {rigid.begin, rigid.end,
+          0.5 * (momentum_before.dot(rigid.momentum) / rigid.mass +
+                 spin_before.dot(angular_velocity(rigid, at.rotation))),
+          momentum, centre.cross(momentum) + 0.5 * (spin_before + rigid.spin)};
 }
 
 void move_to(RigidBody& rigid, const Pose& next, double step, std::vector<Vec3>& displacement,

@@ -20,17 +20,6 @@ constexpr std::size_t kFirstJudged =
 constexpr double kMostLost = 0.5;  // of the largest energy, that the books may lack
 constexpr double kLeastStrain = 1e-6;  // of all matter, whose energy is too little to be judged
 
-struct Momenta {
-  double kinetic = 0;
-  Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
-  Momenta& operator+=(const Momenta& other) {
-    kinetic += other.kinetic;
-    linear += other.linear;
-    angular += other.angular;
-    return *this;
-  }
-};
-
 const char* called(Account::Kind kind) {
   switch (kind) {
     case Account::Kind::work:
@@ -181,7 +170,7 @@ void EnergyHistory::after(const State& state, const StepOutcome& outcome, const 
   if (plasticity_) ledger_.accounts[*plasticity_].energy -= outcome.plastic_work;
   if (fracture_) ledger_.accounts[*fracture_].energy -= outcome.released;
   if (outcome.elastic) elastic_ += *outcome.elastic;
-  if (sample_) add_row(state, supports);
+  if (sample_) add_row(state, supports, half_kick);
   if (closing_)
     ledger_.accounts = kept;
   else
@@ -191,7 +180,7 @@ void EnergyHistory::after(const State& state, const StepOutcome& outcome, const 
 void EnergyHistory::add_row_of(const State& state, const std::vector<Vec3>& supports) {
   before(state, true);
   if (remembers_) elastic_ += cells_.energy(state);  // no step tells it
-  add_row(state, supports);
+  add_row(state, supports, false);
 }
 
 void EnergyHistory::enter(const std::vector<Vec3>& moved, const std::vector<Vec3>& damping,
@@ -219,13 +208,27 @@ void EnergyHistory::book_stored_by_event() {
   if (store) ledger_.accounts[*store].energy -= lacking;
 }
 
-void EnergyHistory::add_row(const State& state, const std::vector<Vec3>& supports) {
-  const Momenta sum = parallel_sum<Momenta>(mass_.size(), [&](std::size_t e) {
+// Of the elements, but of free rigid parts as a whole.
+EnergyHistory::Momenta EnergyHistory::momenta(const State& state, bool half_kick) const {
+  std::vector<RigidMomenta> rigid;
+  for (const ActiveEffect& effect : effects_)
+    for (const RigidMomenta& each : effect->rigid_momenta(half_kick)) rigid.push_back(each);
+  std::vector<std::uint8_t> counted(mass_.size(), 1);
+  for (const RigidMomenta& each : rigid)
+    std::fill(counted.begin() + each.begin, counted.begin() + each.end, std::uint8_t{0});
+  Momenta sum = parallel_sum<Momenta>(mass_.size(), [&](std::size_t e) {
+    if (!counted[e]) return Momenta{};
     const Vec3 mean = 0.5 * (velocity_[e] + state.velocity[e]);
     const Vec3 at = problem_.body.rest[e] + sampled_.displacement[e];
     return Momenta{0.5 * mass_[e] * velocity_[e].dot(state.velocity[e]), mass_[e] * mean,
                    mass_[e] * at.cross(mean)};
   });
+  for (const RigidMomenta& each : rigid) sum += Momenta{each.kinetic, each.momentum, each.angular};
+  return sum;
+}
+
+void EnergyHistory::add_row(const State& state, const std::vector<Vec3>& supports, bool half_kick) {
+  const Momenta sum = momenta(state, half_kick);
   BookRow row;
   row.time = time_;
   row.momentum = sum.linear;

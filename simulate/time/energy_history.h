@@ -103,8 +103,19 @@ class EnergyHistory {
   [[nodiscard]] Ledger take_ledger() { return std::move(ledger_); }
 
  private:
+  struct Momenta {
+    double kinetic = 0;
+    Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
+    Momenta& operator+=(const Momenta& other) {
+      kinetic += other.kinetic;
+      linear += other.linear;
+      angular += other.angular;
+      return *this;
+    }
+  };
   void book_stored_by_event();
-  void add_row(const State& state, const std::vector<Vec3>& supports);
+  void add_row(const State& state, const std::vector<Vec3>& supports, bool half_kick);
+  [[nodiscard]] Momenta momenta(const State& state, bool half_kick) const;
 
   const Problem& problem_;
   const std::vector<ActiveEffect>& effects_;

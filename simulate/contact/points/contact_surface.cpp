@@ -7,6 +7,7 @@
 #include "base/parallel.h"
 #include "simulate/kernels/chunk_layout.h"
 #include "simulate/models/cell_model.h"
+#include "simulate/models/masses.h"
 #include "simulate/rigid/rigid_body.h"
 
 namespace flexel::simulate {
@@ -27,9 +28,10 @@ ContactSurface::ContactSurface(const Problem& problem, const std::vector<std::ui
     gradients_.push_back(gradients);
   }
   rigid_.resize(body_.parts.size());
+  const std::vector<MassMoments> moments = rigid_moments(problem);
   for (std::uint32_t p = 0; p < problem.rigidity.size(); ++p) {
     if (problem.rigidity[p] == Rigidity::none) continue;
-    const RigidBody rigid = rigid_body(body_, p, mass_);
+    const RigidBody rigid = rigid_body(body_, p, moments[p]);
     const Eigen::SelfAdjointEigenSolver<Mat3> eigen(rigid.inverse_inertia, Eigen::EigenvaluesOnly);
     rigid_[p] = RigidPart{problem.rigidity[p] == Rigidity::free, rigid.centre, 1 / rigid.mass,
                           eigen.eigenvalues()[2]};
