@@ -169,8 +169,9 @@ double PairStates::approach(const ContactPair& pair, const Vec3& normal, const S
   return (velocity(pair.i) - of_j).dot(normal);
 }
 
-// A pair that is not pressed gets a soft part of what it can go in kSoftSteps; one that is keeps its own, for
-// the energy it has stored is of that, and hardens slowly as it rests.
+// A pair that is not pressed gets a soft part as wide as the way that it comes in kSoftSteps, but does not
+// press where it is. One that is pressed keeps its own, for the energy it has stored is of that, and hardens
+// slowly as it rests.
 void PairStates::finish_step(const State& state, double drift) {
   parallel_for_each(
       active_.size(),
@@ -179,16 +180,19 @@ void PairStates::finish_step(const State& state, double drift) {
         const PairState& now = states_[p];
         double& soft = memory_[p].soft;
         const ContactPair& pair = list_.pairs()[p];
-        const double least = pair.properties.constants.law.soft;
+        const double least = pair.properties.constants.law.soft, width = list_.point(pair.i).width;
         if (now.pressure > 0) {
-          if (soft > 0) soft -= kHardening * (soft - least);
+          soft -= kHardening * (soft - least);
           if (soft < kHardened * least) soft = 0;
           return;
         }
+        const double most =
+            std::min(std::max(soft, least + 2 * std::max(now.gap, 0.0)), kFarthestSoft * width);
         soft = 0;
-        if (now.gap > kFarthestSoft * list_.point(pair.i).width) return;
+        if (now.gap > kFarthestSoft * width) return;
         const double way = kSoftSteps * drift * approach(pair, now.normal, state);
-        if (way > least) soft = std::min(way, kFarthestSoft * list_.point(pair.i).width);
+        if (way > least) soft = std::min(way, most);
+        if (soft <= least) soft = 0;
       },
       512);
 }

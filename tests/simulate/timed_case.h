@@ -25,7 +25,9 @@ inline TimedCase run_timed(Body body, const Scene& scene, SimulateOptions option
   made.body = std::move(body);
   Progress progress("test", Progress::Mode::quiet);
   const ::testing::TestInfo* test = ::testing::UnitTest::GetInstance()->current_test_info();
-  options.history = ::testing::TempDir() + "/" + test->test_suite_name() + "_" + test->name() + ".csv";
+  std::string name = std::string(test->test_suite_name()) + "_" + test->name();
+  std::replace(name.begin(), name.end(), '/', '_');  // of tests with parameters
+  options.history = ::testing::TempDir() + "/" + name + ".csv";
   made.result = simulate(made.body, scene, options, progress);
   made.history = read_csv(options.history);
   return made;
