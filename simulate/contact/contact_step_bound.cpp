@@ -1,8 +1,9 @@
-// Rows of elements, and of free rigid parts as a whole.
+// Rows of elements, and of free rigid parts as a whole; those of what is beyond the linear range by themselves.
 #include "simulate/contact/contact_step_bound.h"
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace flexel::simulate {
 namespace {
@@ -24,12 +25,11 @@ ContactStepBound::ContactStepBound(const ContactSettings& settings, const Contac
                                    const PairList& list, const PairStates& states)
     : settings_(settings), surface_(surface), list_(list), states_(states) {}
 
-void ContactStepBound::add_row(std::uint32_t number, const Vec3& lever, double stiffness,
-                               std::vector<double>& elements, std::vector<double>& parts) const {
+void ContactStepBound::add_row(std::uint32_t number, const Vec3& lever, double stiffness) {
   const ContactPoint& point = list_.point(number);
   if (const std::optional<RigidPart>& rigid = surface_.rigid(point.part)) {
     if (rigid->free)
-      parts[point.part] +=
+      parts_[point.part] +=
           stiffness * (rigid->per_mass + (point.rest - rigid->centre).squaredNorm() * rigid->per_inertia);
     return;
   }
@@ -43,25 +43,40 @@ void ContactStepBound::add_row(std::uint32_t number, const Vec3& lever, double s
     sum += of[a];
   }
   for (std::uint32_t a = 0; a < point.at.count; ++a)
-    elements[point.at.elements[a]] += stiffness * of[a] * sum;
+    elements_[point.at.elements[a]] += stiffness * of[a] * sum;
 }
 
-double ContactStepBound::stiffness_bound() const {
-  std::vector<double> elements(surface_.body().element_count(), 0), parts(surface_.body().parts.size(), 0);
+// 1/s^2, the largest row of the evaluated pairs, stiffness(pair) [N/m] each; 0 leaves one out.
+template <class Stiffness>
+double ContactStepBound::largest_row(const Stiffness& stiffness) {
+  elements_.resize(surface_.body().element_count(), 0);
+  parts_.assign(surface_.body().parts.size(), 0);
+  bool any = false;
   for (const std::uint32_t p : states_.active()) {
-    const PairState& now = states_[p];
+    const double own = stiffness(states_[p]);
+    if (!(own > 0)) continue;
+    any = true;
     const ContactPair& pair = list_.pairs()[p];
-    const double stiffness =
-        (pair.of_plane() ? 1 : 2) * (now.weight + kHardeningAhead * (now.stiffness - now.weight));
-    const Vec3 lever = 0.5 * now.offset;
-    add_row(pair.i, lever, stiffness, elements, parts);
-    if (!pair.of_plane()) add_row(pair.j, lever, stiffness, elements, parts);
+    const Vec3 lever = 0.5 * states_[p].offset;
+    add_row(pair.i, lever, (pair.of_plane() ? 1 : 2) * own);
+    if (!pair.of_plane()) add_row(pair.j, lever, 2 * own);
   }
+  if (!any) return 0;
   double largest = 0;
-  for (const double part : parts) largest = std::max(largest, kRigidSafety * part);
+  for (const double part : parts_) largest = std::max(largest, kRigidSafety * part);
   for (const std::uint32_t e : surface_.elements())
-    largest = std::max(largest, elements[e] / surface_.mass(e));
-  return damped(largest, settings_.damping);
+    largest = std::max(largest, std::exchange(elements_[e], 0.0) / surface_.mass(e));
+  return largest;
+}
+
+double ContactStepBound::linear() {
+  return largest_row([](const PairState& pair) { return pair.weight; });
+}
+
+double ContactStepBound::hardening(double least) {
+  return largest_row([&](const PairState& pair) {
+    return pair.stiffness > least * pair.weight ? pair.stiffness - pair.weight : 0;
+  });
 }
 
 // m/s, at most, of surfaces against one another.
@@ -73,7 +88,8 @@ double ContactStepBound::speed(const State& state) const {
 }
 
 double ContactStepBound::frequency(const State& state) {
-  bound_ = stiffness_bound();
+  hardening_ = kHardeningAhead * hardening(1);
+  bound_ = damped(linear() + hardening_, settings_.damping);
   checked_builds_ = list_.builds();
   const double motion = 2 * speed(state) / (kTravel * surface_.narrowest());
   return bound_ + motion * motion;
@@ -84,18 +100,15 @@ bool ContactStepBound::moves_too_far(const State& state) const {
 }
 
 bool ContactStepBound::is_exceeded() {
-  double hardest = 0;
-  for (const std::uint32_t p : states_.active())
-    if (const PairState& now = states_[p]; now.weight > 0)
-      hardest = std::max(hardest, now.stiffness / now.weight);
-  if (checked() && hardest < kHardeningAhead) return false;
+  if (checked()) return hardening(kHardeningAhead) > hardening_;
   checked_builds_ = list_.builds();
-  return stiffness_bound() > 1.001 * bound_;
+  return damped(linear() + hardening(1), settings_.damping) > 1.001 * bound_;
 }
 
-void ContactStepBound::restore(double bound, bool checked) {
+void ContactStepBound::restore(double bound, bool checked, double hardening) {
   bound_ = bound;
   checked_builds_ = checked ? list_.builds() : list_.builds() - 1;
+  hardening_ = hardening;
 }
 
 }  // namespace flexel::simulate

@@ -20,27 +20,32 @@ class ContactStepBound {
   [[nodiscard]] double frequency(const State& state);
   // Whether the motion of a step is too large; the pairs need not be evaluated.
   [[nodiscard]] bool moves_too_far(const State& state) const;
-  // Whether the contacts are stiffer than frequency() last said.
+  // Whether the contacts are stiffer than frequency() last said. Of a new list, all pairs are evaluated.
   [[nodiscard]] bool is_exceeded();
 
-  // For checkpoints: 1/s^2, what the last frequency() said of the stiffness, and whether the present list was
-  // checked against it.
+  // For checkpoints: 1/s^2, what the last frequency() said of the stiffness, whether the present list was
+  // checked against it, and what of it is for hardening.
   [[nodiscard]] double bound() const { return bound_; }
   [[nodiscard]] bool checked() const { return checked_builds_ == list_.builds(); }
-  void restore(double bound, bool checked);
+  [[nodiscard]] double hardening_bound() const { return hardening_; }
+  void restore(double bound, bool checked, double hardening);
 
  private:
-  [[nodiscard]] double stiffness_bound() const;
-  void add_row(std::uint32_t number, const Vec3& lever, double stiffness, std::vector<double>& elements,
-               std::vector<double>& parts) const;
+  template <class Stiffness>
+  [[nodiscard]] double largest_row(const Stiffness& stiffness);
+  void add_row(std::uint32_t number, const Vec3& lever, double stiffness);
+  // 1/s^2, of the linear range; of what pairs have beyond it that are at least `least` times as stiff.
+  [[nodiscard]] double linear();
+  [[nodiscard]] double hardening(double least);
   [[nodiscard]] double speed(const State& state) const;
 
   const ContactSettings& settings_;
   const ContactSurface& surface_;
   const PairList& list_;
   const PairStates& states_;
-  double bound_ = 0;
+  double bound_ = 0, hardening_ = 0;
   std::uint64_t checked_builds_ = 0;
+  std::vector<double> elements_, parts_;  // of largest_row(); 0 beside it
 };
 
 }  // namespace flexel::simulate

@@ -18,12 +18,12 @@ Contacts::Contacts(ContactSettings settings, const Problem& problem)
       bound_(settings_, surface_, list_, states_),
       loads_(surface_, settings_.parts) {}
 
-void Contacts::update(const State& state) {
+void Contacts::update(const State& state, bool all) {
   if (list_.update(state)) {
     memory_.follow(list_.pairs());
     states_.reset();
   }
-  states_.update(state);
+  states_.update(state, all);
 }
 
 double Contacts::energy(const State& state) {
@@ -77,7 +77,7 @@ void Contacts::refuse_overlap(const State& state) const {
 
 double Contacts::frequency(const State& state) {
   if (points().empty()) return 0;
-  update(state);
+  update(state, true);
   return bound_.frequency(state);
 }
 
@@ -85,6 +85,7 @@ bool Contacts::needs_step_recheck(const State& state) {
   if (points().empty()) return false;
   if (bound_.moves_too_far(state)) return true;
   update(state);
+  if (!bound_.checked()) update(state, true);
   return bound_.is_exceeded();
 }
 
@@ -92,6 +93,7 @@ std::vector<double> Contacts::memory() const {
   std::vector<double> memory{list_.built() ? 1.0 : 0.0,
                              bound_.bound(),
                              bound_.checked() ? 1.0 : 0.0,
+                             bound_.hardening_bound(),
                              friction_.fresh() ? 1.0 : 0.0,
                              release_.energy(),
                              static_cast<double>(release_.known_parts()),
@@ -104,30 +106,30 @@ std::vector<double> Contacts::memory() const {
 }
 
 void Contacts::restore(const std::vector<double>& memory) {
-  constexpr std::size_t kHead = 8;
+  constexpr std::size_t kHead = 9;
   const auto count = [&](std::size_t at) {
     return memory.size() < kHead ? 0 : static_cast<std::size_t>(memory[at]);
   };
-  const std::size_t joined = count(5), releases = joined + 2 * count(6);
-  const std::size_t records = PairMemory::kValues * count(7);
+  const std::size_t joined = count(6), releases = joined + 2 * count(7);
+  const std::size_t records = PairMemory::kValues * count(8);
   std::vector<Vec3> built_at(list_.built_at().size());
   if (memory.size() != kHead + releases + records + 3 * built_at.size())
     throw InputError("the checkpoint's contacts are not those of its scene");
   const std::span<const double> values(memory);
-  release_.restore(values.subspan(kHead, releases), joined, memory[4]);
+  release_.restore(values.subspan(kHead, releases), joined, memory[5]);
   memory_.restore(values.subspan(kHead + releases, records));
   const double* from = memory.data() + kHead + releases + records;
   for (Vec3& at : built_at) {
     at = Vec3(from[0], from[1], from[2]);
     from += 3;
   }
-  friction_.set_fresh(memory[3] == 1);
+  friction_.set_fresh(memory[4] == 1);
   const bool built = memory[0] != 0;
   list_.rebuild_at(built ? &built_at : nullptr);
   if (!built) return;
   memory_.follow(list_.pairs());
   states_.reset();
-  bound_.restore(memory[1], memory[2] == 1);
+  bound_.restore(memory[1], memory[2] == 1, memory[3]);
 }
 
 std::vector<double> Contacts::transfer_state() const {

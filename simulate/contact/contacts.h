@@ -60,7 +60,8 @@ class Contacts {
   [[nodiscard]] std::vector<std::array<std::uint32_t, 2>> touching(const State& state);
 
  private:
-  void update(const State& state);
+  // `all`: candidates that cannot touch yet too, for the bound of the step.
+  void update(const State& state, bool all = false);
 
   ContactSettings settings_;
   ContactSurface surface_;

@@ -13,7 +13,8 @@ constexpr double kTurning = 0.4;  // by which the cosine between normals may cha
 // m, at most, between positions of two points that touch.
 double touching_distance(const ContactPoint& a, const ContactPoint& b) {
   if (a.radius > 0 && b.radius > 0) return a.radius + b.radius;
-  return std::hypot(std::max(a.width, b.width), a.depth + b.depth + a.radius + b.radius);
+  const double width = std::max(a.width, b.width), depth = a.depth + b.depth + a.radius + b.radius;
+  return std::sqrt(width * width + depth * depth);  // hypot() takes ten times as long
 }
 
 }  // namespace

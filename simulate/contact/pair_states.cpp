@@ -3,6 +3,10 @@
 #include "simulate/contact/pair_states.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
 
 namespace flexel::simulate {
 namespace {
@@ -23,50 +27,161 @@ void PairStates::reset() {
   states_.assign(list_.pairs().size(), PairState{});
   is_active_.assign(list_.pairs().size(), 0);
   active_.clear();
+  points_.resize(list_.points().size());
+  point_evaluation_.assign(points_.size(), 0);
+  const auto planes = static_cast<std::uint32_t>(surface_.body().parts.size());
+  std::vector<PairSchedule::Bodies> bodies;
+  for (const ContactPair& pair : list_.pairs())
+    bodies.push_back({list_.point(pair.i).part, pair.of_plane() ? planes : list_.point(pair.j).part});
+  schedule_.reset(std::move(bodies), planes + 1, surface_.narrowest());
+  moved_from_.clear();
+  find_cells();
 }
 
-bool PairStates::evaluated(const State& state) {
+// That carry points of the list; points that nothing of eight corners carries get one each.
+void PairStates::find_cells() {
+  const std::vector<std::uint32_t>& points = list_.points();
+  const auto elements_of = [&](std::uint32_t number) -> const auto& {
+    return list_.point(number).at.elements;
+  };
+  std::vector<std::uint32_t> order(points.size());
+  std::iota(order.begin(), order.end(), std::uint32_t{0});
+  std::sort(order.begin(), order.end(),
+            [&](std::uint32_t a, std::uint32_t b) { return elements_of(a) < elements_of(b); });
+  cells_.clear();
+  cell_of_.resize(points.size());
+  for (std::size_t n = 0; n < order.size(); ++n) {
+    const ContactPoint& point = list_.point(order[n]);
+    if (n == 0 || point.at.count != 8 || elements_of(order[n]) != elements_of(order[n - 1])) {
+      CarryingCell cell{point.part, order[n], {}, point.at.count == 8};
+      for (std::size_t a = 0; a < point.at.count; ++a)
+        cell.corners[a] = static_cast<std::uint32_t>(
+            std::lower_bound(list_.elements().begin(), list_.elements().end(), point.at.elements[a]) -
+            list_.elements().begin());
+      cells_.push_back(cell);
+    }
+    cell_of_[order[n]] = static_cast<std::uint32_t>(cells_.size() - 1);
+  }
+  shapes_.resize(cells_.size());
+  shape_evaluation_.assign(cells_.size(), 0);
+}
+
+// Since the last evaluation; without one in this list, none. The common way is that of the middle of all.
+std::vector<BodyMotion> PairStates::motion_to(const State& state) {
+  const std::vector<std::uint32_t>& elements = list_.elements();
+  const std::vector<Part>& parts = surface_.body().parts;
+  if (moved_from_.size() != elements.size()) {
+    moved_from_.resize(elements.size());
+    for (std::size_t e = 0; e < elements.size(); ++e) moved_from_[e] = state.displacement[elements[e]];
+    return {};
+  }
+  std::vector<Vec3> moves(elements.size());
+  std::vector<Box> of_body(parts.size() + 1);
+  Box all;
+  for (std::size_t e = 0, part = 0; e < elements.size(); ++e) {
+    while (elements[e] >= parts[part].element_end) ++part;
+    moves[e] = state.displacement[elements[e]] - moved_from_[e];
+    of_body[part].add(moves[e]);
+    moved_from_[e] = state.displacement[elements[e]];
+  }
+  if (!settings_.planes.empty()) of_body.back().add(Vec3::Zero());
+  for (const Box& each : of_body)
+    if (!each.empty()) all.add(each.min), all.add(each.max);
+  std::vector<BodyMotion> motions(of_body.size());
+  const Vec3 middle = 0.5 * (all.min + all.max);
+  for (std::size_t b = 0; b < of_body.size(); ++b) {
+    const Box& box = of_body[b];
+    if (box.empty()) continue;
+    motions[b].path = (box.max - middle).cwiseAbs().cwiseMax((box.min - middle).cwiseAbs()).norm();
+    motions[b].spread = 0.5 * box.diagonal();
+  }
+  for (const CarryingCell& cell : cells_) {
+    if (!cell.deforms) continue;
+    Mat3 change = Mat3::Zero();
+    for (std::size_t a = 0; a < 8; ++a)
+      change += moves[cell.corners[a]] * surface_.gradients(cell.part)[a].transpose();
+    motions[cell.part].turn = std::max(motions[cell.part].turn, change.norm());
+  }
+  return motions;
+}
+
+bool PairStates::evaluated(const State& state) const {
   const std::vector<std::uint32_t>& elements = list_.elements();
   bool same =
-      evaluated_builds_ == list_.builds() && release_.is_at(state) && evaluated_at_.size() == elements.size();
-  for (std::size_t e = 0; same && e < evaluated_at_.size(); ++e)
-    same = evaluated_at_[e] == state.displacement[elements[e]];
-  if (same) return true;
-  evaluated_builds_ = list_.builds();
-  evaluated_at_.resize(elements.size());
-  for (std::size_t e = 0; e < evaluated_at_.size(); ++e) evaluated_at_[e] = state.displacement[elements[e]];
-  return false;
+      evaluated_builds_ == list_.builds() && release_.is_at(state) && moved_from_.size() == elements.size();
+  for (std::size_t e = 0; same && e < elements.size(); ++e)
+    same = moved_from_[e] == state.displacement[elements[e]];
+  return same;
 }
 
-void PairStates::update(const State& state) {
-  if (evaluated(state)) return;
+void PairStates::update(const State& state, bool all) {
+  const bool same = evaluated(state);
+  if (same && (!all || evaluated_all_)) return;
   ++evaluations_;
-  points_.resize(list_.points().size());
-  parallel_for_each(
-      points_.size(), [&](std::size_t n) { points_[n] = surface_.at(list_.points()[n], state); }, 512);
+  evaluated_builds_ = list_.builds();
+  const std::vector<BodyMotion> motions = motion_to(state);
+  // what is released presses at other depths from step to step
+  const bool releases = release_.enabled() || release_.known_parts() < surface_.body().parts.size();
+  evaluated_all_ = all || releases || motions.empty();
+  if (evaluated_all_)
+    schedule_.wake_all();
+  else
+    schedule_.advance(motions);
+  find_points(state);
   if (release_.known_parts() < surface_.body().parts.size()) find_initial_penetrations(state);
   const std::vector<double> before = release_.advance(state);
+  for (const std::uint32_t p : active_) is_active_[p] = 0;
   admit(evaluate_pairs());
   active_.clear();
-  for (std::uint32_t p = 0; p < is_active_.size(); ++p)
+  for (const std::uint32_t p : schedule_.awake())
     if (is_active_[p]) active_.push_back(p);
   release_.enter_energy(before, active_, states_, memory_);
 }
 
-// Returns (pairs; empty without release) 1 for those that come near inside each other during a release; they
-// are not evaluated yet.
+// Of the pairs that are awake.
+void PairStates::find_points(const State& state) {
+  std::vector<std::uint32_t> points, cells;
+  const auto want = [&](std::uint32_t point) {
+    if (std::exchange(point_evaluation_[point], evaluations_) == evaluations_) return;
+    points.push_back(point);
+    if (std::exchange(shape_evaluation_[cell_of_[point]], evaluations_) != evaluations_)
+      cells.push_back(cell_of_[point]);
+  };
+  for (const std::uint32_t p : schedule_.awake()) {
+    const ContactPair& pair = list_.pairs()[p];
+    want(pair.i);
+    if (!pair.of_plane()) want(pair.j);
+  }
+  parallel_for_each(
+      cells.size(),
+      [&](std::size_t n) {
+        shapes_[cells[n]] = surface_.shape_at(list_.points()[cells_[cells[n]].point], state);
+      },
+      512);
+  parallel_for_each(
+      points.size(),
+      [&](std::size_t n) {
+        points_[points[n]] = surface_.at(list_.points()[points[n]], state, shapes_[cell_of_[points[n]]]);
+      },
+      512);
+}
+
+// Of the pairs that are awake. Returns (pairs; empty without release) 1 for those that come near inside each
+// other during a release; they are not evaluated yet.
 std::vector<std::uint8_t> PairStates::evaluate_pairs() {
   const std::vector<ContactPair>& pairs = list_.pairs();
+  const std::vector<std::uint32_t>& awake = schedule_.awake();
   std::vector<std::uint8_t> entering(release_.share_count() == 0 ? 0 : pairs.size(), 0);
   parallel_for_each(
-      pairs.size(),
-      [&](std::size_t p) {
+      awake.size(),
+      [&](std::size_t n) {
+        const std::uint32_t p = awake[n];
         PairRecord& record = memory_[p];
-        if (out_of_reach(pairs[p])) {
-          if (is_active_[p]) states_[p] = {};
-          is_active_[p] = 0;
-          record.phase = PairPhase::separated;
-          record.soft = 0;
+        const PairProximity proximity = pair_proximity(pairs[p], record);
+        const bool sleeps = schedule_.sleep(p, proximity.safe);
+        if (!proximity.near || (sleeps && !evaluated_all_)) {
+          record.phase = proximity.near ? PairPhase::approaching : PairPhase::separated;
+          if (!proximity.near) record.soft = 0;
           return;
         }
         const PairState now = evaluate(pairs[p], release_.allowed(pairs[p], record), record.soft);
@@ -76,7 +191,7 @@ std::vector<std::uint8_t> PairStates::evaluate_pairs() {
         else
           set(p, now);
       },
-      512);
+      256);
   return entering;
 }
 
@@ -113,10 +228,7 @@ void PairStates::find_initial_penetrations(const State& state) {
 
 void PairStates::set(std::size_t pair, PairState now) {
   update_phase(list_.pairs()[pair], now, memory_[pair].phase);
-  if (now.near)
-    states_[pair] = now;
-  else if (is_active_[pair])
-    states_[pair] = {};
+  states_[pair] = now;
   if (!now.near) memory_[pair].soft = 0;
   is_active_[pair] = now.near;
 }
@@ -197,17 +309,52 @@ void PairStates::finish_step(const State& state, double drift) {
       512);
 }
 
-// Whether the kernel is 0 for certain: |t|^2 = d^2 - (d . b)^2 / b^2, in the terms of pair_law.h, is beyond
-// its width by more than rounding.
-bool PairStates::out_of_reach(const ContactPair& pair) const {
-  constexpr double kRounding = 1e-9;
-  const double width = pair.properties.constants.width;
-  if (pair.of_plane() || !(width > 0)) return false;
-  const ContactSide &i = points_[pair.i].side, &j = points_[pair.j].side;
+// In the terms of pair_law.h. Beside a common way points go by at most kPoint times their bodies' paths; normals
+// change by at most |F^-1| times their bodies' turns, and the direction of contact, the mean of both, by twice
+// the larger of these over its length. Gap, offset and facing change accordingly; half of what there is may be
+// used up by either. kBounds covers that F changes meanwhile.
+PairStates::PairProximity PairStates::pair_proximity(const ContactPair& pair,
+                                                     const PairRecord& record) const {
+  constexpr double kRounding = 1e-9, kPoint = 1.2, kBounds = 1.5;
+  const PairConstants& constants = pair.properties.constants;
+  ContactSide i = points_[pair.i].side;
+  const ContactSide j = other_side(pair);
+  if (pair.of_plane()) i.own_plane = 0;
+  const double turning_i = kBounds * points_[pair.i].normal_rate,
+               turning_j = pair.of_plane() ? 0 : kBounds * points_[pair.j].normal_rate;
   const Vec3 d = j.position - i.position, b = i.own_plane * i.normal - j.own_plane * j.normal;
-  const double d2 = d.squaredNorm(), b2 = b.squaredNorm(), along = d.dot(b);
-  const double width2 = width * width;
-  return d2 * b2 - along * along > (width2 + kRounding * (width2 + d2)) * b2;
+  const double distance = d.norm(), length = b.norm();
+  PairProximity found;
+  const auto bear = [&](double margin, double rate) {
+    const SafeMotion safe =
+        rate > 0 ? SafeMotion{0.5 * margin / kPoint, 0.5 * margin / rate} : SafeMotion{margin / kPoint};
+    if (std::min(safe.path, safe.turn) > std::min(found.safe.path, found.safe.turn)) found.safe = safe;
+  };
+  if (i.radius > 0 && j.radius > 0) {
+    bear(distance - i.radius - j.radius - constants.law.softened(record.soft).ahead, 0);
+  } else if (length > 0) {
+    const double along = d.dot(b) / length;
+    const double rate = 2 * distance * std::max(i.own_plane * turning_i, j.own_plane * turning_j) / length;
+    const double offset2 = d.squaredNorm() - along * along, width = constants.width;
+    bear(along - i.radius - j.radius - constants.law.softened(record.soft).ahead, rate);
+    if (width > 0) {
+      if (offset2 > width * width + kRounding * (width * width + distance * distance)) found.near = false;
+      bear(std::sqrt(std::max(offset2, 0.0)) - width, 2 * rate);
+    }
+  } else {
+    found.near = false;  // two that have no plane of their own
+  }
+  if (i.normal != Vec3::Zero() && j.normal != Vec3::Zero()) {
+    const double facing = -i.normal.dot(j.normal), rate = std::max(turning_i, turning_j);
+    if (!(facing > constants.facing_from)) found.near = false;
+    const double margin = (constants.facing_from - facing) / rate;
+    if (rate > 0 && margin > std::min(found.safe.path, found.safe.turn))
+      found.safe = {std::numeric_limits<double>::infinity(), margin};
+  }
+  // what sticks pulls, and what was inside must be seen to come out
+  const bool watched = record.sticks() || record.phase == PairPhase::penetrated;
+  if (watched && found.near) found.safe = {0, 0};
+  return found;
 }
 
 }  // namespace flexel::simulate

@@ -1,6 +1,7 @@
 // Gaps, pressures and phases of the candidate pairs in the state that was evaluated last.
 #pragma once
 #include "simulate/contact/overlap_release.h"
+#include "simulate/contact/pair_schedule.h"
 
 namespace flexel::simulate {
 
@@ -13,8 +14,8 @@ class PairStates {
   // To a new list: no pair is evaluated.
   void reset();
   // Evaluates the pairs of the list in `state`, unless that was done for it already: the hooks of one step
-  // ask for the same state several times.
-  void update(const State& state);
+  // ask for the same state several times. Those that cannot touch are left out (PairSchedule), unless `all`.
+  void update(const State& state, bool all = false);
 
   // After a step of `drift` s that led to `state`, which is evaluated: how softly pairs begin to press.
   void finish_step(const State& state, double drift);
@@ -23,13 +24,25 @@ class PairStates {
   [[nodiscard]] const std::vector<PointState>& points() const { return points_; }  // (PairList::points())
   [[nodiscard]] const std::vector<PairState>& states() const { return states_; }   // (pairs)
   [[nodiscard]] const PairState& operator[](std::size_t pair) const { return states_[pair]; }
-  // Pairs whose state is `near`, ascending: most candidates are not.
+  // Evaluated pairs whose state is `near`, ascending: most candidates are not.
   [[nodiscard]] const std::vector<std::uint32_t>& active() const { return active_; }
   [[nodiscard]] bool is_active(std::size_t pair) const { return is_active_[pair] != 0; }
 
  private:
-  [[nodiscard]] bool evaluated(const State& state);
-  [[nodiscard]] bool out_of_reach(const ContactPair& pair) const;
+  struct PairProximity {
+    bool near = true;  // false for certain: beyond the kernel, or turned away
+    SafeMotion safe;   // before which it cannot press
+  };
+  struct CarryingCell {
+    std::uint32_t part = 0, point = 0;       // one of those that it carries
+    std::array<std::uint32_t, 8> corners{};  // in PairList::elements()
+    bool deforms = false;                    // else its point has no normal
+  };
+  [[nodiscard]] bool evaluated(const State& state) const;
+  void find_cells();
+  [[nodiscard]] std::vector<BodyMotion> motion_to(const State& state);
+  void find_points(const State& state);
+  [[nodiscard]] PairProximity pair_proximity(const ContactPair& pair, const PairRecord& record) const;
   [[nodiscard]] ContactSide other_side(const ContactPair& pair) const;
   // `allowed` [m]: penetration without pressure; `soft` [m]: of PairRecord.
   [[nodiscard]] PairState evaluate(const ContactPair& pair, double allowed, double soft) const;
@@ -45,12 +58,19 @@ class PairStates {
   const PairList& list_;
   PairMemory& memory_;
   OverlapRelease& release_;
-  std::vector<PointState> points_;
-  std::vector<PairState> states_;  // default where the pair is not active
+  PairSchedule schedule_;
+  std::vector<CarryingCell> cells_;
+  std::vector<CellShape> shapes_;                // (cells_) of points that are awake
+  std::vector<std::uint64_t> shape_evaluation_;  // (cells_) that they are of
+  std::vector<std::uint32_t> cell_of_;           // (points_)
+  std::vector<PointState> points_;               // of pairs that are awake
+  std::vector<std::uint64_t> point_evaluation_;  // (points_) that they are of
+  std::vector<PairState> states_;                // of active pairs
   std::vector<std::uint32_t> active_;
   std::vector<std::uint8_t> is_active_;  // (pairs)
-  std::vector<Vec3> evaluated_at_;       // (PairList::elements()) m, displacements
+  std::vector<Vec3> moved_from_;         // (PairList::elements()) m, displacements of the last evaluation
   std::uint64_t evaluated_builds_ = 0, evaluations_ = 0;
+  bool evaluated_all_ = false;
 };
 
 }  // namespace flexel::simulate

@@ -79,15 +79,10 @@ std::size_t ContactSurface::broken_cells() const {
                                    [&](std::size_t c) { return body_.broken[cells_[c]] != 0; });
 }
 
-PointState ContactSurface::at(std::uint32_t point, const State& state) const {
+CellShape ContactSurface::shape_at(std::uint32_t point, const State& state) const {
   const ContactPoint& from = points_[point];
-  PointState made;
-  made.side.position = from.rest;
-  for (std::uint32_t a = 0; a < from.at.count; ++a)
-    made.side.position += from.at.weights[a] * state.displacement[from.at.elements[a]];
-  made.side.own_plane = from.shape == ContactShape::face ? 1 : 0;
-  made.side.radius = from.radius;
-  if (from.shape == ContactShape::ball) return made;
+  CellShape shape;
+  if (from.shape == ContactShape::ball) return shape;
   Mat3 f = Mat3::Identity();
   if (from.at.count == 8)
     for (std::size_t a = 0; a < 8; ++a)
@@ -95,13 +90,29 @@ PointState ContactSurface::at(std::uint32_t point, const State& state) const {
   // The remains of a broken cell may have any shape and direction: whole faces and planes touch its points as
   // they touch those of edges, from all sides.
   const bool broken = cell_[point] != kNoCarrier && body_.broken[cell_[point]] != 0;
-  if (broken || !(f.determinant() > kLeastVolume && f.squaredNorm() < kMostStretch)) {
-    made.shapeless = true;
-    made.side.own_plane = 0;
+  shape.shapeless = broken || !(f.determinant() > kLeastVolume && f.squaredNorm() < kMostStretch);
+  if (!shape.shapeless) shape.inverse = f.inverse();
+  return shape;
+}
+
+PointState ContactSurface::at(std::uint32_t point, const State& state, const CellShape& shape) const {
+  const ContactPoint& from = points_[point];
+  PointState made;
+  static_cast<CellShape&>(made) = shape;
+  made.side.position = from.rest;
+  for (std::uint32_t a = 0; a < from.at.count; ++a)
+    made.side.position += from.at.weights[a] * state.displacement[from.at.elements[a]];
+  made.side.radius = from.radius;
+  if (from.shape == ContactShape::ball) return made;
+  if (shape.shapeless) {
+    made.normal_rate = std::numeric_limits<double>::infinity();
     return made;
   }
-  made.inverse = f.inverse();
-  made.side.normal = (made.inverse.transpose() * from.normal).normalized();
+  made.side.own_plane = from.shape == ContactShape::face ? 1 : 0;
+  made.side.normal = (shape.inverse.transpose() * from.normal).normalized();
+  // a bound of the spectral norm (Golub and Van Loan, section 2.3.3)
+  const Mat3 size = shape.inverse.cwiseAbs();
+  made.normal_rate = std::sqrt(size.colwise().sum().maxCoeff() * size.rowwise().sum().maxCoeff());
   return made;
 }
 

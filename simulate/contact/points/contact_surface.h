@@ -11,11 +11,16 @@
 
 namespace flexel::simulate {
 
-// A contact point in a state.
-struct PointState {
-  ContactSide side;
+// The matter around a point in a state.
+struct CellShape {
   Mat3 inverse = Mat3::Identity();  // F^-1 of its cell
-  bool shapeless = false;           // its cell is broken or too distorted for a normal
+  bool shapeless = false;           // the cell is broken or too distorted for a normal
+};
+
+// A contact point in a state.
+struct PointState : CellShape {
+  ContactSide side;
+  double normal_rate = 0;  // change of the normal, at most, by that of F; infinity where shapeless
 };
 
 // A part that does not deform.
@@ -43,7 +48,12 @@ class ContactSurface {
   [[nodiscard]] const std::optional<RigidPart>& rigid(std::uint32_t part) const { return rigid_[part]; }
   [[nodiscard]] bool prescribed(std::uint32_t part) const { return rigid_[part] && !rigid_[part]->free; }
 
-  [[nodiscard]] PointState at(std::uint32_t point, const State& state) const;
+  [[nodiscard]] PointState at(std::uint32_t point, const State& state) const {
+    return at(point, state, shape_at(point, state));
+  }
+  // The same for all points that one cell carries.
+  [[nodiscard]] CellShape shape_at(std::uint32_t point, const State& state) const;
+  [[nodiscard]] PointState at(std::uint32_t point, const State& state, const CellShape& shape) const;
   // Of those that carry points.
   [[nodiscard]] std::size_t broken_cells() const;
 

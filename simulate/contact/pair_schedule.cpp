@@ -1,0 +1,73 @@
+// All pairs are looked through only now and then, for those that are due soon.
+#include "simulate/contact/pair_schedule.h"
+
+#include <algorithm>
+#include <numeric>
+
+namespace flexel::simulate {
+namespace {
+
+constexpr double kLeastPath = 0.001, kLeastTurn = 0.0002;   // spacings and changes, of a body in a step
+constexpr double kHorizonPath = 0.05, kHorizonTurn = 0.02;  // of a pair
+
+}  // namespace
+
+void PairSchedule::reset(std::vector<Bodies> pairs, std::size_t bodies, double spacing) {
+  pairs_ = std::move(pairs);
+  spacing_ = spacing;
+  due_.resize(pairs_.size());
+  sum_.assign(bodies, {});
+  reach_.assign(bodies, {kLeastPath * spacing, kLeastPath * spacing, kLeastTurn});
+  wake_all();
+}
+
+void PairSchedule::wake_all() {
+  std::fill(due_.begin(), due_.end(), SafeMotion{0, 0});
+  awake_.resize(pairs_.size());
+  std::iota(awake_.begin(), awake_.end(), std::uint32_t{0});
+  left_ = {0, 0};
+}
+
+SafeMotion PairSchedule::sums(const Bodies& of, const std::vector<BodyMotion>& motions) const {
+  const BodyMotion &a = motions[of[0]], &b = motions[of[1]];
+  return {of[0] == of[1] ? 2 * a.spread : a.path + b.path, a.turn + b.turn};
+}
+
+bool PairSchedule::due(std::uint32_t pair, double ahead_path, double ahead_turn) const {
+  const SafeMotion now = sums(pairs_[pair], sum_), next = sums(pairs_[pair], reach_);
+  return due_[pair].path <= now.path + next.path + ahead_path ||
+         due_[pair].turn <= now.turn + next.turn + ahead_turn;
+}
+
+bool PairSchedule::sleep(std::uint32_t pair, const SafeMotion& safe) {
+  const SafeMotion now = sums(pairs_[pair], sum_);
+  due_[pair] = {now.path + safe.path, now.turn + safe.turn};
+  return !due(pair, 0, 0);
+}
+
+void PairSchedule::advance(std::span<const BodyMotion> motions) {
+  SafeMotion most{0, 0};
+  for (std::size_t b = 0; b < sum_.size(); ++b) {
+    const BodyMotion& now = motions[b];
+    sum_[b].path += now.path;
+    sum_[b].spread += now.spread;
+    sum_[b].turn += now.turn;
+    reach_[b] = {2 * now.path + kLeastPath * spacing_, 2 * now.spread + kLeastPath * spacing_,
+                 2 * now.turn + kLeastTurn};
+    most = {std::max({most.path, reach_[b].path, reach_[b].spread}), std::max(most.turn, reach_[b].turn)};
+  }
+  // reach_ is more than twice the motion: it pays for what the sums grow by and for the next reach
+  left_.path -= 2 * most.path;
+  left_.turn -= 2 * most.turn;
+  if (!(left_.path > 0) || !(left_.turn > 0)) {
+    left_ = {kHorizonPath * spacing_, kHorizonTurn};
+    soon_.clear();
+    for (std::uint32_t p = 0; p < pairs_.size(); ++p)
+      if (due(p, left_.path, left_.turn)) soon_.push_back(p);
+  }
+  awake_.clear();
+  for (const std::uint32_t p : soon_)
+    if (due(p, 0, 0)) awake_.push_back(p);
+}
+
+}  // namespace flexel::simulate

@@ -1,0 +1,58 @@
+// Which pairs a step has to look at: most candidates are far from touching, and bounds on the motion since a
+// pair was looked at last tell that they still are.
+//
+// Bodies are the parts and, behind them, the planes as one. In a step a body goes by at most its path p beside a
+// way common to all, by at most its spread s beside its own mean way, and the deformation gradients of its cells
+// change by at most t. A pair (a, b) sleeps until the sums of p_a + p_b (within a part: 2 s) or of t_a + t_b since
+// then have reached what it can bear.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+namespace flexel::simulate {
+
+struct BodyMotion {
+  double path = 0, spread = 0;  // m
+  double turn = 0;
+};
+
+// What a pair can bear before it may press.
+struct SafeMotion {
+  double path = 0;  // m
+  double turn = std::numeric_limits<double>::infinity();
+};
+
+class PairSchedule {
+ public:
+  using Bodies = std::array<std::uint32_t, 2>;
+
+  // To a new list of pairs of those bodies, all of them awake; `spacing` [m]: the narrowest.
+  void reset(std::vector<Bodies> pairs, std::size_t bodies, double spacing);
+  // After a step; the next one may go twice as far.
+  void advance(std::span<const BodyMotion> motions);
+  void wake_all();
+
+  // Lets the pair sleep if that is worth while; whether it does. Parallel, one call a pair.
+  bool sleep(std::uint32_t pair, const SafeMotion& safe);
+  // Ascending; of the last advance().
+  [[nodiscard]] const std::vector<std::uint32_t>& awake() const { return awake_; }
+
+ private:
+  // Sums of a pair, to compare with what it is due at.
+  [[nodiscard]] SafeMotion sums(const Bodies& of, const std::vector<BodyMotion>& motions) const;
+  [[nodiscard]] bool due(std::uint32_t pair, double ahead_path, double ahead_turn) const;
+
+  std::vector<Bodies> pairs_;
+  std::vector<SafeMotion> due_;       // (pairs) sums at which it has to be looked at
+  std::vector<BodyMotion> sum_;       // (bodies) since reset()
+  std::vector<BodyMotion> reach_;     // (bodies) of the next step
+  std::vector<std::uint32_t> soon_;   // those that may be due before left_ is used up, ascending
+  std::vector<std::uint32_t> awake_;  // those that may be due in the next step
+  SafeMotion left_{0, 0};             // m
+  double spacing_ = 0;
+};
+
+}  // namespace flexel::simulate
