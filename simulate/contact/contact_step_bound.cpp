@@ -8,7 +8,7 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr double kHardeningAhead = 1.3;              // growth of hardening until the next check
+constexpr double kLinearAhead = 1.1, kHardeningAhead = 1.3;  // growth until the next check
 constexpr double kRigidSafety = 4;                   // of rigid parts, whose whole impact is one oscillation
 constexpr double kTravel = 0.12, kMostTravel = 0.2;  // spacings a step: asked for, and allowed
 
@@ -89,7 +89,7 @@ double ContactStepBound::speed(const State& state) const {
 
 double ContactStepBound::frequency(const State& state) {
   hardening_ = kHardeningAhead * hardening(1);
-  bound_ = damped(linear() + hardening_, settings_.damping);
+  bound_ = damped(kLinearAhead * linear() + hardening_, settings_.damping);
   checked_builds_ = list_.builds();
   const double motion = 2 * speed(state) / (kTravel * surface_.narrowest());
   return bound_ + motion * motion;

@@ -1,6 +1,7 @@
 // Each hook first brings list and states of the pairs up to date.
 #include "simulate/contact/contacts.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "base/error.h"
@@ -16,7 +17,11 @@ Contacts::Contacts(ContactSettings settings, const Problem& problem)
       states_(settings_, surface_, list_, memory_, release_),
       friction_(settings_.damping, surface_, list_, states_, memory_),
       bound_(settings_, surface_, list_, states_),
-      loads_(surface_, settings_.parts) {}
+      loads_(surface_, settings_.parts) {
+  constexpr int kPatches = 2;  // depths are judged from places half a cell apart
+  if (std::count(settings_.parts.begin(), settings_.parts.end(), 1) > 1)
+    start_.emplace(problem, settings_.parts, kPatches);
+}
 
 void Contacts::update(const State& state, bool all) {
   if (list_.update(state)) {
@@ -71,8 +76,9 @@ double Contacts::injected_energy(const State& state) {
   return release_.take_energy();
 }
 
-void Contacts::refuse_overlap(const State& state) const {
-  refuse_initial_overlap(settings_, surface_, release_.known_parts(), state);
+void Contacts::refuse_overlap(const State& state) {
+  refuse_initial_overlap(settings_, start_ ? *start_ : surface_, release_.known_parts(), state);
+  start_.reset();
 }
 
 double Contacts::frequency(const State& state) {

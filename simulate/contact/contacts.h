@@ -43,7 +43,7 @@ class Contacts {
 
   // Throws InputError (simulate/contact/initial_overlap.h). Only before the first evaluation, and after an
   // event for the parts that have joined.
-  void refuse_overlap(const State& state) const;
+  void refuse_overlap(const State& state);
 
   // Resultants of the last step's forces on free rigid parts, about the origin; about the centres of mass.
   [[nodiscard]] const std::vector<RigidLoad>& rigid_loads() const { return loads_.rigid_loads(); }
@@ -65,6 +65,7 @@ class Contacts {
 
   ContactSettings settings_;
   ContactSurface surface_;
+  std::optional<ContactSurface> start_;  // finer, for refuse_overlap() of several parts
   PairList list_;
   PairMemory memory_;
   OverlapRelease release_;

@@ -42,7 +42,7 @@ bool PairSchedule::due(std::uint32_t pair, double ahead_path, double ahead_turn)
 bool PairSchedule::sleep(std::uint32_t pair, const SafeMotion& safe) {
   const SafeMotion now = sums(pairs_[pair], sum_);
   due_[pair] = {now.path + safe.path, now.turn + safe.turn};
-  return !due(pair, 0, 0);
+  return sleeps(pair);
 }
 
 void PairSchedule::advance(std::span<const BodyMotion> motions) {

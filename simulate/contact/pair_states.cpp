@@ -181,7 +181,7 @@ std::vector<std::uint8_t> PairStates::evaluate_pairs() {
         const bool sleeps = schedule_.sleep(p, proximity.safe);
         if (!proximity.near || (sleeps && !evaluated_all_)) {
           record.phase = proximity.near ? PairPhase::approaching : PairPhase::separated;
-          if (!proximity.near) record.soft = 0;
+          record.soft = 0;
           return;
         }
         const PairState now = evaluate(pairs[p], release_.allowed(pairs[p], record), record.soft);
@@ -291,6 +291,10 @@ void PairStates::finish_step(const State& state, double drift) {
         const std::uint32_t p = active_[n];
         const PairState& now = states_[p];
         double& soft = memory_[p].soft;
+        if (schedule_.sleeps(p)) {
+          soft = 0;  // what sleeps is far from touching without it
+          return;
+        }
         const ContactPair& pair = list_.pairs()[p];
         const double least = pair.properties.constants.law.soft, width = list_.point(pair.i).width;
         if (now.pressure > 0) {

@@ -1,4 +1,4 @@
-// Patches: surface_points() sorted by cell and half cell, gathered greedily by their normals.
+// Patches: surface_points() sorted by cell and place in it, gathered greedily by their normals.
 #include "simulate/contact/points/contact_points.h"
 
 #include <algorithm>
@@ -18,10 +18,10 @@ constexpr double kSamePatch = 0.94;  // cosine of 20 degrees
 constexpr double kBallReach = 1.4;   // spacings, from an element to points of the surface that may be nearest
 constexpr double kLeastPatch = 1e-5;  // of h^2; slivers carry nothing worth their time
 
-struct Piece {  // of surface, in its half cell
+struct Piece {  // of surface, in its cell or, with more patches, share of it
   const SurfacePoint* point = nullptr;
-  Index3 half{};
-  [[nodiscard]] auto key() const { return std::tie(point->at.elements, half); }
+  Index3 share{};
+  [[nodiscard]] auto key() const { return std::tie(point->at.elements, share); }
 };
 
 ContactPoint patch_of(const std::vector<const SurfacePoint*>& members, std::uint32_t part, double width) {
@@ -45,7 +45,7 @@ ContactPoint patch_of(const std::vector<const SurfacePoint*>& members, std::uint
   return made;
 }
 
-// The patches of the pieces [begin, end), all in one half cell.
+// The patches of the pieces [begin, end), all in one share of a cell.
 void gather(std::vector<Piece>::const_iterator begin, std::vector<Piece>::const_iterator end,
             std::uint32_t part, double width, std::vector<ContactPoint>& points) {
   std::vector<std::pair<Vec3, std::vector<const SurfacePoint*>>> patches;
@@ -65,16 +65,16 @@ void gather(std::vector<Piece>::const_iterator begin, std::vector<Piece>::const_
 }
 
 void add_faces(const Problem& problem, std::uint32_t part, const std::vector<SurfacePoint>& surface,
-               std::vector<ContactPoint>& points) {
+               int patches, std::vector<ContactPoint>& points) {
   const Lattice& lattice = problem.body.parts[part].lattice;
   std::vector<Piece> pieces;
   for (const SurfacePoint& point : surface) {
     if (!(point.area_vector.squaredNorm() > 0)) continue;
     const Vec3 at = lattice.to_lattice(point.position);
-    Index3 half;
+    Index3 share;
     for (int axis = 0; axis < 3; ++axis)
-      half[static_cast<std::size_t>(axis)] = static_cast<std::int32_t>(std::floor(2 * at[axis]));
-    pieces.push_back({&point, half});
+      share[static_cast<std::size_t>(axis)] = static_cast<std::int32_t>(std::floor(patches * at[axis]));
+    pieces.push_back({&point, share});
   }
   std::stable_sort(pieces.begin(), pieces.end(),
                    [](const Piece& a, const Piece& b) { return a.key() < b.key(); });
@@ -164,7 +164,8 @@ void measure_walls(std::vector<ContactPoint>& points) {
 
 }  // namespace
 
-std::vector<ContactPoint> contact_points(const Problem& problem, const std::vector<std::uint8_t>& parts) {
+std::vector<ContactPoint> contact_points(const Problem& problem, const std::vector<std::uint8_t>& parts,
+                                         int patches) {
   const Body& body = problem.body;
   std::vector<std::vector<std::uint32_t>> polygons(body.parts.size());
   for (std::uint32_t p = 0; p < body.surface.polygon_count(); ++p)
@@ -175,7 +176,7 @@ std::vector<ContactPoint> contact_points(const Problem& problem, const std::vect
     if (!parts[part]) continue;
     const std::vector<SurfacePoint> surface = surface_points(problem, polygons[part]);
     if (body.parts[part].placement == Placement::corner)
-      add_faces(problem, part, surface, points);
+      add_faces(problem, part, surface, patches, points);
     else
       add_balls(problem, triangles, part, surface, balls);
   }

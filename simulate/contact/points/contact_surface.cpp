@@ -20,8 +20,8 @@ constexpr double kMostStretch = 25;    // sum of squares of its stretches, above
 
 }  // namespace
 
-ContactSurface::ContactSurface(const Problem& problem, const std::vector<std::uint8_t>& parts)
-    : body_(problem.body), points_(contact_points(problem, parts)), mass_(lumped_masses(problem)) {
+ContactSurface::ContactSurface(const Problem& problem, const std::vector<std::uint8_t>& parts, int patches)
+    : body_(problem.body), points_(contact_points(problem, parts, patches)), mass_(lumped_masses(problem)) {
   for (std::size_t p = 0; p < body_.parts.size(); ++p) {
     std::array<Vec3, 8> gradients = cell_kind(body_.parts[p].lattice, problem.materials[p]).gradient;
     for (Vec3& each : gradients) each /= 4;

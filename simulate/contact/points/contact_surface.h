@@ -32,8 +32,9 @@ struct RigidPart {
 
 class ContactSurface {
  public:
-  // `parts` (parts): 1 for those that can touch. The body outlives this.
-  ContactSurface(const Problem& problem, const std::vector<std::uint8_t>& parts);
+  // `parts` (parts): 1 for those that can touch; `patches`: of the surface, across a cell. The body outlives
+  // this.
+  ContactSurface(const Problem& problem, const std::vector<std::uint8_t>& parts, int patches = 1);
 
   [[nodiscard]] const Body& body() const { return body_; }
   [[nodiscard]] const std::vector<ContactPoint>& points() const { return points_; }

@@ -11,8 +11,8 @@ namespace flexel::simulate {
 namespace {
 
 constexpr double kSharpEdge = 0.866;  // cosine of 30 degrees between the normals of the faces
-constexpr double kSpacing = 0.5;      // of the points along an edge, in spacings
-constexpr double kCrowded = 0.35;     // nearer than this to another one, in spacings, a point is left out
+constexpr double kSpacing = 1;        // of the points along an edge, in spacings
+constexpr double kCrowded = 0.7;      // nearer than this to another one, in spacings, a point is left out
 
 struct Edge {
   std::array<std::uint32_t, 2> ends{};  // welded vertices
@@ -124,7 +124,7 @@ class Sampler {
     made.at = *at;
     made.rest = position;
     made.normal = mean;
-    made.area = kSpacing * kSpacing * width * width;
+    made.area = 0.5 * kSpacing * width * width;
     made.depth = 0.5 * width;
     made.width = width;
     made.facing_from = widest - 0.3;
