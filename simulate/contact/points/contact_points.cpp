@@ -99,6 +99,43 @@ double distance_to_polygon(const Surface& surface, const Triangles& triangles, s
   return nearest;
 }
 
+// The polygons near a place, by cubes of kBallReach spacings.
+class PolygonsByCube {
+ public:
+  PolygonsByCube(const std::vector<SurfacePoint>& surface, double width) : width_(kBallReach * width) {
+    for (const SurfacePoint& point : surface) entries_.push_back({cube(point.position), point.polygon});
+    std::sort(entries_.begin(), entries_.end());
+    entries_.erase(std::unique(entries_.begin(), entries_.end()), entries_.end());
+  }
+
+  // Those with a point within kBallReach spacings of `at` are among them; ascending.
+  [[nodiscard]] std::vector<std::uint32_t> near(const Vec3& at) const {
+    std::vector<std::uint32_t> polygons;
+    const Cube middle = cube(at);
+    for (std::int64_t n = 0; n < 27; ++n) {
+      const Cube wanted{middle[0] + n % 3 - 1, middle[1] + n / 3 % 3 - 1, middle[2] + n / 9 - 1};
+      for (auto entry = std::lower_bound(entries_.begin(), entries_.end(), Entry{wanted, 0});
+           entry != entries_.end() && entry->first == wanted; ++entry)
+        polygons.push_back(entry->second);
+    }
+    std::sort(polygons.begin(), polygons.end());
+    polygons.erase(std::unique(polygons.begin(), polygons.end()), polygons.end());
+    return polygons;
+  }
+
+ private:
+  using Cube = std::array<std::int64_t, 3>;
+  using Entry = std::pair<Cube, std::uint32_t>;
+  [[nodiscard]] Cube cube(const Vec3& at) const {
+    Cube found{};
+    for (int axis = 0; axis < 3; ++axis)
+      found[static_cast<std::size_t>(axis)] = static_cast<std::int64_t>(std::floor(at[axis] / width_));
+    return found;
+  }
+  double width_ = 0;
+  std::vector<Entry> entries_;
+};
+
 // Elements at centres that carry surface: a ball that reaches to the surface. Balls of two parts, or of a part
 // and a plane, whose surfaces touch do not overlap then.
 void add_balls(const Problem& problem, const Triangles& triangles, std::uint32_t part,
@@ -108,26 +145,16 @@ void add_balls(const Problem& problem, const Triangles& triangles, std::uint32_t
   for (const SurfacePoint& point : surface) outer.push_back(point.at.elements[0]);
   std::sort(outer.begin(), outer.end());
   outer.erase(std::unique(outer.begin(), outer.end()), outer.end());
-  std::vector<Vec3> at;
-  for (const std::uint32_t element : outer) at.push_back(problem.body.rest[element]);
-  for (const SurfacePoint& point : surface) at.push_back(point.position);
-  // the nearest surface is of a polygon that has a point within kLongestEdge of it (surface_points.cpp)
-  const Neighbours near = neighbours_within(at, kBallReach * width, [&](std::uint32_t i, std::uint32_t j) {
-    return i < outer.size() && j >= outer.size();
-  });
-  for (std::uint32_t i = 0; i < outer.size(); ++i) {
-    std::vector<std::uint32_t> polygons;
-    for (const std::uint32_t j : near.of(i)) polygons.push_back(surface[j - outer.size()].polygon);
-    std::sort(polygons.begin(), polygons.end());
-    polygons.erase(std::unique(polygons.begin(), polygons.end()), polygons.end());
+  const PolygonsByCube polygons(surface, width);
+  for (const std::uint32_t element : outer) {
     ContactPoint made;
     made.shape = ContactShape::ball;
     made.part = part;
-    made.at = {{outer[i]}, {1}, 1};
-    made.rest = at[i];
+    made.at = {{element}, {1}, 1};
+    made.rest = problem.body.rest[element];
     made.area = width * width;
     made.radius = width;
-    for (const std::uint32_t polygon : polygons)
+    for (const std::uint32_t polygon : polygons.near(made.rest))
       made.radius =
           std::min(made.radius, distance_to_polygon(problem.body.surface, triangles, polygon, made.rest));
     made.depth = made.radius;
