@@ -33,7 +33,8 @@ constexpr double kLeastTolerance = 1e-7;
 constexpr double kAngle = 1.05;     // rad: no span of a turned surface is longer
 constexpr double kLongestSpan = 3;  // lattice spacings
 constexpr std::size_t kMostFirstSpans = 200;
-constexpr double kLooks = 2;  // a lattice spacing: what moves a single cell is seen
+constexpr double kStep = 1e-3;  // lattice spacings, of differences
+constexpr double kLooks = 2;    // a lattice spacing: what moves a single cell is seen
 
 // The intervals on which an adaptor is continuous of each order, as breaks.
 template <class Count, class Intervals>
@@ -88,6 +89,19 @@ struct Moved {
     to.push_back(map(point.XYZ()));
   }
 };
+
+// By how much the deformation lengthens what is short and near a point, at most: a bound on the spectral norm of its
+// gradient F, from the row sums of F^T F.
+double stretch_at(const PointMap& map, const gp_XYZ& at, double step) {
+  const gp_XYZ by[3] = {gp_XYZ(step, 0, 0), gp_XYZ(0, step, 0), gp_XYZ(0, 0, step)};
+  gp_XYZ column[3];
+  for (int i = 0; i < 3; ++i) column[i] = (map(at + by[i]) - map(at - by[i])) / (2 * step);
+  double largest = 0;
+  for (const gp_XYZ& a : column)
+    largest = std::max(largest,
+                       std::abs(a.Dot(column[0])) + std::abs(a.Dot(column[1])) + std::abs(a.Dot(column[2])));
+  return std::sqrt(largest);
+}
 
 TopoDS_Face forward(const TopoDS_Shape& face) {
   return TopoDS::Face(face.Oriented(TopAbs_FORWARD));
@@ -214,6 +228,9 @@ void DeformedGeometry::fit_edge(std::size_t i) {
   const PointMap map = faces_of_edge_.Contains(edge) && !faces_of_edge_.FindFromKey(edge).IsEmpty()
                            ? map_.of_face(faces_.FindIndex(faces_of_edge_.FindFromKey(edge).First()) - 1)
                            : map_.elsewhere();
+  // As those of vertices.
+  result.tolerance = BRep_Tool::Tolerance(edge) *
+                     stretch_at(map, curve->Value((begin + end) / 2).XYZ(), kStep * options_.spacing);
   const int looks =
       static_cast<int>(std::clamp(kLooks * length_of(curve, begin, end) / options_.spacing, 60.0, 10'000.0));
   Moved moved;
@@ -251,7 +268,10 @@ void DeformedGeometry::move_vertex(std::size_t i) {
   const PointMap map = on_face
                            ? map_.of_face(faces_.FindIndex(faces_of_vertex_.FindFromKey(vertex).First()) - 1)
                            : map_.elsewhere();
-  vertex_[i].point = gp_Pnt(map(BRep_Tool::Pnt(vertex).XYZ()));
+  const gp_XYZ at = BRep_Tool::Pnt(vertex).XYZ();
+  vertex_[i].point = gp_Pnt(map(at));
+  // The pcurves of its edges stay as they are, and so does what its tolerance covers: where they cross beside it.
+  vertex_[i].tolerance = BRep_Tool::Tolerance(vertex) * stretch_at(map, at, kStep * options_.spacing);
 }
 
 // An edge's covers the gaps to the surfaces that meet in it, a vertex's those of its edges. Looked at in every span of
@@ -280,12 +300,12 @@ void DeformedGeometry::widen_tolerances() {
           if (!ends[0].IsNull()) {
             const double distance = on.Distance(vertex_[vertices_.FindIndex(ends[0]) - 1].point);
             widen(0, distance);
-            edge.tolerance = std::max(edge.tolerance, kMargin * distance);
+            edge.gap = std::max(edge.gap, kMargin * distance);
           }
           continue;
         }
         const gp_Pnt along = edge.curve->Value(edge.begin + share * (edge.end - edge.begin));
-        edge.tolerance = std::max(edge.tolerance, kMargin * along.Distance(on) + 1e-9);
+        edge.gap = std::max(edge.gap, kMargin * along.Distance(on) + 1e-9);
         if (p != 0 && p != points) continue;
         const int end = p == 0 ? 0 : 1;
         if (ends[end].IsNull()) continue;
@@ -295,6 +315,7 @@ void DeformedGeometry::widen_tolerances() {
     }
   }
   for (std::size_t i = 0; i < edge_.size(); ++i) {
+    edge_[i].tolerance = std::max(edge_[i].tolerance, edge_[i].gap);
     TopoDS_Vertex ends[2];
     TopExp::Vertices(TopoDS::Edge(edges_(static_cast<Standard_Integer>(i) + 1)), ends[0], ends[1]);
     for (const TopoDS_Vertex& end : ends) {
@@ -307,7 +328,7 @@ void DeformedGeometry::widen_tolerances() {
 
 double DeformedGeometry::widest_gap() const {
   double widest = 0;
-  for (const DeformedEdge& edge : edge_) widest = std::max(widest, edge.tolerance);
+  for (const DeformedEdge& edge : edge_) widest = std::max(widest, edge.gap);
   return widest;
 }
 

@@ -39,6 +39,7 @@ struct DeformedFace {
 struct DeformedEdge {
   Handle(Geom_Curve) curve;  // null: the edge has none (degenerated)
   double begin = 0, end = 0;
+  double gap = 0;  // to the surfaces that meet in it, at most
   double tolerance = 1e-7;
   bool kept = false;
 };
@@ -49,7 +50,8 @@ struct DeformedVertex {
 };
 
 // What moves each face, edge and vertex of a shape. Surfaces are B-splines of phi(S(u, v)) in the parameters of S; curves
-// follow the surfaces that meet in them, so that edges lie on both; tolerances are what gaps remain.
+// follow the surfaces that meet in them, so that edges lie on both. Tolerances cover what gaps remain, and what those of
+// the shape covered.
 class DeformedGeometry {
  public:
   DeformedGeometry(const TopoDS_Shape& shape, const ShapeMap& map, const FitOptions& options);

@@ -79,44 +79,41 @@ double length_of(const Handle(Geom_Curve) & curve, double begin, double end) {
   return length;
 }
 
-namespace {
+FaceMask::Raster::Raster(std::size_t cells) : n(cells), known(cells * cells) {}
 
-constexpr std::size_t kRaster = 96;  // cells in each direction
-
-}  // namespace
-
-// A cell is whole where its middle and those of the eight cells around it are on one side; edges that pass between these
-// middles and touch none of the nine cells' are thinner than a cell, and a hole so small is not left out of a fit.
 FaceMask::FaceMask(const TopoDS_Face& face, const FaceDomain& domain)
-    : domain_(domain), classifier_(face, 1e-6), cells_(kRaster * kRaster, Cell::rim) {
-  std::vector<std::uint8_t> inside(kRaster * kRaster);
-  for (std::size_t j = 0; j < kRaster; ++j)
-    for (std::size_t i = 0; i < kRaster; ++i) {
-      const double u =
-          domain.u_begin + (domain.u_end - domain.u_begin) * (static_cast<double>(i) + 0.5) / kRaster;
-      const double v =
-          domain.v_begin + (domain.v_end - domain.v_begin) * (static_cast<double>(j) + 0.5) / kRaster;
-      inside[i + kRaster * j] = classifier_.Perform(gp_Pnt2d(u, v)) != TopAbs_OUT;
-    }
-  for (std::size_t j = 1; j + 1 < kRaster; ++j)
-    for (std::size_t i = 1; i + 1 < kRaster; ++i) {
-      std::size_t count = 0;
-      for (std::size_t b = j - 1; b <= j + 1; ++b)
-        for (std::size_t a = i - 1; a <= i + 1; ++a) count += inside[a + kRaster * b];
-      if (count == 9) cells_[i + kRaster * j] = Cell::inside;
-      if (count == 0) cells_[i + kRaster * j] = Cell::outside;
-    }
+    : domain_(domain), classifier_(face, 1e-6), coarse_(96), fine_(8 * coarse_.n) {}
+
+// Whether the middle of a cell is in the face.
+bool FaceMask::middle(Raster& raster, std::size_t i, std::size_t j) const {
+  Known& cell = raster.known[i + raster.n * j];
+  if (cell == Known::not_yet) {
+    const auto at = [&](std::size_t k, double begin, double end) {
+      return begin + (end - begin) * (static_cast<double>(k) + 0.5) / static_cast<double>(raster.n);
+    };
+    const gp_Pnt2d uv(at(i, domain_.u_begin, domain_.u_end), at(j, domain_.v_begin, domain_.v_end));
+    cell = classifier_.Perform(uv) != TopAbs_OUT ? Known::inside : Known::outside;
+  }
+  return cell == Known::inside;
 }
 
+// A coarse cell is whole where its middle and those of the eight cells around it are on one side; edges that pass
+// between these middles and touch none of the nine cells' are thinner than a cell, and a hole so small is not left out
+// of a fit.
 bool FaceMask::has(double u, double v) const {
-  const auto cell = [](double at, double begin, double end) {
-    const double place = std::floor((at - begin) / (end - begin) * static_cast<double>(kRaster));
-    return static_cast<std::size_t>(std::clamp(place, 0.0, static_cast<double>(kRaster - 1)));
+  const auto cell = [](double at, double begin, double end, const Raster& raster) {
+    const double place = std::floor((at - begin) / (end - begin) * static_cast<double>(raster.n));
+    return static_cast<std::size_t>(std::clamp(place, 0.0, static_cast<double>(raster.n - 1)));
   };
-  const Cell found =
-      cells_[cell(u, domain_.u_begin, domain_.u_end) + kRaster * cell(v, domain_.v_begin, domain_.v_end)];
-  if (found != Cell::rim) return found == Cell::inside;
-  return classifier_.Perform(gp_Pnt2d(u, v)) != TopAbs_OUT;
+  const std::size_t i = cell(u, domain_.u_begin, domain_.u_end, coarse_),
+                    j = cell(v, domain_.v_begin, domain_.v_end, coarse_);
+  const bool inside = middle(coarse_, i, j);
+  bool whole = i > 0 && j > 0 && i + 1 < coarse_.n && j + 1 < coarse_.n;
+  for (std::size_t k = 0; whole && k < 9; ++k)
+    whole = middle(coarse_, i + k % 3 - 1, j + k / 3 - 1) == inside;
+  if (whole) return inside;
+  return middle(fine_, cell(u, domain_.u_begin, domain_.u_end, fine_),
+                cell(v, domain_.v_begin, domain_.v_end, fine_));
 }
 
 bool FaceMask::has_near(double u, double v, double du, double dv) const {

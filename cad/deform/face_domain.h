@@ -21,8 +21,8 @@ struct FaceDomain {
 [[nodiscard]] double length_of(const Handle(Geom_Surface) & surface, const FaceDomain& domain, bool along_u);
 [[nodiscard]] double length_of(const Handle(Geom_Curve) & curve, double begin, double end);
 
-// Which parameters lie in the face: where errors of a fit count. What its edges pass by is looked up exactly, the rest in
-// a raster.
+// Which parameters lie in the face: where errors of a fit count. Looked up in rasters that are filled as they are asked;
+// what the face's edges pass by is told to 1/768 of the domain. One thread at a time.
 class FaceMask {
  public:
   FaceMask(const TopoDS_Face& face, const FaceDomain& domain);
@@ -31,10 +31,17 @@ class FaceMask {
   [[nodiscard]] bool has_near(double u, double v, double du, double dv) const;
 
  private:
-  enum class Cell : std::uint8_t { outside, rim, inside };
+  enum class Known : std::uint8_t { not_yet, outside, inside };
+  struct Raster {
+    explicit Raster(std::size_t cells);
+    std::size_t n;             // cells in each direction
+    std::vector<Known> known;  // (n * n) of their middles
+  };
+  [[nodiscard]] bool middle(Raster& raster, std::size_t i, std::size_t j) const;
+
   FaceDomain domain_;
   mutable BRepTopAdaptor_FClass2d classifier_;
-  std::vector<Cell> cells_;
+  mutable Raster coarse_, fine_;
 };
 
 }  // namespace flexel::cad

@@ -12,6 +12,7 @@
 #include <BRepPrimAPI_MakeCylinder.hxx>
 #include <BRepPrimAPI_MakeSphere.hxx>
 #include <BRepPrimAPI_MakeTorus.hxx>
+#include <BRep_Builder.hxx>
 #include <BRep_Tool.hxx>
 #include <GProp_GProps.hxx>
 #include <Geom_CylindricalSurface.hxx>
@@ -20,6 +21,7 @@
 #include <TopExp.hxx>
 #include <TopExp_Explorer.hxx>
 #include <TopoDS.hxx>
+#include <TopoDS_Edge.hxx>
 #include <TopoDS_Face.hxx>
 #include <cmath>
 
@@ -123,6 +125,26 @@ TEST(DeformShape, ARigidMotionKeepsPlanesAndCylinders) {
   const DeformedShape moved = deform_shape(drilled, geometry);
   EXPECT_TRUE(BRepCheck_Analyzer(moved.shape).IsValid());
   EXPECT_NEAR(volume(moved.shape) / volume(drilled), 1, 1e-9);
+}
+
+// Pcurves stay, so whatever the tolerance of an edge or a vertex covers in the shape has to be covered after it.
+TEST(DeformShape, TolerancesOfTheShapeAreKept) {
+  const TopoDS_Shape box = BRepPrimAPI_MakeBox(60, 20, 12).Shape();
+  TopTools_IndexedMapOfShape edges;
+  TopExp::MapShapes(box, TopAbs_EDGE, edges);
+  const TopoDS_Edge edge = TopoDS::Edge(edges(3));
+  BRep_Builder().UpdateEdge(edge, 0.02);
+  BRep_Builder().UpdateVertex(TopExp::FirstVertex(edge), 0.05);
+  const auto longer = [](const gp_XYZ& p) { return gp_XYZ(2 * p.X(), 2 * p.Y(), 2 * p.Z()); };
+  for (const PointMap& map : {PointMap(shear), PointMap(longer)}) {
+    const double stretch = map(gp_XYZ(1, 0, 0)).X() > 1.5 ? 2 : 1;
+    const DeformedGeometry geometry(box, same_everywhere(map), {kTolerance, 5});
+    const DeformedShape deformed = deform_shape(box, geometry);
+    const TopoDS_Edge after = TopoDS::Edge(deformed.image(edge));
+    EXPECT_GE(BRep_Tool::Tolerance(after), stretch * 0.02 * (1 - 1e-9));
+    EXPECT_GE(BRep_Tool::Tolerance(TopExp::FirstVertex(after)), stretch * 0.05 * (1 - 1e-9));
+    EXPECT_LT(geometry.widest_gap(), 0.01);  // what is told of gaps is measured
+  }
 }
 
 // OpenCASCADE meshes each face with the points of its edges: a face that it cannot mesh is left out without a word.
