@@ -282,6 +282,22 @@ std::string info_json(const Surface& surface, const Known& known) {
   return Json{{"files", files}}.dump(2) + "\n";
 }
 
+// What a scene can name, a line each.
+std::string words_of(const Surface& surface) {
+  std::string text = "xmin\nxmax\nymin\nymax\nzmin\nzmax\n";
+  for (const SurfacePart& part : surface.parts) text += printable(part.name) + "\n";
+  const std::vector<std::uint32_t> numbers = face_numbers(surface);
+  for (std::uint32_t f = 0; f < surface.faces.size(); ++f)
+    text += printable(selection_of(f, numbers, surface, surface.parts[surface.faces[f].part].name)) + "\n";
+  return text;
+}
+
+void print(const std::string& text) {
+  OutputFile out("-", false);
+  out.write(text);
+  out.commit();
+}
+
 // The surface as a new PLY with the wall thickness at every vertex, in the unit of the coordinates; 0 where
 // there is none.
 void write_thickness(Surface surface, const std::string& path) {
@@ -300,10 +316,12 @@ void write_thickness(Surface surface, const std::string& path) {
 int info_command(int argc, char** argv) {
   std::vector<std::string> files;
   std::string unit, edge, thickness;
-  bool json = false;
+  bool json = false, words = false;
   CommandLine app{"What a part is, and what a scene can name in it.", "flexel info"};
   app.add_option("part", files, read_titles() + " files; -: stdin").required().type_name("PART");
-  app.add_flag("--json", json, "As JSON, in SI units (docs/guide/info.md)");
+  const Option as_json = app.add_flag("--json", json, "As JSON, in SI units (docs/guide/info.md)");
+  app.add_flag("--words", words, "The names alone that a scene can use, a line each, for completion")
+      .excludes(as_json);
   app.add_option("--unit", unit, "Unit of files that carry none (default mm)").type_name("UNIT");
   app.add_option("--edge", edge, "Split the mesh to this longest edge (default: not split)")
       .type_name("LENGTH");
@@ -326,12 +344,14 @@ int info_command(int argc, char** argv) {
   options.warn = [&](const std::string& line) { progress.warn(line); };
   Surface surface = import_surface(files.front(), options);
   for (std::size_t f = 1; f < files.size(); ++f) append(surface, import_surface(files[f], options));
+  if (words) {
+    print(words_of(surface));
+    return kExitDone;
+  }
   for (const std::string& line : size_warnings(surface)) progress.warn(line);
   const Known known = look_at(surface);
   if (!thickness.empty()) write_thickness(surface, thickness);
-  OutputFile out("-", false);
-  out.write(json ? info_json(surface, known) : printable_lines(info_text(surface, known)));
-  out.commit();
+  print(json ? info_json(surface, known) : printable_lines(info_text(surface, known)));
   return kExitDone;
 }
 

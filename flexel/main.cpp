@@ -1,7 +1,9 @@
 // The program flexel: `flexel COMMAND ...`.
 #include <fmt/format.h>
 
+#include <iterator>
 #include <string>
+#include <vector>
 
 #include "base/error.h"
 #include "base/files/files.h"
@@ -52,16 +54,40 @@ void print(const std::string& text) {
   out.commit();
 }
 
-bool is_stage(const std::string& command) {
-  return command == "voxelize" || command == "simulate" || command == "map";
+// The commands that this program runs itself; `help` and the stage programs beside them.
+struct Command {
+  const char* name;
+  int (*run)(int argc, char** argv);
+};
+constexpr Command kCommands[] = {{"deform", deform_command},
+                                 {"compare", compare_command},
+                                 {"export", export_command},
+                                 {"info", info_command},
+                                 {"picture", picture_command},
+                                 {"materials", materials_command},
+                                 {"scene-keys", scene_keys_command},
+                                 {"measure", measure_command},
+                                 {"study", study_command}};
+constexpr const char* kStages[] = {"voxelize", "simulate", "map"};
+
+std::vector<std::string> command_names() {
+  std::vector<std::string> names;
+  for (const Command& command : kCommands) names.emplace_back(command.name);
+  names.insert(names.end(), std::begin(kStages), std::end(kStages));
+  return names;
 }
 
-[[noreturn]] void unknown_command(const std::string& command) {
-  const std::vector<std::string> commands = {"deform",    "compare",    "export",  "info",  "picture",
-                                             "materials", "scene-keys", "measure", "study", "voxelize",
-                                             "simulate",  "map",        "help"};
-  throw InputError(fmt::format("unknown command \"{}\"; the commands are {}{}", command,
-                               fmt::join(commands, ", "), did_you_mean(command, commands)));
+// Runs the command argv[0].
+int run_command(int argc, char** argv) {
+  const std::string name = argv[0];
+  for (const Command& command : kCommands)
+    if (name == command.name) return command.run(argc, argv);
+  for (const char* stage : kStages)
+    if (name == stage) run_stage_program(stage, argv);
+  std::vector<std::string> names = command_names();
+  names.emplace_back("help");
+  throw InputError(fmt::format("unknown command \"{}\"; the commands are {}{}", name, fmt::join(names, ", "),
+                               did_you_mean(name, names)));
 }
 
 int help(int argc, char** argv) {
@@ -71,43 +97,26 @@ int help(int argc, char** argv) {
   }
   std::string option = "--help";
   char* arguments[] = {argv[1], option.data(), nullptr};
-  const std::string command = argv[1];
-  if (command == "deform") return deform_command(2, arguments);
-  if (command == "compare") return compare_command(2, arguments);
-  if (command == "export") return export_command(2, arguments);
-  if (command == "materials") return materials_command(2, arguments);
-  if (command == "scene-keys") return scene_keys_command(2, arguments);
-  if (command == "measure") return measure_command(2, arguments);
-  if (command == "study") return study_command(2, arguments);
-  if (command == "info") return info_command(2, arguments);
-  if (command == "picture") return picture_command(2, arguments);
-  if (is_stage(command)) run_stage_program(argv[1], arguments);
-  unknown_command(command);
+  return run_command(2, arguments);
 }
 
 int run(int argc, char** argv) {
-  if (argc < 2)
-    throw InputError(
-        "a command is missing: deform, compare, export, info, picture, materials, scene-keys, measure, "
-        "study, "
-        "voxelize, simulate or map (`flexel help`)");
+  if (argc < 2) {
+    const std::vector<std::string> names = command_names();
+    throw InputError(fmt::format("a command is missing: {} or {} (`flexel help`)",
+                                 fmt::join(names.begin(), names.end() - 1, ", "), names.back()));
+  }
   const std::string command = argv[1];
   if (command == "--version") {
     print(fmt::format("flexel {}\n", version()));
     return kExitDone;
   }
+  if (command == "--describe-arguments") {  // as every command does with its own (base/program/arguments.h)
+    for (const std::string& name : command_names()) print(fmt::format("subcommand\t{}\n", name));
+    return kExitDone;
+  }
   if (command == "help" || command == "--help" || command == "-h") return help(argc - 1, argv + 1);
-  if (command == "deform") return deform_command(argc - 1, argv + 1);
-  if (command == "compare") return compare_command(argc - 1, argv + 1);
-  if (command == "materials") return materials_command(argc - 1, argv + 1);
-  if (command == "scene-keys") return scene_keys_command(argc - 1, argv + 1);
-  if (command == "measure") return measure_command(argc - 1, argv + 1);
-  if (command == "export") return export_command(argc - 1, argv + 1);
-  if (command == "study") return study_command(argc - 1, argv + 1);
-  if (command == "info") return info_command(argc - 1, argv + 1);
-  if (command == "picture") return picture_command(argc - 1, argv + 1);
-  if (is_stage(command)) run_stage_program(argv[1], argv + 1);
-  unknown_command(command);
+  return run_command(argc - 1, argv + 1);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <optional>
+#include <string_view>
 
 #include "base/error.h"
 #include "base/files/files.h"
@@ -15,6 +16,8 @@
 
 namespace flexel {
 namespace {
+
+constexpr std::string_view kDescribe = "--describe-arguments";
 
 void collect_options(const CLI::App& app, std::vector<std::string>& names) {
   for (const CLI::Option* option : app.get_options()) {
@@ -44,6 +47,29 @@ void refuse_empty_values(int argc, char** argv) {
       throw InputError(fmt::format("{}: its value is empty; --help shows what is accepted",
                                    word.substr(0, word.size() - 1)));
   }
+}
+
+// CLI11 writes "--no-x{false}" of flags that switch something off: how it stores them, which helps nobody.
+std::string without_false(std::string text) {
+  static constexpr std::string_view kFalse = "{false}";
+  for (std::size_t at = 0; (at = text.find(kFalse, at)) != std::string::npos;)
+    text.replace(at, kFalse.size(), kFalse.size(), ' ');
+  return text;
+}
+
+// A line an argument, its fields set apart by tabs: kind, names, value ("" of a flag), default, description. From these
+// lines man pages and completions are made (tools/interface_files.py).
+std::string described(const CLI::App& app) {
+  std::string text = fmt::format("command\t{}\t\t\t{}\n", app.get_name(), one_line(app.get_description()));
+  for (const CLI::Option* option : app.get_options()) {
+    const bool positional = option->get_positional();
+    const std::string value = option->get_items_expected_max() == 0 ? "" : option->get_type_name();
+    const std::string many = option->get_items_expected_max() > 1 && !value.empty() ? " ..." : "";
+    text += fmt::format("{}\t{}\t{}{}\t{}\t{}\n", positional ? "argument" : "option",
+                        without_false(option->get_name(positional, !positional)), value, many,
+                        one_line(option->get_default_str()), one_line(option->get_description()));
+  }
+  return text;
 }
 
 }  // namespace
@@ -102,12 +128,17 @@ bool parse_arguments(CommandLine& line, int argc, char** argv) {
     const std::string name = app.get_name().empty() ? stem(argv[0]) : app.get_name();
     app.set_version_flag("--version", name + " " + version(), "Print the version and exit");
   }
+  if (argc == 2 && std::string_view(argv[1]) == kDescribe) {
+    if (app.get_name().empty()) app.name(stem(argv[0]));
+    print_to_stdout(described(app));
+    return false;
+  }
   refuse_empty_values(argc, argv);
   try {
     app.parse(argc, argv);
     return true;
   } catch (const CLI::CallForHelp&) {
-    print_to_stdout(app.help());
+    print_to_stdout(without_false(app.help()));
   } catch (const CLI::CallForAllHelp&) {
     print_to_stdout(app.help("", CLI::AppFormatMode::All));
   } catch (const CLI::CallForVersion& version_text) {

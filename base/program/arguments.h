@@ -56,7 +56,8 @@ class CommandLine {
 };
 
 // Parses the arguments. --help and --version print and yield their exit code (0); a wrong argument throws
-// InputError with the nearest valid option where one is near. Returns true when the program should go on,
+// InputError with the nearest valid option where one is near. --describe-arguments alone prints them for the makers of
+// man pages and completions. Returns true when the program should go on,
 // false when it is done (help or version was printed).
 [[nodiscard]] bool parse_arguments(CommandLine& line, int argc, char** argv);
 

@@ -61,6 +61,12 @@ std::string materials_markdown() {
   return text;
 }
 
+std::string materials_words() {
+  std::string text;
+  for (const simulate::Material& material : simulate::material_library()) text += material.name + "\n";
+  return text;
+}
+
 std::string materials_json() {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const simulate::Material& material : simulate::material_library()) {

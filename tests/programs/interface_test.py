@@ -1,0 +1,92 @@
+"""Man pages and completions (tools/interface-files) say what --help says, and complete what a user would type."""
+
+import gzip
+import pathlib
+import re
+import shutil
+import subprocess
+
+from harness import BIN, SOURCE, Skip, ascii_stl, box_triangles, expect, expect_error, expect_ok, main, run, shell
+
+SHARE = pathlib.Path("share")
+STAGES = ["flexel-voxelize", "flexel-simulate", "flexel-map"]
+
+
+def make():
+    expect_ok(run("/usr/bin/python3", "-B", SOURCE / "tools/interface-files", BIN, SHARE))
+
+
+def commands():
+    listed = expect_ok(run("flexel", "--describe-arguments")).out.decode().splitlines()
+    return [line.split("\t")[1] for line in listed]
+
+
+def completions(line):
+    """What bash offers at the end of `line`, whose last word is the one to complete ("" after a blank)."""
+    script = f"""source share/bash-completion/completions/flexel
+    eval "COMP_WORDS=({line})"; [[ "{line[-1]}" != " " ]] || COMP_WORDS+=("")
+    COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1)); _flexel "${{COMP_WORDS[0]}}"; printf '%s\\n' "${{COMPREPLY[@]}}" """
+    return [word for word in expect_ok(shell(script)).out.decode().splitlines() if word]
+
+
+def test_every_option_of_help_is_in_its_man_page():
+    make()
+    for name in commands():
+        help_text = expect_ok(run("flexel", name, "--help")).out.decode()
+        page = gzip.decompress((SHARE / f"man/man1/{'flexel-' + name}.1.gz").read_bytes()).decode().replace("\\-", "-")
+        for option in re.findall(r"^ +(?:-\w,)?(--[\w-]+)", help_text, re.MULTILINE):
+            expect(f"\\fB{option}\\fR" in page, f"{option} is not in the page of flexel {name}")
+    front = gzip.decompress((SHARE / "man/man1/flexel.1.gz").read_bytes()).decode()
+    expect(all(f"flexel-{name}" in front.replace("\\-", "-") for name in commands()), front)
+
+
+def test_man_pages_are_sound_roff():
+    if not shutil.which("man"):
+        raise Skip("no man")
+    make()
+    for page in sorted(SHARE.glob("man/man1/*.gz")):
+        done = subprocess.run(["man", "--warnings", "-E", "UTF-8", "-l", "-Tutf8", "-Z", str(page)], capture_output=True, text=True, check=False)
+        expect(done.returncode == 0 and not done.stderr.strip(), f"{page}: {done.stderr}")
+
+
+def test_bash_completes_commands_options_and_words():
+    make()
+    expect(completions("flexel de") == ["deform"], completions("flexel de"))
+    expect(set(completions("flexel ")) >= set(commands()), completions("flexel "))
+    expect("--material" in completions("flexel deform --ma"), completions("flexel deform --ma"))
+    expect(completions("flexel deform a.stl --heal wr") == ["wrap"], completions("flexel deform a.stl --heal wr"))
+    expect(completions("flexel-map --method sm") == ["smooth"], completions("flexel-map --method sm"))
+    expect(completions("flexel map --method sm") == ["smooth"], completions("flexel map --method sm"))
+    expect(set(completions("flexel deform --model ")) == {"cells", "quadratic", "springs", "paper"}, completions("flexel deform --model "))
+    expect("mm" in completions("flexel info --unit "), completions("flexel info --unit "))
+
+
+def test_bash_completes_materials_and_faces_of_the_part():
+    make()
+    pathlib.Path("my part.stl").write_bytes(ascii_stl(box_triangles()))
+    expect(completions("flexel deform x --material spring") == ["spring\\ steel"], completions("flexel deform x --material spring"))
+    names = expect_ok(run("flexel", "info", "--words", "my part.stl")).out.decode().splitlines()
+    expect("zmax" in names and any(name.endswith("/6") for name in names), names)
+    offered = completions("flexel deform my\\ part.stl --fix ")
+    expect(set(offered) == {name.replace(" ", "\\ ") for name in names}, offered)
+    expect(completions("flexel deform my\\ part.stl --push zm") == ["zmax", "zmin"], completions("flexel deform my\\ part.stl --push zm"))
+    expect_error(run("flexel", "info", "--words", "--json", "my part.stl"), "flexel", "excludes")
+
+
+def test_other_shells_read_theirs():
+    make()
+    missing = [shell_name for shell_name in ("zsh", "fish") if not shutil.which(shell_name)]
+    for program, path in (("zsh", "zsh/vendor-completions/_flexel"), ("fish", "fish/vendor_completions.d/flexel.fish")):
+        if program not in missing:
+            expect_ok(run(program, "-n", SHARE / path))
+    if "fish" not in missing:
+        pathlib.Path("a.stl").write_bytes(ascii_stl(box_triangles()))
+        script = f"set PATH {BIN} $PATH; source {SHARE}/fish/vendor_completions.d/flexel.fish; complete -C 'flexel deform a.stl --fix zm'"
+        offered = expect_ok(run("fish", "-N", "-c", script)).out.decode()
+        expect("zmax" in offered and "zmin" in offered, offered)
+    if len(missing) == 2:
+        raise Skip("neither zsh nor fish")
+
+
+if __name__ == "__main__":
+    main(globals())
