@@ -52,11 +52,26 @@ std::size_t threads_that_start(std::size_t wanted) {
   return started.size() + 1;
 }
 
+// What is thrown by neither OpenCASCADE nor for the file's sake is a fault of ours.
+template <class Result, class Work>
+JobAnswer<Result> answer_or_fault(const Work& work) {
+  try {
+    return answer_of<Result>(work);
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception& fault) {
+    JobAnswer<Result> answer;
+    answer.failed = true;
+    answer.why = fault.what();
+    return answer;
+  }
+}
+
 template <class Result, class Work>
 Bytes answer(std::size_t threads, const Work& work) {
   OSD_Parallel::SetUseOcctThreads(Standard_True);
   OSD_ThreadPool::DefaultPool(static_cast<int>(threads_that_start(threads)));
-  return pack(answer_of<Result>([&](const Warn& warn) -> Result {
+  return pack(answer_or_fault<Result>([&](const Warn& warn) -> Result {
     try {
       return work(warn);
     } catch (const Standard_OutOfMemory&) {

@@ -2,6 +2,7 @@
 // is found before the first stage runs, and nothing is written before the last has ended.
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "base/files/files.h"
@@ -328,8 +329,10 @@ class GoalRuns {
  private:
   // s, for the first answer of a model that nobody asked for.
   [[nodiscard]] double patience() const {
-    constexpr double kShare = 0.3, kUsual = 30;
-    return (plan_.goal->by_default ? 3 : 1) * kShare * plan_.goal->within.value_or(kUsual);  // it may be busy
+    constexpr double kShare = 0.3, kUsualShare = 0.45, kUsual = 30;
+    const AccuracyGoal& goal = *plan_.goal;
+    return (goal.by_default ? kUsualShare * slowed_by_others(goal.began) : kShare) *
+           goal.within.value_or(kUsual);
   }
   [[nodiscard]] std::size_t usual_count() const {
     const bool few = plan_.goal->within.value_or(kShort) < kShort;
@@ -355,9 +358,19 @@ class GoalRuns {
       return run;
     }
     Job job = plan_.job;  // anew for each body: an action that throws leaves none out
-    add_actions(job, run.voxels.body);
-    run.simulated =
-        simulate::simulate(run.voxels.body, job.scene, simulate_options(arguments_, plan_), quiet_);
+    simulate::SimulateOptions asked = simulate_options(arguments_, plan_);
+    if (solved_) asked.failed_output.clear();  // there is a result
+    ++tries_;
+    try {
+      add_actions(job, run.voxels.body);
+      run.simulated = simulate::simulate(run.voxels.body, job.scene, asked, quiet_);
+    } catch (const InputError&) {
+      voxelize::report(run.voxels, quiet_);  // its warnings may say why
+      throw;
+    }
+    std::error_code ignored;
+    if (!solved_ && tries_ > 1) std::filesystem::remove(asked.failed_output, ignored);  // of one before
+    solved_ = true;
     began = std::chrono::steady_clock::now();
     use_field(run.voxels.body, arguments_.map, plan_.map);
     run.mapped = map(run, plan_.map.method).displacement;
@@ -373,6 +386,8 @@ class GoalRuns {
   const Surface& surface_;
   Progress& progress_;
   Progress quiet_{"flexel", Progress::Mode::quiet};
+  int tries_ = 0;
+  bool solved_ = false;  // one of them
   HeldWarnings warnings_;
   ModelChoice model_;
   double usual_size_ = 0;  // m, of a lattice for model `cells`
@@ -393,9 +408,7 @@ SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surf
           0.25 * *plan.goal->error)
     plan.map.method = &mapping::kSmooth;
   accuracy.method = name_of(plan.map.method);
-  if (!runs.model().why_not().empty())
-    progress.say(fmt::format("model quadratic, for thin walls, found no answer ({}): model cells is used",
-                             runs.model().why_not()));
+  accuracy.dropped_model = runs.model().why_not();
   if (runs.model().chosen())
     progress.say(
         fmt::format("model quadratic: a fifth of the matter lies in walls thinner than {} of the usual cells "
@@ -453,7 +466,7 @@ bool suits_quadratic(const SolvedRun& run) {
 // What to do next, of this run.
 std::string next_step(const SolvedRun& run, const std::optional<AccuracyReport>& accuracy) {
   if (!accuracy) return "";
-  if (suits_quadratic(run) && has_thin_walls(run))
+  if (suits_quadratic(run) && has_thin_walls(run) && accuracy->dropped_model.empty())
     return "--model quadratic is made for walls as thin as these";
   std::string chosen_for;
   if (accuracy->goal.error) chosen_for += human_share(*accuracy->goal.error);
@@ -480,6 +493,13 @@ void write_summary(const SolvedRun& run, const mapping::MapReport& mapped, const
   write_text(summary.dump(2) + "\n", path);
 }
 
+void say_dropped_model(const AccuracyReport& accuracy, Progress& progress) {
+  if (accuracy.dropped_model.empty()) return;
+  progress.say(fmt::format(
+      "walls are thin here, and model quadratic, made for such, gave no answer ({}): model cells is used",
+      accuracy.dropped_model));
+}
+
 int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress) {
   std::optional<StopAfter> limit;
   if (plan.timeout) limit.emplace(*plan.timeout, "--timeout", LimitOf::command);
@@ -504,6 +524,7 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
     if (!writes_mesh(plan)) mapped.report.chord.reset();  // nobody gets the triangles
     say_report(mapped.report, arguments.map, plan.map, progress);
   }
+  if (accuracy) say_dropped_model(*accuracy, progress);
   if (!mapped.split_line.empty()) progress.say(mapped.split_line);
   const mapping::MapReport& found = mapped.report;
   std::vector<std::string> paths{arguments.map.report, arguments.summary};

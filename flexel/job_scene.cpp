@@ -9,6 +9,7 @@
 #include "flexel/job.h"
 #include "simulate/effects/gravity.h"
 #include "simulate/input/material_names.h"
+#include "simulate/input/scene_words.h"
 
 namespace flexel::commands {
 namespace {
@@ -146,7 +147,7 @@ void add_options(const JobArguments& arguments, Job& job) {
 
 void plan_scene(const JobArguments& arguments, Job& job) {
   if (arguments.scene.empty()) {
-    job.scene.name = "the command line";
+    job.scene.name = simulate::kCommandLine;
     refuse_idle(arguments);
   } else {
     job.scene = simulate::read_scene(arguments.scene);

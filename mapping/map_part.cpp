@@ -9,6 +9,7 @@
 #include "formats/lattice/fragments_of_body.h"
 #include "formats/part/topology.h"
 #include "mapping/crack/crack_carved.h"
+#include "mapping/loan.h"
 #include "mapping/methods/map_surface.h"
 #include "mapping/report/report.h"
 
@@ -56,19 +57,6 @@ struct Broken {
       if (parted.inside(part)) return true;
     return false;
   }
-};
-
-// Puts what is a body's own back, whatever happens.
-template <class Value>
-class Loan {
- public:
-  Loan(Value& own, Value& lent) : own_(own), lent_(lent) { std::swap(own_, lent_); }
-  Loan(const Loan&) = delete;
-  Loan& operator=(const Loan&) = delete;
-  ~Loan() { std::swap(own_, lent_); }
-
- private:
-  Value &own_, &lent_;
 };
 
 void map_pieces(Body& body, const Components& fragments, const MapOptions& options, CrackMode mode,

@@ -12,6 +12,7 @@
 #include "formats/lattice/body_file.h"
 #include "formats/lattice/fragments_of_body.h"
 #include "formats/part/subdivide.h"
+#include "mapping/loan.h"
 #include "mapping/methods/map_surface.h"
 #include "mapping/refine/refine.h"
 #include "mapping/report/chord.h"
@@ -19,28 +20,6 @@
 
 namespace flexel::mapping {
 namespace {
-
-// The body's own surface and the cells under it, which come back at the end.
-class OwnSurface {
- public:
-  explicit OwnSurface(Body& body)
-      : body_(body),
-        surface_(body.surface),
-        offsets_(body.surface_cell_offsets),
-        cells_(body.surface_cells) {}
-  OwnSurface(const OwnSurface&) = delete;
-  OwnSurface& operator=(const OwnSurface&) = delete;
-  ~OwnSurface() {
-    std::swap(body_.surface, surface_);
-    std::swap(body_.surface_cell_offsets, offsets_);
-    std::swap(body_.surface_cells, cells_);
-  }
-
- private:
-  Body& body_;
-  Surface surface_;
-  std::vector<std::uint32_t> offsets_, cells_;
-};
 
 constexpr const char* kNotSplitCut =
     "the surface is cut along cracks and was not split: where its triangles are too large to show the "
@@ -77,7 +56,10 @@ std::optional<Refinement> refinement_of_state(const Body& body, const MapResult&
 MappedPart map_split(Body& body, const MapOptions& options, const CrackOptions& crack,
                      const Refinement& refinement, Surface written, Progress& progress) {
   const std::size_t before = triangle_count(body.surface);
-  const OwnSurface own(body);
+  Surface surface = body.surface;
+  std::vector<std::uint32_t> offsets = body.surface_cell_offsets, cells = body.surface_cells;
+  const Loan of_surface(body.surface, surface);
+  const Loan of_offsets(body.surface_cell_offsets, offsets), of_cells(body.surface_cells, cells);
   take_refined(body, refined(body.surface, refinement), refinement);
   MappedPart mapped = map_part(body, options, crack, progress);
   mapped.report.split_from = before;

@@ -3,7 +3,6 @@
 
 #include <openvdb/io/Stream.h>
 #include <openvdb/openvdb.h>
-#include <openvdb/tools/MeshToVolume.h>
 #include <openvdb/tools/SignedFloodFill.h>
 
 #include <cmath>
@@ -11,18 +10,19 @@
 
 #include "base/error.h"
 #include "formats/common/length_metadata.h"
+#include "meshes/mesh_distances.h"
 
 namespace flexel::meshes {
 namespace {
 
 // Index (i, j, k) to the centre of that voxel; OpenVDB's vectors are rows.
-openvdb::math::Transform::Ptr transform_of(const Lattice& lattice, const Vec3& spacing) {
+openvdb::Mat4R index_to_world(const Lattice& lattice, const Vec3& spacing) {
   openvdb::Mat4R matrix = openvdb::Mat4R::identity();
   const Vec3 centre = lattice.origin + lattice.axes * (.5 * spacing);
   for (int a = 0; a < 3; ++a)
     for (int b = 0; b < 3; ++b) matrix[a][b] = lattice.axes(b, a) * spacing[a];
   for (int b = 0; b < 3; ++b) matrix[3][b] = centre[b];
-  return openvdb::math::Transform::createLinearTransform(matrix);
+  return matrix;
 }
 
 openvdb::FloatGrid::Ptr fill_grid(const Body& body, const Part& part) {
@@ -33,7 +33,8 @@ openvdb::FloatGrid::Ptr fill_grid(const Body& body, const Part& part) {
     const openvdb::Coord ijk(at[0], at[1], at[2]);
     writer.setValue(ijk, writer.getValue(ijk) + static_cast<float>(body.fill[c]));
   }
-  grid->setTransform(transform_of(part.lattice, part.lattice.spacing));
+  grid->setTransform(
+      openvdb::math::Transform::createLinearTransform(index_to_world(part.lattice, part.lattice.spacing)));
   grid->setGridClass(openvdb::GRID_FOG_VOLUME);
   grid->setName("fill_" + part.name);
   grid->insertMeta(kLengthMetadata, openvdb::StringMetadata("m"));
@@ -41,29 +42,22 @@ openvdb::FloatGrid::Ptr fill_grid(const Body& body, const Part& part) {
 }
 
 // A part's triangles in the index space of its distance grid.
-class SurfaceAdapter {
- public:
-  SurfaceAdapter(const Surface& surface, std::uint32_t part, const Lattice& lattice, double voxel)
-      : surface_(&surface), lattice_(&lattice), voxel_(voxel) {
-    const Triangles all = triangulate(surface);
-    for (std::size_t t = 0; t < all.corners.size(); ++t)
-      if (surface.polygon_part(all.polygon[t]) == part) corners_.push_back(all.corners[t]);
-  }
-  [[nodiscard]] std::size_t polygonCount() const { return corners_.size(); }
-  [[nodiscard]] std::size_t pointCount() const { return surface_->vertices.size(); }
-  [[nodiscard]] std::size_t vertexCount(std::size_t) const { return 3; }
-  void getIndexSpacePoint(std::size_t n, std::size_t v, openvdb::Vec3d& at) const {
-    const Vec3 local =
-        lattice_->axes.transpose() * (surface_->vertices[corners_[n][v]] - lattice_->origin) / voxel_;
-    for (int a = 0; a < 3; ++a) at[a] = local[a] - .5;
-  }
-
- private:
-  const Surface* surface_;
-  const Lattice* lattice_;
-  double voxel_;
-  std::vector<std::array<std::uint32_t, 3>> corners_;
+struct IndexedMesh {
+  std::vector<double> points;
+  std::vector<std::uint32_t> corners;
 };
+IndexedMesh indexed_mesh(const Surface& surface, std::uint32_t part, const Lattice& lattice, double voxel) {
+  IndexedMesh mesh;
+  for (const Vec3& vertex : surface.vertices) {
+    const Vec3 local = lattice.axes.transpose() * (vertex - lattice.origin) / voxel;
+    for (int a = 0; a < 3; ++a) mesh.points.push_back(local[a] - .5);
+  }
+  const Triangles all = triangulate(surface);
+  for (std::size_t t = 0; t < all.corners.size(); ++t)
+    if (surface.polygon_part(all.polygon[t]) == part)
+      mesh.corners.insert(mesh.corners.end(), all.corners[t].begin(), all.corners[t].end());
+  return mesh;
+}
 
 openvdb::FloatGrid::Ptr distance_grid(const Body& body, std::uint32_t number,
                                       const openvdb::FloatGrid& fill) {
@@ -71,10 +65,11 @@ openvdb::FloatGrid::Ptr distance_grid(const Body& body, std::uint32_t number,
   const Part& part = body.parts[number];
   const Vec3& spacing = part.lattice.spacing;
   const double voxel = spacing.minCoeff();
-  const auto transform = transform_of(part.lattice, Vec3::Constant(voxel));
-  auto grid = openvdb::tools::meshToVolume<openvdb::FloatGrid>(
-      SurfaceAdapter(body.surface, number, part.lattice, voxel), *transform, kBandVoxels, kBandVoxels,
-      openvdb::tools::UNSIGNED_DISTANCE_FIELD);
+  const openvdb::Mat4R transform = index_to_world(part.lattice, Vec3::Constant(voxel));
+  const IndexedMesh mesh = indexed_mesh(body.surface, number, part.lattice, voxel);
+  const auto grid = std::static_pointer_cast<openvdb::FloatGrid>(
+      mesh_distances({mesh.points.data(), mesh.points.size() / 3, mesh.corners.data(),
+                      mesh.corners.size() / 3, transform.asPointer(), kBandVoxels, false}));
   const auto reader = fill.getConstUnsafeAccessor();
   for (auto value = grid->beginValueOn(); value; ++value) {
     const openvdb::Coord at = value.getCoord();

@@ -163,6 +163,13 @@ std::string peak_stress(const SimulateResult& result, double stress) {
   return pressure_with_bar(stress, result.error_bars.von_mises->bar->half_width);
 }
 
+// How many times the load could be what it is.
+std::string factor(double share) {
+  constexpr double kMost = 1000;  // beyond it nobody asks
+  if (share * kMost < 1) return "over 1,000";
+  return share > kMost ? "under 0.001" : human_number(1 / share, 2);
+}
+
 std::string strength(const SimulateResult& result, const Body& body, const std::vector<Material>& materials) {
   if (!result.stress) return "not known: no stresses of this model, or --no-stress";
   if (!(result.stress->value > 0)) return "nothing is stressed";
@@ -173,15 +180,14 @@ std::string strength(const SimulateResult& result, const Body& body, const std::
                        peak_stress(result, result.stress->value), place_in_one_unit(result.stress->at),
                        unsure(result));
   if (!(found->share > 0)) return "nothing is stressed";
-  const std::string layers = found->layer_share ? fmt::format(" ({} across printed layers)",
-                                                              human_number(1 / *found->layer_share, 2))
-                                                : "";
+  const std::string layers =
+      found->layer_share ? fmt::format(" ({} across printed layers)", factor(*found->layer_share)) : "";
   std::string text =
       fmt::format("{}safety factor {}{}: {} of {} at which {} {}, at {}{}",
                   found->share > 1                     ? "TOO WEAK, "
                   : found->layer_share.value_or(0) > 1 ? "TOO WEAK across its layers, "
                                                        : "",
-                  human_number(1 / found->share, 2), layers, peak_stress(result, found->stress),
+                  factor(found->share), layers, peak_stress(result, found->stress),
                   human_pressure(found->limit), found->material, found->yields ? "yields" : "breaks",
                   place_in_one_unit(found->stress == result.stress->value ? result.stress->at : found->at),
                   unsure(result));

@@ -104,4 +104,10 @@ void visit(Archive& archive, std::vector<Value>& values) {
     for (Value& value : values) visit(archive, value);
 }
 
+// The members of a type, in this order.
+template <class Archive, class... Values>
+void visit_all(Archive& archive, Values&... values) {
+  (visit(archive, values), ...);
+}
+
 }  // namespace flexel

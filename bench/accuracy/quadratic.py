@@ -23,6 +23,8 @@ import time
 from step_parts import scene_of
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.append(str(ROOT / "tests/programs"))
+from shapes import obj_bar, turned  # noqa: E402
 
 
 def call(*words, cwd=None, accept=(0,)):
@@ -34,26 +36,9 @@ def call(*words, cwd=None, accept=(0,)):
     return done.stdout, time.monotonic() - before, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
 
 
-def turn(degrees, axis=(1, 2, 3)):
-    length, angle = math.hypot(*axis), math.radians(degrees)
-    x, y, z = (each / length for each in axis)
-    c, s = math.cos(angle), math.sin(angle)
-    return [[c + x * x * (1 - c), x * y * (1 - c) - z * s, x * z * (1 - c) + y * s],
-            [y * x * (1 - c) + z * s, c + y * y * (1 - c), y * z * (1 - c) - x * s],
-            [z * x * (1 - c) - y * s, z * y * (1 - c) + x * s, c + z * z * (1 - c)]]
-
-
-def turned(rotation, point):
-    return [sum(a * b for a, b in zip(row, point)) for row in rotation]
-
-
 def bar(path, sizes, degrees):
-    rotation = turn(degrees)
-    corners = [(a, b, c) for c in (0, sizes[2]) for b in (0, sizes[1]) for a in (0, sizes[0])]
-    lines = ["v {:.15g} {:.15g} {:.15g}".format(*turned(rotation, corner)) for corner in corners]
-    for group, faces in {"held": [(0, 4, 6, 2)], "end": [(1, 3, 7, 5)], "side": [(0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6)]}.items():
-        lines += [f"g {group}"] + ["f " + " ".join(str(i + 1) for i in face) for face in faces]
-    path.write_text("\n".join(lines) + "\n")
+    text, rotation = obj_bar(sizes, degrees)
+    path.write_text(text)
     return rotation
 
 

@@ -54,6 +54,10 @@ double peak_memory() {
   return 1024.0 * static_cast<double>(usage.ru_maxrss);
 }
 
+constexpr double kFewer = 10;         // times fewer cells, where a first run takes too long
+constexpr double kSecondShare = 0.6;  // of the time, for one of the two
+constexpr double kBusiest = 3;        // a machine so busy gets so many times as long
+
 constexpr int kGivenUp = 3;  // lattices that turn out too large, until the search ends
 
 class Search {
@@ -88,36 +92,70 @@ class Search {
  private:
   [[nodiscard]] bool met() const { return goal_.error && judged_ && judged_->error <= *goal_.error; }
 
-  // The usual count of cells; finer where walls are lost at that. For --within half the spacing too.
+  // The usual count of cells; a tenth of them where those take too long, finer ones where walls are lost at
+  // that. For --within half the spacing too.
   void first_runs() {
+    std::optional<StopAfter> all;
+    if (goal_.within && !goal_.by_default)
+      all.emplace(std::max(patience_left(), kFirstPatience), "--within", LimitOf::command);
     double size = 0;
-    for (int failures = 0; runs_.empty(); ++failures) try {
-        std::optional<StopAfter> limit;
-        if (goal_.within && !goal_.by_default)
-          limit.emplace(std::max(patience_left(), kFirstPatience), "--within", LimitOf::command);
-        if (size == 0) {
-          const SolvedRun first = solve_(std::nullopt, {});
-          size = nearest_size(spacing_of(first));
-        }
+    for (int failures = 0; runs_.empty();) {
+      const StopAfter limit(first_patience(), "--within");
+      try {
+        if (size == 0) size = nearest_size(spacing_of(solve_(std::nullopt, {})));
         keep(solve_(size, [](std::size_t) { return true; }));
+      } catch (const TimeoutError&) {
+        if (!limit.passed() && !(all && all->passed())) throw;
+        go_coarser(size);
       } catch (const InputError& error) {
-        fail(size, error.what(), failures);
+        fail(size, error.what(), failures++);
       } catch (const DivergedError& error) {
-        fail(size, error.what(), failures);
+        fail(size, error.what(), failures++);
       }
+    }
     if (goal_.error) return;
     size = nearest_size(runs_.back().size / kUsualStep);
     if (affordable(size)) run(size);
   }
 
+  // s, until the first run of the usual count is given up, and one of fewer cells.
+  [[nodiscard]] double first_patience() const {
+    if (goal_.by_default)
+      return (coarser_ ? kSecondShare : 1) * busyness() * goal_.within.value_or(kUsualLimit);
+    return std::max(coarser_ ? patience_left() : kSecondShare * patience_left(), kFirstPatience);
+  }
+
+  // After the run at `size` (0: its lattice was not made) took too long.
+  void go_coarser(double& size) {
+    const std::string gone = human_seconds(seconds_since(goal_.began));
+    const char* more = goal_.by_default ? "--within 5min gives it longer, --count 1000 has no limit"
+                                        : "a longer --within gives it more time";
+    if (size == 0)
+      throw TimeoutError(fmt::format("the lattice of a first run was not made in {}: {}", gone, more));
+    if (coarser_)
+      throw TimeoutError(
+          fmt::format("no run ended in {}, though one of few cells was tried: check the unit of the part and "
+                      "the size of the load; {}",
+                      gone, more));
+    coarser_ = true;
+    note_failure(size, "took too long");
+    size = nearest_size(size * std::cbrt(kFewer));
+  }
+
   void fail(double& size, const std::string& why, int failures) {
     if (!first_failure_) first_failure_ = std::current_exception();
-    if (size == 0 || failures >= kFailures || goal_.by_default) std::rethrow_exception(first_failure_);
+    if (size == 0 || failures >= kFailures || goal_.by_default || coarser_)
+      std::rethrow_exception(first_failure_);
+    note_failure(size, why);
+    size = nearest_size(size / 2);
+  }
+
+  void note_failure(double size, const std::string& why) {
     TriedRun failed;
     failed.size = size;
     failed.failure = why;
     report_.runs.push_back(failed);
-    size = nearest_size(size / 2);
+    progress_.say(fmt::format("--size {}: {}", size_text(size), why));
   }
 
   enum class Outcome { done, given_up, failed };
@@ -201,10 +239,13 @@ class Search {
     const double gone = goal_.by_default ? undisturbed(wall, processor_seconds() - processor_before_) : wall;
     return goal_.within.value_or(kUsualLimit) - gone;
   }
+  // How many times as long as on a machine that nobody else uses all took so far.
+  [[nodiscard]] double busyness() const { return slowed_by_others(goal_.began); }
   // Until a run that is being tried is given up. By default sizes are chosen for a machine that nobody else
-  // uses; a busy one gets three times as long.
+  // uses; a busy one gets up to three times as long.
   [[nodiscard]] double patience_left() const {
-    return (goal_.by_default ? 3 : 1) * goal_.within.value_or(kUsualLimit) - seconds_since(goal_.began);
+    return (goal_.by_default ? kBusiest : 1) * goal_.within.value_or(kUsualLimit) -
+           seconds_since(goal_.began);
   }
   // What the runs that are kept hold already is part of the prediction.
   [[nodiscard]] double memory_limit() const { return kMemoryShare * (available_memory() + peak_memory()); }
@@ -291,9 +332,10 @@ class Search {
   struct Counted {
     double size = 0;  // m, asked for
     double cells = 0;
-  } counted_;            // of the lattice that was made last
-  int given_up_ = 0;     // lattices that were not solved
-  bool chosen_ = false;  // the one run that --within asks for was made
+  } counted_;             // of the lattice that was made last
+  int given_up_ = 0;      // lattices that were not solved
+  bool coarser_ = false;  // the first run took too long: one of fewer cells
+  bool chosen_ = false;   // the one run that --within asks for was made
   double processor_before_;
   std::exception_ptr first_failure_;  // finer lattices did not help
 };
@@ -310,13 +352,27 @@ double seconds_since(std::chrono::steady_clock::time_point began) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
 }
 
-double processor_seconds() {
+namespace {
+
+double processor_seconds_of(int whose) {
   rusage usage = {};
-  getrusage(RUSAGE_SELF, &usage);
+  getrusage(whose, &usage);
   const auto seconds = [](const timeval& time) {
     return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
   };
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+}  // namespace
+
+double processor_seconds() {
+  return processor_seconds_of(RUSAGE_SELF);
+}
+
+double slowed_by_others(std::chrono::steady_clock::time_point began) {
+  const double wall = seconds_since(began);
+  const double alone = undisturbed(wall, processor_seconds() + processor_seconds_of(RUSAGE_CHILDREN));
+  return alone > 0 ? std::clamp(wall / alone, 1.0, kBusiest) : 1;
 }
 
 double preferred_number(double value, int to_a_decade, Rounded rounded) {

@@ -43,6 +43,9 @@ using SolveAt = std::function<SolvedRun(std::optional<double> size, const GoesOn
 // s, of all threads of this process so far.
 [[nodiscard]] double processor_seconds();
 
+// How many times as long as on a machine that nobody else uses this process took since `began`, near its start: from 1 to 3.
+[[nodiscard]] double slowed_by_others(std::chrono::steady_clock::time_point began);
+
 [[nodiscard]] double seconds_since(std::chrono::steady_clock::time_point began);
 
 // The preferred number (ISO 3: 10 or 20 to a decade) that is nearest, or the next one above.

@@ -8,25 +8,13 @@ namespace flexel {
 // Outside the unnamed namespace, where argument-dependent lookup finds them.
 template <class Archive>
 static void visit(Archive& archive, CadReadJob& job) {
-  visit(archive, job.format);
-  visit(archive, job.bytes);
-  visit(archive, job.where);
-  visit(archive, job.file);
-  visit(archive, job.unit);
-  visit(archive, job.deflection);
-  visit(archive, job.angular_deflection);
-  visit(archive, job.threads);
+  visit_all(archive, job.format, job.bytes, job.where, job.file, job.unit, job.deflection,
+            job.angular_deflection, job.threads);
 }
 
 template <class Archive>
 static void visit(Archive& archive, CadWriteJob& job) {
-  visit(archive, job.body);
-  visit(archive, job.format);
-  visit(archive, job.method);
-  visit(archive, job.scale);
-  visit(archive, job.tolerance);
-  visit(archive, job.volume);
-  visit(archive, job.threads);
+  visit_all(archive, job.body, job.format, job.method, job.scale, job.tolerance, job.volume, job.threads);
 }
 
 template <class Archive>
@@ -37,26 +25,14 @@ static void visit(Archive& archive, CadMesh& mesh) {
 
 template <class Archive>
 static void visit(Archive& archive, CadFace& face) {
-  visit(archive, face.name);
-  visit(archive, face.deviation);
+  visit_all(archive, face.name, face.deviation);
 }
 
 template <class Archive>
 static void visit(Archive& archive, CadWritten& written) {
-  visit(archive, written.file);
-  visit(archive, written.solids);
-  visit(archive, written.faces);
-  visit(archive, written.kept);
-  visit(archive, written.tolerance);
-  visit(archive, written.deviation);
-  visit(archive, written.deviation_face);
-  visit(archive, written.missed);
-  visit(archive, written.folded);
-  visit(archive, written.invalid);
-  visit(archive, written.invalid_before);
-  visit(archive, written.gap);
-  visit(archive, written.volume);
-  visit(archive, written.volume_before);
+  visit_all(archive, written.file, written.solids, written.faces, written.kept, written.tolerance,
+            written.deviation, written.deviation_face, written.missed, written.folded, written.invalid,
+            written.invalid_before, written.gap, written.volume, written.volume_before);
 }
 
 namespace {

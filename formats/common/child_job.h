@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -27,40 +28,31 @@ template <class Result>
 struct JobAnswer {
   std::vector<std::string> warnings;
   bool refused = false;
-  std::string where, why;  // of an InputError, where it is refused
+  bool failed = false;     // by a fault of the program, not of what it was given
+  std::string where, why;  // of an InputError, where it is refused; of a fault, where it failed
   Result result;           // else
 };
 
 template <class Archive, class Result>
 void visit(Archive& archive, JobAnswer<Result>& answer) {
-  visit(archive, answer.warnings);
-  visit(archive, answer.refused);
-  visit(archive, answer.where);
-  visit(archive, answer.why);
-  visit(archive, answer.result);
+  visit_all(archive, answer.warnings, answer.refused, answer.failed, answer.where, answer.why, answer.result);
 }
 
 template <class Archive>
 void visit(Archive& archive, SurfacePart& part) {
-  visit(archive, part.name);
-  visit(archive, part.assembly);
+  visit_all(archive, part.name, part.assembly);
 }
 
 template <class Archive>
 void visit(Archive& archive, SurfaceFace& face) {
-  visit(archive, face.name);
-  visit(archive, face.part);
+  visit_all(archive, face.name, face.part);
 }
 
 // Vertices, polygons, faces and parts: no columns, no sources.
 template <class Archive>
 void visit_mesh(Archive& archive, Surface& surface) {
-  visit(archive, surface.vertices);
-  visit(archive, surface.polygon_offsets);
-  visit(archive, surface.polygon_vertices);
-  visit(archive, surface.polygon_face);
-  visit(archive, surface.faces);
-  visit(archive, surface.parts);
+  visit_all(archive, surface.vertices, surface.polygon_offsets, surface.polygon_vertices,
+            surface.polygon_face, surface.faces, surface.parts);
 }
 
 constexpr std::uint64_t kJobEnd = 0x666c6578656c3031;
@@ -106,11 +98,12 @@ struct JobWords {
 [[nodiscard]] Bytes run_job(const ForeignProgram& program, const Bytes& job, const ChildLimits& limits,
                             const std::string& where, const JobWords& words);
 
-// Passes on what the answer says: calls `warn`, throws its InputError.
+// Passes on what the answer says: calls `warn`, throws its InputError, or std::runtime_error where the program failed.
 template <class Result>
 [[nodiscard]] Result result_of(JobAnswer<Result> answer, const std::string& where, const Warn& warn) {
   if (warn)
     for (const std::string& line : answer.warnings) warn(line);
+  if (answer.failed) throw std::runtime_error(where + ": " + answer.why);
   if (answer.refused) throw InputError(answer.where.empty() ? where : answer.where, answer.why);
   return std::move(answer.result);
 }

@@ -31,10 +31,7 @@ ChildLimits mesh_limits(const ImportInput& input) {
 // Outside the unnamed namespace, where argument-dependent lookup finds them.
 template <class Archive>
 static void visit(Archive& archive, MeshReadJob& job) {
-  visit(archive, job.format);
-  visit(archive, job.extension);
-  visit(archive, job.bytes);
-  visit(archive, job.where);
+  visit_all(archive, job.format, job.extension, job.bytes, job.where);
 }
 
 template <class Archive>
@@ -49,15 +46,8 @@ static void visit(Archive& archive, VdbFile& file) {
 
 template <class Archive>
 static void visit(Archive& archive, ForeignMesh& mesh) {
-  visit(archive, mesh.unit);
-  visit(archive, mesh.vertices);
-  visit(archive, mesh.polygon_offsets);
-  visit(archive, mesh.polygon_vertices);
-  visit(archive, mesh.polygon_part);
-  visit(archive, mesh.polygon_group);
-  visit(archive, mesh.polygon_colors);
-  visit(archive, mesh.part_names);
-  visit(archive, mesh.group_names);
+  visit_all(archive, mesh.unit, mesh.vertices, mesh.polygon_offsets, mesh.polygon_vertices, mesh.polygon_part,
+            mesh.polygon_group, mesh.polygon_colors, mesh.part_names, mesh.group_names);
 }
 
 Bytes pack(const MeshReadJob& job) {
@@ -103,7 +93,7 @@ JobAnswer<ForeignMesh> unpack_foreign_mesh(std::span<const std::byte> bytes, con
   JobAnswer<ForeignMesh> answer;
   finish(unpacker, answer);
   const ForeignMesh& mesh = answer.result;
-  if (answer.refused) return answer;
+  if (answer.refused || answer.failed) return answer;
   const std::size_t polygons = mesh.polygon_offsets.empty() ? 0 : mesh.polygon_offsets.size() - 1;
   const auto below = [](const std::vector<std::uint32_t>& numbers, std::size_t limit) {
     return std::all_of(numbers.begin(), numbers.end(), [&](std::uint32_t n) { return n < limit; });

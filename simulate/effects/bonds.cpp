@@ -144,21 +144,20 @@ std::optional<Bonds> Bonds::make(const Parameters& parameters, const Problem& pr
       return each.parts == std::array{std::min(parts[0], parts[1]), std::max(parts[0], parts[1])};
     });
   };
-  const std::vector<TouchingPoint> points = touching_points(problem, named);
   Bonds made;
   using Matrix = decltype(BondedElements::stiffness);
   std::map<std::vector<std::uint32_t>, Matrix> by_elements;
   std::map<std::array<std::uint32_t, 2>, double> area;
-  for (const TouchingPoint& point : points) {
+  for_each_touching_point(problem, named, [&](const TouchingPoint& point) {
     if (!is_named(point.part) &&
         (!parameters.bond || std::max(point.part[0], point.part[1]) >= problem.bonding_parts))
-      continue;
+      return;
     const Weights weights = jump(point);
     auto [entry, fresh] =
         by_elements.try_emplace(elements_of(point), Matrix::Zero(weights.size(), weights.size()));
     entry->second += kPenalty * foundation(point, problem) * point.area * weights * weights.transpose();
     area[{std::min(point.part[0], point.part[1]), std::max(point.part[0], point.part[1])}] += point.area;
-  }
+  });
   for (std::size_t n = 0; n < named.size(); ++n)
     if (!area.contains(named[n].parts))
       throw InputError(parameters.named[n].origin,

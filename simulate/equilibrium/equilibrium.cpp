@@ -23,6 +23,7 @@
 #include "base/stop.h"
 #include "base/units.h"
 #include "simulate/equilibrium/rigid_link_equilibrium.h"
+#include "simulate/input/scene_words.h"
 #include "simulate/result/result.h"
 
 namespace flexel::simulate {
@@ -144,7 +145,8 @@ void LoadStepping::refuse_load() const {
   throw DivergedError(fmt::format(
       "the load{} would move the part by {} at its first stiffness, {} times its size of {}: check the unit "
       "of "
-      "the part (--unit), the load, and the stiffness of {}; [run] load_steps = 10 tries it all the same",
+      "the part (--unit), the load, and the stiffness of {}; in a scene, [run] load_steps = 10 tries it all "
+      "the same",
       force > 0 ? fmt::format(" ({} in all)", human_force(force)) : "", human_length(reach_),
       human_count(static_cast<std::size_t>(std::min(reach_ / diagonal, 1e15))), human_length(diagonal),
       fmt::join(materials, ", ")));
@@ -294,9 +296,9 @@ void refuse_free_motions(Mechanics& mechanics, const State& start, const std::st
     if (motion.part == free.front().part && std::find(names.begin(), names.end(), name) == names.end())
       names.push_back(name);
   }
-  throw InputError(scene,
-                   fmt::format("part \"{}\" is free {}: add a [[fix]] that stops it",
-                               mechanics.body().parts[free.front().part].name, fmt::join(names, " and ")));
+  throw InputError(scene, fmt::format("part \"{}\" is free {}: add {} that stops it",
+                                      mechanics.body().parts[free.front().part].name,
+                                      fmt::join(names, " and "), words_of(scene).a_fix));
 }
 
 void refuse_unsupported_elements(Mechanics& mechanics, const State& start, const std::string& scene) {

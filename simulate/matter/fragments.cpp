@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/units.h"
 #include "formats/lattice/fragments_of_body.h"
+#include "simulate/input/scene_words.h"
 #include "simulate/matter/firm_groups.h"
 #include "simulate/matter/interpolation_weights.h"
 #include "simulate/models/cell_model.h"
@@ -194,25 +195,26 @@ void refuse_loose_fragments(const Fragments& fragments, const Body& body,
         if (tied_elements[e]) held[fragments.of_cell[c]] = 1;
   hold_bonded(fragments, coupled, held);
   for (const Fragment& fragment : fragments.list) fragments_of_part[fragment.part] += !fragment.stray;
+  const SceneWords words = words_of(scene);
   for (std::size_t f = 0; f < fragments.list.size(); ++f) {
     const Fragment& fragment = fragments.list[f];
     if (held[f] || fragment.stray) continue;
     const std::string& part = body.parts[fragment.part].name;
     if (fragments_of_part[fragment.part] == 1)
       throw InputError(
-          scene,
-          fmt::format("nothing holds part \"{}\": it is free to translate and to rotate; add a [[fix]]",
-                      part));
+          scene, fmt::format("nothing holds part \"{}\": it is free to translate and to rotate; add {}", part,
+                             words.a_fix));
     throw InputError(
         scene,
         fmt::format("part \"{}\" is in {} pieces that are not {}connected; the one of {} {} near {} hangs "
-                    "{}: fix it too, or voxelize with a smaller spacing if it should be joined",
+                    "{}: fix it too, or {} if it should be joined",
                     part, fragments_of_part[fragment.part], fragment.hinged ? "firmly " : "",
                     human_count(fragment.size),
                     body.parts[fragment.part].placement == Placement::centre ? "elements" : "cells",
                     near(fragment.centre),
                     fragment.hinged ? "on the rest by edges and corners of cells alone, which let it turn"
-                                    : "on nothing"));
+                                    : "on nothing",
+                    words.a_finer_size));
   }
 }
 

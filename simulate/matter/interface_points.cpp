@@ -78,8 +78,9 @@ class Grid {
 
 class TouchingSearch {
  public:
+  using Use = std::function<void(const TouchingPoint&)>;
   TouchingSearch(const Problem& problem, const std::vector<TouchingGap>& wider);
-  std::vector<TouchingPoint> operator()();
+  void operator()(const Use& use);
 
  private:
   [[nodiscard]] double tolerance(std::uint32_t part) const {
@@ -95,7 +96,7 @@ class TouchingSearch {
     return std::max({tolerance(a), tolerance(b), wider_gap(a, b)});
   }
   void sample(std::uint32_t part);
-  void touch(std::uint32_t finer, std::uint32_t coarser);
+  void touch(std::uint32_t finer, std::uint32_t coarser, const Use& use) const;
   [[nodiscard]] double distance(const Vec3& point, std::uint32_t polygon) const;
 
   const Problem& problem_;
@@ -106,7 +107,6 @@ class TouchingSearch {
   std::vector<std::uint32_t> first_triangle_;      // (polygons + 1)
   std::vector<Box> box_;                           // (parts)
   std::vector<std::vector<SurfacePoint>> points_;  // (parts) near another part
-  std::vector<TouchingPoint> found_;
 };
 
 TouchingSearch::TouchingSearch(const Problem& problem, const std::vector<TouchingGap>& wider)
@@ -152,7 +152,7 @@ double TouchingSearch::distance(const Vec3& point, std::uint32_t polygon) const 
   return least;
 }
 
-void TouchingSearch::touch(std::uint32_t finer, std::uint32_t coarser) {
+void TouchingSearch::touch(std::uint32_t finer, std::uint32_t coarser, const Use& use) const {
   const double limit = std::max(tolerance(finer), wider_gap(finer, coarser));
   const double width = 0.5 * body_.parts[coarser].lattice.spacing.minCoeff();
   std::vector<Facing> facing;
@@ -182,30 +182,34 @@ void TouchingSearch::touch(std::uint32_t finer, std::uint32_t coarser) {
     if (!nearest) continue;
     const auto at = carrier_on_surface(problem_, nearest->polygon, point.position, nearest->normal);
     if (!at) continue;
-    found_.push_back(
-        {{finer, coarser},
+    use({{finer, coarser},
          {with_gradient(problem_, point.at, point.position), with_gradient(problem_, *at, point.position)},
          point.area_vector.norm(),
          own});
   }
 }
 
-std::vector<TouchingPoint> TouchingSearch::operator()() {
+void TouchingSearch::operator()(const Use& use) {
   const auto spacing = [&](std::uint32_t part) { return body_.parts[part].lattice.spacing.mean(); };
   for (std::uint32_t a = 0; a < body_.parts.size(); ++a)
     for (std::uint32_t b = a + 1; b < body_.parts.size(); ++b) {
       if (points_[a].empty() || points_[b].empty()) continue;
       if (!overlap(box_[a], box_[b], margin(a, b))) continue;
-      spacing(a) <= spacing(b) ? touch(a, b) : touch(b, a);
+      spacing(a) <= spacing(b) ? touch(a, b, use) : touch(b, a, use);
     }
-  return std::move(found_);
 }
 
 }  // namespace
 
+void for_each_touching_point(const Problem& problem, const std::vector<TouchingGap>& wider,
+                             const std::function<void(const TouchingPoint&)>& use) {
+  if (problem.body.parts.size() > 1) TouchingSearch(problem, wider)(use);
+}
+
 std::vector<TouchingPoint> touching_points(const Problem& problem, const std::vector<TouchingGap>& wider) {
-  if (problem.body.parts.size() < 2) return {};
-  return TouchingSearch(problem, wider)();
+  std::vector<TouchingPoint> found;
+  for_each_touching_point(problem, wider, [&](const TouchingPoint& point) { found.push_back(point); });
+  return found;
 }
 
 }  // namespace flexel::simulate

@@ -1,5 +1,6 @@
 // Where parts touch: points at which the surface of one part lies on that of another.
 #pragma once
+#include <functional>
 #include <vector>
 
 #include "simulate/matter/interpolation_weights.h"
@@ -24,5 +25,8 @@ struct TouchingGap {
 };
 [[nodiscard]] std::vector<TouchingPoint> touching_points(const Problem& problem,
                                                          const std::vector<TouchingGap>& wider = {});
+// Calls use(point) for each of them: fine surfaces have hundreds of thousands, of 600 bytes each.
+void for_each_touching_point(const Problem& problem, const std::vector<TouchingGap>& wider,
+                             const std::function<void(const TouchingPoint&)>& use);
 
 }  // namespace flexel::simulate

@@ -81,7 +81,7 @@ std::vector<std::string> warnings_of(const SimulateResult& result) {
   // Rigid links are for equilibrium without contact.
   const char* advice = result.timed || result.settled
                            ? "lead the place with [[move]] and \"rotation\" instead"
-                           : "write link = \"rigid\", whose torque turns with it";
+                           : "link = \"rigid\" in a scene's [[load]] gives a torque that turns with it";
   std::vector<std::string> warnings;
   for (const AppliedLoad& load : result.loads) {
     if (!load.rotation || load.displacement) continue;  // nothing, or of a rigid link

@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "simulate/input/scene_words.h"
 #include "simulate/linear/conjugate_gradients.h"
 #include "simulate/linear/free_motions.h"
 #include "simulate/linear/vector_products.h"
@@ -36,8 +37,9 @@ std::array<Vec3, kQuadraticNodes> values_at(const QuadraticSystem& system, const
 void refuse_free(const QuadraticMultigrid& multigrid, const Body& body, const std::string& scene) {
   const std::vector<FreeMotion> free = free_motions(multigrid.coarse(), multigrid.geometry());
   if (free.empty()) return;
-  throw InputError(scene, fmt::format("part \"{}\" is free to {}: add a [[fix]] that stops it",
-                                      body.parts[free.front().part].name, motion_name(free.front())));
+  throw InputError(scene, fmt::format("part \"{}\" is free to {}: add {} that stops it",
+                                      body.parts[free.front().part].name, motion_name(free.front()),
+                                      words_of(scene).a_fix));
 }
 
 SymmetricStress stress_at(const Mat9& moduli, const Mat3& gradient) {

@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/math/area_vector.h"
 #include "formats/lattice/locate.h"
+#include "simulate/input/scene_words.h"
 
 namespace flexel::simulate {
 namespace {
@@ -109,14 +110,14 @@ double held_share(const Load& load, const HeldMasks& held, const Body& body) {
 void check_held(const Load& load, double share, Progress& progress) {
   if (share >= kHeld)
     throw InputError(load.origin,
-                     fmt::format("load \"{}\" does nothing: a [[fix]] or [[move]] holds the place where "
-                                 "it acts; select another face, or fix other axes",
-                                 load.name));
+                     fmt::format("load \"{}\" does nothing: {} holds the place where it acts; select another "
+                                 "face, or fix other axes",
+                                 load.name, words_of(load.origin).fix_or_move));
   if (share >= kPartlyHeld)
-    progress.warn(
-        fmt::format("{}: {:.0f} % of load \"{}\" goes straight into a support: a [[fix]] or [[move]] holds "
-                    "that share of the place where it acts",
-                    load.origin, 100 * share, load.name));
+    progress.warn(fmt::format(
+        "{}: {:.0f} % of load \"{}\" goes straight into a support: {} holds that share of the place where "
+        "it acts",
+        load.origin, 100 * share, load.name, words_of(load.origin).fix_or_move));
 }
 
 // A surface that is led, on elements that are held: neither gets its way. (What is led and held by the same

@@ -33,66 +33,29 @@ std::span<const std::byte> bytes_of(const void* data, std::size_t size) {
 // Outside the unnamed namespace, where argument-dependent lookup finds them.
 template <class Archive>
 static void visit(Archive& archive, Account& account) {
-  visit(archive, account.name);
-  visit(archive, account.kind);
-  visit(archive, account.energy);
+  visit_all(archive, account.name, account.kind, account.energy);
 }
 
 template <class Archive>
 static void visit(Archive& archive, FusedPoint& point) {
-  visit(archive, point.elements);
-  visit(archive, point.weights);
-  visit(archive, point.stiffness);
+  visit_all(archive, point.elements, point.weights, point.stiffness);
 }
 
 template <class Archive>
 static void visit(Archive& archive, BookRow& row) {
-  visit(archive, row.time);
-  visit(archive, row.energies);
-  visit(archive, row.accounts);
-  visit(archive, row.momentum);
-  visit(archive, row.angular);
-  visit(archive, row.probes);
-  visit(archive, row.values);
+  visit_all(archive, row.time, row.energies, row.accounts, row.momentum, row.angular, row.probes, row.values);
 }
 
 template <class Archive>
 static void visit(Archive& archive, Checkpoint& c) {
   for (std::string* text : {&c.scene_name, &c.scene, &c.output, &c.history}) visit(archive, *text);
-  visit(archive, c.compress);
-  visit(archive, c.input);
-  visit(archive, c.state.displacement);
-  visit(archive, c.state.velocity);
-  visit(archive, c.state.share);
-  visit(archive, c.state.time);
-  visit(archive, c.state.kick);
-  visit(archive, c.clock);
-  visit(archive, c.memory.cells.fill);
-  visit(archive, c.memory.cells.plastic);
-  visit(archive, c.memory.cells.springs);
-  visit(archive, c.memory.cells.spring_flow);
-  visit(archive, c.memory.damping_change);
-  visit(archive, c.memory.reach);
-  visit(archive, c.memory.supports);
-  visit(archive, c.events);
-  visit(archive, c.settled);
-  visit(archive, c.fused);
-  visit(archive, c.bonding_parts);
-  visit(archive, c.memory.effects);
-  visit(archive, c.ledger.accounts);
-  visit(archive, c.ledger.rows);
-  visit(archive, c.ledger.probes);
-  visit(archive, c.ledger.columns);
-  visit(archive, c.ledger.start);
-  visit(archive, c.ledger.changed);
-  visit(archive, c.ledger.worst_residual);
-  visit(archive, c.ledger.unstored);
-  visit(archive, c.ledger.unstored_now);
-  visit(archive, c.ledger.worst_unstored);
-  visit(archive, c.ledger.largest_term);
-  visit(archive, c.next_row);
-  visit(archive, c.next_frame);
-  visit(archive, c.frames);
+  visit_all(archive, c.compress, c.input, c.state.displacement, c.state.velocity, c.state.share, c.state.time,
+            c.state.kick, c.clock, c.memory.cells.fill, c.memory.cells.plastic, c.memory.cells.springs,
+            c.memory.cells.spring_flow, c.memory.damping_change, c.memory.reach, c.memory.supports, c.events,
+            c.settled, c.fused, c.bonding_parts, c.memory.effects, c.ledger.accounts, c.ledger.rows,
+            c.ledger.probes, c.ledger.columns, c.ledger.start, c.ledger.changed, c.ledger.worst_residual,
+            c.ledger.unstored, c.ledger.unstored_now, c.ledger.worst_unstored, c.ledger.largest_term,
+            c.next_row, c.next_frame, c.frames);
 }
 
 void write_checkpoint(const Checkpoint& checkpoint, const Bytes& body, const std::string& path) {

@@ -103,7 +103,9 @@ TEST(Ticks, UnitsFitTheValues) {
   EXPECT_EQ(display_unit(std::nullopt, 4e7).factor, 1e6);
   EXPECT_EQ(dimension_of("von_mises"), Dimension::pressure);
   EXPECT_EQ(dimension_of("plastic_strain"), Dimension::share);
+  EXPECT_EQ(dimension_of("velocity.z"), Dimension::velocity);
   EXPECT_EQ(dimension_of("quality"), std::nullopt);
+  EXPECT_EQ(dimension_of("distance_class"), std::nullopt);  // of a file: holds a known word, and is none
 }
 
 TEST(ColourMap, BrightnessRisesEvenly) {

@@ -5,6 +5,7 @@ import math
 import pathlib
 
 from harness import Skip, expect, expect_error, expect_ok, main, run, write
+from shapes import obj_bar, turned
 
 MATERIAL = """material = "gum"
 model = "quadratic"
@@ -24,34 +25,9 @@ where = "end"
 """
 
 
-def turn(degrees, axis=(1, 2, 3)):
-    """Rotation matrix (Rodrigues)."""
-    length, angle = math.hypot(*axis), math.radians(degrees)
-    x, y, z = (each / length for each in axis)
-    c, s = math.cos(angle), math.sin(angle)
-    return [[c + x * x * (1 - c), x * y * (1 - c) - z * s, x * z * (1 - c) + y * s],
-            [y * x * (1 - c) + z * s, c + y * y * (1 - c), y * z * (1 - c) - x * s],
-            [z * x * (1 - c) - y * s, z * y * (1 - c) + x * s, c + z * z * (1 - c)]]
-
-
-def turned(rotation, point):
-    return [sum(a * b for a, b in zip(row, point)) for row in rotation]
-
-
 def bar(name, sizes, degrees=0, gaps=()):
-    """OBJ of a bar along x, turned, with groups held (x = 0), end and side; and copies of it shifted along z by each of `gaps`."""
-    rotation, lines, first = turn(degrees), [], 1
-    x, y, z = sizes
-    for shift in (0, *gaps):
-        for c in (0, z):
-            for b in (0, y):
-                for a in (0, x):
-                    lines.append("v {:.15g} {:.15g} {:.15g}".format(*turned(rotation, (a, b, c + shift))))
-        quads = {"held": [(0, 4, 6, 2)], "end": [(1, 3, 7, 5)], "side": [(0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6)]}
-        for group, faces in quads.items():
-            lines += [f"g {group}"] + ["f " + " ".join(str(i + first) for i in face) for face in faces]
-        first += 8
-    return write(name, "\n".join(lines) + "\n"), rotation
+    text, rotation = obj_bar(sizes, degrees, gaps)
+    return write(name, text), rotation
 
 
 def deflection(part, size, scene, *options):

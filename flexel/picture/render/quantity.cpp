@@ -7,29 +7,28 @@
 #include <array>
 #include <cmath>
 #include <span>
+#include <string_view>
 
 namespace flexel::picture {
 namespace {
 
-struct Word {
-  const char* part;
+struct Named {
+  std::string_view name;
   Dimension dimension;
 };
-// The first that is part of the name counts.
-constexpr std::array<Word, 14> kWords{{{"strain_energy", Dimension::energy},
-                                       {"strain", Dimension::share},
-                                       {"fill", Dimension::share},
-                                       {"stress", Dimension::pressure},
-                                       {"von_mises", Dimension::pressure},
-                                       {"pressure", Dimension::pressure},
-                                       {"displacement", Dimension::length},
-                                       {"thickness", Dimension::length},
-                                       {"distance", Dimension::length},
-                                       {"velocity", Dimension::velocity},
-                                       {"force", Dimension::force},
-                                       {"energy", Dimension::energy},
-                                       {"mass", Dimension::mass},
-                                       {"density", Dimension::density}}};
+// The attributes that the programs make, in SI units (docs/reference/body-file.md). An attribute of a file's own has no
+// unit that we know.
+constexpr std::array<Named, 11> kNamed{{{"displacement", Dimension::length},
+                                        {"thickness", Dimension::length},
+                                        {"velocity", Dimension::velocity},
+                                        {"von_mises", Dimension::pressure},
+                                        {"cell_von_mises", Dimension::pressure},
+                                        {"principal_stress", Dimension::pressure},
+                                        {"cell_principal_stress", Dimension::pressure},
+                                        {"strain", Dimension::share},
+                                        {"plastic_strain", Dimension::share},
+                                        {"spring_strain", Dimension::share},
+                                        {"fill", Dimension::share}}};
 
 struct Scale {
   double factor;
@@ -70,8 +69,10 @@ std::span<const Scale> scales(Dimension dimension) {
 }  // namespace
 
 std::optional<Dimension> dimension_of(const std::string& attribute) {
-  for (const Word& word : kWords)
-    if (attribute.find(word.part) != std::string::npos) return word.dimension;
+  const std::string_view name(attribute);
+  const std::string_view whole = name.substr(0, name.find_last_of('.'));  // without a component: "velocity.z"
+  for (const Named& known : kNamed)
+    if (known.name == name || known.name == whole) return known.dimension;
   return std::nullopt;
 }
 

@@ -8,8 +8,7 @@
 
 namespace flexel::picture {
 
-// What an attribute's name says of it: "von_mises" is a pressure, "strain" a share; nothing for a name that
-// says nothing.
+// Of the attributes that the programs make: "von_mises" is a pressure, "strain" a share; nothing for any other.
 [[nodiscard]] std::optional<Dimension> dimension_of(const std::string& attribute);
 
 // A unit that gives values up to `largest` (SI) handy numbers.
