@@ -1,12 +1,13 @@
 """--timeout, --max-memory and --max-elements of every program; little address space, few threads, no temporary folder."""
 
 import os
+import re
 import resource
 import subprocess
 import time
 import zipfile
 
-from harness import BIN, SCENE, body, box, expect, expect_error, expect_ok, expect_only, main, run, scene, shell
+from harness import BIN, SCENE, SOURCE, body, box, expect, expect_error, expect_ok, expect_only, main, run, scene, shell
 from hostile_test import MESH, MODEL, write_3mf
 
 HELD = ["--material", "steel", "--fix", "xmin", "--push", "xmax: 0 0 -1 N"]
@@ -102,6 +103,14 @@ def test_quarter_of_a_million_parts_in_a_kilobyte():
     seconds = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
     expect(result.out.count(b"part \"") >= 8192, "parts are missing")
     expect(seconds < 15, f"{seconds:.1f} s of processor time for 8,192 parts")
+
+
+def test_the_documented_numbers_are_those_of_the_code():
+    rows = re.findall(r"^\| [^|]+ \| ([0-9'e.]+) \| `(\w+)` in `([^`]+)` \|$", (SOURCE / "docs/reference/limits.md").read_text(), re.M)
+    expect(len(rows) >= 18, f"{len(rows)} rows")
+    for number, name, file in rows:
+        found = re.search(rf"\b{name} = ([0-9'e.]+)", (SOURCE / file).read_text())
+        expect(found and found[1] == number, f"{file}: {name} is {found and found[1]}, not {number}")
 
 
 def test_a_picture_without_room_for_its_library():
