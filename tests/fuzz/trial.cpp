@@ -10,6 +10,8 @@
 #include <fstream>
 
 #include "base/error.h"
+#include "base/printable.h"
+#include "base/text.h"
 #include "tests/fuzz/driver.h"
 
 namespace flexel::fuzz {
@@ -36,9 +38,9 @@ Trial::Outcome Trial::operator()(std::span<const std::byte> data) const {
     read_(path_);
     return Outcome::accepted;
   } catch (const InputError& error) {
-    const std::string line = error.what();
-    if (!line.empty() && line.find('\n') == std::string::npos) return Outcome::refused;
-    std::fprintf(stderr, "%s: a message that is not one line: %s\n", name_.c_str(), line.c_str());
+    reason_ = printable(one_line(error.what()));  // as run_program() says it
+    if (!reason_.empty()) return Outcome::refused;
+    std::fprintf(stderr, "%s: a refusal without a reason\n", name_.c_str());
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s: an exception that is no InputError: %s\n", name_.c_str(), error.what());
   }
@@ -53,7 +55,7 @@ std::vector<Bytes> Trial::seeds(const std::vector<Bytes>& corpus) const {
   std::vector<Bytes> all = corpus;
   for (const Bytes& good : corpus)
     if ((*this)(good) != Outcome::accepted)
-      end_with("an unchanged input of the corpus is refused; it is in " + path_);
+      end_with("an unchanged input of the corpus is refused; it is in " + path_ + ": " + reason_);
   const fs::path folder = fs::path(FLEXEL_FUZZ_CORPUS) / name_;
   if (!fs::is_directory(folder)) return all;
   std::vector<fs::path> files;

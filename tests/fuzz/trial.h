@@ -16,7 +16,7 @@ class Trial {
   // `name` of the fuzzer; its inputs are written to one file of the temporary folder (/dev/shm where there is one).
   Trial(std::string name, std::function<void(const std::string& path)> read);
 
-  // Gives it to the reader. failed, and a line on stderr: an exception that is no InputError, or whose message is not one line.
+  // Gives it to the reader. failed, and a line on stderr: an exception that is no InputError, or that gives no reason.
   [[nodiscard]] Outcome operator()(std::span<const std::byte> data) const;
   // `corpus` and what lies in tests/fuzz/corpus/NAME, each of which is tried. Ends the program where a good input is
   // not accepted, for that would test nothing, or one of the folder fails.
@@ -26,6 +26,7 @@ class Trial {
 
  private:
   std::string name_, path_;
+  mutable std::string reason_;  // of the last refusal
   std::function<void(const std::string& path)> read_;
 };
 
