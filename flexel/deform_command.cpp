@@ -51,7 +51,7 @@ constexpr double kUsualError = 0.05, kUsualSeconds = 20;  // aimed at where noth
 struct DeformArguments {
   JobArguments job;
   std::vector<std::string> outputs;
-  std::string summary, body, timeout, accuracy, within;
+  std::string summary, body, accuracy, within;
   mapping::MapArguments map;
   int threads = 0;
   bool quiet = false, verbose = false, estimate = true;
@@ -79,10 +79,6 @@ void declare_output(CommandLine& app, DeformArguments& arguments) {
                  "Write the summary of all stages (JSON; docs/guide/deform.md)")
       .type_name("FILE");
   add_threads_option(app, arguments.threads);
-  app.add_option("--timeout", arguments.timeout,
-                 "Stop after this time (\"90 s\"): exit 5, of a simulation the last good state in "
-                 "OUTPUT.failed.vtu")
-      .type_name("TIME");
   app.add_option("--accuracy", arguments.accuracy,
                  "Choose size and mapping from cheap runs so that the error is at most this (\"2%\")")
       .type_name("SHARE");
@@ -97,7 +93,6 @@ void declare_output(CommandLine& app, DeformArguments& arguments) {
 // What the arguments ask for, checked.
 struct Plan {
   Job job;
-  std::optional<double> timeout;     // s
   std::optional<AccuracyGoal> goal;  // of --accuracy and --within
   mapping::MapOptions map;
   mapping::CrackOptions crack;
@@ -143,11 +138,11 @@ void plan_outputs(const DeformArguments& arguments, Plan& plan) {
 }
 
 // Nothing is asked for: a size is chosen where error bars can judge it.
-void plan_usual_goal(const DeformArguments& arguments, Plan& plan) {
+void plan_usual_goal(const DeformArguments& arguments, const CommandLine& app, Plan& plan) {
   const simulate::Scene& scene = plan.job.scene;
   if (plan.job.voxelize.size || plan.job.voxelize.count || !arguments.estimate ||
       plan.job.voxelize.placement != Placement::corner || scene.run.time || settles(scene) ||
-      !arguments.timeout.empty())
+      app.has("--timeout"))
     return;
   plan.goal.emplace();
   plan.goal->by_default = true;
@@ -156,8 +151,8 @@ void plan_usual_goal(const DeformArguments& arguments, Plan& plan) {
   plan.goal->within = kUsualSeconds;
 }
 
-void plan_goal(const DeformArguments& arguments, Plan& plan) {
-  if (arguments.accuracy.empty() && arguments.within.empty()) return plan_usual_goal(arguments, plan);
+void plan_goal(const DeformArguments& arguments, const CommandLine& app, Plan& plan) {
+  if (arguments.accuracy.empty() && arguments.within.empty()) return plan_usual_goal(arguments, app, plan);
   const std::string option = arguments.accuracy.empty() ? "--within" : "--accuracy";
   if (plan.job.voxelize.size || plan.job.voxelize.count)
     throw InputError(option + " chooses the size: leave --size and --count out");
@@ -201,14 +196,13 @@ void plan_refinement(Plan& plan) {
 
 Plan make_plan(const DeformArguments& arguments, const CommandLine& app) {
   Plan plan;
-  if (!arguments.timeout.empty()) plan.timeout = simulate::parse_timeout(arguments.timeout);
   plan.map = map_options(arguments.map);
   plan.crack = crack_options(arguments.map);
   plan_outputs(arguments, plan);
   plan.refine = refine_options(arguments.map, app, plan.crack);
   plan_refinement(plan);
   plan.job = plan_job(arguments.job);
-  plan_goal(arguments, plan);
+  plan_goal(arguments, app, plan);
   return plan;
 }
 
@@ -501,8 +495,6 @@ void say_dropped_model(const AccuracyReport& accuracy, Progress& progress) {
 }
 
 int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress) {
-  std::optional<StopAfter> limit;
-  if (plan.timeout) limit.emplace(*plan.timeout, "--timeout", LimitOf::command);
   std::optional<AccuracyReport> accuracy;
   SolvedRun run;
   {
@@ -568,8 +560,9 @@ int deform_command(int argc, char** argv) {
       "flexel deform"};
   declare_input(app, arguments.job);
   declare_output(app, arguments);
+  // Runs in time leave something, and see to it themselves; a time limit, which comes later, leaves the last state.
+  const StopEndsProcess nothing_is_left;
   if (!parse_arguments(app, argc, argv)) return kExitDone;
-  const StopEndsProcess nothing_is_left;  // runs in time leave something, and see to it themselves
   Plan plan = make_plan(arguments, app);
   const ThreadLimit limit(arguments.threads);
   Progress progress("flexel", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);

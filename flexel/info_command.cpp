@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <unordered_map>
 
 #include "base/error.h"
 #include "base/files/output_file.h"
@@ -36,7 +37,8 @@ struct PartInfo {
   double area = 0;    // m^2
   Topology topology;  // as in the file
   voxelize::MeasuredPart healed;
-  std::vector<std::uint32_t> faces;  // indices into Surface::faces
+  std::vector<std::uint32_t> faces;             // indices into Surface::faces
+  std::unordered_map<std::string, int> called;  // how many of its faces have a name
   [[nodiscard]] bool closed() const { return topology.closed(); }
 };
 
@@ -75,6 +77,7 @@ Known look_at(Surface& surface) {
   known.numbers = face_numbers(surface);
   for (std::uint32_t f = 0; f < surface.faces.size(); ++f) {
     parts[surface.faces[f].part].faces.push_back(f);
+    ++parts[surface.faces[f].part].called[surface.faces[f].name];
     parts[surface.faces[f].part].area += known.shapes[f].area;
   }
   return known;
@@ -138,18 +141,17 @@ std::string part_text(const PartInfo& part, const Unit& unit) {
 
 // How a scene selects a face by its number: "part/2", or "part/#2" where the file calls another face "2".
 std::string selection_of(std::uint32_t face, const std::vector<std::uint32_t>& numbers,
-                         const Surface& surface, const std::string& part) {
+                         const Surface& surface, const PartInfo& part) {
   const std::string number = std::to_string(numbers[face]);
-  bool taken = false;
-  for (std::uint32_t f = 0; f < surface.faces.size(); ++f)
-    taken |=
-        f != face && surface.faces[f].part == surface.faces[face].part && surface.faces[f].name == number;
-  return fmt::format("{}/{}{}", part, taken ? "#" : "", number);
+  const auto called = part.called.find(number);
+  const int own = surface.faces[face].name == number ? 1 : 0;
+  const bool taken = called != part.called.end() && called->second > own;
+  return fmt::format("{}/{}{}", part.name, taken ? "#" : "", number);
 }
 
 std::string faces_text(const PartInfo& part, const Surface& surface, const std::vector<FaceShape>& shapes,
                        const std::vector<std::uint32_t>& numbers, const Unit& unit) {
-  const auto selection = [&](std::uint32_t f) { return selection_of(f, numbers, surface, part.name); };
+  const auto selection = [&](std::uint32_t f) { return selection_of(f, numbers, surface, part); };
   std::size_t width = 4;
   for (const std::uint32_t f : part.faces) width = std::max(width, selection(f).size());
   std::string text = fmt::format("  {:<{}} {:>12}  {:<28} {}\n", "face", width, "area " + unit.name + "^2",
@@ -273,8 +275,8 @@ std::string info_json(const Surface& surface, const Known& known) {
       if (!surface.parts[p].assembly.empty()) part["assembly"] = surface.parts[p].assembly;
       part["faces"] = Json::array();
       for (const std::uint32_t f : parts[p].faces)
-        part["faces"].push_back(face_json(surface.faces[f], numbers[f],
-                                          selection_of(f, numbers, surface, parts[p].name), shapes[f]));
+        part["faces"].push_back(
+            face_json(surface.faces[f], numbers[f], selection_of(f, numbers, surface, parts[p]), shapes[f]));
       file["parts"].push_back(part);
     }
     files.push_back(file);

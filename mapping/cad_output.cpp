@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/available_memory.h"
+#include "base/resources.h"
 #include "base/error.h"
 #include "base/files/output_file.h"
 #include "base/human.h"

@@ -29,7 +29,7 @@ using namespace flexel::simulate;
 struct Arguments {
   std::string scene;
   std::vector<std::string> bodies;
-  std::string output, summary, timeout, resume, checkpoint_every;
+  std::string output, summary, resume, checkpoint_every;
   std::vector<std::string> live;
   SimulateOptions options;
   bool quiet = false, verbose = false, compress = false, force = false;
@@ -64,10 +64,6 @@ void declare(CommandLine& app, Arguments& arguments) {
                  "Write the summary as JSON to this file (docs/reference/summary.md)");
   app.add_flag("--explain", arguments.options.explain,
                "Say which effects run and why, and the share of time of each");
-  app.add_option("--timeout", arguments.timeout,
-                 "Stop after this time (\"90 s\", \"5 min\"): exit 5, the last good state in "
-                 "OUTPUT.failed.vtu")
-      .type_name("TIME");
   app.add_option(
       "--history", arguments.options.history,
       "Timed runs: write energies, momenta and probes over time to this CSV file (docs/reference/motion.md)");
@@ -175,6 +171,7 @@ void check_files(const Arguments& arguments) {
 }
 
 Input read_input(Arguments& arguments) {
+  const StopEndsProcess at_once;
   if (arguments.scene == "-" && arguments.bodies.empty())
     throw InputError("scene and body cannot both come from stdin; give the body's file");
   if (!arguments.resume.empty()) return resume(arguments);
@@ -190,11 +187,11 @@ int run(int argc, char** argv) {
                   "flexel-simulate");
   Arguments arguments;
   declare(app, arguments);
+  // Runs in time leave something, and see to it themselves; a time limit, which comes later, leaves the last state.
+  const StopEndsProcess nothing_is_left;
   if (!parse_arguments(app, argc, argv)) return kExitDone;
-  const StopEndsProcess nothing_is_left;  // runs in time leave something, and see to it themselves
   Progress progress("flexel-simulate", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
   SimulateOptions& options = arguments.options;
-  if (!arguments.timeout.empty()) options.timeout = parse_timeout(arguments.timeout);
   if (!arguments.checkpoint_every.empty()) {
     if (options.checkpoint.empty() && arguments.resume.empty())
       throw InputError("--checkpoint-every needs --checkpoint FILE");

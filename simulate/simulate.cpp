@@ -234,8 +234,6 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
   refuse_empty(body);
   erase_stress_columns(body);
   progress.stage("simulate");
-  std::optional<StopAfter> time_limit;
-  if (options.timeout) time_limit.emplace(*options.timeout, "--timeout", LimitOf::command);
   check_actions(scene, body, progress);
   if (is_quadratic(scene, body)) {
     refuse_timed(options, scene.name);

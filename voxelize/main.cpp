@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "base/program/program.h"
 #include "base/program/progress.h"
 #include "base/program/termination.h"
+#include "base/resources.h"
 #include "base/units.h"
 #include "formats/common/file_formats.h"
 #include "formats/exchange/import.h"
@@ -31,8 +33,8 @@ constexpr const char* kName = "flexel-voxelize";
 
 struct Arguments {
   std::vector<std::string> parts;
-  std::string size, placement = "corner", unit, align = "snap", heal = "auto", material, max_memory,
-                    deflection, edge, format, vdb, summary, output = "-";
+  std::string size, placement = "corner", unit, align = "snap", heal = "auto", material, deflection, edge,
+                    format, vdb, summary, output = "-";
   std::optional<long long> count;
   int threads = 0;
   bool moments = false, compress = false, quiet = false, force = false;
@@ -52,8 +54,6 @@ void declare(CommandLine& app, Arguments& arguments) {
   app.add_option("--material", arguments.material, "name of the parts' material; else the scene gives it");
   app.add_flag("--moments", arguments.moments,
                "write the exact moments of cut cells too, for model quadratic");
-  app.add_option("--max-memory", arguments.max_memory,
-                 "refuse what needs more to simulate, for example 4GB (default 80 % of what is free)");
   app.add_option("--deflection", arguments.deflection,
                  "STEP: largest distance of the triangles from the CAD surface");
   app.add_option(
@@ -83,25 +83,6 @@ std::size_t choose(const std::string& option, const std::string& word,
                    did_you_mean(word, words));
 }
 
-// Bytes from "4GB", "512 MiB" or a plain number of bytes.
-double parse_bytes(const std::string& text) {
-  std::size_t end = 0;
-  double value = -1;
-  try {
-    value = std::stod(text, &end);
-  } catch (const std::exception&) {
-    throw InputError("--max-memory: \"" + text + "\" is not a number of bytes, for example 4GB");
-  }
-  std::string unit = text.substr(end);
-  unit.erase(0, unit.find_first_not_of(' '));
-  const std::vector<std::string> units = {"", "B", "kB", "MB", "GB", "TB", "KiB", "MiB", "GiB", "TiB"};
-  const double factors[] = {1, 1, 1e3, 1e6, 1e9, 1e12, 1024., 1048576., 1073741824., 1099511627776.};
-  for (std::size_t n = 0; n < units.size(); ++n)
-    if (unit == units[n] && value > 0 && value < 1e30) return value * factors[n];
-  throw InputError("--max-memory: \"" + text + "\" is not an amount of memory, for example 4GB" +
-                   did_you_mean(unit, units));
-}
-
 VoxelizeOptions voxelize_options(const Arguments& arguments) {
   VoxelizeOptions options;
   if (!arguments.size.empty() && arguments.count) throw InputError("give --size or --count, not both");
@@ -117,7 +98,7 @@ VoxelizeOptions voxelize_options(const Arguments& arguments) {
   options.heal = heal_choice(arguments.heal);
   options.material = arguments.material;
   options.moments = arguments.moments;
-  if (!arguments.max_memory.empty()) options.max_memory = parse_bytes(arguments.max_memory);
+  if (std::isfinite(memory_limit())) options.max_memory = memory_limit();
   return options;
 }
 

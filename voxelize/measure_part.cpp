@@ -13,6 +13,7 @@ std::vector<MeasuredPart> heal_and_measure(Surface& surface, int rays) {
   for (PartMesh& mesh : exact_part_meshes(surface)) healed.push_back(heal(std::move(mesh), {}, ""));
   face_outward(healed, surface);
   std::vector<MeasuredPart> result(healed.size());
+  const int lines = wall_lines(rays, healed.size());
   for (std::size_t p = 0; p < healed.size(); ++p) {
     const PartMesh& mesh = healed[p].mesh;
     result[p].healing = healed[p].done;
@@ -21,7 +22,7 @@ std::vector<MeasuredPart> heal_and_measure(Surface& surface, int rays) {
     constexpr double kLinesDiffer = .01;  // lines alone may be off by that around thin walls
     const double joined = mesh.shell_count > 1 ? union_volume(mesh) : *result[p].volume;
     if (std::abs(joined - *result[p].volume) > kLinesDiffer * joined) result[p].volume = joined;
-    const std::vector<WallSample> samples = wall_samples(mesh, rays);
+    const std::vector<WallSample> samples = wall_samples(mesh, lines);
     if (samples.empty()) continue;
     const WallSample& least = samples[thinnest_sample(samples)];
     result[p].thinnest = ThinWall{least.thickness, least.where, static_cast<std::uint32_t>(p)};

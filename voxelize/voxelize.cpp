@@ -7,9 +7,9 @@
 #include <cmath>
 #include <limits>
 
-#include "base/available_memory.h"
 #include "base/error.h"
 #include "base/nearest_word.h"
+#include "base/resources.h"
 #include "base/stop.h"
 #include "base/units.h"
 #include "formats/exchange/resolution.h"
@@ -126,10 +126,9 @@ VoxelizedPart describe(const HealedPart& healed, const Voxels& voxels, const Ass
 }
 
 // Walls of a part: the thinnest, and how many samples are thinner than two cells.
-void measure_walls(const PartMesh& mesh, std::uint32_t part, VoxelizedPart& found) {
-  constexpr int kLines = 128;
+void measure_walls(const PartMesh& mesh, std::uint32_t part, int lines, VoxelizedPart& found) {
   if (!mesh.balanced()) return;
-  const std::vector<WallSample> samples = wall_samples(mesh, kLines);
+  const std::vector<WallSample> samples = wall_samples(mesh, lines);
   if (samples.empty()) return;
   const WallSample& least = samples[thinnest_sample(samples)];
   found.thinnest = ThinWall{least.thickness, least.where, part};
@@ -147,13 +146,14 @@ void measure_walls(const PartMesh& mesh, std::uint32_t part, VoxelizedPart& foun
 
 // What does not depend on the lattice but where shells interpenetrate: volumes and walls.
 void measure(const std::vector<HealedPart>& meshes, VoxelizeResult& result) {
+  const int lines = wall_lines(128, meshes.size());
   for (std::size_t p = 0; p < meshes.size(); ++p) {
     VoxelizedPart& found = result.parts[p];
     if (found.closed)
       found.surface_volume =
           found.overlapping_voxels > 0 ? union_volume(meshes[p].mesh) : enclosed_volume(meshes[p].mesh);
     result.body.parts[p].surface_volume = found.surface_volume;
-    measure_walls(meshes[p].mesh, static_cast<std::uint32_t>(p), found);
+    measure_walls(meshes[p].mesh, static_cast<std::uint32_t>(p), lines, found);
   }
 }
 
@@ -351,11 +351,13 @@ VoxelizeResult voxelize(Surface surface, const VoxelizeOptions& options, Progres
   check_spacing(spacing, meshes, surface);
   double estimate = 0;
   for (const PartExtent& extent : extents) estimate += estimate_cells(extent, spacing, options.placement);
+  check_elements(estimate / 2, "");  // a lattice has more elements than cells, and the estimate may be high
   check_memory(estimate, options, limit, extents);
   VoxelizeResult result =
       build(surface, meshes, spacing, options.size ? options : without_moments(options), progress);
   if (!options.size) result = correct_count(std::move(result), spacing, meshes, extents, options, progress);
   const double cells = total_cells(result, options.placement);
+  check_elements(static_cast<double>(result.body.element_count()), "");
   check_memory(cells, options, limit, extents);
   measure(meshes, result);
   std::vector<double> cell;

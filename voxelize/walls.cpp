@@ -51,6 +51,13 @@ std::vector<WallSample> wall_samples(const PartMesh& mesh, int lines) {
   return samples;
 }
 
+int wall_lines(int lines, std::size_t parts) {
+  constexpr double kParts = 256;
+  constexpr int kLeast = 16;
+  if (static_cast<double>(parts) <= kParts) return lines;
+  return std::max(kLeast, static_cast<int>(lines * std::sqrt(kParts / static_cast<double>(parts))));
+}
+
 double fifth_wall(std::vector<WallSample> samples, double volume) {
   constexpr double kShare = 0.2;
   std::sort(samples.begin(), samples.end(),

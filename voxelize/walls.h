@@ -15,6 +15,9 @@ struct WallSample {
 // normals oppose each other within 10 degrees. `mesh` is balanced and oriented.
 [[nodiscard]] std::vector<WallSample> wall_samples(const PartMesh& mesh, int lines);
 
+// Lines for each of `parts` parts: `lines`, and beyond 256 parts fewer, so that all together take no longer; at least 16.
+[[nodiscard]] int wall_lines(int lines, std::size_t parts);
+
 // m: about a fifth of `volume` [m^3] lies in walls that are thinner; infinite where no more is in any. A
 // piece counts by the axis along which it is thinnest only where lines along the others find no wall.
 [[nodiscard]] double fifth_wall(std::vector<WallSample> samples, double volume);

@@ -2,6 +2,7 @@
 // Symbolic links are resolved first, so the file is replaced and not the link. Devices and FIFOs are written
 // directly. A fixed table lists the temporary files, for the signal handlers.
 #include "base/files/output_file.h"
+
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
@@ -16,6 +17,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/files/ending_waits.h"
 #include "base/files/files.h"
 #include "base/stop.h"
 
@@ -136,6 +138,7 @@ void OutputFile::open_file() {
   target_ = follow_links(path_);
   refuse_long_name(target_, path_);
   std::string name = temporary_beside(target_);
+  const EndingWaits until_it_is_known;
   descriptor_ = open_or_refuse(name, O_WRONLY | O_CREAT | O_TRUNC, 0666, path_);  // narrowed by the umask
   temporary_ = std::move(name);
   remember_temporary(temporary_);
@@ -226,6 +229,7 @@ bool OutputsTogether::takes(const std::string& path, const std::string& temporar
 }
 
 void OutputsTogether::appear() {
+  const EndingWaits until_all_are_there;
   while (!waiting_.empty()) {
     const Waiting next = waiting_.front();
     if (::rename(next.temporary.c_str(), next.target.c_str()) != 0) refuse(next.path, errno);

@@ -11,7 +11,10 @@
 #include "base/files/files.h"
 #include "base/nearest_word.h"
 #include "base/program/standard_output.h"
+#include "base/resources.h"
+#include "base/stop.h"
 #include "base/text.h"
+#include "base/units.h"
 #include "base/version.h"
 
 namespace flexel {
@@ -58,7 +61,7 @@ std::string without_false(std::string text) {
 }
 
 // A line an argument, its fields set apart by tabs: kind, names, value ("" of a flag), default, description. From these
-// lines man pages and completions are made (tools/interface_files.py).
+// lines man pages and completions are made (tools/interface-files).
 std::string described(const CLI::App& app) {
   std::string text = fmt::format("command\t{}\t\t\t{}\n", app.get_name(), one_line(app.get_description()));
   for (const CLI::Option* option : app.get_options()) {
@@ -72,7 +75,55 @@ std::string described(const CLI::App& app) {
   return text;
 }
 
+// Bytes from "4GB", "512 MiB" or a plain number of bytes.
+double parse_bytes(const std::string& text) {
+  std::size_t end = 0;
+  double value = -1;
+  try {
+    value = std::stod(text, &end);
+  } catch (const std::exception&) {
+    throw InputError("--max-memory: \"" + text + "\" is not a number of bytes, for example 4GB");
+  }
+  std::string unit = text.substr(end);
+  unit.erase(0, unit.find_first_not_of(' '));
+  const std::vector<std::string> units = {"", "B", "kB", "MB", "GB", "TB", "KiB", "MiB", "GiB", "TiB"};
+  const double factors[] = {1, 1, 1e3, 1e6, 1e9, 1e12, 1024., 1048576., 1073741824., 1099511627776.};
+  for (std::size_t n = 0; n < units.size(); ++n)
+    if (unit == units[n] && value > 0 && value < 1e30) return value * factors[n];
+  throw InputError("--max-memory: \"" + text + "\" is not an amount of memory, for example 4GB" +
+                   did_you_mean(unit, units));
+}
+
 }  // namespace
+
+struct CommandLine::Limits {
+  std::string timeout, memory;
+  std::optional<long long> elements;
+  std::optional<StopAfter> stop;
+
+  void declare(CLI::App& app) {
+    app.add_option("--timeout", timeout, "Stop after this time (\"90 s\", \"5 min\"): exit 5")
+        ->type_name("TIME");
+    app.add_option("--max-memory", memory,
+                   "Take no more than this (\"4GB\"); refuse at once what is sure to need more")
+        ->type_name("BYTES");
+    app.add_option("--max-elements", elements, "Refuse bodies of more elements")->type_name("COUNT");
+  }
+  void begin() {
+    if (!memory.empty()) limit_memory(parse_bytes(memory));
+    if (elements && *elements <= 0) throw InputError("--max-elements: must be above zero");
+    if (elements) limit_elements(static_cast<std::size_t>(*elements));
+    if (timeout.empty()) return;
+    double seconds = 0;
+    try {
+      seconds = parse_quantity(timeout, Dimension::time);
+    } catch (const InputError& error) {
+      throw InputError("--timeout", error.what());
+    }
+    if (!(seconds > 0)) throw InputError("--timeout: must be above zero");
+    stop.emplace(seconds, "--timeout", LimitOf::command);
+  }
+};
 
 Option Option::type_name(const std::string& name) const {
   return Option(option_->type_name(name));
@@ -106,7 +157,7 @@ Option Option::check(const std::function<std::string(const std::string&)>& wrong
 }
 
 CommandLine::CommandLine(const std::string& what, const std::string& name)
-    : app_(std::make_unique<CLI::App>(what, name)) {}
+    : app_(std::make_unique<CLI::App>(what, name)), limits_(std::make_unique<Limits>()) {}
 CommandLine::~CommandLine() = default;
 
 template <class T>
@@ -128,6 +179,7 @@ bool parse_arguments(CommandLine& line, int argc, char** argv) {
     const std::string name = app.get_name().empty() ? stem(argv[0]) : app.get_name();
     app.set_version_flag("--version", name + " " + version(), "Print the version and exit");
   }
+  if (app.get_option_no_throw("--timeout") == nullptr) line.limits_->declare(app);
   if (argc == 2 && std::string_view(argv[1]) == kDescribe) {
     if (app.get_name().empty()) app.name(stem(argv[0]));
     print_to_stdout(described(app));
@@ -136,6 +188,7 @@ bool parse_arguments(CommandLine& line, int argc, char** argv) {
   refuse_empty_values(argc, argv);
   try {
     app.parse(argc, argv);
+    line.limits_->begin();
     return true;
   } catch (const CLI::CallForHelp&) {
     print_to_stdout(without_false(app.help()));

@@ -33,7 +33,8 @@ class Option {
   CLI::Option* option_;
 };
 
-// What a program or command can be told.
+// What a program or command can be told. Every one has --timeout, --max-memory and --max-elements, which hold from
+// parse_arguments() on, while this lives.
 class CommandLine {
  public:
   explicit CommandLine(const std::string& what, const std::string& name = "");
@@ -52,7 +53,9 @@ class CommandLine {
 
  private:
   friend bool parse_arguments(CommandLine& line, int argc, char** argv);
+  struct Limits;
   std::unique_ptr<CLI::App> app_;
+  std::unique_ptr<Limits> limits_;
 };
 
 // Parses the arguments. --help and --version print and yield their exit code (0); a wrong argument throws

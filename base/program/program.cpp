@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <cstdio>
 #include <new>
 #include <string_view>
@@ -16,7 +17,9 @@
 #include "base/printable.h"
 #include "base/program/signals.h"
 #include "base/program/standard_output.h"
+#include "base/resources.h"
 #include "base/text.h"
+#include "base/units.h"
 
 namespace flexel {
 namespace {
@@ -45,6 +48,12 @@ bool wants_a_thread(const std::exception& error) {
          std::string_view(error.what()).starts_with("pthread_create");
 }
 
+std::string memory_words() {
+  if (!std::isfinite(memory_limit())) return kNoMemory;
+  return fmt::format("needs more than --max-memory allows ({}): raise it; a larger spacing needs less",
+                     human_bytes(memory_limit()));
+}
+
 // The body's exit code, or that of what it throws.
 int code_of(const std::string& name, const std::function<int()>& body) {
   try {
@@ -68,7 +77,7 @@ int code_of(const std::string& name, const std::function<int()>& body) {
   } catch (const ProgramBeforeFailed& failed) {
     return failed.code();
   } catch (const std::bad_alloc&) {
-    return report(name, kNoMemory, kExitInput);
+    return report(name, memory_words(), kExitInput);
   } catch (const std::exception& error) {
     if (wants_a_thread(error))
       return report(

@@ -17,6 +17,7 @@
 #include <typeinfo>
 
 #include "base/error.h"
+#include "base/files/ending_waits.h"
 #include "base/files/files.h"
 #include "base/files/pipe_code.h"
 #include "base/program/termination.h"
@@ -45,6 +46,7 @@ const char* word_of(int signal) {
 }
 
 void on_interrupt(int signal) {
+  if (EndingWaits::takes(signal)) return;
   const bool at_once = interrupt_count == 0 && stop_ends_process > 0 && termination_waits == 0;
   interrupt_count = interrupt_count + 1;
   if (interrupt_count > 1 || at_once) {
@@ -59,6 +61,7 @@ void on_interrupt(int signal) {
 
 void on_termination(int signal) {
   if (termination_waits > 0) return on_interrupt(signal);
+  if (EndingWaits::takes(signal)) return;
   remove_temporary_outputs();
   std::signal(signal, SIG_DFL);
   std::raise(signal);
@@ -146,6 +149,7 @@ class StopEndsProcess::Watch {
     const std::chrono::nanoseconds left(limit - stop_detail::now());
     if (changed_.wait_for(lock, left, [this] { return done_; })) return;
     if (termination_waits > 0) return;  // check_stop() in the work throws TimeoutError
+    const auto no_file_appears = EndingWaits::none_begins();
     write_words({program_name.data(), ": error: stopped by --timeout\n"});
     remove_temporary_outputs();
     tell_code_through_pipe(STDOUT_FILENO, kExitTimeout);

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <exception>
 
-#include "base/available_memory.h"
+#include "base/resources.h"
 #include "base/error.h"
 #include "base/human.h"
 #include "base/parallel.h"

@@ -94,7 +94,7 @@ std::vector<std::string> environment_with(const std::vector<std::string>& more) 
 }  // namespace
 
 ChildRun run_child(const std::vector<std::string>& argv, const ChildOptions& options) {
-  if (options.heed_interrupts && interrupted()) throw Interrupted();
+  if (options.heed_interrupts) check_stop();
   const std::vector<char*> arguments = pointers(argv);
   const std::vector<std::string> variables = environment_with(options.environment);
   const std::vector<char*> environment = pointers(variables);
@@ -121,7 +121,7 @@ ChildRun run_child(const std::vector<std::string>& argv, const ChildOptions& opt
     if (signalled && late) {
       kill(child, SIGKILL);
       until = kNever;
-    } else if (!signalled && (late || (options.heed_interrupts && interrupted()))) {
+    } else if (!signalled && (late || (options.heed_interrupts && stop_is_due()))) {
       result.out_of_time = late;
       kill(child, SIGINT);
       signalled = true;
@@ -136,7 +136,7 @@ ChildRun run_child(const std::vector<std::string>& argv, const ChildOptions& opt
   result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   result.cpu = seconds(usage.ru_utime) + seconds(usage.ru_stime);
   result.memory = 1024.0 * static_cast<double>(usage.ru_maxrss);
-  if (options.heed_interrupts && interrupted()) throw Interrupted();
+  if (options.heed_interrupts) check_stop();
   return result;
 }
 

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "base/available_memory.h"
+#include "base/resources.h"
 #include "base/error.h"
 #include "base/parallel.h"
 #include "formats/cad/cad_surface.h"

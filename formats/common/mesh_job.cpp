@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "base/available_memory.h"
+#include "base/resources.h"
 #include "base/error.h"
 #include "base/parallel.h"
 #include "formats/part/topology.h"

@@ -1,7 +1,7 @@
 // The body goes to flexel-meshes as a body file.
 #include "formats/exchange/vdb_file.h"
 
-#include "base/available_memory.h"
+#include "base/resources.h"
 #include "base/files/output_file.h"
 #include "base/parallel.h"
 #include "formats/common/mesh_job.h"

@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/resources.h"
 #include "formats/lattice/body_file.h"
 #include "formats/lattice/body_file_names.h"
 #include "formats/lattice/body_metadata.h"
@@ -171,6 +172,7 @@ Body read_body(Bytes bytes, const std::string& where) {
   require_version(file);
   Metadata metadata = read_metadata(file, where);
   Body body = std::move(metadata.body);
+  check_elements(body.parts.empty() ? 0 : static_cast<double>(body.parts.back().element_end), where);
   read_elements(file, body);
   read_cells(file, body);
   read_moments(file, body);

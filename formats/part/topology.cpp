@@ -40,6 +40,18 @@ HalfEdges bucket_half_edges(const std::vector<Corners>& corners, std::size_t ver
   });
 }
 
+// A few triangles of many vertices (one of a hundred thousand parts): their vertices are numbered from 0, in the same order.
+std::size_t number_anew(std::vector<Corners>& corners) {
+  std::vector<std::uint32_t> used;
+  for (const Corners& each : corners) used.insert(used.end(), each.begin(), each.end());
+  std::sort(used.begin(), used.end());
+  used.erase(std::unique(used.begin(), used.end()), used.end());
+  for (Corners& each : corners)
+    for (std::uint32_t& v : each)
+      v = static_cast<std::uint32_t>(std::lower_bound(used.begin(), used.end(), v) - used.begin());
+  return used.size();
+}
+
 // Edges counted in a range of buckets, and the pairs of triangles that meet at a non-manifold edge.
 struct EdgeTally {
   std::size_t open = 0, non_manifold = 0, misoriented = 0;
@@ -179,9 +191,11 @@ Topology topology(const std::vector<Corners>& corners, const std::vector<std::ui
   parallel_for_each(corners.size(), [&](std::size_t t) {
     for (std::size_t i = 0; i < 3; ++i) welded_corners[t][i] = welded[corners[t][i]];
   });
+  const std::size_t vertices =
+      9 * corners.size() < welded.size() ? number_anew(welded_corners) : welded.size();
   Topology result;
   result.neighbour.assign(corners.size(), {kNoTriangle, kNoTriangle, kNoTriangle});
-  HalfEdges edges = bucket_half_edges(welded_corners, welded.size());
+  HalfEdges edges = bucket_half_edges(welded_corners, vertices);
   const auto joined = pair_edges(welded_corners, edges, result);
   number_shells(welded_corners, joined, result);
   return result;

@@ -5,7 +5,7 @@
 #include <map>
 #include <set>
 
-#include "base/available_memory.h"
+#include "base/resources.h"
 #include "base/error.h"
 #include "base/units.h"
 #include "formats/threemf/threemf_content.h"

@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "base/available_memory.h"
+#include "base/resources.h"
 #include "base/error.h"
 #include "base/printable.h"
 #include "base/units.h"

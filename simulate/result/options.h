@@ -11,7 +11,6 @@ struct Checkpoint;  // simulate/time/checkpoint.h
 struct SimulateOptions {
   int threads = 0;                // 0: every core
   std::string failed_output;      // where the last good state goes when the run fails; "" for nowhere
-  std::optional<double> timeout;  // s, after which the run stops
   // Timed runs: where the books go (CSV), and the frames (.pvd); "" for nowhere. docs/reference/motion.md
   std::string history, series;
   bool compress = false;  // the frames

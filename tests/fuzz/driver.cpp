@@ -11,11 +11,9 @@
 #include <chrono>
 #include <cstdio>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <random>
 
-#include "base/error.h"
+#include "tests/fuzz/trial.h"
 
 namespace flexel::fuzz {
 namespace {
@@ -138,66 +136,31 @@ void limit_address_space() {
 #endif
 }
 
-// True when the reader took the file or refused it properly.
-bool survives(const std::function<void(const std::string&)>& read, const std::string& path, bool& accepted) {
-  accepted = false;
-  try {
-    read(path);
-    accepted = true;
-    return true;
-  } catch (const InputError& error) {
-    const std::string line = error.what();
-    if (!line.empty() && line.find('\n') == std::string::npos) return true;
-    std::fprintf(stderr, "a message that is not one line: %s\n", line.c_str());
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "an exception that is no InputError: %s\n", error.what());
-  }
-  return false;
-}
-
 }  // namespace
-
-Bytes bytes_of(const std::string& text) {
-  Bytes bytes(text.size());
-  std::transform(text.begin(), text.end(), bytes.begin(), [](char c) { return static_cast<std::byte>(c); });
-  return bytes;
-}
 
 int run(int argc, char** argv, const std::string& name, const std::vector<Bytes>& corpus,
         const std::function<void(const std::string& path)>& read) {
   const Arguments arguments = parse(argc, argv);
-  const std::string path = std::filesystem::temp_directory_path() / (name + "-" + std::to_string(getpid()));
   limit_address_space();
-  const auto write = [&](const Bytes& data) {
-    std::ofstream(path, std::ios::binary)
-        .write(reinterpret_cast<const char*>(data.data()), static_cast<std::streamsize>(data.size()));
-  };
-  bool accepted = false;
-  for (const Bytes& good : corpus) {  // inputs that are refused as they stand would test nothing
-    write(good);
-    if (!survives(read, path, accepted) || !accepted) {
-      std::fprintf(stderr, "%s: an unchanged input of the corpus is refused; it is in %s\n", name.c_str(),
-                   path.c_str());
-      return 1;
-    }
-  }
+  const Trial trial(name, read);
+  const std::vector<Bytes> seeds = trial.seeds(corpus);
   const auto began = std::chrono::steady_clock::now();
   const auto seconds = [&] {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   };
   std::size_t done = 0, taken = 0;
   for (; done < arguments.iterations && seconds() < arguments.seconds; ++done) {
-    write(mutant(corpus, arguments.first + done));
     alarm(kSecondsPerInput);
-    if (!survives(read, path, accepted)) {
+    const Trial::Outcome outcome = trial(mutant(seeds, arguments.first + done));
+    if (outcome == Trial::Outcome::failed) {
       std::fprintf(stderr, "%s: mutant %zu failed; it is in %s\n", name.c_str(), arguments.first + done,
-                   path.c_str());
+                   trial.path().c_str());
       return 1;
     }
-    taken += accepted ? 1 : 0;
+    taken += outcome == Trial::Outcome::accepted ? 1 : 0;
   }
   alarm(0);
-  std::filesystem::remove(path);
+  trial.clean();
   std::printf("%s: %zu mutants, %zu accepted, %zu refused\n", name.c_str(), done, taken, done - taken);
   return 0;
 }

@@ -1,4 +1,7 @@
-// Mutated scenes that use every table.
+// Mutated scenes: one that uses most tables, and those of the samples.
+#include <algorithm>
+#include <filesystem>
+
 #include "base/files/files.h"
 #include "simulate/scene/scene.h"
 #include "tests/fuzz/driver.h"
@@ -43,10 +46,20 @@ tolerance = 1e-7
 load_steps = 3
 )";
 
+std::vector<flexel::Bytes> corpus() {
+  std::vector<std::string> files;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(FLEXEL_SAMPLES))
+    if (entry.path().extension() == ".toml") files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  std::vector<flexel::Bytes> all = {flexel::fuzz::bytes_of(kScene)};
+  for (const std::string& file : files) all.push_back(flexel::read_all(file));
+  return all;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   using namespace flexel;
-  return fuzz::run(argc, argv, "fuzz_scene", {fuzz::bytes_of(kScene)},
+  return fuzz::run(argc, argv, "fuzz_scene", corpus(),
                    [](const std::string& path) { (void)simulate::read_scene(path); });
 }

@@ -8,8 +8,11 @@ import shutil
 
 from harness import BIN, SCENE, Skip, body, box, bracket, expect, expect_ok, main, need_step, run, scene, write
 
+# FLEXEL_FAULTS_MOST: how many of each kind of call fail, evenly between the first and the last (FLEXEL_FAULTS_ALLOCATIONS: of
+# allocations); FLEXEL_FAULTS_RESULTS: a file to
+# which a line of JSON with the counts is added (tools/reliability).
 KINDS = ("write", "fsync", "rename", "open", "close", "malloc")
-MOST = 12  # of each kind; the others lie evenly between
+MOST = int(os.environ.get("FLEXEL_FAULTS_MOST", "12"))
 OLD = b"what was there before\n"
 
 
@@ -54,7 +57,8 @@ def sweep(command, outputs, least=1):
     tried = failed = 0
     for kind in KINDS:
         count = counts[kind]
-        numbers = range(1, count + 1) if count <= MOST else sorted({1 + round(i * (count - 1) / (MOST - 1)) for i in range(MOST)})
+        most = int(os.environ.get("FLEXEL_FAULTS_ALLOCATIONS", MOST)) if kind == "malloc" else MOST
+        numbers = range(1, count + 1) if count <= most else sorted({1 + round(i * (count - 1) / (most - 1)) for i in range(most)})
         for number in numbers:
             shutil.rmtree("again", ignore_errors=True)
             os.mkdir("again")
@@ -80,6 +84,10 @@ def sweep(command, outputs, least=1):
                 expect(found[name] == OLD or whole(name, found[name], reference[name]), f"{name} is neither old nor new; {what}")
     shutil.rmtree("again", ignore_errors=True)
     expect(failed >= least and tried > failed, f"{failed} of {tried} faults were noticed")
+    if results := os.environ.get("FLEXEL_FAULTS_RESULTS"):
+        with open(results, "a", encoding="utf-8") as file:
+            file.write(json.dumps({"command": " ".join(program.split() + list(command[1:2] if program == "flexel" else ())), "calls": sum(counts.values()),
+                                   "failed": tried, "noticed": failed}) + "\n")
 
 
 def test_voxelize():

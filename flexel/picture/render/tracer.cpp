@@ -44,7 +44,10 @@ struct Tracer::State {
   RTCScene scene = nullptr;
 
   State() {
-    if (device == nullptr) throw std::runtime_error("Embree does not start on this processor");
+    if (device == nullptr) {
+      if (rtcGetDeviceError(nullptr) != RTC_ERROR_UNSUPPORTED_CPU) throw std::bad_alloc();
+      throw std::runtime_error("Embree does not start on this processor");
+    }
     scene = rtcNewScene(device);
     rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
   }

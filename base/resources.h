@@ -1,0 +1,22 @@
+// What this process may take: memory and elements (--max-memory, --max-elements; base/program/arguments.h).
+#pragma once
+#include <cstddef>
+#include <string>
+
+namespace flexel {
+
+// Bytes that can be used without swapping (MemAvailable), and no more than limit_memory() allows; infinite
+// where neither says.
+[[nodiscard]] double available_memory();
+
+// From now on allocations beyond so many bytes fail with std::bad_alloc, here and in children started later, the stacks of
+// threads not counted. `bytes` > 0.
+void limit_memory(double bytes);
+[[nodiscard]] double memory_limit();  // infinite: none
+
+// From now on bodies of more elements are refused.
+void limit_elements(std::size_t elements);
+// Throws InputError(where, ...): `elements` are more than the limit. For estimates before the work, and for what a file says.
+void check_elements(double elements, const std::string& where);
+
+}  // namespace flexel

@@ -1,0 +1,124 @@
+"""--timeout, --max-memory and --max-elements of every program; little address space, few threads, no temporary folder."""
+
+import os
+import re
+import resource
+import subprocess
+import time
+import zipfile
+
+from harness import BIN, SCENE, SOURCE, body, box, expect, expect_error, expect_ok, expect_only, main, run, scene, shell
+from hostile_test import MESH, MODEL, write_3mf
+
+HELD = ["--material", "steel", "--fix", "xmin", "--push", "xmax: 0 0 -1 N"]
+
+
+def everything():
+    """A command of each program, with what it writes."""
+    box()
+    body()
+    scene()
+    return [(["flexel-voxelize", "box.stl", "--size", "1 mm", "-o", "o.vtu"], 12000), (["flexel-simulate", "scene.toml", "body.vtu", "-o", "o.vtu"], 81),
+            (["flexel-map", "body.vtu", "-o", "o.stl"], 81), (["flexel", "deform", "box.stl", *HELD, "--size", "1 mm", "-o", "o.stl"], 12000),
+            (["flexel", "picture", "body.vtu", "-o", "o.png"], 81), (["flexel", "export", "box.stl", "--scene", "scene.toml", "--size", "1 mm", "--calculix", "-o", "o.inp"], 12000),
+            (["flexel", "compare", "box.stl", "box.stl", *HELD, "--size", "1 mm"], 12000), (["flexel", "info", "box.stl"], 0),
+            (["flexel", "measure", "--model", "cells", "--size", "1 mm"], 0), (["flexel", "study", "box.stl", "--scene", "scene.toml", "-o", "s"], 0),
+            (["flexel", "materials"], 0), (["flexel", "scene-keys"], 0)]
+
+
+def test_every_program_has_all_limits():
+    for command, _ in everything():
+        words = command[:2] if command[0] == "flexel" else command[:1]
+        told = expect_ok(run(*words, "--help")).out.decode()
+        for option in ("--timeout", "--max-memory", "--max-elements"):
+            expect(option in told, f"{words} has no {option}")
+            expect_error(run(*command, option, "-1"), command[0], option)
+            expect_error(run(*command, option, "nan"), command[0])
+    expect_only("box.stl", "body.vtu", "scene.toml")
+
+
+def test_elements():
+    for command, elements in everything():
+        if elements == 0:
+            continue
+        expect_error(run(*command, "--max-elements", str(elements // 4)), command[0], "elements", "--max-elements")
+        expect_only("box.stl", "body.vtu", "scene.toml")
+        expect_ok(run(*command, "--max-elements", str(100 * elements)))
+        for name in set(os.listdir(".")) - {"box.stl", "body.vtu", "scene.toml"}:
+            os.remove(name)
+
+
+def peak(command):
+    """Exit code, bytes that the command has had in memory at most, and what it said."""
+    process = subprocess.Popen([str(BIN / command[0]), *command[1:]], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    said = process.stderr.read().decode()
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    return process.returncode, 1024 * usage.ru_maxrss, said
+
+
+def test_memory_is_kept():
+    """A limit below what the work takes ends it with a line, and the program has not had more than that and its own code."""
+    box()
+    code = 120e6  # libraries and what they begin with
+    for command in (["flexel-voxelize", "box.stl", "--size", "0.35 mm", "-o", "o.vtu"], ["flexel", "deform", "box.stl", *HELD, "--size", "0.4 mm", "-o", "o.stl"]):
+        limit = 30e6
+        ended, most, said = peak([*command, "--max-memory", "30MB"])
+        expect(ended == 2 and "more than" in said and said.count("error: ") == 1, f"exit {ended}: {said}")
+        expect(most < limit + code, f"{most / 1e6:.0f} MB with a limit of {limit / 1e6:.0f} MB")
+        expect_only("box.stl")
+
+
+def test_time():
+    """Within a second, on a machine that does much else within three."""
+    box()
+    scene(text=SCENE + "[run]\nload_steps = 10000\n")
+    expect_ok(run("flexel-voxelize", "box.stl", "--size", "0.5 mm", "--quiet", "-o", "body.vtu"))
+    write_3mf("many.3mf", MODEL.format("", f'<object id="1">{MESH}</object>' + "".join(
+        f'<object id="{n + 2}"><components><component objectid="{n + 1}"/><component objectid="{n + 1}"/></components></object>' for n in range(17)), 18))
+    before = sorted(os.listdir("."))
+    for command in (["flexel-voxelize", "box.stl", "--size", "0.1 mm", "--max-memory", "1TB", "-o", "o.vtu"], ["flexel", "info", "many.3mf"],
+                    ["flexel-simulate", "scene.toml", "body.vtu", "-o", "o.vtu"], ["flexel-map", "body.vtu", "--check", "voronoi,self-intersection", "--refine", "0.1 mm", "-o", "o.stl"],
+                    ["flexel", "picture", "many.3mf", "-o", "o.png"], ["flexel", "export", "box.stl", "--scene", "scene.toml", "--size", "0.15 mm", "--calculix", "-o", "o.inp"],
+                    ["flexel", "study", "box.stl", "--scene", "scene.toml", "--budget", "60 s", "-o", "s"],
+                    ["flexel", "measure", "--model", "cells", "--size", "1 mm", "--material", "steel"]):
+        began = time.monotonic()
+        result = run(*command, "--timeout", "0.5 s", timeout=60)
+        took = time.monotonic() - began
+        if result.code == 0 and took < 0.5:
+            continue  # too quick to be stopped
+        expect_error(result, command[0], "stopped by --timeout", code=5)
+        expect(took < 0.5 + 3, f"{command}: {took:.1f} s")
+        for name in set(os.listdir(".")) - set(before):
+            expect(name == "o.failed.vtu" or (name == "s" and os.path.isdir("s")), f"{command} leaves {name}")
+
+
+def test_quarter_of_a_million_parts_in_a_kilobyte():
+    """Time grows with the parts, not with their square."""
+    write_3mf("many.3mf", MODEL.format("", f'<object id="1">{MESH}</object>' + "".join(
+        f'<object id="{n + 2}"><components><component objectid="{n + 1}"/><component objectid="{n + 1}"/></components></object>' for n in range(13)), 14))
+    expect(os.path.getsize("many.3mf") < 2000 and zipfile.is_zipfile("many.3mf"), "the file is small")
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    result = expect_ok(run("flexel", "info", "many.3mf"))
+    seconds = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+    expect(result.out.count(b"part \"") >= 8192, "parts are missing")
+    expect(seconds < 15, f"{seconds:.1f} s of processor time for 8,192 parts")
+
+
+def test_the_documented_numbers_are_those_of_the_code():
+    rows = re.findall(r"^\| [^|]+ \| ([0-9'e.]+) \| `(\w+)` in `([^`]+)` \|$", (SOURCE / "docs/reference/limits.md").read_text(), re.M)
+    expect(len(rows) >= 18, f"{len(rows)} rows")
+    for number, name, file in rows:
+        found = re.search(rf"\b{name} = ([0-9'e.]+)", (SOURCE / file).read_text())
+        expect(found and found[1] == number, f"{file}: {name} is {found and found[1]}, not {number}")
+
+
+def test_a_picture_without_room_for_its_library():
+    box()
+    for memory in (100000, 150000, 200000, 300000):
+        result = shell(f"ulimit -v {memory}; flexel picture box.stl -o p.png")
+        expect(result.code in (0, 2, 127) and "internal error" not in result.err, f"{memory} kB: {result}")
+
+
+if __name__ == "__main__":
+    main(globals())
