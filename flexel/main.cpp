@@ -30,6 +30,7 @@ constexpr const char* kHelp =
     "name\n"
     "  flexel picture FILE... -o OUT.png\n"
     "                        a picture of parts and bodies, deformed and coloured, without a display\n"
+    "  flexel view FILE...   parts, bodies and series in the browser; --html OUT.html writes the page\n"
     "  flexel materials      the materials that --material and scenes know, with their sources\n"
     "  flexel scene-keys     the keys of scenes: where each may stand, what it takes, its default\n"
     "  flexel measure --model NAME --size LENGTH\n"
@@ -57,9 +58,9 @@ bool is_stage(const std::string& command) {
 }
 
 [[noreturn]] void unknown_command(const std::string& command) {
-  const std::vector<std::string> commands = {"deform",    "compare",    "export",  "info",  "picture",
-                                             "materials", "scene-keys", "measure", "study", "voxelize",
-                                             "simulate",  "map",        "help"};
+  const std::vector<std::string> commands = {"deform",   "compare",   "export",     "info",    "picture",
+                                             "view",     "materials", "scene-keys", "measure", "study",
+                                             "voxelize", "simulate",  "map",        "help"};
   throw InputError(fmt::format("unknown command \"{}\"; the commands are {}{}", command,
                                fmt::join(commands, ", "), did_you_mean(command, commands)));
 }
@@ -81,6 +82,7 @@ int help(int argc, char** argv) {
   if (command == "study") return study_command(2, arguments);
   if (command == "info") return info_command(2, arguments);
   if (command == "picture") return picture_command(2, arguments);
+  if (command == "view") return view_command(2, arguments);
   if (is_stage(command)) run_stage_program(argv[1], arguments);
   unknown_command(command);
 }
@@ -88,9 +90,8 @@ int help(int argc, char** argv) {
 int run(int argc, char** argv) {
   if (argc < 2)
     throw InputError(
-        "a command is missing: deform, compare, export, info, picture, materials, scene-keys, measure, "
-        "study, "
-        "voxelize, simulate or map (`flexel help`)");
+        "a command is missing: deform, compare, export, info, picture, view, materials, scene-keys, measure, "
+        "study, voxelize, simulate or map (`flexel help`)");
   const std::string command = argv[1];
   if (command == "--version") {
     print(fmt::format("flexel {}\n", version()));
@@ -106,6 +107,7 @@ int run(int argc, char** argv) {
   if (command == "study") return study_command(argc - 1, argv + 1);
   if (command == "info") return info_command(argc - 1, argv + 1);
   if (command == "picture") return picture_command(argc - 1, argv + 1);
+  if (command == "view") return view_command(argc - 1, argv + 1);
   if (is_stage(command)) run_stage_program(argv[1], argv + 1);
   unknown_command(command);
 }
