@@ -140,14 +140,19 @@ Json colours_json() {
   return {{"palette", palette}, {"tints", tints}, {"nothing", hex(picture::colour_of_nothing())}};
 }
 
+// Those that are not there yet.
 void collect_warnings(const Json& value, Json& warnings) {
   if (!value.is_structured()) return;
-  for (const auto& [key, inner] : value.items())
-    if (value.is_object() && key == "warnings" && inner.is_array())
-      for (const Json& each : inner)
-        warnings.push_back(each.is_string() ? printable(each.get<std::string>()) : "");
-    else
+  for (const auto& [key, inner] : value.items()) {
+    if (!value.is_object() || key != "warnings" || !inner.is_array()) {
       collect_warnings(inner, warnings);
+      continue;
+    }
+    for (const Json& each : inner) {
+      const Json text = each.is_string() ? printable(each.get<std::string>()) : each.dump();
+      if (std::find(warnings.begin(), warnings.end(), text) == warnings.end()) warnings.push_back(text);
+    }
+  }
 }
 
 Json words_json(const RunWords& words) {
@@ -157,7 +162,7 @@ Json words_json(const RunWords& words) {
   if (!words.summary.empty()) {
     if (json_depth(words.summary) <= kDeepestJson) summary = Json::parse(words.summary, nullptr, false);
     if (!summary.is_object()) throw InputError("--summary: is no summary (JSON) of a run");
-    if (words.warnings.empty()) collect_warnings(summary, warnings);
+    collect_warnings(summary, warnings);
   }
   return {{"warnings", warnings}, {"lines", lines}, {"summary", summary}};
 }
