@@ -101,7 +101,9 @@ view::ViewSubject read_subject(const std::string& path, const ImportOptions& imp
       try {
         subject.surface = import_surface(file.path(), import);
       } catch (const InputError& error) {
-        throw InputError(error.where() == file.path() ? subject.where : error.where(), error.what());
+        const std::string path_now = file.path();
+        if (!error.where().starts_with(path_now)) throw;
+        throw InputError(subject.where + error.where().substr(path_now.size()), error.what());
       }
     }
   } else {

@@ -6,12 +6,10 @@ import json
 import pathlib
 import re
 import shutil
-import struct
 import subprocess
 import tempfile
 import time
 import urllib.request
-import zlib
 
 from harness import Skip, expect
 
@@ -88,10 +86,21 @@ class Browser:
         return self.run("return document.getElementById(arguments[0]).innerText", control)
 
     def picture(self):
-        """The page's own picture, as the button saves it: (width, height, rows of RGB bytes)."""
-        data = self.run("""const blob = await flexelView.pictureBlob(flexelView.picture), reader = new FileReader();
-                           return await new Promise(done => { reader.onload = () => done(reader.result); reader.readAsDataURL(blob); });""")
-        return read_png(base64.b64decode(data.split(",")[1]))
+        """What is in the page's own picture, the PNG that its button saves: width, height, share of pixels that are not paper, number of
+        colours, and a number that tells pictures apart."""
+        return self.run("""
+            const bitmap = await createImageBitmap(await flexelView.pictureBlob(flexelView.picture)), {width, height} = bitmap;
+            const context = Object.assign(document.createElement('canvas'), {width, height}).getContext('2d');
+            context.drawImage(bitmap, 0, 0);
+            const pixels = new Uint32Array(context.getImageData(0, 0, width, height).data.buffer), colours = new Set();
+            let seen = 0, hash = 2166136261;
+            for (const pixel of pixels) {
+              hash = Math.imul(hash ^ pixel, 16777619);
+              if (pixel === pixels[width - 1]) continue;
+              ++seen;
+              colours.add(pixel);
+            }
+            return {width, height, share: seen / pixels.length, colours: colours.size, hash};""")
 
     def screenshot(self, name):
         pathlib.Path(name).write_bytes(base64.b64decode(self.ask("GET", "/screenshot")))
@@ -100,38 +109,6 @@ class Browser:
         """All that the page said to the console so far."""
         self.messages += [entry["message"] for entry in self.ask("POST", "/se/log", {"type": "browser"}) if entry["level"] != "INFO"]
         return self.messages
-
-
-def read_png(data):
-    """Rows of RGB bytes of an 8-bit PNG with or without opacity."""
-    at, packed, size = 8, b"", None
-    while at < len(data):
-        length, kind = struct.unpack_from(">I4s", data, at)
-        content = data[at + 8:at + 8 + length]
-        size = struct.unpack(">IIBB", content[:10]) if kind == b"IHDR" else size
-        packed += content if kind == b"IDAT" else b""
-        at += 12 + length
-    width, height, depth, colour = size
-    expect(depth == 8 and colour in (2, 6), f"an 8-bit PNG: {size}")
-    channels = 3 if colour == 2 else 4
-    raw, rows, above = zlib.decompress(packed), [], bytes(channels * width)
-    for y in range(height):
-        start = y * (channels * width + 1)
-        above = unfilter(raw[start], bytearray(raw[start + 1:start + 1 + channels * width]), above, channels)
-        rows.append(above if channels == 3 else bytes(b for i, b in enumerate(above) if i % 4 < 3))
-    return width, height, rows
-
-
-def unfilter(kind, line, above, n):
-    for i in range(len(line)):
-        left, up, corner = (line[i - n] if i >= n else 0), above[i], (above[i - n] if i >= n else 0)
-        if kind == 4:
-            guess = left + up - corner
-            nearest = min((abs(guess - left), 0, left), (abs(guess - up), 1, up), (abs(guess - corner), 2, corner))[2]
-        else:
-            nearest = (0, left, up, (left + up) // 2)[kind]
-        line[i] = (line[i] + nearest) & 255
-    return bytes(line)
 
 
 @contextlib.contextmanager
