@@ -12,6 +12,7 @@ int materials_command(int argc, char** argv);
 int measure_command(int argc, char** argv);
 int scene_keys_command(int argc, char** argv);
 int study_command(int argc, char** argv);
+int view_command(int argc, char** argv);
 
 // Becomes the stage program flexel-NAME that lies beside this one. Returns only by throwing InputError: it is
 // not there.

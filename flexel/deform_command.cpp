@@ -19,6 +19,7 @@
 #include "flexel/bent_picture.h"
 #include "flexel/commands.h"
 #include "flexel/job.h"
+#include "flexel/view/result_page.h"
 #include "formats/common/file_format.h"
 #include "formats/exchange/surface_file.h"
 #include "formats/lattice/body_file.h"
@@ -51,7 +52,7 @@ constexpr double kUsualError = 0.05, kUsualSeconds = 20;  // aimed at where noth
 struct DeformArguments {
   JobArguments job;
   std::vector<std::string> outputs;
-  std::string summary, body, accuracy, within;
+  std::string html, summary, body, accuracy, within;
   mapping::MapArguments map;
   int threads = 0;
   bool quiet = false, verbose = false, estimate = true;
@@ -66,13 +67,15 @@ void declare_input(CommandLine& app, JobArguments& arguments) {
 }
 
 void declare_output(CommandLine& app, DeformArguments& arguments) {
-  app.add_option(
-         "-o,--output", arguments.outputs,
-         "The deformed part (.stl, .obj ...), body (.vtu) or a picture of it (.png); again for more; -: "
-         "stdout")
+  app.add_option("-o,--output", arguments.outputs,
+                 "The deformed part (.stl, .obj ...), body (.vtu), a picture (.png) or a page (.html) of it; "
+                 "again for "
+                 "more; -: stdout")
       .type_name("FILE")
-      .required()
       .one_value_each();
+  app.add_option("--html", arguments.html,
+                 "A page to look at the result in the browser, in one file (docs/guide/view.md)")
+      .type_name("FILE");
   app.add_option("--body", arguments.body, "Write the deformed body (.vtu) too").type_name("FILE");
   declare_map_options(app, arguments.map);
   app.add_option("--summary", arguments.summary,
@@ -99,8 +102,9 @@ struct Plan {
   mapping::RefineOptions refine;
   struct Output {
     std::string path;
-    std::optional<mapping::MapOutput> surface;  // nothing: the body, or its picture
+    std::optional<mapping::MapOutput> surface;  // nothing: the body, its picture or page
     [[nodiscard]] bool is_picture() const { return extension(path) == "png"; }
+    [[nodiscard]] bool is_page() const { return extension(path) == "html" || extension(path) == "htm"; }
   };
   std::vector<Output> outputs;
 };
@@ -116,8 +120,10 @@ std::string failed_name(const Plan& plan) {
 }
 
 void plan_outputs(const DeformArguments& arguments, Plan& plan) {
+  if (arguments.outputs.empty()) throw InputError("-o (or --html) is missing: where the result goes");
   for (const std::string& path : arguments.outputs)
-    if (extension(path) == "vtu" || extension(path) == "png")
+    if (const std::string ending = extension(path);
+        ending == "vtu" || ending == "png" || ending == "html" || ending == "htm")
       plan.outputs.push_back({path, std::nullopt});
     else
       plan.outputs.push_back(
@@ -216,7 +222,7 @@ void write_outputs(const DeformArguments& arguments, const Plan& plan, Body& bod
   for (const Plan::Output& output : plan.outputs)  // first, for --strict may end the run here
     if (cad(output)) write_cad(body, mapped.report, arguments.map, plan.map, *output.surface, progress);
   for (const Plan::Output& output : plan.outputs)
-    if (cad(output))
+    if (cad(output) || output.is_page())  // pages come last: they say what the run said
       continue;
     else if (output.surface)
       write_mapped(mapped.surface(body), body, mapped.result, *output.surface);
@@ -477,14 +483,39 @@ std::string next_step(const SolvedRun& run, const std::optional<AccuracyReport>&
   return accuracy->advice.empty() ? repeat : accuracy->advice + "; " + repeat;
 }
 
-void write_summary(const SolvedRun& run, const mapping::MapReport& mapped, const Plan& plan,
-                   const std::optional<AccuracyReport>& accuracy, const std::string& path) {
+std::string summary_text(const SolvedRun& run, const mapping::MapReport& mapped, const Plan& plan,
+                         const std::optional<AccuracyReport>& accuracy) {
   nlohmann::ordered_json summary;
   summary["voxelize"] = nlohmann::ordered_json::parse(voxelize::summary_json(run.voxels));
   summary["simulate"] = nlohmann::ordered_json::parse(simulate::summary_json(run.simulated, run.voxels.body));
   summary["map"] = nlohmann::ordered_json::parse(mapping::report_json(mapped, plan.map));
   if (accuracy) summary["accuracy"] = nlohmann::ordered_json::parse(accuracy->json());
-  write_text(summary.dump(2) + "\n", path);
+  return summary.dump(2) + "\n";
+}
+
+// What is said at the end. `infill`: estimates for infill too, where nobody has said them.
+std::vector<std::string> last_lines(const SolvedRun& run, const Plan& plan,
+                                    const std::optional<AccuracyReport>& accuracy, bool infill) {
+  const Body& body = run.voxels.body;
+  std::vector<std::string> lines;
+  const std::vector<simulate::Material> materials = known_materials(plan.job.scene, body);
+  if (infill)
+    for (std::size_t p = 0; p < materials.size(); ++p)
+      if (const std::string line = infill_line(body.parts[p].name, materials[p]); !line.empty())
+        lines.push_back(line);
+  for (const std::string& line :
+       answer_lines(run.simulated, body, materials, next_step(run, accuracy), "--size"))
+    lines.push_back(line);
+  return lines;
+}
+
+void write_pages(const DeformArguments& arguments, const Plan& plan, Body& body, const view::RunWords& words,
+                 Progress& progress) {
+  std::string label;
+  for (const std::string& part : arguments.job.parts)
+    label += (label.empty() ? "" : ", ") + std::filesystem::path(part).filename().string();
+  for (const Plan::Output& output : plan.outputs)
+    if (output.is_page()) write_result_page(body, label + ", deformed", words, output.path, progress);
 }
 
 void say_dropped_model(const AccuracyReport& accuracy, Progress& progress) {
@@ -538,16 +569,13 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
     }
     progress.finish();
   }
-  if (!arguments.summary.empty()) write_summary(run, found, plan, accuracy, arguments.summary);
+  const std::string summary = summary_text(run, found, plan, accuracy);
+  if (!arguments.summary.empty()) write_text(summary, arguments.summary);
+  // With --verbose simulate() has said what infill is.
+  const std::vector<std::string> lines = last_lines(run, plan, accuracy, accuracy || !arguments.verbose);
+  write_pages(arguments, plan, body, {run.warnings, lines, summary}, progress);
   outputs.appear();
-  const std::vector<simulate::Material> materials = known_materials(plan.job.scene, body);
-  if (accuracy || !arguments.verbose)  // else simulate() has said it
-    for (std::size_t p = 0; p < materials.size(); ++p)
-      if (const std::string line = infill_line(body.parts[p].name, materials[p]); !line.empty())
-        progress.say(line);
-  for (const std::string& line :
-       answer_lines(run.simulated, body, materials, next_step(run, accuracy), "--size"))
-    progress.say(line);
+  for (const std::string& line : lines) progress.say(line);
   return kExitDone;
 }
 
@@ -563,6 +591,12 @@ int deform_command(int argc, char** argv) {
   // Runs in time leave something, and see to it themselves; a time limit, which comes later, leaves the last state.
   const StopEndsProcess nothing_is_left;
   if (!parse_arguments(app, argc, argv)) return kExitDone;
+  if (!arguments.html.empty()) {
+    if (extension(arguments.html) != "html" && extension(arguments.html) != "htm")
+      throw InputError(
+          fmt::format("--html {}: pages are HTML: name it {}.html", arguments.html, stem(arguments.html)));
+    arguments.outputs.push_back(arguments.html);
+  }
   Plan plan = make_plan(arguments, app);
   const ThreadLimit limit(arguments.threads);
   Progress progress("flexel", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <filesystem>
 #include <pugixml.hpp>
 
@@ -10,14 +11,32 @@
 #include "base/files/named_file.h"
 
 namespace flexel::mapping {
+namespace {
 
-std::vector<std::string> series_files(const std::string& pvd) {
+pugi::xml_node read_collection(const std::string& pvd, pugi::xml_document& document) {
   const Bytes bytes = read_all(pvd);
-  pugi::xml_document document;
   const pugi::xml_parse_result parsed = document.load_buffer(bytes.data(), bytes.size());
   const pugi::xml_node collection = document.child("VTKFile").child("Collection");
   if (!parsed || !collection)
     throw InputError(pvd, "is no series of frames (a .pvd file of VTK): take what flexel-simulate wrote");
+  return collection;
+}
+
+}  // namespace
+
+std::vector<double> series_times(const std::string& pvd) {
+  pugi::xml_document document;
+  std::vector<double> times;
+  for (const pugi::xml_node set : read_collection(pvd, document).children("DataSet")) {
+    const double time = set.attribute("timestep").as_double(std::nan(""));
+    times.push_back(std::isfinite(time) ? time : static_cast<double>(times.size()));
+  }
+  return times;
+}
+
+std::vector<std::string> series_files(const std::string& pvd) {
+  pugi::xml_document document;
+  const pugi::xml_node collection = read_collection(pvd, document);
   const std::filesystem::path folder = std::filesystem::path(pvd).parent_path();
   std::vector<std::string> files;
   for (const pugi::xml_node set : collection.children("DataSet")) {

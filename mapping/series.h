@@ -10,6 +10,8 @@ namespace flexel::mapping {
 // The frames' files, in order, with the folder of the .pvd. Throws InputError: unreadable, no collection, no
 // frame.
 [[nodiscard]] std::vector<std::string> series_files(const std::string& pvd);
+// Their times [s]; frame n without one is at n.
+[[nodiscard]] std::vector<double> series_times(const std::string& pvd);
 
 // Output name of frame `number`: {frame} in `pattern` becomes the number, as 00000; without one it goes
 // before the extension, "bent.stl" -> "bent_00000.stl".
