@@ -1,6 +1,6 @@
 // Loads at contact points, as forces on the elements that carry them; their resultants on free rigid parts.
 #pragma once
-#include "simulate/contact/pair_states.h"
+#include "simulate/contact/pairs/pair_states.h"
 
 namespace flexel::simulate {
 

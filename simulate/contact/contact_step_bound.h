@@ -6,7 +6,7 @@
 // of the smallest spacing a step: the energy error of an impact, whose moment falls between steps, grows with
 // the square of that.
 #pragma once
-#include "simulate/contact/pair_states.h"
+#include "simulate/contact/pairs/pair_states.h"
 
 namespace flexel::simulate {
 

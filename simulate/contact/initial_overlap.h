@@ -1,5 +1,5 @@
 // Initial overlap of parts: contact would throw them apart, or not see them where the penetration exceeds its
-// reach. It is refused, or released as far as that reaches (simulate/contact/overlap_release.h).
+// reach. It is refused, or released as far as that reaches (simulate/contact/pairs/overlap_release.h).
 //
 // A point of one part's surface penetrates another part where, moved inwards by a little, it lies in a whole
 // cell of that part; cut cells are left alone. Its depth is the distance, as contact measures it, from the
@@ -8,8 +8,8 @@
 // depth is the larger of that surface's and its own behind that surface. The overlap of two parts is the
 // deepest of their points.
 #pragma once
+#include "simulate/contact/pairs/settings.h"
 #include "simulate/contact/points/contact_surface.h"
-#include "simulate/contact/settings.h"
 
 namespace flexel::simulate {
 

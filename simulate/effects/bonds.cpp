@@ -12,7 +12,7 @@
 #include "base/nearest_word.h"
 #include "simulate/effects/contact.h"
 #include "simulate/matter/interface_points.h"
-#include "simulate/models/masses.h"
+#include "simulate/matter/masses.h"
 #include "simulate/models/stability.h"
 
 namespace flexel::simulate {

@@ -4,7 +4,7 @@
 #pragma once
 #include <map>
 
-#include "simulate/contact/settings.h"
+#include "simulate/contact/pairs/settings.h"
 #include "simulate/effects/effect.h"
 
 namespace flexel::simulate {

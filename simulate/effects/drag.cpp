@@ -12,8 +12,8 @@
 
 #include "base/parallel.h"
 #include "simulate/matter/interface_points.h"
+#include "simulate/matter/masses.h"
 #include "simulate/matter/surface_points.h"
-#include "simulate/models/masses.h"
 
 namespace flexel::simulate {
 namespace {

@@ -7,7 +7,7 @@
 #include "base/parallel.h"
 #include "simulate/gravitation/gravity_tree.h"
 #include "simulate/matter/interpolation_weights.h"
-#include "simulate/models/masses.h"
+#include "simulate/matter/masses.h"
 
 namespace flexel::simulate {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "base/error.h"
 #include "base/nearest_word.h"
-#include "simulate/models/masses.h"
+#include "simulate/matter/masses.h"
 
 namespace flexel::simulate {
 namespace {

@@ -10,8 +10,8 @@
 
 #include "base/error.h"
 #include "simulate/matter/load_distribution.h"
+#include "simulate/matter/masses.h"
 #include "simulate/matter/surface_points.h"
-#include "simulate/models/masses.h"
 #include "simulate/models/stability.h"
 
 namespace flexel::simulate {

@@ -2,7 +2,7 @@
 //
 // Its elements keep their places in it. Forces act on the elements as on any others; after a step the
 // impulses that they took are summed up to that on the whole, and the elements are put where the part has
-// gone. Mass and inertia are those of its matter (simulate/models/masses.h).
+// gone. Mass and inertia are those of its matter (simulate/matter/masses.h).
 //     X+ = X + dt P / m,    R+ = R exp(dt w),   w = J^-1 (M + M+) / 2,   M = R^T L,   M+ = R+^T L
 // (P, L momentum and angular momentum about the centre of mass, kicked before; J at rest). The rotation is the
 // implicit midpoint rule on the group (Austin, Krishnaprasad and Wang 1993) over a step of tan(dt |w| / 2) * 2 /

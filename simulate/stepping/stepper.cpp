@@ -12,7 +12,7 @@
 #include "base/instruction_set.h"
 #include "base/parallel.h"
 #include "simulate/kernels/scratch.h"
-#include "simulate/models/masses.h"
+#include "simulate/matter/masses.h"
 
 namespace flexel::simulate {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "simulate/models/masses.h"
+#include "simulate/matter/masses.h"
 #include "simulate/probes/report.h"
 #include "simulate/time/time_segment.h"
 

@@ -9,7 +9,7 @@
 #include "simulate/effects/gravity.h"
 #include "simulate/effects/initial_velocity.h"
 #include "simulate/input/scene_selection.h"
-#include "simulate/models/masses.h"
+#include "simulate/matter/masses.h"
 #include "simulate/result/options.h"
 #include "tests/sanitized.h"
 #include "tests/simulate/contact_case.h"

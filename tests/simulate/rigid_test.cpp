@@ -14,7 +14,7 @@
 #include "simulate/effects/damping.h"
 #include "simulate/effects/gravity.h"
 #include "simulate/effects/rigid.h"
-#include "simulate/models/masses.h"
+#include "simulate/matter/masses.h"
 #include "simulate/result/result.h"
 #include "simulate/rigid/path.h"
 #include "simulate/scene/scene.h"

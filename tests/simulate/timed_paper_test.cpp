@@ -10,7 +10,7 @@
 #include "simulate/effects/damping.h"
 #include "simulate/effects/gravity.h"
 #include "simulate/equilibrium/mechanics.h"
-#include "simulate/models/masses.h"
+#include "simulate/matter/masses.h"
 #include "tests/simulate/study_beam.h"
 #include "tests/simulate/timed_case.h"
 

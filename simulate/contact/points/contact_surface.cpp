@@ -6,8 +6,8 @@
 
 #include "base/parallel.h"
 #include "simulate/kernels/chunk_layout.h"
+#include "simulate/matter/masses.h"
 #include "simulate/models/cell_model.h"
-#include "simulate/models/masses.h"
 #include "simulate/rigid/rigid_body.h"
 
 namespace flexel::simulate {

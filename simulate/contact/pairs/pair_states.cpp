@@ -1,6 +1,6 @@
 // Pairs are evaluated in parallel and alone; only those that an initial penetration brings near wait for the
 // others (OverlapRelease::admit).
-#include "simulate/contact/pair_states.h"
+#include "simulate/contact/pairs/pair_states.h"
 
 #include <algorithm>
 #include <cmath>

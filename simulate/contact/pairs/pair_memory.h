@@ -5,7 +5,7 @@
 #pragma once
 #include <span>
 
-#include "simulate/contact/pair_list.h"
+#include "simulate/contact/pairs/pair_list.h"
 
 namespace flexel::simulate {
 

@@ -1,7 +1,7 @@
 // Gaps, pressures and phases of the candidate pairs in the state that was evaluated last.
 #pragma once
-#include "simulate/contact/overlap_release.h"
-#include "simulate/contact/pair_schedule.h"
+#include "simulate/contact/pairs/overlap_release.h"
+#include "simulate/contact/pairs/pair_schedule.h"
 
 namespace flexel::simulate {
 

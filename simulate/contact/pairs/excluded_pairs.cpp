@@ -1,5 +1,5 @@
 // Facing points are joined where the elements of one reach those of the other along a few connections.
-#include "simulate/contact/excluded_pairs.h"
+#include "simulate/contact/pairs/excluded_pairs.h"
 
 #include <algorithm>
 

@@ -1,6 +1,6 @@
 // Tetrahedra from a point to the triangles of a closed surface: integrals of 1, x and x x^T are sums over them
 // (Tonon, "Explicit exact formulas for the 3-D tetrahedron inertia tensor", 2004).
-#include "simulate/models/masses.h"
+#include "simulate/matter/masses.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

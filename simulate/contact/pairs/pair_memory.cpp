@@ -1,5 +1,5 @@
 // Records as rows of numbers, by the numbers of points or by their positions.
-#include "simulate/contact/pair_memory.h"
+#include "simulate/contact/pairs/pair_memory.h"
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,5 @@
 // All pairs are looked through only now and then, for those that are due soon.
-#include "simulate/contact/pair_schedule.h"
+#include "simulate/contact/pairs/pair_schedule.h"
 
 #include <algorithm>
 #include <numeric>

@@ -1,5 +1,5 @@
 // Foundations of two parts act as springs in series.
-#include "simulate/contact/contact_materials.h"
+#include "simulate/contact/pairs/contact_materials.h"
 
 #include <algorithm>
 

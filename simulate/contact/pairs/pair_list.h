@@ -3,8 +3,8 @@
 // A grid (simulate/contact/points/broad_phase.h) finds them. They are found again only after an element of the
 // surface has moved by nearly half the margin against the others: common motion costs nothing.
 #pragma once
-#include "simulate/contact/contact_materials.h"
-#include "simulate/contact/excluded_pairs.h"
+#include "simulate/contact/pairs/contact_materials.h"
+#include "simulate/contact/pairs/excluded_pairs.h"
 
 namespace flexel::simulate {
 

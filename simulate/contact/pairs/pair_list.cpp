@@ -1,5 +1,5 @@
 // Parts whose boxes are apart by more than the margin are left out of the grid.
-#include "simulate/contact/pair_list.h"
+#include "simulate/contact/pairs/pair_list.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,9 +2,9 @@
 // of one part on the same side of it, or facing each other through less than three cells; points of bonded
 // parts that are near at rest.
 #pragma once
+#include "simulate/contact/pairs/settings.h"
 #include "simulate/contact/points/broad_phase.h"
 #include "simulate/contact/points/contact_surface.h"
-#include "simulate/contact/settings.h"
 
 namespace flexel::simulate {
 

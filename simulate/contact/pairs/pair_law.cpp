@@ -1,5 +1,5 @@
 // The derivatives of U in the order of the header.
-#include "simulate/contact/pair_law.h"
+#include "simulate/contact/pairs/pair_law.h"
 
 #include <algorithm>
 #include <cmath>

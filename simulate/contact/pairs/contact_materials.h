@@ -1,8 +1,8 @@
 // Stiffness, friction and adhesion of a pair of contact points, from the settings and materials of their parts.
 #pragma once
-#include "simulate/contact/pair_law.h"
+#include "simulate/contact/pairs/pair_law.h"
+#include "simulate/contact/pairs/settings.h"
 #include "simulate/contact/points/contact_surface.h"
-#include "simulate/contact/settings.h"
 
 namespace flexel::simulate {
 

@@ -1,5 +1,5 @@
 // Pairs are grouped by a point and the part or plane on its other side.
-#include "simulate/contact/overlap_release.h"
+#include "simulate/contact/pairs/overlap_release.h"
 
 #include <algorithm>
 #include <array>
