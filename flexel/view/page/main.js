@@ -59,6 +59,7 @@ async function start() {
   const controls = new Controls(picture, probes, page);
   controls.begin();
   report("");
+  performance.mark("ready");
   window.flexelView = {picture, probes, controls, pictureBlob, Recorder};  // for scripts
   document.documentElement.dataset.ready = "yes";
 }
