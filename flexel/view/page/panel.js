@@ -229,9 +229,10 @@ export class Panel {
     return {text: part.text + (this.kind === "lattice" ? "" : "/" + this.faceNumber[face]), odd: part.odd};
   }
 
-  // The first triangle on the way from `origin` (about the centre) along `direction`: {triangle, weights, ...}.
-  hit(origin, direction) {
-    const {triangles} = this.shape, p = this.after.position.array, {plane, cut} = this.clip;
+  // The first triangle on the way from `origin` (about the centre) along `direction`: {triangle, weights, ...}. `rest`: of the part
+  // as it was.
+  hit(origin, direction, rest) {
+    const {triangles} = this.shape, p = (rest ? this.before : this.after).position.array, {plane, cut} = this.clip;
     const [ox, oy, oz] = origin.toArray(), [dx, dy, dz] = direction.toArray();
     let best;
     for (let t = 0; t < triangles.length; t += 3) {

@@ -236,7 +236,8 @@ export class Picture {
     const panel = this.panels[k], room = this.layout[k], {eye} = this.view.axes;
     this.view.apply(panel.camera, this.radiusOf(panel), room.width / room.height);
     const from = new THREE.Vector3((x - room.x) / room.width * 2 - 1, 1 - (y - room.y) / room.height * 2, -1).unproject(panel.camera);
-    const hit = panel.hit(from, eye.clone().negate());
+    const wiped = this.state.before === "wipe" && panel.shape.moved && x < room.x + this.state.wipe * room.width;
+    const hit = panel.hit(from, eye.clone().negate(), wiped);
     return hit && {panel, ...hit};
   }
 
