@@ -17,7 +17,7 @@ namespace flexel::simulate {
 namespace {
 
 constexpr char kMagic[8] = {'f', 'l', 'e', 'x', 'e', 'l', 'C', 'P'};
-constexpr std::uint64_t kVersion = 4;
+constexpr std::uint64_t kVersion = 5;
 
 struct Head {
   char magic[8];
@@ -71,7 +71,6 @@ static void visit(Archive& archive, Checkpoint& c) {
   visit(archive, c.memory.cells.plastic);
   visit(archive, c.memory.cells.springs);
   visit(archive, c.memory.cells.spring_flow);
-  visit(archive, c.memory.damping_change);
   visit(archive, c.memory.reach);
   visit(archive, c.memory.supports);
   visit(archive, c.events);
