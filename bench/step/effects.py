@@ -19,7 +19,7 @@ import time
 
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(SOURCE / "tests" / folder) for folder in ("interop", "programs")]
-from instructions import EFFECTS, make_block, of_a_step, simulate_command  # noqa: E402
+from instructions import BETWEEN_PARTS, EFFECTS, make_block, make_pair, of_a_step, pair_command, simulate_command  # noqa: E402
 
 COUNTED_CELLS, TIMED_CELLS, TIMED_STEPS, REPEATS = 16, 46, 100, 5
 ROWS = {"nothing": ("", ()), **{name: (text, ()) for name, text in EFFECTS.items()}, "`--history`, a row in 10 steps":
@@ -44,9 +44,9 @@ def nanoseconds(elements, model):
     return {row: statistics.median(values) for row, values in taken.items()}
 
 
-def peak_memory(effect, options):
+def peak_memory(command):
     """Bytes of the process at most, all of it: reading the body, the run, writing."""
-    process = subprocess.Popen(simulate_command(10, effect, "cells", options))
+    process = subprocess.Popen(command)
     _, status, usage = os.wait4(process.pid, 0)
     if status != 0:
         sys.exit("effects.py: a run failed")
@@ -58,13 +58,45 @@ def costs():
     instructions = {row: sum(of_a_step(lambda steps, e=effect, o=options: simulate_command(steps, e, "cells", o)).values()) / elements
                     for row, (effect, options) in ROWS.items()}
     elements = make_block(TIMED_CELLS)
-    memory = {row: peak_memory(*scene) / elements for row, scene in ROWS.items()}
+    memory = {row: peak_memory(simulate_command(10, scene[0], "cells", scene[1])) / elements for row, scene in ROWS.items()}
     taken = nanoseconds(elements, "cells")
     lines = ["| the scene names | instructions | ns | memory, bytes |", "|---|---|---|---|",
              f"| nothing | {instructions['nothing']:.0f} | {taken['nothing']:.1f} | {memory['nothing']:.0f} |"]
     for row in list(ROWS)[1:]:
         lines.append(f"| {row} | {instructions[row] - instructions['nothing']:+.1f} | {taken[row] - taken['nothing']:+.1f} |"
                      f" {memory[row] - memory['nothing']:+.0f} |")
+    return lines
+
+
+def instructions_of(command_for, elements):
+    return sum(of_a_step(command_for).values()) / elements
+
+
+def models():
+    """Instructions of the other models; what a model refuses is left out."""
+    lines = ["| the scene names | `cells` | `springs` | `paper` |", "|---|---|---|---|"]
+    elements = make_block(COUNTED_CELLS)
+    rows = {}
+    for model in ("cells", "springs", "paper"):
+        for row, effect in {"nothing": "", **EFFECTS}.items():
+            try:
+                rows.setdefault(row, []).append(instructions_of(lambda steps, e=effect, m=model: simulate_command(steps, e, m), elements))
+            except subprocess.CalledProcessError:
+                rows.setdefault(row, []).append(None)
+    for row, found in rows.items():
+        told = ["refused" if each is None else f"{each:.0f}" if row == "nothing" else f"{each - bare:+.1f}" for each, bare in zip(found, rows["nothing"])]
+        lines.append(f"| {row} | {' | '.join(told)} |")
+    return lines
+
+
+def between_parts():
+    elements = make_pair(COUNTED_CELLS)
+    lines = ["| two blocks, one on the other | instructions | memory, bytes |", "|---|---|---|"]
+    bare, room = instructions_of(pair_command, elements), peak_memory(pair_command(10)) / elements
+    lines.append(f"| that do not know of each other | {bare:.0f} | {room:.0f} |")
+    for row in BETWEEN_PARTS:
+        taken = instructions_of(lambda steps, r=row: pair_command(steps, r), elements)
+        lines.append(f"| {row} | {taken - bare:+.1f} | {peak_memory(pair_command(10, row)) / elements - room:+.0f} |")
     return lines
 
 
@@ -95,7 +127,7 @@ def main():
         sys.exit("effects.py: needs flexel-simulate on the PATH, and valgrind")
     with tempfile.TemporaryDirectory(prefix="flexel-") as folder:
         os.chdir(folder)
-        tables = "\n".join([*costs(), "", *kernels(pathlib.Path(program))])
+        tables = "\n".join([*costs(), "", *models(), "", *between_parts(), "", *kernels(pathlib.Path(program))])
         os.chdir("/")
     print(tables)
     page = SOURCE / "docs/measurements/effects.md"

@@ -10,11 +10,10 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
 
 #include "base/error.h"
+#include "base/math/dense.h"
 #include "base/parallel.h"
 #include "simulate/linear/conjugate_gradients.h"
 #include "simulate/linear/multigrid.h"
@@ -191,9 +190,9 @@ Eigen::MatrixXd Balance::slope() {
 }
 
 void Balance::refuse_free(const Eigen::MatrixXd& slope) const {
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(slope, Eigen::ComputeFullV);
-  if (svd.singularValues().minCoeff() > kFree * stiff_) return;
-  const LinkVector freest = svd.matrixV().col(unknowns() - 1);
+  const SingularValues svd = singular_values(slope);
+  if (svd.values.minCoeff() > kFree * stiff_) return;
+  const LinkVector freest = svd.v.col(unknowns() - 1);
   Eigen::Index most = 0;
   freest.cwiseAbs().maxCoeff(&most);
   throw InputError(
@@ -215,7 +214,7 @@ bool Balance::find() {
       slope = this->slope();
       refuse_free(slope);
     }
-    const LinkVector step = -slope.fullPivLu().solve(left);
+    const LinkVector step = -solve_dense(slope, left);
     move(step);
     const NewtonOutcome one = newton(mechanics_, state_, options_, progress_);
     if (outcome_.iterations == 0) outcome_.first_reach = one.first_reach;

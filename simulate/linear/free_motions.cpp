@@ -5,13 +5,11 @@
 // space allows.
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <array>
 
 #include "base/disjoint_sets.h"
+#include "base/math/dense.h"
 #include "base/parallel.h"
 #include "simulate/linear/aggregate.h"
 #include "simulate/linear/free_motions.h"
@@ -119,22 +117,21 @@ std::vector<Restriction> restrict_to_rigid(const LinearOperator& matrix, const s
 
 // Orthonormal base of the motions of non-zero size whose energy per size is at most `limit`.
 Eigen::MatrixXd free_space(const Restriction& restriction, double limit) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> size(restriction.size);
+  const SymmetricEigen size = eigen_symmetric_6(restriction.size);
   Eigen::MatrixXd whiten(6, 6);
   Eigen::Index kept = 0;
   for (Eigen::Index c = 0; c < 6; ++c) {
-    if (size.eigenvalues()[c] > 1e-12)
-      whiten.col(kept++) = size.eigenvectors().col(c) / std::sqrt(size.eigenvalues()[c]);
+    if (size.values[c] > 1e-12) whiten.col(kept++) = size.vectors.col(c) / std::sqrt(size.values[c]);
   }
   whiten.conservativeResize(6, kept);
   const Eigen::MatrixXd energy =
       whiten.transpose() * .5 * (restriction.energy + restriction.energy.transpose()) * whiten;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(energy);
+  const SymmetricEigen eigen = eigen_symmetric(energy);
   Eigen::Index free = 0;
-  while (free < kept && eigen.eigenvalues()[free] <= limit) ++free;
+  while (free < kept && eigen.values[free] <= limit) ++free;
   if (free == 0) return Eigen::MatrixXd(6, 0);
-  const Eigen::MatrixXd space = whiten * eigen.eigenvectors().leftCols(free);
-  return space.householderQr().householderQ() * Eigen::MatrixXd::Identity(6, free);
+  const Eigen::MatrixXd space = whiten * eigen.vectors.leftCols(free);
+  return orthonormal_base(space);
 }
 
 // An orthonormal base of the span of `directions` (3 x m, orthonormal), as near to the coordinate axes as it
@@ -160,13 +157,12 @@ std::vector<Vec3> tidy_base(Eigen::MatrixXd directions) {
 void tell(const Eigen::MatrixXd& space, std::uint32_t part, std::vector<FreeMotion>& motions) {
   if (space.cols() == 0) return;
   // Combinations without rotation are the null space of the lower half; the rest turn about its column space.
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(space.bottomRows(3), Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const SingularValues svd = singular_values(space.bottomRows(3));
   Eigen::Index turning = 0;
-  while (turning < svd.singularValues().size() && svd.singularValues()[turning] > 1e-4) ++turning;
-  const Eigen::MatrixXd still = space.topRows(3) * svd.matrixV().rightCols(space.cols() - turning);
+  while (turning < svd.values.size() && svd.values[turning] > 1e-4) ++turning;
+  const Eigen::MatrixXd still = space.topRows(3) * svd.v.rightCols(space.cols() - turning);
   for (const Vec3& direction : tidy_base(still)) motions.push_back({part, direction, Vec3::Zero()});
-  for (const Vec3& axis : tidy_base(svd.matrixU().leftCols(turning)))
-    motions.push_back({part, Vec3::Zero(), axis});
+  for (const Vec3& axis : tidy_base(svd.u.leftCols(turning))) motions.push_back({part, Vec3::Zero(), axis});
 }
 
 std::string axis_name(const Vec3& direction) {

@@ -13,6 +13,7 @@
 #include <optional>
 
 #include "base/disjoint_sets.h"
+#include "base/math/dense.h"
 
 namespace flexel::simulate {
 namespace {
@@ -146,9 +147,7 @@ Eigen::MatrixXd joint_energy(const Body& body, const std::vector<std::uint32_t>&
 std::optional<std::size_t> loose_group(const Eigen::MatrixXd& energy) {
   const double least = kNoEnergy * energy.diagonal().maxCoeff();
   for (Eigen::Index g = 0; g + 6 <= energy.rows(); g += 6) {
-    const Eigen::Matrix<double, 6, 6> own = energy.block<6, 6>(g, g);
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(own, Eigen::EigenvaluesOnly);
-    if (eigen.eigenvalues()[0] <= least) return static_cast<std::size_t>(g / 6);
+    if (eigenvalues_symmetric_6(energy.block<6, 6>(g, g))[0] <= least) return static_cast<std::size_t>(g / 6);
   }
   return std::nullopt;
 }
@@ -175,9 +174,9 @@ void join_frames(const Body& body, const std::vector<SharedElement>& shared,
       energy = joint_energy(body, groups, joints[root], 0.5 * (box.min + box.max), reach);
     }
     if (groups.size() < 3) continue;
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(energy, Eigen::EigenvaluesOnly);
-    const double limit = kNoEnergy * eigen.eigenvalues()[eigen.eigenvalues().size() - 1];
-    if (eigen.eigenvalues()[6] <= limit) continue;  // more than the six of one rigid body
+    const Eigen::VectorXd energies = eigenvalues_symmetric(energy);
+    if (energies[6] <= kNoEnergy * energies[energies.size() - 1])
+      continue;  // more than the six of one rigid body
     for (const std::uint32_t g : groups) sets.unite(cell_of[groups.front()], cell_of[g]);
   }
 }

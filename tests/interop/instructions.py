@@ -5,7 +5,7 @@ import pathlib
 import re
 import subprocess
 
-from shapes import binary_stl, box_triangles
+from shapes import ascii_stl, binary_stl, box_triangles
 
 MATTER = """material = "gum"
 [materials.gum]
@@ -40,6 +40,35 @@ def make_block(cells):
     subprocess.run(["flexel-voxelize", "block.stl", "--size", "1 mm", "--align", "none", "--quiet", "-o", "block.vtu"], check=True,
                    timeout=120)
     return (cells + 1)**3
+
+
+PAIR = MATTER.replace("[parts.block]\n", "").replace('material = "gum"\n', 'material = "gum"\nmodel = "{model}"\n').replace('model = "{model}"\n[run]', "[run]").replace("10 us", "5 us")
+# What a scene says where two parts touch: the blocks of make_pair().
+BETWEEN_PARTS = {
+    "bonded, as parts that touch are by default": "",
+    "`[contact]`": "contact = true\n",
+    "`[contact]`, one part `rigid`": "contact = true\n",
+    "bonded, one part `rigid`": "",
+}
+RIGID = "[parts.upper]\nrigid = true\n"
+
+
+def make_pair(cells):
+    """block.vtu of two blocks of cells^3 cells of a millimetre, one on the other."""
+    lower = box_triangles(3 * (float(cells),))
+    upper = [[(x, y, z + cells) for x, y, z in triangle] for triangle in lower]
+    pathlib.Path("pair.stl").write_bytes(ascii_stl(lower, "lower") + ascii_stl(upper, "upper"))
+    subprocess.run(["flexel-voxelize", "pair.stl", "--size", "1 mm", "--align", "none", "--quiet", "-o", "block.vtu"], check=True,
+                   timeout=120)
+    return 2 * (cells + 1)**3
+
+
+def pair_command(steps, row=None, model="cells"):
+    """The same for two blocks; without `row` they do not know of each other."""
+    top = "bond = false\n" if row is None else BETWEEN_PARTS[row]
+    tables = RIGID if row and "rigid" in row else ""
+    pathlib.Path("scene.toml").write_text(top + PAIR.format(time=5 * steps, model=model) + tables, encoding="utf-8")
+    return ["flexel-simulate", "scene.toml", "block.vtu", "-o", "out.vtu", "--threads", "1", "--quiet"]
 
 
 def simulate_command(steps, effect="", model="cells", options=()):

@@ -1,0 +1,33 @@
+// Decompositions of small dense matrices by Eigen, compiled once: each file that has them of its own takes seconds longer.
+#pragma once
+#include <Eigen/Core>
+
+namespace flexel {
+
+using Mat6d = Eigen::Matrix<double, 6, 6>;
+
+// Of a symmetric matrix: eigenvalues rising, eigenvectors as columns.
+struct SymmetricEigen {
+  Eigen::VectorXd values;
+  Eigen::MatrixXd vectors;
+};
+[[nodiscard]] SymmetricEigen eigen_symmetric(const Eigen::MatrixXd& matrix);
+[[nodiscard]] SymmetricEigen eigen_symmetric_6(const Mat6d& matrix);
+[[nodiscard]] Eigen::VectorXd eigenvalues_symmetric(const Eigen::MatrixXd& matrix);
+[[nodiscard]] Eigen::VectorXd eigenvalues_symmetric_6(const Mat6d& matrix);
+
+// matrix = u diag(values) v^T, u and v square, singular values falling (one-sided Jacobi rotations).
+struct SingularValues {
+  Eigen::MatrixXd u;
+  Eigen::VectorXd values;
+  Eigen::MatrixXd v;
+};
+[[nodiscard]] SingularValues singular_values(const Eigen::MatrixXd& matrix);
+
+// An orthonormal base of the span of the columns, by Householder's reflections.
+[[nodiscard]] Eigen::MatrixXd orthonormal_base(const Eigen::MatrixXd& columns);
+
+// matrix x = right, by Gaussian elimination with full pivoting.
+[[nodiscard]] Eigen::VectorXd solve_dense(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& right);
+
+}  // namespace flexel
