@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/files/output_file.h"
+#include "base/files/outputs.h"
 #include "base/human.h"
 #include "base/printable.h"
 #include "base/program/arguments.h"
@@ -318,7 +319,7 @@ void write_thickness(Surface surface, const std::string& path) {
 int info_command(int argc, char** argv) {
   std::vector<std::string> files;
   std::string unit, edge, thickness;
-  bool json = false, words = false;
+  bool json = false, words = false, force = false;
   CommandLine app{"What a part is, and what a scene can name in it.", "flexel info"};
   app.add_option("part", files, read_titles() + " files; -: stdin").required().type_name("PART");
   const Option as_json = app.add_flag("--json", json, "As JSON, in SI units (docs/guide/info.md)");
@@ -330,10 +331,12 @@ int info_command(int argc, char** argv) {
   app.add_option("--thickness", thickness,
                  "Also write the surface as PLY with the wall thickness at its vertices")
       .type_name("FILE.ply");
+  app.add_flag("--force", force, "Let results replace files that are read");
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   const StopEndsProcess nothing_is_left;
   if (!thickness.empty() && extension(thickness) != "ply")
     throw InputError("--thickness: the file must end in .ply");
+  check_outputs({{thickness, true}, {"-"}}, files, force);
   ImportOptions options;
   // Corners on chords would make the circles that are fitted to round faces too small.
   options.largest_edge = std::numeric_limits<double>::infinity();

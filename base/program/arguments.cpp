@@ -42,13 +42,15 @@ void collect_options(const CLI::App& app, std::vector<std::string>& names) {
       fmt::format("unknown option \"{}\"{}", word, hint.empty() ? "; --help lists the options" : hint));
 }
 
-// CLI11 takes the next argument for the value of "--unit=".
+// CLI11 takes the next argument for the value of "--unit=". `-o ""` is a script's variable that was never set.
 void refuse_empty_values(int argc, char** argv) {
   for (int a = 1; a < argc && std::string_view(argv[a]) != "--"; ++a) {
     const std::string_view word = argv[a];
     if (word.starts_with("--") && word.ends_with('=') && word.find('=') == word.size() - 1)
       throw InputError(fmt::format("{}: its value is empty; --help shows what is accepted",
                                    word.substr(0, word.size() - 1)));
+    if (word.empty() && a > 1 && argv[a - 1][0] == '-')
+      throw InputError(fmt::format("{}: its value is empty; --help shows what is accepted", argv[a - 1]));
   }
 }
 

@@ -102,6 +102,14 @@ Probe parse_probe(TableReader& reader, std::size_t number) {
   return probe;
 }
 
+// Results and columns of the books go by the names.
+void refuse_second_probe(const Scene& scene, const TableReader& reader) {
+  const std::string& name = scene.probes.back().name;
+  const auto same = [&](const Probe& each) { return each.name == name; };
+  if (std::count_if(scene.probes.begin(), scene.probes.end(), same) > 1)
+    reader.fail(fmt::format("two [[probe]] are called \"{}\": give each a name of its own", name));
+}
+
 std::optional<int> whole_number(TableReader& reader, const char* key, int most) {
   const std::optional<double> value = reader.number(key);
   if (!value) return std::nullopt;
@@ -196,6 +204,7 @@ Scene parse_scene(const std::string& text, const std::string& name) {
   for (const SceneValue* table : root.tables("probe")) {
     TableReader reader(*table, name, "[[probe]]");
     scene.probes.push_back(parse_probe(reader, scene.probes.size() + 1));
+    refuse_second_probe(scene, reader);
   }
   scene.run = parse_run(root);
   parse_events(root, scene);

@@ -1,6 +1,7 @@
 // Mutated bindings of both methods that a file can hold, then used. What they belong to and their hash are made right
 // first: damage that a hash finds ends there.
 #include <cstring>
+#include <stdexcept>
 
 #include "mapping/binding_file.h"
 #include "mapping/methods/map_surface.h"
@@ -41,6 +42,8 @@ int main(int argc, char** argv) {
     body.position[i] += 0.01 * Vec3(body.rest[i].y(), 0, 0);
   return fuzz::run(argc, argv, "fuzz_binding", corpus, [&](const std::string& path) {
     mend(path, corpus.front());
-    (void)mapping::map_state(mapping::read_binding(path, body), body);
+    const mapping::MapResult result = mapping::map_state(mapping::read_binding(path, body), body);
+    for (const Vec3& u : result.displacement)
+      if (!u.allFinite()) throw std::runtime_error("a vertex goes to where no number is");
   });
 }

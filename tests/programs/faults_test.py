@@ -5,6 +5,7 @@ import json
 import os
 import pathlib
 import shutil
+import sys
 
 from harness import BIN, SCENE, Skip, body, box, bracket, expect, expect_ok, main, need_step, run, scene, write
 
@@ -86,7 +87,7 @@ def sweep(command, outputs, least=1):
     expect(failed >= least and tried > failed, f"{failed} of {tried} faults were noticed")
     if results := os.environ.get("FLEXEL_FAULTS_RESULTS"):
         with open(results, "a", encoding="utf-8") as file:
-            file.write(json.dumps({"command": " ".join(program.split() + list(command[1:2] if program == "flexel" else ())), "calls": sum(counts.values()),
+            file.write(json.dumps({"name": sys.argv[1].removeprefix("test_").replace("_", " "), "calls": sum(counts.values()),
                                    "failed": tried, "noticed": failed}) + "\n")
 
 

@@ -246,7 +246,18 @@ def test_an_option_without_its_value():
     box("a.stl")
     for option in ("--unit=", "--count=", "--heal="):
         refused("flexel-voxelize", "a.stl", option, "--quiet", "-o", "o.vtu", fragments=[option[:-1], "its value is empty"])
-    expect_only("a.stl")
+    body("b.vtu")
+    scene("s.toml")
+    for command in (["flexel-voxelize", "a.stl"], ["flexel-simulate", "s.toml", "b.vtu"], ["flexel-map", "b.vtu"], ["flexel", "picture", "a.stl"]):
+        refused(*command, "-o", "", fragments=["-o: its value is empty"])
+    expect_only("a.stl", "b.vtu", "s.toml")
+
+
+def test_two_probes_of_one_name():
+    body("b.vtu")
+    probe = '[[probe]]\nname = "tip"\nwhere = "xmax"\n'
+    scene("s.toml", SCENE + probe)
+    refused("flexel-simulate", "s.toml", "b.vtu", "-o", "o.vtu", fragments=["s.toml", 'two [[probe]] are called "tip"'])
 
 
 def test_a_picture_without_room_for_its_parts():

@@ -94,6 +94,25 @@ def test_a_checkpoint_leaves_other_files_alone():
     expect(open("notes.body", encoding="ascii").read() == "precious", "somebody else's file was replaced")
 
 
+def test_info_replaces_no_part_with_its_thickness():
+    box()
+    body("b.vtu")
+    expect_ok(run("flexel-map", "b.vtu", "-o", "part.ply", "--quiet"))
+    before = open("part.ply", "rb").read()
+    os.link("part.ply", "same.ply")
+    for name in ("part.ply", "same.ply"):
+        expect_error(run("flexel", "info", "part.ply", "--thickness", name), "flexel", "is an input of this command", "--force")
+    expect(open("part.ply", "rb").read() == before, "the part was replaced")
+    expect_ok(run("flexel", "info", "part.ply", "--thickness", "part.ply", "--force"))
+
+
+def test_the_same_body_gives_the_same_level_sets():
+    box()
+    for name in ("a.vdb", "b.vdb"):
+        expect_ok(run("flexel-voxelize", "box.stl", "--size", "5 mm", "--vdb", name, "-o", "o.vtu"))
+    expect(open("a.vdb", "rb").read() == open("b.vdb", "rb").read(), "two runs give other bytes")
+
+
 def test_a_name_too_long_is_told_before_the_work():
     box()
     name = "o" * 300 + ".vtu"
