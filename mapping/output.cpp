@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "formats/common/file_formats.h"
+#include "formats/lattice/stress_columns.h"
 #include "mapping/report/attributes.h"
 
 namespace flexel::mapping {
@@ -59,9 +60,11 @@ void write_mapped(const Surface& surface, const Body& body, const MapResult& res
   if (!output.format)
     return write_surface_vtu(surface, displacement, vertex_attributes(surface, body, result), unit,
                              output.path);
-  if (output.scale == 1 && !output.attributes)
+  const bool stressed = !output.attributes && has_surface_stress(body);
+  if (output.scale == 1 && !output.attributes && !stressed)
     return write_surface(surface, displacement, *output.format, unit, output.path);
   Surface changed = surface;
+  if (stressed) erase_surface_stress(changed.vertex_columns);
   if (output.scale != 1) note_scale(changed, output);
   if (output.attributes) {
     changed.vertex_columns.merge(vertex_attributes(surface, body, result));

@@ -6,6 +6,7 @@
 
 #include "base/files/output_file.h"
 #include "base/parallel.h"
+#include "formats/lattice/stress_columns.h"
 #include "formats/vtu/vtu.h"
 #include "mapping/anchors/frame.h"
 #include "mapping/report/quality.h"
@@ -52,6 +53,10 @@ Columns vertex_attributes(const Surface& surface, const Body& body, const MapRes
   columns["degenerate"] = flag(kFrameDegenerate);
   columns["voronoi_cell_left"] = flag(kVoronoiCellLeft);
   if (result.voronoi_checked) columns["voronoi_changed"] = flag(kVoronoiChanged);
+  if (has_surface_stress(body))
+    for (const char* name : {kVonMisesColumn, kPrincipalColumn, kYieldColumn})
+      if (const auto stress = surface.vertex_columns.find(name); stress != surface.vertex_columns.end())
+        columns.insert(*stress);
   return columns;
 }
 

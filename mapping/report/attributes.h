@@ -6,7 +6,7 @@
 namespace flexel::mapping {
 
 // (vertices) displacement (3 components, m), stretch, frame_kind, distance_outside (spacings), rest_residual
-// (m), inverted, degenerate, voronoi_cell_left and, where it was checked, voronoi_changed (docs/reference/mapping.md).
+// (m), inverted, degenerate, voronoi_cell_left and, where it was checked, voronoi_changed (docs/reference/mapping.md); and the stresses that a run left at the vertices.
 // `surface`: what was mapped, at rest.
 [[nodiscard]] Columns vertex_attributes(const Surface& surface, const Body& body, const MapResult& result);
 

@@ -182,7 +182,11 @@ ErrorBars estimate_errors(const Body& body, const Scene& scene, const SimulateOp
   }
   const Sequence energy = runs.energy();
   errors.bars.push_back({ErrorBar::Of::elastic_energy, 0, "", energy.value[0], bar(energy)});
-  if (const Sequence stress = runs.stress(); !wide && stress.value[0] > 0)
+  const Sequence stress = runs.stress();
+  if (QuadraticField::is_in(body) && stress.value[0] > 0)
+    errors.von_mises = {stress.value, field_stress_bar(stress, errors.cells.size(), result.stress->doubt,
+                                                       !result.stress->beside.empty())};
+  else if (!wide && stress.value[0] > 0)
     errors.von_mises = {stress.value, stress_bar(stress, !result.stress->beside.empty())};
   errors.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   return errors;

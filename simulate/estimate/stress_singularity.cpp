@@ -71,12 +71,12 @@ std::string singular_beside(const Body& body, const std::vector<std::uint8_t>& t
   return re_entrant_edge_within(body.surface, at, reach) ? "a re-entrant edge" : "";
 }
 
-void mark_singular(const Body& body, const std::vector<std::uint8_t>& tied, SimulateResult& result) {
-  constexpr double kBesideSpacings = 5;
+void mark_singular(const Body& body, const std::vector<std::uint8_t>& tied, SimulateResult& result,
+                   double spacings) {
   if (!result.stress) return;
   const auto part = std::find_if(body.parts.begin(), body.parts.end(),
                                  [&](const Part& each) { return each.name == result.stress->part; });
-  const double reach = kBesideSpacings * part->lattice.spacing.maxCoeff();
+  const double reach = spacings * part->lattice.spacing.maxCoeff();
   result.stress->beside = singular_beside(body, tied, result.stress->at, reach);
 }
 

@@ -14,8 +14,11 @@ namespace flexel::simulate {
 [[nodiscard]] std::string singular_beside(const Body& body, const std::vector<std::uint8_t>& tied,
                                           const Vec3& at, double reach);
 
-// Says it of the largest stress of `result`, if there is one: within 5 spacings, for coarse cells put the peak of a
+// Says it of the largest stress of `result`, if there is one: within so many spacings, for coarse cells put the peak of a
 // support or an edge that far from it.
-void mark_singular(const Body& body, const std::vector<std::uint8_t>& tied, SimulateResult& result);
+constexpr double kBesideInCells = 5,
+                 kBesideInField = 1.5;  // model `quadratic`: its field peaks at the place itself
+void mark_singular(const Body& body, const std::vector<std::uint8_t>& tied, SimulateResult& result,
+                   double spacings = kBesideInCells);
 
 }  // namespace flexel::simulate

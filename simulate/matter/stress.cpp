@@ -11,6 +11,7 @@
 #include "base/parallel.h"
 #include "formats/lattice/cell_moments.h"
 #include "formats/lattice/fields.h"
+#include "formats/lattice/stress_columns.h"
 #include "simulate/models/cells.h"
 #include "simulate/models/central_spring.h"
 #include "simulate/models/rest_shape.h"
@@ -18,8 +19,6 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr const char* kMises = "von_mises";
-constexpr const char* kPrincipal = "principal_stress";
 constexpr const char* kOfCell = "cell_";  // before a name: in the middle of each cell
 // Of the patch's weight, on the squared gradient per spacing: where the cells lie in one layer the field is
 // constant across it.
@@ -222,8 +221,8 @@ void add_columns(const std::vector<SymmetricStress>& stress, const std::string& 
     const Vec3 each = principal_stresses(stress[i]);
     std::copy(each.begin(), each.end(), principal.values.begin() + static_cast<std::ptrdiff_t>(3 * i));
   });
-  columns[before + kMises] = std::move(mises);
-  columns[before + kPrincipal] = std::move(principal);
+  columns[before + kVonMisesColumn] = std::move(mises);
+  columns[before + kPrincipalColumn] = std::move(principal);
 }
 
 }  // namespace
@@ -271,7 +270,8 @@ std::optional<LargestStress> largest_stress(const Body& body, const Stresses& st
     if (body.parts[p].placement == Placement::centre) continue;
     for (std::uint32_t e = body.parts[p].element_begin; e < body.parts[p].element_end; ++e)
       if (const double value = von_mises(stresses.element[e]); !largest || value > largest->value)
-        largest = LargestStress{value, stresses.element_at[e], p};
+        largest = LargestStress{value, stresses.element_at[e], p,
+                                stresses.element_doubt.empty() ? 0 : stresses.element_doubt[e]};
   }
   return largest;
 }
@@ -279,15 +279,17 @@ std::optional<LargestStress> largest_stress(const Body& body, const Stresses& st
 void write_stress_columns(const Stresses& stresses, Body& body) {
   add_columns(stresses.cell, kOfCell, body.cell_columns);
   add_columns(stresses.element, "", body.element_columns);
+  if (!stresses.vertex.empty()) add_columns(stresses.vertex, "", body.surface.vertex_columns);
 }
 
 bool is_stress_column(const std::string& name) {
-  for (const std::string column : {kMises, kPrincipal})
+  for (const std::string column : {kVonMisesColumn, kPrincipalColumn})
     if (name == column || name == kOfCell + column) return true;
   return false;
 }
 
 void erase_stress_columns(Body& body) {
+  if (has_surface_stress(body)) erase_surface_stress(body.surface.vertex_columns);
   for (Columns* columns : {&body.cell_columns, &body.element_columns})
     std::erase_if(*columns, [](const auto& column) { return is_stress_column(column.first); });
 }

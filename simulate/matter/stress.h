@@ -26,6 +26,10 @@ struct Stresses {
   std::vector<SymmetricStress> cell;     // (cells); 0 in broken and stray ones
   std::vector<SymmetricStress> element;  // (elements); 0 where no cell resists
   std::vector<Vec3> element_at;          // (elements) m, the point of the matter that it is of, at rest
+  // Of model `quadratic`; else none:
+  std::vector<SymmetricStress> vertex;  // (vertices of the surface)
+  // (elements) Pa, von Mises stress of how far the field of one cell is from what the cells around say together
+  std::vector<double> element_doubt;
 };
 
 // The stresses of the corner-placed parts.
@@ -40,14 +44,16 @@ struct LargestStress {
   double value = 0;        // Pa
   Vec3 at = Vec3::Zero();  // m, at rest
   std::uint32_t part = 0;
+  double doubt = 0;  // Pa, Stresses::element_doubt
 };
 [[nodiscard]] std::optional<LargestStress> largest_stress(const Body& body, const Stresses& stresses);
 
 // Columns "von_mises" [Pa] and "principal_stress" [Pa] (3, descending) of the elements, whose largest is
-// largest_stress(); and of the cells "cell_von_mises" and "cell_principal_stress", in the middle of each.
+// largest_stress(); of the cells "cell_von_mises" and "cell_principal_stress", in the middle of each; and of the
+// surface's vertices, where they are known, as of the elements.
 void write_stress_columns(const Stresses& stresses, Body& body);
 [[nodiscard]] bool is_stress_column(const std::string& name);
-// Takes those of an earlier run away.
+// Takes those of an earlier run away, the surface's only where the elements have them too: else they are the part's own.
 void erase_stress_columns(Body& body);
 
 }  // namespace flexel::simulate

@@ -12,6 +12,7 @@
 #include "base/parallel.h"
 #include "base/units.h"
 #include "formats/lattice/fields.h"
+#include "formats/lattice/stress_columns.h"
 #include "simulate/input/infill.h"
 #include "simulate/models/connections.h"
 #include "simulate/models/rest_shape.h"
@@ -138,13 +139,31 @@ void measure_stress(const Problem& problem, const State& state, Body& body, Simu
   if (body.cell_count() > 0) report_stress(problem, stresses(problem, state), body, result);
 }
 
+namespace {
+
+// Of the surface's vertices, where a part's material has a `yield`.
+void write_yield_shares(const std::vector<Material>& materials, const std::vector<SymmetricStress>& vertex,
+                        Surface& surface) {
+  if (std::none_of(materials.begin(), materials.end(), [](const Material& each) { return each.yield > 0; }))
+    return;
+  Column share{1, std::vector<double>(vertex.size(), -1)};
+  for (std::size_t p = 0; p < surface.polygon_count(); ++p)
+    if (const double yield = materials[surface.polygon_part(p)].yield; yield > 0)
+      for (const std::uint32_t v : surface.polygon(p)) share.values[v] = von_mises(vertex[v]) / yield;
+  surface.vertex_columns[kYieldColumn] = std::move(share);
+}
+
+}  // namespace
+
 void report_stress(const Problem& problem, const Stresses& stresses, Body& body, SimulateResult& result) {
   const std::optional<LargestStress> largest = largest_stress(body, stresses);
   if (!largest) return;
   const double yield = problem.materials[largest->part].yield;
   result.stress = StressSummary{largest->value, largest->at, body.parts[largest->part].name, {}};
+  result.stress->doubt = largest->doubt;
   if (yield > 0) result.stress->yield_share = largest->value / yield;
   write_stress_columns(stresses, body);
+  if (!stresses.vertex.empty()) write_yield_shares(problem.materials, stresses.vertex, body.surface);
 }
 
 void sum_up_imbalance(SimulateResult& result) {

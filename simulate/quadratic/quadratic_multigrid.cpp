@@ -18,8 +18,8 @@ namespace {
 constexpr int kSteps = 2;            // of Chebyshev's iteration, before and after
 constexpr double kRange = 16;        // largest over smallest eigenvalue that it damps
 constexpr double kFullEnough = 0.7;  // cells filled so far are as good without a block (measured)
-constexpr double kMargin = 1.1;      // over the estimate of the largest
-constexpr int kPowerSteps = 15;
+constexpr double kMargin = 1.2;      // over the estimate of the largest
+constexpr int kPowerSteps = 15, kMostPowerSteps = 60;
 constexpr double kRaised = 1e-6;  // of a block's scaled diagonal: what it is made from is in single precision
 constexpr std::size_t kBlocksAtATime = 16;
 using Vector = std::vector<Vec3>;
@@ -292,7 +292,11 @@ void QuadraticMultigrid::estimate_largest() {
   for (Vec3& each : x)
     for (double& value : each) value = static_cast<double>(random()) / 4294967295.0 - 0.5;
   matrix_.clear_held(x);
-  for (int step = 0; step < kPowerSteps; ++step) {
+  // A few slivers may have the largest eigenvalue: it shows once the rest has fallen behind.
+  constexpr double kSettled = 1.01;  // from step to step
+  double before = 0;
+  for (int step = 0; step < kMostPowerSteps && (step < kPowerSteps || largest_ > kSettled * before); ++step) {
+    before = largest_;
     const double norm = std::sqrt(dot(x, x));
     if (!(norm > 0)) return;
     parallel_for_each(x.size(), [&](std::size_t n) { x[n] /= norm; });

@@ -24,6 +24,8 @@ class QuadraticMultigrid final : public Preconditioner {
 
   void apply(const std::vector<Vec3>& residual, std::vector<Vec3>& correction) const override;
   void refresh() override {}
+  // Where it shows as not positive: the largest eigenvalue was taken too small. It is twice that from here on.
+  void widen() { largest_ *= 2; }
 
   // The trilinear operator over the elements that are nodes, and where they are.
   [[nodiscard]] const BlockMatrix& coarse() const { return coarse_; }

@@ -19,6 +19,7 @@
 #include "simulate/probes/report.h"
 #include "simulate/quadratic/quadratic_newton.h"
 #include "simulate/quadratic/quadratic_solve.h"
+#include "simulate/quadratic/quadratic_stress.h"
 
 namespace flexel::simulate {
 namespace {
@@ -194,7 +195,7 @@ SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptio
   sum_up_imbalance(result);
   for (const std::string& warning : warnings_of(result)) progress.warn(scene.name + ": " + warning);
   if (options.stress) report_stress(problem, field_stresses(system, solution, state), body, result);
-  if (options.estimate) mark_singular(body, system.tied_elements(), result);
+  if (options.estimate) mark_singular(body, system.tied_elements(), result, kBesideInField);
   const StiffnessPattern pattern =
       stiffness_pattern(body, active_cells(problem), connection_rows({}, body.element_count()), {}, false);
   carry_strays(fragments, problem, pattern.stencil, state);

@@ -21,9 +21,9 @@ namespace {
 
 constexpr int kSafeties = 4;
 constexpr int kMostLinearIterations = 1000;
+constexpr int kMostWidenings = 3;  // of the preconditioner's range, where it shows as not positive
 constexpr double kLeastLinearTolerance = 1e-10;
 constexpr double kLinearGoodEnough = 1e-6;  // of the loads, where rounding allows no less
-constexpr double kBesideCell = 1e-3;        // of a cell: a point so far outside still counts as in it
 constexpr std::size_t kAnswerCellsAtATime = 64;
 
 std::array<Vec3, kQuadraticNodes> values_at(const QuadraticSystem& system, const QuadraticSolution& solution,
@@ -40,44 +40,6 @@ void refuse_free(const QuadraticMultigrid& multigrid, const Body& body, const st
   throw InputError(scene, fmt::format("part \"{}\" is free to {}: add {} that stops it",
                                       body.parts[free.front().part].name, motion_name(free.front()),
                                       words_of(scene).a_fix));
-}
-
-SymmetricStress stress_at(const Mat9& moduli, const Mat3& gradient) {
-  Eigen::Matrix<double, 9, 1> h;
-  for (int k = 0; k < 3; ++k)
-    for (int l = 0; l < 3; ++l) h[3 * k + l] = gradient(k, l);
-  const Eigen::Matrix<double, 9, 1> s = moduli * h;
-  SymmetricStress stress;
-  stress << s[0], s[4], s[8], 0.5 * (s[1] + s[3]), 0.5 * (s[5] + s[7]), 0.5 * (s[6] + s[2]);
-  return stress;
-}
-
-const Mat3& turn_of_cell(const QuadraticSolution& solution, std::size_t cell) {
-  static const Mat3 none = Mat3::Zero();
-  return solution.turn.empty() ? none : solution.turn[cell];
-}
-
-// R^T F - 1: the displacement gradient without the cell's rotation.
-Mat3 local_gradient(const QuadraticSystem& system, const QuadraticSolution& solution, std::size_t cell,
-                    const Vec3& at) {
-  const Mat3 gradient = gradient_at(system, solution.displacement, cell, at);
-  const Mat3& turn = turn_of_cell(solution, cell);
-  return gradient + turn.transpose() + turn.transpose() * gradient;
-}
-
-// Of a cell, turned with it.
-SymmetricStress stress_of(const QuadraticSystem& system, const QuadraticSolution& solution, std::size_t cell,
-                          const Vec3& at) {
-  const SymmetricStress own =
-      stress_at(system.moduli(system.part_of(cell)), local_gradient(system, solution, cell, at));
-  if (solution.turn.empty()) return own;
-  Mat3 sigma;
-  sigma << own[0], own[3], own[5], own[3], own[1], own[4], own[5], own[4], own[2];
-  const Mat3 rotation = Mat3::Identity() + solution.turn[cell];
-  const Mat3 turned = rotation * sigma * rotation.transpose();
-  SymmetricStress stress;
-  stress << turned(0, 0), turned(1, 1), turned(2, 2), turned(0, 1), turned(1, 2), turned(0, 2);
-  return stress;
 }
 
 }  // namespace
@@ -123,11 +85,19 @@ bool correct(const QuadraticSystem& system, double tolerance, QuadraticSolution&
   if (now <= asked * scale && scale > 0) return true;
   const double ahead = scale > 0 ? now / scale : 1;
   std::vector<Vec3> change;
-  const LinearResult result = conjugate_gradients(
-      stiffness, left, change, *solution.tangent->multigrid, asked / ahead, kMostLinearIterations,
-      [&](int iteration, double residual) { progress(solution.iterations + iteration, residual * ahead); });
-  solution.iterations += result.iterations;
-  solution.relative_residual = result.relative_residual * ahead;
+  LinearResult result;
+  for (int widened = 0;; ++widened) {
+    result = conjugate_gradients(
+        stiffness, left, change, *solution.tangent->multigrid, asked / ahead, kMostLinearIterations,
+        [&](int iteration, double residual) { progress(solution.iterations + iteration, residual * ahead); });
+    solution.iterations += result.iterations;
+    solution.relative_residual = result.relative_residual * ahead;
+    const bool stopped = !result.converged && !result.indefinite &&
+                         result.iterations < kMostLinearIterations &&
+                         !(solution.relative_residual < kLinearGoodEnough);
+    if (!stopped || widened == kMostWidenings) break;
+    solution.tangent->multigrid->widen();
+  }
   if (result.iterations == kMostLinearIterations || result.indefinite ||
       !(result.converged || solution.relative_residual < kLinearGoodEnough))
     return false;
@@ -143,6 +113,18 @@ Mat3 gradient_at(const QuadraticSystem& system, const std::vector<Vec3>& displac
   for (std::size_t n = 0; n < kQuadraticNodes; ++n)
     sum += displacement[system.nodes().of_cell[cell][n]] * shape.gradient[n].transpose();
   return sum;
+}
+
+const Mat3& turn_of_cell(const QuadraticSolution& solution, std::size_t cell) {
+  static const Mat3 none = Mat3::Zero();
+  return solution.turn.empty() ? none : solution.turn[cell];
+}
+
+Mat3 local_gradient(const QuadraticSystem& system, const QuadraticSolution& solution, std::size_t cell,
+                    const Vec3& at) {
+  const Mat3 gradient = gradient_at(system, solution.displacement, cell, at);
+  const Mat3& turn = turn_of_cell(solution, cell);
+  return gradient + turn.transpose() + turn.transpose() * gradient;
 }
 
 Vec3 spin_of(const Mat3& h) {
@@ -189,91 +171,6 @@ void write_field(const QuadraticNodes& nodes, const QuadraticSolution& solution,
     }
   }
   body.cell_columns[kQuadraticColumn] = std::move(column);
-}
-
-namespace {
-
-// Stress at a point (rest, world frame) of matter that these cells hold or touch: the mean over those that the point lies
-// in, else of those that it lies the least outside of. A field that a sliver of matter alone carries says nothing of the
-// stress, so cells with a tenth of the fullest one's matter or less only count where there are no others.
-std::optional<SymmetricStress> stress_near(const QuadraticSystem& system, const QuadraticSolution& solution,
-                                           const Vec3& point,
-                                           std::span<const QuadraticNodes::Incidence> cells) {
-  constexpr double kSliver = 0.1;
-  const Body& body = system.problem().body;
-  const std::vector<std::uint32_t>& of_body = system.nodes().cells;
-  double fullest = 0, least = HUGE_VAL;
-  for (const auto& around : cells) fullest = std::max(fullest, body.fill[of_body[around.cell]]);
-  int count = 0;
-  SymmetricStress sum = SymmetricStress::Zero();
-  for (const auto& around : cells) {
-    if (body.fill[of_body[around.cell]] < kSliver * fullest) continue;
-    const Part& part = body.parts[system.part_of(around.cell)];
-    const Vec3 at = cell_coordinates(body, part, of_body[around.cell], point);
-    const double beyond = std::max(-at.minCoeff(), at.maxCoeff() - 1),
-                 outside = beyond <= kBesideCell ? 0 : beyond;
-    if (outside > least) continue;
-    if (outside < least) {
-      least = outside;
-      count = 0;
-      sum.setZero();
-    }
-    sum += stress_of(system, solution, around.cell, at);
-    ++count;
-  }
-  if (count == 0) return std::nullopt;
-  return SymmetricStress(sum / count);
-}
-
-// The same where these cells hold too little matter to say: with the cells around them.
-std::optional<SymmetricStress> stress_around(const QuadraticSystem& system, const QuadraticSolution& solution,
-                                             const Vec3& point,
-                                             std::span<const QuadraticNodes::Incidence> cells) {
-  constexpr double kEnough = 0.1;  // of a voxel
-  const QuadraticNodes& nodes = system.nodes();
-  std::vector<QuadraticNodes::Incidence> around(cells.begin(), cells.end());
-  if (std::none_of(cells.begin(), cells.end(), [&](const auto& each) {
-        return system.problem().body.fill[nodes.cells[each.cell]] > kEnough;
-      }))
-    for (const QuadraticNodes::Incidence& each : cells)
-      for (const std::uint32_t node : nodes.of_cell[each.cell])
-        around.insert(around.end(), nodes.at(node).begin(), nodes.at(node).end());
-  std::sort(around.begin(), around.end(), [](const auto& a, const auto& b) { return a.cell < b.cell; });
-  around.erase(std::unique(around.begin(), around.end(),
-                           [](const auto& a, const auto& b) { return a.cell == b.cell; }),
-               around.end());
-  return stress_near(system, solution, point, around);
-}
-
-// Of the middle of a cell's matter.
-SymmetricStress cell_stress(const QuadraticSystem& system, const QuadraticSolution& solution,
-                            std::size_t cell) {
-  const Body& body = system.problem().body;
-  const Index3& low = body.lattice_index[body.cell_elements[system.nodes().cells[cell]][0]];
-  const Vec3 middle = Vec3(low[0], low[1], low[2]) + system.middle(cell);
-  const QuadraticNodes::Incidence own{static_cast<std::uint32_t>(cell), 0};
-  return stress_around(system, solution, system.lattice(cell).to_world(middle), {&own, 1}).value();
-}
-
-}  // namespace
-
-Stresses field_stresses(const QuadraticSystem& system, const QuadraticSolution& solution,
-                        const State& state) {
-  const QuadraticNodes& nodes = system.nodes();
-  Stresses found = stresses(system.problem(), state);  // for the points that elements stand for
-  parallel_for_each(
-      nodes.cells.size(),
-      [&](std::size_t c) { found.cell[nodes.cells[c]] = cell_stress(system, solution, c); },
-      kAnswerCellsAtATime);
-  parallel_for_each(
-      nodes.elements.size(),
-      [&](std::size_t i) {
-        const std::uint32_t e = nodes.elements[i];
-        if (const auto stress = stress_around(system, solution, found.element_at[e], nodes.at(i)))
-          found.element[e] = *stress;
-      },
-      kAnswerCellsAtATime);
-  return found;
 }
 
 namespace {

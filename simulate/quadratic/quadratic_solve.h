@@ -4,7 +4,6 @@
 #include <memory>
 #include <optional>
 
-#include "simulate/matter/stress.h"
 #include "simulate/quadratic/quadratic_system.h"
 #include "simulate/result/result.h"
 
@@ -45,6 +44,11 @@ constexpr double kMoreSafety = 4;
 // The gradient (world frame) of a displacement (nodes x 3) in a cell at cell coordinates.
 [[nodiscard]] Mat3 gradient_at(const QuadraticSystem& system, const std::vector<Vec3>& displacement,
                                std::size_t cell, const Vec3& at);
+// R - 1 of a cell.
+[[nodiscard]] const Mat3& turn_of_cell(const QuadraticSolution& solution, std::size_t cell);
+// R^T F - 1: the displacement gradient in a cell at cell coordinates, without the cell's rotation.
+[[nodiscard]] Mat3 local_gradient(const QuadraticSystem& system, const QuadraticSolution& solution,
+                                  std::size_t cell, const Vec3& at);
 // The rotation vector of a small displacement gradient.
 [[nodiscard]] Vec3 spin_of(const Mat3& gradient);
 // (27 x 3) m: the displacement of a cell's nodes beside its first one, once the cell's rotation R is taken out of it;
@@ -62,11 +66,6 @@ constexpr double kMoreSafety = 4;
 // broken ones) the field is trilinear between the elements of `state`, which are carried along.
 void write_field(const QuadraticNodes& nodes, const QuadraticSolution& solution, const State& state,
                  Body& body);
-
-// Stresses as `stresses()` defines them, from the field itself: of a cell in the middle of its matter; of an element
-// there, or at the nearest point of the surface, the mean over the cells that hold the point.
-[[nodiscard]] Stresses field_stresses(const QuadraticSystem& system, const QuadraticSolution& solution,
-                                      const State& state);
 
 // Reactions, loads, elastic energy, smallest J (middle of cells) into `result`.
 void report(const QuadraticSystem& system, const QuadraticSolution& solution, SimulateResult& result);

@@ -14,6 +14,7 @@
 #include "simulate/effects/gravity.h"
 #include "simulate/matter/interpolation_weights.h"
 #include "simulate/matter/load_distribution.h"
+#include "simulate/matter/surface_samples.h"
 #include "simulate/models/cells.h"
 
 namespace flexel::simulate {
@@ -47,6 +48,7 @@ QuadraticSystem::QuadraticSystem(const Problem& problem, const Scene& scene)
     // of an orthotropic material the largest eigenvalue of dP/dF
     stiffest_.push_back(law.name == LawName::orthotropic ? law.stiffest : law.lambda + 2 * law.mu);
   }
+  pressure_.assign(body.surface.polygon_count(), 0);
   place_supports(scene.get<Supports>().ties);
   place_loads(scene.get<Loads>().loads);
   if (const auto& acceleration = scene.get<Gravity>().acceleration) add_gravity(*acceleration);
@@ -67,6 +69,7 @@ void QuadraticSystem::place_supports(const std::vector<Tie>& ties) {
   for (const Tie& tie : ties) {
     const Selected selected = resolve(tie.where, problem_.body);
     NitscheSupport support{&tie, {}, {}};
+    for (const std::uint32_t p : selected.polygons) pressure_[p] = kUnknownPressure;
     if (!selected.polygons.empty()) {
       support.points = in_firm_cells(problem_.body, nodes_, face_points(problem_, nodes_, selected.polygons));
       if (support.points.empty())
@@ -124,6 +127,7 @@ void QuadraticSystem::place_loads(const std::vector<Load>& loads) {
                                    "smaller spacing",
                                    load.name));
     check_area(load, selected.polygons, points);
+    for (const std::uint32_t p : selected.polygons) pressure_[p] += load.pressure.value_or(kUnknownPressure);
     std::vector<Vec3> forces;
     std::vector<LoadedPoint> loaded;
     for (const FacePoint& point : points) {

@@ -53,6 +53,8 @@ class QuadraticSystem {
   [[nodiscard]] double penalty(std::size_t cell, double safety) const;  // Pa/m, beta
   [[nodiscard]] NitschePoint point(const NitscheSupport& support, const FacePoint& at, double safety,
                                    double share = 1) const;
+  // (polygons) Pa, what presses on the surface; kUnknownPressure where a support or another load acts.
+  [[nodiscard]] const std::vector<double>& pressure() const { return pressure_; }
   // What of the loaded surface bears on no matter, for people.
   [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
   // (elements) 2 where a support holds all axes, 1 where it holds some, else 0.
@@ -80,6 +82,7 @@ class QuadraticSystem {
   std::vector<NitscheSupport> supports_;
   std::vector<std::vector<SupportIntegrals>> cell_supports_;  // (cells)
   std::vector<NodalLoad> loads_;
+  std::vector<double> pressure_;  // (polygons)
   std::vector<std::string> warnings_;
 };
 

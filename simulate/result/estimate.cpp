@@ -57,4 +57,12 @@ std::optional<Bar> stress_bar(const Sequence& s, bool singular) {
   return bar;
 }
 
+std::optional<Bar> field_stress_bar(const Sequence& s, std::size_t lattices, double doubt, bool singular) {
+  const double e21 = std::abs(s.value[1] - s.value[0]), e32 = std::abs(s.value[2] - s.value[1]);
+  if (singular && std::max(e21, e32) > kHardlyDiffer * std::abs(s.value[0])) return std::nullopt;
+  const double lattice =
+      lattices < 3 ? 2 * e21 : std::max(kSafety * e21, e32 / std::pow(s.ratio[0], kModelOrder));
+  return Bar{std::max(lattice, doubt), s.value[0], std::nullopt};
+}
+
 }  // namespace flexel::simulate

@@ -38,6 +38,12 @@ struct Bar {
 // differ.
 [[nodiscard]] std::optional<Bar> stress_bar(const Sequence& sequence, bool singular = false);
 
+// Of the largest stress in model `quadratic`: the largest of 1.25 times the finer difference, a quarter of the coarser one (what order 2
+// leaves of it) and `doubt` [Pa], by which the field of one cell is off from that of the cells around. With two lattices twice
+// the difference. Nothing at a `singular` place, but where values hardly differ.
+[[nodiscard]] std::optional<Bar> field_stress_bar(const Sequence& sequence, std::size_t lattices,
+                                                  double doubt, bool singular);
+
 struct ErrorBar {
   enum class Of { probe, largest_displacement, elastic_energy };
   Of of = Of::probe;
@@ -55,15 +61,16 @@ struct ErrorBar {
 
 // The largest von Mises stress of each lattice.
 struct StressBar {
-  std::array<double, 3> value{};  // Pa, the finest first
+  std::array<double, 3> value{};  // Pa, the finest first; of two lattices the second twice
   std::optional<Bar> bar;         // nothing where they do not converge
 };
 
 struct ErrorBars {
   std::vector<ErrorBar> bars;
-  std::optional<StressBar> von_mises;  // nothing without three lattices, with thin walls, without stresses
-  std::string note;                    // why there are none, or why they are wide; "" else
-  std::vector<std::size_t> cells;      // of each lattice, the finest first
+  std::optional<StressBar>
+      von_mises;     // nothing without three lattices (`quadratic`: two), with thin walls, without stresses
+  std::string note;  // why there are none, or why they are wide; "" else
+  std::vector<std::size_t> cells;  // of each lattice, the finest first
   double seconds = 0;
 };
 

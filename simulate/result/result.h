@@ -55,6 +55,7 @@ struct StressSummary {     // of the largest von Mises stress
   std::string part;
   std::optional<double> yield_share;  // of the part's material; nothing where it has no `yield`
   std::string beside = {};  // why it grows without bound as cells get smaller (singular_beside()); "" if not
+  double doubt = 0;         // Pa, of model `quadratic`: between one cell's field and that of the cells around
 };
 
 struct SettleSummary {  // of equilibrium with contact (simulate/time/dynamic_relaxation.h)

@@ -1,0 +1,293 @@
+#!/usr/bin/python3
+"""The largest stress of model `quadratic` and its bar, beside known answers: writes docs/measurements/stresses.md.
+
+    PATH=build/release/bin:$PATH bench/accuracy/stresses.py [--only CASE] [--fine] [-o FILE]
+
+Parts are blocks bent to shape (OBJ), on lattices that do not follow them. References: Lame's solutions of thick tubes and spheres;
+NAFEMS LE1 and LE10 (sigma_yy at point D, 92.7 and -5.38 MPa); plates with a hole and with fillets, CalculiX's CPE8 run here (ccx),
+refined until two meshes differ by less than .2 %. Seconds: the whole process of flexel-simulate with its bars, one thread.
+"""
+
+import argparse
+import json
+import math
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+
+import meshio
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+YOUNG, POISSON = 210e9, 0.3
+
+
+def call(*words, cwd=None):
+    before = time.monotonic()
+    done = subprocess.run([str(word) for word in words], capture_output=True, text=True, cwd=cwd, env={**os.environ, "OMP_NUM_THREADS": "1"})
+    if done.returncode != 0:
+        raise RuntimeError(f"{' '.join(map(str, words))}: {(done.stderr.strip().splitlines() or ['no message'])[-1]}")
+    return time.monotonic() - before
+
+
+def write_block(path, counts, point, group=lambda face, i, j: face):
+    """OBJ (mm) of the image of [0, 1]^3 under `point`, in `counts` steps; groups s0, s1, t0, t1, z0, z1, or as `group` has them."""
+    number, lines, groups = {}, [], {}
+    middle, step = point(0.45, 0.45, 0.45), 1e-3
+    edges = [[(b - a) for a, b in zip(middle, point(*(0.45 + step * (k == axis) for k in range(3))))] for axis in range(3)]
+    mirrored = sum(edges[0][i] * (edges[1][i - 2] * edges[2][i - 1] - edges[1][i - 1] * edges[2][i - 2]) for i in range(3)) < 0
+
+    def vertex(key):
+        at = tuple(round(x, 9) for x in point(*(k / n for k, n in zip(key, counts))))
+        if at not in number:
+            number[at] = len(number) + 1
+            lines.append("v {:.12g} {:.12g} {:.12g}".format(*at))
+        return number[at]
+
+    for axis, letter in enumerate("stz"):
+        b, c = (axis + 1) % 3, (axis + 2) % 3
+        for end in (0, 1):
+            for i in range(counts[b]):
+                for j in range(counts[c]):
+                    corners = []
+                    for di, dj in ((0, 0), (1, 0), (1, 1), (0, 1)):
+                        key = [0, 0, 0]
+                        key[axis], key[b], key[c] = end * counts[axis], i + di, j + dj
+                        corners.append(vertex(key))
+                    corners = [v for n, v in enumerate(corners) if v != corners[n - 1]]
+                    if len(corners) > 2:
+                        groups.setdefault(group(f"{letter}{end}", i, j), []).append(corners if bool(end) != mirrored else corners[::-1])
+    for name, faces in groups.items():
+        lines += [f"g {name}"] + ["f " + " ".join(map(str, face)) for face in faces]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def between(low, high, height):
+    """Straight lines from the curve low(s) to high(s) in the plane, drawn out to `height`."""
+    def point(s, t, z):
+        a, b = low(s), high(s)
+        return (a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), z * height)
+    return point
+
+
+def arc(a, b):
+    """A quarter of an ellipse from (a, 0) to (0, b)."""
+    return lambda s: (a * math.cos(s * math.pi / 2), b * math.sin(s * math.pi / 2))
+
+
+def square(side):
+    """The outer sides of a square, at the angle of the quarter circle."""
+    def point(s):
+        angle = s * math.pi / 2
+        scale = side / max(math.cos(angle), math.sin(angle))
+        return (scale * math.cos(angle), scale * math.sin(angle))
+    return point
+
+
+def stepped(narrow, wide, radius, length):
+    """The upper side of a bar that widens at its middle: `narrow` to s = .4, the fillet to .7, the shoulder to .8, `wide`."""
+    middle = length / 2
+
+    def point(s):
+        if s <= 0.4:
+            return (middle * s / 0.4, narrow)
+        if s <= 0.7:
+            angle = (s - 0.4) / 0.3 * math.pi / 2
+            return (middle + radius * math.sin(angle), narrow + radius * (1 - math.cos(angle)))
+        if s <= 0.8:
+            return (middle + radius, narrow + radius + (wide - narrow - radius) * (s - 0.7) / 0.1)
+        return (middle + radius + (middle - radius) * (s - 0.8) / 0.2, wide)
+    return point
+
+
+def fix(face, axes):
+    return f'[[fix]]\nwhere = "{face}"\naxes = "{axes}"\n'
+
+
+def press(face, pressure):
+    return f'[[load]]\nwhere = "{face}"\npressure = "{pressure:.12g} Pa"\n'
+
+
+def octant(s, t, z):
+    """A point of a shell of radii 20 and 40 mm: t is the radius, s the azimuth, z the polar angle."""
+    radius, azimuth, polar = 20 + 20 * t, s * math.pi / 2, z * math.pi / 2
+    return (radius * math.cos(azimuth) * math.cos(polar), radius * math.sin(azimuth) * math.cos(polar), radius * math.sin(polar))
+
+
+def mises_of_plane_strain(radial, hoop):
+    axial = POISSON * (radial + hoop)
+    return math.sqrt(0.5 * ((radial - hoop)**2 + (hoop - axial)**2 + (axial - radial)**2))
+
+
+PLANE_STRAIN = fix("z0", "z") + fix("z1", "z")
+QUARTER = fix("s0", "y") + fix("s1", "x")
+
+
+def cases():
+    """Name: (counts of the surface, its points, groups or None, scene, sizes mm, reference); the reference is ("mises", Pa), ("plane", curves) or
+    ("principal", which, Pa, point D mm)."""
+    inner, outer, pressure = 20.0, 40.0, 10e6
+    hoop = pressure * (outer**2 + inner**2) / (outer**2 - inner**2)
+    hole = (arc(5, 5), square(50))
+    fillet = (lambda s: (100 * s, 0.0), stepped(15, 30, 6, 100))
+    bands = [0, 0.29, 0.31, 0.6]
+
+    def le10(s, t, z):
+        x, y, _ = between(arc(2000, 1000), arc(3250, 2750), 1)(s, t, 0)
+        return (x, y, 1000 * bands[round(3 * z)])
+
+    return {
+        "tube": ((48, 1, 1), between(arc(inner, inner), arc(outer, outer), 10), None, QUARTER + PLANE_STRAIN + press("t0", pressure), (20, 13, 10, 7, 5, 3.4, 2.5),
+                 ("mises", mises_of_plane_strain(-pressure, hoop))),
+        "sphere": ((32, 1, 32), octant, None, fix("s0", "y") + fix("s1", "x") + fix("z0", "z") + press("t0", pressure), (13, 10, 7, 5, 3.4),
+                   ("mises", 1.5 * pressure * outer**3 / (outer**3 - inner**3))),
+        "hole": ((48, 1, 1), between(*hole, 5), None, QUARTER + PLANE_STRAIN + '[[load]]\nwhere = "xmax"\npressure = "-10 MPa"\n', (5, 3.4, 2.5, 1.7, 1.25), ("plane", hole)),
+        "fillet": ((60, 1, 1), between(*fillet, 5), None, fix("s0", "x") + fix("t0", "y") + PLANE_STRAIN + press("s1", -10e6), (6, 4, 3, 2, 1.5), ("plane", fillet)),
+        "LE1": ((48, 1, 1), between(arc(2000, 1000), arc(3250, 2750), 100), None, QUARTER + fix("z0", "z") + press("t1", -10e6), (400, 280, 200, 140, 100), ("principal", 0, 92.7e6, (2000, 0, 50))),
+        "LE10": ((48, 1, 3), le10, lambda face, i, j: "band" if face == "t1" and i == 1 else "t1" if face == "t1" else face,
+                 QUARTER + '[[fix]]\nwhere = ["t1", "band"]\naxes = "xy"\n' + fix("band", "z") + press("z1", 1e6), (600, 400, 300, 200, 150), ("principal", 2, -5.38e6, (2000, 0, 600))),
+    }
+
+
+def plane_reference(folder, low, high, loaded, held, counts, graded):
+    """Largest von Mises stress (Pa) of the shape between two curves (mm) in plane strain: CalculiX's CPE8, nodal values. `loaded`(i, j, n, m): whether the
+    edge from node (i, j) on bears 10 MPa outwards along x; `held`(x, y): the axes that a node at (x, y) is held along;
+    `graded`: elements get smaller towards `low` with this power."""
+    n, m = counts
+    number, points = {}, []
+
+    def node(i, j):
+        if (i, j) not in number:
+            a, b, t = low(i / 2 / n), high(i / 2 / n), (j / 2 / m)**graded
+            number[i, j] = len(number) + 1
+            points.append((a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])))
+        return number[i, j]
+
+    at = lambda i, j: points[node(i, j) - 1]
+    area = lambda quad: sum(at(*quad[k - 1])[0] * at(*quad[k])[1] - at(*quad[k])[0] * at(*quad[k - 1])[1] for k in range(4))
+    elements = []
+    for i in range(0, 2 * n, 2):
+        for j in range(0, 2 * m, 2):
+            corners = [(i, j), (i + 2, j), (i + 2, j + 2), (i, j + 2)]
+            corners = corners if area(corners) > 0 else corners[::-1]
+            elements.append([node(*c) for c in corners] + [node((a[0] + b[0]) // 2, (a[1] + b[1]) // 2) for a, b in zip(corners, corners[1:] + corners[:1])])
+    force = {}
+    for i, j in list(number):
+        for a, b in (((i + 1, j), (i + 2, j)), ((i, j + 1), (i, j + 2))):
+            if i % 2 or j % 2 or b not in number or not loaded(i, j, b, n, m):
+                continue
+            width = 10 * abs(at(*b)[1] - at(i, j)[1])  # N for 1 mm of thickness
+            for key, share in (((i, j), 1 / 6), (a, 2 / 3), (b, 1 / 6)):
+                force[number[key]] = force.get(number[key], 0) + share * width
+    text = "*NODE,NSET=ALL\n" + "".join(f"{k + 1},{x:.12g},{y:.12g},0\n" for k, (x, y) in enumerate(points))
+    text += "*ELEMENT,TYPE=CPE8,ELSET=ALL\n" + "".join(f"{e + 1}," + ",".join(map(str, each)) + "\n" for e, each in enumerate(elements))
+    text += f"*MATERIAL,NAME=M\n*ELASTIC\n{YOUNG / 1e6},{POISSON}\n*SOLID SECTION,ELSET=ALL,MATERIAL=M\n1.\n*STEP\n*STATIC\n*BOUNDARY\n"
+    text += "".join(f"{k + 1},{axis}\n" for k, place in enumerate(points) for axis in held(*place))
+    text += "*CLOAD\n" + "".join(f"{k},1,{f:.12g}\n" for k, f in force.items()) + "*EL FILE,OUTPUT=2D\nS\n*END STEP\n"
+    (folder / "plane.inp").write_text(text)
+    call("ccx", "plane", cwd=folder)
+    largest, inside = 0, False
+    for line in (folder / "plane.frd").read_text().splitlines():
+        if line.startswith(" -4"):
+            inside = "STRESS" in line
+        elif inside and line.startswith(" -1"):
+            xx, yy, zz, xy, yz, zx = (float(line[13 + 12 * k:25 + 12 * k]) for k in range(6))
+            largest = max(largest, 0.5 * ((xx - yy)**2 + (yy - zz)**2 + (zz - xx)**2) + 3 * (xy**2 + yz**2 + zx**2))
+        elif inside and line.startswith(" -3"):
+            inside = False
+    return 1e6 * math.sqrt(largest)
+
+
+def reference(folder, name, given):
+    """Pa"""
+    if given[0] != "plane":
+        return given[1] if given[0] == "mises" else given[2]
+    low, high = given[1]
+    if name == "hole":
+        loaded = lambda i, j, b, n, m: j == 2 * m and b[1] == j and b[0] <= n
+    else:
+        loaded = lambda i, j, b, n, m: i == 2 * n and b[0] == i
+    held = lambda x, y: ([1] if abs(x) < 1e-9 else []) + ([2] if abs(y) < 1e-9 else [])
+    found = []
+    for n, m in ((20, 20), (40, 40), (80, 80), (160, 160)):
+        found.append(plane_reference(folder, low, high, loaded, held, (n, m), 2 if name == "hole" else 1))
+        print(f"{name}: CPE8 {n} x {m}: {found[-1] / 1e6:.4f} MPa", file=sys.stderr, flush=True)
+        if len(found) > 1 and abs(found[-1] / found[-2] - 1) < 2e-3:
+            return found[-1]
+    raise RuntimeError(f"{name}: CalculiX does not settle")
+
+
+def at_point(folder, where, which):
+    """The principal stress at the vertex that rests at `where` (mm), Pa."""
+    call("flexel-map", folder / "out.vtu", "--quiet", "--attributes", "--force", "-o", folder / "mapped.vtu")
+    mesh = meshio.read(folder / "mapped.vtu")
+    rest = mesh.points * 1e-3 - mesh.point_data["displacement"]
+    nearest = min(range(len(rest)), key=lambda v: math.dist(rest[v], [1e-3 * x for x in where]))
+    return mesh.point_data["principal_stress"][nearest][which]
+
+
+def run_case(folder, name, case):
+    """(reference Pa, rows): size mm, cells, value, bar (or None) and what it lies beside, seconds; a run that failed has its message in place of them."""
+    counts, points, group, loads, sizes, given = case
+    write_block(folder / "part.obj", counts, points, *([group] if group else []))
+    true = reference(folder, name, given)
+    (folder / "scene.toml").write_text(f'material = "steel"\nmodel = "quadratic"\n[materials.steel]\nyoung = "{YOUNG} Pa"\npoisson = {POISSON}\n'
+                                       f'density = "7800 kg/m3"\nyield = "250 MPa"\n{loads}')
+    rows = []
+    for size in sizes:
+        call("flexel-voxelize", folder / "part.obj", "--size", f"{size} mm", "--align", "none", "--moments", "--threads", "1", "--quiet", "--force", "-o", folder / "body.vtu")
+        try:
+            seconds = call("flexel-simulate", folder / "scene.toml", folder / "body.vtu", "--threads", "1", "--quiet", "--force", "--summary", folder / "s.json", "-o", folder / "out.vtu")
+        except RuntimeError as error:
+            rows.append((size, str(error).rsplit("error: ", 1)[-1]))
+            print(name, *rows[-1], file=sys.stderr, flush=True)
+            continue
+        found = json.loads((folder / "s.json").read_text())
+        said = found.get("error_bars", {}).get("largest_von_mises")
+        value = at_point(folder, given[3], given[1]) if given[0] == "principal" else found["largest_von_mises"]
+        # the peak and the point of LE1 are one place; LE10's largest stress is elsewhere
+        bar = said["bar"] if said and name != "LE10" else None
+        rows.append((size, found["cells"], value, bar, found.get("largest_von_mises_beside", ""), seconds))
+        print(name, *rows[-1], said and said["values"], file=sys.stderr, flush=True)
+    return true, rows
+
+
+def table(results):
+    text = ("# Stresses of model `quadratic`, measured\n\nWritten by `bench/accuracy/stresses.py`, which says what is run and what the references are. Value: the largest von Mises\n"
+            "stress; of LE1 and LE10 sigma_yy at point D. Bar: that of the run, of the largest von Mises stress. One thread, bars included, on a machine that other jobs used.\n\n"
+            "| case | reference MPa | size mm | cells | value MPa | error % | bar % | holds | s |\n|---|---|---|---|---|---|---|---|---|\n")
+    held, barred = 0, 0
+    for name, (true, rows) in results.items():
+        for row in rows:
+            if len(row) == 2:
+                text += f"| {name} | {true / 1e6:.4g} | {row[0]} | | {row[1]} | | | | |\n"
+                continue
+            size, cells, value, bar, beside, seconds = row
+            said = f"{100 * bar / value:.1f}" if bar else f"none, beside {beside}" if beside else "none"
+            holds = bar and abs(value - true) <= bar
+            barred, held = barred + bool(bar), held + bool(holds)
+            text += (f"| {name} | {true / 1e6:.4g} | {size} | {cells:,} | {value / 1e6:.4g} | {100 * (value / true - 1):+.1f} | {said} | "
+                     f"{'yes' if holds else 'no' if bar else ''} | {seconds:.1f} |\n")
+    return text + f"\n{held} of {barred} bars hold.\n"
+
+
+def main():
+    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    arguments.add_argument("-o", "--output", default=ROOT / "docs/measurements/stresses.md", type=pathlib.Path)
+    arguments.add_argument("--only", action="append")
+    options = arguments.parse_args()
+    results = {}
+    with tempfile.TemporaryDirectory() as place:
+        for name, case in cases().items():
+            if not options.only or name in options.only:
+                results[name] = run_case(pathlib.Path(place), name, case)
+    part = options.output.with_name(options.output.name + ".part")
+    part.write_text(table(results), encoding="utf-8")
+    part.replace(options.output)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

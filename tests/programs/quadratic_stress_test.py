@@ -1,0 +1,154 @@
+"""Stresses of model `quadratic` at the part's own surface: known answers, bars, and one figure in summary, body and mapped file."""
+
+import json
+import math
+import pathlib
+
+from harness import Skip, expect, expect_ok, main, run, write
+
+MATERIAL = """material = "m"
+model = "quadratic"
+[materials.m]
+young = "210 GPa"
+poisson = 0.3
+density = "7800 kg/m3"
+yield = "100 MPa"
+"""
+QUARTER = """[[fix]]
+where = "start"
+axes = "y"
+[[fix]]
+where = "end"
+axes = "x"
+"""
+PLANE = """[[fix]]
+where = "bottom"
+axes = "z"
+[[fix]]
+where = "top"
+axes = "z"
+"""
+INSIDE = """[[load]]
+where = "inner"
+pressure = "10 MPa"
+"""
+
+
+def arc(a, b):
+    """A quarter of an ellipse from (a, 0) to (0, b)."""
+    return lambda s: (a * math.cos(s * math.pi / 2), b * math.sin(s * math.pi / 2))
+
+
+def square(side):
+    def point(s):
+        angle = s * math.pi / 2
+        scale = side / max(math.cos(angle), math.sin(angle))
+        return (scale * math.cos(angle), scale * math.sin(angle))
+    return point
+
+
+def quarter(name, inner, outer, height, steps=32):
+    """OBJ of the matter between two curves, with groups inner, outer, start (y = 0), end (x = 0), bottom and top."""
+    lines = ["v {:.12g} {:.12g} {:.12g}".format(*curve(s / steps), z) for s in range(steps + 1) for curve in (inner, outer) for z in (0, height)]
+    at = lambda s, outside, above: 4 * s + 2 * outside + above + 1
+    quads = {"inner": [(at(s, 0, 0), at(s, 0, 1), at(s + 1, 0, 1), at(s + 1, 0, 0)) for s in range(steps)],
+             "outer": [(at(s, 1, 0), at(s + 1, 1, 0), at(s + 1, 1, 1), at(s, 1, 1)) for s in range(steps)],
+             "bottom": [(at(s, 0, 0), at(s + 1, 0, 0), at(s + 1, 1, 0), at(s, 1, 0)) for s in range(steps)],
+             "top": [(at(s, 0, 1), at(s, 1, 1), at(s + 1, 1, 1), at(s + 1, 0, 1)) for s in range(steps)],
+             "start": [(at(0, 0, 0), at(0, 1, 0), at(0, 1, 1), at(0, 0, 1))],
+             "end": [(at(steps, 0, 0), at(steps, 0, 1), at(steps, 1, 1), at(steps, 1, 0))]}
+    for group, faces in quads.items():
+        lines += [f"g {group}"] + ["f " + " ".join(map(str, face)) for face in faces]
+    return write(name, "\n".join(lines) + "\n")
+
+
+def solve(part, size, scene, *options):
+    write("scene.toml", scene)
+    expect_ok(run("flexel-voxelize", part, "--size", size, "--align", "none", "--moments", "-o", "body.vtu"))
+    done = expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "bent.vtu", "--summary", "s.json", *options))
+    return json.loads(pathlib.Path("s.json").read_text()), done
+
+
+def mapped(meshio):
+    expect_ok(run("flexel-map", "bent.vtu", "--attributes", "-o", "mapped.vtu"))
+    return meshio.read("mapped.vtu")
+
+
+def has_meshio():
+    try:
+        import meshio
+    except ImportError as error:
+        raise Skip("meshio is not installed") from error
+    return meshio
+
+
+def test_tube_under_pressure():
+    """Radii 20 and 40, plane strain, some six cells through the wall that do not follow it: Lame's largest von Mises stress."""
+    part = quarter("tube.obj", arc(20, 20), arc(40, 40), 10)
+    hoop, radial = 10 * 2000 / 1200, -10
+    axial = 0.3 * (hoop + radial)
+    true = 1e6 * math.sqrt(0.5 * ((hoop - radial)**2 + (radial - axial)**2 + (axial - hoop)**2))
+    summary, _ = solve(part, "3.4 mm", MATERIAL + QUARTER + PLANE + INSIDE)
+    found, bar = summary["largest_von_mises"], summary["error_bars"]["largest_von_mises"]["bar"]
+    expect(abs(found / true - 1) < 0.01, f"{found} against {true}")
+    expect(bar is not None and abs(found - true) < bar < 0.1 * true, f"{found} +- {bar} against {true}")
+
+
+def test_stress_along_the_whole_inner_face_of_a_tube():
+    """Principal stresses at every vertex of the inner face: the pressure, but for facets of 2.8 degrees, and the hoop stress within 2 %."""
+    meshio = has_meshio()
+    part = quarter("tube.obj", arc(20, 20), arc(40, 40), 10)
+    solve(part, "3.4 mm", MATERIAL + QUARTER + PLANE + INSIDE, "--no-estimate")
+    mesh = mapped(meshio)
+    inner = [k for k, (x, y, z) in enumerate(mesh.points - 1e3 * mesh.point_data["displacement"]) if abs(math.hypot(x, y) - 20) < 1e-6]
+    expect(len(inner) == 66, len(inner))
+    for k in inner:
+        first, _, last = mesh.point_data["principal_stress"][k]
+        expect(abs(first / 1e6 - 50 / 3) < 0.02 * 50 / 3 and abs(last + 10e6) < 1e5, f"{mesh.points[k]}: {first}, {last}")
+
+
+def test_plate_with_a_hole():
+    """A plate of 100 x 100 with a hole of radius 5, three cells a radius, drawn in plane strain: 27.43 MPa (CalculiX's CPE8, bench/accuracy/stresses.py)."""
+    part = quarter("hole.obj", arc(5, 5), square(50), 5)
+    summary, _ = solve(part, "1.7 mm", MATERIAL + QUARTER + PLANE + '[[load]]\nwhere = "xmax"\npressure = "-10 MPa"\n', "--no-estimate")
+    expect(abs(summary["largest_von_mises"] / 27.43e6 - 1) < 0.03, summary["largest_von_mises"])
+    x, y, _ = summary["largest_von_mises_at"]
+    expect(abs(math.hypot(x, y) - 5e-3) < 2e-5 and x < 1e-3, (x, y))
+
+
+def test_nafems_le1():
+    """sigma_yy at D of the elliptic membrane: 92.7 MPa."""
+    meshio = has_meshio()
+    part = quarter("le1.obj", arc(2000, 1000), arc(3250, 2750), 100, 48)
+    solve(part, "100 mm", MATERIAL + QUARTER + '[[fix]]\nwhere = "bottom"\naxes = "z"\n[[load]]\nwhere = "outer"\npressure = "-10 MPa"\n', "--no-estimate")
+    mesh = mapped(meshio)
+    rest = mesh.points - 1e3 * mesh.point_data["displacement"]
+    point = min(range(len(rest)), key=lambda k: math.dist(rest[k], (2000, 0, 0)))
+    expect(abs(mesh.point_data["principal_stress"][point][0] / 92.7e6 - 1) < 0.02, mesh.point_data["principal_stress"][point])
+
+
+def test_one_figure_everywhere():
+    """The largest of the body's column and of the mapped vertices are the summary's; without --attributes the file is as it was."""
+    meshio = has_meshio()
+    part = quarter("tube.obj", arc(20, 20), arc(40, 40), 10)
+    summary, _ = solve(part, "7 mm", MATERIAL + QUARTER + PLANE + INSIDE, "--no-estimate")
+    largest = summary["largest_von_mises"]
+    body = meshio.read("bent.vtu")
+    expect(max(body.point_data["von_mises"]) == largest, (max(body.point_data["von_mises"]), largest))
+    mesh = mapped(meshio)
+    expect(max(mesh.point_data["von_mises"]) == largest, (max(mesh.point_data["von_mises"]), largest))
+    shares = mesh.point_data["yield_share"]
+    expect(abs(max(shares) / summary["largest_von_mises_yield_share"] - 1) < 1e-12, max(shares))
+    expect_ok(run("flexel-map", "bent.vtu", "-o", "plain.ply"))
+    expect(b"von_mises" not in pathlib.Path("plain.ply").read_bytes(), "a column that nobody asked for")
+
+
+def test_stresses_of_an_earlier_run_go():
+    part = quarter("tube.obj", arc(20, 20), arc(40, 40), 10, 8)
+    solve(part, "7 mm", MATERIAL + QUARTER + PLANE + INSIDE, "--no-estimate")
+    expect_ok(run("flexel-simulate", "scene.toml", "bent.vtu", "--no-stress", "--no-estimate", "-o", "again.vtu"))
+    expect(b"von_mises" not in pathlib.Path("again.vtu").read_bytes(), "stresses of the run before")
+
+
+if __name__ == "__main__":
+    main(globals())
