@@ -35,21 +35,22 @@ bool PairList::update(const State& state) {
 // Half the diagonal of the box of the moves since the list was made bounds them but for a common one. The next
 // step's are among them: the length of a step is chosen before it leads to an impact.
 bool PairList::is_due(const State& state) const {
-  struct Moves : Box {
-    Moves& operator+=(const Box& other) {
-      min = min.cwiseMin(other.min);
-      max = max.cwiseMax(other.max);
-      return *this;
-    }
-  };
+  constexpr std::size_t kGrain = 4096;
   const std::vector<std::uint32_t>& elements = surface_.elements();
-  Moves moves = parallel_sum<Moves>(elements.size(), [&](std::size_t e) {
-    Moves one;
-    const Vec3 move = state.displacement[elements[e]] - built_at_[e];
-    one.add(move);
-    if (state.kick > 0) one.add(move + state.kick * state.velocity[elements[e]]);
-    return one;
+  std::vector<Box> boxes((elements.size() + kGrain - 1) / kGrain);
+  parallel_chunks(elements.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    Box now, next;
+    for (std::size_t e = begin; e < end; ++e) {
+      const Vec3 move = state.displacement[elements[e]] - built_at_[e];
+      now.add(move);
+      next.add(move + state.kick * state.velocity[elements[e]]);
+    }
+    Box& box = boxes[begin / kGrain];
+    box = now;
+    if (state.kick > 0) box.add(next.min), box.add(next.max);
   });
+  Box moves;
+  for (const Box& box : boxes) moves.add(box.min), moves.add(box.max);
   if (!settings_.planes.empty()) moves.add(Vec3::Zero());
   return 0.5 * moves.diagonal() > slack_ || surface_.broken_cells() != built_with_;
 }
