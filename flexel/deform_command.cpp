@@ -515,6 +515,7 @@ void write_pages(const DeformArguments& arguments, const Plan& plan, Body& body,
 int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress) {
   std::optional<StopAfter> limit;
   if (plan.timeout) limit.emplace(*plan.timeout, "--timeout", LimitOf::command);
+  const KeptWarnings warnings;  // for the pages
   std::optional<AccuracyReport> accuracy;
   SolvedRun run;
   {
@@ -561,7 +562,7 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
   if (!arguments.summary.empty()) write_text(summary, arguments.summary);
   // With --verbose simulate() has said what infill is.
   const std::vector<std::string> lines = last_lines(run, plan, accuracy, accuracy || !arguments.verbose);
-  write_pages(arguments, plan, body, {run.warnings, lines, summary}, progress);
+  write_pages(arguments, plan, body, {warnings.lines(), lines, summary}, progress);
   outputs.appear();
   for (const std::string& line : lines) progress.say(line);
   return kExitDone;
