@@ -526,6 +526,7 @@ void say_dropped_model(const AccuracyReport& accuracy, Progress& progress) {
 }
 
 int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress) {
+  const KeptWarnings warnings;  // for the pages
   std::optional<AccuracyReport> accuracy;
   SolvedRun run;
   {
@@ -573,7 +574,7 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
   if (!arguments.summary.empty()) write_text(summary, arguments.summary);
   // With --verbose simulate() has said what infill is.
   const std::vector<std::string> lines = last_lines(run, plan, accuracy, accuracy || !arguments.verbose);
-  write_pages(arguments, plan, body, {run.warnings, lines, summary}, progress);
+  write_pages(arguments, plan, body, {warnings.lines(), lines, summary}, progress);
   outputs.appear();
   for (const std::string& line : lines) progress.say(line);
   return kExitDone;

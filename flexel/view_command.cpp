@@ -84,7 +84,7 @@ view::PageOptions options_of(const ViewArguments& a) {
   return options;
 }
 
-view::ViewSubject read_subject(const std::string& path, const ImportOptions& import) {
+view::ViewSubject read_view_subject(const std::string& path, const ImportOptions& import) {
   view::ViewSubject subject;
   subject.where = path == "-" ? "stdin" : path;
   subject.label = path == "-" ? "stdin" : std::filesystem::path(path).filename().string();
@@ -122,7 +122,7 @@ std::vector<view::ViewFile> read_files(const ViewArguments& arguments, Progress&
   std::vector<view::ViewFile> files;
   for (const std::string& path : arguments.files) {
     progress.stage("read " + path);
-    files.push_back(make_view_file(read_subject(path, import), options, progress));
+    files.push_back(make_view_file(read_view_subject(path, import), options, progress));
   }
   progress.finish();
   return files;

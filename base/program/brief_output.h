@@ -30,4 +30,15 @@ class HeldWarnings {
   int exceptions_;
 };
 
+// While one lives, each different line that Progress::warn() prints is kept too, for whoever shows it again. Process-wide;
+// not nested.
+class KeptWarnings {
+ public:
+  KeptWarnings();
+  ~KeptWarnings();
+  KeptWarnings(const KeptWarnings&) = delete;
+  KeptWarnings& operator=(const KeptWarnings&) = delete;
+  [[nodiscard]] std::vector<std::string> lines() const;
+};
+
 }  // namespace flexel

@@ -20,8 +20,8 @@
 namespace flexel {
 namespace {
 
-bool brief_output = false, holds_warnings = false;
-std::vector<std::string> held_warnings;
+bool brief_output = false, holds_warnings = false, keeps_warnings = false;
+std::vector<std::string> held_warnings, kept_warnings;
 std::string held_program;  // that gave the last of them
 
 constexpr double kDrawInterval = 0.1;  // s
@@ -73,6 +73,19 @@ std::vector<std::string> HeldWarnings::take() {
   return std::exchange(held_warnings, {});
 }
 
+KeptWarnings::KeptWarnings() {
+  keeps_warnings = true;
+}
+
+KeptWarnings::~KeptWarnings() {
+  keeps_warnings = false;
+  kept_warnings.clear();
+}
+
+std::vector<std::string> KeptWarnings::lines() const {
+  return kept_warnings;
+}
+
 Progress::Progress(std::string program, Mode mode) : program_(std::move(program)), mode_(resolve(mode)) {}
 
 Progress::~Progress() {
@@ -115,12 +128,15 @@ void Progress::say(const std::string& line) {
 
 void Progress::warn(const std::string& line) {
   if (mode_ == Mode::silent) return;
+  const auto add_to = [&](std::vector<std::string>& lines) {
+    if (std::find(lines.begin(), lines.end(), line) == lines.end()) lines.push_back(line);
+  };
   if (holds_warnings) {
     held_program = program_;
-    if (std::find(held_warnings.begin(), held_warnings.end(), line) == held_warnings.end())
-      held_warnings.push_back(line);
+    add_to(held_warnings);
     return;
   }
+  if (keeps_warnings) add_to(kept_warnings);
   clear_bar();
   print_error(fmt::format("{}: warning: {}\n", program_, printable(line)));
 }

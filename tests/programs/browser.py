@@ -71,6 +71,15 @@ class Browser:
     def drag(self, x, y, dx, dy):
         self.mouse(("move", x, y), ("down",), ("move", x + dx / 2, y + dy / 2), ("move", x + dx, y + dy), ("up",))
 
+    def touch(self, *fingers, kind="touch"):
+        """Each finger (or "pen") goes along its places (x, y), all at once."""
+        inputs = []
+        for k, places in enumerate(fingers):
+            moves = [{"type": "pointerMove", "duration": 20, "x": round(x), "y": round(y)} for x, y in places]
+            inputs.append({"type": "pointer", "id": f"{kind}{k}", "parameters": {"pointerType": kind},
+                           "actions": [moves[0], {"type": "pointerDown", "button": 0}, *moves[1:], {"type": "pointerUp", "button": 0}]})
+        self.ask("POST", "/actions", {"actions": inputs})
+
     def keys(self, text):
         presses = [{"type": kind, "value": key} for key in text for kind in ("keyDown", "keyUp")]
         self.ask("POST", "/actions", {"actions": [{"type": "key", "id": "keys", "actions": presses}]})

@@ -61,6 +61,19 @@ def test_a_body_is_turned_coloured_and_pointed_at():
         turned = browser.run("return [flexelView.picture.view.azimuth, flexelView.picture.view.elevation]")
         expect(abs(turned[0] - (45 - 0.4 * 120)) < 1 and turned[1] > 45, f"the drag turns it: {turned}")
         expect(browser.picture() != first, "another side is seen")
+        # So do a finger and a pen; two fingers zoom and shift, a tap points.
+        view = lambda: browser.run("const {view} = flexelView.picture; return [view.azimuth, view.zoom, ...view.shift]")
+        for kind in ("touch", "pen"):
+            before = view()
+            browser.touch([(500, 300), (480, 300), (450, 300)], kind=kind)
+            expect(view()[0] > before[0] + 5 and view()[1:] == before[1:], f"{kind} turns: {before} {view()}")
+        before = view()
+        browser.touch([(450, 300), (430, 300), (400, 300)], [(550, 300), (570, 300), (620, 300)])
+        expect(view()[1] > 1.5 * before[1] and view()[0] == before[0], f"two fingers zoom: {before} {view()}")
+        browser.run("flexelView.controls.look('iso')")
+        browser.touch([centre_of_face(browser, "bracket/2")])
+        browser.wait("document.querySelectorAll('#probes li').length === 1")
+        browser.run("flexelView.probes.clear(); flexelView.picture.view.turn(30, 10)")
         # Colours, and the legend's largest stress is the summary's.
         browser.choose("colour", "von_mises")
         largest = browser.run("return [flexelView.picture.range('von_mises').largest, flexelView.picture.page.words.summary.simulate.largest_von_mises]")

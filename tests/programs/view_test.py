@@ -152,6 +152,7 @@ def test_deform_writes_a_page():
     words = page_json(open("bent.html").read())["words"]
     for line in words["lines"]:
         expect(line in result.err, f"the page says what was said: {line}")
+    expect(words["warnings"] and all(line in result.err for line in words["warnings"]), f"warnings too: {words['warnings']} of {result.err}")
     expect(any(line.startswith("how far") for line in words["lines"]), f"{words['lines']}")
     expect(words["summary"]["simulate"]["largest_displacement"] > 1e-3, "and the figures")
     expect_ok(run_deform("-o", "alone.html", "--quiet"))

@@ -48,7 +48,9 @@ async function start() {
   if (typeof DecompressionStream !== "function")
     throw new Error("this browser is too old for this page: it needs DecompressionStream (Chromium 80, Firefox 113)");
   const packs = await Promise.all((await packBytes(page)).map(unpack));
-  const canvas = document.getElementById("canvas");
+  const canvas = document.getElementById("canvas"), trial = document.createElement("canvas");
+  if (!(trial.getContext("webgl2") ?? trial.getContext("webgl")))
+    throw new Error("this browser gives no WebGL, which the page draws with: is it switched off, or the graphics driver missing?");
   const picture = new Picture(page, packs, canvas, document.getElementById("overlay"));
   const said = document.getElementById("said");
   const probes = new Probes(picture, document.getElementById("probes"),
