@@ -5,8 +5,8 @@
 #include <map>
 #include <set>
 
-#include "base/resources.h"
 #include "base/error.h"
+#include "base/resources.h"
 #include "base/units.h"
 #include "formats/threemf/threemf_content.h"
 

@@ -10,9 +10,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "base/resources.h"
 #include "base/error.h"
 #include "base/printable.h"
+#include "base/resources.h"
 #include "base/units.h"
 
 namespace flexel {
