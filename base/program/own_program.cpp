@@ -10,10 +10,12 @@
 namespace flexel {
 
 std::string own_program(const std::string& name) {
+  const int mode =
+      name.ends_with(".so") ? R_OK : X_OK;  // Debian installs modules without the permission to run them
   std::error_code error;
   const std::filesystem::path folder = std::filesystem::read_symlink("/proc/self/exe", error).parent_path();
   for (const std::filesystem::path& path : {folder / name, folder.parent_path() / "libexec/flexel" / name})
-    if (!error && access(path.c_str(), X_OK) == 0) return path.string();
+    if (!error && access(path.c_str(), mode) == 0) return path.string();
   throw InputError("cannot run " + (folder / name).string() +
                    "; the programs of Flexel are installed together: install it again");
 }

@@ -4,7 +4,8 @@
 
 namespace flexel {
 
-// The path of a Flexel program: `name` ("flexel-simulate") in the folder of this one, or in its libexec/flexel.
+// The path of a Flexel program or module: `name` ("flexel-simulate", "flexel-distances.so") in the folder of this one, or in
+// its libexec/flexel.
 // Throws InputError: it is not there.
 [[nodiscard]] std::string own_program(const std::string& name);
 

@@ -211,6 +211,9 @@ void show_series(const std::string& pvd, const ViewOptions& options, ViewFile& f
     mapping::take_refined(body, refined(body.surface, *found.refinement), *found.refinement);
   file.surface = begin_surface(body.surface, file);
   std::vector<std::string> names = field_names(&body, body.surface);
+  const Body last = read_body(files.back());  // it may have what the first has not
+  for (std::string& name : field_names(&last, body.surface))
+    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(std::move(name));
   add_asked(&body, body.surface, options, files.front(), names);
   begin_fields(names, *file.surface);
   std::optional<mapping::Binding> binding;

@@ -3,6 +3,7 @@
 import os
 import pathlib
 import struct
+import time
 
 from browser import chromium
 from harness import SCENE, Skip, ascii_stl, binary_stl, box, box_triangles, bracket, expect, expect_ok, main, run, scene, write
@@ -180,6 +181,14 @@ def test_every_control_has_a_name():
         unnamed = browser.run("""return [...document.querySelectorAll('button, input, select, canvas[tabindex], summary')].filter(each =>
             !(each.getAttribute('aria-label') || each.textContent.trim() || each.labels?.[0]?.textContent.trim())).map(each => each.outerHTML);""")
         expect(unnamed == [], f"{unnamed}")
+        # What the button saves is a PNG under the part's name.
+        browser.run("document.getElementById('save-picture').click()")
+        saved = pathlib.Path(browser.folder, "downloads", "box.png")
+        for _ in range(200):
+            if saved.exists():
+                break
+            time.sleep(0.05)
+        expect(saved.exists() and saved.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n", "the picture is saved")
         expect(browser.run("return [...document.querySelectorAll('[tabindex]')].every(each => each.tabIndex >= 0)"), "all are reached by Tab")
         expect_silence(browser)
 
@@ -190,11 +199,12 @@ def test_parts_of_every_kind_side_by_side():
     corners = [(x, y, z) for z in (0, 10) for y in (0, 10) for x in (0, 40)]
     quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
     write("quads.obj", "".join(f"v {x} {y} {z}\n" for x, y, z in corners) + "".join(f"g side{k}\nf {' '.join(str(i + 1) for i in quad)}\n" for k, quad in enumerate(quads)))
+    write("numbers.obj", pathlib.Path("quads.obj").read_text().replace("side2", "1").replace("side0", "first"))
     write("quads.off", "OFF\n8 6 0\n" + "".join(f"{x} {y} {z}\n" for x, y, z in corners) + "".join(f"4 {' '.join(map(str, quad))}\n" for quad in quads))
     write("quality.ply", "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\nproperty float quality\nelement face 6\n"
           "property list uchar int vertex_indices\nend_header\n" + "".join(f"{x} {y} {z} {x + y}\n" for x, y, z in corners)
           + "".join(f"4 {' '.join(map(str, quad))}\n" for quad in quads))
-    files = ["binary.stl", "ascii.stl", "quads.obj", "quads.off", "quality.ply"]
+    files = ["binary.stl", "ascii.stl", "quads.obj", "numbers.obj", "quads.off", "quality.ply"]
     expect_ok(run("flexel-voxelize", "binary.stl", "--size", "5 mm", "-o", "rest.vtu", "--quiet"))
     for kind in ("glb", "3mf"):
         expect_ok(run("flexel-map", "rest.vtu", "-o", f"box.{kind}", "--quiet"))
@@ -216,6 +226,10 @@ def test_parts_of_every_kind_side_by_side():
         browser.click(x, y)
         browser.wait("document.querySelectorAll('#probes li').length === 1")
         expect(f"{part}/6 (side5)" in browser.text("probes"), browser.text("probes"))
+        names = browser.run("const panel = flexelView.picture.panels[3]; return [0, 1, 2].map(face => panel.faceName(face).text)")
+        expect(names == ["numbers/#1", "numbers/2", "numbers/3"], f"the file calls another face 1: {names}")
+        listed = expect_ok(run("flexel", "info", "numbers.obj")).out.decode()
+        expect(all(name in listed for name in names), f"as flexel info says: {listed}")
         browser.choose("colour", "quality")
         x, y = centre_of_face(browser, "quality/6", files.index("quality.ply"))
         browser.click(x, y)
@@ -245,6 +259,7 @@ def test_hostile_names_do_nothing():
             expect("owned" not in title.replace("touch owned", "") and browser.run("return document.title") == title, f"nothing ran: {title}")
             expect("<img src=x" in browser.text("words-box") or browser.run("return document.getElementById('words').textContent.includes('<img src=x')"), "names are shown as text")
             buttons = browser.run("return [...document.querySelectorAll('#probes .row button')].map(each => each.textContent)")
+            expect("<img src=x" in browser.text("probes"), f"so are those of faces: {browser.text('probes')}")
             quoted = [text for text in buttons if text.startswith("--fix") and "touch" in text]
             for text in quoted:
                 words = run("bash", "-c", f"printf '%s\\n' {text}").out.decode().splitlines()

@@ -5,6 +5,7 @@ import http.client
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import urllib.parse
@@ -19,9 +20,9 @@ def deformed(name="bent.vtu", *options):
 
 
 @contextlib.contextmanager
-def served(*arguments):
+def served(*arguments, program=BIN / "flexel"):
     """The URL that is printed, while the program runs."""
-    process = subprocess.Popen([BIN / "flexel", "view", *arguments, "--quiet"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process = subprocess.Popen([program, "view", *arguments, "--quiet"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     try:
         line = process.stdout.readline().decode()
         expect(re.fullmatch(r"http://127\.0\.0\.1:\d+/[0-9a-f]{32}/\n", line), f"one line with the URL: {line!r}")
@@ -83,6 +84,16 @@ def test_how_it_ends():
             process.send_signal(sent)
             expect(process.wait(timeout=10) == code, f"{sent}: {process.returncode}")
             expect(b"error" not in process.stderr.read(), "no error is said")
+
+
+def test_modules_are_found_where_they_are_installed():
+    """In libexec/flexel, and readable only, as Debian has shared objects."""
+    for folder, name, mode in (("bin", "flexel", 0o755), ("libexec/flexel", "flexel-serve.so", 0o644)):
+        os.makedirs(folder)
+        shutil.copyfile(BIN / name, f"{folder}/{name}")
+        os.chmod(f"{folder}/{name}", mode)
+    with served(box(), program=os.path.abspath("bin/flexel")) as (url, _):
+        expect(ask(url, url.path)[0] == 200, "it serves")
 
 
 def test_a_page_is_one_file():

@@ -223,10 +223,14 @@ export class Panel {
     this.marked = undefined;
   }
 
-  // "bracket/3", as options and scenes take it; the part alone on a lattice.
+  // "bracket/3", as options and scenes take it ("bracket/#3" where the file calls another face 3); the part alone on a lattice.
   faceName(face) {
     const part = this.about.parts[this.partOfFace(face)];
-    return {text: part.text + (this.kind === "lattice" ? "" : "/" + this.faceNumber[face]), odd: part.odd};
+    if (this.kind === "lattice") return part;
+    const number = String(this.faceNumber[face]);
+    const taken = Object.entries(this.about.face_names).some(
+      ([other, name]) => name === number && Number(other) !== face && this.facePart[other] === this.facePart[face]);
+    return {text: `${part.text}/${taken ? "#" : ""}${number}`, odd: part.odd};
   }
 
   // The first triangle on the way from `origin` (about the centre) along `direction`: {triangle, weights, ...}. `rest`: of the part

@@ -5,7 +5,7 @@ import {drawAxes, drawLegend, drawScaleBar, themeOf, write} from "./overlay.js";
 import {colourUniforms} from "./paint.js";
 import {Panel} from "./panel.js";
 
-const kLegendEms = 9.5, kSlow = 100, kMostSlow = 2, kRest = 250;  // ms, frames, ms
+const kLegendEms = 9.5, kSlow = 100, kMostSlow = 2, kRest = 700;  // ms, frames, ms
 
 export class Picture {
   // `page`: what flexel/view/page.cpp writes.
