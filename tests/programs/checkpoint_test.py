@@ -43,6 +43,10 @@ MODELS = {
     "events": text(*RUBBER, "0.3 s", '[damping]\ntime = "2 us"\n[[event]]\nat = "0.05 s"\ndo = "renormalise"\n[[event]]\nat = "0.1 s"\ndo = "edit"\n'
                    'stiffness = 0.5\nwhere = { box = { min = ["10 mm", "-1 mm", "-1 mm"], max = ["20 mm", "11 mm", "11 mm"] } }\n'
                    '[[event]]\nat = "0.2 s"\ndo = "carve"\nwhere = { box = { min = ["14 mm", "4 mm", "4 mm"], max = ["26 mm", "11 mm", "11 mm"] } }\n'),
+    # it falls on one end, bounces, tips over and slides
+    "contact": 'material = "rubber"\n[contact]\nfriction = 0.3\ndamping = "20 us"\n[damping]\ntime = "20 us"\n[[plane]]\npoint = ["0 mm", "0 mm", "-1 mm"]\n'
+               'normal = [0.1, 0, 1]\n[gravity]\nacceleration = [0, 0, "-9.81 m/s2"]\n[[velocity]]\nwhere = "body-box"\nvelocity = [0, 0, "-1 m/s"]\n'
+               '[[probe]]\nname = "tip"\nwhere = "xmax"\n[run]\ntime = "60 ms"\nframes = 40\n',
     "implicit": text("steel", "-100 N", "0.01 s", '[damping]\ntime = "20 us"', 'method = "implicit"\nstep = "5 us"\n'),
 }
 
@@ -98,6 +102,10 @@ def test_damped_cells():
 
 def test_long_damping():
     stop_and_go("long_damping")
+
+
+def test_contact():
+    stop_and_go("contact")
 
 
 def test_springs_that_break():
