@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <unordered_set>
 
 #include "base/math/area_vector.h"
 #include "formats/lattice/locate.h"
@@ -127,7 +128,20 @@ class Sampler {
     }
     if (!(sample.normal.norm() > 0)) return;
     sample.normal.normalize();
-    samples_.push_back(sample);
+    if (seen_.insert(place_of(sample, polygon)).second) samples_.push_back(sample);
+  }
+
+  // A sixty-fourth of a voxel, and the axis that the surface there looks along most: one sample of triangles is enough, of
+  // faces cut into many long ones.
+  [[nodiscard]] std::uint64_t place_of(const SurfaceSample& sample, std::uint32_t polygon) const {
+    const Lattice& lattice = body_.parts[surface_.polygon_part(polygon)].lattice;
+    const Vec3 at = lattice.to_lattice(sample.at), normal = lattice.axes.transpose() * sample.normal;
+    std::uint64_t place = sample.cell;
+    for (int axis = 0; axis < 3; ++axis)
+      place = 4 * place + static_cast<std::uint64_t>(4 * (at[axis] - std::floor(at[axis]))) % 4;
+    Eigen::Index most = 0;
+    normal.cwiseAbs().maxCoeff(&most);
+    return 8 * place + 2 * static_cast<std::uint64_t>(most) + (normal[most] < 0 ? 1 : 0);
   }
 
   [[nodiscard]] const Smooth& smooth_at(std::uint32_t polygon, std::uint32_t vertex) const {
@@ -143,6 +157,7 @@ class Sampler {
   std::vector<std::uint32_t> polygon_;            // (corners)
   std::vector<Vec3> area_;                        // (polygons) m^2
   std::vector<Smooth> smooth_;                    // (corners)
+  std::unordered_set<std::uint64_t> seen_;        // place_of()
   std::vector<SurfaceSample> samples_;
 };
 

@@ -186,28 +186,53 @@ class FieldStress {
   }
 
   [[nodiscard]] SymmetricStress fitted(const Vec3& where, std::span<const std::uint32_t> cells) const {
-    // Of the weight, on squared coefficients of first and second degree [per spacing]: where the matter is too thin or
-    // too small to tell them
-    constexpr double kFirst = 1e-6, kSecond = 1e-4;
+    // Squared, spacings: beyond it points weigh under a thousandth. Where there are none (slivers) all are heard.
+    constexpr double kFar = 2;
+    Fit fit;
+    if (!add_points(where, cells, kFar, fit)) {
+      fit = {};
+      add_points(where, cells, HUGE_VAL, fit);
+    }
+    return fit.value();
+  }
+
+  // Least squares for a polynomial of second degree.
+  struct Fit {
+    Eigen::Matrix<double, 10, 10> normal = Eigen::Matrix<double, 10, 10>::Zero();  // lower triangle
+    Eigen::Matrix<double, 10, 6> values = Eigen::Matrix<double, 10, 6>::Zero();
+
+    // `d`: spacings from where the value is asked.
+    void add(const Vec3& d, double weight, const SymmetricStress& stress) {
+      Eigen::Matrix<double, 10, 1> terms;
+      terms << 1, d, d.cwiseProduct(d), d.x() * d.y(), d.y() * d.z(), d.z() * d.x();
+      normal.selfadjointView<Eigen::Lower>().rankUpdate(terms, weight);
+      values += weight * terms * stress.transpose();
+    }
+    [[nodiscard]] SymmetricStress value() const {
+      // Of the weight, on squared coefficients of first and second degree [per spacing]: where the matter is too thin or
+      // too small to tell them
+      constexpr double kFirst = 1e-6, kSecond = 1e-4;
+      Eigen::Matrix<double, 10, 10> damped = normal;
+      damped.diagonal().segment<3>(1).array() += kFirst * normal(0, 0);
+      damped.diagonal().tail<6>().array() += kSecond * normal(0, 0);
+      return damped.selfadjointView<Eigen::Lower>().ldlt().solve(values).row(0).transpose();
+    }
+  };
+
+  // Adds the points of the cells that are no further away; false where they hold no matter to speak of.
+  bool add_points(const Vec3& where, std::span<const std::uint32_t> cells, double squared_reach,
+                  Fit& fit) const {
     // Spacings. Wider fits are flatter where a notch is only a few cells large, narrower ones take over what the
     // field of one cell is off by (measured: bench/accuracy/stresses.py)
-    constexpr double kReach = 0.5;
-    using Terms = Eigen::Matrix<double, 10, 1>;
-    Eigen::Matrix<double, 10, 10> normal = Eigen::Matrix<double, 10, 10>::Zero();
-    Eigen::Matrix<double, 10, 6> values = Eigen::Matrix<double, 10, 6>::Zero();
+    constexpr double kReach = 0.5, kEnough = 1e-3;
     for (const std::uint32_t c : cells)
       for (std::size_t k = 0; k < 8; ++k) {
         const Vec3 d = points_[c].at[k] - where;
-        const double weight = fill(c) * std::exp(-d.squaredNorm() / (kReach * kReach));
-        Terms terms;
-        terms << 1, d, d.cwiseProduct(d), d.x() * d.y(), d.y() * d.z(), d.z() * d.x();
-        normal.selfadjointView<Eigen::Lower>().rankUpdate(terms, weight);
-        values += weight * terms * points_[c].stress[k].transpose();
+        const double squared = d.squaredNorm();
+        if (squared > squared_reach) continue;
+        fit.add(d, fill(c) * std::exp(-squared / (kReach * kReach)), points_[c].stress[k]);
       }
-    const double weight = normal(0, 0);
-    normal.diagonal().segment<3>(1).array() += kFirst * weight;
-    normal.diagonal().tail<6>().array() += kSecond * weight;
-    return normal.selfadjointView<Eigen::Lower>().ldlt().solve(values).row(0).transpose();
+    return fit.normal(0, 0) > kEnough;
   }
 
   const QuadraticSystem& system_;
