@@ -12,6 +12,7 @@
 #include "base/error.h"
 #include "base/files/files.h"
 #include "base/files/output_file.h"
+#include "mapping/methods/apply.h"
 
 namespace flexel::mapping {
 namespace {
@@ -121,6 +122,15 @@ bool is_in_range(const Binding& binding, const Body& body) {
                      [&](std::uint32_t frame) { return frame < binding.frames.size(); });
 }
 
+// At rest nothing moves: whatever is wrong with a coordinate or a base shows.
+bool gives_rest(const Binding& binding, const Body& body) {
+  constexpr double kRounding = 1e-6;  // of the part's diagonal; bindings miss it by 1e-13 or so
+  const double most = kRounding * bounding_box(body.surface.vertices).diagonal();
+  const std::vector<Vec3> displacement = apply(binding, body, body.rest);
+  return std::all_of(displacement.begin(), displacement.end(),
+                     [&](const Vec3& u) { return u.norm() <= most; });
+}
+
 Header check_header(const Bytes& bytes, const std::string& path) {
   Header header;
   const Header expected;
@@ -192,6 +202,7 @@ Binding read_binding(const std::string& path, const Body& body) {
   binding.rest_residual = header.rest_residual;
   binding.distance_outside = header.distance_outside;
   binding.connections = element_adjacency(body);
+  if (!gives_rest(binding, body)) throw InputError(path, kDamaged);
   return binding;
 }
 

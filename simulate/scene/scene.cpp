@@ -48,6 +48,12 @@ Material parse_material(TableReader& reader, const std::string& name) {
   if (!(material.young > 0)) reader.fail("\"young\" needs to be above 0");
   if (!(material.poisson > -1 && material.poisson < 0.5))
     reader.fail(fmt::format("\"poisson\" = {} needs to lie above -1 and below 0.5", material.poisson));
+  // To either end: nearer, rounding leaves nothing of the softer of bulk and shear modulus.
+  constexpr double kNearest = 1e-6;
+  if (material.poisson < -1 + kNearest || material.poisson > 0.5 - kNearest)
+    reader.fail(fmt::format(
+        "\"poisson\" = {} is nearer to {} than rounding allows: take one from -0.999999 to 0.499999",
+        material.poisson, material.poisson < 0 ? "-1" : "0.5"));
   if (!(material.density > 0)) reader.fail("\"density\" needs to be above 0");
   return material;
 }

@@ -253,6 +253,16 @@ def test_an_option_without_its_value():
     expect_only("a.stl", "b.vtu", "s.toml")
 
 
+def test_matter_that_no_pressure_compresses():
+    body("b.vtu")
+    own = '[materials.own]\nyoung = "1 GPa"\npoisson = {}\ndensity = "1000 kg/m3"\n'
+    for poisson in ("0.49999999999999", "-0.99999999999", "0.4999999"):
+        scene("s.toml", SCENE.replace("steel", "own") + own.format(poisson))
+        refused("flexel-simulate", "s.toml", "b.vtu", "-o", "o.vtu", fragments=["s.toml", "poisson", "rounding"])
+    scene("s.toml", SCENE.replace("steel", "own") + own.format("0.49999"))
+    expect_ok(run("flexel-simulate", "s.toml", "b.vtu", "-o", "o.vtu"))
+
+
 def test_two_probes_of_one_name():
     body("b.vtu")
     probe = '[[probe]]\nname = "tip"\nwhere = "xmax"\n'

@@ -42,7 +42,8 @@ def fewer_words(trial, holds):
     at = 2
     while at < len(trial.command):
         if str(trial.command[at]).startswith("--"):
-            for width in (2, 1):
+            alone = at + 1 == len(trial.command) or str(trial.command[at + 1]).startswith("-")
+            for width in (1,) if alone else (2, 1):
                 other = copy.copy(trial)
                 other.command = trial.command[:at] + trial.command[at + width:]
                 other.outputs = [name for name in trial.outputs if name in other.command]

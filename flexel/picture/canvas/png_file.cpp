@@ -1,10 +1,12 @@
-// libpng: 8-bit RGB, the sRGB chunk, rows filtered adaptively. An error of libpng is a bug here: sizes are
-// checked before.
+// libpng: 8-bit RGB, the sRGB chunk, rows filtered adaptively. An error of libpng that is not for memory is a bug here:
+// sizes are checked before.
 #include <png.h>
 
 #include <algorithm>
 #include <cmath>
+#include <new>
 #include <stdexcept>
+#include <string_view>
 
 #include "flexel/picture/canvas/png_file.h"
 
@@ -12,6 +14,7 @@ namespace flexel::picture {
 namespace {
 
 [[noreturn]] void on_error(png_structp, png_const_charp message) {
+  if (std::string_view(message).find("emory") != std::string_view::npos) throw std::bad_alloc();
   throw std::runtime_error(std::string("libpng: ") + message);
 }
 void on_warning(png_structp, png_const_charp) {}
@@ -26,7 +29,9 @@ void flush(png_structp) {}
 struct Writer {
   png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, on_error, on_warning);
   png_infop info = png_create_info_struct(png);
-  Writer() = default;
+  Writer() {
+    if (png == nullptr || info == nullptr) throw std::bad_alloc();
+  }
   ~Writer() { png_destroy_write_struct(&png, &info); }
   Writer(const Writer&) = delete;
   Writer& operator=(const Writer&) = delete;

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <new>
 #include <stdexcept>
 
 asm(".pushsection .rodata\n"
@@ -27,14 +28,20 @@ extern const unsigned char flexel_font_end[];
 namespace flexel::picture {
 namespace {
 
+void refuse_lack_of_memory(FT_Error error) {
+  constexpr FT_Error kOutOfMemory = 0x40;  // FT_Err_Out_Of_Memory, whose header defines macros by the hundred
+  if ((error & 0xff) == kOutOfMemory) throw std::bad_alloc();
+}
+
 // One library and face; pictures are annotated by one thread.
 class Font {
  public:
   Font() {
     const auto size = static_cast<FT_Long>(flexel_font_end - flexel_font_begin);
-    if (FT_Init_FreeType(&library_) != 0 ||
-        FT_New_Memory_Face(library_, flexel_font_begin, size, 0, &face_) != 0)
-      throw std::runtime_error("FreeType cannot read the built-in font");
+    FT_Error error = FT_Init_FreeType(&library_);
+    if (error == 0) error = FT_New_Memory_Face(library_, flexel_font_begin, size, 0, &face_);
+    refuse_lack_of_memory(error);
+    if (error != 0) throw std::runtime_error("FreeType cannot read the built-in font");
   }
   ~Font() {
     FT_Done_Face(face_);
@@ -43,7 +50,8 @@ class Font {
   Font(const Font&) = delete;
   Font& operator=(const Font&) = delete;
   [[nodiscard]] FT_Face face(float size) const {
-    FT_Set_Char_Size(face_, 0, static_cast<FT_F26Dot6>(std::lround(64 * size)), 72, 72);
+    refuse_lack_of_memory(
+        FT_Set_Char_Size(face_, 0, static_cast<FT_F26Dot6>(std::lround(64 * size)), 72, 72));
     return face_;
   }
 
@@ -76,7 +84,9 @@ float for_each_glyph(const std::string& text, FT_Face face,
     FT_Vector kerning{};
     if (before != 0) FT_Get_Kerning(face, before, glyph, FT_KERNING_UNFITTED, &kerning);
     pen += static_cast<float>(kerning.x) / 64;
-    if (FT_Load_Glyph(face, glyph, FT_LOAD_TARGET_LIGHT) != 0) continue;
+    const FT_Error error = FT_Load_Glyph(face, glyph, FT_LOAD_TARGET_LIGHT);
+    refuse_lack_of_memory(error);
+    if (error != 0) continue;
     use(face->glyph, pen);
     pen += static_cast<float>(face->glyph->linearHoriAdvance) / 65536;
     before = glyph;
@@ -110,7 +120,9 @@ void draw_text(Image& image, float x, float y, const std::string& text, float si
     const float at = x + pen;
     const int whole = static_cast<int>(std::floor(at));
     FT_Outline_Translate(&slot->outline, std::lround(64 * (at - static_cast<float>(whole))), 0);
-    if (FT_Render_Glyph(slot, FT_RENDER_MODE_NORMAL) != 0) return;
+    const FT_Error error = FT_Render_Glyph(slot, FT_RENDER_MODE_NORMAL);
+    refuse_lack_of_memory(error);
+    if (error != 0) return;
     blend_bitmap(image, slot->bitmap, whole + slot->bitmap_left, baseline - slot->bitmap_top, ink);
   });
 }
