@@ -71,9 +71,9 @@ void Contacts::finish_losses(const State& state, double drift) {
   friction_.finish_step(state, drift, dissipate());
 }
 
-double Contacts::injected_energy(const State& state) {
+Contacts::Energies Contacts::take_energies(const State& state) {
   update(state);
-  return release_.take_energy();
+  return {release_.take_energy(), states_.take_hardened()};
 }
 
 void Contacts::refuse_overlap(const State& state) {
@@ -102,6 +102,7 @@ std::vector<double> Contacts::memory() const {
                              bound_.hardening_bound(),
                              friction_.fresh() ? 1.0 : 0.0,
                              release_.energy(),
+                             states_.hardened(),
                              static_cast<double>(release_.known_parts()),
                              static_cast<double>(release_.share_count()),
                              static_cast<double>(memory_.size())};
@@ -112,12 +113,12 @@ std::vector<double> Contacts::memory() const {
 }
 
 void Contacts::restore(const std::vector<double>& memory) {
-  constexpr std::size_t kHead = 9;
+  constexpr std::size_t kHead = 10;
   const auto count = [&](std::size_t at) {
     return memory.size() < kHead ? 0 : static_cast<std::size_t>(memory[at]);
   };
-  const std::size_t joined = count(6), releases = joined + 2 * count(7);
-  const std::size_t records = PairMemory::kValues * count(8);
+  const std::size_t joined = count(7), releases = joined + 2 * count(8);
+  const std::size_t records = PairMemory::kValues * count(9);
   std::vector<Vec3> built_at(list_.built_at().size());
   if (memory.size() != kHead + releases + records + 3 * built_at.size())
     throw InputError("the checkpoint's contacts are not those of its scene");
@@ -130,6 +131,7 @@ void Contacts::restore(const std::vector<double>& memory) {
     from += 3;
   }
   friction_.set_fresh(memory[4] == 1);
+  states_.set_hardened(memory[6]);
   const bool built = memory[0] != 0;
   list_.rebuild_at(built ? &built_at : nullptr);
   if (!built) return;

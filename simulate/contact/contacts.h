@@ -29,8 +29,12 @@ class Contacts {
   // After a step of `drift` s that led to `state`: how softly contact begins; slip and adhesion.
   void finish_step(const State& state, double drift);
   void finish_losses(const State& state, double drift);
-  // J, that the release of initial penetrations has put in since this was asked last.
-  [[nodiscard]] double injected_energy(const State& state);
+  // J, since they were asked for last: what the release of initial penetrations has put in, and what contacts
+  // that rest have lost as they hardened.
+  struct Energies {
+    double released = 0, hardened = 0;
+  };
+  [[nodiscard]] Energies take_energies(const State& state);
 
   // For checkpoints: all that the next steps depend on beside the state. Throws InputError: `memory` is of
   // other contacts.

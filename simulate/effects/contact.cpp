@@ -258,8 +258,10 @@ std::vector<double> Contact::history_values(const State& state, const std::vecto
   return values;
 }
 
-double Contact::injected_energy(const State& state) {
-  return contacts_->injected_energy(state);
+std::vector<EnergyTransfer> Contact::take_transfers(const State& state) {
+  const auto [released, hardened] = contacts_->take_energies(state);
+  return {{"overlap", EnergyAccount::work, released},
+          {"contact hardening", EnergyAccount::dissipation, -hardened}};
 }
 
 std::optional<ContactLosses> Contact::losses() const {

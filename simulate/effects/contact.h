@@ -65,8 +65,7 @@ class Contact : public Effect {
   void restore_from(const std::vector<double>& transfer_state) override;
   [[nodiscard]] std::vector<std::string> history_columns() const override;
   [[nodiscard]] std::vector<double> history_values(const State& state, const std::vector<Vec3>&) override;
-  [[nodiscard]] const char* injected_by() const override { return "overlap"; }
-  [[nodiscard]] double injected_energy(const State& state) override;
+  [[nodiscard]] std::vector<EnergyTransfer> take_transfers(const State& state) override;
   // Nothing where nothing is lost.
   [[nodiscard]] std::optional<ContactLosses> losses() const;
 

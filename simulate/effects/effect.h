@@ -37,6 +37,13 @@ enum class EnergyAccount { none, potential, stored, work, dissipation };
 // with contact; in timed runs alone. Each is more than the one before.
 enum class ActsIn { all, relaxation_and_time, time };
 
+// J, that has come into what an effect stores, but for the work of its forces: from an account of that name.
+struct EnergyTransfer {
+  const char* from = "";
+  EnergyAccount kind = EnergyAccount::work;
+  double energy = 0;
+};
+
 // The step that led to a state.
 struct StepDone {
   const std::vector<double>& mass;  // (elements) kg; empty unless an effect needs_mass()
@@ -123,10 +130,8 @@ class Effect {
                                                            const std::vector<Vec3>& /*unbalanced*/) {
     return {};
   }
-  // J, what has come into what it stores since it was asked last, but for the work of its forces; the energy
-  // history asks before every step and enters it as the work of injected_by().
-  [[nodiscard]] virtual double injected_energy(const State&) { return 0; }
-  [[nodiscard]] virtual const char* injected_by() const { return ""; }
+  // Since they were asked for last; the energy history does before every step.
+  [[nodiscard]] virtual std::vector<EnergyTransfer> take_transfers(const State&) { return {}; }
 
  protected:
   Effect() = default;

@@ -80,7 +80,87 @@ double springs_stiffening(const SpringKind& kind, const CellVectors& u) {
   return largest;
 }
 
+struct Polar {
+  Mat3 rotation;
+  double longest = 0, shortest = 0;  // stretches
+};
+
+Polar polar(const Mat3& f) {
+  Eigen::SelfAdjointEigenSolver<Mat3> eigen;
+  eigen.computeDirect(f.transpose() * f);
+  const Vec3 stretch = eigen.eigenvalues().cwiseMax(0).cwiseSqrt();
+  return {f * eigen.eigenvectors() * stretch.cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose(),
+          stretch[2], stretch[0]};
+}
+
+// Over the largest eigenvalue at rest, `largest` [N/m]. The square root of a sum of dissipations is at most the sum
+// of theirs: that at rest, grown by the stretch, and that by the spin of hourglass displacements. |dF/dt|^2 is at
+// most 1 / (2 h^2) of the velocities' squares; unequal spacings bound as in cell_stiffening().
+double damping_growth(const CellKind& kind, const Vec3& spacing, const CellVectors& u, double largest) {
+  const Mat3 f = Mat3::Identity() + displacement_gradient(kind, u);
+  if (f == Mat3::Identity()) return 1;
+  const Polar of = polar(f);
+  double turned = 0;  // N/m
+  for (int mode = 0; mode < 4; ++mode) {
+    Vec3 q = Vec3::Zero();
+    for (std::size_t a = 0; a < 8; ++a) q += hourglass_sign(mode, static_cast<int>(a)) * u[a] / 8;
+    turned += kind.hourglass[static_cast<std::size_t>(mode)] * q.squaredNorm();
+  }
+  turned /= 2 * std::pow(of.shortest * spacing.minCoeff(), 2);
+  const double ratio = spacing.maxCoeff() / spacing.minCoeff();
+  return std::pow(ratio * std::max(1.0, of.longest) + std::sqrt(turned / largest), 2);
+}
+
+// Likewise: springs turn against the cell. At most Gershgorin's bound, each row's sum.
+double damping_growth(const SpringKind& kind, const CellKind& cell, const CellVectors& u, double largest) {
+  const Mat3 rotation = polar(Mat3::Identity() + displacement_gradient(cell, u)).rotation;
+  std::array<double, 8> at_corner{};
+  double turned = 0;
+  for (const Spring& spring : kind.springs) {
+    const Vec3 now = (spring.rest + u[spring.b] - u[spring.a]).normalized();
+    turned = std::max(turned, (rotation.transpose() * now - spring.rest.normalized()).norm());
+    at_corner[spring.a] += 2 * spring.stiffness;
+    at_corner[spring.b] += 2 * spring.stiffness;
+  }
+  const double most = *std::max_element(at_corner.begin(), at_corner.end()) / largest;
+  const double growth = std::pow(1 + turned * std::sqrt(most), 2);
+  return growth < most ? growth : most;  // also where the cell has no rotation
+}
+
 }  // namespace
+
+std::vector<double> damping_growth(const Problem& problem, const std::vector<Vec3>& displacement) {
+  const Body& body = problem.body;
+  const std::vector<std::uint8_t> active = active_cells(problem);
+  std::vector<double> stiffness, mass;
+  const bool edited =
+      body.cell_columns.contains("stiffness_change") || body.cell_columns.contains("density_change");
+  if (edited) {
+    stiffness = stiffness_shares(body);
+    mass = mass_shares(body);
+  }
+  std::vector<double> result;
+  const std::vector<double> frequencies = cell_frequencies(problem);
+  for (std::size_t p = 0; p < body.parts.size(); ++p) {
+    const Part& part = body.parts[p];
+    const CellKind cells = cell_kind(part.lattice, problem.materials[p]);
+    const double largest =
+        frequencies[p] * problem.materials[p].density * part.lattice.spacing.prod() / 8;  // N/m
+    const SpringKind springs = spring_kind(part.lattice, problem.materials[p]);
+    const bool by_springs = is_springs(problem, p);
+    const Greatest greatest = parallel_sum<Greatest>(part.cell_end - part.cell_begin, [&](std::size_t i) {
+      const std::size_t c = part.cell_begin + i;
+      if (!active[c]) return Greatest{};
+      CellVectors u;
+      for (std::size_t a = 0; a < 8; ++a) u[a] = displacement[body.cell_elements[c][a]];
+      const double factor = edited ? stiffness[c] / mass[c] : 1;
+      return Greatest{factor * (by_springs ? damping_growth(springs, cells, u, largest)
+                                           : damping_growth(cells, part.lattice.spacing, u, largest))};
+    });
+    result.push_back(std::max(1.0, greatest.value));
+  }
+  return result;
+}
 
 std::vector<double> cell_frequencies(const Problem& problem) {
   std::vector<double> result;

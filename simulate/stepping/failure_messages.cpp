@@ -67,11 +67,12 @@ std::string squeezed_most(const Problem& problem, const State& state) {
                      most.value);
 }
 
-std::string damping_unsolved_at(const Vec3& at, int iterations) {
+std::string damping_too_long(int stages) {
   return fmt::format(
-      "the damping of the step was not solved in {} iterations, worst near {}: give a shorter [damping] time "
-      "or [run] step",
-      iterations, place(at));
+      "the damping is so long that a step would take more than {} stages: give a shorter [damping] time or "
+      "[run] "
+      "step",
+      stages);
 }
 
 }  // namespace flexel::simulate

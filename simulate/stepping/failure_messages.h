@@ -22,7 +22,7 @@ namespace flexel::simulate {
 // ", squeezed most near (...), to J = 0.02", of the same cell, or of an element where there are none.
 [[nodiscard]] std::string squeezed_most(const Problem& problem, const State& state);
 
-// Damping that its conjugate gradients did not solve for in so many iterations, worst at `at` [m].
-[[nodiscard]] std::string damping_unsolved_at(const Vec3& at, int iterations);
+// Damping that would need more than so many stages a step.
+[[nodiscard]] std::string damping_too_long(int stages);
 
 }  // namespace flexel::simulate

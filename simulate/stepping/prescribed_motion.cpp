@@ -55,17 +55,19 @@ void PrescribedMotion::impose_velocity(const State& end, double drift, std::vect
         velocity[entry.element][axis] = (path(entry.element, axis, end) - entry.displacement[axis]) / drift;
 }
 
-void PrescribedMotion::clear(std::vector<Vec3>& values) const {
-  for (const Entry& entry : entries_)
-    for (int axis = 0; axis < 3; ++axis)
-      if (constraints_.mask[entry.element] >> axis & 1) values[entry.element][axis] = 0;
-}
-
 void PrescribedMotion::copy(const std::vector<Vec3>& from, std::vector<Vec3>& values) const {
   for (const Entry& entry : entries_)
     for (int axis = 0; axis < 3; ++axis)
       if (constraints_.mask[entry.element] >> axis & 1)
         values[entry.element][axis] = from[entry.element][axis];
+}
+
+void PrescribedMotion::add_change(const std::vector<Vec3>& from, const std::vector<Vec3>& to,
+                                  std::vector<Vec3>& sum) const {
+  for (const Entry& entry : entries_)
+    for (int axis = 0; axis < 3; ++axis)
+      if (constraints_.mask[entry.element] >> axis & 1)
+        sum[entry.element][axis] += to[entry.element][axis] - from[entry.element][axis];
 }
 
 void PrescribedMotion::add_forces(std::vector<Vec3>& forces) const {

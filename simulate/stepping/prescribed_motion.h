@@ -24,9 +24,10 @@ class PrescribedMotion {
   // Sets the held components of `velocity` [m/s] to those that lead to the path at `end.time`, `drift` s
   // away.
   void impose_velocity(const State& end, double drift, std::vector<Vec3>& velocity) const;
-  // Sets the held components to 0, or to those of `from`.
-  void clear(std::vector<Vec3>& values) const;
+  // Sets the held components to those of `from`.
   void copy(const std::vector<Vec3>& from, std::vector<Vec3>& values) const;
+  // Adds to those of `sum` what they have changed by.
+  void add_change(const std::vector<Vec3>& from, const std::vector<Vec3>& to, std::vector<Vec3>& sum) const;
 
   // Adds the supports' forces at the time before the last advance [N] (elements); 0 for free components.
   void add_forces(std::vector<Vec3>& forces) const;

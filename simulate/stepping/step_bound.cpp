@@ -2,10 +2,12 @@
 #include "simulate/stepping/step_bound.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "simulate/models/damping_factors.h"
 #include "simulate/models/stability.h"
+#include "simulate/stepping/staged_damping.h"
 
 namespace flexel::simulate {
 namespace {
@@ -36,6 +38,7 @@ StepBound::StepBound(const Problem& problem, const std::vector<ActiveEffect>& ef
       cells_(cell_frequencies(problem)),
       stiffening_(cells_.size(), 1),
       connections_(cells_.size(), 0),
+      growth_(cells_.size(), 1),
       damping_(longest_damping(problem.body, plan.damping)) {}
 
 bool StepBound::damps_explicitly() const {
@@ -49,22 +52,36 @@ bool StepBound::damps_explicitly() const {
 
 void StepBound::look(const State& state, const PaperModel* paper, const std::vector<double>& mass) {
   stiffening_ = stiffening(problem_, state.displacement, plan_);
+  if (std::any_of(damping_.begin(), damping_.end(), [](double tau) { return tau > 0; }))
+    growth_ = damping_growth(problem_, state.displacement);
   if (paper) connections_ = paper->frequencies(state, mass);
   added_ = 0;
   for (const ActiveEffect& effect : effects_) added_ += effect->added_frequency(state, mass);
 }
 
-double StepBound::longest(bool implicit_damping) const {
+double StepBound::longest(bool staged_damping) const {
   double longest = std::numeric_limits<double>::infinity();
   for (std::size_t p = 0; p < cells_.size(); ++p) {
     // a part has cells or connections
     const double own = cells_[p] * stiffening_[p] + connections_[p];
-    const double damping = implicit_damping && connections_[p] == 0 ? 0 : damping_[p];
-    // what effects add is not damped: total dt^2 / 4 + tau own dt / 2 <= 1
     const double total = own + added_;
-    longest = std::min(longest, stable_step(total, total > 0 ? damping * (own / total) : 0));
+    if (staged_damping && connections_[p] == 0) {
+      longest = std::min(longest, std::sqrt(StagedDamping::kLeast / 4) * stable_step(total, 0));
+      continue;
+    }
+    // what effects add is not damped: total dt^2 / 4 + tau own dt / 2 <= 1
+    const double damped = std::max(own, cells_[p] * growth_[p]);
+    longest = std::min(longest, stable_step(total, total > 0 ? damping_[p] * (damped / total) : 0));
   }
   return longest;
+}
+
+double StepBound::damping_rate() const {
+  constexpr double kGrowthAhead = 1.1;
+  double largest = 0;
+  for (std::size_t p = 0; p < cells_.size(); ++p)
+    largest = std::max(largest, damping_[p] * cells_[p] * growth_[p]);
+  return kGrowthAhead * largest;
 }
 
 }  // namespace flexel::simulate

@@ -19,14 +19,17 @@ class StepBound {
   // Looks at how stiff everything is now. `paper`: the centre-placed parts, or none.
   void look(const State& state, const PaperModel* paper, const std::vector<double>& mass);
 
-  // s; `implicit_damping`: that of the cells does not count. 0 or less: a cell is folded.
-  [[nodiscard]] double longest(bool implicit_damping) const;
+  // s; `staged_damping`: that of the cells is taken in stages (StagedDamping). 0 or less: a cell is folded.
+  [[nodiscard]] double longest(bool staged_damping) const;
+  // 1/s, bounds the rates at which the damping of the cells alone takes velocities; until the next look, too.
+  [[nodiscard]] double damping_rate() const;
 
  private:
   const Problem& problem_;
   const std::vector<ActiveEffect>& effects_;
   const KernelEffects& plan_;
   std::vector<double> cells_, stiffening_, connections_;  // (parts) 1/s^2 at rest, its growth; 1/s^2
+  std::vector<double> growth_;                            // (parts) of the damping
   std::vector<double> damping_;                           // (parts) s, the longest time of a cell
   double added_ = 0;                                      // 1/s^2
 };

@@ -17,7 +17,7 @@ namespace flexel::simulate {
 namespace {
 
 constexpr char kMagic[8] = {'f', 'l', 'e', 'x', 'e', 'l', 'C', 'P'};
-constexpr std::uint64_t kVersion = 4;
+constexpr std::uint64_t kVersion = 5;
 
 struct Head {
   char magic[8];
@@ -51,11 +51,11 @@ static void visit(Archive& archive, Checkpoint& c) {
   for (std::string* text : {&c.scene_name, &c.scene, &c.output, &c.history}) visit(archive, *text);
   visit_all(archive, c.compress, c.input, c.state.displacement, c.state.velocity, c.state.share, c.state.time,
             c.state.kick, c.clock, c.memory.cells.fill, c.memory.cells.plastic, c.memory.cells.springs,
-            c.memory.cells.spring_flow, c.memory.damping_change, c.memory.reach, c.memory.supports, c.events,
-            c.settled, c.fused, c.bonding_parts, c.memory.effects, c.ledger.accounts, c.ledger.rows,
-            c.ledger.probes, c.ledger.columns, c.ledger.start, c.ledger.changed, c.ledger.worst_residual,
-            c.ledger.unstored, c.ledger.unstored_now, c.ledger.worst_unstored, c.ledger.largest_term,
-            c.next_row, c.next_frame, c.frames);
+            c.memory.cells.spring_flow, c.memory.reach, c.memory.supports, c.events, c.settled, c.fused,
+            c.bonding_parts, c.memory.effects, c.ledger.accounts, c.ledger.rows, c.ledger.probes,
+            c.ledger.columns, c.ledger.start, c.ledger.changed, c.ledger.worst_residual, c.ledger.unstored,
+            c.ledger.unstored_now, c.ledger.worst_unstored, c.ledger.largest_term, c.next_row, c.next_frame,
+            c.frames);
 }
 
 void write_checkpoint(const Checkpoint& checkpoint, const Bytes& body, const std::string& path) {

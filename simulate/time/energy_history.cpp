@@ -122,12 +122,12 @@ EnergyHistory::EnergyHistory(const Problem& problem, const std::vector<ActiveEff
 }
 
 void EnergyHistory::before(const State& state, bool sample, double folding) {
-  for (std::size_t p = 0; p < effects_.size(); ++p) {
-    const double more = effects_[p]->injected_energy(state);
-    if (more == 0) continue;
-    ledger_.accounts[own_[p]].energy -= more;
-    ledger_.accounts[ledger_.account(effects_[p]->injected_by(), Account::Kind::work)].energy += more;
-  }
+  for (std::size_t p = 0; p < effects_.size(); ++p)
+    for (const EnergyTransfer& each : effects_[p]->take_transfers(state)) {
+      if (each.energy == 0) continue;
+      ledger_.accounts[own_[p]].energy -= each.energy;
+      ledger_.accounts[ledger_.account(each.from, kind_of(each.kind))].energy += each.energy;
+    }
   velocity_ = state.velocity;
   sample_ = sample;
   time_ = *state.time;

@@ -76,14 +76,15 @@ TimeSegment::TimeSegment(Body& body, const Scene& scene, const SimulateOptions& 
   begin_effects(beginning);
   refuse_held_rigid();
   bound_.emplace(problem_, effects_, plan_);
-  // Explicit damping may cut the step by 2; beyond that every step solves for it.
+  // Damping may cut the step by 2; beyond that every step has stages for it.
   const bool implicit = scene.run.method == TimeMethod::implicit_euler;
   const bool by_steps =
       implicit || scene.run.method == TimeMethod::explicit_euler || bound_->damps_explicitly();
-  stepper_.emplace(problem_, plan_, (!options.history.empty() && !implicit) || !by_steps, options.isa);
+  const bool book = !options.history.empty() && !implicit;
+  stepper_.emplace(problem_, plan_, book, options.isa);
   stepper_->read_memory(body.cell_columns);
   held_.emplace(constraints_, body_, state_, fresh);
-  if (!by_steps) implicit_.emplace(*stepper_, *held_);
+  if (!by_steps) staged_.emplace(*stepper_, *held_, book);
   make_forces();
   if (implicit)
     make_implicit();
@@ -114,7 +115,7 @@ void TimeSegment::begin_effects(const SegmentStart& beginning) {
 }
 
 void TimeSegment::spare_mass() {
-  const bool asked = paper_ || implicit_ || euler_ || !constraints_.mask.empty() ||
+  const bool asked = paper_ || euler_ || !constraints_.mask.empty() ||
                      std::any_of(effects_.begin(), effects_.end(),
                                  [](const ActiveEffect& effect) { return effect->needs_mass(); });
   if (!asked) stepper_->drop_mass();
@@ -174,12 +175,12 @@ void TimeSegment::look() {
   stepper_->mark_broken(body_.broken);
   bound_->look(state_, paper_ ? &*paper_ : nullptr, stepper_->mass());
   if (guard_)
-    guard_->look(state_, kStepsAhead * std::min(bound_->longest(implicit_.has_value()), *scene_.run.time));
+    guard_->look(state_, kStepsAhead * std::min(bound_->longest(staged_.has_value()), *scene_.run.time));
 }
 
 void TimeSegment::choose_step(Clock& clock) {
   look();
-  const double longest = bound_->longest(implicit_.has_value());
+  const double longest = bound_->longest(staged_.has_value());
   if (!(longest > 0)) throw DivergedError(where_it_folds(problem_, state_));
   double step = kShareOfBound * longest;
   if (euler_) {
@@ -191,6 +192,7 @@ void TimeSegment::choose_step(Clock& clock) {
                                    *scene_.run.step, longest));
     step = std::min(clock.steps == 0 ? longest : step, *scene_.run.step);
   }
+  clock.damping_rate = bound_->damping_rate();
   clock.epoch = *state_.time;
   clock.in_epoch = 0;
   const double left = clock.until - clock.epoch;
@@ -215,12 +217,13 @@ void TimeSegment::refuse_unsound() {
   if (!(farthest < kRunaway * (1 + body_extent(body_))))
     throw DivergedError(runs_away_at(body_.rest[where], scene_.run.method));
   look();
-  if (!(bound_->longest(implicit_.has_value()) > 0)) throw DivergedError(where_it_folds(problem_, state_));
+  if (!(bound_->longest(staged_.has_value()) > 0)) throw DivergedError(where_it_folds(problem_, state_));
 }
 
 void TimeSegment::adapt_step(Clock& clock) {
   if (euler_) return;
-  const double longest = bound_->longest(implicit_.has_value());
+  clock.damping_rate = bound_->damping_rate();
+  const double longest = bound_->longest(staged_.has_value());
   if (clock.step > 0.97 * longest || (!scene_.run.step && clock.step < 0.6 * kShareOfBound * longest))
     choose_step(clock);
 }
@@ -312,7 +315,6 @@ bool TimeSegment::renews(const Clock& clock) const {
 TimeSegment::Memory TimeSegment::memory() const {
   Memory memory;
   memory.cells = stepper_->memory();
-  if (implicit_) memory.damping_change = implicit_->change();
   if (euler_) {
     memory.reach = euler_->reach();
     memory.supports = euler_->supports();
@@ -329,18 +331,15 @@ std::vector<std::pair<std::string, std::vector<double>>> TimeSegment::transferre
 
 void TimeSegment::restore(const Memory& memory) {
   const Stepper::Memory own = stepper_->memory();
-  const std::size_t change = memory.damping_change.size();
   if (memory.cells.fill.size() != own.fill.size() || memory.cells.plastic.size() != own.plastic.size() ||
       memory.cells.springs.size() != own.springs.size() ||
       memory.cells.spring_flow.size() != own.spring_flow.size() ||
-      (change != 0 && (!implicit_ || change != body_.element_count())) ||
       (!memory.supports.empty() && (!euler_ || memory.supports.size() != body_.element_count())))
     throw InputError("the checkpoint's memory is not that of its scene and body: it is damaged");
   stepper_->restore(memory.cells);
   stepper_->mark_broken(body_.broken);
   for (std::size_t p = 0; p < effects_.size() && p < memory.effects.size(); ++p)
     effects_[p]->restore(memory.effects[p]);
-  if (implicit_) implicit_->set_change(memory.damping_change);
   if (!euler_) return;
   euler_->set_reach(memory.reach);
   euler_->set_supports(memory.supports);
@@ -360,8 +359,8 @@ void TimeSegment::step(Clock& clock, EnergyHistory* history, bool row) {
   {
     const ScopeTimer timer(kernel_seconds_);
     const std::vector<Vec3>& forces = outer();
-    outcome = implicit_ ? implicit_->advance(state_, forces, advance, end)
-                        : stepper_->advance(state_, forces, advance);
+    outcome = staged_ ? staged_->advance(state_, forces, advance, end, clock.damping_rate)
+                      : stepper_->advance(state_, forces, advance);
     if (outcome.broken > 0 && guard_ && guard_->watches() && stepper_->mark_broken(body_.broken))
       outcome.released += guard_->drop_broken(state_);
   }
@@ -376,8 +375,8 @@ void TimeSegment::step(Clock& clock, EnergyHistory* history, bool row) {
     std::vector<Vec3> supports(body_.element_count(), Vec3::Zero());
     held_->add_forces(supports);
     for (const ActiveEffect& effect : effects_) effect->add_support_forces(supports);
-    history->after(state_, outcome, stepper_->damping_force(), supports, first ? 0 : clock.previous,
-                   clock.step, before == 0);
+    history->after(state_, outcome, staged_ ? staged_->damping_force() : stepper_->damping_force(), supports,
+                   first ? 0 : clock.previous, clock.step, before == 0);
   }
   clock.previous = clock.step;
   if (!(outcome.smallest_jacobian > 0)) throw DivergedError(where_it_folds(problem_, state_));
@@ -390,7 +389,7 @@ void TimeSegment::slow(double factor) {
 }
 
 bool TimeSegment::kicks() const {
-  return !euler_ && !implicit_ && scene_.run.method != TimeMethod::explicit_euler &&
+  return !euler_ && !staged_ && scene_.run.method != TimeMethod::explicit_euler &&
          std::none_of(effects_.begin(), effects_.end(),
                       [](const ActiveEffect& effect) { return effect->finishes_steps(); });
 }

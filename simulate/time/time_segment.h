@@ -7,13 +7,13 @@
 #include <vector>
 
 #include "simulate/events/event.h"
-#include "simulate/implicit/implicit_damping.h"
 #include "simulate/implicit/implicit_euler.h"
 #include "simulate/result/options.h"
 #include "simulate/result/result.h"
 #include "simulate/scene/scene.h"
 #include "simulate/stepping/explicit_barrier.h"
 #include "simulate/stepping/prescribed_motion.h"
+#include "simulate/stepping/staged_damping.h"
 #include "simulate/stepping/step_bound.h"
 #include "simulate/stepping/stepper.h"
 #include "simulate/time/energy_history.h"
@@ -27,6 +27,7 @@ struct Clock {
   double epoch = 0;               // s, time of step 0 of the present length
   std::uint64_t in_epoch = 0;     // steps of the present length
   std::uint64_t steps = 0;        // of the run
+  double damping_rate = 0;        // 1/s, of StagedDamping
 };
 
 // What an act begins with, beside the body and the state.
@@ -66,7 +67,6 @@ class TimeSegment {
   // What the next steps depend on besides state() and the clock; only where renews() says so.
   struct Memory {
     Stepper::Memory cells;
-    std::vector<Vec3> damping_change;          // m/s, of ImplicitDamping
     double reach = 0;                          // s, of ImplicitEuler
     std::vector<Vec3> supports;                // N, of its last step
     std::vector<std::vector<double>> effects;  // what each remembers
@@ -112,8 +112,6 @@ class TimeSegment {
   [[nodiscard]] const State& state() const { return state_; }
   [[nodiscard]] const std::vector<ActiveEffect>& effects() const { return effects_; }
   [[nodiscard]] const Stepper& stepper() const { return *stepper_; }
-  // A step solves for the velocity at its end: it may take seconds.
-  [[nodiscard]] bool solves() const { return implicit_.has_value(); }
   [[nodiscard]] bool damps() const;  // internally
   [[nodiscard]] bool is_implicit() const { return euler_.has_value(); }
   [[nodiscard]] std::unique_ptr<EnergyHistory> make_history(Ledger ledger) const;
@@ -149,7 +147,7 @@ class TimeSegment {
   bool paper_damped_ = false;
   std::optional<Stepper> stepper_;
   std::optional<PrescribedMotion> held_;
-  std::optional<ImplicitDamping> implicit_;
+  std::optional<StagedDamping> staged_;
   std::optional<ImplicitEuler> euler_;
   std::function<void(const std::string&)> hear_ = [](const std::string&) {};
   std::optional<StepBound> bound_;

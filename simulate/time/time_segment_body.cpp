@@ -54,9 +54,10 @@ void TimeSegment::explain(const Clock& clock) const {
       static_cast<std::uint64_t>(std::llround(left / clock.step)), is_implicit() ? "implicit " : "",
       clock.step,
       is_implicit() ? std::string("Newton's method") : fmt::format("kernel {}", stepper().isa())));
-  if (solves())
-    progress_.say(
-        "plan: every step solves for the damping, which taken explicitly would cut it by more than 2");
+  if (staged_)
+    progress_.say(fmt::format(
+        "plan: every step has {} stages for the damping, which in one would cut it by more than 2",
+        damping_stages(clock.step * clock.damping_rate).size()));
   for (const ActiveEffect& effect : effects_)
     progress_.say(fmt::format("plan: {} ({})", effect.name, effect.why));
   for (const Event& event : scene_.events)

@@ -40,10 +40,10 @@ void TimeSegment::report(const Clock& clock, bool stress, SimulateResult& result
 void TimeSegment::tell_loop_apart() {
   if (euler_ || !(kernel_seconds_ > 0)) return;
   KernelShares shares = stepper_->time_shares(state_);
-  double loop = kernel_seconds_;
-  if (implicit_) {  // damping is solved for beside the loop
-    loop -= implicit_->seconds();
-    shares.damping = implicit_->seconds() / loop;
+  const double loop = kernel_seconds_;
+  if (staged_) {  // what is beyond the first stage is for damping
+    const double first = 1 / static_cast<double>(std::max<std::size_t>(staged_->stages(), 1));
+    shares = {1 - first * (1 - shares.damping), first * shares.plasticity, first * shares.fracture};
   }
   for (const ActiveEffect& effect : effects_) {
     const double seconds = loop * effect->kernel_share(shares);

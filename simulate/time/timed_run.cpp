@@ -80,7 +80,6 @@ class TimedRun {
   Bytes act_body_;                  // likewise: the body as the present act began, to be made with it
   std::chrono::steady_clock::time_point saved_ = began_;
   std::size_t events_ = 0;      // that have happened
-  bool torn_ = false;           // a step was begun and not ended: the act's state is none
   bool at_whole_step_ = false;  // velocities are of the time of the state, after an event
   double next_row_ = 0, next_frame_ = 0;
   std::optional<LiveSummary> live_summary_;
@@ -196,13 +195,11 @@ void TimedRun::check() {
     progress_.update(time / duration_, fmt::format("{:.4g} s, step {}", time, clock_.steps));
 }
 
-// Steps that solve for damping may be stopped within, and leave no state; other explicit ones end first.
+// Explicit steps end before the run is stopped.
 void TimedRun::advance(bool row) {
   std::optional<StopWaits> whole;
-  if (!segment_->is_implicit() && !segment_->solves()) whole.emplace();
-  torn_ = segment_->solves();
+  if (!segment_->is_implicit()) whole.emplace();
   segment_->step(clock_, history_.get(), row);
-  torn_ = false;
 }
 
 void TimedRun::step() {
@@ -298,7 +295,7 @@ void TimedRun::play_until(double end, bool resumed) {
 // Saves what a run that is stopped leaves; says where it is.
 std::string TimedRun::stop() {
   const StopWaits saving;
-  std::string saved = save(segment_ && !torn_ ? segment_->state() : sound_.state());
+  std::string saved = save(segment_ ? segment_->state() : sound_.state());
   if (save_checkpoint()) saved += fmt::format("; go on with --resume {}", options_.checkpoint);
   return saved;
 }

@@ -8,7 +8,7 @@ from invariants import books, ends_well, integrators, momentum, refused, require
 from overlap import deepest, touching
 from solids import grid_box, helix
 from suite import case
-from world import OTHER_UNITS, PLAIN, Setup, call, significant
+from world import OTHER_UNITS, PLAIN, Setup, call, placement, significant
 
 
 def gum(view, poisson=0.3, density=1000, young=1e6):
@@ -203,21 +203,22 @@ def mass_ratio(trial):
 
 
 @case("exactly in touch at the start",
-      holds="two blocks face to face and one exactly on a floor, nothing acts: nothing moves, to 1e-9 h; with friction too",
+      holds="two blocks face to face, one beside and one exactly on a floor, nothing acts: nothing moves, to 1e-9 h; with friction too; in all three models",
       breaks="a gap of zero whose sign is rounding's; a force that is not zero where the gap is")
 def in_touch(trial):
     h = 1e-2
 
-    def world(view, run, friction=0.0):
-        scene = gum(view) + f"[contact]\nfriction = {friction}\n[[plane]]\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\n"
-        return Setup({"low": grid_box((3, 3, 2), h), "high": grid_box((2, 2, 2), h, (0.5 * h, 0.5 * h, 2 * h)), "side": grid_box((2, 3, 2), h, (3 * h, 0, 0))}, scene + run, h)
+    def world(view, run, friction, model):
+        scene = f'model = "{model}"\n' + gum(view, 0.25) + f"[contact]\nfriction = {friction}\n[[plane]]\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\n"
+        return Setup({"low": grid_box((3, 3, 2), h), "high": grid_box((2, 2, 2), h, (0.5 * h, 0.5 * h, 2 * h)), "side": grid_box((2, 3, 2), h, (3 * h, 0, 0))}, scene + run, h, placement(model))
 
-    for friction in (0.0, 0.5):
-        outcomes = integrators(trial, lambda view, run: world(view, run, friction), "20 ms", None, f"friction {friction}, ", energy=None, units=None, mirror=None)
+    for model, friction in [(model, friction) for model in ("cells", "springs", "paper") for friction in (0.0, 0.5)]:
+        outcomes = integrators(trial, lambda view, run: world(view, run, friction, model), "20 ms", None, f"{model}, friction {friction}, ", energy=None, units=None,
+                               mirror=None)
         for method, out in outcomes.items():
-            with trial.section(f"friction {friction}, {method}, still"):
+            with trial.section(f"{model}, friction {friction}, {method}, still"):
                 moved = out.summary["largest_displacement"] / h
-                trial.figure(f"moved by {significant(moved)} h")
+                trial.figure(f"{model}: moved by {significant(moved)} h")
                 trial.show(out)
                 require(moved < 1e-9, f"moved by {moved} h")
 

@@ -8,17 +8,11 @@ import peers
 from invariants import ends_well, integrators, momentum, refused, require, same_bits, sound_state, worked
 from solids import bar, grid_box
 from suite import case
-from world import MIRRORED, PLAIN, Setup, call, edited, significant
-
-CENTRE = ("--placement", "centre", "--align", "none")
+from world import CENTRE, MIRRORED, PLAIN, Setup, call, edited, placement, significant
 
 
 def gum(view, poisson=0.25, model="cells", part="bar"):
     return 'material = "gum"\n' + view.material("gum", 1e6, poisson, 1000) + f'[parts.{part}]\nmodel = "{model}"\n'
-
-
-def placement(model):
-    return CENTRE if model == "paper" else ("--align", "none")
 
 
 @case("coincident elements",

@@ -9,9 +9,7 @@ import peers
 from invariants import books, ends_well, integrators, momentum, refused, require, same_bits, sound_state, worked
 from solids import bar, grid_box
 from suite import case
-from world import PLAIN, Setup, call, simulate, significant
-
-CENTRE = ("--placement", "centre", "--align", "none")
+from world import PLAIN, Setup, call, placement, significant, simulate
 
 
 def gum(view, poisson=0.25, model="cells", part="bar"):
@@ -21,7 +19,7 @@ def gum(view, poisson=0.25, model="cells", part="bar"):
 def struck(view, model, run, speed=0.05, h=1e-2, cells=(6, 3, 3)):
     """A free bar whose right third is given a speed: it stretches, bends and spins a little."""
     scene = gum(view, 0.25, model) + f'[[velocity]]\nwhere = {view.half_space((4.2 * h, 0, 0), (1, 0, 0))}\nvelocity = {view.vector("velocity", (speed, speed / 2, -speed))}\n'
-    return Setup({"bar": grid_box(cells, h)}, scene + run, h, CENTRE if model == "paper" else ("--align", "none"))
+    return Setup({"bar": grid_box(cells, h)}, scene + run, h, placement(model))
 
 
 def bound(trial, setup):
@@ -302,7 +300,7 @@ def next_to_no_time(trial):
 
     def world(view, run, model="cells"):
         return Setup({"bar": grid_box((2, 2, 2), h)}, gum(view, 0.25, model) + f'[[velocity]]\nwhere = "bar"\nvelocity = {view.vector("velocity", (1, 0, 0))}\n' + run, h,
-                     CENTRE if model == "paper" else ("--align", "none"))
+                     placement(model))
 
     for model in ("cells", "springs", "paper"):
         longest = bound(trial, world(PLAIN, '[run]\ntime = "10 s"\nstep = "9 s"\n', model))

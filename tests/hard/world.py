@@ -220,6 +220,13 @@ def edited(source, target, change):
     return target
 
 
+CENTRE = ("--placement", "centre", "--align", "none")
+
+
+def placement(model):
+    return CENTRE if model == "paper" else ("--align", "none")
+
+
 def significant(x, digits=3):
     """A number for people: 3 digits."""
     return "0" if x == 0 else f"{x:.{digits}g}" if math.isfinite(x) else str(x)

@@ -85,7 +85,7 @@ def test_a_body_is_turned_coloured_and_pointed_at():
         value = browser.run("const p = flexelView.probes.probes[0]; return p.panel.valueOf(p, 'displacement', 0)")
         most = browser.run("return flexelView.picture.page.words.summary.simulate.largest_displacement")
         expect(0.3 * most < value <= 1.01 * most, f"a point of the free end: {value} of {most}")
-        expect("bracket/2" in browser.text("said"), "and it is said to who cannot see")
+        expect("bracket/2" in browser.run("return document.getElementById('said').textContent"), "and it is said to who cannot see")
         expect_silence(browser)
 
 

@@ -62,7 +62,8 @@ def test_explain_tells_the_whole_time_of_contact():
     lines = expect_ok(run("flexel-simulate", "lift.toml", "body.vtu", "-o", "lifted.vtu", "--explain", "--threads", "1")).err
     shares = {name.strip(): float(share) for name, share in re.findall(r"time: (.+?) +[0-9.]+ s +([0-9.]+) %", lines)}
     expect(abs(sum(shares.values()) - 100) < 1, f"the shares do not add up to the run: {shares}")
-    expect(shares["contact"] + shares["contact friction"] > 60, f"contact takes most of this run: {shares}")
+    expect(min(shares["contact"], shares["contact friction"]) > 0, f"contact takes no time: {shares}")
+    expect(shares["the rest"] < 25, f"time of this run that is nobody's, though contact and damping take nearly all of it: {shares}")
 
 
 def test_refusals():

@@ -36,7 +36,6 @@ Checkpoint some_checkpoint(const Body& body) {
   c.memory.cells.springs.resize(4);
   c.memory.cells.springs[3].broken[7] = 8;
   c.memory.cells.spring_flow.resize(1);
-  c.memory.damping_change = c.state.velocity;
   c.memory.reach = INFINITY;
   c.events = 2;
   c.settled = c.state.velocity;

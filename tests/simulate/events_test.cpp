@@ -132,7 +132,7 @@ TEST(Events, EditOfMassAndStiffnessChangesTheFrequency) {
       plain, 0.001 * plain);
 }
 
-// An edit of the whole is a scene with another time, whether the damping is stepped or solved for.
+// An edit of the whole is a scene with another time, whether the damping takes stages or not.
 TEST(Events, EditOfDampingIsAnotherDamping) {
   for (const char* model : {"cells", "springs"})
     for (const double tau : {20e-6, 5e-3}) {

@@ -7,7 +7,6 @@
 #include <numeric>
 #include <random>
 
-#include "simulate/implicit/implicit_damping.h"
 #include "simulate/models/cells.h"
 #include "tests/simulate/law_materials.h"
 #include "tests/simulate/numbered_body.h"
@@ -190,59 +189,6 @@ TEST(Kernel, FoldedCellIsTold) {
   EXPECT_LE(stepper.advance(state, {}, {1e-6, 1e-6, false}).smallest_jacobian, 0);
   state.displacement[13].x() = std::nan("");
   EXPECT_LE(stepper.advance(state, {}, {1e-6, 1e-6, false}).smallest_jacobian, 0);
-}
-
-// A body at rest, one side of which is led away: no force acts on it but what the side pulls along. The
-// velocities solve M (v+ - v-) = dt D v+ to 1e-6 of that pull, in as few iterations as the condition asks
-// for.
-TEST(Kernel, DampingFollowsWhatIsLed) {
-  const Body body = box_body({{8, 4, 4}, Vec3::Constant(0.01)});
-  for (const Model model : {Model::cells, Model::springs}) {
-    const Problem problem = kernel_setting(body, model);
-    const double dt = 1e-5, tau = 1e-3;
-    Stepper stepper(problem, {{tau}}, true);
-    Constraints led;
-    led.mask.assign(body.element_count(), 0);
-    led.motion.assign(body.element_count(), {0, 0, 0});
-    led.motions.push_back({Vec3(1e-3, 0, 2e-3)});
-    led.courses.push_back({{0, 1e-2}, {0, 1}});
-    for (std::size_t e = 0; e < body.element_count(); ++e)
-      if (body.lattice_index[e][0] == 0) led.mask[e] = 7;
-    State state = shaken(body, 0, 10);
-    for (Vec3& v : state.velocity) v.setZero();
-    PrescribedMotion held(led, body, state);
-    (void)ImplicitDamping(stepper, held, 100).advance(state, {}, {dt, dt, false}, dt);
-    held.impose(state, stepper.mass(), {dt, dt, false});
-    const std::vector<Vec3>& pull = stepper.damping_force();  // D v+
-    double off = 0, whole = 0;
-    for (std::size_t e = 0; e < body.element_count(); ++e) {
-      if (led.mask[e]) continue;
-      off = std::max(off, (stepper.mass()[e] * state.velocity[e] - dt * pull[e]).norm());
-      whole = std::max(whole, stepper.mass()[e] * state.velocity[e].norm());
-    }
-    EXPECT_GT(whole, 0);
-    EXPECT_LT(off, 1e-5 * whole);
-  }
-}
-
-TEST(Kernel, DampingThatIsNotSolvedIsTold) {
-  const Body body = box_body({{4, 4, 4}, Vec3::Constant(0.01)});
-  const Problem problem = kernel_setting(body, Model::cells);
-  Stepper stepper(problem, {{1}}, true);  // a second, of steps of 10 us
-  State state = shaken(body, 0, 10);
-  const Constraints none;
-  const PrescribedMotion held(none, body, state);
-  const auto advance = [&](int iterations) {
-    State copy = state;
-    (void)ImplicitDamping(stepper, held, iterations).advance(copy, {}, {1e-5, 1e-5, false}, 1e-5);
-  };
-  EXPECT_NO_THROW(advance(ImplicitDamping::kIterations));
-  try {
-    advance(3);
-    FAIL() << "solved";
-  } catch (const DivergedError& error) {
-    EXPECT_THAT(error.what(), ::testing::HasSubstr("not solved in 3 iterations, worst near ("));
-  }
 }
 
 TEST(Kernel, UnknownInstructionSetIsRefused) {

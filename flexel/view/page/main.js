@@ -50,15 +50,16 @@ async function start() {
   const packs = await Promise.all((await packBytes(page)).map(unpack));
   const canvas = document.getElementById("canvas");
   const picture = new Picture(page, packs, canvas, document.getElementById("overlay"));
-  const probes = new Probes(picture, document.getElementById("probes"), text => {
-    document.getElementById("said").textContent = text;
-  });
+  const said = document.getElementById("said");
+  const probes = new Probes(picture, document.getElementById("probes"),
+                            (text, how = "faint") => Object.assign(said, {textContent: text, className: how}));
   listen(canvas, picture.view, () => picture.pixelsPerMetre(picture.panels[0], picture.layout[0]) * picture.radiusOf(picture.panels[0]),
          (x, y) => probes.tap(x, y));
   drawAim(picture);
   const controls = new Controls(picture, probes, page);
   controls.begin();
   report("");
+  performance.mark("ready");
   window.flexelView = {picture, probes, controls, pictureBlob, Recorder};  // for scripts
   document.documentElement.dataset.ready = "yes";
 }

@@ -1,5 +1,6 @@
 // One file: its shapes, and what three.js draws of them.
 import {clipUniforms, colourOf, cutMaterial, lineMaterial, markMaterials, surfaceMaterial} from "./paint.js";
+import {coarseTriangles} from "./coarse.js";
 import {DrawnShape} from "./shape.js";
 
 const kEdgeInk = {light: "#20262d", dark: "#0c0f12"}, kRestInk = {light: "#7a8794", dark: "#9aa7b4"};
@@ -21,7 +22,9 @@ class Drawing {
     this.value = attribute(new Float32Array(shape.count), 1);
     this.group = new THREE.Group();
     const mesh = new THREE.BufferGeometry();
-    mesh.setIndex(attribute(shape.triangles, 1));
+    this.geometry = mesh;
+    this.full = attribute(shape.triangles, 1);
+    mesh.setIndex(this.full);
     const attributes = {position: this.position, normal: this.normal, value: this.value, tint};
     for (const [name, each] of Object.entries(attributes)) mesh.setAttribute(name, each);
     this.add(new THREE.Mesh(mesh, surfaceMaterial(colours, clip)), "surface");
@@ -44,6 +47,14 @@ class Drawing {
   place(frame, scale) {
     this.shape.place(frame, scale, this.position.array, this.normal.array);
     this.position.needsUpdate = this.normal.needsUpdate = true;
+  }
+  // For a picture in motion; made when it is first asked for.
+  set coarse(coarse) {
+    if (coarse && this.few === undefined) {
+      const few = coarseTriangles(this.shape);
+      this.few = few ? attribute(few, 1) : null;
+    }
+    this.geometry.setIndex(coarse && this.few ? this.few : this.full);
   }
   // A ghost is not cut open but cut off.
   show(visible, cut, ghost) {
@@ -159,12 +170,14 @@ export class Panel {
   }
 
   // Shows only what is after, or only what was before (`wipe`), or both as `before` says.
-  choose(before, edges, side) {
+  choose(before, edges, side, coarse) {
     const hasBefore = before !== "nothing" && this.shape.moved;
     const after = this.after, rest = hasBefore ? this.before : undefined;
     for (const [kind, each] of Object.entries(this.restDrawings ?? {})) each.group.visible = hasBefore && kind === this.kind;
     after.group.visible = !(before === "wipe" && side === "before" && rest);
     const cut = this.clip.cut.value;
+    after.coarse = coarse;
+    if (rest) rest.coarse = coarse;
     after.show(true, cut, false);
     after.creases.visible = after.borders.visible = edges;
     if (!rest) return;
@@ -216,9 +229,10 @@ export class Panel {
     return {text: part.text + (this.kind === "lattice" ? "" : "/" + this.faceNumber[face]), odd: part.odd};
   }
 
-  // The first triangle on the way from `origin` (about the centre) along `direction`: {triangle, weights, ...}.
-  hit(origin, direction) {
-    const {triangles} = this.shape, p = this.after.position.array, {plane, cut} = this.clip;
+  // The first triangle on the way from `origin` (about the centre) along `direction`: {triangle, weights, ...}. `rest`: of the part
+  // as it was.
+  hit(origin, direction, rest) {
+    const {triangles} = this.shape, p = (rest ? this.before : this.after).position.array, {plane, cut} = this.clip;
     const [ox, oy, oz] = origin.toArray(), [dx, dy, dz] = direction.toArray();
     let best;
     for (let t = 0; t < triangles.length; t += 3) {

@@ -6,7 +6,7 @@ import {drawMeasure, drawProbe} from "./overlay.js";
 const kMostProbes = 20;
 
 export class Probes {
-  // `list`: the element that lists them; `say(text)`: for who cannot see.
+  // `list`: the element that lists them; `say(text, how)`: "spoken" for those who do not see the list.
   constructor(picture, list, say) {
     Object.assign(this, {picture, list, say, probes: [], measures: [], from: undefined, measuring: false, count: 0});
     picture.over.push(pen => this.draw(pen));
@@ -28,7 +28,7 @@ export class Probes {
     for (const panel of this.picture.panels) panel.unmark();
     if (probe.kind === "surface") probe.panel.markFace(face);
     this.update();
-    this.say(this.describe(probe).join(", "));
+    this.say(this.describe(probe).join(", "), "spoken");
   }
 
   measure(at) {
@@ -40,7 +40,7 @@ export class Probes {
     if (this.measures.length > kMostProbes) this.measures.shift();
     this.from = undefined;
     this.update();
-    this.say(this.describeMeasure(this.measures.at(-1)).join(", "));
+    this.say(this.describeMeasure(this.measures.at(-1)).join(", "), "spoken");
   }
 
   clear() {

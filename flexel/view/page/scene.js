@@ -5,7 +5,7 @@ import {drawAxes, drawLegend, drawScaleBar, themeOf, write} from "./overlay.js";
 import {colourUniforms} from "./paint.js";
 import {Panel} from "./panel.js";
 
-const kLegendEms = 9.5;
+const kLegendEms = 9.5, kSlow = 100, kMostSlow = 2, kRest = 250;  // ms, frames, ms
 
 export class Picture {
   // `page`: what flexel/view/page.cpp writes.
@@ -19,7 +19,7 @@ export class Picture {
     this.colours = colourUniforms(page.colours);
     this.panels = packs.map(pack => new Panel(pack, this.colours, page.colours.tints));
     this.view = new View(page.up);
-    this.view.changed = () => this.redraw();
+    this.view.changed = () => this.move();
     this.frames = Math.max(...this.panels.map(panel => panel.frames));
     this.times = this.panels.find(panel => panel.frames === this.frames).about.times;
     this.state = {colour: "none", low: null, high: null, logarithmic: false, steps: 0, outside: 0, scale: 1, frame: 0,
@@ -80,7 +80,7 @@ export class Picture {
     if (changed("colour", "frame", "cells", "low", "high", "logarithmic", "steps", "outside")) this.paint();
     if (changed("theme", "cells")) for (const panel of this.panels) panel.setInk(state.theme);
     for (const panel of this.panels) this.placeSection(panel);
-    this.redraw();
+    changed("scale", "frame", "cutAt") ? this.move() : this.redraw();
   }
 
   paint() {
@@ -162,14 +162,38 @@ export class Picture {
     this.redraw();
   }
 
+  // Redraws what is in motion: roughly where frames were slow, and fully once it rests.
+  move() {
+    this.coarse = this.slow >= kMostSlow;
+    clearTimeout(this.resting);
+    this.redraw();
+  }
+
+  // Once the rough frame is on the screen and nothing moves any more, the whole one.
+  rest() {
+    requestAnimationFrame(() => {
+      clearTimeout(this.resting);
+      this.resting = setTimeout(() => {
+        this.coarse = false;
+        this.redraw();
+      }, kRest);
+    });
+  }
+
+  // Frames wait for those before them, so a long wait means slow ones.
   redraw() {
     if (this.asked) return;
     this.asked = true;
+    const began = performance.now();
     requestAnimationFrame(() => {
       this.asked = false;
+      const wait = performance.now() - began;
+      if (!this.coarse && this.slow < kMostSlow) this.slow = wait < kSlow ? 0 : this.slow + (wait < 4 * kSlow ? 1 : kMostSlow);
       this.draw();
+      if (this.coarse) this.rest();
     });
   }
+  slow = 0;
 
   draw() {
     if (!this.width) return;
@@ -190,7 +214,7 @@ export class Picture {
     this.view.apply(panel.camera, this.radiusOf(panel), width / height);
     renderer.setViewport(x, bottom, width, height);
     const part = (from, to, side) => {
-      panel.choose(state.before, state.edges, side);
+      panel.choose(state.before, state.edges, side, this.coarse);
       renderer.setScissor(x + from * width, bottom, (to - from) * width, height);
       renderer.render(panel.scene, panel.camera);
     };
@@ -212,7 +236,8 @@ export class Picture {
     const panel = this.panels[k], room = this.layout[k], {eye} = this.view.axes;
     this.view.apply(panel.camera, this.radiusOf(panel), room.width / room.height);
     const from = new THREE.Vector3((x - room.x) / room.width * 2 - 1, 1 - (y - room.y) / room.height * 2, -1).unproject(panel.camera);
-    const hit = panel.hit(from, eye.clone().negate());
+    const wiped = this.state.before === "wipe" && panel.shape.moved && x < room.x + this.state.wipe * room.width;
+    const hit = panel.hit(from, eye.clone().negate(), wiped);
     return hit && {panel, ...hit};
   }
 

@@ -37,6 +37,7 @@ class PairSchedule {
 
   // Lets the pair sleep if that is worth while; whether it does. Parallel, one call a pair.
   bool sleep(std::uint32_t pair, const SafeMotion& safe);
+  void keep_awake(std::uint32_t pair) { due_[pair] = {0, 0}; }  // likewise
   [[nodiscard]] bool sleeps(std::uint32_t pair) const { return !due(pair, 0, 0); }
   // Ascending; of the last advance().
   [[nodiscard]] const std::vector<std::uint32_t>& awake() const { return awake_; }

@@ -15,6 +15,7 @@ constexpr double kSoftSteps = 2;       // in which an impact goes through the so
 constexpr double kFarthestSoft = 0.4;  // spacings, at most, of that part: two steps of contact_step_bound.cpp
 constexpr double kHardening = 0.001;   // a step, of what rests: the share of its extra softness that goes
 constexpr double kHardened = 1.01;     // of the least softness, at which that is over
+constexpr double kNoTurn = 1e-9;       // of a body in a step
 constexpr double kShapelessEntry = 0.05;  // spacings; most penetration with which shapeless points approach
 
 }  // namespace
@@ -96,12 +97,16 @@ std::vector<BodyMotion> PairStates::motion_to(const State& state) {
     motions[b].spread = 0.5 * box.diagonal();
   }
   for (const CarryingCell& cell : cells_) {
-    if (!cell.deforms) continue;
+    BodyMotion& motion = motions[cell.part];
+    // |dF| is at most sqrt(3) times the moves' diagonal over the spacing: cells of what hardly deforms are skipped
+    const double most = 3.5 * motion.spread / parts[cell.part].lattice.spacing.minCoeff();
+    if (!cell.deforms || most <= std::max(motion.turn, kNoTurn)) continue;
     Mat3 change = Mat3::Zero();
     for (std::size_t a = 0; a < 8; ++a)
       change += moves[cell.corners[a]] * surface_.gradients(cell.part)[a].transpose();
-    motions[cell.part].turn = std::max(motions[cell.part].turn, change.norm());
+    motion.turn = std::max(motion.turn, change.norm());
   }
+  for (BodyMotion& motion : motions) motion.turn = std::max(motion.turn, motion.spread > 0 ? kNoTurn : 0);
   return motions;
 }
 
@@ -130,8 +135,10 @@ void PairStates::update(const State& state, bool all) {
   find_points(state);
   if (release_.known_parts() < surface_.body().parts.size()) find_initial_penetrations(state);
   const std::vector<double> before = release_.advance(state);
-  for (const std::uint32_t p : active_) is_active_[p] = 0;
+  for (const std::uint32_t p : active_) is_active_[p] = states_[p].pressure > 0 ? kWasPressed : 0;
   admit(evaluate_pairs());
+  for (const std::uint32_t p : active_)
+    if (is_active_[p] == kWasPressed) is_active_[p] = 0;
   active_.clear();
   for (const std::uint32_t p : schedule_.awake())
     if (is_active_[p]) active_.push_back(p);
@@ -177,6 +184,11 @@ std::vector<std::uint8_t> PairStates::evaluate_pairs() {
       [&](std::size_t n) {
         const std::uint32_t p = awake[n];
         PairRecord& record = memory_[p];
+        if (is_active_[p] == kWasPressed) {  // it cannot sleep
+          schedule_.keep_awake(p);
+          set(p, evaluate(pairs[p], release_.allowed(pairs[p], record), record.soft));
+          return;
+        }
         const PairProximity proximity = pair_proximity(pairs[p], record);
         const bool sleeps = schedule_.sleep(p, proximity.safe);
         if (!proximity.near || (sleeps && !evaluated_all_)) {
@@ -281,66 +293,82 @@ double PairStates::approach(const ContactPair& pair, const Vec3& normal, const S
   return (velocity(pair.i) - of_j).dot(normal);
 }
 
-// A pair that is not pressed gets a soft part as wide as the way that it comes in kSoftSteps, but does not
-// press where it is. One that is pressed keeps its own, for the energy it has stored is of that, and hardens
-// slowly as it rests.
+// m, of the soft part of a pair in the steps to come, or 0: that of the law. A pair that will press within
+// kSoftSteps gets one as wide as its way in them, but does not press where it is. One that is pressed keeps its
+// own, for the energy it has stored is of that, and hardens slowly as it rests. It depends on the present state
+// alone, for which pairs sleep a run that goes on from a checkpoint need not know.
+double PairStates::softness_after(std::size_t p, const State& state, double drift) const {
+  const PairState& now = states_[p];
+  const ContactPair& pair = list_.pairs()[p];
+  const double least = pair.properties.constants.law.soft;
+  if (now.pressure > 0) {
+    const double soft = memory_[p].soft - kHardening * (memory_[p].soft - least);
+    return soft < kHardened * least ? 0 : soft;
+  }
+  const double way = kSoftSteps * drift * approach(pair, now.normal, state);
+  if (now.gap > way) return 0;
+  const double most = std::min(least + 2 * std::max(now.gap, 0.0), kFarthestSoft * list_.point(pair.i).width);
+  return std::min(way, most) > least ? std::min(way, most) : 0;
+}
+
 void PairStates::finish_step(const State& state, double drift) {
+  std::vector<double> lost(active_.size(), 0);
   parallel_for_each(
       active_.size(),
       [&](std::size_t n) {
         const std::uint32_t p = active_[n];
-        const PairState& now = states_[p];
-        double& soft = memory_[p].soft;
-        if (schedule_.sleeps(p)) {
-          soft = 0;  // what sleeps is far from touching without it
-          return;
-        }
-        const ContactPair& pair = list_.pairs()[p];
-        const double least = pair.properties.constants.law.soft, width = list_.point(pair.i).width;
-        if (now.pressure > 0) {
-          soft -= kHardening * (soft - least);
-          if (soft < kHardened * least) soft = 0;
-          return;
-        }
-        const double most =
-            std::min(std::max(soft, least + 2 * std::max(now.gap, 0.0)), kFarthestSoft * width);
-        soft = 0;
-        if (now.gap > kFarthestSoft * width) return;
-        const double way = kSoftSteps * drift * approach(pair, now.normal, state);
-        if (way > least) soft = std::min(way, most);
-        if (soft <= least) soft = 0;
+        const double soft = softness_after(p, state, drift);
+        if (soft > 0) schedule_.keep_awake(p);  // it presses sooner than it was judged by
+        if (soft == memory_[p].soft) return;
+        memory_[p].soft = soft;
+        const double before = states_[p].energy;
+        states_[p] = evaluate(list_.pairs()[p], release_.allowed(list_.pairs()[p], memory_[p]), soft);
+        lost[n] = before - states_[p].energy;
       },
       512);
+  for (const double each : lost) hardened_ += each;
 }
 
 // In the terms of pair_law.h. Beside a common way points go by at most kPoint times their bodies' paths; normals
 // change by at most |F^-1| times their bodies' turns, and the direction of contact, the mean of both, by twice
 // the larger of these over its length. Gap, offset and facing change accordingly; half of what there is may be
-// used up by either. kBounds covers that F changes meanwhile.
+// used up by either. kBounds covers that F^-1 changes meanwhile, by turns up to kMostTurn over it: integral of
+// dx / (1 - x) < kBounds x. What has no sure normal is known by its distance alone.
 PairStates::PairProximity PairStates::pair_proximity(const ContactPair& pair,
                                                      const PairRecord& record) const {
-  constexpr double kRounding = 1e-9, kPoint = 1.2, kBounds = 1.5;
+  constexpr double kRounding = 1e-9, kPoint = 1.2, kBounds = 1.5, kMostTurn = 0.3;
   const PairConstants& constants = pair.properties.constants;
   ContactSide i = points_[pair.i].side;
   const ContactSide j = other_side(pair);
   if (pair.of_plane()) i.own_plane = 0;
-  const double turning_i = kBounds * points_[pair.i].normal_rate,
-               turning_j = pair.of_plane() ? 0 : kBounds * points_[pair.j].normal_rate;
+  const double rate_i = points_[pair.i].normal_rate,
+               rate_j = pair.of_plane() ? 0 : points_[pair.j].normal_rate, fastest = std::max(rate_i, rate_j);
   const Vec3 d = j.position - i.position, b = i.own_plane * i.normal - j.own_plane * j.normal;
-  const double distance = d.norm(), length = b.norm();
+  const double distance = d.norm(), length = b.norm(), width = constants.width;
   PairProximity found;
   const auto bear = [&](double margin, double rate) {
+    if (!std::isfinite(rate)) return;
     const SafeMotion safe =
-        rate > 0 ? SafeMotion{0.5 * margin / kPoint, 0.5 * margin / rate} : SafeMotion{margin / kPoint};
+        rate > 0 ? SafeMotion{0.5 * margin / kPoint, std::min(0.5 * margin / rate, kMostTurn / fastest)}
+                 : SafeMotion{margin / kPoint};
     if (std::min(safe.path, safe.turn) > std::min(found.safe.path, found.safe.turn)) found.safe = safe;
   };
+  // what can stick begins to at that gap
+  const double pressed =
+      constants.law.softened(record.soft).ahead + (pair.properties.pull_off > 0 ? constants.law.soft : 0);
+  const double far = std::max(width, constants.limit);
+  if (width > 0) bear(distance - std::sqrt(width * width + far * far), 0);
   if (i.radius > 0 && j.radius > 0) {
-    bear(distance - i.radius - j.radius - constants.law.softened(record.soft).ahead, 0);
+    bear(distance - i.radius - j.radius - pressed, 0);
   } else if (length > 0) {
     const double along = d.dot(b) / length;
-    const double rate = 2 * distance * std::max(i.own_plane * turning_i, j.own_plane * turning_j) / length;
-    const double offset2 = d.squaredNorm() - along * along, width = constants.width;
-    bear(along - i.radius - j.radius - constants.law.softened(record.soft).ahead, rate);
+    const double turning = std::max(i.own_plane > 0 ? rate_i : 0, j.own_plane > 0 ? rate_j : 0);
+    // of a pair of points the other one may get a plane of its own
+    const double rate = pair.of_plane()          ? 0
+                        : std::isfinite(fastest) ? 2 * kBounds * distance * turning / length
+                                                 : fastest;
+    const double offset2 = d.squaredNorm() - along * along;
+    bear(along - i.radius - j.radius - pressed, rate);
     if (width > 0) {
       if (offset2 > width * width + kRounding * (width * width + distance * distance)) found.near = false;
       bear(std::sqrt(std::max(offset2, 0.0)) - width, 2 * rate);
@@ -349,10 +377,10 @@ PairStates::PairProximity PairStates::pair_proximity(const ContactPair& pair,
     found.near = false;  // two that have no plane of their own
   }
   if (i.normal != Vec3::Zero() && j.normal != Vec3::Zero()) {
-    const double facing = -i.normal.dot(j.normal), rate = std::max(turning_i, turning_j);
+    const double facing = -i.normal.dot(j.normal);
     if (!(facing > constants.facing_from)) found.near = false;
-    const double margin = (constants.facing_from - facing) / rate;
-    if (rate > 0 && margin > std::min(found.safe.path, found.safe.turn))
+    const double margin = std::min((constants.facing_from - facing) / kBounds, kMostTurn) / fastest;
+    if (std::isfinite(fastest) && fastest > 0 && margin > std::min(found.safe.path, found.safe.turn))
       found.safe = {std::numeric_limits<double>::infinity(), margin};
   }
   // what sticks pulls, and what was inside must be seen to come out

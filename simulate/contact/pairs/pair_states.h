@@ -1,5 +1,7 @@
 // Gaps, pressures and phases of the candidate pairs in the state that was evaluated last.
 #pragma once
+#include <utility>
+
 #include "simulate/contact/pairs/overlap_release.h"
 #include "simulate/contact/pairs/pair_schedule.h"
 
@@ -17,8 +19,13 @@ class PairStates {
   // ask for the same state several times. Those that cannot touch are left out (PairSchedule), unless `all`.
   void update(const State& state, bool all = false);
 
-  // After a step of `drift` s that led to `state`, which is evaluated: how softly pairs begin to press.
+  // After a step of `drift` s that led to `state`, which is evaluated: how softly pairs begin to press. What
+  // this changes is evaluated again: the states are those that a run which goes on from here would find.
   void finish_step(const State& state, double drift);
+  // J, that pairs have lost as they hardened.
+  [[nodiscard]] double hardened() const { return hardened_; }
+  void set_hardened(double energy) { hardened_ = energy; }
+  [[nodiscard]] double take_hardened() { return std::exchange(hardened_, 0); }
 
   [[nodiscard]] std::uint64_t evaluations() const { return evaluations_; }
   [[nodiscard]] const std::vector<PointState>& points() const { return points_; }  // (PairList::points())
@@ -47,6 +54,7 @@ class PairStates {
   // `allowed` [m]: penetration without pressure; `soft` [m]: of PairRecord.
   [[nodiscard]] PairState evaluate(const ContactPair& pair, double allowed, double soft) const;
   [[nodiscard]] double approach(const ContactPair& pair, const Vec3& normal, const State& state) const;
+  [[nodiscard]] double softness_after(std::size_t pair, const State& state, double drift) const;
   void find_initial_penetrations(const State& state);
   [[nodiscard]] std::vector<std::uint8_t> evaluate_pairs();
   void admit(const std::vector<std::uint8_t>& entering);
@@ -67,10 +75,12 @@ class PairStates {
   std::vector<std::uint64_t> point_evaluation_;  // (points_) that they are of
   std::vector<PairState> states_;                // of active pairs
   std::vector<std::uint32_t> active_;
-  std::vector<std::uint8_t> is_active_;  // (pairs)
-  std::vector<Vec3> moved_from_;         // (PairList::elements()) m, displacements of the last evaluation
+  static constexpr std::uint8_t kWasPressed = 2;  // in the evaluation before, while pairs are evaluated
+  std::vector<std::uint8_t> is_active_;           // (pairs)
+  std::vector<Vec3> moved_from_;  // (PairList::elements()) m, displacements of the last evaluation
   std::uint64_t evaluated_builds_ = 0, evaluations_ = 0;
   bool evaluated_all_ = false;
+  double hardened_ = 0;  // J
 };
 
 }  // namespace flexel::simulate

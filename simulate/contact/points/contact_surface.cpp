@@ -90,8 +90,16 @@ CellShape ContactSurface::shape_at(std::uint32_t point, const State& state) cons
   // The remains of a broken cell may have any shape and direction: whole faces and planes touch its points as
   // they touch those of edges, from all sides.
   const bool broken = cell_[point] != kNoCarrier && body_.broken[cell_[point]] != 0;
-  shape.shapeless = broken || !(f.determinant() > kLeastVolume && f.squaredNorm() < kMostStretch);
+  const double volume = f.determinant(), stretch = f.squaredNorm();
+  shape.shapeless = broken || !(volume > kLeastVolume && stretch < kMostStretch);
   if (!shape.shapeless) shape.inverse = f.inverse();
+  if (shape.shapeless || volume < 3 * kLeastVolume || stretch > 0.5 * kMostStretch) {
+    shape.normal_rate = std::numeric_limits<double>::infinity();
+    return shape;
+  }
+  // a bound of the spectral norm (Golub and Van Loan, section 2.3.3)
+  const Mat3 size = shape.inverse.cwiseAbs();
+  shape.normal_rate = std::sqrt(size.colwise().sum().maxCoeff() * size.rowwise().sum().maxCoeff());
   return shape;
 }
 
@@ -104,15 +112,10 @@ PointState ContactSurface::at(std::uint32_t point, const State& state, const Cel
     made.side.position += from.at.weights[a] * state.displacement[from.at.elements[a]];
   made.side.radius = from.radius;
   if (from.shape == ContactShape::ball) return made;
-  if (shape.shapeless) {
-    made.normal_rate = std::numeric_limits<double>::infinity();
-    return made;
-  }
+  if (shape.shapeless) return made;
   made.side.own_plane = from.shape == ContactShape::face ? 1 : 0;
   made.side.normal = (shape.inverse.transpose() * from.normal).normalized();
-  // a bound of the spectral norm (Golub and Van Loan, section 2.3.3)
-  const Mat3 size = shape.inverse.cwiseAbs();
-  made.normal_rate = std::sqrt(size.colwise().sum().maxCoeff() * size.rowwise().sum().maxCoeff());
+  made.normal_rate = shape.normal_rate;
   return made;
 }
 

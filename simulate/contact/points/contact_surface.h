@@ -15,12 +15,13 @@ namespace flexel::simulate {
 struct CellShape {
   Mat3 inverse = Mat3::Identity();  // F^-1 of its cell
   bool shapeless = false;           // the cell is broken or too distorted for a normal
+  // Change of a normal, at most, by that of F; infinity where a little more would make it shapeless.
+  double normal_rate = 0;
 };
 
 // A contact point in a state.
 struct PointState : CellShape {
   ContactSide side;
-  double normal_rate = 0;  // change of the normal, at most, by that of F; infinity where shapeless
 };
 
 // A part that does not deform.
