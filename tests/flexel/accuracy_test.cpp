@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/stop.h"
 #include "flexel/accuracy/run_error.h"
 
 namespace flexel::commands {
@@ -98,6 +99,44 @@ TEST(Accuracy, WithinIsTheFinestThatFits) {
   // The runs take no time of their own: about 0.85 x 20 s at 1e-4 s a cell
   EXPECT_LT(report.runs.back().seconds, 20);
   EXPECT_GT(report.runs.back().seconds, 8);
+}
+
+// Lattices of spacings below `ends` take for ever.
+SolveAt endless_below(double ends) {
+  return [=, solve = made_up([](double h) { return 1 + h; })](std::optional<double> size,
+                                                              const GoesOn& goes_on) {
+    while (size && *size < ends) check_stop();
+    return solve(size, goes_on);
+  };
+}
+
+AccuracyReport choose_by_default(const SolveAt& solve) {
+  AccuracyGoal goal;
+  goal.error = 0.05;
+  goal.within = 0.1;
+  goal.by_default = true;
+  goal.began = std::chrono::steady_clock::now();
+  AccuracyReport report;
+  Progress silent("", Progress::Mode::silent);
+  (void)choose_resolution(goal, solve, report, silent);
+  return report;
+}
+
+TEST(Accuracy, ARunThatDoesNotEndIsMadeWithFewerCells) {
+  const AccuracyReport report = choose_by_default(endless_below(0.1));
+  EXPECT_EQ(report.runs.front().failure, "took too long");
+  EXPECT_EQ(report.runs.front().size, 0.08);
+  EXPECT_GT(report.runs.back().size, 0.16);
+  EXPECT_GT(report.runs.back().cells, 0);
+}
+
+TEST(Accuracy, RunsThatNeverEndStopTheCommand) {
+  try {
+    (void)choose_by_default(endless_below(1e9));
+    FAIL() << "should have stopped";
+  } catch (const TimeoutError& error) {
+    EXPECT_NE(std::string(error.what()).find("no run ended in"), std::string::npos) << error.what();
+  }
 }
 
 // A wall that is cut once more below a size has twice the cells there: counted before anything is solved.
