@@ -101,44 +101,6 @@ TEST(Accuracy, WithinIsTheFinestThatFits) {
   EXPECT_GT(report.runs.back().seconds, 8);
 }
 
-// Lattices of spacings below `ends` take for ever.
-SolveAt endless_below(double ends) {
-  return [=, solve = made_up([](double h) { return 1 + h; })](std::optional<double> size,
-                                                              const GoesOn& goes_on) {
-    while (size && *size < ends) check_stop();
-    return solve(size, goes_on);
-  };
-}
-
-AccuracyReport choose_by_default(const SolveAt& solve) {
-  AccuracyGoal goal;
-  goal.error = 0.05;
-  goal.within = 0.1;
-  goal.by_default = true;
-  goal.began = std::chrono::steady_clock::now();
-  AccuracyReport report;
-  Progress silent("", Progress::Mode::silent);
-  (void)choose_resolution(goal, solve, report, silent);
-  return report;
-}
-
-TEST(Accuracy, ARunThatDoesNotEndIsMadeWithFewerCells) {
-  const AccuracyReport report = choose_by_default(endless_below(0.1));
-  EXPECT_EQ(report.runs.front().failure, "took too long");
-  EXPECT_EQ(report.runs.front().size, 0.08);
-  EXPECT_GT(report.runs.back().size, 0.16);
-  EXPECT_GT(report.runs.back().cells, 0);
-}
-
-TEST(Accuracy, RunsThatNeverEndStopTheCommand) {
-  try {
-    (void)choose_by_default(endless_below(1e9));
-    FAIL() << "should have stopped";
-  } catch (const TimeoutError& error) {
-    EXPECT_NE(std::string(error.what()).find("no run ended in"), std::string::npos) << error.what();
-  }
-}
-
 // A wall that is cut once more below a size has twice the cells there: counted before anything is solved.
 TEST(Accuracy, ALatticeWithMoreCellsThanThoughtIsGivenUp) {
   const SolveAt smooth = made_up([](double h) { return 1 + h; }, 1e-4);
@@ -308,6 +270,32 @@ TEST(UsualSize, WhatIsWrongIsSaidAtOnce) {
   };
   EXPECT_THROW(choose_by_default(refused), InputError);
   EXPECT_EQ(made, 2);  // the spacing, and one run
+}
+
+// Lattices of spacings below `ends` take for ever.
+SolveAt endless_below(double ends) {
+  return [=, solve = made_up([](double h) { return 1 + h; })](std::optional<double> size,
+                                                              const GoesOn& goes_on) {
+    while (size && *size < ends) check_stop();
+    return solve(size, goes_on);
+  };
+}
+
+TEST(Accuracy, ARunThatDoesNotEndIsMadeWithFewerCells) {
+  const AccuracyReport report = choose_by_default(endless_below(0.1), 0.05, 0.1).report;
+  EXPECT_EQ(report.runs.front().failure, "took too long");
+  EXPECT_EQ(report.runs.front().size, 0.08);
+  EXPECT_GT(report.runs.back().size, 0.16);
+  EXPECT_GT(report.runs.back().cells, 0U);
+}
+
+TEST(Accuracy, RunsThatNeverEndStopTheCommand) {
+  try {
+    (void)choose_by_default(endless_below(1e9), 0.05, 0.1);
+    FAIL() << "should have stopped";
+  } catch (const TimeoutError& error) {
+    EXPECT_NE(std::string(error.what()).find("no run ended in"), std::string::npos) << error.what();
+  }
 }
 
 }  // namespace
