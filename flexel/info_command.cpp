@@ -289,9 +289,12 @@ std::string info_json(const Surface& surface, const Known& known) {
 std::string words_of(const Surface& surface) {
   std::string text = "xmin\nxmax\nymin\nymax\nzmin\nzmax\n";
   for (const SurfacePart& part : surface.parts) text += printable(part.name) + "\n";
+  std::vector<PartInfo> parts(surface.parts.size());
+  for (std::size_t p = 0; p < parts.size(); ++p) parts[p].name = surface.parts[p].name;
+  for (const SurfaceFace& face : surface.faces) ++parts[face.part].called[face.name];
   const std::vector<std::uint32_t> numbers = face_numbers(surface);
   for (std::uint32_t f = 0; f < surface.faces.size(); ++f)
-    text += printable(selection_of(f, numbers, surface, surface.parts[surface.faces[f].part].name)) + "\n";
+    text += printable(selection_of(f, numbers, surface, parts[surface.faces[f].part])) + "\n";
   return text;
 }
 

@@ -1,6 +1,7 @@
 // flexel-map: a deformed body in, its surface deformed out; or any other surface, points, or a series of
 // bodies.
 #include <cmath>
+#include <filesystem>
 
 #include "base/error.h"
 #include "base/files/files.h"
@@ -331,10 +332,24 @@ std::optional<Binding> own_binding(const Arguments& arguments, const Body& body,
   return binding;
 }
 
+// The part's own file is no input here, and yet nobody means to lose it.
+void keep_source(const Body& body, const std::string& output) {
+  namespace fs = std::filesystem;
+  std::error_code ignored;
+  const std::string name = fs::path(output).filename().string();
+  for (const SurfaceSource& source : body.surface.sources)
+    if (source.file == name && fs::is_regular_file(output, ignored) &&
+        content_hash(read_all(output)) == source.hash)
+      throw InputError(output,
+                       "is the part that the body was made of: name another output, or add --force to "
+                       "replace it");
+}
+
 void map_one(const Arguments& arguments, Plan& plan, Progress& progress) {
   Run run(arguments, plan, progress);
   progress.stage("read");
   Body body = read_body(arguments.body);
+  if (!arguments.force) keep_source(body, arguments.output);
   run.take_surface(body);
   use_field(body, arguments.map, plan.options);
   progress.stage("map");

@@ -9,10 +9,10 @@
 #include <cmath>
 #include <exception>
 
-#include "base/resources.h"
 #include "base/error.h"
 #include "base/human.h"
 #include "base/parallel.h"
+#include "base/resources.h"
 #include "base/stop.h"
 #include "base/units.h"
 #include "flexel/accuracy/run_error.h"
@@ -54,9 +54,9 @@ double peak_memory() {
   return 1024.0 * static_cast<double>(usage.ru_maxrss);
 }
 
-constexpr double kFewer = 10;         // times fewer cells, where a first run takes too long
-constexpr double kSecondShare = 0.6;  // of the time, for one of the two
-constexpr double kBusiest = 3;        // a machine so busy gets so many times as long
+constexpr double kFewer = 10;  // times fewer cells, where a first run takes too long
+constexpr double kFirstShareOfTime = 0.8, kSecondShareOfTime = 0.6;  // with --within; by default
+constexpr double kBusiest = 3;  // a machine so busy gets so many times as long
 
 constexpr int kGivenUp = 3;  // lattices that turn out too large, until the search ends
 
@@ -108,6 +108,10 @@ class Search {
         if (!limit.passed() && !(all && all->passed())) throw;
         go_coarser(size);
       } catch (const InputError& error) {
+        if (coarser_)
+          throw TimeoutError(
+              fmt::format("a first run took too long, and one of fewer cells is refused: {}; {}",
+                          error.what(), more_time()));
         fail(size, error.what(), failures++);
       } catch (const DivergedError& error) {
         fail(size, error.what(), failures++);
@@ -121,22 +125,25 @@ class Search {
   // s, until the first run of the usual count is given up, and one of fewer cells.
   [[nodiscard]] double first_patience() const {
     if (goal_.by_default)
-      return (coarser_ ? kSecondShare : 1) * busyness() * goal_.within.value_or(kUsualLimit);
-    return std::max(coarser_ ? patience_left() : kSecondShare * patience_left(), kFirstPatience);
+      return (coarser_ ? kSecondShareOfTime : 1) * busyness() * goal_.within.value_or(kUsualLimit);
+    return std::max(coarser_ ? patience_left() : kFirstShareOfTime * patience_left(), kFirstPatience);
+  }
+
+  [[nodiscard]] const char* more_time() const {
+    return goal_.by_default ? "--within 5min gives it longer, --count 1000 has no limit"
+                            : "a longer --within gives it more time";
   }
 
   // After the run at `size` (0: its lattice was not made) took too long.
   void go_coarser(double& size) {
     const std::string gone = human_seconds(seconds_since(goal_.began));
-    const char* more = goal_.by_default ? "--within 5min gives it longer, --count 1000 has no limit"
-                                        : "a longer --within gives it more time";
     if (size == 0)
-      throw TimeoutError(fmt::format("the lattice of a first run was not made in {}: {}", gone, more));
+      throw TimeoutError(fmt::format("the lattice of a first run was not made in {}: {}", gone, more_time()));
     if (coarser_)
       throw TimeoutError(
           fmt::format("no run ended in {}, though one of few cells was tried: check the unit of the part and "
                       "the size of the load; {}",
-                      gone, more));
+                      gone, more_time()));
     coarser_ = true;
     note_failure(size, "took too long");
     size = nearest_size(size * std::cbrt(kFewer));

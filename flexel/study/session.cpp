@@ -11,10 +11,10 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "base/resources.h"
 #include "base/error.h"
 #include "base/files/files.h"
 #include "base/program/own_program.h"
+#include "base/resources.h"
 #include "base/units.h"
 #include "flexel/study/runs/calculix.h"
 #include "voxelize/memory.h"

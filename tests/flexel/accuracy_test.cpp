@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/stop.h"
 #include "flexel/accuracy/run_error.h"
 
 namespace flexel::commands {
@@ -269,6 +270,32 @@ TEST(UsualSize, WhatIsWrongIsSaidAtOnce) {
   };
   EXPECT_THROW(choose_by_default(refused), InputError);
   EXPECT_EQ(made, 2);  // the spacing, and one run
+}
+
+// Lattices of spacings below `ends` take for ever.
+SolveAt endless_below(double ends) {
+  return [=, solve = made_up([](double h) { return 1 + h; })](std::optional<double> size,
+                                                              const GoesOn& goes_on) {
+    while (size && *size < ends) check_stop();
+    return solve(size, goes_on);
+  };
+}
+
+TEST(Accuracy, ARunThatDoesNotEndIsMadeWithFewerCells) {
+  const AccuracyReport report = choose_by_default(endless_below(0.1), 0.05, 0.1).report;
+  EXPECT_EQ(report.runs.front().failure, "took too long");
+  EXPECT_EQ(report.runs.front().size, 0.08);
+  EXPECT_GT(report.runs.back().size, 0.16);
+  EXPECT_GT(report.runs.back().cells, 0U);
+}
+
+TEST(Accuracy, RunsThatNeverEndStopTheCommand) {
+  try {
+    (void)choose_by_default(endless_below(1e9), 0.05, 0.1);
+    FAIL() << "should have stopped";
+  } catch (const TimeoutError& error) {
+    EXPECT_NE(std::string(error.what()).find("no run ended in"), std::string::npos) << error.what();
+  }
 }
 
 }  // namespace

@@ -47,6 +47,17 @@ def test_map_does_not_replace_what_it_reads():
     expect_ok(run("flexel-map", "body.vtu", "--onto", "box.stl", "-o", "box.stl", "--force", "--quiet"))
 
 
+def test_map_does_not_replace_the_part_that_the_body_was_made_of():
+    box("own.stl")
+    part = open("own.stl", "rb").read()
+    expect_ok(run("flexel-voxelize", "own.stl", "--size", "5 mm", "-o", "body.vtu", "--quiet"))
+    expect_error(run("flexel-map", "body.vtu", "-o", "own.stl"), "flexel-map", "is the part that the body was made of", "--force")
+    expect(open("own.stl", "rb").read() == part, "the part was changed")
+    expect_ok(run("flexel-map", "body.vtu", "-o", "copy.stl", "--quiet"))
+    expect_ok(run("flexel-map", "body.vtu", "-o", "copy.stl", "--quiet"))
+    expect_ok(run("flexel-map", "body.vtu", "-o", "own.stl", "--force", "--quiet"))
+
+
 def test_frames_of_a_series_are_not_replaced():
     body()
     falls = write("falls.toml", 'material = "steel"\n[gravity]\nacceleration = ["0 m/s2", "0 m/s2", "-9.81 m/s2"]\n'
