@@ -7,11 +7,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/resources.h"
 #include "base/error.h"
 #include "base/files/output_file.h"
 #include "base/human.h"
 #include "base/parallel.h"
+#include "base/resources.h"
 #include "base/units.h"
 #include "formats/cad/cad_job.h"
 #include "formats/common/file_formats.h"

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "base/resources.h"
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/resources.h"
 #include "formats/cad/cad_surface.h"
 #include "formats/common/readers.h"
 

@@ -5,9 +5,9 @@
 
 #include <algorithm>
 
-#include "base/resources.h"
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/resources.h"
 #include "formats/part/topology.h"
 
 namespace flexel {

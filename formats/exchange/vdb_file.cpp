@@ -1,9 +1,9 @@
 // The body goes to flexel-meshes as a body file.
 #include "formats/exchange/vdb_file.h"
 
-#include "base/resources.h"
 #include "base/files/output_file.h"
 #include "base/parallel.h"
+#include "base/resources.h"
 #include "formats/common/mesh_job.h"
 #include "formats/lattice/body_file.h"
 

@@ -9,8 +9,8 @@ namespace flexel::simulate {
 struct Checkpoint;  // simulate/time/checkpoint.h
 
 struct SimulateOptions {
-  int threads = 0;                // 0: every core
-  std::string failed_output;      // where the last good state goes when the run fails; "" for nowhere
+  int threads = 0;            // 0: every core
+  std::string failed_output;  // where the last good state goes when the run fails; "" for nowhere
   // Timed runs: where the books go (CSV), and the frames (.pvd); "" for nowhere. docs/reference/motion.md
   std::string history, series;
   bool compress = false;  // the frames
