@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/human.h"
 #include "base/stop.h"
+#include "formats/lattice/stress_columns.h"
 #include "simulate/estimate/stress_singularity.h"
 #include "simulate/matter/fragments.h"
 #include "simulate/matter/interpolation_weights.h"
@@ -145,6 +146,17 @@ QuadraticSolution equilibrium(const QuadraticSystem& system, const Scene& scene,
   return solution;
 }
 
+// What a run finds at the vertices goes by these names.
+void tell_replaced_columns(const Body& body, Progress& progress) {
+  if (has_surface_stress(body)) return;  // an earlier run's
+  for (const char* name : {kVonMisesColumn, kPrincipalColumn, kYieldColumn})
+    if (body.surface.vertex_columns.contains(name))
+      progress.warn(
+          fmt::format("the part's own column \"{}\" is replaced by what this run finds: give it "
+                      "another name in the part's file to keep it",
+                      name));
+}
+
 }  // namespace
 
 bool asks_for_quadratic(const Scene& scene) {
@@ -194,6 +206,7 @@ SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptio
   judge(system, solution, result.elastic_energy, progress);
   sum_up_imbalance(result);
   for (const std::string& warning : warnings_of(result)) progress.warn(scene.name + ": " + warning);
+  if (options.stress) tell_replaced_columns(body, progress);
   if (options.stress) report_stress(problem, field_stresses(system, solution, state), body, result);
   if (options.estimate) mark_singular(body, system.tied_elements(), result, kBesideInField);
   const StiffnessPattern pattern =

@@ -4,7 +4,7 @@ import json
 import math
 import pathlib
 
-from harness import Skip, expect, expect_ok, main, run, write
+from harness import SCENE, Skip, expect, expect_ok, main, run, write
 
 MATERIAL = """material = "m"
 model = "quadratic"
@@ -148,6 +148,19 @@ def test_stresses_of_an_earlier_run_go():
     solve(part, "7 mm", MATERIAL + QUARTER + PLANE + INSIDE, "--no-estimate")
     expect_ok(run("flexel-simulate", "scene.toml", "bent.vtu", "--no-stress", "--no-estimate", "-o", "again.vtu"))
     expect(b"von_mises" not in pathlib.Path("again.vtu").read_bytes(), "stresses of the run before")
+
+
+def test_a_column_of_the_part_is_not_replaced_in_silence():
+    corners = [(x, y, z) for z in (0, 10) for y in (0, 10) for x in (0, 40)]
+    quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    head = ["ply", "format ascii 1.0", "element vertex 8"] + [f"property double {name}" for name in ("x", "y", "z", "von_mises")]
+    head += ["element face 6", "property list uchar int vertex_indices", "end_header"]
+    lines = head + [f"{x} {y} {z} 7" for x, y, z in corners] + ["4 " + " ".join(map(str, quad)) for quad in quads]
+    part = write("own.ply", "\n".join(lines) + "\n")
+    _, done = solve(part, "5 mm", 'model = "quadratic"\n' + SCENE, "--no-estimate")
+    expect('column "von_mises" is replaced' in done.err, done)
+    again = expect_ok(run("flexel-simulate", "scene.toml", "bent.vtu", "--no-estimate", "-o", "again.vtu"))
+    expect("is replaced" not in again.err, again)
 
 
 if __name__ == "__main__":
