@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "base/math/small_matrices.h"
+#include "formats/lattice/fragments_of_body.h"
 #include "formats/part/topology.h"
 #include "simulate/models/rest_shape.h"
 
@@ -53,6 +54,16 @@ Integrals integrals_of_cells(const Problem& problem, std::uint32_t p, const Vec3
     add(share[c] * whole, middle);
   }
   return sum;
+}
+
+// Whether the matter of a part is evenly what its surface encloses, as far as edits and events tell.
+bool is_as_voxelized(const Body& body, const Part& part) {
+  if (body.notes.contains(kCarvedNote)) return false;
+  const auto change = body.cell_columns.find("density_change");
+  if (change == body.cell_columns.end()) return true;
+  const auto from = change->second.values.begin() + static_cast<std::ptrdiff_t>(part.cell_begin);
+  const auto to = change->second.values.begin() + static_cast<std::ptrdiff_t>(part.cell_end);
+  return std::all_of(from, to, [](double value) { return value == 0; });
 }
 
 // Measured in m^3, of closed surfaces.
@@ -123,7 +134,7 @@ std::vector<MassMoments> rigid_moments(const Problem& problem) {
     const Vec3 origin = body.rest[part.element_begin];
     const Integrals cells = integrals_of_cells(problem, p, origin);
     moments[p] = cells.about_centre(origin, cells.mass);
-    if (part.placement != Placement::corner) continue;
+    if (part.placement != Placement::corner || !is_as_voxelized(body, part)) continue;
     if (welded.empty()) {
       welded = weld(body.surface.vertices);
       const Triangles triangles = triangulate(body.surface);

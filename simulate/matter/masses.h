@@ -13,7 +13,8 @@ namespace flexel::simulate {
 [[nodiscard]] std::vector<double> lumped_masses(const Problem& problem);
 
 // (parts) Of rigid parts; the others' are 0. Of the volume that a part's surface encloses, where that is closed
-// and as large as its cells say (one that an event has carved is not); else of its cells, each filled evenly.
+// and as large as its cells say, and neither its density was edited nor anything carved; else of its cells, each
+// filled evenly.
 [[nodiscard]] std::vector<MassMoments> rigid_moments(const Problem& problem);
 
 }  // namespace flexel::simulate

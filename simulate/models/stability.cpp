@@ -129,7 +129,8 @@ double damping_growth(const SpringKind& kind, const CellKind& cell, const CellVe
 
 }  // namespace
 
-std::vector<double> damping_growth(const Problem& problem, const std::vector<Vec3>& displacement) {
+std::vector<double> damping_growth(const Problem& problem, const std::vector<Vec3>& displacement,
+                                   const std::vector<double>& frequencies) {
   const Body& body = problem.body;
   const std::vector<std::uint8_t> active = active_cells(problem);
   std::vector<double> stiffness, mass;
@@ -140,7 +141,6 @@ std::vector<double> damping_growth(const Problem& problem, const std::vector<Vec
     mass = mass_shares(body);
   }
   std::vector<double> result;
-  const std::vector<double> frequencies = cell_frequencies(problem);
   for (std::size_t p = 0; p < body.parts.size(); ++p) {
     const Part& part = body.parts[p];
     const CellKind cells = cell_kind(part.lattice, problem.materials[p]);

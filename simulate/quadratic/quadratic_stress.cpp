@@ -251,10 +251,15 @@ struct StressedSample {
 std::vector<StressedSample> stressed_samples(const QuadraticSystem& system) {
   std::vector<StressedSample> found;
   const std::vector<std::uint32_t>& cells = system.nodes().cells;
-  for (const SurfaceSample& sample : surface_samples(system.problem().body, system.pressure())) {
+  const Body& body = system.problem().body;
+  const std::vector<std::uint8_t> held = system.held_elements();
+  for (SurfaceSample& sample : surface_samples(body, system.pressure())) {
     const auto cell = std::lower_bound(cells.begin(), cells.end(), sample.cell);
-    if (cell != cells.end() && *cell == sample.cell)
-      found.push_back({sample, static_cast<std::uint32_t>(cell - cells.begin())});
+    if (cell == cells.end() || *cell != sample.cell) continue;
+    const auto& corners = body.cell_elements[sample.cell];
+    if (std::any_of(corners.begin(), corners.end(), [&](std::uint32_t e) { return held[e] != 0; }))
+      sample.pressure = kUnknownPressure;
+    found.push_back({sample, static_cast<std::uint32_t>(cell - cells.begin())});
   }
   return found;
 }

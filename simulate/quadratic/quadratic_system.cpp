@@ -267,6 +267,14 @@ std::vector<Vec3> QuadraticSystem::prescribed(double share) const {
   return value;
 }
 
+std::vector<std::uint8_t> QuadraticSystem::held_elements() const {
+  std::vector<std::uint8_t> held(problem_.body.element_count(), 0);
+  for (const NitscheSupport& support : supports_)
+    for (const std::uint32_t node : support.nodes)
+      if (node < nodes_.elements.size()) held[nodes_.elements[node]] = 1;
+  return held;
+}
+
 std::vector<std::uint8_t> QuadraticSystem::tied_elements() const {
   std::vector<std::uint8_t> tied(problem_.body.element_count(), 0);
   const auto mark = [&](std::uint32_t node, const Tie& tie) {

@@ -55,6 +55,8 @@ class QuadraticSystem {
                                    double share = 1) const;
   // (polygons) Pa, what presses on the surface; kUnknownPressure where a support or another load acts.
   [[nodiscard]] const std::vector<double>& pressure() const { return pressure_; }
+  // (elements) 1 where a support selects elements, not a face: what presses on the surface of their cells is not known.
+  [[nodiscard]] std::vector<std::uint8_t> held_elements() const;
   // What of the loaded surface bears on no matter, for people.
   [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
   // (elements) 2 where a support holds all axes, 1 where it holds some, else 0.

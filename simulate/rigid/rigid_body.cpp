@@ -1,11 +1,15 @@
 // Poses and momenta of rigid parts.
 #include "simulate/rigid/rigid_body.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
+#include "base/error.h"
 #include "base/math/small_matrices.h"
 
 namespace flexel::simulate {
@@ -14,6 +18,7 @@ namespace {
 constexpr double kLargestTurn = 0.5;  // rad, in one go
 constexpr double kRounding = 1e-16;   // share of the angular momentum
 constexpr int kMostRounds = 60;
+constexpr double kMostPieces = 1e4;  // of a step, of that turn
 
 Vec3 angular_velocity(const RigidBody& rigid, const Mat3& rotation) {
   return rotation * rigid.inverse_inertia * rotation.transpose() * rigid.spin;
@@ -112,6 +117,11 @@ Pose drifted(const RigidBody& rigid, double step) {
   Pose next{rigid.pose.translation + step / rigid.mass * rigid.momentum, rigid.pose.rotation};
   const double fastest = rigid.inverse_inertia.norm() * rigid.spin.norm();  // rad/s
   const double pieces = std::ceil(std::max(step * fastest / kLargestTurn, 1.0));
+  if (!(pieces <= kMostPieces))
+    throw DivergedError(fmt::format(
+        "a rigid part spins at {:.3g} rad/s, {:.3g} turns in a step of {:.3g} s: a shorter [run] step, "
+        "or a slower spin",
+        fastest, step * fastest / (2 * std::numbers::pi), step));
   for (double piece = 0; piece < pieces; ++piece)
     next.rotation = next.rotation * turned_by(turn_in(rigid, next.rotation, step / pieces));
   return next;

@@ -5,12 +5,23 @@
 #include <cmath>
 #include <limits>
 
+#include "base/parallel.h"
 #include "simulate/models/damping_factors.h"
 #include "simulate/models/stability.h"
 #include "simulate/stepping/staged_damping.h"
 
 namespace flexel::simulate {
 namespace {
+
+constexpr double kGrowthAhead = 1.25, kLeastAhead = 1.1;
+
+struct Fastest {
+  double squared = 0;  // m^2/s^2
+  Fastest& operator+=(const Fastest& other) {
+    squared = std::max(squared, other.squared);
+    return *this;
+  }
+};
 
 // Of each part, by what edits made of that of its cells and elements.
 std::vector<double> longest_damping(const Body& body, const std::vector<double>& of_parts) {
@@ -53,7 +64,7 @@ bool StepBound::damps_explicitly() const {
 void StepBound::look(const State& state, const PaperModel* paper, const std::vector<double>& mass) {
   stiffening_ = stiffening(problem_, state.displacement, plan_);
   if (std::any_of(damping_.begin(), damping_.end(), [](double tau) { return tau > 0; }))
-    growth_ = damping_growth(problem_, state.displacement);
+    growth_ = damping_growth(problem_, state.displacement, cells_);
   if (paper) connections_ = paper->frequencies(state, mass);
   added_ = 0;
   for (const ActiveEffect& effect : effects_) added_ += effect->added_frequency(state, mass);
@@ -76,12 +87,30 @@ double StepBound::longest(bool staged_damping) const {
   return longest;
 }
 
-double StepBound::damping_rate() const {
-  constexpr double kGrowthAhead = 1.1;
+double StepBound::bare_damping_rate() const {
   double largest = 0;
   for (std::size_t p = 0; p < cells_.size(); ++p)
     largest = std::max(largest, damping_[p] * cells_[p] * growth_[p]);
-  return kGrowthAhead * largest;
+  return largest;
+}
+
+double StepBound::damping_rate() const {
+  return kGrowthAhead * bare_damping_rate();
+}
+
+bool StepBound::outgrows(double rate, const State& state, double step, std::uint64_t steps) {
+  constexpr double kTravel = 0.05, kMostSteps = 16;
+  const double fastest = std::sqrt(parallel_sum<Fastest>(state.velocity.size(), [&](std::size_t e) {
+                                     return Fastest{state.velocity[e].squaredNorm()};
+                                   }).squared);
+  double narrowest = std::numeric_limits<double>::infinity();
+  for (const Part& part : problem_.body.parts)
+    narrowest = std::min(narrowest, part.lattice.spacing.minCoeff());
+  const double allowed = kTravel * narrowest / (step * fastest);
+  const auto every = static_cast<std::uint64_t>(std::clamp(allowed, 1.0, kMostSteps));
+  if (steps % every != 0) return false;
+  growth_ = damping_growth(problem_, state.displacement, cells_);
+  return kLeastAhead * bare_damping_rate() > rate;
 }
 
 }  // namespace flexel::simulate

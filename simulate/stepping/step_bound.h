@@ -1,6 +1,7 @@
 // The longest stable step of a whole run: cells, connections and the stiffness that effects add
 // (simulate/models/stability.h), in the state that was last looked at.
 #pragma once
+#include <cstdint>
 #include <vector>
 
 #include "simulate/effects/effect.h"
@@ -21,10 +22,16 @@ class StepBound {
 
   // s; `staged_damping`: that of the cells is taken in stages (StagedDamping). 0 or less: a cell is folded.
   [[nodiscard]] double longest(bool staged_damping) const;
-  // 1/s, bounds the rates at which the damping of the cells alone takes velocities; until the next look, too.
+  // 1/s, bounds the rates at which the damping of the cells alone takes velocities, in the state of the last look and
+  // until cells are a tenth longer than there.
   [[nodiscard]] double damping_rate() const;
+  // Whether `rate` bounds them in `state` no more. Looks at the cells only where they may have changed: every so many
+  // steps that nothing has moved by a twentieth of a spacing since, at its speed.
+  [[nodiscard]] bool outgrows(double rate, const State& state, double step, std::uint64_t steps);
 
  private:
+  [[nodiscard]] double bare_damping_rate() const;
+
   const Problem& problem_;
   const std::vector<ActiveEffect>& effects_;
   const KernelEffects& plan_;

@@ -228,6 +228,11 @@ void TimeSegment::adapt_step(Clock& clock) {
     choose_step(clock);
 }
 
+void TimeSegment::renew_damping(Clock& clock) {
+  if (staged_ && bound_->outgrows(clock.damping_rate, state_, clock.step, clock.steps))
+    clock.damping_rate = bound_->damping_rate();
+}
+
 bool TimeSegment::needs_step_recheck() const {
   if (guard_ && guard_->needs_step_recheck()) return true;
   return std::any_of(effects_.begin(), effects_.end(),

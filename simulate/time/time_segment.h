@@ -60,6 +60,8 @@ class TimeSegment {
   void refuse_unsound();
   // Chooses anew where the length does not suit what was last looked at.
   void adapt_step(Clock& clock);
+  // Before every step: the rates of damping in stages where cells have stretched since the last look.
+  void renew_damping(Clock& clock);
   // Whether an effect cannot wait for the next look.
   [[nodiscard]] bool needs_step_recheck() const;
   // One step. With `history` its books, and a row of them where `row`. Throws DivergedError.

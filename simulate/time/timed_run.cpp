@@ -285,6 +285,7 @@ void TimedRun::play_until(double end, bool resumed) {
   const std::uint64_t between = segment_->is_implicit() ? 1 : kCheck;
   while (goes_on()) {
     if (clock_.steps % between == 0 || segment_->needs_step_recheck() || stop_is_due()) check();
+    segment_->renew_damping(clock_);
     step();
     if (series_ && *segment_->state().time >= next_frame_ * (1 - 1e-9)) write_frame();
   }

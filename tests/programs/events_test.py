@@ -89,5 +89,26 @@ def test_refusals():
         expect_only("body.vtu", "scene.toml")
 
 
+def test_a_rigid_part_of_edited_density_turns_as_a_stiff_one():
+    """Heavy on one half and light on the other, its whole mass as before: pushed at the middle it turns about the heavy half."""
+    write("bar.stl", binary_stl(box_triangles((60, 10, 10))))
+    expect_ok(run("flexel-voxelize", "bar.stl", "--size", "5 mm", "-o", "bar.vtu"))
+    edit = ('[[event]]\nat = "0 s"\ndo = "edit"\nwhere = {{ box = {{ min = ["{} mm", "-1 mm", "-1 mm"], max = ["{} mm", "11 mm", "11 mm"] }} }}\n'
+            'density = {}\n')
+    ends = {}
+    for rigid in ("true", "false"):
+        write("scene.toml", 'material = "m"\n[materials.m]\nyoung = "1 GPa"\npoisson = 0.3\ndensity = "1000 kg/m3"\n'
+              f"[parts.bar]\nrigid = {rigid}\n" + edit.format(29, 61, .1) + edit.format(-1, 31, 1.9) +
+              '[[load]]\nwhere = "zmin"\nforce = ["0 N", "0 N", "0.01 N"]\n'
+              '[[probe]]\nname = "heavy"\nat = ["0 mm", "5 mm", "5 mm"]\n[[probe]]\nname = "light"\nat = ["60 mm", "5 mm", "5 mm"]\n'
+              '[run]\ntime = "20 ms"\n')
+        found = summary("scene.toml", "bar.vtu", "-o", "out.vtu", "--no-stress")["probes"]
+        ends[rigid] = [probe["displacement"][2] for probe in found]
+    heavy, light = ends["true"]
+    expect(heavy < 0 < light, ends)
+    for stiff, soft in zip(ends["true"], ends["false"]):
+        expect(abs(stiff - soft) < 0.2 * abs(soft), ends)
+
+
 if __name__ == "__main__":
     main(globals())

@@ -217,5 +217,43 @@ def test_memory():
         expect(each <= 200, f"{model}: {each:.0f} bytes an element")
 
 
+def test_long_damping_is_stable_while_a_part_is_pulled_to_thrice_its_length():
+    """The rates of damping grow with the stretch: its stages have to follow between two looks at the step."""
+    write("bar.stl", binary_stl(box_triangles((60, 10, 10))))
+    expect_ok(run("flexel-voxelize", "bar.stl", "--size", "5 mm", "-o", "bar.vtu"))
+    for speed, tau in ((3, "0.1 s"), (1, "0.1 s"), (3, "0.01 s")):
+        whole = f"{.12 / speed} s"
+        write("scene.toml", f"""material = "m"
+[materials.m]
+young = "20 kPa"
+poisson = 0.3
+density = "1000 kg/m3"
+[damping]
+time = "{tau}"
+[[fix]]
+where = "xmin"
+[[move]]
+where = "xmax"
+displacement = ["120 mm", "0 mm", "0 mm"]
+time = ["0 s", "{whole}"]
+factor = [0, 1]
+[run]
+time = "{whole}"
+""")
+        expect_ok(run("flexel-simulate", "scene.toml", "bar.vtu", "-o", "out.vtu", "--history", "h.csv"))
+        rows = list(csv.DictReader(open("h.csv", encoding="utf-8")))
+        column = lambda name: [float(row[next(key for key in row if key.startswith(name))]) for row in rows]
+        work, residual = column("work"), column("residual")
+        expect(max(map(abs, residual)) < 0.02 * work[-1], (speed, tau, max(map(abs, residual)), work[-1]))
+
+
+def test_a_spin_beyond_all_steps_is_refused():
+    write("bar.stl", binary_stl(box_triangles((60, 10, 10))))
+    expect_ok(run("flexel-voxelize", "bar.stl", "--size", "5 mm", "-o", "bar.vtu"))
+    write("scene.toml", 'material = "steel"\n[parts.bar]\nrigid = true\n[[velocity]]\nwhere = "bar"\nspin = { axis = [0, 0, 1], through = ["30 mm", "5 mm", "5 mm"], '
+          'angle_per_second = "1e14 rad" }\n[run]\ntime = "1 s"\n')
+    expect_error(run("flexel-simulate", "scene.toml", "bar.vtu", "-o", "out.vtu", timeout=30), "flexel-simulate", "spins at", code=3)
+
+
 if __name__ == "__main__":
     main(globals())

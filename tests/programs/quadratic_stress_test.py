@@ -4,7 +4,7 @@ import json
 import math
 import pathlib
 
-from harness import SCENE, Skip, expect, expect_ok, main, run, write
+from harness import SCENE, Skip, ascii_stl, box_triangles, expect, expect_ok, main, run, write
 
 MATERIAL = """material = "m"
 model = "quadratic"
@@ -148,6 +148,32 @@ def test_stresses_of_an_earlier_run_go():
     solve(part, "7 mm", MATERIAL + QUARTER + PLANE + INSIDE, "--no-estimate")
     expect_ok(run("flexel-simulate", "scene.toml", "bent.vtu", "--no-stress", "--no-estimate", "-o", "again.vtu"))
     expect(b"von_mises" not in pathlib.Path("again.vtu").read_bytes(), "stresses of the run before")
+
+
+def test_supports_of_elements_press_as_those_of_faces():
+    """A cube held across five faces, pressed on the sixth: s_xx = s_yy = nu / (1 - nu) p, whether sides or boxes select what is held."""
+    part = write("cube.stl", ascii_stl(box_triangles((10, 10, 10))).decode())
+    material = """model = "quadratic"
+material = "m"
+[materials.m]
+young = "1 GPa"
+poisson = 0.45
+density = "1000 kg/m3"
+[[load]]
+where = "zmax"
+pressure = "1 MPa"
+"""
+    for how in ("side", "box"):
+        scene = material
+        for axis, side, low, high in (("x", "xmin", (-1, -1, -1), (.1, 11, 11)), ("x", "xmax", (9.9, -1, -1), (11, 11, 11)),
+                                      ("y", "ymin", (-1, -1, -1), (11, .1, 11)), ("y", "ymax", (-1, 9.9, -1), (11, 11, 11)),
+                                      ("z", "zmin", (-1, -1, -1), (11, 11, .1))):
+            corner = lambda at: "[" + ", ".join(f'"{value} mm"' for value in at) + "]"
+            where = f'"{side}"' if how == "side" else f"{{ box = {{ min = {corner(low)}, max = {corner(high)} }} }}"
+            scene += f'[[fix]]\nwhere = {where}\naxes = "{axis}"\n'
+        summary, _ = solve(part, "2.5 mm", scene, "--no-estimate")
+        true = 1e6 * (1 - .45 / .55)
+        expect(abs(summary["largest_von_mises"] / true - 1) < 1e-4, (how, summary["largest_von_mises"], true))
 
 
 def test_a_column_of_the_part_is_not_replaced_in_silence():
