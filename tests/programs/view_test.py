@@ -171,5 +171,20 @@ def test_deform_writes_a_page():
     expect_error(run_deform(), "flexel", "-o", "--html")
 
 
+def test_a_page_that_is_too_large_does_not_take_the_result_along():
+    columns = range(600)
+    corners = [(x, y, z) for x in (0, 40) for y in (0, 10) for z in (0, 10)]
+    quads = ["0 1 3 2", "4 6 7 5", "0 4 5 1", "2 3 7 6", "0 2 6 4", "1 5 7 3"]
+    head = ["ply", "format ascii 1.0", "element vertex 8", *(f"property float {axis}" for axis in "xyz"), *(f"property float column{n}" for n in columns),
+            "element face 6", "property list uchar int vertex_indices", "end_header"]
+    rows = [" ".join(map(str, [*corner, *(sum(corner) + n for n in columns)])) for corner in corners] + [f"4 {quad}" for quad in quads]
+    write("box.ply", "\n".join(head + rows) + "\n")
+    result = run("flexel", "deform", "box.ply", "--fix", "xmin", "--push", "xmax: 0 0 -100 N", "--material", "PLA", "--size", "5 mm", "--edge", "0.3 mm",
+                 "--html", "large.html", "-o", "bent.stl", "--summary", "summary.json")
+    expect_error(result, "flexel", "large.html", "50 MB", "-o OUT.vtu", "--limit")
+    expect("how far" in result.err, f"the answer is said: {result}")
+    expect_only("bent.stl", "box.ply", "summary.json")
+
+
 if __name__ == "__main__":
     main(globals())
