@@ -122,7 +122,11 @@ std::vector<view::ViewFile> read_files(const ViewArguments& arguments, Progress&
   std::vector<view::ViewFile> files;
   for (const std::string& path : arguments.files) {
     progress.stage("read " + path);
-    files.push_back(make_view_file(read_view_subject(path, import), options, progress));
+    const view::ViewSubject subject = read_view_subject(path, import);
+    if (arguments.cells && !subject.body)
+      progress.warn(fmt::format("{}: --cells is for bodies (.vtu), and this is a {}: its surface is shown",
+                                subject.where, subject.series.empty() ? "part" : "series"));
+    files.push_back(make_view_file(subject, options, progress));
   }
   progress.finish();
   return files;

@@ -149,6 +149,11 @@ def test_series():
     expect_ok(run("flexel-simulate", "run.toml", "rest.vtu", "-o", "run.pvd"))
     expect_ok(run("flexel", "view", "run.pvd", "--html", "run.html"))
     expect_ok(run("flexel", "view", "run_00001.vtu", "--html", "frame.html"))  # without a surface: its cells
+    box()
+    for shown, kind in (("run.pvd", "series"), ("box.stl", "part")):
+        warned = expect_ok(run("flexel", "view", shown, "--cells", "--html", "cells.html", "--force")).err
+        expect(f"warning: {shown}: --cells" in warned and kind in warned, warned)
+    expect("warning" not in expect_ok(run("flexel", "view", "run_00001.vtu", "--cells", "--html", "cells.html")).err, "a body has cells")
     os.remove("run_00002.vtu")
     expect_error(run("flexel", "view", "run.pvd", "--html", "gone.html"), "flexel", "run_00002.vtu")
     write("bad.pvd", "<VTKFile/>")
