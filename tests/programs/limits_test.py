@@ -7,7 +7,7 @@ import subprocess
 import time
 import zipfile
 
-from harness import BIN, SCENE, SOURCE, body, box, expect, expect_error, expect_ok, expect_only, main, run, scene, shell, write
+from harness import BIN, SCENE, SOURCE, body, box, bracket, expect, expect_error, expect_ok, expect_only, main, run, scene, shell, write
 from hostile_test import MESH, MODEL, write_3mf
 
 HELD = ["--material", "steel", "--fix", "xmin", "--push", "xmax: 0 0 -1 N"]
@@ -99,6 +99,13 @@ def test_memory_is_kept():
         expect(ended == 2 and "more than" in said and said.count("error: ") == 1, f"exit {ended}: {said}")
         expect(most < limit + code, f"{most / 1e6:.0f} MB with a limit of {limit / 1e6:.0f} MB")
         expect_only("box.stl")
+
+
+def test_a_sound_cad_file_is_not_called_damaged():
+    bracket()
+    result = run("flexel", "info", "bracket.step", "--max-memory", "5MB")
+    expect_error(result, "flexel", "bracket.step", "--max-memory 5 MB")
+    expect("damaged" not in result.err, f"{result}")
 
 
 def test_time():
