@@ -143,6 +143,16 @@ def test_refusals():
     expect_only("bent.vtu", "box.stl", "empty", "folder", "list.json", "rest.vtu", "scene.toml")
 
 
+def test_only_some_files_have_the_colours():
+    deformed()
+    box()
+    for colour in ("displacement", "strain"):
+        for files in (("box.stl", "bent.vtu"), ("bent.vtu", "box.stl")):
+            expect_ok(run("flexel", "view", *files, "--color", colour, "--html", "both.html"))
+            expect(page_json(open("both.html").read())["colour"] == colour, "it begins with them")
+        expect_error(run("flexel", "view", "box.stl", "box.stl", "--color", colour, "--html", "none.html"), "flexel", "box.stl", colour)
+
+
 def test_series():
     body("rest.vtu")
     scene("run.toml", SCENE + '[run]\ntime = "0.2 ms"\nframes = 4\n')
