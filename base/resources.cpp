@@ -5,6 +5,7 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <limits>
 #include <thread>
@@ -49,8 +50,16 @@ double memory_limit() {
   return most_bytes;
 }
 
+double memory_to_use() {
+  return std::isfinite(most_bytes) ? most_bytes : .8 * free_memory();
+}
+
 void limit_elements(std::size_t elements) {
   most_elements = static_cast<double>(elements);
+}
+
+double element_limit() {
+  return most_elements;
 }
 
 void check_elements(double elements, const std::string& where) {

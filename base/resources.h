@@ -13,9 +13,12 @@ namespace flexel {
 // threads not counted. `bytes` > 0.
 void limit_memory(double bytes);
 [[nodiscard]] double memory_limit();  // infinite: none
+// Bytes that work may be sure to need before it is refused: the limit, or 80 % of what is free.
+[[nodiscard]] double memory_to_use();
 
 // From now on bodies of more elements are refused.
 void limit_elements(std::size_t elements);
+[[nodiscard]] double element_limit();  // infinite: none
 // Throws InputError(where, ...): `elements` are more than the limit. For estimates before the work, and for what a file says.
 void check_elements(double elements, const std::string& where);
 

@@ -12,6 +12,7 @@
 #include "base/parallel.h"
 #include "base/program/brief_output.h"
 #include "base/program/termination.h"
+#include "base/resources.h"
 #include "base/stop.h"
 #include "base/units.h"
 #include "flexel/accuracy/resolution_search.h"
@@ -35,6 +36,7 @@
 #include "simulate/simulate.h"
 #include "simulate/summary.h"
 #include "simulate/time/dynamic_relaxation.h"
+#include "voxelize/memory.h"
 #include "voxelize/report.h"
 #include "voxelize/voxelize.h"
 
@@ -334,10 +336,17 @@ class GoalRuns {
     return (goal.by_default ? kUsualShare * slowed_by_others(goal.began) : kShare) *
            goal.within.value_or(kUsual);
   }
+  // No more than --max-elements and --max-memory let pass.
   [[nodiscard]] std::size_t usual_count() const {
-    const bool few = plan_.goal->within.value_or(kShort) < kShort;
-    if (model_.quadratic()) return few ? kFewQuadraticCells : kFirstQuadraticCells;
-    return few ? kFewCells : kFirstCells;
+    constexpr double kElementsPerCell = 2.5, kSpare = 1.25;  // a preferred size may have a fifth more cells
+    const bool few = plan_.goal->within.value_or(kShort) < kShort, quadratic = model_.quadratic();
+    const std::size_t count = quadratic ? few ? kFewQuadraticCells : kFirstQuadraticCells
+                              : few     ? kFewCells
+                                        : kFirstCells;
+    const double allowed =
+        std::min(element_limit() / kElementsPerCell,
+                 voxelize::cells_within(memory_to_use(), Placement::corner, quadratic) / kSpare);
+    return static_cast<std::size_t>(std::clamp(allowed, 1.0, static_cast<double>(count)));
   }
 
   SolvedRun solve(std::optional<double> size, const GoesOn& goes_on) {
@@ -509,13 +518,21 @@ std::vector<std::string> last_lines(const SolvedRun& run, const Plan& plan,
   return lines;
 }
 
-void write_pages(const DeformArguments& arguments, const Plan& plan, Body& body, const view::RunWords& words,
-                 Progress& progress) {
+// Returns why a page is missing; the other results are not lost for it.
+std::optional<view::PageTooLarge> write_pages(const DeformArguments& arguments, const Plan& plan, Body& body,
+                                              const view::RunWords& words, Progress& progress) {
+  std::optional<view::PageTooLarge> missing;
   std::string label;
   for (const std::string& part : arguments.job.parts)
     label += (label.empty() ? "" : ", ") + std::filesystem::path(part).filename().string();
   for (const Plan::Output& output : plan.outputs)
-    if (output.is_page()) write_result_page(body, label + ", deformed", words, output.path, progress);
+    if (output.is_page()) try {
+        write_result_page(body, label + ", deformed", words, output.path, progress);
+      } catch (const view::PageTooLarge& error) {
+        if (missing) progress.warn(missing->what());
+        missing = error;
+      }
+  return missing;
 }
 
 void say_dropped_model(const AccuracyReport& accuracy, Progress& progress) {
@@ -574,9 +591,11 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
   if (!arguments.summary.empty()) write_text(summary, arguments.summary);
   // With --verbose simulate() has said what infill is.
   const std::vector<std::string> lines = last_lines(run, plan, accuracy, accuracy || !arguments.verbose);
-  write_pages(arguments, plan, body, {warnings.lines(), lines, summary}, progress);
+  const std::optional<view::PageTooLarge> missing =
+      write_pages(arguments, plan, body, {warnings.lines(), lines, summary}, progress);
   outputs.appear();
   for (const std::string& line : lines) progress.say(line);
+  if (missing) throw *missing;
   return kExitDone;
 }
 

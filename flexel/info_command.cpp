@@ -326,14 +326,16 @@ int info_command(int argc, char** argv) {
   CommandLine app{"What a part is, and what a scene can name in it.", "flexel info"};
   app.add_option("part", files, read_titles() + " files; -: stdin").required().type_name("PART");
   const Option as_json = app.add_flag("--json", json, "As JSON, in SI units (docs/guide/info.md)");
-  app.add_flag("--words", words, "The names alone that a scene can use, a line each, for completion")
-      .excludes(as_json);
+  const Option as_words =
+      app.add_flag("--words", words, "The names alone that a scene can use, a line each, for completion")
+          .excludes(as_json);
   app.add_option("--unit", unit, "Unit of files that carry none (default mm)").type_name("UNIT");
   app.add_option("--edge", edge, "Split the mesh to this longest edge (default: not split)")
       .type_name("LENGTH");
   app.add_option("--thickness", thickness,
                  "Also write the surface as PLY with the wall thickness at its vertices")
-      .type_name("FILE.ply");
+      .type_name("FILE.ply")
+      .excludes(as_words);
   app.add_flag("--force", force, "Let results replace files that are read");
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   const StopEndsProcess nothing_is_left;

@@ -120,10 +120,21 @@ std::vector<view::ViewFile> read_files(const ViewArguments& arguments, Progress&
   if (!arguments.input_format.empty()) import.format = arguments.input_format;
   const view::ViewOptions options{arguments.cells, arguments.colour};
   std::vector<view::ViewFile> files;
+  std::vector<view::NoSuchAttribute> grey;  // sound where another file has it
   for (const std::string& path : arguments.files) {
     progress.stage("read " + path);
-    files.push_back(make_view_file(read_view_subject(path, import), options, progress));
+    const view::ViewSubject subject = read_view_subject(path, import);
+    if (arguments.cells && !subject.body)
+      progress.warn(fmt::format("{}: --cells is for bodies (.vtu), and this is a {}: its surface is shown",
+                                subject.where, subject.series.empty() ? "part" : "series"));
+    try {
+      files.push_back(make_view_file(subject, options, progress));
+    } catch (const view::NoSuchAttribute& error) {
+      grey.push_back(error);
+      files.push_back(make_view_file(subject, {arguments.cells}, progress));
+    }
   }
+  if (grey.size() == files.size()) throw grey.front();
   progress.finish();
   return files;
 }

@@ -98,7 +98,6 @@ VoxelizeOptions voxelize_options(const Arguments& arguments) {
   options.heal = heal_choice(arguments.heal);
   options.material = arguments.material;
   options.moments = arguments.moments;
-  if (std::isfinite(memory_limit())) options.max_memory = memory_limit();
   return options;
 }
 

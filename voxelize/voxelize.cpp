@@ -40,6 +40,11 @@ std::vector<PartExtent> extents_of(const std::vector<HealedPart>& parts) {
   return extents;
 }
 
+// Of the box around the part, which has no more than these, whatever shells overlap in it.
+double cells_of_box(const HealedPart& part, double spacing) {
+  return (bounding_box(part.mesh.world).size().array() / spacing + 2).prod();
+}
+
 // Spacing asked for, or that for the count asked for.
 double choose_spacing(const VoxelizeOptions& options, const std::vector<PartExtent>& extents) {
   if (options.size) return *options.size;
@@ -342,7 +347,7 @@ VoxelizeResult voxelize(Surface surface, const VoxelizeOptions& options, Progres
   if (options.moments && options.placement == Placement::centre)
     throw InputError("--moments: centre placement has no cells; use --placement corner");
   progress.stage("heal");
-  const double limit = options.max_memory.value_or(.8 * available_memory());
+  const double limit = options.max_memory.value_or(memory_to_use());
   std::vector<HealedPart> meshes = heal_parts(surface, options.heal, limit);
   check_meshes(meshes, surface);
   progress.stage("voxelize");
@@ -350,7 +355,9 @@ VoxelizeResult voxelize(Surface surface, const VoxelizeOptions& options, Progres
   const double spacing = choose_spacing(options, extents);
   check_spacing(spacing, meshes, surface);
   double estimate = 0;
-  for (const PartExtent& extent : extents) estimate += estimate_cells(extent, spacing, options.placement);
+  for (std::size_t p = 0; p < extents.size(); ++p)
+    estimate +=
+        std::min(estimate_cells(extents[p], spacing, options.placement), cells_of_box(meshes[p], spacing));
   check_elements(estimate / 2, "");  // a lattice has more elements than cells, and the estimate may be high
   check_memory(estimate, options, limit, extents);
   VoxelizeResult result =

@@ -27,7 +27,7 @@ EndingWaits::~EndingWaits() {
 bool EndingWaits::takes(int signal) noexcept {
   if (moments == 0) return false;
   waiting = signal;
-  return true;
+  return moments != 0 || waiting.exchange(0) == 0;  // on another thread the moment may have ended in between
 }
 
 std::unique_lock<std::recursive_mutex> EndingWaits::none_begins() {

@@ -8,7 +8,6 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "base/error.h"
 #include "base/files/output_file.h"
 #include "base/json_depth.h"
 #include "base/printable.h"
@@ -260,7 +259,7 @@ void write_page(const std::vector<ViewFile>& files, const PageOptions& options, 
                 const std::string& option, const std::string& path) {
   const Page page = make_page(files, options, true);
   if (static_cast<double>(page.html.size()) > limit)
-    throw InputError(fmt::format(
+    throw PageTooLarge(fmt::format(
         "{}: the page would have {}, more than {}: show fewer files or frames, or raise the limit{}", path,
         human_bytes(static_cast<double>(page.html.size())), human_bytes(limit), option));
   write_text(page.html, path);

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "base/error.h"
 #include "base/files/files.h"
 #include "flexel/view/view_file.h"
 
@@ -32,7 +33,11 @@ struct Page {
 
 constexpr double kUsualLimit = 50e6;  // bytes: what mail takes, twice
 
-// Writes the whole page. Throws InputError: it is larger than `limit` [bytes], which `option` raises; the disk.
+struct PageTooLarge : InputError {
+  using InputError::InputError;
+};
+
+// Writes the whole page. Throws PageTooLarge: than `limit` [bytes], which `option` raises; InputError: the disk.
 void write_page(const std::vector<ViewFile>& files, const PageOptions& options, double limit,
                 const std::string& option, const std::string& path);
 

@@ -141,9 +141,9 @@ void add_asked(const Body* body, const Surface& surface, const ViewOptions& opti
     std::vector<std::string> known = names;
     if (body != nullptr) known.insert(known.begin(), "displacement");
     known.emplace_back("none");
-    throw InputError(where,
-                     fmt::format("has no attribute \"{}\" to colour by; --color takes {}{}", options.colour,
-                                 fmt::join(known, ", "), did_you_mean(options.colour, known)));
+    throw NoSuchAttribute(
+        where, fmt::format("has no attribute \"{}\" to colour by; --color takes {}{}", options.colour,
+                           fmt::join(known, ", "), did_you_mean(options.colour, known)));
   }
   names.push_back(options.colour);
 }

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/error.h"
 #include "base/program/progress.h"
 #include "flexel/view/shape.h"
 #include "formats/lattice/body.h"
@@ -50,8 +51,11 @@ struct ViewOptions {
   std::string colour = {};  // an attribute that is needed; "" for those that there are
 };
 
-// Throws InputError: a body that has neither a surface nor cells, an attribute that is not there, a
-// frame that cannot be read, positions that are not finite.
+struct NoSuchAttribute : InputError {
+  using InputError::InputError;
+};
+
+// Throws NoSuchAttribute; InputError: a body that has neither a surface nor cells, a frame that cannot be read, positions that are not finite.
 [[nodiscard]] ViewFile make_view_file(const ViewSubject& subject, const ViewOptions& options,
                                       Progress& progress);
 

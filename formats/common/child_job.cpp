@@ -5,12 +5,14 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <cstdio>
 #include <new>
 
 #include "base/error.h"
 #include "base/files/memory_file.h"
 #include "base/program/own_program.h"
+#include "base/resources.h"
 #include "base/units.h"
 
 namespace flexel {
@@ -42,6 +44,9 @@ Bytes run_job(const ForeignProgram& program, const Bytes& job, const ChildLimits
           where, fmt::format("{} for {}: it did not {} within {:.3g} s of processor time; {}", words.too_much,
                              program.foreign, words.verb, limits.processor, words.instead));
     case ChildEnd::out_of_memory:
+      if (std::isfinite(memory_limit()) && limits.memory <= memory_limit())
+        throw InputError(where, fmt::format("{} did not {} within --max-memory {}: raise it", program.foreign,
+                                            words.verb, human_bytes(memory_limit())));
       throw InputError(
           where, fmt::format("{} for {}: it wants more memory than it gets ({} at most); {}", words.too_much,
                              program.foreign, human_bytes(limits.memory), words.instead));

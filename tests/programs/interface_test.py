@@ -1,10 +1,15 @@
 """Man pages and completions (tools/interface-files) say what --help says, and complete what a user would type."""
 
 import gzip
+import os
 import pathlib
+import pty
 import re
+import select
 import shutil
+import signal
 import subprocess
+import time
 
 from harness import BIN, SOURCE, Skip, ascii_stl, box_triangles, expect, expect_error, expect_ok, main, run, shell
 
@@ -71,6 +76,39 @@ def test_bash_completes_materials_and_faces_of_the_part():
     expect(set(offered) == {name.replace(" ", "\\ ") for name in names}, offered)
     expect(completions("flexel deform my\\ part.stl --push zm") == ["zmax", "zmin"], completions("flexel deform my\\ part.stl --push zm"))
     expect_error(run("flexel", "info", "--words", "--json", "my part.stl"), "flexel", "excludes")
+    expect_error(run("flexel", "info", "--words", "--thickness", "out.ply", "my part.stl"), "flexel", "excludes")
+
+
+def expect_typed(line, *words):
+    """What an interactive bash has made of `line` and a tab: these words."""
+    child, terminal = pty.fork()
+    if child == 0:
+        os.environ.update(PATH=f"{BIN}:{os.environ['PATH']}", TERM="dumb", INPUTRC="/dev/null")
+        os.execvp("bash", ["bash", "--norc", "--noprofile", "-i"])
+
+    def wait_for(wanted):
+        said, until = b"", time.monotonic() + 20
+        while wanted not in said:
+            expect(time.monotonic() < until, f"{wanted} is missing in {said}")
+            if select.select([terminal], [], [], 0.5)[0]:
+                said += os.read(terminal, 4096)
+
+    try:
+        os.write(terminal, b". share/bash-completion/completions/flexel; echo rea''dy\n")
+        wait_for(b"ready\r\n")
+        os.write(terminal, line.encode() + b"\t\x01printf '<%s>' \n")  # Ctrl-A: the words of the line are printed
+        wait_for("".join(f"<{word}>" for word in words).encode())
+    finally:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        os.close(terminal)
+
+
+def test_an_interactive_bash_quotes_once():
+    make()
+    expect_typed("flexel deform --material spri", "flexel", "deform", "--material", "spring steel")
+    pathlib.Path("my part.stl").write_bytes(ascii_stl(box_triangles()))
+    expect_typed("flexel info my", "flexel", "info", "my part.stl")
 
 
 def test_other_shells_read_theirs():

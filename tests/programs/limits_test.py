@@ -7,7 +7,7 @@ import subprocess
 import time
 import zipfile
 
-from harness import BIN, SCENE, SOURCE, body, box, expect, expect_error, expect_ok, expect_only, main, run, scene, shell
+from harness import BIN, SCENE, SOURCE, body, box, bracket, expect, expect_error, expect_ok, expect_only, main, run, scene, shell, write
 from hostile_test import MESH, MODEL, write_3mf
 
 HELD = ["--material", "steel", "--fix", "xmin", "--push", "xmax: 0 0 -1 N"]
@@ -48,6 +48,38 @@ def test_elements():
             os.remove(name)
 
 
+def test_overlapping_shells_are_counted_once():
+    """Ten cubes of 20 mm, each .1 mm on: 512 elements of 3 mm."""
+    corners = [(x, y, z) for x in (0, 20) for y in (0, 20) for z in (0, 20)]
+    quads = [(1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (2, 6, 8, 4)]
+    lines = [f"v {x + .1 * n} {y + .1 * n} {z + .1 * n}" for n in range(10) for x, y, z in corners]
+    write("cubes.obj", "\n".join(lines + ["f " + " ".join(str(c + 8 * n) for c in quad) for n in range(10) for quad in quads]) + "\n")
+    made = ["flexel-voxelize", "cubes.obj", "--size", "3 mm", "--force", "-o", "o.vtu", "--max-elements"]
+    result = expect_ok(run(*made, "2000"))
+    elements = int(re.search(r"([\d,]+) elements", result.err)[1].replace(",", ""))
+    expect_ok(run(*made, str(elements)))
+    expect_error(run(*made, str(elements - 1)), "flexel-voxelize", f"{elements} elements", "--max-elements")
+
+
+def test_one_memory_limit_for_all_programs():
+    """What one takes, the other does."""
+    box()
+    needed = 35e6 + 4500 * 40 * 10 * 10  # a lattice of cells of 1 mm
+    for program in (["flexel-voxelize", "box.stl"], ["flexel", "deform", "box.stl", *HELD]):
+        command = [*program, "--size", "1 mm", "-o", "o.vtu", "--max-memory"]
+        expect_ok(run(*command, str(int(1.4 * needed))))
+        os.remove("o.vtu")
+        expect_error(run(*command, str(int(.9 * needed))), program[0], "cells need", "--max-memory")
+
+
+def test_a_size_that_nobody_gave_is_within_the_limits():
+    box()
+    for limit in (["--max-elements", "10000"], ["--max-elements", "500"], ["--max-memory", "80MB"]):
+        result = expect_ok(run("flexel", "deform", "box.stl", *HELD, *limit, "-o", "o.stl"))
+        expect("how far" in result.err, f"{limit}: {result}")
+        os.remove("o.stl")
+
+
 def peak(command):
     """Exit code, bytes that the command has had in memory at most, and what it said."""
     process = subprocess.Popen([str(BIN / command[0]), *command[1:]], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
@@ -67,6 +99,13 @@ def test_memory_is_kept():
         expect(ended == 2 and "more than" in said and said.count("error: ") == 1, f"exit {ended}: {said}")
         expect(most < limit + code, f"{most / 1e6:.0f} MB with a limit of {limit / 1e6:.0f} MB")
         expect_only("box.stl")
+
+
+def test_a_sound_cad_file_is_not_called_damaged():
+    bracket()
+    result = run("flexel", "info", "bracket.step", "--max-memory", "5MB")
+    expect_error(result, "flexel", "bracket.step", "--max-memory 5 MB")
+    expect("damaged" not in result.err, f"{result}")
 
 
 def test_time():

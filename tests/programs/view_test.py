@@ -143,12 +143,27 @@ def test_refusals():
     expect_only("bent.vtu", "box.stl", "empty", "folder", "list.json", "rest.vtu", "scene.toml")
 
 
+def test_only_some_files_have_the_colours():
+    deformed()
+    box()
+    for colour in ("displacement", "strain"):
+        for files in (("box.stl", "bent.vtu"), ("bent.vtu", "box.stl")):
+            expect_ok(run("flexel", "view", *files, "--color", colour, "--html", "both.html"))
+            expect(page_json(open("both.html").read())["colour"] == colour, "it begins with them")
+        expect_error(run("flexel", "view", "box.stl", "box.stl", "--color", colour, "--html", "none.html"), "flexel", "box.stl", colour)
+
+
 def test_series():
     body("rest.vtu")
     scene("run.toml", SCENE + '[run]\ntime = "0.2 ms"\nframes = 4\n')
     expect_ok(run("flexel-simulate", "run.toml", "rest.vtu", "-o", "run.pvd"))
     expect_ok(run("flexel", "view", "run.pvd", "--html", "run.html"))
     expect_ok(run("flexel", "view", "run_00001.vtu", "--html", "frame.html"))  # without a surface: its cells
+    box()
+    for shown, kind in (("run.pvd", "series"), ("box.stl", "part")):
+        warned = expect_ok(run("flexel", "view", shown, "--cells", "--html", "cells.html", "--force")).err
+        expect(f"warning: {shown}: --cells" in warned and kind in warned, warned)
+    expect("warning" not in expect_ok(run("flexel", "view", "run_00001.vtu", "--cells", "--html", "cells.html")).err, "a body has cells")
     os.remove("run_00002.vtu")
     expect_error(run("flexel", "view", "run.pvd", "--html", "gone.html"), "flexel", "run_00002.vtu")
     write("bad.pvd", "<VTKFile/>")
@@ -169,6 +184,21 @@ def test_deform_writes_a_page():
     expect_ok(run_deform("-o", "alone.html", "--quiet"))
     expect_error(run_deform("--html", "bent.page"), "flexel", "bent.html")
     expect_error(run_deform(), "flexel", "-o", "--html")
+
+
+def test_a_page_that_is_too_large_does_not_take_the_result_along():
+    columns = range(600)
+    corners = [(x, y, z) for x in (0, 40) for y in (0, 10) for z in (0, 10)]
+    quads = ["0 1 3 2", "4 6 7 5", "0 4 5 1", "2 3 7 6", "0 2 6 4", "1 5 7 3"]
+    head = ["ply", "format ascii 1.0", "element vertex 8", *(f"property float {axis}" for axis in "xyz"), *(f"property float column{n}" for n in columns),
+            "element face 6", "property list uchar int vertex_indices", "end_header"]
+    rows = [" ".join(map(str, [*corner, *(sum(corner) + n for n in columns)])) for corner in corners] + [f"4 {quad}" for quad in quads]
+    write("box.ply", "\n".join(head + rows) + "\n")
+    result = run("flexel", "deform", "box.ply", "--fix", "xmin", "--push", "xmax: 0 0 -100 N", "--material", "PLA", "--size", "5 mm", "--edge", "0.3 mm",
+                 "--html", "large.html", "-o", "bent.stl", "--summary", "summary.json")
+    expect_error(result, "flexel", "large.html", "50 MB", "-o OUT.vtu", "--limit")
+    expect("how far" in result.err, f"the answer is said: {result}")
+    expect_only("bent.stl", "box.ply", "summary.json")
 
 
 if __name__ == "__main__":

@@ -30,7 +30,7 @@ struct VoxelizeOptions {
   bool moments = false;  // also the exact moments of cut cells (Body::moments); corner placement
   HealChoice heal;
   std::string material;              // of every part; "" leaves it to the scene
-  std::optional<double> max_memory;  // bytes; default 80 % of what is free
+  std::optional<double> max_memory;  // bytes; default memory_to_use()
 };
 
 }  // namespace flexel::voxelize
