@@ -131,7 +131,8 @@ TEST(Page, TooLargeIsRefused) {
 }
 
 TEST(Page, ASummaryThatIsNone) {
-  for (const std::string text : {"[", "[1]", "3", std::string(5000, '[').c_str()}) {
+  for (const std::string& text :
+       {std::string("["), std::string("[1]"), std::string("3"), std::string(5000, '[')}) {
     PageOptions options;
     options.words.summary = text;
     EXPECT_THROW((void)make_page({shown(tube(6))}, options, true), InputError) << text;
