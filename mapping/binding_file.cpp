@@ -71,7 +71,7 @@ template <class Value>
 void append(Bytes& bytes, const std::vector<Value>& values) {
   const std::size_t at = bytes.size();
   bytes.resize(at + values.size() * sizeof(Value));
-  std::memcpy(bytes.data() + at, values.data(), values.size() * sizeof(Value));
+  if (!values.empty()) std::memcpy(bytes.data() + at, values.data(), values.size() * sizeof(Value));
 }
 
 // Takes arrays from the front of what is left.
@@ -81,7 +81,7 @@ class Reader {
   template <class Value>
   [[nodiscard]] std::vector<Value> take(std::size_t count) {
     std::vector<Value> values(count);
-    std::memcpy(static_cast<void*>(values.data()), left_.data(), count * sizeof(Value));
+    if (count > 0) std::memcpy(static_cast<void*>(values.data()), left_.data(), count * sizeof(Value));
     left_ = left_.subspan(count * sizeof(Value));
     return values;
   }
