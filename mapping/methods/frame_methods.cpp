@@ -36,7 +36,8 @@ std::shared_ptr<const MethodBinding> load_coordinates(std::span<const std::byte>
   kept->rest_base.resize(frames);
   kept->coordinates.resize(vertices);
   const std::size_t of_frames = frames * sizeof(Mat3);
-  std::memcpy(static_cast<void*>(kept->rest_base.data()), bytes.data(), of_frames);
+  if (frames > 0) std::memcpy(static_cast<void*>(kept->rest_base.data()), bytes.data(), of_frames);
+  if (vertices == 0) return kept;
   std::memcpy(static_cast<void*>(kept->coordinates.data()), bytes.data() + of_frames,
               vertices * sizeof(Vec3));
   return kept;
