@@ -127,10 +127,11 @@ double damping_growth(const SpringKind& kind, const CellKind& cell, const CellVe
   return growth < most ? growth : most;  // also where the cell has no rotation
 }
 
-}  // namespace
-
-std::vector<double> damping_growth(const Problem& problem, const std::vector<Vec3>& displacement,
-                                   const std::vector<double>& frequencies) {
+// (parts) The greatest factor of any active cell, 1 at least. `factor_of(p)` is a function of a cell of part p
+// and its corners' displacements (m); edits of the cell's stiffness and density multiply what it gives.
+template <class FactorOf>
+std::vector<double> greatest_factors(const Problem& problem, const std::vector<Vec3>& displacement,
+                                     const FactorOf& factor_of) {
   const Body& body = problem.body;
   const std::vector<std::uint8_t> active = active_cells(problem);
   std::vector<double> stiffness, mass;
@@ -143,23 +144,33 @@ std::vector<double> damping_growth(const Problem& problem, const std::vector<Vec
   std::vector<double> result;
   for (std::size_t p = 0; p < body.parts.size(); ++p) {
     const Part& part = body.parts[p];
-    const CellKind cells = cell_kind(part.lattice, problem.materials[p]);
-    const double largest =
-        frequencies[p] * problem.materials[p].density * part.lattice.spacing.prod() / 8;  // N/m
-    const SpringKind springs = spring_kind(part.lattice, problem.materials[p]);
-    const bool by_springs = is_springs(problem, p);
+    const auto factor = factor_of(p);
     const Greatest greatest = parallel_sum<Greatest>(part.cell_end - part.cell_begin, [&](std::size_t i) {
       const std::size_t c = part.cell_begin + i;
       if (!active[c]) return Greatest{};
       CellVectors u;
       for (std::size_t a = 0; a < 8; ++a) u[a] = displacement[body.cell_elements[c][a]];
-      const double factor = edited ? stiffness[c] / mass[c] : 1;
-      return Greatest{factor * (by_springs ? damping_growth(springs, cells, u, largest)
-                                           : damping_growth(cells, part.lattice.spacing, u, largest))};
+      return Greatest{(edited ? stiffness[c] / mass[c] : 1) * factor(static_cast<std::uint32_t>(c), u)};
     });
     result.push_back(std::max(1.0, greatest.value));
   }
   return result;
+}
+
+}  // namespace
+
+std::vector<double> damping_growth(const Problem& problem, const std::vector<Vec3>& displacement,
+                                   const std::vector<double>& frequencies) {
+  return greatest_factors(problem, displacement, [&](std::size_t p) {
+    const Lattice& lattice = problem.body.parts[p].lattice;
+    const Material& material = problem.materials[p];
+    const double largest = frequencies[p] * material.density * lattice.spacing.prod() / 8;  // N/m
+    return [&lattice, largest, by_springs = is_springs(problem, p), cells = cell_kind(lattice, material),
+            springs = spring_kind(lattice, material)](std::uint32_t, const CellVectors& u) {
+      return by_springs ? damping_growth(springs, cells, u, largest)
+                        : damping_growth(cells, lattice.spacing, u, largest);
+    };
+  });
 }
 
 std::vector<double> cell_frequencies(const Problem& problem) {
@@ -197,47 +208,24 @@ double stable_step(const Problem& problem, const std::vector<double>& damping) {
 
 std::vector<double> stiffening(const Problem& problem, const std::vector<Vec3>& displacement,
                                const KernelEffects& plan) {
-  const Body& body = problem.body;
-  const std::vector<std::uint8_t> active = active_cells(problem);
-  const RestShapes shapes(body);
-  std::vector<double> stiffness, mass;
-  const bool edited =
-      body.cell_columns.contains("stiffness_change") || body.cell_columns.contains("density_change");
-  if (edited) {
-    stiffness = stiffness_shares(body);
-    mass = mass_shares(body);
-  }
-  std::vector<double> result;
-  for (std::size_t p = 0; p < body.parts.size(); ++p) {
-    const Part& part = body.parts[p];
-    const CellKind cells = cell_kind(part.lattice, problem.materials[p]);
-    const SpringKind springs = spring_kind(part.lattice, problem.materials[p]);
-    const bool by_springs = is_springs(problem, p), plastic = !plan.plasticity.empty();
+  const RestShapes shapes(problem.body);
+  const bool plastic = !plan.plasticity.empty();
+  return greatest_factors(problem, displacement, [&](std::size_t p) {
+    const Part& part = problem.body.parts[p];
+    const bool by_springs = is_springs(problem, p);
     const bool breaks = plan.broken_springs || (!plan.fracture.empty() && plan.fracture[p].any());
-    const Greatest greatest = parallel_sum<Greatest>(part.cell_end - part.cell_begin, [&](std::size_t i) {
-      const std::size_t c = part.cell_begin + i;
-      if (!active[c]) return Greatest{};
-      CellVectors u;
-      for (std::size_t a = 0; a < 8; ++a) u[a] = displacement[body.cell_elements[c][a]];
-      if (by_springs && !breaks && !(1 + volume_change(displacement_gradient(cells, u)) > 0))
-        return Greatest{std::numeric_limits<double>::infinity()};
-      const auto cell = static_cast<std::uint32_t>(c);
-      const double factor = edited ? stiffness[c] / mass[c] : 1;
-      if (by_springs)
-        return Greatest{factor * springs_stiffening(
-                                     shapes.any() ? shapes.of(springs, cell).value_or(springs) : springs, u)};
-      if (!shapes.any()) {
-        double stiffer = cell_stiffening(cells, part.lattice.spacing, u, plastic, std::nullopt);
-        stiffer += fold_stiffening(cells, fold_thresholds(cells, std::nullopt), u);
-        return Greatest{factor * stiffer};
-      }
-      const std::optional<CellKind> shaped = shapes.of(cells, part, cell);
-      return Greatest{factor * (cell_stiffening(cells, part.lattice.spacing, u, plastic, shaped) +
-                                fold_stiffening(cells, fold_thresholds(cells, shaped), u))};
-    });
-    result.push_back(std::max(1.0, greatest.value));
-  }
-  return result;
+    return
+        [&part, &shapes, plastic, by_springs, breaks, cells = cell_kind(part.lattice, problem.materials[p]),
+         springs = spring_kind(part.lattice, problem.materials[p])](std::uint32_t c, const CellVectors& u) {
+          if (by_springs && !breaks && !(1 + volume_change(displacement_gradient(cells, u)) > 0))
+            return std::numeric_limits<double>::infinity();
+          if (by_springs)
+            return springs_stiffening(shapes.any() ? shapes.of(springs, c).value_or(springs) : springs, u);
+          const std::optional<CellKind> shaped = shapes.any() ? shapes.of(cells, part, c) : std::nullopt;
+          return cell_stiffening(cells, part.lattice.spacing, u, plastic, shaped) +
+                 fold_stiffening(cells, fold_thresholds(cells, shaped), u);
+        };
+  });
 }
 
 }  // namespace flexel::simulate
