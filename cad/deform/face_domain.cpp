@@ -112,8 +112,12 @@ bool FaceMask::has(double u, double v) const {
   for (std::size_t k = 0; whole && k < 9; ++k)
     whole = middle(coarse_, i + k % 3 - 1, j + k / 3 - 1) == inside;
   if (whole) return inside;
-  return middle(fine_, cell(u, domain_.u_begin, domain_.u_end, fine_),
-                cell(v, domain_.v_begin, domain_.v_end, fine_));
+  const std::size_t p = cell(u, domain_.u_begin, domain_.u_end, fine_),
+                    q = cell(v, domain_.v_begin, domain_.v_end, fine_);
+  // The face's edges run along the rim of its domain, and arms of it may be thinner there than any cell.
+  if (p == 0 || q == 0 || p + 1 == fine_.n || q + 1 == fine_.n)
+    return classifier_.Perform(gp_Pnt2d(u, v)) != TopAbs_OUT;
+  return middle(fine_, p, q);
 }
 
 bool FaceMask::has_near(double u, double v, double du, double dv) const {

@@ -22,7 +22,7 @@ struct FaceDomain {
 [[nodiscard]] double length_of(const Handle(Geom_Curve) & curve, double begin, double end);
 
 // Which parameters lie in the face: where errors of a fit count. Looked up in rasters that are filled as they are asked;
-// what the face's edges pass by is told to 1/768 of the domain. One thread at a time.
+// what the face's edges pass by is told to 1/768 of the domain, along its rim exactly. One thread at a time.
 class FaceMask {
  public:
   FaceMask(const TopoDS_Face& face, const FaceDomain& domain);
