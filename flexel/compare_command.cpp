@@ -165,6 +165,13 @@ std::string stiffness_text(double value) {
   return per_mm >= 1000 ? human_number(1e-3 * per_mm) + " kN/mm" : human_number(per_mm) + " N/mm";
 }
 
+// "2.9 against yield"; beyond some thousand the figure says no more.
+std::string factor_text(double factor, const std::string& limit) {
+  constexpr double kMuch = 1000;
+  return fmt::format("{} against {}",
+                     factor > kMuch ? "over " + human_number(kMuch) : human_number(factor, 2), limit);
+}
+
 std::vector<std::pair<std::string, std::vector<std::string>>> rows_of(const std::vector<Finding>& all) {
   std::vector<std::pair<std::string, std::vector<std::string>>> rows;
   const auto add = [&](const char* title, const auto& text) {
@@ -186,9 +193,8 @@ std::vector<std::pair<std::string, std::vector<std::string>>> rows_of(const std:
   });
   add("largest von Mises stress",
       [](const Finding& f) { return f.stress ? human_pressure(*f.stress) : "-"; });
-  add("safety factor", [](const Finding& f) {
-    return f.factor ? fmt::format("{} to {}", human_number(*f.factor, 2), f.limit_name) : std::string("-");
-  });
+  add("safety factor",
+      [](const Finding& f) { return f.factor ? factor_text(*f.factor, f.limit_name) : std::string("-"); });
   add("cells", [](const Finding& f) {
     return fmt::format("{} of {}", human_count(f.cells), human_length(f.spacing));
   });

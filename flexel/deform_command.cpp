@@ -568,7 +568,7 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
   if (accuracy) say_dropped_model(*accuracy, progress);
   if (!mapped.split_line.empty()) progress.say(mapped.split_line);
   const mapping::MapReport& found = mapped.report;
-  std::vector<std::string> paths{arguments.map.report, arguments.summary};
+  std::vector<std::string> paths{arguments.map.report, arguments.summary, plan.crack.pieces};
   for (const Plan::Output& output : plan.outputs) paths.push_back(output.path);
   OutputsTogether outputs(std::move(paths));
   {

@@ -265,7 +265,7 @@ class Run {
     if (!table_) say_report(found, arguments_.map, plan_.options, progress_);
     std::string report = arguments_.map.report;
     if (plan_.series && !report.empty()) report = frame_name(report, frame_);
-    OutputsTogether outputs({report, path});
+    OutputsTogether outputs({report, path, plan_.crack.pieces});
     try {
       write_report(found, arguments_.map, plan_.options, report);
     } catch (const InvalidMappingError&) {

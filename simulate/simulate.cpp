@@ -5,11 +5,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <numeric>
 
 #include "base/error.h"
+#include "base/human.h"
 #include "base/parallel.h"
 #include "base/stop.h"
 #include "base/units.h"
@@ -67,6 +69,25 @@ void report_unsupported(std::size_t elements, SimulateResult& result, Progress& 
       human_count(elements)));
 }
 
+// A load P that softens a part as it bends it gives u = u_linear / (1 - P / P_critical) (Southwell 1932), so
+// the share of u that a linear answer misses is P over the load at which it buckles. A lattice that is too
+// stiff by an error bar's share takes that load for larger by as much.
+std::string near_buckling(double linear, const SimulateResult& result) {
+  constexpr double kNear = 0.8;
+  const double found = result.largest_displacement, share = 1 - linear / found;
+  double bar = 0;
+  for (const ErrorBar& each : result.error_bars.bars)
+    if (each.of == ErrorBar::Of::largest_displacement && each.value > 0)
+      bar = each.bar.half_width / each.value;
+  if (!(found > 0 && linear > 0 && share * (1 + bar) > kNear)) return "";
+  return fmt::format(
+      "the part is about to buckle: it moves {} times as far as in proportion to the load, {}, so a little "
+      "more load, or a little less stiffness, moves it much further than any error bar here says",
+      human_number(found / linear, 2),
+      bar > 1 - kNear ? fmt::format("on a lattice that may be off by {}", human_share(bar))
+                      : fmt::format("which is about {} of what buckles it", human_share(share)));
+}
+
 // Outputs that only a timed run has.
 void refuse_timed(const SimulateOptions& options, const std::string& scene) {
   if (!options.history.empty() || !options.series.empty())
@@ -101,6 +122,8 @@ class Run {
   }
 
   SimulateResult operator()();
+  // m: the largest displacement of the first linear answer, where that is one from rest; else 0.
+  [[nodiscard]] double linear_reach() const { return linear_reach_; }
 
  private:
   EquilibriumResult solve(Mechanics& mechanics);
@@ -114,6 +137,7 @@ class Run {
   Fragments fragments_;
   Problem problem_;
   bool buckled_ = false;
+  double linear_reach_ = 0;
   int start_newton_iterations_ = 0;
   std::size_t unsupported_ = 0;     // elements at tips and edges that springs do not hold
   std::vector<std::uint8_t> tied_;  // (elements) Mechanics::tied_elements()
@@ -189,7 +213,10 @@ SimulateResult Run::operator()() {
   report_unsupported(unsupported_, result, progress_);
   Mechanics mechanics(problem_, std::move(effects));
   state_.displacement = where_to_begin(body_);
+  const bool from_rest = std::all_of(state_.displacement.begin(), state_.displacement.end(),
+                                     [](const Vec3& u) { return u.isZero(0); });
   const EquilibriumResult solved = solve(mechanics);
+  if (from_rest && !solved.buckled) linear_reach_ = solved.linear_reach;
   const StopWaits answered;  // what is found is told: the rest takes moments
   buckled_ = solved.buckled;
   mechanics.report(state_, result);
@@ -259,7 +286,8 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
     progress.finish();
     return result;
   }
-  SimulateResult result = Run(body, scene, options, progress)();
+  Run run(body, scene, options, progress);
+  SimulateResult result = run();
   if (options.estimate) {
     progress.stage("error bars");
     result.error_bars =
@@ -268,6 +296,8 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
           return Run(coarse, same, how, silent)();
         });
   }
+  if (const std::string told = near_buckling(run.linear_reach(), result); !told.empty())
+    progress.warn(scene.name + ": " + told);
   progress.finish();
   return result;
 }

@@ -229,6 +229,11 @@ std::optional<VoxelizedPart> voxelize_part(HealedPart& healed, double spacing, c
   return described;
 }
 
+// "": a surface made in memory.
+std::string file_of(const Surface& surface, std::size_t part) {
+  return part < surface.part_source.size() ? surface.sources[surface.part_source[part]].file : "";
+}
+
 // All parts at one spacing.
 VoxelizeResult build(Surface& surface, std::vector<HealedPart>& meshes, double spacing,
                      const VoxelizeOptions& options, Progress& progress) {
@@ -242,7 +247,7 @@ VoxelizeResult build(Surface& surface, std::vector<HealedPart>& meshes, double s
             voxelize_part(meshes[p], spacing, options, surface.parts[p].name, result.body, polygon_cells))
       result.parts.push_back(std::move(*part));
     else
-      open.push_back({surface.parts[p].name, &meshes[p]});
+      open.push_back({surface.parts[p].name, file_of(surface, p), &meshes[p]});
   }
   if (!open.empty()) throw undecided(open, meshes.size());
   Body& body = result.body;

@@ -1,6 +1,6 @@
-// OutputFile. A regular file is written beside its target under a hidden name and renamed by commit().
-// Symbolic links are resolved first, so the file is replaced and not the link. Devices and FIFOs are written
-// directly. A fixed table lists the temporary files, for the signal handlers.
+// OutputFile. A regular file is written beside its target under a hidden name (base/files/hidden_file.h) and
+// renamed by commit(). Symbolic links are resolved first, so the file is replaced and not the link. Devices
+// and FIFOs are written directly. A fixed table lists the temporary files, for the signal handlers.
 #include "base/files/output_file.h"
 
 #include <fcntl.h>
@@ -12,6 +12,7 @@
 #include <array>
 #include <atomic>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <utility>
@@ -19,6 +20,7 @@
 #include "base/error.h"
 #include "base/files/ending_waits.h"
 #include "base/files/files.h"
+#include "base/files/hidden_file.h"
 #include "base/stop.h"
 
 namespace flexel {
@@ -70,15 +72,6 @@ int open_or_refuse(const std::string& name, int flags, mode_t mode, const std::s
   }
 }
 
-// A hidden name beside `target` that no other run uses: process number and a count.
-std::string temporary_beside(const std::string& target) {
-  static std::atomic<unsigned> count{0};
-  const std::filesystem::path path = target;
-  const std::string name = path.filename().string().substr(0, 200);  // stays within the 255 of file systems
-  const std::string hidden = fmt::format(".{}.{}-{}.tmp", name, ::getpid(), count++);
-  return (path.parent_path() / hidden).string();
-}
-
 // A name that the file system cannot hold would be seen only when the temporary file is renamed.
 void refuse_long_name(const std::string& target, const std::string& path) {
   const std::filesystem::path name = target;
@@ -86,6 +79,41 @@ void refuse_long_name(const std::string& target, const std::string& path) {
   const long longest = ::pathconf(folder.c_str(), _PC_NAME_MAX);
   if (longest > 0 && name.filename().string().size() > static_cast<std::size_t>(longest))
     refuse(path, ENAMETOOLONG);
+}
+
+// "{part}" stands for any text.
+bool fits(const std::string& pattern, const std::string& path) {
+  const std::string part = "{part}";
+  const std::size_t at = pattern.find(part);
+  if (at == std::string::npos) return path == pattern;
+  const std::string_view before = std::string_view(pattern).substr(0, at),
+                         after = std::string_view(pattern).substr(at + part.size());
+  return path.size() >= before.size() + after.size() && path.starts_with(before) && path.ends_with(after);
+}
+
+// What was under the target's name before a new file is there.
+enum class Replaced { nothing, kept_aside, lost };
+
+// Both names change places at once. False: the file system, or the kernel, cannot; or one is not there.
+bool exchange(const std::string& a, const std::string& b, const std::string& path) {
+  if (::renameat2(AT_FDCWD, a.c_str(), AT_FDCWD, b.c_str(), RENAME_EXCHANGE) == 0) return true;
+  if (errno == EINVAL || errno == ENOSYS || errno == ENOTSUP || errno == ENOENT) return false;
+  refuse(path, errno);
+}
+
+// An old file takes the new one's hidden name, under which it can be brought back.
+Replaced put_in_place(const std::string& temporary, const std::string& target, const std::string& path) {
+  const bool exists = ::access(target.c_str(), F_OK) == 0;
+  if (exists && exchange(temporary, target, path)) return Replaced::kept_aside;
+  if (::rename(temporary.c_str(), target.c_str()) != 0) refuse(path, errno);
+  return exists ? Replaced::lost : Replaced::nothing;
+}
+
+void take_back(const std::string& temporary, const std::string& target, Replaced replaced) {
+  if (replaced == Replaced::kept_aside)
+    (void)::renameat2(AT_FDCWD, temporary.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE);
+  else if (replaced == Replaced::nothing)
+    ::unlink(target.c_str());
 }
 
 }  // namespace
@@ -137,9 +165,11 @@ void OutputFile::open_file() {
   if (exists && ::access(path_.c_str(), W_OK) != 0) refuse(path_, errno);
   target_ = follow_links(path_);
   refuse_long_name(target_, path_);
-  std::string name = temporary_beside(target_);
+  remove_stale_hidden(target_);
+  std::string name = hidden_beside(target_);
   const EndingWaits until_it_is_known;
   descriptor_ = open_or_refuse(name, O_WRONLY | O_CREAT | O_TRUNC, 0666, path_);  // narrowed by the umask
+  hold_hidden(descriptor_);
   temporary_ = std::move(name);
   remember_temporary(temporary_);
   replaces_ = exists;
@@ -222,20 +252,32 @@ OutputsTogether::~OutputsTogether() {
 
 bool OutputsTogether::takes(const std::string& path, const std::string& temporary,
                             const std::string& target) {
-  if (present_ == nullptr || std::count(present_->paths_.begin(), present_->paths_.end(), path) == 0)
+  if (present_ == nullptr || std::none_of(present_->paths_.begin(), present_->paths_.end(),
+                                          [&](const std::string& each) { return fits(each, path); }))
     return false;
   present_->waiting_.push_back({path, temporary, target});
   return true;
 }
 
+// Where one cannot be renamed, those before it are as they were again, but on a file system that cannot exchange
+// two names (renameat2(2)).
 void OutputsTogether::appear() {
   const EndingWaits until_all_are_there;
-  while (!waiting_.empty()) {
-    const Waiting next = waiting_.front();
-    if (::rename(next.temporary.c_str(), next.target.c_str()) != 0) refuse(next.path, errno);
-    forget_temporary(next.temporary);
-    waiting_.erase(waiting_.begin());
+  std::vector<Replaced> replaced;
+  replaced.reserve(waiting_.size());
+  try {
+    for (const Waiting& each : waiting_)
+      replaced.push_back(put_in_place(each.temporary, each.target, each.path));
+  } catch (const InputError&) {
+    for (std::size_t n = replaced.size(); n-- > 0;)
+      take_back(waiting_[n].temporary, waiting_[n].target, replaced[n]);
+    throw;
   }
+  for (std::size_t n = 0; n < waiting_.size(); ++n) {
+    if (replaced[n] == Replaced::kept_aside) ::unlink(waiting_[n].temporary.c_str());
+    forget_temporary(waiting_[n].temporary);
+  }
+  waiting_.clear();
 }
 
 void refuse_unwritable(const std::string& path, bool binary) {

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -43,6 +44,32 @@ void remove_stale(const fs::path& output) {
   for (const auto& entry : fs::directory_iterator(output, ignored))
     if (entry.path().filename().string().rfind(".flexel-", 0) == 0) fs::remove_all(entry.path(), ignored);
 }
+
+// The results of an earlier study, out of the way in `folder` while this one runs; unless this one leaves its
+// own (keep_new), what it wrote goes and they are back.
+class EarlierResults {
+ public:
+  EarlierResults(fs::path output, const fs::path& folder) : output_(std::move(output)), aside_(folder) {
+    std::error_code ignored;
+    for (const char* name : kResults) fs::rename(output_ / name, aside_ / name, ignored);
+  }
+  ~EarlierResults() {
+    if (!back_) return;
+    std::error_code ignored;
+    for (const char* name : kResults) {
+      fs::remove(output_ / name, ignored);
+      fs::rename(aside_ / name, output_ / name, ignored);
+    }
+  }
+  EarlierResults(const EarlierResults&) = delete;
+  EarlierResults& operator=(const EarlierResults&) = delete;
+  void keep_new() { back_ = false; }
+
+ private:
+  static constexpr std::array kResults{"study.csv", "study.json", "study.html"};
+  fs::path output_, aside_;
+  bool back_ = true;
+};
 
 }  // namespace
 
@@ -120,12 +147,10 @@ Sweep Session::look() {
 }
 
 void Session::run() {
+  std::optional<EarlierResults> earlier;
   try {
     Sweep sweep = look();
-    // Now that there is something to run, what an earlier study left goes.
-    std::error_code ignored;
-    for (const char* name : {"study.csv", "study.json", "study.html"})
-      fs::remove(wanted_.output / name, ignored);
+    earlier.emplace(wanted_.output, folder_->path());
     run_all(sweep);
     repeat_all(sweep);
   } catch (const Interrupted&) {
@@ -133,6 +158,7 @@ void Session::run() {
     note_interrupt();
   }
   finish();
+  if (earlier) earlier->keep_new();
 }
 
 void Session::note_interrupt() {
@@ -152,6 +178,7 @@ void Session::run_all(Sweep& sweep) {
                                 "budget of {}: give more with --budget",
                                 human_seconds(wanted_.budget))
                           : "no run went well; the first: " + study_.rows.front().found.failure;
+    if (left() <= 0 && !study_.rows.empty()) why += "; give more time with --budget";
     throw InputError(why);
   }
 }

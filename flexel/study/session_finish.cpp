@@ -135,13 +135,16 @@ void Session::write_all() {
     study_.notes.push_back(std::string("The plots are left out: ") + error.what());
     progress_.warn(study_.notes.back());
   }
+  const auto path = [&](const char* name) { return (wanted_.output / name).string(); };
+  OutputsTogether outputs({path("study.csv"), path("study.json"), path("study.html")});
   if (columns_) {
     std::string csv = csv_header(*columns_);
     for (std::size_t r = 0; r < study_.rows.size(); ++r) csv += csv_line(r + 1, study_.rows[r], *columns_);
-    write_text(csv, (wanted_.output / "study.csv").string());
+    write_text(csv, path("study.csv"));
   }
-  write_text(study_json(study_), (wanted_.output / "study.json").string());
-  write_text(page(study_, plots), (wanted_.output / "study.html").string());
+  write_text(study_json(study_), path("study.json"));
+  write_text(page(study_, plots), path("study.html"));
+  outputs.appear();
   std::istringstream lines(prediction_table(study_));
   for (std::string line; std::getline(lines, line);) progress_.say(line);
 }

@@ -15,7 +15,8 @@
 
 namespace {
 
-constexpr unsigned kMostConnections = 32, kSecondsIdle = 30;
+// A connection that asks for nothing is soon given to another; one whose page is being sent may be slow.
+constexpr unsigned kMostConnections = 32, kSecondsToAsk = 2, kSecondsToTake = 30;
 constexpr std::size_t kMemory = 32768;  // bytes a connection, half of it for headers
 
 struct Server {
@@ -75,7 +76,10 @@ MHD_Result on_request(void* context, MHD_Connection* connection, const char* pat
   if (std::strcmp(method, "GET") != 0)
     return refuse(connection, server, MHD_HTTP_METHOD_NOT_ALLOWED, "flexel view answers GET only\n");
   for (const FlexelServedFile& file : server.files)
-    if (std::strcmp(file.path, path) == 0) return answer(connection, server, MHD_HTTP_OK, file);
+    if (std::strcmp(file.path, path) == 0) {
+      (void)MHD_set_connection_option(connection, MHD_CONNECTION_OPTION_TIMEOUT, kSecondsToTake);
+      return answer(connection, server, MHD_HTTP_OK, file);
+    }
   return refuse(connection, server, MHD_HTTP_NOT_FOUND, "flexel view has no such page\n");
 }
 
@@ -112,7 +116,7 @@ void* start(const FlexelServedFile* files, std::size_t count, const char* policy
   server->daemon = MHD_start_daemon(MHD_USE_INTERNAL_POLLING_THREAD, 0, nullptr, nullptr, on_request, server,
                                     MHD_OPTION_LISTEN_SOCKET, listener, MHD_OPTION_CONNECTION_LIMIT,
                                     kMostConnections, MHD_OPTION_CONNECTION_MEMORY_LIMIT, kMemory,
-                                    MHD_OPTION_CONNECTION_TIMEOUT, kSecondsIdle, MHD_OPTION_END);
+                                    MHD_OPTION_CONNECTION_TIMEOUT, kSecondsToAsk, MHD_OPTION_END);
   if (server->daemon != nullptr) return server;
   *error = errno;
   close(listener);

@@ -226,10 +226,24 @@ void read_facet(Words& words, std::size_t triangle, AsciiSolid& solid) {
   words.expect("endfacet", triangle);
 }
 
+// Some programs name a solid by the path that they wrote it to: the file's name alone, without ".stl". Other
+// names with a slash stay whole.
+std::string name_of_solid(std::string name) {
+  const auto starts = [&](std::string_view text) { return name.starts_with(text); };
+  const bool drive = name.size() > 2 && std::isalpha(static_cast<unsigned char>(name[0])) != 0 &&
+                     name[1] == ':' && (name[2] == '\\' || name[2] == '/');
+  if (drive || starts("/") || starts("~/") || starts("./") || starts("../") || starts("\\\\"))
+    name = name.substr(name.find_last_of("/\\") + 1);
+  const std::size_t dot = name.size() > 4 ? name.size() - 4 : std::string::npos;
+  return dot != std::string::npos && Words::same(std::string_view(name).substr(dot), ".stl")
+             ? name.substr(0, dot)
+             : name;
+}
+
 // Everything up to the solid's end, after its first word; `triangles` counts over the file.
 AsciiSolid read_solid(Words& words, std::size_t& triangles) {
   AsciiSolid solid;
-  solid.name = clean_name(words.rest_of_line());
+  solid.name = name_of_solid(clean_name(words.rest_of_line()));
   while (true) {
     const std::string_view word = words.next();
     if (word.empty())

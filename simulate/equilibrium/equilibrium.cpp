@@ -231,7 +231,7 @@ bool LoadStepping::branch_off() {
   const bool left = attempt(NewtonSteps::lowering, kPushedIterations);
   pushed_ = false;
   if (left)
-    progress_.say(
+    progress_.warn(
         fmt::format("the part buckles at {:.4g} % of the load; beyond it, one of several shapes "
                     "that it may take",
                     100 * from));
@@ -257,6 +257,7 @@ EquilibriumResult LoadStepping::operator()() {
     throw TimeoutError(fmt::format("{} in equilibrium with {:.4g} % of the load, {} Newton iterations",
                                    error.what(), 100 * done_, result_.newton_iterations));
   }
+  result_.linear_reach = reach_;
   return result_;
 }
 

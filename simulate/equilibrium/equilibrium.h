@@ -13,7 +13,8 @@ struct EquilibriumResult {
   int load_steps = 0, newton_iterations = 0, cg_iterations = 0;
   double relative_residual = 0;
   double linear_seconds = 0;
-  bool buckled = false;  // left a branch that was not stable any more
+  bool buckled = false;     // left a branch that was not stable any more
+  double linear_reach = 0;  // m: the largest displacement of the first linear answer, for the whole load
 };
 
 // The rigid motions that the ties leave free at `start`: throws InputError(scene, ...) naming part and

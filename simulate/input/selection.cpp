@@ -183,7 +183,10 @@ std::vector<std::uint32_t> polygons_called(const Selection& selection, const Sur
 
 std::vector<std::string> every_name(const Body& body) {
   std::vector<std::string> names;
-  for (const char* side : {"xmin", "xmax", "ymin", "ymax", "zmin", "zmax"}) names.emplace_back(side);
+  for (const char* side : {"xmin", "xmax", "ymin", "ymax", "zmin", "zmax"}) {
+    names.emplace_back(side);
+    for (const Part& part : body.parts) names.push_back(part.name + "/" + side);
+  }
   for (const Part& part : body.parts) names.push_back(part.name);
   for (const SurfacePart& part : body.surface.parts)
     for (std::size_t end = 0; !part.assembly.empty(); ++end) {
@@ -199,9 +202,22 @@ std::vector<std::string> every_name(const Body& body) {
   return names;
 }
 
+// A side that is there, and yet holds nothing.
+void refuse_pointed_side(const Selection& selection) {
+  const std::string last = selection.name.substr(selection.name.rfind('/') + 1);
+  if (const auto side = side_of(parse_word(last).text))
+    throw InputError(
+        selection.origin,
+        fmt::format("\"{0}\" holds no face: the part ends there in a point or an edge, and nothing "
+                    "faces {1}{2}; take the elements of a box = {{ min = ..., max = ... }} there, or "
+                    "a face by its number (`flexel info`)",
+                    selection.name, side->sign < 0 ? '-' : '+', "xyz"[side->axis]));
+}
+
 [[noreturn]] void unknown_name(const Selection& selection, const Body& body) {
   const std::string& name = selection.name;
   const std::size_t slash = name.rfind('/');
+  if (slash == std::string::npos || parts_called(body, name.substr(0, slash))) refuse_pointed_side(selection);
   if (slash != std::string::npos) {
     if (const Parts parts = parts_called(body, name.substr(0, slash))) {
       const std::uint32_t part = parts->front();

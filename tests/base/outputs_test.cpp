@@ -1,14 +1,17 @@
 #include "base/files/outputs.h"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <filesystem>
 
 #include "base/error.h"
 #include "base/files/files.h"
+#include "base/files/hidden_file.h"
 #include "base/files/output_file.h"
 #include "base/files/pipe_code.h"
 #include "tests/formats/import_help.h"
@@ -72,6 +75,69 @@ TEST(Outputs, AppearTogetherOrNotAtAll) {
   outputs.appear();
   EXPECT_EQ(text_of(first), "new");
   EXPECT_EQ(text_of(second), "other");
+}
+
+std::size_t files_in(const std::string& folder) {
+  return static_cast<std::size_t>(
+      std::distance(std::filesystem::directory_iterator(folder), std::filesystem::directory_iterator()));
+}
+
+TEST(Outputs, WhatAppearedGoesAgainWhereOneCannot) {
+  const Scratch scratch;
+  const std::string first = scratch.write("first", "old"), second = scratch.path("second"),
+                    folder = scratch.path("folder"), third = folder + "/third";
+  std::filesystem::create_directory(folder);
+  {
+    OutputsTogether outputs({first, second, third});
+    for (const std::string& path : {first, second, third}) write_text("new", path);
+    std::filesystem::remove_all(folder);
+    EXPECT_THROW(outputs.appear(), InputError);
+  }
+  EXPECT_EQ(text_of(first), "old");
+  EXPECT_FALSE(std::filesystem::exists(second));
+  EXPECT_EQ(files_in(std::filesystem::path(first).parent_path()), 1) << "no temporary file is left";
+}
+
+TEST(Outputs, PiecesAppearWithTheOthers) {
+  const Scratch scratch;
+  OutputsTogether outputs({scratch.path("{part}.stl"), scratch.path("report")});
+  write_text("a", scratch.path("a.stl"));
+  write_text("b", scratch.path("b.obj"));
+  EXPECT_FALSE(std::filesystem::exists(scratch.path("a.stl")));
+  EXPECT_TRUE(std::filesystem::exists(scratch.path("b.obj")));
+  outputs.appear();
+  EXPECT_EQ(text_of(scratch.path("a.stl")), "a");
+}
+
+// A child that ends at once has a number that no process has.
+pid_t number_of_none() {
+  const pid_t child = fork();
+  if (child == 0) _exit(0);
+  EXPECT_EQ(waitpid(child, nullptr, 0), child);
+  return child;
+}
+
+TEST(HiddenFile, ThoseOfKilledRunsGo) {
+  const Scratch scratch;
+  const std::string gone = fmt::format(".out.stl.{}-0.tmp", number_of_none()),
+                    alive = fmt::format(".out.stl.{}-7.tmp", getppid());
+  const std::vector<std::string> others{alive,
+                                        gone + "x",
+                                        "." + gone,
+                                        ".out.stl.tmp",
+                                        ".out.stl.12a-0.tmp",
+                                        ".out.stl.-1-0.tmp",
+                                        fmt::format(".other.stl.{}-0.tmp", number_of_none())};
+  for (const std::string& name : others) scratch.write(name, "");
+  const std::string held = scratch.write(fmt::format(".out.stl.{}-1.tmp", number_of_none()), "");
+  const int descriptor = open(held.c_str(), O_RDWR);
+  hold_hidden(descriptor);
+  scratch.write(gone, "half");
+  write_text("whole", scratch.path("out.stl"));
+  EXPECT_FALSE(std::filesystem::exists(scratch.path(gone)));
+  EXPECT_TRUE(std::filesystem::exists(held)) << "another machine writes it";
+  for (const std::string& name : others) EXPECT_TRUE(std::filesystem::exists(scratch.path(name))) << name;
+  close(descriptor);
 }
 
 TEST(Outputs, GoToMemoryToo) {

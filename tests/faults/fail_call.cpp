@@ -106,6 +106,11 @@ int rename(const char* from, const char* to) {
   return fails(kRename) ? -1 : next(from, to);
 }
 
+int renameat2(int from_folder, const char* from, int to_folder, const char* to, unsigned flags) {
+  static const auto next = real<int(int, const char*, int, const char*, unsigned)>("renameat2");
+  return fails(kRename) ? -1 : next(from_folder, from, to_folder, to, flags);
+}
+
 // After open(..., O_CREAT); the mode is there then alone.
 int open(const char* path, int flags, ...) {
   va_list arguments;

@@ -113,6 +113,17 @@ TEST(ImportStl, SolidsBecomePartsThatShareNoVertex) {
   for (std::size_t p = 0; p < 36; ++p) EXPECT_EQ(surface.polygon_part(p), p / 12);
 }
 
+TEST(ImportStl, APathIsNoName) {
+  const Scratch scratch;
+  for (const auto& [given, name] : {std::pair{"/parts/arm.v2", "arm.v2"},
+                                    {"C:\\parts\\left arm.STL", "left arm"},
+                                    {"../arm.stl", "arm"},
+                                    {"left/arm", "left/arm"},
+                                    {"arm.step", "arm.step"},
+                                    {"/", "file"}})
+    EXPECT_EQ(import_surface(scratch.write("file.stl", ascii_solid(given, unit_box()))).parts[0].name, name);
+}
+
 TEST(ImportStl, AsciiKeepsDoublePrecisionAndTheUnitIsApplied) {
   const Scratch scratch;
   const std::string text =

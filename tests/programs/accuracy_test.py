@@ -145,5 +145,18 @@ def test_refusals():
     expect_error(run("flexel", "deform", "beam.stl", "--scene", timed, "--accuracy", "2%", "-o", "out.stl"), "flexel", "timed run")
 
 
+def test_a_column_about_to_buckle_is_told():
+    """Of PLA, 100 x 4 x 4 mm, clamped at one end: it buckles at pi^2 E I / (4 L^2) = 17.1 N (Euler)."""
+    write("column.stl", binary_stl(box_triangles((100, 4, 4))))
+    for newtons, near in ((4, False), (14, True)):
+        write("press.toml", 'material = "PLA"\nmodel = "cells"\n[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\n'
+                            f'force = ["-{newtons} N", "0 N", "10 mN"]\n')
+        result = expect_ok(run("flexel", "deform", "column.stl", "--scene", "press.toml", "--size", "1 mm", "-o", "bent.stl"))
+        expect(("about to buckle: it moves" in result.err) == near, f"{newtons} N: {result.err}")
+    write("across.toml", 'material = "PLA"\nmodel = "cells"\n[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\nforce = ["0 N", "0 N", "1 N"]\n')
+    result = expect_ok(run("flexel", "deform", "column.stl", "--scene", "across.toml", "--size", "1 mm", "-o", "bent.stl"))
+    expect("buckle" not in result.err, result.err)
+
+
 if __name__ == "__main__":
     main(globals())

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 
 from harness import (PARTS, Skip, ascii_stl, binary_stl, body, box, box_triangles, expect, expect_error, expect_ok, main, need_step,
                      bracket, run, write)
@@ -83,6 +84,8 @@ def test_parts_among_each_other():
     expect_error(voxelize("twice.stl", "--size", "1 mm"), "flexel-voxelize", "one body twice in one place", "leave one of them out")
     write("once.stl", ascii_stl(one, "a"))
     silent(voxelize("once.stl", "--size", "1 mm"), "twice")
+    shutil.copy("once.stl", "again.stl")
+    expect_error(voxelize("once.stl", "again.stl", "--size", "1 mm"), "flexel-voxelize", "one body twice in one place")
     write("gap.stl", ascii_stl(one, "left") + ascii_stl(shifted(one, 20.3), "right"))
     gap = says(voxelize("gap.stl", "--size", "1 mm"), '"left" and "right" miss each other by 300 um', "[[bond]] with gap")
     wide = re.search(r'gap = "([^"]*)"', gap.err).group(1)
@@ -93,6 +96,23 @@ def test_parts_among_each_other():
     says(voxelize("lap.stl", "--size", "1 mm"), "overlap: 200 mm^3 lies in both", "cut one from the other")
     write("cut.stl", ascii_stl(box_triangles((18, 10, 10)), "left") + ascii_stl(shifted(one, 18), "right"))
     silent(voxelize("cut.stl", "--size", "1 mm"), "overlap", "miss each other")
+
+
+def test_a_side_that_is_a_point():
+    """A needle: nothing faces down at its tip, and "zmin" is no word that is not known."""
+    around = [(0, 0, 30), (4, 0, 30), (4, 4, 30), (0, 4, 30)]
+    tip, top = (2, 2, 0), [(around[0], around[1], around[2]), (around[0], around[2], around[3])]
+    write("needle.stl", binary_stl([(around[(i + 1) % 4], around[i], tip) for i in range(4)] + top))
+    pull = 'material = "steel"\n[[fix]]\nwhere = "zmax"\n[[load]]\nwhere = {}\nforce = ["1 N", "0 N", "0 N"]\n'
+    write("side.toml", pull.format('"zmin"'))
+    refused = run("flexel", "deform", "needle.stl", "--scene", "side.toml", "--size", "1 mm", "-o", "out.stl")
+    expect_error(refused, "flexel", '"zmin" holds no face', "a point or an edge", "box = { min = ..., max = ... }")
+    expect("did you mean" not in refused.err, refused.err)
+    write("box.toml", pull.format('{ box = { min = ["0 mm", "0 mm", "-1 mm"], max = ["4 mm", "4 mm", "6 mm"] } }'))
+    expect_ok(run("flexel", "deform", "needle.stl", "--scene", "box.toml", "--size", "1 mm", "-o", "out.stl"))
+    write("mistyped.toml", pull.format('"needle/zmni"'))
+    expect_error(run("flexel", "deform", "needle.stl", "--scene", "mistyped.toml", "--size", "1 mm", "-o", "out.stl"), "flexel",
+                 'did you mean "needle/zmin"?')
 
 
 def test_open_surfaces():

@@ -81,8 +81,10 @@ def sweep(command, outputs, least=1):
             errors = [line for line in done.err.splitlines() if f"{program}: error: " in line]
             expect(0 < done.code < 6 and len(errors) == 1, f"one line and an exit code wanted; {what}")
             expect("internal error" not in done.err, what)
-            for name in outputs:
-                expect(found[name] == OLD or whole(name, found[name], reference[name]), f"{name} is neither old nor new; {what}")
+            old, new = ([name for name in outputs if good(name)] for good in
+                        (lambda name: found[name] == OLD, lambda name: found[name] != OLD and whole(name, found[name], reference[name])))
+            expect(sorted(old + new) == sorted(outputs), f"old: {old}, new: {new}, and others neither; {what}")
+            expect(not old or not new, f"some are old ({old}), some new ({new}); {what}")
     shutil.rmtree("again", ignore_errors=True)
     expect(failed >= least and tried > failed, f"{failed} of {tried} faults were noticed")
     if results := os.environ.get("FLEXEL_FAULTS_RESULTS"):

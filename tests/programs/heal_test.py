@@ -111,7 +111,7 @@ def test_a_sheet_is_refused_with_what_to_do():
     sheet = [t for t in grid_box() if all(corner[2] == 0 for corner in t)]
     write("sheet.stl", ascii_stl(sheet, "plate"))
     for option in ("auto", "wrap", "none"):
-        expect_error(run("flexel-voxelize", "sheet.stl", "--size", "4 mm", "--heal", option, "-o", "body.vtu"), "flexel-voxelize", "plate",
+        expect_error(run("flexel-voxelize", "sheet.stl", "--size", "4 mm", "--heal", option, "-o", "body.vtu"), "flexel-voxelize", "sheet.stl: part \"plate\"" if option != "wrap" else "plate",
                      *{"auto": ["encloses no volume", "sheet", "open edges", "give it a thickness or close it"],
                        "wrap": ["sheet", "close it", "no wrap closes it"], "none": ["plate"]}[option])
         expect_only("sheet.stl")

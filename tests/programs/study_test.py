@@ -247,6 +247,22 @@ def test_an_interrupt_keeps_the_rows():
     expect([p for p in left if p != str(os.getpid())] == [], f"no program is left running: {left}")
 
 
+def test_a_study_that_is_stopped_leaves_the_earlier_one():
+    box()
+    os.mkdir("study")
+    earlier = {name: f"earlier {name}\n" for name in ("study.csv", "study.json", "study.html")}
+    for name, text in earlier.items():
+        pathlib.Path("study", name).write_text(text)
+    command = ("flexel", "study", "box.stl", "--scene", scene(), "--budget", "100 s", "-o", "study", "--timeout", "6 s")
+    expect_error(run(*command), "flexel", "stopped by --timeout", code=5)
+    expect_only(*earlier, folder="study")
+    for name, text in earlier.items():
+        expect(pathlib.Path("study", name).read_text() == text, f"{name} is not the earlier one")
+        os.remove(f"study/{name}")
+    expect_error(run(*command), "flexel", "stopped by --timeout", code=5)
+    expect_only(folder="study")
+
+
 def test_timed_runs_have_drift_and_lag():
     write("timed.toml", SCENE + "[run]\ntime = \"40 us\"\n")
     study_until(lambda found: {"integrator", "step"} <= {r["sweep"] for r in found}, "12 s", "50 s", "95 s", scene_file="timed.toml")

@@ -7,7 +7,9 @@ import os
 import re
 import shutil
 import signal
+import socket
 import subprocess
+import time
 import urllib.parse
 
 from harness import BIN, SCENE, body, box, bracket, expect, expect_error, expect_ok, expect_only, main, run, scene, write
@@ -76,6 +78,21 @@ def test_others_get_nothing():
         expect(ask(url, url.path, **{"X-Long": "x" * 40000})[0] == 431, "headers have a limit")
         expect(ask(url, "/" + "x" * 40000)[0] in (404, 414, 431), "so has the path")
         expect(ask(url, url.path)[0] == 200, "it still answers")
+
+
+def test_idle_connections_lock_nobody_out():
+    with served(box()) as (url, _):
+        idle = [socket.create_connection((url.hostname, url.port)) for _ in range(40)]
+        idle[0].sendall(b"GET / HTTP/1.1\r\n")  # and no more
+        status, begin = None, time.monotonic()
+        while status is None and time.monotonic() < begin + 15:  # half as long as a page may take
+            try:
+                status = ask(url, url.path)[0]
+            except OSError:  # there is no room yet
+                time.sleep(0.2)
+        expect(status == 200, "the page is not answered")
+        for connection in idle:
+            connection.close()
 
 
 def test_how_it_ends():

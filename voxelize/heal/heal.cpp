@@ -242,19 +242,23 @@ bool has_large_hole(const HealedPart& part) {
 }
 
 InputError undecided(const std::vector<UndecidedPart>& parts, std::size_t all) {
+  const bool one_file = std::all_of(parts.begin(), parts.end(),
+                                    [&](const UndecidedPart& each) { return each.file == parts[0].file; });
+  const std::string where = one_file ? parts[0].file : "";
   if (parts.size() == 1 && is_sheet(*parts[0].part))
-    return InputError(fmt::format("part \"{}\" encloses no volume: {}; give it a thickness or close it",
+    return InputError(where,
+                      fmt::format("part \"{}\" encloses no volume: {}; give it a thickness or close it",
                                   parts[0].name, why_undecided(*parts[0].part)));
   if (parts.size() == 1)
-    return InputError(fmt::format("part \"{}\": inside cannot be told from outside: {}; {}", parts[0].name,
-                                  why_undecided(*parts[0].part), cure(parts)));
+    return InputError(where, fmt::format("part \"{}\": inside cannot be told from outside: {}; {}",
+                                         parts[0].name, why_undecided(*parts[0].part), cure(parts)));
   constexpr std::size_t kNamed = 4;
   std::string names;
   for (std::size_t p = 0; p < std::min(kNamed, parts.size()); ++p)
     names += fmt::format("{}\"{}\" ({})", p == 0 ? "" : ", ", parts[p].name, why_undecided(*parts[p].part));
   if (parts.size() > kNamed) names += fmt::format(" and {} more", parts.size() - kNamed);
-  return InputError(fmt::format("inside cannot be told from outside in {} of {} parts: {}; {}", parts.size(),
-                                all, names, cure(parts)));
+  return InputError(where, fmt::format("inside cannot be told from outside in {} of {} parts: {}; {}",
+                                       parts.size(), all, names, cure(parts)));
 }
 
 std::vector<std::string> healing_lines(const Healing& done) {

@@ -30,7 +30,7 @@ void refuse_fine_wrap(const PartMesh& mesh, const HealChoice& how, double memory
 
 // A part of which inside cannot be told from outside.
 struct UndecidedPart {
-  std::string name;
+  std::string name, file;
   const HealedPart* part = nullptr;
 };
 
