@@ -464,10 +464,10 @@ bool has_thin_walls(const SolvedRun& run) {
   return worst > kWide && walls_are_thin(run.voxels);
 }
 
-// Model `quadratic` takes the scene: equilibrium of parts that do not touch, without rigid links.
+// Model `quadratic` takes the scene: equilibrium without rigid links.
 bool suits_quadratic(const SolvedRun& run) {
   const simulate::SimulateResult& found = run.simulated;
-  return !QuadraticField::is_in(run.voxels.body) && !found.timed && !found.settled && found.bonds.empty() &&
+  return !QuadraticField::is_in(run.voxels.body) && !found.timed && !found.settled &&
          std::none_of(found.loads.begin(), found.loads.end(),
                       [](const simulate::AppliedLoad& load) { return load.displacement.has_value(); });
 }

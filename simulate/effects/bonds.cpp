@@ -11,7 +11,6 @@
 #include "base/error.h"
 #include "base/nearest_word.h"
 #include "simulate/effects/contact.h"
-#include "simulate/matter/interface_points.h"
 #include "simulate/matter/masses.h"
 #include "simulate/models/stability.h"
 
@@ -69,7 +68,6 @@ std::vector<Bonds::Named> parse_named(TableReader& scene) {
   return named;
 }
 
-// Throws InputError: no such part, or a gap wider than half a spacing.
 TouchingGap named_gap(const Bonds::Named& named, const Body& body) {
   TouchingGap made{{}, named.gap};
   std::vector<std::string> names;
@@ -135,10 +133,23 @@ void Bonds::parse(TableReader& scene, Parameters& parameters) {
   parameters.bond = bond ? bond->flag : !contact;
 }
 
+std::vector<TouchingGap> Bonds::named_gaps(const Parameters& parameters, const Body& body) {
+  std::vector<TouchingGap> gaps;
+  for (const Named& each : parameters.named) gaps.push_back(named_gap(each, body));
+  return gaps;
+}
+
+void Bonds::refuse_apart(const Named& named) {
+  throw InputError(
+      named.origin,
+      fmt::format("parts \"{}\" and \"{}\" of a [[bond]] do not touch: no face of one looks "
+                  "at one of the other{}",
+                  named.parts[0], named.parts[1], named.gap > 0 ? " over its gap" : "; give a \"gap\""));
+}
+
 std::optional<Bonds> Bonds::make(const Parameters& parameters, const Problem& problem) {
   if (!parameters.bond && parameters.named.empty()) return std::nullopt;
-  std::vector<TouchingGap> named;
-  for (const Named& each : parameters.named) named.push_back(named_gap(each, problem.body));
+  const std::vector<TouchingGap> named = named_gaps(parameters, problem.body);
   const auto is_named = [&](const std::array<std::uint32_t, 2>& parts) {
     return std::any_of(named.begin(), named.end(), [&](const TouchingGap& each) {
       return each.parts == std::array{std::min(parts[0], parts[1]), std::max(parts[0], parts[1])};
@@ -159,12 +170,7 @@ std::optional<Bonds> Bonds::make(const Parameters& parameters, const Problem& pr
     area[{std::min(point.part[0], point.part[1]), std::max(point.part[0], point.part[1])}] += point.area;
   });
   for (std::size_t n = 0; n < named.size(); ++n)
-    if (!area.contains(named[n].parts))
-      throw InputError(parameters.named[n].origin,
-                       fmt::format("parts \"{}\" and \"{}\" of a [[bond]] do not touch: no face of one looks "
-                                   "at one of the other{}",
-                                   parameters.named[n].parts[0], parameters.named[n].parts[1],
-                                   named[n].gap > 0 ? " over its gap" : "; give a \"gap\""));
+    if (!area.contains(named[n].parts)) refuse_apart(parameters.named[n]);
   if (by_elements.empty()) return std::nullopt;
   for (const auto& [elements, stiffness] : by_elements) made.bonds_.push_back({elements, stiffness});
   for (const auto& [parts, shared] : area)

@@ -14,6 +14,7 @@
 #include <array>
 
 #include "simulate/effects/effect.h"
+#include "simulate/matter/interface_points.h"
 
 namespace flexel::simulate {
 
@@ -31,6 +32,10 @@ class Bonds : public Effect {
   static constexpr const char* name = "bonds";
   static constexpr double kPenalty = 20;  // stiffness per area, in E / h
 
+  // (named) their parts, the lower number first. Throws InputError: no such part, or a gap wider than half a spacing.
+  [[nodiscard]] static std::vector<TouchingGap> named_gaps(const Parameters& parameters, const Body& body);
+  // Throws InputError: the parts do not touch.
+  [[noreturn]] static void refuse_apart(const Named& named);
   static void parse(TableReader& scene, Parameters& parameters);
   [[nodiscard]] static std::optional<Bonds> make(const Parameters& parameters, const Problem& problem);
   [[nodiscard]] std::string why() const override;

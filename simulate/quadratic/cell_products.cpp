@@ -68,6 +68,20 @@ void put_rotation(const Mat3& rotation, std::size_t lane, Number* to) {
 
 }  // namespace
 
+CellCouplings::CellCouplings(std::vector<std::array<std::uint32_t, 2>> pairs_of_cells, std::size_t cell_count)
+    : pairs(std::move(pairs_of_cells)), cross(pairs.size()), offsets{0}, place(cell_count, -1) {
+  std::vector<std::vector<std::uint32_t>> of(cell_count);
+  for (std::uint32_t p = 0; p < pairs.size(); ++p)
+    for (std::uint32_t side = 0; side < 2; ++side) of[pairs[p][side]].push_back(2 * p + side);
+  for (std::uint32_t c = 0; c < cell_count; ++c) {
+    if (of[c].empty()) continue;
+    place[c] = static_cast<std::int32_t>(cells.size());
+    cells.push_back(c);
+    of_cell.insert(of_cell.end(), of[c].begin(), of[c].end());
+    offsets.push_back(static_cast<std::uint32_t>(of_cell.size()));
+  }
+}
+
 template <class Number>
 CellProducts<Number>::CellProducts(const QuadraticNodes& nodes, const std::vector<PartCells>& parts,
                                    const std::vector<std::uint32_t>& part,
@@ -120,6 +134,7 @@ CellProducts<Number>::CellProducts(const CellProducts<Other>& other)
       turned_(other.turned_),
       support_at_(other.support_at_),
       support_(other.support_),
+      couplings_(other.couplings_),
       cell_force_(other.cell_force_.size()) {
   for (const auto& each : other.parts_)
     parts_.push_back({in_precision<Number>(each.elasticity, unit_), each.axes, each.along_world});
@@ -190,9 +205,8 @@ void CellProducts<Number>::apply(std::size_t e, Number* values) const {
   run_kernel(eight.whole, cells, part.elasticity, values);
 }
 
-// Adds R S R^T x to the forces of a cell.
 template <class Number>
-void CellProducts<Number>::add_support(std::size_t cell, const double* x, Number* forces) const {
+CellValues CellProducts<Number>::support_forces(std::size_t cell, const double* x) const {
   CellValues own, sum = CellValues::Zero();
   for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
     const Eigen::Map<const Vec3> at(x + 3 * nodes_->of_cell[cell][n]);
@@ -206,12 +220,36 @@ void CellProducts<Number>::add_support(std::size_t cell, const double* x, Number
     sum.head(i) += own[i] * row;
     packed += i + 1;
   }
-  for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
-    const Vec3 at = sum.segment<3>(static_cast<Eigen::Index>(3 * n));
-    const Vec3 force = turned_.empty() ? at : Vec3(turned_[cell] * at);
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      forces[3 * n + axis] += static_cast<Number>(force[static_cast<Eigen::Index>(axis)] / unit_);
-  }
+  for (Eigen::Index n = 0; n < kCellUnknowns && !turned_.empty(); n += 3)
+    sum.segment<3>(n) = (turned_[cell] * sum.segment<3>(n)).eval();
+  return sum / unit_;
+}
+
+// Summed up in doubles: a translation leaves nothing, though both terms are large.
+template <class Number>
+void CellProducts<Number>::add_coupled(const double* x) const {
+  const CellCouplings& couplings = *couplings_;
+  parallel_for_each(
+      couplings.cells.size(),
+      [&](std::size_t i) {
+        const std::uint32_t cell = couplings.cells[i];
+        CellValues there, sum = CellValues::Zero();
+        for (std::uint32_t at = couplings.offsets[i]; at < couplings.offsets[i + 1]; ++at) {
+          const std::size_t pair = couplings.of_cell[at] / 2, side = couplings.of_cell[at] % 2;
+          const auto& other = nodes_->of_cell[couplings.pairs[pair][1 - side]];
+          for (std::size_t n = 0; n < kQuadraticNodes; ++n)
+            there.segment<3>(static_cast<Eigen::Index>(3 * n)) =
+                Eigen::Map<const Vec3>(x + 3 * std::size_t{other[n]});
+          if (side == 0)
+            sum.noalias() += couplings.cross[pair] * there;
+          else
+            sum.noalias() += couplings.cross[pair].transpose() * there;
+        }
+        sum = (sum / unit_ + support_forces(cell, x)).eval();
+        Number* to = &cell_force_[std::size_t{cell} * kCellUnknowns];
+        for (Eigen::Index n = 0; n < kCellUnknowns; ++n) to[n] += static_cast<Number>(sum[n]);
+      },
+      kEightsAtATime);
 }
 
 template <class Number>
@@ -234,10 +272,15 @@ void CellProducts<Number>::forces(const double* x, double* y) const {
         for (std::size_t lane = 0; lane < eight.count; ++lane) {
           Number* to = &cell_force_[eight.cell[lane] * kCellUnknowns];
           for (std::size_t i = 0; i < kCellUnknowns; ++i) to[i] = values[kWidth * i + lane];
-          if (is_supported(eight.cell[lane])) add_support(eight.cell[lane], x, to);
+          const std::uint32_t cell = eight.cell[lane];
+          if (!is_supported(cell) || (couplings_ && couplings_->place[cell] >= 0)) continue;
+          const CellValues held = support_forces(cell, x);
+          for (std::size_t i = 0; i < kCellUnknowns; ++i)
+            to[i] += static_cast<Number>(held[static_cast<Eigen::Index>(i)]);
         }
       },
       kEightsAtATime);
+  if (couplings_) add_coupled(x);
   parallel_for_each(
       nodes_->size(),
       [&](std::size_t n) {

@@ -2,6 +2,7 @@
 // supports. Eight cells of a part at a time, by the kernels of kernel_quadratic.h.
 #pragma once
 #include <functional>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -16,6 +17,19 @@ struct CellTurn {
   using Columns = Eigen::Matrix<double, kCellUnknowns, 3>;
   Mat3 rotation = Mat3::Identity();
   Columns a = Columns::Zero(), gamma = Columns::Zero();
+};
+
+// What joins cells of different parts (nitsche_bond.h): their cross stiffness, in the world frame. What it adds to either
+// cell's own stiffness is a support of it.
+struct CellCouplings {
+  std::vector<std::array<std::uint32_t, 2>> pairs;  // cells
+  std::vector<CellMatrix> cross;                    // (pairs) rows: the first cell; columns: the second
+  std::vector<std::uint32_t> cells;                 // that are in any pair, ascending
+  // (cells + 1) and (2 x pairs): 2 pair + side of each of them, ascending
+  std::vector<std::uint32_t> offsets, of_cell;
+  std::vector<std::int32_t> place;  // (all cells) in `cells`, or -1
+
+  CellCouplings(std::vector<std::array<std::uint32_t, 2>> pairs_of_cells, std::size_t cell_count);
 };
 
 // K x of up to eight columns.
@@ -41,6 +55,9 @@ class CellProducts {
   void reserve_supports(const std::vector<std::uint32_t>& cells);
   // What supports add to K, symmetric.
   void set_support(std::size_t cell, const CellMatrix& matrix);
+  // `couplings` may change as long as nothing is multiplied; none: no parts are bonded.
+  void set_couplings(std::shared_ptr<const CellCouplings> couplings) { couplings_ = std::move(couplings); }
+  [[nodiscard]] const CellCouplings* couplings() const { return couplings_.get(); }
   // (cells) From now on every cell is turned; what `more` has is added to `a` (none: nothing).
   void turn(const std::vector<CellTurn>& turns, const std::vector<CellTurn::Columns>& more = {});
 
@@ -77,7 +94,10 @@ class CellProducts {
     bool along_world;  // the axes are the world's
   };
   void apply(std::size_t eight, Number* values) const;
-  void add_support(std::size_t cell, const double* x, Number* forces) const;
+  // N: R S R^T x of a cell, in its unit.
+  [[nodiscard]] Eigen::Matrix<double, kCellUnknowns, 1> support_forces(std::size_t cell,
+                                                                       const double* x) const;
+  void add_coupled(const double* x) const;
   // All lanes are one cell. `turned`: as it is now, else as at first.
   void multiply_one(std::size_t cell, bool turned, const CellColumns& x, CellColumns& product) const;
   [[nodiscard]] CellMatrix support(std::size_t cell) const;  // R S R^T
@@ -94,6 +114,7 @@ class CellProducts {
   std::vector<Mat3> turned_;              // (cells) R; none: not turned
   std::vector<std::int32_t> support_at_;  // (cells) or -1; none: no supports
   std::vector<double> support_;           // (supported cells x 81 x 82 / 2) lower triangle, row by row
+  std::shared_ptr<const CellCouplings> couplings_;
   mutable std::vector<Number> cell_force_;  // (cells x 81)
 };
 

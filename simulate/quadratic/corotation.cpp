@@ -53,7 +53,7 @@ Corotation::Corotation(const QuadraticSystem& system, QuadraticOperator& stiffne
       stress_(system.nodes().cells.size()),
       force_(system.nodes().cells.size() * kCellUnknowns) {
   for (std::uint32_t c = 0; c < system.nodes().cells.size(); ++c)
-    if (!system.cell_supports(c).empty()) supported_.push_back(c);
+    if (system.is_supported(c)) supported_.push_back(c);
   for (std::size_t c = 0; c < system.nodes().cells.size(); ++c)
     stiffest_ = std::max(stiffest_, system.stiffest(c) * system.lattice(c).spacing.maxCoeff());
 }
@@ -127,6 +127,29 @@ std::array<Vec3, kQuadraticNodes> Corotation::support_forces(std::size_t cell,
   return led;
 }
 
+void Corotation::take_bonds(const std::vector<Vec3>& displacement, std::vector<Vec3>& left) const {
+  const QuadraticNodes& nodes = system_.nodes();
+  std::vector<std::array<NodeVectors, 2>> forces(system_.bonds().size());
+  parallel_for_each(
+      forces.size(),
+      [&](std::size_t p) {
+        const auto& cell = system_.bonds()[p].cell;
+        std::array<NodeVectors, 2> u, local;
+        for (std::size_t side = 0; side < 2; ++side) {
+          local[side] = local_displacement(nodes, cell[side], displacement, from_rest_[cell[side]]);
+          for (std::size_t n = 0; n < kQuadraticNodes; ++n)
+            u[side][n] = displacement[nodes.of_cell[cell[side]][n]];
+        }
+        forces[p] = bond_forces(system_.bond(p, safety_), u, local,
+                                {turn_[cell[0]].rotation, turn_[cell[1]].rotation});
+      },
+      kTurnedCellsAtATime);
+  for (std::size_t p = 0; p < forces.size(); ++p)
+    for (std::size_t side = 0; side < 2; ++side)
+      for (std::size_t n = 0; n < kQuadraticNodes; ++n)
+        left[nodes.of_cell[system_.bonds()[p].cell[side]][n]] -= forces[p][side][n];
+}
+
 bool Corotation::residual(const std::vector<Vec3>& displacement, double share, std::vector<Vec3>& left) {
   const QuadraticNodes& nodes = system_.nodes();
   std::vector<std::uint8_t> folded(nodes.cells.size(), 0);
@@ -144,6 +167,7 @@ bool Corotation::residual(const std::vector<Vec3>& displacement, double share, s
   for (std::size_t i = 0; i < supported_.size(); ++i)
     for (std::size_t n = 0; n < kQuadraticNodes; ++n) left[nodes.of_cell[supported_[i]][n]] += held[i][n];
   double outer = dot(left, left);
+  take_bonds(displacement, left);
   parallel_for_each(nodes.size(), [&](std::size_t n) {
     for (const QuadraticNodes::Incidence& incidence : nodes.at(n))
       left[n] -= Eigen::Map<const Vec3>(&force_[incidence.cell * kCellUnknowns + 3 * incidence.node]);
@@ -171,6 +195,10 @@ void Corotation::set_tangent(bool stressed) {
         stiffness_.cells().set_support(c, system_.support_stiffness(c, safety_, turn_[c].rotation));
       },
       kTurnedCellsAtATime);
+  if (stiffness_.cells().couplings() == nullptr) return;
+  stiffness_.cells().set_couplings(nullptr);  // before there are others
+  stiffness_.cells().set_couplings(
+      system_.couplings(safety_, [&](std::size_t c) { return turn_[c].rotation; }));
 }
 
 }  // namespace flexel::simulate

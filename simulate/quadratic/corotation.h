@@ -38,6 +38,8 @@ class Corotation {
   [[nodiscard]] std::array<Vec3, kQuadraticNodes> support_forces(std::size_t cell,
                                                                  const std::vector<Vec3>& displacement,
                                                                  double share) const;
+  // Takes from `left` what bonds hold the nodes of their cells with.
+  void take_bonds(const std::vector<Vec3>& displacement, std::vector<Vec3>& left) const;
 
   const QuadraticSystem& system_;
   QuadraticOperator& stiffness_;

@@ -7,7 +7,6 @@
 #include <optional>
 
 #include "formats/lattice/locate.h"
-#include "simulate/matter/voxel_pieces.h"
 
 namespace flexel::simulate {
 namespace {
@@ -28,39 +27,46 @@ std::optional<std::uint32_t> beyond(const QuadraticNodes& nodes, std::uint32_t c
 struct Rule {
   std::vector<double> at, weight;
 };
-const Rule& rule_for(const Outline& piece) {
-  constexpr double kSmall = 0.1;  // spacings
+const Rule& rule_of(bool small) {
   static const Rule two{{0.21132486540518712, 0.78867513459481288}, {0.5, 0.5}};
   static const Rule four{
       {0.06943184420297371, 0.33000947820757187, 0.66999052179242813, 0.93056815579702629},
       {0.17392742256872693, 0.32607257743127307, 0.32607257743127307, 0.17392742256872693}};
-  double largest = 0;
-  for (const Vec3& corner : piece) largest = std::max(largest, (corner - piece[0]).cwiseAbs().maxCoeff());
-  return largest < kSmall ? two : four;
+  return small ? two : four;
 }
 
-// A piece's points: of each triangle of its fan those of a square, collapsed to it.
 void add_points(const Body& body, const Part& part, std::uint32_t cell, std::uint32_t body_cell,
                 const Outline& piece, std::vector<FacePoint>& points) {
-  const Rule& rule = rule_for(piece);
-  for (std::size_t v = 1; v + 1 < piece.size(); ++v) {
-    const Vec3 a = part.lattice.to_world(piece[0]), b = part.lattice.to_world(piece[v]),
-               c = part.lattice.to_world(piece[v + 1]);
-    const Vec3 area = 0.5 * (b - a).cross(c - a);
-    if (!(area.norm() > 0)) continue;
-    for (std::size_t r = 0; r < rule.at.size(); ++r)
-      for (std::size_t q = 0; q < rule.at.size(); ++q) {
-        FacePoint point;
-        point.cell = cell;
-        point.position = a + rule.at[r] * ((b - a) + rule.at[q] * (c - b));
-        point.area_vector = 2 * rule.weight[r] * rule.at[r] * rule.weight[q] * area;
-        point.at = cell_coordinates(body, part, body_cell, point.position);
-        points.push_back(point);
-      }
-  }
+  Outline polygon;
+  for (const Vec3& corner : piece) polygon.push_back(part.lattice.to_world(corner));
+  for_each_gauss_point(polygon, is_small(piece), [&](const Vec3& position, const Vec3& area_vector) {
+    points.push_back({cell, cell_coordinates(body, part, body_cell, position), position, area_vector});
+  });
 }
 
 }  // namespace
+
+bool is_small(const Outline& piece) {
+  constexpr double kSmall = 0.1;  // spacings
+  double largest = 0;
+  for (const Vec3& corner : piece) largest = std::max(largest, (corner - piece[0]).cwiseAbs().maxCoeff());
+  return largest < kSmall;
+}
+
+// Of each triangle of its fan those of a square, collapsed to it.
+void for_each_gauss_point(const Outline& polygon, bool small,
+                          const std::function<void(const Vec3&, const Vec3&)>& use) {
+  const Rule& rule = rule_of(small);
+  for (std::size_t v = 1; v + 1 < polygon.size(); ++v) {
+    const Vec3 &a = polygon[0], &b = polygon[v], &c = polygon[v + 1];
+    const Vec3 area = 0.5 * (b - a).cross(c - a);
+    if (!(area.norm() > 0)) continue;
+    for (std::size_t r = 0; r < rule.at.size(); ++r)
+      for (std::size_t q = 0; q < rule.at.size(); ++q)
+        use(a + rule.at[r] * ((b - a) + rule.at[q] * (c - b)),
+            2 * rule.weight[r] * rule.at[r] * rule.weight[q] * area);
+  }
+}
 
 std::vector<FacePoint> in_firm_cells(const Body& body, const QuadraticNodes& nodes,
                                      std::vector<FacePoint> points) {

@@ -1,7 +1,9 @@
 // Points of the part's surface under which supports hold and loads act, each in the cell that its matter lies in.
 #pragma once
+#include <functional>
 #include <vector>
 
+#include "simulate/matter/voxel_pieces.h"
 #include "simulate/quadratic/quadratic_nodes.h"
 
 namespace flexel::simulate {
@@ -16,6 +18,12 @@ struct FacePoint {
 // Of the selected polygons: each is cut by the voxels, and each piece gets Gauss points; none where no cell that resists lies under.
 [[nodiscard]] std::vector<FacePoint> face_points(const Problem& problem, const QuadraticNodes& nodes,
                                                  const std::vector<std::uint32_t>& polygons);
+
+// Gauss's points of a convex polygon (m, world frame), each with its share of the area vector. `small`: beside a voxel,
+// where fewer do (is_small(), of the polygon in lattice coordinates).
+void for_each_gauss_point(const Outline& polygon, bool small,
+                          const std::function<void(const Vec3&, const Vec3&)>& use);
+[[nodiscard]] bool is_small(const Outline& piece);
 
 // The points, those in cells with little matter taken over by the next cell inwards (its polynomials reach a little
 // further): there the traction of a field that hardly any matter resists would need any penalty to hold it.

@@ -12,20 +12,25 @@ Mat3 projector_of(const Tie& tie) {
 
 }  // namespace
 
-NitschePoint nitsche_point(const FacePoint& point, const Tie& tie, double share, const Lattice& lattice,
-                           const Mat9& moduli, double penalty) {
+NitschePoint traction_point(const FacePoint& point, const Lattice& lattice, const Mat9& moduli) {
   NitschePoint made;
   made.shape = world_shape(lattice, point.at);
   made.area = point.area_vector.norm();
-  made.penalty = penalty;
-  made.projector = projector_of(tie);
-  made.led = tie.motion.displacement(point.position, share);
   const Vec3 normal = point.area_vector / made.area;
   Eigen::Matrix<double, 3, 9> normal_moduli;  // (i, 3 k + l): sum_j n_j A(3 i + j, 3 k + l)
   for (int i = 0; i < 3; ++i) normal_moduli.row(i) = normal.transpose() * moduli.middleRows<3>(3 * i);
   for (std::size_t n = 0; n < kQuadraticNodes; ++n)
     for (int k = 0; k < 3; ++k)
       made.traction[n].col(k) = normal_moduli.middleCols<3>(3 * k) * made.shape.gradient[n];
+  return made;
+}
+
+NitschePoint nitsche_point(const FacePoint& point, const Tie& tie, double share, const Lattice& lattice,
+                           const Mat9& moduli, double penalty) {
+  NitschePoint made = traction_point(point, lattice, moduli);
+  made.penalty = penalty;
+  made.projector = projector_of(tie);
+  made.led = tie.motion.displacement(point.position, share);
   return made;
 }
 
@@ -58,7 +63,7 @@ void SupportIntegrals::find(const Lattice& lattice, const Mat9& moduli) {
     const auto count = static_cast<Eigen::Index>(std::min(kAtATime, points.size() - first));
     for (Eigen::Index p = 0; p < count; ++p) {
       const NitschePoint point =
-          nitsche_point(*points[first + static_cast<std::size_t>(p)], *support->tie, 0, lattice, moduli, 0);
+          traction_point(*points[first + static_cast<std::size_t>(p)], lattice, moduli);
       for (Eigen::Index n = 0; n < kNodes; ++n) {
         value(n, p) = point.shape.value[static_cast<std::size_t>(n)];
         weighted(n, p) = point.area * value(n, p);

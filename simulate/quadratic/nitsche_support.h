@@ -33,6 +33,8 @@ struct NitschePoint {
   double area = 0, penalty = 0;  // m^2, Pa/m
   Vec3 led = Vec3::Zero();       // m, d
 };
+// Shape functions, tractions and area only.
+[[nodiscard]] NitschePoint traction_point(const FacePoint& point, const Lattice& lattice, const Mat9& moduli);
 // `share`: of the tie's motion that is done.
 [[nodiscard]] NitschePoint nitsche_point(const FacePoint& point, const Tie& tie, double share,
                                          const Lattice& lattice, const Mat9& moduli, double penalty);

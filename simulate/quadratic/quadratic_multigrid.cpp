@@ -25,6 +25,16 @@ constexpr std::size_t kBlocksAtATime = 16;
 using Vector = std::vector<Vec3>;
 using CornerMatrix = Eigen::Matrix<double, 24, 24>;
 
+// P^T K P, of a matrix of the nodes of two cells.
+CornerMatrix corners_of(const CellMatrix& matrix) {
+  Eigen::Matrix<double, kCellUnknowns, 24> embedding = Eigen::Matrix<double, kCellUnknowns, 24>::Zero();
+  for (std::size_t n = 0; n < kQuadraticNodes; ++n)
+    for (std::size_t a = 0; a < 8; ++a)
+      embedding.block<3, 3>(static_cast<Eigen::Index>(3 * n), static_cast<Eigen::Index>(3 * a)) =
+          trilinear_weight(n, a) * Mat3::Identity();
+  return embedding.transpose() * matrix * embedding;
+}
+
 }  // namespace
 
 // Of all cells, while the rest is made from it.
@@ -95,13 +105,14 @@ struct QuadraticMultigrid::CellStiffness {
 };
 
 QuadraticMultigrid::QuadraticMultigrid(const QuadraticOperator& matrix, const Body& body,
+                                       const std::vector<BondedCells>& bonds,
                                        const std::vector<Vec3>& displacement)
     : matrix_(matrix), cells_(matrix.cells()) {
   make_transfer();
   {
     const CellStiffness cells(matrix.cells(), matrix.nodes().cells.size());
     make_coarse(body, displacement, cells);
-    make_blocks(cells);
+    make_blocks(cells, bonds);
   }
   hierarchy_ = aggregation_multigrid(coarse_, geometry_);
   estimate_largest();
@@ -131,10 +142,18 @@ void QuadraticMultigrid::make_coarse(const Body& body, const std::vector<Vec3>& 
   const QuadraticNodes& nodes = matrix_.nodes();
   std::array<std::size_t, 8> corner{};
   for (std::size_t a = 0; a < 8; ++a) corner[a] = node_of_corner(a);
+  const CellCouplings none({}, nodes.cells.size()),
+      &couplings = matrix_.cells().couplings() != nullptr ? *matrix_.cells().couplings() : none;
   std::vector<std::vector<std::uint32_t>> rows(nodes.elements.size());
   for (const auto& cell : nodes.of_cell)
     for (const std::size_t a : corner)
       for (const std::size_t b : corner) rows[cell[a]].push_back(cell[b]);
+  for (const auto& [first, second] : couplings.pairs)
+    for (const std::size_t a : corner)
+      for (const std::size_t b : corner) {
+        rows[nodes.of_cell[first][a]].push_back(nodes.of_cell[second][b]);
+        rows[nodes.of_cell[second][b]].push_back(nodes.of_cell[first][a]);
+      }
   coarse_.row_offsets.assign(1, 0);
   for (std::vector<std::uint32_t>& row : rows) {
     std::sort(row.begin(), row.end());
@@ -148,6 +167,18 @@ void QuadraticMultigrid::make_coarse(const Body& body, const std::vector<Vec3>& 
       for (std::size_t b = 0; b < 8; ++b)
         coarse_.values[position_of(coarse_, nodes.of_cell[c][corner[a]], nodes.of_cell[c][corner[b]])] +=
             cells.corners[c].block<3, 3>(static_cast<Eigen::Index>(3 * a), static_cast<Eigen::Index>(3 * b));
+  for (std::size_t p = 0; p < couplings.pairs.size(); ++p) {
+    const CornerMatrix cross = corners_of(couplings.cross[p]);
+    for (std::size_t a = 0; a < 8; ++a)
+      for (std::size_t b = 0; b < 8; ++b) {
+        const Mat3 block =
+            cross.block<3, 3>(static_cast<Eigen::Index>(3 * a), static_cast<Eigen::Index>(3 * b));
+        const std::uint32_t first = nodes.of_cell[couplings.pairs[p][0]][corner[a]],
+                            second = nodes.of_cell[couplings.pairs[p][1]][corner[b]];
+        coarse_.values[position_of(coarse_, first, second)] += block;
+        coarse_.values[position_of(coarse_, second, first)] += block.transpose();
+      }
+  }
   Constraints held;
   held.mask.assign(matrix_.held().begin(), matrix_.held().begin() + static_cast<std::ptrdiff_t>(rows.size()));
   eliminate(held, coarse_);
@@ -160,11 +191,14 @@ void QuadraticMultigrid::make_coarse(const Body& body, const std::vector<Vec3>& 
   }
 }
 
-void QuadraticMultigrid::make_blocks(const CellStiffness& cells) {
+void QuadraticMultigrid::make_blocks(const CellStiffness& cells, const std::vector<BondedCells>& bonds) {
   const QuadraticNodes& nodes = matrix_.nodes();
+  bond_blocks_ = BondBlocks(matrix_, bonds, [&](std::size_t cell, std::size_t a, std::size_t b) {
+    return cells.block(cell, a, b);
+  });
   block_of_.assign(nodes.cells.size(), -1);
   for (std::uint32_t c = 0; c < nodes.cells.size(); ++c) {
-    if (cells_.fill(c) >= kFullEnough && !cells_.is_supported(c)) continue;
+    if (bond_blocks_.has(c) || (cells_.fill(c) >= kFullEnough && !cells_.is_supported(c))) continue;
     block_of_[c] = static_cast<std::int32_t>(block_cells_.size());
     block_cells_.push_back(c);
   }
@@ -172,7 +206,8 @@ void QuadraticMultigrid::make_blocks(const CellStiffness& cells) {
   inverse_.assign(nodes.size(), Block::Zero());
   for (std::size_t n = 0; n < nodes.size(); ++n) {
     const auto count = std::count_if(nodes.at(n).begin(), nodes.at(n).end(),
-                                     [&](const auto& at) { return block_of_[at.cell] >= 0; });
+                                     [&](const auto& at) { return block_of_[at.cell] >= 0; }) +
+                       static_cast<std::ptrdiff_t>(bond_blocks_.count(n));
     if (count > 0) {
       weight_[n] = 1 / std::sqrt(static_cast<double>(count));
       continue;
@@ -269,13 +304,14 @@ void QuadraticMultigrid::smooth_once(const Vector& residual, Vector& correction)
         quadratic_kernel::best().square(inverse_factors_[b], wanted, &block_values_[b * kPaddedUnknowns]);
       },
       kBlocksAtATime);
+  bond_blocks_.solve(weight_, residual);
   correction.resize(residual.size());
   parallel_for_each(nodes.size(), [&](std::size_t n) {
     if (weight_[n] == 0) {
       correction[n] = inverse_[n] * residual[n];
       return;
     }
-    Vec3 sum = Vec3::Zero();
+    Vec3 sum = bond_blocks_.count(n) > 0 ? bond_blocks_.sum(n) : Vec3(Vec3::Zero());
     for (const QuadraticNodes::Incidence& at : nodes.at(n))
       if (const std::int32_t block = block_of_[at.cell]; block >= 0)
         sum += Eigen::Map<const Eigen::Vector3f>(

@@ -2,7 +2,7 @@
 //
 // Chebyshev(2) before and after, smoothed by additive Schwarz: one block (all 27 nodes of the assembled stiffness) a cell
 // that is filled less than 70 % or that a support holds, weighted by 1 / sqrt(multiplicity) on both sides, and 3 x 3 blocks of all
-// other nodes. Between them the trilinear field on the same lattice: its Galerkin operator P^T K P, made cell by cell, and
+// other nodes; across bonds the blocks of bond_blocks.h. Between them the trilinear field on the same lattice: its Galerkin operator P^T K P, made cell by cell, and
 // the hierarchy of simulate/linear/multigrid.h. Without the blocks of the cut cells conjugate gradients need some
 // thirty times the iterations (measured). Products and blocks are in single precision.
 #pragma once
@@ -10,14 +10,15 @@
 
 #include "simulate/linear/preconditioner.h"
 #include "simulate/models/stiffness.h"
-#include "simulate/quadratic/quadratic_operator.h"
+#include "simulate/quadratic/bond_blocks.h"
 
 namespace flexel::simulate {
 
 class QuadraticMultigrid final : public Preconditioner {
  public:
   // Keeps references to the first two. `displacement`: (nodes x 3) m, where the matrix is the tangent; none: at rest.
-  QuadraticMultigrid(const QuadraticOperator& matrix, const Body& body,
+  // `bonds`: those whose couplings the matrix has.
+  QuadraticMultigrid(const QuadraticOperator& matrix, const Body& body, const std::vector<BondedCells>& bonds,
                      const std::vector<Vec3>& displacement = {});
   QuadraticMultigrid(const QuadraticMultigrid&) = delete;
   QuadraticMultigrid& operator=(const QuadraticMultigrid&) = delete;
@@ -35,7 +36,7 @@ class QuadraticMultigrid final : public Preconditioner {
   struct CellStiffness;
   void make_transfer();
   void make_coarse(const Body& body, const std::vector<Vec3>& displacement, const CellStiffness& cells);
-  void make_blocks(const CellStiffness& cells);
+  void make_blocks(const CellStiffness& cells, const std::vector<BondedCells>& bonds);
   void factorise(std::size_t block, std::uint32_t cell, const CellStiffness& cells);
   void estimate_largest();
   // y = K x, 0 in prescribed components
@@ -56,6 +57,7 @@ class QuadraticMultigrid final : public Preconditioner {
   std::vector<std::uint32_t> block_cells_;                   // cells that have a block
   std::vector<quadratic_kernel::Triangle> inverse_factors_;  // (blocks) inverse of Cholesky's factor
   std::vector<std::int32_t> block_of_;                       // (cells) or -1
+  mutable BondBlocks bond_blocks_;
   std::vector<double> weight_;               // (nodes) 1 / sqrt(multiplicity); 0: not in any block
   std::vector<Block> inverse_;               // (nodes) of the diagonal block, where weight_ is 0
   double largest_ = 1;                       // eigenvalue of M^-1 A

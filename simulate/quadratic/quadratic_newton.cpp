@@ -216,7 +216,7 @@ class LargeDeflection {
   }
   void make_preconditioner(const std::vector<Vec3>& u) {
     tangent_.multigrid.reset();  // before there is another
-    tangent_.multigrid.emplace(tangent_.stiffness, system_.problem().body, u);
+    tangent_.multigrid.emplace(tangent_.stiffness, system_.problem().body, system_.bonds(), u);
     made_at_ = u;
   }
 

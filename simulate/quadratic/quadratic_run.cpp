@@ -34,7 +34,8 @@ void refuse_what_is_missing(const Scene& scene, const Body& body, const std::vec
   if (scene.run.renormalise)
     throw InputError(scene.name, needs + "it has no renormalise; use model \"cells\"");
   for (const ActiveEffect& effect : effects)
-    if (effect.name != Supports::name && effect.name != Loads::name && effect.name != "gravity")
+    if (effect.name != Supports::name && effect.name != Loads::name && effect.name != Bonds::name &&
+        effect.name != "gravity")
       throw InputError(scene.name, fmt::format("{}it has no {} ({}); use model \"cells\"", needs, effect.name,
                                                effect.why));
   refuse_timed(effects, ActsIn::all, scene.name);
@@ -195,7 +196,7 @@ SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptio
   report_strays(fragments, result, progress);
   const QuadraticSystem system(problem, scene);
   for (const std::string& warning : system.warnings()) progress.warn(warning);
-  refuse_loose_fragments(fragments, body, system.tied_elements(), {}, scene.name);
+  refuse_loose_fragments(fragments, body, system.tied_elements(), system.bonded_elements(), scene.name);
   double solving = 0;
   const QuadraticSolution solution = equilibrium(system, scene, solving, progress);
   const StopWaits answered;
@@ -203,6 +204,7 @@ SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptio
   State state;
   state.displacement = element_displacement(system, solution);
   report(system, solution, result);
+  result.bonds = system.bonded_parts();
   judge(system, solution, result.elastic_energy, progress);
   sum_up_imbalance(result);
   for (const std::string& warning : warnings_of(result)) progress.warn(scene.name + ": " + warning);

@@ -52,7 +52,8 @@ QuadraticSolution solve(const QuadraticSystem& system, double tolerance, double 
   for (int attempt = 0; attempt < kSafeties; ++attempt, found.safety *= kMoreSafety) {
     found.tangent = std::make_unique<QuadraticTangent>(system.stiffness(found.safety));
     const QuadraticOperator& stiffness = found.tangent->stiffness;
-    const QuadraticMultigrid& multigrid = found.tangent->multigrid.emplace(stiffness, system.problem().body);
+    const QuadraticMultigrid& multigrid =
+        found.tangent->multigrid.emplace(stiffness, system.problem().body, system.bonds());
     if (attempt == 0) refuse_free(multigrid, system.problem().body, scene);
     found.displacement = system.prescribed();
     found.unbalanced.resize(n);

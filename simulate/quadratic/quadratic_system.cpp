@@ -50,6 +50,7 @@ QuadraticSystem::QuadraticSystem(const Problem& problem, const Scene& scene)
   }
   pressure_.assign(body.surface.polygon_count(), 0);
   place_supports(scene.get<Supports>().ties);
+  place_bonds(scene.get<Bonds>());
   place_loads(scene.get<Loads>().loads);
   if (const auto& acceleration = scene.get<Gravity>().acceleration) add_gravity(*acceleration);
 }
@@ -105,6 +106,54 @@ void QuadraticSystem::integrate_supports() {
       nodes_.cells.size(),
       [&](std::size_t c) {
         for (SupportIntegrals& each : cell_supports_[c]) each.find(lattice(c), moduli_[part_[c]]);
+      },
+      kIntegratedCellsAtATime);
+}
+
+void QuadraticSystem::place_bonds(const Bonds::Parameters& parameters) {
+  const Body& body = problem_.body;
+  cell_bonds_.resize(nodes_.cells.size());
+  if (body.parts.size() < 2) return;
+  const std::vector<TouchingGap> named = Bonds::named_gaps(parameters, body);
+  std::vector<std::uint8_t> touches(named.size(), 0);
+  for (std::uint32_t a = 0; a < body.parts.size(); ++a)
+    for (std::uint32_t b = a + 1; b < body.parts.size(); ++b) {
+      double gap = 0;
+      bool asked = parameters.bond;
+      for (const TouchingGap& each : named)
+        if (each.parts == std::array{a, b}) {
+          gap = std::max(gap, each.gap);
+          asked = true;
+        }
+      if (!asked) continue;
+      CommonSurface common = common_surface(problem_, nodes_, {a, b}, gap);
+      if (common.pairs.empty()) continue;
+      for (std::size_t n = 0; n < named.size(); ++n)
+        if (named[n].parts == std::array{a, b}) touches[n] = 1;
+      for (const std::uint32_t polygon : common.polygons) pressure_[polygon] = kUnknownPressure;
+      std::move(common.pairs.begin(), common.pairs.end(), std::back_inserter(bonds_));
+      bonded_parts_.push_back({{body.parts[a].name, body.parts[b].name}, common.area});
+    }
+  for (std::size_t n = 0; n < named.size(); ++n)
+    if (!touches[n]) Bonds::refuse_apart(parameters.named[n]);
+  for (std::uint32_t p = 0; p < bonds_.size(); ++p)
+    for (std::uint32_t side = 0; side < 2; ++side) cell_bonds_[bonds_[p].cell[side]].push_back(2 * p + side);
+  if (!bonds_.empty()) find_bearing_limits();
+}
+
+void QuadraticSystem::find_bearing_limits() {
+  bearing_limit_.assign(nodes_.cells.size(), 0);
+  const CellProducts<double> elastic = regular_cells();
+  parallel_for_each(
+      nodes_.cells.size(),
+      [&](std::size_t c) {
+        if (cell_bonds_[c].empty()) return;
+        std::vector<const FacePoint*> points;
+        for (const std::uint32_t at : cell_bonds_[c])
+          for (const FacePoint& point : bonds_[at / 2].points[at % 2]) points.push_back(&point);
+        std::array<Vec3, kQuadraticNodes> rest;
+        for (std::size_t n = 0; n < kQuadraticNodes; ++n) rest[n] = nodes_.rest[nodes_.of_cell[c][n]];
+        bearing_limit_[c] = bearing_limit(elastic.matrix(c), rest, points, lattice(c), moduli_[part_[c]]);
       },
       kIntegratedCellsAtATime);
 }
@@ -182,7 +231,53 @@ CellMatrix QuadraticSystem::support_stiffness(std::size_t cell, double safety, c
   CellMatrix matrix = CellMatrix::Zero();
   for (const SupportIntegrals& each : cell_supports_[cell])
     each.add_to(penalty(cell, safety), rotation, matrix);
+  for (const std::uint32_t at : cell_bonds_[cell]) add_own_stiffness(bond(at / 2, safety), at % 2, matrix);
   return matrix;
+}
+
+BondSides QuadraticSystem::bond(std::size_t pair, double safety) const {
+  BondSides made;
+  made.pair = &bonds_[pair];
+  std::array<double, 2> limit{};
+  for (std::size_t side = 0; side < 2; ++side) {
+    const std::uint32_t cell = bonds_[pair].cell[side];
+    made.lattice[side] = &lattice(cell);
+    made.moduli[side] = &moduli_[part_[cell]];
+    limit[side] = bearing_limit_[cell];
+  }
+  const double sum = limit[0] + limit[1];
+  made.weight = {limit[1] / sum, limit[0] / sum};
+  made.penalty = safety * kBondNitsche * limit[0] * made.weight[0];
+  return made;
+}
+
+std::shared_ptr<const CellCouplings> QuadraticSystem::couplings(
+    double safety, const std::function<Mat3(std::size_t)>& rotation) const {
+  if (bonds_.empty()) return nullptr;
+  std::vector<std::array<std::uint32_t, 2>> pairs;
+  for (const BondedCells& each : bonds_) pairs.push_back(each.cell);
+  auto made = std::make_shared<CellCouplings>(std::move(pairs), nodes_.cells.size());
+  parallel_for_each(
+      bonds_.size(),
+      [&](std::size_t p) {
+        made->cross[p] =
+            cross_stiffness(bond(p, safety), {rotation(bonds_[p].cell[0]), rotation(bonds_[p].cell[1])});
+      },
+      kIntegratedCellsAtATime);
+  return made;
+}
+
+std::vector<std::vector<std::uint32_t>> QuadraticSystem::bonded_elements() const {
+  std::vector<std::vector<std::uint32_t>> found;
+  for (const BondedCells& each : bonds_) {
+    std::vector<std::uint32_t>& elements = found.emplace_back();
+    for (const std::uint32_t cell : each.cell) {
+      const auto& own = problem_.body.cell_elements[nodes_.cells[cell]];
+      elements.insert(elements.end(), own.begin(), own.end());
+    }
+    std::sort(elements.begin(), elements.end());
+  }
+  return found;
 }
 
 double QuadraticSystem::penalty(std::size_t cell, double safety) const {
@@ -219,16 +314,20 @@ CellProducts<double> QuadraticSystem::outside() const {
   return cells([&](std::size_t c) { return Moments(kOutside * (whole - moments(c))); });
 }
 
-QuadraticOperator QuadraticSystem::stiffness(double safety) const {
+CellProducts<double> QuadraticSystem::regular_cells() const {
   const Moments whole = whole_cell_moments();
-  CellProducts<double> cells = this->cells([&](std::size_t c) -> std::optional<Moments> {
+  return cells([&](std::size_t c) -> std::optional<Moments> {
     if (moments_at_[c] == kWhole) return std::nullopt;
     const Moments own = moments(c);
     return Moments(own + kOutside * (whole - own));
   });
+}
+
+QuadraticOperator QuadraticSystem::stiffness(double safety) const {
+  CellProducts<double> cells = regular_cells();
   std::vector<std::uint32_t> supported;
   for (std::uint32_t c = 0; c < nodes_.cells.size(); ++c)
-    if (!cell_supports_[c].empty()) supported.push_back(c);
+    if (is_supported(c)) supported.push_back(c);
   cells.reserve_supports(supported);
   parallel_for_each(
       supported.size(),
@@ -236,6 +335,7 @@ QuadraticOperator QuadraticSystem::stiffness(double safety) const {
         cells.set_support(supported[i], support_stiffness(supported[i], safety, Mat3::Identity()));
       },
       kIntegratedCellsAtATime);
+  cells.set_couplings(couplings(safety, [](std::size_t) { return Mat3(Mat3::Identity()); }));
   return {nodes_, std::move(cells), held()};
 }
 

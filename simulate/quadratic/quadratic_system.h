@@ -1,5 +1,9 @@
 // A scene's linear equilibrium in model `quadratic`: cells, supports and loads, put together.
 #pragma once
+#include <memory>
+
+#include "simulate/effects/bonds.h"
+#include "simulate/quadratic/nitsche_bond.h"
 #include "simulate/quadratic/nitsche_support.h"
 #include "simulate/quadratic/quadratic_multigrid.h"
 #include "simulate/scene/scene.h"
@@ -15,7 +19,8 @@ struct NodalLoad {
 
 class QuadraticSystem {
  public:
-  // Throws InputError: cells that the surface cuts without moments, a support or load under which no matter lies.
+  // Throws InputError: cells that the surface cuts without moments, a support or load under which no matter lies, a
+  // [[bond]] of parts that do not touch.
   // Keeps references.
   QuadraticSystem(const Problem& problem, const Scene& scene);
   QuadraticSystem(const QuadraticSystem&) = delete;
@@ -48,7 +53,21 @@ class QuadraticSystem {
   [[nodiscard]] const std::vector<SupportIntegrals>& cell_supports(std::size_t cell) const {
     return cell_supports_[cell];
   }
-  // What its supports add to a cell's stiffness, in the frame of a cell that is turned.
+  // (pairs) cells of different parts that are bonded.
+  [[nodiscard]] const std::vector<BondedCells>& bonds() const { return bonds_; }
+  [[nodiscard]] BondSides bond(std::size_t pair, double safety) const;
+  // Who is bonded with whom.
+  [[nodiscard]] const std::vector<BondedParts>& bonded_parts() const { return bonded_parts_; }
+  // Supports or bonds add to the stiffness of a cell.
+  [[nodiscard]] bool is_supported(std::size_t cell) const {
+    return !cell_supports_[cell].empty() || !cell_bonds_[cell].empty();
+  }
+  // The cross stiffness of all bonds; `rotation`: (cells), none: as at rest. Nothing where there are none.
+  [[nodiscard]] std::shared_ptr<const CellCouplings> couplings(
+      double safety, const std::function<Mat3(std::size_t)>& rotation) const;
+  // (pairs) the elements of both cells, ascending.
+  [[nodiscard]] std::vector<std::vector<std::uint32_t>> bonded_elements() const;
+  // What its supports and bonds add to a cell's stiffness, in the frame of a cell that is turned.
   [[nodiscard]] CellMatrix support_stiffness(std::size_t cell, double safety, const Mat3& rotation) const;
   [[nodiscard]] double penalty(std::size_t cell, double safety) const;  // Pa/m, beta
   [[nodiscard]] NitschePoint point(const NitscheSupport& support, const FacePoint& at, double safety,
@@ -65,9 +84,13 @@ class QuadraticSystem {
  private:
   [[nodiscard]] CellProducts<double> cells(
       const std::function<std::optional<Moments>(std::size_t)>& moments) const;
+  // With a little stiffness where there is no matter.
+  [[nodiscard]] CellProducts<double> regular_cells() const;
   void require_moments() const;
   void place_supports(const std::vector<Tie>& ties);
   void integrate_supports();
+  void place_bonds(const Bonds::Parameters& parameters);
+  void find_bearing_limits();
   void place_loads(const std::vector<Load>& loads);
   void check_area(const Load& load, const std::vector<std::uint32_t>& polygons,
                   const std::vector<FacePoint>& points);
@@ -83,6 +106,10 @@ class QuadraticSystem {
   std::vector<double> stiffest_;           // (parts) Pa, lambda + 2 mu
   std::vector<NitscheSupport> supports_;
   std::vector<std::vector<SupportIntegrals>> cell_supports_;  // (cells)
+  std::vector<BondedCells> bonds_;
+  std::vector<std::vector<std::uint32_t>> cell_bonds_;  // (cells) 2 pair + side
+  std::vector<double> bearing_limit_;                   // (cells) Pa/m, of bonded ones
+  std::vector<BondedParts> bonded_parts_;
   std::vector<NodalLoad> loads_;
   std::vector<double> pressure_;  // (polygons)
   std::vector<std::string> warnings_;
