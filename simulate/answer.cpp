@@ -8,6 +8,7 @@
 
 #include "base/human.h"
 #include "base/units.h"
+#include "simulate/mode_lines.h"
 #include "simulate/scene/strength.h"
 
 namespace flexel::simulate {
@@ -224,6 +225,7 @@ std::string usual_next(const SimulateResult& result, const Body& body, const std
 std::vector<std::string> answer_lines(const SimulateResult& result, const Body& body,
                                       const std::vector<Material>& materials, const std::string& next,
                                       const std::string& size_option) {
+  if (result.modes) return mode_lines(*result.modes, result.mass);
   std::vector<std::string> lines{"how far    " + how_far(result)};
   if (!result.probes.empty()) lines.push_back("probes     " + probes(result));
   lines.push_back("how sure   " + how_sure(result, body));

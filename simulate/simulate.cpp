@@ -26,6 +26,7 @@
 #include "simulate/matter/stress.h"
 #include "simulate/models/rest_shape.h"
 #include "simulate/models/set_rest_shape.h"
+#include "simulate/modes/modes_run.h"
 #include "simulate/probes/probes.h"
 #include "simulate/probes/report.h"
 #include "simulate/quadratic/quadratic_run.h"
@@ -262,6 +263,11 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
   erase_stress_columns(body);
   progress.stage("simulate");
   check_actions(scene, body, progress);
+  if (asks_for_modes(scene)) {
+    SimulateResult result = run_modes(body, scene, options, progress);
+    progress.finish();
+    return result;
+  }
   if (is_quadratic(scene, body)) {
     refuse_timed(options, scene.name);
     SimulateResult result = run_quadratic(body, scene, options, progress);

@@ -177,6 +177,26 @@ std::string live_line(const LiveSummary& live) {
       live.behind, 1e3 * rms_jitter(live), 1e3 * live.worst_jitter, live.readers, human_count(live.dropped));
 }
 
+Json modes_json(const ModesSummary& summary) {
+  Json json = {{"rigid", summary.rigid},
+               {"prestressed", summary.prestressed},
+               {"iterations", summary.iterations},
+               {"largest_displacement", summary.shape}};
+  json[summary.buckling ? "buckling" : "modes"] = Json::array();
+  for (const Mode& mode : summary.modes) {
+    Json each;
+    if (summary.buckling)
+      each["load_factor"] = mode.load_factor;
+    else
+      each = {{"frequency", mode.frequency}, {"effective_mass", vector(mode.effective_mass)}};
+    each["error"] = mode.error;
+    each["probes"] = Json::array();
+    for (const Vec3& probe : mode.probes) each["probes"].push_back(vector(probe));
+    json[summary.buckling ? "buckling" : "modes"].push_back(each);
+  }
+  return json;
+}
+
 Json run_json(const SimulateResult& result) {
   Json json;
   if (result.timed) {
@@ -281,6 +301,7 @@ std::string summary_json(const SimulateResult& result, const Body& body) {
     if (!result.stress->beside.empty()) json["largest_von_mises_beside"] = result.stress->beside;
     if (result.stress->yield_share) json["largest_von_mises_yield_share"] = *result.stress->yield_share;
   }
+  if (result.modes) json["shapes"] = modes_json(*result.modes);
   json.update(run_json(result));
   json["seconds"] = result.seconds;
   json["time"] = Json::array();
@@ -290,6 +311,7 @@ std::string summary_json(const SimulateResult& result, const Body& body) {
 }
 
 std::vector<std::string> summary_lines(const SimulateResult& result) {
+  if (result.modes) return {};  // answer_lines() has them
   std::vector<std::string> lines;
   lines.push_back(fmt::format("largest displacement {}{} at {}", human_length(result.largest_displacement),
                               bar_of(result, ErrorBar::Of::largest_displacement),

@@ -183,6 +183,34 @@ bool Corotation::residual(const std::vector<Vec3>& displacement, double share, s
   return true;
 }
 
+void Corotation::stress_forces(const double* x, double* y) const {
+  const QuadraticNodes& nodes = system_.nodes();
+  std::vector<double> force(nodes.cells.size() * kCellUnknowns);
+  parallel_for_each(
+      nodes.cells.size(),
+      [&](std::size_t c) {
+        const CellTurn& turn = turn_[c];
+        CellValues local;
+        for (std::size_t n = 0; n < kQuadraticNodes; ++n)
+          local.segment<3>(at(n)) =
+              turn.rotation.transpose() * Eigen::Map<const Vec3>(x + 3 * std::size_t{nodes.of_cell[c][n]});
+        const Vec3 spin = turn.gamma.transpose() * local, pull = stress_[c].transpose() * local;
+        const CellValues sum = stress_[c] * spin + turn.gamma * pull;
+        for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
+          Eigen::Map<Vec3> to(&force[c * kCellUnknowns + 3 * n]);
+          to = turn.rotation * sum.segment<3>(at(n));
+        }
+      },
+      kTurnedCellsAtATime);
+  parallel_for_each(nodes.size(), [&](std::size_t n) {
+    Vec3 sum = Vec3::Zero();
+    for (const QuadraticNodes::Incidence& incidence : nodes.at(n))
+      sum += Eigen::Map<const Vec3>(&force[incidence.cell * kCellUnknowns + 3 * incidence.node]);
+    Eigen::Map<Vec3> to(y + 3 * n);
+    to = sum;
+  });
+}
+
 void Corotation::set_tangent(bool stressed) {
   if (stressed)
     stiffness_.cells().turn(turn_, stress_);

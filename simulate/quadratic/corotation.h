@@ -29,6 +29,9 @@ class Corotation {
   // stiffness), which may make it indefinite, is left out.
   void set_tangent(bool stressed);
 
+  // y (nodes x 3) N = K_sigma x, the part of the stresses alone, at the last displacement; x (nodes x 3) m.
+  void stress_forces(const double* x, double* y) const;
+
   // (cells) R - 1 of the last displacement.
   [[nodiscard]] const std::vector<Mat3>& turns() const { return from_rest_; }
 

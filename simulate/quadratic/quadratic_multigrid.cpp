@@ -106,7 +106,8 @@ struct QuadraticMultigrid::CellStiffness {
 
 QuadraticMultigrid::QuadraticMultigrid(const QuadraticOperator& matrix, const Body& body,
                                        const std::vector<BondedCells>& bonds,
-                                       const std::vector<Vec3>& displacement)
+                                       const std::vector<Vec3>& displacement,
+                                       const std::vector<double>& held_softly)
     : matrix_(matrix), cells_(matrix.cells()) {
   make_transfer();
   {
@@ -114,6 +115,9 @@ QuadraticMultigrid::QuadraticMultigrid(const QuadraticOperator& matrix, const Bo
     make_coarse(body, displacement, cells);
     make_blocks(cells, bonds);
   }
+  for (std::size_t e = 0; e < coarse_.rows() && !held_softly.empty(); ++e)
+    coarse_.values[diagonal_position(coarse_, e)].diagonal().array() +=
+        held_softly[matrix.nodes().elements[e]];
   hierarchy_ = aggregation_multigrid(coarse_, geometry_);
   estimate_largest();
 }

@@ -17,9 +17,10 @@ namespace flexel::simulate {
 class QuadraticMultigrid final : public Preconditioner {
  public:
   // Keeps references to the first two. `displacement`: (nodes x 3) m, where the matrix is the tangent; none: at rest.
-  // `bonds`: those whose couplings the matrix has.
+  // `bonds`: those whose couplings the matrix has. `held_softly`: (elements of the body) N/m that the trilinear field is
+  // held with besides, where rigid motions are free; none: nothing.
   QuadraticMultigrid(const QuadraticOperator& matrix, const Body& body, const std::vector<BondedCells>& bonds,
-                     const std::vector<Vec3>& displacement = {});
+                     const std::vector<Vec3>& displacement = {}, const std::vector<double>& held_softly = {});
   QuadraticMultigrid(const QuadraticMultigrid&) = delete;
   QuadraticMultigrid& operator=(const QuadraticMultigrid&) = delete;
 

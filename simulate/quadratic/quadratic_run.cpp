@@ -28,36 +28,6 @@ namespace {
 // Stress is taken as proportional to strain: an answer is off by about the strain.
 constexpr double kNoticeable = 0.03, kTooLarge = 0.25;
 
-void refuse_what_is_missing(const Scene& scene, const Body& body, const std::vector<ActiveEffect>& effects) {
-  const std::string needs = "model \"quadratic\" finds equilibria at small strain: ";
-  if (scene.run.time) throw InputError(scene.name, needs + "it has no [run] time; use model \"cells\"");
-  if (scene.run.renormalise)
-    throw InputError(scene.name, needs + "it has no renormalise; use model \"cells\"");
-  for (const ActiveEffect& effect : effects)
-    if (effect.name != Supports::name && effect.name != Loads::name && effect.name != Bonds::name &&
-        effect.name != "gravity")
-      throw InputError(scene.name, fmt::format("{}it has no {} ({}); use model \"cells\"", needs, effect.name,
-                                               effect.why));
-  refuse_timed(effects, ActsIn::all, scene.name);
-  for (const Columns* columns : {&body.cell_columns, &body.element_columns})
-    for (const auto& [name, column] : *columns)
-      if (!is_stress_column(name) && name != "velocity" && name != kQuadraticColumn)
-        throw InputError(scene.name,
-                         fmt::format("{}it does not know what an earlier run left in the body (\"{}\"); use "
-                                     "model \"cells\"",
-                                     needs, name));
-  for (const Tie& tie : scene.get<Supports>().ties)
-    if (tie.link)
-      throw InputError(tie.origin, fmt::format("{}it has no rigid links (\"{}\"); use link = \"averaging\"",
-                                               needs, tie.name));
-  for (const Part& part : body.parts)
-    if (part.placement == Placement::centre)
-      throw InputError(scene.name,
-                       fmt::format("model \"quadratic\" needs elements at the corners of the voxels: "
-                                   "voxelize part \"{}\" with --placement corner",
-                                   part.name));
-}
-
 void judge_strain(double strain, Progress& progress) {
   constexpr const char* kAssumed = "model \"quadratic\" takes stress as proportional to strain";
   if (strain > kTooLarge)
@@ -124,9 +94,52 @@ ProbeResult measure_probe(const Probe& probe, const ProbePoints& placed, const Q
   return result;
 }
 
-// The linear solution, and what large deflections make of it. Adds to `seconds`.
-QuadraticSolution equilibrium(const QuadraticSystem& system, const Scene& scene, double& seconds,
-                              Progress& progress) {
+// What a run finds at the vertices goes by these names.
+void tell_replaced_columns(const Body& body, Progress& progress) {
+  if (has_surface_stress(body)) return;  // an earlier run's
+  for (const char* name : {kVonMisesColumn, kPrincipalColumn, kYieldColumn})
+    if (body.surface.vertex_columns.contains(name))
+      progress.warn(
+          fmt::format("the part's own column \"{}\" is replaced by what this run finds: give it "
+                      "another name in the part's file to keep it",
+                      name));
+}
+
+}  // namespace
+
+void refuse_what_quadratic_lacks(const Scene& scene, const Body& body,
+                                 const std::vector<ActiveEffect>& effects) {
+  const std::string needs = "model \"quadratic\" finds equilibria at small strain: ";
+  if (scene.run.time) throw InputError(scene.name, needs + "it has no [run] time; use model \"cells\"");
+  if (scene.run.renormalise)
+    throw InputError(scene.name, needs + "it has no renormalise; use model \"cells\"");
+  for (const ActiveEffect& effect : effects)
+    if (effect.name != Supports::name && effect.name != Loads::name && effect.name != Bonds::name &&
+        effect.name != "gravity")
+      throw InputError(scene.name, fmt::format("{}it has no {} ({}); use model \"cells\"", needs, effect.name,
+                                               effect.why));
+  refuse_timed(effects, ActsIn::all, scene.name);
+  for (const Columns* columns : {&body.cell_columns, &body.element_columns})
+    for (const auto& [name, column] : *columns)
+      if (!is_stress_column(name) && name != "velocity" && name != kQuadraticColumn)
+        throw InputError(scene.name,
+                         fmt::format("{}it does not know what an earlier run left in the body (\"{}\"); use "
+                                     "model \"cells\"",
+                                     needs, name));
+  for (const Tie& tie : scene.get<Supports>().ties)
+    if (tie.link)
+      throw InputError(tie.origin, fmt::format("{}it has no rigid links (\"{}\"); use link = \"averaging\"",
+                                               needs, tie.name));
+  for (const Part& part : body.parts)
+    if (part.placement == Placement::centre)
+      throw InputError(scene.name,
+                       fmt::format("model \"quadratic\" needs elements at the corners of the voxels: "
+                                   "voxelize part \"{}\" with --placement corner",
+                                   part.name));
+}
+
+QuadraticSolution quadratic_equilibrium(const QuadraticSystem& system, const Scene& scene, double& seconds,
+                                        Progress& progress) {
   constexpr double kRough = 1e-3;  // of a linear solution that large deflections may change
   const ScopeTimer timer(seconds);
   const auto linear = [&](int iteration, double residual) {
@@ -146,19 +159,6 @@ QuadraticSolution equilibrium(const QuadraticSystem& system, const Scene& scene,
                         ": model \"quadratic\" did not converge; use a smaller --size, or model \"cells\"");
   return solution;
 }
-
-// What a run finds at the vertices goes by these names.
-void tell_replaced_columns(const Body& body, Progress& progress) {
-  if (has_surface_stress(body)) return;  // an earlier run's
-  for (const char* name : {kVonMisesColumn, kPrincipalColumn, kYieldColumn})
-    if (body.surface.vertex_columns.contains(name))
-      progress.warn(
-          fmt::format("the part's own column \"{}\" is replaced by what this run finds: give it "
-                      "another name in the part's file to keep it",
-                      name));
-}
-
-}  // namespace
 
 bool asks_for_quadratic(const Scene& scene) {
   return scene.model == "quadratic" ||
@@ -189,7 +189,7 @@ SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptio
   report_materials(problem, progress);
   const std::vector<ProbePoints> probes = place_probes(scene, problem);
   const std::vector<ActiveEffect> effects = active_effects(scene.effects, problem);
-  refuse_what_is_missing(scene, body, effects);
+  refuse_what_quadratic_lacks(scene, body, effects);
   report_effects(effects,
                  "cells with quadratic shape functions, which turn with their matter where that matters",
                  options.explain, progress);
@@ -198,7 +198,7 @@ SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptio
   for (const std::string& warning : system.warnings()) progress.warn(warning);
   refuse_loose_fragments(fragments, body, system.tied_elements(), system.bonded_elements(), scene.name);
   double solving = 0;
-  const QuadraticSolution solution = equilibrium(system, scene, solving, progress);
+  const QuadraticSolution solution = quadratic_equilibrium(system, scene, solving, progress);
   const StopWaits answered;
   name_materials(body, problem.materials);
   State state;

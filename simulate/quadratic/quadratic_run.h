@@ -20,4 +20,14 @@ namespace flexel::simulate {
 [[nodiscard]] SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptions& options,
                                            Progress& progress);
 
+class QuadraticSystem;     // simulate/quadratic/quadratic_system.h
+struct QuadraticSolution;  // simulate/quadratic/quadratic_solve.h
+
+// Its parts, for other analyses. Throws InputError naming what the model does not have.
+void refuse_what_quadratic_lacks(const Scene& scene, const Body& body,
+                                 const std::vector<ActiveEffect>& effects);
+// The linear solution, and what large deflections make of it. Adds to `seconds`. Throws as solve() and solve_large() do.
+[[nodiscard]] QuadraticSolution quadratic_equilibrium(const QuadraticSystem& system, const Scene& scene,
+                                                      double& seconds, Progress& progress);
+
 }  // namespace flexel::simulate

@@ -21,7 +21,6 @@ namespace flexel::simulate {
 namespace {
 
 constexpr std::uint32_t kWhole = std::numeric_limits<std::uint32_t>::max();
-constexpr double kOutside = 1e-6;  // stiffness of what is not matter, of the material's: slivers stay regular
 constexpr std::size_t kIntegratedCellsAtATime = 16;
 
 Moments body_moments(const Body& body, std::size_t place) {
@@ -217,6 +216,10 @@ void QuadraticSystem::add_gravity(const Vec3& acceleration) {
       made.forces[nodes_.of_cell[c][n]] += problem_.materials[part_[c]].density * volumes[n] * acceleration;
   }
   loads_.push_back(std::move(made));
+}
+
+bool QuadraticSystem::is_whole(std::size_t cell) const {
+  return moments_at_[cell] == kWhole;
 }
 
 Moments QuadraticSystem::moments(std::size_t cell) const {

@@ -17,6 +17,9 @@ struct NodalLoad {
   bool couple = false;       // it was given a torque, or a point where its force acts
 };
 
+// Stiffness and inertia of what is not matter, of the material's: slivers stay regular.
+constexpr double kOutside = 1e-6;
+
 class QuadraticSystem {
  public:
   // Throws InputError: cells that the surface cuts without moments, a support or load under which no matter lies, a
@@ -42,6 +45,8 @@ class QuadraticSystem {
   [[nodiscard]] const Mat9& moduli(std::uint32_t part) const { return moduli_[part]; }
   [[nodiscard]] std::uint32_t part_of(std::size_t cell) const { return part_[cell]; }
   [[nodiscard]] double stiffest(std::size_t cell) const { return stiffest_[part_[cell]]; }  // Pa
+  // Whether that cell of nodes().cells is full of matter.
+  [[nodiscard]] bool is_whole(std::size_t cell) const;
   // Of the cell of that index in nodes().cells.
   [[nodiscard]] Moments moments(std::size_t cell) const;
   [[nodiscard]] const Lattice& lattice(std::size_t cell) const {

@@ -85,7 +85,32 @@ struct TimedSummary {  // of a run in time
   std::optional<LiveSummary> live = {};
 };
 
-struct SimulateResult {
+struct Mode {              // a natural vibration, or a shape of buckling
+  double frequency = 0;    // Hz; of vibrations
+  double load_factor = 0;  // of buckling: times the loads of the scene
+  double error = 0;        // of the frequency or the factor, relative: what the iteration left over
+  Vec3 effective_mass =
+      Vec3::Zero();          // kg, by axis of the world: what moves along with it when the ground does
+  std::vector<Vec3> probes;  // m, of the scene's probes, in the shape as it is written
+};
+
+struct ModesSummary {       // of a run with [run] modes or buckling
+  std::vector<Mode> modes;  // lowest first, those of rigid motions left out
+  std::size_t rigid = 0;    // motions at 0 Hz
+  double shape = 0;         // m, that the shapes go at most where they are written
+  int iterations = 0;
+  bool buckling = false;
+  bool prestressed = false;  // by loads of the scene
+};
+
+struct SolverCounts {
+  int load_steps = 0, newton_iterations = 0, cg_iterations = 0;
+  int start_newton_iterations = 0;  // the most on a coarser lattice that the run started from
+  double relative_residual = 0;
+  double seconds = 0;
+};
+
+struct SimulateResult : SolverCounts {
   ErrorBars error_bars;  // at equilibrium
   std::vector<ProbeResult> probes;
   std::vector<Reaction> reactions;
@@ -104,12 +129,9 @@ struct SimulateResult {
   std::optional<double> smallest_corner_jacobian;
   Vec3 smallest_corner_at = Vec3::Zero();  // m, rest position of that corner
   std::optional<StressSummary> stress;     // nothing where no part has stresses, or they were not asked for
-  int load_steps = 0, newton_iterations = 0, cg_iterations = 0;
-  int start_newton_iterations = 0;  // the most on a coarser lattice that the run started from
-  double relative_residual = 0;
-  double seconds = 0;
   std::optional<TimedSummary> timed;
   std::optional<SettleSummary> settled;
+  std::optional<ModesSummary> modes;
 };
 
 }  // namespace flexel::simulate

@@ -152,6 +152,17 @@ void parse_time(TableReader& reader, RunSettings& run) {
                     *method));
 }
 
+void parse_modes(TableReader& reader, RunSettings& run) {
+  constexpr int kMost = 1000;
+  run.modes = whole_number(reader, "modes", kMost);
+  run.buckling = whole_number(reader, "buckling", kMost);
+  if (run.modes && run.buckling) reader.fail("[run] has both \"modes\" and \"buckling\"; give one");
+  const char* wanted = run.modes ? "modes" : "buckling";
+  if ((run.modes || run.buckling) && run.time)
+    reader.fail(reader.find(wanted)->line,
+                fmt::format("[run] has both \"{}\" and \"time\": a timed run has none; give one", wanted));
+}
+
 RunSettings parse_run(TableReader& root) {
   RunSettings run;
   const SceneValue* table = root.find("run");
@@ -167,6 +178,7 @@ RunSettings parse_run(TableReader& root) {
   run.tolerance_given = reader.find("tolerance") != nullptr;
   run.load_steps = whole_number(reader, "load_steps", 10000).value_or(run.load_steps);
   run.newton_iterations = whole_number(reader, "newton_iterations", 1000000);
+  parse_modes(reader, run);
   if (const SceneValue* value = reader.find("renormalise")) {
     if (value->kind != SceneValue::Kind::boolean)
       reader.fail(value->line, "\"renormalise\" needs to be true or false");

@@ -55,7 +55,9 @@ struct RunSettings {
   // after which the run gives up; each load step that ends in equilibrium allows 10 more. Nothing: 100, or 40
   // where the first linear answer is several times the size of the body
   std::optional<int> newton_iterations;
-  bool renormalise = false;  // the shape at the end becomes the rest shape (simulate/models/rest_shape.h)
+  std::optional<int> modes;     // natural vibrations that are wanted; nothing: equilibrium
+  std::optional<int> buckling;  // shapes of buckling, likewise
+  bool renormalise = false;     // the shape at the end becomes the rest shape (simulate/models/rest_shape.h)
 };
 
 struct Scene {

@@ -70,6 +70,8 @@ SceneKeyGroup run_keys() {
            {r, "tolerance", K::number, {}, "1e-8; 1e-5 with contact", "forces left over, relative"},
            {r, "load_steps", K::whole_number, {}, "1", "in which the load grows"},
            {r, "newton_iterations", K::whole_number, {}, "100", "after which the run gives up"},
+           {r, "modes", K::whole_number, {}, "", "natural vibrations in place of equilibrium: how many"},
+           {r, "buckling", K::whole_number, {}, "", "load factors and shapes of buckling: how many"},
            {r, "renormalise", K::flag, {}, "false", "the shape at the end becomes the rest shape"},
            {p, "name", K::text, {}, "probe N", "for the summary"},
            {p, "at", K::vector, D::length, "", "a material point; or where"},
