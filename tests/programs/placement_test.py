@@ -3,7 +3,9 @@
 import json
 import struct
 
-from harness import box, body, expect, expect_error, expect_ok, main, run, scene, write
+import meshio
+
+from harness import binary_stl, box, body, expect, expect_error, expect_ok, main, run, scene, write
 
 SCENE = """[parts.box]
 material = "PLA"
@@ -33,6 +35,27 @@ def vertices_of(stl):
 def simulate(text, *options):
     expect_ok(run("flexel-simulate", scene("bend.toml", text), "centres.vtu", "-o", "bent.vtu", "--summary", "summary.json", *options))
     return json.load(open("summary.json"))
+
+
+def wedge(name, mirrored):
+    """40 x 20 x 40 mm with a face at 45 degrees, which passes through the centres of voxels of 5 mm."""
+    outline = [(0, 0), (40, 0), (0, 40)]
+    if mirrored:
+        outline = [(40 - x, z) for x, z in reversed(outline)]
+    near, far = ([(x, y, z) for x, z in outline] for y in (0, 20))
+    triangles = [near, far[::-1]]
+    for i in range(3):
+        j = (i + 1) % 3
+        triangles += [(near[j], near[i], far[i]), (near[j], far[i], far[j])]
+    write(f"{name}.stl", binary_stl(triangles))
+    expect_ok(run("flexel-voxelize", f"{name}.stl", "--size", "5 mm", "--placement", "centre", "-o", f"{name}.vtu"))
+    return {tuple(round(1e4 * x) for x in point) for point in meshio.read(f"{name}.vtu").points}
+
+
+def test_mirrored_parts_have_mirrored_elements():
+    one, other = wedge("one", False), wedge("other", True)
+    expect(len(one) == len(other) == 4 * 36, f"{len(one)} and {len(other)} elements")
+    expect({(400 - x, y, z) for x, y, z in one} == other, "elements at mirrored places")
 
 
 def test_every_voxel_of_an_aligned_box_has_an_element():

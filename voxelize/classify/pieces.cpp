@@ -288,6 +288,18 @@ std::vector<Foot> feet_of(const VoxelRecords& voxel, const std::vector<std::uint
   return feet;
 }
 
+// The record that the voxel's centre lies on, or kVoid. Such a centre is inside, whichever side the matter is on: so
+// mirrored parts get mirrored elements.
+std::uint32_t record_at_centre(const VoxelRecords& voxel) {
+  constexpr double kOn = 1e-9;  // voxels
+  const Vec3 middle(voxel.i + .5, voxel.j + .5, voxel.k + .5);
+  for (std::uint32_t r = 0; r < voxel.records.size(); ++r) {
+    const TrianglePoints p = points_of(*voxel.mesh, voxel.records[r].triangle);
+    if (distance_to_triangle(middle, *p[0], *p[1], *p[2]) <= kOn) return r;
+  }
+  return VoxelPieces::kVoid;
+}
+
 // Joins fragments by a star around `centre`. Returns false on a tie; `bounds` gets what bounds each corner
 // and the voxel's centre.
 bool join_by_star(const VoxelRecords& voxel, const std::vector<std::uint32_t>& fragment,
@@ -299,7 +311,10 @@ bool join_by_star(const VoxelRecords& voxel, const std::vector<std::uint32_t>& f
   for (int a = 0; a < 8; ++a)
     if (!star.add_point(corner_point(voxel, a), voxel.winding[a] > 0, sets, bounds[a])) return false;
   bounds[8] = -1;
-  if (with_centre) {
+  if (const std::uint32_t on = with_centre ? record_at_centre(voxel) : VoxelPieces::kVoid;
+      on != VoxelPieces::kVoid) {
+    bounds[8] = fragment[on];
+  } else if (with_centre) {
     const Vec3 middle(voxel.i + .5, voxel.j + .5, voxel.k + .5);
     if (!star.add_point(middle, winding_at(voxel, middle) > 0, sets, bounds[8])) return false;
   }
@@ -314,7 +329,8 @@ bool join_by_star(const VoxelRecords& voxel, const std::vector<std::uint32_t>& f
 VoxelPieces one_piece(const VoxelRecords& voxel, bool with_centre) {
   VoxelPieces pieces;
   for (int a = 0; a < 8; ++a) pieces.of_corner[a] = voxel.winding[a] > 0 ? 0 : VoxelPieces::kVoid;
-  if (with_centre && winding_at(voxel, Vec3(voxel.i + .5, voxel.j + .5, voxel.k + .5)) > 0)
+  if (with_centre && (record_at_centre(voxel) != VoxelPieces::kVoid ||
+                      winding_at(voxel, Vec3(voxel.i + .5, voxel.j + .5, voxel.k + .5)) > 0))
     pieces.of_centre = 0;
   return pieces;
 }
