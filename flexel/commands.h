@@ -3,6 +3,7 @@
 
 namespace flexel::commands {
 
+int clay_command(int argc, char** argv);
 int compare_command(int argc, char** argv);
 int deform_command(int argc, char** argv);
 int export_command(int argc, char** argv);

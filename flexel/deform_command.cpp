@@ -17,9 +17,9 @@
 #include "base/units.h"
 #include "flexel/accuracy/resolution_search.h"
 #include "flexel/accuracy/run_error.h"
-#include "flexel/bent_picture.h"
 #include "flexel/commands.h"
 #include "flexel/job.h"
+#include "flexel/picture/bent_picture.h"
 #include "flexel/view/result_page.h"
 #include "formats/common/file_format.h"
 #include "formats/exchange/surface_file.h"
@@ -229,7 +229,7 @@ void write_outputs(const DeformArguments& arguments, const Plan& plan, Body& bod
     else if (output.surface)
       write_mapped(mapped.surface(body), body, mapped.result, *output.surface);
     else if (output.is_picture())
-      write_bent_picture(body, output.path, progress);
+      picture::write_bent_picture(body, output.path, progress);
     else
       write_body(body, output.path);
 }

@@ -33,6 +33,7 @@ constexpr const char* kHelp =
     "  flexel picture FILE... -o OUT.png\n"
     "                        a picture of parts and bodies, deformed and coloured, without a display\n"
     "  flexel view FILE...   parts, bodies and series in the browser; --html OUT.html writes the page\n"
+    "  flexel clay PART      pull at a part in the browser, and save it bent\n"
     "  flexel materials      the materials that --material and scenes know, with their sources\n"
     "  flexel scene-keys     the keys of scenes: where each may stand, what it takes, its default\n"
     "  flexel measure --model NAME --size LENGTH\n"
@@ -60,11 +61,11 @@ struct Command {
   const char* name;
   int (*run)(int argc, char** argv);
 };
-constexpr Command kCommands[] = {{"deform", deform_command},       {"compare", compare_command},
-                                 {"export", export_command},       {"info", info_command},
-                                 {"picture", picture_command},     {"view", view_command},
-                                 {"materials", materials_command}, {"scene-keys", scene_keys_command},
-                                 {"measure", measure_command},     {"study", study_command}};
+constexpr Command kCommands[] = {
+    {"deform", deform_command},   {"compare", compare_command},     {"export", export_command},
+    {"info", info_command},       {"picture", picture_command},     {"view", view_command},
+    {"clay", clay_command},       {"materials", materials_command}, {"scene-keys", scene_keys_command},
+    {"measure", measure_command}, {"study", study_command}};
 constexpr const char* kStages[] = {"voxelize", "simulate", "map"};
 
 std::vector<std::string> command_names() {

@@ -60,6 +60,10 @@ Json pack_drawn(const Drawn& drawn, const std::string& at, ArrayPack& pack) {
   pack.add_indices(at + "/borders", flat(shape.borders));
   if (shares_normals(shape)) pack.add_indices(at + "/smooth", shape.smooth);
   if (!drawn.colours.empty()) pack.add_bytes(at + "/colours", drawn.colours);
+  if (!drawn.carriers.empty()) {
+    pack.add_indices(at + "/carriers", drawn.carriers);
+    pack.add_numbers(at + "/weights", drawn.weights);
+  }
   const bool moved = is_moved(drawn);
   if (moved)
     for (std::size_t f = 0; f < drawn.displacement.size(); ++f)
@@ -240,6 +244,7 @@ Page make_page(const std::vector<ViewFile>& files, const PageOptions& options, b
                {"colours", colours_json()},
                {"units", units_json(files)},
                {"words", words_json(options.words)}};
+  if (!options.clay.empty()) json["clay"] = Json::parse(options.clay);
   if (options.exaggeration) json["scale"] = *options.exaggeration;
   json["files"] = Json::array();
   std::string data;

@@ -21,6 +21,8 @@ struct PageOptions {
   std::optional<double> exaggeration;  // of displacements; nothing: so that they are seen
   char up = 'z';                       // the axis of the files that points up
   RunWords words;
+  // JSON of the hands' controls where the page is of flexel clay (page/clay.js); "" for a page to be looked at
+  std::string clay;
 };
 
 struct Page {

@@ -35,6 +35,8 @@ FLEXEL_TAKE_IN("scene", FLEXEL_PAGE_FOLDER "scene.js");
 FLEXEL_TAKE_IN("controls", FLEXEL_PAGE_FOLDER "controls.js");
 FLEXEL_TAKE_IN("probes", FLEXEL_PAGE_FOLDER "probes.js");
 FLEXEL_TAKE_IN("record", FLEXEL_PAGE_FOLDER "record.js");
+FLEXEL_TAKE_IN("stream", FLEXEL_PAGE_FOLDER "stream.js");
+FLEXEL_TAKE_IN("clay", FLEXEL_PAGE_FOLDER "clay.js");
 FLEXEL_TAKE_IN("main", FLEXEL_PAGE_FOLDER "main.js");
 
 #define FLEXEL_TAKEN(name)                                                                                \
@@ -62,6 +64,8 @@ FLEXEL_TAKEN(scene)
 FLEXEL_TAKEN(controls)
 FLEXEL_TAKEN(probes)
 FLEXEL_TAKEN(record)
+FLEXEL_TAKEN(stream)
+FLEXEL_TAKEN(clay)
 FLEXEL_TAKEN(main)
 
 namespace flexel::view {
@@ -87,7 +91,7 @@ const PageFiles& page_files() {
     for (const std::string_view text :
          {unpack_text(), numbers_text(), paint_text(), shape_text(), elements_text(), camera_text(),
           coarse_text(), panel_text(), overlay_text(), scene_text(), probes_text(), record_text(),
-          controls_text(), main_text()})
+          controls_text(), stream_text(), clay_text(), main_text()})
       append_module(text, all);
     return all;
   }();

@@ -5,7 +5,9 @@
 #include <fmt/format.h>
 #include <sys/random.h>
 
+#include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <cstring>
 
 #include "base/error.h"
@@ -40,10 +42,59 @@ std::string random_token() {
   return token;
 }
 
+ServedLive& live_of(void* context) {
+  return *static_cast<ServedLive*>(context);
+}
+
+unsigned act(void* context, const char* bytes, std::size_t size, char* answer, std::size_t room) {
+  try {
+    const ServedLive::Answer given = live_of(context).act(std::string(bytes, size));
+    std::memcpy(answer, given.bytes.data(), std::min(room, given.bytes.size()));
+    return given.status;
+  } catch (...) {
+    return 500;
+  }
+}
+
+void* open_reader(void* context, const char* client) {
+  try {
+    return live_of(context).open(client).release();
+  } catch (...) {
+    return nullptr;
+  }
+}
+
+long next_bytes(void* reader, char* buffer, std::size_t size) {
+  try {
+    return static_cast<ServedLive::Reader*>(reader)->next(buffer, size);
+  } catch (...) {
+    return -1;
+  }
+}
+
+void close_reader(void* reader) {
+  delete static_cast<ServedLive::Reader*>(reader);
+}
+
+unsigned save(void* context, const char* name, void** bytes, std::size_t* size) {
+  try {
+    const ServedLive::Answer given = live_of(context).save(name);
+    *bytes = std::malloc(given.bytes.size() + 1);
+    if (*bytes == nullptr) return 500;
+    std::memcpy(*bytes, given.bytes.data(), given.bytes.size());
+    *size = given.bytes.size();
+    return given.status;
+  } catch (...) {
+    return 500;
+  }
+}
+
 }  // namespace
 
 struct PageServer::Files {
   Page page;
+  std::string root;
+  FlexelServeLive live{};
   std::vector<std::string> paths;
   std::vector<FlexelServedFile> served;
   void add(const std::string& path, const char* type, const void* bytes, std::size_t size) {
@@ -52,7 +103,7 @@ struct PageServer::Files {
   }
 };
 
-PageServer::PageServer(Page page) : files_(std::make_unique<Files>()) {
+PageServer::PageServer(Page page, ServedLive* live) : files_(std::make_unique<Files>()) {
   files_->page = std::move(page);
   const std::string root = fmt::format("/{}/", random_token());
   const Page& kept = files_->page;
@@ -61,10 +112,13 @@ PageServer::PageServer(Page page) : files_(std::make_unique<Files>()) {
     files_->add(fmt::format("{}data/{}", root, f), "application/octet-stream", kept.data[f].data(),
                 kept.data[f].size());
   for (std::size_t f = 0; f < files_->paths.size(); ++f) files_->served[f].path = files_->paths[f].c_str();
+  files_->root = root;
+  files_->live = {live, files_->root.c_str(), kLargestPost, act, open_reader, next_bytes, close_reader, save};
   std::uint16_t port = 0;
   int error = 0;
-  server_ = serve_module().start(files_->served.data(), files_->served.size(), "frame-ancestors 'none'",
-                                 &port, &error);
+  server_ = serve_module().start(files_->served.data(), files_->served.size(),
+                                 live == nullptr ? nullptr : &files_->live, "frame-ancestors 'none'", &port,
+                                 &error);
   if (server_ == nullptr)
     throw InputError(fmt::format("no port of 127.0.0.1 can be listened on ({}): --html writes a file instead",
                                  std::strerror(error)));

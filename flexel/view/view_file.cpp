@@ -14,6 +14,7 @@
 #include "base/units.h"
 #include "flexel/picture/attribute.h"
 #include "formats/lattice/body_file.h"
+#include "formats/lattice/locate.h"
 #include "mapping/map_refined.h"
 #include "mapping/methods/map_surface.h"
 #include "mapping/refine/refine.h"
@@ -230,7 +231,41 @@ void show_series(const std::string& pvd, const ViewOptions& options, ViewFile& f
   }
 }
 
+// The nearest element alone, for points over no cell.
+std::uint32_t nearest_element(const Body& body, const Vec3& point) {
+  std::uint32_t nearest = 0;
+  for (std::uint32_t e = 0; e < body.element_count(); ++e)
+    if ((body.rest[e] - point).squaredNorm() < (body.rest[nearest] - point).squaredNorm()) nearest = e;
+  return nearest;
+}
+
+void carry(const Body& body, Drawn& drawn) {
+  constexpr std::size_t kCorners = 8;
+  const std::size_t count = drawn.shape.rest.size();
+  drawn.carriers.assign(kCorners * count, 0);
+  drawn.weights.assign(kCorners * count, 0);
+  parallel_for_each(count, [&](std::size_t p) {
+    const Vec3& point = drawn.shape.rest[p];
+    const std::optional<CellPoint> at = locate_on_surface(body, drawn.shape.owner[p], point);
+    drawn.weights[kCorners * p] = 1;
+    if (!at) drawn.carriers[kCorners * p] = nearest_element(body, point);
+    for (std::size_t a = 0; at && a < kCorners; ++a) {
+      drawn.carriers[kCorners * p + a] = body.cell_elements[at->cell][a];
+      drawn.weights[kCorners * p + a] = at->weights[a];
+    }
+  });
+}
+
 }  // namespace
+
+ViewFile make_live_file(const Body& body, const std::string& label) {
+  ViewFile file;
+  file.label = label;
+  add_facts(body, file);
+  file.surface = begin_surface(body.surface, file);
+  carry(body, *file.surface);
+  return file;
+}
 
 ViewFile make_view_file(const ViewSubject& subject, const ViewOptions& options, Progress& progress) {
   ViewFile file;

@@ -33,6 +33,9 @@ struct Drawn {
   std::vector<std::vector<Vec3>> displacement;  // (frames)(points x 3) m; none where nothing moved
   std::vector<Field> fields;
   std::vector<std::uint8_t> colours;  // (points x 3) the file's own, sRGB; or none
+  // (points x 8) elements that carry each point, and their weights; or none: it moves as its frames say
+  std::vector<std::uint32_t> carriers = {};
+  std::vector<double> weights = {};
 };
 
 struct ViewFile {
@@ -54,6 +57,9 @@ struct ViewOptions {
 struct NoSuchAttribute : InputError {
   using InputError::InputError;
 };
+
+// The surface of a body, to be moved by its elements while it is looked at: Drawn::carriers.
+[[nodiscard]] ViewFile make_live_file(const Body& body, const std::string& label);
 
 // Throws NoSuchAttribute; InputError: a body that has neither a surface nor cells, a frame that cannot be read, positions that are not finite.
 [[nodiscard]] ViewFile make_view_file(const ViewSubject& subject, const ViewOptions& options,

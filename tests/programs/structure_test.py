@@ -22,7 +22,7 @@ simulate/kernels simulate/matter simulate/gravitation simulate/contact/points si
 simulate/equilibrium simulate/estimate simulate/probes simulate/quadratic simulate/modes simulate/live simulate/stepping simulate/implicit simulate/time simulate
 mapping/types mapping/anchors mapping/checks mapping/methods mapping/space mapping/crack mapping/report mapping/refine mapping
 cad/read cad/deform cad
-flexel/process flexel/picture/canvas flexel/picture/render flexel/picture flexel/view flexel/study/runs flexel/study flexel/export
+flexel/process flexel/picture/canvas flexel/picture/render flexel/picture flexel/view flexel/clay flexel/study/runs flexel/study flexel/export
 flexel/measure flexel/accuracy flexel
 """.split()
 STAGES = {"voxelize", "simulate", "mapping"}

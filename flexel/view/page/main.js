@@ -1,5 +1,6 @@
 // Reads the page's data, and begins.
 import {listen} from "./camera.js";
+import {Clay} from "./clay.js";
 import {Controls} from "./controls.js";
 import {Probes} from "./probes.js";
 import {pictureBlob, Recorder} from "./record.js";
@@ -60,9 +61,11 @@ async function start() {
   drawAim(picture);
   const controls = new Controls(picture, probes, page);
   controls.begin();
+  const clay = page.clay ? new Clay(picture, controls, page) : undefined;
+  await clay?.begin();
   report("");
   performance.mark("ready");
-  window.flexelView = {picture, probes, controls, pictureBlob, Recorder};  // for scripts
+  window.flexelView = {picture, probes, controls, clay, pictureBlob, Recorder};  // for scripts
   document.documentElement.dataset.ready = "yes";
 }
 

@@ -14,6 +14,8 @@ export class DrawnShape {
     this.borders = of("borders");
     this.smooth = of("smooth");
     this.colours = of("colours");
+    this.carriers = of("carriers");
+    this.weights = of("weights");
     this.moved = about.moved;
     this.frames = Math.max(1, about.frames);
     this.displacement = [];
@@ -44,13 +46,22 @@ export class DrawnShape {
 
   restOf(point) { return [0, 1, 2].map(c => this.rest.lower[c] + this.rest.step * this.rest.steps[3 * point + c]); }
 
+  // (points x 3) m: the displacement of all from now on.
+  setLive(displacement) {
+    this.live = displacement;
+    this.moved = true;
+    this.lengths.clear();
+  }
+
   displacementOf(point, frame) {
+    if (this.live) return [0, 1, 2].map(c => this.live[3 * point + c]);
     const u = this.displacement[Math.min(frame, this.displacement.length - 1)];
     return u ? [0, 1, 2].map(c => u.lower[c] + u.step * u.steps[3 * point + c]) : [0, 0, 0];
   }
 
   // Positions about the centre, with the displacement of a frame `scale` times as large; and their normals.
   place(frame, scale, position = this.position, normal = this.normal) {
+    if (this.live) return this.placeLive(scale, position, normal);
     const {steps, lower, step} = this.rest, n = steps.length;
     const u = scale === 0 ? undefined : this.displacement[Math.min(frame, this.displacement.length - 1)];
     const start = [0, 1, 2].map(c => lower[c] - this.centre[c] + (u ? scale * u.lower[c] : 0));
@@ -60,6 +71,13 @@ export class DrawnShape {
       position[i + 1] = start[1] + step * steps[i + 1] + by * moved[i + 1];
       position[i + 2] = start[2] + step * steps[i + 2] + by * moved[i + 2];
     }
+    this.setNormals(position, normal);
+  }
+
+  placeLive(scale, position, normal) {
+    const {steps, lower, step} = this.rest;
+    for (let i = 0; i < steps.length; ++i)
+      position[i] = lower[i % 3] - this.centre[i % 3] + step * steps[i] + scale * this.live[i];
     this.setNormals(position, normal);
   }
 
@@ -105,16 +123,16 @@ export class DrawnShape {
     if (field) return field.values[Math.min(frame, field.values.length - 1)];
     const [column, component] = name.split(".");
     if (column !== "displacement" || !this.moved) return undefined;
-    return this.displacementValues(component, Math.min(frame, this.displacement.length - 1));
+    return this.displacementValues(component, this.live ? 0 : Math.min(frame, this.displacement.length - 1));
   }
 
   displacementValues(component, frame) {
     const key = component + "/" + frame;
     if (this.lengths.has(key)) return this.lengths.get(key);
-    const {steps, lower, step} = this.displacement[frame], values = new Float32Array(this.count);
+    const {steps, lower, step} = this.displacement[frame] ?? {}, values = new Float32Array(this.count);
     const axis = "xyz".indexOf(component ?? "-");
     for (let p = 0; p < this.count; ++p) {
-      const at = c => lower[c] + step * steps[3 * p + c];
+      const at = c => this.live ? this.live[3 * p + c] : lower[c] + step * steps[3 * p + c];
       values[p] = axis >= 0 ? at(axis) : Math.hypot(at(0), at(1), at(2));
     }
     this.lengths.clear();

@@ -1,0 +1,38 @@
+// What hands have done to a part: a scene does the same.
+#pragma once
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "flexel/clay/act.h"
+#include "formats/lattice/body.h"
+
+namespace flexel::clay {
+
+struct ClayTool {
+  std::string where;           // TOML, of the scene
+  Vec3 centre = Vec3::Zero();  // m, rest, of a ball
+  double radius = 0;           // m, likewise; 0: a face
+  Vec3 middle = Vec3::Zero();  // m, rest
+  ToolPose pose;
+};
+
+// Everything that undo brings back.
+struct ClayDocument {
+  std::shared_ptr<const Body> body;                       // at rest, or as its shape was kept last
+  std::vector<std::string> kept;                          // scenes, each ended by keeping its shape
+  std::string material;                                   // "": the scene's own
+  std::vector<std::string> holds;                         // names of faces
+  std::vector<ClayTool> tools;                            // the last one is in the hand
+  std::uint64_t grabs = 0;                                // number of the last grab
+  std::shared_ptr<const std::vector<Vec3>> displacement;  // (elements) m, in equilibrium
+};
+
+// Scene of what was done since the shape was kept last: `base`, holds, tools. `keep`: and the shape is kept.
+[[nodiscard]] std::string scene_text(const ClayDocument& document, const std::string& base, bool keep);
+
+// TOML of a name; of a ball.
+[[nodiscard]] std::string where_of_name(const std::string& name);
+[[nodiscard]] std::string where_of_ball(const Vec3& centre, double radius);
+
+}  // namespace flexel::clay

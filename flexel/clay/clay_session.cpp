@@ -1,0 +1,533 @@
+// Poses replace those that nobody has taken up yet, so what waits is what was last said. The spring between hand and tool
+// is ten times as stiff as the part where the tool took it, which the first step of a stroke shows: the tool lags a tenth.
+#include "flexel/clay/clay_session.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "base/error.h"
+#include "base/files/temporary_folder.h"
+#include "base/printable.h"
+#include "base/program/own_program.h"
+#include "base/stop.h"
+#include "flexel/clay/rigid_fit.h"
+#include "flexel/clay/tar.h"
+#include "flexel/process/child.h"
+#include "formats/lattice/body_file.h"
+#include "formats/lattice/locate.h"
+#include "simulate/scene/scene_checks.h"
+
+namespace flexel::clay {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kMostWaiting = 256, kMostHolds = 64, kMostTools = 16, kMostUndo = 100;
+constexpr double kDragTolerance = 1e-4, kTolerance = 1e-8;
+constexpr int kDragIterations = 12, kIterations = 40, kMostHalvings = 6;
+constexpr double kSpring = 10;     // times the part's stiffness
+constexpr double kBalance = 1e-4;  // of the way of the hand
+constexpr std::chrono::seconds kLease{10}, kPatience{60};
+constexpr const char* kFormats[] = {"stl", "obj", "3mf", "step", "ply", "off", "glb", "vtu"};
+
+Body bent(const ClayDocument& document) {
+  Body body = *document.body;
+  for (std::size_t e = 0; e < body.element_count(); ++e)
+    body.position[e] = body.rest[e] + (*document.displacement)[e];
+  return body;
+}
+
+std::shared_ptr<const std::vector<Vec3>> displacement_of(const Body& body) {
+  auto displacement = std::make_shared<std::vector<Vec3>>(body.element_count());
+  for (std::size_t e = 0; e < body.element_count(); ++e) (*displacement)[e] = body.position[e] - body.rest[e];
+  return displacement;
+}
+
+// What a tool takes, as it is now.
+std::vector<MovedPoint> points_of(const simulate::Selected& selected, const ClayDocument& document) {
+  const Body& body = *document.body;
+  std::vector<MovedPoint> points;
+  for (const std::uint32_t e : selected.elements)
+    points.push_back({body.rest[e], (*document.displacement)[e]});
+  for (const std::uint32_t p : selected.polygons)
+    for (std::uint32_t k = body.surface.polygon_offsets[p]; k < body.surface.polygon_offsets[p + 1]; ++k) {
+      const Vec3& vertex = body.surface.vertices[body.surface.polygon_vertices[k]];
+      if (const std::optional<CellPoint> at = locate_on_surface(body, p, vertex))
+        points.push_back({vertex, interpolate(*at, body, *document.displacement)});
+    }
+  return points;
+}
+
+Json numbers(const Vec3& a, const Vec3& b) {
+  return {a.x(), a.y(), a.z(), b.x(), b.y(), b.z()};
+}
+
+// (points x 3) as frames have them.
+std::string single_precision(const std::vector<Vec3>& points) {
+  std::vector<float> numbers;
+  numbers.reserve(3 * points.size());
+  for (const Vec3& point : points)
+    for (const double x : point) numbers.push_back(static_cast<float>(x));
+  return {reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(float)};
+}
+
+std::string file_text(const std::string& path) {
+  const Bytes bytes = read_all(path);
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+std::string bytes_of(const Body& body) {
+  const TemporaryFolder folder;
+  const std::string path = (folder.path() / "body.vtu").string();
+  write_body(body, path);
+  return file_text(path);
+}
+
+// (name, text) in the order in which they are run.
+std::vector<std::pair<std::string, std::string>> scenes_of(const ClayDocument& document,
+                                                           const std::string& base) {
+  std::vector<std::pair<std::string, std::string>> scenes;
+  for (std::size_t k = 0; k < document.kept.size(); ++k)
+    scenes.emplace_back(fmt::format("scene-{}.toml", k + 1), document.kept[k]);
+  scenes.emplace_back("scene.toml", scene_text(document, base, false));
+  for (auto& [name, text] : scenes)
+    text.insert(0, "# for flexel-simulate, on rest.vtu or on what the scene before this one left\n");
+  return scenes;
+}
+
+std::string header_of(const Body& body) {
+  Json parts = Json::array();
+  const std::vector<std::uint32_t> part = element_parts(body);
+  for (std::size_t p = 0; p < body.parts.size(); ++p) {
+    const auto begin = std::lower_bound(part.begin(), part.end(), p) - part.begin();
+    const auto end = std::upper_bound(part.begin(), part.end(), p) - part.begin();
+    parts.push_back({{"name", printable(body.parts[p].name)}, {"begin", begin}, {"end", end}});
+  }
+  const Json header = {{"flexel-live", 1},
+                       {"clay", 1},
+                       {"rate", 0},
+                       {"state_every", 1},
+                       {"elements", body.element_count()},
+                       {"parts", parts},
+                       {"tools", Json::array()}};
+  return header.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+bool is_motion(const Act& act) {
+  return act.kind == Act::Kind::pose || act.kind == Act::Kind::hand;
+}
+
+}  // namespace
+
+ClaySession::ClaySession(std::shared_ptr<const Body> body, std::string material, std::string base)
+    : base_(std::move(base)), first_(std::move(body)), hub_(header_of(*first_)) {
+  ClayDocument document;
+  document.body = first_;
+  document.material = std::move(material);
+  document.displacement = displacement_of(*first_);
+  take_up(std::move(document));
+  publish();
+  thread_ = std::thread([this] { run(); });
+}
+
+ClaySession::~ClaySession() {
+  {
+    const std::lock_guard lock(mutex_);
+    stop_ = true;
+  }
+  changed_.notify_all();
+  hub_.close();
+  thread_.join();
+}
+
+Answer ClaySession::act(const std::string& message) {
+  ActMessage said;
+  try {
+    said = parse_acts(message);
+  } catch (const InputError& error) {
+    return {400, fmt::format("{}{}{}\n", error.where(), error.where().empty() ? "" : ": ", error.what())};
+  }
+  const std::lock_guard lock(mutex_);
+  const Clock::time_point now = Clock::now();
+  const bool takes = std::any_of(said.acts.begin(), said.acts.end(),
+                                 [](const Act& act) { return act.kind == Act::Kind::take; });
+  if (holder_.empty() || takes || now - heard_ > kLease) give_tool(said.client);
+  if (holder_ != said.client) return {409, "another page holds the tool\n"};
+  heard_ = now;
+  if (queue_.size() + said.acts.size() > kMostWaiting) return {429, "too many acts wait\n"};
+  for (Act& act : said.acts) {
+    if (is_motion(act)) ++line_;
+    if (is_motion(act) && !queue_.empty() && is_motion(queue_.back()))
+      queue_.back() = std::move(act);
+    else
+      queue_.push_back(std::move(act));
+  }
+  changed_.notify_all();
+  return {200, fmt::format("{{\"line\":{}}}\n", line_)};
+}
+
+void ClaySession::joined(const std::string& client) {
+  const std::lock_guard lock(mutex_);
+  if (holder_.empty()) give_tool(client);
+}
+
+void ClaySession::left(const std::string& client) {
+  const std::lock_guard lock(mutex_);
+  if (holder_ == client) give_tool("");
+}
+
+// Under the mutex.
+void ClaySession::give_tool(const std::string& client) {
+  news_ = news_ || holder_ != client;
+  holder_ = client;
+  heard_ = Clock::now();
+  changed_.notify_all();
+}
+
+std::function<void()> ClaySession::stop_asked() {
+  return [this] {
+    check_stop();
+    const std::lock_guard lock(mutex_);
+    if (stop_) throw Interrupted();
+  };
+}
+
+// False at the end. No act: the part is still on its way, or the tool has changed hands.
+bool ClaySession::wait(std::optional<Act>& act) {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [&] { return stop_ || news_ || !queue_.empty() || !settled_; });
+  act.reset();
+  news_ = false;
+  if (stop_) return false;
+  if (!queue_.empty()) {
+    act = std::move(queue_.front());
+    queue_.pop_front();
+    settled_ = false;
+    taken_ = line_;
+  }
+  return true;
+}
+
+void ClaySession::run() {
+  std::optional<Act> act;
+  while (wait(act)) {
+    try {
+      if (act)
+        perform(*act);
+      else
+        refine();
+    } catch (const Interrupted&) {
+      return;
+    } catch (const std::exception& error) {
+      said_ = error.what();
+      stroke_ = {};
+      const std::lock_guard lock(mutex_);
+      settled_ = true;
+    }
+    publish();
+  }
+}
+
+void ClaySession::perform(const Act& act) {
+  if (act.kind == Act::Kind::take) return;
+  said_.clear();
+  if (act.kind == Act::Kind::stay) {
+    stroke_ = {};
+    return;
+  }
+  if (!is_motion(act)) {
+    stroke_ = {};
+    return change(act);
+  }
+  if (document_.tools.empty()) throw InputError("no tool is there to be led: pull at a place first");
+  if (!stroke_.begun) remember();
+  stroke_.begun = true;
+  if (act.kind == Act::Kind::hand) {
+    stroke_.hand = act.pose;
+  } else {
+    stroke_.hand.reset();
+    stroke_.target = act.pose;
+  }
+  lead();
+}
+
+void ClaySession::remember() {
+  undo_.push_back(document_);
+  if (undo_.size() > kMostUndo) undo_.erase(undo_.begin());
+  redo_.clear();
+}
+
+void ClaySession::change(const Act& act) {
+  if (act.kind == Act::Kind::undo || act.kind == Act::Kind::redo) return travel(act.kind == Act::Kind::undo);
+  ClayDocument next = document_;
+  if (act.kind == Act::Kind::hold) {
+    const auto found = std::find(next.holds.begin(), next.holds.end(), act.name);
+    if ((found != next.holds.end()) == act.on) return;
+    if (act.on && std::any_of(next.tools.begin(), next.tools.end(),
+                              [&](const ClayTool& tool) { return tool.where == where_of_name(act.name); }))
+      throw InputError(fmt::format("a tool has \"{}\": let it spring back before it is held", act.name));
+    if (act.on && next.holds.size() == kMostHolds) throw InputError("64 places are held: let one go first");
+    act.on ? next.holds.push_back(act.name) : static_cast<void>(next.holds.erase(found));
+  } else if (act.kind == Act::Kind::grab) {
+    grab(act, next);
+    next.grabs = ++grabs_;
+  } else if (act.kind == Act::Kind::release) {
+    if (next.tools.empty()) return;
+    next.tools.pop_back();
+  } else if (act.kind == Act::Kind::keep) {
+    keep(next);
+  } else if (act.kind == Act::Kind::material) {
+    if (next.material.empty()) throw InputError("the scene says what the part is made of");
+    next.material = act.name;
+  }
+  ClayDocument before = document_;
+  take_up(std::move(next));
+  std::swap(before, document_);
+  remember();
+  document_ = std::move(before);
+}
+
+void ClaySession::grab(const Act& act, ClayDocument& next) const {
+  const std::string face = where_of_name(act.name);
+  if (std::find(next.holds.begin(), next.holds.end(), act.name) != next.holds.end())
+    throw InputError(fmt::format("\"{}\" is held: free it before it is pulled at", act.name));
+  const auto same = std::find_if(next.tools.begin(), next.tools.end(), [&](const ClayTool& tool) {
+    if (!act.name.empty()) return tool.where == face;
+    return tool.radius > 0 && (tool.centre - act.at).norm() < tool.radius + act.radius;
+  });
+  if (same != next.tools.end())  // it is taken up again
+    return static_cast<void>(std::rotate(same, same + 1, next.tools.end()));
+  if (next.tools.size() == kMostTools) throw InputError("16 tools are there: let one go first");
+  ClayTool tool;
+  simulate::Selection where = simulate::select_by_name(act.name, "pull");
+  tool.where = face;
+  tool.centre = act.at;
+  tool.radius = act.radius;
+  if (act.name.empty()) {
+    where.kind = simulate::Selection::Kind::sphere;
+    where.point = act.at;
+    where.radius = act.radius;
+    tool.where = where_of_ball(act.at, act.radius);
+  }
+  const std::vector<MovedPoint> points = points_of(resolve(where, *next.body), next);
+  if (points.empty()) throw InputError("no matter lies there");
+  tool.middle = mean_rest(points);
+  tool.pose = rigid_fit(points);
+  next.tools.push_back(std::move(tool));
+}
+
+void ClaySession::keep(ClayDocument& next) const {
+  if (!model_) throw InputError("nothing has changed since the shape was kept");
+  const std::vector<ToolPose> poses = model_->poses();
+  if (!model_->lead(poses, kTolerance, kIterations, [] { check_stop(); }))
+    throw InputError("the part is not at rest: its shape cannot be kept");
+  auto body = std::make_shared<Body>(bent(next));
+  for (std::size_t e = 0; e < body->element_count(); ++e)
+    body->position[e] = body->rest[e] + model_->displacement()[e];
+  model_->renormalise(*body);
+  next.kept.push_back(scene_text(next, base_, true));
+  next.displacement = displacement_of(*body);
+  next.body = std::move(body);
+  next.tools.clear();
+}
+
+// A new model of what acts now. Nothing has changed where it throws.
+void ClaySession::take_up(ClayDocument next) {
+  const simulate::Scene scene =
+      simulate::parse_scene(scene_text(next, base_, false), "what acts on the part");
+  (void)materials_of_parts(scene, *next.body);
+  std::unique_ptr<PulledBody> model;
+  const bool held =
+      !scene.get<simulate::Supports>().ties.empty() || !scene.get<simulate::Loads>().loads.empty();
+  if (held) {
+    Progress silent("", Progress::Mode::silent);
+    check_actions(scene, *next.body, silent);
+    std::vector<Vec3> middles;
+    std::vector<ToolPose> poses;
+    for (const ClayTool& tool : next.tools) {
+      middles.push_back(tool.middle);
+      poses.push_back(tool.pose);
+    }
+    const double arm = 0.1 * bounding_box(next.body->rest).diagonal();
+    const auto found = [&](const std::vector<Vec3>& start) {
+      model = std::make_unique<PulledBody>(*next.body, scene, middles, arm, start);
+      return model->lead(poses, kTolerance, kIterations, stop_asked());
+    };
+    if (!found(*next.displacement) && !found(*displacement_of(*next.body)))
+      throw InputError("no equilibrium is found there");
+    next.displacement = std::make_shared<const std::vector<Vec3>>(model->whole_displacement());
+  } else {
+    next.displacement = displacement_of(*next.body);
+  }
+  document_ = std::move(next);
+  model_ = std::move(model);
+}
+
+void ClaySession::travel(bool back) {
+  std::vector<ClayDocument>& from = back ? undo_ : redo_;
+  std::vector<ClayDocument>& to = back ? redo_ : undo_;
+  if (from.empty()) return;
+  ClayDocument before = document_;
+  take_up(from.back());
+  from.pop_back();
+  to.push_back(std::move(before));
+}
+
+std::vector<ToolPose> ClaySession::poses_with(const ToolPose& last) const {
+  std::vector<ToolPose> poses;
+  for (const ClayTool& tool : document_.tools) poses.push_back(tool.pose);
+  poses.back() = last;
+  return poses;
+}
+
+// Where the tool should be: where spring and part balance, as far as their stiffnesses are known.
+ToolPose ClaySession::goal() const {
+  if (!stroke_.hand) return stroke_.target;
+  if (stroke_.spring == 0) return *stroke_.hand;
+  const ToolPose& now = document_.tools.back().pose;
+  const Vec3 unbalanced =
+      stroke_.spring * (stroke_.hand->displacement - now.displacement) + model_->felt().back().force;
+  return {now.displacement + unbalanced / (stroke_.spring + stroke_.part), stroke_.hand->turn};
+}
+
+void ClaySession::learn_stiffness(const ToolPose& before, const Vec3& force) {
+  const Vec3 way = document_.tools.back().pose.displacement - before.displacement;
+  const Vec3 more = force - model_->felt().back().force;  // on the part
+  if (!(way.squaredNorm() > 0)) return;
+  const double stiffness = more.dot(way) / way.squaredNorm();
+  if (!(stiffness > 0)) return;
+  stroke_.part = stiffness;
+  if (stroke_.spring == 0) stroke_.spring = kSpring * stiffness;
+}
+
+// One step of the tool towards where it should be; a shorter one where the part does not follow so far at once.
+void ClaySession::lead() {
+  const ToolPose before = document_.tools.back().pose, whole = goal() - before;
+  const Vec3 force = model_->felt().back().force;
+  double share = 1;
+  for (int tries = 0; tries < kMostHalvings; ++tries, share /= 2) {
+    const ToolPose pose = share == 1 ? before + whole : before + whole * share;
+    if (!model_->lead(poses_with(share == 1 ? goal() : pose), kDragTolerance, kDragIterations, stop_asked()))
+      continue;
+    document_.tools.back().pose = model_->poses().back();
+    document_.displacement = std::make_shared<const std::vector<Vec3>>(model_->whole_displacement());
+    learn_stiffness(before, force);
+    return;
+  }
+  stroke_ = {};
+  throw InputError("the part does not follow further: it would fold or buckle");
+}
+
+void ClaySession::refine() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (settled_) return;
+  }
+  if (!document_.tools.empty() && stroke_.begun) {
+    const ToolPose left = goal() - document_.tools.back().pose;
+    const double way = stroke_.hand ? stroke_.hand->displacement.norm() : stroke_.target.displacement.norm();
+    const double arm = 0.1 * bounding_box(document_.body->rest).diagonal();
+    if (std::sqrt(left.dot(left, arm)) > (stroke_.hand ? kBalance * way : 0)) return lead();
+  }
+  if (model_) {
+    if (!model_->lead(model_->poses(), kTolerance, kIterations, stop_asked()))
+      throw InputError("no equilibrium is found there");
+    document_.displacement = std::make_shared<const std::vector<Vec3>>(model_->whole_displacement());
+  }
+  const std::lock_guard lock(mutex_);
+  settled_ = queue_.empty();
+}
+
+std::string ClaySession::head(std::size_t bytes) const {
+  Json felt = Json::array(), place = Json::array(), names = Json::array(), middles = Json::array();
+  for (std::size_t t = 0; t < document_.tools.size(); ++t) {
+    const ClayTool& tool = document_.tools[t];
+    const PulledBody::Felt by_part = model_ ? model_->felt()[t] : PulledBody::Felt{};
+    felt.push_back(numbers(by_part.force, by_part.torque));
+    place.push_back(numbers(tool.pose.displacement, tool.pose.turn));
+    names.push_back(fmt::format("tool {}", t + 1));
+    middles.push_back({tool.middle.x(), tool.middle.y(), tool.middle.z()});
+  }
+  Json json = {{"frame", frame_},
+               {"time", 0},
+               {"late", false},
+               {"line", taken_},
+               {"felt", felt},
+               {"place", place},
+               {"tools", names},
+               {"middles", middles},
+               {"holds", document_.holds},
+               {"undo", !undo_.empty()},
+               {"redo", !redo_.empty()},
+               {"kept", document_.kept.size()},
+               {"material", document_.material},
+               {"grabs", document_.grabs},
+               {"settled", settled_},
+               {"holder", holder_.substr(0, 8)},
+               {"said", printable(said_)}};
+  if (stroke_.hand) json["hand"] = numbers(stroke_.hand->displacement, stroke_.hand->turn);
+  json["bytes"] = bytes;
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+void ClaySession::publish() {
+  const std::vector<Vec3>& moved = *document_.displacement;
+  std::vector<Vec3> places = document_.body->rest;
+  for (std::size_t e = 0; e < moved.size(); ++e) places[e] += moved[e];
+  const std::string positions = single_precision(places);
+  std::string frame, silent;
+  {
+    const std::lock_guard lock(mutex_);
+    frame = head(positions.size());
+    silent = head(0);
+    if (settled_) shown_ = document_;
+  }
+  ++frame_;
+  frame += positions;
+  hub_.publish(std::move(frame), std::move(silent));
+  changed_.notify_all();
+}
+
+Answer ClaySession::mapped(const std::string& name, const Body& body) const {
+  const TemporaryFolder folder;
+  const std::string path = (folder.path() / "body.vtu").string(), out = (folder.path() / name).string();
+  write_body(body, path);
+  ChildOptions options;
+  options.log = folder.path() / "log";
+  const ChildRun run = run_child({own_program("flexel-map"), path, "-o", out, "--quiet"}, options);
+  if (run.exit_code != 0) return {500, file_text(options.log.string())};
+  return {200, file_text(out)};
+}
+
+Answer ClaySession::save(const std::string& name) {
+  ClayDocument document;
+  {
+    std::unique_lock lock(mutex_);
+    if (!changed_.wait_for(lock, kPatience, [&] { return stop_ || (settled_ && queue_.empty()); }) || stop_)
+      return {500, "the part does not come to rest\n"};
+    document = shown_;
+  }
+  try {
+    if (name == "rest.f32") return {200, single_precision(first_->rest)};
+    if (name == "rest.vtu" || name == "body.vtu")
+      return {200, bytes_of(name == "rest.vtu" ? *first_ : bent(document))};
+    for (const char* format : kFormats)
+      if (name == std::string("part.") + format) return mapped(name, bent(document));
+    if (name == "scene.tar") {
+      std::vector<std::pair<std::string, std::string>> files = scenes_of(document, base_);
+      files.emplace(files.begin(), "rest.vtu", bytes_of(*first_));
+      return {200, tar_of(files)};
+    }
+    for (const auto& [own, text] : scenes_of(document, base_))
+      if (name == own) return {200, text};
+  } catch (const std::exception& error) {
+    return {500, fmt::format("{}\n", error.what())};
+  }
+  return {404, "flexel clay has no such file\n"};
+}
+
+}  // namespace flexel::clay

@@ -1,0 +1,159 @@
+// A hand goes on as it went: the answer of the elements to the last motion of the tools predicts that to the next, and Newton's
+// method begins there. What it then finds is the equilibrium, whatever was predicted.
+#include "flexel/clay/pulled_body.h"
+
+#include <algorithm>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "simulate/conditions/rigid_link.h"
+#include "simulate/effects/supports.h"
+#include "simulate/equilibrium/equilibrium.h"
+#include "simulate/matter/coplanar_elements.h"
+#include "simulate/models/rest_shape.h"
+#include "simulate/models/set_rest_shape.h"
+#include "simulate/quadratic/quadratic_run.h"
+#include "simulate/scene/scene_checks.h"
+#include "simulate/time/dynamic_relaxation.h"
+
+namespace flexel::clay {
+namespace {
+
+void refuse_others(const simulate::Scene& scene, const Body& body) {
+  const auto refuse = [&](const char* what) {
+    throw InputError(scene.name, std::string(what) + ": hands lead parts at equilibrium, without contact");
+  };
+  if (scene.run.time || !scene.events.empty()) refuse("a run in time");
+  if (simulate::is_quadratic(scene, body)) refuse("model \"quadratic\"");
+  if (simulate::settles(scene)) refuse("contact or rigid parts");
+  for (const simulate::Tie& tie : scene.get<simulate::Supports>().ties)
+    if (tie.link) refuse("a load with a rigid link");
+}
+
+simulate::Problem problem_of(const simulate::Scene& scene, const Body& body,
+                             const simulate::Fragments& fragments) {
+  simulate::Problem problem{body,
+                            materials_of_parts(scene, body),
+                            stray_cells(fragments),
+                            models_of_parts(scene, body),
+                            hooke_of_parts(scene, body),
+                            stray_elements(fragments, body),
+                            {},
+                            simulate::settled_displacement(body)};
+  const std::vector<std::uint8_t> unsupported = unsupported_elements(problem);
+  for (std::size_t e = 0; e < unsupported.size(); ++e)
+    if (unsupported[e]) problem.stray_element[e] = 1;
+  return problem;
+}
+
+}  // namespace
+
+PulledBody::~PulledBody() = default;
+
+PulledBody::PulledBody(const Body& body, simulate::Scene scene, std::vector<Vec3> middles, double arm,
+                       std::vector<Vec3> start)
+    : body_(body),
+      fragments_(simulate::find_fragments(body)),
+      problem_((refuse_others(scene, body), problem_of(scene, body, fragments_))),
+      middles_(std::move(middles)),
+      arm_(arm),
+      poses_(middles_.size()),
+      felt_(middles_.size()) {
+  std::vector<simulate::Tie>& ties = scene.get<simulate::Supports>().ties;
+  first_tool_ = ties.size() - middles_.size();
+  for (std::size_t t = 0; t < middles_.size(); ++t) {
+    simulate::Motion& motion = ties[first_tool_ + t].motion;
+    poses_[t] = {motion.translation, motion.angle * motion.axis};
+    motion.link = links_.emplace_back(std::make_shared<simulate::RigidLink>());
+    motion.link->middle = middles_[t];
+  }
+  lead_ties(poses_);
+  std::vector<simulate::ActiveEffect> effects = active_effects(scene.effects, problem_);
+  simulate::refuse_timed(effects, simulate::ActsIn::all, scene.name);
+  mechanics_ = std::make_unique<simulate::Mechanics>(problem_, std::move(effects));
+  state_.displacement = std::move(start);
+  refuse_loose_fragments(fragments_, body_, mechanics_->tied_elements(), mechanics_->coupled_elements(),
+                         scene.name);
+  refuse_unsupported_elements(*mechanics_, state_, scene.name);
+  refuse_free_motions(*mechanics_, state_, scene.name);
+}
+
+bool PulledBody::lead(const std::vector<ToolPose>& poses, double tolerance, int iterations,
+                      const std::function<void()>& stop) {
+  return solve(poses, tolerance, iterations, true, stop) ||
+         (!answer_.empty() && solve(poses, tolerance, iterations, false, stop));
+}
+
+bool PulledBody::solve(const std::vector<ToolPose>& poses, double tolerance, int iterations, bool predicted,
+                       const std::function<void()>& stop) {
+  lead_ties(poses);
+  simulate::State trial = state_;
+  if (predicted && !answer_.empty()) {
+    double along = 0, length = 0;
+    for (std::size_t t = 0; t < poses.size(); ++t) {
+      along += way_[t].dot(poses[t] - poses_[t], arm_);
+      length += way_[t].dot(way_[t], arm_);
+    }
+    const double share = length > 0 ? along / length : 0;
+    parallel_for_each(trial.displacement.size(),
+                      [&](std::size_t e) { trial.displacement[e] += share * answer_[e]; });
+  }
+  simulate::NewtonOptions options;
+  options.steps = simulate::NewtonSteps::full;
+  options.tolerance = tolerance;
+  options.max_iterations = iterations;
+  const simulate::NewtonOutcome outcome = simulate::newton(
+      *mechanics_, trial, options, [&](const std::string&) { stop(); }, &memory_);
+  if (!outcome.converged) {
+    memory_ = {};
+    lead_ties(poses_);
+    return false;
+  }
+  const std::vector<Vec3> before = std::exchange(state_, std::move(trial)).displacement;
+  learn(poses, before);
+  residual_ = outcome.relative_residual;
+  poses_ = poses;
+  measure();
+  return true;
+}
+
+// The ties hold the links, at the load's whole share.
+void PulledBody::lead_ties(const std::vector<ToolPose>& poses) {
+  for (std::size_t t = 0; t < poses.size(); ++t) {
+    links_[t]->translation = poses[t].displacement;
+    links_[t]->turn = poses[t].turn;
+  }
+}
+
+void PulledBody::learn(const std::vector<ToolPose>& poses, const std::vector<Vec3>& before) {
+  double length = 0;
+  for (std::size_t t = 0; t < poses.size(); ++t)
+    length += (poses[t] - poses_[t]).dot(poses[t] - poses_[t], arm_);
+  if (!(length > 1e-12 * arm_ * arm_)) return;  // rounding would speak
+  way_.resize(poses.size());
+  for (std::size_t t = 0; t < poses.size(); ++t) way_[t] = poses[t] - poses_[t];
+  answer_.resize(before.size());
+  parallel_for_each(before.size(), [&](std::size_t e) { answer_[e] = state_.displacement[e] - before[e]; });
+}
+
+void PulledBody::measure() {
+  simulate::SimulateResult found;
+  mechanics_->report(state_, found);
+  for (std::size_t t = 0; t < felt_.size(); ++t) {
+    const simulate::Reaction& reaction = found.reactions[first_tool_ + t];
+    felt_[t].force = -reaction.force;
+    felt_[t].torque = -(reaction.moment - (middles_[t] + poses_[t].displacement).cross(reaction.force));
+  }
+}
+
+std::vector<Vec3> PulledBody::whole_displacement() const {
+  simulate::State state = state_;
+  carry_strays(fragments_, problem_, mechanics_->stencil(), state);
+  return state.displacement;
+}
+
+void PulledBody::renormalise(Body& body) const {
+  simulate::renormalise_all(body, problem_, whole_displacement());
+}
+
+}  // namespace flexel::clay

@@ -1,0 +1,38 @@
+// The rotation is V diag(1, 1, det(V U^T)) U^T of the covariance U S V^T.
+#include "flexel/clay/rigid_fit.h"
+
+#include <Eigen/SVD>
+
+namespace flexel::clay {
+
+Vec3 mean_rest(const std::vector<MovedPoint>& points) {
+  Vec3 sum = Vec3::Zero();
+  for (const MovedPoint& point : points) sum += point.rest;
+  return points.empty() ? sum : Vec3(sum / static_cast<double>(points.size()));
+}
+
+ToolPose rigid_fit(const std::vector<MovedPoint>& points) {
+  ToolPose pose;
+  if (points.empty()) return pose;
+  const Vec3 middle = mean_rest(points);
+  for (const MovedPoint& point : points) pose.displacement += point.displacement;
+  pose.displacement /= static_cast<double>(points.size());
+  Mat3 covariance = Mat3::Zero();
+  bool moved = false;
+  for (const MovedPoint& point : points) {
+    const Vec3 arm = point.rest - middle;
+    const Vec3 bent = point.displacement - pose.displacement;
+    moved = moved || bent.squaredNorm() > 1e-24 * arm.squaredNorm();
+    covariance += arm * (arm + bent).transpose();
+  }
+  if (!moved) return pose;
+  const Eigen::JacobiSVD<Mat3> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  if (!(svd.singularValues()[1] > 1e-9 * svd.singularValues()[0])) return pose;
+  Mat3 flip = Mat3::Identity();
+  flip(2, 2) = (svd.matrixV() * svd.matrixU().transpose()).determinant() < 0 ? -1 : 1;
+  const Eigen::AngleAxisd turn(Mat3(svd.matrixV() * flip * svd.matrixU().transpose()));
+  pose.turn = turn.angle() * turn.axis();
+  return pose;
+}
+
+}  // namespace flexel::clay

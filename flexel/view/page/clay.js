@@ -1,0 +1,349 @@
+// Hands: what is held, the tool that follows the mouse, what it feels, and what is saved. Every act is a line that is posted
+// (docs/reference/clay-protocol.md); the part moves as the frames say.
+import {button, element} from "./elements.js";
+import {numberText} from "./numbers.js";
+import {readFrames} from "./stream.js";
+
+const kFormats = ["stl", "obj", "3mf", "step"], kTurnPerPixel = 0.01, kCorners = 8;  // rad
+
+const hex = bytes => [...bytes].map(byte => byte.toString(16).padStart(2, "0")).join("");
+
+export class Clay {
+  constructor(picture, controls, page) {
+    Object.assign(this, {picture, controls, about: page.clay, panel: picture.panels[0], frame: undefined, drag: undefined,
+                         waiting: [], busy: false, mode: "hold", shown: 0, latencies: [], sent: []});
+    this.client = hex(crypto.getRandomValues(new Uint8Array(8)));
+    this.shape = this.panel.shape;
+    page.units.displacement = page.units["/size"];
+    this.unit = page.units["/size"];
+    for (const id of ["shape", "series"]) document.getElementById(id).hidden = true;
+    document.getElementById("clay").hidden = false;
+    this.makeControls();
+    this.listen(document.getElementById("stage"));
+    picture.over.push(pen => this.draw(pen));
+  }
+
+  async begin() {
+    const answer = await fetch("save/rest.f32");
+    if (!answer.ok) throw new Error(await answer.text());
+    this.rest = new Float32Array(await answer.arrayBuffer());
+    this.facePlaces = this.placesOfFaces();
+    readFrames(this.client, frame => this.take(frame), (yes, why) => this.setConnected(yes, why));
+  }
+
+  by(id) { return document.getElementById(id); }
+
+  // --- controls ---
+
+  makeControls() {
+    const {about} = this, on = (id, event, act) => this.by(id).addEventListener(event, () => act(this.by(id)));
+    for (const each of document.querySelectorAll("input[name=hand]"))
+      each.addEventListener("change", () => { this.mode = each.value; });
+    const faces = this.by("face");
+    this.faceNames = [...new Set(this.shape.face)].sort((a, b) => a - b).map(face => this.panel.faceName(face)).filter(name => !name.odd);
+    for (const name of this.faceNames) element("option", {value: name.text, textContent: name.text}, faces);
+    on("face-hold", "click", () => this.toggleHold(faces.value));
+    on("face-pull", "click", () => this.post("grab face " + faces.value));
+    on("stay", "click", () => this.post("release"));
+    on("keep", "click", () => this.post("keep"));
+    on("undo", "click", () => this.post("undo"));
+    on("redo", "click", () => this.post("redo"));
+    on("take", "click", () => this.post("take"));
+    on("lead", "click", () => this.leadExactly());
+    this.by("ball-unit").textContent = this.unit.name;
+    for (const each of document.querySelectorAll(".length-unit")) each.textContent = this.unit.name;
+    this.by("ball").value = Number((2 * about.spacing / this.unit.factor).toPrecision(2));
+    const materials = this.by("material");
+    if (about.material && !about.materials.includes(about.material)) about.materials.unshift(about.material);
+    for (const name of about.materials) element("option", {value: name, textContent: name}, materials);
+    this.by("material-row").hidden = !about.material;
+    on("material", "change", box => this.post("material " + box.value));
+    for (const format of kFormats)
+      button(format.toUpperCase(), `Save the part as it is now, as ${format.toUpperCase()}`, () => this.save(`part.${format}`, `${about.stem}-bent.${format}`), this.by("save-part"));
+    button("Scene", "Save the scene that does the same without hands", () => this.save("scene.tar", `${about.stem}-scene.tar`), this.by("save-part"));
+    document.addEventListener("keydown", event => {
+      if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z" || /INPUT|SELECT|TEXTAREA/.test(event.target.tagName)) return;
+      event.preventDefault();
+      this.post(event.shiftKey ? "redo" : "undo");
+    });
+  }
+
+  say(text, how = "faint") { Object.assign(this.by("hands-said"), {textContent: text, className: how}); }
+
+  setConnected(yes, why) {
+    if (this.connected === yes) return;
+    this.connected = yes;
+    if (!yes) this.say(`flexel clay does not answer (${why}); this page tries again`, "warning");
+    this.showState();
+  }
+
+  leadExactly() {
+    const number = id => Number(this.by(id).value) || 0;
+    const way = ["x", "y", "z"].map(axis => number("lead-" + axis) * this.unit.factor);
+    this.post(`0 ${way.join(" ")}`, "stay");
+  }
+
+  toggleHold(name) {
+    if (!name) return;
+    this.post((this.frame?.holds.includes(name) ? "free " : "hold ") + name);
+  }
+
+  async save(name, as) {
+    this.say(`saving ${as} \u2026`);
+    const answer = await fetch("save/" + name);
+    if (!answer.ok) return this.say(await answer.text(), "warning");
+    const link = element("a", {href: URL.createObjectURL(await answer.blob()), download: as}, document.body);
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 60000);
+    link.remove();
+    this.say(`saved ${as}`);
+  }
+
+  // --- acts ---
+
+  // Lines go out one message after another; where the hand is replaces where it was.
+  post(...lines) {
+    for (const line of lines) {
+      const moves = text => /^(hand|\d|-)/.test(text);
+      if (moves(line) && this.waiting.length > 0 && moves(this.waiting.at(-1).line)) this.waiting.pop();
+      this.waiting.push({line, at: performance.now()});
+    }
+    if (!this.busy) this.pump();
+  }
+
+  async pump() {
+    this.busy = true;
+    try {
+      while (this.waiting.length > 0) {
+        const acts = this.waiting.splice(0), lines = acts.map(act => act.line);
+        const answer = await fetch("act", {method: "POST", body: [`client ${this.client}`, ...lines].join("\n")});
+        const text = await answer.text();
+        if (!answer.ok) this.say(text.trim(), "warning");
+        else this.sent.push({line: JSON.parse(text).line, at: acts.at(-1).at});
+      }
+    } catch (error) {
+      this.waiting = [];
+      this.say(`flexel clay does not answer (${error.message})`, "warning");
+    } finally {
+      this.busy = false;
+    }
+  }
+
+  // --- the hand ---
+
+  listen(stage) {
+    stage.addEventListener("pointerdown", event => this.down(event), {capture: true});
+    stage.addEventListener("pointermove", event => this.move(event), {capture: true});
+    for (const name of ["pointerup", "pointercancel"]) stage.addEventListener(name, event => this.up(event), {capture: true});
+  }
+
+  place(event) {
+    const box = this.picture.canvas.getBoundingClientRect();
+    return [event.clientX - box.left, event.clientY - box.top];
+  }
+
+  down(event) {
+    if (event.target !== this.picture.canvas || event.button !== 0 || event.shiftKey || this.drag || this.mode === "look" || !this.mine) return;
+    const at = this.place(event), hit = this.picture.pick(...at);
+    if (!hit) return;
+    event.stopPropagation();
+    if (this.mode === "hold") return this.toggleHold(this.panel.faceName(this.shape.face[hit.triangle]).text);
+    this.picture.canvas.setPointerCapture(event.pointerId);
+    const rest = this.panel.restOf(hit), name = this.panel.faceName(this.shape.face[hit.triangle]);
+    this.drag = {from: at, now: at, pointer: event.pointerId, mode: this.mode, grabs: this.frame.grabs, axes: this.picture.view.axes};
+    const radius = Math.max(1e-9, Number(this.by("ball").value) * this.unit.factor);
+    this.post(this.by("takes").value === "face" ? `grab face ${name.text}` : `grab at ${rest.join(" ")} ${radius}`);
+  }
+
+  move(event) {
+    if (!this.drag || event.pointerId !== this.drag.pointer) return;
+    event.stopPropagation();
+    this.drag.now = this.place(event);
+    this.follow();
+  }
+
+  up(event) {
+    if (!this.drag || event.pointerId !== this.drag.pointer) return;
+    event.stopPropagation();
+    this.drag.done = true;
+    this.follow();
+  }
+
+  // Where the hand has led the tool that it holds; nothing before the run has taken hold.
+  follow() {
+    const {drag} = this;
+    if (!drag?.base) return;
+    const metre = this.picture.pixelsPerMetre(this.panel, this.picture.layout[0]);
+    const [x, y] = [drag.now[0] - drag.from[0], drag.now[1] - drag.from[1]], {right, up, eye} = drag.axes;
+    const pose = [...drag.base];
+    for (const [k, axis] of ["x", "y", "z"].entries())
+      if (drag.mode === "twist") pose[3 + k] += kTurnPerPixel * x * eye[axis];
+      else pose[k] += (x * right[axis] - y * up[axis]) / metre;
+    if (x !== 0 || y !== 0) this.post("hand " + pose.join(" "));
+    if (!drag.done) return;
+    this.drag = undefined;
+    this.post("stay");
+  }
+
+  // --- frames ---
+
+  take(frame) {
+    const before = this.frame;
+    this.frame = {...frame, positions: frame.positions ?? before?.positions};
+    if (this.drag && !this.drag.base && frame.grabs > this.drag.grabs) {
+      this.drag.base = frame.place.at(-1);
+      this.follow();
+    }
+    if (this.drag && !this.drag.base && frame.said) this.drag = undefined;
+    if (frame.said !== before?.said || (frame.holds.length === 0) !== (before?.holds.length === 0)) this.say(frame.said || this.hint, frame.said ? "warning" : "faint");
+    if (frame.positions) this.fresh = frame.positions;
+    if (this.asked) return;
+    this.asked = true;
+    requestAnimationFrame(() => this.show());
+  }
+
+  show() {
+    this.asked = false;
+    if (this.fresh) this.bend(this.fresh);
+    this.fresh = undefined;
+    this.showState();
+    ++this.shown;
+    const arrived = this.sent.filter(each => each.line <= this.frame.line);
+    if (arrived.length > 0) {
+      this.latencies.push(performance.now() - arrived.at(-1).at);
+      if (this.latencies.length > 1000) this.latencies.shift();
+      this.sent = this.sent.filter(each => each.line > this.frame.line);
+    }
+    this.vibrate();
+  }
+
+  // The points where their elements carry them.
+  bend(positions) {
+    const {shape, rest} = this, {carriers, weights} = shape, moved = shape.live ?? new Float32Array(3 * shape.count);
+    for (let p = 0; p < shape.count; ++p) {
+      let x = 0, y = 0, z = 0;
+      for (let a = kCorners * p; a < kCorners * (p + 1); ++a) {
+        const e = 3 * carriers[a], w = weights[a];
+        x += w * (positions[e] - rest[e]);
+        y += w * (positions[e + 1] - rest[e + 1]);
+        z += w * (positions[e + 2] - rest[e + 2]);
+      }
+      moved[3 * p] = x;
+      moved[3 * p + 1] = y;
+      moved[3 * p + 2] = z;
+    }
+    shape.setLive(moved);
+    this.picture.ranges.clear();
+    this.picture.set({frame: 0});
+    if (this.by("colour").options.length !== this.picture.names.length + 1) this.controls.listColours();
+  }
+
+  get mine() { return this.connected && this.frame && (!this.frame.holder || this.frame.holder === this.client.slice(0, 8)); }
+
+  // What someone new does next.
+  get hint() {
+    if (this.frame.holds.length === 0) return "Click a face that stays where it is.";
+    return this.frame.tools.length === 0 ? "Choose \u201cpulls where it drags\u201d, and drag at another place." : "Drag on, keep the shape, or save.";
+  }
+
+  forceText(t) {
+    const force = Math.hypot(...this.frame.felt[t].slice(0, 3));
+    return force >= 1000 ? `${numberText(force / 1000, 3)}\u00a0kN` : `${numberText(force, 3)}\u00a0N`;
+  }
+
+  showState() {
+    const {frame, mine} = this;
+    if (!frame) return;
+    for (const each of document.querySelectorAll("#clay button, #clay input, #clay select")) each.disabled = !mine && !each.closest("#save-part");
+    this.by("take").disabled = false;
+    this.by("watching").hidden = mine || !this.connected;
+    if (mine) {
+      this.by("undo").disabled = !frame.undo;
+      this.by("redo").disabled = !frame.redo;
+      for (const id of ["stay", "lead"]) this.by(id).disabled = frame.tools.length === 0;
+      this.by("keep").disabled = frame.tools.length === 0;
+    }
+    this.by("held").textContent = frame.holds.length > 0 ? frame.holds.join(", ") : "nothing yet: click a face";
+    if (frame.material) this.by("material").value = frame.material;
+    const last = frame.tools.length - 1;
+    const way = last < 0 ? 0 : Math.hypot(...frame.place[last].slice(0, 3)) / this.unit.factor;
+    this.by("feel").textContent = last < 0 ? "nothing" : `${this.forceText(last)} at ${numberText(way, 3)}\u00a0${this.unit.name}` + (frame.settled ? "" : " \u2026");
+    this.picture.redraw();
+  }
+
+  // A gamepad or a phone shakes with the force, as a share of the largest so far.
+  vibrate() {
+    const last = this.frame.felt.at(-1);
+    if (!this.drag || !last) return;
+    const force = Math.hypot(...last.slice(0, 3));
+    this.strongest = Math.max(this.strongest ?? 0, force);
+    const share = this.strongest > 0 ? force / this.strongest : 0;
+    for (const pad of navigator.getGamepads?.() ?? [])
+      pad?.vibrationActuator?.playEffect?.("dual-rumble", {duration: 100, strongMagnitude: share, weakMagnitude: share})?.catch(() => {});
+    if (this.drag.touch) navigator.vibrate?.(Math.round(20 * share));
+  }
+
+  // --- the overlay ---
+
+  // By name, a point of each face: the centre of its largest triangle.
+  placesOfFaces() {
+    const {shape, panel} = this, places = new Map(), sizes = new Map();
+    for (let t = 0; t < shape.face.length; ++t) {
+      const [a, b, c] = [0, 1, 2].map(k => new THREE.Vector3(...shape.restOf(shape.triangles[3 * t + k])));
+      const area = b.clone().sub(a).cross(c.clone().sub(a)).length(), name = panel.faceName(shape.face[t]).text;
+      if (area <= (sizes.get(name) ?? 0)) continue;
+      sizes.set(name, area);
+      places.set(name, {triangle: t, weights: [1 / 3, 1 / 3, 1 / 3]});
+    }
+    return places;
+  }
+
+  worldPoint(point) {
+    const {centre} = this.shape;
+    return this.picture.project(this.panel, new THREE.Vector3(...point.map((x, k) => x - centre[k])));
+  }
+
+  draw({context, em, theme}) {
+    const {frame} = this;
+    if (!frame || !this.facePlaces) return;
+    context.font = `${em}px system-ui, sans-serif`;
+    context.lineWidth = 2;
+    context.textAlign = "left";
+    context.fillStyle = context.strokeStyle = theme.ink;
+    for (const name of frame.holds) {
+      const at = this.facePlaces.get(name);
+      if (!at) continue;
+      const [x, y] = this.picture.project(this.panel, this.panel.placeOf(at));
+      context.fillRect(x - em / 3, y - em / 3, 0.66 * em, 0.66 * em);
+      context.fillText(`held: ${name}`, x + 0.6 * em, y + 0.35 * em);
+    }
+    frame.tools.forEach((_, t) => {
+      const middle = frame.middles[t], [x, y] = this.worldPoint(middle.map((m, k) => m + frame.place[t][k]));
+      const leads = t === frame.tools.length - 1 && frame.hand;
+      context.beginPath();
+      context.arc(x, y, 0.5 * em, 0, 2 * Math.PI);
+      context.stroke();
+      context.fillText(this.forceText(t), x + 0.8 * em, y - 0.6 * em);
+      if (leads) this.drawSpring(context, [x, y], this.worldPoint(middle.map((m, k) => m + frame.hand[k])), em);
+    });
+  }
+
+  // From the tool to the hand that draws it.
+  drawSpring(context, [x, y], [hx, hy], em) {
+    const turns = 8, length = Math.hypot(hx - x, hy - y);
+    if (length < 2) return;
+    const [nx, ny] = [-(hy - y) / length * 0.3 * em, (hx - x) / length * 0.3 * em];
+    context.lineWidth = 1;
+    context.beginPath();
+    context.moveTo(x, y);
+    for (let k = 1; k < turns; ++k) {
+      const side = k % 2 ? 1 : -1;
+      context.lineTo(x + (hx - x) * k / turns + side * nx, y + (hy - y) * k / turns + side * ny);
+    }
+    context.lineTo(hx, hy);
+    context.stroke();
+    context.beginPath();
+    context.arc(hx, hy, 0.25 * em, 0, 2 * Math.PI);
+    context.fill();
+  }
+}

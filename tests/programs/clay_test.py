@@ -1,0 +1,297 @@
+"""flexel clay from the outside: hands over HTTP, what they get wrong, who holds the tool, and that a run without hands gives the same."""
+
+import contextlib
+import http.client
+import json
+import pathlib
+import re
+import socket
+import struct
+import subprocess
+import sys
+import threading
+import time
+import urllib.parse
+
+from harness import BIN, SOURCE, bracket, expect, expect_error, expect_ok, main, run, write
+
+sys.path.insert(0, str(SOURCE / "bench" / "live"))
+from client import Frames  # noqa: E402
+
+TIP = "0.0796 0.02 0.003"  # on face 2 of the bracket, at rest
+
+
+@contextlib.contextmanager
+def clay(*arguments):
+    """The URL that is printed, while the program runs; it ends by Ctrl-C, without a word and with 130."""
+    process = subprocess.Popen([BIN / "flexel", "clay", *arguments, "--quiet"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    try:
+        line = process.stdout.readline().decode()
+        expect(re.fullmatch(r"http://127\.0\.0\.1:\d+/[0-9a-f]{32}/\n", line), f"one line with the URL: {line!r} {process.stderr.read1() if not line else ''}")
+        yield urllib.parse.urlparse(line.strip()), process
+        expect(process.poll() is None, f"it runs still: {process.poll()}")
+        process.send_signal(2)
+        expect(process.wait(30) == 130, f"Ctrl-C ends it: {process.returncode}")
+    finally:
+        process.kill()
+        process.communicate()
+
+
+class Hand:
+    """A client: reads frames in a thread, posts acts."""
+
+    def __init__(self, url, client):
+        self.url, self.client, self.frames, self.last, self.seen = url, client, Frames(), None, 0
+        self.connection = http.client.HTTPConnection(url.hostname, url.port, timeout=60)
+        self.connection.request("GET", f"{url.path}live?client={client}")
+        self.answer = self.connection.getresponse()
+        expect(self.answer.status == 200, f"frames: {self.answer.status}")
+        self.thread = threading.Thread(target=self.read, daemon=True)
+        self.thread.start()
+
+    def read(self):
+        try:
+            while data := self.answer.read1(1 << 16):
+                for frame in self.frames.feed(data):
+                    if "positions" not in frame and self.last:
+                        frame["positions"] = self.last["positions"]
+                    self.last = frame
+                    self.seen += 1
+        except (OSError, ValueError, AttributeError, http.client.HTTPException):
+            pass
+
+    def leave(self):
+        self.answer.close()
+        with contextlib.suppress(OSError):
+            self.connection.sock and self.connection.sock.shutdown(socket.SHUT_RDWR)
+        self.connection.close()
+
+    def post(self, *lines, client=None):
+        return post(self.url, "\n".join([f"client {client or self.client}", *lines]))
+
+    def act(self, *lines):
+        status, text = self.post(*lines)
+        expect(status == 200, f"{lines}: {status} {text}")
+        return self.settled(json.loads(text)["line"])
+
+    def settled(self, line=0, patience=60):
+        """The first frame at rest after a message, once the run has taken it up."""
+        status, _, text = ask(self.url, self.url.path + "save/scene.toml")  # waits until it is at rest
+        expect(status == 200, f"at rest: {status} {text[:300]}")
+        end = time.monotonic() + patience
+        while not (self.last and self.last["settled"] and self.last["line"] >= line and "positions" in self.last):
+            expect(time.monotonic() < end, f"never at rest: {self.last and {k: v for k, v in self.last.items() if k != 'positions'}}")
+            time.sleep(0.02)
+        time.sleep(0.1)
+        return self.last
+
+
+def ask(url, path, method="GET", content=None, **headers):
+    """Status, headers and bytes of an answer."""
+    connection = http.client.HTTPConnection(url.hostname, url.port, timeout=100)
+    connection.request(method, path, content, headers)
+    answer = connection.getresponse()
+    return answer.status, dict(answer.getheaders()), answer.read()
+
+
+def post(url, content, **headers):
+    status, _, text = ask(url, url.path + "act", "POST", content=content.encode() if isinstance(content, str) else content,
+                          **{"Content-Length": str(len(content)), **headers})
+    return status, text.decode()
+
+
+def saved(url, name):
+    status, _, data = ask(url, url.path + "save/" + name)
+    expect(status == 200, f"{name}: {status} {data[:300]}")
+    pathlib.Path(name).write_bytes(data)
+    return data
+
+
+def corners(data):
+    return [struct.unpack_from("<3f", data, 84 + 50 * t + 12 + 12 * k) for t in range(struct.unpack_from("<I", data, 80)[0]) for k in range(3)]
+
+
+def farthest(one, other):
+    """The largest distance between corners of two STL files [mm]."""
+    one, other = corners(one), corners(other)
+    expect(len(one) == len(other) and one, f"as many triangles: {len(one)} {len(other)}")
+    return max(sum((x - y) ** 2 for x, y in zip(a, b)) ** 0.5 for a, b in zip(one, other))
+
+
+def test_a_face_that_is_led_is_that_of_flexel_deform():
+    bracket()
+    with clay("bracket.step", "--size", "4 mm", "--material", "PLA") as (url, _):
+        hand = Hand(url, "0123456789abcdef")
+        hand.act("hold bracket/1")
+        hand.act("grab face bracket/2")
+        frame = hand.act("0 0 0 -0.001", "0 0 0 -0.005")
+        expect(frame["place"][-1][:3] == [0, 0, -0.005], f"the tool is there: {frame['place']}")
+        bent = saved(url, "part.stl")
+        scene = saved(url, "scene.toml").decode()
+    expect_ok(run("flexel", "deform", "bracket.step", "--fix", "bracket/1", "--move", "bracket/2: 0 0 -5 mm", "--material", "PLA", "--size", "4 mm",
+                  "-o", "deform.stl", "--summary", "summary.json", "--quiet"))
+    expect(farthest(bent, pathlib.Path("deform.stl").read_bytes()) < 1e-4, "the part is that of flexel deform within 0.1 um")
+    reactions = json.loads(pathlib.Path("summary.json").read_text())["simulate"]["reactions"]
+    force = next(each for each in reactions if "bracket/2" in each["name"])["force"]
+    felt = frame["felt"][-1][:3]
+    expect(max(abs(a + b) for a, b in zip(force, felt)) < 1e-5 * max(map(abs, force)), f"and so is the force: {felt} {force}")
+    expect("[[fix]]" in scene and "[[move]]" in scene and 'material = "PLA"' in scene, scene)
+
+
+def test_the_scene_does_the_same_without_hands():
+    """A hand pulls and twists at a place, keeps the shape, and pulls again: two scenes in a pipe end in the same."""
+    bracket()
+    with clay("bracket.step", "--size", "4 mm", "--material", "PLA") as (url, _):
+        hand = Hand(url, "0123456789abcdef")
+        hand.act("hold bracket/1", f"grab at {TIP} 0.008")
+        hand.act("hand 0 0.001 -0.002")
+        frame = hand.act("hand 0.0005 0.002 -0.004 0.05 0 0")
+        hand.act("stay")
+        way, hand_way = frame["place"][-1][:3], [0.0005, 0.002, -0.004]
+        lag = sum((a - b) ** 2 for a, b in zip(way, hand_way)) ** 0.5 / sum(a * a for a in hand_way) ** 0.5
+        expect(0.02 < lag < 0.3, f"the tool lags behind the hand as a spring does: {lag}")
+        first = saved(url, "part.stl")
+        frame = hand.act("keep")
+        expect(frame["kept"] == 1 and frame["tools"] == [] and not frame["said"], f"{frame['kept']} {frame['tools']} {frame['said']}")
+        expect(farthest(saved(url, "part.stl"), first) < 1e-3, "what is kept is the shape that was seen")
+        hand.act("grab face bracket/2")
+        base = hand.last["place"][-1]
+        hand.act("0 " + " ".join(str(x + d) for x, d in zip(base, [0, 0, 0.002, 0, 0, 0])))
+        bent = saved(url, "part.stl")
+        for name in ("rest.vtu", "scene-1.toml", "scene.toml"):
+            saved(url, name)
+    expect_ok(run("flexel-simulate", "scene-1.toml", "rest.vtu", "-o", "one.vtu", "--no-estimate"))
+    expect_ok(run("flexel-simulate", "scene.toml", "one.vtu", "-o", "two.vtu", "--no-estimate"))
+    for body, stl, hands in (("one.vtu", "one.stl", first), ("two.vtu", "two.stl", bent)):
+        expect_ok(run("flexel-map", body, "-o", stl, "--quiet"))
+        expect(farthest(pathlib.Path(stl).read_bytes(), hands) < 1e-3, f"{stl} is what hands made, within a micrometre")
+
+
+def test_undo_and_redo_lead_back_and_forth():
+    bracket()
+    with clay("bracket.step", "--size", "5 mm") as (url, _):
+        hand = Hand(url, "0123456789abcdef")
+        states = [hand.settled()["positions"]]
+        for lines in (["hold bracket/1"], [f"grab at {TIP} 0.01"], ["hand 0 0 -0.003", "stay"], ["release"], ["material steel"]):
+            states.append(hand.act(*lines)["positions"])
+        different = lambda a, b: max(abs(x - y) for x, y in zip(a, b))
+        expect(different(states[2], states[3]) > 1e-3 and different(states[4], states[0]) < 1e-7, "it bends, and springs back")
+        for state in reversed(states[:-1]):
+            frame = hand.act("undo")
+            expect(different(frame["positions"], state) < 1e-7, f"undone: {different(frame['positions'], state)}")
+        expect(not frame["undo"] and frame["redo"] and frame["holds"] == [], "all is undone")
+        for state in states[1:]:
+            frame = hand.act("redo")
+            expect(different(frame["positions"], state) < 1e-7, f"done again: {different(frame['positions'], state)}")
+        expect(frame["undo"] and not frame["redo"], "all is done again")
+
+
+def test_what_cannot_be_is_said_and_harms_nothing():
+    bracket()
+    with clay("bracket.step", "--size", "5 mm") as (url, process):
+        hand = Hand(url, "0123456789abcdef")
+        for lines, said in ((["hand 0 0 -0.001"], "no tool"), (["hold bracket/99"], "bracket/99"), (["grab at 5 5 5 0.001"], "no element"),
+                            (["keep"], "kept"), (["material butter"], "butter"), (["hold bracket/1", "grab face bracket/1"], "is held")):
+            frame = hand.act(*lines)
+            expect(said in frame["said"], f"{lines}: {frame['said']!r}")
+        hand.act("grab face bracket/2")
+        frame = hand.act("0 -0.2 0 0")  # through the wall that holds it
+        expect("does not follow" in frame["said"], f"{frame['said']!r}")
+        bad = ["", "hold x", "client 1", "client 0123456789abcdeF\n", "client 0123456789abcdef\nfly", "client 0123456789abcdef\nhand nan 0 0",
+               "client 0123456789abcdef\nhand 1e9 0 0", "client 0123456789abcdef\ngrab at 0 0 0 -1", "client 0123456789abcdef\nhold \x1b[31m",
+               "client 0123456789abcdef\n0 1 2", "client 0123456789abcdef\nundo now", "client 0123456789abcdef\n" + 300 * "undo\n"]
+        for content in bad:
+            status, text = post(url, content)
+            expect(status == 400 and text.count("\n") == 1, f"{content[:60]!r}: {status} {text!r}")
+        expect(post(url, "client 0123456789abcdef\n" + "x" * 20000)[0] == 413, "a message that is too large")
+        expect(post(url, b"\xff\xfe\x00" * 100)[0] == 400, "bytes that are no text")
+        expect(post(url, "client 0123456789abcdef\nundo", Origin="http://evil.example")[0] == 403, "another page")
+        for method, path, wanted in (("GET", "act", 404), ("POST", "live", 405), ("POST", "", 405), ("GET", "live", 503), ("GET", "save/part.exe", 404),
+                                     ("GET", "save/../scene.toml", 404), ("GET", "save/scene-1.toml", 404)):
+            status = ask(url, url.path + path, method)[0]
+            expect(status == wanted, f"{method} {path}: {status}")
+        expect(ask(url, "/" + 32 * "0" + "/act", "POST")[0] == 405, "another token has no acts")
+        expect(hand.act("undo")["said"] == "", "it goes on")
+
+
+def test_one_holds_the_tool_and_others_watch():
+    bracket()
+    with clay("bracket.step", "--size", "5 mm") as (url, _):
+        first = Hand(url, 16 * "a")
+        first.act("hold bracket/1")
+        others = [Hand(url, f"{k:016x}") for k in range(10)]
+        status, text = others[0].post("undo")
+        expect(status == 409 and "another page" in text, f"{status} {text}")
+        first.act("grab face bracket/2")
+        first.act("hand 0 0 -0.002")
+        for other in others:
+            frame = other.settled(1)
+            expect(list(frame["positions"]) == list(first.last["positions"]) and frame["holder"] == 8 * "a", "all see the same")
+        others[1].act("take", "stay")
+        expect(first.post("undo")[0] == 409, "the tool is taken")
+        others[1].leave()  # vanishes with the tool in its hand
+        end = time.monotonic() + 15
+        while first.post("stay")[0] != 200:
+            expect(time.monotonic() < end, "the tool is free again")
+            time.sleep(0.1)
+        expect(first.settled()["place"][-1][2] < -0.001, "and the part is where it was left")
+
+
+def test_readers_that_sleep_or_vanish_hold_nothing_up():
+    bracket()
+    with clay("bracket.step", "--size", "3 mm") as (url, _):
+        hand = Hand(url, 16 * "a")
+        sleepers = []
+        for k in range(10):
+            sleeper = socket.create_connection((url.hostname, url.port))
+            sleeper.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            sleeper.sendall(f"GET {url.path}live?client={k:016x} HTTP/1.1\r\nHost: {url.netloc}\r\n\r\n".encode())
+            sleepers.append(sleeper)
+        hand.act("hold bracket/1")
+        hand.act("grab face bracket/2")
+        for k in range(60):
+            expect(hand.post(f"0 0 0 {-1e-5 * k}")[0] == 200, "acts get through")
+            time.sleep(0.01)
+            if k == 30:
+                for sleeper in sleepers[:5]:
+                    sleeper.close()
+        frame = hand.act("0 0 0 -0.003")
+        expect(frame["place"][-1][2] == -0.003 and hand.seen > 5, "the hand that is awake is served")
+        for sleeper in sleepers[5:]:
+            sleeper.close()
+
+
+def test_many_acts_at_once_are_refused_not_kept():
+    bracket()
+    with clay("bracket.step", "--size", "10 mm") as (url, _):
+        hand = Hand(url, 16 * "a")
+        hand.act("hold bracket/1", "grab face bracket/2")
+        statuses = [hand.post(*(["release", "undo"] * 100))[0] for _ in range(6)]
+        expect(set(statuses) <= {200, 429} and 429 in statuses, f"{statuses}")
+        expect(hand.settled()["said"] == "", "and it comes to rest")
+
+
+def test_arguments():
+    bracket()
+    write("time.toml", 'material = "PLA"\n[run]\ntime = "1 s"\n[[fix]]\nwhere = "bracket/1"\n[[load]]\nwhere = "bracket/2"\nforce = ["0 N", "0 N", "-1 N"]\n')
+    refused = lambda *arguments: run("flexel", "clay", *arguments)
+    expect_error(refused("none.step"), "flexel", "none.step")
+    expect_error(refused("bracket.step", "--material", "butter"), "flexel", "butter")
+    expect_error(refused("bracket.step", "--size", "1 mm", "--count", "5"), "flexel", "--count")
+    expect_error(refused("bracket.step", "--scene", "time.toml"), "flexel", "run in time")
+    expect_error(refused("bracket.step", "--scene", "time.toml", "--material", "ABS"), "flexel", "give one")
+    write("load.toml", 'material = "PLA"\n[run]\ntolerance = 1e-8\n[[fix]]\nwhere = "bracket/1"\n[[load]]\nwhere = "bracket/2"\nforce = ["0 N", "0 N", "-50 N"]\n')
+    with clay("bracket.step", "--scene", "load.toml", "--size", "5 mm") as (url, _):
+        hand = Hand(url, 16 * "a")
+        bent = hand.settled()["positions"]
+        hand.act("grab face bracket/8")
+        expect("the scene says" in hand.act("material ABS")["said"], "its material is the scene's")
+        saved(url, "part.stl")
+        saved(url, "scene.toml")
+        expect(max(abs(a - b) for a, b in zip(bent, hand.last["positions"])) < 1e-3, "the load acts on")
+        expect(not hand.act("keep")["said"], "with a [run] of its own the shape is kept too")
+        expect(b"renormalise = true" in saved(url, "scene-1.toml"), "and its scene says so")
+
+
+if __name__ == "__main__":
+    main(globals())
