@@ -154,6 +154,30 @@ def test_what_is_refused():
         expect_error(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "x.vtu"), "flexel-simulate", fragment)
     write("scene.toml", scene("modes = 3", HELD))
     expect_error(run("flexel-simulate", "scene.toml", "body.vtu", "--history", "h.csv", "-o", "x.vtu"), "flexel-simulate", "--history")
+    expect_error(run("flexel", "deform", "beam.obj", "--scene", "scene.toml", "-o", "x.stl"), "flexel", "flexel-simulate")
+
+
+def test_two_loose_pieces():
+    """Each has six rigid motions, and each shape of one is there twice."""
+    near, far = box_triangles((60.0, 20.0, 10.0)), [[(x, y, z + 40) for x, y, z in t] for t in box_triangles((60.0, 20.0, 10.0))]
+    for model in ("quadratic", "cells", "springs"):
+        counts = []
+        for name, triangles in (("one", near), ("two", near + far)):
+            write(f"{name}.stl", binary_stl(triangles))
+            voxels(f"{name}.stl", "5 mm")
+            shapes, _ = solve(scene("modes = 4", model=model, poisson=0.25))
+            counts.append((shapes["rigid"], [mode["frequency"] for mode in shapes["modes"]]))
+        (alone, usual), (both, found) = counts
+        expect((alone, both) == (6, 12), f"{model}: {alone} and {both} rigid motions")
+        close(found, [usual[0], usual[0], usual[1], usual[1]], 1e-4, model)
+
+
+def test_stops_in_time():
+    write("cube.stl", binary_stl(box_triangles((100.0, 100.0, 100.0))))
+    voxels("cube.stl", "4 mm")
+    write("scene.toml", scene("modes = 40", model="cells"))
+    done = run("flexel-simulate", "scene.toml", "body.vtu", "-o", "x.pvd", "--timeout", "0.3 s")
+    expect(done.code == 5 and not list(pathlib.Path(".").glob("x*")), f"{done}")
 
 
 def test_bits_do_not_depend_on_threads():
