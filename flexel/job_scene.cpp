@@ -74,6 +74,16 @@ void plan_infill(const JobArguments& arguments, simulate::Scene& scene) {
   check_infill(scene.infill, "--shell");
 }
 
+// Shapes without size are no deformed part.
+void refuse_modes(const simulate::Scene& scene) {
+  if (!scene.run.modes && !scene.run.buckling) return;
+  throw InputError(
+      scene.name,
+      fmt::format("[run] {} is for flexel-simulate: flexel-voxelize PART --moments -o body.vtu, then "
+                  "flexel-simulate SCENE body.vtu -o shapes.pvd",
+                  scene.run.modes ? "modes" : "buckling"));
+}
+
 }  // namespace
 
 void declare_scene(CommandLine& app, JobArguments& arguments) {
@@ -151,6 +161,7 @@ void plan_scene(const JobArguments& arguments, Job& job) {
     refuse_idle(arguments);
   } else {
     job.scene = simulate::read_scene(arguments.scene);
+    refuse_modes(job.scene);
   }
   add_options(arguments, job);
 }

@@ -31,6 +31,7 @@ using Eigen::VectorXd;
 constexpr double kShown = 0.05;         // of the part's extent, that shapes go at most where they are written
 constexpr std::size_t kMostPieces = 8;  // that may be loose
 constexpr Index kLeastGuard = 4;        // columns beside those that are wanted
+constexpr int kMostOfBuckling = 100;    // iterations: under loads that pull they do not end
 constexpr double kNegative = 1e-6;      // of the largest eigenvalue found
 constexpr double kNotRigid = 1e-6;      // likewise, of one that should be 0
 
@@ -111,6 +112,11 @@ MatrixXd starting_columns(const VibratingBody& body, const Pencil& pencil, Index
   return made;
 }
 
+[[noreturn]] void refuse_stout(const std::string& scene) {
+  throw InputError(
+      scene, "nothing buckles under these loads: they pull, or matter would be strained by a third before");
+}
+
 Eigenpairs find(VibratingBody& body, const Scene& scene, Progress& progress) {
   const bool buckling = scene.run.buckling.has_value();
   const auto wanted = static_cast<Index>(buckling ? *scene.run.buckling : *scene.run.modes);
@@ -126,6 +132,7 @@ Eigenpairs find(VibratingBody& body, const Scene& scene, Progress& progress) {
     const Pencil pencil = body.pencil();
     EigenOptions options;
     options.wanted = wanted + rigid;
+    if (buckling) options.most_iterations = kMostOfBuckling;
     const Eigenpairs found = lowest_eigenpairs(
         pencil, starting_columns(body, pencil, wanted, scene.name), options, [&](int iteration, Index done) {
           check_stop();
@@ -139,6 +146,7 @@ Eigenpairs find(VibratingBody& body, const Scene& scene, Progress& progress) {
       throw DivergedError(scene.name +
                           ": the stiffness is not positive; use a smaller --size, or model \"cells\"");
     }
+    if (buckling && largest > 0 && found.values[0] > -pencil.rounding) refuse_stout(scene.name);
     if (!found.converged || found.values.size() < options.wanted || !found.vectors.allFinite())
       throw DivergedError(fmt::format("{}: {} did not converge within {} iterations; use a smaller --size",
                                       scene.name, buckling ? "buckling" : "modes", found.iterations));
@@ -182,9 +190,8 @@ Vec3 measure_there(const ProbePoints& probe, const Body& body, const State& stat
 }
 
 // The shapes one by one: figures, and a frame of the series for each. Leaves the body in the first.
-void tell(const VibratingBody& vibrating, const Eigenpairs& found, const Scene& scene,
-          const SimulateOptions& options, const std::vector<ProbePoints>& probes, Body& body,
-          ModesSummary& summary) {
+void tell(const VibratingBody& vibrating, const Eigenpairs& found, const SimulateOptions& options,
+          const std::vector<ProbePoints>& probes, Body& body, ModesSummary& summary) {
   std::optional<Series> series;
   if (!options.series.empty()) series.emplace(options.series, options.compress);
   std::vector<Vec3> still;
@@ -194,7 +201,7 @@ void tell(const VibratingBody& vibrating, const Eigenpairs& found, const Scene& 
   }
   for (auto j = static_cast<Index>(summary.rigid); j < found.values.size(); ++j) {
     check_stop();
-    if (summary.buckling && !(found.values[j] < 0)) break;  // the others need pull where these need push
+    if (summary.buckling && !(found.values[j] < -vibrating.pencil().rounding)) break;
     Mode mode;
     if (summary.buckling)
       mode.load_factor = -1 / found.values[j];
@@ -209,8 +216,6 @@ void tell(const VibratingBody& vibrating, const Eigenpairs& found, const Scene& 
     summary.modes.push_back(mode);
     if (series) series->add(body, static_cast<double>(summary.modes.size()));
   }
-  if (summary.modes.empty())
-    throw InputError(scene.name, "nothing buckles under these loads: they pull; turn them round");
   (void)vibrating.show(shown(found.vectors.col(static_cast<Index>(summary.rigid)), summary.shape), body);
 }
 
@@ -248,7 +253,7 @@ SimulateResult run_modes(Body& body, const Scene& scene, const SimulateOptions& 
   summary.iterations = found.iterations;
   summary.buckling = scene.run.buckling.has_value();
   summary.prestressed = vibrating->prestressed() && !summary.buckling;
-  tell(*vibrating, found, scene, options, probes, body, summary);
+  tell(*vibrating, found, options, probes, body, summary);
   result.mass = mass_of(problem);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   return result;

@@ -14,17 +14,18 @@
 #include "simulate/matter/masses.h"
 #include "simulate/models/cells.h"
 #include "simulate/models/stiffness.h"
+#include "simulate/modes/quadratic_mass.h"
 #include "simulate/modes/what_acts.h"
 #include "simulate/probes/report.h"
 #include "simulate/quadratic/corotation.h"
-#include "simulate/quadratic/quadratic_mass.h"
 #include "simulate/quadratic/quadratic_run.h"
 #include "simulate/quadratic/quadratic_solve.h"
 
 namespace flexel::simulate {
 namespace {
 
-constexpr double kMostSafety = 64;  // of supports
+constexpr double kMostSafety = 64;     // of supports
+constexpr double kMostStrained = 0.3;  // displacement gradient beyond which nothing is told of buckling
 constexpr double kStressedAt =
     1e-4;  // displacement gradient at which stresses are taken: rotations are small there
 
@@ -203,7 +204,9 @@ Pencil QuadraticVibration::pencil() const {
     std::copy_n(to[0].data(), 3 * to.size(), y);
     clear_held(y);
   };
-  made.rounding = made.inverts_b ? 1e-12 : kRoundedEigenvalue * largest_eigenvalue(problem_);
+  // Beyond that factor matter would be strained by more than its length: nothing is told of it.
+  made.rounding =
+      made.inverts_b ? kStressedAt / stress_share_ : kRoundedEigenvalue * largest_eigenvalue(problem_);
   return made;
 }
 

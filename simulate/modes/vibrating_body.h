@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "simulate/linear/eigenpairs.h"
+#include "simulate/modes/eigenpairs.h"
 #include "simulate/state/state.h"
 
 namespace flexel::simulate {

@@ -2,7 +2,7 @@
 // eigenvectors of their scaled Gram matrix, columns that depend on others dropped (Stathopoulos and Wu 2002; Hetmaniuk and
 // Lehoucq 2006), the old directions by orthonormal coefficients (Duersch, Shao, Yang and Gu 2018). So Rayleigh and Ritz's
 // problem is an ordinary one of three blocks.
-#include "simulate/linear/eigenpairs.h"
+#include "simulate/modes/eigenpairs.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // Sums along one axis after the other, as the stiffness' products (sum factorization).
-#include "simulate/quadratic/quadratic_mass.h"
+#include "simulate/modes/quadratic_mass.h"
 
 #include "base/parallel.h"
 
