@@ -5,7 +5,8 @@
 
 Each part is made by gmsh (OpenCASCADE) or is a STEP file of ../shared/parts (left out, and said so, where that folder is not there; it is held
 and drawn by 10 N along (1, 1, 1) at the flat faces at the two ends of its longest side). CalculiX gets its mesh of quadratic
-tetrahedra (C3D10) at three sizes, of a STEP file with curved edges but where those fold an element; Flexel the STEP file at two spacings, both
+tetrahedra (C3D10) at three sizes, of a STEP file with curved edges but where those fold an element; Flexel the STEP file at two spacings, in model quadratic at
+four times and twice the coarser of them, both
 one thread and the same faces, material and load. What is compared is the mean displacement of a face, or that of a point. The
 reference is Lame's solution for the tube, reference.py's for the L-bracket and the STEP files, otherwise CalculiX's three values extrapolated (Aitken),
 or the finest where they do not approach a limit. Seconds are the processor's, which other jobs change little, and hold everything from the file with the part or mesh
@@ -202,7 +203,7 @@ def quantities(vector, unit):
     return "[" + ", ".join(f'"{value:.15g} {unit}"' for value in vector) + "]"
 
 
-def flexel(case, folder, spacing):
+def flexel(case, folder, spacing, model="cells"):
     step = case.step or folder / "part.step"
     if not step.exists():
         geo = (folder / "part.geo").read_text() + 'Save "part.step";\n'
@@ -216,6 +217,7 @@ def flexel(case, folder, spacing):
     asked = f'where = "{names[case.asked]}"' if isinstance(case.asked, str) else f"at = {quantities(case.turn @ case.asked, 'mm')}"
     scene = folder / "scene.toml"
     scene.write_text(f"""material = "it"
+model = "{model}"
 [materials.it]
 young = "{YOUNG} MPa"
 poisson = {case.poisson}
@@ -229,7 +231,7 @@ name = "asked"
 """)
     body = folder / "body.vtu"
     first, memory = measured(["flexel-voxelize", step, "--size", f"{spacing} mm", "--align", case.align, "-o", body,
-                              "--threads", "1"])
+                              "--threads", "1", *(["--moments"] if model == "quadratic" else [])])
     second, more = measured(["flexel-simulate", scene, body, "-o", folder / "bent.vtu", "--threads", "1", "--summary", folder / "s.json"])
     found = json.loads((folder / "s.json").read_text())
     bars = found.get("error_bars", {}).get("bars", [])
@@ -253,13 +255,15 @@ def run(name, quick):
     with tempfile.TemporaryDirectory() as place:
         folder = pathlib.Path(place)
         rows = [calculix(case, folder, size) for size in case.sizes[: 2 if quick else 3]]
-        ours = [flexel(case, folder, spacing) for spacing in case.spacings[: 1 if quick else 2]]
+        ours = [("", spacing, flexel(case, folder, spacing)) for spacing in case.spacings[: 1 if quick else 2]]
+        ours += [(" of model quadratic", times * case.spacings[0], flexel(case, folder, times * case.spacings[0], "quadratic"))
+                 for times in ((4,) if quick else (4, 2))]
     reference = case.reference or limit([row[0] for row in rows])
     for size, (value, seconds, memory, count, meshing) in zip(case.sizes, rows):
         print(f"| {name} | CalculiX, C3D10 of {size:g} mm | {count:,} | {100 * (value / reference - 1):+.2f} | | {meshing:.2f} | {seconds:.2f} |"
               f" {memory:.0f} |")
-    for spacing, (value, bar, seconds, memory, cells) in zip(case.spacings, ours):
-        print(f"| {name} | Flexel, cells of {spacing:g} mm | {cells:,} | {100 * (value / reference - 1):+.2f} | {100 * bar / reference:.2f} |"
+    for model, spacing, (value, bar, seconds, memory, cells) in ours:
+        print(f"| {name} | Flexel, cells{model} of {spacing:g} mm | {cells:,} | {100 * (value / reference - 1):+.2f} | {'none' if math.isnan(bar) else f'{100 * bar / reference:.2f}'} |"
               f" | {seconds:.2f} | {memory:.0f} |", flush=True)
 
 

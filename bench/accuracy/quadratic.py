@@ -157,6 +157,56 @@ def cantilevers(folder):
     return text
 
 
+def piece(path, rotation, low, high):
+    """OBJ text of a box with the groups x0 and x1, turned [mm]."""
+    corners = [turned(rotation, (a, b, c)) for c in (low[2], high[2]) for b in (low[1], high[1]) for a in (low[0], high[0])]
+    quads = {"x0": [(0, 4, 6, 2)], "x1": [(1, 3, 7, 5)], "side": [(0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6)]}
+    path.write_text("".join("v {:.15g} {:.15g} {:.15g}\n".format(*corner) for corner in corners) + "".join(
+        f"g {group}\n" + "".join("f " + " ".join(str(i + 1) for i in face) + "\n" for face in faces) for group, faces in quads.items()))
+
+
+def solve_pieces(folder, pieces, rotation, force, poisson, stiffer=1):
+    """(the end's displacement, its reading of the summary) of boxes in a row, `pieces` [(name, from, to, size) mm along the bar]; the last one has so many
+    times the stiffness."""
+    bodies = []
+    for name, low, high, size in pieces:
+        piece(folder / f"{name}.obj", rotation, (low, 0, 0), (high, 50, 50))
+        bodies.append(folder / f"{name}.vtu")
+        call("flexel-voxelize", folder / f"{name}.obj", "--size", f"{size} mm", "--align", "none", "--moments", "--threads", "1", "--quiet", "-o", bodies[-1], "--force")
+    first, last = pieces[0][0], pieces[-1][0]
+    vector = ", ".join(f'"{each:.12g} N"' for each in turned(rotation, force))
+    (folder / "scene.toml").write_text(
+        f'model = "quadratic"\nmaterial = "gum"\n[materials.gum]\nyoung = "1 MPa"\npoisson = {poisson}\ndensity = "1000 kg/m3"\n'
+        f'[materials.other]\nyoung = "{stiffer} MPa"\npoisson = {poisson}\ndensity = "1000 kg/m3"\n[parts.{last}]\nmaterial = "other"\n'
+        f'[[fix]]\nwhere = "{first}/x0"\n[[load]]\nwhere = "{last}/x1"\nforce = [{vector}]\n[[probe]]\nname = "end"\nwhere = "{last}/x1"\n')
+    call("flexel-simulate", folder / "scene.toml", *bodies, "--threads", "1", "--quiet", "--no-stress", "--no-estimate", "--summary", folder / "s.json",
+         "--force", "-o", folder / "out.vtu")
+    found = json.loads((folder / "s.json").read_text())
+    return found["probes"][0]["displacement"], found
+
+
+def bonded(folder):
+    text = ("\n## Bonded parts\n\nA bar of 200 x 50 x 50, n cells thick, cut across in the middle and bonded again; the far half with the same cells, or with cells of .7 of them. Bent: the end beside\n"
+            "that of the whole bar. Drawn, Poisson's ratio 0, the far half of so many times the stiffness: beside the series of the two. What it is off by in %; iterations of the whole bar and of the\n"
+            "bonded one.\n\n| bar | n | cells of the far half | off % | whole, iterations | iterations |\n|---|---|---|---|---|---|\n")
+    off = lambda found, exact: 100 * math.dist(found, exact) / math.hypot(*exact)
+    for words, degrees in (("bent", 0), ("bent, turned by 33 degrees", 33)):
+        rotation = obj_bar((1, 1, 1), degrees)[1]
+        for n in (1, 2, 3, 4):
+            exact, whole = solve_pieces(folder, [("whole", 0, 200, 50 / n)], rotation, (0, 0, 1e-3), 0.3)
+            for finer in (1, 0.7):
+                end, found = solve_pieces(folder, [("near", 0, 100, 50 / n), ("far", 100, 200, finer * 50 / n)], rotation, (0, 0, 1e-3), 0.3)
+                text += f"| {words} | {n} | {'the same' if finer == 1 else '.7'} | {off(end, exact):.3f} | {whole['cg_iterations']} | {found['cg_iterations']} |\n"
+    for words, degrees in (("drawn", 0), ("drawn, turned by 33 degrees", 33)):
+        rotation = obj_bar((1, 1, 1), degrees)[1]
+        for stiffer in (1, 10, 1000):
+            for finer in (1, 0.7):
+                exact = turned(rotation, (1e-2 / 0.0025 / 1e6 * 0.1 * (1 + 1 / stiffer), 0, 0))
+                end, found = solve_pieces(folder, [("near", 0, 100, 25), ("far", 100, 200, finer * 25)], rotation, (1e-2, 0, 0), 0, stiffer)
+                text += f"| {words}, {stiffer} times | 2 | {'the same' if finer == 1 else '.7'} | {off(end, exact):.4f} | | {found['cg_iterations']} |\n"
+    return text
+
+
 def calculix(folder, part, text, edge):
     """(displacement of the probe along the push m, elements, s of meshing, s of solving): second-order tetrahedra."""
     (folder / "scene.toml").write_text(text)
@@ -215,7 +265,7 @@ def main():
     with tempfile.TemporaryDirectory() as place:
         folder = pathlib.Path(place)
         text = ("# Model `quadratic`, measured\n\nWritten by `bench/accuracy/quadratic.py`, which says what is run and what the references are; the model is in\n"
-                "[quadratic.md](../theory/quadratic.md). Above 0 is too soft. One thread.\n\n" + beams(folder) + strips(folder) + cantilevers(folder) + step_parts(folder, options.parts))
+                "[quadratic.md](../theory/quadratic.md). Above 0 is too soft. One thread.\n\n" + beams(folder) + strips(folder) + cantilevers(folder) + bonded(folder) + step_parts(folder, options.parts))
     part = options.output.with_name(options.output.name + ".part")
     part.write_text(text, encoding="utf-8")
     part.replace(options.output)

@@ -67,7 +67,7 @@ bool re_entrant_edge_within(const Surface& surface, const Vec3& at, double reach
 std::string singular_beside(const Body& body, const std::vector<std::uint8_t>& tied, const Vec3& at,
                             double reach) {
   for (std::size_t e = 0; e < tied.size(); ++e)
-    if (tied[e] == 2 && (body.rest[e] - at).norm() <= reach) return "a support";
+    if (tied[e] >= 2 && (body.rest[e] - at).norm() <= reach) return tied[e] == 2 ? "a support" : "a bond";
   return re_entrant_edge_within(body.surface, at, reach) ? "a re-entrant edge" : "";
 }
 

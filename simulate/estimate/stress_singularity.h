@@ -10,7 +10,8 @@ namespace flexel::simulate {
 
 // What lies within `reach` [m] of `at` (m, rest) and makes stresses there grow without bound as cells get
 // smaller (Williams, J. Appl. Mech. 19, 1952): "a support", an element that `tied` (elements) says is held in
-// all directions (2), or "a re-entrant edge" of the surface, turning by more than 30 degrees. "" for neither.
+// all directions (2), "a bond" of parts (3), or "a re-entrant edge" of the surface, turning by more than 30 degrees. ""
+// for none.
 [[nodiscard]] std::string singular_beside(const Body& body, const std::vector<std::uint8_t>& tied,
                                           const Vec3& at, double reach);
 

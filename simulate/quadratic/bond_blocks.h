@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "simulate/quadratic/nitsche_bond.h"
+#include "simulate/quadratic/cells/nitsche_bond.h"
 #include "simulate/quadratic/quadratic_operator.h"
 
 namespace flexel::simulate {

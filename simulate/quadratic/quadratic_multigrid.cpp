@@ -344,6 +344,7 @@ void QuadraticMultigrid::estimate_largest() {
     smooth_once(image, x);
     largest_ = std::sqrt(dot(x, x));
   }
+  if (largest_ > kSettled * before) widen();  // what is left of the growth is not known
 }
 
 // kSteps of Chebyshev's iteration on [largest / kRange, kMargin largest].

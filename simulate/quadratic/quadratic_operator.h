@@ -2,7 +2,7 @@
 // out of the cells' products and put back as rows of the identity.
 #pragma once
 #include "simulate/linear/operator.h"
-#include "simulate/quadratic/cell_products.h"
+#include "simulate/quadratic/cells/cell_products.h"
 
 namespace flexel::simulate {
 

@@ -94,6 +94,15 @@ ProbeResult measure_probe(const Probe& probe, const ProbePoints& placed, const Q
   return result;
 }
 
+// For singular_beside(): where supports hold, and where parts are bonded, whose edges are corners of two materials.
+std::vector<std::uint8_t> singular_elements(const QuadraticSystem& system) {
+  std::vector<std::uint8_t> found = system.tied_elements();
+  for (const std::vector<std::uint32_t>& elements : system.bonded_elements())
+    for (const std::uint32_t e : elements)
+      if (found[e] != 2) found[e] = 3;
+  return found;
+}
+
 // What a run finds at the vertices goes by these names.
 void tell_replaced_columns(const Body& body, Progress& progress) {
   if (has_surface_stress(body)) return;  // an earlier run's
@@ -210,7 +219,7 @@ SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptio
   for (const std::string& warning : warnings_of(result)) progress.warn(scene.name + ": " + warning);
   if (options.stress) tell_replaced_columns(body, progress);
   if (options.stress) report_stress(problem, field_stresses(system, solution, state), body, result);
-  if (options.estimate) mark_singular(body, system.tied_elements(), result, kBesideInField);
+  if (options.estimate) mark_singular(body, singular_elements(system), result, kBesideInField);
   const StiffnessPattern pattern =
       stiffness_pattern(body, active_cells(problem), connection_rows({}, body.element_count()), {}, false);
   carry_strays(fragments, problem, pattern.stencil, state);

@@ -3,8 +3,8 @@
 #include <memory>
 
 #include "simulate/effects/bonds.h"
-#include "simulate/quadratic/nitsche_bond.h"
-#include "simulate/quadratic/nitsche_support.h"
+#include "simulate/quadratic/cells/nitsche_bond.h"
+#include "simulate/quadratic/cells/nitsche_support.h"
 #include "simulate/quadratic/quadratic_multigrid.h"
 #include "simulate/scene/scene.h"
 

@@ -4,7 +4,7 @@
 #include <Eigen/Geometry>
 #include <random>
 
-#include "simulate/quadratic/cell_products.h"
+#include "simulate/quadratic/cells/cell_products.h"
 #include "tests/simulate/box_body.h"
 
 namespace flexel::simulate {

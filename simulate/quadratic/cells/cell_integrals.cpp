@@ -1,5 +1,5 @@
 // Moment k is the weight of Gauss's point k; a cell_elasticity() is the strain-stress relation in the lattice's axes.
-#include "simulate/quadratic/cell_integrals.h"
+#include "simulate/quadratic/cells/cell_integrals.h"
 
 #include <algorithm>
 

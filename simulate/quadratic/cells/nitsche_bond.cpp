@@ -1,12 +1,12 @@
 // Many points at a time, as for supports.
-#include "simulate/quadratic/nitsche_bond.h"
+#include "simulate/quadratic/cells/nitsche_bond.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
-#include "simulate/quadratic/nitsche_support.h"
+#include "simulate/quadratic/cells/nitsche_support.h"
 
 namespace flexel::simulate {
 namespace {

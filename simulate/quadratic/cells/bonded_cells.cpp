@@ -1,6 +1,6 @@
 // Facets of the finer part are cut by those of the other, projected along their normals. Which facets are near each other
 // is found by a sweep along the longest side of where the parts' boxes meet.
-#include "simulate/quadratic/bonded_cells.h"
+#include "simulate/quadratic/cells/bonded_cells.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

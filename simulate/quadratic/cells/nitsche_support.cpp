@@ -1,5 +1,5 @@
 // The terms of Nitsche's method at one point, with dP/dF of the material at rest.
-#include "simulate/quadratic/nitsche_support.h"
+#include "simulate/quadratic/cells/nitsche_support.h"
 
 #include <algorithm>
 

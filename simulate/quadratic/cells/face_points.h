@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "simulate/matter/voxel_pieces.h"
-#include "simulate/quadratic/quadratic_nodes.h"
+#include "simulate/quadratic/cells/quadratic_nodes.h"
 
 namespace flexel::simulate {
 

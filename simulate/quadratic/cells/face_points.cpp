@@ -1,6 +1,6 @@
 // Polygons are cut by planes of the lattice axis by axis; the piece in a voxel gets Gauss points of the triangles of
 // its fan, collapsed from a square.
-#include "simulate/quadratic/face_points.h"
+#include "simulate/quadratic/cells/face_points.h"
 
 #include <algorithm>
 #include <cmath>

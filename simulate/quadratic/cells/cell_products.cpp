@@ -1,7 +1,7 @@
 // A product is made cell by cell, then gathered node by node in the order of the cells, so that it has the same
 // bits for any number of threads. Displacements are taken beside those of a cell's first node, for a translation needs no
 // force and floats have no digits to spare for it.
-#include "simulate/quadratic/cell_products.h"
+#include "simulate/quadratic/cells/cell_products.h"
 
 #include <algorithm>
 #include <cmath>

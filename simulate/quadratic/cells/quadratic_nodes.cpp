@@ -1,5 +1,5 @@
 // An edge or a face is known by its elements: the keys of all cells are sorted, and equal ones are one node.
-#include "simulate/quadratic/quadratic_nodes.h"
+#include "simulate/quadratic/cells/quadratic_nodes.h"
 
 #include <algorithm>
 #include <functional>

@@ -8,8 +8,8 @@
 // bonded surface for a strain energy of 1/2: so the traction is that of the softer, or fuller, of the two, and the form is
 // positive from kBondNitsche = 4 on. Tractions turn with their cells (corotation.h), jumps are the world's.
 #pragma once
-#include "simulate/quadratic/bonded_cells.h"
-#include "simulate/quadratic/cell_integrals.h"
+#include "simulate/quadratic/cells/bonded_cells.h"
+#include "simulate/quadratic/cells/cell_integrals.h"
 
 namespace flexel::simulate {
 

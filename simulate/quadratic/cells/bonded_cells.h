@@ -3,7 +3,7 @@
 #include <array>
 #include <vector>
 
-#include "simulate/quadratic/face_points.h"
+#include "simulate/quadratic/cells/face_points.h"
 
 namespace flexel::simulate {
 

@@ -10,8 +10,8 @@
 #include <string>
 
 #include "simulate/effects/supports.h"
-#include "simulate/quadratic/cell_integrals.h"
-#include "simulate/quadratic/face_points.h"
+#include "simulate/quadratic/cells/cell_integrals.h"
+#include "simulate/quadratic/cells/face_points.h"
 
 namespace flexel::simulate {
 

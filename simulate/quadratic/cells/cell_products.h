@@ -6,8 +6,8 @@
 #include <optional>
 #include <vector>
 
-#include "simulate/quadratic/cell_integrals.h"
-#include "simulate/quadratic/quadratic_nodes.h"
+#include "simulate/quadratic/cells/cell_integrals.h"
+#include "simulate/quadratic/cells/quadratic_nodes.h"
 
 namespace flexel::simulate {
 
