@@ -73,7 +73,7 @@ def test_fused_parts_stay_fused_in_later_runs():
                                     '[[probe]]\nname = "end"\nwhere = "twin/xmax"\n')
         end = summary(pulled, "out.vtu", "-o", "on.vtu")["probes"][0]["displacement"][0]
         expect(1e-5 < end < 1e-3, f"{placement}: the end is drawn by {end} m")
-        expect_ok(run("flexel-simulate", "on.vtu", scene("free.toml", FREE), "-o", "free.vtu"))
+        expect_ok(run("flexel-simulate", scene("free.toml", FREE), "on.vtu", "-o", "free.vtu"))
         expect_error(run("flexel-simulate", pulled, "box.vtu", "twin.vtu", "-o", "loose.vtu"), "flexel-simulate", "twin")
 
 
