@@ -44,8 +44,9 @@ simulate::Model model_named(const std::string& name) {
 simulate::HookeConstant hooke_named(const std::string& name) {
   if (name == "paper") return simulate::HookeConstant::paper;
   if (name == "ganovelli") return simulate::HookeConstant::ganovelli;
-  throw InputError(fmt::format("--hooke: no Hooke constant \"{}\"{}; known: paper, ganovelli", name,
-                               did_you_mean(name, {"paper", "ganovelli"})));
+  if (name == "isotropic") return simulate::HookeConstant::isotropic;
+  throw InputError(fmt::format("--hooke: no Hooke constant \"{}\"{}; known: paper, ganovelli, isotropic",
+                               name, did_you_mean(name, {"paper", "ganovelli", "isotropic"})));
 }
 
 Measured measured(const MeasureArguments& arguments) {
@@ -158,7 +159,7 @@ int measure_command(int argc, char** argv) {
       .show_default();
   app.add_option("--poisson", arguments.poisson, "Poisson's ratio in place of the material's")
       .type_name("NU");
-  app.add_option("--hooke", arguments.hooke, "Model paper: paper or ganovelli")
+  app.add_option("--hooke", arguments.hooke, "Model paper: paper, ganovelli or isotropic")
       .type_name("NAME")
       .show_default();
   app.add_flag("--json", arguments.json, "As JSON, in SI units");

@@ -21,6 +21,7 @@
 #include "simulate/estimate/coarsen.h"
 #include "simulate/estimate/error_bars.h"
 #include "simulate/estimate/stress_singularity.h"
+#include "simulate/events/fuse.h"
 #include "simulate/matter/coplanar_elements.h"
 #include "simulate/matter/fragments.h"
 #include "simulate/matter/stress.h"
@@ -207,6 +208,8 @@ SimulateResult Run::operator()() {
   name_materials(body_, problem_.materials);
   const std::vector<ProbePoints> probes = place_probes(scene_, problem_);
   std::vector<ActiveEffect> effects = active_effects(scene_.effects, problem_);
+  if (std::vector<FusedPoint> fused = fused_points(body_); !fused.empty())
+    effects.push_back(activate(FusedPoints(body_, std::move(fused))));
   refuse_timed(effects, ActsIn::all, scene_.name);
   refuse_timed(options_, scene_.name);
   report_effects(effects, "the parts' models, equilibrium by Newton's method", options_.explain, progress_);

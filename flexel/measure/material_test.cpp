@@ -166,7 +166,9 @@ class Beam {
                                : model_ == simulate::Model::springs ? "springs"
                                                                     : "cells";
     if (model_ == simulate::Model::paper)
-      scene.parts["bar"].hooke = hooke_ == simulate::HookeConstant::ganovelli ? "ganovelli" : "paper";
+      scene.parts["bar"].hooke = hooke_ == simulate::HookeConstant::ganovelli   ? "ganovelli"
+                                 : hooke_ == simulate::HookeConstant::isotropic ? "isotropic"
+                                                                                : "paper";
     for (const double end : {-1.0, 1.0}) {
       simulate::Motion way = motion;
       way.through = middle_ + Vec3(end * length_ / 2, 0, 0);

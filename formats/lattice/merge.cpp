@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "formats/lattice/body_moments.h"
+#include "formats/lattice/fused_points.h"
 
 namespace flexel {
 namespace {
@@ -45,6 +46,9 @@ void append(Body& body, Body other) {
   const auto elements = static_cast<std::uint32_t>(body.element_count());
   const auto cells = static_cast<std::uint32_t>(body.cell_count());
   const std::size_t parts = body.parts.size();
+  std::vector<FusedPoint> fused = fused_points(body), others_fused = fused_points(other);
+  for (FusedPoint& point : others_fused)
+    for (std::uint32_t& e : point.elements) e += elements;
   append_columns(body.element_columns, other.element_columns, "element");
   append_columns(body.cell_columns, other.cell_columns, "cell");
   for (Part part : other.parts) {
@@ -69,7 +73,9 @@ void append(Body& body, Body other) {
   append_surface_cells(body, other, cells);
   append(body.surface, std::move(other.surface));
   for (std::size_t p = parts; p < body.parts.size(); ++p) body.parts[p].name = body.surface.parts[p].name;
+  fused.insert(fused.end(), others_fused.begin(), others_fused.end());
   for (const auto& [key, note] : other.notes) body.notes.try_emplace(key, note);
+  set_fused_points(body, fused);
 }
 
 }  // namespace flexel

@@ -14,6 +14,7 @@
 #include "simulate/matter/interface_points.h"
 #include "simulate/matter/masses.h"
 #include "simulate/matter/surface_points.h"
+#include "simulate/models/rest_shape.h"
 
 namespace flexel::simulate {
 namespace {
@@ -112,13 +113,15 @@ std::optional<Drag> Drag::make(const Parameters& parameters, const Problem& prob
   made.density_ = *parameters.density;
   made.coefficient_ = parameters.coefficient;
   const std::vector<double> mass = lumped_masses(problem);
+  const std::vector<double> factor = element_factors(problem.body, "radius_change");
   for (std::size_t p = 0; p < problem.body.parts.size(); ++p) {
     const Part& part = problem.body.parts[p];
     made.kinds_.push_back(cell_kind(part.lattice, problem.materials[p]));
     if (part.placement == Placement::corner) continue;
-    const double radius = 0.5 * part.lattice.spacing.mean();
-    for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
+    for (std::uint32_t e = part.element_begin; e < part.element_end; ++e) {
+      const double radius = 0.5 * part.lattice.spacing.mean() * (factor.empty() ? 1 : factor[e]);
       made.balls_.push_back({e, std::numbers::pi * radius * radius, mass[e]});
+    }
   }
   made.faces_ = faces(problem);
   uncover(problem, made.faces_);

@@ -27,6 +27,8 @@
 
 namespace flexel::simulate {
 
+class PaperModel;
+
 // Where the energy that an effect's forces give or take is entered: nowhere, for it adds no forces; as
 // potential energy (its energy() is that); as potential energy that is the work of its forces step by step
 // (energy() follows that to second order in the step; what differs when it is 0 again is entered as
@@ -94,6 +96,8 @@ class Effect {
   virtual void check_kernel(const KernelEffects&) const {}
   // What the scene gives every element at the beginning of the run; all effects add theirs before any start().
   virtual void add_initial_state(State&) {}
+  // The connections of centre-placed parts, and tau [s] (parts) of their damping; before any step.
+  virtual void attach(const PaperModel&, const std::vector<double>& /*damping*/) {}
   // Changes the state before the first step.
   virtual void start(State&) {}
   // At the beginning of every segment, after start(), and when velocities were changed from outside.

@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "simulate/effects/part_entries.h"
+#include "simulate/models/connections.h"
 
 namespace flexel::simulate {
 
@@ -34,18 +35,11 @@ std::optional<Fracture> Fracture::make(const Parameters& parameters, const Probl
       const Material& material = problem.materials[p];
       const double strength = entry.strength.value_or(material.strength);
       const double elongation = entry.elongation.value_or(material.elongation);
-      const bool can_break = model_of(problem, p) != Model::paper;
-      if (entry.part && !can_break)
-        throw InputError(
-            entry.origin,
-            fmt::format("part \"{}\" cannot break: fracture is for models \"cells\" and \"springs\"",
-                        *entry.part));
       if (entry.part && !(strength > 0) && !(elongation > 0))
         throw InputError(entry.origin,
                          fmt::format("part \"{}\": {} has neither strength nor elongation: write strength = "
                                      "\"40 MPa\" here or in [materials.NAME]",
                                      *entry.part, material.name));
-      if (!can_break) continue;
       if ((strength > 0 || elongation > 0) && material.law != LawName::neo_hooke)
         throw InputError(
             entry.origin,
@@ -54,8 +48,11 @@ std::optional<Fracture> Fracture::make(const Parameters& parameters, const Probl
                         problem.body.parts[p].name, material.name, law_name(material.law)));
       made.limits_[p] = {};
       made.needs_flow_[p] = false;
-      if (model_of(problem, p) == Model::springs) {  // t = l (1 + elongation)
-        if (strength > 0) made.limits_[p].elongation = strength / material.young;
+      const Model model = model_of(problem, p);
+      if (model == Model::springs || model == Model::paper) {  // t = l (1 + elongation)
+        // the strain of a connection at that stress, along the lattice
+        const double stiffer = model == Model::paper ? axial_stiffness(hooke_of(problem, p)) : 1;
+        if (strength > 0) made.limits_[p].elongation = strength / (stiffer * material.young);
         if (elongation > 0) made.limits_[p].elongation = elongation;
         continue;
       }
@@ -65,9 +62,8 @@ std::optional<Fracture> Fracture::make(const Parameters& parameters, const Probl
     }
   for (const FractureLimits& limits : made.limits_)
     if (limits.any()) return made;
-  throw InputError(
-      made.origin_,
-      "no part can break: write strength = \"40 MPa\" here or in [materials.NAME] (model \"paper\" cannot)");
+  throw InputError(made.origin_,
+                   "no part can break: write strength = \"40 MPa\" here or in [materials.NAME]");
 }
 
 std::string Fracture::why() const {

@@ -12,6 +12,10 @@ namespace flexel::simulate {
   return problem.models.empty() ? Model::cells : problem.models[part];
 }
 
+[[nodiscard]] inline HookeConstant hooke_of(const Problem& problem, std::size_t part) {
+  return part < problem.hooke.size() ? problem.hooke[part] : HookeConstant::paper;
+}
+
 // The parts that `entry`, with `part` and `origin`, is for. Throws InputError: the body has none of that
 // name.
 template <class Entry>

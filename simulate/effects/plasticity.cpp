@@ -31,12 +31,6 @@ std::optional<Plasticity> Plasticity::make(const Parameters& parameters, const P
     for (const std::size_t p : parts_of(entry, problem)) {
       const Material& material = problem.materials[p];
       const double yield = entry.yield.value_or(material.yield);
-      const bool can_flow = model_of(problem, p) != Model::paper;
-      if (entry.part && !can_flow)
-        throw InputError(
-            entry.origin,
-            fmt::format("part \"{}\" cannot flow: plasticity is for models \"cells\" and \"springs\"",
-                        *entry.part));
       if (entry.part && !(yield > 0))
         throw InputError(entry.origin, fmt::format("part \"{}\": {} has no yield stress: write yield = \"250 "
                                                    "MPa\" here or in [materials.NAME]",
@@ -47,13 +41,12 @@ std::optional<Plasticity> Plasticity::make(const Parameters& parameters, const P
             fmt::format("part \"{}\" cannot flow: plasticity is for law \"neo-hooke\", and {} has \"{}\"; "
                         "leave its \"yield\" out, or name another part",
                         problem.body.parts[p].name, material.name, law_name(material.law)));
-      if (can_flow && yield > 0) made.flow_[p] = {yield, entry.hardening.value_or(material.hardening)};
+      if (yield > 0) made.flow_[p] = {yield, entry.hardening.value_or(material.hardening)};
     }
   for (const PlasticFlow& flow : made.flow_)
     if (std::isfinite(flow.yield)) return made;
-  throw InputError(
-      parameters.entries[0].origin,
-      "no part can flow: write yield = \"250 MPa\" here or in [materials.NAME] (model \"paper\" cannot)");
+  throw InputError(parameters.entries[0].origin,
+                   "no part can flow: write yield = \"250 MPa\" here or in [materials.NAME]");
 }
 
 std::string Plasticity::why() const {

@@ -15,6 +15,7 @@
 #include "base/error.h"
 #include "formats/lattice/body_moments.h"
 #include "formats/lattice/cell_moments.h"
+#include "formats/lattice/fused_points.h"
 #include "formats/lattice/quadratic_field.h"
 #include "simulate/estimate/coarse_grid.h"
 #include "simulate/estimate/coarse_moments.h"
@@ -261,6 +262,7 @@ void refuse(const Body& body) {
     for (const auto& [name, column] : *columns)
       if (!is_stress_column(name) && name != "velocity" && name != kQuadraticColumn)
         throw InputError(fmt::format("the body remembers an earlier run (\"{}\")", name));
+  if (body.notes.contains(kFusedNote)) throw InputError("an earlier run fused points of the body");
   for (const Part& part : body.parts) {
     if (part.placement == Placement::centre)
       throw InputError(fmt::format("part \"{}\" has its elements at the voxels' centres", part.name));

@@ -64,6 +64,11 @@ std::string Add::apply(EventContext& context) const {
   level(other.cell_columns, other.cell_count(), context.body.cell_columns);
   level(context.body.cell_columns, context.body.cell_count(), other.cell_columns);
   const std::size_t parts = other.parts.size();
+  for (FusedPoint& point : fused_points(other)) {
+    for (std::uint32_t& e : point.elements) e += static_cast<std::uint32_t>(context.body.element_count());
+    context.fused.push_back(std::move(point));
+  }
+  other.notes.erase(kFusedNote);
   append(context.body, std::move(other));
   context.state.displacement.insert(context.state.displacement.end(), state.displacement.begin(),
                                     state.displacement.end());

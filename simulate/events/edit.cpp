@@ -3,6 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <tuple>
+
+#include "base/error.h"
+#include "base/files/append_text.h"
 #include "formats/part/column.h"
 
 namespace flexel::simulate {
@@ -46,11 +50,17 @@ Edit Edit::parse(TableReader& reader) {
   made.stiffness_ = factor(reader, "stiffness");
   made.damping_ = factor(reader, "damping");
   made.density_ = factor(reader, "density");
+  made.strength_ = factor(reader, "strength");
+  made.yield_ = factor(reader, "yield");
+  made.friction_ = factor(reader, "friction");
+  made.radius_ = factor(reader, "radius");
   made.stick_ = reader.quantity("stick", Dimension::pressure).value_or(0);
-  if (made.stiffness_ == 1 && made.damping_ == 1 && made.density_ == 1 && made.stick_ == 0)
+  made.origin_ = reader.place();
+  if (made.stiffness_ == 1 && made.damping_ == 1 && made.density_ == 1 && made.strength_ == 1 &&
+      made.yield_ == 1 && made.friction_ == 1 && made.radius_ == 1 && made.stick_ == 0)
     reader.fail(
-        "edit needs \"stiffness\", \"damping\" or \"density\", factors on what there is, for example "
-        "stiffness = 2, or \"stick\", a traction more");
+        "edit needs \"stiffness\", \"damping\", \"density\", \"strength\", \"yield\", \"friction\" or "
+        "\"radius\", factors on what there is, for example stiffness = 2, or \"stick\", a traction more");
   return made;
 }
 
@@ -61,16 +71,28 @@ std::string Edit::apply(EventContext& context) const {
     if (part.placement == Placement::corner)
       std::fill(elements.begin() + part.element_begin, elements.begin() + part.element_end, 0);
   const bool by_elements = std::find(elements.begin(), elements.end(), 1) != elements.end();
-  for (const auto& [column, by] : {std::pair{"stiffness_change", stiffness_},
-                                   {"damping_change", damping_},
-                                   {"density_change", density_}}) {
+  if (radius_ != 1 && elements != chosen.elements)
+    throw InputError(origin_,
+                     fmt::format("edit: {} has elements without a radius: \"radius\" is that of elements of "
+                                 "model \"paper\"",
+                                 describe(region_)));
+  std::string factors;
+  for (const auto& [called, column, by] : {std::tuple{"stiffness", "stiffness_change", stiffness_},
+                                           {"damping", "damping_change", damping_},
+                                           {"density", "density_change", density_},
+                                           {"strength", "strength_change", strength_},
+                                           {"yield", "yield_change", yield_}}) {
     multiply(context.body.cell_columns, column, chosen.cells, by);
     if (by_elements) multiply(context.body.element_columns, column, elements, by);
+    if (by != 1) append_text(factors, ", {} times {}", called, by);
   }
+  multiply(context.body.element_columns, "friction_change", chosen.elements, friction_);
+  multiply(context.body.element_columns, "radius_change", elements, radius_);
+  if (friction_ != 1) append_text(factors, ", friction times {}", friction_);
+  if (radius_ != 1) append_text(factors, ", radius times {}", radius_);
   add_stick(context.body, chosen.elements, stick_);
-  return fmt::format("{}: stiffness times {}, damping times {}, density times {}{}", describe(region_),
-                     stiffness_, damping_, density_,
-                     stick_ != 0 ? fmt::format(", sticks with {} Pa more", stick_) : "");
+  if (stick_ != 0) append_text(factors, ", sticks with {} Pa more", stick_);
+  return describe(region_) + ":" + factors.substr(1);
 }
 
 }  // namespace flexel::simulate

@@ -1,6 +1,7 @@
-// edit: what cells and elements are made of changes, by factors on stiffness (and with it damping, strength
-// and yield stress), on the time of the damping and on mass, and by a traction more or less that their
-// surface sticks with. Velocities stay. docs/reference/events.md
+// edit: what cells and elements are made of changes (Jansson and Vergeest, sections 3.2 and 6.1.1: k, b, m, t, mu, r),
+// by factors on stiffness (and with it damping, strength and yield stress), on the time of the damping, mass, strength,
+// yield stress, friction and the radius of elements of model `paper`, and by a traction more or less that their surface
+// sticks with. Velocities stay. docs/reference/events.md
 #pragma once
 #include "simulate/events/event.h"
 
@@ -14,8 +15,10 @@ class Edit {
 
  private:
   EventRegion region_;
-  double stiffness_ = 1, damping_ = 1, density_ = 1;  // factors
-  double stick_ = 0;                                  // Pa, more
+  double stiffness_ = 1, damping_ = 1, density_ = 1, strength_ = 1, yield_ = 1, friction_ = 1,
+         radius_ = 1;  // factors
+  std::string origin_;
+  double stick_ = 0;  // Pa, more
 };
 
 }  // namespace flexel::simulate

@@ -15,18 +15,12 @@
 #include <vector>
 
 #include "base/program/progress.h"
+#include "formats/lattice/fused_points.h"
 #include "simulate/input/scene_selection.h"
 #include "simulate/input/scene_table.h"
 #include "simulate/state/state.h"
 
 namespace flexel::simulate {
-
-// A point of one part and a point of another that are held together: sum of weights x positions = 0.
-struct FusedPoint {
-  std::vector<std::uint32_t> elements;
-  std::vector<double> weights;  // sum 0
-  double stiffness = 0;         // N/m
-};
 
 // What an event acts on; all of it agrees when it begins and when it ends.
 struct EventContext {

@@ -5,13 +5,16 @@
 #include <fmt/format.h>
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 #include <unordered_map>
 
 #include "base/error.h"
 #include "base/units.h"
 #include "simulate/models/cells.h"
+#include "simulate/models/central_spring.h"
 #include "simulate/models/set_rest_shape.h"
 
 namespace flexel::simulate {
@@ -107,6 +110,50 @@ double stiffness_between(const Problem& problem, std::uint32_t a, std::uint32_t 
   return std::min(of(a), of(b));
 }
 
+// Elements at the centres of voxels: a connection for every two of different parts that are near, its length what it is
+// now, k = E l with the mean of both E (Jansson and Vergeest, section 3.2 and equation 22).
+std::size_t connect_elements(EventContext& context, const Chosen& chosen, const std::vector<Vec3>& now,
+                             double within) {
+  const Body& body = context.body;
+  std::vector<std::pair<Bucket, std::uint32_t>> sorted;  // by cubes of the distance
+  const auto bucket = [&](const Vec3& at) {
+    return Bucket{std::llround(std::floor(at.x() / within)), std::llround(std::floor(at.y() / within)),
+                  std::llround(std::floor(at.z() / within))};
+  };
+  for (const Part& part : body.parts)
+    for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
+      if (part.placement == Placement::centre && chosen.elements[e]) sorted.emplace_back(bucket(now[e]), e);
+  std::sort(sorted.begin(), sorted.end());
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
+  const std::vector<std::uint32_t> part = element_parts(body);
+  for (const auto& [home, a] : sorted)
+    for (std::int64_t n = 0; n < 27; ++n) {
+      const Bucket at{home[0] + n % 3 - 1, home[1] + n / 3 % 3 - 1, home[2] + n / 9 - 1};
+      for (auto other = std::lower_bound(sorted.begin(), sorted.end(), std::pair{at, 0u});
+           other != sorted.end() && other->first == at; ++other)
+        if (const std::uint32_t b = other->second;
+            a < b && part[a] != part[b] && (now[b] - now[a]).norm() <= within)
+          pairs.emplace_back(a, b);
+    }
+  std::sort(pairs.begin(), pairs.end());
+  for (const auto& [a, b] : pairs) {
+    const double length = (now[b] - now[a]).norm();
+    const auto& materials = context.problem.materials;
+    const double young = 0.5 * (materials[part[a]].young + materials[part[b]].young);
+    if (length > 0) context.fused.push_back({{a, b}, {1, -1}, young * length, length});
+  }
+  return pairs.size();
+}
+
+// What was fused before is not fused again.
+void drop_repeated(std::vector<FusedPoint>& fused, std::size_t before) {
+  std::set<std::vector<std::uint32_t>> known;
+  for (std::size_t i = 0; i < before; ++i) known.insert(fused[i].elements);
+  fused.erase(std::remove_if(fused.begin() + static_cast<std::ptrdiff_t>(before), fused.end(),
+                             [&](const FusedPoint& point) { return known.contains(point.elements); }),
+              fused.end());
+}
+
 std::size_t fuse_parts(EventContext& context, const Chosen& chosen, const std::vector<Vec3>& now,
                        double within) {
   const Body& body = context.body;
@@ -121,7 +168,9 @@ std::size_t fuse_parts(EventContext& context, const Chosen& chosen, const std::v
       for (const std::uint32_t e : body.cell_elements[c]) ++cells_at[e];
   const std::size_t before = context.fused.size();
   for (std::uint32_t e = 0; e < body.element_count(); ++e) {
-    if (!chosen.elements[e] || cells_at[e] == 0 || cells_at[e] == 8) continue;  // inner ones touch nothing
+    const bool is_centre = body.parts[part_of[e]].placement == Placement::centre;
+    // inner ones touch nothing
+    if (!chosen.elements[e] || (!is_centre && cells_at[e] == 0) || cells_at[e] == 8) continue;
     double nearest = within;
     std::optional<FusedPoint> best;
     grid.near(now[e], [&](std::uint32_t c) {
@@ -142,7 +191,9 @@ std::size_t fuse_parts(EventContext& context, const Chosen& chosen, const std::v
     });
     if (best) context.fused.push_back(std::move(*best));
   }
-  return context.fused.size() - before;
+  const std::size_t found = context.fused.size() - before + connect_elements(context, chosen, now, within);
+  drop_repeated(context.fused, before);
+  return found;
 }
 
 // Whether a broken cell has its shape back: every edge within `within` of its length at rest, not inside out.
@@ -207,9 +258,11 @@ std::string Fuse::apply(EventContext& context) const {
   const std::size_t points = fuse_parts(context, chosen, now, within_);
   const std::size_t cells = heal(context, chosen, now, within_);
   if (points + cells == 0)
-    throw InputError(origin_, fmt::format("fuse: in {} nothing of one part is within {} of another, and no "
-                                          "broken cell is nearly whole",
-                                          describe(region_), human_length(within_)));
+    throw InputError(
+        origin_,
+        fmt::format("fuse: in {} nothing of one part is within {} of another (at centre placement from "
+                    "element to element), and no broken cell is nearly whole",
+                    describe(region_), human_length(within_)));
   return fmt::format("{} points of parts fused, {} broken cells whole again", points, cells);
 }
 
@@ -226,16 +279,45 @@ Vec3 FusedPoints::gap(const FusedPoint& point, const State& state) const {
 
 double FusedPoints::energy(const State& state) {
   double energy = 0;
-  for (const FusedPoint& point : points_) energy += 0.5 * point.stiffness * gap(point, state).squaredNorm();
+  for (const FusedPoint& point : points_) {
+    const double off = gap(point, state).norm() - point.length;
+    energy += 0.5 * point.stiffness * off * off;
+  }
   return energy;
 }
 
 void FusedPoints::add_forces(const State& state, std::vector<Vec3>& forces) {
   for (const FusedPoint& point : points_) {
-    const Vec3 pull = -point.stiffness * gap(point, state);
+    const Vec3 apart = gap(point, state);
+    Vec3 pull = -point.stiffness * apart;
+    if (point.length > 0) pull *= 1 - point.length / apart.norm();
     for (std::size_t i = 0; i < point.elements.size(); ++i)
       forces[point.elements[i]] += point.weights[i] * pull;
   }
+}
+
+void FusedPoints::add_stiffness(const State& state, BlockMatrix& matrix) {
+  for (const FusedPoint& point : points_) {
+    Block block = point.stiffness * Block::Identity();
+    if (point.length > 0) {
+      const Vec3 apart = gap(point, state);
+      const double length = apart.norm();
+      block = spring_tangent(point.stiffness, {apart / length, length, length - point.length}, true);
+    }
+    for (std::size_t i = 0; i < point.elements.size(); ++i)
+      for (std::size_t j = 0; j < point.elements.size(); ++j)
+        matrix.values[position_of(matrix, point.elements[i], point.elements[j])] +=
+            point.weights[i] * point.weights[j] * block;
+  }
+}
+
+std::vector<CoupledElements> FusedPoints::couples() const {
+  std::vector<CoupledElements> groups;
+  for (const FusedPoint& point : points_) {
+    groups.push_back(point.elements);
+    std::sort(groups.back().begin(), groups.back().end());
+  }
+  return groups;
 }
 
 // Gershgorin on the rows of k w w^T.

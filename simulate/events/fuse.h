@@ -19,9 +19,10 @@ class Fuse {
   std::string origin_;
 };
 
-// The points that were fused so far, as an effect. With the present positions x and weights w of a point, the
-// energy is 1/2 k |sum_i w_i x_i|^2: no force at the moment of fusing, none by any rigid motion of all, and
-// neither momentum nor angular momentum, for the weights sum to 0.
+// The points that were fused so far, as an effect. With the present positions x and weights w of a point, and its
+// length l at the moment of fusing, the energy is 1/2 k (|sum_i w_i x_i| - l)^2: no force at that moment, none by any
+// rigid motion of all, and neither momentum nor angular momentum, for the weights sum to 0. Between elements of model
+// `paper` that is a connection (Jansson and Vergeest, section 3.2).
 class FusedPoints : public Effect {
  public:
   static constexpr const char* name = "fused";
@@ -32,6 +33,9 @@ class FusedPoints : public Effect {
   [[nodiscard]] bool needs_mass() const override { return true; }
   [[nodiscard]] double energy(const State& state) override;
   void add_forces(const State& state, std::vector<Vec3>& forces) override;
+  [[nodiscard]] bool adds_stiffness() const override { return true; }
+  void add_stiffness(const State& state, BlockMatrix& matrix) override;
+  [[nodiscard]] std::vector<CoupledElements> couples() const override;
   [[nodiscard]] double added_frequency(const State&, const std::vector<double>& mass) override;
 
  private:

@@ -53,14 +53,20 @@ step::CellConstants constants_of(const Part& part, const Material& material, dou
   return c;
 }
 
-// Cells of a part that resist, in the body's order, by the factor that edits made of their damping.
-std::map<double, std::vector<std::uint32_t>> cells_by_damping(const Body& body, const Part& part,
-                                                              const std::vector<std::uint8_t>& active,
-                                                              double damping) {
-  const std::vector<double> factor = damping > 0 ? damping_factors(body) : std::vector<double>();
-  std::map<double, std::vector<std::uint32_t>> cells;
-  for (std::uint32_t c = part.cell_begin; c < part.cell_end; ++c)
-    if (active[c]) cells[factor.empty() ? 1 : factor[c]].push_back(c);
+// Cells of a part that resist, in the body's order, by what edits made of them, as far as `plan` has it.
+std::map<CellFactors, std::vector<std::uint32_t>> cells_by_factors(const Body& body, std::uint32_t part,
+                                                                   const std::vector<std::uint8_t>& active,
+                                                                   const KernelEffects& plan) {
+  using Factors = std::vector<double>;
+  const bool breaks = !plan.fracture.empty() && plan.fracture[part].any();
+  const bool flows = !plan.plasticity.empty() && std::isfinite(plan.plasticity[part].yield);
+  const Factors damping = plan.damping[part] > 0 ? damping_factors(body) : Factors();
+  const Factors strength = breaks ? cell_factors(body, "strength_change") : Factors();
+  const Factors yield = flows ? cell_factors(body, "yield_change") : Factors();
+  const auto of = [](const Factors& factors, std::uint32_t c) { return factors.empty() ? 1 : factors[c]; };
+  std::map<CellFactors, std::vector<std::uint32_t>> cells;
+  for (std::uint32_t c = body.parts[part].cell_begin; c < body.parts[part].cell_end; ++c)
+    if (active[c]) cells[{of(damping, c), of(strength, c), of(yield, c)}].push_back(c);
   return cells;
 }
 
@@ -310,9 +316,11 @@ StepLayout step_layout(const Problem& problem, const KernelEffects& plan) {
   LayoutBuilder builder(problem, plan.remembers(), layout);
   for (std::uint32_t p = 0; p < body.parts.size(); ++p) {
     const bool by_connection = steps_by_connection(problem, plan, p);
-    for (const auto& [factor, cells] : cells_by_damping(body, body.parts[p], active, plan.damping[p])) {
-      layout.constants.push_back(constants_of(body.parts[p], problem.materials[p], factor * plan.damping[p]));
+    for (const auto& [factors, cells] : cells_by_factors(body, p, active, plan)) {
+      layout.constants.push_back(
+          constants_of(body.parts[p], problem.materials[p], factors.damping * plan.damping[p]));
       layout.kind_part.push_back(p);
+      layout.kind_factors.push_back(factors);
       const TiledCells tiled = tiled_cells(body, cells, by_connection ? kConnectionTile : kTile);
       for (std::size_t t = 0; t + 1 < tiled.tile_begin.size();) {
         const std::size_t begin = tiled.tile_begin[t];

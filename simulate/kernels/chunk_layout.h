@@ -14,6 +14,12 @@
 
 namespace flexel::simulate {
 
+// What edits made of the damping, strength and yield stress of a cell.
+struct CellFactors {
+  double damping = 1, strength = 1, yield = 1;
+  auto operator<=>(const CellFactors&) const = default;
+};
+
 struct StepLayout {
   static constexpr std::size_t kChunkCells = 2048;
 
@@ -38,9 +44,10 @@ struct StepLayout {
   std::vector<double> cell_fill;
   std::vector<std::uint32_t> elements;       // by chunk, ascending
   std::vector<std::uint16_t> owned, shared;  // by chunk, numbers within it
-  // (kinds) cells of a part with one damping time: as many a part as edits made different
+  // (kinds) cells of a part with one damping time and one strength: as many a part as edits made different
   std::vector<step::CellConstants> constants;
   std::vector<std::uint32_t> kind_part;
+  std::vector<CellFactors> kind_factors;
 
   // Elements of several chunks, ascending, and the slots of their forces (compressed rows, ascending).
   std::vector<std::uint32_t> shared_elements;

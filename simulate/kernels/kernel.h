@@ -52,7 +52,7 @@ struct CellConstants {
   double damping;                 // s; 0 in the variants without damping
   double yield, hardening;        // Pa, J2 yield stress and its isotropic, linear hardening
   double strength, elongation;    // Pa, plastic strain: what breaks a cell; infinity: nothing
-                                  // (springs: yield, hardening, elongation are strains of a spring)
+                                  // (springs: elongation is the strain of a spring)
   double axes[9];                 // column-major rotation from the lattice to the world frame
   bool aligned;                   // axes is the identity
   Law law;                        // lattice frame

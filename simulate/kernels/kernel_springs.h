@@ -5,8 +5,11 @@
 // 2). Each cell that holds a share of it sees the same length and decides the same. A cell whose springs
 // leave its elements in two or more pieces breaks as a whole.
 //
-// Plasticity: a spring's rest length follows it where its stretch e = d - l - p passes l (`yield` +
-// `hardening` a), both here in strain, a the sum of |dp| / l.
+// Plasticity: a cell has the Kirchhoff stress of its springs, tau = 1/V sum k e d n (x) n, e = d - l - p the stretch, n
+// the direction. Its deviator s is kept within |s| <= sqrt(2/3) (yield + hardening a), a the equivalent plastic strain,
+// by a flow g N, N = s / |s|, that the rest lengths follow: dp = g l n N n. What a spring is stretched beside the mean of
+// those parallel to it, as in bending, is kept within max(3/2 (1 - m^2), 1/20) of yield / E, m the share of the yield stress
+// that the mean stress takes (simulate/kernels/kernel_plastic.h has the same for cells).
 #pragma once
 #include "simulate/kernels/kernel_plastic.h"
 
@@ -92,20 +95,127 @@ FLEXEL_INLINE LaneBits break_springs(const Corners& u, const CellConstants& k, C
   return before;
 }
 
-// Stretch that a spring resists; flows where it is too large.
-FLEXEL_INLINE Lanes flow(Lanes stretch, double rest, double stiffness, const CellConstants& k,
-                         const Lanes& fill, double* flowed, double* strain, Sums& sums) {
-  stretch -= load(flowed);
-  const Lanes plastic = load(strain), size = stretch > 0 ? stretch : -stretch;
-  const Lanes bound = rest * (k.yield + k.hardening * plastic);
+// What the springs of a block's cells are like: stretch less what flowed [m], unit direction, length [m], stiffness
+// without fill [N/m], 0 of broken ones.
+struct SpringSet {
+  Lanes stretch[28], unit[28][3], length[28], stiffness[28];
+  double rest[28];
+};
+
+FLEXEL_INLINE void read_springs(const Corners& u, const CellConstants& k, const LaneBits& gone,
+                                const SpringFlow& memory, SpringSet& springs) {
+#pragma GCC unroll 1
+  for (int n = 0; n < 28; ++n) {
+    const SpringLanes s = spring_of(u, kEnds.a[n], kEnds.b[n], k);
+    Lanes square = {};
+    for (int c = 0; c < 3; ++c) square += s.d[c] * s.d[c];
+    springs.length[n] = square_root(square);
+    springs.rest[n] = __builtin_sqrt(s.rest_square);
+    springs.stretch[n] = s.off / (springs.length[n] + springs.rest[n]) - load(memory.flowed[n]);
+    springs.stiffness[n] = (gone >> n & 1) != 0 ? Lanes{} : Lanes{} + k.spring[s.kind];
+    for (int c = 0; c < 3; ++c) springs.unit[n][c] = s.d[c] / springs.length[n];
+  }
+}
+
+// n T n; T: xx, yy, zz, xy, yz, zx.
+FLEXEL_INLINE Lanes along(const Lanes* n, const Lanes* tensor) {
+  return n[0] * n[0] * tensor[0] + n[1] * n[1] * tensor[1] + n[2] * n[2] * tensor[2] +
+         2 * (n[0] * n[1] * tensor[3] + n[1] * n[2] * tensor[4] + n[2] * n[0] * tensor[5]);
+}
+
+FLEXEL_INLINE Lanes smaller(const Lanes& a, const Lanes& b) {
+  return a < b ? a : b;
+}
+
+// Springs of a cell that are parallel: a direction each of the half-neighbourhood, and how many it has.
+struct SpringFamilies {
+  int of[28], size[13];
+};
+constexpr SpringFamilies kFamilies = [] {
+  SpringFamilies families{};
+  int known[13] = {}, count = 0;
+  for (int n = 0; n < 28; ++n) {
+    int direction = 0;
+    for (int c = 2; c >= 0; --c) direction = 3 * direction + (kEnds.b[n] >> c & 1) - (kEnds.a[n] >> c & 1);
+    int family = 0;
+    while (family < count && known[family] != direction) ++family;
+    if (family == count) known[count++] = direction;
+    families.of[n] = family;
+    ++families.size[family];
+  }
+  return families;
+}();
+
+// Leads the rest lengths by the flow `flowed` along `normal` (0: none), and those of springs that are stretched too
+// much beside the mean of their family, where all springs are left (`whole`), so that the mean stays. `share`: of the
+// yield stress that the mean stress takes; `strain`: yield / E.
+FLEXEL_INLINE void move(const SpringSet& springs, const Lanes* normal, const Lanes& flowed,
+                        const Lanes& share, const Lanes& strain, const LaneMask& whole, const Lanes& fill,
+                        SpringFlow& memory, Sums& sums) {
+  const Lanes left = 1.5 * (1 - share * share);
+  const Lanes most = (left < 0.05 ? Lanes{} + 0.05 : left) * strain;
+  Lanes moved[28], mean[13] = {}, excess[13] = {};
+#pragma GCC unroll 1
+  for (int n = 0; n < 28; ++n) mean[kFamilies.of[n]] += springs.stretch[n] / kFamilies.size[kFamilies.of[n]];
+#pragma GCC unroll 1
+  for (int n = 0; n < 28; ++n) {
+    const int family = kFamilies.of[n];
+    const Lanes beside = springs.stretch[n] - mean[family], bound = springs.rest[n] * most;
+    const Lanes over = beside > bound ? beside - bound : beside < -bound ? beside + bound : Lanes{};
+    moved[n] = whole ? over : Lanes{};
+    excess[family] += moved[n] / kFamilies.size[family];
+  }
+#pragma GCC unroll 1
+  for (int n = 0; n < 28; ++n) {
+    const Lanes by_flow = springs.rest[n] * flowed * along(springs.unit[n], normal);
+    moved[n] = fill > 0 ? moved[n] + by_flow - excess[kFamilies.of[n]] : Lanes{};
+    store(memory.flowed[n], load(memory.flowed[n]) + moved[n]);
+    sums.plastic_work +=
+        fill > 0 ? springs.stiffness[n] * fill * moved[n] * (springs.stretch[n] - moved[n]) : Lanes{};
+  }
+}
+
+// Lets the cells flow whose mean stress, or whose springs beside it, pass the yield stress.
+FLEXEL_INLINE void flow(const Corners& u, const CellConstants& k, const Lanes& fill, const LaneBits& gone,
+                        SpringFlow& memory, Sums& sums) {
+  constexpr double kRoot = 0.81649658092772603;  // of 2/3
+  const double volume = k.spacing[0] * k.spacing[1] * k.spacing[2];
+  const double young = (4 * k.spring[0] + 2 * k.spring[1]) / (0.8 * k.spacing[0]);
+  SpringSet springs;
+  read_springs(u, k, gone, memory, springs);
+  Lanes stress[6] = {};
+#pragma GCC unroll 1
+  for (int n = 0; n < 28; ++n) {
+    const Lanes pull = springs.stiffness[n] * springs.stretch[n] * springs.length[n] / volume;
+    for (int c = 0; c < 3; ++c) {
+      stress[c] += pull * springs.unit[n][c] * springs.unit[n][c];
+      stress[3 + c] += pull * springs.unit[n][c] * springs.unit[n][(c + 1) % 3];
+    }
+  }
+  const Lanes mean = (stress[0] + stress[1] + stress[2]) / 3;
+  Lanes deviator[6], square = {};
+  for (int c = 0; c < 6; ++c) {
+    deviator[c] = c < 3 ? stress[c] - mean : stress[c];
+    square += (c < 3 ? 1 : 2) * deviator[c] * deviator[c];
+  }
+  const Lanes size = square_root(square), strain = load(memory.strain[0]);
+  const Lanes bound = kRoot * (k.yield + k.hardening * strain);
   const LaneMask yields = (size > bound) & (fill > 0);
-  if (!any(yields)) return stretch;
-  const Lanes moved = yields ? (size - bound) / (1 + k.hardening) : Lanes{};
-  const Lanes signed_move = stretch > 0 ? moved : -moved;
-  store(flowed, load(flowed) + signed_move);
-  store(strain, plastic + moved / rest);
-  sums.plastic_work += stiffness * fill * moved * (bound + 0.5 * k.hardening * moved);
-  return stretch - signed_move;
+  Lanes flowed = {};
+  for (int c = 0; c < 6; ++c) deviator[c] = yields ? deviator[c] / size : Lanes{};
+  if (any(yields)) {
+    Lanes softening = {};
+#pragma GCC unroll 1
+    for (int n = 0; n < 28; ++n) {
+      const Lanes part = along(springs.unit[n], deviator);
+      softening += springs.stiffness[n] * springs.length[n] * springs.rest[n] * part * part / volume;
+    }
+    flowed = yields ? (size - bound) / (softening + 2 * k.hardening / 3) : Lanes{};
+    const Lanes now = strain + kRoot * flowed;
+    for (int n = 0; n < 28; ++n) store(memory.strain[n], now);
+  }
+  move(springs, deviator, flowed, smaller(size / bound, Lanes{} + 1), bound / (kRoot * young),
+       (gone == 0) & (fill > 0), fill, memory, sums);
 }
 
 struct SpringsModel {
@@ -126,6 +236,8 @@ struct SpringsModel {
       before = break_springs(u, k, block, chunk.springs[number], sums);
       broken = load_bits(chunk.springs[number].broken);
     }
+    if constexpr (has.plasticity)
+      if (k.yield < __builtin_huge_val()) flow(u, k, fill, before, chunk.spring_flow[number], sums);
     const auto add_spring = [&](int a, int b, [[maybe_unused]] int spring) __attribute__((always_inline)) {
       const SpringLanes s = spring_of(u, a, b, k);
       Lanes square = {};
@@ -138,10 +250,7 @@ struct SpringsModel {
       Lanes stretch = s.off / (length + rest_length);
       if constexpr (has.plasticity) {
         SpringFlow& memory = chunk.spring_flow[number];
-        Lanes resists = fill;
-        if constexpr (has.fracture) resists = (before >> spring & 1) != 0 ? Lanes{} : fill;
-        stretch = flow(stretch, rest_length, k.spring[s.kind], k, resists, memory.flowed[spring],
-                       memory.strain[spring], sums);
+        stretch -= load(memory.flowed[spring]);
         pull = stiffness * stretch / length;
       } else if constexpr (damping == Damping::none) {
         pull = stiffness * s.off / (length * (length + rest_length));

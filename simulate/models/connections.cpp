@@ -12,7 +12,10 @@ namespace {
 
 // k in units of E h, for a direction along 1 (face), 2 (edge) or 3 (corner) axes.
 double relative_stiffness(HookeConstant hooke, int axes) {
+  constexpr double kCorner = 0.1;  // t of model `springs`
   if (hooke == HookeConstant::paper) return std::sqrt(static_cast<double>(axes));
+  if (hooke == HookeConstant::isotropic)
+    return axes == 1 ? 0.4 + 4 * kCorner / 3 : axes == 2 ? 0.4 - 4 * kCorner / 3 : kCorner;
   return axes == 1 ? 1.0 : axes == 2 ? 1.0 / 6 : 1.0 / 12;
 }
 
@@ -40,10 +43,14 @@ ConnectionKinds connection_kinds(const Lattice& lattice, const Material& materia
   return kinds;
 }
 
-double axial_stiffness(HookeConstant hooke) {
+LatticeConstants lattice_constants(HookeConstant hooke) {
   const double k1 = relative_stiffness(hooke, 1), k2 = relative_stiffness(hooke, 2),
                k3 = relative_stiffness(hooke, 3);
-  const double c11 = k1 + 2 * k2 + 4 * k3 / 3, c12 = k2 + 4 * k3 / 3;
+  return {k1 + 2 * k2 + 4 * k3 / 3, k2 + 4 * k3 / 3};
+}
+
+double axial_stiffness(HookeConstant hooke) {
+  const auto [c11, c12] = lattice_constants(hooke);
   return c11 - 2 * c12 * c12 / (c11 + c12);
 }
 

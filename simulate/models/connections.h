@@ -6,6 +6,8 @@
 //     ganovelli  k = sum over tetrahedra of E V / l^2 (equation 21; Ganovelli, Cignoni, Montani and Scopigno
 //                2000), each cube of eight elements cut into the six Kuhn tetrahedra about a diagonal and
 //                averaged over its four diagonals: E h, E h / 6, E h / 12
+//     isotropic  those of model `springs` (simulate/models/spring_model.h): every direction has Young's modulus E
+//                and Poisson's ratio 1/4
 // Every connection has the value of the interior, also at the surface.
 #pragma once
 #include <cstdint>
@@ -42,8 +44,13 @@ struct Connections {
 [[nodiscard]] ConnectionKinds connection_kinds(const Lattice& lattice, const Material& material,
                                                HookeConstant hooke);
 
-// Young's modulus along an axis of the lattice, over that of the material: C11 - 2 C12^2 / (C11 + C12) with
-// C11 = (k1 + 2 k2 + 4/3 k3) / h and C12 = (k2 + 4/3 k3) / h.
+// Elastic constants of the endless lattice, over the material's Young's modulus: C11 = (k1 + 2 k2 + 4/3 k3) / h and
+// C12 = C44 = (k2 + 4/3 k3) / h (Cauchy: central forces).
+struct LatticeConstants {
+  double c11 = 0, c12 = 0;
+};
+[[nodiscard]] LatticeConstants lattice_constants(HookeConstant hooke);
+// Young's modulus along an axis of the lattice, over that of the material: C11 - 2 C12^2 / (C11 + C12).
 [[nodiscard]] double axial_stiffness(HookeConstant hooke);
 
 // The connections of the body's centre-placed parts (Body::connections); none of stray elements.

@@ -1,25 +1,16 @@
-// A column that has not one number a row is someone else's.
+// Columns that hold a factor less 1.
 #include "simulate/models/damping_factors.h"
 
+#include "simulate/models/rest_shape.h"
+
 namespace flexel::simulate {
-namespace {
-
-std::vector<double> factors(const Columns& columns) {
-  std::vector<double> result;
-  const auto found = columns.find("damping_change");
-  if (found != columns.end() && found->second.components == 1)
-    for (const double change : found->second.values) result.push_back(1 + change);
-  return result;
-}
-
-}  // namespace
 
 std::vector<double> damping_factors(const Body& body) {
-  return factors(body.cell_columns);
+  return cell_factors(body, "damping_change");
 }
 
 std::vector<double> element_damping_factors(const Body& body) {
-  return factors(body.element_columns);
+  return element_factors(body, "damping_change");
 }
 
 bool edits_damping(const Body& body) {

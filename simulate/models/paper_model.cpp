@@ -36,28 +36,53 @@ struct Least {
   }
 };
 
+// Without those of rigid parts.
+Connections resisting_connections(const Problem& problem) {
+  Connections made = make_connections(problem);
+  if (problem.rigidity.empty()) return made;
+  Connections left;
+  left.parts = made.parts;
+  for (std::size_t p = 0; p < made.parts.size(); ++p) {
+    PartConnections& part = left.parts[p];
+    part.begin = part.end = static_cast<std::uint32_t>(left.size());
+    if (problem.rigidity[p] != Rigidity::none) continue;
+    for (std::uint32_t c = made.parts[p].begin; c < made.parts[p].end; ++c) {
+      left.a.push_back(made.a[c]);
+      left.b.push_back(made.b[c]);
+      left.kind.push_back(made.kind[c]);
+    }
+    part.end = static_cast<std::uint32_t>(left.size());
+  }
+  return left;
+}
+
+bool is_rigid_part(const Problem& problem, std::uint32_t part) {
+  return part < problem.rigidity.size() && problem.rigidity[part] != Rigidity::none;
+}
+
 }  // namespace
 
 PaperModel::PaperModel(const Problem& problem)
     : body_(problem.body),
-      connections_(make_connections(problem)),
+      connections_(resisting_connections(problem)),
       rows_(connection_rows(connections_, problem.body.element_count())),
       part_(element_parts(problem.body)),
       active_(problem.body.element_count(), 0) {
   for (std::size_t e = 0; e < active_.size(); ++e)
-    active_[e] = body_.parts[part_[e]].placement == Placement::centre &&
+    active_[e] = body_.parts[part_[e]].placement == Placement::centre && !is_rigid_part(problem, part_[e]) &&
                  !(e < problem.stray_element.size() && problem.stray_element[e]);
   const std::size_t entries = rows_.entries.size();
   const RestShapes shapes(body_);
   const std::vector<double> factors = stiffness_factors(body_);
-  if (shapes.any()) flowed_.assign(entries, 0);
+  if (shapes.any()) memory_.flowed.assign(entries, 0);
   if (!factors.empty()) factor_.assign(entries, 1);
-  if (flowed_.empty() && factor_.empty()) return;
+  if (memory_.flowed.empty() && factor_.empty()) return;
   for (std::uint32_t e = 0; e < active_.size(); ++e)
     for (std::size_t i = rows_.offsets[e]; i < rows_.offsets[e + 1]; ++i) {
       const ConnectionRows::Entry& entry = rows_.entries[i];
       const std::uint32_t from = entry.sign > 0 ? e : entry.other;
-      if (!flowed_.empty()) flowed_[i] = shapes.of_connection(from, entry.kind - std::size_t{1});
+      if (!memory_.flowed.empty())
+        memory_.flowed[i] = shapes.of_connection(from, entry.kind - std::size_t{1});
       if (!factor_.empty()) factor_[i] = 0.5 * (factors[e] + factors[entry.other]);
     }
 }
@@ -66,11 +91,12 @@ Stretch PaperModel::stretched(const State& state, std::uint32_t element,
                               const ConnectionRows::Entry& entry) const {
   Stretch now = stretch(entry.sign * kind(element, entry.kind).rest,
                         state.displacement[entry.other] - state.displacement[element]);
-  if (!flowed_.empty()) now.elongation -= flowed_[place(entry)];
+  if (!memory_.flowed.empty()) now.elongation -= memory_.flowed[place(entry)];
   return now;
 }
 
 double PaperModel::stiffness(std::uint32_t element, const ConnectionRows::Entry& entry) const {
+  if (is_broken(entry)) return 0;
   const double own = kind(element, entry.kind).stiffness;
   return factor_.empty() ? own : factor_[place(entry)] * own;
 }
@@ -80,6 +106,7 @@ double PaperModel::volume_ratio(const State& state, std::uint32_t element) const
   std::array<int, 3> sides{};
   std::array<double, 3> length{};
   for (const ConnectionRows::Entry& entry : rows_.of(element)) {
+    if (is_broken(entry)) return 1;
     const std::size_t axis = axis_of(entry.kind);
     if (axis == 3) continue;
     const ConnectionKind& connection = kind(element, entry.kind);
@@ -102,7 +129,7 @@ double PaperModel::energy(const State& state) const {
         if (!(volume_ratio(state, element) > 0)) return std::numeric_limits<double>::infinity();
         double energy = 0;
         for (const ConnectionRows::Entry& entry : rows_.of(element)) {
-          if (entry.sign < 0) continue;
+          if (entry.sign < 0 || is_broken(entry)) continue;
           const double elongation = stretched(state, element, entry).elongation;
           energy += 0.5 * stiffness(element, entry) * elongation * elongation;
         }
@@ -117,6 +144,7 @@ void PaperModel::add_forces(const State& state, std::vector<Vec3>& forces) const
       [&](std::size_t e) {
         const auto element = static_cast<std::uint32_t>(e);
         for (const ConnectionRows::Entry& entry : rows_.of(element)) {
+          if (is_broken(entry)) continue;
           const Stretch now = stretched(state, element, entry);
           forces[e] += (stiffness(element, entry) * now.elongation) * now.direction;
         }
@@ -133,6 +161,7 @@ void PaperModel::add_damping(const State& state, const std::vector<double>& damp
         const auto element = static_cast<std::uint32_t>(e);
         if (damping[part_[e]] == 0) return;
         for (const ConnectionRows::Entry& entry : rows_.of(element)) {
+          if (is_broken(entry)) continue;
           const double change = factor.empty() ? 1 : 0.5 * (factor[e] + factor[entry.other]);
           const ConnectionKind& connection = kind(element, entry.kind);
           const Vec3 direction =
@@ -159,6 +188,7 @@ std::vector<double> PaperModel::frequencies(const State& state, const std::vecto
           const auto element = static_cast<std::uint32_t>(part.element_begin + i);
           Mat3 own = Mat3::Zero();
           for (const ConnectionRows::Entry& entry : rows_.of(element)) {
+            if (is_broken(entry)) continue;
             own += spring_tangent(stiffness(element, entry), stretched(state, element, entry), true);
           }
           Eigen::SelfAdjointEigenSolver<Mat3> eigen;

@@ -4,13 +4,23 @@
 // Springs alone would let matter turn inside out and stay so. As a measure of that every element with
 // neighbours along each axis of the lattice has a deformation gradient: by differences between the two
 // neighbours along an axis, or between the one and itself. Its determinant J is the volume now over that at
-// rest; states with J <= 0 are refused.
+// rest; states with J <= 0 are refused. At a crack, where an element has lost a connection, it says nothing.
+//
+// Rigid parts have no connections here: they cost nothing and do not bound the step.
 #pragma once
 #include "simulate/linear/block_matrix.h"
 #include "simulate/models/central_spring.h"
 #include "simulate/models/connections.h"
 
 namespace flexel::simulate {
+
+// What connections have become since the lattice was made; empty arrays where nothing flows or breaks
+// (simulate/paper/connection_yield.h).
+struct ConnectionMemory {
+  std::vector<double> flowed;        // (entries of the rows) m, change of the rest length
+  std::vector<double> strain;        // (elements) equivalent plastic strain
+  std::vector<std::uint8_t> broken;  // (entries of the rows) 1: it resists no more
+};
 
 class PaperModel {
  public:
@@ -41,19 +51,28 @@ class PaperModel {
     std::uint32_t element = 0;
   };
   [[nodiscard]] SmallestVolume smallest_volume(const State& state) const;
-  // J of an element; 1 where it lacks neighbours along an axis.
+  // J of an element; 1 where it lacks neighbours along an axis, or has lost a connection.
   [[nodiscard]] double volume_ratio(const State& state, std::uint32_t element) const;
 
- private:
+  // One connection, as an entry of the row of `element`: its direction in the lattice; as it is now, from its own
+  // rest length (simulate/models/rest_shape.h); its Hooke constant [N/m], 0 of a broken one.
   [[nodiscard]] const ConnectionKind& kind(std::uint32_t element, std::uint8_t which) const {
     return connections_.parts[part_[element]].kinds[which];
   }
-  // A connection as it is now, from its own rest length (simulate/models/rest_shape.h), and its Hooke constant.
   [[nodiscard]] Stretch stretched(const State& state, std::uint32_t element,
                                   const ConnectionRows::Entry& entry) const;
   [[nodiscard]] double stiffness(std::uint32_t element, const ConnectionRows::Entry& entry) const;
+  // Its place among the entries of the rows.
   [[nodiscard]] std::size_t place(const ConnectionRows::Entry& entry) const {
     return static_cast<std::size_t>(&entry - rows_.entries.data());
+  }
+  [[nodiscard]] std::uint32_t part_of(std::uint32_t element) const { return part_[element]; }
+  [[nodiscard]] const ConnectionMemory& memory() const { return memory_; }
+  [[nodiscard]] ConnectionMemory& memory() { return memory_; }
+
+ private:
+  [[nodiscard]] bool is_broken(const ConnectionRows::Entry& entry) const {
+    return !memory_.broken.empty() && memory_.broken[place(entry)] != 0;
   }
 
   const Body& body_;
@@ -61,7 +80,7 @@ class PaperModel {
   ConnectionRows rows_;
   std::vector<std::uint32_t> part_;  // (elements)
   std::vector<std::uint8_t> active_;
-  std::vector<double> flowed_;  // (entries of rows_) m, change of the rest length; empty: none
+  ConnectionMemory memory_;
   std::vector<double> factor_;  // (entries of rows_) of the Hooke constant; empty: none
 };
 

@@ -37,17 +37,24 @@ Mat3 root_less_one(const Mat3& change) {
   return eigen.eigenvectors() * values.asDiagonal() * eigen.eigenvectors().transpose();
 }
 
-std::vector<double> shares(const Body& body, const char* name) {
-  std::vector<double> result = body.fill;
-  if (const Column* change = column_of(body.cell_columns, name, 1))
-    for (std::size_t c = 0; c < result.size(); ++c) result[c] *= 1 + change->values[c];
+std::vector<double> factors(const Columns& columns, const char* name, const char* of) {
+  std::vector<double> result;
+  const Column* change = column_of(columns, name, 1);
+  if (!change) return result;
+  for (const double value : change->values) {
+    if (!(1 + value > 0))
+      throw InputError(
+          fmt::format("column \"{}\" of {}: {} is {:g}, a factor less 1: it needs to be above -1", name, of,
+                      result.size(), value));
+    result.push_back(1 + value);
+  }
   return result;
 }
 
-std::vector<double> factors(const Body& body, const char* name) {
-  std::vector<double> result;
-  if (const Column* change = column_of(body.element_columns, name, 1))
-    for (const double value : change->values) result.push_back(1 + value);
+std::vector<double> shares(const Body& body, const char* name) {
+  std::vector<double> result = body.fill;
+  const std::vector<double> factor = factors(body.cell_columns, name, "cells");
+  for (std::size_t c = 0; c < factor.size(); ++c) result[c] *= factor[c];
   return result;
 }
 
@@ -108,10 +115,20 @@ std::vector<double> mass_shares(const Body& body) {
   return shares(body, "density_change");
 }
 std::vector<double> stiffness_factors(const Body& body) {
-  return factors(body, "stiffness_change");
+  return element_factors(body, "stiffness_change");
 }
 std::vector<double> mass_factors(const Body& body) {
-  return factors(body, "density_change");
+  return element_factors(body, "density_change");
+}
+std::vector<double> element_factors(const Body& body, const char* column) {
+  return factors(body.element_columns, column, "elements");
+}
+std::vector<double> cell_factors(const Body& body, const char* column) {
+  return factors(body.cell_columns, column, "cells");
+}
+std::vector<double> element_values(const Body& body, const char* column) {
+  const Column* found = column_of(body.element_columns, column, 1);
+  return found ? found->values : std::vector<double>();
 }
 
 }  // namespace flexel::simulate

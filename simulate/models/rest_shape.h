@@ -52,5 +52,10 @@ class RestShapes {
 // (elements) the factors of edits at centre placement; empty: none.
 [[nodiscard]] std::vector<double> stiffness_factors(const Body& body);
 [[nodiscard]] std::vector<double> mass_factors(const Body& body);
+// The factors of any such column, of elements and of cells; empty: none. Throws InputError: one is not above 0.
+[[nodiscard]] std::vector<double> element_factors(const Body& body, const char* column);
+[[nodiscard]] std::vector<double> cell_factors(const Body& body, const char* column);
+// (elements) a column of one number each; empty: none.
+[[nodiscard]] std::vector<double> element_values(const Body& body, const char* column);
 
 }  // namespace flexel::simulate

@@ -34,12 +34,18 @@ void report_materials(const Problem& problem, Progress& progress) {
       progress.warn(
           fmt::format("part \"{}\": model \"springs\" has Poisson's ratio 0.25, not the {:.3g} of {}", part,
                       material.poisson, material.name));
-    if (problem.models[p] == Model::paper)
+    if (problem.models[p] == Model::paper && problem.hooke[p] == HookeConstant::isotropic) {
+      if (std::abs(material.poisson - 0.25) > 0.005)
+        progress.warn(
+            fmt::format("part \"{}\": model \"paper\" has Poisson's ratio 0.25, not the {:.3g} of {}", part,
+                        material.poisson, material.name));
+    } else if (problem.models[p] == Model::paper) {
       progress.warn(fmt::format(
           "part \"{}\": model \"paper\" is stiffer than {} inside (Young's modulus {:.3g} times along the "
           "lattice's axes) and softer at its surface; it is meant for comparison with the paper, not for "
-          "sizes",
-          part, material.name, axial_stiffness(problem.hooke[p])));
+          "sizes; hooke = \"isotropic\" of [parts.\"{}\"] has the modulus of the material",
+          part, material.name, axial_stiffness(problem.hooke[p]), part));
+    }
   }
 }
 

@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/human.h"
 #include "base/stop.h"
+#include "formats/lattice/fused_points.h"
 #include "formats/lattice/stress_columns.h"
 #include "simulate/estimate/stress_singularity.h"
 #include "simulate/matter/fragments.h"
@@ -135,6 +136,10 @@ void refuse_what_quadratic_lacks(const Scene& scene, const Body& body,
                          fmt::format("{}it does not know what an earlier run left in the body (\"{}\"); use "
                                      "model \"cells\"",
                                      needs, name));
+  if (body.notes.contains(kFusedNote))
+    throw InputError(
+        scene.name,
+        fmt::format("{}it does not know points that an earlier run fused; use model \"cells\"", needs));
   for (const Tie& tie : scene.get<Supports>().ties)
     if (tie.link)
       throw InputError(tie.origin, fmt::format("{}it has no rigid links (\"{}\"); use link = \"averaging\"",

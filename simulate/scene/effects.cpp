@@ -15,6 +15,7 @@
 #include "simulate/effects/plasticity.h"
 #include "simulate/effects/rigid.h"
 #include "simulate/effects/supports.h"
+#include "simulate/paper/connection_friction.h"
 
 namespace flexel::simulate {
 namespace {
@@ -102,6 +103,11 @@ std::vector<SceneKey> damping_keys() {
           {"[damping]", "part", K::text, {}, "every part", "a part's name"}};
 }
 
+std::vector<SceneKey> internal_friction_keys() {
+  return {{"[internal_friction]", "coefficient", K::number, {}, "required", "mu along connections"},
+          {"[internal_friction]", "part", K::text, {}, "every part", "a part's name"}};
+}
+
 std::vector<SceneKey> velocity_keys() {
   const std::string v = "[[velocity]]", s = "spin of [[velocity]]";
   return {{v, "where", K::selection, {}, "required", "what moves"},
@@ -170,7 +176,7 @@ std::vector<SceneKey> contact_keys() {
 // The order is that of the sums.
 const std::vector<EffectRow>& effect_rows() {
   constexpr const char* kAll = "cells, springs, paper";
-  constexpr const char* kMatter = "cells, springs";
+  constexpr const char* kConnections = "paper";
   constexpr ActsIn kEverywhere = ActsIn::all, kNotAtRest = ActsIn::time,
                    kWithContact = ActsIn::relaxation_and_time;
   static const std::vector<EffectRow> rows = {
@@ -179,10 +185,12 @@ const std::vector<EffectRow>& effect_rows() {
       row<Supports>("places that are held or led", kEverywhere, kAll, {"move"}, support_keys()),
       row<Bonds>("parts that touch hold together", kEverywhere, kAll, {}, bond_keys()),
       row<Damping>("internal damping", kWithContact, kAll, {"damping"}, damping_keys()),
+      row<ConnectionFriction>("sliding friction within a part", kNotAtRest, kConnections,
+                              {"internal_friction"}, internal_friction_keys()),
       row<InitialVelocity>("what matter moves with at the start", kNotAtRest, kAll, {"velocity"},
                            velocity_keys()),
-      row<Plasticity>("deformation that stays", kNotAtRest, kMatter, {"plasticity"}, plasticity_keys()),
-      row<Fracture>("matter that breaks", kNotAtRest, kMatter, {"fracture"}, fracture_keys()),
+      row<Plasticity>("deformation that stays", kNotAtRest, kAll, {"plasticity"}, plasticity_keys()),
+      row<Fracture>("matter that breaks", kNotAtRest, kAll, {"fracture"}, fracture_keys()),
       row<Drag>("a medium that resists what moves", kNotAtRest, kAll, {"drag"}, drag_keys()),
       row<RigidParts>("rigid parts and manipulators", kWithContact, kAll, {}, rigid_keys()),
       row<Contact>("parts push each other, slide and stick", kWithContact, kAll, {"contact"}, contact_keys()),

@@ -25,7 +25,7 @@ namespace flexel::simulate {
 struct PartSettings {
   std::string material;  // "" : the scene's default, else the body's own
   std::string model;     // "" : cells at corner placement, paper at centre placement
-  std::string hooke;     // of model paper: "paper" ("" too) or "ganovelli"
+  std::string hooke;     // of model paper: "paper" ("" too), "ganovelli" or "isotropic"
   Infill infill = {};    // of its own `material`, else of the scene's
   std::string origin;
   std::optional<Mat3> axes = {};  // of an orthotropic material, columns, world frame; nothing: the world's

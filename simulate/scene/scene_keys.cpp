@@ -50,7 +50,7 @@ SceneKeyGroup material_keys() {
        {p, "material", K::text, {}, "the scene's", "of this part"},
        {p, "model", K::text, {}, "the scene's", "\"cells\", \"quadratic\", \"springs\" or \"paper\""},
        {p, "axes", K::list, {}, "the world's", "of an orthotropic material: its first and second direction"},
-       {p, "hooke", K::text, {}, "\"paper\"", "or \"ganovelli\": constants of model paper"},
+       {p, "hooke", K::text, {}, "\"paper\"", "or \"ganovelli\", \"isotropic\": of model paper"},
        {p, "infill", K::quantity, D::share, "the scene's", "with the material beside it"},
        {p, "shell", K::quantity, D::length, "0", "solid walls around an infill"}}};
 }
@@ -91,6 +91,10 @@ SceneKeyGroup event_keys() {
            {e, "stiffness", K::number, {}, "1", "of edit: a factor"},
            {e, "damping", K::number, {}, "1", "of edit: a factor"},
            {e, "density", K::number, {}, "1", "of edit: a factor"},
+           {e, "strength", K::number, {}, "1", "of edit: a factor, on elongation too"},
+           {e, "yield", K::number, {}, "1", "of edit: a factor"},
+           {e, "friction", K::number, {}, "1", "of edit: a factor"},
+           {e, "radius", K::number, {}, "1", "of edit: a factor, of elements of model paper"},
            {e, "stick", K::quantity, D::pressure, "0", "of edit: a traction more"},
            {e, "within", K::quantity, D::length, "required", "of fuse: over which distance"},
            {e, "body", K::text, {}, "required", "of add: a body's file"},

@@ -79,10 +79,11 @@ void refuse_model(const Scene& scene, const PartSettings& settings, const Part& 
     throw InputError(
         settings.origin,
         fmt::format("\"hooke\" belongs to model \"paper\"; part \"{}\" has model \"{}\"", part.name, model));
-  if (settings.hooke != "paper" && settings.hooke != "ganovelli")
-    throw InputError(settings.origin,
-                     fmt::format("no Hooke constant \"{}\"{}; known: paper, ganovelli", settings.hooke,
-                                 did_you_mean(settings.hooke, {"paper", "ganovelli"})));
+  if (settings.hooke != "paper" && settings.hooke != "ganovelli" && settings.hooke != "isotropic")
+    throw InputError(
+        settings.origin,
+        fmt::format("no Hooke constant \"{}\"{}; known: paper, ganovelli, isotropic", settings.hooke,
+                    did_you_mean(settings.hooke, {"paper", "ganovelli", "isotropic"})));
 }
 
 // Throws InputError, one line: a law but neo-Hooke's with another model than cells, an infill, a rest shape of
@@ -139,8 +140,10 @@ std::vector<HookeConstant> hooke_of_parts(const Scene& scene, const Body& body) 
   std::vector<HookeConstant> constants;
   for (const Part& part : body.parts) {
     const auto found = scene.parts.find(part.name);
-    const bool ganovelli = found != scene.parts.end() && found->second.hooke == "ganovelli";
-    constants.push_back(ganovelli ? HookeConstant::ganovelli : HookeConstant::paper);
+    const std::string hooke = found != scene.parts.end() ? found->second.hooke : "";
+    constants.push_back(hooke == "ganovelli"   ? HookeConstant::ganovelli
+                        : hooke == "isotropic" ? HookeConstant::isotropic
+                                               : HookeConstant::paper);
   }
   return constants;
 }

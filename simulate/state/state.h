@@ -21,8 +21,9 @@ struct State {
 // How a part resists: cells, springs and quadratic at corner placement, paper at centre placement.
 enum class Model { cells, springs, paper, quadratic };
 
-// Where the Hooke constants of model `paper` come from: equation (22) or (21) of the paper.
-enum class HookeConstant { paper, ganovelli };
+// Where the Hooke constants of model `paper` come from: equation (22) or (21) of the paper, or those that make
+// the lattice isotropic with the material's Young's modulus.
+enum class HookeConstant { paper, ganovelli, isotropic };
 
 // Whether a part is rigid: free to move as a whole, or led on a path (simulate/effects/rigid.h).
 enum class Rigidity : std::uint8_t { none, free, led };

@@ -108,11 +108,11 @@ void Stepper::choose_kernels(const Problem& problem, const KernelEffects& plan) 
     const PlasticFlow flow = plan.plasticity.empty() ? PlasticFlow{} : plan.plasticity[p];
     const FractureLimits limits = plan.fracture.empty() ? FractureLimits{} : plan.fracture[p];
     const bool springs = problem.models.size() > p && problem.models[p] == Model::springs;
-    const double unit = springs ? problem.materials[p].young : 1;
-    c.yield = flow.yield / unit;
-    c.hardening = flow.hardening / unit;
-    c.strength = limits.strength;
-    c.elongation = limits.elongation;
+    const CellFactors& factors = layout_.kind_factors[kind];
+    c.yield = factors.yield * flow.yield;
+    c.hardening = flow.hardening;
+    c.strength = factors.strength * limits.strength;
+    c.elongation = factors.strength * limits.elongation;
     step::Composition has{plan.damping[p] > 0 ? step::Damping::plain : step::Damping::none,
                           std::isfinite(flow.yield) || plan.rest_shapes,
                           limits.any() || (springs && plan.broken_springs)};

@@ -13,11 +13,21 @@
 #include "base/files/packing.h"
 #include "formats/lattice/body_file.h"
 
+namespace flexel {
+
+// Where argument-dependent lookup finds it.
+template <class Archive>
+static void visit(Archive& archive, FusedPoint& point) {
+  visit_all(archive, point.elements, point.weights, point.stiffness, point.length);
+}
+
+}  // namespace flexel
+
 namespace flexel::simulate {
 namespace {
 
 constexpr char kMagic[8] = {'f', 'l', 'e', 'x', 'e', 'l', 'C', 'P'};
-constexpr std::uint64_t kVersion = 5;
+constexpr std::uint64_t kVersion = 6;
 
 struct Head {
   char magic[8];
@@ -37,11 +47,6 @@ static void visit(Archive& archive, Account& account) {
 }
 
 template <class Archive>
-static void visit(Archive& archive, FusedPoint& point) {
-  visit_all(archive, point.elements, point.weights, point.stiffness);
-}
-
-template <class Archive>
 static void visit(Archive& archive, BookRow& row) {
   visit_all(archive, row.time, row.energies, row.accounts, row.momentum, row.angular, row.probes, row.values);
 }
@@ -51,7 +56,8 @@ static void visit(Archive& archive, Checkpoint& c) {
   for (std::string* text : {&c.scene_name, &c.scene, &c.output, &c.history}) visit(archive, *text);
   visit_all(archive, c.compress, c.input, c.state.displacement, c.state.velocity, c.state.share, c.state.time,
             c.state.kick, c.clock, c.memory.cells.fill, c.memory.cells.plastic, c.memory.cells.springs,
-            c.memory.cells.spring_flow, c.memory.reach, c.memory.supports, c.events, c.settled, c.fused,
+            c.memory.cells.spring_flow, c.memory.connections.flowed, c.memory.connections.strain,
+            c.memory.connections.broken, c.memory.reach, c.memory.supports, c.events, c.settled, c.fused,
             c.bonding_parts, c.memory.effects, c.ledger.accounts, c.ledger.rows, c.ledger.probes,
             c.ledger.columns, c.ledger.start, c.ledger.changed, c.ledger.worst_residual, c.ledger.unstored,
             c.ledger.unstored_now, c.ledger.worst_unstored, c.ledger.largest_term, c.next_row, c.next_frame,

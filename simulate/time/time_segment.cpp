@@ -65,11 +65,12 @@ TimeSegment::TimeSegment(Body& body, const Scene& scene, const SimulateOptions& 
       scene_(scene),
       progress_(progress),
       problem_(timed_problem(body, scene, beginning)),
+      fused_(beginning.fused),
       probes_(place_probes(scene, problem_)),
       effects_(active_effects(scene.effects, problem_)),
       state_(std::move(state)) {
   const bool fresh = beginning.fresh;
-  if (!beginning.fused.empty()) effects_.push_back(activate(FusedPoints(body, beginning.fused)));
+  if (!fused_.empty()) effects_.push_back(activate(FusedPoints(body, fused_)));
   if (fresh) report_materials(problem_, progress_);
   name_materials(body_, problem_.materials);
   configure_kernel();
@@ -139,7 +140,7 @@ void TimeSegment::make_implicit() {
   };
   if (!plan_.plasticity.empty()) refuse("[plasticity]");
   if (!plan_.fracture.empty()) refuse("[fracture]");
-  if (paper_damped_) refuse("[damping] of model \"paper\"");
+  if (damps_connections()) refuse("[damping] of model \"paper\"");
   for (const ActiveEffect& effect : effects_)
     if (!effect->takes_implicit_steps()) refuse(fmt::format("{} ({})", effect.name, effect.why));
   euler_.emplace(problem_, effects_, plan_, stepper_->mass(), scene_.run.tolerance);
@@ -155,8 +156,12 @@ void TimeSegment::make_forces() {
   for (std::size_t p = 0; p < body_.parts.size(); ++p) {
     if (body_.parts[p].placement != Placement::centre) continue;
     if (!paper_) paper_.emplace(problem_);
-    paper_damped_ = paper_damped_ || plan_.damping[p] > 0;
     varies_ = true;
+  }
+  if (paper_) {
+    yield_.emplace(problem_, plan_, *paper_);
+    if (!yield_->acts()) yield_.reset();
+    for (const ActiveEffect& effect : effects_) effect->attach(*paper_, plan_.damping);
   }
   if (varies_ && steady_.empty()) steady_.assign(body_.element_count(), Vec3::Zero());
 }
@@ -276,7 +281,7 @@ void TimeSegment::add_connection_forces(EnergyHistory* history) {
   if (const PaperModel::SmallestVolume least = paper_->smallest_volume(state_); !(least.value > 0))
     throw DivergedError(folds_at("an element", body_.rest[least.element]));
   paper_->add_forces(state_, outer_);
-  if (!paper_damped_) return;
+  if (!damps_connections()) return;
   add_apart(history ? &history->connection_damping() : nullptr,
             [&](std::vector<Vec3>& sum) { paper_->add_damping(state_, plan_.damping, sum); });
 }
@@ -320,6 +325,7 @@ bool TimeSegment::renews(const Clock& clock) const {
 TimeSegment::Memory TimeSegment::memory() const {
   Memory memory;
   memory.cells = stepper_->memory();
+  if (yield_) memory.connections = paper_->memory();
   if (euler_) {
     memory.reach = euler_->reach();
     memory.supports = euler_->supports();
@@ -338,10 +344,11 @@ void TimeSegment::restore(const Memory& memory) {
   const Stepper::Memory own = stepper_->memory();
   if (memory.cells.fill.size() != own.fill.size() || memory.cells.plastic.size() != own.plastic.size() ||
       memory.cells.springs.size() != own.springs.size() ||
-      memory.cells.spring_flow.size() != own.spring_flow.size() ||
+      memory.cells.spring_flow.size() != own.spring_flow.size() || !fits_connections(memory.connections) ||
       (!memory.supports.empty() && (!euler_ || memory.supports.size() != body_.element_count())))
     throw InputError("the checkpoint's memory is not that of its scene and body: it is damaged");
   stepper_->restore(memory.cells);
+  if (yield_) paper_->memory() = memory.connections;
   stepper_->mark_broken(body_.broken);
   for (std::size_t p = 0; p < effects_.size() && p < memory.effects.size(); ++p)
     effects_[p]->restore(memory.effects[p]);
@@ -350,14 +357,28 @@ void TimeSegment::restore(const Memory& memory) {
   euler_->set_supports(memory.supports);
 }
 
+bool TimeSegment::fits_connections(const ConnectionMemory& memory) const {
+  if (!yield_) return memory.flowed.empty() && memory.strain.empty() && memory.broken.empty();
+  const ConnectionMemory& own = paper_->memory();
+  return memory.flowed.size() == own.flowed.size() && memory.strain.size() == own.strain.size() &&
+         memory.broken.size() == own.broken.size();
+}
+
+ConnectionLosses TimeSegment::yield_connections() {
+  if (!yield_) return {};
+  const ScopeTimer timer(paper_seconds_);
+  return yield_->advance(state_);
+}
+
 void TimeSegment::step(Clock& clock, EnergyHistory* history, bool row) {
   if (euler_) return step_implicitly(clock, history, row);
-  if (history) history->before(state_, row, row && guard_ ? guard_->energy(state_) : 0);
   const bool first = clock.steps == 0;
   const double before = first ? (scene_.run.method == TimeMethod::verlet ? 0 : clock.step) : clock.previous;
   const step::Advance advance{0.5 * (before + clock.step), clock.step,
                               scene_.run.method == TimeMethod::explicit_euler};
   state_.kick = advance.kick;
+  const ConnectionLosses lost = yield_connections();
+  if (history) history->before(state_, row, row && guard_ ? guard_->energy(state_) : 0);
   sum_forces(history);
   StepOutcome outcome;
   const double end = clock.epoch + static_cast<double>(clock.in_epoch + 1) * clock.step;
@@ -370,6 +391,8 @@ void TimeSegment::step(Clock& clock, EnergyHistory* history, bool row) {
       outcome.released += guard_->drop_broken(state_);
   }
   if (outcome.broken > 0) stepper_->mark_broken(body_.broken);
+  outcome.plastic_work += lost.plastic_work;
+  outcome.released += lost.released;
   ++clock.in_epoch;
   ++clock.steps;
   state_.time = end;
@@ -402,12 +425,15 @@ bool TimeSegment::kicks() const {
 void TimeSegment::kick(double time) {
   const StopWaits whole;  // half a kick is no state
   const Stepper::Memory memory = stepper_->memory();
+  const ConnectionMemory connections = yield_ ? paper_->memory() : ConnectionMemory{};
   const std::vector<Vec3> before = state_.velocity;
   state_.kick = std::abs(time);
+  (void)yield_connections();
   sum_forces(nullptr);
   (void)stepper_->advance(state_, outer(), {time, 0, false});
   held_->copy(before, state_.velocity);
   stepper_->restore(memory);
+  if (yield_) paper_->memory() = connections;
 }
 
 void TimeSegment::close_books(const Clock& clock, EnergyHistory& history) {
@@ -422,6 +448,12 @@ void TimeSegment::close_books(const Clock& clock, EnergyHistory& history) {
   state_ = std::move(last);
   body_.broken = broken;
   restore(before);
+}
+
+bool TimeSegment::damps_connections() const {
+  for (std::size_t p = 0; p < body_.parts.size(); ++p)
+    if (body_.parts[p].placement == Placement::centre && plan_.damping[p] > 0) return true;
+  return false;
 }
 
 bool TimeSegment::damps() const {

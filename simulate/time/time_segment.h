@@ -8,6 +8,7 @@
 
 #include "simulate/events/event.h"
 #include "simulate/implicit/implicit_euler.h"
+#include "simulate/paper/connection_yield.h"
 #include "simulate/result/options.h"
 #include "simulate/result/result.h"
 #include "simulate/scene/scene.h"
@@ -69,6 +70,7 @@ class TimeSegment {
   // What the next steps depend on besides state() and the clock; only where renews() says so.
   struct Memory {
     Stepper::Memory cells;
+    ConnectionMemory connections;
     double reach = 0;                          // s, of ImplicitEuler
     std::vector<Vec3> supports;                // N, of its last step
     std::vector<std::vector<double>> effects;  // what each remembers
@@ -135,18 +137,23 @@ class TimeSegment {
   // Forces of the effects at the present state; none: empty.
   [[nodiscard]] const std::vector<Vec3>& outer() const;
   void add_connection_forces(EnergyHistory* history);
+  // Breaks and lets flow what passes its limits in the present state.
+  ConnectionLosses yield_connections();
+  [[nodiscard]] bool damps_connections() const;
+  [[nodiscard]] bool fits_connections(const ConnectionMemory& memory) const;
 
   Body& body_;
   const Scene& scene_;
   Progress& progress_;
   Problem problem_;
+  std::vector<FusedPoint> fused_;
   std::vector<ProbePoints> probes_;
   std::vector<ActiveEffect> effects_;
   KernelEffects plan_;
   Constraints constraints_;
   State state_;
-  std::optional<PaperModel> paper_;  // of the centre-placed parts
-  bool paper_damped_ = false;
+  std::optional<PaperModel> paper_;       // of the centre-placed parts
+  std::optional<ConnectionYield> yield_;  // where they flow or break
   std::optional<Stepper> stepper_;
   std::optional<PrescribedMotion> held_;
   std::optional<StagedDamping> staged_;

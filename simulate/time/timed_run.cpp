@@ -102,6 +102,7 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
                     "something else is not out at its end",
                     contact.parting, duration_));
   start_.settled = settled_displacement(body);
+  start_.fused = fused_points(body);
   start_.bonding_parts = body.parts.size();
   if (!options.series.empty()) series_.emplace(options.series, options.compress);
   if (!options.checkpoint.empty()) {
@@ -253,9 +254,6 @@ SimulateResult TimedRun::report() {
   if (settling_) settling_->report(result);
   refuse_not_finite(result, scene_.name);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
-  if (!start_.fused.empty())
-    progress_.say(fmt::format("{} fused points hold in this run only: a later one has to fuse again",
-                              start_.fused.size()));
   if (options_.explain) explain_times(result.shares, result.seconds, progress_);
   return result;
 }
@@ -320,6 +318,7 @@ void TimedRun::apply(std::size_t end) {
   start_.fresh = false;
   segment_.reset();
   const bool was_edited = edits_damping(body_);
+  body_.notes.erase(kFusedNote);  // events change start_.fused and the numbers of elements
   for (; events_ < end; ++events_) {
     const Event& event = scene_.events[events_];
     const Problem problem = timed_problem(body_, scene_, start_);

@@ -60,16 +60,21 @@ def test_carving_half_takes_half_the_mass():
     expect("carved away" in mapped.err, f"the mapping should tell, too: {mapped}")
 
 
-def test_fused_parts_are_said_to_part_again():
-    """A body file has no connections between parts: the run that fused says that the next one has to."""
-    body()
+def test_fused_parts_stay_fused_in_later_runs():
+    """In time and at equilibrium; without the event the second part has nothing that holds it."""
+    write("box.stl", binary_stl(box_triangles()))
     write("twin.stl", binary_stl([[[x + 40.1, y, z] for x, y, z in triangle] for triangle in box_triangles()]))
-    expect_ok(run("flexel-voxelize", "twin.stl", "--size", "5 mm", "-o", "twin.vtu"))
-    scene(text=FREE + '[[event]]\nat = "0 s"\ndo = "fuse"\nwithin = "0.5 mm"\n')
-    result = expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "twin.vtu", "-o", "out.vtu"))
-    expect(result.err.count("hold in this run only") == 1, result)
-    result = expect_ok(run("flexel-simulate", scene(text=FREE), "out.vtu", "-o", "on.vtu"))
-    expect("this run only" not in result.err, result)
+    for placement, within in (("corner", "0.5 mm"), ("centre", "7.3 mm")):
+        for name in ("box", "twin"):
+            expect_ok(run("flexel-voxelize", f"{name}.stl", "--size", "5 mm", "--placement", placement, "-o", f"{name}.vtu"))
+        scene("fuse.toml", FREE + f'[[event]]\nat = "0 s"\ndo = "fuse"\nwithin = "{within}"\n')
+        expect_ok(run("flexel-simulate", "fuse.toml", "box.vtu", "twin.vtu", "-o", "out.vtu"))
+        pulled = scene("pull.toml", 'material = "rubber"\n[[fix]]\nwhere = "box/xmin"\n[[load]]\nwhere = "twin/xmax"\nforce = ["1 N", 0, 0]\n'
+                                    '[[probe]]\nname = "end"\nwhere = "twin/xmax"\n')
+        end = summary(pulled, "out.vtu", "-o", "on.vtu")["probes"][0]["displacement"][0]
+        expect(1e-5 < end < 1e-3, f"{placement}: the end is drawn by {end} m")
+        expect_ok(run("flexel-simulate", scene("free.toml", FREE), "on.vtu", "-o", "free.vtu"))
+        expect_error(run("flexel-simulate", pulled, "box.vtu", "twin.vtu", "-o", "loose.vtu"), "flexel-simulate", "twin")
 
 
 def test_refusals():

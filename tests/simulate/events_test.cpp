@@ -323,7 +323,7 @@ TEST(Events, WrongEntriesAreRefused) {
               HasSubstr("did you mean \"renormalise\"?"));
   EXPECT_THAT(message(event("0.2 s", "do = \"renormalise\"")), HasSubstr("timed runs only"));
   EXPECT_THAT(message(run + event("0.2 s", "do = \"edit\"")),
-              HasSubstr("needs \"stiffness\", \"damping\" or \"density\""));
+              HasSubstr("needs \"stiffness\", \"damping\", \"density\""));
   EXPECT_THAT(message(run + event("0.2 s", "do = \"edit\"\nstiffness = 0")), HasSubstr("is a factor"));
   EXPECT_THAT(message(run + event("0.2 s", "do = \"carve\"")), HasSubstr("where"));
   EXPECT_THAT(message(run + event("0.2 s", "do = \"fuse\"")), HasSubstr("within"));

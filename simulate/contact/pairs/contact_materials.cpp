@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "simulate/models/rest_shape.h"
+
 namespace flexel::simulate {
 namespace {
 
@@ -14,13 +16,14 @@ constexpr double kMostPullOff = 0.35;  // spacings, at most, of the extension at
 
 ContactMaterials::ContactMaterials(const ContactSettings& settings, const Problem& problem,
                                    const ContactSurface& surface)
-    : settings_(settings), surface_(surface) {
+    : settings_(settings), surface_(surface), slides_(element_factors(problem.body, "friction_change")) {
   for (std::size_t p = 0; p < problem.body.parts.size(); ++p) {
     const Material& material = problem.materials[p];
     foundation_.push_back(kStiffness * settings.stiffness * material.young /
                           problem.body.parts[p].lattice.spacing.mean());
     friction_.push_back(material.contact_friction.value_or(settings.friction));
     stick_.push_back(settings.stick.empty() ? 0 : settings.stick[p]);
+    rigid_.push_back(p < problem.rigidity.size() && problem.rigidity[p] != Rigidity::none);
   }
 }
 
@@ -28,13 +31,13 @@ PairProperties ContactMaterials::between(std::uint32_t i, std::uint32_t j) const
   const ContactPoint &a = surface_.points()[i], &b = surface_.points()[j];
   // the faces beside an edge have all of the adhering area
   const bool edged = a.shape == ContactShape::edge || b.shape == ContactShape::edge;
-  return {0.5 * (friction_[a.part] + friction_[b.part]), constants(i, j),
+  return {0.5 * (friction(i) + friction(j)), constants(i, j),
           edged ? 0 : pull_off(i, 0.5 * (stick(i) + stick(j)), foundation(i, j))};
 }
 
 PairProperties ContactMaterials::against_plane(std::uint32_t point, const ContactPlane& plane) const {
   const ContactPoint& at = surface_.points()[point];
-  const double own = friction_[at.part];
+  const double own = friction(point);
   const double traction =
       at.shape == ContactShape::edge ? 0 : 0.5 * (stick(point) + plane.stick.value_or(stick(point)));
   return {0.5 * (own + plane.friction.value_or(own)), plane_constants(point),
@@ -51,12 +54,21 @@ bool ContactMaterials::dissipate() const {
 }
 
 // Pa/m: springs in series, scaled so that two equal parts have that of each; two balls have the mean, as in
-// the paper (section 3.2).
+// the paper (section 3.2), unless one is of a rigid part, whose own stiffness says nothing.
 double ContactMaterials::foundation(std::uint32_t i, std::uint32_t j) const {
   const ContactPoint &from = surface_.points()[i], &to = surface_.points()[j];
   const double a = foundation_[from.part], b = foundation_[to.part];
   const bool balls = from.radius > 0 && to.radius > 0;
-  return balls ? 0.5 * (a + b) : 2 * a * b / (a + b);
+  return balls && !rigid_[from.part] && !rigid_[to.part] ? 0.5 * (a + b) : 2 * a * b / (a + b);
+}
+
+// mu of the part, times the factor of the elements that carry the point.
+double ContactMaterials::friction(std::uint32_t point) const {
+  const ContactPoint& at = surface_.points()[point];
+  if (slides_.empty()) return friction_[at.part];
+  double factor = 0;
+  for (std::uint32_t a = 0; a < at.at.count; ++a) factor += at.at.weights[a] * slides_[at.at.elements[a]];
+  return friction_[at.part] * std::max(factor, 0.0);
 }
 
 // Pa: that of the part and the changes by events, the elements' column "stick_change".

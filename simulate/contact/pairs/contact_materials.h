@@ -25,15 +25,18 @@ class ContactMaterials {
  private:
   [[nodiscard]] double foundation(std::uint32_t i, std::uint32_t j) const;
   [[nodiscard]] double stick(std::uint32_t point) const;
+  [[nodiscard]] double friction(std::uint32_t point) const;
   [[nodiscard]] double pull_off(std::uint32_t i, double stick, double foundation) const;
   [[nodiscard]] PairConstants constants(std::uint32_t i, std::uint32_t j) const;
   [[nodiscard]] PairConstants plane_constants(std::uint32_t i) const;
 
   const ContactSettings& settings_;
   const ContactSurface& surface_;
-  std::vector<double> foundation_;  // (parts) kappa, Pa/m
-  std::vector<double> friction_;    // (parts) mu
-  std::vector<double> stick_;       // (parts) Pa; infinity: glue
+  std::vector<double> foundation_;   // (parts) kappa, Pa/m
+  std::vector<double> friction_;     // (parts) mu
+  std::vector<double> stick_;        // (parts) Pa; infinity: glue
+  std::vector<std::uint8_t> rigid_;  // (parts)
+  std::vector<double> slides_;       // (elements) factors of friction; empty: 1
 };
 
 }  // namespace flexel::simulate

@@ -10,6 +10,7 @@
 #include "simulate/contact/points/broad_phase.h"
 #include "simulate/contact/points/edge_points.h"
 #include "simulate/matter/surface_points.h"
+#include "simulate/models/rest_shape.h"
 
 namespace flexel::simulate {
 namespace {
@@ -146,6 +147,7 @@ void add_balls(const Problem& problem, const Triangles& triangles, std::uint32_t
   std::sort(outer.begin(), outer.end());
   outer.erase(std::unique(outer.begin(), outer.end()), outer.end());
   const PolygonsByCube polygons(surface, width);
+  const std::vector<double> factor = element_factors(problem.body, "radius_change");
   for (const std::uint32_t element : outer) {
     ContactPoint made;
     made.shape = ContactShape::ball;
@@ -157,6 +159,7 @@ void add_balls(const Problem& problem, const Triangles& triangles, std::uint32_t
     for (const std::uint32_t polygon : polygons.near(made.rest))
       made.radius =
           std::min(made.radius, distance_to_polygon(problem.body.surface, triangles, polygon, made.rest));
+    if (!factor.empty()) made.radius *= factor[element];
     made.depth = made.radius;
     made.width = width;
     points.push_back(made);

@@ -1,0 +1,249 @@
+// Connections of model `paper` that break, flow, slide and are fused, against the paper's own equations.
+#include "simulate/paper/connection_yield.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "formats/lattice/body_file.h"
+#include "simulate/effects/damping.h"
+#include "simulate/effects/fracture.h"
+#include "simulate/effects/plasticity.h"
+#include "simulate/matter/masses.h"
+#include "simulate/paper/connection_friction.h"
+#include "tests/simulate/centre_body.h"
+#include "tests/simulate/scene_case.h"
+#include "tests/simulate/stepped.h"
+#include "tests/simulate/timed_case.h"
+
+namespace flexel::simulate {
+namespace {
+
+using testing::book;
+using testing::centre_body;
+using testing::CentreOptions;
+using testing::expect_books_close;
+using testing::expect_momenta_kept;
+using ::testing::HasSubstr;
+using testing::refusal;
+using testing::run_timed;
+using testing::set_velocity;
+using testing::TimedCase;
+
+constexpr double kYoung = 1e6, kDensity = 1000, kWidth = 0.01;  // Pa, kg/m3, m
+
+CentreOptions row_of(Index3 voxels) {
+  CentreOptions options;
+  options.voxels = voxels;
+  options.spacing = kWidth;
+  return options;
+}
+
+Problem problem_of_paper(const Body& body, Rigidity rigidity = Rigidity::none) {
+  Problem problem{body, {{"gum", kYoung, 0.25, kDensity, ""}}, {}, {Model::paper}, {HookeConstant::paper},
+                  {}};
+  problem.rigidity.assign(1, rigidity);
+  return problem;
+}
+
+// As `text` of a scene has it, of gum.
+Scene scene_of(const std::string& text) {
+  return parse_scene(
+      "material = \"gum\"\n[materials.gum]\nyoung = \"1 MPa\"\npoisson = 0.25\ndensity = \"1000 kg/m3\"\n" +
+          text,
+      "scene.toml");
+}
+
+// Two elements, the second drawn away by `by`; how many connections broke.
+std::uint64_t broken_when_drawn(double elongation, double by, const Body& body) {
+  const Problem problem = problem_of_paper(body);
+  PaperModel model(problem);
+  FractureLimits limits;
+  limits.elongation = elongation;
+  ConnectionYield yield(problem, {{0}, {}, {limits}}, model);
+  const State state{{Vec3::Zero(), Vec3(by, 0, 0)}, 1, {Vec3::Zero(), Vec3::Zero()}, 0.0};
+  const std::uint64_t broken = yield.advance(state).broken;
+  std::vector<Vec3> forces(2, Vec3::Zero());
+  model.add_forces(state, forces);
+  EXPECT_EQ(forces[0].x() == 0, broken > 0);
+  return broken;
+}
+
+// Section 4.2: "if its elements are a distance t apart, we destroy it".
+TEST(ConnectionYield, AConnectionEndsAtItsThresholdAndNotBefore) {
+  Body body = centre_body(row_of({2, 1, 1}));
+  EXPECT_EQ(broken_when_drawn(0.25, 0.25 * kWidth * (1 - 1e-12), body), 0u);
+  EXPECT_EQ(broken_when_drawn(0.25, 0.25 * kWidth * (1 + 1e-12), body), 1u);
+  // section 3.2: the mean of the two elements'
+  body.element_columns["strength_change"] = {1, {2, 0}};
+  EXPECT_EQ(broken_when_drawn(0.25, 0.5 * kWidth * (1 - 1e-12), body), 0u);
+  EXPECT_EQ(broken_when_drawn(0.25, 0.5 * kWidth * (1 + 1e-12), body), 1u);
+  body.element_columns["strength_change"] = {1, {2, -1}};
+  EXPECT_THROW((void)broken_when_drawn(0.25, 0, body), InputError);
+}
+
+// A bar whose halves fly apart: momenta, books, and two pieces in the file, which a later run begins with.
+TEST(ConnectionYield, ATornBarIsTwoPiecesInTheFileToo) {
+  Body body = centre_body(row_of({8, 2, 2}));
+  std::vector<Vec3> velocity;
+  for (const Vec3& x : body.rest) velocity.push_back(Vec3(x.x() < 4 * kWidth ? -4 : 4, 0.5, 0));
+  set_velocity(body, velocity);
+  const std::string torn = "[fracture]\nelongation = 0.05\n[run]\ntime = \"4 ms\"\nstep = \"1 us\"\n";
+  const TimedCase made = run_timed(body, scene_of(torn));
+  expect_books_close(made.result);
+  expect_momenta_kept(made.history, 1e-9);
+  EXPECT_GT(made.history.column("fracture dissipated").back(), 0);
+  const auto across = [](const Body& of) {
+    std::size_t count = 0;
+    const Adjacency graph = element_adjacency(of);
+    for (std::uint32_t e = 0; e < of.element_count(); ++e)
+      for (const std::uint32_t other : graph.of(e))
+        count += (of.lattice_index[e][0] < 4) != (of.lattice_index[other][0] < 4);
+    return count;
+  };
+  EXPECT_GT(across(body), 0u);
+  EXPECT_EQ(across(made.body), 0u);
+  const std::string path = ::testing::TempDir() + "torn_paper.vtu";
+  write_body(made.body, path);
+  const TimedCase later = run_timed(read_body(path), scene_of("[run]\ntime = \"1 ms\"\n"));
+  EXPECT_EQ(across(later.body), 0u);
+  const double gap = made.body.position.back().x() - made.body.position.front().x();
+  EXPECT_NEAR(later.body.position.back().x() - later.body.position.front().x() - gap, 8e-3, 3e-3);
+}
+
+// sigma = yield + hardening a at the end of a slow pull of true stress P / A0 exp(strain), and that set stays.
+TEST(ConnectionYield, APulledBarFlowsAtItsYieldStress) {
+  for (const char* hooke : {"paper", "isotropic"}) {
+    const double stress = 15e3, yield = 10e3, hardening = 2e5;
+    const std::string scene =
+        std::string("[parts.box]\nhooke = \"") + hooke +
+        "\"\n[plasticity]\nyield = \"10 kPa\"\nhardening = \"200 kPa\"\n[damping]\ntime = \"0.3 ms\"\n"
+        "[[load]]\nwhere = \"xmax\"\nforce = [\"13.5 N\", 0, 0]\ntime = [\"0 s\", \"0.3 s\"]\nfactor = [0, "
+        "1]\n"
+        "[[load]]\nwhere = \"xmin\"\nforce = [\"-13.5 N\", 0, 0]\ntime = [\"0 s\", \"0.3 s\"]\nfactor = [0, "
+        "1]\n"
+        "[run]\ntime = \"0.35 s\"\n";
+    const TimedCase made = run_timed(centre_body(row_of({14, 3, 3})), scene_of(scene));
+    EXPECT_LT(book(made.result, "worst_residual"), 5e-3 * book(made.result, "largest_term")) << hooke;
+    const std::vector<double>& strain = made.body.element_columns.at("plastic_strain").values;
+    double sum = 0, count = 0, ahead = 0, behind = 0;  // of the middle, and of the layers around it
+    for (std::size_t e = 0; e < strain.size(); ++e) {
+      const int layer = made.body.lattice_index[e][0];
+      if (layer == 4) behind += made.body.position[e].x() / 9;
+      if (layer == 9) ahead += made.body.position[e].x() / 9;
+      if (layer <= 4 || layer >= 9) continue;
+      sum += strain[e];
+      count += 1;
+    }
+    // Kirchhoff stress: P / A0 times the stretch
+    const double expected = (stress * (ahead - behind) / (5 * kWidth) - yield) / hardening;
+    EXPECT_NEAR(sum / count, expected, 0.05 * expected) << hooke;
+    EXPECT_GT(made.history.column("plasticity dissipated").back(), 0);
+    EXPECT_TRUE(made.body.element_columns.contains("connection_rest"));
+  }
+}
+
+// Equation 20 on two elements: a connection pressed by F_N and slid across loses mu F_N of momentum a second on either
+// side, until it stands; momentum is kept.
+TEST(ConnectionYield, SlidingAcrossAConnectionIsBrakedByItsNormalForce) {
+  Body body = centre_body(row_of({2, 1, 1}));
+  body.position[1].x() -= 0.05 * kWidth;
+  Problem problem = problem_of_paper(body);
+  const PaperModel model(problem);
+  const double force = kYoung * kWidth * 0.05 * kWidth, mu = 0.3, mass = kDensity * std::pow(kWidth, 3);
+  std::optional<ConnectionFriction> friction = ConnectionFriction::make({{{mu, std::nullopt, ""}}}, problem);
+  ASSERT_TRUE(friction.has_value());
+  friction->attach(model, {0});
+  State state{{Vec3::Zero(), Vec3(-0.05 * kWidth, 0, 0)}, 1, {Vec3(0, 1, 2), Vec3(0, -1, -2)}, 0.0, 1e-6};
+  std::vector<Vec3> forces(2, Vec3::Zero());
+  friction->add_forces(state, forces);
+  EXPECT_NEAR(forces[0].norm(), mu * force, 1e-12 * force);
+  EXPECT_NEAR(forces[0].dot(Vec3(0, 1, 2).normalized()), -mu * force, 1e-12 * force);
+  EXPECT_EQ(forces[0], Vec3(-forces[1]));
+  // no step turns the sliding round
+  state.kick = 1e3 * mass / (mu * force);
+  forces.assign(2, Vec3::Zero());
+  friction->add_forces(state, forces);
+  const Vec3 after = state.velocity[0] + state.kick / mass * forces[0];
+  EXPECT_NEAR((after - (state.velocity[1] + state.kick / mass * forces[1])).norm(), 0, 1e-9);
+  // along the connection there is none
+  state.velocity = {Vec3(1, 0, 0), Vec3(-1, 0, 0)};
+  forces.assign(2, Vec3::Zero());
+  friction->add_forces(state, forces);
+  EXPECT_EQ(forces[0].norm(), 0);
+}
+
+TEST(ConnectionYield, InternalFrictionTakesEnergyAndKeepsMomentum) {
+  Body body = centre_body(row_of({4, 4, 4}));
+  std::vector<Vec3> velocity;
+  for (const Vec3& x : body.rest) velocity.push_back(Vec3(1, 2, 0) + Vec3(0, 0, 30 * (x.x() - 0.02)));
+  set_velocity(body, velocity);
+  const TimedCase made =
+      run_timed(body, scene_of("[internal_friction]\ncoefficient = 0.3\n[run]\ntime = \"20 ms\"\n"));
+  expect_books_close(made.result);
+  for (const char* axis : {"momentum x", "momentum y", "momentum z"})
+    for (const double value : made.history.column(axis))
+      EXPECT_NEAR(value, made.history.column(axis)[0], 1e-9 * made.history.column("momentum y")[0]);
+  EXPECT_GT(made.history.column("internal friction dissipated").back(),
+            0.1 * made.history.column("kinetic")[0] * 0.01);
+}
+
+TEST(ConnectionYield, InternalFrictionIsRefusedByNameElsewhere) {
+  const std::string friction = "[internal_friction]\ncoefficient = 0.3\n[run]\ntime = \"1 ms\"\n";
+  EXPECT_THAT(refusal(testing::box_body({}), scene_of(friction)),
+              HasSubstr("connections of model \"paper\""));
+  EXPECT_THAT(refusal(centre_body(row_of({2, 2, 2})), scene_of(friction + "method = \"implicit\"\n")),
+              HasSubstr("internal friction"));
+  EXPECT_THAT(refusal(centre_body(row_of({2, 2, 2})), scene_of("[internal_friction]\ncoefficient = 0.3\n")),
+              HasSubstr("timed runs only"));
+}
+
+// Two blocks, elements kWidth + 1 mm apart: fused from element to element, free of force at that moment, and still so
+// in a later run and at equilibrium.
+TEST(ConnectionYield, FusedBlocksAreOneInLaterRunsToo) {
+  CentreOptions options = row_of({3, 2, 2});
+  options.name = "left";
+  Body body = centre_body(options);
+  options.name = "right";
+  options.origin = Vec3(3 * kWidth + 1e-3, 0, 0);
+  const std::string path = ::testing::TempDir() + "paper_right.vtu";
+  write_body(centre_body(options), path);
+  set_velocity(body, std::vector<Vec3>(body.element_count(), Vec3(0.02, 0, 0)));
+  const auto scene = [&](const char* within) {
+    return scene_of("[run]\ntime = \"50 ms\"\n[[event]]\nat = \"0 s\"\ndo = \"add\"\nbody = \"" + path +
+                    "\"\n[[event]]\nat = \"0 s\"\ndo = \"fuse\"\nwithin = \"" + within + "\"\n");
+  };
+  EXPECT_THAT(refusal(body, scene("10.9 mm")), HasSubstr("from element to element"));
+  const TimedCase made = run_timed(body, scene("15 mm"));
+  expect_books_close(made.result);
+  expect_momenta_kept(made.history, 1e-9);
+  EXPECT_EQ(fused_points(made.body).size(), 12u) << "straight ones and diagonals";
+  const std::size_t last = made.body.element_count() - 1;
+  EXPECT_NEAR(made.body.position[last].x() - made.body.rest[last].x(), 0.01 * 0.05, 2e-4);
+  const std::string fused = ::testing::TempDir() + "paper_fused.vtu";
+  write_body(made.body, fused);
+  Body later = read_body(fused);
+  EXPECT_EQ(fused_points(later).size(), 12u);
+  later.element_columns.erase("velocity");
+  later.position = later.rest;
+  const std::string pull =
+      "[[fix]]\nwhere = \"left/xmin\"\n[[load]]\nwhere = \"right/xmax\"\nforce = [\"0.1 N\", 0, 0]\n";
+  (void)testing::simulate_quietly(later, scene_of(pull));
+  EXPECT_GT(later.position[last].x() - later.rest[last].x(), 0);
+  EXPECT_LT(later.position[last].x() - later.rest[last].x(), 0.1 * kWidth);
+}
+
+TEST(ConnectionYield, RigidPartsHaveNoConnections) {
+  const Body body = centre_body(row_of({3, 3, 3}));
+  EXPECT_FALSE(PaperModel(problem_of_paper(body)).rows().entries.empty());
+  for (const Rigidity rigidity : {Rigidity::free, Rigidity::led}) {
+    const Problem problem = problem_of_paper(body, rigidity);
+    const PaperModel model(problem);
+    EXPECT_TRUE(model.rows().entries.empty());
+    EXPECT_EQ(model.frequencies({std::vector<Vec3>(27, Vec3::Zero())}, lumped_masses(problem))[0], 0);
+  }
+}
+
+}  // namespace
+}  // namespace flexel::simulate
