@@ -154,7 +154,7 @@ int clay_command(int argc, char** argv) {
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
   } catch (...) {
-    session.hub().close();  // readers end before the server does
+    session.close();  // readers end before the server does
     throw;
   }
 }

@@ -24,7 +24,7 @@ os.environ.setdefault("FLEXEL_PARTS", str(ROOT / "../shared/parts"))
 sys.path.insert(0, str(ROOT / "tests/programs"))
 from browser import chromium  # noqa: E402
 from clay_browser_test import bent_by_hand, settle  # noqa: E402
-from clay_test import Hand, clay  # noqa: E402
+from clay_test import Hand, ask, clay  # noqa: E402
 
 # The tip goes 2 mm up and down, once in two seconds; a pose at every picture.
 DRAG = """
@@ -41,20 +41,33 @@ for (;;) {
 """
 
 
-def by_program(url, seconds):
-    """Frames a second and latencies [s] of a client that poses as soon as it knows of the pose before."""
+def processor(process):
+    """s, of all of its threads so far."""
+    fields = pathlib.Path(f"/proc/{process.pid}/stat").read_text().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def by_program(url, process, seconds):
+    """Frames a second, processor time a frame [s] and latencies [s] of a client that poses as soon as it knows of the pose before."""
     hand = Hand(url, 16 * "b")
     hand.act("take", "grab face bracket/2")
-    latencies, first, began = [], hand.seen, time.monotonic()
+    latencies, first, used, began = [], hand.seen, processor(process), time.monotonic()
     while (now := time.monotonic()) < began + seconds:
         status, text = hand.post(f"0 0 0 {2e-3 * math.sin(math.pi * (now - began))}")
         line = int(text.split(":")[1].strip(" }\n"))
         while hand.last["line"] < line:
             time.sleep(0.0005)
         latencies.append(time.monotonic() - now)
-    rate = (hand.seen - first) / (time.monotonic() - began)
+    frames = max(1, hand.seen - first)
+    rate, work = frames / (time.monotonic() - began), (processor(process) - used) / frames
     hand.leave()
-    return rate, latencies
+    return rate, work, latencies
+
+
+def page_weight():
+    """MB, of the page and what it fetches before it has drawn."""
+    with clay("bracket.step") as (url, _):
+        return sum(len(ask(url, url.path + path)[2]) for path in ("", "data/0", "save/rest.f32")) / 1e6
 
 
 def percentile(values, share):
@@ -62,27 +75,26 @@ def percentile(values, share):
 
 
 def measure(count, seconds):
-    with clay("bracket.step", "--count", str(count)) as (url, _):
+    with clay("bracket.step", "--count", str(count)) as (url, process):
         setup = Hand(url, 16 * "c")
         cells = sum(1 for _ in setup.settled()["positions"]) // 3
         setup.act("hold bracket/1", "grab face bracket/2")
         setup.leave()
-        rate, latencies = by_program(url, seconds)
+        rate, work, latencies = by_program(url, process, seconds)
         with chromium() as browser:
-            began = time.monotonic()
             browser.open(url.geturl())
             loaded = browser.run("return performance.getEntriesByName('ready')[0].startTime")
             browser.run("flexelView.clay.post('take')")
             browser.wait("flexelView.clay.mine && flexelView.clay.frame.tools.length === 1")
             drawn = browser.run(DRAG, seconds)
     ms = drawn["latencies"] or [math.nan]
-    print(f"| {count:,} | {cells:,} | {rate:.1f} | {1e3 * statistics.median(latencies):.0f} | {1e3 * percentile(latencies, 0.95):.0f} | "
+    print(f"| {count:,} | {cells:,} | {1e3 * work:.0f} | {rate:.1f} | {1e3 * statistics.median(latencies):.0f} | {1e3 * percentile(latencies, 0.95):.0f} | "
           f"{drawn['rate']:.1f} | {statistics.median(ms):.0f} | {percentile(ms, 0.95):.0f} | {loaded / 1e3:.2f} s |", flush=True)
 
 
 def pictures(folder):
     with clay("bracket.step", "--material", "PLA") as (url, _), chromium((1280, 900)) as browser:
-        x, y = bent_by_hand(browser, url)
+        x, y = bent_by_hand(browser, url, "z")
         browser.choose("colour", "displacement")
         settle(browser)
         time.sleep(1)
@@ -112,9 +124,9 @@ def main():
         subprocess.run([pathlib.Path(os.environ["FLEXEL_BIN"]) / "make_bracket", "bracket.step"], check=True)
         if folder:
             return pictures(folder)
-        print(f"load of the machine before: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores\n")
-        print("| cells asked for | elements | frames a second | ms, median | 95 % | drawn a second | ms to the picture, median | 95 % | loaded after |")
-        print("|---|---|---|---|---|---|---|---|---|", flush=True)
+        print(f"The page without data: {page_weight():.2f} MB (bracket.step included); load of the machine before: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores\n")
+        print("| cells asked for | elements | processor ms a frame | frames a second | ms, median | 95 % | drawn a second | ms to the picture, median | 95 % | loaded after |")
+        print("|---|---|---|---|---|---|---|---|---|---|", flush=True)
         for count in options.counts.split(","):
             measure(int(count), options.seconds)
         os.chdir("/")

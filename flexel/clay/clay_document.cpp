@@ -52,6 +52,7 @@ std::string scene_text(const ClayDocument& document, const std::string& base, bo
   std::string text;
   if (!document.material.empty()) text += "material = " + where_of_name(document.material) + "\n";
   text += base;
+  if (!text.empty() && text.back() != '\n') text += '\n';
   for (const std::string& name : document.holds) text += "\n[[fix]]\nwhere = " + where_of_name(name) + "\n";
   for (std::size_t t = 0; t < document.tools.size(); ++t) text += move_of(document.tools[t], t + 1);
   return keep ? kept_text(std::move(text)) : text;

@@ -135,13 +135,17 @@ ClaySession::ClaySession(std::shared_ptr<const Body> body, std::string material,
 }
 
 ClaySession::~ClaySession() {
+  close();
+  thread_.join();
+}
+
+void ClaySession::close() {
   {
     const std::lock_guard lock(mutex_);
     stop_ = true;
   }
   changed_.notify_all();
   hub_.close();
-  thread_.join();
 }
 
 Answer ClaySession::act(const std::string& message) {
@@ -161,10 +165,8 @@ Answer ClaySession::act(const std::string& message) {
   if (queue_.size() + said.acts.size() > kMostWaiting) return {429, "too many acts wait\n"};
   for (Act& act : said.acts) {
     if (is_motion(act)) ++line_;
-    if (is_motion(act) && !queue_.empty() && is_motion(queue_.back()))
-      queue_.back() = std::move(act);
-    else
-      queue_.push_back(std::move(act));
+    if (is_motion(act) && !queue_.empty() && is_motion(queue_.back().act)) queue_.pop_back();
+    queue_.push_back({std::move(act), line_});
   }
   changed_.notify_all();
   return {200, fmt::format("{{\"line\":{}}}\n", line_)};
@@ -204,10 +206,10 @@ bool ClaySession::wait(std::optional<Act>& act) {
   news_ = false;
   if (stop_) return false;
   if (!queue_.empty()) {
-    act = std::move(queue_.front());
+    act = std::move(queue_.front().act);
+    taken_ = queue_.front().line;
     queue_.pop_front();
     settled_ = false;
-    taken_ = line_;
   }
   return true;
 }
@@ -226,7 +228,7 @@ void ClaySession::run() {
       said_ = error.what();
       stroke_ = {};
       const std::lock_guard lock(mutex_);
-      settled_ = true;
+      settled_ = !act;  // after an act that failed the part comes to rest where it is
     }
     publish();
   }
@@ -404,12 +406,18 @@ void ClaySession::learn_stiffness(const ToolPose& before, const Vec3& force) {
   if (stroke_.spring == 0) stroke_.spring = kSpring * stiffness;
 }
 
+bool ClaySession::more_waits() {
+  const std::lock_guard lock(mutex_);
+  return !queue_.empty();
+}
+
 // One step of the tool towards where it should be; a shorter one where the part does not follow so far at once.
 void ClaySession::lead() {
   const ToolPose before = document_.tools.back().pose, whole = goal() - before;
   const Vec3 force = model_->felt().back().force;
   double share = 1;
   for (int tries = 0; tries < kMostHalvings; ++tries, share /= 2) {
+    if (tries > 0 && more_waits()) return;  // the hand has gone elsewhere
     const ToolPose pose = share == 1 ? before + whole : before + whole * share;
     if (!model_->lead(poses_with(share == 1 ? goal() : pose), kDragTolerance, kDragIterations, stop_asked()))
       continue;

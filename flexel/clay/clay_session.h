@@ -37,6 +37,8 @@ class ClaySession {
   void joined(const std::string& client);
   void left(const std::string& client);
   [[nodiscard]] FrameHub& hub() { return hub_; }
+  // Nothing is waited for any more: readers end, files are refused, the part stays where it is.
+  void close();
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -61,6 +63,7 @@ class ClaySession {
   [[nodiscard]] std::vector<ToolPose> poses_with(const ToolPose& last) const;
   void learn_stiffness(const ToolPose& before, const Vec3& force);
   void remember();
+  [[nodiscard]] bool more_waits();
   void publish();
   [[nodiscard]] std::string head(std::size_t bytes) const;
   [[nodiscard]] Answer mapped(const std::string& name, const Body& body) const;
@@ -79,7 +82,11 @@ class ClaySession {
   // Of all, under the mutex
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::deque<Act> queue_;
+  struct Waiting {
+    Act act;
+    std::uint64_t line = 0;  // number of the last pose up to it
+  };
+  std::deque<Waiting> queue_;
   std::string holder_;
   Clock::time_point heard_;             // from the holder
   std::uint64_t line_ = 0, taken_ = 0;  // poses that came, that the part follows

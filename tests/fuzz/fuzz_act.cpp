@@ -10,8 +10,10 @@ namespace {
 using namespace flexel;
 
 constexpr const char* kMessage =
-    "client 0123456789abcdef\nhold bracket/1\nfree bracket/1\ngrab face bracket/2\ngrab at 0.08 0.02 0.003 0.004\n"
-    "hand 0 0 -0.005\nhand 0 0 -0.005 0 0.1 0\n0 1e-3 0 0\n0 1e-3 2e-3 0 0 0.1 0\nstay\nrelease\nkeep\nundo\nredo\n"
+    "client 0123456789abcdef\nhold bracket/1\nfree bracket/1\ngrab face bracket/2\ngrab at 0.08 0.02 0.003 "
+    "0.004\n"
+    "hand 0 0 -0.005\nhand 0 0 -0.005 0 0.1 0\n0 1e-3 0 0\n0 1e-3 2e-3 0 0 0.1 "
+    "0\nstay\nrelease\nkeep\nundo\nredo\n"
     "material PLA\ntake\n";
 
 // Names and numbers of a message are those of a scene that can be read.
@@ -22,9 +24,9 @@ void check_scene(const clay::ActMessage& message) {
     if (!act.pose.displacement.allFinite() || !act.pose.turn.allFinite() || !act.at.allFinite()) std::abort();
     if (act.kind == clay::Act::Kind::hold) document.holds.push_back(act.name);
     if (act.kind == clay::Act::Kind::grab)
-      document.tools.push_back({act.name.empty() ? clay::where_of_ball(act.at, act.radius)
-                                                 : clay::where_of_name(act.name),
-                                act.at, act.radius, act.at, act.pose});
+      document.tools.push_back(
+          {act.name.empty() ? clay::where_of_ball(act.at, act.radius) : clay::where_of_name(act.name), act.at,
+           act.radius, act.at, act.pose});
   }
   (void)simulate::parse_scene(clay::scene_text(document, "", true), "clay");
 }

@@ -39,14 +39,15 @@ def pressed(browser, label):
         return [left + width / 2, top + height / 2];""", label))
 
 
-def bent_by_hand(browser, url):
-    """Holds the wall side, drags the tip by 5 mm with the mouse; the frame that it ends in."""
+def bent_by_hand(browser, url, along="any"):
+    """Holds the wall side, drags the tip by 5 mm in the picture; where the mouse is, its button still down."""
     browser.open(url.geturl())
     browser.run("flexelView.picture.view.turn(-180, 0); flexelView.picture.fit()")
     browser.click(*centre_of_face(browser, "bracket/1"))
     browser.wait("flexelView.clay.frame.holds.includes('bracket/1')")
     browser.run("flexelView.controls.look('iso')")
     choose_hand(browser, "pull")
+    browser.choose("along", along)
     x, y = centre_of_face(browser, "bracket/2")
     scale = browser.run("const {picture} = flexelView; return picture.pixelsPerMetre(picture.panels[0], picture.layout[0])")
     far = 0.005 * scale
@@ -82,6 +83,16 @@ def test_a_drag_is_the_move_of_flexel_deform():
     expect(abs(1e3 * box - min(c[2] for c in corners(data))) < 0.03, "what is drawn is that within 0.03 mm")
     force = json.loads(pathlib.Path("summary.json").read_text())["simulate"]["reactions"][-1]["force"]
     expect(max(abs(a + b) for a, b in zip(force, frame["felt"][-1])) < 1e-4 * max(map(abs, force)), f"and so is the force: {force} {frame['felt']}")
+
+
+def test_a_drag_along_an_axis_goes_nowhere_else():
+    bracket()
+    with clay("bracket.step", "--size", "5 mm") as (url, _), chromium() as browser:
+        x, y = bent_by_hand(browser, url, "z")
+        browser.mouse(("move", x, y), ("up",))
+        settle(browser)
+        place = browser.run("return flexelView.clay.frame.place[0]")
+        expect(-0.008 < place[2] < -0.004 and max(map(abs, place[:2])) < 0.1 * abs(place[2]), f"along z: {place}")
 
 
 def test_the_way_of_someone_new_by_keys():

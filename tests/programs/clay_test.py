@@ -188,7 +188,7 @@ def test_undo_and_redo_lead_back_and_forth():
 
 def test_what_cannot_be_is_said_and_harms_nothing():
     bracket()
-    with clay("bracket.step", "--size", "5 mm") as (url, process):
+    with clay("bracket.step", "--size", "8 mm") as (url, process):
         hand = Hand(url, "0123456789abcdef")
         for lines, said in ((["hand 0 0 -0.001"], "no tool"), (["hold bracket/99"], "bracket/99"), (["grab at 5 5 5 0.001"], "no element"),
                             (["keep"], "kept"), (["material butter"], "butter"), (["hold bracket/1", "grab face bracket/1"], "is held")):

@@ -176,13 +176,26 @@ export class Clay {
     const metre = this.picture.pixelsPerMetre(this.panel, this.picture.layout[0]);
     const [x, y] = [drag.now[0] - drag.from[0], drag.now[1] - drag.from[1]], {right, up, eye} = drag.axes;
     const pose = [...drag.base];
-    for (const [k, axis] of ["x", "y", "z"].entries())
-      if (drag.mode === "twist") pose[3 + k] += kTurnPerPixel * x * eye[axis];
-      else pose[k] += (x * right[axis] - y * up[axis]) / metre;
+    if (drag.mode === "twist") {
+      ["x", "y", "z"].forEach((axis, k) => { pose[3 + k] += kTurnPerPixel * x * eye[axis]; });
+    } else {
+      const way = right.clone().multiplyScalar(x / metre).addScaledVector(up, -y / metre);
+      const along = this.by("along").value;
+      if (along !== "any") this.keepAlong(way, along, right, up);
+      [way.x, way.y, way.z].forEach((value, k) => { pose[k] += value; });
+    }
     if (x !== 0 || y !== 0) this.post("hand " + pose.join(" "));
     if (!drag.done) return;
     this.drag = undefined;
     this.post("stay");
+  }
+
+  // A way in the picture becomes one along an axis that looks the same there.
+  keepAlong(way, axis, right, up) {
+    const direction = new THREE.Vector3(...["x", "y", "z"].map(each => each === axis ? 1 : 0));
+    const [a, b] = [direction.dot(right), direction.dot(up)], seen = a * a + b * b;
+    const length = seen < 0.01 ? 0 : (way.dot(right) * a + way.dot(up) * b) / seen;
+    way.copy(direction.multiplyScalar(length));
   }
 
   // --- frames ---
@@ -195,7 +208,9 @@ export class Clay {
       this.follow();
     }
     if (this.drag && !this.drag.base && frame.said) this.drag = undefined;
-    if (frame.said !== before?.said || (frame.holds.length === 0) !== (before?.holds.length === 0)) this.say(frame.said || this.hint, frame.said ? "warning" : "faint");
+    const text = frame.said || this.hint;
+    if (text !== this.told) this.say(text, frame.said ? "warning" : "faint");
+    this.told = text;
     if (frame.positions) this.fresh = frame.positions;
     if (this.asked) return;
     this.asked = true;
@@ -246,6 +261,12 @@ export class Clay {
     return this.frame.tools.length === 0 ? "Choose \u201cpulls where it drags\u201d, and drag at another place." : "Drag on, keep the shape, or save.";
   }
 
+  turnText(t) {
+    const turn = Math.hypot(...this.frame.place[t].slice(3)) * 180 / Math.PI;
+    if (turn < 0.05) return "";
+    return `, ${numberText(Math.hypot(...this.frame.felt[t].slice(3)), 3)}\u00a0N\u00a0m at ${numberText(turn, 3)}\u00b0`;
+  }
+
   forceText(t) {
     const force = Math.hypot(...this.frame.felt[t].slice(0, 3));
     return force >= 1000 ? `${numberText(force / 1000, 3)}\u00a0kN` : `${numberText(force, 3)}\u00a0N`;
@@ -267,7 +288,7 @@ export class Clay {
     if (frame.material) this.by("material").value = frame.material;
     const last = frame.tools.length - 1;
     const way = last < 0 ? 0 : Math.hypot(...frame.place[last].slice(0, 3)) / this.unit.factor;
-    this.by("feel").textContent = last < 0 ? "nothing" : `${this.forceText(last)} at ${numberText(way, 3)}\u00a0${this.unit.name}` + (frame.settled ? "" : " \u2026");
+    this.by("feel").textContent = last < 0 ? "nothing" : `${this.forceText(last)} at ${numberText(way, 3)}\u00a0${this.unit.name}` + this.turnText(last) + (frame.settled ? "" : " \u2026");
     this.picture.redraw();
   }
 
@@ -309,13 +330,14 @@ export class Clay {
     context.font = `${em}px system-ui, sans-serif`;
     context.lineWidth = 2;
     context.textAlign = "left";
+    context.textBaseline = "middle";
     context.fillStyle = context.strokeStyle = theme.ink;
     for (const name of frame.holds) {
       const at = this.facePlaces.get(name);
       if (!at) continue;
       const [x, y] = this.picture.project(this.panel, this.panel.placeOf(at));
       context.fillRect(x - em / 3, y - em / 3, 0.66 * em, 0.66 * em);
-      context.fillText(`held: ${name}`, x + 0.6 * em, y + 0.35 * em);
+      this.label(context, theme, `held: ${name}`, x + 0.6 * em, y);
     }
     frame.tools.forEach((_, t) => {
       const middle = frame.middles[t], [x, y] = this.worldPoint(middle.map((m, k) => m + frame.place[t][k]));
@@ -323,9 +345,18 @@ export class Clay {
       context.beginPath();
       context.arc(x, y, 0.5 * em, 0, 2 * Math.PI);
       context.stroke();
-      context.fillText(this.forceText(t), x + 0.8 * em, y - 0.6 * em);
+      this.label(context, theme, this.forceText(t), x + 0.8 * em, y - 0.8 * em);
       if (leads) this.drawSpring(context, [x, y], this.worldPoint(middle.map((m, k) => m + frame.hand[k])), em);
     });
+  }
+
+  // In a box, for the part below may have any colour.
+  label(context, theme, text, x, y) {
+    const {width} = context.measureText(text), {em} = this.picture;
+    context.fillStyle = theme.box;
+    context.fillRect(x - 0.2 * em, y - 0.7 * em, width + 0.4 * em, 1.4 * em);
+    context.fillStyle = theme.ink;
+    context.fillText(text, x, y);
   }
 
   // From the tool to the hand that draws it.
