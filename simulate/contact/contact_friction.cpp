@@ -42,48 +42,35 @@ void ContactFriction::find_motions(const State& state) {
   evaluation_ = states_.evaluations();
   velocities_.resize(elements.size());
   for (std::size_t e = 0; e < velocities_.size(); ++e) velocities_[e] = state.velocity[elements[e]];
-  const std::vector<std::uint32_t> points = loaded_points();
-  motions_.resize(list_.points().size());
-  parallel_for_each(
-      points.size(),
-      [&](std::size_t n) {
-        const std::uint32_t number = points[n];
-        const ContactPoint& point = list_.point(number);
-        Motion motion;
-        for (std::uint32_t a = 0; a < point.at.count; ++a)
-          motion.velocity += point.at.weights[a] * state.velocity[point.at.elements[a]];
-        if (point.at.count == 8) {
-          for (std::size_t a = 0; a < 8; ++a)
-            motion.gradient +=
-                state.velocity[point.at.elements[a]] * surface_.gradients(point.part)[a].transpose();
-          motion.gradient *= states_.points()[number].inverse;
-        }
-        motions_[number] = motion;
-      },
-      512);
-}
-
-// Numbers in PairList::points() of those in pairs under pressure or that can stick: only their motions are
-// asked for.
-std::vector<std::uint32_t> ContactFriction::loaded_points() const {
-  std::vector<std::uint8_t> loaded(list_.points().size(), 0);
+  const CarryingCells& cells = states_.cells();
+  point_velocity_.resize(cells.points().size());
+  cell_gradient_.resize(cells.cells().size());
+  point_found_.resize(cells.points().size(), 0);
+  cell_found_.resize(cells.cells().size(), 0);
+  ++found_;
+  const auto find = [&](std::uint32_t point) {
+    if (std::exchange(point_found_[point], found_) == found_) return;
+    point_velocity_[point] = cells.at_point(point, velocities_);
+    const std::uint32_t cell = cells.points()[point].cell;
+    if (std::exchange(cell_found_[cell], found_) == found_) return;
+    if (cells.cells()[cell].deforms())
+      cell_gradient_[cell] = cells.gradient(cell, velocities_) * states_.points()[point].inverse;
+    else
+      cell_gradient_[cell].setZero();
+  };
   for (const std::uint32_t p : states_.active()) {
     const ContactPair& pair = list_.pairs()[p];
     if (!(states_[p].pressure > 0) && !(pair.properties.pull_off > 0)) continue;
-    loaded[pair.i] = 1;
-    if (!pair.of_plane()) loaded[pair.j] = 1;
+    find(pair.i);
+    if (!pair.of_plane()) find(pair.j);
   }
-  std::vector<std::uint32_t> points;
-  for (std::uint32_t n = 0; n < loaded.size(); ++n)
-    if (loaded[n]) points.push_back(n);
-  return points;
 }
 
 // m/s, of j against i where they meet.
 Vec3 ContactFriction::relative_velocity(const ContactPair& pair) const {
   const std::array<Vec3, 2> place = meeting_place(pair);
   const auto at = [&](std::uint32_t point, const Vec3& away) {
-    return Vec3(motions_[point].velocity + motions_[point].gradient * away);
+    return Vec3(point_velocity_[point] + cell_gradient_[states_.cells().points()[point].cell] * away);
   };
   const Vec3 of_i = at(pair.i, place[0]);
   return pair.of_plane() ? Vec3(-of_i) : Vec3(at(pair.j, place[1]) - of_i);
@@ -128,25 +115,27 @@ Vec3 ContactFriction::force(std::size_t pair) const {
   return along * now.normal - at_most(kTangential * stiffness * held, largest_tangential(pair));
 }
 
-std::vector<PointLoad> ContactFriction::loads(const State& state) {
+const PointLoads& ContactFriction::loads(const State& state) {
   const std::vector<std::uint32_t>& active = states_.active();
-  if (active.empty()) return {};
+  loads_.reset(list_.points().size());
+  if (active.empty()) return loads_;
   if (damping_ > 0) find_motions(state);
-  std::vector<Vec3> forces(active.size(), Vec3::Zero());
+  forces_.resize(active.size());
   parallel_for_each(
-      active.size(), [&](std::size_t c) { forces[c] = force(active[c]); }, 512);
-  std::vector<PointLoad> loads(list_.points().size());
+      active.size(), [&](std::size_t c) { forces_[c] = force(active[c]); }, 512);
   for (std::size_t c = 0; c < active.size(); ++c) {
-    if (forces[c] == Vec3::Zero()) continue;
+    if (forces_[c] == Vec3::Zero()) continue;
     const ContactPair& pair = list_.pairs()[active[c]];
     const std::array<Vec3, 2> place = meeting_place(pair);
-    loads[pair.i].force -= forces[c];
-    loads[pair.i].couple -= forces[c] * place[0].transpose();
+    PointLoad& on_i = loads_.of(pair.i);
+    on_i.force -= forces_[c];
     if (pair.of_plane()) continue;
-    loads[pair.j].force += forces[c];
-    loads[pair.j].couple += forces[c] * place[1].transpose();
+    on_i.couple -= forces_[c] * place[0].transpose();
+    PointLoad& on_j = loads_.of(pair.j);
+    on_j.force += forces_[c];
+    on_j.couple += forces_[c] * place[1].transpose();
   }
-  return loads;
+  return loads_;
 }
 
 void ContactFriction::finish_step(const State& state, double drift, bool active) {

@@ -24,8 +24,8 @@ class ContactFriction {
   ContactFriction(double damping, const ContactSurface& surface, const PairList& list,
                   const PairStates& states, PairMemory& memory);
 
-  // The loads (PairList::points()) in `state`, for which the pairs have been evaluated; empty: none.
-  [[nodiscard]] std::vector<PointLoad> loads(const State& state);
+  // The loads in `state`, for which the pairs have been evaluated.
+  [[nodiscard]] const PointLoads& loads(const State& state);
   // Slip and adhesion after a step of `drift` s that led to `state`, likewise evaluated. `active`: whether
   // anything dissipates at all.
   void finish_step(const State& state, double drift, bool active);
@@ -35,12 +35,7 @@ class ContactFriction {
   void set_fresh(bool fresh) { fresh_ = fresh; }
 
  private:
-  struct Motion {  // of a point: its velocity [m/s] and that of the matter around it, dv/dx [1/s]
-    Vec3 velocity = Vec3::Zero();
-    Mat3 gradient = Mat3::Zero();
-  };
   void find_motions(const State& state);
-  [[nodiscard]] std::vector<std::uint32_t> loaded_points() const;
   void forget_separated();
   void update_record(std::size_t pair, double drift, bool fresh);
   [[nodiscard]] Vec3 force(std::size_t pair) const;
@@ -55,10 +50,16 @@ class ContactFriction {
   const PairList& list_;
   const PairStates& states_;
   PairMemory& memory_;
-  // Motions of the points, of which evaluation of the pairs and velocities of PairList::elements().
-  std::vector<Motion> motions_;
+  PointLoads loads_;
+  std::vector<Vec3> forces_;  // (active pairs) N
+  // Of points in pairs under pressure or that can stick, m/s, and of their cells, dv/dx [1/s]: for which evaluation
+  // of the pairs and velocities of PairList::elements().
+  std::vector<Vec3> point_velocity_;
+  std::vector<Mat3> cell_gradient_;
   std::vector<Vec3> velocities_;
   std::uint64_t evaluation_ = 0;
+  std::vector<std::uint64_t> point_found_, cell_found_;  // by which find_motions()
+  std::uint64_t found_ = 0;
   // Active pairs of the last finish_step(), in the list of this number.
   std::vector<std::uint32_t> last_active_;
   std::uint64_t last_builds_ = 0;

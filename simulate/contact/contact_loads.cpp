@@ -7,39 +7,45 @@
 namespace flexel::simulate {
 
 ContactLoads::ContactLoads(const ContactSurface& surface, const std::vector<std::uint8_t>& parts)
-    : surface_(surface) {
-  for (std::uint32_t p = 0; p < parts.size(); ++p)
-    if (surface.rigid(p) && surface.rigid(p)->free && parts[p]) rigid_loads_.push_back({p});
+    : surface_(surface), rigid_load_(parts.size(), kNotRigid) {
+  for (std::uint32_t p = 0; p < parts.size(); ++p) {
+    if (!surface.rigid(p) || !surface.rigid(p)->free || !parts[p]) continue;
+    rigid_load_[p] = rigid_loads_.size();
+    rigid_loads_.push_back({p});
+  }
 }
 
 void ContactLoads::clear() {
   for (RigidLoad& load : rigid_loads_) load.force = load.torque = Vec3::Zero();
 }
 
-void ContactLoads::add(const State& state, const PairList& list, const std::vector<PointState>& points,
-                       const std::vector<PointLoad>& loads, std::vector<Vec3>& forces) {
-  const Body& body = surface_.body();
-  for (std::uint32_t n = 0; n < loads.size(); ++n) {
-    const PointLoad& load = loads[n];
-    const ContactPoint& point = list.point(n);
-    if (load.force == Vec3::Zero() && load.turning == Vec3::Zero()) continue;
-    RigidLoad* rigid = nullptr;
-    for (RigidLoad& each : rigid_loads_)
-      if (each.part == point.part) rigid = &each;
-    const auto add_force = [&](std::uint32_t element, const Vec3& force) {
-      forces[element] += force;
-      if (!rigid) return;
-      rigid->force += force;
-      rigid->torque += (body.rest[element] + state.displacement[element]).cross(force);
-    };
-    for (std::uint32_t a = 0; a < point.at.count; ++a)
-      add_force(point.at.elements[a], point.at.weights[a] * load.force);
-    if (point.at.count != 8) continue;
-    const Vec3& normal = points[n].side.normal;
-    const Vec3 turned = points[n].inverse * (load.turning - load.turning.dot(normal) * normal);
-    const Mat3 couple = normal * turned.transpose() + load.couple * points[n].inverse.transpose();
-    for (std::size_t a = 0; a < 8; ++a)
-      add_force(point.at.elements[a], couple * surface_.gradients(point.part)[a]);
+void ContactLoads::add(const State& state, const PairList& list, const PairStates& states,
+                       const PointLoads& loads, std::vector<Vec3>& forces) {
+  for (std::size_t n = 0; n < loads.points().size(); ++n) {
+    const PointLoad& load = loads.loads()[n];
+    const ContactPoint& point = list.point(loads.points()[n]);
+    const PointState& now = states.points()[loads.points()[n]];
+    const InterpolationWeights& at = point.at;
+    std::array<Vec3, 8> on;
+    for (std::uint32_t a = 0; a < at.count; ++a) on[a] = at.weights[a] * load.force;
+    if (at.count == 8) {
+      const Vec3& normal = now.side.normal;
+      const Vec3 turned = now.inverse * (load.turning - load.turning.dot(normal) * normal);
+      const Mat3 couple = normal * turned.transpose() + load.couple * now.inverse.transpose();
+      const std::array<Vec3, 3>& slopes = states.cells().slopes(point.part);
+      const Vec3 x = couple * slopes[0], y = couple * slopes[1], z = couple * slopes[2];
+      const Vec3 sum = x + y, difference = x - y;
+      on[0] -= sum + z, on[1] += difference - z, on[2] -= difference + z, on[3] += sum - z;
+      on[4] += z - sum, on[5] += difference + z, on[6] += z - difference, on[7] += sum + z;
+    }
+    for (std::uint32_t a = 0; a < at.count; ++a) forces[at.elements[a]] += on[a];
+    if (rigid_load_[point.part] == kNotRigid) continue;
+    RigidLoad& rigid = rigid_loads_[rigid_load_[point.part]];
+    for (std::uint32_t a = 0; a < at.count; ++a) {
+      rigid.force += on[a];
+      rigid.torque +=
+          (surface_.body().rest[at.elements[a]] + state.displacement[at.elements[a]]).cross(on[a]);
+    }
   }
 }
 

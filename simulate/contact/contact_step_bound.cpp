@@ -80,23 +80,22 @@ double ContactStepBound::hardening(double least) {
 }
 
 // m/s, at most, of surfaces against one another.
-double ContactStepBound::speed(const State& state) const {
-  Box speeds;
-  for (const std::uint32_t e : surface_.elements()) speeds.add(state.velocity[e]);
+double ContactStepBound::speed() const {
+  Box speeds = list_.speeds();
   if (!settings_.planes.empty()) speeds.add(Vec3::Zero());
   return speeds.diagonal();
 }
 
-double ContactStepBound::frequency(const State& state) {
+double ContactStepBound::frequency() {
   hardening_ = kHardeningAhead * hardening(1);
   bound_ = damped(kLinearAhead * linear() + hardening_, settings_.damping);
   checked_builds_ = list_.builds();
-  const double motion = 2 * speed(state) / (kTravel * surface_.narrowest());
+  const double motion = 2 * speed() / (kTravel * surface_.narrowest());
   return bound_ + motion * motion;
 }
 
 bool ContactStepBound::moves_too_far(const State& state) const {
-  return speed(state) * state.kick > kMostTravel * surface_.narrowest();
+  return speed() * state.kick > kMostTravel * surface_.narrowest();
 }
 
 bool ContactStepBound::is_exceeded() {

@@ -17,8 +17,8 @@ class ContactStepBound {
                    const PairStates& states);
 
   // 1/s^2, added by the contacts to the square of the largest frequency, or what bounds the motion of a step.
-  [[nodiscard]] double frequency(const State& state);
-  // Whether the motion of a step is too large; the pairs need not be evaluated.
+  [[nodiscard]] double frequency();
+  // Whether the motion of a step is too large, by the velocities that the list of pairs has seen last.
   [[nodiscard]] bool moves_too_far(const State& state) const;
   // Whether the contacts are stiffer than frequency() last said. Of a new list, all pairs are evaluated.
   [[nodiscard]] bool is_exceeded();
@@ -37,7 +37,7 @@ class ContactStepBound {
   // 1/s^2, of the linear range; of what pairs have beyond it that are at least `least` times as stiff.
   [[nodiscard]] double linear();
   [[nodiscard]] double hardening(double least);
-  [[nodiscard]] double speed(const State& state) const;
+  [[nodiscard]] double speed() const;
 
   const ContactSettings& settings_;
   const ContactSurface& surface_;

@@ -23,11 +23,16 @@ Contacts::Contacts(ContactSettings settings, const Problem& problem)
     start_.emplace(problem, settings_.parts, kPatches);
 }
 
+void Contacts::update_list(const State& state, bool ahead) {
+  if (!list_.update(state, ahead)) return;
+  memory_.follow(list_.pairs());
+  states_.reset();
+}
+
 void Contacts::update(const State& state, bool all) {
-  if (list_.update(state)) {
-    memory_.follow(list_.pairs());
-    states_.reset();
-  }
+  if (is_current_ && !all) return;
+  const bool evaluated = !list_.pairs().empty() && states_.is_at(state);
+  if (!is_current_ && !evaluated) update_list(state, false);
   states_.update(state, all);
 }
 
@@ -38,36 +43,47 @@ double Contacts::energy(const State& state) {
   return energy;
 }
 
+bool Contacts::act(const State& state) {
+  update(state);
+  if (states_.active().empty()) loads_.clear();
+  return !states_.active().empty();
+}
+
 void Contacts::add_forces(const State& state, std::vector<Vec3>& forces) {
   update(state);
   loads_.clear();
-  if (states_.active().empty()) return;
-  std::vector<PointLoad> loads(list_.points().size());
+  point_loads_.reset(list_.points().size());
   for (const std::uint32_t p : states_.active()) {
     const PairState& now = states_[p];
     const ContactPair& pair = list_.pairs()[p];
     if (!(now.pressure > 0)) continue;
-    loads[pair.i].force -= now.force;
-    loads[pair.i].turning += now.turning[0];
+    PointLoad& on_i = point_loads_.of(pair.i);
+    on_i.force -= now.force;
+    on_i.turning += now.turning[0];
     if (pair.of_plane()) continue;
-    loads[pair.j].force += now.force;
-    loads[pair.j].turning += now.turning[1];
+    PointLoad& on_j = point_loads_.of(pair.j);
+    on_j.force += now.force;
+    on_j.turning += now.turning[1];
   }
-  loads_.add(state, list_, states_.points(), loads, forces);
+  loads_.add(state, list_, states_, point_loads_, forces);
 }
 
 void Contacts::add_dissipative_forces(const State& state, std::vector<Vec3>& forces) {
   update(state);
-  loads_.add(state, list_, states_.points(), friction_.loads(state), forces);
+  loads_.add(state, list_, states_, friction_.loads(state), forces);
 }
 
+// Without pairs nothing happens in a step; whether there are is asked before the next one.
 void Contacts::finish_step(const State& state, double drift) {
+  is_current_ = false;
+  if (list_.built() && list_.pairs().empty()) return;
   update(state);
   states_.finish_step(state, drift);
 }
 
 void Contacts::finish_losses(const State& state, double drift) {
-  update(state);
+  is_current_ = false;
+  if (!list_.built() || !list_.pairs().empty()) update(state);
   friction_.finish_step(state, drift, dissipate());
 }
 
@@ -83,14 +99,17 @@ void Contacts::refuse_overlap(const State& state) {
 
 double Contacts::frequency(const State& state) {
   if (points().empty()) return 0;
+  update_list(state, true);
   update(state, true);
-  return bound_.frequency(state);
+  return bound_.frequency();
 }
 
 bool Contacts::needs_step_recheck(const State& state) {
   if (points().empty()) return false;
+  update_list(state, true);
   if (bound_.moves_too_far(state)) return true;
-  update(state);
+  states_.update(state);
+  is_current_ = true;
   if (!bound_.checked()) update(state, true);
   return bound_.is_exceeded();
 }
@@ -130,6 +149,7 @@ void Contacts::restore(const std::vector<double>& memory) {
     at = Vec3(from[0], from[1], from[2]);
     from += 3;
   }
+  is_current_ = false;
   friction_.set_fresh(memory[4] == 1);
   states_.set_hardened(memory[6]);
   const bool built = memory[0] != 0;

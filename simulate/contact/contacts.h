@@ -23,6 +23,7 @@ class Contacts {
   [[nodiscard]] const std::vector<ContactPoint>& points() const { return surface_.points(); }
 
   [[nodiscard]] double energy(const State& state);  // J, of the forces along the normals
+  [[nodiscard]] bool act(const State& state);       // whether any pair is near
   void add_forces(const State& state, std::vector<Vec3>& forces);
   // Of friction, damping and adhesion.
   void add_dissipative_forces(const State& state, std::vector<Vec3>& forces);
@@ -57,13 +58,16 @@ class Contacts {
 
   // 1/s^2, added to the square of the largest frequency, or what bounds the motion of a step.
   [[nodiscard]] double frequency(const State& state);
-  // Whether more is needed than frequency() said last.
+  // Whether more is needed than frequency() said last. The displacements are these until the next
+  // finish_step(): the pairs are not looked at again.
   [[nodiscard]] bool needs_step_recheck(const State& state);
 
   // Pairs under pressure, as numbers of points (a plane: behind the last point), ascending.
   [[nodiscard]] std::vector<std::array<std::uint32_t, 2>> touching(const State& state);
 
  private:
+  // The list of pairs; `ahead`: with the way of the next step.
+  void update_list(const State& state, bool ahead);
   // `all`: candidates that cannot touch yet too, for the bound of the step.
   void update(const State& state, bool all = false);
 
@@ -77,6 +81,8 @@ class Contacts {
   ContactFriction friction_;
   ContactStepBound bound_;
   ContactLoads loads_;
+  PointLoads point_loads_;   // of add_forces()
+  bool is_current_ = false;  // list and states, for the displacements of the last needs_step_recheck()
 };
 
 }  // namespace flexel::simulate

@@ -209,6 +209,10 @@ double Contact::energy(const State& state) {
   return contacts_->energy(state);
 }
 
+bool Contact::acts(const State& state) {
+  return contacts_->act(state);
+}
+
 void Contact::add_forces(const State& state, std::vector<Vec3>& forces) {
   contacts_->add_forces(state, forces);
 }
@@ -267,6 +271,10 @@ std::vector<EnergyTransfer> Contact::take_transfers(const State& state) {
 std::optional<ContactLosses> Contact::losses() const {
   if (!contacts_->dissipate()) return std::nullopt;
   return ContactLosses(contacts_);
+}
+
+bool ContactLosses::acts(const State& state) {
+  return contacts_->act(state);
 }
 
 void ContactLosses::add_forces(const State& state, std::vector<Vec3>& forces) {

@@ -21,6 +21,7 @@ class ContactLosses : public Effect {
   [[nodiscard]] EnergyAccount account() const override { return EnergyAccount::dissipation; }
   [[nodiscard]] bool finishes_steps() const override { return true; }
   [[nodiscard]] bool takes_implicit_steps() const override { return false; }
+  [[nodiscard]] bool acts(const State& state) override;
   void add_forces(const State& state, std::vector<Vec3>& forces) override;
   void finish_step(State& state, const StepDone& done) override;
 
@@ -54,6 +55,7 @@ class Contact : public Effect {
   [[nodiscard]] EnergyAccount account() const override { return EnergyAccount::stored; }
   [[nodiscard]] bool takes_implicit_steps() const override { return false; }
   [[nodiscard]] double energy(const State& state) override;
+  [[nodiscard]] bool acts(const State& state) override;
   void add_forces(const State& state, std::vector<Vec3>& forces) override;
   [[nodiscard]] double added_frequency(const State& state, const std::vector<double>& mass) override;
   [[nodiscard]] bool needs_step_recheck(const State& state) override;

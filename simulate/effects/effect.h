@@ -81,6 +81,8 @@ class Effect {
 
   // --- mechanics ---
   [[nodiscard]] virtual double energy(const State&) { return 0; }  // J
+  // Whether its forces may be other than 0 in this state; asked right before add_forces().
+  [[nodiscard]] virtual bool acts(const State&) { return true; }
   // N, minus the energy's derivative.
   virtual void add_forces(const State&, std::vector<Vec3>& /*forces*/) {}
   // N/m, minus the forces' derivative.

@@ -149,9 +149,10 @@ void TimeSegment::make_implicit() {
 void TimeSegment::make_forces() {
   for (const ActiveEffect& effect : effects_) {
     if (effect->account() == EnergyAccount::none) continue;
-    if (steady_.empty()) steady_.assign(body_.element_count(), Vec3::Zero());
-    if (effect->constant()) effect->add_forces(state_, steady_);
     varies_ = varies_ || !effect->constant();
+    if (!effect->constant()) continue;
+    if (steady_.empty()) steady_.assign(body_.element_count(), Vec3::Zero());
+    effect->add_forces(state_, steady_);
   }
   for (std::size_t p = 0; p < body_.parts.size(); ++p) {
     if (body_.parts[p].placement != Placement::centre) continue;
@@ -163,7 +164,6 @@ void TimeSegment::make_forces() {
     if (!yield_->acts()) yield_.reset();
     for (const ActiveEffect& effect : effects_) effect->attach(*paper_, plan_.damping);
   }
-  if (varies_ && steady_.empty()) steady_.assign(body_.element_count(), Vec3::Zero());
 }
 
 std::unique_ptr<EnergyHistory> TimeSegment::make_history(Ledger ledger) const {
@@ -253,11 +253,15 @@ void TimeSegment::add_apart(std::vector<Vec3>* own, const Add& add) {
   if (own) parallel_for_each(own->size(), [&](std::size_t e) { (*own)[e] = outer_[e] - (*own)[e]; });
 }
 
-// Forces of the effects at the present state; with a history also one by one, those that are constant but
-// once.
-void TimeSegment::sum_forces(EnergyHistory* history) {
+// Those that are constant but once. Where no other acts, as contacts do not in free flight, their sum as it is.
+const std::vector<Vec3>& TimeSegment::sum_forces(EnergyHistory* history) {
   const bool guarded = guard_ && guard_->watches();
-  if (!varies_ && !guarded) return;
+  const bool needed = guarded || (varies_ && (history || paper_));
+  const auto acts = [&](const ActiveEffect& effect) {
+    return effect.untimed().account() != EnergyAccount::none && !effect.untimed().constant() &&
+           effect->acts(state_);
+  };
+  if (!needed && (!varies_ || std::none_of(effects_.begin(), effects_.end(), acts))) return steady_;
   outer_ = steady_;
   if (outer_.empty()) outer_.assign(body_.element_count(), Vec3::Zero());
   for (std::size_t p = 0; p < effects_.size(); ++p) {
@@ -267,13 +271,10 @@ void TimeSegment::sum_forces(EnergyHistory* history) {
               [&](std::vector<Vec3>& sum) { effect->add_forces(state_, sum); });
   }
   if (paper_) add_connection_forces(history);
-  if (!guarded) return;
+  if (!guarded) return outer_;
   const ScopeTimer timer(kernel_seconds_);
   guard_->add_forces(state_, outer_);
-}
-
-const std::vector<Vec3>& TimeSegment::outer() const {
-  return varies_ || (guard_ && guard_->watches()) ? outer_ : steady_;
+  return outer_;
 }
 
 void TimeSegment::add_connection_forces(EnergyHistory* history) {
@@ -379,12 +380,11 @@ void TimeSegment::step(Clock& clock, EnergyHistory* history, bool row) {
   state_.kick = advance.kick;
   const ConnectionLosses lost = yield_connections();
   if (history) history->before(state_, row, row && guard_ ? guard_->energy(state_) : 0);
-  sum_forces(history);
+  const std::vector<Vec3>& forces = sum_forces(history);
   StepOutcome outcome;
   const double end = clock.epoch + static_cast<double>(clock.in_epoch + 1) * clock.step;
   {
     const ScopeTimer timer(kernel_seconds_);
-    const std::vector<Vec3>& forces = outer();
     outcome = staged_ ? staged_->advance(state_, forces, advance, end, clock.damping_rate)
                       : stepper_->advance(state_, forces, advance);
     if (outcome.broken > 0 && guard_ && guard_->watches() && stepper_->mark_broken(body_.broken))
@@ -429,8 +429,7 @@ void TimeSegment::kick(double time) {
   const std::vector<Vec3> before = state_.velocity;
   state_.kick = std::abs(time);
   (void)yield_connections();
-  sum_forces(nullptr);
-  (void)stepper_->advance(state_, outer(), {time, 0, false});
+  (void)stepper_->advance(state_, sum_forces(nullptr), {time, 0, false});
   held_->copy(before, state_.velocity);
   stepper_->restore(memory);
   if (yield_) paper_->memory() = connections;

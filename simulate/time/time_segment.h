@@ -133,9 +133,8 @@ class TimeSegment {
   void tell_loop_apart();
   template <class Add>
   void add_apart(std::vector<Vec3>* own, const Add& add);
-  void sum_forces(EnergyHistory* history);
-  // Forces of the effects at the present state; none: empty.
-  [[nodiscard]] const std::vector<Vec3>& outer() const;
+  // Forces of the effects at the present state; none: empty. With a history also one by one.
+  [[nodiscard]] const std::vector<Vec3>& sum_forces(EnergyHistory* history);
   void add_connection_forces(EnergyHistory* history);
   // Breaks and lets flow what passes its limits in the present state.
   ConnectionLosses yield_connections();

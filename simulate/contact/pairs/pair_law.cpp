@@ -31,7 +31,30 @@ Smooth ramp(double at, double from, double to) {
 
 }  // namespace
 
-PairState pair_state(const ContactSide& i, const ContactSide& j, const PairConstants& pair) {
+void press(PairState& now, const ContactSide& i, const ContactSide& j, const NormalLaw& normal_law) {
+  const NormalLaw::Value law = normal_law.at(-now.gap);
+  now.stiffness = now.weight * law.stiffness;
+  now.energy = now.pressure = now.share = 0;
+  now.force = now.turning[0] = now.turning[1] = Vec3::Zero();
+  if (!(law.pressure > 0)) return;
+  now.share = normal_law.share(-now.gap);
+  now.energy = now.weight * law.energy;
+  now.pressure = now.weight * law.pressure;
+  const double spread = now.narrowing * law.energy;  // N/m, of t
+  now.force = now.pressure * now.normal + spread * now.offset;
+  if (now.length > 0) {
+    const Vec3 tilt = (spread * now.along - now.pressure) / now.length * now.offset;
+    now.turning = {i.own_plane * tilt, -j.own_plane * tilt};
+  }
+  if (now.facing_slope > 0) {
+    const double turn = now.facing_slope * law.energy;
+    now.turning[0] -= turn * j.normal;
+    now.turning[1] -= turn * i.normal;
+  }
+}
+
+PairState pair_state(const ContactSide& i, const ContactSide& j, const PairConstants& pair, double allowed,
+                     double soft) {
   PairState now;
   const Vec3 d = j.position - i.position;
   const double far = std::max(pair.limit, pair.width);
@@ -45,32 +68,19 @@ PairState pair_state(const ContactSide& i, const ContactSide& j, const PairConst
   const bool balls = i.radius > 0 && j.radius > 0;
   if (!balls && !(length > 0)) return now;  // two that have no plane of their own
   now.normal = balls ? d.normalized() : Vec3(b / length);
-  const double along = d.dot(now.normal);
-  now.gap = along - i.radius - j.radius + pair.allowed;
-  now.offset = balls ? Vec3(Vec3::Zero()) : Vec3(d - along * now.normal);
+  now.along = d.dot(now.normal);
+  now.gap = now.along - i.radius - j.radius + allowed;
+  now.offset = balls ? Vec3(Vec3::Zero()) : Vec3(d - now.along * now.normal);
   const Smooth k = kernel(now.offset.squaredNorm(), pair.width);
   if (!(k.value > 0)) return now;
   now.near = true;
   now.deep = now.gap < -pair.limit;
   if (now.deep) return now;
   now.weight = pair.stiffness * k.value * facing.value;
-  const NormalLaw::Value law = pair.law.at(-now.gap);
-  now.stiffness = now.weight * law.stiffness;
-  if (!(law.pressure > 0)) return now;
-  now.share = pair.law.share(-now.gap);
-  now.energy = now.weight * law.energy;
-  now.pressure = now.weight * law.pressure;
-  const double spread = -2 * pair.stiffness * k.slope * facing.value * law.energy;  // N/m, of t
-  now.force = now.pressure * now.normal + spread * now.offset;
-  if (!balls) {
-    const Vec3 tilt = (spread * along - now.pressure) / length * now.offset;
-    now.turning = {i.own_plane * tilt, -j.own_plane * tilt};
-  }
-  if (faces) {
-    const double turn = pair.stiffness * k.value * facing.slope * law.energy;
-    now.turning[0] -= turn * j.normal;
-    now.turning[1] -= turn * i.normal;
-  }
+  now.length = balls ? 0 : length;
+  now.narrowing = -2 * pair.stiffness * k.slope * facing.value;
+  now.facing_slope = pair.stiffness * k.value * facing.slope;
+  press(now, i, j, pair.law.softened(soft));
   return now;
 }
 

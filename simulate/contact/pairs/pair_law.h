@@ -63,8 +63,7 @@ struct PairConstants {
   double stiffness = 0;  // kappa A_i A_j [N m], or kappa A [N/m] where the kernel is 1
   double width = 0;      // rho [m]; 0: the kernel is 1
   double facing_from = 0, facing_fully = 0;
-  double limit = 0;    // m, penetration beyond which the pair is no contact
-  double allowed = 0;  // m, p: penetration without pressure (initial-penetration release)
+  double limit = 0;  // m, penetration beyond which the pair is no contact
   NormalLaw law;
 };
 
@@ -81,8 +80,17 @@ struct PairState {
   Vec3 offset = Vec3::Zero();                               // t
   Vec3 force = Vec3::Zero();                                // N, on j; minus it on i
   std::array<Vec3, 2> turning{Vec3::Zero(), Vec3::Zero()};  // dU/dn_i, dU/dn_j [J]
+  // Of the geometry, for press(): d . n [m]; |b|, 0 for balls; derivatives of the weight by half of t^2 [N/m^3],
+  // its sign turned, and by c [N/m].
+  double along = 0, length = 0, narrowing = 0, facing_slope = 0;
 };
 
-[[nodiscard]] PairState pair_state(const ContactSide& i, const ContactSide& j, const PairConstants& pair);
+// `allowed` [m]: p, penetration without pressure (initial-penetration release); `soft` [m]: delta_0, where it is
+// wider than the law's own.
+[[nodiscard]] PairState pair_state(const ContactSide& i, const ContactSide& j, const PairConstants& pair,
+                                   double allowed = 0, double soft = 0);
+// The same pair under a law of another softness: pair_state() with it, bit by bit. Only if it is near and not
+// deep.
+void press(PairState& now, const ContactSide& i, const ContactSide& j, const NormalLaw& law);
 
 }  // namespace flexel::simulate

@@ -26,33 +26,39 @@ PairList::PairList(const ContactSettings& settings, const Problem& problem, cons
       excluded_(settings, problem, surface),
       built_at_(surface.elements().size()) {}
 
-bool PairList::update(const State& state) {
-  if (built_ && !is_due(state)) return false;
+bool PairList::update(const State& state, bool ahead) {
+  if (!is_due(state, ahead)) return false;
   build(state);
   return true;
 }
 
 // Half the diagonal of the box of the moves since the list was made bounds them but for a common one. The next
-// step's are among them: the length of a step is chosen before it leads to an impact.
-bool PairList::is_due(const State& state) const {
+// step's are in their box widened by that of the velocities: the length of a step is chosen before it leads to
+// an impact.
+bool PairList::is_due(const State& state, bool ahead) {
   constexpr std::size_t kGrain = 4096;
   const std::vector<std::uint32_t>& elements = surface_.elements();
-  std::vector<Box> boxes((elements.size() + kGrain - 1) / kGrain);
+  boxes_.assign((elements.size() + kGrain - 1) / kGrain, {});
   parallel_chunks(elements.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-    Box now, next;
+    Box moves, speeds;
     for (std::size_t e = begin; e < end; ++e) {
-      const Vec3 move = state.displacement[elements[e]] - built_at_[e];
-      now.add(move);
-      next.add(move + state.kick * state.velocity[elements[e]]);
+      moves.add(state.displacement[elements[e]] - built_at_[e]);
+      if (ahead) speeds.add(state.velocity[elements[e]]);
     }
-    Box& box = boxes[begin / kGrain];
-    box = now;
-    if (state.kick > 0) box.add(next.min), box.add(next.max);
+    boxes_[begin / kGrain] = {moves, speeds};
   });
-  Box moves;
-  for (const Box& box : boxes) moves.add(box.min), moves.add(box.max);
+  Box moves, speeds;
+  for (const auto& [own_moves, own_speeds] : boxes_) {
+    moves.add(own_moves.min), moves.add(own_moves.max);
+    if (ahead) speeds.add(own_speeds.min), speeds.add(own_speeds.max);
+  }
+  if (ahead) speeds_ = speeds;
+  if (ahead && state.kick > 0 && !speeds.empty()) {
+    moves.add(moves.min + state.kick * speeds.min);
+    moves.add(moves.max + state.kick * speeds.max);
+  }
   if (!settings_.planes.empty()) moves.add(Vec3::Zero());
-  return 0.5 * moves.diagonal() > slack_ || surface_.broken_cells() != built_with_;
+  return !built_ || 0.5 * moves.diagonal() > slack_ || surface_.broken_cells() != built_with_;
 }
 
 void PairList::rebuild_at(const std::vector<Vec3>* displacements) {

@@ -23,8 +23,11 @@ class PairList {
   // `settings` and `surface` outlive this.
   PairList(const ContactSettings& settings, const Problem& problem, const ContactSurface& surface);
 
-  // Finds the pairs anew where that is due. Returns whether it was.
-  bool update(const State& state);
+  // Finds the pairs anew where that is due; `ahead`: also where the way of the next step may make it so.
+  // Returns whether it was.
+  bool update(const State& state, bool ahead);
+  // m/s, velocities of the elements when update() was asked ahead last.
+  [[nodiscard]] const Box& speeds() const { return speeds_; }
 
   [[nodiscard]] const std::vector<ContactPair>& pairs() const { return pairs_; }  // ascending by key
   // Contact points of pairs, ascending, and the elements that carry them, ascending.
@@ -43,7 +46,7 @@ class PairList {
   void rebuild_at(const std::vector<Vec3>* displacements);
 
  private:
-  [[nodiscard]] bool is_due(const State& state) const;
+  [[nodiscard]] bool is_due(const State& state, bool ahead);
   void build(const State& state);
   [[nodiscard]] std::vector<std::uint32_t> points_of_near_parts(const std::vector<Vec3>& positions,
                                                                 double farthest);
@@ -60,10 +63,12 @@ class PairList {
   std::vector<ContactPair> pairs_;
   std::vector<std::uint32_t> points_, elements_;
   std::vector<Vec3> built_at_;
+  std::vector<std::array<Box, 2>> boxes_;  // of is_due()
   bool built_ = false;
   std::size_t built_with_ = 0;  // broken cells
   double slack_ = 0;            // m, that elements may move before other pairs can touch
   std::uint64_t builds_ = 0;
+  Box speeds_;
 };
 
 }  // namespace flexel::simulate

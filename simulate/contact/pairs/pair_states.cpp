@@ -22,7 +22,12 @@ constexpr double kShapelessEntry = 0.05;  // spacings; most penetration with whi
 
 PairStates::PairStates(const ContactSettings& settings, const ContactSurface& surface, const PairList& list,
                        PairMemory& memory, OverlapRelease& release)
-    : settings_(settings), surface_(surface), list_(list), memory_(memory), release_(release) {}
+    : settings_(settings),
+      surface_(surface),
+      list_(list),
+      memory_(memory),
+      release_(release),
+      cells_(surface) {}
 
 void PairStates::reset() {
   states_.assign(list_.pairs().size(), PairState{});
@@ -36,35 +41,9 @@ void PairStates::reset() {
     bodies.push_back({list_.point(pair.i).part, pair.of_plane() ? planes : list_.point(pair.j).part});
   schedule_.reset(std::move(bodies), planes + 1, surface_.narrowest());
   moved_from_.clear();
-  find_cells();
-}
-
-// That carry points of the list; points that nothing of eight corners carries get one each.
-void PairStates::find_cells() {
-  const std::vector<std::uint32_t>& points = list_.points();
-  const auto elements_of = [&](std::uint32_t number) -> const auto& {
-    return list_.point(number).at.elements;
-  };
-  std::vector<std::uint32_t> order(points.size());
-  std::iota(order.begin(), order.end(), std::uint32_t{0});
-  std::sort(order.begin(), order.end(),
-            [&](std::uint32_t a, std::uint32_t b) { return elements_of(a) < elements_of(b); });
-  cells_.clear();
-  cell_of_.resize(points.size());
-  for (std::size_t n = 0; n < order.size(); ++n) {
-    const ContactPoint& point = list_.point(order[n]);
-    if (n == 0 || point.at.count != 8 || elements_of(order[n]) != elements_of(order[n - 1])) {
-      CarryingCell cell{point.part, order[n], {}, point.at.count == 8};
-      for (std::size_t a = 0; a < point.at.count; ++a)
-        cell.corners[a] = static_cast<std::uint32_t>(
-            std::lower_bound(list_.elements().begin(), list_.elements().end(), point.at.elements[a]) -
-            list_.elements().begin());
-      cells_.push_back(cell);
-    }
-    cell_of_[order[n]] = static_cast<std::uint32_t>(cells_.size() - 1);
-  }
-  shapes_.resize(cells_.size());
-  shape_evaluation_.assign(cells_.size(), 0);
+  cells_.reset(list_);
+  shapes_.resize(cells_.cells().size());
+  shape_evaluation_.assign(cells_.cells().size(), 0);
 }
 
 // Since the last evaluation; without one in this list, none. The common way is that of the middle of all.
@@ -76,13 +55,13 @@ std::vector<BodyMotion> PairStates::motion_to(const State& state) {
     for (std::size_t e = 0; e < elements.size(); ++e) moved_from_[e] = state.displacement[elements[e]];
     return {};
   }
-  std::vector<Vec3> moves(elements.size());
+  moves_.resize(elements.size());
   std::vector<Box> of_body(parts.size() + 1);
   Box all;
   for (std::size_t e = 0, part = 0; e < elements.size(); ++e) {
     while (elements[e] >= parts[part].element_end) ++part;
-    moves[e] = state.displacement[elements[e]] - moved_from_[e];
-    of_body[part].add(moves[e]);
+    moves_[e] = state.displacement[elements[e]] - moved_from_[e];
+    of_body[part].add(moves_[e]);
     moved_from_[e] = state.displacement[elements[e]];
   }
   if (!settings_.planes.empty()) of_body.back().add(Vec3::Zero());
@@ -96,31 +75,27 @@ std::vector<BodyMotion> PairStates::motion_to(const State& state) {
     motions[b].path = (box.max - middle).cwiseAbs().cwiseMax((box.min - middle).cwiseAbs()).norm();
     motions[b].spread = 0.5 * box.diagonal();
   }
-  for (const CarryingCell& cell : cells_) {
+  for (const CarryingCell& cell : cells_.cells()) {
     BodyMotion& motion = motions[cell.part];
     // |dF| is at most sqrt(3) times the moves' diagonal over the spacing: cells of what hardly deforms are skipped
     const double most = 3.5 * motion.spread / parts[cell.part].lattice.spacing.minCoeff();
-    if (!cell.deforms || most <= std::max(motion.turn, kNoTurn)) continue;
-    Mat3 change = Mat3::Zero();
-    for (std::size_t a = 0; a < 8; ++a)
-      change += moves[cell.corners[a]] * surface_.gradients(cell.part)[a].transpose();
-    motion.turn = std::max(motion.turn, change.norm());
+    if (!cell.deforms() || most <= std::max(motion.turn, kNoTurn)) continue;
+    motion.turn = std::max(motion.turn, cells_.gradient_norm(cell, moves_));
   }
   for (BodyMotion& motion : motions) motion.turn = std::max(motion.turn, motion.spread > 0 ? kNoTurn : 0);
   return motions;
 }
 
-bool PairStates::evaluated(const State& state) const {
+bool PairStates::is_at(const State& state) const {
   const std::vector<std::uint32_t>& elements = list_.elements();
-  bool same =
-      evaluated_builds_ == list_.builds() && release_.is_at(state) && moved_from_.size() == elements.size();
-  for (std::size_t e = 0; same && e < elements.size(); ++e)
-    same = moved_from_[e] == state.displacement[elements[e]];
-  return same;
+  if (evaluated_builds_ != list_.builds() || moved_from_.size() != elements.size()) return false;
+  for (std::size_t e = 0; e < elements.size(); ++e)
+    if (moved_from_[e] != state.displacement[elements[e]]) return false;
+  return true;
 }
 
 void PairStates::update(const State& state, bool all) {
-  const bool same = evaluated(state);
+  const bool same = release_.is_at(state) && is_at(state);
   if (same && (!all || evaluated_all_)) return;
   ++evaluations_;
   evaluated_builds_ = list_.builds();
@@ -132,7 +107,7 @@ void PairStates::update(const State& state, bool all) {
     schedule_.wake_all();
   else
     schedule_.advance(motions);
-  find_points(state);
+  find_points();
   if (release_.known_parts() < surface_.body().parts.size()) find_initial_penetrations(state);
   const std::vector<double> before = release_.advance(state);
   for (const std::uint32_t p : active_) is_active_[p] = states_[p].pressure > 0 ? kWasPressed : 0;
@@ -146,13 +121,14 @@ void PairStates::update(const State& state, bool all) {
 }
 
 // Of the pairs that are awake.
-void PairStates::find_points(const State& state) {
-  std::vector<std::uint32_t> points, cells;
+void PairStates::find_points() {
+  wanted_points_.clear();
+  wanted_cells_.clear();
   const auto want = [&](std::uint32_t point) {
     if (std::exchange(point_evaluation_[point], evaluations_) == evaluations_) return;
-    points.push_back(point);
-    if (std::exchange(shape_evaluation_[cell_of_[point]], evaluations_) != evaluations_)
-      cells.push_back(cell_of_[point]);
+    wanted_points_.push_back(point);
+    const std::uint32_t cell = cells_.points()[point].cell;
+    if (std::exchange(shape_evaluation_[cell], evaluations_) != evaluations_) wanted_cells_.push_back(cell);
   };
   for (const std::uint32_t p : schedule_.awake()) {
     const ContactPair& pair = list_.pairs()[p];
@@ -160,15 +136,20 @@ void PairStates::find_points(const State& state) {
     if (!pair.of_plane()) want(pair.j);
   }
   parallel_for_each(
-      cells.size(),
+      wanted_cells_.size(),
       [&](std::size_t n) {
-        shapes_[cells[n]] = surface_.shape_at(list_.points()[cells_[cells[n]].point], state);
+        const std::uint32_t c = wanted_cells_[n];
+        const CarryingCell& cell = cells_.cells()[c];
+        shapes_[c] = surface_.shape_at(list_.points()[cell.point],
+                                       cell.deforms() ? cells_.gradient(c, moved_from_) : Mat3(Mat3::Zero()));
       },
       512);
   parallel_for_each(
-      points.size(),
+      wanted_points_.size(),
       [&](std::size_t n) {
-        points_[points[n]] = surface_.at(list_.points()[points[n]], state, shapes_[cell_of_[points[n]]]);
+        const std::uint32_t point = wanted_points_[n];
+        points_[point] = surface_.at(list_.points()[point], cells_.at_point(point, moved_from_),
+                                     shapes_[cells_.points()[point].cell]);
       },
       512);
 }
@@ -270,27 +251,17 @@ ContactSide PairStates::other_side(const ContactPair& pair) const {
   return {from - (from - plane.point).dot(plane.normal) * plane.normal, plane.normal, 1, 0};
 }
 
-PairState PairStates::evaluate(const ContactPair& pair, double allowed, double soft) const {
+ContactSide PairStates::own_side(const ContactPair& pair) const {
   ContactSide from = points_[pair.i].side;
   if (pair.of_plane()) from.own_plane = 0;  // the plane's normal is the exact one
-  if (!(allowed > 0) && !(soft > 0)) return pair_state(from, other_side(pair), pair.properties.constants);
-  PairConstants constants = pair.properties.constants;
-  constants.allowed = allowed;
-  constants.law = constants.law.softened(soft);
-  return pair_state(from, other_side(pair), constants);
+  return from;
 }
 
-// m/s, at which the points of a pair come together along `normal`.
-double PairStates::approach(const ContactPair& pair, const Vec3& normal, const State& state) const {
-  const auto velocity = [&](std::uint32_t number) {
-    const InterpolationWeights& at = list_.point(number).at;
-    Vec3 sum = Vec3::Zero();
-    for (std::uint32_t a = 0; a < at.count; ++a) sum += at.weights[a] * state.velocity[at.elements[a]];
-    return sum;
-  };
-  Vec3 of_j = Vec3::Zero();
-  if (!pair.of_plane()) of_j = velocity(pair.j);
-  return (velocity(pair.i) - of_j).dot(normal);
+Vec3 PairStates::velocity(std::uint32_t point, const State& state) const {
+  const InterpolationWeights& at = list_.point(point).at;
+  Vec3 sum = Vec3::Zero();
+  for (std::uint32_t a = 0; a < at.count; ++a) sum += at.weights[a] * state.velocity[at.elements[a]];
+  return sum;
 }
 
 // m, of the soft part of a pair in the steps to come, or 0: that of the law. A pair that will press within
@@ -305,14 +276,16 @@ double PairStates::softness_after(std::size_t p, const State& state, double drif
     const double soft = memory_[p].soft - kHardening * (memory_[p].soft - least);
     return soft < kHardened * least ? 0 : soft;
   }
-  const double way = kSoftSteps * drift * approach(pair, now.normal, state);
+  Vec3 nearing = velocity(pair.i, state);
+  if (!pair.of_plane()) nearing -= velocity(pair.j, state);
+  const double way = kSoftSteps * drift * nearing.dot(now.normal);
   if (now.gap > way) return 0;
   const double most = std::min(least + 2 * std::max(now.gap, 0.0), kFarthestSoft * list_.point(pair.i).width);
   return std::min(way, most) > least ? std::min(way, most) : 0;
 }
 
 void PairStates::finish_step(const State& state, double drift) {
-  std::vector<double> lost(active_.size(), 0);
+  lost_.assign(active_.size(), 0);
   parallel_for_each(
       active_.size(),
       [&](std::size_t n) {
@@ -322,11 +295,12 @@ void PairStates::finish_step(const State& state, double drift) {
         if (soft == memory_[p].soft) return;
         memory_[p].soft = soft;
         const double before = states_[p].energy;
-        states_[p] = evaluate(list_.pairs()[p], release_.allowed(list_.pairs()[p], memory_[p]), soft);
-        lost[n] = before - states_[p].energy;
+        const ContactPair& pair = list_.pairs()[p];
+        press(states_[p], own_side(pair), other_side(pair), pair.properties.constants.law.softened(soft));
+        lost_[n] = before - states_[p].energy;
       },
       512);
-  for (const double each : lost) hardened_ += each;
+  for (const double each : lost_) hardened_ += each;
 }
 
 // In the terms of pair_law.h. Beside a common way points go by at most kPoint times their bodies' paths; normals
@@ -338,9 +312,7 @@ PairStates::PairProximity PairStates::pair_proximity(const ContactPair& pair,
                                                      const PairRecord& record) const {
   constexpr double kRounding = 1e-9, kPoint = 1.2, kBounds = 1.5, kMostTurn = 0.3;
   const PairConstants& constants = pair.properties.constants;
-  ContactSide i = points_[pair.i].side;
-  const ContactSide j = other_side(pair);
-  if (pair.of_plane()) i.own_plane = 0;
+  const ContactSide i = own_side(pair), j = other_side(pair);
   const double rate_i = points_[pair.i].normal_rate,
                rate_j = pair.of_plane() ? 0 : points_[pair.j].normal_rate, fastest = std::max(rate_i, rate_j);
   const Vec3 d = j.position - i.position, b = i.own_plane * i.normal - j.own_plane * j.normal;

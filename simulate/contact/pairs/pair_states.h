@@ -2,6 +2,7 @@
 #pragma once
 #include <utility>
 
+#include "simulate/contact/pairs/carrying_cells.h"
 #include "simulate/contact/pairs/overlap_release.h"
 #include "simulate/contact/pairs/pair_schedule.h"
 
@@ -27,6 +28,9 @@ class PairStates {
   void set_hardened(double energy) { hardened_ = energy; }
   [[nodiscard]] double take_hardened() { return std::exchange(hardened_, 0); }
 
+  // Whether the displacements are those that were evaluated last, of the list as it is.
+  [[nodiscard]] bool is_at(const State& state) const;
+  [[nodiscard]] const CarryingCells& cells() const { return cells_; }
   [[nodiscard]] std::uint64_t evaluations() const { return evaluations_; }
   [[nodiscard]] const std::vector<PointState>& points() const { return points_; }  // (PairList::points())
   [[nodiscard]] const std::vector<PairState>& states() const { return states_; }   // (pairs)
@@ -40,20 +44,16 @@ class PairStates {
     bool near = true;  // false for certain: beyond the kernel, or turned away
     SafeMotion safe;   // before which it cannot press
   };
-  struct CarryingCell {
-    std::uint32_t part = 0, point = 0;       // one of those that it carries
-    std::array<std::uint32_t, 8> corners{};  // in PairList::elements()
-    bool deforms = false;                    // else its point has no normal
-  };
-  [[nodiscard]] bool evaluated(const State& state) const;
-  void find_cells();
   [[nodiscard]] std::vector<BodyMotion> motion_to(const State& state);
-  void find_points(const State& state);
+  void find_points();
   [[nodiscard]] PairProximity pair_proximity(const ContactPair& pair, const PairRecord& record) const;
   [[nodiscard]] ContactSide other_side(const ContactPair& pair) const;
+  [[nodiscard]] ContactSide own_side(const ContactPair& pair) const;
   // `allowed` [m]: penetration without pressure; `soft` [m]: of PairRecord.
-  [[nodiscard]] PairState evaluate(const ContactPair& pair, double allowed, double soft) const;
-  [[nodiscard]] double approach(const ContactPair& pair, const Vec3& normal, const State& state) const;
+  [[nodiscard]] PairState evaluate(const ContactPair& pair, double allowed, double soft) const {
+    return pair_state(own_side(pair), other_side(pair), pair.properties.constants, allowed, soft);
+  }
+  [[nodiscard]] Vec3 velocity(std::uint32_t point, const State& state) const;
   [[nodiscard]] double softness_after(std::size_t pair, const State& state, double drift) const;
   void find_initial_penetrations(const State& state);
   [[nodiscard]] std::vector<std::uint8_t> evaluate_pairs();
@@ -67,17 +67,19 @@ class PairStates {
   PairMemory& memory_;
   OverlapRelease& release_;
   PairSchedule schedule_;
-  std::vector<CarryingCell> cells_;
-  std::vector<CellShape> shapes_;                // (cells_) of points that are awake
-  std::vector<std::uint64_t> shape_evaluation_;  // (cells_) that they are of
-  std::vector<std::uint32_t> cell_of_;           // (points_)
-  std::vector<PointState> points_;               // of pairs that are awake
-  std::vector<std::uint64_t> point_evaluation_;  // (points_) that they are of
-  std::vector<PairState> states_;                // of active pairs
+  CarryingCells cells_;
+  std::vector<CellShape> shapes_;                            // (cells) of points that are awake
+  std::vector<std::uint64_t> shape_evaluation_;              // (cells) that they are of
+  std::vector<std::uint32_t> wanted_points_, wanted_cells_;  // of the evaluation
+  std::vector<PointState> points_;                           // of pairs that are awake
+  std::vector<std::uint64_t> point_evaluation_;              // (points_) that they are of
+  std::vector<PairState> states_;                            // of active pairs
   std::vector<std::uint32_t> active_;
   static constexpr std::uint8_t kWasPressed = 2;  // in the evaluation before, while pairs are evaluated
   std::vector<std::uint8_t> is_active_;           // (pairs)
   std::vector<Vec3> moved_from_;  // (PairList::elements()) m, displacements of the last evaluation
+  std::vector<Vec3> moves_;       // likewise, from those before
+  std::vector<double> lost_;      // (active_) J, of finish_step()
   std::uint64_t evaluated_builds_ = 0, evaluations_ = 0;
   bool evaluated_all_ = false;
   double hardened_ = 0;  // J

@@ -79,14 +79,23 @@ std::size_t ContactSurface::broken_cells() const {
                                    [&](std::size_t c) { return body_.broken[cells_[c]] != 0; });
 }
 
-CellShape ContactSurface::shape_at(std::uint32_t point, const State& state) const {
+PointState ContactSurface::at(std::uint32_t point, const State& state) const {
+  const ContactPoint& from = points_[point];
+  Vec3 displacement = Vec3::Zero();
+  for (std::uint32_t a = 0; a < from.at.count; ++a)
+    displacement += from.at.weights[a] * state.displacement[from.at.elements[a]];
+  Mat3 gradient = Mat3::Zero();
+  if (from.at.count == 8)
+    for (std::size_t a = 0; a < 8; ++a)
+      gradient += state.displacement[from.at.elements[a]] * gradients_[from.part][a].transpose();
+  return at(point, displacement, shape_at(point, gradient));
+}
+
+CellShape ContactSurface::shape_at(std::uint32_t point, const Mat3& gradient) const {
   const ContactPoint& from = points_[point];
   CellShape shape;
   if (from.shape == ContactShape::ball) return shape;
-  Mat3 f = Mat3::Identity();
-  if (from.at.count == 8)
-    for (std::size_t a = 0; a < 8; ++a)
-      f += state.displacement[from.at.elements[a]] * gradients_[from.part][a].transpose();
+  const Mat3 f = Mat3::Identity() + gradient;
   // The remains of a broken cell may have any shape and direction: whole faces and planes touch its points as
   // they touch those of edges, from all sides.
   const bool broken = cell_[point] != kNoCarrier && body_.broken[cell_[point]] != 0;
@@ -103,13 +112,11 @@ CellShape ContactSurface::shape_at(std::uint32_t point, const State& state) cons
   return shape;
 }
 
-PointState ContactSurface::at(std::uint32_t point, const State& state, const CellShape& shape) const {
+PointState ContactSurface::at(std::uint32_t point, const Vec3& displacement, const CellShape& shape) const {
   const ContactPoint& from = points_[point];
   PointState made;
   static_cast<CellShape&>(made) = shape;
-  made.side.position = from.rest;
-  for (std::uint32_t a = 0; a < from.at.count; ++a)
-    made.side.position += from.at.weights[a] * state.displacement[from.at.elements[a]];
+  made.side.position = from.rest + displacement;
   made.side.radius = from.radius;
   if (from.shape == ContactShape::ball) return made;
   if (shape.shapeless) return made;

@@ -50,12 +50,11 @@ class ContactSurface {
   [[nodiscard]] const std::optional<RigidPart>& rigid(std::uint32_t part) const { return rigid_[part]; }
   [[nodiscard]] bool prescribed(std::uint32_t part) const { return rigid_[part] && !rigid_[part]->free; }
 
-  [[nodiscard]] PointState at(std::uint32_t point, const State& state) const {
-    return at(point, state, shape_at(point, state));
-  }
-  // The same for all points that one cell carries.
-  [[nodiscard]] CellShape shape_at(std::uint32_t point, const State& state) const;
-  [[nodiscard]] PointState at(std::uint32_t point, const State& state, const CellShape& shape) const;
+  [[nodiscard]] PointState at(std::uint32_t point, const State& state) const;
+  // The same for all points that one cell carries; `gradient` of the displacements there.
+  [[nodiscard]] CellShape shape_at(std::uint32_t point, const Mat3& gradient) const;
+  // `displacement` [m] of the point.
+  [[nodiscard]] PointState at(std::uint32_t point, const Vec3& displacement, const CellShape& shape) const;
   // Of those that carry points.
   [[nodiscard]] std::size_t broken_cells() const;
 

@@ -1,0 +1,76 @@
+// Points of one cell are found by sorting them by their elements.
+#include "simulate/contact/pairs/carrying_cells.h"
+
+#include <algorithm>
+#include <numeric>
+
+namespace flexel::simulate {
+
+CarryingCells::CarryingCells(const ContactSurface& surface) {
+  for (std::uint32_t p = 0; p < surface.body().parts.size(); ++p) {
+    const std::array<Vec3, 8>& of = surface.gradients(p);
+    slopes_.push_back({0.5 * (of[1] - of[0]), 0.5 * (of[2] - of[0]), 0.5 * (of[4] - of[0])});
+    const auto& [x, y, z] = slopes_.back();
+    steepness_.emplace_back(x.norm(), y.norm(), z.norm());
+  }
+}
+
+void CarryingCells::reset(const PairList& list) {
+  const std::vector<std::uint32_t>& points = list.points();
+  const auto elements_of = [&](std::uint32_t number) -> const auto& {
+    return list.point(number).at.elements;
+  };
+  std::vector<std::uint32_t> order(points.size());
+  std::iota(order.begin(), order.end(), std::uint32_t{0});
+  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return elements_of(a) == elements_of(b) ? a < b : elements_of(a) < elements_of(b);
+  });
+  cells_.clear();
+  points_.resize(points.size());
+  for (std::size_t n = 0; n < order.size(); ++n) {
+    const ContactPoint& point = list.point(order[n]);
+    if (n == 0 || point.at.count != 8 || elements_of(order[n]) != elements_of(order[n - 1])) {
+      CarryingCell cell{point.part, order[n], {}, point.at.count};
+      for (std::size_t a = 0; a < point.at.count; ++a)
+        cell.corners[a] = static_cast<std::uint32_t>(
+            std::lower_bound(list.elements().begin(), list.elements().end(), point.at.elements[a]) -
+            list.elements().begin());
+      cells_.push_back(cell);
+    }
+    points_[order[n]] = {static_cast<std::uint32_t>(cells_.size() - 1), point.at.weights};
+  }
+}
+
+Vec3 CarryingCells::at_point(std::uint32_t point, const std::vector<Vec3>& values) const {
+  const CarriedPoint& of = points_[point];
+  const CarryingCell& cell = cells_[of.cell];
+  Vec3 sum = Vec3::Zero();
+  for (std::uint32_t a = 0; a < cell.count; ++a) sum += of.weights[a] * values[cell.corners[a]];
+  return sum;
+}
+
+std::array<Vec3, 3> CarryingCells::differences(const CarryingCell& cell, const std::vector<Vec3>& values) {
+  const auto at = [&](std::size_t a) -> const Vec3& { return values[cell.corners[a]]; };
+  const Vec3 up01 = at(1) - at(0), up23 = at(3) - at(2), up45 = at(5) - at(4), up67 = at(7) - at(6);
+  const Vec3 sum01 = at(0) + at(1), sum23 = at(2) + at(3), sum45 = at(4) + at(5), sum67 = at(6) + at(7);
+  return {(up01 + up23) + (up45 + up67), (sum23 - sum01) + (sum67 - sum45),
+          (sum45 + sum67) - (sum01 + sum23)};
+}
+
+Mat3 CarryingCells::gradient(std::uint32_t cell, const std::vector<Vec3>& values) const {
+  const std::array<Vec3, 3> along = differences(cells_[cell], values);
+  const std::array<Vec3, 3>& slopes = slopes_[cells_[cell].part];
+  return along[0] * slopes[0].transpose() + along[1] * slopes[1].transpose() +
+         along[2] * slopes[2].transpose();
+}
+
+// The axes are square to one another.
+double CarryingCells::gradient_norm(const CarryingCell& cell, const std::vector<Vec3>& values) const {
+  const std::array<Vec3, 3> along = differences(cell, values);
+  const Vec3& steepness = steepness_[cell.part];
+  return std::sqrt(steepness.x() * steepness.x() * along[0].squaredNorm() +
+                   steepness.y() * steepness.y() * along[1].squaredNorm() +
+                   steepness.z() * steepness.z() * along[2].squaredNorm());
+}
+
+}  // namespace flexel::simulate

@@ -1,0 +1,52 @@
+// The cells that carry the points of a list of pairs, and where in them the points are. Elements are numbered as in
+// PairList::elements(), so that what a step reads of them lies together in memory; what points of one cell share
+// is found once.
+#pragma once
+#include "simulate/contact/pairs/pair_list.h"
+
+namespace flexel::simulate {
+
+struct CarryingCell {
+  std::uint32_t part = 0, point = 0;                         // one of those that it carries
+  std::array<std::uint32_t, 8> corners{};                    // in PairList::elements()
+  std::uint32_t count = 0;                                   // of corners
+  [[nodiscard]] bool deforms() const { return count == 8; }  // else its points have no normal
+};
+
+struct CarriedPoint {
+  std::uint32_t cell = 0;
+  std::array<double, 8> weights{};
+};
+
+class CarryingCells {
+ public:
+  explicit CarryingCells(const ContactSurface& surface);
+
+  // To the points of a new list; those that nothing of eight corners carries get a cell each.
+  void reset(const PairList& list);
+
+  [[nodiscard]] const std::vector<CarryingCell>& cells() const { return cells_; }
+  [[nodiscard]] const std::vector<CarriedPoint>& points() const { return points_; }  // (PairList::points())
+  // (axes) 1/m, gradients of the cell's weights along its axes: that of corner a is the sum of these with the
+  // signs of a.
+  [[nodiscard]] const std::array<Vec3, 3>& slopes(std::uint32_t part) const { return slopes_[part]; }
+
+  // `values`: (PairList::elements()).
+  [[nodiscard]] Vec3 at_point(std::uint32_t point, const std::vector<Vec3>& values) const;
+  // Of a cell that deforms, by the places at rest: the mean over it.
+  [[nodiscard]] Mat3 gradient(std::uint32_t cell, const std::vector<Vec3>& values) const;
+  // Its norm.
+  [[nodiscard]] double gradient_norm(const CarryingCell& cell, const std::vector<Vec3>& values) const;
+
+ private:
+  // (axes) sums over the corners with their signs.
+  [[nodiscard]] static std::array<Vec3, 3> differences(const CarryingCell& cell,
+                                                       const std::vector<Vec3>& values);
+
+  std::vector<CarryingCell> cells_;
+  std::vector<CarriedPoint> points_;
+  std::vector<std::array<Vec3, 3>> slopes_;  // (parts)
+  std::vector<Vec3> steepness_;              // (parts) 1/m, norms of the slopes
+};
+
+}  // namespace flexel::simulate
