@@ -21,6 +21,7 @@
 #include "simulate/quadratic/quadratic_newton.h"
 #include "simulate/quadratic/quadratic_solve.h"
 #include "simulate/quadratic/quadratic_stress.h"
+#include "simulate/thermal/thermal.h"
 
 namespace flexel::simulate {
 namespace {
@@ -34,13 +35,15 @@ void refuse_what_is_missing(const Scene& scene, const Body& body, const std::vec
   if (scene.run.renormalise)
     throw InputError(scene.name, needs + "it has no renormalise; use model \"cells\"");
   for (const ActiveEffect& effect : effects)
-    if (effect.name != Supports::name && effect.name != Loads::name && effect.name != "gravity")
+    if (effect.name != Supports::name && effect.name != Loads::name && effect.name != "gravity" &&
+        effect.name != Thermal::name)
       throw InputError(scene.name, fmt::format("{}it has no {} ({}); use model \"cells\"", needs, effect.name,
                                                effect.why));
   refuse_timed(effects, ActsIn::all, scene.name);
   for (const Columns* columns : {&body.cell_columns, &body.element_columns})
     for (const auto& [name, column] : *columns)
-      if (!is_stress_column(name) && name != "velocity" && name != kQuadraticColumn)
+      if (!is_stress_column(name) && name != "velocity" && name != kQuadraticColumn &&
+          !is_temperature_column(scene.get<Thermal>(), name))
         throw InputError(scene.name,
                          fmt::format("{}it does not know what an earlier run left in the body (\"{}\"); use "
                                      "model \"cells\"",

@@ -1,5 +1,5 @@
 // The body is moved into the picture's subject, so that memory holds it once.
-#include "flexel/bent_picture.h"
+#include "flexel/picture/bent_picture.h"
 #include "flexel/picture/canvas/png_file.h"
 
 #include <fmt/format.h>
