@@ -62,12 +62,11 @@ struct Command {
   const char* name;
   int (*run)(int argc, char** argv);
 };
-constexpr Command kCommands[] = {{"deform", deform_command},       {"compare", compare_command},
-                                 {"compensate", compensate_command},
-                                 {"export", export_command},       {"info", info_command},
-                                 {"picture", picture_command},     {"view", view_command},
-                                 {"materials", materials_command}, {"scene-keys", scene_keys_command},
-                                 {"measure", measure_command},     {"study", study_command}};
+constexpr Command kCommands[] = {
+    {"deform", deform_command},   {"compare", compare_command},     {"compensate", compensate_command},
+    {"export", export_command},   {"info", info_command},           {"picture", picture_command},
+    {"view", view_command},       {"materials", materials_command}, {"scene-keys", scene_keys_command},
+    {"measure", measure_command}, {"study", study_command}};
 constexpr const char* kStages[] = {"voxelize", "simulate", "map"};
 
 std::vector<std::string> command_names() {
