@@ -5,6 +5,7 @@ namespace flexel::commands {
 
 int clay_command(int argc, char** argv);
 int compare_command(int argc, char** argv);
+int compensate_command(int argc, char** argv);
 int deform_command(int argc, char** argv);
 int export_command(int argc, char** argv);
 int info_command(int argc, char** argv);

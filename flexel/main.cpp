@@ -24,6 +24,8 @@ constexpr const char* kHelp =
     "                        the part, deformed as its material would be ({}; .vtu for "
     "the body,\n"
     "                        .png for a picture)\n"
+    "  flexel compensate PART... --scene FILE -o OUT\n"
+    "                        the part to be made so that the scene bends it into the shape of PART\n"
     "  flexel compare PART PART... --scene FILE\n"
     "                        which is stiffer: mass, displacement, stiffness and stress in one table\n"
     "  flexel export PART... --scene FILE --calculix -o OUT.inp\n"
@@ -62,9 +64,10 @@ struct Command {
   int (*run)(int argc, char** argv);
 };
 constexpr Command kCommands[] = {
-    {"deform", deform_command},   {"compare", compare_command},     {"export", export_command},
-    {"info", info_command},       {"picture", picture_command},     {"view", view_command},
-    {"clay", clay_command},       {"materials", materials_command}, {"scene-keys", scene_keys_command},
+    {"deform", deform_command},   {"compare", compare_command},     {"compensate", compensate_command},
+    {"export", export_command},   {"info", info_command},           {"picture", picture_command},
+    {"view", view_command},       {"clay", clay_command},           {"materials", materials_command},
+    {"scene-keys", scene_keys_command},
     {"measure", measure_command}, {"study", study_command}};
 constexpr const char* kStages[] = {"voxelize", "simulate", "map"};
 

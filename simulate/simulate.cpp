@@ -17,6 +17,7 @@
 #include "base/units.h"
 #include "formats/lattice/body_file.h"
 #include "formats/lattice/quadratic_field.h"
+#include "simulate/conduction/conduction.h"
 #include "simulate/equilibrium/equilibrium.h"
 #include "simulate/estimate/coarsen.h"
 #include "simulate/estimate/error_bars.h"
@@ -33,6 +34,9 @@
 #include "simulate/quadratic/quadratic_run.h"
 #include "simulate/scene/scene.h"
 #include "simulate/scene/scene_checks.h"
+#include "simulate/thermal/free_strain.h"
+#include "simulate/thermal/temperature_column.h"
+#include "simulate/thermal/thermal.h"
 #include "simulate/time/dynamic_relaxation.h"
 #include "simulate/time/timed_run.h"
 
@@ -252,6 +256,61 @@ SimulateResult Run::operator()() {
   return result;
 }
 
+// Free strain as rest shapes of model `cells`, in the body while this lives.
+class FreeStrainInBody {
+ public:
+  FreeStrainInBody(Body& body, const Scene& scene) : body_(body) {
+    const ThermalSettings& settings = scene.get<Thermal>();
+    if (!settings.expands()) return;
+    const std::vector<Material> materials = materials_of_parts(scene, body);
+    Thermal::refuse_unfit(settings, body, models_of_parts(scene, body), materials);
+    if (RestShapes(body).any())
+      throw InputError(
+          scene.name,
+          "the body has a rest shape of its own, which an earlier run left, and free strain needs that of "
+          "the lattice: begin with the body as voxelized");
+    body.cell_columns[kFreeStrainColumn] = free_strain_column(body, FreeStrain(body, settings, materials));
+  }
+  ~FreeStrainInBody() { body_.cell_columns.erase(kFreeStrainColumn); }
+  FreeStrainInBody(const FreeStrainInBody&) = delete;
+  FreeStrainInBody& operator=(const FreeStrainInBody&) = delete;
+
+ private:
+  Body& body_;
+};
+
+void refuse_heat(const Scene& scene) {
+  const ThermalSettings& settings = scene.get<Thermal>();
+  if ((settings.expands() || settings.conducts()) && (scene.run.time || settles(scene)))
+    throw InputError(scene.name,
+                     "heat and shrinkage act at equilibrium without contact only: leave [run] time and "
+                     "contact, or [thermal], [shrinkage] and faces of conduction, out");
+}
+
+// The runs at equilibrium without contact, by the model. `linear_reach`: Run::linear_reach(), of model `quadratic` 0.
+SimulateResult run_at_rest(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress,
+                           double* linear_reach = nullptr) {
+  if (is_quadratic(scene, body)) return run_quadratic(body, scene, options, progress);
+  const FreeStrainInBody free(body, scene);
+  Run run(body, scene, options, progress);
+  SimulateResult result = run();
+  if (linear_reach != nullptr) *linear_reach = run.linear_reach();
+  return result;
+}
+
+ErrorBars bars_at_rest(Body& body, const Scene& scene, const SimulateOptions& options,
+                       const SimulateResult& result) {
+  const TakenTemperatures temperatures(body, scene.get<Thermal>());
+  return estimate_errors(body, scene, options, result, [&](auto& coarse, auto& same, auto& how) {
+    Progress silent("", Progress::Mode::silent);
+    temperatures.give(coarse);
+    if (scene.get<Thermal>().conducts()) conduct(coarse, same, silent);
+    const SimulateResult found = run_at_rest(coarse, same, how, silent);
+    temperatures.take_back(coarse);
+    return found;
+  });
+}
+
 }  // namespace
 
 double parse_timeout(const std::string& text, const std::string& option) {
@@ -266,6 +325,8 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
   erase_stress_columns(body);
   progress.stage("simulate");
   check_actions(scene, body, progress);
+  refuse_heat(scene);
+  if (scene.get<Thermal>().conducts()) conduct(body, scene, progress);
   if (asks_for_modes(scene)) {
     SimulateResult result = run_modes(body, scene, options, progress);
     progress.finish();
@@ -273,13 +334,8 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
   }
   if (is_quadratic(scene, body)) {
     refuse_timed(options, scene.name);
-    SimulateResult result = run_quadratic(body, scene, options, progress);
-    if (options.estimate)
-      result.error_bars =
-          estimate_errors(body, scene, options, result, [](auto& coarse, auto& same, auto& how) {
-            Progress silent("", Progress::Mode::silent);
-            return run_quadratic(coarse, same, how, silent);
-          });
+    SimulateResult result = run_at_rest(body, scene, options, progress);
+    if (options.estimate) result.error_bars = bars_at_rest(body, scene, options, result);
     progress.finish();
     return result;
   }
@@ -295,17 +351,13 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
     progress.finish();
     return result;
   }
-  Run run(body, scene, options, progress);
-  SimulateResult result = run();
+  double linear_reach = 0;
+  SimulateResult result = run_at_rest(body, scene, options, progress, &linear_reach);
   if (options.estimate) {
     progress.stage("error bars");
-    result.error_bars =
-        estimate_errors(body, scene, options, result, [](auto& coarse, auto& same, auto& how) {
-          Progress silent("", Progress::Mode::silent);
-          return Run(coarse, same, how, silent)();
-        });
+    result.error_bars = bars_at_rest(body, scene, options, result);
   }
-  if (const std::string told = near_buckling(run.linear_reach(), result); !told.empty())
+  if (const std::string told = near_buckling(linear_reach, result); !told.empty())
     progress.warn(scene.name + ": " + told);
   progress.finish();
   return result;

@@ -6,6 +6,7 @@
 #include "base/units.h"
 #include "flexel/measure/materials_table.h"
 #include "simulate/input/materials.h"
+#include "simulate/thermal/thermal_settings.h"
 
 namespace flexel::commands {
 namespace {
@@ -18,7 +19,13 @@ std::string percent(double share) {
   return share > 0 ? fmt::format("{:.3g} %", 100 * share) : "";
 }
 
+std::string source_of(const simulate::Material& material) {
+  const std::string heat = simulate::library_thermal_figures(material.name).source;
+  return heat.empty() ? material.source : material.source + "; heat: " + heat;
+}
+
 std::vector<std::string> row(const simulate::Material& material) {
+  const simulate::ThermalFigures heat = simulate::library_thermal_figures(material.name);
   return {material.name,
           human_pressure(material.young),
           fmt::format("{:.4g}", material.poisson),
@@ -29,12 +36,24 @@ std::vector<std::string> row(const simulate::Material& material) {
           pressure(material.layer_strength),
           material.friction > 0 ? fmt::format("{:.2g}", material.friction) : "",
           percent(material.damping),
-          material.source};
+          heat.expansion ? fmt::format("{:.3g}", 1e6 * *heat.expansion) : "",
+          heat.conductivity ? fmt::format("{:.3g}", *heat.conductivity) : "",
+          source_of(material)};
 }
 
-const std::vector<std::string> kHead = {"name",     "young",    "poisson",    "density [kg/m3]",
-                                        "yield",    "strength", "elongation", "across layers",
-                                        "friction", "damping",  "source"};
+const std::vector<std::string> kHead = {"name",
+                                        "young",
+                                        "poisson",
+                                        "density [kg/m3]",
+                                        "yield",
+                                        "strength",
+                                        "elongation",
+                                        "across layers",
+                                        "friction",
+                                        "damping",
+                                        "expansion [1e-6/K]",
+                                        "conductivity [W/(m K)]",
+                                        "source"};
 
 }  // namespace
 
@@ -81,7 +100,10 @@ std::string materials_json() {
                                      {"friction", material.friction},
                                      {"damping", material.damping}})
       if (value > 0) each[key] = value;
-    each["source"] = material.source;
+    const simulate::ThermalFigures heat = simulate::library_thermal_figures(material.name);
+    if (heat.expansion) each["expansion"] = *heat.expansion;
+    if (heat.conductivity) each["conductivity"] = *heat.conductivity;
+    each["source"] = source_of(material);
     list.push_back(each);
   }
   return list.dump(2) + "\n";

@@ -35,9 +35,9 @@ class PaperModel;
 // numerical); as work done on the body; or as energy dissipated.
 enum class EnergyAccount { none, potential, stored, work, dissipation };
 
-// Where an effect acts: everywhere; in timed runs and in the dynamic relaxation that looks for equilibrium
-// with contact; in timed runs alone. Each is more than the one before.
-enum class ActsIn { all, relaxation_and_time, time };
+// Where an effect acts: at equilibrium alone (its make() refuses other runs); everywhere; in timed runs and in the
+// dynamic relaxation that looks for equilibrium with contact; in timed runs alone. Each is more than the one before.
+enum class ActsIn { equilibrium, all, relaxation_and_time, time };
 
 // J, that has come into what an effect stores, but for the work of its forces: from an account of that name.
 struct EnergyTransfer {

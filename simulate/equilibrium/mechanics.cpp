@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "base/parallel.h"
+#include "simulate/thermal/free_strain.h"
 
 namespace flexel::simulate {
 namespace {
@@ -52,6 +53,11 @@ Mechanics::Mechanics(const Problem& problem, std::vector<ActiveEffect> effects, 
       effects_(std::move(effects)),
       constraints_(initial_constraints(problem, pattern_.stencil, paper_)) {
   for (const ActiveEffect& effect : effects_) effect->constrain(constraints_);
+  if (body_.cell_columns.contains(kFreeStrainColumn)) {
+    std::vector<Vec3> free(body_.element_count(), Vec3::Zero());
+    cells_.add_forces({free, 1}, free);
+    free_scale_ = std::sqrt(squared_norm(free));
+  }
   if (!stored_) make_tangent(problem);
   if (stored_) {
     stored_tangent_ = std::make_unique<StoredMatrix>(pattern_.matrix);
@@ -116,7 +122,7 @@ Forces Mechanics::forces(const State& state) {
       if (constraints_.mask[e] >> axis & 1) sum += inner[e][axis] * inner[e][axis];
     return sum;
   });
-  result.scale = std::sqrt(outer + held);
+  result.scale = std::sqrt(outer + held + free_scale_ * free_scale_);
   // Beside an infinite scale every residual would be 0: NaN is below no tolerance.
   if (!std::isfinite(result.scale)) result.scale = std::numeric_limits<double>::quiet_NaN();
   parallel_for_each(inner.size(), [&](std::size_t e) { result.total[e] += inner[e]; });

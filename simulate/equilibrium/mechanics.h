@@ -84,6 +84,7 @@ class Mechanics {
   std::unique_ptr<LinearOperator> stored_tangent_;
   const LinearOperator* tangent_ = nullptr;
   Constraints constraints_;
+  double free_scale_ = 0;  // N, the norm of the forces that free strain makes at rest
   double cell_seconds_ = 0, paper_seconds_ = 0;
 };
 

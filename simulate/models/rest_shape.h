@@ -8,6 +8,7 @@
 //     broken_springs     (cells) bits
 //     connection_rest    (elements x 13) m, the same of the connections of model `paper`, at the element that
 //                        has the bit in Body::connections
+//     free_strain        (cells x 18) of a run with free strain, while it goes on (simulate/thermal/free_strain.h)
 //     settled            (elements x 3) m, displacement of the shape that was last renormalised: what a fix
 //     or
 //                        move of a later run starts from
@@ -37,7 +38,7 @@ class RestShapes {
 
  private:
   const Column *flow_ = nullptr, *volume_ = nullptr, *hourglass_ = nullptr, *springs_ = nullptr,
-               *broken_ = nullptr, *connections_ = nullptr;
+               *broken_ = nullptr, *connections_ = nullptr, *free_ = nullptr;
   bool any_ = false;
 };
 

@@ -58,7 +58,7 @@ Corotation::Corotation(const QuadraticSystem& system, QuadraticOperator& stiffne
     stiffest_ = std::max(stiffest_, system.stiffest(c) * system.lattice(c).spacing.maxCoeff());
 }
 
-bool Corotation::evaluate(std::size_t cell, const std::vector<Vec3>& displacement) {
+bool Corotation::evaluate(std::size_t cell, const std::vector<Vec3>& displacement, double share) {
   const QuadraticNodes& nodes = system_.nodes();
   const auto& of_cell = nodes.of_cell[cell];
   const QuadraticShape shape = world_shape(system_.lattice(cell), system_.middle(cell));
@@ -83,7 +83,8 @@ bool Corotation::evaluate(std::size_t cell, const std::vector<Vec3>& displacemen
     turn.gamma.middleRows<3>(at(n)) = -cross_matrix(shape.gradient[n]) * spin;
   }
   stiffness_.cells().elastic_forces(cell, columns, product);
-  const CellValues force = product.col(0);
+  CellValues force = product.col(0);
+  if (system_.heated()) force -= share * Eigen::Map<const CellValues>(system_.free_forces(cell).data());
   const auto spins = columns.middleCols<3>(1);
   Mat3 turned = spins.transpose() * product.middleCols<3>(1), stressed = Mat3::Zero();
   Vec3 moment = Vec3::Zero();  // Y^T f
@@ -118,7 +119,7 @@ std::array<Vec3, kQuadraticNodes> Corotation::support_forces(std::size_t cell,
   taken.fill(Vec3::Zero());
   led.fill(Vec3::Zero());
   for (const SupportIntegrals& held : system_.cell_supports(cell)) {
-    held.add_forces(system_.penalty(cell, safety_), u, local, rotation, taken);
+    held.add_forces(system_.penalty(cell, safety_), share, u, local, rotation, taken);
     if (!held.support->tie->is_move) continue;
     for (const FacePoint* point : held.points)
       add_led(system_.point(*held.support, *point, safety_, share), rotation, led);
@@ -154,7 +155,7 @@ bool Corotation::residual(const std::vector<Vec3>& displacement, double share, s
   const QuadraticNodes& nodes = system_.nodes();
   std::vector<std::uint8_t> folded(nodes.cells.size(), 0);
   parallel_for_each(
-      nodes.cells.size(), [&](std::size_t c) { folded[c] = !evaluate(c, displacement); },
+      nodes.cells.size(), [&](std::size_t c) { folded[c] = !evaluate(c, displacement, share); },
       kTurnedCellsAtATime);
   if (std::any_of(folded.begin(), folded.end(), [](std::uint8_t each) { return each != 0; })) return false;
   std::vector<std::array<Vec3, kQuadraticNodes>> held(supported_.size());
@@ -167,6 +168,7 @@ bool Corotation::residual(const std::vector<Vec3>& displacement, double share, s
   for (std::size_t i = 0; i < supported_.size(); ++i)
     for (std::size_t n = 0; n < kQuadraticNodes; ++n) left[nodes.of_cell[supported_[i]][n]] += held[i][n];
   double outer = dot(left, left);
+  outer += std::pow(share * system_.free_force(), 2);
   take_bonds(displacement, left);
   parallel_for_each(nodes.size(), [&](std::size_t n) {
     for (const QuadraticNodes::Incidence& incidence : nodes.at(n))

@@ -36,7 +36,7 @@ class Corotation {
   [[nodiscard]] const std::vector<Mat3>& turns() const { return from_rest_; }
 
  private:
-  bool evaluate(std::size_t cell, const std::vector<Vec3>& displacement);
+  bool evaluate(std::size_t cell, const std::vector<Vec3>& displacement, double share);
   // (27 x 3) N: what its supports and their moves do to the nodes of a cell.
   [[nodiscard]] std::array<Vec3, kQuadraticNodes> support_forces(std::size_t cell,
                                                                  const std::vector<Vec3>& displacement,

@@ -272,7 +272,8 @@ bool solve_large(const QuadraticSystem& system, const RunSettings& settings, con
   for (std::size_t c = 0; c < system.nodes().cells.size(); ++c) {
     const Mat3 gradient = gradient_at(system, solution.displacement, c, system.middle(c));
     turn = std::max(turn, spin_of(gradient).norm());
-    strain = std::max(strain, 0.5 * (gradient + gradient.transpose()).norm());
+    strain = std::max(
+        strain, (0.5 * (gradient + gradient.transpose()) - system.free_strain(c, system.middle(c))).norm());
     finest = std::min(finest, system.lattice(c).spacing.minCoeff());
   }
   const double slenderness = bounding_box(system.nodes().rest).diagonal() / finest;

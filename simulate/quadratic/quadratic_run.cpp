@@ -22,6 +22,7 @@
 #include "simulate/quadratic/quadratic_newton.h"
 #include "simulate/quadratic/quadratic_solve.h"
 #include "simulate/quadratic/quadratic_stress.h"
+#include "simulate/thermal/thermal.h"
 
 namespace flexel::simulate {
 namespace {
@@ -125,13 +126,19 @@ void refuse_what_quadratic_lacks(const Scene& scene, const Body& body,
     throw InputError(scene.name, needs + "it has no renormalise; use model \"cells\"");
   for (const ActiveEffect& effect : effects)
     if (effect.name != Supports::name && effect.name != Loads::name && effect.name != Bonds::name &&
-        effect.name != "gravity")
+        effect.name != "gravity" && effect.name != Thermal::name)
       throw InputError(scene.name, fmt::format("{}it has no {} ({}); use model \"cells\"", needs, effect.name,
                                                effect.why));
   refuse_timed(effects, ActsIn::all, scene.name);
+  const auto acts = [&](std::string_view name) {
+    return std::any_of(effects.begin(), effects.end(), [&](const ActiveEffect& each) { return each.name == name; });
+  };
+  if (acts(Thermal::name) && acts(Bonds::name))
+    throw InputError(scene.name, needs + "it has no heat and shrinkage across bonds; use model \"cells\"");
   for (const Columns* columns : {&body.cell_columns, &body.element_columns})
     for (const auto& [name, column] : *columns)
-      if (!is_stress_column(name) && name != "velocity" && name != kQuadraticColumn)
+      if (!is_stress_column(name) && name != "velocity" && name != kQuadraticColumn &&
+          !is_temperature_column(scene.get<Thermal>(), name))
         throw InputError(scene.name,
                          fmt::format("{}it does not know what an earlier run left in the body (\"{}\"); use "
                                      "model \"cells\"",

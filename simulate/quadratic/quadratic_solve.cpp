@@ -42,6 +42,20 @@ void refuse_free(const QuadraticMultigrid& multigrid, const Body& body, const st
                                       words_of(scene).a_fix));
 }
 
+// From what free strain makes of the parts, where that is nearer to equilibrium.
+void start_nearer(const QuadraticSystem& system, QuadraticSolution& solution) {
+  const std::vector<Vec3> wanted = system.right_side(solution.safety);
+  const auto left = [&](const std::vector<Vec3>& displacement) {
+    std::vector<Vec3> forces(wanted.size());
+    solution.tangent->stiffness.forces(displacement[0].data(), forces[0].data());
+    for (std::size_t n = 0; n < forces.size(); ++n) forces[n] = wanted[n] - forces[n];
+    solution.tangent->stiffness.clear_held(forces);
+    return dot(forces, forces);
+  };
+  std::vector<Vec3> free = system.free_shape();
+  if (left(free) < left(solution.displacement)) solution.displacement = std::move(free);
+}
+
 }  // namespace
 
 QuadraticSolution solve(const QuadraticSystem& system, double tolerance, double safety,
@@ -56,6 +70,7 @@ QuadraticSolution solve(const QuadraticSystem& system, double tolerance, double 
         found.tangent->multigrid.emplace(stiffness, system.problem().body, system.bonds());
     if (attempt == 0) refuse_free(multigrid, system.problem().body, scene);
     found.displacement = system.prescribed();
+    if (system.heated()) start_nearer(system, found);
     found.unbalanced.resize(n);
     if (correct(system, tolerance, found, progress)) return found;
     if (found.iterations >= kMostLinearIterations) break;
@@ -81,9 +96,14 @@ bool correct(const QuadraticSystem& system, double tolerance, QuadraticSolution&
                     left = find_unbalanced(solution.displacement);
   stiffness.clear_held(start);
   stiffness.clear_held(left);
-  const double scale = std::sqrt(dot(start, start)), now = std::sqrt(dot(left, left));
+  // a body that is held all around has nothing to do, and no scale in what is left of it
+  const double scale = std::max(std::sqrt(dot(start, start)), system.free_force()),
+               now = std::sqrt(dot(left, left));
   const double asked = std::max(tolerance, kLeastLinearTolerance);
-  if (now <= asked * scale && scale > 0) return true;
+  if (now <= asked * scale && scale > 0) {
+    solution.unbalanced = find_unbalanced(solution.displacement);
+    return true;
+  }
   const double ahead = scale > 0 ? now / scale : 1;
   std::vector<Vec3> change;
   LinearResult result;
@@ -126,6 +146,11 @@ Mat3 local_gradient(const QuadraticSystem& system, const QuadraticSolution& solu
   const Mat3 gradient = gradient_at(system, solution.displacement, cell, at);
   const Mat3& turn = turn_of_cell(solution, cell);
   return gradient + turn.transpose() + turn.transpose() * gradient;
+}
+
+Mat3 elastic_gradient(const QuadraticSystem& system, const QuadraticSolution& solution, std::size_t cell,
+                      const Vec3& at) {
+  return local_gradient(system, solution, cell, at) - system.free_strain(cell, at);
 }
 
 Vec3 spin_of(const Mat3& h) {
@@ -176,6 +201,26 @@ void write_field(const QuadraticNodes& nodes, const QuadraticSolution& solution,
 
 namespace {
 
+// J, of the strain beside the free one; with weights instead of K, so that nothing cancels where there is none.
+double heated_energy(const QuadraticSystem& system, const QuadraticSolution& solution,
+                     const std::function<Moments(std::size_t)>& moments, bool free) {
+  return parallel_sum<double>(
+      system.nodes().cells.size(),
+      [&](std::size_t c) {
+        const Mat9& moduli = system.moduli(system.part_of(c));
+        const Moments weights = moments(c);
+        double sum = 0;
+        for (std::size_t k = 0; k < kMoments; ++k) {
+          const Vec3 at = gauss_point(k);
+          const Mat3 strain = free ? system.free_strain(c, at) : elastic_gradient(system, solution, c, at);
+          sum += 0.5 * weights[static_cast<Eigen::Index>(k)] *
+                 strain.cwiseProduct(stress_of(moduli, strain)).sum();
+        }
+        return sum * system.lattice(c).spacing.prod();
+      },
+      kAnswerCellsAtATime);
+}
+
 // J, of the cells once their rotation is taken out.
 double energy_of(const CellProducts<double>& cells, const QuadraticNodes& nodes,
                  const QuadraticSolution& solution) {
@@ -196,6 +241,13 @@ double energy_of(const CellProducts<double>& cells, const QuadraticNodes& nodes,
 
 double energy_outside(const QuadraticSystem& system, const QuadraticSolution& solution,
                       double elastic_energy) {
+  if (system.heated()) {
+    constexpr double kRounding = 1e-12;  // of the energy that it would take to undo the free strain
+    const auto all = [&](std::size_t c) { return system.stiffness_moments(c); };
+    const auto beyond = [&](std::size_t c) { return Moments(all(c) - system.moments(c)); };
+    if (!(elastic_energy > kRounding * heated_energy(system, solution, all, true))) return 0;
+    return heated_energy(system, solution, beyond, false) / elastic_energy;
+  }
   const double outside = energy_of(system.outside(), system.nodes(), solution);
   return elastic_energy > 0 ? outside / elastic_energy : 0;
 }
@@ -241,7 +293,11 @@ void report(const QuadraticSystem& system, const QuadraticSolution& solution, Si
       });
     result.loads.push_back(total);
   }
-  result.elastic_energy = energy_of(solution.tangent->stiffness.cells(), nodes, solution);
+  result.elastic_energy =
+      system.heated()
+          ? heated_energy(
+                system, solution, [&](std::size_t c) { return system.stiffness_moments(c); }, false)
+          : energy_of(solution.tangent->stiffness.cells(), nodes, solution);
   for (std::size_t c = 0; c < nodes.cells.size(); ++c)
     result.smallest_jacobian = std::min(
         result.smallest_jacobian,
@@ -259,7 +315,7 @@ double typical_strain(const QuadraticSystem& system, const QuadraticSolution& so
   };
   const QuadraticNodes& nodes = system.nodes();
   const Sums sums = parallel_sum<Sums>(nodes.cells.size(), [&](std::size_t c) {
-    const Mat3 h = local_gradient(system, solution, c, system.middle(c));
+    const Mat3 h = elastic_gradient(system, solution, c, system.middle(c));
     const Mat3 strain = 0.5 * (h + h.transpose());
     const double most = Eigen::SelfAdjointEigenSolver<Mat3>(strain, Eigen::EigenvaluesOnly)
                             .eigenvalues()

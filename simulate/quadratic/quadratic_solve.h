@@ -49,6 +49,9 @@ constexpr double kMoreSafety = 4;
 // R^T F - 1: the displacement gradient in a cell at cell coordinates, without the cell's rotation.
 [[nodiscard]] Mat3 local_gradient(const QuadraticSystem& system, const QuadraticSolution& solution,
                                   std::size_t cell, const Vec3& at);
+// The same without the free strain: what stress is proportional to.
+[[nodiscard]] Mat3 elastic_gradient(const QuadraticSystem& system, const QuadraticSolution& solution,
+                                    std::size_t cell, const Vec3& at);
 // The rotation vector of a small displacement gradient.
 [[nodiscard]] Vec3 spin_of(const Mat3& gradient);
 // (27 x 3) m: the displacement of a cell's nodes beside its first one, once the cell's rotation R is taken out of it;

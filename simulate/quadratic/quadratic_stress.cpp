@@ -22,17 +22,6 @@ struct Boundary {
   double pressure = 0;         // Pa; kUnknownPressure
 };
 
-Mat3 times(const Mat9& moduli, const Mat3& gradient) {
-  Eigen::Matrix<double, 9, 1> h;
-  for (int k = 0; k < 3; ++k)
-    for (int l = 0; l < 3; ++l) h[3 * k + l] = gradient(k, l);
-  const Eigen::Matrix<double, 9, 1> s = moduli * h;
-  Mat3 stress;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) stress(i, j) = s[3 * i + j];
-  return stress;
-}
-
 // What has to be added to a gradient for a traction more along the surface's normal n: a n^T.
 Mat3 across(const Mat9& moduli, const Vec3& n, const Vec3& traction) {
   Mat3 q = Mat3::Zero();
@@ -153,7 +142,7 @@ class FieldStress {
   // Of a cell's own field at cell coordinates, turned with it.
   [[nodiscard]] SymmetricStress of_field(std::size_t cell, const Vec3& at) const {
     const Mat3 own =
-        times(system_.moduli(system_.part_of(cell)), local_gradient(system_, solution_, cell, at));
+        stress_of(system_.moduli(system_.part_of(cell)), elastic_gradient(system_, solution_, cell, at));
     return components(rotation(cell) * own * rotation(cell).transpose());
   }
 
@@ -165,7 +154,7 @@ class FieldStress {
     const Mat3 turn = rotation(cell);
     Mat3 sigma = turn.transpose() * matrix(stress) * turn;
     const Vec3 acts = -boundary.pressure * (turn.transpose() * boundary.normal);
-    sigma += times(moduli, across(moduli, boundary.normal, acts - sigma * boundary.normal));
+    sigma += stress_of(moduli, across(moduli, boundary.normal, acts - sigma * boundary.normal));
     return components(turn * sigma * turn.transpose());
   }
 

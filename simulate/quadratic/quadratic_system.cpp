@@ -16,6 +16,7 @@
 #include "simulate/matter/load_distribution.h"
 #include "simulate/matter/surface_samples.h"
 #include "simulate/models/cells.h"
+#include "simulate/thermal/thermal.h"
 
 namespace flexel::simulate {
 namespace {
@@ -48,8 +49,10 @@ QuadraticSystem::QuadraticSystem(const Problem& problem, const Scene& scene)
     stiffest_.push_back(law.name == LawName::orthotropic ? law.stiffest : law.lambda + 2 * law.mu);
   }
   pressure_.assign(body.surface.polygon_count(), 0);
+  free_ = FreeStrain(body, scene.get<Thermal>(), problem.materials);
   place_supports(scene.get<Supports>().ties);
   place_bonds(scene.get<Bonds>());
+  if (heated()) integrate_free_strain();
   place_loads(scene.get<Loads>().loads);
   if (const auto& acceleration = scene.get<Gravity>().acceleration) add_gravity(*acceleration);
 }
@@ -226,6 +229,12 @@ Moments QuadraticSystem::moments(std::size_t cell) const {
   return moments_at_[cell] == kWhole ? whole_cell_moments() : body_moments(problem_.body, moments_at_[cell]);
 }
 
+Moments QuadraticSystem::stiffness_moments(std::size_t cell) const {
+  if (moments_at_[cell] == kWhole) return whole_cell_moments();
+  const Moments own = moments(cell);
+  return own + kOutside * (whole_cell_moments() - own);
+}
+
 Vec3 QuadraticSystem::middle(std::size_t cell) const {
   return middle_of(moments(cell)).cwiseMax(0).cwiseMin(1);
 }
@@ -289,8 +298,79 @@ double QuadraticSystem::penalty(std::size_t cell, double safety) const {
 
 NitschePoint QuadraticSystem::point(const NitscheSupport& support, const FacePoint& at, double safety,
                                     double share) const {
-  return nitsche_point(at, *support.tie, share, lattice(at.cell), moduli_[part_[at.cell]],
-                       penalty(at.cell, safety));
+  NitschePoint made = nitsche_point(at, *support.tie, share, lattice(at.cell), moduli_[part_[at.cell]],
+                                    penalty(at.cell, safety));
+  if (heated())
+    made.free = stress_of(moduli_[part_[at.cell]], free_strain(at.cell, at.at)) * at.area_vector.normalized();
+  return made;
+}
+
+// int B^T A : e dV with the weights of the stiffness, so that a strain that the cells can have leaves no force; and the traction
+// of the free strain on supports.
+void QuadraticSystem::integrate_free_strain() {
+  free_forces_.assign(nodes_.cells.size() * kCellUnknowns, 0);
+  parallel_for_each(
+      nodes_.cells.size(),
+      [&](std::size_t c) {
+        const Moments weights = stiffness_moments(c);
+        const double volume = lattice(c).spacing.prod();
+        for (std::size_t k = 0; k < kMoments; ++k) {
+          const Vec3 at = gauss_point(k);
+          const Mat3 stress = volume * weights[static_cast<Eigen::Index>(k)] *
+                              stress_of(moduli_[part_[c]], free_strain(c, at));
+          const QuadraticShape shape = world_shape(lattice(c), at);
+          for (std::size_t n = 0; n < kQuadraticNodes; ++n)
+            Eigen::Map<Vec3>(&free_forces_[c * kCellUnknowns + 3 * n]) += stress * shape.gradient[n];
+        }
+        for (SupportIntegrals& held : cell_supports_[c])
+          for (const FacePoint* point : held.points) {
+            const Vec3 traction =
+                stress_of(moduli_[part_[c]], free_strain(c, point->at)) * point->area_vector;
+            const QuadraticShape shape = quadratic_shape(point->at);
+            for (std::size_t n = 0; n < kQuadraticNodes; ++n) held.free[n] += shape.value[n] * traction;
+          }
+      },
+      kIntegratedCellsAtATime);
+  free_force_ = norm_of_free_forces();
+}
+
+double QuadraticSystem::norm_of_free_forces() const {
+  std::vector<Vec3> sum(nodes_.size(), Vec3::Zero());
+  for (std::size_t c = 0; c < nodes_.cells.size(); ++c)
+    for (std::size_t n = 0; n < kQuadraticNodes; ++n)
+      sum[nodes_.of_cell[c][n]] += Eigen::Map<const Vec3>(&free_forces_[c * kCellUnknowns + 3 * n]);
+  double squared = 0;
+  for (const Vec3& each : sum) squared += each.squaredNorm();
+  return std::sqrt(squared);
+}
+
+std::vector<Vec3> QuadraticSystem::free_shape() const {
+  std::vector<Vec3> shape = prescribed();
+  const std::vector<std::uint8_t> held = this->held();
+  struct Of {
+    Mat3 strain = Mat3::Zero();
+    double volume = 0;
+    std::optional<Vec3> about;
+  };
+  std::vector<Of> parts(moduli_.size());
+  for (std::size_t c = 0; c < nodes_.cells.size(); ++c) {
+    Of& part = parts[part_[c]];
+    const double volume = problem_.body.fill[nodes_.cells[c]];
+    part.strain += volume * free_strain(c, middle(c));
+    part.volume += volume;
+    for (std::size_t n = 0; n < kQuadraticNodes && !part.about; ++n)
+      if (held[nodes_.of_cell[c][n]] == 7) part.about = nodes_.rest[nodes_.of_cell[c][n]];
+  }
+  for (std::size_t c = 0; c < nodes_.cells.size(); ++c) {
+    const Of& part = parts[part_[c]];
+    const Vec3 about = part.about.value_or(nodes_.rest[nodes_.of_cell[0][0]]);
+    for (const std::uint32_t n : nodes_.of_cell[c]) {
+      const Vec3 moved = part.strain / std::max(part.volume, 1e-300) * (nodes_.rest[n] - about);
+      for (int axis = 0; axis < 3; ++axis)
+        if (!(held[n] >> axis & 1)) shape[n][axis] = moved[axis];
+    }
+  }
+  return shape;
 }
 
 std::vector<std::uint8_t> QuadraticSystem::held() const {
@@ -318,11 +398,9 @@ CellProducts<double> QuadraticSystem::outside() const {
 }
 
 CellProducts<double> QuadraticSystem::regular_cells() const {
-  const Moments whole = whole_cell_moments();
   return cells([&](std::size_t c) -> std::optional<Moments> {
     if (moments_at_[c] == kWhole) return std::nullopt;
-    const Moments own = moments(c);
-    return Moments(own + kOutside * (whole - own));
+    return stiffness_moments(c);
   });
 }
 
@@ -346,6 +424,16 @@ std::vector<Vec3> QuadraticSystem::right_side(double safety) const {
   std::vector<Vec3> sum(nodes_.size(), Vec3::Zero());
   for (const NodalLoad& load : loads_)
     for (std::size_t n = 0; n < sum.size(); ++n) sum[n] += load.forces[n];
+  for (std::size_t c = 0; heated() && c < nodes_.cells.size(); ++c) {
+    const std::span<const double> own = free_forces(c);
+    for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
+      Vec3 force = Eigen::Map<const Vec3>(&own[3 * n]);
+      for (const SupportIntegrals& held : cell_supports_[c])
+        force -= Vec3(held.support->tie->axes[0], held.support->tie->axes[1], held.support->tie->axes[2])
+                     .cwiseProduct(held.free[n]);
+      sum[nodes_.of_cell[c][n]] += force;
+    }
+  }
   for (const NitscheSupport& support : supports_) {
     if (!support.tie->is_move) continue;
     for (const FacePoint& at : support.points) {

@@ -7,6 +7,7 @@
 #include "simulate/quadratic/cells/nitsche_support.h"
 #include "simulate/quadratic/quadratic_multigrid.h"
 #include "simulate/scene/scene.h"
+#include "simulate/thermal/free_strain.h"
 
 namespace flexel::simulate {
 
@@ -35,6 +36,19 @@ class QuadraticSystem {
   [[nodiscard]] CellProducts<double> outside() const;
   // (nodes x 3) N: loads and what led faces ask for.
   [[nodiscard]] std::vector<Vec3> right_side(double safety) const;
+  // (27 x 3) N: what the free strain makes the nodes of a cell do, in the cell's frame.
+  [[nodiscard]] std::span<const double> free_forces(std::size_t cell) const {
+    return {free_forces_.data() + cell * kCellUnknowns, heated() ? std::size_t{kCellUnknowns} : 0};
+  }
+  [[nodiscard]] bool heated() const { return free_.any(); }
+  // N, the norm of what it asks of all nodes; 0 where there is none.
+  [[nodiscard]] double free_force() const { return free_force_; }
+  // At cell coordinates; world frame at rest.
+  [[nodiscard]] Mat3 free_strain(std::size_t cell, const Vec3& at) const {
+    return heated() ? free_.at(part_[cell], nodes_.cells[cell], at) : Mat3(Mat3::Zero());
+  }
+  // (nodes x 3) m: each part as its mean free strain makes it, about what holds it; what supports hold stays.
+  [[nodiscard]] std::vector<Vec3> free_shape() const;
   // (nodes x 3) m, in prescribed components at this share of the moves; 0 elsewhere.
   [[nodiscard]] std::vector<Vec3> prescribed(double share = 1) const;
 
@@ -47,6 +61,8 @@ class QuadraticSystem {
   [[nodiscard]] double stiffest(std::size_t cell) const { return stiffest_[part_[cell]]; }  // Pa
   // Whether that cell of nodes().cells is full of matter.
   [[nodiscard]] bool is_whole(std::size_t cell) const;
+  // Of what the stiffness has of a cell: its matter, and a little where there is none.
+  [[nodiscard]] Moments stiffness_moments(std::size_t cell) const;
   // Of the cell of that index in nodes().cells.
   [[nodiscard]] Moments moments(std::size_t cell) const;
   [[nodiscard]] const Lattice& lattice(std::size_t cell) const {
@@ -100,6 +116,8 @@ class QuadraticSystem {
   void check_area(const Load& load, const std::vector<std::uint32_t>& polygons,
                   const std::vector<FacePoint>& points);
   void add_gravity(const Vec3& acceleration);
+  void integrate_free_strain();
+  [[nodiscard]] double norm_of_free_forces() const;
   [[nodiscard]] std::vector<std::uint8_t> held() const;
 
   const Problem& problem_;
@@ -115,6 +133,9 @@ class QuadraticSystem {
   std::vector<std::vector<std::uint32_t>> cell_bonds_;  // (cells) 2 pair + side
   std::vector<double> bearing_limit_;                   // (cells) Pa/m, of bonded ones
   std::vector<BondedParts> bonded_parts_;
+  FreeStrain free_;
+  double free_force_ = 0;            // N
+  std::vector<double> free_forces_;  // (cells x 81) N; none: no free strain
   std::vector<NodalLoad> loads_;
   std::vector<double> pressure_;  // (polygons)
   std::vector<std::string> warnings_;

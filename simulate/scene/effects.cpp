@@ -16,6 +16,7 @@
 #include "simulate/effects/rigid.h"
 #include "simulate/effects/supports.h"
 #include "simulate/paper/connection_friction.h"
+#include "simulate/thermal/thermal.h"
 
 namespace flexel::simulate {
 namespace {
@@ -150,6 +151,42 @@ std::vector<SceneKey> rigid_keys() {
       {t, "rotation", K::list, {}, "", "{ axis, angle } at each time"}};
 }
 
+std::vector<SceneKey> thermal_keys() {
+  const std::string t = "[thermal]", s = "[shrinkage]", m = "[materials.NAME]";
+  const std::string fixed = "[[temperature]]", heat = "[[heat]]", air = "[[convection]]";
+  return {{t, "change", K::quantity, {}, "0", "of the temperature, \"80 K\""},
+          {t, "gradient", K::list, {}, "0", "of the temperature, \"500 K/m\" along x, y, z"},
+          {t, "about", K::vector, D::length, "the origin", "where the gradient gives nothing"},
+          {t, "column", K::text, {}, "", "temperatures [K] of the body's elements or cells"},
+          {t,
+           "reference",
+           K::quantity,
+           {},
+           "",
+           "of column and conduction: where the part has its shape, \"20 degC\""},
+          {t, "part", K::text, {}, "every part", "a part's name"},
+          {s, "axis", K::direction, {}, "[0, 0, 1]", "that layers are stacked along"},
+          {s, "layer", K::quantity, D::length, "required", "height of a layer"},
+          {s, "along", K::quantity, D::share, "required", "inherent strain along the axis"},
+          {s, "across", K::quantity, D::share, "required", "inherent strain across it"},
+          {s, "height", K::list, D::length, "", "above the part's lowest point"},
+          {s, "factor", K::list, {}, "1", "of both strains at each height"},
+          {s, "part", K::text, {}, "every part", "a part's name"},
+          {fixed, "where", K::selection, {}, "required", "a face that has the temperature"},
+          {fixed, "name", K::text, {}, "the selection", "for the summary"},
+          {fixed, "value", K::quantity, {}, "required", "\"100 degC\""},
+          {heat, "where", K::selection, {}, "required", "a face that heat comes in by"},
+          {heat, "name", K::text, {}, "the selection", "for the summary"},
+          {heat, "flux", K::quantity, {}, "", "\"1000 W/m2\""},
+          {heat, "power", K::quantity, {}, "", "\"5 W\", in total"},
+          {air, "where", K::selection, {}, "required", "a face that a fluid touches"},
+          {air, "name", K::text, {}, "the selection", "for the summary"},
+          {air, "coefficient", K::quantity, {}, "required", "\"10 W/(m2 K)\""},
+          {air, "ambient", K::quantity, {}, "required", "temperature of the fluid"},
+          {m, "expansion", K::quantity, {}, "the library's", "\"12e-6 /K\""},
+          {m, "conductivity", K::quantity, {}, "the library's", "\"50 W/(m K)\""}};
+}
+
 std::vector<SceneKey> contact_keys() {
   const std::string c = "[contact]", p = "[[plane]]";
   return {
@@ -183,6 +220,8 @@ const std::vector<EffectRow>& effect_rows() {
       row<Gravity>("weight and attraction", kEverywhere, kAll, {"gravity"}, gravity_keys()),
       row<Loads>("forces, torques and pressures", kEverywhere, kAll, {"load"}, load_keys()),
       row<Supports>("places that are held or led", kEverywhere, kAll, {"move"}, support_keys()),
+      row<Thermal>("heat and shrinkage", ActsIn::equilibrium, "cells, quadratic", {"thermal", "shrinkage"},
+                   thermal_keys()),
       row<Bonds>("parts that touch hold together", kEverywhere, kAll, {}, bond_keys()),
       row<Damping>("internal damping", kWithContact, kAll, {"damping"}, damping_keys()),
       row<ConnectionFriction>("sliding friction within a part", kNotAtRest, kConnections,

@@ -39,7 +39,9 @@ Material parse_material(TableReader& reader, const std::string& name) {
   material.layer_strength = optional_limit("layer_strength");
   material.elongation = reader.number("elongation").value_or(0);
   material.contact_friction = reader.number("friction");
-  (void)reader.find("stick");  // simulate/effects/contact.cpp
+  (void)reader.find("stick");      // simulate/effects/contact.cpp
+  (void)reader.find("expansion");  // simulate/thermal/thermal.cpp
+  (void)reader.find("conductivity");
   reader.finish();
   if (material.contact_friction && !(*material.contact_friction >= 0))
     reader.fail("\"friction\" needs to be 0 or more");

@@ -103,6 +103,8 @@ SceneKeyGroup event_keys() {
 
 const char* name_of(ActsIn acts) {
   switch (acts) {
+    case ActsIn::equilibrium:
+      return "equilibrium";
     case ActsIn::all:
       return "equilibrium, timed runs";
     case ActsIn::relaxation_and_time:

@@ -18,12 +18,12 @@ formats/vtu formats/lattice formats/exchange
 meshes
 voxelize/types voxelize/mesh voxelize/distances voxelize/classify voxelize/heal voxelize/lattice voxelize
 simulate/laws simulate/input simulate/result simulate/linear simulate/state simulate/rigid simulate/conditions simulate/models
-simulate/kernels simulate/matter simulate/gravitation simulate/contact/points simulate/contact/pairs simulate/contact simulate/effects simulate/paper simulate/events simulate/scene
-simulate/equilibrium simulate/estimate simulate/probes simulate/quadratic/cells simulate/quadratic simulate/live simulate/stepping simulate/implicit simulate/time simulate/modes simulate
+simulate/kernels simulate/matter simulate/gravitation simulate/contact/points simulate/contact/pairs simulate/contact simulate/effects simulate/thermal simulate/paper simulate/events simulate/scene
+simulate/equilibrium simulate/estimate simulate/probes simulate/quadratic/cells simulate/quadratic simulate/conduction simulate/live simulate/stepping simulate/implicit simulate/time simulate/modes simulate
 mapping/types mapping/anchors mapping/checks mapping/methods mapping/space mapping/crack mapping/report mapping/refine mapping
 cad/read cad/deform cad
 flexel/process flexel/picture/canvas flexel/picture/render flexel/picture flexel/view flexel/clay flexel/study/runs flexel/study flexel/export
-flexel/measure flexel/accuracy flexel
+flexel/measure flexel/accuracy flexel/compensate flexel
 """.split()
 STAGES = {"voxelize", "simulate", "mapping"}
 HEAVY = re.compile(r"\b(assimp|CGAL|openvdb|embree3)/|<(png\.h|ft2build\.h|microhttpd\.h)>|<[A-Z][A-Za-z0-9]*_?[A-Za-z0-9]*\.hxx>|<(gp|TopoDS|TopExp|BRep|Poly)\w*\.hxx>")

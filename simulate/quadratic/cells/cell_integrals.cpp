@@ -4,14 +4,22 @@
 #include <algorithm>
 
 namespace flexel::simulate {
-namespace {
 
 Vec3 gauss_point(std::size_t k) {
   return {kGaussPoints[k % kMomentPoints], kGaussPoints[k / kMomentPoints % kMomentPoints],
           kGaussPoints[k / (kMomentPoints * kMomentPoints)]};
 }
 
-}  // namespace
+Mat3 stress_of(const Mat9& moduli, const Mat3& gradient) {
+  Eigen::Matrix<double, 9, 1> h;
+  for (int k = 0; k < 3; ++k)
+    for (int l = 0; l < 3; ++l) h[3 * k + l] = gradient(k, l);
+  const Eigen::Matrix<double, 9, 1> s = moduli * h;
+  Mat3 stress;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) stress(i, j) = s[3 * i + j];
+  return stress;
+}
 
 quadratic_kernel::Elasticity<double> cell_elasticity(const Lattice& lattice, const Mat9& moduli) {
   constexpr int row[6] = {0, 1, 2, 0, 1, 2}, column[6] = {0, 1, 2, 1, 2, 0};

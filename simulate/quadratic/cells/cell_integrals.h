@@ -23,6 +23,10 @@ using Moments = Eigen::Matrix<double, static_cast<int>(kMoments), 1>;
 
 // Integrals of the shape functions over a cell of that volume [m^3].
 [[nodiscard]] std::array<double, kQuadraticNodes> shape_integrals(double voxel, const Moments& moments);
+// Gauss's point whose weight moment k is, in cell coordinates.
+[[nodiscard]] Vec3 gauss_point(std::size_t k);
+// A : gradient [Pa].
+[[nodiscard]] Mat3 stress_of(const Mat9& moduli, const Mat3& gradient);
 // Middle of the matter, in cell coordinates.
 [[nodiscard]] Vec3 middle_of(const Moments& moments);
 

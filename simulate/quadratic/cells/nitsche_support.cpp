@@ -48,13 +48,15 @@ Vec3 reaction(const NitschePoint& point, const std::array<Vec3, kQuadraticNodes>
     moved += point.shape.value[n] * u[n];
     traction += point.traction[n] * local[n];
   }
-  return point.area * (point.projector * (rotation * traction - point.penalty * (moved - point.led)));
+  return point.area *
+         (point.projector * (rotation * (traction - point.free) - point.penalty * (moved - point.led)));
 }
 
 // Many points at a time: most of the work is the product of shape functions and tractions.
 void SupportIntegrals::find(const Lattice& lattice, const Mat9& moduli) {
   constexpr std::size_t kAtATime = 32;
   constexpr auto kNodes = static_cast<Eigen::Index>(kQuadraticNodes);
+  free.fill(Vec3::Zero());
   mass.setZero();
   traction.setZero();
   Eigen::Matrix<double, kQuadraticNodes, Eigen::Dynamic> value(kNodes, kAtATime), weighted = value;
@@ -96,7 +98,7 @@ void SupportIntegrals::add_to(double penalty, const Mat3& rotation, CellMatrix& 
     }
 }
 
-void SupportIntegrals::add_forces(double penalty, const std::array<Vec3, kQuadraticNodes>& u,
+void SupportIntegrals::add_forces(double penalty, double share, const std::array<Vec3, kQuadraticNodes>& u,
                                   const std::array<Vec3, kQuadraticNodes>& local, const Mat3& rotation,
                                   std::array<Vec3, kQuadraticNodes>& forces) const {
   const Mat3 projector = projector_of(*support->tie);
@@ -106,7 +108,7 @@ void SupportIntegrals::add_forces(double penalty, const std::array<Vec3, kQuadra
     turned[b] = rotation.transpose() * held[b];
   }
   for (std::size_t a = 0; a < kQuadraticNodes; ++a) {
-    Vec3 penalised = Vec3::Zero(), pulled = Vec3::Zero(), adjoint = Vec3::Zero();
+    Vec3 penalised = Vec3::Zero(), pulled = -share * free[a], adjoint = Vec3::Zero();
     for (std::size_t b = 0; b < kQuadraticNodes; ++b) {
       penalised += mass(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) * held[b];
       pulled += traction_block(a, b) * local[b];

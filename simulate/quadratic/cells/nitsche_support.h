@@ -32,6 +32,7 @@ struct NitschePoint {
   Mat3 projector = Mat3::Zero();
   double area = 0, penalty = 0;  // m^2, Pa/m
   Vec3 led = Vec3::Zero();       // m, d
+  Vec3 free = Vec3::Zero();      // Pa, A : e n of the free strain, in the frame of the cell
 };
 // Shape functions, tractions and area only.
 [[nodiscard]] NitschePoint traction_point(const FacePoint& point, const Lattice& lattice, const Mat9& moduli);
@@ -52,12 +53,14 @@ struct SupportIntegrals {
   std::vector<const FacePoint*> points;
   Eigen::Matrix<double, kQuadraticNodes, kQuadraticNodes> mass;
   Eigen::Matrix<double, kQuadraticNodes, 9 * kQuadraticNodes> traction;
+  std::array<Vec3, kQuadraticNodes> free{};  // N, int N_a A : e n dA of the free strain e
 
   void find(const Lattice& lattice, const Mat9& moduli);
   // Adds its part to the cell's matrix, in the frame of a cell that is turned by `rotation`. `penalty`: beta [Pa/m].
   void add_to(double penalty, const Mat3& rotation, CellMatrix& matrix) const;
-  // Adds its forces on the nodes, but for what a move asks for, to (27 x 3) [N]; u and `local` as for reaction().
-  void add_forces(double penalty, const std::array<Vec3, kQuadraticNodes>& u,
+  // Adds its forces on the nodes, but for what a move asks for, to (27 x 3) [N]; u and `local` as for reaction(). `share`: of the
+  // free strain.
+  void add_forces(double penalty, double share, const std::array<Vec3, kQuadraticNodes>& u,
                   const std::array<Vec3, kQuadraticNodes>& local, const Mat3& rotation,
                   std::array<Vec3, kQuadraticNodes>& forces) const;
 
