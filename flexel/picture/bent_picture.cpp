@@ -1,5 +1,5 @@
 // The body is moved into the picture's subject, so that memory holds it once.
-#include "flexel/bent_picture.h"
+#include "flexel/picture/bent_picture.h"
 #include "flexel/picture/canvas/png_file.h"
 
 #include <fmt/format.h>
@@ -8,16 +8,16 @@
 #include "base/files/output_file.h"
 #include "flexel/picture/picture.h"
 
-namespace flexel::commands {
+namespace flexel::picture {
 
 void write_bent_picture(Body& body, const std::string& path, Progress& progress) {
-  picture::PictureOptions options;
+  PictureOptions options;
   options.colour = "displacement";
   options.exaggeration = std::nullopt;
-  std::vector<picture::PictureSubject> subjects(1);
+  std::vector<PictureSubject> subjects(1);
   subjects[0].where = path;
   subjects[0].body = std::move(body);
-  const picture::PictureResult picture = draw_picture(subjects, options, progress);
+  const PictureResult picture = draw_picture(subjects, options, progress);
   body = std::move(*subjects[0].body);
   const Bytes bytes = encode_png(picture.image);
   OutputFile out(path);
@@ -25,4 +25,4 @@ void write_bent_picture(Body& body, const std::string& path, Progress& progress)
   out.commit();
 }
 
-}  // namespace flexel::commands
+}  // namespace flexel::picture
