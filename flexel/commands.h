@@ -5,6 +5,7 @@ namespace flexel::commands {
 
 int compare_command(int argc, char** argv);
 int deform_command(int argc, char** argv);
+int doctor_command(int argc, char** argv);
 int export_command(int argc, char** argv);
 int info_command(int argc, char** argv);
 int picture_command(int argc, char** argv);
