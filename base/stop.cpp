@@ -60,6 +60,10 @@ void request_stop() noexcept {
   stop_detail::interrupted = true;
 }
 
+void forget_stop() noexcept {
+  stop_detail::interrupted = false;
+}
+
 StopAfter::StopAfter(double seconds, std::string name, LimitOf of)
     : name_(std::move(name)),
       of_(of),

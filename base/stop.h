@@ -44,6 +44,8 @@ void throw_stop();                               // unless a StopWaits lives
 
 // For the signal handler: interrupted() becomes true. Safe there.
 void request_stop() noexcept;
+// For a process that outlives a run that was stopped: the next one may begin.
+void forget_stop() noexcept;
 
 // True where check_stop() would throw, but for a StopWaits. For code that may not throw.
 [[nodiscard]] inline bool stop_is_due() noexcept {

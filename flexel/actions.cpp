@@ -10,7 +10,7 @@
 #include "base/error.h"
 #include "base/math/area_vector.h"
 #include "base/units.h"
-#include "flexel/face_shape.h"
+#include "flexel/measure/face_shape.h"
 #include "simulate/scene/scene_checks.h"
 
 namespace flexel::commands {

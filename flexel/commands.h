@@ -7,6 +7,7 @@ int clay_command(int argc, char** argv);
 int compare_command(int argc, char** argv);
 int compensate_command(int argc, char** argv);
 int deform_command(int argc, char** argv);
+int doctor_command(int argc, char** argv);
 int export_command(int argc, char** argv);
 int info_command(int argc, char** argv);
 int picture_command(int argc, char** argv);

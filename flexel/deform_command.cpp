@@ -18,6 +18,7 @@
 #include "flexel/accuracy/resolution_search.h"
 #include "flexel/accuracy/run_error.h"
 #include "flexel/commands.h"
+#include "flexel/deform.h"
 #include "flexel/job.h"
 #include "flexel/picture/bent_picture.h"
 #include "flexel/view/result_page.h"
@@ -57,7 +58,9 @@ struct DeformArguments {
   std::string html, summary, body, accuracy, within;
   mapping::MapArguments map;
   int threads = 0;
-  bool quiet = false, verbose = false, estimate = true;
+  bool quiet = false, verbose = false, estimate = true, json = false;
+  bool needs_output = true;
+  const Surface* part = nullptr;  // in place of the files
 };
 
 void declare_input(CommandLine& app, JobArguments& arguments) {
@@ -83,6 +86,7 @@ void declare_output(CommandLine& app, DeformArguments& arguments) {
   app.add_option("--summary", arguments.summary,
                  "Write the summary of all stages (JSON; docs/guide/deform.md)")
       .type_name("FILE");
+  app.add_flag("--json", arguments.json, "Print the summary as JSON to stdout (docs/reference/json.md)");
   add_threads_option(app, arguments.threads);
   app.add_option("--accuracy", arguments.accuracy,
                  "Choose size and mapping from cheap runs so that the error is at most this (\"2%\")")
@@ -122,7 +126,10 @@ std::string failed_name(const Plan& plan) {
 }
 
 void plan_outputs(const DeformArguments& arguments, Plan& plan) {
-  if (arguments.outputs.empty()) throw InputError("-o (or --html) is missing: where the result goes");
+  if (arguments.json && std::count(arguments.outputs.begin(), arguments.outputs.end(), "-") > 0)
+    throw InputError("--json and -o - both write to stdout: name a file with -o");
+  if (arguments.outputs.empty() && arguments.needs_output && !arguments.json)
+    throw InputError("-o (or --html) is missing: where the result goes");
   for (const std::string& path : arguments.outputs)
     if (const std::string ending = extension(path);
         ending == "vtu" || ending == "png" || ending == "html" || ending == "htm")
@@ -427,6 +434,7 @@ SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surf
 }
 
 Surface read_part_files(const DeformArguments& arguments, const Plan& plan, Progress& progress) {
+  if (arguments.part != nullptr) return *arguments.part;
   const StopEndsProcess at_once;
   return read_parts(arguments.job.parts, plan.job.import, progress);
 }
@@ -542,17 +550,16 @@ void say_dropped_model(const AccuracyReport& accuracy, Progress& progress) {
       accuracy.dropped_model));
 }
 
-int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress) {
+Deformed run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress) {
   const KeptWarnings warnings;  // for the pages
-  std::optional<AccuracyReport> accuracy;
-  SolvedRun run;
+  Deformed result;
+  auto& [run, mapped, accuracy, lines, summary] = result;
   {
     const BriefOutput brief(!arguments.verbose);
     run = solve(arguments, plan, accuracy, progress);
   }
   Body& body = run.voxels.body;
   for (const std::string& line : run.warnings) progress.warn(line);
-  mapping::MappedPart mapped;
   const StopEndsProcess at_once;
   {
     const BriefOutput brief(!arguments.verbose);
@@ -587,22 +594,21 @@ int run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress)
     }
     progress.finish();
   }
-  const std::string summary = summary_text(run, found, plan, accuracy);
+  summary = summary_text(run, found, plan, accuracy);
   if (!arguments.summary.empty()) write_text(summary, arguments.summary);
   // With --verbose simulate() has said what infill is.
-  const std::vector<std::string> lines = last_lines(run, plan, accuracy, accuracy || !arguments.verbose);
+  lines = last_lines(run, plan, accuracy, accuracy || !arguments.verbose);
   const std::optional<view::PageTooLarge> missing =
       write_pages(arguments, plan, body, {warnings.lines(), lines, summary}, progress);
   outputs.appear();
   for (const std::string& line : lines) progress.say(line);
+  if (arguments.json) write_text(summary, "-");
   if (missing) throw *missing;
-  return kExitDone;
+  return result;
 }
 
-}  // namespace
-
-int deform_command(int argc, char** argv) {
-  DeformArguments arguments;
+// Nothing: help was asked for.
+std::optional<Deformed> run_with(DeformArguments arguments, int argc, char** argv, Progress::Mode mode) {
   CommandLine app{
       "Deforms a part as its material would be: import, lattice, simulation and mapping in one run.",
       "flexel deform"};
@@ -610,7 +616,7 @@ int deform_command(int argc, char** argv) {
   declare_output(app, arguments);
   // Runs in time leave something, and see to it themselves; a time limit, which comes later, leaves the last state.
   const StopEndsProcess nothing_is_left;
-  if (!parse_arguments(app, argc, argv)) return kExitDone;
+  if (!parse_arguments(app, argc, argv)) return {};
   if (!arguments.html.empty()) {
     if (extension(arguments.html) != "html" && extension(arguments.html) != "htm")
       throw InputError(
@@ -619,8 +625,30 @@ int deform_command(int argc, char** argv) {
   }
   Plan plan = make_plan(arguments, app);
   const ThreadLimit limit(arguments.threads);
-  Progress progress("flexel", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
+  Progress progress("flexel", arguments.quiet ? Progress::Mode::quiet : mode);
   return run_stages(arguments, plan, progress);
+}
+
+}  // namespace
+
+int deform_command(int argc, char** argv) {
+  (void)run_with({}, argc, argv, Progress::Mode::automatic);
+  return kExitDone;
+}
+
+Deformed deform(const std::vector<std::string>& arguments, const Surface* part, Progress::Mode mode) {
+  std::vector<std::string> words = {"deform"};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  std::vector<char*> pointers;
+  for (std::string& word : words) pointers.push_back(word.data());
+  pointers.push_back(nullptr);
+  DeformArguments given;
+  given.needs_output = false;
+  given.part = part;
+  std::optional<Deformed> result =
+      run_with(std::move(given), static_cast<int>(words.size()), pointers.data(), mode);
+  if (!result) throw InputError("help is no result: leave --help out");
+  return *std::move(result);
 }
 
 }  // namespace flexel::commands

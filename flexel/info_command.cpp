@@ -17,7 +17,7 @@
 #include "base/units.h"
 #include "flexel/commands.h"
 #include "flexel/coordinates.h"
-#include "flexel/face_shape.h"
+#include "flexel/measure/face_shape.h"
 #include "formats/common/file_formats.h"
 #include "formats/exchange/import.h"
 #include "formats/exchange/size_warning.h"

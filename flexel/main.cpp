@@ -42,6 +42,7 @@ constexpr const char* kHelp =
     "                        what the lattice makes of a material: E, nu and G by direction and resolution\n"
     "  flexel study PART... --scene FILE -o FOLDER\n"
     "                        what accuracy costs in time: a page with plots and the size to use\n"
+    "  flexel doctor         what is installed, and a short run whose answer is known\n"
     "  flexel voxelize ...   part -> lattice of elements      (the program flexel-voxelize)\n"
     "  flexel simulate ...   lattice + scene -> deformed      (flexel-simulate)\n"
     "  flexel map ...        deformed lattice -> the part     (flexel-map)\n"
@@ -63,12 +64,19 @@ struct Command {
   const char* name;
   int (*run)(int argc, char** argv);
 };
-constexpr Command kCommands[] = {
-    {"deform", deform_command},   {"compare", compare_command},     {"compensate", compensate_command},
-    {"export", export_command},   {"info", info_command},           {"picture", picture_command},
-    {"view", view_command},       {"clay", clay_command},           {"materials", materials_command},
-    {"scene-keys", scene_keys_command},
-    {"measure", measure_command}, {"study", study_command}};
+constexpr Command kCommands[] = {{"deform", deform_command},
+                                 {"compare", compare_command},
+                                 {"compensate", compensate_command},
+                                 {"export", export_command},
+                                 {"info", info_command},
+                                 {"picture", picture_command},
+                                 {"view", view_command},
+                                 {"clay", clay_command},
+                                 {"materials", materials_command},
+                                 {"scene-keys", scene_keys_command},
+                                 {"measure", measure_command},
+                                 {"study", study_command},
+                                 {"doctor", doctor_command}};
 constexpr const char* kStages[] = {"voxelize", "simulate", "map"};
 
 std::vector<std::string> command_names() {

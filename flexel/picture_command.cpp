@@ -16,6 +16,7 @@
 #include "flexel/commands.h"
 #include "flexel/picture/canvas/png_file.h"
 #include "flexel/picture/picture.h"
+#include "flexel/picture_command.h"
 #include "formats/exchange/import.h"
 #include "formats/lattice/body_file.h"
 
@@ -33,11 +34,19 @@ struct PictureArguments {
   int threads = 0;
 };
 
-void declare(CommandLine& app, PictureArguments& a) {
+void declare_files(CommandLine& app, PictureArguments& a) {
   app.add_option("file", a.files, "Parts (STEP, STL, OBJ ...) and bodies (.vtu); -: stdin")
       .required()
       .type_name("FILE");
   app.add_option("-o,--output", a.output, "The picture (.png); -: stdout").required().type_name("FILE");
+  app.add_option("--unit", a.unit, "Unit of files that carry none (default mm)").type_name("UNIT");
+  app.add_option("--input-format", a.input_format, "Format of the files, where their bytes do not tell")
+      .type_name("NAME");
+  app.add_flag("--quiet", a.quiet, "Say only warnings and errors");
+  app.add_flag("--force", a.force, "Let the picture replace a file that is read");
+}
+
+void declare_drawing(CommandLine& app, PictureArguments& a) {
   app.add_option("--color,--colour", a.colour,
                  "displacement, strain, fill, thickness, any attribute, or none")
       .type_name("NAME");
@@ -61,12 +70,7 @@ void declare(CommandLine& app, PictureArguments& a) {
   app.add_flag("--faces", a.faces,
                "Write the numbers of the faces on them (part/3), from four sides without --view");
   app.add_flag("--no-outline", a.no_outline, "Leave out the shape at rest");
-  app.add_option("--unit", a.unit, "Unit of files that carry none (default mm)").type_name("UNIT");
-  app.add_option("--input-format", a.input_format, "Format of the files, where their bytes do not tell")
-      .type_name("NAME");
   add_threads_option(app, a.threads);
-  app.add_flag("--quiet", a.quiet, "Say only warnings and errors");
-  app.add_flag("--force", a.force, "Let the picture replace a file that is read");
 }
 
 double number(const std::string& text, const std::string& option) {
@@ -185,7 +189,8 @@ void check_output(const std::string& output) {
 int picture_command(int argc, char** argv) {
   PictureArguments arguments;
   CommandLine app{"A picture (PNG) of parts and bodies, made without a display.", "flexel picture"};
-  declare(app, arguments);
+  declare_files(app, arguments);
+  declare_drawing(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   const StopEndsProcess nothing_is_left;
   check_output(arguments.output);
@@ -212,6 +217,25 @@ int picture_command(int argc, char** argv) {
   out.write(bytes.data(), bytes.size());
   out.commit();
   return kExitDone;
+}
+
+picture::PictureResult draw_subjects(const std::vector<std::string>& arguments,
+                                     const std::vector<picture::PictureSubject>& subjects,
+                                     Progress& progress) {
+  PictureArguments given;
+  CommandLine app{"A picture of what is in memory.", "flexel picture"};
+  declare_drawing(app, given);
+  std::vector<std::string> words = {"picture"};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  std::vector<char*> pointers;
+  for (std::string& word : words) pointers.push_back(word.data());
+  pointers.push_back(nullptr);
+  if (!parse_arguments(app, static_cast<int>(words.size()), pointers.data()))
+    throw InputError("help is no picture: leave --help out");
+  const picture::PictureOptions options = options_of(given);
+  const ThreadLimit limit(given.threads);
+  progress.stage("picture");
+  return draw_picture(subjects, options, progress);
 }
 
 }  // namespace flexel::commands

@@ -98,6 +98,7 @@ std::string near_buckling(double linear, const SimulateResult& result) {
 void refuse_timed(const SimulateOptions& options, const std::string& scene) {
   if (!options.history.empty() || !options.series.empty())
     throw InputError(scene, "--history and a .pvd series are for timed runs: give [run] time = \"1 s\"");
+  if (options.on_frame) throw InputError(scene, "frames are of timed runs: give [run] time = \"1 s\"");
   if (!options.live.empty()) throw InputError(scene, "--live is for timed runs: give [run] time = \"1 s\"");
   if (!options.checkpoint.empty())
     throw InputError(scene, "--checkpoint is for timed runs: give [run] time = \"1 s\"");

@@ -13,7 +13,7 @@ function(flexel_script_tests folder timeout)
       string(REGEX REPLACE "^test_" "" name ${function})
       add_test(NAME ${folder}.${topic}.${name} COMMAND ${FLEXEL_PYTHON} -B ${script} ${function})
       set_tests_properties(${folder}.${topic}.${name} PROPERTIES TIMEOUT ${timeout} COST ${timeout} SKIP_RETURN_CODE 77 ENVIRONMENT
-        "FLEXEL_BIN=${CMAKE_RUNTIME_OUTPUT_DIRECTORY};FLEXEL_SOURCE=${CMAKE_SOURCE_DIR};FLEXEL_PARTS=${CMAKE_SOURCE_DIR}/../shared/parts;PYTHONPATH=${CMAKE_SOURCE_DIR}/tests/programs")
+        "FLEXEL_BIN=${CMAKE_RUNTIME_OUTPUT_DIRECTORY};FLEXEL_SOURCE=${CMAKE_SOURCE_DIR};FLEXEL_PARTS=${CMAKE_SOURCE_DIR}/../shared/parts;PYTHONPATH=${CMAKE_SOURCE_DIR}/tests/programs:${CMAKE_BINARY_DIR}/python;FLEXEL_HAS_PYTHON=${builds_python_module}")
     endforeach()
   endforeach()
 endfunction()

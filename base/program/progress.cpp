@@ -14,12 +14,14 @@
 #include <string_view>
 #include <utility>
 
+#include "base/human.h"
 #include "base/printable.h"
 #include "base/program/brief_output.h"
 
 namespace flexel {
 namespace {
 
+ProgressListener* listener = nullptr;
 bool brief_output = false, holds_warnings = false, keeps_warnings = false;
 std::vector<std::string> held_warnings, kept_warnings;
 std::string held_program;  // that gave the last of them
@@ -48,6 +50,16 @@ std::size_t terminal_columns() {
 }
 
 }  // namespace
+
+void set_progress_listener(ProgressListener* to) noexcept {
+  listener = to;
+}
+
+std::optional<double> seconds_left(double seconds, double share) {
+  constexpr double kSoonest = 2, kLeastShare = 0.02;  // s; before that it is a guess
+  if (seconds < kSoonest || !(share >= kLeastShare && share < 1)) return {};
+  return seconds * (1 - share) / share;
+}
 
 BriefOutput::BriefOutput(bool brief) {
   brief_output = brief;
@@ -105,14 +117,18 @@ void Progress::stage(const std::string& name) {
 }
 
 void Progress::update(double share, const std::string& note) {
-  if (mode_ != Mode::bar || stage_.empty()) return;
+  const bool heard = listener != nullptr && mode_ != Mode::quiet && mode_ != Mode::silent;
+  if ((mode_ != Mode::bar && !heard) || stage_.empty()) return;
   const double time = now();
   if (last_drawn_ >= 0 && time - last_drawn_ < kDrawInterval) return;
   last_drawn_ = time;
   const double done = std::isfinite(share) ? std::clamp(share, 0.0, 1.0) : 0.0;
+  const std::optional<double> left = seconds_left(time - stage_began_, done);
+  if (heard) return listener->update(stage_, done, note, left);
   const auto filled = static_cast<std::size_t>(std::lround(done * kBarWidth));
   std::string line = fmt::format("{}: {} [{}{}] {:3.0f} %", program_, stage_, std::string(filled, '#'),
                                  std::string(kBarWidth - filled, '.'), std::floor(100 * done));
+  if (left) line += fmt::format("  {} left", human_seconds(*left));
   if (!note.empty()) line += "  " + printable(note);
   const std::size_t columns = terminal_columns();
   if (line.size() >= columns) line.resize(columns - 1);  // a wrapped line could not be rewritten
@@ -122,6 +138,7 @@ void Progress::update(double share, const std::string& note) {
 
 void Progress::say(const std::string& line) {
   if (mode_ == Mode::quiet || mode_ == Mode::silent || brief_output) return;
+  if (listener != nullptr) return listener->say(line);
   clear_bar();
   print_error(fmt::format("{}: {}\n", program_, printable(line)));
 }
@@ -137,13 +154,14 @@ void Progress::warn(const std::string& line) {
     return;
   }
   if (keeps_warnings) add_to(kept_warnings);
+  if (listener != nullptr) return listener->warn(line);
   clear_bar();
   print_error(fmt::format("{}: warning: {}\n", program_, printable(line)));
 }
 
 void Progress::finish() {
   clear_bar();
-  if (mode_ == Mode::lines && !stage_.empty() && !brief_output) {
+  if (mode_ == Mode::lines && listener == nullptr && !stage_.empty() && !brief_output) {
     const double seconds = now() - stage_began_;
     print_error(fmt::format("{}: {}: {:.{}f} s\n", program_, stage_, seconds, seconds < 1 ? 4 : 2));
   }

@@ -2,9 +2,30 @@
 #pragma once
 #include <fmt/format.h>
 
+#include <optional>
 #include <string>
 
 namespace flexel {
+
+// Hears what every Progress of the process says, in place of stderr: for a program that Flexel is a library of. Called on
+// the thread of the run.
+class ProgressListener {
+ public:
+  ProgressListener() = default;
+  virtual ~ProgressListener() = default;
+  ProgressListener(const ProgressListener&) = delete;
+  ProgressListener& operator=(const ProgressListener&) = delete;
+  // As Progress::update(); `left`: s, as seconds_left() has it.
+  virtual void update(const std::string& stage, double share, const std::string& note,
+                      std::optional<double> left) noexcept = 0;
+  virtual void say(const std::string& line) noexcept = 0;
+  virtual void warn(const std::string& line) noexcept = 0;
+};
+// Null: stderr again.
+void set_progress_listener(ProgressListener* listener) noexcept;
+
+// Of a stage that took `seconds` for `share` of its work, were the rest as fast; nothing before it can be told.
+[[nodiscard]] std::optional<double> seconds_left(double seconds, double share);
 
 // One display for a whole run, whichever stages run in it: a bar on a terminal, a line per finished stage in
 // a log, nothing but warnings when quiet, nothing at all when silent (a run within a run). Not thread-safe:

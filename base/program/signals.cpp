@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <atomic>
 #include <condition_variable>
 #include <csignal>
 #include <cstdlib>
@@ -28,6 +29,7 @@ namespace {
 
 volatile std::sig_atomic_t interrupt_count = 0, interrupting_signal = SIGINT, termination_waits = 0;
 volatile std::sig_atomic_t stop_ends_process = 0;
+std::atomic<bool> may_end_process{true};
 std::array<char, 64> program_name{};  // of this program, for the signal handlers
 
 // As a shell gives it.
@@ -161,10 +163,14 @@ class StopEndsProcess::Watch {
   std::thread thread_;
 };
 
+void never_end_process() noexcept {
+  may_end_process = false;
+}
+
 StopEndsProcess::StopEndsProcess() {
   check_stop();
   const std::int64_t limit = stop_detail::command_limit();
-  if (limit != stop_detail::kNever) watch_ = std::make_unique<Watch>(limit);
+  if (may_end_process && limit != stop_detail::kNever) watch_ = std::make_unique<Watch>(limit);
   stop_ends_process = stop_ends_process + 1;
 }
 StopEndsProcess::~StopEndsProcess() {

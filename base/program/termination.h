@@ -33,4 +33,8 @@ class StopEndsProcess {
   std::unique_ptr<Watch> watch_;  // null: the command has no limit
 };
 
+// For a library within another's process, before anything runs: from now on nothing here ends the process, and every stop
+// waits for the next check_stop().
+void never_end_process() noexcept;
+
 }  // namespace flexel

@@ -131,7 +131,8 @@ void refuse_what_quadratic_lacks(const Scene& scene, const Body& body,
                                                effect.why));
   refuse_timed(effects, ActsIn::all, scene.name);
   const auto acts = [&](std::string_view name) {
-    return std::any_of(effects.begin(), effects.end(), [&](const ActiveEffect& each) { return each.name == name; });
+    return std::any_of(effects.begin(), effects.end(),
+                       [&](const ActiveEffect& each) { return each.name == name; });
   };
   if (acts(Thermal::name) && acts(Bonds::name))
     throw InputError(scene.name, needs + "it has no heat and shrinkage across bonds; use model \"cells\"");

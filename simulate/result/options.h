@@ -1,8 +1,13 @@
 // How a run is to be done, but for its scene.
 #pragma once
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+
+namespace flexel {
+struct Body;  // formats/lattice/body.h
+}
 
 namespace flexel::simulate {
 
@@ -30,6 +35,9 @@ struct SimulateOptions {
   bool stress = true;    // compute it, and give the body its columns
   bool estimate = true;  // equilibrium: error bars, by two runs on coarser lattices
   bool explain = false;  // say which effects run and why, and afterwards the share of time of each
+  // Timed runs: called with each frame's body and time [s], on the thread of the run; the body is the run's own, and
+  // another after the call.
+  std::function<void(const Body& body, double time)> on_frame = {};
 };
 
 }  // namespace flexel::simulate

@@ -54,6 +54,7 @@ class TimedRun {
   void check();
   void step();
   void advance(bool row);
+  [[nodiscard]] bool has_frames() const { return series_ || options_.on_frame; }
   void write_frame();
   [[nodiscard]] double now() const;
   [[nodiscard]] std::string save(const std::optional<State>& state);
@@ -80,6 +81,7 @@ class TimedRun {
   Bytes act_body_;                  // likewise: the body as the present act began, to be made with it
   std::chrono::steady_clock::time_point saved_ = began_;
   std::size_t events_ = 0;      // that have happened
+  std::size_t frames_ = 0;      // so far
   bool at_whole_step_ = false;  // velocities are of the time of the state, after an event
   double next_row_ = 0, next_frame_ = 0;
   std::optional<LiveSummary> live_summary_;
@@ -133,6 +135,7 @@ void TimedRun::resume(const Checkpoint& from) {
   if (series_) series_->resume(from.frames);
   next_row_ = from.next_row;
   next_frame_ = from.next_frame;
+  frames_ = from.frames.size();
 }
 
 // Within an implicit step: what was reached before it stays.
@@ -218,15 +221,16 @@ void TimedRun::step() {
 }
 
 void TimedRun::write_frame() {
-  if (!series_) return;
+  if (!has_frames()) return;
   segment_->store(segment_->state());
-  try {
-    series_->add(body_, *segment_->state().time);
-  } catch (const InputError& error) {
-    throw InputError(error.where(), error.what() + (clock_.steps > 0 ? stop() : ""));
-  }
+  if (series_) try {
+      series_->add(body_, *segment_->state().time);
+    } catch (const InputError& error) {
+      throw InputError(error.where(), error.what() + (clock_.steps > 0 ? stop() : ""));
+    }
+  if (options_.on_frame) options_.on_frame(body_, *segment_->state().time);
   segment_->unload();
-  next_frame_ = duration_ * static_cast<double>(series_->size()) / scene_.run.frames.value_or(kFrames);
+  next_frame_ = duration_ * static_cast<double>(++frames_) / scene_.run.frames.value_or(kFrames);
 }
 
 // Without an act an event is happening.
@@ -285,7 +289,7 @@ void TimedRun::play_until(double end, bool resumed) {
     if (clock_.steps % between == 0 || segment_->needs_step_recheck() || stop_is_due()) check();
     segment_->renew_damping(clock_);
     step();
-    if (series_ && *segment_->state().time >= next_frame_ * (1 - 1e-9)) write_frame();
+    if (has_frames() && *segment_->state().time >= next_frame_ * (1 - 1e-9)) write_frame();
   }
   segment_
       ->refuse_unsound();  // a step looks at the state that it begins with: nothing has looked at the last

@@ -1,5 +1,5 @@
 // Flat, round and curved faces, in any direction and place.
-#include "flexel/face_shape.h"
+#include "flexel/measure/face_shape.h"
 
 #include <gtest/gtest.h>
 

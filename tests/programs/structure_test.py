@@ -8,7 +8,7 @@ import sys
 
 from harness import BIN, SOURCE, Skip, expect, main, need
 
-CODE = ["base", "formats", "meshes", "voxelize", "simulate", "mapping", "cad", "flexel"]
+CODE = ["base", "formats", "meshes", "voxelize", "simulate", "mapping", "cad", "flexel", "python"]
 
 # Every folder of the code, each after those that it may include: docs/development.md says what they hold.
 ORDER = """
@@ -24,6 +24,7 @@ mapping/types mapping/anchors mapping/checks mapping/methods mapping/space mappi
 cad/read cad/deform cad
 flexel/process flexel/picture/canvas flexel/picture/render flexel/picture flexel/view flexel/clay flexel/study/runs flexel/study flexel/export
 flexel/measure flexel/accuracy flexel/compensate flexel
+python
 """.split()
 STAGES = {"voxelize", "simulate", "mapping"}
 HEAVY = re.compile(r"\b(assimp|CGAL|openvdb|embree3)/|<(png\.h|ft2build\.h|microhttpd\.h)>|<[A-Z][A-Za-z0-9]*_?[A-Za-z0-9]*\.hxx>|<(gp|TopoDS|TopExp|BRep|Poly)\w*\.hxx>")

@@ -5,7 +5,7 @@
 //
 // The angle that a face covers of its cylinder is counted in steps of half a degree. A hole is concave and
 // its faces, one or several of one cylinder side by side, cover the full circle; those of a fillet do not.
-#include "flexel/face_shape.h"
+#include "flexel/measure/face_shape.h"
 
 #include <fmt/format.h>
 

@@ -1,0 +1,192 @@
+"""Deforms CAD parts: voxelizes them, simulates, and maps the deformation back onto the part.
+
+    import flexel
+    result = flexel.deform("bracket.step", fix="bracket/1", push={"bracket/2": (0, 0, -100)}, material="PLA",
+                           output="bent.stl")
+    print(result)
+    result.body["von_mises"].max()
+
+Numbers are SI (metres, newtons, seconds); texts carry their unit ("2 mm"). Arrays are read-only numpy views. Runs let
+the GIL go, take every core, and one runs at a time. docs/guide/python.md has more.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pathlib
+import shutil
+from typing import Any, Callable, Dict, List, Optional, Sequence, Union
+
+from . import _flexel
+from ._objects import Body, Frame, Mapped, Part, Result
+from ._options import Quantity, length, paths, words
+from ._said import Progress, heard
+from .errors import (DivergedError, FlexelError, FlexelWarning, InputError, InvalidMappingError, StoppedByTimeout)
+
+__all__ = ["Body", "DivergedError", "FlexelError", "FlexelWarning", "Frame", "InputError", "InvalidMappingError", "Mapped",
+           "Part", "Result", "StoppedByTimeout", "deform", "map", "materials", "picture", "read", "read_body", "simulate",
+           "study", "voxelize"]
+__version__ = _flexel.version
+Paths = Union[str, os.PathLike, Sequence[Union[str, os.PathLike]]]
+
+
+def _find_programs() -> None:
+    """CAD files are read by flexel-cad, and a study runs the programs: they are in the same installation or build."""
+    package = pathlib.Path(__file__).resolve().parent
+    places = [os.environ.get("FLEXEL_BIN", "")] + [str(up / "bin") for up in package.parents[1:4]]
+    places.append(os.path.dirname(shutil.which("flexel") or ""))
+    for place in places:
+        if place and os.access(os.path.join(place, "flexel"), os.X_OK):
+            _flexel.set_program_folder(place)
+            return
+
+
+_find_programs()
+
+
+def read(path: Paths, *, unit: Optional[str] = None, format: Optional[str] = None, edge: Optional[Quantity] = None,
+         deflection: Optional[Quantity] = None, progress: Progress = None) -> Part:
+    """Reads parts: STEP, IGES, BREP, STL, OBJ, PLY, OFF, glTF, 3MF ...
+
+    unit: a length unit's name, of files that carry none (default mm). edge: the mesh is split to this longest edge [m].
+    deflection: of CAD files, the largest distance of the triangles from the surface [m]. Raises InputError.
+    """
+    options: Dict[str, Any] = {"edge": length(edge), "deflection": length(deflection)}
+    if unit is not None:
+        options["unit"] = unit
+    if format is not None:
+        options["format"] = format
+    files = paths(path)
+    core, said = heard(_flexel.read_part, files, options, progress=progress)
+    return Part(core, os.path.basename(files[0]), said.warnings)
+
+
+def _as_part(part, progress: Progress) -> Part:
+    return part if isinstance(part, Part) else read(part, progress=progress)
+
+
+def voxelize(part: Union[Part, Paths], *, size: Optional[Quantity] = None, count: Optional[int] = None,
+             placement: str = "corner", align: str = "snap", heal: str = "auto", material: str = "", moments: bool = False,
+             threads: int = 0, progress: Progress = None) -> Body:
+    """The lattice of a part, as flexel-voxelize makes it.
+
+    size: spacing [m] or "2 mm"; or count: about this many cells (default 20,000). placement: "corner" or "centre". align:
+    "snap", "box" or "none". heal: "auto", "wrap", "wrap:5 mm" or "none". moments: for model "quadratic". threads: 0 is every
+    core. Raises InputError.
+    """
+    given = _as_part(part, progress)
+    options = {"size": length(size), "count": count, "placement": placement, "align": align, "heal": heal,
+               "material": material, "moments": moments}
+    core, summary, said = heard(_flexel.voxelize, given._core, options, threads, progress=progress)
+    return Body(core, summary, said.warnings, given.label)
+
+
+def read_body(path: Union[str, os.PathLike], *, progress: Progress = None) -> Body:
+    """Reads a body file (.vtu). Raises InputError."""
+    core, said = heard(_flexel.read_body, os.fspath(path), progress=progress)
+    return Body(core, "", said.warnings, os.path.basename(os.fspath(path)))
+
+
+def simulate(body: Body, scene: Union[str, os.PathLike, None] = None, *, on_frame: Optional[Callable[[Frame], Any]] = None,
+             estimate: bool = True, stress: bool = True, threads: int = 0, history: str = "", failed: str = "", isa: str = "",
+             progress: Progress = None, **options) -> Result:
+    """Runs a scene on a body, as flexel-simulate does; the body stays as it is.
+
+    scene: the path of a scene (.toml), or the text of one (docs/reference/scene.md), or None. options add to it: fix, push,
+    move, torque, twist, bearing, gravity, probe, material, model, infill, shell, as of `flexel deform`:
+    push={"bracket/2": (0, 0, -100)} [N], "bracket/2: 0 0 -100 N" or a list of such; fix="bracket/1".
+    on_frame: of runs in time, called with each Frame ([run] frames of the scene). estimate: error bars. history: a CSV of
+    energies. failed: where the last good state goes when the run fails (.vtu).
+    Raises InputError, DivergedError, KeyboardInterrupt.
+    """
+    callback = None if on_frame is None else lambda core: on_frame(Frame(core))
+    given = {"threads": threads, "estimate": estimate, "stress": stress, "history": os.fspath(history),
+             "failed": os.fspath(failed), "isa": isa, "on_frame": callback}
+    text, name = "", ""
+    line = words(options)
+    if isinstance(scene, str) and ("\n" in scene or "=" in scene):
+        text, name = scene, "scene"
+    elif scene is not None:
+        line.append("--scene=" + os.fspath(scene))
+    core, said = heard(_flexel.simulate, body._core, line, text, name, given, progress=progress)
+    return Result(core, said, {}, body.label)
+
+
+def map(body: Body, *, output: Union[str, os.PathLike, None] = None, progress: Progress = None, **options) -> Mapped:
+    """The part's own surface, deformed as the body is; `output`: written too, byte for byte as flexel-map does.
+
+    options are those of flexel-map: method="smooth", check="voronoi", crack="cap", refine="off", strict=True, ...
+    A coarse mesh gets more triangles where they are needed to show the bend; refine="off" keeps its vertices.
+    Raises InputError, InvalidMappingError.
+    """
+    core, said = heard(_flexel.map, body._core, words(options), "" if output is None else os.fspath(output),
+                       progress=progress)
+    return Mapped(core, body, options, said.warnings)
+
+
+_OF_MAPPING = ("method", "check", "crack", "debris", "refine", "keep_vertices", "tolerance", "scale", "attributes", "ascii",
+               "strict")
+
+
+def deform(part: Union[Part, Paths], *, output: Union[Paths, None] = None, progress: Progress = None, **options) -> Result:
+    """All stages in one run, as `flexel deform`: the size is chosen where none is given.
+
+    options are those of the command: fix, push, move, torque, twist, bearing, gravity, probe, material, scene, size, count,
+    accuracy, within, model, no_estimate=True, ... output: files to write (.stl, .step, .vtu, .png, .html).
+    Raises InputError, DivergedError, InvalidMappingError, StoppedByTimeout (timeout="90 s"), KeyboardInterrupt.
+
+        flexel.deform("bracket.step", fix="bracket/1", push={"bracket/2": (0, 0, -100)}, material="PLA", size="2 mm")
+    """
+    line = words(options)
+    if output is not None:
+        line += ["--output=" + each for each in paths(output)]
+    if isinstance(part, Part):
+        core_part, names = part._core, [part.label]
+    else:
+        core_part, names = None, paths(part)
+    core, said = heard(_flexel.deform, line + ["--"] + names, core_part, progress=progress)
+    label = ", ".join(os.path.basename(name) for name in names) + ", deformed"
+    return Result(core, said, {name: options[name] for name in _OF_MAPPING if name in options}, label)
+
+
+def study(part: Paths, *, output: Union[str, os.PathLike], progress: Progress = None, **options) -> Dict[str, Any]:
+    """What accuracy costs in time, as `flexel study`: writes study.html, study.csv and study.json to the folder `output`, and
+    returns what study.json holds. options: scene, fix, push, material, budget="2 min", reference, against.
+    """
+    code, _ = heard(_flexel.run_command, "study", words(options) + ["--output=" + os.fspath(output), "--"] + paths(part),
+                    progress=progress)
+    if code:
+        raise KeyboardInterrupt
+    with open(os.path.join(output, "study.json"), encoding="utf-8") as file:
+        return json.load(file)
+
+
+def _subjects(shown) -> List:
+    items = shown if isinstance(shown, (list, tuple)) else [shown]
+    return [(each.label, (each.body if isinstance(each, Result) else each)._core) for each in items]
+
+
+def picture(shown, path: Union[str, os.PathLike, None] = None, *, progress: Progress = None, **options) -> bytes:
+    """A PNG of parts, bodies and results (one or a list), as `flexel picture` draws it; written to `path` too.
+
+    options: color="von_mises", scale="auto" or a factor, view="iso" or "30,20", size="1600x1200", cells=True, faces=True,
+    range="0:5 mm", up="y".
+    """
+    line: List[str] = []
+    for name, value in options.items():
+        if value is True:
+            line.append("--" + name.replace("_", "-"))
+        elif value is not None and value is not False:
+            line.append(f"--{name.replace('_', '-')}={value}")
+    png, _ = heard(_flexel.picture, _subjects(shown), line, progress=progress)
+    if path is not None:
+        with open(path, "wb") as file:
+            file.write(png)
+    return png
+
+
+def materials() -> List[Dict[str, Any]]:
+    """The library of materials, SI (docs/reference/materials.md)."""
+    found = json.loads(_flexel.materials())
+    return found["materials"] if isinstance(found, dict) else found

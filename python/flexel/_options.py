@@ -1,0 +1,87 @@
+"""Options of the commands from keywords: units as texts or SI numbers, places as words."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Iterable, List, Optional, Union
+
+from . import _flexel
+from .errors import InputError
+
+_UNITS = {"push": "N", "move": "m", "torque": "N m", "twist": "rad", "bearing": "N", "probe": "m"}
+_SCALARS = {"gravity": "m/s^2", "size": "m", "edge": "m", "within": "s", "timeout": "s", "shell": "m", "tolerance": "m",
+            "budget": "s"}
+
+
+def _number(value) -> str:
+    return repr(float(value))
+
+
+def length(value) -> Optional[float]:
+    """Metres of "2 mm" or of a number, which is metres."""
+    return _flexel.parse_quantity(value, "length") if isinstance(value, str) else None if value is None else float(value)
+
+
+def _amount(value, unit: str) -> str:
+    """ "0 0 -50 N" of (0, 0, -50), "5 N" of 5; a text is left as it is."""
+    if isinstance(value, str):
+        return value
+    try:
+        numbers = " ".join(_number(each) for each in value)
+    except TypeError:
+        numbers = _number(value)
+    return f"{numbers} {unit}"
+
+
+def _listed(value) -> List:
+    return [value] if isinstance(value, (str, os.PathLike)) or not isinstance(value, Iterable) else list(value)
+
+
+def _actions(name: str, value) -> List[str]:
+    if isinstance(value, Mapping):
+        return [f"{where}: {_amount(amount, _UNITS[name])}" for where, amount in value.items()]
+    return [str(each) for each in _listed(value)]
+
+
+def _of_parts(value) -> List[str]:
+    """ "knob=PLA" of {"knob": "PLA"}."""
+    if isinstance(value, Mapping):
+        return [f"{part}={each}" for part, each in value.items()]
+    return [str(each) for each in _listed(value)]
+
+
+def words(options: Mapping) -> List[str]:
+    """The command line of keywords: no_estimate=True is --no-estimate, fix=["a", "b"] is --fix a --fix b."""
+    line: List[str] = []
+    for name, value in options.items():
+        option = "--" + name.replace("_", "-")
+        if value is None or value is False:
+            continue
+        if value is True:
+            line.append(option)
+            continue
+        if name in _UNITS:
+            values = _actions(name, value)
+        elif name in ("material", "infill"):
+            values = _of_parts(value)
+        elif name in _SCALARS:
+            values = [_amount(value, _SCALARS[name])]
+        elif name == "accuracy" and not isinstance(value, str):
+            values = [_number(value)]
+        elif isinstance(value, (int, float)):
+            values = [str(value) if isinstance(value, int) else _number(value)]
+        else:
+            values = [os.fspath(each) if isinstance(each, os.PathLike) else str(each) for each in _listed(value)]
+        line.extend(f"{option}={each}" for each in values)
+    return line
+
+
+def paths(value) -> List[str]:
+    given = [os.fspath(each) for each in _listed(value)]
+    if not given:
+        raise InputError("no file is named")
+    return given
+
+
+Quantity = Union[str, float]

@@ -1,0 +1,167 @@
+// The state of a run is that of its process, as in the programs.
+#include "python/module_run_scope.h"
+
+#include <pybind11/stl.h>
+
+#include <algorithm>
+#include <csignal>
+#include <exception>
+#include <mutex>
+#include <optional>
+#include <utility>
+
+#include "base/error.h"
+#include "base/stop.h"
+
+namespace flexel::python {
+namespace {
+
+std::recursive_mutex one_run;
+int runs = 0;                         // within each other
+std::exception_ptr callback_error;    // of the innermost run
+struct sigaction outer_interrupt {};  // Python's
+
+void on_interrupt(int signal) {
+  request_stop();
+  if (outer_interrupt.sa_handler != SIG_DFL && outer_interrupt.sa_handler != SIG_IGN)
+    outer_interrupt.sa_handler(signal);
+}
+
+// Python's handlers run on its main thread only; there, and for the outermost run, SIGINT stops the work as well.
+class StopsOnInterrupt {
+ public:
+  explicit StopsOnInterrupt(bool wanted) : installed_(wanted) {
+    if (!installed_) return;
+    struct sigaction action {};
+    action.sa_handler = on_interrupt;
+    sigemptyset(&action.sa_mask);
+    sigaction(SIGINT, &action, &outer_interrupt);
+    if (outer_interrupt.sa_handler == SIG_IGN) sigaction(SIGINT, &outer_interrupt, nullptr);
+  }
+  ~StopsOnInterrupt() {
+    if (installed_) sigaction(SIGINT, &outer_interrupt, nullptr);
+  }
+  StopsOnInterrupt(const StopsOnInterrupt&) = delete;
+  StopsOnInterrupt& operator=(const StopsOnInterrupt&) = delete;
+
+ private:
+  bool installed_;
+};
+
+class Listener : public ProgressListener {
+ public:
+  Listener(const py::object& progress, Said& said) : progress_(progress), said_(said) {}
+  void update(const std::string& stage, double share, const std::string& note,
+              std::optional<double> left) noexcept override {
+    if (!wanted_) return;
+    try {
+      call_back([&] { progress_(stage, share, note, left); });
+    } catch (...) {
+      wanted_ = false;  // the run ends; the error is kept
+    }
+  }
+  void say(const std::string& line) noexcept override { keep(said_.lines, line); }
+  void warn(const std::string& line) noexcept override { keep(said_.warnings, line); }
+
+ private:
+  static void keep(std::vector<std::string>& lines, const std::string& line) noexcept try {
+    if (std::find(lines.begin(), lines.end(), line) == lines.end()) lines.push_back(line);
+  } catch (...) {  // without memory the run itself ends
+  }
+  const py::object& progress_;
+  Said& said_;
+  bool wanted_ = !progress_.is_none();
+};
+
+bool on_main_thread() {
+  const py::module_ threading = py::module_::import("threading");
+  return threading.attr("current_thread")().is(threading.attr("main_thread")());
+}
+
+Listener* heard = nullptr;
+
+// One run within the lock: its listener, and the state that ends with it.
+class Scope {
+ public:
+  explicit Scope(Listener& listener) : outer_(heard), outer_error_(std::exchange(callback_error, nullptr)) {
+    ++runs;
+    set_progress_listener(heard = &listener);
+  }
+  ~Scope() {
+    set_progress_listener(heard = outer_);
+    callback_error = outer_error_;
+    if (--runs == 0) forget_stop();
+  }
+  Scope(const Scope&) = delete;
+  Scope& operator=(const Scope&) = delete;
+
+ private:
+  Listener* outer_;
+  std::exception_ptr outer_error_;
+};
+
+// Raises flexel.errors.NAME.
+void raise(const char* name, const std::string& what, const std::string& where) {
+  try {
+    const py::object type = py::module_::import("flexel.errors").attr(name);
+    PyErr_SetObject(type.ptr(), type(what, where).ptr());
+  } catch (py::error_already_set& error) {
+    error.restore();
+  }
+}
+
+}  // namespace
+
+void call_back(const std::function<void()>& callback) {
+  const py::gil_scoped_acquire gil;
+  try {
+    callback();
+  } catch (...) {
+    callback_error = std::current_exception();
+    request_stop();
+    throw Interrupted();
+  }
+}
+
+Said run_work(const py::object& progress, const std::function<void()>& work) {
+  Said said;
+  Listener listener(progress, said);
+  const bool takes_signals = on_main_thread();
+  std::exception_ptr error, from_callback;
+  {
+    const py::gil_scoped_release free;
+    const std::lock_guard lock(one_run);
+    const StopsOnInterrupt stops(takes_signals && runs == 0);
+    const Scope scope(listener);
+    try {
+      work();
+    } catch (...) {
+      error = std::current_exception();
+    }
+    from_callback = std::exchange(callback_error, nullptr);
+  }
+  if (from_callback) std::rethrow_exception(from_callback);
+  if (!error) return said;
+  if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+  std::rethrow_exception(error);
+}
+
+void translate_errors() {
+  py::register_exception_translator([](std::exception_ptr error) {
+    try {
+      std::rethrow_exception(error);
+    } catch (const InputError& e) {
+      raise("InputError", e.what(), e.where());
+    } catch (const DivergedError& e) {
+      raise("DivergedError", e.what(), "");
+    } catch (const InvalidMappingError& e) {
+      raise("InvalidMappingError", e.what(), "");
+    } catch (const TimeoutError& e) {
+      raise("StoppedByTimeout", e.what(), "");
+    } catch (const Interrupted&) {
+      PyErr_SetNone(PyExc_KeyboardInterrupt);
+    }
+  });
+}
+
+}  // namespace flexel::python

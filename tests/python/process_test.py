@@ -1,0 +1,148 @@
+"""Threads, Ctrl-C, progress and callbacks: what a run does to the process that it is in."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+from shared import PULL, SWING, box_body, check, main, module
+
+# A run that takes minutes; the child says when it begins.
+LONG = """
+import sys, flexel
+sys.path.insert(0, {tests!r})
+from shared import SWING, box_body
+body = box_body(flexel, 0.0005)
+def begins(frame):
+    print("begun", flush=True)
+try:
+    flexel.simulate(body, SWING.replace("TIME", "100 s"), on_frame=begins)
+except KeyboardInterrupt:
+    small = flexel.simulate(box_body(flexel), estimate=False, fix="xmin", push={{"xmax": (0, 0, -1)}}, material="steel")
+    print("interrupted, and goes on" if small.largest_displacement > 0 else "", flush=True)
+"""
+
+
+def test_ctrl_c():
+    module()
+    code = LONG.format(tests=os.path.dirname(os.path.abspath(__file__)))
+    child = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    check.assertEqual(child.stdout.readline(), b"begun\n")
+    child.send_signal(signal.SIGINT)
+    out, err = child.communicate(timeout=60)
+    check.assertEqual((child.returncode, out), (0, b"interrupted, and goes on\n"), err.decode())
+
+
+def test_ctrl_c_ends_a_script():
+    module()
+    code = LONG.format(tests=os.path.dirname(os.path.abspath(__file__))).replace("except KeyboardInterrupt", "except ZeroDivisionError")
+    child = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    check.assertEqual(child.stdout.readline(), b"begun\n")
+    child.send_signal(signal.SIGINT)
+    _, err = child.communicate(timeout=60)
+    check.assertEqual(child.returncode, -signal.SIGINT, err.decode())
+    check.assertIn("KeyboardInterrupt", err.decode())
+
+
+def test_a_handler_of_ones_own():
+    """A Python handler that SIGINT has already is called, and what it raises comes out."""
+    flexel = module()
+
+    class Mine(Exception):
+        pass
+
+    def handler(number, frame):
+        raise Mine
+
+    before = signal.signal(signal.SIGINT, handler)
+    try:
+        with check.assertRaises(Mine):
+            flexel.simulate(box_body(flexel, 0.001), SWING.replace("TIME", "100 s"),
+                            on_frame=lambda frame: os.kill(os.getpid(), signal.SIGINT))
+        check.assertIs(signal.getsignal(signal.SIGINT), handler)
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_callbacks_that_raise():
+    flexel = module()
+    body = box_body(flexel)
+    with check.assertRaises(ZeroDivisionError):
+        flexel.simulate(body, SWING.replace("TIME", "1 ms"), on_frame=lambda frame: 1 / 0)
+    check.assertGreater(flexel.simulate(body, estimate=False, **PULL).largest_displacement, 0)
+
+
+def test_frames_are_over_after_the_callback():
+    flexel = module()
+    frames = []
+    flexel.simulate(box_body(flexel), SWING.replace("TIME", "0.1 ms"), on_frame=frames.append)
+    with check.assertRaises(flexel.InputError):
+        frames[0].body()
+
+
+def test_a_run_within_a_callback():
+    flexel = module()
+    body, found = box_body(flexel), []
+    flexel.simulate(body, SWING.replace("TIME", "0.1 ms"),
+                    on_frame=lambda frame: found.append(flexel.simulate(body, estimate=False, **PULL).largest_displacement))
+    check.assertEqual(len(found), 5)
+    check.assertEqual(len(set(found)), 1)
+
+
+def test_frames_are_of_timed_runs():
+    flexel = module()
+    with check.assertRaises(flexel.InputError):
+        flexel.simulate(box_body(flexel), on_frame=print, **PULL)
+
+
+def test_threads_give_the_same():
+    """Runs of several threads: the same bits, and Python goes on meanwhile."""
+    flexel = module()
+    bodies = [box_body(flexel, 0.002 / (n + 1)) for n in range(3)]
+    alone = [flexel.simulate(body, estimate=False, **PULL).body.position.copy() for body in bodies]
+    found = [None] * 3
+
+    def work(n):
+        found[n] = flexel.simulate(bodies[n], estimate=False, **PULL).body.position
+
+    threads = [threading.Thread(target=work, args=(n,)) for n in range(3)]
+    for thread in threads:
+        thread.start()
+    ticks = 0
+    while any(thread.is_alive() for thread in threads):
+        ticks += 1
+        time.sleep(0.001)
+    check.assertGreater(ticks, 3, "Python stood still")
+    for one, other in zip(alone, found):
+        check.assertTrue((one == other).all())
+
+
+def test_progress():
+    flexel = module()
+    seen = []
+    flexel.simulate(box_body(flexel, 0.001), SWING.replace("TIME", "2 ms"), progress=lambda *each: seen.append(each))
+    check.assertTrue(seen)
+    for stage, share, note, left in seen:
+        check.assertIsInstance(stage, str)
+        check.assertTrue(0 <= share <= 1)
+        check.assertTrue(left is None or left >= 0)
+
+    def refuse(*each):
+        raise LookupError("enough")
+
+    with check.assertRaises(LookupError):
+        flexel.simulate(box_body(flexel, 0.001), SWING.replace("TIME", "100 s"), progress=refuse)
+
+
+def test_nothing_on_stderr_without_a_terminal():
+    module()
+    code = ("import sys\nsys.path.insert(0, %r)\nimport flexel, shared\n"
+            "flexel.simulate(shared.box_body(flexel), estimate=False, **shared.PULL)" % os.path.dirname(os.path.abspath(__file__)))
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, timeout=60, check=True)
+    check.assertEqual((done.stdout, done.stderr), (b"", b""))
+
+
+if __name__ == "__main__":
+    main(globals())
