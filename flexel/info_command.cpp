@@ -16,7 +16,7 @@
 #include "base/program/termination.h"
 #include "base/units.h"
 #include "flexel/commands.h"
-#include "flexel/coordinates.h"
+#include "flexel/measure/coordinates.h"
 #include "flexel/measure/face_shape.h"
 #include "formats/common/file_formats.h"
 #include "formats/exchange/import.h"

@@ -14,8 +14,8 @@
 #include "formats/lattice/cell_moments.h"
 #include "simulate/matter/fragments.h"
 #include "simulate/models/cells.h"
-#include "simulate/quadratic/cell_integrals.h"
-#include "simulate/quadratic/face_points.h"
+#include "simulate/quadratic/cells/cell_integrals.h"
+#include "simulate/quadratic/cells/face_points.h"
 #include "simulate/thermal/thermal.h"
 
 namespace flexel::simulate {
