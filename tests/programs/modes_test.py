@@ -172,6 +172,24 @@ def test_two_loose_pieces():
         close(found, [usual[0], usual[0], usual[1], usual[1]], 1e-4, model)
 
 
+def test_bonded_halves_vibrate_as_the_whole():
+    """Parts that touch are bonded: one body with six rigid motions, free, and its frequencies, free and held."""
+    for name, low, high in (("whole", 0, 120), ("left", 0, 60), ("right", 60, 120)):
+        box = box_triangles((high - low, 20.0, 10.0))
+        write(f"{name}.stl", binary_stl([[(x + low, y, z) for x, y, z in t] for t in box]))
+    held = '[[fix]]\nwhere = "{}/xmin"\n'
+    for model, size, within in (("quadratic", "10 mm", 2e-3), ("cells", "5 mm", 1e-6)):
+        found = {}
+        for parts in (("whole.stl",), ("left.stl", "right.stl")):
+            expect_ok(run("flexel-voxelize", *parts, "--size", size, "--align", "none", "--moments", "-o", "body.vtu"))
+            free, _ = solve(scene("modes = 4", model=model))
+            expect(free["rigid"] == 6, f"{model}, {parts}: {free['rigid']}")
+            clamped = frequencies(scene("modes = 4", held.format(parts[0][:-4]), model=model))
+            found[parts] = [mode["frequency"] for mode in free["modes"]] + clamped
+        whole, halves = found.values()
+        close(halves, whole, within, model)
+
+
 def test_stops_in_time():
     write("cube.stl", binary_stl(box_triangles((100.0, 100.0, 100.0))))
     voxels("cube.stl", "4 mm")

@@ -189,7 +189,7 @@ TEST(Heal, EdgesOfManyTrianglesAreNotCalledOpen) {
   cells.triangles.push_back({1, 2, 6});
   cells.triangles.push_back({1, 6, 5});
   const HealedPart healed = heal(part(cells), {Heal::automatic}, "part");
-  const std::string message = undecided({{"part", &healed}}, 1).what();
+  const std::string message = undecided({{"part", "part.stl", &healed}}, 1).what();
   EXPECT_THAT(message, testing::HasSubstr("4 edges where more than two triangles meet"));
   EXPECT_THAT(message, testing::Not(testing::HasSubstr("open edge")));
   EXPECT_THAT(message, testing::EndsWith("take a wrap of it: --heal wrap"));
