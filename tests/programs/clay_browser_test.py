@@ -13,7 +13,9 @@ from harness import bracket, expect, expect_ok, main, run
 
 
 def settle(browser):
-    browser.wait("!flexelView.clay.busy && flexelView.clay.waiting.length === 0 && flexelView.clay.frame && flexelView.clay.frame.settled", 60)
+    """All that was done has been sent, and a frame that has taken it is at rest."""
+    browser.wait("""(({busy, waiting, sent, frame}) => !busy && waiting.length === 0 && frame && frame.settled &&
+        sent.every(each => each.line <= frame.line))(flexelView.clay)""", 60)
 
 
 def choose_hand(browser, mode):
