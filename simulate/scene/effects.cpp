@@ -182,7 +182,7 @@ std::vector<SceneKey> thermal_keys() {
           {air, "where", K::selection, {}, "required", "a face that a fluid touches"},
           {air, "name", K::text, {}, "the selection", "for the summary"},
           {air, "coefficient", K::quantity, {}, "required", "\"10 W/(m2 K)\""},
-          {air, "ambient", K::quantity, {}, "required", "temperature of the fluid"},
+          {air, "ambient", K::quantity, {}, "required", "temperature of the fluid, \"20 degC\""},
           {m, "expansion", K::quantity, {}, "the library's", "\"12e-6 /K\""},
           {m, "conductivity", K::quantity, {}, "the library's", "\"50 W/(m K)\""}};
 }
