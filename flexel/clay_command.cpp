@@ -90,6 +90,10 @@ Clay read_clay(const ClayArguments& a, Progress& progress) {
   Clay clay;
   clay.scene = read_scene_text(a);
   clay.material = material_of(a, clay.scene);
+  if (!a.scene.empty()) {
+    clay::refuse_unkept(clay.scene, a.scene);
+    clay::refuse_unled(simulate::parse_scene(clay.scene, a.scene));
+  }
   JobArguments arguments;
   arguments.parts = {a.part};
   ImportOptions import;
@@ -106,6 +110,7 @@ Clay read_clay(const ClayArguments& a, Progress& progress) {
       voxelize::voxelize(read_parts({a.part}, import, progress), options, progress);
   voxelize::report(result, progress);
   clay.body = std::make_shared<const Body>(std::move(result.body));
+  if (!a.scene.empty()) clay::refuse_unled(simulate::parse_scene(clay.scene, a.scene), *clay.body);
   progress.finish();
   return clay;
 }

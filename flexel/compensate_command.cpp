@@ -11,6 +11,7 @@
 #include "base/human.h"
 #include "base/math/area_vector.h"
 #include "base/parallel.h"
+#include "base/program/brief_output.h"
 #include "base/program/termination.h"
 #include "base/stop.h"
 #include "base/units.h"
@@ -21,8 +22,11 @@
 #include "formats/lattice/body_file.h"
 #include "mapping/cad_output.h"
 #include "mapping/output.h"
+#include "simulate/effects/rigid.h"
 #include "simulate/result/options.h"
 #include "simulate/simulate.h"
+#include "simulate/time/dynamic_relaxation.h"
+#include "voxelize/report.h"
 #include "voxelize/voxelize.h"
 
 namespace flexel::commands {
@@ -74,14 +78,15 @@ class Compensation {
       job_.voxelize.size = std::cbrt(body_.parts.front().lattice.spacing.prod());
     }
     lattice_ = body_;
-    largest_ = 0;
-    for (const Vec3& each : moved_) largest_ = std::max(largest_, each.norm());
-    if (!(largest_ > 0)) throw InputError("the scene moves nothing: there is nothing to compensate");
     split();
+    largest_ = rest().largest;  // nothing is compensated yet
+    if (!(largest_ > 0)) throw InputError("the scene moves nothing: there is nothing to compensate");
     iterate();
     field_ = body_;
     run(kOwnLattice);
+    pass_on(warnings_);
     check_ = rest();
+    refuse_worse(check_);
   }
 
   void write(const std::vector<Output>& outputs) {
@@ -114,7 +119,7 @@ class Compensation {
         human_length(check_.largest), place(check_.at), human_share(check_.largest / largest_),
         human_length(check_.rms()));
     if (check_.largest > kAllowed * largest_)
-      progress_.warn(left + "; use a smaller --size, or --model quadratic");
+      progress_.warn(left + "; use a smaller --size" + other_model());
     else
       progress_.say(left);
   }
@@ -140,7 +145,10 @@ class Compensation {
     surface.vertices = made_;
     voxelize::VoxelizeOptions options = job_.voxelize;
     if (options.size) *options.size *= finer;
-    Body body = voxelize::voxelize(std::move(surface), options, quiet_).body;
+    voxelize::VoxelizeResult voxels = voxelize::voxelize(std::move(surface), options, quiet_);
+    if (!reported_) report(voxels);
+    HeldWarnings held;  // of a run that fails they are printed
+    Body body = std::move(voxels.body);
     Job job = job_;
     add_actions(job, body);
     simulate::SimulateOptions how;
@@ -153,6 +161,23 @@ class Compensation {
     moved_ = std::move(mapped.result.displacement);
     body_ = std::move(body);
     last_ = std::move(mapped.result);
+    warnings_ = held.take();
+  }
+
+  // What is wrong with the part that was given; those made of it share that.
+  void report(const voxelize::VoxelizeResult& voxels) {
+    std::vector<std::string> lines;
+    {
+      HeldWarnings held;
+      voxelize::report(voxels, quiet_);
+      lines = held.take();
+    }
+    pass_on(lines);
+    reported_ = true;
+  }
+
+  void pass_on(const std::vector<std::string>& warnings) {
+    for (const std::string& line : warnings) progress_.warn(line);
   }
 
   // Triangles that are too large to show the deformation are split, so that what is made can bend.
@@ -167,13 +192,18 @@ class Compensation {
 
   void iterate() {
     progress_.stage("compensate");
-    double before = HUGE_VAL;
+    double before = largest_;
     std::vector<Vec3> best = made_;
     for (iterations_ = 1; iterations_ <= kMostIterations; ++iterations_) {
       for (std::size_t v = 0; v < made_.size(); ++v) made_[v] -= made_[v] + moved_[v] - wanted_.vertices[v];
       refuse_folded();
       run(kIteration);
-      const double now = rest().largest;
+      const Rest left = rest();
+      const double now = left.largest;
+      if (iterations_ == 1 && !(now < before)) {
+        pass_on(warnings_);
+        refuse_worse(left);
+      }
       progress_.update(0.9 * iterations_ / kMostIterations, fmt::format("{} remain", human_length(now)));
       if (now >= before) {  // what is left is that of the lattices
         made_ = best;
@@ -199,6 +229,20 @@ class Compensation {
     return found;
   }
 
+  // Made as it is wanted the part would be nearer to its shape.
+  void refuse_worse(const Rest& left) const {
+    if (left.largest < largest_) return;
+    throw DivergedError(
+        fmt::format("no part was found that becomes this shape: {} remain at {}, and {} of the part as it "
+                    "is; use smaller "
+                    "loads, or a smaller --size{}",
+                    human_length(left.largest), place(left.at), human_length(largest_), other_model()));
+  }
+
+  [[nodiscard]] std::string other_model() const {
+    return job_.voxelize.moments ? "" : ", or --model quadratic";
+  }
+
   void refuse_folded() const {
     for (std::size_t p = 0; p < wanted_.polygon_count(); ++p) {
       const Vec3 is = area_vector(wanted_.vertices, wanted_.polygon(p)),
@@ -212,7 +256,9 @@ class Compensation {
   const CompensateArguments& arguments_;
   Job job_;
   Progress& progress_;
-  Progress quiet_{"flexel", Progress::Mode::silent};
+  Progress quiet_{"flexel", Progress::Mode::quiet};
+  std::vector<std::string> warnings_;  // of the last run
+  bool reported_ = false;
   Surface wanted_;
   std::vector<Vec3> made_, moved_;  // (vertices x 3) m: where they are made; how far the scene moves them
   Body body_, lattice_, field_;  // of the last run; of the shape wanted, and of the part as made, at the end
@@ -228,6 +274,9 @@ std::vector<Output> plan_outputs(const CompensateArguments& arguments) {
   std::vector<OutputName> names;
   bool cad = false;
   for (const std::string& path : arguments.outputs) {
+    if (means_stdout(path))
+      throw InputError(
+          fmt::format("-o {}: compensate writes files, not to stdout: name one, such as make.stl", path));
     Output output{path, std::nullopt};
     if (extension(path) != "vtu") {
       output.surface = mapping::map_output("", path, arguments.map.ascii, 0, 1, false);
@@ -242,6 +291,18 @@ std::vector<Output> plan_outputs(const CompensateArguments& arguments) {
   inputs.push_back(arguments.job.scene);
   check_outputs(names, inputs, arguments.job.force);
   return outputs;
+}
+
+void refuse_time(const simulate::Scene& scene) {
+  const auto refuse = [&](const std::string& what) {
+    throw InputError(scene.name, "compensation is for runs to equilibrium, and " + what);
+  };
+  if (scene.run.time) refuse("this scene is a timed run");
+  if (!settles(scene)) return;
+  const auto& rigid = scene.get<simulate::RigidParts>();
+  if (!rigid.parts.empty()) refuse("rigid parts come to rest by a run in time: leave them out");
+  if (!rigid.manipulators.empty()) refuse("manipulators act by a run in time: leave them out");
+  refuse("[contact] comes to rest by a run in time: leave it out");
 }
 
 }  // namespace
@@ -263,9 +324,7 @@ int compensate_command(int argc, char** argv) {
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   const std::vector<Output> outputs = plan_outputs(arguments);
   Job job = plan_job(arguments.job);
-  if (job.scene.run.time)
-    throw InputError(job.scene.name,
-                     "compensation is for runs to equilibrium, and this scene is a timed run");
+  refuse_time(job.scene);
   const ThreadLimit limit(arguments.threads);
   Progress progress("flexel", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
   progress.stage("import");

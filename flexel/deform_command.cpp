@@ -147,6 +147,7 @@ void plan_outputs(const DeformArguments& arguments, Plan& plan) {
   for (const Plan::Output& output : plan.outputs) names.push_back({output.path});
   for (const std::string& path : {arguments.map.report, arguments.summary, failed_name(plan)})
     names.push_back({path});
+  if (arguments.json) names.push_back({"-"});
   std::vector<std::string> inputs = arguments.job.parts;
   inputs.push_back(arguments.job.scene);
   check_outputs(names, inputs, arguments.job.force);

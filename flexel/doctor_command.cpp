@@ -31,8 +31,10 @@ namespace {
 
 struct Tool {
   std::string name, what;
-  bool own = false;  // of Flexel: without it the installation is damaged
+  bool own = false;  // of Flexel
   bool found = false;
+  // Without it the installation is damaged; a build may leave flexel-cad out.
+  [[nodiscard]] bool needed() const { return own && name != "flexel-cad"; }
 };
 
 bool on_path(const std::string& name) {
@@ -108,9 +110,9 @@ std::string as_text(const std::vector<Tool>& found, const SelfTest& test) {
                   default_thread_count(), human_bytes(available_memory()), instruction_set());
   for (const Tool& tool : found)
     text += fmt::format("{:<7}     {:<20} {}\n",
-                        tool.found ? "there"
-                        : tool.own ? "MISSING"
-                                   : "missing",
+                        tool.found      ? "there"
+                        : tool.needed() ? "MISSING"
+                                        : "missing",
                         tool.name, tool.what);
   text += fmt::format("self-test   {}: a pulled bar stores {:.6g} nJ, {:.6g} are known; {}\n",
                       test.passed() ? "passed" : "FAILED", 1e9 * test.found, 1e9 * test.known,
@@ -146,7 +148,7 @@ int doctor_command(int argc, char** argv) {
   out.commit();
   if (!test.passed()) throw InputError("the self-test failed: this machine or this build computes wrongly");
   for (const Tool& tool : found)
-    if (tool.own && !tool.found && tool.name != "flexel-cad")  // which a build may leave out
+    if (tool.needed() && !tool.found)
       throw InputError(fmt::format("{} is missing: install Flexel again", tool.name));
   return kExitDone;
 }

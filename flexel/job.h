@@ -44,6 +44,8 @@ struct Job {
 void plan_scene(const JobArguments& arguments, Job& job);
 // What options add to the scene of `job`.
 void add_options(const JobArguments& arguments, Job& job);
+// Throws InputError where the scene asks for modes or buckling, whose shapes without size are no deformed part.
+void refuse_modes(const simulate::Scene& scene);
 // Throws InputError where options alone, without a scene's file, name no material or nothing that acts.
 void refuse_idle(const JobArguments& arguments);
 

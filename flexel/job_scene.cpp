@@ -74,7 +74,8 @@ void plan_infill(const JobArguments& arguments, simulate::Scene& scene) {
   check_infill(scene.infill, "--shell");
 }
 
-// Shapes without size are no deformed part.
+}  // namespace
+
 void refuse_modes(const simulate::Scene& scene) {
   if (!scene.run.modes && !scene.run.buckling) return;
   throw InputError(
@@ -83,8 +84,6 @@ void refuse_modes(const simulate::Scene& scene) {
                   "flexel-simulate SCENE body.vtu -o shapes.pvd",
                   scene.run.modes ? "modes" : "buckling"));
 }
-
-}  // namespace
 
 void declare_scene(CommandLine& app, JobArguments& arguments) {
   const auto add = [&](const char* name, std::vector<std::string>& values, const char* what,

@@ -152,6 +152,7 @@ void make_folder(const std::string& output) {
 void read_scenes(const StudyArguments& a, study::Case& study_case) {
   const simulate::Scene file = a.job.scene.empty() ? simulate::Scene{} : simulate::read_scene(a.job.scene);
   if (a.job.scene.empty()) refuse_idle(a.job);
+  refuse_modes(file);
   if (a.job.model == "quadratic" || simulate::asks_for_quadratic(file))
     throw InputError(
         "flexel study does not run model \"quadratic\": compare sizes with flexel deform --model quadratic "

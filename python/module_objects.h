@@ -26,6 +26,18 @@ struct BodyObject {
 
 [[nodiscard]] std::shared_ptr<BodyObject> body_object(Body body);
 
+// The option of that name; what is of another type is a TypeError that names it.
+template <class T>
+[[nodiscard]] T taken(const py::dict& options, const char* name) {
+  const py::object value = options[name];
+  try {
+    return value.cast<T>();
+  } catch (const py::cast_error&) {
+    const std::string shown = py::str(py::repr(value));
+    throw py::type_error(std::string(name) + ": " + shown + " is of the wrong type or too large");
+  }
+}
+
 // A read-only view of `values` (n x components, row major), which keeps `owner` alive.
 template <class T>
 [[nodiscard]] py::array_t<T> view_of(const T* values, std::size_t n, std::size_t components,

@@ -12,13 +12,13 @@ namespace {
 
 std::optional<double> maybe(const py::dict& options, const char* name) {
   if (!options.contains(name) || options[name].is_none()) return {};
-  return options[name].cast<double>();
+  return taken<double>(options, name);
 }
 
 ImportOptions import_options(const py::dict& options) {
   ImportOptions import;
-  if (options.contains("unit")) import.unit = length_unit(options["unit"].cast<std::string>());
-  if (options.contains("format")) import.format = options["format"].cast<std::string>();
+  if (options.contains("unit")) import.unit = length_unit(taken<std::string>(options, "unit"));
+  if (options.contains("format")) import.format = taken<std::string>(options, "format");
   import.largest_edge = maybe(options, "edge");
   import.deflection = maybe(options, "deflection");
   return import;

@@ -4,24 +4,34 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
 #include <csignal>
 #include <exception>
+#include <limits>
 #include <mutex>
 #include <optional>
 #include <utility>
 
 #include "base/error.h"
+#include "base/resources.h"
 #include "base/stop.h"
 
 namespace flexel::python {
 namespace {
 
-std::recursive_mutex one_run;
+constexpr std::chrono::milliseconds kUntilSignals(50);  // of a wait, until signals are looked at
+
+std::recursive_timed_mutex one_run;
 int runs = 0;                         // within each other
 std::exception_ptr callback_error;    // of the innermost run
 struct sigaction outer_interrupt {};  // Python's
+std::atomic<bool> signalled{false};   // since the outermost run began
+static_assert(std::atomic<bool>::is_always_lock_free);
 
 void on_interrupt(int signal) {
+  signalled = true;
   request_stop();
   if (outer_interrupt.sa_handler != SIG_DFL && outer_interrupt.sa_handler != SIG_IGN)
     outer_interrupt.sa_handler(signal);
@@ -80,17 +90,28 @@ bool on_main_thread() {
 
 Listener* heard = nullptr;
 
-// One run within the lock: its listener, and the state that ends with it.
+void restore_element_limit(double limit) {
+  limit_elements(std::isfinite(limit) ? static_cast<std::size_t>(limit)
+                                      : std::numeric_limits<std::size_t>::max());
+}
+
+// One run within the lock: its listener, and the state that ends with it. A stop that a callback's error asked for ends this
+// run only; one by a signal ends those around it too.
 class Scope {
  public:
-  explicit Scope(Listener& listener) : outer_(heard), outer_error_(std::exchange(callback_error, nullptr)) {
+  explicit Scope(Listener& listener)
+      : outer_(heard),
+        outer_error_(std::exchange(callback_error, nullptr)),
+        outer_elements_(element_limit()) {
     ++runs;
     set_progress_listener(heard = &listener);
   }
   ~Scope() {
     set_progress_listener(heard = outer_);
-    callback_error = outer_error_;
-    if (--runs == 0) forget_stop();
+    const bool by_callback = std::exchange(callback_error, outer_error_) != nullptr;
+    restore_element_limit(outer_elements_);
+    if (--runs == 0) signalled = false;
+    if (runs == 0 || (by_callback && !signalled)) forget_stop();
   }
   Scope(const Scope&) = delete;
   Scope& operator=(const Scope&) = delete;
@@ -98,7 +119,23 @@ class Scope {
  private:
   Listener* outer_;
   std::exception_ptr outer_error_;
+  double outer_elements_;
 };
+
+using Turn = std::unique_lock<std::recursive_timed_mutex>;
+
+// With the GIL: waits for the runs of other threads. Meanwhile Python's handlers run, and what they raise is thrown.
+Turn wait_for_turn() {
+  Turn turn(one_run, std::defer_lock);
+  while (true) {
+    {
+      const py::gil_scoped_release free;
+      if (turn.try_lock_for(kUntilSignals)) break;
+    }
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+  }
+  return turn;
+}
 
 // Raises flexel.errors.NAME.
 void raise(const char* name, const std::string& what, const std::string& where) {
@@ -129,16 +166,16 @@ Said run_work(const py::object& progress, const std::function<void()>& work) {
   const bool takes_signals = on_main_thread();
   std::exception_ptr error, from_callback;
   {
+    const Turn turn = wait_for_turn();
     const py::gil_scoped_release free;
-    const std::lock_guard lock(one_run);
-    const StopsOnInterrupt stops(takes_signals && runs == 0);
     const Scope scope(listener);
+    const StopsOnInterrupt stops(takes_signals && runs == 1);
     try {
       work();
     } catch (...) {
       error = std::current_exception();
     }
-    from_callback = std::exchange(callback_error, nullptr);
+    from_callback = callback_error;
   }
   if (from_callback) std::rethrow_exception(from_callback);
   if (!error) return said;

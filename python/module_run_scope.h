@@ -18,7 +18,7 @@ struct Said {
 };
 
 // Runs `work` on this thread, without the GIL. The libraries keep what belongs to a process (limits, held warnings), so runs
-// of several threads wait for each other; one that a callback starts within a run goes ahead. `progress`: None, or called
+// of several threads wait for each other, until a signal's handler raises; one that a callback starts within a run goes ahead. `progress`: None, or called
 // with (stage, share in [0, 1], note, seconds left or None), at most ten times a second. What it throws ends the run.
 // SIGINT on the main thread ends the run, and what Python's own handler makes of it is thrown.
 Said run_work(const py::object& progress, const std::function<void()>& work);

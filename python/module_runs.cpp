@@ -67,18 +67,28 @@ voxelize::Align align_of(const std::string& word) {
   throw InputError("align: unknown word \"" + word + "\" (one of snap, box, none)");
 }
 
-py::tuple voxelize_part(const PartObject& part, const py::dict& given, int threads, const py::object& heard) {
+int threads_of(const py::dict& given) {
+  const int threads = taken<int>(given, "threads");
+  if (threads < 0) throw InputError("threads: must not be below zero (0 is every core)");
+  return threads;
+}
+
+py::tuple voxelize_part(const PartObject& part, const py::dict& given, const py::object& heard) {
   voxelize::VoxelizeOptions options;
-  if (!given["size"].is_none()) options.size = given["size"].cast<double>();
-  if (!given["count"].is_none()) options.count = given["count"].cast<std::size_t>();
+  if (!given["size"].is_none()) options.size = taken<double>(given, "size");
+  if (!given["count"].is_none()) {
+    const auto count = taken<long long>(given, "count");
+    if (count <= 0) throw InputError("count: must be above zero");
+    options.count = static_cast<std::size_t>(count);
+  }
   if (options.size && options.count) throw InputError("give size or count, not both");
   if (options.size && !(*options.size > 0)) throw InputError("size: must be above zero");
-  if (options.count && *options.count == 0) throw InputError("count: must be above zero");
-  options.placement = voxelize::placement_choice(given["placement"].cast<std::string>());
-  options.align = align_of(given["align"].cast<std::string>());
-  options.heal = voxelize::heal_choice(given["heal"].cast<std::string>());
-  options.material = given["material"].cast<std::string>();
-  options.moments = given["moments"].cast<bool>();
+  options.placement = voxelize::placement_choice(taken<std::string>(given, "placement"));
+  options.align = align_of(taken<std::string>(given, "align"));
+  options.heal = voxelize::heal_choice(taken<std::string>(given, "heal"));
+  options.material = taken<std::string>(given, "material");
+  options.moments = taken<bool>(given, "moments");
+  const int threads = threads_of(given);
   std::shared_ptr<BodyObject> body;
   std::string summary;
   Said said = run_work(heard, [&] {
@@ -100,12 +110,15 @@ simulate::Scene scene_of(std::vector<std::string> words, const std::string& scen
   commands::declare_scene(app, arguments);
   parse(app, "simulate", std::move(words));
   commands::Job job;
-  if (scene_name.empty()) {
-    plan_scene(arguments, job);
-  } else {
+  if (!scene_name.empty()) {
     job.scene = simulate::parse_scene(scene_text, scene_name);
-    add_options(arguments, job);
+  } else if (!arguments.scene.empty()) {
+    job.scene = simulate::read_scene(arguments.scene);
+  } else {
+    job.scene.name = simulate::kCommandLine;
+    refuse_idle(arguments);
   }
+  add_options(arguments, job);
   if (job.scene.name == simulate::kCommandLine) check_parts(job, body.surface);
   add_actions(job, body);
   return job.scene;
@@ -113,12 +126,12 @@ simulate::Scene scene_of(std::vector<std::string> words, const std::string& scen
 
 simulate::SimulateOptions simulate_options(const py::dict& given) {
   simulate::SimulateOptions options;
-  options.threads = given["threads"].cast<int>();
-  options.estimate = given["estimate"].cast<bool>();
-  options.stress = given["stress"].cast<bool>();
-  options.history = given["history"].cast<std::string>();
-  options.failed_output = given["failed"].cast<std::string>();
-  options.isa = given["isa"].cast<std::string>();
+  options.threads = threads_of(given);
+  options.estimate = taken<bool>(given, "estimate");
+  options.stress = taken<bool>(given, "stress");
+  options.history = taken<std::string>(given, "history");
+  options.failed_output = taken<std::string>(given, "failed");
+  options.isa = taken<std::string>(given, "isa");
   if (const py::object callback = given["on_frame"]; !callback.is_none())
     options.on_frame = [callback](const Body& body, double time) {
       call_back([&] {

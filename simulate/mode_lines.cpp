@@ -13,7 +13,7 @@ std::vector<std::string> mode_lines(const ModesSummary& summary, double mass) {
   Vec3 sum = Vec3::Zero();
   std::string head = fmt::format("{}      {}", summary.buckling ? "shapes" : "modes ", summary.modes.size());
   if (summary.rigid > 0) head += fmt::format(", and {} rigid motions at 0 Hz", summary.rigid);
-  if (summary.prestressed) head += ", about the state that the loads hold";
+  if (summary.prestressed) head += ", about the equilibrium that the body is in";
   lines.push_back(head);
   for (std::size_t m = 0; m < summary.modes.size(); ++m) {
     const Mode& mode = summary.modes[m];

@@ -19,6 +19,7 @@
 #include "formats/lattice/quadratic_field.h"
 #include "simulate/conduction/conduction.h"
 #include "simulate/equilibrium/equilibrium.h"
+#include "simulate/equilibrium/positive_tangent.h"
 #include "simulate/estimate/coarsen.h"
 #include "simulate/estimate/error_bars.h"
 #include "simulate/estimate/stress_singularity.h"
@@ -86,6 +87,12 @@ std::string near_buckling(double linear, const SimulateResult& result) {
     if (each.of == ErrorBar::Of::largest_displacement && each.value > 0)
       bar = each.bar.half_width / each.value;
   if (!(found > 0 && linear > 0 && share * (1 + bar) > kNear)) return "";
+  constexpr double kBuckled = 0.95;  // beyond buckling the share tends to 1
+  if (share > kBuckled)
+    return fmt::format(
+        "the part has buckled, or is about to: it moves {} times as far as in proportion to the load, and a "
+        "little less stiffness moves it further than any error bar here says",
+        human_number(found / linear, 2));
   return fmt::format(
       "the part is about to buckle: it moves {} times as far as in proportion to the load, {}, so a little "
       "more load, or a little less stiffness, moves it much further than any error bar here says",
@@ -134,6 +141,7 @@ class Run {
 
  private:
   EquilibriumResult solve(Mechanics& mechanics);
+  void warn_of_buckling_by_heat(Mechanics& mechanics);
   [[nodiscard]] std::optional<std::vector<Vec3>> coarse_equilibrium();
   [[nodiscard]] std::string save_failed(const Mechanics& mechanics);
 
@@ -203,8 +211,22 @@ std::string Run::save_failed(const Mechanics& mechanics) {
   if (options_.failed_output.empty()) return "";
   carry_strays(fragments_, problem_, mechanics.stencil(), state_);
   move_body(body_, state_);
+  body_.cell_columns.erase(kFreeStrainColumn);  // of this run only
   write_body(body_, options_.failed_output);
   return "; the last state in equilibrium is in " + options_.failed_output;
+}
+
+// Load steps scale loads and moves; free strain acts whole from the first on, so that buckling is not met on the way.
+void Run::warn_of_buckling_by_heat(Mechanics& mechanics) {
+  if (!body_.cell_columns.contains(kFreeStrainColumn)) return;
+  const std::optional<bool> stable = has_positive_tangent(mechanics, state_);
+  if (stable == true) return;
+  progress_.warn(scene_.name + ": " +
+                 (stable
+                      ? "this equilibrium is not stable: the part buckles under less heat or shrinkage than "
+                        "this, and what is told is as if it did not; a small load to the side shows where "
+                        "it goes"
+                      : "whether this equilibrium is stable was not found out: the part may buckle"));
 }
 
 SimulateResult Run::operator()() {
@@ -235,6 +257,7 @@ SimulateResult Run::operator()() {
   measure_corners(mechanics.cells(), body_, state_, result, progress_);
   if (options_.stress) measure_stress(problem_, state_, body_, result);
   if (options_.estimate) mark_singular(body_, tied_, result);
+  warn_of_buckling_by_heat(mechanics);
   carry_strays(fragments_, problem_, mechanics.stencil(), state_);
   move_body(body_, state_);
   if (scene_.run.renormalise) renormalise_all(body_, problem_, state_.displacement);
@@ -283,9 +306,10 @@ class FreeStrainInBody {
 void refuse_heat(const Scene& scene) {
   const ThermalSettings& settings = scene.get<Thermal>();
   if ((settings.expands() || settings.conducts()) && (scene.run.time || settles(scene)))
-    throw InputError(scene.name,
-                     "heat and shrinkage act at equilibrium without contact only: leave [run] time and "
-                     "contact, or [thermal], [shrinkage] and faces of conduction, out");
+    throw InputError(
+        scene.name,
+        "heat and shrinkage act at equilibrium without contact only: leave [run] time, "
+        "contact, rigid parts and manipulators out, or [thermal], [shrinkage] and faces of conduction");
 }
 
 // The runs at equilibrium without contact, by the model. `linear_reach`: Run::linear_reach(), of model `quadratic` 0.
@@ -324,6 +348,7 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
   const ThreadLimit limit(options.threads);
   refuse_empty(body);
   erase_stress_columns(body);
+  body.cell_columns.erase(kFreeStrainColumn);  // a run's own
   progress.stage("simulate");
   check_actions(scene, body, progress);
   refuse_heat(scene);

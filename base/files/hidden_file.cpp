@@ -1,5 +1,6 @@
 // The number of a process says nothing on another machine or in another container that shares the folder, and
-// a lock nothing between a file's writing and its renaming: only where both are gone is a file stale.
+// a lock nothing between a file's writing and its renaming: only where both are gone, and nobody has written to it for
+// an hour, is a file stale.
 #include "base/files/hidden_file.h"
 
 #include <fcntl.h>
@@ -12,6 +13,7 @@
 #include <cerrno>
 #include <charconv>
 #include <csignal>
+#include <ctime>
 #include <filesystem>
 #include <map>
 #include <mutex>
@@ -25,6 +27,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view kEnding = ".tmp";
+constexpr std::time_t kStaleAfter = 3600;  // s
 
 // Without process, count and ending.
 std::string beginning_of(const std::string& target) {
@@ -65,7 +68,7 @@ void remove_if_stale(const std::string& path, pid_t process) {
   if (descriptor < 0) return;
   struct stat status = {};
   if (::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode) && status.st_uid == ::geteuid() &&
-      ::flock(descriptor, LOCK_EX | LOCK_NB) == 0)
+      status.st_mtime < std::time(nullptr) - kStaleAfter && ::flock(descriptor, LOCK_EX | LOCK_NB) == 0)
     ::unlink(path.c_str());
   ::close(descriptor);
 }

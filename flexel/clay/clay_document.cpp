@@ -3,6 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "base/error.h"
+#include "simulate/scene/scene.h"
+
 namespace flexel::clay {
 namespace {
 
@@ -25,12 +30,13 @@ std::string move_of(const ClayTool& tool, std::size_t number) {
 
 // Asks for it in the [run] that the text has, or in one of its own.
 std::string kept_text(std::string text) {
-  constexpr const char* kTable = "[run]";
   const std::string keep = "renormalise = true\n";
-  std::size_t at = text.starts_with(kTable) ? 0 : text.find(std::string("\n") + kTable);
-  if (at == text.npos) return text + "\n[run]\n" + keep;
-  at = std::min(text.find('\n', at + 1), text.size() - 1);
-  return text.insert(at + 1, keep);
+  for (std::size_t line = 0, next = 0; line < text.size(); line = next) {
+    next = std::min(text.find('\n', line), text.size() - 1) + 1;
+    const std::size_t first = text.find_first_not_of(" \t", line);
+    if (first != text.npos && text.compare(first, 5, "[run]") == 0) return text.insert(next, keep);
+  }
+  return text + "\n[run]\n" + keep;
 }
 
 }  // namespace
@@ -56,6 +62,26 @@ std::string scene_text(const ClayDocument& document, const std::string& base, bo
   for (const std::string& name : document.holds) text += "\n[[fix]]\nwhere = " + where_of_name(name) + "\n";
   for (std::size_t t = 0; t < document.tools.size(); ++t) text += move_of(document.tools[t], t + 1);
   return keep ? kept_text(std::move(text)) : text;
+}
+
+void refuse_unkept(const std::string& base, const std::string& name) {
+  const simulate::Scene scene = simulate::parse_scene(base, name);
+  if (scene.run.renormalise) return;  // refuse_unled tells why not
+  ClayDocument document;
+  if (scene.material.empty()) document.material = "PLA";
+  document.holds = {"xmin"};
+  document.tools.emplace_back().where = where_of_name("xmax");
+  std::string why = "\"renormalise\" is nowhere in its [run]";
+  try {
+    if (simulate::parse_scene(scene_text(document, base, true), "then").run.renormalise) return;
+  } catch (const InputError& error) {
+    why = fmt::format("{}: {}", error.where(), error.what());
+  }
+  throw InputError(
+      name,
+      fmt::format("what hands do cannot be added to it ({}): write [run], [[fix]] and [[move]] as tables of "
+                  "their own",
+                  why));
 }
 
 }  // namespace flexel::clay

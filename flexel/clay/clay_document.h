@@ -31,6 +31,9 @@ struct ClayDocument {
 // Scene of what was done since the shape was kept last: `base`, holds, tools. `keep`: and the shape is kept.
 [[nodiscard]] std::string scene_text(const ClayDocument& document, const std::string& base, bool keep);
 
+// Throws InputError(name, ...): a base that is no scene, or that scene_text makes none of, holds, tools and all.
+void refuse_unkept(const std::string& base, const std::string& name);
+
 // TOML of a name; of a ball.
 [[nodiscard]] std::string where_of_name(const std::string& name);
 [[nodiscard]] std::string where_of_ball(const Vec3& centre, double radius);

@@ -130,6 +130,7 @@ ClaySession::ClaySession(std::shared_ptr<const Body> body, std::string material,
   document.material = std::move(material);
   document.displacement = displacement_of(*first_);
   take_up(std::move(document));
+  shown_ = document_;
   publish();
   thread_ = std::thread([this] { run(); });
 }
@@ -174,11 +175,14 @@ Answer ClaySession::act(const std::string& message) {
 
 void ClaySession::joined(const std::string& client) {
   const std::lock_guard lock(mutex_);
+  ++readers_[client];
   if (holder_.empty()) give_tool(client);
 }
 
 void ClaySession::left(const std::string& client) {
   const std::lock_guard lock(mutex_);
+  if (--readers_[client] > 0) return;  // it has come back before its old connection ended
+  readers_.erase(client);
   if (holder_ == client) give_tool("");
 }
 
@@ -228,7 +232,7 @@ void ClaySession::run() {
       said_ = error.what();
       stroke_ = {};
       const std::lock_guard lock(mutex_);
-      settled_ = !act;  // after an act that failed the part comes to rest where it is
+      settle(!act);  // after an act that failed the part comes to rest where it is
     }
     publish();
   }
@@ -447,7 +451,13 @@ void ClaySession::refine() {
     document_.displacement = std::make_shared<const std::vector<Vec3>>(model_->whole_displacement());
   }
   const std::lock_guard lock(mutex_);
-  settled_ = queue_.empty();
+  settle(queue_.empty());
+}
+
+// Under the mutex: nobody sees the part at rest without what it is at rest.
+void ClaySession::settle(bool settled) {
+  settled_ = settled;
+  if (settled) shown_ = document_;
 }
 
 std::string ClaySession::head(std::size_t bytes) const {
@@ -492,7 +502,6 @@ void ClaySession::publish() {
     const std::lock_guard lock(mutex_);
     frame = head(positions.size());
     silent = head(0);
-    if (settled_) shown_ = document_;
   }
   ++frame_;
   frame += positions;

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <deque>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -59,6 +60,7 @@ class ClaySession {
   void travel(bool back);
   void lead();
   void refine();
+  void settle(bool settled);
   [[nodiscard]] ToolPose goal() const;
   [[nodiscard]] std::vector<ToolPose> poses_with(const ToolPose& last) const;
   void learn_stiffness(const ToolPose& before, const Vec3& force);
@@ -88,6 +90,7 @@ class ClaySession {
   };
   std::deque<Waiting> queue_;
   std::string holder_;
+  std::map<std::string, int> readers_;  // of each client
   Clock::time_point heard_;             // from the holder
   std::uint64_t line_ = 0, taken_ = 0;  // poses that came, that the part follows
   bool settled_ = true, stop_ = false;

@@ -14,21 +14,11 @@
 #include "simulate/models/set_rest_shape.h"
 #include "simulate/quadratic/quadratic_run.h"
 #include "simulate/scene/scene_checks.h"
+#include "simulate/thermal/thermal.h"
 #include "simulate/time/dynamic_relaxation.h"
 
 namespace flexel::clay {
 namespace {
-
-void refuse_others(const simulate::Scene& scene, const Body& body) {
-  const auto refuse = [&](const char* what) {
-    throw InputError(scene.name, std::string(what) + ": hands lead parts at equilibrium, without contact");
-  };
-  if (scene.run.time || !scene.events.empty()) refuse("a run in time");
-  if (simulate::is_quadratic(scene, body)) refuse("model \"quadratic\"");
-  if (simulate::settles(scene)) refuse("contact or rigid parts");
-  for (const simulate::Tie& tie : scene.get<simulate::Supports>().ties)
-    if (tie.link) refuse("a load with a rigid link");
-}
 
 simulate::Problem problem_of(const simulate::Scene& scene, const Body& body,
                              const simulate::Fragments& fragments) {
@@ -48,13 +38,36 @@ simulate::Problem problem_of(const simulate::Scene& scene, const Body& body,
 
 }  // namespace
 
+void refuse_unled(const simulate::Scene& scene) {
+  const auto refuse = [&](const char* what) {
+    throw InputError(scene.name, std::string(what) + ": hands lead parts at equilibrium, without contact");
+  };
+  if (scene.run.time || !scene.events.empty()) refuse("a run in time");
+  if (scene.run.modes) refuse("[run] modes");
+  if (scene.run.buckling) refuse("[run] buckling");
+  if (scene.run.renormalise)
+    throw InputError(scene.name, "[run] renormalise: a hand keeps the shape with \"Keep the shape\"");
+  const simulate::ThermalSettings& thermal = scene.get<simulate::Thermal>();
+  if (thermal.expands()) refuse("[thermal] or [shrinkage]");
+  if (thermal.conducts()) refuse("a face of conduction of heat");
+  if (simulate::settles(scene)) refuse("contact or rigid parts");
+  for (const simulate::Tie& tie : scene.get<simulate::Supports>().ties)
+    if (tie.link) refuse("a load with a rigid link");
+}
+
+void refuse_unled(const simulate::Scene& scene, const Body& body) {
+  refuse_unled(scene);
+  if (simulate::is_quadratic(scene, body))
+    throw InputError(scene.name, "model \"quadratic\": hands lead parts of the other models");
+}
+
 PulledBody::~PulledBody() = default;
 
 PulledBody::PulledBody(const Body& body, simulate::Scene scene, std::vector<Vec3> middles, double arm,
                        std::vector<Vec3> start)
     : body_(body),
       fragments_(simulate::find_fragments(body)),
-      problem_((refuse_others(scene, body), problem_of(scene, body, fragments_))),
+      problem_((refuse_unled(scene, body), problem_of(scene, body, fragments_))),
       middles_(std::move(middles)),
       arm_(arm),
       poses_(middles_.size()),

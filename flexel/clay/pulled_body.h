@@ -12,11 +12,16 @@
 
 namespace flexel::clay {
 
+// Throws InputError: what hands cannot lead (a run in time, modes, buckling, a shape that the scene itself keeps, heat,
+// shrinkage, contact, rigid links; with a body also model "quadratic").
+void refuse_unled(const simulate::Scene& scene);
+void refuse_unled(const simulate::Scene& scene, const Body& body);
+
 class PulledBody {
  public:
   // `body` outlives it. The last `middles.size()` [[move]] of `scene` are tools, turned about these [m, rest]; `arm` [m]: how large
-  // one is. Begins at `start` (elements) [m]. Throws InputError: as flexel-simulate would of the scene; what hands cannot lead (a
-  // run in time, contact, model "quadratic", rigid links).
+  // one is. Begins at `start` (elements) [m]. Throws InputError: as flexel-simulate would of the scene, and as
+  // refuse_unled does.
   PulledBody(const Body& body, simulate::Scene scene, std::vector<Vec3> middles, double arm,
              std::vector<Vec3> start);
   PulledBody(const PulledBody&) = delete;

@@ -38,11 +38,18 @@ constexpr double kKnown = 0.05;       // how well a median should be known
 constexpr int kMostRepeats = 5;
 constexpr double kLongest = 1e9;  // s
 
-// What an earlier study that was killed left behind.
+constexpr std::array kResults{"study.csv", "study.json", "study.html"};
+
+// What an earlier study that was killed left behind. The page is written last: without it, what that study had put
+// aside is back.
 void remove_stale(const fs::path& output) {
   std::error_code ignored;
-  for (const auto& entry : fs::directory_iterator(output, ignored))
-    if (entry.path().filename().string().rfind(".flexel-", 0) == 0) fs::remove_all(entry.path(), ignored);
+  for (const auto& entry : fs::directory_iterator(output, ignored)) {
+    if (entry.path().filename().string().rfind(".flexel-", 0) != 0) continue;
+    if (fs::exists(entry.path() / "study.html", ignored) && !fs::exists(output / "study.html", ignored))
+      for (const char* name : kResults) fs::rename(entry.path() / name, output / name, ignored);
+    fs::remove_all(entry.path(), ignored);
+  }
 }
 
 // The results of an earlier study, out of the way in `folder` while this one runs; unless this one leaves its
@@ -66,7 +73,6 @@ class EarlierResults {
   void keep_new() { back_ = false; }
 
  private:
-  static constexpr std::array kResults{"study.csv", "study.json", "study.html"};
   fs::path output_, aside_;
   bool back_ = true;
 };

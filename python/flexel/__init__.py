@@ -20,7 +20,7 @@ from typing import Any, Callable, Dict, List, Optional, Sequence, Union
 
 from . import _flexel
 from ._objects import Body, Frame, Mapped, Part, Result
-from ._options import Quantity, length, paths, words
+from ._options import Quantity, is_scene_text, length, paths, refuse_limits, words
 from ._said import Progress, heard
 from .errors import (DivergedError, FlexelError, FlexelWarning, InputError, InvalidMappingError, StoppedByTimeout)
 
@@ -59,7 +59,8 @@ def read(path: Paths, *, unit: Optional[str] = None, format: Optional[str] = Non
         options["format"] = format
     files = paths(path)
     core, said = heard(_flexel.read_part, files, options, progress=progress)
-    return Part(core, os.path.basename(files[0]), said.warnings)
+    return Part(core, os.path.basename(files[0]), said.warnings,
+                [os.path.abspath(each) for each in files if each != "-"])
 
 
 def _as_part(part, progress: Progress) -> Part:
@@ -77,8 +78,8 @@ def voxelize(part: Union[Part, Paths], *, size: Optional[Quantity] = None, count
     """
     given = _as_part(part, progress)
     options = {"size": length(size), "count": count, "placement": placement, "align": align, "heal": heal,
-               "material": material, "moments": moments}
-    core, summary, said = heard(_flexel.voxelize, given._core, options, threads, progress=progress)
+               "material": material, "moments": moments, "threads": threads}
+    core, summary, said = heard(_flexel.voxelize, given._core, options, progress=progress)
     return Body(core, summary, said.warnings, given.label)
 
 
@@ -93,7 +94,8 @@ def simulate(body: Body, scene: Union[str, os.PathLike, None] = None, *, on_fram
              progress: Progress = None, **options) -> Result:
     """Runs a scene on a body, as flexel-simulate does; the body stays as it is.
 
-    scene: the path of a scene (.toml), or the text of one (docs/reference/scene.md), or None. options add to it: fix, push,
+    scene: the path of a scene (.toml), or the text of one (docs/reference/scene.md; has a line's end, or "=" and names no
+    file), or None. options add to it: fix, push,
     move, torque, twist, bearing, gravity, probe, material, model, infill, shell, as of `flexel deform`:
     push={"bracket/2": (0, 0, -100)} [N], "bracket/2: 0 0 -100 N" or a list of such; fix="bracket/1".
     on_frame: of runs in time, called with each Frame ([run] frames of the scene). estimate: error bars. history: a CSV of
@@ -105,7 +107,7 @@ def simulate(body: Body, scene: Union[str, os.PathLike, None] = None, *, on_fram
              "failed": os.fspath(failed), "isa": isa, "on_frame": callback}
     text, name = "", ""
     line = words(options)
-    if isinstance(scene, str) and ("\n" in scene or "=" in scene):
+    if is_scene_text(scene):
         text, name = scene, "scene"
     elif scene is not None:
         line.append("--scene=" + os.fspath(scene))
@@ -142,12 +144,12 @@ def deform(part: Union[Part, Paths], *, output: Union[Paths, None] = None, progr
     if output is not None:
         line += ["--output=" + each for each in paths(output)]
     if isinstance(part, Part):
-        core_part, names = part._core, [part.label]
+        core_part, names = part._core, part._names()
     else:
         core_part, names = None, paths(part)
     core, said = heard(_flexel.deform, line + ["--"] + names, core_part, progress=progress)
-    label = ", ".join(os.path.basename(name) for name in names) + ", deformed"
-    return Result(core, said, {name: options[name] for name in _OF_MAPPING if name in options}, label)
+    label = part.label if isinstance(part, Part) else ", ".join(os.path.basename(name) for name in names)
+    return Result(core, said, {name: options[name] for name in _OF_MAPPING if name in options}, label + ", deformed")
 
 
 def study(part: Paths, *, output: Union[str, os.PathLike], progress: Progress = None, **options) -> Dict[str, Any]:
@@ -173,6 +175,7 @@ def picture(shown, path: Union[str, os.PathLike, None] = None, *, progress: Prog
     options: color="von_mises", scale="auto" or a factor, view="iso" or "30,20", size="1600x1200", cells=True, faces=True,
     range="0:5 mm", up="y".
     """
+    refuse_limits(options)
     line: List[str] = []
     for name, value in options.items():
         if value is True:

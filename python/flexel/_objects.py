@@ -39,8 +39,13 @@ def _inline(page: str, what: str) -> str:
 class Part:
     """One or more solids as the polygons of their file (`flexel.read`, `Part.from_mesh`)."""
 
-    def __init__(self, core: "_flexel.Part", label: str = "part", warnings: Sequence[str] = ()):
-        self._core, self.label, self.warnings = core, label, list(warnings)
+    def __init__(self, core: "_flexel.Part", label: str = "part", warnings: Sequence[str] = (), files: Sequence[str] = ()):
+        """files: what it was read from, absolute, which results do not replace."""
+        self._core, self.label, self.warnings, self._files = core, label, list(warnings), list(files)
+
+    def _names(self) -> List[str]:
+        """What stands for it in a command: its files, or else a name that no file can have."""
+        return self._files or [os.path.join(os.devnull, os.path.basename(self.label) or "part")]
 
     @classmethod
     def from_mesh(cls, vertices, faces, *, unit: str = "m", name: str = "part", edge=None,

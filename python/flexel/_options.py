@@ -51,8 +51,16 @@ def _of_parts(value) -> List[str]:
     return [str(each) for each in _listed(value)]
 
 
+def refuse_limits(options: Mapping) -> None:
+    """A limit of memory would be one of the whole process, and stay."""
+    if any(name.replace("-", "_").startswith("max_memory") for name in options):
+        raise InputError("max_memory: is for the programs, for in Python it would limit all of the process: run the command, or "
+                         "use max_elements")
+
+
 def words(options: Mapping) -> List[str]:
     """The command line of keywords: no_estimate=True is --no-estimate, fix=["a", "b"] is --fix a --fix b."""
+    refuse_limits(options)
     line: List[str] = []
     for name, value in options.items():
         option = "--" + name.replace("_", "-")
@@ -75,6 +83,13 @@ def words(options: Mapping) -> List[str]:
             values = [os.fspath(each) if isinstance(each, os.PathLike) else str(each) for each in _listed(value)]
         line.extend(f"{option}={each}" for each in values)
     return line
+
+
+def is_scene_text(scene) -> bool:
+    """Whether a scene is given as its text: not where it is a file, or named as one."""
+    if not isinstance(scene, str) or "\n" in scene:
+        return isinstance(scene, str)
+    return "=" in scene and not scene.endswith(".toml") and not os.path.exists(scene)
 
 
 def paths(value) -> List[str]:

@@ -7,12 +7,17 @@
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
+#include <utility>
 
 #include "base/error.h"
 #include "base/human.h"
+#include "base/stop.h"
 #include "formats/lattice/cell_moments.h"
+#include "simulate/effects/bonds.h"
 #include "simulate/matter/fragments.h"
+#include "simulate/matter/interface_points.h"
 #include "simulate/models/cells.h"
 #include "simulate/quadratic/cells/cell_integrals.h"
 #include "simulate/quadratic/cells/face_points.h"
@@ -26,9 +31,47 @@ constexpr double kOutside =
     1e-6;  // conductivity of what is not matter, of the material's: slivers stay regular
 constexpr double kTolerance = 1e-11;
 constexpr int kMostIterations = 20000;
+constexpr double kIce = 273.15;  // K
+// Heats sum to nothing but for what the equations are not solved to: as shares of the heats, and of the
+// penalty's part of them, which cancels.
+constexpr double kImbalance = 1e-3, kRounding = 1e-9;
 
 using Matrix = Eigen::SparseMatrix<double>;
 using Corners = std::array<double, 8>;
+
+struct HeatThrough {
+  double sum = 0;    // W, into the part
+  double gauge = 0;  // W, of the terms that cancel in it
+};
+
+// Preconditioned conjugate gradients from 0: Eigen's own would hear no stop. False: not converged.
+bool solve_heat(const Matrix& matrix, const Eigen::VectorXd& right, Eigen::VectorXd& x, Progress& progress) {
+  x = Eigen::VectorXd::Zero(right.size());
+  const double whole = right.norm();
+  if (whole == 0) return true;
+  const Eigen::IncompleteCholesky<double> preconditioner(matrix);
+  if (preconditioner.info() != Eigen::Success) return false;
+  Eigen::VectorXd residual = right, z = preconditioner.solve(residual), direction = z;
+  double product = residual.dot(z);
+  for (int i = 0; i < kMostIterations; ++i) {
+    check_stop();
+    const Eigen::VectorXd image = matrix * direction;
+    const double curvature = direction.dot(image);
+    if (!(curvature > 0)) return false;
+    x += product / curvature * direction;
+    residual -= product / curvature * image;
+    const double left = residual.norm() / whole;
+    if (left <= kTolerance) return x.allFinite();
+    if (i % 50 == 0)
+      progress.update(std::clamp(std::log(left) / std::log(kTolerance), 0.0, 1.0),
+                      fmt::format("heat, iteration {}", i + 1));
+    z = preconditioner.solve(residual);
+    const double next = residual.dot(z);
+    direction = z + next / product * direction;
+    product = next;
+  }
+  return false;
+}
 
 // Trilinear shape functions and their gradients [1/m], world frame.
 struct TrilinearShape {
@@ -71,22 +114,21 @@ class Conduction {
         break;
       }
     find_conductivities();
-    for (std::uint32_t c = 0; c < nodes_.cells.size(); ++c) add_cell(c);
+    refuse_bonded();
+    for (std::uint32_t c = 0; c < nodes_.cells.size(); ++c) {
+      check_stop();
+      add_cell(c);
+    }
     for (const HeatFace& face : settings_.faces) add_face(face);
     refuse_undetermined();
   }
 
   // (elements) K.
-  [[nodiscard]] std::vector<double> solve() {
+  [[nodiscard]] std::vector<double> solve(Progress& progress) {
     const auto n = static_cast<Eigen::Index>(nodes_.elements.size());
     Matrix matrix(n, n);
     matrix.setFromTriplets(entries_.begin(), entries_.end());
-    Eigen::ConjugateGradient<Matrix, Eigen::Lower | Eigen::Upper, Eigen::IncompleteCholesky<double>> solver;
-    solver.setTolerance(kTolerance);
-    solver.setMaxIterations(kMostIterations);
-    solver.compute(matrix);
-    temperature_ = solver.solve(right_);
-    if (solver.info() != Eigen::Success || !temperature_.allFinite())
+    if (!solve_heat(matrix, right_, temperature_, progress))
       throw DivergedError(scene_.name + ": heat conduction did not converge; use a smaller --size");
     std::vector<double> all(body_.element_count(), zero_ + (n > 0 ? temperature_.mean() : 0));
     for (Eigen::Index i = 0; i < n; ++i)
@@ -94,33 +136,41 @@ class Conduction {
     return all;
   }
 
-  // W, into the part through each face.
+  // W, into the part through each face. Throws DivergedError: they do not sum to nothing.
   [[nodiscard]] std::vector<double> heat() const {
     std::vector<double> sums;
+    double sum = 0, most = 0;
     for (const FaceOfCells& face : faces_) {
-      double sum = 0;
-      for (const FacePoint& point : face.points) {
-        const TrilinearShape shape = shape_at(lattice(point.cell), point.at);
-        const Vec3 normal = point.area_vector.normalized();
-        double here = 0, flow = 0;
-        for (std::size_t a = 0; a < 8; ++a) {
-          const double value = temperature_[unknown(point.cell, a)];
-          here += shape.value[a] * value;
-          flow += conductivity(point.cell) * shape.gradient[a].dot(normal) * value;
-        }
-        const double area = point.area_vector.norm();
-        if (face.face->kind == HeatFace::Kind::temperature)
-          sum += area * (flow - penalty(point.cell) * (here - face.value));
-        else if (face.face->kind == HeatFace::Kind::convection)
-          sum += area * face.face->value * (face.value - here);
-        else
-          sum += area * face.value;
-      }
-      sums.push_back(sum);
+      const HeatThrough through = heat_through(face);
+      sums.push_back(through.sum);
+      sum += through.sum;
+      most += kImbalance * std::abs(through.sum) + kRounding * through.gauge;
     }
+    if (!(std::abs(sum) <= most))
+      throw DivergedError(
+          fmt::format("{}: heat conduction did not converge: {} W more go in than out; use a smaller --size",
+                      scene_.name, human_number(sum, 4)));
     return sums;
   }
 
+  // K, of the matter: at the faces, where a steady temperature has its extremes, and at the corners of whole cells.
+  [[nodiscard]] std::pair<double, double> range() const {
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    const auto add = [&](double value) {
+      low = std::min(low, zero_ + value);
+      high = std::max(high, zero_ + value);
+    };
+    for (const FaceOfCells& face : faces_)
+      for (const FacePoint& point : face.points)
+        add(temperature_at(point.cell, shape_at(lattice(point.cell), point.at)));
+    for (std::uint32_t c = 0; c < nodes_.cells.size(); ++c)
+      for (std::size_t a = 0; a < 8 && body_.fill[nodes_.cells[c]] >= kWholeFill; ++a)
+        add(temperature_[unknown(c, a)]);
+    return {low, high};
+  }
+
+  // "": none.
+  [[nodiscard]] const std::string& warning() const { return warning_; }
   [[nodiscard]] const std::string& face_name(std::size_t face) const { return faces_[face].face->name; }
 
  private:
@@ -142,6 +192,55 @@ class Conduction {
   // Elements come first among the nodes.
   [[nodiscard]] int unknown(std::uint32_t cell, std::size_t corner) const {
     return static_cast<int>(nodes_.of_cell[cell][node_of_corner(corner)]);
+  }
+
+  // Above zero_.
+  [[nodiscard]] double temperature_at(std::uint32_t cell, const TrilinearShape& shape) const {
+    double here = 0;
+    for (std::size_t a = 0; a < 8; ++a) here += shape.value[a] * temperature_[unknown(cell, a)];
+    return here;
+  }
+
+  [[nodiscard]] HeatThrough heat_through(const FaceOfCells& face) const {
+    HeatThrough through;
+    for (const FacePoint& point : face.points) {
+      const TrilinearShape shape = shape_at(lattice(point.cell), point.at);
+      const double area = point.area_vector.norm(), here = temperature_at(point.cell, shape);
+      if (face.face->kind == HeatFace::Kind::temperature) {
+        double flow = 0;
+        for (std::size_t a = 0; a < 8; ++a)
+          flow += conductivity(point.cell) * shape.gradient[a].dot(point.area_vector) *
+                  temperature_[unknown(point.cell, a)];
+        const double beta = area * penalty(point.cell);
+        through.sum += flow - beta * (here - face.value);
+        through.gauge += beta * (std::abs(here) + std::abs(face.value));
+      } else if (face.face->kind == HeatFace::Kind::convection) {
+        through.sum += area * face.face->value * (face.value - here);
+        through.gauge += area * face.face->value * (std::abs(here) + std::abs(face.value));
+      } else {
+        through.sum += area * face.value;
+      }
+    }
+    return through;
+  }
+
+  // Bonds carry forces only. Parts that touch and are not bonded may mean to be insulated: a warning.
+  void refuse_bonded() {
+    if (body_.parts.size() < 2) return;
+    const Bonds::Parameters& bonds = scene_.get<Bonds>();
+    const std::vector<TouchingGap> named = Bonds::named_gaps(bonds, body_);
+    for_each_touching_point(problem_, named, [&](const TouchingPoint& point) {
+      const std::array pair{std::min(point.part[0], point.part[1]), std::max(point.part[0], point.part[1])};
+      const std::string names =
+          fmt::format("parts \"{}\" and \"{}\"", body_.parts[pair[0]].name, body_.parts[pair[1]].name);
+      if (bonds.bond || std::any_of(named.begin(), named.end(),
+                                    [&](const TouchingGap& each) { return each.parts == pair; }))
+        throw InputError(scene_.name,
+                         names +
+                             " are bonded, and conduction passes no heat from part to part: make them "
+                             "one part, or take temperatures from [thermal] column = \"NAME\"");
+      if (warning_.empty()) warning_ = names + " touch, and parts pass no heat to each other";
+    });
   }
 
   void find_conductivities() {
@@ -271,19 +370,27 @@ class Conduction {
   std::vector<Eigen::Triplet<double>> entries_;
   Eigen::VectorXd right_, temperature_;
   std::vector<FaceOfCells> faces_;
+  std::string warning_;
 };
 
 }  // namespace
 
 void conduct(Body& body, const Scene& scene, Progress& progress) {
   body.element_columns.erase(kTemperatureColumn);
+  Thermal::refuse_unfit(scene.get<Thermal>(), body, models_of_parts(scene, body),
+                        materials_of_parts(scene, body));
   Conduction conduction(body, scene);
-  const std::vector<double> temperature = conduction.solve();
+  if (!conduction.warning().empty()) progress.warn(scene.name + ": " + conduction.warning());
+  const std::vector<double> temperature = conduction.solve(progress);
   const std::vector<double> heat = conduction.heat();
-  constexpr double kIce = 273.15;
-  const auto [low, high] = std::minmax_element(temperature.begin(), temperature.end());
+  const auto [low, high] = conduction.range();
+  if (low < -1e-3 * (high - low))  // what a face at 0 K may be off by
+    throw InputError(scene.name,
+                     fmt::format("conduction gives {} degC, below absolute zero: less heat can be drawn than "
+                                 "that; check the signs and sizes of power, flux and coefficient",
+                                 human_number(low - kIce, 5)));
   progress.say(
-      fmt::format("temperature {} to {} degC", human_number(*low - kIce, 4), human_number(*high - kIce, 4)));
+      fmt::format("temperature {} to {} degC", human_number(low - kIce, 4), human_number(high - kIce, 4)));
   for (std::size_t f = 0; f < heat.size(); ++f)
     progress.say(fmt::format("heat through \"{}\": {} W", conduction.face_name(f), human_number(heat[f], 4)));
   body.element_columns[kTemperatureColumn] = {1, temperature};

@@ -9,8 +9,9 @@
 namespace flexel::simulate {
 
 // Writes the elements' column "temperature" [K], and says its range and the heat through each face. Throws InputError: a
-// material without conductivity, a face under which no matter lies, matter whose temperature nothing gives;
-// DivergedError.
+// material without conductivity, a model that does not conduct, bonded parts, a face under which no matter lies, matter
+// whose temperature nothing gives, a temperature below absolute zero; DivergedError: not converged, or heats that do
+// not sum to nothing.
 void conduct(Body& body, const Scene& scene, Progress& progress);
 
 }  // namespace flexel::simulate

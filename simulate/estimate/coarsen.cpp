@@ -20,6 +20,7 @@
 #include "simulate/estimate/coarse_grid.h"
 #include "simulate/estimate/coarse_moments.h"
 #include "simulate/matter/stress.h"
+#include "simulate/thermal/thermal_settings.h"
 
 namespace flexel::simulate {
 namespace {
@@ -260,7 +261,8 @@ void PartCoarsening::append_moments(Body& coarse) const {
 void refuse(const Body& body) {
   for (const Columns* columns : {&body.cell_columns, &body.element_columns})
     for (const auto& [name, column] : *columns)
-      if (!is_stress_column(name) && name != "velocity" && name != kQuadraticColumn)
+      if (!is_stress_column(name) && name != "velocity" && name != kQuadraticColumn &&
+          name != kTemperatureColumn)
         throw InputError(fmt::format("the body remembers an earlier run (\"{}\")", name));
   if (body.notes.contains(kFusedNote)) throw InputError("an earlier run fused points of the body");
   for (const Part& part : body.parts) {

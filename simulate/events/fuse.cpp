@@ -271,10 +271,14 @@ std::string FusedPoints::why() const {
 }
 
 Vec3 FusedPoints::gap(const FusedPoint& point, const State& state) const {
-  Vec3 sum = Vec3::Zero();
-  for (std::size_t i = 0; i < point.elements.size(); ++i)
-    sum += point.weights[i] * (body_->rest[point.elements[i]] + state.displacement[point.elements[i]]);
-  return sum;
+  // The weights' sum is 0: from one of the elements, so that rounding is that of the distances between them.
+  Vec3 rest = Vec3::Zero(), moved = Vec3::Zero();
+  for (std::size_t i = 1; i < point.elements.size(); ++i) {
+    const std::uint32_t own = point.elements[i], first = point.elements[0];
+    rest += point.weights[i] * (body_->rest[own] - body_->rest[first]);
+    moved += point.weights[i] * (state.displacement[own] - state.displacement[first]);
+  }
+  return rest + moved;
 }
 
 double FusedPoints::energy(const State& state) {

@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "simulate/equilibrium/equilibrium.h"
 #include "simulate/equilibrium/newton.h"
+#include "simulate/events/fuse.h"
 #include "simulate/linear/free_motions.h"
 #include "simulate/linear/multigrid.h"
 #include "simulate/linear/vector_products.h"
@@ -111,7 +112,9 @@ void CellVibration::prepare(const Scene& scene, const SimulateOptions& options, 
   report_materials(problem_, progress);
   std::vector<ActiveEffect> effects = active_effects(scene.effects, problem_);
   refuse_what_modes_lack(scene, effects);
-  prestressed_ = drives(effects) || RestShapes(body_).any();
+  std::vector<FusedPoint> fused = fused_points(body_);
+  prestressed_ = drives(effects) || RestShapes(body_).any() || !fused.empty();
+  if (!fused.empty()) effects.push_back(activate(FusedPoints(body_, std::move(fused))));
   if (options.explain) report_effects(effects, "natural vibrations of the parts' models", true, progress);
   report_strays(fragments_, result, progress);
   mechanics_ = std::make_unique<Mechanics>(problem_, std::move(effects));

@@ -67,7 +67,9 @@ void judge(const QuadraticSystem& system, const QuadraticSolution& solution, dou
   else if (!*solution.stable)
     progress.warn(
         "this equilibrium is not stable: the part buckles under less than this load, somewhere at least, and "
-        "what is told is as if it did not; model \"cells\" follows buckling");
+        "what is told is as if it did not; model \"cells\" follows buckling by loads, and with a small load "
+        "to the "
+        "side that by heat");
 }
 
 ProbeResult measure_probe(const Probe& probe, const ProbePoints& placed, const QuadraticSystem& system,
@@ -139,7 +141,7 @@ void refuse_what_quadratic_lacks(const Scene& scene, const Body& body,
   for (const Columns* columns : {&body.cell_columns, &body.element_columns})
     for (const auto& [name, column] : *columns)
       if (!is_stress_column(name) && name != "velocity" && name != kQuadraticColumn &&
-          !is_temperature_column(scene.get<Thermal>(), name))
+          name != kTemperatureColumn && !is_temperature_column(scene.get<Thermal>(), name))
         throw InputError(scene.name,
                          fmt::format("{}it does not know what an earlier run left in the body (\"{}\"); use "
                                      "model \"cells\"",

@@ -18,7 +18,7 @@ namespace {
 
 constexpr const char* kBlank = " \t\r,";
 
-std::vector<std::string> words_of(const std::string& line) {
+std::vector<std::string> words_in(const std::string& line) {
   std::vector<std::string> words;
   for (std::size_t begin = line.find_first_not_of(kBlank); begin != std::string::npos;) {
     const std::size_t end = line.find_first_of(kBlank, begin);
@@ -40,7 +40,7 @@ std::optional<double> number_of(const std::string& word) {
 }  // namespace
 
 std::optional<PoseLine> parse_pose_line(const std::string& line, const std::string& place) {
-  std::vector<std::string> words = words_of(line);
+  std::vector<std::string> words = words_in(line);
   if (words.empty() || words.front().front() == '#') return std::nullopt;
   PoseLine pose;
   if (words.size() == 1 && words.front() == "end") {

@@ -154,12 +154,12 @@ void Thermal::refuse_unfit(const Parameters& parameters, const Body& body, const
   for (std::size_t p = 0; p < models.size(); ++p) {
     const std::string& part = body.parts[p].name;
     if (models[p] != Model::cells && models[p] != Model::quadratic)
-      throw InputError(
-          origin_of(parameters),
-          fmt::format("part \"{}\": free strain is for models \"quadratic\" and \"cells\", and it "
-                      "has model \"{}\"",
-                      part, models[p] == Model::springs ? "springs" : "paper"));
-    if (models[p] == Model::cells && materials[p].law != LawName::neo_hooke)
+      throw InputError(origin_of(parameters),
+                       fmt::format("part \"{}\": {} is for models \"quadratic\" and \"cells\", and it "
+                                   "has model \"{}\"",
+                                   part, parameters.expands() ? "free strain" : "conduction",
+                                   models[p] == Model::springs ? "springs" : "paper"));
+    if (parameters.expands() && models[p] == Model::cells && materials[p].law != LawName::neo_hooke)
       throw InputError(origin_of(parameters),
                        fmt::format("part \"{}\": free strain of law \"{}\" is for model \"quadratic\"; write "
                                    "model = \"quadratic\"",

@@ -59,9 +59,16 @@ ThermalFigures library_thermal_figures(const std::string& material) {
 }
 
 ThermalFigures thermal_figures(const ThermalSettings& settings, const Material& material) {
+  ThermalFigures found = library_thermal_figures(material.name);
   for (const auto& [name, figures] : settings.materials)
-    if (same_material_name(name, material.name)) return figures;
-  return library_thermal_figures(material.name);
+    if (same_material_name(name, material.name)) {
+      found = figures;
+      break;
+    }
+  // as the modulus (simulate/input/infill.h); free strain does not depend on how dense the matter is
+  if (found.conductivity && material.infill < 1)
+    *found.conductivity *= material.walls + (1 - material.walls) * material.infill * material.infill;
+  return found;
 }
 
 bool is_temperature_column(const ThermalSettings& settings, const std::string& column) {

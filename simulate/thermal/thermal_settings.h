@@ -63,7 +63,7 @@ constexpr const char* kTemperatureColumn = "temperature";
 
 // Of the library, at room temperature; nothing in what is not known.
 [[nodiscard]] ThermalFigures library_thermal_figures(const std::string& material);
-// The scene's own go before the library.
+// The scene's own go before the library; the conductivity is what an infill leaves of it.
 [[nodiscard]] ThermalFigures thermal_figures(const ThermalSettings& settings, const Material& material);
 
 // The indices of the parts that an entry with that `part` is for. Throws InputError(origin, ...): there is none.

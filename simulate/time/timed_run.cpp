@@ -15,6 +15,7 @@
 #include "base/program/termination.h"
 #include "base/stop.h"
 #include "formats/lattice/body_file.h"
+#include "formats/lattice/fused_points.h"
 #include "simulate/effects/contact.h"
 #include "simulate/live/live_link.h"
 #include "simulate/models/damping_factors.h"
@@ -243,7 +244,10 @@ double TimedRun::now() const {
 std::string TimedRun::save(const std::optional<State>& state) {
   if (history_) attempt("history", [&] { write_text(history_->ledger().csv(), options_.history, true); });
   if (!state) return "";
-  if (segment_) segment_->store(*state);  // else an event failed, and the body is what it was before that
+  if (segment_)
+    segment_->store(*state);
+  else  // an event failed, and the body is what it was before that
+    set_fused_points(body_, start_.fused);
   if (options_.failed_output.empty() || !attempt("state", [&] { write_body(body_, options_.failed_output); }))
     return "";
   return fmt::format("; the state at {:.6g} s is in {}", *state->time, options_.failed_output);

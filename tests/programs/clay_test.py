@@ -271,6 +271,62 @@ def test_many_acts_at_once_are_refused_not_kept():
         expect(hand.settled()["said"] == "", "and it comes to rest")
 
 
+def test_a_page_that_comes_back_keeps_the_tool():
+    bracket()
+    with clay("bracket.step", "--size", "10 mm") as (url, _):
+        old = Hand(url, 16 * "a")
+        old.act("hold bracket/1")
+        again, other = Hand(url, 16 * "a"), Hand(url, 16 * "b")
+        old.leave()  # its old connection ends after the new one has come
+        end = time.monotonic() + 4
+        while time.monotonic() < end:
+            expect(other.post("stay")[0] == 409, "the tool stays with the page that came back")
+            time.sleep(0.05)
+        expect(again.post("stay")[0] == 200, "which goes on")
+        again.leave()
+        end = time.monotonic() + 8  # before the lease ends
+        while other.post("stay")[0] != 200:
+            expect(time.monotonic() < end, "its last connection frees the tool")
+            time.sleep(0.05)
+
+
+def test_what_is_saved_right_after_an_act_has_it():
+    bracket()
+    with clay("bracket.step", "--size", "10 mm") as (url, _):
+        for _ in range(40):
+            for act, there in (("hold bracket/1", True), ("undo", False)):
+                expect(post(url, f"client {16 * 'a'}\n{act}")[0] == 200, act)
+                expect((b"[[fix]]" in saved(url, "scene.toml")) == there, f"{act} is in what is saved")
+
+
+LOAD = 'material = "PLA"\n{}[[fix]]\nwhere = "bracket/1"\n[[load]]\nwhere = "bracket/2"\nforce = ["0 N", "0 N", "-1 N"]\n{}'
+
+
+def test_scenes_that_hands_cannot_go_with_are_refused():
+    bracket()
+    for run_keys, tables, said in (
+            ("[run]\nmodes = 3\n", "", "modes"), ("[run]\nbuckling = 2\n", "", "buckling"), ("[run]\nrenormalise = true\n", "", "renormalise"),
+            ("", '[thermal]\nchange = "80 K"\n', "[thermal]"), ("", '[shrinkage]\nlayer = "0.2 mm"\nalong = "-0.2 %"\nacross = "-0.3 %"\n', "[shrinkage]"),
+            ("", '[[temperature]]\nwhere = "bracket/1"\nvalue = "100 degC"\n', "conduction"), ("run = { tolerance = 1e-8 }\n", "", "[run]")):
+        write("scene.toml", LOAD.format(run_keys, tables))
+        expect_error(run("flexel", "clay", "bracket.step", "--scene", "scene.toml", "--size", "10 mm"), "scene.toml", said)
+    write("scene.toml", 'material = "PLA"\n[thermal]\nchange = "80 K"\n')  # and where nothing is held yet
+    expect_error(run("flexel", "clay", "bracket.step", "--scene", "scene.toml", "--size", "10 mm"), "scene.toml", "[thermal]")
+    write("scene.toml", 'material = "PLA"\nfix = [{ where = "bracket/1" }]\n')
+    expect_error(run("flexel", "clay", "bracket.step", "--scene", "scene.toml", "--size", "10 mm"), "scene.toml", "[[fix]]")
+
+
+def test_a_kept_scene_has_one_run_table():
+    bracket()
+    write("scene.toml", LOAD.format("  \t[run] # mine\n  tolerance = 1e-8\n", ""))
+    with clay("bracket.step", "--scene", "scene.toml", "--size", "10 mm") as (url, _):
+        hand = Hand(url, 16 * "a")
+        expect(not hand.act("grab face bracket/8", "keep")["said"], "the shape is kept")
+        expect(saved(url, "scene-1.toml").count(b"[run]") == 1, "one [run]")
+        saved(url, "rest.vtu")
+    expect_ok(run("flexel-simulate", "scene-1.toml", "rest.vtu", "-o", "one.vtu", "--no-estimate"))
+
+
 def test_arguments():
     bracket()
     write("time.toml", 'material = "PLA"\n[run]\ntime = "1 s"\n[[fix]]\nwhere = "bracket/1"\n[[load]]\nwhere = "bracket/2"\nforce = ["0 N", "0 N", "-1 N"]\n')

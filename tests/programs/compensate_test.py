@@ -4,7 +4,7 @@ import json
 import math
 import pathlib
 
-from harness import ascii_stl, box_triangles, expect, expect_error, expect_ok, main, run
+from harness import ascii_stl, box_triangles, expect, expect_error, expect_ok, expect_only, main, run
 
 SAG = ["--fix", "xmin", "--gravity", "60 g", "--material", "PLA", "--model", "quadratic"]
 
@@ -53,6 +53,49 @@ def test_what_cannot_be_is_one_line():
     done = run("flexel", "compensate", "shelf.stl", "--fix", "xmin", "--move", "xmax: 100 0 0 mm", "--material", "PLA", "--size", "3mm", "-o", "make.stl")
     expect_error(done, "flexel", "fold")  # twice as long from no length at all
     expect(not pathlib.Path("make.stl").exists(), "a part was written")
+
+
+def test_stages_warn():
+    size = (40.0, 10.0, 10.0)
+    pathlib.Path("box.stl").write_bytes(ascii_stl(box_triangles(size)))
+    scene = ["--fix", "xmin", "--push", "xmax: 0 0 -1500 N", "--material", "PLA", "--model", "quadratic", "--size", "2.5mm"]
+    deformed = expect_ok(run("flexel", "deform", "box.stl", *scene, "-o", "bent.stl", "--no-estimate"))
+    expect("warning: " in deformed.err and "matter is strained by" in deformed.err, deformed)
+    done = run("flexel", "compensate", "box.stl", *scene, "-o", "make.stl", "--quiet")
+    told = [line for line in done.err.splitlines() if "matter is strained by" in line]
+    expect(len(told) == 1 and told[0].startswith("flexel: warning: "), done)
+
+
+def test_what_was_healed_is_said_once():
+    pathlib.Path("shelf.stl").write_bytes(ascii_stl(box_triangles((80.0, 10.0, 3.0))[:-1]))  # a triangle is missing
+    done = expect_ok(run("flexel", "compensate", "shelf.stl", *SAG, "--size", "3mm", "-o", "make.stl", "--quiet"))
+    expect(sum("healed" in line for line in done.err.splitlines()) == 1, done)
+
+
+def test_a_worse_part_is_not_written():
+    pathlib.Path("column.stl").write_bytes(ascii_stl(box_triangles((100.0, 4.0, 4.0))))
+    column = ["--fix", "xmin", "--push", "xmax: -14 0.01 0 N", "--material", "PLA", "--size", "2mm"]
+    done = run("flexel", "compensate", "column.stl", *column, "--model", "quadratic", "-o", "make.stl", "--summary", "s.json")
+    expect_error(done, "flexel", "remain", code=3)
+    expect("--model" not in done.err, done)  # it has that
+    expect_only("column.stl")
+
+
+def test_runs_in_time_are_refused():
+    pathlib.Path("shelf.stl").write_bytes(ascii_stl(box_triangles((80.0, 10.0, 3.0))))
+    scene = 'material = "PLA"\n[[fix]]\nwhere = "xmin"\n[gravity]\nacceleration = ["0 m/s2", "0 m/s2", "-9.81 m/s2"]\n'
+    for name, more, word in (("contact", "[contact]\n", "[contact]"), ("rigid", "[parts.shelf]\nrigid = true\n", "rigid parts"),
+                             ("timed", '[run]\ntime = "1 s"\n', "timed run")):
+        pathlib.Path(f"{name}.toml").write_text(scene + more)
+        done = run("flexel", "compensate", "shelf.stl", "--scene", f"{name}.toml", "--size", "3mm", "-o", "make.stl")
+        expect_error(done, "flexel", f"{name}.toml", word, "equilibrium")
+
+
+def test_a_part_on_stdout_is_refused():
+    pathlib.Path("shelf.stl").write_bytes(ascii_stl(box_triangles((80.0, 10.0, 3.0))))
+    done = run("flexel", "compensate", "shelf.stl", *SAG, "--size", "3mm", "-o", "-")
+    expect_error(done, "flexel", "-o -", "make.stl")
+    expect("--format" not in done.err, done)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 import json
 import pathlib
+import shutil
 
 from harness import BIN, box, expect, expect_error, expect_ok, main, run
 
@@ -28,6 +29,13 @@ def test_json_and_a_part_on_stdout():
     expect_error(run("flexel", "deform", "box.stl", *PULL, "--json", "-o", "-", "--format", "stl"), "flexel", "--json", "-o")
 
 
+def test_json_and_another_result_on_stdout():
+    box()
+    for option in ("--summary", "--report", "--body"):
+        expect_error(run("flexel", "deform", "box.stl", *PULL, "--json", "-o", "bent.stl", option, "-"), "flexel", "stdout")
+        expect(not pathlib.Path("bent.stl").exists(), f"{option}: a part was written")
+
+
 def test_other_commands():
     box()
     expect(parsed("info", "box.stl", "--json")["files"][0]["parts"][0]["triangles"] == 12, "a box has 12 triangles")
@@ -45,6 +53,19 @@ def test_doctor():
         expect(there == (BIN / name).exists(), f"{name}: {there}")
     said = expect_ok(run("flexel", "doctor")).out.decode()
     expect("self-test   passed" in said, said)
+
+
+def test_doctor_where_programs_are_missing():
+    pathlib.Path("bin").mkdir()
+    shutil.copy(BIN / "flexel", "bin/flexel")
+    own = ["flexel-voxelize", "flexel-simulate", "flexel-map", "flexel-meshes", "flexel-distances.so", "flexel-serve.so"]
+    for name in own:
+        pathlib.Path("bin", name).symlink_to(BIN / name)
+    said = expect_ok(run("bin/flexel", "doctor")).out.decode()  # a build may leave flexel-cad out
+    expect("missing     flexel-cad" in said and "MISSING" not in said, said)
+    pathlib.Path("bin", own[0]).unlink()
+    done = run("bin/flexel", "doctor")
+    expect(done.code == 2 and f"MISSING     {own[0]}" in done.out.decode() and f"error: {own[0]} is missing" in done.err, done)
 
 
 if __name__ == "__main__":

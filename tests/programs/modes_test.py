@@ -190,6 +190,28 @@ def test_bonded_halves_vibrate_as_the_whole():
         close(halves, whole, within, model)
 
 
+def test_fused_points_hold():
+    """Bars that an earlier run fused over a gap vibrate as one: a single bar of that length is within 3 %."""
+    near = box_triangles((40.0, 8.0, 8.0))
+    write("near.stl", binary_stl(near))
+    write("far.stl", binary_stl([[(x + 40.2, y, z) for x, y, z in t] for t in near]))
+    write("one.stl", binary_stl(box_triangles((80.2, 8.0, 8.0))))
+    write("fuse.toml", 'material = "steel"\n[run]\ntime = "0.1 us"\n[[event]]\nat = "0 s"\ndo = "fuse"\nwithin = "0.5 mm"\n')
+    held = '[[fix]]\nwhere = "xmin"\n'
+    asks = scene("modes = 2", held, model="cells")
+    expect_ok(run("flexel-voxelize", "one.stl", "--size", "2 mm", "-o", "body.vtu"))
+    whole = frequencies(asks)
+    expect_ok(run("flexel-voxelize", "near.stl", "far.stl", "--size", "2 mm", "-o", "gap.vtu"))
+    expect_ok(run("flexel-simulate", "fuse.toml", "gap.vtu", "-o", "body.vtu"))
+    close(frequencies(asks), whole, 0.03, "fused bars")
+
+
+def test_study_refuses_modes():
+    write("scene.toml", scene("modes = 3", '[[fix]]\nwhere = "xmin"\n'))
+    write("bar.stl", binary_stl(box_triangles((40.0, 8.0, 8.0))))
+    expect_error(run("flexel", "study", "bar.stl", "--scene", "scene.toml", "-o", "s"), "flexel study", "[run] modes is for flexel-simulate")
+
+
 def test_stops_in_time():
     write("cube.stl", binary_stl(box_triangles((100.0, 100.0, 100.0))))
     voxels("cube.stl", "4 mm")

@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import pathlib
+import re
 
 from harness import SOURCE, Skip, ascii_stl, box_triangles, expect, expect_error, expect_ok, main, run
 
@@ -80,6 +81,56 @@ def test_wrong_heat_is_one_line():
     refused('[[heat]]\nwhere = "xmin"\npower = "1 W"', "temperature")
     refused('[[temperature]]\nwhere = "xmin"\nvalue = "20 degC"', "conductivity", material="PLA")
     refused('[shrinkage]\nlayer = "0 mm"\nalong = "0 %"\nacross = "-1 %"', "above 0")
+
+
+def between(text="", size="5mm", triangles=None, low=20, high=120, ends=("xmin", "xmax"), model="quadratic"):
+    """Conduction between two ends of a part of material m, 50 W/(m K): what ran."""
+    pathlib.Path("part.stl").write_bytes(triangles or ascii_stl(box_triangles()))
+    expect_ok(run("flexel-voxelize", "part.stl", "--size", size, "--moments", "--align", "none", "-o", "rest.vtu", "--force"))
+    material = '[materials.m]\nyoung = "200 GPa"\npoisson = 0.3\ndensity = "7800 kg/m3"\nconductivity = "50 W/(m K)"\n'
+    faces = "".join(f'[[temperature]]\nwhere = "{end}"\nvalue = "{value} degC"\n' for end, value in zip(ends, (high, low)))
+    pathlib.Path("s.toml").write_text(f'material = "m"\nmodel = "{model}"\n{text}{material}{faces}{HELD}')
+    return run("flexel-simulate", "s.toml", "rest.vtu", "-o", "bent.vtu", "--no-estimate", "--force")
+
+
+def heat_of(done):
+    return float(re.search(r'heat through "xmin": (-?[\d.,]+) W', expect_ok(done).err).group(1).replace(",", ""))
+
+
+def test_bonded_parts_do_not_conduct():
+    halves = [[[(x + shift, y, z) for x, y, z in t] for t in box_triangles((20.0, 10.0, 10.0))] for shift in (0.0, 20.0)]
+    part = ascii_stl(halves[0], "left") + ascii_stl(halves[1], "right")
+    expect_error(between(triangles=part), "flexel-simulate", "left", "right", "bonded", "no heat")
+    said = between("bond = false\n", triangles=part).err
+    expect(said.count("touch, and parts pass no heat to each other") == 1, said)
+    apart = ascii_stl(halves[0], "left") + ascii_stl([[(x + 5, y, z) for x, y, z in t] for t in halves[1]], "right")
+    expect("touch" not in between(triangles=apart).err, "parts that are apart do not touch")
+
+
+def test_an_infill_conducts_less():
+    solid = heat_of(between())
+    near(solid, 50 * 1e-4 * 100 / 0.04, 1e-3)
+    near(heat_of(between('infill = "50 %"\n')), 0.25 * solid, 1e-3)
+    share = 1e-3 * 1800e-6 / 4e-6  # shell times area over volume
+    walls = share - share * share / 4
+    near(heat_of(between('infill = "50 %"\nshell = "1 mm"\n')), (walls + (1 - walls) * 0.25) * solid, 1e-3)
+
+
+def test_below_absolute_zero():
+    refused('[[heat]]\nwhere = "xmin"\npower = "-50 W"\n[[convection]]\nwhere = "xmax"\ncoefficient = "10 W/(m2 K)"\n'
+            'ambient = "20 degC"', "below absolute zero", "degC")
+
+
+def test_the_range_is_of_the_matter():
+    said = expect_ok(between(size="7mm")).err  # the lattice stands out of the part
+    low, high = (float(each) for each in re.search(r"temperature (-?[\d.]+) to (-?[\d.]+) degC", said).groups())
+    expect(abs(low - 20) < 0.1 and abs(high - 120) < 0.1, f"{low} to {high}, not 20 to 120")
+
+
+def test_conduction_has_its_models():
+    done = between(model="springs")
+    expect_error(done, "flexel-simulate", "conduction is for models")
+    expect("heat through" not in done.err, f"solved before it was refused: {done}")
 
 
 def test_bars_and_a_column():

@@ -48,7 +48,7 @@ Problem problem_of_paper(const Body& body, Rigidity rigidity = Rigidity::none) {
 }
 
 // As `text` of a scene has it, of gum.
-Scene scene_of(const std::string& text) {
+Scene yielding_scene(const std::string& text) {
   return parse_scene(
       "material = \"gum\"\n[materials.gum]\nyoung = \"1 MPa\"\npoisson = 0.25\ndensity = \"1000 kg/m3\"\n" +
           text,
@@ -90,7 +90,7 @@ TEST(ConnectionYield, ATornBarIsTwoPiecesInTheFileToo) {
   for (const Vec3& x : body.rest) velocity.push_back(Vec3(x.x() < 4 * kWidth ? -4 : 4, 0.5, 0));
   set_velocity(body, velocity);
   const std::string torn = "[fracture]\nelongation = 0.05\n[run]\ntime = \"4 ms\"\nstep = \"1 us\"\n";
-  const TimedCase made = run_timed(body, scene_of(torn));
+  const TimedCase made = run_timed(body, yielding_scene(torn));
   expect_books_close(made.result);
   expect_momenta_kept(made.history, 1e-9);
   EXPECT_GT(made.history.column("fracture dissipated").back(), 0);
@@ -106,7 +106,7 @@ TEST(ConnectionYield, ATornBarIsTwoPiecesInTheFileToo) {
   EXPECT_EQ(across(made.body), 0u);
   const std::string path = ::testing::TempDir() + "torn_paper.vtu";
   write_body(made.body, path);
-  const TimedCase later = run_timed(read_body(path), scene_of("[run]\ntime = \"1 ms\"\n"));
+  const TimedCase later = run_timed(read_body(path), yielding_scene("[run]\ntime = \"1 ms\"\n"));
   EXPECT_EQ(across(later.body), 0u);
   const double gap = made.body.position.back().x() - made.body.position.front().x();
   EXPECT_NEAR(later.body.position.back().x() - later.body.position.front().x() - gap, 8e-3, 3e-3);
@@ -124,7 +124,7 @@ TEST(ConnectionYield, APulledBarFlowsAtItsYieldStress) {
         "[[load]]\nwhere = \"xmin\"\nforce = [\"-13.5 N\", 0, 0]\ntime = [\"0 s\", \"0.3 s\"]\nfactor = [0, "
         "1]\n"
         "[run]\ntime = \"0.35 s\"\n";
-    const TimedCase made = run_timed(centre_body(row_of({14, 3, 3})), scene_of(scene));
+    const TimedCase made = run_timed(centre_body(row_of({14, 3, 3})), yielding_scene(scene));
     EXPECT_LT(book(made.result, "worst_residual"), 5e-3 * book(made.result, "largest_term")) << hooke;
     const std::vector<double>& strain = made.body.element_columns.at("plastic_strain").values;
     double sum = 0, count = 0, ahead = 0, behind = 0;  // of the middle, and of the layers around it
@@ -180,7 +180,7 @@ TEST(ConnectionYield, InternalFrictionTakesEnergyAndKeepsMomentum) {
   for (const Vec3& x : body.rest) velocity.push_back(Vec3(1, 2, 0) + Vec3(0, 0, 30 * (x.x() - 0.02)));
   set_velocity(body, velocity);
   const TimedCase made =
-      run_timed(body, scene_of("[internal_friction]\ncoefficient = 0.3\n[run]\ntime = \"20 ms\"\n"));
+      run_timed(body, yielding_scene("[internal_friction]\ncoefficient = 0.3\n[run]\ntime = \"20 ms\"\n"));
   expect_books_close(made.result);
   for (const char* axis : {"momentum x", "momentum y", "momentum z"})
     for (const double value : made.history.column(axis))
@@ -191,12 +191,13 @@ TEST(ConnectionYield, InternalFrictionTakesEnergyAndKeepsMomentum) {
 
 TEST(ConnectionYield, InternalFrictionIsRefusedByNameElsewhere) {
   const std::string friction = "[internal_friction]\ncoefficient = 0.3\n[run]\ntime = \"1 ms\"\n";
-  EXPECT_THAT(refusal(testing::box_body({}), scene_of(friction)),
+  EXPECT_THAT(refusal(testing::box_body({}), yielding_scene(friction)),
               HasSubstr("connections of model \"paper\""));
-  EXPECT_THAT(refusal(centre_body(row_of({2, 2, 2})), scene_of(friction + "method = \"implicit\"\n")),
+  EXPECT_THAT(refusal(centre_body(row_of({2, 2, 2})), yielding_scene(friction + "method = \"implicit\"\n")),
               HasSubstr("internal friction"));
-  EXPECT_THAT(refusal(centre_body(row_of({2, 2, 2})), scene_of("[internal_friction]\ncoefficient = 0.3\n")),
-              HasSubstr("timed runs only"));
+  EXPECT_THAT(
+      refusal(centre_body(row_of({2, 2, 2})), yielding_scene("[internal_friction]\ncoefficient = 0.3\n")),
+      HasSubstr("timed runs only"));
 }
 
 // Two blocks, elements kWidth + 1 mm apart: fused from element to element, free of force at that moment, and still so
@@ -211,8 +212,8 @@ TEST(ConnectionYield, FusedBlocksAreOneInLaterRunsToo) {
   write_body(centre_body(options), path);
   set_velocity(body, std::vector<Vec3>(body.element_count(), Vec3(0.02, 0, 0)));
   const auto scene = [&](const char* within) {
-    return scene_of("[run]\ntime = \"50 ms\"\n[[event]]\nat = \"0 s\"\ndo = \"add\"\nbody = \"" + path +
-                    "\"\n[[event]]\nat = \"0 s\"\ndo = \"fuse\"\nwithin = \"" + within + "\"\n");
+    return yielding_scene("[run]\ntime = \"50 ms\"\n[[event]]\nat = \"0 s\"\ndo = \"add\"\nbody = \"" + path +
+                          "\"\n[[event]]\nat = \"0 s\"\ndo = \"fuse\"\nwithin = \"" + within + "\"\n");
   };
   EXPECT_THAT(refusal(body, scene("10.9 mm")), HasSubstr("from element to element"));
   const TimedCase made = run_timed(body, scene("15 mm"));
@@ -229,7 +230,7 @@ TEST(ConnectionYield, FusedBlocksAreOneInLaterRunsToo) {
   later.position = later.rest;
   const std::string pull =
       "[[fix]]\nwhere = \"left/xmin\"\n[[load]]\nwhere = \"right/xmax\"\nforce = [\"0.1 N\", 0, 0]\n";
-  (void)testing::simulate_quietly(later, scene_of(pull));
+  (void)testing::simulate_quietly(later, yielding_scene(pull));
   EXPECT_GT(later.position[last].x() - later.rest[last].x(), 0);
   EXPECT_LT(later.position[last].x() - later.rest[last].x(), 0.1 * kWidth);
 }

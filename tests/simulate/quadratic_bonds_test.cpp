@@ -56,7 +56,7 @@ std::string held_and_pulled(const Vec3& force) {
   return "[[fix]]\nwhere = \"near/x0\"\n[[load]]\nwhere = \"far/x1\"\nforce = " + words(force, "N") + "\n";
 }
 
-SimulateResult run(Body& body, const std::string& scene) {
+SimulateResult run_bonded(Body& body, const std::string& scene) {
   Progress progress("test", Progress::Mode::quiet);
   SimulateOptions options;
   options.estimate = false;
@@ -64,7 +64,7 @@ SimulateResult run(Body& body, const std::string& scene) {
 }
 
 Vec3 tip(Body body, const std::string& scene) {
-  return run(body, scene).probes[0].displacement;
+  return run_bonded(body, scene).probes[0].displacement;
 }
 
 // An even stress passes, through lattices that match, that do not, and that are turned against one another.
@@ -74,7 +74,7 @@ TEST(QuadraticBonds, PatchTest) {
     for (const double stiffer : {1., 100.}) {
       Body body = cut_bar(near, far);
       const std::string scene = materials(stiffer, 0) + held_and_pulled({force, 0, 0});
-      const SimulateResult result = run(body, scene);
+      const SimulateResult result = run_bonded(body, scene);
       const double exact = force / area / 1e6 * 0.02 * (1 + 1 / stiffer);
       EXPECT_NEAR(result.probes[0].displacement.x() / exact, 1, 1e-5) << near << far << stiffer;
       EXPECT_LT(result.imbalance.norm(), 1e-6 * force);
@@ -91,15 +91,15 @@ TEST(QuadraticBonds, ACutBarBendsAsTheWholeBar) {
     const std::string scene = materials() + held_and_pulled(axes * Vec3(0, 0, 1e-3));
     Body whole = testing::box_body({.cells = {4, 2, 2}, .spacing = Vec3::Constant(0.01), .axes = axes});
     const SimulateResult one =
-        run(whole,
-            "model = \"quadratic\"\nmaterial = \"gum\"\n[materials.gum]\nyoung = \"1 MPa\"\n"
-            "poisson = 0.3\ndensity = \"1000 kg/m3\"\n[[probe]]\nname = \"end\"\nwhere = \"x1\"\n"
-            "[[fix]]\nwhere = \"x0\"\n[[load]]\nwhere = \"x1\"\nforce = " +
-                words(axes * Vec3(0, 0, 1e-3), "N") + "\n");
+        run_bonded(whole,
+                   "model = \"quadratic\"\nmaterial = \"gum\"\n[materials.gum]\nyoung = \"1 MPa\"\n"
+                   "poisson = 0.3\ndensity = \"1000 kg/m3\"\n[[probe]]\nname = \"end\"\nwhere = \"x1\"\n"
+                   "[[fix]]\nwhere = \"x0\"\n[[load]]\nwhere = \"x1\"\nforce = " +
+                       words(axes * Vec3(0, 0, 1e-3), "N") + "\n");
     const Vec3 exact = one.probes[0].displacement;
     for (const auto& [far, off] : {std::pair{2, 1e-3}, {3, 0.01}}) {
       Body cut = cut_bar(2, far, axes);
-      const SimulateResult result = run(cut, scene);
+      const SimulateResult result = run_bonded(cut, scene);
       EXPECT_LT((result.probes[0].displacement - exact).norm(), off * exact.norm()) << degrees << far;
       EXPECT_LT(result.cg_iterations, 40) << degrees << far;  // hundreds where the blocks lack nodes across
     }
@@ -109,7 +109,7 @@ TEST(QuadraticBonds, ACutBarBendsAsTheWholeBar) {
 // A far half that is led around takes the near one along without strain, also where its cells turn by more than a radian.
 TEST(QuadraticBonds, ARigidMotionStrainsNothing) {
   Body body = cut_bar(1, 2);
-  const SimulateResult result = run(
+  const SimulateResult result = run_bonded(
       body, materials(10) +
                 "[[move]]\nwhere = \"far/x1\"\nrotation = { axis = [1, 2, 2], through = [\"10 mm\", 0, 0], "
                 "angle = \"100 deg\" }\n");
@@ -151,7 +151,7 @@ TEST(QuadraticBonds, NamedBondsReachOverAGap) {
                     bond = "[[bond]]\nparts = [\"near\", \"far\"]\n";
   const auto refusal = [](Body body, const std::string& text) -> std::string {
     try {
-      (void)run(body, text);
+      (void)run_bonded(body, text);
     } catch (const InputError& error) {
       return error.what();
     }

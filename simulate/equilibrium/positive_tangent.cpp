@@ -1,0 +1,34 @@
+// A load that is as symmetric as the part never excites the shape that it buckles into; irregular forces do.
+#include "simulate/equilibrium/positive_tangent.h"
+
+#include <random>
+
+#include "base/stop.h"
+#include "simulate/equilibrium/newton.h"
+#include "simulate/linear/conjugate_gradients.h"
+#include "simulate/linear/multigrid.h"
+
+namespace flexel::simulate {
+
+std::optional<bool> has_positive_tangent(Mechanics& mechanics, const State& state) {
+  constexpr double kTolerance = 1e-6;
+  constexpr int kIterations = 1000;
+  mechanics.assemble(state);
+  mechanics.eliminate_prescribed();
+  std::mt19937 random(1);
+  std::vector<Vec3> irregular(state.displacement.size()), answer;
+  for (std::size_t e = 0; e < irregular.size(); ++e)
+    for (int axis = 0; axis < 3; ++axis) {
+      const double value = static_cast<double>(random()) / 4294967295.0 - 0.5;
+      irregular[e][axis] = mechanics.constraints().mask[e] >> axis & 1 ? 0 : value;
+    }
+  const auto preconditioner =
+      aggregation_multigrid(mechanics.tangent(), node_geometry(mechanics.body(), state));
+  const LinearResult result = conjugate_gradients(mechanics.tangent(), irregular, answer, *preconditioner,
+                                                  kTolerance, kIterations, [](int, double) { check_stop(); });
+  if (result.indefinite) return false;
+  if (result.converged) return true;
+  return std::nullopt;
+}
+
+}  // namespace flexel::simulate

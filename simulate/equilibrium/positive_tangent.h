@@ -1,0 +1,13 @@
+// Whether an equilibrium is stable.
+#pragma once
+#include <optional>
+
+#include "simulate/equilibrium/mechanics.h"
+
+namespace flexel::simulate {
+
+// Whether the tangent at `state` is positive: conjugate gradients on irregular forces (N) meet no direction of negative
+// curvature. Nothing: they did not converge. Assembles the tangent anew.
+[[nodiscard]] std::optional<bool> has_positive_tangent(Mechanics& mechanics, const State& state);
+
+}  // namespace flexel::simulate
