@@ -232,11 +232,10 @@ class Compensation {
   // Made as it is wanted the part would be nearer to its shape.
   void refuse_worse(const Rest& left) const {
     if (left.largest < largest_) return;
-    throw DivergedError(
-        fmt::format("no part was found that becomes this shape: {} remain at {}, and {} of the part as it "
-                    "is; use smaller "
-                    "loads, or a smaller --size{}",
-                    human_length(left.largest), place(left.at), human_length(largest_), other_model()));
+    throw DivergedError(fmt::format(
+        "no part was found that becomes this shape: {} remain at {}, and {} where PART is made as it is; use "
+        "smaller loads, or a smaller --size{}",
+        human_length(left.largest), place(left.at), human_length(largest_), other_model()));
   }
 
   [[nodiscard]] std::string other_model() const {

@@ -6,10 +6,8 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <cmath>
 #include <csignal>
 #include <exception>
-#include <limits>
 #include <mutex>
 #include <optional>
 #include <utility>
@@ -91,8 +89,8 @@ bool on_main_thread() {
 Listener* heard = nullptr;
 
 void restore_element_limit(double limit) {
-  limit_elements(std::isfinite(limit) ? static_cast<std::size_t>(limit)
-                                      : std::numeric_limits<std::size_t>::max());
+  constexpr double kNone = 1e18;  // and above it; a double of more need not fit
+  limit_elements(static_cast<std::size_t>(std::min(limit, kNone)));
 }
 
 // One run within the lock: its listener, and the state that ends with it. A stop that a callback's error asked for ends this

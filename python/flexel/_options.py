@@ -54,8 +54,7 @@ def _of_parts(value) -> List[str]:
 def refuse_limits(options: Mapping) -> None:
     """A limit of memory would be one of the whole process, and stay."""
     if any(name.replace("-", "_").startswith("max_memory") for name in options):
-        raise InputError("max_memory: is for the programs, for in Python it would limit all of the process: run the command, or "
-                         "use max_elements")
+        raise InputError("max_memory: it would limit all of Python, and stay: run the command, or use max_elements")
 
 
 def words(options: Mapping) -> List[str]:

@@ -110,10 +110,11 @@ def test_bonded_parts_do_not_conduct():
 def test_an_infill_conducts_less():
     solid = heat_of(between())
     near(solid, 50 * 1e-4 * 100 / 0.04, 1e-3)
-    near(heat_of(between('infill = "50 %"\n')), 0.25 * solid, 1e-3)
+    struts = (0.5 + 2 * 0.5**1.5) / 3
+    near(heat_of(between('infill = "50 %"\n')), struts * solid, 1e-3)
     share = 1e-3 * 1800e-6 / 4e-6  # shell times area over volume
     walls = share - share * share / 4
-    near(heat_of(between('infill = "50 %"\nshell = "1 mm"\n')), (walls + (1 - walls) * 0.25) * solid, 1e-3)
+    near(heat_of(between('infill = "50 %"\nshell = "1 mm"\n')), (walls + (1 - walls) * struts) * solid, 1e-3)
 
 
 def test_below_absolute_zero():
@@ -125,6 +126,26 @@ def test_the_range_is_of_the_matter():
     said = expect_ok(between(size="7mm")).err  # the lattice stands out of the part
     low, high = (float(each) for each in re.search(r"temperature (-?[\d.]+) to (-?[\d.]+) degC", said).groups())
     expect(abs(low - 20) < 0.1 and abs(high - 120) < 0.1, f"{low} to {high}, not 20 to 120")
+
+
+def test_buckling_by_heat_is_told():
+    """Held at both ends, a bar of 200 x 4 x 4 mm buckles near 110 K (Euler): told beyond it, and not far below."""
+    pathlib.Path("thin.stl").write_bytes(ascii_stl(box_triangles((200.0, 4.0, 4.0))))
+    expect_ok(run("flexel-voxelize", "thin.stl", "--size", "2 mm", "-o", "thin.vtu"))
+    for change, told in (("60 K", False), ("300 K", True)):
+        pathlib.Path("thin.toml").write_text(f'material = "steel"\n[thermal]\nchange = "{change}"\n{HELD}[[fix]]\nwhere = "xmax"\n')
+        said = expect_ok(run("flexel-simulate", "thin.toml", "thin.vtu", "-o", "out.vtu", "--no-estimate")).err
+        expect(("buckles under less heat" in said) == told, f"{change}: {said}")
+
+
+def test_a_failed_run_leaves_no_free_strain():
+    pathlib.Path("bar.stl").write_bytes(ascii_stl(box_triangles()))
+    expect_ok(run("flexel-voxelize", "bar.stl", "--size", "2 mm", "-o", "bar.vtu"))
+    load = '[[load]]\nwhere = "xmax"\nforce = [0, "{} N", 0]\n'
+    plain = 'material = "steel"\n' + HELD
+    pathlib.Path("far.toml").write_text(plain + load.format(5e5) + '[thermal]\nchange = "80 K"\n[run]\nnewton_iterations = 2\n')
+    expect_error(run("flexel-simulate", "far.toml", "bar.vtu", "-o", "far.vtu"), "flexel-simulate", "far.failed.vtu", code=3)
+    expect(b"free_strain" not in pathlib.Path("far.failed.vtu").read_bytes(), "the strain of a heated run stays in its body")
 
 
 def test_conduction_has_its_models():

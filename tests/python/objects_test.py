@@ -1,10 +1,12 @@
 """Views keep what they are of alive and cannot change it; meshes in and out; units; what is wrong is said as the programs say it."""
 
 import gc
+import os
 import pathlib
+import resource
 import warnings
 
-from shared import PULL, box, box_body, check, expect_error, main, module, run
+from shared import PULL, SWING, box, box_body, check, expect_error, main, module, run
 
 
 def test_views_outlive_their_owners():
@@ -134,6 +136,92 @@ def test_warnings():
     check.assertTrue(part.warnings, "a part of 40 km is nothing to warn of?")
     check.assertEqual([str(each.message) for each in caught], part.warnings)
     check.assertTrue(all(each.category is flexel.FlexelWarning for each in caught))
+
+
+def test_the_source_is_not_overwritten():
+    flexel = module()
+    os.mkdir("parts")
+    flexel.Part.from_mesh(*box()).write("parts/box.ply")
+    before = pathlib.Path("parts/box.ply").read_bytes()
+    part = flexel.read("parts/box.ply", unit="m")
+    unrelated = pathlib.Path("box.ply")
+    unrelated.write_bytes(b"of another part")
+    os.chdir("parts")
+    for source in (part, "box.ply"):
+        with check.assertRaises(flexel.InputError) as caught:
+            flexel.deform(source, output="box.ply", size="5 mm", **PULL)
+        check.assertIn("is an input", str(caught.exception))
+    check.assertEqual(pathlib.Path("box.ply").read_bytes(), before)
+    os.chdir("..")
+    result = flexel.deform(part, output="box.ply", size="5 mm", **PULL)
+    check.assertEqual(result.label, "box.ply, deformed")
+    check.assertGreater(len(unrelated.read_bytes()), 100)
+    made = flexel.Part.from_mesh(*box(), name="box.ply")
+    flexel.deform(made, output=["box.ply", "box.html"], size="5 mm", **PULL)
+    check.assertIn("box.ply, deformed", pathlib.Path("box.html").read_text(encoding="utf-8"))
+
+
+def test_limits_end_with_their_call():
+    flexel = module()
+    part = flexel.Part.from_mesh(*box())
+    limit = resource.getrlimit(resource.RLIMIT_DATA)
+    with check.assertRaises(flexel.InputError) as caught:
+        flexel.deform(part, size="2.5 mm", max_elements=10, **PULL)
+    check.assertIn("--max-elements", str(caught.exception))
+    body = flexel.voxelize(part, size="2.5 mm")
+    check.assertEqual(len(body.rest), 17 * 5 * 5)
+    check.assertGreater(flexel.deform(part, size="5 mm", **PULL).largest_displacement, 0)
+    for call in (lambda: flexel.deform(part, max_memory="4GB", **PULL), lambda: flexel.map(body, max_memory="4GB"),
+                 lambda: flexel.simulate(body, max_memory="4GB", **PULL), lambda: flexel.picture(body, max_memory="4GB")):
+        with check.assertRaises(flexel.InputError) as caught:
+            call()
+        check.assertIn("max_memory", str(caught.exception))
+    check.assertEqual(resource.getrlimit(resource.RLIMIT_DATA), limit)
+
+
+def test_modes_by_path_and_as_text():
+    flexel = module()
+    body = box_body(flexel)
+    scene = 'material = "steel"\n[[fix]]\nwhere = "xmin"\n[run]\nmodes = 2\n'
+    pathlib.Path("modes.toml").write_text(scene)
+    by_path, as_text = (flexel.simulate(body, given).summary["shapes"] for given in ("modes.toml", scene))
+    check.assertEqual(by_path, as_text)
+    check.assertEqual(len(by_path["modes"]), 2)
+    for given in ("modes.toml", scene):
+        with check.assertRaises(flexel.InputError) as caught:
+            flexel.simulate(body, given, on_frame=print)
+        check.assertRegex(str(caught.exception), "^[^\n]*frames are of timed runs[^\n]*$")
+
+
+def test_scenes_with_odd_names():
+    flexel = module()
+    body = box_body(flexel)
+    scene = SWING.replace("TIME", "0.1 ms")
+    for name in ("load=5 N.toml", "load=6 N"):
+        pathlib.Path(name).write_text(scene)
+        check.assertTrue(flexel.simulate(body, name).summary)
+    with check.assertRaises(flexel.InputError) as caught:
+        flexel.simulate(body, "none=1.toml")
+    check.assertIn("none=1.toml", str(caught.exception))
+
+
+def test_values_of_the_wrong_type():
+    flexel = module()
+    part = flexel.Part.from_mesh(*box())
+    part.write("box.ply")
+    for error, name, call in (
+            (flexel.InputError, "count", lambda: flexel.voxelize(part, count=-5)),
+            (TypeError, "count", lambda: flexel.voxelize(part, count=2.5)),
+            (TypeError, "count", lambda: flexel.voxelize(part, count=10**30)),
+            (TypeError, "align", lambda: flexel.voxelize(part, size="5 mm", align=None)),
+            (TypeError, "threads", lambda: flexel.voxelize(part, size="5 mm", threads=None)),
+            (flexel.InputError, "threads", lambda: flexel.voxelize(part, size="5 mm", threads=-1)),
+            (TypeError, "unit", lambda: flexel.Part.from_mesh(*box(), unit=None)),
+            (TypeError, "unit", lambda: flexel.read("box.ply", unit=5)),
+            (TypeError, "isa", lambda: flexel.simulate(box_body(flexel), isa=None, **PULL))):
+        with check.assertRaises(error) as caught:
+            call()
+        check.assertRegex(str(caught.exception), f"^{name}: [^\n]+$")
 
 
 def test_meshio_round_trip():

@@ -91,6 +91,46 @@ def test_a_run_within_a_callback():
     check.assertEqual(len(set(found)), 1)
 
 
+def test_an_error_of_a_run_within_a_run():
+    """Caught, it leaves the outer run alone."""
+    flexel = module()
+    body, caught = box_body(flexel), []
+
+    def inner(frame):
+        try:
+            flexel.simulate(body, SWING.replace("TIME", "0.1 ms"), on_frame=lambda frame: 1 / 0)
+        except ZeroDivisionError as error:
+            caught.append(error)
+
+    flexel.simulate(body, SWING.replace("TIME", "0.2 ms"), on_frame=inner)
+    check.assertEqual(len(caught), 5)
+
+
+def test_ctrl_c_ends_a_wait():
+    """For the run of another thread, which goes on."""
+    flexel = module()
+    body, begun, enough = box_body(flexel), threading.Event(), threading.Event()
+
+    def occupy(frame):
+        begun.set()
+        enough.wait(60)
+
+    other = threading.Thread(target=lambda: flexel.simulate(body, SWING.replace("TIME", "0.1 ms"), on_frame=occupy))
+    other.start()
+    begun.wait(60)
+    timer = threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT))
+    timer.start()
+    began = time.monotonic()
+    try:
+        with check.assertRaises(KeyboardInterrupt):
+            flexel.simulate(body, estimate=False, **PULL)
+        check.assertLess(time.monotonic() - began, 20)
+    finally:
+        enough.set()
+        other.join()
+    check.assertGreater(flexel.simulate(body, estimate=False, **PULL).largest_displacement, 0)
+
+
 def test_frames_are_of_timed_runs():
     flexel = module()
     with check.assertRaises(flexel.InputError):
