@@ -309,11 +309,11 @@ def test_scenes_that_hands_cannot_go_with_are_refused():
             ("", '[thermal]\nchange = "80 K"\n', "[thermal]"), ("", '[shrinkage]\nlayer = "0.2 mm"\nalong = "-0.2 %"\nacross = "-0.3 %"\n', "[shrinkage]"),
             ("", '[[temperature]]\nwhere = "bracket/1"\nvalue = "100 degC"\n', "conduction"), ("run = { tolerance = 1e-8 }\n", "", "[run]")):
         write("scene.toml", LOAD.format(run_keys, tables))
-        expect_error(run("flexel", "clay", "bracket.step", "--scene", "scene.toml", "--size", "10 mm"), "scene.toml", said)
+        expect_error(run("flexel", "clay", "bracket.step", "--scene", "scene.toml", "--size", "10 mm"), "flexel", "scene.toml", said)
     write("scene.toml", 'material = "PLA"\n[thermal]\nchange = "80 K"\n')  # and where nothing is held yet
-    expect_error(run("flexel", "clay", "bracket.step", "--scene", "scene.toml", "--size", "10 mm"), "scene.toml", "[thermal]")
+    expect_error(run("flexel", "clay", "bracket.step", "--scene", "scene.toml", "--size", "10 mm"), "flexel", "scene.toml", "[thermal]")
     write("scene.toml", 'material = "PLA"\nfix = [{ where = "bracket/1" }]\n')
-    expect_error(run("flexel", "clay", "bracket.step", "--scene", "scene.toml", "--size", "10 mm"), "scene.toml", "[[fix]]")
+    expect_error(run("flexel", "clay", "bracket.step", "--scene", "scene.toml", "--size", "10 mm"), "flexel", "scene.toml", "[[fix]]")
 
 
 def test_a_kept_scene_has_one_run_table():
