@@ -209,7 +209,7 @@ def test_fused_points_hold():
 def test_study_refuses_modes():
     write("scene.toml", scene("modes = 3", '[[fix]]\nwhere = "xmin"\n'))
     write("bar.stl", binary_stl(box_triangles((40.0, 8.0, 8.0))))
-    expect_error(run("flexel", "study", "bar.stl", "--scene", "scene.toml", "-o", "s"), "flexel study", "[run] modes is for flexel-simulate")
+    expect_error(run("flexel", "study", "bar.stl", "--scene", "scene.toml", "-o", "s"), "flexel", "[run] modes is for flexel-simulate")
 
 
 def test_stops_in_time():
