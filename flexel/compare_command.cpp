@@ -107,6 +107,7 @@ void judge_stress(const simulate::SimulateResult& result, const simulate::Scene&
   std::vector<std::string> unknown;
   const auto near = nearest_to_strength(body, materials_of_parts(scene, body), unknown);
   if (!near || !(near->share > 0)) return;
+  if (near->share <= 1 && result.stress->lacks_bending()) return;  // it would be too good
   found.factor = 1 / near->share;
   found.limit = near->limit;
   found.limit_name = near->yields ? "yield" : "strength";

@@ -72,12 +72,25 @@ std::string directed(const Vec3& force) {
                                     : "N");
 }
 
-// The force of a support, or its moment where that is all that it bears.
-std::string borne(const Reaction& reaction) {
-  constexpr double kLever = 1e-6;  // 1/m, force over moment: a lever no part has
-  if (reaction.moment.norm() == 0 || reaction.force.norm() > kLever * reaction.moment.norm())
-    return directed(reaction.force);
-  return human_number(reaction.moment.norm()) + " N m";
+// "0.42 N m about +x"
+std::string turning(const Vec3& moment) {
+  const double size = moment.norm();
+  for (int axis = 0; axis < 3; ++axis)
+    if (std::abs(moment[axis]) > (1 - 1e-4) * size)
+      return fmt::format("{} N m about {}{}", human_number(size), moment[axis] < 0 ? "-" : "+", kAxes[axis]);
+  const auto number = [&](double value) {
+    return std::abs(value) < 1e-3 * moment.cwiseAbs().maxCoeff() ? "0" : human_number(value);
+  };
+  return fmt::format("({}, {}, {}) N m", number(moment.x()), number(moment.y()), number(moment.z()));
+}
+
+// The force of a support; its moment about its own middle where that is more than the force has over `size`, m, of the body.
+std::string borne(const Reaction& reaction, double size) {
+  constexpr double kRounding = 1e-3;
+  const Vec3 moment = reaction.moment_about_middle();
+  const double lever = size * reaction.force.norm();
+  if (!(moment.norm() > lever)) return directed(reaction.force);
+  return turning(moment) + (lever > kRounding * moment.norm() ? " and " + directed(reaction.force) : "");
 }
 
 std::string more(std::size_t all) {
@@ -102,11 +115,13 @@ std::string probes(const SimulateResult& result) {
   return text + more(result.probes.size());
 }
 
-// The worst bar of the displacements.
+// The worst bar of the displacements; where moves alone drive the run, and so give the largest displacement, that of the energy too.
 std::optional<double> worst_share(const SimulateResult& result) {
+  const bool moved = std::any_of(result.reactions.begin(), result.reactions.end(),
+                                 [](const Reaction& each) { return each.is_move; });
   std::optional<double> worst;
   for (const ErrorBar& each : result.error_bars.bars) {
-    if (each.of == ErrorBar::Of::elastic_energy) continue;
+    if (each.of == ErrorBar::Of::elastic_energy && !(moved && result.loads.empty())) continue;
     if (each.of == ErrorBar::Of::probe && std::abs(each.value) < 1e-3 * result.largest_displacement) continue;
     if (const std::optional<double> share = share_of(&each)) worst = std::max(worst.value_or(0), *share);
   }
@@ -121,6 +136,12 @@ std::string reason(const SimulateResult& result) {
   return "";
 }
 
+// "within 3 %", "under 0.01 %"
+std::string within(double share) {
+  const std::string text = human_share(share);
+  return text.starts_with("under") ? text : "within " + text;
+}
+
 std::string how_sure(const SimulateResult& result, const Body& body) {
   if (result.timed) return "not known: runs in time have no error bars; compare with half the size";
   if (result.settled) return "not known: runs with contact have no error bars; compare with half the size";
@@ -133,9 +154,9 @@ std::string how_sure(const SimulateResult& result, const Body& body) {
                                                        : note.substr(why + 8));
   }
   const std::string cells = fmt::format("{} cells beside coarser ones", human_count(body.cell_count()));
-  if (*worst <= 0.05) return fmt::format("well, within {}: {}", human_share(*worst), cells);
-  if (*worst <= 0.2) return fmt::format("fairly, within {}: {}", human_share(*worst), cells);
-  if (*worst <= kGuess) return fmt::format("roughly, within {}{}", human_share(*worst), reason(result));
+  if (*worst <= 0.05) return fmt::format("well, {}: {}", within(*worst), cells);
+  if (*worst <= 0.2) return fmt::format("fairly, {}: {}", within(*worst), cells);
+  if (*worst <= kGuess) return fmt::format("roughly, {}{}", within(*worst), reason(result));
   return fmt::format("hardly, off by up to {}{}", human_share(*worst), reason(result));
 }
 
@@ -181,6 +202,10 @@ std::string strength(const SimulateResult& result, const Body& body, const std::
                        peak_stress(result, result.stress->value), place_in_one_unit(result.stress->at),
                        unsure(result));
   if (!(found->share > 0)) return "nothing is stressed";
+  if (found->share <= 1 && result.stress->lacks_bending())
+    return fmt::format(
+        "not known: walls under two cells thick do not show the stress of their bending ({} without it)",
+        human_pressure(found->stress));
   const std::string layers =
       found->layer_share ? fmt::format(" ({} across printed layers)", factor(*found->layer_share)) : "";
   std::string text =
@@ -196,12 +221,13 @@ std::string strength(const SimulateResult& result, const Body& body, const std::
   return text;
 }
 
-std::string held_by(const SimulateResult& result) {
+std::string held_by(const SimulateResult& result, const Body& body) {
   if (result.reactions.empty()) return "nothing";
+  const double size = bounding_box(body.rest).diagonal();
   std::string text;
   for (std::size_t r = 0; r < std::min(kNamed, result.reactions.size()); ++r)
     text += fmt::format("{}\"{}\" with {}", text.empty() ? "" : ", ", result.reactions[r].name,
-                        borne(result.reactions[r]));
+                        borne(result.reactions[r], size));
   return text + more(result.reactions.size());
 }
 
@@ -230,7 +256,7 @@ std::vector<std::string> answer_lines(const SimulateResult& result, const Body& 
   if (!result.probes.empty()) lines.push_back("probes     " + probes(result));
   lines.push_back("how sure   " + how_sure(result, body));
   lines.push_back("strength   " + strength(result, body, materials));
-  lines.push_back("held by    " + held_by(result));
+  lines.push_back("held by    " + held_by(result, body));
   lines.push_back("next       " + (next.empty() ? usual_next(result, body, size_option) : next));
   return lines;
 }

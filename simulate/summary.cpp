@@ -279,8 +279,10 @@ std::string summary_json(const SimulateResult& result, const Body& body) {
   json["loads"] = loads_json(result.loads);
   json["reactions"] = Json::array();
   for (const Reaction& reaction : result.reactions)
-    json["reactions"].push_back(
-        {{"name", reaction.name}, {"force", vector(reaction.force)}, {"moment", vector(reaction.moment)}});
+    json["reactions"].push_back({{"name", reaction.name},
+                                 {"force", vector(reaction.force)},
+                                 {"moment", vector(reaction.moment)},
+                                 {"middle", vector(reaction.middle)}});
   json["bonds"] = Json::array();
   for (const BondedParts& bond : result.bonds)
     json["bonds"].push_back({{"parts", bond.parts}, {"area", bond.area}});
@@ -299,6 +301,7 @@ std::string summary_json(const SimulateResult& result, const Body& body) {
     json["largest_von_mises_at"] = vector(result.stress->at);
     json["largest_von_mises_part"] = result.stress->part;
     if (!result.stress->beside.empty()) json["largest_von_mises_beside"] = result.stress->beside;
+    if (result.stress->thin_walls > 0) json["largest_von_mises_thin_walls"] = result.stress->thin_walls;
     if (result.stress->yield_share) json["largest_von_mises_yield_share"] = *result.stress->yield_share;
   }
   if (result.modes) json["shapes"] = modes_json(*result.modes);
@@ -323,9 +326,10 @@ std::vector<std::string> summary_lines(const SimulateResult& result) {
                                 bar_of(result, ErrorBar::Of::probe, p), lengths(probe.displacement)));
   }
   if (result.stress) {
-    const std::string share = result.stress->yield_share
-                                  ? fmt::format(", {} of yield", human_share(*result.stress->yield_share))
-                                  : "";
+    std::string share = result.stress->yield_share
+                            ? fmt::format(", {} of yield", human_share(*result.stress->yield_share))
+                            : "";
+    if (result.stress->lacks_bending()) share += ", without the bending of walls under two cells thick";
     lines.push_back(fmt::format("largest von Mises stress {}{} in \"{}\" at {}{}",
                                 human_pressure(result.stress->value), stress_bar_of(result),
                                 result.stress->part, lengths(result.stress->at), share));

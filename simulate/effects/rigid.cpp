@@ -215,7 +215,8 @@ void RigidParts::report(const State&, const std::vector<Vec3>&, SimulateResult& 
     const Vec3& centre = moving.body.centre;
     const Vec3 arm = pose.rotation * (moving.led->path.about.value_or(centre) - centre);
     const Vec3 about = centre + pose.translation + arm;
-    result.reactions.push_back({moving.led->name, moving.force, moving.torque + about.cross(moving.force)});
+    result.reactions.push_back(
+        {moving.led->name, moving.force, moving.torque + about.cross(moving.force), about, true});
   }
 }
 

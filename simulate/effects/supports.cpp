@@ -274,9 +274,14 @@ void Supports::constrain(Constraints& constraints) {
 
 std::vector<Reaction> Supports::reactions(const State& state, const std::vector<Vec3>& unbalanced) const {
   std::vector<Reaction> reaction;
-  for (const Tie& tie : ties_) reaction.push_back({tie.name, Vec3::Zero(), Vec3::Zero()});
+  for (const Tie& tie : ties_)
+    reaction.push_back({tie.name, Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), tie.is_move});
+  std::vector<double> places(ties_.size(), 0);
   const auto add = [&](std::size_t tie, const Vec3& force, std::uint32_t e) {
-    add_at(force, body_->rest[e] + state.displacement[e], reaction[tie].force, reaction[tie].moment);
+    const Vec3 place = body_->rest[e] + state.displacement[e];
+    add_at(force, place, reaction[tie].force, reaction[tie].moment);
+    reaction[tie].middle += place;
+    ++places[tie];
   };
   for (const TiedElements& tied : tied_) {
     const Displacements force = tied.stiffness * violation(tied, state);
@@ -295,6 +300,8 @@ std::vector<Reaction> Supports::reactions(const State& state, const std::vector<
       }
       add(t, held, e);
     }
+  for (std::size_t t = 0; t < ties_.size(); ++t)
+    if (places[t] > 0) reaction[t].middle /= places[t];
   return reaction;
 }
 

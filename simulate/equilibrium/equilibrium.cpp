@@ -166,7 +166,7 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
     check_stop();
     progress_.update(done_, fmt::format("load {:.3g} %, {}", 100 * trial_.share, note));
   });
-  if (result_.newton_iterations == 0) reach_ = outcome_.first_reach / trial_.share;
+  if (reach_ == 0) reach_ = outcome_.first_reach / trial_.share;  // from rest: a near start moves by less
   result_.newton_iterations += outcome_.iterations;
   result_.cg_iterations += outcome_.cg_iterations;
   result_.linear_seconds += outcome_.linear_seconds;

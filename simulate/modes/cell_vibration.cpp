@@ -7,8 +7,10 @@
 
 #include "base/disjoint_sets.h"
 #include "base/error.h"
+#include "base/human.h"
 #include "simulate/equilibrium/equilibrium.h"
 #include "simulate/equilibrium/newton.h"
+#include "simulate/estimate/coarsen.h"
 #include "simulate/events/fuse.h"
 #include "simulate/linear/free_motions.h"
 #include "simulate/linear/multigrid.h"
@@ -56,6 +58,17 @@ class HeldSoftly final : public LinearOperator {
   const LinearOperator& matrix_;
   const std::vector<double>& more_;
 };
+
+// Frequencies have no error bars, which would tell.
+void warn_of_thin_walls(const Body& body, const std::string& scene, Progress& progress) {
+  constexpr double kMuch = 0.2;
+  if (const double thin = share_of_thin_walls(body, 2); thin > kMuch)
+    progress.warn(
+        fmt::format("{}: {} of the matter lies in walls under 2 cells, which these cells bend too hard or "
+                    "too easily: frequencies may be far off; "
+                    "use a smaller spacing, or model = \"quadratic\" on a body of flexel-voxelize --moments",
+                    scene, human_share(thin)));
+}
 
 class CellVibration final : public VibratingBody {
  public:
@@ -117,6 +130,7 @@ void CellVibration::prepare(const Scene& scene, const SimulateOptions& options, 
   if (!fused.empty()) effects.push_back(activate(FusedPoints(body_, std::move(fused))));
   if (options.explain) report_effects(effects, "natural vibrations of the parts' models", true, progress);
   report_strays(fragments_, result, progress);
+  warn_of_thin_walls(body_, scene.name, progress);
   mechanics_ = std::make_unique<Mechanics>(problem_, std::move(effects));
   state_.displacement.assign(body_.element_count(), Vec3::Zero());
   if (prestressed_) {

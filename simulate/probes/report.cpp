@@ -13,6 +13,7 @@
 #include "base/units.h"
 #include "formats/lattice/fields.h"
 #include "formats/lattice/stress_columns.h"
+#include "simulate/estimate/coarsen.h"
 #include "simulate/input/infill.h"
 #include "simulate/models/connections.h"
 #include "simulate/models/rest_shape.h"
@@ -142,7 +143,9 @@ void measure_corners(const Cells& cells, const Body& body, const State& state, S
 }
 
 void measure_stress(const Problem& problem, const State& state, Body& body, SimulateResult& result) {
-  if (body.cell_count() > 0) report_stress(problem, stresses(problem, state), body, result);
+  if (body.cell_count() == 0) return;
+  report_stress(problem, stresses(problem, state), body, result);
+  if (result.stress) result.stress->thin_walls = share_of_thin_walls(body, 2);
 }
 
 namespace {

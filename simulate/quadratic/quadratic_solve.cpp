@@ -260,13 +260,14 @@ void report(const QuadraticSystem& system, const QuadraticSolution& solution, Si
   };
   std::vector<std::uint8_t> counted(nodes.size(), 0);  // a node of two supports counts for the first
   for (const NitscheSupport& support : system.supports()) {
-    Reaction reaction{support.tie->name, Vec3::Zero(), Vec3::Zero()};
+    Reaction reaction{support.tie->name, Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), support.tie->is_move};
     for (const FacePoint& at : support.points) {
       const NitschePoint point = system.point(support, at, solution.safety);
       const Mat3& turn = turn_of_cell(solution, at.cell);
       const auto u = values_at(system, solution, at.cell);
       Vec3 moved = Vec3::Zero();
       for (std::size_t n = 0; n < kQuadraticNodes && large; ++n) moved += point.shape.value[n] * u[n];
+      reaction.middle += at.position + moved;
       add_at(flexel::simulate::reaction(point, u,
                                         local_displacement(nodes, at.cell, solution.displacement, turn),
                                         Mat3::Identity() + turn),
@@ -279,8 +280,11 @@ void report(const QuadraticSystem& system, const QuadraticSolution& solution, Si
           counted[n] = static_cast<std::uint8_t>(counted[n] | 1u << axis);
           held[static_cast<Eigen::Index>(axis)] = -solution.unbalanced[n][static_cast<Eigen::Index>(axis)];
         }
+      reaction.middle += place(n);
       add_at(held, place(n), reaction.force, reaction.moment);
     }
+    if (const std::size_t held = support.points.size() + support.nodes.size(); held > 0)
+      reaction.middle /= static_cast<double>(held);
     result.reactions.push_back(reaction);
   }
   for (const NodalLoad& load : system.loads()) {

@@ -23,6 +23,9 @@ struct Reaction {  // of one [[fix]] or [[move]]
   std::string name;
   Vec3 force = Vec3::Zero();   // N, by the support on the body
   Vec3 moment = Vec3::Zero();  // N m, about the world's origin, where the body is now
+  Vec3 middle = Vec3::Zero();  // m: the mean place, now, of what is held
+  bool is_move = false;        // of a [[move]]
+  [[nodiscard]] Vec3 moment_about_middle() const { return moment - middle.cross(force); }
 };
 
 struct AppliedLoad {  // of one [[load]], or of gravity
@@ -56,6 +59,8 @@ struct StressSummary {     // of the largest von Mises stress
   std::optional<double> yield_share;  // of the part's material; nothing where it has no `yield`
   std::string beside = {};  // why it grows without bound as cells get smaller (singular_beside()); "" if not
   double doubt = 0;         // Pa, of model `quadratic`: between one cell's field and that of the cells around
+  double thin_walls = 0;  // share of the matter in walls under two cells, whose bending is not in the stress
+  [[nodiscard]] bool lacks_bending() const { return thin_walls > 0.2; }
 };
 
 struct SettleSummary {  // of equilibrium with contact (simulate/time/dynamic_relaxation.h)

@@ -74,6 +74,34 @@ TEST(Answer, WithoutABarNothingIsPromised) {
   EXPECT_THAT(bare.text(), HasSubstr("runs in time have no error bars"));
 }
 
+// A twisted bar: a force along it, of second order, says nothing.
+TEST(Answer, AMomentIsNamedWhereTheForceSaysLittle) {
+  Case made = with_bar(0.03);
+  EXPECT_THAT(made.text(), HasSubstr("held by    \"xmin\" with 5 N along +z\n"));
+  simulate::Reaction& reaction = made.result.reactions[0];
+  reaction.middle = Vec3(0.5, 0.2, 0);
+  reaction.force = Vec3(0.6, 0, 0);
+  reaction.moment = Vec3(4, 0, 0) + reaction.middle.cross(reaction.force);
+  EXPECT_THAT(made.text(), HasSubstr("with 4 N m about +x and 600 mN along +x"));
+  reaction.force.setZero();
+  reaction.moment = Vec3(3, 4, 0);
+  EXPECT_THAT(made.text(), HasSubstr("with (3, 4, 0) N m\n"));
+}
+
+// Moves give the largest displacement, exact on every lattice; what they take to be made is not.
+TEST(Answer, WhereMovesDriveTheEnergyIsJudged) {
+  Case made = with_bar(1e-6);
+  made.result.reactions[0].is_move = true;
+  simulate::ErrorBar energy;
+  energy.of = simulate::ErrorBar::Of::elastic_energy;
+  energy.value = 1;
+  energy.bar.half_width = 0.1;
+  made.result.error_bars.bars.push_back(energy);
+  EXPECT_THAT(made.text(), HasSubstr("fairly, within 10 %"));
+  made.result.loads.push_back({"push", Vec3(0, 0, 1), Vec3::Zero()});
+  EXPECT_THAT(made.text(), HasSubstr("well, within"));
+}
+
 TEST(Answer, HowNearToFailing) {
   Case made = with_bar(0.03);
   EXPECT_THAT(made.text(), HasSubstr("safety factor 5: about 47 MPa of 235 MPa at which steel yields"));
@@ -89,6 +117,10 @@ TEST(Answer, HowNearToFailing) {
   EXPECT_THAT(made.text(), HasSubstr("safety factor 2: about 470 MPa of 940 MPa at which steel breaks"));
   made.materials[0].layer_strength = 470e6;
   EXPECT_THAT(made.text(), HasSubstr("safety factor 2 (1 across printed layers)"));
+  made.result.stress->thin_walls = 0.9;
+  EXPECT_THAT(made.text(), HasSubstr("strength   not known: walls under two cells thick"));
+  made.result.stress->value = made.body.element_columns["von_mises"].values[0] = 4700e6;
+  EXPECT_THAT(made.text(), HasSubstr("TOO WEAK"));
   made.result.stress.reset();  // model `paper`
   EXPECT_THAT(made.text(), HasSubstr("strength   not known"));
 }

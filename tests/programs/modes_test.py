@@ -228,5 +228,15 @@ def test_bits_do_not_depend_on_threads():
     expect(one == two, "other figures by two threads")
 
 
+def test_walls_thinner_than_the_cells_are_told():
+    """A strip of 1 mm in cells of 2.5 mm: model cells gives more than twice the frequency."""
+    beam((100, 10, 1))
+    voxels("beam.obj", "2.5 mm")
+    for model, told in (("cells", True), ("quadratic", False)):
+        write("scene.toml", scene("modes = 2", model=model))
+        said = expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu")).err
+        expect(("walls under 2 cells" in said) == told, f"{model}: {said}")
+
+
 if __name__ == "__main__":
     main(globals())
