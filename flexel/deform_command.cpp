@@ -306,17 +306,16 @@ class GoalRuns {
   SolvedRun operator()(std::optional<double> size, const GoesOn& goes_on) {
     std::optional<StopAfter> limit;
     if (size && model_.may_take_back()) limit.emplace(patience(), "--within");
-    std::optional<SolvedRun> usual;
     try {
-      SolvedRun run = solve(size, goes_on);
       if (size) {
+        SolvedRun run = solve(size, goes_on);
         model_.keep();
         return run;
       }
-      usual_size_ = preferred_number(spacing_of(run), 20, Rounded::nearest);
-      model_.choose(run.voxels);
-      usual = std::move(run);
-      if (model_.chosen()) return solve(size, goes_on);
+      usual_size_ = made(size).size;
+      model_.choose(made_->voxels);
+      if (model_.chosen()) return size_of(made(size));
+      return size_of(*made_);
     } catch (const InputError& error) {
       if (!model_.take_back(error.what())) throw;
     } catch (const DivergedError& error) {
@@ -325,7 +324,7 @@ class GoalRuns {
       if (!limit || !limit->passed() || !model_.take_back("it takes too long")) throw;
     }
     limit.reset();
-    return usual ? *std::move(usual) : solve(usual_size_, goes_on);
+    return size ? solve(usual_size_, goes_on) : size_of(made(usual_size_));
   }
 
   [[nodiscard]] mapping::MapResult map(SolvedRun& run, mapping::MapMethod method) {
@@ -357,23 +356,43 @@ class GoalRuns {
     return static_cast<std::size_t>(std::clamp(allowed, 1.0, static_cast<double>(count)));
   }
 
-  SolvedRun solve(std::optional<double> size, const GoesOn& goes_on) {
+  static SolvedRun size_of(const SolvedRun& made) {
     SolvedRun run;
-    progress_.update(0, size ? "--size " + size_text(*size) : "");
+    run.size = made.size;
+    return run;
+  }
+
+  // Its lattice; nothing: at the size for a usual count. Kept for solve(), which may ask for it next.
+  SolvedRun& made(std::optional<double> size) {
+    if (made_ && made_->size == size && made_with_moments_ == plan_.job.voxelize.moments) return *made_;
+    made_.reset();
     drop_warnings();
-    run.size = size.value_or(0);
     voxelize::VoxelizeOptions options = plan_.job.voxelize;
     options.size = size;
-    if (!size) options.count = usual_count();
+    if (!size) {
+      options.count = usual_count();
+      options.rounded = [](double any) { return preferred_number(any, 20, Rounded::nearest); };
+    }
+    SolvedRun run;
     const double processor = processor_seconds();
-    auto began = std::chrono::steady_clock::now();
+    const auto began = std::chrono::steady_clock::now();
     run.voxels = voxelize::voxelize(surface_, options, quiet_);
     run.voxelize_seconds = seconds_since(began);
-    if (!size) return run;  // only its spacing is wanted
+    run.processor_seconds = processor_seconds() - processor;
+    run.size = run.voxels.size;
+    made_with_moments_ = options.moments;
+    return made_.emplace(std::move(run));
+  }
+
+  SolvedRun solve(std::optional<double> size, const GoesOn& goes_on) {
+    progress_.update(0, size ? "--size " + size_text(*size) : "");
+    SolvedRun run = std::move(made(size));
+    made_.reset();
     if (!goes_on(run.voxels.body.cell_count())) {
       run.given_up = true;
       return run;
     }
+    const double processor = processor_seconds();
     Job job = plan_.job;  // anew for each body: an action that throws leaves none out
     simulate::SimulateOptions asked = simulate_options(arguments_, plan_);
     if (solved_) asked.failed_output.clear();  // there is a result
@@ -388,11 +407,11 @@ class GoalRuns {
     std::error_code ignored;
     if (!solved_ && tries_ > 1) std::filesystem::remove(asked.failed_output, ignored);  // of one before
     solved_ = true;
-    began = std::chrono::steady_clock::now();
+    const auto began = std::chrono::steady_clock::now();
     use_field(run.voxels.body, arguments_.map, plan_.map);
     run.mapped = map(run, plan_.map.method).displacement;
     run.map_seconds = seconds_since(began);
-    run.processor_seconds = processor_seconds() - processor;
+    run.processor_seconds += processor_seconds() - processor;
     if (!model_.quadratic()) run.wall = wall_thickness(run.voxels);
     run.warnings = warnings_.take();
     return run;
@@ -408,6 +427,8 @@ class GoalRuns {
   HeldWarnings warnings_;
   ModelChoice model_;
   double usual_size_ = 0;  // m, of a lattice for model `cells`
+  std::optional<SolvedRun> made_;
+  bool made_with_moments_ = false;
 };
 
 // The size that --accuracy or --within asks for, and the run at it. The mapping is `smooth` where that moves

@@ -160,7 +160,7 @@ void read_scenes(const StudyArguments& a, study::Case& study_case) {
   study_case.scene = a.job.scene;
   study_case.scene_text = whole_scene(a.job, file);
   if (study_case.scene_text == file.text) return;
-  study_case.scene = (fs::path(a.output) / "study-scene.toml").string();
+  study_case.scene = (fs::path(a.output) / study::kOwnScene).string();
   std::error_code none;
   if (fs::equivalent(a.job.scene, study_case.scene, none))
     throw InputError(a.job.scene, "is where the study writes its own scene: use another name");
@@ -197,7 +197,7 @@ study::Assignment assignment(const StudyArguments& a) {
   const study::SceneFacts facts = study::scene_facts(result.study_case.scene_text, result.study_case.scene);
   for (const std::string& text : a.references) add_references(text, facts, result.references);
   make_folder(a.output);
-  if (result.study_case.scene != job.scene) write_text(result.study_case.scene_text, result.study_case.scene);
+  result.writes_scene = result.study_case.scene != job.scene;
   result.output = a.output;
   return result;
 }

@@ -8,6 +8,7 @@
 
 #include "base/human.h"
 #include "base/units.h"
+#include "simulate/estimate/error_bars.h"
 #include "simulate/mode_lines.h"
 #include "simulate/scene/strength.h"
 
@@ -242,7 +243,8 @@ std::string usual_next(const SimulateResult& result, const Body& body, const std
   if (result.timed || (worst && *worst <= 0.05) || body.parts.empty())
     return "--verbose says all that was found, --summary FILE as JSON";
   const double spacing = std::cbrt(body.parts.front().lattice.spacing.prod());
-  return fmt::format("{} {}mm{}", size_option, size_digits(1e3 * spacing / 2),
+  const double finer = worst ? 2 : refinement_for_walls(body);  // else there might be no bar again
+  return fmt::format("{} {}mm{}", size_option, size_digits(1e3 * spacing / finer),
                      worst ? " makes this surer" : " shows how sure this is");
 }
 

@@ -312,10 +312,11 @@ void refuse_heat(const Scene& scene) {
         "contact, rigid parts and manipulators out, or [thermal], [shrinkage] and faces of conduction");
 }
 
-// The runs at equilibrium without contact, by the model. `linear_reach`: Run::linear_reach(), of model `quadratic` 0.
+// The runs at equilibrium without contact, by the model. `linear_reach` [m]: the largest displacement in proportion to
+// the load; 0: not known.
 SimulateResult run_at_rest(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress,
                            double* linear_reach = nullptr) {
-  if (is_quadratic(scene, body)) return run_quadratic(body, scene, options, progress);
+  if (is_quadratic(scene, body)) return run_quadratic(body, scene, options, progress, linear_reach);
   const FreeStrainInBody free(body, scene);
   Run run(body, scene, options, progress);
   SimulateResult result = run();
@@ -334,6 +335,20 @@ ErrorBars bars_at_rest(Body& body, const Scene& scene, const SimulateOptions& op
     temperatures.take_back(coarse);
     return found;
   });
+}
+
+// run_at_rest() with its error bars.
+SimulateResult run_and_judge(Body& body, const Scene& scene, const SimulateOptions& options,
+                             Progress& progress) {
+  double linear_reach = 0;
+  SimulateResult result = run_at_rest(body, scene, options, progress, &linear_reach);
+  if (options.estimate) {
+    progress.stage("error bars");
+    result.error_bars = bars_at_rest(body, scene, options, result);
+  }
+  if (const std::string told = near_buckling(linear_reach, result); !told.empty())
+    progress.warn(scene.name + ": " + told);
+  return result;
 }
 
 }  // namespace
@@ -360,8 +375,7 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
   }
   if (is_quadratic(scene, body)) {
     refuse_timed(options, scene.name);
-    SimulateResult result = run_at_rest(body, scene, options, progress);
-    if (options.estimate) result.error_bars = bars_at_rest(body, scene, options, result);
+    SimulateResult result = run_and_judge(body, scene, options, progress);
     progress.finish();
     return result;
   }
@@ -377,14 +391,7 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
     progress.finish();
     return result;
   }
-  double linear_reach = 0;
-  SimulateResult result = run_at_rest(body, scene, options, progress, &linear_reach);
-  if (options.estimate) {
-    progress.stage("error bars");
-    result.error_bars = bars_at_rest(body, scene, options, result);
-  }
-  if (const std::string told = near_buckling(linear_reach, result); !told.empty())
-    progress.warn(scene.name + ": " + told);
+  SimulateResult result = run_and_judge(body, scene, options, progress);
   progress.finish();
   return result;
 }

@@ -48,8 +48,9 @@ double cells_of_box(const HealedPart& part, double spacing) {
 // Spacing asked for, or that for the count asked for.
 double choose_spacing(const VoxelizeOptions& options, const std::vector<PartExtent>& extents) {
   if (options.size) return *options.size;
-  return spacing_for_cells(extents, static_cast<double>(options.count.value_or(kDefaultCount)),
-                           options.placement);
+  const double any = spacing_for_cells(extents, static_cast<double>(options.count.value_or(kDefaultCount)),
+                                       options.placement);
+  return options.rounded ? options.rounded(any) : any;
 }
 
 void check_spacing(double spacing, const std::vector<HealedPart>& meshes, const Surface& surface) {
@@ -267,15 +268,21 @@ double total_cells(const VoxelizeResult& result, Placement placement) {
 }
 
 // The body at the spacing for the count asked for. The estimate is rough for thin parts: it is scaled by what
-// came out, again while the count is off by more than a tenth, at most three times; a spacing between one
-// that gave too many and one that gave too few stays between them. The best is kept.
+// came out, again while the count is off by more than a tenth (of rounded spacings, what half a step makes of
+// it too), at most three times; a spacing between one that gave too many and one that gave too few stays
+// between them. None is tried twice. The best is kept.
 class CountSearch {
  public:
-  CountSearch(const std::vector<PartExtent>& extents, double wanted, Placement placement)
-      : extents_(extents), placement_(placement), wanted_(wanted), target_(wanted) {}
+  CountSearch(const std::vector<PartExtent>& extents, const VoxelizeOptions& options)
+      : extents_(extents),
+        placement_(options.placement),
+        rounded_(options.rounded),
+        wanted_(static_cast<double>(options.count.value_or(kDefaultCount))),
+        target_(wanted_) {}
 
   // What came out at `spacing`.
   void add(double spacing, double got) {
+    tried_.push_back(spacing);
     if (got > wanted_)
       too_small_ = std::max(too_small_, spacing);
     else
@@ -286,18 +293,23 @@ class CountSearch {
       best_ = spacing;
     }
   }
-  [[nodiscard]] bool close() const { return least_error_ <= std::log(1.1); }
+  [[nodiscard]] bool close() const { return least_error_ <= std::log(rounded_ ? 1.3 : 1.1); }
   [[nodiscard]] double best() const { return best_; }
-  [[nodiscard]] double next() const {
-    const double spacing = spacing_for_cells(extents_, target_, placement_);
+  // Nothing: there is no other.
+  [[nodiscard]] std::optional<double> next() const {
+    double spacing = spacing_for_cells(extents_, target_, placement_);
     const bool between = spacing > too_small_ && spacing < too_large_;
-    return between || too_small_ == 0 || std::isinf(too_large_) ? spacing
-                                                                : std::sqrt(too_small_ * too_large_);
+    if (!between && too_small_ > 0 && !std::isinf(too_large_)) spacing = std::sqrt(too_small_ * too_large_);
+    if (rounded_) spacing = rounded_(spacing);
+    if (std::find(tried_.begin(), tried_.end(), spacing) != tried_.end()) return std::nullopt;
+    return spacing;
   }
 
  private:
   const std::vector<PartExtent>& extents_;
   Placement placement_;
+  std::function<double(double)> rounded_;
+  std::vector<double> tried_;  // m
   double wanted_, target_;
   double too_small_ = 0, too_large_ = std::numeric_limits<double>::infinity();
   double least_error_ = std::numeric_limits<double>::infinity(), best_ = 0;
@@ -313,7 +325,7 @@ VoxelizeResult correct_count(VoxelizeResult result, double spacing, std::vector<
                              const std::vector<PartExtent>& extents, const VoxelizeOptions& options,
                              Progress& progress) {
   constexpr int kCorrections = 3;
-  CountSearch search(extents, static_cast<double>(options.count.value_or(kDefaultCount)), options.placement);
+  CountSearch search(extents, options);
   search.add(spacing, total_cells(result, options.placement));
   Surface surface;
   const auto build_at = [&](double next, const VoxelizeOptions& how) {
@@ -323,9 +335,11 @@ VoxelizeResult correct_count(VoxelizeResult result, double spacing, std::vector<
   };
   const VoxelizeOptions quick = without_moments(options);
   for (int n = 0; n < kCorrections && !search.close(); ++n) {
+    const std::optional<double> next = search.next();
+    if (!next) break;
     std::swap(surface, result.body.surface);
     try {
-      build_at(search.next(), quick);
+      build_at(*next, quick);
     } catch (const InputError&) {  // as small a count cannot be met: the best before stays
       spacing = 0;
       break;
@@ -336,6 +350,7 @@ VoxelizeResult correct_count(VoxelizeResult result, double spacing, std::vector<
     if (surface.parts.empty()) std::swap(surface, result.body.surface);
     build_at(search.best(), options);
   }
+  result.size = spacing;
   return result;
 }
 
@@ -367,6 +382,7 @@ VoxelizeResult voxelize(Surface surface, const VoxelizeOptions& options, Progres
   check_memory(estimate, options, limit, extents);
   VoxelizeResult result =
       build(surface, meshes, spacing, options.size ? options : without_moments(options), progress);
+  result.size = spacing;
   if (!options.size) result = correct_count(std::move(result), spacing, meshes, extents, options, progress);
   const double cells = total_cells(result, options.placement);
   check_elements(static_cast<double>(result.body.element_count()), "");

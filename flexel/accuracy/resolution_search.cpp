@@ -102,7 +102,7 @@ class Search {
     for (int failures = 0; runs_.empty();) {
       const StopAfter limit(first_patience(), "--within");
       try {
-        if (size == 0) size = nearest_size(spacing_of(solve_(std::nullopt, {})));
+        if (size == 0) size = nearest_size(solve_(std::nullopt, {}).size);
         keep(solve_(size, [](std::size_t) { return true; }));
       } catch (const TimeoutError&) {
         if (!limit.passed() && !(all && all->passed())) throw;
@@ -111,7 +111,7 @@ class Search {
         if (coarser_)
           throw TimeoutError(
               fmt::format("a first run took too long, and one of fewer cells is refused: {}; {}",
-                          error.what(), more_time()));
+                          error.what(), longer()));
         fail(size, error.what(), failures++);
       } catch (const DivergedError& error) {
         fail(size, error.what(), failures++);
@@ -129,21 +129,30 @@ class Search {
     return std::max(coarser_ ? patience_left() : kFirstShareOfTime * patience_left(), kFirstPatience);
   }
 
-  [[nodiscard]] const char* more_time() const {
-    return goal_.by_default ? "--within 5min gives it longer, --count 1000 has no limit"
-                            : "a longer --within gives it more time";
+  [[nodiscard]] std::string longer() const {
+    return goal_.by_default ? "--within 5min gives it longer" : "a longer --within gives it more time";
+  }
+  [[nodiscard]] std::string more_time() const {
+    return longer() + (goal_.by_default ? ", --count 1000 has no limit" : "");
+  }
+
+  // Said of time that others had.
+  [[nodiscard]] std::string while_busy() const {
+    constexpr double kBusy = 0.5;
+    const double processor = processor_seconds() - processor_before_;
+    if (processor > kBusy * seconds_since(goal_.began)) return "";
+    return fmt::format(" (others use this machine: {} of processor time)", human_seconds(processor));
   }
 
   // After the run at `size` (0: its lattice was not made) took too long.
   void go_coarser(double& size) {
-    const std::string gone = human_seconds(seconds_since(goal_.began));
+    const std::string gone = human_seconds(seconds_since(goal_.began)) + while_busy();
     if (size == 0)
       throw TimeoutError(fmt::format("the lattice of a first run was not made in {}: {}", gone, more_time()));
     if (coarser_)
-      throw TimeoutError(
-          fmt::format("no run ended in {}, though one of few cells was tried: check the unit of the part and "
-                      "the size of the load; {}",
-                      gone, more_time()));
+      throw TimeoutError(fmt::format(
+          "no run ended in {}, though one of few cells was tried: {}{}", gone,
+          while_busy().empty() ? "check the unit of the part and the size of the load; " : "", more_time()));
     coarser_ = true;
     note_failure(size, "took too long");
     size = nearest_size(size * std::cbrt(kFewer));

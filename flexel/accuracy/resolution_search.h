@@ -31,8 +31,8 @@ namespace flexel::commands {
 
 // Asked of a run when its lattice is made: whether so many cells are to be solved.
 using GoesOn = std::function<bool(std::size_t cells)>;
-// Runs the stages at `size`; nothing: makes a lattice of a usual count of cells and no more. Where `goes_on`
-// says no, nor is anything solved: the run is `given_up`.
+// Runs the stages at `size`; nothing: makes a lattice of a usual count of cells and no more (of the run, `size` says at
+// which one). Where `goes_on` says no, nor is anything solved: the run is `given_up`.
 using SolveAt = std::function<SolvedRun(std::optional<double> size, const GoesOn& goes_on)>;
 
 // Makes runs until the goal is met, or the next would take too long or need too much memory, or four finer

@@ -14,6 +14,7 @@
 
 #include "base/error.h"
 #include "base/files/files.h"
+#include "base/files/output_file.h"
 #include "base/program/own_program.h"
 #include "base/resources.h"
 #include "base/units.h"
@@ -38,7 +39,16 @@ constexpr double kKnown = 0.05;       // how well a median should be known
 constexpr int kMostRepeats = 5;
 constexpr double kLongest = 1e9;  // s
 
-constexpr std::array kResults{"study.csv", "study.json", "study.html"};
+constexpr std::array kResults{"study.csv", "study.json", "study.html", kOwnScene};
+
+// The results of a study; not a scene that is its input, though an earlier study wrote it.
+std::vector<const char*> results_of(const Assignment& wanted) {
+  std::vector<const char*> names(kResults.begin(), kResults.end());
+  std::error_code none;
+  if (!wanted.writes_scene && fs::equivalent(wanted.study_case.scene, wanted.output / kOwnScene, none))
+    names.pop_back();
+  return names;
+}
 
 // What an earlier study that was killed left behind. The page is written last: without it, what that study had put
 // aside is back.
@@ -56,14 +66,15 @@ void remove_stale(const fs::path& output) {
 // own (keep_new), what it wrote goes and they are back.
 class EarlierResults {
  public:
-  EarlierResults(fs::path output, const fs::path& folder) : output_(std::move(output)), aside_(folder) {
+  EarlierResults(const Assignment& wanted, const fs::path& folder)
+      : output_(wanted.output), aside_(folder), names_(results_of(wanted)) {
     std::error_code ignored;
-    for (const char* name : kResults) fs::rename(output_ / name, aside_ / name, ignored);
+    for (const char* name : names_) fs::rename(output_ / name, aside_ / name, ignored);
   }
   ~EarlierResults() {
     if (!back_) return;
     std::error_code ignored;
-    for (const char* name : kResults) {
+    for (const char* name : names_) {
       fs::remove(output_ / name, ignored);
       fs::rename(aside_ / name, output_ / name, ignored);
     }
@@ -74,6 +85,7 @@ class EarlierResults {
 
  private:
   fs::path output_, aside_;
+  std::vector<const char*> names_;
   bool back_ = true;
 };
 
@@ -155,8 +167,9 @@ Sweep Session::look() {
 void Session::run() {
   std::optional<EarlierResults> earlier;
   try {
+    earlier.emplace(wanted_, folder_->path());
+    if (wanted_.writes_scene) write_text(wanted_.study_case.scene_text, wanted_.study_case.scene);
     Sweep sweep = look();
-    earlier.emplace(wanted_.output, folder_->path());
     run_all(sweep);
     repeat_all(sweep);
   } catch (const Interrupted&) {

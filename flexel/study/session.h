@@ -11,8 +11,11 @@
 
 namespace flexel::study {
 
+constexpr const char* kOwnScene = "study-scene.toml";
+
 struct Assignment {
   Case study_case;
+  bool writes_scene = false;            // the case's scene is kOwnScene in `output`, which the study writes
   std::vector<std::string> part_names;  // for people
   double budget = 120;                  // s
   std::filesystem::path output;         // a folder that exists

@@ -80,12 +80,15 @@ class CoarseRuns {
   }
 
   // Adds one lattice; false, with the reason, where it cannot be done. A lattice whose cells are wider than
-  // many walls says nothing: from the second on it is left out.
+  // many walls says nothing beside a third one, nor beside a fine one that has not two cells through them:
+  // both hold the matter, neither the shape, and may agree on a wrong value.
   bool add(const Body& finer, Body& coarse, std::string& reason) {
     try {
       coarse = coarsened(finer);
-      if (found_.size() > 1 && thin_walls(coarse, 1, quadratic_))
-        throw InputError("walls are thinner than its cells");
+      if (thin_walls(coarse, 1, quadratic_)) {
+        if (found_.size() > 1) throw InputError("walls are thinner than its cells");
+        if (thin_walls(finer, kThinWall, quadratic_)) throw InputError("walls are thinner than two cells");
+      }
       ratio_.push_back(ratio_of(finer, coarse));
       found_.push_back(answers(solve_(coarse, scene_, options_)));
     } catch (const InputError& error) {
@@ -135,6 +138,13 @@ std::string first_sentence(const std::string& text) {
 }
 
 }  // namespace
+
+double refinement_for_walls(const Body& body) {
+  constexpr double kStep = 1.25, kMost = 64;
+  double finer = 2;
+  while (finer < kMost && thin_walls(body, kThinWall / finer, QuadraticField::is_in(body))) finer *= kStep;
+  return finer;
+}
 
 ErrorBars estimate_errors(const Body& body, const Scene& scene, const SimulateOptions& options,
                           const SimulateResult& result, const SolveCoarse& solve) {

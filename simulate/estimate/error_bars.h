@@ -17,4 +17,8 @@ using SolveCoarse = std::function<SimulateResult(Body&, const Scene&, const Simu
 [[nodiscard]] ErrorBars estimate_errors(const Body& body, const Scene& scene, const SimulateOptions& options,
                                         const SimulateResult& result, const SolveCoarse& solve);
 
+// How many times as fine a lattice needs to be for two cells through most walls, to a quarter; at least twice, and
+// that in model `quadratic`, whose cells hold walls of any thickness.
+[[nodiscard]] double refinement_for_walls(const Body& body);
+
 }  // namespace flexel::simulate

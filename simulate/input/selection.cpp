@@ -329,7 +329,19 @@ bool holds(const Selection& selection, const Vec3& point) {
   }
 }
 
-Selected resolve_region(const Selection& selection, const std::vector<Vec3>& at) {
+// Why a box between the elements of coarse cells holds none.
+std::string between_elements(const Selection& selection, const Body& body) {
+  if (selection.kind != Selection::Kind::box) return "";
+  const double side = (selection.max - selection.min).minCoeff();
+  double apart = 0;
+  for (const Part& part : body.parts) apart = std::max(apart, part.lattice.spacing.maxCoeff());
+  if (!(side < apart)) return "";
+  return fmt::format(
+      ", up to {} apart, and its shortest side is {}: a larger box or smaller cells may hold some",
+      human_length(apart), human_length(side));
+}
+
+Selected resolve_region(const Selection& selection, const Body& body, const std::vector<Vec3>& at) {
   Selected selected;
   for (std::uint32_t e = 0; e < at.size(); ++e)
     if (holds(selection, at[e])) selected.elements.push_back(e);
@@ -337,10 +349,10 @@ Selected resolve_region(const Selection& selection, const std::vector<Vec3>& at)
     const Box box = bounding_box(at);
     throw InputError(
         selection.origin,
-        fmt::format("the {} holds no element; the elements lie from ({}, {}, {}) to ({}, {}, {})",
+        fmt::format("the {} holds no element; the elements lie from ({}, {}, {}) to ({}, {}, {}){}",
                     describe(selection), human_length(box.min.x()), human_length(box.min.y()),
                     human_length(box.min.z()), human_length(box.max.x()), human_length(box.max.y()),
-                    human_length(box.max.z())));
+                    human_length(box.max.z()), between_elements(selection, body)));
   }
   return selected;
 }
@@ -424,7 +436,7 @@ Selected resolve(const Selection& selection, const Body& body, const std::vector
       return rest;
     }
     default:
-      return resolve_region(selection, at ? *at : body.rest);
+      return resolve_region(selection, body, at ? *at : body.rest);
   }
 }
 

@@ -6,9 +6,11 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <unordered_map>
 
 #include "base/math/distance.h"
+#include "base/parallel.h"
 #include "simulate/matter/surface_points.h"
 
 namespace flexel::simulate {
@@ -47,26 +49,27 @@ class Grid {
     std::vector<std::uint32_t>& polygons = cubes_[key(cube(point))];
     if (polygons.empty() || polygons.back() != polygon) polygons.push_back(polygon);
   }
-  // use(polygon) for those with a sample in the cubes around `point`, some more than once.
-  template <class Use>
-  void for_each_near(const Vec3& point, const Use& use) const {
-    const std::array<std::int64_t, 3> middle = cube(point);
-    for (std::int64_t n = 0; n < 27; ++n) {
-      const auto found =
-          cubes_.find(key({middle[0] + n % 3 - 1, middle[1] + n / 3 % 3 - 1, middle[2] + n / 9 - 1}));
-      if (found == cubes_.end()) continue;
-      for (const std::uint32_t polygon : found->second) use(polygon);
-    }
-  }
-
- private:
-  [[nodiscard]] std::array<std::int64_t, 3> cube(const Vec3& point) const {
-    std::array<std::int64_t, 3> result;
+  using Cube = std::array<std::int64_t, 3>;
+  [[nodiscard]] Cube cube(const Vec3& point) const {
+    Cube result;
     for (int axis = 0; axis < 3; ++axis)
       result[static_cast<std::size_t>(axis)] = static_cast<std::int64_t>(std::floor(point[axis] / width_));
     return result;
   }
-  static std::uint64_t key(const std::array<std::int64_t, 3>& cube) {
+  // Those with a sample in a cube or one around it, each once.
+  void find(const Cube& middle, std::vector<std::uint32_t>& polygons) const {
+    polygons.clear();
+    for (std::int64_t n = 0; n < 27; ++n) {
+      const auto found =
+          cubes_.find(key({middle[0] + n % 3 - 1, middle[1] + n / 3 % 3 - 1, middle[2] + n / 9 - 1}));
+      if (found != cubes_.end()) polygons.insert(polygons.end(), found->second.begin(), found->second.end());
+    }
+    std::sort(polygons.begin(), polygons.end());
+    polygons.erase(std::unique(polygons.begin(), polygons.end()), polygons.end());
+  }
+
+ private:
+  static std::uint64_t key(const Cube& cube) {
     std::uint64_t hash = 0;
     for (const std::int64_t each : cube)
       hash = (hash ^ static_cast<std::uint64_t>(each)) * 0x9e3779b97f4a7c15u;
@@ -74,6 +77,24 @@ class Grid {
   }
   double width_;
   std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cubes_;
+};
+
+// What a grid finds around points, of which many that follow each other lie in one cube.
+class Nearby {
+ public:
+  explicit Nearby(const Grid& grid) : grid_(grid) {}
+  const std::vector<std::uint32_t>& operator()(const Vec3& point) {
+    if (const Grid::Cube cube = grid_.cube(point); cube != cube_) {
+      cube_ = cube;
+      grid_.find(*cube_, found_);
+    }
+    return found_;
+  }
+
+ private:
+  const Grid& grid_;
+  std::optional<Grid::Cube> cube_;
+  std::vector<std::uint32_t> found_;
 };
 
 class TouchingSearch {
@@ -96,6 +117,9 @@ class TouchingSearch {
     return std::max({tolerance(a), tolerance(b), wider_gap(a, b)});
   }
   void sample(std::uint32_t part);
+  [[nodiscard]] const Facing* nearest(const SurfacePoint& point, double limit,
+                                      const std::vector<Facing>& facing,
+                                      const std::vector<std::uint32_t>& near) const;
   void touch(std::uint32_t finer, std::uint32_t coarser, const Use& use) const;
   [[nodiscard]] double distance(const Vec3& point, std::uint32_t polygon) const;
 
@@ -152,6 +176,24 @@ double TouchingSearch::distance(const Vec3& point, std::uint32_t polygon) const 
   return least;
 }
 
+// Of `near`, numbers in `facing`; null: none within the limit.
+const Facing* TouchingSearch::nearest(const SurfacePoint& point, double limit,
+                                      const std::vector<Facing>& facing,
+                                      const std::vector<std::uint32_t>& near) const {
+  const Vec3 own = point.area_vector.normalized();
+  double least = limit;
+  const Facing* nearest = nullptr;
+  for (const std::uint32_t n : near) {
+    const Facing& other = facing[n];
+    if (own.dot(other.normal) > kFacing || !box_holds(other.box, point.position, limit)) continue;
+    const double away = distance(point.position, other.polygon);
+    if (away > least || (nearest && away == least && other.polygon >= nearest->polygon)) continue;
+    least = away;
+    nearest = &other;
+  }
+  return nearest;
+}
+
 void TouchingSearch::touch(std::uint32_t finer, std::uint32_t coarser, const Use& use) const {
   const double limit = std::max(tolerance(finer), wider_gap(finer, coarser));
   const double width = 0.5 * body_.parts[coarser].lattice.spacing.minCoeff();
@@ -166,26 +208,29 @@ void TouchingSearch::touch(std::uint32_t finer, std::uint32_t coarser, const Use
     // No point of the finer part looks further than into the next cube.
     if (box_holds(box_[finer], point.position, 2 * width)) grid.add(point.position, entry->second);
   }
-  for (const SurfacePoint& point : points_[finer]) {
-    if (!box_holds(box_[coarser], point.position, limit)) continue;
-    const Vec3 own = point.area_vector.normalized();
-    double least = limit;
-    const Facing* nearest = nullptr;
-    grid.for_each_near(point.position, [&](std::uint32_t n) {
-      const Facing& other = facing[n];
-      if (own.dot(other.normal) > kFacing || !box_holds(other.box, point.position, limit)) return;
-      const double away = distance(point.position, other.polygon);
-      if (away > least || (nearest && away == least && other.polygon >= nearest->polygon)) return;
-      least = away;
-      nearest = &other;
+  // A window at a time: in parallel, then told in their order.
+  constexpr std::size_t kWindow = 65536, kGrain = 2048;
+  std::vector<std::optional<TouchingPoint>> found;
+  for (std::size_t begin = 0; begin < points_[finer].size(); begin += kWindow) {
+    found.assign(std::min(kWindow, points_[finer].size() - begin), std::nullopt);
+    parallel_chunks(found.size(), kGrain, [&](std::size_t first, std::size_t last) {
+      Nearby nearby(grid);
+      for (std::size_t i = first; i < last; ++i) {
+        const SurfacePoint& point = points_[finer][begin + i];
+        if (!box_holds(box_[coarser], point.position, limit)) continue;
+        const Facing* other = nearest(point, limit, facing, nearby(point.position));
+        if (!other) continue;
+        const auto at = carrier_on_surface(problem_, other->polygon, point.position, other->normal);
+        if (!at) continue;
+        found[i] = {
+            {finer, coarser},
+            {with_gradient(problem_, point.at, point.position), with_gradient(problem_, *at, point.position)},
+            point.area_vector.norm(),
+            point.area_vector.normalized()};
+      }
     });
-    if (!nearest) continue;
-    const auto at = carrier_on_surface(problem_, nearest->polygon, point.position, nearest->normal);
-    if (!at) continue;
-    use({{finer, coarser},
-         {with_gradient(problem_, point.at, point.position), with_gradient(problem_, *at, point.position)},
-         point.area_vector.norm(),
-         own});
+    for (const std::optional<TouchingPoint>& each : found)
+      if (each) use(*each);
   }
 }
 

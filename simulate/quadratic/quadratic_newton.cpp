@@ -92,6 +92,7 @@ class LargeDeflection {
       if (iterations <= kFewIterations) step = std::min(2 * step, longest);
     }
     solution_.displacement = now;
+    if (!turned && reach_ > 0) solution_.amplification = largest(now) / reach_;
     solution_.turn = corotation_.turns();
   }
 

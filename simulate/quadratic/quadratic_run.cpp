@@ -203,7 +203,7 @@ bool is_quadratic(const Scene& scene, const Body& body) {
 }
 
 SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptions& options,
-                             Progress& progress) {
+                             Progress& progress, double* linear_reach) {
   const auto began = std::chrono::steady_clock::now();
   const Fragments fragments = find_fragments(body);
   const Problem problem{
@@ -244,6 +244,7 @@ SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptio
   for (std::size_t e = 0; e < body.element_count(); ++e)
     body.position[e] = body.rest[e] + state.displacement[e];
   measure_displacement(body, state, result);
+  if (linear_reach != nullptr) *linear_reach = result.largest_displacement / solution.amplification;
   result.mass = mass_of(problem);
   refuse_not_finite(result, scene.name);
   result.load_steps = std::max(solution.load_steps, 1);

@@ -16,9 +16,9 @@ namespace flexel::simulate {
 
 // Moves the body to equilibrium; its column "quadratic_displacement" has the field between the elements. Throws
 // InputError naming what the model does not have; DivergedError where displacements are too large for a linear
-// answer, or the solver does not converge.
+// answer, or the solver does not converge. `linear_reach` [m]: the largest displacement in proportion to the load.
 [[nodiscard]] SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptions& options,
-                                           Progress& progress);
+                                           Progress& progress, double* linear_reach = nullptr);
 
 class QuadraticSystem;     // simulate/quadratic/quadratic_system.h
 struct QuadraticSolution;  // simulate/quadratic/quadratic_solve.h

@@ -21,7 +21,8 @@ struct QuadraticSolution {
   std::vector<Mat3> turn;        // (cells) R - 1 where large deflections turned them; none: a linear solution
   // As far as was looked: where loads are far too small to buckle it nobody does. Nothing: it was not found out.
   std::optional<bool> stable = true;
-  double safety = 1;  // of the supports' penalty (QuadraticSystem::stiffness)
+  double amplification = 1;  // the largest displacement beside that of the linear solution
+  double safety = 1;         // of the supports' penalty (QuadraticSystem::stiffness)
   int load_steps = 0, newton_iterations = 0;
   int iterations = 0;  // of conjugate gradients, in all
   double relative_residual = 0;

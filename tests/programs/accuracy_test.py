@@ -169,5 +169,33 @@ def test_a_strip_bent_to_its_length_has_not_buckled():
         expect(f"strength   {strength}" in result.err, result.err)
 
 
+def test_a_column_about_to_buckle_is_told_by_model_quadratic():
+    """The same column in cells as wide as it is."""
+    write("column.stl", binary_stl(box_triangles((100, 4, 4))))
+    for newtons, near in ((4, False), (15, True)):
+        write("press.toml", 'material = "PLA"\nmodel = "quadratic"\n[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\n'
+                            f'force = ["-{newtons} N", "0 N", "10 mN"]\n')
+        result = expect_ok(run("flexel", "deform", "column.stl", "--scene", "press.toml", "--size", "4 mm", "-o", "bent.stl"))
+        expect(("about to buckle: it moves" in result.err) == near, f"{newtons} N: {result.err}")
+
+
+def hollow_box():
+    """120 x 40 x 40 mm with walls of 3 mm."""
+    inner = [[(x + 3, y + 3, z + 3) for x, y, z in reversed(triangle)] for triangle in box_triangles((114, 34, 34))]
+    write("hollow.stl", binary_stl([*box_triangles((120, 40, 40)), *inner]))
+    return ["hollow.stl", "--model", "cells", "--material", "PLA", "--fix", "xmin", "--push", "xmax: 0 0 -10 N"]
+
+
+def test_cells_that_lose_walls_say_nothing_of_coarser_ones():
+    """1.3 cells through the walls beside .7: no bar; at the size that is advised there is one, and it holds."""
+    options = hollow_box()
+    summary, said = deform([*options, "--size", "2.3 mm"])
+    bars = summary["simulate"]["error_bars"]["bars"]
+    expect(bars == [] and "not known: walls are thinner than two cells" in said, said)
+    size = said.split("next       --size ")[1].split()[0]
+    finer, said = deform([*options, "--size", size])
+    expect(finer["simulate"]["error_bars"]["bars"] != [], said)
+
+
 if __name__ == "__main__":
     main(globals())

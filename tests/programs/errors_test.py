@@ -138,6 +138,11 @@ def test_scene_that_selects_nothing():
                      "holds no element")
 
 
+def test_box_between_the_elements():
+    thin = '{ box = { min = ["38.4 mm", "0 mm", "0 mm"], max = ["38.5 mm", "10 mm", "10 mm"] } }'
+    simulate_refuses(SCENE.replace('"xmax"', thin), "holds no element", "its shortest side is 100 um", "smaller cells")
+
+
 def test_scene_that_holds_nothing():
     simulate_refuses(SCENE.replace('[[fix]]\nwhere = "xmin"\n', ""), "body-box", "free")
 

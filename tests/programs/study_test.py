@@ -250,10 +250,11 @@ def test_an_interrupt_keeps_the_rows():
 def test_a_study_that_is_stopped_leaves_the_earlier_one():
     box()
     os.mkdir("study")
-    earlier = {name: f"earlier {name}\n" for name in ("study.csv", "study.json", "study.html")}
+    earlier = {name: f"earlier {name}\n" for name in ("study.csv", "study.json", "study.html", "study-scene.toml")}
     for name, text in earlier.items():
         pathlib.Path("study", name).write_text(text)
-    command = ("flexel", "study", "box.stl", "--scene", scene(), "--budget", "100 s", "-o", "study", "--timeout", "6 s")
+    command = ("flexel", "study", "box.stl", "--material", "steel", "--fix", "xmin", "--push", "xmax: 0 0 -10 N", "--budget", "100 s", "-o",
+               "study", "--timeout", "6 s")
     expect_error(run(*command), "flexel", "stopped by --timeout", code=5)
     expect_only(*earlier, folder="study")
     for name, text in earlier.items():

@@ -101,5 +101,21 @@ TEST(Count, IsMetWithinATenth) {
       }
 }
 
+TEST(Count, TriesRoundedSizesOnly) {
+  const auto rounded = [](double size) { return std::pow(10, std::round(20 * std::log10(size)) / 20); };
+  for (const Mesh& mesh : {box({0, 0, 0}, {1, .8, .004}), icosphere(4, .5)}) {
+    Progress progress("test", Progress::Mode::quiet);
+    VoxelizeOptions options;
+    options.count = 20000;
+    options.rounded = rounded;
+    const VoxelizeResult result = voxelize(surface(mesh), options, progress);
+    EXPECT_NEAR(result.size, rounded(result.size), 1e-12);
+    EXPECT_NEAR(static_cast<double>(result.parts[0].cells) / 20000, 1, .35);
+    VoxelizeOptions same;
+    same.size = result.size;
+    EXPECT_EQ(voxelize(surface(mesh), same, progress).parts[0].cells, result.parts[0].cells);
+  }
+}
+
 }  // namespace
 }  // namespace flexel::voxelize

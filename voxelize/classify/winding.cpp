@@ -33,13 +33,28 @@ Vector cross(Vector a, Vector b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-// Signed solid angle (van Oosterom and Strackee, 1983).
-double solid_angle(Vector p, Vector q, Vector r) {
-  const double a = std::sqrt(dot(p, p)), b = std::sqrt(dot(q, q)), c = std::sqrt(dot(r, r));
-  const double numerator = dot(p, cross(q, r));
-  const double denominator = a * b * c + dot(p, q) * c + dot(q, r) * a + dot(r, p) * b;
-  return numerator == 0 && denominator == 0 ? 0 : 2 * std::atan2(numerator, denominator);
-}
+// The sum of signed solid angles of triangles. The half of each is the argument of a complex number (van
+// Oosterom and Strackee, 1983): these are multiplied, and one arctangent is taken in the end. The argument of
+// the product loses a turn where both arguments have one sign and it has the other.
+class SolidAngle {
+ public:
+  void add(Vector p, Vector q, Vector r) {
+    const double a = std::sqrt(dot(p, p)), b = std::sqrt(dot(q, q)), c = std::sqrt(dot(r, r));
+    const double im = dot(p, cross(q, r)) + 0.;  // no -0, whose argument may be -pi
+    const double re = a * b * c + dot(p, q) * c + dot(q, r) * a + dot(r, p) * b;
+    const double size = std::abs(re) + std::abs(im);
+    if (!(size > 0)) return;
+    const double real = (re_ * re - im_ * im) / size, imaginary = (re_ * im + im_ * re) / size;
+    if (im_ >= 0 && im >= 0 && imaginary < 0) turns_ += 1;
+    if (im_ < 0 && im < 0 && imaginary >= 0) turns_ -= 1;
+    re_ = real;
+    im_ = imaginary;
+  }
+  [[nodiscard]] double sum() const { return 2 * (std::atan2(im_, re_) + 2 * std::numbers::pi * turns_); }
+
+ private:
+  double re_ = 1, im_ = 0, turns_ = 0;
+};
 
 }  // namespace
 
@@ -111,13 +126,12 @@ struct WindingNumber::Tree {
     if (squared > kFar * kFar * node.radius * node.radius)
       return dot({node.normal[0], node.normal[1], node.normal[2]}, to) / (squared * std::sqrt(squared));
     if (node.left != 0) return angle(node.left, point) + angle(node.left + 1, point);
-    double sum = 0;
+    SolidAngle sum;
     for (std::uint32_t t = node.begin; t < node.end; ++t) {
       const Corners& c = mesh->corners[order[t]];
-      sum += solid_angle(between(point, points[c[0]]), between(point, points[c[1]]),
-                         between(point, points[c[2]]));
+      sum.add(between(point, points[c[0]]), between(point, points[c[1]]), between(point, points[c[2]]));
     }
-    return sum;
+    return sum.sum();
   }
 
   const PartMesh* mesh;

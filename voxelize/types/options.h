@@ -1,5 +1,6 @@
 // Options of voxelization.
 #pragma once
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -25,6 +26,8 @@ struct VoxelizeOptions {
   std::optional<double> size;  // spacing h [m]
   // Or about this many cells (elements for centre placement) over all parts; default 20,000
   std::optional<std::size_t> count;
+  // Of a spacing chosen for a count, both in m: only those that it gives are tried. Null: any.
+  std::function<double(double)> rounded = {};
   Placement placement = Placement::corner;
   Align align = Align::snap;
   bool moments = false;  // also the exact moments of cut cells (Body::moments); corner placement
