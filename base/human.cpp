@@ -41,7 +41,6 @@ struct Scale {
 
 constexpr Scale kLengths[] = {{1e-9, "nm"}, {1e-6, "um"}, {1e-3, "mm"}, {1, "m"}, {1e3, "km"}};
 constexpr Scale kPressures[] = {{1, "Pa"}, {1e3, "kPa"}, {1e6, "MPa"}, {1e9, "GPa"}};
-constexpr Scale kEnergies[] = {{1e-9, "nJ"}, {1e-6, "uJ"}, {1e-3, "mJ"}, {1, "J"}, {1e3, "kJ"}, {1e6, "MJ"}};
 
 // The largest unit in which the value, rounded to three digits, is at least 1.
 const Scale& fitting(double value, std::span<const Scale> ascending) {
@@ -101,10 +100,6 @@ std::string human_seconds(double seconds) {
   return seconds < kHours ? significant(seconds / 60, 2) + " min" : significant(seconds / 3600, 2) + " h";
 }
 
-std::string human_energy(double joules) {
-  return joules == 0 ? "0 J" : human(joules, kEnergies);
-}
-
 std::string counted(std::size_t count, const std::string& noun) {
   return human_count(count) + " " + noun + (count == 1 ? "" : "s");
 }
@@ -115,10 +110,6 @@ std::string length_with_bar(double metres, double bar) {
 
 std::string pressure_with_bar(double pascals, double bar) {
   return with_bar(pascals, bar, kPressures);
-}
-
-std::string energy_with_bar(double joules, double bar) {
-  return with_bar(joules, bar, kEnergies);
 }
 
 std::string length_range(double low, double high) {

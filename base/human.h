@@ -17,8 +17,6 @@ namespace flexel {
 // "0.25 s", "40 s", "12 min", "2.5 h"; two significant digits.
 [[nodiscard]] std::string human_seconds(double seconds);
 
-[[nodiscard]] std::string human_energy(double joules);  // "261 mJ"
-
 // "1 voxel", "2,048 voxels".
 [[nodiscard]] std::string counted(std::size_t count, const std::string& noun);
 
@@ -26,7 +24,6 @@ namespace flexel {
 // most four significant digits. A bar smaller than one unit of the last digit is written "under" that unit.
 [[nodiscard]] std::string length_with_bar(double metres, double bar);
 [[nodiscard]] std::string pressure_with_bar(double pascals, double bar);
-[[nodiscard]] std::string energy_with_bar(double joules, double bar);
 
 // "0 to 5.7 mm": a range [m], for values whose error bar is over half of them.
 [[nodiscard]] std::string length_range(double low, double high);

@@ -13,10 +13,10 @@
 #include "base/program/standard_output.h"
 #include "base/program/termination.h"
 #include "base/stop.h"
-#include "base/units.h"
 #include "flexel/clay/served_session.h"
 #include "flexel/commands.h"
 #include "flexel/job.h"
+#include "flexel/picture_command.h"
 #include "flexel/view/page.h"
 #include "flexel/view/serve.h"
 #include "simulate/input/materials.h"
@@ -30,8 +30,8 @@ constexpr std::size_t kUsualCells = 3000;  // that follow a hand at once
 constexpr const char* kUsualMaterial = "PLA";
 
 struct ClayArguments {
-  std::string part, scene, material, size, heal = "auto", unit, up = "z";
-  std::optional<std::size_t> count;
+  std::string part, scene, material, up = "z";
+  JobArguments lattice;
   bool quiet = false;
   int threads = 0;
 };
@@ -42,16 +42,8 @@ void declare(CommandLine& app, ClayArguments& a) {
       .type_name("FILE");
   app.add_option("--material", a.material, "What it is made of (`flexel materials`); default PLA")
       .type_name("NAME");
-  app.add_option("--size", a.size, "Spacing of the lattice (\"2 mm\")").type_name("LENGTH");
-  app.add_option("--count", a.count, "Or: about this many cells (default 3000)").type_name("N");
-  app.add_option("--heal", a.heal, "Broken surfaces: auto, wrap or none (docs/reference/healing.md)")
-      .type_name("HOW")
-      .show_default();
-  app.add_option("--unit", a.unit, "Unit of files that carry none (default mm)").type_name("UNIT");
-  app.add_option("--up", a.up, "The axis that points up: x, y (glTF, many OBJ files) or z")
-      .one_of({"x", "y", "z"})
-      .type_name("AXIS")
-      .show_default();
+  declare_lattice(app, a.lattice, "Or: about this many cells (default 3000)");
+  declare_up(app, a.up);
   add_threads_option(app, a.threads);
   app.add_flag("--quiet", a.quiet, "Say only warnings and errors");
 }
@@ -94,20 +86,12 @@ Clay read_clay(const ClayArguments& a, Progress& progress) {
     clay::refuse_unkept(clay.scene, a.scene);
     clay::refuse_unled(simulate::parse_scene(clay.scene, a.scene));
   }
-  JobArguments arguments;
-  arguments.parts = {a.part};
-  ImportOptions import;
-  if (!a.unit.empty()) import.unit = length_unit(a.unit);
-  voxelize::VoxelizeOptions options;
-  if (!a.size.empty()) options.size = parse_quantity(a.size, Dimension::length);
-  if (options.size && !(*options.size > 0)) throw InputError("--size: must be above zero");
-  if (options.size && a.count) throw InputError("give --size or --count, not both");
-  if (a.count && *a.count == 0) throw InputError("--count: must be above zero");
-  if (!options.size) options.count = a.count.value_or(kUsualCells);
-  options.heal = voxelize::heal_choice(a.heal);
+  Job job;
+  plan_lattice(a.lattice, job);
+  if (!job.voxelize.size && !job.voxelize.count) job.voxelize.count = kUsualCells;
   progress.stage("import");
   voxelize::VoxelizeResult result =
-      voxelize::voxelize(read_parts({a.part}, import, progress), options, progress);
+      voxelize::voxelize(read_parts({a.part}, job.import, progress), job.voxelize, progress);
   voxelize::report(result, progress);
   clay.body = std::make_shared<const Body>(std::move(result.body));
   if (!a.scene.empty()) clay::refuse_unled(simulate::parse_scene(clay.scene, a.scene), *clay.body);

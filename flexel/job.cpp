@@ -12,15 +12,19 @@
 #include "simulate/quadratic/quadratic_run.h"
 
 namespace flexel::commands {
-void declare_job(CommandLine& app, JobArguments& arguments) {
-  app.add_option("part", arguments.parts, read_titles() + " files; -: stdin").required().type_name("PART");
-  declare_scene(app, arguments);
+void declare_lattice(CommandLine& app, JobArguments& arguments, const std::string& count) {
   app.add_option("--size", arguments.size, "Spacing of the lattice (\"2 mm\")").type_name("LENGTH");
-  app.add_option("--count", arguments.count, "Or: about this many cells").type_name("N");
+  app.add_option("--count", arguments.count, count).type_name("N");
   app.add_option("--heal", arguments.heal, "Broken surfaces: auto, wrap or none (docs/reference/healing.md)")
       .type_name("HOW")
       .show_default();
   app.add_option("--unit", arguments.unit, "Unit of files that carry none (default mm)").type_name("UNIT");
+}
+
+void declare_job(CommandLine& app, JobArguments& arguments) {
+  app.add_option("part", arguments.parts, read_titles() + " files; -: stdin").required().type_name("PART");
+  declare_scene(app, arguments);
+  declare_lattice(app, arguments);
   app.add_option(
          "--edge", arguments.edge,
          "Split the mesh to this longest edge (default: STEP a 64th of the file's diagonal, meshes not)")
@@ -28,15 +32,8 @@ void declare_job(CommandLine& app, JobArguments& arguments) {
   app.add_flag("--force", arguments.force, "Let results replace files that are read");
 }
 
-Job plan_job(const JobArguments& arguments) {
-  Job job;
-  if (std::count(arguments.parts.begin(), arguments.parts.end(), "-") + (arguments.scene == "-") > 1)
-    throw InputError("only one input can come from stdin");
+void plan_lattice(const JobArguments& arguments, Job& job) {
   if (!arguments.unit.empty()) job.import.unit = length_unit(arguments.unit);
-  if (!arguments.edge.empty()) {
-    job.import.largest_edge = parse_quantity(arguments.edge, Dimension::length);
-    if (!(*job.import.largest_edge > 0)) throw InputError("--edge: must be above zero");
-  }
   if (!arguments.size.empty() && arguments.count) throw InputError("give --size or --count, not both");
   if (!arguments.size.empty()) {
     job.voxelize.size = parse_quantity(arguments.size, Dimension::length);
@@ -45,6 +42,17 @@ Job plan_job(const JobArguments& arguments) {
   if (arguments.count && *arguments.count == 0) throw InputError("--count: must be above zero");
   job.voxelize.count = arguments.count;
   job.voxelize.heal = voxelize::heal_choice(arguments.heal);
+}
+
+Job plan_job(const JobArguments& arguments) {
+  Job job;
+  if (std::count(arguments.parts.begin(), arguments.parts.end(), "-") + (arguments.scene == "-") > 1)
+    throw InputError("only one input can come from stdin");
+  plan_lattice(arguments, job);
+  if (!arguments.edge.empty()) {
+    job.import.largest_edge = parse_quantity(arguments.edge, Dimension::length);
+    if (!(*job.import.largest_edge > 0)) throw InputError("--edge: must be above zero");
+  }
   job.voxelize.placement = voxelize::placement_choice(arguments.placement);
   plan_scene(arguments, job);
   job.voxelize.moments = simulate::asks_for_quadratic(job.scene);

@@ -25,6 +25,10 @@ struct JobArguments {
 // Adds the options of what happens: --scene to --shell.
 void declare_scene(CommandLine& app, JobArguments& arguments);
 
+// Adds --size to --unit; `count` is the help of --count.
+void declare_lattice(CommandLine& app, JobArguments& arguments,
+                     const std::string& count = "Or: about this many cells");
+
 // Adds all of their options to the program, but for --placement, which not every command has.
 void declare_job(CommandLine& app, JobArguments& arguments);
 
@@ -40,6 +44,8 @@ struct Job {
   }
 };
 
+// What --size to --unit ask for. Throws InputError: see plan_job().
+void plan_lattice(const JobArguments& arguments, Job& job);
 // The scene of the arguments. Throws InputError: see plan_job().
 void plan_scene(const JobArguments& arguments, Job& job);
 // What options add to the scene of `job`.

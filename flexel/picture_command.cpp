@@ -39,9 +39,7 @@ void declare_files(CommandLine& app, PictureArguments& a) {
       .required()
       .type_name("FILE");
   app.add_option("-o,--output", a.output, "The picture (.png); -: stdout").required().type_name("FILE");
-  app.add_option("--unit", a.unit, "Unit of files that carry none (default mm)").type_name("UNIT");
-  app.add_option("--input-format", a.input_format, "Format of the files, where their bytes do not tell")
-      .type_name("NAME");
+  declare_import_to_draw(app, a.unit, a.input_format);
   app.add_flag("--quiet", a.quiet, "Say only warnings and errors");
   app.add_flag("--force", a.force, "Let the picture replace a file that is read");
 }
@@ -60,10 +58,7 @@ void declare_drawing(CommandLine& app, PictureArguments& a) {
                  "auto, iso, front, back, left, right, top, bottom, or AZIMUTH,ELEVATION in degrees")
       .type_name("VIEW")
       .show_default();
-  app.add_option("--up", a.up, "The axis that points up: x, y (glTF, many OBJ files) or z")
-      .one_of({"x", "y", "z"})
-      .type_name("AXIS")
-      .show_default();
+  declare_up(app, a.up);
   app.add_option("--size", a.size, "Pixels").type_name("WIDTHxHEIGHT").show_default();
   app.add_flag("--cells", a.cells, "Draw the cells of a body instead of its surface");
   app.add_flag("--elements", a.elements, "Draw the elements of a body instead of its surface");
@@ -186,6 +181,28 @@ void check_output(const std::string& output) {
 
 }  // namespace
 
+void declare_up(CommandLine& app, std::string& up) {
+  app.add_option("--up", up, "The axis that points up: x, y (glTF, many OBJ files) or z")
+      .one_of({"x", "y", "z"})
+      .type_name("AXIS")
+      .show_default();
+}
+
+void declare_import_to_draw(CommandLine& app, std::string& unit, std::string& format) {
+  app.add_option("--unit", unit, "Unit of files that carry none (default mm)").type_name("UNIT");
+  app.add_option("--input-format", format, "Format of the files, where their bytes do not tell")
+      .type_name("NAME");
+}
+
+ImportOptions import_to_draw(const std::string& unit, const std::string& format) {
+  ImportOptions import;
+  import.largest_edge = std::numeric_limits<double>::infinity();  // flat faces need no splitting to be drawn
+  import.angular_deflection = 0.12;                               // round ones should look round
+  if (!unit.empty()) import.unit = length_unit(unit);
+  if (!format.empty()) import.format = format;
+  return import;
+}
+
 int picture_command(int argc, char** argv) {
   PictureArguments arguments;
   CommandLine app{"A picture (PNG) of parts and bodies, made without a display.", "flexel picture"};
@@ -196,13 +213,7 @@ int picture_command(int argc, char** argv) {
   check_output(arguments.output);
   check_outputs({{arguments.output, true}}, arguments.files, arguments.force);
   const picture::PictureOptions options = options_of(arguments);
-  ImportOptions import;
-  // Flat faces need no splitting to be drawn.
-  import.largest_edge = std::numeric_limits<double>::infinity();
-  // Outlines of round faces should look round.
-  import.angular_deflection = 0.12;
-  if (!arguments.unit.empty()) import.unit = length_unit(arguments.unit);
-  if (!arguments.input_format.empty()) import.format = arguments.input_format;
+  const ImportOptions import = import_to_draw(arguments.unit, arguments.input_format);
   const ThreadLimit limit(arguments.threads);
   Progress progress("flexel", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
   progress.stage("read");

@@ -3,7 +3,6 @@
 
 #include <chrono>
 #include <filesystem>
-#include <limits>
 #include <thread>
 
 #include "base/error.h"
@@ -16,6 +15,7 @@
 #include "base/stop.h"
 #include "base/units.h"
 #include "flexel/commands.h"
+#include "flexel/picture_command.h"
 #include "flexel/view/page.h"
 #include "flexel/view/serve.h"
 #include "formats/exchange/import.h"
@@ -48,17 +48,12 @@ void declare(CommandLine& app, ViewArguments& a) {
                  "Begin with displacements this many times as large; auto: so that they are seen")
       .type_name("FACTOR")
       .show_default();
-  app.add_option("--up", a.up, "The axis that points up: x, y (glTF, many OBJ files) or z")
-      .one_of({"x", "y", "z"})
-      .type_name("AXIS")
-      .show_default();
+  declare_up(app, a.up);
   app.add_flag("--cells", a.cells, "Take the cells of bodies along, to be shown in place of the surface");
   app.add_option("--limit", a.limit, "The largest file that --html writes, in megabytes")
       .type_name("MB")
       .show_default();
-  app.add_option("--unit", a.unit, "Unit of files that carry none (default mm)").type_name("UNIT");
-  app.add_option("--input-format", a.input_format, "Format of the files, where their bytes do not tell")
-      .type_name("NAME");
+  declare_import_to_draw(app, a.unit, a.input_format);
   add_threads_option(app, a.threads);
   app.add_flag("--quiet", a.quiet, "Say only warnings and errors");
   app.add_flag("--force", a.force, "Let the page replace a file that is read");
@@ -113,11 +108,7 @@ view::ViewSubject read_view_subject(const std::string& path, const ImportOptions
 }
 
 std::vector<view::ViewFile> read_files(const ViewArguments& arguments, Progress& progress) {
-  ImportOptions import;
-  import.largest_edge = std::numeric_limits<double>::infinity();  // flat faces need no splitting to be drawn
-  import.angular_deflection = 0.12;                               // round ones should look round
-  if (!arguments.unit.empty()) import.unit = length_unit(arguments.unit);
-  if (!arguments.input_format.empty()) import.format = arguments.input_format;
+  const ImportOptions import = import_to_draw(arguments.unit, arguments.input_format);
   const view::ViewOptions options{arguments.cells, arguments.colour};
   std::vector<view::ViewFile> files;
   std::vector<view::NoSuchAttribute> grey;  // sound where another file has it

@@ -109,12 +109,7 @@ std::vector<std::string> faults(const CadWritten& written, const MapReport& foun
 ChildLimits limits_of(const Body& body) {
   double bytes = 0;
   for (const SurfaceSource& source : body.surface.sources) bytes += static_cast<double>(source.bytes.size());
-  const double seconds = 600 + 1e-3 * bytes;
-  ChildLimits limits;
-  limits.processor = seconds * static_cast<double>(thread_count());
-  limits.wall = 3 * seconds;
-  limits.memory = .8 * available_memory();
-  return limits;
+  return limits_of_child(600 + 1e-3 * bytes, .8 * available_memory());
 }
 
 }  // namespace

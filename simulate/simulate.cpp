@@ -19,12 +19,12 @@
 #include "formats/lattice/quadratic_field.h"
 #include "simulate/conduction/conduction.h"
 #include "simulate/equilibrium/equilibrium.h"
+#include "simulate/equilibrium/equilibrium_problem.h"
 #include "simulate/equilibrium/positive_tangent.h"
 #include "simulate/estimate/coarsen.h"
 #include "simulate/estimate/error_bars.h"
 #include "simulate/estimate/stress_singularity.h"
 #include "simulate/events/fuse.h"
-#include "simulate/matter/coplanar_elements.h"
 #include "simulate/matter/fragments.h"
 #include "simulate/matter/stress.h"
 #include "simulate/models/rest_shape.h"
@@ -119,21 +119,7 @@ class Run {
         options_(options),
         progress_(progress),
         fragments_(find_fragments(body)),
-        problem_{body_,
-                 materials_of_parts(scene, body),
-                 stray_cells(fragments_),
-                 models_of_parts(scene, body),
-                 hooke_of_parts(scene, body),
-                 stray_elements(fragments_, body),
-                 {},
-                 settled_displacement(body)} {
-    const std::vector<std::uint8_t> unsupported = unsupported_elements(problem_);
-    for (std::size_t e = 0; e < unsupported.size(); ++e)
-      if (unsupported[e]) {
-        problem_.stray_element[e] = 1;
-        ++unsupported_;
-      }
-  }
+        problem_(equilibrium_problem(body_, scene, fragments_, unsupported_)) {}
 
   SimulateResult operator()();
   // m: the largest displacement of the first linear answer, where that is one from rest; else 0.
@@ -150,11 +136,11 @@ class Run {
   const SimulateOptions& options_;
   Progress& progress_;
   Fragments fragments_;
+  std::size_t unsupported_ = 0;  // elements at tips and edges that springs do not hold
   Problem problem_;
   bool buckled_ = false;
   double linear_reach_ = 0;
   int start_newton_iterations_ = 0;
-  std::size_t unsupported_ = 0;     // elements at tips and edges that springs do not hold
   std::vector<std::uint8_t> tied_;  // (elements) Mechanics::tied_elements()
   State state_;
   std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();

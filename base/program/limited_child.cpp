@@ -23,6 +23,7 @@
 
 #include "base/error.h"
 #include "base/files/memory_file.h"
+#include "base/parallel.h"
 #include "base/stop.h"
 
 namespace flexel {
@@ -174,6 +175,10 @@ ChildEnd end_of(int status) {
 }
 
 }  // namespace
+
+ChildLimits limits_of_child(double seconds, double memory) {
+  return {seconds * static_cast<double>(thread_count()), 3 * seconds, memory};
+}
 
 ChildOutput run_in_child(const std::function<int(int out)>& body, const ChildLimits& limits) {
   using Clock = std::chrono::steady_clock;

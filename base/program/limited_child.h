@@ -14,6 +14,9 @@ struct ChildLimits {
   double memory = 2e9;    // bytes that the child may have in memory
 };
 
+// Of what takes one thread so many seconds: another program may have the processor two thirds of the time.
+[[nodiscard]] ChildLimits limits_of_child(double seconds, double memory);
+
 enum class ChildEnd { finished, crashed, out_of_time, out_of_memory, not_started };
 
 // What the child exits with.

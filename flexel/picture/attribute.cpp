@@ -133,14 +133,6 @@ std::vector<double> at_elements(const Body& body, const Attribute& attribute) {
   return sum;
 }
 
-std::vector<double> at_cells(const Body& body, const Attribute& attribute) {
-  if (attribute.at == Attribute::At::cells) return attribute.values;
-  std::vector<double> values(body.cell_count(), 0);
-  for (std::size_t c = 0; c < values.size(); ++c)
-    for (const std::uint32_t e : body.cell_elements[c]) values[c] += attribute.values[e] / 8;
-  return values;
-}
-
 std::vector<double> at_vertices(const Body& body, const Attribute& attribute,
                                 const std::vector<std::uint32_t>& nearest_element) {
   const std::vector<double> elements = at_elements(body, attribute);

@@ -31,10 +31,8 @@ struct Attribute {
 // (formats/lattice/fields.h, simulate/matter/stress.h); nothing for other names.
 [[nodiscard]] std::optional<double> largest_in_matter(const Body& body, const std::string& name);
 
-// Values of cells at the elements: the mean over the element's cells, weighted by fill; and of elements in
-// the cells: the mean of the eight.
+// Values of cells at the elements: the mean over the element's cells, weighted by fill.
 [[nodiscard]] std::vector<double> at_elements(const Body& body, const Attribute& attribute);
-[[nodiscard]] std::vector<double> at_cells(const Body& body, const Attribute& attribute);
 
 // Values at the surface's vertices: interpolated in the cell under the vertex, or those of the element that
 // `nearest_element` (vertices) names.

@@ -6,7 +6,6 @@
 #include <algorithm>
 
 #include "base/error.h"
-#include "base/parallel.h"
 #include "base/resources.h"
 #include "formats/part/topology.h"
 
@@ -19,11 +18,7 @@ constexpr const char* kUnsound = "is damaged: what its reader gives does not fit
 // Sound files take a few seconds and 30 bytes of memory a byte; text of polygons with little space the most.
 ChildLimits mesh_limits(const ImportInput& input) {
   const auto bytes = static_cast<double>(input.bytes.size());
-  ChildLimits limits;
-  limits.processor = (30 + 1e-5 * bytes) * static_cast<double>(thread_count());
-  limits.wall = 3 * (30 + 1e-5 * bytes);
-  limits.memory = std::min(.8 * available_memory(), 1e9 + 200 * bytes);
-  return limits;
+  return limits_of_child(30 + 1e-5 * bytes, std::min(.8 * available_memory(), 1e9 + 200 * bytes));
 }
 
 }  // namespace

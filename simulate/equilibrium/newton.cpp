@@ -25,7 +25,6 @@
 #include <utility>
 
 #include "base/parallel.h"
-#include "simulate/linear/block_jacobi.h"
 #include "simulate/linear/conjugate_gradients.h"
 #include "simulate/linear/multigrid.h"
 #include "simulate/linear/vector_products.h"

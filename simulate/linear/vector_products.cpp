@@ -9,9 +9,4 @@ double dot(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
   return parallel_sum<double>(a.size(), [&](std::size_t i) { return a[i].dot(b[i]); });
 }
 
-double weighted_dot(const std::vector<Vec3>& a, const std::vector<Vec3>& b,
-                    const std::vector<double>& weight) {
-  return parallel_sum<double>(a.size(), [&](std::size_t i) { return weight[i] * a[i].dot(b[i]); });
-}
-
 }  // namespace flexel::simulate

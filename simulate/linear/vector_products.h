@@ -9,8 +9,4 @@ namespace flexel::simulate {
 // sum_i a_i . b_i, in parallel; the same bits for any thread count.
 [[nodiscard]] double dot(const std::vector<Vec3>& a, const std::vector<Vec3>& b);
 
-// sum_i weight_i a_i . b_i, likewise.
-[[nodiscard]] double weighted_dot(const std::vector<Vec3>& a, const std::vector<Vec3>& b,
-                                  const std::vector<double>& weight);
-
 }  // namespace flexel::simulate

@@ -9,13 +9,13 @@
 #include "base/error.h"
 #include "base/human.h"
 #include "simulate/equilibrium/equilibrium.h"
+#include "simulate/equilibrium/equilibrium_problem.h"
 #include "simulate/equilibrium/newton.h"
 #include "simulate/estimate/coarsen.h"
 #include "simulate/events/fuse.h"
 #include "simulate/linear/free_motions.h"
 #include "simulate/linear/multigrid.h"
 #include "simulate/linear/vector_products.h"
-#include "simulate/matter/coplanar_elements.h"
 #include "simulate/matter/fragments.h"
 #include "simulate/matter/masses.h"
 #include "simulate/models/rest_shape.h"
@@ -75,18 +75,7 @@ class CellVibration final : public VibratingBody {
   CellVibration(const Body& body, const Scene& scene)
       : body_(body),
         fragments_(find_fragments(body)),
-        problem_{body,
-                 materials_of_parts(scene, body),
-                 stray_cells(fragments_),
-                 models_of_parts(scene, body),
-                 hooke_of_parts(scene, body),
-                 stray_elements(fragments_, body),
-                 {},
-                 settled_displacement(body)} {
-    const std::vector<std::uint8_t> unsupported = unsupported_elements(problem_);
-    for (std::size_t e = 0; e < unsupported.size(); ++e)
-      if (unsupported[e]) problem_.stray_element[e] = 1;
-  }
+        problem_(equilibrium_problem(body, scene, fragments_, unsupported_)) {}
 
   void prepare(const Scene& scene, const SimulateOptions& options, SimulateResult& result,
                Progress& progress);
@@ -108,6 +97,7 @@ class CellVibration final : public VibratingBody {
 
   const Body& body_;
   Fragments fragments_;
+  std::size_t unsupported_ = 0;  // elements that no connection holds
   Problem problem_;
   std::unique_ptr<Mechanics> mechanics_;
   State state_;
@@ -197,9 +187,7 @@ State CellVibration::show(const Eigen::VectorXd& shape, Body& body) const {
   State state = state_;
   for (std::size_t e = 0; e < state.displacement.size(); ++e)
     state.displacement[e] += shape.segment<3>(static_cast<Eigen::Index>(3 * e));
-  carry_strays(fragments_, problem_, mechanics_->stencil(), state);
-  for (std::size_t e = 0; e < state.displacement.size(); ++e)
-    body.position[e] = body.rest[e] + state.displacement[e];
+  show_elements(fragments_, problem_, mechanics_->stencil(), state, body);
   return state;
 }
 

@@ -58,8 +58,7 @@ void QuadraticMass::cut_cell(std::size_t cell, CellValues& values) const {
   along_axis<3, kPoints>(values.data(), one.data(), 9, 3, at_points_.data());
   along_axis<3, kPoints>(one.data(), two.data(), 3, 3 * kPoints, at_points_.data());
   along_axis<3, kPoints>(two.data(), at.data(), 1, 3 * kSquare, at_points_.data());
-  const Moments own = system_.moments(cell);
-  const Moments weight = own + kOutside * (whole_cell_moments() - own);
+  const Moments weight = system_.stiffness_moments(cell);
   for (std::size_t k = 0; k < kMoments; ++k)
     for (std::size_t axis = 0; axis < 3; ++axis) at[3 * k + axis] *= weight[static_cast<Eigen::Index>(k)];
   std::array<double, 15> back;

@@ -219,10 +219,8 @@ State QuadraticVibration::show(const Eigen::VectorXd& shape, Body& body) const {
   state.displacement = element_displacement(*system_, moved);
   const StiffnessPattern pattern =
       stiffness_pattern(body_, active_cells(problem_), connection_rows({}, body_.element_count()), {}, false);
-  carry_strays(fragments_, problem_, pattern.stencil, state);
+  show_elements(fragments_, problem_, pattern.stencil, state, body);
   write_field(system_->nodes(), moved, state, body);
-  for (std::size_t e = 0; e < body.element_count(); ++e)
-    body.position[e] = body.rest[e] + state.displacement[e];
   return state;
 }
 

@@ -14,6 +14,13 @@ std::size_t VibratingNodes::freedoms() const {
   return free;
 }
 
+void show_elements(const Fragments& fragments, const Problem& problem, const Stencil& stencil, State& state,
+                   Body& body) {
+  carry_strays(fragments, problem, stencil, state);
+  for (std::size_t e = 0; e < state.displacement.size(); ++e)
+    body.position[e] = body.rest[e] + state.displacement[e];
+}
+
 // Of linear cells: 4 c^2 / h^2 along each axis, c the speed of compression.
 double largest_eigenvalue(const Problem& problem) {
   double largest = 0;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "simulate/matter/fragments.h"
 #include "simulate/modes/eigenpairs.h"
 #include "simulate/state/state.h"
 
@@ -37,6 +38,10 @@ class VibratingBody {
   // The scene's loads act.
   [[nodiscard]] virtual bool prestressed() const = 0;
 };
+
+// Moves the elements of `body` by `state`, stray ones as what is nearest to them moved (carry_strays()).
+void show_elements(const Fragments& fragments, const Problem& problem, const Stencil& stencil, State& state,
+                   Body& body);
 
 // (1/s)^2: about the largest eigenvalue that a lattice of these parts has.
 [[nodiscard]] double largest_eigenvalue(const Problem& problem);

@@ -12,6 +12,7 @@
 #include "simulate/effects/plasticity.h"
 #include "simulate/matter/masses.h"
 #include "simulate/paper/connection_friction.h"
+#include "tests/sanitized.h"
 #include "tests/simulate/centre_body.h"
 #include "tests/simulate/scene_case.h"
 #include "tests/simulate/stepped.h"
@@ -114,7 +115,8 @@ TEST(ConnectionYield, ATornBarIsTwoPiecesInTheFileToo) {
 
 // sigma = yield + hardening a at the end of a slow pull of true stress P / A0 exp(strain), and that set stays.
 TEST(ConnectionYield, APulledBarFlowsAtItsYieldStress) {
-  for (const char* hooke : {"paper", "isotropic"}) {
+  for (const char* hooke : less_if_sanitized<std::vector<const char*>>({"paper", "isotropic"}, {"paper"},
+                                                                       "one constant of two")) {
     const double stress = 15e3, yield = 10e3, hardening = 2e5;
     const std::string scene =
         std::string("[parts.box]\nhooke = \"") + hooke +

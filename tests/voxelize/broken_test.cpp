@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "tests/sanitized.h"
 #include "tests/voxelize/shapes.h"
 #include "voxelize/classify/axis_parity.h"
 #include "voxelize/mesh/part_mesh.h"
@@ -122,7 +123,8 @@ TEST(Broken, SelfIntersectingShellsNeverHoldLessThanNothing) {
   std::mt19937 random(23);
   std::normal_distribution<double> noise(0, .35);
   std::size_t impossible = 0;
-  for (int trial = 0; trial < 8; ++trial) {
+  const int trials = less_if_sanitized(8, 2, "two shells of eight");
+  for (int trial = 0; trial < trials; ++trial) {
     Mesh crumpled = trial % 2 == 0 ? icosphere(2, 1) : torus(1, .3, 24, 12);
     for (Vec3& vertex : crumpled.vertices) vertex += Vec3(noise(random), noise(random), noise(random));
     for (const double size : {.1, .3}) {
@@ -138,7 +140,7 @@ TEST(Broken, SelfIntersectingShellsNeverHoldLessThanNothing) {
       impossible += part.overlapping_voxels;
     }
   }
-  EXPECT_GT(impossible, 1000u);  // the shells do pass through themselves
+  EXPECT_GT(impossible, 125u * static_cast<unsigned>(trials));  // the shells do pass through themselves
 }
 
 TEST(Broken, VotingOnAClosedMeshIsNearTheExactFill) {
