@@ -47,7 +47,7 @@ void declare(CommandLine& app, Arguments& arguments) {
   app.add_option("--placement", arguments.placement, "elements at the voxels' corner (default) or centre");
   app.add_option("--unit", arguments.unit, "length unit of files that carry none (default mm)");
   app.add_option("--align", arguments.align,
-                 "lattice to the part's flat faces: snap (default), to its box: box, or none");
+                 "lattice to the part's flat faces, its box or neither: snap (default), box or none");
   app.add_option("--heal", arguments.heal,
                  "broken surfaces: auto (default) repairs small damage and refuses what cannot be told, wrap "
                  "(wrap:LENGTH) wraps them, none takes them as they are");
