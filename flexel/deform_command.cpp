@@ -359,7 +359,9 @@ class GoalRuns {
 
   SolvedRun solve(std::optional<double> size, const GoesOn& goes_on) {
     SolvedRun run;
-    progress_.update(0, size ? "--size " + size_text(*size) : "");
+    const AccuracyGoal& goal = *plan_.goal;  // without a time of its own the search takes what it needs
+    progress_.update(goal.within ? seconds_since(goal.began) / *goal.within : 0,
+                     size ? "--size " + size_text(*size) : "");
     drop_warnings();
     run.size = size.value_or(0);
     voxelize::VoxelizeOptions options = plan_.job.voxelize;

@@ -1,8 +1,10 @@
 """Views keep what they are of alive and cannot change it; meshes in and out; units; what is wrong is said as the programs say it."""
 
+import ast
 import gc
 import os
 import pathlib
+import re
 import resource
 import time
 import warnings
@@ -219,6 +221,33 @@ def test_pages_of_all_that_is_shown():
         check.assertIn("bar", page)
         check.assertRegex(shown._repr_html_(), "^<iframe srcdoc=")
         check.assertEqual(flexel.picture(shown, size="100x100")[:4], b"\x89PNG")
+
+
+def test_the_stub_is_of_the_module():
+    """_flexel.pyi has the functions, classes and members of the module, with as many arguments."""
+    flexel = module()
+    core = flexel._flexel
+    stub = ast.parse(pathlib.Path(flexel.__file__).with_name("_flexel.pyi").read_text())
+
+    def members(thing):
+        return {name for name in vars(thing) if not name.startswith("_")}
+
+    def check_arguments(node, function):
+        signature = re.match(r"\w+\((.*)\) -> ", function.__doc__.splitlines()[0]).group(1)
+        check.assertEqual(len(re.findall(r"\b(?:arg\d+|self): ", signature)), len(node.args.args), node.name)
+
+    functions = {node.name: node for node in stub.body if isinstance(node, ast.FunctionDef)}
+    classes = {node.name: node for node in stub.body if isinstance(node, ast.ClassDef)}
+    values = {node.target.id for node in stub.body if isinstance(node, ast.AnnAssign)}
+    check.assertEqual(set(functions) | set(classes) | values, members(core))
+    for name, node in functions.items():
+        check_arguments(node, getattr(core, name))
+    for name, node in classes.items():
+        methods = {each.name: each for each in node.body if isinstance(each, ast.FunctionDef)}
+        fields = {each.target.id for each in node.body if isinstance(each, ast.AnnAssign)}
+        check.assertEqual(set(methods) | fields, members(getattr(core, name)), name)
+        for method, each in methods.items():
+            check_arguments(each, getattr(getattr(core, name), method))
 
 
 def test_limits_of_simulate():

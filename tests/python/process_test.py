@@ -120,6 +120,21 @@ def test_limits_of_an_outer_run_are_its_own():
     check.assertEqual(found, [41 * 11 * 11] * 5)
 
 
+def test_progress_of_a_run_to_equilibrium():
+    """By the residual: it grows, and so tells the time left."""
+    flexel = module()
+    shares = []
+
+    def progress(stage, share, note, left):
+        if stage == "simulate":
+            shares.append(share)
+
+    flexel.simulate(box_body(flexel, 0.0005), estimate=False, progress=progress, **PULL)
+    check.assertGreater(len(shares), 3)
+    check.assertEqual(shares, sorted(shares))
+    check.assertTrue(any(0.05 < share < 1 for share in shares), f"{shares}")
+
+
 def test_progress_runs_nothing():
     """It may be told on any thread of the run, which holds the lock: refused, not a wait for ever."""
     flexel = module()
