@@ -6,7 +6,7 @@ import re
 import shutil
 import sys
 
-from harness import BIN, SOURCE, Skip, box, expect, expect_ok, main, run
+from harness import BIN, SOURCE, Skip, box, expect, expect_ok, main, need, run
 
 # Linked as shared libraries with interfaces of C, or tools: their packages carry their own licences.
 NOT_COMPILED_IN = {"build-essential", "cmake", "ninja-build", "zlib1g-dev", "libpng-dev", "libfreetype-dev", "libmicrohttpd-dev", "gnuplot-nox",
@@ -24,6 +24,47 @@ def test_licences_of_all_that_is_compiled_in():
     used = set(re.findall(r"(?<=\n\n)Files: .*?\nLicense: (.*?)\n", text, re.S))
     given = set(re.findall(r"\n\nLicense: (.*)\n ", text))
     expect(used == given, f"licences without text, or without use: {used ^ given}")
+
+
+def git(*arguments):
+    return expect_ok(run("git", "-c", "user.name=a", "-c", "user.email=a@b.invalid", *arguments))
+
+
+def test_a_release_is_of_what_is_committed():
+    """tools/release begins with a clean clone: what is not committed, or lies in the folder, is refused before anything is built."""
+    need("git")
+    pathlib.Path("tree/tools").mkdir(parents=True)
+    shutil.copy(SOURCE / "tools/release", "tree/tools/release")
+    for name in ("CMakeLists.txt", "CHANGELOG.md"):
+        shutil.copy(SOURCE / name, f"tree/{name}")
+    pathlib.Path("tree/tools/check").write_text("#!/bin/sh\necho checked in $PWD $*; exit 7\n")
+    os.chmod("tree/tools/check", 0o755)
+    git("init", "-q", "tree")
+    git("-C", "tree", "add", "-A")
+    git("-C", "tree", "commit", "-qm", "all of it")
+
+    def refused(*arguments):
+        done = run("tree/tools/release", *arguments)
+        expect(done.code == 2 and done.err.startswith("tools/release: error: ") and len(done.err.splitlines()) == 1, f"{done}")
+        return done.err
+
+    out = pathlib.Path("out").absolute()
+    expect("unknown option" in refused(out, "--fast"), "an unknown option")
+    out.mkdir(exist_ok=True)
+    (out / "old").touch()
+    expect("is not empty" in refused(out), "a folder with files")
+    (out / "old").unlink()
+    done = run("tree/tools/release", out)
+    expect(done.code == 7 and b"checked in /" in done.out and str(pathlib.Path("tree").absolute()).encode() not in done.out.split(b"checked in")[1],
+           f"{done}\n{done.out.decode()}")
+    expect(not os.listdir(out), "a release of what failed its tests")
+    pathlib.Path("tree/new").touch()
+    expect("has changes" in refused(out), "a file that is not committed")
+    git("-C", "tree", "add", "-A")
+    git("-C", "tree", "commit", "-qm", "more")
+    version = re.search(r"project\(flexel VERSION ([0-9.]+)", pathlib.Path("tree/CMakeLists.txt").read_text())[1]
+    git("-C", "tree", "tag", f"v{version}", "HEAD~1")
+    expect("raise the version" in refused(out), "a version that another commit has")
 
 
 def test_a_tree_that_was_moved():
