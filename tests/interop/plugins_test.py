@@ -22,25 +22,31 @@ def expect_sag(found, where):
 
 
 BLENDER = """
-import sys
+import os, sys
 import bpy, bmesh
 sys.path.insert(0, {plugins!r})
 import blender_flexel
+def bar_in(scene):
+    mesh = bpy.data.meshes.new("bar")
+    bar = bpy.data.objects.new("bar", mesh)
+    scene.collection.objects.link(bar)
+    cells = bmesh.new()
+    bmesh.ops.create_cube(cells, size=1)
+    bmesh.ops.subdivide_edges(cells, edges=cells.edges[:], cuts=8, use_grid_fill=True)
+    cells.to_mesh(mesh)
+    bar.scale = (0.08, 0.01, 0.01)
+    for name, x in (("root", -0.5), ("tip", 0.5)):
+        bar.vertex_groups.new(name=name).add([v.index for v in mesh.vertices if abs(v.co.x - x) < 1e-6], 1, "ADD")
+    settings = scene.flexel
+    settings.held, settings.pushed, settings.force, settings.size = "root", "tip", (0, 0, -5), "2.5 mm"
+    return mesh, bar, settings
+"""
+BLENDER_BATCH = BLENDER + """
 bpy.ops.wm.read_factory_settings(use_empty=True)
 blender_flexel.register()
 scene = bpy.context.scene
-mesh = bpy.data.meshes.new("bar")
-bar = bpy.data.objects.new("bar", mesh)
-scene.collection.objects.link(bar)
-cells = bmesh.new()
-bmesh.ops.create_cube(cells, size=1)
-bmesh.ops.subdivide_edges(cells, edges=cells.edges[:], cuts=8, use_grid_fill=True)
-cells.to_mesh(mesh)
-for name, x in (("root", -0.5), ("tip", 0.5)):
-    bar.vertex_groups.new(name=name).add([v.index for v in mesh.vertices if abs(v.co.x - x) < 1e-6], 1, "ADD")
+mesh, bar, settings = bar_in(scene)
 bpy.context.view_layer.objects.active = bar
-settings = scene.flexel
-settings.held, settings.pushed, settings.force, settings.size = "root", "tip", (0, 0, -5), "2.5 mm"
 # Metres; millimetres, turned; mirrored.
 for unit, scale, turn in ((1, (0.08, 0.01, 0.01), 0), (0.001, (80, 10, 10), 0.7), (1, (0.08, -0.01, 0.01), 0)):
     scene.unit_settings.scale_length, bar.scale, bar.rotation_euler.z = unit, scale, turn
@@ -64,9 +70,39 @@ except RuntimeError as error:
 """
 
 
+# The panel's button: the run goes on beside Blender until it is done.
+BLENDER_WINDOW = BLENDER + """
+blender_flexel.register()
+def begin():
+    window = bpy.context.window_manager.windows[0]
+    area = next(each for each in window.screen.areas if each.type == "VIEW_3D")
+    mesh, bar, settings = bar_in(window.scene)
+    with bpy.context.temp_override(window=window, area=area, object=bar, active_object=bar):
+        print("BEGUN", bpy.ops.object.flexel_deform("INVOKE_DEFAULT"), flush=True)
+    def end():
+        if mesh.shape_keys is None:
+            return 0.2
+        moved = [p.co.z * 0.01 - v.co.z * 0.01 for p, v in zip(mesh.shape_keys.key_blocks["Flexel"].data, mesh.vertices)]
+        print("FOUND", -min(moved), flush=True)
+        os._exit(0)
+    bpy.app.timers.register(end)
+bpy.app.timers.register(begin, first_interval=0.5)
+"""
+
+
+def test_blender_window():
+    need("blender", "xvfb-run")
+    write("drive.py", BLENDER_WINDOW.format(plugins=str(PLUGINS)))
+    said = run("xvfb-run", "-a", "blender", "--factory-startup", "--python", os.path.abspath("drive.py"), timeout=110,
+               env={**on_path(), "LIBGL_ALWAYS_SOFTWARE": "1", "HOME": os.getcwd()})
+    text = said.out.decode()
+    expect("BEGUN {'RUNNING_MODAL'}" in text and "FOUND" in text, f"{said}\n{text}")
+    expect_sag(float(re.search(r"FOUND (\S+)", text)[1]), "Blender")
+
+
 def test_blender():
     need("blender")
-    write("drive.py", BLENDER.format(plugins=str(PLUGINS)))
+    write("drive.py", BLENDER_BATCH.format(plugins=str(PLUGINS)))
     said = run("blender", "-b", "--factory-startup", "--python-exit-code", "3", "--python", os.path.abspath("drive.py"), timeout=110, env=on_path())
     text = said.out.decode()
     expect(said.code == 0, f"{said}\n{text}")
