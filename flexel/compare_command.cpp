@@ -17,6 +17,7 @@
 #include "base/human.h"
 #include "base/parallel.h"
 #include "base/printable.h"
+#include "base/program/brief_output.h"
 #include "base/program/termination.h"
 #include "base/units.h"
 #include "flexel/commands.h"
@@ -315,12 +316,14 @@ int compare_command(int argc, char** argv) {
   const StopEndsProcess nothing_is_left;
   const ThreadLimit limit(arguments.threads);
   Progress progress("flexel", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
-  Progress inner("flexel", Progress::Mode::quiet);
+  Progress inner("flexel", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
   std::vector<Finding> all;
   std::string name;
   for (const std::string& file : arguments.job.parts) {
     progress.stage(std::filesystem::path(file).filename().string());
+    const BriefOutput bars_only(true);
     all.push_back(run_named(arguments, file, name, inner));
+    inner.finish();
   }
   progress.finish();
   std::string text = arguments.json ? comparison_json(all) : printable_lines(table_of(all));

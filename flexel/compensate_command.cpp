@@ -43,7 +43,7 @@ struct CompensateArguments {
   std::string summary;
   mapping::MapArguments map;
   int threads = 0;
-  bool quiet = false;
+  bool quiet = false, json = false;
 };
 
 struct Output {
@@ -286,6 +286,7 @@ std::vector<Output> plan_outputs(const CompensateArguments& arguments) {
   }
   check_cad_output(arguments.map, {}, cad);
   names.push_back({arguments.summary});
+  if (arguments.json) names.push_back({"-"});
   std::vector<std::string> inputs = arguments.job.parts;
   inputs.push_back(arguments.job.scene);
   check_outputs(names, inputs, arguments.job.force);
@@ -316,6 +317,7 @@ int compensate_command(int argc, char** argv) {
       .type_name("FILE")
       .one_value_each();
   app.add_option("--summary", arguments.summary, "Write what remains as JSON, in m").type_name("FILE");
+  app.add_flag("--json", arguments.json, "Print the summary as JSON to stdout (docs/reference/json.md)");
   app.add_flag("--ascii", arguments.map.ascii, "Write text where a format has both");
   add_threads_option(app, arguments.threads);
   app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
@@ -339,6 +341,7 @@ int compensate_command(int argc, char** argv) {
   together.appear();
   progress.finish();
   compensation.tell();
+  if (arguments.json) write_text(compensation.summary(), "-");
   return kExitDone;
 }
 

@@ -301,7 +301,13 @@ class ModelChoice {
 class GoalRuns {
  public:
   GoalRuns(const DeformArguments& arguments, Plan& plan, const Surface& surface, Progress& progress)
-      : arguments_(arguments), plan_(plan), surface_(surface), progress_(progress), model_(plan.job) {}
+      : arguments_(arguments),
+        plan_(plan),
+        surface_(surface),
+        progress_(progress),
+        inner_("flexel",
+               arguments.quiet || arguments.verbose ? Progress::Mode::quiet : Progress::Mode::automatic),
+        model_(plan.job) {}
 
   SolvedRun operator()(std::optional<double> size, const GoesOn& goes_on) {
     std::optional<StopAfter> limit;
@@ -330,7 +336,7 @@ class GoalRuns {
   [[nodiscard]] mapping::MapResult map(SolvedRun& run, mapping::MapMethod method) {
     mapping::MapOptions options;
     options.method = method;
-    return map_part(run.voxels.body, options, {}, quiet_).result;
+    return map_part(run.voxels.body, options, {}, inner_).result;
   }
   [[nodiscard]] const ModelChoice& model() const { return model_; }
   void drop_warnings() { (void)warnings_.take(); }
@@ -376,7 +382,7 @@ class GoalRuns {
     SolvedRun run;
     const double processor = processor_seconds();
     const auto began = std::chrono::steady_clock::now();
-    run.voxels = voxelize::voxelize(surface_, options, quiet_);
+    run.voxels = voxelize::voxelize(surface_, options, inner_);
     run.voxelize_seconds = seconds_since(began);
     run.processor_seconds = processor_seconds() - processor;
     run.size = run.voxels.size;
@@ -385,7 +391,9 @@ class GoalRuns {
   }
 
   SolvedRun solve(std::optional<double> size, const GoesOn& goes_on) {
-    progress_.update(0, size ? "--size " + size_text(*size) : "");
+    const AccuracyGoal& goal = *plan_.goal;  // without a time of its own the search takes what it needs
+    progress_.update(goal.within ? seconds_since(goal.began) / *goal.within : 0,
+                     size ? "--size " + size_text(*size) : "");
     SolvedRun run = std::move(made(size));
     made_.reset();
     if (!goes_on(run.voxels.body.cell_count())) {
@@ -399,9 +407,9 @@ class GoalRuns {
     ++tries_;
     try {
       add_actions(job, run.voxels.body);
-      run.simulated = simulate::simulate(run.voxels.body, job.scene, asked, quiet_);
+      run.simulated = simulate::simulate(run.voxels.body, job.scene, asked, inner_);
     } catch (const InputError&) {
-      voxelize::report(run.voxels, quiet_);  // its warnings may say why
+      voxelize::report(run.voxels, inner_);  // its warnings may say why
       throw;
     }
     std::error_code ignored;
@@ -421,7 +429,7 @@ class GoalRuns {
   Plan& plan_;
   const Surface& surface_;
   Progress& progress_;
-  Progress quiet_{"flexel", Progress::Mode::quiet};
+  Progress inner_;  // of one run: bars and warnings, no lines
   int tries_ = 0;
   bool solved_ = false;  // one of them
   HeldWarnings warnings_;

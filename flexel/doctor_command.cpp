@@ -29,12 +29,17 @@
 namespace flexel::commands {
 namespace {
 
+#ifdef FLEXEL_STEP
+constexpr bool kReadsCad = true;
+#else
+constexpr bool kReadsCad = false;  // this build has no flexel-cad
+#endif
+
 struct Tool {
   std::string name, what;
-  bool own = false;  // of Flexel
+  bool own = false;     // of Flexel
+  bool needed = false;  // without it the installation is damaged
   bool found = false;
-  // Without it the installation is damaged; a build may leave flexel-cad out.
-  [[nodiscard]] bool needed() const { return own && name != "flexel-cad"; }
 };
 
 bool on_path(const std::string& name) {
@@ -46,15 +51,15 @@ bool on_path(const std::string& name) {
 }
 
 std::vector<Tool> tools() {
-  std::vector<Tool> all = {{"flexel-voxelize", "parts to lattices", true},
-                           {"flexel-simulate", "lattices deformed", true},
-                           {"flexel-map", "deformed parts", true},
-                           {"flexel-meshes", "FBX, Collada and other scenes", true},
-                           {"flexel-distances.so", "repairs of open surfaces", true},
-                           {"flexel-serve.so", "flexel view without --html", true},
-                           {"flexel-cad", "STEP, IGES and BREP", true},
+  std::vector<Tool> all = {{"flexel-voxelize", "parts to lattices", true, true},
+                           {"flexel-simulate", "lattices deformed", true, true},
+                           {"flexel-map", "deformed parts", true, true},
+                           {"flexel-meshes", "FBX, Collada and other scenes", true, true},
+                           {"flexel-distances.so", "repairs of open surfaces", true, true},
+                           {"flexel-serve.so", "flexel view without --html, flexel clay", true, true},
+                           {"flexel-cad", "STEP, IGES and BREP", true, kReadsCad},
                            {"gnuplot", "plots of flexel study"},
-                           {"gmsh", "flexel export --mesh gmsh, flexel study --against calculix"},
+                           {"gmsh", "flexel export --mesh tet, flexel study --against calculix"},
                            {"ccx", "flexel study --against calculix"}};
   for (Tool& tool : all) try {
       tool.found = tool.own ? !own_program(tool.name).empty() : on_path(tool.name);
@@ -109,10 +114,11 @@ std::string as_text(const std::vector<Tool>& found, const SelfTest& test) {
       fmt::format("version     {}\ncores       {}\nmemory      {} free\nkernels     {}\n", version(),
                   default_thread_count(), human_bytes(available_memory()), instruction_set());
   for (const Tool& tool : found)
-    text += fmt::format("{:<7}     {:<20} {}\n",
-                        tool.found      ? "there"
-                        : tool.needed() ? "MISSING"
-                                        : "missing",
+    text += fmt::format("{:<8}    {:<20} {}\n",
+                        tool.found    ? "there"
+                        : tool.needed ? "MISSING"
+                        : tool.own    ? "left out"
+                                      : "missing",
                         tool.name, tool.what);
   text += fmt::format("self-test   {}: a pulled bar stores {:.6g} nJ, {:.6g} are known; {}\n",
                       test.passed() ? "passed" : "FAILED", 1e9 * test.found, 1e9 * test.known,
@@ -127,7 +133,8 @@ std::string as_json(const std::vector<Tool>& found, const SelfTest& test) {
                                  {"isa", instruction_set()}};
   json["tools"] = nlohmann::ordered_json::array();
   for (const Tool& tool : found)
-    json["tools"].push_back({{"name", tool.name}, {"own", tool.own}, {"found", tool.found}});
+    json["tools"].push_back(
+        {{"name", tool.name}, {"own", tool.own}, {"needed", tool.needed}, {"found", tool.found}});
   json["self_test"] = {
       {"passed", test.passed()}, {"found", test.found}, {"known", test.known}, {"seconds", test.seconds}};
   return json.dump(2) + "\n";
@@ -147,9 +154,12 @@ int doctor_command(int argc, char** argv) {
   out.write(json ? as_json(found, test) : as_text(found, test));
   out.commit();
   if (!test.passed()) throw InputError("the self-test failed: this machine or this build computes wrongly");
+  std::vector<std::string> missing;
   for (const Tool& tool : found)
-    if (tool.needed() && !tool.found)
-      throw InputError(fmt::format("{} is missing: install Flexel again", tool.name));
+    if (tool.needed && !tool.found) missing.push_back(tool.name);
+  if (!missing.empty())
+    throw InputError(fmt::format("{} {} missing: install Flexel again", fmt::join(missing, ", "),
+                                 missing.size() == 1 ? "is" : "are"));
   return kExitDone;
 }
 

@@ -32,7 +32,7 @@ constexpr std::size_t kLookCells = 3000;
 struct ExportArguments {
   JobArguments job;
   std::string output, mesh = "hex", element = "C3D8I", nlgeom = "auto", summary;
-  bool calculix = false, quiet = false;
+  bool calculix = false, quiet = false, json = false;
   int threads = 0;
 };
 
@@ -53,6 +53,7 @@ void declare(CommandLine& app, ExportArguments& arguments) {
       .show_default();
   app.add_option("--summary", arguments.summary, "Write what was written as JSON (docs/guide/export.md)")
       .type_name("FILE");
+  app.add_flag("--json", arguments.json, "Print the summary as JSON to stdout (docs/reference/json.md)");
   add_threads_option(app, arguments.threads);
   app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
 }
@@ -73,7 +74,8 @@ void check(const ExportArguments& arguments) {
     throw InputError("--element is for --mesh hex; tetrahedra are C3D10");
   std::vector<std::string> inputs = arguments.job.parts;
   inputs.push_back(arguments.job.scene);
-  check_outputs({{arguments.output}, {arguments.summary}}, inputs, arguments.job.force);
+  check_outputs({{arguments.output}, {arguments.summary}, {arguments.json ? "-" : ""}}, inputs,
+                arguments.job.force);
 }
 
 simulate::Problem problem_of(const Body& body, const simulate::Scene& scene) {
@@ -279,6 +281,7 @@ int export_command(int argc, char** argv) {
   write_text(calculix_file(analysis, options), arguments.output);
   if (!arguments.summary.empty()) write_text(summary(analysis, arguments), arguments.summary);
   outputs.appear();
+  if (arguments.json) write_text(summary(analysis, arguments), "-");
   return kExitDone;
 }
 

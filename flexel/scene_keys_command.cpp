@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/files/files.h"
@@ -59,17 +60,38 @@ std::string as_words() {
   return fmt::format("{}\n{}\n", fmt::join(tables, "\n"), fmt::join(keys, "\n"));
 }
 
+std::string as_json() {
+  nlohmann::ordered_json groups = nlohmann::ordered_json::array();
+  for (const simulate::SceneKeyGroup& group : simulate::scene_key_groups()) {
+    nlohmann::ordered_json keys = nlohmann::ordered_json::array();
+    for (const simulate::SceneKey& key : group.keys)
+      keys.push_back({{"table", key.table},
+                      {"key", key.key},
+                      {"value", value_of(key)},
+                      {"default", key.standard},
+                      {"help", key.help}});
+    groups.push_back({{"name", group.name},
+                      {"help", group.help},
+                      {"acts", group.acts},
+                      {"models", group.models},
+                      {"keys", std::move(keys)}});
+  }
+  return nlohmann::ordered_json{{"groups", std::move(groups)}}.dump(2) + "\n";
+}
+
 }  // namespace
 
 int scene_keys_command(int argc, char** argv) {
-  bool markdown = false, words = false;
+  bool markdown = false, words = false, json = false;
   CommandLine app{"Lists the keys of a scene: where each may stand, what it takes, its default.",
                   "flexel scene-keys"};
   const Option as_page = app.add_flag("--markdown", markdown, "As tables in Markdown");
-  app.add_flag("--words", words, "Tables and keys alone, a line each, for completion").excludes(as_page);
+  const Option as_list =
+      app.add_flag("--words", words, "Tables and keys alone, a line each, for completion").excludes(as_page);
+  app.add_flag("--json", json, "As JSON (docs/reference/json.md)").excludes(as_page).excludes(as_list);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   OutputFile out("-", false);
-  out.write(words ? as_words() : markdown ? as_markdown() : as_text());
+  out.write(json ? as_json() : words ? as_words() : markdown ? as_markdown() : as_text());
   out.commit();
   return kExitDone;
 }

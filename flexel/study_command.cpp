@@ -40,7 +40,7 @@ struct StudyArguments {
   JobArguments job;  // parts, and what happens to them
   std::vector<std::string> references;
   std::string budget = "2 min", output, against, heal;
-  bool quiet = false;
+  bool quiet = false, json = false;
 };
 
 void declare(CommandLine& app, StudyArguments& a) {
@@ -64,6 +64,7 @@ void declare(CommandLine& app, StudyArguments& a) {
   app.add_option("--heal", a.heal, "Broken surfaces: auto, wrap or none (docs/reference/healing.md)")
       .type_name("HOW");
   app.add_option("--edge", a.job.edge, "Split the mesh to this longest edge").type_name("LENGTH");
+  app.add_flag("--json", a.json, "Print study.json to stdout too (docs/reference/json.md)");
   app.add_flag("--quiet", a.quiet, "Say only warnings and errors");
 }
 
@@ -217,6 +218,10 @@ int study_command(int argc, char** argv) {
   const TerminationWaits waits;  // the folder of its runs is removed
   study::Session session(wanted, progress);
   session.run();
+  if (arguments.json) {
+    const Bytes written = read_all((fs::path(arguments.output) / "study.json").string());
+    write_text({reinterpret_cast<const char*>(written.data()), written.size()}, "-");
+  }
   return session.interrupted() ? kExitInterrupted : kExitDone;
 }
 

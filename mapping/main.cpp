@@ -1,7 +1,6 @@
 // flexel-map: a deformed body in, its surface deformed out; or any other surface, points, or a series of
 // bodies.
 #include <cmath>
-#include <filesystem>
 
 #include "base/error.h"
 #include "base/files/files.h"
@@ -37,7 +36,7 @@ struct Arguments {
   std::string body = "-", output, unit, onto, edge, points, far, binding, save_binding;
   double far_distance = 3;
   MapArguments map;
-  bool quiet = false, force = false;
+  bool quiet = false, force = false, json = false;
   int threads = 0;
 };
 
@@ -78,6 +77,8 @@ void declare(CommandLine& app, Arguments& arguments) {
   app.add_option("--unit", arguments.unit, "Unit of the coordinates written; else that of the input")
       .type_name("UNIT");
   add_threads_option(app, arguments.threads);
+  app.add_flag("--json", arguments.json,
+               "Print the report of --report to stdout; the result needs a file (-o)");
   app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
   app.add_flag("--force", arguments.force, "Let results replace files that are read");
   app.add_option("-o,--output", arguments.output,
@@ -170,6 +171,8 @@ Plan make_plan(Arguments& arguments, const CommandLine& app) {
     throw InputError("only one input can come from stdin");
   if (plan.series && arguments.output == "-")
     throw InputError("a series gives a file for each frame: name it with -o, such as -o bent.stl");
+  if (plan.series && arguments.json)
+    throw InputError("--json is of one state: give one frame, or --report for a file a frame");
   if (arguments.points.empty() && !arguments.output.empty())
     plan.output = map_output(arguments.map.format, arguments.output, arguments.map.ascii, plan.unit,
                              arguments.map.scale, arguments.map.attributes);
@@ -188,6 +191,7 @@ Plan make_plan(Arguments& arguments, const CommandLine& app) {
                                            arguments.binding};
   std::vector<OutputName> outputs = {{arguments.save_binding, true}};
   if (!plan.series) outputs.insert(outputs.end(), {{arguments.map.report}, {arguments.output}});
+  if (arguments.json) outputs.push_back({"-"});
   check_outputs(outputs, inputs, arguments.force);
   return plan;
 }
@@ -270,6 +274,7 @@ class Run {
       write_report(found, arguments_.map, plan_.options, report);
     } catch (const InvalidMappingError&) {
       outputs.appear();
+      print_json(found);
       throw;
     }
     progress_.stage("write");
@@ -290,10 +295,14 @@ class Run {
     }
     outputs.appear();
     progress_.finish();
+    print_json(found);
     ++frame_;
   }
 
  private:
+  void print_json(const MapReport& found) const {
+    if (arguments_.json) write_text(report_json(found, plan_.options), "-");
+  }
   // What is not as it should be, with --strict, leaves the report.
   void write_part(const Body& body, const MapReport& found, const MapOutput& output,
                   OutputsTogether& outputs) {
@@ -301,6 +310,7 @@ class Run {
       write_cad(body, found, arguments_.map, plan_.options, output, progress_);
     } catch (const InvalidMappingError&) {
       outputs.appear();
+      print_json(found);
       throw;
     }
   }
@@ -330,19 +340,6 @@ std::optional<Binding> own_binding(const Arguments& arguments, const Body& body,
     write_binding(*binding, body, arguments.save_binding);
   }
   return binding;
-}
-
-// The part's own file is no input here, and yet nobody means to lose it.
-void keep_source(const Body& body, const std::string& output) {
-  namespace fs = std::filesystem;
-  std::error_code ignored;
-  const std::string name = fs::path(output).filename().string();
-  for (const SurfaceSource& source : body.surface.sources)
-    if (source.file == name && fs::is_regular_file(output, ignored) &&
-        content_hash(read_all(output)) == source.hash)
-      throw InputError(output,
-                       "is the part that the body was made of: name another output, or add --force to "
-                       "replace it");
 }
 
 void map_one(const Arguments& arguments, Plan& plan, Progress& progress) {

@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <filesystem>
 
 #include "base/error.h"
+#include "base/files/files.h"
 #include "formats/common/file_formats.h"
 #include "formats/lattice/stress_columns.h"
 #include "mapping/report/attributes.h"
@@ -71,6 +73,18 @@ void write_mapped(const Surface& surface, const Body& body, const MapResult& res
     for (SurfaceSource& source : changed.sources) source.bytes.clear();  // a new file, with all columns
   }
   write_surface(changed, displacement, *output.format, unit, output.path);
+}
+
+void keep_source(const Body& body, const std::string& path) {
+  namespace fs = std::filesystem;
+  std::error_code ignored;
+  const std::string name = fs::path(path).filename().string();
+  for (const SurfaceSource& source : body.surface.sources)
+    if (source.file == name && fs::is_regular_file(path, ignored) &&
+        content_hash(read_all(path)) == source.hash)
+      throw InputError(path,
+                       "is the part that the body was made of: name another output, or add --force to "
+                       "replace it");
 }
 
 }  // namespace flexel::mapping

@@ -33,4 +33,8 @@ void check_unit(SurfaceFormat format, double unit);
 // A mesh or .vtu (CAD files: mapping/cad_output.h). `surface`: as it is to be written, the vertices that were mapped, in the same order.
 void write_mapped(const Surface& surface, const Body& body, const MapResult& result, const MapOutput& output);
 
+// Throws InputError: `path` is the file that `body` was made of, by name and content. It is no input of a mapping, and yet
+// nobody means to lose it.
+void keep_source(const Body& body, const std::string& path);
+
 }  // namespace flexel::mapping

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <csignal>
 #include <exception>
+#include <limits>
 #include <mutex>
 #include <optional>
 #include <utility>
@@ -27,6 +28,7 @@ std::exception_ptr callback_error;    // of the innermost run
 struct sigaction outer_interrupt {};  // Python's
 std::atomic<bool> signalled{false};   // since the outermost run began
 static_assert(std::atomic<bool>::is_always_lock_free);
+thread_local bool tells_progress = false;  // Python's function of progress has the thread
 
 void on_interrupt(int signal) {
   signalled = true;
@@ -62,11 +64,13 @@ class Listener : public ProgressListener {
   void update(const std::string& stage, double share, const std::string& note,
               std::optional<double> left) noexcept override {
     if (!wanted_) return;
+    tells_progress = true;
     try {
       call_back([&] { progress_(stage, share, note, left); });
     } catch (...) {
       wanted_ = false;  // the run ends; the error is kept
     }
+    tells_progress = false;
   }
   void say(const std::string& line) noexcept override { keep(said_.lines, line); }
   void warn(const std::string& line) noexcept override { keep(said_.warnings, line); }
@@ -102,6 +106,7 @@ class Scope {
         outer_error_(std::exchange(callback_error, nullptr)),
         outer_elements_(element_limit()) {
     ++runs;
+    restore_element_limit(std::numeric_limits<double>::infinity());  // that of an outer run is its own
     set_progress_listener(heard = &listener);
   }
   ~Scope() {
@@ -159,6 +164,9 @@ void call_back(const std::function<void()>& callback) {
 }
 
 Said run_work(const py::object& progress, const std::function<void()>& work) {
+  // Progress may come from any thread of the run, which holds the lock.
+  if (tells_progress)
+    throw InputError("a function of progress cannot run anything itself: run it after, or in on_frame");
   Said said;
   Listener listener(progress, said);
   const bool takes_signals = on_main_thread();

@@ -1,6 +1,7 @@
 // The stages and commands, as the programs run them but for files.
 #include <cmath>
 
+#include "base/files/outputs.h"
 #include "base/parallel.h"
 #include "base/program/arguments.h"
 #include "flexel/commands.h"
@@ -102,10 +103,10 @@ py::tuple voxelize_part(const PartObject& part, const py::dict& given, const py:
   return py::make_tuple(body, summary, std::move(said));
 }
 
-// `words`: options of a scene, as of `flexel deform`. `scene_text`: in place of --scene, where it has a name.
-simulate::Scene scene_of(std::vector<std::string> words, const std::string& scene_text,
+// `words`: options of a scene, as of `flexel deform`, for `app`, with which their --timeout ends. `scene_text`: in place of
+// --scene, where it has a name.
+simulate::Scene scene_of(CommandLine& app, std::vector<std::string> words, const std::string& scene_text,
                          const std::string& scene_name, const Body& body) {
-  CommandLine app{"A scene.", "flexel simulate"};
   commands::JobArguments arguments;
   commands::declare_scene(app, arguments);
   parse(app, "simulate", std::move(words));
@@ -154,7 +155,8 @@ py::tuple simulate_body(const BodyObject& body, const std::vector<std::string>& 
   Said said = run_work(heard, [&] {
     Body moved = body.body;
     simulate::erase_stress_columns(moved);
-    const simulate::Scene scene = scene_of(words, scene_text, scene_name, moved);
+    CommandLine app{"A scene.", "flexel simulate"};
+    const simulate::Scene scene = scene_of(app, words, scene_text, scene_name, moved);
     Progress progress("flexel");
     const simulate::SimulateResult result = simulate::simulate(moved, scene, options, progress);
     run->summary = summary_json(result, moved);
@@ -174,15 +176,19 @@ std::shared_ptr<MappedObject> mapped_object(mapping::MappedPart mapped, const Bo
   return object;
 }
 
-// As flexel-map; `path`: "" to write nothing.
+// As flexel-map; `path`: "" to write nothing; `inputs`: what is not replaced without --force.
 py::tuple map_body(const BodyObject& given, const std::vector<std::string>& words, const std::string& path,
-                   const py::object& heard) {
+                   const std::vector<std::string>& inputs, const py::object& heard) {
   std::shared_ptr<MappedObject> object;
   Said said = run_work(heard, [&] {
     CommandLine app{"A mapping.", "flexel map"};
     mapping::MapArguments arguments;
     mapping::declare_map_options(app, arguments);
+    bool force = false;
+    app.add_flag("--force", force, "Let results replace files that are read");
     parse(app, "map", words);
+    check_outputs({{path}, {arguments.report}}, inputs, force);
+    if (!force && !path.empty()) mapping::keep_source(given.body, path);
     mapping::MapOptions options = map_options(arguments);
     const mapping::CrackOptions crack = crack_options(arguments);
     mapping::RefineOptions refine = refine_options(arguments, app, crack);
@@ -246,8 +252,10 @@ py::tuple run_command(const std::string& name, std::vector<std::string> words, c
 
 using Subjects = std::vector<std::pair<std::string, py::object>>;
 
-py::tuple picture(const Subjects& given, const std::vector<std::string>& words, const py::object& heard) {
-  std::vector<picture::PictureSubject> subjects(given.size());
+// Of `flexel picture` or of `flexel view`.
+template <class Subject>
+std::vector<Subject> subjects_of(const Subjects& given) {
+  std::vector<Subject> subjects(given.size());
   for (std::size_t s = 0; s < given.size(); ++s) {
     subjects[s].label = subjects[s].where = given[s].first;
     if (py::isinstance<BodyObject>(given[s].second))
@@ -255,6 +263,11 @@ py::tuple picture(const Subjects& given, const std::vector<std::string>& words, 
     else
       subjects[s].surface = given[s].second.cast<const PartObject&>().surface;
   }
+  return subjects;
+}
+
+py::tuple picture(const Subjects& given, const std::vector<std::string>& words, const py::object& heard) {
+  const auto subjects = subjects_of<picture::PictureSubject>(given);
   Bytes png;
   Said said = run_work(heard, [&] {
     Progress progress("flexel");
@@ -267,14 +280,7 @@ py::tuple picture(const Subjects& given, const std::vector<std::string>& words, 
 
 // The page of flexel view, whole.
 py::tuple page(const Subjects& given, const view::RunWords& words, const py::object& heard) {
-  std::vector<view::ViewSubject> subjects(given.size());
-  for (std::size_t s = 0; s < given.size(); ++s) {
-    subjects[s].label = subjects[s].where = given[s].first;
-    if (py::isinstance<BodyObject>(given[s].second))
-      subjects[s].body = given[s].second.cast<const BodyObject&>().body;
-    else
-      subjects[s].surface = given[s].second.cast<const PartObject&>().surface;
-  }
+  const auto subjects = subjects_of<view::ViewSubject>(given);
   std::string html;
   Said said = run_work(heard, [&] {
     Progress progress("flexel");
@@ -285,6 +291,14 @@ py::tuple page(const Subjects& given, const view::RunWords& words, const py::obj
     html = make_page(files, options, true).html;
   });
   return py::make_tuple(html, std::move(said));
+}
+
+// Before `outputs` are written: throws InputError where one is an input, unless `force`.
+void check_paths(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs,
+                 bool force) {
+  std::vector<OutputName> names;
+  for (const std::string& path : outputs) names.push_back({path});
+  check_outputs(names, inputs, force);
 }
 
 void add_results(py::module_& module) {
@@ -328,6 +342,7 @@ void add_runs(py::module_& module) {
   module.def("map", &map_body);
   module.def("deform", &deform_part);
   module.def("run_command", &run_command);
+  module.def("check_outputs", &check_paths);
   module.def("picture", &picture);
   module.def("page",
              [](const Subjects& subjects, const std::vector<std::string>& warnings,

@@ -32,7 +32,7 @@ struct Arguments {
   std::string output, summary, resume, checkpoint_every;
   std::vector<std::string> live;
   SimulateOptions options;
-  bool quiet = false, verbose = false, compress = false, force = false;
+  bool quiet = false, verbose = false, compress = false, force = false, json = false;
 };
 
 // CLI11's ranges let "nan" pass.
@@ -62,6 +62,7 @@ void declare(CommandLine& app, Arguments& arguments) {
   add_threads_option(app, arguments.options.threads);
   app.add_option("--summary", arguments.summary,
                  "Write the summary as JSON to this file (docs/reference/summary.md)");
+  app.add_flag("--json", arguments.json, "Print it to stdout; the body needs a file (-o)");
   app.add_flag("--explain", arguments.options.explain,
                "Say which effects run and why, and the share of time of each");
   app.add_option(
@@ -159,8 +160,11 @@ void refuse_shared_streams(const Arguments& arguments, const Scene& scene) {
 // A run that is resumed goes on with its checkpoint.
 void check_files(const Arguments& arguments) {
   const SimulateOptions& options = arguments.options;
-  const std::vector<OutputName> results = {
-      {arguments.output, true}, {arguments.summary}, {options.history}, {options.live == "-" ? "-" : ""}};
+  const std::vector<OutputName> results = {{arguments.output, true},
+                                           {arguments.summary},
+                                           {options.history},
+                                           {options.live == "-" ? "-" : ""},
+                                           {arguments.json ? "-" : ""}};
   std::vector<OutputName> all = results;
   all.push_back({options.checkpoint});
   all.push_back({options.failed_output});
@@ -224,6 +228,7 @@ int run(int argc, char** argv) {
   outputs.appear();
   progress.finish();
   for (const std::string& line : answer_lines(result, body, known_materials(scene, body))) progress.say(line);
+  if (arguments.json) write_text(summary_json(result, body), "-");
   return kExitDone;
 }
 

@@ -37,7 +37,7 @@ struct Arguments {
                     format, vdb, summary, output = "-";
   std::optional<long long> count;
   int threads = 0;
-  bool moments = false, compress = false, quiet = false, force = false;
+  bool moments = false, compress = false, quiet = false, force = false, json = false;
 };
 
 void declare(CommandLine& app, Arguments& arguments) {
@@ -47,7 +47,7 @@ void declare(CommandLine& app, Arguments& arguments) {
   app.add_option("--placement", arguments.placement, "elements at the voxels' corner (default) or centre");
   app.add_option("--unit", arguments.unit, "length unit of files that carry none (default mm)");
   app.add_option("--align", arguments.align,
-                 "lattice to the part's flat faces: snap (default), to its box: box, or none");
+                 "lattice to the part's flat faces, its box or neither: snap (default), box or none");
   app.add_option("--heal", arguments.heal,
                  "broken surfaces: auto (default) repairs small damage and refuses what cannot be told, wrap "
                  "(wrap:LENGTH) wraps them, none takes them as they are");
@@ -69,6 +69,7 @@ void declare(CommandLine& app, Arguments& arguments) {
   app.add_option("--vdb", arguments.vdb, "also write fill and distance as OpenVDB grids to this file");
   app.add_option("--summary", arguments.summary,
                  "also write what was found as JSON (docs/reference/voxelize.md)");
+  app.add_flag("--json", arguments.json, "print that to stdout; the body needs a file (-o)");
   app.add_option("-o,--output", arguments.output, "body file (.vtu); - or none: standard output");
 }
 
@@ -134,8 +135,9 @@ int run(int argc, char** argv) {
   ImportOptions how = import_options(arguments);
   if (!arguments.vdb.empty() && options.placement != Placement::corner)
     throw InputError("--vdb: centre placement has no cells; use --placement corner");
-  check_outputs({{arguments.output, true}, {arguments.vdb, true}, {arguments.summary}}, arguments.parts,
-                arguments.force);
+  check_outputs(
+      {{arguments.output, true}, {arguments.vdb, true}, {arguments.summary}, {arguments.json ? "-" : ""}},
+      arguments.parts, arguments.force);
   const ThreadLimit threads(arguments.threads);
   Progress progress(kName, arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
   how.warn = [&](const std::string& line) { progress.warn(line); };
@@ -152,6 +154,7 @@ int run(int argc, char** argv) {
   write_body(result.body, arguments.output, {.compress = arguments.compress});
   outputs.appear();
   progress.finish();
+  if (arguments.json) write_text(summary_json(result), "-");
   return kExitDone;
 }
 

@@ -116,7 +116,7 @@ bool PulledBody::solve(const std::vector<ToolPose>& poses, double tolerance, int
   options.tolerance = tolerance;
   options.max_iterations = iterations;
   const simulate::NewtonOutcome outcome = simulate::newton(
-      *mechanics_, trial, options, [&](const std::string&) { stop(); }, &memory_);
+      *mechanics_, trial, options, [&](double, const std::string&) { stop(); }, &memory_);
   if (!outcome.converged) {
     memory_ = {};
     lead_ties(poses_);

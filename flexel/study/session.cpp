@@ -301,6 +301,7 @@ void Session::run_one(Sweep& sweep, const Trial& trial, Prediction predicted) {
     if (first) why = why_not(trial, predicted);
     return why.empty();
   };
+  progress_.update(spent() / wanted_.budget, trial.label);
   row.found = run_trial(trial, first, options);
   if (row.found.given_up) {
     numbers_.erase(trial.label);

@@ -19,7 +19,7 @@ import shutil
 from typing import Any, Callable, Dict, List, Optional, Sequence, Union
 
 from . import _flexel
-from ._objects import Body, Frame, Mapped, Part, Result
+from ._objects import Body, Frame, Mapped, Part, Result, check_outputs
 from ._options import Quantity, is_scene_text, length, paths, refuse_limits, words
 from ._said import Progress, heard
 from .errors import (DivergedError, FlexelError, FlexelWarning, InputError, InvalidMappingError, StoppedByTimeout)
@@ -59,8 +59,11 @@ def read(path: Paths, *, unit: Optional[str] = None, format: Optional[str] = Non
         options["format"] = format
     files = paths(path)
     core, said = heard(_flexel.read_part, files, options, progress=progress)
-    return Part(core, os.path.basename(files[0]), said.warnings,
-                [os.path.abspath(each) for each in files if each != "-"])
+    return Part(core, os.path.basename(files[0]), said.warnings, _absolute(files))
+
+
+def _absolute(files: Sequence[str]) -> List[str]:
+    return [os.path.abspath(each) for each in files if each != "-"]
 
 
 def _as_part(part, progress: Progress) -> Part:
@@ -80,18 +83,18 @@ def voxelize(part: Union[Part, Paths], *, size: Optional[Quantity] = None, count
     options = {"size": length(size), "count": count, "placement": placement, "align": align, "heal": heal,
                "material": material, "moments": moments, "threads": threads}
     core, summary, said = heard(_flexel.voxelize, given._core, options, progress=progress)
-    return Body(core, summary, said.warnings, given.label)
+    return Body(core, summary, said.warnings, given.label, given._files)
 
 
 def read_body(path: Union[str, os.PathLike], *, progress: Progress = None) -> Body:
     """Reads a body file (.vtu). Raises InputError."""
     core, said = heard(_flexel.read_body, os.fspath(path), progress=progress)
-    return Body(core, "", said.warnings, os.path.basename(os.fspath(path)))
+    return Body(core, "", said.warnings, os.path.basename(os.fspath(path)), _absolute([os.fspath(path)]))
 
 
 def simulate(body: Body, scene: Union[str, os.PathLike, None] = None, *, on_frame: Optional[Callable[[Frame], Any]] = None,
              estimate: bool = True, stress: bool = True, threads: int = 0, history: str = "", failed: str = "", isa: str = "",
-             progress: Progress = None, **options) -> Result:
+             force: bool = False, progress: Progress = None, **options) -> Result:
     """Runs a scene on a body, as flexel-simulate does; the body stays as it is.
 
     scene: the path of a scene (.toml), or the text of one (docs/reference/scene.md; has a line's end, or "=" and names no
@@ -99,7 +102,7 @@ def simulate(body: Body, scene: Union[str, os.PathLike, None] = None, *, on_fram
     move, torque, twist, bearing, gravity, probe, material, model, infill, shell, as of `flexel deform`:
     push={"bracket/2": (0, 0, -100)} [N], "bracket/2: 0 0 -100 N" or a list of such; fix="bracket/1".
     on_frame: of runs in time, called with each Frame ([run] frames of the scene). estimate: error bars. history: a CSV of
-    energies. failed: where the last good state goes when the run fails (.vtu).
+    energies. failed: where the last good state goes when the run fails (.vtu). force: they may replace what was read.
     Raises InputError, DivergedError, KeyboardInterrupt.
     """
     callback = None if on_frame is None else lambda core: on_frame(Frame(core))
@@ -107,12 +110,15 @@ def simulate(body: Body, scene: Union[str, os.PathLike, None] = None, *, on_fram
              "failed": os.fspath(failed), "isa": isa, "on_frame": callback}
     text, name = "", ""
     line = words(options)
+    inputs = list(body._files)
     if is_scene_text(scene):
         text, name = scene, "scene"
     elif scene is not None:
         line.append("--scene=" + os.fspath(scene))
+        inputs.append(os.fspath(scene))
+    check_outputs([history, failed], inputs, force)
     core, said = heard(_flexel.simulate, body._core, line, text, name, given, progress=progress)
-    return Result(core, said, {}, body.label)
+    return Result(core, said, {}, body.label, body._files)
 
 
 def map(body: Body, *, output: Union[str, os.PathLike, None] = None, progress: Progress = None, **options) -> Mapped:
@@ -120,10 +126,11 @@ def map(body: Body, *, output: Union[str, os.PathLike, None] = None, progress: P
 
     options are those of flexel-map: method="smooth", check="voronoi", crack="cap", refine="off", strict=True, ...
     A coarse mesh gets more triangles where they are needed to show the bend; refine="off" keeps its vertices.
-    Raises InputError, InvalidMappingError.
+    Raises InputError, also where `output` is a file that the body came from, unless force=True; InvalidMappingError.
     """
-    core, said = heard(_flexel.map, body._core, words(options), "" if output is None else os.fspath(output),
+    core, said = heard(_flexel.map, body._core, words(options), "" if output is None else os.fspath(output), body._files,
                        progress=progress)
+    options.pop("force", None)
     return Mapped(core, body, options, said.warnings)
 
 
@@ -149,7 +156,8 @@ def deform(part: Union[Part, Paths], *, output: Union[Paths, None] = None, progr
         core_part, names = None, paths(part)
     core, said = heard(_flexel.deform, line + ["--"] + names, core_part, progress=progress)
     label = part.label if isinstance(part, Part) else ", ".join(os.path.basename(name) for name in names)
-    return Result(core, said, {name: options[name] for name in _OF_MAPPING if name in options}, label + ", deformed")
+    files = part._files if isinstance(part, Part) else _absolute(names)
+    return Result(core, said, {name: options[name] for name in _OF_MAPPING if name in options}, label + ", deformed", files)
 
 
 def study(part: Paths, *, output: Union[str, os.PathLike], progress: Progress = None, **options) -> Dict[str, Any]:
@@ -166,16 +174,24 @@ def study(part: Paths, *, output: Union[str, os.PathLike], progress: Progress = 
 
 def _subjects(shown) -> List:
     items = shown if isinstance(shown, (list, tuple)) else [shown]
-    return [(each.label, (each.body if isinstance(each, Result) else each)._core) for each in items]
+    bodies = [each.body if isinstance(each, (Result, Mapped)) else each for each in items]
+    return [(each.label, body._core) for each, body in zip(items, bodies)]
 
 
-def picture(shown, path: Union[str, os.PathLike, None] = None, *, progress: Progress = None, **options) -> bytes:
+def _files_of(shown) -> List[str]:
+    return [file for each in (shown if isinstance(shown, (list, tuple)) else [shown]) for file in each._files]
+
+
+def picture(shown, path: Union[str, os.PathLike, None] = None, *, force: bool = False, progress: Progress = None,
+            **options) -> bytes:
     """A PNG of parts, bodies and results (one or a list), as `flexel picture` draws it; written to `path` too.
 
     options: color="von_mises", scale="auto" or a factor, view="iso" or "30,20", size="1600x1200", cells=True, faces=True,
-    range="0:5 mm", up="y".
+    range="0:5 mm", up="y". Raises InputError, also where `path` is a file that was read, unless `force`.
     """
     refuse_limits(options)
+    if path is not None:
+        check_outputs([path], _files_of(shown), force)
     line: List[str] = []
     for name, value in options.items():
         if value is True:

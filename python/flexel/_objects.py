@@ -36,7 +36,31 @@ def _inline(page: str, what: str) -> str:
             'style="width:100%;height:520px;border:1px solid #ccc"></iframe>')
 
 
-class Part:
+def check_outputs(outputs: Sequence, inputs: Sequence[str], force: bool) -> None:
+    """Raises InputError where a result would replace what was read, unless `force`."""
+    _flexel.check_outputs([os.fspath(each) for each in outputs if each], list(inputs), force)
+
+
+class Shown:
+    """What has a page in the browser."""
+
+    label: str
+    _files: List[str]  # what it was made of, absolute, which results do not replace
+
+    def page(self, *, progress: Progress = None) -> str:
+        raise NotImplementedError
+
+    def write_page(self, path, *, force: bool = False) -> None:
+        """Writes `page()`. Raises InputError where that is a file that was read, unless `force`."""
+        check_outputs([path], self._files, force)
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(self.page())
+
+    def _repr_html_(self) -> str:
+        return _inline(self.page(), self.label)
+
+
+class Part(Shown):
     """One or more solids as the polygons of their file (`flexel.read`, `Part.from_mesh`)."""
 
     def __init__(self, core: "_flexel.Part", label: str = "part", warnings: Sequence[str] = (), files: Sequence[str] = ()):
@@ -125,10 +149,11 @@ class Part:
         """Metres per unit of the file that it came from."""
         return self._core.unit
 
-    def write(self, path, *, progress: Progress = None) -> None:
-        """Writes the mesh, in the unit that it came in; the ending names the format (.stl, .obj, .ply ...)."""
-        heard_nothing = _flexel.Part.write
-        heard(heard_nothing, self._core, os.fspath(path), progress=progress)
+    def write(self, path, *, force: bool = False, progress: Progress = None) -> None:
+        """Writes the mesh, in the unit that it came in; the ending names the format (.stl, .obj, .ply ...). Raises InputError
+        where that is a file that it was read from, unless `force`."""
+        check_outputs([path], self._files, force)
+        heard(_flexel.Part.write, self._core, os.fspath(path), progress=progress)
 
     def to_meshio(self):
         """The triangles as a meshio mesh, points in metres."""
@@ -139,18 +164,17 @@ class Part:
         page, _ = heard(_flexel.page, [(self.label, self._core)], [], [], "", progress=progress)
         return page
 
-    def _repr_html_(self) -> str:
-        return _inline(self.page(), self.label)
-
     def __repr__(self) -> str:
         return f"<flexel.Part {self.label!r}: {len(self.vertices)} vertices, {len(self.faces)} faces>"
 
 
-class Body:
+class Body(Shown):
     """The lattice of a part: elements, cells, and where a run has moved them. It never changes: runs give new ones."""
 
-    def __init__(self, core: "_flexel.Body", summary: str = "", warnings: Sequence[str] = (), label: str = "body"):
+    def __init__(self, core: "_flexel.Body", summary: str = "", warnings: Sequence[str] = (), label: str = "body",
+                 files: Sequence[str] = ()):
         self._core, self._summary, self.warnings, self.label = core, summary, list(warnings), label
+        self._files = list(files)
 
     @property
     def rest(self) -> np.ndarray:
@@ -217,7 +241,7 @@ class Body:
     @property
     def surface(self) -> Part:
         """The part's own mesh at rest (a copy)."""
-        return Part(self._core.surface, self.label)
+        return Part(self._core.surface, self.label, files=self._files)
 
     @property
     def notes(self) -> Dict[str, str]:
@@ -228,8 +252,10 @@ class Body:
         """What `flexel-voxelize --summary` writes; {} of a body that was read or simulated."""
         return json.loads(self._summary) if self._summary else {}
 
-    def write(self, path, *, compress: bool = False, progress: Progress = None) -> None:
-        """Writes the body (.vtu), byte for byte as the programs do."""
+    def write(self, path, *, compress: bool = False, force: bool = False, progress: Progress = None) -> None:
+        """Writes the body (.vtu), byte for byte as the programs do. Raises InputError where that is a file that was read,
+        unless `force`."""
+        check_outputs([path], self._files, force)
         heard(_flexel.Body.write, self._core, os.fspath(path), compress, progress=progress)
 
     def to_meshio(self):
@@ -248,22 +274,21 @@ class Body:
         page, _ = heard(_flexel.page, [(self.label, self._core)], [], [], "", progress=progress)
         return page
 
-    def write_page(self, path) -> None:
-        with open(path, "w", encoding="utf-8") as file:
-            file.write(self.page())
-
-    def _repr_html_(self) -> str:
-        return _inline(self.page(), self.label)
-
     def __repr__(self) -> str:
         return f"<flexel.Body {self.label!r}: {len(self.rest)} elements, {len(self.cell_elements)} cells>"
 
 
-class Mapped:
+class Mapped(Shown):
     """The part's own surface, deformed (`flexel.map`, `Result.part`)."""
 
     def __init__(self, core: "_flexel.Mapped", body: Body, options: Dict[str, Any], warnings: Sequence[str] = ()):
         self._core, self._body, self._options, self.warnings = core, body, options, list(warnings)
+        self.label, self._files = body.label, body._files
+
+    @property
+    def body(self) -> Body:
+        """The lattice that carries it."""
+        return self._body
 
     @property
     def rest(self) -> np.ndarray:
@@ -296,9 +321,14 @@ class Mapped:
         return json.loads(self._core.report) if self._core.report else {}
 
     def write(self, path, *, progress: Progress = None, **options) -> None:
-        """Maps anew and writes what flexel-map writes to `path`: .stl, .obj, .ply ..., or .step of a CAD part."""
+        """Maps anew and writes what flexel-map writes to `path`: .stl, .obj, .ply ..., or .step of a CAD part. Raises
+        InputError where that is a file that was read, unless force=True."""
         given = words({**self._options, **options})
-        heard(_flexel.map, self._body._core, given, os.fspath(path), progress=progress)
+        heard(_flexel.map, self._body._core, given, os.fspath(path), self._files, progress=progress)
+
+    def page(self, *, progress: Progress = None) -> str:
+        """The page of `flexel view` (HTML, whole)."""
+        return self._body.page(progress=progress)
 
     def to_meshio(self):
         """The deformed triangles as a meshio mesh, points in metres."""
@@ -309,12 +339,13 @@ class Mapped:
         return f"<flexel.Mapped: {len(self.rest)} vertices>"
 
 
-class Result:
+class Result(Shown):
     """What a run found (`flexel.simulate`, `flexel.deform`)."""
 
-    def __init__(self, core: "_flexel.Run", said, options: Dict[str, Any], label: str):
+    def __init__(self, core: "_flexel.Run", said, options: Dict[str, Any], label: str, files: Sequence[str] = ()):
         self._core = core
-        self.body = Body(core.body, label=label)
+        self._files = list(files)
+        self.body = Body(core.body, label=label, files=files)
         self.warnings: List[str] = list(said.warnings)
         self.lines: List[str] = list(said.lines)
         self._whole = json.loads(core.summary)
@@ -359,7 +390,7 @@ class Result:
             if self._core.mapped is not None:
                 self._part = Mapped(self._core.mapped, self.body, self._map_options)
             else:
-                core, said = heard(_flexel.map, self.body._core, words(self._map_options), "")
+                core, said = heard(_flexel.map, self.body._core, words(self._map_options), "", [])
                 self._part = Mapped(core, self.body, self._map_options, said.warnings)
         return self._part
 
@@ -369,13 +400,6 @@ class Result:
         page, _ = heard(_flexel.page, [(self.label, self.body._core)], self.warnings, self.answer, summary,
                         progress=progress)
         return page
-
-    def write_page(self, path) -> None:
-        with open(path, "w", encoding="utf-8") as file:
-            file.write(self.page())
-
-    def _repr_html_(self) -> str:
-        return _inline(self.page(), self.label)
 
     def __repr__(self) -> str:
         return "<flexel.Result\n  " + "\n  ".join(self.answer) + ">"

@@ -162,9 +162,10 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   if (near_) trial_.displacement = *near_;
   trial_.share = done_ + increment_ > 1 - 1e-9 ? 1 : done_ + increment_;
   if (pushed_) push(trial_);
-  outcome_ = newton_with_links(mechanics_, trial_, options, [&](const std::string& note) {
+  outcome_ = newton_with_links(mechanics_, trial_, options, [&](double gone, const std::string& note) {
     check_stop();
-    progress_.update(done_, fmt::format("load {:.3g} %, {}", 100 * trial_.share, note));
+    progress_.update(done_ + gone * (trial_.share - done_),
+                     fmt::format("load {:.3g} %, {}", 100 * trial_.share, note));
   });
   if (reach_ == 0) reach_ = outcome_.first_reach / trial_.share;  // from rest: a near start moves by less
   result_.newton_iterations += outcome_.iterations;

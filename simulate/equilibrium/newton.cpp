@@ -63,8 +63,8 @@ double rounding_floor(const LinearOperator& matrix, const std::vector<Vec3>& u) 
 
 class Solver {
  public:
-  Solver(Mechanics& mechanics, State& state, const NewtonOptions& options,
-         const std::function<void(const std::string&)>& progress, NewtonMemory* memory)
+  Solver(Mechanics& mechanics, State& state, const NewtonOptions& options, const NewtonProgress& progress,
+         NewtonMemory* memory)
       : mechanics_(mechanics),
         state_(state),
         options_(options),
@@ -76,6 +76,10 @@ class Solver {
   NewtonOutcome run();
 
  private:
+  [[nodiscard]] double way_gone() const {
+    const double residual = std::max(outcome_.relative_residual, options_.tolerance);
+    return std::max(0.0, std::log(residual) / std::log(options_.tolerance));
+  }
   [[nodiscard]] bool full() const { return options_.steps == NewtonSteps::full; }
   void begin();
   [[nodiscard]] bool arrived();
@@ -96,7 +100,7 @@ class Solver {
   Mechanics& mechanics_;
   State& state_;
   const NewtonOptions& options_;
-  const std::function<void(const std::string&)>& progress_;
+  const NewtonProgress& progress_;
   NewtonOutcome outcome_;
   NewtonMemory own_;
   NewtonMemory& kept_;
@@ -192,8 +196,8 @@ LinearResult Solver::iterate(const std::vector<Vec3>& rhs, double forcing) {
         mechanics_.tangent(), left, step, *kept_.preconditioner, std::min(forcing / share, kLargestForcing),
         most,
         [&](int iteration, double relative) {
-          progress_(
-              fmt::format("newton {}, cg {}, {:.0e}", outcome_.iterations + 1, iteration, share * relative));
+          progress_(way_gone(), fmt::format("newton {}, cg {}, {:.0e}", outcome_.iterations + 1, iteration,
+                                            share * relative));
         },
         hopeless);
     outcome_.cg_iterations += one.iterations;
@@ -359,7 +363,8 @@ bool Solver::advance() {
     parallel_for_each(rhs.size(), [&](std::size_t e) { predicted[e] -= residual_[e]; });
     kept_.model_error = norm(predicted) / before;
   }
-  progress_(fmt::format("newton {}, residual {:.1e}", outcome_.iterations + 1, outcome_.relative_residual));
+  progress_(way_gone(),
+            fmt::format("newton {}, residual {:.1e}", outcome_.iterations + 1, outcome_.relative_residual));
   return true;
 }
 
@@ -386,7 +391,7 @@ NewtonOutcome Solver::run() {
 }  // namespace
 
 NewtonOutcome newton(Mechanics& mechanics, State& state, const NewtonOptions& options,
-                     const std::function<void(const std::string&)>& progress, NewtonMemory* memory) {
+                     const NewtonProgress& progress, NewtonMemory* memory) {
   return Solver(mechanics, state, options, progress, memory).run();
 }
 

@@ -46,11 +46,13 @@ struct NewtonOutcome {
   std::string trouble;        // why it stopped when not converged
 };
 
+// Hears how much of the way to the tolerance is gone, in [0, 1], by the logarithm of the residual, and a note. May throw.
+using NewtonProgress = std::function<void(double, const std::string&)>;
+
 // Moves `state` to the equilibrium at its share. On failure the state is what was reached: the caller keeps
-// its own copy. `progress` hears of every iteration and may throw. `memory`: from one solution to the next.
+// its own copy. `progress` hears of every iteration. `memory`: from one solution to the next.
 [[nodiscard]] NewtonOutcome newton(Mechanics& mechanics, State& state, const NewtonOptions& options,
-                                   const std::function<void(const std::string&)>& progress,
-                                   NewtonMemory* memory = nullptr);
+                                   const NewtonProgress& progress, NewtonMemory* memory = nullptr);
 
 // Geometry of the unknowns at `state`, for the preconditioner and for free_motions().
 [[nodiscard]] NodeGeometry node_geometry(const Body& body, const State& state);

@@ -42,8 +42,7 @@ std::vector<std::shared_ptr<RigidLink>> rigid_links(const Constraints& constrain
 
 class Balance {
  public:
-  Balance(Mechanics& mechanics, State& state, const NewtonOptions& options,
-          const std::function<void(const std::string&)>& progress)
+  Balance(Mechanics& mechanics, State& state, const NewtonOptions& options, const NewtonProgress& progress)
       : mechanics_(mechanics),
         state_(state),
         options_(options),
@@ -67,7 +66,7 @@ class Balance {
   Mechanics& mechanics_;
   State& state_;
   const NewtonOptions& options_;
-  const std::function<void(const std::string&)>& progress_;
+  const NewtonProgress& progress_;
   std::vector<std::shared_ptr<RigidLink>> links_;
   NewtonOutcome outcome_;
   double scale_ = 0;  // N: loads and reactions
@@ -134,7 +133,7 @@ bool Balance::add_column(const Preconditioner& preconditioner, Eigen::Index j, E
   const LinearResult solved = conjugate_gradients(
       mechanics_.tangent(), pushed, response, preconditioner, kResponse, kMaxLinkCgIterations,
       [&](int iteration, double relative) {
-        progress_(fmt::format("rigid link {}, cg {}, {:.0e}", j / 6 + 1, iteration, relative));
+        progress_(0, fmt::format("rigid link {}, cg {}, {:.0e}", j / 6 + 1, iteration, relative));
       });
   outcome_.cg_iterations += solved.iterations;
   if (solved.indefinite) return false;
@@ -248,7 +247,7 @@ NewtonOutcome Balance::run() {
 }  // namespace
 
 NewtonOutcome newton_with_links(Mechanics& mechanics, State& state, const NewtonOptions& options,
-                                const std::function<void(const std::string&)>& progress) {
+                                const NewtonProgress& progress) {
   if (rigid_links(mechanics.constraints()).empty()) return newton(mechanics, state, options, progress);
   return Balance(mechanics, state, options, progress).run();
 }

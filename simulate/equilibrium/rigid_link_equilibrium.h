@@ -8,7 +8,6 @@ namespace flexel::simulate {
 // Without links it is newton(). On failure the links are where they were. Throws InputError, named for the
 // link, when nothing resists a motion of it.
 [[nodiscard]] NewtonOutcome newton_with_links(Mechanics& mechanics, State& state,
-                                              const NewtonOptions& options,
-                                              const std::function<void(const std::string&)>& progress);
+                                              const NewtonOptions& options, const NewtonProgress& progress);
 
 }  // namespace flexel::simulate

@@ -158,7 +158,8 @@ bool ImplicitEuler::solve(State& trial, NewtonSteps steps,
   options.tolerance = tolerance_;
   if (steps == NewtonSteps::full) options.max_iterations = kFullIterations;
   options.least_scale = force_scale(trial);
-  const NewtonOutcome outcome = newton(mechanics_, trial, options, progress, &memory_);
+  const NewtonOutcome outcome = newton(
+      mechanics_, trial, options, [&](double, const std::string& note) { progress(note); }, &memory_);
   told.newton_iterations += outcome.iterations;
   told.cg_iterations += outcome.cg_iterations;
   told.trouble = outcome.trouble;

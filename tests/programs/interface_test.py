@@ -79,12 +79,18 @@ def test_bash_completes_materials_and_faces_of_the_part():
     expect_error(run("flexel", "info", "--words", "--thickness", "out.ply", "my part.stl"), "flexel", "excludes")
 
 
-def expect_typed(line, *words):
-    """What an interactive bash has made of `line` and a tab: these words."""
+SHELLS = {"bash": (["bash", "--norc", "--noprofile", "-i"], ". share/bash-completion/completions/flexel"),
+          "zsh": (["zsh", "-f", "-i"], "unsetopt prompt_cr prompt_sp; PS1='> '; bindkey -e; fpath=(share/zsh/vendor-completions $fpath); "
+                                       "autoload -Uz compinit; compinit -u -D")}
+
+
+def expect_typed(line, *words, program="bash"):
+    """What an interactive shell has made of `line` and a tab: these words."""
+    command, preparation = SHELLS[program]
     child, terminal = pty.fork()
     if child == 0:
         os.environ.update(PATH=f"{BIN}:{os.environ['PATH']}", TERM="dumb", INPUTRC="/dev/null")
-        os.execvp("bash", ["bash", "--norc", "--noprofile", "-i"])
+        os.execvp(command[0], command)
 
     def wait_for(wanted):
         said, until = b"", time.monotonic() + 20
@@ -94,9 +100,11 @@ def expect_typed(line, *words):
                 said += os.read(terminal, 4096)
 
     try:
-        os.write(terminal, b". share/bash-completion/completions/flexel; echo rea''dy\n")
+        os.write(terminal, f"{preparation}; echo rea''dy\n".encode())
         wait_for(b"ready\r\n")
-        os.write(terminal, line.encode() + b"\t\x01printf '<%s>' \n")  # Ctrl-A: the words of the line are printed
+        os.write(terminal, line.encode() + b"\t")
+        time.sleep(0.2)
+        os.write(terminal, b"\x01printf '<%s>' \n")  # Ctrl-A: the words of the line are printed
         wait_for("".join(f"<{word}>" for word in words).encode())
     finally:
         os.kill(child, signal.SIGKILL)
@@ -111,17 +119,61 @@ def test_an_interactive_bash_quotes_once():
     expect_typed("flexel info my", "flexel", "info", "my part.stl")
 
 
+def test_bash_completes_kinds_of_files():
+    make()
+    for name in ("a.step", "B.STL", "c.vtu", "d.toml", "e.txt"):
+        pathlib.Path(name).touch()
+    pathlib.Path("folder").mkdir()
+    for line, wanted in (("flexel info ", ["B.STL", "a.step", "folder", "share"]), ("flexel deform a.step --scene ", ["d.toml", "folder", "share"]),
+                         ("flexel simulate ", ["c.vtu", "d.toml", "folder", "share"]), ("flexel map ", ["c.vtu", "folder", "share"]),
+                         ("flexel info e", ["e.txt"]), ("flexel materials ", []), ("flexel export --mesh ", ["hex", "tet"]),
+                         ("flexel export --nlgeom ", ["auto", "off", "on"]), ("flexel-simulate --isa ", ["avx2", "avx512", "portable"]),
+                         ("flexel voxelize --align ", ["box", "none", "snap"])):
+        expect(sorted(completions(line)) == wanted, f"{line}: {completions(line)}")
+    expect({"step", "iges", "stl", "3mf", "vtu"} <= set(completions("flexel map --format ")), completions("flexel map --format "))
+
+
+def test_an_interactive_zsh():
+    if not shutil.which("zsh"):
+        raise Skip("no zsh")
+    make()
+    pathlib.Path("my part.stl").write_bytes(ascii_stl(box_triangles()))
+    pathlib.Path("my scene.toml").touch()
+    expect_typed("flexel deform --material spri", "flexel", "deform", "--material", "spring steel", program="zsh")
+    expect_typed("flexel info my", "flexel", "info", "my part.stl", program="zsh")
+    expect_typed("flexel deform my\\ part.stl --fix zma", "flexel", "deform", "my part.stl", "--fix", "zmax", program="zsh")
+    expect_typed("flexel deform my\\ part.stl --scene my", "flexel", "deform", "my part.stl", "--scene", "my scene.toml", program="zsh")
+    expect_typed("flexel export --mesh h", "flexel", "export", "--mesh", "hex", program="zsh")
+    expect_typed("flexel-map --method sm", "flexel-map", "--method", "smooth", program="zsh")
+
+
+def offered_by_fish(line):
+    script = f"set PATH {BIN} $PATH; source {SHARE}/fish/vendor_completions.d/flexel.fish; complete -C '{line}'"
+    return [row.split("\t")[0] for row in expect_ok(run("fish", "-N", "-c", script)).out.decode().splitlines()]
+
+
+def test_fish_completes_faces_materials_and_files():
+    if not shutil.which("fish"):
+        raise Skip("no fish")
+    make()
+    pathlib.Path("a.stl").write_bytes(ascii_stl(box_triangles()))
+    for name in ("b.txt", "c.toml"):
+        pathlib.Path(name).touch()
+    expect(offered_by_fish("flexel deform a.stl --fix zm") == ["zmax", "zmin"], offered_by_fish("flexel deform a.stl --fix zm"))
+    expect("part/6" in offered_by_fish("flexel deform a.stl --push pa"), offered_by_fish("flexel deform a.stl --push pa"))
+    expect("spring steel" in offered_by_fish("flexel deform a.stl --material spr"), offered_by_fish("flexel deform a.stl --material spr"))
+    expect(offered_by_fish("flexel info ")[0] == "a.stl", offered_by_fish("flexel info "))
+    expect(offered_by_fish("flexel deform a.stl --scene ")[0] == "c.toml", offered_by_fish("flexel deform a.stl --scene "))
+    expect(set(offered_by_fish("flexel export --mesh ")) == {"hex", "tet"}, offered_by_fish("flexel export --mesh "))
+    expect("mm" in offered_by_fish("flexel info --unit "), offered_by_fish("flexel info --unit "))
+
+
 def test_other_shells_read_theirs():
     make()
     missing = [shell_name for shell_name in ("zsh", "fish") if not shutil.which(shell_name)]
     for program, path in (("zsh", "zsh/vendor-completions/_flexel"), ("fish", "fish/vendor_completions.d/flexel.fish")):
         if program not in missing:
             expect_ok(run(program, "-n", SHARE / path))
-    if "fish" not in missing:
-        pathlib.Path("a.stl").write_bytes(ascii_stl(box_triangles()))
-        script = f"set PATH {BIN} $PATH; source {SHARE}/fish/vendor_completions.d/flexel.fish; complete -C 'flexel deform a.stl --fix zm'"
-        offered = expect_ok(run("fish", "-N", "-c", script)).out.decode()
-        expect("zmax" in offered and "zmin" in offered, offered)
     if len(missing) == 2:
         raise Skip("neither zsh nor fish")
 

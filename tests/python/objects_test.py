@@ -1,9 +1,12 @@
 """Views keep what they are of alive and cannot change it; meshes in and out; units; what is wrong is said as the programs say it."""
 
+import ast
 import gc
 import os
 import pathlib
+import re
 import resource
+import time
 import warnings
 
 from shared import PULL, SWING, box, box_body, check, expect_error, main, module, run
@@ -159,6 +162,102 @@ def test_the_source_is_not_overwritten():
     made = flexel.Part.from_mesh(*box(), name="box.ply")
     flexel.deform(made, output=["box.ply", "box.html"], size="5 mm", **PULL)
     check.assertIn("box.ply, deformed", pathlib.Path("box.html").read_text(encoding="utf-8"))
+
+
+def test_results_do_not_replace_what_was_read():
+    flexel = module()
+    flexel.Part.from_mesh(*box()).write("own.ply")
+    part = flexel.read("own.ply", unit="m")
+    body = flexel.voxelize(part, size="5 mm")
+    body.write("body.vtu")
+    read = flexel.read_body("body.vtu")
+    scene = 'material = "steel"\n[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\nforce = ["0 N", "0 N", "-1 N"]\n'
+    pathlib.Path("scene.toml").write_text(scene)
+    result = flexel.simulate(read, "scene.toml", estimate=False)
+    bent = flexel.simulate(body, "scene.toml", estimate=False)
+    deformed = flexel.deform(part, size="5 mm", **PULL)
+    os.symlink("own.ply", "link.ply")
+    pathlib.Path("aside").mkdir()
+    pathlib.Path("aside/own.ply").write_bytes(pathlib.Path("own.ply").read_bytes())
+    for name, attempt in (("own.ply", lambda path, **more: part.write(path, **more)),
+                          ("own.ply", lambda path, **more: body.surface.write(path, **more)),
+                          ("own.ply", lambda path, **more: flexel.map(bent.body, output=path, **more)),
+                          ("own.ply", lambda path, **more: flexel.map(result.body, output=path, **more)),
+                          ("aside/own.ply", lambda path, **more: flexel.map(result.body, output=path, **more)),
+                          ("own.ply", lambda path, **more: flexel.map(bent.body, report=path, **more)),
+                          ("own.ply", lambda path, **more: bent.part.write(path, **more)),
+                          ("own.ply", lambda path, **more: deformed.part.write(path, **more)),
+                          ("link.ply", lambda path, **more: part.write(path, **more)),
+                          ("own.ply", lambda path, **more: flexel.picture(part, path, **more)),
+                          ("own.ply", lambda path, **more: flexel.picture([bent, deformed], path, **more)),
+                          ("own.ply", lambda path, **more: part.write_page(path, **more)),
+                          ("own.ply", lambda path, **more: bent.write_page(path, **more)),
+                          ("body.vtu", lambda path, **more: read.write(path, **more)),
+                          ("body.vtu", lambda path, **more: result.write_page(path, **more)),
+                          ("body.vtu", lambda path, **more: flexel.simulate(read, scene, history=path, **more)),
+                          ("scene.toml", lambda path, **more: flexel.simulate(body, "scene.toml", history=path, **more))):
+        before = pathlib.Path(name).read_bytes()
+        with check.assertRaises(flexel.InputError) as caught:
+            attempt(name)
+        check.assertRegex(str(caught.exception), "is an input|is the part that")
+        check.assertEqual(pathlib.Path(name).read_bytes(), before, name)
+    flexel.map(bent.body, output="own.ply", force=True)
+    check.assertNotEqual(pathlib.Path("own.ply").read_bytes(), pathlib.Path("aside/own.ply").read_bytes())
+    for name, attempt in (("own.ply", part.write), ("body.vtu", read.write), ("own.ply", result.part.write)):
+        attempt(name, force=True)
+        attempt("new-" + name)
+    flexel.picture(part, "own.ply", force=True)
+    check.assertEqual(pathlib.Path("own.ply").read_bytes()[:4], b"\x89PNG")
+
+
+def test_pages_of_all_that_is_shown():
+    flexel = module()
+    part = flexel.Part.from_mesh(*box(), name="bar")
+    result = flexel.deform(part, size="5 mm", **PULL)
+    for shown in (part, result.body, result.part, result):
+        shown.write_page("page.html")
+        page = pathlib.Path("page.html").read_text(encoding="utf-8")
+        check.assertIn("<html", page)
+        check.assertIn("bar", page)
+        check.assertRegex(shown._repr_html_(), "^<iframe srcdoc=")
+        check.assertEqual(flexel.picture(shown, size="100x100")[:4], b"\x89PNG")
+
+
+def test_the_stub_is_of_the_module():
+    """_flexel.pyi has the functions, classes and members of the module, with as many arguments."""
+    flexel = module()
+    core = flexel._flexel
+    stub = ast.parse(pathlib.Path(flexel.__file__).with_name("_flexel.pyi").read_text())
+
+    def members(thing):
+        return {name for name in vars(thing) if not name.startswith("_")}
+
+    def check_arguments(node, function):
+        signature = re.match(r"\w+\((.*)\) -> ", function.__doc__.splitlines()[0]).group(1)
+        check.assertEqual(len(re.findall(r"\b(?:arg\d+|self): ", signature)), len(node.args.args), node.name)
+
+    functions = {node.name: node for node in stub.body if isinstance(node, ast.FunctionDef)}
+    classes = {node.name: node for node in stub.body if isinstance(node, ast.ClassDef)}
+    values = {node.target.id for node in stub.body if isinstance(node, ast.AnnAssign)}
+    check.assertEqual(set(functions) | set(classes) | values, members(core))
+    for name, node in functions.items():
+        check_arguments(node, getattr(core, name))
+    for name, node in classes.items():
+        methods = {each.name: each for each in node.body if isinstance(each, ast.FunctionDef)}
+        fields = {each.target.id for each in node.body if isinstance(each, ast.AnnAssign)}
+        check.assertEqual(set(methods) | fields, members(getattr(core, name)), name)
+        for method, each in methods.items():
+            check_arguments(each, getattr(getattr(core, name), method))
+
+
+def test_limits_of_simulate():
+    flexel = module()
+    body = flexel.voxelize(flexel.Part.from_mesh(*box()), size="1 mm")
+    began = time.monotonic()
+    with check.assertRaises(flexel.StoppedByTimeout):
+        flexel.simulate(body, SWING.replace("TIME", "100 s"), timeout="0.5 s")
+    check.assertLess(time.monotonic() - began, 30)
+    check.assertGreater(flexel.simulate(body, estimate=False, **PULL).largest_displacement, 0)
 
 
 def test_limits_end_with_their_call():

@@ -7,7 +7,7 @@ import sys
 import threading
 import time
 
-from shared import PULL, SWING, box_body, check, main, module
+from shared import PULL, SWING, box, box_body, check, main, module
 
 # A run that takes minutes; the child says when it begins.
 LONG = """
@@ -104,6 +104,52 @@ def test_an_error_of_a_run_within_a_run():
 
     flexel.simulate(body, SWING.replace("TIME", "0.2 ms"), on_frame=inner)
     check.assertEqual(len(caught), 5)
+
+
+def test_limits_of_an_outer_run_are_its_own():
+    flexel = module()
+    body, found = box_body(flexel), []
+    larger = flexel.Part.from_mesh(*box())
+
+    def inner(frame):
+        found.append(len(flexel.voxelize(larger, size=0.001).rest))
+        with check.assertRaises(flexel.InputError):
+            flexel.deform(larger, size=0.001, max_elements=100, **PULL)
+
+    flexel.simulate(body, SWING.replace("TIME", "0.1 ms"), max_elements=1000, on_frame=inner)
+    check.assertEqual(found, [41 * 11 * 11] * 5)
+
+
+def test_progress_of_a_run_to_equilibrium():
+    """By the residual: it grows, and so tells the time left."""
+    flexel = module()
+    shares = []
+
+    def progress(stage, share, note, left):
+        if stage == "simulate":
+            shares.append(share)
+
+    flexel.simulate(box_body(flexel, 0.0005), estimate=False, progress=progress, **PULL)
+    check.assertGreater(len(shares), 3)
+    check.assertEqual(shares, sorted(shares))
+    check.assertTrue(any(0.05 < share < 1 for share in shares), f"{shares}")
+
+
+def test_progress_runs_nothing():
+    """It may be told on any thread of the run, which holds the lock: refused, not a wait for ever."""
+    flexel = module()
+    body, part, refused = box_body(flexel, 0.001), flexel.Part.from_mesh(*box()), []
+
+    def progress(stage, share, note, left):
+        try:
+            flexel.voxelize(part, size=0.005)
+        except flexel.InputError as error:
+            refused.append(str(error))
+
+    flexel.simulate(body, SWING.replace("TIME", "0.1 ms"), progress=progress)
+    check.assertTrue(refused)
+    check.assertIn("progress cannot run anything", refused[0])
+    check.assertEqual(len(flexel.voxelize(part, size=0.005).rest), 9 * 3 * 3)
 
 
 def test_ctrl_c_ends_a_wait():

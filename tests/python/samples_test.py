@@ -35,6 +35,20 @@ def test_force_against_displacement():
     check.assertLess(max(stiffness) / min(stiffness), 2)
 
 
+def test_the_page():
+    """The blocks of docs/guide/python.md, in order."""
+    module()
+    need_step()
+    bracket()
+    blocks = re.findall(r"^```python\n(.*?)^```$", (SOURCE / "docs/guide/python.md").read_text(encoding="utf-8"), re.M | re.S)
+    text = expect_ok(run(sys.executable, "-c", "\n".join(blocks), timeout=115)).out.decode()
+    check.assertIn("how far", text)
+    frames = rows(text)
+    check.assertEqual(len(frames), 6)
+    check.assertGreater(frames[-1][1], frames[1][1])
+    check.assertTrue(all(pathlib.Path(name).stat().st_size for name in ("bent.stl", "bent.step")))
+
+
 def test_force_plot():
     module()
     need_step()
