@@ -2,7 +2,9 @@
 """Measures contact in every model that has it: rest, bounces, friction, points of contact, and what contact and damping cost.
 Prints the tables and writes docs/measurements/contact.md. Costs are processor time of one thread, medians of three.
 
-    PATH=build/release/bin:$PATH bench/contact/measure.py
+    PATH=build/release/bin:$PATH bench/contact/measure.py [rest bounces friction pressed costs damping kneaded]
+
+With names of sections it makes these anew and leaves the others.
 """
 
 import csv
@@ -248,7 +250,7 @@ def kneaded():
         placement = ("--placement", "centre") if model == "paper" else ()
         subprocess.run(["flexel-voxelize", "kneaded.stl", "--size", "6mm", *placement, "-o", "body.vtu", "--quiet"], check=True, stderr=subprocess.DEVNULL)
         summary, _, seconds, _ = simulate(text)
-        yield f"| {model} | {steps_of(summary)} | {seconds:.2f} | {seconds / 0.112:.0f} |"
+        yield f"| {model} | {steps_of(summary)} | {seconds:.2f} | {seconds / 0.112:.1f} |"
     yield ""
 
 
@@ -267,10 +269,17 @@ def main():
                 lines.append(line)
                 print(line, flush=True)
             os.chdir("/")
+    page = SOURCE / "docs/measurements/contact.md"
     if len(chosen) == len(SECTIONS):
         processor = re.search(r"model name\s*: (.*)", pathlib.Path("/proc/cpuinfo").read_text(encoding="utf-8")) if platform.system() == "Linux" else None
         head = f"# Contact\n\n`bench/contact/measure.py` writes this page{f' (here on {processor[1]})' if processor else ''}. What it measures: [contact-mechanics.md](../theory/contact-mechanics.md).\n\n"
-        (SOURCE / "docs/measurements/contact.md").write_text(head + "\n".join(lines).rstrip() + "\n", encoding="utf-8")
+        page.write_text(head + "\n".join(lines).rstrip() + "\n", encoding="utf-8")
+        return
+    parts = re.split(r"(?m)^(?=## )", page.read_text(encoding="utf-8"))
+    for part in re.split(r"(?m)^(?=## )", "\n".join(lines).rstrip() + "\n\n")[1:]:
+        title = part.splitlines()[0]
+        parts = [part if each.startswith(title + "\n") else each for each in parts]
+    page.write_text("".join(parts).rstrip() + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,11 @@
 // Self-intersection: boxes that meet (CGAL's box intersection), then the triangles with exact predicates;
-// only pairs that did not meet at rest are counted. Voronoi: the Delaunay triangulation's edges are the
+// only pairs that did not meet at rest are counted, those of two parts by how deep they are in each other. Voronoi: the Delaunay triangulation's edges are the
 // candidates; the facet of an edge is the polygon of the circumcentres of the cells around it.
 #include "mapping/checks/cgal_checks.h"
 
+#include <CGAL/AABB_traits.h>
+#include <CGAL/AABB_tree.h>
+#include <CGAL/AABB_triangle_primitive.h>
 #include <CGAL/Delaunay_triangulation_3.h>
 #include <CGAL/Delaunay_triangulation_cell_base_3.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
@@ -14,6 +17,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <map>
 
 #include "base/error.h"
 #include "formats/part/topology.h"
@@ -41,6 +46,67 @@ bool meet(const std::vector<Vec3>& at, const Corners& a, const Corners& b) {
 bool share_a_corner(const Corners& a, const Corners& b) {
   return std::any_of(a.begin(), a.end(),
                      [&](std::uint32_t v) { return std::find(b.begin(), b.end(), v) != b.end(); });
+}
+
+// m, of two triangles that meet: the least way that parts them, along a normal or square to an edge of each.
+double depth(const std::vector<Vec3>& at, const Corners& a, const Corners& b) {
+  const auto edge = [&](const Corners& of, std::size_t n) { return Vec3(at[of[(n + 1) % 3]] - at[of[n]]); };
+  double least = std::numeric_limits<double>::infinity();
+  const auto try_axis = [&](const Vec3& axis, double scale) {
+    if (!(axis.norm() > 1e-6 * scale)) return;
+    const Vec3 along = axis.normalized();
+    const auto extent = [&](const Corners& of) {
+      const std::array<double, 3> x{along.dot(at[of[0]]), along.dot(at[of[1]]), along.dot(at[of[2]])};
+      const auto [low, high] = std::minmax_element(x.begin(), x.end());
+      return std::array{*low, *high};
+    };
+    const auto first = extent(a), second = extent(b);
+    least = std::min({least, first[1] - second[0], second[1] - first[0]});
+  };
+  for (const Corners* of : {&a, &b})
+    try_axis(edge(*of, 0).cross(edge(*of, 1)), edge(*of, 0).norm() * edge(*of, 1).norm());
+  for (std::size_t m = 0; m < 3; ++m)
+    for (std::size_t n = 0; n < 3; ++n)
+      try_axis(edge(a, m).cross(edge(b, n)), edge(a, m).norm() * edge(b, n).norm());
+  return std::max(least, 0.0);
+}
+
+using Solids = std::vector<std::vector<Kernel::Triangle_3>>;  // (parts)
+using Tree = CGAL::AABB_tree<CGAL::AABB_traits<
+    Kernel, CGAL::AABB_triangle_primitive<Kernel, std::vector<Kernel::Triangle_3>::const_iterator>>>;
+
+// m, of corners of one part inside another, from its surface, at most: where a ray meets that an odd number of times.
+double deepest_corner(const std::vector<Kernel::Triangle_3>& of, const std::vector<Kernel::Triangle_3>& in) {
+  const Kernel::Vector_3 somewhere(0.80171, 0.33419, 0.49573);
+  const Tree tree(in.begin(), in.end());
+  double deepest = 0;
+  for (const Kernel::Triangle_3& each : of)
+    for (int n = 0; n < 3; ++n) {
+      const Point corner = each.vertex(n);
+      if (!CGAL::do_overlap(corner.bbox(), tree.bbox())) continue;
+      if (tree.number_of_intersected_primitives(Kernel::Ray_3(corner, somewhere)) % 2 == 1)
+        deepest = std::max(deepest, std::sqrt(tree.squared_distance(corner)));
+    }
+  return deepest;
+}
+
+constexpr double kThrough = 0.25;  // spacings, beyond which parts have passed through each other
+
+// Of meetings of two parts by their pairs of triangles, how deep each is: large triangles that cross tell it
+// themselves, of small ones the corners that are inside.
+void add_depths(const std::map<std::array<std::uint32_t, 2>, std::vector<double>>& meetings,
+                const Solids& solids, const Body& body, SurfaceMeetings& found) {
+  for (const auto& [parts, depths] : meetings) {
+    const auto [one, other] = parts;
+    const double inside =
+        std::max(deepest_corner(solids[one], solids[other]), deepest_corner(solids[other], solids[one]));
+    const double limit = kThrough * std::min(body.parts[one].lattice.spacing.minCoeff(),
+                                             body.parts[other].lattice.spacing.minCoeff());
+    found.between += depths.size();
+    found.through += static_cast<std::size_t>(std::count_if(
+        depths.begin(), depths.end(), [&](double each) { return std::max(each, inside) > limit; }));
+    found.deepest = std::max({found.deepest, inside, *std::max_element(depths.begin(), depths.end())});
+  }
 }
 
 using Vertex = CGAL::Triangulation_vertex_base_with_info_3<std::uint32_t, Kernel>;
@@ -102,8 +168,9 @@ std::vector<std::vector<std::uint32_t>> large_neighbours(const Part& part, const
 
 }  // namespace
 
-std::size_t new_self_intersections(const Surface& surface, const std::vector<Vec3>& displacement) {
+SurfaceMeetings new_meetings(const Body& body, const std::vector<Vec3>& displacement) {
   using TriangleBox = CGAL::Box_intersection_d::Box_with_info_d<double, 3, std::uint32_t>;
+  const Surface& surface = body.surface;
   Triangles triangles = triangulate(surface);
   const std::vector<std::uint32_t> welded = weld(surface.vertices);
   std::vector<Vec3> moved = surface.vertices;
@@ -113,14 +180,25 @@ std::size_t new_self_intersections(const Surface& surface, const std::vector<Vec
     for (std::uint32_t& v : triangles.corners[t]) v = welded[v];
     boxes.emplace_back(triangle(moved, triangles.corners[t]).bbox(), t);
   }
-  std::size_t count = 0;
+  const auto part_of = [&](std::uint32_t t) { return surface.polygon_part(triangles.polygon[t]); };
+  Solids solids(body.parts.size());
+  for (std::uint32_t t = 0; t < triangles.corners.size(); ++t)
+    if (const Kernel::Triangle_3 each = triangle(moved, triangles.corners[t]); !each.is_degenerate())
+      solids[part_of(t)].push_back(each);
+  std::map<std::array<std::uint32_t, 2>, std::vector<double>> meetings;
+  SurfaceMeetings found;
   CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const TriangleBox& a, const TriangleBox& b) {
     const Corners &first = triangles.corners[a.info()], &second = triangles.corners[b.info()];
-    if (!share_a_corner(first, second) && meet(moved, first, second) &&
-        !meet(surface.vertices, first, second))
-      ++count;
+    if (share_a_corner(first, second) || !meet(moved, first, second) || meet(surface.vertices, first, second))
+      return;
+    const std::uint32_t one = part_of(a.info()), other = part_of(b.info());
+    if (one == other)
+      ++found.self;
+    else
+      meetings[{std::min(one, other), std::max(one, other)}].push_back(depth(moved, first, second));
   });
-  return count;
+  add_depths(meetings, solids, body, found);
+  return found;
 }
 
 std::vector<std::uint8_t> voronoi_changes(const Body& body, const MapResult& result) {

@@ -5,10 +5,8 @@
 
 namespace flexel::mapping {
 
-// Pairs of triangles, without a common corner, that meet in the deformed surface and did not at rest. Corners
-// at equal positions are one. `displacement`: (vertices x 3) m, finite.
-[[nodiscard]] std::size_t new_self_intersections(const Surface& surface,
-                                                 const std::vector<Vec3>& displacement);
+// Of the surface of `body`, whose corners at equal positions are one. `displacement`: (vertices x 3) m, finite.
+[[nodiscard]] SurfaceMeetings new_meetings(const Body& body, const std::vector<Vec3>& displacement);
 
 // (elements of the body) 1: the element holds a vertex and its neighbours in the Voronoi diagram of its
 // part's elements have changed. Neighbours are those whose common facet is larger than 5 % of the spacing

@@ -57,8 +57,7 @@ void make_checks(const Body& body, const MapOptions& options, MapResult& result)
       if (result.referenced[v] && changed[result.frame_of(v).elements[0]]) result.flags[v] |= kVoronoiChanged;
     result.voronoi_checked = true;
   }
-  if (options.check_intersection && finite)
-    result.new_self_intersections = new_self_intersections(body.surface, result.displacement);
+  if (options.check_intersection && finite) result.new_meetings = new_meetings(body, result.displacement);
 }
 
 const std::vector<std::string> kFarNames = {"follow", "rigid", "refuse"};  // by FarVertices

@@ -68,9 +68,16 @@ std::string failure(const MapReport& report) {
     causes.push_back(share(report.degenerate, report.vertices) + " sit in frames that were crushed flat");
   if (report.not_finite > 0)
     causes.push_back(share(report.not_finite, report.vertices) + " have no finite position");
-  if (report.new_self_intersections.value_or(0) > 0)
-    causes.push_back(fmt::format("{} pairs of triangles pass through each other and did not at rest",
-                                 human_count(*report.new_self_intersections)));
+  const SurfaceMeetings meetings = report.new_meetings.value_or(SurfaceMeetings{});
+  if (meetings.self > 0)
+    causes.push_back(
+        fmt::format("{} pairs of triangles of one part pass through each other and did not at rest",
+                    human_count(meetings.self)));
+  if (meetings.through > 0)
+    causes.push_back(
+        fmt::format("{} pairs of triangles of different parts pass through each other, by up to {}, and did "
+                    "not at rest",
+                    human_count(meetings.through), human_length(meetings.deepest)));
   return fmt::format("{}; take a smaller load or a finer lattice", fmt::join(causes, ", "));
 }
 
@@ -104,7 +111,7 @@ MapReport report(const Body& body, const MapResult& result, bool cut) {
     report.not_finite += (flags & kNotFinite) != 0;
   }
   if (!result.voronoi_checked) report.voronoi_changed.reset();
-  report.new_self_intersections = result.new_self_intersections;
+  report.new_meetings = result.new_meetings;
   report.far = result.far;
   report.rest_residual = result.rest_residual;
   report.distance_outside = result.distance_outside;
@@ -160,10 +167,13 @@ std::vector<std::string> report_lines(const MapReport& report) {
     lines.push_back(fmt::format(
         "the mapped surface can be used: no frame of its {} vertices is inverted or degenerate{}",
         human_count(report.vertices),
-        report.new_self_intersections ? ", and it does not pass through itself where it did not before"
-                                      : ""));
+        report.new_meetings ? ", and no part passes through itself where it did not before" : ""));
   else
     lines.push_back("the mapped surface cannot be used as it is: " + failure(report));
+  if (report.new_meetings && report.new_meetings->between > report.new_meetings->through)
+    lines.push_back(
+        fmt::format("parts touch: {} pairs of their triangles meet that did not at rest, by up to {}",
+                    human_count(report.new_meetings->between), human_length(report.new_meetings->deepest)));
   if (report.kinds[0] < report.vertices) lines.push_back(fewer_elements(report));
   constexpr double kStrongStrain = 0.1;
   if (report.voronoi_cell_left > 0 && report.largest_strain > kStrongStrain)
@@ -220,17 +230,21 @@ Json report_object(const MapReport& report, const MapOptions& options) {
   json["frames"] = {{"distinct", report.distinct_frames}, {"full", report.kinds[0]},
                     {"plane", report.kinds[1]},           {"line", report.kinds[2]},
                     {"rigid", report.kinds[3]},           {"widened", report.widened}};
+  const std::optional<SurfaceMeetings>& meetings = report.new_meetings;
   json["failures"] = {
       {"inverted", report.inverted},
       {"degenerate", report.degenerate},
       {"not_finite", report.not_finite},
-      {"new_self_intersections", optional_count(report.new_self_intersections)},
+      {"new_self_intersections", meetings ? Json(meetings->self) : Json(nullptr)},
+      {"parts_through_each_other", meetings ? Json(meetings->through) : Json(nullptr)},
       {"coarse_triangles", report.chord ? Json(report.chord->coarse_triangles) : Json(nullptr)}};
   json["advisories"] = {{"voronoi_cell_left", report.voronoi_cell_left},
                         {"voronoi_changed", optional_count(report.voronoi_changed)},
+                        {"parts_that_meet", meetings ? Json(meetings->between) : Json(nullptr)},
                         {"far_vertices", report.far},
                         {"flipped_triangles", quality.flipped},
                         {"folded_triangles", quality.folded}};
+  json["deepest_meeting"] = meetings ? Json(meetings->deepest) : Json(nullptr);
   json["rest_residual"] = report.rest_residual;
   json["distance_outside"] = report.distance_outside;
   json["largest_vertex_displacement"] = report.largest_displacement;

@@ -19,6 +19,16 @@ struct Frame {
   std::uint8_t rings = 0;  // how many times the search along connections was widened
 };
 
+// Pairs of triangles without a common corner that meet in the deformed surface and did not at rest. Parts that touch
+// are pressed into each other a little; one part that meets itself, or another one deeply, has passed through.
+struct SurfaceMeetings {
+  std::size_t self = 0;     // of one part
+  std::size_t between = 0;  // of two parts
+  std::size_t through = 0;  // of these, deeper than a quarter of the smaller spacing
+  double deepest = 0;       // m, between parts: the least way that parts such a pair along one of its normals
+  [[nodiscard]] bool sound() const { return self == 0 && through == 0; }
+};
+
 struct MapResult {
   std::vector<Vec3> displacement;        // (vertices x 3) m
   std::vector<std::uint8_t> flags;       // (vertices) bits of MapFlag
@@ -30,7 +40,7 @@ struct MapResult {
                                 // half a voxel's diagonal
   std::size_t far = 0;          // vertices carried rigidly because they lie too far outside
   bool voronoi_checked = false;
-  std::optional<std::size_t> new_self_intersections;  // where it was asked for
+  std::optional<SurfaceMeetings> new_meetings;  // where it was asked for
   [[nodiscard]] const Frame& frame_of(std::size_t vertex) const { return frames[frame[vertex]]; }
 };
 
@@ -78,11 +88,12 @@ struct MapReport {
   std::size_t widened = 0;             // vertices whose search was widened
   std::size_t far = 0;                 // carried rigidly
   std::size_t voronoi_cell_left = 0, inverted = 0, degenerate = 0, not_finite = 0;
-  std::optional<std::size_t> voronoi_changed, new_self_intersections;  // where they were checked
-  double rest_residual = 0;                                            // m
-  double distance_outside = 0;                                         // in spacings
-  double largest_displacement = 0;                                     // m
-  double largest_strain = 0;                                           // |principal stretch - 1| at a vertex
+  std::optional<std::size_t> voronoi_changed;   // where they were checked
+  std::optional<SurfaceMeetings> new_meetings;  // likewise
+  double rest_residual = 0;                     // m
+  double distance_outside = 0;                  // in spacings
+  double largest_displacement = 0;              // m
+  double largest_strain = 0;                    // |principal stretch - 1| at a vertex
   SurfaceQuality quality;
   std::optional<ChordError> chord;        // nothing of a surface that was cut along cracks
   std::optional<std::size_t> split_from;  // triangles, before they were split to show the deformation
@@ -91,7 +102,7 @@ struct MapReport {
   CrackReport crack;
   // The places of the vertices can be trusted.
   [[nodiscard]] bool placed() const {
-    return inverted == 0 && degenerate == 0 && not_finite == 0 && new_self_intersections.value_or(0) == 0;
+    return inverted == 0 && degenerate == 0 && not_finite == 0 && (!new_meetings || new_meetings->sound());
   }
   // And so can the triangles between them.
   [[nodiscard]] bool valid() const { return placed() && (!chord || chord->coarse_triangles == 0); }

@@ -34,14 +34,12 @@ std::array<Vec3, 2> ContactFriction::meeting_place(const ContactPair& pair) cons
 
 // finish_step() asks for the motions that loads() of the next step asks for again.
 void ContactFriction::find_motions(const State& state) {
-  const std::vector<std::uint32_t>& elements = list_.elements();
-  bool same = evaluation_ == states_.evaluations() && velocities_.size() == elements.size();
-  for (std::size_t e = 0; same && e < velocities_.size(); ++e)
-    same = velocities_[e] == state.velocity[elements[e]];
-  if (same) return;
+  if (evaluation_ == states_.evaluations() && velocities_.size() == list_.elements().size() &&
+      same_bits(list_.runs(), state.velocity, velocities_))
+    return;
   evaluation_ = states_.evaluations();
-  velocities_.resize(elements.size());
-  for (std::size_t e = 0; e < velocities_.size(); ++e) velocities_[e] = state.velocity[elements[e]];
+  velocities_.resize(list_.elements().size());
+  gather(list_.runs(), state.velocity, velocities_);
   const CarryingCells& cells = states_.cells();
   point_velocity_.resize(cells.points().size());
   cell_gradient_.resize(cells.cells().size());

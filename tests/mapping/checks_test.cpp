@@ -1,6 +1,9 @@
 // What the report says of triangles, volume, the surface passing through itself, and Voronoi neighbours.
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
+
 #include <Eigen/LU>
 
 #include "base/error.h"
@@ -68,7 +71,7 @@ TEST(Quality, TrianglesTurnedOverAreCounted) {
   EXPECT_EQ(mapped(body, {&kBlended}).quality.flipped, 0u);
 }
 
-// Two blocks of one part, bound by nothing: one is pushed through the other.
+// Two blocks, bound by nothing: one is pushed through the other.
 TEST(Intersection, OnlyNewOnesAreCounted) {
   Body body = test::block(3, 3, 3, 0.1, Placement::corner, 4);
   Body other = test::block(3, 3, 3, 0.1, Placement::corner, 4);
@@ -80,12 +83,13 @@ TEST(Intersection, OnlyNewOnesAreCounted) {
   test::append_body(body, other);
   MapOptions options;
   options.check_intersection = true;
-  EXPECT_EQ(mapped(body, options).new_self_intersections, 0u);
-  EXPECT_EQ(mapped(body).new_self_intersections, std::nullopt);
+  EXPECT_EQ(mapped(body, options).new_meetings->between, 0u);
+  EXPECT_FALSE(mapped(body).new_meetings.has_value());
   for (std::uint32_t e = body.parts[1].element_begin; e < body.parts[1].element_end; ++e)
     body.position[e] -= Vec3(0.35, 0, 0);
   const MapReport found = mapped(body, options);
-  EXPECT_GT(found.new_self_intersections, 8u);
+  EXPECT_GT(found.new_meetings->through, 8u);
+  EXPECT_EQ(found.new_meetings->self, 0u);
   EXPECT_FALSE(found.valid());
   EXPECT_NE(report_lines(found).front().find("pass through each other"), std::string::npos);
   // The same state at rest already: nothing is new.
@@ -94,7 +98,55 @@ TEST(Intersection, OnlyNewOnesAreCounted) {
   for (std::size_t v = body.surface.vertices.size() / 2; v < body.surface.vertices.size(); ++v)
     body.surface.vertices[v] -= Vec3(0.35, 0, 0);
   body.parts[1].lattice.origin -= Vec3(0.35, 0, 0);
-  EXPECT_EQ(mapped(body, options).new_self_intersections, 0u);
+  EXPECT_EQ(mapped(body, options).new_meetings->between, 0u);
+}
+
+// A bar that is rolled up over its own beginning.
+TEST(Intersection, OfAPartWithItself) {
+  Body body = test::block(40, 2, 2, 0.1, Placement::corner, 4);
+  MapOptions options;
+  options.check_intersection = true;
+  const auto rolled = [&](double turns) {
+    test::deform(body, [&](const Vec3& x) -> Vec3 {
+      const double angle = 2 * std::numbers::pi * turns * x.x() / 4, radius = 0.6 + x.y();
+      return {radius * std::sin(angle), radius * std::cos(angle), x.z()};
+    });
+    return *mapped(body, options).new_meetings;
+  };
+  EXPECT_EQ(rolled(0.9).self, 0u);
+  EXPECT_GT(rolled(1.05).self, 0u);
+  EXPECT_EQ(rolled(1.05).between, 0u);
+  EXPECT_FALSE(mapped(body, options).valid());
+}
+
+// Pressed in as contact does, two parts touch; deeper ones have passed through each other.
+TEST(Intersection, PartsThatTouchAreToldFromThoseThatPass) {
+  const Vec3 apart(0.35, 0.01, 0.02);
+  const auto pressed = [&](int fine, double depth) {
+    Body body = test::block(3, 3, 3, 0.1, Placement::corner, fine);
+    Body other = test::block(3, 3, 3, 0.1, Placement::corner, fine);
+    for (Vec3& x : other.rest) x += apart;
+    for (Vec3& x : other.surface.vertices) x += apart;
+    other.parts[0].lattice.origin += apart;
+    other.position = other.rest;
+    const double gap =
+        bounding_box(other.surface.vertices).min.x() - bounding_box(body.surface.vertices).max.x();
+    test::append_body(body, other);
+    MapOptions options;
+    options.check_intersection = true;
+    for (std::uint32_t e = body.parts[1].element_begin; e < body.parts[1].element_end; ++e)
+      body.position[e] -= Vec3(gap + depth, 0, 0);
+    return mapped(body, options);
+  };
+  for (const int fine : {4, 15}) {  // triangles of .75 and of a fifth of a spacing
+    const MapReport touching = pressed(fine, 0.005);
+    EXPECT_TRUE(touching.valid());
+    EXPECT_GT(touching.new_meetings->between, 0u);
+    EXPECT_NEAR(touching.new_meetings->deepest, 0.005, 1e-6);
+    const MapReport through = pressed(fine, 0.03);
+    EXPECT_FALSE(through.valid());
+    EXPECT_NEAR(through.new_meetings->deepest, 0.03, 1e-6);
+  }
 }
 
 TEST(VoronoiCheck, TiesOfTheLatticeDoNotCountAndShearDoes) {

@@ -56,6 +56,20 @@ def test_a_glued_tool_lifts_the_part():
     expect(abs(lifted("glue = true") - 2e-3) < 2e-4, "with glue it comes along")
 
 
+def test_what_a_tool_presses_is_no_part_that_passes_through_itself():
+    write("low.stl", binary_stl(box_triangles((10.0, 10.0, 10.0))))
+    write("high.stl", binary_stl([[(x + 1, y + 1, z + 10.2) for x, y, z in t] for t in box_triangles((5.0, 5.0, 5.0))]))
+    expect_ok(run("flexel-voxelize", "low.stl", "high.stl", "--size", "2.5 mm", "-o", "body.vtu"))
+    scene("press.toml", LIFT.replace("GLUE", "").replace('"2 mm"', '"-0.4 mm"').replace("[damping]", "[[plane]]\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\n[damping]"))
+    expect_ok(run("flexel-simulate", "press.toml", "body.vtu", "-o", "pressed.vtu"))
+    said = expect_ok(run("flexel-map", "pressed.vtu", "-o", "pressed.stl", "--strict", "--check", "self-intersection", "--report", "r.json")).err
+    with open("r.json", encoding="utf-8") as file:
+        report = json.load(file)
+    expect(report["failures"]["new_self_intersections"] == 0 and report["failures"]["parts_through_each_other"] == 0, f"{report['failures']}")
+    expect(report["advisories"]["parts_that_meet"] > 0 and 0 < report["deepest_meeting"] < 0.1e-3, f"{report}")
+    expect("no part passes through itself" in said and "parts touch" in said, said)
+
+
 def test_explain_tells_the_whole_time_of_contact():
     two_blocks()
     scene("lift.toml", LIFT.replace("GLUE", "glue = true"))

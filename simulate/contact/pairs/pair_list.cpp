@@ -24,6 +24,7 @@ PairList::PairList(const ContactSettings& settings, const Problem& problem, cons
       surface_(surface),
       materials_(settings, problem, surface),
       excluded_(settings, problem, surface),
+      surface_runs_(element_runs(surface.elements(), surface.body().parts)),
       built_at_(surface.elements().size()) {}
 
 bool PairList::update(const State& state, bool ahead) {
@@ -36,19 +37,19 @@ bool PairList::update(const State& state, bool ahead) {
 // step's are in their box widened by that of the velocities: the length of a step is chosen before it leads to
 // an impact.
 bool PairList::is_due(const State& state, bool ahead) {
-  constexpr std::size_t kGrain = 4096;
-  const std::vector<std::uint32_t>& elements = surface_.elements();
-  boxes_.assign((elements.size() + kGrain - 1) / kGrain, {});
-  parallel_chunks(elements.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-    Box moves, speeds;
-    for (std::size_t e = begin; e < end; ++e) {
-      moves.add(state.displacement[elements[e]] - built_at_[e]);
-      if (ahead) speeds.add(state.velocity[elements[e]]);
+  constexpr std::size_t kGrain = 1024;
+  boxes_.assign((surface_runs_.size() + kGrain - 1) / kGrain, {});
+  parallel_chunks(surface_runs_.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    auto& [moves, speeds] = boxes_[begin / kGrain];
+    for (std::size_t r = begin; r < end; ++r) {
+      const ElementRun& run = surface_runs_[r];
+      moves.add_differences({&state.displacement[run.first], run.count}, {&built_at_[run.place], run.count});
+      if (ahead) speeds.add({&state.velocity[run.first], run.count});
     }
-    boxes_[begin / kGrain] = {moves, speeds};
   });
   Box moves, speeds;
-  for (const auto& [own_moves, own_speeds] : boxes_) {
+  for (const auto& [wide_moves, wide_speeds] : boxes_) {
+    const Box own_moves = wide_moves.box(), own_speeds = wide_speeds.box();
     moves.add(own_moves.min), moves.add(own_moves.max);
     if (ahead) speeds.add(own_speeds.min), speeds.add(own_speeds.max);
   }
@@ -197,6 +198,7 @@ void PairList::number_points() {
   }
   std::sort(elements_.begin(), elements_.end());
   elements_.erase(std::unique(elements_.begin(), elements_.end()), elements_.end());
+  runs_ = element_runs(elements_, surface_.body().parts);
 }
 
 }  // namespace flexel::simulate

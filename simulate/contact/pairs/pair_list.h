@@ -4,6 +4,7 @@
 // surface has moved by nearly half the margin against the others: common motion costs nothing.
 #pragma once
 #include "simulate/contact/pairs/contact_materials.h"
+#include "simulate/contact/pairs/element_runs.h"
 #include "simulate/contact/pairs/excluded_pairs.h"
 
 namespace flexel::simulate {
@@ -33,6 +34,7 @@ class PairList {
   // Contact points of pairs, ascending, and the elements that carry them, ascending.
   [[nodiscard]] const std::vector<std::uint32_t>& points() const { return points_; }
   [[nodiscard]] const std::vector<std::uint32_t>& elements() const { return elements_; }
+  [[nodiscard]] const std::vector<ElementRun>& runs() const { return runs_; }  // of elements()
   [[nodiscard]] const ContactPoint& point(std::uint32_t number) const {
     return surface_.points()[points_[number]];
   }
@@ -62,8 +64,9 @@ class PairList {
   ExcludedPairs excluded_;
   std::vector<ContactPair> pairs_;
   std::vector<std::uint32_t> points_, elements_;
+  std::vector<ElementRun> runs_, surface_runs_;  // of elements_; of all that carry points
   std::vector<Vec3> built_at_;
-  std::vector<std::array<Box, 2>> boxes_;  // of is_due()
+  std::vector<std::array<WideBox, 2>> boxes_;  // of is_due()
   bool built_ = false;
   std::size_t built_with_ = 0;  // broken cells
   double slack_ = 0;            // m, that elements may move before other pairs can touch

@@ -30,7 +30,7 @@ class PairSchedule {
   using Bodies = std::array<std::uint32_t, 2>;
 
   // To a new list of pairs of those bodies, all of them awake; `spacing` [m]: the narrowest.
-  void reset(std::vector<Bodies> pairs, std::size_t bodies, double spacing);
+  void reset(const std::vector<Bodies>& pairs, std::size_t bodies, double spacing);
   // After a step; the next one may go twice as far.
   void advance(std::span<const BodyMotion> motions);
   void wake_all();
@@ -38,22 +38,29 @@ class PairSchedule {
   // Lets the pair sleep if that is worth while; whether it does. Parallel, one call a pair.
   bool sleep(std::uint32_t pair, const SafeMotion& safe);
   void keep_awake(std::uint32_t pair) { due_[pair] = {0, 0}; }  // likewise
-  [[nodiscard]] bool sleeps(std::uint32_t pair) const { return !due(pair, 0, 0); }
+  [[nodiscard]] bool sleeps(std::uint32_t pair) const { return !due(pair, next_); }
   // Ascending; of the last advance().
   [[nodiscard]] const std::vector<std::uint32_t>& awake() const { return awake_; }
 
  private:
-  // Sums of a pair, to compare with what it is due at.
-  [[nodiscard]] SafeMotion sums(const Bodies& of, const std::vector<BodyMotion>& motions) const;
-  [[nodiscard]] bool due(std::uint32_t pair, double ahead_path, double ahead_turn) const;
+  // Sums of a couple of bodies, to compare with what its pairs are due at.
+  [[nodiscard]] static SafeMotion sums(const Bodies& of, const std::vector<BodyMotion>& motions);
+  void find_sums();
+  [[nodiscard]] bool due(std::uint32_t pair, const std::vector<SafeMotion>& limits) const {
+    const SafeMotion &at = due_[pair], &limit = limits[couple_[pair]];
+    return at.path <= limit.path || at.turn <= limit.turn;
+  }
 
-  std::vector<Bodies> pairs_;
-  std::vector<SafeMotion> due_;       // (pairs) sums at which it has to be looked at
-  std::vector<BodyMotion> sum_;       // (bodies) since reset()
-  std::vector<BodyMotion> reach_;     // (bodies) of the next step
-  std::vector<std::uint32_t> soon_;   // those that may be due before left_ is used up, ascending
-  std::vector<std::uint32_t> awake_;  // those that may be due in the next step
-  SafeMotion left_{0, 0};             // m
+  std::vector<Bodies> couples_;         // of bodies that have pairs
+  std::vector<std::uint32_t> couple_;   // (pairs) in couples_
+  std::vector<SafeMotion> now_, next_;  // (couples_) sums so far, and those that the next step may lead to
+  std::vector<SafeMotion> ahead_;       // (couples_) next_ and what is left
+  std::vector<SafeMotion> due_;         // (pairs) sums at which it has to be looked at
+  std::vector<BodyMotion> sum_;         // (bodies) since reset()
+  std::vector<BodyMotion> reach_;       // (bodies) of the next step
+  std::vector<std::uint32_t> soon_;     // those that may be due before left_ is used up, ascending
+  std::vector<std::uint32_t> awake_;    // those that may be due in the next step
+  SafeMotion left_{0, 0};               // m
   double spacing_ = 0;
 };
 

@@ -39,7 +39,7 @@ void PairStates::reset() {
   std::vector<PairSchedule::Bodies> bodies;
   for (const ContactPair& pair : list_.pairs())
     bodies.push_back({list_.point(pair.i).part, pair.of_plane() ? planes : list_.point(pair.j).part});
-  schedule_.reset(std::move(bodies), planes + 1, surface_.narrowest());
+  schedule_.reset(bodies, planes + 1, surface_.narrowest());
   moved_from_.clear();
   cells_.reset(list_);
   shapes_.resize(cells_.cells().size());
@@ -47,51 +47,59 @@ void PairStates::reset() {
 }
 
 // Since the last evaluation; without one in this list, none. The common way is that of the middle of all.
-std::vector<BodyMotion> PairStates::motion_to(const State& state) {
-  const std::vector<std::uint32_t>& elements = list_.elements();
+std::span<const BodyMotion> PairStates::motion_to(const State& state) {
   const std::vector<Part>& parts = surface_.body().parts;
-  if (moved_from_.size() != elements.size()) {
-    moved_from_.resize(elements.size());
-    for (std::size_t e = 0; e < elements.size(); ++e) moved_from_[e] = state.displacement[elements[e]];
+  if (moved_from_.size() != list_.elements().size()) {
+    moved_from_.resize(list_.elements().size());
+    gather(list_.runs(), state.displacement, moved_from_);
     return {};
   }
-  moves_.resize(elements.size());
-  std::vector<Box> of_body(parts.size() + 1);
-  Box all;
-  for (std::size_t e = 0, part = 0; e < elements.size(); ++e) {
-    while (elements[e] >= parts[part].element_end) ++part;
-    moves_[e] = state.displacement[elements[e]] - moved_from_[e];
-    of_body[part].add(moves_[e]);
-    moved_from_[e] = state.displacement[elements[e]];
+  moves_.resize(moved_from_.size());
+  of_body_.assign(parts.size(), {});
+  for (const ElementRun& run : list_.runs()) {
+    using Values = Eigen::ArrayXd;
+    const Eigen::Index count = 3 * static_cast<Eigen::Index>(run.count);
+    const Eigen::Map<const Values> now(state.displacement[run.first].data(), count);
+    Eigen::Map<Values> before(moved_from_[run.place].data(), count);
+    Eigen::Map<Values>(moves_[run.place].data(), count) = now - before;
+    before = now;
+    of_body_[run.part].add({&moves_[run.place], run.count});
   }
-  if (!settings_.planes.empty()) of_body.back().add(Vec3::Zero());
-  for (const Box& each : of_body)
-    if (!each.empty()) all.add(each.min), all.add(each.max);
-  std::vector<BodyMotion> motions(of_body.size());
+  motions_.assign(parts.size() + 1, {});
+  Box all;
+  for (std::size_t b = 0; b < motions_.size(); ++b) {
+    const Box box = body_box(b);
+    if (!box.empty()) all.add(box.min), all.add(box.max);
+  }
   const Vec3 middle = 0.5 * (all.min + all.max);
-  for (std::size_t b = 0; b < of_body.size(); ++b) {
-    const Box& box = of_body[b];
+  for (std::size_t b = 0; b < motions_.size(); ++b) {
+    const Box box = body_box(b);
     if (box.empty()) continue;
-    motions[b].path = (box.max - middle).cwiseAbs().cwiseMax((box.min - middle).cwiseAbs()).norm();
-    motions[b].spread = 0.5 * box.diagonal();
+    motions_[b].path = (box.max - middle).cwiseAbs().cwiseMax((box.min - middle).cwiseAbs()).norm();
+    motions_[b].spread = 0.5 * box.diagonal();
   }
   for (const CarryingCell& cell : cells_.cells()) {
-    BodyMotion& motion = motions[cell.part];
+    BodyMotion& motion = motions_[cell.part];
     // |dF| is at most sqrt(3) times the moves' diagonal over the spacing: cells of what hardly deforms are skipped
     const double most = 3.5 * motion.spread / parts[cell.part].lattice.spacing.minCoeff();
     if (!cell.deforms() || most <= std::max(motion.turn, kNoTurn)) continue;
     motion.turn = std::max(motion.turn, cells_.gradient_norm(cell, moves_));
   }
-  for (BodyMotion& motion : motions) motion.turn = std::max(motion.turn, motion.spread > 0 ? kNoTurn : 0);
-  return motions;
+  for (BodyMotion& motion : motions_) motion.turn = std::max(motion.turn, motion.spread > 0 ? kNoTurn : 0);
+  return motions_;
+}
+
+// m, of the moves of a part or, behind them, of the planes.
+Box PairStates::body_box(std::size_t body) const {
+  if (body < of_body_.size()) return of_body_[body].box();
+  Box box;
+  if (!settings_.planes.empty()) box.add(Vec3::Zero());
+  return box;
 }
 
 bool PairStates::is_at(const State& state) const {
-  const std::vector<std::uint32_t>& elements = list_.elements();
-  if (evaluated_builds_ != list_.builds() || moved_from_.size() != elements.size()) return false;
-  for (std::size_t e = 0; e < elements.size(); ++e)
-    if (moved_from_[e] != state.displacement[elements[e]]) return false;
-  return true;
+  return evaluated_builds_ == list_.builds() && moved_from_.size() == list_.elements().size() &&
+         same_bits(list_.runs(), state.displacement, moved_from_);
 }
 
 void PairStates::update(const State& state, bool all) {
@@ -99,7 +107,7 @@ void PairStates::update(const State& state, bool all) {
   if (same && (!all || evaluated_all_)) return;
   ++evaluations_;
   evaluated_builds_ = list_.builds();
-  const std::vector<BodyMotion> motions = motion_to(state);
+  const std::span<const BodyMotion> motions = motion_to(state);
   // what is released presses at other depths from step to step
   const bool releases = release_.enabled() || release_.known_parts() < surface_.body().parts.size();
   evaluated_all_ = all || releases || motions.empty();

@@ -44,7 +44,8 @@ class PairStates {
     bool near = true;  // false for certain: beyond the kernel, or turned away
     SafeMotion safe;   // before which it cannot press
   };
-  [[nodiscard]] std::vector<BodyMotion> motion_to(const State& state);
+  [[nodiscard]] std::span<const BodyMotion> motion_to(const State& state);
+  [[nodiscard]] Box body_box(std::size_t body) const;
   void find_points();
   [[nodiscard]] PairProximity pair_proximity(const ContactPair& pair, const PairRecord& record) const;
   [[nodiscard]] ContactSide other_side(const ContactPair& pair) const;
@@ -79,7 +80,9 @@ class PairStates {
   std::vector<std::uint8_t> is_active_;           // (pairs)
   std::vector<Vec3> moved_from_;  // (PairList::elements()) m, displacements of the last evaluation
   std::vector<Vec3> moves_;       // likewise, from those before
-  std::vector<double> lost_;      // (active_) J, of finish_step()
+  std::vector<WideBox> of_body_;  // (parts) of moves_
+  std::vector<BodyMotion> motions_;
+  std::vector<double> lost_;  // (active_) J, of finish_step()
   std::uint64_t evaluated_builds_ = 0, evaluations_ = 0;
   bool evaluated_all_ = false;
   double hardened_ = 0;  // J

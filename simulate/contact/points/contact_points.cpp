@@ -9,6 +9,7 @@
 #include "base/math/distance.h"
 #include "simulate/contact/points/broad_phase.h"
 #include "simulate/contact/points/edge_points.h"
+#include "simulate/contact/points/merged_patches.h"
 #include "simulate/matter/surface_points.h"
 #include "simulate/models/rest_shape.h"
 
@@ -67,6 +68,7 @@ void gather(std::vector<Piece>::const_iterator begin, std::vector<Piece>::const_
 
 void add_faces(const Problem& problem, std::uint32_t part, const std::vector<SurfacePoint>& surface,
                int patches, std::vector<ContactPoint>& points) {
+  std::vector<ContactPoint> faces;
   const Lattice& lattice = problem.body.parts[part].lattice;
   std::vector<Piece> pieces;
   for (const SurfacePoint& point : surface) {
@@ -82,9 +84,11 @@ void add_faces(const Problem& problem, std::uint32_t part, const std::vector<Sur
   for (auto begin = pieces.cbegin(); begin != pieces.cend();) {
     const auto end =
         std::find_if(begin, pieces.cend(), [&](const Piece& piece) { return piece.key() != begin->key(); });
-    gather(begin, end, part, lattice.spacing.mean(), points);
+    gather(begin, end, part, lattice.spacing.mean(), faces);
     begin = end;
   }
+  if (patches == 1) faces = merged_patches(lattice, std::move(faces));
+  points.insert(points.end(), faces.begin(), faces.end());
 }
 
 double distance_to_polygon(const Surface& surface, const Triangles& triangles, std::uint32_t polygon,

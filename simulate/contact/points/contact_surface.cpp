@@ -75,8 +75,8 @@ void ContactSurface::find_cells() {
 }
 
 std::size_t ContactSurface::broken_cells() const {
-  return parallel_sum<std::size_t>(cells_.size(),
-                                   [&](std::size_t c) { return body_.broken[cells_[c]] != 0; });
+  return static_cast<std::size_t>(
+      std::count_if(cells_.begin(), cells_.end(), [&](std::uint32_t c) { return body_.broken[c] != 0; }));
 }
 
 PointState ContactSurface::at(std::uint32_t point, const State& state) const {
