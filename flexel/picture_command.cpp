@@ -239,6 +239,7 @@ picture::PictureResult draw_subjects(const std::vector<std::string>& arguments,
   std::vector<std::string> words = {"picture"};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> pointers;
+  pointers.reserve(words.size() + 1);
   for (std::string& word : words) pointers.push_back(word.data());
   pointers.push_back(nullptr);
   if (!parse_arguments(app, static_cast<int>(words.size()), pointers.data()))
