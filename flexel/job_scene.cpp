@@ -9,6 +9,7 @@
 #include "flexel/job.h"
 #include "simulate/effects/gravity.h"
 #include "simulate/input/material_names.h"
+#include "simulate/input/part_names.h"
 #include "simulate/input/scene_words.h"
 
 namespace flexel::commands {
@@ -169,15 +170,18 @@ void check_parts(const Job& job, const Surface& surface) {
   std::vector<std::string> names;
   for (const SurfacePart& part : surface.parts) names.push_back(part.name);
   for (const auto& [name, settings] : job.scene.parts)
-    if (settings.origin.rfind("--", 0) == 0 && std::find(names.begin(), names.end(), name) == names.end())
+    if (settings.origin.rfind("--", 0) == 0 && simulate::parts_called(names, surface.parts, name).empty())
       throw InputError(fmt::format("{}: no part \"{}\"{}", settings.origin, name,
                                    did_you_mean(name, names).empty()
                                        ? fmt::format("; the file has {}", fmt::join(names, ", "))
                                        : did_you_mean(name, names)));
   if (!job.scene.material.empty()) return;
+  std::vector<bool> has_material(names.size(), false);
+  for (const auto& [name, settings] : job.scene.parts)
+    for (const std::uint32_t part : simulate::parts_called(names, surface.parts, name))
+      has_material[part] = has_material[part] || !settings.material.empty();
   for (const std::string& name : names)
-    if (const auto found = job.scene.parts.find(name);
-        found == job.scene.parts.end() || found->second.material.empty())
+    if (!has_material[static_cast<std::size_t>(&name - names.data())])
       throw InputError(
           fmt::format("part \"{}\" has no material: add --material NAME for every part that has none "
                       "of its own, or --material \"{}=NAME\"",

@@ -1,11 +1,13 @@
 // Pairs of lines: a group code, and its value. Code 0 begins an entity, 9 a variable of the header; 70 of a POLYLINE are
-// its flags, 71 to 74 of a VERTEX the corners of a face (AutoCAD's DXF reference).
+// its flags, 71 to 74 of a VERTEX the corners of a face; 8 is the layer of an entity, of a LAYER itself 2 is the name, 70
+// with bit 1 means frozen, a negative 62 off (AutoCAD's DXF reference).
 #include "meshes/dxf_document.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <charconv>
+#include <set>
 #include <span>
 
 #include "base/error.h"
@@ -60,6 +62,7 @@ class DxfScanner {
       if (code == "2" && entity_ == "SECTION") section_ = value;
       if (section_ == "HEADER" && variable_ == "$INSUNITS" && code == "70")
         document_.unit = dxf_unit(whole(value), where_);
+      if (section_ == "TABLES" && entity_ == "LAYER") look_at_layer(code, value);
       if (section_ == "ENTITIES") look_at(code, value);
     }
     if (!ended) throw InputError(where_, "is cut off: DXF ends with EOF, and this does not");
@@ -77,6 +80,20 @@ class DxfScanner {
     return line;
   }
 
+  void look_at_layer(std::string_view code, std::string_view value) {
+    if (code == "2") layer_ = value;
+    if ((code == "70" && (whole(value) & 1) != 0) || (code == "62" && value.starts_with('-')))
+      hidden_.emplace(layer_);
+  }
+
+  // The entity becomes one that nobody knows.
+  void leave_out(const char* why) {
+    char* const first = reinterpret_cast<char*>(document_.bytes.data()) + (entity_.data() - text_.data());
+    if (*first == '~') return;
+    *first = '~';
+    ++document_.others[why];
+  }
+
   void look_at(std::string_view code, std::string_view value) {
     constexpr std::string_view kRead[] = {"3DFACE", "POLYLINE", "VERTEX", "SEQEND", "SECTION"};
     constexpr std::string_view kCorners[] = {"71", "72", "73", "74"};
@@ -85,10 +102,9 @@ class DxfScanner {
       check_entity();
       ++document_.others[std::string(entity_.substr(0, 40))];
     }
-    if (code == "67" && whole(value) != 0 && (entity_ == "3DFACE" || entity_ == "POLYLINE")) {
-      // On the sheet, not in the model: an entity that nobody knows.
-      document_.bytes[static_cast<std::size_t>(entity_.data() - text_.data())] = std::byte{'~'};
-      ++document_.others["on a sheet (paper space)"];
+    if (entity_ == "3DFACE" || entity_ == "POLYLINE") {
+      if (code == "67" && whole(value) != 0) leave_out("on a sheet (paper space)");
+      if (code == "8" && hidden_.contains(value)) leave_out("on a layer that is off or frozen");
     }
     if (code == "70" && entity_ == "POLYLINE" && (whole(value) & kPolygonMesh) != 0)
       refuse(where_, "polygon meshes (POLYLINE with flag 16)",
@@ -109,7 +125,8 @@ class DxfScanner {
   std::string_view text_;
   const std::string& where_;
   std::size_t at_ = 0;
-  std::string_view section_, entity_, variable_;
+  std::string_view section_, entity_, variable_, layer_;
+  std::set<std::string_view> hidden_;  // layers
   DxfDocument document_;
 };
 

@@ -23,6 +23,7 @@
 #include <XCAFApp_Application.hxx>
 #include <XCAFDoc_ColorTool.hxx>
 #include <XCAFDoc_DocumentTool.hxx>
+#include <XCAFDoc_GraphNode.hxx>
 #include <XCAFDoc_LayerTool.hxx>
 #include <XCAFDoc_ShapeTool.hxx>
 #include <XSControl_WorkSession.hxx>
@@ -41,6 +42,13 @@ TCollection_ExtendedString name_of(const TDF_Label& label) {
   return label.FindAttribute(TDataStd_Name::GetID(), name) ? name->Get() : TCollection_ExtendedString();
 }
 
+ShapeStyle overridden(ShapeStyle style, const ShapeStyle& by) {
+  for (std::size_t type = 0; type < style.colors.size(); ++type)
+    if (by.colors[type]) style.colors[type] = by.colors[type];
+  style.layers.insert(style.layers.end(), by.layers.begin(), by.layers.end());
+  return style;
+}
+
 // Reads the labels of a document.
 class DocumentReader {
  public:
@@ -53,7 +61,7 @@ class DocumentReader {
     TDF_LabelSequence free;
     shapes_->GetFreeShapes(free);
     std::vector<CadNode> nodes;
-    for (Standard_Integer i = 1; i <= free.Length(); ++i) nodes.push_back(node(free(i)));
+    for (Standard_Integer i = 1; i <= free.Length(); ++i) nodes.push_back(node(free(i), {}));
     return nodes;
   }
 
@@ -69,14 +77,27 @@ class DocumentReader {
     return found;
   }
 
-  // Of a product, or of its use in an assembly.
-  [[nodiscard]] CadNode node(const TDF_Label& label) const {
+  // What an assembly says of one use in another assembly inside it (a "specified higher usage occurrence"): `uses`, from
+  // the outermost. That of the outermost assembly goes first.
+  [[nodiscard]] ShapeStyle style_from_above(const std::vector<TDF_Label>& uses) const {
+    for (std::size_t first = 0; first + 1 < uses.size(); ++first) {
+      TDF_LabelSequence path;
+      for (std::size_t i = first; i < uses.size(); ++i) path.Append(uses[i]);
+      if (Handle(XCAFDoc_GraphNode) found; XCAFDoc_ShapeTool::FindSHUO(path, found) && !found.IsNull())
+        return style(found->Label());
+    }
+    return {};
+  }
+
+  // Of a product, or of its use in an assembly; `uses`: of the assemblies above it, from the outermost.
+  [[nodiscard]] CadNode node(const TDF_Label& label, std::vector<TDF_Label> uses) const {
     CadNode found;
     TDF_Label product = label;
     if (XCAFDoc_ShapeTool::IsReference(label)) {
       found.location = XCAFDoc_ShapeTool::GetLocation(label);
       found.instance_name = name_of(label);
-      found.instance_style = style(label);
+      uses.push_back(label);
+      found.instance_style = overridden(style(label), style_from_above(uses));
       XCAFDoc_ShapeTool::GetReferredShape(label, product);
     }
     found.name = name_of(product);
@@ -85,7 +106,7 @@ class DocumentReader {
       TDF_LabelSequence components;
       XCAFDoc_ShapeTool::GetComponents(product, components);
       for (Standard_Integer i = 1; i <= components.Length(); ++i)
-        found.children.push_back(node(components(i)));
+        found.children.push_back(node(components(i), uses));
       return found;
     }
     found.shape = XCAFDoc_ShapeTool::GetShape(product);
@@ -233,6 +254,7 @@ TopoDS_Shape read_step_tree(const CadReadJob& job, CadTree& tree) {
   reader.SetColorMode(Standard_True);
   reader.SetNameMode(Standard_True);
   reader.SetLayerMode(Standard_True);
+  reader.SetSHUOMode(Standard_True);
   Handle(TDocStd_Document) document;
   XCAFApp_Application::GetApplication()->NewDocument("BinXCAF", document);
   const auto transfer = [&] {

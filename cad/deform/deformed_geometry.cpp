@@ -6,6 +6,7 @@
 #include <Geom2d_Curve.hxx>
 #include <GeomAdaptor_Curve.hxx>
 #include <GeomAdaptor_Surface.hxx>
+#include <Geom_BSplineCurve.hxx>
 #include <Geom_BSplineSurface.hxx>
 #include <Geom_TrimmedCurve.hxx>
 #include <Standard_Failure.hxx>
@@ -134,6 +135,7 @@ DeformedGeometry::DeformedGeometry(const TopoDS_Shape& shape, const ShapeMap& ma
   parallel_for_each(
       edge_.size(), [&](std::size_t i) { fit_edge(i); }, 4);
   for (std::size_t i = 0; i < vertex_.size(); ++i) move_vertex(i);
+  join_ends();
   widen_tolerances();
 }
 
@@ -272,6 +274,42 @@ void DeformedGeometry::move_vertex(std::size_t i) {
   vertex_[i].point = gp_Pnt(map(at));
   // The pcurves of its edges stay as they are, and so does what its tolerance covers: where they cross beside it.
   vertex_[i].tolerance = BRep_Tool::Tolerance(vertex) * stretch_at(map, at, kStep * options_.spacing);
+}
+
+// A vertex is where its edges end: in the mean of those that were fitted, or of those that stayed what they were. Fitted
+// ones then end in it, to the last digit: readers of STEP look for a vertex along its curves, and one beside the seam of
+// a closed curve cuts that curve there, which OpenCASCADE takes for no length at all.
+void DeformedGeometry::join_ends() {
+  struct Ends {
+    gp_XYZ kept{0, 0, 0}, fitted{0, 0, 0};
+    int kept_count = 0, fitted_count = 0;
+  };
+  std::vector<Ends> ends(vertex_.size());
+  const auto for_ends = [&](std::size_t i, const auto& act) {
+    TopoDS_Vertex vertices[2];
+    TopExp::Vertices(TopoDS::Edge(edges_(static_cast<Standard_Integer>(i) + 1).Oriented(TopAbs_FORWARD)),
+                     vertices[0], vertices[1]);
+    for (int end = 0; end < 2; ++end)
+      if (!vertices[end].IsNull() && !edge_[i].curve.IsNull())
+        act(static_cast<std::size_t>(vertices_.FindIndex(vertices[end]) - 1), end == 0);
+  };
+  for (std::size_t i = 0; i < edge_.size(); ++i)
+    for_ends(i, [&](std::size_t v, bool first) {
+      const gp_XYZ at = edge_[i].curve->Value(first ? edge_[i].begin : edge_[i].end).XYZ();
+      (edge_[i].kept ? ends[v].kept : ends[v].fitted) += at;
+      ++(edge_[i].kept ? ends[v].kept_count : ends[v].fitted_count);
+    });
+  for (std::size_t v = 0; v < vertex_.size(); ++v)
+    if (ends[v].kept_count > 0)
+      vertex_[v].point = gp_Pnt(ends[v].kept / ends[v].kept_count);
+    else if (ends[v].fitted_count > 0)
+      vertex_[v].point = gp_Pnt(ends[v].fitted / ends[v].fitted_count);
+  for (std::size_t i = 0; i < edge_.size(); ++i)
+    if (const auto spline = Handle(Geom_BSplineCurve)::DownCast(edge_[i].curve);
+        !edge_[i].kept && !spline.IsNull())
+      for_ends(i, [&](std::size_t v, bool first) {
+        spline->SetPole(first ? 1 : spline->NbPoles(), vertex_[v].point);
+      });
 }
 
 // An edge's covers the gaps to the surfaces that meet in it, a vertex's those of its edges. Looked at in every span of

@@ -50,8 +50,8 @@ struct DeformedVertex {
 };
 
 // What moves each face, edge and vertex of a shape. Surfaces are B-splines of phi(S(u, v)) in the parameters of S; curves
-// follow the surfaces that meet in them, so that edges lie on both. Tolerances cover what gaps remain, and what those of
-// the shape covered.
+// follow the surfaces that meet in them, so that edges lie on both, and end in their vertices. Tolerances cover what gaps
+// remain, and what those of the shape covered.
 class DeformedGeometry {
  public:
   DeformedGeometry(const TopoDS_Shape& shape, const ShapeMap& map, const FitOptions& options);
@@ -69,6 +69,7 @@ class DeformedGeometry {
   void fit_face(std::size_t i);
   void fit_edge(std::size_t i);
   void move_vertex(std::size_t i);
+  void join_ends();
   void widen_tolerances();
   // A point of an edge on one of the faces that meet in it.
   struct OnFace;

@@ -4,10 +4,8 @@
 #include <fmt/format.h>
 
 #include <BRepCheck_Analyzer.hxx>
-#include <BRepGProp.hxx>
 #include <BRepTopAdaptor_FClass2d.hxx>
 #include <BRep_Tool.hxx>
-#include <GProp_GProps.hxx>
 #include <Geom_Surface.hxx>
 #include <TopExp.hxx>
 #include <TopExp_Explorer.hxx>
@@ -24,6 +22,8 @@
 #include "cad/deform/deform_shape.h"
 #include "cad/deform/deformed_geometry.h"
 #include "cad/deform/face_polygons.h"
+#include "cad/deform/losses.h"
+#include "cad/deform/solid_volume.h"
 #include "cad/deform/write_tree.h"
 #include "formats/lattice/body_file.h"
 #include "formats/part/surface.h"
@@ -201,26 +201,6 @@ FaceCheck check_face(const DeformedGeometry& geometry, std::size_t i, const Node
   return found;
 }
 
-// OpenCASCADE's quick rule is good to some 1e-4 on most faces; with a tolerance it takes several times as long.
-double volume_of(const TopoDS_Shape& shape, bool exactly) {
-  constexpr double kExact = 1e-4;
-  GProp_GProps properties;
-  exactly ? static_cast<void>(BRepGProp::VolumeProperties(shape, properties, kExact))
-          : BRepGProp::VolumeProperties(shape, properties);
-  return properties.Mass();
-}
-
-struct Volumes {
-  double before = 0, after = 0;
-};
-Volumes volumes_of(const TopoDS_Shape& before, const TopoDS_Shape& after, double expected) {
-  constexpr double kClose = 5e-4;
-  Volumes volumes{volume_of(before, false), volume_of(after, false)};
-  if (std::isfinite(expected) && !(std::abs(volumes.after / volumes.before - expected) <= kClose))
-    volumes = {volume_of(before, true), volume_of(after, true)};
-  return volumes;
-}
-
 // Faces without a surface, misses, folds.
 void judge_faces(Work& work, const DeformedGeometry& geometry, const NodeMap& map, double unit,
                  double spacing) {
@@ -306,7 +286,18 @@ void deform_nodes(Work& work, std::vector<CadNode>& nodes, const TopLoc_Location
   }
 }
 
-CadTree deformed_source(Work& work, std::uint32_t index, const std::string& format) {
+// What of a source does not come out.
+void tell_losses(const CadTree& tree, const SurfaceSource& source, const std::string& format,
+                 const Warn& warn) {
+  if (source.format == "step")
+    if (const std::string pmi = pmi_of(source.bytes); !pmi.empty())
+      warn(fmt::format("{} of {} do not come along: they are of the shape as it was", pmi, source.file));
+  if (const std::string lost = no_room_for(tree, format); !lost.empty())
+    warn(fmt::format("{} of {} do not come along: {} has no room for them; STEP has", lost, source.file,
+                     format == "brep" ? "BREP" : "IGES"));
+}
+
+CadTree deformed_source(Work& work, std::uint32_t index, const std::string& format, const Warn& warn) {
   const SurfaceSource& source = work.body.surface.sources[index];
   if (source.bytes.empty() || (source.format != "step" && source.format != "iges" && source.format != "brep"))
     throw InputError(source.file,
@@ -326,6 +317,7 @@ CadTree deformed_source(Work& work, std::uint32_t index, const std::string& form
     throw InputError(source.file,
                      fmt::format("holds {} solids where the body has {} parts of it: write a mesh instead",
                                  tree.solids, part_of_solid.size()));
+  tell_losses(tree, source, format, warn);
   deform_nodes(work, tree.roots, TopLoc_Location(), tree.unit, part_of_solid, source.file);
   return tree;
 }
@@ -343,13 +335,20 @@ void read_again(CadWritten& written, const std::string& format, double unit) {
     throw InputError(
         fmt::format("the {} file, read again, holds {} solids instead of {}: write another format", format,
                     solids.size(), written.solids));
-  double volume = 0;  // m^3
-  for (const TopoDS_Shape& solid : solids) {
-    volume += back.unit * back.unit * back.unit * std::abs(volume_of(solid, false));
+  const auto sum = [&](double (*volume)(const TopoDS_Shape&)) {  // m^3
+    double found = 0;
+    for (const TopoDS_Shape& solid : solids)
+      found += back.unit * back.unit * back.unit * std::abs(volume(solid));
+    return found;
+  };
+  const auto is_right = [&](double volume) {
+    return std::abs(volume - written.volume) <= 5e-3 * written.volume;
+  };
+  for (const TopoDS_Shape& solid : solids)
     if (!BRepCheck_Analyzer(solid).IsValid() && written.invalid.empty())
       written.invalid.emplace_back("a solid, read again");
-  }
-  if (!(std::abs(volume - written.volume) <= 5e-3 * written.volume))
+  if (is_right(sum(quick_volume))) return;
+  if (const double volume = sum(mesh_volume); !is_right(volume))
     throw InputError(
         fmt::format("the {} file, read again, encloses {:.6g} m^3 instead of {:.6g}: write another format",
                     format, volume, written.volume));
@@ -361,7 +360,7 @@ CadWritten write_deformed(const CadWriteJob& job, const Warn& warn) {
   Work work(read_body(job.body, "the body"), job);
   std::vector<CadTree> trees;
   for (std::uint32_t s = 0; s < work.body.surface.sources.size(); ++s)
-    trees.push_back(deformed_source(work, s, job.format));
+    trees.push_back(deformed_source(work, s, job.format, warn));
   if (trees.empty()) throw InputError("the body carries no surface: its part is not known");
   for (const CadTree& tree : trees)
     if (tree.unit != trees.front().unit)

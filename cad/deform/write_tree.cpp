@@ -1,15 +1,16 @@
 // Through a document (XCAF), whose writers take names, colours and layers along. The time in the header is that of the
-// source, or none: a run writes the same bytes today and tomorrow (IGES apart, where OpenCASCADE puts names in the order of
-// their addresses).
+// source, or none: a run writes the same bytes today and tomorrow.
 #include "cad/deform/write_tree.h"
 
 #include <APIHeaderSection_MakeHeader.hxx>
 #include <BRepTools.hxx>
 #include <BRep_Builder.hxx>
 #include <HeaderSection_FileName.hxx>
+#include <IGESBasic_Name.hxx>
 #include <IGESCAFControl_Writer.hxx>
 #include <IGESControl_Controller.hxx>
 #include <IGESData_GlobalSection.hxx>
+#include <IGESData_IGESEntity.hxx>
 #include <IGESData_IGESModel.hxx>
 #include <Interface_Static.hxx>
 #include <Message.hxx>
@@ -18,10 +19,15 @@
 #include <STEPCAFControl_Writer.hxx>
 #include <Standard_Failure.hxx>
 #include <StepData_StepModel.hxx>
+#include <TCollection_AsciiString.hxx>
 #include <TCollection_HAsciiString.hxx>
+#include <TDF_LabelSequence.hxx>
 #include <TDataStd_Name.hxx>
 #include <TDocStd_Document.hxx>
 #include <TopoDS_Compound.hxx>
+#include <TransferBRep.hxx>
+#include <TransferBRep_ShapeMapper.hxx>
+#include <Transfer_FinderProcess.hxx>
 #include <XCAFApp_Application.hxx>
 #include <XCAFDoc_ColorTool.hxx>
 #include <XCAFDoc_DocumentTool.hxx>
@@ -85,7 +91,6 @@ class DocumentWriter {
     dress(label, name_of(node), node.style);
     return label;
   }
-  // OpenCASCADE's writer of IGES follows the names of all products and uses without looking whether there are any.
   static TCollection_ExtendedString name_of(const CadNode& node) {
     return node.name.IsEmpty() ? TCollection_ExtendedString("part") : node.name;
   }
@@ -131,14 +136,58 @@ Bytes write_step(const CadTree& style, const Handle(TDocStd_Document) & document
   return file.bytes();
 }
 
+// The names of an IGES file. OpenCASCADE's own writer puts them in the order of their addresses in memory.
+class IgesNames {
+ public:
+  explicit IgesNames(IGESCAFControl_Writer& writer) : writer_(writer) {}
+
+  void write(const Handle(TDocStd_Document) & document) {
+    TDF_LabelSequence roots;
+    XCAFDoc_DocumentTool::ShapeTool(document->Main())->GetFreeShapes(roots);
+    for (Standard_Integer i = 1; i <= roots.Length(); ++i) write(roots(i), TopLoc_Location());
+  }
+
+ private:
+  void write(const TDF_Label& label, const TopLoc_Location& above) {
+    const TopLoc_Location here = above * XCAFDoc_ShapeTool::GetLocation(label);
+    TDF_Label product = label;
+    if (XCAFDoc_ShapeTool::IsReference(label)) XCAFDoc_ShapeTool::GetReferredShape(label, product);
+    name(label, XCAFDoc_ShapeTool::GetShape(product).Moved(here));
+    TDF_LabelSequence inside;
+    if (XCAFDoc_ShapeTool::IsAssembly(product)) {
+      XCAFDoc_ShapeTool::GetComponents(product, inside);
+      for (Standard_Integer i = 1; i <= inside.Length(); ++i) write(inside(i), here);
+      return;
+    }
+    XCAFDoc_ShapeTool::GetSubShapes(product, inside);
+    for (Standard_Integer i = 1; i <= inside.Length(); ++i)
+      name(inside(i), XCAFDoc_ShapeTool::GetShape(inside(i)).Moved(here));
+  }
+  void name(const TDF_Label& label, const TopoDS_Shape& shape) {
+    Handle(TDataStd_Name) found;
+    if (shape.IsNull() || !label.FindAttribute(TDataStd_Name::GetID(), found)) return;
+    Handle(IGESData_IGESEntity) entity;
+    const Handle(Transfer_FinderProcess) process = writer_.TransferProcess();
+    const Handle(TransferBRep_ShapeMapper) mapper = TransferBRep::ShapeMapper(process, shape);
+    if (!process->FindTypedTransient(mapper, STANDARD_TYPE(IGESData_IGESEntity), entity) || entity->HasName())
+      return;
+    const Handle(IGESBasic_Name) written = new IGESBasic_Name();
+    written->Init(1, new TCollection_HAsciiString(TCollection_AsciiString(found->Get(), '_')));
+    entity->AddProperty(written);
+    writer_.AddEntity(written);
+  }
+  IGESCAFControl_Writer& writer_;
+};
+
 Bytes write_iges(const Handle(TDocStd_Document) & document) {
   IGESControl_Controller::Init();
   Interface_Static::SetIVal("write.iges.brep.mode", 1);  // solids, not loose faces
   IGESCAFControl_Writer writer;
   writer.SetColorMode(Standard_True);
-  writer.SetNameMode(Standard_True);
+  writer.SetNameMode(Standard_False);
   writer.SetLayerMode(Standard_True);
   if (!writer.Transfer(document)) throw Standard_Failure("the shapes cannot be written as IGES");
+  IgesNames(writer).write(document);
   std::ostringstream out;
   writer.ComputeModel();
   IGESData_GlobalSection global = writer.Model()->GlobalSection();

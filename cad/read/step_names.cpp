@@ -86,6 +86,8 @@ void StepNames::add_colors(const STEPControl_Reader& reader) {
     if (surface.IsNull() || !STEPConstruct_Styles::DecodeColor(surface, color)) continue;
     const TopoDS_Shape shape = TransferBRep::ShapeResult(process, style->Item());
     if (shape.IsNull()) continue;
+    // Of one use of the shape: it may have others.
+    if (component && color_.contains(shape.TShape().get())) continue;
     ShapeColor& values = color_[shape.TShape().get()];
     color.Values(values[0], values[1], values[2], Quantity_TOC_sRGB);
     for (double& value : values) value = std::clamp(std::round(value * 1e6) / 1e6, 0.0, 1.0);

@@ -48,6 +48,7 @@ class ThreeMfReader {
         const std::string id(xml_value(resource, "id"));
         const std::string_view name = local_name(resource.name());
         if (name == "basematerials") colors[id] = threemf_colors(resource, "base", "displaycolor");
+        textured_ = textured_ || name == "texture2dgroup";
         if (name == "colorgroup") colors[id] = threemf_colors(resource, "color", "color");
       }
     }
@@ -79,6 +80,14 @@ class ThreeMfReader {
           "\"{}\"{} has slices beside its triangles, which are not read: a 3MF file that is written "
           "from it has none where the part moved",
           *sliced_.begin(), others(sliced_)));
+    if (textured_ || shaded_)
+      warn(
+          fmt::format("{}: {} come out where all of it is written again as one 3MF file; other formats, a "
+                      "file for each part and one of several sources leave them out",
+                      content_.where(),
+                      textured_ && shaded_ ? "textures and colours of corners"
+                      : textured_          ? "textures"
+                                           : "colours of corners"));
   }
 
   void add_use(std::size_t u) {
@@ -141,6 +150,7 @@ class ThreeMfReader {
                        whole_number(names[2], colors->second.size(), which[2]);
     if (known) {
       colored_ = true;
+      shaded_ = shaded_ || which[0] != which[1] || which[0] != which[2];
       for (std::size_t i = 0; i < 4; ++i)
         color[i] = which[0] == which[1] && which[0] == which[2]
                        ? colors->second[which[0]][i]
@@ -158,8 +168,9 @@ class ThreeMfReader {
   std::vector<std::uint32_t> polygon_part_, welded_;
   Column color_{4, {}};
   bool colored_ = false;
-  std::set<std::string> supports_;  // names of objects that hold the print up
-  std::set<std::string> sliced_;    // and of those with slices
+  bool textured_ = false, shaded_ = false;  // shaded: corners of a triangle differ in colour
+  std::set<std::string> supports_;          // names of objects that hold the print up
+  std::set<std::string> sliced_;            // and of those with slices
 };
 
 Evidence sniff_3mf(const ImportInput& input) {

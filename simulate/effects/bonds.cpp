@@ -9,8 +9,8 @@
 #include <map>
 
 #include "base/error.h"
-#include "base/nearest_word.h"
 #include "simulate/effects/contact.h"
+#include "simulate/input/part_names.h"
 #include "simulate/matter/masses.h"
 #include "simulate/models/stability.h"
 
@@ -70,15 +70,12 @@ std::vector<Bonds::Named> parse_named(TableReader& scene) {
 
 TouchingGap named_gap(const Bonds::Named& named, const Body& body) {
   TouchingGap made{{}, named.gap};
-  std::vector<std::string> names;
-  for (const Part& part : body.parts) names.push_back(part.name);
-  for (std::size_t side = 0; side < 2; ++side) {
-    const auto found = std::find(names.begin(), names.end(), named.parts[side]);
-    if (found == names.end())
-      throw InputError(named.origin, fmt::format("[[bond]] names part \"{}\", which the body does not have{}",
-                                                 named.parts[side], did_you_mean(named.parts[side], names)));
-    made.parts[side] = static_cast<std::uint32_t>(found - names.begin());
-  }
+  for (std::size_t side = 0; side < 2; ++side)
+    made.parts[side] = require_part(body, named.parts[side], named.origin);
+  if (made.parts[0] == made.parts[1])
+    throw InputError(named.origin,
+                     fmt::format("\"{}\" and \"{}\" are one part, which cannot be bonded to itself",
+                                 named.parts[0], named.parts[1]));
   std::sort(made.parts.begin(), made.parts.end());
   const double most = 0.5 * std::max(body.parts[made.parts[0]].lattice.spacing.minCoeff(),
                                      body.parts[made.parts[1]].lattice.spacing.minCoeff());

@@ -6,8 +6,8 @@
 #include <algorithm>
 
 #include "base/error.h"
-#include "base/nearest_word.h"
 #include "simulate/contact/contacts.h"
+#include "simulate/input/part_names.h"
 
 namespace flexel::simulate {
 namespace {
@@ -62,9 +62,10 @@ std::map<std::string, double> sticky_materials(TableReader& scene) {
   return sticky;
 }
 
-double stick_of(const Contact::Parameters& parameters, const Part& part, const Material& material) {
-  if (std::count(parameters.glued.begin(), parameters.glued.end(), part.name) > 0)
-    return std::numeric_limits<double>::infinity();
+double stick_of(const Contact::Parameters& parameters, const Body& body, std::uint32_t part,
+                const Material& material) {
+  for (const std::string& glued : parameters.glued)
+    if (require_part(body, glued, "[[manipulator]]") == part) return std::numeric_limits<double>::infinity();
   const auto own = parameters.sticky.find(material.name);
   return own == parameters.sticky.end() ? parameters.stick : own->second;
 }
@@ -125,16 +126,8 @@ ContactPlane parse_plane(TableReader& reader, std::size_t number) {
 std::vector<std::uint8_t> chosen_parts(const Contact::Parameters& parameters, const Body& body) {
   if (!parameters.parts) return std::vector<std::uint8_t>(body.parts.size(), 1);
   std::vector<std::uint8_t> chosen(body.parts.size(), 0);
-  std::vector<std::string> names;
-  for (const Part& part : body.parts) names.push_back(part.name);
-  for (const std::string& name : *parameters.parts) {
-    const auto found = std::find(names.begin(), names.end(), name);
-    if (found == names.end())
-      throw InputError(parameters.origin,
-                       fmt::format("[contact] names part \"{}\", which the body does not have{}", name,
-                                   did_you_mean(name, names)));
-    chosen[static_cast<std::size_t>(found - names.begin())] = 1;
-  }
+  for (const std::string& name : *parameters.parts)
+    for (const std::uint32_t p : require_parts(body, name, parameters.origin)) chosen[p] = 1;
   return chosen;
 }
 
@@ -186,14 +179,13 @@ std::optional<Contact> Contact::make(const Parameters& parameters, const Problem
   settings.release_time = parameters.parting;
   for (const std::array<std::string, 2>& each : parameters.bonded) {
     std::array<std::uint32_t, 2> parts{};
-    for (std::uint32_t p = 0; p < problem.body.parts.size(); ++p)
-      for (std::size_t side = 0; side < 2; ++side)
-        if (problem.body.parts[p].name == each[side]) parts[side] = p;
+    for (std::size_t side = 0; side < 2; ++side)
+      parts[side] = require_part(problem.body, each[side], "[[bond]]");
     std::sort(parts.begin(), parts.end());
     settings.bonded.push_back(parts);
   }
-  for (const Part& part : problem.body.parts)
-    settings.stick.push_back(stick_of(parameters, part, problem.materials[settings.stick.size()]));
+  for (std::uint32_t p = 0; p < problem.body.parts.size(); ++p)
+    settings.stick.push_back(stick_of(parameters, problem.body, p, problem.materials[p]));
   settings.planes = parameters.planes;
   Contact made;
   made.contacts_ = std::make_shared<Contacts>(std::move(settings), problem);

@@ -1,10 +1,7 @@
-// Entries of a scene that are for one part, by name, or for every part.
+// Entries of a scene that are for one part or assembly, by name, or for every part.
 #pragma once
-#include <fmt/format.h>
-
-#include "base/error.h"
-#include "base/nearest_word.h"
 #include "simulate/effects/effect.h"
+#include "simulate/input/part_names.h"
 
 namespace flexel::simulate {
 
@@ -20,16 +17,13 @@ namespace flexel::simulate {
 // name.
 template <class Entry>
 [[nodiscard]] std::vector<std::size_t> parts_of(const Entry& entry, const Problem& problem) {
-  std::vector<std::size_t> parts;
-  std::vector<std::string> names;
-  for (std::size_t p = 0; p < problem.body.parts.size(); ++p) {
-    names.push_back(problem.body.parts[p].name);
-    if (!entry.part || *entry.part == names[p]) parts.push_back(p);
+  if (entry.part) {
+    const std::vector<std::uint32_t> parts = require_parts(problem.body, *entry.part, entry.origin);
+    return {parts.begin(), parts.end()};
   }
-  if (parts.empty())
-    throw InputError(entry.origin, fmt::format("the body has no part \"{}\"{}", *entry.part,
-                                               did_you_mean(*entry.part, names)));
-  return parts;
+  std::vector<std::size_t> all;
+  for (std::size_t p = 0; p < problem.body.parts.size(); ++p) all.push_back(p);
+  return all;
 }
 
 }  // namespace flexel::simulate

@@ -7,22 +7,10 @@
 #include <algorithm>
 
 #include "base/error.h"
-#include "base/nearest_word.h"
+#include "simulate/input/part_names.h"
 #include "simulate/matter/masses.h"
 
 namespace flexel::simulate {
-namespace {
-
-std::uint32_t part_named(const std::string& name, const Body& body, const std::string& origin) {
-  std::vector<std::string> names;
-  for (const Part& part : body.parts) names.push_back(part.name);
-  const auto found = std::find(names.begin(), names.end(), name);
-  if (found == names.end())
-    throw InputError(origin, fmt::format("no part \"{}\"{}", name, did_you_mean(name, names)));
-  return static_cast<std::uint32_t>(found - names.begin());
-}
-
-}  // namespace
 
 void RigidParts::parse(TableReader& scene, Parameters& parameters) {
   if (const SceneValue* parts = scene.find("parts"))
@@ -52,9 +40,10 @@ void RigidParts::parse(TableReader& scene, Parameters& parameters) {
 std::vector<Rigidity> RigidParts::rigidity(const Parameters& parameters, const Body& body) {
   if (parameters.parts.empty() && parameters.manipulators.empty()) return {};
   std::vector<Rigidity> result(body.parts.size(), Rigidity::none);
-  for (const std::string& name : parameters.parts) result[part_named(name, body, "[parts]")] = Rigidity::free;
+  for (const std::string& name : parameters.parts)
+    for (const std::uint32_t p : require_parts(body, name, "[parts]")) result[p] = Rigidity::free;
   for (const Manipulator& each : parameters.manipulators) {
-    Rigidity& part = result[part_named(each.part, body, each.origin)];
+    Rigidity& part = result[require_part(body, each.part, each.origin)];
     if (part == Rigidity::led)
       throw InputError(each.origin, fmt::format("part \"{}\" has two [[manipulator]]", each.part));
     part = Rigidity::led;
@@ -74,7 +63,7 @@ std::optional<RigidParts> RigidParts::make(const Parameters& parameters, const P
     Moving moving;
     moving.body = rigid_body(problem.body, p, moments[p]);
     for (const Manipulator& each : parameters.manipulators)
-      if (each.part == problem.body.parts[p].name) moving.led = each;
+      if (require_part(problem.body, each.part, each.origin) == p) moving.led = each;
     moving.velocity.resize(moving.body.arms.size());
     moving.support.resize(moving.body.arms.size(), Vec3::Zero());
     made.moving_.push_back(std::move(moving));

@@ -20,6 +20,7 @@
 #include "base/math/area_vector.h"
 #include "base/nearest_word.h"
 #include "base/units.h"
+#include "simulate/input/part_names.h"
 
 namespace flexel::simulate {
 namespace {
@@ -97,23 +98,9 @@ std::optional<std::uint32_t> part_named(const Body& body, const std::string& nam
   return std::nullopt;
 }
 
-// The parts in the assembly of that name or path, or the one part at the end of the path; none where there is none.
-std::vector<std::uint32_t> parts_at(const Body& body, const std::string& path) {
-  std::vector<std::uint32_t> found;
-  const std::string wanted = "/" + path + "/";
-  for (std::uint32_t p = 0; p < body.surface.parts.size(); ++p) {
-    const SurfacePart& part = body.surface.parts[p];
-    const std::string whole = fmt::format("/{}/{}/", part.assembly, part.name);
-    const std::size_t at = whole.find(wanted);
-    if (!path.empty() && !part.assembly.empty() && at < 1 + part.assembly.size()) found.push_back(p);
-  }
-  return found;
-}
-
-// That of the name, else those at the path; nothing where there is none.
-Parts parts_called(const Body& body, const std::string& name) {
-  if (const auto part = part_named(body, name)) return std::vector{*part};
-  std::vector<std::uint32_t> parts = parts_at(body, name);
+// Nothing where there is none.
+Parts called(const Body& body, const std::string& name) {
+  std::vector<std::uint32_t> parts = parts_called(body, name);
   return parts.empty() ? Parts() : parts;
 }
 
@@ -217,9 +204,9 @@ void refuse_pointed_side(const Selection& selection) {
 [[noreturn]] void unknown_name(const Selection& selection, const Body& body) {
   const std::string& name = selection.name;
   const std::size_t slash = name.rfind('/');
-  if (slash == std::string::npos || parts_called(body, name.substr(0, slash))) refuse_pointed_side(selection);
+  if (slash == std::string::npos || called(body, name.substr(0, slash))) refuse_pointed_side(selection);
   if (slash != std::string::npos) {
-    if (const Parts parts = parts_called(body, name.substr(0, slash))) {
+    if (const Parts parts = called(body, name.substr(0, slash))) {
       const std::uint32_t part = parts->front();
       const auto count = std::count_if(body.surface.faces.begin(), body.surface.faces.end(),
                                        [&](const SurfaceFace& face) { return face.part == part; });
@@ -232,10 +219,9 @@ void refuse_pointed_side(const Selection& selection) {
         throw InputError(selection.origin, fmt::format("no face \"{}\"; part \"{}\" has faces 1 to {}", name,
                                                        body.parts[part].name, count));
     } else {
-      std::vector<std::string> all;
-      for (const Part& each : body.parts) all.push_back(each.name);
-      throw InputError(selection.origin, fmt::format("no part \"{}\" for \"{}\"; the body has {}",
-                                                     name.substr(0, slash), name, fmt::join(all, ", ")));
+      throw InputError(selection.origin,
+                       fmt::format("no part \"{}\" for \"{}\"; the body has {}", name.substr(0, slash), name,
+                                   fmt::join(part_names(body), ", ")));
     }
   }
   std::string hint = did_you_mean(name, every_name(body));
@@ -259,7 +245,7 @@ std::vector<std::uint32_t> range(std::uint32_t begin, std::uint32_t end) {
 // The elements of all parts at a path.
 std::vector<std::uint32_t> elements_at(const Body& body, const std::string& path) {
   std::vector<std::uint32_t> elements;
-  for (const std::uint32_t p : parts_at(body, path))
+  for (const std::uint32_t p : parts_at(body.surface.parts, path))
     for (std::uint32_t e = body.parts[p].element_begin; e < body.parts[p].element_end; ++e)
       elements.push_back(e);
   std::sort(elements.begin(), elements.end());
@@ -272,7 +258,7 @@ Selected resolve_name(const Selection& selection, const Body& body) {
   std::optional<std::uint32_t> part = part_named(body, name);
   if (!part && whole.by == Word::By::file) part = part_named(body, whole.text);
   if (part) {
-    if (whole.by == Word::By::either && !parts_at(body, name).empty())
+    if (whole.by == Word::By::either && !parts_at(body.surface.parts, name).empty())
       throw InputError(
           selection.origin,
           fmt::format("\"{0}\" means two things: a part and an assembly; write \"={0}\" for the part, "
@@ -288,7 +274,7 @@ Selected resolve_name(const Selection& selection, const Body& body) {
   std::vector<std::uint32_t> found = polygons_called(selection, body.surface, "", name, std::nullopt);
   // The part's own name may hold a slash: try every one.
   for (std::size_t slash = name.find('/'); slash != std::string::npos; slash = name.find('/', slash + 1)) {
-    const Parts parts = parts_called(body, name.substr(0, slash));
+    const Parts parts = called(body, name.substr(0, slash));
     if (!parts) continue;
     if (slash + 1 == name.size())
       throw InputError(
@@ -384,7 +370,7 @@ std::optional<Vec3> side_axis(const Selection& selection, const Body& body) {
   if (selection.kind != Selection::Kind::name || part_named(body, selection.name)) return std::nullopt;
   const std::size_t slash = selection.name.rfind('/');
   const std::string before = slash == std::string::npos ? "" : selection.name.substr(0, slash);
-  if (slash != std::string::npos && !parts_called(body, before)) return std::nullopt;
+  if (slash != std::string::npos && parts_called(body, before).empty()) return std::nullopt;
   const Word word = parse_word(selection.name.substr(slash == std::string::npos ? 0 : slash + 1));
   const std::optional<Side> side = side_of(word.text);
   if (!side || word.by == Word::By::file) return std::nullopt;

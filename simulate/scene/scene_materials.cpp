@@ -2,11 +2,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 
 #include "base/error.h"
 #include "base/nearest_word.h"
 #include "base/units.h"
 #include "simulate/input/material_names.h"
+#include "simulate/input/part_names.h"
 #include "simulate/models/rest_shape.h"
 #include "simulate/scene/scene.h"
 #include "simulate/scene/scene_checks.h"
@@ -27,11 +29,36 @@ Material material_named(const Scene& scene, const std::string& name, const std::
   throw InputError(origin, fmt::format("no material \"{}\"{}", name, hint));
 }
 
-// What [parts.NAME], the scene or the body says; "" where nothing does.
-const std::string& name_of_material(const Scene& scene, const Part& part) {
-  const auto own = scene.parts.find(part.name);
-  if (own != scene.parts.end() && !own->second.material.empty()) return own->second.material;
+// What `settings` of the part, the scene or the body says; "" where nothing does.
+const std::string& name_of_material(const Scene& scene, const PartSettings& settings, const Part& part) {
+  if (!settings.material.empty()) return settings.material;
   return scene.material.empty() ? part.material : scene.material;
+}
+
+// Fills what `settings` leaves open.
+void take_over(PartSettings& settings, const PartSettings& wider) {
+  if (settings.material.empty() && !settings.infill.share)
+    settings.infill = wider.infill;  // belongs to a material
+  if (settings.material.empty()) settings.material = wider.material;
+  if (settings.model.empty()) settings.model = wider.model;
+  if (settings.hooke.empty()) settings.hooke = wider.hooke;
+  if (!settings.axes) settings.axes = wider.axes;
+  if (settings.origin.empty()) settings.origin = wider.origin;
+}
+
+// What [parts] says of a part: its own entry, and where that leaves something open the entries of the assemblies that
+// hold it, the smallest first.
+PartSettings settings_of_part(const Scene& scene, const Body& body, std::size_t part) {
+  PartSettings settings;
+  std::multimap<std::size_t, const PartSettings*> wider;  // by how many parts they are for
+  for (const auto& [name, entry] : scene.parts) {
+    if (name == body.parts[part].name) settings = entry;
+    const std::vector<std::uint32_t> parts = parts_called(body, name);
+    if (name != body.parts[part].name && std::binary_search(parts.begin(), parts.end(), part))
+      wider.emplace(parts.size(), &entry);
+  }
+  for (const auto& [parts, entry] : wider) take_over(settings, *entry);
+  return settings;
 }
 
 // What the part, the scene or the placement says.
@@ -124,10 +151,8 @@ void refuse_law(const Scene& scene, const PartSettings& settings, const Body& bo
 
 std::vector<Model> models_of_parts(const Scene& scene, const Body& body) {
   std::vector<Model> models;
-  for (const Part& part : body.parts) {
-    const auto found = scene.parts.find(part.name);
-    const std::string model =
-        model_of_part(scene, found == scene.parts.end() ? PartSettings{} : found->second, part);
+  for (std::size_t p = 0; p < body.parts.size(); ++p) {
+    const std::string model = model_of_part(scene, settings_of_part(scene, body, p), body.parts[p]);
     models.push_back(model == "springs"     ? Model::springs
                      : model == "paper"     ? Model::paper
                      : model == "quadratic" ? Model::quadratic
@@ -138,9 +163,8 @@ std::vector<Model> models_of_parts(const Scene& scene, const Body& body) {
 
 std::vector<HookeConstant> hooke_of_parts(const Scene& scene, const Body& body) {
   std::vector<HookeConstant> constants;
-  for (const Part& part : body.parts) {
-    const auto found = scene.parts.find(part.name);
-    const std::string hooke = found != scene.parts.end() ? found->second.hooke : "";
+  for (std::size_t p = 0; p < body.parts.size(); ++p) {
+    const std::string hooke = settings_of_part(scene, body, p).hooke;
     constants.push_back(hooke == "ganovelli"   ? HookeConstant::ganovelli
                         : hooke == "isotropic" ? HookeConstant::isotropic
                                                : HookeConstant::paper);
@@ -149,23 +173,17 @@ std::vector<HookeConstant> hooke_of_parts(const Scene& scene, const Body& body) 
 }
 
 std::vector<Material> materials_of_parts(const Scene& scene, const Body& body) {
-  std::vector<std::string> names;
-  for (const Part& part : body.parts) names.push_back(part.name);
   for (const auto& [name, settings] : scene.parts)
-    if (std::find(names.begin(), names.end(), name) == names.end() &&
-        std::find(scene.coming_parts.begin(), scene.coming_parts.end(), name) == scene.coming_parts.end()) {
-      std::string hint = did_you_mean(name, names);
-      if (hint.empty()) hint = fmt::format("; it has {}", fmt::join(names, ", "));
-      throw InputError(settings.origin, fmt::format("the body has no part \"{}\"{}", name, hint));
-    }
+    if (std::find(scene.coming_parts.begin(), scene.coming_parts.end(), name) == scene.coming_parts.end())
+      (void)require_parts(body, name, settings.origin);
   std::vector<Material> materials;
   bool infill_used = false;  // the scene's
-  for (const Part& part : body.parts) {
-    PartSettings settings;
-    settings.origin = scene.name;
-    if (const auto found = scene.parts.find(part.name); found != scene.parts.end()) settings = found->second;
+  for (std::size_t index = 0; index < body.parts.size(); ++index) {
+    const Part& part = body.parts[index];
+    PartSettings settings = settings_of_part(scene, body, index);
+    if (settings.origin.empty()) settings.origin = scene.name;
     refuse_model(scene, settings, part);
-    const std::string& name = name_of_material(scene, part);
+    const std::string& name = name_of_material(scene, settings, part);
     if (name.empty())
       throw InputError(
           scene.name, fmt::format("part \"{}\" has no material: write material = \"steel\" at the top of the "
@@ -176,7 +194,6 @@ std::vector<Material> materials_of_parts(const Scene& scene, const Body& body) {
         settings.infill.share || !settings.material.empty() ? settings.infill : scene.infill;
     infill_used = infill_used || settings.material.empty();
     Material material = material_named(scene, name, settings.origin);
-    const auto index = static_cast<std::size_t>(&part - body.parts.data());
     refuse_law(scene, settings, body, index, material, model_of_part(scene, settings, part));
     if (settings.axes) material.axes = *settings.axes;
     if (infill.share) {
@@ -195,7 +212,8 @@ std::vector<Material> materials_of_parts(const Scene& scene, const Body& body) {
 
 void warn_of_unused_materials(const Scene& scene, const Body& body, Progress& progress) {
   std::vector<std::string> used;
-  for (const Part& part : body.parts) used.push_back(name_of_material(scene, part));
+  for (std::size_t p = 0; p < body.parts.size(); ++p)
+    used.push_back(name_of_material(scene, settings_of_part(scene, body, p), body.parts[p]));
   if (!scene.events.empty()) {  // a part that joins later
     used.push_back(scene.material);
     for (const auto& [name, settings] : scene.parts) used.push_back(settings.material);

@@ -3,14 +3,27 @@
 
 #include <gtest/gtest.h>
 
+#include <BRepBuilderAPI_Copy.hxx>
 #include <BRepGProp.hxx>
 #include <BRepPrimAPI_MakeBox.hxx>
 #include <GProp_GProps.hxx>
 #include <Interface_Static.hxx>
+#include <STEPCAFControl_Writer.hxx>
 #include <STEPControl_Controller.hxx>
+#include <TDF_LabelSequence.hxx>
+#include <TDocStd_Document.hxx>
 #include <TopoDS_Shape.hxx>
+#include <XCAFApp_Application.hxx>
+#include <XCAFDoc_ColorTool.hxx>
+#include <XCAFDoc_DocumentTool.hxx>
+#include <XCAFDoc_GraphNode.hxx>
+#include <XCAFDoc_ShapeTool.hxx>
+#include <cmath>
+#include <map>
+#include <memory>
 #include <string_view>
 
+#include "base/files/memory_file.h"
 #include "cad/read/assembly_paths.h"
 
 namespace flexel::cad {
@@ -90,6 +103,79 @@ TEST(WriteTree, NamesColoursAndLayersComeBack) {
       found = found || (color && std::abs(color->GetRGB().Green() - 0.4) < 1e-3);
     EXPECT_TRUE(found);
   }
+}
+
+// Of the leaves of a tree: x + y of their place, and the colour that counts: what their uses say goes first.
+void collect_greens(const std::vector<CadNode>& nodes, const TopLoc_Location& above,
+                    std::map<double, double>& greens) {
+  for (const CadNode& node : nodes) {
+    const TopLoc_Location here = above * node.location;
+    collect_greens(node.children, here, greens);
+    if (node.shape.IsNull()) continue;
+    double green = -1;
+    for (const ShapeStyle* style : {&node.style, &node.instance_style})
+      for (const auto& color : style->colors)
+        if (color) green = color->GetRGB().Green();
+    const gp_XYZ at = here.Transformation().TranslationPart();
+    greens[std::round(at.X() + at.Y())] = std::round(100 * green) / 100;
+  }
+}
+
+// A shape of its own for each use, as deformation makes them.
+void make_own(std::vector<CadNode>& nodes) {
+  for (CadNode& node : nodes) {
+    make_own(node.children);
+    if (!node.shape.IsNull()) node.shape = BRepBuilderAPI_Copy(node.shape).Shape();
+  }
+}
+
+// Two uses of a pair of boxes; the first box in the second pair has a colour that the outermost assembly gives it.
+TEST(WriteTree, ColoursOfSingleUsesInsideAssembliesComeBack) {
+  Handle(TDocStd_Document) document;
+  XCAFApp_Application::GetApplication()->NewDocument("BinXCAF", document);
+  const auto shapes = XCAFDoc_DocumentTool::ShapeTool(document->Main());
+  const auto colors = XCAFDoc_DocumentTool::ColorTool(document->Main());
+  gp_Trsf shift;
+  shift.SetTranslation(gp_Vec(100, 0, 0));
+  const TDF_Label box = shapes->AddShape(BRepPrimAPI_MakeBox(10, 20, 30).Shape(), Standard_False);
+  colors->SetColor(box, Quantity_Color(0.2, 0.4, 0.6, Quantity_TOC_RGB), XCAFDoc_ColorSurf);
+  const TDF_Label pair = shapes->NewShape(), machine = shapes->NewShape();
+  const TDF_Label first = shapes->AddComponent(pair, box, TopLoc_Location());
+  shapes->AddComponent(pair, box, TopLoc_Location(shift));
+  shift.SetTranslation(gp_Vec(0, 200, 0));
+  shapes->AddComponent(machine, pair, TopLoc_Location());
+  const TDF_Label second = shapes->AddComponent(machine, pair, TopLoc_Location(shift));
+  shapes->UpdateAssemblies();
+  TDF_LabelSequence path;
+  path.Append(second);
+  path.Append(first);
+  Handle(XCAFDoc_GraphNode) use;
+  ASSERT_TRUE(shapes->SetSHUO(path, use));
+  ASSERT_TRUE(XCAFDoc_ShapeTool::FindSHUO(path, use));
+  colors->SetColor(use->Label(), Quantity_Color(0.9, 0.8, 0.1, Quantity_TOC_RGB), XCAFDoc_ColorSurf);
+  STEPCAFControl_Writer writer;
+  writer.SetSHUOMode(Standard_True);
+  ASSERT_TRUE(writer.Transfer(document, STEPControl_AsIs));
+  const MemoryFile file;
+  ASSERT_EQ(writer.Write(file.path().c_str()), IFSelect_RetDone);
+  CadTree tree = read_tree(job_of(file.bytes(), "step"), true);
+  const std::map<double, double> wanted = {{0, .4}, {100, .4}, {200, .8}, {300, .4}};
+  std::map<double, double> greens;
+  collect_greens(tree.roots, TopLoc_Location(), greens);
+  EXPECT_EQ(greens, wanted);
+  make_own(tree.roots);
+  const CadTree back = read_tree(job_of(write_tree({tree}, "step"), "step"), true);
+  greens.clear();
+  collect_greens(back.roots, TopLoc_Location(), greens);
+  EXPECT_EQ(greens, wanted);
+}
+
+TEST(WriteTree, IgesIsTheSameEveryTime) {
+  const CadTree tree = assembly("MM", "");
+  std::vector<std::unique_ptr<char[]>> moved;  // what follows lies elsewhere in memory
+  const Bytes first = write_tree({tree}, "iges");
+  for (std::size_t i = 0; i < 200; ++i) moved.push_back(std::make_unique<char[]>(16 + 8 * i));
+  EXPECT_EQ(write_tree({assembly("MM", "")}, "iges"), first);
 }
 
 TEST(WriteTree, OtherFormatsHoldTheSolidsInPlace) {

@@ -85,7 +85,7 @@ def test_refusals():
     scene("lift.toml", LIFT.replace("GLUE", "glue = 3"))
     expect_error(run("flexel-simulate", "lift.toml", "body.vtu", "-o", "o.vtu"), "flexel-simulate", '"glue" needs to be true or false')
     scene("bond.toml", 'material = "rubber"\n[[bond]]\nparts = ["low", "hihg"]\n[run]\ntime = "1 ms"\n')
-    expect_error(run("flexel-simulate", "bond.toml", "body.vtu", "-o", "o.vtu"), "flexel-simulate", 'bond.toml:2: [[bond]] names part "hihg", which the body does not have; did you mean "high"')
+    expect_error(run("flexel-simulate", "bond.toml", "body.vtu", "-o", "o.vtu"), "flexel-simulate", 'bond.toml:2: the body has no part "hihg"; did you mean "high"')
 
     scene("short.toml", 'material = "rubber"\n[contact]\noverlap = "part"\noverlap_time = "20 ms"\n[run]\ntime = "1 ms"\n')
     short = run("flexel-simulate", "short.toml", "body.vtu", "-o", "o.vtu")

@@ -305,5 +305,26 @@ def test_size_warning_names_the_likely_unit():
     expect("likely" not in expect_ok(run("flexel-voxelize", box(), "--count", "500", "-o", "rest.vtu")).err, "40 mm is no suspicious size")
 
 
+def dxf(hidden):
+    """A box of 4 cm on layer "part", and one a metre long on layer "help", whose entry in the table of layers ends with `hidden`."""
+    text = f"0\nSECTION\n2\nHEADER\n9\n$INSUNITS\n70\n4\n0\nENDSEC\n0\nSECTION\n2\nTABLES\n0\nTABLE\n2\nLAYER\n0\nLAYER\n2\nhelp\n{hidden}0\nENDTAB\n0\nENDSEC\n0\nSECTION\n2\nENTITIES\n"
+    for layer, size in (("part", (40.0, 10.0, 10.0)), ("help", (1000.0, 10.0, 10.0))):
+        vertices, triangles = indexed_box(size)
+        for a, b, c in triangles:
+            text += f"0\n3DFACE\n8\n{layer}\n"
+            for corner, vertex in enumerate((a, b, c, c)):
+                text += "".join(f"{10 * (i + 1) + corner}\n{vertices[vertex][i]}\n" for i in range(3))
+    return text + "0\nENDSEC\n0\nEOF\n"
+
+
+def test_layers_of_dxf_that_are_off_stay_out():
+    for hidden, out in (("70\n0\n62\n7\n", False), ("70\n0\n62\n-7\n", True), ("70\n1\n62\n7\n", True)):
+        write("drawing.dxf", dxf(hidden))
+        said = run("flexel", "info", "drawing.dxf")
+        expect_ok(said)
+        expect(("1,000" in said.out.decode() or "1000" in said.out.decode()) != out, f"{hidden!r}: {said.out.decode()}")
+        expect(("layer that is off or frozen" in said.err) == out, said.err)
+
+
 if __name__ == "__main__":
     main(globals())

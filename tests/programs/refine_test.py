@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import re
 import struct
 import zipfile
 
@@ -653,6 +654,18 @@ def test_deform_splits_the_surface_and_keeps_that_of_the_body():
     expect_error(run("flexel", "deform", "bar.obj", *BEND, "--refine", "auto", "-o", "x.vtu"), "flexel", "--refine", "mesh")
     expect_ok(run("flexel", "deform", "bar.obj", *BEND, "--refine", "5 mm", "-o", "even.obj"))
     expect(info("even.obj")["triangles"] > 1000, "to an edge")
+
+
+def test_what_a_new_3mf_leaves_out_is_told():
+    """Textures, and colours that change within a triangle, are in the file as it comes out again and nowhere else."""
+    BARS["3mf"]()
+    said = expect_ok(run("flexel-voxelize", "bar.3mf", "--count", "500", "-o", "rest.vtu")).err
+    expect("textures and colours of corners come out where" in said, said)
+    with zipfile.ZipFile("bar.3mf") as archive:
+        model = archive.read("3D/m.model").decode()
+    model = re.sub(r"<m:texture2dgroup.*?</m:texture2dgroup>", "", re.sub(r' pid="[34]" p1="\d+" p2="\d+" p3="\d+"', "", model))
+    said = expect_ok(run("flexel-voxelize", threemf("plain.3mf", model), "--count", "500", "-o", "rest.vtu")).err
+    expect("come out where" not in said, said)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,96 @@
+"""Assemblies of STEP files: parts that touch do what the scene says, and names of assemblies stand for the parts in them."""
+
+import json
+import pathlib
+
+from harness import PARTS, Skip, expect, expect_error, expect_ok, main, need, need_step, run, scene, write
+
+# A bolt whose head rests on a plate; its shank has 1 mm of play.
+BOLTED = """SetFactory("OpenCASCADE");
+Box(1) = {-20, -10, 0, 40, 20, 5};
+Cylinder(2) = {0, 0, -1, 0, 0, 7, 4};
+BooleanDifference(3) = { Volume{1}; Delete; }{ Volume{2}; Delete; };
+Cylinder(4) = {0, 0, -6, 0, 0, 11, 3};
+Cylinder(5) = {0, 0, 5, 0, 0, 4, 8};
+BooleanUnion(6) = { Volume{4}; Delete; }{ Volume{5}; Delete; };
+Save "bolted.step";
+"""
+
+PULL = """material = "rubber"
+HOLD
+[damping]
+time = "50 us"
+[[fix]]
+where = "PLATE/xmin"
+[[fix]]
+where = "PLATE/xmax"
+[[manipulator]]
+part = "BOLT"
+time = ["0 s", "10 ms"]
+displacement = [["0 mm", "0 mm", "0 mm"], ["0 mm", "0 mm", "WAY mm"]]
+[[probe]]
+name = "under the head"
+at = ["0 mm", "6 mm", "4.8 mm"]
+[run]
+time = "12 ms"
+"""
+
+
+def moved(hold, way, plate, bolt):
+    """How far the plate goes along z under the head, mm."""
+    scene("pull.toml", PULL.replace("HOLD", hold).replace("WAY", str(way)).replace("PLATE", plate).replace("BOLT", bolt))
+    expect_ok(run("flexel-simulate", "pull.toml", "body.vtu", "-o", "pulled.vtu", "--summary", "s.json"))
+    return 1e3 * json.loads(pathlib.Path("s.json").read_text())["probes"][0]["displacement"][2]
+
+
+def test_a_bolt_and_a_plate_are_bonded_or_in_contact_as_the_scene_says():
+    need_step()
+    need("gmsh")
+    write("bolted.geo", BOLTED)
+    run("gmsh", "bolted.geo", "-0", "-v", "1")
+    expect_ok(run("flexel-voxelize", "bolted.step", "--size", "1.5 mm", "-o", "body.vtu"))
+    plate, bolt = ("bolted", "bolted-2")
+    expect(abs(moved("", 1, plate, bolt) - 1) < .2, "bonded, the plate comes along")
+    expect(abs(moved("contact = true", 1, plate, bolt)) < .05, "in contact, the bolt lifts off")
+    expect(abs(moved("contact = true", -1, plate, bolt) + 1) < .2, "in contact, the head presses the plate down")
+    expect(abs(moved("bond = false", -1, plate, bolt)) < .05, "with neither, the bolt goes through")
+    bonded = f'contact = true\n[[bond]]\nparts = ["{plate}", "{bolt}"]'
+    expect(abs(moved(bonded, 1, plate, bolt) - 1) < .2, "[[bond]] holds them in spite of contact")
+
+
+def test_names_of_assemblies_stand_for_their_parts():
+    need_step()
+    part = PARTS / "as1-oc-214.stp"
+    if not part.exists():
+        raise Skip("no real parts here")
+    text = """[parts.as1]
+material = "steel"
+[parts.nut-bolt-assembly]
+material = "brass"
+[parts."l-bracket-assembly/l-bracket"]
+material = "PLA"
+[[fix]]
+where = "plate/zmin"
+[[move]]
+where = "rod/xmax"
+displacement = ["0 mm", "8 mm", "0 mm"]
+"""
+    scene(text=text)
+    expect_ok(run("flexel-voxelize", part, "--count", "1500", "-o", "rest.vtu", "--quiet"))
+    expect_ok(run("flexel-simulate", "scene.toml", "rest.vtu", "-o", "bent.vtu", "--no-estimate", "--quiet", "--summary", "s.json"))
+    materials = {each["name"]: each["material"] for each in json.loads(pathlib.Path("s.json").read_text())["parts"]}
+    expect(len(materials) == 18 and materials["plate"] == "steel" and materials["rod"] == "steel", f"{materials}")
+    brass = {name for name, material in materials.items() if material == "brass"}
+    expect(brass == {"bolt", "nut-3", "bolt-4", "nut-6"}, f"one pair in either bracket's assembly: {materials}")
+    expect(materials["l-bracket"] == "PLA" and materials["l-bracket-2"] == "steel", f"{materials}")
+    scene("bond.toml", text + '[[bond]]\nparts = ["nut-bolt-assembly", "plate"]\n')
+    expect_error(run("flexel-simulate", "bond.toml", "rest.vtu", "-o", "x.vtu"), "flexel-simulate", '"nut-bolt-assembly" is an assembly of')
+    scene("none.toml", text.replace("parts.nut-bolt-assembly", "parts.nut-bolt-assembley"))
+    expect_error(run("flexel-simulate", "none.toml", "rest.vtu", "-o", "x.vtu"), "flexel-simulate", 'the body has no part "nut-bolt-assembley"')
+    command = ("flexel", "deform", part, "--count", "1500", "--material", "as1=steel", "--material", "nut-bolt-assembly=brass", "--fix", "plate/zmin", "--push", "rod/xmax: 0 10 0 N")
+    expect_ok(run(*command, "-o", "bent.stl", "--quiet"))
+    expect_error(run(*command, "--material", "nuts=brass", "-o", "bent.stl"), "flexel", 'no part "nuts"')
+
+
+if __name__ == "__main__":
+    main(globals())
