@@ -12,6 +12,7 @@
 #include "base/stop.h"
 #include "formats/lattice/fused_points.h"
 #include "formats/lattice/stress_columns.h"
+#include "simulate/effects/rigid.h"
 #include "simulate/estimate/stress_singularity.h"
 #include "simulate/matter/fragments.h"
 #include "simulate/matter/interpolation_weights.h"
@@ -128,10 +129,15 @@ void refuse_what_quadratic_lacks(const Scene& scene, const Body& body,
     throw InputError(scene.name, needs + "it has no renormalise; use model \"cells\"");
   for (const ActiveEffect& effect : effects)
     if (effect.name != Supports::name && effect.name != Loads::name && effect.name != Bonds::name &&
-        effect.name != "gravity" && effect.name != Thermal::name)
+        effect.name != "gravity" && effect.name != Thermal::name && effect.name != RigidParts::name)
       throw InputError(scene.name, fmt::format("{}it has no {} ({}); use model \"cells\"", needs, effect.name,
                                                effect.why));
-  refuse_timed(effects, ActsIn::all, scene.name);
+  for (const ActiveEffect& effect : effects)
+    if (effect.acts > ActsIn::all && effect.name != RigidParts::name)
+      throw InputError(scene.name,
+                       fmt::format("{} ({}) acts in timed runs only: give [run] time = \"1 s\", or "
+                                   "leave it out",
+                                   effect.name, effect.why));
   const auto acts = [&](std::string_view name) {
     return std::any_of(effects.begin(), effects.end(),
                        [&](const ActiveEffect& each) { return each.name == name; });
@@ -150,10 +156,12 @@ void refuse_what_quadratic_lacks(const Scene& scene, const Body& body,
     throw InputError(
         scene.name,
         fmt::format("{}it does not know points that an earlier run fused; use model \"cells\"", needs));
-  for (const Tie& tie : scene.get<Supports>().ties)
-    if (tie.link)
-      throw InputError(tie.origin, fmt::format("{}it has no rigid links (\"{}\"); use link = \"averaging\"",
-                                               needs, tie.name));
+  for (const Manipulator& each : scene.get<RigidParts>().manipulators)
+    throw InputError(
+        each.origin,
+        fmt::format("{}it has no [[manipulator]] (\"{}\"); make the part rigid, and lead one of its "
+                    "faces with [[move]]",
+                    needs, each.name));
   for (const Part& part : body.parts)
     if (part.placement == Placement::centre)
       throw InputError(scene.name,
@@ -171,7 +179,8 @@ QuadraticSolution quadratic_equilibrium(const QuadraticSystem& system, const Sce
     progress.update(0.05 + 0.4 * std::min(1.0, std::log(residual) / std::log(scene.run.tolerance)),
                     fmt::format("iteration {}", iteration));
   };
-  QuadraticSolution solution = solve(system, std::max(kRough, scene.run.tolerance), 1, scene.name, linear);
+  const double rough = system.linked().empty() ? std::max(kRough, scene.run.tolerance) : scene.run.tolerance;
+  QuadraticSolution solution = solve(system, rough, 1, scene.name, linear);
   const auto large = [&](double share, double residual) {
     check_stop();
     progress.update(0.45 + 0.5 * share, fmt::format("residual {:.1e}", residual));
