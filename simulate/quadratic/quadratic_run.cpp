@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/human.h"
+#include "base/resources.h"
 #include "base/stop.h"
 #include "formats/lattice/fused_points.h"
 #include "formats/lattice/stress_columns.h"
@@ -106,6 +107,26 @@ std::vector<std::uint8_t> singular_elements(const QuadraticSystem& system) {
     for (const std::uint32_t e : elements)
       if (found[e] != 2) found[e] = 3;
   return found;
+}
+
+// What bonds, held cells and links take is not known before they are placed. Less than a run needs in all: whole cells and no error bars.
+void refuse_too_large(const QuadraticSystem& system, const std::string& scene) {
+  constexpr double kProgram = 35e6, kCell = 9e3, kHeldCell = 79e3, kBond = 105e3;  // bytes
+  constexpr double kLink = 6 * 2 * sizeof(Vec3);                                   // a node
+  const std::size_t cells = system.nodes().cells.size(), links = system.linked().size();
+  double held = 0;
+  for (std::size_t c = 0; c < cells; ++c) held += system.is_supported(c) ? 1 : 0;
+  const double needed = kProgram + kCell * static_cast<double>(cells) + kHeldCell * held +
+                        kBond * static_cast<double>(system.bonds().size()) +
+                        kLink * static_cast<double>(links * system.nodes().size());
+  if (needed > memory_to_use())
+    throw InputError(
+        scene,
+        fmt::format(
+            "model \"quadratic\" needs at least {} (cells {}, held or bonded {}, bonded pairs {}, rigid "
+            "bodies {}), more than the limit of {}; use a larger --size, or raise --max-memory",
+            human_bytes(needed), human_count(cells), human_count(static_cast<std::size_t>(held)),
+            human_count(system.bonds().size()), links, human_bytes(memory_to_use())));
 }
 
 // What a run finds at the vertices goes by these names.
@@ -228,6 +249,7 @@ SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptio
                  options.explain, progress);
   report_strays(fragments, result, progress);
   const QuadraticSystem system(problem, scene);
+  refuse_too_large(system, scene.name);
   for (const std::string& warning : system.warnings()) progress.warn(warning);
   refuse_loose_fragments(fragments, body, system.tied_elements(), system.bonded_elements(), scene.name);
   double solving = 0;
