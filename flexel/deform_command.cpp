@@ -502,12 +502,9 @@ bool has_thin_walls(const SolvedRun& run) {
   return worst > kWide && walls_are_thin(run.voxels);
 }
 
-// Model `quadratic` takes the scene: equilibrium without rigid links.
+// Model `quadratic` takes the scene: equilibrium without contact.
 bool suits_quadratic(const SolvedRun& run) {
-  const simulate::SimulateResult& found = run.simulated;
-  return !QuadraticField::is_in(run.voxels.body) && !found.timed && !found.settled &&
-         std::none_of(found.loads.begin(), found.loads.end(),
-                      [](const simulate::AppliedLoad& load) { return load.displacement.has_value(); });
+  return !QuadraticField::is_in(run.voxels.body) && !run.simulated.timed && !run.simulated.settled;
 }
 
 // What to do next, of this run.

@@ -15,7 +15,8 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr double kGuess = 0.5;     // a bar over this share of the value: hardly more than its size is known
+constexpr double kGuess = 0.5;  // a bar over this share of the value: hardly more than its size is known
+constexpr const char* kAxes[] = {"x", "y", "z"};
 constexpr std::size_t kNamed = 2;  // probes, supports: so many are named, the others counted
 
 const ErrorBar* find_bar(const SimulateResult& result, ErrorBar::Of of, std::size_t probe = 0) {
@@ -57,7 +58,6 @@ std::string moved(double length, const ErrorBar* bar) {
 
 // A force along an axis by that axis.
 std::string directed(const Vec3& force) {
-  constexpr const char* kAxes[] = {"x", "y", "z"};
   const double size = force.norm();
   for (int axis = 0; axis < 3; ++axis)
     if (size > 0 && std::abs(force[axis]) > (1 - 1e-4) * size)

@@ -23,11 +23,13 @@ struct RigidLink {
   // Found
   Vec3 translation = Vec3::Zero();  // m, of `middle`
   Vec3 turn = Vec3::Zero();         // rad: rotation vector
+  bool small = false;               // to first order in the turn, arms as they are at rest
   // Told by the ties: what they pull the matter with, the moment about the middle where it is now
   Vec3 pull = Vec3::Zero(), pull_moment = Vec3::Zero();  // N, N m
 
   // Displacement [m] of the material point that rested at `rest`.
   [[nodiscard]] Vec3 displacement(const Vec3& rest) const {
+    if (small) return translation + turn.cross(rest - middle);
     const double angle = turn.norm();
     if (angle == 0) return translation;
     // (R - I) arm by half angles: no cancellation for a small angle.

@@ -14,6 +14,7 @@
 #include "simulate/linear/conjugate_gradients.h"
 #include "simulate/linear/vector_products.h"
 #include "simulate/quadratic/corotation.h"
+#include "simulate/quadratic/quadratic_links.h"
 
 namespace flexel::simulate {
 namespace {
@@ -49,16 +50,17 @@ class LargeDeflection {
         corotation_(system, tangent_.stiffness, solution.safety),
         reach_(largest(solution.displacement)),
         extent_(std::max(bounding_box(system.nodes().rest).diagonal(), largest_led(system))),
-        angle_(largest_angle(system)) {}
+        angle_(largest_angle(system)),
+        links_(system) {}
 
   void run(const RunSettings& settings, const std::string& scene) {
     const std::vector<Vec3> linear = solution_.displacement;
     std::vector<Vec3> before(linear.size(), Vec3::Zero()), now = before;
-    const bool overloaded = reach_ > extent_;
-    if (reach_ > kOutOfProportion * extent_ && settings.load_steps == 1)
-      throw DivergedError(
-          fmt::format("{}: {}; or, if that is meant, write [run] load_steps = 4", scene, overload()));
-    const int most = settings.newton_iterations.value_or(overloaded ? 40 : 100);
+    const Eigen::VectorXd linear_links = links_.motions();
+    Eigen::VectorXd links_before = 0 * linear_links, links_now = links_before;
+    links_.take_small(false);
+    if (settings.load_steps == 1) refuse_out_of_proportion(scene);
+    const int most = settings.newton_iterations.value_or(reach_ > extent_ ? 40 : 100);
     double done = 0, last = 0;
     // the linear answer to a move that turns follows the chord of its end, which says nothing of the way there
     const bool turned = angle_ > kFirstTurn;
@@ -73,7 +75,9 @@ class LargeDeflection {
                    : turned ? Vec3(Vec3::Zero())
                             : Vec3(share * linear[n]);
       });
-      const int iterations = reach(share, guess);
+      links_.set_motions(done > 0 ? Eigen::VectorXd(links_now + ahead * (links_now - links_before))
+                                  : Eigen::VectorXd((turned ? 0 : share) * linear_links));
+      const int iterations = reach_with_links(share, guess);
       if (iterations > kMostIterations) {
         step = (share - done) / 2;
         if (step < kLeastStep * longest || solution_.iterations > kMostLinearInAll ||
@@ -86,6 +90,8 @@ class LargeDeflection {
       ++solution_.load_steps;
       before = now;
       now = guess;
+      links_before = links_now;
+      links_now = links_.motions();
       last = share - done;
       done = share;
       weak_support_ = false;
@@ -129,10 +135,15 @@ class LargeDeflection {
                                                       *tangent_.multigrid, kLoosest, kMostLinear);
       solution_.iterations += result.iterations;
       if (result.indefinite) return false;
-      if (result.converged) return true;
+      if (result.converged) return links_stable(u);
       if (anew) break;
     }
     return std::nullopt;
+  }
+  bool links_stable(std::vector<Vec3> u) {
+    if (!links_.any()) return true;
+    LinkedNodes nodes = linked_nodes(u, 1, [] { return true; });
+    return links_.stable(nodes, 1, solution_.safety);
   }
   // The stiffness is not positive, and stresses are not the reason.
   [[nodiscard]] bool weak_support() const { return weak_support_; }
@@ -143,6 +154,12 @@ class LargeDeflection {
         "at its first stiffness the load would move the part by {}, {} times its size: check the "
         "unit of the part and the load",
         human_length(reach_), human_number(reach_ / extent_, 2));
+  }
+
+  void refuse_out_of_proportion(const std::string& scene) const {
+    if (reach_ > kOutOfProportion * extent_)
+      throw DivergedError(
+          fmt::format("{}: {}; or, if that is meant, write [run] load_steps = 4", scene, overload()));
   }
 
   [[noreturn]] void fail(const std::string& scene, double done) const {
@@ -157,10 +174,14 @@ class LargeDeflection {
   // m: how far moves lead the matter.
   static double largest_led(const QuadraticSystem& system) {
     double most = 0;
-    for (const NitscheSupport& support : system.supports())
+    for (const NitscheSupport& support : system.supports()) {
+      if (support.tie->link) continue;
       for (const FacePoint& point : support.points)
         most = std::max(most, support.tie->motion.displacement(point.position, 1).norm());
-    return std::max(most, largest(system.prescribed()));
+      for (const std::uint32_t n : support.nodes)
+        most = std::max(most, support.tie->motion.displacement(system.nodes().rest[n], 1).norm());
+    }
+    return most;
   }
 
   static double largest(const std::vector<Vec3>& values) {
@@ -206,6 +227,39 @@ class LargeDeflection {
       ++solution_.newton_iterations;
     }
     return kMostIterations + 1;
+  }
+
+  // What links are balanced with, at `u`.
+  LinkedNodes linked_nodes(std::vector<Vec3>& u, double share, std::function<bool()> hold) {
+    constexpr double kResponse = 1e-7;
+    return {u,
+            solution_.unbalanced,
+            corotation_.turns(),
+            tangent_.stiffness,
+            std::move(hold),
+            [this, &u, share] { return corotation_.residual(u, share, solution_.unbalanced); },
+            [this, &u] {
+              corotation_.set_tangent(true);
+              if (stale(u)) make_preconditioner(u);
+            },
+            [this](const std::vector<Vec3>& right, std::vector<Vec3>& x) {
+              const LinearResult result = conjugate_gradients(tangent_.stiffness, right, x,
+                                                              *tangent_.multigrid, kResponse, kMostLinear);
+              solution_.iterations += result.iterations;
+              return result.converged && !result.indefinite;
+            }};
+  }
+
+  // The same with every link in balance.
+  int reach_with_links(double share, std::vector<Vec3>& u) {
+    int iterations = reach(share, u);
+    if (!links_.any() || iterations > kMostIterations) return iterations;
+    LinkedNodes nodes = linked_nodes(u, share, [&] {
+      const int more = reach(share, u);
+      iterations = std::max(iterations, more);
+      return more <= kMostIterations;
+    });
+    return links_.find(nodes, share, solution_.safety, tolerance_) ? iterations : kMostIterations + 1;
   }
 
   // Cells have turned too far since the preconditioner was made.
@@ -259,6 +313,7 @@ class LargeDeflection {
   bool indefinite_ = false;        // the last tangent
   bool weak_support_ = false;
   std::vector<Vec3> made_at_;  // (nodes x 3) m, where the preconditioner was made; none: at rest
+  LinkBalance links_;
 };
 
 }  // namespace
@@ -282,7 +337,7 @@ bool solve_large(const QuadraticSystem& system, const RunSettings& settings, con
              far = strain * slenderness * slenderness < kFarFromBuckling;
   if (straight && far) return correct(system, settings.tolerance, solution, linear);
   LargeDeflection large(system, settings, progress, solution);
-  if (!large.matters()) {
+  if (system.linked().empty() && !large.matters()) {
     if (large.weak_support() || !correct(system, settings.tolerance, solution, linear)) return false;
   } else {
     if (!large.weak_support()) large.run(settings, scene);

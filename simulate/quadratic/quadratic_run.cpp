@@ -9,9 +9,11 @@
 
 #include "base/error.h"
 #include "base/human.h"
+#include "base/resources.h"
 #include "base/stop.h"
 #include "formats/lattice/fused_points.h"
 #include "formats/lattice/stress_columns.h"
+#include "simulate/effects/rigid.h"
 #include "simulate/estimate/stress_singularity.h"
 #include "simulate/matter/fragments.h"
 #include "simulate/matter/interpolation_weights.h"
@@ -107,6 +109,26 @@ std::vector<std::uint8_t> singular_elements(const QuadraticSystem& system) {
   return found;
 }
 
+// What bonds, held cells and links take is not known before they are placed. Less than a run needs in all: whole cells and no error bars.
+void refuse_too_large(const QuadraticSystem& system, const std::string& scene) {
+  constexpr double kProgram = 35e6, kCell = 9e3, kHeldCell = 79e3, kBond = 105e3;  // bytes
+  constexpr double kLink = 6 * 2 * sizeof(Vec3);                                   // a node
+  const std::size_t cells = system.nodes().cells.size(), links = system.linked().size();
+  double held = 0;
+  for (std::size_t c = 0; c < cells; ++c) held += system.is_supported(c) ? 1 : 0;
+  const double needed = kProgram + kCell * static_cast<double>(cells) + kHeldCell * held +
+                        kBond * static_cast<double>(system.bonds().size()) +
+                        kLink * static_cast<double>(links * system.nodes().size());
+  if (needed > memory_to_use())
+    throw InputError(
+        scene,
+        fmt::format(
+            "model \"quadratic\" needs at least {} (cells {}, held or bonded {}, bonded pairs {}, rigid "
+            "bodies {}), more than the limit of {}; use a larger --size, or raise --max-memory",
+            human_bytes(needed), human_count(cells), human_count(static_cast<std::size_t>(held)),
+            human_count(system.bonds().size()), links, human_bytes(memory_to_use())));
+}
+
 // What a run finds at the vertices goes by these names.
 void tell_replaced_columns(const Body& body, Progress& progress) {
   if (has_surface_stress(body)) return;  // an earlier run's
@@ -128,10 +150,15 @@ void refuse_what_quadratic_lacks(const Scene& scene, const Body& body,
     throw InputError(scene.name, needs + "it has no renormalise; use model \"cells\"");
   for (const ActiveEffect& effect : effects)
     if (effect.name != Supports::name && effect.name != Loads::name && effect.name != Bonds::name &&
-        effect.name != "gravity" && effect.name != Thermal::name)
+        effect.name != "gravity" && effect.name != Thermal::name && effect.name != RigidParts::name)
       throw InputError(scene.name, fmt::format("{}it has no {} ({}); use model \"cells\"", needs, effect.name,
                                                effect.why));
-  refuse_timed(effects, ActsIn::all, scene.name);
+  for (const ActiveEffect& effect : effects)
+    if (effect.acts > ActsIn::all && effect.name != RigidParts::name)
+      throw InputError(scene.name,
+                       fmt::format("{} ({}) acts in timed runs only: give [run] time = \"1 s\", or "
+                                   "leave it out",
+                                   effect.name, effect.why));
   const auto acts = [&](std::string_view name) {
     return std::any_of(effects.begin(), effects.end(),
                        [&](const ActiveEffect& each) { return each.name == name; });
@@ -150,10 +177,12 @@ void refuse_what_quadratic_lacks(const Scene& scene, const Body& body,
     throw InputError(
         scene.name,
         fmt::format("{}it does not know points that an earlier run fused; use model \"cells\"", needs));
-  for (const Tie& tie : scene.get<Supports>().ties)
-    if (tie.link)
-      throw InputError(tie.origin, fmt::format("{}it has no rigid links (\"{}\"); use link = \"averaging\"",
-                                               needs, tie.name));
+  for (const Manipulator& each : scene.get<RigidParts>().manipulators)
+    throw InputError(
+        each.origin,
+        fmt::format("{}it has no [[manipulator]] (\"{}\"); make the part rigid, and lead one of its "
+                    "faces with [[move]]",
+                    needs, each.name));
   for (const Part& part : body.parts)
     if (part.placement == Placement::centre)
       throw InputError(scene.name,
@@ -171,7 +200,8 @@ QuadraticSolution quadratic_equilibrium(const QuadraticSystem& system, const Sce
     progress.update(0.05 + 0.4 * std::min(1.0, std::log(residual) / std::log(scene.run.tolerance)),
                     fmt::format("iteration {}", iteration));
   };
-  QuadraticSolution solution = solve(system, std::max(kRough, scene.run.tolerance), 1, scene.name, linear);
+  const double rough = system.linked().empty() ? std::max(kRough, scene.run.tolerance) : scene.run.tolerance;
+  QuadraticSolution solution = solve(system, rough, 1, scene.name, linear);
   const auto large = [&](double share, double residual) {
     check_stop();
     progress.update(0.45 + 0.5 * share, fmt::format("residual {:.1e}", residual));
@@ -219,6 +249,7 @@ SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptio
                  options.explain, progress);
   report_strays(fragments, result, progress);
   const QuadraticSystem system(problem, scene);
+  refuse_too_large(system, scene.name);
   for (const std::string& warning : system.warnings()) progress.warn(warning);
   refuse_loose_fragments(fragments, body, system.tied_elements(), system.bonded_elements(), scene.name);
   double solving = 0;

@@ -15,6 +15,7 @@
 #include "simulate/linear/free_motions.h"
 #include "simulate/linear/vector_products.h"
 #include "simulate/matter/load_distribution.h"
+#include "simulate/quadratic/quadratic_links.h"
 
 namespace flexel::simulate {
 namespace {
@@ -56,6 +57,34 @@ void start_nearer(const QuadraticSystem& system, QuadraticSolution& solution) {
   if (left(free) < left(solution.displacement)) solution.displacement = std::move(free);
 }
 
+// N, what a residual is small beside: what loads and moves ask for while links are at rest.
+double scale_of(const QuadraticSystem& system, const QuadraticSolution& solution) {
+  const LinkBalance links(system);
+  const Eigen::VectorXd q = links.motions();
+  links.set_motions(Eigen::VectorXd::Zero(q.size()));
+  const std::vector<Vec3> wanted = system.right_side(solution.safety), led = system.prescribed();
+  links.set_motions(q);
+  std::vector<Vec3> start(wanted.size());
+  solution.tangent->stiffness.forces(led[0].data(), start[0].data());
+  parallel_for_each(start.size(), [&](std::size_t i) { start[i] = wanted[i] - start[i]; });
+  // what acts on nodes that links hold is theirs to balance
+  if (links.any()) return std::max({std::sqrt(dot(start, start)), system.free_force(), system.load_norm()});
+  solution.tangent->stiffness.clear_held(start);
+  return std::max(std::sqrt(dot(start, start)), system.free_force());
+}
+
+// (nodes x 3) N: right side less what the cells do, of the linear solution.
+std::vector<Vec3> unbalanced_of(const QuadraticSystem& system, const QuadraticSolution& solution) {
+  const std::vector<Vec3> wanted = system.right_side(solution.safety);
+  std::vector<Vec3> left(wanted.size());
+  solution.tangent->stiffness.forces(solution.displacement[0].data(), left[0].data());
+  parallel_for_each(left.size(), [&](std::size_t i) { left[i] = wanted[i] - left[i]; });
+  return left;
+}
+
+bool correct_held(const QuadraticSystem& system, double tolerance, QuadraticSolution& solution,
+                  const std::function<void(int, double)>& progress);
+
 }  // namespace
 
 QuadraticSolution solve(const QuadraticSystem& system, double tolerance, double safety,
@@ -63,7 +92,10 @@ QuadraticSolution solve(const QuadraticSystem& system, double tolerance, double 
   QuadraticSolution found;
   found.safety = safety;
   const std::size_t n = system.nodes().size();
+  const LinkBalance links(system);
+  links.take_small(true);
   for (int attempt = 0; attempt < kSafeties; ++attempt, found.safety *= kMoreSafety) {
+    links.set_motions(Eigen::VectorXd::Zero(links.motions().size()));
     found.tangent = std::make_unique<QuadraticTangent>(system.stiffness(found.safety));
     const QuadraticOperator& stiffness = found.tangent->stiffness;
     const QuadraticMultigrid& multigrid =
@@ -83,25 +115,50 @@ QuadraticSolution solve(const QuadraticSystem& system, double tolerance, double 
 
 bool correct(const QuadraticSystem& system, double tolerance, QuadraticSolution& solution,
              const std::function<void(int, double)>& progress) {
+  if (!correct_held(system, tolerance, solution, progress)) return false;
+  LinkBalance links(system);
+  if (!links.any()) return true;
+  constexpr double kResponse = 1e-8;
+  const QuadraticOperator& stiffness = solution.tangent->stiffness;
+  LinkedNodes nodes{
+      solution.displacement,
+      solution.unbalanced,
+      solution.turn,
+      stiffness,
+      [&] { return correct_held(system, tolerance, solution, progress); },
+      [&] {
+        solution.unbalanced = unbalanced_of(system, solution);
+        return true;
+      },
+      [] {},
+      [&](const std::vector<Vec3>& right, std::vector<Vec3>& x) {
+        const LinearResult result = conjugate_gradients(
+            stiffness, right, x, *solution.tangent->multigrid, kResponse, kMostLinearIterations,
+            [&](int iteration, double residual) { progress(solution.iterations + iteration, residual); });
+        solution.iterations += result.iterations;
+        return !result.indefinite;
+      }};
+  return links.find(nodes, 1, solution.safety, tolerance);
+}
+
+namespace {
+
+bool correct_held(const QuadraticSystem& system, double tolerance, QuadraticSolution& solution,
+                  const std::function<void(int, double)>& progress) {
   const QuadraticOperator& stiffness = solution.tangent->stiffness;
   const std::size_t n = system.nodes().size();
-  const std::vector<Vec3> wanted = system.right_side(solution.safety);
-  const auto find_unbalanced = [&](const std::vector<Vec3>& displacement) {
-    std::vector<Vec3> left(n);
-    stiffness.forces(displacement[0].data(), left[0].data());
-    parallel_for_each(n, [&](std::size_t i) { left[i] = wanted[i] - left[i]; });
-    return left;
-  };
-  std::vector<Vec3> start = find_unbalanced(system.prescribed()),
-                    left = find_unbalanced(solution.displacement);
-  stiffness.clear_held(start);
+  // what links lead to has changed with them
+  const std::vector<Vec3> led = system.prescribed();
+  for (std::size_t i = 0; i < n; ++i)
+    for (int axis = 0; axis < 3; ++axis)
+      if (stiffness.held()[i] >> axis & 1) solution.displacement[i][axis] = led[i][axis];
+  std::vector<Vec3> left = unbalanced_of(system, solution);
   stiffness.clear_held(left);
   // a body that is held all around has nothing to do, and no scale in what is left of it
-  const double scale = std::max(std::sqrt(dot(start, start)), system.free_force()),
-               now = std::sqrt(dot(left, left));
+  const double scale = scale_of(system, solution), now = std::sqrt(dot(left, left));
   const double asked = std::max(tolerance, kLeastLinearTolerance);
   if (now <= asked * scale && scale > 0) {
-    solution.unbalanced = find_unbalanced(solution.displacement);
+    solution.unbalanced = unbalanced_of(system, solution);
     return true;
   }
   const double ahead = scale > 0 ? now / scale : 1;
@@ -123,9 +180,11 @@ bool correct(const QuadraticSystem& system, double tolerance, QuadraticSolution&
       !(result.converged || solution.relative_residual < kLinearGoodEnough))
     return false;
   parallel_for_each(n, [&](std::size_t i) { solution.displacement[i] += change[i]; });
-  solution.unbalanced = find_unbalanced(solution.displacement);
+  solution.unbalanced = unbalanced_of(system, solution);
   return true;
 }
+
+}  // namespace
 
 Mat3 gradient_at(const QuadraticSystem& system, const std::vector<Vec3>& displacement, std::size_t cell,
                  const Vec3& at) {
@@ -155,19 +214,6 @@ Mat3 elastic_gradient(const QuadraticSystem& system, const QuadraticSolution& so
 
 Vec3 spin_of(const Mat3& h) {
   return 0.5 * Vec3(h(2, 1) - h(1, 2), h(0, 2) - h(2, 0), h(1, 0) - h(0, 1));
-}
-
-std::array<Vec3, kQuadraticNodes> local_displacement(const QuadraticNodes& nodes, std::size_t cell,
-                                                     const std::vector<Vec3>& displacement,
-                                                     const Mat3& turn) {
-  const auto& of_cell = nodes.of_cell[cell];
-  std::array<Vec3, kQuadraticNodes> local;
-  for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
-    const Vec3 rest = nodes.rest[of_cell[n]] - nodes.rest[of_cell[0]];
-    const Vec3 moved = displacement[of_cell[n]] - displacement[of_cell[0]];
-    local[n] = moved + turn.transpose() * (rest + moved);
-  }
-  return local;
 }
 
 std::vector<Vec3> element_displacement(const QuadraticSystem& system, const QuadraticSolution& solution) {
@@ -283,9 +329,15 @@ void report(const QuadraticSystem& system, const QuadraticSolution& solution, Si
       reaction.middle += place(n);
       add_at(held, place(n), reaction.force, reaction.moment);
     }
-    if (const std::size_t held = support.points.size() + support.nodes.size(); held > 0)
-      reaction.middle /= static_cast<double>(held);
-    result.reactions.push_back(reaction);
+    if (!support.tie->link) {
+      if (const std::size_t held = support.points.size() + support.nodes.size(); held > 0)
+        reaction.middle /= static_cast<double>(held);
+      result.reactions.push_back(reaction);
+      continue;
+    }
+    const RigidLink& link = *support.tie->motion.link;
+    const Vec3 moved = link.displacement(link.at), at = large ? Vec3(link.at + moved) : link.at;
+    result.loads.push_back({link.name, link.force, link.torque + at.cross(link.force), moved, link.turn});
   }
   for (const NodalLoad& load : system.loads()) {
     AppliedLoad total{load.name, Vec3::Zero(), Vec3::Zero()};

@@ -55,12 +55,6 @@ constexpr double kMoreSafety = 4;
                                     std::size_t cell, const Vec3& at);
 // The rotation vector of a small displacement gradient.
 [[nodiscard]] Vec3 spin_of(const Mat3& gradient);
-// (27 x 3) m: the displacement of a cell's nodes beside its first one, once the cell's rotation R is taken out of it;
-// `turn` is R - 1.
-[[nodiscard]] std::array<Vec3, kQuadraticNodes> local_displacement(const QuadraticNodes& nodes,
-                                                                   std::size_t cell,
-                                                                   const std::vector<Vec3>& displacement,
-                                                                   const Mat3& turn);
 
 // (elements x 3) m, 0 where no cell resists.
 [[nodiscard]] std::vector<Vec3> element_displacement(const QuadraticSystem& system,

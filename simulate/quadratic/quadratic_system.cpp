@@ -12,6 +12,7 @@
 #include "base/parallel.h"
 #include "formats/lattice/cell_moments.h"
 #include "simulate/effects/gravity.h"
+#include "simulate/effects/rigid.h"
 #include "simulate/matter/interpolation_weights.h"
 #include "simulate/matter/load_distribution.h"
 #include "simulate/matter/surface_samples.h"
@@ -50,7 +51,7 @@ QuadraticSystem::QuadraticSystem(const Problem& problem, const Scene& scene)
   }
   pressure_.assign(body.surface.polygon_count(), 0);
   free_ = FreeStrain(body, scene.get<Thermal>(), problem.materials);
-  place_supports(scene.get<Supports>().ties);
+  place_supports();
   place_bonds(scene.get<Bonds>());
   if (heated()) integrate_free_strain();
   place_loads(scene.get<Loads>().loads);
@@ -68,32 +69,141 @@ void QuadraticSystem::require_moments() const {
                       body.parts[part_[i]].name));
 }
 
-void QuadraticSystem::place_supports(const std::vector<Tie>& ties) {
-  for (const Tie& tie : ties) {
-    const Selected selected = resolve(tie.where, problem_.body);
-    NitscheSupport support{&tie, {}, {}};
-    for (const std::uint32_t p : selected.polygons) pressure_[p] = kUnknownPressure;
-    if (!selected.polygons.empty()) {
-      support.points = in_firm_cells(problem_.body, nodes_, face_points(problem_, nodes_, selected.polygons));
-      if (support.points.empty())
-        throw InputError(tie.origin, fmt::format("\"{}\": no matter lies under the selected surface; use a "
-                                                 "smaller spacing",
-                                                 tie.name));
+void QuadraticSystem::place_supports() {
+  ties_ = scene_.get<Supports>().ties;
+  const std::size_t given = ties_.size();
+  rigidity_ = RigidParts::rigidity(scene_.get<RigidParts>(), problem_.body);
+  for (std::size_t p = 0; p < rigidity_.size(); ++p)
+    if (rigidity_[p] != Rigidity::none) {
+      Tie& tie = ties_.emplace_back();
+      tie.name = problem_.body.parts[p].name;
+      tie.origin = scene_.name;
+      tie.link = LinkLoad{};
     }
-    std::vector<std::uint8_t> chosen(problem_.body.element_count(), 0);
-    for (const std::uint32_t e : selected.elements) chosen[e] = 1;
-    // a node between elements is held where all of them are
-    std::vector<std::uint8_t> free(nodes_.size(), 0);
-    for (std::size_t c = 0; !selected.elements.empty() && c < nodes_.cells.size(); ++c)
-      for (std::size_t n = 0; n < kQuadraticNodes; ++n)
-        for (std::size_t a = 0; a < 8; ++a)
-          if (trilinear_weight(n, a) > 0 && !chosen[problem_.body.cell_elements[nodes_.cells[c]][a]])
-            free[nodes_.of_cell[c][n]] = 1;
-    for (std::uint32_t n = 0; !selected.elements.empty() && n < nodes_.size(); ++n)
-      if (!free[n]) support.nodes.push_back(n);
-    supports_.push_back(std::move(support));
+  for (std::size_t t = 0; t < given; ++t) place_support(ties_[t], resolve(ties_[t].where, problem_.body));
+  refuse_on_rigid_parts();
+  for (std::size_t p = 0, t = given; p < rigidity_.size(); ++p) {
+    if (rigidity_[p] == Rigidity::none) continue;
+    Selected whole;
+    for (std::uint32_t e = problem_.body.parts[p].element_begin; e < problem_.body.parts[p].element_end; ++e)
+      whole.elements.push_back(e);
+    place_support(ties_[t++], whole);
   }
+  make_links();
   integrate_supports();
+}
+
+void QuadraticSystem::place_support(const Tie& tie, const Selected& selected) {
+  NitscheSupport support{&tie, {}, {}};
+  for (const std::uint32_t p : selected.polygons) pressure_[p] = kUnknownPressure;
+  if (!selected.polygons.empty()) {
+    support.points = in_firm_cells(problem_.body, nodes_, face_points(problem_, nodes_, selected.polygons));
+    if (support.points.empty())
+      throw InputError(tie.origin, fmt::format("\"{}\": no matter lies under the selected surface; use a "
+                                               "smaller spacing",
+                                               tie.name));
+  }
+  std::vector<std::uint8_t> chosen(problem_.body.element_count(), 0);
+  for (const std::uint32_t e : selected.elements) chosen[e] = 1;
+  // a node between elements is held where all of them are
+  std::vector<std::uint8_t> free(nodes_.size(), 0);
+  for (std::size_t c = 0; !selected.elements.empty() && c < nodes_.cells.size(); ++c)
+    for (std::size_t n = 0; n < kQuadraticNodes; ++n)
+      for (std::size_t a = 0; a < 8; ++a)
+        if (trilinear_weight(n, a) > 0 && !chosen[problem_.body.cell_elements[nodes_.cells[c]][a]])
+          free[nodes_.of_cell[c][n]] = 1;
+  for (std::uint32_t n = 0; !selected.elements.empty() && n < nodes_.size(); ++n)
+    if (!free[n]) support.nodes.push_back(n);
+  supports_.push_back(std::move(support));
+}
+
+// Faces of a rigid part may be held: by the springs of the penalty.
+void QuadraticSystem::refuse_on_rigid_parts() const {
+  const auto is_rigid = [&](std::size_t cell) {
+    return !rigidity_.empty() && rigidity_[part_[cell]] != Rigidity::none;
+  };
+  for (const NitscheSupport& support : supports_) {
+    bool elements = false, linked = false;
+    std::vector<std::uint8_t> held(nodes_.size(), 0);
+    for (const std::uint32_t n : support.nodes) held[n] = 1;
+    for (std::size_t c = 0; c < nodes_.cells.size(); ++c)
+      for (const std::uint32_t n : nodes_.of_cell[c]) elements |= is_rigid(c) && held[n] != 0;
+    for (const FacePoint& point : support.points) linked |= support.tie->link && is_rigid(point.cell);
+    if (elements || linked)
+      throw InputError(support.tie->origin,
+                       fmt::format("\"{}\" {}: model \"quadratic\" holds a rigid part by its faces only",
+                                   support.tie->name,
+                                   linked ? "is a rigid link on a rigid part, which needs none"
+                                          : "selects elements of a rigid part"));
+  }
+}
+
+// A link leaves nodes to others that hold them.
+void QuadraticSystem::make_links() {
+  std::vector<std::uint8_t> taken(nodes_.size(), 0);
+  for (const NitscheSupport& support : supports_)
+    for (const std::uint32_t n : support.nodes)
+      if (!support.tie->link) taken[n] = 1;
+  std::size_t t = 0;
+  for (NitscheSupport& support : supports_) {
+    Tie& tie = ties_[t++];
+    if (!tie.link) continue;
+    std::erase_if(support.nodes, [&](std::uint32_t n) { return taken[n] != 0; });
+    for (const std::uint32_t n : support.nodes) taken[n] = 1;
+    tie.motion.link = make_link(support);
+    tie.is_move = true;
+  }
+  for (const NitscheSupport& support : supports_)
+    if (support.tie->link) linked_.push_back(&support);
+}
+
+std::shared_ptr<RigidLink> QuadraticSystem::make_link(const NitscheSupport& support) const {
+  const Tie& tie = *support.tie;
+  std::vector<LoadedPoint> points;
+  for (const FacePoint& point : support.points) points.push_back({point.position, point.area_vector.norm()});
+  std::vector<double> matter(support.nodes.empty() ? 0 : nodes_.size(), 0);  // m^3
+  for (std::size_t c = 0; c < nodes_.cells.size() && !matter.empty(); ++c) {
+    const auto volumes = shape_integrals(lattice(c).spacing.prod(), moments(c));
+    for (std::size_t n = 0; n < kQuadraticNodes; ++n) matter[nodes_.of_cell[c][n]] += volumes[n];
+  }
+  for (const std::uint32_t n : support.nodes)
+    points.push_back({nodes_.rest[n], std::cbrt(matter[n] * matter[n])});
+  const auto link = std::make_shared<RigidLink>();
+  double total = 0, squared = 0;
+  for (const LoadedPoint& point : points) {
+    total += point.weight;
+    link->middle += point.weight * point.position;
+  }
+  if (!(total > 0))
+    throw InputError(tie.origin, fmt::format("\"{}\": a rigid link has no matter of its own", tie.name));
+  link->middle /= total;
+  for (const LoadedPoint& point : points)
+    squared += point.weight * (point.position - link->middle).squaredNorm();
+  link->reach = std::sqrt(squared / total);
+  if (!(link->reach > 1e-9 * bounding_box(nodes_.rest).diagonal()))
+    throw InputError(tie.origin, fmt::format("\"{}\": a rigid link needs more than one point", tie.name));
+  link->at = tie.link->at.value_or(link->middle);
+  link->force = tie.link->force;
+  link->torque = tie.link->torque;
+  link->name = tie.name;
+  link->origin = tie.origin;
+  link->small = true;
+  return link;
+}
+
+double QuadraticSystem::load_norm() const {
+  std::vector<Vec3> sum(nodes_.size(), Vec3::Zero());
+  for (const NodalLoad& load : loads_)
+    for (std::size_t n = 0; n < sum.size(); ++n) sum[n] += load.forces[n];
+  double squared = 0;
+  for (const Vec3& each : sum) squared += each.squaredNorm();
+  for (const NitscheSupport* support : linked_) {
+    const RigidLink& link = *support->tie->motion.link;
+    const Vec3 moment = link.torque + (link.at - link.middle).cross(link.force);
+    const auto bearing = static_cast<double>(support->points.size() + support->nodes.size());
+    squared += std::pow(link.force.norm() + moment.norm() / link.reach, 2) / bearing;
+  }
+  return std::sqrt(squared);
 }
 
 void QuadraticSystem::integrate_supports() {
@@ -130,6 +240,10 @@ void QuadraticSystem::place_bonds(const Bonds::Parameters& parameters) {
       if (!asked) continue;
       CommonSurface common = common_surface(problem_, nodes_, {a, b}, gap);
       if (common.pairs.empty()) continue;
+      if (!rigidity_.empty() && rigidity_[a] != Rigidity::none && rigidity_[b] != Rigidity::none)
+        throw InputError(scene_.name, fmt::format("parts \"{}\" and \"{}\" touch and are both rigid: make "
+                                                  "them one part, or one of them not rigid",
+                                                  body.parts[a].name, body.parts[b].name));
       for (std::size_t n = 0; n < named.size(); ++n)
         if (named[n].parts == std::array{a, b}) touches[n] = 1;
       for (const std::uint32_t polygon : common.polygons) pressure_[polygon] = kUnknownPressure;
@@ -260,6 +374,13 @@ BondSides QuadraticSystem::bond(std::size_t pair, double safety) const {
   const double sum = limit[0] + limit[1];
   made.weight = {limit[1] / sum, limit[0] / sum};
   made.penalty = safety * kBondNitsche * limit[0] * made.weight[0];
+  // beside a rigid part the traction is that of the other
+  for (std::size_t side = 0; side < 2 && !rigidity_.empty(); ++side)
+    if (rigidity_[part_[bonds_[pair].cell[side]]] != Rigidity::none) {
+      made.weight[side] = 0;
+      made.weight[1 - side] = 1;
+      made.penalty = safety * kBondNitsche * limit[1 - side];
+    }
   return made;
 }
 

@@ -55,6 +55,10 @@ class QuadraticSystem {
   [[nodiscard]] const Problem& problem() const { return problem_; }
   [[nodiscard]] const QuadraticNodes& nodes() const { return nodes_; }
   [[nodiscard]] const std::vector<NitscheSupport>& supports() const { return supports_; }
+  // Those that a rigid link or a rigid part leads: the motions of their ties have a RigidLink, which is found with the displacement.
+  [[nodiscard]] const std::vector<const NitscheSupport*>& linked() const { return linked_; }
+  // N, the norm of all loads, on held nodes too, and of what links bear on their nodes with.
+  [[nodiscard]] double load_norm() const;
   [[nodiscard]] const std::vector<NodalLoad>& loads() const { return loads_; }
   [[nodiscard]] const Mat9& moduli(std::uint32_t part) const { return moduli_[part]; }
   [[nodiscard]] std::uint32_t part_of(std::size_t cell) const { return part_[cell]; }
@@ -108,7 +112,11 @@ class QuadraticSystem {
   // With a little stiffness where there is no matter.
   [[nodiscard]] CellProducts<double> regular_cells() const;
   void require_moments() const;
-  void place_supports(const std::vector<Tie>& ties);
+  void place_supports();
+  void place_support(const Tie& tie, const Selected& selected);
+  void refuse_on_rigid_parts() const;
+  void make_links();
+  [[nodiscard]] std::shared_ptr<RigidLink> make_link(const NitscheSupport& support) const;
   void integrate_supports();
   void place_bonds(const Bonds::Parameters& parameters);
   void find_bearing_limits();
@@ -127,7 +135,10 @@ class QuadraticSystem {
   std::vector<std::uint32_t> moments_at_;  // (cells) place in the body's moments; kWhole
   std::vector<Mat9> moduli_;               // (parts) Pa, world frame
   std::vector<double> stiffest_;           // (parts) Pa, lambda + 2 mu
+  std::vector<Tie> ties_;                  // the scene's, then those of rigid parts
+  std::vector<Rigidity> rigidity_;         // (parts); none: no part is rigid
   std::vector<NitscheSupport> supports_;
+  std::vector<const NitscheSupport*> linked_;
   std::vector<std::vector<SupportIntegrals>> cell_supports_;  // (cells)
   std::vector<BondedCells> bonds_;
   std::vector<std::vector<std::uint32_t>> cell_bonds_;  // (cells) 2 pair + side

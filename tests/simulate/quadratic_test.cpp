@@ -393,9 +393,6 @@ TEST(Quadratic, WhatItDoesNotHaveIsRefusedByName) {
   EXPECT_EQ(refusal(bar(), held), "accepted");
   EXPECT_THAT(refusal(bar(), held + "[run]\ntime = \"1 ms\"\n"), HasSubstr("it has no [run] time"));
   EXPECT_THAT(refusal(bar(), held + "[contact]\n"), HasSubstr("it has no contact"));
-  EXPECT_THAT(
-      refusal(bar(), held + "[[load]]\nwhere = \"x1\"\ntorque = [\"1e-5 N m\", 0, 0]\nlink = \"rigid\"\n"),
-      HasSubstr("it has no rigid links"));
   EXPECT_THAT(refusal(bar(), material(0.3) + pull({1, 0, 0})), HasSubstr("add a [[fix]]"));
   EXPECT_THAT(refusal(bar(), material(0.3) + "[[fix]]\nwhere = \"x0\"\naxes = \"x\"\n" + pull({1e-3, 0, 0})),
               HasSubstr("is free to"));

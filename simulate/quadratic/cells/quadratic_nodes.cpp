@@ -101,4 +101,17 @@ QuadraticNodes quadratic_nodes(const Body& body, const std::vector<std::uint8_t>
   return nodes;
 }
 
+std::array<Vec3, kQuadraticNodes> local_displacement(const QuadraticNodes& nodes, std::size_t cell,
+                                                     const std::vector<Vec3>& displacement,
+                                                     const Mat3& turn) {
+  const auto& of_cell = nodes.of_cell[cell];
+  std::array<Vec3, kQuadraticNodes> local;
+  for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
+    const Vec3 rest = nodes.rest[of_cell[n]] - nodes.rest[of_cell[0]];
+    const Vec3 moved = displacement[of_cell[n]] - displacement[of_cell[0]];
+    local[n] = moved + turn.transpose() * (rest + moved);
+  }
+  return local;
+}
+
 }  // namespace flexel::simulate

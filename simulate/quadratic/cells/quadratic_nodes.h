@@ -33,4 +33,11 @@ struct QuadraticNodes {
 // `active`: (cells of the body) 1 where a cell resists.
 [[nodiscard]] QuadraticNodes quadratic_nodes(const Body& body, const std::vector<std::uint8_t>& active);
 
+// (27 x 3) m: the displacement of a cell's nodes beside its first one, once the cell's rotation R is taken out of it;
+// `turn` is R - 1.
+[[nodiscard]] std::array<Vec3, kQuadraticNodes> local_displacement(const QuadraticNodes& nodes,
+                                                                   std::size_t cell,
+                                                                   const std::vector<Vec3>& displacement,
+                                                                   const Mat3& turn);
+
 }  // namespace flexel::simulate
