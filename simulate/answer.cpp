@@ -16,7 +16,7 @@ namespace flexel::simulate {
 namespace {
 
 constexpr double kGuess = 0.5;  // a bar over this share of the value: hardly more than its size is known
-constexpr const char* kAxes[] = {"x", "y", "z"};
+constexpr const char* kAxisNames[] = {"x", "y", "z"};
 constexpr std::size_t kNamed = 2;  // probes, supports: so many are named, the others counted
 
 const ErrorBar* find_bar(const SimulateResult& result, ErrorBar::Of of, std::size_t probe = 0) {
@@ -61,7 +61,7 @@ std::string directed(const Vec3& force) {
   const double size = force.norm();
   for (int axis = 0; axis < 3; ++axis)
     if (size > 0 && std::abs(force[axis]) > (1 - 1e-4) * size)
-      return fmt::format("{} along {}{}", human_force(size), force[axis] < 0 ? "-" : "+", kAxes[axis]);
+      return fmt::format("{} along {}{}", human_force(size), force[axis] < 0 ? "-" : "+", kAxisNames[axis]);
   const double largest = force.cwiseAbs().maxCoeff();
   const double unit = largest >= 999.5 ? 1e3 : largest > 0 && largest < 0.9995 ? 1e-3 : 1;
   const auto number = [&](double value) {
@@ -78,7 +78,8 @@ std::string turning(const Vec3& moment) {
   const double size = moment.norm();
   for (int axis = 0; axis < 3; ++axis)
     if (std::abs(moment[axis]) > (1 - 1e-4) * size)
-      return fmt::format("{} N m about {}{}", human_number(size), moment[axis] < 0 ? "-" : "+", kAxes[axis]);
+      return fmt::format("{} N m about {}{}", human_number(size), moment[axis] < 0 ? "-" : "+",
+                         kAxisNames[axis]);
   const auto number = [&](double value) {
     return std::abs(value) < 1e-3 * moment.cwiseAbs().maxCoeff() ? "0" : human_number(value);
   };
