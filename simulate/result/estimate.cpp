@@ -9,7 +9,8 @@ namespace flexel::simulate {
 namespace {
 
 constexpr double kSafety = 1.25, kWideSafety = 3;
-constexpr double kFieldSafety = 2;  // of stresses of a field: measured (bench/accuracy/stresses.py)
+// Of stresses of a field: measured (bench/accuracy/stresses.py).
+constexpr double kFieldSafety = 1.25, kDoubtSafety = 1.5;
 constexpr double kLeastOrder = 0.5, kModelOrder = 2, kSuspiciousOrder = 2.1;
 constexpr int kOrderIterations = 50;
 constexpr double kHardlyDiffer = 1e-3;  // stresses, relative
@@ -63,7 +64,7 @@ std::optional<Bar> field_stress_bar(const Sequence& s, std::size_t lattices, dou
   if (singular && std::max(e21, e32) > kHardlyDiffer * std::abs(s.value[0])) return std::nullopt;
   const double lattice = lattices < 3 ? kWideSafety * e21
                                       : std::max(kFieldSafety * e21, e32 / std::pow(s.ratio[0], kModelOrder));
-  return Bar{std::max(lattice, doubt), s.value[0], std::nullopt};
+  return Bar{std::max(lattice, kDoubtSafety * doubt), s.value[0], std::nullopt};
 }
 
 }  // namespace flexel::simulate
