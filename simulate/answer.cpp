@@ -117,13 +117,16 @@ std::string probes(const SimulateResult& result) {
   return text + more(result.probes.size());
 }
 
-// The worst bar of the displacements; where moves alone drive the run, and so give the largest displacement, that of the energy too.
+// The worst bar of the displacements; where moves give the largest displacement, that of the energy too.
 std::optional<double> worst_share(const SimulateResult& result) {
   const bool moved = std::any_of(result.reactions.begin(), result.reactions.end(),
                                  [](const Reaction& each) { return each.is_move; });
+  constexpr double kGiven = 1e-3;  // a bar that small is of a displacement that a move gives
+  const std::optional<double> largest = share_of(find_bar(result, ErrorBar::Of::largest_displacement));
+  const bool by_moves = moved && (result.loads.empty() || (largest && *largest < kGiven));
   std::optional<double> worst;
   for (const ErrorBar& each : result.error_bars.bars) {
-    if (each.of == ErrorBar::Of::elastic_energy && !(moved && result.loads.empty())) continue;
+    if (each.of == ErrorBar::Of::elastic_energy && !by_moves) continue;
     if (each.of == ErrorBar::Of::probe && std::abs(each.value) < 1e-3 * result.largest_displacement) continue;
     if (const std::optional<double> share = share_of(&each)) worst = std::max(worst.value_or(0), *share);
   }
@@ -244,9 +247,12 @@ std::string usual_next(const SimulateResult& result, const Body& body, const std
   if (result.timed || (worst && *worst <= 0.05) || body.parts.empty())
     return "--verbose says all that was found, --summary FILE as JSON";
   const double spacing = std::cbrt(body.parts.front().lattice.spacing.prod());
-  const double finer = worst ? 2 : refinement_for_walls(body);  // else there might be no bar again
+  const bool walls = !worst && !reason(result).empty();
+  const double finer = walls ? refinement_for_walls(body) : 2;  // else there might be no bar again
   return fmt::format("{} {}mm{}", size_option, size_digits(1e3 * spacing / finer),
-                     worst ? " makes this surer" : " shows how sure this is");
+                     worst            ? " makes this surer"
+                     : result.settled ? ": compare with it"
+                                      : " shows how sure this is");
 }
 
 }  // namespace

@@ -300,7 +300,7 @@ def table(results):
     """The cases that the bars' factors were chosen on, then the others."""
     seen = {name: rows for name, rows in results.items() if name in cases()}
     unseen = {name: rows for name, rows in results.items() if name not in cases()}
-    text = one_table(seen)
+    text = one_table(seen)  # the page's head, whatever was run
     if unseen:
         text += "\n## Other cases\n\nThe bars' factors were chosen before these were run. Radii and widths in mm.\n\n" + one_table(unseen).split("\n\n", 2)[2]
     return text
@@ -323,7 +323,7 @@ def one_table(results):
             barred, held = barred + bool(bar), held + bool(holds)
             text += (f"| {name} | {true / 1e6:.4g} | {size} | {cells:,} | {value / 1e6:.4g} | {100 * (value / true - 1):+.1f} | {said} | "
                      f"{'yes' if holds else 'no' if bar else ''} | {seconds:.1f} |\n")
-    return text + f"\n{held} of {barred} bars hold; their median is {statistics.median(widths):.1f} %.\n"
+    return text + (f"\n{held} of {barred} bars hold; their median is {statistics.median(widths):.1f} %.\n" if widths else "")
 
 
 def main():

@@ -5,12 +5,40 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <limits>
 
 #include "base/error.h"
 #include "simulate/input/part_names.h"
 #include "simulate/matter/masses.h"
 
 namespace flexel::simulate {
+namespace {
+
+// Of each part: what [parts] says; its own entry, else that of the smallest assembly that holds it.
+std::vector<Rigidity> rigidity_of_entries(const RigidParts::Parameters& parameters, const Body& body) {
+  const std::vector<std::string> names = part_names(body);
+  std::vector<Rigidity> result(names.size(), Rigidity::none);
+  // by how many parts the entry is for that has decided; 0: the part's own
+  std::vector<std::size_t> width(names.size(), std::numeric_limits<std::size_t>::max());
+  const auto decide = [&](const std::string& name, const std::vector<std::uint32_t>& parts, Rigidity says) {
+    for (const std::uint32_t p : parts) {
+      const std::size_t its = names[p] == name ? 0 : parts.size();
+      if (its >= width[p]) continue;
+      width[p] = its;
+      result[p] = says;
+    }
+  };
+  for (const std::string& name : parameters.parts) {
+    const std::vector<std::uint32_t> parts = parts_called(names, body.surface.parts, name);
+    if (parts.empty()) (void)require_parts(body, name, "[parts]");  // throws
+    decide(name, parts, Rigidity::free);
+  }
+  for (const std::string& name : parameters.soft)  // may be of a part that joins later
+    decide(name, parts_called(names, body.surface.parts, name), Rigidity::none);
+  return result;
+}
+
+}  // namespace
 
 void RigidParts::parse(TableReader& scene, Parameters& parameters) {
   if (const SceneValue* parts = scene.find("parts"))
@@ -19,7 +47,7 @@ void RigidParts::parse(TableReader& scene, Parameters& parameters) {
         if (key != "rigid") continue;
         if (entry.kind != SceneValue::Kind::boolean)
           scene.fail(entry.line, "\"rigid\" needs to be true or false");
-        if (entry.flag) parameters.parts.push_back(part);
+        (entry.flag ? parameters.parts : parameters.soft).push_back(part);
       }
   for (const SceneValue* table : scene.tables("manipulator")) {
     TableReader reader(*table, scene.file(), "[[manipulator]]");
@@ -39,9 +67,7 @@ void RigidParts::parse(TableReader& scene, Parameters& parameters) {
 
 std::vector<Rigidity> RigidParts::rigidity(const Parameters& parameters, const Body& body) {
   if (parameters.parts.empty() && parameters.manipulators.empty()) return {};
-  std::vector<Rigidity> result(body.parts.size(), Rigidity::none);
-  for (const std::string& name : parameters.parts)
-    for (const std::uint32_t p : require_parts(body, name, "[parts]")) result[p] = Rigidity::free;
+  std::vector<Rigidity> result = rigidity_of_entries(parameters, body);
   for (const Manipulator& each : parameters.manipulators) {
     Rigidity& part = result[require_part(body, each.part, each.origin)];
     if (part == Rigidity::led)
@@ -68,6 +94,7 @@ std::optional<RigidParts> RigidParts::make(const Parameters& parameters, const P
     moving.support.resize(moving.body.arms.size(), Vec3::Zero());
     made.moving_.push_back(std::move(moving));
   }
+  if (made.moving_.empty() && !problem.rigidity.empty()) return std::nullopt;  // each has `rigid = false`
   return made;
 }
 
@@ -204,8 +231,8 @@ void RigidParts::report(const State&, const std::vector<Vec3>&, SimulateResult& 
     const Vec3& centre = moving.body.centre;
     const Vec3 arm = pose.rotation * (moving.led->path.about.value_or(centre) - centre);
     const Vec3 about = centre + pose.translation + arm;
-    result.reactions.push_back(
-        {moving.led->name, moving.force, moving.torque + about.cross(moving.force), about, true});
+    result.reactions.push_back({moving.led->name, moving.force, moving.torque + about.cross(moving.force),
+                                centre + pose.translation, true});
   }
 }
 

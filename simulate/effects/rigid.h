@@ -21,11 +21,13 @@ class RigidParts : public Effect {
   struct Parameters {
     std::vector<std::string> parts;  // `rigid = true`
     std::vector<Manipulator> manipulators;
+    std::vector<std::string> soft;  // `rigid = false`
   };
   static constexpr const char* name = "rigid";
 
   static void parse(TableReader& scene, Parameters& parameters);
-  // Of each part: what the scene makes of it. Throws InputError: a name that the body does not have, two
+  // Of each part: what the scene makes of it; its own entry of [parts] goes before those of the assemblies that hold it,
+  // a smaller assembly before a larger one. Throws InputError: a name that the body does not have, two
   // paths of one part.
   [[nodiscard]] static std::vector<Rigidity> rigidity(const Parameters& parameters, const Body& body);
 

@@ -19,11 +19,11 @@ constexpr int kMostSteps = 12;
 constexpr double kLooser = 10;        // tolerance of the links over that of the nodes
 constexpr double kGoodEnough = 1e-6;  // of the forces, where rounding lets it be no less
 constexpr double kServes = 0.1;       // a step that leaves more than this of b: take S anew
-constexpr double kAstray = 4;         // ... and more than this: give up
+constexpr double kAstray = 4;         // ... and more than this: back, or give up where S was new
 constexpr double kDifference = 1e-5;  // of the reach
 constexpr double kMostTurn = 0.7;     // rad, of a step
 constexpr double kStale = 0.05;       // rad, that links turned since S was made
-constexpr double kFree = 1e-10;       // of lambda + 2 mu times the reach: nothing resists
+constexpr double kFree = 1e-13;       // of lambda + 2 mu times the reach: nothing resists
 
 Vec3 cross(const Vec3& a, const Vec3& b) {
   return a.cross(b);
@@ -265,10 +265,11 @@ double LinkBalance::turn_of(const Eigen::VectorXd& step) const {
 
 void LinkBalance::refuse_free() const {
   const SingularValues svd = singular_values(slope_);
-  double stiffest = 0;
+  double stiffest = 0;  // of what deforms: the material of rigid parts means nothing here
   for (const NitscheSupport* support : system_.linked())
     for (std::size_t c = 0; c < system_.nodes().cells.size(); ++c)
-      stiffest = std::max(stiffest, system_.stiffest(c) * support->tie->motion.link->reach);
+      if (!system_.is_rigid(c))
+        stiffest = std::max(stiffest, system_.stiffest(c) * support->tie->motion.link->reach);
   if (svd.values.minCoeff() > kFree * stiffest) return;
   Eigen::Index most = 0;
   svd.v.col(slope_.cols() - 1).cwiseAbs().maxCoeff(&most);
@@ -281,33 +282,55 @@ void LinkBalance::refuse_free() const {
 }
 
 bool LinkBalance::find(LinkedNodes& nodes, double share, double safety, double tolerance) {
-  if (!any()) return true;
+  if (!any() || balance(nodes, share, safety, tolerance)) return true;
+  slope_.resize(0, 0);  // the next attempt starts elsewhere
+  return false;
+}
+
+void LinkBalance::go(LinkedNodes& nodes, const Eigen::VectorXd& step) const {
+  set_motions(motions() + step);
+  for (Eigen::Index j = 0; j < step.size(); ++j) {
+    const std::vector<Vec3>& response = responses_[static_cast<std::size_t>(j)];
+    parallel_for_each(response.size(),
+                      [&](std::size_t n) { nodes.displacement[n] += step[j] * response[n]; });
+  }
+}
+
+bool LinkBalance::balance(LinkedNodes& nodes, double share, double safety, double tolerance) {
   Eigen::VectorXd left = lacking(nodes, share, safety);
   double scale = forces(nodes, share, safety);
   const double asked = kLooser * tolerance;
   bool serves = slope_.size() > 0 && turn_of(motions() - made_at_) < kStale;
+  bool made = false;  // S, in this call
   for (int k = 0; k < kMostSteps && left.norm() > asked * scale; ++k) {
     if (!serves) {
       if (!find_slope(nodes, share, safety)) return false;
       refuse_free();
+      made = true;
     }
     Eigen::VectorXd step = -solve_dense(slope_, left);
     if (const double turn = turn_of(step); !nodes.turns.empty() && turn > kMostTurn) step *= kMostTurn / turn;
-    set_motions(motions() + step);
-    for (Eigen::Index j = 0; j < step.size(); ++j) {
-      const std::vector<Vec3>& response = responses_[static_cast<std::size_t>(j)];
-      parallel_for_each(response.size(),
-                        [&](std::size_t n) { nodes.displacement[n] += step[j] * response[n]; });
+    const Eigen::VectorXd q = motions();
+    const std::vector<Vec3> u = nodes.displacement;
+    go(nodes, step);
+    const bool held = nodes.hold();
+    const Eigen::VectorXd now = held ? lacking(nodes, share, safety) : left;
+    const double scale_now = held ? forces(nodes, share, safety) : scale;
+    const bool good_enough = held && now.norm() <= kGoodEnough * scale_now;
+    if (!held || !(now.norm() < kAstray * left.norm())) {
+      if (made || good_enough) return good_enough;
+      // S of another load step led astray: back, and take it anew
+      set_motions(q);
+      nodes.displacement = u;
+      if (!nodes.evaluate()) return false;
+      serves = false;
+      continue;
     }
-    if (!nodes.hold()) return false;
-    const Eigen::VectorXd now = lacking(nodes, share, safety);
-    scale = forces(nodes, share, safety);
-    const bool good_enough = now.norm() <= kGoodEnough * scale;
-    if (!(now.norm() < kAstray * left.norm())) return good_enough;
     if (now.norm() > 0.5 * left.norm() && good_enough) return true;
     serves = now.norm() < kServes * left.norm();
     slope_ += (now - left - slope_ * step) * step.transpose() / step.squaredNorm();
     left = now;
+    scale = scale_now;
   }
   return left.norm() <= asked * scale;
 }

@@ -50,6 +50,10 @@ class LinkBalance {
                                 std::vector<Vec3>& left);
   [[nodiscard]] double turn_of(const Eigen::VectorXd& step) const;
   void refuse_free() const;
+  // Moves the links by `step` and the nodes as they answer to it.
+  void go(LinkedNodes& nodes, const Eigen::VectorXd& step) const;
+  // find() where there are links; false leaves an S that may serve nobody.
+  [[nodiscard]] bool balance(LinkedNodes& nodes, double share, double safety, double tolerance);
 
   const QuadraticSystem& system_;
   Eigen::MatrixXd slope_;                     // S [N/m]; none: not known

@@ -27,6 +27,7 @@ constexpr int kMostIterations = 20;                        // of a load step
 constexpr int kFewIterations = 6;                          // after which the next step is longer
 constexpr double kMostStale = 0.1;                         // rad
 constexpr int kMostLinear = 400, kMostLinearInAll = 5000;  // the second: where no load step succeeds
+constexpr int kMoreWithLinks = 7;  // times as many in all: the nodes follow each step of the links
 constexpr double kLeastTolerance = 1e-8, kGoodEnough = 1e-6;
 constexpr double kLoosest = 1e-2;  // residual of a linear solution
 
@@ -60,7 +61,8 @@ class LargeDeflection {
     Eigen::VectorXd links_before = 0 * linear_links, links_now = links_before;
     links_.take_small(false);
     if (settings.load_steps == 1) refuse_out_of_proportion(scene);
-    const int most = settings.newton_iterations.value_or(reach_ > extent_ ? 40 : 100);
+    const int more = links_.any() ? kMoreWithLinks : 1;
+    const int most = settings.newton_iterations.value_or(more * (reach_ > extent_ ? 40 : 100));
     double done = 0, last = 0;
     // the linear answer to a move that turns follows the chord of its end, which says nothing of the way there
     const bool turned = angle_ > kFirstTurn;
@@ -68,19 +70,16 @@ class LargeDeflection {
     double step = std::min(longest, kFirstTurn / std::max(largest_turn(linear), 1e-300));
     while (done < 1) {
       const double share = done + step > 1 - 1e-9 ? 1 : done + step;
-      std::vector<Vec3> guess(now.size());
       const double ahead = last > 0 ? (share - done) / last : 0;
-      parallel_for_each(guess.size(), [&](std::size_t n) {
-        guess[n] = done > 0 ? Vec3(now[n] + ahead * (now[n] - before[n]))
-                   : turned ? Vec3(Vec3::Zero())
-                            : Vec3(share * linear[n]);
-      });
+      std::vector<Vec3> guess =
+          done > 0 ? further(now, before, ahead) : further(linear, linear, 0, turned ? 0 : share);
       links_.set_motions(done > 0 ? Eigen::VectorXd(links_now + ahead * (links_now - links_before))
                                   : Eigen::VectorXd((turned ? 0 : share) * linear_links));
       const int iterations = reach_with_links(share, guess);
       if (iterations > kMostIterations) {
         step = (share - done) / 2;
-        if (step < kLeastStep * longest || solution_.iterations > kMostLinearInAll ||
+        if (step < kLeastStep * longest ||
+            solution_.iterations - link_iterations_ > more * kMostLinearInAll ||
             solution_.newton_iterations > most + 10 * solution_.load_steps) {
           if (weak_support_) return;
           fail(scene, done);
@@ -100,6 +99,15 @@ class LargeDeflection {
     solution_.displacement = now;
     if (!turned && reach_ > 0) solution_.amplification = largest(now) / reach_;
     solution_.turn = corotation_.turns();
+  }
+
+  // (nodes) `share` times `from`, and `ahead` times what it is from `before`.
+  static std::vector<Vec3> further(const std::vector<Vec3>& from, const std::vector<Vec3>& before,
+                                   double ahead, double share = 1) {
+    std::vector<Vec3> to(from.size());
+    parallel_for_each(to.size(),
+                      [&](std::size_t n) { to[n] = share * from[n] + ahead * (from[n] - before[n]); });
+    return to;
   }
 
   // Whether cells that turn answer noticeably otherwise: by one correction of the linear solution.
@@ -246,6 +254,7 @@ class LargeDeflection {
               const LinearResult result = conjugate_gradients(tangent_.stiffness, right, x,
                                                               *tangent_.multigrid, kResponse, kMostLinear);
               solution_.iterations += result.iterations;
+              link_iterations_ += result.iterations;
               return result.converged && !result.indefinite;
             }};
   }
@@ -256,8 +265,9 @@ class LargeDeflection {
     if (!links_.any() || iterations > kMostIterations) return iterations;
     LinkedNodes nodes = linked_nodes(u, share, [&] {
       const int more = reach(share, u);
+      if (more > kMostIterations) return false;
       iterations = std::max(iterations, more);
-      return more <= kMostIterations;
+      return true;
     });
     return links_.find(nodes, share, solution_.safety, tolerance_) ? iterations : kMostIterations + 1;
   }
@@ -314,6 +324,7 @@ class LargeDeflection {
   bool weak_support_ = false;
   std::vector<Vec3> made_at_;  // (nodes x 3) m, where the preconditioner was made; none: at rest
   LinkBalance links_;
+  int link_iterations_ = 0;  // of solution_.iterations: how the nodes answer to links
 };
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "base/error.h"
 #include "base/parallel.h"
@@ -298,6 +299,19 @@ double energy_outside(const QuadraticSystem& system, const QuadraticSolution& so
   return elastic_energy > 0 ? outside / elastic_energy : 0;
 }
 
+namespace {
+
+double smallest_jacobian(const QuadraticSystem& system, const QuadraticSolution& solution) {
+  double smallest = std::numeric_limits<double>::infinity();
+  for (std::size_t c = 0; c < system.nodes().cells.size(); ++c)
+    smallest = std::min(
+        smallest,
+        (Mat3::Identity() + gradient_at(system, solution.displacement, c, system.middle(c))).determinant());
+  return smallest;
+}
+
+}  // namespace
+
 void report(const QuadraticSystem& system, const QuadraticSolution& solution, SimulateResult& result) {
   const QuadraticNodes& nodes = system.nodes();
   const bool large = !solution.turn.empty();  // a linear solution has its moments about the places at rest
@@ -354,10 +368,7 @@ void report(const QuadraticSystem& system, const QuadraticSolution& solution, Si
           ? heated_energy(
                 system, solution, [&](std::size_t c) { return system.stiffness_moments(c); }, false)
           : energy_of(solution.tangent->stiffness.cells(), nodes, solution);
-  for (std::size_t c = 0; c < nodes.cells.size(); ++c)
-    result.smallest_jacobian = std::min(
-        result.smallest_jacobian,
-        (Mat3::Identity() + gradient_at(system, solution.displacement, c, system.middle(c))).determinant());
+  result.smallest_jacobian = std::min(result.smallest_jacobian, smallest_jacobian(system, solution));
 }
 
 double typical_strain(const QuadraticSystem& system, const QuadraticSolution& solution) {

@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "base/human.h"
 #include "base/math/area_vector.h"
+#include "base/math/dense.h"
 #include "base/parallel.h"
 #include "formats/lattice/cell_moments.h"
 #include "simulate/effects/gravity.h"
@@ -119,9 +120,6 @@ void QuadraticSystem::place_support(const Tie& tie, const Selected& selected) {
 
 // Faces of a rigid part may be held: by the springs of the penalty.
 void QuadraticSystem::refuse_on_rigid_parts() const {
-  const auto is_rigid = [&](std::size_t cell) {
-    return !rigidity_.empty() && rigidity_[part_[cell]] != Rigidity::none;
-  };
   for (const NitscheSupport& support : supports_) {
     bool elements = false, linked = false;
     std::vector<std::uint8_t> held(nodes_.size(), 0);
@@ -177,11 +175,22 @@ std::shared_ptr<RigidLink> QuadraticSystem::make_link(const NitscheSupport& supp
   if (!(total > 0))
     throw InputError(tie.origin, fmt::format("\"{}\": a rigid link has no matter of its own", tie.name));
   link->middle /= total;
-  for (const LoadedPoint& point : points)
-    squared += point.weight * (point.position - link->middle).squaredNorm();
+  Mat3 spread = Mat3::Zero();
+  for (const LoadedPoint& point : points) {
+    const Vec3 arm = point.position - link->middle;
+    squared += point.weight * arm.squaredNorm();
+    spread += point.weight * arm * arm.transpose();
+  }
   link->reach = std::sqrt(squared / total);
   if (!(link->reach > 1e-9 * bounding_box(nodes_.rest).diagonal()))
     throw InputError(tie.origin, fmt::format("\"{}\": a rigid link needs more than one point", tie.name));
+  constexpr double kOneLine = 1e-9;  // of the spread along it
+  if (!(eigenvalues_symmetric(spread)[1] > kOneLine * squared))
+    throw InputError(tie.origin,
+                     fmt::format("\"{}\": what a rigid link leads lies on one line at this size, and nothing "
+                                 "stops it from turning about that: select a wider region, or use a smaller "
+                                 "--size",
+                                 tie.name));
   link->at = tie.link->at.value_or(link->middle);
   link->force = tie.link->force;
   link->torque = tie.link->torque;

@@ -63,6 +63,10 @@ class QuadraticSystem {
   [[nodiscard]] const Mat9& moduli(std::uint32_t part) const { return moduli_[part]; }
   [[nodiscard]] std::uint32_t part_of(std::size_t cell) const { return part_[cell]; }
   [[nodiscard]] double stiffest(std::size_t cell) const { return stiffest_[part_[cell]]; }  // Pa
+  // Whether a cell is of a rigid part.
+  [[nodiscard]] bool is_rigid(std::size_t cell) const {
+    return !rigidity_.empty() && rigidity_[part_[cell]] != Rigidity::none;
+  }
   // Whether that cell of nodes().cells is full of matter.
   [[nodiscard]] bool is_whole(std::size_t cell) const;
   // Of what the stiffness has of a cell: its matter, and a little where there is none.

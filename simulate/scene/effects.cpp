@@ -212,17 +212,17 @@ std::vector<SceneKey> contact_keys() {
 
 // The order is that of the sums.
 const std::vector<EffectRow>& effect_rows() {
-  constexpr const char* kAll = "cells, springs, paper";
+  constexpr const char *kAll = "cells, springs, paper", *kEvery = "cells, quadratic, springs, paper";
   constexpr const char* kConnections = "paper";
   constexpr ActsIn kEverywhere = ActsIn::all, kNotAtRest = ActsIn::time,
                    kWithContact = ActsIn::relaxation_and_time;
   static const std::vector<EffectRow> rows = {
-      row<Gravity>("weight and attraction", kEverywhere, kAll, {"gravity"}, gravity_keys()),
-      row<Loads>("forces, torques and pressures", kEverywhere, kAll, {"load"}, load_keys()),
-      row<Supports>("places that are held or led", kEverywhere, kAll, {"move"}, support_keys()),
+      row<Gravity>("weight and attraction", kEverywhere, kEvery, {"gravity"}, gravity_keys()),
+      row<Loads>("forces, torques and pressures", kEverywhere, kEvery, {"load"}, load_keys()),
+      row<Supports>("places that are held or led", kEverywhere, kEvery, {"move"}, support_keys()),
       row<Thermal>("heat and shrinkage", ActsIn::equilibrium, "cells, quadratic", {"thermal", "shrinkage"},
                    thermal_keys()),
-      row<Bonds>("parts that touch hold together", kEverywhere, kAll, {}, bond_keys()),
+      row<Bonds>("parts that touch hold together", kEverywhere, kEvery, {}, bond_keys()),
       row<Damping>("internal damping", kWithContact, kAll, {"damping"}, damping_keys()),
       row<ConnectionFriction>("sliding friction within a part", kNotAtRest, kConnections,
                               {"internal_friction"}, internal_friction_keys()),
@@ -231,7 +231,8 @@ const std::vector<EffectRow>& effect_rows() {
       row<Plasticity>("deformation that stays", kNotAtRest, kAll, {"plasticity"}, plasticity_keys()),
       row<Fracture>("matter that breaks", kNotAtRest, kAll, {"fracture"}, fracture_keys()),
       row<Drag>("a medium that resists what moves", kNotAtRest, kAll, {"drag"}, drag_keys()),
-      row<RigidParts>("rigid parts and manipulators", kWithContact, kAll, {}, rigid_keys()),
+      row<RigidParts>("rigid parts and manipulators", kWithContact,
+                      "cells, springs, paper; quadratic at equilibrium", {}, rigid_keys()),
       row<Contact>("parts push each other, slide and stick", kWithContact, kAll, {"contact"}, contact_keys()),
   };
   return rows;

@@ -46,19 +46,34 @@ void take_over(PartSettings& settings, const PartSettings& wider) {
   if (settings.origin.empty()) settings.origin = wider.origin;
 }
 
-// What [parts] says of a part: its own entry, and where that leaves something open the entries of the assemblies that
+// (parts) What [parts] says: a part's own entry, and where that leaves something open the entries of the assemblies that
 // hold it, the smallest first.
-PartSettings settings_of_part(const Scene& scene, const Body& body, std::size_t part) {
-  PartSettings settings;
-  std::multimap<std::size_t, const PartSettings*> wider;  // by how many parts they are for
+std::vector<PartSettings> settings_of_parts(const Scene& scene, const Body& body) {
+  struct Entry {
+    std::vector<std::uint32_t> parts;
+    const PartSettings* settings;
+  };
+  const std::vector<std::string> names = part_names(body);
+  std::multimap<std::size_t, Entry> entries;  // by how many parts they are for; 0: a part's own
   for (const auto& [name, entry] : scene.parts) {
-    if (name == body.parts[part].name) settings = entry;
-    const std::vector<std::uint32_t> parts = parts_called(body, name);
-    if (name != body.parts[part].name && std::binary_search(parts.begin(), parts.end(), part))
-      wider.emplace(parts.size(), &entry);
+    std::vector<std::uint32_t> parts = parts_called(names, body.surface.parts, name);
+    if (parts.empty()) continue;
+    const std::size_t width = names[parts.front()] == name ? 0 : parts.size();
+    entries.emplace(width, Entry{std::move(parts), &entry});
   }
-  for (const auto& [parts, entry] : wider) take_over(settings, *entry);
+  std::vector<PartSettings> settings(names.size());
+  for (const auto& [width, entry] : entries)
+    for (const std::uint32_t p : entry.parts) take_over(settings[p], *entry.settings);
   return settings;
+}
+
+// Throws InputError, one line: an entry of [parts] for a part that the body does not have and no event adds.
+void refuse_unknown_parts(const Scene& scene, const Body& body) {
+  const std::vector<std::string> names = part_names(body);
+  for (const auto& [name, settings] : scene.parts)
+    if (std::find(scene.coming_parts.begin(), scene.coming_parts.end(), name) == scene.coming_parts.end() &&
+        parts_called(names, body.surface.parts, name).empty())
+      (void)require_parts(body, name, settings.origin);
 }
 
 // What the part, the scene or the placement says.
@@ -150,9 +165,10 @@ void refuse_law(const Scene& scene, const PartSettings& settings, const Body& bo
 }  // namespace
 
 std::vector<Model> models_of_parts(const Scene& scene, const Body& body) {
+  const std::vector<PartSettings> settings = settings_of_parts(scene, body);
   std::vector<Model> models;
   for (std::size_t p = 0; p < body.parts.size(); ++p) {
-    const std::string model = model_of_part(scene, settings_of_part(scene, body, p), body.parts[p]);
+    const std::string model = model_of_part(scene, settings[p], body.parts[p]);
     models.push_back(model == "springs"     ? Model::springs
                      : model == "paper"     ? Model::paper
                      : model == "quadratic" ? Model::quadratic
@@ -163,8 +179,8 @@ std::vector<Model> models_of_parts(const Scene& scene, const Body& body) {
 
 std::vector<HookeConstant> hooke_of_parts(const Scene& scene, const Body& body) {
   std::vector<HookeConstant> constants;
-  for (std::size_t p = 0; p < body.parts.size(); ++p) {
-    const std::string hooke = settings_of_part(scene, body, p).hooke;
+  for (const PartSettings& settings : settings_of_parts(scene, body)) {
+    const std::string& hooke = settings.hooke;
     constants.push_back(hooke == "ganovelli"   ? HookeConstant::ganovelli
                         : hooke == "isotropic" ? HookeConstant::isotropic
                                                : HookeConstant::paper);
@@ -173,14 +189,13 @@ std::vector<HookeConstant> hooke_of_parts(const Scene& scene, const Body& body) 
 }
 
 std::vector<Material> materials_of_parts(const Scene& scene, const Body& body) {
-  for (const auto& [name, settings] : scene.parts)
-    if (std::find(scene.coming_parts.begin(), scene.coming_parts.end(), name) == scene.coming_parts.end())
-      (void)require_parts(body, name, settings.origin);
+  refuse_unknown_parts(scene, body);
+  std::vector<PartSettings> settings_of = settings_of_parts(scene, body);
   std::vector<Material> materials;
   bool infill_used = false;  // the scene's
   for (std::size_t index = 0; index < body.parts.size(); ++index) {
     const Part& part = body.parts[index];
-    PartSettings settings = settings_of_part(scene, body, index);
+    PartSettings& settings = settings_of[index];
     if (settings.origin.empty()) settings.origin = scene.name;
     refuse_model(scene, settings, part);
     const std::string& name = name_of_material(scene, settings, part);
@@ -211,9 +226,10 @@ std::vector<Material> materials_of_parts(const Scene& scene, const Body& body) {
 }
 
 void warn_of_unused_materials(const Scene& scene, const Body& body, Progress& progress) {
+  const std::vector<PartSettings> settings_of = settings_of_parts(scene, body);
   std::vector<std::string> used;
   for (std::size_t p = 0; p < body.parts.size(); ++p)
-    used.push_back(name_of_material(scene, settings_of_part(scene, body, p), body.parts[p]));
+    used.push_back(name_of_material(scene, settings_of[p], body.parts[p]));
   if (!scene.events.empty()) {  // a part that joins later
     used.push_back(scene.material);
     for (const auto& [name, settings] : scene.parts) used.push_back(settings.material);

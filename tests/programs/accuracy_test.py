@@ -187,7 +187,7 @@ def hollow_box():
 
 
 def test_cells_that_lose_walls_say_nothing_of_coarser_ones():
-    """1.3 cells through the walls beside .7: no bar; at the size that is advised there is one, and it holds."""
+    """1.3 cells through the walls beside .7: no bar; at the size that is advised there is one."""
     options = hollow_box()
     summary, said = deform([*options, "--size", "2.3 mm"])
     bars = summary["simulate"]["error_bars"]["bars"]

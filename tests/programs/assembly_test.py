@@ -2,6 +2,7 @@
 
 import json
 import pathlib
+import re
 
 from harness import PARTS, Skip, expect, expect_error, expect_ok, main, need, need_step, run, scene, write
 
@@ -90,6 +91,34 @@ displacement = ["0 mm", "8 mm", "0 mm"]
     command = ("flexel", "deform", part, "--count", "1500", "--material", "as1=steel", "--material", "nut-bolt-assembly=brass", "--fix", "plate/zmin", "--push", "rod/xmax: 0 10 0 N")
     expect_ok(run(*command, "-o", "bent.stl", "--quiet"))
     expect_error(run(*command, "--material", "nuts=brass", "-o", "bent.stl"), "flexel", 'no part "nuts"')
+
+
+def test_of_a_part_its_own_entry_goes_before_those_of_its_assemblies():
+    need_step()
+    part = PARTS / "as1-oc-214.stp"
+    if not part.exists():
+        raise Skip("no real parts here")
+    expect_ok(run("flexel-voxelize", part, "--count", "1500", "-o", "rest.vtu", "--quiet"))
+    top = 'material = "steel"\nbond = false\n[[fix]]\nwhere = "plate/zmin"\n[run]\ntime = "1 us"\n'
+
+    def rigid(*entries):
+        """How many parts are rigid, whichever way round the entries stand."""
+        counts = set()
+        for order in (entries, entries[::-1]):
+            scene(text=top + "".join(f'[parts."{name}"]\nrigid = {flag}\n' for name, flag in order))
+            said = expect_ok(run("flexel-simulate", "scene.toml", "rest.vtu", "-o", "moved.vtu", "--explain")).err
+            found = re.search(r"(\d+) rigid part\(s\)", said)
+            counts.add(int(found[1]) if found else 0)
+        expect(len(counts) == 1, f"the order of the entries counts: {entries}, {counts}")
+        return counts.pop()
+
+    pair = ("nut-bolt-assembly", "true")
+    expect(rigid(pair) == 4, "two bolts and two nuts")
+    expect(rigid(pair, ("bolt", "false")) == 3, "the bolt's own entry goes before its assembly's")
+    expect(rigid(("nut-bolt-assembly", "false"), ("bolt", "true")) == 1, "and so where it is the one that is rigid")
+    expect(rigid(("l-bracket-assembly", "false"), pair) == 4, "the smaller assembly goes before the larger")
+    expect(rigid(("l-bracket-assembly", "true"), ("nut-bolt-assembly", "false"), ("bolt", "true"), ("plate", "false")) == 6, "7, less the 2 of the smaller, and the bolt")
+    expect(rigid(pair, *((name, "false") for name in ("bolt", "nut-3", "bolt-4", "nut-6"))) == 0, "none is left")
 
 
 if __name__ == "__main__":
