@@ -26,6 +26,14 @@ int whole(std::string_view text) {
   return value;
 }
 
+// Names of layers have no case.
+std::string upper(std::string_view text) {
+  std::string made(text);
+  for (char& c : made)
+    if (c >= 'a' && c <= 'z') c = static_cast<char>(c - 'a' + 'A');
+  return made;
+}
+
 [[noreturn]] void refuse(const std::string& where, std::string_view what, const char* cure) {
   throw InputError(where, fmt::format("holds {}, which assimp does not read right: {}", what, cure));
 }
@@ -56,7 +64,7 @@ class DxfScanner {
       const std::string_view code = next_line(), value = next_line();
       ended = code == "0" && value == "EOF";
       if (ended) break;
-      if (code == "0") entity_ = value;
+      if (code == "0") entity_ = value, left_out_ = false;
       if (code == "9") variable_ = value;
       if (code == "0" && value == "ENDSEC") section_ = "";
       if (code == "2" && entity_ == "SECTION") section_ = value;
@@ -83,14 +91,14 @@ class DxfScanner {
   void look_at_layer(std::string_view code, std::string_view value) {
     if (code == "2") layer_ = value;
     if ((code == "70" && (whole(value) & 1) != 0) || (code == "62" && value.starts_with('-')))
-      hidden_.emplace(layer_);
+      hidden_.insert(upper(layer_));
   }
 
   // The entity becomes one that nobody knows.
   void leave_out(const char* why) {
-    char* const first = reinterpret_cast<char*>(document_.bytes.data()) + (entity_.data() - text_.data());
-    if (*first == '~') return;
-    *first = '~';
+    if (left_out_) return;
+    left_out_ = true;
+    document_.bytes[static_cast<std::size_t>(entity_.data() - text_.data())] = std::byte{'~'};
     ++document_.others[why];
   }
 
@@ -104,9 +112,9 @@ class DxfScanner {
     }
     if (entity_ == "3DFACE" || entity_ == "POLYLINE") {
       if (code == "67" && whole(value) != 0) leave_out("on a sheet (paper space)");
-      if (code == "8" && hidden_.contains(value)) leave_out("on a layer that is off or frozen");
+      if (code == "8" && hidden_.contains(upper(value))) leave_out("on a layer that is off or frozen");
     }
-    if (code == "70" && entity_ == "POLYLINE" && (whole(value) & kPolygonMesh) != 0)
+    if (code == "70" && entity_ == "POLYLINE" && !left_out_ && (whole(value) & kPolygonMesh) != 0)
       refuse(where_, "polygon meshes (POLYLINE with flag 16)",
              "explode them into faces before exporting, or export STL");
     if (entity_ == "VERTEX" && among(code, kCorners) && value.starts_with('-'))
@@ -126,7 +134,8 @@ class DxfScanner {
   const std::string& where_;
   std::size_t at_ = 0;
   std::string_view section_, entity_, variable_, layer_;
-  std::set<std::string_view> hidden_;  // layers
+  bool left_out_ = false;         // the entity
+  std::set<std::string> hidden_;  // layers, in upper case
   DxfDocument document_;
 };
 

@@ -71,16 +71,22 @@ double depth(const std::vector<Vec3>& at, const Corners& a, const Corners& b) {
   return std::max(least, 0.0);
 }
 
-using Solids = std::vector<std::vector<Kernel::Triangle_3>>;  // (parts)
+struct Solid {
+  std::vector<Kernel::Triangle_3> triangles;  // none degenerate
+  bool open = false;                          // has open edges, and so no sure inside
+};
+using Solids = std::vector<Solid>;  // (parts)
 using Tree = CGAL::AABB_tree<CGAL::AABB_traits<
     Kernel, CGAL::AABB_triangle_primitive<Kernel, std::vector<Kernel::Triangle_3>::const_iterator>>>;
 
 // m, of corners of one part inside another, from its surface, at most: where a ray meets that an odd number of times.
-double deepest_corner(const std::vector<Kernel::Triangle_3>& of, const std::vector<Kernel::Triangle_3>& in) {
+// None is inside an open surface.
+double deepest_corner(const Solid& of, const Solid& in) {
+  if (in.open) return 0;
   const Kernel::Vector_3 somewhere(0.80171, 0.33419, 0.49573);
-  const Tree tree(in.begin(), in.end());
+  const Tree tree(in.triangles.begin(), in.triangles.end());
   double deepest = 0;
-  for (const Kernel::Triangle_3& each : of)
+  for (const Kernel::Triangle_3& each : of.triangles)
     for (int n = 0; n < 3; ++n) {
       const Point corner = each.vertex(n);
       if (!CGAL::do_overlap(corner.bbox(), tree.bbox())) continue;
@@ -181,10 +187,6 @@ SurfaceMeetings new_meetings(const Body& body, const std::vector<Vec3>& displace
     boxes.emplace_back(triangle(moved, triangles.corners[t]).bbox(), t);
   }
   const auto part_of = [&](std::uint32_t t) { return surface.polygon_part(triangles.polygon[t]); };
-  Solids solids(body.parts.size());
-  for (std::uint32_t t = 0; t < triangles.corners.size(); ++t)
-    if (const Kernel::Triangle_3 each = triangle(moved, triangles.corners[t]); !each.is_degenerate())
-      solids[part_of(t)].push_back(each);
   std::map<std::array<std::uint32_t, 2>, std::vector<double>> meetings;
   SurfaceMeetings found;
   CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const TriangleBox& a, const TriangleBox& b) {
@@ -197,6 +199,16 @@ SurfaceMeetings new_meetings(const Body& body, const std::vector<Vec3>& displace
     else
       meetings[{std::min(one, other), std::max(one, other)}].push_back(depth(moved, first, second));
   });
+  if (meetings.empty()) return found;
+  Solids solids(body.parts.size());
+  std::vector<std::vector<Corners>> corners(body.parts.size());
+  for (std::uint32_t t = 0; t < triangles.corners.size(); ++t) {
+    corners[part_of(t)].push_back(triangles.corners[t]);
+    if (const Kernel::Triangle_3 each = triangle(moved, triangles.corners[t]); !each.is_degenerate())
+      solids[part_of(t)].triangles.push_back(each);
+  }
+  for (std::size_t p = 0; p < solids.size(); ++p)
+    solids[p].open = topology(corners[p], welded).open_edges > 0;
   add_depths(meetings, solids, body, found);
   return found;
 }

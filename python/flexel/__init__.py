@@ -19,7 +19,7 @@ import shutil
 from typing import Any, Callable, Dict, List, Optional, Sequence, Union
 
 from . import _flexel
-from ._objects import Body, Frame, Mapped, Part, Result, check_outputs
+from ._objects import Body, Frame, Mapped, Part, Result, check_outputs, write_whole
 from ._options import Quantity, is_scene_text, length, paths, refuse_limits, words
 from ._said import Progress, heard
 from .errors import (DivergedError, FlexelError, FlexelWarning, InputError, InvalidMappingError, StoppedByTimeout)
@@ -105,20 +105,20 @@ def simulate(body: Body, scene: Union[str, os.PathLike, None] = None, *, on_fram
     energies. failed: where the last good state goes when the run fails (.vtu). force: they may replace what was read.
     Raises InputError, DivergedError, KeyboardInterrupt.
     """
-    callback = None if on_frame is None else lambda core: on_frame(Frame(core))
+    inputs = list(body._files)
+    callback = None if on_frame is None else lambda core: on_frame(Frame(core, inputs))
     given = {"threads": threads, "estimate": estimate, "stress": stress, "history": os.fspath(history),
              "failed": os.fspath(failed), "isa": isa, "on_frame": callback}
     text, name = "", ""
     line = words(options)
-    inputs = list(body._files)
     if is_scene_text(scene):
         text, name = scene, "scene"
     elif scene is not None:
         line.append("--scene=" + os.fspath(scene))
-        inputs.append(os.fspath(scene))
+        inputs += _absolute([os.fspath(scene)])
     check_outputs([history, failed], inputs, force)
     core, said = heard(_flexel.simulate, body._core, line, text, name, given, progress=progress)
-    return Result(core, said, {}, body.label, body._files)
+    return Result(core, said, {}, body.label, inputs)
 
 
 def map(body: Body, *, output: Union[str, os.PathLike, None] = None, progress: Progress = None, **options) -> Mapped:
@@ -154,9 +154,11 @@ def deform(part: Union[Part, Paths], *, output: Union[Paths, None] = None, progr
         core_part, names = part._core, part._names()
     else:
         core_part, names = None, paths(part)
+    files = list(part._files) if isinstance(part, Part) else _absolute(names)
+    if options.get("scene"):
+        files += _absolute(paths(options["scene"]))
     core, said = heard(_flexel.deform, line + ["--"] + names, core_part, progress=progress)
     label = part.label if isinstance(part, Part) else ", ".join(os.path.basename(name) for name in names)
-    files = part._files if isinstance(part, Part) else _absolute(names)
     return Result(core, said, {name: options[name] for name in _OF_MAPPING if name in options}, label + ", deformed", files)
 
 
@@ -200,8 +202,7 @@ def picture(shown, path: Union[str, os.PathLike, None] = None, *, force: bool = 
             line.append(f"--{name.replace('_', '-')}={value}")
     png, _ = heard(_flexel.picture, _subjects(shown), line, progress=progress)
     if path is not None:
-        with open(path, "wb") as file:
-            file.write(png)
+        write_whole(png, path)
     return png
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import json
 import os
+import secrets
+import shutil
 from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
@@ -41,6 +43,27 @@ def check_outputs(outputs: Sequence, inputs: Sequence[str], force: bool) -> None
     _flexel.check_outputs([os.fspath(each) for each in outputs if each], list(inputs), force)
 
 
+def write_whole(data: bytes, path) -> None:
+    """Whole or not at all: what is there stays until all is written. Links are followed; devices and FIFOs are written to."""
+    target = os.path.realpath(os.fsdecode(path))
+    there = os.path.exists(target)
+    if there and not os.path.isfile(target):
+        with open(target, "wb") as file:
+            file.write(data)
+        return
+    temporary = os.path.join(os.path.dirname(target), ".flexel-" + secrets.token_hex(8))
+    try:
+        with open(temporary, "xb") as file:
+            file.write(data)
+        if there:
+            shutil.copymode(target, temporary)
+        os.replace(temporary, target)
+    except BaseException:
+        if os.path.exists(temporary):
+            os.unlink(temporary)
+        raise
+
+
 class Shown:
     """What has a page in the browser."""
 
@@ -53,8 +76,7 @@ class Shown:
     def write_page(self, path, *, force: bool = False) -> None:
         """Writes `page()`. Raises InputError where that is a file that was read, unless `force`."""
         check_outputs([path], self._files, force)
-        with open(path, "w", encoding="utf-8") as file:
-            file.write(self.page())
+        write_whole(self.page().encode(), path)
 
     def _repr_html_(self) -> str:
         return _inline(self.page(), self.label)
@@ -408,8 +430,8 @@ class Result(Shown):
 class Frame:
     """A state of a run in time, as a callback gets it."""
 
-    def __init__(self, core: "_flexel.Frame"):
-        self._core = core
+    def __init__(self, core: "_flexel.Frame", files: Sequence[str] = ()):
+        self._core, self._files = core, list(files)
 
     @property
     def time(self) -> float:
@@ -418,4 +440,4 @@ class Frame:
 
     def body(self) -> Body:
         """The body as it is now (a copy, to keep). Raises InputError once the callback is over."""
-        return Body(self._core.body(), label=f"{self.time:g} s")
+        return Body(self._core.body(), label=f"{self.time:g} s", files=self._files)

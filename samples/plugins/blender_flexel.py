@@ -10,9 +10,10 @@ Lengths are those of the scene (its unit scale), forces are in newtons along the
 import os
 import subprocess
 import tempfile
+from typing import NamedTuple
 
 import bpy
-from mathutils import Vector
+from mathutils import Matrix, Vector
 
 bl_info = {"name": "Flexel", "author": "The developers of Flexel", "version": (1, 0, 0), "blender": (3, 4, 0),
            "location": "View3D > Sidebar > Flexel", "description": "Deforms the selected object as its material would be",
@@ -59,13 +60,24 @@ def at_rest(mesh):
     return [point.co.copy() for point in (keys.reference_key.data if keys else mesh.vertices)]
 
 
-def write_part(thing, scene, held, pushed, path):
+class Begun(NamedTuple):
+    """The object as its part is written: it may be moved, and edited, while Flexel runs."""
+
+    world: Matrix
+    unit: float  # m
+    points: list  # at_rest()
+
+
+def begun_of(thing, scene):
+    return Begun(thing.matrix_world.copy(), metres(scene), at_rest(thing.data))
+
+
+def write_part(mesh, begun, held, pushed, path):
     """The mesh in world axes and metres as OBJ, its polygons grouped as held, pushed and free."""
-    mesh, world, unit = thing.data, thing.matrix_world, metres(scene)
-    mirrored = world.determinant() < 0
+    mirrored = begun.world.determinant() < 0
     with open(path, "w", encoding="ascii") as file:
-        for point in at_rest(mesh):
-            file.write("v " + " ".join(repr(unit * each) for each in world @ point) + "\n")
+        for point in begun.points:
+            file.write("v " + " ".join(repr(begun.unit * each) for each in begun.world @ point) + "\n")
         for name, chosen in (("held", held), ("pushed", pushed - held), ("free", None)):
             file.write(f"g {name}\n")
             for polygon in mesh.polygons:
@@ -74,14 +86,14 @@ def write_part(thing, scene, held, pushed, path):
                     file.write("f " + " ".join(str(each + 1) for each in corners) + "\n")
 
 
-def command_of(thing, scene, folder):
+def command_of(thing, scene, begun, folder):
     """Writes the part, and gives the command that bends it."""
     settings = scene.flexel
     held = group_of(thing, settings.held, "Held")
     pushed = group_of(thing, settings.pushed, "Pushed")
     if not pushed - held:
         raise FlexelError("Pushed: all of its faces are held")
-    write_part(thing, scene, held, pushed, os.path.join(folder, "part.obj"))
+    write_part(thing.data, begun, held, pushed, os.path.join(folder, "part.obj"))
     command = ["flexel", "deform", "part.obj", "--unit", "m", "--fix", "held", "--push",
                "pushed: {:.9g} {:.9g} {:.9g} N".format(*settings.force), "--material", settings.material, "--keep-vertices",
                "-o", "bent.obj"]
@@ -96,7 +108,7 @@ def start(command, folder):
             raise FlexelError("the program flexel is not on the PATH") from None
 
 
-def take_result(thing, scene, folder, code):
+def take_result(thing, begun, folder, code):
     """Adds the shape key; returns what the program said of the result."""
     with open(os.path.join(folder, "said"), encoding="utf-8", errors="replace") as file:
         said = file.read().strip().splitlines()
@@ -104,17 +116,17 @@ def take_result(thing, scene, folder, code):
         raise FlexelError(said[-1] if said else f"flexel ended with exit code {code}")
     with open(os.path.join(folder, "bent.obj"), encoding="ascii") as file:
         bent = [Vector(map(float, line.split()[1:4])) for line in file if line.startswith("v ")]
-    if len(bent) != len(thing.data.vertices):
-        raise FlexelError("the mesh has changed meanwhile")
+    if at_rest(thing.data) != begun.points or len(bent) != len(begun.points):
+        raise FlexelError("the mesh has changed meanwhile: press Deform again")
     if not thing.data.shape_keys:
         thing.shape_key_add(name="Basis", from_mix=False)
     old = thing.data.shape_keys.key_blocks.get(KEY)
     if old is not None:
         thing.shape_key_remove(old)
     key = thing.shape_key_add(name=KEY, from_mix=False)
-    back = thing.matrix_world.inverted()
+    back = begun.world.inverted()
     for point, place in zip(key.data, bent):
-        point.co = back @ (place / metres(scene))
+        point.co = back @ (place / begun.unit)
     key.value = 1
     return [line.removeprefix("flexel: ") for line in said]
 
@@ -132,12 +144,17 @@ class OBJECT_OT_flexel_deform(bpy.types.Operator):
 
     def begin(self, context):
         self.thing, self.folder = context.object, tempfile.TemporaryDirectory(prefix="flexel-")
+        self.take_edits()
+        self.begun = begun_of(self.thing, context.scene)
+        self.run = start(command_of(self.thing, context.scene, self.begun, self.folder.name), self.folder.name)
+
+    def take_edits(self):
         if self.thing.mode == "EDIT":
             self.thing.update_from_editmode()
-        self.run = start(command_of(self.thing, context.scene, self.folder.name), self.folder.name)
 
     def end(self, context):
-        for line in take_result(self.thing, context.scene, self.folder.name, self.run.wait()):
+        self.take_edits()
+        for line in take_result(self.thing, self.begun, self.folder.name, self.run.wait()):
             self.report({"INFO"}, line)
 
     def guarded(self, step, context):

@@ -1,7 +1,6 @@
 // Helpers of the import tests: scratch files, errors, the parts folder.
 #pragma once
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cstdint>
 #include <cstring>
@@ -13,28 +12,9 @@
 #include "base/error.h"
 #include "formats/exchange/import.h"
 #include "formats/part/topology.h"
+#include "tests/scratch.h"
 
 namespace flexel::test {
-
-// A folder of this test alone, removed with its files.
-class Scratch {
- public:
-  Scratch() {
-    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = std::filesystem::temp_directory_path() / (std::string("flexel-") + test->test_suite_name() +
-                                                        "-" + test->name() + "-" + std::to_string(getpid()));
-    std::filesystem::create_directories(folder_);
-  }
-  ~Scratch() { std::filesystem::remove_all(folder_); }
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
-  std::string write(const std::string& name, const std::string& content) const {
-    std::ofstream(path(name), std::ios::binary) << content;
-    return path(name);
-  }
-
- private:
-  std::filesystem::path folder_;
-};
 
 inline std::string read_file(const std::string& path) {
   std::ifstream in(path, std::ios::binary);

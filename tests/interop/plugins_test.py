@@ -67,10 +67,20 @@ try:
     bpy.ops.object.flexel_deform()
 except RuntimeError as error:
     print("REFUSED", str(error).strip())
+settings.material = "PLA"
+take_result = blender_flexel.take_result
+def take_edited(*given):
+    mesh.shape_keys.reference_key.data[0].co.x += 0.1
+    return take_result(*given)
+blender_flexel.take_result = take_edited
+try:
+    bpy.ops.object.flexel_deform()
+except RuntimeError as error:
+    print("REFUSED", str(error).strip())
 """
 
 
-# The panel's button: the run goes on beside Blender until it is done.
+# The panel's button: the run goes on beside Blender until it is done, and the object is moved meanwhile.
 BLENDER_WINDOW = BLENDER + """
 blender_flexel.register()
 def begin():
@@ -79,6 +89,9 @@ def begin():
     mesh, bar, settings = bar_in(window.scene)
     with bpy.context.temp_override(window=window, area=area, object=bar, active_object=bar):
         print("BEGUN", bpy.ops.object.flexel_deform("INVOKE_DEFAULT"), flush=True)
+    bar.location, bar.rotation_euler.x, bar.scale.z = (0, 0, 1), 0.5, 0.02
+    window.view_layer.update()
+    print("MOVED", bar.matrix_world.translation.z, flush=True)
     def end():
         if mesh.shape_keys is None:
             return 0.2
@@ -96,7 +109,7 @@ def test_blender_window():
     said = run("xvfb-run", "-a", "blender", "--factory-startup", "--python", os.path.abspath("drive.py"), timeout=110,
                env={**on_path(), "LIBGL_ALWAYS_SOFTWARE": "1", "HOME": os.getcwd()})
     text = said.out.decode()
-    expect("BEGUN {'RUNNING_MODAL'}" in text and "FOUND" in text, f"{said}\n{text}")
+    expect("BEGUN {'RUNNING_MODAL'}" in text and "MOVED 1.0" in text and "FOUND" in text, f"{said}\n{text}")
     expect_sag(float(re.search(r"FOUND (\S+)", text)[1]), "Blender")
 
 
@@ -112,8 +125,8 @@ def test_blender():
         expect_sag(sag, "Blender")
         expect(held < 0.01 * SAG and keys == 2, f"the held end moves {held} m; {keys} shape keys")
     refused = [line for line in text.splitlines() if line.startswith("REFUSED")]
-    expect(len(refused) == 3 and 'no vertex group "nothing"' in refused[0] and "all of its faces are held" in refused[1]
-           and "cheese" in refused[2], text)
+    expect(len(refused) == 4 and 'no vertex group "nothing"' in refused[0] and "all of its faces are held" in refused[1]
+           and "cheese" in refused[2] and "the mesh has changed meanwhile" in refused[3], text)
 
 
 FREECAD = """

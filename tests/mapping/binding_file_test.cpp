@@ -12,20 +12,13 @@
 #include "bodies.h"
 #include "mapping/methods/map_surface.h"
 #include "motions.h"
+#include "tests/scratch.h"
 
 namespace flexel::mapping {
 namespace {
 
 class BindingFile : public testing::Test {
  protected:
-  void SetUp() override {
-    path_ = (std::filesystem::temp_directory_path() /
-             ("flexel-" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()) +
-              ".binding"))
-                .string();
-  }
-  void TearDown() override { std::filesystem::remove(path_); }
-
   void write(std::span<const std::byte> bytes) const {
     OutputFile file(path_);
     file.write(bytes.data(), bytes.size());
@@ -41,7 +34,8 @@ class BindingFile : public testing::Test {
     }
   }
 
-  std::string path_;
+  flexel::test::Scratch scratch_;
+  std::string path_ = scratch_.path("rest.binding");
 };
 
 TEST_F(BindingFile, GivesTheSameBits) {

@@ -1,6 +1,7 @@
 // What the report says of triangles, volume, the surface passing through itself, and Voronoi neighbours.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -147,6 +148,43 @@ TEST(Intersection, PartsThatTouchAreToldFromThoseThatPass) {
     EXPECT_FALSE(through.valid());
     EXPECT_NEAR(through.new_meetings->deepest, 0.03, 1e-6);
   }
+}
+
+// Into the hole of an open part goes what does not touch its walls: there only triangles tell how deep.
+TEST(Intersection, AnOpenSurfaceHasNoInside) {
+  const Vec3 apart(0.35, 0.01, 0.02);
+  Body body = test::block(3, 3, 3, 0.1, Placement::corner, 15);
+  Body cup = test::block(3, 3, 3, 0.1, Placement::corner, 15);
+  for (Vec3& x : cup.rest) x += apart;
+  for (Vec3& x : cup.surface.vertices) x += apart;
+  cup.parts[0].lattice.origin += apart;
+  cup.position = cup.rest;
+  const double rim = bounding_box(cup.surface.vertices).min.x();
+  Surface& surface = cup.surface;
+  const Surface whole = surface;
+  surface.polygon_offsets = {0};
+  surface.polygon_vertices.clear();
+  surface.polygon_face.clear();
+  for (std::size_t p = 0; p < whole.polygon_count(); ++p) {
+    const auto corners = whole.polygon(p);
+    if (std::all_of(corners.begin(), corners.end(),
+                    [&](std::uint32_t v) { return whole.vertices[v].x() == rim; }))
+      continue;
+    surface.polygon_vertices.insert(surface.polygon_vertices.end(), corners.begin(), corners.end());
+    surface.polygon_offsets.push_back(static_cast<std::uint32_t>(surface.polygon_vertices.size()));
+    surface.polygon_face.push_back(whole.polygon_face[p]);
+  }
+  ASSERT_LT(surface.polygon_count(), whole.polygon_count());
+  const double gap = rim - bounding_box(body.surface.vertices).max.x();
+  test::append_body(body, cup);
+  MapOptions options;
+  options.check_intersection = true;
+  for (std::uint32_t e = body.parts[1].element_begin; e < body.parts[1].element_end; ++e)
+    body.position[e] -= Vec3(gap + 0.005, 0, 0);
+  const MapReport found = mapped(body, options);
+  EXPECT_GT(found.new_meetings->between, 0u);
+  EXPECT_EQ(found.new_meetings->through, 0u);
+  EXPECT_NEAR(found.new_meetings->deepest, 0.005, 1e-6);
 }
 
 TEST(VoronoiCheck, TiesOfTheLatticeDoNotCountAndShearDoes) {

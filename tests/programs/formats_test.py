@@ -305,25 +305,31 @@ def test_size_warning_names_the_likely_unit():
     expect("likely" not in expect_ok(run("flexel-voxelize", box(), "--count", "500", "-o", "rest.vtu")).err, "40 mm is no suspicious size")
 
 
-def dxf(hidden):
-    """A box of 4 cm on layer "part", and one a metre long on layer "help", whose entry in the table of layers ends with `hidden`."""
+def dxf(hidden, help="help", more=""):
+    """A box of 4 cm on layer "part", and one a metre long on layer `help`; the entry of "help" in the table of layers ends with `hidden`."""
     text = f"0\nSECTION\n2\nHEADER\n9\n$INSUNITS\n70\n4\n0\nENDSEC\n0\nSECTION\n2\nTABLES\n0\nTABLE\n2\nLAYER\n0\nLAYER\n2\nhelp\n{hidden}0\nENDTAB\n0\nENDSEC\n0\nSECTION\n2\nENTITIES\n"
-    for layer, size in (("part", (40.0, 10.0, 10.0)), ("help", (1000.0, 10.0, 10.0))):
+    for layer, size in (("part", (40.0, 10.0, 10.0)), (help, (1000.0, 10.0, 10.0))):
         vertices, triangles = indexed_box(size)
         for a, b, c in triangles:
             text += f"0\n3DFACE\n8\n{layer}\n"
             for corner, vertex in enumerate((a, b, c, c)):
                 text += "".join(f"{10 * (i + 1) + corner}\n{vertices[vertex][i]}\n" for i in range(3))
-    return text + "0\nENDSEC\n0\nEOF\n"
+    return text + more + "0\nENDSEC\n0\nEOF\n"
 
 
 def test_layers_of_dxf_that_are_off_stay_out():
-    for hidden, out in (("70\n0\n62\n7\n", False), ("70\n0\n62\n-7\n", True), ("70\n1\n62\n7\n", True)):
-        write("drawing.dxf", dxf(hidden))
+    seen, off, frozen = "70\n0\n62\n7\n", "70\n0\n62\n-7\n", "70\n1\n62\n7\n"
+    corners = "".join(f"0\nVERTEX\n8\nhelp\n10\n{x}\n20\n{y}\n30\n0\n70\n64\n" for x in (0, 1) for y in (0, 1))
+    mesh = f"0\nPOLYLINE\n8\nhelp\n66\n1\n70\n16\n71\n2\n72\n2\n{corners}0\nSEQEND\n8\nhelp\n"
+    for hidden, help, more, out in ((seen, "help", "", False), (off, "help", "", True), (frozen, "help", "", True),
+                                    (seen, "HELP", "", False), (frozen, "HELP", "", True), (frozen, "help", mesh, True)):
+        write("drawing.dxf", dxf(hidden, help, more))
         said = run("flexel", "info", "drawing.dxf")
         expect_ok(said)
         expect(("1,000" in said.out.decode() or "1000" in said.out.decode()) != out, f"{hidden!r}: {said.out.decode()}")
         expect(("layer that is off or frozen" in said.err) == out, said.err)
+    write("drawing.dxf", dxf(seen, more=mesh))
+    expect("polygon meshes" in run("flexel", "info", "drawing.dxf").err, "one that is seen is refused")
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ import re
 import resource
 import time
 import warnings
+from unittest import mock
 
 from shared import PULL, SWING, box, box_body, check, expect_error, main, module, run
 
@@ -176,6 +177,10 @@ def test_results_do_not_replace_what_was_read():
     result = flexel.simulate(read, "scene.toml", estimate=False)
     bent = flexel.simulate(body, "scene.toml", estimate=False)
     deformed = flexel.deform(part, size="5 mm", **PULL)
+    staged = flexel.deform("own.ply", scene="scene.toml", unit="m", size="5 mm", no_estimate=True)
+    pathlib.Path("swing.toml").write_text(SWING.replace("TIME", "0.1 ms"))
+    frames = []
+    flexel.simulate(read, pathlib.Path("swing.toml"), on_frame=lambda frame: frames.append(frame.body()))
     os.symlink("own.ply", "link.ply")
     pathlib.Path("aside").mkdir()
     pathlib.Path("aside/own.ply").write_bytes(pathlib.Path("own.ply").read_bytes())
@@ -195,7 +200,18 @@ def test_results_do_not_replace_what_was_read():
                           ("body.vtu", lambda path, **more: read.write(path, **more)),
                           ("body.vtu", lambda path, **more: result.write_page(path, **more)),
                           ("body.vtu", lambda path, **more: flexel.simulate(read, scene, history=path, **more)),
-                          ("scene.toml", lambda path, **more: flexel.simulate(body, "scene.toml", history=path, **more))):
+                          ("scene.toml", lambda path, **more: flexel.simulate(body, "scene.toml", history=path, **more)),
+                          ("scene.toml", lambda path, **more: result.write_page(path, **more)),
+                          ("scene.toml", lambda path, **more: result.body.write(path, **more)),
+                          ("scene.toml", lambda path, **more: result.body.write_page(path, **more)),
+                          ("scene.toml", lambda path, **more: result.part.write(path, format="stl", **more)),
+                          ("scene.toml", lambda path, **more: flexel.picture(result, path, **more)),
+                          ("scene.toml", lambda path, **more: staged.write_page(path, **more)),
+                          ("scene.toml", lambda path, **more: staged.body.write(path, **more)),
+                          ("own.ply", lambda path, **more: staged.write_page(path, **more)),
+                          ("body.vtu", lambda path, **more: frames[0].write(path, **more)),
+                          ("swing.toml", lambda path, **more: frames[-1].write_page(path, **more)),
+                          ("swing.toml", lambda path, **more: flexel.picture(frames[0], path, **more))):
         before = pathlib.Path(name).read_bytes()
         with check.assertRaises(flexel.InputError) as caught:
             attempt(name)
@@ -221,6 +237,38 @@ def test_pages_of_all_that_is_shown():
         check.assertIn("bar", page)
         check.assertRegex(shown._repr_html_(), "^<iframe srcdoc=")
         check.assertEqual(flexel.picture(shown, size="100x100")[:4], b"\x89PNG")
+
+
+def test_a_page_that_fails_leaves_the_old_one():
+    flexel = module()
+    part = flexel.Part.from_mesh(*box())
+    part.write_page("page.html")
+    os.chmod("page.html", 0o640)
+    os.symlink("page.html", "link.html")
+    before = pathlib.Path("page.html").read_bytes()
+
+    def fails():
+        raise KeyboardInterrupt
+
+    def unwritable():
+        return "\ud800"
+
+    for page, error in ((fails, KeyboardInterrupt), (unwritable, UnicodeEncodeError)):
+        part.page = page
+        with check.assertRaises(error):
+            part.write_page("page.html")
+        check.assertEqual(pathlib.Path("page.html").read_bytes(), before)
+    part.page = lambda: "é"
+    with mock.patch("os.replace", side_effect=OSError):
+        with check.assertRaises(OSError):
+            part.write_page("page.html")
+    check.assertEqual(pathlib.Path("page.html").read_bytes(), before)
+    part.write_page("link.html")
+    check.assertEqual(pathlib.Path("page.html").read_text(encoding="utf-8"), "é")
+    check.assertEqual(os.stat("page.html").st_mode & 0o777, 0o640)
+    check.assertTrue(os.path.islink("link.html"))
+    part.write_page(os.devnull)
+    check.assertEqual(sorted(os.listdir(".")), ["link.html", "page.html"])
 
 
 def test_the_stub_is_of_the_module():

@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "base/files/files.h"
 #include "formats/lattice/body_file.h"
+#include "tests/scratch.h"
 #include "tests/simulate/box_body.h"
 
 namespace flexel::simulate {
@@ -63,7 +64,7 @@ class CheckpointFile : public ::testing::Test {
  protected:
   void SetUp() override {
     body_ = testing::box_body({});
-    path_ = ::testing::TempDir() + "/" + ::testing::UnitTest::GetInstance()->current_test_info()->name();
+    path_ = scratch_.path("checkpoint");
     write_checkpoint(some_checkpoint(body_), body_bytes(body_), path_);
     bytes_ = read_all(path_);
   }
@@ -71,6 +72,7 @@ class CheckpointFile : public ::testing::Test {
     std::ofstream file(path_, std::ios::binary);
     file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   }
+  test::Scratch scratch_;
   Body body_;
   std::string path_;
   Bytes bytes_;

@@ -13,6 +13,7 @@
 #include "simulate/matter/masses.h"
 #include "simulate/paper/connection_friction.h"
 #include "tests/sanitized.h"
+#include "tests/scratch.h"
 #include "tests/simulate/centre_body.h"
 #include "tests/simulate/scene_case.h"
 #include "tests/simulate/stepped.h"
@@ -105,7 +106,8 @@ TEST(ConnectionYield, ATornBarIsTwoPiecesInTheFileToo) {
   };
   EXPECT_GT(across(body), 0u);
   EXPECT_EQ(across(made.body), 0u);
-  const std::string path = ::testing::TempDir() + "torn_paper.vtu";
+  const test::Scratch scratch;
+  const std::string path = scratch.path("torn_paper.vtu");
   write_body(made.body, path);
   const TimedCase later = run_timed(read_body(path), yielding_scene("[run]\ntime = \"1 ms\"\n"));
   EXPECT_EQ(across(later.body), 0u);
@@ -210,7 +212,8 @@ TEST(ConnectionYield, FusedBlocksAreOneInLaterRunsToo) {
   Body body = centre_body(options);
   options.name = "right";
   options.origin = Vec3(3 * kWidth + 1e-3, 0, 0);
-  const std::string path = ::testing::TempDir() + "paper_right.vtu";
+  const test::Scratch scratch;
+  const std::string path = scratch.path("paper_right.vtu");
   write_body(centre_body(options), path);
   set_velocity(body, std::vector<Vec3>(body.element_count(), Vec3(0.02, 0, 0)));
   const auto scene = [&](const char* within) {
@@ -224,7 +227,7 @@ TEST(ConnectionYield, FusedBlocksAreOneInLaterRunsToo) {
   EXPECT_EQ(fused_points(made.body).size(), 12u) << "straight ones and diagonals";
   const std::size_t last = made.body.element_count() - 1;
   EXPECT_NEAR(made.body.position[last].x() - made.body.rest[last].x(), 0.01 * 0.05, 2e-4);
-  const std::string fused = ::testing::TempDir() + "paper_fused.vtu";
+  const std::string fused = scratch.path("paper_fused.vtu");
   write_body(made.body, fused);
   Body later = read_body(fused);
   EXPECT_EQ(fused_points(later).size(), 12u);

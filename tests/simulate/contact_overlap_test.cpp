@@ -11,6 +11,7 @@
 #include "simulate/effects/contact.h"
 #include "simulate/effects/damping.h"
 #include "simulate/input/scene_selection.h"
+#include "tests/scratch.h"
 #include "tests/simulate/contact_case.h"
 
 namespace flexel::simulate {
@@ -214,7 +215,8 @@ TEST(Contact, LettingOutGoesOnOverAnEvent) {
 }
 
 TEST(Contact, APartThatJoinsInsideAnotherIsRefusedOrLetOut) {
-  const std::string path = ::testing::TempDir() + "joins.vtu";
+  const test::Scratch scratch;
+  const std::string path = scratch.path("joins.vtu");
   const auto run = [&](double depth, double parting, std::optional<double> step = {}) {
     write_body(block("b", {2, 2, 2}, Vec3(0, 0, (2 - depth) * kSide)), path);
     Scene scene = scene_of(0.02);

@@ -4,6 +4,7 @@
 #include "base/error.h"
 #include "formats/lattice/body_file.h"
 #include "formats/lattice/cell_moments.h"
+#include "tests/scratch.h"
 #include "tests/simulate/box_body.h"
 #include "tests/simulate/stepped.h"
 #include "tests/simulate/timed_case.h"
@@ -237,7 +238,8 @@ TEST(Events, FusedBlocksFlyAsOne) {
   options.name = "right";
   options.origin = Vec3(4.01e-2, 0.3e-2, 0.2e-2);  // 0.1 mm away, shifted
   const Body right = box_body(options);
-  const std::string path = ::testing::TempDir() + "fuse_right.vtu";
+  const test::Scratch scratch;
+  const std::string path = scratch.path("fuse_right.vtu");
   write_body(right, path);
   set_velocity(body, std::vector<Vec3>(body.element_count(), Vec3(0.02, 0, 0)));
   const std::string add = event("0 s", "do = \"add\"\nbody = \"" + path + "\"");
@@ -268,7 +270,8 @@ TEST(Events, AddedBodyFallsLikeTheOthers) {
   options.spacing = Vec3::Constant(1e-2);
   options.name = "late";
   options.origin = Vec3(1, 0, 0);
-  const std::string path = ::testing::TempDir() + "late.vtu";
+  const test::Scratch scratch;
+  const std::string path = scratch.path("late.vtu");
   write_body(box_body(options), path);
   const TimedCase made = run_timed(
       bar_of_cells(),

@@ -11,6 +11,7 @@
 #include "base/parallel.h"
 #include "simulate/models/cell_model.h"
 #include "simulate/scene/scene.h"
+#include "tests/scratch.h"
 #include "tests/simulate/stepped.h"
 #include "tests/simulate/timed_case.h"
 
@@ -74,7 +75,8 @@ struct Broke {
 // When the books first tell of energy released by fracture.
 Broke run_to_fracture(Body& body, const Scene& scene) {
   SimulateOptions options;
-  options.history = ::testing::TempDir() + "fracture.csv";
+  const test::Scratch scratch;
+  options.history = scratch.path("fracture.csv");
   Progress progress("test", Progress::Mode::quiet);
   Broke broke;
   broke.result = simulate(body, scene, options, progress);

@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "simulate/scene/scene.h"
+#include "tests/scratch.h"
 #include "tests/simulate/stepped.h"
 #include "tests/simulate/timed_case.h"
 
@@ -69,7 +70,8 @@ TEST(Plasticity, BarKeepsItsSet) {
     Body body = box_of({3 * n, n, n}, 2e-3 / n);
     const Scene scene = parse_scene(kYieldingBar, "bar.toml");
     SimulateOptions options;
-    options.history = ::testing::TempDir() + "plastic_bar.csv";
+    const test::Scratch scratch;
+    options.history = scratch.path("plastic_bar.csv");
     Progress progress("test", Progress::Mode::quiet);
     const SimulateResult result = simulate(body, scene, options, progress);
     // Logarithmic strains, Kirchhoff stress t = P exp(e): t = yield + H ep, e = ep + t / E.
@@ -96,7 +98,8 @@ TEST(Plasticity, SpringsKeepTheirSet) {
     std::string text = std::string(kYieldingBar) + "[parts.box]\nmodel = \"springs\"\n";
     text.replace(text.find("poisson = 0.3"), 13, "poisson = 0.25");
     SimulateOptions options;
-    options.history = ::testing::TempDir() + "plastic_springs.csv";
+    const test::Scratch scratch;
+    options.history = scratch.path("plastic_springs.csv");
     Progress progress("test", Progress::Mode::quiet);
     const SimulateResult result = simulate(body, parse_scene(text, "bar.toml"), options, progress);
     double plastic = 0;

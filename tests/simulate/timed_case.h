@@ -10,6 +10,7 @@
 #include "simulate/result/result.h"
 #include "simulate/scene/scene.h"
 #include "simulate/simulate.h"
+#include "tests/scratch.h"
 #include "tests/simulate/csv.h"
 
 namespace flexel::simulate::testing {
@@ -24,10 +25,8 @@ inline TimedCase run_timed(Body body, const Scene& scene, SimulateOptions option
   TimedCase made;
   made.body = std::move(body);
   Progress progress("test", Progress::Mode::quiet);
-  const ::testing::TestInfo* test = ::testing::UnitTest::GetInstance()->current_test_info();
-  std::string name = std::string(test->test_suite_name()) + "_" + test->name();
-  std::replace(name.begin(), name.end(), '/', '_');  // of tests with parameters
-  options.history = ::testing::TempDir() + "/" + name + ".csv";
+  const test::Scratch scratch;
+  options.history = scratch.path("history.csv");
   made.result = simulate(made.body, scene, options, progress);
   made.history = read_csv(options.history);
   return made;

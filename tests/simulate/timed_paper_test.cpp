@@ -3,7 +3,6 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
-#include <filesystem>
 #include <random>
 
 #include "base/error.h"
@@ -11,6 +10,7 @@
 #include "simulate/effects/gravity.h"
 #include "simulate/equilibrium/mechanics.h"
 #include "simulate/matter/masses.h"
+#include "tests/scratch.h"
 #include "tests/simulate/study_beam.h"
 #include "tests/simulate/timed_case.h"
 
@@ -47,12 +47,9 @@ SimulateResult run_with_books(Body& body, const Scene& scene, int threads = 0) {
   Progress progress("test", Progress::Mode::quiet);
   SimulateOptions options;
   options.threads = threads;
-  const std::string name = ::testing::UnitTest::GetInstance()->current_test_info()->name();
-  options.history =
-      (std::filesystem::temp_directory_path() / ("flexel_timed_paper_" + name + ".csv")).string();
-  const SimulateResult result = simulate(body, scene, options, progress);
-  std::filesystem::remove(options.history);
-  return result;
+  const test::Scratch scratch;
+  options.history = scratch.path("history.csv");
+  return simulate(body, scene, options, progress);
 }
 
 Problem timed_problem(const Body& body) {

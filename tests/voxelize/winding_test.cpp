@@ -50,5 +50,15 @@ TEST(WindingNumber, AddsUpMoreThanATurn) {
   EXPECT_NEAR(WindingNumber(mesh, mesh.vertices).at(Vec3(0, 0, 0)), 4, 1e-3);
 }
 
+// A triangle whose half angle is a quarter turn to the bit, twice: the product of both is -1, of no sure side.
+TEST(WindingNumber, AddsUpToHalfATurnToTheBit) {
+  PartMesh mesh;
+  mesh.vertices = {Vec3(3, 0, 0), Vec3(0, 3, 0), Vec3(-1, -2, 2)};
+  mesh.corners = {{0, 2, 1}, {0, 2, 1}};
+  EXPECT_NEAR(WindingNumber(mesh, mesh.vertices).at(Vec3(0, 0, 0)), -0.5, 1e-12);
+  mesh.corners = {{0, 1, 2}, {0, 1, 2}};
+  EXPECT_NEAR(WindingNumber(mesh, mesh.vertices).at(Vec3(0, 0, 0)), 0.5, 1e-12);
+}
+
 }  // namespace
 }  // namespace flexel::voxelize

@@ -40,11 +40,11 @@ class SolidAngle {
  public:
   void add(Vector p, Vector q, Vector r) {
     const double a = std::sqrt(dot(p, p)), b = std::sqrt(dot(q, q)), c = std::sqrt(dot(r, r));
-    const double im = dot(p, cross(q, r)) + 0.;  // no -0, whose argument may be -pi
+    const double im = dot(p, cross(q, r)) + 0.;  // no -0, here and below: its argument may be -pi
     const double re = a * b * c + dot(p, q) * c + dot(q, r) * a + dot(r, p) * b;
     const double size = std::abs(re) + std::abs(im);
     if (!(size > 0)) return;
-    const double real = (re_ * re - im_ * im) / size, imaginary = (re_ * im + im_ * re) / size;
+    const double real = (re_ * re - im_ * im) / size, imaginary = (re_ * im + im_ * re) / size + 0.;
     if (im_ >= 0 && im >= 0 && imaginary < 0) turns_ += 1;
     if (im_ < 0 && im < 0 && imaginary >= 0) turns_ -= 1;
     re_ = real;
