@@ -129,8 +129,8 @@ def test_progress_of_a_run_to_equilibrium():
         if stage == "simulate":
             shares.append(share)
 
-    flexel.simulate(box_body(flexel, 0.0005), estimate=False, progress=progress, **PULL)
-    check.assertGreater(len(shares), 3)
+    flexel.simulate(box_body(flexel, 0.0004), estimate=False, progress=progress, **PULL)
+    check.assertGreater(len(shares), 1)
     check.assertEqual(shares, sorted(shares))
     check.assertTrue(any(0.05 < share < 1 for share in shares), f"{shares}")
 
