@@ -23,7 +23,7 @@ constexpr double kAstray = 4;         // ... and more than this: back, or give u
 constexpr double kDifference = 1e-5;  // of the reach
 constexpr double kMostTurn = 0.7;     // rad, of a step
 constexpr double kStale = 0.05;       // rad, that links turned since S was made
-constexpr double kFree = 1e-13;       // of lambda + 2 mu times the reach: nothing resists
+constexpr double kFree = 1e-10;       // of lambda + 2 mu times the reach: nothing resists
 
 Vec3 cross(const Vec3& a, const Vec3& b) {
   return a.cross(b);

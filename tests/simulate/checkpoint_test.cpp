@@ -72,7 +72,7 @@ class CheckpointFile : public ::testing::Test {
     std::ofstream file(path_, std::ios::binary);
     file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   }
-  test::Scratch scratch_;
+  flexel::test::Scratch scratch_;
   Body body_;
   std::string path_;
   Bytes bytes_;

@@ -106,7 +106,7 @@ TEST(ConnectionYield, ATornBarIsTwoPiecesInTheFileToo) {
   };
   EXPECT_GT(across(body), 0u);
   EXPECT_EQ(across(made.body), 0u);
-  const test::Scratch scratch;
+  const flexel::test::Scratch scratch;
   const std::string path = scratch.path("torn_paper.vtu");
   write_body(made.body, path);
   const TimedCase later = run_timed(read_body(path), yielding_scene("[run]\ntime = \"1 ms\"\n"));
@@ -212,7 +212,7 @@ TEST(ConnectionYield, FusedBlocksAreOneInLaterRunsToo) {
   Body body = centre_body(options);
   options.name = "right";
   options.origin = Vec3(3 * kWidth + 1e-3, 0, 0);
-  const test::Scratch scratch;
+  const flexel::test::Scratch scratch;
   const std::string path = scratch.path("paper_right.vtu");
   write_body(centre_body(options), path);
   set_velocity(body, std::vector<Vec3>(body.element_count(), Vec3(0.02, 0, 0)));

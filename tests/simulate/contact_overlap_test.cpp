@@ -215,7 +215,7 @@ TEST(Contact, LettingOutGoesOnOverAnEvent) {
 }
 
 TEST(Contact, APartThatJoinsInsideAnotherIsRefusedOrLetOut) {
-  const test::Scratch scratch;
+  const flexel::test::Scratch scratch;
   const std::string path = scratch.path("joins.vtu");
   const auto run = [&](double depth, double parting, std::optional<double> step = {}) {
     write_body(block("b", {2, 2, 2}, Vec3(0, 0, (2 - depth) * kSide)), path);

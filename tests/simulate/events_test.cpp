@@ -238,7 +238,7 @@ TEST(Events, FusedBlocksFlyAsOne) {
   options.name = "right";
   options.origin = Vec3(4.01e-2, 0.3e-2, 0.2e-2);  // 0.1 mm away, shifted
   const Body right = box_body(options);
-  const test::Scratch scratch;
+  const flexel::test::Scratch scratch;
   const std::string path = scratch.path("fuse_right.vtu");
   write_body(right, path);
   set_velocity(body, std::vector<Vec3>(body.element_count(), Vec3(0.02, 0, 0)));
@@ -270,7 +270,7 @@ TEST(Events, AddedBodyFallsLikeTheOthers) {
   options.spacing = Vec3::Constant(1e-2);
   options.name = "late";
   options.origin = Vec3(1, 0, 0);
-  const test::Scratch scratch;
+  const flexel::test::Scratch scratch;
   const std::string path = scratch.path("late.vtu");
   write_body(box_body(options), path);
   const TimedCase made = run_timed(

@@ -75,7 +75,7 @@ struct Broke {
 // When the books first tell of energy released by fracture.
 Broke run_to_fracture(Body& body, const Scene& scene) {
   SimulateOptions options;
-  const test::Scratch scratch;
+  const flexel::test::Scratch scratch;
   options.history = scratch.path("fracture.csv");
   Progress progress("test", Progress::Mode::quiet);
   Broke broke;

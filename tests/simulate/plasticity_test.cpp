@@ -70,7 +70,7 @@ TEST(Plasticity, BarKeepsItsSet) {
     Body body = box_of({3 * n, n, n}, 2e-3 / n);
     const Scene scene = parse_scene(kYieldingBar, "bar.toml");
     SimulateOptions options;
-    const test::Scratch scratch;
+    const flexel::test::Scratch scratch;
     options.history = scratch.path("plastic_bar.csv");
     Progress progress("test", Progress::Mode::quiet);
     const SimulateResult result = simulate(body, scene, options, progress);
@@ -98,7 +98,7 @@ TEST(Plasticity, SpringsKeepTheirSet) {
     std::string text = std::string(kYieldingBar) + "[parts.box]\nmodel = \"springs\"\n";
     text.replace(text.find("poisson = 0.3"), 13, "poisson = 0.25");
     SimulateOptions options;
-    const test::Scratch scratch;
+    const flexel::test::Scratch scratch;
     options.history = scratch.path("plastic_springs.csv");
     Progress progress("test", Progress::Mode::quiet);
     const SimulateResult result = simulate(body, parse_scene(text, "bar.toml"), options, progress);

@@ -25,7 +25,7 @@ inline TimedCase run_timed(Body body, const Scene& scene, SimulateOptions option
   TimedCase made;
   made.body = std::move(body);
   Progress progress("test", Progress::Mode::quiet);
-  const test::Scratch scratch;
+  const flexel::test::Scratch scratch;
   options.history = scratch.path("history.csv");
   made.result = simulate(made.body, scene, options, progress);
   made.history = read_csv(options.history);

@@ -47,7 +47,7 @@ SimulateResult run_with_books(Body& body, const Scene& scene, int threads = 0) {
   Progress progress("test", Progress::Mode::quiet);
   SimulateOptions options;
   options.threads = threads;
-  const test::Scratch scratch;
+  const flexel::test::Scratch scratch;
   options.history = scratch.path("history.csv");
   return simulate(body, scene, options, progress);
 }
