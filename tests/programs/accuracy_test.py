@@ -146,13 +146,14 @@ def test_refusals():
 
 
 def test_a_column_about_to_buckle_is_told():
-    """Of PLA, 100 x 4 x 4 mm, clamped at one end: it buckles at pi^2 E I / (4 L^2) = 17.1 N (Euler)."""
+    """Of PLA, 100 x 4 x 4 mm, clamped at one end: it buckles at pi^2 E I / (4 L^2) = 17.1 N (Euler). In model quadratic the cells are as wide as it."""
     write("column.stl", binary_stl(box_triangles((100, 4, 4))))
-    for newtons, near in ((4, False), (14, True)):
-        write("press.toml", 'material = "PLA"\nmodel = "cells"\n[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\n'
+    for model, size, newtons, near in (("cells", "1 mm", 4, False), ("cells", "1 mm", 14, True), ("quadratic", "4 mm", 4, False),
+                                       ("quadratic", "4 mm", 15, True)):
+        write("press.toml", f'material = "PLA"\nmodel = "{model}"\n[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\n'
                             f'force = ["-{newtons} N", "0 N", "10 mN"]\n')
-        result = expect_ok(run("flexel", "deform", "column.stl", "--scene", "press.toml", "--size", "1 mm", "-o", "bent.stl"))
-        expect(("about to buckle: it moves" in result.err) == near, f"{newtons} N: {result.err}")
+        result = expect_ok(run("flexel", "deform", "column.stl", "--scene", "press.toml", "--size", size, "-o", "bent.stl"))
+        expect(("about to buckle: it moves" in result.err) == near, f"{model}, {newtons} N: {result.err}")
     write("across.toml", 'material = "PLA"\nmodel = "cells"\n[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\nforce = ["0 N", "0 N", "1 N"]\n')
     result = expect_ok(run("flexel", "deform", "column.stl", "--scene", "across.toml", "--size", "1 mm", "-o", "bent.stl"))
     expect("buckle" not in result.err, result.err)
@@ -167,16 +168,6 @@ def test_a_strip_bent_to_its_length_has_not_buckled():
                                "--model", "cells", "--size", size, "-o", "bent.stl"))
         expect("buckle" not in result.err, result.err)
         expect(f"strength   {strength}" in result.err, result.err)
-
-
-def test_a_column_about_to_buckle_is_told_by_model_quadratic():
-    """The same column in cells as wide as it is."""
-    write("column.stl", binary_stl(box_triangles((100, 4, 4))))
-    for newtons, near in ((4, False), (15, True)):
-        write("press.toml", 'material = "PLA"\nmodel = "quadratic"\n[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\n'
-                            f'force = ["-{newtons} N", "0 N", "10 mN"]\n')
-        result = expect_ok(run("flexel", "deform", "column.stl", "--scene", "press.toml", "--size", "4 mm", "-o", "bent.stl"))
-        expect(("about to buckle: it moves" in result.err) == near, f"{newtons} N: {result.err}")
 
 
 def hollow_box():
