@@ -100,6 +100,9 @@ std::vector<std::string> KeptWarnings::lines() const {
 
 Progress::Progress(std::string program, Mode mode) : program_(std::move(program)), mode_(resolve(mode)) {}
 
+Progress::Progress(Progress& whole, double from, double to)
+    : mode_(Mode::silent), whole_(&whole), from_(from), to_(to) {}
+
 Progress::~Progress() {
   // A stage that an exception ended was not finished.
   if (std::uncaught_exceptions() > 0)
@@ -109,6 +112,7 @@ Progress::~Progress() {
 }
 
 void Progress::stage(const std::string& name) {
+  if (whole_ != nullptr) return;
   finish();
   stage_ = name;
   stage_began_ = now();
@@ -117,6 +121,7 @@ void Progress::stage(const std::string& name) {
 }
 
 void Progress::update(double share, const std::string& note) {
+  if (whole_ != nullptr) return whole_->update(from_ + share * (to_ - from_), note);
   const bool heard = listener != nullptr && mode_ != Mode::quiet && mode_ != Mode::silent;
   if ((mode_ != Mode::bar && !heard) || stage_.empty()) return;
   const double time = now();
