@@ -9,6 +9,7 @@
 #include "base/files/outputs.h"
 #include "base/nearest_word.h"
 #include "base/parallel.h"
+#include "base/program/progress_stretch.h"
 #include "base/program/termination.h"
 #include "base/units.h"
 #include "base/version.h"
@@ -224,8 +225,8 @@ mesh_export::Analysis analyse(const ExportArguments& arguments, Job& job, const 
     look.size.reset();
     look.count = kLookCells;
     progress.stage("look");
-    Progress stretch(progress, 0, 1);
-    const Body body = voxelize::voxelize(surface, look, stretch).body;
+    ProgressStretch stretch(progress, 0, 1);
+    const Body body = voxelize::voxelize(surface, look, stretch.inner()).body;
     add_actions(job, body);
     mesh_export::refuse_untranslatable(job.scene, problem_of(body, job.scene));
     progress.stage("gmsh");

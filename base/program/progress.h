@@ -34,14 +34,11 @@ class Progress {
  public:
   enum class Mode { automatic, bar, lines, quiet, silent };
   explicit Progress(std::string program, Mode mode = Mode::automatic);
-  // A run within a run: silent but for its updates, which move the stage of `whole` from share `from` to `to`. `whole`
-  // outlives it.
-  Progress(Progress& whole, double from, double to);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  // A stage begins ("voxelize"); the one before it ends. Nothing in a run within a run.
+  // A stage begins ("voxelize"); the one before it ends.
   void stage(const std::string& name);
   // Share of the stage that is done, in [0, 1], and a short note ("newton 3, residual 1e-4"). Drawn at most
   // 10 times a second.
@@ -62,8 +59,6 @@ class Progress {
   bool bar_drawn_ = false;
   double stage_began_ = 0;
   double last_drawn_ = -1;
-  Progress* whole_ = nullptr;  // of a run within a run
-  double from_ = 0, to_ = 1;   // shares of its stage
 };
 
 }  // namespace flexel

@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "base/files/temporary_folder.h"
 #include "base/math/distance.h"
+#include "base/program/progress_stretch.h"
 #include "flexel/export/gmsh.h"
 #include "flexel/export/mesh.h"
 #include "formats/common/file_formats.h"
@@ -86,9 +87,9 @@ GmshMesh mesh_all(const std::vector<std::string>& paths, const Surface& surface,
   const double runs = static_cast<double>(gmsh_runs(surface));
   double run = 0;
   const auto mesh = [&](const TemporaryFolder& folder, const std::string& script, const std::string& part) {
-    Progress stretch(progress, run / runs, (run + 1) / runs);
+    ProgressStretch stretch(progress, run / runs, (run + 1) / runs);
     ++run;
-    return mesh_with_gmsh(folder.path().string(), script, part, stretch);
+    return mesh_with_gmsh(folder.path().string(), script, part, stretch.inner());
   };
   for (std::size_t s = 0; s < surface.sources.size(); ++s) {
     const SurfaceSource& source = surface.sources[s];

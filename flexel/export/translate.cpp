@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/human.h"
+#include "base/program/progress_stretch.h"
 #include "base/units.h"
 #include "flexel/export/analysis.h"
 #include "flexel/export/nodal_forces.h"
@@ -179,15 +180,15 @@ bool large_deflection(const Surface& surface, simulate::Scene scene, int threads
   try {
     voxelize::VoxelizeOptions coarse;
     coarse.count = kProbeCells;
-    Progress voxelizing(progress, 0, kVoxelizing);
-    Body body = voxelize::voxelize(surface, coarse, voxelizing).body;
+    ProgressStretch voxelizing(progress, 0, kVoxelizing);
+    Body body = voxelize::voxelize(surface, coarse, voxelizing.inner()).body;
     for (const bool small : {true, false}) {
       simulate::Scene scaled = scene;
       if (small) scale_actions(scaled, kSmallShare);
       Body copy = body;
-      Progress run(progress, small ? kVoxelizing : kSmallRun, small ? kSmallRun : 1);
-      moved[small] =
-          simulate::simulate(copy, scaled, options, run).largest_displacement / (small ? kSmallShare : 1);
+      ProgressStretch run(progress, small ? kVoxelizing : kSmallRun, small ? kSmallRun : 1);
+      moved[small] = simulate::simulate(copy, scaled, options, run.inner()).largest_displacement /
+                     (small ? kSmallShare : 1);
     }
   } catch (const DivergedError&) {
     if (moved[1] > 0) {

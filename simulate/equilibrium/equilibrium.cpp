@@ -20,6 +20,7 @@
 
 #include "base/error.h"
 #include "base/human.h"
+#include "base/program/progress_stretch.h"
 #include "base/stop.h"
 #include "base/units.h"
 #include "simulate/equilibrium/rigid_link_equilibrium.h"
@@ -247,8 +248,8 @@ bool LoadStepping::begin_near() {
   farthest_reach_ = std::numeric_limits<double>::infinity();
   if (!far) return false;
   if (!overloaded()) {
-    Progress stretch(progress_, 0, kStartShare);
-    near_ = start_(stretch);
+    ProgressStretch stretch(progress_, 0, kStartShare);
+    near_ = start_(stretch.inner());
     begun_ = kStartShare;
   }
   const int before = result_.newton_iterations;

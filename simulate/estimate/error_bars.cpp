@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/program/progress_stretch.h"
 #include "base/stop.h"
 #include "formats/lattice/fields.h"
 #include "formats/lattice/quadratic_field.h"
@@ -97,8 +98,8 @@ class CoarseRuns {
       }
       ratio_.push_back(ratio_of(finer, coarse));
       const bool first = found_.size() == 1;
-      Progress stretch(progress_, first ? 0 : kFirstRun, first ? kFirstRun : 1);
-      found_.push_back(answers(solve_(coarse, scene_, options_, stretch)));
+      ProgressStretch stretch(progress_, first ? 0 : kFirstRun, first ? kFirstRun : 1);
+      found_.push_back(answers(solve_(coarse, scene_, options_, stretch.inner())));
     } catch (const InputError& error) {
       reason = error.what();
     } catch (const DivergedError& error) {

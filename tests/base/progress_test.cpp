@@ -1,5 +1,5 @@
 // Progress, as a listener hears it.
-#include "base/program/progress.h"
+#include "base/program/progress_stretch.h"
 
 #include <gtest/gtest.h>
 
@@ -39,12 +39,15 @@ TEST(Progress, ARunWithinARunMovesItsStretchOfTheStage) {
   Progress whole("flexel", Progress::Mode::lines);
   whole.stage("bars");
   wait();
-  Progress stretch(whole, 0.25, 0.75);
+  ProgressStretch first(whole, 0.25, 0.75);
+  Progress& stretch = first.inner();
   stretch.stage("simulate");
   stretch.update(0.5, "newton 3");
   wait();
-  Progress deeper(stretch, 0.5, 1);
-  deeper.update(0.5);
+  {
+    ProgressStretch deeper(stretch, 0.5, 1);
+    deeper.inner().update(0.5);
+  }
   stretch.say("not told");
   stretch.warn("neither is this");
   EXPECT_EQ(heard.stages, std::vector<std::string>(3, "bars"));
@@ -59,8 +62,8 @@ TEST(Progress, OfASilentRunNothingIsHeard) {
   Heard heard;
   Progress silent("flexel", Progress::Mode::silent);
   silent.stage("bars");
-  Progress stretch(silent, 0, 1);
-  stretch.update(0.5);
+  ProgressStretch stretch(silent, 0, 1);
+  stretch.inner().update(0.5);
   EXPECT_TRUE(heard.stages.empty());
 }
 
