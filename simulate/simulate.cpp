@@ -27,6 +27,7 @@
 #include "simulate/events/fuse.h"
 #include "simulate/matter/fragments.h"
 #include "simulate/matter/stress.h"
+#include "simulate/memory.h"
 #include "simulate/models/rest_shape.h"
 #include "simulate/models/set_rest_shape.h"
 #include "simulate/modes/modes_run.h"
@@ -354,6 +355,9 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
   progress.stage("simulate");
   check_actions(scene, body, progress);
   refuse_heat(scene);
+  refuse_beyond_memory(body, scene);
+  if (const std::optional<double> needed = memory_needed(body, scene); needed && options.explain)
+    progress.say(fmt::format("memory: about {}", human_bytes(*needed)));
   if (scene.get<Thermal>().conducts()) conduct(body, scene, progress);
   if (asks_for_modes(scene)) {
     SimulateResult result = run_modes(body, scene, options, progress);

@@ -107,7 +107,7 @@ class LoadStepping {
   Progress& progress_;
   const CoarseStart& start_;
   double first_, increment_, done_ = 0;
-  double begun_ = 0;  // share of the run's time that its start has taken
+  double begun_ = kPrepared;  // share of the run's time that its start takes
   EquilibriumResult result_;
   State trial_;  // of the last attempt
   NewtonOutcome outcome_;
@@ -248,9 +248,9 @@ bool LoadStepping::begin_near() {
   farthest_reach_ = std::numeric_limits<double>::infinity();
   if (!far) return false;
   if (!overloaded()) {
-    ProgressStretch stretch(progress_, 0, kStartShare);
+    ProgressStretch stretch(progress_, kPrepared, kStarted);
     near_ = start_(stretch.inner());
-    begun_ = kStartShare;
+    begun_ = kStarted;
   }
   const int before = result_.newton_iterations;
   if (near_ && !attempt(NewtonSteps::full, kFullStepIterations))
