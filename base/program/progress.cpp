@@ -17,6 +17,7 @@
 #include "base/human.h"
 #include "base/printable.h"
 #include "base/program/brief_output.h"
+#include "base/program/progress_stretch.h"
 
 namespace flexel {
 namespace {
@@ -100,6 +101,23 @@ std::vector<std::string> KeptWarnings::lines() const {
 
 Progress::Progress(std::string program, Mode mode) : program_(std::move(program)), mode_(resolve(mode)) {}
 
+ProgressStretch* ProgressStretch::last_ = nullptr;
+
+ProgressStretch::ProgressStretch(Progress& whole, double from, double to)
+    : whole_(whole), from_(from), to_(to), inner_("", Progress::Mode::silent), before_(last_) {
+  last_ = this;
+}
+
+ProgressStretch::~ProgressStretch() {
+  last_ = before_;
+}
+
+ProgressStretch* ProgressStretch::of(const Progress& inner) {
+  ProgressStretch* found = last_;
+  while (found != nullptr && &found->inner_ != &inner) found = found->before_;
+  return found;
+}
+
 Progress::~Progress() {
   // A stage that an exception ended was not finished.
   if (std::uncaught_exceptions() > 0)
@@ -109,6 +127,7 @@ Progress::~Progress() {
 }
 
 void Progress::stage(const std::string& name) {
+  if (mode_ == Mode::silent) return;
   finish();
   stage_ = name;
   stage_began_ = now();
@@ -117,7 +136,12 @@ void Progress::stage(const std::string& name) {
 }
 
 void Progress::update(double share, const std::string& note) {
-  const bool heard = listener != nullptr && mode_ != Mode::quiet && mode_ != Mode::silent;
+  if (mode_ == Mode::silent) {
+    if (const ProgressStretch* stretch = ProgressStretch::of(*this))
+      stretch->whole_.update(stretch->from_ + share * (stretch->to_ - stretch->from_), note);
+    return;
+  }
+  const bool heard = listener != nullptr && mode_ != Mode::quiet;
   if ((mode_ != Mode::bar && !heard) || stage_.empty()) return;
   const double time = now();
   if (last_drawn_ >= 0 && time - last_drawn_ < kDrawInterval) return;

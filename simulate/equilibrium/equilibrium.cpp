@@ -20,6 +20,7 @@
 
 #include "base/error.h"
 #include "base/human.h"
+#include "base/program/progress_stretch.h"
 #include "base/stop.h"
 #include "base/units.h"
 #include "simulate/equilibrium/rigid_link_equilibrium.h"
@@ -43,6 +44,8 @@ constexpr double kPushedIncrement = 0.25;   // of the first load step: how far b
 constexpr int kPushedIterations = 300;
 constexpr int kMostPushes = 4;         // of a run
 constexpr double kUnsupported = 1e-9;  // of the stiffness of an element in its stiffest direction
+constexpr double kStartShare =
+    0.2;  // of the run's time: finding a start on a lattice of an eighth of the cells
 constexpr double kFarReach = 0.1;  // diagonals: a first linear answer beyond this makes a start elsewhere pay
 constexpr double kOverload = 3;    // diagonals: a first linear answer beyond this suggests a wrong unit
 // ... and one beyond this many diagonals, or times the way that moves lead, is one. A strip rolled up by two
@@ -104,6 +107,7 @@ class LoadStepping {
   Progress& progress_;
   const CoarseStart& start_;
   double first_, increment_, done_ = 0;
+  double begun_ = kPrepared;  // share of the run's time that its start takes
   EquilibriumResult result_;
   State trial_;  // of the last attempt
   NewtonOutcome outcome_;
@@ -164,7 +168,7 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   if (pushed_) push(trial_);
   outcome_ = newton_with_links(mechanics_, trial_, options, [&](double gone, const std::string& note) {
     check_stop();
-    progress_.update(done_ + gone * (trial_.share - done_),
+    progress_.update(begun_ + (1 - begun_) * (done_ + gone * (trial_.share - done_)),
                      fmt::format("load {:.3g} %, {}", 100 * trial_.share, note));
   });
   if (reach_ == 0) reach_ = outcome_.first_reach / trial_.share;  // from rest: a near start moves by less
@@ -243,7 +247,11 @@ bool LoadStepping::begin_near() {
   const bool far = outcome_.first_reach > farthest_reach_;
   farthest_reach_ = std::numeric_limits<double>::infinity();
   if (!far) return false;
-  if (!overloaded()) near_ = start_();
+  if (!overloaded()) {
+    ProgressStretch stretch(progress_, kPrepared, kStarted);
+    near_ = start_(stretch.inner());
+    begun_ = kStarted;
+  }
   const int before = result_.newton_iterations;
   if (near_ && !attempt(NewtonSteps::full, kFullStepIterations))
     spent_near_ = result_.newton_iterations - before;

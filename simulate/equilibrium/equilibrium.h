@@ -30,8 +30,9 @@ void refuse_unsupported_elements(Mechanics& mechanics, const State& start, const
 // equilibrium.
 //
 // `start` is asked for displacements (elements, m) near the equilibrium under the whole load, once, where the
-// linear answer reaches so far that the way there is long; it may be empty, or give nothing.
-using CoarseStart = std::function<std::optional<std::vector<Vec3>>()>;
+// linear answer reaches so far that the way there is long; it may be empty, or give nothing. Its Progress is a stretch
+// of this run's.
+using CoarseStart = std::function<std::optional<std::vector<Vec3>>(Progress&)>;
 [[nodiscard]] EquilibriumResult find_equilibrium(Mechanics& mechanics, State& state,
                                                  const RunSettings& settings, Progress& progress,
                                                  const CoarseStart& start = {});
