@@ -140,9 +140,12 @@ struct CoarseLevel {
 
 class Multigrid : public Preconditioner {
  public:
-  Multigrid(const LinearOperator& matrix, const NodeGeometry& geometry) : matrix_(matrix) {
+  Multigrid(const LinearOperator& matrix, const NodeGeometry& geometry, double factor_cost)
+      : matrix_(matrix) {
     assert(geometry.position.size() == matrix.rows() && geometry.index.size() == matrix.rows());
-    if (matrix.rows() > kDirectRows) build_structure(geometry);
+    const bool cheap =
+        factor_cost > 0 && factor_operations(matrix) <= factor_cost * static_cast<double>(matrix.rows());
+    if (matrix.rows() > kDirectRows && !cheap) build_structure(geometry);
     refresh();
   }
 
@@ -299,8 +302,8 @@ class Multigrid : public Preconditioner {
 }  // namespace
 
 std::unique_ptr<Preconditioner> aggregation_multigrid(const LinearOperator& matrix,
-                                                      const NodeGeometry& geometry) {
-  return std::make_unique<Multigrid>(matrix, geometry);
+                                                      const NodeGeometry& geometry, double factor_cost) {
+  return std::make_unique<Multigrid>(matrix, geometry, factor_cost);
 }
 
 namespace {
@@ -308,8 +311,8 @@ namespace {
 // With the operator that it needs.
 class MultigridOfStored : public Preconditioner {
  public:
-  MultigridOfStored(const BlockMatrix& matrix, const NodeGeometry& geometry)
-      : operator_(matrix), multigrid_(operator_, geometry) {}
+  MultigridOfStored(const BlockMatrix& matrix, const NodeGeometry& geometry, double factor_cost)
+      : operator_(matrix), multigrid_(operator_, geometry, factor_cost) {}
   void apply(const std::vector<Vec3>& residual, std::vector<Vec3>& correction) const override {
     multigrid_.apply(residual, correction);
   }
@@ -323,9 +326,9 @@ class MultigridOfStored : public Preconditioner {
 
 }  // namespace
 
-std::unique_ptr<Preconditioner> aggregation_multigrid(const BlockMatrix& matrix,
-                                                      const NodeGeometry& geometry) {
-  return std::make_unique<MultigridOfStored>(matrix, geometry);
+std::unique_ptr<Preconditioner> aggregation_multigrid(const BlockMatrix& matrix, const NodeGeometry& geometry,
+                                                      double factor_cost) {
+  return std::make_unique<MultigridOfStored>(matrix, geometry, factor_cost);
 }
 
 }  // namespace flexel::simulate
