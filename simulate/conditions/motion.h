@@ -14,6 +14,7 @@ struct Motion {
   Vec3 through = Vec3::Zero();                // m, a point of the axis
   double angle = 0;                           // rad, right-handed about axis
   std::shared_ptr<RigidLink> link = nullptr;  // it leads, at any share, in place of all above
+  bool from_rest = false;                     // whatever Constraints::start says
 
   // Displacement [m] of the material point that rested at `rest` when `share` of the motion is done. Affine
   // in `rest`.
