@@ -17,12 +17,13 @@
 #include "base/human.h"
 #include "base/printable.h"
 #include "base/program/brief_output.h"
-#include "base/program/progress_stretch.h"
+#include "base/program/silent_updates.h"
 
 namespace flexel {
 namespace {
 
 ProgressListener* listener = nullptr;
+SilentUpdate silent_update = nullptr;
 bool brief_output = false, holds_warnings = false, keeps_warnings = false;
 std::vector<std::string> held_warnings, kept_warnings;
 std::string held_program;  // that gave the last of them
@@ -54,6 +55,10 @@ std::size_t terminal_columns() {
 
 void set_progress_listener(ProgressListener* to) noexcept {
   listener = to;
+}
+
+void set_silent_update(SilentUpdate hears) noexcept {
+  silent_update = hears;
 }
 
 std::optional<double> seconds_left(double seconds, double share) {
@@ -101,23 +106,6 @@ std::vector<std::string> KeptWarnings::lines() const {
 
 Progress::Progress(std::string program, Mode mode) : program_(std::move(program)), mode_(resolve(mode)) {}
 
-ProgressStretch* ProgressStretch::last_ = nullptr;
-
-ProgressStretch::ProgressStretch(Progress& whole, double from, double to)
-    : whole_(whole), from_(from), to_(to), inner_("", Progress::Mode::silent), before_(last_) {
-  last_ = this;
-}
-
-ProgressStretch::~ProgressStretch() {
-  last_ = before_;
-}
-
-ProgressStretch* ProgressStretch::of(const Progress& inner) {
-  ProgressStretch* found = last_;
-  while (found != nullptr && &found->inner_ != &inner) found = found->before_;
-  return found;
-}
-
 Progress::~Progress() {
   // A stage that an exception ended was not finished.
   if (std::uncaught_exceptions() > 0)
@@ -137,8 +125,7 @@ void Progress::stage(const std::string& name) {
 
 void Progress::update(double share, const std::string& note) {
   if (mode_ == Mode::silent) {
-    if (const ProgressStretch* stretch = ProgressStretch::of(*this))
-      stretch->whole_.update(stretch->from_ + share * (stretch->to_ - stretch->from_), note);
+    if (silent_update != nullptr) silent_update(*this, share, note);
     return;
   }
   const bool heard = listener != nullptr && mode_ != Mode::quiet;

@@ -1,5 +1,7 @@
 // A run within a run, as the display of the whole shows it.
 #pragma once
+#include <string>
+
 #include "base/program/progress.h"
 
 namespace flexel {
@@ -15,9 +17,7 @@ class ProgressStretch {
   [[nodiscard]] Progress& inner() { return inner_; }
 
  private:
-  friend class Progress;
-  // That of a silent Progress; null: of none.
-  static ProgressStretch* of(const Progress& inner);
+  static void pass_on(const Progress& inner, double share, const std::string& note);
   static ProgressStretch* last_;
   Progress& whole_;
   double from_, to_;

@@ -44,8 +44,8 @@ constexpr double kPushedIncrement = 0.25;   // of the first load step: how far b
 constexpr int kPushedIterations = 300;
 constexpr int kMostPushes = 4;         // of a run
 constexpr double kUnsupported = 1e-9;  // of the stiffness of an element in its stiffest direction
-constexpr double kStartShare =
-    0.2;  // of the run's time: finding a start on a lattice of an eighth of the cells
+// Shares of the run's time: until the first linear solution begins; until a start from a coarser lattice is found.
+constexpr double kPrepared = 0.25, kStarted = 0.4;
 constexpr double kFarReach = 0.1;  // diagonals: a first linear answer beyond this makes a start elsewhere pay
 constexpr double kOverload = 3;    // diagonals: a first linear answer beyond this suggests a wrong unit
 // ... and one beyond this many diagonals, or times the way that moves lead, is one. A strip rolled up by two

@@ -91,7 +91,7 @@ def peak(command):
 
 def test_what_a_run_takes_is_told_before_it():
     box()
-    expect_ok(run("flexel-voxelize", "box.stl", "--size", "0.8 mm", "--align", "none", "-o", "body.vtu"))
+    expect_ok(run("flexel-voxelize", "box.stl", "--size", "0.8 mm", "--align", "none", "--moments", "-o", "body.vtu"))
     held = SCENE[:SCENE.index("[[load]]")]
     for name, text in (("cells", SCENE), ("springs", 'model = "springs"\n' + SCENE), ("quadratic", 'model = "quadratic"\n' + SCENE),
                        ("in time", SCENE + '[run]\ntime = "0.1 us"\n'), ("modes", held + "[run]\nmodes = 8\n")):
