@@ -12,6 +12,8 @@
 namespace flexel::simulate::quadratic_kernel {
 namespace {
 
+static_assert(kSideBySide == kWidth);
+
 // Gauss's points on [-1, 1].
 template <std::size_t kPoints>
 constexpr double kAt[kPoints] = {};

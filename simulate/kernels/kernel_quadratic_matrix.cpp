@@ -12,6 +12,8 @@
 namespace flexel::simulate::quadratic_kernel {
 namespace {
 
+static_assert(kSideBySide == kWidth);
+
 using V = VectorOf<double>::Type;
 constexpr std::size_t kAxisPoints = 5, kPlanePoints = kAxisPoints * kAxisPoints;
 
