@@ -21,7 +21,6 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr std::size_t kDirectRows = 1000;   // elements; a matrix up to this size is factorised at once
 constexpr std::size_t kCoarsestRows = 500;  // aggregates of six unknowns
 constexpr double kStrongLink = .01;         // weaker couplings do not hold an aggregate together
 constexpr double kAnyLink = 1e-12;          // weaker couplings are rounding
@@ -140,9 +139,10 @@ struct CoarseLevel {
 
 class Multigrid : public Preconditioner {
  public:
-  Multigrid(const LinearOperator& matrix, const NodeGeometry& geometry) : matrix_(matrix) {
+  Multigrid(const LinearOperator& matrix, const NodeGeometry& geometry, std::size_t direct_rows)
+      : matrix_(matrix) {
     assert(geometry.position.size() == matrix.rows() && geometry.index.size() == matrix.rows());
-    if (matrix.rows() > kDirectRows) build_structure(geometry);
+    if (matrix.rows() > direct_rows) build_structure(geometry);
     refresh();
   }
 
@@ -299,8 +299,8 @@ class Multigrid : public Preconditioner {
 }  // namespace
 
 std::unique_ptr<Preconditioner> aggregation_multigrid(const LinearOperator& matrix,
-                                                      const NodeGeometry& geometry) {
-  return std::make_unique<Multigrid>(matrix, geometry);
+                                                      const NodeGeometry& geometry, std::size_t direct_rows) {
+  return std::make_unique<Multigrid>(matrix, geometry, direct_rows);
 }
 
 namespace {
@@ -309,7 +309,7 @@ namespace {
 class MultigridOfStored : public Preconditioner {
  public:
   MultigridOfStored(const BlockMatrix& matrix, const NodeGeometry& geometry)
-      : operator_(matrix), multigrid_(operator_, geometry) {}
+      : operator_(matrix), multigrid_(operator_, geometry, kDirectRows) {}
   void apply(const std::vector<Vec3>& residual, std::vector<Vec3>& correction) const override {
     multigrid_.apply(residual, correction);
   }

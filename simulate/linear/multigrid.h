@@ -6,11 +6,14 @@
 
 namespace flexel::simulate {
 
+constexpr std::size_t kDirectRows = 1000;  // elements; a matrix up to this size is factorised at once
+
 // Smoothed aggregation with six rigid motions an aggregate (Vanek, Mandel, Brezina 1996; notes in
 // docs/theory/solver.md): the paper's reduction of a group of elements to one (section 3.1), with its rotation. A
-// direct factorisation where the matrix is small. Keeps a reference to `matrix`.
+// direct factorisation up to `direct_rows` elements. Keeps a reference to `matrix`.
 [[nodiscard]] std::unique_ptr<Preconditioner> aggregation_multigrid(const LinearOperator& matrix,
-                                                                    const NodeGeometry& geometry);
+                                                                    const NodeGeometry& geometry,
+                                                                    std::size_t direct_rows = kDirectRows);
 [[nodiscard]] std::unique_ptr<Preconditioner> aggregation_multigrid(const BlockMatrix& matrix,
                                                                     const NodeGeometry& geometry);
 
