@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""largest.py [--bin FOLDER] [--write] [--step TIME]: the most cells that keep up with a hand, by material and method.
+"""largest.py [--bin FOLDER] [--method explicit|implicit] [--step TIME] [--write]: the most cells that keep up with a hand, by material and method.
 
 A plate is pressed into a block that lies on a floor, by a fifth of its height. Explicit steps: then it is held; measured is the
 processor time of up to a tenth of a second of motion, on one thread. Implicit steps cost what Newton's method needs, which is
 little at rest: the plate is pressed in within .2 s, then moved by a hand's way, to and fro by a tenth of the block's height four times
-a second; measured is half a second of that. Each is a long run less a short one, the least of three (implicit: of two). A block keeps up where a second
-of motion takes at most a second. Prints a table; with --write into docs/measurements/live-latency.md too.
+a second; measured is half a second of that. Each is a long run less a short one, the least of three (implicit: of two). A block
+keeps up where a second of motion takes at most a second. Prints a table for each; with --write into
+docs/measurements/live-latency.md too.
 """
 
 import argparse
@@ -116,25 +117,25 @@ def most(programs, material, method, step):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--bin", type=pathlib.Path, default=SOURCE / "build/release/bin")
+    parser.add_argument("--method", choices=("explicit", "implicit"), help="default: both")
     parser.add_argument("--step", default="5 ms", help='of implicit steps; default "5 ms"')
     parser.add_argument("--write", action="store_true", help="into docs/measurements/live-latency.md")
     arguments = parser.parse_args()
     programs = arguments.bin.resolve()
-    rows = ["| material | E | cells' size | steps | most cells | s of processor a second |", "|---|---|---|---|---|---|"]
-    for material in MATERIALS:
-        for method in ("explicit", "implicit"):
+    for method in (arguments.method,) if arguments.method else ("explicit", "implicit"):
+        rows = ["| material | E | cells' size | most cells | s of processor a second |", "|---|---|---|---|---|"]
+        for material in MATERIALS:
             with tempfile.TemporaryDirectory(prefix="flexel-") as folder:
                 os.chdir(folder)
                 found = most(programs, material, method, arguments.step)
                 os.chdir("/")
-            steps = "explicit" if method == "explicit" else f"implicit, {arguments.step}"
-            rows.append(f"| {material[0]} | {material[1]} | {material[4]:g} mm | {steps} | " + (f"{found[0]} | {found[1]:.2f} |" if found else "none: 4 cells are too many | |"))
-    table = "\n".join(rows)
-    print(table)
-    if arguments.write:
-        page = SOURCE / "docs/measurements/live-latency.md"
-        text = page.read_text(encoding="utf-8")
-        page.write_text(re.sub(r"(<!-- largest\.py -->\n).*?(<!-- end -->)", lambda m: m[1] + table + "\n" + m[2], text, flags=re.DOTALL), encoding="utf-8")
+            rows.append(f"| {material[0]} | {material[1]} | {material[4]:g} mm | " + (f"{found[0]} | {found[1]:.2f} |" if found else "none: 4 cells are too many | |"))
+        table = "\n".join(rows)
+        print(f"{method}\n{table}")
+        if arguments.write:
+            page = SOURCE / "docs/measurements/live-latency.md"
+            block = re.compile(rf"(<!-- largest\.py {method} -->\n).*?(<!-- end -->)", re.DOTALL)
+            page.write_text(block.sub(lambda m: m[1] + table + "\n" + m[2], page.read_text(encoding="utf-8")), encoding="utf-8")
 
 
 if __name__ == "__main__":

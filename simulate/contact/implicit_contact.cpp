@@ -8,7 +8,7 @@ namespace flexel::simulate {
 namespace {
 
 constexpr double kTangential = 0.8;  // as in contact_friction.cpp
-constexpr double kSettled = 1e-3;    // of the contact forces, by which what is lagged may still change
+constexpr double kSettled = 1e-2;    // of the contact forces, by which what is lagged may still change
 
 }  // namespace
 

@@ -28,7 +28,7 @@ class ImplicitContact {
 
   // A step of `step` s begins at `before`, for which the pairs have been evaluated.
   void begin(const State& before, double step);
-  // Whether friction and damping of the pairs as evaluated in `found` are those that are held, to a thousandth of
+  // Whether friction and damping of the pairs as evaluated in `found` are those that are held, to a hundredth of
   // the contact forces. If not, they are held from now on.
   [[nodiscard]] bool take_up(const State& found);
 

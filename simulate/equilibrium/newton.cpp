@@ -26,7 +26,6 @@
 
 #include "base/parallel.h"
 #include "simulate/linear/conjugate_gradients.h"
-#include "simulate/linear/multigrid.h"
 #include "simulate/linear/vector_products.h"
 
 namespace flexel::simulate {
@@ -151,8 +150,8 @@ void Solver::factor() {
   else if (kept_.preconditioner)
     kept_.preconditioner->refresh();
   else
-    kept_.preconditioner =
-        aggregation_multigrid(mechanics_.tangent(), node_geometry(mechanics_.body(), state_));
+    kept_.preconditioner = aggregation_multigrid(mechanics_.tangent(),
+                                                 node_geometry(mechanics_.body(), state_), options_.direct);
   kept_.stale = keeps;
   kept_.outdated = false;
   kept_.factored = true;

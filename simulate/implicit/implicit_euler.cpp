@@ -16,6 +16,8 @@ namespace {
 
 constexpr double kShortest = 1.0 / 1024;  // of a step
 constexpr int kFullIterations = 12;
+// Elements: contact changes the tangent in every iteration, and a factorisation is dearer than a hierarchy.
+constexpr std::size_t kDirectRowsTouching = 100;
 constexpr int kPasses = 12;         // of Newton's method, until what is held fixed in it suits
 constexpr int kShares = 4;          // of a step, that are tried until effects bear it
 constexpr double kWhole = 0.999;    // share that needs no other
@@ -33,6 +35,8 @@ ImplicitEuler::ImplicitEuler(const Problem& problem, const std::vector<ActiveEff
       reach_(std::numeric_limits<double>::infinity()),
       seconds_(effects.size(), 0) {
   for (const double tau : tau_) damped_ = damped_ || tau > 0;
+  for (const ActiveEffect& effect : effects)
+    touches_ = touches_ || effect->account() == EnergyAccount::stored;
   make_mechanics();
 }
 
@@ -177,6 +181,7 @@ bool ImplicitEuler::solve(State& trial, NewtonSteps steps,
   options.tolerance = tolerance_;
   if (steps == NewtonSteps::full) options.max_iterations = kFullIterations;
   options.least_scale = force_scale(trial);
+  if (touches_) options.direct.rows = kDirectRowsTouching;
   for (int pass = 0; pass < kPasses; ++pass) {
     const NewtonOutcome outcome = newton(
         *mechanics_, trial, options, [&](double, const std::string& note) { progress(note); }, &memory_);

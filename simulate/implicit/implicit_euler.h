@@ -84,15 +84,15 @@ class ImplicitEuler {
   const std::vector<double>& mass_;
   const std::vector<double>& tau_;  // (parts) s
   double tolerance_;
-  bool damped_ = false;
-  double step_ = 0, reach_;               // s
-  State before_;                          // at the start of the step
-  std::vector<Vec3> target_;              // x~, displacements without forces [m]
-  State aimed_;                           // those, with what is led where it will be
-  BlockMatrix damping_matrix_;            // at before_; empty without damping
-  std::optional<Mechanics> mechanics_;    // refers to the above
-  std::vector<CoupledElements> coupled_;  // in it, by effects, ascending
-  std::vector<double> seconds_;           // (effects_) within those before
+  bool damped_ = false, touches_ = false;  // by damping and contact
+  double step_ = 0, reach_;                // s
+  State before_;                           // at the start of the step
+  std::vector<Vec3> target_;               // x~, displacements without forces [m]
+  State aimed_;                            // those, with what is led where it will be
+  BlockMatrix damping_matrix_;             // at before_; empty without damping
+  std::optional<Mechanics> mechanics_;     // refers to the above
+  std::vector<CoupledElements> coupled_;   // in it, by effects, ascending
+  std::vector<double> seconds_;            // (effects_) within those before
   NewtonMemory memory_;
   std::vector<Vec3> moved_, supports_;
 };

@@ -21,7 +21,6 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr std::size_t kDirectRows = 1000;   // elements; a matrix up to this size is factorised at once
 constexpr std::size_t kCoarsestRows = 500;  // aggregates of six unknowns
 constexpr double kStrongLink = .01;         // weaker couplings do not hold an aggregate together
 constexpr double kAnyLink = 1e-12;          // weaker couplings are rounding
@@ -140,12 +139,12 @@ struct CoarseLevel {
 
 class Multigrid : public Preconditioner {
  public:
-  Multigrid(const LinearOperator& matrix, const NodeGeometry& geometry, double factor_cost)
+  Multigrid(const LinearOperator& matrix, const NodeGeometry& geometry, const DirectLimit& direct)
       : matrix_(matrix) {
     assert(geometry.position.size() == matrix.rows() && geometry.index.size() == matrix.rows());
-    const bool cheap =
-        factor_cost > 0 && factor_operations(matrix) <= factor_cost * static_cast<double>(matrix.rows());
-    if (matrix.rows() > kDirectRows && !cheap) build_structure(geometry);
+    const bool cheap = direct.row_cost > 0 &&
+                       factor_operations(matrix) <= direct.row_cost * static_cast<double>(matrix.rows());
+    if (matrix.rows() > direct.rows && !cheap) build_structure(geometry);
     refresh();
   }
 
@@ -302,8 +301,9 @@ class Multigrid : public Preconditioner {
 }  // namespace
 
 std::unique_ptr<Preconditioner> aggregation_multigrid(const LinearOperator& matrix,
-                                                      const NodeGeometry& geometry, double factor_cost) {
-  return std::make_unique<Multigrid>(matrix, geometry, factor_cost);
+                                                      const NodeGeometry& geometry,
+                                                      const DirectLimit& direct) {
+  return std::make_unique<Multigrid>(matrix, geometry, direct);
 }
 
 namespace {
@@ -311,8 +311,8 @@ namespace {
 // With the operator that it needs.
 class MultigridOfStored : public Preconditioner {
  public:
-  MultigridOfStored(const BlockMatrix& matrix, const NodeGeometry& geometry, double factor_cost)
-      : operator_(matrix), multigrid_(operator_, geometry, factor_cost) {}
+  MultigridOfStored(const BlockMatrix& matrix, const NodeGeometry& geometry, const DirectLimit& direct)
+      : operator_(matrix), multigrid_(operator_, geometry, direct) {}
   void apply(const std::vector<Vec3>& residual, std::vector<Vec3>& correction) const override {
     multigrid_.apply(residual, correction);
   }
@@ -327,8 +327,8 @@ class MultigridOfStored : public Preconditioner {
 }  // namespace
 
 std::unique_ptr<Preconditioner> aggregation_multigrid(const BlockMatrix& matrix, const NodeGeometry& geometry,
-                                                      double factor_cost) {
-  return std::make_unique<MultigridOfStored>(matrix, geometry, factor_cost);
+                                                      const DirectLimit& direct) {
+  return std::make_unique<MultigridOfStored>(matrix, geometry, direct);
 }
 
 }  // namespace flexel::simulate

@@ -145,7 +145,7 @@ QuadraticMultigrid::QuadraticMultigrid(const QuadraticOperator& matrix, const Bo
   for (std::size_t e = 0; e < coarse_.rows() && !held_softly.empty(); ++e)
     coarse_.values[diagonal_position(coarse_, e)].diagonal().array() +=
         held_softly[matrix.nodes().elements[e]];
-  hierarchy_ = aggregation_multigrid(coarse_, geometry_, kFactorCost);
+  hierarchy_ = aggregation_multigrid(coarse_, geometry_, {.row_cost = kFactorCost});
   estimate_largest();
 }
 
