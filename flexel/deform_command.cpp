@@ -650,7 +650,11 @@ std::optional<Deformed> run_with(DeformArguments arguments, int argc, char** arg
           fmt::format("--html {}: pages are HTML: name it {}.html", arguments.html, stem(arguments.html)));
     arguments.outputs.push_back(arguments.html);
   }
-  Plan plan = make_plan(arguments, app);
+  Plan plan;
+  if (arguments.part != nullptr)
+    plan = make_plan(arguments, app);
+  else
+    plan_after_files(arguments.job, [&] { plan = make_plan(arguments, app); });
   const ThreadLimit limit(arguments.threads);
   Progress progress("flexel", arguments.quiet ? Progress::Mode::quiet : mode);
   return run_stages(arguments, plan, progress);
