@@ -369,16 +369,15 @@ class GoalRuns {
     model_.use_quadratic(
         fmt::format("the first answer of model cells was rough, off by up to {}", human_share(guess)));
     const mapping::MapOptions map = plan_.map;
-    const StopAfter limit(patience(), "--within");
     try {
+      const StopAfter limit(patience(), "--within");
       std::vector<SolvedRun> other;
       const double size = made(std::nullopt).size;
       other.push_back(solve(size, [](std::size_t) { return true; }));
       if (error_of(other) < guess) return std::move(other.front());
     } catch (const InputError&) {  // a scene that `quadratic` does not take
     } catch (const DivergedError&) {
-    } catch (const TimeoutError&) {
-      if (!limit.passed()) throw;
+    } catch (const TimeoutError&) {  // there is an answer; a limit of the whole command ends what comes next
     }
     drop_warnings();
     plan_.map = map;
@@ -388,6 +387,7 @@ class GoalRuns {
   }
   // Share; of no bar infinite.
   [[nodiscard]] double error_of(const std::vector<SolvedRun>& run) const {
+    const StopWaits answered;
     const std::optional<Judged> judged = judge(run, Quantities(plan_.goal->driven));
     return judged ? judged->error : std::numeric_limits<double>::infinity();
   }
