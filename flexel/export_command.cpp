@@ -255,8 +255,11 @@ int export_command(int argc, char** argv) {
   declare(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   const StopEndsProcess nothing_is_left;
-  check(arguments);
-  Job job = plan_job(arguments.job);
+  Job job;
+  plan_after_files(arguments.job, [&] {
+    check(arguments);
+    job = plan_job(arguments.job);
+  });
   const ThreadLimit limit(arguments.threads);
   Progress progress("flexel", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
   progress.stage("import");
