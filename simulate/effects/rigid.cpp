@@ -247,7 +247,7 @@ void RigidParts::add_support_forces(std::vector<Vec3>& forces) {
       forces[e] += moving.support[e - moving.body.begin];
 }
 
-// 18 numbers and the velocities, a part.
+// 24 numbers and the velocities, a part. Implicit steps tell the forces of the last one before the next.
 std::vector<double> RigidParts::memory() const {
   std::vector<double> memory;
   const auto add = [&](const auto& values) {
@@ -258,6 +258,8 @@ std::vector<double> RigidParts::memory() const {
     add(moving.body.pose.rotation);
     add(moving.body.momentum);
     add(moving.body.spin);
+    add(moving.force);
+    add(moving.torque);
     for (const Vec3& velocity : moving.velocity) add(velocity);
   }
   return memory;
@@ -270,13 +272,15 @@ void RigidParts::restore(const std::vector<double>& memory) {
     from += values.size();
   };
   std::size_t wanted = 0;
-  for (const Moving& moving : moving_) wanted += 18 + 3 * moving.velocity.size();
+  for (const Moving& moving : moving_) wanted += 24 + 3 * moving.velocity.size();
   if (memory.size() != wanted) throw InputError("the checkpoint's rigid parts are not those of its scene");
   for (Moving& moving : moving_) {
     take(moving.body.pose.translation);
     take(moving.body.pose.rotation);
     take(moving.body.momentum);
     take(moving.body.spin);
+    take(moving.force);
+    take(moving.torque);
     for (Vec3& velocity : moving.velocity) take(velocity);
   }
 }
