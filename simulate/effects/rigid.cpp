@@ -22,7 +22,7 @@ std::vector<Rigidity> rigidity_of_entries(const RigidParts::Parameters& paramete
   std::vector<std::size_t> width(names.size(), std::numeric_limits<std::size_t>::max());
   const auto decide = [&](const std::string& name, const std::vector<std::uint32_t>& parts, Rigidity says) {
     for (const std::uint32_t p : parts) {
-      const std::size_t its = names[p] == name ? 0 : parts.size();
+      const std::size_t its = entry_width(names, parts, name);
       if (its >= width[p]) continue;
       width[p] = its;
       result[p] = says;

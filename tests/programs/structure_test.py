@@ -21,7 +21,7 @@ simulate/laws simulate/input simulate/result simulate/linear simulate/state simu
 simulate/kernels simulate/matter simulate/gravitation simulate/contact/points simulate/contact/pairs simulate/contact simulate/effects simulate/thermal simulate/paper simulate/events simulate/scene
 simulate/equilibrium simulate/estimate simulate/probes simulate/quadratic/cells simulate/quadratic simulate/conduction simulate/live simulate/stepping simulate/implicit simulate/time simulate/modes simulate
 mapping/types mapping/anchors mapping/checks mapping/methods mapping/space mapping/crack mapping/report mapping/refine mapping
-cad/read cad/deform cad
+cad/read cad/fit cad/deform cad
 flexel/process flexel/picture/canvas flexel/picture/render flexel/picture flexel/view flexel/clay flexel/study/runs flexel/study flexel/export
 flexel/measure flexel/accuracy flexel/compensate flexel
 python
