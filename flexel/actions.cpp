@@ -62,6 +62,15 @@ std::string other_option(Dimension dimension, const std::string& unit) {
   return "";
 }
 
+// Takes the word "follower" from the end of a unit; false where it is not there.
+bool take_follower(std::string& unit) {
+  constexpr std::string_view kWord = " follower";
+  if (unit.size() < kWord.size() || unit.compare(unit.size() - kWord.size(), kWord.size(), kWord) != 0)
+    return false;
+  unit = trimmed(unit.substr(0, unit.size() - kWord.size()));
+  return true;
+}
+
 Action parse_action(const std::string& text, const std::string& option, Dimension dimension,
                     const std::string& example) {
   const auto fail = [&](const std::string& what) {
@@ -72,7 +81,10 @@ Action parse_action(const std::string& text, const std::string& option, Dimensio
   if (colon == std::string::npos) fail("no colon between where and how much");
   action.where = trimmed(text.substr(0, colon));
   if (action.where.empty()) fail("nothing before the colon says where");
-  const Amount amount = split_amount(text.substr(colon + 1));
+  Amount amount = split_amount(text.substr(colon + 1));
+  action.follower = take_follower(amount.unit);
+  if (action.follower && dimension != Dimension::force && dimension != Dimension::torque)
+    fail("\"follower\" goes with forces, pressures and torques");
   const auto value = [&](std::size_t i, Dimension of) {
     try {
       return parse_quantity(amount.numbers[i] + " " + amount.unit, of);
@@ -140,6 +152,9 @@ Action parse_twist(const std::string& text) {
 Action parse_bearing(const std::string& text) {
   const char* example = "--bearing \"part/3: 0 0 -200 N\"";
   Action action = parse_action(text, "--bearing", Dimension::force, example);
+  if (action.follower)
+    throw InputError(
+        fmt::format("--bearing \"{}\": a pin's load does not follow the hole; leave \"follower\" out", text));
   if (!action.vector || *action.vector == Vec3::Zero())
     throw InputError(
         fmt::format("--bearing \"{}\": a pin presses in a direction: give three components, for example {}",
@@ -227,6 +242,7 @@ void add_push(simulate::Scene& scene, const Action& action, const Body& body) {
     loads.push_back(simulate::make_push(
         where, action.vector ? *action.vector : Vec3(*action.along * inward_normal(where, body))));
   }
+  loads.back().follower = action.follower;
 }
 
 void add_move(simulate::Scene& scene, const Action& action, const Body& body) {
@@ -241,6 +257,7 @@ void add_torque(simulate::Scene& scene, const Action& action, const Body& body) 
   load.name = describe(load.where);
   load.origin = load.where.origin;
   load.torque = action.vector ? *action.vector : Vec3(*action.along * face_axis(load.where, body).direction);
+  load.follower = action.follower;
   scene.get<simulate::Loads>().loads.push_back(std::move(load));
 }
 

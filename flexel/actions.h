@@ -9,12 +9,14 @@
 namespace flexel::commands {
 
 // "WHERE: AMOUNT", parsed; AMOUNT is "0 0 -50 N" (three components and a unit; commas will do) or "50 N"
-// (along the inward normal; of torques and twists: about the face's own axis).
+// (along the inward normal; of torques and twists: about the face's own axis). Forces, pressures and
+// torques may end with "follower": they turn with the surface.
 struct Action {
   std::string where;
   std::optional<Vec3> vector;      // N, m, N m or rad
   std::optional<double> along;     // likewise
   std::optional<double> pressure;  // Pa
+  bool follower = false;
 };
 
 // `text` of --push: a force, in total, or a pressure. Throws InputError that shows how to write it.

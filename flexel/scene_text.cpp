@@ -70,9 +70,10 @@ std::string tie_text(const simulate::Tie& tie) {
   if (!tie.is_move) return text;
   if (tie.motion.angle == 0)
     return text + fmt::format("displacement = {}\n", vector(tie.motion.translation, "m"));
-  return text + fmt::format("rotation = {{ axis = {}, through = {}, angle = {} }}\n",
+  return text + fmt::format("rotation = {{ axis = {}, through = {}, angle = {}{} }}\n",
                             direction_text(tie.motion.axis), vector(tie.motion.through, "m"),
-                            quantity(tie.motion.angle, "rad"));
+                            quantity(tie.motion.angle, "rad"),
+                            tie.motion.arc_from ? ", arc_from = " + vector(*tie.motion.arc_from, "m") : "");
 }
 
 std::string load_text(const simulate::Load& load) {
@@ -82,6 +83,7 @@ std::string load_text(const simulate::Load& load) {
     text += fmt::format("{} = {}\n", load.bearing ? "bearing" : "force", vector(*load.force, "N"));
   if (load.torque) text += fmt::format("torque = {}\n", vector(*load.torque, "N m"));
   if (load.pressure) text += fmt::format("pressure = {}\n", quantity(*load.pressure, "Pa"));
+  if (load.follower) text += "follower = true\n";
   return text;
 }
 

@@ -128,7 +128,7 @@ class Run {
 
  private:
   EquilibriumResult solve(Mechanics& mechanics);
-  void warn_of_buckling_by_heat(Mechanics& mechanics);
+  void warn_of_buckling(Mechanics& mechanics);
   [[nodiscard]] std::optional<std::vector<Vec3>> coarse_equilibrium(Progress& stretch);
   [[nodiscard]] std::string save_failed(const Mechanics& mechanics);
 
@@ -203,8 +203,14 @@ std::string Run::save_failed(const Mechanics& mechanics) {
   return "; the last state in equilibrium is in " + options_.failed_output;
 }
 
-// Load steps scale loads and moves; free strain acts whole from the first on, so that buckling is not met on the way.
-void Run::warn_of_buckling_by_heat(Mechanics& mechanics) {
+// Loads that follow have no energy whose minimum is looked for. Load steps scale loads and moves; free
+// strain acts whole from the first on, so that buckling is not met on the way.
+void Run::warn_of_buckling(Mechanics& mechanics) {
+  if (mechanics.follows() && has_positive_tangent(mechanics, state_) != true)
+    progress_.warn(
+        scene_.name +
+        ": whether this equilibrium is stable under loads that follow it was not found out: the part may "
+        "buckle or flutter; [run] time with [damping] shows whether it stays");
   if (!body_.cell_columns.contains(kFreeStrainColumn)) return;
   const std::optional<bool> stable = has_positive_tangent(mechanics, state_);
   if (stable == true) return;
@@ -244,7 +250,7 @@ SimulateResult Run::operator()() {
   measure_corners(mechanics.cells(), body_, state_, result, progress_);
   if (options_.stress) measure_stress(problem_, state_, body_, result);
   if (options_.estimate) mark_singular(body_, tied_, result);
-  warn_of_buckling_by_heat(mechanics);
+  warn_of_buckling(mechanics);
   carry_strays(fragments_, problem_, mechanics.stencil(), state_);
   move_body(body_, state_);
   if (scene_.run.renormalise) renormalise_all(body_, problem_, state_.displacement);

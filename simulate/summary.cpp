@@ -50,8 +50,10 @@ std::string resultant(const Vec3& force, const Vec3& moment) {
 
 // "; its point moves by (...) and turns by (...) deg" of a rigid link, or nothing.
 std::string link_motion(const AppliedLoad& load) {
-  if (!load.displacement || !load.rotation) return "";
+  if (!load.rotation || !(load.displacement || load.follower)) return "";
   const Vec3 shown = 180 / M_PI * without_rounding(*load.rotation);
+  if (!load.displacement)
+    return fmt::format("; it turned by ({:.3g}, {:.3g}, {:.3g}) deg", shown.x(), shown.y(), shown.z());
   return fmt::format("; its point moves by {} and turns by ({:.3g}, {:.3g}, {:.3g}) deg",
                      lengths(*load.displacement), shown.x(), shown.y(), shown.z());
 }
@@ -226,6 +228,7 @@ Json loads_json(const std::vector<AppliedLoad>& loads) {
     json.push_back({{"name", load.name}, {"force", vector(load.force)}, {"moment", vector(load.moment)}});
     if (load.displacement) json.back()["displacement"] = vector(*load.displacement);
     if (load.rotation) json.back()["rotation"] = vector(*load.rotation);
+    if (load.follower) json.back()["follower"] = true;
   }
   return json;
 }

@@ -109,6 +109,12 @@ void refuse_untranslatable(const simulate::Scene& scene, const simulate::Problem
       throw InputError(tie.origin, fmt::format("load \"{}\": a rigid link has no translation; export it with "
                                                "link = \"averaging\"",
                                                tie.name));
+  for (const simulate::Load& load : scene.get<simulate::Loads>().loads)
+    if (load.follower)
+      throw InputError(load.origin,
+                       fmt::format("load \"{}\": follower = true has no translation: leave it out to "
+                                   "export the load as it is at rest",
+                                   load.name));
   simulate::EffectParameters others = scene.effects;
   others.get<simulate::Gravity>().acceleration.reset();
   others.get<simulate::Loads>() = {};

@@ -14,12 +14,13 @@ namespace flexel::simulate {
 
 struct RigidLink {
   std::string name, origin;  // of its load; "beam.toml:12"
-  // Given. Dead: force and couple keep their direction where the link turns, and act at `at`, which goes
-  // along.
+  // Given. Force and couple keep their direction where the link turns, or turn with it (follower); they
+  // act at `at`, which goes along.
   Vec3 at = Vec3::Zero();                            // m, rest
   Vec3 force = Vec3::Zero(), torque = Vec3::Zero();  // N, N m: the whole load
-  Vec3 middle = Vec3::Zero();                        // m, rest: of the matter
-  double reach = 1;                                  // m: how far the matter extends around it
+  bool follower = false;
+  Vec3 middle = Vec3::Zero();  // m, rest: of the matter
+  double reach = 1;            // m: how far the matter extends around it
   // Found
   Vec3 translation = Vec3::Zero();  // m, of `middle`
   Vec3 turn = Vec3::Zero();         // rad: rotation vector
@@ -28,14 +29,22 @@ struct RigidLink {
   Vec3 pull = Vec3::Zero(), pull_moment = Vec3::Zero();  // N, N m
 
   // Displacement [m] of the material point that rested at `rest`.
-  [[nodiscard]] Vec3 displacement(const Vec3& rest) const {
-    if (small) return translation + turn.cross(rest - middle);
+  [[nodiscard]] Vec3 displacement(const Vec3& rest) const { return translation + turning(rest - middle); }
+  // The force or the couple now.
+  [[nodiscard]] Vec3 now(const Vec3& given) const {
+    return follower && !small ? Vec3(given + turning(given)) : given;
+  }
+
+ private:
+  // What the turn changes of a vector.
+  [[nodiscard]] Vec3 turning(const Vec3& vector) const {
+    if (small) return turn.cross(vector);
     const double angle = turn.norm();
-    if (angle == 0) return translation;
+    if (angle == 0) return Vec3::Zero();
     // (R - I) arm by half angles: no cancellation for a small angle.
-    const Vec3 axis = turn / angle, across = axis.cross(rest - middle);
+    const Vec3 axis = turn / angle, across = axis.cross(vector);
     const double sine = std::sin(0.5 * angle), cosine = std::cos(0.5 * angle);
-    return translation + 2 * sine * (cosine * across + sine * axis.cross(across));
+    return 2 * sine * (cosine * across + sine * axis.cross(across));
   }
 };
 

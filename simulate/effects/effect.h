@@ -75,6 +75,8 @@ class Effect {
   [[nodiscard]] virtual bool constant() const { return false; }
   // It has an add_stiffness(), at the elements that add_forces() pulls at.
   [[nodiscard]] virtual bool adds_stiffness() const { return false; }
+  // Its forces follow the shape and have no energy: add_force_change() tells how, which is not symmetric.
+  [[nodiscard]] virtual bool follows() const { return false; }
   // Its forces are minus the derivative of resistance() by the velocities.
   [[nodiscard]] virtual bool resists() const { return false; }
   // Its finish_step() changes the state or remembers it.
@@ -92,6 +94,9 @@ class Effect {
   virtual void add_forces(const State&, std::vector<Vec3>& /*forces*/) {}
   // N/m, minus the forces' derivative.
   virtual void add_stiffness(const State&, BlockMatrix&) {}
+  // N, how the forces of an effect that follows() change to first order along a change (elements) m; or
+  // that with the derivative transposed (true). Added to the last.
+  virtual void add_force_change(const State&, const std::vector<Vec3>&, bool, std::vector<Vec3>&) {}
   // Elements that follow a path exactly.
   virtual void constrain(Constraints&) {}
   // `unbalanced`: N (elements), on elements that are held.

@@ -11,6 +11,8 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "simulate/followers/pressing_load.h"
+#include "simulate/followers/turning_load.h"
 #include "simulate/input/scene_selection.h"
 #include "simulate/matter/load_distribution.h"
 #include "simulate/matter/surface_points.h"
@@ -29,6 +31,7 @@ Load parse_load(TableReader& reader) {
   load.pressure = reader.quantity("pressure", Dimension::pressure);
   const std::optional<Vec3> pin = reader.vector("bearing", Dimension::force);
   load.course = parse_course(reader);
+  load.follower = parse_follower(reader);
   const std::string link = reader.text("link").value_or("averaging");
   if (link != "averaging")
     reader.fail(fmt::format("\"link\" = \"{}\": use \"averaging\" or \"rigid\"", link));
@@ -42,6 +45,8 @@ Load parse_load(TableReader& reader) {
   if (load.at && !load.force) reader.fail("\"at\" says where a \"force\" acts; give one");
   if (pin) {
     if (*pin == Vec3::Zero()) reader.fail("\"bearing\" is zero and has no direction");
+    if (load.follower)
+      reader.fail("\"follower\" goes with \"force\", \"torque\" and \"pressure\", not with \"bearing\"");
     load.force = pin;
     load.bearing = true;
   }
@@ -52,29 +57,90 @@ void spread(const InterpolationWeights& at, const Vec3& force, std::vector<Vec3>
   for (std::uint32_t a = 0; a < at.count; ++a) sum[at.elements[a]] += at.weights[a] * force;
 }
 
-void add_surface_load(const Load& load, const std::vector<std::uint32_t>& polygons, const Problem& problem,
-                      std::vector<Vec3>& sum) {
-  const std::vector<SurfacePoint> points = gathered_surface_points(problem, polygons);
+std::vector<SurfacePoint> points_under(const Load& load, const std::vector<std::uint32_t>& polygons,
+                                       const Problem& problem) {
+  // what turns depends on second moments, which gathered points do not keep
+  std::vector<SurfacePoint> points =
+      load.follower ? surface_points(problem, polygons) : gathered_surface_points(problem, polygons);
   if (!(total_area(points) > 0))
     throw InputError(
         load.origin,
         fmt::format("load \"{}\": no matter lies under the selected surface; use a smaller spacing",
                     load.name));
-  if (load.pressure) {
-    for (const SurfacePoint& point : points) spread(point.at, -*load.pressure * point.area_vector, sum);
-    return;
-  }
+  return points;
+}
+
+std::vector<LoadedPoint> loaded_points(const std::vector<SurfacePoint>& points) {
   std::vector<LoadedPoint> loaded;
   loaded.reserve(points.size());
   for (const SurfacePoint& point : points)
     loaded.push_back({point.position, point.area_vector.norm(), point.area_vector.normalized()});
-  const std::vector<Vec3> forces = load_forces(load, loaded);
+  return loaded;
+}
+
+// 1/m, world frame: gradients of the trilinear weights at the point that has these weights.
+std::array<Vec3, 8> weight_gradients(const InterpolationWeights& at, const Lattice& lattice) {
+  Vec3 place = Vec3::Zero();  // cell coordinates
+  for (std::size_t a = 0; a < 8; ++a)
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      if (a >> axis & 1) place[static_cast<Eigen::Index>(axis)] += at.weights[a];
+  std::array<Vec3, 8> gradients;
+  for (std::size_t a = 0; a < 8; ++a) {
+    Vec3 value, slope;
+    for (int axis = 0; axis < 3; ++axis) {
+      const bool far = (a >> axis & 1) != 0;
+      value[axis] = far ? place[axis] : 1 - place[axis];
+      slope[axis] = (far ? 1 : -1) / lattice.spacing[axis];
+    }
+    gradients[a] = lattice.axes * Vec3(slope.x() * value.y() * value.z(), value.x() * slope.y() * value.z(),
+                                       value.x() * value.y() * slope.z());
+  }
+  return gradients;
+}
+
+std::unique_ptr<FollowerLoad> pressing_load(const Load& load, const std::vector<SurfacePoint>& points,
+                                            const Body& body) {
+  auto made = std::make_unique<PressingLoad>(*load.pressure);
+  for (const SurfacePoint& point : points) {
+    const Part& part = body.parts[body.surface.polygon_part(point.polygon)];
+    if (part.placement == Placement::centre)
+      throw InputError(
+          load.origin,
+          fmt::format(
+              "load \"{}\": a pressure with follower = true needs cells, which model \"paper\" does not "
+              "have (part \"{}\"); leave follower out, or use model \"cells\"",
+              load.name, part.name));
+    made->add_point(point.at.elements, point.at.weights, weight_gradients(point.at, part.lattice),
+                    point.area_vector);
+  }
+  return made;
+}
+
+std::unique_ptr<FollowerLoad> follower_on_surface(const Load& load,
+                                                  const std::vector<std::uint32_t>& polygons,
+                                                  const Problem& problem) {
+  const std::vector<SurfacePoint> points = points_under(load, polygons, problem);
+  if (load.pressure) return pressing_load(load, points, problem.body);
+  return turning_load(load, loaded_points(points), [&](std::size_t q, const auto& each) {
+    for (std::uint32_t a = 0; a < points[q].at.count; ++a)
+      each(points[q].at.elements[a], points[q].at.weights[a]);
+  });
+}
+
+void add_surface_load(const Load& load, const std::vector<std::uint32_t>& polygons, const Problem& problem,
+                      std::vector<Vec3>& sum) {
+  const std::vector<SurfacePoint> points = points_under(load, polygons, problem);
+  if (load.pressure) {
+    for (const SurfacePoint& point : points) spread(point.at, -*load.pressure * point.area_vector, sum);
+    return;
+  }
+  const std::vector<Vec3> forces = load_forces(load, loaded_points(points));
   for (std::size_t q = 0; q < points.size(); ++q) spread(points[q].at, forces[q], sum);
 }
 
-// On the selected elements, by the volume of the matter around them.
-void add_volume_load(const Load& load, const std::vector<std::uint32_t>& elements, const Problem& problem,
-                     std::vector<Vec3>& sum) {
+// The selected elements, by the volume of the matter around them.
+std::vector<LoadedPoint> loaded_elements(const Load& load, const std::vector<std::uint32_t>& elements,
+                                         const Problem& problem) {
   if (load.pressure || load.bearing)
     throw InputError(
         load.origin,
@@ -90,11 +156,31 @@ void add_volume_load(const Load& load, const std::vector<std::uint32_t>& element
   if (!(total > 0))
     throw InputError(load.origin,
                      fmt::format("load \"{}\": the selected elements hold no matter", load.name));
-  const std::vector<Vec3> forces = load_forces(load, loaded);
+  return loaded;
+}
+
+void add_volume_load(const Load& load, const std::vector<std::uint32_t>& elements, const Problem& problem,
+                     std::vector<Vec3>& sum) {
+  const std::vector<Vec3> forces = load_forces(load, loaded_elements(load, elements, problem));
   for (std::size_t q = 0; q < elements.size(); ++q) sum[elements[q]] += forces[q];
 }
 
+std::unique_ptr<FollowerLoad> follower_on_elements(const Load& load,
+                                                   const std::vector<std::uint32_t>& elements,
+                                                   const Problem& problem) {
+  return turning_load(load, loaded_elements(load, elements, problem),
+                      [&](std::size_t q, const auto& each) { each(elements[q], 1); });
+}
+
 }  // namespace
+
+bool parse_follower(TableReader& reader) {
+  const SceneValue* value = reader.find("follower");
+  if (!value) return false;
+  if (value->kind != SceneValue::Kind::boolean)
+    reader.fail(value->line, "\"follower\" needs to be true or false");
+  return value->flag;
+}
 
 std::vector<Vec3> load_forces(const Load& load, const std::vector<LoadedPoint>& points) {
   if (load.bearing) {
@@ -110,6 +196,18 @@ std::vector<Vec3> load_forces(const Load& load, const std::vector<LoadedPoint>& 
   throw InputError(
       load.origin,
       fmt::format("load \"{}\": its points lie on a line and take no moment about it; select a larger area",
+                  load.name));
+}
+
+std::unique_ptr<FollowerLoad> turning_load(const Load& load, const std::vector<LoadedPoint>& points,
+                                           const NodeWeights& carriers) {
+  std::optional<TurningLoad> made = TurningLoad::make(points, carriers, load.force.value_or(Vec3::Zero()),
+                                                      load.torque.value_or(Vec3::Zero()), load.at);
+  if (made) return std::make_unique<TurningLoad>(std::move(*made));
+  throw InputError(
+      load.origin,
+      fmt::format("load \"{}\": its points lie on a line, whose turn cannot be seen, and it cannot "
+                  "follow them; select a larger area, or leave follower out",
                   load.name));
 }
 
@@ -130,12 +228,19 @@ std::optional<Loads> Loads::make(const Parameters& parameters, const Problem& pr
     if (!selected.polygons.empty() && !selected.elements.empty())
       throw InputError(load.origin,
                        fmt::format("load \"{}\" mixes surface and elements; write two loads", load.name));
+    Spread made{load.name, load.course, {}, load.torque.has_value() || load.at.has_value()};
+    const bool on_surface = selected.elements.empty();
+    if (load.follower) {
+      made.follower = on_surface ? follower_on_surface(load, selected.polygons, problem)
+                                 : follower_on_elements(load, selected.elements, problem);
+      loads.loads_.push_back(std::move(made));
+      continue;
+    }
     std::vector<Vec3> sum(problem.body.element_count(), Vec3::Zero());
-    if (selected.elements.empty())
+    if (on_surface)
       add_surface_load(load, selected.polygons, problem, sum);
     else
       add_volume_load(load, selected.elements, problem, sum);
-    Spread made{load.name, load.course, {}, load.torque.has_value() || load.at.has_value()};
     for (std::uint32_t e = 0; e < sum.size(); ++e)
       if (sum[e] != Vec3::Zero()) made.forces.push_back({e, sum[e]});
     loads.loads_.push_back(std::move(made));
@@ -144,12 +249,63 @@ std::optional<Loads> Loads::make(const Parameters& parameters, const Problem& pr
 }
 
 std::string Loads::why() const {
-  return fmt::format("{} [[load]]", loads_.size());
+  const auto following = std::count_if(loads_.begin(), loads_.end(),
+                                       [](const Spread& load) { return load.follower != nullptr; });
+  return fmt::format("{} [[load]]{}", loads_.size(),
+                     following > 0 ? fmt::format(", {} of which follow(s) the shape", following) : "");
 }
 
 bool Loads::constant() const {
   return std::all_of(loads_.begin(), loads_.end(),
-                     [](const Spread& load) { return load.course.time.empty(); });
+                     [](const Spread& load) { return load.course.time.empty() && !load.follower; });
+}
+
+bool Loads::follows() const {
+  return std::any_of(loads_.begin(), loads_.end(),
+                     [](const Spread& load) { return load.follower != nullptr; });
+}
+
+void Loads::add_force_change(const State& state, const std::vector<Vec3>& change, bool transposed,
+                             std::vector<Vec3>& forces) {
+  for (const Spread& load : loads_) {
+    if (!load.follower) continue;
+    const double factor = load.course.at(state);
+    if (transposed)
+      load.follower->add_transposed_change(state.displacement, factor, change, forces);
+    else
+      load.follower->add_change(state.displacement, factor, change, forces);
+  }
+}
+
+double Loads::added_frequency(const State&, const std::vector<double>& mass) {
+  if (added_frequency_) return *added_frequency_;
+  std::vector<double> sums(mass.size(), 0);
+  for (const Spread& load : loads_) {
+    double factor = load.course.factor.empty() ? 1 : 0;
+    for (const double each : load.course.factor) factor = std::max(factor, std::abs(each));
+    if (load.follower) load.follower->add_row_sums(factor, sums);
+  }
+  double largest = 0;
+  for (std::size_t e = 0; e < mass.size(); ++e)
+    if (sums[e] > 0) largest = std::max(largest, sums[e] / mass[e]);
+  added_frequency_ = largest;
+  return largest;
+}
+
+std::vector<double> Loads::memory() const {
+  std::vector<double> turns;
+  for (const Spread& load : loads_)
+    if (load.follower) turns.insert(turns.end(), load.turn.begin(), load.turn.end());
+  return turns;
+}
+
+void Loads::restore(const std::vector<double>& memory) {
+  std::size_t next = 0;
+  for (Spread& load : loads_)
+    if (load.follower && next + 3 <= memory.size()) {
+      load.turn = Eigen::Map<const Vec3>(&memory[next]);
+      next += 3;
+    }
 }
 
 double Loads::energy(const State& state) {
@@ -163,8 +319,12 @@ double Loads::energy(const State& state) {
 }
 
 void Loads::add_forces(const State& state, std::vector<Vec3>& forces) {
-  for (const Spread& load : loads_) {
+  for (Spread& load : loads_) {
     const double factor = load.course.at(state);
+    if (load.follower) {
+      load.follower->add_forces(state.displacement, factor, forces);
+      load.turn = load.follower->turn(state.displacement, load.turn);
+    }
     for (const ElementForce& at : load.forces) forces[at.element] += factor * at.force;
   }
 }
@@ -173,6 +333,16 @@ void Loads::report(const State& state, const std::vector<Vec3>&, SimulateResult&
   for (const Spread& load : loads_) {
     const double factor = load.course.at(state);
     AppliedLoad total{load.name, Vec3::Zero(), Vec3::Zero()};
+    if (load.follower) {
+      std::vector<Vec3> forces(body_->element_count(), Vec3::Zero());
+      load.follower->add_forces(state.displacement, factor, forces);
+      for (std::size_t e = 0; e < forces.size(); ++e)
+        add_at(forces[e], body_->rest[e] + state.displacement[e], total.force, total.moment);
+      total.follower = true;
+      if (load.couple) total.rotation = load.follower->turn(state.displacement, load.turn);
+      result.loads.push_back(total);
+      continue;
+    }
     for (const ElementForce& at : load.forces)
       add_at(factor * at.force, body_->rest[at.element] + state.displacement[at.element], total.force,
              total.moment);

@@ -126,6 +126,7 @@ void Supports::make_link(Tie& tie, const Selected& selected, const Problem& prob
   link->at = tie.link->at.value_or(link->middle);
   link->force = tie.link->force;
   link->torque = tie.link->torque;
+  link->follower = tie.link->follower;
   link->name = tie.name;
   link->origin = tie.origin;
   tie.motion.link = link;
@@ -315,9 +316,10 @@ void Supports::report(const State& state, const std::vector<Vec3>& unbalanced, S
     RigidLink& link = *ties_[t].motion.link;
     link.pull = reaction[t].force;
     link.pull_moment = reaction[t].moment - (link.middle + link.translation).cross(link.pull);
-    const Vec3 moved = link.displacement(link.at), force = state.share * link.force;
-    result.loads.push_back(
-        {ties_[t].name, force, state.share * link.torque + (link.at + moved).cross(force), moved, link.turn});
+    const Vec3 moved = link.displacement(link.at), force = state.share * link.now(link.force);
+    result.loads.push_back({ties_[t].name, force,
+                            state.share * link.now(link.torque) + (link.at + moved).cross(force), moved,
+                            link.turn, link.follower});
   }
 }
 

@@ -27,6 +27,7 @@ namespace flexel::simulate {
 struct LinkLoad {
   Vec3 force = Vec3::Zero(), torque = Vec3::Zero();  // N, N m
   std::optional<Vec3> at = {};                       // m, rest: where the force acts; nothing: the middle
+  bool follower = false;                             // both turn with the link
 };
 
 struct Tie {

@@ -1,6 +1,7 @@
 // [[fix]], [[move]], and [[load]] by a rigid link, of a scene.
 #include <fmt/format.h>
 
+#include "simulate/effects/loads.h"
 #include "simulate/effects/supports.h"
 #include "simulate/input/scene_selection.h"
 
@@ -47,6 +48,7 @@ void parse_rotation(TableReader& reader, Tie& tie) {
   tie.motion.through = rotation.to_vector(rotation.require("through", "[\"0 mm\", \"0 mm\", \"0 mm\"]"),
                                           Dimension::length, "through");
   tie.motion.angle = rotation.to_quantity(rotation.require("angle", "\"30 deg\""), Dimension::angle, "angle");
+  tie.motion.arc_from = rotation.vector("arc_from", Dimension::length);
   rotation.finish();
   if (!(tie.axes[0] && tie.axes[1] && tie.axes[2]))
     reader.fail("[[move]] has a rotation and a free axis; a rotation leads all three");
@@ -61,7 +63,7 @@ Tie parse_link(TableReader& reader) {
   const std::optional<Vec3> force = reader.vector("force", Dimension::force);
   const std::optional<Vec3> torque = reader.vector("torque", Dimension::torque);
   tie.link = LinkLoad{force.value_or(Vec3::Zero()), torque.value_or(Vec3::Zero()),
-                      reader.vector("at", Dimension::length)};
+                      reader.vector("at", Dimension::length), parse_follower(reader)};
   tie.course = parse_course(reader);
   for (const char* other : {"pressure", "bearing"})
     if (reader.find(other))

@@ -75,6 +75,7 @@ class LoadStepping {
         progress_(progress),
         start_(start),
         first_(1.0 / std::max(settings.load_steps, least_load_steps(mechanics.constraints()))),
+        longest_(first_),
         increment_(first_) {}
 
   EquilibriumResult operator()();
@@ -93,7 +94,8 @@ class LoadStepping {
   bool branch_off();
   void push(State& state) const;
   [[nodiscard]] bool overloaded() const {
-    return reach_ > kOverload * bounding_box(mechanics_.body().rest).diagonal();
+    return reach_ > (mechanics_.follows() ? kOutOfProportion : kOverload) *
+                        bounding_box(mechanics_.body().rest).diagonal();
   }
   [[nodiscard]] int iterations_left() const;
   // Beyond this only a mistake puts the first linear answer [m]; infinite where the scene says how to go on.
@@ -106,7 +108,8 @@ class LoadStepping {
   const RunSettings& settings_;
   Progress& progress_;
   const CoarseStart& start_;
-  double first_, increment_, done_ = 0;
+  double first_, longest_;  // share of the load: the first step; none is longer
+  double increment_, done_ = 0;
   double begun_ = kPrepared;  // share of the run's time that its start takes
   EquilibriumResult result_;
   State trial_;  // of the last attempt
@@ -180,7 +183,7 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   state_ = trial_;
   ++result_.load_steps;
   result_.relative_residual = outcome_.relative_residual;
-  if (outcome_.iterations <= kEasyIterations) increment_ = std::min(first_, 2 * increment_);
+  if (outcome_.iterations <= kEasyIterations) increment_ = std::min(longest_, 2 * increment_);
   return true;
 }
 
@@ -226,7 +229,8 @@ void LoadStepping::push(State& state) const {
 }
 
 bool LoadStepping::branch_off() {
-  if (!(done_ > 0) || overloaded() || outcome_.relative_residual > kBalanced || pushes_ == kMostPushes)
+  if (!(done_ > 0) || overloaded() || mechanics_.follows() || outcome_.relative_residual > kBalanced ||
+      pushes_ == kMostPushes)
     return false;
   ++pushes_;
   result_.buckled = true;
@@ -282,13 +286,16 @@ void LoadStepping::solve() {
     if (reach_ > hopeless_reach_) refuse_load();
     hopeless_reach_ = std::numeric_limits<double>::infinity();  // the first answer alone counts
     if (begin_near()) continue;
-    if (iterations_left() > 0 && increment_ <= kLoweringIncrement * first_ &&
+    if (iterations_left() > 0 && increment_ <= kLoweringIncrement * first_ && !mechanics_.follows() &&
         attempt(NewtonSteps::lowering, NewtonOptions().max_iterations))
       continue;
-    if (!gives_up())
+    if (!gives_up()) {
       increment_ /= 2;
-    else if (!branch_off())
+      // a part that rolls up turns as far with each step of the load
+      if (mechanics_.follows()) longest_ = increment_;
+    } else if (!branch_off()) {
       diverge();
+    }
   }
 }
 

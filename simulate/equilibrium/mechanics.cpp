@@ -5,6 +5,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -63,6 +64,21 @@ Mechanics::Mechanics(const Problem& problem, std::vector<ActiveEffect> effects, 
     stored_tangent_ = std::make_unique<StoredMatrix>(pattern_.matrix);
     tangent_ = stored_tangent_.get();
   }
+  follow_loads();
+}
+
+void Mechanics::follow_loads() {
+  const auto follows = [](const ActiveEffect& effect) { return effect->follows(); };
+  if (std::any_of(effects_.begin(), effects_.end(), follows)) followed_.emplace(followed(false));
+}
+
+FollowedTangent Mechanics::followed(bool symmetric) const {
+  return {*tangent_, constraints_.mask,
+          [this](const std::vector<Vec3>& along, bool transposed, std::vector<Vec3>& change) {
+            for (const ActiveEffect& effect : effects_)
+              if (effect->follows()) effect->add_force_change(linearised_, along, transposed, change);
+          },
+          symmetric};
 }
 
 // Where an effect adds to elements that it does not pull at, the matrix is stored after all.
@@ -130,6 +146,7 @@ Forces Mechanics::forces(const State& state) {
 }
 
 void Mechanics::assemble(const State& state, const TangentOptions& tangent) {
+  if (follows()) linearised_ = state;
   {
     const ScopeTimer timer(cell_seconds_);
     if (made_)

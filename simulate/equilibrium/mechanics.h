@@ -5,6 +5,7 @@
 
 #include "simulate/effects/effect.h"
 #include "simulate/equilibrium/cell_stiffness.h"
+#include "simulate/followers/followed_tangent.h"
 #include "simulate/models/cells.h"
 #include "simulate/models/paper_model.h"
 
@@ -42,6 +43,14 @@ class Mechanics {
   [[nodiscard]] const PaperModel& paper() const { return paper_; }
   // The tangent at the last assemble().
   [[nodiscard]] const LinearOperator& tangent() const { return *tangent_; }
+  // Some load follows the shape (Effect::follows()): the energy tells nothing of it.
+  [[nodiscard]] bool follows() const { return followed_.has_value(); }
+  // Likewise with what such loads add, not symmetric; tangent() where none follows.
+  [[nodiscard]] const LinearOperator& whole_tangent() const {
+    return follows() ? static_cast<const LinearOperator&>(*followed_) : *tangent_;
+  }
+  // Likewise; `symmetric`: its symmetric part.
+  [[nodiscard]] FollowedTangent followed(bool symmetric) const;
   // Likewise, where it is stored.
   [[nodiscard]] const BlockMatrix& stiffness() const {
     assert(stored_);
@@ -71,6 +80,7 @@ class Mechanics {
  private:
   static std::vector<CoupledElements> coupled(const std::vector<ActiveEffect>& effects);
   void make_tangent(const Problem& problem);
+  void follow_loads();
   // Where effects add their stiffness.
   [[nodiscard]] BlockMatrix& added_stiffness() { return made_ ? made_->added() : pattern_.matrix; }
 
@@ -84,6 +94,8 @@ class Mechanics {
   std::unique_ptr<LinearOperator> stored_tangent_;
   const LinearOperator* tangent_ = nullptr;
   Constraints constraints_;
+  std::optional<FollowedTangent> followed_;
+  State linearised_;       // of the last assemble(), where loads follow
   double free_scale_ = 0;  // N, the norm of the forces that free strain makes at rest
   double cell_seconds_ = 0, paper_seconds_ = 0;
 };

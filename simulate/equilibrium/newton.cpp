@@ -7,6 +7,9 @@
 // Lowering steps: every step must lower the energy (Armijo) with J > 0 in every cell. A tangent that turns
 // out indefinite is assembled again with the cells' moduli projected to their positive part.
 //
+// Where loads follow the shape (simulate/followers) the tangent is not symmetric: GMRES takes the place of
+// conjugate gradients, with the same preconditioner, and steps lower the residual in place of the energy.
+//
 // Full steps: a linear answer turns thin walls by shear, which stretches them a little; the stresses of that
 // stretch exceed those of the bending by far, and a tangent that holds them resists the next step like a
 // drum skin. So the geometric stiffness is taken with the stresses that the linear model predicted, which do
@@ -25,6 +28,7 @@
 #include <utility>
 
 #include "base/parallel.h"
+#include "simulate/followers/gmres.h"
 #include "simulate/linear/conjugate_gradients.h"
 #include "simulate/linear/vector_products.h"
 
@@ -96,6 +100,7 @@ class Solver {
   LinearResult iterate(const std::vector<Vec3>& rhs, double forcing);
   std::vector<Vec3> right_hand_side();
   bool line_search(const std::vector<Vec3>& residual);
+  bool lower_residual();
   bool lead_prescribed();
   bool full_step();
   [[nodiscard]] State moved(double step) const;
@@ -163,7 +168,7 @@ std::vector<Vec3> Solver::right_hand_side() {
   std::vector<Vec3> rhs = residual_;
   if (!gap_.empty()) {
     std::vector<Vec3> pulled(rhs.size());
-    multiply(mechanics_.tangent(), gap_, pulled);
+    multiply(mechanics_.whole_tangent(), gap_, pulled);
     for (std::size_t e = 0; e < rhs.size(); ++e) rhs[e] -= pulled[e];
     clear_prescribed(mechanics_.constraints(), rhs);
   }
@@ -198,9 +203,10 @@ LinearResult Solver::iterate(const std::vector<Vec3>& rhs, double forcing) {
       return stopped;
     };
     std::vector<Vec3> step;
-    LinearResult one = conjugate_gradients(
-        mechanics_.tangent(), left, step, *kept_.preconditioner, std::min(forcing / share, kLargestForcing),
-        most,
+    const auto solve = mechanics_.follows() ? gmres : static_cast<decltype(&gmres)>(conjugate_gradients);
+    LinearResult one = solve(
+        mechanics_.whole_tangent(), left, step, *kept_.preconditioner,
+        std::min(forcing / share, kLargestForcing), most,
         [&](int iteration, double relative) {
           progress_(
               way_ahead(share * relative),
@@ -213,7 +219,7 @@ LinearResult Solver::iterate(const std::vector<Vec3>& rhs, double forcing) {
       parallel_for_each(rhs.size(), [&](std::size_t e) { direction_[e] += step[e]; });
     one.indefinite = one.indefinite || (full() && (one.iterations == most || (stopped && !stale)));
     if (!stopped || !stale) return one;
-    multiply(mechanics_.tangent(), direction_, left);
+    multiply(mechanics_.whole_tangent(), direction_, left);
     parallel_for_each(rhs.size(), [&](std::size_t e) { left[e] = rhs[e] - left[e]; });
     share = norm(left) / norm(rhs);
     kept_.outdated = true;
@@ -271,7 +277,22 @@ bool Solver::lead_prescribed() {
   return false;
 }
 
+// Where loads have no energy: as far as the forces that are left fall.
+bool Solver::lower_residual() {
+  for (double step = 1; step >= kSmallestStep; step /= 2) {
+    State trial = moved(step);
+    if (!std::isfinite(mechanics_.energy(trial))) continue;
+    Forces forces = mechanics_.forces(trial);
+    clear_prescribed(mechanics_.constraints(), forces.total);
+    if (!(norm(forces.total) < (1 - kArmijo * step) * residual_norm_)) continue;
+    state_ = std::move(trial);
+    return true;
+  }
+  return false;
+}
+
 bool Solver::line_search(const std::vector<Vec3>& residual) {
+  if (mechanics_.follows()) return lower_residual();
   const double slope = -dot(residual, direction_);
   if (!(slope < 0)) return false;
   const double before = mechanics_.energy(state_);
@@ -361,7 +382,7 @@ bool Solver::advance() {
   if (outcome_.first_reach > options_.farthest_reach) return false;
   // What the linear model predicts for the residual after a full step.
   std::vector<Vec3> predicted(rhs.size());
-  if (kept_.factored) multiply(mechanics_.tangent(), direction_, predicted);
+  if (kept_.factored) multiply(mechanics_.whole_tangent(), direction_, predicted);
   parallel_for_each(rhs.size(), [&](std::size_t e) { predicted[e] = rhs[e] - predicted[e]; });
   const double before = led ? residual_norm_ : norm(rhs);
   if (!(full() ? full_step() : led ? line_search(residual_) : lead_prescribed())) return false;

@@ -24,8 +24,11 @@ std::optional<bool> has_positive_tangent(Mechanics& mechanics, const State& stat
     }
   const auto preconditioner =
       aggregation_multigrid(mechanics.tangent(), node_geometry(mechanics.body(), state));
-  const LinearResult result = conjugate_gradients(mechanics.tangent(), irregular, answer, *preconditioner,
-                                                  kTolerance, kIterations, [](int, double) { check_stop(); });
+  const FollowedTangent symmetric = mechanics.followed(true);
+  const LinearOperator& tangent =
+      mechanics.follows() ? static_cast<const LinearOperator&>(symmetric) : mechanics.tangent();
+  const LinearResult result = conjugate_gradients(tangent, irregular, answer, *preconditioner, kTolerance,
+                                                  kIterations, [](int, double) { check_stop(); });
   if (result.indefinite) return false;
   if (result.converged) return true;
   return std::nullopt;

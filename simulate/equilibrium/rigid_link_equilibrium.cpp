@@ -107,8 +107,8 @@ LinkVector Balance::lacking(const State& state) {
   for (std::size_t l = 0; l < links_.size(); ++l) {
     const RigidLink& link = *links_[l];
     const Vec3 arm = link.at - link.middle + link.displacement(link.at) - link.translation;
-    const Vec3 force = state.share * link.force;
-    const Vec3 moment = state.share * link.torque + arm.cross(force);
+    const Vec3 force = state.share * link.now(link.force);
+    const Vec3 moment = state.share * link.now(link.torque) + arm.cross(force);
     const auto at = static_cast<Eigen::Index>(6 * l);
     result.segment<3>(at) = force - link.pull;
     result.segment<3>(at + 3) = (moment - link.pull_moment) / link.reach;

@@ -60,6 +60,7 @@ class ImplicitEuler::EffectOfStep : public Effect {
   [[nodiscard]] bool adds_stiffness() const override {
     return effect_->adds_stiffness() || effect_->resists();
   }
+  [[nodiscard]] bool follows() const override { return effect_->follows(); }
   [[nodiscard]] std::vector<CoupledElements> couples() const override { return effect_->couples(); }
   void constrain(Constraints& constraints) override {
     effect_->constrain(constraints);
@@ -76,6 +77,10 @@ class ImplicitEuler::EffectOfStep : public Effect {
   void add_stiffness(const State& state, BlockMatrix& matrix) override {
     effect_->resists() ? effect_->add_resistance(euler_->along_the_way(state), 1 / euler_->step_, matrix)
                        : effect_->add_stiffness(state, matrix);
+  }
+  void add_force_change(const State& state, const std::vector<Vec3>& change, bool transposed,
+                        std::vector<Vec3>& forces) override {
+    effect_->add_force_change(state, change, transposed, forces);
   }
 
  private:

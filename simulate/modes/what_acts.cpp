@@ -25,6 +25,13 @@ void refuse_what_modes_lack(const Scene& scene, const std::vector<ActiveEffect>&
         effect.name != Bonds::name)
       throw InputError(scene.name,
                        fmt::format("[run] {} has no {} ({}): leave it out", what, effect.name, effect.why));
+  for (const ActiveEffect& effect : effects)
+    if (effect->follows())
+      throw InputError(
+          scene.name,
+          fmt::format("[run] {} has no loads with follower = true, whose stiffness is not symmetric: "
+                      "leave follower out",
+                      what));
   for (const Tie& tie : scene.get<Supports>().ties)
     if (tie.link)
       throw InputError(

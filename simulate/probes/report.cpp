@@ -86,19 +86,16 @@ void measure_displacement(const Body& body, const State& state, SimulateResult& 
 // cosine of it is left.
 std::vector<std::string> warnings_of(const SimulateResult& result) {
   constexpr double kLargestTurn = 10 * std::numbers::pi / 180;
-  // Rigid links are for equilibrium without contact.
-  const char* advice = result.timed || result.settled
-                           ? "lead the place with [[move]] and \"rotation\" instead"
-                           : "link = \"rigid\" in a scene's [[load]] gives a torque that turns with it";
   std::vector<std::string> warnings;
   for (const AppliedLoad& load : result.loads) {
-    if (!load.rotation || load.displacement) continue;  // nothing, or of a rigid link
+    if (!load.rotation || load.displacement || load.follower) continue;  // nothing, or no dead couple
     if (const double turn = load.rotation->norm(); turn > kLargestTurn)
-      warnings.push_back(
-          fmt::format("load \"{}\" turned what it acts on by {:.0f} degrees, and its forces keep the "
-                      "direction that they have at rest: about {:.0f} % of its torque is left, and the "
-                      "result is that of so much; {}",
-                      load.name, 180 / std::numbers::pi * turn, std::max(0.0, 100 * std::cos(turn)), advice));
+      warnings.push_back(fmt::format(
+          "load \"{}\" turned what it acts on by {:.0f} degrees, and its forces keep the "
+          "direction that they have at rest: about {:.0f} % of its torque is left, and the "
+          "result is that of so much; follower = true in its [[load]] (\"..., follower\" in --torque) turns "
+          "it with what it acts on",
+          load.name, 180 / std::numbers::pi * turn, std::max(0.0, 100 * std::cos(turn))));
   }
   return warnings;
 }

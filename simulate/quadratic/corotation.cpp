@@ -163,8 +163,7 @@ bool Corotation::residual(const std::vector<Vec3>& displacement, double share, s
       supported_.size(), [&](std::size_t i) { held[i] = support_forces(supported_[i], displacement, share); },
       kTurnedCellsAtATime);
   left.assign(nodes.size(), Vec3::Zero());
-  for (const NodalLoad& load : system_.loads())
-    for (std::size_t n = 0; n < nodes.size(); ++n) left[n] += share * load.forces[n];
+  for (const NodalLoad& load : system_.loads()) load.add_to(displacement, share, left);
   for (std::size_t i = 0; i < supported_.size(); ++i)
     for (std::size_t n = 0; n < kQuadraticNodes; ++n) left[nodes.of_cell[supported_[i]][n]] += held[i][n];
   double outer = dot(left, left);

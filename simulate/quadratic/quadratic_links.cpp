@@ -130,7 +130,8 @@ std::vector<Vec3> asked_for(const QuadraticSystem& system, const NitscheSupport&
 // Force and moment of a link's load about its middle where that is now.
 Wrench load_of(const RigidLink& link, double share) {
   const Vec3 arm = arm_of(link, link.at, link.displacement(link.at));
-  return {share * link.force, share * (link.torque + arm.cross(link.force))};
+  const Vec3 force = link.now(link.force);
+  return {share * force, share * (link.now(link.torque) + arm.cross(force))};
 }
 
 }  // namespace

@@ -11,6 +11,8 @@
 #include "base/human.h"
 #include "base/math/greatest.h"
 #include "base/parallel.h"
+#include "simulate/followers/followed_tangent.h"
+#include "simulate/followers/gmres.h"
 #include "simulate/linear/conjugate_gradients.h"
 #include "simulate/linear/vector_products.h"
 #include "simulate/quadratic/corotation.h"
@@ -93,12 +95,21 @@ class LargeDeflection {
       links_now = links_.motions();
       last = share - done;
       done = share;
+      count_turns(now);
       weak_support_ = false;
       if (iterations <= kFewIterations) step = std::min(2 * step, longest);
     }
     solution_.displacement = now;
     if (!turned && reach_ > 0) solution_.amplification = largest(now) / reach_;
     solution_.turn = corotation_.turns();
+  }
+
+  // Of loads that follow, so that whole turns are told.
+  void count_turns(const std::vector<Vec3>& u) {
+    solution_.load_turn.resize(system_.loads().size(), Vec3::Zero());
+    for (std::size_t l = 0; l < system_.loads().size(); ++l)
+      if (const auto& follower = system_.loads()[l].follower)
+        solution_.load_turn[l] = follower->turn(u, solution_.load_turn[l]);
   }
 
   // (nodes) `share` times `from`, and `ahead` times what it is from `before`.
@@ -139,10 +150,14 @@ class LargeDeflection {
     bool anew = stale(u);
     for (int attempt = 0; attempt < 2; ++attempt, anew = true) {
       if (anew) make_preconditioner(u);
-      const LinearResult result = conjugate_gradients(tangent_.stiffness, irregular, change,
-                                                      *tangent_.multigrid, kLoosest, kMostLinear);
+      const LinearResult result = system_.follows()
+                                      ? conjugate_gradients(followed(u, true), irregular, change,
+                                                            *tangent_.multigrid, kLoosest, kMostLinear)
+                                      : conjugate_gradients(tangent_.stiffness, irregular, change,
+                                                            *tangent_.multigrid, kLoosest, kMostLinear);
       solution_.iterations += result.iterations;
-      if (result.indefinite) return false;
+      // where the symmetric part is not positive, loads that follow may still leave the equilibrium stable
+      if (result.indefinite) return system_.follows() ? std::nullopt : std::optional(false);
       if (result.converged) return links_stable(u);
       if (anew) break;
     }
@@ -210,6 +225,7 @@ class LargeDeflection {
 
   // Equilibrium at a share of the load, from `u`. How many iterations it took; more than kMostIterations: there was none.
   int reach(double share, std::vector<Vec3>& u) {
+    share_ = share;
     const std::vector<Vec3> led = system_.prescribed(share);
     const std::vector<std::uint8_t>& held = tangent_.stiffness.held();
     for (std::size_t n = 0; n < u.size(); ++n)
@@ -289,11 +305,11 @@ class LargeDeflection {
   bool solve(const std::vector<Vec3>& u, const std::vector<Vec3>& left, double residual,
              std::vector<Vec3>& change) {
     corotation_.set_tangent(true);
-    if (!stale(u) && attempt(left, residual, change)) return true;
+    if (!stale(u) && attempt(u, left, residual, change)) return true;
     for (const bool stressed : {true, false}) {
       corotation_.set_tangent(stressed);
       make_preconditioner(u);
-      if (attempt(left, residual, change)) return true;
+      if (attempt(u, left, residual, change)) return true;
     }
     weak_support_ |= indefinite_;
     return false;
@@ -304,9 +320,29 @@ class LargeDeflection {
     return std::min(kLoosest, std::max(residual, 0.3 * tolerance_ / residual));
   }
 
-  bool attempt(const std::vector<Vec3>& left, double residual, std::vector<Vec3>& change) {
-    const LinearResult result = conjugate_gradients(tangent_.stiffness, left, change, *tangent_.multigrid,
-                                                    forcing(residual), kMostLinear);
+  // The stiffness with what loads add that follow the shape, at `u` and the share of the load that is
+  // looked for.
+  [[nodiscard]] FollowedTangent followed(const std::vector<Vec3>& u, bool symmetric) const {
+    return {tangent_.stiffness, tangent_.stiffness.held(),
+            [this, &u](const std::vector<Vec3>& along, bool transposed, std::vector<Vec3>& forces) {
+              for (const NodalLoad& load : system_.loads()) {
+                if (!load.follower) continue;
+                if (transposed)
+                  load.follower->add_transposed_change(u, share_, along, forces);
+                else
+                  load.follower->add_change(u, share_, along, forces);
+              }
+            },
+            symmetric};
+  }
+
+  bool attempt(const std::vector<Vec3>& u, const std::vector<Vec3>& left, double residual,
+               std::vector<Vec3>& change) {
+    const LinearResult result =
+        system_.follows()
+            ? gmres(followed(u, false), left, change, *tangent_.multigrid, forcing(residual), kMostLinear)
+            : conjugate_gradients(tangent_.stiffness, left, change, *tangent_.multigrid, forcing(residual),
+                                  kMostLinear);
     solution_.iterations += result.iterations;
     indefinite_ = result.indefinite;
     return result.converged;
@@ -324,6 +360,7 @@ class LargeDeflection {
   bool weak_support_ = false;
   std::vector<Vec3> made_at_;  // (nodes x 3) m, where the preconditioner was made; none: at rest
   LinkBalance links_;
+  double share_ = 1;         // of the load, that reach() looks for
   int link_iterations_ = 0;  // of solution_.iterations: how the nodes answer to links
 };
 

@@ -310,6 +310,33 @@ double smallest_jacobian(const QuadraticSystem& system, const QuadraticSolution&
   return smallest;
 }
 
+// Loads on nodes, where they act: where the nodes are now, or (a linear solution) at rest.
+void report_loads(const QuadraticSystem& system, const QuadraticSolution& solution, bool large,
+                  SimulateResult& result) {
+  const QuadraticNodes& nodes = system.nodes();
+  for (std::size_t l = 0; l < system.loads().size(); ++l) {
+    const NodalLoad& load = system.loads()[l];
+    AppliedLoad total{load.name, Vec3::Zero(), Vec3::Zero()};
+    std::vector<Vec3> forces = load.forces;
+    if (large) {
+      std::fill(forces.begin(), forces.end(), Vec3::Zero());
+      load.add_to(solution.displacement, 1, forces);
+    }
+    for (std::size_t n = 0; n < nodes.size(); ++n)
+      add_at(forces[n], large ? Vec3(nodes.rest[n] + solution.displacement[n]) : nodes.rest[n], total.force,
+             total.moment);
+    total.follower = load.follower != nullptr;
+    if (load.couple && load.follower)
+      total.rotation = load.follower->turn(
+          solution.displacement, l < solution.load_turn.size() ? solution.load_turn[l] : Vec3(Vec3::Zero()));
+    else if (load.couple)
+      total.rotation = turn_of_couple(nodes.size(), [&](std::size_t n) {
+        return LoadedMotion{load.forces[n], nodes.rest[n], solution.displacement[n]};
+      });
+    result.loads.push_back(total);
+  }
+}
+
 }  // namespace
 
 void report(const QuadraticSystem& system, const QuadraticSolution& solution, SimulateResult& result) {
@@ -351,18 +378,11 @@ void report(const QuadraticSystem& system, const QuadraticSolution& solution, Si
     }
     const RigidLink& link = *support.tie->motion.link;
     const Vec3 moved = link.displacement(link.at), at = large ? Vec3(link.at + moved) : link.at;
-    result.loads.push_back({link.name, link.force, link.torque + at.cross(link.force), moved, link.turn});
+    const Vec3 force = large ? link.now(link.force) : link.force;
+    const Vec3 torque = large ? link.now(link.torque) : link.torque;
+    result.loads.push_back({link.name, force, torque + at.cross(force), moved, link.turn, link.follower});
   }
-  for (const NodalLoad& load : system.loads()) {
-    AppliedLoad total{load.name, Vec3::Zero(), Vec3::Zero()};
-    for (std::size_t n = 0; n < nodes.size(); ++n)
-      add_at(load.forces[n], place(n), total.force, total.moment);
-    if (load.couple)
-      total.rotation = turn_of_couple(nodes.size(), [&](std::size_t n) {
-        return LoadedMotion{load.forces[n], nodes.rest[n], solution.displacement[n]};
-      });
-    result.loads.push_back(total);
-  }
+  report_loads(system, solution, large, result);
   result.elastic_energy =
       system.heated()
           ? heated_energy(

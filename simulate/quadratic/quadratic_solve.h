@@ -19,6 +19,7 @@ struct QuadraticSolution {
   std::vector<Vec3> displacement;  // (nodes x 3) m
   std::vector<Vec3> unbalanced;  // (nodes x 3) N: on prescribed components what holds them, else the residual
   std::vector<Mat3> turn;        // (cells) R - 1 where large deflections turned them; none: a linear solution
+  std::vector<Vec3> load_turn;  // (loads) rad, that those that follow have turned by; none: a linear solution
   // As far as was looked: where loads are far too small to buckle it nobody does. Nothing: it was not found out.
   std::optional<bool> stable = true;
   double amplification = 1;  // the largest displacement beside that of the linear solution

@@ -14,6 +14,7 @@
 #include "formats/lattice/cell_moments.h"
 #include "simulate/effects/gravity.h"
 #include "simulate/effects/rigid.h"
+#include "simulate/followers/pressing_load.h"
 #include "simulate/matter/interpolation_weights.h"
 #include "simulate/matter/load_distribution.h"
 #include "simulate/matter/surface_samples.h"
@@ -194,6 +195,7 @@ std::shared_ptr<RigidLink> QuadraticSystem::make_link(const NitscheSupport& supp
   link->at = tie.link->at.value_or(link->middle);
   link->force = tie.link->force;
   link->torque = tie.link->torque;
+  link->follower = tie.link->follower;
   link->name = tie.name;
   link->origin = tie.origin;
   link->small = true;
@@ -283,6 +285,16 @@ void QuadraticSystem::find_bearing_limits() {
       kIntegratedCellsAtATime);
 }
 
+void NodalLoad::add_to(const std::vector<Vec3>& displacement, double share, std::vector<Vec3>& sum) const {
+  if (follower) return follower->add_forces(displacement, share, sum);
+  for (std::size_t n = 0; n < sum.size(); ++n) sum[n] += share * forces[n];
+}
+
+bool QuadraticSystem::follows() const {
+  return std::any_of(loads_.begin(), loads_.end(),
+                     [](const NodalLoad& load) { return load.follower != nullptr; });
+}
+
 void QuadraticSystem::place_loads(const std::vector<Load>& loads) {
   for (const Load& load : loads) {
     const Selected selected = resolve(load.where, problem_.body);
@@ -316,8 +328,26 @@ void QuadraticSystem::place_loads(const std::vector<Load>& loads) {
       for (std::size_t n = 0; n < kQuadraticNodes; ++n)
         made.forces[nodes_.of_cell[points[q].cell][n]] += shape.value[n] * forces[q];
     }
+    if (load.follower) made.follower = follower(load, points, loaded);
     loads_.push_back(std::move(made));
   }
+}
+
+std::unique_ptr<FollowerLoad> QuadraticSystem::follower(const Load& load,
+                                                        const std::vector<FacePoint>& points,
+                                                        const std::vector<LoadedPoint>& loaded) const {
+  if (!load.pressure)
+    return turning_load(load, loaded, [&](std::size_t q, const auto& each) {
+      const QuadraticShape shape = quadratic_shape(points[q].at);
+      for (std::size_t n = 0; n < kQuadraticNodes; ++n)
+        each(nodes_.of_cell[points[q].cell][n], shape.value[n]);
+    });
+  auto made = std::make_unique<PressingLoad>(*load.pressure);
+  for (const FacePoint& point : points) {
+    const QuadraticShape shape = world_shape(lattice(point.cell), point.at);
+    made->add_point(nodes_.of_cell[point.cell], shape.value, shape.gradient, point.area_vector);
+  }
+  return made;
 }
 
 void QuadraticSystem::check_area(const Load& load, const std::vector<std::uint32_t>& polygons,

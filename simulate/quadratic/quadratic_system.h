@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "simulate/effects/bonds.h"
+#include "simulate/effects/loads.h"
 #include "simulate/quadratic/cells/nitsche_bond.h"
 #include "simulate/quadratic/cells/nitsche_support.h"
 #include "simulate/quadratic/quadratic_multigrid.h"
@@ -14,8 +15,12 @@ namespace flexel::simulate {
 // A [[load]] or [gravity], on the nodes.
 struct NodalLoad {
   std::string name;
-  std::vector<Vec3> forces;  // (nodes x 3) N
-  bool couple = false;       // it was given a torque, or a point where its force acts
+  std::vector<Vec3> forces;                          // (nodes x 3) N, at rest
+  bool couple = false;                               // it was given a torque, or a point where its force acts
+  std::unique_ptr<FollowerLoad> follower = nullptr;  // in place of the forces where deflections are large
+
+  // N (nodes x 3), added to `sum` where the nodes have gone by `displacement`.
+  void add_to(const std::vector<Vec3>& displacement, double share, std::vector<Vec3>& sum) const;
 };
 
 // Stiffness and inertia of what is not matter, of the material's: slivers stay regular.
@@ -60,6 +65,8 @@ class QuadraticSystem {
   // N, the norm of all loads, on held nodes too, and of what links bear on their nodes with.
   [[nodiscard]] double load_norm() const;
   [[nodiscard]] const std::vector<NodalLoad>& loads() const { return loads_; }
+  // Some load follows the shape.
+  [[nodiscard]] bool follows() const;
   [[nodiscard]] const Mat9& moduli(std::uint32_t part) const { return moduli_[part]; }
   [[nodiscard]] std::uint32_t part_of(std::size_t cell) const { return part_[cell]; }
   [[nodiscard]] double stiffest(std::size_t cell) const { return stiffest_[part_[cell]]; }  // Pa
@@ -125,6 +132,8 @@ class QuadraticSystem {
   void place_bonds(const Bonds::Parameters& parameters);
   void find_bearing_limits();
   void place_loads(const std::vector<Load>& loads);
+  [[nodiscard]] std::unique_ptr<FollowerLoad> follower(const Load& load, const std::vector<FacePoint>& points,
+                                                       const std::vector<LoadedPoint>& loaded) const;
   void check_area(const Load& load, const std::vector<std::uint32_t>& polygons,
                   const std::vector<FacePoint>& points);
   void add_gravity(const Vec3& acceleration);

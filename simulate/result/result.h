@@ -32,8 +32,10 @@ struct AppliedLoad {  // of one [[load]], or of gravity
   std::string name;
   Vec3 force = Vec3::Zero();   // N, in total
   Vec3 moment = Vec3::Zero();  // N m, about the world's origin, where the body is now
-  // Of a rigid link: how far its point went [m] and the rotation vector that the link turned by [rad]
+  // Of a rigid link: how far its point went [m]. Of that or of a couple: the rotation vector that it
+  // turned what it acts on by [rad]; of one that follows, whole turns included
   std::optional<Vec3> displacement = {}, rotation = {};
+  bool follower = false;  // it turned with what it acts on
 };
 
 // Adds a force at a place to a resultant and its moment about the origin.

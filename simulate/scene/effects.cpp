@@ -71,6 +71,7 @@ std::vector<SceneKey> load_keys() {
           {t, "torque", K::vector, D::torque, "", "a couple about this axis"},
           {t, "pressure", K::quantity, D::pressure, "", "along the surface's normals, inwards"},
           {t, "bearing", K::vector, D::force, "", "of a pin in a hole"},
+          {t, "follower", K::flag, {}, "false", "it turns with what it acts on"},
           {t, "link", K::text, {}, "\"averaging\"", "or \"rigid\": how force and torque reach the selection"},
           {t, "time", K::list, D::time, "", "times of a load curve; in timed runs"},
           {t, "factor", K::list, {}, "", "the load's factor at each of them"}};
@@ -78,18 +79,20 @@ std::vector<SceneKey> load_keys() {
 
 std::vector<SceneKey> support_keys() {
   const std::string f = "[[fix]]", m = "[[move]]", r = "rotation of [[move]]";
-  return {{f, "where", K::selection, {}, "required", "what is held"},
-          {f, "name", K::text, {}, "the selection", "for the summary"},
-          {f, "axes", K::text, {}, "\"xyz\"", "the world axes that are held"},
-          {m, "where", K::selection, {}, "required", "what is led"},
-          {m, "name", K::text, {}, "the selection", "for the summary"},
-          {m, "displacement", K::vector, D::length, "", "\"free\" leaves an axis to itself"},
-          {m, "rotation", K::table, {}, "", "comes before the displacement"},
-          {m, "time", K::list, D::time, "", "times of a load curve; in timed runs"},
-          {m, "factor", K::list, {}, "", "the motion's factor at each of them"},
-          {r, "axis", K::direction, {}, "required", "right-handed"},
-          {r, "through", K::vector, D::length, "required", "a point of the axis"},
-          {r, "angle", K::quantity, D::angle, "required", "more than a turn is what it says"}};
+  return {
+      {f, "where", K::selection, {}, "required", "what is held"},
+      {f, "name", K::text, {}, "the selection", "for the summary"},
+      {f, "axes", K::text, {}, "\"xyz\"", "the world axes that are held"},
+      {m, "where", K::selection, {}, "required", "what is led"},
+      {m, "name", K::text, {}, "the selection", "for the summary"},
+      {m, "displacement", K::vector, D::length, "", "\"free\" leaves an axis to itself"},
+      {m, "rotation", K::table, {}, "", "comes before the displacement"},
+      {m, "time", K::list, D::time, "", "times of a load curve; in timed runs"},
+      {m, "factor", K::list, {}, "", "the motion's factor at each of them"},
+      {r, "axis", K::direction, {}, "required", "right-handed"},
+      {r, "through", K::vector, D::length, "required", "a point of the axis"},
+      {r, "angle", K::quantity, D::angle, "required", "more than a turn is what it says"},
+      {r, "arc_from", K::vector, D::length, "", "the way from here to through becomes an arc of the angle"}};
 }
 
 std::vector<SceneKey> bond_keys() {

@@ -179,9 +179,9 @@ def test_loads_that_do_not_do_what_they_seem_to():
     says(simulate(slides), 'of load "zmax" goes straight into a support')
     silent(simulate(slides.replace("-10 N", "0 N")), "straight into a support")
     roll = HELD + '[[load]]\nwhere = "xmax"\ntorque = ["0 N m", "3000 N m", "0 N m"]\n'
-    turned = says(simulate(roll.replace('"steel"', '"PLA"').replace("3000", "55"), "--no-estimate"), "its forces keep the direction", 'link = "rigid"')
+    turned = says(simulate(roll.replace('"steel"', '"PLA"').replace("3000", "55"), "--no-estimate"), "its forces keep the direction", "follower = true")
     expect("of its torque is left" in turned.err, turned.err)
-    silent(simulate(roll.replace('"steel"', '"PLA"').replace("3000", "55") + 'link = "rigid"\n', "--no-estimate"), "of its torque is left")
+    silent(simulate(roll.replace('"steel"', '"PLA"').replace("3000", "55") + "follower = true\n", "--no-estimate"), "of its torque is left")
 
 
 def test_results_do_not_go_to_one_name():

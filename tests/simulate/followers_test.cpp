@@ -1,0 +1,441 @@
+// Loads that turn with what they act on: resultants, derivatives, closed forms, books, and what is refused.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
+
+#include "base/error.h"
+#include "simulate/equilibrium/mechanics.h"
+#include "simulate/followers/gmres.h"
+#include "simulate/followers/pressing_load.h"
+#include "simulate/followers/turning_load.h"
+#include "simulate/linear/block_jacobi.h"
+#include "simulate/linear/vector_products.h"
+#include "simulate/scene/scene.h"
+#include "simulate/simulate.h"
+#include "tests/simulate/box_body.h"
+#include "tests/simulate/timed_case.h"
+
+namespace flexel::simulate {
+namespace {
+
+using ::testing::HasSubstr;
+
+// Any values in [-size, size].
+std::vector<Vec3> any_vectors(std::size_t count, double size, double phase) {
+  std::vector<Vec3> values(count);
+  for (std::size_t i = 0; i < count; ++i)
+    for (int axis = 0; axis < 3; ++axis)
+      values[i][axis] = size * std::sin(phase + 7.3 * static_cast<double>(3 * i + axis) + axis);
+  return values;
+}
+
+// Points that are nodes themselves, off any plane.
+std::vector<LoadedPoint> points_as_nodes() {
+  std::vector<LoadedPoint> points;
+  const std::vector<Vec3> places = any_vectors(12, 1, 0.3);
+  for (std::size_t i = 0; i < places.size(); ++i)
+    points.push_back(
+        {places[i].cwiseProduct(Vec3(1, 2, 0.5)), 1 + 0.3 * std::sin(5.0 * static_cast<double>(i))});
+  return points;
+}
+
+const Vec3 kFollowerForce(3, -2, 5), kFollowerTorque(-1, 4, 2), kFollowerAt(2, 1, -3);
+
+TurningLoad turning_points(const std::vector<LoadedPoint>& points) {
+  return *TurningLoad::make(
+      points, [](std::size_t q, const auto& each) { each(static_cast<std::uint32_t>(q), 1); }, kFollowerForce,
+      kFollowerTorque, kFollowerAt);
+}
+
+// Turned by `turn` about the origin, moved, and strained by the part `strain` of any_vectors().
+std::vector<Vec3> displaced(const std::vector<LoadedPoint>& points, const Mat3& turn, double strain) {
+  std::vector<Vec3> moved = any_vectors(points.size(), strain, 1.1);
+  for (std::size_t i = 0; i < points.size(); ++i)
+    moved[i] += turn * points[i].position - points[i].position + Vec3(4, -1, 2);
+  return moved;
+}
+
+Mat3 any_turn(double angle) {
+  return Eigen::AngleAxisd(angle, Vec3(1, -2, 3).normalized()).toRotationMatrix();
+}
+
+Vec3 middle_of_points(const std::vector<LoadedPoint>& points, const std::vector<Vec3>& moved) {
+  Vec3 sum = Vec3::Zero();
+  double total = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    sum += points[i].weight * (points[i].position + moved[i]);
+    total += points[i].weight;
+  }
+  return sum / total;
+}
+
+TEST(Followers, ForceAndMomentTurnWithTheFaceHoweverItIsStrained) {
+  const std::vector<LoadedPoint> points = points_as_nodes();
+  const TurningLoad load = turning_points(points);
+  const std::vector<Vec3> none(points.size(), Vec3::Zero());
+  const Vec3 rest_middle = middle_of_points(points, none);
+  const Vec3 moment = kFollowerTorque + (kFollowerAt - rest_middle).cross(kFollowerForce);
+  for (const double angle : {0.0, 0.7, 3.0})
+    for (const double strain : {0.0, 0.2}) {
+      const std::vector<Vec3> moved = displaced(points, any_turn(angle), strain);
+      std::vector<Vec3> forces(points.size(), Vec3::Zero());
+      load.add_forces(moved, 2, forces);
+      Vec3 sum = Vec3::Zero(), about = Vec3::Zero();
+      const Vec3 middle = middle_of_points(points, moved);
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        sum += forces[i];
+        about += (points[i].position + moved[i] - middle).cross(forces[i]);
+      }
+      const Vec3 turn = load.turn(moved, Vec3::Zero());
+      const Mat3 rotation = turn.norm() > 0
+                                ? Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix()
+                                : Mat3(Mat3::Identity());
+      if (strain == 0) {
+        EXPECT_LT((rotation - any_turn(angle)).norm(), 1e-12);
+      }
+      EXPECT_LT((sum - 2 * rotation * kFollowerForce).norm(), 1e-12 * sum.norm());
+      EXPECT_LT((about - 2 * rotation * moment).norm(), 1e-12 * moment.norm());
+    }
+}
+
+TEST(Followers, WholeTurnsAreCounted) {
+  const std::vector<LoadedPoint> points = points_as_nodes();
+  const TurningLoad load = turning_points(points);
+  Vec3 turn = Vec3::Zero();
+  for (int step = 1; step <= 30; ++step)
+    turn = load.turn(displaced(points, any_turn(0.5 * step), 0.05), turn);
+  EXPECT_NEAR(turn.norm(), 15, 0.3);
+  for (int step = 29; step >= 0; --step) turn = load.turn(displaced(points, any_turn(0.5 * step), 0), turn);
+  EXPECT_LT(turn.norm(), 1e-9);
+}
+
+// The derivative against central differences, and the transposed one against it.
+void expect_change_of(const FollowerLoad& load, const std::vector<Vec3>& moved, double step,
+                      double tolerance) {
+  const std::size_t n = moved.size();
+  const std::vector<Vec3> along = any_vectors(n, 1, 2.2), back = any_vectors(n, 1, 0.9);
+  std::vector<Vec3> more(n, Vec3::Zero()), less = more, change = more, transposed = more, ahead = moved,
+                                           behind = moved;
+  for (std::size_t i = 0; i < n; ++i) {
+    ahead[i] += step * along[i];
+    behind[i] -= step * along[i];
+  }
+  load.add_forces(ahead, 1.5, more);
+  load.add_forces(behind, 1.5, less);
+  load.add_change(moved, 1.5, along, change);
+  load.add_transposed_change(moved, 1.5, back, transposed);
+  const double size = std::sqrt(dot(change, change));
+  ASSERT_GT(size, 0);
+  for (std::size_t i = 0; i < n; ++i)
+    EXPECT_LT((change[i] - (more[i] - less[i]) / (2 * step)).norm(), tolerance * size);
+  EXPECT_NEAR(dot(back, change), dot(along, transposed), 1e-12 * size * std::sqrt(dot(back, back)));
+}
+
+TEST(Followers, ChangeOfATurningLoad) {
+  const std::vector<LoadedPoint> points = points_as_nodes();
+  const TurningLoad load = turning_points(points);
+  for (const double angle : {0.0, 0.7, 3.0})
+    for (const double strain : {0.0, 0.2})
+      expect_change_of(load, displaced(points, any_turn(angle), strain), 1e-5, 1e-9);
+  std::vector<LoadedPoint> flat = points;
+  for (LoadedPoint& point : flat) point.position.x() = 3;
+  expect_change_of(turning_points(flat), displaced(flat, any_turn(2), 0.1), 1e-5, 1e-9);
+}
+
+// The eight corners of a unit cube, each face with its four Gauss points: exact for trilinear shapes.
+PressingLoad pressed_cube(bool open) {
+  PressingLoad load(2);
+  const double gauss = 0.5 - 0.5 / std::sqrt(3);
+  for (int axis = 0; axis < 3; ++axis)
+    for (int side = 0; side < 2; ++side) {
+      if (open && axis == 0) continue;
+      for (int point = 0; point < 4; ++point) {
+        Vec3 at;
+        at[axis] = side;
+        at[(axis + 1) % 3] = point % 2 ? gauss : 1 - gauss;
+        at[(axis + 2) % 3] = point / 2 ? gauss : 1 - gauss;
+        std::array<std::uint32_t, 8> nodes{};
+        std::array<double, 8> values{};
+        std::array<Vec3, 8> gradients{};
+        for (std::uint32_t a = 0; a < 8; ++a) {
+          nodes[a] = a;
+          Vec3 value, slope;
+          for (int i = 0; i < 3; ++i) {
+            value[i] = a >> i & 1 ? at[i] : 1 - at[i];
+            slope[i] = a >> i & 1 ? 1 : -1;
+          }
+          values[a] = value.prod();
+          gradients[a] = Vec3(slope.x() * value.y() * value.z(), value.x() * slope.y() * value.z(),
+                              value.x() * value.y() * slope.z());
+        }
+        Vec3 area = Vec3::Zero();
+        area[axis] = (side ? 1 : -1) * 0.25;
+        load.add_point(nodes, values, gradients, area);
+      }
+    }
+  return load;
+}
+
+double cube_volume(const std::vector<Vec3>& moved) {
+  double volume = 0;  // Gauss: exact for the determinant of a trilinear map
+  const double gauss = 0.5 - 0.5 / std::sqrt(3);
+  for (int p = 0; p < 8; ++p) {
+    const Vec3 at(p & 1 ? gauss : 1 - gauss, p & 2 ? gauss : 1 - gauss, p & 4 ? gauss : 1 - gauss);
+    Mat3 f = Mat3::Identity();
+    for (std::size_t a = 0; a < 8; ++a) {
+      Vec3 value, slope;
+      for (int i = 0; i < 3; ++i) {
+        value[i] = a >> i & 1 ? at[i] : 1 - at[i];
+        slope[i] = a >> i & 1 ? 1 : -1;
+      }
+      f += moved[a] * Vec3(slope.x() * value.y() * value.z(), value.x() * slope.y() * value.z(),
+                           value.x() * value.y() * slope.z())
+                          .transpose();
+    }
+    volume += f.determinant() / 8;
+  }
+  return volume;
+}
+
+TEST(Followers, PressureOnAClosedSurfaceIsTheVolumesDerivative) {
+  const PressingLoad load = pressed_cube(false);
+  const std::vector<Vec3> moved = any_vectors(8, 0.15, 0.4);
+  std::vector<Vec3> forces(8, Vec3::Zero()), change = forces, transposed = forces;
+  load.add_forces(moved, 1, forces);
+  Vec3 sum = Vec3::Zero();
+  for (std::size_t a = 0; a < 8; ++a) {
+    sum += forces[a];
+    for (int axis = 0; axis < 3; ++axis) {
+      std::vector<Vec3> more = moved, less = moved;
+      more[a][axis] += 1e-5;
+      less[a][axis] -= 1e-5;
+      EXPECT_NEAR(forces[a][axis], -2 * (cube_volume(more) - cube_volume(less)) / 2e-5, 1e-9);
+    }
+  }
+  EXPECT_LT(sum.norm(), 1e-13);
+  load.add_change(moved, 1, any_vectors(8, 1, 1), change);
+  load.add_transposed_change(moved, 1, any_vectors(8, 1, 1), transposed);
+  for (std::size_t a = 0; a < 8; ++a) EXPECT_LT((change[a] - transposed[a]).norm(), 1e-12);
+}
+
+TEST(Followers, ChangeOfAPressure) {
+  for (const bool open : {false, true})
+    expect_change_of(pressed_cube(open), any_vectors(8, 0.3, 0.4), 1e-5, 1e-9);
+}
+
+// A matrix that is not symmetric, by blocks on two diagonals: the answer is that of its product.
+TEST(Followers, GmresSolvesWhatIsNotSymmetric) {
+  constexpr std::uint32_t kRows = 60;
+  BlockMatrix matrix;
+  matrix.row_offsets = {0};
+  for (std::uint32_t row = 0; row < kRows; ++row) {
+    for (const std::int64_t column : {std::int64_t{row} - 1, std::int64_t{row}, std::int64_t{row} + 1}) {
+      if (column < 0 || column >= kRows) continue;
+      matrix.columns.push_back(static_cast<std::uint32_t>(column));
+      Block block = (column == row ? 2.2 : column < row ? -1.4 : -0.6) * Block::Identity();
+      block(0, 1) += 0.3;
+      matrix.values.push_back(block);
+    }
+    matrix.row_offsets.push_back(matrix.columns.size());
+  }
+  const std::vector<Vec3> wanted = any_vectors(kRows, 1, 0.2);
+  std::vector<Vec3> right, found;
+  multiply(matrix, wanted, right);
+  const StoredMatrix stored(matrix);
+  const auto preconditioner = block_jacobi(matrix);
+  const LinearResult result = gmres(stored, right, found, *preconditioner, 1e-12, 1000);
+  EXPECT_TRUE(result.converged);
+  EXPECT_LE(result.relative_residual, 1e-12);
+  for (std::size_t row = 0; row < kRows; ++row) EXPECT_LT((found[row] - wanted[row]).norm(), 1e-9);
+}
+
+constexpr double kBarYoung = 1e9, kBarLength = 0.08;
+
+// A bar 80 x 1 x 1 mm of `across` cells, held at x = 0; without contraction across, so that a circle is
+// exact.
+Body follower_bar(int across, const Mat3& axes = Mat3::Identity()) {
+  return testing::box_body(
+      {.cells = {80 * across, across, across}, .spacing = Vec3::Constant(1e-3 / across), .axes = axes});
+}
+
+std::string follower_stuff(const std::string& model, double poisson) {
+  return fmt::format(
+      "model = \"{}\"\nmaterial = \"it\"\n[materials.it]\nyoung = \"1 GPa\"\npoisson = {}\ndensity = \"1000 "
+      "kg/m3\"\n[[fix]]\nwhere = \"box/x0\"\n",
+      model, poisson);
+}
+
+std::string words_for(const Vec3& v, const char* unit) {
+  return fmt::format("[\"{:.17g} {}\", \"{:.17g} {}\", \"{:.17g} {}\"]", v.x(), unit, v.y(), unit, v.z(),
+                     unit);
+}
+
+SimulateResult run_follower(Body& body, const std::string& scene) {
+  Progress progress("test", Progress::Mode::quiet);
+  SimulateOptions options;
+  options.estimate = options.stress = false;
+  return simulate(body, parse_scene(scene, "s.toml"), options, progress);
+}
+
+// Of the length: how far the middle of the end is from its place on the arc.
+double off_the_arc(const std::string& model, double poisson, double angle, const std::string& rest,
+                   int across = 4) {
+  Body body = follower_bar(across);
+  const double moment = kBarYoung * std::pow(1e-3, 4) / 12 * angle / kBarLength;
+  const SimulateResult result =
+      run_follower(body, follower_stuff(model, poisson) + "[[load]]\nwhere = \"box/x1\"\n" + rest +
+                             "torque = " + words_for(Vec3(0, -moment, 0), "N m") +
+                             "\n[[probe]]\nname = \"end\"\nat = [\"80 mm\", \"0.5 mm\", \"0.5 mm\"]\n");
+  EXPECT_EQ(result.loads.size(), 1u);
+  // few connections through the thickness are stiffer than the bar, but bend it evenly all the same
+  const double turned = model == "springs" ? -result.loads[0].rotation->y() : angle;
+  // model `cells` may miss whole turns in what it tells
+  if (model != "springs") {
+    EXPECT_NEAR(std::remainder(-result.loads[0].rotation->y() - angle, 2 * std::numbers::pi), 0,
+                0.02 * angle);
+  }
+  const double radius = kBarLength / turned;
+  const Vec3 exact(radius * std::sin(turned) - kBarLength, 0, radius * (1 - std::cos(turned)));
+  return (result.probes[0].displacement - exact).norm() / kBarLength;
+}
+
+// A cantilever under the moment theta E I / L at its end is an arc of the angle theta. Dead forces would
+// leave it 30 % and more of the length away.
+TEST(Followers, ACantileverIsRolledUpIntoACircle) {
+  for (const double angle : {std::numbers::pi / 2, std::numbers::pi, 2 * std::numbers::pi}) {
+    EXPECT_LT(off_the_arc("cells", 0, angle, "follower = true\n", angle < 2 ? 4 : 2), 0.01) << angle;
+    EXPECT_LT(off_the_arc("quadratic", 0, angle, "follower = true\n", 1), 0.01) << angle;
+  }
+  EXPECT_LT(off_the_arc("springs", 0.25, std::numbers::pi, "follower = true\n", 2), 0.01);
+}
+
+std::string all_followers(double scale) {
+  return fmt::format(
+      "[[load]]\nwhere = \"box/x1\"\nfollower = true\ntorque = [\"{0} N m\", \"{1} N m\", \"{0} N "
+      "m\"]\nforce = [\"{2} "
+      "N\", \"{2} N\", 0]\nat = [\"90 mm\", \"5 mm\", \"9 mm\"]\n[[load]]\nwhere = \"box/z0\"\nfollower = "
+      "true\npressure = \"{3} kPa\"\n",
+      0.02 * scale, -0.05 * scale, 0.5 * scale, 20 * scale);
+}
+
+// 60 x 20 x 20 mm of gum, whose elements at x = 0 are held: a face would be by springs at equilibrium alone.
+std::string follower_gum(const std::string& model, double damping = 0) {
+  return fmt::format(
+      "model = \"{}\"\nmaterial = \"gum\"\n[materials.gum]\nyoung = \"1 MPa\"\npoisson = 0.25\ndensity = "
+      "\"1000 kg/m3\"\n[[fix]]\nwhere = {{ half_space = {{ point = [0, 0, 0], normal = [-1, 0, 0] }} }}\n{}",
+      model, damping > 0 ? fmt::format("[damping]\ntime = \"{} s\"\n", damping) : "");
+}
+
+Body gum_block() {
+  return testing::box_body({.cells = {6, 2, 2}, .spacing = Vec3::Constant(0.01)});
+}
+
+// What the solver takes for the change of all forces is that.
+TEST(Followers, TheWholeTangentIsThatOfTheForces) {
+  for (const char* model : {"cells", "springs"}) {
+    const Body body = gum_block();
+    const Scene scene = parse_scene(follower_gum(model) + all_followers(10), "s.toml");
+    const Problem problem{body,
+                          materials_of_parts(scene, body),
+                          {},
+                          models_of_parts(scene, body),
+                          hooke_of_parts(scene, body),
+                          {},
+                          {},
+                          {}};
+    Mechanics mechanics(problem, active_effects(scene.effects, problem));
+    ASSERT_TRUE(mechanics.follows());
+    State state{any_vectors(body.element_count(), 1e-3, 0.7), 0.8};
+    clear_prescribed(mechanics.constraints(), state.displacement);
+    std::vector<Vec3> along = any_vectors(body.element_count(), 1, 0.1), product;
+    clear_prescribed(mechanics.constraints(), along);
+    mechanics.assemble(state);
+    mechanics.eliminate_prescribed();
+    multiply(mechanics.whole_tangent(), along, product);
+    const double step = 1e-7;
+    State more = state, less = state;
+    for (std::size_t e = 0; e < along.size(); ++e) {
+      more.displacement[e] += step * along[e];
+      less.displacement[e] -= step * along[e];
+    }
+    std::vector<Vec3> up = mechanics.forces(more).total, down = mechanics.forces(less).total;
+    std::vector<Vec3> loads(along.size(), Vec3::Zero());
+    for (const ActiveEffect& effect : mechanics.effects())
+      if (effect->follows()) effect->add_force_change(state, along, false, loads);
+    const double size = std::sqrt(dot(product, product)), own = std::sqrt(dot(loads, loads));
+    EXPECT_GT(own, 1e-3 * size);  // the loads are seen
+    for (std::size_t e = 0; e < along.size(); ++e)
+      for (int axis = 0; axis < 3; ++axis)
+        if (!(mechanics.constraints().mask[e] >> axis & 1)) {
+          EXPECT_NEAR(product[e][axis], -(up[e][axis] - down[e][axis]) / (2 * step), 1e-6 * size);
+        }
+  }
+}
+
+// Loads that turn with a part that is turned as a whole are those of the part that is not.
+TEST(Followers, AnswersDoNotDependOnTheFrame) {
+  Body straight = gum_block();
+  const SimulateResult first = run_follower(straight, follower_gum("cells") + all_followers(1));
+  EXPECT_GT(first.loads[0].rotation->norm(), 0.3);
+  EXPECT_LT(first.imbalance.norm(), 1e-6);
+  Body quadratic = gum_block();
+  const SimulateResult second = run_follower(quadratic, follower_gum("quadratic") + all_followers(1));
+  // two models, two cells through the thickness, strains of some percent
+  EXPECT_LT((*second.loads[0].rotation - *first.loads[0].rotation).norm(),
+            0.1 * first.loads[0].rotation->norm());
+  EXPECT_LT((second.loads[0].force - first.loads[0].force).norm(), 0.1 * first.loads[0].force.norm());
+}
+
+// In time: the work of the loads is what the body has, and with damping it comes to rest in the
+// equilibrium.
+TEST(Followers, BooksCloseInTimeAndTheEndIsTheEquilibrium) {
+  for (const char* model : {"cells", "springs"}) {
+    const testing::TimedCase swung = testing::run_timed(
+        gum_block(),
+        parse_scene(follower_gum(model) + all_followers(0.5) + "[run]\ntime = \"0.1 s\"\n", "s.toml"));
+    testing::expect_books_close(swung.result);
+    EXPECT_GT(swung.result.loads[0].rotation->norm(), 0.1);
+    const testing::TimedCase damped = testing::run_timed(
+        gum_block(),
+        parse_scene(follower_gum(model, 0.01) + all_followers(0.5) + "[run]\ntime = \"2 s\"\n", "s.toml"));
+    Body still = gum_block();
+    const SimulateResult rest = run_follower(still, follower_gum(model) + all_followers(0.5));
+    EXPECT_LT((*damped.result.loads[0].rotation - *rest.loads[0].rotation).norm(),
+              1e-3 * rest.loads[0].rotation->norm())
+        << model;
+  }
+}
+
+TEST(Followers, ARigidLinkTurnsItsTorqueToo) {
+  EXPECT_LT(off_the_arc("quadratic", 0, std::numbers::pi / 2, "link = \"rigid\"\nfollower = true\n", 1),
+            0.01);
+}
+
+std::string follower_refusal(const std::string& rest) {
+  Body body = gum_block();
+  try {
+    (void)run_follower(body, follower_gum("cells") + rest);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(Followers, WhatTheyDoNotTakeIsRefused) {
+  EXPECT_THAT(follower_refusal("[[load]]\nwhere = \"box/x1\"\nbearing = [\"1 N\", 0, 0]\nfollower = true\n"),
+              HasSubstr("not with \"bearing\""));
+  EXPECT_THAT(follower_refusal("[[load]]\nwhere = \"box/x1\"\nforce = [\"1 N\", 0, 0]\nfollower = 1\n"),
+              HasSubstr("needs to be true or false"));
+  EXPECT_THAT(follower_refusal(all_followers(0.01) + "[run]\nmodes = 2\n"), HasSubstr("follower"));
+  EXPECT_THAT(
+      follower_refusal("[[load]]\nwhere = { box = { min = [\"59 mm\", \"-1 mm\", \"-1 mm\"], max = [\"61 "
+                       "mm\", \"1 mm\", \"21 mm\"] } }\nforce = [\"1 N\", 0, 0]\nfollower = true\n"),
+      HasSubstr("lie on a line"));
+}
+
+}  // namespace
+}  // namespace flexel::simulate
