@@ -86,33 +86,11 @@ void refuse_modes(const simulate::Scene& scene) {
                   scene.run.modes ? "modes" : "buckling"));
 }
 
-void declare_scene(CommandLine& app, JobArguments& arguments) {
+void declare_matter(CommandLine& app, JobArguments& arguments) {
   const auto add = [&](const char* name, std::vector<std::string>& values, const char* what,
                        const char* type) {
     app.add_option(name, values, what).type_name(type).one_value_each();
   };
-  app.add_option("--scene", arguments.scene, "Scene file (TOML; docs/reference/scene.md)").type_name("FILE");
-  add("--fix", arguments.fixes, "Hold this surface: \"xmin\", \"part/3\" (`flexel info` lists faces)",
-      "WHERE");
-  add("--push", arguments.pushes,
-      "Push a surface: \"xmax: 0 0 -50 N\", \"part/3: 50 N\" (inwards), \"part/3: 2 MPa\"; with \", "
-      "follower\" it turns with the surface",
-      "WHERE:FORCE");
-  add("--move", arguments.moves, "Move a surface: \"xmax: 0 0 -2 mm\", \"part/3: 2 mm\" (inwards)",
-      "WHERE:LENGTH");
-  add("--torque", arguments.torques,
-      "Turn a surface by a couple: \"xmax: 5 N m\" (about its axis), \"part/3: 0 0 5 N m\"; with \", "
-      "follower\" "
-      "it turns with the surface",
-      "WHERE:TORQUE");
-  add("--twist", arguments.twists,
-      "Turn a surface by an angle: \"xmax: 10 deg\" (about its axis), \"part/3: 0 0 10 deg\"", "WHERE:ANGLE");
-  add("--bearing", arguments.bearings, "Press on a hole as a pin does: \"part/3: 0 0 -200 N\"",
-      "WHERE:FORCE");
-  app.add_option("--gravity", arguments.gravity, "Weight: \"1 g\" (along -z), \"0 -9.81 0 m/s^2\"")
-      .type_name("ACCELERATION");
-  add("--probe", arguments.probes,
-      "Say how far a point or a surface moves: \"tip: 80 5 3 mm\", \"tip: part/3\"", "NAME:POINT");
   add("--material", arguments.materials,
       "What the parts are made of: steel, PLA, ... (docs/reference/scene.md); of one part: \"knob=PLA\"",
       "[PART=]NAME");
@@ -126,8 +104,39 @@ void declare_scene(CommandLine& app, JobArguments& arguments) {
       .type_name("LENGTH");
 }
 
+void declare_scene(CommandLine& app, JobArguments& arguments) {
+  const auto add = [&](const char* name, std::vector<std::string>& values, const char* what,
+                       const char* type) {
+    app.add_option(name, values, what).type_name(type).one_value_each();
+  };
+  app.add_option("--scene", arguments.scene, "Scene file (TOML; docs/reference/scene.md)").type_name("FILE");
+  add("--fix", arguments.fixes, "Hold this surface: \"xmin\", \"part/3\" (`flexel info` lists faces)",
+      "WHERE");
+  add("--push", arguments.pushes,
+      "Push a surface: \"xmax: 0 0 -50 N\", \"part/3: 50 N\" (inwards), \"part/3: 2 MPa\"; with \", "
+      "follower\" it "
+      "turns with the surface",
+      "WHERE:FORCE");
+  add("--move", arguments.moves, "Move a surface: \"xmax: 0 0 -2 mm\", \"part/3: 2 mm\" (inwards)",
+      "WHERE:LENGTH");
+  add("--torque", arguments.torques,
+      "Turn a surface by a couple: \"xmax: 5 N m\" (about its axis), \"part/3: 0 0 5 N m\"; with \", "
+      "follower\" it "
+      "turns with the surface",
+      "WHERE:TORQUE");
+  add("--twist", arguments.twists,
+      "Turn a surface by an angle: \"xmax: 10 deg\" (about its axis), \"part/3: 0 0 10 deg\"", "WHERE:ANGLE");
+  add("--bearing", arguments.bearings, "Press on a hole as a pin does: \"part/3: 0 0 -200 N\"",
+      "WHERE:FORCE");
+  app.add_option("--gravity", arguments.gravity, "Weight: \"1 g\" (along -z), \"0 -9.81 0 m/s^2\"")
+      .type_name("ACCELERATION");
+  add("--probe", arguments.probes,
+      "Say how far a point or a surface moves: \"tip: 80 5 3 mm\", \"tip: part/3\"", "NAME:POINT");
+  declare_matter(app, arguments);
+}
+
 void refuse_idle(const JobArguments& arguments) {
-  if (arguments.gravity.empty() && arguments.pushes.empty() && arguments.moves.empty() &&
+  if (!arguments.flex && arguments.gravity.empty() && arguments.pushes.empty() && arguments.moves.empty() &&
       arguments.torques.empty() && arguments.twists.empty() && arguments.bearings.empty())
     throw InputError(
         "nothing acts on the part: add --push \"WHERE: 0 0 -50 N\", --move \"WHERE: 0 0 -2 mm\", --torque, "
@@ -169,6 +178,7 @@ void plan_scene(const JobArguments& arguments, Job& job) {
     refuse_modes(job.scene);
   }
   add_options(arguments, job);
+  if (arguments.flex) job.flex = plan_flex(*arguments.flex);
 }
 
 void check_parts(const Job& job, const Surface& surface) {
@@ -198,6 +208,7 @@ void add_actions(Job& job, const Body& body) {
   for (const Action& move : job.moves) add_move(job.scene, move, body);
   for (const Action& torque : job.torques) add_torque(job.scene, torque, body);
   for (const Action& twist : job.twists) add_twist(job.scene, twist, body);
+  if (job.flex) add_flex(job.scene, *job.flex, body);
 }
 
 }  // namespace flexel::commands
