@@ -310,10 +310,12 @@ int compare_command(int argc, char** argv) {
   if (std::count(arguments.job.parts.begin(), arguments.job.parts.end(), "-") > 0 ||
       arguments.job.scene == "-")
     throw InputError("flexel compare reads its scene once for each part: give files, not stdin");
-  if (plan_job(arguments.job).scene.run.time)
-    throw InputError(arguments.job.scene,
-                     "flexel compare is for runs to equilibrium, and this scene is a timed run");
   const StopEndsProcess nothing_is_left;
+  plan_after_files(arguments.job, [&] {
+    if (plan_job(arguments.job).scene.run.time)
+      throw InputError(arguments.job.scene,
+                       "flexel compare is for runs to equilibrium, and this scene is a timed run");
+  });
   const ThreadLimit limit(arguments.threads);
   Progress progress("flexel", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
   Progress inner("flexel", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);

@@ -323,9 +323,13 @@ int compensate_command(int argc, char** argv) {
   app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
   const StopEndsProcess nothing_is_left;
   if (!parse_arguments(app, argc, argv)) return kExitDone;
-  const std::vector<Output> outputs = plan_outputs(arguments);
-  Job job = plan_job(arguments.job);
-  refuse_time(job.scene);
+  std::vector<Output> outputs;
+  Job job;
+  plan_after_files(arguments.job, [&] {
+    outputs = plan_outputs(arguments);
+    job = plan_job(arguments.job);
+    refuse_time(job.scene);
+  });
   const ThreadLimit limit(arguments.threads);
   Progress progress("flexel", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
   progress.stage("import");

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "base/files/files.h"
@@ -266,10 +267,20 @@ class ModelChoice {
 
   void choose(const voxelize::VoxelizeResult& usual) {
     constexpr double kTooThin = 0.3;  // cells: nor do a tenth of the cells resolve such walls
-    if (free_ && !chosen_ && walls_are_thin(usual) &&
-        wall_thickness(usual) > kTooThin * usual.parts.front().spacing.minCoeff())
+    if (may_be_other() && walls_are_thin(usual) &&
+        wall_thickness(usual) > kTooThin * usual.parts.front().spacing.minCoeff()) {
       set(true);
+      why_ =
+          fmt::format("a fifth of the matter lies in walls thinner than {} of the usual cells", kThinWalls);
+    }
   }
+  // Nobody named a model, and `cells` is in use.
+  [[nodiscard]] bool may_be_other() const { return free_ && !chosen_; }
+  void use_quadratic(const std::string& why) {
+    set(true);
+    why_ = why;
+  }
+  void use_cells() { set(false); }
   void keep() { free_ = false; }
   [[nodiscard]] bool may_take_back() const { return chosen_ && free_; }
   // False where the model was not chosen here, or has answered already.
@@ -282,6 +293,8 @@ class ModelChoice {
   }
   // Why the model that was chosen is not the one that answered; "" if it is.
   [[nodiscard]] const std::string& why_not() const { return why_not_; }
+  // Why `quadratic` was chosen.
+  [[nodiscard]] const std::string& why() const { return why_; }
   [[nodiscard]] bool quadratic() const { return job_.voxelize.moments; }
   [[nodiscard]] bool chosen() const { return chosen_; }
 
@@ -294,7 +307,7 @@ class ModelChoice {
   Job& job_;
   bool free_;
   bool chosen_ = false;
-  std::string why_not_;
+  std::string why_, why_not_;
 };
 
 // The runs at several sizes; warnings of runs that are only tried are held back.
@@ -314,7 +327,7 @@ class GoalRuns {
     if (size && model_.may_take_back()) limit.emplace(patience(), "--within");
     try {
       if (size) {
-        SolvedRun run = solve(size, goes_on);
+        SolvedRun run = surer_of_two(solve(size, goes_on));
         model_.keep();
         return run;
       }
@@ -340,8 +353,45 @@ class GoalRuns {
   }
   [[nodiscard]] const ModelChoice& model() const { return model_; }
   void drop_warnings() { (void)warnings_.take(); }
+  // In vain: `cells` was surer.
+  [[nodiscard]] bool tried_quadratic() const { return tried_quadratic_; }
 
  private:
+  // Where the first answer of model `cells` is rough, that of `quadratic` if its bar is narrower: what
+  // bends may be thin though most of the matter is not.
+  SolvedRun surer_of_two(SolvedRun run) {
+    constexpr double kRough = 0.2;
+    if (run.given_up || !model_.may_be_other()) return run;
+    std::vector<SolvedRun> first;
+    first.push_back(std::move(run));
+    const double guess = error_of(first);
+    if (!(guess > kRough)) return std::move(first.front());
+    model_.use_quadratic(
+        fmt::format("the first answer of model cells was rough, off by up to {}", human_share(guess)));
+    const mapping::MapOptions map = plan_.map;
+    try {
+      const StopAfter limit(patience(), "--within");
+      std::vector<SolvedRun> other;
+      const double size = made(std::nullopt).size;
+      other.push_back(solve(size, [](std::size_t) { return true; }));
+      if (error_of(other) < guess) return std::move(other.front());
+    } catch (const InputError&) {  // a scene that `quadratic` does not take
+    } catch (const DivergedError&) {
+    } catch (const TimeoutError&) {  // there is an answer; a limit of the whole command ends what comes next
+    }
+    drop_warnings();
+    plan_.map = map;
+    model_.use_cells();
+    tried_quadratic_ = true;
+    return std::move(first.front());
+  }
+  // Share; of no bar infinite.
+  [[nodiscard]] double error_of(const std::vector<SolvedRun>& run) const {
+    const StopWaits answered;
+    const std::optional<Judged> judged = judge(run, Quantities(plan_.goal->driven));
+    return judged ? judged->error : std::numeric_limits<double>::infinity();
+  }
+
   // s, for the first answer of a model that nobody asked for.
   [[nodiscard]] double patience() const {
     constexpr double kShare = 0.3, kUsualShare = 0.45, kUsual = 30;
@@ -432,6 +482,7 @@ class GoalRuns {
   Progress inner_;  // of one run: bars and warnings, no lines
   int tries_ = 0;
   bool solved_ = false;  // one of them
+  bool tried_quadratic_ = false;
   HeldWarnings warnings_;
   ModelChoice model_;
   double usual_size_ = 0;  // m, of a lattice for model `cells`
@@ -455,11 +506,9 @@ SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surf
     plan.map.method = &mapping::kSmooth;
   accuracy.method = name_of(plan.map.method);
   accuracy.dropped_model = runs.model().why_not();
+  accuracy.tried_quadratic = runs.tried_quadratic();
   if (runs.model().chosen())
-    progress.say(
-        fmt::format("model quadratic: a fifth of the matter lies in walls thinner than {} of the usual cells "
-                    "(--model cells is the other)",
-                    kThinWalls));
+    progress.say(fmt::format("model quadratic: {} (--model cells is the other)", runs.model().why()));
   return run;
 }
 
@@ -510,7 +559,8 @@ bool suits_quadratic(const SolvedRun& run) {
 // What to do next, of this run.
 std::string next_step(const SolvedRun& run, const std::optional<AccuracyReport>& accuracy) {
   if (!accuracy) return "";
-  if (suits_quadratic(run) && has_thin_walls(run) && accuracy->dropped_model.empty())
+  if (suits_quadratic(run) && has_thin_walls(run) && accuracy->dropped_model.empty() &&
+      !accuracy->tried_quadratic)
     return "--model quadratic is made for walls as thin as these";
   std::string chosen_for;
   if (accuracy->goal.error) chosen_for += human_share(*accuracy->goal.error);
@@ -661,7 +711,11 @@ std::optional<Deformed> run_with(DeformArguments arguments, int argc, char** arg
           fmt::format("--html {}: pages are HTML: name it {}.html", arguments.html, stem(arguments.html)));
     arguments.outputs.push_back(arguments.html);
   }
-  Plan plan = make_plan(arguments, app);
+  Plan plan;
+  if (arguments.part != nullptr)
+    plan = make_plan(arguments, app);
+  else
+    plan_after_files(arguments.job, [&] { plan = make_plan(arguments, app); });
   const ThreadLimit limit(arguments.threads);
   Progress progress("flexel", arguments.quiet ? Progress::Mode::quiet : mode);
   return run_stages(arguments, plan, progress);

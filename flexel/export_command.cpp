@@ -9,6 +9,7 @@
 #include "base/files/outputs.h"
 #include "base/nearest_word.h"
 #include "base/parallel.h"
+#include "base/program/progress_stretch.h"
 #include "base/program/termination.h"
 #include "base/units.h"
 #include "base/version.h"
@@ -223,15 +224,16 @@ mesh_export::Analysis analyse(const ExportArguments& arguments, Job& job, const 
     voxelize::VoxelizeOptions look = job.voxelize;
     look.size.reset();
     look.count = kLookCells;
-    Progress silent("", Progress::Mode::silent);
-    const Body body = voxelize::voxelize(surface, look, silent).body;
+    progress.stage("look");
+    ProgressStretch stretch(progress, 0, 1);
+    const Body body = voxelize::voxelize(surface, look, stretch.inner()).body;
     add_actions(job, body);
     mesh_export::refuse_untranslatable(job.scene, problem_of(body, job.scene));
     progress.stage("gmsh");
     mesh_export::TetrahedraOptions options;
     options.size = job.voxelize.size.value_or(bounding_box(surface.vertices).diagonal() / kTetrahedraAcross);
     options.threads = arguments.threads;
-    mesh_export::AnalysisMesh mesh = tetrahedra(arguments.job.parts, surface, options);
+    mesh_export::AnalysisMesh mesh = tetrahedra(arguments.job.parts, surface, options, progress);
     if (const std::size_t folded = folded_tetrahedra(mesh); folded > 0)
       throw InputError(arguments.job.parts.front(),
                        fmt::format("gmsh's mesh folds in {} of {} tetrahedra; use a smaller --size",
@@ -253,8 +255,11 @@ int export_command(int argc, char** argv) {
   declare(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   const StopEndsProcess nothing_is_left;
-  check(arguments);
-  Job job = plan_job(arguments.job);
+  Job job;
+  plan_after_files(arguments.job, [&] {
+    check(arguments);
+    job = plan_job(arguments.job);
+  });
   const ThreadLimit limit(arguments.threads);
   Progress progress("flexel", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
   progress.stage("import");
@@ -266,8 +271,8 @@ int export_command(int argc, char** argv) {
   mesh_export::Analysis analysis = analyse(arguments, job, surface, progress);
   if (arguments.nlgeom == "auto") {
     progress.stage("look at the deflection");
-    analysis.large_deflection =
-        mesh_export::large_deflection(surface, job.scene, arguments.threads, analysis.why_deflection);
+    analysis.large_deflection = mesh_export::large_deflection(surface, job.scene, arguments.threads,
+                                                              analysis.why_deflection, progress);
   } else {
     analysis.large_deflection = arguments.nlgeom == "on";
     analysis.why_deflection = "--nlgeom " + arguments.nlgeom;

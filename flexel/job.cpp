@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "base/error.h"
+#include "base/stop.h"
 #include "base/units.h"
 #include "formats/common/file_formats.h"
 #include "formats/exchange/size_warning.h"
@@ -62,6 +63,22 @@ Job plan_job(const JobArguments& arguments) {
   plan_scene(arguments, job);
   job.voxelize.moments = simulate::asks_for_quadratic(job.scene);
   return job;
+}
+
+void plan_after_files(const JobArguments& arguments, const std::function<void()>& plan) {
+  constexpr double kPatience = 3;  // s
+  try {
+    plan();
+  } catch (const InputError&) {
+    const StopAfter limit(kPatience, "reading");
+    try {
+      for (const std::string& path : arguments.parts)
+        if (path != "-") (void)import_surface(path);  // in whatever unit: the options may be what is wrong
+    } catch (const TimeoutError&) {
+      if (!limit.passed()) throw;
+    }
+    throw;
+  }
 }
 
 Surface read_parts(const std::vector<std::string>& paths, const ImportOptions& options, Progress& progress) {

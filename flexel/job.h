@@ -1,6 +1,7 @@
 // Options for parts and for their loads and supports, shared by `flexel deform`, `flexel export` and `flexel
 // compare` (loads and supports: `flexel study` too).
 #pragma once
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -60,6 +61,11 @@ void add_options(const JobArguments& arguments, Job& job);
 void refuse_modes(const simulate::Scene& scene);
 // Throws InputError where options alone, without a scene's file, name no material or nothing that acts.
 void refuse_idle(const JobArguments& arguments);
+
+// Makes a plan of the arguments. Where that throws InputError, a part's file that cannot be read is told of
+// first, as far as reading finds its fault in a few seconds: what the options lack is of no use without the
+// part.
+void plan_after_files(const JobArguments& arguments, const std::function<void()>& plan);
 
 // Reads the scene, not the parts. Throws InputError: wrong or missing arguments, nothing that acts, no
 // material, an unknown one.

@@ -181,7 +181,7 @@ study::Assignment assignment(const StudyArguments& a) {
     result.study_case.parts.push_back(fs::absolute(part).string());
     result.part_names.push_back(fs::path(part).filename().string());
   }
-  read_scenes(a, result.study_case);
+  plan_after_files(job, [&] { read_scenes(a, result.study_case); });
   const auto pass = [&](const char* option, const std::string& value) {
     if (value.empty()) return;
     result.study_case.voxelize_options.emplace_back(option);

@@ -27,6 +27,7 @@
 #include "simulate/events/fuse.h"
 #include "simulate/matter/fragments.h"
 #include "simulate/matter/stress.h"
+#include "simulate/memory.h"
 #include "simulate/models/rest_shape.h"
 #include "simulate/models/set_rest_shape.h"
 #include "simulate/modes/modes_run.h"
@@ -128,7 +129,7 @@ class Run {
  private:
   EquilibriumResult solve(Mechanics& mechanics);
   void warn_of_buckling(Mechanics& mechanics);
-  [[nodiscard]] std::optional<std::vector<Vec3>> coarse_equilibrium();
+  [[nodiscard]] std::optional<NearStart> coarse_equilibrium(Progress& stretch);
   [[nodiscard]] std::string save_failed(const Mechanics& mechanics);
 
   Body& body_;
@@ -140,6 +141,7 @@ class Run {
   Problem problem_;
   bool buckled_ = false;
   double linear_reach_ = 0;
+  FollowerMemory followers_;  // where the run ended
   int start_newton_iterations_ = 0;
   std::vector<std::uint8_t> tied_;  // (elements) Mechanics::tied_elements()
   State state_;
@@ -153,7 +155,8 @@ EquilibriumResult Run::solve(Mechanics& mechanics) {
   refuse_free_motions(mechanics, state_, scene_.name);
   try {
     CoarseStart start;
-    if (body_.cell_count() >= kLeastCellsToCoarsen) start = [&] { return coarse_equilibrium(); };
+    if (body_.cell_count() >= kLeastCellsToCoarsen)
+      start = [&](Progress& stretch) { return coarse_equilibrium(stretch); };
     return find_equilibrium(mechanics, state_, scene_.run, progress_, start);
   } catch (const DivergedError& error) {
     throw DivergedError(error.what() + save_failed(mechanics));
@@ -164,7 +167,7 @@ EquilibriumResult Run::solve(Mechanics& mechanics) {
 
 // Where the elements are in equilibrium on a lattice twice as coarse: nothing where there is none, or where
 // the coarse lattice says little of this one.
-std::optional<std::vector<Vec3>> Run::coarse_equilibrium() {
+std::optional<NearStart> Run::coarse_equilibrium(Progress& stretch) {
   try {
     Coarsening coarse = coarsening(body_);
     if (share_of_thin_walls(coarse.body, 1) > kMostThinWalls) return std::nullopt;
@@ -174,15 +177,14 @@ std::optional<std::vector<Vec3>> Run::coarse_equilibrium() {
     SimulateOptions options = options_;
     options.stress = options.explain = false;
     options.failed_output.clear();
-    Progress silent("", Progress::Mode::silent);
-    Run run(coarse.body, same, options, silent);
+    Run run(coarse.body, same, options, stretch);
     const SimulateResult found = run();
     start_newton_iterations_ = std::max(found.newton_iterations, found.start_newton_iterations);
     if (run.buckled_) return std::nullopt;  // the lattices may go to different sides
     if (options_.explain)
       progress_.say(fmt::format("start: from the equilibrium of {} cells, {} Newton iterations",
                                 human_count(coarse.body.cell_count()), found.newton_iterations));
-    return prolonged_displacement(coarse, body_);
+    return NearStart{prolonged_displacement(coarse, body_), run.followers_};
   } catch (const InputError&) {
   } catch (const DivergedError&) {
   } catch (const TimeoutError&) {
@@ -242,6 +244,7 @@ SimulateResult Run::operator()() {
   if (from_rest && !solved.buckled) linear_reach_ = solved.linear_reach;
   const StopWaits answered;  // what is found is told: the rest takes moments
   buckled_ = solved.buckled;
+  followers_ = follower_memory(mechanics);
   mechanics.report(state_, result);
   for (const std::string& warning : warnings_of(result)) progress_.warn(scene_.name + ": " + warning);
   result.elastic_energy = mechanics.elastic_energy(state_);
@@ -317,16 +320,17 @@ SimulateResult run_at_rest(Body& body, const Scene& scene, const SimulateOptions
 }
 
 ErrorBars bars_at_rest(Body& body, const Scene& scene, const SimulateOptions& options,
-                       const SimulateResult& result) {
+                       const SimulateResult& result, Progress& progress) {
   const TakenTemperatures temperatures(body, scene.get<Thermal>());
-  return estimate_errors(body, scene, options, result, [&](auto& coarse, auto& same, auto& how) {
-    Progress silent("", Progress::Mode::silent);
+  const SolveCoarse solve = [&](Body& coarse, const Scene& same, const SimulateOptions& how,
+                                Progress& stretch) {
     temperatures.give(coarse);
-    if (scene.get<Thermal>().conducts()) conduct(coarse, same, silent);
-    const SimulateResult found = run_at_rest(coarse, same, how, silent);
+    if (scene.get<Thermal>().conducts()) conduct(coarse, same, stretch);
+    const SimulateResult found = run_at_rest(coarse, same, how, stretch);
     temperatures.take_back(coarse);
     return found;
-  });
+  };
+  return estimate_errors(body, scene, options, result, solve, progress);
 }
 
 // run_at_rest() with its error bars.
@@ -336,7 +340,7 @@ SimulateResult run_and_judge(Body& body, const Scene& scene, const SimulateOptio
   SimulateResult result = run_at_rest(body, scene, options, progress, &linear_reach);
   if (options.estimate) {
     progress.stage("error bars");
-    result.error_bars = bars_at_rest(body, scene, options, result);
+    result.error_bars = bars_at_rest(body, scene, options, result, progress);
   }
   if (const std::string told = near_buckling(linear_reach, result); !told.empty())
     progress.warn(scene.name + ": " + told);
@@ -359,6 +363,9 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
   progress.stage("simulate");
   check_actions(scene, body, progress);
   refuse_heat(scene);
+  refuse_beyond_memory(body, scene);
+  if (const std::optional<double> needed = memory_needed(body, scene); needed && options.explain)
+    progress.say(fmt::format("memory: about {}", human_bytes(*needed)));
   if (scene.get<Thermal>().conducts()) conduct(body, scene, progress);
   if (asks_for_modes(scene)) {
     SimulateResult result = run_modes(body, scene, options, progress);

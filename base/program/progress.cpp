@@ -17,11 +17,13 @@
 #include "base/human.h"
 #include "base/printable.h"
 #include "base/program/brief_output.h"
+#include "base/program/silent_updates.h"
 
 namespace flexel {
 namespace {
 
 ProgressListener* listener = nullptr;
+SilentUpdate silent_update = nullptr;
 bool brief_output = false, holds_warnings = false, keeps_warnings = false;
 std::vector<std::string> held_warnings, kept_warnings;
 std::string held_program;  // that gave the last of them
@@ -53,6 +55,10 @@ std::size_t terminal_columns() {
 
 void set_progress_listener(ProgressListener* to) noexcept {
   listener = to;
+}
+
+void set_silent_update(SilentUpdate hears) noexcept {
+  silent_update = hears;
 }
 
 std::optional<double> seconds_left(double seconds, double share) {
@@ -109,6 +115,7 @@ Progress::~Progress() {
 }
 
 void Progress::stage(const std::string& name) {
+  if (mode_ == Mode::silent) return;
   finish();
   stage_ = name;
   stage_began_ = now();
@@ -117,7 +124,11 @@ void Progress::stage(const std::string& name) {
 }
 
 void Progress::update(double share, const std::string& note) {
-  const bool heard = listener != nullptr && mode_ != Mode::quiet && mode_ != Mode::silent;
+  if (mode_ == Mode::silent) {
+    if (silent_update != nullptr) silent_update(*this, share, note);
+    return;
+  }
+  const bool heard = listener != nullptr && mode_ != Mode::quiet;
   if ((mode_ != Mode::bar && !heard) || stage_.empty()) return;
   const double time = now();
   if (last_drawn_ >= 0 && time - last_drawn_ < kDrawInterval) return;

@@ -22,8 +22,8 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "cad/deform/fit.h"
-#include "cad/deform/rigid_motion.h"
+#include "cad/fit/fit.h"
+#include "cad/fit/rigid_motion.h"
 
 namespace flexel::cad {
 namespace {
@@ -139,6 +139,28 @@ DeformedGeometry::DeformedGeometry(const TopoDS_Shape& shape, const ShapeMap& ma
   widen_tolerances();
 }
 
+// That of all points of a face's domain, within kRigidShare of the tolerance; nothing: there is none. A few points tell it
+// of most faces: no motion leaves less than their mean.
+std::optional<RigidMotion> DeformedGeometry::motion_of(const Handle(Geom_Surface) & surface,
+                                                       const DeformedFace& face, const PointMap& map) const {
+  constexpr int kFew = 5;
+  const FaceDomain& d = face.domain;
+  const auto motion = [&](int u_looks, int v_looks) {
+    Moved moved;
+    for (int p = 0; p <= u_looks; ++p)
+      for (int q = 0; q <= v_looks; ++q)
+        moved.add(surface->Value(d.u_begin + (d.u_end - d.u_begin) * p / u_looks,
+                                 d.v_begin + (d.v_end - d.v_begin) * q / v_looks),
+                  map);
+    return rigid_motion(moved.from, moved.to, kLeastTolerance);
+  };
+  const double most = kRigidShare * options_.tolerance;
+  if (motion(kFew, kFew).mean > most) return {};
+  const auto [u_looks, v_looks] = looks_at(face, options_.spacing);
+  const RigidMotion rigid = motion(u_looks, v_looks);
+  return rigid.error <= most ? std::optional(rigid) : std::nullopt;
+}
+
 void DeformedGeometry::fit_face(std::size_t i) {
   DeformedFace& result = face_[i];
   const TopoDS_Face face = forward(faces_(static_cast<Standard_Integer>(i) + 1));
@@ -149,18 +171,10 @@ void DeformedGeometry::fit_face(std::size_t i) {
   const FaceDomain& d = result.domain;
   result.u_length = length_of(surface, d, true);
   result.v_length = length_of(surface, d, false);
-  const auto [u_looks, v_looks] = looks_at(result, options_.spacing);
-  Moved moved;
-  for (int p = 0; p <= u_looks; ++p)
-    for (int q = 0; q <= v_looks; ++q)
-      moved.add(surface->Value(d.u_begin + (d.u_end - d.u_begin) * p / u_looks,
-                               d.v_begin + (d.v_end - d.v_begin) * q / v_looks),
-                map);
-  if (const RigidMotion rigid = rigid_motion(moved.from, moved.to, kLeastTolerance);
-      rigid.error <= kRigidShare * options_.tolerance) {
+  if (const std::optional<RigidMotion> rigid = motion_of(surface, result, map)) {
     result.surface =
-        rigid.none ? surface : Handle(Geom_Surface)::DownCast(surface->Transformed(rigid.motion));
-    result.error = rigid.error;
+        rigid->none ? surface : Handle(Geom_Surface)::DownCast(surface->Transformed(rigid->motion));
+    result.error = rigid->error;
     result.kept = result.reached = true;
     return;
   }

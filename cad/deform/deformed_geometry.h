@@ -8,9 +8,11 @@
 #include <functional>
 #include <gp_Pnt.hxx>
 #include <gp_XYZ.hxx>
+#include <optional>
 #include <vector>
 
 #include "cad/deform/face_domain.h"
+#include "cad/fit/rigid_motion.h"
 
 namespace flexel::cad {
 
@@ -66,6 +68,8 @@ class DeformedGeometry {
   [[nodiscard]] const DeformedVertex* find_vertex(const TopoDS_Shape& vertex) const;
 
  private:
+  [[nodiscard]] std::optional<RigidMotion> motion_of(const Handle(Geom_Surface) & surface,
+                                                     const DeformedFace& face, const PointMap& map) const;
   void fit_face(std::size_t i);
   void fit_edge(std::size_t i);
   void move_vertex(std::size_t i);

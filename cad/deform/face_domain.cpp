@@ -115,9 +115,25 @@ bool FaceMask::has(double u, double v) const {
   const std::size_t p = cell(u, domain_.u_begin, domain_.u_end, fine_),
                     q = cell(v, domain_.v_begin, domain_.v_end, fine_);
   // The face's edges run along the rim of its domain, and arms of it may be thinner there than any cell.
-  if (p == 0 || q == 0 || p + 1 == fine_.n || q + 1 == fine_.n)
-    return classifier_.Perform(gp_Pnt2d(u, v)) != TopAbs_OUT;
+  if (p == 0 || p + 1 == fine_.n) return on_rim(u, v, p == 0 ? 0 : 1);
+  if (q == 0 || q + 1 == fine_.n) return on_rim(u, v, q == 0 ? 2 : 3);
   return middle(fine_, p, q);
+}
+
+std::size_t FaceMask::RimHash::operator()(const RimPlace& place) const {
+  return std::hash<double>()(place.across) * 31 + 4 * std::size_t{place.along} + place.side;
+}
+
+// `side`: u_begin, u_end, v_begin, v_end.
+bool FaceMask::on_rim(double u, double v, std::uint32_t side) const {
+  constexpr double kCells = 12288;
+  const double along = side < 2 ? (v - domain_.v_begin) / (domain_.v_end - domain_.v_begin)
+                                : (u - domain_.u_begin) / (domain_.u_end - domain_.u_begin);
+  const RimPlace place{side, static_cast<std::uint32_t>(std::clamp(along, 0.0, 1.0) * kCells),
+                       side < 2 ? u : v};
+  const auto [found, is_new] = rim_.try_emplace(place, false);
+  if (is_new) found->second = classifier_.Perform(gp_Pnt2d(u, v)) != TopAbs_OUT;
+  return found->second;
 }
 
 bool FaceMask::has_near(double u, double v, double du, double dv) const {

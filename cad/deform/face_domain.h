@@ -5,6 +5,7 @@
 #include <Geom_Surface.hxx>
 #include <TopoDS_Face.hxx>
 #include <cstdint>
+#include <unordered_map>
 #include <vector>
 
 namespace flexel::cad {
@@ -22,7 +23,7 @@ struct FaceDomain {
 [[nodiscard]] double length_of(const Handle(Geom_Curve) & curve, double begin, double end);
 
 // Which parameters lie in the face: where errors of a fit count. Looked up in rasters that are filled as they are asked;
-// what the face's edges pass by is told to 1/768 of the domain, along its rim exactly. One thread at a time.
+// what the face's edges pass by is told to 1/768 of the domain, along its rim to 1/12288 and across it exactly. One thread at a time.
 class FaceMask {
  public:
   FaceMask(const TopoDS_Face& face, const FaceDomain& domain);
@@ -37,11 +38,22 @@ class FaceMask {
     std::size_t n;             // cells in each direction
     std::vector<Known> known;  // (n * n) of their middles
   };
+  // Where along the rim, to 1/12288 of it, and how far from it, to the last digit.
+  struct RimPlace {
+    std::uint32_t side = 0, along = 0;
+    double across = 0;
+    bool operator==(const RimPlace&) const = default;
+  };
+  struct RimHash {
+    std::size_t operator()(const RimPlace& place) const;
+  };
   [[nodiscard]] bool middle(Raster& raster, std::size_t i, std::size_t j) const;
+  [[nodiscard]] bool on_rim(double u, double v, std::uint32_t side) const;
 
   FaceDomain domain_;
   mutable BRepTopAdaptor_FClass2d classifier_;
   mutable Raster coarse_, fine_;
+  mutable std::unordered_map<RimPlace, bool, RimHash> rim_;
 };
 
 }  // namespace flexel::cad

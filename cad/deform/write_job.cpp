@@ -14,6 +14,7 @@
 #include <TopoDS_Vertex.hxx>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "base/error.h"
 #include "base/human.h"
@@ -24,6 +25,7 @@
 #include "cad/deform/face_polygons.h"
 #include "cad/deform/losses.h"
 #include "cad/deform/solid_volume.h"
+#include "cad/deform/sphere_frames.h"
 #include "cad/deform/write_tree.h"
 #include "formats/lattice/body_file.h"
 #include "formats/part/surface.h"
@@ -36,6 +38,7 @@ namespace {
 constexpr std::uint32_t kNoFace = 0xffffffffu;
 // Of the tolerance: between the points that a fit looks at its error is larger.
 constexpr double kFitShare = 0.75;
+constexpr int kManyPoints = 5000;  // of a face: whether they are in it is then looked up, to 1/768 of it
 
 // What one job works on.
 struct Work {
@@ -180,17 +183,22 @@ FaceCheck check_face(const DeformedGeometry& geometry, std::size_t i, const Node
       TopoDS::Face(geometry.faces()(static_cast<Standard_Integer>(i) + 1).Oriented(TopAbs_FORWARD));
   const Handle(Geom_Surface) before = BRep_Tool::Surface(face);
   const PointMap map = node.of_face(i);
-  BRepTopAdaptor_FClass2d trimmed(face, 1e-6);
   const FaceDomain& d = moved.domain;
   const double step = 1e-3 * spacing;
   const auto difference = [&](const gp_XYZ& x, const gp_XYZ& by) { return map(x + by) - map(x - by); };
   // Two a spacing, in a sequence that fills the face evenly (M. Roberts' R2, from the plastic number).
   const double wanted = 4 * moved.u_length * moved.v_length / (spacing * spacing);
   const int points = static_cast<int>(std::clamp(wanted, 200.0, 50'000.0));
+  BRepTopAdaptor_FClass2d trimmed(face, 1e-6);
+  std::optional<FaceMask> mask;
+  if (points > kManyPoints) mask.emplace(face, d);
+  const auto is_inside = [&](double u, double v) {
+    return mask ? mask->has(u, v) : trimmed.Perform(gp_Pnt2d(u, v)) == TopAbs_IN;
+  };
   for (int n = 1; n <= points; ++n) {
     const double u = d.u_begin + (d.u_end - d.u_begin) * std::fmod(0.5 + 0.7548776662466927 * n, 1.0);
     const double v = d.v_begin + (d.v_end - d.v_begin) * std::fmod(0.5 + 0.5698402909980532 * n, 1.0);
-    if (trimmed.Perform(gp_Pnt2d(u, v)) != TopAbs_IN) continue;
+    if (!is_inside(u, v)) continue;
     const gp_XYZ x = before->Value(u, v).XYZ();
     found.deviation = std::max(found.deviation, unit * (moved.surface->Value(u, v).XYZ() - map(x)).Modulus());
     if (n % 4 != 0) continue;
@@ -255,8 +263,16 @@ void judge_solids(Work& work, const CadNode& node, const TopoDS_Shape& after,
   }
 }
 
+// No pole of a sphere is left at a corner of a face.
+void turn_spheres_of(CadNode& node) {
+  const TurnedShape turned = turn_spheres(node.shape);
+  for (StyledShape& styled : node.styled) styled.shape = turned.image(styled.shape);
+  node.shape = turned.shape;
+}
+
 void deform_node(Work& work, CadNode& node, const TopLoc_Location& here, double unit,
                  const std::vector<std::uint32_t>& part_of_solid, const std::string& where) {
+  turn_spheres_of(node);
   NodeMap map(work, here.Transformation(), unit);
   const std::uint32_t part = nearest_part(work, map, node.shape);
   map.set_places(places_of(work, node, map, part_of_solid, where), part);

@@ -33,11 +33,12 @@ struct TriedRun {
 
 struct AccuracyReport {
   AccuracyGoal goal;
-  std::vector<TriedRun> runs;  // in the order they were made; the last is the one that counts
-  std::string stopped;         // why no finer run was made, where the goal is not met
-  std::string method;          // of mapping
-  std::string dropped_model;   // why the model for thin walls, tried first, is not the one that answered
-  double seconds = 0;          // of all runs, until the result was written
+  std::vector<TriedRun> runs;    // in the order they were made; the last is the one that counts
+  std::string stopped;           // why no finer run was made, where the goal is not met
+  std::string method;            // of mapping
+  std::string dropped_model;     // why the model for thin walls, tried first, is not the one that answered
+  bool tried_quadratic = false;  // beside a rough first answer of model `cells`, in vain
+  double seconds = 0;            // of all runs, until the result was written
   // What to ask for next, with the time that it is expected to take: "--accuracy 2% takes about 40 s".
   std::string advice;
   [[nodiscard]] bool met() const;

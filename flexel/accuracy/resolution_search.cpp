@@ -208,6 +208,7 @@ class Search {
   }
 
   void keep(SolvedRun solved) {
+    const StopWaits answered;  // no limit of an attempt takes away an answer that is there
     const double total = solved.voxelize_seconds + solved.simulated.seconds +
                          solved.simulated.error_bars.seconds + solved.map_seconds;
     const double free =

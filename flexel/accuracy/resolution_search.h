@@ -2,9 +2,9 @@
 // default an error of 5 % within about 20 s; `flexel deform --accuracy 2%` and `--within 10s` ask for others.
 //
 // The compared quantities: the displacement of each probe along its direction in the last run; where no probe
-// moves, that of the vertex that moves most; and, where a [[move]] drives the part, the elastic energy. The
-// error of a single run is that of its error bars (simulate/estimate/error_bars.h). Beside a coarser run i -
-// 1, at the ratio r of the spacings, the error of run i is
+// moves, that of the point of the surface that moves most; and, where a [[move]] drives the part, the
+// elastic energy. The error of a single run is that of its error bars (simulate/estimate/error_bars.h).
+// Beside a coarser run i - 1, at the ratio r of the spacings, the error of run i is
 //     three runs that approach a limit:           their grid convergence index (simulate/result/estimate.h)
 //     order p <= 2.1 of the run's own error bars: 1.25 |f_i - f_(i-1)| / (r^p - 1), p between 1 and 2
 //     else:                                       3 |f_i - f_(i-1)| / (r - 1)

@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "formats/lattice/fields.h"
+
 namespace flexel::commands {
 namespace {
 
@@ -54,6 +56,29 @@ std::optional<Judged> judge_alone(const Quantity& fine) {
                 std::clamp(fine.bar->order.value_or(kLeastOrder), kLeastOrder, kMostOrder), fine.name};
 }
 
+// The point of the part's surface that moves most in the last run: a vertex, or a point of a polygon that
+// moves more than any vertex does.
+class MostMoved {
+ public:
+  explicit MostMoved(const SolvedRun& last) : surface_(largest_displacement_of_surface(last.voxels.body)) {
+    constexpr double kMore = 1e-3;  // than mapping and cells may differ
+    for (std::size_t v = 0; v < last.mapped.size(); ++v)
+      if (last.mapped[v].squaredNorm() > last.mapped[vertex_].squaredNorm()) vertex_ = v;
+    between_ = surface_.value() > (1 + kMore) * (last.mapped.empty() ? 0 : last.mapped[vertex_].norm());
+  }
+  // m, of that point in a run on the same surface.
+  [[nodiscard]] Vec3 in(const SolvedRun& run) const {
+    if (between_)
+      return displacement_on_surface(run.voxels.body, surface_.polygon, surface_.at).value_or(Vec3::Zero());
+    return run.mapped.empty() ? Vec3::Zero() : run.mapped[vertex_];
+  }
+
+ private:
+  LargestDisplacement surface_;
+  std::size_t vertex_ = 0;
+  bool between_ = false;
+};
+
 // Of each quantity that is not zero, with its index.
 std::vector<std::pair<Quantity, Judged>> judge_each(const std::vector<SolvedRun>& runs,
                                                     const Quantities& quantities) {
@@ -83,10 +108,8 @@ std::vector<std::pair<Quantity, Judged>> judge_each(const std::vector<SolvedRun>
 
 std::vector<Quantity> Quantities::of(const SolvedRun& run, const SolvedRun& last) const {
   std::vector<Quantity> found;
-  std::size_t most = 0;
-  for (std::size_t v = 0; v < last.mapped.size(); ++v)
-    if (last.mapped[v].squaredNorm() > last.mapped[most].squaredNorm()) most = v;
-  const double largest = last.mapped.empty() ? 0 : last.mapped[most].norm();
+  const MostMoved most(last);
+  const double largest = most.in(last).norm();
   const auto along = [](const Vec3& moved, const Vec3& direction) {
     return direction.norm() > 0 ? moved.dot(direction.normalized()) : moved.norm();
   };
@@ -97,8 +120,8 @@ std::vector<Quantity> Quantities::of(const SolvedRun& run, const SolvedRun& last
                      along(run.simulated.probes[p].displacement, direction),
                      bar_of(run, simulate::ErrorBar::Of::probe, p), simulate::ErrorBar::Of::probe, p});
   }
-  if (found.empty() && !last.mapped.empty())
-    found.push_back({"largest displacement", along(run.mapped[most], last.mapped[most]),
+  if (found.empty() && largest > 0)
+    found.push_back({"largest displacement", along(most.in(run), most.in(last)),
                      bar_of(run, simulate::ErrorBar::Of::largest_displacement, 0)});
   if (driven_ && last.simulated.elastic_energy > 0)
     found.push_back({"elastic energy", run.simulated.elastic_energy,

@@ -23,7 +23,7 @@ class Quantities {
  public:
   explicit Quantities(bool driven) : driven_(driven) {}
 
-  // The probes' displacements; where no probe moves, the displacement of the vertex that moves most in
+  // The probes' displacements; where no probe moves, that of the point of the surface that moves most in
   // `last`, along its direction there.
   [[nodiscard]] std::vector<Quantity> of(const SolvedRun& run, const SolvedRun& last) const;
 

@@ -4,14 +4,17 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <sstream>
 #include <unordered_map>
 
 #include "base/error.h"
 #include "base/files/files.h"
 #include "base/files/output_file.h"
+#include "flexel/export/gmsh_log.h"
 #include "flexel/process/child.h"
 
 namespace flexel::mesh_export {
@@ -99,7 +102,8 @@ GmshMesh read_msh(const std::string& path) {
 
 }  // namespace
 
-GmshMesh mesh_with_gmsh(const std::string& folder, const std::string& script, const std::string& part) {
+GmshMesh mesh_with_gmsh(const std::string& folder, const std::string& script, const std::string& part,
+                        Progress& progress) {
   write_text(script, folder + "/mesh.geo");
   const std::string gmsh = find_program("gmsh");
   if (gmsh.empty())
@@ -109,8 +113,17 @@ GmshMesh mesh_with_gmsh(const std::string& folder, const std::string& script, co
   ChildOptions options;
   options.log = folder + "/log";
   options.folder = folder;
+  GmshLog log;
+  std::ifstream written;
+  options.meanwhile = [&, began = std::chrono::steady_clock::now()] {
+    if (!written.is_open()) written.open(options.log);
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+    log.add(std::string(std::istreambuf_iterator<char>(written), {}), seconds);
+    written.clear();  // gmsh goes on where it ended
+    progress.update(log.share(seconds));
+  };
   const ChildRun run =
-      run_child({gmsh, "mesh.geo", "-3", "-format", "msh22", "-o", "mesh.msh", "-v", "3"}, options);
+      run_child({gmsh, "mesh.geo", "-3", "-format", "msh22", "-o", "mesh.msh", "-v", "5"}, options);
   const std::string mesh_file = folder + "/mesh.msh";
   GmshMesh mesh;
   if (run.exit_code == 0 && std::filesystem::exists(mesh_file)) mesh = read_msh(mesh_file);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "base/math/vec.h"
+#include "base/program/progress.h"
 
 namespace flexel::mesh_export {
 
@@ -28,6 +29,6 @@ struct GmshMesh {
 // Runs gmsh on a script in `folder`, which merges the geometry, and reads the mesh. `part` is what is meshed,
 // for messages. Throws InputError: gmsh is not installed, or cannot mesh it (with its own last error).
 [[nodiscard]] GmshMesh mesh_with_gmsh(const std::string& folder, const std::string& script,
-                                      const std::string& part);
+                                      const std::string& part, Progress& progress);
 
 }  // namespace flexel::mesh_export

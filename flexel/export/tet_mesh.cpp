@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "base/files/temporary_folder.h"
 #include "base/math/distance.h"
+#include "base/program/progress_stretch.h"
 #include "flexel/export/gmsh.h"
 #include "flexel/export/mesh.h"
 #include "formats/common/file_formats.h"
@@ -72,9 +73,24 @@ void append(GmshMesh& all, const GmshMesh& one, double unit) {
   }
 }
 
+// Of the parts that gmsh meshes one after another: a CAD file is one, a mesh has its own.
+std::size_t gmsh_runs(const Surface& surface) {
+  std::size_t runs = 0;
+  for (const SurfaceSource& source : surface.sources) runs += is_cad(source) ? 1 : 0;
+  for (const std::uint32_t source : surface.part_source) runs += is_cad(surface.sources[source]) ? 0 : 1;
+  return runs;
+}
+
 GmshMesh mesh_all(const std::vector<std::string>& paths, const Surface& surface,
-                  const TetrahedraOptions& options) {
+                  const TetrahedraOptions& options, Progress& progress) {
   GmshMesh all;
+  const double runs = static_cast<double>(gmsh_runs(surface));
+  double run = 0;
+  const auto mesh = [&](const TemporaryFolder& folder, const std::string& script, const std::string& part) {
+    ProgressStretch stretch(progress, run / runs, (run + 1) / runs);
+    ++run;
+    return mesh_with_gmsh(folder.path().string(), script, part, stretch.inner());
+  };
   for (std::size_t s = 0; s < surface.sources.size(); ++s) {
     const SurfaceSource& source = surface.sources[s];
     if (is_cad(source)) {
@@ -85,12 +101,12 @@ GmshMesh mesh_all(const std::vector<std::string>& paths, const Surface& surface,
       std::filesystem::create_symlink(std::filesystem::absolute(paths[s]), folder.path() / name);
       // gmsh reads STEP and IGES in millimetres, BREP as it is
       const double unit = carries_unit(source) ? 1e-3 : source.unit;
-      append(all,
-             mesh_with_gmsh(folder.path().string(),
-                            fmt::format("SetFactory(\"OpenCASCADE\");\nMerge \"{}\";\n{}", name,
-                                        settings(options, unit)),
-                            source.file),
-             unit);
+      append(
+          all,
+          mesh(folder,
+               fmt::format("SetFactory(\"OpenCASCADE\");\nMerge \"{}\";\n{}", name, settings(options, unit)),
+               source.file),
+          unit);
       continue;
     }
     for (std::uint32_t part = 0; part < surface.parts.size(); ++part) {
@@ -99,15 +115,14 @@ GmshMesh mesh_all(const std::vector<std::string>& paths, const Surface& surface,
       const Surface one = part_surface(surface, part);
       write_surface(one, std::vector<Vec3>(one.vertices.size(), Vec3::Zero()), surface_format("stl"), 1e-3,
                     (folder.path() / "part.stl").string());
-      append(
-          all,
-          mesh_with_gmsh(folder.path().string(),
-                         fmt::format("Merge \"part.stl\";\nClassifySurfaces{{{0} * Pi / 180, 1, 1, {0} * Pi "
-                                     "/ 180}};\nCreateGeometry;\nSurface Loop(1) = Surface{{:}};\nVolume(1) "
-                                     "= {{1}};\n{1}",
-                                     kRegionAngle, settings(options, 1e-3)),
-                         fmt::format("{}, part \"{}\"", source.file, surface.parts[part].name)),
-          1e-3);
+      append(all,
+             mesh(folder,
+                  fmt::format("Merge \"part.stl\";\nClassifySurfaces{{{0} * Pi / 180, 1, 1, {0} * Pi "
+                              "/ 180}};\nCreateGeometry;\nSurface Loop(1) = Surface{{:}};\nVolume(1) "
+                              "= {{1}};\n{1}",
+                              kRegionAngle, settings(options, 1e-3)),
+                  fmt::format("{}, part \"{}\"", source.file, surface.parts[part].name)),
+             1e-3);
     }
   }
   return all;
@@ -267,8 +282,8 @@ void make_body(const Surface& surface, const GmshMesh& from, AnalysisMesh& mesh)
 }  // namespace
 
 AnalysisMesh tetrahedra(const std::vector<std::string>& paths, const Surface& surface,
-                        const TetrahedraOptions& options) {
-  const GmshMesh from = mesh_all(paths, surface, options);
+                        const TetrahedraOptions& options, Progress& progress) {
+  const GmshMesh from = mesh_all(paths, surface, options, progress);
   check_size(surface, from);
   AnalysisMesh mesh;
   mesh.kind = AnalysisMesh::Kind::tetrahedra;

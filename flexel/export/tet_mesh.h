@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "base/program/progress.h"
 #include "flexel/export/mesh.h"
 
 namespace flexel::mesh_export {
@@ -17,6 +18,6 @@ struct TetrahedraOptions {
 // names from those nearest to them. Throws InputError: gmsh is not installed, cannot mesh the part, or was
 // given stdin.
 [[nodiscard]] AnalysisMesh tetrahedra(const std::vector<std::string>& paths, const Surface& surface,
-                                      const TetrahedraOptions& options);
+                                      const TetrahedraOptions& options, Progress& progress);
 
 }  // namespace flexel::mesh_export

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/human.h"
+#include "base/program/progress_stretch.h"
 #include "base/units.h"
 #include "flexel/export/analysis.h"
 #include "flexel/export/nodal_forces.h"
@@ -26,7 +27,8 @@ constexpr double kTouching = 1e-2;  // of the spacing or the mesh's edge: surfac
 constexpr double kTied = 0.1;       // of a tetrahedron's edge: gap that is tied
 constexpr std::size_t kProbeCells = 3000;
 constexpr double kSmallShare = 1e-3, kDifference = 0.01;
-constexpr double kSmallAngle = 0.01;  // rad
+constexpr double kSmallAngle = 0.01;                  // rad
+constexpr double kVoxelizing = 0.2, kSmallRun = 0.5;  // shares of the look's time that are gone after each
 
 std::string kind_of(const simulate::Load& load) {
   if (load.pressure) return "pressure";
@@ -170,7 +172,8 @@ Analysis translate(AnalysisMesh mesh, const simulate::Scene& scene, const simula
   return analysis;
 }
 
-bool large_deflection(const Surface& surface, simulate::Scene scene, int threads, std::string& why) {
+bool large_deflection(const Surface& surface, simulate::Scene scene, int threads, std::string& why,
+                      Progress& progress) {
   simulate::SimulateOptions options;
   options.threads = threads;
   options.stress = options.estimate = false;
@@ -179,18 +182,19 @@ bool large_deflection(const Surface& surface, simulate::Scene scene, int threads
       why = fmt::format("\"{}\" is turned by {:.3g} degrees", tie.name, tie.motion.angle * 180 / M_PI);
       return true;
     }
-  Progress silent("", Progress::Mode::silent);
   double moved[2] = {0, 0};
   try {
     voxelize::VoxelizeOptions coarse;
     coarse.count = kProbeCells;
-    Body body = voxelize::voxelize(surface, coarse, silent).body;
+    ProgressStretch voxelizing(progress, 0, kVoxelizing);
+    Body body = voxelize::voxelize(surface, coarse, voxelizing.inner()).body;
     for (const bool small : {true, false}) {
       simulate::Scene scaled = scene;
       if (small) scale_actions(scaled, kSmallShare);
       Body copy = body;
-      moved[small] =
-          simulate::simulate(copy, scaled, options, silent).largest_displacement / (small ? kSmallShare : 1);
+      ProgressStretch run(progress, small ? kVoxelizing : kSmallRun, small ? kSmallRun : 1);
+      moved[small] = simulate::simulate(copy, scaled, options, run.inner()).largest_displacement /
+                     (small ? kSmallShare : 1);
     }
   } catch (const DivergedError&) {
     if (moved[1] > 0) {

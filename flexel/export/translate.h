@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "base/program/progress.h"
 #include "flexel/export/analysis.h"
 
 namespace flexel::mesh_export {
@@ -23,6 +24,6 @@ void refuse_untranslatable(const simulate::Scene& scene, const simulate::Problem
 // from a coarse lattice of ours under the scene's loads and under a thousandth of them. In `why` how that was
 // told, or why it could not be.
 [[nodiscard]] bool large_deflection(const Surface& surface, simulate::Scene scene, int threads,
-                                    std::string& why);
+                                    std::string& why, Progress& progress);
 
 }  // namespace flexel::mesh_export

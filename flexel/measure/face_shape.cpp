@@ -23,6 +23,9 @@ namespace {
 
 const double kFlatCosine = std::cos(0.2 * M_PI / 180);
 const double kRoundSine = std::sin(1.0 * M_PI / 180);
+// Between the axis and the plane of a triangle: one whose corners lie on a cylinder of 16 sides, at different
+// heights, slants by 3 degrees, one of 8 sides by 7. That the corners lie on one circle is what tells.
+const double kSlantSine = std::sin(10.0 * M_PI / 180);
 constexpr double kRoundDeviation = 0.01;
 constexpr std::size_t kSteps = 720;                  // round a cylinder
 constexpr std::size_t kAllRound = kSteps - 10;       // steps: closed but for what rounding leaves
@@ -204,7 +207,7 @@ FaceShape face_shape(const Surface& surface, const std::vector<std::uint32_t>& p
     return shape;
   }
   const Vec3 axis = axis_of(sums.normals);
-  if (all_normals(surface, polygons, [&](const Vec3& n) { return std::abs(n.dot(axis)) <= kRoundSine; }))
+  if (all_normals(surface, polygons, [&](const Vec3& n) { return std::abs(n.dot(axis)) <= kSlantSine; }))
     fit_circle(surface, polygons, axis, shape);
   if (shape.kind != FaceShape::Kind::round) return shape;
   const std::size_t steps = reach_of(surface, polygons, shape).steps.count();

@@ -84,13 +84,13 @@ View choose_view(const std::vector<Panel>& panels, const PictureOptions& options
 }
 
 void draw_panel(Image& image, const Panel& panel, const Viewport& viewport, const Camera& camera,
-                const ShadeOptions& shade, float scale) {
+                const ShadeOptions& shade, float scale, const std::function<void(double)>& progress) {
   // The viewport holds the part exactly; outlines and soft edges need a little more.
   const int spare = 4;
   Viewport room{std::max(0, viewport.x - spare), std::max(0, viewport.y - spare), 0, 0};
   room.width = std::min(image.width, viewport.x + viewport.width + spare) - room.x;
   room.height = std::min(image.height, viewport.y + viewport.height + spare) - room.y;
-  render(image, room, camera, panel.drawn, *panel.tracer, shade);
+  render(image, room, camera, panel.drawn, *panel.tracer, shade, progress);
   check_stop();
   LineStyle style;
   style.scale = scale;
@@ -241,7 +241,7 @@ PictureResult draw_picture(const std::vector<PictureSubject>& subjects, const Pi
   std::optional<Legend> legend;
   if (!by.name.empty()) legend = make_legend(panels, by, options, result.notes);
   hint_at_scale(panels, *options.exaggeration, result.notes);
-  progress.update(0.4, "choosing the view");
+  progress.update(0.25, "choosing the view");
   const Layout layout = lay_out(panels.size(), options, legend ? &*legend : nullptr);
   if (views.empty()) {
     views = {choose_view(panels, options, result.notes)};
@@ -251,7 +251,6 @@ PictureResult draw_picture(const std::vector<PictureSubject>& subjects, const Pi
       views.insert(views.end(), sides.begin(), sides.end());
   }
   const Framing framing = frame_panels(panels, layout, views);
-  progress.update(0.5, "casting rays");
   for (std::size_t p = 0; p < panels.size(); ++p) {
     ShadeOptions shade;
     shade.by_value = !by.name.empty() && !by.by_rays;
@@ -261,7 +260,11 @@ PictureResult draw_picture(const std::vector<PictureSubject>& subjects, const Pi
       shade.low = static_cast<float>(legend->low);
       shade.high = static_cast<float>(legend->high);
     }
-    draw_panel(result.image, panels[p], layout.panels[p], framing.cameras[p], shade, layout.text / 21);
+    const auto drawn = [&](double share) {
+      progress.update(0.3 + 0.7 * (static_cast<double>(p) + share) / static_cast<double>(panels.size()),
+                      "casting rays");
+    };
+    draw_panel(result.image, panels[p], layout.panels[p], framing.cameras[p], shade, layout.text / 21, drawn);
   }
   if (options.faces) number_faces(result.image, panels, layout, framing, result.notes);
   annotate(result.image, panels, layout, framing, legend ? &*legend : nullptr, *options.exaggeration);

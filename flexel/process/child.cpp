@@ -127,6 +127,7 @@ ChildRun run_child(const std::vector<std::string>& argv, const ChildOptions& opt
       signalled = true;
       until = Clock::now() + kGrace;
     }
+    if (options.meanwhile) options.meanwhile();
   }
   int status = 0;
   rusage usage = {};

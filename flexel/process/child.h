@@ -3,6 +3,7 @@
 #pragma once
 #include <chrono>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -25,7 +26,8 @@ struct ChildOptions {
   std::filesystem::path folder;          // the working folder; "": that of this process
   std::vector<std::string> environment;  // "NAME=VALUE", added to this process's
   Deadline deadline = kNever;
-  bool heed_interrupts = true;  // false: an interrupt that has come already does not count
+  bool heed_interrupts = true;      // false: an interrupt that has come already does not count
+  std::function<void()> meanwhile;  // called some ten times a second while it runs
 };
 
 // Runs the program (argv[0] its path) with stdin from /dev/null, and waits for it. An interrupt (SIGINT) is

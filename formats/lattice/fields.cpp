@@ -18,15 +18,114 @@ constexpr double kNoStrain = std::numeric_limits<double>::quiet_NaN();
 
 struct FirstLargest {
   double squared = -1;
-  Vec3 displacement = Vec3::Zero(), at = Vec3::Zero();
+  LargestDisplacement found;
   FirstLargest& operator+=(const FirstLargest& other) {
     if (other.squared > squared) *this = other;
     return *this;
   }
 };
 
-FirstLargest moved(const Vec3& displacement, const Vec3& at) {
-  return {displacement.squaredNorm(), displacement, at};
+FirstLargest moved(const Vec3& displacement, const Vec3& at, std::uint32_t polygon = kNoPolygonAround) {
+  return {displacement.squaredNorm(), {displacement, at, polygon}};
+}
+
+std::vector<Vec3> own_displacement(const Body& body) {
+  std::vector<Vec3> displacement(body.element_count());
+  parallel_for_each(displacement.size(),
+                    [&](std::size_t e) { displacement[e] = body.position[e] - body.rest[e]; });
+  return displacement;
+}
+
+// Moves points of the surface by the cells under them. Keeps references.
+class SurfaceMotion {
+ public:
+  SurfaceMotion(const Body& body, const std::vector<Vec3>& displacement)
+      : body_(body), displacement_(displacement) {
+    if (QuadraticField::is_in(body)) field_.emplace(body, displacement);
+  }
+
+  [[nodiscard]] Vec3 operator()(std::uint32_t polygon, const CellPoint& cell, const Vec3& at) const {
+    if (!field_) return interpolate(cell, body_, displacement_);
+    const Part& part = body_.parts[body_.surface.polygon_part(polygon)];
+    return field_->displacement(cell.cell, cell_coordinates(body_, part, cell.cell, at));
+  }
+  [[nodiscard]] std::optional<Vec3> operator()(std::uint32_t polygon, const Vec3& at) const {
+    const std::optional<CellPoint> cell = locate_on_surface(body_, polygon, at);
+    if (!cell) return std::nullopt;
+    return (*this)(polygon, *cell, at);
+  }
+
+ private:
+  const Body& body_;
+  const std::vector<Vec3>& displacement_;
+  std::optional<QuadraticField> field_;
+};
+
+// The points of a triangle's edges and, where it lies over it, of its plane that are nearest to `to`.
+struct NearestPoints {
+  std::array<Vec3, 4> at;
+  std::size_t count = 3;
+};
+
+NearestPoints nearest_points(const std::array<Vec3, 3>& corners, const Vec3& to) {
+  NearestPoints found;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Vec3 &from = corners[i], edge = corners[(i + 1) % 3] - from;
+    const double squared = edge.squaredNorm();
+    const double share = squared > 0 ? std::clamp((to - from).dot(edge) / squared, 0.0, 1.0) : 0;
+    found.at[i] = from + share * edge;
+  }
+  const Vec3 normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+  if (!(normal.squaredNorm() > 0)) return found;
+  const Vec3 foot = to - (to - corners[0]).dot(normal) / normal.squaredNorm() * normal;
+  for (std::size_t i = 0; i < 3; ++i)
+    if ((corners[(i + 1) % 3] - corners[i]).cross(foot - corners[i]).dot(normal) < 0) return found;
+  found.at[found.count++] = foot;
+  return found;
+}
+
+// Of one triangle, between its corners. Points outside a cell are its neighbours'.
+FirstLargest largest_between_corners(const Body& body, const SurfaceMotion& motion, std::uint32_t polygon,
+                                     const std::array<Vec3, 3>& corners) {
+  constexpr double kRounding = 1e-9;  // of a cell
+  const Part& part = body.parts[body.surface.polygon_part(polygon)];
+  FirstLargest largest;
+  for (std::uint32_t c = body.surface_cell_offsets[polygon]; c < body.surface_cell_offsets[polygon + 1];
+       ++c) {
+    const std::uint32_t cell = body.surface_cells[c];
+    Vec3 middle = Vec3::Zero();
+    for (const std::uint32_t e : body.cell_elements[cell]) middle += 0.125 * body.rest[e];
+    const NearestPoints points = nearest_points(corners, middle);
+    for (std::size_t i = 0; i < points.count; ++i) {
+      const Vec3 inside = cell_coordinates(body, part, cell, points.at[i]);
+      if (inside.minCoeff() < -kRounding || inside.maxCoeff() > 1 + kRounding) continue;
+      largest +=
+          moved(motion(polygon, cell_point(body, cell, points.at[i]), points.at[i]), points.at[i], polygon);
+    }
+  }
+  return largest;
+}
+
+FirstLargest largest_of_surface(const Body& body, const std::vector<Vec3>& displacement) {
+  constexpr double kMore = 1e-9;  // than rounding
+  const SurfaceMotion motion(body, displacement);
+  const std::vector<std::uint32_t> around = polygons_around_vertices(body);
+  FirstLargest largest = parallel_sum<FirstLargest>(around.size(), [&](std::size_t v) {
+    if (around[v] == kNoPolygonAround) return FirstLargest{};
+    const Vec3& vertex = body.surface.vertices[v];
+    const std::optional<Vec3> found = motion(around[v], vertex);
+    return found ? moved(*found, vertex, around[v]) : FirstLargest{};
+  });
+  if (largest.squared < 0) return largest;
+  const Triangles triangles = triangulate(body.surface);
+  const FirstLargest between = parallel_sum<FirstLargest>(triangles.corners.size(), [&](std::size_t t) {
+    const std::uint32_t polygon = triangles.polygon[t];
+    const auto& [a, b, c] = triangles.corners[t];
+    const std::vector<Vec3>& at = body.surface.vertices;
+    return largest_between_corners(body, motion, polygon, {at[a], at[b], at[c]});
+  });
+  if (between.squared > (1 + kMore) * largest.squared) largest = between;
+  return largest;
 }
 
 Mat3 mean_gradient(const Body& body, const Part& part, std::size_t cell) {
@@ -77,31 +176,26 @@ std::vector<std::uint32_t> polygons_around_vertices(const Body& body) {
 
 LargestDisplacement largest_displacement(const Body& body, const std::vector<Vec3>& displacement) {
   std::vector<std::uint8_t> inside = elements_in_matter(body);
-  const std::vector<std::uint32_t> around = polygons_around_vertices(body);
-  std::optional<QuadraticField> field;
-  if (QuadraticField::is_in(body)) field.emplace(body, displacement);
-  FirstLargest largest = parallel_sum<FirstLargest>(around.size(), [&](std::size_t v) {
-    if (around[v] == kNoPolygonAround) return FirstLargest{};
-    const Vec3& vertex = body.surface.vertices[v];
-    const auto at = locate_on_surface(body, around[v], vertex);
-    if (!at) return FirstLargest{};
-    if (!field) return moved(interpolate(*at, body, displacement), vertex);
-    const Part& part = body.parts[body.surface.polygon_part(around[v])];
-    return moved(field->displacement(at->cell, cell_coordinates(body, part, at->cell, vertex)), vertex);
-  });
+  FirstLargest largest = largest_of_surface(body, displacement);
   if (largest.squared < 0 && std::find(inside.begin(), inside.end(), 1) == inside.end())
     std::fill(inside.begin(), inside.end(), std::uint8_t{1});
   largest += parallel_sum<FirstLargest>(inside.size(), [&](std::size_t e) {
     return inside[e] != 0 ? moved(displacement[e], body.rest[e]) : FirstLargest{};
   });
-  return {largest.displacement, largest.at};
+  return largest.found;
 }
 
 LargestDisplacement largest_displacement(const Body& body) {
-  std::vector<Vec3> displacement(body.element_count());
-  parallel_for_each(displacement.size(),
-                    [&](std::size_t e) { displacement[e] = body.position[e] - body.rest[e]; });
-  return largest_displacement(body, displacement);
+  return largest_displacement(body, own_displacement(body));
+}
+
+LargestDisplacement largest_displacement_of_surface(const Body& body) {
+  return largest_of_surface(body, own_displacement(body)).found;
+}
+
+std::optional<Vec3> displacement_on_surface(const Body& body, std::uint32_t polygon, const Vec3& at) {
+  const std::vector<Vec3> displacement = own_displacement(body);
+  return SurfaceMotion(body, displacement)(polygon, at);
 }
 
 double equivalent_strain(const Mat3& gradient) {

@@ -20,16 +20,27 @@ constexpr std::uint32_t kNoPolygonAround = 0xffffffffu;
 struct LargestDisplacement {
   Vec3 displacement = Vec3::Zero();  // m
   Vec3 at = Vec3::Zero();            // m, at rest
+  // Of the surface, on which `at` lies; kNoPolygonAround: an element.
+  std::uint32_t polygon = kNoPolygonAround;
   [[nodiscard]] double value() const { return displacement.norm(); }
 };
 
-// The largest displacement of the part's matter: of the elements that lie in it and of the vertices of its
-// surface, each moved by the cell that carries it (trilinear weights, or the field of model `quadratic`). `displacement`: (elements x 3) m. Of
-// equal ones the first. A body without a surface and without a whole cell: of all elements.
+// The largest displacement of the part's matter: of the elements that lie in it and of its surface, there
+// of the vertices and, in each cell, of the points of polygons and edges that are nearest to its middle: a
+// polygon may move most where it has no vertex. Each is moved by the cell that carries it (trilinear
+// weights, or the field of model `quadratic`). `displacement`: (elements x 3) m. Of equal ones the first,
+// vertices before others. A body without a surface and without a whole cell: of all elements.
 [[nodiscard]] LargestDisplacement largest_displacement(const Body& body,
                                                        const std::vector<Vec3>& displacement);
 // Of the body's own positions.
 [[nodiscard]] LargestDisplacement largest_displacement(const Body& body);
+// Of the surface alone, by the body's own positions. Zero where no cell lies under it.
+[[nodiscard]] LargestDisplacement largest_displacement_of_surface(const Body& body);
+
+// Displacement [m] of the point `at` [m, at rest] of a polygon of the surface; nothing where no cell lies
+// under the polygon. Of a body with other cells under the same surface it is that of the same point.
+[[nodiscard]] std::optional<Vec3> displacement_on_surface(const Body& body, std::uint32_t polygon,
+                                                          const Vec3& at);
 
 // Equivalent (von Mises) logarithmic strain of a deformation gradient F, sqrt(2/3 e : e) with e the deviator
 // of 1/2 ln(F^T F); NaN where F has no inverse or is turned inside out.

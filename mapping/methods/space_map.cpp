@@ -4,6 +4,7 @@
 #include "mapping/methods/space_map.h"
 
 #include <Eigen/Geometry>
+#include <cmath>
 #include <numeric>
 
 #include "base/error.h"
@@ -37,6 +38,13 @@ Share share_of(std::uint8_t from, const Vec3& within) {
         Vec3(slope[0] * value[1] * value[2], value[0] * slope[1] * value[2], value[0] * value[1] * slope[2]);
   }
   return sum;
+}
+
+// From a cell of the point `at`, in lattice coordinates, in spacings.
+double squared_distance(const Body& body, std::uint32_t cell, const Vec3& at) {
+  const Index3& index = body.lattice_index[body.cell_elements[cell][0]];
+  const Vec3 within = at - Vec3(index[0], index[1], index[2]);
+  return (within - within.cwiseMax(Vec3::Zero()).cwiseMin(Vec3::Ones())).squaredNorm();
 }
 
 }  // namespace
@@ -78,9 +86,7 @@ Group SpaceMap::group_at(const Vec3& x, std::uint32_t part, std::optional<std::s
   double least = 1e300;
   for (std::uint32_t i = cells_of_.begin[element]; i < cells_of_.begin[element + 1]; ++i) {
     const std::uint32_t cell = cells_of_.values[i];
-    const Index3& index = body_.lattice_index[body_.cell_elements[cell][0]];
-    const Vec3 at = u - Vec3(index[0], index[1], index[2]);
-    const double distance = (at - at.cwiseMax(Vec3::Zero()).cwiseMin(Vec3::Ones())).squaredNorm();
+    const double distance = squared_distance(body_, cell, u);
     if (distance >= least) continue;
     least = distance;
     body_.broken[cell] ? take(element, false) : take(cell, true);
@@ -89,8 +95,12 @@ Group SpaceMap::group_at(const Vec3& x, std::uint32_t part, std::optional<std::s
 }
 
 SpaceMap::Value SpaceMap::Probe::at(const Vec3& x, std::uint32_t part, std::optional<std::size_t> polygon) {
-  gather(map_.group_at(x, part, polygon));
-  return blend(x);
+  return blend<true>(reached(map_.group_at(x, part, polygon)), x);
+}
+
+SpaceMap::Value SpaceMap::Probe::place(const Vec3& x, std::uint32_t part,
+                                       std::optional<std::size_t> polygon) {
+  return blend<false>(reached(map_.group_at(x, part, polygon)), x);
 }
 
 std::optional<std::uint32_t> SpaceMap::Probe::cell_at(const Vec3& x, std::uint32_t part,
@@ -99,55 +109,71 @@ std::optional<std::uint32_t> SpaceMap::Probe::cell_at(const Vec3& x, std::uint32
   return group.in_cell ? std::optional(group.owner) : std::nullopt;
 }
 
-void SpaceMap::Probe::gather(const Group& group) {
-  if (gathered_ && group.owner == group_.owner && group.in_cell == group_.in_cell) return;
+const SpaceMap::Probe::Reached& SpaceMap::Probe::reached(const Group& group) {
+  constexpr std::size_t kMost = 2048;  // some 12 MB
+  if (last_ != nullptr && group.owner == last_->group.owner && group.in_cell == last_->group.in_cell)
+    return *last_;
+  if (reached_.size() >= kMost) reached_.clear();
+  const auto [found, is_new] = reached_.try_emplace(2 * std::uint64_t{group.owner} + (group.in_cell ? 1 : 0));
+  Reached& near = found->second;
+  last_ = &near;
+  if (!is_new) return near;
+  const Body& body = map_.body_;
   const Reach& reach =
-      finder_.find(group.in_cell ? std::span<const std::uint32_t>(map_.body_.cell_elements[group.owner])
+      finder_.find(group.in_cell ? std::span<const std::uint32_t>(body.cell_elements[group.owner])
                                  : std::span<const std::uint32_t>(&group.owner, 1),
                    kBlendSteps);
-  elements_ = reach.elements;
-  from_ = reach.from;
-  if (!group.in_cell) std::fill(from_.begin(), from_.end(), std::uint8_t{0xff});
-  group_ = group;
-  gathered_ = true;
+  near.group = group;
+  near.elements = reach.elements;
+  near.from = reach.from;
+  if (!group.in_cell) std::fill(near.from.begin(), near.from.end(), std::uint8_t{0xff});
+  for (const std::uint32_t element : near.elements) near.offset.push_back(offset(body, group, element));
+  return near;
 }
 
-SpaceMap::Value SpaceMap::Probe::blend(const Vec3& x) const {
+template <bool kGradient>
+SpaceMap::Value SpaceMap::Probe::blend(const Reached& near, const Vec3& x) const {
   const Body& body = map_.body_;
-  const Lattice& lattice = body.parts[group_.part].lattice;
-  const Vec3 point = within(body, group_, x);
+  const Lattice& lattice = body.parts[near.group.part].lattice;
+  const Vec3 point = within(body, near.group, x);
   double total = 0;
   Vec3 sum = Vec3::Zero(), total_gradient = Vec3::Zero();  // weights' gradients: by spacings
   Mat3 outer = Mat3::Zero(), inner = Mat3::Zero();
-  for (std::size_t i = 0; i < elements_.size(); ++i) {
-    const Vec3 away = point - offset(body, group_, elements_[i]);
-    const double r = away.norm() / kBlendRadius;
-    if (r >= 1) continue;
-    const Share share = share_of(from_[i], point);
-    const Vec3 slope = -20 * (1 - r) * (1 - r) * (1 - r) / (kBlendRadius * kBlendRadius) * away;
+  for (std::size_t i = 0; i < near.elements.size(); ++i) {
+    const Vec3 away = point - near.offset[i];
+    const double square = away.squaredNorm();
+    if (square >= kBlendRadius * kBlendRadius) continue;
+    const double r = std::sqrt(square) / kBlendRadius;
+    const Share share = share_of(near.from[i], point);
     const double weight = wendland(r) * share.value;
-    const Vec3 weight_gradient = slope * share.value + wendland(r) * share.gradient;
-    const ElementMotion& motion = map_.motions_[elements_[i]];
-    const Vec3 moved = motion.displacement + motion.gradient * (x - body.rest[elements_[i]]);
+    const ElementMotion& motion = map_.motions_[near.elements[i]];
+    const Vec3 moved = motion.displacement + motion.gradient * (x - body.rest[near.elements[i]]);
     total += weight;
-    total_gradient += weight_gradient;
     sum += weight * moved;
-    outer += moved * weight_gradient.transpose();
-    inner += weight * motion.gradient;
+    if constexpr (kGradient) {
+      const Vec3 slope = -20 * (1 - r) * (1 - r) * (1 - r) / (kBlendRadius * kBlendRadius) * away;
+      const Vec3 weight_gradient = slope * share.value + wendland(r) * share.gradient;
+      total_gradient += weight_gradient;
+      outer += moved * weight_gradient.transpose();
+      inner += weight * motion.gradient;
+    }
   }
-  if (!(total > 0)) return nearest(x);
+  if (!(total > 0)) return nearest(near, x);
   const Vec3 u = sum / total;
-  const Mat3 to_spacings = lattice.spacing.cwiseInverse().asDiagonal() * lattice.axes.transpose();
-  return {x + u, Mat3::Identity() + (inner + (outer - u * total_gradient.transpose()) * to_spacings) / total,
-          true, total};
+  Value value{x + u, Mat3::Identity(), true, total};
+  if constexpr (kGradient) {
+    const Mat3 to_spacings = lattice.spacing.cwiseInverse().asDiagonal() * lattice.axes.transpose();
+    value.gradient += (inner + (outer - u * total_gradient.transpose()) * to_spacings) / total;
+  }
+  return value;
 }
 
-SpaceMap::Value SpaceMap::Probe::nearest(const Vec3& x) const {
+SpaceMap::Value SpaceMap::Probe::nearest(const Reached& near, const Vec3& x) const {
   const Body& body = map_.body_;
-  std::uint32_t best = elements_[0];
-  for (std::size_t a = 0; a < (group_.in_cell ? 8u : 1u); ++a)
-    if ((body.rest[elements_[a]] - x).squaredNorm() < (body.rest[best] - x).squaredNorm())
-      best = elements_[a];
+  std::uint32_t best = near.elements[0];
+  for (std::size_t a = 0; a < (near.group.in_cell ? 8u : 1u); ++a)
+    if ((body.rest[near.elements[a]] - x).squaredNorm() < (body.rest[best] - x).squaredNorm())
+      best = near.elements[a];
   const ElementMotion& motion = map_.motions_[best];
   return {x + motion.displacement + motion.gradient * (x - body.rest[best]),
           Mat3::Identity() + motion.gradient, false};

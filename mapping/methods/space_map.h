@@ -3,6 +3,7 @@
 #pragma once
 #include <memory>
 #include <optional>
+#include <unordered_map>
 
 #include "base/bucket.h"
 #include "mapping/anchors/nearest.h"
@@ -24,29 +25,39 @@ class SpaceMap {
     double weight = 0;  // of all elements together: falls to 0 where none is near
   };
 
-  // Evaluates points; keeps what it gathered for the cell of the last one. One for each thread. It must not
+  // Evaluates points; keeps what it gathered for the cells of the last ones. One for each thread. It must not
   // outlive the map.
   class Probe {
    public:
     explicit Probe(const SpaceMap& map) : map_(map), finder_(map.connections_) {}
+    Probe(const Probe&) = delete;
+    Probe& operator=(const Probe&) = delete;
     // `x` (m, world frame, at rest) of part `part`. `polygon`: of the surface, near x; it selects the wall
     // where two walls are nearer to each other than a spacing.
     [[nodiscard]] Value at(const Vec3& x, std::uint32_t part, std::optional<std::size_t> polygon = {});
+    // The same without the gradient, which is left as it is in a new Value.
+    [[nodiscard]] Value place(const Vec3& x, std::uint32_t part, std::optional<std::size_t> polygon = {});
 
     // The cell that x lies in, or that is nearest to it; nothing where no whole cell is there.
     [[nodiscard]] std::optional<std::uint32_t> cell_at(const Vec3& x, std::uint32_t part,
                                                        std::optional<std::size_t> polygon = {}) const;
 
    private:
-    void gather(const Group& group);
-    [[nodiscard]] Value nearest(const Vec3& x) const;
-    [[nodiscard]] Value blend(const Vec3& x) const;
+    // Of a cell or an element: those whose weights may count near it.
+    struct Reached {
+      Group group;
+      std::vector<std::uint32_t> elements;
+      std::vector<std::uint8_t> from;  // (elements)
+      std::vector<Vec3> offset;        // (elements) spacings, as seen from the group
+    };
+    [[nodiscard]] const Reached& reached(const Group& group);
+    [[nodiscard]] Value nearest(const Reached& near, const Vec3& x) const;
+    template <bool kGradient>
+    [[nodiscard]] Value blend(const Reached& near, const Vec3& x) const;
     const SpaceMap& map_;
     ReachFinder finder_;
-    Group group_;
-    bool gathered_ = false;
-    std::vector<std::uint32_t> elements_;
-    std::vector<std::uint8_t> from_;
+    std::unordered_map<std::uint64_t, Reached> reached_;  // by owner
+    const Reached* last_ = nullptr;                       // of reached_
   };
 
   // (elements) The motion around each.

@@ -38,7 +38,7 @@ MissedPoint FlatTriangles::operator()(const FlatTriangle& triangle) {
   double longest = 0;
   for (std::size_t i = 0; i < 3; ++i) {
     longest = std::max(longest, (rest.at((i + 1) % 3) - rest.at(i)).norm());
-    moved.at(i) = probe_.at(rest.at(i), triangle.part, triangle.polygon).position;
+    moved.at(i) = probe_.place(rest.at(i), triangle.part, triangle.polygon).position;
   }
   const Vec3 area = (moved[1] - moved[0]).cross(moved[2] - moved[0]);
   if (!(area.norm() > 0) || !area.allFinite()) return found;
@@ -52,7 +52,7 @@ MissedPoint FlatTriangles::operator()(const FlatTriangle& triangle) {
   if (turned.norm() > 0) found.facing = normal.dot(turned.normalized());
   const auto look = [&](double u, double v, const Vec3* from = nullptr, const Vec3* to = nullptr) {
     const Vec3 x = rest[0] + u * (rest[1] - rest[0]) + v * (rest[2] - rest[0]);
-    const SpaceMap::Value value = probe_.at(x, triangle.part, triangle.polygon);
+    const SpaceMap::Value value = probe_.place(x, triangle.part, triangle.polygon);
     if (!value.heard || !value.position.allFinite()) return;
     found.displacement = std::max(found.displacement, (value.position - x).norm());
     const double distance = from != nullptr ? distance_from_line(value.position, *from, *to)

@@ -20,7 +20,7 @@ struct Constraints {
   // m, along an axis that is prescribed, when `share` of the motion is done
   [[nodiscard]] double path(const Body& body, std::uint32_t element, int axis, double share) const {
     const Motion& way = motions[motion[element][static_cast<std::size_t>(axis)]];
-    if (start.empty()) return way.displacement(body.rest[element], share)[axis];
+    if (start.empty() || way.from_rest) return way.displacement(body.rest[element], share)[axis];
     return start[element][axis] + way.displacement(body.rest[element] + start[element], share)[axis];
   }
 };

@@ -16,6 +16,7 @@ struct Motion {
   Vec3 through = Vec3::Zero();                // m, a point of the axis
   double angle = 0;                           // rad, right-handed about axis
   std::shared_ptr<RigidLink> link = nullptr;  // it leads, at any share, in place of all above
+  bool from_rest = false;                     // whatever Constraints::start says
   // m, rest: the straight way from here to `through` becomes an arc of the angle and of the same length,
   // which starts as it did
   std::optional<Vec3> arc_from = {};

@@ -30,6 +30,11 @@ class ContactFriction {
   // anything dissipates at all.
   void finish_step(const State& state, double drift, bool active);
 
+  // Of an active pair under pressure: from each of its points where they meet [m]; N/m, of the pair along its
+  // normal, from no pressure to the present one.
+  [[nodiscard]] std::array<Vec3, 2> meeting_place(const ContactPair& pair) const;
+  [[nodiscard]] double secant_stiffness(std::size_t pair) const;
+
   // For checkpoints: whether no step has been finished.
   [[nodiscard]] bool fresh() const { return fresh_; }
   void set_fresh(bool fresh) { fresh_ = fresh; }
@@ -39,10 +44,8 @@ class ContactFriction {
   void forget_separated();
   void update_record(std::size_t pair, double drift, bool fresh);
   [[nodiscard]] Vec3 force(std::size_t pair) const;
-  [[nodiscard]] std::array<Vec3, 2> meeting_place(const ContactPair& pair) const;
   [[nodiscard]] Vec3 relative_velocity(const ContactPair& pair) const;
   [[nodiscard]] double extension(std::size_t pair) const;
-  [[nodiscard]] double secant_stiffness(std::size_t pair) const;
   [[nodiscard]] double largest_tangential(std::size_t pair) const;
 
   double damping_;

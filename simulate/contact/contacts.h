@@ -8,6 +8,7 @@
 #pragma once
 #include "simulate/contact/contact_friction.h"
 #include "simulate/contact/contact_step_bound.h"
+#include "simulate/contact/implicit_contact.h"
 
 namespace flexel::simulate {
 
@@ -31,11 +32,23 @@ class Contacts {
   void finish_step(const State& state, double drift);
   void finish_losses(const State& state, double drift);
   // J, since they were asked for last: what the release of initial penetrations has put in, and what contacts
-  // that rest have lost as they hardened.
+  // that rest have lost as they hardened; what implicit steps have lost of what is stored.
   struct Energies {
-    double released = 0, hardened = 0;
+    double released = 0, hardened = 0, numerical = 0;
   };
   [[nodiscard]] Energies take_energies(const State& state);
+
+  // Implicit steps, as the hooks of simulate/effects/effect.h. The share of the step that is borne: none goes
+  // further than a spacing, nor than a quarter of one where surfaces are near one another.
+  [[nodiscard]] std::string refuses_implicit_steps() const;
+  [[nodiscard]] double begin_implicit_step(const State& before, const State& aimed, double step);
+  [[nodiscard]] bool take_recoupled() { return std::exchange(coupled_at_, list_.builds()) != list_.builds(); }
+  [[nodiscard]] std::vector<CoupledElements> couples() const { return implicit_.couples(); }
+  void add_normal_stiffness(const State& trial, BlockMatrix& matrix);
+  [[nodiscard]] double friction_potential(const State& trial) const;
+  void add_friction_stiffness(const State& trial, BlockMatrix& matrix) const;
+  [[nodiscard]] bool settles(const State& found);
+  void end_implicit_step(const State& state);
 
   // For checkpoints: all that the next steps depend on beside the state. Throws InputError: `memory` is of
   // other contacts.
@@ -81,8 +94,13 @@ class Contacts {
   ContactFriction friction_;
   ContactStepBound bound_;
   ContactLoads loads_;
-  PointLoads point_loads_;   // of add_forces()
-  bool is_current_ = false;  // list and states, for the displacements of the last needs_step_recheck()
+  ImplicitContact implicit_;
+  PointLoads point_loads_;        // of add_forces()
+  bool stepping_ = false;         // within an implicit step
+  double stored_ = 0;             // J, as it began
+  double numerical_ = 0;          // J, of Energies
+  std::uint64_t coupled_at_ = 0;  // the list that take_recoupled() has seen
+  bool is_current_ = false;       // list and states, for the displacements of the last needs_step_recheck()
 };
 
 }  // namespace flexel::simulate

@@ -255,9 +255,10 @@ std::vector<double> Contact::history_values(const State& state, const std::vecto
 }
 
 std::vector<EnergyTransfer> Contact::take_transfers(const State& state) {
-  const auto [released, hardened] = contacts_->take_energies(state);
+  const auto [released, hardened, numerical] = contacts_->take_energies(state);
   return {{"overlap", EnergyAccount::work, released},
-          {"contact hardening", EnergyAccount::dissipation, -hardened}};
+          {"contact hardening", EnergyAccount::dissipation, -hardened},
+          {"numerical", EnergyAccount::dissipation, -numerical}};
 }
 
 std::optional<ContactLosses> Contact::losses() const {
@@ -271,6 +272,38 @@ bool ContactLosses::acts(const State& state) {
 
 void ContactLosses::add_forces(const State& state, std::vector<Vec3>& forces) {
   contacts_->add_dissipative_forces(state, forces);
+}
+
+double ContactLosses::energy(const State& state) {
+  return contacts_->friction_potential(state);
+}
+
+void ContactLosses::add_stiffness(const State& state, BlockMatrix& matrix) {
+  contacts_->add_friction_stiffness(state, matrix);
+}
+
+void Contact::add_stiffness(const State& state, BlockMatrix& matrix) {
+  contacts_->add_normal_stiffness(state, matrix);
+}
+
+std::vector<CoupledElements> Contact::couples() const {
+  return contacts_->couples();
+}
+
+std::string Contact::refuses_implicit_steps() const {
+  return contacts_->refuses_implicit_steps();
+}
+
+StepBearing Contact::begin_implicit_step(const State& before, const State& aimed, double step) {
+  return {contacts_->begin_implicit_step(before, aimed, step), contacts_->take_recoupled()};
+}
+
+bool Contact::settles(const State& found) {
+  return contacts_->settles(found);
+}
+
+void Contact::end_implicit_step(const State& state, const StepDone&, const std::vector<Vec3>&) {
+  contacts_->end_implicit_step(state);
 }
 
 void Contact::finish_step(State& state, const StepDone& done) {

@@ -20,9 +20,12 @@ class ContactLosses : public Effect {
   [[nodiscard]] std::string why() const override { return "friction, damping and sticking of [contact]"; }
   [[nodiscard]] EnergyAccount account() const override { return EnergyAccount::dissipation; }
   [[nodiscard]] bool finishes_steps() const override { return true; }
-  [[nodiscard]] bool takes_implicit_steps() const override { return false; }
+  [[nodiscard]] bool adds_stiffness() const override { return true; }
+  // Within an implicit step, of which it is a part (simulate/contact/implicit_contact.h).
+  [[nodiscard]] double energy(const State& state) override;
   [[nodiscard]] bool acts(const State& state) override;
   void add_forces(const State& state, std::vector<Vec3>& forces) override;
+  void add_stiffness(const State& state, BlockMatrix& matrix) override;
   void finish_step(State& state, const StepDone& done) override;
 
  private:
@@ -53,14 +56,22 @@ class Contact : public Effect {
   [[nodiscard]] std::string why() const override;
 
   [[nodiscard]] EnergyAccount account() const override { return EnergyAccount::stored; }
-  [[nodiscard]] bool takes_implicit_steps() const override { return false; }
+  [[nodiscard]] bool adds_stiffness() const override { return true; }
+  [[nodiscard]] std::vector<CoupledElements> couples() const override;
   [[nodiscard]] double energy(const State& state) override;
   [[nodiscard]] bool acts(const State& state) override;
   void add_forces(const State& state, std::vector<Vec3>& forces) override;
+  void add_stiffness(const State& state, BlockMatrix& matrix) override;
   [[nodiscard]] double added_frequency(const State& state, const std::vector<double>& mass) override;
   [[nodiscard]] bool needs_step_recheck(const State& state) override;
   // Needs no finishes_steps(): what it remembers does not mind that the last velocities are of a whole step.
   void finish_step(State& state, const StepDone& done) override;
+  [[nodiscard]] std::string refuses_implicit_steps() const override;
+  [[nodiscard]] StepBearing begin_implicit_step(const State& before, const State& aimed,
+                                                double step) override;
+  [[nodiscard]] bool settles(const State& found) override;
+  void end_implicit_step(const State& state, const StepDone& done,
+                         const std::vector<Vec3>& supports) override;
   [[nodiscard]] std::vector<double> memory() const override;
   void restore(const std::vector<double>& memory) override;
   [[nodiscard]] std::vector<double> transfer_state() const override;

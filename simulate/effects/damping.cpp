@@ -25,9 +25,9 @@ std::optional<Damping> Damping::make(const Parameters& parameters, const Problem
   made.entries_ = parameters.entries.size();
   made.time_.assign(problem.body.parts.size(), 0);
   bool damped = false;
-  for (const Entry& entry : parameters.entries) {
-    for (const std::size_t p : parts_of(entry, problem)) made.time_[p] = entry.time;
-    damped = damped || entry.time > 0;
+  for (const auto& [entry, parts] : entries_of_parts(parameters.entries, problem.body)) {
+    for (const std::uint32_t p : parts) made.time_[p] = entry->time;
+    damped = damped || entry->time > 0;
   }
   if (!damped) return std::nullopt;
   return made;

@@ -15,7 +15,7 @@ class Damping : public Effect {
     std::string origin;
   };
   struct Parameters {
-    std::vector<Entry> entries;  // a later one goes before an earlier one
+    std::vector<Entry> entries;  // which goes before which: entries_of_parts()
   };
   static constexpr const char* name = "damping";
 

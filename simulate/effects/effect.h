@@ -46,6 +46,12 @@ struct EnergyTransfer {
   double energy = 0;
 };
 
+// What an effect makes of a step that is to be taken.
+struct StepBearing {
+  double share = 1;        // of it, that may be taken at once
+  bool recouples = false;  // couples() has changed
+};
+
 // The step that led to a state.
 struct StepDone {
   const std::vector<double>& mass;  // (elements) kg; empty unless an effect needs_mass()
@@ -75,7 +81,6 @@ class Effect {
   [[nodiscard]] virtual bool resists() const { return false; }
   // Its finish_step() changes the state or remembers it.
   [[nodiscard]] virtual bool finishes_steps() const { return false; }
-  [[nodiscard]] virtual bool takes_implicit_steps() const { return true; }
   // added_frequency() or finish_step() reads the masses.
   [[nodiscard]] virtual bool needs_mass() const { return false; }
   // Elements between which its forces act; they are inner forces then, and hold nothing.
@@ -92,6 +97,9 @@ class Effect {
   // N, how the forces of an effect that follows() change to first order along a change (elements) m; or
   // that with the derivative transposed (true). Added to the last.
   virtual void add_force_change(const State&, const std::vector<Vec3>&, bool, std::vector<Vec3>&) {}
+  // The run has come to this state and goes on from it: the equilibrium of a load step, or the end of a step
+  // in time. States that are only tried are not told.
+  virtual void accept(const State&) {}
   // Elements that follow a path exactly.
   virtual void constrain(Constraints&) {}
   // `unbalanced`: N (elements), on elements that are held.
@@ -127,6 +135,25 @@ class Effect {
   virtual void add_support_forces(std::vector<Vec3>& /*forces*/) {}
   // The share of the hot loop's time that it takes.
   [[nodiscard]] virtual double kernel_share(const KernelShares&) const { return 0; }
+
+  // --- implicit steps (simulate/implicit/implicit_euler.h), in the order of their calls ---
+  // What of it they do not take, in words; empty: they take it.
+  [[nodiscard]] virtual std::string refuses_implicit_steps() const { return {}; }
+  // Elements that finish_step() leads in explicit steps.
+  virtual void constrain_implicit_steps(Constraints&) {}
+  // Puts those where they are at `time` [s].
+  virtual void lead_to(double /*time*/, std::vector<Vec3>& /*displacement*/) {}
+  // A step of `step` s begins at `before`; without forces it would end at `aimed`.
+  [[nodiscard]] virtual StepBearing begin_implicit_step(const State& /*before*/, const State& /*aimed*/,
+                                                        double /*step*/) {
+    return {};
+  }
+  // Newton's method has ended at `found`. False: what it took for fixed is another there, and has been taken
+  // from there.
+  [[nodiscard]] virtual bool settles(const State& /*found*/) { return true; }
+  // The step has led to `state`, and the books have it. `supports`: N (elements), on those that are led.
+  virtual void end_implicit_step(const State& /*state*/, const StepDone&,
+                                 const std::vector<Vec3>& /*supports*/) {}
 
   // What goes on from step to step, for checkpoints.
   [[nodiscard]] virtual std::vector<double> memory() const { return {}; }

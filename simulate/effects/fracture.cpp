@@ -30,8 +30,9 @@ std::optional<Fracture> Fracture::make(const Parameters& parameters, const Probl
   made.origin_ = parameters.entries[0].origin;
   made.limits_.resize(problem.body.parts.size());
   made.needs_flow_.resize(problem.body.parts.size());
-  for (const Entry& entry : parameters.entries)
-    for (const std::size_t p : parts_of(entry, problem)) {
+  for (const auto& [each, parts] : entries_of_parts(parameters.entries, problem.body))
+    for (const std::uint32_t p : parts) {
+      const Entry& entry = *each;
       const Material& material = problem.materials[p];
       const double strength = entry.strength.value_or(material.strength);
       const double elongation = entry.elongation.value_or(material.elongation);

@@ -27,8 +27,9 @@ std::optional<Plasticity> Plasticity::make(const Parameters& parameters, const P
   if (parameters.entries.empty()) return std::nullopt;
   Plasticity made;
   made.flow_.resize(problem.body.parts.size());
-  for (const Entry& entry : parameters.entries)
-    for (const std::size_t p : parts_of(entry, problem)) {
+  for (const auto& [each, parts] : entries_of_parts(parameters.entries, problem.body))
+    for (const std::uint32_t p : parts) {
+      const Entry& entry = *each;
       const Material& material = problem.materials[p];
       const double yield = entry.yield.value_or(material.yield);
       if (entry.part && !(yield > 0))

@@ -22,7 +22,7 @@ std::vector<Rigidity> rigidity_of_entries(const RigidParts::Parameters& paramete
   std::vector<std::size_t> width(names.size(), std::numeric_limits<std::size_t>::max());
   const auto decide = [&](const std::string& name, const std::vector<std::uint32_t>& parts, Rigidity says) {
     for (const std::uint32_t p : parts) {
-      const std::size_t its = names[p] == name ? 0 : parts.size();
+      const std::size_t its = entry_width(names, parts, name);
       if (its >= width[p]) continue;
       width[p] = its;
       result[p] = says;
@@ -128,6 +128,78 @@ void RigidParts::begin(const State& state) {
   }
 }
 
+// What leads it, from the impulse and the moment about its centre [N s, N m s] that everything else gave it on
+// its way to `next`; `rotation`: as the forces found it.
+void RigidParts::Moving::feel(const Pose& next, const Mat3& rotation, const Vec3& impulse,
+                              const Vec3& turning, const StepDone& done) {
+  const Vec3 momentum = body.mass / done.drift * (next.translation - body.pose.translation);
+  const Vec3 turn = turn_of(next.rotation * body.pose.rotation.transpose());
+  const Mat3 middle = turned_by(0.5 * turn) * body.pose.rotation;
+  const Vec3 spin = middle * body.inertia * middle.transpose() * turn / done.drift;
+  force = (momentum - body.momentum - impulse) / done.kick;
+  const Vec3 arm = rotation * (led->path.about.value_or(body.centre) - body.centre);
+  torque = (spin - body.spin - turning) / done.kick - arm.cross(force);
+  body.momentum = momentum;
+  body.spin = spin;
+  if (!led->live) return;
+  led->live->impulse += impulse;
+  led->live->turning += turning - arm.cross(impulse);
+  led->live->seconds += done.kick;
+}
+
+std::string RigidParts::refuses_implicit_steps() const {
+  const auto free = [](const Moving& moving) { return !moving.led; };
+  return std::any_of(moving_.begin(), moving_.end(), free) ? "a free rigid part" : "";
+}
+
+void RigidParts::constrain_implicit_steps(Constraints& constraints) {
+  for (Moving& moving : moving_) {
+    moving.link = std::make_shared<RigidLink>();
+    moving.link->middle = moving.body.centre;
+    Motion motion;
+    motion.link = moving.link;
+    motion.from_rest = true;
+    const auto number = static_cast<std::uint32_t>(constraints.motions.size());
+    constraints.motions.push_back(motion);
+    constraints.courses.push_back({});
+    for (std::uint32_t e = moving.body.begin; e < moving.body.end; ++e) {
+      constraints.mask[e] = 7;
+      constraints.motion[e] = {number, number, number};
+    }
+  }
+}
+
+void RigidParts::lead_to(double time, std::vector<Vec3>& displacement) {
+  for (Moving& moving : moving_) {
+    const Pose pose = moving.pose_at(time);
+    moving.link->translation = pose.translation;
+    moving.link->turn = turn_of(pose.rotation);
+    for (std::uint32_t e = moving.body.begin; e < moving.body.end; ++e)
+      displacement[e] = moving.link->displacement(body_->rest[e]);
+  }
+}
+
+// Forces are those at the end of the step.
+void RigidParts::end_implicit_step(const State& state, const StepDone& done,
+                                   const std::vector<Vec3>& supports) {
+  for (Moving& moving : moving_) {
+    RigidBody& body = moving.body;
+    moving.before = {body.pose, body.momentum, body.spin};
+    const Pose next = moving.pose_at(*state.time);
+    Vec3 impulse = Vec3::Zero(), turning = Vec3::Zero();
+    for (std::uint32_t e = body.begin; e < body.end; ++e) {
+      const std::uint32_t n = e - body.begin;
+      const Vec3 took = done.mass[e] * (state.velocity[e] - moving.velocity[n]) - done.kick * supports[e];
+      impulse += took;
+      turning += (next.rotation * body.arms[n]).cross(took);
+      moving.support[n] = supports[e];
+      moving.velocity[n] = state.velocity[e];
+    }
+    moving.feel(next, next.rotation, impulse, turning, done);
+    body.pose = next;
+  }
+}
+
 void RigidParts::finish_step(State& state, const StepDone& done) {
   for (Moving& moving : moving_) {
     RigidBody& body = moving.body;
@@ -140,23 +212,8 @@ void RigidParts::finish_step(State& state, const StepDone& done) {
       moving.support[e - body.begin] = state.velocity[e];  // as if free
     }
     if (moving.led) {
-      const Pose before = body.pose, next = moving.pose_at(*state.time);
-      const Vec3 momentum = body.mass / done.drift * (next.translation - before.translation);
-      const Vec3 turn = turn_of(next.rotation * before.rotation.transpose());
-      const Mat3 middle = turned_by(0.5 * turn) * before.rotation;
-      const Vec3 spin = middle * body.inertia * middle.transpose() * turn / done.drift;
-      moving.force = (momentum - body.momentum - impulse) / done.kick;
-      const Vec3 about = moving.led->path.about.value_or(body.centre) - body.centre;
-      const Vec3 arm = before.rotation * about;
-      moving.torque = (spin - body.spin - turning) / done.kick - arm.cross(moving.force);
-      if (moving.led->live) {
-        LiveTool& live = *moving.led->live;
-        live.impulse += impulse;
-        live.turning += turning - arm.cross(impulse);
-        live.seconds += done.kick;
-      }
-      body.momentum = momentum;
-      body.spin = spin;
+      const Pose next = moving.pose_at(*state.time);
+      moving.feel(next, body.pose.rotation, impulse, turning, done);
       move_to(body, next, done.drift, state.displacement, state.velocity);
     } else {
       body.momentum += impulse;
@@ -190,7 +247,7 @@ void RigidParts::add_support_forces(std::vector<Vec3>& forces) {
       forces[e] += moving.support[e - moving.body.begin];
 }
 
-// 18 numbers and the velocities, a part.
+// 24 numbers and the velocities, a part. Implicit steps tell the forces of the last one before the next.
 std::vector<double> RigidParts::memory() const {
   std::vector<double> memory;
   const auto add = [&](const auto& values) {
@@ -201,6 +258,8 @@ std::vector<double> RigidParts::memory() const {
     add(moving.body.pose.rotation);
     add(moving.body.momentum);
     add(moving.body.spin);
+    add(moving.force);
+    add(moving.torque);
     for (const Vec3& velocity : moving.velocity) add(velocity);
   }
   return memory;
@@ -213,13 +272,15 @@ void RigidParts::restore(const std::vector<double>& memory) {
     from += values.size();
   };
   std::size_t wanted = 0;
-  for (const Moving& moving : moving_) wanted += 18 + 3 * moving.velocity.size();
+  for (const Moving& moving : moving_) wanted += 24 + 3 * moving.velocity.size();
   if (memory.size() != wanted) throw InputError("the checkpoint's rigid parts are not those of its scene");
   for (Moving& moving : moving_) {
     take(moving.body.pose.translation);
     take(moving.body.pose.rotation);
     take(moving.body.momentum);
     take(moving.body.spin);
+    take(moving.force);
+    take(moving.torque);
     for (Vec3& velocity : moving.velocity) take(velocity);
   }
 }

@@ -35,11 +35,15 @@ class RigidParts : public Effect {
   [[nodiscard]] std::string why() const override;
 
   [[nodiscard]] bool finishes_steps() const override { return true; }
-  [[nodiscard]] bool takes_implicit_steps() const override { return false; }
   [[nodiscard]] bool needs_mass() const override { return true; }
   void start(State& state) override;
   void begin(const State& state) override;
   void finish_step(State& state, const StepDone& done) override;
+  [[nodiscard]] std::string refuses_implicit_steps() const override;
+  void constrain_implicit_steps(Constraints& constraints) override;
+  void lead_to(double time, std::vector<Vec3>& displacement) override;
+  void end_implicit_step(const State& state, const StepDone& done,
+                         const std::vector<Vec3>& supports) override;
   [[nodiscard]] std::vector<RigidMomenta> rigid_momenta(bool half_kick) const override;
   // N (elements): what keeps a manipulator on its path, in the last step.
   void add_support_forces(std::vector<Vec3>& forces) override;
@@ -61,10 +65,13 @@ class RigidParts : public Effect {
     RigidBody body;
     Before before;
     std::optional<Manipulator> led;
+    std::shared_ptr<RigidLink> link = nullptr;  // of those led, in implicit steps: where it is
     [[nodiscard]] Pose pose_at(double time) const;
     std::vector<Vec3> velocity;                        // (its elements) m/s, that the step began with
     std::vector<Vec3> support;                         // (its elements) N, of the last step; of those led
     Vec3 force = Vec3::Zero(), torque = Vec3::Zero();  // N, N m, of what leads it
+    void feel(const Pose& next, const Mat3& rotation, const Vec3& impulse, const Vec3& turning,
+              const StepDone& done);
   };
   std::vector<Moving> moving_;
   const Body* body_ = nullptr;

@@ -20,6 +20,7 @@
 
 #include "base/error.h"
 #include "base/human.h"
+#include "base/program/progress_stretch.h"
 #include "base/stop.h"
 #include "base/units.h"
 #include "simulate/equilibrium/rigid_link_equilibrium.h"
@@ -43,6 +44,8 @@ constexpr double kPushedIncrement = 0.25;   // of the first load step: how far b
 constexpr int kPushedIterations = 300;
 constexpr int kMostPushes = 4;         // of a run
 constexpr double kUnsupported = 1e-9;  // of the stiffness of an element in its stiffest direction
+// Shares of the run's time: until the first linear solution begins; until a start from a coarser lattice is found.
+constexpr double kPrepared = 0.25, kStarted = 0.4;
 constexpr double kFarReach = 0.1;  // diagonals: a first linear answer beyond this makes a start elsewhere pay
 constexpr double kOverload = 3;    // diagonals: a first linear answer beyond this suggests a wrong unit
 // ... and one beyond this many diagonals, or times the way that moves lead, is one. A strip rolled up by two
@@ -59,6 +62,12 @@ int least_load_steps(const Constraints& constraints) {
   for (const Motion& motion : constraints.motions)
     turns = std::max(turns, std::abs(motion.angle) / (2 * std::numbers::pi));
   return static_cast<int>(std::ceil(turns / kLargestTurn - 1e-9));
+}
+
+void restore_followers(Mechanics& mechanics, const FollowerMemory& memory) {
+  std::size_t next = 0;
+  for (const ActiveEffect& effect : mechanics.effects())
+    if (effect->follows() && next < memory.size()) effect->restore(memory[next++]);
 }
 
 // A run over load steps.
@@ -107,15 +116,16 @@ class LoadStepping {
   const CoarseStart& start_;
   double first_, longest_;  // share of the load: the first step; none is longer
   double increment_, done_ = 0;
+  double begun_ = kPrepared;  // share of the run's time that its start takes
   EquilibriumResult result_;
   State trial_;  // of the last attempt
   NewtonOutcome outcome_;
   double farthest_reach_ = std::numeric_limits<double>::infinity();  // m, of an attempt's linear answer
   double hopeless_reach_ = std::numeric_limits<double>::infinity();  // m, likewise, for the whole load
-  double reach_ = 0;                       // m: of the first linear answer, for the whole load
-  std::optional<std::vector<Vec3>> near_;  // m: where the next attempt starts in place of `state_`
-  int spent_near_ = 0;                     // iterations of an attempt from there that came to nothing
-  bool pushed_ = false;                    // the next attempt starts beside the last equilibrium
+  double reach_ = 0;               // m: of the first linear answer, for the whole load
+  std::optional<NearStart> near_;  // where the next attempt starts in place of `state_`
+  int spent_near_ = 0;             // iterations of an attempt from there that came to nothing
+  bool pushed_ = false;            // the next attempt starts beside the last equilibrium
   int pushes_ = 0;
 };
 
@@ -162,12 +172,12 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   options.max_iterations = std::min(max_iterations, iterations_left());
   options.farthest_reach = std::min(farthest_reach_, hopeless_reach_ * (done_ + increment_));
   trial_ = state_;
-  if (near_) trial_.displacement = *near_;
+  if (near_) trial_.displacement = near_->displacement;
   trial_.share = done_ + increment_ > 1 - 1e-9 ? 1 : done_ + increment_;
   if (pushed_) push(trial_);
   outcome_ = newton_with_links(mechanics_, trial_, options, [&](double gone, const std::string& note) {
     check_stop();
-    progress_.update(done_ + gone * (trial_.share - done_),
+    progress_.update(begun_ + (1 - begun_) * (done_ + gone * (trial_.share - done_)),
                      fmt::format("load {:.3g} %, {}", 100 * trial_.share, note));
   });
   if (reach_ == 0) reach_ = outcome_.first_reach / trial_.share;  // from rest: a near start moves by less
@@ -177,6 +187,8 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   if (!outcome_.converged) return false;
   done_ = trial_.share;
   state_ = trial_;
+  if (near_) restore_followers(mechanics_, near_->followers);
+  for (const ActiveEffect& effect : mechanics_.effects()) effect->accept(state_);
   ++result_.load_steps;
   result_.relative_residual = outcome_.relative_residual;
   if (outcome_.iterations <= kEasyIterations) increment_ = std::min(longest_, 2 * increment_);
@@ -247,7 +259,11 @@ bool LoadStepping::begin_near() {
   const bool far = outcome_.first_reach > farthest_reach_;
   farthest_reach_ = std::numeric_limits<double>::infinity();
   if (!far) return false;
-  if (!overloaded()) near_ = start_();
+  if (!overloaded()) {
+    ProgressStretch stretch(progress_, kPrepared, kStarted);
+    near_ = start_(stretch.inner());
+    begun_ = kStarted;
+  }
   const int before = result_.newton_iterations;
   if (near_ && !attempt(NewtonSteps::full, kFullStepIterations))
     spent_near_ = result_.newton_iterations - before;
@@ -292,6 +308,13 @@ void LoadStepping::solve() {
 }
 
 }  // namespace
+
+FollowerMemory follower_memory(const Mechanics& mechanics) {
+  FollowerMemory memory;
+  for (const ActiveEffect& effect : mechanics.effects())
+    if (effect->follows()) memory.push_back(effect->memory());
+  return memory;
+}
 
 void refuse_free_motions(Mechanics& mechanics, const State& start, const std::string& scene) {
   mechanics.assemble(start);

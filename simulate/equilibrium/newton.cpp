@@ -30,7 +30,6 @@
 #include "base/parallel.h"
 #include "simulate/followers/gmres.h"
 #include "simulate/linear/conjugate_gradients.h"
-#include "simulate/linear/multigrid.h"
 #include "simulate/linear/vector_products.h"
 
 namespace flexel::simulate {
@@ -83,6 +82,13 @@ class Solver {
   [[nodiscard]] double way_gone() const {
     const double residual = std::max(outcome_.relative_residual, options_.tolerance);
     return std::max(0.0, std::log(residual) / std::log(options_.tolerance));
+  }
+  // Likewise when the step's linear solution has come to `relative` of its right-hand side: were the step all of it,
+  // the residual would be that much less. It is less than half of that where it bends.
+  [[nodiscard]] double way_ahead(double relative) const {
+    const double more =
+        std::log(std::clamp(relative, options_.tolerance, 1.0)) / std::log(options_.tolerance);
+    return std::min(1.0, way_gone() + more / 2);
   }
   [[nodiscard]] bool full() const { return options_.steps == NewtonSteps::full; }
   void begin();
@@ -149,8 +155,8 @@ void Solver::factor() {
   else if (kept_.preconditioner)
     kept_.preconditioner->refresh();
   else
-    kept_.preconditioner =
-        aggregation_multigrid(mechanics_.tangent(), node_geometry(mechanics_.body(), state_));
+    kept_.preconditioner = aggregation_multigrid(mechanics_.tangent(),
+                                                 node_geometry(mechanics_.body(), state_), options_.direct);
   kept_.stale = keeps;
   kept_.outdated = false;
   kept_.factored = true;
@@ -202,8 +208,9 @@ LinearResult Solver::iterate(const std::vector<Vec3>& rhs, double forcing) {
         mechanics_.whole_tangent(), left, step, *kept_.preconditioner,
         std::min(forcing / share, kLargestForcing), most,
         [&](int iteration, double relative) {
-          progress_(way_gone(), fmt::format("newton {}, cg {}, {:.0e}", outcome_.iterations + 1, iteration,
-                                            share * relative));
+          progress_(
+              way_ahead(share * relative),
+              fmt::format("newton {}, cg {}, {:.0e}", outcome_.iterations + 1, iteration, share * relative));
         },
         hopeless);
     outcome_.cg_iterations += one.iterations;

@@ -6,6 +6,7 @@
 
 #include "simulate/equilibrium/mechanics.h"
 #include "simulate/linear/free_motions.h"
+#include "simulate/linear/multigrid.h"
 #include "simulate/linear/preconditioner.h"
 
 namespace flexel::simulate {
@@ -20,6 +21,7 @@ struct NewtonOptions {
   double tolerance = 1e-8;  // residual relative to loads and reactions
   int max_iterations = 40;
   double least_scale = 0;  // N, that the residual is measured against at least
+  DirectLimit direct;      // of aggregation_multigrid()
   // m: a first linear answer that reaches further ends the attempt
   double farthest_reach = std::numeric_limits<double>::infinity();
 };

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "base/error.h"
 #include "base/math/dense.h"
@@ -30,6 +31,7 @@ constexpr double kResponse = 1e-8;    // relative residual of the linear solutio
 constexpr int kMaxLinkCgIterations = 3000;
 // Of the elements' mean stiffness: nothing resists. A cantilever a thousand times as long as thick has that.
 constexpr double kFree = 1e-9;
+constexpr double kSlopeShare = 0.5;  // of the run's time: the first slope
 
 using LinkVector = Eigen::VectorXd;
 
@@ -53,6 +55,8 @@ class Balance {
 
  private:
   [[nodiscard]] Eigen::Index unknowns() const { return static_cast<Eigen::Index>(6 * links_.size()); }
+  // The elements' equilibrium, which takes the run from one share of its time to another.
+  NewtonOutcome settle(double from, double to);
   void move(const LinkVector& step);
   [[nodiscard]] State led(const std::vector<Vec3>& response, double step) const;
   LinkVector lacking(const State& state);
@@ -71,6 +75,7 @@ class Balance {
   NewtonOutcome outcome_;
   double scale_ = 0;  // N: loads and reactions
   double stiff_ = 0;  // N/m, mean of the tangent's diagonal
+  double gone_ = 0;   // share of the run's time
   // (unknowns) answers of the elements to a unit of each [m/m], and what their linear solutions left [N/m]
   std::vector<std::vector<Vec3>> response_, left_over_;
 };
@@ -133,7 +138,10 @@ bool Balance::add_column(const Preconditioner& preconditioner, Eigen::Index j, E
   const LinearResult solved = conjugate_gradients(
       mechanics_.tangent(), pushed, response, preconditioner, kResponse, kMaxLinkCgIterations,
       [&](int iteration, double relative) {
-        progress_(0, fmt::format("rigid link {}, cg {}, {:.0e}", j / 6 + 1, iteration, relative));
+        const double column = std::clamp(std::log(relative) / std::log(kResponse), 0.0, 1.0);
+        const double share = (static_cast<double>(j) + column) / static_cast<double>(unknowns());
+        progress_(std::max(gone_, kSlopeShare * share),
+                  fmt::format("rigid link {}, cg {}, {:.0e}", j / 6 + 1, iteration, relative));
       });
   outcome_.cg_iterations += solved.iterations;
   if (solved.indefinite) return false;
@@ -203,6 +211,13 @@ void Balance::refuse_free(const Eigen::MatrixXd& slope) const {
           "xyz"[most % 3]));
 }
 
+NewtonOutcome Balance::settle(double from, double to) {
+  return newton(mechanics_, state_, options_, [&](double gone, const std::string& note) {
+    gone_ = from + gone * (to - from);
+    progress_(gone_, note);
+  });
+}
+
 // Moves the links until nothing is lacking. False when it did not get there.
 bool Balance::find() {
   LinkVector left = lacking(state_);
@@ -215,7 +230,8 @@ bool Balance::find() {
     }
     const LinkVector step = -solve_dense(slope, left);
     move(step);
-    const NewtonOutcome one = newton(mechanics_, state_, options_, progress_);
+    const double from = std::max(gone_, kSlopeShare);
+    const NewtonOutcome one = settle(from, 0.5 * (1 + from));
     if (outcome_.iterations == 0) outcome_.first_reach = one.first_reach;
     outcome_.iterations += one.iterations;
     outcome_.cg_iterations += one.cg_iterations;

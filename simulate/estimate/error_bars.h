@@ -2,6 +2,7 @@
 #pragma once
 #include <functional>
 
+#include "base/program/progress.h"
 #include "simulate/result/options.h"
 #include "simulate/result/result.h"
 #include "simulate/scene/scene.h"
@@ -9,13 +10,14 @@
 namespace flexel::simulate {
 
 // Runs a scene on a body to equilibrium.
-using SolveCoarse = std::function<SimulateResult(Body&, const Scene&, const SimulateOptions&)>;
+using SolveCoarse = std::function<SimulateResult(Body&, const Scene&, const SimulateOptions&, Progress&)>;
 
 // Error bars of `result`, which `scene` gave on `body` (now deformed). Fixes, loads, moves and probes are
 // placed anew on each coarser body, from the same selections. What cannot be done is said in the note; the
 // run does not fail. Throws Interrupted.
 [[nodiscard]] ErrorBars estimate_errors(const Body& body, const Scene& scene, const SimulateOptions& options,
-                                        const SimulateResult& result, const SolveCoarse& solve);
+                                        const SimulateResult& result, const SolveCoarse& solve,
+                                        Progress& progress);
 
 // How many times as fine a lattice needs to be for two cells through most walls, to a quarter; at least twice, and
 // that in model `quadratic`, whose cells hold walls of any thickness.

@@ -3,6 +3,7 @@
 // step while it serves.
 #include "simulate/implicit/implicit_euler.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -15,19 +16,39 @@ namespace {
 
 constexpr double kShortest = 1.0 / 1024;  // of a step
 constexpr int kFullIterations = 12;
+// Elements: contact changes the tangent in every iteration, and a factorisation is dearer than a hierarchy.
+constexpr std::size_t kDirectRowsTouching = 100;
+constexpr int kPasses = 12;         // of Newton's method, until what is held fixed in it suits
+constexpr int kShares = 4;          // of a step, that are tried until effects bear it
+constexpr double kWhole = 0.999;    // share that needs no other
+constexpr double kSameStep = 1e-9;  // by which the length may differ for a tangent to be kept
 
 }  // namespace
 
 ImplicitEuler::ImplicitEuler(const Problem& problem, const std::vector<ActiveEffect>& effects,
                              const KernelEffects& plan, const std::vector<double>& mass, double tolerance)
     : problem_(problem),
+      effects_(effects),
       mass_(mass),
       tau_(plan.damping),
       tolerance_(tolerance),
-      outer_effects_(effects.size()),
       reach_(std::numeric_limits<double>::infinity()),
-      mechanics_(problem, all_effects(effects), StiffnessStorage::stored) {
-  if (damped_) damping_matrix_ = mechanics_.stiffness();
+      seconds_(effects.size(), 0) {
+  for (const double tau : tau_) damped_ = damped_ || tau > 0;
+  for (const ActiveEffect& effect : effects)
+    touches_ = touches_ || effect->account() == EnergyAccount::stored;
+  make_mechanics();
+}
+
+// With the pattern of what effects couple now.
+void ImplicitEuler::make_mechanics() {
+  forget();
+  if (mechanics_)
+    for (std::size_t p = 0; p < effects_.size(); ++p) seconds_[p] += mechanics_->effects()[p].seconds;
+  mechanics_.emplace(problem_, all_effects(), StiffnessStorage::stored);
+  coupled_ = mechanics_->coupled_elements();
+  std::sort(coupled_.begin(), coupled_.end());
+  if (damped_) damping_matrix_ = mechanics_->stiffness();
 }
 
 // An effect of the run as the mechanics of a step sees it: one that resists velocity has that of the step.
@@ -41,7 +62,10 @@ class ImplicitEuler::EffectOfStep : public Effect {
   }
   [[nodiscard]] bool follows() const override { return effect_->follows(); }
   [[nodiscard]] std::vector<CoupledElements> couples() const override { return effect_->couples(); }
-  void constrain(Constraints& constraints) override { effect_->constrain(constraints); }
+  void constrain(Constraints& constraints) override {
+    effect_->constrain(constraints);
+    effect_->constrain_implicit_steps(constraints);
+  }
   [[nodiscard]] double energy(const State& state) override {
     return effect_->resists() ? euler_->step_ * effect_->resistance(euler_->along_the_way(state))
                               : effect_->energy(state);
@@ -127,10 +151,9 @@ class ImplicitEuler::StepDamping : public Effect {
   const ImplicitEuler* euler_;
 };
 
-std::vector<ActiveEffect> ImplicitEuler::all_effects(const std::vector<ActiveEffect>& effects) {
+std::vector<ActiveEffect> ImplicitEuler::all_effects() {
   std::vector<ActiveEffect> all;
-  for (const ActiveEffect& effect : effects) all.push_back(activate(EffectOfStep(*this, effect.untimed())));
-  for (const double tau : tau_) damped_ = damped_ || tau > 0;
+  for (const ActiveEffect& effect : effects_) all.push_back(activate(EffectOfStep(*this, effect.untimed())));
   all.push_back(activate(Inertia(*this)));
   if (damped_) all.push_back(activate(StepDamping(*this)));
   return all;
@@ -151,8 +174,8 @@ State ImplicitEuler::along_the_way(const State& trial) const {
 // step begins.
 double ImplicitEuler::force_scale(const State& trial) const {
   std::vector<Vec3> forces(mass_.size(), Vec3::Zero());
-  for (std::size_t p = 0; p < outer_effects_; ++p)
-    if (mechanics_.effects()[p].couples.empty()) mechanics_.effects()[p]->add_forces(trial, forces);
+  for (std::size_t p = 0; p < effects_.size(); ++p)
+    if (mechanics_->effects()[p].couples.empty()) mechanics_->effects()[p]->add_forces(trial, forces);
   return std::sqrt(dot(forces, forces));
 }
 
@@ -163,29 +186,80 @@ bool ImplicitEuler::solve(State& trial, NewtonSteps steps,
   options.tolerance = tolerance_;
   if (steps == NewtonSteps::full) options.max_iterations = kFullIterations;
   options.least_scale = force_scale(trial);
-  const NewtonOutcome outcome = newton(
-      mechanics_, trial, options, [&](double, const std::string& note) { progress(note); }, &memory_);
-  told.newton_iterations += outcome.iterations;
-  told.cg_iterations += outcome.cg_iterations;
-  told.trouble = outcome.trouble;
-  return outcome.converged;
+  if (touches_) options.direct.rows = kDirectRowsTouching;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    const NewtonOutcome outcome = newton(
+        *mechanics_, trial, options, [&](double, const std::string& note) { progress(note); }, &memory_);
+    told.newton_iterations += outcome.iterations;
+    told.cg_iterations += outcome.cg_iterations;
+    told.trouble = outcome.trouble;
+    if (!outcome.converged) return false;
+    if (settles(trial)) return true;
+  }
+  told.trouble = "the friction of contacts does not settle";
+  return false;
 }
 
-bool ImplicitEuler::attempt(State& state, double step, double end,
-                            const std::function<void(const std::string&)>& progress, ImplicitStep& told) {
-  if (step != step_) forget();
-  step_ = step;
-  before_ = state;
+bool ImplicitEuler::settles(const State& found) const {
+  bool all = true;
+  for (const ActiveEffect& effect : effects_) all = effect->settles(found) && all;
+  return all;
+}
+
+// Where a step without forces would lead.
+void ImplicitEuler::aim(const State& state, double end) {
+  step_ = end - *state.time;
   target_.resize(mass_.size());
   parallel_for_each(mass_.size(),
-                    [&](std::size_t e) { target_[e] = state.displacement[e] + step * state.velocity[e]; });
-  if (damped_) set_damping(problem_, mechanics_.stencil(), tau_, before_.displacement, damping_matrix_);
-  State start = state;
-  start.time = end;
-  start.kick = 0;
-  State onward = start;
-  onward.displacement = target_;
-  if (mechanics_.energy(onward) < mechanics_.energy(start)) start.displacement = target_;
+                    [&](std::size_t e) { target_[e] = state.displacement[e] + step_ * state.velocity[e]; });
+  aimed_ = state;
+  aimed_.time = end;
+  aimed_.kick = 0;
+  aimed_.displacement = target_;
+  for (const ActiveEffect& effect : effects_) effect->lead_to(end, aimed_.displacement);
+}
+
+// A step from `state` to `end` [s], or as much of it as effects bear; where it ends.
+double ImplicitEuler::begin(const State& state, double end) {
+  const double previous = step_;
+  bool recouples = false;
+  for (int look = 0; look < kShares; ++look) {
+    aim(state, end);
+    State led = aimed_;  // what is prescribed may pull further than what is free goes
+    apply(mechanics_->constraints(), problem_.body, led, led.displacement);
+    double share = 1;
+    for (const ActiveEffect& effect : effects_) {
+      const StepBearing bearing = effect->begin_implicit_step(state, led, step_);
+      share = std::min(share, bearing.share);
+      recouples = recouples || bearing.recouples;
+    }
+    if (!(share < kWhole) || look + 1 == kShares) break;
+    end = *state.time + share * step_;
+  }
+  if (recouples && !covers_couples()) make_mechanics();
+  if (std::abs(step_ - previous) > kSameStep * previous) forget();
+  return end;
+}
+
+// Whether the matrix has a place for all that effects couple now.
+bool ImplicitEuler::covers_couples() const {
+  for (const ActiveEffect& effect : effects_) {
+    std::vector<CoupledElements> groups = effect->couples();
+    std::sort(groups.begin(), groups.end());
+    if (!std::includes(coupled_.begin(), coupled_.end(), groups.begin(), groups.end())) return false;
+  }
+  return true;
+}
+
+bool ImplicitEuler::attempt(State& state, const std::function<void(const std::string&)>& progress,
+                            ImplicitStep& told) {
+  const double step = step_;
+  before_ = state;
+  if (damped_) set_damping(problem_, mechanics_->stencil(), tau_, before_.displacement, damping_matrix_);
+  State start = aimed_;
+  start.displacement = state.displacement;
+  for (const ActiveEffect& effect : effects_) effect->lead_to(*aimed_.time, start.displacement);
+  if (mechanics_->energy(aimed_) < mechanics_->energy(start)) start.displacement = aimed_.displacement;
   State trial = start;
   if (!solve(trial, NewtonSteps::full, progress, told)) {
     forget();
@@ -197,10 +271,10 @@ bool ImplicitEuler::attempt(State& state, double step, double end,
     moved_[e] = trial.displacement[e] - before_.displacement[e];
     trial.velocity[e] = moved_[e] / step;
   });
-  supports_ = mechanics_.forces(trial).total;
+  supports_ = mechanics_->forces(trial).total;
   parallel_for_each(mass_.size(), [&](std::size_t e) {
     for (int axis = 0; axis < 3; ++axis)
-      supports_[e][axis] = mechanics_.constraints().mask[e] >> axis & 1 ? -supports_[e][axis] : 0;
+      supports_[e][axis] = mechanics_->constraints().mask[e] >> axis & 1 ? -supports_[e][axis] : 0;
   });
   state = std::move(trial);
   return true;
@@ -215,8 +289,10 @@ ImplicitStep ImplicitEuler::advance(State& state, double end, double whole,
   // Steps that shrink without end would come nearer and nearer to what stops them, until nothing is left of
   // them but rounding.
   for (const double shortest = std::min(left, kShortest * whole); step >= shortest; step /= 2) {
-    if (attempt(state, step, step == left ? end : *state.time + step, progress, told)) {
-      told.step = step;
+    const double whole_way = step == left ? end : *state.time + step, borne = begin(state, whole_way);
+    if (attempt(state, progress, told)) {
+      told.step = step_;
+      if (borne < whole_way) return told;  // it says nothing of longer ones
       reach_ = step == left ? std::max(reach_, 2 * step) : 2 * step;
       return told;
     }
@@ -238,23 +314,31 @@ std::vector<Vec3> ImplicitEuler::damping_force() const {
 
 double ImplicitEuler::numerical_dissipation(const State& state) {
   std::vector<Vec3> forces(mass_.size(), Vec3::Zero());
-  mechanics_.add_elastic_forces(state, forces);
+  mechanics_->add_elastic_forces(state, forces);
   const double moved = parallel_sum<double>(mass_.size(), [&](std::size_t e) {
     return 0.5 * mass_[e] * (state.velocity[e] - before_.velocity[e]).squaredNorm() -
            forces[e].dot(moved_[e]);
   });
-  return moved + mechanics_.elastic_energy(before_) - mechanics_.elastic_energy(state);
+  return moved + mechanics_->elastic_energy(before_) - mechanics_->elastic_energy(state);
 }
 
 void ImplicitEuler::add_forces(std::size_t effect, const State& state, std::vector<Vec3>& forces) const {
-  mechanics_.effects()[effect]->add_forces(state, forces);
+  mechanics_->effects()[effect]->add_forces(state, forces);
+}
+
+void ImplicitEuler::finish(const State& state) {
+  for (const ActiveEffect& effect : effects_) {
+    effect->end_implicit_step(state, {mass_, step_, step_}, supports_);
+    effect->accept(state);
+  }
 }
 
 double ImplicitEuler::add_seconds(const std::vector<ActiveEffect>& effects) const {
   double sum = 0;
   for (std::size_t p = 0; p < effects.size(); ++p) {
-    effects[p].seconds += mechanics_.effects()[p].seconds;
-    sum += mechanics_.effects()[p].seconds;
+    const double own = seconds_[p] + mechanics_->effects()[p].seconds;
+    effects[p].seconds += own;
+    sum += own;
   }
   return sum;
 }

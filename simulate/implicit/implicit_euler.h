@@ -4,10 +4,13 @@
 // the step, and x~ = u- + dt v-, a step is the least of the incremental potential
 //     1/2 |u - x~|^2_M / dt^2 + 1/2 |u - u-|^2_C / dt + E(u),      v = (u - u-) / dt
 // (Kane, Marsden, Ortiz, West 2000, section 3; Martin, Thomaszewski, Grinspun, Gross 2011, section 3.3),
-// found by Newton's method with every cell the right way round. First order in the step; it takes energy from
+// found by Newton's method with every cell the right way round. Contact is a part of E, its friction a potential of the
+// motion since u- (simulate/contact/implicit_contact.h); what that takes for fixed is taken anew from the least,
+// which is found again until it suits. First order in the step; it takes energy from
 // what swings faster than the step resolves, and the books tell how much.
 #pragma once
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "simulate/equilibrium/mechanics.h"
@@ -25,7 +28,7 @@ struct ImplicitStep {
 
 class ImplicitEuler {
  public:
-  // Refers to `problem`, `plan` and `mass` [kg] (elements) while it lives. `tolerance`: of Newton's residual,
+  // Refers to `problem`, `effects`, `plan` and `mass` [kg] (elements) while it lives. `tolerance`: of Newton's residual,
   // relative to the forces.
   ImplicitEuler(const Problem& problem, const std::vector<ActiveEffect>& effects, const KernelEffects& plan,
                 const std::vector<double>& mass, double tolerance);
@@ -33,11 +36,13 @@ class ImplicitEuler {
   ImplicitEuler& operator=(const ImplicitEuler&) = delete;
 
   // Advances `state` to the time `end` [s], or where Newton's method fails part of the way there: a half, a
-  // quarter ... of it, but no less than 1/1024 of `whole` [s], and later steps grow back. On failure `state`
-  // is untouched. `progress` hears of every iteration and may throw.
+  // quarter ... of it, but no less than 1/1024 of `whole` [s], and later steps grow back; or as far as effects
+  // bear. On failure `state` is untouched. finish() has to follow. `progress` hears of every iteration and may throw.
   ImplicitStep advance(State& state, double end, double whole,
                        const std::function<void(const std::string&)>& progress);
 
+  // The advance and its books are done: what effects remember of it.
+  void finish(const State& state);
   // The next step makes its tangent anew, so that it depends on the state and reach() alone.
   void forget() { memory_ = {}; }
   // The longest step [s] that is tried next; infinity unless one failed.
@@ -62,25 +67,32 @@ class ImplicitEuler {
   class EffectOfStep;
   class Inertia;
   class StepDamping;
-  [[nodiscard]] std::vector<ActiveEffect> all_effects(const std::vector<ActiveEffect>& effects);
-  bool attempt(State& state, double step, double end, const std::function<void(const std::string&)>& progress,
-               ImplicitStep& told);
+  [[nodiscard]] std::vector<ActiveEffect> all_effects();
+  void make_mechanics();
+  [[nodiscard]] bool covers_couples() const;
+  double begin(const State& state, double end);
+  void aim(const State& state, double end);
+  bool attempt(State& state, const std::function<void(const std::string&)>& progress, ImplicitStep& told);
   bool solve(State& trial, NewtonSteps steps, const std::function<void(const std::string&)>& progress,
              ImplicitStep& told);
+  [[nodiscard]] bool settles(const State& found) const;
   [[nodiscard]] double force_scale(const State& trial) const;
   [[nodiscard]] State along_the_way(const State& trial) const;
 
   const Problem& problem_;
+  const std::vector<ActiveEffect>& effects_;
   const std::vector<double>& mass_;
   const std::vector<double>& tau_;  // (parts) s
   double tolerance_;
-  bool damped_ = false;
-  std::size_t outer_effects_;
-  double step_ = 0, reach_;     // s
-  State before_;                // at the start of the step
-  std::vector<Vec3> target_;    // x~, displacements without forces [m]
-  BlockMatrix damping_matrix_;  // at before_; empty without damping
-  Mechanics mechanics_;         // refers to the above
+  bool damped_ = false, touches_ = false;  // by damping and contact
+  double step_ = 0, reach_;                // s
+  State before_;                           // at the start of the step
+  std::vector<Vec3> target_;               // x~, displacements without forces [m]
+  State aimed_;                            // those, with what is led where it will be
+  BlockMatrix damping_matrix_;             // at before_; empty without damping
+  std::optional<Mechanics> mechanics_;     // refers to the above
+  std::vector<CoupledElements> coupled_;   // in it, by effects, ascending
+  std::vector<double> seconds_;            // (effects_) within those before
   NewtonMemory memory_;
   std::vector<Vec3> moved_, supports_;
 };

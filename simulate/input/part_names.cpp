@@ -38,6 +38,11 @@ std::vector<std::uint32_t> parts_called(const Body& body, const std::string& nam
   return parts_called(part_names(body), body.surface.parts, name);
 }
 
+std::size_t entry_width(const std::vector<std::string>& names, const std::vector<std::uint32_t>& parts,
+                        const std::string& name) {
+  return names[parts.front()] == name ? 0 : parts.size();
+}
+
 std::vector<std::uint32_t> require_parts(const Body& body, const std::string& name,
                                          const std::string& origin) {
   std::vector<std::uint32_t> found = parts_called(body, name);

@@ -22,6 +22,11 @@ namespace flexel::simulate {
 
 [[nodiscard]] std::vector<std::string> part_names(const Body& body);
 
+// By how many parts an entry for `parts`, which `name` means, is for; 0: it is a part's own. Narrower entries go before
+// wider ones.
+[[nodiscard]] std::size_t entry_width(const std::vector<std::string>& names,
+                                      const std::vector<std::uint32_t>& parts, const std::string& name);
+
 // parts_called(), one part at least. Throws InputError(origin, "the body has no part ...").
 [[nodiscard]] std::vector<std::uint32_t> require_parts(const Body& body, const std::string& name,
                                                        const std::string& origin);

@@ -3,7 +3,7 @@
 // J. Comput. Phys. 37, 1980). A cell's own matrix would be 26 kB to read, its moments are 1 kB.
 #include "simulate/kernels/kernel_quadratic.h"
 
-#include "base/simd.h"
+#include "simulate/kernels/quadratic_vectors.h"
 
 #ifndef FLEXEL_ISA
 #error "compiled once per instruction set: simulate/CMakeLists.txt sets FLEXEL_ISA"
@@ -12,37 +12,7 @@
 namespace flexel::simulate::quadratic_kernel {
 namespace {
 
-// Vectors as long as the registers: the compiler keeps longer ones in memory. The bits are the same.
-#if defined(__AVX512F__)
-constexpr std::size_t kBytes = 64;
-#elif defined(__AVX2__)
-constexpr std::size_t kBytes = 32;
-#else
-constexpr std::size_t kBytes = 16;
-#endif
-template <class Number>
-constexpr std::size_t kLanes = kWidth * sizeof(Number) < kBytes ? kWidth : kBytes / sizeof(Number);
-
-template <class Number>
-struct VectorOf;
-template <>
-struct VectorOf<double> {
-  using Type = double __attribute__((vector_size(sizeof(double) * kLanes<double>)));
-};
-template <>
-struct VectorOf<float> {
-  using Type = float __attribute__((vector_size(sizeof(float) * kLanes<float>)));
-};
-
-template <class Vector, class Number>
-FLEXEL_INLINE Vector get(const Number* from, std::size_t place) {
-  return simd::load_as<Vector>(from + kWidth * place);
-}
-
-template <class Vector, class Number>
-FLEXEL_INLINE void put(Number* to, std::size_t place, const Vector& value) {
-  __builtin_memcpy(to + kWidth * place, &value, sizeof value);
-}
+static_assert(kSideBySide == kWidth);
 
 // Gauss's points on [-1, 1].
 template <std::size_t kPoints>

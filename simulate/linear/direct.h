@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "base/math/vec.h"
+#include "simulate/linear/operator.h"
 
 namespace flexel::simulate {
 
@@ -23,6 +24,9 @@ class DirectSolver {
   mutable Eigen::VectorXd work_;
   bool analysed_ = false;
 };
+
+// Multiplications that factorise() takes of a matrix of 3x3 blocks; its pattern tells.
+[[nodiscard]] double factor_operations(const LinearOperator& matrix);
 
 // Lower half of a matrix of RxR blocks.
 template <class View>

@@ -21,7 +21,6 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr std::size_t kDirectRows = 1000;   // elements; a matrix up to this size is factorised at once
 constexpr std::size_t kCoarsestRows = 500;  // aggregates of six unknowns
 constexpr double kStrongLink = .01;         // weaker couplings do not hold an aggregate together
 constexpr double kAnyLink = 1e-12;          // weaker couplings are rounding
@@ -140,9 +139,12 @@ struct CoarseLevel {
 
 class Multigrid : public Preconditioner {
  public:
-  Multigrid(const LinearOperator& matrix, const NodeGeometry& geometry) : matrix_(matrix) {
+  Multigrid(const LinearOperator& matrix, const NodeGeometry& geometry, const DirectLimit& direct)
+      : matrix_(matrix) {
     assert(geometry.position.size() == matrix.rows() && geometry.index.size() == matrix.rows());
-    if (matrix.rows() > kDirectRows) build_structure(geometry);
+    const bool cheap = direct.row_cost > 0 &&
+                       factor_operations(matrix) <= direct.row_cost * static_cast<double>(matrix.rows());
+    if (matrix.rows() > direct.rows && !cheap) build_structure(geometry);
     refresh();
   }
 
@@ -299,8 +301,9 @@ class Multigrid : public Preconditioner {
 }  // namespace
 
 std::unique_ptr<Preconditioner> aggregation_multigrid(const LinearOperator& matrix,
-                                                      const NodeGeometry& geometry) {
-  return std::make_unique<Multigrid>(matrix, geometry);
+                                                      const NodeGeometry& geometry,
+                                                      const DirectLimit& direct) {
+  return std::make_unique<Multigrid>(matrix, geometry, direct);
 }
 
 namespace {
@@ -308,8 +311,8 @@ namespace {
 // With the operator that it needs.
 class MultigridOfStored : public Preconditioner {
  public:
-  MultigridOfStored(const BlockMatrix& matrix, const NodeGeometry& geometry)
-      : operator_(matrix), multigrid_(operator_, geometry) {}
+  MultigridOfStored(const BlockMatrix& matrix, const NodeGeometry& geometry, const DirectLimit& direct)
+      : operator_(matrix), multigrid_(operator_, geometry, direct) {}
   void apply(const std::vector<Vec3>& residual, std::vector<Vec3>& correction) const override {
     multigrid_.apply(residual, correction);
   }
@@ -323,9 +326,9 @@ class MultigridOfStored : public Preconditioner {
 
 }  // namespace
 
-std::unique_ptr<Preconditioner> aggregation_multigrid(const BlockMatrix& matrix,
-                                                      const NodeGeometry& geometry) {
-  return std::make_unique<MultigridOfStored>(matrix, geometry);
+std::unique_ptr<Preconditioner> aggregation_multigrid(const BlockMatrix& matrix, const NodeGeometry& geometry,
+                                                      const DirectLimit& direct) {
+  return std::make_unique<MultigridOfStored>(matrix, geometry, direct);
 }
 
 }  // namespace flexel::simulate

@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <optional>
 #include <unordered_map>
 
@@ -34,6 +35,12 @@ bool box_holds(const Box& box, const Vec3& point, double margin) {
          (point.array() <= box.max.array() + margin).all();
 }
 
+// A point of a surface (surface_points()); what carries it is found again where it touches.
+struct Sample {
+  Vec3 position, area_vector;
+  std::uint32_t polygon;
+};
+
 // A polygon of the coarser part, with the normal of its first sample point.
 struct Facing {
   std::uint32_t polygon = 0;
@@ -56,13 +63,22 @@ class Grid {
       result[static_cast<std::size_t>(axis)] = static_cast<std::int64_t>(std::floor(point[axis] / width_));
     return result;
   }
-  // Those with a sample in a cube or one around it, each once.
-  void find(const Cube& middle, std::vector<std::uint32_t>& polygons) const {
+  [[nodiscard]] Box box(const Cube& cube) const {
+    Box result;
+    result.min = width_ * Vec3(static_cast<double>(cube[0]), static_cast<double>(cube[1]),
+                               static_cast<double>(cube[2]));
+    result.max = result.min + Vec3::Constant(width_);
+    return result;
+  }
+  // Those with a sample in a cube or one around it that are wanted, each once.
+  template <class Wanted>
+  void find(const Cube& middle, std::vector<std::uint32_t>& polygons, const Wanted& wanted) const {
     polygons.clear();
     for (std::int64_t n = 0; n < 27; ++n) {
       const auto found =
           cubes_.find(key({middle[0] + n % 3 - 1, middle[1] + n / 3 % 3 - 1, middle[2] + n / 9 - 1}));
-      if (found != cubes_.end()) polygons.insert(polygons.end(), found->second.begin(), found->second.end());
+      if (found != cubes_.end())
+        std::copy_if(found->second.begin(), found->second.end(), std::back_inserter(polygons), wanted);
     }
     std::sort(polygons.begin(), polygons.end());
     polygons.erase(std::unique(polygons.begin(), polygons.end()), polygons.end());
@@ -79,20 +95,25 @@ class Grid {
   std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cubes_;
 };
 
-// What a grid finds around points, of which many that follow each other lie in one cube.
+// What a grid finds around points, of which many that follow each other lie in one cube: the polygons
+// within `limit` of the cube, by their boxes. In fine meshes they are a few of the hundreds around it.
 class Nearby {
  public:
-  explicit Nearby(const Grid& grid) : grid_(grid) {}
+  Nearby(const Grid& grid, const std::vector<Facing>& facing, double limit)
+      : grid_(grid), facing_(facing), limit_(limit) {}
   const std::vector<std::uint32_t>& operator()(const Vec3& point) {
     if (const Grid::Cube cube = grid_.cube(point); cube != cube_) {
       cube_ = cube;
-      grid_.find(*cube_, found_);
+      grid_.find(*cube_, found_,
+                 [&](std::uint32_t n) { return overlap(facing_[n].box, grid_.box(cube), limit_); });
     }
     return found_;
   }
 
  private:
   const Grid& grid_;
+  const std::vector<Facing>& facing_;
+  double limit_;
   std::optional<Grid::Cube> cube_;
   std::vector<std::uint32_t> found_;
 };
@@ -117,8 +138,8 @@ class TouchingSearch {
     return std::max({tolerance(a), tolerance(b), wider_gap(a, b)});
   }
   void sample(std::uint32_t part);
-  [[nodiscard]] const Facing* nearest(const SurfacePoint& point, double limit,
-                                      const std::vector<Facing>& facing,
+  [[nodiscard]] bool is_near_another(std::uint32_t part, const Vec3& point) const;
+  [[nodiscard]] const Facing* nearest(const Sample& point, double limit, const std::vector<Facing>& facing,
                                       const std::vector<std::uint32_t>& near) const;
   void touch(std::uint32_t finer, std::uint32_t coarser, const Use& use) const;
   [[nodiscard]] double distance(const Vec3& point, std::uint32_t polygon) const;
@@ -128,9 +149,9 @@ class TouchingSearch {
   const std::vector<TouchingGap>& wider_;
   double diagonal_ = 0;
   Triangles triangles_;
-  std::vector<std::uint32_t> first_triangle_;      // (polygons + 1)
-  std::vector<Box> box_;                           // (parts)
-  std::vector<std::vector<SurfacePoint>> points_;  // (parts) near another part
+  std::vector<std::uint32_t> first_triangle_;  // (polygons + 1)
+  std::vector<Box> box_;                       // (parts)
+  std::vector<std::vector<Sample>> points_;    // (parts) near another part
 };
 
 TouchingSearch::TouchingSearch(const Problem& problem, const std::vector<TouchingGap>& wider)
@@ -162,7 +183,27 @@ void TouchingSearch::sample(std::uint32_t part) {
         break;
       }
   }
-  if (!polygons.empty()) points_[part] = surface_points(problem_, polygons);
+  // Some polygons at a time, and of their points only what is near another part, without the 100 bytes of
+  // their carriers: around the bolts of a frame there are hundreds of thousands, and few of them touch.
+  constexpr std::size_t kAtATime = 16384;
+  std::vector<Sample>& kept = points_[part];
+  for (std::size_t begin = 0; begin < polygons.size(); begin += kAtATime) {
+    const auto from = polygons.begin() + static_cast<std::ptrdiff_t>(begin);
+    const auto to =
+        polygons.begin() + static_cast<std::ptrdiff_t>(std::min(begin + kAtATime, polygons.size()));
+    for (const SurfacePoint& point : surface_points(problem_, {from, to}))
+      if (is_near_another(part, point.position))
+        kept.push_back({point.position, point.area_vector, point.polygon});
+  }
+  kept.shrink_to_fit();
+}
+
+// As far as touch() looks: by its limit, and in the coarser part by two widths of its grid.
+bool TouchingSearch::is_near_another(std::uint32_t part, const Vec3& point) const {
+  const double spacing = body_.parts[part].lattice.spacing.minCoeff();
+  for (std::uint32_t other = 0; other < body_.parts.size(); ++other)
+    if (other != part && box_holds(box_[other], point, std::max(margin(part, other), spacing))) return true;
+  return false;
 }
 
 double TouchingSearch::distance(const Vec3& point, std::uint32_t polygon) const {
@@ -177,8 +218,7 @@ double TouchingSearch::distance(const Vec3& point, std::uint32_t polygon) const 
 }
 
 // Of `near`, numbers in `facing`; null: none within the limit.
-const Facing* TouchingSearch::nearest(const SurfacePoint& point, double limit,
-                                      const std::vector<Facing>& facing,
+const Facing* TouchingSearch::nearest(const Sample& point, double limit, const std::vector<Facing>& facing,
                                       const std::vector<std::uint32_t>& near) const {
   const Vec3 own = point.area_vector.normalized();
   double least = limit;
@@ -200,7 +240,7 @@ void TouchingSearch::touch(std::uint32_t finer, std::uint32_t coarser, const Use
   std::vector<Facing> facing;
   std::unordered_map<std::uint32_t, std::uint32_t> number;  // of a polygon in `facing`
   Grid grid(width);
-  for (const SurfacePoint& point : points_[coarser]) {
+  for (const Sample& point : points_[coarser]) {
     const auto [entry, added] = number.try_emplace(point.polygon, static_cast<std::uint32_t>(facing.size()));
     if (added)
       facing.push_back(
@@ -209,22 +249,23 @@ void TouchingSearch::touch(std::uint32_t finer, std::uint32_t coarser, const Use
     if (box_holds(box_[finer], point.position, 2 * width)) grid.add(point.position, entry->second);
   }
   // A window at a time: in parallel, then told in their order.
-  constexpr std::size_t kWindow = 65536, kGrain = 2048;
+  constexpr std::size_t kWindow = 16384, kGrain = 1024;
   std::vector<std::optional<TouchingPoint>> found;
   for (std::size_t begin = 0; begin < points_[finer].size(); begin += kWindow) {
     found.assign(std::min(kWindow, points_[finer].size() - begin), std::nullopt);
     parallel_chunks(found.size(), kGrain, [&](std::size_t first, std::size_t last) {
-      Nearby nearby(grid);
+      Nearby nearby(grid, facing, limit);
       for (std::size_t i = first; i < last; ++i) {
-        const SurfacePoint& point = points_[finer][begin + i];
+        const Sample& point = points_[finer][begin + i];
         if (!box_holds(box_[coarser], point.position, limit)) continue;
         const Facing* other = nearest(point, limit, facing, nearby(point.position));
         if (!other) continue;
         const auto at = carrier_on_surface(problem_, other->polygon, point.position, other->normal);
-        if (!at) continue;
+        const auto own = carrier_on_surface(problem_, point.polygon, point.position, point.area_vector);
+        if (!at || !own) continue;
         found[i] = {
             {finer, coarser},
-            {with_gradient(problem_, point.at, point.position), with_gradient(problem_, *at, point.position)},
+            {with_gradient(problem_, *own, point.position), with_gradient(problem_, *at, point.position)},
             point.area_vector.norm(),
             point.area_vector.normalized()};
       }

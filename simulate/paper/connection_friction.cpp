@@ -37,8 +37,9 @@ std::optional<ConnectionFriction> ConnectionFriction::make(const Parameters& par
   made.entries_ = parameters.entries.size();
   made.coefficient_.assign(problem.body.parts.size(), 0);
   bool any = false;
-  for (const Entry& entry : parameters.entries)
-    for (const std::size_t p : parts_of(entry, problem)) {
+  for (const auto& [each, parts] : entries_of_parts(parameters.entries, problem.body))
+    for (const std::uint32_t p : parts) {
+      const Entry& entry = *each;
       const bool has_connections = model_of(problem, p) == Model::paper;
       if (entry.part && !has_connections)
         throw InputError(entry.origin, fmt::format("part \"{}\" has no internal friction: it acts along the "

@@ -21,7 +21,7 @@ class ConnectionFriction : public Effect {
     std::string origin;
   };
   struct Parameters {
-    std::vector<Entry> entries;  // a later one goes before an earlier one
+    std::vector<Entry> entries;  // which goes before which: entries_of_parts()
   };
   static constexpr const char* name = "internal friction";
 
@@ -31,7 +31,7 @@ class ConnectionFriction : public Effect {
                                                               const Problem& problem);
   [[nodiscard]] std::string why() const override;
   [[nodiscard]] EnergyAccount account() const override { return EnergyAccount::dissipation; }
-  [[nodiscard]] bool takes_implicit_steps() const override { return false; }
+  [[nodiscard]] std::string refuses_implicit_steps() const override { return why(); }
   void attach(const PaperModel& model, const std::vector<double>& damping) override;
   void add_forces(const State& state, std::vector<Vec3>& forces) override;
 

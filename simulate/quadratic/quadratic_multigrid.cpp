@@ -1,7 +1,7 @@
 // Prescribed components are 0 in every residual and correction.
 #include "simulate/quadratic/quadratic_multigrid.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -19,88 +19,115 @@ constexpr int kSteps = 2;            // of Chebyshev's iteration, before and aft
 constexpr double kRange = 16;        // largest over smallest eigenvalue that it damps
 constexpr double kFullEnough = 0.7;  // cells filled so far are as good without a block (measured)
 constexpr double kMargin = 1.2;      // over the estimate of the largest
-constexpr int kPowerSteps = 15, kMostPowerSteps = 60;
+constexpr std::size_t kLanczosSteps = 8, kMostLanczosSteps = 30;
 constexpr double kRaised = 1e-6;  // of a block's scaled diagonal: what it is made from is in single precision
+// Multiplications an element that a factor of the trilinear field may take: about what the iterations cost that it saves.
+constexpr double kFactorCost = 1e5;
 constexpr std::size_t kBlocksAtATime = 16;
 using Vector = std::vector<Vec3>;
-using CornerMatrix = Eigen::Matrix<double, 24, 24>;
+using BlockTriangle = std::array<double, quadratic_kernel::kFactorSize>;
 
-// P^T K P, of a matrix of the nodes of two cells.
-CornerMatrix corners_of(const CellMatrix& matrix) {
-  Eigen::Matrix<double, kCellUnknowns, 24> embedding = Eigen::Matrix<double, kCellUnknowns, 24>::Zero();
-  for (std::size_t n = 0; n < kQuadraticNodes; ++n)
-    for (std::size_t a = 0; a < 8; ++a)
-      embedding.block<3, 3>(static_cast<Eigen::Index>(3 * n), static_cast<Eigen::Index>(3 * a)) =
-          trilinear_weight(n, a) * Mat3::Identity();
-  return embedding.transpose() * matrix * embedding;
+double greatest_eigenvalue(const std::vector<double>& diagonal, const std::vector<double>& beside) {
+  const auto size = static_cast<Eigen::Index>(diagonal.size());
+  Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver;
+  solver.computeFromTridiagonal(Eigen::Map<const Eigen::VectorXd>(diagonal.data(), size),
+                                Eigen::Map<const Eigen::VectorXd>(beside.data(), size - 1),
+                                Eigen::EigenvaluesOnly);
+  return solver.eigenvalues()[size - 1];
+}
+
+// A cell that has a node of a block: which of the block's nodes that is, and which of its own.
+struct SharedNode {
+  std::uint32_t cell, here, there;
+};
+
+// (nodes of a cell with their cells) by cell, then in the order of the block's nodes.
+std::vector<SharedNode> shared_nodes(const QuadraticNodes& nodes, std::uint32_t cell) {
+  std::vector<SharedNode> shared;
+  for (std::uint32_t n = 0; n < kQuadraticNodes; ++n)
+    for (const QuadraticNodes::Incidence& at : nodes.at(nodes.of_cell[cell][n]))
+      shared.push_back({at.cell, n, at.node});
+  std::stable_sort(shared.begin(), shared.end(),
+                   [](const SharedNode& a, const SharedNode& b) { return a.cell < b.cell; });
+  return shared;
 }
 
 }  // namespace
 
-// Of all cells, while the rest is made from it.
+// Of all cells, while the rest is made from it. Cells that have the same matrix share it.
 struct QuadraticMultigrid::CellStiffness {
-  std::vector<CornerMatrix> corners;  // (cells) of the trilinear field
-  std::vector<std::size_t> place;     // (cells) in `packed`: cells that have the same matrix share it
-  std::vector<float> packed;          // (x kPackedSize) lower triangle, row by row
+  std::vector<std::size_t> place;  // (cells)
+  std::vector<float> nodes;        // (places x kNodeMatrix) CellBlocks
+  std::vector<double> corners;     // (places x kCornerMatrix)
 
-  CellStiffness(const CellProducts<double>& cells, std::size_t count) : corners(count), place(count) {
-    std::vector<std::uint32_t> others;  // cells whose matrix is no other's
+  CellStiffness(const CellProducts<double>& cells, std::size_t count) : place(count) {
+    using quadratic_kernel::kCornerMatrix, quadratic_kernel::kNodeMatrix;
     const std::vector<std::uint32_t> twins = cells.twins();
+    std::size_t others = 0;
     for (std::uint32_t c = 0; c < count; ++c)
-      if (twins[c] == c) {
-        place[c] = others.size();
-        others.push_back(c);
-      }
-    packed.resize(others.size() * kPackedSize);
-    parallel_for_each(
-        others.size(),
-        [&](std::size_t i) {
-          corners[others[i]] = corner_matrix(cells, others[i]);
-          const CellMatrix matrix = cells.matrix(others[i]);
-          float* to = &packed[i * kPackedSize];
-          for (int row = 0; row < kCellUnknowns; ++row)
-            for (int j = 0; j <= row; ++j) *to++ = static_cast<float>(matrix(row, j));
-        },
-        kBlocksAtATime);
-    for (std::size_t c = 0; c < count; ++c)
-      if (const std::uint32_t same = twins[c]; same != c) {
-        place[c] = place[same];
-        corners[c] = corners[same];
-      }
+      if (twins[c] == c) place[c] = others++;
+    for (std::size_t c = 0; c < count; ++c) place[c] = place[twins[c]];
+    nodes.resize(others * kNodeMatrix);
+    corners.resize(others * kCornerMatrix);
+    cells.matrices([&](std::uint32_t c, const CellBlocks& blocks) {
+      float* to = &nodes[place[c] * kNodeMatrix];
+      for (std::size_t i = 0; i < kNodeMatrix; ++i) to[i] = static_cast<float>(blocks.nodes[i]);
+      std::copy(blocks.corners.begin(), blocks.corners.end(), &corners[place[c] * kCornerMatrix]);
+    });
   }
 
-  // P^T K P
-  static CornerMatrix corner_matrix(const CellProducts<double>& cells, std::size_t cell) {
-    CornerMatrix made = CornerMatrix::Zero();
-    CellColumns embedded;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      embedded.setZero();
-      for (std::size_t n = 0; n < kQuadraticNodes; ++n)
-        for (std::size_t a = 0; a < 8; ++a)
-          embedded(static_cast<Eigen::Index>(3 * n + axis), static_cast<Eigen::Index>(a)) =
-              trilinear_weight(n, a);
-      const CellColumns forces = cells.multiply(cell, embedded);
-      for (std::size_t n = 0; n < kQuadraticNodes; ++n)
-        for (std::size_t a = 0; a < 8; ++a)
-          if (const double weight = trilinear_weight(n, a); weight > 0)
-            for (std::size_t b = 0; b < 8; ++b)
-              made.block<3, 1>(static_cast<Eigen::Index>(3 * a), static_cast<Eigen::Index>(3 * b + axis)) +=
-                  weight * forces.block<3, 1>(static_cast<Eigen::Index>(3 * n), static_cast<Eigen::Index>(b));
-    }
-    return 0.5 * (made + made.transpose());
+  // (3 x 3, row by row) Of two of a cell's nodes, a >= b.
+  [[nodiscard]] const float* lower_block(std::size_t cell, std::size_t a, std::size_t b) const {
+    return &nodes[place[cell] * quadratic_kernel::kNodeMatrix + quadratic_kernel::block_place(a, b)];
   }
-
   // Of two of a cell's nodes.
   [[nodiscard]] Mat3 block(std::size_t cell, std::size_t a, std::size_t b) const {
-    const float* from = &packed[place[cell] * kPackedSize];
-    Mat3 found;
-    for (std::size_t i = 0; i < 3; ++i)
-      for (std::size_t j = 0; j < 3; ++j) {
-        const std::size_t most = std::max(3 * a + i, 3 * b + j), least = std::min(3 * a + i, 3 * b + j);
-        found(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
-            static_cast<double>(from[most * (most + 1) / 2 + least]);
-      }
-    return found;
+    using Rows = Eigen::Matrix<float, 3, 3, Eigen::RowMajor>;
+    const Eigen::Map<const Rows> found(lower_block(cell, std::max(a, b), std::min(a, b)));
+    return a >= b ? Mat3(found.cast<double>()) : Mat3(found.transpose().cast<double>());
+  }
+  // Of two of a cell's corners.
+  [[nodiscard]] Mat3 corner_block(std::size_t cell, std::size_t a, std::size_t b) const {
+    using Rows = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+    const Eigen::Map<const Rows> found(
+        &corners[place[cell] * quadratic_kernel::kCornerMatrix +
+                 quadratic_kernel::block_place(std::max(a, b), std::min(a, b))]);
+    return a >= b ? Mat3(found) : Mat3(found.transpose());
+  }
+
+  // The lower triangle of the assembled stiffness of a cell's nodes, as kernel_quadratic_matrix.h has it.
+  void assemble(const QuadraticNodes& of, const std::vector<std::uint8_t>& held, std::uint32_t cell,
+                BlockTriangle& sum) const {
+    sum.fill(0);
+    const std::vector<SharedNode> shared = shared_nodes(of, cell);
+    for (std::size_t begin = 0, end = 0; begin < shared.size(); begin = end) {
+      while (end < shared.size() && shared[end].cell == shared[begin].cell) ++end;
+      for (std::size_t p = begin; p < end; ++p)
+        for (std::size_t q = begin; q <= p; ++q) add(shared[p], shared[q], sum);
+    }
+    const auto entry = [&](std::size_t row, std::size_t column) -> double& {
+      return sum[quadratic_kernel::row_place(row) + column];
+    };
+    for (std::size_t i = 0; i < quadratic_kernel::kUnknowns; ++i) {
+      if (!(held[of.of_cell[cell][i / 3]] >> i % 3 & 1)) continue;
+      for (std::size_t j = 0; j < i; ++j) entry(i, j) = 0;
+      for (std::size_t j = i + 1; j < quadratic_kernel::kUnknowns; ++j) entry(j, i) = 0;
+      entry(i, i) = 1;
+    }
+  }
+
+ private:
+  // `row` comes after `column` in the block.
+  void add(const SharedNode& row, const SharedNode& column, BlockTriangle& sum) const {
+    const bool lower = row.there >= column.there;
+    const float* from =
+        lower_block(row.cell, std::max(row.there, column.there), std::min(row.there, column.there));
+    for (std::size_t i = 0; i < 3; ++i) {
+      double* to = &sum[quadratic_kernel::row_place(3 * row.here + i) + 3 * column.here];
+      const std::size_t count = row.here == column.here ? i + 1 : 3;
+      for (std::size_t j = 0; j < count; ++j)
+        to[j] += static_cast<double>(lower ? from[3 * i + j] : from[3 * j + i]);
+    }
   }
 };
 
@@ -118,7 +145,7 @@ QuadraticMultigrid::QuadraticMultigrid(const QuadraticOperator& matrix, const Bo
   for (std::size_t e = 0; e < coarse_.rows() && !held_softly.empty(); ++e)
     coarse_.values[diagonal_position(coarse_, e)].diagonal().array() +=
         held_softly[matrix.nodes().elements[e]];
-  hierarchy_ = aggregation_multigrid(coarse_, geometry_);
+  hierarchy_ = aggregation_multigrid(coarse_, geometry_, {.row_cost = kFactorCost});
   estimate_largest();
 }
 
@@ -170,7 +197,7 @@ void QuadraticMultigrid::make_coarse(const Body& body, const std::vector<Vec3>& 
     for (std::size_t a = 0; a < 8; ++a)
       for (std::size_t b = 0; b < 8; ++b)
         coarse_.values[position_of(coarse_, nodes.of_cell[c][corner[a]], nodes.of_cell[c][corner[b]])] +=
-            cells.corners[c].block<3, 3>(static_cast<Eigen::Index>(3 * a), static_cast<Eigen::Index>(3 * b));
+            cells.corner_block(c, a, b);
   for (std::size_t p = 0; p < couplings.pairs.size(); ++p) {
     const CornerMatrix cross = corners_of(couplings.cross[p]);
     for (std::size_t a = 0; a < 8; ++a)
@@ -227,63 +254,72 @@ void QuadraticMultigrid::make_blocks(const CellStiffness& cells, const std::vect
       }
     inverse_[n] = diagonal.inverse();
   }
+  make_weights(cells);
   inverse_factors_.assign(block_cells_.size(), {});
   block_values_.assign(block_cells_.size() * quadratic_kernel::kPaddedUnknowns, 0);
-  parallel_for_each(
-      block_cells_.size(), [&](std::size_t b) { factorise(b, block_cells_[b], cells); }, kBlocksAtATime);
+  constexpr std::size_t kWidth = quadratic_kernel::kWidth;
+  parallel_for_each((block_cells_.size() + kWidth - 1) / kWidth,
+                    [&](std::size_t e) { factorise(kWidth * e, cells); }, 2);
 }
 
-// The inverse of Cholesky's factor of the assembled stiffness of a cell's nodes: with T = L^-1, T^T T is its inverse, and
-// positive however T is rounded.
-void QuadraticMultigrid::factorise(std::size_t block, std::uint32_t cell, const CellStiffness& cells) {
+// Beside bonds, whose blocks hold nodes of other cells too, by multiplicity.
+void QuadraticMultigrid::make_weights(const CellStiffness& cells) {
   const QuadraticNodes& nodes = matrix_.nodes();
-  const auto& own = nodes.of_cell[cell];
-  std::vector<std::uint32_t> around;
-  for (const std::uint32_t node : own)
-    for (const QuadraticNodes::Incidence& at : nodes.at(node)) around.push_back(at.cell);
-  std::sort(around.begin(), around.end());
-  around.erase(std::unique(around.begin(), around.end()), around.end());
-  CellMatrix sum = CellMatrix::Zero();
-  for (const std::uint32_t other : around) {
-    std::vector<std::pair<Eigen::Index, std::size_t>> shared;  // row here, node there
-    for (std::size_t n = 0; n < kQuadraticNodes; ++n)
-      if (const auto found = std::find(own.begin(), own.end(), nodes.of_cell[other][n]); found != own.end())
-        shared.emplace_back(3 * (found - own.begin()), n);
-    for (const auto& [a, there_a] : shared)
-      for (const auto& [b, there_b] : shared)
-        if (b <= a) sum.block<3, 3>(a, b) += cells.block(other, there_a, there_b);
+  // a support may leave a sliver less than nothing
+  const auto stiffness = [&](std::uint32_t cell, std::size_t node) {
+    const float* block = cells.lower_block(cell, node, node);
+    return std::max(static_cast<double>(block[0] + block[4] + block[8]), 0.0);
+  };
+  std::vector<double> sum(nodes.size(), 0);
+  for (const std::uint32_t c : block_cells_)
+    for (std::size_t n = 0; n < kQuadraticNodes; ++n) sum[nodes.of_cell[c][n]] += stiffness(c, n);
+  block_weight_.resize(block_cells_.size() * kQuadraticNodes);
+  for (std::size_t b = 0; b < block_cells_.size(); ++b)
+    for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
+      const std::uint32_t node = nodes.of_cell[block_cells_[b]][n];
+      const bool shared = bond_blocks_.count(node) == 0 && sum[node] > 0;
+      block_weight_[b * kQuadraticNodes + n] =
+          static_cast<float>(shared ? std::sqrt(stiffness(block_cells_[b], n) / sum[node]) : weight_[node]);
+    }
+}
+
+// The inverses of the Cholesky factors of the assembled stiffness of the nodes of eight cells: with T = L^-1, T^T T is its
+// inverse, and positive however T is rounded.
+void QuadraticMultigrid::factorise(std::size_t first, const CellStiffness& cells) {
+  constexpr std::size_t kWidth = quadratic_kernel::kWidth;
+  const std::size_t count = std::min(kWidth, block_cells_.size() - first);
+  thread_local std::vector<double> matrices;
+  matrices.assign(quadratic_kernel::kFactorSize * kWidth, 0);
+  BlockTriangle sum;
+  for (std::size_t lane = 0; lane < count; ++lane) {
+    cells.assemble(matrix_.nodes(), matrix_.held(), block_cells_[first + lane], sum);
+    for (std::size_t i = 0; i < sum.size(); ++i) matrices[kWidth * i + lane] = sum[i];
   }
-  sum.triangularView<Eigen::StrictlyUpper>() = sum.transpose();
-  for (std::size_t n = 0; n < kQuadraticNodes; ++n)
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      if (matrix_.held()[own[n]] >> axis & 1) {
-        const auto i = static_cast<Eigen::Index>(3 * n + axis);
-        sum.row(i).setZero();
-        sum.col(i).setZero();
-        sum(i, i) = 1;
-      }
-  const Eigen::Matrix<double, kCellUnknowns, 1> scale =
-      sum.diagonal().cwiseAbs().cwiseMax(1e-300).cwiseSqrt();
-  const auto inverse = scale.cwiseInverse().asDiagonal();
-  CellMatrix scaled = inverse * sum * inverse;
-  scaled.diagonal().array() += kRaised;
-  Eigen::LLT<CellMatrix> factor(scaled);
-  for (double more = 1e-4; factor.info() != Eigen::Success && more < 10; more *= 10) {
-    scaled.diagonal().array() += more;
-    factor.compute(scaled);
+  const unsigned failed = quadratic_kernel::best_matrices().invert_factors(matrices.data(), kRaised, count,
+                                                                           &inverse_factors_[first]);
+  for (std::size_t lane = 0; lane < count; ++lane)
+    if ((failed >> lane & 1) != 0) {
+      cells.assemble(matrix_.nodes(), matrix_.held(), block_cells_[first + lane], sum);
+      factorise_raised(sum, inverse_factors_[first + lane]);
+    }
+}
+
+// Where rounding left a block that is not positive: raised until it is.
+void QuadraticMultigrid::factorise_raised(const BlockTriangle& sum, quadratic_kernel::Triangle& to) {
+  constexpr double kMostRaised = 10;
+  for (double raised = 1e-4; raised < kMostRaised; raised *= 10) {
+    std::vector<double> matrix(quadratic_kernel::kFactorSize * quadratic_kernel::kWidth, 0);
+    for (std::size_t i = 0; i < sum.size(); ++i) matrix[quadratic_kernel::kWidth * i] = sum[i];
+    if (quadratic_kernel::best_matrices().invert_factors(matrix.data(), raised, 1, &to) % 2 == 0) return;
   }
-  CellMatrix lower = CellMatrix::Identity();
-  if (factor.info() == Eigen::Success) factor.matrixL().solveInPlace(lower);  // else by the diagonal alone
-  quadratic_kernel::Triangle& to = inverse_factors_[block];
-  for (int i = 0; i < kCellUnknowns; ++i) to.scale[i] = static_cast<float>(1 / scale[i]);
-  std::int16_t* steps = to.steps;
-  for (std::size_t r = 0; r < static_cast<std::size_t>(kCellUnknowns); ++r) {
-    const auto row = lower.row(static_cast<Eigen::Index>(r));
-    const double step = row.cwiseAbs().maxCoeff() / quadratic_kernel::kMostSteps;
-    to.step[r] = static_cast<float>(step);
-    for (std::size_t j = 0; j <= r; ++j)
-      steps[j] = static_cast<std::int16_t>(std::lround(row[static_cast<Eigen::Index>(j)] / step));
-    steps += quadratic_kernel::group_columns(r / quadratic_kernel::kRows);
+  // by the diagonal alone
+  std::size_t place = 0;
+  for (std::size_t r = 0; r < quadratic_kernel::kUnknowns; ++r) {
+    to.scale[r] = static_cast<float>(
+        1 / std::sqrt(std::max(std::abs(sum[quadratic_kernel::row_place(r) + r]), 1e-300)));
+    to.step[r] = 1.F / quadratic_kernel::kMostSteps;
+    to.steps[place + r] = quadratic_kernel::kMostSteps;
+    place += quadratic_kernel::group_columns(r / quadratic_kernel::kRows);
   }
 }
 
@@ -303,8 +339,8 @@ void QuadraticMultigrid::smooth_once(const Vector& residual, Vector& correction)
         const auto& own = nodes.of_cell[block_cells_[b]];
         for (std::size_t n = 0; n < kQuadraticNodes; ++n)
           for (std::size_t axis = 0; axis < 3; ++axis)
-            wanted[3 * n + axis] =
-                static_cast<float>(weight_[own[n]] * residual[own[n]][static_cast<Eigen::Index>(axis)]);
+            wanted[3 * n + axis] = static_cast<float>(block_weight_[b * kQuadraticNodes + n] *
+                                                      residual[own[n]][static_cast<Eigen::Index>(axis)]);
         quadratic_kernel::best().square(inverse_factors_[b], wanted, &block_values_[b * kPaddedUnknowns]);
       },
       kBlocksAtATime);
@@ -315,36 +351,51 @@ void QuadraticMultigrid::smooth_once(const Vector& residual, Vector& correction)
       correction[n] = inverse_[n] * residual[n];
       return;
     }
-    Vec3 sum = bond_blocks_.count(n) > 0 ? bond_blocks_.sum(n) : Vec3(Vec3::Zero());
-    for (const QuadraticNodes::Incidence& at : nodes.at(n))
-      if (const std::int32_t block = block_of_[at.cell]; block >= 0)
-        sum += Eigen::Map<const Eigen::Vector3f>(
-                   &block_values_[static_cast<std::size_t>(block) * kPaddedUnknowns + 3 * at.node])
-                   .cast<double>();
-    correction[n] = weight_[n] * sum;
+    Vec3 sum = bond_blocks_.count(n) > 0 ? Vec3(weight_[n] * bond_blocks_.sum(n)) : Vec3(Vec3::Zero());
+    for (const QuadraticNodes::Incidence& at : nodes.at(n)) {
+      if (block_of_[at.cell] < 0) continue;
+      const auto block = static_cast<std::size_t>(block_of_[at.cell]);
+      sum += (block_weight_[block * kQuadraticNodes + at.node] *
+              Eigen::Map<const Eigen::Vector3f>(&block_values_[block * kPaddedUnknowns + 3 * at.node]))
+                 .cast<double>();
+    }
+    correction[n] = sum;
   });
   matrix_.clear_held(correction);
 }
 
+// Of the tridiagonal matrix that conjugate gradients make of M^-1 A (Lanczos 1950): a few slivers may have the largest
+// eigenvalue, which the power method shows only once the rest has fallen behind.
 void QuadraticMultigrid::estimate_largest() {
+  constexpr double kSettled = 1.005;  // from step to step
   std::mt19937 random(1);
-  Vector x(matrix_.nodes().size()), image;
-  for (Vec3& each : x)
+  Vector residual(matrix_.nodes().size()), direction, image, smoothed;
+  for (Vec3& each : residual)
     for (double& value : each) value = static_cast<double>(random()) / 4294967295.0 - 0.5;
-  matrix_.clear_held(x);
-  // A few slivers may have the largest eigenvalue: it shows once the rest has fallen behind.
-  constexpr double kSettled = 1.01;  // from step to step
-  double before = 0;
-  for (int step = 0; step < kMostPowerSteps && (step < kPowerSteps || largest_ > kSettled * before); ++step) {
+  matrix_.clear_held(residual);
+  smooth_once(residual, smoothed);
+  direction = smoothed;
+  std::vector<double> diagonal, beside;
+  double squared = dot(residual, smoothed), before = 0,
+         turned = 0;  // turned: what the last step left for the next diagonal
+  for (std::size_t step = 0; squared > 0 && step < kMostLanczosSteps; ++step) {
+    multiply_roughly(direction, image);
+    const double length = squared / dot(direction, image);
+    if (!(length > 0)) break;
+    diagonal.push_back(1 / length + turned);
     before = largest_;
-    const double norm = std::sqrt(dot(x, x));
-    if (!(norm > 0)) return;
-    parallel_for_each(x.size(), [&](std::size_t n) { x[n] /= norm; });
-    multiply_roughly(x, image);
-    smooth_once(image, x);
-    largest_ = std::sqrt(dot(x, x));
+    largest_ = greatest_eigenvalue(diagonal, beside);
+    if (step >= kLanczosSteps && largest_ < kSettled * before) return;
+    parallel_for_each(residual.size(), [&](std::size_t n) { residual[n] -= length * image[n]; });
+    smooth_once(residual, smoothed);
+    const double next = dot(residual, smoothed), ratio = next / squared;
+    beside.push_back(std::sqrt(ratio) / length);
+    turned = ratio / length;
+    squared = next;
+    parallel_for_each(residual.size(),
+                      [&](std::size_t n) { direction[n] = smoothed[n] + ratio * direction[n]; });
   }
-  if (largest_ > kSettled * before) widen();  // what is left of the growth is not known
+  if (diagonal.size() == kMostLanczosSteps) widen();  // what is left of the growth is not known
 }
 
 // kSteps of Chebyshev's iteration on [largest / kRange, kMargin largest].

@@ -58,7 +58,7 @@ std::vector<PartSettings> settings_of_parts(const Scene& scene, const Body& body
   for (const auto& [name, entry] : scene.parts) {
     std::vector<std::uint32_t> parts = parts_called(names, body.surface.parts, name);
     if (parts.empty()) continue;
-    const std::size_t width = names[parts.front()] == name ? 0 : parts.size();
+    const std::size_t width = entry_width(names, parts, name);
     entries.emplace(width, Entry{std::move(parts), &entry});
   }
   std::vector<PartSettings> settings(names.size());

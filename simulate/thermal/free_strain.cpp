@@ -12,6 +12,7 @@
 #include "base/human.h"
 #include "base/parallel.h"
 #include "base/units.h"
+#include "simulate/effects/part_entries.h"
 
 namespace flexel::simulate {
 namespace {
@@ -88,17 +89,14 @@ FreeStrain::FreeStrain(const Body& body, const ThermalSettings& settings,
     : body_(&body), changes_(settings.changes), shrinkages_(settings.shrinkages) {
   if (!settings.expands()) return;
   parts_.resize(body.parts.size());
-  std::vector<std::string> names;
-  for (const Part& part : body.parts) names.push_back(part.name);
-  for (const TemperatureChange& change : changes_)
-    for (const std::size_t p : thermal_parts(change.part, names, change.origin))
-      add_change(change, settings, materials, p);
-  for (const Shrinkage& shrinkage : shrinkages_)
-    for (const std::size_t p : thermal_parts(shrinkage.part, names, shrinkage.origin)) {
-      parts_[p].shrinkage = &shrinkage;
-      const Extent high = extent(body, p, shrinkage.axis);
+  for (const auto& [change, parts] : entries_of_parts(changes_, body))
+    for (const std::uint32_t p : parts) add_change(*change, settings, materials, p);
+  for (const auto& [shrinkage, parts] : entries_of_parts(shrinkages_, body))
+    for (const std::uint32_t p : parts) {
+      parts_[p].shrinkage = shrinkage;
+      const Extent high = extent(body, p, shrinkage->axis);
       parts_[p].bottom = high.low;
-      parts_[p].layers = std::max(1.0, std::ceil((high.high - high.low) / shrinkage.layer - 1e-6));
+      parts_[p].layers = std::max(1.0, std::ceil((high.high - high.low) / shrinkage->layer - 1e-6));
     }
   for (std::uint32_t p = 0; p < parts_.size(); ++p) check(p);
 }

@@ -6,8 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/error.h"
-#include "base/nearest_word.h"
 #include "simulate/input/material_names.h"
 
 namespace flexel::simulate {
@@ -77,16 +75,6 @@ bool is_temperature_column(const ThermalSettings& settings, const std::string& c
   if (column == kTemperatureColumn && settings.conducts()) return true;
   return std::any_of(settings.changes.begin(), settings.changes.end(),
                      [&](const TemperatureChange& each) { return each.column == column; });
-}
-
-std::vector<std::size_t> thermal_parts(const std::optional<std::string>& part,
-                                       const std::vector<std::string>& names, const std::string& origin) {
-  std::vector<std::size_t> parts;
-  for (std::size_t p = 0; p < names.size(); ++p)
-    if (!part || *part == names[p]) parts.push_back(p);
-  if (parts.empty())
-    throw InputError(origin, fmt::format("the body has no part \"{}\"{}", *part, did_you_mean(*part, names)));
-  return parts;
 }
 
 }  // namespace flexel::simulate

@@ -47,7 +47,7 @@ struct HeatFace {
 };
 
 struct ThermalSettings {
-  std::vector<TemperatureChange> changes;  // a later one goes before an earlier one
+  std::vector<TemperatureChange> changes;  // which goes before which: entries_of_parts()
   std::vector<Shrinkage> shrinkages;       // likewise
   std::vector<HeatFace> faces;
   std::map<std::string, ThermalFigures> materials;  // the scene's own, with or without figures
@@ -65,10 +65,5 @@ constexpr const char* kTemperatureColumn = "temperature";
 [[nodiscard]] ThermalFigures library_thermal_figures(const std::string& material);
 // The scene's own go before the library; the conductivity is what an infill leaves of it.
 [[nodiscard]] ThermalFigures thermal_figures(const ThermalSettings& settings, const Material& material);
-
-// The indices of the parts that an entry with that `part` is for. Throws InputError(origin, ...): there is none.
-[[nodiscard]] std::vector<std::size_t> thermal_parts(const std::optional<std::string>& part,
-                                                     const std::vector<std::string>& names,
-                                                     const std::string& origin);
 
 }  // namespace flexel::simulate

@@ -142,7 +142,8 @@ void TimeSegment::make_implicit() {
   if (!plan_.fracture.empty()) refuse("[fracture]");
   if (damps_connections()) refuse("[damping] of model \"paper\"");
   for (const ActiveEffect& effect : effects_)
-    if (!effect->takes_implicit_steps()) refuse(fmt::format("{} ({})", effect.name, effect.why));
+    if (const std::string what = effect->refuses_implicit_steps(); !what.empty())
+      refuse(fmt::format("{} ({})", effect.name, what));
   euler_.emplace(problem_, effects_, plan_, stepper_->mass(), scene_.run.tolerance);
 }
 
@@ -221,6 +222,7 @@ void TimeSegment::refuse_unsound() {
   }
   if (!(farthest < kRunaway * (1 + body_extent(body_))))
     throw DivergedError(runs_away_at(body_.rest[where], scene_.run.method));
+  if (euler_) return;  // its steps end with every cell the right way round
   look();
   if (!(bound_->longest(staged_.has_value()) > 0)) throw DivergedError(where_it_folds(problem_, state_));
 }
@@ -305,18 +307,22 @@ void TimeSegment::step_implicitly(Clock& clock, EnergyHistory* history, bool row
           clock.step, told.step == 0 ? "down to 1/1024 of it" : fmt::format("{} shorter ones", failures),
           told.trouble, squeezed_most(problem_, state_)));
     held_->settle(state_, euler_->supports());
-    if (!history) continue;
-    for (std::size_t p = 0; p < effects_.size(); ++p)
-      if (std::vector<Vec3>& own = history->forces_of(p); !own.empty()) {
-        std::fill(own.begin(), own.end(), Vec3::Zero());
-        euler_->add_forces(p, state_, own);
-      }
-    history->enter(euler_->moved(), euler_->damping_force(), euler_->supports(),
-                   euler_->numerical_dissipation(state_));
+    if (history) enter_implicit_step(*history);
+    euler_->finish(state_);
   }
   ++clock.in_epoch;
   ++clock.steps;
   clock.previous = clock.step;
+}
+
+void TimeSegment::enter_implicit_step(EnergyHistory& history) {
+  for (std::size_t p = 0; p < effects_.size(); ++p)
+    if (std::vector<Vec3>& own = history.forces_of(p); !own.empty()) {
+      std::fill(own.begin(), own.end(), Vec3::Zero());
+      euler_->add_forces(p, state_, own);
+    }
+  history.enter(euler_->moved(), euler_->damping_force(), euler_->supports(),
+                euler_->numerical_dissipation(state_));
 }
 
 bool TimeSegment::renews(const Clock& clock) const {
@@ -399,6 +405,7 @@ void TimeSegment::step(Clock& clock, EnergyHistory* history, bool row) {
   held_->impose(state_, stepper_->mass(), advance);
   for (const ActiveEffect& effect : effects_)
     effect->finish_step(state_, {stepper_->mass(), advance.kick, advance.drift});
+  for (const ActiveEffect& effect : effects_) effect->accept(state_);
   if (history) {
     std::vector<Vec3> supports(body_.element_count(), Vec3::Zero());
     held_->add_forces(supports);

@@ -129,6 +129,7 @@ class TimeSegment {
   void make_implicit();
   void refuse_held_rigid() const;
   void step_implicitly(Clock& clock, EnergyHistory* history, bool row);
+  void enter_implicit_step(EnergyHistory& history);
   void look();
   void tell_loop_apart();
   template <class Add>

@@ -1,5 +1,5 @@
 // Knots, fits and rigid motions: exact where they must be, and of the order that they promise.
-#include "cad/deform/fit.h"
+#include "cad/fit/fit.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <gp_Pnt.hxx>
 #include <numbers>
 
-#include "cad/deform/rigid_motion.h"
+#include "cad/fit/rigid_motion.h"
 
 namespace flexel::cad {
 namespace {

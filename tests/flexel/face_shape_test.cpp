@@ -56,6 +56,37 @@ TEST(FaceShape, PartsOfCylindersGiveAxisRadiusAndSide) {
     }
 }
 
+// Rings of corners, each turned by half a step against the one below: no triangle of the cylinder is
+// parallel to its axis.
+TEST(FaceShape, ARemeshedCylinderIsRound) {
+  constexpr int kSides = 16, kRings = 5;
+  Surface surface;
+  surface.parts.push_back({"part"});
+  surface.faces.push_back({"", 0});
+  surface.polygon_offsets.push_back(0);
+  for (int j = 0; j < kRings; ++j)
+    for (int i = 0; i < kSides; ++i) {
+      const double a = 2 * M_PI * (i + 0.5 * j) / kSides;
+      surface.vertices.push_back(kTurn * Vec3(0.3 * std::cos(a), 0.3 * std::sin(a), 0.1 * j) + kShift);
+    }
+  const auto add = [&](int a, int b, int c) {
+    for (const int v : {a, b, c}) surface.polygon_vertices.push_back(static_cast<std::uint32_t>(v));
+    surface.polygon_offsets.push_back(static_cast<std::uint32_t>(surface.polygon_vertices.size()));
+    surface.polygon_face.push_back(0);
+  };
+  for (int j = 0; j + 1 < kRings; ++j)
+    for (int i = 0; i < kSides; ++i) {
+      const int next = (i + 1) % kSides, low = j * kSides, high = low + kSides;
+      add(low + i, high + i, low + next);
+      add(low + next, high + i, high + next);
+    }
+  const FaceShape shape = face_shapes(surface)[0];
+  ASSERT_EQ(shape.kind, FaceShape::Kind::round);
+  EXPECT_TRUE(shape.is_hole());
+  EXPECT_NEAR(std::abs(shape.axis.dot(kTurn.col(2))), 1, 1e-5);
+  EXPECT_NEAR(shape.radius, 0.3, 1e-3);
+}
+
 // A hole that the CAD program cut into two faces, and two hollows of half a circle that lie one behind the
 // other.
 TEST(FaceShape, TwoHalvesAreAHoleOnlyWhereTheyLieSideBySide) {

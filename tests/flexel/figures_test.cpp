@@ -127,6 +127,48 @@ INSTANTIATE_TEST_SUITE_P(OfEveryModel, Figures,
                                            ModelCase{"paper", Placement::centre}),
                          [](const auto& each) { return std::string(each.param.model); });
 
+// Both ends of the bar are held, and with them all of its vertices; no cell is whole. It moves where it has
+// neither.
+TEST(FiguresOfDisplacement, ThePartMovesWhereItHasNoVertices) {
+  for (const bool quadratic : {false, true}) {
+    voxelize::VoxelizeOptions options;
+    options.size = 0.012;
+    options.align = voxelize::Align::none;
+    options.moments = quadratic;
+    Progress quiet("test", Progress::Mode::silent);
+    Body body = voxelize::voxelize(bar(), options, quiet).body;
+    const std::string model = quadratic ? "model = \"quadratic\"\n" : "";
+    simulate::SimulateOptions run;
+    run.estimate = false;
+    const simulate::SimulateResult result = simulate::simulate(
+        body,
+        simulate::parse_scene(model + "material = \"steel\"\n[[fix]]\nwhere = [\"x0\", \"x1\"]\n"
+                                      "[[load]]\nwhere = \"sides\"\nforce = [0, 0, \"-10 N\"]\n",
+                              "s.toml"),
+        run, quiet);
+    double most = 0;
+    constexpr int kSteps = 40;
+    for (std::uint32_t p = 2; p < 6; ++p)
+      for (int i = 0; i <= kSteps; ++i)
+        for (int j = 0; j <= kSteps; ++j) {
+          const auto corners = body.surface.polygon(p);
+          const std::vector<Vec3>& at = body.surface.vertices;
+          const double u = static_cast<double>(i) / kSteps, v = static_cast<double>(j) / kSteps;
+          const Vec3 point = (1 - u) * ((1 - v) * at[corners[0]] + v * at[corners[3]]) +
+                             u * ((1 - v) * at[corners[1]] + v * at[corners[2]]);
+          most = std::max(most, displacement_on_surface(body, p, point)->norm());
+        }
+    EXPECT_GT(most, 1e-9);
+    EXPECT_GT(result.largest_displacement, 0.95 * most) << model;
+    EXPECT_LT(result.largest_displacement, 1.05 * most) << model;
+    const LargestDisplacement surface = largest_displacement_of_surface(body);
+    constexpr double kRounding = 1e-6;  // nanometres are left of positions
+    EXPECT_NEAR(surface.value() / result.largest_displacement, 1, kRounding);
+    EXPECT_NEAR((*displacement_on_surface(body, surface.polygon, surface.at) - surface.displacement).norm(),
+                0, kRounding * surface.value());
+  }
+}
+
 // Away from the ends tension is the same everywhere, and so is the stress, at elements beside the part as
 // well.
 TEST(FiguresOfStress, UniformTensionIsUniform) {

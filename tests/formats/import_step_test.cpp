@@ -4,6 +4,7 @@
 
 #include "base/parallel.h"
 #include "tests/formats/import_help.h"
+#include "tests/sanitized.h"
 
 namespace flexel::test {
 namespace {
@@ -201,13 +202,10 @@ TEST(ImportStep, ALostLineNeverGivesHalfASolid) {
     at = end == std::string::npos ? text.size() : end + 1;
   }
   const double whole = shape(import_surface(part_path("red_cube_blue_cylinder.step"))).volume;
-#ifdef __SANITIZE_ADDRESS__  // where every start of flexel-cad takes a second
-  constexpr std::size_t kEvery = 16;
-#else
-  constexpr std::size_t kEvery = 2;
-#endif
+  // A start of flexel-cad takes a second there.
+  const auto every = less_if_sanitized<std::size_t>(2, 16, "one line of sixteen is lost");
   std::size_t refused = 0;
-  for (std::size_t lost = 8; lost < lines.size(); lost += kEvery) {
+  for (std::size_t lost = 8; lost < lines.size(); lost += every) {
     std::string damaged;
     for (std::size_t i = 0; i < lines.size(); ++i)
       if (i != lost) damaged += lines[i];
@@ -226,7 +224,7 @@ TEST(ImportStep, ALostLineNeverGivesHalfASolid) {
       EXPECT_NEAR(found.volume / whole, 1, 1e-9) << lines[lost];
     }
   }
-  EXPECT_GT(refused, 40 / kEvery);
+  EXPECT_GT(refused, 40 / every);
 }
 
 // OpenCASCADE's parser recurses until its stack is full, within malloc at times.

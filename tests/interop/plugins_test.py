@@ -3,18 +3,19 @@
 import os
 import pathlib
 import re
-import shutil
 import sys
 
-from harness import BIN, SOURCE, Skip, body, expect, expect_ok, main, need, need_step, run, write
+from harness import BIN, SOURCE, Skip, body, box, expect, expect_ok, main, need, need_step, run, write
+from screen import screen
 
 PLUGINS = SOURCE / "samples/plugins"
+PATIENCE = 140  # s: other tests run beside these
 # F l^3 / (3 E I) of a bar of 80 x 10 x 10 mm of the library's PLA (3.25 GPa) under 5 N [m]
 SAG = 5 * 0.08**3 / (3 * 3.25e9 * 0.01**4 / 12)
 
 
-def on_path():
-    return dict(os.environ, PATH=f"{BIN}:{os.environ['PATH']}")
+def on_path(**more):
+    return {**os.environ, "PATH": f"{BIN}:{os.environ['PATH']}", **more}
 
 
 def expect_sag(found, where):
@@ -104,10 +105,11 @@ bpy.app.timers.register(begin, first_interval=0.5)
 
 
 def test_blender_window():
-    need("blender", "xvfb-run")
+    need("blender")
     write("drive.py", BLENDER_WINDOW.format(plugins=str(PLUGINS)))
-    said = run("xvfb-run", "-a", "blender", "--factory-startup", "--python", os.path.abspath("drive.py"), timeout=110,
-               env={**on_path(), "LIBGL_ALWAYS_SOFTWARE": "1", "HOME": os.getcwd()})
+    with screen() as shown:
+        said = run("blender", "--factory-startup", "--python", os.path.abspath("drive.py"), timeout=PATIENCE,
+                   env=on_path(HOME=os.getcwd(), **shown))
     text = said.out.decode()
     expect("BEGUN {'RUNNING_MODAL'}" in text and "MOVED 1.0" in text and "FOUND" in text, f"{said}\n{text}")
     expect_sag(float(re.search(r"FOUND (\S+)", text)[1]), "Blender")
@@ -116,7 +118,7 @@ def test_blender_window():
 def test_blender():
     need("blender")
     write("drive.py", BLENDER_BATCH.format(plugins=str(PLUGINS)))
-    said = run("blender", "-b", "--factory-startup", "--python-exit-code", "3", "--python", os.path.abspath("drive.py"), timeout=110, env=on_path())
+    said = run("blender", "-b", "--factory-startup", "--python-exit-code", "3", "--python", os.path.abspath("drive.py"), timeout=PATIENCE, env=on_path())
     text = said.out.decode()
     expect(said.code == 0, f"{said}\n{text}")
     found = [tuple(map(float, line.split()[1:])) for line in text.splitlines() if line.startswith("FOUND")]
@@ -179,19 +181,18 @@ FREECAD_SELECT = """
 """
 
 
-def freecad(rest, *command):
-    need_step()
-    need(*command)
+def freecad(program, rest, **shown):
     write("drive.py", FREECAD.format(macro=str(PLUGINS / "flexel.FCMacro"), rest=rest))
-    options = {"QTWEBENGINE_DISABLE_SANDBOX": "1", "HOME": os.getcwd()}
-    done = run(*(["xvfb-run", "-a"] if command[0] == "xvfb-run" else []), command[-1], "drive.py", timeout=110, env={**on_path(), **options})
+    done = run(program, "drive.py", timeout=PATIENCE, env=on_path(QTWEBENGINE_DISABLE_SANDBOX="1", HOME=os.getcwd(), **shown))
     text = done.out.decode(errors="replace")
     expect("FAILED" not in text and "END" in text, f"{done}\n{text}")
     return text
 
 
 def test_freecad():
-    text = freecad(FREECAD_BEND, "freecadcmd")
+    need_step()
+    need("freecadcmd")
+    text = freecad("freecadcmd", FREECAD_BEND)
     valid, before, after, solids, sag, held = re.search(r"FOUND (\w+) (\d+) (\d+) (\d) (\S+) (\S+)", text).groups()
     expect((valid, before, after, solids) == ("True", "7", "7", "1"), text)
     expect_sag(float(sag), "FreeCAD")
@@ -203,7 +204,10 @@ def test_freecad():
 
 def test_freecad_selection():
     """The macro as its user has it, on a screen that nobody sees."""
-    text = freecad(FREECAD_SELECT, "xvfb-run", "freecad")
+    need_step()
+    need("freecad")
+    with screen() as shown:
+        text = freecad("freecad", FREECAD_SELECT, **shown)
     label, sag = re.search(r"FOUND (.*) (\S+)", text).groups()
     expect(label == "cut, bent", text)
     expect_sag(float(sag), "FreeCAD")
@@ -211,16 +215,17 @@ def test_freecad_selection():
 
 
 def test_paraview():
-    need("pvpython", "xvfb-run")
+    need("pvpython")
     body()
     write("scene.toml", 'material = "steel"\n[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\nforce = ["100 N", "0 N", "0 N"]\n')
     expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "bent.vtu"))
-    show = ["xvfb-run", "-a", "pvpython", str(PLUGINS / "paraview_show.py")]
-    text = expect_ok(run(*show, "bent.vtu", "von_mises", "bent.png", timeout=110)).out.decode()
+    show = ["pvpython", PLUGINS / "paraview_show.py", "bent.vtu"]
+    with screen() as shown:
+        text = expect_ok(run(*show, "von_mises", "bent.png", timeout=PATIENCE, env=on_path(**shown))).out.decode()
+        failed = run(*show, "taste", "bent.png", timeout=PATIENCE, env=on_path(**shown))
     low, high = map(float, re.search(r"von_mises: (\S+) to (\S+)", text).groups())
     expect(0 < low < 1e6 < high, f"100 N on 100 mm2 are 1 MPa: {text}")
     expect(pathlib.Path("bent.png").read_bytes()[:4] == b"\x89PNG", "no picture")
-    failed = run(*show, "bent.vtu", "taste", "bent.png", timeout=110)
     expect(failed.code == 1 and "von_mises" in failed.err, f"{failed}")
 
 
@@ -249,11 +254,9 @@ def test_python_of_the_page():
 
 def test_pyvista():
     python_module("numpy", "meshio", "pyvista")
-    from harness import box
-
     box()
-    prefix = ["xvfb-run", "-a"] if shutil.which("xvfb-run") else []
-    text = expect_ok(run(*prefix, sys.executable, str(PLUGINS / "pyvista_show.py"), "box.stl", "bent.png", timeout=110)).out.decode()
+    with screen() as shown:
+        text = expect_ok(run(sys.executable, PLUGINS / "pyvista_show.py", "box.stl", "bent.png", timeout=PATIENCE, env=on_path(**shown))).out.decode()
     expect(re.search(r"\d+ vertices, \d+ cells, [0-9.]+ mm", text), text)
     expect(pathlib.Path("bent.png").read_bytes()[:4] == b"\x89PNG", "no picture")
 

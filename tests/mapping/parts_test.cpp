@@ -11,6 +11,7 @@
 #include "mapping/methods/map_surface.h"
 #include "mapping/report/report.h"
 #include "motions.h"
+#include "tests/sanitized.h"
 #include "voxelize/voxelize.h"
 
 namespace flexel::mapping {
@@ -20,11 +21,7 @@ using test::silent;
 
 // Sanitizers make all of this twenty times as slow: there the lattice is coarser, and of many polygons only
 // some are mapped.
-#ifdef __SANITIZE_ADDRESS__
-constexpr std::size_t kCells = 300, kMostVertices = 3000;
-#else
-constexpr std::size_t kCells = 1500, kMostVertices = 20'000;
-#endif
+const std::size_t kCells = sanitized() ? 300 : 1500, kMostVertices = sanitized() ? 3000 : 20'000;
 
 const std::filesystem::path kFolder = FLEXEL_PARTS_DIR;
 

@@ -11,6 +11,7 @@
 #include "mapping/map_refined.h"
 #include "mapping/report/chord.h"
 #include "motions.h"
+#include "tests/sanitized.h"
 
 namespace flexel::mapping {
 namespace {
@@ -272,12 +273,7 @@ TEST(Refinement, KeepsNeedlesOnTheirSide) {
       lattice, {0, 0, 0}, {50, 8, 8},
       [&](const Vec3& p) { return p.x() < length && std::hypot(p.y(), p.z()) < radius + 0.02; },
       Placement::corner);
-#ifdef __SANITIZE_ADDRESS__  // minutes otherwise
-  constexpr int kAround = 24;
-#else
-  constexpr int kAround = 100;
-#endif
-  test::add_tube_surface(body, length, radius, 1, kAround);
+  test::add_tube_surface(body, length, radius, 1, less_if_sanitized(100, 24, "24 needles"));
   body.surface_cell_offsets.clear();  // they have cells near their corners only
   body.surface_cells.clear();
   test::deform(body, [](const Vec3& p) -> Vec3 {

@@ -123,6 +123,22 @@ TEST(SpaceMap, FollowsAffineMotionsFarOutToo) {
   }
 }
 
+TEST(SpaceMap, ThePlaceIsThatWithTheGradient) {
+  const Body body = stepped_body();
+  const SpaceMap map(body);
+  SpaceMap::Probe probe(map), other(map);
+  std::mt19937 random(6);
+  std::uniform_real_distribution<double> share(-0.5, 1.5);
+  for (int trial = 0; trial < 1000; ++trial) {
+    const Vec3 x =
+        body.parts[0].lattice.to_world(Vec3(12 * share(random), 8 * share(random), 6 * share(random)));
+    const SpaceMap::Value a = probe.at(x, 0), b = other.place(x, 0);
+    EXPECT_EQ(a.position, b.position);
+    EXPECT_EQ(a.heard, b.heard);
+    EXPECT_EQ(a.weight, b.weight);
+  }
+}
+
 TEST(SpaceMap, RefusesAPartWithoutElements) {
   Body body = test::block(2, 2, 2, 0.1, Placement::corner);
   body.parts.push_back(body.parts[0]);

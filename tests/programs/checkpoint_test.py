@@ -129,6 +129,11 @@ def test_implicit_steps():
     stop_and_go("implicit")
 
 
+def test_implicit_contact():
+    MODELS["implicit_contact"] = MODELS["contact"] + 'method = "implicit"\nstep = "0.1 ms"\n'
+    stop_and_go("implicit_contact")
+
+
 def start_one():
     body()
     scene(text=MODELS["cells"])

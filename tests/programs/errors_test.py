@@ -45,6 +45,19 @@ def test_missing_file():
     voxelize_refuses("absent.stl", "absent.stl", "no such file")
 
 
+def test_a_file_that_cannot_be_read_is_told_of_before_what_the_options_lack():
+    write("cut.stl", binary_stl(box_triangles())[:-70])
+    box()
+    for command in (("deform",), ("deform", "-o", "bent.stl"), ("export", "--calculix", "-o", "deck.inp"), ("study", "-o", "folder"), ("compensate", "-o", "made.stl")):
+        expect_error(run("flexel", command[0], "absent.stl", *command[1:]), "flexel", "absent.stl", "no such file")
+        if command[0] != "study":
+            expect_error(run("flexel", command[0], "box.stl", "absent.stl", *command[1:]), "flexel", "absent.stl", "no such file")
+        expect_error(run("flexel", command[0], "cut.stl", *command[1:]), "flexel", "cut.stl", "cut off")
+    expect_error(run("flexel", "compare", "box.stl", "cut.stl"), "flexel", "cut.stl", "cut off")
+    expect_error(run("flexel", "deform", "box.stl", "-o", "bent.stl"), "flexel", "nothing acts on the part")
+    expect_error(run("flexel", "deform", "cut.stl", "-o", "bent.stl", "--push", "xmax: 1 N", "--material", "PLAA"), "flexel", "cut off")
+
+
 def test_unknown_format():
     voxelize_refuses(write("part.xyz", b"\x00\x01 neither this nor that\n"), "part.xyz")
 

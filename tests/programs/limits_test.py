@@ -89,6 +89,23 @@ def peak(command):
     return process.returncode, 1024 * usage.ru_maxrss, said
 
 
+def test_what_a_run_takes_is_told_before_it():
+    box()
+    expect_ok(run("flexel-voxelize", "box.stl", "--size", "0.8 mm", "--align", "none", "--moments", "-o", "body.vtu"))
+    held = SCENE[:SCENE.index("[[load]]")]
+    for name, text in (("cells", SCENE), ("springs", 'model = "springs"\n' + SCENE), ("quadratic", 'model = "quadratic"\n' + SCENE),
+                       ("in time", SCENE + '[run]\ntime = "0.1 us"\n'), ("modes", held + "[run]\nmodes = 8\n")):
+        write("scene.toml", text)
+        command = ["flexel-simulate", "scene.toml", "body.vtu", "-o", "bent.vtu"]
+        ended, most, said = peak([*command, "--explain"])
+        told = re.search(r"memory: about ([\d.]+) MB", said)
+        expect(ended == 0 and told, f"{name}: exit {ended}: {said}")
+        expect(1 / 1.3 < 1e6 * float(told[1]) / most < 1.3, f"{name}: {told[0]}, and it took {most / 1e6:.1f} MB")
+        write("old.vtu", "old")
+        expect_error(run(*command[:-1], "old.vtu", "--max-memory", f"{float(told[1]) / 1.4:.1f}MB"), "flexel-simulate", "needs about", "--max-memory")
+        expect(open("old.vtu").read() == "old", "the old result is gone")
+
+
 def test_memory_is_kept():
     """A limit below what the work takes ends it with a line, and the program has not had more than that and its own code."""
     box()

@@ -58,10 +58,18 @@ def first_frame(live):
 
 
 def test_poses_lead_as_a_path_does():
-    prepare()
+    poses_lead_as_a_path_does("")
+
+
+def test_poses_lead_as_a_path_does_in_implicit_steps():
+    poses_lead_as_a_path_does('method = "implicit"\nstep = "2 ms"\n')
+
+
+def poses_lead_as_a_path_does(method):
+    prepare(PAT + method)
     done = expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "poses.vtu", "--history", "poses.csv", "--verbose", stdin=LINES))
     expect("live: 3 pose(s)" in done.err, f"the summary should count the poses: {done.err}")
-    scene("keys.toml", PAT.replace('path = "stdin"', KEYED).replace("TIME", "50 ms"))
+    scene("keys.toml", (PAT + method).replace('path = "stdin"', KEYED).replace("TIME", "50 ms"))
     expect_ok(run("flexel-simulate", "keys.toml", "body.vtu", "-o", "keys.vtu", "--history", "keys.csv"))
     for kind in ("vtu", "csv"):
         expect(open(f"poses.{kind}", "rb").read() == open(f"keys.{kind}", "rb").read(), f"the same path should give the same .{kind}")

@@ -21,7 +21,7 @@ simulate/laws simulate/input simulate/result simulate/linear simulate/state simu
 simulate/kernels simulate/matter simulate/gravitation simulate/contact/points simulate/contact/pairs simulate/contact simulate/followers simulate/effects simulate/thermal simulate/paper simulate/events simulate/scene
 simulate/equilibrium simulate/estimate simulate/probes simulate/quadratic/cells simulate/quadratic simulate/conduction simulate/live simulate/stepping simulate/implicit simulate/time simulate/modes simulate
 mapping/types mapping/anchors mapping/checks mapping/methods mapping/space mapping/crack mapping/report mapping/refine mapping
-cad/read cad/deform cad
+cad/read cad/fit cad/deform cad
 flexel/process flexel/picture/canvas flexel/picture/render flexel/picture flexel/view flexel/clay flexel/study/runs flexel/study flexel/export
 flexel/measure flexel/accuracy flexel/compensate flexel/flex flexel
 python
@@ -116,7 +116,8 @@ def blocks(lines, indent):
         line = lines[i]
         if line.startswith(pad) and len(line) > indent and line[indent] not in " }/#":
             j = i
-            while j < len(lines) and not lines[j].rstrip().endswith(("{", ";")):
+            # a function of one line ends in "}"
+            while j < len(lines) and not lines[j].rstrip().endswith(("{", ";", "}")):
                 j += 1
             if j < len(lines) and lines[j].rstrip().endswith("{"):
                 k = j + 1

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "base/parallel.h"
+#include "simulate/linear/direct.h"
 #include "tests/simulate/voxel_problem.h"
 
 namespace flexel::simulate::test {
@@ -300,6 +301,25 @@ TEST(Multigrid, AnElementWithoutStiffnessDoesNoHarm) {
     }
   }
   EXPECT_LT(iterations(problem), 25);
+}
+
+// Each of n blocks is coupled with all others: its column has as many as are left.
+TEST(FactorOperations, OfAFullMatrixAndOfADiagonalOne) {
+  constexpr std::uint32_t kRows = 12;
+  BlockMatrix full, diagonal;
+  full.row_offsets = diagonal.row_offsets = {0};
+  double squares = 0;
+  for (std::uint32_t row = 0; row < kRows; ++row) {
+    for (std::uint32_t column = 0; column < kRows; ++column) full.columns.push_back(column);
+    diagonal.columns.push_back(row);
+    full.row_offsets.push_back(full.columns.size());
+    diagonal.row_offsets.push_back(diagonal.columns.size());
+    squares += row * row;
+  }
+  full.values.assign(full.columns.size(), Block::Identity());
+  diagonal.values.assign(kRows, Block::Identity());
+  EXPECT_EQ(factor_operations(StoredMatrix(full)), 13.5 * squares);
+  EXPECT_EQ(factor_operations(StoredMatrix(diagonal)), 0);
 }
 
 }  // namespace

@@ -2,6 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <cstring>
+#include <mutex>
 #include <random>
 
 #include "simulate/quadratic/cells/cell_products.h"
@@ -175,13 +178,14 @@ struct Tables {
   const char* name;
   InstructionSet set;
   const quadratic_kernel::Table& (*table)();
+  const quadratic_kernel::MatrixTable& (*matrices)();
 };
 const std::vector<Tables>& tables() {
   static const std::vector<Tables> all = {
-    {"portable", InstructionSet::portable, &quadratic_kernel::portable},
+    {"portable", InstructionSet::portable, &quadratic_kernel::portable, &quadratic_kernel::matrices_portable},
 #if defined(__x86_64__)
-    {"avx2", InstructionSet::avx2, &quadratic_kernel::avx2},
-    {"avx512", InstructionSet::avx512, &quadratic_kernel::avx512},
+    {"avx2", InstructionSet::avx2, &quadratic_kernel::avx2, &quadratic_kernel::matrices_avx2},
+    {"avx512", InstructionSet::avx512, &quadratic_kernel::avx512, &quadratic_kernel::matrices_avx512},
 #endif
   };
   return all;
@@ -252,6 +256,108 @@ TEST(QuadraticKernels, TheSquareOfATriangle) {
               1e-6 * wanted.norm());
     if (first.empty()) first = y;
     EXPECT_EQ(first, y) << each.name;
+  }
+}
+
+// Of each cell as forces() takes it, and of the trilinear field over its corners.
+TEST(QuadraticProducts, MatricesOfNodesAndCorners) {
+  std::mt19937 random(11);
+  const Lump lump(true, random);
+  for (const bool turned : {false, true}) {
+    const CellProducts<double> products = lump.products(turned);
+    std::vector<std::uint8_t> seen(lump.nodes.cells.size(), 0);
+    const std::vector<std::uint32_t> twins = products.twins();
+    std::mutex one_at_a_time;
+    products.matrices([&](std::uint32_t c, const CellBlocks& blocks) {
+      const std::lock_guard lock(one_at_a_time);
+      seen[c] = 1;
+      const CellMatrix matrix = lump.reference(c, turned);
+      const CornerMatrix corners = corners_of(matrix);
+      for (std::size_t a = 0; a < kQuadraticNodes; ++a)
+        for (std::size_t b = 0; b <= a; ++b)
+          for (std::size_t i = 0; i < 9; ++i) {
+            const auto row = static_cast<Eigen::Index>(3 * a + i / 3),
+                       column = static_cast<Eigen::Index>(3 * b + i % 3);
+            const std::size_t place = quadratic_kernel::block_place(a, b) + i;
+            EXPECT_NEAR(blocks.nodes[place], matrix(row, column), 1e-13 * matrix.norm()) << c;
+            if (a < 8) {
+              EXPECT_NEAR(blocks.corners[place], corners(row, column), 1e-13 * corners.norm()) << c;
+            }
+          }
+    });
+    for (std::size_t c = 0; c < seen.size(); ++c) EXPECT_EQ(seen[c], twins[c] == c ? 1 : 0) << c;
+  }
+}
+
+TEST(QuadraticKernels, MatricesHaveTheSameBitsOnAllInstructionSets) {
+  std::mt19937 random(12);
+  const auto moments = any_numbers<double>(kMoments * kWidth, random);
+  for (const bool isotropic : {true, false}) {
+    Elasticity<double> part{{2, 3, 1}, {}, isotropic};
+    const auto moduli = any_numbers<double>(36, random);
+    std::copy(moduli.begin(), moduli.end(), part.moduli);
+    std::vector<double> first_nodes, first_corners;
+    for (const Tables& each : tables()) {
+      if (!runs(each.set)) continue;
+      std::vector<double> nodes(quadratic_kernel::kNodeMatrix * kWidth),
+          corners(quadratic_kernel::kCornerMatrix * kWidth);
+      each.matrices().matrices(moments.data(), part, nodes.data(), corners.data());
+      if (first_nodes.empty()) {
+        first_nodes = nodes;
+        first_corners = corners;
+      }
+      EXPECT_EQ(nodes, first_nodes) << each.name;
+      EXPECT_EQ(corners, first_corners) << each.name;
+    }
+  }
+}
+
+Eigen::MatrixXd written_out(const quadratic_kernel::Triangle& triangle) {
+  Eigen::MatrixXd full = Eigen::MatrixXd::Zero(81, 81);
+  const std::int16_t* steps = triangle.steps;
+  for (Eigen::Index r = 0; r < 81; ++r) {
+    for (Eigen::Index j = 0; j <= r; ++j)
+      full(r, j) = static_cast<double>(triangle.step[r]) * steps[j] * static_cast<double>(triangle.scale[j]);
+    steps += quadratic_kernel::group_columns(static_cast<std::size_t>(r) / quadratic_kernel::kRows);
+  }
+  return full;
+}
+
+// Five matrices; the third of them is not positive.
+TEST(QuadraticKernels, InverseFactors) {
+  constexpr std::size_t kCount = 5, kBad = 2;
+  std::vector<Eigen::MatrixXd> wanted;
+  std::vector<double> lower(quadratic_kernel::kFactorSize * kWidth, 0);
+  for (std::size_t lane = 0; lane < kCount; ++lane) {
+    const Eigen::MatrixXd half = Eigen::MatrixXd::Random(81, 81),
+                          scale = Eigen::VectorXd::LinSpaced(81, 1, 1e6).asDiagonal();
+    Eigen::MatrixXd matrix = scale * (half * half.transpose() + Eigen::MatrixXd::Identity(81, 81)) * scale;
+    if (lane == kBad) matrix(40, 40) = -1;
+    wanted.push_back(matrix);
+    for (std::size_t r = 0; r < 81; ++r)
+      for (std::size_t c = 0; c <= r; ++c)
+        lower[kWidth * (quadratic_kernel::row_place(r) + c) + lane] =
+            matrix(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c));
+  }
+  std::vector<quadratic_kernel::Triangle> first;
+  for (const Tables& each : tables()) {
+    if (!runs(each.set)) continue;
+    std::vector<double> lost = lower;
+    std::vector<quadratic_kernel::Triangle> found(kCount);
+    const unsigned failed = each.matrices().invert_factors(lost.data(), 0, kCount, found.data());
+    EXPECT_EQ(failed & ((1u << kCount) - 1), 1u << kBad);
+    for (std::size_t lane = 0; lane < kCount; ++lane) {
+      if (lane == kBad) {
+        EXPECT_EQ(found[lane].step[0], 0);
+        continue;
+      }
+      const Eigen::MatrixXd t = written_out(found[lane]),
+                            scale = wanted[lane].diagonal().cwiseSqrt().asDiagonal();
+      const Eigen::MatrixXd unit = scale.inverse() * wanted[lane] * t.transpose() * t * scale;
+      EXPECT_LT((unit - Eigen::MatrixXd::Identity(81, 81)).norm(), 0.05) << each.name;
+    }
+    if (first.empty()) first = found;
+    EXPECT_EQ(std::memcmp(first.data(), found.data(), kCount * sizeof(first[0])), 0) << each.name;
   }
 }
 

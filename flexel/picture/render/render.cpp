@@ -200,23 +200,31 @@ Tracer make_tracer(const Drawable& drawn) {
 }
 
 void render(Image& image, const Viewport& viewport, const Camera& camera, const Drawable& drawn,
-            const Tracer& tracer, const ShadeOptions& options) {
+            const Tracer& tracer, const ShadeOptions& options, const std::function<void(double)>& progress) {
+  constexpr double kLit = 0.3, kShaded = 0.35;  // shares of the time; edges take the rest
+  constexpr std::size_t kBands = 10;
   const Scene scene{viewport, camera, drawn, tracer, options};
   const PixelBuffer buffer = trace_pixels(scene);
   const std::vector<Light> light =
       smooth_light(trace_light(buffer, viewport, camera, drawn, tracer), buffer, camera);
+  progress(kLit);
   const std::vector<Colour> colours = shade_pixels(scene, image, buffer, light);
-  parallel_for_each(
-      static_cast<std::size_t>(buffer.height),
-      [&](std::size_t row) {
-        const int y = static_cast<int>(row);
-        for (int x = 0; x < buffer.width; ++x) {
-          Colour& pixel = image.pixels[image.index(viewport.x + x, viewport.y + y)];
-          pixel = stands_out(buffer, colours, x, y) ? fine_colour(scene, buffer, light, pixel, x, y)
-                                                    : colours[buffer.index(x, y)];
-        }
-      },
-      4);
+  const auto rows = static_cast<std::size_t>(buffer.height);
+  for (std::size_t band = 0; band < kBands; ++band) {
+    progress(kShaded + (1 - kShaded) * static_cast<double>(band) / kBands);
+    const std::size_t begin = rows * band / kBands, end = rows * (band + 1) / kBands;
+    parallel_for_each(
+        end - begin,
+        [&](std::size_t row) {
+          const int y = static_cast<int>(begin + row);
+          for (int x = 0; x < buffer.width; ++x) {
+            Colour& pixel = image.pixels[image.index(viewport.x + x, viewport.y + y)];
+            pixel = stands_out(buffer, colours, x, y) ? fine_colour(scene, buffer, light, pixel, x, y)
+                                                      : colours[buffer.index(x, y)];
+          }
+        },
+        4);
+  }
 }
 
 }  // namespace flexel::picture

@@ -7,7 +7,9 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr double kSkin = 0.4;     // margin, of the widest spacing
+constexpr double kSkin = 0.4;  // margin, of the widest spacing
+constexpr double kSlack =
+    0.45;  // of the margin; not quite half: weights outside [0, 1] carry a point further
 constexpr double kTurning = 0.4;  // by which the cosine between normals may change meanwhile
 
 // m, at most, between positions of two points that touch.
@@ -25,18 +27,36 @@ PairList::PairList(const ContactSettings& settings, const Problem& problem, cons
       materials_(settings, problem, surface),
       excluded_(settings, problem, surface),
       surface_runs_(element_runs(surface.elements(), surface.body().parts)),
-      built_at_(surface.elements().size()) {}
+      built_at_(surface.elements().size()),
+      skin_(kSkin * surface.widest()) {}
 
 bool PairList::update(const State& state, bool ahead) {
   if (!is_due(state, ahead)) return false;
+  skin_ = kSkin * surface_.widest();
   build(state);
   return true;
+}
+
+bool PairList::update_ahead(const State& before, double way) {
+  constexpr double kRoom = 1.5;
+  if (!is_due(before, false, kRoom * way)) return false;
+  skin_ = std::max(kSkin * surface_.widest(), 0.5 * kRoom / kSlack * way);
+  build(before);
+  return true;
+}
+
+double PairList::way(const State& before, const State& aimed) const {
+  Box moves;
+  for (const std::uint32_t e : surface_.elements()) moves.add(aimed.displacement[e] - before.displacement[e]);
+  if (moves.empty()) return 0;
+  if (!settings_.planes.empty()) moves.add(Vec3::Zero());
+  return moves.diagonal();
 }
 
 // Half the diagonal of the box of the moves since the list was made bounds them but for a common one. The next
 // step's are in their box widened by that of the velocities: the length of a step is chosen before it leads to
 // an impact.
-bool PairList::is_due(const State& state, bool ahead) {
+bool PairList::is_due(const State& state, bool ahead, double way) {
   constexpr std::size_t kGrain = 1024;
   boxes_.assign((surface_runs_.size() + kGrain - 1) / kGrain, {});
   parallel_chunks(surface_runs_.size(), kGrain, [&](std::size_t begin, std::size_t end) {
@@ -59,7 +79,12 @@ bool PairList::is_due(const State& state, bool ahead) {
     moves.add(moves.max + state.kick * speeds.max);
   }
   if (!settings_.planes.empty()) moves.add(Vec3::Zero());
-  return !built_ || 0.5 * moves.diagonal() > slack_ || surface_.broken_cells() != built_with_;
+  return !built_ || 0.5 * (moves.diagonal() + way) > slack_ || surface_.broken_cells() != built_with_;
+}
+
+// By as much more as the margin is wider.
+double PairList::turning() const {
+  return kTurning * skin_ / (kSkin * surface_.widest());
 }
 
 void PairList::rebuild_at(const std::vector<Vec3>* displacements) {
@@ -88,7 +113,7 @@ void PairList::build(const State& state) {
         normals[i] = side.normal;
       },
       256);
-  slack_ = 0.45 * kSkin * surface_.widest();  // not quite half: weights outside [0, 1] carry a point further
+  slack_ = kSlack * skin_;
   pairs_.clear();
   add_pairs(positions, normals);
   add_plane_pairs(positions, normals);
@@ -102,7 +127,6 @@ void PairList::build(const State& state) {
 std::vector<std::uint32_t> PairList::points_of_near_parts(const std::vector<Vec3>& positions,
                                                           double farthest) {
   const std::vector<ContactPoint>& points = surface_.points();
-  const double skin = kSkin * surface_.widest();
   std::vector<Box> box(surface_.body().parts.size());
   for (std::size_t i = 0; i < points.size(); ++i) box[points[i].part].add(positions[i]);
   std::vector<std::uint8_t> near(box.size(), 0);
@@ -112,7 +136,7 @@ std::vector<std::uint32_t> PairList::points_of_near_parts(const std::vector<Vec3
     for (std::size_t b = a + 1; b < box.size(); ++b) {
       if (box[a].empty() || box[b].empty()) continue;
       const Vec3 apart = (box[a].min - box[b].max).cwiseMax(box[b].min - box[a].max).cwiseMax(0);
-      if (apart.norm() < farthest + skin)
+      if (apart.norm() < farthest + skin_)
         near[a] = near[b] = 1;
       else
         nearest = std::min(nearest, apart.norm() - farthest);
@@ -120,7 +144,7 @@ std::vector<std::uint32_t> PairList::points_of_near_parts(const std::vector<Vec3
   std::vector<std::uint32_t> result;
   for (std::uint32_t i = 0; i < points.size(); ++i)
     if (near[points[i].part]) result.push_back(i);
-  if (result.empty() && settings_.planes.empty() && nearest > skin) slack_ = 0.45 * nearest;
+  if (result.empty() && settings_.planes.empty() && nearest > skin_) slack_ = kSlack * nearest;
   return result;
 }
 
@@ -130,10 +154,10 @@ bool PairList::may_touch(std::uint32_t i, std::uint32_t j, const std::vector<Vec
   if (a.part == b.part && (!settings_.self || surface_.rigid(a.part))) return false;
   if (surface_.prescribed(a.part) && surface_.prescribed(b.part)) return false;
   if (a.shape == ContactShape::edge && b.shape == ContactShape::edge) return false;
-  const double near = touching_distance(a, b) + kSkin * surface_.widest();
+  const double near = touching_distance(a, b) + skin_;
   if ((positions[j] - positions[i]).squaredNorm() > near * near) return false;
   const bool faces = normals[i] != Vec3::Zero() && normals[j] != Vec3::Zero();
-  if (faces && -normals[i].dot(normals[j]) < std::min(a.facing_from, b.facing_from) - kTurning) return false;
+  if (faces && -normals[i].dot(normals[j]) < std::min(a.facing_from, b.facing_from) - turning()) return false;
   return !excluded_.contains(i, j);
 }
 
@@ -147,10 +171,9 @@ void PairList::add_pairs(const std::vector<Vec3>& positions, const std::vector<V
   std::vector<Vec3> at;
   at.reserve(in_grid.size());
   for (const std::uint32_t i : in_grid) at.push_back(positions[i]);
-  const Neighbours found =
-      neighbours_within(at, farthest + kSkin * widest, [&](std::uint32_t a, std::uint32_t b) {
-        return may_touch(in_grid[a], in_grid[b], positions, normals);
-      });
+  const Neighbours found = neighbours_within(at, farthest + skin_, [&](std::uint32_t a, std::uint32_t b) {
+    return may_touch(in_grid[a], in_grid[b], positions, normals);
+  });
   for (std::uint32_t a = 0; a < in_grid.size(); ++a)
     for (const std::uint32_t b : found.of(a)) {
       const std::uint32_t i = in_grid[a], j = in_grid[b];
@@ -160,13 +183,12 @@ void PairList::add_pairs(const std::vector<Vec3>& positions, const std::vector<V
 
 void PairList::add_plane_pairs(const std::vector<Vec3>& positions, const std::vector<Vec3>& normals) {
   const std::vector<ContactPoint>& points = surface_.points();
-  const double skin = kSkin * surface_.widest();
   for (std::uint32_t p = 0; p < settings_.planes.size(); ++p) {
     const ContactPlane& plane = settings_.planes[p];
     for (std::uint32_t i = 0; i < points.size(); ++i) {
       if (surface_.prescribed(points[i].part)) continue;
-      if ((positions[i] - plane.point).dot(plane.normal) - points[i].radius > skin) continue;
-      if (normals[i] != Vec3::Zero() && -normals[i].dot(plane.normal) < points[i].facing_from - kTurning)
+      if ((positions[i] - plane.point).dot(plane.normal) - points[i].radius > skin_) continue;
+      if (normals[i] != Vec3::Zero() && -normals[i].dot(plane.normal) < points[i].facing_from - turning())
         continue;
       pairs_.push_back({i, ContactPair::kOfPlane, p, std::uint64_t{i} << 32 | (points.size() + p),
                         materials_.against_plane(i, plane)});

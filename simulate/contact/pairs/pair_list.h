@@ -27,6 +27,12 @@ class PairList {
   // Finds the pairs anew where that is due; `ahead`: also where the way of the next step may make it so.
   // Returns whether it was.
   bool update(const State& state, bool ahead);
+  // Likewise for an implicit step, which would lead from `before` to `aimed` without forces: the list has room for
+  // half more. `way` [m]: how far the surfaces go against one another in it, at most.
+  bool update_ahead(const State& before, double way);
+  [[nodiscard]] double way(const State& before, const State& aimed) const;
+  // Whether other pairs may touch than those of the list.
+  [[nodiscard]] bool outgrown(const State& state) { return is_due(state, false); }
   // m/s, velocities of the elements when update() was asked ahead last.
   [[nodiscard]] const Box& speeds() const { return speeds_; }
 
@@ -48,8 +54,9 @@ class PairList {
   void rebuild_at(const std::vector<Vec3>* displacements);
 
  private:
-  [[nodiscard]] bool is_due(const State& state, bool ahead);
+  [[nodiscard]] bool is_due(const State& state, bool ahead, double way = 0);
   void build(const State& state);
+  [[nodiscard]] double turning() const;
   [[nodiscard]] std::vector<std::uint32_t> points_of_near_parts(const std::vector<Vec3>& positions,
                                                                 double farthest);
   [[nodiscard]] bool may_touch(std::uint32_t i, std::uint32_t j, const std::vector<Vec3>& positions,
@@ -69,6 +76,7 @@ class PairList {
   std::vector<std::array<WideBox, 2>> boxes_;  // of is_due()
   bool built_ = false;
   std::size_t built_with_ = 0;  // broken cells
+  double skin_;                 // m, margin
   double slack_ = 0;            // m, that elements may move before other pairs can touch
   std::uint64_t builds_ = 0;
   Box speeds_;

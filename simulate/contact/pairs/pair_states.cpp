@@ -181,6 +181,7 @@ std::vector<std::uint8_t> PairStates::evaluate_pairs() {
         const PairProximity proximity = pair_proximity(pairs[p], record);
         const bool sleeps = schedule_.sleep(p, proximity.safe);
         if (!proximity.near || (sleeps && !evaluated_all_)) {
+          if (frozen_) return;
           record.phase = proximity.near ? PairPhase::approaching : PairPhase::separated;
           record.soft = 0;
           return;
@@ -228,10 +229,14 @@ void PairStates::find_initial_penetrations(const State& state) {
 }
 
 void PairStates::set(std::size_t pair, PairState now) {
-  update_phase(list_.pairs()[pair], now, memory_[pair].phase);
+  PairPhase phase = memory_[pair].phase;
+  const bool passed = frozen_ && now.near && now.deep && phase == PairPhase::approaching;
+  if (!passed) update_phase(list_.pairs()[pair], now, phase);
   states_[pair] = now;
-  if (!now.near) memory_[pair].soft = 0;
   is_active_[pair] = now.near;
+  if (frozen_) return;
+  memory_[pair].phase = phase;
+  if (!now.near) memory_[pair].soft = 0;
 }
 
 // The phase after the state `now`; a penetrated pair has none.

@@ -20,6 +20,14 @@ class PairStates {
   // ask for the same state several times. Those that cannot touch are left out (PairSchedule), unless `all`.
   void update(const State& state, bool all = false);
 
+  // Until thaw() evaluations are of trials within an implicit step: phases stay what they are, and a pair that
+  // was pressed stays active beyond its limit, as `deep`.
+  void freeze() { frozen_ = true; }
+  void thaw() {
+    frozen_ = false;
+    evaluated_builds_ = 0;  // the trial that was last evaluated counts from now on
+  }
+
   // After a step of `drift` s that led to `state`, which is evaluated: how softly pairs begin to press. What
   // this changes is evaluated again: the states are those that a run which goes on from here would find.
   void finish_step(const State& state, double drift);
@@ -84,7 +92,7 @@ class PairStates {
   std::vector<BodyMotion> motions_;
   std::vector<double> lost_;  // (active_) J, of finish_step()
   std::uint64_t evaluated_builds_ = 0, evaluations_ = 0;
-  bool evaluated_all_ = false;
+  bool evaluated_all_ = false, frozen_ = false;
   double hardened_ = 0;  // J
 };
 

@@ -66,7 +66,24 @@ void put_rotation(const Mat3& rotation, std::size_t lane, Number* to) {
       to[kWidth * static_cast<std::size_t>(3 * i + j) + lane] = static_cast<Number>(rotation(i, j));
 }
 
+using Columns = std::array<Mat3, kQuadraticNodes>;  // of CellTurn
+
+void add_lower(const auto& matrix, std::size_t nodes, double* blocks) {
+  for (Eigen::Index a = 0; a < static_cast<Eigen::Index>(3 * nodes); a += 3)
+    for (Eigen::Index b = 0; b <= a; b += 3)
+      for (Eigen::Index i = 0; i < 9; ++i) *blocks++ += matrix(a + i / 3, b + i % 3);
+}
+
 }  // namespace
+
+CornerMatrix corners_of(const CellMatrix& matrix) {
+  Eigen::Matrix<double, kCellUnknowns, 24> embedding = Eigen::Matrix<double, kCellUnknowns, 24>::Zero();
+  for (std::size_t n = 0; n < kQuadraticNodes; ++n)
+    for (std::size_t a = 0; a < 8; ++a)
+      embedding.block<3, 3>(static_cast<Eigen::Index>(3 * n), static_cast<Eigen::Index>(3 * a)) =
+          trilinear_weight(n, a) * Mat3::Identity();
+  return embedding.transpose() * matrix * embedding;
+}
 
 CellCouplings::CellCouplings(std::vector<std::array<std::uint32_t, 2>> pairs_of_cells, std::size_t cell_count)
     : pairs(std::move(pairs_of_cells)), cross(pairs.size()), offsets{0}, place(cell_count, -1) {
@@ -293,42 +310,23 @@ void CellProducts<Number>::forces(const double* x, double* y) const {
       kNodesAtATime);
 }
 
+// All lanes are one cell.
 template <class Number>
-void CellProducts<Number>::multiply_one(std::size_t cell, bool turned, const CellColumns& x,
-                                        CellColumns& product) const {
-  const std::size_t e = place_[cell] / kWidth, lane = place_[cell] % kWidth;
-  const Eight& eight = eights_[e];
+void CellProducts<Number>::elastic_forces(std::size_t cell, const CellColumns& x,
+                                          CellColumns& product) const {
+  const Eight& eight = eights_[place_[cell] / kWidth];
   const Part& part = parts_[eight.part];
-  const auto everywhere = [&](const Number* from, std::size_t count) {
-    std::vector<Number> to(count * kWidth);
-    for (std::size_t i = 0; i < count; ++i)
-      std::fill_n(to.begin() + static_cast<std::ptrdiff_t>(kWidth * i), kWidth, from[kWidth * i + lane]);
-    return to;
-  };
-  const std::vector<Number> moments =
-      everywhere(&moments_[eight.moments], eight.whole ? kWholeMoments : kMoments);
-  std::vector<Number> rotation, a, gamma;
-  quadratic_kernel::EightCells<Number> cells{moments.data(), nullptr, nullptr, nullptr};
-  if (turned && !rotation_.empty()) {
-    rotation = everywhere(&rotation_[e * 9 * kWidth], 9);
-    a = everywhere(&a_[e * kTurnNumbers * kWidth], kTurnNumbers);
-    gamma = everywhere(&gamma_[e * kTurnNumbers * kWidth], kTurnNumbers);
-    cells = {moments.data(), rotation.data(), a.data(), gamma.data()};
-  } else if (!part.along_world) {
-    cells.rotation = &first_rotation_[eight.part * 9 * kWidth];
-  }
-  alignas(64) Number values[kCellUnknowns * kWidth];
+  alignas(64) Number moments[kMoments * kWidth], values[kCellUnknowns * kWidth];
+  const Number* own = &moments_[eight.moments + place_[cell] % kWidth];
+  for (std::size_t k = 0; k < (eight.whole ? kWholeMoments : kMoments); ++k)
+    std::fill_n(moments + kWidth * k, kWidth, own[kWidth * k]);
+  quadratic_kernel::EightCells<Number> cells{moments, nullptr, nullptr, nullptr};
+  if (!part.along_world) cells.rotation = &first_rotation_[eight.part * 9 * kWidth];
   for (Eigen::Index i = 0; i < kCellUnknowns; ++i)
     for (Eigen::Index c = 0; c < 8; ++c) values[8 * i + c] = static_cast<Number>(x(i, c));
   run_kernel(eight.whole, cells, part.elasticity, values);
   for (Eigen::Index i = 0; i < kCellUnknowns; ++i)
     for (Eigen::Index c = 0; c < 8; ++c) product(i, c) = static_cast<double>(values[8 * i + c]);
-}
-
-template <class Number>
-void CellProducts<Number>::elastic_forces(std::size_t cell, const CellColumns& x,
-                                          CellColumns& product) const {
-  multiply_one(cell, false, x, product);
 }
 
 template <class Number>
@@ -345,27 +343,107 @@ CellMatrix CellProducts<Number>::support(std::size_t cell) const {
 }
 
 template <class Number>
-CellColumns CellProducts<Number>::multiply(std::size_t cell, const CellColumns& x) const {
-  CellColumns product;
-  multiply_one(cell, true, x, product);
-  if (is_supported(cell)) product += support(cell) * x;
-  return product;
+void CellProducts<Number>::first_matrices(
+    const Eight& eight, std::vector<double>& nodes,
+    std::vector<double>& corners) const requires std::same_as<Number, double> {
+  static const std::vector<double> whole = [] {
+    std::vector<double> made;
+    for (const double weight : whole_moments()) made.insert(made.end(), kWidth, weight);
+    return made;
+  }();
+  nodes.resize(quadratic_kernel::kNodeMatrix * kWidth);
+  corners.resize(quadratic_kernel::kCornerMatrix * kWidth);
+  quadratic_kernel::best_matrices().matrices(eight.whole ? whole.data() : &moments_[eight.moments],
+                                             parts_[eight.part].elasticity, nodes.data(), corners.data());
 }
 
 template <class Number>
-CellMatrix CellProducts<Number>::matrix(std::size_t cell) const {
-  CellMatrix made;
-  CellColumns unit, column;
-  for (Eigen::Index first = 0; first < kCellUnknowns; first += 8) {
-    const Eigen::Index count = std::min<Eigen::Index>(8, kCellUnknowns - first);
-    unit.setZero();
-    for (Eigen::Index c = 0; c < count; ++c) unit(first + c, c) = 1;
-    multiply_one(cell, true, unit, column);
-    made.middleCols(first, count) = column.leftCols(count);
+void CellProducts<Number>::turn_blocks(std::size_t cell,
+                                       CellBlocks& blocks) const requires std::same_as<Number, double> {
+  const Part& part = parts_[eights_[place_[cell] / kWidth].part];
+  const Mat3 rotation = turned_.empty() ? part.axes : Mat3(turned_[cell] * part.axes);
+  const auto turn = [&](std::size_t count, const Columns& a, const Columns& gamma, double* block) {
+    for (std::size_t p = 0; p < count; ++p)
+      for (std::size_t q = 0; q <= p; ++q, block += 9) {
+        Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> own(block);
+        Mat3 sum = own;
+        if (!rotation_.empty()) sum += a[p] * gamma[q].transpose() + gamma[p] * a[q].transpose();
+        own = rotation * sum * rotation.transpose();
+      }
+  };
+  Columns a{}, gamma{}, corner_a{}, corner_gamma{};
+  if (!rotation_.empty()) {
+    const std::size_t first = place_[cell] / kWidth * kTurnNumbers * kWidth + place_[cell] % kWidth;
+    corner_a.fill(Mat3::Zero());
+    corner_gamma.fill(Mat3::Zero());
+    for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
+      for (std::size_t i = 0; i < 9; ++i) {
+        const std::size_t at = first + kWidth * (9 * n + i);
+        const auto row = static_cast<Eigen::Index>(i / 3), column = static_cast<Eigen::Index>(i % 3);
+        a[n](row, column) = a_[at];
+        gamma[n](row, column) = gamma_[at];
+      }
+      for (std::size_t corner = 0; corner < 8; ++corner) {
+        corner_a[corner] += trilinear_weight(n, corner) * a[n];
+        corner_gamma[corner] += trilinear_weight(n, corner) * gamma[n];
+      }
+    }
   }
-  made = (0.5 * (made + made.transpose())).eval();  // rounding alone makes it uneven
-  if (is_supported(cell)) made += support(cell);
-  return made;
+  if (!rotation_.empty() || !part.along_world) {
+    turn(kQuadraticNodes, a, gamma, blocks.nodes.data());
+    turn(8, corner_a, corner_gamma, blocks.corners.data());
+  }
+  if (!is_supported(cell)) return;
+  const CellMatrix held = support(cell);
+  add_lower(held, kQuadraticNodes, blocks.nodes.data());
+  add_lower(corners_of(held), 8, blocks.corners.data());
+}
+
+template <class Number>
+void CellProducts<Number>::matrices(const std::function<void(std::uint32_t, const CellBlocks&)>& take)
+    const requires std::same_as<Number, double> {
+  const std::vector<std::uint32_t> twin = twins();
+  parallel_for_each(
+      eights_.size(),
+      [&](std::size_t e) {
+        const Eight& eight = eights_[e];
+        const auto alone = [&](std::size_t lane) { return twin[eight.cell[lane]] == eight.cell[lane]; };
+        bool any = false;
+        for (std::size_t lane = 0; lane < eight.count; ++lane) any |= alone(lane);
+        if (!any) return;
+        thread_local std::vector<double> nodes, corners;
+        first_matrices(eight, nodes, corners);
+        CellBlocks blocks;
+        for (std::size_t lane = 0; lane < eight.count; ++lane) {
+          if (!alone(lane)) continue;
+          for (std::size_t i = 0; i < blocks.nodes.size(); ++i) blocks.nodes[i] = nodes[kWidth * i + lane];
+          for (std::size_t i = 0; i < blocks.corners.size(); ++i)
+            blocks.corners[i] = corners[kWidth * i + lane];
+          turn_blocks(eight.cell[lane], blocks);
+          take(eight.cell[lane], blocks);
+        }
+      },
+      kEightsAtATime);
+}
+
+template <class Number>
+CellMatrix CellProducts<Number>::matrix(std::size_t cell) const requires std::same_as<Number, double> {
+  std::vector<double> nodes, corners;
+  first_matrices(eights_[place_[cell] / kWidth], nodes, corners);
+  CellBlocks blocks;
+  blocks.corners.fill(0);
+  for (std::size_t i = 0; i < blocks.nodes.size(); ++i)
+    blocks.nodes[i] = nodes[kWidth * i + place_[cell] % kWidth];
+  turn_blocks(cell, blocks);
+  CellMatrix made;
+  const double* number = blocks.nodes.data();
+  for (Eigen::Index a = 0; a < kCellUnknowns; a += 3)
+    for (Eigen::Index b = 0; b <= a; b += 3)
+      for (Eigen::Index i = 0; i < 9; ++i, ++number) {
+        made(a + i / 3, b + i % 3) = *number;
+        if (a != b) made(b + i % 3, a + i / 3) = *number;
+      }
+  return 0.5 * (made + made.transpose());  // rounding alone makes it uneven
 }
 
 template <class Number>

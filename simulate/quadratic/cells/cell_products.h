@@ -1,11 +1,13 @@
 // Products with the stiffness of the cells of model `quadratic`, made from their moments; no matrix is kept but those of
 // supports. Eight cells of a part at a time, by the kernels of kernel_quadratic.h.
 #pragma once
+#include <concepts>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
 
+#include "simulate/kernels/kernel_quadratic_matrix.h"
 #include "simulate/quadratic/cells/cell_integrals.h"
 #include "simulate/quadratic/cells/quadratic_nodes.h"
 
@@ -31,6 +33,16 @@ struct CellCouplings {
 
   CellCouplings(std::vector<std::array<std::uint32_t, 2>> pairs_of_cells, std::size_t cell_count);
 };
+
+// Of a cell: the lower triangle of its matrix by blocks of its 27 nodes, and that of the trilinear field over its corners.
+// Block a >= b is at block_place(a, b), row by row (simulate/kernels/kernel_quadratic_matrix.h) [N/m].
+struct CellBlocks {
+  std::array<double, quadratic_kernel::kNodeMatrix> nodes;
+  std::array<double, quadratic_kernel::kCornerMatrix> corners;
+};
+using CornerMatrix = Eigen::Matrix<double, 24, 24>;
+// P^T M P, P the trilinear field at the nodes of a cell.
+[[nodiscard]] CornerMatrix corners_of(const CellMatrix& matrix);
 
 // K x of up to eight columns.
 using CellColumns = Eigen::Matrix<double, kCellUnknowns, 8>;
@@ -66,11 +78,12 @@ class CellProducts {
   // K x of a cell without its supports and before it was turned.
   void elastic_forces(std::size_t cell, const CellColumns& x, CellColumns& product) const;
   // Of a cell, as forces() takes it.
-  [[nodiscard]] CellMatrix matrix(std::size_t cell) const;
-  // (cells) a cell that has the same matrix, the same one for all of those.
+  [[nodiscard]] CellMatrix matrix(std::size_t cell) const requires std::same_as<Number, double>;
+  // (cells) a cell that has the same matrix, the same one for all of those, and the first of them.
   [[nodiscard]] std::vector<std::uint32_t> twins() const;
-  // matrix(cell) x
-  [[nodiscard]] CellColumns multiply(std::size_t cell, const CellColumns& x) const;
+  // Calls take(cell, matrices) for each cell that is its own twin, as forces() takes it; from several threads.
+  void matrices(const std::function<void(std::uint32_t, const CellBlocks&)>& take)
+      const requires std::same_as<Number, double>;
 
   [[nodiscard]] bool is_supported(std::size_t cell) const {
     return !support_at_.empty() && support_at_[cell] >= 0;
@@ -98,9 +111,12 @@ class CellProducts {
   [[nodiscard]] Eigen::Matrix<double, kCellUnknowns, 1> support_forces(std::size_t cell,
                                                                        const double* x) const;
   void add_coupled(const double* x) const;
-  // All lanes are one cell. `turned`: as it is now, else as at first.
-  void multiply_one(std::size_t cell, bool turned, const CellColumns& x, CellColumns& product) const;
   [[nodiscard]] CellMatrix support(std::size_t cell) const;  // R S R^T
+  // Of the cells of an eight in the axes of their lattice, as they were at first: to `nodes` and `corners`, side by side.
+  void first_matrices(const Eight& eight, std::vector<double>& nodes,
+                      std::vector<double>& corners) const requires std::same_as<Number, double>;
+  // What turning and supports make of those of a cell.
+  void turn_blocks(std::size_t cell, CellBlocks& blocks) const requires std::same_as<Number, double>;
 
   const QuadraticNodes* nodes_;
   std::vector<Part> parts_;

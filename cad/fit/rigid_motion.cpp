@@ -1,9 +1,10 @@
 // The rotation is the eigenvector of the greatest eigenvalue of a symmetric 4 x 4 matrix, as a quaternion.
-#include "cad/deform/rigid_motion.h"
+#include "cad/fit/rigid_motion.h"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <gp_Quaternion.hxx>
 #include <gp_Vec.hxx>
 
@@ -40,8 +41,10 @@ RigidMotion rigid_motion(const std::vector<gp_XYZ>& from, const std::vector<gp_X
     gp_XYZ moved = from[i];
     found.motion.Transforms(moved);
     found.error = std::max(found.error, (moved - to[i]).Modulus());
+    found.mean += (moved - to[i]).SquareModulus() / static_cast<double>(from.size());
     found.none = found.none && (from[i] - to[i]).Modulus() <= still;
   }
+  found.mean = std::sqrt(found.mean);
   return found;
 }
 

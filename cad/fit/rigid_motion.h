@@ -8,7 +8,9 @@ namespace flexel::cad {
 
 struct RigidMotion {
   gp_Trsf motion;
-  double error = 0;   // largest distance of a moved point from where it went
+  double error = 0;  // largest distance of a moved point from where it went
+  double mean =
+      0;  // root of the mean square of these: no rigid motion leaves a smaller one, nor all within less
   bool none = false;  // no point moved at all, within `still`
 };
 

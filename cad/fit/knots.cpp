@@ -1,6 +1,6 @@
 // Greville's abscissae (W. J. Gordon and R. F. Riesenfeld, "B-spline curves and surfaces", 1974): averages of kDegree
 // knots, at which interpolation is well-posed (I. J. Schoenberg and A. Whitney, 1953).
-#include "cad/deform/knots.h"
+#include "cad/fit/knots.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 // Interpolation at Greville's abscissae. The error of a surface is measured along its lines of nodes, one direction
 // after the other, so that each is refined where it needs it; then between the nodes of both.
-#include "cad/deform/fit.h"
+#include "cad/fit/fit.h"
 
 #include <BSplCLib.hxx>
 #include <BSplSLib.hxx>
@@ -89,19 +89,31 @@ class ErrorGauge {
     const double du = (u_.at.back() - u_.at.front()) / static_cast<double>(u_.spans()),
                  dv = (v_.at.back() - v_.at.front()) / static_cast<double>(v_.spans());
     SpanErrors errors = none();
-    for (int q = 0; q < kPoints; ++q) {
-      const double share = (q + 0.5) / kPoints;
-      for (std::size_t s = 0; s < u_.spans(); ++s) {
-        const double h = u_.at[s + 1] - u_.at[s], u = u_.at[s] + share * h;
-        for (std::size_t j = 0; j < nodes_v.size(); j += every_v)
-          if (map_.counts(u, nodes_v[j], h, dv)) errors.u[s] = std::max(errors.u[s], error(u, nodes_v[j]));
-      }
-      for (std::size_t s = 0; s < v_.spans(); ++s) {
-        const double h = v_.at[s + 1] - v_.at[s], v = v_.at[s] + share * h;
-        for (std::size_t i = 0; i < nodes_u.size(); i += every_u)
-          if (map_.counts(nodes_u[i], v, du, h)) errors.v[s] = std::max(errors.v[s], error(nodes_u[i], v));
-      }
-    }
+    // All points of a span in a row: OpenCASCADE keeps the polynomial of the last one. Where one counts, all of it does.
+    const auto on_span = [&](double begin, double end, const auto& counts, const auto& error_at) {
+      const auto at = [&](int q) { return begin + (end - begin) * (q + 0.5) / kPoints; };
+      bool any = false;
+      for (int q = 0; !any && q < kPoints; ++q) any = counts(at((q + kPoints / 2) % kPoints));
+      double largest = 0;
+      for (int q = 0; any && q < kPoints; ++q) largest = std::max(largest, error_at(at(q)));
+      return largest;
+    };
+    for (std::size_t s = 0; s < u_.spans(); ++s)
+      for (std::size_t j = 0; j < nodes_v.size(); j += every_v)
+        errors.u[s] =
+            std::max(errors.u[s],
+                     on_span(
+                         u_.at[s], u_.at[s + 1],
+                         [&](double u) { return map_.counts(u, nodes_v[j], u_.at[s + 1] - u_.at[s], dv); },
+                         [&](double u) { return error(u, nodes_v[j]); }));
+    for (std::size_t s = 0; s < v_.spans(); ++s)
+      for (std::size_t i = 0; i < nodes_u.size(); i += every_u)
+        errors.v[s] =
+            std::max(errors.v[s],
+                     on_span(
+                         v_.at[s], v_.at[s + 1],
+                         [&](double v) { return map_.counts(nodes_u[i], v, du, v_.at[s + 1] - v_.at[s]); },
+                         [&](double v) { return error(nodes_u[i], v); }));
     return errors;
   }
 

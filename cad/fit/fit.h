@@ -5,7 +5,7 @@
 #include <functional>
 #include <gp_XYZ.hxx>
 
-#include "cad/deform/knots.h"
+#include "cad/fit/knots.h"
 
 namespace flexel::cad {
 

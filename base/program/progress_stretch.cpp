@@ -1,0 +1,26 @@
+// The stretches that live now are a stack; an update of a silent Progress goes to the one that it belongs to.
+#include "base/program/progress_stretch.h"
+
+#include "base/program/silent_updates.h"
+
+namespace flexel {
+
+ProgressStretch* ProgressStretch::last_ = nullptr;
+
+ProgressStretch::ProgressStretch(Progress& whole, double from, double to)
+    : whole_(whole), from_(from), to_(to), inner_("", Progress::Mode::silent), before_(last_) {
+  last_ = this;
+  set_silent_update(&ProgressStretch::pass_on);
+}
+
+ProgressStretch::~ProgressStretch() {
+  last_ = before_;
+}
+
+void ProgressStretch::pass_on(const Progress& inner, double share, const std::string& note) {
+  for (const ProgressStretch* each = last_; each != nullptr; each = each->before_)
+    if (&each->inner_ == &inner)
+      return each->whole_.update(each->from_ + share * (each->to_ - each->from_), note);
+}
+
+}  // namespace flexel

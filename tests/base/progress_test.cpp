@@ -1,0 +1,78 @@
+// Progress, as a listener hears it.
+#include "base/program/progress_stretch.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <thread>
+#include <vector>
+
+namespace flexel {
+namespace {
+
+class Heard : public ProgressListener {
+ public:
+  Heard() { set_progress_listener(this); }
+  ~Heard() override { set_progress_listener(nullptr); }
+  Heard(const Heard&) = delete;
+  Heard& operator=(const Heard&) = delete;
+  void update(const std::string& stage, double share, const std::string& note,
+              std::optional<double> left) noexcept override {
+    stages.push_back(stage);
+    shares.push_back(share);
+    notes.push_back(note);
+    had_left = had_left || left.has_value();
+  }
+  void say(const std::string& line) noexcept override { lines.push_back(line); }
+  void warn(const std::string& line) noexcept override { lines.push_back(line); }
+  std::vector<std::string> stages, notes, lines;
+  std::vector<double> shares;
+  bool had_left = false;
+};
+
+void wait() {
+  std::this_thread::sleep_for(std::chrono::milliseconds(110));  // updates sooner than that are not shown
+}
+
+TEST(Progress, ARunWithinARunMovesItsStretchOfTheStage) {
+  Heard heard;
+  Progress whole("flexel", Progress::Mode::lines);
+  whole.stage("bars");
+  wait();
+  ProgressStretch first(whole, 0.25, 0.75);
+  Progress& stretch = first.inner();
+  stretch.stage("simulate");
+  stretch.update(0.5, "newton 3");
+  wait();
+  {
+    ProgressStretch deeper(stretch, 0.5, 1);
+    deeper.inner().update(0.5);
+  }
+  stretch.say("not told");
+  stretch.warn("neither is this");
+  EXPECT_EQ(heard.stages, std::vector<std::string>(3, "bars"));
+  EXPECT_EQ(heard.shares, (std::vector<double>{0, 0.5, 0.625}));
+  EXPECT_EQ(heard.notes, (std::vector<std::string>{"", "newton 3", ""}));
+  EXPECT_TRUE(heard.lines.empty());
+  whole.say("told");
+  EXPECT_EQ(heard.lines, std::vector<std::string>{"told"});
+}
+
+TEST(Progress, OfASilentRunNothingIsHeard) {
+  Heard heard;
+  Progress silent("flexel", Progress::Mode::silent);
+  silent.stage("bars");
+  ProgressStretch stretch(silent, 0, 1);
+  stretch.inner().update(0.5);
+  EXPECT_TRUE(heard.stages.empty());
+}
+
+TEST(Progress, TimeLeftIsToldFromTwoSecondsOn) {
+  EXPECT_FALSE(seconds_left(1.9, 0.5));
+  EXPECT_FALSE(seconds_left(5, 0.01));
+  EXPECT_FALSE(seconds_left(5, 1));
+  EXPECT_DOUBLE_EQ(seconds_left(5, 0.25).value(), 15);
+}
+
+}  // namespace
+}  // namespace flexel
