@@ -577,6 +577,19 @@ std::string next_step(const SolvedRun& run, const std::optional<AccuracyReport>&
   return accuracy->advice.empty() ? repeat : accuracy->advice + "; " + repeat;
 }
 
+// Of `flexel flex`; nothing where the surface was cut along cracks, whose vertices are others.
+std::optional<FlexAnswer> flex_answer(const SolvedRun& run, const Plan& plan,
+                                      const mapping::MappedPart& mapped) {
+  if (!plan.job.flex || mapped.cracked) return std::nullopt;
+  FlexAnswer answer{measure_flex(*plan.job.flex, run.voxels.body, mapped.result.displacement), {}};
+  const bool closed = std::all_of(run.voxels.parts.begin(), run.voxels.parts.end(),
+                                  [](const voxelize::VoxelizedPart& part) { return part.closed; });
+  const mapping::SurfaceQuality& surface = mapped.report.quality;
+  if (closed && surface.volume_before > 0)
+    answer.volume_change = surface.volume_after / surface.volume_before - 1;
+  return answer;
+}
+
 std::string summary_text(const SolvedRun& run, const mapping::MapReport& mapped, const Plan& plan,
                          const std::optional<AccuracyReport>& accuracy,
                          const std::optional<FlexAnswer>& flexed) {
@@ -676,8 +689,7 @@ Deformed run_stages(const DeformArguments& arguments, Plan& plan, Progress& prog
     }
     progress.finish();
   }
-  std::optional<FlexAnswer> flexed;
-  if (plan.job.flex) flexed = measure_flex(*plan.job.flex, body, mapped.result.displacement);
+  const std::optional<FlexAnswer> flexed = flex_answer(run, plan, mapped);
   summary = summary_text(run, found, plan, accuracy, flexed);
   if (!arguments.summary.empty()) write_text(summary, arguments.summary);
   // With --verbose simulate() has said what infill is.

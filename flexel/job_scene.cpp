@@ -114,15 +114,14 @@ void declare_scene(CommandLine& app, JobArguments& arguments) {
       "WHERE");
   add("--push", arguments.pushes,
       "Push a surface: \"xmax: 0 0 -50 N\", \"part/3: 50 N\" (inwards), \"part/3: 2 MPa\"; with \", "
-      "follower\" it "
-      "turns with the surface",
+      "follower\" it turns with the surface",
       "WHERE:FORCE");
   add("--move", arguments.moves, "Move a surface: \"xmax: 0 0 -2 mm\", \"part/3: 2 mm\" (inwards)",
       "WHERE:LENGTH");
   add("--torque", arguments.torques,
       "Turn a surface by a couple: \"xmax: 5 N m\" (about its axis), \"part/3: 0 0 5 N m\"; with \", "
-      "follower\" it "
-      "turns with the surface",
+      "follower\" "
+      "it turns with the surface",
       "WHERE:TORQUE");
   add("--twist", arguments.twists,
       "Turn a surface by an angle: \"xmax: 10 deg\" (about its axis), \"part/3: 0 0 10 deg\"", "WHERE:ANGLE");

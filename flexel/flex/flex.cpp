@@ -8,10 +8,8 @@
 #include <numbers>
 
 #include "base/error.h"
-#include "base/math/area_vector.h"
 #include "base/units.h"
 #include "flexel/measure/face_shape.h"
-#include "formats/part/topology.h"
 #include "simulate/input/scene_selection.h"
 
 namespace flexel::commands {
@@ -20,18 +18,33 @@ namespace {
 constexpr double kMostTurns = 4;  // in all: further on a part lies within itself
 
 double parse_flex_angle(const std::string& text, const char* option) {
-  const double angle = parse_quantity(text, Dimension::angle);
-  if (angle == 0)
-    throw InputError(fmt::format("{} \"{}\": an angle of nothing leaves the part as it is", option, text));
+  double angle = 0;
+  try {
+    angle = parse_quantity(text, Dimension::angle);
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{} \"{}\": {}", option, text, error.what()));
+  }
+  if (angle == 0) throw InputError(fmt::format("{} \"{}\" leaves the part as it is", option, text));
   if (std::abs(angle) > 2 * std::numbers::pi * kMostTurns)
     throw InputError(
-        fmt::format("{} \"{}\": more than {} whole turns; a smaller angle", option, text, kMostTurns));
+        fmt::format("{} \"{}\": more than {} whole turns; give a smaller angle", option, text, kMostTurns));
   return angle;
 }
 
-Eigen::Index parse_axis(const std::string& text, const char* option) {
-  if (text.size() == 1 && text[0] >= 'x' && text[0] <= 'z') return text[0] - 'x';
-  throw InputError(fmt::format("{} \"{}\": use x, y or z", option, text));
+// "x", "y" or "z".
+std::optional<Eigen::Index> axis_called(const std::string& name) {
+  if (name.size() != 1 || name[0] < 'x' || name[0] > 'z') return std::nullopt;
+  return name[0] - 'x';
+}
+
+Vec3 parse_about(const std::string& text, std::optional<Eigen::Index> along) {
+  const bool back = text.front() == '-';
+  const std::optional<Eigen::Index> axis = axis_called(back ? text.substr(1) : text);
+  if (!axis) throw InputError(fmt::format("--about \"{}\": use x, y, z, -x, -y or -z", text));
+  if (along == axis)
+    throw InputError(
+        "--about is the axis of --along: a bend turns about one across it; --twist turns about it");
+  return Vec3::Unit(*axis) * (back ? -1 : 1);
 }
 
 simulate::Selection side(const std::string& name, const Flex& flex) {
@@ -90,17 +103,14 @@ Flex plan_flex(const FlexArguments& arguments) {
   flex.bends = arguments.twist.empty();
   flex.angle =
       flex.bends ? parse_flex_angle(arguments.bend, "--bend") : parse_flex_angle(arguments.twist, "--twist");
-  if (!arguments.along.empty()) flex.along = parse_axis(arguments.along, "--along");
+  if (!arguments.along.empty()) {
+    flex.along = axis_called(arguments.along);
+    if (!flex.along) throw InputError(fmt::format("--along \"{}\": use x, y or z", arguments.along));
+  }
   if (arguments.about.empty()) return flex;
   if (!flex.bends)
     throw InputError("--about is of --bend: a twist turns about the way from end to end (--along)");
-  const bool back = arguments.about.front() == '-';
-  const Eigen::Index axis =
-      parse_axis(arguments.about.substr(back || arguments.about.front() == '+' ? 1 : 0), "--about");
-  flex.about = Vec3(Vec3::Unit(axis) * (back ? -1 : 1));
-  if (flex.along == axis)
-    throw InputError(
-        "--about is the axis of --along: a bend turns about one across it; --twist turns about it");
+  flex.about = parse_about(arguments.about, flex.along);
   return flex;
 }
 
@@ -155,22 +165,14 @@ void add_flex(simulate::Scene& scene, const Flex& flex, const Body& body) {
   ties.push_back(std::move(led));
 }
 
-FlexAnswer measure_flex(const Flex& flex, const Body& body, const std::vector<Vec3>& displacement) {
+double measure_flex(const Flex& flex, const Body& body, const std::vector<Vec3>& displacement) {
   const FlexFrame frame = flex_frame(flex, body.surface);
   const Mat3 held = turn_of_side(body, resolve(side(frame.held, flex), body), displacement);
   const Mat3 led = turn_of_side(body, resolve(side(frame.led, flex), body), displacement);
   const Eigen::AngleAxisd between(Mat3(held.transpose() * led));
   const double turned = between.angle() * between.axis().dot(frame.axis);
   const double whole = 2 * std::numbers::pi;
-  FlexAnswer answer;
-  answer.angle = turned + whole * std::round((flex.angle - turned) / whole);
-  std::vector<Vec3> moved = body.surface.vertices;
-  for (std::size_t v = 0; v < moved.size(); ++v) moved[v] += displacement[v];
-  const Triangles triangles = triangulate(body.surface);
-  const double before = signed_volume(body.surface.vertices, triangles.corners),
-               after = signed_volume(moved, triangles.corners);
-  if (std::abs(before) > 0) answer.volume_change = after / before - 1;
-  return answer;
+  return turned + whole * std::round((flex.angle - turned) / whole);
 }
 
 std::string flex_line(const Flex& flex, const FlexAnswer& answer) {

@@ -25,8 +25,8 @@ struct Flex {
 
 void declare_flex(CommandLine& app, FlexArguments& arguments);
 
-// Nothing where the command is not `flexel flex`. Throws InputError: not one of --bend and --twist,
-// angles of nothing, axes that do not fit.
+// Throws InputError: not one of --bend and --twist, no angle or one of 0 or too many turns, axes that do not
+// fit.
 [[nodiscard]] Flex plan_flex(const FlexArguments& arguments);
 
 // The axes that the part's size decides: a bend goes about the wider of the two axes across, and leads
@@ -41,15 +41,15 @@ struct FlexFrame {
 // Adds the support and the rotation to the scene. Throws InputError: a side that has no face of its own.
 void add_flex(simulate::Scene& scene, const Flex& flex, const Body& body);
 
-// How far the ends have turned to each other, by the rigid motions nearest to those of their vertices,
-// and how much the volume of closed parts has changed. `displacement`: (vertices of the body's surface,
-// or more) m.
+// rad, how far the second end has turned from the first one, like `Flex::angle`, by the rigid motions nearest
+// to those of their vertices; whole turns are those of `flex`. `displacement`: (vertices of the body's
+// surface, or more) m.
+[[nodiscard]] double measure_flex(const Flex& flex, const Body& body, const std::vector<Vec3>& displacement);
+
 struct FlexAnswer {
-  double angle = 0;                     // rad, of the turn from one end to the other, like `Flex::angle`
-  std::optional<double> volume_change;  // share
+  double angle = 0;                     // rad, measured
+  std::optional<double> volume_change;  // share; nothing where a part is not closed
 };
-[[nodiscard]] FlexAnswer measure_flex(const Flex& flex, const Body& body,
-                                      const std::vector<Vec3>& displacement);
 [[nodiscard]] std::string flex_line(const Flex& flex, const FlexAnswer& answer);
 
 }  // namespace flexel::commands
