@@ -9,6 +9,7 @@ int compensate_command(int argc, char** argv);
 int deform_command(int argc, char** argv);
 int doctor_command(int argc, char** argv);
 int export_command(int argc, char** argv);
+int flex_command(int argc, char** argv);
 int info_command(int argc, char** argv);
 int picture_command(int argc, char** argv);
 int materials_command(int argc, char** argv);

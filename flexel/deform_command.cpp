@@ -496,7 +496,7 @@ SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surf
                         AccuracyReport& accuracy, Progress& progress) {
   for (const simulate::Tie& tie : plan.job.scene.get<simulate::Supports>().ties)
     plan.goal->driven |= tie.is_move;
-  plan.goal->driven |= !plan.job.moves.empty() || !plan.job.twists.empty();
+  plan.goal->driven |= !plan.job.moves.empty() || !plan.job.twists.empty() || plan.job.flex;
   GoalRuns runs(arguments, plan, surface, progress);
   SolvedRun run = choose_resolution(*plan.goal, std::ref(runs), accuracy, progress);
   runs.drop_warnings();
@@ -577,13 +577,31 @@ std::string next_step(const SolvedRun& run, const std::optional<AccuracyReport>&
   return accuracy->advice.empty() ? repeat : accuracy->advice + "; " + repeat;
 }
 
+// Of `flexel flex`; nothing where the surface was cut along cracks, whose vertices are others.
+std::optional<FlexAnswer> flex_answer(const SolvedRun& run, const Plan& plan,
+                                      const mapping::MappedPart& mapped) {
+  if (!plan.job.flex || mapped.cracked) return std::nullopt;
+  FlexAnswer answer{measure_flex(*plan.job.flex, run.voxels.body, mapped.result.displacement), {}};
+  const bool closed = std::all_of(run.voxels.parts.begin(), run.voxels.parts.end(),
+                                  [](const voxelize::VoxelizedPart& part) { return part.closed; });
+  const mapping::SurfaceQuality& surface = mapped.report.quality;
+  if (closed && surface.volume_before > 0)
+    answer.volume_change = surface.volume_after / surface.volume_before - 1;
+  return answer;
+}
+
 std::string summary_text(const SolvedRun& run, const mapping::MapReport& mapped, const Plan& plan,
-                         const std::optional<AccuracyReport>& accuracy) {
+                         const std::optional<AccuracyReport>& accuracy,
+                         const std::optional<FlexAnswer>& flexed) {
   nlohmann::ordered_json summary;
   summary["voxelize"] = nlohmann::ordered_json::parse(voxelize::summary_json(run.voxels));
   summary["simulate"] = nlohmann::ordered_json::parse(simulate::summary_json(run.simulated, run.voxels.body));
   summary["map"] = nlohmann::ordered_json::parse(mapping::report_json(mapped, plan.map));
   if (accuracy) summary["accuracy"] = nlohmann::ordered_json::parse(accuracy->json());
+  if (flexed) {
+    summary["flex"] = {{"angle", flexed->angle}, {"angle_asked", plan.job.flex->angle}};
+    if (flexed->volume_change) summary["flex"]["volume_change"] = *flexed->volume_change;
+  }
   return summary.dump(2) + "\n";
 }
 
@@ -671,10 +689,12 @@ Deformed run_stages(const DeformArguments& arguments, Plan& plan, Progress& prog
     }
     progress.finish();
   }
-  summary = summary_text(run, found, plan, accuracy);
+  const std::optional<FlexAnswer> flexed = flex_answer(run, plan, mapped);
+  summary = summary_text(run, found, plan, accuracy, flexed);
   if (!arguments.summary.empty()) write_text(summary, arguments.summary);
   // With --verbose simulate() has said what infill is.
   lines = last_lines(run, plan, accuracy, accuracy || !arguments.verbose);
+  if (flexed) lines.push_back(flex_line(*plan.job.flex, *flexed));
   const std::optional<view::PageTooLarge> missing =
       write_pages(arguments, plan, body, {warnings.lines(), lines, summary}, progress);
   outputs.appear();
@@ -686,9 +706,12 @@ Deformed run_stages(const DeformArguments& arguments, Plan& plan, Progress& prog
 
 // Nothing: help was asked for.
 std::optional<Deformed> run_with(DeformArguments arguments, int argc, char** argv, Progress::Mode mode) {
+  const bool flex = arguments.job.flex.has_value();
   CommandLine app{
-      "Deforms a part as its material would be: import, lattice, simulation and mapping in one run.",
-      "flexel deform"};
+      flex ? "Bends or twists a part to an angle: its ends are led there, and its material decides what lies "
+             "between."
+           : "Deforms a part as its material would be: import, lattice, simulation and mapping in one run.",
+      flex ? "flexel flex" : "flexel deform"};
   declare_input(app, arguments.job);
   declare_output(app, arguments);
   // Runs in time leave something, and see to it themselves; a time limit, which comes later, leaves the last state.
@@ -714,6 +737,13 @@ std::optional<Deformed> run_with(DeformArguments arguments, int argc, char** arg
 
 int deform_command(int argc, char** argv) {
   (void)run_with({}, argc, argv, Progress::Mode::automatic);
+  return kExitDone;
+}
+
+int flex_command(int argc, char** argv) {
+  DeformArguments arguments;
+  arguments.job.flex.emplace();
+  (void)run_with(std::move(arguments), argc, argv, Progress::Mode::automatic);
   return kExitDone;
 }
 

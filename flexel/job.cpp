@@ -24,7 +24,12 @@ void declare_lattice(CommandLine& app, JobArguments& arguments, const std::strin
 
 void declare_job(CommandLine& app, JobArguments& arguments) {
   app.add_option("part", arguments.parts, read_titles() + " files; -: stdin").required().type_name("PART");
-  declare_scene(app, arguments);
+  if (arguments.flex) {
+    declare_flex(app, *arguments.flex);
+    declare_matter(app, arguments);
+  } else {
+    declare_scene(app, arguments);
+  }
   declare_lattice(app, arguments);
   app.add_option(
          "--edge", arguments.edge,

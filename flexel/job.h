@@ -10,6 +10,7 @@
 #include "base/program/arguments.h"
 #include "base/program/progress.h"
 #include "flexel/actions.h"
+#include "flexel/flex/flex.h"
 #include "formats/exchange/import.h"
 #include "voxelize/types/options.h"
 #include "voxelize/types/result.h"
@@ -20,9 +21,12 @@ struct JobArguments {
   std::vector<std::string> parts, fixes, pushes, moves, torques, twists, bearings, probes, materials, infills;
   std::string scene, model, gravity, shell, size, heal = "auto", placement = "corner", unit, edge;
   std::optional<std::size_t> count;
-  bool force = false;  // results may replace files that are read
+  bool force = false;                 // results may replace files that are read
+  std::optional<FlexArguments> flex;  // of `flexel flex`, in place of a scene and of what acts
 };
 
+// Adds the options of what parts are: --material to --shell.
+void declare_matter(CommandLine& app, JobArguments& arguments);
 // Adds the options of what happens: --scene to --shell.
 void declare_scene(CommandLine& app, JobArguments& arguments);
 
@@ -30,7 +34,8 @@ void declare_scene(CommandLine& app, JobArguments& arguments);
 void declare_lattice(CommandLine& app, JobArguments& arguments,
                      const std::string& count = "Or: about this many cells");
 
-// Adds all of their options to the program, but for --placement, which not every command has.
+// Adds all of their options to the program, but for --placement, which not every command has. With
+// `arguments.flex` those of `flexel flex`.
 void declare_job(CommandLine& app, JobArguments& arguments);
 
 // What they ask for, checked.
@@ -40,6 +45,7 @@ struct Job {
   simulate::Scene scene;
   // Not in the scene before the part is known: add_actions()
   std::vector<Action> pushes, moves, torques, twists;
+  std::optional<Flex> flex;
   [[nodiscard]] bool acts_along_faces() const {
     return !(pushes.empty() && moves.empty() && torques.empty() && twists.empty());
   }
@@ -72,7 +78,8 @@ void plan_after_files(const JobArguments& arguments, const std::function<void()>
 // Throws InputError: --material or --infill of a part that is not there, a part without a material.
 void check_parts(const Job& job, const Surface& surface);
 
-// Adds --push, --move, --torque and --twist to the scene; `body` gives the normals.
+// Adds --push, --move, --torque, --twist and what `flexel flex` asks for to the scene; `body` gives the
+// normals.
 void add_actions(Job& job, const Body& body);
 
 }  // namespace flexel::commands

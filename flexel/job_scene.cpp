@@ -86,6 +86,24 @@ void refuse_modes(const simulate::Scene& scene) {
                   scene.run.modes ? "modes" : "buckling"));
 }
 
+void declare_matter(CommandLine& app, JobArguments& arguments) {
+  const auto add = [&](const char* name, std::vector<std::string>& values, const char* what,
+                       const char* type) {
+    app.add_option(name, values, what).type_name(type).one_value_each();
+  };
+  add("--material", arguments.materials,
+      "What the parts are made of: steel, PLA, ... (docs/reference/scene.md); of one part: \"knob=PLA\"",
+      "[PART=]NAME");
+  app.add_option("--model", arguments.model,
+                 "How the parts resist: cells, quadratic (small strains; exact on thin and slanted walls), "
+                 "springs or paper")
+      .type_name("NAME");
+  add("--infill", arguments.infills, "Printed with this infill: 20%; of one part: \"knob=20%\" (an estimate)",
+      "[PART=]SHARE");
+  app.add_option("--shell", arguments.shell, "With --infill: thickness of the solid walls (\"1 mm\")")
+      .type_name("LENGTH");
+}
+
 void declare_scene(CommandLine& app, JobArguments& arguments) {
   const auto add = [&](const char* name, std::vector<std::string>& values, const char* what,
                        const char* type) {
@@ -113,21 +131,11 @@ void declare_scene(CommandLine& app, JobArguments& arguments) {
       .type_name("ACCELERATION");
   add("--probe", arguments.probes,
       "Say how far a point or a surface moves: \"tip: 80 5 3 mm\", \"tip: part/3\"", "NAME:POINT");
-  add("--material", arguments.materials,
-      "What the parts are made of: steel, PLA, ... (docs/reference/scene.md); of one part: \"knob=PLA\"",
-      "[PART=]NAME");
-  app.add_option("--model", arguments.model,
-                 "How the parts resist: cells, quadratic (small strains; exact on thin and slanted walls), "
-                 "springs or paper")
-      .type_name("NAME");
-  add("--infill", arguments.infills, "Printed with this infill: 20%; of one part: \"knob=20%\" (an estimate)",
-      "[PART=]SHARE");
-  app.add_option("--shell", arguments.shell, "With --infill: thickness of the solid walls (\"1 mm\")")
-      .type_name("LENGTH");
+  declare_matter(app, arguments);
 }
 
 void refuse_idle(const JobArguments& arguments) {
-  if (arguments.gravity.empty() && arguments.pushes.empty() && arguments.moves.empty() &&
+  if (!arguments.flex && arguments.gravity.empty() && arguments.pushes.empty() && arguments.moves.empty() &&
       arguments.torques.empty() && arguments.twists.empty() && arguments.bearings.empty())
     throw InputError(
         "nothing acts on the part: add --push \"WHERE: 0 0 -50 N\", --move \"WHERE: 0 0 -2 mm\", --torque, "
@@ -169,6 +177,7 @@ void plan_scene(const JobArguments& arguments, Job& job) {
     refuse_modes(job.scene);
   }
   add_options(arguments, job);
+  if (arguments.flex) job.flex = plan_flex(*arguments.flex);
 }
 
 void check_parts(const Job& job, const Surface& surface) {
@@ -198,6 +207,7 @@ void add_actions(Job& job, const Body& body) {
   for (const Action& move : job.moves) add_move(job.scene, move, body);
   for (const Action& torque : job.torques) add_torque(job.scene, torque, body);
   for (const Action& twist : job.twists) add_twist(job.scene, twist, body);
+  if (job.flex) add_flex(job.scene, *job.flex, body);
 }
 
 }  // namespace flexel::commands

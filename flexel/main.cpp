@@ -24,6 +24,8 @@ constexpr const char* kHelp =
     "                        the part, deformed as its material would be ({}; .vtu for "
     "the body,\n"
     "                        .png for a picture)\n"
+    "  flexel flex PART --bend \"90 deg\" --material NAME -o OUT\n"
+    "                        bent to an arc of this angle, or twisted (--twist), as its material would be\n"
     "  flexel compensate PART... --scene FILE -o OUT\n"
     "                        the part to be made so that the scene bends it into the shape of PART\n"
     "  flexel compare PART PART... --scene FILE\n"
@@ -68,6 +70,7 @@ constexpr Command kCommands[] = {{"deform", deform_command},
                                  {"compare", compare_command},
                                  {"compensate", compensate_command},
                                  {"export", export_command},
+                                 {"flex", flex_command},
                                  {"info", info_command},
                                  {"picture", picture_command},
                                  {"view", view_command},

@@ -1,0 +1,77 @@
+"""flexel flex, judged from outside: the angle and the arc are measured on the vertices that it writes."""
+
+import json
+import math
+import pathlib
+
+from harness import ascii_stl, box_triangles, expect, expect_error, expect_ok, main, run
+
+SIZE = (80.0, 12.0, 4.0)
+HOW = ["--material", "PLA", "--size", "1mm", "--no-estimate", "--keep-vertices", "--ascii", "--quiet"]
+
+
+def part():
+    pathlib.Path("bar.stl").write_bytes(ascii_stl(box_triangles(SIZE)))
+
+
+def vertices(path):
+    return [tuple(map(float, line.split()[1:])) for line in pathlib.Path(path).read_text().splitlines() if line.strip().startswith("vertex")]
+
+
+def end_direction(before, after):
+    """Angle in the x-z plane [deg] that the end's upright edge has turned by, and where its middle is."""
+    low = [b for a, b in zip(before, after) if a[0] == SIZE[0] and a[2] == 0]
+    high = [b for a, b in zip(before, after) if a[0] == SIZE[0] and a[2] == SIZE[2]]
+    mean = lambda points: [sum(p[i] for p in points) / len(points) for i in range(3)]
+    a, b = mean(sorted(set(low))), mean(sorted(set(high)))
+    return math.degrees(math.atan2(a[0] - b[0], b[2] - a[2])), [(p + q) / 2 for p, q in zip(a, b)]
+
+
+def test_a_bar_is_bent_to_the_arc_that_is_asked_for():
+    part()
+    for angle in (90, 30):
+        expect_ok(run("flexel", "flex", "bar.stl", "--bend", f"{angle} deg", *HOW, "-o", "bent.stl", "--summary", "s.json"))
+        turned, middle = end_direction(vertices("bar.stl"), vertices("bent.stl"))
+        expect(abs(turned - angle) < 0.1, f"{turned} degrees")
+        radius = SIZE[0] / math.radians(angle)
+        exact = [radius * math.sin(math.radians(angle)), SIZE[1] / 2, SIZE[2] / 2 + radius * (1 - math.cos(math.radians(angle)))]
+        expect(math.dist(middle, exact) < 0.005 * SIZE[0], f"{middle} is not {exact}")
+        told = json.loads(pathlib.Path("s.json").read_text())["flex"]
+        expect(abs(math.degrees(told["angle"]) - angle) < 0.1, told)
+        expect(abs(told["volume_change"]) < 0.02, told)
+    expect_ok(run("flexel", "flex", "bar.stl", "--bend", "30 deg", "--about", "y", *HOW, "-o", "down.stl"))
+    turned, middle = end_direction(vertices("bar.stl"), vertices("down.stl"))
+    expect(abs(turned + 30) < 0.1 and middle[2] < -10, f"{turned} degrees, {middle}")
+
+
+def test_a_bar_is_twisted():
+    part()
+    done = expect_ok(run("flexel", "flex", "bar.stl", "--twist", "45 deg", *[each for each in HOW if each != "--quiet"], "-o", "twisted.stl"))
+    expect("twisted by 45.00 deg between its ends" in done.err, done.err)
+    before, after = vertices("bar.stl"), vertices("twisted.stl")
+    edge = [(a, b) for a, b in zip(before, after) if a[0] == SIZE[0] and a[2] == 0]
+    left = next(b for a, b in edge if a[1] == 0)
+    right = next(b for a, b in edge if a[1] == SIZE[1])
+    turned = math.degrees(math.atan2(right[2] - left[2], right[1] - left[1]))
+    expect(abs(turned - 45) < 0.1, f"{turned} degrees")
+
+
+def test_what_cannot_be_is_one_line():
+    part()
+    flex = lambda *words: run("flexel", "flex", "bar.stl", *words, "--material", "PLA", "--size", "2mm", "-o", "bent.stl")
+    expect_error(flex(), "flexel", "give --bend")
+    expect_error(flex("--bend", "90 deg", "--twist", "1 deg"), "flexel", "not both")
+    expect_error(flex("--bend", "0 deg"), "flexel", '--bend "0 deg" leaves the part as it is')
+    expect_error(flex("--bend", "2000 deg"), "flexel", "whole turns")
+    expect_error(flex("--bend", "90"), "flexel", '--bend "90": ')
+    expect_error(flex("--bend", "90 deg", "--along", "w"), "flexel", "use x, y or z")
+    expect_error(flex("--bend", "90 deg", "--along", "x", "--about", "x"), "flexel", "across it")
+    expect_error(flex("--bend", "90 deg", "--about", "-w"), "flexel", "use x, y, z, -x, -y or -z")
+    expect_error(flex("--twist", "90 deg", "--about", "x"), "flexel", "--about is of --bend")
+    expect_error(run("flexel", "flex", "bar.stl", "--bend", "90 deg", "-o", "bent.stl"), "flexel", "no material")
+    expect_error(flex("--bend", "90 deg", "--fix", "xmin"), "flexel", "--fix")
+    expect(not pathlib.Path("bent.stl").exists(), "something was written")
+
+
+if __name__ == "__main__":
+    main(globals())
