@@ -582,11 +582,10 @@ std::optional<FlexAnswer> flex_answer(const SolvedRun& run, const Plan& plan,
                                       const mapping::MappedPart& mapped) {
   if (!plan.job.flex || mapped.cracked) return std::nullopt;
   FlexAnswer answer{measure_flex(*plan.job.flex, run.voxels.body, mapped.result.displacement), {}};
-  const bool closed = std::all_of(run.voxels.parts.begin(), run.voxels.parts.end(),
-                                  [](const voxelize::VoxelizedPart& part) { return part.closed; });
-  const mapping::SurfaceQuality& surface = mapped.report.quality;
-  if (closed && surface.volume_before > 0)
-    answer.volume_change = surface.volume_after / surface.volume_before - 1;
+  // that of the matter: large triangles cut off what is bent
+  const mapping::MapReport& report = mapped.report;
+  if (report.lattice_volume_before > 0)
+    answer.volume_change = report.lattice_volume_after / report.lattice_volume_before - 1;
   return answer;
 }
 

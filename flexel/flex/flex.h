@@ -48,7 +48,7 @@ void add_flex(simulate::Scene& scene, const Flex& flex, const Body& body);
 
 struct FlexAnswer {
   double angle = 0;                     // rad, measured
-  std::optional<double> volume_change;  // share; nothing where a part is not closed
+  std::optional<double> volume_change;  // share, of the matter; nothing where it has no cells
 };
 [[nodiscard]] std::string flex_line(const Flex& flex, const FlexAnswer& answer);
 
