@@ -579,13 +579,15 @@ std::string next_step(const SolvedRun& run, const std::optional<AccuracyReport>&
 
 // Of `flexel flex`; nothing where the surface was cut along cracks, whose vertices are others.
 std::optional<FlexAnswer> flex_answer(const SolvedRun& run, const Plan& plan,
-                                      const mapping::MappedPart& mapped) {
+                                      const mapping::MappedPart& mapped, Progress& progress) {
   if (!plan.job.flex || mapped.cracked) return std::nullopt;
   FlexAnswer answer{measure_flex(*plan.job.flex, run.voxels.body, mapped.result.displacement), {}};
   // that of the matter: large triangles cut off what is bent
   const mapping::MapReport& report = mapped.report;
   if (report.lattice_volume_before > 0)
     answer.volume_change = report.lattice_volume_after / report.lattice_volume_before - 1;
+  const std::string missed = flex_warning(*plan.job.flex, answer);
+  if (!missed.empty()) progress.warn(missed);
   return answer;
 }
 
@@ -688,7 +690,7 @@ Deformed run_stages(const DeformArguments& arguments, Plan& plan, Progress& prog
     }
     progress.finish();
   }
-  const std::optional<FlexAnswer> flexed = flex_answer(run, plan, mapped);
+  const std::optional<FlexAnswer> flexed = flex_answer(run, plan, mapped, progress);
   summary = summary_text(run, found, plan, accuracy, flexed);
   if (!arguments.summary.empty()) write_text(summary, arguments.summary);
   // With --verbose simulate() has said what infill is.

@@ -4,7 +4,7 @@ import json
 import math
 import pathlib
 
-from harness import ascii_stl, box_triangles, expect, expect_error, expect_ok, main, run
+from harness import PARTS, ascii_stl, box_triangles, expect, expect_error, expect_ok, main, run
 
 SIZE = (80.0, 12.0, 4.0)
 HOW = ["--material", "PLA", "--size", "1mm", "--no-estimate", "--keep-vertices", "--ascii", "--quiet"]
@@ -57,6 +57,14 @@ def test_a_bar_is_twisted():
     right = next(b for a, b in edge if a[1] == SIZE[1])
     turned = math.degrees(math.atan2(right[2] - left[2], right[1] - left[1]))
     expect(abs(turned - 45) < 0.1, f"{turned} degrees")
+
+
+def test_an_end_that_gives_way_is_told():
+    """A ball reaches its ends with little of its surface."""
+    done = expect_ok(run("flexel", "flex", PARTS / "ballA.off", "--bend", "20 deg", "--material", "rubber", "--count", "1500", "--no-estimate", "--summary", "s.json", "-o", "bent.stl"))
+    told = math.degrees(json.loads(pathlib.Path("s.json").read_text())["flex"]["angle"])
+    expect(told < 19, told)
+    expect(f"the ends have turned by {told:.2f} deg only, not by 20.00 deg" in done.err, done.err)
 
 
 def test_what_cannot_be_is_one_line():
