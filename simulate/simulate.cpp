@@ -345,6 +345,15 @@ SimulateResult run_and_judge(Body& body, const Scene& scene, const SimulateOptio
   return result;
 }
 
+void explain_memory(const Body& body, const Scene& scene, Progress& progress) {
+  const std::optional<MemoryNeeded> needed = memory_needed(body, scene);
+  if (!needed) return;
+  const bool more = needed->with_large_deflections > needed->bytes;
+  progress.say(fmt::format(
+      "memory: about {}{}", human_bytes(needed->bytes),
+      more ? ", with large deflections " + human_bytes(needed->with_large_deflections) : std::string()));
+}
+
 }  // namespace
 
 double parse_timeout(const std::string& text, const std::string& option) {
@@ -362,8 +371,7 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
   check_actions(scene, body, progress);
   refuse_heat(scene);
   refuse_beyond_memory(body, scene);
-  if (const std::optional<double> needed = memory_needed(body, scene); needed && options.explain)
-    progress.say(fmt::format("memory: about {}", human_bytes(*needed)));
+  if (options.explain) explain_memory(body, scene, progress);
   if (scene.get<Thermal>().conducts()) conduct(body, scene, progress);
   if (asks_for_modes(scene)) {
     SimulateResult result = run_modes(body, scene, options, progress);
