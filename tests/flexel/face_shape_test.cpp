@@ -140,7 +140,10 @@ TEST(FaceShape, SlightConesAndBarrelsAreCurved) {
         }))[0];
       };
       EXPECT_EQ(turned([](double) { return 1; }).kind, FaceShape::Kind::round);
-      EXPECT_EQ(turned([&](double z) { return 1 + slope * z; }).kind, FaceShape::Kind::curved);
+      // a sixth of a cone this slight is, as well, one of a cylinder that is tilted
+      if (angle > M_PI) {
+        EXPECT_EQ(turned([&](double z) { return 1 + slope * z; }).kind, FaceShape::Kind::curved);
+      }
       EXPECT_EQ(turned([&](double z) { return 1 - slope * z * z / height; }).kind, FaceShape::Kind::curved);
     }
 }
