@@ -119,8 +119,15 @@ std::unique_ptr<FollowerLoad> pressing_load(const Load& load, const std::vector<
 std::unique_ptr<FollowerLoad> follower_on_surface(const Load& load,
                                                   const std::vector<std::uint32_t>& polygons,
                                                   const Problem& problem) {
-  const std::vector<SurfacePoint> points = points_under(load, polygons, problem);
+  std::vector<SurfacePoint> points = points_under(load, polygons, problem);
   if (load.pressure) return pressing_load(load, points, problem.body);
+  // A turn is seen from carriers only where they are what says where a point is: the nearest element of
+  // centre placement is up to half a voxel from it.
+  for (SurfacePoint& point : points) {
+    point.position.setZero();
+    for (std::uint32_t a = 0; a < point.at.count; ++a)
+      point.position += point.at.weights[a] * problem.body.rest[point.at.elements[a]];
+  }
   return turning_load(load, loaded_points(points), [&](std::size_t q, const auto& each) {
     for (std::uint32_t a = 0; a < points[q].at.count; ++a)
       each(points[q].at.elements[a], points[q].at.weights[a]);
@@ -171,6 +178,25 @@ std::unique_ptr<FollowerLoad> follower_on_elements(const Load& load,
   return turning_load(load, loaded_elements(load, elements, problem),
                       [&](std::size_t q, const auto& each) { each(elements[q], 1); });
 }
+
+// Of a load's forces, and the couple about their middle, weighted by their sizes: of forces side by side there is none.
+class Resultant {
+ public:
+  void add(const Vec3& force, const Vec3& place) {
+    add_at(force, place, force_, moment_);
+    sizes_ += force.norm();
+    middle_ += force.norm() * place;
+  }
+  void tell(AppliedLoad& load) const {
+    load.force = force_;
+    load.moment = moment_;
+    if (sizes_ > 0) load.couple = (moment_ - (middle_ / sizes_).cross(force_)).norm();
+  }
+
+ private:
+  Vec3 force_ = Vec3::Zero(), moment_ = Vec3::Zero(), middle_ = Vec3::Zero();  // N, N m, N m
+  double sizes_ = 0;                                                           // N
+};
 
 }  // namespace
 
@@ -336,16 +362,19 @@ void Loads::report(const State& state, const std::vector<Vec3>&, SimulateResult&
     if (load.follower) {
       std::vector<Vec3> forces(body_->element_count(), Vec3::Zero());
       load.follower->add_forces(state.displacement, factor, forces);
+      Resultant sum;
       for (std::size_t e = 0; e < forces.size(); ++e)
-        add_at(forces[e], body_->rest[e] + state.displacement[e], total.force, total.moment);
+        sum.add(forces[e], body_->rest[e] + state.displacement[e]);
+      sum.tell(total);
       total.follower = true;
       if (load.couple) total.rotation = load.follower->turn(state.displacement, load.turn);
       result.loads.push_back(total);
       continue;
     }
+    Resultant sum;
     for (const ElementForce& at : load.forces)
-      add_at(factor * at.force, body_->rest[at.element] + state.displacement[at.element], total.force,
-             total.moment);
+      sum.add(factor * at.force, body_->rest[at.element] + state.displacement[at.element]);
+    sum.tell(total);
     if (load.couple)
       total.rotation = turn_of_couple(load.forces.size(), [&](std::size_t i) {
         const ElementForce& at = load.forces[i];

@@ -39,6 +39,7 @@ bool settles(const Scene& scene) {
 
 Settling::Settling(Scene& scene, const Body& body) {
   const double sound = sound_time(scene, body);
+  extent_ = body_extent(body);
   ramp_ = kRamp * sound;
   const TimeCurve grows{{0, ramp_}, {0, 1}};
   for (Load& load : scene.get<Loads>().loads) load.course = grows;
@@ -95,7 +96,7 @@ void Settling::look(const std::function<void(SimulateResult&)>& tell) {
   SimulateResult told;
   tell(told);
   double scale = 0;
-  for (const AppliedLoad& load : told.loads) scale += load.force.norm();
+  for (const AppliedLoad& load : told.loads) scale += load.force.norm() + load.couple / extent_;
   for (const Reaction& reaction : told.reactions) scale += reaction.force.norm();
   const double left = parallel_sum<double>(force_.size(), [&](std::size_t e) { return force_[e].norm(); });
   summary_.residual = scale > 0 ? left / scale : left > 0 ? HUGE_VAL : 0;

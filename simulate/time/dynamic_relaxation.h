@@ -42,6 +42,7 @@ class Settling {
   static constexpr std::uint64_t kLook = 20;  // steps between two looks at the residual
   void look(const std::function<void(SimulateResult&)>& tell);
 
+  double extent_ = 0;                 // m, of the body
   double ramp_ = 0;                   // s
   double kinetic_ = 0, largest_ = 0;  // J: now, ever
   bool done_ = false;
