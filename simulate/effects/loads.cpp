@@ -179,25 +179,6 @@ std::unique_ptr<FollowerLoad> follower_on_elements(const Load& load,
                       [&](std::size_t q, const auto& each) { each(elements[q], 1); });
 }
 
-// Of a load's forces, and the couple about their middle, weighted by their sizes: of forces side by side there is none.
-class Resultant {
- public:
-  void add(const Vec3& force, const Vec3& place) {
-    add_at(force, place, force_, moment_);
-    sizes_ += force.norm();
-    middle_ += force.norm() * place;
-  }
-  void tell(AppliedLoad& load) const {
-    load.force = force_;
-    load.moment = moment_;
-    if (sizes_ > 0) load.couple = (moment_ - (middle_ / sizes_).cross(force_)).norm();
-  }
-
- private:
-  Vec3 force_ = Vec3::Zero(), moment_ = Vec3::Zero(), middle_ = Vec3::Zero();  // N, N m, N m
-  double sizes_ = 0;                                                           // N
-};
-
 }  // namespace
 
 bool parse_follower(TableReader& reader) {
@@ -362,19 +343,16 @@ void Loads::report(const State& state, const std::vector<Vec3>&, SimulateResult&
     if (load.follower) {
       std::vector<Vec3> forces(body_->element_count(), Vec3::Zero());
       load.follower->add_forces(state.displacement, factor, forces);
-      Resultant sum;
       for (std::size_t e = 0; e < forces.size(); ++e)
-        sum.add(forces[e], body_->rest[e] + state.displacement[e]);
-      sum.tell(total);
+        add_at(forces[e], body_->rest[e] + state.displacement[e], total.force, total.moment);
       total.follower = true;
       if (load.couple) total.rotation = load.follower->turn(state.displacement, load.turn);
       result.loads.push_back(total);
       continue;
     }
-    Resultant sum;
     for (const ElementForce& at : load.forces)
-      sum.add(factor * at.force, body_->rest[at.element] + state.displacement[at.element]);
-    sum.tell(total);
+      add_at(factor * at.force, body_->rest[at.element] + state.displacement[at.element], total.force,
+             total.moment);
     if (load.couple)
       total.rotation = turn_of_couple(load.forces.size(), [&](std::size_t i) {
         const ElementForce& at = load.forces[i];

@@ -36,7 +36,6 @@ struct AppliedLoad {  // of one [[load]], or of gravity
   // turned what it acts on by [rad]; of one that follows, whole turns included
   std::optional<Vec3> displacement = {}, rotation = {};
   bool follower = false;  // it turned with what it acts on
-  double couple = 0;      // N m, |moment| about the middle of what a [[load]] acts on; 0 where nobody asks
 };
 
 // Adds a force at a place to a resultant and its moment about the origin.
