@@ -206,13 +206,14 @@ std::string Run::save_failed(const Mechanics& mechanics) {
 // Loads that follow have no energy whose minimum is looked for. Load steps scale loads and moves; free
 // strain acts whole from the first on, so that buckling is not met on the way.
 void Run::warn_of_buckling(Mechanics& mechanics) {
-  // The tangent is that of elements with rigid links held where they are.
-  const std::vector<Motion>& motions = mechanics.constraints().motions;
-  const bool turning_link = std::any_of(motions.begin(), motions.end(), [](const Motion& motion) {
-    return motion.link && motion.link->follower;
-  });
-  if (mechanics.follows() || turning_link)
-    report_following(!turning_link && has_positive_tangent(mechanics, state_) == true, progress_);
+  bool linked = false, follows = mechanics.follows();
+  for (const Motion& motion : mechanics.constraints().motions)
+    if (motion.link) {
+      linked = true;
+      follows |= motion.link->follower;
+    }
+  // The tangent knows rigid links only where they are held.
+  if (follows) report_following(!linked && has_positive_tangent(mechanics, state_) == true, progress_);
   if (!body_.cell_columns.contains(kFreeStrainColumn)) return;
   const std::optional<bool> stable = has_positive_tangent(mechanics, state_);
   if (stable == true) return;
