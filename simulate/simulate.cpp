@@ -206,11 +206,14 @@ std::string Run::save_failed(const Mechanics& mechanics) {
 // Loads that follow have no energy whose minimum is looked for. Load steps scale loads and moves; free
 // strain acts whole from the first on, so that buckling is not met on the way.
 void Run::warn_of_buckling(Mechanics& mechanics) {
-  if (mechanics.follows() && has_positive_tangent(mechanics, state_) != true)
-    progress_.warn(
-        scene_.name +
-        ": whether this equilibrium is stable under loads that follow it was not found out: the part may "
-        "buckle or flutter; [run] time with [damping] shows whether it stays");
+  bool linked = false, follows = mechanics.follows();
+  for (const Motion& motion : mechanics.constraints().motions)
+    if (motion.link) {
+      linked = true;
+      follows |= motion.link->follower;
+    }
+  // The tangent knows rigid links only where they are held.
+  if (follows) report_following(!linked && has_positive_tangent(mechanics, state_) == true, progress_);
   if (!body_.cell_columns.contains(kFreeStrainColumn)) return;
   const std::optional<bool> stable = has_positive_tangent(mechanics, state_);
   if (stable == true) return;

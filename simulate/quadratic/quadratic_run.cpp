@@ -60,7 +60,9 @@ void judge(const QuadraticSystem& system, const QuadraticSolution& solution, dou
            Progress& progress) {
   judge_strain(typical_strain(system, solution), progress);
   judge_outside(energy_outside(system, solution, elastic_energy), progress);
-  if (!solution.stable)
+  if (system.follows() || system.links_follow())
+    report_following(solution.stable == true, progress);
+  else if (!solution.stable)
     progress.warn(
         "whether this equilibrium is stable was not found out: the part may buckle, which model \"cells\" "
         "follows");
