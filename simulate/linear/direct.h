@@ -25,8 +25,9 @@ class DirectSolver {
   bool analysed_ = false;
 };
 
-// Multiplications that factorise() takes of a matrix of 3x3 blocks; its pattern tells.
-[[nodiscard]] double factor_operations(const LinearOperator& matrix);
+// Whether factorise() takes no more multiplications of a symmetric matrix of 3x3 blocks, by its pattern: 27 / 2 of a pair of
+// blocks in a column of the factor. False without a count for large solids, which always take more.
+[[nodiscard]] bool factor_takes_at_most(const LinearOperator& matrix, double multiplications);
 
 // Lower half of a matrix of RxR blocks.
 template <class View>

@@ -142,9 +142,9 @@ class Multigrid : public Preconditioner {
   Multigrid(const LinearOperator& matrix, const NodeGeometry& geometry, const DirectLimit& direct)
       : matrix_(matrix) {
     assert(geometry.position.size() == matrix.rows() && geometry.index.size() == matrix.rows());
-    const bool cheap = direct.row_cost > 0 &&
-                       factor_operations(matrix) <= direct.row_cost * static_cast<double>(matrix.rows());
-    if (matrix.rows() > direct.rows && !cheap) build_structure(geometry);
+    const double cheap = direct.row_cost * static_cast<double>(matrix.rows());
+    if (matrix.rows() > direct.rows && !(cheap > 0 && factor_takes_at_most(matrix, cheap)))
+      build_structure(geometry);
     refresh();
   }
 

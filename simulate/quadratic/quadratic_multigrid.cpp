@@ -381,7 +381,7 @@ void QuadraticMultigrid::estimate_largest() {
   for (std::size_t step = 0; squared > 0 && step < kMostLanczosSteps; ++step) {
     multiply_roughly(direction, image);
     const double length = squared / dot(direction, image);
-    if (!(length > 0)) break;
+    if (!(length > 0)) return widen();  // not positive: the estimate is no bound
     diagonal.push_back(1 / length + turned);
     before = largest_;
     largest_ = greatest_eigenvalue(diagonal, beside);

@@ -35,7 +35,7 @@ Shot shoot(const Surface& surface, const View& view, int size = 400, const std::
   camera.pixels = 0.45f * static_cast<float>(size);
   camera.x = camera.y = static_cast<float>(size) / 2;
   Image image(size, size, colour(kWhite));
-  render(image, {0, 0, size, size}, camera, drawn, make_tracer(drawn), options);
+  render(image, {0, 0, size, size}, camera, drawn, make_tracer(drawn), options, [](double) {});
   return {camera, image, camera.pixels / frame.radius};
 }
 

@@ -66,7 +66,7 @@ void put_rotation(const Mat3& rotation, std::size_t lane, Number* to) {
       to[kWidth * static_cast<std::size_t>(3 * i + j) + lane] = static_cast<Number>(rotation(i, j));
 }
 
-using Columns = std::array<Mat3, kQuadraticNodes>;  // of CellTurn
+using TurnColumns = std::array<Mat3, kQuadraticNodes>;  // of CellTurn
 
 void add_lower(const auto& matrix, std::size_t nodes, double* blocks) {
   for (Eigen::Index a = 0; a < static_cast<Eigen::Index>(3 * nodes); a += 3)
@@ -362,7 +362,7 @@ void CellProducts<Number>::turn_blocks(std::size_t cell,
                                        CellBlocks& blocks) const requires std::same_as<Number, double> {
   const Part& part = parts_[eights_[place_[cell] / kWidth].part];
   const Mat3 rotation = turned_.empty() ? part.axes : Mat3(turned_[cell] * part.axes);
-  const auto turn = [&](std::size_t count, const Columns& a, const Columns& gamma, double* block) {
+  const auto turn = [&](std::size_t count, const TurnColumns& a, const TurnColumns& gamma, double* block) {
     for (std::size_t p = 0; p < count; ++p)
       for (std::size_t q = 0; q <= p; ++q, block += 9) {
         Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> own(block);
@@ -371,7 +371,7 @@ void CellProducts<Number>::turn_blocks(std::size_t cell,
         own = rotation * sum * rotation.transpose();
       }
   };
-  Columns a{}, gamma{}, corner_a{}, corner_gamma{};
+  TurnColumns a{}, gamma{}, corner_a{}, corner_gamma{};
   if (!rotation_.empty()) {
     const std::size_t first = place_[cell] / kWidth * kTurnNumbers * kWidth + place_[cell] % kWidth;
     corner_a.fill(Mat3::Zero());
