@@ -129,7 +129,7 @@ class Run {
  private:
   EquilibriumResult solve(Mechanics& mechanics);
   void warn_of_buckling(Mechanics& mechanics);
-  [[nodiscard]] std::optional<std::vector<Vec3>> coarse_equilibrium(Progress& stretch);
+  [[nodiscard]] std::optional<NearStart> coarse_equilibrium(Progress& stretch);
   [[nodiscard]] std::string save_failed(const Mechanics& mechanics);
 
   Body& body_;
@@ -141,6 +141,7 @@ class Run {
   Problem problem_;
   bool buckled_ = false;
   double linear_reach_ = 0;
+  FollowerMemory followers_;  // where the run ended
   int start_newton_iterations_ = 0;
   std::vector<std::uint8_t> tied_;  // (elements) Mechanics::tied_elements()
   State state_;
@@ -166,7 +167,7 @@ EquilibriumResult Run::solve(Mechanics& mechanics) {
 
 // Where the elements are in equilibrium on a lattice twice as coarse: nothing where there is none, or where
 // the coarse lattice says little of this one.
-std::optional<std::vector<Vec3>> Run::coarse_equilibrium(Progress& stretch) {
+std::optional<NearStart> Run::coarse_equilibrium(Progress& stretch) {
   try {
     Coarsening coarse = coarsening(body_);
     if (share_of_thin_walls(coarse.body, 1) > kMostThinWalls) return std::nullopt;
@@ -183,7 +184,7 @@ std::optional<std::vector<Vec3>> Run::coarse_equilibrium(Progress& stretch) {
     if (options_.explain)
       progress_.say(fmt::format("start: from the equilibrium of {} cells, {} Newton iterations",
                                 human_count(coarse.body.cell_count()), found.newton_iterations));
-    return prolonged_displacement(coarse, body_);
+    return NearStart{prolonged_displacement(coarse, body_), run.followers_};
   } catch (const InputError&) {
   } catch (const DivergedError&) {
   } catch (const TimeoutError&) {
@@ -246,6 +247,7 @@ SimulateResult Run::operator()() {
   if (from_rest && !solved.buckled) linear_reach_ = solved.linear_reach;
   const StopWaits answered;  // what is found is told: the rest takes moments
   buckled_ = solved.buckled;
+  followers_ = follower_memory(mechanics);
   mechanics.report(state_, result);
   for (const std::string& warning : warnings_of(result)) progress_.warn(scene_.name + ": " + warning);
   result.elastic_energy = mechanics.elastic_energy(state_);

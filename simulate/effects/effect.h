@@ -97,6 +97,9 @@ class Effect {
   // N, how the forces of an effect that follows() change to first order along a change (elements) m; or
   // that with the derivative transposed (true). Added to the last.
   virtual void add_force_change(const State&, const std::vector<Vec3>&, bool, std::vector<Vec3>&) {}
+  // The run has come to this state and goes on from it: the equilibrium of a load step, or the end of a step
+  // in time. States that are only tried are not told.
+  virtual void accept(const State&) {}
   // Elements that follow a path exactly.
   virtual void constrain(Constraints&) {}
   // `unbalanced`: N (elements), on elements that are held.

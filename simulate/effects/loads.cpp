@@ -284,6 +284,12 @@ void Loads::add_force_change(const State& state, const std::vector<Vec3>& change
   }
 }
 
+// Trial states of an iteration may have turned anywhere, by whole turns more or less.
+void Loads::accept(const State& state) {
+  for (Spread& load : loads_)
+    if (load.follower) load.turn = load.follower->turn(state.displacement, load.turn);
+}
+
 double Loads::added_frequency(const State&, const std::vector<double>& mass) {
   if (added_frequency_) return *added_frequency_;
   std::vector<double> sums(mass.size(), 0);
@@ -326,12 +332,9 @@ double Loads::energy(const State& state) {
 }
 
 void Loads::add_forces(const State& state, std::vector<Vec3>& forces) {
-  for (Spread& load : loads_) {
+  for (const Spread& load : loads_) {
     const double factor = load.course.at(state);
-    if (load.follower) {
-      load.follower->add_forces(state.displacement, factor, forces);
-      load.turn = load.follower->turn(state.displacement, load.turn);
-    }
+    if (load.follower) load.follower->add_forces(state.displacement, factor, forces);
     for (const ElementForce& at : load.forces) forces[at.element] += factor * at.force;
   }
 }

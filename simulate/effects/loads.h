@@ -62,6 +62,7 @@ class Loads : public Effect {
   [[nodiscard]] bool follows() const override;
   void add_force_change(const State& state, const std::vector<Vec3>& change, bool transposed,
                         std::vector<Vec3>& forces) override;
+  void accept(const State& state) override;
   [[nodiscard]] double added_frequency(const State& state, const std::vector<double>& mass) override;
   [[nodiscard]] std::vector<double> memory() const override;
   void restore(const std::vector<double>& memory) override;
@@ -79,7 +80,7 @@ class Loads : public Effect {
     std::vector<ElementForce> forces;  // ascending by element; none where it follows
     bool couple = false;               // it was given a torque, or a point where its force acts
     std::unique_ptr<FollowerLoad> follower = nullptr;
-    Vec3 turn = Vec3::Zero();  // rad, that the follower has turned by
+    Vec3 turn = Vec3::Zero();  // rad, that the follower has turned by where the run has come to
   };
   const Body* body_ = nullptr;
   std::vector<Spread> loads_;

@@ -64,6 +64,12 @@ int least_load_steps(const Constraints& constraints) {
   return static_cast<int>(std::ceil(turns / kLargestTurn - 1e-9));
 }
 
+void restore_followers(Mechanics& mechanics, const FollowerMemory& memory) {
+  std::size_t next = 0;
+  for (const ActiveEffect& effect : mechanics.effects())
+    if (effect->follows() && next < memory.size()) effect->restore(memory[next++]);
+}
+
 // A run over load steps.
 class LoadStepping {
  public:
@@ -116,10 +122,10 @@ class LoadStepping {
   NewtonOutcome outcome_;
   double farthest_reach_ = std::numeric_limits<double>::infinity();  // m, of an attempt's linear answer
   double hopeless_reach_ = std::numeric_limits<double>::infinity();  // m, likewise, for the whole load
-  double reach_ = 0;                       // m: of the first linear answer, for the whole load
-  std::optional<std::vector<Vec3>> near_;  // m: where the next attempt starts in place of `state_`
-  int spent_near_ = 0;                     // iterations of an attempt from there that came to nothing
-  bool pushed_ = false;                    // the next attempt starts beside the last equilibrium
+  double reach_ = 0;               // m: of the first linear answer, for the whole load
+  std::optional<NearStart> near_;  // where the next attempt starts in place of `state_`
+  int spent_near_ = 0;             // iterations of an attempt from there that came to nothing
+  bool pushed_ = false;            // the next attempt starts beside the last equilibrium
   int pushes_ = 0;
 };
 
@@ -166,7 +172,7 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   options.max_iterations = std::min(max_iterations, iterations_left());
   options.farthest_reach = std::min(farthest_reach_, hopeless_reach_ * (done_ + increment_));
   trial_ = state_;
-  if (near_) trial_.displacement = *near_;
+  if (near_) trial_.displacement = near_->displacement;
   trial_.share = done_ + increment_ > 1 - 1e-9 ? 1 : done_ + increment_;
   if (pushed_) push(trial_);
   outcome_ = newton_with_links(mechanics_, trial_, options, [&](double gone, const std::string& note) {
@@ -181,6 +187,8 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   if (!outcome_.converged) return false;
   done_ = trial_.share;
   state_ = trial_;
+  if (near_) restore_followers(mechanics_, near_->followers);
+  for (const ActiveEffect& effect : mechanics_.effects()) effect->accept(state_);
   ++result_.load_steps;
   result_.relative_residual = outcome_.relative_residual;
   if (outcome_.iterations <= kEasyIterations) increment_ = std::min(longest_, 2 * increment_);
@@ -300,6 +308,13 @@ void LoadStepping::solve() {
 }
 
 }  // namespace
+
+FollowerMemory follower_memory(const Mechanics& mechanics) {
+  FollowerMemory memory;
+  for (const ActiveEffect& effect : mechanics.effects())
+    if (effect->follows()) memory.push_back(effect->memory());
+  return memory;
+}
 
 void refuse_free_motions(Mechanics& mechanics, const State& start, const std::string& scene) {
   mechanics.assemble(start);

@@ -17,6 +17,17 @@ struct EquilibriumResult {
   double linear_reach = 0;  // m: the largest displacement of the first linear answer, for the whole load
 };
 
+// What loads that follow the shape remember of the way to where they are: Effect::memory() of each, in their
+// order. It is the same on every lattice.
+using FollowerMemory = std::vector<std::vector<double>>;
+[[nodiscard]] FollowerMemory follower_memory(const Mechanics& mechanics);
+
+// A place near an equilibrium, and the way there.
+struct NearStart {
+  std::vector<Vec3> displacement;  // m (elements)
+  FollowerMemory followers;
+};
+
 // The rigid motions that the ties leave free at `start`: throws InputError(scene, ...) naming part and
 // motion.
 void refuse_free_motions(Mechanics& mechanics, const State& start, const std::string& scene);
@@ -29,10 +40,10 @@ void refuse_unsupported_elements(Mechanics& mechanics, const State& start, const
 // worst cell and a suggestion; Interrupted and TimeoutError (base/stop.h). `state` is then the last one in
 // equilibrium.
 //
-// `start` is asked for displacements (elements, m) near the equilibrium under the whole load, once, where the
-// linear answer reaches so far that the way there is long; it may be empty, or give nothing. Its Progress is a stretch
-// of this run's.
-using CoarseStart = std::function<std::optional<std::vector<Vec3>>(Progress&)>;
+// `start` is asked for a place near the equilibrium under the whole load, once, where the linear answer
+// reaches so far that the way there is long; it may be empty, or give nothing. Its Progress is a stretch of
+// this run's.
+using CoarseStart = std::function<std::optional<NearStart>(Progress&)>;
 [[nodiscard]] EquilibriumResult find_equilibrium(Mechanics& mechanics, State& state,
                                                  const RunSettings& settings, Progress& progress,
                                                  const CoarseStart& start = {});

@@ -342,8 +342,10 @@ void ImplicitEuler::add_forces(std::size_t effect, const State& state, std::vect
 }
 
 void ImplicitEuler::finish(const State& state) {
-  for (const ActiveEffect& effect : effects_)
+  for (const ActiveEffect& effect : effects_) {
     effect->end_implicit_step(state, {mass_, step_, step_}, supports_);
+    effect->accept(state);
+  }
 }
 
 double ImplicitEuler::add_seconds(const std::vector<ActiveEffect>& effects) const {

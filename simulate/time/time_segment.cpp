@@ -404,6 +404,7 @@ void TimeSegment::step(Clock& clock, EnergyHistory* history, bool row) {
   held_->impose(state_, stepper_->mass(), advance);
   for (const ActiveEffect& effect : effects_)
     effect->finish_step(state_, {stepper_->mass(), advance.kick, advance.drift});
+  for (const ActiveEffect& effect : effects_) effect->accept(state_);
   if (history) {
     std::vector<Vec3> supports(body_.element_count(), Vec3::Zero());
     held_->add_forces(supports);

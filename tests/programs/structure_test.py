@@ -116,7 +116,8 @@ def blocks(lines, indent):
         line = lines[i]
         if line.startswith(pad) and len(line) > indent and line[indent] not in " }/#":
             j = i
-            while j < len(lines) and not lines[j].rstrip().endswith(("{", ";")):
+            # a function of one line ends in "}"
+            while j < len(lines) and not lines[j].rstrip().endswith(("{", ";", "}")):
                 j += 1
             if j < len(lines) and lines[j].rstrip().endswith("{"):
                 k = j + 1
