@@ -2,8 +2,10 @@
 // is found before the first stage runs, and nothing is written before the last has ended.
 #include <fmt/format.h>
 
+#include <cmath>
 #include <filesystem>
 #include <limits>
+#include <new>
 #include <nlohmann/json.hpp>
 
 #include "base/files/files.h"
@@ -33,6 +35,7 @@
 #include "mapping/report/report.h"
 #include "simulate/answer.h"
 #include "simulate/input/infill.h"
+#include "simulate/quadratic/quadratic_run.h"
 #include "simulate/result/options.h"
 #include "simulate/scene/strength.h"
 #include "simulate/simulate.h"
@@ -255,6 +258,12 @@ bool walls_are_thin(const voxelize::VoxelizeResult& voxels) {
   return wall_thickness(voxels) < kThinWalls * voxels.parts.front().spacing.minCoeff();
 }
 
+// For model `quadratic` too: nor do a tenth of the cells resolve such walls.
+bool walls_are_too_thin(const voxelize::VoxelizeResult& voxels) {
+  constexpr double kTooThin = 0.3;  // cells
+  return wall_thickness(voxels) <= kTooThin * voxels.parts.front().spacing.minCoeff();
+}
+
 // Which model the runs at several sizes have. Where nobody says it, thin walls get `quadratic`, unless that does not take
 // the scene.
 class ModelChoice {
@@ -266,13 +275,10 @@ class ModelChoice {
                            [](const auto& part) { return !part.second.model.empty(); })) {}
 
   void choose(const voxelize::VoxelizeResult& usual) {
-    constexpr double kTooThin = 0.3;  // cells: nor do a tenth of the cells resolve such walls
-    if (may_be_other() && walls_are_thin(usual) &&
-        wall_thickness(usual) > kTooThin * usual.parts.front().spacing.minCoeff()) {
-      set(true);
-      why_ =
-          fmt::format("a fifth of the matter lies in walls thinner than {} of the usual cells", kThinWalls);
-    }
+    if (!may_be_other() || !walls_are_thin(usual)) return;
+    if (walls_are_too_thin(usual)) return keep();
+    use_quadratic(
+        fmt::format("a fifth of the matter lies in walls thinner than {} of the usual cells", kThinWalls));
   }
   // Nobody named a model, and `cells` is in use.
   [[nodiscard]] bool may_be_other() const { return free_ && !chosen_; }
@@ -366,24 +372,44 @@ class GoalRuns {
     first.push_back(std::move(run));
     const double guess = error_of(first);
     if (!(guess > kRough)) return std::move(first.front());
-    model_.use_quadratic(
-        fmt::format("the first answer of model cells was rough, off by up to {}", human_share(guess)));
+    model_.use_quadratic("the first answer of model cells was rough: it " + in_words(guess));
     const mapping::MapOptions map = plan_.map;
+    std::string why_not;
     try {
       const StopAfter limit(patience(), "--within");
       std::vector<SolvedRun> other;
       const double size = made(std::nullopt).size;
       other.push_back(solve(size, [](std::size_t) { return true; }));
-      if (error_of(other) < guess) return std::move(other.front());
-    } catch (const InputError&) {  // a scene that `quadratic` does not take
-    } catch (const DivergedError&) {
+      const double error = error_of(other);
+      why_not = warning_of_strain(other.front());
+      if (why_not.empty() && error < guess) return std::move(other.front());
+      if (why_not.empty()) why_not = "no surer: its first answer " + in_words(error);
+    } catch (const InputError& error) {  // a scene that `quadratic` does not take
+      why_not = error.what();
+    } catch (const DivergedError& error) {
+      why_not = error.what();
     } catch (const TimeoutError&) {  // there is an answer; a limit of the whole command ends what comes next
+      why_not = "it takes too long";
+    } catch (const std::bad_alloc&) {
+      why_not = "it takes too much memory";
     }
+    progress_.say(fmt::format("model quadratic, tried beside a first answer of model cells that {}: {}",
+                              in_words(guess), why_not));
     drop_warnings();
     plan_.map = map;
     model_.use_cells();
     tried_quadratic_ = true;
     return std::move(first.front());
+  }
+  // The line that tells that strains are not small, of which model `quadratic` has no bar; "" if they are.
+  static std::string warning_of_strain(const SolvedRun& run) {
+    for (const std::string& line : run.warnings)
+      if (line.find(simulate::kSmallStrainWarning) != std::string::npos) return line;
+    return "";
+  }
+  // Of error_of().
+  static std::string in_words(double error) {
+    return std::isfinite(error) ? "was off by up to " + human_share(error) : "had no error bars";
   }
   // Share; of no bar infinite.
   [[nodiscard]] double error_of(const std::vector<SolvedRun>& run) const {
@@ -548,7 +574,7 @@ bool has_thin_walls(const SolvedRun& run) {
   for (const simulate::ErrorBar& each : run.simulated.error_bars.bars)
     if (each.of != simulate::ErrorBar::Of::elastic_energy && std::abs(each.value) > 0)
       worst = std::max(worst, each.bar.half_width / std::abs(each.value));
-  return worst > kWide && walls_are_thin(run.voxels);
+  return worst > kWide && walls_are_thin(run.voxels) && !walls_are_too_thin(run.voxels);
 }
 
 // Model `quadratic` takes the scene: equilibrium without contact.

@@ -6,25 +6,50 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <numeric>
 
 #include "base/error.h"
 #include "base/resources.h"
 #include "base/units.h"
+#include "formats/lattice/cell_moments.h"
 #include "simulate/effects/contact.h"
 #include "simulate/time/dynamic_relaxation.h"
 
 namespace flexel::simulate {
 namespace {
 
-constexpr double kSure = 1.3;                                   // what the estimate may be off by
-constexpr double kProgram = 27e6, kTimedProgram = 15e6;         // bytes
-constexpr double kBlock = 100, kBlockOfSprings = 165;           // bytes
-constexpr double kElementOfPaper = 4100, kMovingElement = 520;  // bytes
-constexpr double kQuadraticNode = 2900, kElementOfMode = 450;   // bytes
+constexpr double kSure = 1.3;                            // what the estimate may be off by
+constexpr double kProgram = 27e6, kSmallProgram = 15e6;  // bytes
+constexpr double kBlock = 100, kBlockOfSprings = 165;    // bytes
+constexpr double kConnection = 350, kMovingElement = 520, kElementOfMode = 450;  // bytes
+// Of model `quadratic`, bytes: whole cells share one matrix until they turn with their matter; cells that the surface
+// cuts have one each, and a factor of it, and so have those that are held.
+constexpr double kQuadraticNode = 1250, kCutCell = 24e3, kHeldCell = 79e3, kTurnedCell = 11e3;
+
+double connections_of(const Body& body) {
+  return std::accumulate(body.connections.begin(), body.connections.end(), 0.0,
+                         [](double sum, std::uint32_t bits) { return sum + std::popcount(bits); });
+}
 
 }  // namespace
 
-std::optional<double> memory_needed(const Body& body, const Scene& scene) {
+MemoryNeeded quadratic_memory(const Body& body, std::size_t held) {
+  const auto elements = static_cast<double>(body.element_count()),
+             cells = static_cast<double>(body.cell_count());
+  const auto cut = static_cast<double>(
+      std::count_if(body.fill.begin(), body.fill.end(), [](double fill) { return fill < kWholeFill; }));
+  const double nodes = 4 * (elements + cells);
+  MemoryNeeded needed;
+  needed.bytes =
+      kSmallProgram + kQuadraticNode * nodes + kCutCell * cut + kHeldCell * static_cast<double>(held);
+  needed.with_large_deflections = needed.bytes + kTurnedCell * (cells - cut);
+  return needed;
+}
+
+std::optional<MemoryNeeded> memory_needed(const Body& body, const Scene& scene) {
   const std::vector<Model> models = models_of_parts(scene, body);
   if (models.empty() ||
       std::any_of(models.begin(), models.end(), [&](Model m) { return m != models.front(); }))
@@ -36,27 +61,32 @@ std::optional<double> memory_needed(const Body& body, const Scene& scene) {
   const double modes = scene.run.modes.value_or(0);
   if (model == Model::quadratic) {
     if (modes > 0 || scene.run.buckling) return std::nullopt;
-    return kTimedProgram + kQuadraticNode * 4 * (elements + cells);
+    return quadratic_memory(body, 0);
   }
   if (settles(scene)) return std::nullopt;
+  const auto of = [](double bytes) { return MemoryNeeded{bytes, bytes}; };
   if (scene.run.time) {
     if (scene.run.method == TimeMethod::implicit_euler || scene.get<Contact>().on) return std::nullopt;
-    return kTimedProgram + kMovingElement * elements;
+    return of(kSmallProgram + kMovingElement * elements);
   }
-  if (model == Model::paper) return kProgram + kElementOfPaper * elements;
-  return kProgram + (model == Model::springs ? kBlockOfSprings : kBlock) * blocks +
-         kElementOfMode * modes * elements;
+  if (model == Model::paper) return of(kSmallProgram + kConnection * connections_of(body));
+  return of(kProgram + (model == Model::springs ? kBlockOfSprings : kBlock) * blocks +
+            kElementOfMode * modes * elements);
+}
+
+void refuse_beyond_memory(double bytes, const std::string& what, const std::string& scene) {
+  const bool limited = std::isfinite(memory_limit());
+  const double most = limited ? memory_limit() : available_memory();
+  if (bytes <= kSure * most) return;
+  throw InputError(
+      scene, fmt::format("this run needs about {} ({}), more than {} {}: voxelize with a larger --size{}",
+                         human_bytes(bytes), what, limited ? "the limit of" : "the free memory of",
+                         human_bytes(most), limited ? ", or raise --max-memory" : ""));
 }
 
 void refuse_beyond_memory(const Body& body, const Scene& scene) {
-  const std::optional<double> needed = memory_needed(body, scene);
-  if (!needed || *needed <= kSure * memory_to_use()) return;
-  throw InputError(
-      scene.name,
-      fmt::format(
-          "this run needs about {} for {} elements, more than the limit of {}: voxelize with a larger "
-          "--size, or raise --max-memory",
-          human_bytes(*needed), human_count(body.element_count()), human_bytes(memory_to_use())));
+  if (const std::optional<MemoryNeeded> needed = memory_needed(body, scene))
+    refuse_beyond_memory(needed->bytes, human_count(body.element_count()) + " elements", scene.name);
 }
 
 }  // namespace flexel::simulate

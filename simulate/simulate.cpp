@@ -207,11 +207,14 @@ std::string Run::save_failed(const Mechanics& mechanics) {
 // Loads that follow have no energy whose minimum is looked for. Load steps scale loads and moves; free
 // strain acts whole from the first on, so that buckling is not met on the way.
 void Run::warn_of_buckling(Mechanics& mechanics) {
-  if (mechanics.follows() && has_positive_tangent(mechanics, state_) != true)
-    progress_.warn(
-        scene_.name +
-        ": whether this equilibrium is stable under loads that follow it was not found out: the part may "
-        "buckle or flutter; [run] time with [damping] shows whether it stays");
+  bool linked = false, follows = mechanics.follows();
+  for (const Motion& motion : mechanics.constraints().motions)
+    if (motion.link) {
+      linked = true;
+      follows |= motion.link->follower;
+    }
+  // The tangent knows rigid links only where they are held.
+  if (follows) report_following(!linked && has_positive_tangent(mechanics, state_) == true, progress_);
   if (!body_.cell_columns.contains(kFreeStrainColumn)) return;
   const std::optional<bool> stable = has_positive_tangent(mechanics, state_);
   if (stable == true) return;
@@ -347,6 +350,15 @@ SimulateResult run_and_judge(Body& body, const Scene& scene, const SimulateOptio
   return result;
 }
 
+void explain_memory(const Body& body, const Scene& scene, Progress& progress) {
+  const std::optional<MemoryNeeded> needed = memory_needed(body, scene);
+  if (!needed) return;
+  const bool more = needed->with_large_deflections > needed->bytes;
+  progress.say(fmt::format(
+      "memory: about {}{}", human_bytes(needed->bytes),
+      more ? ", with large deflections " + human_bytes(needed->with_large_deflections) : std::string()));
+}
+
 }  // namespace
 
 double parse_timeout(const std::string& text, const std::string& option) {
@@ -364,8 +376,7 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
   check_actions(scene, body, progress);
   refuse_heat(scene);
   refuse_beyond_memory(body, scene);
-  if (const std::optional<double> needed = memory_needed(body, scene); needed && options.explain)
-    progress.say(fmt::format("memory: about {}", human_bytes(*needed)));
+  if (options.explain) explain_memory(body, scene, progress);
   if (scene.get<Thermal>().conducts()) conduct(body, scene, progress);
   if (asks_for_modes(scene)) {
     SimulateResult result = run_modes(body, scene, options, progress);

@@ -97,9 +97,9 @@ bool FaceMask::middle(Raster& raster, std::size_t i, std::size_t j) const {
   return cell == Known::inside;
 }
 
-// A coarse cell is whole where its middle and those of the eight cells around it are on one side; edges that pass
-// between these middles and touch none of the nine cells' are thinner than a cell, and a hole so small is not left out
-// of a fit.
+// A coarse cell is in the face where its middle and those of the eight cells around it are: a hole that passes between
+// these middles is thinner than a cell, and one so small is not left out of a fit. The converse does not hold: a rib
+// between nine middles outside belongs to the face.
 bool FaceMask::has(double u, double v) const {
   const auto cell = [](double at, double begin, double end, const Raster& raster) {
     const double place = std::floor((at - begin) / (end - begin) * static_cast<double>(raster.n));
@@ -107,11 +107,9 @@ bool FaceMask::has(double u, double v) const {
   };
   const std::size_t i = cell(u, domain_.u_begin, domain_.u_end, coarse_),
                     j = cell(v, domain_.v_begin, domain_.v_end, coarse_);
-  const bool inside = middle(coarse_, i, j);
-  bool whole = i > 0 && j > 0 && i + 1 < coarse_.n && j + 1 < coarse_.n;
-  for (std::size_t k = 0; whole && k < 9; ++k)
-    whole = middle(coarse_, i + k % 3 - 1, j + k / 3 - 1) == inside;
-  if (whole) return inside;
+  bool whole = i > 0 && j > 0 && i + 1 < coarse_.n && j + 1 < coarse_.n && middle(coarse_, i, j);
+  for (std::size_t k = 0; whole && k < 9; ++k) whole = middle(coarse_, i + k % 3 - 1, j + k / 3 - 1);
+  if (whole) return true;
   const std::size_t p = cell(u, domain_.u_begin, domain_.u_end, fine_),
                     q = cell(v, domain_.v_begin, domain_.v_end, fine_);
   // The face's edges run along the rim of its domain, and arms of it may be thinner there than any cell.

@@ -22,8 +22,9 @@ struct FaceDomain {
 [[nodiscard]] double length_of(const Handle(Geom_Surface) & surface, const FaceDomain& domain, bool along_u);
 [[nodiscard]] double length_of(const Handle(Geom_Curve) & curve, double begin, double end);
 
-// Which parameters lie in the face: where errors of a fit count. Looked up in rasters that are filled as they are asked;
-// what the face's edges pass by is told to 1/768 of the domain, along its rim to 1/12288 and across it exactly. One thread at a time.
+// Which parameters lie in the face: where errors of a fit count. Looked up in rasters that are filled as they are asked:
+// told to 1/768 of the domain, along its rim to 1/12288 and across it exactly; holes thinner than 1/96 may count as the
+// face. A rib thinner than 1/768 may not be found: who judges a fit must not believe an "outside". One thread at a time.
 class FaceMask {
  public:
   FaceMask(const TopoDS_Face& face, const FaceDomain& domain);

@@ -38,7 +38,8 @@ namespace {
 constexpr std::uint32_t kNoFace = 0xffffffffu;
 // Of the tolerance: between the points that a fit looks at its error is larger.
 constexpr double kFitShare = 0.75;
-constexpr int kManyPoints = 5000;  // of a face: whether they are in it is then looked up, to 1/768 of it
+constexpr int kManyPoints =
+    5000;  // of a face: those that a FaceMask finds in it are not looked for in its edges
 
 // What one job works on.
 struct Work {
@@ -192,8 +193,10 @@ FaceCheck check_face(const DeformedGeometry& geometry, std::size_t i, const Node
   BRepTopAdaptor_FClass2d trimmed(face, 1e-6);
   std::optional<FaceMask> mask;
   if (points > kManyPoints) mask.emplace(face, d);
+  // The mask does not know what is thinner than its cells, and the fit asked the same mask: where it says "outside", the
+  // edges themselves decide.
   const auto is_inside = [&](double u, double v) {
-    return mask ? mask->has(u, v) : trimmed.Perform(gp_Pnt2d(u, v)) == TopAbs_IN;
+    return (mask && mask->has(u, v)) || trimmed.Perform(gp_Pnt2d(u, v)) == TopAbs_IN;
   };
   for (int n = 1; n <= points; ++n) {
     const double u = d.u_begin + (d.u_end - d.u_begin) * std::fmod(0.5 + 0.7548776662466927 * n, 1.0);

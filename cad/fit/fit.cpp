@@ -89,13 +89,12 @@ class ErrorGauge {
     const double du = (u_.at.back() - u_.at.front()) / static_cast<double>(u_.spans()),
                  dv = (v_.at.back() - v_.at.front()) / static_cast<double>(v_.spans());
     SpanErrors errors = none();
-    // All points of a span in a row: OpenCASCADE keeps the polynomial of the last one. Where one counts, all of it does.
+    // All points of a span in a row: OpenCASCADE keeps the polynomial of the last one.
     const auto on_span = [&](double begin, double end, const auto& counts, const auto& error_at) {
-      const auto at = [&](int q) { return begin + (end - begin) * (q + 0.5) / kPoints; };
-      bool any = false;
-      for (int q = 0; !any && q < kPoints; ++q) any = counts(at((q + kPoints / 2) % kPoints));
       double largest = 0;
-      for (int q = 0; any && q < kPoints; ++q) largest = std::max(largest, error_at(at(q)));
+      for (int q = 0; q < kPoints; ++q)
+        if (const double at = begin + (end - begin) * (q + 0.5) / kPoints; counts(at))
+          largest = std::max(largest, error_at(at));
       return largest;
     };
     for (std::size_t s = 0; s < u_.spans(); ++s)

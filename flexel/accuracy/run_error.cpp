@@ -108,21 +108,23 @@ std::vector<std::pair<Quantity, Judged>> judge_each(const std::vector<SolvedRun>
 
 std::vector<Quantity> Quantities::of(const SolvedRun& run, const SolvedRun& last) const {
   std::vector<Quantity> found;
-  const MostMoved most(last);
-  const double largest = most.in(last).norm();
+  const double largest = last.simulated.largest_displacement;
   const auto along = [](const Vec3& moved, const Vec3& direction) {
     return direction.norm() > 0 ? moved.dot(direction.normalized()) : moved.norm();
   };
   for (std::size_t p = 0; p < last.simulated.probes.size(); ++p) {
     const Vec3& direction = last.simulated.probes[p].displacement;
-    if (direction.norm() < kSmall * largest) continue;
+    if (!(direction.norm() > 0) || direction.norm() < kSmall * largest) continue;
     found.push_back({"probe " + last.simulated.probes[p].name,
                      along(run.simulated.probes[p].displacement, direction),
                      bar_of(run, simulate::ErrorBar::Of::probe, p), simulate::ErrorBar::Of::probe, p});
   }
-  if (found.empty() && largest > 0)
-    found.push_back({"largest displacement", along(most.in(run), most.in(last)),
-                     bar_of(run, simulate::ErrorBar::Of::largest_displacement, 0)});
+  if (found.empty()) {
+    const MostMoved most(last);
+    if (const Vec3 direction = most.in(last); direction.norm() > 0)
+      found.push_back({"largest displacement", along(most.in(run), direction),
+                       bar_of(run, simulate::ErrorBar::Of::largest_displacement, 0)});
+  }
   if (driven_ && last.simulated.elastic_energy > 0)
     found.push_back({"elastic energy", run.simulated.elastic_energy,
                      bar_of(run, simulate::ErrorBar::Of::elastic_energy, 0),

@@ -127,6 +127,37 @@ void fit_circle(const Surface& surface, const std::vector<std::uint32_t>& polygo
   shape.hollow = outward < 0;
 }
 
+// Whether the radius changes along the axis: that of a cone does in proportion, that of a barrel with its square. Both are
+// fitted to the corners, which lie on the surface however it was meshed.
+bool tapers(const Surface& surface, const std::vector<std::uint32_t>& polygons, const FaceShape& cylinder) {
+  double low = 1e300, high = -1e300;  // m, along the axis
+  const auto for_each_corner = [&](const auto& visit) {
+    for (const std::uint32_t p : polygons)
+      for (const std::uint32_t v : surface.polygon(p)) {
+        const Vec3 arm = surface.vertices[v] - cylinder.axis_point;
+        const double along = arm.dot(cylinder.axis);
+        visit(along, (arm - along * cylinder.axis).norm() - cylinder.radius);
+      }
+  };
+  for_each_corner([&](double along, double) {
+    low = std::min(low, along);
+    high = std::max(high, along);
+  });
+  const double half = (high - low) / 2;
+  if (!(half > 0)) return false;
+  Mat3 normal_matrix = Mat3::Zero();
+  Vec3 right = Vec3::Zero();
+  for_each_corner([&](double along, double further) {
+    const double t = (along - low) / half - 1;
+    const Vec3 row(1, t, t * t);
+    normal_matrix += row * row.transpose();
+    right += row * further;
+  });
+  // corners at two places along the axis only leave its square open
+  const Vec3 fit = normal_matrix.completeOrthogonalDecomposition().solve(right);
+  return std::abs(fit[1]) + 2 * std::abs(fit[2]) > kRoundSine * half;
+}
+
 // The part of a cylinder that a face covers.
 struct Reach {
   std::bitset<kSteps> steps;          // round the axis
@@ -207,13 +238,15 @@ FaceShape face_shape(const Surface& surface, const std::vector<std::uint32_t>& p
     return shape;
   }
   const Vec3 axis = axis_of(sums.normals);
-  if (all_normals(surface, polygons, [&](const Vec3& n) { return std::abs(n.dot(axis)) <= kSlantSine; }))
-    fit_circle(surface, polygons, axis, shape);
-  if (shape.kind != FaceShape::Kind::round) return shape;
-  const std::size_t steps = reach_of(surface, polygons, shape).steps.count();
-  shape.angle = 2 * M_PI * static_cast<double>(steps) / kSteps;
-  shape.closed = steps >= kAllRound;
-  return shape;
+  if (!all_normals(surface, polygons, [&](const Vec3& n) { return std::abs(n.dot(axis)) <= kSlantSine; }))
+    return shape;
+  FaceShape round = shape;
+  fit_circle(surface, polygons, axis, round);
+  if (round.kind != FaceShape::Kind::round || tapers(surface, polygons, round)) return shape;
+  const std::size_t steps = reach_of(surface, polygons, round).steps.count();
+  round.angle = 2 * M_PI * static_cast<double>(steps) / kSteps;
+  round.closed = steps >= kAllRound;
+  return round;
 }
 
 std::vector<FaceShape> face_shapes(const Surface& surface) {

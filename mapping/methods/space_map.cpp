@@ -110,7 +110,7 @@ std::optional<std::uint32_t> SpaceMap::Probe::cell_at(const Vec3& x, std::uint32
 }
 
 const SpaceMap::Probe::Reached& SpaceMap::Probe::reached(const Group& group) {
-  constexpr std::size_t kMost = 2048;  // some 12 MB
+  constexpr std::size_t kMost = 256;  // some 1.5 MB, for each thread that asks
   if (last_ != nullptr && group.owner == last_->group.owner && group.in_cell == last_->group.in_cell)
     return *last_;
   if (reached_.size() >= kMost) reached_.clear();

@@ -8,8 +8,6 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr double kTangential = 0.8;  // stiffness along the surface, of that along the normal
-
 Vec3 at_most(const Vec3& value, double most) {
   const double norm = value.norm();
   return norm > most ? Vec3(value * (most / norm)) : value;

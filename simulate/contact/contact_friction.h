@@ -18,6 +18,8 @@
 
 namespace flexel::simulate {
 
+constexpr double kTangential = 0.8;  // stiffness of a pair along the surface, of that along the normal
+
 class ContactFriction {
  public:
   // All but `damping` [s] outlive this; slip and adhesion are kept in `memory`.

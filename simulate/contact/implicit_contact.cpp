@@ -7,8 +7,7 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr double kTangential = 0.8;  // as in contact_friction.cpp
-constexpr double kSettled = 1e-2;    // of the contact forces, by which what is lagged may still change
+constexpr double kSettled = 1e-2;  // of the contact forces, by which what is lagged may still change
 
 }  // namespace
 
@@ -51,7 +50,7 @@ ImplicitContact::Rubbing ImplicitContact::rubbing(std::uint32_t number) const {
   made.pressure = now.pressure;
   made.most = pair.properties.friction * now.pressure;
   made.stiffness = kTangential * friction_.secant_stiffness(number);
-  made.dashpot = damping_ * now.stiffness * now.share / step_;
+  made.dashpot = dashpot_[number];
   return made;
 }
 
@@ -59,7 +58,10 @@ void ImplicitContact::begin(const State& before, double step) {
   before_ = before.displacement;
   step_ = step;
   growth_ = 1 + damping_ / step;
+  dashpot_.assign(list_.pairs().size(), 0);
   rubbing_.clear();
+  for (const std::uint32_t p : states_.active())
+    if (states_[p].pressure > 0) dashpot_[p] = damping_ * states_[p].stiffness * states_[p].share / step;
   for (const std::uint32_t p : states_.active())
     if (states_[p].pressure > 0) rubbing_.push_back(rubbing(p));
 }

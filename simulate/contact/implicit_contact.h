@@ -8,9 +8,10 @@
 //     H(r) / a + D(q),   r = r- + a s,   a = 1 + tau / dt
 // r- the slip that the pair carries, H that of a spring of k_t which slides at mu N (Huber's function: k_t r^2 / 2
 // below, mu N (|r| - mu N / 2 k_t) above it), D = tau k q^2 / 2 dt where that pulls by less than N, else linear.
-// At rest this is the law of explicit steps (simulate/contact/contact_friction.h). N, k_t, k, the normal and where the
+// At rest this is the law of explicit steps (simulate/contact/contact_friction.h). N, k_t, the normal and where the
 // pair meets are taken from a solution and held while Newton's method finds the next (lagged: Li et al. 2020,
-// section 5.2), until they do not change any more.
+// section 5.2), until they do not change any more. k is that of the beginning of the step, as the damping of cells
+// is: a dashpot lets the pair press less, with that it would become softer, and the rounds would not end.
 //
 // The tangent leaves out how weights and normals turn with the motion: it has k b b^T with b the gap's
 // derivative, which is positive.
@@ -77,6 +78,7 @@ class ImplicitContact {
   const ContactFriction& friction_;
   PairMemory& memory_;
   double step_ = 0, growth_ = 1;  // s; a
+  std::vector<double> dashpot_;   // (pairs) N/m, tau k / dt
   std::vector<Vec3> before_;      // (elements) m
   std::vector<Rubbing> rubbing_;  // ascending by pair
 };

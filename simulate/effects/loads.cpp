@@ -119,8 +119,15 @@ std::unique_ptr<FollowerLoad> pressing_load(const Load& load, const std::vector<
 std::unique_ptr<FollowerLoad> follower_on_surface(const Load& load,
                                                   const std::vector<std::uint32_t>& polygons,
                                                   const Problem& problem) {
-  const std::vector<SurfacePoint> points = points_under(load, polygons, problem);
+  std::vector<SurfacePoint> points = points_under(load, polygons, problem);
   if (load.pressure) return pressing_load(load, points, problem.body);
+  // A turn is seen from carriers only where they are what says where a point is: the nearest element of
+  // centre placement is up to half a voxel from it.
+  for (SurfacePoint& point : points) {
+    point.position.setZero();
+    for (std::uint32_t a = 0; a < point.at.count; ++a)
+      point.position += point.at.weights[a] * problem.body.rest[point.at.elements[a]];
+  }
   return turning_load(load, loaded_points(points), [&](std::size_t q, const auto& each) {
     for (std::uint32_t a = 0; a < points[q].at.count; ++a)
       each(points[q].at.elements[a], points[q].at.weights[a]);

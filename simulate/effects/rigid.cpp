@@ -149,7 +149,7 @@ void RigidParts::Moving::feel(const Pose& next, const Mat3& rotation, const Vec3
 
 std::string RigidParts::refuses_implicit_steps() const {
   const auto free = [](const Moving& moving) { return !moving.led; };
-  return std::any_of(moving_.begin(), moving_.end(), free) ? "a free rigid part" : "";
+  return std::any_of(moving_.begin(), moving_.end(), free) ? "free rigid parts (\"rigid\" of [parts])" : "";
 }
 
 void RigidParts::constrain_implicit_steps(Constraints& constraints) {

@@ -24,7 +24,7 @@ bool share_an_axis(const Tie& a, const Tie& b) {
 bool same_motion(const Tie& one, const Tie& other) {
   const Motion &a = one.motion, &b = other.motion;
   return !one.link && !other.link && a.translation == b.translation && a.angle == b.angle &&
-         (a.angle == 0 || (a.axis == b.axis && a.through == b.through));
+         (a.angle == 0 || (a.axis == b.axis && a.through == b.through && a.arc_from == b.arc_from));
 }
 
 bool intersect(const std::vector<std::uint32_t>& a, const std::vector<std::uint32_t>& b) {

@@ -50,6 +50,15 @@ void parse_rotation(TableReader& reader, Tie& tie) {
   tie.motion.angle = rotation.to_quantity(rotation.require("angle", "\"30 deg\""), Dimension::angle, "angle");
   tie.motion.arc_from = rotation.vector("arc_from", Dimension::length);
   rotation.finish();
+  if (tie.motion.arc_from) {
+    constexpr double kAcross = 1e-9;  // of the way, that is more than rounding
+    const Vec3 way = tie.motion.through - *tie.motion.arc_from;
+    if (tie.motion.angle == 0) rotation.fail("\"arc_from\" needs an \"angle\" other than 0");
+    if (!(tie.motion.axis.cross(way).norm() > kAcross * way.norm()))
+      rotation.fail(
+          "the way from \"arc_from\" to \"through\" makes no arc: it needs a length, and another direction "
+          "than \"axis\"");
+  }
   if (!(tie.axes[0] && tie.axes[1] && tie.axes[2]))
     reader.fail("[[move]] has a rotation and a free axis; a rotation leads all three");
 }

@@ -401,13 +401,16 @@ NewtonOutcome Solver::run() {
   for (; outcome_.iterations < options_.max_iterations; ++outcome_.iterations) {
     if (arrived()) {
       outcome_.converged = !(full() && (kept_.projected || indefinite_));
-      if (!outcome_.converged) outcome_.trouble = "the equilibrium that was found is unstable";
+      if (!outcome_.converged)
+        outcome_.trouble = mechanics_.follows() ? "the equilibrium that was found may be unstable"
+                                                : "the equilibrium that was found is unstable";
       return outcome_;
     }
     if (advance()) continue;
     if (!full() && gap_.empty() && outcome_.relative_residual <= 10 * options_.tolerance) break;
     outcome_.trouble = full() ? "full steps lead away from equilibrium"
-                              : "no step lowers the energy with every cell the right way round";
+                              : fmt::format("no step lowers the {} with every cell the right way round",
+                                            mechanics_.follows() ? "forces that are left over" : "energy");
     return outcome_;
   }
   outcome_.converged = outcome_.relative_residual <= options_.tolerance;

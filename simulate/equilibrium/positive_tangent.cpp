@@ -13,6 +13,11 @@ namespace flexel::simulate {
 std::optional<bool> has_positive_tangent(Mechanics& mechanics, const State& state) {
   constexpr double kTolerance = 1e-6;
   constexpr int kIterations = 1000;
+  // What was found is told under a StopWaits; this question may not keep that waiting.
+  if (stop_is_due()) {
+    check_stop();
+    return std::nullopt;
+  }
   mechanics.assemble(state);
   mechanics.eliminate_prescribed();
   std::mt19937 random(1);
@@ -27,8 +32,9 @@ std::optional<bool> has_positive_tangent(Mechanics& mechanics, const State& stat
   const FollowedTangent symmetric = mechanics.followed(true);
   const LinearOperator& tangent =
       mechanics.follows() ? static_cast<const LinearOperator&>(symmetric) : mechanics.tangent();
-  const LinearResult result = conjugate_gradients(tangent, irregular, answer, *preconditioner, kTolerance,
-                                                  kIterations, [](int, double) { check_stop(); });
+  const LinearResult result = conjugate_gradients(
+      tangent, irregular, answer, *preconditioner, kTolerance, kIterations, [](int, double) { check_stop(); },
+      [](int, double) { return stop_is_due(); });
   if (result.indefinite) return false;
   if (result.converged) return true;
   return std::nullopt;

@@ -18,10 +18,10 @@ constexpr double kShortest = 1.0 / 1024;  // of a step
 constexpr int kFullIterations = 12;
 // Elements: contact changes the tangent in every iteration, and a factorisation is dearer than a hierarchy.
 constexpr std::size_t kDirectRowsTouching = 100;
-constexpr int kPasses = 12;         // of Newton's method, until what is held fixed in it suits
-constexpr int kShares = 4;          // of a step, that are tried until effects bear it
-constexpr double kWhole = 0.999;    // share that needs no other
-constexpr double kSameStep = 1e-9;  // by which the length may differ for a tangent to be kept
+constexpr int kPasses = 12;            // of Newton's method, until what is held fixed in it suits
+constexpr int kLooks = 40;             // at a step, each at a shorter one, until effects bear it
+constexpr double kBorneWhole = 0.999;  // share that needs no other look
+constexpr double kSameStep = 1e-9;     // by which the length may differ for a tangent to be kept
 
 }  // namespace
 
@@ -170,22 +170,27 @@ State ImplicitEuler::along_the_way(const State& trial) const {
   return state;
 }
 
-// What forces the residual is measured against where everything moves freely: those of the effects as the
-// step begins.
-double ImplicitEuler::force_scale(const State& trial) const {
+// What forces [N] the residual is measured against where everything moves freely: those of the effects as the
+// step begins, before anything is led. A tool led into a part that has not moved yet would press with forces that
+// the step never has, and beside them those that it has would be nothing.
+double ImplicitEuler::force_scale() const {
+  State state = before_;
+  state.time = aimed_.time;
   std::vector<Vec3> forces(mass_.size(), Vec3::Zero());
   for (std::size_t p = 0; p < effects_.size(); ++p)
-    if (mechanics_->effects()[p].couples.empty()) mechanics_->effects()[p]->add_forces(trial, forces);
+    if (mechanics_->effects()[p].couples.empty()) mechanics_->effects()[p]->add_forces(state, forces);
   return std::sqrt(dot(forces, forces));
 }
 
+// What Newton's method finds without a step counts only where it is a place to be: where surfaces have passed through
+// one another no pair presses any more, which looks like equilibrium.
 bool ImplicitEuler::solve(State& trial, NewtonSteps steps,
                           const std::function<void(const std::string&)>& progress, ImplicitStep& told) {
   NewtonOptions options;
   options.steps = steps;
   options.tolerance = tolerance_;
   if (steps == NewtonSteps::full) options.max_iterations = kFullIterations;
-  options.least_scale = force_scale(trial);
+  options.least_scale = force_scale();
   if (touches_) options.direct.rows = kDirectRowsTouching;
   for (int pass = 0; pass < kPasses; ++pass) {
     const NewtonOutcome outcome = newton(
@@ -194,9 +199,12 @@ bool ImplicitEuler::solve(State& trial, NewtonSteps steps,
     told.cg_iterations += outcome.cg_iterations;
     told.trouble = outcome.trouble;
     if (!outcome.converged) return false;
-    if (settles(trial)) return true;
+    if (!settles(trial)) continue;
+    if (std::isfinite(mechanics_->energy(trial))) return true;
+    told.trouble = "surfaces pass through one another within the step";
+    return false;
   }
-  told.trouble = "the friction of contacts does not settle";
+  told.trouble = "friction and damping of contacts do not settle";
   return false;
 }
 
@@ -219,11 +227,12 @@ void ImplicitEuler::aim(const State& state, double end) {
   for (const ActiveEffect& effect : effects_) effect->lead_to(end, aimed_.displacement);
 }
 
-// A step from `state` to `end` [s], or as much of it as effects bear; where it ends.
-double ImplicitEuler::begin(const State& state, double end) {
+// A step from `state` to `end` [s], or as much of it as effects bear; where it ends. Nothing: they bear none of
+// `shortest` [s].
+std::optional<double> ImplicitEuler::begin(const State& state, double end, double shortest) {
   const double previous = step_;
   bool recouples = false;
-  for (int look = 0; look < kShares; ++look) {
+  for (int look = 0;; ++look) {
     aim(state, end);
     State led = aimed_;  // what is prescribed may pull further than what is free goes
     apply(mechanics_->constraints(), problem_.body, led, led.displacement);
@@ -233,7 +242,8 @@ double ImplicitEuler::begin(const State& state, double end) {
       share = std::min(share, bearing.share);
       recouples = recouples || bearing.recouples;
     }
-    if (!(share < kWhole) || look + 1 == kShares) break;
+    if (!(share < kBorneWhole)) break;
+    if (share * step_ < shortest || look == kLooks) return std::nullopt;
     end = *state.time + share * step_;
   }
   if (recouples && !covers_couples()) make_mechanics();
@@ -288,17 +298,22 @@ ImplicitStep ImplicitEuler::advance(State& state, double end, double whole,
   if (left - step < 0.25 * step) step = left;
   // Steps that shrink without end would come nearer and nearer to what stops them, until nothing is left of
   // them but rounding.
-  for (const double shortest = std::min(left, kShortest * whole); step >= shortest; step /= 2) {
-    const double whole_way = step == left ? end : *state.time + step, borne = begin(state, whole_way);
+  for (const double shortest = std::min(left, kShortest * whole); step >= shortest;) {
+    const double whole_way = step == left ? end : *state.time + step;
+    const std::optional<double> borne = begin(state, whole_way, 0.5 * shortest);
+    if (!borne) {
+      told.trouble = "parts come near one another so fast that contact bears no step of that length";
+      return told;
+    }
     if (attempt(state, progress, told)) {
       told.step = step_;
-      if (borne < whole_way) return told;  // it says nothing of longer ones
+      if (*borne < whole_way) return told;  // it says nothing of longer ones
       reach_ = step == left ? std::max(reach_, 2 * step) : 2 * step;
       return told;
     }
     forget();
     ++told.failures;
-    reach_ = step / 2;
+    reach_ = step = 0.5 * std::min(step, step_);
   }
   return told;
 }

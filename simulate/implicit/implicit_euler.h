@@ -37,7 +37,8 @@ class ImplicitEuler {
 
   // Advances `state` to the time `end` [s], or where Newton's method fails part of the way there: a half, a
   // quarter ... of it, but no less than 1/1024 of `whole` [s], and later steps grow back; or as far as effects
-  // bear. On failure `state` is untouched. finish() has to follow. `progress` hears of every iteration and may throw.
+  // bear, but no less than half of that. On failure `state` is untouched. finish() has to follow. `progress` hears of
+  // every iteration and may throw.
   ImplicitStep advance(State& state, double end, double whole,
                        const std::function<void(const std::string&)>& progress);
 
@@ -70,13 +71,13 @@ class ImplicitEuler {
   [[nodiscard]] std::vector<ActiveEffect> all_effects();
   void make_mechanics();
   [[nodiscard]] bool covers_couples() const;
-  double begin(const State& state, double end);
+  std::optional<double> begin(const State& state, double end, double shortest);
   void aim(const State& state, double end);
   bool attempt(State& state, const std::function<void(const std::string&)>& progress, ImplicitStep& told);
   bool solve(State& trial, NewtonSteps steps, const std::function<void(const std::string&)>& progress,
              ImplicitStep& told);
   [[nodiscard]] bool settles(const State& found) const;
-  [[nodiscard]] double force_scale(const State& trial) const;
+  [[nodiscard]] double force_scale() const;
   [[nodiscard]] State along_the_way(const State& trial) const;
 
   const Problem& problem_;

@@ -187,11 +187,13 @@ void TouchingSearch::sample(std::uint32_t part) {
   // their carriers: around the bolts of a frame there are hundreds of thousands, and few of them touch.
   constexpr std::size_t kAtATime = 16384;
   std::vector<Sample>& kept = points_[part];
+  std::vector<std::uint32_t> triangles;
   for (std::size_t begin = 0; begin < polygons.size(); begin += kAtATime) {
-    const auto from = polygons.begin() + static_cast<std::ptrdiff_t>(begin);
-    const auto to =
-        polygons.begin() + static_cast<std::ptrdiff_t>(std::min(begin + kAtATime, polygons.size()));
-    for (const SurfacePoint& point : surface_points(problem_, {from, to}))
+    triangles.clear();
+    for (std::size_t i = begin; i < std::min(begin + kAtATime, polygons.size()); ++i)
+      for (std::uint32_t t = first_triangle_[polygons[i]]; t < first_triangle_[polygons[i] + 1]; ++t)
+        triangles.push_back(t);
+    for (const SurfacePoint& point : surface_points(problem_, triangles_, triangles))
       if (is_near_another(part, point.position))
         kept.push_back({point.position, point.area_vector, point.polygon});
   }

@@ -69,10 +69,10 @@ double longest_edge(const Body& body, std::uint32_t polygon) {
   return kLongestEdge * body.parts[body.surface.polygon_part(polygon)].lattice.spacing.minCoeff();
 }
 
-std::vector<Share> shares_of(const Body& body, const std::vector<std::uint32_t>& polygons) {
-  const Triangles triangles = triangulate(body.surface);
+std::vector<Share> shares_of(const Body& body, const Triangles& triangles,
+                             const std::vector<std::uint32_t>& chosen) {
   std::vector<Share> shares;
-  for (const std::uint32_t t : selected_triangles(body, triangles, polygons)) {
+  for (const std::uint32_t t : chosen) {
     const std::uint32_t polygon = triangles.polygon[t];
     Corners corners;
     for (std::size_t c = 0; c < 3; ++c) corners[c] = body.surface.vertices[triangles.corners[t][c]];
@@ -81,6 +81,11 @@ std::vector<Share> shares_of(const Body& body, const std::vector<std::uint32_t>&
     });
   }
   return shares;
+}
+
+std::vector<Share> shares_of(const Body& body, const std::vector<std::uint32_t>& polygons) {
+  const Triangles triangles = triangulate(body.surface);
+  return shares_of(body, triangles, selected_triangles(body, triangles, polygons));
 }
 
 // The point of a piece; its carrier has count 0 where nothing carries it.
@@ -134,10 +139,7 @@ class Gathered {
   std::size_t last_ = 0;
 };
 
-}  // namespace
-
-std::vector<SurfacePoint> surface_points(const Problem& problem, const std::vector<std::uint32_t>& polygons) {
-  const std::vector<Share> shares = shares_of(problem.body, polygons);
+std::vector<SurfacePoint> points_of(const Problem& problem, const std::vector<Share>& shares) {
   const auto for_each_piece_of = [&](std::size_t s, const auto& each) {
     for_each_piece(shares[s].corners, longest_edge(problem.body, shares[s].polygon), each);
   };
@@ -161,6 +163,17 @@ std::vector<SurfacePoint> surface_points(const Problem& problem, const std::vect
   std::erase_if(points,
                 [](const SurfacePoint& point) { return point.at.count == 0; });  // nothing carries them
   return points;
+}
+
+}  // namespace
+
+std::vector<SurfacePoint> surface_points(const Problem& problem, const std::vector<std::uint32_t>& polygons) {
+  return points_of(problem, shares_of(problem.body, polygons));
+}
+
+std::vector<SurfacePoint> surface_points(const Problem& problem, const Triangles& triangles,
+                                         const std::vector<std::uint32_t>& chosen) {
+  return points_of(problem, shares_of(problem.body, triangles, chosen));
 }
 
 std::vector<SurfacePoint> gathered_surface_points(const Problem& problem,

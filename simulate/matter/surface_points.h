@@ -20,6 +20,10 @@ struct SurfacePoint {
 [[nodiscard]] std::vector<SurfacePoint> surface_points(const Problem& problem,
                                                        const std::vector<std::uint32_t>& polygons);
 
+// The same of some of the surface's triangles (numbers in `triangles`), for many calls on one surface.
+[[nodiscard]] std::vector<SurfacePoint> surface_points(const Problem& problem, const Triangles& triangles,
+                                                       const std::vector<std::uint32_t>& chosen);
+
 // The same quadrature in few points, for what is linear in position and weights: of the points that one cell
 // (one element) carries within a piece of a polygon of some ten spacings, the mean by area. Sums of area, of
 // area times position and of area times weights stay as they are.

@@ -31,7 +31,9 @@ class ConnectionFriction : public Effect {
                                                               const Problem& problem);
   [[nodiscard]] std::string why() const override;
   [[nodiscard]] EnergyAccount account() const override { return EnergyAccount::dissipation; }
-  [[nodiscard]] std::string refuses_implicit_steps() const override { return why(); }
+  [[nodiscard]] std::string refuses_implicit_steps() const override {
+    return "[internal_friction] of model \"paper\"";
+  }
   void attach(const PaperModel& model, const std::vector<double>& damping) override;
   void add_forces(const State& state, std::vector<Vec3>& forces) override;
 

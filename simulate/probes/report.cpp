@@ -76,6 +76,22 @@ void report_strays(const Fragments& fragments, SimulateResult& result, Progress&
         crumbs, human_count(result.stray_cells), human_volume(volume)));
 }
 
+void report_following(bool alone, Progress& progress) {
+  const std::string flutter = "[run] time shows flutter (not method = \"implicit\", which damps it away)";
+  if (alone)
+    progress.say(
+        "no other equilibrium branches off from this one under loads that follow it, but it may flutter, "
+        "which "
+        "no run at equilibrium sees: " +
+        flutter);
+  else
+    progress.warn(
+        "whether this equilibrium is stable under loads that follow it was not found out: the part may "
+        "buckle "
+        "or flutter; a small load to the side may show buckling, " +
+        flutter);
+}
+
 void measure_displacement(const Body& body, const State& state, SimulateResult& result) {
   const LargestDisplacement largest = largest_displacement(body, state.displacement);
   result.largest_displacement = largest.value();

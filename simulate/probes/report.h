@@ -33,6 +33,10 @@ void measure_stress(const Problem& problem, const State& state, Body& body, Simu
 // Those that are known already.
 void report_stress(const Problem& problem, const Stresses& stresses, Body& body, SimulateResult& result);
 
+// Says what is known of an equilibrium under loads that follow. `alone`: no other branches off there; else nobody found out,
+// which is a warning. Flutter needs masses, and no run at equilibrium sees it.
+void report_following(bool alone, Progress& progress);
+
 // What is left of loads and reactions, summed.
 void sum_up_imbalance(SimulateResult& result);
 

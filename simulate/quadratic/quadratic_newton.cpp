@@ -156,17 +156,20 @@ class LargeDeflection {
                                       : conjugate_gradients(tangent_.stiffness, irregular, change,
                                                             *tangent_.multigrid, kLoosest, kMostLinear);
       solution_.iterations += result.iterations;
-      // where the symmetric part is not positive, loads that follow may still leave the equilibrium stable
-      if (result.indefinite) return system_.follows() ? std::nullopt : std::optional(false);
+      if (result.indefinite) return not_positive();
       if (result.converged) return links_stable(u);
       if (anew) break;
     }
     return std::nullopt;
   }
-  bool links_stable(std::vector<Vec3> u) {
+  std::optional<bool> links_stable(std::vector<Vec3> u) {
     if (!links_.any()) return true;
     LinkedNodes nodes = linked_nodes(u, 1, [] { return true; });
-    return links_.stable(nodes, 1, solution_.safety);
+    return links_.stable(nodes, 1, solution_.safety) ? std::optional(true) : not_positive();
+  }
+  // Not stable; but where the symmetric part is not positive, loads that follow may still leave it so.
+  [[nodiscard]] std::optional<bool> not_positive() const {
+    return system_.follows() || system_.links_follow() ? std::nullopt : std::optional(false);
   }
   // The stiffness is not positive, and stresses are not the reason.
   [[nodiscard]] bool weak_support() const { return weak_support_; }

@@ -9,7 +9,6 @@
 
 #include "base/error.h"
 #include "base/human.h"
-#include "base/resources.h"
 #include "base/stop.h"
 #include "formats/lattice/fused_points.h"
 #include "formats/lattice/stress_columns.h"
@@ -17,6 +16,7 @@
 #include "simulate/estimate/stress_singularity.h"
 #include "simulate/matter/fragments.h"
 #include "simulate/matter/interpolation_weights.h"
+#include "simulate/memory.h"
 #include "simulate/models/cells.h"
 #include "simulate/models/stiffness.h"
 #include "simulate/probes/probes.h"
@@ -40,10 +40,8 @@ void judge_strain(double strain, Progress& progress) {
                     "model \"cells\"",
                     human_share(strain), kAssumed));
   if (strain > kNoticeable)
-    progress.warn(
-        fmt::format("matter is strained by {}, and {}: about so much of the answer is left out; use "
-                    "model \"cells\"",
-                    human_share(strain), kAssumed));
+    progress.warn(fmt::format("matter is strained by {}, and {}: {}; use model \"cells\"",
+                              human_share(strain), kAssumed, kSmallStrainWarning));
 }
 
 // Walls of a few hundredths of a cell are held by what keeps cells of slivers regular.
@@ -62,7 +60,9 @@ void judge(const QuadraticSystem& system, const QuadraticSolution& solution, dou
            Progress& progress) {
   judge_strain(typical_strain(system, solution), progress);
   judge_outside(energy_outside(system, solution, elastic_energy), progress);
-  if (!solution.stable)
+  if (system.follows() || system.links_follow())
+    report_following(solution.stable == true, progress);
+  else if (!solution.stable)
     progress.warn(
         "whether this equilibrium is stable was not found out: the part may buckle, which model \"cells\" "
         "follows");
@@ -109,24 +109,21 @@ std::vector<std::uint8_t> singular_elements(const QuadraticSystem& system) {
   return found;
 }
 
-// What bonds, held cells and links take is not known before they are placed. Less than a run needs in all: whole cells and no error bars.
-void refuse_too_large(const QuadraticSystem& system, const std::string& scene) {
-  constexpr double kProgram = 35e6, kCell = 9e3, kHeldCell = 79e3, kBond = 105e3;  // bytes
-  constexpr double kLink = 6 * 2 * sizeof(Vec3);                                   // a node
+// What bonds, held cells and links take is not known before they are placed.
+void refuse_too_large(const QuadraticSystem& system, const Body& body, const std::string& scene) {
+  constexpr double kBond = 105e3, kLink = 6 * 2 * sizeof(Vec3);  // bytes; of a link, a node
   const std::size_t cells = system.nodes().cells.size(), links = system.linked().size();
-  double held = 0;
+  std::size_t held = 0;
   for (std::size_t c = 0; c < cells; ++c) held += system.is_supported(c) ? 1 : 0;
-  const double needed = kProgram + kCell * static_cast<double>(cells) + kHeldCell * held +
+  const double needed = quadratic_memory(body, held).bytes +
                         kBond * static_cast<double>(system.bonds().size()) +
                         kLink * static_cast<double>(links * system.nodes().size());
-  if (needed > memory_to_use())
-    throw InputError(
-        scene,
-        fmt::format(
-            "model \"quadratic\" needs at least {} (cells {}, held or bonded {}, bonded pairs {}, rigid "
-            "bodies {}), more than the limit of {}; use a larger --size, or raise --max-memory",
-            human_bytes(needed), human_count(cells), human_count(static_cast<std::size_t>(held)),
-            human_count(system.bonds().size()), links, human_bytes(memory_to_use())));
+  refuse_beyond_memory(
+      needed,
+      fmt::format("model \"quadratic\", cells {}, held or bonded {}, bonded pairs {}, rigid "
+                  "bodies {}",
+                  human_count(cells), human_count(held), human_count(system.bonds().size()), links),
+      scene);
 }
 
 // What a run finds at the vertices goes by these names.
@@ -249,7 +246,7 @@ SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptio
                  options.explain, progress);
   report_strays(fragments, result, progress);
   const QuadraticSystem system(problem, scene);
-  refuse_too_large(system, scene.name);
+  refuse_too_large(system, body, scene.name);
   for (const std::string& warning : system.warnings()) progress.warn(warning);
   refuse_loose_fragments(fragments, body, system.tied_elements(), system.bonded_elements(), scene.name);
   double solving = 0;

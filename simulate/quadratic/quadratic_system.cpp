@@ -295,6 +295,11 @@ bool QuadraticSystem::follows() const {
                      [](const NodalLoad& load) { return load.follower != nullptr; });
 }
 
+bool QuadraticSystem::links_follow() const {
+  return std::any_of(linked_.begin(), linked_.end(),
+                     [](const NitscheSupport* support) { return support->tie->motion.link->follower; });
+}
+
 void QuadraticSystem::place_loads(const std::vector<Load>& loads) {
   for (const Load& load : loads) {
     const Selected selected = resolve(load.where, problem_.body);

@@ -67,6 +67,8 @@ class QuadraticSystem {
   [[nodiscard]] const std::vector<NodalLoad>& loads() const { return loads_; }
   // Some load follows the shape.
   [[nodiscard]] bool follows() const;
+  // The load of some rigid link does.
+  [[nodiscard]] bool links_follow() const;
   [[nodiscard]] const Mat9& moduli(std::uint32_t part) const { return moduli_[part]; }
   [[nodiscard]] std::uint32_t part_of(std::size_t cell) const { return part_[cell]; }
   [[nodiscard]] double stiffest(std::size_t cell) const { return stiffest_[part_[cell]]; }  // Pa

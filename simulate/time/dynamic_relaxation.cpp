@@ -39,6 +39,8 @@ bool settles(const Scene& scene) {
 
 Settling::Settling(Scene& scene, const Body& body) {
   const double sound = sound_time(scene, body);
+  extent_ = body_extent(body);
+  for (const Vec3& at : body.rest) middle_ += at / static_cast<double>(body.element_count());
   ramp_ = kRamp * sound;
   const TimeCurve grows{{0, ramp_}, {0, 1}};
   for (Load& load : scene.get<Loads>().loads) load.course = grows;
@@ -85,17 +87,24 @@ double Settling::after(const State& state, const std::vector<double>& mass,
   ++summary_.steps;
   kinetic_ = sums.kinetic;
   largest_ = std::max(largest_, kinetic_);
-  if (*state.time > ramp_ && summary_.steps % kLook == 0) look(tell);
+  if (*state.time > ramp_ && summary_.steps % kLook == 0) look(state, tell);
   if (first || !(sums.stiffness > 0)) return 1;
   const double turned = std::sqrt(sums.stiffness * state.kick / sums.mass);  // omega dt
   return std::exp(-2 * std::min(turned, 1.0));
 }
 
-void Settling::look(const std::function<void(SimulateResult&)>& tell) {
+// A couple has no force: it counts by its moment over the body's extent. About the body's middle that of a force is less than
+// the force.
+void Settling::look(const State& state, const std::function<void(SimulateResult&)>& tell) {
   SimulateResult told;
   tell(told);
+  Vec3 middle = middle_;
+  for (const Vec3& moved : state.displacement)
+    middle += moved / static_cast<double>(state.displacement.size());
+  const auto moment = [&](const AppliedLoad& load) -> Vec3 { return load.moment - middle.cross(load.force); };
   double scale = 0;
-  for (const AppliedLoad& load : told.loads) scale += load.force.norm();
+  for (const AppliedLoad& load : told.loads)
+    scale += std::max(load.force.norm(), moment(load).norm() / extent_);
   for (const Reaction& reaction : told.reactions) scale += reaction.force.norm();
   const double left = parallel_sum<double>(force_.size(), [&](std::size_t e) { return force_[e].norm(); });
   summary_.residual = scale > 0 ? left / scale : left > 0 ? HUGE_VAL : 0;

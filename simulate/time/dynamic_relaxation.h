@@ -40,8 +40,10 @@ class Settling {
 
  private:
   static constexpr std::uint64_t kLook = 20;  // steps between two looks at the residual
-  void look(const std::function<void(SimulateResult&)>& tell);
+  void look(const State& state, const std::function<void(SimulateResult&)>& tell);
 
+  Vec3 middle_ = Vec3::Zero();        // m, of the body's elements at rest
+  double extent_ = 0;                 // m, of the body
   double ramp_ = 0;                   // s
   double kinetic_ = 0, largest_ = 0;  // J: now, ever
   bool done_ = false;

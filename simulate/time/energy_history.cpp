@@ -279,6 +279,12 @@ void EnergyHistory::add_row(const State& state, const std::vector<Vec3>& support
 }
 
 void EnergyHistory::refuse_broken_books(const State& state) const {
+  if (!ledger_.rows.empty() && !std::isfinite(ledger_.rows.back().energies.residual + ledger_.unstored_now))
+    throw DivergedError(
+        fmt::format("an energy is no number any more, the fastest element rests near {}: give a shorter "
+                    "[run] step or load "
+                    "it more slowly",
+                    fastest_near(problem_.body, state)));
   if (ledger_.rows.size() < kFirstJudged || !(ledger_.largest_term > least_)) return;
   const double lost =
       std::max(std::abs(ledger_.rows.back().energies.residual), std::abs(ledger_.unstored_now));

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <gp_Ax1.hxx>
 #include <gp_Dir.hxx>
@@ -105,6 +106,26 @@ TEST(Fit, WhatDoesNotCountDoesNotRefine) {
   EXPECT_TRUE(fit.reached);
   map.counts = [](double, double, double, double) { return true; };
   EXPECT_FALSE(fit_surface(map, make_knots(0, 2, {}, 16), make_knots(0, 2, {}, 2), 1e-3).reached);
+}
+
+// A face may end in the middle of a span: what is beyond is neither asked nor told.
+TEST(Fit, PointsOfASpanCountOneByOne) {
+  constexpr double kEnd = 1.05;
+  const Knots knots = make_knots(0, 2, {}, 4);
+  const std::vector<double> nodes = knots.greville();
+  const auto is_node = [&](double t) {
+    return std::any_of(nodes.begin(), nodes.end(), [&](double node) { return std::abs(node - t) < 1e-12; });
+  };
+  std::size_t beyond = 0, within = 0;
+  SurfaceMap map;
+  map.point = [&](double u, double v) {
+    if (!is_node(u) || !is_node(v)) ++(u < kEnd ? within : beyond);
+    return gp_XYZ(u, v, 0.01 * std::sin(3 * u));
+  };
+  map.counts = [](double u, double, double, double) { return u < kEnd; };
+  EXPECT_TRUE(fit_surface(map, knots, knots, 1).reached);  // no refinement
+  EXPECT_GT(within, 100);
+  EXPECT_EQ(beyond, 0);
 }
 
 TEST(RigidMotion, IsFoundAndOnlyWhereThereIsOne) {

@@ -128,6 +128,26 @@ TEST(FaceShape, OthersAreCurved) {
     EXPECT_EQ(face_shapes(patch(24, place))[0].kind, FaceShape::Kind::curved);
 }
 
+// Of a height at which the corners lie within a hundredth of one circle all the same.
+TEST(FaceShape, SlightConesAndBarrelsAreCurved) {
+  const double slope = std::tan(4 * M_PI / 180), height = 0.2;
+  for (const bool hollow : {false, true})
+    for (const double angle : {1.0, 2 * M_PI}) {
+      const auto turned = [&](const std::function<double(double)>& radius) {
+        return face_shapes(patch(48, [&](double u, double v) -> Vec3 {
+          const double a = angle * (hollow ? 1 - u : u), r = radius(height * (v - 0.5));
+          return kTurn * Vec3(r * std::cos(a), r * std::sin(a), height * v) + kShift;
+        }))[0];
+      };
+      EXPECT_EQ(turned([](double) { return 1; }).kind, FaceShape::Kind::round);
+      // a sixth of a cone this slight is, as well, one of a cylinder that is tilted
+      if (angle > M_PI) {
+        EXPECT_EQ(turned([&](double z) { return 1 + slope * z; }).kind, FaceShape::Kind::curved);
+      }
+      EXPECT_EQ(turned([&](double z) { return 1 - slope * z * z / height; }).kind, FaceShape::Kind::curved);
+    }
+}
+
 TEST(FaceShape, InWords) {
   FaceShape shape;
   shape.kind = FaceShape::Kind::flat;

@@ -130,7 +130,7 @@ def test_implicit_steps():
 
 
 def test_implicit_contact():
-    MODELS["implicit_contact"] = MODELS["contact"] + 'method = "implicit"\nstep = "0.1 ms"\n'
+    MODELS["implicit_contact"] = MODELS["contact"] + 'method = "implicit"\nstep = "2 ms"\n'
     stop_and_go("implicit_contact")
 
 

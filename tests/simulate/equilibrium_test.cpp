@@ -101,6 +101,53 @@ TEST(Equilibrium, RigidRotationByMovesIsExact) {
   }
 }
 
+// Every piece of the straight way turns by its share of the angle: the end is where they lead to.
+TEST(Equilibrium, AnArcIsTheWayBentEvenly) {
+  Motion motion;
+  motion.axis = Vec3(1, 2, -1).normalized();
+  motion.through = Vec3(0.5, -0.3, 0.2);
+  motion.arc_from = Vec3(0.1, 0.2, -0.1);
+  for (const double angle : {5e-4, -0.8, 2.5, 7.0})
+    for (const double share : {0.3, 1.0}) {
+      motion.angle = angle;
+      const auto turn = [&](double part) { return Eigen::AngleAxisd(part * share * angle, motion.axis); };
+      constexpr int kPieces = 2000;  // Simpson's rule
+      Vec3 end = *motion.arc_from;
+      for (int i = 0; i < kPieces; ++i)
+        for (const auto& [at, weight] : {std::pair{0.0, 1.0}, std::pair{0.5, 4.0}, std::pair{1.0, 1.0}})
+          end += weight / 6 / kPieces * (turn((i + at) / kPieces) * (motion.through - *motion.arc_from));
+      EXPECT_LT((motion.through + motion.displacement(motion.through, share) - end).norm(), 1e-11) << angle;
+      const Vec3 arm(0.02, 0.07, -0.04), beside = motion.through + arm;
+      EXPECT_LT((beside + motion.displacement(beside, share) - end - turn(1) * arm).norm(), 1e-11) << angle;
+    }
+}
+
+std::string bent_end(const std::string& more) {
+  return "[[move]]\nwhere = { half_space = { point = [\"59 mm\", 0, 0], normal = [1, 0, 0] } }\nrotation = { "
+         "axis "
+         "= [0, -1, 0], through = [\"60 mm\", \"5 mm\", \"5 mm\"], angle = \"0.8 rad\"" +
+         more + " }\n";
+}
+
+TEST(Equilibrium, AMoveLeadsAnEndAlongItsArc) {
+  Body body = box_body({.cells = {12, 2, 2}, .spacing = Vec3::Constant(0.005)});
+  const std::string start = "material = \"rubber\"\n[[fix]]\nwhere = \"box/x0\"\n",
+                    arc = bent_end(", arc_from = [0, \"5 mm\", \"5 mm\"]");
+  (void)simulate_quietly(body, parse_scene(start + arc, "s.toml"));
+  const double radius = 0.06 / 0.8;
+  const Vec3 end(radius * std::sin(0.8), 0.005, 0.005 + radius * (1 - std::cos(0.8)));
+  const Eigen::AngleAxisd turn(0.8, -Vec3::UnitY());
+  for (std::size_t e = 0; e < body.element_count(); ++e)
+    if (body.lattice_index[e][0] == 12) {
+      EXPECT_LT((body.position[e] - end - turn * (body.rest[e] - Vec3(0.06, 0.005, 0.005))).norm(), 1e-14);
+    }
+  // about the same axis, but not to the same place
+  const Body anew = box_body({.cells = {12, 2, 2}, .spacing = Vec3::Constant(0.005)});
+  EXPECT_EQ(refusal(anew, parse_scene(start + arc + arc, "s.toml")), "accepted");
+  EXPECT_THAT(refusal(anew, parse_scene(start + arc + bent_end(""), "s.toml")),
+              HasSubstr("lead the same place"));
+}
+
 TEST(Equilibrium, GravityIsCarriedByTheFix) {
   Body body = box_body(uneven_box());
   Scene scene = steel_scene();

@@ -8,7 +8,9 @@
 #include <numbers>
 
 #include "base/error.h"
+#include "base/stop.h"
 #include "simulate/equilibrium/mechanics.h"
+#include "simulate/equilibrium/positive_tangent.h"
 #include "simulate/followers/gmres.h"
 #include "simulate/followers/pressing_load.h"
 #include "simulate/followers/turning_load.h"
@@ -17,6 +19,7 @@
 #include "simulate/scene/scene.h"
 #include "simulate/simulate.h"
 #include "tests/simulate/box_body.h"
+#include "tests/simulate/centre_body.h"
 #include "tests/simulate/timed_case.h"
 
 namespace flexel::simulate {
@@ -311,25 +314,41 @@ TEST(Followers, ACantileverIsRolledUpIntoACircle) {
   EXPECT_LT(off_the_arc("springs", 0.25, std::numbers::pi, "follower = true\n", 2), 0.01);
 }
 
-std::string all_followers(double scale) {
-  return fmt::format(
-      "[[load]]\nwhere = \"box/x1\"\nfollower = true\ntorque = [\"{0} N m\", \"{1} N m\", \"{0} N "
-      "m\"]\nforce = [\"{2} "
-      "N\", \"{2} N\", 0]\nat = [\"90 mm\", \"5 mm\", \"9 mm\"]\n[[load]]\nwhere = \"box/z0\"\nfollower = "
-      "true\npressure = \"{3} kPa\"\n",
-      0.02 * scale, -0.05 * scale, 0.5 * scale, 20 * scale);
+// Of gum_block() turned by `turn` about the origin.
+std::string all_followers(double scale, const Mat3& turn = Mat3::Identity()) {
+  return "[[load]]\nwhere = \"box/x1\"\nfollower = true\ntorque = " +
+         words_for(turn * scale * Vec3(0.02, -0.05, 0.02), "N m") +
+         "\nforce = " + words_for(turn * scale * Vec3(0.5, 0.5, 0), "N") +
+         "\nat = " + words_for(turn * Vec3(90, 5, 9), "mm") +
+         fmt::format("\n[[load]]\nwhere = \"box/z0\"\nfollower = true\npressure = \"{} kPa\"\n", 20 * scale);
 }
 
 // 60 x 20 x 20 mm of gum, whose elements at x = 0 are held: a face would be by springs at equilibrium alone.
-std::string follower_gum(const std::string& model, double damping = 0) {
+std::string follower_gum(const std::string& model, double damping = 0, const Mat3& turn = Mat3::Identity()) {
   return fmt::format(
       "model = \"{}\"\nmaterial = \"gum\"\n[materials.gum]\nyoung = \"1 MPa\"\npoisson = 0.25\ndensity = "
-      "\"1000 kg/m3\"\n[[fix]]\nwhere = {{ half_space = {{ point = [0, 0, 0], normal = [-1, 0, 0] }} }}\n{}",
-      model, damping > 0 ? fmt::format("[damping]\ntime = \"{} s\"\n", damping) : "");
+      "\"1000 kg/m3\"\n[[fix]]\nwhere = {{ half_space = {{ point = {}, normal = [{}, {}, {}] }} }}\n{}",
+      model, words_for(turn * Vec3(1, 0, 0), "mm"), -turn(0, 0), -turn(1, 0), -turn(2, 0),
+      damping > 0 ? fmt::format("[damping]\ntime = \"{} s\"\n", damping) : "");
 }
 
 Body gum_block() {
   return testing::box_body({.cells = {6, 2, 2}, .spacing = Vec3::Constant(0.01)});
+}
+
+// While an answer is told, a run that is to stop is not kept by the question whether it is stable.
+TEST(Followers, WhetherTheTangentIsPositiveCanBeStopped) {
+  const Body body = gum_block();
+  const Scene scene = parse_scene(follower_gum("cells") + all_followers(0.01), "s.toml");
+  const Problem problem{body, materials_of_parts(scene, body), {}, models_of_parts(scene, body), {}, {}, {},
+                        {}};
+  Mechanics mechanics(problem, active_effects(scene.effects, problem));
+  const State state{std::vector<Vec3>(body.element_count(), Vec3::Zero()), 1};
+  EXPECT_EQ(has_positive_tangent(mechanics, state), true);
+  const StopAfter limit(0, "--timeout");
+  EXPECT_THROW((void)has_positive_tangent(mechanics, state), TimeoutError);
+  const StopWaits answered;
+  EXPECT_EQ(has_positive_tangent(mechanics, state), std::nullopt);
 }
 
 // What the solver takes for the change of all forces is that.
@@ -374,18 +393,69 @@ TEST(Followers, TheWholeTangentIsThatOfTheForces) {
   }
 }
 
-// Loads that turn with a part that is turned as a whole are those of the part that is not.
+// A part that is turned as a whole, with its loads, has the answer of the one that is not, turned.
 TEST(Followers, AnswersDoNotDependOnTheFrame) {
-  Body straight = gum_block();
-  const SimulateResult first = run_follower(straight, follower_gum("cells") + all_followers(1));
-  EXPECT_GT(first.loads[0].rotation->norm(), 0.3);
-  EXPECT_LT(first.imbalance.norm(), 1e-6);
-  Body quadratic = gum_block();
+  // points of a pressure at thirds of the sides' halves: on no plane between two cells, where rounding would choose the cell
+  // whose gradient they take
+  const auto block = [](const Mat3& axes) {
+    return testing::box_body({.cells = {4, 2, 2}, .spacing = Vec3(0.015, 0.01, 0.01), .axes = axes});
+  };
+  const Mat3 turn = any_turn(2.1);
+  constexpr double kLike = 1e-4;  // of two edges of one length rounding chooses which is cut
+  for (const char* model : {"cells", "quadratic"}) {
+    Body straight = block(Mat3::Identity()), turned = block(turn);
+    const SimulateResult first = run_follower(straight, follower_gum(model) + all_followers(1));
+    const SimulateResult second = run_follower(turned, follower_gum(model, 0, turn) + all_followers(1, turn));
+    EXPECT_GT(first.loads[0].rotation->norm(), 0.3);
+    EXPECT_LT(first.imbalance.norm(), 1e-6);
+    for (std::size_t l = 0; l < 2; ++l) {
+      const Vec3 &force = first.loads[l].force, &moment = first.loads[l].moment;
+      EXPECT_LT((second.loads[l].force - turn * force).norm(), kLike * force.norm()) << model;
+      EXPECT_LT((second.loads[l].moment - turn * moment).norm(), kLike * moment.norm()) << model;
+    }
+    EXPECT_LT((*second.loads[0].rotation - turn * *first.loads[0].rotation).norm(), kLike) << model;
+    for (std::size_t e = 0; e < straight.element_count(); ++e)
+      EXPECT_LT((turned.position[e] - turn * straight.position[e]).norm(), kLike * first.largest_displacement)
+          << model;
+  }
+}
+
+TEST(Followers, ModelsAgree) {
+  Body cells = gum_block(), quadratic = gum_block();
+  const SimulateResult first = run_follower(cells, follower_gum("cells") + all_followers(1));
   const SimulateResult second = run_follower(quadratic, follower_gum("quadratic") + all_followers(1));
-  // two models, two cells through the thickness, strains of some percent
+  // two cells through the thickness, strains of some percent
   EXPECT_LT((*second.loads[0].rotation - *first.loads[0].rotation).norm(),
             0.1 * first.loads[0].rotation->norm());
   EXPECT_LT((second.loads[0].force - first.loads[0].force).norm(), 0.1 * first.loads[0].force.norm());
+}
+
+// Elements of model `paper` lie half a voxel under the surface: loads turn as these do, and are whole.
+TEST(Followers, APaperFaceTurnsItsLoads) {
+  Body body = testing::centre_body({.voxels = {40, 2, 2}, .spacing = 2e-3});
+  const Vec3 force(1, -2, 6), torque(0, -0.1, 0.05);
+  const std::string load = "[[load]]\nwhere = \"box/x1\"\nfollower = true\n";
+  const SimulateResult result =
+      run_follower(body, follower_stuff("paper", 0.25) + load + "force = " + words_for(force, "N") + "\n" +
+                             load + "torque = " + words_for(torque, "N m") + "\n");
+  std::vector<Vec3> rest, now;
+  for (std::size_t e = 0; e < body.element_count(); ++e)
+    if (body.lattice_index[e][0] == 39) {
+      rest.push_back(body.rest[e]);
+      now.push_back(body.position[e]);
+    }
+  ASSERT_EQ(rest.size(), 4u);
+  Eigen::Matrix<double, 3, 4> before, after;
+  for (int i = 0; i < 4; ++i) {
+    before.col(i) = rest[static_cast<std::size_t>(i)];
+    after.col(i) = now[static_cast<std::size_t>(i)];
+  }
+  const Mat3 turn = Eigen::umeyama(before, after, false).topLeftCorner<3, 3>();
+  EXPECT_GT(Eigen::AngleAxisd(turn).angle(), 0.5);
+  EXPECT_LT((result.loads[0].force - turn * force).norm(), 5e-3 * force.norm());
+  EXPECT_NEAR(result.loads[0].force.norm(), force.norm(), 1e-9 * force.norm());
+  EXPECT_LT((result.loads[1].moment - turn * torque).norm(), 5e-3 * torque.norm());
+  EXPECT_NEAR(result.loads[1].moment.norm(), torque.norm(), 1e-9 * torque.norm());
 }
 
 // In time: the work of the loads is what the body has, and with damping it comes to rest in the
@@ -408,9 +478,74 @@ TEST(Followers, BooksCloseInTimeAndTheEndIsTheEquilibrium) {
   }
 }
 
-TEST(Followers, ARigidLinkTurnsItsTorqueToo) {
-  EXPECT_LT(off_the_arc("quadratic", 0, std::numbers::pi / 2, "link = \"rigid\"\nfollower = true\n", 1),
-            0.01);
+// rad, of the free end of a cantilever under an end force that stays square to it, F L^2 / (E I) = `force`:
+// from the free end on kappa' = F cos(phi), phi' = -kappa (Timoshenko and Gere 1961, section 2.7).
+double turn_of_the_end(double force) {
+  constexpr int kSteps = 2000;
+  double phi = 0, kappa = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    const double step = 1.0 / kSteps, half_phi = phi - 0.5 * step * kappa;
+    const double half_kappa = kappa + 0.5 * step * force * std::cos(phi);
+    phi -= step * half_kappa;
+    kappa += step * force * std::cos(half_phi);
+  }
+  return -phi;
+}
+
+TEST(Followers, AForceAcrossBendsACantileverIntoTheElastica) {
+  constexpr double kForce = 8, kSide = 4e-3;
+  const double turn =
+      turn_of_the_end(kForce * kBarLength * kBarLength / (kBarYoung * std::pow(kSide, 4) / 12));
+  EXPECT_GT(turn, 1);
+  const Vec3 exact = kForce * Vec3(-std::sin(turn), 0, std::cos(turn));
+  for (const auto& [model, link] : {std::pair{"cells", "averaging"}, std::pair{"quadratic", "averaging"},
+                                    std::pair{"quadratic", "rigid"}}) {
+    Body body = testing::box_body({.cells = {40, 2, 2}, .spacing = Vec3::Constant(2e-3)});
+    const SimulateResult result = run_follower(
+        body, follower_stuff(model, 0) +
+                  fmt::format("[[load]]\nwhere = \"box/x1\"\nlink = \"{}\"\nfollower = true\nforce = {}\n",
+                              link, words_for(Vec3(0, 0, kForce), "N")));
+    EXPECT_LT((result.loads[0].force - exact).norm(), 0.02 * kForce) << model << " " << link;
+    EXPECT_NEAR(result.loads[0].force.norm(), kForce, 1e-9 * kForce) << model << " " << link;
+    EXPECT_LT(result.imbalance.norm(), 1e-4 * kForce) << model << " " << link;
+  }
+}
+
+// What programs say of a run.
+class FollowersSay : public ::testing::Test, public ProgressListener {
+ protected:
+  void SetUp() override { set_progress_listener(this); }
+  void TearDown() override { set_progress_listener(nullptr); }
+  void update(const std::string&, double, const std::string&, std::optional<double>) noexcept override {}
+  void say(const std::string& line) noexcept override { said_ += line + "\n"; }
+  void warn(const std::string& line) noexcept override { warned_ += line + "\n"; }
+  std::string said_, warned_;
+};
+
+TEST_F(FollowersSay, WhetherAnotherEquilibriumBranchesOff) {
+  for (const std::string model : {"cells", "quadratic"})
+    for (const bool rigid : {false, true}) {
+      said_.clear();
+      warned_.clear();
+      Body body = gum_block();
+      Progress progress("test", Progress::Mode::lines);
+      SimulateOptions options;
+      options.estimate = options.stress = false;
+      (void)simulate(body,
+                     parse_scene(follower_gum(model) +
+                                     fmt::format("[[load]]\nwhere = \"box/x1\"\nlink = \"{}\"\nfollower = "
+                                                 "true\nforce = [0, 0, \"0.2 N\"]\n",
+                                                 rigid ? "rigid" : "averaging"),
+                                 "s.toml"),
+                     options, progress);
+      // of links, model `cells` does not know
+      const bool known = model == "quadratic" || !rigid;
+      EXPECT_THAT(known ? said_ : warned_, HasSubstr("[run] time shows flutter")) << model << rigid;
+      EXPECT_THAT(known ? warned_ : said_, ::testing::Not(HasSubstr("flutter"))) << model << rigid;
+      if (!known) {
+        EXPECT_THAT(warned_, HasSubstr("was not found out"));
+      }
+    }
 }
 
 std::string follower_refusal(const std::string& rest) {

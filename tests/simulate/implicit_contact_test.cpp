@@ -313,6 +313,75 @@ TEST(ImplicitContact, AToolPressesAsInExplicitSteps) {
   }
 }
 
+// A plate of PLA, led along `path`, above a block of it that lies free in space.
+TimedCase push(const ManipulatorPath& path, double time, double step, double tolerance) {
+  Body body = block("block", {3, 3, 2});
+  append(body, block("plate", {2, 2, 1}, Vec3(0.004, 0.005, 0.0201)));
+  Scene scene = implicit(scene_of(time), step);
+  scene.materials["gum"] = {"gum", 3.5e9, 0.35, 1240, "test"};
+  scene.run.tolerance = tolerance;
+  scene.get<Contact>().friction = 0.3;
+  Manipulator tool;
+  tool.part = tool.name = "plate";
+  tool.path = path;
+  tool.path.turn.assign(path.time.size(), Vec3::Zero());
+  scene.get<RigidParts>().manipulators.push_back(tool);
+  return run_timed(body, scene);
+}
+
+// What moves freely feels forces far below those of a tool led into it before it moves.
+TEST(ImplicitContact, AStiffFreeBlockIsPushedAtALooseToleranceAsAtATightOne) {
+  for (const double step : {1e-3, 5e-3}) {
+    const auto figures = [&](double tolerance) {
+      ManipulatorPath path;
+      path.time = {0, 0.03};
+      path.displacement = {Vec3::Zero(), Vec3(0, 0, -0.009)};
+      const TimedCase made = push(path, 0.03, step, tolerance);
+      expect_books_close(made.result);
+      double most = 0;
+      for (const double force : made.history.column("plate force z")) most = std::max(most, std::abs(force));
+      return std::array{most, made.history.column("work").back(), made.history.column("kinetic").back()};
+    };
+    const std::array<double, 3> loose = figures(1e-4), tight = figures(1e-8);
+    for (std::size_t f = 0; f < tight.size(); ++f) {
+      EXPECT_GT(tight[f], 0);
+      EXPECT_NEAR(loose[f], tight[f], 0.01 * tight[f]) << step << " figure " << f;
+    }
+  }
+}
+
+// It would come out on the other side, where nothing touches any more.
+TEST(ImplicitContact, AToolThatLeapsThroughAPartIsRefused) {
+  for (const auto& [step, begins, takes] :
+       {std::tuple{0.01, 0.0, 1e-6}, {0.02, 0.0, 2e-6}, {0.02, 0.0501, 1e-6}}) {
+    ManipulatorPath path;
+    path.time = {0, begins + takes, 0.1};
+    path.displacement = {Vec3::Zero(), Vec3(0, 0, -0.05), Vec3(0, 0, -0.05)};
+    if (begins > 0) {
+      path.time.insert(path.time.begin() + 1, begins);
+      path.displacement.insert(path.displacement.begin(), Vec3::Zero());
+    }
+    EXPECT_THROW((void)push(path, 0.1, step, 1e-4), DivergedError) << step << begins << takes;
+  }
+}
+
+// An impact that Newton's method resolves in a few rounds with the dashpots of contacts as without.
+TEST(ImplicitContact, DampedContactsSettleAtAnImpact) {
+  const auto iterations = [](double damping) {
+    Scene scene = implicit(scene_of(0.01), 2e-3);
+    throw_part(scene, "b", Vec3(0.5, 0, -2));
+    scene.get<Contact>().friction = 0.3;
+    scene.get<Contact>().damping = damping;
+    Body body = block("a", {3, 3, 2});
+    append(body, block("b", {2, 2, 2}, Vec3(0.003, 0.002, 0.0204)));
+    const TimedCase made = run_timed(body, scene);
+    expect_books_close(made.result);
+    return made.result.newton_iterations;
+  };
+  const int without = iterations(0);
+  EXPECT_LT(iterations(2e-4), 2 * without);
+}
+
 TEST(ImplicitContact, WhatIsNotTakenIsRefusedByName) {
   const auto refusal = [](const std::function<void(Scene&)>& change) {
     Scene scene = implicit(resting(0.01, 0), 1e-3);
@@ -327,7 +396,7 @@ TEST(ImplicitContact, WhatIsNotTakenIsRefusedByName) {
   using ::testing::HasSubstr;
   EXPECT_EQ(refusal([](Scene&) {}), "taken");
   EXPECT_THAT(refusal([](Scene& scene) { scene.get<RigidParts>().parts = {"a"}; }),
-              HasSubstr("a free rigid part"));
+              HasSubstr("does not take free rigid parts"));
   EXPECT_THAT(refusal([](Scene& scene) { scene.get<Contact>().stick = 1e3; }), HasSubstr("stick"));
   EXPECT_THAT(refusal([](Scene& scene) { scene.get<Contact>().planes.back().stick = 1e3; }),
               HasSubstr("stick"));

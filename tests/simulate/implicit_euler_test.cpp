@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "base/error.h"
@@ -64,6 +65,81 @@ TEST(DampingMatrix, IsTheKernelsDamping) {
     for (std::size_t e = 0; e < pulled.size(); ++e)
       EXPECT_LT((pulled[e] + stepper.damping_force()[e]).norm(), 1e-11 * largest) << e;
   }
+}
+
+// Bears steps of so many seconds, or a share of whatever is asked; settles or does not; has an energy.
+struct Bearing : Effect {
+  static constexpr const char* name = "bearing";
+  double longest = std::numeric_limits<double>::infinity(), share = 1, joules = 0;
+  bool settled = true;
+  [[nodiscard]] std::string why() const override { return "a test"; }
+  [[nodiscard]] double energy(const State&) override { return joules; }
+  [[nodiscard]] StepBearing begin_implicit_step(const State&, const State&, double step) override {
+    return {std::min(share, longest / step), false};
+  }
+  [[nodiscard]] bool settles(const State&) override { return settled; }
+};
+
+ImplicitStep advance(const Bearing& bearing) {
+  const Body body = small_box();
+  const Problem problem = testing::problem_of(body, kCauchyGum);
+  const std::vector<double> mass(body.element_count(), 1);
+  std::vector<ActiveEffect> effects;
+  effects.push_back(activate(Bearing(bearing)));
+  const KernelEffects plan{{0}};
+  ImplicitEuler euler(problem, effects, plan, mass, 1e-8);
+  State state = testing::at_rest(body);
+  state.time = 0;
+  const ImplicitStep told = euler.advance(state, 1, 1, [](const std::string&) {});
+  EXPECT_EQ(*state.time, told.step);
+  return told;
+}
+
+TEST(ImplicitEuler, GoesAsFarAsEffectsBear) {
+  EXPECT_EQ(advance({}).step, 1);
+  Bearing eighth;
+  eighth.longest = 0.125;
+  EXPECT_NEAR(advance(eighth).step, 0.125, 1e-12);
+  Bearing none;
+  none.share = 0.5;  // of whatever is asked
+  EXPECT_EQ(advance(none).step, 0);
+  EXPECT_NE(advance(none).trouble, "");
+}
+
+// Each try is at half of what the last one was at, not of what it was asked for: 1/8 ... 1/1024.
+TEST(ImplicitEuler, HalvesTheStepThatFailed) {
+  Bearing eighth;
+  eighth.longest = 0.125;
+  eighth.settled = false;
+  const ImplicitStep told = advance(eighth);
+  EXPECT_EQ(told.step, 0);
+  EXPECT_EQ(told.failures, 8);
+}
+
+// Without forces Newton's method has nothing to do there.
+TEST(ImplicitEuler, DoesNotEndWhereTheEnergyIsInfinite) {
+  Bearing nowhere;
+  nowhere.joules = std::numeric_limits<double>::infinity();
+  const ImplicitStep told = advance(nowhere);
+  EXPECT_EQ(told.step, 0);
+  EXPECT_NE(told.trouble, "");
+}
+
+// Nothing is larger than what is no number: every comparison with it has to fail.
+TEST(EnergyHistory, RefusesEnergiesThatAreNoNumbers) {
+  const Body body = small_box();
+  const Problem problem = testing::problem_of(body, kCauchyGum);
+  const std::vector<double> mass(body.element_count(), 1);
+  State state = testing::at_rest(body);
+  state.time = 0;
+  const std::vector<ActiveEffect> effects;
+  const std::vector<ProbePoints> probes;
+  EnergyHistory history(problem, effects, probes, mass, nullptr, {{0}});
+  history.add_row_of(state, {});
+  EXPECT_NO_THROW(history.refuse_broken_books(state));
+  history.enter(state.displacement, {}, {}, std::nan(""));
+  history.add_row_of(state, {});
+  EXPECT_THROW(history.refuse_broken_books(state), DivergedError);
 }
 
 Scene implicit_scene(const Material& material, double time, double step) {

@@ -109,6 +109,15 @@ TEST(Scene, RefusesWithLineAndReason) {
       {"[[move]]\nwhere = \"xmin\"\nrotation = { axis = [0, 0, 0], through = [0, 0, 0], angle = \"1 deg\" "
        "}\n",
        "s.toml:3", "direction"},
+      {"[[move]]\nwhere = \"xmin\"\nrotation = { axis = [0, 0, 1], through = [0, 0, 0], angle = \"1 deg\", "
+       "arc_from = [0, 0, \"1 mm\"] }\n",
+       "s.toml:3", "makes no arc"},
+      {"[[move]]\nwhere = \"xmin\"\nrotation = { axis = [0, 0, 1], through = [0, 0, 0], angle = \"1 deg\", "
+       "arc_from = [0, 0, 0] }\n",
+       "s.toml:3", "makes no arc"},
+      {"[[move]]\nwhere = \"xmin\"\nrotation = { axis = [0, 0, 1], through = [0, 0, 0], angle = 0, "
+       "arc_from = [\"1 mm\", 0, 0] }\n",
+       "s.toml:3", "other than 0"},
       {"[materials.x]\nyoung = \"1 GPa\"\npoisson = 0.5\ndensity = \"1 kg/m3\"\n", "s.toml:1", "below 0.5"},
       {"[materials.x]\nyoung = \"-1 GPa\"\npoisson = 0.3\ndensity = \"1 kg/m3\"\n", "s.toml:1", "above 0"},
       {"[materials.x]\npoisson = 0.3\ndensity = \"1 kg/m3\"\n", "s.toml:1", "needs \"young\""},

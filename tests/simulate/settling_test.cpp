@@ -74,6 +74,33 @@ TEST(Settling, TwoStackedBlocksAreSpringsInSeries) {
   EXPECT_FALSE(body.element_columns.contains("velocity"));
 }
 
+// Of a couple no force is left to measure what is left over by.
+TEST(Settling, ABarComesToRestUnderACouple) {
+  for (const bool follower : {false, true}) {
+    const auto turned = [&](bool contact) {
+      Body body = block("bar", {6, 2, 2});
+      Scene scene = still(0.3);
+      scene.get<Supports>().ties.push_back(make_fix(select_by_name("bar/x0")));
+      Load load = make_push(select_by_name("bar/x1"), Vec3::Zero());
+      load.force.reset();
+      load.torque = Vec3(0, -0.03, 0.02);
+      load.follower = follower;
+      scene.get<Loads>().loads.push_back(load);
+      scene.get<Contact>().on = contact;
+      const SimulateResult result = settle(body, scene);
+      EXPECT_EQ(result.settled.has_value(), contact);
+      if (result.settled) {
+        EXPECT_LE(result.settled->residual, 1e-5);
+        EXPECT_GT(result.settled->residual, 0);
+      }
+      return *result.loads.at(0).rotation;
+    };
+    const Vec3 at_once = turned(false), settled = turned(true);
+    EXPECT_GT(at_once.norm(), 0.1);
+    EXPECT_LT((settled - at_once).norm(), 5e-3 * at_once.norm()) << follower;
+  }
+}
+
 // On a table that is held, so that what it carries is told, and tilted against both lattices.
 TEST(Settling, ABlockAtRestWeighsOnWhatCarriesIt) {
   const Mat3 axes = testing::turn(0.4, Vec3(0, 0, 1));
