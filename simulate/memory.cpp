@@ -3,31 +3,21 @@
 // about 0 and f about 2 c + n, 9 n + 18 c of them.
 #include "simulate/memory.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <cstdint>
 #include <numeric>
 
-#include "base/error.h"
-#include "base/resources.h"
 #include "base/units.h"
-#include "formats/lattice/cell_moments.h"
 #include "simulate/effects/contact.h"
 #include "simulate/time/dynamic_relaxation.h"
 
 namespace flexel::simulate {
 namespace {
 
-constexpr double kSure = 1.3;                            // what the estimate may be off by
-constexpr double kProgram = 27e6, kSmallProgram = 15e6;  // bytes
-constexpr double kBlock = 100, kBlockOfSprings = 165;    // bytes
+constexpr double kProgram = 27e6, kSmallProgram = 15e6;                          // bytes
+constexpr double kBlock = 100, kBlockOfSprings = 165;                            // bytes
 constexpr double kConnection = 350, kMovingElement = 520, kElementOfMode = 450;  // bytes
-// Of model `quadratic`, bytes: whole cells share one matrix until they turn with their matter; cells that the surface
-// cuts have one each, and a factor of it, and so have those that are held.
-constexpr double kQuadraticNode = 1250, kCutCell = 24e3, kHeldCell = 79e3, kTurnedCell = 11e3;
 
 double connections_of(const Body& body) {
   return std::accumulate(body.connections.begin(), body.connections.end(), 0.0,
@@ -35,19 +25,6 @@ double connections_of(const Body& body) {
 }
 
 }  // namespace
-
-MemoryNeeded quadratic_memory(const Body& body, std::size_t held) {
-  const auto elements = static_cast<double>(body.element_count()),
-             cells = static_cast<double>(body.cell_count());
-  const auto cut = static_cast<double>(
-      std::count_if(body.fill.begin(), body.fill.end(), [](double fill) { return fill < kWholeFill; }));
-  const double nodes = 4 * (elements + cells);
-  MemoryNeeded needed;
-  needed.bytes =
-      kSmallProgram + kQuadraticNode * nodes + kCutCell * cut + kHeldCell * static_cast<double>(held);
-  needed.with_large_deflections = needed.bytes + kTurnedCell * (cells - cut);
-  return needed;
-}
 
 std::optional<MemoryNeeded> memory_needed(const Body& body, const Scene& scene) {
   const std::vector<Model> models = models_of_parts(scene, body);
@@ -72,16 +49,6 @@ std::optional<MemoryNeeded> memory_needed(const Body& body, const Scene& scene) 
   if (model == Model::paper) return of(kSmallProgram + kConnection * connections_of(body));
   return of(kProgram + (model == Model::springs ? kBlockOfSprings : kBlock) * blocks +
             kElementOfMode * modes * elements);
-}
-
-void refuse_beyond_memory(double bytes, const std::string& what, const std::string& scene) {
-  const bool limited = std::isfinite(memory_limit());
-  const double most = limited ? memory_limit() : available_memory();
-  if (bytes <= kSure * most) return;
-  throw InputError(
-      scene, fmt::format("this run needs about {} ({}), more than {} {}: voxelize with a larger --size{}",
-                         human_bytes(bytes), what, limited ? "the limit of" : "the free memory of",
-                         human_bytes(most), limited ? ", or raise --max-memory" : ""));
 }
 
 void refuse_beyond_memory(const Body& body, const Scene& scene) {

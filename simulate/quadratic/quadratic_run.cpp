@@ -16,7 +16,6 @@
 #include "simulate/estimate/stress_singularity.h"
 #include "simulate/matter/fragments.h"
 #include "simulate/matter/interpolation_weights.h"
-#include "simulate/memory.h"
 #include "simulate/models/cells.h"
 #include "simulate/models/stiffness.h"
 #include "simulate/probes/probes.h"
@@ -24,6 +23,7 @@
 #include "simulate/quadratic/quadratic_newton.h"
 #include "simulate/quadratic/quadratic_solve.h"
 #include "simulate/quadratic/quadratic_stress.h"
+#include "simulate/result/memory_limit.h"
 #include "simulate/thermal/thermal.h"
 
 namespace flexel::simulate {

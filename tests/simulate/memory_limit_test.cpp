@@ -1,5 +1,5 @@
 // What is refused before a run for the memory it takes, and in which words.
-#include "simulate/memory.h"
+#include "simulate/result/memory_limit.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
