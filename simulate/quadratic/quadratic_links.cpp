@@ -16,14 +16,14 @@ namespace flexel::simulate {
 namespace {
 
 constexpr int kMostSteps = 12;
-constexpr double kLooser = 10;        // tolerance of the links over that of the nodes
-constexpr double kGoodEnough = 1e-6;  // of the forces, where rounding lets it be no less
-constexpr double kServes = 0.1;       // a step that leaves more than this of b: take S anew
-constexpr double kAstray = 4;         // ... and more than this: back, or give up where S was new
-constexpr double kDifference = 1e-5;  // of the reach
-constexpr double kMostTurn = 0.7;     // rad, of a step
-constexpr double kStale = 0.05;       // rad, that links turned since S was made
-constexpr double kFree = 1e-10;       // of lambda + 2 mu times the reach: nothing resists
+constexpr double kLooser = 10;             // tolerance of the links over that of the nodes
+constexpr double kLinksGoodEnough = 1e-6;  // of the forces, where rounding lets it be no less
+constexpr double kServes = 0.1;            // a step that leaves more than this of b: take S anew
+constexpr double kAstray = 4;              // ... and more than this: back, or give up where S was new
+constexpr double kDifference = 1e-5;       // of the reach
+constexpr double kMostLinkTurn = 0.7;      // rad, of a step
+constexpr double kStale = 0.05;            // rad, that links turned since S was made
+constexpr double kFree = 1e-10;            // of lambda + 2 mu times the reach: nothing resists
 
 Vec3 cross(const Vec3& a, const Vec3& b) {
   return a.cross(b);
@@ -310,14 +310,15 @@ bool LinkBalance::balance(LinkedNodes& nodes, double share, double safety, doubl
       made = true;
     }
     Eigen::VectorXd step = -solve_dense(slope_, left);
-    if (const double turn = turn_of(step); !nodes.turns.empty() && turn > kMostTurn) step *= kMostTurn / turn;
+    if (const double turn = turn_of(step); !nodes.turns.empty() && turn > kMostLinkTurn)
+      step *= kMostLinkTurn / turn;
     const Eigen::VectorXd q = motions();
     const std::vector<Vec3> u = nodes.displacement;
     go(nodes, step);
     const bool held = nodes.hold();
     const Eigen::VectorXd now = held ? lacking(nodes, share, safety) : left;
     const double scale_now = held ? forces(nodes, share, safety) : scale;
-    const bool good_enough = held && now.norm() <= kGoodEnough * scale_now;
+    const bool good_enough = held && now.norm() <= kLinksGoodEnough * scale_now;
     if (!held || !(now.norm() < kAstray * left.norm())) {
       if (made || good_enough) return good_enough;
       // S of another load step led astray: back, and take it anew
