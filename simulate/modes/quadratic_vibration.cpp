@@ -204,9 +204,8 @@ Pencil QuadraticVibration::pencil() const {
     std::copy_n(to[0].data(), 3 * to.size(), y);
     clear_held(y);
   };
-  // Beyond that factor matter would be strained by more than its length: nothing is told of it.
-  made.rounding =
-      made.inverts_b ? kStressedAt / stress_share_ : kRoundedEigenvalue * largest_eigenvalue(problem_);
+  made.rounding = made.inverts_b ? kStressedAt / stress_share_ / kMostStrained
+                                 : kRoundedEigenvalue * largest_eigenvalue(problem_);
   return made;
 }
 

@@ -1,3 +1,4 @@
+// What model quadratic holds by the counts of its cells, and the refusal of what is beyond a limit.
 #include "simulate/result/memory_limit.h"
 
 #include <fmt/format.h>

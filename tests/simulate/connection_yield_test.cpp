@@ -198,7 +198,7 @@ TEST(ConnectionYield, InternalFrictionIsRefusedByNameElsewhere) {
   EXPECT_THAT(refusal(testing::box_body({}), yielding_scene(friction)),
               HasSubstr("connections of model \"paper\""));
   EXPECT_THAT(refusal(centre_body(row_of({2, 2, 2})), yielding_scene(friction + "method = \"implicit\"\n")),
-              HasSubstr("internal friction"));
+              HasSubstr("[internal_friction] of model"));
   EXPECT_THAT(
       refusal(centre_body(row_of({2, 2, 2})), yielding_scene("[internal_friction]\ncoefficient = 0.3\n")),
       HasSubstr("timed runs only"));
