@@ -31,7 +31,7 @@ double area(const TopoDS_Shape& shape) {
   return properties.Mass();
 }
 
-double volume(const TopoDS_Shape& shape) {
+double enclosed_volume(const TopoDS_Shape& shape) {
   GProp_GProps properties;
   BRepGProp::VolumeProperties(shape, properties, 1e-9);
   return properties.Mass();
@@ -80,7 +80,7 @@ TEST(SphereFrames, NoPoleIsLeftAndAllElseStays) {
     const TurnedShape turned = turn_spheres(ball);
     EXPECT_EQ(poles(turned.shape), 0);
     EXPECT_TRUE(BRepCheck_Analyzer(turned.shape).IsValid());
-    EXPECT_NEAR(volume(turned.shape), volume(ball), 1e-6 * volume(ball));
+    EXPECT_NEAR(enclosed_volume(turned.shape), enclosed_volume(ball), 1e-6 * enclosed_volume(ball));
     EXPECT_LT(widest_gap(turned.shape), 1e-7);
     TopTools_IndexedMapOfShape before, after;
     TopExp::MapShapes(ball, TopAbs_FACE, before);
@@ -114,7 +114,8 @@ TEST(SphereFrames, WhatIsTurnedCanBeDeformed) {
     const DeformedShape deformed = deform_shape(turned, geometry);
     EXPECT_TRUE(BRepCheck_Analyzer(deformed.shape).IsValid());
     EXPECT_EQ(poles(deformed.shape), 0);
-    EXPECT_NEAR(volume(deformed.shape), volume(ball), 1e-4 * volume(ball));  // det J = 1
+    EXPECT_NEAR(enclosed_volume(deformed.shape), enclosed_volume(ball),
+                1e-4 * enclosed_volume(ball));  // det J = 1
   }
 }
 

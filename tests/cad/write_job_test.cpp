@@ -31,7 +31,7 @@ namespace flexel::cad {
 namespace {
 
 constexpr double kThickness = 2, kMillimetres = 1e-3;
-constexpr double kTolerance = 20e-6;                         // m
+constexpr double kAskedTolerance = 20e-6;                    // m
 constexpr double kCoarse = 100.0 / 96, kFine = 100.0 / 768;  // mm, cells of a FaceMask
 
 TopoDS_Wire rectangle(double x_low, double x_high, double y_low, double y_high) {
@@ -137,7 +137,7 @@ Told write_frame(double low, double high) {
   job.body = body_bytes(body);
   job.format = "brep";
   job.method = "blended";
-  job.tolerance = kTolerance;
+  job.tolerance = kAskedTolerance;
   Told told{write_deformed(job, [](const std::string&) {}), {}};
   told.miss = miss_on_rib(shape, told.written, body, (low + high) / 2);
   return told;
@@ -150,7 +150,7 @@ TEST(WriteDeformed, AMissOnARibIsToldHoweverThinItIs) {
   for (const auto& [low, high] :
        {std::pair(50 - 0.45 * kCoarse, 50 + 0.45 * kCoarse), std::pair(fine + 0.01, fine + kFine - 0.01)}) {
     const Told told = write_frame(low, high);
-    if (told.miss.largest <= kTolerance) continue;
+    if (told.miss.largest <= kAskedTolerance) continue;
     ++misses;
     EXPECT_GT(told.written.deviation, 0.5 * told.miss.largest) << low << " " << high;
     EXPECT_FALSE(told.written.missed.empty()) << low << " " << high;

@@ -41,7 +41,7 @@ struct Pressed {
   std::optional<Contacts> contacts;
   State before, trial;
 
-  Pressed(double friction, double damping) : body(stacked()), problem(problem_of(body)) {
+  Pressed(double friction, double damping) : body(stacked()), problem(testing::problem_of(body)) {
     ContactSettings settings = all_parts(body);
     settings.friction = friction;
     settings.damping = damping;
