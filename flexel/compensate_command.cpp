@@ -32,7 +32,7 @@
 namespace flexel::commands {
 namespace {
 
-constexpr double kAim = 1e-3, kAllowed = 0.01;  // of the largest displacement: to stop at; to be told of
+constexpr double kStopsAt = 1e-3, kAllowed = 0.01;  // of the largest displacement: to stop at; to be told of
 constexpr int kMostIterations = 12;
 constexpr double kOwnLattice = 0.8;   // spacing of the check, of that of the iteration
 constexpr double kLeastFacing = 0.1;  // cosine between a face as it is to be and as it is to be made
@@ -211,7 +211,7 @@ class Compensation {
         return;
       }
       best = made_;
-      if (now <= kAim * largest_) return;
+      if (now <= kStopsAt * largest_) return;
       before = now;
     }
     iterations_ = kMostIterations;

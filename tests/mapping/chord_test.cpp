@@ -14,36 +14,27 @@ namespace {
 
 using test::map_quietly;
 
-constexpr double kLength = 4, kHeight = 0.4, kChordSpacing = 0.05, kAngle = 0.5;
+using test::coarse_bar, test::kBarLength;
 
-// A bar of 80 x 8 x 8 cells along x with a surface of twelve triangles; cells under polygons so large are
-// looked for where the points are.
-Body bar() {
-  Body body = test::block(80, 8, 8, kChordSpacing, Placement::corner, 1);
-  body.surface_cell_offsets.clear();
-  body.surface_cells.clear();
-  return body;
-}
+constexpr double kArc = 0.5;  // over the length of the bar
 
-// Along a circle, by kAngle over the length of the bar.
-Vec3 along_circle(const Vec3& p) {
-  const double radius = kLength / kAngle, angle = p.x() / radius, r = radius - p.z();
-  return {r * std::sin(angle), p.y(), radius - r * std::cos(angle)};
+Vec3 bent(const Vec3& p) {
+  return test::along_circle(p, kArc, 0);
 }
 
 class Chord : public testing::TestWithParam<MapMethod> {};
 
 TEST_P(Chord, IsTheSagittaOfABentBar) {
-  Body body = bar();
-  test::deform(body, along_circle);
+  Body body = coarse_bar();
+  test::deform(body, bent);
   const MapReport found = report(body, map_quietly(body, GetParam()));
   // The lowest edges are the longest arcs, of the largest radius.
   const Box box = bounding_box(body.surface.vertices);
-  const double radius = kLength / kAngle - box.min.z(), angle = box.size().x() / (kLength / kAngle);
+  const double radius = kBarLength / kArc - box.min.z(), angle = box.size().x() / (kBarLength / kArc);
   const double sagitta = radius * (1 - std::cos(angle / 2));
   ASSERT_TRUE(found.chord);
   EXPECT_NEAR(found.chord->largest, sagitta, 0.02 * sagitta);
-  EXPECT_NEAR(found.chord->at.x(), kLength / 2, 0.06 * kLength);
+  EXPECT_NEAR(found.chord->at.x(), kBarLength / 2, 0.06 * kBarLength);
   EXPECT_NEAR(found.chord->share(), sagitta / found.largest_displacement, 0.02);
   EXPECT_NEAR(found.chord->longest_edge, std::hypot(box.size().x(), box.size().z()), 1e-9);
   EXPECT_EQ(found.chord->coarse_triangles, 4u);  // above and below; the sides stay in their planes
@@ -59,11 +50,11 @@ TEST_P(Chord, IsTheSagittaOfABentBar) {
 }
 
 TEST_P(Chord, IsGoneWithTheEdgesThatAreAdvised) {
-  Body body = bar();
-  test::deform(body, along_circle);
+  Body body = coarse_bar();
+  test::deform(body, bent);
   const ChordError coarse = *report(body, map_quietly(body, GetParam())).chord;
   const double edge = sufficient_edge(coarse);
-  EXPECT_GT(edge, 3 * kChordSpacing);  // or nothing would be looked at
+  EXPECT_GT(edge, 3 * test::kBarSpacing);  // or nothing would be looked at
   subdivide_mesh(body.surface, edge, "bar");
   const MapReport found = report(body, map_quietly(body, GetParam()));
   EXPECT_LT(found.chord->share(), 0.005);
@@ -77,7 +68,7 @@ TEST_P(Chord, IsNoneOfAMotionThatKeepsPlanesFlat) {
   const Mat3 turned = test::rotation(2.1, Vec3(1, 2, 3));
   const Mat3 sheared = (Mat3() << 1.2, 0.3, 0, -0.1, 0.9, 0.2, 0.1, 0, 1.1).finished();
   for (const Mat3& motion : {turned, sheared, Mat3(Mat3::Identity())}) {
-    Body body = bar();
+    Body body = coarse_bar();
     test::deform(body, [&](const Vec3& p) -> Vec3 { return motion * p + Vec3(0.1, 7, 0); });
     const MapReport found = report(body, map_quietly(body, GetParam()));
     EXPECT_LT(found.chord->largest, 1e-13);
@@ -106,11 +97,11 @@ TEST(ChordOfAPlate, SeesWhatNoVertexDoes) {
 
 // Twelve triangles around a bar that fell apart: what lies between the halves is not bent.
 TEST(ChordOfABrokenBar, LeavesOutWhatTheFractureTore) {
-  Body body = bar();
+  Body body = coarse_bar();
   for (std::uint32_t c = 0; c < body.cell_count(); ++c)
     body.broken[c] = body.lattice_index[body.cell_elements[c][0]][0] == 40;
   test::deform(body, [](const Vec3& p) -> Vec3 {
-    return p.x() < kLength / 2 + kChordSpacing / 2 ? p : Vec3(p + Vec3(1, 0, 0.5));
+    return p.x() < kBarLength / 2 + test::kBarSpacing / 2 ? p : Vec3(p + Vec3(1, 0, 0.5));
   });
   const MapReport found = report(body, map_quietly(body, &kBlended));
   EXPECT_EQ(found.chord->coarse_triangles, 0u);
@@ -118,8 +109,8 @@ TEST(ChordOfABrokenBar, LeavesOutWhatTheFractureTore) {
 }
 
 TEST(ChordOfACutSurface, IsNotMeasured) {
-  Body body = bar();
-  test::deform(body, along_circle);
+  Body body = coarse_bar();
+  test::deform(body, bent);
   const MapReport found = report(body, map_quietly(body, &kBlended), true);
   EXPECT_FALSE(found.chord);
   EXPECT_TRUE(nlohmann::json::parse(report_json(found, {}))["chord_error"].is_null());

@@ -99,6 +99,18 @@ Body knot(int across, Placement placement) {
   return body;
 }
 
+Body coarse_bar() {
+  Body body = block(80, 8, 8, kBarSpacing, Placement::corner, 1);
+  body.surface_cell_offsets.clear();
+  body.surface_cells.clear();
+  return body;
+}
+
+Vec3 along_circle(const Vec3& p, double angle, double neutral) {
+  const double radius = kBarLength / angle, turned = p.x() / radius, r = radius + neutral - p.z();
+  return {r * std::sin(turned), p.y(), radius + neutral - r * std::cos(turned)};
+}
+
 Vec3 bend(const Vec3& p) {
   const double radius = kLength / M_PI, angle = M_PI * p.x() / kLength;
   return {(radius - p.y()) * std::sin(angle), radius - (radius - p.y()) * std::cos(angle), p.z()};

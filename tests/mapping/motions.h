@@ -34,6 +34,12 @@ Body round_bar(int across, Placement placement, int along_vertices = 128, int ar
 // A trefoil tube of diameter 1, about 8 across, so that strands pass each other; its lattice is turned too.
 Body knot(int across, Placement placement);
 
+// A bar of 80 x 8 x 8 cells along x under six quads, so large that their cells are looked for where the points are.
+constexpr double kBarLength = 4, kBarSide = 0.4, kBarSpacing = 0.05;
+Body coarse_bar();
+// Bends that bar along a circle by an angle over its length; the fibres at the height `neutral` keep their length.
+Vec3 along_circle(const Vec3& p, double angle, double neutral);
+
 Vec3 bend(const Vec3& p);     // of the bar: half a circle
 Vec3 twist(const Vec3& p);    // one full turn over a length of 8
 Vec3 stretch(const Vec3& p);  // to twice its length, keeping the volume

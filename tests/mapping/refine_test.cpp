@@ -19,20 +19,12 @@ namespace {
 using test::silent;
 using Mode = RefineOptions::Mode;
 
-constexpr double kLength = 4, kSide = 0.4, kSpacing = 0.05, kAngle = 1;
+using test::coarse_bar, test::kBarLength, test::kBarSide;
 
-// A bar of 80 x 8 x 8 cells along x with six quads around it.
-Body bar() {
-  Body body = test::block(80, 8, 8, kSpacing, Placement::corner, 1);
-  body.surface_cell_offsets.clear();
-  body.surface_cells.clear();
-  return body;
-}
+constexpr double kAngle = 1;  // over the length of the bar
 
-// Along a circle, by kAngle over the length of the bar; its middle line keeps its length.
-Vec3 along_circle(const Vec3& p) {
-  const double radius = kLength / kAngle, angle = p.x() / radius, r = radius + kSide / 2 - p.z();
-  return {r * std::sin(angle), p.y(), radius + kSide / 2 - r * std::cos(angle)};
+Vec3 rolled(const Vec3& p) {
+  return test::along_circle(p, kAngle, kBarSide / 2);
 }
 
 Topology topology_of(const Surface& surface) {
@@ -63,8 +55,8 @@ MappedPart map_it(Body& body, const RefineOptions& refine, MapMethod method = &k
 class RefinedBar : public testing::TestWithParam<MapMethod> {};
 
 TEST_P(RefinedBar, LiesOnTheArcAndKeepsItsVolume) {
-  Body body = bar();
-  test::deform(body, along_circle);
+  Body body = coarse_bar();
+  test::deform(body, rolled);
   const MappedPart coarse = map_it(body, {Mode::off}, GetParam()), fine = map_it(body, {}, GetParam());
   const double exact = signed_volume(body.surface.vertices, triangulate(body.surface).corners);
   EXPECT_LT(volume(body.surface, coarse.result.displacement), 0.95 * exact);
@@ -76,16 +68,16 @@ TEST_P(RefinedBar, LiesOnTheArcAndKeepsItsVolume) {
   EXPECT_EQ(fine.report.split_from, 12u);
   // Midpoints of edges too, so triangles are flat only where the arc is.
   const Surface& surface = *fine.refined;
-  const double tolerance = 0.02 * kSide;
+  const double tolerance = 0.02 * kBarSide;
   for (std::size_t p = 0; p < surface.polygon_count(); ++p)
     for (std::size_t i = 0; i < 3; ++i) {
       const std::uint32_t a = surface.polygon(p)[i], b = surface.polygon(p)[(i + 1) % 3];
       const Vec3 middle = 0.5 * (surface.vertices[a] + surface.vertices[b]);
       const Vec3 mapped = middle + 0.5 * (fine.result.displacement[a] + fine.result.displacement[b]);
-      const Vec3 off = mapped - along_circle(middle);
+      const Vec3 off = mapped - rolled(middle);
       // Across the arc; along it and across the bar it may slide on its own side.
-      const Vec3 outwards = (mapped - Vec3(0, mapped.y(), kLength / kAngle + kSide / 2)).normalized();
-      const bool on_side = std::abs(std::abs(middle.y() - kSide / 2) - kSide / 2) < 0.01 * kSide;
+      const Vec3 outwards = (mapped - Vec3(0, mapped.y(), kBarLength / kAngle + kBarSide / 2)).normalized();
+      const bool on_side = std::abs(std::abs(middle.y() - kBarSide / 2) - kBarSide / 2) < 0.01 * kBarSide;
       if (!on_side) {
         EXPECT_LT(std::abs(off.dot(outwards)), tolerance) << middle.transpose();
       }
@@ -93,8 +85,8 @@ TEST_P(RefinedBar, LiesOnTheArcAndKeepsItsVolume) {
 }
 
 TEST_P(RefinedBar, StaysClosedAndKeepsVerticesAndFaces) {
-  Body body = bar();
-  test::deform(body, along_circle);
+  Body body = coarse_bar();
+  test::deform(body, rolled);
   const Surface before = body.surface;
   const MappedPart coarse = map_it(body, {Mode::off}, GetParam()), fine = map_it(body, {}, GetParam());
   ASSERT_TRUE(fine.refined);
@@ -102,7 +94,7 @@ TEST_P(RefinedBar, StaysClosedAndKeepsVerticesAndFaces) {
   EXPECT_TRUE(found.closed() && found.oriented());
   EXPECT_EQ(found.shell_count, 1u);
   EXPECT_NEAR(volume(*fine.refined, std::vector<Vec3>(fine.refined->vertices.size(), Vec3::Zero())) /
-                  (kLength * kSide * kSide),
+                  (kBarLength * kBarSide * kBarSide),
               1, 0.01);
   ASSERT_GT(fine.refined->vertices.size(), before.vertices.size() + 50);
   for (std::size_t v = 0; v < before.vertices.size(); ++v) {
@@ -122,7 +114,7 @@ INSTANTIATE_TEST_SUITE_P(Methods, RefinedBar, testing::ValuesIn(test::kEveryMeth
 
 TEST(Refinement, LeavesWhatIsNotCoarseAlone) {
   for (const double angle : {0.0, 0.4}) {  // turned as a whole, which triangles follow
-    Body body = bar();
+    Body body = coarse_bar();
     test::deform(body, [&](const Vec3& p) -> Vec3 { return test::rotation(angle, Vec3(1, 2, 3)) * p; });
     const MappedPart mapped = map_it(body, {});
     EXPECT_FALSE(mapped.refined);
@@ -132,26 +124,26 @@ TEST(Refinement, LeavesWhatIsNotCoarseAlone) {
 }
 
 TEST(Refinement, SplitsOnlyWhereThePartBends) {
-  Body body = bar();
+  Body body = coarse_bar();
   // Straight up to the middle, then along a circle.
-  const double bends_from = kLength / 2;
+  const double bends_from = kBarLength / 2;
   test::deform(body, [&](const Vec3& p) -> Vec3 {
     if (p.x() < bends_from) return p;
-    return Vec3(bends_from, 0, 0) + along_circle(p - Vec3(bends_from, 0, 0));
+    return Vec3(bends_from, 0, 0) + rolled(p - Vec3(bends_from, 0, 0));
   });
   const MappedPart fine = map_it(body, {});
   ASSERT_TRUE(fine.refined);
   std::size_t straight = 0, bent = 0;
   for (const Vec3& v : fine.refined->vertices) {
-    straight += v.x() > 0.01 && v.x() < 0.4 * kLength;
-    bent += v.x() > 0.6 * kLength && v.x() < kLength - 0.01;
+    straight += v.x() > 0.01 && v.x() < 0.4 * kBarLength;
+    bent += v.x() > 0.6 * kBarLength && v.x() < kBarLength - 0.01;
   }
   EXPECT_LT(3 * straight, bent);
 }
 
 // Twice the corners on every edge, as files with normals or texture coordinates have them.
 TEST(Refinement, KeepsSeamsClosed) {
-  Body body = bar();
+  Body body = coarse_bar();
   Surface& surface = body.surface;
   const std::vector<Vec3> corners = surface.vertices;
   surface.vertices.clear();
@@ -161,7 +153,7 @@ TEST(Refinement, KeepsSeamsClosed) {
   }
   surface.vertex_columns["x"].values.clear();
   for (const Vec3& v : surface.vertices) surface.vertex_columns["x"].values.push_back(v.x());
-  test::deform(body, along_circle);
+  test::deform(body, rolled);
   const MappedPart fine = map_it(body, {});
   ASSERT_TRUE(fine.refined);
   const Topology found = topology_of(*fine.refined);
@@ -184,7 +176,7 @@ TEST(Refinement, KeepsSeamsClosed) {
 
 // A needle of a closed mesh, narrower than seams come apart, lies between neighbours that fit it exactly.
 TEST(Refinement, KeepsWhatFitsApart) {
-  Body body = bar();
+  Body body = coarse_bar();
   Surface& surface = body.surface;
   const Triangles before = triangulate(surface);
   const std::uint32_t a = before.corners[0][0], b = before.corners[0][1], c = before.corners[0][2];
@@ -213,7 +205,7 @@ TEST(Refinement, KeepsWhatFitsApart) {
 }
 
 TEST(RefinementToAnEdge, LeavesAFileThatCannotBeSplitWhole) {
-  Body body = bar();
+  Body body = coarse_bar();
   body.surface.sources.resize(1);
   SurfaceSource& source = body.surface.sources[0];
   source.file = "bar.obj";
@@ -230,8 +222,8 @@ TEST(RefinementToAnEdge, LeavesAFileThatCannotBeSplitWhole) {
 }
 
 TEST(Refinement, IsTheSameForAnyNumberOfThreads) {
-  Body body = bar();
-  test::deform(body, along_circle);
+  Body body = coarse_bar();
+  test::deform(body, rolled);
   std::optional<MappedPart> one, many;
   {
     const ThreadLimit limit(1);
@@ -323,7 +315,7 @@ TEST(Refinement, GivesPiecesTheCellsOfTheirPolygonThatAreNear) {
 
 TEST(RefinementToAnEdge, SplitsUntilNoneIsLonger) {
   for (const double edge : {3.0, 0.7, 0.11}) {
-    const Surface surface = bar().surface;
+    const Surface surface = coarse_bar().surface;
     const Surface split = refined(surface, refine_to_edge(surface, edge));
     double longest = 0;
     for (std::size_t p = 0; p < split.polygon_count(); ++p)
@@ -335,7 +327,7 @@ TEST(RefinementToAnEdge, SplitsUntilNoneIsLonger) {
     EXPECT_GT(longest, edge / 3);
     EXPECT_TRUE(topology_of(split).closed() && topology_of(split).oriented());
   }
-  const Surface surface = bar().surface;
+  const Surface surface = coarse_bar().surface;
   EXPECT_FALSE(refine_to_edge(surface, 10).changes());
   EXPECT_EQ(refined(surface, refine_to_edge(surface, 10)).polygon_vertices, surface.polygon_vertices);
   EXPECT_THROW(static_cast<void>(refine_to_edge(surface, 1e-4)), InputError);
@@ -360,7 +352,7 @@ TEST(RefinementToAnEdge, TakesTrianglesThatAreNone) {
 }
 
 TEST(RefinementTwice, IsOneRefinement) {
-  const Surface surface = bar().surface;
+  const Surface surface = coarse_bar().surface;
   const Refinement first = refine_to_edge(surface, 1), second = refine_to_edge(refined(surface, first), 0.3);
   const Surface twice = refined(refined(surface, first), second),
                 once = refined(surface, composed(first, second));

@@ -17,9 +17,9 @@ TEST(Memory, WithoutALimitOnlyWhatSurelyDoesNotFitIsRefused) {
     refuse_beyond_memory(1e18, "10 elements", "scene.toml");
     FAIL() << "a million terabytes";
   } catch (const InputError& error) {
-    EXPECT_THAT(error.what(), testing::HasSubstr("10 elements"));
-    EXPECT_THAT(error.what(), testing::HasSubstr("free memory"));
-    EXPECT_THAT(error.what(), testing::Not(testing::HasSubstr("--max-memory")));
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("10 elements"));
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("free memory"));
+    EXPECT_THAT(error.what(), ::testing::Not(::testing::HasSubstr("--max-memory")));
   }
 }
 

@@ -13,8 +13,8 @@ namespace flexel::simulate {
 namespace {
 
 constexpr std::size_t kEightsAtATime = 4, kNodesAtATime = 512;
-constexpr std::size_t kWidth = quadratic_kernel::kWidth, kPoints = 3;
-constexpr std::size_t kWholeMoments = kPoints * kPoints * kPoints;
+constexpr std::size_t kWidth = quadratic_kernel::kWidth, kPointsPerAxis = 3;
+constexpr std::size_t kWholeMoments = kPointsPerAxis * kPointsPerAxis * kPointsPerAxis;
 constexpr std::size_t kTurnNumbers = static_cast<std::size_t>(kCellUnknowns) * 3;
 using CellValues = Eigen::Matrix<double, kCellUnknowns, 1>;
 
@@ -110,7 +110,7 @@ CellProducts<Number>::CellProducts(const QuadraticNodes& nodes, const std::vecto
     for (std::size_t lane = 0; lane < kWidth; ++lane)
       put_rotation(each.axes.transpose(), lane, first_rotation_.data() + first_rotation_.size() - 9 * kWidth);
   }
-  constexpr double weights[kPoints] = {5. / 18, 8. / 18, 5. / 18};  // Gauss's on [0, 1]
+  constexpr double weights[kPointsPerAxis] = {5. / 18, 8. / 18, 5. / 18};  // Gauss's on [0, 1]
   for (std::size_t k = 0; k < kWholeMoments; ++k)
     moments_.insert(moments_.end(), kWidth,
                     static_cast<Number>(weights[k % 3] * weights[k / 3 % 3] * weights[k / 9]));
