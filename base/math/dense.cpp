@@ -31,6 +31,15 @@ SingularValues singular_values(const Eigen::MatrixXd& matrix) {
   return {svd.matrixU(), svd.singularValues(), svd.matrixV()};
 }
 
+NearestRotation nearest_rotation(const Eigen::Matrix3d& matrix) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3d senses = Eigen::Matrix3d::Identity();
+  senses(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
+  return {svd.matrixU() * senses * svd.matrixV().transpose(),
+          svd.matrixV() * (senses * svd.singularValues().asDiagonal()) * svd.matrixV().transpose(),
+          svd.singularValues(), senses(2, 2)};
+}
+
 Eigen::MatrixXd orthonormal_base(const Eigen::MatrixXd& columns) {
   return columns.householderQr().householderQ() * Eigen::MatrixXd::Identity(columns.rows(), columns.cols());
 }

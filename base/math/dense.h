@@ -24,6 +24,15 @@ struct SingularValues {
 };
 [[nodiscard]] SingularValues singular_values(const Eigen::MatrixXd& matrix);
 
+// matrix = rotation stretch, the stretch symmetric: of all rotations that nearest to the matrix (Kabsch 1976). The singular
+// values fall; the matrix is of a reflection where `sense` is -1 (1 else).
+struct NearestRotation {
+  Eigen::Matrix3d rotation, stretch;
+  Eigen::Vector3d values;
+  double sense;
+};
+[[nodiscard]] NearestRotation nearest_rotation(const Eigen::Matrix3d& matrix);
+
 // An orthonormal base of the span of the columns, by Householder's reflections.
 [[nodiscard]] Eigen::MatrixXd orthonormal_base(const Eigen::MatrixXd& columns);
 

@@ -1,7 +1,9 @@
 // The rotation is V diag(1, 1, det(V U^T)) U^T of the covariance U S V^T.
 #include "flexel/clay/rigid_fit.h"
 
-#include <Eigen/SVD>
+#include <Eigen/Geometry>
+
+#include "base/math/dense.h"
 
 namespace flexel::clay {
 
@@ -23,14 +25,12 @@ ToolPose rigid_fit(const std::vector<MovedPoint>& points) {
     const Vec3 arm = point.rest - middle;
     const Vec3 bent = point.displacement - pose.displacement;
     moved = moved || bent.squaredNorm() > 1e-24 * arm.squaredNorm();
-    covariance += arm * (arm + bent).transpose();
+    covariance += (arm + bent) * arm.transpose();
   }
   if (!moved) return pose;
-  const Eigen::JacobiSVD<Mat3> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  if (!(svd.singularValues()[1] > 1e-9 * svd.singularValues()[0])) return pose;
-  Mat3 flip = Mat3::Identity();
-  flip(2, 2) = (svd.matrixV() * svd.matrixU().transpose()).determinant() < 0 ? -1 : 1;
-  const Eigen::AngleAxisd turn(Mat3(svd.matrixV() * flip * svd.matrixU().transpose()));
+  const NearestRotation nearest = nearest_rotation(covariance);
+  if (!(nearest.values[1] > 1e-9 * nearest.values[0])) return pose;
+  const Eigen::AngleAxisd turn(nearest.rotation);
   pose.turn = turn.angle() * turn.axis();
   return pose;
 }

@@ -4,10 +4,10 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <numbers>
 
 #include "base/error.h"
+#include "base/math/dense.h"
 #include "base/units.h"
 #include "flexel/measure/face_shape.h"
 #include "simulate/input/scene_selection.h"
@@ -74,10 +74,7 @@ Mat3 turn_of_side(const Body& body, const simulate::Selected& selected,
     if (taken[v])
       product += (body.surface.vertices[v] + displacement[v] - moved) *
                  (body.surface.vertices[v] - middle).transpose();
-  const Eigen::JacobiSVD<Mat3> svd(product, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Mat3 sense = Mat3::Identity();
-  sense(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
-  return svd.matrixU() * sense * svd.matrixV().transpose();
+  return nearest_rotation(product).rotation;
 }
 
 }  // namespace

@@ -4,11 +4,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
 
 #include "base/error.h"
+#include "base/math/dense.h"
 #include "base/nearest_word.h"
 #include "base/stop.h"
 #include "mapping/anchors/frame.h"
@@ -23,9 +22,8 @@ namespace {
 // The rotation nearest to a deformation gradient (its polar factor); the identity where it has none.
 Mat3 rotation_of(const Mat3& gradient) {
   if (!gradient.allFinite()) return Mat3::Identity();
-  const Eigen::JacobiSVD<Mat3> svd(gradient, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Mat3 rotation = svd.matrixU() * svd.matrixV().transpose();
-  return rotation.determinant() > 0 ? rotation : Mat3(Mat3::Identity());
+  const NearestRotation nearest = nearest_rotation(gradient);
+  return nearest.sense > 0 ? nearest.rotation : Mat3(Mat3::Identity());
 }
 
 void treat_far_vertices(const Body& body, const MapOptions& options, MapResult& result) {

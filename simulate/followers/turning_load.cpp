@@ -4,9 +4,10 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <map>
 #include <numbers>
+
+#include "base/math/dense.h"
 
 namespace flexel::simulate {
 namespace {
@@ -29,14 +30,10 @@ Vec3 spin_of_skew(const Mat3& m) {
 std::optional<TurningLoad> TurningLoad::make(const std::vector<LoadedPoint>& points, const Carriers& carriers,
                                              const Vec3& force, const Vec3& torque,
                                              const std::optional<Vec3>& at) {
-  double total = 0;
-  Vec3 middle = Vec3::Zero();
-  for (const LoadedPoint& point : points) {
-    total += point.weight;
-    middle += point.weight * point.position;
-  }
-  if (!(total > 0)) return std::nullopt;
-  middle /= total;
+  const std::optional<WeightedMiddle> found = weighted_middle(points);
+  if (!found) return std::nullopt;
+  const double total = found->total;  // no structured binding: a lambda below takes it
+  const Vec3 middle = found->place;
   TurningLoad made;
   std::map<std::uint32_t, Node> nodes;
   for (std::size_t q = 0; q < points.size(); ++q) {
@@ -61,12 +58,10 @@ std::optional<TurningLoad> TurningLoad::make(const std::vector<LoadedPoint>& poi
 TurningLoad::Frame TurningLoad::frame(const std::vector<Vec3>& displacement) const {
   Mat3 a = rest_;
   for (const Node& node : nodes_) a += displacement[node.at] * node.arm.transpose();
-  const Eigen::JacobiSVD<Mat3> svd(a, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Mat3 sense = Mat3::Identity();
-  sense(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
+  const NearestRotation nearest = nearest_rotation(a);
   Frame made;
-  made.turn = svd.matrixU() * sense * svd.matrixV().transpose();
-  made.stretch = svd.matrixV() * (sense * svd.singularValues().asDiagonal()) * svd.matrixV().transpose();
+  made.turn = nearest.rotation;
+  made.stretch = nearest.stretch;
   made.inverse = (made.stretch.trace() * Mat3::Identity() - made.stretch).inverse();
   made.spread = made.inverse * moment_;
   return made;

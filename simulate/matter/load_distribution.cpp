@@ -1,10 +1,10 @@
 // Both are sums over the points in their order.
 #include "simulate/matter/load_distribution.h"
 
-#include <Eigen/Geometry>
-#include <Eigen/SVD>
-
 #include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+
+#include "base/math/dense.h"
 
 namespace flexel::simulate {
 namespace {
@@ -14,16 +14,22 @@ constexpr double kLeftOver = 0.2;  // of a bearing load
 
 }  // namespace
 
+std::optional<WeightedMiddle> weighted_middle(const std::vector<LoadedPoint>& points) {
+  WeightedMiddle middle;
+  for (const LoadedPoint& point : points) {
+    middle.total += point.weight;
+    middle.place += point.weight * point.position;
+  }
+  if (!(middle.total > 0)) return std::nullopt;
+  middle.place /= middle.total;
+  return middle;
+}
+
 std::optional<std::vector<Vec3>> averaging_link(const std::vector<LoadedPoint>& points, const Vec3& force,
                                                 const Vec3& moment, const std::optional<Vec3>& at) {
-  double total = 0;
-  Vec3 middle = Vec3::Zero();
-  for (const LoadedPoint& point : points) {
-    total += point.weight;
-    middle += point.weight * point.position;
-  }
-  if (!(total > 0)) return std::nullopt;
-  middle /= total;
+  const std::optional<WeightedMiddle> found = weighted_middle(points);
+  if (!found) return std::nullopt;
+  const auto& [total, middle] = *found;
   Mat3 inertia = Mat3::Zero();
   for (const LoadedPoint& point : points) {
     const Vec3 arm = point.position - middle;
@@ -93,11 +99,9 @@ std::optional<Vec3> turn_of_couple(std::size_t count, const std::function<Loaded
     arms += arm.norm() * each.force.norm();
   }
   if (!(moment.norm() > kCouple * arms)) return std::nullopt;
-  const Eigen::JacobiSVD<Mat3> svd(product, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  if (!(svd.singularValues()[1] > 1e-9 * svd.singularValues()[0])) return std::nullopt;  // a line
-  Mat3 sense = Mat3::Identity();
-  sense(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
-  const Eigen::AngleAxisd turn(Mat3(svd.matrixU() * sense * svd.matrixV().transpose()));
+  const NearestRotation nearest = nearest_rotation(product);
+  if (!(nearest.values[1] > 1e-9 * nearest.values[0])) return std::nullopt;  // a line
+  const Eigen::AngleAxisd turn(nearest.rotation);
   return Vec3(turn.angle() * turn.axis());
 }
 

@@ -15,6 +15,13 @@ struct LoadedPoint {
   Vec3 normal = Vec3::Zero();    // unit, outward; of a surface
 };
 
+struct WeightedMiddle {
+  double total = 0;           // of the weights
+  Vec3 place = Vec3::Zero();  // m
+};
+// Nothing where the weights have no sum.
+[[nodiscard]] std::optional<WeightedMiddle> weighted_middle(const std::vector<LoadedPoint>& points);
+
 // Forces [N] at the points that are statically equivalent to `force` [N] at the point `at` together with the
 // couple `moment` [N m]: f_q = w_q (a + b x (x_q - c)), c the points' middle (an averaging link, known as
 // RBE3; least weighted squares). Without `at` the force acts at c. Nothing where the points lie on a line and

@@ -4,12 +4,12 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "base/error.h"
+#include "base/math/dense.h"
 #include "base/math/small_matrices.h"
 
 namespace flexel::simulate {
@@ -99,12 +99,7 @@ void take_up(RigidBody& rigid, const Body& body, const std::vector<double>& mass
     spin += mass[e] * now.cross(velocity[e] - speed);
   }
   Mat3 rotation = Mat3::Identity();
-  if (turned) {
-    const Eigen::JacobiSVD<Mat3> svd(moment, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    Mat3 signs = Mat3::Identity();
-    if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0) signs(2, 2) = -1;
-    rotation = svd.matrixU() * signs * svd.matrixV().transpose();
-  }
+  if (turned) rotation = nearest_rotation(moment).rotation;
   const Vec3 centre = at - rotation * at_rest;
   rigid.pose = {centre - rigid.centre, rotation};
   // about an axis that all elements lie on nothing is known to turn
