@@ -11,6 +11,7 @@
 #include "base/math/area_vector.h"
 #include "formats/exchange/surface_file.h"
 #include "tests/formats/import_help.h"
+#include "tests/sanitized.h"
 
 namespace flexel::test {
 namespace {
@@ -205,8 +206,10 @@ TEST(SubdivideImport, TooManyTrianglesAndNoLengthAreErrors) {
 
 TEST(SubdivideStep, PartsAreSplitToASixtyFourthOfTheirDiagonal) {
   SKIP_WITHOUT_PARTS();
-  for (const char* file : {"4040_base_mount.step", "Moving_Jaw_SO101.step", "base_interface_AP203.STEP",
-                           "featuretype.STEP", "lower_leg_structure_fork.STEP"}) {
+  for (const char* file : less_if_sanitized<std::vector<const char*>>(
+           {"4040_base_mount.step", "Moving_Jaw_SO101.step", "base_interface_AP203.STEP", "featuretype.STEP",
+            "lower_leg_structure_fork.STEP"},
+           {"4040_base_mount.step", "base_interface_AP203.STEP"}, "two parts of five")) {
     SCOPED_TRACE(file);
     ImportOptions whole;
     whole.largest_edge = std::numeric_limits<double>::infinity();

@@ -21,7 +21,7 @@ using test::silent;
 
 // Sanitizers make all of this twenty times as slow: there the lattice is coarser, and of many polygons only
 // some are mapped.
-const std::size_t kCells = sanitized() ? 300 : 1500, kMostVertices = sanitized() ? 3000 : 20'000;
+const std::size_t kCells = sanitized() ? 300 : 1500, kMostVertices = sanitized() ? 1000 : 20'000;
 
 const std::filesystem::path kFolder = FLEXEL_PARTS_DIR;
 

@@ -10,6 +10,7 @@
 #include "mapping/methods/apply.h"
 #include "mapping/methods/bind.h"
 #include "motions.h"
+#include "tests/sanitized.h"
 
 namespace flexel::mapping {
 namespace {
@@ -103,9 +104,13 @@ TEST(SpaceField, SecondDerivativesAreContinuousEverywhere) {
   add_quadratic(body);
   for (const MapMethod method : {&kBlended, &kShapeFunctions}) {
     const SpaceField field(body, method, 1);
-    for (const auto& [from, to] : {std::pair(Vec3(0.1, 0.13, 0.2), Vec3(3.1, 0.21, 0.23)),  // along a bar
-                                   std::pair(Vec3(0.05, 2.9, 0.17), Vec3(2.9, 0.11, 0.2)),  // across the void
-                                   std::pair(Vec3(0.3, 1.7, 0.2), Vec3(6, 5, 1))}) {        // far away
+    using Line = std::pair<Vec3, Vec3>;
+    const Line across_void{Vec3(0.05, 2.9, 0.17), Vec3(2.9, 0.11, 0.2)};
+    for (const auto& [from, to] :
+         less_if_sanitized<std::vector<Line>>({{Vec3(0.1, 0.13, 0.2), Vec3(3.1, 0.21, 0.23)},  // along a bar
+                                               across_void,
+                                               {Vec3(0.3, 1.7, 0.2), Vec3(6, 5, 1)}},  // far away
+                                              {across_void}, "one line of three")) {
       const double coarse = roughness(field, from, to, 2000), fine = roughness(field, from, to, 8000);
       EXPECT_LT(fine, 0.5 * coarse) << name_of(method) << " from " << from.transpose();
     }

@@ -18,6 +18,7 @@
 #include "simulate/linear/vector_products.h"
 #include "simulate/scene/scene.h"
 #include "simulate/simulate.h"
+#include "tests/sanitized.h"
 #include "tests/simulate/box_body.h"
 #include "tests/simulate/centre_body.h"
 #include "tests/simulate/timed_case.h"
@@ -498,8 +499,10 @@ TEST(Followers, AForceAcrossBendsACantileverIntoTheElastica) {
       turn_of_the_end(kForce * kBarLength * kBarLength / (kBarYoung * std::pow(kSide, 4) / 12));
   EXPECT_GT(turn, 1);
   const Vec3 exact = kForce * Vec3(-std::sin(turn), 0, std::cos(turn));
-  for (const auto& [model, link] : {std::pair{"cells", "averaging"}, std::pair{"quadratic", "averaging"},
-                                    std::pair{"quadratic", "rigid"}}) {
+  using Way = std::pair<const char*, const char*>;
+  for (const auto& [model, link] : less_if_sanitized<std::vector<Way>>(
+           {{"cells", "averaging"}, {"quadratic", "averaging"}, {"quadratic", "rigid"}},
+           {{"cells", "averaging"}}, "one of three")) {
     Body body = testing::box_body({.cells = {40, 2, 2}, .spacing = Vec3::Constant(2e-3)});
     const SimulateResult result = run_follower(
         body, follower_stuff(model, 0) +
