@@ -50,6 +50,7 @@ std::string reason(const SimulateResult& result) {
   const std::string& note = result.error_bars.note;
   if (note.find("wall") != std::string::npos || note.find("one cell thick") != std::string::npos)
     return ": its walls are only a few cells thick";
+  if (note.starts_with("the support")) return ": " + note.substr(0, note.find(": "));
   return "";
 }
 
