@@ -15,6 +15,8 @@
 namespace flexel::simulate {
 namespace {
 
+constexpr double kShare =
+    1.0 / 3;  // of the rim: the flank of a tooth has its root beside it, the end of a bar nothing
 constexpr double kFlush = 0.01;  // sine of the turn: less than the first facet of a fillet has
 
 using EndsOfRim = std::array<std::array<double, 3>, 2>;
@@ -57,7 +59,7 @@ std::optional<double> width_amid_matter(const Surface& surface, const std::vecto
       if (own.dot(inward) > -kFlush) beside += (b - a).norm();
     });
   }
-  if (!(beside > 0.5 * length) || !(length > 0)) return std::nullopt;
+  if (!(beside > kShare * length) || !(length > 0)) return std::nullopt;
   return 2 * area / length;
 }
 

@@ -8,7 +8,7 @@
 
 namespace flexel::simulate {
 
-// The width [m] of a region of the surface where matter goes on beside it, flush or rising, along more than half of its rim (a ring
+// The width [m] of a region of the surface where matter goes on beside it, flush or rising, along more than a third of its rim (a ring
 // around a screw, a patch of a face): twice its area over the length of its rim, which is exact for rings and long strips and half
 // the side of a square. Nothing where it ends at outer edges, as the end of a bar does, or has no rim. `polygons`: numbers, ascending.
 [[nodiscard]] std::optional<double> width_amid_matter(const Surface& surface,

@@ -43,6 +43,9 @@ TEST(NarrowSupport, APatchAndThePitOfAScrewAreAmidMatterAndAnEndIsNot) {
   EXPECT_EQ(width_amid_matter(squares(0), all), std::nullopt) << "nothing goes on beside it";
   // A strip from side to side: flush along six of its eight edges.
   EXPECT_DOUBLE_EQ(width_amid_matter(squares(0), {3, 4, 5}).value(), 0.75);
+  // Along one side: three of eight edges.
+  EXPECT_DOUBLE_EQ(width_amid_matter(squares(0), {0, 1, 2}).value(), 0.75);
+  EXPECT_EQ(width_amid_matter(squares(0), {0, 1, 2, 3, 4, 5, 6, 7}).has_value(), false) << "two of twelve";
   EXPECT_EQ(width_amid_matter(squares(0), {}), std::nullopt);
 }
 
