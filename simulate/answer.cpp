@@ -54,7 +54,8 @@ std::string reason(const SimulateResult& result) {
   return "";
 }
 
-// "5.28 mm +- 0.54 mm (10 %)", or what a guess is worth. Walls of a cell or two may bend several times as far.
+// "5.28 mm +- 0.54 mm (10 %)", or what a guess is worth. Walls of a cell or two may bend several times as
+// far.
 std::string moved(double length, const ErrorBar* bar, const SimulateResult& result) {
   const std::optional<double> share = share_of(bar);
   const bool unknown = result.error_bars.bars.empty() && !reason(result).empty();

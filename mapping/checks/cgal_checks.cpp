@@ -168,8 +168,8 @@ double facet_area(const Delaunay& delaunay, const Delaunay::Edge& edge, const Ve
 
 constexpr std::uint32_t kGuard = 0xFFFFFFFF;  // no element
 
-// Points far around the others. Without them the cells at the rim of a part are bounded by its hull, and which of
-// its nearly coplanar points are corners of that is rounding.
+// Points far around the others. Without them the cells at the rim of a part are bounded by its hull, and which
+// of its nearly coplanar points are corners of that is rounding.
 void add_guards(std::vector<std::pair<Point, std::uint32_t>>& points) {
   constexpr double kFar = 10;  // diagonals
   Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;

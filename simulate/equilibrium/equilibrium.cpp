@@ -195,8 +195,8 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   return true;
 }
 
-// What a torque does that goes on turning what it acts on, at a state in equilibrium; "" where none turns it far. Its forces
-// keep their direction, so past a right angle they turn nothing.
+// What a torque does that goes on turning what it acts on, at a state in equilibrium; "" where none turns it
+// far. Its forces keep their direction, so past a right angle they turn nothing.
 std::string said_of_dead_torques(Mechanics& mechanics, const State& state) {
   constexpr double kFar = 10 * std::numbers::pi / 180;
   SimulateResult told;

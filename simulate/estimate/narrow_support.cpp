@@ -15,19 +15,19 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr double kShare =
+constexpr double kRimShare =
     1.0 / 3;  // of the rim: the flank of a tooth has its root beside it, the end of a bar nothing
-constexpr double kFlush = 0.01;  // sine of the turn: less than the first facet of a fillet has
+constexpr double kFlushTurn = 0.01;  // sine of the turn: less than the first facet of a fillet has
 
 using EndsOfRim = std::array<std::array<double, 3>, 2>;
 
-std::array<double, 3> coordinates(const Vec3& at) {
+std::array<double, 3> rim_point(const Vec3& at) {
   return {at.x(), at.y(), at.z()};
 }
 
 // The directed edges of a polygon, by their ends.
 template <class Use>
-void for_each_edge(const Surface& surface, std::uint32_t polygon, const Use& use) {
+void for_each_rim_edge(const Surface& surface, std::uint32_t polygon, const Use& use) {
   const auto corners = surface.polygon(polygon);
   for (std::size_t i = 0; i < corners.size(); ++i)
     use(surface.vertices[corners[i]], surface.vertices[corners[(i + 1) % corners.size()]]);
@@ -40,8 +40,8 @@ std::optional<double> width_amid_matter(const Surface& surface, const std::vecto
   double area = 0;
   for (const std::uint32_t polygon : polygons) {
     area += area_vector(surface.vertices, surface.polygon(polygon)).norm();
-    for_each_edge(surface, polygon, [&](const Vec3& a, const Vec3& b) {
-      if (rim.erase({coordinates(b), coordinates(a)}) == 0) rim[{coordinates(a), coordinates(b)}] = polygon;
+    for_each_rim_edge(surface, polygon, [&](const Vec3& a, const Vec3& b) {
+      if (rim.erase({rim_point(b), rim_point(a)}) == 0) rim[{rim_point(a), rim_point(b)}] = polygon;
     });
   }
   double length = 0, beside = 0;
@@ -49,17 +49,17 @@ std::optional<double> width_amid_matter(const Surface& surface, const std::vecto
     length += (Eigen::Map<const Vec3>(ends[1].data()) - Eigen::Map<const Vec3>(ends[0].data())).norm();
   for (std::uint32_t other = 0; other < surface.polygon_count(); ++other) {
     if (std::binary_search(polygons.begin(), polygons.end(), other)) continue;
-    for_each_edge(surface, other, [&](const Vec3& a, const Vec3& b) {
-      const auto found = rim.find({coordinates(b), coordinates(a)});
+    for_each_rim_edge(surface, other, [&](const Vec3& a, const Vec3& b) {
+      const auto found = rim.find({rim_point(b), rim_point(a)});
       if (found == rim.end()) return;
       const Vec3 own = area_vector(surface.vertices, surface.polygon(found->second)).normalized();
       const Vec3 its = area_vector(surface.vertices, surface.polygon(other)).normalized();
       // Away from the edge within the other polygon; above the region's plane it rises.
       const Vec3 inward = its.cross(b - a).normalized();
-      if (own.dot(inward) > -kFlush) beside += (b - a).norm();
+      if (own.dot(inward) > -kFlushTurn) beside += (b - a).norm();
     });
   }
-  if (!(beside > kShare * length) || !(length > 0)) return std::nullopt;
+  if (!(beside > kRimShare * length) || !(length > 0)) return std::nullopt;
   return 2 * area / length;
 }
 
