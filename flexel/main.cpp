@@ -1,5 +1,8 @@
 // The program flexel: `flexel COMMAND ...`.
 #include <fmt/format.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include <iterator>
 #include <string>
@@ -135,5 +138,10 @@ int run(int argc, char** argv) {
 }  // namespace flexel::commands
 
 int main(int argc, char** argv) {
+#ifdef __GLIBC__
+  // Blocks above this go back to the system when they are freed. The library would raise its bound to 32 MB as
+  // it meets such, and the matrices of one Newton step would leave holes that those of the next do not fit.
+  mallopt(M_MMAP_THRESHOLD, 16 * 1024 * 1024);
+#endif
   return flexel::run_program("flexel", [&] { return flexel::commands::run(argc, argv); });
 }

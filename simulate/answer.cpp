@@ -45,10 +45,21 @@ std::string place_in_one_unit(const Vec3& at) {
                                : "mm");
 }
 
-// "5.28 mm +- 0.54 mm (10 %)", or what a guess is worth.
-std::string moved(double length, const ErrorBar* bar) {
+// Why a bar is wide, or missing, of the note of simulate/estimate/error_bars.cpp.
+std::string reason(const SimulateResult& result) {
+  const std::string& note = result.error_bars.note;
+  if (note.find("wall") != std::string::npos || note.find("one cell thick") != std::string::npos)
+    return ": its walls are only a few cells thick";
+  if (note.starts_with("the support")) return ": " + note.substr(0, note.find(": "));
+  return "";
+}
+
+// "5.28 mm +- 0.54 mm (10 %)", or what a guess is worth. Walls of a cell or two may bend several times as
+// far.
+std::string moved(double length, const ErrorBar* bar, const SimulateResult& result) {
   const std::optional<double> share = share_of(bar);
-  if (!share) return human_length(length);
+  const bool unknown = result.error_bars.bars.empty() && !reason(result).empty();
+  if (!share) return (unknown ? "no more than a first guess: " : "") + human_length(length);
   const double width = *share * length;
   if (*share > kGuess)
     return fmt::format("no more than a first guess: {}, could be {}", human_length(length),
@@ -103,17 +114,18 @@ std::string how_far(const SimulateResult& result) {
   if (!(result.largest_displacement > 0)) return "nothing moves";
   const std::string when =
       result.timed ? fmt::format(" at the end, {}", human_seconds(result.timed->time)) : "";
-  return fmt::format("{}, at {}{}",
-                     moved(result.largest_displacement, find_bar(result, ErrorBar::Of::largest_displacement)),
-                     place_in_one_unit(result.largest_displacement_at), when);
+  return fmt::format(
+      "{}, at {}{}",
+      moved(result.largest_displacement, find_bar(result, ErrorBar::Of::largest_displacement), result),
+      place_in_one_unit(result.largest_displacement_at), when);
 }
 
 std::string probes(const SimulateResult& result) {
   std::string text;
   for (std::size_t p = 0; p < std::min(kNamed, result.probes.size()); ++p)
-    text +=
-        fmt::format("{}\"{}\" {}", text.empty() ? "" : "; ", result.probes[p].name,
-                    moved(result.probes[p].displacement.norm(), find_bar(result, ErrorBar::Of::probe, p)));
+    text += fmt::format(
+        "{}\"{}\" {}", text.empty() ? "" : "; ", result.probes[p].name,
+        moved(result.probes[p].displacement.norm(), find_bar(result, ErrorBar::Of::probe, p), result));
   return text + more(result.probes.size());
 }
 
@@ -131,14 +143,6 @@ std::optional<double> worst_share(const SimulateResult& result) {
     if (const std::optional<double> share = share_of(&each)) worst = std::max(worst.value_or(0), *share);
   }
   return worst;
-}
-
-// Why a bar is wide, of the note of simulate/estimate/error_bars.cpp.
-std::string reason(const SimulateResult& result) {
-  const std::string& note = result.error_bars.note;
-  if (note.find("wall") != std::string::npos || note.find("one cell thick") != std::string::npos)
-    return ": its walls are only a few cells thick";
-  return "";
 }
 
 // "within 3 %", "under 0.01 %"

@@ -29,6 +29,7 @@ namespace {
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Point = Kernel::Point_3;
 using Corners = std::array<std::uint32_t, 3>;
+using InPlane = Eigen::Vector2d;
 
 Point point(const Vec3& v) {
   return {v.x(), v.y(), v.z()};
@@ -129,23 +130,58 @@ bool is_sliver(const Delaunay& delaunay, const Delaunay::Cell_handle& cell, doub
   return std::abs(delaunay.tetrahedron(cell).volume()) < kSliver * reach * reach * reach;
 }
 
-// Area of the Voronoi facet between the ends of `edge`, in m^2.
+// Signed area, in m^2, of what the triangle (0, a, b) has in common with the disc of that radius about 0.
+double area_in_disc(const InPlane& a, const InPlane& b, double radius) {
+  const auto cross = [](const InPlane& p, const InPlane& q) { return p.x() * q.y() - p.y() * q.x(); };
+  const auto sector = [&](const InPlane& p, const InPlane& q) {
+    return radius * radius * std::atan2(cross(p, q), p.dot(q)) / 2;
+  };
+  const InPlane way = b - a;
+  const double half = a.dot(way), length = way.squaredNorm();
+  const double root = half * half - length * (a.squaredNorm() - radius * radius);
+  if (!(root > 0)) return sector(a, b);
+  const double enters = (-half - std::sqrt(root)) / length, leaves = (-half + std::sqrt(root)) / length;
+  if (leaves <= 0 || enters >= 1) return sector(a, b);
+  const InPlane in = a + std::max(enters, 0.0) * way, out = a + std::min(leaves, 1.0) * way;
+  return (enters > 0 ? sector(a, in) : 0) + cross(in, out) / 2 + (leaves < 1 ? sector(out, b) : 0);
+}
+
+// Area of the Voronoi facet between the ends of `edge` within `reach` of their `middle`, in m^2.
 double facet_area(const Delaunay& delaunay, const Delaunay::Edge& edge, const Vec3& middle, double reach) {
-  std::vector<Vec3> polygon;
+  const Point one = edge.first->vertex(edge.second)->point(), other = edge.first->vertex(edge.third)->point();
+  const Vec3 along = Vec3(other.x() - one.x(), other.y() - one.y(), other.z() - one.z()).normalized();
+  const Vec3 first_axis = along.unitOrthogonal(), second_axis = along.cross(first_axis);
+  std::vector<InPlane> polygon;
   auto cell = delaunay.incident_cells(edge);
   const auto first = cell;
   do {
     if (delaunay.is_infinite(cell) || is_sliver(delaunay, cell, reach)) continue;
     const Point centre = delaunay.dual(cell);
-    Vec3 away = Vec3(centre.x(), centre.y(), centre.z()) - middle;
-    if (!away.allFinite()) continue;
-    if (away.norm() > reach) away *= reach / away.norm();
-    polygon.push_back(away);
+    const Vec3 away = Vec3(centre.x(), centre.y(), centre.z()) - middle;
+    if (away.allFinite()) polygon.emplace_back(away.dot(first_axis), away.dot(second_axis));
   } while (++cell != first);
-  Vec3 area = Vec3::Zero();
-  for (std::size_t i = 2; i < polygon.size(); ++i)
-    area += (polygon[i - 1] - polygon[0]).cross(polygon[i] - polygon[0]) / 2;
-  return area.norm();
+  double area = 0;
+  for (std::size_t i = 0; i < polygon.size(); ++i)
+    area += area_in_disc(polygon[i], polygon[(i + 1) % polygon.size()], reach);
+  return std::abs(area);
+}
+
+constexpr std::uint32_t kGuard = 0xFFFFFFFF;  // no element
+
+// Points far around the others. Without them the cells at the rim of a part are bounded by its hull, and which
+// of its nearly coplanar points are corners of that is rounding.
+void add_guards(std::vector<std::pair<Point, std::uint32_t>>& points) {
+  constexpr double kFar = 10;  // diagonals
+  Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
+  for (const auto& [at, element] : points) {
+    low = low.cwiseMin(Vec3(at.x(), at.y(), at.z()));
+    high = high.cwiseMax(Vec3(at.x(), at.y(), at.z()));
+  }
+  const double far = kFar * (high - low).norm();
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3 way((corner & 1) != 0 ? 1 : -1, (corner & 2) != 0 ? 1 : -1, (corner & 4) != 0 ? 1 : -1);
+    points.emplace_back(point((low + high) / 2 + far * way), kGuard);
+  }
 }
 
 // (elements of the part) the elements, ascending, that each has a large facet with; nothing for elements that
@@ -155,6 +191,7 @@ std::vector<std::vector<std::uint32_t>> large_neighbours(const Part& part, const
   std::vector<std::pair<Point, std::uint32_t>> points;
   for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
     points.emplace_back(point(position[e]), e);
+  add_guards(points);
   const Delaunay delaunay(points.begin(), points.end());
   std::vector<std::vector<std::uint32_t>> neighbours(part.element_end - part.element_begin);
   if (delaunay.dimension() < 3) return neighbours;
@@ -162,7 +199,7 @@ std::vector<std::vector<std::uint32_t>> large_neighbours(const Part& part, const
   for (auto edge = delaunay.finite_edges_begin(); edge != delaunay.finite_edges_end(); ++edge) {
     const std::uint32_t a = edge->first->vertex(edge->second)->info(),
                         b = edge->first->vertex(edge->third)->info();
-    if (!holds[a] && !holds[b]) continue;
+    if (a == kGuard || b == kGuard || (!holds[a] && !holds[b])) continue;
     const Vec3 middle = (position[a] + position[b]) / 2;
     if (facet_area(delaunay, *edge, middle, kReach * spacing) < kSmallFacet * spacing * spacing) continue;
     if (holds[a]) neighbours[a - part.element_begin].push_back(b);

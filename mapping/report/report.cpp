@@ -186,7 +186,7 @@ std::vector<std::string> report_lines(const MapReport& report) {
     lines.push_back(
         share(*report.voronoi_changed, report.vertices) +
         " are held by elements whose Voronoi neighbours have changed: the paper's condition for a "
-        "valid mapping, which shear over 5 % breaks without harm");
+        "valid mapping, which shear over 2 % breaks without harm");
   if (report.far > 0)
     lines.push_back(share(report.far, report.vertices) +
                     " lie far outside the lattice and are carried rigidly");

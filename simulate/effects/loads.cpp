@@ -192,10 +192,12 @@ bool parse_follower(TableReader& reader) {
 std::vector<Vec3> load_forces(const Load& load, const std::vector<LoadedPoint>& points) {
   if (load.bearing) {
     if (auto forces = bearing(points, *load.force)) return *forces;
-    throw InputError(load.origin,
-                     fmt::format("load \"{}\": the face does not look against the bearing load all around "
-                                 "it; select the cylindrical face, and give a force across its axis",
-                                 load.name));
+    throw InputError(
+        load.origin,
+        fmt::format("load \"{}\": the face does not look against the bearing load all around "
+                    "it; select the whole cylinder (of a hole in two halves in a scene both: where = "
+                    "[\"part/3\", \"part/4\"]), and give a force across its axis",
+                    load.name));
   }
   if (auto forces = averaging_link(points, load.force.value_or(Vec3::Zero()),
                                    load.torque.value_or(Vec3::Zero()), load.at))

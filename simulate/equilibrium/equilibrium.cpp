@@ -195,6 +195,21 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   return true;
 }
 
+// What a torque does that goes on turning what it acts on, at a state in equilibrium; "" where none turns it
+// far. Its forces keep their direction, so past a right angle they turn nothing.
+std::string said_of_dead_torques(Mechanics& mechanics, const State& state) {
+  constexpr double kFar = 10 * std::numbers::pi / 180;
+  SimulateResult told;
+  mechanics.report(state, told);
+  for (const AppliedLoad& load : told.loads)
+    if (load.rotation && !load.displacement && !load.follower && load.rotation->norm() > kFar)
+      return fmt::format(
+          "; the forces of load \"{}\" keep the direction that they have at rest: follower = true in its "
+          "[[load]] (\"..., follower\" in --torque) turns them with what they act on",
+          load.name);
+  return "";
+}
+
 void LoadStepping::diverge() const {
   const MostCompressed worst = mechanics_.most_compressed(trial_);
   const Body& body = mechanics_.body();
@@ -211,11 +226,11 @@ void LoadStepping::diverge() const {
                 human_length(reach_), human_number(reach_ / diagonal, 2))
           : "Use a smaller load or move, a smaller spacing or a stiffer material; a part that buckles or "
             "snaps through has no equilibrium nearby";
-  throw DivergedError(
-      fmt::format("no equilibrium beyond {:.4g} % of the load{} (tried {:.4g} %): {}; most compressed "
-                  "is {} near {} of part \"{}\" with J = {:.3g}. {}",
-                  100 * done_, limit, 100 * trial_.share, outcome_.trouble, worst.name,
-                  point_name(worst.rest), body.parts[worst.part].name, worst.value, advice));
+  throw DivergedError(fmt::format(
+      "no equilibrium beyond {:.4g} % of the load{} (tried {:.4g} %): {}; most compressed "
+      "is {} near {} of part \"{}\" with J = {:.3g}. {}{}",
+      100 * done_, limit, 100 * trial_.share, outcome_.trouble, worst.name, point_name(worst.rest),
+      body.parts[worst.part].name, worst.value, advice, said_of_dead_torques(mechanics_, state_)));
 }
 
 // Linear over the body, in directions that no symmetry of a part is likely to have.

@@ -14,6 +14,7 @@
 #include "formats/lattice/fields.h"
 #include "formats/lattice/quadratic_field.h"
 #include "simulate/estimate/coarsen.h"
+#include "simulate/estimate/narrow_support.h"
 
 namespace flexel::simulate {
 namespace {
@@ -178,6 +179,9 @@ ErrorBars estimate_errors(const Body& body, const Scene& scene, const SimulateOp
           "{:.0f} % of the matter lies in walls under 2 cells: the bars are three times the "
           "largest difference; use a smaller spacing",
           100 * *thin);
+    } else if (const std::string narrow = support_under_two_cells(body, scene); !narrow.empty()) {
+      wide = true;
+      errors.note = narrow + ": the bars are three times the largest difference; use a smaller spacing";
     }
   } else {
     wide = true;

@@ -68,8 +68,10 @@ TEST(Answer, WithoutABarNothingIsPromised) {
   Case bare = with_bar(0.03);
   bare.result.error_bars = {};
   EXPECT_THAT(bare.text(), HasSubstr("how sure   not known"));
+  EXPECT_THAT(bare.text(), HasSubstr("how far    1.7 mm, at"));
   bare.result.error_bars.note = "part \"lever\" is one cell thick";
   EXPECT_THAT(bare.text(), HasSubstr("one cell thick"));
+  EXPECT_THAT(bare.text(), HasSubstr("how far    no more than a first guess: 1.7 mm, at"));
   bare.result.timed.emplace();
   EXPECT_THAT(bare.text(), HasSubstr("runs in time have no error bars"));
 }

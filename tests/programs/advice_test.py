@@ -182,6 +182,9 @@ def test_loads_that_do_not_do_what_they_seem_to():
     turned = says(simulate(roll.replace('"steel"', '"PLA"').replace("3000", "55"), "--no-estimate"), "its forces keep the direction", "follower = true")
     expect("of its torque is left" in turned.err, turned.err)
     silent(simulate(roll.replace('"steel"', '"PLA"').replace("3000", "55") + "follower = true\n", "--no-estimate"), "of its torque is left")
+    write("bar.stl", binary_stl(box_triangles((80, 10, 6))))
+    expect_error(run("flexel", "deform", "bar.stl", "--material", "rubber", "--fix", "xmin", "--torque", "xmax: 0 0.05 0 N m", "--size", "2 mm",
+                     "-o", "out.stl"), "flexel", "no equilibrium", 'the forces of load "xmax" keep the direction', "follower = true", code=3)
 
 
 def test_results_do_not_go_to_one_name():

@@ -1,0 +1,53 @@
+// Held regions that matter goes on beside, and their widths.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "simulate/estimate/narrow_support.h"
+
+namespace flexel::simulate {
+namespace {
+
+// Nine squares of 1 m in the plane z = 0, the middle one (number 4) at another height, with walls to it.
+Surface squares(double height) {
+  Surface surface;
+  surface.polygon_offsets = {0};
+  const auto add = [&](const std::vector<Vec3>& corners) {
+    for (const Vec3& corner : corners) {
+      surface.polygon_vertices.push_back(static_cast<std::uint32_t>(surface.vertices.size()));
+      surface.vertices.push_back(corner);
+    }
+    surface.polygon_offsets.push_back(static_cast<std::uint32_t>(surface.polygon_vertices.size()));
+    surface.polygon_face.push_back(0);
+  };
+  for (int n = 0; n < 9; ++n) {
+    const double x = n % 3, y = n / 3, z = n == 4 ? height : 0;
+    add({Vec3(x, y, z), Vec3(x + 1, y, z), Vec3(x + 1, y + 1, z), Vec3(x, y + 1, z)});
+  }
+  if (height == 0) return surface;
+  const std::vector<Vec3> rim = {Vec3(1, 1, 0), Vec3(2, 1, 0), Vec3(2, 2, 0), Vec3(1, 2, 0)};
+  const Vec3 rise(0, 0, height);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Vec3 &a = rim[i], &b = rim[(i + 1) % 4];
+    add({a, b, b + rise, a + rise});
+  }
+  return surface;
+}
+
+TEST(NarrowSupport, APatchAndThePitOfAScrewAreAmidMatterAndAnEndIsNot) {
+  const std::vector<std::uint32_t> middle = {4};
+  EXPECT_DOUBLE_EQ(width_amid_matter(squares(0), middle).value(), 0.5);     // flush
+  EXPECT_DOUBLE_EQ(width_amid_matter(squares(-0.4), middle).value(), 0.5);  // at the bottom of a pit
+  EXPECT_EQ(width_amid_matter(squares(0.4), middle), std::nullopt) << "the end of a boss";
+  std::vector<std::uint32_t> all;
+  for (std::uint32_t n = 0; n < 9; ++n) all.push_back(n);
+  EXPECT_EQ(width_amid_matter(squares(0), all), std::nullopt) << "nothing goes on beside it";
+  // A strip from side to side: flush along six of its eight edges.
+  EXPECT_DOUBLE_EQ(width_amid_matter(squares(0), {3, 4, 5}).value(), 0.75);
+  // Along one side: three of eight edges.
+  EXPECT_DOUBLE_EQ(width_amid_matter(squares(0), {0, 1, 2}).value(), 0.75);
+  EXPECT_EQ(width_amid_matter(squares(0), {0, 1, 2, 3, 4, 5, 6, 7}).has_value(), false) << "two of twelve";
+  EXPECT_EQ(width_amid_matter(squares(0), {}), std::nullopt);
+}
+
+}  // namespace
+}  // namespace flexel::simulate
