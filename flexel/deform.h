@@ -7,6 +7,7 @@
 #include "base/program/progress.h"
 #include "flexel/accuracy/accuracy_report.h"
 #include "flexel/accuracy/solved_run.h"
+#include "mapping/cad_output.h"
 #include "mapping/map_part.h"
 
 namespace flexel::commands {
@@ -17,6 +18,7 @@ struct Deformed {
   std::optional<AccuracyReport> accuracy;  // of sizes that were chosen
   std::vector<std::string> lines;          // the answer, as the command says it
   std::string summary;                     // JSON (docs/guide/deform.md)
+  std::vector<mapping::CadAnswer> cad;     // STEP, IGES and BREP files that were written
 };
 
 // Runs `flexel deform` with these arguments (without its name). -o may be left out. `part` is what stands in for the files of

@@ -226,15 +226,18 @@ Plan make_plan(const DeformArguments& arguments, const CommandLine& app) {
   return plan;
 }
 
-void write_outputs(const DeformArguments& arguments, const Plan& plan, Body& body,
-                   const mapping::MappedPart& mapped, Progress& progress) {
+// Returns what is said of CAD files.
+std::vector<mapping::CadAnswer> write_outputs(const DeformArguments& arguments, const Plan& plan, Body& body,
+                                              const mapping::MappedPart& mapped, Progress& progress) {
   progress.stage("write");
   if (!plan.crack.pieces.empty())
     write_parts(mapped.surface(body), mapped.result.displacement, plan.crack.pieces_format,
                 default_unit(body.surface), plan.crack.pieces);
   const auto cad = [](const Plan::Output& output) { return output.surface && is_cad(*output.surface); };
+  std::vector<mapping::CadAnswer> answers;
   for (const Plan::Output& output : plan.outputs)  // first, for --strict may end the run here
-    if (cad(output)) write_cad(body, mapped.report, arguments.map, plan.map, *output.surface, progress);
+    if (cad(output))
+      answers.push_back(write_cad(body, mapped.report, arguments.map, plan.map, *output.surface, progress));
   for (const Plan::Output& output : plan.outputs)
     if (cad(output) || output.is_page())  // pages come last: they say what the run said
       continue;
@@ -244,6 +247,7 @@ void write_outputs(const DeformArguments& arguments, const Plan& plan, Body& bod
       picture::write_bent_picture(body, output.path, progress);
     else
       write_body(body, output.path);
+  return answers;
 }
 
 simulate::SimulateOptions simulate_options(const DeformArguments& arguments, const Plan& plan) {
@@ -619,7 +623,8 @@ std::optional<FlexAnswer> flex_answer(const SolvedRun& run, const Plan& plan,
 
 std::string summary_text(const SolvedRun& run, const mapping::MapReport& mapped, const Plan& plan,
                          const std::optional<AccuracyReport>& accuracy,
-                         const std::optional<FlexAnswer>& flexed) {
+                         const std::optional<FlexAnswer>& flexed,
+                         const std::vector<mapping::CadAnswer>& cad) {
   nlohmann::ordered_json summary;
   summary["voxelize"] = nlohmann::ordered_json::parse(voxelize::summary_json(run.voxels));
   summary["simulate"] = nlohmann::ordered_json::parse(simulate::summary_json(run.simulated, run.voxels.body));
@@ -629,12 +634,16 @@ std::string summary_text(const SolvedRun& run, const mapping::MapReport& mapped,
     summary["flex"] = {{"angle", flexed->angle}, {"angle_asked", plan.job.flex->angle}};
     if (flexed->volume_change) summary["flex"]["volume_change"] = *flexed->volume_change;
   }
+  for (const mapping::CadAnswer& each : cad)
+    summary["cad"].push_back(nlohmann::ordered_json::parse(each.json));
   return summary.dump(2) + "\n";
 }
 
-// What is said at the end. `infill`: estimates for infill too, where nobody has said them.
+// What is said at the end. `infill`: estimates for infill too, where nobody has said them. The last one says what to do
+// next.
 std::vector<std::string> last_lines(const SolvedRun& run, const Plan& plan,
-                                    const std::optional<AccuracyReport>& accuracy, bool infill) {
+                                    const std::optional<AccuracyReport>& accuracy, bool infill,
+                                    const std::vector<mapping::CadAnswer>& cad) {
   const Body& body = run.voxels.body;
   std::vector<std::string> lines;
   const std::vector<simulate::Material> materials = known_materials(plan.job.scene, body);
@@ -645,6 +654,7 @@ std::vector<std::string> last_lines(const SolvedRun& run, const Plan& plan,
   for (const std::string& line :
        answer_lines(run.simulated, body, materials, next_step(run, accuracy), "--size"))
     lines.push_back(line);
+  for (const mapping::CadAnswer& each : cad) lines.insert(lines.end() - 1, "faces      " + each.line);
   return lines;
 }
 
@@ -675,7 +685,7 @@ void say_dropped_model(const AccuracyReport& accuracy, Progress& progress) {
 Deformed run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress) {
   const KeptWarnings warnings;  // for the pages
   Deformed result;
-  auto& [run, mapped, accuracy, lines, summary] = result;
+  auto& [run, mapped, accuracy, lines, summary, cad] = result;
   {
     const BriefOutput brief(!arguments.verbose);
     run = solve(arguments, plan, accuracy, progress);
@@ -704,7 +714,7 @@ Deformed run_stages(const DeformArguments& arguments, Plan& plan, Progress& prog
     const BriefOutput brief(!arguments.verbose);
     try {
       write_report(found, arguments.map, plan.map, arguments.map.report);
-      write_outputs(arguments, plan, body, mapped, progress);
+      cad = write_outputs(arguments, plan, body, mapped, progress);
     } catch (const InvalidMappingError&) {
       outputs.appear();
       throw;
@@ -717,10 +727,10 @@ Deformed run_stages(const DeformArguments& arguments, Plan& plan, Progress& prog
     progress.finish();
   }
   const std::optional<FlexAnswer> flexed = flex_answer(run, plan, mapped, progress);
-  summary = summary_text(run, found, plan, accuracy, flexed);
+  summary = summary_text(run, found, plan, accuracy, flexed, cad);
   if (!arguments.summary.empty()) write_text(summary, arguments.summary);
   // With --verbose simulate() has said what infill is.
-  lines = last_lines(run, plan, accuracy, accuracy || !arguments.verbose);
+  lines = last_lines(run, plan, accuracy, accuracy || !arguments.verbose, cad);
   if (flexed) lines.push_back(flex_line(*plan.job.flex, *flexed));
   const std::optional<view::PageTooLarge> missing =
       write_pages(arguments, plan, body, {warnings.lines(), lines, summary}, progress);

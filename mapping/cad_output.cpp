@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/files/output_file.h"
@@ -106,6 +107,40 @@ std::vector<std::string> faults(const CadWritten& written, const MapReport& foun
   return lines;
 }
 
+std::string line_of(const CadWritten& written, const std::string& title) {
+  const std::string others =
+      written.kept == written.faces
+          ? "all as before, moved"
+          : fmt::format("{} as before, the others within {} of the deformation{}", written.kept,
+                        human_length(written.deviation),
+                        written.deviation_face.empty() ? "" : " (" + written.deviation_face + ")");
+  return fmt::format("{}: {} of {}, {}; {}", title, counted(written.solids, "solid"),
+                     counted(written.faces, "face"), others,
+                     written.invalid.empty() ? "valid, also when read again" : "not valid");
+}
+
+std::string json_of(const CadWritten& written, const MapOutput& output) {
+  nlohmann::ordered_json json = {{"file", output.path},
+                                 {"format", output.format->file->name},
+                                 {"solids", written.solids},
+                                 {"faces", written.faces},
+                                 {"faces_kept", written.kept},
+                                 {"tolerance", written.tolerance},
+                                 {"deviation", written.deviation},
+                                 {"deviation_face", written.deviation_face},
+                                 {"missed", nlohmann::ordered_json::array()},
+                                 {"folded", written.folded},
+                                 {"valid", written.invalid.empty()},
+                                 {"invalid", written.invalid},
+                                 {"invalid_before", written.invalid_before},
+                                 {"largest_gap", written.gap},
+                                 {"volume_before", written.volume_before},
+                                 {"volume_after", written.volume}};
+  for (const CadFace& face : written.missed)
+    json["missed"].push_back({{"face", face.name}, {"deviation", face.deviation}});
+  return json.dump();
+}
+
 ChildLimits limits_of(const Body& body) {
   double bytes = 0;
   for (const SurfaceSource& source : body.surface.sources) bytes += static_cast<double>(source.bytes.size());
@@ -127,8 +162,8 @@ void check_cad_output(const MapArguments& arguments, const CrackOptions& crack, 
     throw InputError("--attributes: STEP, IGES and BREP have no vertices: write .vtu or PLY");
 }
 
-void write_cad(const Body& body, const MapReport& found, const MapArguments& arguments,
-               const MapOptions& options, const MapOutput& output, Progress& progress) {
+CadAnswer write_cad(const Body& body, const MapReport& found, const MapArguments& arguments,
+                    const MapOptions& options, const MapOutput& output, Progress& progress) {
   const std::string title(output.format->file->title);
   for (const SurfaceSource& source : body.surface.sources)
     if (!is_cad(source) || source.bytes.empty())
@@ -156,15 +191,9 @@ void write_cad(const Body& body, const MapReport& found, const MapArguments& arg
   OutputFile file(output.path);
   file.write(written.file.data(), written.file.size());
   file.commit();
-  const std::string others =
-      written.kept == written.faces
-          ? "all as before, moved"
-          : fmt::format("{} as before, the others within {} of the deformation{}", written.kept,
-                        human_length(written.deviation),
-                        written.deviation_face.empty() ? "" : " (" + written.deviation_face + ")");
-  progress.say(fmt::format("{}: {} of {}, {}; {}", title, counted(written.solids, "solid"),
-                           counted(written.faces, "face"), others,
-                           written.invalid.empty() ? "valid, also when read again" : "not valid"));
+  CadAnswer answer{line_of(written, title), json_of(written, output)};
+  progress.say(answer.line);
+  return answer;
 }
 
 }  // namespace flexel::mapping

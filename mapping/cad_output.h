@@ -1,5 +1,7 @@
 // Writes the part's own CAD file, deformed: exact faces, not triangles.
 #pragma once
+#include <string>
+
 #include "base/program/progress.h"
 #include "formats/lattice/body.h"
 #include "mapping/crack/crack.h"
@@ -13,10 +15,16 @@ namespace flexel::mapping {
 // read.
 void check_cad_output(const MapArguments& arguments, const CrackOptions& crack, bool any_cad);
 
+// Of a file that was written.
+struct CadAnswer {
+  std::string line;  // as the programs say it
+  std::string json;  // an object (docs/guide/deform.md)
+};
+
 // STEP, IGES or BREP of `body`, whose sources hold its CAD files: each face is fitted to the deformation that `options`
 // name, and what was made is measured, checked, read again and told. Throws InputError: a part that is a mesh, or that
 // broke; InvalidMappingError, and nothing is written: a face or solid is not as it should be, with --strict.
-void write_cad(const Body& body, const MapReport& found, const MapArguments& arguments,
-               const MapOptions& options, const MapOutput& output, Progress& progress);
+CadAnswer write_cad(const Body& body, const MapReport& found, const MapArguments& arguments,
+                    const MapOptions& options, const MapOutput& output, Progress& progress);
 
 }  // namespace flexel::mapping

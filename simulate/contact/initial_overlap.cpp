@@ -17,7 +17,6 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr double kBorne = 0.05;        // spacings, of penetration that contact bears
 constexpr double kSearched = 4;        // spacings, of penetration that is searched for
 constexpr double kReleased = 0.9;      // of the depth at which two surfaces do not act on each other any more
 constexpr double kFacingCosine = 0.5;  // cosine from which surfaces face each other
@@ -128,7 +127,7 @@ std::vector<std::uint8_t> OverlapCheck::inside(const std::vector<std::uint32_t>&
   std::vector<Vec3> at;
   Box box;
   for (const std::uint32_t i : points) {
-    at.push_back(now_[i].side.position - 1.01 * kBorne * point(i).width * now_[i].side.normal);
+    at.push_back(now_[i].side.position - 1.01 * kTouchingDepth * point(i).width * now_[i].side.normal);
     box.add(at.back());
   }
   double reach = 0;
@@ -234,7 +233,7 @@ void OverlapCheck::refuse_planes(std::size_t known, const std::string& when) con
     if (point(i).part < known || surface_.prescribed(point(i).part)) continue;
     for (const ContactPlane& plane : settings_.planes)
       if (const double depth = point(i).radius - (now_[i].side.position - plane.point).dot(plane.normal);
-          depth > kBorne * point(i).width)
+          depth > kTouchingDepth * point(i).width)
         refuse_overlapping(
             fmt::format("part \"{}\" begins inside {}", body_.parts[point(i).part].name, plane.name), depth,
             false, when, advice(0, 0));
@@ -261,7 +260,7 @@ void OverlapCheck::refuse_parts(std::size_t known, const std::string& when) cons
       const Depth found = deepest({a, b}, common);
       const double spacing =
           std::min(body_.parts[a].lattice.spacing.mean(), body_.parts[b].lattice.spacing.mean());
-      const double borne = settings_.release_time > 0 ? found.most : kBorne * spacing;
+      const double borne = settings_.release_time > 0 ? found.most : kTouchingDepth * spacing;
       if (found.depth > borne)
         refuse_overlapping(
             fmt::format("parts \"{}\" and \"{}\" overlap", body_.parts[a].name, body_.parts[b].name),

@@ -59,6 +59,35 @@ def test_a_bolt_and_a_plate_are_bonded_or_in_contact_as_the_scene_says():
     expect(abs(moved(bonded, 1, plate, bolt) - 1) < .2, "[[bond]] holds them in spite of contact")
 
 
+FITTED = BOLTED.replace("0, 0, 7, 4", "0, 0, 7, 3").replace("bolted.step", "fitted.step")
+
+PRESSED = """material = "PLA"
+contact = true
+[[fix]]
+where = "PLATE/xmin"
+[[fix]]
+where = "PLATE/xmax"
+[[load]]
+where = "BOLT/zmax"
+force = ["0 N", "0 N", "-20 N"]
+"""
+
+
+def test_a_bolt_that_fills_its_hole_is_no_press_fit():
+    need_step()
+    need("gmsh")
+    write("fitted.geo", FITTED)
+    run("gmsh", "fitted.geo", "-0", "-v", "1")
+    expect_ok(run("flexel-voxelize", "fitted.step", "--size", "2 mm", "-o", "body.vtu"))
+    scene("press.toml", PRESSED.replace("PLATE", "fitted").replace("BOLT", "fitted-2"))
+    expect_ok(run("flexel-simulate", "press.toml", "body.vtu", "-o", "pressed.vtu", "--no-estimate", "--summary", "s.json"))
+    found = json.loads(pathlib.Path("s.json").read_text())
+    left, right = (each["force"] for each in found["reactions"])
+    expect(abs(left[2] + right[2] - 20) < .1, f"the ends bear the load: {left} {right}")
+    # of 20 N in the middle between clamped ends; the rims of the hole pressed with over 100 N
+    expect(abs(left[0]) < 20 and abs(right[0]) < 20, f"the bolt does not press the ends apart: {left} {right}")
+
+
 def test_names_of_assemblies_stand_for_their_parts():
     need_step()
     part = PARTS / "as1-oc-214.stp"

@@ -59,6 +59,21 @@ def test_the_same_faces_come_back_bent():
     expect(pathlib.Path("bent.step").read_text().count("AUTOMOTIVE_DESIGN") == pathlib.Path("bracket.step").read_text().count("AUTOMOTIVE_DESIGN"), "schema")
 
 
+def test_one_run_tells_the_faces_it_wrote():
+    part = bracket()
+    said = expect_ok(run("flexel", "deform", part, "--material", "pla", "--fix", "bracket/1", "--push", "bracket/2: 0 0 -200 N", "--size", "4mm", "--no-estimate", "-o", "bent.step",
+                         "-o", "bent.brep", "--summary", "summary.json")).err
+    lines = re.findall(r"faces +(STEP|BREP): 1 solid of 11 faces, (\d+) as before, the others within (\S+) (\S+) of the deformation \(bracket/(\d+)\); valid, also when read again", said)
+    expect([each[0] for each in lines] == ["STEP", "BREP"], said)
+    found = json.loads(pathlib.Path("summary.json").read_text())["cad"]
+    for line, file in zip(lines, found, strict=True):
+        metres = float(line[2]) * {"nm": 1e-9, "um": 1e-6, "mm": 1e-3}[line[3]]
+        expect(abs(file["deviation"] / metres - 1) < 0.01 and file["deviation_face"] == f"bracket/{line[4]}", f"{line} {file}")
+        expect(file["faces_kept"] == int(line[1]) and file["deviation"] <= file["tolerance"] and file["valid"] and not file["missed"], f"{file}")
+        expect(pathlib.Path(file["file"]).suffix[1:] == file["format"], f"{file}")
+        expect(abs(file["volume_after"] * 1e9 / volume(file["file"]) - 1) < 1e-3, f"{file}")
+
+
 def test_corners_are_where_points_go():
     """flexel-map --points moves the corners without any CAD library."""
     bent()

@@ -142,6 +142,63 @@ TEST(Contact, BlocksThatLieFlushFeelNothing) {
   EXPECT_LT(contacts.energy(starting_at_rest(body)), 1e-20);
 }
 
+// A prism of `sides` sides about the z-axis, within `body`; hollow where `inner` [m] is above 0.
+Body prism(Body body, std::uint32_t sides, double radius, double inner, double low, double high) {
+  std::vector<Vec3> vertices;
+  for (const double r : inner > 0 ? std::vector{radius, inner} : std::vector{radius})
+    for (const double z : {low, high})
+      for (std::uint32_t n = 0; n < sides; ++n) {
+        const double angle = 2 * std::numbers::pi * n / sides;
+        vertices.emplace_back(r * std::cos(angle), r * std::sin(angle), z);
+      }
+  std::vector<std::vector<std::uint32_t>> polygons;
+  std::vector<std::uint32_t> below, above;
+  for (std::uint32_t n = 0; n < sides; ++n) {
+    const std::uint32_t next = (n + 1) % sides, up = sides, in = 2 * sides;
+    polygons.push_back({n, next, next + up, n + up});
+    above.push_back(n + up);
+    below.insert(below.begin(), n);
+    if (!(inner > 0)) continue;
+    polygons.push_back({n + in, n + in + up, next + in + up, next + in});
+    polygons.push_back({n + up, next + up, next + in + up, n + in + up});
+    polygons.push_back({n, n + in, next + in, next});
+  }
+  if (!(inner > 0)) polygons.insert(polygons.end(), {below, above});
+  return within_block(std::move(body), vertices, polygons);
+}
+
+// Facets of one reach into the other, and the rims of the hole lie behind the planes of the pin's patches beside them.
+TEST(Contact, APinThatFillsAHoleFeelsNothingUntilItIsPushed) {
+  for (const double radius : {1.6 * kSide, 2.7 * kSide}) {
+    Body body = prism(block("plate", {12, 12, 4}, Vec3(-6 * kSide, -6 * kSide, -0.5 * kSide)), 18, 5 * kSide,
+                      radius, 0, 3 * kSide);
+    append(body, prism(block("pin", {8, 8, 8}, Vec3(-4 * kSide, -4 * kSide, -2.5 * kSide)), 16, radius, 0,
+                       -1.2 * kSide, 4.1 * kSide));
+    const Problem problem = problem_of(body);
+    Contacts contacts(all_parts(body), problem);
+    State state = starting_at_rest(body);
+    const auto force_on_pin = [&](const Vec3& shift) {
+      for (std::uint32_t e = body.parts[1].element_begin; e < body.parts[1].element_end; ++e)
+        state.displacement[e] = shift;
+      std::vector<Vec3> forces(body.element_count(), Vec3::Zero());
+      contacts.add_forces(state, forces);
+      Vec3 sum = Vec3::Zero();
+      for (std::uint32_t e = body.parts[1].element_begin; e < body.parts[1].element_end; ++e)
+        sum += forces[e];
+      return sum;
+    };
+    constexpr double kPush = 0.05 * kSide;
+    const double at_rest = force_on_pin(Vec3::Zero()).norm(), stored = contacts.energy(state);
+    const double pushed = -force_on_pin(Vec3(kPush, 0, 0)).x();
+    // penalty 3 E / h over the half of the wall that it is pushed against, with the square of the cosine
+    const double expected = 3 * kGum.young / kSide * kPush * 0.5 * std::numbers::pi * radius * 3 * kSide;
+    EXPECT_GT(pushed, 0.5 * expected) << radius;
+    EXPECT_LT(pushed, 1.5 * expected) << radius;
+    EXPECT_LT(at_rest, 1e-6 * pushed) << radius;
+    EXPECT_LT(stored, 1e-6 * pushed * kPush) << radius;
+  }
+}
+
 // The sides of a block that is pressed and slides out look at each other while they are far inside: the way
 // out gives no more than the pressing took.
 TEST(Contact, ABlockThatSlidesOutFromUnderAnotherIsNotThrown) {

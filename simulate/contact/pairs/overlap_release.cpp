@@ -38,7 +38,8 @@ std::uint32_t OverlapRelease::later_part(const ContactPair& pair) const {
 }
 
 double OverlapRelease::allowed(const ContactPair& pair, const PairRecord& record) const {
-  return record.penetration > 0 && !shares_.empty() ? shares_[later_part(pair)] * record.penetration : 0;
+  return record.penetration > 0 && !shares_.empty() ? shares_[later_part(pair)] * record.penetration
+                                                    : pair.rest_overlap;
 }
 
 // Of a pair's first point: a part, or numbered behind them a plane.

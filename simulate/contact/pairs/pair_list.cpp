@@ -7,9 +7,9 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr double kSkin = 0.4;  // margin, of the widest spacing
-constexpr double kSlack =
-    0.45;  // of the margin; not quite half: weights outside [0, 1] carry a point further
+constexpr double kSkin = 0.4;     // margin, of the widest spacing
+constexpr double kSlack = 0.45;   // of the margin; not quite half: weights
+                                  // outside [0, 1] carry a point further
 constexpr double kTurning = 0.4;  // by which the cosine between normals may change meanwhile
 
 // m, at most, between positions of two points that touch.
@@ -53,9 +53,9 @@ double PairList::way(const State& before, const State& aimed) const {
   return moves.diagonal();
 }
 
-// Half the diagonal of the box of the moves since the list was made bounds them but for a common one. The next
-// step's are in their box widened by that of the velocities: the length of a step is chosen before it leads to
-// an impact.
+// Half the diagonal of the box of the moves since the list was made bounds them
+// but for a common one. The next step's are in their box widened by that of the
+// velocities: the length of a step is chosen before it leads to an impact.
 bool PairList::is_due(const State& state, bool ahead, double way) {
   constexpr std::size_t kGrain = 1024;
   boxes_.assign((surface_runs_.size() + kGrain - 1) / kGrain, {});
@@ -122,8 +122,9 @@ void PairList::build(const State& state) {
   number_points();
 }
 
-// Of parts that may touch themselves or whose boxes are near one another. Where there are none, more slack:
-// `farthest` [m] bounds the distance of two points that touch.
+// Of parts that may touch themselves or whose boxes are near one another. Where
+// there are none, more slack: `farthest` [m] bounds the distance of two points
+// that touch.
 std::vector<std::uint32_t> PairList::points_of_near_parts(const std::vector<Vec3>& positions,
                                                           double farthest) {
   const std::vector<ContactPoint>& points = surface_.points();
@@ -131,7 +132,8 @@ std::vector<std::uint32_t> PairList::points_of_near_parts(const std::vector<Vec3
   for (std::size_t i = 0; i < points.size(); ++i) box[points[i].part].add(positions[i]);
   std::vector<std::uint8_t> near(box.size(), 0);
   for (std::uint32_t p = 0; p < near.size(); ++p) near[p] = settings_.self && !surface_.rigid(p);
-  double nearest = std::numeric_limits<double>::infinity();  // m, between boxes that are apart
+  double nearest = std::numeric_limits<double>::infinity();  // m, between boxes
+                                                             // that are apart
   for (std::size_t a = 0; a < box.size(); ++a)
     for (std::size_t b = a + 1; b < box.size(); ++b) {
       if (box[a].empty() || box[b].empty()) continue;
@@ -161,6 +163,30 @@ bool PairList::may_touch(std::uint32_t i, std::uint32_t j, const std::vector<Vec
   return !excluded_.contains(i, j);
 }
 
+// Of curved surfaces that fit each other, which patches show as facets. Where
+// two faces lie flush or overlap, their normals are opposite, and what overlaps
+// presses. A face has its plane alone: the rim of a hole is behind the planes
+// of the patches beside it on the pin, within a spacing and at up to 60
+// degrees; beyond `hard` such a pair exerts no force (PairPhase::penetrated).
+double PairList::rest_overlap(std::uint32_t i, std::uint32_t j, const PairConstants& constants) const {
+  constexpr double kOpposite = 0.9998;  // cosine of 1 degree
+  constexpr double kBending = 0.6;      // tangent of half of 60 degrees and a little
+  const ContactPoint &a = surface_.points()[i], &b = surface_.points()[j];
+  const bool balls = a.shape == ContactShape::ball || b.shape == ContactShape::ball;
+  if (settings_.release_time > 0 || a.part == b.part || balls) return 0;
+  const ContactSide of_a = surface_.at(i, Vec3::Zero(), CellShape{}).side,
+                    of_b = surface_.at(j, Vec3::Zero(), CellShape{}).side;
+  const PairState rest = pair_state(of_a, of_b, constants);
+  if (!rest.near || rest.deep || !(rest.gap < 0) || -of_a.normal.dot(of_b.normal) > kOpposite) return 0;
+  const double opposite = std::clamp(-of_a.normal.dot(of_b.normal), 0.0, 1.0);
+  const bool edge = a.shape == ContactShape::edge || b.shape == ContactShape::edge;
+  const double bending =
+      edge ? kBending : std::sqrt((1 - opposite) / (1 + opposite));  // tan of half the angle
+  const double most = std::min(kTouchingDepth * std::min(a.width, b.width) + bending * rest.offset.norm(),
+                               constants.law.hard);
+  return -rest.gap <= most ? -rest.gap : 0;
+}
+
 void PairList::add_pairs(const std::vector<Vec3>& positions, const std::vector<Vec3>& normals) {
   const double widest = surface_.widest();
   double farthest = 0;  // that any two points touch over
@@ -177,7 +203,9 @@ void PairList::add_pairs(const std::vector<Vec3>& positions, const std::vector<V
   for (std::uint32_t a = 0; a < in_grid.size(); ++a)
     for (const std::uint32_t b : found.of(a)) {
       const std::uint32_t i = in_grid[a], j = in_grid[b];
-      pairs_.push_back({i, j, 0, std::uint64_t{i} << 32 | j, materials_.between(i, j)});
+      const PairProperties properties = materials_.between(i, j);
+      pairs_.push_back(
+          {i, j, 0, std::uint64_t{i} << 32 | j, properties, rest_overlap(i, j, properties.constants)});
     }
 }
 
@@ -191,7 +219,7 @@ void PairList::add_plane_pairs(const std::vector<Vec3>& positions, const std::ve
       if (normals[i] != Vec3::Zero() && -normals[i].dot(plane.normal) < points[i].facing_from - turning())
         continue;
       pairs_.push_back({i, ContactPair::kOfPlane, p, std::uint64_t{i} << 32 | (points.size() + p),
-                        materials_.against_plane(i, plane)});
+                        materials_.against_plane(i, plane), 0});
     }
   }
 }

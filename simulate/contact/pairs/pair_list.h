@@ -15,6 +15,9 @@ struct ContactPair {
   std::uint32_t plane = 0;
   std::uint64_t key = 0;  // contact points, i << 32 | j; a plane is numbered behind the last point
   PairProperties properties;
+  // m, penetration at rest of two parts that presses nothing: where curved surfaces touch, their patches overlap. 0 where
+  // initial penetrations are released.
+  double rest_overlap = 0;
 
   [[nodiscard]] bool of_plane() const { return j == kOfPlane; }
 };
@@ -61,6 +64,7 @@ class PairList {
                                                                 double farthest);
   [[nodiscard]] bool may_touch(std::uint32_t i, std::uint32_t j, const std::vector<Vec3>& positions,
                                const std::vector<Vec3>& normals) const;
+  [[nodiscard]] double rest_overlap(std::uint32_t i, std::uint32_t j, const PairConstants& constants) const;
   void add_pairs(const std::vector<Vec3>& positions, const std::vector<Vec3>& normals);
   void add_plane_pairs(const std::vector<Vec3>& positions, const std::vector<Vec3>& normals);
   void number_points();

@@ -10,6 +10,9 @@
 
 namespace flexel::simulate {
 
+// Spacings: parts that begin in each other by no more are not refused.
+inline constexpr double kTouchingDepth = 0.05;
+
 // A rigid half-space at rest.
 struct ContactPlane {
   Vec3 point = Vec3::Zero();            // m
