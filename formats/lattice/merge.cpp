@@ -49,6 +49,10 @@ void append(Body& body, Body other) {
   std::vector<FusedPoint> fused = fused_points(body), others_fused = fused_points(other);
   for (FusedPoint& point : others_fused)
     for (std::uint32_t& e : point.elements) e += elements;
+  std::vector<StuckPlaces> stuck = stuck_places(body), others_stuck = stuck_places(other);
+  for (StuckPlaces& places : others_stuck)
+    for (const std::size_t part : {std::size_t{0}, std::size_t{7}})
+      if (places[part] >= 0) places[part] += static_cast<double>(parts);
   append_columns(body.element_columns, other.element_columns, "element");
   append_columns(body.cell_columns, other.cell_columns, "cell");
   for (Part part : other.parts) {
@@ -76,6 +80,8 @@ void append(Body& body, Body other) {
   fused.insert(fused.end(), others_fused.begin(), others_fused.end());
   for (const auto& [key, note] : other.notes) body.notes.try_emplace(key, note);
   set_fused_points(body, fused);
+  stuck.insert(stuck.end(), others_stuck.begin(), others_stuck.end());
+  set_stuck_places(body, stuck);
 }
 
 }  // namespace flexel

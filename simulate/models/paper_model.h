@@ -24,7 +24,7 @@ struct ConnectionMemory {
 
 class PaperModel {
  public:
-  // Keeps a reference to the problem's body.
+  // Keeps a reference to the problem's body. Throws InputError: a column of connections is damaged.
   explicit PaperModel(const Problem& problem);
 
   [[nodiscard]] const ConnectionRows& rows() const { return rows_; }
@@ -43,6 +43,8 @@ class PaperModel {
   // of a swing is sum_c 1/2 (u_a - u_b) k_c (u_a - u_b) <= sum_e u_e B_e u_e, hence omega^2 <= 2 max eig(B_e)
   // / m_e. `mass` (elements) [kg].
   [[nodiscard]] std::vector<double> frequencies(const State& state, const std::vector<double>& mass) const;
+  // Adds minus the derivative of the damping by the velocities [N s/m], which resists them.
+  void add_damping_matrix(const State& state, const std::vector<double>& damping, BlockMatrix& matrix) const;
   // Adds the tangent. With `project` without the negative part that compressed connections have.
   void add_stiffness(const State& state, bool project, BlockMatrix& matrix) const;
 
@@ -62,6 +64,10 @@ class PaperModel {
   [[nodiscard]] Stretch stretched(const State& state, std::uint32_t element,
                                   const ConnectionRows::Entry& entry) const;
   [[nodiscard]] double stiffness(std::uint32_t element, const ConnectionRows::Entry& entry) const;
+  // What the body's columns make of the time of its damping: a factor.
+  [[nodiscard]] double damping_factor(const ConnectionRows::Entry& entry) const {
+    return damping_factor_.empty() ? 1 : damping_factor_[place(entry)];
+  }
   // Its place among the entries of the rows.
   [[nodiscard]] std::size_t place(const ConnectionRows::Entry& entry) const {
     return static_cast<std::size_t>(&entry - rows_.entries.data());
@@ -81,7 +87,8 @@ class PaperModel {
   std::vector<std::uint32_t> part_;  // (elements)
   std::vector<std::uint8_t> active_;
   ConnectionMemory memory_;
-  std::vector<double> factor_;  // (entries of rows_) of the Hooke constant; empty: none
+  // (entries of rows_) of the Hooke constant, and of the time of the damping; empty: 1
+  std::vector<double> factor_, damping_factor_;
 };
 
 }  // namespace flexel::simulate
